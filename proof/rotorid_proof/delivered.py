@@ -1,4 +1,4 @@
-"""What was taken home, asked of every kind of set: nothing worse elsewhere, a body, hovers, flies everywhere."""
+"""What was taken home, asked of every kind of set: how well it predicts, whether it hovers and flies everywhere."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import traceback
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from rotorid.errors import InputError
@@ -23,6 +24,12 @@ from rotorid.vehicle.exports.forms import FORMS
 
 ENGINES = {"rotorpy": "rotorpy", "mjcf": "mujoco", "gym-pybullet-drones": "pybullet"}
 """Form of an export to the module that flies it."""
+CANDIDATES = ("believed", "refitted", "named", "believed+d", "refitted+d", "named+d")
+"""Vehicles that may be delivered; with `+d` with derivatives."""
+STAGES = ("refitted", "named", "after", "noise")
+"""Errors on runs held out, in the geometric mean over channels of force and moment over the believed vehicle's."""
+WORSE = 1.05
+"""Error over the better of the believed and the refitted vehicle's from which a channel is worse."""
 COLUMNS = (
     "set",
     "kind",
@@ -30,9 +37,12 @@ COLUMNS = (
     "vehicle",
     "conditions",
     "instruments",
-    "withheld",
-    "withheld_values",
-    "worse_elsewhere",
+    "chosen",
+    "not_delivered",
+    *(f"score_{name}" for name in CANDIDATES),
+    *(f"held_out_{stage}" for stage in STAGES),
+    "channels",
+    "channels_worse",
     "unfit",
     "not_exported",
     "not_flown_by",
@@ -70,9 +80,10 @@ def row_of(recordings: RecordingSet, analysis: Analysis, verdict: Verdict) -> di
             place: " ".join(f.id for f in delivered(analysis, place))
             for place in ("vehicle", "conditions", "instruments")
         },
-        "withheld": "; ".join(f"{f.id}: {f.withheld}" for f in analysis.findings if f.withheld),
-        "withheld_values": "; ".join(f"{name}: {why}" for name, why in analysis.withheld_values.items()),
-        "worse_elsewhere": "; ".join(analysis.worse_elsewhere),
+        "chosen": candidate_name(verdict.delivered.model, verdict.delivered.derivatives),
+        "not_delivered": "; ".join(f"{f.id}: {f.withheld}" for f in analysis.findings if f.withheld),
+        **{f"score_{candidate_name(s.model, s.derivatives)}": s.score for s in verdict.delivered.scores},
+        **held_out_errors(verdict),
         "unfit": question_of(analysis.believed, analysis.recordings.runs)[0](vehicle) if flies else "",
         "not_exported": " ".join(refused_by(vehicle)) if flies else "",
         "not_flown_by": " ".join(not_flown_by(vehicle)) if flies else "",
@@ -80,6 +91,27 @@ def row_of(recordings: RecordingSet, analysis: Analysis, verdict: Verdict) -> di
         "doubts": " ".join(d.what for d in verdict.doubts),
         "failed": "",
     }
+
+
+def candidate_name(model: str, derivatives: bool) -> str:
+    """Name of a candidate as in CANDIDATES."""
+    return f"{model}+d" if derivatives else model
+
+
+def held_out_errors(verdict: Verdict) -> dict[str, float | int]:
+    """Errors of each stage in the geometric mean over channels, over the believed vehicle's; channels made worse."""
+    rows = []
+    for name, channel in verdict.channels.items():
+        e = channel.rmse.held_out
+        if name.split("_")[0] in ("force", "moment") and e.before and None not in (e.refitted, e.named, e.after):
+            rows.append([x / e.before for x in (e.refitted, e.named, e.after, channel.noise_floor or np.nan)])
+    if not rows:
+        return {"channels": 0}
+    table = np.array(rows)
+    means = np.exp(np.nanmean(np.log(np.maximum(table, 1e-9)), axis=0))
+    worse = table[:, 2] > WORSE * np.minimum(1.0, table[:, 0])
+    stages = {f"held_out_{stage}": round(float(m), 4) for stage, m in zip(STAGES, means, strict=True)}
+    return {**stages, "channels": len(rows), "channels_worse": int(worse.sum())}
 
 
 def not_flown_by(vehicle: Vehicle) -> list[str]:

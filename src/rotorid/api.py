@@ -229,7 +229,9 @@ def simulate(vehicle: Believed, seconds: float = 20.0, flights: int = 2, seed: i
 
 
 def export(vehicle: Believed, to: str) -> Exported:
-    """The vehicle for another tool (`rotorid export`): its `text`, and `left_out`, what it cannot express."""
+    """The vehicle for another tool (`rotorid export`): its `text`, `companions` (files next to it), and `left_out`.
+
+    The last is what it cannot express."""
     return export_vehicle(vehicle_from(vehicle), to)
 
 

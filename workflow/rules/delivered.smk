@@ -1,7 +1,7 @@
 """What is delivered, put to the test: `snakemake --cores 2 delivered`.
 
-Every public set, the sets of the campaign and a share of the concealed ones: is any channel worse where the model was
-not fitted, does the vehicle hover, is it a body, does every engine that is installed fly it.
+Every public set, the sets of the campaign and a share of the concealed ones: what error is left on the runs held out,
+is any channel worse there, does the vehicle hover, is it a body, does every engine that is installed fly it.
 """
 
 DELIVERED_SETS = {Path(folder).name: folder for folder in [*BENCH_SETS.values(), *STAND_SETS.values()]}

@@ -1,7 +1,7 @@
-"""What is delivered of one set or of every set below a folder, and whether it passes its own gate.
+"""What is delivered of one set or of every set below a folder, how well it predicts, and whether it flies.
 
 - Reads recording sets, runs the mismatch stage on each.
-- Writes a row a set: what stands in each file, what the gate withheld, what fails all the same.
+- Writes a row a set: what stands in each file, every candidate's number, errors on runs held out, what does not fly.
 """
 
 import json

@@ -19,8 +19,9 @@ def export(
 ) -> None:
     """Write the vehicle, with its effects as far as the form knows them, for another tool.
 
-    What the form cannot express is named, on the screen and in the file. Where the tool is installed the vehicle is
-    flown there and compared with ours first: a file that the tool does not read is not written.
+    What the form cannot express is named, on the screen and in the file. Derivatives that the tool can add in its own
+    step are a further file next to it. Where the tool is installed the vehicle is flown there and compared with ours
+    first: a file that the tool does not read is not written.
 
     Example: `rotorid export flights-verdict/improved_vehicle.yaml --to rotorpy`
     """
@@ -34,9 +35,12 @@ def export(
         exported = export_vehicle(vehicle, to)
         flown = try_out(vehicle, to, exported)
         path = out or Path(exported.file_name)
-        with all_or_none(path) as (part,):
-            part.write_text(exported.text, encoding="utf-8")
-        typer.echo(f"{path}: written for {to}")
+        texts = {path: exported.text} | {path.parent / name: text for name, text in exported.companions.items()}
+        with all_or_none(*texts) as parts:
+            for part, text in zip(parts, texts.values(), strict=True):
+                part.write_text(text, encoding="utf-8")
+        for written in texts:
+            typer.echo(f"{written}: written for {to}")
         for sentence in exported.left_out:
             typer.echo(f"  - not expressed: {sentence}")
         if flown:

@@ -64,6 +64,7 @@ def verdict(
     `rotorid verdict flights --ci --max-unexplained 20% --no-doubts`
     """
     with one_sentence():
+        from rotorid.mismatch.tell.steps import steps_sentence
         from rotorid.recordings.importers.logfile import is_bag
 
         start, limit = time.monotonic(), share_of(max_unexplained)
@@ -90,6 +91,8 @@ def verdict(
             for line in (*(d.sentence for d in found.doubts), *found.warnings):
                 typer.echo(f"! {line}")
             typer.echo(found.sentence)
+            if steps := steps_sentence(found):
+                typer.echo(steps)
             others = ", ".join(sorted(p.name for p in target.iterdir() if p.suffix in (".json", ".yaml")))
             typer.echo(f"{target / 'report.html'} (and {others}), {time.monotonic() - start:.0f} s")
         faults = faults_of(found, limit, no_doubts) if ci else []

@@ -19,6 +19,7 @@ OPEN = (
     "changes.compare",
     "changes.joint",
     "changes.words",
+    "decision.drift",
     "decision.findings",
     "decision.probability",
     "decision.rules",
@@ -27,6 +28,7 @@ OPEN = (
     "decision.words",
     "delivery.doubts",
     "delivery.files",
+    "delivery.flown",
     "delivery.model",
     "delivery.parts",
     "delivery.usable",
@@ -65,6 +67,7 @@ OPEN = (
     "tell.forward",
     "tell.ledger",
     "tell.locate",
+    "tell.steps",
     "tell.tiles",
     "tell.verdict",
 )

@@ -20,11 +20,13 @@ from rotorid.mismatch.decision.evidence import weighed
 from rotorid.mismatch.decision.findings import Analysis, Finding, RunWind, Trace, by_channel, in_interval, not_held, rms
 from rotorid.mismatch.decision.probability import with_probabilities
 from rotorid.mismatch.decision.shares import fitted_part
-from rotorid.mismatch.delivery.final import Offered, as_delivered
-from rotorid.mismatch.delivery.gate import Gated, Offer, Settled
+from rotorid.mismatch.delivery.candidates import Candidate, Ground
+from rotorid.mismatch.delivery.files import conditions_of, instruments_of
+from rotorid.mismatch.delivery.final import Offered, Stretches, as_delivered
+from rotorid.mismatch.delivery.flown import squares_of_windows
+from rotorid.mismatch.delivery.model import model_of
 from rotorid.mismatch.delivery.parts import claimed, place_of, with_effects
 from rotorid.mismatch.delivery.reduce import chain_ids, with_only
-from rotorid.mismatch.delivery.stated import restated
 from rotorid.mismatch.delivery.usable import question_of
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.model import within_trust
@@ -40,7 +42,7 @@ from rotorid.mismatch.model.leftover import leftover
 from rotorid.mismatch.model.next_flight import next_flight
 from rotorid.mismatch.model.payload_windows import loads, on_board
 from rotorid.mismatch.model.prepare import Prepared, prepare
-from rotorid.mismatch.model.refitted import refitted, values_alone
+from rotorid.mismatch.model.refitted import values_alone
 from rotorid.mismatch.model.report_runs import on_every_run, scaled_by_run
 from rotorid.mismatch.model.values import (
     changed_vehicle,
@@ -63,6 +65,8 @@ from rotorid.mismatch.plant.split import parts_of, split_runs
 from rotorid.mismatch.posterior.limits import UpperLimit
 from rotorid.mismatch.posterior.status import CLAIMED
 from rotorid.recordings import RecordingSet, Split, Vehicle
+from rotorid.vehicle.derivatives import quantities
+from rotorid.vehicle.improved import active_forms
 
 UNITS = {"force": "N", "moment": "N m"}
 SENSOR_UNITS = {2: "m/s2", 3: "rad/s"}
@@ -131,10 +135,10 @@ def analysed(recordings: RecordingSet, mistakes, remarks, watch: Watch) -> Analy
     if len(seen.rows) == len(model.rows):
         return None
     choice = replace(choice, findings=with_windows(findings, seen))
-    plain_fit, plain_values = refitted(model)
-    first = account(choice, seen, fit, moved, plain_fit, plain_values)
+    plain_fit, plain_moved = settled(model, values_alone(model), ())
+    first = account(choice, seen, fit, moved, plain_fit, {**plain_moved, **values_alone(model)})
     words = with_values_in_question(weighed(first))
-    return with_noise_held_out(as_delivered(offered(choice, words, seen, unseen, moved)))
+    return with_noise_held_out(as_delivered(offered(choice, words, seen, unseen, moved, plain_moved)))
 
 
 @dataclass(frozen=True)
@@ -205,6 +209,7 @@ def account(
         believed=prepared.vehicle,
         refitted=changed_vehicle(prepared.vehicle, {k: v[0] for k, v in plain_values.items()}),
         improved=choice.vehicle(moved, stated),
+        named=choice.vehicle(moved, stated),
         findings=tuple(findings),
         values={**contract_values(prepared.vehicle, stated), **choice.scale},
         not_testable=not_testable(prepared, found.chain, findings),
@@ -240,61 +245,86 @@ def winds_of(seen: WrenchModel) -> tuple[RunWind, ...]:
     return tuple(out)
 
 
-def offered(choice: Choice, words: Analysis, seen: WrenchModel, unseen: RecordingSet, moved: Values) -> Offered:
+def offered(
+    choice: Choice, words: Analysis, seen: WrenchModel, unseen: RecordingSet, moved: Values, plain_moved: Values
+) -> Offered:
     """What a choice offers for delivery: what is claimed, fitted without effects that are only suggested.
 
     A value that is only suggested, because a payload that is not excluded would change it, is offered as it is: the
     vehicle flies with that number, whichever of the two it is. `words` is the analysis of the whole choice with its
-    statuses; `moved` are the values that it moved within their trust.
+    statuses; `moved` and `plain_moved` are the values that it and the refitted vehicle moved within their trust.
     """
     found, vehicle = choice.found, choice.found.prepared.vehicle
     ids = {f.id for f in claimed(words.findings)}
     values = found.values
     whole = ids >= {f.id for f in words.findings if f.id in words.without}
     fewer = found if whole else with_only(found, ids, values)
-    model = fewer.model
+    model, thinner = fewer.model, found.prepared.thinner
 
-    def stated_of(settled: Settled) -> Values:
-        given = settled.offer.values
-        if settled.offer.active or not choice.stated:
+    def stated_of(candidate: Candidate) -> Values:
+        given = candidate.values
+        if candidate.model == "named" or not choice.stated:
             both = {"thrust", "torque"} <= set(given)  # which a full speed stands for
             return {k: v for k, v in choice.stated.items() if k in given or (k == "speed" and both)}
         return speed_for_coefficients(given, vehicle) if only_throttle(choice.recordings) else given
 
-    def improved(settled: Settled) -> Vehicle:
-        return choice.vehicle(settled.moved, stated_of(settled))
+    def improved(candidate: Candidate) -> Vehicle:
+        return choice.vehicle(candidate.moved, stated_of(candidate))
 
-    def vehicle_of(settled: Settled) -> Vehicle:
-        stated = restated(words.findings, model, settled)
-        inside = {model.search.terms[k].effect for k in settled.offer.active} | chain_ids(fewer)
-        kept = [f for f in claimed(stated) if f.id in inside and place_of(f) == "vehicle"]
-        return with_effects(improved(settled), kept)
+    def vehicle_of(candidate: Candidate, findings: Sequence[Finding]) -> Vehicle:
+        inside = {model.search.terms[k].effect for k in candidate.active}
+        if candidate.model != "believed" or not found.commanded:
+            inside |= chain_ids(fewer)
+        kept = [f for f in claimed(findings) if f.id in inside and place_of(f) == "vehicle"]
+        whole_vehicle = with_effects(improved(candidate), kept)
+        derivatives = candidate.learnt.derivatives if candidate.learnt else ()
+        return whole_vehicle.model_copy(update={"derivatives": derivatives})
 
-    def again(gated: Gated, findings: tuple[Finding, ...]) -> Analysis:
-        settled = gated.settled
-        kept = with_only(fewer, ids - set(gated.withheld), settled.offer.values)
-        last = replace(choice, found=kept, stated=stated_of(settled), findings=findings)
-        same_rows = replace(seen, selection=kept.model.selection) if kept.model.rows is found.model.rows else None
-        every = same_rows or on_every_run(kept, choice.recordings, choice.split, unseen)
-        moved_plain = {**gated.refitted.moved, **gated.refitted.offer.values}
-        return account(last, every, settled.fit, settled.moved, gated.refitted.fit, moved_plain)
+    def stretches_of(every: WrenchModel) -> Stretches:
+        pairs = zip(every.rows, every.segments, strict=True)
+        return [(r.run, r.time_s, thinner(quantities(s.motion, vehicle))) for r, s in pairs]
+
+    def again(named: Candidate, refitted: Candidate, findings: tuple[Finding, ...]) -> tuple[Analysis, Stretches]:
+        if whole and named.moved.keys() == moved.keys() and refitted.moved.keys() == plain_moved.keys():
+            return words, stretches_of(seen)
+        last = replace(choice, found=fewer, stated=stated_of(named), findings=findings)
+        every = seen if whole else on_every_run(fewer, choice.recordings, choice.split, unseen)
+        plain = {**refitted.moved, **refitted.values}
+        return account(last, every, named.fit, named.moved, refitted.fit, plain), stretches_of(every)
+
+    def flown(candidate: Candidate, findings: Sequence[Finding], ground: Ground) -> np.ndarray:
+        """Each window by derivatives that were learnt without its run or piece."""
+        segments = [s for s in found.prepared.segments if s.motion.has(("rotor_speed", "angular_velocity"))]
+        parts = (conditions_of(words), instruments_of(words)) if candidate.model == "named" else ()
+        vehicle = vehicle_of(candidate, findings)
+        whole_model, of_unit = model_of(vehicle, *parts), None
+        if candidate.learnt:
+            fold = dict(zip(model.regression.left_out_together(), model.regression.folds(), strict=True))
+            own = [vehicle.model_copy(update={"derivatives": d}) for d in candidate.learnt.without]
+            models = [replace(whole_model, forms=tuple(active_forms(v))) for v in own]
+            of_unit = lambda unit: models[fold[unit]]  # noqa: E731
+        return squares_of_windows(segments, whole_model, ground.unit_at, ground.units, of_unit)
 
     question, faults = question_of(vehicle, choice.recordings.runs)
     return Offered(
         words=words,
         model=model,
-        offer=Offer(values, tuple(model.selection.active)),
+        values=values,
+        active=tuple(model.selection.active),
         plain=values_alone(found.model),
         believed_left=believed_residuals(fewer.prepared, model.rows, fewer.commanded),
         believed=vehicle,
-        stated=choice.stated,
         moved=moved,
         names=PARAMETER_NAMES,
         whole=whole,
         improved=improved,
         again=again,
-        unusable=lambda settled: question(vehicle_of(settled)),
+        stretches=stretches_of(model),
+        vehicle=vehicle_of,
+        flown=flown,
+        unfit=question,
         remarks=faults,
+        chain_is_named=found.commanded,
     )
 
 
@@ -460,7 +490,9 @@ def make_traces(
         for c in range(6):
             if np.isfinite(r.y[:, c]).all():
                 unit = UNITS[CHANNELS[c].split("_")[0]]
-                out.append(Trace(r.run, CHANNELS[c], unit, r.time_s, before[:, c], plain[:, c], after[:, c]))
+                out.append(
+                    Trace(r.run, CHANNELS[c], unit, r.time_s, before[:, c], plain[:, c], after[:, c], after[:, c])
+                )
         if chain is not None and found.measured:
             result = chain.result
             path = commanded_path(
@@ -470,7 +502,9 @@ def make_traces(
             left = prepared.thinner(segment.motion.rotor_speed - path)
             for i in range(believed.shape[1]):
                 name = f"rotor_speed_{i + 1}"
-                out.append(Trace(r.run, name, "rad/s", r.time_s, believed[:, i], believed[:, i], left[:, i]))
+                out.append(
+                    Trace(r.run, name, "rad/s", r.time_s, believed[:, i], believed[:, i], left[:, i], left[:, i])
+                )
     return tuple(out)
 
 
@@ -480,7 +514,7 @@ def sensor_traces(model: WrenchModel, refitted: list[np.ndarray], delivered: lis
     Offsets of the sensors, which no vehicle states, are taken out before, too.
     """
     return tuple(
-        Trace(r.run, CHANNELS[c], SENSOR_UNITS[c // 3], r.time_s, plain[:, c], plain[:, c], after[:, c])
+        Trace(r.run, CHANNELS[c], SENSOR_UNITS[c // 3], r.time_s, plain[:, c], plain[:, c], after[:, c], after[:, c])
         for r, plain, after in zip(model.rows, refitted, delivered, strict=True)
         for c in range(6, 12)
         if np.isfinite(r.y[:, c]).all()
@@ -510,7 +544,7 @@ def with_noise_held_out(analysis: Analysis) -> Analysis:
         return analysis
     part, floors = fitted_part(analysis), dict(analysis.noise_floor)
     for channel, traces in by_channel(analysis.traces).items():
-        left = rms(t.after[part(t.run, t.time_s) < 0] for t in traces)
+        left = rms(t.named[part(t.run, t.time_s) < 0] for t in traces)
         noise = analysis.p_values.get(channel, (0.0, 0.0))[1] > NO_DEPENDENCE_P
         if noise and channel not in analysis.unexplained_channels and not np.isnan(left):
             floors[channel] = max(floors.get(channel, 0.0), left)

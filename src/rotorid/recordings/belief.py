@@ -27,7 +27,7 @@ ONE_SPOT_M = 1e-4
 
 def check_belief(vehicle: Vehicle, where: str) -> None:
     """InputError in one sentence for what no vehicle of a recording set can be; `where` names its file."""
-    for key in ("effects", "reading_gain"):
+    for key in ("effects", "derivatives", "reading_gain"):
         if getattr(vehicle, key):
             raise InputError(
                 f"{where}: {key}: belongs in improved_vehicle.yaml, which the simulator runs; a recording is compared "

@@ -61,6 +61,42 @@ class Noise(_Strict):
     moment_n_m: Number | None = Field(None, ge=0)
 
 
+def unit_of(channel: str, quantity: str) -> str:
+    """Unit of a derivative: of its channel per unit of its quantity."""
+    force = channel.startswith("force")
+    if quantity in ("u", "v", "w"):
+        return "N s/m" if force else "N s"
+    if quantity in ("p", "q", "r"):
+        return "N s/rad" if force else "N m s/rad"
+    return "N" if force else "N m"
+
+
+class Derivative(_Strict):
+    """What a channel of force or moment gains per unit of a quantity (`rotorid.vehicle.derivatives`)."""
+
+    channel: Literal["force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z"]
+    quantity: Literal[
+        "constant", "u", "v", "w", "p", "q", "r", "thrust", "thrust_roll", "thrust_pitch", "thrust_yaw", "speed"
+    ]
+    unit: str
+    value: Number
+    interval_95: tuple[Number, Number]
+    low: Number
+    high: Number
+    """Range in which it holds; beyond, the quantity is held at the edge."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Derivative:
+        if self.low > self.high:
+            raise ValueError(f"low is {self.low:g}, above high, {self.high:g}")
+        if self.quantity == "constant" and not self.low - 1e-9 <= 1 <= self.high + 1e-9:
+            raise ValueError(f"a constant is 1, outside low to high, {self.low:g} to {self.high:g}")
+        wanted = unit_of(self.channel, self.quantity)
+        if self.unit != wanted:
+            raise ValueError(f"unit is {self.unit!r}, expected {wanted!r} of {self.channel} by {self.quantity}")
+        return self
+
+
 Length = Annotated[Number, Field(ge=-100, le=100)]
 Place = tuple[Length, Length, Length]
 SMALLEST_COEFFICIENT, LARGEST_COEFFICIENT = 1e-14, 1e2
@@ -95,6 +131,8 @@ class Vehicle(_Strict):
     """Factors of a bench's force readings by axis (`improved_vehicle.yaml` only)."""
     effects: tuple[dict[str, Any], ...] = ()
     """Established effects (`improved_vehicle.yaml` only): id, form and parameters each."""
+    derivatives: tuple[Derivative, ...] = ()
+    """Stability and control derivatives (`improved_vehicle.yaml` only) of what the effects leave."""
 
     @field_validator("trust")
     @classmethod
@@ -132,7 +170,19 @@ class Vehicle(_Strict):
                 )
         if self.inertia_kg_m2 is not None and np.linalg.eigvalsh(self.inertia_kg_m2.matrix())[0] <= 0:
             raise ValueError("inertia_kg_m2 is not a positive definite matrix")
+        self._check_derivatives()
         return self
+
+    def _check_derivatives(self) -> None:
+        if self.derivatives and self.kind != "flight":
+            raise ValueError(f"derivatives belong to a vehicle of kind flight, this is a {self.kind}")
+        first: dict = {}
+        for i, d in enumerate(self.derivatives):
+            if (k := first.setdefault((d.channel, d.quantity), i)) != i:
+                raise ValueError(f"derivatives.{i} states {d.channel} by {d.quantity} again, after derivatives.{k}")
+            k = first.setdefault(d.quantity, i)
+            if (d.low, d.high) != (self.derivatives[k].low, self.derivatives[k].high):
+                raise ValueError(f"derivatives.{i} has another range of {d.quantity} than derivatives.{k}")
 
     @property
     def rotor_count(self) -> int:

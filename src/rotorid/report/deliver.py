@@ -31,6 +31,7 @@ from rotorid.mismatch.model.decided import Watch, unwatched
 from rotorid.mismatch.tell.forward import Forward, forward_channels, prove
 from rotorid.mismatch.tell.ledger import ledger, text_of
 from rotorid.mismatch.tell.locate import locate
+from rotorid.mismatch.tell.steps import steps_sentence
 from rotorid.mismatch.tell.verdict import Verdict, make_verdict
 from rotorid.recordings import RecordingSet, Vehicle, read_vehicle, write_vehicle
 from rotorid.recordings.sufficient import sufficient
@@ -90,13 +91,13 @@ def judge(recordings: RecordingSet) -> Verdict:
 def verdict_of(analysis: Analysis) -> Verdict:
     """The verdict that an analysis amounts to."""
     forward = forward_channels(analysis).channels if analysis.instrument is None else {}
-    return with_runs_left_out(make_verdict(analysis, locate(analysis), forward), analysis)
+    return with_first_details(make_verdict(analysis, locate(analysis), forward), analysis)
 
 
-def with_runs_left_out(verdict: Verdict, analysis: Analysis) -> Verdict:
-    """The verdict, whose details also say which runs were of no use."""
-    left_out = analysis.recordings.left_out
-    return verdict.model_copy(update={"details": (*left_out, *verdict.details)}) if left_out else verdict
+def with_first_details(verdict: Verdict, analysis: Analysis) -> Verdict:
+    """The verdict, whose details first say what each step takes off the error, and which runs were of no use."""
+    first = [text for text in (steps_sentence(verdict),) if text]
+    return verdict.model_copy(update={"details": (*first, *analysis.recordings.left_out, *verdict.details)})
 
 
 @ONE_THREAD
@@ -132,7 +133,7 @@ def write_files(
         else:
             forward = Forward({})
             prove_reading(analysis, improved, reloaded, instruments)
-        verdict = with_runs_left_out(make_verdict(analysis, locations, forward.channels), analysis)
+        verdict = with_first_details(make_verdict(analysis, locations, forward.channels), analysis)
         verdict_part.write_text(verdict.text(), encoding="utf-8")
         decided = ledger(analysis, verdict)
         ledger_part.write_text(text_of(decided), encoding="utf-8")

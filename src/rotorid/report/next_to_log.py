@@ -16,14 +16,16 @@ from importlib.util import find_spec
 import numpy as np
 
 from rotorid.errors import InputError
+from rotorid.mismatch.decision.drift import WINDOW_S
 from rotorid.mismatch.decision.findings import Analysis
 from rotorid.mismatch.decision.shares import segments_of
+from rotorid.mismatch.delivery.flown import UNITS, driven_by
 from rotorid.mismatch.delivery.model import Model, model_of
-from rotorid.mismatch.tell.forward import UNITS, WINDOW_S, delivered_model, driven_by
+from rotorid.mismatch.tell.forward import delivered_model
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.attitude import normalised, quaternion_rate, rotation_from_quaternion
 from rotorid.vehicle.exports import ardupilot_frame, sih
-from rotorid.vehicle.exports.flown import read_by
+from rotorid.vehicle.exports.flown import multirotor_of, passive_forces, read_by
 from rotorid.vehicle.exports.forms import FLU, Exported, expressed, parts_of
 from rotorid.vehicle.windows import States, plan_windows
 
@@ -244,10 +246,9 @@ def _shares(vehicle: Vehicle, exported: Exported, windows: Sequence[Window], kno
 
 
 def in_rotorpy(vehicle: Vehicle, exported: Exported, windows: Sequence[Window]) -> list[States]:
-    """RotorPy's Multirotor with the exported parameters; the speeds are set at every sample and held over a step."""
-    from rotorpy.vehicles.multirotor import Multirotor
-
-    out = []
+    """RotorPy's Multirotor with the exported parameters and their companion; the speeds are set at every sample and
+    held over a step."""
+    out, multirotor = [], multirotor_of(exported)
     for window in windows:
         start, mid = window.recorded, 0.5 * (window.speed[:-1] + window.speed[1:])
         state = {
@@ -256,7 +257,7 @@ def in_rotorpy(vehicle: Vehicle, exported: Exported, windows: Sequence[Window]) 
             "rotor_speeds": mid[0],
         }  # fmt: skip
         with read_by("RotorPy"):
-            flyer = Multirotor(exported.parameters, state, control_abstraction="cmd_motor_speeds")
+            flyer = multirotor(exported.parameters, state, control_abstraction="cmd_motor_speeds")
         flyer.tau_m = 1e6
         kept = [state]
         for k, speed in enumerate(mid):
@@ -270,15 +271,24 @@ def in_rotorpy(vehicle: Vehicle, exported: Exported, windows: Sequence[Window]) 
 
 
 def in_mujoco(vehicle: Vehicle, exported: Exported, windows: Sequence[Window]) -> list[States]:
-    """MuJoCo with the exported model; the thrusts are set at every step."""
+    """MuJoCo with the exported model and its companion; the thrusts are set at every step."""
     import mujoco
 
     with read_by("MuJoCo"):
         model = mujoco.MjModel.from_xml_string(exported.text)
+    with passive_forces(exported):
+        return _in_mujoco(vehicle, model, windows)
+
+
+def _in_mujoco(vehicle: Vehicle, model, windows: Sequence[Window]) -> list[States]:
+    """Windows of a MuJoCo model."""
+    import mujoco
+
     coefficients = vehicle.thrust_coefficients_n_s2()
     out = []
     for window in windows:
         data, start = mujoco.MjData(model), window.recorded
+        model.opt.wind[:] = window.wind * FLU
         data.qpos[:] = [0, 0, 0, *(start.quaternion[0] * [1, *FLU])]
         data.qvel[:] = [*(_first(start.velocity) * FLU), *(start.angular_velocity[0] * FLU)]
         kept = [(data.qpos.copy(), data.qvel.copy())]

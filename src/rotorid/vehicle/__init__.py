@@ -7,6 +7,7 @@ OPEN = (
     "control.readings",
     "control.references",
     "control.swings",
+    "derivatives",
     "exports",
     "exports.ardupilot_frame",
     "exports.flown",

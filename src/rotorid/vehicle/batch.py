@@ -126,9 +126,10 @@ class Batch:
     def _change_effect(self, key: str, values: np.ndarray) -> None:
         pairs = zip(self.vehicle.effects, all_forms(self.vehicle), strict=True)
         entries = [entry for entry, (form, _) in pairs if isinstance(form, Form)]
+        # Derivatives, the last form, have no entry.
         places = {
             f"{entry['id']}.{p.symbol}": (number, column)
-            for number, (entry, (form, _)) in enumerate(zip(entries, self._effects, strict=True))
+            for number, (entry, (form, _)) in enumerate(zip(entries, self._effects, strict=False))
             for column, p in enumerate(form.parameters)
         }
         if key not in places:

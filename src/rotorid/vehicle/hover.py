@@ -83,9 +83,14 @@ def wrench_at_rest(vehicle: Vehicle, path: CommandPath | None, asked: np.ndarray
 
     They are the accelerations times the believed mass and inertia.
     """
-    command = np.sqrt(np.maximum(allocation_matrix(vehicle) @ asked, 0.0))[None]
+    command = np.sqrt(np.maximum(allocation_matrix(vehicle) @ asked, 0.0))
     limits = vehicle.rotor_speed_limits_rad_s or (0.0, np.inf)
-    command = np.clip(command, *limits)
+    return wrench_of_command(vehicle, path, np.clip(command, *limits), height_m)
+
+
+def wrench_of_command(vehicle: Vehicle, path: CommandPath | None, command: np.ndarray, height_m: float) -> np.ndarray:
+    """The same where rotor speeds (k,), rad/s, are commanded."""
+    command, limits = command[None], vehicle.rotor_speed_limits_rad_s or (0.0, np.inf)
     speed = command if path is None else np.clip(path.steady(command), *limits)
     every = active_forms(vehicle)
     instant = Dynamics(vehicle, [pair for pair in every if not has_memory(pair[0])], 1)

@@ -16,6 +16,7 @@ from rotorid.errors import InputError
 from rotorid.recordings.run import RecordingSet
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.command_path import CommandPath
+from rotorid.vehicle.derivatives import derivative_form
 from rotorid.vehicle.simulator import Commands, Controller, Motors, Noise, Trace, recording, simulate
 
 LAGS_OF_SPEED = frozenset({"one constant", "up and down"})
@@ -30,13 +31,16 @@ ActiveSetForm = tuple[SetForm, np.ndarray]
 
 
 def active_forms(vehicle: Vehicle) -> list[ActiveForm]:
-    """Forms of wrench and sensor effects among `vehicle.effects` with their values, in the order of the file.
+    """Forms of wrench and sensor effects among `vehicle.effects` with their values, in the order of the file; then the
+    vehicle's derivatives.
 
     An entry is `{id, form, parameters: {symbol: value}}`; `form` may be left out where the effect has one form.
     InputError names the entry and what was expected. Forms between command and rotor speed and forms that spoil
     the recorded set are passed over here: `active_speed_forms` and `active_set_forms` have them.
     """
-    return [found for found in all_forms(vehicle) if isinstance(found[0], Form)]
+    found = [found for found in all_forms(vehicle) if isinstance(found[0], Form)]
+    derivatives = derivative_form(vehicle)
+    return found if derivatives is None else [*found, derivatives]
 
 
 def active_speed_forms(vehicle: Vehicle) -> list[ActiveSpeedForm]:
@@ -200,7 +204,7 @@ def record_as_stated(
     The set's vehicle is the one believed: the file without its effects (and with what a mistake makes of it).
     """
     run = recording(trace, vehicle, name, noise, rng, index, active_forms(vehicle), every)
-    recordings = RecordingSet(vehicle.name, vehicle.model_copy(update={"effects": ()}), (run,))
+    recordings = RecordingSet(vehicle.name, vehicle.model_copy(update={"effects": (), "derivatives": ()}), (run,))
     for form, values in active_set_forms(vehicle):
         recordings = form.apply(recordings, values)
     return recordings

@@ -120,7 +120,7 @@ def simulate_windows(
     """
     time_s = np.asarray(time_s, float)
     if sample is None:
-        sample = plan_windows(time_s, window_s, step_s, _usable(inputs, recorded))
+        sample = plan_windows(time_s, window_s, step_s, usable(inputs, recorded))
     flight = _Flight(vehicle, effects, time_s, inputs, recorded, sample)
     kernels = kernels_of(effects, vehicle) if compiled else None
     if kernels is not None:
@@ -140,7 +140,7 @@ def simulate_windows(
     return Windows(sample, flight.states(np.moveaxis(out, 0, 1)))
 
 
-def _usable(inputs: Inputs, recorded: States) -> np.ndarray:
+def usable(inputs: Inputs, recorded: States) -> np.ndarray:
     """Samples at which every input and state that is there has a value, (n,)."""
     good = np.isfinite(inputs.rotor_speed).all(axis=1)
     fields = (

@@ -89,7 +89,7 @@ def analysis(seed: int = 0, findings=(), bursts=(), dash: bool = True, pole: flo
             taken = np.zeros(len(time))
             if any(f.id == "rotor_drag" for f in findings) and channel == "force_x":
                 taken = -K_D * 4 * HOVER * speed
-            traces.append(Trace(r.name, channel, unit, time, after + taken, after + taken, after))
+            traces.append(Trace(r.name, channel, unit, time, after + taken, after + taken, after, after))
     vehicle = thesis_vehicle()
     values = dict(
         recordings=RecordingSet("made", vehicle, runs, ("b",)),
@@ -97,6 +97,7 @@ def analysis(seed: int = 0, findings=(), bursts=(), dash: bool = True, pole: flo
         believed=vehicle,
         refitted=vehicle,
         improved=vehicle,
+        named=vehicle,
         findings=tuple(findings),
         values={},
         not_testable={"ground_effect": "no height above ground"},

@@ -98,7 +98,7 @@ def effect_shares(
             sums[trace.channel] = sums.get(trace.channel, np.zeros(2)) + new
         return sum(s[0] / max(s[1], 1) / units[c] ** 2 for c, s in sums.items() if units.get(c))
 
-    before, after = (energy([getattr(t, stage) for t in analysis.compared]) for stage in ("before", "after"))
+    before, after = (energy([getattr(t, stage) for t in analysis.compared]) for stage in ("before", "named"))
     if before <= after:
         return dict.fromkeys(analysis.without, 0.0)
     return {i: float(np.clip((energy(x) - after) / (before - after), 0.0, 1.0)) for i, x in analysis.without.items()}
@@ -162,7 +162,7 @@ def contribution(
     """
     size: dict[str, list[float]] = {}
     for trace, left, mask in zip(analysis.compared, without, rows, strict=True):
-        added = (left - trace.after) ** 2
+        added = (left - trace.named) ** 2
         own = size.setdefault(trace.channel, [0.0, 0.0, 0.0, 0.0])
         own[0], own[1] = own[0] + float(np.nansum(added[mask])), own[1] + int(mask.sum())
         own[2], own[3] = own[2] + float(np.nansum(added[~mask])), own[3] + int((~mask).sum())
@@ -185,7 +185,7 @@ def leftover_rms(analysis: Analysis, rows: list[np.ndarray], channel: str) -> fl
     pairs = [(t, m) for t, m in zip(analysis.compared, rows, strict=True) if t.channel == channel and m.any()]
     if not pairs:
         return 0.0
-    left = np.concatenate([t.after[m] for t, m in pairs])
+    left = np.concatenate([t.named[m] for t, m in pairs])
     return float(np.sqrt(max(0.0, np.nanmean(left**2) - (analysis.noise_floor.get(channel) or 0.0) ** 2)))
 
 
@@ -195,7 +195,7 @@ def ratio_of(analysis: Analysis, without: tuple[np.ndarray, ...], rows: list[np.
     Blocks are drawn anew for the interval. What acts for a short time is judged in shorter blocks.
     """
     parts = zip(analysis.compared, without, rows, strict=True)
-    own = [(t, left - t.after, m) for t, left, m in parts if t.channel == channel]
+    own = [(t, left - t.named, m) for t, left, m in parts if t.channel == channel]
     for block_s in BLOCKS_S:
         energies = np.array([e for t, added, m in own for e in block_energies(t, added, m, block_s)]).reshape(-1, 3)
         acting = energies[energies[:, 2] > VOTES_FROM * energies[:, 2].max(initial=0.0)]
@@ -212,12 +212,12 @@ def ratio_of(analysis: Analysis, without: tuple[np.ndarray, ...], rows: list[np.
 def block_energies(trace: Trace, added: np.ndarray, mask: np.ndarray, block_s: float):
     """Energies of blocks of masked rows: with the effect, without it (its contribution `added` (n,) put back), and of
     the contribution alone."""
-    index = np.flatnonzero(mask & np.isfinite(trace.after) & np.isfinite(added))
+    index = np.flatnonzero(mask & np.isfinite(trace.named) & np.isfinite(added))
     if not len(index):
         return
     period_s = float(np.median(np.diff(trace.time_s))) if len(trace.time_s) > 1 else block_s
     for rows in np.array_split(index, max(1, len(index) // max(1, int(round(block_s / period_s))))):
-        after, own = trace.after[rows], added[rows]
+        after, own = trace.named[rows], added[rows]
         yield float(after @ after), float((after + own) @ (after + own)), float(own @ own)
 
 

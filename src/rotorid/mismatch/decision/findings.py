@@ -64,7 +64,7 @@ class Finding:
     probability: float | None = None
     """That it, or one of its class, is at work; None where none was computed."""
     withheld: str = ""
-    """Of one that is claimed: why the gate keeps it out of the files; empty where it is delivered."""
+    """Of one that is claimed: why it is in none of the files; empty where it is delivered."""
 
     @property
     def which(self) -> tuple[str, tuple[str, ...]]:
@@ -121,7 +121,7 @@ class ValueRow:
 
 @dataclass(frozen=True)
 class Trace:
-    """Residual of one channel of one run, thinned, before refitting, after refitting and with the effects."""
+    """Residual of one channel of one run, thinned."""
 
     run: str
     channel: str
@@ -129,7 +129,21 @@ class Trace:
     time_s: np.ndarray
     before: np.ndarray
     refitted: np.ndarray
+    named: np.ndarray
+    """With the effects, one member of each class."""
     after: np.ndarray
+    """Of the vehicle that is delivered, derivatives included."""
+
+
+@dataclass(frozen=True)
+class Delivery:
+    """Which candidate is taken home, and every candidate's number."""
+
+    model: Literal["believed", "refitted", "named"]
+    derivatives: bool
+    scores: tuple[tuple[str, bool, float, float, str], ...]
+    """Model, whether with derivatives, mean logarithm of the error over the believed vehicle's where not fitted, the
+    standard error of its difference from the best, and why it was not fit to be flown (or nothing)."""
 
 
 def by_channel(traces: Iterable[Trace]) -> dict[str, list[Trace]]:
@@ -158,7 +172,9 @@ class Analysis:
     refitted: Vehicle
     """Believed values re-estimated without new physics."""
     improved: Vehicle
-    """Values re-estimated together with the established effects (which `findings` hold)."""
+    """The vehicle that is taken home, without the effects (which `findings` hold)."""
+    named: Vehicle
+    """Values re-estimated together with the established effects."""
     findings: tuple[Finding, ...]
     values: dict[str, tuple[float, float, float, float]]
     """Wrong values: contract name to (believed, refitted, low, high)."""
@@ -206,11 +222,8 @@ class Analysis:
     """Values corrected within their trust, in words: `thrust coefficient −0.7 %`."""
     doubts: tuple[Doubt, ...] = ()
     """What `check` doubts in the set, and values that are only proposed."""
-    worse_elsewhere: tuple[str, ...] = ()
-    """Channels that what is delivered predicts worse than the refitted vehicle where neither was fitted, in words;
-    the gate lets none pass."""
-    withheld_values: Mapping[str, str] = field(default_factory=dict)
-    """Wrong value (by its contract name) that the gate keeps out of the vehicle, to the reason."""
+    delivery: Delivery = Delivery("believed", False, ())
+    """Which vehicle is taken home; before it is chosen the believed one."""
     believed_values: tuple[ValueRow, ...] = ()
     """Every believed value before and after, as an identification report has them."""
     value_correlations: Mapping[tuple[str, str], float] = field(default_factory=dict)

@@ -91,7 +91,7 @@ def effect_sizes(analysis: Analysis, held: list[np.ndarray]) -> dict[str, Size]:
     known, units = scales(analysis), {t.channel: t.unit for t in analysis.compared}
     out: dict[str, Size] = {}
     for effect_id, without in analysis.without.items():
-        moved = [(t, left - t.after, mask) for t, left, mask in zip(analysis.compared, without, held, strict=True)]
+        moved = [(t, left - t.named, mask) for t, left, mask in zip(analysis.compared, without, held, strict=True)]
         parts: dict[str, list[np.ndarray]] = {}
         for trace, added, mask in moved:
             parts.setdefault(trace.channel, []).append(added[mask])
@@ -103,7 +103,7 @@ def effect_sizes(analysis: Analysis, held: list[np.ndarray]) -> dict[str, Size]:
     return out
 
 
-def channel_metres(analysis: Analysis, channel: str, stage: Literal["before", "after"]) -> float | None:
+def channel_metres(analysis: Analysis, channel: str, stage: Literal["before", "named"]) -> float | None:
     """How far off a channel's error leads within half a second, on the runs held out where there are any."""
     part = fitted_part(analysis)
     own = [(t, getattr(t, stage), part(t.run, t.time_s)) for t in analysis.traces if t.channel == channel]
@@ -119,7 +119,7 @@ def _metres(analysis: Analysis, channel: str, errors: Iterable[tuple[Trace, np.n
     return drift_m(analysis.believed, channel, own)
 
 
-def channel_size(analysis: Analysis, channel: str, rms: float, stage: Literal["before", "after"]) -> Size | None:
+def channel_size(analysis: Analysis, channel: str, rms: float, stage: Literal["before", "named"]) -> Size | None:
     """The size of a channel's error; None where the channel has no scale."""
     known, units = scales(analysis), {t.channel: t.unit for t in analysis.traces}
     if channel not in known or channel not in units:

@@ -35,14 +35,14 @@ def still_off(analysis: Analysis) -> float:
     """Largest error of a channel beyond its noise, over what a pilot knows: the weight, the moment at hand."""
     known, off = scales(analysis), [0.0]
     for channel, traces in by_channel(t for t in analysis.traces if t.channel in known).items():
-        square = rms(t.after for t in traces) ** 2
+        square = rms(t.named for t in traces) ** 2
         off.append(math.sqrt(max(square - analysis.noise_floor.get(channel, 0.0) ** 2, 0.0)) / known[channel].value)
     return max(off)
 
 
 def corrected(analysis: Analysis):
     """The vehicle as the analysis has it: mistakes undone and wrong values at their numbers, without effects."""
-    return analysis.improved.model_copy(update={"effects": ()})
+    return analysis.improved.model_copy(update={"effects": (), "derivatives": ()})
 
 
 def as_corrected(doubt: Doubt) -> Doubt:

@@ -1,20 +1,28 @@
-"""The analysis whose model holds what is claimed and passes the gate, and nothing else, for every kind of set."""
+"""The analysis whose model holds what is claimed, and the vehicle that is taken home, for every kind of set."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import exp
+
+import numpy as np
 
 from rotorid.mismatch.decision.evidence import with_shares
-from rotorid.mismatch.decision.findings import Analysis, Finding
-from rotorid.mismatch.decision.words import parameter_words
-from rotorid.mismatch.delivery.gate import Gated, Offer, Residuals, Settled, gate
-from rotorid.mismatch.delivery.parts import improved_vehicle
+from rotorid.mismatch.decision.findings import Analysis, Delivery, Finding, Trace
+from rotorid.mismatch.delivery.candidates import Candidate, Ground, Scored, choose
+from rotorid.mismatch.delivery.derivatives import Learnt, learn
+from rotorid.mismatch.delivery.parts import claimed, improved_vehicle, place_of
 from rotorid.mismatch.delivery.stated import restated, value_correlations, value_rows
 from rotorid.mismatch.delivery.usable import exports_lost
 from rotorid.mismatch.model.delivered import FittedModel, Values
-from rotorid.mismatch.model.values import names_of
+from rotorid.mismatch.model.within_trust import both_ways
+from rotorid.mismatch.plant.rows import CHANNELS
 from rotorid.recordings import Vehicle
+from rotorid.steps import step
+
+Stretches = Sequence[tuple[str, np.ndarray, np.ndarray]]
+"""Of every stretch its run, the instants of its rows (n,), s, and the quantities of derivatives at them, (n, 12)."""
 
 
 @dataclass(frozen=True)
@@ -25,63 +33,145 @@ class Offered:
     """Of the whole choice, with its statuses, which stay."""
     model: FittedModel
     """Of the fitted runs, with what is claimed alone."""
-    offer: Offer
+    values: Values
+    """Values called wrong."""
+    active: tuple[str, ...]
+    """Terms of what is claimed."""
     plain: Values
     """Values called wrong where no effect is at work."""
-    believed_left: Residuals
-    """What the believed vehicle leaves of every stretch."""
+    believed_left: list[np.ndarray]
+    """What the believed vehicle leaves of every fitted stretch, (n, channels)."""
     believed: Vehicle
-    stated: Values
-    """Wrong values as the analysis states them."""
     moved: Values
     """Values that the whole choice moved within their trust."""
     names: Mapping[str, str]
     """Keys of values to their contract names."""
     whole: bool
-    """Whether `model` and `offer` lack nothing of the choice."""
-    improved: Callable[[Settled], Vehicle]
-    """The vehicle of a settled offer, without its effects."""
-    again: Callable[[Gated, tuple[Finding, ...]], Analysis]
-    """What remains, accounted for on every run anew."""
-    unusable: Callable[[Settled], str] = lambda settled: ""
-    """Why the vehicle of a settled offer is no body that hovers and flies; empty where it is."""
+    """Whether `model` lacks nothing of the choice."""
+    improved: Callable[[Candidate], Vehicle]
+    """A candidate's vehicle without effects."""
+    again: Callable[[Candidate, Candidate, tuple[Finding, ...]], tuple[Analysis, Stretches]]
+    """The named and the refitted candidate accounted for on every run, and the stretches of every run."""
+    stretches: Stretches = ()
+    """Of the fitted rows; none where there are no derivatives (stands and benches)."""
+    vehicle: Callable[[Candidate, Sequence[Finding]], Vehicle] = lambda candidate, findings: None
+    """A candidate's vehicle as it would be written, given what is claimed."""
+    flown: Callable[[Candidate, Sequence[Finding], Ground], np.ndarray] = lambda c, findings, ground: c.flown
+    """Errors of a candidate's vehicle run forward in windows of the fitted runs (`Candidate.flown`)."""
+    unfit: Callable[[Vehicle], str] = lambda vehicle: ""
+    """Why a vehicle is no body that hovers and flies; empty where it is."""
     remarks: tuple[str, ...] = ()
+    chain_is_named: bool = False
+    """Whether what lies between command and speed is known by force and moment alone: the believed vehicle lacks it."""
     restates: bool = True
-    """Whether numbers are stated by the settled fit even where nothing was kept out; else by the fit that found them,
-    with the believed values free."""
+    """Whether numbers are stated by the fit that is delivered even where nothing else than that was found."""
 
 
+@step("choosing what is delivered")
 def as_delivered(offered: Offered) -> Analysis:
-    """What an offer amounts to once it has passed the gate; statuses, wrong values and their reasons stay."""
+    """What an offer amounts to once a vehicle is chosen; statuses, wrong values and their reasons stay."""
     words, model = offered.words, offered.model
-    gated = gate(model, offered.offer, offered.plain, offered.believed_left, offered.unusable)
-    settled = gated.settled
-    through = offered.whole and gated.passes_whole and settled.moved.keys() == offered.moved.keys()
-    stated = words.findings if through and not offered.restates else restated(words.findings, model, settled)
-    findings = tuple(replace(f, withheld=gated.withheld.get(f.id, "")) for f in stated)
-    if through:
-        last = replace(words, findings=findings, improved=offered.improved(settled))
-    else:
-        last = replace(
-            offered.again(gated, findings),
-            findings=findings,
-            values=words.values,
-            suggested_values=words.suggested_values,
-            instead=words.instead,
-            not_testable=words.not_testable,
-        )
-    reasons, of_name = gated.withheld_values, names_of(offered.stated, offered.names)
-    fell_back = [fell_back_note(key, why, offered.names) for key, why in gated.fell_back.items()]
+    ground = ground_of(offered)
+    believed = Candidate("believed", {}, (), None, {}, np.concatenate(offered.believed_left)[:, : len(CHANNELS) // 2])
+    refitted = fitted_candidate("refitted", offered, offered.plain, (), ground)
+    named = fitted_candidate("named", offered, offered.values, offered.active, ground)
+    candidates = [believed, refitted]
+    if offered.active or offered.values != offered.plain:
+        candidates.append(named)
+    if offered.stretches:
+        candidates += [c.with_derivatives(learnt) for c in candidates if (learnt := learnt_of(offered, c)).derivatives]
+    findings = restated(words.findings, model, named) if offered.restates or not offered.whole else words.findings
+    candidates = [replace(c, flown=offered.flown(c, findings, ground)) for c in candidates]
+    chosen, scored = choose(
+        candidates,
+        ground,
+        lambda c: "" if c.name == ("believed", False) else offered.unfit(offered.vehicle(c, findings)),
+    )
+    taken = chosen.candidate
+    findings = tuple(replace(f, withheld=why_not(f, taken, scored, offered)) for f in findings)
+    accounted, stretches = offered.again(named, refitted, findings)
+    last = replace(
+        accounted,
+        findings=findings,
+        values=words.values,
+        suggested_values=words.suggested_values,
+        instead=words.instead,
+        not_testable=words.not_testable,
+        improved=offered.improved(taken),
+    )
+    last = with_taken(last, taken, scored, stretches)
     return replace(
         with_shares(last),
-        worse_elsewhere=tuple(map(str, gated.worse(model))),
-        withheld_values={name: reasons[k] for name, keys in of_name.items() for k in keys if k in reasons},
-        notes=(*last.notes, *fell_back, *offered.remarks, *exports_lost(improved_vehicle(last), offered.believed)),
-        believed_values=value_rows(model, settled, last.improved, offered.believed, offered.names),
-        value_correlations=value_correlations(model, settled, offered.names),
+        notes=(*last.notes, *offered.remarks, *exports_lost(improved_vehicle(last), offered.believed)),
+        believed_values=value_rows(model, named, last.improved, offered.believed, offered.names),
+        value_correlations=value_correlations(model, named, offered.names),
     )
 
 
-def fell_back_note(key: str, why: str, names: Mapping[str, str]) -> str:
-    """That a value of the refitted vehicle is left as believed."""
-    return f"Refitted, the {parameter_words(names[key])[0]} stays as believed: {why}."
+def ground_of(offered: Offered) -> Ground:
+    """The fitted rows, by what is left out together."""
+    regression = offered.model.regression
+    unit = np.append(regression.left_out_together(), -1)
+    rows = regression.blocks_of_rows
+    places: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
+    for r, block in zip(offered.model.rows, rows, strict=True):
+        places.setdefault(r.run, []).append((r.time_s, unit[block]))
+    joined = {run: tuple(map(np.concatenate, zip(*parts, strict=True))) for run, parts in places.items()}
+    return Ground(np.concatenate([unit[b] for b in rows]), joined)
+
+
+def fitted_candidate(name: str, offered: Offered, values: Values, active: Sequence[str], ground: Ground) -> Candidate:
+    """A candidate with the other values as believed, or moved within their trust, whichever has the smaller number."""
+    ways = both_ways(offered.model, values, active)
+    found = [
+        Candidate(name, values, tuple(active), w.fit, w.moved, np.concatenate(w.left)[:, : len(CHANNELS) // 2])
+        for w in ways
+    ]
+    return min(found, key=lambda c: ground.score(c.left))
+
+
+def learnt_of(offered: Offered, candidate: Candidate) -> Learnt:
+    """The derivatives of what a candidate leaves."""
+    regression = offered.model.regression
+    fold = np.append(regression.folds(), -1)
+    folds = np.concatenate([fold[b] for b in regression.blocks_of_rows])
+    return learn(np.concatenate([x for _, _, x in offered.stretches]), candidate.left, folds)
+
+
+def why_not(finding: Finding, taken: Candidate, scored: Sequence[Scored], offered: Offered) -> str:
+    """Why a claimed property of the vehicle is not in the vehicle that is taken home; empty where it is."""
+    if finding not in claimed([finding]) or place_of(finding) != "vehicle" or taken.model == "named":
+        return ""
+    if finding.form is None and not (offered.chain_is_named and taken.model == "believed"):
+        return ""  # what lies between command and speed is fitted and judged in the rotors' speeds
+    best = min((s for s in scored if s.candidate.model == "named"), key=lambda s: s.score, default=None)
+    if best is None:
+        return ""
+    own = next(s for s in scored if s.candidate.name == taken.name)
+    if best.unfit:
+        return f"with the named physics {best.unfit}"
+    return (
+        f"on what was left out of the fit, vehicles with named physics have {100 * exp(best.score):.0f} % of the "
+        f"believed vehicle's error, the plainer one that is delivered {100 * exp(own.score):.0f} %"
+    )
+
+
+def with_taken(analysis: Analysis, taken: Candidate, scored: Sequence[Scored], stretches: Stretches) -> Analysis:
+    """The analysis with the traces that the vehicle taken home leaves, and that vehicle's derivatives."""
+    derivatives = taken.learnt.derivatives if taken.learnt else ()
+    added = {(run, float(time_s[0])): taken.learnt.of(x) for run, time_s, x in stretches if len(time_s) and derivatives}
+
+    def left(trace: Trace) -> Trace:
+        if trace.channel not in CHANNELS[:6]:
+            return trace
+        base = {"believed": trace.before, "refitted": trace.refitted, "named": trace.named}[taken.model]
+        part = added.get((trace.run, float(trace.time_s[0])) if len(trace.time_s) else None)
+        return replace(trace, after=base if part is None else base - part[:, CHANNELS.index(trace.channel)])
+
+    scores = tuple((*s.candidate.name, s.score, s.standard_error, s.unfit) for s in scored)
+    return replace(
+        analysis,
+        improved=analysis.improved.model_copy(update={"derivatives": derivatives}),
+        traces=tuple(map(left, analysis.traces)),
+        delivery=Delivery(taken.model, bool(derivatives), scores),
+    )

@@ -44,7 +44,7 @@ def model_of(vehicle: Vehicle, conditions: Conditions | None = None, instruments
     )
     return Model(
         vehicle,
-        tuple((form, values) for _, form, values in stated if isinstance(form, Form)),
+        tuple(active_forms(vehicle)),
         tuple((effect_id, form) for effect_id, form, _ in chain),
         tuple(float(v) for _, _, values in chain for v in values),
         conditions,
@@ -58,4 +58,4 @@ def _forms(vehicle: Vehicle, entry: Entry) -> list[ActiveForm]:
     if not entry.form:
         return []
     effects = ({"id": entry.id, "form": entry.form, "parameters": entry.parameters},)
-    return active_forms(vehicle.model_copy(update={"effects": effects}))
+    return active_forms(vehicle.model_copy(update={"effects": effects, "derivatives": ()}))

@@ -10,7 +10,7 @@ import numpy as np
 
 from rotorid.mismatch.decision.decide import coefficients
 from rotorid.mismatch.decision.findings import Finding, ValueRow
-from rotorid.mismatch.delivery.gate import Settled
+from rotorid.mismatch.delivery.candidates import Candidate
 from rotorid.mismatch.model.delivered import FittedModel
 from rotorid.mismatch.model.values import believed_value
 from rotorid.mismatch.model.within_trust import all_free
@@ -20,9 +20,9 @@ ONLY_A_RATIO = 0.9
 """Correlation of two values' estimates from which little more than their ratio is known."""
 
 
-def restated(findings: Sequence[Finding], model: FittedModel, settled: Settled) -> tuple[Finding, ...]:
+def restated(findings: Sequence[Finding], model: FittedModel, named: Candidate) -> tuple[Finding, ...]:
     """Findings with their linear parameters by a settled fit; intervals reach to where the findings had them."""
-    key_of = {model.search.terms[k].form: k for k in settled.offer.active}
+    key_of = {model.search.terms[k].form: k for k in named.active}
     out = []
     for finding in findings:
         key = key_of.get(finding.form)
@@ -31,7 +31,7 @@ def restated(findings: Sequence[Finding], model: FittedModel, settled: Settled) 
             continue
         form = finding.form
         values = np.array(finding.values, float)
-        values[list(form.linear)] = form.stated(coefficients(model.regression, settled.fit, key)[0])
+        values[list(form.linear)] = form.stated(coefficients(model.regression, named.fit, key)[0])
         now = dict(zip((p.symbol for p in form.parameters), values, strict=True))
         parameters = tuple(
             replace(e, value=v, low=min(e.low, e.low + v - e.value), high=max(e.high, e.high + v - e.value))
@@ -45,18 +45,18 @@ def restated(findings: Sequence[Finding], model: FittedModel, settled: Settled) 
 
 def value_rows(
     model: FittedModel,
-    settled: Settled,
+    named: Candidate,
     improved: Vehicle,
     believed: Vehicle,
     names: Mapping[str, str],
 ) -> tuple[ValueRow, ...]:
     """Every believed value before and after: estimated jointly with the delivered effects, all free, and delivered."""
-    fit = all_free(model, settled.offer.values, list(settled.offer.active))[1]
+    fit = all_free(model, named.values, list(named.active))[1]
     rows = []
-    for key in model.values_beside(settled.offer.active):
+    for key in model.values_beside(named.active):
         beta, covariance = coefficients(model.regression, fit, key)
-        if key in settled.offer.values:
-            change, sd = settled.offer.values[key]
+        if key in named.values:
+            change, sd = named.values[key]
         else:
             change, sd = model.change(key, float(beta[0]), float(np.sqrt(covariance[0, 0])))
         was = believed_value(believed, key)
@@ -78,13 +78,11 @@ def delivered_value(improved: Vehicle, believed: Vehicle, key: str) -> float:
     return believed_value(improved, key)
 
 
-def value_correlations(model: FittedModel, settled: Settled, names: Mapping[str, str]) -> dict[tuple[str, str], float]:
+def value_correlations(model: FittedModel, named: Candidate, names: Mapping[str, str]) -> dict[tuple[str, str], float]:
     """Correlations of two values' estimates from ONLY_A_RATIO on, trust left out: what the recordings alone know."""
-    keys = model.values_beside(settled.offer.active)
+    keys = model.values_beside(named.active)
     loose = dict.fromkeys(keys, 1.0)
-    fit = model.regression.fit(
-        [*model.regression.keys_of("nuisance", "wind"), *keys, *settled.offer.active], loose=loose
-    )
+    fit = model.regression.fit([*model.regression.keys_of("nuisance", "wind"), *keys, *named.active], loose=loose)
     places = fit.places(model.regression.columns(keys))
     covariance = fit.covariance[np.ix_(places, places)]
     sd = np.sqrt(np.maximum(np.diag(covariance), 1e-300))

@@ -7,6 +7,7 @@ leave a maximum thrust below the weight.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from rotorid.steps import step
 from rotorid.vehicle.control.swings import FLIGHTS, SECONDS, SEED, swings, turned_over
 from rotorid.vehicle.exports.forms import FORMS, export_vehicle
 from rotorid.vehicle.flyable import flyable
-from rotorid.vehicle.hover import wrench_at_rest
+from rotorid.vehicle.hover import wrench_at_rest, wrench_of_command
 from rotorid.vehicle.improved import command_path
 
 MOST_HOVER_SHARE = 0.9
@@ -27,6 +28,9 @@ MOST_HOVER_SHARE = 0.9
 HIGH_ABOVE_GROUND_M = 1e3
 BEYOND_ALL = 1e6
 """Weights that no rotors lift: asked for, each turns at its limit."""
+CARRIES = (0.7, 1.4)
+"""Upward force at the recorded rotor speeds, over what was felt with them, that a vehicle which flies like the recorded
+one may make: airspeed and climb change the thrust at the same speed by some ten percent."""
 LIGHT = 0.5
 """Share of the largest recorded thrust below which a vehicle is not taken to be in the air."""
 
@@ -49,8 +53,13 @@ def question_of(believed: Vehicle, runs: Sequence[Run]) -> tuple[Question, tuple
 
 def questions(believed: Vehicle, runs: Sequence[Run]) -> tuple[Question, ...]:
     """Everything that is asked, the cheapest first."""
-    share = recorded_share(runs, believed)
-    return no_body, lambda vehicle: cannot_hover(vehicle, share), cannot_fly
+    share, recorded = recorded_share(runs, believed), recorded_hover(runs, believed)
+    return (
+        no_body,
+        lambda vehicle: cannot_hover(vehicle, share),
+        lambda vehicle: off_as_recorded(vehicle, recorded),
+        cannot_fly,
+    )
 
 
 def no_body(vehicle: Vehicle) -> str:
@@ -74,6 +83,47 @@ def cannot_hover(vehicle: Vehicle, recorded_share: float) -> str:
     return (
         f"its full thrust is {most:.3g} N for a weight of {weight:.3g} N; hovering may take {100 * allowed:.0f} % of it"
     )
+
+
+@dataclass(frozen=True)
+class RecordedHover:
+    """What was recorded in the air, medians over time."""
+
+    speed_rad_s: np.ndarray
+    """Of each rotor, (k,): measured, else commanded."""
+    measured: bool
+    specific_force_m_s2: float
+    """Upward."""
+
+
+def recorded_hover(runs: Sequence[Run], vehicle: Vehicle) -> RecordedHover | None:
+    """Rotor speeds in the air and the specific force that went with them; None where the runs do not have both."""
+    limits, force = vehicle.rotor_speed_limits_rad_s, c.SPECIFIC_FORCE[2]
+    for group in ("rotor_speed", "rotor_command", "throttle"):
+        names = list(c.rotor_columns(group, vehicle.rotor_count))
+        own = [r.table[[*names, force]].to_numpy() for r in runs if r.has(*names, force)]
+        if own and (limits is not None or group != "throttle"):
+            table = np.concatenate(own)
+            table[:, :-1] *= limits[1] if group == "throttle" else 1.0
+            square = (table[:, :-1] ** 2).mean(axis=1)
+            flying = table[square > LIGHT * np.nanquantile(square, 0.99)]
+            if len(flying):
+                middle = np.nanmedian(flying, axis=0)
+                return RecordedHover(middle[:-1], group == "rotor_speed", -float(middle[-1]))
+    return None
+
+
+def off_as_recorded(vehicle: Vehicle, recorded: RecordedHover | None) -> str:
+    """Why it does not carry at the recorded rotor speeds what it carried then; empty where it does."""
+    if recorded is None or recorded.specific_force_m_s2 <= 0:
+        return ""
+    flown = flyable(vehicle)[0]
+    path = None if recorded.measured else command_path(flown)
+    up = wrench_of_command(flown, path, recorded.speed_rad_s, HIGH_ABOVE_GROUND_M)[0]
+    share = float(up) / (vehicle.mass_kg * recorded.specific_force_m_s2)
+    if CARRIES[0] <= share <= CARRIES[1]:
+        return ""
+    return f"at the rotor speeds that were recorded it makes {share:.2g} times the upward force that was felt"
 
 
 def full_thrust_n(vehicle: Vehicle) -> float | None:

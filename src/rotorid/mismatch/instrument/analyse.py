@@ -20,8 +20,8 @@ from rotorid.mismatch.decision.evidence import weighed
 from rotorid.mismatch.decision.findings import Analysis, Finding, Trace
 from rotorid.mismatch.decision.probability import with_probabilities
 from rotorid.mismatch.decision.select import Selection
-from rotorid.mismatch.delivery.final import Offered, as_delivered
-from rotorid.mismatch.delivery.gate import Gated, Offer
+from rotorid.mismatch.delivery.candidates import Candidate
+from rotorid.mismatch.delivery.final import Offered, Stretches, as_delivered
 from rotorid.mismatch.delivery.parts import claimed
 from rotorid.mismatch.instrument.approximate import needless_values
 from rotorid.mismatch.instrument.chain import (
@@ -159,7 +159,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     seen = on_every_run(model, chain, unseen)
     refitted, moved_plain = settled(model, plain, [])
     first = account(choice, recordings, seen, fit, moved_values, refitted, {**moved_plain, **plain})
-    return as_delivered(offered(choice, weighed(first), seen, plain, moved_values))
+    return as_delivered(offered(choice, weighed(first), seen, plain, moved_values, moved_plain))
 
 
 @dataclass(frozen=True)
@@ -219,6 +219,7 @@ def account(
         believed=setup.vehicle,
         refitted=improved(setup.vehicle, plain),
         improved=choice.vehicle({**moved_values, **choice.values}),
+        named=choice.vehicle({**moved_values, **choice.values}),
         findings=findings,
         values=contract_values(setup.vehicle, choice.stated, VALUE_NAMES) | full_speed_value(setup, chain),
         not_testable={k: v for k, v in choice.reasons.items() if k not in claimed_ids},
@@ -241,11 +242,13 @@ def account(
     )
 
 
-def offered(choice: Choice, words: Analysis, seen: ReadingModel, plain: Values, moved: Values) -> Offered:
+def offered(
+    choice: Choice, words: Analysis, seen: ReadingModel, plain: Values, moved: Values, plain_moved: Values
+) -> Offered:
     """What a choice offers for delivery: what is claimed, fitted without effects that are only suggested.
 
     `words` is the analysis of the whole choice with its statuses; `plain` are the values called wrong where no effect
-    is at work, `moved` those that the choice moved within their trust.
+    is at work, `moved` and `plain_moved` those that the choice and the refitted model moved within their trust.
     """
     model, chain = choice.model, choice.chain
     ids = {f.id for f in claimed(words.findings)}
@@ -253,28 +256,30 @@ def offered(choice: Choice, words: Analysis, seen: ReadingModel, plain: Values, 
     fewer = with_terms(model, active)
     gone = [k for k, _ in chain.fit.chain if k not in ids] if chain is not None and choice.measured else []
 
-    def again(gated: Gated, findings: tuple[Finding, ...]) -> Analysis:
-        final, refitted = gated.settled, gated.refitted
-        kept, shorter = with_terms(fewer, list(final.offer.active)), chain
+    def again(named: Candidate, refitted: Candidate, findings: tuple[Finding, ...]) -> tuple[Analysis, Stretches]:
+        same = len(active) == len(model.selection.active) and not gone
+        if same and named.moved.keys() == moved.keys() and refitted.moved.keys() == plain_moved.keys():
+            return words, ()
+        shorter = chain
         for key in gone:
             shorter = without_id(shorter, key)
-        stated = {k: v for k, v in choice.stated.items() if k in final.offer.values}
-        own = replace(choice, model=kept, chain=shorter, values=final.offer.values, stated=stated, findings=findings)
-        every, changed = replace(seen, selection=kept.selection), {**refitted.moved, **refitted.offer.values}
-        return account(own, words.recordings, every, final.fit, final.moved, refitted.fit, changed)
+        stated = {k: v for k, v in choice.stated.items() if k in named.values}
+        own = replace(choice, model=fewer, chain=shorter, values=named.values, stated=stated, findings=findings)
+        every, changed = replace(seen, selection=fewer.selection), {**refitted.moved, **refitted.values}
+        return account(own, words.recordings, every, named.fit, named.moved, refitted.fit, changed), ()
 
     return Offered(
         words=words,
         model=fewer,
-        offer=Offer(choice.values, tuple(active)),
+        values=choice.values,
+        active=tuple(active),
         plain=plain,
         believed_left=[np.nan_to_num(r.y) for r in model.rows],
         believed=choice.setup.vehicle,
-        stated=choice.stated,
         moved=moved,
         names=VALUE_NAMES,
         whole=len(active) == len(model.selection.active) and not gone,
-        improved=lambda settled: choice.vehicle({**settled.moved, **settled.offer.values}),
+        improved=lambda candidate: choice.vehicle({**candidate.moved, **candidate.values}),
         again=again,
         restates=False,
     )
@@ -303,8 +308,8 @@ def without_each(
             out[effect] = on_traces(traces, seen.rows, residuals_of(seen, fewer))
     for key in [] if chain is None else [k for k, _ in chain.fit.chain if k in names and k not in out]:
         own = speed_traces(seen.setup, without_id(chain, key))
-        left = {(t.run, t.channel, first_s(t.time_s)): t.after for t in own}
-        out[key] = tuple(left.get((t.run, t.channel, first_s(t.time_s)), t.after) for t in traces)
+        left = {(t.run, t.channel, first_s(t.time_s)): t.named for t in own}
+        out[key] = tuple(left.get((t.run, t.channel, first_s(t.time_s)), t.named) for t in traces)
     return out
 
 
@@ -314,7 +319,7 @@ def speed_left(setup: Setup, chain: ChainResult, traces: tuple[Trace, ...]) -> f
     if not own or not chain.findings or set(setup.split.held_out) & set(setup.split.training):
         return 0.0
     floor = (chain.noise_rad_s or 0.0) ** 2 * sum(len(t.before) for t in own)
-    start, left = (sum(float(x @ x) for x in stage) for stage in ([t.before for t in own], [t.after for t in own]))
+    start, left = (sum(float(x @ x) for x in stage) for stage in ([t.before for t in own], [t.named for t in own]))
     return float(np.clip((left - floor) / max(start - floor, 1e-9), 0.0, 1.0)) if left > floor else 0.0
 
 
@@ -361,7 +366,7 @@ def make_traces(model: ReadingModel, refitted: Fit, fit: Fit):
     before = [np.nan_to_num(r.y) for r in model.rows]
     again, after = ([np.nan_to_num(x) for x in residuals_of(model, f)] for f in (refitted, fit))
     traces = [
-        Trace(r.run, CHANNELS[c], UNITS[c], r.time_s, y[:, c], values[:, c], left[:, c])
+        Trace(r.run, CHANNELS[c], UNITS[c], r.time_s, y[:, c], values[:, c], left[:, c], left[:, c])
         for r, y, values, left in zip(model.rows, before, again, after, strict=True)
         for c in model.setup.instrument.channels
     ]

@@ -714,5 +714,5 @@ def speed_traces(setup: Setup, result: ChainResult) -> tuple[Trace, ...]:
     for x, a, b in zip(setup.loadings, believed, left, strict=True):
         times, a, b = averaged(x.time_s, setup.average), averaged(a, setup.average), averaged(b, setup.average)
         for i in range(a.shape[1]):
-            out.append(Trace(x.run, f"rotor_speed_{i + 1}", "rad/s", times, a[:, i], a[:, i], b[:, i]))
+            out.append(Trace(x.run, f"rotor_speed_{i + 1}", "rad/s", times, a[:, i], a[:, i], b[:, i], b[:, i]))
     return tuple(out)

@@ -100,7 +100,7 @@ def on_traces(traces: Sequence[Trace], rows: Sequence[Rows], left: Sequence[np.n
     known = {}
     for r, part in zip(rows, left, strict=True):
         known |= {(r.run, first_s(r.time_s), CHANNELS[k]): values for k, values in enumerate(part.T)}
-    return tuple(known.get((t.run, first_s(t.time_s), t.channel), t.after) for t in traces)
+    return tuple(known.get((t.run, first_s(t.time_s), t.channel), t.named) for t in traces)
 
 
 def speeds_without(found: Fitted, seen: WrenchModel, key: str, traces: tuple[Trace, ...]) -> tuple[np.ndarray, ...]:
@@ -111,7 +111,7 @@ def speeds_without(found: Fitted, seen: WrenchModel, key: str, traces: tuple[Tra
         path = commanded_path(segment, result.fit.chain, result.fit.values, result.fit.shift_s, *rest, result.fit.holds)
         left = thinner(segment.motion.rotor_speed - path)
         known |= {(r.run, first_s(r.time_s), f"rotor_speed_{i + 1}"): own for i, own in enumerate(left.T)}
-    return tuple(known.get((t.run, first_s(t.time_s), t.channel), t.after) for t in traces)
+    return tuple(known.get((t.run, first_s(t.time_s), t.channel), t.named) for t in traces)
 
 
 def first_s(time_s: np.ndarray) -> float:

@@ -510,11 +510,26 @@ class Regression:
         """Columns of the terms of a set, ascending."""
         return self.columns([t.key for t in self.terms if asked & self._number[t.key]])
 
-    def folds(self, whole_runs: bool) -> np.ndarray:
-        """Fold of every block (blocks,), -1 for one that is not fitted; blocks of a fold are left out together."""
+    @property
+    def leaves_runs(self) -> bool:
+        """Whether enough runs are fitted to leave out whole ones: errors are common to a run."""
+        return len(np.unique(self.run[self.training])) >= LEAST_RUNS
+
+    def folds(self, whole_runs: bool | None = None) -> np.ndarray:
+        """Fold of every block (blocks,), -1 for one that is not fitted; blocks of a fold are left out together.
+
+        Default is what everything that is judged where it was not fitted goes by: whole runs where there are enough.
+        """
+        run, whole = self.run[self.training], self.leaves_runs if whole_runs is None else whole_runs
         out = np.full(len(self.training), -1)
-        run = self.run[self.training]
-        out[self.training] = folds(environments(run, self.block_s), run, whole_runs)
+        out[self.training] = folds(environments(run, self.block_s), run, whole)
+        return out
+
+    def left_out_together(self) -> np.ndarray:
+        """Number of the run (or, of fewer than LEAST_RUNS, of the piece) of every block (blocks,); -1 if not fitted."""
+        run, out = self.run[self.training], np.full(len(self.training), -1)
+        pieces = run if self.leaves_runs else environments(run, self.block_s)
+        out[self.training] = np.unique(pieces, return_inverse=True)[1]
         return out
 
     def left_out(
@@ -579,7 +594,7 @@ class Regression:
         others; else environments of every run in turn.
         """
         if whole_runs is None:
-            if len(np.unique(self.run[self.training])) < LEAST_RUNS:
+            if not self.leaves_runs:
                 return self.compare(more, fewer, loose, False)
             apart = self.compare(more, fewer, loose, True)
             return apart if apart.answers else self.compare(more, fewer, loose, False)

@@ -1,8 +1,9 @@
 """What makes a verdict agree with itself: its word and its shares follow from the errors that it prints.
 
-With b, a and n the energies of before, after and the noise floor over the located channels of the runs held out, each
+With b, a and n the energies of before, named and the noise floor over the located channels of the runs held out, each
 channel in units of its floor, the share left is max(0, a − n) / max(b − n, n): up to 0.15 the mismatch is explained,
-below 0.85 partly. A reader with a pocket calculator gets the same word.
+below 0.85 partly. Derivatives, which have no cause, explain nothing. A reader with a
+pocket calculator gets the same word.
 """
 
 from __future__ import annotations
@@ -27,24 +28,24 @@ PLAINLY_OFF = 1.5
 
 def quoted(channel: Channel) -> Errors:
     """A channel's errors on the runs held out; where nothing of it is held out, on the fitted ones."""
-    return channel.rmse.training if channel.rmse.held_out.after is None else channel.rmse.held_out
+    return channel.rmse.training if channel.rmse.held_out.named is None else channel.rmse.held_out
 
 
 def energies(channels: Mapping[str, Channel], located: Sequence[str]) -> tuple[float, float, float]:
-    """Energies before, after and of the noise floor over located channels, each in units of its floor."""
-    before = after = noise = 0.0
+    """Energies before, with what is named, and of the noise floor over located channels, each in units of its floor."""
+    before = named = noise = 0.0
     for name in located:
         errors, floor = quoted(channels[name]), channels[name].noise_floor
-        if errors.before is None or errors.after is None or not floor:
+        if errors.before is None or errors.named is None or not floor:
             continue
-        before, after, noise = before + (errors.before / floor) ** 2, after + (errors.after / floor) ** 2, noise + 1.0
-    return before, after, noise
+        before, named, noise = before + (errors.before / floor) ** 2, named + (errors.named / floor) ** 2, noise + 1.0
+    return before, named, noise
 
 
 def share_left(channels: Mapping[str, Channel], located: Sequence[str]) -> float:
     """Share of the mismatch that is left, from the errors printed."""
-    before, after, noise = energies(channels, located)
-    return min(1.0, max(0.0, after - noise) / max(before - noise, noise)) if noise else 0.0
+    before, named, noise = energies(channels, located)
+    return min(1.0, max(0.0, named - noise) / max(before - noise, noise)) if noise else 0.0
 
 
 def verdict_word(analysis: Analysis, locations: Sequence[Location], left: float) -> str:
@@ -83,7 +84,7 @@ def missing_places(
     stated = with_status(analysis, *CLAIMED) or analysis.wrong_values
     for name, channel in channels.items():
         both = (channel.rmse.held_out, channel.rmse.training)
-        errors = [x for e in both if (x := e.before if stated else e.after) is not None]
+        errors = [x for e in both if (x := e.before if stated else e.named) is not None]
         wrench = name.split("_")[0] in ("force", "moment")
         if wrench and name not in there and max(errors, default=0.0) > PLAINLY_OFF * (channel.noise_floor or np.inf):
             out.setdefault(name, analysis.p_values.get(name, (1.0, 1.0))[0])

@@ -148,14 +148,14 @@ def _edge(analysis: Analysis, interval: Interval, sample: int, end: int) -> floa
 
 def mismatch_of(trace: Trace, explained: bool) -> np.ndarray:
     """The mismatch with as little noise as can be had: what the findings take away, else the residual itself."""
-    return trace.before - trace.after if explained else trace.after
+    return trace.before - trace.named if explained else trace.named
 
 
 def channel_noise(traces: Sequence[Trace]) -> float:
     """Usual size of the residual after the effects, robust against stretches in which it is larger."""
-    parts = [_blocks(t.after, _period(t)) for t in traces]
+    parts = [_blocks(t.named, _period(t)) for t in traces]
     sizes = [np.sqrt(np.nanmean(blocks**2, axis=1)) for blocks in parts if len(blocks)]
-    return float(np.nanmedian(np.concatenate(sizes))) if sizes else rms([t.after for t in traces])
+    return float(np.nanmedian(np.concatenate(sizes))) if sizes else rms([t.named for t in traces])
 
 
 def _blocks(values: np.ndarray, period_s: float) -> np.ndarray:
@@ -306,7 +306,7 @@ def _freedom_per_sample(traces: Sequence[Trace]) -> float:
     count = int(1.0 / _period(traces[0]))
     covariance = np.zeros(count + 1)
     for trace in traces:
-        a = np.nan_to_num(trace.after - np.nanmean(trace.after))
+        a = np.nan_to_num(trace.named - np.nanmean(trace.named))
         for lag in range(min(count + 1, len(a))):
             covariance[lag] += a[lag:] @ a[: len(a) - lag]
     rho = covariance / max(covariance[0], 1e-300)
@@ -324,12 +324,12 @@ def _unexplained(analysis: Analysis, segments: list[Segment]) -> list[Interval]:
     """Stretches in which the residual after the effects is larger or shifted."""
     channels = _long_enough(analysis)
     windows = sum(
-        2 * len(_window_starts(len(t.after), length)) for ts in channels.values() for t in ts for length in _lengths(t)
+        2 * len(_window_starts(len(t.named), length)) for ts in channels.values() for t in ts for length in _lengths(t)
     )
     limit = SCAN_ERROR / max(windows, 1)
     found, hard = [], effort(segments)
     for traces in channels.values():
-        parts = [np.nan_to_num(t.after) for t in traces]
+        parts = [np.nan_to_num(t.named) for t in traces]
         taps = autoregression(parts)
         white = [causal(taps, p) for p in parts]
         # One or two wild samples are a glitch; a mismatch lasts.
@@ -348,7 +348,7 @@ def _sensor_differences(analysis: Analysis) -> dict[tuple[str, str, float], np.n
     if analysis.force_source != "accelerometer":
         return {}
     return {
-        (t.run, f"force_{t.channel[-1]}", float(t.time_s[0])): analysis.improved.mass_kg * t.after
+        (t.run, f"force_{t.channel[-1]}", float(t.time_s[0])): analysis.improved.mass_kg * t.named
         for t in analysis.between_sensors
         if t.channel.startswith("accelerometer") and len(t.time_s)
     }
@@ -360,7 +360,7 @@ def _of_one_sensor(interval: Interval, differences: Mapping[tuple[str, str, floa
     difference = differences.get((trace.run, trace.channel, float(trace.time_s[0])))
     if difference is None:
         return False
-    left, whole = (float(np.nansum(x[part] ** 2)) for x in (trace.after - difference, trace.after))
+    left, whole = (float(np.nansum(x[part] ** 2)) for x in (trace.named - difference, trace.named))
     return left < 0.5 * whole
 
 
@@ -370,7 +370,7 @@ def _apart(traces, parts) -> list[Interval]:
     between = apart([t.run for t in traces], parts, 1.0 / _period(traces[0]), noise)
     means = between.means if between else {}
     return [
-        Interval(t, 0, len(t.after), between.p_value, False, of_the_run=True)
+        Interval(t, 0, len(t.named), between.p_value, False, of_the_run=True)
         for t in traces
         if abs(means.get(t.run, 0.0)) > SHIFTED * noise
     ]
@@ -403,7 +403,7 @@ def _evened(traces: Sequence[Trace], white: list[np.ndarray], hard) -> list[np.n
 
 
 def _lengths(trace: Trace) -> list[int]:
-    return [n for s in SCAN_S if 4 < (n := int(round(s / _period(trace)))) <= len(trace.after) // 2]
+    return [n for s in SCAN_S if 4 < (n := int(round(s / _period(trace)))) <= len(trace.named) // 2]
 
 
 def _window_starts(size: int, length: int) -> np.ndarray:
@@ -434,13 +434,13 @@ def _flagged(series: Sequence[np.ndarray], hits: Iterable[tuple[int, int, np.nda
 def _nearby(trace: Trace, start: int, stop: int) -> slice:
     """A stretch and a second on either side: where its edges are looked for."""
     reach = int(round(1.0 / _period(trace)))
-    return slice(max(start - reach, 0), min(stop + reach, len(trace.after)))
+    return slice(max(start - reach, 0), min(stop + reach, len(trace.named)))
 
 
 def _louder(traces, white, limit) -> list[Interval]:
     """Windows with more energy than the spread of the windows' energies allows."""
     hits = []
-    for length in _lengths(min(traces, key=lambda t: len(t.after))):
+    for length in _lengths(min(traces, key=lambda t: len(t.named))):
         means = [_window_sums(w**2, length) / length for w in white]
         pooled = np.concatenate(means)
         usual = max(float(np.median(pooled)), 1e-300)  # of a rotor at rest next to nothing is left
@@ -483,7 +483,7 @@ def _correlation(values: np.ndarray, lag: int) -> float:
 def _shifted(traces, white, parts, limit) -> list[Interval]:
     """Windows whose mean is further from zero than the windows' own spread allows, and far enough to matter."""
     noise, least, hits = channel_noise(traces), 1.0, []
-    for length in _lengths(min(traces, key=lambda t: len(t.after))):
+    for length in _lengths(min(traces, key=lambda t: len(t.named))):
         sums = [_window_sums(w, length) / np.sqrt(length) for w in white]
         local = [_window_sums(p, length) / length for p in parts]
         count = sum(len(w) // length for w in white)

@@ -142,13 +142,13 @@ def _still_off(contents: Contents, main: str, how: SizeWords) -> str:
     known = scales(contents.analysis)
     left = {}
     for channel, own in contents.channels.items():
-        after = quoted(own).after
-        if channel in known and after is not None:
-            left[channel] = math.sqrt(max(after**2 - (own.noise_floor or 0.0) ** 2, 0.0))
+        named = quoted(own).named
+        if channel in known and named is not None:
+            left[channel] = math.sqrt(max(named**2 - (own.noise_floor or 0.0) ** 2, 0.0))
     most = max(left, key=lambda c: left[c] / known[c].value, default=None)
     if most in (None, main) or left[most] < WORTH_A_WORD * known[most].value:
         return ""
-    size = channel_size(contents.analysis, most, left[most], "after")
+    size = channel_size(contents.analysis, most, left[most], "named")
     off = f"{number(left[most])} {contents.channels[most].unit}"
     return f"; the {channel_words(most)} stays {off} off ({size_words(size, how)})"
 
@@ -234,12 +234,12 @@ def size_words(size: Size, how: SizeWords = "both") -> str:
 
 def _better_in_short(main: str, channels: Mapping[str, Channel]) -> str:
     errors = quoted(channels[main]) if main else None
-    if errors is None or errors.before is None or errors.after is None:
+    if errors is None or errors.before is None or errors.named is None:
         return ""
     unit, floor = channels[main].unit, number(channels[main].noise_floor)
-    if errors.after >= errors.before:
-        return f"; the error is not smaller with this ({number(errors.after)} {unit})"
-    return f"; the error falls to {number(errors.after)} {unit} (noise {floor})"
+    if errors.named >= errors.before:
+        return f"; the error is not smaller with this ({number(errors.named)} {unit})"
+    return f"; the error falls to {number(errors.named)} {unit} (noise {floor})"
 
 
 def warnings_of(channels: Mapping[str, Channel]) -> list[str]:
@@ -297,8 +297,8 @@ def main_channel(analysis: Analysis, locations: Sequence[Location], channels: Ma
 
     def size(name: str) -> float:
         errors = quoted(channels[name])
-        before, after = errors.before or 0.0, errors.after or 0.0
-        off = math.sqrt(max(before**2 - after**2, 0.0)) if explained else before
+        before, named = errors.before or 0.0, errors.named or 0.0
+        off = math.sqrt(max(before**2 - named**2, 0.0)) if explained else before
         return off / known[name].value if name in known else 0.0
 
     return max(named or there or [t.channel for t in analysis.traces], key=size, default="")
@@ -379,7 +379,7 @@ def _left_out(finding: Finding, share: float | None) -> str:
     numbers = f" ({', '.join(filter(None, said))})" if any(said) else ""
     if _concerns_the_recording(finding):
         return f"{named}: {sentence}{numbers}."
-    kept_out = f" It is not delivered: {finding.withheld}." if finding.withheld else ""
+    kept_out = f" It is not in the delivered vehicle: {finding.withheld}." if finding.withheld else ""
     return f"{named} was left out{f': {sentence}' if sentence else ''}{numbers}.{kept_out}"
 
 
@@ -416,8 +416,8 @@ def _better(main: str, channels: Mapping[str, Channel], corrected: Sequence[str]
     channel = channels[main]
     errors, unit = quoted(channel), channel.unit
     error = f"error of the {channel_words(main)} {_said_of(channel)}"
-    before, after, noise = map(number, (errors.before, errors.after, channel.noise_floor))
-    if errors.before is not None and errors.after is not None and errors.after >= errors.before:
+    before, after, noise = map(number, (errors.before, errors.named, channel.noise_floor))
+    if errors.before is not None and errors.named is not None and errors.named >= errors.before:
         return f"The {error} is not smaller with this: {before} before, {after} {unit} after."
     also = f", and believed values corrected within their trust ({listed(list(corrected))})," if corrected else ""
     return (
@@ -446,7 +446,7 @@ def _agreement(analysis: Analysis, channels: Mapping[str, Channel]) -> str:
     shown = [c for c in ("force_z", "force_x", "moment_x", "moment_z") if c in channels] or list(channels)
     chosen = shown[:1] + [c for c in shown[1:] if c.startswith("moment")][:1]
     errors = [
-        f"the {channel_words(c)} is {number(quoted(channels[c]).after)} {channels[c].unit} off "
+        f"the {channel_words(c)} is {number(quoted(channels[c]).named)} {channels[c].unit} off "
         f"(noise {number(channels[c].noise_floor)})"
         for c in chosen
     ]

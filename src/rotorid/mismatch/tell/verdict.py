@@ -82,10 +82,12 @@ class Runs(Part):
 
 
 class Errors(Part):
-    """Root mean square error with believed values, with values refitted, and with the established effects."""
+    """Root mean square errors of the believed vehicle, of values refitted, of values with the effects that are claimed
+    (one member of each class), and of the vehicle that is delivered, derivatives included."""
 
     before: Magnitude
     refitted: Magnitude
+    named: Magnitude
     after: Magnitude
 
 
@@ -221,7 +223,6 @@ class BelievedValue(Part):
     interval_95: Interval
     delivered: Number = Field(description="What stands in improved_vehicle.yaml.")
     wrong: bool = Field(description="Whether it is among `parameters`.")
-    withheld: str = Field(description="Of a wrong one that is not delivered: why.")
 
 
 class Correlated(Part):
@@ -229,6 +230,39 @@ class Correlated(Part):
 
     values: tuple[str, str]
     correlation: Number
+
+
+class Score(Part):
+    """How well a candidate predicts what was left out of the fit."""
+
+    model: Literal["believed", "refitted", "named"]
+    derivatives: bool
+    score: Number = Field(
+        description="Mean over channels, and over what half a second of simulation is off by, of the logarithm of the "
+        "error over the believed vehicle's; lower is better."
+    )
+    standard_error: Magnitude = Field(description="Of the difference from the best candidate.")
+    unfit: str = Field(description="Why it does not hover or fly; empty where it does, or was not asked.")
+
+
+class Delivered(Part):
+    """Which candidate stands in improved_vehicle.yaml."""
+
+    model: Literal["believed", "refitted", "named"]
+    derivatives: bool
+    scores: tuple[Score, ...]
+
+
+class DerivativeOf(Part):
+    """What a channel gains per unit of a quantity, predictive and without a cause."""
+
+    channel: str
+    quantity: str
+    unit: str
+    value: Number
+    interval_95: Interval
+    low: Number
+    high: Number
 
 
 class WrongValue(Part):
@@ -282,6 +316,8 @@ class Verdict(Part):
     channels: dict[str, Channel]
     locations: tuple[Location, ...]
     effects: tuple[EffectVerdict, ...]
+    delivered: Delivered
+    derivatives: tuple[DerivativeOf, ...]
     absent: tuple[Absent, ...]
     parameters: dict[str, WrongValue]
     believed_values: dict[str, BelievedValue]
@@ -329,6 +365,8 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
             effect_verdict(f, shares.get(f.id), analysis.effect_sizes.get(f.id))
             for f in by_share(analysis.findings, shares)
         ),
+        delivered=delivered_of(analysis),
+        derivatives=tuple(DerivativeOf(**d.model_dump()) for d in analysis.improved.derivatives),
         absent=tuple(
             Absent(id=a.id, symbol=a.symbol, at_most=a.at_most, unit=a.unit, share_of_weight=a.share or None)
             for a in analysis.absent
@@ -388,8 +426,13 @@ def believed_value_of(row: ValueRow, analysis: Analysis) -> BelievedValue:
         interval_95=(row.low, row.high),
         delivered=row.delivered,
         wrong=row.name in analysis.values,
-        withheld=analysis.withheld_values.get(row.name, ""),
     )
+
+
+def delivered_of(analysis: Analysis) -> Delivered:
+    """Which candidate is taken home, and every candidate's number."""
+    scores = tuple(Score(**dict(zip(Score.model_fields, s, strict=True))) for s in analysis.delivery.scores)
+    return Delivered(model=analysis.delivery.model, derivatives=analysis.delivery.derivatives, scores=scores)
 
 
 def with_missing_places(

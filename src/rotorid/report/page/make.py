@@ -34,6 +34,7 @@ from rotorid.mismatch.decision.words import (
     sure,
 )
 from rotorid.mismatch.delivery.parts import form_of
+from rotorid.mismatch.tell.steps import steps_of, together, would_explain
 from rotorid.mismatch.tell.tiles import errors_of, tiles
 from rotorid.mismatch.tell.verdict import (
     Absent,
@@ -48,6 +49,7 @@ from rotorid.mismatch.tell.verdict import (
 from rotorid.recordings import RecordingSet
 from rotorid.report.page.data import page_data
 from rotorid.steps import step
+from rotorid.vehicle.derivatives import symbol_of
 
 WORDS = {
     "no_mismatch": "no mismatch",
@@ -112,6 +114,7 @@ def make_page(
         tiles=[
             {"heading": t.heading, "large": pretty(t.large), "small": pretty(t.small)} for t in tiles(verdict, main)
         ],
+        steps=step_rows(verdict),
         details=[pretty(text) for text in verdict.details],
         where_text=where_text(verdict),
         strip=strip(analysis, verdict),
@@ -123,6 +126,8 @@ def make_page(
         values=[value_range(name, *v) for name, v in analysis.values.items()],
         all_values=[value_row(name, row) for name, row in verdict.believed_values.items()],
         correlated=correlated_text(verdict),
+        derivatives=derivative_rows(verdict),
+        scores=score_rows(verdict),
         better_text=better_text(verdict),
         forward_text=forward_text(verdict),
         table=error_table(verdict.channels, data["fit_percent"]),
@@ -498,7 +503,7 @@ def value_row(name: str, row: BelievedValue) -> dict:
         "estimate": pretty(plus_minus(row.estimate, low, high)) if row.estimate is not None else "–",
         "delivered": cell(row.delivered),
         "change": pretty(change),
-        "note": pretty(f"not delivered: {row.withheld}" if row.withheld else "wrong" if row.wrong else ""),
+        "note": pretty("wrong" if row.wrong else ""),
     }
 
 
@@ -543,14 +548,94 @@ def error_table(channels: Mapping[str, Channel], fits: Mapping[str, tuple[float,
                 "noise": cell(channels[c].noise_floor),
                 "bars": bars(channels[c]),
                 "fit": pretty(" → ".join(f"{v:.0f}" for v in fits[c])) if c in fits else "–",
-                "held_out": [cell(getattr(channels[c].rmse.held_out, s)) for s in ("before", "refitted", "after")],
-                "training": [cell(getattr(channels[c].rmse.training, s)) for s in ("before", "refitted", "after")],
+                "held_out": [cell(getattr(channels[c].rmse.held_out, s)) for s in STAGES],
+                "training": [cell(getattr(channels[c].rmse.training, s)) for s in STAGES],
             }
             for c in chosen
         ]
         if rows:
             groups.append({"name": name, "rows": rows})
     return groups
+
+
+STAGES = ("before", "refitted", "named", "after")
+MODELS = {"believed": "as believed", "refitted": "values refitted", "named": "values and named physics"}
+
+
+def step_rows(verdict: Verdict) -> list[dict]:
+    """A bar a channel: shares of its error, in percent of its length, that values, named physics and derivatives take
+    off, noise, and what is left above it."""
+    rows, steps = [], steps_of(verdict.channels, verdict.delivered.model)
+    whole = together(steps)
+    for name, s in {**steps, **({"all channels": whole} if whole else {})}.items():
+        ends = np.minimum.accumulate(np.clip([1.0, s.values, s.named, s.delivered], 0.0, 1.0))
+        noise = min(s.noise, ends[3])
+        widths = [*(ends[:-1] - ends[1:]), ends[3] - noise, noise]
+        rows.append(
+            {
+                "name": capital(channel_words(name)) if name in steps else "All, in the mean",
+                "parts": [
+                    {"kind": kind, "width": f"{100 * w:.1f}", "said": f"{words} {100 * w:.0f} %"}
+                    for kind, words, w in zip(STEP_KINDS, STEP_WORDS, widths, strict=True)
+                ],
+                "worse": s.delivered > 1.0,
+            }
+        )
+    return rows
+
+
+STEP_KINDS = ("values", "named", "derivatives", "left", "noise")
+STEP_WORDS = ("values take off", "named physics", "predictable, without a name", "left above the noise", "noise")
+
+
+def derivative_rows(verdict: Verdict) -> list[dict]:
+    """The table of derivatives, those first whose interval leaves out nothing."""
+    rows = []
+    for d in verdict.derivatives:
+        low, high = d.interval_95
+        clear = low > 0 or high < 0
+        names = [effect_words(i) for i in would_explain(d.channel, d.quantity, verdict)] if clear else []
+        rows.append(
+            {
+                "symbol": subscripts(symbol_of(d.channel, d.quantity)),
+                "words": derivative_words(d.channel, d.quantity),
+                "value": pretty(f"{number(d.value, 3)} ({number(low, 3)} to {number(high, 3)})"),
+                "unit": unit_text(d.unit),
+                "range": "" if d.quantity == "constant" else pretty(f"{number(d.low, 2)} to {number(d.high, 2)}"),
+                "clear": clear,
+                "names": listed(names, "or") if names else "",
+            }
+        )
+    return sorted(rows, key=lambda row: not row["clear"])
+
+
+def derivative_words(channel: str, quantity: str) -> str:
+    """A derivative in words: `sideways force by sideways velocity`."""
+    if quantity == "constant":
+        return f"{channel_words(channel)}, constant"
+    return f"{channel_words(channel)} by {QUANTITY_WORDS[quantity]}"
+
+
+QUANTITY_WORDS = {
+    **{"u": "forward velocity", "v": "sideways velocity", "w": "downward velocity"},
+    **{"p": "roll rate", "q": "pitch rate", "r": "yaw rate", "thrust": "thrust", "thrust_roll": "rolling thrust"},
+    **{"thrust_pitch": "pitching thrust", "thrust_yaw": "thrust by spin", "speed": "rotor speed"},
+}
+
+
+def score_rows(verdict: Verdict) -> list[dict]:
+    """Every candidate with its error over the believed vehicle's where nothing was fitted; the delivered one marked."""
+    taken = verdict.delivered.model, verdict.delivered.derivatives
+    return [
+        {
+            "name": MODELS[s.model] + (", with derivatives" if s.derivatives else ""),
+            "error": f"{100 * math.exp(s.score):.0f} %",
+            "doubt": f"± {100 * math.exp(s.score) * (s.standard_error or 0.0):.0f} %",
+            "taken": (s.model, s.derivatives) == taken,
+            "unfit": s.unfit,
+        }
+        for s in verdict.delivered.scores
+    ]
 
 
 FARTHEST = 100.0

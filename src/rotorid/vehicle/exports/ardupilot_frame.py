@@ -13,13 +13,14 @@ import numpy as np
 from scipy.optimize import brentq
 
 from rotorid.recordings.vehicle import Vehicle
+from rotorid.vehicle.exports.derivatives import left_of_one_damping, own_damping
 from rotorid.vehicle.exports.forms import Exported, parts_of
 from rotorid.vehicle.exports.four_in_x import SENSES, order_in_x
 from rotorid.vehicle.exports.sih import RICHEST, full_speed_rad_s, with_drag_of_hover
 from rotorid.vehicle.mixer import hover_speed_rad_s
 
 KNOWS = frozenset({"rotor_drag", "frame_drag", "rotational_damping", "com_offset", "command_saturation"})
-KNOWS |= {"throttle_curve"}
+KNOWS |= {"throttle_curve", "derivatives"}
 GRAVITY = 9.80665
 """ArduPilot's."""
 DENSITY_KG_M3 = 1.225
@@ -38,7 +39,7 @@ def ardupilot_json(vehicle: Vehicle) -> Exported:
     parts = parts_of(with_drag_of_hover(vehicle), KNOWS)
     order = order_in_x(parts.places, vehicle.yaw_signs(), vehicle.name, "ArduPilot's frame X")
     places, thrust, torque = parts.places[order], parts.thrust[order], parts.torque[order]
-    left = list(parts.left_out)
+    left = [*parts.left_out, *left_of_one_damping(vehicle)]
     if not parts.limits_rad_s:
         left.append(
             f"full thrust: rotor_speed_limits_rad_s is not stated, {RICHEST:g} times the hover's speed is taken"
@@ -56,15 +57,20 @@ def ardupilot_json(vehicle: Vehicle) -> Exported:
     if vehicle.rotor_radius_m is None:
         left.append("rotor_radius_m is not stated: an eighth of the diagonal is taken for the disc's area")
     drag = len(order) * float(np.mean(parts.drag)) * hover_speed_rad_s(vehicle)
+    # X_u and the like come on top, as the drag of the hover's thrust.
+    own, weights = own_damping(vehicle, turning=False)
+    drag = max(drag + float(np.average(own, weights=weights)), 0.0)
     momentum = drag / np.sqrt(DENSITY_KG_M3 * area * weight)
     if drag:
-        left.append("rotor drag: it goes with the root of the thrust there, and along z as well")
+        left.append("linear drag: it goes with the root of the thrust there, and along z as well")
     bluff = 2 * float(np.mean(parts.frame[:2])) / DENSITY_KG_M3
     if bluff:
         left.append("drag of the frame: by component there, and the same along every axis")
     rate = 0.0
-    damping = float(np.mean(np.array(parts.damping) / np.diag(parts.inertia)))
-    if damping:
+    own, weights = own_damping(vehicle, turning=True)
+    inertia = np.diag(parts.inertia)
+    damping = float(np.mean(np.array(parts.damping) / inertia) + np.average(own / inertia, weights=weights))
+    if damping > 0:
         rate = float(DAMPING_RAD_S / damping)
         left.append("damping about each axis: one rate for all is taken")
     if not any(entry["id"] == "motor_lag" for entry in vehicle.effects):

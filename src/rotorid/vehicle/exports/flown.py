@@ -20,6 +20,7 @@ import numpy as np
 
 from rotorid.errors import InputError
 from rotorid.recordings.vehicle import Vehicle
+from rotorid.vehicle.exports.derivatives import MUJOCO_FILE, ROTORPY_FILE
 from rotorid.vehicle.exports.forms import AT_ONCE_S, FLU, Exported, expressed
 from rotorid.vehicle.improved import simulate_as_stated
 from rotorid.vehicle.mixer import hover_speed_rad_s
@@ -103,10 +104,32 @@ def difference(
     )
 
 
-def in_rotorpy(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> Difference:
-    """Fly RotorPy's Multirotor with the exported parameters next to ours."""
+def multirotor_of(exported: Exported) -> type:
+    """RotorPy's Multirotor, or that of the file's companion."""
     from rotorpy.vehicles.multirotor import Multirotor
 
+    scope: dict[str, Any] = {"WithDerivatives": Multirotor}
+    exec(exported.companions.get(ROTORPY_FILE, ""), scope)
+    return scope["WithDerivatives"]
+
+
+@contextmanager
+def passive_forces(exported: Exported) -> Iterator[None]:
+    """MuJoCo with the callback of the file's companion or none, and after it with that of before."""
+    import mujoco
+
+    scope: dict[str, Any] = {"passive": None}
+    exec(exported.companions.get(MUJOCO_FILE, ""), scope)
+    before = mujoco.get_mjcb_passive()
+    mujoco.set_mjcb_passive(scope["passive"])
+    try:
+        yield
+    finally:
+        mujoco.set_mjcb_passive(before)
+
+
+def in_rotorpy(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> Difference:
+    """Fly RotorPy's Multirotor with the exported parameters and their companion next to ours."""
     time, speeds = commands_of(vehicle, duration_s)
     tau_s = exported.parameters["tau_m"]
     state = {
@@ -115,7 +138,9 @@ def in_rotorpy(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) ->
     }  # fmt: skip
     tight = {"method": "RK45", "rtol": 1e-6, "atol": 1e-9}
     with read_by("RotorPy"):
-        flyer = Multirotor(exported.parameters, state, control_abstraction="cmd_motor_speeds", integrator_kwargs=tight)
+        flyer = multirotor_of(exported)(
+            exported.parameters, state, control_abstraction="cmd_motor_speeds", integrator_kwargs=tight
+        )
     at_once = tau_s == AT_ONCE_S
     if at_once:  # the speed is set at every step and stays over it
         flyer.tau_m = 1e6
@@ -132,7 +157,7 @@ def in_rotorpy(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) ->
 
 
 def in_mujoco(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> Difference:
-    """Fly the exported model in MuJoCo next to ours without the effects that the model cannot express."""
+    """Fly the exported model and its companion in MuJoCo next to ours without the effects that they cannot express."""
     import mujoco
 
     with read_by("MuJoCo"):
@@ -145,11 +170,12 @@ def in_mujoco(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> 
     tau_s = float(model.actuator_dynprm[0, 0]) if model.na else 0.0
     data.act[:] = thrust[0, : model.na]
     position, attitude = [data.qpos[:3].copy()], [data.qpos[3:7].copy()]
-    for k in range(len(time) - 1):
-        data.ctrl[:] = thrust[k]
-        mujoco.mj_step(model, data)
-        position.append(data.qpos[:3].copy())
-        attitude.append(data.qpos[3:7].copy())
+    with passive_forces(exported):
+        for k in range(len(time) - 1):
+            data.ctrl[:] = thrust[k]
+            mujoco.mj_step(model, data)
+            position.append(data.qpos[:3].copy())
+            attitude.append(data.qpos[3:7].copy())
     here = ours(expressed(vehicle, "mjcf"), np.sqrt(lagging(speeds**2, tau_s, tau_s)))
     return difference((np.array(position), np.array(attitude)), here, "MuJoCo")
 
@@ -187,15 +213,25 @@ class GazeboMotor:
             sense = 1.0 if value["turningDirection"] == "ccw" else -1.0
             return GazeboMotor(value["linkName"], sense, *(float(value[name]) for name in names))
 
-        plugins = ElementTree.fromstring(text).iter("plugin")
+        plugins = [p for p in ElementTree.fromstring(text).iter("plugin") if p.find("motorNumber") is not None]
         return [read(p) for p in sorted(plugins, key=lambda p: int(p.findtext("motorNumber", "0")))]
+
+
+def gazebo_damping_of(text: str) -> np.ndarray:
+    """Linear terms (6, 6) of a model's Hydrodynamics by velocity and rates; SI, forward-left-up."""
+    plugins = ElementTree.fromstring(text).iter("plugin")
+    own = next(
+        (p for p in plugins if p.get("name") == "gz::sim::systems::Hydrodynamics"), ElementTree.Element("plugin")
+    )
+    return np.array([[float(own.findtext(channel + quantity, "0")) for quantity in "UVWPQR"] for channel in "xyzkmn"])
 
 
 def in_drake(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> Difference:
     """Fly the exported SDF model in Drake next to ours without the effects that the model cannot express.
 
     Drake reads masses, inertias, places and joints. It has no motor model: thrust C_F ω² and drag −k ω v⊥ act on the
-    rotor's link and the torque on the body, as in Gazebo's `MulticopterMotorModel::UpdateForcesAndMoments`.
+    rotor's link and the torque on the body, as in Gazebo's `MulticopterMotorModel::UpdateForcesAndMoments`, and the
+    linear terms of its `Hydrodynamics` on the body.
     """
     from pydrake.common.value import Value
     from pydrake.math import RotationMatrix
@@ -205,7 +241,7 @@ def in_drake(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> D
     from pydrake.systems.analysis import Simulator
     from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
-    motors = GazeboMotor.all_of(exported.text)
+    motors, damping = GazeboMotor.all_of(exported.text), gazebo_damping_of(exported.text)
     time, speeds = commands_of(vehicle, duration_s)
     turning = np.stack(
         [
@@ -234,20 +270,23 @@ def in_drake(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> D
             plant.SetPositionsAndVelocities(inside, self.get_input_port().Eval(context))
             step = min(int(context.get_time() / STEP_S + 1e-6), len(turning) - 1)
             turned = plant.EvalBodyPoseInWorld(inside, base).rotation().matrix()
-            forces = []
+            moving = plant.EvalBodySpatialVelocityInWorld(inside, base)
+            state = np.concatenate([turned.T @ moving.translational(), turned.T @ moving.rotational()])
+            added = damping @ state
+            wrenches = [(base, turned @ added[3:], turned @ added[:3])]
             for m, link, speed in zip(motors, links, turning[step], strict=True):
                 moving = plant.EvalBodySpatialVelocityInWorld(inside, link).translational()
                 across = moving - (moving @ turned[:, 2]) * turned[:, 2]
                 thrust = m.thrust * speed**2
                 pull = thrust * turned[:, 2] - abs(speed) * m.drag * across
-                for body, torque, force in (
-                    (link, np.zeros(3), pull),
-                    (base, -m.sense * m.moment * thrust * turned[:, 2], np.zeros(3)),
-                ):
-                    applied = ExternallyAppliedSpatialForce()
-                    applied.body_index, applied.p_BoBq_B = body.index(), np.zeros(3)
-                    applied.F_Bq_W = SpatialForce(torque, force)
-                    forces.append(applied)
+                wrenches.append((link, np.zeros(3), pull))
+                wrenches.append((base, -m.sense * m.moment * thrust * turned[:, 2], np.zeros(3)))
+            forces = []
+            for body, torque, force in wrenches:
+                applied = ExternallyAppliedSpatialForce()
+                applied.body_index, applied.p_BoBq_B = body.index(), np.zeros(3)
+                applied.F_Bq_W = SpatialForce(torque, force)
+                forces.append(applied)
             out.set_value(forces)
 
     rotors = builder.AddSystem(Rotors())

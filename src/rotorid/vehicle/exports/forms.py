@@ -14,6 +14,17 @@ import numpy as np
 
 from rotorid.errors import InputError
 from rotorid.recordings.vehicle import Vehicle
+from rotorid.vehicle.exports.derivatives import (
+    MUJOCO_FILE,
+    ROTORPY_FILE,
+    expressed_by,
+    gazebo_damping,
+    left_of,
+    left_of_gazebo,
+    mujoco_companion,
+    of_state,
+    rotorpy_companion,
+)
 from rotorid.vehicle.exports.limits import refusal
 from rotorid.vehicle.mixer import hover_speed_rad_s
 
@@ -75,24 +86,27 @@ class Parts:
 KNOWS = {
     "rotorpy": frozenset(
         {"rotor_drag", "axial_inflow", "translational_lift", "flapping_moment", "frame_drag", "motor_lag"}
-        | {"com_offset", "inertia_products", "command_saturation"}
+        | {"com_offset", "inertia_products", "command_saturation", "derivatives"}
     ),
-    "mjcf": frozenset({"com_offset", "inertia_products", "motor_lag", "command_saturation"}),
-    "sdf": frozenset({"rotor_drag", "motor_lag", "com_offset", "inertia_products", "command_saturation"}),
+    "mjcf": frozenset({"com_offset", "inertia_products", "motor_lag", "command_saturation", "derivatives"}),
+    "sdf": frozenset(
+        {"rotor_drag", "motor_lag", "com_offset", "inertia_products", "command_saturation", "derivatives"}
+    ),
     "gym-pybullet-drones": frozenset({"rotor_drag", "com_offset", "command_saturation"}),
     "px4": frozenset({"com_offset", "throttle_curve"}),
 }
-"""By form, ids of the effects that it has a place for."""
+"""By form, ids of the effects that it has a place for, and `derivatives` where it says itself what it takes of them."""
 
 
 def expressed(vehicle: Vehicle, to: str) -> Vehicle:
-    """The vehicle with those of its effects that a form takes, and the file's limits.
+    """The vehicle with those of its effects and derivatives that a form takes, and the file's limits.
 
     The lag of the motors is left to who flies it: each tool has its own.
     """
     parts = parts_of(vehicle, KNOWS[to])
     kept = tuple(e for e in parts.taken if e["id"] not in ("motor_lag", "command_saturation"))
-    return vehicle.model_copy(update={"effects": kept, "rotor_speed_limits_rad_s": parts.limits_rad_s})
+    taken = {"effects": kept, "derivatives": expressed_by(vehicle, to)}
+    return vehicle.model_copy(update=taken | {"rotor_speed_limits_rad_s": parts.limits_rad_s})
 
 
 def parts_of(vehicle: Vehicle, knows: frozenset[str]) -> Parts:
@@ -115,6 +129,8 @@ def parts_of(vehicle: Vehicle, knows: frozenset[str]) -> Parts:
         kept.append(entry)
         if isinstance(taken, str):
             left.append(f"{said}: {taken}")
+    if "derivatives" not in knows:
+        left += left_of(vehicle, ())
     return Parts(vehicle.mass_kg, taken=tuple(kept), left_out=tuple(left), **values)
 
 
@@ -175,10 +191,20 @@ def _in_flu(inertia: np.ndarray) -> np.ndarray:
     return inertia * np.outer(FLU, FLU)
 
 
+def _companion(vehicle: Vehicle, name: str, text_of: Callable[[Vehicle], str]) -> tuple[list[str], dict[str, str]]:
+    """Sentences for what a tool with a companion leaves of the derivatives, and the companion's name and text."""
+    taken = of_state(vehicle)
+    if not taken:
+        return left_of(vehicle, ()), {}
+    said = f"derivatives: this file has none, {name} next to it adds them in the tool's own step"
+    return [said, *left_of(vehicle, taken)], {name: text_of(vehicle)}
+
+
 def rotorpy(vehicle: Vehicle) -> Exported:
     """RotorPy's `quad_params` as a Python file."""
     parts = parts_of(vehicle, KNOWS["rotorpy"])
-    left = list(parts.left_out)
+    added, companions = _companion(vehicle, ROTORPY_FILE, rotorpy_companion)
+    left = [*parts.left_out, *added]
     left += _left_of_each_rotor(parts)
     up, down = parts.tau_s
     if up != down:
@@ -219,7 +245,7 @@ def rotorpy(vehicle: Vehicle) -> Exported:
     lines += ["}", ""]
     arrays = {k: np.array(v) if isinstance(v, list) else v for k, v in values.items()}
     arrays["rotor_pos"] = {k: np.array(v) for k, v in values["rotor_pos"].items()}
-    return Exported("\n".join(lines), "rotorpy_params.py", tuple(left), arrays)
+    return Exported("\n".join(lines), "rotorpy_params.py", tuple(left), arrays, companions=companions)
 
 
 def mjcf(vehicle: Vehicle) -> Exported:
@@ -237,6 +263,8 @@ def mjcf(vehicle: Vehicle) -> Exported:
             left = [sentence for sentence in left if not sentence.startswith("motor_lag")]
         else:
             left.append(f"motor_lag: a lag of the rotor speed is taken as one of the thrust, {tau_s:.4g} s")
+    added, companions = _companion(vehicle, MUJOCO_FILE, mujoco_companion)
+    left += added
     j = _in_flu(parts.inertia)
     full = " ".join(f"{v:.9g}" for v in (j[0, 0], j[1, 1], j[2, 2], j[0, 1], j[0, 2], j[1, 2]))
     limit = parts.limits_rad_s
@@ -270,7 +298,7 @@ def mjcf(vehicle: Vehicle) -> Exported:
   </actuator>
 </mujoco>
 """
-    return Exported(text, "vehicle.xml", tuple(left))
+    return Exported(text, "vehicle.xml", tuple(left), companions=companions)
 
 
 def px4(vehicle: Vehicle) -> Exported:
@@ -322,7 +350,7 @@ def sdf(vehicle: Vehicle) -> Exported:
     `src/systems/multicopter_motor_model`; the models of PX4's x500.
     """
     parts = parts_of(vehicle, KNOWS["sdf"])
-    left = [*parts.left_out, *_left_of_the_lowest_speed(parts)]
+    left = [*parts.left_out, *left_of_gazebo(vehicle), *_left_of_the_lowest_speed(parts)]
     up, down = parts.tau_s
     if up == 0:
         left.append(f"rotors that follow at once: Gazebo's motor model needs a lag, {AT_ONCE_S:g} s is taken")
@@ -392,7 +420,7 @@ def sdf(vehicle: Vehicle) -> Exported:
       <visual name="body"><geometry><box><size>0.1 0.1 0.04</size></box></geometry></visual>
     </link>
 {nl.join(links)}
-{nl.join(motors)}
+{nl.join(motors)}{gazebo_damping(vehicle)}
   </model>
 </sdf>
 """

@@ -9,11 +9,13 @@ from __future__ import annotations
 import numpy as np
 
 from rotorid.recordings.vehicle import Vehicle
+from rotorid.vehicle.exports.derivatives import left_of_one_damping, own_damping
 from rotorid.vehicle.exports.forms import Exported, Parts, parts_of
 from rotorid.vehicle.exports.four_in_x import order_in_x
 from rotorid.vehicle.mixer import hover_speed_rad_s
 
 KNOWS = frozenset({"rotor_drag", "rotational_damping", "motor_lag", "inertia_products", "command_saturation"})
+KNOWS |= {"derivatives"}
 FASTEST_S = 0.005
 """Shortest SIH_T_TAU that its Euler step of 4 ms stands."""
 RICHEST = 2.0
@@ -47,7 +49,7 @@ def px4_sih(vehicle: Vehicle) -> Exported:
     parts = parts_of(with_drag_of_hover(vehicle), KNOWS)
     order = order_in_x(parts.places, vehicle.yaw_signs(), vehicle.name, "PX4's SIH")
     places, thrust, torque = parts.places[order], parts.thrust[order], parts.torque[order]
-    left = list(parts.left_out)
+    left = [*parts.left_out, *left_of_one_damping(vehicle)]
     full = full_speed_rad_s(vehicle, parts)
     if not parts.limits_rad_s:
         left.append(
@@ -63,8 +65,14 @@ def px4_sih(vehicle: Vehicle) -> Exported:
     drag = len(order) * float(np.mean(parts.drag)) * hover
     if drag:
         left.append("rotor drag: that of the hover's rotor speed is taken, and along z as along x and y")
+    # X_u and the like come on top; SIH's drag and damping are not below 0.
+    own, weights = own_damping(vehicle, turning=False)
+    drag = max(drag + float(np.average(own, weights=weights)), 0.0)
     if np.ptp(parts.damping) > 0:
         left.append("damping about each axis: its mean is taken")
+    j = parts.inertia
+    own, weights = own_damping(vehicle, turning=True)
+    damping = max(float(np.mean(parts.damping) + np.average(own, weights=weights / np.diag(j) ** 2)), 0.0)
     up, down = parts.tau_s
     tau_s = max((up + down) / 2, FASTEST_S)
     if tau_s > (up + down) / 2:
@@ -72,14 +80,13 @@ def px4_sih(vehicle: Vehicle) -> Exported:
     left.append("motor signals: in SIH thrust is proportional to them, so THR_MDL_FAC belongs to 0 there")
     if vehicle.gravity_m_s2 != 9.81:
         left.append(f"gravity of {vehicle.gravity_m_s2:g} m/s²: SIH has that of its latitude")
-    j = parts.inertia
     values = {
         "SIH_MASS": parts.mass_kg,
         "SIH_IXX": j[0, 0], "SIH_IYY": j[1, 1], "SIH_IZZ": j[2, 2],
         "SIH_IXY": j[0, 1], "SIH_IXZ": j[0, 2], "SIH_IYZ": j[1, 2],
         "SIH_T_MAX": thrust.mean() * full**2, "SIH_Q_MAX": torque.mean() * full**2,
         "SIH_L_ROLL": np.abs(places[:, 1]).mean(), "SIH_L_PITCH": np.abs(places[:, 0]).mean(),
-        "SIH_KDV": drag, "SIH_KDW": np.mean(parts.damping), "SIH_T_TAU": tau_s, "THR_MDL_FAC": 0.0,
+        "SIH_KDV": drag, "SIH_KDW": damping, "SIH_T_TAU": tau_s, "THR_MDL_FAC": 0.0,
     }  # fmt: skip
     comments = [f"# {vehicle.name}, exported by rotorid for PX4's SIH", *(f"# Not expressed: {s}" for s in left)]
     rows = ["1\t1\tSIH_VEHICLE_TYPE\t0\t6", *(f"1\t1\t{name}\t{float(value):.9g}\t9" for name, value in values.items())]

@@ -196,7 +196,7 @@ def test_the_ratio_is_that_of_errors_with_and_without_where_the_effect_acts():
     time_s = np.arange(0.0, 120.0, 0.025)
     noise = rng.standard_normal(len(time_s))
     added = np.where(time_s > 80.0, rng.standard_normal(len(time_s)), 0.0)
-    trace = Trace("a", "force_x", "N", time_s, noise + added, noise + added, noise)
+    trace = Trace("a", "force_x", "N", time_s, noise + added, noise + added, noise, noise)
     analysis = SimpleNamespace(compared=(trace,))
     every, nothing = np.ones(len(time_s), bool), np.zeros(len(time_s), bool)
     ratio = ratio_of(analysis, (noise + added,), [every], "force_x")
@@ -210,8 +210,8 @@ def test_an_error_of_a_sensor_is_judged_by_what_two_sensors_say():
     rng = np.random.default_rng(2)
     time_s = np.arange(0.0, 60.0, 0.025)
     noise, missed = rng.standard_normal((2, len(time_s)))
-    force = Trace("a", "force_z", "N", time_s, noise + missed, noise, noise)
-    between = Trace("a", "accelerometer_z", "m/s2", time_s, noise + missed, noise + missed, noise)
+    force = Trace("a", "force_z", "N", time_s, noise + missed, noise, noise, noise)
+    between = Trace("a", "accelerometer_z", "m/s2", time_s, noise + missed, noise + missed, noise, noise)
     analysis = SimpleNamespace(
         compared=(force, between), between_sensors=(between,), noise_floor={"force_z": 1.0, "accelerometer_z": 1.0}
     )

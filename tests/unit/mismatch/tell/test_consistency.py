@@ -10,7 +10,7 @@ from rotorid.mismatch.tell.consistency import missing_places, verdict_word
 
 
 def channel(before: float, after: float):
-    errors = SimpleNamespace(before=before, after=after)
+    errors = SimpleNamespace(before=before, named=after, after=after)
     return SimpleNamespace(noise_floor=1.0, rmse=SimpleNamespace(held_out=errors, training=errors))
 
 

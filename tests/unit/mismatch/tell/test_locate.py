@@ -30,7 +30,7 @@ def test_the_same_noise_louder_for_a_while_is_a_sensor_and_no_mismatch(pole):
     for seed in range(5):
         made = analysis(seed, pole=pole)
         louder = [np.where((t.time_s > 20) & (t.time_s < 23) & (t.run == "b"), 3.0, 1.0) for t in made.traces]
-        traces = [replace(t, after=t.after * x) for t, x in zip(made.traces, louder, strict=True)]
+        traces = [replace(t, named=t.named * x) for t, x in zip(made.traces, louder, strict=True)]
         assert not locate(replace(made, traces=tuple(traces)))
 
 
@@ -48,7 +48,7 @@ def test_a_run_that_differs_from_the_others_is_located_as_a_whole():
     """Run b is off by 3 of its noise throughout; reported only where the analysis says that runs differ."""
     made = analysis(unexplained_depends_on=("run",))
     traces = tuple(
-        replace(t, after=t.after + 3 * made.noise_floor[t.channel]) if (t.run, t.channel) == ("b", "moment_y") else t
+        replace(t, named=t.named + 3 * made.noise_floor[t.channel]) if (t.run, t.channel) == ("b", "moment_y") else t
         for t in made.traces
     )
     (found,) = locate(replace(made, traces=traces))
@@ -104,7 +104,7 @@ def test_two_wild_samples_are_no_mismatch():
             after = t.after.copy()
             if (t.run, t.channel) == ("b", "moment_y"):
                 after[400 : 400 + count] += size * made.noise_floor[t.channel]
-            traces.append(replace(t, after=after))
+            traces.append(replace(t, named=after))
         return replace(made, traces=tuple(traces))
 
     assert not locate(spoiled(2, 10.0))
@@ -126,6 +126,14 @@ def test_what_the_accelerometer_alone_reads_is_located_nowhere(alone):
     made = analysis(bursts=[("b", "force_y", 20.0, 23.0, 6.0)])
     (burst,) = [t for t in made.traces if (t.run, t.channel) == ("b", "force_y")]
     read = np.where((burst.time_s > 20.0) & (burst.time_s < 23.0), burst.after, 0.0) / made.improved.mass_kg
-    sensors = replace(burst, channel="accelerometer_y", unit="m/s2", before=read, refitted=read, after=read * alone)
+    sensors = replace(
+        burst,
+        channel="accelerometer_y",
+        unit="m/s2",
+        before=read,
+        refitted=read,
+        named=read * alone,
+        after=read * alone,
+    )
     found = locate(replace(made, force_source="accelerometer", between_sensors=(sensors,)))
     assert [(f.run, f.channel) for f in found] == ([] if alone else [("b", "force_y")])

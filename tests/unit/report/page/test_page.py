@@ -51,7 +51,7 @@ def test_the_page_opens_with_the_sentence_of_the_verdict(findings):
 
 
 def test_the_page_begins_with_doubts_and_shows_warnings_values_and_what_is_withheld():
-    made = analysis(findings=[drag_finding(withheld="where it was not fitted, the roll moment is worse")], dash=True)
+    made = analysis(findings=[drag_finding(withheld="a plainer vehicle predicts as well")], dash=True)
     made = replace(
         made,
         doubts=(Doubt("mass_kg", "The mass is <in grams>.", stops=True),),
@@ -64,7 +64,7 @@ def test_the_page_begins_with_doubts_and_shows_warnings_values_and_what_is_withh
     assert doubts < heading and "The mass is &lt;in grams&gt;." in page and 'class="word not_judged"' in page
     assert "What is delivered makes worse" in page and "is larger with the improved vehicle" in page
     assert "All believed values" in page and "0.700 ± 0.020" in page
-    assert "Not delivered: where it was not fitted, the roll moment is worse." in page
+    assert "Not delivered: a plainer vehicle predicts as well." in page
 
 
 def test_the_tiles_say_what_where_and_how_much():

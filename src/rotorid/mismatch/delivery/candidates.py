@@ -1,0 +1,163 @@
+"""Which vehicle is taken home: one number chooses among a few candidates.
+
+The number is the mean, over the channels of force and moment and over what half a second of simulation from recorded
+states is off by, of the logarithm of the error on what was left out of the fit (`Regression.folds`): whole
+runs where there are three or more. Taken is the plainest candidate within one standard error of the best, among those
+that hover and fly. No channel has a veto, and no part is taken out by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from rotorid.mismatch.delivery.derivatives import Learnt
+from rotorid.mismatch.model.delivered import Values
+from rotorid.mismatch.plant.regression import Fit
+
+PLAINEST_FIRST = (
+    ("believed", False),
+    ("refitted", False),
+    ("named", False),
+    ("named", True),
+    ("refitted", True),
+    ("believed", True),
+)
+"""Candidates by what of them has no cause: derivatives that stand next to named physics have less to say than those
+that stand in for it."""
+DRAWS = 400
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A vehicle that may be taken home."""
+
+    model: Literal["believed", "refitted", "named"]
+    values: Values
+    """Values called wrong."""
+    active: tuple[str, ...]
+    """Terms of effects at work."""
+    fit: Fit | None
+    moved: Values
+    """Values moved within their trust."""
+    left: np.ndarray
+    """What it leaves of all fitted stretches where it was not fitted, (n, 6), N and N m."""
+    learnt: Learnt | None = None
+    """Its derivatives; None without."""
+    flown: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 1)))
+    """Mean squares of the errors of windows simulated forward, and their number, (channels, 2, units)."""
+
+    @property
+    def name(self) -> tuple[str, bool]:
+        """Which of PLAINEST_FIRST it is."""
+        return self.model, self.learnt is not None
+
+    def with_derivatives(self, learnt: Learnt) -> Candidate:
+        """The candidate with derivatives of what it leaves."""
+        return replace(self, learnt=learnt, left=self.left - learnt.left_out)
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A candidate's number."""
+
+    candidate: Candidate
+    score: float
+    """Mean logarithm of the error over the believed vehicle's."""
+    standard_error: float
+    """Of its difference from the best candidate's, by drawing runs (or pieces) anew."""
+    unfit: str = ""
+    """Why it does not hover or fly; empty where it does, or was not asked."""
+
+
+@dataclass(frozen=True)
+class Ground:
+    """The rows on which candidates are compared."""
+
+    unit: np.ndarray
+    """(n,) number of the run (or piece) of each row; -1 for a row that is not judged."""
+    places: Mapping[str, tuple[np.ndarray, np.ndarray]]
+    """Of every run the instants of its rows, s, and their units, (m,) each."""
+
+    @property
+    def units(self) -> int:
+        """Number of units."""
+        return int(self.unit.max(initial=-1)) + 1
+
+    def unit_at(self, run: str, time_s: np.ndarray) -> np.ndarray:
+        """Unit of a run at instants (n,): that of the next row; -1 where there is none."""
+        times, units = self.places.get(run, (np.zeros(0), np.zeros(0, int)))
+        if not len(times):
+            return np.full(len(time_s), -1)
+        return units[np.minimum(np.searchsorted(times, time_s), len(times) - 1)]
+
+    def squares(self, left: np.ndarray) -> np.ndarray:
+        """Squares of the channels and their number, (channels, 2, units)."""
+        judged, count = self.unit >= 0, self.units
+        out = [
+            np.stack(
+                [
+                    np.bincount(self.unit[judged], left[judged, c] ** 2, count),
+                    np.bincount(self.unit[judged], None, count),
+                ]
+            )
+            for c in range(left.shape[1])
+            if np.isfinite(left[judged, c]).all()
+        ]
+        return np.array(out)
+
+    def score(self, left: np.ndarray) -> float:
+        """Mean logarithm of the errors of the channels, in their units."""
+        return float(mean_logarithm(self.squares(left).sum(axis=2)))
+
+
+def mean_logarithm(sums: np.ndarray) -> np.ndarray:
+    """Mean logarithm of the root mean squares, from squares and their numbers, (..., quantities, 2)."""
+    return 0.5 * np.log(np.maximum(sums[..., 0], 1e-300) / np.maximum(sums[..., 1], 1.0)).mean(axis=-1)
+
+
+def compared(candidates: Sequence[Candidate], ground: Ground) -> list[Scored]:
+    """Every candidate's number, the candidates in the order of PLAINEST_FIRST; the believed vehicle is among them."""
+    ordered = sorted(candidates, key=lambda c: PLAINEST_FIRST.index(c.name))
+    every = [[ground.squares(c.left), *([c.flown] if len(c.flown) else [])] for c in ordered]
+    squares = np.array([np.concatenate(parts) for parts in every])
+    units = squares.shape[-1]
+    drawn = np.random.default_rng(0).integers(0, units, (DRAWS, units))
+    weights = np.array([np.ones(units), *(np.bincount(d, minlength=units) for d in drawn)])
+    scores = mean_logarithm((squares @ weights.T).transpose(0, 3, 1, 2))
+    best = int(np.argmin(scores[:, 0]))
+    doubt = (scores[:, 1:] - scores[best, 1:]).std(axis=1)
+    believed = next(i for i, c in enumerate(ordered) if c.name == ("believed", False))
+    return [
+        Scored(c, float(s - scores[believed, 0]), float(d))
+        for c, s, d in zip(ordered, scores[:, 0], doubt, strict=True)
+    ]
+
+
+def choose(
+    candidates: Sequence[Candidate], ground: Ground, unfit: Callable[[Candidate], str]
+) -> tuple[Scored, list[Scored]]:
+    """The candidate to deliver, and all with their numbers; the believed vehicle where none hovers and flies."""
+    kept, faults = list(candidates), {}
+    while True:
+        scored = compared(kept, ground)
+        best = min(scored, key=lambda s: s.score)
+        first = next(s for s in scored if s.score - best.score <= s.standard_error)
+        # Only who may be chosen is flown; the best, too, for the others are measured by it.
+        failing = {
+            s.candidate.name: why
+            for s in (best, first)
+            if s.candidate.name != ("believed", False) and (why := unfit(s.candidate))
+        }
+        if not failing:
+            known = {s.candidate.name: s for s in scored}
+            every = [
+                known.get(s.candidate.name, replace(s, unfit=faults.get(s.candidate.name, "")))
+                for s in compared(candidates, ground)
+            ]
+            return first, every
+        faults |= failing
+        kept = [c for c in kept if c.name not in failing]

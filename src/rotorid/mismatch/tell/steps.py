@@ -1,0 +1,159 @@
+"""How much of the error each step takes off: believed → values → named physics → derivatives → noise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from rotorid.effects.catalogue import catalogue
+from rotorid.effects.contract import Motion
+from rotorid.mismatch.decision.words import effect_words, listed
+from rotorid.mismatch.tell.consistency import quoted
+from rotorid.mismatch.tell.verdict import Channel, Verdict
+from rotorid.recordings import Vehicle
+from rotorid.vehicle.derivatives import CHANNELS, QUANTITIES
+
+WORTH_SAYING = 0.02
+"""Share of the error below which a step takes nothing off that is worth a word."""
+AT_THE_NOISE = 1.1
+"""Error over the noise floor up to which what is left is called noise."""
+MOST_NAMES = 2
+SWING = {**dict.fromkeys("uvw", 5.0), **dict.fromkeys("pqr", 2.0)}
+"""Of each quantity, m/s and rad/s, how far a catalogue form is moved to see what it makes of it."""
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Errors of one channel, or of several in the geometric mean, each over the believed vehicle's."""
+
+    values: float
+    named: float
+    """With named physics; as `values` where a vehicle without is delivered."""
+    delivered: float
+    noise: float
+
+
+def steps_of(channels: Mapping[str, Channel], model: str) -> dict[str, Steps]:
+    """Steps of every channel of force and moment, on the runs held out where there are any."""
+    out = {}
+    for name, channel in channels.items():
+        errors = quoted(channel)
+        if name in CHANNELS and errors.before and None not in (errors.refitted, errors.named, errors.after):
+            values = errors.before if model == "believed" else errors.refitted
+            named = errors.named if model == "named" else values
+            floor = channel.noise_floor or 0.0
+            out[name] = Steps(*(x / errors.before for x in (values, named, errors.after, floor)))
+    return out
+
+
+def together(steps: Mapping[str, Steps]) -> Steps | None:
+    """The geometric mean over channels; None of none."""
+    if not steps:
+        return None
+    rows = np.array([[s.values, s.named, s.delivered, s.noise] for s in steps.values()])
+    return Steps(*np.exp(np.log(np.maximum(rows, 1e-9)).mean(axis=0)))
+
+
+def steps_sentence(verdict: Verdict) -> str:
+    """What each step takes off the error on flights not used for fitting; empty where nothing is compared."""
+    whole = together(steps_of(verdict.channels, verdict.delivered.model))
+    if whole is None or verdict.kind != "flight":
+        return ""
+    held = any(c.rmse.held_out.after is not None for c in verdict.channels.values())
+    claimed = dict.fromkeys(e.id for e in verdict.effects if e.delivered)
+    names = [effect_words(i) for i in claimed]
+    said = listed(names[:MOST_NAMES] if len(names) <= MOST_NAMES else [*names[:1], f"{len(names) - 1} more effects"])
+    taken = [
+        ("values", 1.0 - whole.values, "take"),
+        (said or "named physics", whole.values - whole.named, "takes" if len(names) < 2 else "take"),
+    ]
+    parts = [
+        f"{name} {verb} {'another ' if k and taken[0][1] >= WORTH_SAYING else ''}{100 * share:.0f} % of the error off"
+        for k, (name, share, verb) in enumerate(taken)
+        if share >= WORTH_SAYING
+    ]
+    nameless = whole.named - whole.delivered
+    if nameless >= WORTH_SAYING:
+        parts.append(f"{100 * nameless:.0f} % {'more ' if parts else ''}is predictable and has no name yet")
+    if not parts:
+        parts.append("nothing that was found takes a part of the error off")
+    left = (
+        "the rest is noise"
+        if whole.delivered <= AT_THE_NOISE * whole.noise
+        else f"{100 * whole.delivered:.0f} % is left, of which noise is {100 * min(whole.noise, whole.delivered):.0f} %"
+    )
+    where = "On flights not used for fitting" if held else "On the flight that was fitted"
+    return f"{where}, {', '.join(parts)}; {left}."
+
+
+@cache
+def _moved_by() -> dict[str, frozenset[tuple[str, str]]]:
+    """To each id of physics or sensor the derivatives that one of its forms can make about a hover of some vehicle."""
+    arm = 0.1
+    vehicle = Vehicle.model_validate(
+        dict(
+            name="any",
+            kind="flight",
+            mass_kg=1.0,
+            inertia_kg_m2=dict(xx=0.01, yy=0.011, zz=0.02),
+            rotors=[
+                dict(x_m=x * arm, y_m=y * arm, z_m=-0.02, spin=s)
+                for x, y, s in ((1, 1, "ccw"), (1, -1, "cw"), (-1, -1, "ccw"), (-1, 1, "cw"))
+            ],
+            thrust_coefficient_n_s2=1e-5,
+            torque_coefficient_n_m_s2=1e-7,
+            rotor_radius_m=0.06,
+            rotor_inertia_kg_m2=1e-5,
+            ground_z_m=0.0,
+        )
+    )
+    quantities = [q for q in QUANTITIES if q in SWING]
+    n = 1 + 2 * len(quantities)
+    velocity, rates = np.zeros((n, 3)), np.zeros((n, 3))
+    for k, q in enumerate(quantities):
+        for row, sign in ((1 + 2 * k, 1.0), (2 + 2 * k, -1.0)):
+            (velocity if q in "uvw" else rates)[row, k % 3] = sign * SWING[q]
+    speed = np.full((n, 4), np.sqrt(9.81 / 4e-5))
+    motion = Motion(
+        time_s=0.01 * np.arange(n),
+        rotor_speed=speed,
+        rotor_acceleration=np.zeros((n, 4)),
+        angular_velocity=rates,
+        angular_acceleration=np.zeros((n, 3)),
+        specific_force=np.tile([0.0, 0.0, -9.81], (n, 1)),
+        rotation=np.tile(np.eye(3), (n, 1, 1)),
+        velocity=velocity,
+        position=np.zeros((n, 3)),
+        height=np.ones(n),
+        voltage=np.ones(n),
+    )
+    out = {}
+    for effect_id, effect in catalogue().items():
+        found = set()
+        for form in (
+            effect.forms(vehicle) if effect.fitted and effect.kind == "physics" and not effect.of_the_rig else ()
+        ):
+            if form.memory or form.on_loading:
+                continue
+            values = np.array([p.starts[0] if p.starts else 1.0 for p in form.parameters])
+            added = form.contribution(motion, vehicle, values)
+            parts = [np.zeros((n, 3)) if x is None else np.nan_to_num(x) for x in (added.force, added.moment)]
+            table = np.concatenate(parts, axis=1)
+            largest = np.abs(table).max(axis=0) + 1e-30
+            for k, q in enumerate(quantities):
+                odd = np.abs(table[1 + 2 * k] - table[2 + 2 * k]) / largest
+                found |= {(c, q) for c, size in zip(CHANNELS, odd, strict=True) if size > 0.05}
+            found |= {
+                (c, "constant") for c, size in zip(CHANNELS, np.abs(table[0]) / largest, strict=True) if size > 0.05
+            }
+        out[effect_id] = frozenset(found)
+    return out
+
+
+def would_explain(channel: str, quantity: str, verdict: Verdict) -> list[str]:
+    """Ids of the catalogue, tested and not claimed, that make such a derivative."""
+    open_ids = [e.id for e in verdict.effects if e.status != "established"] + [a.id for a in verdict.absent]
+    return [i for i in dict.fromkeys(open_ids) if (channel, quantity) in _moved_by().get(i, ())]

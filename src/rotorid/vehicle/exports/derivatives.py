@@ -1,0 +1,185 @@
+"""A vehicle's derivatives in other tools: as a companion in the tool's own step, as terms of its file, or named.
+
+Bodies there are forward-left-up. Gazebo's linear damping: gz-sim, `src/systems/hydrodynamics` (`Configure`,
+`buildDampingMatrix`). PX4's SIH and ArduPilot's frame have one drag and one damping of all axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rotorid.recordings.vehicle import Derivative, Vehicle
+from rotorid.vehicle.derivatives import CHANNELS, QUANTITIES, symbol_of, table_of
+
+OF_STATE = QUANTITIES[:7]
+"""What a tool's step knows of the vehicle: 1, velocity through the air, body rates."""
+SIGNS = np.array([1.0, 1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
+"""Of `OF_STATE` in forward-left-up axes; those of the channels are the last six."""
+MOST_SHOWN = 6
+ROTORPY_FILE, MUJOCO_FILE = "rotorpy_derivatives.py", "mujoco_derivatives.py"
+DAMPING = tuple(zip(CHANNELS, OF_STATE[1:], strict=True))
+"""X_u, Y_v, Z_w, L_p, M_q, N_r."""
+
+
+def of_state(vehicle: Vehicle, constants: bool = True) -> tuple[Derivative, ...]:
+    """Those by what a tool's step knows of the vehicle."""
+    wanted = OF_STATE if constants else OF_STATE[1:]
+    return tuple(d for d in vehicle.derivatives if d.quantity in wanted)
+
+
+def expressed_by(vehicle: Vehicle, to: str) -> tuple[Derivative, ...]:
+    """The derivatives as a form and its companion have them; those of SIH and ArduPilot are in terms of their own."""
+    if to in ("rotorpy", "mjcf"):
+        return of_state(vehicle)
+    if to == "sdf":
+        return tuple(d.model_copy(update={"low": -np.inf, "high": np.inf}) for d in of_state(vehicle, constants=False))
+    return ()
+
+
+def said_of(derivatives: Sequence[Derivative], vehicle: Vehicle) -> str:
+    """Their name, with the largest by what they add within their range, over the weight and its moment on an arm."""
+    weight = vehicle.mass_kg * vehicle.gravity_m_s2
+    arm = np.linalg.norm(vehicle.rotor_positions_m(), axis=1).max() or 1.0
+
+    def size(d: Derivative) -> float:
+        reach = abs(d.value) * max(abs(d.low), abs(d.high))
+        return reach / weight if d.channel.startswith("force") else reach / (weight * arm)
+
+    shown = sorted(derivatives, key=size, reverse=True)[:MOST_SHOWN]
+    words = [f"{symbol_of(d.channel, d.quantity)} = {d.value:.3g}" for d in shown]
+    words += [f"{len(derivatives) - len(shown)} smaller"] if len(derivatives) > len(shown) else []
+    return f"derivatives ({', '.join(words)})"
+
+
+def left_of(vehicle: Vehicle, taken: Sequence[Derivative]) -> list[str]:
+    """A sentence for the derivatives that are not `taken`; none where all are."""
+    rest = [d for d in vehicle.derivatives if d not in taken]
+    return [said_of(rest, vehicle)] if rest else []
+
+
+def table_in_flu(derivatives: Sequence[Derivative]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Derivatives of the state as a matrix (6, 7) of forward-left-up axes, and the ends (7,) of each range."""
+    matrix, held = table_of(tuple(derivatives))
+    ends = np.sort(held[: len(SIGNS)] * SIGNS[:, None], axis=1)
+    return SIGNS[1:, None] * matrix[:, : len(SIGNS)] * SIGNS, ends[:, 0], ends[:, 1]
+
+
+def _number(value: float) -> str:
+    return f"{value:.9g}" if np.isfinite(value) else "np.inf" if value > 0 else "-np.inf"
+
+
+def _table(vehicle: Vehicle) -> str:
+    """The Python lines that both companions share."""
+    matrix, low, high = table_in_flu(of_state(vehicle))
+    rows = [
+        f"    [{', '.join(map(_number, row + 0.0))}],  # {channel}"
+        for channel, row in zip(CHANNELS, matrix, strict=True)
+    ]
+    ends = [f"{name} = np.array([{', '.join(map(_number, end))}])" for name, end in (("LOW", low), ("HIGH", high))]
+    return "\n".join(["MATRIX = np.array([", *rows, "])", *ends])
+
+
+def rotorpy_companion(vehicle: Vehicle) -> str:
+    """A subclass of RotorPy's Multirotor that adds them."""
+    return f'''# {" ".join(vehicle.name.split())}, exported by rotorid.
+"""Derivatives for RotorPy: fly `WithDerivatives(quad_params, ...)` in place of `Multirotor(quad_params, ...)`.
+
+Force, N, and moment, N m, are MATRIX @ x of x = (1, velocity through the air, m/s, body rates, rad/s), each held
+between LOW and HIGH. Body axes forward-left-up.
+"""
+
+import numpy as np
+from rotorpy.vehicles.multirotor import Multirotor
+
+{_table(vehicle)}
+
+
+class WithDerivatives(Multirotor):
+    def compute_body_wrench(self, body_rates, rotor_speeds, body_airspeed_vector):
+        force, moment = super().compute_body_wrench(body_rates, rotor_speeds, body_airspeed_vector)
+        x = np.concatenate([[1.0], body_airspeed_vector, body_rates])
+        added = MATRIX @ np.clip(x, LOW, HIGH)
+        return force + added[:3], moment + added[3:]
+'''
+
+
+def mujoco_companion(vehicle: Vehicle) -> str:
+    """MuJoCo's callback for passive forces that adds them."""
+    return f'''# {" ".join(vehicle.name.split())}, exported by rotorid.
+"""Derivatives for MuJoCo: `mujoco.set_mjcb_passive(passive)` once, and every step adds them.
+
+Force, N, and moment, N m, are MATRIX @ x of x = (1, velocity through the air, m/s, body rates, rad/s), each held
+between LOW and HIGH. Body axes forward-left-up. MuJoCo has one such callback for all models; None takes it off.
+"""
+
+import mujoco
+import numpy as np
+
+{_table(vehicle)}
+
+
+def passive(model, data):
+    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "vehicle")
+    if body < 0:  # another model
+        return
+    # Of a free joint: velocity and force in world axes, rates and moment in those of the body.
+    first, rotation = model.body_dofadr[body], data.xmat[body].reshape(3, 3)
+    move, turn = slice(first, first + 3), slice(first + 3, first + 6)
+    x = np.concatenate([[1.0], rotation.T @ (data.qvel[move] - model.opt.wind), data.qvel[turn]])
+    added = MATRIX @ np.clip(x, LOW, HIGH)
+    data.qfrc_passive[move] += rotation @ added[:3]
+    data.qfrc_passive[turn] += added[3:]
+'''
+
+
+def gazebo_damping(vehicle: Vehicle) -> str:
+    """Gazebo's Hydrodynamics system with the linear terms of the body's link, xU to nR; empty without any."""
+    matrix = table_in_flu(of_state(vehicle, constants=False))[0][:, 1:]
+    terms = [
+        f"      <{channel}{quantity}>{matrix[i, j]:.9g}</{channel}{quantity}>"
+        for i, channel in enumerate("xyzkmn")
+        for j, quantity in enumerate("UVWPQR")
+        if matrix[i, j]
+    ]
+    if not terms:
+        return ""
+    nl = "\n"
+    return f"""
+    <plugin filename="gz-sim-hydrodynamics-system" name="gz::sim::systems::Hydrodynamics">
+      <link_name>base_link</link_name>
+      <disable_added_mass>true</disable_added_mass>
+      <disable_coriolis>true</disable_coriolis>
+{nl.join(terms)}
+    </plugin>"""
+
+
+def left_of_gazebo(vehicle: Vehicle) -> list[str]:
+    """What Gazebo's linear terms leave."""
+    taken = of_state(vehicle, constants=False)
+    if not taken:
+        return left_of(vehicle, ())
+    near = "taken as linear terms of Gazebo's Hydrodynamics, which are not held beyond the flown range and know no wind"
+    return [f"{said_of(taken, vehicle)}: {near}", *left_of(vehicle, taken)]
+
+
+def own_damping(vehicle: Vehicle, turning: bool) -> tuple[np.ndarray, np.ndarray]:
+    """−X_u, −Y_v, −Z_w, N s/m, or (`turning`) −L_p, −M_q, −N_r, N m s/rad, (3,), and each one's weight in a mean.
+
+    The weights are the squares of the largest speed or rate flown: one force for all axes is then off the least.
+    """
+    matrix, held = table_of(vehicle.derivatives)
+    at = np.arange(3) + 3 * turning
+    reach = np.abs(held[at + 1]).max(axis=1)
+    reach[~np.isfinite(reach)] = 0.0  # by which there is no derivative
+    return -matrix[at, at + 1], reach**2 if reach.any() else np.ones(3)
+
+
+def left_of_one_damping(vehicle: Vehicle) -> list[str]:
+    """What one drag and one damping of all axes leave."""
+    taken = [d for d in vehicle.derivatives if (d.channel, d.quantity) in DAMPING]
+    if not taken:
+        return left_of(vehicle, ())
+    near = "taken as one drag and one damping of all axes, means by the squares of what was flown, without its range"
+    return [f"{said_of(taken, vehicle)}: {near}", *left_of(vehicle, taken)]
