@@ -16,7 +16,7 @@ from rotorid.mismatch.delivery.parts import claimed, improved_vehicle, place_of
 from rotorid.mismatch.delivery.stated import restated, value_correlations, value_rows
 from rotorid.mismatch.delivery.usable import exports_lost
 from rotorid.mismatch.model.delivered import FittedModel, Values
-from rotorid.mismatch.model.within_trust import both_ways
+from rotorid.mismatch.model.within_trust import ways
 from rotorid.mismatch.plant.rows import CHANNELS
 from rotorid.recordings import Vehicle
 from rotorid.steps import step
@@ -122,10 +122,9 @@ def ground_of(offered: Offered) -> Ground:
 
 def fitted_candidate(name: str, offered: Offered, values: Values, active: Sequence[str], ground: Ground) -> Candidate:
     """A candidate with the other values as believed, or moved within their trust, whichever has the smaller number."""
-    ways = both_ways(offered.model, values, active)
     found = [
         Candidate(name, values, tuple(active), w.fit, w.moved, np.concatenate(w.left)[:, : len(CHANNELS) // 2])
-        for w in ways
+        for w in ways(offered.model, values, active)
     ]
     return min(found, key=lambda c: ground.score(c.left))
 

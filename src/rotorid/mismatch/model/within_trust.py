@@ -80,20 +80,15 @@ def ways(model: FittedModel, values: Values, active: Sequence[str]) -> list[Way]
     Values not called wrong move together, and only if where it was not fitted the error falls by it in some channel,
     grows in none, and none of them would move beyond its trust.
     """
-    held, loose = both_ways(model, values, active)
-    if pushed_beyond_trust(model, loose.moved):
+    plain, as_believed = delivered_fit(model, [*values, *active], values)
+    held = Way(model, plain, values, as_believed, {})
+    free, fit = all_free(model, values, active)
+    moved = changes(model, values, active, fit)
+    if pushed_beyond_trust(model, moved):
         return [held]
+    loose = Way(model, free, values, fit, moved)
     better = pays(held.left, loose.left, judged_rows(model), model.rows_per_block)
     return [loose, held] if better else [held, loose]
-
-
-def both_ways(model: FittedModel, values: Values, active: Sequence[str]) -> tuple[Way, Way]:
-    """The fits with the terms of `active` and values not called wrong as believed, and with these moved."""
-    plain, as_believed = delivered_fit(model, [*values, *active], values)
-    free, fit = all_free(model, values, active)
-    return Way(model, plain, values, as_believed, {}), Way(
-        model, free, values, fit, changes(model, values, active, fit)
-    )
 
 
 def settled(model: FittedModel, values: Values, active: Sequence[str]) -> tuple[Fit, Values]:

@@ -70,11 +70,11 @@ def steps_sentence(verdict: Verdict) -> str:
         ("values", 1.0 - whole.values, "take"),
         (said or "named physics", whole.values - whole.named, "takes" if len(names) < 2 else "take"),
     ]
-    parts = [
-        f"{name} {verb} {'another ' if k and taken[0][1] >= WORTH_SAYING else ''}{100 * share:.0f} % of the error off"
-        for k, (name, share, verb) in enumerate(taken)
-        if share >= WORTH_SAYING
-    ]
+    parts: list[str] = []
+    for name, share, verb in taken:
+        if share >= WORTH_SAYING:
+            what = f"{100 * share:.0f} %"
+            parts.append(f"{name} another {what}" if parts else f"{name} {verb} {what} of the error off")
     nameless = whole.named - whole.delivered
     if nameless >= WORTH_SAYING:
         parts.append(f"{100 * nameless:.0f} % {'more ' if parts else ''}is predictable and has no name yet")
@@ -83,7 +83,7 @@ def steps_sentence(verdict: Verdict) -> str:
     left = (
         "the rest is noise"
         if whole.delivered <= AT_THE_NOISE * whole.noise
-        else f"{100 * whole.delivered:.0f} % is left, of which noise is {100 * min(whole.noise, whole.delivered):.0f} %"
+        else f"{100 * whole.delivered:.0f} % is left (noise alone: {100 * whole.noise:.0f} %)"
     )
     where = "On flights not used for fitting" if held else "On the flight that was fitted"
     return f"{where}, {', '.join(parts)}; {left}."
