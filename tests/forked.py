@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 SERVER = """
-import json, os, re, signal, sys, traceback
+import atexit, json, os, re, signal, sys, traceback
 from rotorid.cli import app
 
 def answered(words, said):
@@ -44,6 +44,7 @@ for line in sys.stdin:
         # Of this child alone: it begins at what the parent holds when it forks.
         with open("/proc/self/status") as status, open(peak, "w") as file:
             file.write(re.search(r"VmHWM:\\s+(\\d+)", status.read())[1])
+        atexit._run_exitfuncs()  # as at the end of any process: what measures coverage writes it down
         os._exit(code)
     _, status, usage = os.wait4(child, 0)
     answers.write(json.dumps([os.waitstatus_to_exitcode(status), usage.ru_utime]) + chr(10))
