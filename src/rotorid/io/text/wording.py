@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, get_args
-
-from pydantic import BaseModel, ValidationError
+from typing import TYPE_CHECKING, Any, get_args
 
 from rotorid.io.text.names import hint, listed
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel, ValidationError
 
 _EXACT = {
     "greater_than": "a number greater than {gt:g}",
@@ -101,7 +102,7 @@ def keys_at(model: type[BaseModel], location: tuple[str | int, ...]) -> list[str
 
 def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
     """The models inside a type such as `dict[str, Channel]`."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+    if hasattr(annotation, "model_fields"):
         yield annotation
     for inner in get_args(annotation):
         yield from _models_in(inner)
