@@ -95,23 +95,19 @@ class Ground:
         return units[np.minimum(np.searchsorted(times, time_s), len(times) - 1)]
 
     def squares(self, left: np.ndarray) -> np.ndarray:
-        """Squares of the channels and their number, (channels, 2, units)."""
+        """Squares of what is left of channels, (n, channels), and their number, (channels, 2, units)."""
         judged, count = self.unit >= 0, self.units
-        out = [
-            np.stack(
-                [
-                    np.bincount(self.unit[judged], left[judged, c] ** 2, count),
-                    np.bincount(self.unit[judged], None, count),
-                ]
-            )
-            for c in range(left.shape[1])
-            if np.isfinite(left[judged, c]).all()
-        ]
-        return np.array(out)
+        unit = self.unit[judged]
+        return np.array([[np.bincount(unit, s, count), np.bincount(unit, None, count)] for s in left[judged].T ** 2])
+
+    def compared(self, candidates: Sequence[Candidate]) -> np.ndarray:
+        """Mask of the channels that every candidate says something of, (channels,)."""
+        return np.all([np.isfinite(c.left[self.unit >= 0]).all(axis=0) for c in candidates], axis=0)
 
     def score(self, left: np.ndarray) -> float:
         """Mean logarithm of the errors of the channels, in their units."""
-        return float(mean_logarithm(self.squares(left).sum(axis=2)))
+        known = np.isfinite(left[self.unit >= 0]).all(axis=0)
+        return float(mean_logarithm(self.squares(left[:, known]).sum(axis=2)))
 
 
 def mean_logarithm(sums: np.ndarray) -> np.ndarray:
@@ -122,7 +118,8 @@ def mean_logarithm(sums: np.ndarray) -> np.ndarray:
 def compared(candidates: Sequence[Candidate], ground: Ground) -> list[Scored]:
     """Every candidate's number, the candidates in the order of PLAINEST_FIRST; the believed vehicle is among them."""
     ordered = sorted(candidates, key=lambda c: PLAINEST_FIRST.index(c.name))
-    every = [[ground.squares(c.left), *([c.flown] if len(c.flown) else [])] for c in ordered]
+    known = ground.compared(ordered)
+    every = [[ground.squares(c.left[:, known]), *([c.flown] if len(c.flown) else [])] for c in ordered]
     squares = np.array([np.concatenate(parts) for parts in every])
     units = squares.shape[-1]
     drawn = np.random.default_rng(0).integers(0, units, (DRAWS, units))
