@@ -1,6 +1,6 @@
-"""What is taken home: which findings go into which file, and the gate that a vehicle passes before it is written.
+"""What is taken home: which vehicle, and which findings go into which file.
 
-`parts` sorts findings into vehicle, conditions and instruments; `gate` keeps out what makes a channel worse where it
-was not fitted; `usable` asks whether the vehicle is a body that hovers and flies; `files` writes and reads the three
-files.
+`parts` sorts findings into vehicle, conditions and instruments; `derivatives` fits what is predictable and has no name;
+`flown` flies vehicles in windows of the recording; `candidates` chooses one by one number; `usable` asks whether a
+vehicle is a body that hovers and flies; `files` writes and reads the three files.
 """
