@@ -17,6 +17,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 OUTPUTS = ("results", "cache", ".snakemake")
+ON_THE_PATH = os.path.join(".snakemake", "pip-deployments")
+"""Where Snakemake, once it is imported, has packages looked for as well."""
 RAW = "raw"
 
 
@@ -55,6 +57,8 @@ class Guard:
         if not path.startswith(self.prefix):
             return None
         inside = path[len(self.prefix) :]
+        if (inside + os.sep).startswith(ON_THE_PATH + os.sep):
+            return None
         first = inside.partition(os.sep)[0]
         if first in OUTPUTS or (first == RAW and self.raw is not None and inside not in self.raw):
             return inside

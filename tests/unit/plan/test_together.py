@@ -57,7 +57,8 @@ def test_a_third_set_is_judged_with_the_others() -> None:
         joined_sets(a_set("first", 1), a_set("second", 1), a_set("third", 1, mass_kg=9.0))
 
 
-def test_a_verdict_of_several_sets_finds_each_of_them(tmp_path: Path) -> None:
+def test_a_verdict_of_several_sets_finds_each_of_them(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)  # sets are looked for below the folder one is in, too
     for name in ("first", "second"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "vehicle.yaml").write_text("", encoding="utf-8")
@@ -105,7 +106,8 @@ def test_bad_input_ends_in_one_sentence(tmp_path: Path, monkeypatch, words, said
     assert said in done.output and len(done.output.strip().splitlines()) == 1
 
 
-def test_a_verdict_without_its_set_asks_for_it(tmp_path: Path) -> None:
+def test_a_verdict_without_its_set_asks_for_it(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "verdict.json").write_text('{"set": "lost", "kind": "flight", "effects": []}', encoding="utf-8")
     done = CliRunner().invoke(app, ["plan", str(tmp_path)])
     assert done.exit_code == 1 and "--set" in done.output
