@@ -97,14 +97,13 @@ def table_of(rows: pd.DataFrame, what: str) -> list[str]:
 def largest(rules: pd.DataFrame) -> pd.DataFrame:
     """The rules that took most, the rest as one row, and the sum."""
     alone = rules.drop(index=ALL).sort_values(list(rules), ascending=False)
-    rest = alone.iloc[SHOWN:].sum().rename("all others")
-    return pd.concat([alone.iloc[:SHOWN], rest.to_frame().T, rules.loc[[ALL]]])
+    rest = alone.iloc[SHOWN:].sum().to_frame("all others").T
+    return pd.concat([alone.iloc[:SHOWN], rest, rules.loc[[ALL]]])
 
 
 def main(before: str, out: Path | None, cores: int, configfile: str | None) -> None:
     options = ["--cores", str(cores), *(["--configfile", configfile] if configfile else [])]
     cases = [case for case in CASES if case == "without" or os.environ.get("ROTORID_PUBLIC_DATA")]
-    # Their environments are no child's time of a build.
     with tempfile.TemporaryDirectory() as place:
         names = [
             subprocess.run(["git", "rev-parse", "--short", c], cwd=ROOT, check=True, capture_output=True, text=True)
