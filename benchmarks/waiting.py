@@ -1,4 +1,4 @@
-"""How well a verdict says how long is left: the steps of real verdicts, each foretold by the record of the others.
+"""How well a verdict says how long is left: the steps of real verdicts, each foreknown by the record of the others.
 
     python benchmarks/waiting.py record DIR SET    a file of the steps of a verdict and their processor seconds into DIR
     python benchmarks/waiting.py table DIR [--out benchmarks/waiting.md]
@@ -49,8 +49,8 @@ def ratios(run: list, others: list) -> dict[float, float | None]:
         done, spent = 0, share * whole
         while spent > run[done][1]:
             spent, done = spent - run[done][1], done + 1
-        told = left(others, run[:done], run[done][0], spent)
-        out[share] = None if told is None else max(told, SOON_S) / max((1 - share) * whole, SOON_S)
+        known = left(others, run[:done], run[done][0], spent)
+        out[share] = None if known is None else max(known, SOON_S) / max((1 - share) * whole, SOON_S)
     return out
 
 

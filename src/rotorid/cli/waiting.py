@@ -89,13 +89,12 @@ class Waiting:
     def __init__(
         self, runs: Sequence[Run], say: Callable[[str], None] | None = None, clock: Callable[[], float] = time.monotonic
     ):
-        """`say` takes a line at once, and later one when a step begins or ends, every `PAUSE_S` seconds at most."""
+        """`say` takes a line when a step begins or ends, every `PAUSE_S` seconds at most."""
         self.runs, self.say, self.clock = runs, say, clock
         self.done: Run = []
         self.path: tuple[str, ...] = ()
         self.began = self.since = clock()
         self.said = -PAUSE_S
-        self.speak()
 
     def heard(self, path: tuple[str, ...]) -> None:
         """A step began or ended."""

@@ -70,7 +70,7 @@ def test_what_ends_soon_is_said_in_words() -> None:
 def test_the_line_has_time_step_and_what_is_left() -> None:
     clock = Clock()
     shown = Waiting([RUN] * 3, clock=clock)
-    assert shown.line() == "     0 s  reading"
+    assert shown.line() == "     1 s  step 0"
     with heard_by(shown.heard):
         clock.now += 4.0
         with step("flight"), step("prepare"):
@@ -86,7 +86,7 @@ def test_without_a_terminal_lines_are_few() -> None:
     for number in range(100):
         clock.now += 1.0
         shown.heard((f"step {number}",))
-    assert 8 <= len(said) <= 11 and said[0] == "     0 s  reading"
+    assert 8 <= len(said) <= 11 and said[0] == "     1 s  step 0"
 
 
 def test_the_record_holds_the_last_runs_and_survives_what_is_broken() -> None:

@@ -26,8 +26,8 @@ PLAINEST_FIRST = (
     ("refitted", True),
     ("believed", True),
 )
-"""Candidates by what of them has no cause: derivatives that stand next to named physics have less to say than those
-that stand in for it."""
+"""Candidates by how much of them has no cause: derivatives next to named physics have less to say than those in its
+place."""
 DRAWS = 400
 
 

@@ -114,7 +114,7 @@ def recorded_hover(runs: Sequence[Run], vehicle: Vehicle) -> RecordedHover | Non
 
 
 def off_as_recorded(vehicle: Vehicle, recorded: RecordedHover | None) -> str:
-    """Why it does not carry at the recorded rotor speeds what it carried then; empty where it does."""
+    """Why its force at the recorded rotor speeds is not the one that was felt; empty where it is."""
     if recorded is None or recorded.specific_force_m_s2 <= 0:
         return ""
     flown = flyable(vehicle)[0]
