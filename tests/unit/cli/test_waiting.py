@@ -70,7 +70,7 @@ def test_what_ends_soon_is_said_in_words() -> None:
 def test_the_line_has_time_step_and_what_is_left() -> None:
     clock = Clock()
     shown = Waiting([RUN] * 3, clock=clock)
-    assert shown.line() == "     1 s  step 0"
+    assert shown.line() == "     0 s  reading"
     with heard_by(shown.heard):
         clock.now += 4.0
         with step("flight"), step("prepare"):

@@ -49,7 +49,7 @@ def claimed(findings: Sequence[Finding]) -> list[Finding]:
 
 
 def delivered(analysis: Analysis, place: Place) -> list[Finding]:
-    """Findings that go into one of the files, in the order of the analysis; what the chosen vehicle lacks is not among them.
+    """Findings that go into one of the files, in the order of the analysis, less what the chosen vehicle lacks.
 
     A condition or an error of a sensor may have no form (a wind, a delay of stamps): its parameters describe it.
     """
