@@ -14,6 +14,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatch
+from functools import cached_property
 from pathlib import Path
 
 from rotorid.errors import InputError
@@ -38,7 +39,7 @@ class Entry:
     case: str
     set: str
 
-    @property
+    @cached_property
     def family(self) -> str:
         """Kind of case: `single`, `clean`, `stand-clean`, ..."""
         first, second, *rest = self.case.split("/")

@@ -7,6 +7,8 @@ import time
 from functools import cache
 from pathlib import Path
 
+from snakemake.persistence import PersistenceBase
+
 from rotorid.report import log as logs
 from rotorid.report.codehash import Code
 from rotorid.config import check, from_command_line
@@ -16,6 +18,9 @@ from rotorid.io.text.files import read_yaml
 # Jobs run side by side: threads of the linear algebra in each of them cost processor time and save none.
 for library in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(library, "1")
+
+# Snakemake imports pandas at every start to hash the tables among a rule's params. Here there are none.
+PersistenceBase._serialize_param = PersistenceBase._serialize_param_builtin
 
 STARTED = time.time()
 ROOT = Path(workflow.basedir)

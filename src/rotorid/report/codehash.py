@@ -45,6 +45,7 @@ class Code:
         self._homes = {package: self.root / folder for package, folder in PACKAGES.items()}
         self._facts: dict[Path, _Facts] = {}
         self._files: dict[str, list[Path]] = {}
+        self._imports: dict[Path, set[Path]] = {}
         self._codes: dict[Path, str] = {}
         self._memory = Path(memory) if memory else None
         self._remembered = self._recall()
@@ -79,11 +80,16 @@ class Code:
         found: set[Path] = set()
         waiting = [script]
         while waiting:
-            names = self._facts_of(waiting.pop()).names
-            new = {file for name in names for file in self._files_of(name)} - found
+            new = self._imported_by(waiting.pop()) - found
             found |= new
             waiting += new
         return sorted(found)
+
+    def _imported_by(self, path: Path) -> set[Path]:
+        """Files that a file imports itself; most are asked for by many scripts."""
+        if path not in self._imports:
+            self._imports[path] = {file for name in self._facts_of(path).names for file in self._files_of(name)}
+        return self._imports[path]
 
     def _read_by(self, modules: list[Path]) -> list[Path]:
         """Files that are no code but shipped next to a module that reads such files (`importlib.resources`), sorted."""
@@ -126,8 +132,18 @@ class Code:
         return self._facts[path]
 
     def _files_of(self, name: str) -> list[Path]:
+        """Files that importing `name` runs: the packages on the way and the module itself, where they exist."""
+        above, _, last = name.rpartition(".")
         if name not in self._files:
-            self._files[name] = list(_files_of(name, self._homes))
+            package, *inside = name.split(".")
+            if package not in self._homes:
+                return []
+            place = self._homes[package].joinpath(package, *inside)
+            if last == "*":
+                own = sorted(place.parent.rglob("*.py"))
+            else:
+                own = [file for file in (place / "__init__.py", place.with_suffix(".py")) if file.is_file()]
+            self._files[name] = (self._files_of(above) if above else []) + own
         return self._files[name]
 
 
@@ -180,21 +196,6 @@ def _package_of(path: Path, homes: Mapping[str, Path]) -> str:
         if path.is_relative_to(home / package):
             return ".".join(path.parent.relative_to(home).parts)
     return ""
-
-
-def _files_of(name: str, homes: Mapping[str, Path]) -> Iterator[Path]:
-    """Files that importing `name` runs: the packages on the way and the module itself, where they exist."""
-    parts = name.removesuffix(".*").split(".")
-    if parts[0] not in homes:
-        return
-    source = homes[parts[0]]
-    for depth in range(1, len(parts) + 1):
-        place = source.joinpath(*parts[:depth])
-        for file in (place / "__init__.py", place.with_suffix(".py")):
-            if file.is_file():
-                yield file
-    if name.endswith(".*"):
-        yield from sorted(source.joinpath(*parts).rglob("*.py"))
 
 
 def _parse(path: Path) -> ast.Module:
