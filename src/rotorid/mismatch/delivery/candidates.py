@@ -104,11 +104,6 @@ class Ground:
         """Mask of the channels that every candidate says something of, (channels,)."""
         return np.all([np.isfinite(c.left[self.unit >= 0]).all(axis=0) for c in candidates], axis=0)
 
-    def score(self, left: np.ndarray) -> float:
-        """Mean logarithm of the errors of the channels, in their units."""
-        known = np.isfinite(left[self.unit >= 0]).all(axis=0)
-        return float(mean_logarithm(self.squares(left[:, known]).sum(axis=2)))
-
 
 def mean_logarithm(sums: np.ndarray) -> np.ndarray:
     """Mean logarithm of the root mean squares, from squares and their numbers, (..., quantities, 2)."""

@@ -73,8 +73,8 @@ def as_delivered(offered: Offered) -> Analysis:
     words, model = offered.words, offered.model
     ground = ground_of(offered)
     believed = Candidate("believed", {}, (), None, {}, np.concatenate(offered.believed_left)[:, : len(CHANNELS) // 2])
-    refitted = fitted_candidate("refitted", offered, offered.plain, (), ground)
-    named = fitted_candidate("named", offered, offered.values, offered.active, ground)
+    refitted = fitted_candidate("refitted", offered, offered.plain, ())
+    named = fitted_candidate("named", offered, offered.values, offered.active)
     candidates = [believed, refitted]
     if offered.active or offered.values != offered.plain:
         candidates.append(named)
@@ -120,13 +120,11 @@ def ground_of(offered: Offered) -> Ground:
     return Ground(np.concatenate([unit[b] for b in rows]), joined)
 
 
-def fitted_candidate(name: str, offered: Offered, values: Values, active: Sequence[str], ground: Ground) -> Candidate:
-    """A candidate with the other values as believed, or moved within their trust, whichever has the smaller number."""
-    found = [
-        Candidate(name, values, tuple(active), w.fit, w.moved, np.concatenate(w.left)[:, : len(CHANNELS) // 2])
-        for w in ways(offered.model, values, active)
-    ]
-    return min(found, key=lambda c: ground.score(c.left))
+def fitted_candidate(name: str, offered: Offered, values: Values, active: Sequence[str]) -> Candidate:
+    """A candidate with the other values as believed, or moved within their trust where that pays (`ways`)."""
+    way = ways(offered.model, values, active)[0]
+    left = np.concatenate(way.left)[:, : len(CHANNELS) // 2]
+    return Candidate(name, values, tuple(active), way.fit, way.moved, left)
 
 
 def learnt_of(offered: Offered, candidate: Candidate) -> Learnt:
