@@ -59,9 +59,9 @@ $(TESTED): $(READY) $(SOURCES)
 	@$(BIN)/pytest -m "not slow" -n 2 --dist loadfile
 	@touch $@
 
-# Those that copy the tree, list it or start programs in it, and those of what public sets become.
+# Those that copy the tree, list it or start programs in it (or Snakemake itself), and those of what public sets become.
 TREE := tests/test_tree.py tests/workflow tests/acquire/test_at_the_bench.py tests/unit/cli/test_pages.py \
-	tests/unit/proof/test_plantings.py tests/unit/proof/test_changes_rows.py \
+	tests/unit/proof/test_plantings.py tests/unit/proof/test_changes_rows.py tests/unit/test_wrong_config.py \
 	tests/unit/recordings/importers/test_public_sets.py
 
 test-tree: $(READY) ## of the checks those that could see what a report leaves in the tree; tests/tree.py holds the others
