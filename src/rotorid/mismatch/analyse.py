@@ -135,8 +135,9 @@ def analysed(recordings: RecordingSet, mistakes, remarks, watch: Watch) -> Analy
     if len(seen.rows) == len(model.rows):
         return None
     choice = replace(choice, findings=with_windows(findings, seen))
-    plain_fit, plain_moved = settled(model, values_alone(model), ())
-    first = account(choice, seen, fit, moved, plain_fit, {**plain_moved, **values_alone(model)})
+    plain = values_alone(model)
+    plain_fit, plain_moved = settled(model, plain, ())
+    first = account(choice, seen, fit, moved, plain_fit, {**plain_moved, **plain})
     words = with_values_in_question(weighed(first))
     return with_noise_held_out(as_delivered(offered(choice, words, seen, unseen, moved, plain_moved)))
 

@@ -9,16 +9,7 @@ import numpy as np
 from rotorid.mismatch.decision.decide import wrong_values
 from rotorid.mismatch.decision.select import Selection
 from rotorid.mismatch.model.delivered import Values
-from rotorid.mismatch.model.within_trust import settled
 from rotorid.mismatch.model.wrench import WrenchModel
-from rotorid.mismatch.plant.regression import Fit
-
-
-def refitted(model: WrenchModel) -> tuple[Fit, Values]:
-    """The fit of a model's rows by believed values alone, and what it changes of them."""
-    values = values_alone(model)
-    fit, moved = settled(model, values, ())
-    return fit, {**moved, **values}
 
 
 def values_alone(model: WrenchModel) -> Values:
