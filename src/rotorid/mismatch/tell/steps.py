@@ -66,9 +66,10 @@ def steps_sentence(verdict: Verdict) -> str:
     claimed = dict.fromkeys(e.id for e in verdict.effects if e.delivered)
     names = [effect_words(i) for i in claimed]
     said = listed(names[:MOST_NAMES] if len(names) <= MOST_NAMES else [*names[:1], f"{len(names) - 1} more effects"])
+    values = min(whole.values, 1.0)  # values alone that do not help take nothing off
     taken = [
-        ("values", 1.0 - whole.values, "take"),
-        (said or "named physics", whole.values - whole.named, "takes" if len(names) < 2 else "take"),
+        ("values", 1.0 - values, "take"),
+        (said or "named physics", values - whole.named, "takes" if len(names) < 2 else "take"),
     ]
     parts: list[str] = []
     for name, share, verb in taken:
