@@ -139,16 +139,18 @@ def why_not(finding: Finding, taken: Candidate, scored: Sequence[Scored], offere
     """Why a claimed property of the vehicle is not in the vehicle that is taken home; empty where it is."""
     if finding not in claimed([finding]) or place_of(finding) != "vehicle" or taken.model == "named":
         return ""
-    if finding.form is None and not (offered.chain_is_named and taken.model == "believed"):
-        return ""  # what lies between command and speed is fitted and judged in the rotors' speeds
-    best = min((s for s in scored if s.candidate.model == "named"), key=lambda s: s.score, default=None)
+    between = finding.form is None  # command and speed: the refitted vehicle has it, too
+    if between and not (offered.chain_is_named and taken.model == "believed"):
+        return ""  # fitted and judged in the rotors' speeds
+    having = ("named", "refitted") if between else ("named",)
+    best = min((s for s in scored if s.candidate.model in having), key=lambda s: s.score, default=None)
     if best is None:
         return ""
     own = next(s for s in scored if s.candidate.name == taken.name)
     if best.unfit:
-        return f"with the named physics {best.unfit}"
+        return f"with it {best.unfit}"
     return (
-        f"on what was left out of the fit, vehicles with named physics have {100 * exp(best.score):.0f} % of the "
+        f"on what was left out of the fit, vehicles with it have {100 * exp(best.score):.0f} % of the "
         f"believed vehicle's error, the plainer one that is delivered {100 * exp(own.score):.0f} %"
     )
 
