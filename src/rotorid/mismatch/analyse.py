@@ -315,7 +315,6 @@ def offered(
         plain=values_alone(found.model),
         believed_left=believed_residuals(fewer.prepared, model.rows, fewer.commanded),
         believed=vehicle,
-        moved=moved,
         names=PARAMETER_NAMES,
         whole=whole,
         improved=improved,

@@ -42,8 +42,6 @@ class Offered:
     believed_left: list[np.ndarray]
     """What the believed vehicle leaves of every fitted stretch, (n, channels)."""
     believed: Vehicle
-    moved: Values
-    """Values that the whole choice moved within their trust."""
     names: Mapping[str, str]
     """Keys of values to their contract names."""
     whole: bool

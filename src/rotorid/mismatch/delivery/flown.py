@@ -148,8 +148,8 @@ def squares_of_windows(
     """
     out = np.zeros((len(UNITS), 2, units))
     for segment, inputs, states in zip(segments, *driven_by(segments, model), strict=True):
-        plan = simulate_plan(segment, inputs, states)
         time_s = segment.motion.time_s
+        plan = plan_windows(time_s, WINDOW_S, None, usable(inputs, states))
         ends = [unit_of(segment.run, time_s[plan[:, k]]) for k in (0, -1)]
         own = np.where(ends[0] == ends[1], ends[0], -1)
         parts = [own >= 0] if of_unit is None else [own == u for u in np.unique(own[own >= 0])]
@@ -163,8 +163,3 @@ def squares_of_windows(
                     square = (np.nan_to_num(np.minimum(errors[name], FARTHEST), nan=FARTHEST) ** 2).mean(axis=1)
                     out[number] += [np.bincount(own[part], square, units), np.bincount(own[part], None, units)]
     return out[out[:, 1].sum(axis=1) > 0]
-
-
-def simulate_plan(segment: Segment, inputs: Inputs, states: States) -> np.ndarray:
-    """Samples of the windows of a stretch, (w, m)."""
-    return plan_windows(segment.motion.time_s, WINDOW_S, None, usable(inputs, states))

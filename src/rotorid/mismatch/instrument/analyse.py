@@ -276,7 +276,6 @@ def offered(
         plain=plain,
         believed_left=[np.nan_to_num(r.y) for r in model.rows],
         believed=choice.setup.vehicle,
-        moved=moved,
         names=VALUE_NAMES,
         whole=len(active) == len(model.selection.active) and not gone,
         improved=lambda candidate: choice.vehicle({**candidate.moved, **candidate.values}),
