@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
+from rotorid.effects.contract import Form
 from rotorid.errors import InputError
 from rotorid.mismatch.analyse import findings_inside, findings_outside
 from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.decision.probability import with_probabilities
 from rotorid.mismatch.decision.select import COST_PER_PARAMETER
+from rotorid.mismatch.delivery.derivatives import folds_of, learn
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.model.absent import chosen_already
 from rotorid.mismatch.model.fitted import Fitted, fitted
 from rotorid.mismatch.model.next_flight import CURVES, beyond_flying
 from rotorid.mismatch.model.prepare import Prepared, prepare
-from rotorid.mismatch.model.within_trust import settled
+from rotorid.mismatch.model.within_trust import settled, ways
 from rotorid.mismatch.plant.motion import HIGHEST_CUTOFF_HZ
 from rotorid.mismatch.plant.regression import Regression
 from rotorid.mismatch.plant.rows import Term
@@ -26,6 +29,7 @@ from rotorid.mismatch.posterior.status import CLAIMED
 from rotorid.plan.between import ChainQuestion, chain_question
 from rotorid.recordings import RecordingSet
 from rotorid.recordings.sufficient import sufficient
+from rotorid.vehicle.derivatives import derivative_form, own_controls, quantities
 
 LEAST_WEIGHT = 0.05
 """Relative probability from which a form may as well be the true one."""
@@ -79,6 +83,16 @@ class Known:
     def regression(self) -> Regression:
         """The engine's normal equations of the set."""
         return self.fitted.model.search.regression if self.whitened is None else self.whitened
+
+    @cached_property
+    def beside(self) -> tuple[tuple[Form, np.ndarray], ...]:
+        """Derivatives of what the fitted model leaves, as a form with its values; none where they do not predict."""
+        model, vehicle, thinner = self.fitted.model, self.prepared.vehicle, self.prepared.thinner
+        way = ways(model, self.fitted.values, model.selection.active)[0]
+        x = np.concatenate([thinner(quantities(s.motion, vehicle)) for s in model.segments])
+        learnt = learn(x, np.concatenate(way.left)[:, :6], folds_of(model.regression), own_controls(vehicle))
+        found = derivative_form(vehicle.model_copy(update={"derivatives": learnt.derivatives}))
+        return () if found is None else (found,)
 
 
 def known(

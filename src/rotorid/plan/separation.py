@@ -155,13 +155,14 @@ def world_of(known: Known, question: Question | None, hypothesis: Hypothesis | N
         chain = tuple((form, result.fit.of(key)[1]) for key, form in result.fit.chain)
     voltages = [s.motion.voltage.mean() for s in known.prepared.segments if s.motion.voltage is not None]
     return World(
-        known.prepared.vehicle,
-        effects,
-        chain,
-        full,
-        float(np.mean(voltages)) if voltages else None,
-        volt,
-        None if model.wind is None else np.array([*model.wind, 0.0]),
+        vehicle=known.prepared.vehicle,
+        effects=effects,
+        beside=known.beside,
+        chain=chain,
+        full_speed_rad_s=full,
+        voltage_v=float(np.mean(voltages)) if voltages else None,
+        full_voltage_v=volt,
+        wind_m_s=None if model.wind is None else np.array([*model.wind, 0.0]),
     )
 
 

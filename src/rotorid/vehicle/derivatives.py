@@ -48,6 +48,28 @@ def quantities(motion: Motion, vehicle: Vehicle) -> np.ndarray:
     return out
 
 
+def about_hover_of(x: np.ndarray, vehicle: Vehicle, other: Vehicle) -> np.ndarray:
+    """Quantities (n, 12) of a vehicle as they are of another one that hovers at another speed."""
+    ratio = _hover_square(vehicle) / _hover_square(other)
+    out = x.copy()
+    out[:, 7] = (x[:, 7] + 1.0) * ratio - 1.0
+    out[:, 8:11] *= ratio
+    out[:, 11] *= np.sqrt(ratio)
+    return out
+
+
+def own_controls(vehicle: Vehicle) -> dict[str, tuple[str, float]]:
+    """Of each channel that rotors make the control quantity that asks for it, and what a unit of it makes, N or N m."""
+    weight, arm = vehicle.mass_kg * vehicle.gravity_m_s2, _arm_m(vehicle.rotor_positions_m())
+    torque = float(vehicle.torque_coefficients_n_m_s2().mean() / vehicle.thrust_coefficients_n_s2().mean())
+    return {
+        "force_z": ("thrust", -weight),
+        "moment_x": ("thrust_roll", -weight * arm),
+        "moment_y": ("thrust_pitch", weight * arm),
+        "moment_z": ("thrust_yaw", weight * torque),
+    }
+
+
 def _hover_square(vehicle: Vehicle) -> float:
     """Mean square of the rotor speeds in hover, rad2/s2."""
     return vehicle.mass_kg * vehicle.gravity_m_s2 / float(vehicle.thrust_coefficients_n_s2().sum())

@@ -12,13 +12,23 @@ import yaml
 from typer.testing import CliRunner
 
 from rotorid.cli import app
+from rotorid.effects.contract import Motion
 from rotorid.errors import InputError
 from rotorid.recordings import Vehicle, read_vehicle, templates, write_vehicle
 from rotorid.recordings.vehicle import Derivative, unit_of
 from rotorid.report import next_to_log
 from rotorid.vehicle.batch import Batch
 from rotorid.vehicle.control.swings import swings, turned_over
-from rotorid.vehicle.derivatives import CHANNELS, QUANTITIES, derivative_form, table_of, wrench
+from rotorid.vehicle.derivatives import (
+    CHANNELS,
+    QUANTITIES,
+    about_hover_of,
+    derivative_form,
+    own_controls,
+    quantities,
+    table_of,
+    wrench,
+)
 from rotorid.vehicle.exports import ardupilot_frame, export_vehicle, sih
 from rotorid.vehicle.exports.all_forms import NAMES
 from rotorid.vehicle.exports.derivatives import MUJOCO_FILE, ROTORPY_FILE
@@ -327,3 +337,31 @@ def test_the_command_writes_the_companion_next_to_the_file(tmp_path):
         done = CliRunner().invoke(app, ["export", str(tmp_path / "v.yaml"), "--to", form, "-o", str(folder / "made")])
         assert done.exit_code == 0, done.output
         assert {p.name for p in folder.iterdir()} == {"made", file} and file in done.output
+
+
+@pytest.mark.parametrize("name", ["x500", "neurobem"])
+def test_a_control_asks_for_what_the_rotors_make(name):
+    vehicle = templates.read(name)
+    rng, hub = np.random.default_rng(3), vehicle.rotor_positions_m()
+    square = (vehicle.mass_kg * 9.81 / vehicle.thrust_coefficients_n_s2().sum()) * rng.uniform(0.5, 1.5, len(hub))
+    thrust = vehicle.thrust_coefficients_n_s2() * square
+    made = {
+        "force_z": -thrust.sum(),
+        "moment_x": -(thrust * hub[:, 1]).sum(),
+        "moment_y": (thrust * hub[:, 0]).sum(),
+        "moment_z": (vehicle.yaw_signs() * vehicle.torque_coefficients_n_m_s2() * square).sum(),
+    }
+    still = Motion(time_s=np.zeros(1), rotor_speed=np.sqrt(square)[None])
+    x = quantities(still, vehicle)[0]
+    for channel, (quantity, unit) in own_controls(vehicle).items():
+        hovering = unit if quantity == "thrust" else 0.0
+        assert hovering + unit * x[QUANTITIES.index(quantity)] == pytest.approx(made[channel], rel=2e-3)
+
+
+def test_quantities_of_another_hover():
+    vehicle = templates.read("x500")
+    other = vehicle.model_copy(update={"mass_kg": 1.3 * vehicle.mass_kg})
+    turning = Motion(time_s=np.zeros(1), rotor_speed=np.array([[500.0, 600.0, 550.0, 450.0]]))
+    assert about_hover_of(quantities(turning, vehicle), vehicle, other)[:, 7:] == pytest.approx(
+        quantities(turning, other)[:, 7:]
+    )

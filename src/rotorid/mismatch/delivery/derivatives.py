@@ -8,13 +8,16 @@ collinearity).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from scipy.stats import t as student
 
+from rotorid.mismatch.plant.regression import Regression
 from rotorid.recordings.vehicle import Derivative
-from rotorid.vehicle.derivatives import CHANNELS, QUANTITIES, table_of, unit_of, wrench
+from rotorid.vehicle.derivatives import CHANNELS, CONTROLS, QUANTITIES, table_of, unit_of, wrench
 
 PENALTIES = 10.0 ** np.arange(-4.0, 3.5, 0.5)
 """Of the ridge, times the number of rows; quantities are standardised."""
@@ -25,6 +28,8 @@ HELPS_IN = 2 / 3
 EDGE = 0.002
 """Share of the rows beyond each edge at which a quantity is held."""
 LEAST_FOLDS = 3
+LEAST_GAIN = 0.3
+"""Share of what is asked that rotors make at least: less is what a controller leaves that cancels a disturbance."""
 DAMPED_BY = ("u", "v", "w", "p", "q", "r")
 """Of each channel the quantity that its own motion is: X_u, Y_v, Z_w, L_p, M_q and N_r are damping, or nothing."""
 
@@ -44,15 +49,26 @@ class Learnt:
         return np.nan_to_num(wrench(x, *table_of(self.derivatives)))
 
 
-def learn(x: np.ndarray, y: np.ndarray, fold: np.ndarray) -> Learnt:
+def learn(
+    x: np.ndarray, y: np.ndarray, fold: np.ndarray, controls: Mapping[str, tuple[str, float]] = MappingProxyType({})
+) -> Learnt:
     """Derivatives by the quantities x (n, 12) of what is left of the channels, y (n, 6), N and N m.
 
-    NaN is not recorded. `fold` (n,) numbers what is left out together; rows of -1 take no part. Intervals are the
-    jackknife's over folds, by Student's t: what is common to a run is the same in all of its rows.
+    NaN is not recorded. `fold` (n,) numbers what is left out together; rows of -1 take no part. `controls` (as from
+    `own_controls`) are used where they are exogenous. Intervals are the jackknife's over folds, by Student's t: what is
+    common to a run is the same in all of its rows.
     """
     known = np.isfinite(x).mean(axis=0) > 0.5
-    known[QUANTITIES.index("thrust") :] = False  # what a controller commands follows what disturbs it
+    known[QUANTITIES.index(CONTROLS[0]) :] = False  # what a controller commands follows what disturbs it
+    state = known.copy()
     rows = (fold >= 0) & np.isfinite(x[:, known]).all(axis=1)
+    asked = {}
+    for channel, (quantity, unit) in controls.items():
+        c, k = CHANNELS.index(channel), QUANTITIES.index(quantity)
+        own = rows & np.isfinite(x[:, k]) & np.isfinite(y[:, c])
+        if own.any() and exogenous(x[own][:, state], unit * x[own, k], y[own, c]):
+            known[k], asked[channel] = True, quantity
+    rows &= np.isfinite(x[:, known]).all(axis=1)
     folds = [np.flatnonzero(rows & (fold == k)) for k in np.unique(fold[rows])]
     left_out = np.zeros((len(x), len(CHANNELS)))
     if len(folds) < LEAST_FOLDS or known.sum() < 2:
@@ -68,14 +84,13 @@ def learn(x: np.ndarray, y: np.ndarray, fold: np.ndarray) -> Learnt:
     for c, channel in enumerate(CHANNELS):
         if not np.isfinite(y[rows, c]).all():
             continue
-        beta, without, penalty = _ridge([(z[f], y[f, c]) for f in folds])
+        kept = np.array([q not in CONTROLS or q == asked.get(channel) for q in names])
+        beta, without, penalty = _ridge([(z[f], y[f, c]) for f in folds], kept)
         own = names.index(DAMPED_BY[c]) if DAMPED_BY[c] in names else 0
         if own and beta[own] > 0:
             # No air drives a motion on: a positive one is what a closed loop feigns, and flown it runs away.
-            kept = np.arange(len(names)) != own
-            shorter, others, penalty = _ridge([(z[f][:, kept], y[f, c]) for f in folds])
-            beta, without = np.zeros(len(names)), np.zeros((len(folds), len(names)))
-            beta[kept], without[:, kept] = shorter, others
+            kept[own] = False
+            beta, without, penalty = _ridge([(z[f], y[f, c]) for f in folds], kept)
         if penalty is None:
             continue
         for f, b in zip(folds, without, strict=True):
@@ -95,10 +110,18 @@ def learn(x: np.ndarray, y: np.ndarray, fold: np.ndarray) -> Learnt:
                 high=float(b),
             )
             for q, value, r, a, b in zip(names, values, reach, low, high, strict=True)
+            if q not in CONTROLS or q == asked.get(channel)
         ]
-        for own, changed in zip(apart, others, strict=True):
-            own += [d.model_copy(update={"value": float(v)}) for d, v in zip(out[-len(names) :], changed, strict=True)]
+        at = [names.index(d.quantity) for d in out if d.channel == channel]
+        for own, changed in zip(apart, others[:, at], strict=True):
+            own += [d.model_copy(update={"value": float(v)}) for d, v in zip(out[-len(at) :], changed, strict=True)]
     return Learnt(tuple(out), left_out, tuple(map(tuple, apart)))
+
+
+def folds_of(regression: Regression) -> np.ndarray:
+    """Of the rows of every stretch, one after another, what they are left out with, (n,); -1 for rows of no block."""
+    fold = np.append(regression.folds(), -1)
+    return np.concatenate([fold[b] for b in regression.blocks_of_rows])
 
 
 def _about_zero(beta: np.ndarray, middle: np.ndarray, scale: np.ndarray) -> np.ndarray:
@@ -108,9 +131,27 @@ def _about_zero(beta: np.ndarray, middle: np.ndarray, scale: np.ndarray) -> np.n
     return slopes
 
 
-def _ridge(parts: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray, float | None]:
+def exogenous(state: np.ndarray, asked: np.ndarray, left: np.ndarray) -> bool:
+    """Whether what is left of a channel, (n,), says by how much more or less the rotors make than is `asked`, (n,).
+
+    A controller that fights a disturbance asks against it: regressed on what is asked, what is felt then shows too
+    small a gain, and what is asked, regressed on what is felt, too large a one. The true gain lies between (Klepper and
+    Leamer 1984). It is known where none of the gains between is nearer to one, as stated, than to the first, which is
+    what is learnt.
+    """
+    asked, felt = (v - state @ np.linalg.lstsq(state, v, rcond=None)[0] for v in (asked, asked + left))
+    both = float(asked @ felt)
+    if both <= LEAST_GAIN * float(asked @ asked):
+        return False
+    first, last = both / float(asked @ asked) - 1.0, float(felt @ felt) / both - 1.0
+    return first * last > 0 and abs(first) <= 2.0 * abs(last)
+
+
+def _ridge(parts: list[tuple[np.ndarray, np.ndarray]], kept: np.ndarray) -> tuple[np.ndarray, np.ndarray, float | None]:
     """Coefficients (k,) of all folds' rows, those without each fold, (folds, k), and the penalty that leaves least
-    there; no penalty where the channel is better without any. The first column is a constant, which is not shrunk."""
+    there; no penalty where the channel is better without any. Columns that are not kept, (k,), have 0; the first is a
+    constant, which is not shrunk."""
+    parts = [(x[:, kept], y) for x, y in parts]
     grams, rights = np.array([x.T @ x for x, _ in parts]), np.array([x.T @ y for x, y in parts])
     sizes = np.array([len(y) for _, y in parts])
 
@@ -127,4 +168,6 @@ def _ridge(parts: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.n
     own = np.array([float(y @ y) for _, y in parts])
     best = int(np.argmin(left.sum(axis=0)))
     pays = left[:, best].sum() < MOST_LEFT * own.sum() and np.mean(left[:, best] < own) >= HELPS_IN
-    return solved(gram, right, size)[best], without[:, best], float(PENALTIES[best]) if pays else None
+    beta, others = np.zeros(len(kept)), np.zeros((len(parts), len(kept)))
+    beta[kept], others[:, kept] = solved(gram, right, size)[best], without[:, best]
+    return beta, others, float(PENALTIES[best]) if pays else None

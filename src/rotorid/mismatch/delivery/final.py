@@ -11,7 +11,7 @@ import numpy as np
 from rotorid.mismatch.decision.evidence import with_shares
 from rotorid.mismatch.decision.findings import Analysis, Delivery, Finding, Trace
 from rotorid.mismatch.delivery.candidates import Candidate, Ground, Scored, choose
-from rotorid.mismatch.delivery.derivatives import Learnt, learn
+from rotorid.mismatch.delivery.derivatives import Learnt, folds_of, learn
 from rotorid.mismatch.delivery.parts import claimed, improved_vehicle, place_of
 from rotorid.mismatch.delivery.stated import restated, value_correlations, value_rows
 from rotorid.mismatch.delivery.usable import exports_lost
@@ -20,6 +20,7 @@ from rotorid.mismatch.model.within_trust import ways
 from rotorid.mismatch.plant.rows import CHANNELS
 from rotorid.recordings import Vehicle
 from rotorid.steps import step
+from rotorid.vehicle.derivatives import about_hover_of, own_controls
 
 Stretches = Sequence[tuple[str, np.ndarray, np.ndarray]]
 """Of every stretch its run, the instants of its rows (n,), s, and the quantities of derivatives at them, (n, 12)."""
@@ -97,7 +98,7 @@ def as_delivered(offered: Offered) -> Analysis:
         not_testable=words.not_testable,
         improved=offered.improved(taken),
     )
-    last = with_taken(last, taken, scored, stretches)
+    last = with_taken(last, taken, scored, stretches, offered.believed)
     return replace(
         with_shares(last),
         notes=(*last.notes, *offered.remarks, *exports_lost(improved_vehicle(last), offered.believed)),
@@ -127,10 +128,9 @@ def fitted_candidate(name: str, offered: Offered, values: Values, active: Sequen
 
 def learnt_of(offered: Offered, candidate: Candidate) -> Learnt:
     """The derivatives of what a candidate leaves."""
-    regression = offered.model.regression
-    fold = np.append(regression.folds(), -1)
-    folds = np.concatenate([fold[b] for b in regression.blocks_of_rows])
-    return learn(np.concatenate([x for _, _, x in offered.stretches]), candidate.left, folds)
+    vehicle = offered.improved(candidate)
+    x = about_hover_of(np.concatenate([x for _, _, x in offered.stretches]), offered.believed, vehicle)
+    return learn(x, candidate.left, folds_of(offered.model.regression), own_controls(vehicle))
 
 
 def why_not(finding: Finding, taken: Candidate, scored: Sequence[Scored], offered: Offered) -> str:
@@ -153,10 +153,16 @@ def why_not(finding: Finding, taken: Candidate, scored: Sequence[Scored], offere
     )
 
 
-def with_taken(analysis: Analysis, taken: Candidate, scored: Sequence[Scored], stretches: Stretches) -> Analysis:
+def with_taken(
+    analysis: Analysis, taken: Candidate, scored: Sequence[Scored], stretches: Stretches, believed: Vehicle
+) -> Analysis:
     """The analysis with the traces that the vehicle taken home leaves, and that vehicle's derivatives."""
     derivatives = taken.learnt.derivatives if taken.learnt else ()
-    added = {(run, float(time_s[0])): taken.learnt.of(x) for run, time_s, x in stretches if len(time_s) and derivatives}
+    added = {
+        (run, float(time_s[0])): taken.learnt.of(about_hover_of(x, believed, analysis.improved))
+        for run, time_s, x in stretches
+        if len(time_s) and derivatives
+    }
 
     def left(trace: Trace) -> Trace:
         if trace.channel not in CHANNELS[:6]:

@@ -7,6 +7,7 @@ from rotorid.mismatch.delivery.derivatives import learn
 from rotorid.vehicle.derivatives import CHANNELS, QUANTITIES
 
 N, FOLDS = 3000, 6
+STATE = QUANTITIES[:7]
 FOLD = np.repeat(np.arange(FOLDS), N // FOLDS)
 
 
@@ -72,6 +73,33 @@ def test_what_a_controller_commands_is_no_quantity():
     y = left(5)
     y[:, 2] += 0.5 * x[:, 7]
     assert learn(x, y, FOLD).derivatives == ()
+
+
+CONTROL = {"moment_y": ("thrust_pitch", 2.0)}
+
+
+def looped(seed: int, gain: float, disturbed: float, excited: float) -> tuple[np.ndarray, np.ndarray]:
+    """Quantities and what is left of a vehicle whose pitch moment is `gain` times as large as believed: its controller
+    answers a reference, and cancels a disturbance that nobody recorded."""
+    rng, x, y = np.random.default_rng(50 + seed), flown(seed), left(seed)
+    reference, wind = excited * rng.normal(size=N), disturbed * rng.normal(size=N)
+    asked = (reference - wind) / (2.0 * gain)
+    x[:, QUANTITIES.index("thrust_pitch")] = asked
+    y[:, 4] += (gain - 1.0) * 2.0 * asked + wind
+    return x, y
+
+
+@pytest.mark.parametrize("gain", [0.6, 0.8, 1.3, 1.8])
+def test_a_gain_is_learnt_where_references_move_the_controls(gain):
+    found = learn(*looped(1, gain, 0.1, 1.0), FOLD, CONTROL).derivatives
+    own = next(d for d in found if d.quantity == "thrust_pitch")
+    assert own.unit == "N m" and own.value / 2.0 + 1.0 == pytest.approx(gain, abs=0.05)
+    assert {d.channel for d in found} == {"moment_y"}
+
+
+@pytest.mark.parametrize("gain", [0.8, 1.0, 1.2])
+def test_what_a_controller_cancels_is_no_gain(gain):
+    assert not [d for d in learn(*looped(2, gain, 1.0, 0.2), FOLD, CONTROL).derivatives if d.quantity not in STATE]
 
 
 def test_two_folds_are_too_few_and_a_channel_that_was_not_recorded_has_none():
