@@ -335,6 +335,10 @@ def believed(sheet: Sheet, rng, kit: Kit):
     return out, {k: {"believed": has[k], "true": true[k]} for k in sheet.wrong}
 
 
+AGAIN = 50
+"""First number of the paths that a case is flown along again: no case has as many runs."""
+
+
 def make(family: str, seed: int):
     """The set of a family and a seed, its truth and its noise-free tables."""
     sheet, kit = drafted(family, seed)
@@ -342,20 +346,30 @@ def make(family: str, seed: int):
     return finished(sheet, kit, vehicle, off, *recorded(sheet, kit, vehicle, seed), seed)
 
 
-def recorded(sheet: Sheet, kit: Kit, vehicle: dict, seed: int):
+def flown_again(family: str, seed: int, pace: float):
+    """The runs of a case along other paths under a controller whose bandwidth is `pace` times as large, noise-free."""
+    sheet, kit = drafted(family, seed)
+    vehicle, _ = believed(sheet, np.random.default_rng([seed, 22]), kit)
+    return recorded(sheet, kit, vehicle, seed, pace, AGAIN)[1]
+
+
+def recorded(sheet: Sheet, kit: Kit, vehicle: dict, seed: int, pace: float = 1.0, first: int = 0):
     """Tables of the runs as written, as perfect instruments would have written them, rms values by channel, windows of
-    mistakes, and what a blade-element rotor's parts amount to."""
+    mistakes, and what a blade-element rotor's parts amount to.
+
+    `pace` is the controller's bandwidth over its own, `first` numbers the paths.
+    """
     craft = sheet.craft
     tables, ideals, channels, windows = {}, {}, {}, []
     lag = max(sheet.nature.lag + sheet.nature.second, 0.02)
-    flown = replace(craft, slow=min(craft.slow, 0.045 / lag))
+    flown = replace(craft, slow=pace * min(craft.slow, 0.045 / lag))
     parts = {"axial_inflow": [], "translational_lift": []}
     for i, style in enumerate(sheet.styles[: 3 + seed % 2]):
         name = f"run{i + 1:02d}"
         seconds = float(np.random.default_rng([seed, 23, i]).uniform(22, 34))
         times = np.arange(int(seconds * FINE_HZ)) / FINE_HZ
         for scale in (0.9, 0.65, 0.45, 0.3):
-            rng = np.random.default_rng([seed, 24, i])
+            rng = np.random.default_rng([seed, 24, first + i])
             way = path(seconds, style, rng, scale, craft.name == "micro")
             try:
                 flight = solve(flown, sheet.nature, way, times)

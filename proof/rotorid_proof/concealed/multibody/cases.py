@@ -383,6 +383,10 @@ def believed(draft: Draft, rng: np.random.Generator, grade: logger.Grade) -> tup
     return out, {k: {"believed": has[k], "true": true[k]} for k in off}
 
 
+AGAIN = 50
+"""First number of the paths that a case is flown along again: no case has as many runs."""
+
+
 def make(family: str, seed: int):
     """The set of a family and a seed, its truth and its noise-free tables."""
     draft, grade, runs = drafted(family, seed)
@@ -390,18 +394,28 @@ def make(family: str, seed: int):
     return finished(draft, grade, vehicle_file, off, *recorded(draft, grade, runs, vehicle_file, seed), seed)
 
 
-def recorded(draft: Draft, grade: logger.Grade, runs, vehicle_file: dict, seed: int):
-    """Tables of the runs as written, as perfect instruments would have written them, and rms values by channel."""
+def flown_again(family: str, seed: int, pace: float):
+    """The runs of a case along other paths under a controller whose bandwidth is `pace` times as large, noise-free."""
+    draft, grade, runs = drafted(family, seed)
+    vehicle_file, _ = believed(draft, np.random.default_rng([seed, 2]), grade)
+    return recorded(draft, grade, runs, vehicle_file, seed, pace, AGAIN)[1]
+
+
+def recorded(draft: Draft, grade: logger.Grade, runs, vehicle_file: dict, seed: int, pace: float = 1.0, first: int = 0):
+    """Tables of the runs as written, as perfect instruments would have written them, and rms values by channel.
+
+    `pace` is the controller's bandwidth over its own, `first` numbers the paths.
+    """
     quad = draft.quad
     tables, ideals, channels = {}, {}, {}
     for i, (kinds, seconds) in enumerate(runs):
         name = f"run{i + 1:02d}"
         for agility in (0.9, 0.65, 0.45):
-            rng = np.random.default_rng([seed, 3, i])
+            rng = np.random.default_rng([seed, 3, first + i])
             path = course.reference(seconds, kinds, rng, agility, floor_m=1.3 * quad.radius + 0.05)
             noise = logger.gyro_noise(len(path), grade.rate, rng)
             world = replace(draft.world, wind=draft.wind(np.arange(len(path)) * STEP, i) if draft.wind else None)
-            bandwidth = min(13.0, 0.4 / max(world.lag, 0.02))
+            bandwidth = pace * min(13.0, 0.4 / max(world.lag, 0.02))
             try:
                 flight = fly(quad, world, path, noise, bandwidth, charge=1.0 - 0.04 * i)
                 break

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
-from rotorid.effects.catalogue import catalogue
+from rotorid.effects.catalogue import before_the_rotors, catalogue
 from rotorid.effects.contract import Motion
 from rotorid.mismatch.decision.words import effect_words, listed
 from rotorid.mismatch.tell.consistency import quoted
@@ -63,13 +63,19 @@ def steps_sentence(verdict: Verdict) -> str:
     if whole is None or verdict.kind != "flight":
         return ""
     held = any(c.rmse.held_out.after is not None for c in verdict.channels.values())
-    claimed = dict.fromkeys(e.id for e in verdict.effects if e.delivered)
-    names = [effect_words(i) for i in claimed]
-    said = listed(names[:MOST_NAMES] if len(names) <= MOST_NAMES else [*names[:1], f"{len(names) - 1} more effects"])
+    claimed = list(dict.fromkeys(e.id for e in verdict.effects if e.delivered))
+    # Without measured rotor speeds the values are fitted with what lies between command and speed.
+    measured = any(name.startswith("rotor_speed") for name in verdict.channels)
+    between = [] if measured else [i for i in claimed if i in before_the_rotors()]
+    rest = [i for i in claimed if i not in between]
     values = min(whole.values, 1.0)  # values alone that do not help take nothing off
     taken = [
-        ("values", 1.0 - values, "take"),
-        (said or "named physics", values - whole.named, "takes" if len(names) < 2 else "take"),
+        (_named(["values", *map(effect_words, between)]), 1.0 - values, "take"),
+        (
+            _named(map(effect_words, rest)) or "named physics",
+            values - whole.named,
+            "takes" if len(rest) < 2 else "take",
+        ),
     ]
     parts: list[str] = []
     for name, share, verb in taken:
@@ -88,6 +94,12 @@ def steps_sentence(verdict: Verdict) -> str:
     )
     where = "On flights not used for fitting" if held else "On the flight that was fitted"
     return f"{where}, {', '.join(parts)}; {left}."
+
+
+def _named(words: Iterable[str]) -> str:
+    """The first of some names and how many more there are."""
+    names = list(words)
+    return listed(names if len(names) <= MOST_NAMES else [*names[: MOST_NAMES - 1], f"{len(names) - 1} more effects"])
 
 
 @cache

@@ -34,6 +34,13 @@ def test_values_that_do_not_help_take_nothing_off():
     assert "rotor drag takes 60 % of the error off;" in said and "values" not in said
 
 
+def test_without_rotor_speeds_what_is_between_command_and_speed_counts_with_the_values():
+    verdict = shrunk("named", 0.65, 0.45, 0.45)
+    lag = next(e for e in verdict.effects if e.id == "rotor_drag").model_copy(update={"id": "motor_lag"})
+    said = steps_sentence(verdict.model_copy(update={"effects": [*verdict.effects, lag]}))
+    assert "values and the lag of the motors take 35 % of the error off, rotor drag another 20 %" in said
+
+
 def test_what_is_not_delivered_takes_nothing_off():
     verdict = shrunk("refitted", 0.65, 0.45, 0.50)
     whole = together(steps_of(verdict.channels, "refitted"))
