@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rotorid.mismatch.decision.words import WRENCH_WORDS, listed
 from rotorid.mismatch.model.dependence import ALARM_P, SMALLEST_SHARE_OF_NOISE, left_by, standardised
 from rotorid.mismatch.model.slow_changes import slow_excess
 from rotorid.mismatch.model.wrench import WORTH_STATING, channel_floor
@@ -50,12 +51,6 @@ class ChannelLeftover:
     def counts(self) -> bool:
         """Whether anything is left over here."""
         return self.unexplained > 0 or self.by_values > 0
-
-    @property
-    def gain(self) -> str:
-        """What a plain empirical term would gain, in words."""
-        whole = np.sqrt((self.noise + self.unexplained + self.by_values) / self.count)
-        return f"{self.name} from {whole:.3g} to {np.sqrt(self.noise / self.count):.3g} {_unit(self.name)}"
 
 
 @dataclass(frozen=True)
@@ -159,20 +154,27 @@ def description(
     slow: Mapping[str, tuple[float, float]],
     depends: Sequence[str],
 ) -> str:
-    """Causes, as far as they can be identified, and what a plain empirical term would gain."""
+    """Causes, as far as they can be identified."""
     causes = list(sentences)
     if slow:
-        peaks = [f"{name} around {hz:.1f} Hz, {rms:.2g} {_unit(name)} rms" for name, (rms, hz) in slow.items()]
+        peaks = [
+            f"{WRENCH_WORDS[name][0]} around {hz:.1f} Hz, {rms:.2g} {_unit(name)} rms"
+            for name, (rms, hz) in slow.items()
+        ]
         causes.append(f"it changes slowly in a way that no column follows ({'; '.join(peaks)})")
     causes += [_differing(c.name, c.between) for c in channels if c.between]
-    diffuse = [c.name for c in channels if c.diffuse > 0]
+    diffuse = [f"the {WRENCH_WORDS[c.name][0]}" for c in channels if c.diffuse > 0]
     if not causes and diffuse:
-        causes.append(f"{', '.join(diffuse)} still depend on {' and '.join(depends) or 'the inputs'}")
+        causes.append(
+            f"{listed(diffuse)} still depend{'s' if len(diffuse) == 1 else ''} on {' and '.join(depends) or 'the inputs'}"
+        )
     parts = [" and ".join(causes) + "; the cause is not in the catalogue"] if causes else []
-    unsettled = [c.name for c in channels if c.by_values > 0]
+    unsettled = [WRENCH_WORDS[c.name][0] for c in channels if c.by_values > 0]
     if unsettled:
-        parts.append(f"what is left of {', '.join(unsettled)} cannot be put down to any one believed value")
-    return f"{'; '.join(parts)} (a plain empirical term would lower {', '.join(c.gain for c in channels)})"
+        parts.append(
+            f"what is left of {listed([f'the {w}' for w in unsettled])} cannot be put down to any one believed value"
+        )
+    return "; ".join(parts)
 
 
 def kept_by_values(delivered: float, fitted: float, noise: float, least: float = 1.0) -> float:
@@ -188,7 +190,7 @@ def _differing(channel: str, between: DifferingMeans) -> str:
     """The runs with the lowest and the highest mean, in words."""
     low, high = (pick(between.means, key=between.means.get) for pick in (min, max))
     values = " and ".join(f"{between.means[run]:.2g} {_unit(channel)} in {run}" for run in (low, high))
-    return f"{channel} is off by another amount in each run ({values}), as if something were changed between flights"
+    return f"the {WRENCH_WORDS[channel][0]} is off by another amount in each run ({values}), as if something were changed between flights"
 
 
 def _energy(parts: Iterable[np.ndarray]) -> float:
