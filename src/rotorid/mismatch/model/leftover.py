@@ -165,9 +165,8 @@ def description(
     causes += [_differing(c.name, c.between) for c in channels if c.between]
     diffuse = [f"the {WRENCH_WORDS[c.name][0]}" for c in channels if c.diffuse > 0]
     if not causes and diffuse:
-        causes.append(
-            f"{listed(diffuse)} still depend{'s' if len(diffuse) == 1 else ''} on {' and '.join(depends) or 'the inputs'}"
-        )
+        still = "still depends" if len(diffuse) == 1 else "still depend"
+        causes.append(f"{listed(diffuse)} {still} on {' and '.join(depends) or 'the inputs'}")
     parts = [" and ".join(causes) + "; the cause is not in the catalogue"] if causes else []
     unsettled = [WRENCH_WORDS[c.name][0] for c in channels if c.by_values > 0]
     if unsettled:
@@ -190,7 +189,8 @@ def _differing(channel: str, between: DifferingMeans) -> str:
     """The runs with the lowest and the highest mean, in words."""
     low, high = (pick(between.means, key=between.means.get) for pick in (min, max))
     values = " and ".join(f"{between.means[run]:.2g} {_unit(channel)} in {run}" for run in (low, high))
-    return f"the {WRENCH_WORDS[channel][0]} is off by another amount in each run ({values}), as if something were changed between flights"
+    name = WRENCH_WORDS[channel][0]
+    return f"the {name} is off by another amount in each run ({values}), as if something were changed between flights"
 
 
 def _energy(parts: Iterable[np.ndarray]) -> float:
