@@ -59,17 +59,20 @@ def swing_states(hanging, time_s, length_m, damping_ratio, gravity_m_s2, hung=No
     edges = np.arange(0, size, block)
     counts = np.diff(np.append(edges, size))[:, None]
     coarse, instants = np.add.reduceat(hanging, edges) / counts, np.add.reduceat(time_s, edges) / counts[:, 0]
+    step = block * dt
     omega = sqrt(gravity_m_s2 / length_m)
     if hung is None:
-        recent = np.maximum(1.0 - omega * block * dt * np.arange(len(coarse)) / np.pi, 0.0)
+        recent = np.maximum(1.0 - omega * step * np.arange(len(coarse)) / np.pi, 0.0)
         hung = np.array([[time_s[0], *(recent @ coarse / recent.sum()), 0.0, 0.0, 0.0]])
     firsts = [0, *np.searchsorted(instants, hung[1:, 0]).tolist(), len(coarse)]
     parts = [
-        _swung(coarse[a:b].tobytes(), tuple(state[1:].tolist()), block * dt, length_m, 2 * damping_ratio * omega)
+        _swung(coarse[a:b].tobytes(), tuple(state[1:].tolist()), step, length_m, 2 * damping_ratio * omega)
         for a, b, state in zip(firsts[:-1], firsts[1:], hung, strict=True)
         if b > a
     ]
-    states = np.stack([np.interp(time_s, instants, column) for column in np.concatenate(parts).T], axis=1)
+    states = np.concatenate(parts)
+    if len(instants) < len(time_s):
+        states = np.stack([np.interp(time_s, instants, column) for column in states.T], axis=1)
     states[:, :3] /= np.maximum(np.linalg.norm(states[:, :3], axis=1, keepdims=True), 1e-12)
     return states
 
@@ -79,12 +82,14 @@ def moved(state: np.ndarray, move: np.ndarray, rate: float) -> np.ndarray:
 
     `state` is (6,), `move` (4,).
     """
-    along = state[:3] / np.linalg.norm(state[:3])
-    first = np.cross(along, [1.0, 0.0, 0.0] if abs(along[0]) < 0.7 else [0.0, 1.0, 0.0])
-    first /= np.linalg.norm(first)
-    second = np.cross(along, first)
+    x, y, z = along = state[:3] / sqrt(state[:3] @ state[:3])
+    # Across it, from the axis that it is farther from: along × x, or along × y.
+    first = np.array([0.0, z, -y]) if abs(x) < 0.7 else np.array([-z, 0.0, x])
+    first /= sqrt(first @ first)
+    a, b, c = first
+    second = np.array([y * c - z * b, z * a - x * c, x * b - y * a])
     direction = along + move[0] * first + move[1] * second
-    direction /= np.linalg.norm(direction)
+    direction /= sqrt(direction @ direction)
     turning = state[3:] + rate * (move[2] * first + move[3] * second)
     return np.concatenate([direction, turning - (turning @ direction) * direction])
 
