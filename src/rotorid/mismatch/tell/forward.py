@@ -22,7 +22,7 @@ from rotorid.mismatch.delivery.model import Model, model_of
 from rotorid.mismatch.delivery.parts import claimed, improved_vehicle, place_of, with_effects
 from rotorid.mismatch.model.prepare import sensor_noise
 from rotorid.mismatch.plant.motion import Segment, SensorNoise
-from rotorid.mismatch.tell.verdict import Channel, Errors, PValues, SplitErrors
+from rotorid.mismatch.tell.verdict import Channel, Errors, PValues, SplitErrors, reached
 from rotorid.steps import step
 from rotorid.vehicle.windows import States
 
@@ -70,10 +70,9 @@ def forward_channels(analysis: Analysis) -> Forward:
             Errors(**{stage: _rms(found, name, part, sign) for stage, found in errors.items()}) for sign in (1, -1)
         )
         rmse = SplitErrors(training=of_training, held_out=of_held_out)
-        left = [e for e in (rmse.training.after, rmse.held_out.after) if e is not None]
         channels[name] = Channel(
             unit=UNITS[name],
-            noise_floor=min([floor[name], *left]) if name in floor else None,
+            noise_floor=reached(floor.get(name), rmse.held_out),
             rmse=rmse,
             p_value=PValues(before=None, after=None),
         )

@@ -464,15 +464,26 @@ def inverse_channels(analysis: Analysis) -> dict[str, Channel]:
     for channel, traces in by_channel(analysis.traces).items():
         before, after = analysis.p_values.get(channel, (None, None))
         signs = [part(t.run, t.time_s) for t in traces]
+        rmse = SplitErrors(
+            training=_errors(traces, [s > 0 for s in signs]), held_out=_errors(traces, [s < 0 for s in signs])
+        )
         found[channel] = Channel(
             unit=traces[0].unit,
-            noise_floor=analysis.noise_floor.get(channel),
-            rmse=SplitErrors(
-                training=_errors(traces, [s > 0 for s in signs]), held_out=_errors(traces, [s < 0 for s in signs])
-            ),
+            noise_floor=reached(analysis.noise_floor.get(channel), rmse.held_out),
+            rmse=rmse,
             p_value=PValues(before=before, after=after),
         )
     return found
+
+
+def reached(floor: float | None, held_out: Errors) -> float | None:
+    """A noise floor, but no more than an error that is reached where nothing was fitted.
+
+    The floor is a root mean square of the runs that are fitted: a landing among them, or a second of vibration, makes
+    it larger than the whole error of other runs.
+    """
+    errors = [e for e in held_out.model_dump().values() if e is not None]
+    return None if floor is None else min([floor, *errors])
 
 
 def _errors(traces: Sequence[Trace], masks: Sequence[np.ndarray]) -> Errors:

@@ -17,6 +17,7 @@ from rotorid.mismatch.tell.verdict import (
     SplitErrors,
     Verdict,
     make_verdict,
+    reached,
     schema_text,
 )
 from rotorid.recordings.doubts import Doubt
@@ -118,7 +119,7 @@ def test_a_burst_that_nothing_explains_is_unexplained():
 def test_the_sentence_says_where_what_and_how_much_better():
     found = verdict_of(analysis(findings=[drag_finding()]))
     assert "m/s of airspeed on, the forward force is" in found.sentence
-    assert "rotor drag was left out; the error falls to 0.049 N (noise 0.050)" in found.sentence
+    assert "rotor drag was left out; the error falls to 0.049 N (noise 0.049)" in found.sentence
     told = " ".join(found.details)
     assert "Rotor drag was left out: the sideways force grows with airspeed times rotor speed" in told
     assert "k_d = 6.00e-5 ± 0.20e-5 N s2/(rad m)" in told
@@ -199,3 +200,10 @@ def test_all_believed_values_stand_in_one_table():
     value = found.believed_values["mass_kg"]
     assert (value.believed, value.estimate, value.interval_95, value.delivered) == (0.652, 0.70, (0.68, 0.72), 0.652)
     assert found.correlations[0].correlation == 0.999
+
+
+def test_a_floor_is_no_larger_than_an_error_that_is_reached_where_nothing_was_fitted():
+    reached_there = Errors(before=0.4, refitted=0.3, named=None, after=0.2)
+    assert reached(1.0, reached_there) == 0.2 and reached(0.1, reached_there) == 0.1
+    assert reached(1.0, Errors(before=None, refitted=None, named=None, after=None)) == 1.0
+    assert reached(None, reached_there) is None
