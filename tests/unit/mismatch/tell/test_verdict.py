@@ -123,7 +123,7 @@ def test_the_sentence_says_where_what_and_how_much_better():
     told = " ".join(found.details)
     assert "Rotor drag was left out: the sideways force grows with airspeed times rotor speed" in told
     assert "k_d = 6.00e-5 ± 0.20e-5 N s2/(rad m)" in told
-    assert "on flights not used for fitting" in told and "the sensor's own noise is 0.050 N" in told
+    assert "on flights not used for fitting" in told and "the sensor's own noise is 0.049 N" in told
 
 
 def test_a_wrong_value_is_told_with_what_was_believed():
