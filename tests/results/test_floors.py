@@ -1,4 +1,4 @@
-"""Every verdict that was made here, of shared recordings and of examples: no floor is above an error that is reached."""
+"""Every verdict made here, of shared recordings and of examples: no floor is above an error that is reached."""
 
 import json
 from pathlib import Path

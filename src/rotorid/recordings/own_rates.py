@@ -6,11 +6,15 @@ all its readings by least squares, which keeps the band below half the rate of t
 it. Its values at the knots are the new readings. Speeds and commands of rotors, which jump, are joined by straight
 lines. What this costs is stated: the rate, its band, and the noise there.
 
+Where packets are lost several at a time, hardly a stretch is left in which every sensor has readings. There a sensor
+that is faster than the analysis needs has the rate that the analysis needs, whose periods bridge such gaps.
+
 A sensor that comes evenly, however slow, stays as it is, and so does a hole of several of its own periods.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -30,6 +34,12 @@ COVERED = 0.95
 """Share of the steps between readings that a step of the new grid is as long as."""
 LONG_STEP, SCATTERED = 1.5, 0.15
 """A sensor is scattered where more than such a share of its steps is longer than so many usual ones."""
+TORN = 0.8
+"""Share of a flight in long stretches in which every sensor has readings: below it, gaps are bridged."""
+LEAST_STRETCH_S, LEAST_SINGLE_S = 3.0, 9.0
+"""A stretch that can be used lasts so long; of a single run, a third of which is held out."""
+RATE_ENOUGH_HZ = 50.0
+"""What the analysis needs: its highest cutoff, 20 Hz, over USED_BAND."""
 USED_BAND = 0.4
 """Highest frequency, over the rate, that the analysis uses of a sensor."""
 LINES_A_PERIOD = 4.0
@@ -44,7 +54,7 @@ by chance noise then is as even over the band as of an even sensor, and the gain
 def on_own_rates(recordings: RecordingSet) -> RecordingSet:
     """Flights whose scattered sensors have an even grid, the same in every run; a sentence for each in `left_out`.
 
-    A set that the rule of usual steps cuts at holes alone stays as it is.
+    A set that the rule of usual steps cuts at holes alone stays as it is, unless they are everywhere.
     """
     if recordings.vehicle.kind != "flight":
         return recordings
@@ -53,9 +63,27 @@ def on_own_rates(recordings: RecordingSet) -> RecordingSet:
     sensors = (*rotors, c.POSITION, c.VELOCITY, c.QUATERNION, c.ANGULAR_VELOCITY, c.SPECIFIC_FORCE, (c.HEIGHT,))
     there = {names: [run for run in recordings.runs if is_read(run, names)] for names in sensors}
     scattered = [names for names, runs in there.items() if any(is_scattered(run, names) for run in runs)]
-    if not any(cut_by_chance(run, names) for names in scattered for run in there[names]):
+    by_chance = any(cut_by_chance(run, names) for names in scattered for run in there[names])
+    own = {n: max(own_period_s(run, n) for run in there[n]) for n in (scattered if by_chance else ())}
+    even = _with_grids(recordings, own, rotors)
+    read = [names for names, runs in there.items() if runs]
+    long_s = LEAST_SINGLE_S if len(even.runs) == 1 else LEAST_STRETCH_S
+    if any(whole_share(run, read, long_s) < TORN for run in even.runs):
+        gaps = [n for n in read if n in own or any(_cuts(_whole_steps_s(run, n)) for run in there[n])]
+        wide = {n: max(1.0 / RATE_ENOUGH_HZ, *(own_period_s(run, n) for run in there[n])) for n in gaps}
+        bridged = _with_grids(recordings, wide, rotors)
+        before, after = (sum(whole_share(run, read, long_s) for run in made.runs) for made in (even, bridged))
+        even, own = (bridged, wide) if after > before else (even, own)
+    if not own:
         return recordings
-    periods = {n: max(own_period_s(run, n) for run in there[n]) for n in scattered}
+    said = [_sentence(there[n], n, period, n in rotors) for n, period in own.items()]
+    return replace(even, left_out=(*recordings.left_out, *said))
+
+
+def _with_grids(
+    recordings: RecordingSet, periods: Mapping[tuple[str, ...], float], rotors: Collection[tuple[str, ...]]
+) -> RecordingSet:
+    """The set with every sensor of `periods` on an even grid of so many seconds a step."""
     runs = []
     for run in recordings.runs:
         new = {}
@@ -64,8 +92,22 @@ def on_own_rates(recordings: RecordingSet) -> RecordingSet:
                 values = evenly(run, names, period, jumps=names in rotors)
                 new |= dict(zip(names, values.T, strict=True))
         runs.append(replace(run, table=run.table.assign(**new)))
-    said = [_sentence(there[n], n, period, n in rotors) for n, period in periods.items()]
-    return replace(recordings, runs=tuple(runs), left_out=(*recordings.left_out, *said))
+    return replace(recordings, runs=tuple(runs))
+
+
+def whole_share(run: Run, sensors: Sequence[tuple[str, ...]], long_s: float) -> float:
+    """Share of a flight's time that lies in stretches of `long_s`, s, in which no sensor of it has a hole."""
+    ends = []
+    for names in sensors:
+        if is_read(run, names):
+            known = run.time_s[np.isfinite(run.array(names)).all(axis=1)]
+            steps = np.diff(known)
+            ends += [(known[k], known[k + 1]) for k in np.flatnonzero(steps > HOLE_PERIODS * np.median(steps))]
+    reached, whole, last = run.time_s[0], 0.0, run.time_s[-1]
+    for start, stop in [*sorted(ends), (last, last)]:
+        whole += start - reached if start - reached >= long_s else 0.0
+        reached = max(reached, stop)
+    return float(whole / max(last - run.time_s[0], 1e-9))
 
 
 def _sentence(runs: list[Run], names: tuple[str, ...], period_s: float, jumps: bool) -> str:
@@ -105,11 +147,16 @@ def _whole_steps_s(run: Run, names: tuple[str, ...]) -> np.ndarray:
     return np.diff(run.time_s[np.isfinite(run.array(names)).all(axis=1)])
 
 
+def _cuts(steps_s: np.ndarray) -> int:
+    """Number of steps that the rule of usual steps takes for holes."""
+    return int((steps_s > HOLE_PERIODS * np.median(steps_s)).sum()) if len(steps_s) else 0
+
+
 def cut_by_chance(run: Run, names: tuple[str, ...]) -> bool:
     """Whether a rule in usual steps cuts a sensor where no column of it has a hole of several of its own periods."""
     steps = _steps_s(run, names)
     whole = _whole_steps_s(run, names)
-    cuts = int((whole > HOLE_PERIODS * np.median(whole)).sum()) if len(whole) else len(run.time_s)
+    cuts = _cuts(whole) if len(whole) else len(run.time_s)
     every = [np.diff(run.time_s[np.isfinite(run.column(name))]) for name in names]
     mean = max(float(s.mean()) for s in steps)
     return cuts > sum(int((s > HOLE_PERIODS * mean).sum()) for s in every)

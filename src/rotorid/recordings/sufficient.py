@@ -14,18 +14,16 @@ import numpy as np
 from rotorid.errors import InputError
 from rotorid.io.text.names import listed, nearest, plain
 from rotorid.recordings import columns as c
-from rotorid.recordings.own_rates import HOLE_PERIODS, on_own_rates
+from rotorid.recordings.own_rates import HOLE_PERIODS, LEAST_SINGLE_S, LEAST_STRETCH_S, on_own_rates
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.tables import clock_jump, place
 from rotorid.recordings.vehicle import Vehicle
 
 LEAST_FLIGHT_HZ = 2.0
 """Slower flights show no motion of their own: between two samples a quadrotor has turned and come back."""
-LEAST_STRETCH_S = 3.0
 LEAST_STRETCH_SAMPLES = 30
-"""A stretch of flight without a hole must last so long, and so many samples of its slowest sensor."""
-LEAST_SINGLE_S = 9.0
-"""Of a single run a third is held out, after a gap of two seconds; both parts need two seconds."""
+"""A stretch of flight without a hole must last LEAST_STRETCH_S, and so many samples of its slowest sensor. Of a single
+run (LEAST_SINGLE_S) a third is held out, after a gap of two seconds; both parts need two seconds."""
 SINGLE_GAP_S, HELD_OUT_SHARE = 2.0, 1 / 3
 """Of a single run this share is held out, after a gap."""
 LEAST_READINGS = 10
@@ -471,7 +469,8 @@ def check_single(recordings: RecordingSet) -> None:
         return
     longest, _ = longest_stretch_s(run, [driven_by(run, vehicle), *moving_sensors(run)])
     if longest < LEAST_SINGLE_S:
-        others = f", and the other runs cannot be used ({first_reason(recordings)})" if recordings.left_out else ""
+        why = first_reason(recordings)
+        others = f", and the other runs cannot be used ({why})" if why else ""
         raise InputError(
             f"{whereof(run)}: too little data: a single run must last at least {LEAST_SINGLE_S:g} s without a hole, "
             f"because its last third is held out; found {longest:.3g} s{others}"
@@ -494,13 +493,14 @@ def check_common(recordings: RecordingSet) -> None:
 
 
 def first_reason(recordings: RecordingSet) -> str:
-    """Why the first of the runs left out cannot be used."""
-    return recordings.left_out[0].removeprefix("Left out: ").removesuffix(".")
+    """Why the first of the runs left out cannot be used; empty where all are used."""
+    said = (x.removeprefix("Left out: ").removesuffix(".") for x in recordings.left_out if x.startswith("Left out: "))
+    return next((why for why in said if ": " in why), "")  # a run's file; a sensor has none
 
 
 def with_split_of_the_rest(recordings: RecordingSet) -> RecordingSet:
     """The set with `held_out` less the runs left out; InputError where one side of the split is then empty."""
-    if not recordings.held_out or not recordings.left_out:
+    if not recordings.held_out or not first_reason(recordings):
         return recordings
     names = {run.name for run in recordings.runs}
     held_out = tuple(name for name in recordings.held_out if name in names)

@@ -98,11 +98,44 @@ def test_a_hole_of_several_periods_stays_one_and_what_is_even_stays_as_it_is(flo
     slow.loc[slow.index % 5 != 0, list(c.VELOCITY)] = np.nan
     even = replace(flown, runs=(replace(flown.runs[0], table=slow),))
     assert on_own_rates(even) is even
-    bursts = slow.copy()
-    for start in np.arange(0.5, 12, 0.5):
-        bursts.loc[(slow[c.TIME] > start) & (slow[c.TIME] < start + 0.1), list(c.ANGULAR_VELOCITY)] = np.nan
-    with pytest.raises(InputError, match="the longest stretch in which every sensor has readings lasts 0.5 s"):
-        sufficient(replace(flown, runs=(replace(flown.runs[0], table=bursts),)))
+
+
+def with_bursts(recordings: RecordingSet, lasting_s: float, every_s: float) -> RecordingSet:
+    """Each sensor gives nothing for a time, again and again, no two of them at once."""
+    runs = []
+    for run in recordings.runs:
+        table = run.table.copy()
+        for k, names in enumerate(SENSORS):
+            for start in np.arange(0.3 + 0.07 * k, table[c.TIME].iloc[-1], every_s):
+                inside = (table[c.TIME] > start) & (table[c.TIME] < start + lasting_s)
+                table.loc[inside, list(names)] = np.nan
+        runs.append(replace(run, table=table))
+    return replace(recordings, runs=tuple(runs))
+
+
+def test_gaps_of_a_tenth_of_a_second_everywhere_are_bridged(flown: RecordingSet) -> None:
+    torn = with_bursts(flown, 0.1, 0.7)
+    used = sufficient(torn)
+    assert len(used.runs) == 2 and any("brought to an even 50 Hz" in said for said in used.left_out)
+    longest, _ = longest_stretch_s(used.runs[0], list(SENSORS))
+    assert longest > 11.0
+    for run, true in zip(used.runs, flown.runs, strict=True):
+        known = np.isfinite(run.array(c.VELOCITY)).all(axis=1)
+        off = run.array(c.VELOCITY)[known] - true.array(c.VELOCITY)[known]
+        assert np.sqrt(np.mean(off**2)) < 0.04 and np.abs(off).max() < 0.3  # of 5 m/s, read with 0.02 m/s of noise
+
+
+def test_longer_gaps_everywhere_leave_no_stretch(flown: RecordingSet) -> None:
+    with pytest.raises(InputError, match="the longest stretch in which every sensor has readings lasts 0"):
+        sufficient(with_bursts(flown, 0.3, 0.7))
+
+
+def test_a_run_of_its_own_is_bridged_where_a_gap_would_leave_less_than_is_held_out_of(flown: RecordingSet) -> None:
+    table = flown.runs[0].table.copy()
+    middle = (table[c.TIME] > 6.0) & (table[c.TIME] < 6.08)
+    table.loc[middle, list(c.ANGULAR_VELOCITY)] = np.nan
+    alone = sufficient(replace(flown, runs=(replace(flown.runs[0], table=table),)))
+    assert longest_stretch_s(alone.runs[0], list(SENSORS))[0] > 11.0
 
 
 def test_a_sensor_of_next_to_no_readings_is_left_alone(flown: RecordingSet) -> None:
