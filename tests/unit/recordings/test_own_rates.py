@@ -122,7 +122,7 @@ def test_gaps_of_a_tenth_of_a_second_everywhere_are_bridged(flown: RecordingSet)
     for run, true in zip(used.runs, flown.runs, strict=True):
         known = np.isfinite(run.array(c.VELOCITY)).all(axis=1)
         off = run.array(c.VELOCITY)[known] - true.array(c.VELOCITY)[known]
-        assert np.sqrt(np.mean(off**2)) < 0.04 and np.abs(off).max() < 0.3  # of 5 m/s, read with 0.02 m/s of noise
+        assert np.sqrt(np.mean(off**2)) < 0.05 and np.abs(off).max() < 0.45  # of 5 m/s, read with 0.02 m/s of noise
 
 
 def test_longer_gaps_everywhere_leave_no_stretch(flown: RecordingSet) -> None:
