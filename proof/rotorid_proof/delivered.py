@@ -21,6 +21,7 @@ from rotorid.report.deliver import analysis_of, verdict_of
 from rotorid.vehicle.exports import export_vehicle
 from rotorid.vehicle.exports.flown import try_out
 from rotorid.vehicle.exports.forms import FORMS
+from rotorid_proof.peers import predicting
 
 ENGINES = {"rotorpy": "rotorpy", "mjcf": "mujoco", "gym-pybullet-drones": "pybullet"}
 """Form of an export to the module that flies it."""
@@ -41,6 +42,7 @@ COLUMNS = (
     "not_delivered",
     *(f"score_{name}" for name in CANDIDATES),
     *(f"held_out_{stage}" for stage in STAGES),
+    *(f"peer_{name}" for name in predicting.PEERS),
     "channels",
     "channels_worse",
     "unfit",
@@ -84,6 +86,7 @@ def row_of(recordings: RecordingSet, analysis: Analysis, verdict: Verdict) -> di
         "not_delivered": "; ".join(f"{f.id}: {f.withheld}" for f in analysis.findings if f.withheld),
         **{f"score_{candidate_name(s.model, s.derivatives)}": s.score for s in verdict.delivered.scores},
         **held_out_errors(verdict),
+        **({f"peer_{n}": e for n, e in predicting.errors(analysis).items()} if flies else {}),
         "unfit": question_of(analysis.believed, analysis.recordings.runs)[0](vehicle) if flies else "",
         "not_exported": " ".join(refused_by(vehicle)) if flies else "",
         "not_flown_by": " ".join(not_flown_by(vehicle)) if flies else "",
