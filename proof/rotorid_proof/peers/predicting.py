@@ -53,15 +53,18 @@ def errors(analysis: Analysis) -> dict[str, float]:
         folds = GroupKFold(min(MOST_FOLDS, len(np.unique(groups[fitted]))))
         left = []
         for c in there:
-            search = GridSearchCV(method, grid, scoring="neg_mean_squared_error", cv=folds)
-            search.fit(x[fitted], y[fitted, c] / y[fitted, c].std(), groups=groups[fitted])
-            left.append(y[held, c] - y[fitted, c].std() * np.ravel(search.predict(x[held])))
+            search, size = GridSearchCV(method, grid, scoring="neg_mean_squared_error", cv=folds), y[fitted, c].std()
+            if grid:
+                search.fit(x[fitted], y[fitted, c] / size, groups=groups[fitted])
+            else:
+                search = method.fit(x[fitted], y[fitted, c] / size)
+            left.append(y[held, c] - size * np.ravel(search.predict(x[held])))
         return _mean(_rms(np.column_stack(left)) / base)
 
     penalties = len(x) * 10.0 ** np.arange(-4.0, 3.0)
     found = {"ridge": learnt(make_pipeline(StandardScaler(), Ridge()), {"ridge__alpha": penalties})}
-    network = MLPRegressor(hidden_layer_sizes=(20, 20), activation="logistic", max_iter=400, random_state=0)
-    found["network"] = learnt(make_pipeline(StandardScaler(), network), {"mlpregressor__alpha": [1e-4, 1e-1]})
+    network = MLPRegressor(hidden_layer_sizes=(20, 20), activation="logistic", early_stopping=True, random_state=0)
+    found["network"] = learnt(make_pipeline(StandardScaler(), network), {})
     try:
         from pysindy.optimizers import STLSQ
     except ImportError:  # a development dependency

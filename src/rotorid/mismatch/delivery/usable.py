@@ -167,8 +167,9 @@ def recorded_share(runs: Sequence[Run], vehicle: Vehicle) -> float:
         names = list(c.rotor_columns(group, vehicle.rotor_count))
         tables = [r.table[names].to_numpy() for r in runs if r.has(*names)]
         if tables:
-            share = np.nanmean((scale * np.concatenate(tables) / limits[1]) ** 2, axis=1)
-            flying = share[share > LIGHT * np.nanmax(share)]
+            table = np.concatenate(tables)
+            share = np.mean((scale * table[np.isfinite(table).all(axis=1)] / limits[1]) ** 2, axis=1)
+            flying = share[share > LIGHT * share.max(initial=0.0)]
             return float(np.median(flying)) if len(flying) else 0.0
     return 0.0
 
