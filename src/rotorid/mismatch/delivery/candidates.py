@@ -2,8 +2,8 @@
 
 The number is the mean, over the channels of force and moment and over what half a second of simulation from recorded
 states is off by, of the logarithm of the error on what was left out of the fit (`Regression.folds`): whole
-runs where there are three or more. Taken is the plainest candidate within one standard error of the best, among those
-that hover and fly. No channel has a veto, and no part is taken out by itself.
+runs where there are three or more. Taken is the plainest candidate within one standard error of the best, or within
+three percent, among those that hover and fly. No channel has a veto, and no part is taken out by itself.
 """
 
 from __future__ import annotations
@@ -29,6 +29,8 @@ PLAINEST_FIRST = (
 """Candidates by how much of them has no cause: derivatives next to named physics have less to say than those in its
 place."""
 DRAWS = 400
+WORTH = 0.03
+"""Logarithm of an error below which a richer candidate gains nothing that shows in flight."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +139,7 @@ def choose(
     while True:
         scored = compared(kept, ground)
         best = min(scored, key=lambda s: s.score)
-        first = next(s for s in scored if s.score - best.score <= s.standard_error)
+        first = next(s for s in scored if s.score - best.score <= max(s.standard_error, WORTH))
         # Only who may be chosen is flown; the best, too, for the others are measured by it.
         failing = {
             s.candidate.name: why
