@@ -35,22 +35,9 @@ from rotorid.recordings import columns as c
 from rotorid.recordings.importers.clean import drop_repeated_times, report_gaps
 from rotorid.recordings.importers.frames import continuous
 from rotorid.recordings.importers.report import Fault
+from rotorid.recordings.importers.units import UNITS, converted
 from rotorid.recordings.tables import clock_jump, numbers, read_cells, read_parquet_cells
 
-G = 9.80665
-UNITS: dict[str, dict[str, float]] = {
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
-    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "ft": 0.3048},
-    "velocity": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
-    "rate": {"rad/s": 1.0, "deg/s": np.pi / 180},
-    "angle": {"rad": 1.0, "deg": np.pi / 180},
-    "acceleration": {"m/s2": 1.0, "g": G, "mg": G / 1000},
-    "rotor": {"rad/s": 1.0, "rpm": np.pi / 30, "hz": 2 * np.pi},
-    "share": {"1": 1.0, "%": 0.01, "us": 1.0, "raw": 1.0},
-    "voltage": {"V": 1.0, "mV": 1e-3, "cV": 1e-2, "dV": 0.1},
-    "current": {"A": 1.0, "mA": 1e-3, "cA": 1e-2},
-    "temperature": {"degC": 1.0},
-}
 CHANNELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "time": ("time", (c.TIME,)),
     "position": ("length", c.POSITION),
@@ -204,7 +191,7 @@ def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFra
             low, high = channel.range
             values = np.clip((values - low) / (high - low), 0, 1)
         elif not (name == "attitude" and channel.form != "euler"):
-            values = values * UNITS[kind].get(channel.unit, 1.0)
+            values = converted(values, kind, channel.unit)
         if name == "attitude":
             rotation, values = _attitude(values, channel.form, body, world)
         elif name in ("angular_velocity", "specific_force"):

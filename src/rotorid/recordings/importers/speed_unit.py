@@ -13,9 +13,9 @@ import numpy as np
 import pandas as pd
 
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.mapping import UNITS
 from rotorid.recordings.importers.propose import thrust_coefficient
 from rotorid.recordings.importers.report import Fault
+from rotorid.recordings.importers.units import UNITS
 
 USUAL_COEFFICIENT = 1.7e-5
 """C_F / (mass of the vehicle a rotor)^(4/3), N s² kg^(-4/3): thrust grows with the fourth power of the size, mass with

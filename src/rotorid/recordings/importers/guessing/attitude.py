@@ -24,7 +24,8 @@ from rotorid.recordings.importers.guessing.draft import (
     unit_by_factor,
 )
 from rotorid.recordings.importers.guessing.names import Family
-from rotorid.recordings.importers.mapping import OPEN, UNITS
+from rotorid.recordings.importers.mapping import OPEN
+from rotorid.recordings.importers.units import UNITS
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,8 @@ from rotorid.recordings.importers.guessing import agreement as by
 from rotorid.recordings.importers.guessing import names as named
 from rotorid.recordings.importers.guessing.agreement import Agreement
 from rotorid.recordings.importers.guessing.names import Family
-from rotorid.recordings.importers.mapping import UNITS, Channel
+from rotorid.recordings.importers.mapping import Channel
+from rotorid.recordings.importers.units import UNITS
 
 CONFIRMED = 0.8
 """Correlation of changes from which one quantity is what the other integrates to."""

@@ -13,7 +13,8 @@ from rotorid.recordings.importers.guessing.draft import (
     triples_of,
 )
 from rotorid.recordings.importers.guessing.names import Family
-from rotorid.recordings.importers.mapping import OPEN, UNITS
+from rotorid.recordings.importers.mapping import OPEN
+from rotorid.recordings.importers.units import UNITS
 
 
 def guess_specific_force(draft: Draft) -> None:

@@ -11,7 +11,8 @@ from rotorid.recordings.importers.guessing.draft import (
     Draft,
 )
 from rotorid.recordings.importers.guessing.names import Family
-from rotorid.recordings.importers.mapping import OPEN, UNITS
+from rotorid.recordings.importers.mapping import OPEN
+from rotorid.recordings.importers.units import UNITS
 
 
 def guess_rotors(draft: Draft, quantity: str) -> None:

@@ -10,7 +10,8 @@ from rotorid.recordings.importers.guessing.draft import (
     RATES_HZ,
     Draft,
 )
-from rotorid.recordings.importers.mapping import OPEN, UNITS
+from rotorid.recordings.importers.mapping import OPEN
+from rotorid.recordings.importers.units import UNITS
 
 
 def guess_time(draft: Draft) -> None:

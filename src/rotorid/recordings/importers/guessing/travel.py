@@ -19,7 +19,8 @@ from rotorid.recordings.importers.guessing.draft import (
     unit_by_factor,
 )
 from rotorid.recordings.importers.guessing.names import Family
-from rotorid.recordings.importers.mapping import OPEN, UNITS
+from rotorid.recordings.importers.mapping import OPEN
+from rotorid.recordings.importers.units import UNITS
 
 
 def _gained(draft: Draft) -> np.ndarray | None:
