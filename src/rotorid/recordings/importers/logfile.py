@@ -23,7 +23,7 @@ from rotorid.recordings.importers import (
     ros,
 )
 from rotorid.recordings.importers.known import Known, px4_vehicle
-from rotorid.recordings.importers.mapping import Mapping, read_by_mapping
+from rotorid.recordings.importers.mapping import ELECTRICAL, Mapping, read_by_mapping
 from rotorid.recordings.importers.readers import limited, silent
 from rotorid.recordings.importers.report import Fault
 
@@ -143,6 +143,7 @@ def _read(path: Path, kind: str, mapping: Mapping | None) -> Imported:
     runs, cuts = _in_the_air(table, _stem(path), path)
     speeds = None if mapping is None else mapping.channels.get("rotor_speed") or mapping.channels.get("rotor_command")
     unit = (speeds.unit if speeds else "") or "rad/s"
+    unit = "rpm" if unit in ELECTRICAL else unit  # they are turns of the rotor by now
     return Imported(kind, runs, (*faults, *cuts), axes, speed_unit=unit)
 
 

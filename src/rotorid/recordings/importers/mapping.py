@@ -2,15 +2,22 @@
 
 A mapping names columns, units and frames::
 
-    body: flu              # frd | flu            axes of accelerometer, gyroscope and attitude
-    world: enu             # ned | enu | nwu      axes of position and velocity, and what the attitude refers to
+    body: flu              # frd | flu | fur      axes of accelerometer, gyroscope and attitude
+    world: enu             # ned | enu | nwu | nue  axes of position and velocity, and what the attitude refers to
     channels:
       time: {columns: [t], unit: us}
       specific_force: {columns: [ax, ay, az], unit: g}
-      attitude: {columns: [qx, qy, qz, qw], form: xyzw}       # wxyz | xyzw | euler (roll, pitch, yaw)
+      attitude: {columns: [qx, qy, qz, qw], form: xyzw}       # wxyz | xyzw | euler | euler_xyz (roll, pitch, yaw)
       velocity: {columns: [vx, vy, vz], unit: m/s, axes: body}  # world (default) | body
+      position: {columns: [x, y, z], unit: m, world: neu}       # where its axes are not those of the attitude
       throttle: {columns: [m1, m2, m3, m4], unit: us, range: [1000, 2000]}
+      rotor_speed: {columns: [e1, e2, e3, e4], unit: 100erpm, poles: 14}   # electrical turns: poles of a motor
+      angular_velocity: {columns: [gx, gy, gz], unit: deg/s, scale: 0.061}  # counts: what one is in the unit
     keep: [wind_sensor]    # other columns, kept under their own names
+
+`euler` turns by yaw about z, then pitch about the new y, then roll about the new x (z-y'-x''); `euler_xyz` by roll
+first (x-y'-z'', as motion captures write it). Axes are named in their order, x first: forward, right, left, up, down;
+north, east, west, up, down.
 
 A value that is `?` is a question left open: nothing is imported until it is answered.
 `rotorid.recordings.importers.guessing` proposes such a mapping from the names of the columns and from what stands in
@@ -45,8 +52,8 @@ CHANNELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "attitude": ("angle", c.QUATERNION),
     "angular_velocity": ("rate", c.ANGULAR_VELOCITY),
     "specific_force": ("acceleration", c.SPECIFIC_FORCE),
-    "rotor_speed": ("rotor", ()),
-    "rotor_command": ("rotor", ()),
+    "rotor_speed": ("turns", ()),
+    "rotor_command": ("turns", ()),
     "throttle": ("share", ()),
     "height": ("length", (c.HEIGHT,)),
     "battery_voltage": ("voltage", (c.BATTERY_VOLTAGE,)),
@@ -54,14 +61,19 @@ CHANNELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "temperature": ("temperature", (c.TEMPERATURE,)),
 }
 """Channels of a mapping: kind of unit and columns of the contract (none: one a rotor)."""
-BODY = {"frd": np.eye(3), "flu": np.diag([1.0, -1.0, -1.0])}
+Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+BODY = {"frd": np.eye(3), "flu": np.diag([1.0, -1.0, -1.0]), "fur": Y_UP}
 """Body axes as columns in forward-right-down."""
 WORLD = {
     "ned": np.eye(3),
     "nwu": np.diag([1.0, -1.0, -1.0]),
     "enu": np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]),
+    "nue": Y_UP,
 }
 """World axes as columns in north-east-down."""
+TRAVEL = WORLD | {"neu": np.diag([1.0, 1.0, -1.0])}
+"""Axes that position and velocity may have, too: a left-handed system has no attitude."""
+ELECTRICAL = ("erpm", "100erpm")
 
 
 class Channel(BaseModel):
@@ -71,12 +83,18 @@ class Channel(BaseModel):
 
     columns: tuple[str, ...]
     unit: str = ""
-    form: Literal["wxyz", "xyzw", "euler", "?"] = "wxyz"
+    scale: float | Literal["?"] = 1.0
+    """What one count is in the unit."""
+    form: Literal["wxyz", "xyzw", "euler", "euler_xyz", "?"] = "wxyz"
     """Attitude only."""
     axes: Literal["world", "body", "?"] = "world"
     """Velocity only."""
-    range: tuple[float, float] | None = None
+    world: Literal["ned", "enu", "nwu", "nue", "neu", "?"] | None = None
+    """Position and velocity only: their axes where they are not those of the attitude."""
+    range: tuple[float, float] | Literal["?"] | None = None
     """Throttle only: readings of no and of full throttle."""
+    poles: int | Literal["?"] | None = None
+    """Speeds in electrical turns only: magnetic poles of a motor."""
 
 
 class Mapping(BaseModel):
@@ -84,12 +102,14 @@ class Mapping(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    body: Literal["frd", "flu", "?"] = "frd"
-    world: Literal["ned", "enu", "nwu", "?"] = "ned"
+    body: Literal["frd", "flu", "fur", "?"] = "frd"
+    world: Literal["ned", "enu", "nwu", "nue", "?"] = "ned"
     channels: dict[str, Channel]
     keep: tuple[str, ...] = ()
 
 
+EULER = {"euler": "ZYX", "euler_xyz": "XYZ"}
+"""Orders of the turns about the axes of the body as they come."""
 OPEN = "?"
 """What stands for an answer that only a person can give."""
 
@@ -105,9 +125,17 @@ def open_questions(mapping: Mapping) -> list[str]:
             known = UNITS[CHANNELS[name][0]] if name in CHANNELS else ()
             found.append(f"channels.{name}.unit ({' or '.join(known)})")
         if channel.form == OPEN:
-            found.append(f"channels.{name}.form (wxyz, xyzw or euler)")
+            found.append(f"channels.{name}.form (wxyz, xyzw, euler or euler_xyz)")
         if channel.axes == OPEN:
             found.append(f"channels.{name}.axes (world or body)")
+        if channel.world == OPEN:
+            found.append(f"channels.{name}.world ({' or '.join(TRAVEL)})")
+        if channel.scale == OPEN:
+            found.append(f"channels.{name}.scale (what one count is in the unit)")
+        if channel.range == OPEN:
+            found.append(f"channels.{name}.range ([reading of no throttle, of full throttle])")
+        if channel.poles == OPEN:
+            found.append(f"channels.{name}.poles (magnetic poles of a motor)")
     return found
 
 
@@ -134,7 +162,14 @@ def read_mapping(path: Path) -> Mapping:
             raise InputError(f"{path}: {name}: unit {channel.unit!r}, expected one of {', '.join(known)}")
         wanted = len(CHANNELS[name][1])
         if name == "attitude":
-            wanted = 3 if channel.form == "euler" else 4
+            wanted = 3 if channel.form in EULER else 4
+        if channel.range is not None and not channel.range[1] > channel.range[0]:
+            low, high = channel.range
+            raise InputError(f"{path}: {name}: range [{low:g}, {high:g}], expected no throttle below full throttle")
+        if channel.unit in ELECTRICAL and not (channel.poles or 0) > 0:
+            raise InputError(f"{path}: {name}: unit {channel.unit} needs poles, the magnetic poles of a motor")
+        if channel.scale == 0:
+            raise InputError(f"{path}: {name}: scale 0, expected what one count is in the unit")
         if wanted and len(channel.columns) != wanted:
             raise InputError(f"{path}: {name}: {len(channel.columns)} columns, expected {wanted}")
     if "time" not in mapping.channels:
@@ -187,19 +222,21 @@ def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFra
         channel = mapping.channels[name]
         values = _numbers(raw, channel.columns, name, where)
         kind, columns = CHANNELS[name]
+        if channel.scale != 1.0:
+            values = values * channel.scale
         if name == "throttle" and channel.range is not None:
             low, high = channel.range
             values = np.clip((values - low) / (high - low), 0, 1)
-        elif not (name == "attitude" and channel.form != "euler"):
+        elif name != "attitude" or channel.form in EULER:
             values = converted(values, kind, channel.unit)
+        if channel.unit in ELECTRICAL:
+            values = values / (channel.poles / 2)
         if name == "attitude":
             rotation, values = _attitude(values, channel.form, body, world)
         elif name in ("angular_velocity", "specific_force"):
             values = values @ body.T
-        elif name == "position":
-            values = values @ world.T
-        elif name == "velocity" and channel.axes == "world":
-            values = values @ world.T
+        elif name == "position" or (name == "velocity" and channel.axes == "world"):
+            values = values @ TRAVEL[channel.world or mapping.world].T
         elif name == "velocity":
             if rotation is None:
                 raise InputError(f"{where}: velocity in body axes needs an attitude to be turned into the world")
@@ -235,12 +272,17 @@ def _numbers(raw: pd.DataFrame, columns, channel: str, where: str) -> np.ndarray
     return numbers(raw[list(dict.fromkeys(columns))], where)[list(columns)].to_numpy(float)
 
 
+def from_angles(angles: np.ndarray, form: str) -> Rotation:
+    """Rotations by roll, pitch and yaw (n, 3), rad, in one of the orders of `EULER`."""
+    return Rotation.from_euler(EULER[form], angles if form == "euler_xyz" else angles[:, ::-1])
+
+
 def _attitude(values: np.ndarray, form: str, body: np.ndarray, world: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Quaternions (n, 4), scalar first, FRD to NED; NaN where a value is missing. Twice, as `convert` takes it."""
     out = np.full((len(values), 4), np.nan)
     known = np.isfinite(values).all(axis=1)
-    if form == "euler":
-        turn = Rotation.from_euler("ZYX", values[known][:, [2, 1, 0]])
+    if form in EULER:
+        turn = from_angles(values[known], form)
     else:
         known &= np.linalg.norm(np.nan_to_num(values), axis=1) > 0
         turn = Rotation.from_quat(values[known] if form == "xyzw" else values[known][:, [1, 2, 3, 0]])

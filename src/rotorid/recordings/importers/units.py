@@ -18,6 +18,7 @@ UNITS: dict[str, dict[str, float]] = {
     "angle": {"rad": 1.0, "deg": np.pi / 180, "mrad": 1e-3, "cdeg": np.pi / 18000},
     "acceleration": {"m/s2": 1.0, "g": G, "mg": G / 1000},
     "rotor": {"rad/s": 1.0, "rpm": np.pi / 30, "hz": 2 * np.pi},
+    "turns": {"rad/s": 1.0, "rpm": np.pi / 30, "hz": 2 * np.pi, "erpm": np.pi / 30, "100erpm": 100 * np.pi / 30},
     "share": {"1": 1.0, "%": 0.01, "us": 1.0, "raw": 1.0},
     "voltage": {"V": 1.0, "mV": 1e-3, "cV": 1e-2, "dV": 0.1},
     "current": {"A": 1.0, "mA": 1e-3, "cA": 1e-2, "dA": 0.1},
@@ -28,7 +29,7 @@ UNITS: dict[str, dict[str, float]] = {
         "lbf.ft": POUND_N * FOOT_M, "lbf.in": POUND_N * INCH_M, "ozf.in": OUNCE_N * INCH_M,
     },
 }  # fmt: skip
-"""To each kind of quantity its units, and the factor to the contract's."""
+"""To each kind of quantity its units, and the factor to the contract's (`turns`: electrical ones per pair of poles)."""
 ZEROS = {"degF": -32 * 5 / 9, "K": -273.15}
 """What a reading of 0 is in the contract's unit, where that is not 0."""
 SPELLINGS: dict[str, dict[str, str]] = {
@@ -42,6 +43,8 @@ SPELLINGS: dict[str, dict[str, str]] = {
     "acceleration": {"m/s2": "ms2 mps2 m/s/s m/ss", "g": "gs g0 gn", "mg": "milligee"},
     "rotor": {"rad/s": "rads radps rads1", "rpm": "r/min rev/min revs/min 1/min u/min min1 revolutions/min rpms",
               "hz": "1/s r/s rev/s revs/s rps s1 revolutions/s"},
+    "turns": {"rad/s": "rads radps rads1", "rpm": "r/min rev/min revs/min 1/min u/min min1 rpms",
+              "hz": "1/s r/s rev/s revs/s rps s1", "erpm": "", "100erpm": "erpm/100"},
     "share": {"1": "ratio fraction norm normalized normalised 01", "%": "percent pct prc", "us": "usec", "raw": ""},
     "voltage": {"V": "volt volts", "mV": "millivolt millivolts", "cV": "", "dV": ""},
     "current": {"A": "amp amps ampere amperes", "mA": "milliamp milliamps", "cA": "", "dA": ""},

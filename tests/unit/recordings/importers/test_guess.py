@@ -173,3 +173,101 @@ def test_names(names: str, quantity: str | None) -> None:
     (family,) = column_names.families([names.format(a) for a in "xyz"], "xyz")
     named = [q for q in column_names.TRIPLES if column_names.is_named(family, q)]
     assert named == ([quantity] if quantity else [])
+
+
+# Throttles and electrical speeds ------------------------------------------------------------------
+
+SHARES = 0.45 + 0.12 * np.sin(np.outer(np.arange(900) * 0.01, [2.1, 3.3, 4.7, 5.9]))
+SPOOLED = np.vstack([np.zeros((100, 4)), np.full((100, 4), 0.05), SHARES])
+BETAFLIGHT = {"loopIteration": 1.0, **{f"gyroADC[{k}]": 3.0 for k in range(3)}}
+
+
+def throttles_of(names: str, values: np.ndarray, **more):
+    table = {"t_s": 0.01 * np.arange(len(values)), **more}
+    table |= {names.format(k): column for k, column in enumerate(values.T)}
+    return guess(pd.DataFrame(table))
+
+
+@pytest.mark.parametrize(
+    ("names", "values", "more", "ends"),
+    [
+        ("motor[{}]", 158 + 1889 * SPOOLED, BETAFLIGHT, [48, 2047]),  # in the air at 1008, on the ground at 252
+        ("motor[{}]", 158 + 0 * SPOOLED, BETAFLIGHT, [48, 2047]),  # nothing but idle
+        ("motor[{}]", 158 + 1889 * SHARES / 1.3, BETAFLIGHT, [48, 2047]),
+        ("motor[{}]", 1000 + 1000 * SHARES, BETAFLIGHT, "?"),
+        ("m{}", 48 + 1999 * SPOOLED, {}, [48, 2047]),
+        ("m{}", 1000 + 1000 * SHARES, {}, [1000, 2000]),
+        ("m{}", np.maximum(1000 + 1000 * SPOOLED, 900), {}, [1000, 2000]),
+        ("m{}_us", 1000 + 500 * SHARES, {}, [1000, 2000]),
+        ("m{}_dshot", 1000 + 500 * SHARES, {}, [48, 2047]),
+        ("m{}", 1000 + 500 * SHARES, {}, "?"),
+        ("m{}", SPOOLED, {}, None),
+        ("m{}", 0.1 * SPOOLED, {}, None),
+        ("m{}", -1 + 2 * SHARES, {}, [-1, 1]),
+        ("m{}", 100 * SPOOLED, {}, "?"),  # of 100, or of 255 (8 bits)
+        ("m{}_pct", 100 * SPOOLED, {}, [0, 100]),
+        ("m{}", np.minimum(180 * SPOOLED, 100), {}, [0, 100]),
+        ("m{}", 255 * SPOOLED, {}, [0, 255]),
+        ("m{}", np.minimum(1800 * SPOOLED, 1000), {}, [0, 1000]),
+        ("m{}", np.minimum(1800 * SPOOLED, 1023), {}, [0, 1023]),
+        ("m{}", 1000 * SPOOLED, {}, "?"),
+        ("m{}", 32767 * SPOOLED, {}, "?"),
+        ("m{}", np.minimum(60000 * SPOOLED, 32767), {}, [0, 32767]),
+        ("m{}", 65535 * SPOOLED * 1.5, {}, [0, 65535]),
+    ],
+)  # fmt: skip
+def test_the_range_of_throttles_is_found_or_asked(names: str, values: np.ndarray, more: dict, ends) -> None:
+    """By smallest and largest, by where a vehicle hovers, and by the other columns; asked where two ranges fit."""
+    found = throttles_of(names, values, **more)
+    channel = found.mapping.channels["throttle"]
+    assert (channel.unit == "1") == (ends is None), found.evidence
+    assert channel.range == (tuple(ends) if isinstance(ends, list) else ends), (found.evidence, found.open)
+    assert ("throttle" in found.open) == (ends == "?")
+
+
+ELECTRICAL = 60 / (2 * np.pi) * 7 * (900 + 100 * SHARES)  # of seven pairs of poles, turns a minute
+
+
+@pytest.mark.parametrize(
+    ("names", "values", "more", "unit"),
+    [
+        ("eRPM[{}]", ELECTRICAL / 100, BETAFLIGHT, "100erpm"), ("eRPM(/100)[{}]", ELECTRICAL / 100, {}, "100erpm"),
+        ("eRPM[{}]", ELECTRICAL / 100, {}, "100erpm"), ("erpm_{}", ELECTRICAL, {}, "erpm"),
+        ("motor_{}_erpm", ELECTRICAL, {}, "erpm"), ("erpm_{}", ELECTRICAL / 12, {}, "?"),
+    ],
+)  # fmt: skip
+def test_electrical_speeds_are_no_speeds_of_rotors(names: str, values: np.ndarray, more: dict, unit: str) -> None:
+    found = throttles_of(names, values, **more)
+    channel = found.mapping.channels["rotor_speed"]
+    assert (channel.unit, channel.poles) == (unit, "?") and "poles" in found.open["rotor_speed"]
+    if unit != "?":
+        answered = channel.model_copy(update={"poles": 14})
+        alone = {"time": found.mapping.channels["time"], "rotor_speed": answered}
+        mapping = found.mapping.model_copy(update={"body": "frd", "channels": alone, "keep": ()})
+        table = {"t_s": 0.01 * np.arange(len(values)), **more} | {names.format(k): v for k, v in enumerate(values.T)}
+        made, _ = convert(pd.DataFrame(table), mapping, "own.csv")
+        np.testing.assert_allclose(made["rotor_speed_1_rad_s"], 900 + 100 * SHARES[:, 0])
+
+
+def test_slow_turns_are_asked_although_the_names_say_rpm() -> None:
+    assert throttles_of("rpm_{}", 1000 * SHARES).mapping.channels["rotor_speed"].unit == "?"
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("throttle: {columns: [m], range: [2000, 1000]}", r"range \[2000, 1000\], expected no throttle below"),
+        ("rotor_speed: {columns: [m], unit: erpm}", "needs poles"),
+        ("rotor_speed: {columns: [m], unit: 100erpm, poles: 0}", "needs poles"),
+        ("height: {columns: [m], scale: 0}", "scale 0"),
+        ("position: {columns: [m, m, m], unit: m, world: '?'}", "position.world"),
+        ("height: {columns: [m], scale: '?'}", "height.scale"),
+        ("rotor_speed: {columns: [m], unit: erpm, poles: '?'}", "rotor_speed.poles"),
+        ("throttle: {columns: [m], unit: raw, range: '?'}", "throttle.range"),
+    ],
+)
+def test_what_a_mapping_lacks_is_named(line: str, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "mapping.yaml"
+    path.write_text(f"channels:\n  time: {{columns: [t], unit: s}}\n  {line}\n")
+    with pytest.raises(InputError, match=said):
+        read_mapping(path)

@@ -120,10 +120,14 @@ def _frames_without_accelerometer(draft: Draft) -> tuple[str, str]:
     return OPEN, OPEN
 
 
-def world_that_matters(draft: Draft, world: str) -> str:
-    """The world's axes; nothing is asked where no channel stands in the world."""
-    if world == OPEN and not {"attitude", "velocity", "position"} & set(draft.channels):
-        draft.open.pop("world", None)
-        draft.evidence["world"] = "no channel is in world axes: it plays no part"
-        return "ned"
-    return world
+def axes_that_matter(draft: Draft, body: str, world: str) -> tuple[str, str]:
+    """The axes of body and world; nothing is asked where no channel stands in them."""
+    for key, channels, found, usual in (
+        ("body", {"attitude", "angular_velocity", "specific_force", "velocity"}, body, "frd"),
+        ("world", {"attitude", "velocity", "position"}, world, "ned"),
+    ):
+        if found == OPEN and not channels & set(draft.channels):
+            draft.open.pop(key, None)
+            draft.evidence[key] = f"no channel is in {key} axes: it plays no part"
+            body, world = (usual, world) if key == "body" else (body, usual)
+    return body, world

@@ -14,7 +14,7 @@ import pandas as pd
 from rotorid.errors import InputError
 from rotorid.recordings.importers.guessing.attitude import guess_attitude_and_rates
 from rotorid.recordings.importers.guessing.draft import Draft
-from rotorid.recordings.importers.guessing.force import guess_frames, guess_specific_force, world_that_matters
+from rotorid.recordings.importers.guessing.force import axes_that_matter, guess_frames, guess_specific_force
 from rotorid.recordings.importers.guessing.rotors import guess_rotors
 from rotorid.recordings.importers.guessing.scalars import guess_scalar, guess_time
 from rotorid.recordings.importers.guessing.travel import guess_height, guess_position, guess_velocity
@@ -46,7 +46,7 @@ def guess(table: pd.DataFrame) -> Guess:
     body, world = guess_frames(draft)
     guess_velocity(draft)
     guess_position(draft)
-    world = world_that_matters(draft, world)
+    body, world = axes_that_matter(draft, body, world)
     guess_height(draft)
     for name in ("rotor_command", "rotor_speed", "throttle"):
         guess_rotors(draft, name)

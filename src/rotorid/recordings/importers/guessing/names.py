@@ -14,7 +14,8 @@ UNIT_WORDS: dict[str, str] = {
     "m_s2": "m/s2", "m_s_2": "m/s2", "m_s^2": "m/s2", "ms2": "m/s2", "mps2": "m/s2", "mg": "mg", "g": "g",
     "m_s": "m/s", "mps": "m/s", "cm_s": "cm/s", "mm_s": "mm/s",
     "rad_s": "rad/s", "rads": "rad/s", "radps": "rad/s", "deg_s": "deg/s", "dps": "deg/s", "degps": "deg/s",
-    "rad": "rad", "deg": "deg", "m": "m", "cm": "cm", "mm": "mm", "ft": "ft", "rpm": "rpm", "hz": "hz",
+    "mrad_s": "mrad/s", "mrad": "mrad", "cdeg": "cdeg",
+    "rad": "rad", "deg": "deg", "m": "m", "cm": "cm", "mm": "mm", "ft": "ft", "rpm": "rpm", "hz": "hz", "erpm": "erpm",
 }  # fmt: skip
 """Words of a unit at the end of a name to the mapping's unit."""
 QUALIFIERS = frozenset(
@@ -22,6 +23,8 @@ QUALIFIERS = frozenset(
     "lin linear meas measured 0".split()
 )
 """Words at the end of a stem that do not change what it is."""
+AFTER_NUMBERS = frozenset("us usec pwm dshot pct percent raw".split())
+"""Words that may stand behind the number of a rotor (`m1_us`, `servo1_raw`)."""
 IN_BODY = frozenset(("b", "body", "bodyframe", "frd", "flu"))
 SOURCES = frozenset("state estimate est ekf odom odometry vicon mocap imu drone quad uav vehicle px4 mavros".split())
 """Words at the beginning of a stem that say where a value comes from."""
@@ -87,7 +90,7 @@ class Family:
 
 def words_of(name: str) -> list[str]:
     """The words of a name in small letters."""
-    parted = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", str(name))
+    parted = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", str(name).replace("eRPM", "erpm"))
     return [w for w in re.split(r"[^a-z0-9^µ]+", parted.lower()) if w]
 
 
@@ -153,8 +156,9 @@ def numbered(names: Iterable[str]) -> list[Family]:
     """Families of three to twelve columns numbered in one go from 0 or 1 (`u0` … `u3`, `motor[1]`, `m1_rpm`)."""
     found: dict[str, dict[int, tuple[str, str]]] = {}
     for name in names:
-        words, unit = _without_unit(words_of(name))
-        if words and words[-1] in ("us", "pwm") and len(words) > 1 and re.search(r"\d$", words[-2]):
+        words, unit = _without_unit(words_of(name.replace("(/100)", "")))
+        unit = "100erpm" if "(/100)" in name else unit
+        if words and words[-1] in AFTER_NUMBERS and len(words) > 1 and re.search(r"\d$", words[-2]):
             words = words[:-1]
         match = re.fullmatch(r"(.*?)(?:_m)?_?(\d{1,2})", "_".join(words))
         if match:
@@ -199,7 +203,7 @@ def is_rotor(family: Family, quantity: str) -> bool:
         )
     if family.words & WISHED and quantity == "rotor_speed":
         return False
-    if quantity == "rotor_speed" and family.unit in ("rpm", "rad/s", "hz"):
+    if quantity == "rotor_speed" and family.unit in ("rpm", "rad/s", "hz", "erpm", "100erpm"):
         return _ends_in(stem, ROTORS[quantity] | ROTORS["throttle"])
     return _ends_in("_".join(rest), ROTORS[quantity])
 
