@@ -12,8 +12,11 @@ Explorer `flightlog_fields_presenter.js`.
 
 from __future__ import annotations
 
+import csv
+import io
 import re
 import struct
+from array import array
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -52,7 +55,8 @@ def read_betaflight(path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
 
     InputError where the file is of another firmware, cannot be read, or holds no flight.
     """
-    found = blackbox.sessions(Path(path).read_bytes())
+    data = Path(path).read_bytes()
+    found = [_exported(data, path)] if data.startswith(b'"Product"') else blackbox.sessions(data)
     runs: dict[str, pd.DataFrame] = {}
     faults: list[Fault] = []
     reasons: list[str] = []
@@ -71,6 +75,37 @@ def read_betaflight(path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
     if not runs:
         raise InputError(f"{path}: {reasons[-1] if reasons else 'holds no log'}")
     return runs, faults
+
+
+def _exported(data: bytes, path: Path) -> blackbox.Session:
+    """The session in a table that Blackbox Explorer exports: its header, a line each, then frames as logged."""
+    rows = csv.reader(io.StringIO(data.decode("utf-8", "replace")))
+    headers: dict[str, str] = {}
+    names: tuple[str, ...] = ()
+    values, whole = array("d"), True
+    try:
+        for cells in rows:
+            if not names and "time" in cells:
+                names = tuple(name.strip() for name in cells)
+            elif not names and len(cells) > 1:
+                headers[cells[0]] = ",".join(cells[1:])
+            elif names and cells:
+                whole = len(cells) == len(names)
+                values.extend(_cell(cell) for cell in cells[: len(cells) * whole])
+    except csv.Error as error:
+        raise InputError(f"{path}, line {rows.line_num}: cannot be read as a table ({error})") from None
+    if not names:
+        raise InputError(f"{path}: Blackbox Explorer's header is there, but no heading with a column time below it")
+    if scale := _number(headers, "gyroScale", 0.0):  # the Explorer turns deg/s into rad/µs
+        headers.setdefault("gyro_scale", f"{np.degrees(scale) * 1e6:.9f}")
+    return blackbox.Session(headers, names, np.array(values).reshape(-1, len(names)), whole, 0)
+
+
+def _cell(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return np.nan
 
 
 def _flights(session: blackbox.Session, name: str, path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
@@ -230,7 +265,7 @@ def _number(headers: Mapping[str, str], name: str, otherwise: float) -> float:
     text = headers.get(name, "").strip()
     if re.fullmatch(r"0x[0-9a-fA-F]{1,8}", text):
         return struct.unpack("<f", struct.pack("<I", int(text, 16)))[0]
-    return float(text) if re.fullmatch(r"[-+]?\d{1,15}(\.\d*)?", text) else otherwise
+    return float(text) if re.fullmatch(r"[-+]?\d{1,15}(\.\d*)?(e[-+]?\d{1,2})?", text) else otherwise
 
 
 def _pair(headers: Mapping[str, str], name: str) -> tuple[float, float] | None:

@@ -30,6 +30,7 @@ from rotorid.recordings.importers.report import Fault
 GZIP = b"\x1f\x8b"
 BY_FIRST_BYTES = (
     (b"H Product:Blackbox", "betaflight"),
+    (b'"Product","Blackbox', "betaflight"),
     (b"\xa3\x95", "ardupilot"),
     (b"#ROSBAG V2.0", "ros"),
     (b"\x89MCAP0", "ros"),

@@ -200,15 +200,30 @@ def read_by_mapping(path: Path, mapping: Mapping | None) -> tuple[pd.DataFrame, 
     Without a mapping the columns must have the contract's names; InputError says how to get a mapping.
     """
     raw = read_columns(path)
+    lost = _left_out(raw)
     if mapping is None:
         if c.TIME in raw.columns and sum(c.is_known(n) for n in raw.columns) > 1:
-            return *_clocked(numbers(raw, path), path), "the contract's: the columns have its names"
+            table, faults = _clocked(numbers(raw, path), path)
+            return table, lost + faults, "the contract's: the columns have its names"
         raise InputError(
             f"{path}: the columns ({', '.join(raw.columns[:6])}, …) are not named as the recording contract has them; "
             f"`rotorid import {path.name} --write-mapping mapping.yaml` proposes what each one is"
         )
     table, faults = convert(raw, mapping, str(path))
-    return table, faults, f"body {mapping.body.upper()}, world {mapping.world.upper()}, turned into FRD and NED"
+    return table, lost + faults, f"body {mapping.body.upper()}, world {mapping.world.upper()}, turned into FRD and NED"
+
+
+def _left_out(raw: pd.DataFrame) -> list[Fault]:
+    """What of the file of a table is none of its rows."""
+    layout = raw.attrs.get("layout")
+    faults = []
+    if layout and layout.above:
+        found = f"{len(layout.above)} lines above the heading in line {layout.heading_line}"
+        faults.append(Fault("above", "", found, "left out", 0))
+    if layout and layout.cut_off:
+        found = "the last line is cut off"
+        faults.append(Fault("cut_off", c.TIME, found, "left out", 1))
+    return faults
 
 
 def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFrame, list[Fault]]:

@@ -36,7 +36,11 @@ class Guess:
 
 def guess(table: pd.DataFrame) -> Guess:
     """A mapping proposed for a table of any columns; those with a cell that is no number take no part."""
+    layout = table.attrs.get("layout")
     table, left_out = _of_numbers(table)
+    if layout and layout.above:
+        first = layout.above[0][:150]
+        left_out.insert(0, f"left out: {len(layout.above)} lines above the heading, the first of them: {first}")
     draft = Draft(table)
     guess_time(draft)
     for name in ("battery_voltage", "battery_current", "temperature"):

@@ -57,7 +57,7 @@ ROTORS: dict[str, frozenset[str]] = {
         "motor motors throttle throttles pwm m mot output outputs thr control u act actuator actuators".split()
     ),
 }  # fmt: skip
-QUATERNION = frozenset("q quat quaternion att_q attitude_q orientation".split())
+QUATERNION = frozenset("q quat quaternion att_q attitude_q orientation rotation".split())
 ANGLES = ({"roll", "phi"}, {"pitch", "theta"}, {"yaw", "psi", "heading"})
 SCALARS: dict[str, tuple[str, ...]] = {
     "time": (r"t([ _(\[]*([munµ]?s)[)\]]?)?", r"time(stamp)?([ _(\[].*)?", r"time_.*", r".*timestamp.*"),
