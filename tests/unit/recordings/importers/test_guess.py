@@ -19,7 +19,7 @@ from rotorid.recordings import read_set, templates
 from rotorid.recordings.importers.guessing import names as column_names
 from rotorid.recordings.importers.guessing.guess import guess
 from rotorid.recordings.importers.guessing.text import as_text
-from rotorid.recordings.importers.mapping import BODY, UNITS, WORLD, convert, read_mapping
+from rotorid.recordings.importers.mapping import BODY, TRAVEL, UNITS, WORLD, convert, read_mapping
 from tests.public_logs import LOGS, needs_logs
 
 NAMES = {
@@ -271,3 +271,180 @@ def test_what_a_mapping_lacks_is_named(line: str, said: str, tmp_path: Path) -> 
     path.write_text(f"channels:\n  time: {{columns: [t], unit: s}}\n  {line}\n")
     with pytest.raises(InputError, match=said):
         read_mapping(path)
+
+
+# Axes, orders and units that differ between channels -----------------------------------------------
+
+
+def in_axes(
+    flown: pd.DataFrame, body: str = "frd", world: str = "ned", travel: str = "", place: str = ""
+) -> pd.DataFrame:
+    """The flight in plain names, sensors and attitude in `body` and `world`, velocity and position in other axes."""
+    table = plain(flown)
+    turn = Rotation.from_quat(flown[list(c.QUATERNION)].to_numpy()[:, [1, 2, 3, 0]])
+    own = Rotation.from_matrix(WORLD[world]).inv() * turn * Rotation.from_matrix(BODY[body])
+    table[["qw", "qx", "qy", "qz"]] = own.as_quat()[:, [3, 0, 1, 2]]
+    for short, names in (("gyro_", c.ANGULAR_VELOCITY), ("acc_", c.SPECIFIC_FORCE)):
+        table[[f"{short}{a}" for a in "xyz"]] = flown[list(names)].to_numpy() @ BODY[body]
+    table[["vx", "vy", "vz"]] = flown[list(c.VELOCITY)].to_numpy() @ TRAVEL[travel or world]
+    table[["pos_x", "pos_y", "pos_z"]] = flown[list(c.POSITION)].to_numpy() @ TRAVEL[place or travel or world]
+    return table
+
+
+def check_converted(flown: pd.DataFrame, table: pd.DataFrame, mapping, north: bool = True) -> None:
+    """The mapping brings a table back to the flight; where nothing shows north, up to a turn about the vertical."""
+    made, _ = convert(table, mapping, "own.csv")
+    for names in (c.ANGULAR_VELOCITY, c.SPECIFIC_FORCE):
+        np.testing.assert_allclose(made[list(names)], flown[list(names)], atol=1e-5)
+    for names in (c.VELOCITY, c.POSITION):
+        found, true = made[list(names)].to_numpy(), flown[list(names)].to_numpy()
+        np.testing.assert_allclose(found[:, 2], true[:, 2], atol=1e-5)
+        np.testing.assert_allclose(np.linalg.norm(found, axis=1), np.linalg.norm(true, axis=1), atol=1e-5)
+        if north:
+            np.testing.assert_allclose(found, true, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("body", "world"), [("frd", "ned"), ("flu", "enu"), ("fur", "nue"), ("flu", "nue"), ("frd", "enu")]
+)
+@pytest.mark.parametrize("travel", ["ned", "enu", "nwu", "nue", "neu"])
+@pytest.mark.parametrize("place", ["", "neu", "ned"])
+def test_velocity_and_position_in_other_axes_than_the_attitude(
+    flown: pd.DataFrame, body: str, world: str, travel: str, place: str
+) -> None:
+    table = in_axes(flown, body, world, travel, place)
+    found = guess(table)
+    assert found.mapping.body == body and not found.open, (found.open, found.evidence)
+    assert found.mapping.world == world or {found.mapping.world, world} == {"enu", "nwu"}
+    check_converted(flown, table, found.mapping, north=found.mapping.world == world)
+
+
+def test_y_up_is_never_taken_for_z_up(flown: pd.DataFrame) -> None:
+    """As motion captures write it: attitude and position alone, nothing else in the table."""
+    table = in_axes(flown, "fur", "nue")[["t_s", "qw", "qx", "qy", "qz", "pos_x", "pos_y", "pos_z"]]
+    found = guess(table)
+    assert (found.mapping.body, found.mapping.world) in (("fur", "nue"), ("?", "?")), found.evidence
+
+
+def test_a_height_that_only_rises_is_asked_for_its_direction(flown: pd.DataFrame) -> None:
+    table = in_axes(flown)[["t_s", "qw", "qx", "qy", "qz", "acc_x", "acc_y", "acc_z", "pos_x", "pos_y", "pos_z"]]
+    climbed = table.assign(pos_z=np.linspace(0, 5, len(table)))
+    assert guess(climbed).mapping.channels["position"].world == "?"
+    assert guess(climbed.assign(pos_z=-climbed["pos_z"])).mapping.channels["position"].world is None
+
+
+@pytest.mark.parametrize("form", ["euler", "euler_xyz"])
+@pytest.mark.parametrize("unit", ["rad", "deg"])
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_the_order_of_roll_pitch_and_yaw_is_decided_by_the_gyroscope(
+    flown: pd.DataFrame, form: str, unit: str, noise: float
+) -> None:
+    table = plain(flown)
+    turn = Rotation.from_quat(table[["qx", "qy", "qz", "qw"]].to_numpy()) * Rotation.from_euler("z", 0.7)
+    angles = turn.as_euler("ZYX")[:, ::-1] if form == "euler" else turn.as_euler("XYZ")
+    back = Rotation.from_euler("z", -0.7).as_matrix()
+    rates = table[["gyro_x", "gyro_y", "gyro_z"]].to_numpy() @ back.T
+    rates = rates + noise * np.random.default_rng(0).standard_normal(rates.shape)
+    force = table[["acc_x", "acc_y", "acc_z"]].to_numpy() @ back.T
+    table = table.drop(columns=["qw", "qx", "qy", "qz"]).assign(
+        **dict(zip(("roll", "pitch", "yaw"), np.unwrap(angles, axis=0).T / UNITS["angle"][unit], strict=True)),
+        **dict(zip(("gyro_x", "gyro_y", "gyro_z"), rates.T, strict=True)),
+        **dict(zip(("acc_x", "acc_y", "acc_z"), force.T, strict=True)),
+    )
+    found = guess(table)
+    channel = found.mapping.channels["attitude"]
+    assert (channel.form, channel.unit) == (form, unit), (found.evidence, found.open)
+    made, _ = convert(table, found.mapping, "own.csv")
+    read = Rotation.from_quat(made[list(c.QUATERNION)].to_numpy()[:, [1, 2, 3, 0]])
+    assert (read.inv() * turn).magnitude().max() < 1e-6
+
+
+def test_an_order_that_nothing_shows_is_asked_where_it_matters(flown: pd.DataFrame) -> None:
+    angles = 0.4 * np.sin(np.outer(flown[c.TIME], [1.0, 1.3, 0.7]))
+    table = flown[[c.TIME]].rename(columns={c.TIME: "t_s"})
+    table[["roll_deg", "pitch_deg", "yaw_deg"]] = np.degrees(angles)
+    assert guess(table).mapping.channels["attitude"].form == "?"
+    table[["roll_deg", "pitch_deg", "yaw_deg"]] *= 0.05
+    assert guess(table).mapping.channels["attitude"].form == "euler"
+
+
+@pytest.mark.parametrize(
+    ("factor", "unit"), [(1.0, "rad/s"), (np.pi / 180, "deg/s"), (1e-3, "mrad/s"), (0.00106526, "?"), (0.1, "?")]
+)
+def test_the_unit_of_a_gyroscope_follows_from_the_attitude(flown: pd.DataFrame, factor: float, unit: str) -> None:
+    """Counts of a sensor have no unit: the question says the scale that the attitude asks for."""
+    table = plain(flown)
+    table[["gyro_x", "gyro_y", "gyro_z"]] /= factor
+    found = guess(table)
+    channel = found.mapping.channels["angular_velocity"]
+    assert channel.unit == unit
+    if unit == "?":
+        scale = float(found.open["angular_velocity"].split("scale: ")[1].rstrip(")"))
+        assert scale == pytest.approx(factor, rel=0.01)
+
+
+@pytest.mark.parametrize("factor", [np.pi / 180, 1e-3, 0.00106526])
+def test_a_gyroscope_without_an_attitude_is_asked_for_its_unit(flown: pd.DataFrame, factor: float) -> None:
+    table = plain(flown).drop(columns=["qw", "qx", "qy", "qz"])
+    table[["gyro_x", "gyro_y", "gyro_z"]] /= factor / 5
+    found = guess(table)
+    assert found.mapping.channels["angular_velocity"].unit == "?" and "counts" in found.open["angular_velocity"]
+    named = table.rename(columns={f"gyro_{a}": f"gyro_{a}_mrad_s" for a in "xyz"})
+    assert guess(named).mapping.channels["angular_velocity"].unit == "mrad/s"
+
+
+@pytest.mark.parametrize("counts", [512, 2048, 8192, 16384])
+def test_an_accelerometer_in_counts_is_asked_for_its_scale(flown: pd.DataFrame, counts: int) -> None:
+    table = plain(flown)
+    table[["acc_x", "acc_y", "acc_z"]] *= counts / 9.80665
+    found = guess(table)
+    assert found.mapping.channels["specific_force"].unit == "?"
+    assert f"1/{counts}" in found.open["specific_force"]
+    answered = found.mapping.channels["specific_force"].model_copy(update={"unit": "g", "scale": 1 / counts})
+    channels = {"time": found.mapping.channels["time"], "specific_force": answered}
+    made, _ = convert(table, found.mapping.model_copy(update={"channels": channels, "world": "ned", "keep": ()}), "own")
+    np.testing.assert_allclose(made[list(c.SPECIFIC_FORCE)], flown[list(c.SPECIFIC_FORCE)], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("message", "force", "rate"),
+    [("RAW_IMU", "mg", "mrad/s"), ("SCALED_IMU2", "mg", "mrad/s"), ("HIGHRES_IMU", "m/s2", "rad/s")],
+)
+@pytest.mark.parametrize("attitude", [True, False])
+def test_the_names_of_mavlink(flown: pd.DataFrame, message: str, force: str, rate: str, attitude: bool) -> None:
+    table = plain(flown)
+    own = {f"{message}.{a}acc": table[f"acc_{a}"] / UNITS["acceleration"][force] for a in "xyz"}
+    own |= {f"{message}.{a}gyro": table[f"gyro_{a}"] / UNITS["rate"][rate] for a in "xyz"}
+    own |= {f"{message}.{a}mag": 0.0 for a in "xyz"}
+    own |= {
+        f"SERVO_OUTPUT_RAW.servo{k}_raw": np.where(k < 5, 1500 + 100 * np.sin(k * table["t_s"]), 0)
+        for k in range(1, 17)
+    }
+    kept = ["t_s", *(["qw", "qx", "qy", "qz"] if attitude else [])]
+    found = guess(table[kept].assign(**own))
+    channels = found.mapping.channels
+    assert channels["specific_force"].unit == force and channels["angular_velocity"].unit == rate, found.open
+    assert channels["angular_velocity"].columns == tuple(f"{message}.{a}gyro" for a in "xyz")
+    assert channels["throttle"].columns == tuple(f"SERVO_OUTPUT_RAW.servo{k}_raw" for k in range(1, 5))
+    assert channels["throttle"].range == (1000.0, 2000.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "unit"),
+    [
+        ("battery_current_mA", 15000.0, "mA"), ("battery_current_A", 15.0, "A"), ("current", 15.0, "A"),
+        ("current", 1500.0, "?"), ("battery_current_cA", 1500.0, "cA"), ("current [mA]", 1500.0, "mA"),
+        ("battery_current_mA", 0.02, "?"), ("battery_voltage", 16.0, "V"), ("battery_voltage_cV", 1600.0, "cV"),
+        ("battery_voltage_mV", 16000.0, "mV"), ("vbat", 16000.0, "mV"), ("vbat", 168.0, "dV"), ("vbat", 1680.0, "cV"),
+        ("vbat", 380.0, "?"), ("battery_voltage_mV", 16.0, "?"), ("Voltage (V)", 16.0, "V"),
+        ("temperature_K", 300.0, "K"), ("temperature", 300.0, "K"), ("temperature_c", 35.0, "degC"),
+        ("temperature", 35.0, "degC"), ("temperature", 95.0, "?"), ("temp_degF", 95.0, "degF"),
+        ("Temperature (°F)", 95.0, "degF"),
+    ],
+)  # fmt: skip
+def test_units_of_battery_and_temperature_by_name_and_size(name: str, value: float, unit: str) -> None:
+    table = pd.DataFrame({"t_s": 0.01 * np.arange(200), name: value * (1 + 0.01 * np.sin(np.arange(200)))})
+    found = guess(table)
+    (channel,) = (v for k, v in found.mapping.channels.items() if k != "time")
+    assert channel.unit == unit, (found.evidence, found.open)
+    assert bool(found.open) == (unit == "?")

@@ -47,10 +47,10 @@ def guess(table: pd.DataFrame) -> Guess:
         guess_scalar(draft, name)
     guess_attitude_and_rates(draft)
     guess_specific_force(draft)
-    body, world = guess_frames(draft)
+    body, draft.world = guess_frames(draft)
     guess_velocity(draft)
     guess_position(draft)
-    body, world = axes_that_matter(draft, body, world)
+    body, world = axes_that_matter(draft, body, draft.world)
     guess_height(draft)
     for name in ("rotor_command", "rotor_speed", "throttle"):
         guess_rotors(draft, name)

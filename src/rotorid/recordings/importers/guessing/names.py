@@ -54,7 +54,7 @@ ROTORS: dict[str, frozenset[str]] = {
     "rotor_speed": frozenset("rpm erpm rotor_speed rotor_speeds motor_speed motor_speeds mot_speed".split()),
     "rotor_command": frozenset("rotor_command rotor_commands".split()),
     "throttle": frozenset(
-        "motor motors throttle throttles pwm m mot output outputs thr control u act actuator actuators".split()
+        "motor motors throttle throttles pwm m mot output outputs thr control u act actuator actuators servo".split()
     ),
 }  # fmt: skip
 QUATERNION = frozenset("q quat quaternion att_q attitude_q orientation rotation".split())
@@ -66,6 +66,7 @@ SCALARS: dict[str, tuple[str, ...]] = {
     "height": (r"height.*", r"agl.*", r"range.*"),
     "temperature": (r"temp(erature)?.*",),
 }
+MAVLINK = "xyz of MAVLink"
 AXES = ("xyz", "012", "123", "ned", "enu")
 FOURS = ("wxyz", "0123", "1234")
 
@@ -153,7 +154,7 @@ def families(names: Iterable[str], axes: str) -> list[Family]:
 
 
 def numbered(names: Iterable[str]) -> list[Family]:
-    """Families of three to twelve columns numbered in one go from 0 or 1 (`u0` … `u3`, `motor[1]`, `m1_rpm`)."""
+    """Families of three to sixteen columns numbered in one go from 0 or 1 (`u0` … `u3`, `motor[1]`, `m1_rpm`)."""
     found: dict[str, dict[int, tuple[str, str]]] = {}
     for name in names:
         words, unit = _without_unit(words_of(name.replace("(/100)", "")))
@@ -167,13 +168,27 @@ def numbered(names: Iterable[str]) -> list[Family]:
     result = []
     for stem, members in found.items():
         count = len(members)
-        if 3 <= count <= 12 and sorted(members) in (list(range(count)), list(range(1, count + 1))):
+        if 3 <= count <= 16 and sorted(members) in (list(range(count)), list(range(1, count + 1))):
             order = sorted(members)
             units = {members[k][1] for k in order}
             columns = tuple(members[k][0] for k in order)
             unit = units.pop() if len(units) == 1 else ""
             result.append(Family(stem, columns, "number", unit, frozenset(stem.split("_"))))
     return result
+
+
+def of_mavlink(names: Iterable[str]) -> list[Family]:
+    """Accelerometers and gyroscopes as MAVLink's messages name them: `RAW_IMU.xacc`, `SCALED_IMU2.ygyro`."""
+    found: dict[tuple[str, ...], dict[str, str]] = {}
+    for name in names:
+        *before, last = words_of(name) or [""]
+        if last[:1] in ("x", "y", "z") and last[1:] in ("acc", "gyro"):
+            found.setdefault((*before, last[1:]), {})[last[0]] = name
+    return [
+        Family(words[-1], tuple(members[a] for a in "xyz"), MAVLINK, "", frozenset(words))
+        for words, members in found.items()
+        if set(members) == set("xyz")
+    ]
 
 
 def _ends_in(stem: str, words: frozenset[str]) -> bool:

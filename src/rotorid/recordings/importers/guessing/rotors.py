@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from rotorid.recordings.importers.guessing import names as named
@@ -58,7 +60,7 @@ def guess_rotors(draft: Draft, quantity: str) -> None:
         )
     if not offered:
         return
-    family = offered[0]
+    family = _that_move(draft, offered[0])
     values = draft.values(family.columns)
     if not np.isfinite(values).any():
         return
@@ -87,6 +89,13 @@ def guess_rotors(draft: Draft, quantity: str) -> None:
         kinds = " or ".join(f"[{RANGES[k][0]:g}, {RANGES[k][1]:g}] ({k})" for k in found)
         question = f"which readings are no and full throttle: {kinds or 'no usual range holds them'}?"
         draft.put(quantity, family.columns, evidence, question, unit="raw", range=OPEN)
+
+
+def _that_move(draft: Draft, family: Family) -> Family:
+    """A family without outputs that keep one value and drive nothing; itself where fewer than three would be left."""
+    values = draft.values(family.columns)
+    moving = [n for n, column in zip(family.columns, values.T, strict=True) if np.nanmin(column) != np.nanmax(column)]
+    return replace(family, columns=tuple(moving)) if 3 <= len(moving) < len(family.columns) else family
 
 
 def _is_betaflight(draft: Draft) -> bool:
