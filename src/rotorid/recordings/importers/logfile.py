@@ -88,6 +88,12 @@ def format_of(path: Path) -> str:
         return "csv"
     if head.startswith(b"PAR1"):
         return "parquet"
+    if head[8:9] in (b"\xfe", b"\xfd") and path.suffix.lower() in (".tlog", ".rlog"):
+        raise InputError(
+            f"{path}: a telemetry log of MAVLink, which is not read; take the autopilot's own log (.bin, .ulg), or "
+            "make a table of it (`pip install pymavlink`, then `mavlogdump.py --format csv --types "
+            f"RAW_IMU,ATTITUDE,SERVO_OUTPUT_RAW {path.name} > flight.csv`) and import that"
+        )
     for start, name in BY_FIRST_BYTES:
         if head.startswith(start):
             return name

@@ -39,7 +39,7 @@ from rotorid.errors import InputError
 from rotorid.io.text.files import read_yaml
 from rotorid.io.text.wording import explain
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.clean import drop_repeated_times, report_gaps
+from rotorid.recordings.importers.clean import drop_repeated_times, join_rows, report_gaps
 from rotorid.recordings.importers.frames import continuous
 from rotorid.recordings.importers.report import Fault
 from rotorid.recordings.importers.units import UNITS, converted
@@ -230,12 +230,15 @@ def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFra
     """Contract columns of a table by a mapping; InputError names a column that is not there or no numbers."""
     check_answered(mapping, f"the mapping of {where}")
     body, world = BODY[mapping.body], WORLD[mapping.world]
+    wanted = [(name, channel.columns) for name, channel in mapping.channels.items()] + [("keep", mapping.keep)]
+    table = pd.concat([_numbers(raw, columns, name, where) for name, columns in wanted if columns], axis=1)
+    table = join_rows(table.loc[:, ~table.columns.duplicated()], mapping.channels["time"].columns[0])
     out: dict[str, np.ndarray] = {}
     rotation = None
     order = sorted(mapping.channels, key=lambda n: n != "attitude")
     for name in order:
         channel = mapping.channels[name]
-        values = _numbers(raw, channel.columns, name, where)
+        values = table[list(channel.columns)].to_numpy(float)
         kind, columns = CHANNELS[name]
         if channel.scale != 1.0:
             values = values * channel.scale
@@ -264,7 +267,7 @@ def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFra
             columns = c.rotor_columns(name, len(channel.columns))
         out.update(zip(columns, values.T, strict=True))
     for name in mapping.keep:
-        out[name] = _numbers(raw, (name,), "keep", where)[:, 0]
+        out[name] = table[name].to_numpy(float)
     out[c.TIME] = out[c.TIME] - np.nanmin(out[c.TIME])
     return _clocked(pd.DataFrame({c.TIME: out.pop(c.TIME), **out}), where)
 
@@ -280,11 +283,11 @@ def _clocked(table: pd.DataFrame, where: object) -> tuple[pd.DataFrame, list[Fau
     return table, faults + report_gaps(table)
 
 
-def _numbers(raw: pd.DataFrame, columns, channel: str, where: str) -> np.ndarray:
+def _numbers(raw: pd.DataFrame, columns, channel: str, where: str) -> pd.DataFrame:
     for name in columns:
         if name not in raw.columns:
             raise InputError(f"{where}: {channel} wants column {name!r}, which is not there{_near(name, raw.columns)}")
-    return numbers(raw[list(dict.fromkeys(columns))], where)[list(columns)].to_numpy(float)
+    return numbers(raw[list(dict.fromkeys(columns))], where)
 
 
 def from_angles(angles: np.ndarray, form: str) -> Rotation:

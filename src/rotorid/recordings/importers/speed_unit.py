@@ -59,6 +59,13 @@ def in_unit_of_weight(
             tables = [out[run] for run in mine]
             unit, off = carrying_unit(tables, kind, written, mass_kg, rotors, coefficient_n_s2)
             if unit == written:
+                if not 1 / IMPOSSIBLE < off < IMPOSSIBLE and np.isfinite(off):
+                    found = (
+                        f"in {written}, as stated, the rotors hover at {off:.2g} times the speed that carries "
+                        f"{mass_kg:.3g} kg, which no unit explains: electrical turns (divide by half of the motor's "
+                        "poles), or another vehicle"
+                    )
+                    faults.append(Fault("unit", kind, found, "kept as recorded", sum(len(t) for t in tables)))
                 continue
             factor = UNITS["rotor"][unit] / UNITS["rotor"][written]
             for run in mine:

@@ -16,6 +16,7 @@ from rotorid.cli.simulating import fly
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings import read_set, templates
+from rotorid.recordings.importers.clean import join_rows
 from rotorid.recordings.importers.guessing import names as column_names
 from rotorid.recordings.importers.guessing.guess import guess
 from rotorid.recordings.importers.guessing.text import as_text
@@ -448,3 +449,39 @@ def test_units_of_battery_and_temperature_by_name_and_size(name: str, value: flo
     (channel,) = (v for k, v in found.mapping.channels.items() if k != "time")
     assert channel.unit == unit, (found.evidence, found.open)
     assert bool(found.open) == (unit == "?")
+
+
+def test_messages_that_have_a_row_each_are_joined(flown: pd.DataFrame) -> None:
+    """As `mavlogdump.py --format csv` writes a telemetry log: rows of one instant, each with its own cells."""
+    sensors = [f"{kind}_{a}" for kind in ("gyro", "acc") for a in "xyz"]
+    groups = (["qw", "qx", "qy", "qz"], sensors, ["vx", "vy", "vz"])
+    table = in_axes(flown)[["t_s", *(n for g in groups for n in g)]]
+    rows = pd.concat([table[["t_s", *g]] for g in groups]).sort_values("t_s", kind="stable").reset_index(drop=True)
+    found = guess(rows[list(table)])
+    whole = guess(table)
+    assert found.mapping == whole.mapping
+    mapping = whole.mapping.model_copy(update={"body": "frd", "world": "ned"})
+    made, faults = convert(rows, mapping, "own.csv")
+    pd.testing.assert_frame_equal(made, convert(table, mapping, "own.csv")[0])
+    assert not any("clock" in f.sentence for f in faults)
+
+
+def test_rows_of_one_instant_that_hold_the_same_cells_are_no_messages() -> None:
+    table = pd.DataFrame({"t": [0.0, 0.0, 1.0, 1.0, 2.0], "a": [1.0, 2.0, 3.0, np.nan, 5.0], "b": [1, 1, np.nan, 4, 5]})
+    joined = join_rows(table, "t")
+    assert joined["t"].tolist() == [0.0, 0.0, 1.0, 2.0] and joined["a"].tolist() == [1.0, 2.0, 3.0, 5.0]
+    assert joined["b"].tolist() == [1, 1, 4, 5]
+
+
+def test_the_body_rates_of_mavlinks_attitude(flown: pd.DataFrame) -> None:
+    names = {f"gyro_{a}": f"ATTITUDE.{n}speed" for a, n in zip("xyz", ("roll", "pitch", "yaw"), strict=True)}
+    found = guess(plain(flown).drop(columns=["qw", "qx", "qy", "qz"]).rename(columns=names))
+    assert found.mapping.channels["angular_velocity"].columns == tuple(names.values())
+    assert found.mapping.channels["angular_velocity"].unit == "rad/s"
+
+
+def test_a_telemetry_log_points_to_its_converter(tmp_path: Path) -> None:
+    path = tmp_path / "flight.tlog"
+    path.write_bytes((1_700_000_000_000_000).to_bytes(8, "big") + b"\xfd\x09" + bytes(40))
+    done = CliRunner().invoke(app, ["import", str(path), "-o", str(tmp_path / "set")])
+    assert done.exit_code == 1 and "mavlogdump.py --format csv" in done.output and "flight.tlog" in done.output

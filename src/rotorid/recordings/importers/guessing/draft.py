@@ -29,6 +29,8 @@ FACTOR_OFF = 0.15
 """How far a factor may be from that of a unit."""
 FACTOR_OFF_COUNTS = 0.03
 """The same where counts of usual sensors are near: 16.4 to 1 deg/s are 1.064 thousandths of rad/s each."""
+RATES_BY_NAME = {("p", "q", "r"): "", ("rollspeed", "pitchspeed", "yawspeed"): "rad/s"}
+"""Names of body rates without a word in common, and their unit where it is fixed (MAVLink's `ATTITUDE`)."""
 RATES_HZ = (5.0, 8000.0)
 """Rates at which tables are recorded."""
 THOUSANDTHS = 100.0
@@ -76,10 +78,10 @@ class Draft:
 def triples_of(draft: Draft) -> list[Family]:
     free = draft.free()
     found = [f for axes in named.AXES for f in named.families(free, axes)]
-    rates = [n for n in ("p", "q", "r") if n in {str(x).lower() for x in free}]
-    if len(rates) == 3:
-        columns = tuple(next(x for x in free if str(x).lower() == n) for n in rates)
-        found.append(Family("omega", columns, "xyz", "", frozenset(("omega",))))
+    last = {(named.words_of(n) or [""])[-1]: n for n in free}
+    for names, unit in RATES_BY_NAME.items():
+        if set(names) <= set(last):
+            found.append(Family("omega", tuple(last[n] for n in names), "xyz", unit, frozenset(("omega",))))
     found += _with_units(draft, named.of_mavlink(free))
     return [f for f in found if np.isfinite(draft.values(f.columns)).all(axis=1).sum() > 1]
 

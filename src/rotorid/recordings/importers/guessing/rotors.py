@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 
 from rotorid.recordings.importers.guessing import names as named
 from rotorid.recordings.importers.guessing.draft import (
@@ -94,7 +95,8 @@ def guess_rotors(draft: Draft, quantity: str) -> None:
 def _that_move(draft: Draft, family: Family) -> Family:
     """A family without outputs that keep one value and drive nothing; itself where fewer than three would be left."""
     values = draft.values(family.columns)
-    moving = [n for n, column in zip(family.columns, values.T, strict=True) if np.nanmin(column) != np.nanmax(column)]
+    spread = pd.DataFrame(values).nunique().to_numpy()
+    moving = [n for n, count in zip(family.columns, spread, strict=True) if count > 1]
     return replace(family, columns=tuple(moving)) if 3 <= len(moving) < len(family.columns) else family
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rotorid.recordings.importers.clean import join_rows
 from rotorid.recordings.importers.guessing import agreement as by
 from rotorid.recordings.importers.guessing import names as named
 from rotorid.recordings.importers.guessing.draft import (
@@ -24,6 +25,7 @@ def guess_time(draft: Draft) -> None:
             "time", [OPEN], "", "no column is named as a time, and without one nothing can be imported", unit=OPEN
         )
         return
+    draft.table = join_rows(draft.table, name)
     values = draft.table[name].to_numpy(float)
     steps = np.diff(values[np.isfinite(values)])
     steps = steps[steps > 0]
