@@ -151,7 +151,8 @@ def _read(path: Path, kind: str, mapping: Mapping | None) -> Imported:
     speeds = None if mapping is None else mapping.channels.get("rotor_speed") or mapping.channels.get("rotor_command")
     unit = (speeds.unit if speeds else "") or "rad/s"
     unit = "rpm" if unit in ELECTRICAL else unit  # they are turns of the rotor by now
-    return Imported(kind, runs, (*faults, *cuts), axes, speed_unit=unit)
+    stand = any({*c.FORCE, *c.MOMENT} & set(run) for run in runs.values())
+    return Imported(kind, runs, (*faults, *cuts), axes, kind="stand" if stand else "flight", speed_unit=unit)
 
 
 def _in_the_air(table: pd.DataFrame, name: str, path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault]]:

@@ -13,6 +13,7 @@ A mapping names columns, units and frames::
       throttle: {columns: [m1, m2, m3, m4], unit: us, range: [1000, 2000]}
       rotor_speed: {columns: [e1, e2, e3, e4], unit: 100erpm, poles: 14}   # electrical turns: poles of a motor
       angular_velocity: {columns: [gx, gy, gz], unit: deg/s, scale: 0.061}  # counts: what one is in the unit
+      thrust: {columns: [load], unit: kgf}     # of a stand: along -z; torque likewise; or force and moment, of three
     keep: [wind_sensor]    # other columns, kept under their own names
 
 `euler` turns by yaw about z, then pitch about the new y, then roll about the new x (z-y'-x''); `euler_xyz` by roll
@@ -59,6 +60,10 @@ CHANNELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "battery_voltage": ("voltage", (c.BATTERY_VOLTAGE,)),
     "battery_current": ("current", (c.BATTERY_CURRENT,)),
     "temperature": ("temperature", (c.TEMPERATURE,)),
+    "thrust": ("force", (c.FORCE[2],)),
+    "torque": ("torque", (c.MOMENT[2],)),
+    "force": ("force", c.FORCE),
+    "moment": ("torque", c.MOMENT),
 }
 """Channels of a mapping: kind of unit and columns of the contract (none: one a rotor)."""
 Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
@@ -251,8 +256,12 @@ def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFra
             values = values / (channel.poles / 2)
         if name == "attitude":
             rotation, values = _attitude(values, channel.form, body, world)
-        elif name in ("angular_velocity", "specific_force"):
+        elif name in ("angular_velocity", "specific_force", "force", "moment"):
             values = values @ body.T
+        elif name == "thrust":
+            values = -values
+        elif name == "torque":  # the vehicle's file gives it the sign of its rotor
+            values = values * (-1.0 if np.nansum(values) < 0 else 1.0)
         elif name == "position" or (name == "velocity" and channel.axes == "world"):
             values = values @ TRAVEL[channel.world or mapping.world].T
         elif name == "velocity":

@@ -181,7 +181,8 @@ def set_of_logs(
         known = float(np.mean(vehicle.thrust_coefficients_n_s2()))
         runs, changed = in_unit_of_weight(runs, units, vehicle.mass_kg, vehicle.rotor_count, known)
         faults += changed
-    if kinds == {"stand"} and all(f.format == "rcbenchmark" for f in found):
+    unsigned = all(f.format == "rcbenchmark" for f in found) or (mapping is not None and "torque" in mapping.channels)
+    if kinds == {"stand"} and unsigned:
         runs, changed = signed_by_spin(runs, vehicle)
         faults += changed
     return SetOfLogs(

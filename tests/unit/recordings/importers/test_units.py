@@ -8,6 +8,8 @@ import pytest
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
+from rotorid.recordings.importers.guessing.guess import guess
+from rotorid.recordings.importers.mapping import read_columns
 from rotorid.recordings.importers.rcbenchmark import HEADINGS, read_rcbenchmark
 from rotorid.recordings.importers.set_of_logs import set_of_logs
 from rotorid.recordings.importers.units import SPELLINGS, UNITS, bracketed, converted, stated, unit_of
@@ -185,3 +187,62 @@ def test_a_command_in_per_cent(tmp_path: Path) -> None:
     table["ESC signal (%)"] = 100 * SHARE
     table.to_csv(tmp_path / "a.csv", index=False)
     np.testing.assert_allclose(read_rcbenchmark(tmp_path / "a.csv")[0]["throttle_1"], SHARE)
+
+
+# Other stands, by a mapping -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+@pytest.mark.parametrize(
+    ("thrust", "torque", "speed", "current"),
+    [
+        ("Thrust (kgf)", "Torque (N·m)", "RPM", "Current (A)"),
+        ("thrust_g", "torque_Nmm", "motor_speed_rad_s", "current_mA"),
+        ("Thrust [lbf]", "Torque [lbf·in]", "Motor Speed [Hz]", "Current [A]"),
+        ("Load cell (oz)", "torque_oz_in", "rpm", "Current (mA)"),
+        ("Propeller Thrust, N", "Propeller Torque, N·cm", "Rotation speed (rev/min)", "current"),
+    ],
+)
+def test_a_table_of_another_stand(
+    thrust: str, torque: str, speed: str, current: str, separator: str, tmp_path: Path
+) -> None:
+    """Units stand in the headings; thrust is taken along -z, the torque by the spin of the stated rotor."""
+    share = np.linspace(0, 1, 200)
+    true = {"force_z_n": -8 * share**2, "moment_z_n_m": -0.1 * share**2, "rotor_speed_1_rad_s": 2000 * share}
+    wrote = {"Time (s)": 0.1 * np.arange(200), "Throttle (%)": 100 * share}
+    for name, kind, values in (
+        (thrust, "force", -true["force_z_n"]),
+        (torque, "torque", -true["moment_z_n_m"]),
+        (speed, "turns", true["rotor_speed_1_rad_s"]),
+        (current, "current", 20 * share),
+    ):
+        wrote[name] = values / UNITS[kind][stated(name, kind) or {"current": "A", "rpm": "rpm"}[name.lower()]]
+    path = tmp_path / "stand.csv"
+    pd.DataFrame(wrote).to_csv(path, index=False, sep=separator)
+    found = guess(read_columns(path))
+    assert not found.open, (found.open, found.evidence)
+    vehicle = tmp_path / "stand.yaml"
+    vehicle.write_text(
+        "name: stand\nkind: stand\nmass_kg: 0.05\ninertia_kg_m2: {xx: 1.0e-5, yy: 1.0e-5, zz: 1.0e-5}\n"
+        "rotors:\n  - {x_m: 0.0, y_m: 0.0, spin: cw}\nthrust_coefficient_n_s2: 2.0e-6\n"
+        "torque_coefficient_n_m_s2: 2.5e-8\ntared: true\n"
+    )
+    with pytest.raises(InputError, match="needs --vehicle"):
+        set_of_logs([path], "stand", mapping=found.mapping)
+    run = set_of_logs([path], "stand", vehicle_file=vehicle, mapping=found.mapping).runs["stand"]
+    for name, values in true.items():
+        np.testing.assert_allclose(run[name], values, atol=1e-9, err_msg=name)
+    np.testing.assert_allclose(run[c.BATTERY_CURRENT], 20 * share, atol=1e-9)
+    np.testing.assert_allclose(run["throttle_1"], share, atol=1e-9)
+
+
+def test_a_stand_whose_heading_names_no_unit_is_asked() -> None:
+    table = pd.DataFrame(
+        {"t_s": 0.1 * np.arange(100), "thrust": np.linspace(0, 9, 100), "rpm": np.linspace(0, 9e3, 100)}
+    )
+    assert set(guess(table).open) == {"thrust"}
+
+
+def test_a_flight_with_a_column_called_thrust_is_no_stand() -> None:
+    table = pd.DataFrame({"t_s": 0.01 * np.arange(300), "thrust": 0.5} | {f"acc_{a}": 9.8 * (a == "z") for a in "xyz"})
+    assert "thrust" not in guess(table).mapping.channels

@@ -15,7 +15,7 @@ from rotorid.errors import InputError
 from rotorid.recordings.importers.guessing.attitude import guess_attitude_and_rates
 from rotorid.recordings.importers.guessing.draft import Draft
 from rotorid.recordings.importers.guessing.force import axes_that_matter, guess_frames, guess_specific_force
-from rotorid.recordings.importers.guessing.rotors import guess_rotors
+from rotorid.recordings.importers.guessing.rotors import guess_rotors, guess_stand
 from rotorid.recordings.importers.guessing.scalars import guess_scalar, guess_time
 from rotorid.recordings.importers.guessing.travel import guess_height, guess_position, guess_velocity
 from rotorid.recordings.importers.mapping import Mapping
@@ -54,6 +54,7 @@ def guess(table: pd.DataFrame) -> Guess:
     guess_height(draft)
     for name in ("rotor_command", "rotor_speed", "throttle"):
         guess_rotors(draft, name)
+    guess_stand(draft)
     mapping = Mapping(body=body, world=world, channels=draft.channels, keep=tuple(draft.free()))
     return Guess(mapping, draft.evidence, draft.open, tuple(left_out))
 

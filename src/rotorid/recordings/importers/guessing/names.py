@@ -65,6 +65,10 @@ SCALARS: dict[str, tuple[str, ...]] = {
     "battery_current": (r"amperage.*", r"current.*", r"i_?bat.*", r"battery_?current.*"),
     "height": (r"height.*", r"agl.*", r"range.*"),
     "temperature": (r"temp(erature)?.*",),
+    "thrust": (r"thrust([ _(\[,/].*)?", r".*[ _]thrust([ _(\[,/].*)?", r"load( cell)?([ _(\[,/].*)?"),
+    "torque": (r"torque([ _(\[,/].*)?", r".*[ _]torque([ _(\[,/].*)?"),
+    "rotor_speed": (r"(rotor|motor|prop\w*)?[ _]?(speed|rpm)([ _(\[,/].*)?", r".*[ _(\[]rpm.*", r".*rotation.*speed.*"),
+    "throttle": (r"(throttle|esc|pwm|motor command)([ _(\[,/].*)?",),
 }
 MAVLINK = "xyz of MAVLink"
 AXES = ("xyz", "012", "123", "ned", "enu")

@@ -14,8 +14,8 @@ from rotorid.recordings.importers.guessing.draft import (
     Draft,
 )
 from rotorid.recordings.importers.guessing.names import Family
-from rotorid.recordings.importers.mapping import ELECTRICAL, OPEN
-from rotorid.recordings.importers.units import UNITS, bracketed
+from rotorid.recordings.importers.mapping import CHANNELS, ELECTRICAL, OPEN
+from rotorid.recordings.importers.units import UNITS, bracketed, stated
 
 RANGES: dict[str, tuple[float, float]] = {
     "a share": (0.0, 1.0),
@@ -65,6 +65,33 @@ def guess_rotors(draft: Draft, quantity: str) -> None:
     values = draft.values(family.columns)
     if not np.isfinite(values).any():
         return
+    _put(draft, quantity, family, how)
+
+
+def guess_stand(draft: Draft) -> None:
+    """Thrust and torque of a stand, and speed and throttle of its one rotor, by their names and the units in these."""
+    if {"specific_force", "angular_velocity"} & set(draft.channels):
+        return
+    for quantity in ("thrust", "torque"):
+        if (name := named.scalar(draft.free(), quantity)) is None:
+            continue
+        kind = CHANNELS[quantity][0]
+        unit, top = stated(name, kind), float(np.nanmax(np.abs(draft.values([name])), initial=0.0))
+        question = "" if unit else f"in which unit? Its largest value is {top:.4g}"
+        draft.put(quantity, [name], f"by its name; up to {top:.4g}", question, unit=unit or OPEN)
+    if "thrust" not in draft.channels:
+        return
+    for quantity in ("rotor_speed", "throttle"):
+        name = named.scalar(draft.free(), quantity)
+        if quantity not in draft.channels and name is not None:
+            unit = stated(name, "turns") if quantity == "rotor_speed" else ""
+            words = frozenset(named.words_of(name))
+            _put(draft, quantity, Family(name, (name,), "number", unit, words), "by its name")
+
+
+def _put(draft: Draft, quantity: str, family: Family, how: str) -> None:
+    """A channel of rotors with its unit or range, or the question that is left."""
+    values = draft.values(family.columns)
     top = float(np.nanquantile(values, 0.99))
     evidence = f"{how}; up to {top:.5g}"
     follows = _carries(draft, family)
