@@ -210,6 +210,8 @@ def _below_other_lines(text: bytes, path: Path) -> tuple[Layout, bytes] | None:
     A heading is what stands above three rows of numbers with as many cells. Where it names columns alike, or nothing
     but units, the lines above with as many cells are a part of it.
     """
+    if b"\r" in text[:BLOCK].replace(b"\r\n", b"\n"):
+        return None
     lines = text[:BLOCK].split(b"\n")[: MOST_ABOVE + ROWS_BELOW + 1]
     cells = []
     for line in lines:

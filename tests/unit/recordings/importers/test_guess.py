@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -485,3 +486,19 @@ def test_a_telemetry_log_points_to_its_converter(tmp_path: Path) -> None:
     path.write_bytes((1_700_000_000_000_000).to_bytes(8, "big") + b"\xfd\x09" + bytes(40))
     done = CliRunner().invoke(app, ["import", str(path), "-o", str(tmp_path / "set")])
     assert done.exit_code == 1 and "mavlogdump.py --format csv" in done.output and "flight.tlog" in done.output
+
+
+def test_columns_that_hold_nothing_are_no_channels() -> None:
+    """A telemetry log names every message that it could have: columns without a cell raise nothing and mean nothing."""
+    names = [f"RAW_IMU.{a}{kind}" for kind in ("acc", "gyro") for a in "xyz"] + [
+        "thrust",
+        "torque",
+        "rpm",
+        "roll",
+        "pitch",
+    ]
+    names += ["yaw", *(f"servo{k}_raw" for k in range(1, 5)), *(f"eRPM[{k}]" for k in range(4))]
+    empty = pd.DataFrame({"t_s": 0.01 * np.arange(100)} | {n: np.nan for n in names})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert set(guess(empty).mapping.channels) == {"time"}

@@ -63,10 +63,9 @@ def _attitudes(draft: Draft) -> tuple[list[_Turn], str]:
         inverse = [_Turn(t.columns, t.form, t.wxyz * [1, -1, -1, -1], inverse=True) for t in turns]
         return turns + inverse, f"{how}, of length {np.nanmedian(lengths[chosen]):.4g}"
     found = named.angles(free)
-    if found is None:
+    if found is None or not np.isfinite(values := draft.values(found[0])).all(axis=1).any():
         return [], ""
     columns, stated = found
-    values = draft.values(columns)
     units = [stated] if stated in UNITS["angle"] else ["deg"] if np.nanmax(np.abs(values)) > 7 else ["rad", "deg"]
     turns = []
     known = np.isfinite(values).all(axis=1)
@@ -204,7 +203,8 @@ def _attitude_alone(draft: Draft, turns: list[_Turn], why: str) -> None:
     level = []
     for turn in turns:
         norm = np.linalg.norm(turn.wxyz, axis=1)
-        upright = 1 - 2 * (turn.wxyz[:, 1] ** 2 + turn.wxyz[:, 2] ** 2) / norm**2
+        with np.errstate(invalid="ignore", divide="ignore"):
+            upright = 1 - 2 * (turn.wxyz[:, 1] ** 2 + turn.wxyz[:, 2] ** 2) / norm**2
         level.append(float(np.nanmedian(np.abs(upright))) if np.isfinite(upright).any() else 0.0)
     straight = [k for k, t in enumerate(turns) if not t.inverse]
     straight_turns = [turns[k] for k in straight]

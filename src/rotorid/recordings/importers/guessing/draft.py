@@ -92,7 +92,8 @@ def _with_units(draft: Draft, families: list[Family]) -> list[Family]:
     out = []
     for family in families:
         if (force := message.get(family.words - {family.stem})) is not None:
-            raw = float(np.nanmedian(np.linalg.norm(draft.values(force.columns), axis=1))) > THOUSANDTHS
+            sizes = np.linalg.norm(draft.values(force.columns), axis=1)
+            raw = bool(np.isfinite(sizes).any()) and float(np.nanmedian(sizes)) > THOUSANDTHS
             units = {"acc": ("m/s2", "mg"), "gyro": ("rad/s", "mrad/s")}[family.stem]
             family = replace(family, unit=units[raw])
         out.append(family)

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 UNIT_WORDS: dict[str, str] = {
+    "m_s_s": "m/s2",
     "m_s2": "m/s2", "m_s_2": "m/s2", "m_s^2": "m/s2", "ms2": "m/s2", "mps2": "m/s2", "mg": "mg", "g": "g",
     "m_s": "m/s", "mps": "m/s", "cm_s": "cm/s", "mm_s": "mm/s",
     "rad_s": "rad/s", "rads": "rad/s", "radps": "rad/s", "deg_s": "deg/s", "dps": "deg/s", "degps": "deg/s",

@@ -62,9 +62,6 @@ def guess_rotors(draft: Draft, quantity: str) -> None:
     if not offered:
         return
     family = _that_move(draft, offered[0])
-    values = draft.values(family.columns)
-    if not np.isfinite(values).any():
-        return
     _put(draft, quantity, family, how)
 
 
@@ -73,10 +70,11 @@ def guess_stand(draft: Draft) -> None:
     if {"specific_force", "angular_velocity"} & set(draft.channels):
         return
     for quantity in ("thrust", "torque"):
-        if (name := named.scalar(draft.free(), quantity)) is None:
+        name = named.scalar(draft.free(), quantity)
+        if name is None or not draft.table[name].notna().any():
             continue
         kind = CHANNELS[quantity][0]
-        unit, top = stated(name, kind), float(np.nanmax(np.abs(draft.values([name])), initial=0.0))
+        unit, top = stated(name, kind), float(np.nanmax(np.abs(draft.values([name]))))
         question = "" if unit else f"in which unit? Its largest value is {top:.4g}"
         draft.put(quantity, [name], f"by its name; up to {top:.4g}", question, unit=unit or OPEN)
     if "thrust" not in draft.channels:
@@ -92,6 +90,8 @@ def guess_stand(draft: Draft) -> None:
 def _put(draft: Draft, quantity: str, family: Family, how: str) -> None:
     """A channel of rotors with its unit or range, or the question that is left."""
     values = draft.values(family.columns)
+    if not np.isfinite(values).any():
+        return
     top = float(np.nanquantile(values, 0.99))
     evidence = f"{how}; up to {top:.5g}"
     follows = _carries(draft, family)
