@@ -13,7 +13,7 @@ from pathlib import Path
 import atheris
 
 target = sys.argv.pop(1)
-with atheris.instrument_imports(include=["rotorid", "pyulog", "orangebox"]):
+with atheris.instrument_imports(include=["rotorid", "pyulog"]):
     look = import_module(f"tests.fuzz.{target}").look
 
 with tempfile.TemporaryDirectory(dir="/dev/shm") as folder:

@@ -10,6 +10,7 @@ import csv
 import io
 import zlib
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -25,6 +26,8 @@ PACKED_BLOCK = 1 << 16
 """Bytes taken from a gzipped file at once: what is left of them is copied for each of its parts."""
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+MOST_ABOVE, ROWS_BELOW = 200, 3
+"""Lines that may stand above a heading, and rows of numbers below by which one is known."""
 DECIMAL_COMMAS = 1.5
 """A line with so many times the cells of its heading has commas in its numbers."""
 
@@ -51,31 +54,47 @@ def opened(path: Path) -> io.BufferedReader:
     return io.BufferedReader(_Content(blocks(path)), BLOCK)
 
 
-def look_through(path: Path, foreign: bool = False) -> tuple[list[str], str]:
-    """Names of the columns and the sign between them.
+@dataclass(frozen=True)
+class Layout:
+    """How a table is written: names of its columns, the sign between them, and what is no row of it."""
+
+    names: list[str]
+    separator: str
+    above: tuple[str, ...] = ()
+    """Lines above the heading that are none of the table (what a motion capture says of its take)."""
+    heading_line: int = 1
+    """Line of the heading in the file, counted from 1; of several the last."""
+    cut_off: bool = False
+    """Whether the last line ends before its last cell."""
+
+
+def look_through(path: Path, foreign: bool = False) -> Layout:
+    """How the table of a file is written.
 
     `foreign`: a table of one's own, not of a recording set. Its columns may be separated by semicolons, tabs, bars or
-    blanks as well, and one without a name is called by its number (`column_3`).
+    blanks as well, one without a name is called by its number (`column_3`), lines may stand above the heading, the
+    heading may have several lines, and the last line may be cut off.
 
     Raises
     ------
     InputError
         The file is no table, has a line with more or fewer cells than its heading, or is too large.
     """
-    heading, separator, quoted, line = [], ",", False, 1
+    found, quoted, cut = None, False, False
     for line, text in _whole_lines(path):
         check_text(text, path, line)
-        check_size(line - 2, len(heading), path)
-        if not heading and text.strip():
-            heading, separator = _heading(text, path, foreign)
+        check_size(line - 2, len(found.names) if found else 0, path)
+        if found is None and text.strip():
+            found, text = _heading(text, path, foreign)
+            line += found.heading_line - 1
         quoted = quoted or b'"' in text
-        if heading and not quoted:
-            _check_cells(text, line, len(heading), separator, path)
-    if not heading:
+        if found and not quoted:
+            cut = _check_cells(text, line, len(found.names), found.separator, path, foreign)
+    if found is None:
         raise InputError(f"{path}: is empty, expected a line of column names and samples below")
     if quoted:
-        _check_quoted(path, len(heading), separator)
-    return heading, separator
+        cut = _check_quoted(path, found, foreign)
+    return replace(found, cut_off=cut)
 
 
 def check_size(rows: int, columns: int, where: object) -> None:
@@ -153,11 +172,15 @@ def _whole_lines(path: Path) -> Iterator[tuple[int, bytes]]:
         yield line, rest
 
 
-def _heading(text: bytes, path: Path, foreign: bool) -> tuple[list[str], str]:
-    """Names of the columns, from the first line that is not blank, and the sign between them."""
+def _heading(text: bytes, path: Path, foreign: bool) -> tuple[Layout, bytes]:
+    """How the table is written by the beginning of its text, and the text from the last line of the heading on."""
+    if foreign and (below := _below_other_lines(text, path)) is not None:
+        layout, rest = below
+        check_heading(layout.names, path, layout.heading_line)
+        return layout, rest
     first = text.lstrip(b"\r\n").splitlines()[0].decode("utf-8")
-    widths = {sign: len(_names(first, sign)) for sign in SEPARATORS}
-    separator = max(widths, key=widths.get)
+    separator = _separator(first)
+    widths = {",": len(_names(first, ",")), separator: len(_names(first, separator))}
     if not foreign:
         if separator != "," and widths[","] == 1:
             raise InputError(
@@ -168,31 +191,86 @@ def _heading(text: bytes, path: Path, foreign: bool) -> tuple[list[str], str]:
     elif widths[separator] == 1:
         separator = " "
     names = _names(first, separator)
-    if foreign:
-        names = [name or f"column_{number}" for number, name in enumerate(names, 1)]
-    check_heading(names, path)
-    return names, separator
+    check_heading(_numbered(names) if foreign else names, path)
+    return Layout(_numbered(names) if foreign else names, separator), text
+
+
+def _separator(line: str) -> str:
+    """The sign that parts a line into most cells."""
+    return max(SEPARATORS, key=lambda sign: len(_names(line, sign)))
+
+
+def _numbered(names: list[str]) -> list[str]:
+    return [name or f"column_{number}" for number, name in enumerate(names, 1)]
+
+
+def _below_other_lines(text: bytes, path: Path) -> tuple[Layout, bytes] | None:
+    """The layout of a table with other lines above its heading, or several of heading; None where line 1 is all.
+
+    A heading is what stands above three rows of numbers with as many cells. Where it names columns alike, or nothing
+    but units, the lines above with as many cells are a part of it.
+    """
+    if b"\r" in text[:BLOCK].replace(b"\r\n", b"\n"):
+        return None
+    lines = text[:BLOCK].split(b"\n")[: MOST_ABOVE + ROWS_BELOW + 1]
+    cells = []
+    for line in lines:
+        decoded = line.decode("utf-8").rstrip("\r")
+        sign = _separator(decoded)
+        cells.append((_names(decoded, sign), sign))
+    for k in range(1, len(cells) - ROWS_BELOW):
+        if k > 1 and not _is_row(cells[k - 1][0]) and all(_is_row(row) for row, _ in cells[k : k + ROWS_BELOW]):
+            raise InputError(f"{path}, line {k + 1}: expected the names of the columns above, found numbers")
+        names, sign = cells[k]
+        below = [_names(line.decode("utf-8").rstrip("\r"), sign) for line in lines[k + 1 : k + 1 + ROWS_BELOW]]
+        if _is_row(names) or not all(len(row) == len(names) and _is_row(row) for row in below):
+            continue
+        if k and len(cells[0][0]) == len(names) and _is_row(cells[1][0]):
+            return None  # line 1 is the heading, and a word stands among the numbers
+        names, first = list(names), k
+        while (
+            first
+            and len(cells[first - 1][0]) == len(names)
+            and (len(set(filter(None, names))) < len(list(filter(None, names))) or all(_is_unit(n) for n in names))
+        ):
+            first -= 1
+            names = [" ".join(filter(None, pair)) for pair in zip(cells[first][0], names, strict=True)]
+        above = tuple(line.decode("utf-8").strip() for line in lines[:first] if line.strip())
+        return Layout(_numbered(names), sign, above, k + 1), b"\n".join(text.split(b"\n", k)[k:])
+    return None
+
+
+def _is_row(cells: list[str]) -> bool:
+    """Whether cells are a row of numbers: half of what is written or more, and two or more."""
+    given = [cell for cell in cells if cell]
+    count = sum(map(_is_number, given))
+    return count >= 2 and 2 * count >= len(given)
+
+
+def _is_unit(name: str) -> bool:
+    """Whether a cell of a heading is empty or a unit: in brackets, or a word of a few letters with a fraction."""
+    return not name or name[0] + name[-1] in ("()", "[]", "<>") or (len(name) < 6 and ("/" in name or len(name) < 3))
 
 
 def _names(line: str, separator: str) -> list[str]:
     return [name.strip() for name in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
 
 
-def check_heading(names: list[str], path: Path) -> None:
+def check_heading(names: list[str], path: Path, line: int = 1) -> None:
     """InputError where a column has no name or one that is there twice, or where the names are numbers."""
     seen: set[str] = set()
     for number, name in enumerate(names, 1):
         if not name:
-            raise InputError(f"{path}, line 1: column {number} has no name")
+            raise InputError(f"{path}, line {line}: column {number} has no name")
         if not name.isprintable():
             raise InputError(
-                f"{path}, line 1: the name of column {number} holds a control character ({printable(name)})"
+                f"{path}, line {line}: the name of column {number} holds a control character ({printable(name)})"
             )
         if name in seen:
-            raise InputError(f"{path}, line 1: column {name} is there twice")
+            raise InputError(f"{path}, line {line}: column {name} is there twice")
         seen.add(name)
     if all(_is_number(name) for name in names):
-        raise InputError(f"{path}, line 1: expected the names of the columns, found numbers")
+        raise InputError(f"{path}, line {line}: expected the names of the columns, found numbers")
 
 
 def _is_number(text: str) -> bool:
@@ -203,8 +281,8 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def _check_cells(text: bytes, first_line: int, count: int, separator: str, path: Path) -> None:
-    """InputError where a line has not as many cells as the heading."""
+def _check_cells(text: bytes, first_line: int, count: int, separator: str, path: Path, foreign: bool) -> bool:
+    """Whether the text ends in a line that is cut off; InputError where a line has not as many cells as the heading."""
     array = np.frombuffer(text, np.uint8)
     ends = np.flatnonzero(array == ord("\n" if b"\n" in text else "\r"))
     starts = np.concatenate([[0], ends + 1])
@@ -214,19 +292,30 @@ def _check_cells(text: bytes, first_line: int, count: int, separator: str, path:
     for k in np.flatnonzero(cells != count):
         if text[starts[k] : ends[k]].strip():
             last = ends[k] == len(text)
+            if foreign and last and cells[k] < count:
+                return True
             raise InputError(_wrong_cells(path, first_line + int(k), int(cells[k]), count, last))
+    return False
 
 
-def _check_quoted(path: Path, count: int, separator: str) -> None:
+def _check_quoted(path: Path, layout: Layout, foreign: bool) -> bool:
     """The same where some cells stand in quotes."""
+    count, short = len(layout.names), None
     with io.TextIOWrapper(opened(path), "utf-8-sig", newline="") as text:
-        reader = csv.reader(text, delimiter=separator, skipinitialspace=True)
+        for _ in range(layout.heading_line - 1):
+            text.readline()
+        reader = csv.reader(text, delimiter=layout.separator, skipinitialspace=True)
         try:
             for row in reader:
+                if short is not None:
+                    raise InputError(_wrong_cells(path, *short, count, last=False))
                 if row and len(row) != count:
-                    raise InputError(_wrong_cells(path, reader.line_num, len(row), count, last=False))
+                    short = reader.line_num + layout.heading_line - 1, len(row)
+                    if not foreign or len(row) > count:
+                        raise InputError(_wrong_cells(path, *short, count, last=False))
         except csv.Error as error:
             raise InputError(f"{path}, line {reader.line_num}: cannot be read as a table ({error})") from None
+    return short is not None
 
 
 def _wrong_cells(path: Path, line: int, found: int, count: int, last: bool) -> str:

@@ -30,6 +30,7 @@ GRAVITY_M_S2 = (9.5, 10.1)
 LIFT_M_S2 = (5.0, 20.0)
 """Where the median of an accelerometer in flight lies, in its unit and axes."""
 HIGHEST_VOLTAGE_V = 120.0
+FASTEST_USUAL_RAD_S = 20.0
 LEAST_TURNING_RAD_S = 0.05
 """Spread of a body rate below which nothing can be said of it."""
 AGREES, CONTRADICTS = 0.5, -0.3
@@ -283,7 +284,17 @@ def _rates_of_attitude(attitude: np.ndarray) -> np.ndarray:
 
 def _gyroscope(run: Run, clock: np.ndarray) -> Iterator[Doubt]:
     gyro, attitude = _on(run, clock, c.ANGULAR_VELOCITY), _on(run, clock, c.QUATERNION)
-    if gyro is None or attitude is None:
+    if gyro is None:
+        return
+    if attitude is None:
+        usual = float(np.nanmedian(np.linalg.norm(gyro, axis=1)))
+        if usual > FASTEST_USUAL_RAD_S:
+            yield Doubt(
+                c.ANGULAR_VELOCITY[0],
+                f"the vehicle turns at {usual:.3g} rad/s in the median, expected at most {FASTEST_USUAL_RAD_S:g}: the "
+                "gyroscope is in degrees per second, in counts, or ten times too large",
+                stops=True,
+            )
         return
     derived = _rates_of_attitude(attitude)
     for axis, k in (("x", 0), ("y", 1), ("z", 2)):

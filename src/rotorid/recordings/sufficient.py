@@ -16,6 +16,7 @@ from rotorid.io.text.names import listed, nearest, plain
 from rotorid.recordings import columns as c
 from rotorid.recordings.own_rates import HOLE_PERIODS, LEAST_SINGLE_S, LEAST_STRETCH_S, on_own_rates
 from rotorid.recordings.run import RecordingSet, Run
+from rotorid.recordings.spikes import without_spikes
 from rotorid.recordings.tables import clock_jump, place
 from rotorid.recordings.vehicle import Vehicle
 
@@ -62,7 +63,7 @@ def sufficient(recordings: RecordingSet) -> RecordingSet:
     InputError
         One sentence with file and column, where a column is misspelled or what is left does not suffice.
     """
-    recordings = on_own_rates(without_dead_sensors(without_rotors_on_a_bench(recordings)))
+    recordings = on_own_rates(without_spikes(without_dead_sensors(without_rotors_on_a_bench(recordings))))
     for run in recordings.runs:
         check_spelling(run, recordings.vehicle)
     usable, reasons = [], []

@@ -46,16 +46,21 @@ def read_parquet(path: Path) -> pd.DataFrame:
 def read_cells(path: Path, foreign: bool = False) -> pd.DataFrame:
     """The cells of a CSV file, plain or gzipped: numbers where a column holds nothing else.
 
-    `foreign` as in `csv_text.look_through`.
+    `foreign` as in `csv_text.look_through`; the table's `attrs` then hold the `layout` that was found.
     """
-    heading, separator = look_through(path, foreign)
+    layout = look_through(path, foreign)
     try:
         with opened(path) as file:
-            table = pd.read_csv(file, sep=separator, skipinitialspace=True, index_col=False, low_memory=False)
+            for _ in range(layout.heading_line - 1):
+                file.readline()
+            table = pd.read_csv(file, sep=layout.separator, skipinitialspace=True, index_col=False, low_memory=False)
     except (pd.errors.ParserError, pd.errors.EmptyDataError, OverflowError) as error:
         raise InputError(f"{path}: cannot be read as a table ({printable(error)})") from None
     check_size(*table.shape, path)
-    table.columns = heading
+    table = table.iloc[: len(table) - layout.cut_off]
+    table.columns = layout.names
+    if foreign:
+        table.attrs["layout"] = layout
     return table
 
 
@@ -162,9 +167,9 @@ def clock_jump(time_s: np.ndarray, where: str) -> str | None:
     )
 
 
-def place(where: object, row: int) -> str:
+def place(where: object, row: int, heading_line: int = 1) -> str:
     """Where the reader of a message finds a sample (0 is the first): a CSV's line, the row of anything else."""
-    return f"row {row + 1}" if str(where).endswith(".parquet") else f"line {row + 2}"
+    return f"row {row + 1}" if str(where).endswith(".parquet") else f"line {row + 1 + heading_line}"
 
 
 def _like_time(name: str) -> bool:
@@ -177,19 +182,22 @@ def numbers(table: pd.DataFrame, path: object) -> pd.DataFrame:
     if len(repeated):
         raise InputError(f"{path}: column {printable(repeated[0])} is there twice")
     out = {}
+    heading_line = table.attrs["layout"].heading_line if "layout" in table.attrs else 1
     for name in table.columns:
         column = table[name]
         kind = column.dtype
         if pd.api.types.is_bool_dtype(kind) and c.is_known(str(name)):
-            raise InputError(f"{path}, {place(path, 0)}, column {name}: expected a number, found {column.iloc[0]}")
+            raise InputError(
+                f"{path}, {place(path, 0, heading_line)}, column {name}: expected a number, found {column.iloc[0]}"
+            )
         if pd.api.types.is_numeric_dtype(kind) and not pd.api.types.is_complex_dtype(kind):
             out[name] = column.to_numpy(float, na_value=np.nan)
         else:
-            out[name] = _from_objects(column, path, str(name))
+            out[name] = _from_objects(column, path, str(name), heading_line)
     return pd.DataFrame(out, columns=list(table.columns))
 
 
-def _from_objects(column: pd.Series, path: object, name: str) -> np.ndarray:
+def _from_objects(column: pd.Series, path: object, name: str, heading_line: int) -> np.ndarray:
     values = np.full(len(column), np.nan)
     decimals = not pd.api.types.is_datetime64_any_dtype(column.dtype)
     for row, cell in enumerate(_cells(column)):
@@ -204,7 +212,8 @@ def _from_objects(column: pd.Series, path: object, name: str) -> np.ndarray:
         except (TypeError, ValueError, OverflowError):
             found = printable(repr(cell))
             found = found if len(found) < 60 else found[:57] + "..."
-            raise InputError(f"{path}, {place(path, row)}, column {name}: expected a number, found {found}") from None
+            where = place(path, row, heading_line)
+            raise InputError(f"{path}, {where}, column {name}: expected a number, found {found}") from None
     return values
 
 

@@ -58,6 +58,7 @@ SPEEDS = c.rotor_columns("rotor_speed", 4)
         (times(c.SPECIFIC_FORCE, 1 / 9.81), "multiples of g"),
         (times(SPEEDS, RPM), "revolutions per minute"),
         (times(c.ANGULAR_VELOCITY, 180 / np.pi), "degrees per second"),
+        (times(c.ANGULAR_VELOCITY, 10), "times the derivative of the attitude"),
         (times(c.ANGULAR_VELOCITY[1:2], -1), "angular_velocity_y_rad_s turns against the attitude"),
         (exchange(*c.ANGULAR_VELOCITY[:2]), "axes are exchanged"),
         (exchange(SPEEDS[0], SPEEDS[1]), "order of the rotors"),
@@ -74,6 +75,17 @@ SPEEDS = c.rotor_columns("rotor_speed", 4)
 def test_each_mistake_is_named(flown, change, said) -> None:
     found = doubts_of(changed(flown, change))
     assert any(said in doubt.sentence and doubt.stops for doubt in found), found
+
+
+@pytest.mark.parametrize(("factor", "wrong"), [(1.0, False), (180 / np.pi, True), (1000.0, True)])
+def test_rates_that_nothing_turns_at_are_named_without_an_attitude(flown, factor: float, wrong: bool) -> None:
+    def change(table):
+        times(c.ANGULAR_VELOCITY, factor)(table)
+        for name in (*c.QUATERNION, *c.VELOCITY, *c.POSITION):
+            del table[name]
+
+    found = doubts_of(changed(flown, change))
+    assert any("rad/s in the median" in doubt.sentence and doubt.stops for doubt in found) == wrong, found
 
 
 def test_what_every_run_repeats_is_one_doubt(flown) -> None:

@@ -1,18 +1,22 @@
-"""Betaflight blackbox logs through orangebox.
+"""Betaflight's blackbox logs: what the fields of a session mean, by its own header.
 
 Betaflight's body axes are forward-left-up (a positive pitch rate lowers the nose, a positive yaw rate turns left, and
 the accelerometer reads +1 g along z at rest): half a turn about x makes them forward-right-down. Units by the log's own
-header: `gyro_scale` (deg/s), `acc_1G`, `motorOutput` (range of the motors' commands), `motor_poles`; `eRPM` in hundreds
-of electrical turns a minute; voltage and current in hundredths since version 4.0. Blackbox logs hold no velocity; an
-attitude only since `imuQuaternion` is logged.
+header: `gyro_scale` (deg/s) and `blackbox_high_resolution` (tenths of it), `acc_1G`, `motorOutput` (range of the
+motors' commands) and `features` (3D), `motor_poles`; `eRPM` in hundreds of electrical turns a minute; voltage and
+current by the version. Blackbox logs hold no velocity; an attitude only since `imuQuaternion` is logged.
 
-Sources: Betaflight `src/main/blackbox/blackbox.c`, Blackbox Explorer `js/flightlog.js` and
-`flightlog_fields_presenter.js`.
+Sources: Betaflight `src/main/blackbox/blackbox.c`, `src/main/drivers/dshot.c`, `src/main/flight/mixer_init.c`, Blackbox
+Explorer `flightlog_fields_presenter.js`.
 """
 
 from __future__ import annotations
 
+import csv
+import io
+import re
 import struct
+from array import array
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -20,81 +24,120 @@ import numpy as np
 import pandas as pd
 
 from rotorid.errors import InputError
-from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers import in_the_air
+from rotorid.recordings.importers import blackbox, in_the_air
 from rotorid.recordings.importers.clean import report_gaps
 from rotorid.recordings.importers.frames import half_turn_about_x, quaternion_to_frd_ned
-from rotorid.recordings.importers.optional import needs
 from rotorid.recordings.importers.report import Fault
 
 GRAVITY_M_S2 = 9.80665
 DEFAULT_POLES = 14
 QUATERNION_SCALE = 32767.0
 """`imuQuaternion` holds x, y and z of the unit quaternion times this; w is what is missing to length 1."""
-FIRST_IN_HUNDREDTHS = (4, 0)
-"""Version since which voltage and current are logged in hundredths of a volt and an ampere."""
+OTHER_NAMES = {"gyroADC": ("gyroData",), "accSmooth": ("accADC",), "eRPM": ("eRPM(/100)",)}
+"""To a field its names in other releases."""
+FEATURE_3D = 1 << 12
+DSHOT = (48.0, 2047.0)
+DSHOT_FORWARD = 1048.0
+"""With 3D, DShot's commands below this turn a motor backwards, from 48 on the faster the larger."""
+DEADBAND_3D = (1406.0, 1514.0)
+"""Betaflight's own dead band of 3D where motors have pulses in µs; the header does not hold what was set."""
+SLOWEST_PULSE_US = 900.0
+"""Commands of motors that turn below this are none of pulses in µs."""
+VOLTS = (((4, 0), 100), ((3, 1), 10))
+AMPERES = (((3, 1), 100),)
+"""Since which version so many counts of a field are 1 V or 1 A; before that it counts steps of the converter."""
+CONVERTER_STEP_MV = 3300 / 4095
 
 
 def read_betaflight(path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
-    """Every flight of every log in a blackbox file by name, in contract columns, and what was found.
+    """Every flight of every session in a blackbox file by name, in contract columns, and what was found.
 
     InputError where the file is of another firmware, cannot be read, or holds no flight.
     """
-    orangebox = needs("orangebox", "betaflight", path)
-    try:
-        first = orangebox.Parser.load(str(path), 1)
-        count = first.reader.log_count
-        logs = [first, *(orangebox.Parser.load(str(path), number) for number in range(2, count + 1))]
-    except MemoryError:
-        raise
-    except Exception as error:  # orangebox has errors of its own and lets others through
-        raise InputError(f"{path}: not a blackbox log that can be read ({printable(error)[:150]})") from None
+    data = Path(path).read_bytes()
+    found = [_exported(data, path)] if data.startswith(b'"Product"') else blackbox.sessions(data)
     runs: dict[str, pd.DataFrame] = {}
     faults: list[Fault] = []
-    reason = InputError(f"{path}: holds no log")
-    for number, log in enumerate(logs, 1):
-        name = path.name.split(".")[0] + (f"_{number}" if len(logs) > 1 else "")
+    reasons: list[str] = []
+    for number, session in enumerate(found, 1):
+        name = path.name.split(".")[0] + (f"_{number}" if len(found) > 1 else "")
         try:
-            found, more = _flights(log, name, path)
+            if isinstance(session, InputError):
+                raise session
+            flown, more = _flights(session, name, path)
         except InputError as error:
-            reason = error
+            reasons.append(str(error).removeprefix(f"{path}: "))
+            faults.append(Fault("no_flight", c.TIME, f"session {number}: {reasons[-1]}", "left out", 0))
             continue
-        runs |= found
+        runs |= flown
         faults += more
     if not runs:
-        raise reason
+        raise InputError(f"{path}: {reasons[-1] if reasons else 'holds no log'}")
     return runs, faults
 
 
-def _flights(log, name: str, path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
-    headers = log.headers
-    firmware = f"{headers.get('Firmware revision', headers.get('Firmware type', ''))}"
+def _exported(data: bytes, path: Path) -> blackbox.Session:
+    """The session in a table that Blackbox Explorer exports: its header, a line each, then frames as logged."""
+    rows = csv.reader(io.StringIO(data.decode("utf-8", "replace")))
+    headers: dict[str, str] = {}
+    names: tuple[str, ...] = ()
+    values, whole = array("d"), True
+    try:
+        for cells in rows:
+            if not names and "time" in cells:
+                names = tuple(name.strip() for name in cells)
+            elif not names and len(cells) > 1:
+                headers[cells[0]] = ",".join(cells[1:])
+            elif names and cells:
+                whole = len(cells) == len(names)
+                values.extend(_cell(cell) for cell in cells[: len(cells) * whole])
+    except csv.Error as error:
+        raise InputError(f"{path}, line {rows.line_num}: cannot be read as a table ({error})") from None
+    if not names:
+        raise InputError(f"{path}: Blackbox Explorer's header is there, but no heading with a column time below it")
+    if scale := _number(headers, "gyroScale", 0.0):  # the Explorer turns deg/s into rad/µs
+        headers.setdefault("gyro_scale", f"{np.degrees(scale) * 1e6:.9f}")
+    return blackbox.Session(headers, names, np.array(values).reshape(-1, len(names)), whole, 0)
+
+
+def _cell(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return np.nan
+
+
+def _flights(session: blackbox.Session, name: str, path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
+    headers = session.headers
+    firmware = headers.get("Firmware revision", headers.get("Firmware type", ""))
     if "betaflight" not in firmware.lower():
         raise InputError(
             f"{path}: a blackbox log of {firmware or 'an unknown firmware'}; only Betaflight's axes and units are "
             "known, turn it into CSV (blackbox_decode), then `rotorid import FILE.csv`"
         )
-    try:
-        rows = [frame.data for frame in log.frames()]
-    except MemoryError:
-        raise
-    except Exception as error:  # a damaged frame may be anything to orangebox
-        raise InputError(f"{path}: not a blackbox log that can be read ({printable(error)[:150]})") from None
-    if len(rows) < 2:
-        raise InputError(f"{path}: holds {len(rows)} samples")
-    # Flags are words or nothing; every sensor is decoded to numbers.
-    raw = pd.DataFrame(rows, columns=log.field_names[: len(rows[0])]).select_dtypes("number")
-    return convert(raw, headers, name, path)
+    if len(session.values) < 2:
+        raise InputError(f"{path}: holds {len(session.values)} samples")
+    raw = pd.DataFrame(session.values, columns=session.names)
+    faults = []
+    if session.damaged:
+        found = f"{session.damaged} frames are damaged or count from one that is"
+        faults.append(Fault("damaged", c.TIME, found, "left out", session.damaged, name))
+    if not session.whole:
+        found = "the log breaks off without its end event (power lost, or a full memory)"
+        lasts = (raw["time"].iloc[-1] - raw["time"].iloc[0]) * 1e-6
+        faults.append(Fault("cut_off", c.TIME, found, f"{len(raw)} frames up to {lasts:.2f} s kept", 0, name))
+    runs, more = convert(raw, headers, name, path)
+    return runs, faults + more
 
 
 def convert(
-    raw: pd.DataFrame, headers: Mapping[str, object], name: str, where: object
+    raw: pd.DataFrame, headers: Mapping[str, str], name: str, where: object
 ) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
-    """Flights in contract columns of the main frames of one log (`time` in µs) and its header."""
+    """Flights in contract columns of the main frames of one session (`time` in µs) and its header."""
     if "time" not in raw:
         raise InputError(f"{where}: the log has no field time")
-    faults: list[Fault] = []
+    raw, faults = _known_names(raw)
     time = raw["time"].to_numpy(float) * 1e-6
     keep = np.isfinite(time) & in_the_air.increasing(np.nan_to_num(time, nan=-np.inf))
     if not keep.all():
@@ -109,12 +152,13 @@ def convert(
 
     gyro = fields("gyroADC", 3)
     if gyro is not None:
-        scale = _float_of(headers.get("gyro_scale"), 1.0)
+        scale = _number(headers, "gyro_scale", _number(headers, "gyro.scale", 1.0))
+        scale /= 10 if _number(headers, "blackbox_high_resolution", 0) > 0 else 1
         table[list(c.ANGULAR_VELOCITY)] = half_turn_about_x(np.radians(gyro * scale))
     else:
         faults.append(Fault("missing", ", ".join(c.ANGULAR_VELOCITY), "gyroADC is not logged", "no body rates", 0))
     acceleration = fields("accSmooth", 3)
-    one_g = float(headers.get("acc_1G", 0) or 0)
+    one_g = _number(headers, "acc_1G", 0)
     if acceleration is not None and one_g > 0:
         table[list(c.SPECIFIC_FORCE)] = half_turn_about_x(acceleration / one_g * GRAVITY_M_S2)
     else:
@@ -125,54 +169,113 @@ def convert(
         xyz = attitude / QUATERNION_SCALE
         w = np.sqrt(np.clip(1 - np.sum(xyz**2, axis=1), 0, None))
         table[list(c.QUATERNION)] = quaternion_to_frd_ned(np.column_stack([w, xyz]))
-    throttle, more = _throttles(raw, headers)
+    motors = [n for i in range(8) if (n := f"motor[{i}]") in raw]
+    if not motors:
+        raise InputError(f"{where}: no motor[0], motor[1], … is logged, so that nothing shows when the vehicle flies")
+    throttle, more = throttles(raw[motors].to_numpy(float), headers)
     faults += more
-    if throttle is None:
-        raise InputError(f"{where}: motor[0] to motor[3] are not logged, so that nothing shows when the vehicle flies")
     table[list(c.rotor_columns("throttle", throttle.shape[1]))] = throttle
     turns = fields("eRPM", throttle.shape[1])
     if turns is not None and np.nanmax(turns) > 0:
-        poles = float(headers.get("motor_poles", DEFAULT_POLES) or DEFAULT_POLES)
-        if "motor_poles" not in headers:
-            found = "the header does not state motor_poles"
+        poles = _number(headers, "motor_poles", 0)
+        if not poles > 0:
+            poles, found = DEFAULT_POLES, "the header does not state motor_poles"
             faults.append(Fault("unit", "rotor_speed", found, f"taken as {DEFAULT_POLES}", 0))
-        speeds = turns * 100 / (poles / 2) * 2 * np.pi / 60
+        speeds = np.where(np.isnan(throttle), np.nan, turns * 100 / (poles / 2) * 2 * np.pi / 60)
         table[list(c.rotor_columns("rotor_speed", turns.shape[1]))] = speeds
-    for field, column in (("vbatLatest", c.BATTERY_VOLTAGE), ("amperageLatest", c.BATTERY_CURRENT)):
-        if field in raw and _version(headers) >= FIRST_IN_HUNDREDTHS and raw[field].max() > 0:
-            table[column] = raw[field].to_numpy(float) / 100
+    battery, more = _battery(raw, headers)
+    faults += more
+    table = table.assign(**battery)
     faults += report_gaps(table)
     runs, cuts = in_the_air.flights(table, in_the_air.airborne(table)[0], name, where)
     return runs, [*faults, *cuts]
 
 
-def _throttles(raw: pd.DataFrame, headers: Mapping[str, object]) -> tuple[np.ndarray | None, list[Fault]]:
-    """Commands of the motors as fractions (n, k), None where fewer than four are logged."""
-    names = [n for i in range(8) if (n := f"motor[{i}]") in raw]
-    if len(names) < 4:
-        return None, []
-    stated = headers.get("motorOutput")
+def _known_names(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
+    """The fields under the names of today's releases; what looks like one of them and is none is named."""
+    names = {f"{other}[{i}]": f"{base}[{i}]" for base, others in OTHER_NAMES.items() for other in others
+             for i in range(8) if f"{base}[{i}]" not in raw}  # fmt: skip
+    raw = raw.rename(columns=names)
     faults = []
-    if isinstance(stated, list) and len(stated) == 2 and float(stated[1]) > float(stated[0]):
-        low, high = map(float, stated)
-    else:
-        low, high = float(headers.get("minthrottle", 1000)), float(headers.get("maxthrottle", 2000))
+    for base in ("gyroADC", "accSmooth", "eRPM", "motor", "vbatLatest", "amperageLatest"):
+        core = re.sub(r"ADC|Smooth|Latest", "", base).lower()
+        like = [n for n in raw if core in n.lower() and not re.search(r"unfilt|legacy", n.lower())]
+        if like and not any(n.split("[")[0] == base for n in raw):
+            found = f"{base} is not logged, but {', '.join(like)} looks like it under a name that is not known"
+            faults.append(Fault("unknown_name", base, found, "left out", 0))
+    return raw, faults
+
+
+def throttles(motors: np.ndarray, headers: Mapping[str, str]) -> tuple[np.ndarray, list[Fault]]:
+    """Commands of motors (n, k) as fractions of the range that the header states, and what was found.
+
+    With 3D a motor also turns backwards; the contract has no fraction for that, so these are NaN.
+    """
+    faults = []
+    low, high = _pair(headers, "motorOutput") or (0.0, 0.0)
+    if not high > low:
+        low, high = _number(headers, "minthrottle", 1000.0), _number(headers, "maxthrottle", 2000.0)
+        turning = motors[motors > 0]
+        if len(turning) and np.quantile(turning, 0.01) < SLOWEST_PULSE_US:
+            low, high = DSHOT
         found = "the header does not state motorOutput"
         faults.append(Fault("unit", "throttle", found, f"no and full throttle taken as {low:g} and {high:g}", 0))
-    return np.clip((raw[names].to_numpy(float) - low) / (high - low), 0, 1), faults
+    backwards = np.zeros(motors.shape, bool)
+    if int(_number(headers, "features", 0)) & FEATURE_3D:
+        if low < SLOWEST_PULSE_US:
+            backwards, low = (motors > 0) & (motors < DSHOT_FORWARD), DSHOT_FORWARD + low - DSHOT[0]
+        else:
+            backwards, low = motors < DEADBAND_3D[0], DEADBAND_3D[1]
+            found = "pulses in µs with 3D, whose dead band the header does not state"
+            faults.append(Fault("unit", "throttle", found, f"no throttle taken as {low:g} µs, Betaflight's own", 0))
+    share = np.clip((motors - low) / (high - low), 0, 1)
+    if backwards.any():
+        found = f"{int(backwards.any(axis=1).sum())} samples have a motor that turns backwards (3D)"
+        faults.append(Fault("backwards", "throttle", found, "made empty cells", int(backwards.sum())))
+    return np.where(backwards, np.nan, share), faults
 
 
-def _float_of(value: object, otherwise: float) -> float:
-    """A number of a header: plain, or the bits of a 32-bit float in hexadecimal (`0x3f800000` is 1)."""
-    if isinstance(value, str) and value.lower().startswith("0x"):
-        return struct.unpack("<f", struct.pack("<I", int(value, 16)))[0]
-    if isinstance(value, int) and value > 1_000_000:  # a reader that took the hexadecimal for a whole number
-        return struct.unpack("<f", struct.pack("<I", value))[0]
-    return float(value) if isinstance(value, int | float) else otherwise
+def _battery(raw: pd.DataFrame, headers: Mapping[str, str]) -> tuple[dict[str, np.ndarray], list[Fault]]:
+    """Voltage and current of the battery in contract columns, as far as they are logged and their unit is known."""
+    version = _version(headers)
+    found, faults = {}, []
+    for field, column, since in (
+        ("vbatLatest", c.BATTERY_VOLTAGE, VOLTS),
+        ("amperageLatest", c.BATTERY_CURRENT, AMPERES),
+    ):
+        if field not in raw or not raw[field].max() > 0:
+            continue
+        values = raw[field].to_numpy(float)
+        counts = next((n for first, n in since if version >= first), None)
+        offset, per_ampere = _pair(headers, "currentMeter") or _pair(headers, "currentSensor") or (0.0, 0.0)
+        if counts is not None:
+            found[column] = values / counts
+        elif version and field == "vbatLatest" and (scale := _number(headers, "vbatscale", 0)) > 0:
+            found[column] = values * CONVERTER_STEP_MV * scale * 1e-4  # the divider in tenths, mV
+        elif version and field == "amperageLatest" and per_ampere > 0:
+            found[column] = (values * CONVERTER_STEP_MV - offset) * 10 / per_ampere
+        else:
+            why = "the header does not state the version or the scale that its unit depends on"
+            faults.append(Fault("unit", column, f"{field}: {why}", "left out", len(raw)))
+    return found, faults
 
 
-def _version(headers: Mapping[str, object]) -> tuple[int, ...]:
+def _number(headers: Mapping[str, str], name: str, otherwise: float) -> float:
+    """A number of the header: plain, or the bits of a 32-bit float in hexadecimal (`0x3f800000` is 1)."""
+    text = headers.get(name, "").strip()
+    if re.fullmatch(r"0x[0-9a-fA-F]{1,8}", text):
+        return struct.unpack("<f", struct.pack("<I", int(text, 16)))[0]
+    return float(text) if re.fullmatch(r"[-+]?\d{1,15}(\.\d*)?(e[-+]?\d{1,2})?", text) else otherwise
+
+
+def _pair(headers: Mapping[str, str], name: str) -> tuple[float, float] | None:
+    """Two numbers of the header with a comma between; None where it does not state them."""
+    parts = headers.get(name, "").split(",")
+    numbers = [_number({name: p}, name, np.nan) for p in parts]
+    return (numbers[0], numbers[1]) if len(numbers) == 2 and np.isfinite(numbers).all() else None
+
+
+def _version(headers: Mapping[str, str]) -> tuple[int, ...]:
     """Betaflight's version, `(4, 4)`; empty where the header does not state it."""
-    words = str(headers.get("Firmware revision", "")).split()
-    parts = words[1].split(".") if len(words) > 1 else []
-    return tuple(int(p) for p in parts[:2] if p.isdigit())
+    found = re.search(r"(\d{1,4})\.(\d{1,3})", headers.get("Firmware revision", ""))
+    return (int(found[1]), int(found[2])) if found else ()

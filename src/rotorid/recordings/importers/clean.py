@@ -28,6 +28,23 @@ def drop_repeated_times(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]
     return table[keep].reset_index(drop=True), [fault]
 
 
+def join_rows(table: pd.DataFrame, time: str) -> pd.DataFrame:
+    """Rows of one instant as one row where each holds cells that the others lack: messages that have a row each.
+
+    `time` names the clock's column. Rows of one instant that hold the same cells stay as they are.
+    """
+    clock = table[time].to_numpy(float)
+    group = np.cumsum(np.diff(clock, prepend=np.nan) != 0)
+    if len(table) < 2 or group[-1] == len(table):
+        return table
+    given = table.drop(columns=time).notna()
+    alone = (given.groupby(group).sum().max(axis=1) <= 1).to_numpy()[group - 1]
+    group = np.where(alone, group, -np.arange(1, len(table) + 1))
+    joined = table.groupby(pd.factorize(group)[0]).first()
+    joined.attrs = table.attrs
+    return joined.reset_index(drop=True)
+
+
 def report_gaps(table: pd.DataFrame, factor: float = 3.0) -> list[Fault]:
     """A fault where the clock steps by more than `factor` times its median step; nothing is filled in."""
     steps = np.diff(table[TIME].to_numpy(float))

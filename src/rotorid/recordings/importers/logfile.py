@@ -23,13 +23,14 @@ from rotorid.recordings.importers import (
     ros,
 )
 from rotorid.recordings.importers.known import Known, px4_vehicle
-from rotorid.recordings.importers.mapping import Mapping, read_by_mapping
+from rotorid.recordings.importers.mapping import ELECTRICAL, Mapping, read_by_mapping
 from rotorid.recordings.importers.readers import limited, silent
 from rotorid.recordings.importers.report import Fault
 
 GZIP = b"\x1f\x8b"
 BY_FIRST_BYTES = (
     (b"H Product:Blackbox", "betaflight"),
+    (b'"Product","Blackbox', "betaflight"),
     (b"\xa3\x95", "ardupilot"),
     (b"#ROSBAG V2.0", "ros"),
     (b"\x89MCAP0", "ros"),
@@ -87,6 +88,12 @@ def format_of(path: Path) -> str:
         return "csv"
     if head.startswith(b"PAR1"):
         return "parquet"
+    if head[8:9] in (b"\xfe", b"\xfd") and path.suffix.lower() in (".tlog", ".rlog"):
+        raise InputError(
+            f"{path}: a telemetry log of MAVLink, which is not read; take the autopilot's own log (.bin, .ulg), or "
+            "make a table of it (`pip install pymavlink`, then `mavlogdump.py --format csv --types "
+            f"RAW_IMU,ATTITUDE,SERVO_OUTPUT_RAW {path.name} > flight.csv`) and import that"
+        )
     for start, name in BY_FIRST_BYTES:
         if head.startswith(start):
             return name
@@ -143,7 +150,9 @@ def _read(path: Path, kind: str, mapping: Mapping | None) -> Imported:
     runs, cuts = _in_the_air(table, _stem(path), path)
     speeds = None if mapping is None else mapping.channels.get("rotor_speed") or mapping.channels.get("rotor_command")
     unit = (speeds.unit if speeds else "") or "rad/s"
-    return Imported(kind, runs, (*faults, *cuts), axes, speed_unit=unit)
+    unit = "rpm" if unit in ELECTRICAL else unit  # they are turns of the rotor by now
+    stand = any({*c.FORCE, *c.MOMENT} & set(run) for run in runs.values())
+    return Imported(kind, runs, (*faults, *cuts), axes, kind="stand" if stand else "flight", speed_unit=unit)
 
 
 def _in_the_air(table: pd.DataFrame, name: str, path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault]]:

@@ -2,15 +2,23 @@
 
 A mapping names columns, units and frames::
 
-    body: flu              # frd | flu            axes of accelerometer, gyroscope and attitude
-    world: enu             # ned | enu | nwu      axes of position and velocity, and what the attitude refers to
+    body: flu              # frd | flu | fur      axes of accelerometer, gyroscope and attitude
+    world: enu             # ned | enu | nwu | nue  axes of position and velocity, and what the attitude refers to
     channels:
       time: {columns: [t], unit: us}
       specific_force: {columns: [ax, ay, az], unit: g}
-      attitude: {columns: [qx, qy, qz, qw], form: xyzw}       # wxyz | xyzw | euler (roll, pitch, yaw)
+      attitude: {columns: [qx, qy, qz, qw], form: xyzw}       # wxyz | xyzw | euler | euler_xyz (roll, pitch, yaw)
       velocity: {columns: [vx, vy, vz], unit: m/s, axes: body}  # world (default) | body
+      position: {columns: [x, y, z], unit: m, world: neu}       # where its axes are not those of the attitude
       throttle: {columns: [m1, m2, m3, m4], unit: us, range: [1000, 2000]}
+      rotor_speed: {columns: [e1, e2, e3, e4], unit: 100erpm, poles: 14}   # electrical turns: poles of a motor
+      angular_velocity: {columns: [gx, gy, gz], unit: deg/s, scale: 0.061}  # counts: what one is in the unit
+      thrust: {columns: [load], unit: kgf}     # of a stand: along -z; torque likewise; or force and moment, of three
     keep: [wind_sensor]    # other columns, kept under their own names
+
+`euler` turns by yaw about z, then pitch about the new y, then roll about the new x (z-y'-x''); `euler_xyz` by roll
+first (x-y'-z'', as motion captures write it). Axes are named in their order, x first: forward, right, left, up, down;
+north, east, west, up, down.
 
 A value that is `?` is a question left open: nothing is imported until it is answered.
 `rotorid.recordings.importers.guessing` proposes such a mapping from the names of the columns and from what stands in
@@ -32,25 +40,12 @@ from rotorid.errors import InputError
 from rotorid.io.text.files import read_yaml
 from rotorid.io.text.wording import explain
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.clean import drop_repeated_times, report_gaps
+from rotorid.recordings.importers.clean import drop_repeated_times, join_rows, report_gaps
 from rotorid.recordings.importers.frames import continuous
 from rotorid.recordings.importers.report import Fault
+from rotorid.recordings.importers.units import UNITS, converted
 from rotorid.recordings.tables import clock_jump, numbers, read_cells, read_parquet_cells
 
-G = 9.80665
-UNITS: dict[str, dict[str, float]] = {
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
-    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "ft": 0.3048},
-    "velocity": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
-    "rate": {"rad/s": 1.0, "deg/s": np.pi / 180},
-    "angle": {"rad": 1.0, "deg": np.pi / 180},
-    "acceleration": {"m/s2": 1.0, "g": G, "mg": G / 1000},
-    "rotor": {"rad/s": 1.0, "rpm": np.pi / 30, "hz": 2 * np.pi},
-    "share": {"1": 1.0, "%": 0.01, "us": 1.0, "raw": 1.0},
-    "voltage": {"V": 1.0, "mV": 1e-3, "cV": 1e-2, "dV": 0.1},
-    "current": {"A": 1.0, "mA": 1e-3, "cA": 1e-2},
-    "temperature": {"degC": 1.0},
-}
 CHANNELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "time": ("time", (c.TIME,)),
     "position": ("length", c.POSITION),
@@ -58,23 +53,32 @@ CHANNELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "attitude": ("angle", c.QUATERNION),
     "angular_velocity": ("rate", c.ANGULAR_VELOCITY),
     "specific_force": ("acceleration", c.SPECIFIC_FORCE),
-    "rotor_speed": ("rotor", ()),
-    "rotor_command": ("rotor", ()),
+    "rotor_speed": ("turns", ()),
+    "rotor_command": ("turns", ()),
     "throttle": ("share", ()),
     "height": ("length", (c.HEIGHT,)),
     "battery_voltage": ("voltage", (c.BATTERY_VOLTAGE,)),
     "battery_current": ("current", (c.BATTERY_CURRENT,)),
     "temperature": ("temperature", (c.TEMPERATURE,)),
+    "thrust": ("force", (c.FORCE[2],)),
+    "torque": ("torque", (c.MOMENT[2],)),
+    "force": ("force", c.FORCE),
+    "moment": ("torque", c.MOMENT),
 }
 """Channels of a mapping: kind of unit and columns of the contract (none: one a rotor)."""
-BODY = {"frd": np.eye(3), "flu": np.diag([1.0, -1.0, -1.0])}
+Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+BODY = {"frd": np.eye(3), "flu": np.diag([1.0, -1.0, -1.0]), "fur": Y_UP}
 """Body axes as columns in forward-right-down."""
 WORLD = {
     "ned": np.eye(3),
     "nwu": np.diag([1.0, -1.0, -1.0]),
     "enu": np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]),
+    "nue": Y_UP,
 }
 """World axes as columns in north-east-down."""
+TRAVEL = WORLD | {"neu": np.diag([1.0, 1.0, -1.0])}
+"""Axes that position and velocity may have, too: a left-handed system has no attitude."""
+ELECTRICAL = ("erpm", "100erpm")
 
 
 class Channel(BaseModel):
@@ -84,12 +88,18 @@ class Channel(BaseModel):
 
     columns: tuple[str, ...]
     unit: str = ""
-    form: Literal["wxyz", "xyzw", "euler", "?"] = "wxyz"
+    scale: float | Literal["?"] = 1.0
+    """What one count is in the unit."""
+    form: Literal["wxyz", "xyzw", "euler", "euler_xyz", "?"] = "wxyz"
     """Attitude only."""
     axes: Literal["world", "body", "?"] = "world"
     """Velocity only."""
-    range: tuple[float, float] | None = None
+    world: Literal["ned", "enu", "nwu", "nue", "neu", "?"] | None = None
+    """Position and velocity only: their axes where they are not those of the attitude."""
+    range: tuple[float, float] | Literal["?"] | None = None
     """Throttle only: readings of no and of full throttle."""
+    poles: int | Literal["?"] | None = None
+    """Speeds in electrical turns only: magnetic poles of a motor."""
 
 
 class Mapping(BaseModel):
@@ -97,12 +107,14 @@ class Mapping(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    body: Literal["frd", "flu", "?"] = "frd"
-    world: Literal["ned", "enu", "nwu", "?"] = "ned"
+    body: Literal["frd", "flu", "fur", "?"] = "frd"
+    world: Literal["ned", "enu", "nwu", "nue", "?"] = "ned"
     channels: dict[str, Channel]
     keep: tuple[str, ...] = ()
 
 
+EULER = {"euler": "ZYX", "euler_xyz": "XYZ"}
+"""Orders of the turns about the axes of the body as they come."""
 OPEN = "?"
 """What stands for an answer that only a person can give."""
 
@@ -118,9 +130,17 @@ def open_questions(mapping: Mapping) -> list[str]:
             known = UNITS[CHANNELS[name][0]] if name in CHANNELS else ()
             found.append(f"channels.{name}.unit ({' or '.join(known)})")
         if channel.form == OPEN:
-            found.append(f"channels.{name}.form (wxyz, xyzw or euler)")
+            found.append(f"channels.{name}.form (wxyz, xyzw, euler or euler_xyz)")
         if channel.axes == OPEN:
             found.append(f"channels.{name}.axes (world or body)")
+        if channel.world == OPEN:
+            found.append(f"channels.{name}.world ({' or '.join(TRAVEL)})")
+        if channel.scale == OPEN:
+            found.append(f"channels.{name}.scale (what one count is in the unit)")
+        if channel.range == OPEN:
+            found.append(f"channels.{name}.range ([reading of no throttle, of full throttle])")
+        if channel.poles == OPEN:
+            found.append(f"channels.{name}.poles (magnetic poles of a motor)")
     return found
 
 
@@ -147,7 +167,14 @@ def read_mapping(path: Path) -> Mapping:
             raise InputError(f"{path}: {name}: unit {channel.unit!r}, expected one of {', '.join(known)}")
         wanted = len(CHANNELS[name][1])
         if name == "attitude":
-            wanted = 3 if channel.form == "euler" else 4
+            wanted = 3 if channel.form in EULER else 4
+        if channel.range is not None and not channel.range[1] > channel.range[0]:
+            low, high = channel.range
+            raise InputError(f"{path}: {name}: range [{low:g}, {high:g}], expected no throttle below full throttle")
+        if channel.unit in ELECTRICAL and not (channel.poles or 0) > 0:
+            raise InputError(f"{path}: {name}: unit {channel.unit} needs poles, the magnetic poles of a motor")
+        if channel.scale == 0:
+            raise InputError(f"{path}: {name}: scale 0, expected what one count is in the unit")
         if wanted and len(channel.columns) != wanted:
             raise InputError(f"{path}: {name}: {len(channel.columns)} columns, expected {wanted}")
     if "time" not in mapping.channels:
@@ -178,41 +205,65 @@ def read_by_mapping(path: Path, mapping: Mapping | None) -> tuple[pd.DataFrame, 
     Without a mapping the columns must have the contract's names; InputError says how to get a mapping.
     """
     raw = read_columns(path)
+    lost = _left_out(raw)
     if mapping is None:
         if c.TIME in raw.columns and sum(c.is_known(n) for n in raw.columns) > 1:
-            return *_clocked(numbers(raw, path), path), "the contract's: the columns have its names"
+            table, faults = _clocked(numbers(raw, path), path)
+            return table, lost + faults, "the contract's: the columns have its names"
         raise InputError(
             f"{path}: the columns ({', '.join(raw.columns[:6])}, …) are not named as the recording contract has them; "
             f"`rotorid import {path.name} --write-mapping mapping.yaml` proposes what each one is"
         )
     table, faults = convert(raw, mapping, str(path))
-    return table, faults, f"body {mapping.body.upper()}, world {mapping.world.upper()}, turned into FRD and NED"
+    return table, lost + faults, f"body {mapping.body.upper()}, world {mapping.world.upper()}, turned into FRD and NED"
+
+
+def _left_out(raw: pd.DataFrame) -> list[Fault]:
+    """What of the file of a table is none of its rows."""
+    layout = raw.attrs.get("layout")
+    faults = []
+    if layout and layout.above:
+        found = f"{len(layout.above)} lines above the heading in line {layout.heading_line}"
+        faults.append(Fault("above", "", found, "left out", 0))
+    if layout and layout.cut_off:
+        found = "the last line is cut off"
+        faults.append(Fault("cut_off", c.TIME, found, "left out", 1))
+    return faults
 
 
 def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFrame, list[Fault]]:
     """Contract columns of a table by a mapping; InputError names a column that is not there or no numbers."""
     check_answered(mapping, f"the mapping of {where}")
     body, world = BODY[mapping.body], WORLD[mapping.world]
+    wanted = [(name, channel.columns) for name, channel in mapping.channels.items()] + [("keep", mapping.keep)]
+    table = pd.concat([_numbers(raw, columns, name, where) for name, columns in wanted if columns], axis=1)
+    table = join_rows(table.loc[:, ~table.columns.duplicated()], mapping.channels["time"].columns[0])
     out: dict[str, np.ndarray] = {}
     rotation = None
     order = sorted(mapping.channels, key=lambda n: n != "attitude")
     for name in order:
         channel = mapping.channels[name]
-        values = _numbers(raw, channel.columns, name, where)
+        values = table[list(channel.columns)].to_numpy(float)
         kind, columns = CHANNELS[name]
+        if channel.scale != 1.0:
+            values = values * channel.scale
         if name == "throttle" and channel.range is not None:
             low, high = channel.range
             values = np.clip((values - low) / (high - low), 0, 1)
-        elif not (name == "attitude" and channel.form != "euler"):
-            values = values * UNITS[kind].get(channel.unit, 1.0)
+        elif name != "attitude" or channel.form in EULER:
+            values = converted(values, kind, channel.unit)
+        if channel.unit in ELECTRICAL:
+            values = values / (channel.poles / 2)
         if name == "attitude":
             rotation, values = _attitude(values, channel.form, body, world)
-        elif name in ("angular_velocity", "specific_force"):
+        elif name in ("angular_velocity", "specific_force", "force", "moment"):
             values = values @ body.T
-        elif name == "position":
-            values = values @ world.T
-        elif name == "velocity" and channel.axes == "world":
-            values = values @ world.T
+        elif name == "thrust":
+            values = -values
+        elif name == "torque":  # the vehicle's file gives it the sign of its rotor
+            values = values * (-1.0 if np.nansum(values) < 0 else 1.0)
+        elif name == "position" or (name == "velocity" and channel.axes == "world"):
+            values = values @ TRAVEL[channel.world or mapping.world].T
         elif name == "velocity":
             if rotation is None:
                 raise InputError(f"{where}: velocity in body axes needs an attitude to be turned into the world")
@@ -225,7 +276,7 @@ def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFra
             columns = c.rotor_columns(name, len(channel.columns))
         out.update(zip(columns, values.T, strict=True))
     for name in mapping.keep:
-        out[name] = _numbers(raw, (name,), "keep", where)[:, 0]
+        out[name] = table[name].to_numpy(float)
     out[c.TIME] = out[c.TIME] - np.nanmin(out[c.TIME])
     return _clocked(pd.DataFrame({c.TIME: out.pop(c.TIME), **out}), where)
 
@@ -241,19 +292,24 @@ def _clocked(table: pd.DataFrame, where: object) -> tuple[pd.DataFrame, list[Fau
     return table, faults + report_gaps(table)
 
 
-def _numbers(raw: pd.DataFrame, columns, channel: str, where: str) -> np.ndarray:
+def _numbers(raw: pd.DataFrame, columns, channel: str, where: str) -> pd.DataFrame:
     for name in columns:
         if name not in raw.columns:
             raise InputError(f"{where}: {channel} wants column {name!r}, which is not there{_near(name, raw.columns)}")
-    return numbers(raw[list(dict.fromkeys(columns))], where)[list(columns)].to_numpy(float)
+    return numbers(raw[list(dict.fromkeys(columns))], where)
+
+
+def from_angles(angles: np.ndarray, form: str) -> Rotation:
+    """Rotations by roll, pitch and yaw (n, 3), rad, in one of the orders of `EULER`."""
+    return Rotation.from_euler(EULER[form], angles if form == "euler_xyz" else angles[:, ::-1])
 
 
 def _attitude(values: np.ndarray, form: str, body: np.ndarray, world: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Quaternions (n, 4), scalar first, FRD to NED; NaN where a value is missing. Twice, as `convert` takes it."""
     out = np.full((len(values), 4), np.nan)
     known = np.isfinite(values).all(axis=1)
-    if form == "euler":
-        turn = Rotation.from_euler("ZYX", values[known][:, [2, 1, 0]])
+    if form in EULER:
+        turn = from_angles(values[known], form)
     else:
         known &= np.linalg.norm(np.nan_to_num(values), axis=1) > 0
         turn = Rotation.from_quat(values[known] if form == "xyzw" else values[known][:, [1, 2, 3, 0]])

@@ -1,8 +1,9 @@
-"""RCbenchmark 1520 thrust-stand exports: one motor and propeller, steady points of rising throttle.
+"""RCbenchmark thrust-stand exports (1520, 1580, 1585): one motor and propeller, steady points of rising throttle.
 
-Files come as UTF-8 with a byte-order mark, UTF-8 without or latin-1, with LF, CR LF or bare CR line ends.
-"Motor Electrical Speed" holds mechanical revolutions per minute in these files (upstream divided by the pole
-pairs already: it gives a plausible thrust coefficient). There is no torque.
+Files come as UTF-8 with a byte-order mark, UTF-8 without or latin-1, with LF, CR LF or bare CR line ends. The program
+writes each quantity in the unit that its user has chosen and names it in the heading: "Thrust (kgf)".
+"Motor Electrical Speed" holds mechanical revolutions (the program divided by the pole pairs already: it gives a
+plausible thrust coefficient). The 1520 has no torque.
 """
 
 from __future__ import annotations
@@ -17,20 +18,24 @@ from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.clean import drop_repeated_times
 from rotorid.recordings.importers.report import Fault
+from rotorid.recordings.importers.units import UNITS, bracketed, converted, unit_of
 from rotorid.recordings.lost_speeds import lost_speed
+from rotorid.recordings.vehicle import Vehicle
 
-GRAM_FORCE_N = 9.80665e-3
-RPM = 2 * np.pi / 60
 ESC_LOW_US, ESC_HIGH_US = 1000.0, 2000.0
-HEADINGS = {
-    "Time": "time",
-    "ESC signal": "esc",
-    "Thrust": "thrust",
-    "Voltage": "voltage",
-    "Current": "current",
-    "Motor Electrical Speed": "rpm",
-    "Motor Optical Speed": "optical",
+HEADINGS: dict[str, tuple[str, str, str]] = {
+    "Time": ("time", "time", "s"),
+    "ESC signal": ("esc", "share", "us"),
+    "Thrust": ("thrust", "force", "gf"),
+    "Torque": ("torque", "torque", "N.m"),
+    "Voltage": ("voltage", "voltage", "V"),
+    "Current": ("current", "current", "A"),
+    "Motor Electrical Speed": ("speed", "rotor", "rpm"),
+    "Motor Optical Speed": ("optical", "rotor", "rpm"),
 }
+"""To a heading the column here, the kind of its unit, and the unit where the heading names none."""
+NOT_ALWAYS = ("torque", "speed", "optical")
+TORQUE = c.MOMENT[2]
 
 
 def decode_text(data: bytes) -> tuple[str, list[Fault]]:
@@ -50,46 +55,77 @@ def decode_text(data: bytes) -> tuple[str, list[Fault]]:
     return text.replace("\r\n", "\n").replace("\r", "\n"), faults
 
 
-def read_table(text: str, where: str) -> pd.DataFrame:
-    """Numeric columns `time, esc, thrust, voltage, current, rpm` (and `optical` where there) of an export."""
+def read_table(text: str, where: str) -> tuple[pd.DataFrame, list[Fault]]:
+    """Columns of an export in SI units by the names of `HEADINGS`, and what was found.
+
+    `time` s, `esc` from 0 to 1, `thrust` N, `torque` N m, `voltage` V, `current` A, `speed` and `optical` rad/s.
+    """
     try:
         rows = [row for row in csv.reader(text.split("\n")) if any(cell.strip() for cell in row)]
     except csv.Error as error:
         raise InputError(f"{where}: cannot be read as a table ({error})") from None
     if len(rows) < 2:
         raise InputError(f"{where}: expected a heading and rows of numbers")
-    places = {}
-    for place, heading in enumerate(rows[0]):
-        for start, name in HEADINGS.items():
-            if heading.strip().startswith(start):
-                places[name] = place
-    for start, name in HEADINGS.items():
-        if name not in places and name != "optical":
-            raise InputError(f"{where}, line 1: no column whose heading starts with {start!r}")
+    places, faults = _places(rows[0], where)
+    if len(rows) > 2 and len(rows[-1]) < len(rows[0]):
+        found = f"line {len(rows)} is cut off after {len(rows[-1])} of {len(rows[0])} cells"
+        faults.append(Fault("cut_off", c.TIME, found, "left out", 1))
+        rows.pop()
     columns: dict[str, list[float]] = {name: [] for name in places}
     for line, row in enumerate(rows[1:], start=2):
         if len(row) != len(rows[0]):
-            last = line == len(rows) and len(row) < len(rows[0])
-            why = " (the file is cut off: delete its last line)" if last else ""
-            raise InputError(f"{where}, line {line}: has {len(row)} cells, the heading has {len(rows[0])}{why}")
-        for name, place in places.items():
+            raise InputError(f"{where}, line {line}: has {len(row)} cells, the heading has {len(rows[0])}")
+        for name, (place, _, _) in places.items():
             cell = row[place].strip()
             try:
                 columns[name].append(float(cell) if cell else np.nan)
             except ValueError:
                 heading = rows[0][place].strip()
                 raise InputError(f"{where}, line {line}, column {heading}: expected a number, found {cell!r}") from None
-    return pd.DataFrame(columns)
+    read = {name: converted(np.array(columns[name]), kind, unit) for name, (_, kind, unit) in places.items()}
+    if places["esc"][2] == "us":
+        read["esc"] = (read["esc"] - ESC_LOW_US) / (ESC_HIGH_US - ESC_LOW_US)
+    return pd.DataFrame(read), faults
+
+
+def _places(headings: list[str], where: str) -> tuple[dict[str, tuple[int, str, str]], list[Fault]]:
+    """To a column here its place in the file, its kind and its unit; InputError names a heading that is not there."""
+    places, faults = {}, []
+    for place, heading in enumerate(headings):
+        title, text = bracketed(heading)
+        known = next((start for start in HEADINGS if start.lower() == title.lower()), None)
+        if known is None:
+            continue
+        name, kind, usual = HEADINGS[known]
+        unit = unit_of(text, kind) if text else usual
+        if not unit:
+            raise InputError(
+                f"{where}, line 1, column {heading.strip()}: no known unit of a {title.lower()}, expected one of "
+                f"{', '.join(UNITS[kind])}"
+            )
+        if not text:
+            faults.append(Fault("unit", "", f"the heading {title!r} names no unit", f"taken as {usual}", 0))
+        places[name] = place, kind, unit
+    for title, (name, _, _) in HEADINGS.items():
+        if name not in (*places, *NOT_ALWAYS):
+            raise InputError(f"{where}, line 1: no column whose heading starts with {title!r}")
+    if not {"speed", "optical"} & set(places):
+        raise InputError(f"{where}, line 1: no column whose heading starts with 'Motor Electrical Speed'")
+    return places, faults
 
 
 def convert(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
-    """Contract columns of a stand with one rotor; measured values are kept as they were recorded.
+    """Contract columns of a stand with one rotor of what `read_table` gives; measured values are kept as recorded.
 
-    The thrust is a force along -z of the body, which the rotor passes on to the sensor.
+    The thrust is a force along -z of the body, which the rotor passes on to the sensor. The torque is positive while
+    the rotor turns; `signed_by_spin` gives it the sign of its rotor.
     """
     faults = []
-    thrust_n = raw["thrust"].to_numpy() * GRAM_FORCE_N
-    speed = raw["rpm"].to_numpy() * RPM
+    thrust_n = raw["thrust"].to_numpy()
+    optical = raw["optical"].to_numpy() if "optical" in raw else np.zeros(len(raw))
+    electrical = raw["speed"].to_numpy() if "speed" in raw else np.zeros(len(raw))
+    both = (optical > 0).any() and (electrical > 0).any()
+    speed = electrical if (electrical > 0).any() or not (optical > 0).any() else optical
     turning = speed > 0
     if turning.sum() >= 2 and np.corrcoef(speed[turning] ** 2, thrust_n[turning])[0, 1] < -0.5:
         faults.append(
@@ -101,7 +137,7 @@ def convert(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
                 int(len(raw)),
             )
         )
-    silent = (speed == 0) & (np.abs(thrust_n) > 0) & (raw["esc"].to_numpy() > ESC_LOW_US)
+    silent = (speed == 0) & (np.abs(thrust_n) > 0) & (raw["esc"].to_numpy() > 0)
     if silent.any():
         faults.append(
             Fault(
@@ -127,28 +163,40 @@ def convert(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
                 int(negative.sum()),
             )
         )
-    if "optical" in raw and (raw["optical"] > 0).any():
-        faults.append(
-            Fault(
-                "second_sensor",
-                "",
-                "an optical speed is recorded too",
-                "left out",
-                int((raw["optical"] > 0).sum()),
-            )
-        )
+    if both:
+        found, count = "an optical speed is recorded too", int((optical > 0).sum())
+        faults.append(Fault("second_sensor", "", found, "left out", count))
     table = pd.DataFrame(
         {
             c.TIME: raw["time"],
-            "throttle_1": (raw["esc"] - ESC_LOW_US) / (ESC_HIGH_US - ESC_LOW_US),
+            "throttle_1": raw["esc"],
             "rotor_speed_1_rad_s": speed,
             "force_z_n": -thrust_n,
             c.BATTERY_VOLTAGE: raw["voltage"],
             c.BATTERY_CURRENT: raw["current"],
         }
     )
+    if "torque" in raw and raw["torque"].notna().any():
+        torque = raw["torque"].to_numpy()
+        table[TORQUE] = torque * (-1.0 if np.nansum(torque * speed) < 0 else 1.0)
     table, repeated = drop_repeated_times(table)
     return table, faults + repeated
+
+
+def signed_by_spin(runs: dict[str, pd.DataFrame], vehicle: Vehicle) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
+    """Runs of `read_rcbenchmark` whose torque has the sign that the stated spin of the rotor gives it.
+
+    The export does not say which way its torque counts: a rotor that turns ccw pushes its mount to positive z.
+    """
+    mine = [name for name, table in runs.items() if TORQUE in table]
+    spin = vehicle.rotors[0].spin if vehicle.rotors else "ccw"
+    if not mine:
+        return runs, []
+    sign = 1.0 if spin == "ccw" else -1.0
+    found = "an export does not say which way its torque counts"
+    done = f"its sign is that of a rotor that turns {spin}, as the vehicle's file states"
+    signed = {name: runs[name].assign(**{TORQUE: sign * runs[name][TORQUE]}) for name in mine}
+    return {**runs, **signed}, [Fault("sign", TORQUE, found, done, 0)]
 
 
 def read_rcbenchmark(path: Path) -> tuple[pd.DataFrame, list[Fault]]:
@@ -158,5 +206,6 @@ def read_rcbenchmark(path: Path) -> tuple[pd.DataFrame, list[Fault]]:
     except FileNotFoundError:
         raise InputError(f"{path}: file is missing") from None
     text, faults = decode_text(data)
-    table, more = convert(read_table(text, str(path)))
-    return table, faults + more
+    raw, more = read_table(text, str(path))
+    table, converted_ = convert(raw)
+    return table, [*faults, *more, *converted_]

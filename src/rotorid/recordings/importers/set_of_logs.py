@@ -20,6 +20,7 @@ from rotorid.recordings.importers.adding import add_to_set
 from rotorid.recordings.importers.logfile import TEMPLATES, files_of, read_log
 from rotorid.recordings.importers.mapping import Mapping
 from rotorid.recordings.importers.propose import propose
+from rotorid.recordings.importers.rcbenchmark import signed_by_spin
 from rotorid.recordings.importers.report import Fault, ImportReport
 from rotorid.recordings.importers.speed_unit import in_unit_of_weight
 from rotorid.recordings.manifest import sha256, write_manifest
@@ -179,6 +180,10 @@ def set_of_logs(
     if kinds == {"flight"} and (vehicle_file is not None or kept):
         known = float(np.mean(vehicle.thrust_coefficients_n_s2()))
         runs, changed = in_unit_of_weight(runs, units, vehicle.mass_kg, vehicle.rotor_count, known)
+        faults += changed
+    unsigned = all(f.format == "rcbenchmark" for f in found) or (mapping is not None and "torque" in mapping.channels)
+    if kinds == {"stand"} and unsigned:
+        runs, changed = signed_by_spin(runs, vehicle)
         faults += changed
     return SetOfLogs(
         name,

@@ -13,9 +13,9 @@ import numpy as np
 import pandas as pd
 
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.mapping import UNITS
 from rotorid.recordings.importers.propose import thrust_coefficient
 from rotorid.recordings.importers.report import Fault
+from rotorid.recordings.importers.units import UNITS
 
 USUAL_COEFFICIENT = 1.7e-5
 """C_F / (mass of the vehicle a rotor)^(4/3), N s² kg^(-4/3): thrust grows with the fourth power of the size, mass with
@@ -59,6 +59,13 @@ def in_unit_of_weight(
             tables = [out[run] for run in mine]
             unit, off = carrying_unit(tables, kind, written, mass_kg, rotors, coefficient_n_s2)
             if unit == written:
+                if not 1 / IMPOSSIBLE < off < IMPOSSIBLE and np.isfinite(off):
+                    found = (
+                        f"in {written}, as stated, the rotors hover at {off:.2g} times the speed that carries "
+                        f"{mass_kg:.3g} kg, which no unit explains: electrical turns (divide by half of the motor's "
+                        "poles), or another vehicle"
+                    )
+                    faults.append(Fault("unit", kind, found, "kept as recorded", sum(len(t) for t in tables)))
                 continue
             factor = UNITS["rotor"][unit] / UNITS["rotor"][written]
             for run in mine:

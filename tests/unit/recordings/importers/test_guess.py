@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +17,11 @@ from rotorid.cli.simulating import fly
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings import read_set, templates
+from rotorid.recordings.importers.clean import join_rows
 from rotorid.recordings.importers.guessing import names as column_names
 from rotorid.recordings.importers.guessing.guess import guess
 from rotorid.recordings.importers.guessing.text import as_text
-from rotorid.recordings.importers.mapping import BODY, UNITS, WORLD, convert, read_mapping
+from rotorid.recordings.importers.mapping import BODY, TRAVEL, UNITS, WORLD, convert, read_mapping
 from tests.public_logs import LOGS, needs_logs
 
 NAMES = {
@@ -173,3 +175,330 @@ def test_names(names: str, quantity: str | None) -> None:
     (family,) = column_names.families([names.format(a) for a in "xyz"], "xyz")
     named = [q for q in column_names.TRIPLES if column_names.is_named(family, q)]
     assert named == ([quantity] if quantity else [])
+
+
+# Throttles and electrical speeds ------------------------------------------------------------------
+
+SHARES = 0.45 + 0.12 * np.sin(np.outer(np.arange(900) * 0.01, [2.1, 3.3, 4.7, 5.9]))
+SPOOLED = np.vstack([np.zeros((100, 4)), np.full((100, 4), 0.05), SHARES])
+BETAFLIGHT = {"loopIteration": 1.0, **{f"gyroADC[{k}]": 3.0 for k in range(3)}}
+
+
+def throttles_of(names: str, values: np.ndarray, **more):
+    table = {"t_s": 0.01 * np.arange(len(values)), **more}
+    table |= {names.format(k): column for k, column in enumerate(values.T)}
+    return guess(pd.DataFrame(table))
+
+
+@pytest.mark.parametrize(
+    ("names", "values", "more", "ends"),
+    [
+        ("motor[{}]", 158 + 1889 * SPOOLED, BETAFLIGHT, [48, 2047]),  # in the air at 1008, on the ground at 252
+        ("motor[{}]", 158 + 0 * SPOOLED, BETAFLIGHT, [48, 2047]),  # nothing but idle
+        ("motor[{}]", 158 + 1889 * SHARES / 1.3, BETAFLIGHT, [48, 2047]),
+        ("motor[{}]", 1000 + 1000 * SHARES, BETAFLIGHT, "?"),
+        ("m{}", 48 + 1999 * SPOOLED, {}, [48, 2047]),
+        ("m{}", 1000 + 1000 * SHARES, {}, [1000, 2000]),
+        ("m{}", np.maximum(1000 + 1000 * SPOOLED, 900), {}, [1000, 2000]),
+        ("m{}_us", 1000 + 500 * SHARES, {}, [1000, 2000]),
+        ("m{}_dshot", 1000 + 500 * SHARES, {}, [48, 2047]),
+        ("m{}", 1000 + 500 * SHARES, {}, "?"),
+        ("m{}", SPOOLED, {}, None),
+        ("m{}", 0.1 * SPOOLED, {}, None),
+        ("m{}", -1 + 2 * SHARES, {}, [-1, 1]),
+        ("m{}", 100 * SPOOLED, {}, "?"),  # of 100, or of 255 (8 bits)
+        ("m{}_pct", 100 * SPOOLED, {}, [0, 100]),
+        ("m{}", np.minimum(180 * SPOOLED, 100), {}, [0, 100]),
+        ("m{}", 255 * SPOOLED, {}, [0, 255]),
+        ("m{}", np.minimum(1800 * SPOOLED, 1000), {}, [0, 1000]),
+        ("m{}", np.minimum(1800 * SPOOLED, 1023), {}, [0, 1023]),
+        ("m{}", 1000 * SPOOLED, {}, "?"),
+        ("m{}", 32767 * SPOOLED, {}, "?"),
+        ("m{}", np.minimum(60000 * SPOOLED, 32767), {}, [0, 32767]),
+        ("m{}", 65535 * SPOOLED * 1.5, {}, [0, 65535]),
+    ],
+)  # fmt: skip
+def test_the_range_of_throttles_is_found_or_asked(names: str, values: np.ndarray, more: dict, ends) -> None:
+    """By smallest and largest, by where a vehicle hovers, and by the other columns; asked where two ranges fit."""
+    found = throttles_of(names, values, **more)
+    channel = found.mapping.channels["throttle"]
+    assert (channel.unit == "1") == (ends is None), found.evidence
+    assert channel.range == (tuple(ends) if isinstance(ends, list) else ends), (found.evidence, found.open)
+    assert ("throttle" in found.open) == (ends == "?")
+
+
+ELECTRICAL = 60 / (2 * np.pi) * 7 * (900 + 100 * SHARES)  # of seven pairs of poles, turns a minute
+
+
+@pytest.mark.parametrize(
+    ("names", "values", "more", "unit"),
+    [
+        ("eRPM[{}]", ELECTRICAL / 100, BETAFLIGHT, "100erpm"), ("eRPM(/100)[{}]", ELECTRICAL / 100, {}, "100erpm"),
+        ("eRPM[{}]", ELECTRICAL / 100, {}, "100erpm"), ("erpm_{}", ELECTRICAL, {}, "erpm"),
+        ("motor_{}_erpm", ELECTRICAL, {}, "erpm"), ("erpm_{}", ELECTRICAL / 12, {}, "?"),
+    ],
+)  # fmt: skip
+def test_electrical_speeds_are_no_speeds_of_rotors(names: str, values: np.ndarray, more: dict, unit: str) -> None:
+    found = throttles_of(names, values, **more)
+    channel = found.mapping.channels["rotor_speed"]
+    assert (channel.unit, channel.poles) == (unit, "?") and "poles" in found.open["rotor_speed"]
+    if unit != "?":
+        answered = channel.model_copy(update={"poles": 14})
+        alone = {"time": found.mapping.channels["time"], "rotor_speed": answered}
+        mapping = found.mapping.model_copy(update={"body": "frd", "channels": alone, "keep": ()})
+        table = {"t_s": 0.01 * np.arange(len(values)), **more} | {names.format(k): v for k, v in enumerate(values.T)}
+        made, _ = convert(pd.DataFrame(table), mapping, "own.csv")
+        np.testing.assert_allclose(made["rotor_speed_1_rad_s"], 900 + 100 * SHARES[:, 0])
+
+
+def test_slow_turns_are_asked_although_the_names_say_rpm() -> None:
+    assert throttles_of("rpm_{}", 1000 * SHARES).mapping.channels["rotor_speed"].unit == "?"
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("throttle: {columns: [m], range: [2000, 1000]}", r"range \[2000, 1000\], expected no throttle below"),
+        ("rotor_speed: {columns: [m], unit: erpm}", "needs poles"),
+        ("rotor_speed: {columns: [m], unit: 100erpm, poles: 0}", "needs poles"),
+        ("height: {columns: [m], scale: 0}", "scale 0"),
+        ("position: {columns: [m, m, m], unit: m, world: '?'}", "position.world"),
+        ("height: {columns: [m], scale: '?'}", "height.scale"),
+        ("rotor_speed: {columns: [m], unit: erpm, poles: '?'}", "rotor_speed.poles"),
+        ("throttle: {columns: [m], unit: raw, range: '?'}", "throttle.range"),
+    ],
+)
+def test_what_a_mapping_lacks_is_named(line: str, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "mapping.yaml"
+    path.write_text(f"channels:\n  time: {{columns: [t], unit: s}}\n  {line}\n")
+    with pytest.raises(InputError, match=said):
+        read_mapping(path)
+
+
+# Axes, orders and units that differ between channels -----------------------------------------------
+
+
+def in_axes(
+    flown: pd.DataFrame, body: str = "frd", world: str = "ned", travel: str = "", place: str = ""
+) -> pd.DataFrame:
+    """The flight in plain names, sensors and attitude in `body` and `world`, velocity and position in other axes."""
+    table = plain(flown)
+    turn = Rotation.from_quat(flown[list(c.QUATERNION)].to_numpy()[:, [1, 2, 3, 0]])
+    own = Rotation.from_matrix(WORLD[world]).inv() * turn * Rotation.from_matrix(BODY[body])
+    table[["qw", "qx", "qy", "qz"]] = own.as_quat()[:, [3, 0, 1, 2]]
+    for short, names in (("gyro_", c.ANGULAR_VELOCITY), ("acc_", c.SPECIFIC_FORCE)):
+        table[[f"{short}{a}" for a in "xyz"]] = flown[list(names)].to_numpy() @ BODY[body]
+    table[["vx", "vy", "vz"]] = flown[list(c.VELOCITY)].to_numpy() @ TRAVEL[travel or world]
+    table[["pos_x", "pos_y", "pos_z"]] = flown[list(c.POSITION)].to_numpy() @ TRAVEL[place or travel or world]
+    return table
+
+
+def check_converted(flown: pd.DataFrame, table: pd.DataFrame, mapping, north: bool = True) -> None:
+    """The mapping brings a table back to the flight; where nothing shows north, up to a turn about the vertical."""
+    made, _ = convert(table, mapping, "own.csv")
+    for names in (c.ANGULAR_VELOCITY, c.SPECIFIC_FORCE):
+        np.testing.assert_allclose(made[list(names)], flown[list(names)], atol=1e-5)
+    for names in (c.VELOCITY, c.POSITION):
+        found, true = made[list(names)].to_numpy(), flown[list(names)].to_numpy()
+        np.testing.assert_allclose(found[:, 2], true[:, 2], atol=1e-5)
+        np.testing.assert_allclose(np.linalg.norm(found, axis=1), np.linalg.norm(true, axis=1), atol=1e-5)
+        if north:
+            np.testing.assert_allclose(found, true, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("body", "world"), [("frd", "ned"), ("flu", "enu"), ("fur", "nue"), ("flu", "nue"), ("frd", "enu")]
+)
+@pytest.mark.parametrize("travel", ["ned", "enu", "nwu", "nue", "neu"])
+@pytest.mark.parametrize("place", ["", "neu", "ned"])
+def test_velocity_and_position_in_other_axes_than_the_attitude(
+    flown: pd.DataFrame, body: str, world: str, travel: str, place: str
+) -> None:
+    table = in_axes(flown, body, world, travel, place)
+    found = guess(table)
+    assert found.mapping.body == body and not found.open, (found.open, found.evidence)
+    assert found.mapping.world == world or {found.mapping.world, world} == {"enu", "nwu"}
+    check_converted(flown, table, found.mapping, north=found.mapping.world == world)
+
+
+def test_y_up_is_never_taken_for_z_up(flown: pd.DataFrame) -> None:
+    """As motion captures write it: attitude and position alone, nothing else in the table."""
+    table = in_axes(flown, "fur", "nue")[["t_s", "qw", "qx", "qy", "qz", "pos_x", "pos_y", "pos_z"]]
+    found = guess(table)
+    assert (found.mapping.body, found.mapping.world) in (("fur", "nue"), ("?", "?")), found.evidence
+
+
+def test_a_height_that_only_rises_is_asked_for_its_direction(flown: pd.DataFrame) -> None:
+    table = in_axes(flown)[["t_s", "qw", "qx", "qy", "qz", "acc_x", "acc_y", "acc_z", "pos_x", "pos_y", "pos_z"]]
+    climbed = table.assign(pos_z=np.linspace(0, 5, len(table)))
+    assert guess(climbed).mapping.channels["position"].world == "?"
+    assert guess(climbed.assign(pos_z=-climbed["pos_z"])).mapping.channels["position"].world is None
+
+
+@pytest.mark.parametrize("form", ["euler", "euler_xyz"])
+@pytest.mark.parametrize("unit", ["rad", "deg"])
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_the_order_of_roll_pitch_and_yaw_is_decided_by_the_gyroscope(
+    flown: pd.DataFrame, form: str, unit: str, noise: float
+) -> None:
+    table = plain(flown)
+    turn = Rotation.from_quat(table[["qx", "qy", "qz", "qw"]].to_numpy()) * Rotation.from_euler("z", 0.7)
+    angles = turn.as_euler("ZYX")[:, ::-1] if form == "euler" else turn.as_euler("XYZ")
+    back = Rotation.from_euler("z", -0.7).as_matrix()
+    rates = table[["gyro_x", "gyro_y", "gyro_z"]].to_numpy() @ back.T
+    rates = rates + noise * np.random.default_rng(0).standard_normal(rates.shape)
+    force = table[["acc_x", "acc_y", "acc_z"]].to_numpy() @ back.T
+    table = table.drop(columns=["qw", "qx", "qy", "qz"]).assign(
+        **dict(zip(("roll", "pitch", "yaw"), np.unwrap(angles, axis=0).T / UNITS["angle"][unit], strict=True)),
+        **dict(zip(("gyro_x", "gyro_y", "gyro_z"), rates.T, strict=True)),
+        **dict(zip(("acc_x", "acc_y", "acc_z"), force.T, strict=True)),
+    )
+    found = guess(table)
+    channel = found.mapping.channels["attitude"]
+    assert (channel.form, channel.unit) == (form, unit), (found.evidence, found.open)
+    made, _ = convert(table, found.mapping, "own.csv")
+    read = Rotation.from_quat(made[list(c.QUATERNION)].to_numpy()[:, [1, 2, 3, 0]])
+    assert (read.inv() * turn).magnitude().max() < 1e-6
+
+
+def test_an_order_that_nothing_shows_is_asked_where_it_matters(flown: pd.DataFrame) -> None:
+    angles = 0.4 * np.sin(np.outer(flown[c.TIME], [1.0, 1.3, 0.7]))
+    table = flown[[c.TIME]].rename(columns={c.TIME: "t_s"})
+    table[["roll_deg", "pitch_deg", "yaw_deg"]] = np.degrees(angles)
+    assert guess(table).mapping.channels["attitude"].form == "?"
+    table[["roll_deg", "pitch_deg", "yaw_deg"]] *= 0.05
+    assert guess(table).mapping.channels["attitude"].form == "euler"
+
+
+@pytest.mark.parametrize(
+    ("factor", "unit"), [(1.0, "rad/s"), (np.pi / 180, "deg/s"), (1e-3, "mrad/s"), (0.00106526, "?"), (0.1, "?")]
+)
+def test_the_unit_of_a_gyroscope_follows_from_the_attitude(flown: pd.DataFrame, factor: float, unit: str) -> None:
+    """Counts of a sensor have no unit: the question says the scale that the attitude asks for."""
+    table = plain(flown)
+    table[["gyro_x", "gyro_y", "gyro_z"]] /= factor
+    found = guess(table)
+    channel = found.mapping.channels["angular_velocity"]
+    assert channel.unit == unit
+    if unit == "?":
+        scale = float(found.open["angular_velocity"].split("scale: ")[1].rstrip(")"))
+        assert scale == pytest.approx(factor, rel=0.01)
+
+
+@pytest.mark.parametrize("factor", [np.pi / 180, 1e-3, 0.00106526])
+def test_a_gyroscope_without_an_attitude_is_asked_for_its_unit(flown: pd.DataFrame, factor: float) -> None:
+    table = plain(flown).drop(columns=["qw", "qx", "qy", "qz"])
+    table[["gyro_x", "gyro_y", "gyro_z"]] /= factor / 5
+    found = guess(table)
+    assert found.mapping.channels["angular_velocity"].unit == "?" and "counts" in found.open["angular_velocity"]
+    named = table.rename(columns={f"gyro_{a}": f"gyro_{a}_mrad_s" for a in "xyz"})
+    assert guess(named).mapping.channels["angular_velocity"].unit == "mrad/s"
+
+
+@pytest.mark.parametrize("counts", [512, 2048, 8192, 16384])
+def test_an_accelerometer_in_counts_is_asked_for_its_scale(flown: pd.DataFrame, counts: int) -> None:
+    table = plain(flown)
+    table[["acc_x", "acc_y", "acc_z"]] *= counts / 9.80665
+    found = guess(table)
+    assert found.mapping.channels["specific_force"].unit == "?"
+    assert f"1/{counts}" in found.open["specific_force"]
+    answered = found.mapping.channels["specific_force"].model_copy(update={"unit": "g", "scale": 1 / counts})
+    channels = {"time": found.mapping.channels["time"], "specific_force": answered}
+    made, _ = convert(table, found.mapping.model_copy(update={"channels": channels, "world": "ned", "keep": ()}), "own")
+    np.testing.assert_allclose(made[list(c.SPECIFIC_FORCE)], flown[list(c.SPECIFIC_FORCE)], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("message", "force", "rate"),
+    [("RAW_IMU", "mg", "mrad/s"), ("SCALED_IMU2", "mg", "mrad/s"), ("HIGHRES_IMU", "m/s2", "rad/s")],
+)
+@pytest.mark.parametrize("attitude", [True, False])
+def test_the_names_of_mavlink(flown: pd.DataFrame, message: str, force: str, rate: str, attitude: bool) -> None:
+    table = plain(flown)
+    own = {f"{message}.{a}acc": table[f"acc_{a}"] / UNITS["acceleration"][force] for a in "xyz"}
+    own |= {f"{message}.{a}gyro": table[f"gyro_{a}"] / UNITS["rate"][rate] for a in "xyz"}
+    own |= {f"{message}.{a}mag": 0.0 for a in "xyz"}
+    own |= {
+        f"SERVO_OUTPUT_RAW.servo{k}_raw": np.where(k < 5, 1500 + 100 * np.sin(k * table["t_s"]), 0)
+        for k in range(1, 17)
+    }
+    kept = ["t_s", *(["qw", "qx", "qy", "qz"] if attitude else [])]
+    found = guess(table[kept].assign(**own))
+    channels = found.mapping.channels
+    assert channels["specific_force"].unit == force and channels["angular_velocity"].unit == rate, found.open
+    assert channels["angular_velocity"].columns == tuple(f"{message}.{a}gyro" for a in "xyz")
+    assert channels["throttle"].columns == tuple(f"SERVO_OUTPUT_RAW.servo{k}_raw" for k in range(1, 5))
+    assert channels["throttle"].range == (1000.0, 2000.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "unit"),
+    [
+        ("battery_current_mA", 15000.0, "mA"), ("battery_current_A", 15.0, "A"), ("current", 15.0, "A"),
+        ("current", 1500.0, "?"), ("battery_current_cA", 1500.0, "cA"), ("current [mA]", 1500.0, "mA"),
+        ("battery_current_mA", 0.02, "?"), ("battery_voltage", 16.0, "V"), ("battery_voltage_cV", 1600.0, "cV"),
+        ("battery_voltage_mV", 16000.0, "mV"), ("vbat", 16000.0, "mV"), ("vbat", 168.0, "dV"), ("vbat", 1680.0, "cV"),
+        ("vbat", 380.0, "?"), ("battery_voltage_mV", 16.0, "?"), ("Voltage (V)", 16.0, "V"),
+        ("temperature_K", 300.0, "K"), ("temperature", 300.0, "K"), ("temperature_c", 35.0, "degC"),
+        ("temperature", 35.0, "degC"), ("temperature", 95.0, "?"), ("temp_degF", 95.0, "degF"),
+        ("Temperature (°F)", 95.0, "degF"),
+    ],
+)  # fmt: skip
+def test_units_of_battery_and_temperature_by_name_and_size(name: str, value: float, unit: str) -> None:
+    table = pd.DataFrame({"t_s": 0.01 * np.arange(200), name: value * (1 + 0.01 * np.sin(np.arange(200)))})
+    found = guess(table)
+    (channel,) = (v for k, v in found.mapping.channels.items() if k != "time")
+    assert channel.unit == unit, (found.evidence, found.open)
+    assert bool(found.open) == (unit == "?")
+
+
+def test_messages_that_have_a_row_each_are_joined(flown: pd.DataFrame) -> None:
+    """As `mavlogdump.py --format csv` writes a telemetry log: rows of one instant, each with its own cells."""
+    sensors = [f"{kind}_{a}" for kind in ("gyro", "acc") for a in "xyz"]
+    groups = (["qw", "qx", "qy", "qz"], sensors, ["vx", "vy", "vz"])
+    table = in_axes(flown)[["t_s", *(n for g in groups for n in g)]]
+    rows = pd.concat([table[["t_s", *g]] for g in groups]).sort_values("t_s", kind="stable").reset_index(drop=True)
+    found = guess(rows[list(table)])
+    whole = guess(table)
+    assert found.mapping == whole.mapping
+    mapping = whole.mapping.model_copy(update={"body": "frd", "world": "ned"})
+    made, faults = convert(rows, mapping, "own.csv")
+    pd.testing.assert_frame_equal(made, convert(table, mapping, "own.csv")[0])
+    assert not any("clock" in f.sentence for f in faults)
+
+
+def test_rows_of_one_instant_that_hold_the_same_cells_are_no_messages() -> None:
+    table = pd.DataFrame({"t": [0.0, 0.0, 1.0, 1.0, 2.0], "a": [1.0, 2.0, 3.0, np.nan, 5.0], "b": [1, 1, np.nan, 4, 5]})
+    joined = join_rows(table, "t")
+    assert joined["t"].tolist() == [0.0, 0.0, 1.0, 2.0] and joined["a"].tolist() == [1.0, 2.0, 3.0, 5.0]
+    assert joined["b"].tolist() == [1, 1, 4, 5]
+
+
+def test_the_body_rates_of_mavlinks_attitude(flown: pd.DataFrame) -> None:
+    names = {f"gyro_{a}": f"ATTITUDE.{n}speed" for a, n in zip("xyz", ("roll", "pitch", "yaw"), strict=True)}
+    found = guess(plain(flown).drop(columns=["qw", "qx", "qy", "qz"]).rename(columns=names))
+    assert found.mapping.channels["angular_velocity"].columns == tuple(names.values())
+    assert found.mapping.channels["angular_velocity"].unit == "rad/s"
+
+
+def test_a_telemetry_log_points_to_its_converter(tmp_path: Path) -> None:
+    path = tmp_path / "flight.tlog"
+    path.write_bytes((1_700_000_000_000_000).to_bytes(8, "big") + b"\xfd\x09" + bytes(40))
+    done = CliRunner().invoke(app, ["import", str(path), "-o", str(tmp_path / "set")])
+    assert done.exit_code == 1 and "mavlogdump.py --format csv" in done.output and "flight.tlog" in done.output
+
+
+def test_columns_that_hold_nothing_are_no_channels() -> None:
+    """A telemetry log names every message that it could have: columns without a cell raise nothing and mean nothing."""
+    names = [f"RAW_IMU.{a}{kind}" for kind in ("acc", "gyro") for a in "xyz"] + [
+        "thrust",
+        "torque",
+        "rpm",
+        "roll",
+        "pitch",
+    ]
+    names += ["yaw", *(f"servo{k}_raw" for k in range(1, 5)), *(f"eRPM[{k}]" for k in range(4))]
+    empty = pd.DataFrame({"t_s": 0.01 * np.arange(100)} | {n: np.nan for n in names})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert set(guess(empty).mapping.channels) == {"time"}

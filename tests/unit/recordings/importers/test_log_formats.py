@@ -118,7 +118,6 @@ def blackbox(truth: pd.DataFrame, firmware: str = "Betaflight 4.4.2 (abc) STM32F
 
 
 def test_betaflight(tmp_path: Path) -> None:
-    pytest.importorskip("orangebox")
     path, truth = tmp_path / "LOG00001.BFL", flown()
     path.write_bytes(blackbox(truth))
     found = read_log(path)
@@ -134,7 +133,6 @@ def test_betaflight(tmp_path: Path) -> None:
 
 
 def test_blackbox_of_another_firmware_is_refused(tmp_path: Path) -> None:
-    pytest.importorskip("orangebox")
     path = tmp_path / "LOG.TXT"
     path.write_bytes(blackbox(flown(), "INAV 6.1.1 (abc) MATEKF405"))
     with pytest.raises(InputError, match="blackbox log of INAV"):
@@ -383,10 +381,11 @@ def test_a_file_that_is_cut_off_or_broken_gets_one_sentence(tmp_path: Path, head
 def test_a_missing_package_is_named_with_how_to_get_it(tmp_path: Path, monkeypatch) -> None:
     import sys
 
-    path = tmp_path / "log.bbl"
-    path.write_bytes(blackbox(flown()))
-    monkeypatch.setitem(sys.modules, "orangebox", None)
-    with pytest.raises(InputError, match=r"pip install 'rotorid\[betaflight\]'"):
+    path = tmp_path / "log.bin"
+    path.write_bytes(dataflash(flown(), PARAMETERS))
+    for module in [m for m in sys.modules if m.split(".")[0] == "pymavlink"] + ["pymavlink"]:
+        monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(InputError, match=r"pip install 'rotorid\[ardupilot\]'"):
         read_log(path)
 
 
@@ -396,7 +395,6 @@ def test_a_folder_is_a_bag_only_with_its_metadata(tmp_path: Path) -> None:
 
 
 def test_a_betaflight_log_becomes_a_set_with_betaflights_order_of_rotors(tmp_path: Path) -> None:
-    pytest.importorskip("orangebox")
     from rotorid.recordings import read_set
 
     path = tmp_path / "LOG00001.BFL"

@@ -16,7 +16,7 @@ from rotorid.recordings.importers.logfile import read_log
 from rotorid.recordings.importers.mapping import UNITS, Mapping
 from rotorid.recordings.importers.propose import propose
 from rotorid.recordings.importers.set_of_logs import set_of_logs
-from rotorid.recordings.importers.speed_unit import carrying_unit, in_unit_of_weight
+from rotorid.recordings.importers.speed_unit import carrying_unit, in_unit_of_weight, usual_coefficient
 from tests.public_logs import PUBLIC
 
 SPEEDS = list(c.rotor_columns("rotor_speed", 4))
@@ -111,3 +111,14 @@ def test_a_geometry_of_one_metre_is_directions_alone() -> None:
     assert any("±1 m is unset" in remark for remark in proposal.remarks)
     real, _ = known.px4_vehicle(parameters | {"CA_ROTOR0_PX": 0.9}, 4)
     assert real.rotors is not None and real.directions is None
+
+
+def test_speeds_that_no_unit_explains_are_named_and_kept() -> None:
+    """Electrical turns taken for turns: seven times too many."""
+    time_s = np.arange(0, 10, 0.01)
+    speed = 7 * np.sqrt(0.65 * 9.81 / 4 / usual_coefficient(0.65, 4))
+    names = c.rotor_columns("rotor_speed", 4)
+    table = pd.DataFrame({c.TIME: time_s, c.SPECIFIC_FORCE[2]: -9.81} | {n: speed + np.sin(time_s) for n in names})
+    runs, faults = in_unit_of_weight({"a": table}, {"a": "rpm"}, 0.65, 4)
+    assert runs["a"].equals(table)
+    assert "7 times the speed that carries" in faults[0].sentence and "electrical turns" in faults[0].sentence

@@ -13,22 +13,20 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation
 
 STEP_S = 0.2
-AXIS_SHARE = 0.05
-"""Share of the energy of the changes that an axis needs to say anything of its sign."""
 
 
 @dataclass(frozen=True)
 class Agreement:
     """How the changes of a quantity (n, 3) follow those of a candidate (n, 3) that should integrate to it.
 
-    `correlation` about zero over all axes together, `slope` quantity per candidate, `signs` of each axis (0: no
-    motion), and `size`, the 95 % quantile of the changes of the quantity.
+    `correlation` about zero over all axes together, `slope` quantity per candidate, `size`, the 95 % quantile of
+    the changes of the quantity, and `by_axis`, the correlation of each axis alone.
     """
 
     correlation: float = 0.0
     slope: float = 0.0
-    signs: tuple[int, int, int] = (0, 0, 0)
     size: float = 0.0
+    by_axis: tuple[float, ...] = (0.0,)
 
     @property
     def in_words(self) -> str:
@@ -47,8 +45,8 @@ def compare(quantity: np.ndarray, candidate: np.ndarray) -> Agreement:
         return Agreement()
     correlation = float(ab.sum() / np.sqrt(aa.sum() * bb.sum()))
     size = float(np.quantile(np.linalg.norm(a, axis=1), 0.95))
-    signs = tuple(int(np.sign(s)) if p > AXIS_SHARE * aa.sum() else 0 for s, p in zip(ab, aa, strict=True))
-    return Agreement(correlation, float(ab.sum() / bb.sum()), signs, size)
+    by_axis = tuple(float(c / np.sqrt(p * q)) if p * q > 0 else 0.0 for c, p, q in zip(ab, aa, bb, strict=True))
+    return Agreement(correlation, float(ab.sum() / bb.sum()), size, by_axis)
 
 
 def steps_of(time_s: np.ndarray) -> np.ndarray:

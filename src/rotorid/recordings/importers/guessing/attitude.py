@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from rotorid.recordings.importers.guessing import agreement as by
 from rotorid.recordings.importers.guessing import names as named
@@ -24,7 +24,11 @@ from rotorid.recordings.importers.guessing.draft import (
     unit_by_factor,
 )
 from rotorid.recordings.importers.guessing.names import Family
-from rotorid.recordings.importers.mapping import OPEN, UNITS
+from rotorid.recordings.importers.mapping import EULER, OPEN, from_angles
+from rotorid.recordings.importers.units import UNITS
+
+SAME_ORDER_RAD = np.radians(2.0)
+"""Where the two orders of roll, pitch and yaw are no farther apart, the usual one is taken without a question."""
 
 
 @dataclass(frozen=True)
@@ -59,19 +63,17 @@ def _attitudes(draft: Draft) -> tuple[list[_Turn], str]:
         inverse = [_Turn(t.columns, t.form, t.wxyz * [1, -1, -1, -1], inverse=True) for t in turns]
         return turns + inverse, f"{how}, of length {np.nanmedian(lengths[chosen]):.4g}"
     found = named.angles(free)
-    if found is None:
+    if found is None or not np.isfinite(values := draft.values(found[0])).all(axis=1).any():
         return [], ""
     columns, stated = found
-    values = draft.values(columns)
     units = [stated] if stated in UNITS["angle"] else ["deg"] if np.nanmax(np.abs(values)) > 7 else ["rad", "deg"]
     turns = []
-    for unit_ in units:
+    known = np.isfinite(values).all(axis=1)
+    for unit_, form in product(units, EULER):
         wxyz = np.full((len(values), 4), np.nan)
-        known = np.isfinite(values).all(axis=1)
-        angles = values[known] * UNITS["angle"][unit_]
         if known.any():
-            wxyz[known] = Rotation.from_euler("ZYX", angles[:, ::-1]).as_quat()[:, [3, 0, 1, 2]]
-        turns.append(_Turn(columns, "euler", wxyz, unit_))
+            wxyz[known] = from_angles(values[known] * UNITS["angle"][unit_], form).as_quat()[:, [3, 0, 1, 2]]
+        turns.append(_Turn(columns, form, wxyz, unit_))
     return turns, "roll, pitch, yaw by their names"
 
 
@@ -112,7 +114,11 @@ def _confirmed(draft: Draft, turns: list[_Turn], found: dict, best: tuple[int, F
     unit = unit_by_factor("rate", agreed.slope)
     question = ""
     if unit is None:
-        unit, question = OPEN, f"its integral is {1 / agreed.slope:.3g} times the attitude's change, which fits no unit"
+        unit = OPEN
+        question = (
+            f"its integral is {1 / agreed.slope:.3g} times the attitude's change, which fits no unit (if these are "
+            f"counts: unit: rad/s, scale: {agreed.slope:.4g})"
+        )
     elif family.unit and family.unit != unit:
         question, unit = f"its names say {family.unit}, the attitude {unit}", OPEN
     how = "by their names" if by_name else "no name says it"
@@ -129,6 +135,10 @@ def _confirmed(draft: Draft, turns: list[_Turn], found: dict, best: tuple[int, F
     question, form = "", turn.form
     if turn.inverse:
         question, form = "it turns the world into the body: change the signs of x, y, z (or that of w)", OPEN
+    elif not is_clear(agreed, runner_up) and form in EULER:
+        apart = _apart(turns, turn.unit)
+        form, question = ("euler", "") if apart < SAME_ORDER_RAD else (OPEN, _which_order(apart))
+        why += f", {np.degrees(apart):.2g}° apart at most in the two orders"
     elif not is_clear(agreed, runner_up):
         question, form = f"the gyroscope hardly decides the order ({runner_up.correlation:.2f} for the other)", OPEN
     draft.put(
@@ -141,7 +151,22 @@ def _confirmed(draft: Draft, turns: list[_Turn], found: dict, best: tuple[int, F
         **more,
     )
     if form != OPEN:
-        draft.wxyz = signed_continuous(turn.wxyz)
+        draft.wxyz = signed_continuous(next(t for t in turns if (t.form, t.unit) == (form, turn.unit)).wxyz)
+
+
+def _apart(turns: list[_Turn], unit: str) -> float:
+    """How far the readings of roll, pitch and yaw in the two orders are apart in nearly all of a table, rad."""
+    first, second = (by.rotations(t.wxyz) for t in turns if t.unit == unit)
+    if first is None or second is None:
+        return 0.0
+    return float(np.quantile((first[0].inv() * second[0]).magnitude(), 0.95))
+
+
+def _which_order(apart: float) -> str:
+    return (
+        "euler (yaw, then pitch, then roll: z-y'-x'') or euler_xyz (roll first: x-y'-z'', usual in motion captures)? "
+        f"The two are {np.degrees(apart):.2g}° apart here, and no gyroscope shows which"
+    )
 
 
 def _mirrored(draft: Draft, turns: list[_Turn], family: Family) -> str:
@@ -167,10 +192,9 @@ def _rates_alone(draft: Draft, family: Family, seen: str, mirrored: str) -> None
         draft.put("angular_velocity", family.columns, evidence, mirrored or seen, unit=OPEN)
     elif family.unit in UNITS["rate"]:
         draft.put("angular_velocity", family.columns, evidence, unit=family.unit)
-    elif top > FASTEST_GYRO_RAD_S:
-        draft.put("angular_velocity", family.columns, evidence + ", too fast for rad/s", unit="deg/s")
     else:
-        question = "rad/s or deg/s: neither the names nor an attitude show which"
+        which = "deg/s, mrad/s or counts (then with a scale)" if top > FASTEST_GYRO_RAD_S else "rad/s or deg/s"
+        question = f"{which}: neither the names nor an attitude show which"
         draft.put("angular_velocity", family.columns, evidence, question, unit=OPEN)
 
 
@@ -179,10 +203,12 @@ def _attitude_alone(draft: Draft, turns: list[_Turn], why: str) -> None:
     level = []
     for turn in turns:
         norm = np.linalg.norm(turn.wxyz, axis=1)
-        upright = 1 - 2 * (turn.wxyz[:, 1] ** 2 + turn.wxyz[:, 2] ** 2) / norm**2
+        with np.errstate(invalid="ignore", divide="ignore"):
+            upright = 1 - 2 * (turn.wxyz[:, 1] ** 2 + turn.wxyz[:, 2] ** 2) / norm**2
         level.append(float(np.nanmedian(np.abs(upright))) if np.isfinite(upright).any() else 0.0)
     straight = [k for k, t in enumerate(turns) if not t.inverse]
-    first = turns[straight[0]]
+    straight_turns = [turns[k] for k in straight]
+    first = straight_turns[0]
     if len({(t.form, t.unit) for t in turns if not t.inverse}) == 1:
         more = {"unit": first.unit} if first.unit else {}
         draft.put("attitude", first.columns, why, form=first.form, **more)
@@ -191,12 +217,19 @@ def _attitude_alone(draft: Draft, turns: list[_Turn], why: str) -> None:
     ranked = sorted(straight, key=lambda k: -level[k])
     said = ", ".join(f"{turns[k].form or turns[k].unit} {level[k]:.2f}" for k in straight)
     chosen = turns[ranked[0]]
-    if first.form != "euler" and level[ranked[0]] > 0.95 and level[ranked[1]] < 0.8:
+    if first.form not in EULER and level[ranked[0]] > 0.95 and level[ranked[1]] < 0.8:
         evidence = f"{why}; level most of the time in this order (cosine of the tilt: {said})"
         draft.put("attitude", chosen.columns, evidence, form=chosen.form)
         draft.wxyz = signed_continuous(chosen.wxyz)
-    elif first.form == "euler":
-        draft.put("attitude", first.columns, why, "rad or deg: no gyroscope shows which", form="euler", unit=OPEN)
+    elif first.form in EULER:
+        units = list(dict.fromkeys(t.unit for t in straight_turns))
+        unit = units[0] if len(units) == 1 else OPEN
+        apart = max(_apart(straight_turns, u) for u in units)
+        form = "euler" if apart < SAME_ORDER_RAD else OPEN
+        asked = ["rad or deg: no gyroscope shows which"] * (unit == OPEN) + [_which_order(apart)] * (form == OPEN)
+        draft.put("attitude", first.columns, why, "; ".join(asked), form=form, unit=unit)
+        if not asked:
+            draft.wxyz = signed_continuous(first.wxyz)
     else:
         question = f"wxyz or xyzw: no gyroscope shows which (cosine of the tilt: {said})"
         draft.put("attitude", first.columns, why, question, form=OPEN)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
@@ -13,7 +13,8 @@ from rotorid.recordings.importers.guessing import agreement as by
 from rotorid.recordings.importers.guessing import names as named
 from rotorid.recordings.importers.guessing.agreement import Agreement
 from rotorid.recordings.importers.guessing.names import Family
-from rotorid.recordings.importers.mapping import UNITS, Channel
+from rotorid.recordings.importers.mapping import OPEN, Channel
+from rotorid.recordings.importers.units import UNITS
 
 CONFIRMED = 0.8
 """Correlation of changes from which one quantity is what the other integrates to."""
@@ -26,8 +27,14 @@ MOVES = {"angle": 0.02, "velocity": 0.1, "position": 0.05}
 """Changes over a step below which a table says nothing: rad, m/s, m."""
 FACTOR_OFF = 0.15
 """How far a factor may be from that of a unit."""
+FACTOR_OFF_COUNTS = 0.03
+"""The same where counts of usual sensors are near: 16.4 to 1 deg/s are 1.064 thousandths of rad/s each."""
+RATES_BY_NAME = {("p", "q", "r"): "", ("rollspeed", "pitchspeed", "yawspeed"): "rad/s"}
+"""Names of body rates without a word in common, and their unit where it is fixed (MAVLink's `ATTITUDE`)."""
 RATES_HZ = (5.0, 8000.0)
 """Rates at which tables are recorded."""
+THOUSANDTHS = 100.0
+"""Median size of an accelerometer's reading above which it counts thousandths of g."""
 FASTEST_GYRO_RAD_S = 40.0
 G = 9.80665
 
@@ -45,6 +52,8 @@ class Draft:
     wxyz: np.ndarray | None = None
     """Attitude as recorded (n, 4), where its order is known."""
     instants: np.ndarray | None = None
+    world: str = OPEN
+    """Axes that the attitude refers to, where they are known."""
 
     def values(self, columns: Sequence[str]) -> np.ndarray:
         return self.table[list(columns)].to_numpy(float)
@@ -69,11 +78,26 @@ class Draft:
 def triples_of(draft: Draft) -> list[Family]:
     free = draft.free()
     found = [f for axes in named.AXES for f in named.families(free, axes)]
-    rates = [n for n in ("p", "q", "r") if n in {str(x).lower() for x in free}]
-    if len(rates) == 3:
-        columns = tuple(next(x for x in free if str(x).lower() == n) for n in rates)
-        found.append(Family("omega", columns, "xyz", "", frozenset(("omega",))))
+    last = {(named.words_of(n) or [""])[-1]: n for n in free}
+    for names, unit in RATES_BY_NAME.items():
+        if set(names) <= set(last):
+            found.append(Family("omega", tuple(last[n] for n in names), "xyz", unit, frozenset(("omega",))))
+    found += _with_units(draft, named.of_mavlink(free))
     return [f for f in found if np.isfinite(draft.values(f.columns)).all(axis=1).sum() > 1]
+
+
+def _with_units(draft: Draft, families: list[Family]) -> list[Family]:
+    """MAVLink's sensors: m/s² and rad/s in HIGHRES_IMU; thousandths of g and rad/s in the messages of raw integers."""
+    message = {f.words - {f.stem}: f for f in named.of_mavlink(draft.table.columns) if f.stem == "acc"}
+    out = []
+    for family in families:
+        if (force := message.get(family.words - {family.stem})) is not None:
+            sizes = np.linalg.norm(draft.values(force.columns), axis=1)
+            raw = bool(np.isfinite(sizes).any()) and float(np.nanmedian(sizes)) > THOUSANDTHS
+            units = {"acc": ("m/s2", "mg"), "gyro": ("rad/s", "mrad/s")}[family.stem]
+            family = replace(family, unit=units[raw])
+        out.append(family)
+    return out
 
 
 def signed_continuous(wxyz: np.ndarray) -> np.ndarray:
@@ -91,7 +115,8 @@ def is_clear(agreed: Agreement, other: Agreement) -> bool:
 
 def unit_by_factor(kind: str, slope: float) -> str | None:
     """The unit whose factor a slope is within `FACTOR_OFF` of; None where there is none."""
-    return next((u for u, f in UNITS[kind].items() if abs(slope / f - 1) < FACTOR_OFF), None)
+    off = {"mrad/s": FACTOR_OFF_COUNTS}
+    return next((u for u, f in UNITS[kind].items() if abs(slope / f - 1) < off.get(u, FACTOR_OFF)), None)
 
 
 def in_words(agreed: Agreement, kind: str, what: str) -> str:

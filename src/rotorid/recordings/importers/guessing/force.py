@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 
 from rotorid.recordings.importers.guessing import agreement as by
@@ -13,7 +15,8 @@ from rotorid.recordings.importers.guessing.draft import (
     triples_of,
 )
 from rotorid.recordings.importers.guessing.names import Family
-from rotorid.recordings.importers.mapping import OPEN, UNITS
+from rotorid.recordings.importers.mapping import OPEN
+from rotorid.recordings.importers.units import UNITS
 
 
 def guess_specific_force(draft: Draft) -> None:
@@ -31,7 +34,9 @@ def guess_specific_force(draft: Draft) -> None:
         family, read = offered[0], norms[offered[0]]
         evidence = f"by their names; the median of its norm is {read:.4g}"
         question = f"a median of {read:.4g} is 1 g in no unit" + (
-            ": is gravity removed? Then it is no accelerometer's reading; remove the channel" if read < 3 else ""
+            ": is gravity removed? Then it is no accelerometer's reading; remove the channel"
+            if read < 3
+            else f"; if these are counts: unit: g, scale: what one count is (about {1 / read:.4g}, or 1/{_power(read)})"
         )
         draft.put("specific_force", family.columns, evidence, question, unit=OPEN)
     else:
@@ -52,6 +57,11 @@ def _force_unit(family: Family, norm: float) -> str:
     return unit if stated in ("", unit) else ""
 
 
+def _power(counts: float) -> int:
+    """The power of two next to a number, as sensors have counts to 1 g."""
+    return 2 ** round(float(np.log2(counts)))
+
+
 def _upright(draft: Draft, family: Family) -> bool:
     values = draft.values(family.columns)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -67,26 +77,33 @@ def guess_frames(draft: Draft) -> tuple[str, str]:
     values = draft.values(force.columns)
     size = np.linalg.norm(values, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
-        share = float(np.nanmedian(values[:, 2] / size))
-    body = "frd" if share < -0.8 else "flu" if share > 0.8 else OPEN
-    draft.evidence["body"] = f"the accelerometer's z reads {share:+.2f} of its norm in the median"
+        _, y, z = np.nanmedian(values / size[:, None], axis=0)
+    body = "frd" if z < -0.8 else "flu" if z > 0.8 else "fur" if y > 0.8 else OPEN
+    axis, share = ("y", y) if body == "fur" else ("z", z)
+    draft.evidence["body"] = f"the accelerometer's {axis} reads {share:+.2f} of its norm in the median"
     if body == OPEN:
-        draft.open["body"] = "frd reads -1, flu +1 in level flight"
+        draft.open["body"] = "frd reads -1 along z, flu +1, fur +1 along y in level flight"
     if draft.wxyz is None or draft.time_s is None:
         draft.open["world"] = "ned, enu or nwu: without an attitude of known order nothing shows which way z points"
         return body, OPEN
     turned = by.into_world(draft.time_s, draft.wxyz, values)
-    up = float(np.nanmedian(turned[:, 2] / np.linalg.norm(turned, axis=1)))
+    up = np.nanmedian(turned / np.linalg.norm(turned, axis=1, keepdims=True), axis=0)
     return body, _world(draft, up, "the accelerometer turned by the attitude")
 
 
-def _world(draft: Draft, up: float, what: str) -> str:
-    """World axes by the share of the upward direction along the world's z."""
-    draft.evidence["world"] = f"{what} points to {up:+.2f} along the world's z in the median"
-    if abs(up) < 0.8:
-        draft.open["world"] = "up should be -1 (ned) or +1 (enu, nwu): does the attitude turn the body into the world?"
+def _world(draft: Draft, up: np.ndarray, what: str) -> str:
+    """World axes by the upward direction (3,) along them."""
+    axis = "y" if up[1] > 0.8 else "z"
+    draft.evidence["world"] = f"{what} points to {up['xyz'.index(axis)]:+.2f} along the world's {axis} in the median"
+    if axis == "y":
+        return "nue"
+    if abs(up[2]) < 0.8:
+        draft.open["world"] = (
+            "up should be -1 (ned) or +1 (enu, nwu) along z, or +1 along y (nue): does the attitude turn the body into "
+            "the world?"
+        )
         return OPEN
-    if up < 0:
+    if up[2] < 0:
         return "ned"
     draft.evidence["world"] += ", so z is up; nwu is the same but for what is called north, which no verdict rests on"
     return "enu"
@@ -96,33 +113,38 @@ def _frames_without_accelerometer(draft: Draft) -> tuple[str, str]:
     """Frames by where a vehicle that tilts is accelerated to: its thrust is along -z (FRD) or +z (FLU)."""
     speeds = [f for f in triples_of(draft) if named.is_named(f, "velocity")]
     places = [f for f in triples_of(draft) if named.is_named(f, "position")]
-    question = "frd or flu: neither an accelerometer nor velocity and attitude show which"
     if draft.wxyz is not None and draft.instants is not None and (speeds or places):
-        axis = np.tile([0.0, 0.0, 1.0], (len(draft.time_s), 1))
-        z = by.into_world(draft.time_s, draft.wxyz, axis)
-        pull = np.column_stack([z[:, :2] / z[:, [2]], np.zeros(len(z))]) * 9.81
-        gained = draft.integrated(pull)
-        values = draft.values((speeds or places)[0].columns)
-        if speeds:
-            seen = by.compare(draft.changes(values) * [1, 1, 0], gained)
-        else:
-            seen = by.compare(np.diff(draft.changes(values), axis=0) * [1, 1, 0] / by.STEP_S, gained[1:])
-        if abs(seen.correlation) > CONFIRMED:
-            body = "frd" if seen.correlation < 0 else "flu"
-            draft.evidence["body"] = (
-                f"tilt and acceleration agree with thrust along {'-' if body == 'frd' else '+'}z ({seen.in_words})"
-            )
-            up = float(np.nanmedian(z[:, 2])) * (-1 if body == "frd" else 1)
-            return body, _world(draft, up, "the thrust turned by the attitude")
-    draft.open["body"] = question
-    draft.open["world"] = "ned, enu or nwu: nothing shows which way z points"
+        values = draft.changes(draft.values((speeds or places)[0].columns))
+        found = {}
+        for own, upward in product((2, 1), (2, 1)):
+            thrust = by.into_world(draft.time_s, draft.wxyz, np.tile(np.eye(3)[own], (len(draft.time_s), 1)))
+            level = 1 - np.eye(3)[upward]
+            with np.errstate(invalid="ignore", divide="ignore"):
+                gained = draft.integrated(thrust / thrust[:, [upward]] * level * G)
+            if speeds:
+                seen = by.compare(values * level, gained)
+            else:
+                seen = by.compare(np.diff(values, axis=0) * level / by.STEP_S, gained[1:])
+            found[own, upward] = seen, np.nanmedian(thrust, axis=0)
+        (own, upward), (seen, thrust) = max(found.items(), key=lambda item: abs(item[1][0].correlation))
+        if abs(seen.correlation) > CONFIRMED and (own == 2 or seen.correlation > 0):
+            body = "fur" if own == 1 else "frd" if seen.correlation < 0 else "flu"
+            axis = {"frd": "-z", "flu": "+z", "fur": "+y"}[body]
+            draft.evidence["body"] = f"tilt and acceleration agree with thrust along {axis} ({seen.in_words})"
+            return body, _world(draft, -thrust if body == "frd" else thrust, "the thrust turned by the attitude")
+    draft.open["body"] = "frd, flu or fur: neither an accelerometer nor velocity and attitude show which"
+    draft.open["world"] = "ned, enu, nwu or nue: nothing shows which way up is"
     return OPEN, OPEN
 
 
-def world_that_matters(draft: Draft, world: str) -> str:
-    """The world's axes; nothing is asked where no channel stands in the world."""
-    if world == OPEN and not {"attitude", "velocity", "position"} & set(draft.channels):
-        draft.open.pop("world", None)
-        draft.evidence["world"] = "no channel is in world axes: it plays no part"
-        return "ned"
-    return world
+def axes_that_matter(draft: Draft, body: str, world: str) -> tuple[str, str]:
+    """The axes of body and world; nothing is asked where no channel stands in them."""
+    for key, channels, found, usual in (
+        ("body", {"attitude", "angular_velocity", "specific_force", "velocity"}, body, "frd"),
+        ("world", {"attitude", "velocity", "position"}, world, "ned"),
+    ):
+        if found == OPEN and not channels & set(draft.channels):
+            draft.open.pop(key, None)
+            draft.evidence[key] = f"no channel is in {key} axes: it plays no part"
+            body, world = (usual, world) if key == "body" else (body, usual)
+    return body, world

@@ -14,8 +14,8 @@ import pandas as pd
 from rotorid.errors import InputError
 from rotorid.recordings.importers.guessing.attitude import guess_attitude_and_rates
 from rotorid.recordings.importers.guessing.draft import Draft
-from rotorid.recordings.importers.guessing.force import guess_frames, guess_specific_force, world_that_matters
-from rotorid.recordings.importers.guessing.rotors import guess_rotors
+from rotorid.recordings.importers.guessing.force import axes_that_matter, guess_frames, guess_specific_force
+from rotorid.recordings.importers.guessing.rotors import guess_rotors, guess_stand
 from rotorid.recordings.importers.guessing.scalars import guess_scalar, guess_time
 from rotorid.recordings.importers.guessing.travel import guess_height, guess_position, guess_velocity
 from rotorid.recordings.importers.mapping import Mapping
@@ -36,20 +36,25 @@ class Guess:
 
 def guess(table: pd.DataFrame) -> Guess:
     """A mapping proposed for a table of any columns; those with a cell that is no number take no part."""
+    layout = table.attrs.get("layout")
     table, left_out = _of_numbers(table)
+    if layout and layout.above:
+        first = layout.above[0][:150]
+        left_out.insert(0, f"left out: {len(layout.above)} lines above the heading, the first of them: {first}")
     draft = Draft(table)
     guess_time(draft)
     for name in ("battery_voltage", "battery_current", "temperature"):
         guess_scalar(draft, name)
     guess_attitude_and_rates(draft)
     guess_specific_force(draft)
-    body, world = guess_frames(draft)
+    body, draft.world = guess_frames(draft)
     guess_velocity(draft)
     guess_position(draft)
-    world = world_that_matters(draft, world)
+    body, world = axes_that_matter(draft, body, draft.world)
     guess_height(draft)
     for name in ("rotor_command", "rotor_speed", "throttle"):
         guess_rotors(draft, name)
+    guess_stand(draft)
     mapping = Mapping(body=body, world=world, channels=draft.channels, keep=tuple(draft.free()))
     return Guess(mapping, draft.evidence, draft.open, tuple(left_out))
 

@@ -11,10 +11,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 UNIT_WORDS: dict[str, str] = {
+    "m_s_s": "m/s2",
     "m_s2": "m/s2", "m_s_2": "m/s2", "m_s^2": "m/s2", "ms2": "m/s2", "mps2": "m/s2", "mg": "mg", "g": "g",
     "m_s": "m/s", "mps": "m/s", "cm_s": "cm/s", "mm_s": "mm/s",
     "rad_s": "rad/s", "rads": "rad/s", "radps": "rad/s", "deg_s": "deg/s", "dps": "deg/s", "degps": "deg/s",
-    "rad": "rad", "deg": "deg", "m": "m", "cm": "cm", "mm": "mm", "ft": "ft", "rpm": "rpm", "hz": "hz",
+    "mrad_s": "mrad/s", "mrad": "mrad", "cdeg": "cdeg",
+    "rad": "rad", "deg": "deg", "m": "m", "cm": "cm", "mm": "mm", "ft": "ft", "rpm": "rpm", "hz": "hz", "erpm": "erpm",
 }  # fmt: skip
 """Words of a unit at the end of a name to the mapping's unit."""
 QUALIFIERS = frozenset(
@@ -22,6 +24,8 @@ QUALIFIERS = frozenset(
     "lin linear meas measured 0".split()
 )
 """Words at the end of a stem that do not change what it is."""
+AFTER_NUMBERS = frozenset("us usec pwm dshot pct percent raw".split())
+"""Words that may stand behind the number of a rotor (`m1_us`, `servo1_raw`)."""
 IN_BODY = frozenset(("b", "body", "bodyframe", "frd", "flu"))
 SOURCES = frozenset("state estimate est ekf odom odometry vicon mocap imu drone quad uav vehicle px4 mavros".split())
 """Words at the beginning of a stem that say where a value comes from."""
@@ -51,10 +55,10 @@ ROTORS: dict[str, frozenset[str]] = {
     "rotor_speed": frozenset("rpm erpm rotor_speed rotor_speeds motor_speed motor_speeds mot_speed".split()),
     "rotor_command": frozenset("rotor_command rotor_commands".split()),
     "throttle": frozenset(
-        "motor motors throttle throttles pwm m mot output outputs thr control u act actuator actuators".split()
+        "motor motors throttle throttles pwm m mot output outputs thr control u act actuator actuators servo".split()
     ),
 }  # fmt: skip
-QUATERNION = frozenset("q quat quaternion att_q attitude_q orientation".split())
+QUATERNION = frozenset("q quat quaternion att_q attitude_q orientation rotation".split())
 ANGLES = ({"roll", "phi"}, {"pitch", "theta"}, {"yaw", "psi", "heading"})
 SCALARS: dict[str, tuple[str, ...]] = {
     "time": (r"t([ _(\[]*([munµ]?s)[)\]]?)?", r"time(stamp)?([ _(\[].*)?", r"time_.*", r".*timestamp.*"),
@@ -62,7 +66,12 @@ SCALARS: dict[str, tuple[str, ...]] = {
     "battery_current": (r"amperage.*", r"current.*", r"i_?bat.*", r"battery_?current.*"),
     "height": (r"height.*", r"agl.*", r"range.*"),
     "temperature": (r"temp(erature)?.*",),
+    "thrust": (r"thrust([ _(\[,/].*)?", r".*[ _]thrust([ _(\[,/].*)?", r"load( cell)?([ _(\[,/].*)?"),
+    "torque": (r"torque([ _(\[,/].*)?", r".*[ _]torque([ _(\[,/].*)?"),
+    "rotor_speed": (r"(rotor|motor|prop\w*)?[ _]?(speed|rpm)([ _(\[,/].*)?", r".*[ _(\[]rpm.*", r".*rotation.*speed.*"),
+    "throttle": (r"(throttle|esc|pwm|motor command)([ _(\[,/].*)?",),
 }
+MAVLINK = "xyz of MAVLink"
 AXES = ("xyz", "012", "123", "ned", "enu")
 FOURS = ("wxyz", "0123", "1234")
 
@@ -87,7 +96,7 @@ class Family:
 
 def words_of(name: str) -> list[str]:
     """The words of a name in small letters."""
-    parted = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", str(name))
+    parted = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", str(name).replace("eRPM", "erpm"))
     return [w for w in re.split(r"[^a-z0-9^µ]+", parted.lower()) if w]
 
 
@@ -150,11 +159,12 @@ def families(names: Iterable[str], axes: str) -> list[Family]:
 
 
 def numbered(names: Iterable[str]) -> list[Family]:
-    """Families of three to twelve columns numbered in one go from 0 or 1 (`u0` … `u3`, `motor[1]`, `m1_rpm`)."""
+    """Families of three to sixteen columns numbered in one go from 0 or 1 (`u0` … `u3`, `motor[1]`, `m1_rpm`)."""
     found: dict[str, dict[int, tuple[str, str]]] = {}
     for name in names:
-        words, unit = _without_unit(words_of(name))
-        if words and words[-1] in ("us", "pwm") and len(words) > 1 and re.search(r"\d$", words[-2]):
+        words, unit = _without_unit(words_of(name.replace("(/100)", "")))
+        unit = "100erpm" if "(/100)" in name else unit
+        if words and words[-1] in AFTER_NUMBERS and len(words) > 1 and re.search(r"\d$", words[-2]):
             words = words[:-1]
         match = re.fullmatch(r"(.*?)(?:_m)?_?(\d{1,2})", "_".join(words))
         if match:
@@ -163,13 +173,27 @@ def numbered(names: Iterable[str]) -> list[Family]:
     result = []
     for stem, members in found.items():
         count = len(members)
-        if 3 <= count <= 12 and sorted(members) in (list(range(count)), list(range(1, count + 1))):
+        if 3 <= count <= 16 and sorted(members) in (list(range(count)), list(range(1, count + 1))):
             order = sorted(members)
             units = {members[k][1] for k in order}
             columns = tuple(members[k][0] for k in order)
             unit = units.pop() if len(units) == 1 else ""
             result.append(Family(stem, columns, "number", unit, frozenset(stem.split("_"))))
     return result
+
+
+def of_mavlink(names: Iterable[str]) -> list[Family]:
+    """Accelerometers and gyroscopes as MAVLink's messages name them: `RAW_IMU.xacc`, `SCALED_IMU2.ygyro`."""
+    found: dict[tuple[str, ...], dict[str, str]] = {}
+    for name in names:
+        *before, last = words_of(name) or [""]
+        if last[:1] in ("x", "y", "z") and last[1:] in ("acc", "gyro"):
+            found.setdefault((*before, last[1:]), {})[last[0]] = name
+    return [
+        Family(words[-1], tuple(members[a] for a in "xyz"), MAVLINK, "", frozenset(words))
+        for words, members in found.items()
+        if set(members) == set("xyz")
+    ]
 
 
 def _ends_in(stem: str, words: frozenset[str]) -> bool:
@@ -199,7 +223,7 @@ def is_rotor(family: Family, quantity: str) -> bool:
         )
     if family.words & WISHED and quantity == "rotor_speed":
         return False
-    if quantity == "rotor_speed" and family.unit in ("rpm", "rad/s", "hz"):
+    if quantity == "rotor_speed" and family.unit in ("rpm", "rad/s", "hz", "erpm", "100erpm"):
         return _ends_in(stem, ROTORS[quantity] | ROTORS["throttle"])
     return _ends_in("_".join(rest), ROTORS[quantity])
 

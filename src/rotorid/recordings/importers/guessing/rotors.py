@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pandas as pd
 
 from rotorid.recordings.importers.guessing import names as named
 from rotorid.recordings.importers.guessing.draft import (
@@ -11,7 +14,37 @@ from rotorid.recordings.importers.guessing.draft import (
     Draft,
 )
 from rotorid.recordings.importers.guessing.names import Family
-from rotorid.recordings.importers.mapping import OPEN, UNITS
+from rotorid.recordings.importers.mapping import CHANNELS, ELECTRICAL, OPEN
+from rotorid.recordings.importers.units import UNITS, bracketed, stated
+
+RANGES: dict[str, tuple[float, float]] = {
+    "a share": (0.0, 1.0),
+    "-1 to 1": (-1.0, 1.0),
+    "per cent": (0.0, 100.0),
+    "8 bits": (0.0, 255.0),
+    "per mille": (0.0, 1000.0),
+    "10 bits": (0.0, 1023.0),
+    "pulses in µs": (1000.0, 2000.0),
+    "DShot": (48.0, 2047.0),
+    "15 bits": (0.0, 32767.0),
+    "16 bits": (0.0, 65535.0),
+}
+"""Readings of no and of full throttle; a motor that is off may read 0 in each."""
+RANGES_BY_NAME = {
+    "pulses in µs": frozenset("us usec pwm pulse servo rcout".split()),
+    "DShot": frozenset(("dshot",)),
+    "per cent": frozenset("percent pct".split()),
+}
+BETAFLIGHTS = ("DShot", "pulses in µs")
+LOWEST_PULSE_US = 880.0
+"""Pulses of motors that are disarmed go down to 900 µs."""
+PULSES_OF_HOVER_US = 1300.0
+"""Above this in hover and never below 1000, DShot would be a motor that never gets less than half of its power."""
+HOVERS = (0.12, 0.92)
+"""Shares of full throttle at which multirotors spend most of a flight."""
+SLOWEST_ELECTRICAL_RPM = 3000.0
+FASTEST_HUNDREDS = 12_000.0
+"""In hundreds of electrical turns a minute no motor turns faster than this in the middle of a flight."""
 
 
 def guess_rotors(draft: Draft, quantity: str) -> None:
@@ -28,7 +61,34 @@ def guess_rotors(draft: Draft, quantity: str) -> None:
         )
     if not offered:
         return
-    family = offered[0]
+    family = _that_move(draft, offered[0])
+    _put(draft, quantity, family, how)
+
+
+def guess_stand(draft: Draft) -> None:
+    """Thrust and torque of a stand, and speed and throttle of its one rotor, by their names and the units in these."""
+    if {"specific_force", "angular_velocity"} & set(draft.channels):
+        return
+    for quantity in ("thrust", "torque"):
+        name = named.scalar(draft.free(), quantity)
+        if name is None or not draft.table[name].notna().any():
+            continue
+        kind = CHANNELS[quantity][0]
+        unit, top = stated(name, kind), float(np.nanmax(np.abs(draft.values([name]))))
+        question = "" if unit else f"in which unit? Its largest value is {top:.4g}"
+        draft.put(quantity, [name], f"by its name; up to {top:.4g}", question, unit=unit or OPEN)
+    if "thrust" not in draft.channels:
+        return
+    for quantity in ("rotor_speed", "throttle"):
+        name = named.scalar(draft.free(), quantity)
+        if quantity not in draft.channels and name is not None:
+            unit = stated(name, "turns") if quantity == "rotor_speed" else ""
+            words = frozenset(named.words_of(name))
+            _put(draft, quantity, Family(name, (name,), "number", unit, words), "by its name")
+
+
+def _put(draft: Draft, quantity: str, family: Family, how: str) -> None:
+    """A channel of rotors with its unit or range, or the question that is left."""
     values = draft.values(family.columns)
     if not np.isfinite(values).any():
         return
@@ -38,23 +98,91 @@ def guess_rotors(draft: Draft, quantity: str) -> None:
     if follows > CONTRADICTED:
         evidence += f"; with them grows the specific force along z (correlation {follows:.2f})"
     if quantity != "throttle":
-        unit, why = _speed_unit(family, float(np.nanmedian(values)))
-        draft.put(quantity, family.columns, f"{evidence}; {why}", "" if unit != OPEN else why, unit=unit)
+        unit, why = _speed_unit(family, float(np.nanmedian(values)), _is_betaflight(draft))
+        question, more = "" if unit != OPEN else why, {}
+        if _is_electrical(family):
+            more = {"poles": OPEN}
+            poles = "how many magnetic poles has a motor (14 on most of five-inch propellers)?"
+            question = f"{question}; {poles}" if question else poles
+        draft.put(quantity, family.columns, f"{evidence}; {why}", question, unit=unit, **more)
         return
-    if top <= 1.05:
+    found = _possible_ranges(values, family, _is_betaflight(draft))
+    if found == ["a share"]:
         draft.put(quantity, family.columns, f"{evidence}, so a share", unit="1")
-        return
-    low, high = (0, 100) if top <= 105 else (1000, 2000) if top <= 2100 else (0, 65535)
-    more = f"so no throttle is taken as {low} and full throttle as {high}"
-    draft.put(quantity, family.columns, f"{evidence}, {more}", unit="raw", range=(float(low), float(high)))
+    elif len(found) == 1:
+        low, high = RANGES[found[0]]
+        more = f"so {found[0]}: no throttle is taken as {low:g} and full throttle as {high:g}"
+        draft.put(quantity, family.columns, f"{evidence}, {more}", unit="raw", range=(low, high))
+    else:
+        kinds = " or ".join(f"[{RANGES[k][0]:g}, {RANGES[k][1]:g}] ({k})" for k in found)
+        question = f"which readings are no and full throttle: {kinds or 'no usual range holds them'}?"
+        draft.put(quantity, family.columns, evidence, question, unit="raw", range=OPEN)
 
 
-def _speed_unit(family: Family, middle: float) -> tuple[str, str]:
+def _that_move(draft: Draft, family: Family) -> Family:
+    """A family without outputs that keep one value and drive nothing; itself where fewer than three would be left."""
+    values = draft.values(family.columns)
+    spread = pd.DataFrame(values).nunique().to_numpy()
+    moving = [n for n, count in zip(family.columns, spread, strict=True) if count > 1]
+    return replace(family, columns=tuple(moving)) if 3 <= len(moving) < len(family.columns) else family
+
+
+def _is_betaflight(draft: Draft) -> bool:
+    """Whether the columns are those of a decoded blackbox log."""
+    plain = {bracketed(n)[0] for n in draft.table.columns}
+    return {"gyroADC[0]", "motor[0]"} <= plain or {"loopIteration", "motor[0]"} <= plain
+
+
+def _possible_ranges(values: np.ndarray, family: Family, betaflight: bool) -> list[str]:
+    """The `RANGES` that hold throttles (n, k) and leave a vehicle that hovers in their middle.
+
+    Where several do, one whose end the throttles reach exactly.
+    """
+    known = values[np.isfinite(values)]
+    given = known[known > 0] if (known >= 0).all() else known
+    if not len(given):
+        return []
+    low, middle, high = np.quantile(given, [0.005, 0.5, 0.995])
+    names = {w for column in family.columns for w in named.words_of(column)}
+    stated = next((kind for kind, words in RANGES_BY_NAME.items() if names & words), None)
+    among = (stated,) if stated else BETAFLIGHTS if betaflight else tuple(RANGES)
+    held = []
+    for kind in among:
+        bottom, full = RANGES[kind]
+        below = LOWEST_PULSE_US if kind == "pulses in µs" else bottom - 0.02 * (full - bottom)
+        if kind == "-1 to 1" and low >= 0:
+            continue
+        if below <= low and high <= full + 0.02 * (full - bottom):
+            held.append(kind)
+    if stated is None and not betaflight:
+        fits = [k for k in held if HOVERS[0] <= (middle - RANGES[k][0]) / np.ptp(RANGES[k]) <= HOVERS[1]]
+        held = fits or [k for k in held if k in ("a share", "-1 to 1")][:1] or held
+        if low >= RANGES["pulses in µs"][0] and middle > PULSES_OF_HOVER_US:
+            held = [k for k in held if k != "DShot"]
+    reached = [k for k in held if given.max() == RANGES[k][1] or (RANGES[k][0] > 0 and given.min() == RANGES[k][0])]
+    return reached if len(reached) == 1 and len(held) > 1 else held
+
+
+def _is_electrical(family: Family) -> bool:
+    return "erpm" in family.words or family.unit in ELECTRICAL
+
+
+def _speed_unit(family: Family, middle: float, betaflight: bool) -> tuple[str, str]:
     """Unit of rotor speeds by their names, else by where only one is possible; and why."""
+    if _is_electrical(family):
+        if family.unit == "100erpm" or betaflight:
+            return "100erpm", "hundreds of electrical turns a minute, as Betaflight logs them"
+        if middle < SLOWEST_ELECTRICAL_RPM:
+            return "100erpm", f"a median of {middle:.4g} electrical turns a minute is too slow: these are hundreds"
+        if middle > FASTEST_HUNDREDS:
+            return "erpm", f"electrical turns a minute by the names; a median of {middle:.4g} is too fast for hundreds"
+        return OPEN, f"a median of {middle:.4g} can be electrical turns a minute (erpm) or hundreds of them (100erpm)"
     if family.unit in UNITS["rotor"]:
         return family.unit, "the names state the unit"
-    if "rpm" in "_".join(family.words) and middle > 1000:
-        return "rpm", "the names state the unit"
+    if "rpm" in "_".join(family.words):
+        if middle > 1000:
+            return "rpm", "the names state the unit"
+        return OPEN, f"the names say rpm, but a median of {middle:.4g} is slow for rpm"
     if middle > 5000:
         return "rpm", f"a median of {middle:.4g} is too fast for rad/s"
     if 600 < middle < 1500:

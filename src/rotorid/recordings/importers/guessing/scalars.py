@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
+from rotorid.recordings.importers.clean import join_rows
 from rotorid.recordings.importers.guessing import agreement as by
 from rotorid.recordings.importers.guessing import names as named
 from rotorid.recordings.importers.guessing.draft import (
     RATES_HZ,
     Draft,
 )
-from rotorid.recordings.importers.mapping import OPEN, UNITS
+from rotorid.recordings.importers.mapping import CHANNELS, OPEN
+from rotorid.recordings.importers.units import UNITS, converted, stated
+
+USUAL = {"voltage": (60.0, 2.5, 60.0), "current": (60.0, 0.0, 150.0), "temperature": (60.0, -30.0, 130.0)}
+"""To a kind the largest median that is plainly in the contract's unit, and between what limits it lies, V, A, °C."""
 
 
 def guess_time(draft: Draft) -> None:
@@ -20,6 +25,7 @@ def guess_time(draft: Draft) -> None:
             "time", [OPEN], "", "no column is named as a time, and without one nothing can be imported", unit=OPEN
         )
         return
+    draft.table = join_rows(draft.table, name)
     values = draft.table[name].to_numpy(float)
     steps = np.diff(values[np.isfinite(values)])
     steps = steps[steps > 0]
@@ -60,11 +66,25 @@ def guess_scalar(draft: Draft, quantity: str) -> None:
     values = draft.table[name].to_numpy(float)
     if not np.isfinite(values).any():
         return
-    middle = float(np.nanmedian(np.abs(values)))
-    if quantity == "battery_voltage":
-        unit = "V" if middle < 60 else "dV" if middle < 600 else "cV" if middle < 3000 else "mV"
-    elif quantity == "battery_current":
-        unit = "A" if middle < 200 else "cA" if middle < 2e4 else "mA"
+    middle = float(np.nanmedian(values if quantity == "temperature" else np.abs(values)))
+    kind = CHANNELS[quantity][0]
+    said, fits = stated(name, kind), _fitting(kind, middle)
+    evidence, question = f"by its name; its median is {middle:.4g}", ""
+    if said and (said in fits or not fits):
+        unit = said
+    elif said:
+        unit, question = OPEN, f"its name says {said}, its median of {middle:.4g} {' or '.join(fits)}"
+    elif len(fits) == 1:
+        unit = fits[0]
     else:
-        unit = "degC"
-    draft.put(quantity, [name], f"by its name; its median is {middle:.4g}", unit=unit)
+        unit = OPEN
+        question = f"its unit is not clear: a median of {middle:.4g} can be {' or '.join(fits or UNITS[kind])}"
+    draft.put(quantity, [name], evidence, question, unit=unit)
+
+
+def _fitting(kind: str, middle: float) -> list[str]:
+    """Units in which a median is what batteries and vehicles have; the contract's own where it is plainly that."""
+    plain, low, high = USUAL[kind]
+    if low <= middle <= plain:
+        return [next(iter(UNITS[kind]))]
+    return [u for u in UNITS[kind] if low <= float(converted(np.array(middle), kind, u)) <= high]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import yaml
 
 from rotorid.recordings.importers.guessing.guess import Guess
-from rotorid.recordings.importers.mapping import OPEN
+from rotorid.recordings.importers.mapping import BODY, OPEN, WORLD
 
 
 def as_text(found: Guess, source: str) -> str:
@@ -18,7 +18,7 @@ def as_text(found: Guess, source: str) -> str:
             f"# Nothing is imported while a {OPEN!r} is left: write the answer in its place, or remove the channel."
         ]
     lines += [f"# {sentence}" for sentence in found.left_out]
-    for key, words in (("body", "frd | flu"), ("world", "ned | enu | nwu")):
+    for key, words in (("body", " | ".join(BODY)), ("world", " | ".join(WORLD))):
         lines += _comment(found, key, "")
         value = getattr(mapping, key)
         lines.append(f"{key}: {value if value != OPEN else repr(OPEN)}   # {words}")

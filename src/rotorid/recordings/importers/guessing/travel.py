@@ -19,7 +19,8 @@ from rotorid.recordings.importers.guessing.draft import (
     unit_by_factor,
 )
 from rotorid.recordings.importers.guessing.names import Family
-from rotorid.recordings.importers.mapping import OPEN, UNITS
+from rotorid.recordings.importers.mapping import OPEN, TRAVEL
+from rotorid.recordings.importers.units import UNITS
 
 
 def _gained(draft: Draft) -> np.ndarray | None:
@@ -39,20 +40,51 @@ def guess_velocity(draft: Draft) -> None:
         f for f in triples if not f.words & named.OTHER_THINGS and not named.is_named(f, "position")
     ]
     found: dict[tuple[str, Family], Agreement] = {}
+    others: dict[Family, tuple[str, str]] = {}
     if gained is not None:
         for family in candidates:
             values = draft.values(family.columns)
-            found["world", family] = by.compare(draft.changes(values), gained)
+            found["world", family], others[family] = _in_any_axes(draft.changes(values), gained, draft.world)
             found["body", family] = by.compare(draft.changes(by.into_world(draft.time_s, draft.wxyz, values)), gained)
     best = max(found, key=lambda key: found[key].correlation, default=None)
     enough = CONFIRMED if offered else BY_NUMBERS_ALONE
     if best is not None and found[best].correlation >= enough:
-        _velocity_confirmed(draft, best, found, bool(offered))
+        _velocity_confirmed(draft, best, found, others[best[1]], bool(offered))
     elif offered:
         _velocity_alone(draft, offered[0], found)
 
 
-def _velocity_confirmed(draft: Draft, best: tuple[str, Family], found: dict, by_name: bool) -> None:
+def _in_any_axes(changes: np.ndarray, gained: np.ndarray, world: str) -> tuple[Agreement, tuple[str, str]]:
+    """How changes (n, 3) follow those gained in the axes of the attitude's world, in whatever axes they agree best.
+
+    Returns the agreement, and the world of the attitude and of the changes: the same one unless another leaves clearly
+    less unexplained. An attitude whose world has z up may refer to any north, so that both such worlds are tried.
+    """
+    same = by.compare(changes, gained)
+    if world == OPEN:
+        return same, (world, world)
+    best, axes = same, (world, world)
+    for attitude in ("enu", "nwu") if world == "enu" else (world,):
+        for own in TRAVEL:
+            seen = by.compare(changes @ TRAVEL[own].T @ TRAVEL[attitude], gained)
+            turned = min(same.by_axis) < -CONTRADICTED and min(seen.by_axis) > CONTRADICTED
+            if (is_clear(seen, same) or turned) and seen.correlation > best.correlation:
+                best, axes = seen, (attitude, own)
+    return best, axes
+
+
+def _own_axes(draft: Draft, axes: tuple[str, str]) -> tuple[dict[str, str], str]:
+    """What a mapping states where a channel has other axes than the attitude, and the same in words."""
+    attitude, own = axes
+    if own == attitude:
+        return {}, ""
+    draft.world = attitude
+    return {"world": own}, f", its axes are {own} where those of the attitude are {attitude}"
+
+
+def _velocity_confirmed(
+    draft: Draft, best: tuple[str, Family], found: dict, own_axes: tuple[str, str], by_name: bool
+) -> None:
     axes, family = best
     agreed = found[best]
     other = found["body" if axes == "world" else "world", family]
@@ -63,6 +95,9 @@ def _velocity_confirmed(draft: Draft, best: tuple[str, Family], found: dict, by_
     said += f"; in {'body' if axes == 'world' else 'world'} axes {other.correlation:.2f})"
     question = ""
     more = {"unit": unit or OPEN, "axes": axes}
+    if axes == "world":
+        other_axes, words = _own_axes(draft, own_axes)
+        more, said = more | other_axes, said + words
     if unit is None or (family.unit in UNITS["velocity"] and family.unit != unit):
         question = f"the accelerometer asks for {1 / agreed.slope:.3g} m/s a unit"
         more["unit"] = OPEN
@@ -124,15 +159,16 @@ def guess_position(draft: Draft) -> None:
     candidates = offered or [f for f in triples if not f.words & named.OTHER_THINGS]
     speed = draft.channels.get("velocity")
     found: dict[Family, Agreement] = {}
+    own_axes: dict[Family, tuple[str, str]] = {}
     if speed is not None and speed.unit != OPEN:
         readings = _moved_by(draft, draft.values(speed.columns) * UNITS["velocity"][speed.unit])
         readings = {name: moved for name, moved in readings.items() if speed.axes in (OPEN, name)}
         for family in candidates:
             changes = draft.changes(draft.values(family.columns)) if readings else None
             for moved in readings.values():
-                agreed = by.compare(changes, moved)
+                agreed, axes = _in_any_axes(changes, moved, speed.world or draft.world)
                 if agreed.correlation > found.get(family, Agreement()).correlation or family not in found:
-                    found[family] = agreed
+                    found[family], own_axes[family] = agreed, axes
     best = max(found, key=lambda f: found[f].correlation, default=None)
     if best is not None and found[best].correlation >= (CONFIRMED if offered else BY_NUMBERS_ALONE):
         agreed = found[best]
@@ -140,7 +176,10 @@ def guess_position(draft: Draft) -> None:
         how = "by their names" if offered else "no name says it"
         evidence = f"{how}; the velocity integrates to it ({agreed.in_words})"
         question = "" if unit else f"the velocity asks for {1 / agreed.slope:.3g} m a unit"
-        draft.put("position", best.columns, evidence, question, unit=unit or OPEN)
+        own = own_axes[best][1] if own_axes[best][1] != own_axes[best][0] else speed.world
+        more = {"world": own} if own not in (None, draft.world, OPEN) else {}
+        evidence += f", its axes are {own}" if more else ""
+        draft.put("position", best.columns, evidence, question, unit=unit or OPEN, **more)
     elif offered:
         family = offered[0]
         # The unit of the changes is not known: only the correlation is looked at.
@@ -148,7 +187,19 @@ def guess_position(draft: Draft) -> None:
         seen = f"the velocity does not integrate to it ({found[family].in_words})" if off else "no velocity confirms it"
         unit = family.unit if family.unit in UNITS["length"] and not off else OPEN
         question = "is it a position? The velocity does not integrate to it" if off else "in which unit?"
-        draft.put("position", family.columns, f"by their names; {seen}", "" if unit != OPEN else question, unit=unit)
+        questions, more = [question] if unit == OPEN else [], {}
+        if draft.world == "ned" and _is_up(draft.values(family.columns)[:, 2]):
+            more = {"world": OPEN}
+            questions.append(
+                "z is never below its start: does it point up (neu) although that of the attitude is down?"
+            )
+        draft.put("position", family.columns, f"by their names; {seen}", " ".join(questions), unit=unit, **more)
+
+
+def _is_up(z: np.ndarray) -> bool:
+    """Whether a vertical place (n,) begins at its lowest and rises by many times what it ever falls below."""
+    known = z[np.isfinite(z)]
+    return len(known) > 1 and known.max() > 0 and known.max() - known[0] > 10 * max(known[0] - known.min(), 0.0)
 
 
 def guess_height(draft: Draft) -> None:
