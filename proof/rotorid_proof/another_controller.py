@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.mismatch.decision.findings import Analysis
-from rotorid.mismatch.delivery.flown import squares_of_windows
+from rotorid.mismatch.delivery.flown import UNITS, squares_of_windows
 from rotorid.mismatch.delivery.model import model_of
 from rotorid.mismatch.delivery.parts import improved_vehicle
 from rotorid.mismatch.plant.motion import HIGHEST_CUTOFF_HZ, analysis_rate_hz, build_segments, full_speed
@@ -30,6 +30,8 @@ from rotorid_proof.concealed.write import write_set
 from rotorid_proof.delivered import row_of
 
 PACE = 0.6
+NEGLIGIBLE = {"position": 1e-4, "velocity": 1e-3, "attitude": 1e-3, "angular_velocity": 1e-3}
+"""m, m/s, rad, rad/s: smaller distances after half a second count as these; files are written with six digits."""
 SHOWN = ("set", "hidden", "chosen", "derivative_channels", "again_believed", "again_delivered", "unfit", "failed")
 FLOWN_AGAIN = {"multibody": multibody.flown_again, "continuous": continuous.flown_again}
 
@@ -44,7 +46,8 @@ def errors(vehicle: Vehicle, runs: list[Run]) -> np.ndarray:
         for s in segments
     ]
     sums = squares_of_windows(segments, model_of(vehicle), lambda run, t: np.zeros(len(t), int), 1)
-    return np.sqrt(sums[:, 0, 0] / sums[:, 1, 0])
+    found = dict(zip(UNITS, np.sqrt(sums[:, 0, 0] / np.maximum(sums[:, 1, 0], 1.0)), strict=True))
+    return np.array([max(e, NEGLIGIBLE[name]) for name, e in found.items()])
 
 
 def row(name: str, seed: int) -> dict:
