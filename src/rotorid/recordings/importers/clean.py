@@ -12,6 +12,8 @@ from rotorid.recordings.importers.report import Fault
 
 REVERSED = 0.02
 """Share of the largest value that a value of the other sign must exceed to be one: less is noise about zero."""
+UNEXPLAINED = 0.2
+"""Share of its variance that the motors of a mixer may leave of another motor's signal."""
 
 
 def drop_repeated_times(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
@@ -56,6 +58,21 @@ def one_sense(values: np.ndarray, names: Sequence[str], sense: float | None = No
         if lost.any()
     ]
     return np.where(against, np.nan, np.abs(own) if sense is None else np.clip(own, 0, None)), faults
+
+
+def further_motors(outputs: np.ndarray, motors: int) -> list[int]:
+    """Columns of outputs (n, k) beyond the first `motors` that are motors, too.
+
+    A mixer makes the signals of all motors from four demands, so that four of them say the others; a gimbal or a switch
+    they do not say.
+    """
+    known = outputs[np.isfinite(outputs).all(axis=1)]
+    if len(known) < 10 * (motors + 1):
+        return []
+    basis = np.column_stack([known[:, :motors], np.ones(len(known))])
+    rest = known[:, motors:] - basis @ np.linalg.lstsq(basis, known[:, motors:], rcond=None)[0]
+    moves, left = known[:, motors:].var(axis=0), rest.var(axis=0)
+    return [motors + k for k in range(len(moves)) if moves[k] > 0 and left[k] < UNEXPLAINED * moves[k]]
 
 
 def report_gaps(table: pd.DataFrame, factor: float = 3.0) -> list[Fault]:
