@@ -7,8 +7,8 @@ Layout, little-endian throughout::
     per event: u16 id | u32 time in ms (version 1) or u64 time in µs (version 2) | its variables packed
     u32 CRC-32 of everything before it
 
-Types are the characters of Python's `struct`: f float, B H I unsigned, b h i signed integers.
-Source: bitcraze/crazyflie-firmware, `tools/usdlog/cfusdlog.py` (the format, none of its code).
+Types are the characters of Python's `struct`: f float, e half a float, B H I unsigned, b h i signed integers.
+Source: bitcraze/crazyflie-firmware, `usddeck.c` and `tools/usdlog/cfusdlog.py` (the format, none of its code).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from rotorid.recordings.importers.report import Fault
 
 MAGIC = 0xBC
 TIME = "time_s"
-TYPES = {"f": "<f4", "d": "<f8", "b": "i1", "B": "u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4"}
+TYPES = {"e": "<f2", "f": "<f4", "d": "<f8", "b": "i1", "B": "u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4"}
 TYPES |= {"q": "<i8", "Q": "<u8"}
 
 

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers import clean, crazyflie, frames, in_the_air, known, px4_ulog
+from rotorid.recordings.importers import clean, crazyflie, crazyflie_usd, frames, in_the_air, known, px4_ulog
 from rotorid.recordings.importers.crazyflie_usd import decode_usd_log, read_usd_log
 from rotorid.recordings.importers.imrc_bench_csv import read_imrc_bench
 from rotorid.recordings.importers.neurobem import USED, read_neurobem
@@ -466,6 +466,90 @@ def test_a_log_without_gyro_leaves_the_missing_axis_empty() -> None:
     assert "no_pitch" in kinds(faults)
     assert "specific_force_x_m_s2" not in table
     assert table["specific_force_z_m_s2"].iloc[0] == pytest.approx(-1.1 * 9.81)
+
+
+def compressed(xyzw: np.ndarray) -> np.ndarray:
+    """Quaternions as the firmware packs them: the number of the largest, then sign and nine bits of each other."""
+    codes = []
+    for q in xyzw:
+        largest = int(np.argmax(np.abs(q)))
+        code = largest
+        for k in range(4):
+            if k != largest:
+                negative = (q[k] < 0) != (q[largest] < 0)
+                code = code << 10 | int(negative) << 9 | int(511 * abs(q[k]) * np.sqrt(2) + 0.5)
+        codes.append(code)
+    return np.array(codes)
+
+
+def of_every_form() -> tuple[pd.DataFrame, pd.DataFrame]:
+    """What the firmware logs of 200 states in each of its forms, and the same in contract columns."""
+    rng = np.random.default_rng(3)
+    turns = Rotation.random(200, random_state=3)  # forward-left-up to z up
+    flip = np.array([1.0, -1.0, -1.0])
+    place, moves, rates, force = rng.normal(size=(4, 200, 3))
+    yaw, pitch, roll = turns.as_euler("ZYX", degrees=True).T
+    xyzw = turns.as_quat()
+    own = turns.inv().apply(moves)
+    log = {"time_s": np.arange(200) * 0.01, "stateEstimateZ.quat": compressed(xyzw)}
+    groups = (
+        ("stateEstimate", "qx qy qz qw", xyzw), ("kalman", "q1 q2 q3 q0", xyzw),
+        ("stateEstimate", "roll pitch yaw", np.column_stack([roll, -pitch, yaw])),  # nose up
+        ("stabilizer", "roll pitch yaw", np.column_stack([roll, -pitch, yaw])),
+        ("stateEstimate", "x y z", place), ("stateEstimateZ", "x y z", place * 1000),
+        ("kalman", "stateX stateY stateZ", place), ("stateEstimate", "vx vy vz", moves),
+        ("stateEstimateZ", "vx vy vz", moves * 1000), ("kalman", "statePX statePY statePZ", own),
+        ("gyro", "x y z", np.degrees(rates)), ("acc", "x y z", force),
+        ("stateEstimateZ", "rateRoll ratePitch rateYaw", rates * np.array([1, -1, 1]) * 1000),
+    )  # fmt: skip
+    for group, names, values in groups:
+        log |= {f"{group}.{name}": v for name, v in zip(names.split(), values.T, strict=True)}
+    true = {n: v for n, v in zip(c.QUATERNION, (xyzw[:, [3, 0, 1, 2]] * [1, 1, -1, -1]).T, strict=True)}
+    for names, values in (
+        (c.POSITION, place), (c.VELOCITY, moves), (c.ANGULAR_VELOCITY, rates), (c.SPECIFIC_FORCE, 9.81 * force)
+    ):  # fmt: skip
+        true |= dict(zip(names, (values * flip).T, strict=True))
+    return pd.DataFrame(log), pd.DataFrame(true)
+
+
+@pytest.mark.parametrize(
+    ("names", "own"), [(names, own) for names, forms in crazyflie.FORMS.items() for own, _ in forms]
+)
+def test_a_crazyflie_state_is_read_in_each_of_its_forms(names: tuple[str, ...], own: tuple[str, ...]) -> None:
+    log, true = of_every_form()
+    table, faults = crazyflie.convert(log[["time_s", *own]])
+    expected, found = true[list(names)].to_numpy(), table[list(names)].to_numpy()
+    if names == c.QUATERNION:
+        expected = expected * np.sign(np.sum(expected * found, axis=1))[:, None]
+    np.testing.assert_allclose(found, expected, atol=3e-3 if own == ("stateEstimateZ.quat",) else 1e-9)
+    assert faults == []
+
+
+def test_a_velocity_in_body_axes_is_turned_by_the_attitude() -> None:
+    log, true = of_every_form()
+    table, _ = crazyflie.convert(
+        log[["time_s", *crazyflie.BODY_VELOCITY, "kalman.q0", "kalman.q1", "kalman.q2", "kalman.q3"]]
+    )
+    np.testing.assert_allclose(table[list(c.VELOCITY)], true[list(c.VELOCITY)], atol=1e-9)
+    assert not set(c.VELOCITY) & set(crazyflie.convert(log[["time_s", *crazyflie.BODY_VELOCITY]])[0])
+
+
+def test_pitch_is_not_called_missing_where_it_is_in_the_log() -> None:
+    log, true = of_every_form()
+    log = log[["time_s", "stateEstimate.roll", "stateEstimate.pitch", "stateEstimate.yaw"]]
+    log = log.assign(**{"stateEstimate.ax": 0.0, "stateEstimate.ay": 0.0, "stateEstimate.az": 0.1})
+    table, faults = crazyflie.convert(log)
+    assert faults == [] and not set(c.SPECIFIC_FORCE) & set(table)
+    along = np.abs(np.sum(table[list(c.QUATERNION)].to_numpy() * true[list(c.QUATERNION)].to_numpy(), axis=1))
+    np.testing.assert_allclose(along, 1, atol=1e-12)
+
+
+@pytest.mark.parametrize("letter", crazyflie_usd.TYPES)
+def test_each_type_of_a_usd_variable_is_read(letter: str) -> None:
+    value = 1.5 if letter in "efd" else 100
+    tables, faults = decode_usd_log(usd_bytes([("before", "f"), ("a", letter), ("after", "H")], [(2.5, value, 7)] * 3))
+    assert faults == []
+    assert tables["fixedFrequency"][["before", "a", "after"]].to_numpy().tolist() == [[2.5, value, 7]] * 3
 
 
 # PX4 ----------------------------------------------------------------------------------------------
