@@ -98,6 +98,8 @@ GOOD, DOWN = 4, 25
 """Status of a range finder that reads, and the orientation of one that looks down."""
 PULSE_US = (1000.0, 2000.0)
 RPM = 2 * np.pi / 60
+HEAD, END = b"\xa3\x95", "END"
+"""First bytes of a message, and the key under which stands how many bytes of the last one came."""
 CLOCKS = {"TimeUS": 1e-6, "TimeMS": 1e-3}
 """Fields of a message's clock, to the seconds that they count in."""
 
@@ -105,7 +107,10 @@ Log = Mapping[str, pd.DataFrame]
 
 
 def read_messages(path: Path) -> dict[str, pd.DataFrame]:
-    """Tables of the messages that are needed by kind, with `time_s`; InputError where the file is no DataFlash log."""
+    """Tables of the messages that are needed by kind, with `time_s`, and `END` where the file ends inside a message.
+
+    InputError where the file is no DataFlash log.
+    """
     reader = needs("pymavlink.DFReader", "ardupilot", path)
     rows: dict[str, list[dict]] = {}
     latest_s = 0.0
@@ -117,11 +122,13 @@ def read_messages(path: Path) -> dict[str, pd.DataFrame]:
             if stamp is not None or kind in ("EV", "PARM"):
                 latest_s = row[c.TIME] = latest_s if stamp is None else float(stamp)
             rows.setdefault(kind, []).append(row)
+        if came := _cut_message(log.data_map, log.offset):
+            rows[END] = [{c.TIME: latest_s, "bytes": came}]
     except MemoryError:
         raise
     except Exception as error:  # pymavlink lets whatever a broken file raises through
         raise InputError(f"{path}: not a DataFlash log that can be read ({printable(error)[:150]})") from None
-    if not rows:
+    if not set(rows) - {END}:
         raise InputError(f"{path}: a DataFlash log with no message that is needed (IMU, ATT, RCOU)")
     tables = {}
     for kind, found in rows.items():
@@ -132,6 +139,16 @@ def read_messages(path: Path) -> dict[str, pd.DataFrame]:
             table = table.rename(columns={f"Ch{n}": f"C{n}" for n in range(1, 17)})
         tables[kind] = table
     return tables
+
+
+def _cut_message(data, offset: int) -> int:
+    """Bytes of the message that a file ends in, by where its reader stopped; 0 where it ends between two.
+
+    A single byte of a head is not looked for: every 256th whole file ends with it.
+    """
+    if bytes(data[max(offset - 3, 0) : max(offset - 1, 0)]) == HEAD:  # a head whose message did not come
+        return len(data) - offset + 3
+    return len(HEAD) if bytes(data[len(data) - len(HEAD) :]) == HEAD else 0
 
 
 def parameters(log: Log) -> Parameters:
@@ -214,6 +231,9 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[Fault], np.ndar
     stated, values = parameters(log), in_flight(log, where)
     check_frame(log, values, where)
     faults = stated.faults(CHANGED, grid[0])
+    if END in log:
+        found = f"the file ends inside a message, after {int(log[END]['bytes'].iloc[0])} bytes of it"
+        faults.append(Fault("cut_off", "", found, "what came before is kept; the log stopped before its end", 0))
     keep = in_the_air.increasing(grid)
     if not keep.all():
         found = f"{int((~keep).sum())} messages do not move the clock on"

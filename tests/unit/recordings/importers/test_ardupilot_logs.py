@@ -12,6 +12,7 @@ from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import ardupilot
 from rotorid.recordings.importers.in_the_air import off_the_ground
+from tests.unit.recordings.importers.test_log_formats import PARAMETERS, dataflash, flown
 
 ROOT = Path(__file__).parents[4]
 _named = os.environ.get("ROTORID_PUBLIC_DATA")
@@ -356,3 +357,23 @@ def test_the_frame_is_the_one_that_flew() -> None:
     log = framed({"FRAME_CLASS": 2}, {n: 32 + n for n in range(1, 7)})
     assert len(throttles_of(set_later(log, [(0.2, "FRAME_CLASS", 1.0)]))) == 4
     assert len(throttles_of(set_later(log, [(1.8, "FRAME_CLASS", 1.0)]))) == 6
+
+
+def test_a_log_cut_off_anywhere_keeps_every_whole_message(tmp_path: Path) -> None:
+    pytest.importorskip("pymavlink")
+    data, path = dataflash(flown().iloc[:40], PARAMETERS), tmp_path / "log.bin"
+    whole = sum(map(len, (plain := ardupilot.read_messages(written(path, data))).values()))
+    assert ardupilot.END not in plain
+    # the last message of each row is BAT, before it are four of ESC
+    for lost in range(1, 4 * 16 + 20):
+        log = ardupilot.read_messages(written(path, data[: len(data) - lost]))
+        messages = 1 + max(0, lost - 20) // 16 + (lost > 20 and (lost - 20) % 16 > 0)
+        left = (20 - lost) if lost <= 20 else -(lost - 20) % 16
+        assert sum(len(t) for kind, t in log.items() if kind != ardupilot.END) == whole - messages, lost
+        _, faults, _ = ardupilot.convert(log, path)
+        assert any(f.kind == "cut_off" for f in faults) == (left > 1), lost
+
+
+def written(path: Path, data: bytes) -> Path:
+    path.write_bytes(data)
+    return path
