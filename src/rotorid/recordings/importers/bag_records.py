@@ -55,6 +55,8 @@ class Records:
     schemas: dict[int, tuple[str, str, str]] = field(default_factory=dict)
     """Name, encoding and text of each schema of an MCAP file."""
     cut: bool = False
+    lost_chunks: int = 0
+    """Chunks that cannot be unpacked."""
 
     def messages(self) -> Iterator[tuple[Channel, int, bytes]]:
         """(channel, time of recording in ns, bytes) of each message of ROS."""
@@ -97,7 +99,7 @@ class Records:
         if len(body) < 40:
             return b""
         compression, place = _string(body, 28)
-        return _unpacked(body[place + 8 :], compression, self.path)
+        return self._unpacked(body[place + 8 :], compression)
 
     def _of_bag(self, data: bytes, in_chunk: bool) -> Iterator[tuple[Channel, int, bytes]]:
         at, indexed = 0, in_chunk
@@ -107,7 +109,7 @@ class Records:
             body, at = data[at + 4 : at + 4 + size], at + 4 + size
             code = fields.get("op", b"\0")[0]
             if code == BAG_CHUNK:
-                yield from self._of_bag(_unpacked(body, fields["compression"].decode(), self.path), True)
+                yield from self._of_bag(self._unpacked(body, fields["compression"].decode()), True)
             if len(body) < size:
                 self.cut = True
                 return
@@ -123,6 +125,22 @@ class Records:
                 seconds, rest = struct.unpack("<II", fields["time"])
                 yield channel, seconds * 10**9 + rest, body
         self.cut |= not indexed
+
+    def _unpacked(self, data: bytes, compression: str) -> bytes:
+        """Bytes of a chunk, as many as can be unpacked of one that is cut off."""
+        if compression == "bz2":
+            reader = bz2.BZ2Decompressor()
+        elif compression == "lz4":
+            reader = needs("lz4.frame", "ros", self.path).LZ4FrameDecompressor()
+        elif compression == "zstd":
+            reader = needs("rosbags.rosbag2.storage_mcap", "ros", self.path).zstd.ZstdDecompressor()
+        else:
+            return data
+        try:
+            return reader.decompress(data)
+        except Exception:  # each library raises its own
+            self.lost_chunks += 1
+            return b""
 
     def _of_database(self) -> Iterator[tuple[Channel, int, bytes]]:
         with closing(sqlite3.connect(f"{self.path.resolve().as_uri()}?immutable=1", uri=True)) as base:
@@ -162,22 +180,6 @@ def typestores(channels: list[Channel], path: Path) -> dict[str, object]:
         except Exception:  # rosbags lets whatever a strange definition raises through
             continue
     return found
-
-
-def _unpacked(data: bytes, compression: str, path: Path) -> bytes:
-    """Bytes of a chunk, as many as can be unpacked of one that is cut off."""
-    if compression == "bz2":
-        reader = bz2.BZ2Decompressor()
-    elif compression == "lz4":
-        reader = needs("lz4.frame", "ros", path).LZ4FrameDecompressor()
-    elif compression == "zstd":
-        reader = needs("rosbags.rosbag2.storage_mcap", "ros", path).zstd.ZstdDecompressor()
-    else:
-        return data
-    try:
-        return reader.decompress(data)
-    except Exception:  # each library raises its own
-        return b""
 
 
 def _fields(data: bytes, at: int) -> tuple[dict[str, bytes], int]:

@@ -161,6 +161,7 @@ class Found:
     cut: bool = False
     broken: int = 0
     """Messages that cannot be decoded."""
+    lost_chunks: int = 0
 
     def add(self, topic: str, msgtype: str, recorded_ns: int, message) -> None:
         stamp = getattr(getattr(message, "header", None), "stamp", None)
@@ -213,6 +214,7 @@ def _by_records(path: Path) -> Found:
             if not k.of_ros:
                 found.foreign[k.topic] = k.encoding or k.schema or "unknown"
         found.cut |= records.cut
+        found.lost_chunks += records.lost_chunks
     return found
 
 
@@ -260,6 +262,9 @@ def read_series(path: Path) -> tuple[dict[str, list[Series]], list[Fault]]:
     if found.broken:
         seen = f"{found.broken} messages cannot be decoded"
         faults.append(Fault("damaged", "", seen, "left out", found.broken))
+    if found.lost_chunks:
+        seen = f"{found.lost_chunks} chunks of messages cannot be unpacked"
+        faults.append(Fault("damaged", "", seen, "left out; their time is a gap", found.lost_chunks))
     if foreign:
         seen = f"{', '.join(foreign[:LISTED])} hold no messages of ROS"
         faults.append(Fault("unread", "", seen, "left out", 0))

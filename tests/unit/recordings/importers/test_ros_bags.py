@@ -25,6 +25,7 @@ from rotorid.cli import app
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import ros
+from rotorid.recordings.importers.bag_records import Records
 from tests.unit.recordings.importers.test_log_formats import FLU, check_against, flown
 
 EPOCH_S = 1_700_000_000.0
@@ -553,6 +554,18 @@ def test_a_bag_cut_anywhere_gives_whole_messages_or_one_sentence(form, tmp_path:
             assert str(error).startswith(f"{path}: ")
             counts.append(0)
     assert counts == sorted(counts, reverse=True) and counts[0] == 8 * 1200  # quantities and rows
+
+
+@pytest.mark.parametrize("name", ["bag bz2", "mcap zstd"])
+def test_a_chunk_that_cannot_be_unpacked_is_named(form, tmp_path: Path, name: str) -> None:
+    data = bytearray(form(name).read_bytes())
+    middle = len(data) // 5
+    data[middle : middle + 200] = bytes(200)
+    path = tmp_path / f"log{form(name).suffix}"
+    path.write_bytes(data)
+    records = Records(path)
+    kept = len(list(records.messages()))
+    assert records.lost_chunks >= 1 and kept < 3 * 1200
 
 
 @pytest.mark.parametrize("name", FORMS)
