@@ -151,6 +151,8 @@ def what_is_left(recordings: RecordingSet, before: RecordingSet, lost: Finding) 
     gone = {n for own in sensors.values() for names in own if set(names) & set(lost.channels) for n in names}
     runs = tuple(Run(r.name, r.table.drop(columns=[n for n in gone if n in r.table])) for r in recordings.runs)
     if not all(driven_by(run, vehicle) and channels_of(run) for run in runs):
+        if len(runs) > 1:
+            return recordings, ()  # what the runs hold at other times may suffice
         raise InputError(
             f"set {recordings.name}: {lost.sentence.removesuffix('; these samples were left out.')}; without these "
             "readings nothing is left that can be compared"
@@ -160,9 +162,8 @@ def what_is_left(recordings: RecordingSet, before: RecordingSet, lost: Finding) 
 
 def _sensors(run: Run, vehicle: Vehicle, alone: bool) -> list[tuple[str, ...]]:
     """Sensors that a run is compared by: of several runs one without rotor speeds is compared by its commands."""
-    speeds, *commands = (names for names in rotor_groups(vehicle).values() if names and run.has(*names))
-    rotors = [speeds, *commands] if alone or not commands else commands
-    return [*rotors, *moving_sensors(run)]
+    rotors = [names for names in rotor_groups(vehicle).values() if names and run.has(*names)]
+    return [*(rotors if alone else rotors[-1:]), *moving_sensors(run)]
 
 
 def _lasts_s(run: Run, sensors: list[tuple[str, ...]]) -> float:
