@@ -26,6 +26,7 @@ OPEN = (
     "decision.select",
     "decision.shares",
     "decision.words",
+    "delivery.derivatives",
     "delivery.doubts",
     "delivery.files",
     "delivery.flown",

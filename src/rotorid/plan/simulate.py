@@ -46,7 +46,7 @@ class World:
     vehicle: Vehicle
     effects: tuple[tuple[Form, np.ndarray], ...] = ()
     beside: tuple[tuple[Form, np.ndarray], ...] = ()
-    """Derivatives of what the model leaves: they fly, and no model is told from another by them."""
+    """Derivatives of what the model leaves: they fly, and separate no model from another."""
     chain: tuple = ()
     """Speed forms with their values, in the order of their stages."""
     full_speed_rad_s: float = 1.0

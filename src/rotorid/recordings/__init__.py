@@ -36,6 +36,7 @@ OPEN = (
     "columns",
     "doubts",
     "files",
+    "held",
     "importers.guessing.guess",
     "importers.guessing.text",
     "importers.logfile",

@@ -17,7 +17,7 @@ from rotorid.recordings.doubts import Doubt
 from rotorid.recordings.files import read_set
 from rotorid.recordings.physics import gravity, impossible_values, near_names, physical_doubts, voltages
 from rotorid.recordings.run import RecordingSet, Run
-from rotorid.recordings.still import still_readings
+from rotorid.recordings.still import still_readings, still_sensors
 from rotorid.recordings.sufficient import sufficient
 from rotorid.recordings.unread import unread_files
 
@@ -194,7 +194,7 @@ def doubts_of(recordings: RecordingSet) -> tuple[Doubt, ...]:
         found += [*gravity(recordings.vehicle), *impossible_values(recordings)]
     if recordings.vehicle.kind == "flight":
         found += physical_doubts(recordings)
-    found += still_readings(recordings)
+    found += [*still_readings(recordings), *still_sensors(recordings)]
     return tuple(found)
 
 

@@ -362,24 +362,31 @@ def nothing_compared(run: Run, vehicle: Vehicle) -> str | None:
     )
 
 
-def longest_stretch_s(run: Run, groups: list[tuple[str, ...]]) -> tuple[float, float]:
-    """Longest time in which every sensor gives readings without a hole, s, and the slowest sensor's period, s."""
+def whole_stretches(run: Run, groups: Iterable[tuple[str, ...]]) -> tuple[list[tuple[float, float]], float]:
+    """Start and stop, s, of every stretch in which every sensor gives readings without a hole, and the slowest sensor's
+    period, s."""
     time_s, holes, slowest = run.time_s, [], 0.0
     for names in groups:
         known = time_s[np.isfinite(run.array(names)).all(axis=1)]
         if len(known) < LEAST_VALUES:
-            return 0.0, float("inf")
+            return [], float("inf")
         steps = np.diff(known)
         period = float(np.median(steps))
         slowest = max(slowest, period)
         holes += [(known[k], known[k + 1]) for k in np.flatnonzero(steps > HOLE_PERIODS * period)]
         holes += [(-np.inf, known[0]), (known[-1], np.inf)]
-    holes.sort()
-    longest, reached = 0.0, time_s[0]
-    for start, stop in holes:
-        longest = max(longest, min(start, time_s[-1]) - reached)
-        reached = max(reached, stop)
-    return float(max(longest, time_s[-1] - reached, 0.0)), slowest
+    found, reached = [], float(time_s[0])
+    for start, stop in [*sorted(holes), (float(time_s[-1]), np.inf)]:
+        if start > reached:
+            found.append((reached, float(min(start, time_s[-1]))))
+        reached = max(reached, float(stop))
+    return found, slowest
+
+
+def longest_stretch_s(run: Run, groups: list[tuple[str, ...]]) -> tuple[float, float]:
+    """Longest time in which every sensor gives readings without a hole, s, and the slowest sensor's period, s."""
+    found, slowest = whole_stretches(run, groups)
+    return max((stop - start for start, stop in found), default=0.0), slowest
 
 
 def compared_readings(run: Run, vehicle: Vehicle) -> list[str]:

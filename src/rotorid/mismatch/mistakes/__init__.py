@@ -13,8 +13,12 @@ from rotorid.steps import step
 @step("looking for mistakes in the recordings")
 def find_mistakes(recordings: RecordingSet) -> tuple[RecordingSet, tuple[Finding, ...], tuple[str, ...]]:
     """The set of a vehicle in flight as corrected, what was wrong with it, and notes for the reader."""
-    recordings, lost = dropout.find(ReadSet(recordings.name, recordings.vehicle, recordings.runs, recordings.held_out))
-    result = Result(recordings, (lost,) if lost else ())
+    before = ReadSet(recordings.name, recordings.vehicle, recordings.runs, recordings.held_out)
+    recordings, lost = dropout.find(before)
+    notes: tuple[str, ...] = ()
+    if lost:
+        recordings, notes = dropout.what_is_left(recordings, before, lost)
+    result = Result(recordings, (lost,) if lost else (), notes)
     for find in (units.find, connected, axes.find, rotor_layout.find, timing.find, vibration.find):
         result = result.then(find)
     last = result.recordings

@@ -2,41 +2,55 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rotorid.errors import InputError
 from rotorid.mismatch.decision.findings import Finding
-from rotorid.mismatch.mistakes.signals import COMMANDED, P_LIMIT, replace_columns, sensor_columns
-from rotorid.mismatch.plant.motion import stretches
+from rotorid.mismatch.mistakes.signals import COMMANDED, replace_columns, sensor_columns
+from rotorid.mismatch.plant.split import parts_of, split_runs
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
+from rotorid.recordings.held import (
+    SHORTEST_FREEZE_PERIODS,
+    SHORTEST_FREEZE_S,
+    SHORTEST_GAP_PERIODS,
+    SHORTEST_GAP_S,
+    at_the_end,
+    contradiction,
+    held,
+    noisy_columns,
+    standing_together,
+    stretches,
+)
+from rotorid.recordings.sufficient import (
+    LEAST_SINGLE_S,
+    LEAST_STRETCH_S,
+    channels_of,
+    driven_by,
+    longest_stretch_s,
+    moving_sensors,
+    rotor_groups,
+    whole_stretches,
+)
 
-SHORTEST_GAP_S = 0.3
-"""A held stretch counts from this length on; two that are closer are one."""
-SHORTEST_GAP_PERIODS = 12
-"""It counts from this many of the sensor's own periods on, a missing one as well."""
 SHORTEST_EMPTY_S = 1.0
 """Empty cells say themselves that nothing was read: a link that loses half a second now and then is no lost sensor."""
-SHORTEST_FREEZE_PERIODS = 8
-SHORTEST_FREEZE_S = 0.04
-"""Where all columns of a sensor stand still at once, a shorter stretch is no chance."""
 SHORTEST_STAND_S = 0.15
 STANDING = 0.2
 """A rotor below this share of what the others turn at, relative to its own habit, stands still."""
 IMPLAUSIBLE_THRUST = 0.45
 """A rotor that at its fastest gives less than this share of its part of the others' thrust is not being read."""
 LARGEST_UNTOUCHED_SHARE = 0.5
-SMOOTH = 0.3
-"""Second differences of a reading without noise are this share of its first ones at most; white noise has 1.7."""
+LEAST_OF_A_SIDE = 0.5
+"""Share of the fitted or held-out part of a single run in which every sensor must have readings."""
 PLAIN_CHANGE = 8.0
 """Times the noise by which a reading should have changed to be called held."""
 PLAIN_STEPS = 2.0
 """The same in steps of a coarse reading, which stands still until the load has changed by one."""
 OTHERS_GO_ON = 0.5
 """Share of the samples in which every other rotor's command changes while one stands still."""
-LEAST_JUMP = 5.0
-"""A jump is this many of the usual steps of a reading: what was held jumps back at its end."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +69,8 @@ class Dropout:
 
 def find(recordings: RecordingSet) -> tuple[RecordingSet, Finding | None]:
     """The set with dropouts blanked, and the finding."""
-    noisy = noisy_columns(recordings)
+    names = [n for own in sensor_columns(recordings.vehicle).values() for n in own]
+    noisy = noisy_columns(recordings.runs, names)
     found = [s for run in recordings.runs for s in in_run(run, recordings.vehicle, noisy)]
     if not found:
         return recordings, None
@@ -86,6 +101,81 @@ def find(recordings: RecordingSet) -> tuple[RecordingSet, Finding | None]:
     return replace_columns(recordings, change), finding
 
 
+def what_is_left(recordings: RecordingSet, before: RecordingSet, lost: Finding) -> tuple[RecordingSet, tuple[str, ...]]:
+    """The flights as they can be analysed where a sensor was lost for so long that a side of the split lacks it.
+
+    Of several runs the few that have next to nothing with every sensor are left out, else the sensor is left out of
+    all. A single run is cut to its longest stretch with every sensor, where that is long enough; else it loses the
+    sensor. With a sentence on what was done.
+
+    Parameters
+    ----------
+    recordings, before
+        The set with lost samples blanked, and as it was recorded.
+    lost
+        What was found.
+
+    Raises
+    ------
+    InputError
+        Nothing that can be compared is left.
+    """
+    vehicle = recordings.vehicle
+    sensors = {run.name: _sensors(run, vehicle, len(before.runs) == 1) for run in before.runs}
+    short = [run for run in recordings.runs if _lasts_s(run, sensors[run.name]) < LEAST_STRETCH_S]
+    if len(recordings.runs) == 1:
+        (run,) = recordings.runs
+        found, _ = whole_stretches(run, sensors[run.name])
+        sides = parts_of(recordings, split_runs(recordings))
+        if all(_share(side.runs[0], found) > LEAST_OF_A_SIDE for side in sides):
+            return recordings, ()
+        start, stop = max(found, key=lambda s: s[1] - s[0], default=(0.0, 0.0))
+        if stop - start >= LEAST_SINGLE_S:
+            inside = run.table[(run.time_s >= start) & (run.time_s <= stop)].reset_index(drop=True)
+            note = f"Of {run.name} only {start:.2f} to {stop:.2f} s are analysed, where every sensor has readings."
+            return replace(recordings, runs=(Run(run.name, inside),)), (note,)
+    elif not short:
+        return recordings, ()
+    elif 2 * len(short) < len(recordings.runs):
+        kept = tuple(run for run in recordings.runs if run not in short)
+        names = {run.name for run in kept}
+        held_out = tuple(n for n in recordings.held_out or () if n in names)
+        whole = bool(held_out) and set(held_out) != names
+        note = f"Left out: {', '.join(run.name for run in short)}, where a sensor was lost nearly throughout."
+        rest, more = what_is_left(
+            replace(recordings, runs=kept, held_out=held_out if whole else None),
+            replace(before, runs=tuple(r for r in before.runs if r.name in names)),
+            lost,
+        )
+        return rest, (note, *more)
+    gone = {n for own in sensors.values() for names in own if set(names) & set(lost.channels) for n in names}
+    runs = tuple(Run(r.name, r.table.drop(columns=[n for n in gone if n in r.table])) for r in recordings.runs)
+    if not all(driven_by(run, vehicle) and channels_of(run) for run in runs):
+        if len(runs) > 1:
+            return recordings, ()  # what the runs hold at other times may suffice
+        raise InputError(
+            f"set {recordings.name}: {lost.sentence.removesuffix('; these samples were left out.')}; without these "
+            "readings nothing is left that can be compared"
+        )
+    return replace(recordings, runs=runs), (f"Left out of every run: {', '.join(sorted(gone))}, lost for too long.",)
+
+
+def _sensors(run: Run, vehicle: Vehicle, alone: bool) -> list[tuple[str, ...]]:
+    """Sensors that a run is compared by: of several runs one without rotor speeds is compared by its commands."""
+    rotors = [names for names in rotor_groups(vehicle).values() if names and run.has(*names)]
+    return [*(rotors if alone else rotors[-1:]), *moving_sensors(run)]
+
+
+def _lasts_s(run: Run, sensors: list[tuple[str, ...]]) -> float:
+    return longest_stretch_s(run, sensors)[0]
+
+
+def _share(run: Run, stretches_s: list[tuple[float, float]]) -> float:
+    """Share of a run's time that lies in stretches, s."""
+    first, last = run.time_s[0], run.time_s[-1]
+    return sum(max(min(stop, last) - max(start, first), 0.0) for start, stop in stretches_s) / (last - first)
+
+
 def in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[Dropout]:
     """Every dropout of a run, column by column; `noisy` columns are known to have noise of their own."""
     found, flown = [], vehicle.kind == "flight"
@@ -94,40 +184,44 @@ def in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[Dropout]:
         if not present or (not flown and sensor in (*COMMANDED, "rotors")):
             continue  # on a stand rotors rest and turn evenly
         if sensor in COMMANDED:
-            found += standing_commands(run, present, noisy) if len(present) > 1 else []
+            found += standing_commands(run, vehicle, present, noisy) if len(present) > 1 else []
             continue
         zero = standing_rotors(run, vehicle, names) if sensor == "rotors" and len(present) == len(names) > 2 else {}
         frozen = []
         if len(present) > 1 and not zero and flown:
             alive = not noisy.isdisjoint(present)
-            frozen = held(run.time_s, run.array(tuple(present)), SHORTEST_FREEZE_S, SHORTEST_FREEZE_PERIODS, alive)
+            against = contradiction(run, vehicle, present)
+            values = run.array(tuple(present))
+            frozen = held(run.time_s, values, SHORTEST_FREEZE_S, SHORTEST_FREEZE_PERIODS, alive, against)
         for name in present:
             values = run.column(name)
             blank = missing(run.time_s, values)
             stands = zero.get(name, np.zeros(len(values), bool))
             found += _as_dropouts(run, name, "zero", stands) + _as_dropouts(run, name, "missing", blank & ~stands)
             rest = np.where(stands, np.nan, values)
-            for mask, p in [*held(run.time_s, rest[:, None], noisy=name in noisy), *frozen]:
+            against = contradiction(run, vehicle, [name]) if flown and sensor == "rotors" else None
+            for mask, p in [*held(run.time_s, rest[:, None], noisy=name in noisy, contradicted=against), *frozen]:
                 if flown or load_went_on(run, vehicle, values, mask):
                     found += _as_dropouts(run, name, "held", mask, p)
     return found
 
 
-def standing_commands(run: Run, names: list[str], noisy: set[str]) -> list[Dropout]:
-    """Stretches in which one rotor's command stands still while all others go on.
+def standing_commands(run: Run, vehicle: Vehicle, names: list[str], noisy: set[str]) -> list[Dropout]:
+    """Stretches in which one rotor's command stands still while all others go on, or all of them do in flight.
 
     A command at the end of its range may truly stand still: its motor gives all that it can. On the ground all commands
     stand still together.
     """
-    found = []
+    together = standing_together(run, vehicle, tuple(names))
+    found = [s for mask, p in together for name in names for s in _as_dropouts(run, name, "held", mask, p)]
     commands = run.array(tuple(names))
     moves = np.abs(np.diff(commands, axis=0, prepend=commands[:1])) > 0.0
     for k, name in enumerate(names):
         own = commands[:, k]
-        ends = np.nanmin(own), np.nanmax(own)
-        for mask, p in held(run.time_s, own[:, None], noisy=name in noisy):
+        against = contradiction(run, vehicle, [name])
+        for mask, p in held(run.time_s, own[:, None], noisy=name in noisy, contradicted=against):
             others = np.delete(moves[mask], k, axis=1).mean(axis=0)
-            if own[mask][0] not in ends and others.min() > OTHERS_GO_ON:
+            if not at_the_end(own, mask) and others.min() > OTHERS_GO_ON:
                 found += _as_dropouts(run, name, "held", mask, p)
     return found
 
@@ -185,92 +279,6 @@ def missing(time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
     for k in np.flatnonzero(gap > longest):
         mask[index[k] + 1 : index[k + 1]] = True
     return mask
-
-
-def held(
-    time_s: np.ndarray,
-    values: np.ndarray,
-    shortest_s: float = SHORTEST_GAP_S,
-    periods: int = SHORTEST_GAP_PERIODS,
-    noisy: bool = False,
-) -> list[tuple[np.ndarray, float]]:
-    """Stretches in which changing columns (n, k) all repeat one reading far longer than chance and habit allow.
-
-    At least `shortest_s` seconds and `periods` of the sensor's own periods long. Each as a mask (n,) with its p-value.
-    `noisy` says that other runs show noise of the sensor's own.
-    """
-    index = np.flatnonzero(np.isfinite(values).all(axis=1))
-    if len(index) < 100:
-        return []
-    v, t = values[index], time_s[index]
-    same = np.concatenate([[False], (np.diff(v, axis=0) == 0.0).all(axis=1)])
-    runs = [(a - 1, b) for a, b in stretches(same)]
-    if not runs:
-        return []
-    lengths = np.array([b - a for a, b in runs])
-    read = t[~same] if same.mean() > 0.4 else t
-    period = float(np.median(np.diff(read if len(read) > 1 else t)))
-    out = []
-    for (a, b), length in zip(runs, lengths, strict=True):
-        duration = t[b - 1] - t[a]
-        if duration < max(shortest_s, periods * period):
-            continue
-        # Stretches half as long or longer are of its own kind; the shorter ones show what chance and habit do.
-        others = lengths[lengths < length / 2]
-        habit = np.quantile(others, 0.99) if len(others) > 20 else 1
-        repeat = (others - 1).sum() / len(v)
-        p = float(min(1.0, len(v) * max(repeat, 1.0 / len(v)) ** (length / max(habit, 1))))
-        if p > P_LIMIT or length < 8 * habit or may_stand(v, a, b, noisy):
-            continue
-        mask = np.zeros(len(values), bool)
-        # The first of the repeated readings is a true one, but where it is a jump (to zero) by itself.
-        mask[index[a] + int(not jumps_to(v, a)) : index[b - 1] + 1] = True
-        out.append((mask, p))
-    return out
-
-
-def may_stand(values: np.ndarray, start: int, stop: int, noisy: bool) -> bool:
-    """Whether columns (n, k) that repeat one reading from `start` to `stop` may truly have stood still.
-
-    A sensor's own noise never does; `noisy` says that other runs show it. A simulator without noise hovers, or flies in
-    a plane, with readings that are exactly constant, and leaves them without a jump.
-    """
-    outside = [values[: start + 1], values[stop:]]
-    usual, bend = steps_and_bends(outside)
-    if usual == 0.0:
-        return not noisy
-    if bend > SMOOTH * usual:
-        return False
-    jump = float(np.abs(values[stop] - values[stop - 1]).max()) if stop < len(values) else 0.0
-    return jump < LEAST_JUMP * usual
-
-
-def jumps_to(values: np.ndarray, start: int) -> bool:
-    """Whether columns (n, k) come to the reading at `start` by a step far beyond their usual ones."""
-    usual, _ = steps_and_bends([values[: start + 1]])
-    return start > 0 and bool(np.abs(values[start] - values[start - 1]).max() > LEAST_JUMP * usual > 0)
-
-
-def steps_and_bends(parts: list[np.ndarray]) -> tuple[float, float]:
-    """Median size of the first and second differences of columns (n, k), where they move; 0 where they never do."""
-    step, bend = [np.zeros(0)], [np.zeros(0)]
-    for part in (p for p in parts if len(p) > 2):
-        first, second = (np.abs(np.diff(part, n=n, axis=0)).max(axis=1) for n in (1, 2))
-        step.append(first[first > 0])
-        bend.append(second[first[1:] > 0])
-    return tuple(float(np.median(x)) if len(x) else 0.0 for x in map(np.concatenate, (step, bend)))
-
-
-def noisy_columns(recordings: RecordingSet) -> set[str]:
-    """Columns that in some run show noise of their own."""
-
-    def noisy(run: Run, name: str) -> bool:
-        values = run.column(name)
-        usual, bend = steps_and_bends([values[np.isfinite(values)][:, None]])
-        return bend > SMOOTH * usual > 0
-
-    names = [n for own in sensor_columns(recordings.vehicle).values() for n in own]
-    return {n for n in names if any(run.has(n) and noisy(run, n) for run in recordings.runs)}
 
 
 def standing_rotors(run: Run, vehicle: Vehicle, names: tuple[str, ...]) -> dict[str, np.ndarray]:

@@ -13,12 +13,14 @@ from scipy.signal import welch
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form, Motion, not_testable_reason, rotor_thrusts
+from rotorid.errors import InputError
 from rotorid.mismatch.decision import rules
 from rotorid.mismatch.model.made import Memory
 from rotorid.mismatch.plant.estimated_velocity import made_from_accelerometer
 from rotorid.mismatch.plant.excess_noise import noise_factors
 from rotorid.mismatch.plant.motion import (
     HIGHEST_CUTOFF_HZ,
+    SHORTEST_SEGMENT_S,
     Segment,
     SensorNoise,
     analysis_rate_hz,
@@ -251,6 +253,11 @@ def prepare(
     for run in recordings.runs:
         segments += build_segments(run, vehicle, rate_hz, cutoff, shift_s, full_speed_rad_s=full)
         noisy += build_segments(run, vehicle, rate_hz, cutoff, shift_s, noise, draws_of(run, 0), full)
+    if not segments:
+        raise InputError(
+            f"set {recordings.name}: no stretch of {SHORTEST_SEGMENT_S:g} s in which every sensor has readings is left "
+            f"in {', '.join(run.name for run in recordings.runs)}"
+        )
     thinner = Thinner(rate_hz, cutoff)
     if len(noisy) == len(segments) and rules.COLOURED_NOISE(
         bool(factors := noise_factors(segments, noisy, vehicle, thinner))

@@ -23,7 +23,10 @@ from rotorid.mismatch.plant.regression import Fit
 from rotorid.mismatch.plant.rows import RUN_SCALE, Rows, Term
 from rotorid.recordings import RecordingSet, Split
 
-COMPARED = ("rotor_speed", "specific_force", "angular_velocity", "rotation", "velocity", "height", "voltage")
+COMPARED = (
+    "rotor_speed", "specific_force", "accelerometer", "angular_velocity", "gyroscope", "rotation", "velocity", "height",
+    "voltage",
+)  # fmt: skip
 """Quantities of a stretch that a model may need."""
 
 
@@ -80,7 +83,9 @@ def on_every_run(found: Fitted, recordings: RecordingSet, split: Split, unseen: 
 def comparable(segment: Segment, model: WrenchModel) -> bool:
     """Whether a stretch has every quantity that the model's rows are made of."""
     known = model.segments[0].motion
-    if segment.command is None and model.segments[0].command is not None:
+    first = model.segments[0]
+    own = ("command", "kinematic_specific_force", "kinematic_angular_velocity")
+    if any(getattr(segment, n) is None and getattr(first, n) is not None for n in own):
         return False
     return all(getattr(known, n) is None or getattr(segment.motion, n) is not None for n in COMPARED)
 

@@ -12,6 +12,7 @@ from rotorid.effects.contract import Motion
 from rotorid.mismatch.plant.height import quiet_height
 from rotorid.recordings import Run, Vehicle
 from rotorid.recordings import columns as c
+from rotorid.recordings.held import stretches
 from rotorid.recordings.signal import kernels
 
 SensorNoise = dict[str, np.ndarray]
@@ -368,9 +369,3 @@ def estimated_full_speed(vehicle: Vehicle, throttle: np.ndarray) -> float:
     weight = vehicle.mass_kg * vehicle.gravity_m_s2
     mean_square = float(np.nanmean(throttle**2, axis=0) @ vehicle.thrust_coefficients_n_s2())
     return float(np.sqrt(weight / mean_square))
-
-
-def stretches(good: np.ndarray) -> list[tuple[int, int]]:
-    """Start and stop (exclusive) of every run of True."""
-    edges = np.diff(np.concatenate([[0], good.astype(np.int8), [0]]))
-    return list(zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True))

@@ -10,12 +10,18 @@ have no clock and take the time of the message before them. Its estimate `EKF1` 
 The land detector calls idle, spool-up and the wait after landing flight: what is on the ground by the detector of all
 importers (`in_the_air.airborne`) is left out.
 
-Sources: ArduPilot, Onboard Message Log Messages; Motor order diagrams; parameters `SERVOn_FUNCTION`, `FRAME_TYPE`,
-`MOT_PWM_MIN`; `AP_MotorsMulticopter::get_pwm_output_min` for limits of 0.
+Outputs are motors only where the frame class says so: helicopters use motor functions for their servos, tricopters one
+for the servo of the tail. Those, and whatever is no multirotor of fixed rotors, are refused by name. Parameters may
+change within a log; each pulse is read by those that held then.
+
+Sources: ArduPilot, Onboard Message Log Messages; Motor order diagrams; parameters `SERVOn_FUNCTION`, `FRAME_CLASS`,
+`FRAME_TYPE`, `MOT_PWM_MIN`; `AP_MotorsMulticopter::get_pwm_output_min` for limits of 0; `AP_Motors::motor_frame_class`;
+`SRV_Channel.h`; `APM_BUILD_*` for the builds of `VER`.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -26,17 +32,64 @@ from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import in_the_air
-from rotorid.recordings.importers.clean import report_gaps
+from rotorid.recordings.importers.clean import one_sense, report_gaps
 from rotorid.recordings.importers.frames import continuous, quaternion_from_euler_frd
 from rotorid.recordings.importers.optional import needs
+from rotorid.recordings.importers.parameters import Parameters, Values
 from rotorid.recordings.importers.report import Fault
 
 KINDS = (
-    "IMU", "ACC", "GYR", "XKQ", "NKQ", "ATT", "XKF1", "NKF1", "EKF1", "RCOU", "ESC", "BAT", "CURR", "BARO", "RFND",
-    "EV", "PARM", "MSG",
+    "IMU", "ACC", "GYR", "XKQ", "NKQ", "ATT", "XKF1", "NKF1", "EKF1", "RCOU", "RCO2", "RCO3", "ESC", "BAT", "CURR",
+    "BARO", "RFND", "EV", "PARM", "MSG", "VER",
 )  # fmt: skip
-MOTORS = {33 + i: i for i in range(8)} | {82 + i: 8 + i for i in range(4)}
+MOTORS = {33 + i: i for i in range(8)} | {82 + i: 8 + i for i in range(4)} | {160 + i: 12 + i for i in range(20)}
 """`SERVOn_FUNCTION` to the number of the motor, from 0."""
+OUTPUTS = range(1, 33)
+MULTIROTORS = {1: 4, 2: 6, 3: 8, 4: 8, 5: 6, 12: 12, 14: 10}
+"""`FRAME_CLASS` of multirotors of fixed rotors to their number of motors."""
+SCRIPTED = (0, 15, 17)
+"""Frame classes whose motors are those that the output functions name: none chosen, a matrix of a script."""
+OTHER_CLASSES = {
+    6: "a helicopter, whose motor functions are the servos of its swash plate",
+    7: "a tricopter, whose tail rotor a servo tilts",
+    8: "a singlecopter, steered by vanes",
+    9: "a coaxial copter, steered by vanes",
+    10: "a tailsitter",
+    11: "a helicopter of two rotors, whose motor functions are the servos of its swash plates",
+    13: "a helicopter of four rotors, whose motor functions are the servos of their pitch",
+    16: "a vehicle whose rotors point in several directions",
+}
+"""`FRAME_CLASS` of what no vehicle.yaml can describe."""
+OTHER_BUILDS = {1: "a rover", 3: "a plane", 4: "an antenna tracker", 7: "a submarine", 12: "a blimp"}
+"""Build of the firmware (`VER.BU`) for what is no copter; 2 is Copter, 13 its helicopters."""
+OTHER_FIRMWARE = {
+    r"(ArduPlane|APM:Plane)\b": "a plane",
+    r"(ArduRover|APM:Rover|Rover)\b": "a rover",
+    r"ArduSub\b": "a submarine",
+    r"Blimp\b": "a blimp",
+    r"AntennaTracker\b": "an antenna tracker",
+    r".*\bFrame: HELI": OTHER_CLASSES[6],
+    r".*\bFrame: TRI": OTHER_CLASSES[7],
+    r".*\bFrame: SINGLE": OTHER_CLASSES[8],
+    r".*\bFrame: COAX": OTHER_CLASSES[9],
+}
+"""What a message of the start says where neither a parameter nor `VER` does (Copter 3.4 and before)."""
+TILTED_TYPES = {4: "V-tail", 5: "A-tail"}
+"""`FRAME_TYPE` of quadrotors whose rear rotors lean outwards."""
+CHANGED = (
+    (
+        r"MOT_PWM_(MIN|MAX)|SERVO\d+_FUNCTION|RCMAP_THROTTLE|RC\d+_(MIN|MAX)",
+        "throttle",
+        "each pulse is read by the value that held then",
+    ),
+    (
+        r"(Q_)?FRAME(_CLASS|_TYPE)?|AHRS_EKF_(USE|TYPE)",
+        "vehicle.yaml",
+        "the value that held for most of the flight is taken",
+    ),
+    (r"MOT_(THST_EXPO|SPIN_(MIN|MAX|ARM)|THST_HOVER|BAT_VOLT_(MIN|MAX))", "", "no column depends on it"),
+)
+"""Parameters on which a value depends, or that `rotorid parameters` states: names, column, what a change means."""
 ORDER_OF_FRAME = {1: "ardupilot", 12: "betaflight"}
 """`FRAME_TYPE` of a quadrotor to the key of `known.ORDERS`: X, and X with Betaflight's order."""
 LANDED, FLYING = 18, 28
@@ -45,6 +98,8 @@ GOOD, DOWN = 4, 25
 """Status of a range finder that reads, and the orientation of one that looks down."""
 PULSE_US = (1000.0, 2000.0)
 RPM = 2 * np.pi / 60
+HEAD, END = b"\xa3\x95", "END"
+"""First bytes of a message, and the key under which stands how many bytes of the last one came."""
 CLOCKS = {"TimeUS": 1e-6, "TimeMS": 1e-3}
 """Fields of a message's clock, to the seconds that they count in."""
 
@@ -52,7 +107,10 @@ Log = Mapping[str, pd.DataFrame]
 
 
 def read_messages(path: Path) -> dict[str, pd.DataFrame]:
-    """Tables of the messages that are needed by kind, with `time_s`; InputError where the file is no DataFlash log."""
+    """Tables of the messages that are needed by kind, with `time_s`, and `END` where the file ends inside a message.
+
+    InputError where the file is no DataFlash log.
+    """
     reader = needs("pymavlink.DFReader", "ardupilot", path)
     rows: dict[str, list[dict]] = {}
     latest_s = 0.0
@@ -61,14 +119,16 @@ def read_messages(path: Path) -> dict[str, pd.DataFrame]:
         while (message := log.recv_match(type=list(KINDS))) is not None:
             kind, row = message.get_type(), message.to_dict()
             stamp = next((row[name] * unit for name, unit in CLOCKS.items() if name in row), None)
-            if stamp is not None or kind == "EV":
+            if stamp is not None or kind in ("EV", "PARM"):
                 latest_s = row[c.TIME] = latest_s if stamp is None else float(stamp)
             rows.setdefault(kind, []).append(row)
+        if came := _cut_message(log.data_map, log.offset):
+            rows[END] = [{c.TIME: latest_s, "bytes": came}]
     except MemoryError:
         raise
     except Exception as error:  # pymavlink lets whatever a broken file raises through
         raise InputError(f"{path}: not a DataFlash log that can be read ({printable(error)[:150]})") from None
-    if not rows:
+    if not set(rows) - {END}:
         raise InputError(f"{path}: a DataFlash log with no message that is needed (IMU, ATT, RCOU)")
     tables = {}
     for kind, found in rows.items():
@@ -81,22 +141,61 @@ def read_messages(path: Path) -> dict[str, pd.DataFrame]:
     return tables
 
 
-def parameters(log: Log) -> dict[str, float]:
-    """The vehicle's parameters as the log states them last."""
+def _cut_message(data, offset: int) -> int:
+    """Bytes of the message that a file ends in, by where its reader stopped; 0 where it ends between two.
+
+    A single byte of a head is not looked for: every 256th whole file ends with it.
+    """
+    if bytes(data[max(offset - 3, 0) : max(offset - 1, 0)]) == HEAD:  # a head whose message did not come
+        return len(data) - offset + 3
+    return len(HEAD) if bytes(data[len(data) - len(HEAD) :]) == HEAD else 0
+
+
+def parameters(log: Log) -> Parameters:
+    """The vehicle's parameters over the log."""
     table = log.get("PARM")
     if table is None or not {"Name", "Value"} <= set(table):
-        return {}
-    stated = zip(table["Name"], table["Value"], strict=True)
-    return {name: float(value) for name, value in stated if isinstance(value, int | float) and np.isfinite(value)}
+        return Parameters({})
+    times = table[c.TIME] if c.TIME in table else np.zeros(len(table))
+    rows = zip(times, table["Name"], table["Value"], strict=True)
+    return Parameters.of((t, n, float(v)) for t, n, v in rows if isinstance(v, int | float) and np.isfinite(v))
 
 
-def order_of(values: Mapping[str, float]) -> tuple[str, list[Fault]]:
+def check_frame(log: Log, values: Values, where: object) -> None:
+    """InputError that names the vehicle where it is no multirotor of fixed rotors."""
+    kind = int(values.get("FRAME_CLASS", 0))
+    builds = log.get("VER", pd.DataFrame()).get("BU", [])
+    said = [str(line) for line in log.get("MSG", pd.DataFrame()).get("Message", [])]
+    build = next((int(b) for b in builds if b in OTHER_BUILDS), None)
+    other = next((name for text, name in OTHER_FIRMWARE.items() if any(re.match(text, line) for line in said)), None)
+    if values.get("Q_ENABLE", 0) > 0:
+        by, what = "Q_ENABLE 1", "a plane with rotors that lift it (a quadplane)"
+    elif build is not None:
+        by, what = f"VER.BU {build}", OTHER_BUILDS[build]
+    elif kind in OTHER_CLASSES:
+        by, what = f"FRAME_CLASS {kind}", OTHER_CLASSES[kind]
+    elif other is not None:
+        by, what = "its messages", other
+    elif "FRAME_CLASS" not in values and any(name.startswith(("H_SW", "H_RSC")) for name in values):
+        by, what = "parameters H_*", OTHER_CLASSES[6]
+    elif kind not in MULTIROTORS and kind not in SCRIPTED:
+        by, what = f"FRAME_CLASS {kind}", "of a frame that is not known here"
+    else:
+        return
+    raise InputError(f"{where}: the log is of {what} ({by}); only multirotors of fixed rotors can be imported")
+
+
+def order_of(values: Values) -> tuple[str, list[Fault]]:
     """Key of the rotors' order by frame class and type, empty where it is not known."""
     kind, form = int(values.get("FRAME_CLASS", 1)), int(values.get("FRAME_TYPE", values.get("FRAME", 1)))
     if kind == 1 and form in ORDER_OF_FRAME:
         return ORDER_OF_FRAME[form], []
     found = f"FRAME_CLASS {kind}, FRAME_TYPE {form}: the order of its rotors is not known here"
-    return "", [Fault("order", "vehicle.yaml", found, "taken from the template: check it", 0)]
+    faults = [Fault("order", "vehicle.yaml", found, "taken from the template: check it", 0)]
+    if kind == 1 and form in TILTED_TYPES:
+        found = f"FRAME_TYPE {form} is a {TILTED_TYPES[form]}, whose rear rotors lean outwards"
+        faults.append(Fault("tilted_rotor", "vehicle.yaml", found, "their thrust is taken along -z", 0))
+    return "", faults
 
 
 def _of_first(table: pd.DataFrame | None, key: str = "I") -> pd.DataFrame | None:
@@ -109,17 +208,32 @@ def _of_first(table: pd.DataFrame | None, key: str = "I") -> pd.DataFrame | None
     return table
 
 
-def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[Fault], np.ndarray]:
-    """Contract columns of a whole log, its faults, and where it flies (mask of rows)."""
+def _clock(log: Log, where: object) -> np.ndarray:
+    """Times of the inertial sensor's messages, else of the attitude's, s; InputError where there are none."""
     imu = _of_first(log.get("IMU"))
-    accelerometer, gyroscope = (imu, imu) if imu is not None else (_of_first(log.get("ACC")), _of_first(log.get("GYR")))
-    clock = next(
-        (t for t in (gyroscope, accelerometer, _of_first(log.get("ATT"))) if t is not None and len(t) > 1), None
-    )
+    offered = (imu, _of_first(log.get("GYR")), _of_first(log.get("ACC")), _of_first(log.get("ATT")))
+    clock = next((t for t in offered if t is not None and len(t) > 1), None)
     if clock is None:
         raise InputError(f"{where}: no message IMU, GYR or ATT to take the clock from")
-    faults: list[Fault] = []
-    grid = clock[c.TIME].to_numpy(float)
+    return clock[c.TIME].to_numpy(float)
+
+
+def in_flight(log: Log, where: object) -> Values:
+    """The parameters as they held for most of the flight."""
+    grid = _clock(log, where)
+    flown = _flying(log, grid)
+    return parameters(log).mostly(grid if flown is None or not flown.any() else grid[flown])
+
+
+def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[Fault], np.ndarray]:
+    """Contract columns of a whole log, its faults, and where it flies (mask of rows)."""
+    grid = _clock(log, where)
+    stated, values = parameters(log), in_flight(log, where)
+    check_frame(log, values, where)
+    faults = stated.faults(CHANGED, grid[0])
+    if END in log:
+        found = f"the file ends inside a message, after {int(log[END]['bytes'].iloc[0])} bytes of it"
+        faults.append(Fault("cut_off", "", found, "what came before is kept; the log stopped before its end", 0))
     keep = in_the_air.increasing(grid)
     if not keep.all():
         found = f"{int((~keep).sum())} messages do not move the clock on"
@@ -133,6 +247,8 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[Fault], np.ndar
         parts.append((tuple(names), table[c.TIME].to_numpy(float), table[list(fields)].to_numpy(float)))
         return True
 
+    imu = _of_first(log.get("IMU"))
+    accelerometer, gyroscope = (imu, imu) if imu is not None else (_of_first(log.get("ACC")), _of_first(log.get("GYR")))
     put(c.ANGULAR_VELOCITY, gyroscope, ("GyrX", "GyrY", "GyrZ"))
     put(c.SPECIFIC_FORCE, accelerometer, ("AccX", "AccY", "AccZ"))
     quaternion = next((t for k in ("XKQ", "NKQ") if (t := _of_first(log.get(k), "C")) is not None), None)
@@ -144,7 +260,7 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[Fault], np.ndar
         angles = np.radians(attitude[["Roll", "Pitch", "Yaw"]].to_numpy(float))
         parts.append((c.QUATERNION, attitude[c.TIME].to_numpy(float), quaternion_from_euler_frd(*angles.T)))
     estimate = next((t for k in ("XKF1", "NKF1") if (t := _of_first(log.get(k), "C")) is not None), None)
-    if estimate is None and (estimate := log.get("EKF1")) is not None and parameters(log).get("AHRS_EKF_USE") != 1:
+    if estimate is None and (estimate := log.get("EKF1")) is not None and values.get("AHRS_EKF_USE") != 1:
         found = "EKF1 did not fly the vehicle (AHRS_EKF_USE is not 1)"
         faults.append(Fault("estimate", "velocity, position", found, "columns left out", len(estimate)))
         estimate = None
@@ -154,40 +270,78 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[Fault], np.ndar
     below = log.get("RFND")
     if below is not None and {"Dist", "Stat", "Orient"} <= set(below):
         put((c.HEIGHT,), below[(below["Stat"] == GOOD) & (below["Orient"] == DOWN)], ("Dist",))
-    throttles, channels, more = _throttles(log, parameters(log))
-    faults += more
-    if throttles is not None:
-        parts.append((c.rotor_columns("throttle", len(channels)), *throttles))
-        parts += _speeds(log.get("ESC"), channels, grid, faults)
+    outputs = _outputs(log)
+    if outputs is None:
+        faults.append(Fault("no_command", "", "RCOU is not logged", "no throttle columns", 0))
+    else:
+        channels, more = _channels(values, outputs)
+        faults += more
+        parts += _throttles(outputs, stated, values.get("FRAME_CLASS", 0.0), faults)
+        parts += _speeds(log.get("ESC"), channels, faults)
     table = in_the_air.table_on(grid, parts)
     flying, ground = in_the_air.airborne(table, _flying(log, grid))
     return table, [*faults, *ground, *report_gaps(table)], flying
 
 
-def _throttles(log: Log, values: Mapping[str, float]):
-    """Times and throttles (n, k), the motors' channels (from 1), and faults."""
+def _outputs(log: Log) -> pd.DataFrame | None:
+    """Pulses of all outputs: `RCOU`, and `RCO2` and `RCO3`, which are written with it; None where none is logged."""
     outputs = _of_first(log.get("RCOU"))
-    if outputs is None:
-        return None, (), [Fault("no_command", "", "RCOU is not logged", "no throttle columns", 0)]
-    by_motor = {}
-    for number in range(1, 17):
+    for kind in ("RCO2", "RCO3"):
+        more = log.get(kind)
+        if outputs is not None and more is not None:
+            own = [c.TIME, *(name for name in more if re.fullmatch(r"C\d+", name) and name not in outputs)]
+            outputs = outputs.merge(more[own].drop_duplicates(c.TIME), on=c.TIME, how="left")
+    return outputs
+
+
+def _channels(values: Values, outputs: pd.DataFrame) -> tuple[dict[int, int], list[Fault]]:
+    """To each motor (from 0) its output (from 1) by frame class and output functions, and what of it is doubtful."""
+    count = MULTIROTORS.get(int(values.get("FRAME_CLASS", 0)), 0)
+    by_motor: dict[int, int] = {}
+    for number in OUTPUTS:
         motor = MOTORS.get(int(values.get(f"SERVO{number}_FUNCTION", -1)))
-        if motor is not None and f"C{number}" in outputs:
+        if motor is not None:
             by_motor.setdefault(motor, number)
-    faults = []
     if not by_motor:
-        by_motor = {i: i + 1 for i in range(4) if f"C{i + 1}" in outputs}
+        count = count or 4
         found = "no SERVOn_FUNCTION is a motor"
-        faults.append(Fault("order", "throttle", found, "channels 1 to 4 taken for motors 1 to 4", 0))
-    channels = tuple(by_motor[m] for m in sorted(by_motor))
-    low, high, more = _limits(values, len(outputs))
-    faults += more
-    pulses = outputs[[f"C{n}" for n in channels]].to_numpy(float)
-    throttle = np.where(pulses > 0, np.clip((pulses - low) / (high - low), 0, 1), np.nan)
-    return (outputs[c.TIME].to_numpy(float), throttle), channels, faults
+        action = f"channels 1 to {count} taken for motors 1 to {count}"
+        logged = {i: i + 1 for i in range(count) if f"C{i + 1}" in outputs}
+        return logged, [Fault("order", "throttle", found, action, 0)]
+    faults = []
+    count = count or max(by_motor) + 1
+    unused = [number for motor, number in sorted(by_motor.items()) if motor >= count]
+    if unused:
+        found = f"outputs {', '.join(map(str, unused))} have the functions of motors beyond the {count} of the frame"
+        faults.append(Fault("order", "throttle", found, "left out", 0))
+    for motor in range(count):
+        if (number := by_motor.get(motor)) is None:
+            found = f"no SERVOn_FUNCTION is motor {motor + 1} of {count}"
+        elif f"C{number}" not in outputs:
+            found = f"output {number} is not logged"
+        else:
+            continue
+        faults.append(Fault("no_command", f"throttle_{motor + 1}", found, "column left out", 0))
+    return {m: n for m, n in sorted(by_motor.items()) if m < count and f"C{n}" in outputs}, faults
 
 
-def _limits(values: Mapping[str, float], pulses: int) -> tuple[float, float, list[Fault]]:
+def _throttles(outputs: pd.DataFrame, stated: Parameters, frame: float, faults: list[Fault]) -> list[tuple]:
+    """Throttles with their times, each pulse by the parameters that held then."""
+    times, throttles = outputs[c.TIME].to_numpy(float), {}
+    for start, stop, values in stated.spans(CHANGED[0][0]):
+        inside = (times >= start) & (times < stop)
+        if not inside.any():
+            continue
+        low, high, more = _limits(values, int(inside.sum()))
+        faults += more
+        for motor, number in _channels({**values, "FRAME_CLASS": frame}, outputs)[0].items():
+            pulses = outputs.loc[inside, f"C{number}"].to_numpy(float)
+            own = throttles.setdefault(f"throttle_{motor + 1}", np.full(len(times), np.nan))
+            own[inside] = np.where(pulses > 0, np.clip((pulses - low) / (high - low), 0, 1), np.nan)
+    return [((name,), times, own) for name, own in sorted(throttles.items())]
+
+
+def _limits(values: Values, pulses: int) -> tuple[float, float, list[Fault]]:
     """Pulses (µs) of no and of full throttle, and a fault where the motors' own limits do not state them."""
 
     def stated(low: str, high: str) -> bool:
@@ -228,18 +382,21 @@ def _battery(log: Log, faults: list[Fault]) -> list[tuple]:
     return parts
 
 
-def _speeds(esc: pd.DataFrame | None, channels: tuple[int, ...], grid: np.ndarray, faults: list[Fault]) -> list[tuple]:
+def _speeds(esc: pd.DataFrame | None, channels: Mapping[int, int], faults: list[Fault]) -> list[tuple]:
     """Rotor speeds of `ESC` messages, whose instance is the output's number from 0."""
     if esc is None or not {"Instance", "RPM"} <= set(esc):
         return []
     found = []
-    for rotor, channel in enumerate(channels, 1):
+    for motor, channel in channels.items():
+        name = f"rotor_speed_{motor + 1}_rad_s"
         own = esc[esc["Instance"] == channel - 1]
-        if not len(own) or not own["RPM"].max() > 0:
+        if not len(own) or not own["RPM"].abs().max() > 0:
             seen = f"ESC holds no speed of output {channel}"
-            faults.append(Fault("speed_missing", f"rotor_speed_{rotor}_rad_s", seen, "column left out", 0))
+            faults.append(Fault("speed_missing", name, seen, "column left out", 0))
             continue
-        found.append(((f"rotor_speed_{rotor}_rad_s",), own[c.TIME].to_numpy(float), own[["RPM"]].to_numpy(float) * RPM))
+        speeds, more = one_sense(own[["RPM"]].to_numpy(float) * RPM, (name,))
+        faults += more
+        found.append(((name,), own[c.TIME].to_numpy(float), speeds))
     return found
 
 
@@ -259,6 +416,6 @@ def read_ardupilot(path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault], st
     """Every flight of a DataFlash log by name, what was found, and the key of the rotors' order."""
     log = read_messages(path)
     table, faults, flying = convert(log, path)
-    order, more = order_of(parameters(log))
+    order, more = order_of(in_flight(log, path))
     runs, cuts = in_the_air.flights(table, flying, path.name.split(".")[0], path)
     return runs, [*faults, *more, *cuts], order

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 
 from rotorid.recordings.columns import TIME
 from rotorid.recordings.importers.report import Fault
+
+REVERSED = 0.02
+"""Share of the largest value that a value of the other sign must exceed to be one: less is noise about zero."""
+UNEXPLAINED = 0.2
+"""Share of its variance that the motors of a mixer may leave of another motor's signal."""
 
 
 def drop_repeated_times(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
@@ -43,6 +50,46 @@ def join_rows(table: pd.DataFrame, time: str) -> pd.DataFrame:
     joined = table.groupby(pd.factorize(group)[0]).first()
     joined.attrs = table.attrs
     return joined.reset_index(drop=True)
+
+
+def one_sense(values: np.ndarray, names: Sequence[str], sense: float | None = None) -> tuple[np.ndarray, list[Fault]]:
+    """Magnitudes of signed speeds or commands (n, k) and a fault for each column that is reversed for a time.
+
+    A sign is a turning sense where a rotor keeps it. A cell against the usual sense of its column, or against `sense`
+    where it is given, is a rotor that pushes the other way, for which the contract has no column: it becomes empty.
+    """
+    values = np.asarray(values, float)
+    signs = np.sign(np.nansum(np.sign(values), axis=0)) if sense is None else np.full(values.shape[1], sense)
+    own = values * np.where(signs == 0, 1.0, signs)
+    largest = np.nanmax(np.abs(own), axis=0, initial=0.0, where=np.isfinite(own))
+    against = own < -REVERSED * largest
+    faults = [
+        Fault(
+            "reversed",
+            name,
+            f"against its usual sign in {lost.mean():.1%} of the samples",
+            "made empty cells",
+            int(lost.sum()),
+        )
+        for name, lost in zip(names, against.T, strict=True)
+        if lost.any()
+    ]
+    return np.where(against, np.nan, np.abs(own) if sense is None else np.clip(own, 0, None)), faults
+
+
+def further_motors(outputs: np.ndarray, motors: int) -> list[int]:
+    """Columns of outputs (n, k) beyond the first `motors` that are motors, too.
+
+    A mixer makes the signals of all motors from four demands, so that four of them say the others; a gimbal or a switch
+    they do not say.
+    """
+    known = outputs[np.isfinite(outputs).all(axis=1)]
+    if len(known) < 10 * (motors + 1):
+        return []
+    basis = np.column_stack([known[:, :motors], np.ones(len(known))])
+    rest = known[:, motors:] - basis @ np.linalg.lstsq(basis, known[:, motors:], rcond=None)[0]
+    moves, left = known[:, motors:].var(axis=0), rest.var(axis=0)
+    return [motors + k for k in range(len(moves)) if moves[k] > 0 and left[k] < UNEXPLAINED * moves[k]]
 
 
 def report_gaps(table: pd.DataFrame, factor: float = 3.0) -> list[Fault]:

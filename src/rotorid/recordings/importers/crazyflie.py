@@ -4,6 +4,11 @@ The firmware's frames: body forward-left-up, world z up (north-west-up), quatern
 1 front right (ccw), 2 rear right (cw), 3 rear left (ccw), 4 front left (cw); the joint regression of the
 recorded moments on the squared speeds confirms this order. Gyroscopes log degrees per second, accelerometers
 multiples of 9.81 m/s², motors fractions of 65,536.
+
+A state is read in each form that the firmware logs (`FORMS`), the first that is there. Roll, pitch and yaw are of its
+old body frame, in which pitch is positive nose up and so the contract's; the same sign is on the compressed pitch rate.
+Sources: crazyflie-firmware `stabilizer.c` (log groups, `compressState`), `stabilizer_types.h`, `kalman_core.c`,
+`quatcompress.h`.
 """
 
 from __future__ import annotations
@@ -19,7 +24,12 @@ from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.clean import blank_held, cut, drop_repeated_times, report_gaps, true_stretches
 from rotorid.recordings.importers.crazyflie_usd import read_usd_log
-from rotorid.recordings.importers.frames import continuous, half_turn_about_x, quaternion_to_frd_ned
+from rotorid.recordings.importers.frames import (
+    continuous,
+    half_turn_about_x,
+    quaternion_from_euler_frd,
+    quaternion_to_frd_ned,
+)
 from rotorid.recordings.importers.in_the_air import airborne, stretches_of
 from rotorid.recordings.importers.report import Fault
 
@@ -30,6 +40,57 @@ RPM = 2 * np.pi / 60
 ROTORS = range(1, 5)
 SPEEDS = list(c.rotor_columns("rotor_speed", 4))
 THROTTLES = list(c.rotor_columns("throttle", 4))
+
+
+def _decompressed(code: np.ndarray) -> np.ndarray:
+    """Quaternions (n, 4), scalar first, of the firmware's 32 bits: which of x, y, z, w is the largest, and the other
+    three with a sign and nine bits each."""
+    code = np.asarray(code).ravel().astype(np.int64)
+    largest = code >> 30
+    xyzw, rest = np.zeros((len(code), 4)), code.copy()
+    for k in (3, 2, 1, 0):
+        held = largest != k
+        size = (rest & 511) / 511 * np.sqrt(0.5)
+        xyzw[:, k] = np.where(held, np.where(rest & 512, -size, size), 0.0)
+        rest = np.where(held, rest >> 10, rest)
+    xyzw[np.arange(len(code)), largest] = np.sqrt(np.clip(1 - (xyzw**2).sum(axis=1), 0, None))
+    return xyzw[:, [3, 0, 1, 2]]
+
+
+def _of_old_angles(degrees: np.ndarray) -> np.ndarray:
+    """Quaternions of roll, pitch and yaw (n, 3), deg: pitch is positive nose up, yaw counter-clockwise."""
+    return quaternion_from_euler_frd(*np.radians(degrees * np.array([1.0, 1.0, -1.0])).T)
+
+
+def _names(group: str, names: str) -> tuple[str, ...]:
+    return tuple(f"{group}.{name}" for name in names.split())
+
+
+FORMS: dict[tuple[str, ...], tuple[tuple[tuple[str, ...], Callable[[np.ndarray], np.ndarray]], ...]] = {
+    c.POSITION: (
+        (_names("stateEstimate", "x y z"), half_turn_about_x),
+        (_names("stateEstimateZ", "x y z"), lambda v: half_turn_about_x(v / 1000)),
+        (_names("kalman", "stateX stateY stateZ"), half_turn_about_x),
+    ),
+    c.VELOCITY: (
+        (_names("stateEstimate", "vx vy vz"), half_turn_about_x),
+        (_names("stateEstimateZ", "vx vy vz"), lambda v: half_turn_about_x(v / 1000)),
+    ),
+    c.QUATERNION: (
+        (_names("stateEstimate", "qw qx qy qz"), quaternion_to_frd_ned),
+        (_names("kalman", "q0 q1 q2 q3"), quaternion_to_frd_ned),
+        (_names("stateEstimateZ", "quat"), lambda v: quaternion_to_frd_ned(_decompressed(v))),
+        (_names("stateEstimate", "roll pitch yaw"), _of_old_angles),
+        (_names("stabilizer", "roll pitch yaw"), _of_old_angles),
+    ),
+    c.ANGULAR_VELOCITY: (
+        (_names("gyro", "x y z"), lambda v: half_turn_about_x(np.radians(v))),
+        (_names("stateEstimateZ", "rateRoll ratePitch rateYaw"), lambda v: v / 1000 * np.array([1.0, 1.0, -1.0])),
+    ),
+    c.SPECIFIC_FORCE: ((_names("acc", "x y z"), lambda v: half_turn_about_x(v) * STANDARD_GRAVITY_M_S2),),
+}
+"""Names of the firmware's variables, in the order in which they are preferred, and how they become the contract's."""
+BODY_VELOCITY = _names("kalman", "statePX statePY statePZ")
 
 
 def _axes(table: pd.DataFrame, prefix: str, axes: str = "xyz") -> np.ndarray | None:
@@ -60,21 +121,25 @@ def convert(log: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
     def put(names, values):
         columns.update(zip(names, values.T, strict=True))
 
-    position, velocity = _axes(log, "stateEstimate."), _axes(log, "stateEstimate.v")
-    if position is not None:
-        put(c.POSITION, half_turn_about_x(position))
-    if velocity is not None:
-        put(c.VELOCITY, half_turn_about_x(velocity))
-    quaternion = _axes(log, "stateEstimate.q", "wxyz")
+    for names, forms in FORMS.items():
+        for own, turned in forms:
+            if set(own) <= set(log.columns):
+                put(names, turned(log[list(own)].to_numpy(float)))
+                break
+    if not set(c.VELOCITY) & set(columns) and set(BODY_VELOCITY) <= set(log.columns) and c.QUATERNION[0] in columns:
+        xyzw = np.column_stack([columns[n] for n in c.QUATERNION])[:, [1, 2, 3, 0]]
+        put(c.VELOCITY, Rotation.from_quat(xyzw).apply(half_turn_about_x(log[list(BODY_VELOCITY)].to_numpy(float))))
     estimate = _axes(log, "stateEstimate.a")
-    if quaternion is not None:
-        put(c.QUATERNION, quaternion_to_frd_ned(quaternion))
-    elif estimate is not None and {"stateEstimate.roll", "stateEstimate.yaw"} <= set(log.columns):
+    if (
+        c.QUATERNION[0] not in columns
+        and estimate is not None
+        and {"stateEstimate.roll", "stateEstimate.yaw"} <= set(log.columns)
+    ):
         roll, yaw = np.radians(log[["stateEstimate.roll", "stateEstimate.yaw"]].to_numpy(float)).T
         quaternion, force_g = attitude_without_pitch(estimate + [0, 0, 1], roll, yaw)
         put(c.QUATERNION, continuous(quaternion_to_frd_ned(quaternion)))
-        force = half_turn_about_x(force_g) * STANDARD_GRAVITY_M_S2
-        put(c.SPECIFIC_FORCE[1:], force[:, 1:])
+        if c.SPECIFIC_FORCE[0] not in columns:
+            put(c.SPECIFIC_FORCE[1:], (half_turn_about_x(force_g) * STANDARD_GRAVITY_M_S2)[:, 1:])
         faults.append(
             Fault(
                 "no_pitch",
@@ -84,11 +149,6 @@ def convert(log: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
                 len(log),
             )
         )
-    gyro, acceleration = _axes(log, "gyro."), _axes(log, "acc.")
-    if gyro is not None:
-        put(c.ANGULAR_VELOCITY, half_turn_about_x(np.radians(gyro)))
-    if acceleration is not None:
-        put(c.SPECIFIC_FORCE, half_turn_about_x(acceleration) * STANDARD_GRAVITY_M_S2)
     output = [f"pwm.m{i}_pwm" for i in ROTORS]
     request = [f"motor.m{i}" for i in ROTORS]
     drive = output if set(output) <= set(log.columns) else request
@@ -99,8 +159,9 @@ def convert(log: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
     speeds = [f"rpm.m{i}" for i in ROTORS]
     if set(speeds) <= set(log.columns):
         put(SPEEDS, log[speeds].to_numpy(float) * RPM)
-    if "pm.vbatMV" in log:
-        columns[c.BATTERY_VOLTAGE] = log["pm.vbatMV"].to_numpy(float) / 1000
+    for name, a_volt in (("pm.vbatMV", 1000), ("pm.vbat", 1)):
+        if name in log and c.BATTERY_VOLTAGE not in columns:
+            columns[c.BATTERY_VOLTAGE] = log[name].to_numpy(float) / a_volt
     table, repeated = drop_repeated_times(pd.DataFrame(columns))
     return table, faults + repeated
 

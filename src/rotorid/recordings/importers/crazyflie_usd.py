@@ -7,8 +7,8 @@ Layout, little-endian throughout::
     per event: u16 id | u32 time in ms (version 1) or u64 time in µs (version 2) | its variables packed
     u32 CRC-32 of everything before it
 
-Types are the characters of Python's `struct`: f float, B H I unsigned, b h i signed integers.
-Source: bitcraze/crazyflie-firmware, `tools/usdlog/cfusdlog.py` (the format, none of its code).
+Types are the characters of Python's `struct`: f float, e half a float, B H I unsigned, b h i signed integers.
+Source: bitcraze/crazyflie-firmware, `usddeck.c` and `tools/usdlog/cfusdlog.py` (the format, none of its code).
 """
 
 from __future__ import annotations
@@ -25,8 +25,10 @@ from rotorid.errors import InputError
 from rotorid.recordings.importers.report import Fault
 
 MAGIC = 0xBC
+CHECKSUM = 4
+"""Bytes of it at the end of a log."""
 TIME = "time_s"
-TYPES = {"f": "<f4", "d": "<f8", "b": "i1", "B": "u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4"}
+TYPES = {"e": "<f2", "f": "<f4", "d": "<f8", "b": "i1", "B": "u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4"}
 TYPES |= {"q": "<i8", "Q": "<u8"}
 
 
@@ -82,39 +84,22 @@ def decode_usd_log(data: bytes, where: str = "log") -> tuple[dict[str, pd.DataFr
     is kept; a file that is no uSD log raises InputError.
     """
     types, version, offset = _event_types(data, where)
-    faults: list[Fault] = []
-    (stored,) = struct.unpack_from("<I", data, len(data) - 4)
-    if crc32(data[:-4]) != stored:
-        faults.append(
-            Fault(
-                "checksum",
-                "",
-                f"CRC-32 is {crc32(data[:-4]):08x}, file says {stored:08x}",
-                "kept; bytes may be damaged",
-                1,
-            )
-        )
-    end = len(data) - 4
+    whole = crc32(data[:-CHECKSUM]) == struct.unpack("<I", data[-CHECKSUM:])[0]
+    end = len(data) - CHECKSUM * whole  # of a log that is cut off the last bytes are no checksum
     offsets: dict[int, list[int]] = {identifier: [] for identifier in types}
+    unknown, inside = None, None
     while offset + 2 <= end:
         identifier = data[offset] | data[offset + 1] << 8
         kind = types.get(identifier)
         if kind is None:
-            faults.append(
-                Fault(
-                    "unknown_event",
-                    "",
-                    f"event id {identifier} at byte {offset} is not in the header",
-                    f"{end - offset} bytes after it left out",
-                    1,
-                )
-            )
+            unknown = identifier
             break
         if offset + kind.dtype.itemsize > end:
-            faults.append(Fault("cut_off", "", f"last event ({kind.name}) is cut off", "left out", 1))
+            inside = kind
             break
         offsets[identifier].append(offset)
         offset += kind.dtype.itemsize
+    faults = _faults_of_end(data, offset, whole, unknown, inside)
     raw = np.frombuffer(data, np.uint8)
     scale = 1e-6 if version == 2 else 1e-3
     tables = {}
@@ -125,6 +110,25 @@ def decode_usd_log(data: bytes, where: str = "log") -> tuple[dict[str, pd.DataFr
         columns |= {name: rows[name].astype(float) for name in kind.variables}
         tables[kind.name] = pd.DataFrame(columns)
     return tables, faults
+
+
+def _faults_of_end(data: bytes, offset: int, whole: bool, unknown: int | None, inside: EventType | None) -> list[Fault]:
+    """What is wrong with a log whose events end at an offset: with an event that is not known, or inside one."""
+    rest, faults = len(data) - offset, []
+    checked = rest == CHECKSUM  # exactly a checksum follows, right or wrong
+    if rest <= CHECKSUM:
+        unknown = None  # bytes of a checksum are no event
+    if unknown is not None:
+        found = f"event id {unknown} at byte {offset} is not in the header"
+        faults.append(Fault("unknown_event", "", found, f"{rest - CHECKSUM} bytes after it left out", 1))
+    if not whole and (checked or unknown is not None):
+        stored = struct.unpack("<I", data[-CHECKSUM:])[0]
+        found = f"CRC-32 is {crc32(data[:-CHECKSUM]):08x}, file says {stored:08x}"
+        faults.insert(0, Fault("checksum", "", found, "kept; bytes may be damaged", 1))
+    elif inside is not None or not (whole or unknown is not None):
+        found = f"the file ends inside an event ({inside.name})" if inside else "the file ends without its checksum"
+        faults.append(Fault("cut_off", "", found, "what came before is kept; the log stopped before its end", 1))
+    return faults
 
 
 def read_usd_log(path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault]]:

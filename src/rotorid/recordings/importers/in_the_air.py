@@ -184,14 +184,17 @@ def without_pauses(up: np.ndarray, time_s: np.ndarray) -> np.ndarray:
 
 
 def flights(
-    table: pd.DataFrame, flying: np.ndarray, name: str, where: object
+    table: pd.DataFrame, flying: np.ndarray, name: str, where: object, jumps: np.ndarray | None = None
 ) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
     """Every flight of a table by name, take-off and landing left out, its clock at zero; InputError where none is.
 
-    Where the table begins or ends in the air nothing is left out there.
+    Where the table begins or ends in the air nothing is left out there. No run holds a row of `jumps` (n,), however
+    few these are.
     """
     time_s = table[c.TIME].to_numpy(float)
     flying = without_pauses(flying, time_s)
+    if jumps is not None:
+        flying &= ~jumps
     found = _long_enough(flying, time_s)
     if not found:
         longest = max((b - a for a, b in true_stretches(flying, time_s, 0.0)), default=0.0)

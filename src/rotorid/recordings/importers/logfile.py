@@ -174,8 +174,8 @@ def _px4(path: Path) -> Imported:
         converted = px4_ulog.convert(log, rotors)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    known, faults = px4_vehicle(log.parameters, rotors)
-    runs, cuts = in_the_air.flights(converted.table, converted.flying, path.stem, path)
+    known, faults = px4_vehicle(px4_ulog.in_flight(log), rotors)
+    runs, cuts = in_the_air.flights(converted.table, converted.flying, path.stem, path, converted.jumps)
     axes = "PX4's: body forward-right-down, world north-east-down, as the contract's"
     return Imported("px4", runs, (*converted.faults, *faults, *cuts), axes, known, speed_unit="rpm")
 

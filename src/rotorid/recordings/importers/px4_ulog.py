@@ -6,13 +6,17 @@ value stands in the row nearest in time, so nothing is interpolated.
 
 What PX4 marks as invalid is a missing sample: positions and velocities by `xy_valid`, `z_valid`, `v_xy_valid`,
 `v_z_valid`, the height by `dist_bottom_valid`, a speed controller by `esc_online_flags`, a battery by `connected`,
-a current of -1. Position, velocity and attitude are the flight controller's estimates.
+a current of -1. Position, velocity and attitude are the flight controller's estimates; where it resets one of them, a
+run ends. Parameters may change within a log; each throttle is read by those that held then.
+
+Sources: PX4 `msg/`, `src/modules/control_allocator/module.yaml`, `src/lib/mixer_module`; the ULog file format.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -23,21 +27,44 @@ from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import in_the_air
-from rotorid.recordings.importers.clean import drop_repeated_times, report_gaps
+from rotorid.recordings.importers.clean import drop_repeated_times, further_motors, one_sense, report_gaps
 from rotorid.recordings.importers.frames import continuous
+from rotorid.recordings.importers.parameters import Parameters, Values
 from rotorid.recordings.importers.report import Fault
 
 RPM = 2 * np.pi / 60
 FIRST_MOTOR = 101
 """Number of motor 1 among PX4's output functions."""
-ROTORS_OF_TYPE = {2: 4, 13: 6, 14: 8, 15: 3, 29: 12}
-"""Rotors by MAV_TYPE; only multirotors are known here."""
-OTHER_TYPES = {1: "a fixed wing", 4: "a helicopter", 10: "a rover", 11: "a boat", 12: "a submarine"}
+MOST_MOTORS = 12
+ROTORS_OF_TYPE = {0: 0, 2: 4, 13: 6, 14: 8, 29: 12, 35: 10, 43: 0}
+"""Rotors by MAV_TYPE of multirotors; 0 where the type states no number."""
+OTHER_TYPES = {1: "a fixed wing", 3: "a coaxial helicopter", 4: "a helicopter", 7: "an airship", 10: "a rover"}
+OTHER_TYPES |= {11: "a boat", 12: "a submarine", 15: "a tricopter, whose tail rotor a servo tilts"}
 OTHER_TYPES |= {n: "a VTOL" for n in range(19, 26)}
+OTHER_AIRFRAMES = {1: "a fixed wing", 2: "a VTOL", 3: "a VTOL", 4: "a VTOL", 5: "a rover", 6: "a rover", 13: "a rover"}
+OTHER_AIRFRAMES |= {7: "a vehicle whose motors point in several directions", 8: "a multirotor with rotors that tilt"}
+OTHER_AIRFRAMES |= {n: "a helicopter" for n in (10, 11, 12)} | {n: "a spacecraft" for n in (14, 15)}
+"""CA_AIRFRAME of what is no multirotor of fixed rotors."""
+CHANGED = (
+    (r"THR_MDL_FAC|CA_R_REV|PWM_(MAIN|AUX)_\w+", "throttle", "each value is read by what held then"),
+    (r"CA_ROTOR\w+|CA_AIRFRAME|MAV_TYPE", "vehicle.yaml", "the value that held for most of the flight is taken"),
+    (r"MPC_THR_HOVER|EKF2_BCOEF_[XY]|EKF2_MCOEF", "", "no column depends on it"),
+)
+"""Parameters on which a value depends, or that `rotorid parameters` states: names, column, what a change means."""
 PULSE_US = (1000.0, 2000.0)
 """Pulse widths of no and full throttle where no parameter states them."""
 PLAUSIBLE_PULSE_US = (500.0, 2500.0)
 AROUND_RESET_S = 0.2
+RESETS = (
+    ("vehicle_local_position", "xy_reset_counter", ("delta_xy[0]", "delta_xy[1]"), 0.02),
+    ("vehicle_local_position", "z_reset_counter", ("delta_z",), 0.02),
+    ("vehicle_local_position", "vxy_reset_counter", ("delta_vxy[0]", "delta_vxy[1]"), 0.02),
+    ("vehicle_local_position", "vz_reset_counter", ("delta_vz",), 0.02),
+    ("vehicle_local_position", "heading_reset_counter", ("delta_heading",), 0.01),
+    ("vehicle_attitude", "quat_reset_counter", tuple(f"delta_q_reset[{i}]" for i in (1, 2, 3)), 0.005),
+)
+"""What the estimator sets anew at once: topic, counter, the fields that hold by how much, and how much of it (m, m/s,
+rad; half of the angle) is within the noise of an estimate."""
 ARMED = 2
 
 Topics = Mapping[str, Sequence[Mapping[str, np.ndarray]]]
@@ -45,24 +72,45 @@ Topics = Mapping[str, Sequence[Mapping[str, np.ndarray]]]
 
 @dataclass(frozen=True)
 class Px4Log:
-    """What is read of a log: instances of each topic in order, parameters at the start, seconds lost, damage."""
+    """What is read of a log: instances of each topic in order, parameters, seconds lost, damage, bytes of a message in
+    which the file ends."""
 
     topics: Topics
-    parameters: Mapping[str, float] = field(default_factory=dict)
+    parameters: Parameters = Parameters({})
     lost_s: tuple[float, ...] = ()
     damaged: bool = False
+    rest: int = 0
 
 
 @dataclass(frozen=True)
 class Converted:
     """A whole log in contract columns.
 
-    `flying` (n,) says in which rows the vehicle is in the air, as far as the log shows.
+    `flying` (n,) says in which rows the vehicle is in the air, as far as the log shows; `jumps` (n,) in which the
+    estimator is reset, so that no run may hold them.
     """
 
     table: pd.DataFrame
     faults: list[Fault]
     flying: np.ndarray
+    jumps: np.ndarray
+
+
+class _Subscriptions(dict):
+    """pyulog's subscriptions by their number: one that is taken by another keeps what it has received."""
+
+    def __setitem__(self, number: int, subscription) -> None:
+        if number in self:
+            super().__setitem__(-1 - len(self), self[number])
+        super().__setitem__(number, subscription)
+
+
+class _Reader(ULog):
+    """pyulog's reader, which forgets what came before a topic is subscribed once more under the same number."""
+
+    def _load_file(self, *arguments, **named) -> None:
+        self._subscriptions = _Subscriptions()
+        super()._load_file(*arguments, **named)
 
 
 def open_log(path: Path) -> Px4Log:
@@ -70,26 +118,76 @@ def open_log(path: Path) -> Px4Log:
     if not Path(path).is_file():
         raise InputError(f"{path}: file is missing")
     try:
-        log = ULog(str(path))
+        log = _Reader(str(path))
     except MemoryError:
         raise
     except Exception as error:
         raise InputError(f"{path}: not a ULog file that can be read ({printable(error)[:150]})") from None
-    topics: dict[str, list[Mapping[str, np.ndarray]]] = {}
+    parts: dict[tuple[str, int], list[Mapping[str, np.ndarray]]] = {}
     for dataset in sorted(log.data_list, key=lambda d: d.multi_id):
         if "timestamp" in dataset.data:  # a damaged format may have lost it
-            topics.setdefault(dataset.name, []).append(dataset.data)
+            parts.setdefault((dataset.name, dataset.multi_id), []).append(dataset.data)
+    topics: dict[str, list[Mapping[str, np.ndarray]]] = {}
+    for (name, _), found in parts.items():
+        topics.setdefault(name, []).append(_joined(found))
+    changed = ((at, name, value) for at, name, value in log.changed_parameters if isinstance(value, int | float))
     return Px4Log(
-        topics, dict(log.initial_parameters), tuple(d.duration / 1000 for d in log.dropouts), log.file_corruption
+        topics,
+        Parameters.of(changed, log.initial_parameters),
+        tuple(d.duration / 1000 for d in log.dropouts),
+        log.file_corruption,
+        0 if log.file_corruption else _cut_message(Path(path).read_bytes()),
     )
 
 
+def _joined(parts: Sequence[Mapping[str, np.ndarray]]) -> Mapping[str, np.ndarray]:
+    """One instance of a topic from those that it was subscribed as one after the other, in order of time."""
+    if len(parts) == 1:
+        return parts[0]
+    fields = set.intersection(*(set(part) for part in parts))
+    order = np.argsort(np.concatenate([part["timestamp"] for part in parts]), kind="stable")
+    return {name: np.concatenate([part[name] for part in parts])[order] for name in fields}
+
+
+def _cut_message(data: bytes) -> int:
+    """Bytes of the message that a ULog file ends in; 0 where it ends between two."""
+    at = 16
+    while at + 3 <= len(data):
+        stop = at + 3 + int.from_bytes(data[at : at + 2], "little")
+        if stop > len(data):
+            break
+        at = stop
+    return len(data) - at
+
+
+def in_flight(log: Px4Log) -> Values:
+    """The parameters as they held for most of the flight."""
+    times = _clock(log.topics)
+    if not log.parameters.changes or not len(times):
+        return log.parameters.start
+    flown = _flying(log, times)
+    return log.parameters.mostly(times if flown is None or not flown.any() else times[flown])
+
+
 def rotor_count(log: Px4Log) -> int:
-    """Number of rotors by the log's parameters (4 where they say nothing); InputError if it is no multirotor."""
-    kind = int(log.parameters.get("MAV_TYPE", 2))
-    if kind in OTHER_TYPES:
-        raise InputError(f"the log is of {OTHER_TYPES[kind]} (MAV_TYPE {kind}); only multirotors can be imported")
-    return int(log.parameters.get("CA_ROTOR_COUNT", 0)) or ROTORS_OF_TYPE.get(kind, 4)
+    """Number of rotors by the log's parameters, else by the motors that it drives, else 4; InputError if it is no
+    multirotor of fixed rotors."""
+    values = in_flight(log)
+    kind, airframe = int(values.get("MAV_TYPE", 2)), int(values.get("CA_AIRFRAME", 0))
+    if kind not in ROTORS_OF_TYPE or airframe in OTHER_AIRFRAMES:
+        what, by = OTHER_TYPES.get(kind, "a vehicle that is not known here"), f"MAV_TYPE {kind}"
+        if kind in ROTORS_OF_TYPE:
+            what, by = OTHER_AIRFRAMES[airframe], f"CA_AIRFRAME {airframe}"
+        raise InputError(f"the log is of {what} ({by}); only multirotors can be imported")
+    stated = int(values.get("CA_ROTOR_COUNT", 0)) or (ROTORS_OF_TYPE[kind] if "MAV_TYPE" in values else 0)
+    return stated or _driven_motors(log.topics) or 4
+
+
+def _driven_motors(topics: Topics) -> int:
+    """Number of motors to which `actuator_motors` gives a value; the others are NaN throughout."""
+    motors = _first(topics, "actuator_motors")
+    given = [i for i, name in enumerate(_indexed("control", MOST_MOTORS), 1) if np.isfinite(motors.get(name, [])).any()]
+    return max(given, default=0)
 
 
 # Clocks -------------------------------------------------------------------------------------------
@@ -140,14 +238,17 @@ def _throttles(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray,
     motors = _first(log.topics, "actuator_motors")
     values = _stack(motors, _indexed("control", rotors))
     if values is not None:
-        values, faults = np.clip(values, 0, None), []
-        curve = float(log.parameters.get("THR_MDL_FAC", 0.0))
-        if 0 < curve <= 1:  # PX4 turns the thrust asked for into the signal of the motor by this curve
-            half = (1 - curve) / (2 * curve)
-            values = np.sqrt(half**2 + values / curve) - half
-            seen = f"THR_MDL_FAC is {curve:g}: actuator_motors holds thrusts"
-            faults.append(Fault("unit", names, seen, "turned into signals by PX4's own curve", len(values)))
-        return values, _time(motors, sampled=False), faults
+        times = _time(motors, sampled=False)
+        faults = _more_rotors("actuator_motors", _driven_motors(log.topics), rotors)
+        values, reversed_ = one_sense(values, c.rotor_columns("throttle", rotors), 1.0)
+        for start, stop, stated in log.parameters.spans(CHANGED[0][0]):
+            inside, curve = (times >= start) & (times < stop), float(stated.get("THR_MDL_FAC", 0.0))
+            if 0 < curve <= 1 and inside.any():  # PX4 turns the thrust asked for into the signal by this curve
+                half = (1 - curve) / (2 * curve)
+                values[inside] = np.sqrt(half**2 + values[inside] / curve) - half
+                seen = f"THR_MDL_FAC is {curve:g}: actuator_motors holds thrusts"
+                faults.append(Fault("unit", names, seen, "turned into signals by PX4's own curve", int(inside.sum())))
+        return values, times, faults + reversed_
     instances = log.topics.get("actuator_outputs", [])
     if not instances:
         found = "neither actuator_motors nor actuator_outputs is logged"
@@ -155,11 +256,20 @@ def _throttles(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray,
     return _from_pulses(log, instances, rotors, names)
 
 
+def _more_rotors(topic: str, driven: int, rotors: int) -> list[Fault]:
+    """A fault where a topic has motors beyond the vehicle's."""
+    if driven <= rotors:
+        return []
+    found = f"{topic} drives {driven} motors, the log's parameters state {rotors}"
+    return [Fault("order", "", found, "the others are left out; check CA_ROTOR_COUNT and MAV_TYPE", 0)]
+
+
 def _from_pulses(log: Px4Log, instances, rotors: int, names: str):
     """Throttles of `actuator_outputs`, pulse widths in µs."""
-    outputs = _outputs_of_motors(log.parameters, rotors)
+    flown = in_flight(log)
+    port, outputs = _outputs_of_motors(flown, rotors)
     if outputs is None:
-        found = "no output of PWM_MAIN_FUNC* is a motor, and actuator_motors is not logged"
+        found = f"no output of PWM_MAIN_FUNC* or PWM_AUX_FUNC* is motor {port}, and actuator_motors is not logged"
         return None, np.zeros(0), [Fault("no_command", "", found, "no throttle columns", 0)]
     faults = []
     stacks = [_stack(data, [f"output[{k}]" for k in outputs]) for data in instances]
@@ -171,41 +281,60 @@ def _from_pulses(log: Px4Log, instances, rotors: int, names: str):
     if len(instances) > 1:
         found = f"{len(instances)} instances of actuator_outputs"
         faults.append(Fault("instances", names, found, f"instance {chosen}, whose outputs move, taken", 0))
-    pulses = stacks[chosen]
+    if not any("_FUNC" in name for name in flown):  # no output states what it is
+        every = _stack(instances[chosen], [f for f in _indexed("output", 16) if f in instances[chosen]])
+        faults += _more_rotors("actuator_outputs", rotors + len(further_motors(every, rotors)), rotors)
+    times, pulses = _time(instances[chosen], sampled=False), stacks[chosen]
     turning = pulses[pulses > 0]
     if len(turning) and not (turning.min() >= PLAUSIBLE_PULSE_US[0] and turning.max() <= PLAUSIBLE_PULSE_US[1]):
         found = f"outputs from {turning.min():g} to {turning.max():g} are no pulse widths in µs"
         return None, np.zeros(0), [*faults, Fault("unit", names, found, "no throttle columns", len(pulses))]
-    low, high, stated = _pulse_range(log.parameters, outputs)
-    if not stated:
-        found = "no parameter states the pulse widths of no and full throttle"
-        faults.append(Fault("unit", names, found, f"taken as {low[0]:g} and {high[0]:g} µs", len(pulses)))
-    throttle = (pulses - low) / (high - low)
+    throttle = np.full(pulses.shape, np.nan)
+    for start, stop, values in log.parameters.spans(CHANGED[0][0]):
+        inside = (times >= start) & (times < stop)
+        low, high, stated = _pulse_range(values, port, outputs)
+        throttle[inside] = (pulses[inside] - low) / (high - low)
+        if not stated and inside.any():
+            found = "no parameter states the pulse widths of no and full throttle"
+            action = f"taken as {low[0]:g} and {high[0]:g} µs"
+            faults.append(Fault("unit", names, found, action, int(inside.sum())))
+    both = [i for i in range(rotors) if int(flown.get("CA_R_REV", 0)) >> i & 1]  # 0 in the middle of their range
+    throttle[:, both], backwards = one_sense(
+        2 * throttle[:, both] - 1, [c.rotor_columns("throttle", rotors)[i] for i in both], 1.0
+    )
     outside = (throttle < -0.01) | (throttle > 1.01)
     if outside.any():
         found = f"{outside.any(axis=1).mean():.0%} of the rows lie outside the range (disarmed motors get less)"
         faults.append(Fault("range", names, found, "cut off at 0 and 1", int(outside.any(axis=1).sum())))
-    return np.clip(throttle, 0, 1), _time(instances[chosen], sampled=False), faults
+    return np.clip(throttle, 0, 1), times, faults + backwards
 
 
-def _outputs_of_motors(parameters: Mapping[str, float], rotors: int) -> list[int] | None:
-    """Indices of the outputs that drive motors 1 to `rotors`; the first ones where no function is stated."""
-    functions = {int(v): int(k.removeprefix("PWM_MAIN_FUNC")) for k, v in parameters.items() if "PWM_MAIN_FUNC" in k}
-    if not functions:
-        return list(range(rotors))
-    wanted = [FIRST_MOTOR + i for i in range(rotors)]
-    return [functions[w] - 1 for w in wanted] if set(wanted) <= set(functions) else None
+def _outputs_of_motors(parameters: Values, rotors: int) -> tuple[str | int, list[int] | None]:
+    """The port (`MAIN` or `AUX`) and the indices of its outputs that drive motors 1 to `rotors`; the first ones of
+    `MAIN` where no function is stated, and the number of a motor that has no output where one is missing."""
+    by_port, stated = {}, False
+    for port in ("MAIN", "AUX"):
+        named = rf"PWM_{port}_FUNC(\d+)"
+        functions = {int(v): int(m[1]) for k, v in parameters.items() if (m := re.fullmatch(named, k))}
+        by_port[port] = [functions.get(FIRST_MOTOR + i) for i in range(rotors)]
+        stated |= bool(functions)
+    if not stated:
+        return "MAIN", list(range(rotors))
+    port, motors = min(by_port.items(), key=lambda item: item[1].count(None))
+    return (motors.index(None) + 1, None) if None in motors else (port, [k - 1 for k in motors])
 
 
-def _pulse_range(parameters: Mapping[str, float], outputs: Sequence[int]) -> tuple[np.ndarray, np.ndarray, bool]:
+def _pulse_range(parameters: Values, port: str, outputs: Sequence[int]) -> tuple[np.ndarray, np.ndarray, bool]:
     """Pulse widths of no and full throttle by output, µs, and whether a parameter states them."""
     ends, stated = [], True
     for word, default in zip(("MIN", "MAX"), PULSE_US, strict=True):
-        common = next((parameters[k] for k in (f"PWM_MAIN_{word}", f"PWM_{word}") if parameters.get(k, 0) > 0), None)
-        own = [parameters.get(f"PWM_MAIN_{word}{k + 1}", -1) for k in outputs]
+        common = next((parameters[k] for k in (f"PWM_{port}_{word}", f"PWM_{word}") if parameters.get(k, 0) > 0), None)
+        own = [parameters.get(f"PWM_{port}_{word}{k + 1}", -1) for k in outputs]
         stated &= common is not None or all(v > 0 for v in own)
         ends.append(np.array([v if v > 0 else (common or default) for v in own], float))
-    return ends[0], ends[1], stated
+    reverse = [bool(int(parameters.get(f"PWM_{port}_REV", 0)) >> k & 1) for k in outputs]
+    low, high = ends
+    return np.where(reverse, high, low), np.where(reverse, low, high), stated
 
 
 def _speeds(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray, list[Fault]]:
@@ -221,10 +350,12 @@ def _speeds(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray, li
         found = f"esc_status holds {len(slots)} controllers for {rotors} rotors"
         return None, np.zeros(0), [Fault("speed_missing", "rotor_speed", found, "no rotor speeds", 0)]
     online = np.asarray(data.get("esc_online_flags", np.full(len(data["timestamp"]), -1))).astype(np.int64)
-    values = np.column_stack([np.abs(np.asarray(data[f"esc[{place[r]}].esc_rpm"], float)) for r in range(rotors)]) * RPM
+    values = np.column_stack([np.asarray(data[f"esc[{place[r]}].esc_rpm"], float) for r in range(rotors)]) * RPM
+    values, faults = one_sense(values, c.rotor_columns("rotor_speed", rotors))
     heard = np.column_stack([(online >> place[r]) & 1 for r in range(rotors)]).astype(bool)
-    faults = []
-    if not values.any():
+    turning = [i for i in slots if i not in place.values() and np.any(data[f"esc[{i}].esc_rpm"])]
+    faults += _more_rotors("esc_status", rotors + len(turning), rotors)
+    if not np.nan_to_num(values).any():
         found = "every speed in esc_status is 0"
         return None, np.zeros(0), [Fault("speed_missing", "rotor_speed", found, "no rotor speeds", len(values))]
     if not heard.all():
@@ -316,14 +447,18 @@ def _batteries(topics: Topics) -> tuple[list[tuple[tuple[str, ...], np.ndarray, 
     return out, faults
 
 
-def _resets(data: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Times, µs, at which the estimator of PX4 jumped in position or velocity."""
-    counters = [data[k] for k in ("xy_reset_counter", "z_reset_counter", "vxy_reset_counter", "vz_reset_counter")
-                if k in data]  # fmt: skip
-    if not counters:
-        return np.zeros(0, np.int64)
-    jumps = np.any([np.diff(np.asarray(counter).astype(int)) != 0 for counter in counters], axis=0)
-    return _time(data)[1:][jumps]
+def _resets(topics: Topics) -> np.ndarray:
+    """Times, µs, at which the estimator of PX4 jumped in position, velocity, heading or attitude."""
+    jumps = [np.zeros(0, np.int64)]
+    for topic, counter, fields, small in RESETS:
+        data = _first(topics, topic)
+        if counter in data:
+            jumped = np.diff(np.asarray(data[counter]).astype(int)) != 0
+            by = _stack(data, fields)
+            if by is not None:
+                jumped &= ~(np.linalg.norm(by[1:], axis=1) < small)
+            jumps.append(_time(data)[1:][jumped])
+    return np.unique(np.concatenate(jumps))
 
 
 def _flying(log: Px4Log, grid: np.ndarray) -> np.ndarray | None:
@@ -342,16 +477,22 @@ def _flying(log: Px4Log, grid: np.ndarray) -> np.ndarray | None:
     return in_the_air.without_pauses(up, (grid - grid[0]) * 1e-6)
 
 
+def _clock(topics: Topics) -> np.ndarray:
+    """Times, µs, of the inertial topic with most samples, or of the attitude; empty where there is none."""
+    attitude = _first(topics, "vehicle_attitude")
+    clocks = [time for _, time, _ in _inertial(topics).values()] + ([_time(attitude)] if attitude else [])
+    return max(clocks, key=len, default=np.zeros(0, np.int64))
+
+
 def convert(log: Px4Log, rotors: int) -> Converted:
     """Contract columns of a whole log, its faults, and where it flies; InputError where there is no clock."""
     inertial = _inertial(log.topics)
     attitude = _first(log.topics, "vehicle_attitude")
-    clocks = [time for _, time, _ in inertial.values()] + ([_time(attitude)] if attitude else [])
-    if not clocks:
+    base = _clock(log.topics)
+    if not len(base):
         raise InputError(
             "no topic vehicle_angular_velocity, sensor_combined or vehicle_attitude to take the clock from"
         )
-    base = max(clocks, key=len)
     frame, faults = drop_repeated_times(pd.DataFrame({c.TIME: (base - base[0]) * 1e-6}))
     grid = (frame[c.TIME].to_numpy() * 1e6).round().astype(np.int64) + base[0]
     columns: dict[str, np.ndarray] = {c.TIME: (grid - grid[0]) * 1e-6}
@@ -382,15 +523,20 @@ def convert(log: Px4Log, rotors: int) -> Converted:
     table = pd.DataFrame({k: v for k, v in columns.items() if k == c.TIME or np.isfinite(v).any()})
     flying, ground = in_the_air.airborne(table, _flying(log, grid))
     faults += ground
-    jumps = _resets(place) if place else []
-    for jump in jumps:
-        flying &= np.abs(grid - jump) * 1e-6 > AROUND_RESET_S
-    if len(jumps):
-        found = f"PX4's estimator jumped {len(jumps)} times"
-        faults.append(Fault("estimator_reset", "", found, "a run ends at each jump in the air", len(jumps)))
+    jumps = np.zeros(len(grid), bool)
+    for reset in _resets(log.topics):
+        jumps |= np.abs(grid - reset) * 1e-6 <= AROUND_RESET_S
+    if jumps.any():
+        times = int(np.count_nonzero(np.diff(jumps.astype(int), prepend=0) > 0))
+        found = f"PX4's estimator jumped {times} times in position, velocity or attitude"
+        faults.append(Fault("estimator_reset", "", found, "a run ends at each jump in the air", times))
+    faults += log.parameters.faults(CHANGED, float(grid[0]), 1e-6)
+    if log.rest:
+        found = f"the file ends inside a message, after {log.rest} bytes of it"
+        faults.append(Fault("cut_off", "", found, "what came before is kept; the log stopped before its end", 0))
     if log.damaged:
         faults.append(Fault("damaged", "", "the file is damaged", "what could be read is kept", 0))
     if log.lost_s:
         found = f"the logger lost {len(log.lost_s)} stretches, {sum(log.lost_s):.3g} s in all"
         faults.append(Fault("dropout", c.TIME, found, "left as gaps", len(log.lost_s)))
-    return Converted(table, faults + report_gaps(table), flying)
+    return Converted(table, faults + report_gaps(table), flying & ~jumps, jumps)

@@ -1,24 +1,33 @@
 """ROS 1 bags, ROS 2 bags and MCAP files through rosbags: no ROS is needed.
 
 By ROS's REP 103 the body is forward-left-up and the world has z up; half a turn about x makes them forward-right-down
-and z down. Of each quantity the topic of a known type with the most messages is read:
+and z down; PX4's own messages are forward-right-down and north-east-down. Of each quantity the topic of a known type
+that states most values is read:
 
 | quantity | types |
 | --- | --- |
-| body rates, specific force | `sensor_msgs/Imu` |
-| attitude | `nav_msgs/Odometry`, `geometry_msgs/PoseStamped`, `…/TransformStamped`, then `sensor_msgs/Imu` |
-| position, velocity | `nav_msgs/Odometry` (twist in body axes), `geometry_msgs/PoseStamped`, `…/TransformStamped` |
-| rotor speeds | `mav_msgs/Actuators` and `actuator_msgs/Actuators` (rad/s), `mavros_msgs/ESCStatus` (rpm) |
-| throttles | `mavros_msgs/RCOut` (µs) |
+| body rates, specific force | `sensor_msgs/Imu`; `SensorCombined`, `VehicleAngularVelocity`, `VehicleAcceleration` |
+| attitude | poses (`POSES`), then `sensor_msgs/Imu`; `VehicleAttitude` |
+| position, velocity | poses, `nav_msgs/Odometry` (twist in body axes), `TwistStamped`; `VehicleLocalPosition` |
+| rotor speeds, rad/s | `Actuators` of `mav_msgs` and `actuator_msgs`, `mav_msgs/MotorSpeed` |
+| rotor speeds, rpm | `mavros_msgs/ESCStatus`, `mavros_msgs/ESCTelemetry`; `EscStatus` |
+| commanded speeds | `mav_msgs/CommandMotorSpeed`, `Actuators` of a topic called a command next to another |
+| throttles | `mavros_msgs/RCOut` (µs); `ActuatorMotors` |
 | battery, height | `sensor_msgs/BatteryState`, `sensor_msgs/Range` |
 
-The clock is the messages' own stamp where they have one, else the time at which they were recorded.
+Behind the semicolon are those of `px4_msgs`. `sensor_msgs/Imu` states nothing of a quantity whose covariance begins
+with -1; neither does a quaternion of length zero, nor a topic that holds what an unset message does throughout. What a
+bag holds and is not read is listed where a quantity is missing.
+
+A topic has one clock: its messages' own stamps, unless all of them are zero or they jump; then the times of recording,
+which the topic of the inertial sensor relates to its stamps. Stamps that are off from those by a constant are shifted.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +38,8 @@ from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import in_the_air
-from rotorid.recordings.importers.clean import report_gaps
+from rotorid.recordings.importers.bag_records import Records, typestores
+from rotorid.recordings.importers.clean import further_motors, one_sense, report_gaps
 from rotorid.recordings.importers.frames import half_turn_about_x, quaternion_to_frd_ned
 from rotorid.recordings.importers.optional import needs
 from rotorid.recordings.importers.report import Fault
@@ -46,28 +56,84 @@ def _wxyz(q) -> list[float]:
     return [q.w, q.x, q.y, q.z]
 
 
-READERS: dict[str, Callable] = {
-    "sensor_msgs/msg/Imu": lambda m: {
-        "rates": _xyz(m.angular_velocity), "force": _xyz(m.linear_acceleration), "imu_attitude": _wxyz(m.orientation),
-    },
-    "nav_msgs/msg/Odometry": lambda m: {
-        "attitude": _wxyz(m.pose.pose.orientation), "position": _xyz(m.pose.pose.position),
-        "body_velocity": _xyz(m.twist.twist.linear),
-    },
-    "geometry_msgs/msg/PoseStamped": lambda m: {
-        "attitude": _wxyz(m.pose.orientation), "position": _xyz(m.pose.position),
-    },
+def _imu(m) -> dict[str, list[float]]:
+    """Of an Imu message what it states: a covariance that begins with -1 is a quantity that it has not."""
+    every = {
+        "rates": (_xyz(m.angular_velocity), m.angular_velocity_covariance),
+        "force": (_xyz(m.linear_acceleration), m.linear_acceleration_covariance),
+        "imu_attitude": (_wxyz(m.orientation), m.orientation_covariance),
+    }
+    return {name: values for name, (values, covariance) in every.items() if covariance[0] != -1}
+
+
+def _pose(pose) -> dict[str, list[float]]:
+    return {"attitude": _wxyz(pose.orientation), "position": _xyz(pose.position)}
+
+
+def _twist(m) -> dict[str, list[float]]:
+    """A velocity in the axes that its frame names: those of the body, or of the world."""
+    of_body = any(word in m.header.frame_id for word in ("base", "body", "fcu"))
+    return {"body_velocity" if of_body else "velocity": _xyz(m.twist.linear)}
+
+
+def _local_position(m) -> dict[str, list[float]]:
+    flags = ("xy_valid", "z_valid", "v_xy_valid", "v_z_valid")
+    xy, z, v_xy, v_z = (1.0 if getattr(m, flag, True) else np.nan for flag in flags)
+    return {"position": [m.x * xy, -m.y * xy, -m.z * z], "velocity": [m.vx * v_xy, -m.vy * v_xy, -m.vz * v_z]}
+
+
+def _flipped(v) -> list[float]:
+    """PX4's forward-right-down and north-east-down, as the rest of a bag: half a turn about x."""
+    return [v[0], -v[1], -v[2]]
+
+
+POSES: dict[str, Callable] = {
+    "geometry_msgs/msg/PoseStamped": lambda m: _pose(m.pose),
+    "geometry_msgs/msg/PoseWithCovarianceStamped": lambda m: _pose(m.pose.pose),
     "geometry_msgs/msg/TransformStamped": lambda m: {
         "attitude": _wxyz(m.transform.rotation), "position": _xyz(m.transform.translation),
     },
-    "mav_msgs/msg/Actuators": lambda m: {"speeds": list(m.angular_velocities)},
-    "actuator_msgs/msg/Actuators": lambda m: {"speeds": list(m.velocity)},
+    "nav_msgs/msg/Odometry": lambda m: _pose(m.pose.pose) | {"body_velocity": _xyz(m.twist.twist.linear)},
+}  # fmt: skip
+READERS: dict[str, Callable] = POSES | {
+    "sensor_msgs/msg/Imu": _imu,
+    "geometry_msgs/msg/TwistStamped": _twist,
+    "mav_msgs/msg/Actuators": lambda m: {"speeds": list(m.angular_velocities), "throttle": list(m.normalized)},
+    "actuator_msgs/msg/Actuators": lambda m: {"speeds": list(m.velocity), "throttle": list(m.normalized)},
+    "mav_msgs/msg/MotorSpeed": lambda m: {"speeds": list(m.motor_speed)},
+    "mav_msgs/msg/CommandMotorSpeed": lambda m: {"commands": list(m.motor_speed)},
     "mavros_msgs/msg/ESCStatus": lambda m: {"rpm": [e.rpm for e in m.esc_status]},
+    "mavros_msgs/msg/ESCTelemetry": lambda m: {"rpm": [e.rpm for e in m.esc_telemetry]},
     "mavros_msgs/msg/RCOut": lambda m: {"pulses": list(m.channels)},
     "sensor_msgs/msg/BatteryState": lambda m: {"voltage": [m.voltage], "current": [-m.current]},
     "sensor_msgs/msg/Range": lambda m: {"range": [m.range]},
+    "px4_msgs/msg/SensorCombined": lambda m: {
+        "rates": _flipped(m.gyro_rad), "force": _flipped(m.accelerometer_m_s2),
+    },
+    "px4_msgs/msg/VehicleAngularVelocity": lambda m: {"rates": _flipped(m.xyz)},
+    "px4_msgs/msg/VehicleAcceleration": lambda m: {"force": _flipped(m.xyz)},
+    "px4_msgs/msg/VehicleAttitude": lambda m: {"attitude": [m.q[0], m.q[1], -m.q[2], -m.q[3]]},
+    "px4_msgs/msg/VehicleLocalPosition": _local_position,
+    "px4_msgs/msg/ActuatorMotors": lambda m: {"throttle": list(m.control)},
+    "px4_msgs/msg/EscStatus": lambda m: {"rpm": [e.esc_rpm for e in m.esc[: m.esc_count]]},
 }  # fmt: skip
-"""To the type of a message what it holds by quantity; several types may hold one."""
+"""To the type of a message what it states by quantity; several types may hold one."""
+WANTED = {
+    "body rates": ("rates",), "specific force": ("force",), "attitude": ("attitude", "imu_attitude"),
+    "velocity": ("velocity", "body_velocity"), "rotors": ("speeds", "rpm", "commands", "throttle", "pulses"),
+}  # fmt: skip
+"""What a verdict needs, to the quantities that give it."""
+UNSET = {"attitude": (1.0, 0.0, 0.0, 0.0), "imu_attitude": (1.0, 0.0, 0.0, 0.0)}
+UNSET |= dict.fromkeys(("rates", "force", "position", "velocity", "body_velocity"), (0.0, 0.0, 0.0))
+"""What a message holds of a quantity that nobody has set."""
+COMMANDED = re.compile(r"command|cmd|setpoint|desired|target|reference", re.IGNORECASE)
+SAME_CLOCK_S = 1.0
+"""Stamps further than this from those of the inertial sensor, or from one message to the next, are another clock."""
+STEADY_S = 0.2
+"""Spread of the difference of two clocks up to which it is a constant."""
+MIXED = 4
+"""Motors of a mixer whose signals say those of all others: it has four demands."""
+LISTED = 8
 
 
 @dataclass(frozen=True)
@@ -78,48 +144,168 @@ class Series:
     time_s: np.ndarray
     values: np.ndarray
 
+    @property
+    def changes(self) -> int:
+        """How often its values change: a topic that repeats what it has states no more for it."""
+        return int((np.diff(self.values, axis=0) != 0).any(axis=1).sum())
 
-def read_series(path: Path) -> tuple[dict[str, list[Series]], list[Fault]]:
-    """Every known quantity of a bag by topic, those with the most messages first.
 
-    InputError where it cannot be read or holds no known type.
-    """
+@dataclass
+class Found:
+    """What a bag holds: (stamp, time of recording, values) of each quantity of a topic, the topics that are not read
+    with their type and number of messages, and whether the file ends early. Stamps are 0 where there are none."""
+
+    rows: dict[tuple[str, str], list[tuple[float, float, list[float]]]] = field(default_factory=dict)
+    unread: dict[str, tuple[str, int]] = field(default_factory=dict)
+    foreign: dict[str, str] = field(default_factory=dict)
+    cut: bool = False
+    broken: int = 0
+    """Messages that cannot be decoded."""
+    lost_chunks: int = 0
+
+    def add(self, topic: str, msgtype: str, recorded_ns: int, message) -> None:
+        stamp = getattr(getattr(message, "header", None), "stamp", None)
+        stamp_s = getattr(message, "timestamp", 0) * 1e-6 if stamp is None else stamp.sec + stamp.nanosec * 1e-9
+        for quantity, values in READERS[msgtype](message).items():
+            self.rows.setdefault((quantity, topic), []).append((stamp_s, recorded_ns * 1e-9, values))
+
+    def skip(self, topic: str, msgtype: str, messages: int) -> None:
+        self.unread[topic] = msgtype, self.unread.get(topic, ("", 0))[1] + messages
+
+
+def _by_rosbags(path: Path) -> Found:
+    """A bag, MCAP file or folder of one that is whole and holds ROS alone."""
     highlevel = needs("rosbags.highlevel", "ros", path)
     typesys = needs("rosbags.typesys", "ros", path)
-    found: dict[tuple[str, str], list[tuple[float, list[float]]]] = {}
-    unknown: dict[str, str] = {}
+    found = Found()
+    with highlevel.AnyReader([path], default_typestore=typesys.get_typestore(typesys.Stores.LATEST)) as bag:
+        known = [k for k in bag.connections if k.msgtype in READERS]
+        for k in bag.connections:
+            if (encoding := getattr(k.ext, "serialization_format", "cdr")) != "cdr":
+                found.foreign[k.topic] = encoding
+            elif k.msgtype not in READERS:
+                found.skip(k.topic, k.msgtype, k.msgcount)
+        for connection, recorded_ns, raw in bag.messages(connections=known) if known else ():
+            found.add(connection.topic, connection.msgtype, recorded_ns, bag.deserialize(raw, connection.msgtype))
+    return found
+
+
+def _by_records(path: Path) -> Found:
+    """What can be read, record by record, of a file or folder that rosbags refuses."""
+    files = [path] if path.is_file() else sorted(p for p in path.iterdir() if p.suffix in (".db3", ".mcap"))
+    found = Found()
+    for file in files:
+        records = Records(file)
+        listed = list(records.messages())
+        stores = typestores([k for k in records.channels.values() if k.of_ros], path)
+        for channel, recorded_ns, raw in listed:
+            if channel.msgtype in READERS:
+                store = stores[channel.encoding]
+                read = store.deserialize_ros1 if channel.encoding == "ros1" else store.deserialize_cdr
+                try:
+                    message = read(raw, channel.msgtype)
+                except Exception:  # rosbags lets whatever broken bytes raise through
+                    found.broken += 1
+                    continue
+                found.add(channel.topic, channel.msgtype, recorded_ns, message)
+            else:
+                found.skip(channel.topic, channel.msgtype, 1)
+        for k in records.channels.values():
+            if not k.of_ros:
+                found.foreign[k.topic] = k.encoding or k.schema or "unknown"
+        found.cut |= records.cut
+        found.lost_chunks += records.lost_chunks
+    return found
+
+
+def _found(path: Path) -> Found:
+    """InputError where nothing of a bag can be read."""
+    needs("rosbags.highlevel", "ros", path)
     try:
-        store = typesys.get_typestore(typesys.Stores.LATEST)
-        with highlevel.AnyReader([path], default_typestore=store) as bag:
-            known = [k for k in bag.connections if k.msgtype in READERS]
-            unknown = {k.topic: k.msgtype for k in bag.connections if k.msgtype not in READERS}
-            for connection, recorded_ns, raw in bag.messages(connections=known) if known else ():
-                message = bag.deserialize(raw, connection.msgtype)
-                stamp = getattr(getattr(message, "header", None), "stamp", None)
-                time_s = recorded_ns * 1e-9
-                if stamp is not None and stamp.sec > 0:
-                    time_s = stamp.sec + stamp.nanosec * 1e-9
-                for quantity, values in READERS[connection.msgtype](message).items():
-                    found.setdefault((quantity, connection.topic), []).append((time_s, values))
+        return _by_rosbags(path)
     except MemoryError:
         raise
     except Exception as error:  # rosbags lets whatever a broken file raises through
-        raise InputError(f"{path}: not a bag or MCAP file that can be read ({printable(error)[:150]})") from None
-    if not found:
-        listed = ", ".join(f"{t} ({k})" for t, k in sorted(unknown.items())[:8]) or "none"
+        why = printable(error)[:150]
+    try:
+        found = _by_records(path)
+    except MemoryError:
+        raise
+    except Exception:
+        found = Found()
+    if not (found.rows or found.unread or found.foreign):
+        raise InputError(f"{path}: not a bag or MCAP file that can be read ({why})")
+    return found
+
+
+def read_series(path: Path) -> tuple[dict[str, list[Series]], list[Fault]]:
+    """Every known quantity of a bag by topic, those that state most first.
+
+    InputError where it cannot be read or holds no known type.
+    """
+    found = _found(path)
+    at = [row[1] for rows in found.rows.values() for row in (rows[0], rows[-1])]
+    lasts_s = max(max(at, default=0.0) - min(at, default=0.0), 1e-9)
+    others = [
+        f"{topic} ({kind}, {n / lasts_s:.3g} Hz)" if at else f"{topic} ({kind})"
+        for topic, (kind, n) in sorted(found.unread.items())
+        if n
+    ]
+    foreign = [f"{topic} ({encoding})" for topic, encoding in sorted(found.foreign.items())]
+    if not found.rows:
+        listed = ", ".join([*others, *foreign][:LISTED]) or "none"
         raise InputError(f"{path}: no topic of a type that is known; found {listed}")
+    faults = []
+    if found.cut:
+        seen = "the file ends early, without its index"
+        faults.append(Fault("cut_off", "", seen, "what came before is kept; the log stopped before its end", 0))
+    if found.broken:
+        seen = f"{found.broken} messages cannot be decoded"
+        faults.append(Fault("damaged", "", seen, "left out", found.broken))
+    if found.lost_chunks:
+        seen = f"{found.lost_chunks} chunks of messages cannot be unpacked"
+        faults.append(Fault("damaged", "", seen, "left out; their time is a gap", found.lost_chunks))
+    if foreign:
+        seen = f"{', '.join(foreign[:LISTED])} hold no messages of ROS"
+        faults.append(Fault("unread", "", seen, "left out", 0))
+    times, more = _times(found)
+    faults += more
     series: dict[str, list[Series]] = {}
-    for (quantity, topic), rows in found.items():
-        width = min(len(v) for _, v in rows)
-        rows.sort(key=lambda row: row[0])
-        time_s = np.array([t for t, _ in rows])
-        values = np.array([v[:width] for _, v in rows], float)
+    for (quantity, topic), rows in found.rows.items():
+        widths = [len(values) for *_, values in rows]
+        width = max(set(widths), key=widths.count)
+        odd = len(widths) - widths.count(width)
+        if odd:
+            seen = f"{odd} of {len(widths)} messages of {topic} do not hold {width} values as the others do"
+            faults.append(Fault("shape", quantity, seen, "left out", odd))
+        keep = np.array(widths) == width
+        if not width:
+            continue
+        time_s = times[quantity, topic][keep]
+        values = np.array([v for (*_, v) in rows if len(v) == width], float)
+        if "attitude" in quantity:
+            stated = np.linalg.norm(values, axis=1) > 0.5  # a quaternion of length zero is none
+            time_s, values = time_s[stated], values[stated]
+        if len(time_s) < 2:
+            continue
+        order = np.argsort(time_s, kind="stable")
+        time_s, values = time_s[order], values[order]
         keep = in_the_air.increasing(time_s)
-        if width and keep.sum() > 1:
-            series.setdefault(quantity, []).append(Series(topic, time_s[keep], values[keep]))
+        own = Series(topic, time_s[keep], values[keep])
+        if quantity in UNSET and (own.values == UNSET[quantity]).all():
+            seen = f"{quantity.replace('_', ' ')} of {topic} was never set ({UNSET[quantity][0]:g}, 0, … throughout)"
+            faults.append(Fault("stuck", quantity, seen, "states nothing, left out", len(values)))
+        elif keep.sum() > 1:
+            series.setdefault(quantity, []).append(own)
     for offered in series.values():
-        offered.sort(key=lambda s: -len(s.time_s))
-    faults = [
+        offered.sort(key=lambda s: -s.changes)
+    _set_commands_apart(series)
+    missing = [name for name, quantities in WANTED.items() if not set(quantities) & set(series)]
+    if missing and others:
+        more = f" and {len(others) - LISTED} more" if len(others) > LISTED else ""
+        seen = f"no topic of a type that is read states {', '.join(missing)}; not read are {', '.join(others[:LISTED])}"
+        faults.append(Fault("unread", "", seen + more, "export what is missing as a CSV", 0))
+    faults += [
         Fault("instances", quantity, f"{', '.join(s.topic for s in offered)} hold it", f"{offered[0].topic} taken", 0)
         for quantity, offered in series.items()
         if len(offered) > 1
@@ -127,46 +313,133 @@ def read_series(path: Path) -> tuple[dict[str, list[Series]], list[Fault]]:
     return series, faults
 
 
+def _set_commands_apart(series: dict[str, list[Series]]) -> None:
+    """Speeds of a topic that is called a command are commands, where another topic has speeds."""
+    speeds = series.get("speeds", [])
+    asked = [s for s in speeds if COMMANDED.search(s.topic)]
+    if asked and len(asked) < len(speeds):
+        series["speeds"] = [s for s in speeds if s not in asked]
+        series["commands"] = [*series.get("commands", []), *asked]
+
+
+def _times(found: Found) -> tuple[dict[tuple[str, str], np.ndarray], list[Fault]]:
+    """Times of the rows of each quantity of a topic, s, on the clock of the inertial sensor's stamps.
+
+    A topic whose stamps are all zero, jump, or run at another rate has those at which its messages were recorded.
+    """
+    stamps = {key: np.array([row[0] for row in rows]) for key, rows in found.rows.items()}
+    recorded = {key: np.array([row[1] for row in rows]) for key, rows in found.rows.items()}
+    sound = {key for key in stamps if stamps[key].any() and not _jumps(stamps[key], recorded[key])}
+    first = next((q for q in ("rates", "imu_attitude", "attitude") if any(k[0] == q for k in stamps)), None)
+    base = max((k for k in stamps if k[0] == first), key=lambda k: len(stamps[k]), default=None)
+
+    def placed(key: tuple[str, str]) -> np.ndarray:
+        """Times of recording on the base's clock."""
+        if base not in sound:
+            return recorded[key]
+        at, index = np.unique(recorded[base], return_index=True)
+        to = stamps[base][index]
+        inside = np.interp(recorded[key], at, to)
+        return inside + np.minimum(recorded[key] - at[0], 0) + np.maximum(recorded[key] - at[-1], 0)
+
+    times, faults = {}, {}
+    for key, own in stamps.items():
+        on_base = placed(key)
+        off = np.median(own - on_base)
+        if key not in sound:
+            times[key], seen = on_base, "its stamps jump" if own.any() else ""
+            action = "the times at which its messages were recorded hold"
+        elif abs(off) < SAME_CLOCK_S:
+            times[key], seen = own, ""
+        else:
+            seen = f"its stamps are {off:.4g} s from those of {base[1]}"
+            steady = np.ptp(np.quantile(own - on_base, [0.05, 0.95])) < STEADY_S
+            times[key] = own - off if steady else on_base
+            action = "shifted by that" if steady else "the times at which its messages were recorded hold"
+        if seen:
+            faults[key[1]] = Fault("two_clocks", c.TIME, f"{key[1]}: {seen}", action, len(own))
+    return times, list(faults.values())
+
+
+def _jumps(stamps: np.ndarray, recorded: np.ndarray) -> bool:
+    """Whether the stamps of a topic go back, or run on by far more than the time between two recordings, s."""
+    order = np.argsort(recorded, kind="stable")
+    steps, waited = np.diff(stamps[order]), np.diff(recorded[order])
+    return bool(np.any(steps < -SAME_CLOCK_S) or np.any(steps > SAME_CLOCK_S + 10 * waited))
+
+
 def convert(series: dict[str, list[Series]], faults: list[Fault], where: object) -> tuple[pd.DataFrame, np.ndarray]:
     """Contract columns and where it flies (mask of rows), of the first series of each quantity."""
     first = {quantity: offered[0] for quantity, offered in series.items()}
     if "attitude" not in first and "imu_attitude" in first:
         size = np.linalg.norm(first["imu_attitude"].values, axis=1)
-        if np.all(np.abs(size - 1) < 0.01):  # all zero, or w alone, where the sensor has none
+        if np.all(np.abs(size - 1) < 0.01):
             first["attitude"] = first["imu_attitude"]
     clock = max((first[q] for q in ("rates", "attitude") if q in first), key=lambda s: len(s.time_s), default=None)
     if clock is None:
         raise InputError(f"{where}: neither sensor_msgs/Imu nor a pose to take the clock from")
     grid = clock.time_s
     parts: list[tuple] = []
-    for quantity, names in (("rates", c.ANGULAR_VELOCITY), ("force", c.SPECIFIC_FORCE), ("position", c.POSITION)):
+    for quantity, names in (
+        ("rates", c.ANGULAR_VELOCITY), ("force", c.SPECIFIC_FORCE), ("position", c.POSITION), ("velocity", c.VELOCITY)
+    ):  # fmt: skip
         if quantity in first:
             parts.append((names, first[quantity].time_s, half_turn_about_x(first[quantity].values)))
     if "attitude" in first:
         parts.append((c.QUATERNION, first["attitude"].time_s, quaternion_to_frd_ned(first["attitude"].values)))
-    if "body_velocity" in first:
-        own = next(s for s in series["attitude"] if s.topic == first["body_velocity"].topic)
-        turn = Rotation.from_quat(own.values[:, [1, 2, 3, 0]])
-        parts.append((c.VELOCITY, own.time_s, half_turn_about_x(turn.apply(first["body_velocity"].values))))
-    turning = first.get("speeds") or first.get("rpm")
-    if turning is not None:
-        speeds = np.abs(turning.values) * (1.0 if "speeds" in first else RPM)
-        parts.append((c.rotor_columns("rotor_speed", speeds.shape[1]), turning.time_s, speeds))
-    if "pulses" in first:
-        pulses = first["pulses"].values
-        used = [i for i in range(pulses.shape[1]) if np.ptp(pulses[:, i]) > 0][:4]
-        low, high = PULSE_US
-        found = f"channels {', '.join(str(i + 1) for i in used)} of {first['pulses'].topic} move"
-        faults.append(
-            Fault("unit", "throttle", found, f"taken for motors in order, {low:g} to {high:g} µs", len(pulses))
-        )
-        throttle = np.clip((pulses[:, used] - low) / (high - low), 0, 1)
-        parts.append((c.rotor_columns("throttle", len(used)), first["pulses"].time_s, throttle))
+    if "body_velocity" in first and "velocity" not in first:
+        parts += _turned(first["body_velocity"], [*series.get("attitude", []), *series.get("imu_attitude", [])], faults)
+    for quantity, kind, unit in (
+        ("speeds", "rotor_speed", 1.0), ("rpm", "rotor_speed", RPM), ("commands", "rotor_command", 1.0)
+    ):  # fmt: skip
+        if quantity in first and not (quantity == "rpm" and "speeds" in first):
+            names = c.rotor_columns(kind, first[quantity].values.shape[1])
+            values, reversed_ = one_sense(first[quantity].values * unit, names)
+            faults += reversed_
+            parts.append((names, first[quantity].time_s, values))
+    if "throttle" in first:
+        used = np.isfinite(first["throttle"].values).any(axis=0)
+        names = c.rotor_columns("throttle", int(np.flatnonzero(used).max(initial=-1)) + 1)
+        values, reversed_ = one_sense(first["throttle"].values[:, : len(names)], names, 1.0)
+        faults += reversed_
+        parts.append((names, first["throttle"].time_s, values))
+    elif "pulses" in first:
+        parts.append(_of_pulses(first["pulses"], faults))
     for quantity, name in (("voltage", c.BATTERY_VOLTAGE), ("current", c.BATTERY_CURRENT), ("range", c.HEIGHT)):
         if quantity in first:
             parts.append(((name,), first[quantity].time_s, first[quantity].values))
     table = in_the_air.table_on(grid, parts)
     return table, in_the_air.airborne(table)[0]
+
+
+def _turned(velocity: Series, attitudes: list[Series], faults: list[Fault]) -> list[tuple]:
+    """A velocity in body axes turned into the world by the attitude of its own topic, else by the nearest in time."""
+    attitude = next((s for s in attitudes if s.topic == velocity.topic), attitudes[0] if attitudes else None)
+    if attitude is None:
+        seen = f"the velocity of {velocity.topic} is in body axes, and no topic states an attitude"
+        faults.append(Fault("no_attitude", ", ".join(c.VELOCITY), seen, "columns left out", len(velocity.time_s)))
+        return []
+    nearest = np.searchsorted((attitude.time_s[1:] + attitude.time_s[:-1]) / 2, velocity.time_s)
+    turn = Rotation.from_quat(attitude.values[nearest][:, [1, 2, 3, 0]])
+    return [(c.VELOCITY, velocity.time_s, half_turn_about_x(turn.apply(velocity.values)))]
+
+
+def _of_pulses(outputs: Series, faults: list[Fault]) -> tuple:
+    """Throttles of an array of all outputs, which names no motors: the first four that move are motors, and each other
+    whose signal follows from theirs."""
+    moving = np.flatnonzero(np.ptp(outputs.values, axis=0) > 0)
+    pulses = outputs.values[:, moving]
+    used = [*range(min(MIXED, len(moving))), *further_motors(pulses, MIXED)]
+    low, high = PULSE_US
+    seen = f"channels {', '.join(str(moving[k] + 1) for k in used)} of {outputs.topic} move"
+    action = f"taken for motors in order, {low:g} to {high:g} µs"
+    faults.append(Fault("unit", "throttle", seen, action, len(pulses)))
+    others = [str(moving[k] + 1) for k in range(len(moving)) if k not in used]
+    if others:
+        seen = f"channels {', '.join(others)} of {outputs.topic} move, too, but not with the motors"
+        faults.append(Fault("servo", "throttle", seen, "taken for no motors", len(pulses)))
+    throttle = np.clip((pulses[:, used] - low) / (high - low), 0, 1)
+    return c.rotor_columns("throttle", len(used)), outputs.time_s, throttle
 
 
 def read_ros(path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault], str]:

@@ -15,6 +15,7 @@ from rotorid.errors import InputError
 from rotorid.io.text.bounds import MOST_RUNS
 from rotorid.io.text.writing import staging, take_name
 from rotorid.recordings import Run, read_vehicle, templates
+from rotorid.recordings import columns as c
 from rotorid.recordings.files import VEHICLE, usable_runs
 from rotorid.recordings.importers.adding import add_to_set
 from rotorid.recordings.importers.logfile import TEMPLATES, files_of, read_log
@@ -25,6 +26,7 @@ from rotorid.recordings.importers.report import Fault, ImportReport
 from rotorid.recordings.importers.speed_unit import in_unit_of_weight
 from rotorid.recordings.manifest import sha256, write_manifest
 from rotorid.recordings.tables import check_table, parquet_is_here, write_table
+from rotorid.recordings.vehicle import Vehicle
 
 
 @dataclass(frozen=True)
@@ -177,6 +179,7 @@ def set_of_logs(
         text, remarks = proposal.text, proposal.remarks
         if there is not None and there.is_file() and there.read_text(encoding="utf-8") != text:
             raise InputError(f"{there} is there already and would change; move it away, or leave --mass-kg and --like")
+    _check_rotors(runs, vehicle if vehicle_file is not None or kept else proposal.vehicle, logs[0])
     if kinds == {"flight"} and (vehicle_file is not None or kept):
         known = float(np.mean(vehicle.thrust_coefficients_n_s2()))
         runs, changed = in_unit_of_weight(runs, units, vehicle.mass_kg, vehicle.rotor_count, known)
@@ -195,6 +198,16 @@ def set_of_logs(
         {name: sha256(file) for path in logs for name, file in files_of(path).items()},
         kept,
     )
+
+
+def _check_rotors(runs: Names[str, pd.DataFrame], vehicle: Vehicle, log: Path) -> None:
+    """InputError where a log drives more rotors than the vehicle has: without them its thrust would be short."""
+    numbers = [found[1] for table in runs.values() for name in table if (found := c.rotor_number(name))]
+    if vehicle.kind != "bench" and max(numbers, default=0) > vehicle.rotor_count:
+        raise InputError(
+            f"{log}: the log drives {max(numbers)} rotors, the vehicle has {vehicle.rotor_count}; "
+            f"give --vehicle with a vehicle.yaml of {max(numbers)} rotors"
+        )
 
 
 def _checked(name: str, table: pd.DataFrame) -> Run:

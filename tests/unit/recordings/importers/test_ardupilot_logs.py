@@ -8,9 +8,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import ardupilot
 from rotorid.recordings.importers.in_the_air import off_the_ground
+from tests.unit.recordings.importers.test_log_formats import PARAMETERS, dataflash, flown
 
 ROOT = Path(__file__).parents[4]
 _named = os.environ.get("ROTORID_PUBLIC_DATA")
@@ -218,3 +220,160 @@ def test_damaged_events_and_batteries_are_passed_over() -> None:
     table, _, flying = ardupilot.convert(log, "log")
     assert c.BATTERY_VOLTAGE not in table
     assert flying[700:900].all()
+
+
+# Which output is a rotor --------------------------------------------------------------------------
+
+FUNCTIONS = [*range(33, 41), *range(82, 86)]
+"""Output functions of motors 1 to 12."""
+
+
+def framed(values: dict[str, float], outputs: dict[int, int], **more: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """A log whose outputs (from 1) have functions, output n at n hundredths of full throttle."""
+    log = tables({"MOT_PWM_MIN": 1000.0, "MOT_PWM_MAX": 2000.0, **values, **functions(outputs)}, **more)
+    pulses = {f"C{n}": np.full(100, 1000.0 + 10 * n) for n in range(1, 15)}
+    return log | {"RCOU": pd.DataFrame({c.TIME: log["IMU"][c.TIME], **pulses})}
+
+
+def functions(outputs: dict[int, int]) -> dict[str, float]:
+    return {f"SERVO{n}_FUNCTION": float(function) for n, function in outputs.items()}
+
+
+def throttles_of(log: dict[str, pd.DataFrame]) -> dict[str, float]:
+    table, _, _ = ardupilot.convert(log, "log")
+    return {name: table[name].iloc[50] for name in table if name.startswith("throttle_")}
+
+
+@pytest.mark.parametrize(("frame", "motors"), [(1, 4), (2, 6), (3, 8), (4, 8), (5, 6), (12, 12), (14, 10)])
+def test_the_frame_class_says_how_many_outputs_are_rotors(frame: int, motors: int) -> None:
+    """Outputs in reverse, a servo of a gimbal between them, and a motor function that the frame does not drive."""
+    outputs = {14 - i: FUNCTIONS[i] for i in range(motors)} | {1: 6}
+    if motors < 12:
+        outputs[2] = FUNCTIONS[motors]
+    log = framed({"FRAME_CLASS": frame}, outputs)
+    assert throttles_of(log) == pytest.approx({f"throttle_{i + 1}": (14 - i) / 100 for i in range(motors)})
+    _, faults, _ = ardupilot.convert(log, "log")
+    assert any("outputs 2 have the functions of motors beyond" in f.found for f in faults) == (motors < 12)
+
+
+@pytest.mark.parametrize("frame", [0, 15, 17])
+def test_a_frame_of_a_script_has_the_motors_that_its_functions_name(frame: int) -> None:
+    log = framed({"FRAME_CLASS": frame}, {n: FUNCTIONS[n - 1] for n in range(1, 6)})
+    assert throttles_of(log) == pytest.approx({f"throttle_{n}": n / 100 for n in range(1, 6)})
+
+
+@pytest.mark.parametrize(
+    ("values", "said", "name"),
+    [
+        ({"FRAME_CLASS": 6}, "", "a helicopter, .*FRAME_CLASS 6"),
+        ({"FRAME_CLASS": 7}, "", "a tricopter.*FRAME_CLASS 7"),
+        ({"FRAME_CLASS": 8}, "", "a singlecopter.*FRAME_CLASS 8"),
+        ({"FRAME_CLASS": 9}, "", "a coaxial copter.*FRAME_CLASS 9"),
+        ({"FRAME_CLASS": 10}, "", "a tailsitter.*FRAME_CLASS 10"),
+        ({"FRAME_CLASS": 11}, "", "a helicopter of two rotors.*FRAME_CLASS 11"),
+        ({"FRAME_CLASS": 13}, "", "a helicopter of four rotors.*FRAME_CLASS 13"),
+        ({"FRAME_CLASS": 16}, "", "point in several directions.*FRAME_CLASS 16"),
+        ({"FRAME_CLASS": 99}, "", "not known here.*FRAME_CLASS 99"),
+        ({"Q_ENABLE": 1, "Q_FRAME_CLASS": 1}, "ArduPlane V4.5.7 (2a3dc4b7)", "quadplane"),
+        ({"Q_ENABLE": 0}, "ArduPlane V4.5.7 (2a3dc4b7)", "a plane"),
+        ({"FRAME_CLASS": 1}, "ArduRover V4.5.7 (2a3dc4b7)", "a rover"),
+        ({"FRAME_CLASS": 1}, "ArduSub V4.5.7 (2a3dc4b7)", "a submarine"),
+        ({}, "Blimp V4.5.7", "a blimp"),
+        ({"H_SWASH_TYPE": 0}, "", "a helicopter"),
+        ({"FRAME": 1}, "Frame: TRI", "a tricopter"),
+        ({"FRAME": 1}, "Frame: HELI", "a helicopter"),
+    ],
+)
+def test_what_is_no_multirotor_of_fixed_rotors_is_refused_by_its_name(values, said: str, name: str) -> None:
+    log = framed(values, {n: 32 + n for n in range(1, 5)})
+    with pytest.raises(InputError, match=f"{name}.*only multirotors"):
+        ardupilot.convert(log | {"MSG": pd.DataFrame({"Message": [said, "Low battery"]})}, "log")
+
+
+@pytest.mark.parametrize("build", ardupilot.OTHER_BUILDS)
+def test_the_build_of_another_vehicle_is_refused(build: int) -> None:
+    log = framed({"FRAME_CLASS": 1}, {n: 32 + n for n in range(1, 5)})
+    with pytest.raises(InputError, match=f"VER.BU {build}"):
+        ardupilot.convert(log | {"VER": pd.DataFrame({"BU": [build]})}, "log")
+    assert len(throttles_of(log | {"VER": pd.DataFrame({"BU": [2]})})) == 4
+
+
+def test_a_motor_without_an_output_leaves_its_own_column_out() -> None:
+    log = framed({"FRAME_CLASS": 1}, {1: 33, 2: 34, 4: 36})
+    assert throttles_of(log) == pytest.approx({"throttle_1": 0.01, "throttle_2": 0.02, "throttle_4": 0.04})
+    assert [f.column for f in ardupilot.convert(log, "log")[1] if f.kind == "no_command"] == ["throttle_3"]
+
+
+def test_outputs_beyond_the_fourteenth_are_in_messages_of_their_own() -> None:
+    log = framed({"FRAME_CLASS": 1}, {1: 33, 2: 34, 15: 35, 19: 36})
+    clock = {c.TIME: log["IMU"][c.TIME]}
+    more = {"RCO2": pd.DataFrame({**clock, "C15": 1150}), "RCO3": pd.DataFrame({**clock, "C19": 1190})}
+    assert throttles_of(log | more)["throttle_4"] == pytest.approx(0.19)
+    assert throttles_of(log | more)["throttle_3"] == pytest.approx(0.15)
+
+
+@pytest.mark.parametrize(("form", "name"), ardupilot.TILTED_TYPES.items())
+def test_rotors_that_lean_by_the_frame_type_are_named(form: int, name: str) -> None:
+    _, faults = ardupilot.order_of({"FRAME_CLASS": 1, "FRAME_TYPE": form})
+    assert any(f.kind == "tilted_rotor" and name in f.found for f in faults)
+
+
+# Parameters that change ---------------------------------------------------------------------------
+
+
+def set_later(log: dict[str, pd.DataFrame], changes: list[tuple[float, str, float]]) -> dict[str, pd.DataFrame]:
+    """The log with parameters that are stated again at later times."""
+    start = log["PARM"].assign(**{c.TIME: 0.0})
+    return log | {"PARM": pd.concat([start, pd.DataFrame(changes, columns=[c.TIME, "Name", "Value"])])}
+
+
+@pytest.mark.parametrize(
+    ("change", "before", "after"),
+    [
+        (("MOT_PWM_MIN", 900.0), 0.5, 0.6 / 1.1),
+        (("MOT_PWM_MAX", 3000.0), 0.5, 0.25),
+        (("SERVO1_FUNCTION", 0.0), 0.5, 0.9),  # output 5 has the same function
+    ],
+)
+def test_a_pulse_is_read_by_the_parameters_that_held_then(change, before: float, after: float) -> None:
+    log = framed({"FRAME_CLASS": 1}, {1: 33, 2: 34, 3: 35, 4: 36, 5: 33})
+    log["RCOU"] = log["RCOU"].assign(C1=1500.0, C5=1900.0)
+    table, faults, _ = ardupilot.convert(set_later(log, [(1.0, "MOT_PWM_MIN", 1000.0), (1.01, *change)]), "log")
+    found = table["throttle_1"].to_numpy()
+    assert found[:50] == pytest.approx(before) and found[52:] == pytest.approx(after)
+    (said,) = [f.sentence for f in faults if f.kind == "parameter_changed"]
+    assert f"{change[0]} was set from" in said and f"to {change[1]:g} at 1.01 s" in said
+
+
+@pytest.mark.parametrize("name", ["MOT_THST_EXPO", "MOT_SPIN_MIN", "MOT_SPIN_MAX", "FRAME_TYPE"])
+def test_a_change_of_what_else_is_compared_is_stated(name: str) -> None:
+    log = framed({"FRAME_CLASS": 1, name: 1.0}, {n: 32 + n for n in range(1, 5)})
+    _, faults, _ = ardupilot.convert(set_later(log, [(1.0, name, 0.0), (1.0, "ATC_RAT_RLL_P", 0.2)]), "log")
+    assert [f.found.split()[0] for f in faults if f.kind == "parameter_changed"] == [name]
+
+
+def test_the_frame_is_the_one_that_flew() -> None:
+    """Set up on the bench: a hexarotor for 0.2 s of two."""
+    log = framed({"FRAME_CLASS": 2}, {n: 32 + n for n in range(1, 7)})
+    assert len(throttles_of(set_later(log, [(0.2, "FRAME_CLASS", 1.0)]))) == 4
+    assert len(throttles_of(set_later(log, [(1.8, "FRAME_CLASS", 1.0)]))) == 6
+
+
+def test_a_log_cut_off_anywhere_keeps_every_whole_message(tmp_path: Path) -> None:
+    pytest.importorskip("pymavlink")
+    data, path = dataflash(flown().iloc[:40], PARAMETERS), tmp_path / "log.bin"
+    whole = sum(map(len, (plain := ardupilot.read_messages(written(path, data))).values()))
+    assert ardupilot.END not in plain
+    # the last message of each row is BAT, before it are four of ESC
+    for lost in range(1, 4 * 16 + 20):
+        log = ardupilot.read_messages(written(path, data[: len(data) - lost]))
+        messages = 1 + max(0, lost - 20) // 16 + (lost > 20 and (lost - 20) % 16 > 0)
+        left = (20 - lost) if lost <= 20 else -(lost - 20) % 16
+        assert sum(len(t) for kind, t in log.items() if kind != ardupilot.END) == whole - messages, lost
+        _, faults, _ = ardupilot.convert(log, path)
+        assert any(f.kind == "cut_off" for f in faults) == (left > 1), lost
+
+
+def written(path: Path, data: bytes) -> Path:
+    path.write_bytes(data)
+    return path

@@ -12,10 +12,11 @@ from scipy.spatial.transform import Rotation
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers import clean, crazyflie, frames, known, px4_ulog
+from rotorid.recordings.importers import clean, crazyflie, crazyflie_usd, frames, in_the_air, known, px4_ulog
 from rotorid.recordings.importers.crazyflie_usd import decode_usd_log, read_usd_log
 from rotorid.recordings.importers.imrc_bench_csv import read_imrc_bench
 from rotorid.recordings.importers.neurobem import USED, read_neurobem
+from rotorid.recordings.importers.parameters import Parameters
 from rotorid.recordings.importers.rcbenchmark import decode_text, read_rcbenchmark
 from rotorid.recordings.importers.vicon_csv import read_vicon_csv
 
@@ -358,9 +359,9 @@ def test_a_log_cut_off_anywhere_keeps_every_whole_event() -> None:
     header = len(usd_bytes([("a", "f")], [])) - 4
     for length in range(header + 4, len(data)):
         tables, faults = decode_usd_log(data[:length])
-        whole = (length - 4 - header) // 14
+        whole, rest = divmod(length - header, 14)
         assert len(tables["fixedFrequency"]) == whole
-        assert "checksum" in kinds(faults)
+        assert kinds(faults) == ["checksum" if rest == 4 else "cut_off"]  # four bytes may be a wrong checksum
 
 
 def test_an_unknown_event_stops_the_reading_there() -> None:
@@ -467,6 +468,90 @@ def test_a_log_without_gyro_leaves_the_missing_axis_empty() -> None:
     assert table["specific_force_z_m_s2"].iloc[0] == pytest.approx(-1.1 * 9.81)
 
 
+def compressed(xyzw: np.ndarray) -> np.ndarray:
+    """Quaternions as the firmware packs them: the number of the largest, then sign and nine bits of each other."""
+    codes = []
+    for q in xyzw:
+        largest = int(np.argmax(np.abs(q)))
+        code = largest
+        for k in range(4):
+            if k != largest:
+                negative = (q[k] < 0) != (q[largest] < 0)
+                code = code << 10 | int(negative) << 9 | int(511 * abs(q[k]) * np.sqrt(2) + 0.5)
+        codes.append(code)
+    return np.array(codes)
+
+
+def of_every_form() -> tuple[pd.DataFrame, pd.DataFrame]:
+    """What the firmware logs of 200 states in each of its forms, and the same in contract columns."""
+    rng = np.random.default_rng(3)
+    turns = Rotation.random(200, random_state=3)  # forward-left-up to z up
+    flip = np.array([1.0, -1.0, -1.0])
+    place, moves, rates, force = rng.normal(size=(4, 200, 3))
+    yaw, pitch, roll = turns.as_euler("ZYX", degrees=True).T
+    xyzw = turns.as_quat()
+    own = turns.inv().apply(moves)
+    log = {"time_s": np.arange(200) * 0.01, "stateEstimateZ.quat": compressed(xyzw)}
+    groups = (
+        ("stateEstimate", "qx qy qz qw", xyzw), ("kalman", "q1 q2 q3 q0", xyzw),
+        ("stateEstimate", "roll pitch yaw", np.column_stack([roll, -pitch, yaw])),  # nose up
+        ("stabilizer", "roll pitch yaw", np.column_stack([roll, -pitch, yaw])),
+        ("stateEstimate", "x y z", place), ("stateEstimateZ", "x y z", place * 1000),
+        ("kalman", "stateX stateY stateZ", place), ("stateEstimate", "vx vy vz", moves),
+        ("stateEstimateZ", "vx vy vz", moves * 1000), ("kalman", "statePX statePY statePZ", own),
+        ("gyro", "x y z", np.degrees(rates)), ("acc", "x y z", force),
+        ("stateEstimateZ", "rateRoll ratePitch rateYaw", rates * np.array([1, -1, 1]) * 1000),
+    )  # fmt: skip
+    for group, names, values in groups:
+        log |= {f"{group}.{name}": v for name, v in zip(names.split(), values.T, strict=True)}
+    true = {n: v for n, v in zip(c.QUATERNION, (xyzw[:, [3, 0, 1, 2]] * [1, 1, -1, -1]).T, strict=True)}
+    for names, values in (
+        (c.POSITION, place), (c.VELOCITY, moves), (c.ANGULAR_VELOCITY, rates), (c.SPECIFIC_FORCE, 9.81 * force)
+    ):  # fmt: skip
+        true |= dict(zip(names, (values * flip).T, strict=True))
+    return pd.DataFrame(log), pd.DataFrame(true)
+
+
+@pytest.mark.parametrize(
+    ("names", "own"), [(names, own) for names, forms in crazyflie.FORMS.items() for own, _ in forms]
+)
+def test_a_crazyflie_state_is_read_in_each_of_its_forms(names: tuple[str, ...], own: tuple[str, ...]) -> None:
+    log, true = of_every_form()
+    table, faults = crazyflie.convert(log[["time_s", *own]])
+    expected, found = true[list(names)].to_numpy(), table[list(names)].to_numpy()
+    if names == c.QUATERNION:
+        expected = expected * np.sign(np.sum(expected * found, axis=1))[:, None]
+    np.testing.assert_allclose(found, expected, atol=3e-3 if own == ("stateEstimateZ.quat",) else 1e-9)
+    assert faults == []
+
+
+def test_a_velocity_in_body_axes_is_turned_by_the_attitude() -> None:
+    log, true = of_every_form()
+    table, _ = crazyflie.convert(
+        log[["time_s", *crazyflie.BODY_VELOCITY, "kalman.q0", "kalman.q1", "kalman.q2", "kalman.q3"]]
+    )
+    np.testing.assert_allclose(table[list(c.VELOCITY)], true[list(c.VELOCITY)], atol=1e-9)
+    assert not set(c.VELOCITY) & set(crazyflie.convert(log[["time_s", *crazyflie.BODY_VELOCITY]])[0])
+
+
+def test_pitch_is_not_called_missing_where_it_is_in_the_log() -> None:
+    log, true = of_every_form()
+    log = log[["time_s", "stateEstimate.roll", "stateEstimate.pitch", "stateEstimate.yaw"]]
+    log = log.assign(**{"stateEstimate.ax": 0.0, "stateEstimate.ay": 0.0, "stateEstimate.az": 0.1})
+    table, faults = crazyflie.convert(log)
+    assert faults == [] and not set(c.SPECIFIC_FORCE) & set(table)
+    along = np.abs(np.sum(table[list(c.QUATERNION)].to_numpy() * true[list(c.QUATERNION)].to_numpy(), axis=1))
+    np.testing.assert_allclose(along, 1, atol=1e-12)
+
+
+@pytest.mark.parametrize("letter", crazyflie_usd.TYPES)
+def test_each_type_of_a_usd_variable_is_read(letter: str) -> None:
+    value = 1.5 if letter in "efd" else 100
+    tables, faults = decode_usd_log(usd_bytes([("before", "f"), ("a", letter), ("after", "H")], [(2.5, value, 7)] * 3))
+    assert faults == []
+    assert tables["fixedFrequency"][["before", "a", "after"]].to_numpy().tolist() == [[2.5, value, 7]] * 3
+
+
 # PX4 ----------------------------------------------------------------------------------------------
 
 
@@ -525,7 +610,7 @@ def test_a_px4_log_is_laid_out_on_the_fastest_inertial_clock(tmp_path: Path) -> 
 def px4(parameters=None, **topics) -> px4_ulog.Px4Log:
     """A log of topics given as one instance or a list of instances."""
     instances = {k: v if isinstance(v, list) else [v] for k, v in topics.items()}
-    return px4_ulog.Px4Log(instances, parameters or {})
+    return px4_ulog.Px4Log(instances, Parameters(parameters or {}))
 
 
 def gyro(count: int = 5, step_us: int = 1000) -> dict:
@@ -636,14 +721,23 @@ def test_px4_only_the_part_in_the_air_is_flown_and_a_jump_of_the_estimator_ends_
     flying = px4_ulog.convert(px4_flight(), 1).flying
     time_s = np.arange(2001) * 0.01
     assert (time_s[flying].min(), time_s[flying].max()) == (5.0, pytest.approx(14.99))
-    jump = {
-        "timestamp": np.arange(21) * 10**6,
-        **{name: np.zeros(21) for name in ("x", "y", "z", "vx", "vy", "vz")},
-        "vxy_reset_counter": (np.arange(21) >= 10).astype(int),
-    }
-    converted = px4_ulog.convert(px4_flight(vehicle_local_position=jump), 1)
-    assert len(clean.true_stretches(converted.flying, time_s, 1.0)) == 2
-    assert "estimator_reset" in kinds(converted.faults)
+
+
+@pytest.mark.parametrize(("topic", "counter", "fields", "small"), px4_ulog.RESETS)
+@pytest.mark.parametrize("wraps", [False, True])
+def test_px4_each_jump_of_the_estimator_ends_a_run(topic: str, counter: str, fields, small: float, wraps: bool) -> None:
+    """At 10 s; one that the estimate's own noise exceeds ends nothing. Counters are of eight bits."""
+    count = 2001
+    after = np.arange(count) >= 1000
+    data = {"timestamp": np.arange(count) * 10_000, counter: (after + 255 * wraps).astype(np.uint8)}
+    data |= {name: np.zeros(count) for name in ("x", "y", "z", "vx", "vy", "vz")}
+    data |= {f"q[{i}]": np.full(count, float(i == 0)) for i in range(4)}
+    for by, runs in ((None, 2), (2 * small, 2), (0.5 * small, 1)):
+        stated = {} if by is None else {f: after * (by if f == fields[0] else 0.0) for f in fields}
+        converted = px4_ulog.convert(px4(sensor_combined=gyro(count, 10_000), **{topic: data | stated}), 1)
+        found, _ = in_the_air.flights(converted.table, converted.flying, "run", "log", converted.jumps)
+        assert len(found) == runs, by
+        assert ("estimator_reset" in kinds(converted.faults)) == (runs > 1)
 
 
 def test_px4_rotors_and_torque_come_from_control_allocation() -> None:
@@ -654,7 +748,185 @@ def test_px4_rotors_and_torque_come_from_control_allocation() -> None:
     found, faults = known.px4_vehicle(parameters, 2)
     assert [(r.x_m, r.y_m, r.spin) for r in found.rotors] == [(0.1, 0.2, "ccw"), (-0.1, -0.2, "cw")]
     assert found.torque_over_thrust_m == pytest.approx(0.04)
-    assert faults == []
+    assert kinds(faults) == ["unequal_rotors"]
     assert known.px4_vehicle({}, 4)[0].rotors is None
+
+
+@pytest.mark.parametrize(
+    ("values", "name"),
+    [
+        *(({"MAV_TYPE": kind}, f"{name}.*MAV_TYPE {kind}") for kind, name in px4_ulog.OTHER_TYPES.items()),
+        *(({"CA_AIRFRAME": kind}, f"{name}.*CA_AIRFRAME {kind}") for kind, name in px4_ulog.OTHER_AIRFRAMES.items()),
+        ({"MAV_TYPE": 99}, "not known here.*MAV_TYPE 99"),
+    ],
+)
+def test_px4_what_is_no_multirotor_of_fixed_rotors_is_refused_by_its_name(values, name: str) -> None:
+    with pytest.raises(InputError, match=f"{name}.*only multirotors"):
+        px4_ulog.rotor_count(px4(values, sensor_combined=gyro()))
+
+
+@pytest.mark.parametrize(("kind", "rotors"), [(2, 4), (13, 6), (14, 8), (29, 12), (35, 10), (0, 6), (43, 6), (None, 6)])
+def test_px4_the_type_says_how_many_rotors_and_else_the_motors_that_are_driven(kind, rotors: int) -> None:
+    motors = {"timestamp": np.arange(5) * 1000, **{f"control[{i}]": np.full(5, 0.5) for i in range(6)}}
+    motors |= {f"control[{i}]": np.full(5, np.nan) for i in range(6, 12)}
+    log = px4({} if kind is None else {"MAV_TYPE": kind}, sensor_combined=gyro(), actuator_motors=motors)
+    assert px4_ulog.rotor_count(log) == rotors
+    assert px4_ulog.rotor_count(px4({"CA_ROTOR_COUNT": 3}, actuator_motors=motors)) == 3
+    faults = px4_ulog.convert(log, rotors).faults
+    assert any("drives 6 motors" in f.found for f in faults) == (rotors < 6)
+
+
+def test_px4_speeds_and_outputs_of_more_motors_than_stated_are_named() -> None:
+    """The signals of a hexarotor follow from any four of them; that of a gimbal does not."""
+    rng = np.random.default_rng(0)
+    demand = rng.normal(0, 30, (400, 4))
+    mix = rng.choice([-1.0, 1.0], (6, 4)) + 0.1 * rng.normal(size=(6, 4))
+    pulses = np.column_stack([1500 + demand @ mix.T, 1500 + 100 * rng.normal(size=400)])
+    time = np.arange(400) * 1000
+    esc = {"timestamp": time, **{f"esc[{i}].esc_rpm": np.full(400, 5000) for i in range(6)}}
+    esc |= {f"esc[{i}].esc_rpm": np.zeros(400) for i in (6, 7)}
+    outputs_ = {"timestamp": time, **{f"output[{i}]": p for i, p in enumerate(pulses.T)}}
+    log = px4(sensor_combined=gyro(400), actuator_outputs=outputs_, esc_status=esc)
+    for rotors, named in ((4, True), (6, False)):
+        found = [f.found for f in px4_ulog.convert(log, rotors).faults if f.kind == "order"]
+        assert [f.split()[:3] for f in found] == [
+            [t, "drives", "6"] for t in ("actuator_outputs", "esc_status")
+        ] * named
+
+
+AXES = [
+    ({"AX": 0.2}, True), ({"AY": -0.2}, True), ({"AX": -0.05, "AY": 0.05}, True), ({"AZ": 1.0}, True),
+    ({"AX": 0.9, "AZ": -0.9}, True), ({"AX": 1.0, "AZ": 0.0}, True), ({"AZ": 0.0}, True),
+    ({"AZ": -0.9}, False), ({"AZ": -2.0}, False), ({"AX": 1e-3}, False), ({}, False),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("axis", "tilted"), AXES)
+@pytest.mark.parametrize("places", [True, False])
+def test_px4_a_tilted_rotor_is_named_by_its_whole_axis(axis: dict[str, float], tilted: bool, places: bool) -> None:
+    values = {f"CA_ROTOR2_{k}": v for k, v in axis.items()}
+    if places:
+        values |= {f"CA_ROTOR{i}_{k}": 0.1 for i in range(4) for k in ("PX", "PY", "PZ", "KM")}
+    _, faults = known.px4_vehicle(values, 4)
+    assert kinds(faults) == ["tilted_rotor"] * tilted
+    assert all("rotor 3 tilted" in f.found for f in faults)
+
+
+@pytest.mark.parametrize(
+    ("values", "kind", "said"),
+    [
+        ({"CA_ROTOR0_TILT": 1, "CA_ROTOR3_TILT": 2}, "tilted_rotor", "rotors 1, 4"),
+        ({"CA_ROTOR1_KM": -0.03}, "unequal_rotors", "KM of rotor 2"),
+        ({"CA_ROTOR1_CT": 5.0}, "unequal_rotors", "CT of rotor 2"),
+        ({"CA_SV_CS_COUNT": 2}, "servo", "CA_SV_CS_COUNT"),
+        ({"CA_SV_TL_COUNT": 1}, "servo", "CA_SV_TL_COUNT"),
+    ],
+)
+def test_px4_what_a_vehicle_file_cannot_hold_is_named(values: dict[str, float], kind: str, said: str) -> None:
+    _, faults = known.px4_vehicle(values, 4)
+    assert kinds(faults) == [kind] and said in faults[0].found
+    assert (
+        not known.px4_vehicle(dict.fromkeys(values, 0.0) | {k: 0.05 for k in values if "KM" in k}, 4)[1] or "CT" in said
+    )
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_px4_a_motor_that_is_reversed_for_a_time_has_empty_cells_there(sign: float) -> None:
+    """A speed's sign is a turning sense where it stays; a command's is reverse thrust always."""
+    time = np.arange(10) * 1000
+    flips = np.where(np.arange(10) < 3, -1.0, 1.0)
+    motors = {"timestamp": time, "control[0]": 0.5 * flips, "control[1]": np.full(10, 0.5)}
+    esc = {"timestamp": time, "esc[0].esc_rpm": sign * 6000 * flips, "esc[1].esc_rpm": np.full(10, sign * 6000.0)}
+    converted = px4_ulog.convert(px4(sensor_combined=gyro(10), actuator_motors=motors, esc_status=esc), 2)
+    for name, size in (("throttle_{}", 0.5), ("rotor_speed_{}_rad_s", 200 * np.pi)):
+        assert converted.table[name.format(1)].isna().tolist() == [True] * 3 + [False] * 7
+        assert converted.table[name.format(1)].dropna().to_numpy() == pytest.approx(size)
+        assert converted.table[name.format(2)].to_numpy() == pytest.approx(size)
+    assert [f.column for f in converted.faults if f.kind == "reversed"] == ["throttle_1", "rotor_speed_1_rad_s"]
+
+
+@pytest.mark.parametrize("port", ["MAIN", "AUX"])
+def test_px4_rotors_are_found_by_function_on_either_port(port: str) -> None:
+    """Between servos, in another order, one with its range reversed, one that turns both ways."""
+    values = {f"PWM_{port}_FUNC{k}": f for k, f in ((1, 201), (2, 102), (4, 101), (5, 103), (6, 0))}
+    values |= {f"PWM_{port}_MIN{k}": 1000 for k in (2, 4, 5)} | {f"PWM_{port}_MAX{k}": 2000 for k in (2, 4, 5)}
+    values |= {f"PWM_{port}_REV": 1 << 1, "CA_R_REV": 1 << 2}
+    if port == "AUX":
+        values["PWM_MAIN_FUNC1"] = 201
+    log = px4(values, sensor_combined=gyro(), actuator_outputs=outputs(1900.0, 1700.0, 1111.0, 1250.0, 1800.0, 1900.0))
+    table = px4_ulog.convert(log, 3).table
+    assert table[["throttle_1", "throttle_2", "throttle_3"]].iloc[0].tolist() == pytest.approx([0.25, 0.3, 0.6])
+    (said,) = [f.found for f in px4_ulog.convert(log, 4).faults if f.kind == "no_command"]
+    assert "motor 4" in said
+
+
+@pytest.mark.parametrize(
+    ("change", "before", "after"),
+    [
+        (("PWM_MAIN_MIN1", 1250.0), 0.5, 1 / 3),
+        (("PWM_MAIN_MAX1", 3000.0), 0.5, 0.25),
+        (("PWM_MAIN_REV", 1), 0.5, 0.5),
+        (("THR_MDL_FAC", 0.5), 0.5, 0.5),  # turns thrusts into signals, and these are signals
+    ],
+)
+def test_px4_a_pulse_is_read_by_the_parameters_that_held_then(change, before: float, after: float) -> None:
+    stated = {"PWM_MAIN_FUNC1": 101, "PWM_MAIN_MIN1": 1000, "PWM_MAIN_MAX1": 2000, "PWM_MAIN_REV": 0, "THR_MDL_FAC": 0}
+    topics = {"sensor_combined": [gyro(10)], "actuator_outputs": [outputs(1500.0, count=10)]}
+    log = px4_ulog.Px4Log(topics, Parameters.of([(3000.0, "PWM_MAIN_MIN1", 1000), (5000.0, *change)], stated))
+    converted = px4_ulog.convert(log, 1)
+    assert converted.table["throttle_1"].tolist() == pytest.approx([before] * 5 + [after] * 5)
+    (said,) = [f.sentence for f in converted.faults if f.kind == "parameter_changed"]
+    assert f"{change[0]} was set from" in said and f"to {change[1]:g} at 0.01 s" in said
+
+
+def test_px4_a_thrust_curve_set_in_the_air_holds_from_then_on() -> None:
+    motors = {"timestamp": np.arange(10) * 1000, "control[0]": np.full(10, 0.3 * 0.5**2 + 0.7 * 0.5)}
+    changes = [(5000.0, "THR_MDL_FAC", 0.3), (8000.0, "THR_MDL_FAC", 0.0)]
+    topics = {"sensor_combined": [gyro(10)], "actuator_motors": [motors]}
+    converted = px4_ulog.convert(px4_ulog.Px4Log(topics, Parameters.of(changes, {"THR_MDL_FAC": 0.0})), 1)
+    assert converted.table["throttle_1"].tolist() == pytest.approx([0.425] * 5 + [0.5] * 3 + [0.425] * 2)
+    (said,) = [f.found for f in converted.faults if f.kind == "parameter_changed"]
+    assert said == "THR_MDL_FAC was set from 0 to 0.3 at 0.01 s, to 0 at 0.01 s of the log"
+
+
+@pytest.mark.parametrize("name", ["CA_ROTOR0_PX", "CA_ROTOR_COUNT", "MAV_TYPE", "MPC_THR_HOVER", "EKF2_BCOEF_X"])
+def test_px4_a_change_of_what_else_is_compared_is_stated_and_the_value_of_most_of_the_flight_taken(name: str) -> None:
+    for at, value in ((4000.0, 3.0), (16000.0, 2.0)):
+        log = px4_ulog.Px4Log(
+            {"sensor_combined": [gyro(20)]}, Parameters.of([(at, name, 3.0), (at, "MC_ROLL_P", 5)], {name: 2.0})
+        )
+        assert px4_ulog.in_flight(log)[name] == value
+        changed = [f.found.split()[0] for f in px4_ulog.convert(log, 1).faults if f.kind == "parameter_changed"]
+        assert changed == [name]
+
+
+def ulog_message(kind: str, body: bytes) -> bytes:
+    return struct.pack("<HB", len(body), ord(kind)) + body
+
+
+@pytest.mark.parametrize("number", [0, 7], ids=["by its number", "by another"])
+def test_px4_a_topic_subscribed_twice_keeps_its_first_half(tmp_path: Path, number: int) -> None:
+    data = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0) + ulog_message("B", bytes(40))
+    data += ulog_message("F", b"vehicle_angular_velocity:uint64_t timestamp;float[3] xyz;")
+    for half, own in ((0, 0), (1, number)):
+        data += ulog_message("A", struct.pack("<BH", 0, own) + b"vehicle_angular_velocity")
+        for k in range(50 * half, 50 * half + 50):
+            data += ulog_message("D", struct.pack("<HQfff", own, 1_000_000 + 4000 * k, k, 0, 0))
+    (tmp_path / "log.ulg").write_bytes(data)
+    table = px4_ulog.convert(px4_ulog.open_log(tmp_path / "log.ulg"), 4).table
+    assert table["angular_velocity_x_rad_s"].tolist() == list(range(100))
+
+
+def test_px4_a_log_cut_off_anywhere_keeps_every_whole_message(tmp_path: Path) -> None:
+    kind = np.dtype([("timestamp", "<u8"), ("xyz", "<f4", 3)])
+    rates = np.zeros(40, kind)
+    rates["timestamp"] = 1_000_000 + np.arange(40) * 4000
+    data = ulog_bytes({"vehicle_angular_velocity": ("uint64_t timestamp;float[3] xyz;", kind, rates)})[:-5]
+    size = 3 + 2 + kind.itemsize
+    for lost in range(2 * size + 1):
+        (tmp_path / "log.ulg").write_bytes(data[: len(data) - lost])
+        converted = px4_ulog.convert(px4_ulog.open_log(tmp_path / "log.ulg"), 4)
+        assert len(converted.table) == 40 - -(-lost // size)
+        assert ("cut_off" in kinds(converted.faults)) == (lost % size > 0)
     with pytest.raises(InputError, match="VTOL"):
         px4_ulog.rotor_count(px4({"MAV_TYPE": 22}))

@@ -1,0 +1,217 @@
+"""Records of ROS 1 bags, MCAP files and ROS 2 databases read one after the other, without index or footer.
+
+What is whole before a file ends is kept: a recorder whose battery goes off writes no index, and rosbags then refuses
+the file. Channels of MCAP that hold no ROS message are listed and passed over.
+
+Sources: the bag format 2.0; the MCAP specification; the tables of rosbag2's sqlite3 storage.
+"""
+
+from __future__ import annotations
+
+import bz2
+import sqlite3
+import struct
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rotorid.recordings.importers.optional import needs
+
+MCAP, BAG = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n"
+FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK = 0x02, 0x03, 0x04, 0x05, 0x06
+"""Codes of MCAP's records."""
+BAG_MESSAGE, BAG_HEADER, BAG_CHUNK, BAG_CONNECTION = 0x02, 0x03, 0x05, 0x07
+"""Codes of the records of a bag."""
+ROS_ENCODINGS = {("ros1msg", "ros1"), ("ros2msg", "cdr"), ("ros2idl", "cdr"), ("omgidl", "cdr")}
+"""Encodings of a schema and of its messages that are ROS's."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One topic of a file: its type in ROS 2's spelling, the definition of it, and how its messages are encoded."""
+
+    topic: str
+    msgtype: str
+    schema: str
+    """`ros1msg`, `ros2msg`, `ros2idl`, or what a foreign channel states."""
+    definition: str
+    encoding: str
+
+    @property
+    def of_ros(self) -> bool:
+        return (self.schema, self.encoding) in ROS_ENCODINGS
+
+
+@dataclass
+class Records:
+    """Every message that is whole, in the order of the file, the channels by number, and whether the file ends early.
+
+    `messages` is read once; `cut` is known after that.
+    """
+
+    path: Path
+    channels: dict[int, Channel] = field(default_factory=dict)
+    schemas: dict[int, tuple[str, str, str]] = field(default_factory=dict)
+    """Name, encoding and text of each schema of an MCAP file."""
+    cut: bool = False
+    lost_chunks: int = 0
+    """Chunks that cannot be unpacked."""
+
+    def messages(self) -> Iterator[tuple[Channel, int, bytes]]:
+        """(channel, time of recording in ns, bytes) of each message of ROS."""
+        with open(self.path, "rb") as file:
+            head = file.read(16)
+        if head.startswith(MCAP):
+            yield from self._of_mcap(self.path.read_bytes()[len(MCAP) :], False)
+        elif head.startswith(BAG):
+            yield from self._of_bag(self.path.read_bytes()[len(BAG) :], False)
+        else:
+            yield from self._of_database()
+
+    def _of_mcap(self, data: bytes, in_chunk: bool) -> Iterator[tuple[Channel, int, bytes]]:
+        at = 0
+        while at + 9 <= len(data):
+            code, size = data[at], struct.unpack_from("<Q", data, at + 1)[0]
+            body = data[at + 9 : at + 9 + size]
+            at += 9 + size
+            if code == FOOTER:
+                return
+            if code == CHUNK:
+                yield from self._of_mcap(self._unpacked_mcap(body), True)
+            if len(body) < size:
+                self.cut = True
+                return
+            if code == SCHEMA:
+                name, place = _string(body, 2)
+                encoding, place = _string(body, place)
+                self.schemas[_u16(body, 0)] = name, encoding, _string(body, place)[0]
+            elif code == CHANNEL and (number := _u16(body, 0)) not in self.channels:
+                name, schema, text = self.schemas.get(_u16(body, 2), ("", "", ""))
+                topic, place = _string(body, 4)
+                self.channels[number] = Channel(topic, _spelled(name), schema, text, _string(body, place)[0])
+            elif code == MESSAGE and (channel := self.channels.get(_u16(body, 0))) and channel.of_ros:
+                yield channel, struct.unpack_from("<Q", body, 6)[0], body[22:]
+        self.cut |= not in_chunk or at < len(data)
+
+    def _unpacked_mcap(self, body: bytes) -> bytes:
+        """The records of a chunk, as many as came."""
+        if len(body) < 40:
+            return b""
+        compression, place = _string(body, 28)
+        return self._unpacked(body[place + 8 :], compression)
+
+    def _of_bag(self, data: bytes, in_chunk: bool) -> Iterator[tuple[Channel, int, bytes]]:
+        at, indexed = 0, in_chunk
+        while at < len(data):
+            fields, at = _fields(data, at)
+            size = struct.unpack_from("<I", data, at)[0] if at + 4 <= len(data) else len(data)
+            body, at = data[at + 4 : at + 4 + size], at + 4 + size
+            code = fields.get("op", b"\0")[0]
+            if code == BAG_CHUNK:
+                yield from self._of_bag(self._unpacked(body, fields["compression"].decode()), True)
+            if len(body) < size:
+                self.cut = True
+                return
+            if code == BAG_HEADER:
+                indexed = struct.unpack("<Q", fields["index_pos"])[0] > 0
+            elif code == BAG_CONNECTION:
+                own, _ = _fields(struct.pack("<I", len(body)) + body, 0)
+                kind, text = own["type"].decode(), own["message_definition"].decode(errors="replace")
+                self.channels[_u32(fields["conn"])] = Channel(
+                    fields["topic"].decode(), _spelled(kind), "ros1msg", text, "ros1"
+                )
+            elif code == BAG_MESSAGE and (channel := self.channels.get(_u32(fields["conn"]))):
+                seconds, rest = struct.unpack("<II", fields["time"])
+                yield channel, seconds * 10**9 + rest, body
+        self.cut |= not indexed
+
+    def _unpacked(self, data: bytes, compression: str) -> bytes:
+        """Bytes of a chunk, as many as can be unpacked of one that is cut off."""
+        if compression == "bz2":
+            reader = bz2.BZ2Decompressor()
+        elif compression == "lz4":
+            reader = needs("lz4.frame", "ros", self.path).LZ4FrameDecompressor()
+        elif compression == "zstd":
+            reader = needs("rosbags.rosbag2.storage_mcap", "ros", self.path).zstd.ZstdDecompressor()
+        else:
+            return data
+        try:
+            return reader.decompress(data)
+        except Exception:  # each library raises its own
+            self.lost_chunks += 1
+            return b""
+
+    def _of_database(self) -> Iterator[tuple[Channel, int, bytes]]:
+        with closing(sqlite3.connect(f"{self.path.resolve().as_uri()}?immutable=1", uri=True)) as base:
+            base.execute("PRAGMA writable_schema = ON")  # or a file that is shorter than it says is refused at once
+            texts = {}
+            if base.execute("SELECT 1 FROM sqlite_master WHERE name = 'message_definitions'").fetchone():
+                rows = base.execute("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions")
+                texts = {kind: (encoding, text) for kind, encoding, text in rows}
+            for number, topic, kind, encoding in base.execute(
+                "SELECT id, name, type, serialization_format FROM topics"
+            ):
+                schema, text = texts.get(kind, ("ros2msg", ""))
+                self.channels[number] = Channel(topic, kind, schema or "ros2msg", text, encoding)
+            try:
+                for number, at, body in base.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY id"):
+                    if (channel := self.channels.get(number)) and channel.of_ros:
+                        yield channel, at, body
+            except sqlite3.DatabaseError:
+                self.cut = True
+
+
+def typestores(channels: list[Channel], path: Path) -> dict[str, object]:
+    """rosbags' stores of types by encoding (`ros1`, `cdr`) with what the channels define; a definition that cannot be
+    read leaves its type to those that are known."""
+    typesys = needs("rosbags.typesys", "ros", path)
+    stores = {"ros1": typesys.Stores.ROS1_NOETIC, "cdr": typesys.Stores.LATEST}
+    found = {encoding: typesys.get_typestore(store) for encoding, store in stores.items()}
+    for channel in channels:
+        if not channel.definition:
+            continue
+        try:
+            if channel.schema in ("ros1msg", "ros2msg"):
+                types = typesys.get_types_from_msg(channel.definition, channel.msgtype)
+            else:
+                types = typesys.get_types_from_idl(channel.definition)
+            found[channel.encoding].register({k: v for k, v in types.items() if k not in found[channel.encoding].types})
+        except Exception:  # rosbags lets whatever a strange definition raises through
+            continue
+    return found
+
+
+def _fields(data: bytes, at: int) -> tuple[dict[str, bytes], int]:
+    """The fields of a bag's header at a place, none where it is cut off, and the place after it."""
+    if at + 4 > len(data):
+        return {}, len(data)
+    size = struct.unpack_from("<I", data, at)[0]
+    header, at = data[at + 4 : at + 4 + size], at + 4 + size
+    fields, place = {}, 0
+    while len(header) == size and place + 4 <= size:
+        length = struct.unpack_from("<I", header, place)[0]
+        name, _, value = header[place + 4 : place + 4 + length].partition(b"=")
+        fields[name.decode("latin-1")] = value
+        place += 4 + length
+    return fields, at
+
+
+def _u32(data: bytes) -> int:
+    return struct.unpack("<I", data)[0]
+
+
+def _u16(data: bytes, at: int) -> int:
+    return struct.unpack_from("<H", data, at)[0]
+
+
+def _string(data: bytes, at: int) -> tuple[str, int]:
+    """A string behind its length, and the place after it."""
+    size = struct.unpack_from("<I", data, at)[0]
+    return data[at + 4 : at + 4 + size].decode(errors="replace"), at + 4 + size
+
+
+def _spelled(msgtype: str) -> str:
+    """A type's name as ROS 2 spells it: `sensor_msgs/Imu` is `sensor_msgs/msg/Imu`."""
+    package, _, name = msgtype.rpartition("/")
+    return f"{package}/msg/{name}" if package and "/" not in package else msgtype
