@@ -8,6 +8,7 @@ vehicle, and nothing else is learnt from held-out runs.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -43,6 +44,8 @@ MOST_KNOTS = 150
 strongest are looked at."""
 RESTLESS_SHARE = 0.5
 """A wind that never rests must take away more than this share of the energy left in the horizontal force."""
+FOLLOWS = 0.5
+"""Share of the squares of a wind that the vehicle's own velocity may explain."""
 LASTING_S = 12.0
 """A wind that changes for longer has no one height: its root mean square is stated."""
 MOST_EXTRAPOLATION = 1.05
@@ -295,6 +298,8 @@ def in_moving_air(prepared: Prepared, model: WrenchModel, terms: list[Term], ask
         if not gusts:
             return None
     everywhere = any(t.window[2] - t.window[1] > 0.9 * length_of(model, t.run) for t in asked)
+    if everywhere and follows_velocity(gusts, model):
+        return None
     if everywhere and horizontal_energy(again) > (1 - RESTLESS_SHARE) * horizontal_energy(model):
         return None
     if len(gusts) < len(asked):
@@ -319,6 +324,24 @@ def believed(gusts: list[Gust], model: WrenchModel) -> list[Gust]:
     if max((size for _, size in sizes), default=0.0) <= rules.OVERSHADOWED["times_for_burst"]:
         return []
     return [g for g, size in sizes if size > BESIDE_A_BURST]
+
+
+def follows_velocity(gusts: Sequence[Gust], model: WrenchModel) -> bool:
+    """Whether most of a wind is a share of the velocity over ground, below one: a drag that is stated wrongly.
+
+    What a wind blows along is slower than the wind.
+    """
+    winds, flown = [], []
+    for gust in gusts:
+        for motion in (s.motion for s in model.segments if s.run == gust.run):
+            inside = (motion.time_s >= gust.knots_s[0]) & (motion.time_s <= gust.knots_s[-1])
+            winds.append(blowing(gust.knots_s, gust.wind_m_s, motion.time_s[inside]))
+            world = np.einsum("nij,nj->ni", motion.rotation[inside], motion.velocity[inside])
+            flown.append(world[:, :2])
+    wind, velocity = np.concatenate(winds), np.concatenate(flown)
+    share = float((wind * velocity).sum() / max(float((velocity**2).sum()), 1e-12))
+    left = float(((wind - share * velocity) ** 2).sum())
+    return abs(share) < 1.0 and left < (1.0 - FOLLOWS) * float((wind**2).sum())
 
 
 def share_of_airspeed(gust: Gust, model: WrenchModel) -> float:
