@@ -8,7 +8,9 @@
 import json
 from pathlib import Path
 
-from rotorid.mismatch.changes import changes_from, reference_of, words
+from rotorid.mismatch.changes import words
+from rotorid.mismatch.changes.compare import changes_from
+from rotorid.mismatch.changes.joint import reference_of
 from rotorid.mismatch.decision.words import channel_words
 from rotorid.recordings import read_set
 from rotorid.recordings.importers.report import read_report

@@ -9,7 +9,9 @@ import pandas as pd
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
-from rotorid.mismatch.changes import Changes, as_one, changes_from, reference_of
+from rotorid.mismatch.changes.compare import Changes, changes_from
+from rotorid.mismatch.changes.joint import reference_of
+from rotorid.mismatch.changes.level_one import as_one
 from rotorid.mismatch.changes.words import change_words
 from rotorid.recordings import RecordingSet, read_set
 from rotorid.report.fleet.summary import day_of
