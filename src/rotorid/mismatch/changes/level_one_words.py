@@ -142,8 +142,7 @@ def quantity_words(d: Difference) -> str:
         "drag": f"drag along {member}",
         "noise": f"noise of {member}",
     }
-    unit = {"accelerometer": "g", "gyroscope": "rad/s", "gyroscope_turn": "°"}.get(kind, "%")
-    return f"{names.get(kind, 'thrust asked for at the same load')} ({unit})"
+    return f"{names.get(kind, 'thrust at the same load')} ({unit_of(d)})"
 
 
 def in_unit_of_words(d: Difference, value: float) -> float:
@@ -159,12 +158,13 @@ def _family(kind: str) -> str:
     return "lift" if kind.startswith("lift") else kind
 
 
-def _unit(d: Difference) -> str:
+def unit_of(d: Difference) -> str:
+    """Unit of `in_unit_of_words`."""
     return {"accelerometer": "g", "gyroscope": "rad/s", "gyroscope_turn": "°"}.get(d.quantity.kind, "%")
 
 
 def _amount(d: Difference, value: float) -> str:
-    return f"{number(abs(in_unit_of_words(d, value)))} {_unit(d)}"
+    return f"{number(abs(in_unit_of_words(d, value)))} {unit_of(d)}"
 
 
 def _size_of(d: Difference, signed: bool) -> str:
@@ -176,7 +176,7 @@ def _size_of(d: Difference, signed: bool) -> str:
         return f"{abs(value):.0f} ({low:.0f} to {high:.0f}) %"
     digits = max(0, min(4, 1 - int(np.floor(np.log10(max(half, 1e-6))))))
     shown = f"{value:+.{digits}f}" if signed else f"{abs(value):.{digits}f}"
-    return f"{shown} ± {half:.{digits}f} {_unit(d)}"
+    return f"{shown} ± {half:.{digits}f} {unit_of(d)}"
 
 
 def level_one_json(found: LevelOne, explained: Mapping[str, tuple[str, ...]]) -> dict:

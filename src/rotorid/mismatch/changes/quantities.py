@@ -136,6 +136,10 @@ class Grid:
     throttle: bool
     """Whether those are a throttle."""
 
+    def like(self, other: Grid) -> bool:
+        """Whether the same is known of the rotors."""
+        return (self.speeds, self.commands, self.throttle) == (other.speeds, other.commands, other.throttle)
+
 
 def grid_of(sets: Sequence[RecordingSet]) -> Grid:
     """The grid of all runs of some sets of one vehicle; what not every run has is used of none."""

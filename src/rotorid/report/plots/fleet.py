@@ -90,10 +90,10 @@ MOST_HISTORIES = 8
 
 
 def draw_history(numbers: pd.DataFrame, events: pd.DataFrame, path: Path) -> None:
-    """Each vehicle's believed values over its sets, as changes since its first ones with intervals (95 %).
+    """Each vehicle's trims, shares and thrust over its sets, as changes since its first ones with intervals (95 %).
 
-    `numbers` and `events` are the tables of `rotorid.report.fleet.history.history`. A value that some set shows to have
-    changed has a colour, the others are grey; a line stands where an event begins.
+    `numbers` and `events` are the tables of `rotorid.report.fleet.history.history`. A quantity that differs from
+    some set on has a colour, the others are grey; a line stands where an event begins.
     """
     counts = events["vehicle"].value_counts()
     vehicles = sorted(numbers["vehicle"].unique(), key=lambda v: (-counts.get(v, 0), v))[:MOST_HISTORIES]
@@ -112,9 +112,11 @@ def one_history(axis, numbers: pd.DataFrame, events: pd.DataFrame) -> None:
     """One vehicle's values over its sets."""
     order = {name: place for place, name in enumerate(dict.fromkeys(numbers["set"]), 1)}
     changed = [name for name in dict.fromkeys(numbers["name"]) if name in set(events["id"])]
+    first = numbers["name"].str.startswith(("share/", "trim/", "lift"))
+    numbers = numbers[first | numbers["name"].isin(changed)]
     for name, own in numbers.groupby("name", sort=False):
         place = own["set"].map(order).to_numpy()
-        value, low, high = (100 * own[c].to_numpy(float) for c in ("change", "low_95", "high_95"))
+        value, low, high = (own[c].to_numpy(float) for c in ("change", "low_95", "high_95"))
         colour = style.CYCLE[changed.index(name) % len(style.CYCLE)] if name in changed else style.GREY
         bars = [np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)]
         label = name if name in changed else None
@@ -122,7 +124,8 @@ def one_history(axis, numbers: pd.DataFrame, events: pd.DataFrame) -> None:
     for name in dict.fromkeys(events["set"]):
         axis.axvline(order[name] - 0.5, color=style.ORANGE, lw=0.8, ls="--")
     axis.set_xlim(0.5, len(order) + 0.5)
-    axis.set_ylabel("change (%)")
+    units = sorted(set(numbers["unit"])) or ["%"]
+    axis.set_ylabel(f"change ({', '.join(units)})")
     axis.set_xlabel("set after the good ones")
     if changed:
         axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
