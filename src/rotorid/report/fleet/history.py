@@ -147,7 +147,7 @@ def change_points(shown: Shown, good: int) -> list[ChangePoint]:
 
 
 def rarity(d: Difference) -> tuple[float, float]:
-    """How rare a difference is, the rarest first; of those too rare to be told apart, by their size."""
+    """How rare a difference is, the rarest first; of those that are equally rare, by their size."""
     return d.false_alarms, -abs(d.value) / d.sd
 
 
