@@ -62,22 +62,22 @@ def compare(
             raise InputError(
                 f"{sets[0]}: nothing to compare it with; expected two sets or more, the last one in question"
             )
-        with progress("compare", quiet):
+        with progress("compare: what differs", quiet):
             from rotorid.mismatch.changes.level_one import as_one, of_one_vehicle, seen_by
             from rotorid.mismatch.changes.level_one_words import level_one_sentences
 
             *known, second = of_one_vehicle(read(sets, mass_kg, like, vehicle, mapping))
             good = as_one(known)
             seen = seen_by(good, second)
-            # What cannot be wrong comes first, and before the minutes that its explanation takes.
-            if seen is not None and not as_json:
-                for line in level_one_sentences(seen):
-                    typer.echo(line)
-            with step("comparing"):
-                from rotorid.mismatch.changes import words
-                from rotorid.mismatch.changes.compare import changes_between
+        # What cannot be wrong comes first, and before the minutes that its explanation takes.
+        if seen is not None and not as_json:
+            for line in level_one_sentences(seen):
+                typer.echo(line)
+        with progress("compare", quiet), step("comparing"):
+            from rotorid.mismatch.changes import words
+            from rotorid.mismatch.changes.compare import changes_between
 
-                found = changes_between(good, second, seen=seen)
+            found = changes_between(good, second, seen=seen)
         text = json.dumps(words.as_json(found), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
         if out is not None:
             write(out, text)

@@ -136,7 +136,8 @@ def changes_from(
     A name that predicts other trims, shares or thrust than what differs is not stated.
     """
     base = reference.recordings
-    seen = seen or seen_by(base, new)
+    if seen is None and isinstance(reference, Reference):
+        seen = seen_by(reference.as_recorded, new)
     if new.vehicle.kind != base.vehicle.kind:
         raise InputError(
             f"{new.name}/vehicle.yaml: kind is {new.vehicle.kind}, expected {base.vehicle.kind} as in {base.name}"

@@ -22,7 +22,9 @@ from scipy.special import polygamma, stdtr, stdtrit
 
 from rotorid.errors import InputError
 from rotorid.mismatch.changes.quantities import (
+    BY_VOLTAGE,
     CONDITIONS,
+    DOUBT_OF_VOLTAGE,
     KINDS,
     PART,
     SLOPES,
@@ -44,8 +46,8 @@ BUDGET = {
     "lift_of_throttle": 0.15,
     "lift_without_voltage": 0.15,
     "sideways": 0.1,
-    "accelerometer": 0.05,
-    "gyroscope_scale": 0.05,
+    "accelerometer": 0.1,
+    "gyroscope_scale": 0.1,
     "follows": 0.025,
     "gyroscope": 0.025,
     "gyroscope_turn": 0.025,
@@ -73,7 +75,7 @@ SCATTER = (
     ("lift", "NeuroBEM", 0.01, 3, 1),
     ("lift", "imrc", 0.00078, 8, 1),
     ("lift", "appius", 0.034, 1, 1),
-    ("lift_of_throttle", "CrazyPAD", 0.012, 8, 1),
+    ("lift_of_throttle", "CrazyPAD", 0.011, 8, 1),
     ("follows", "imrc", 0.012, 8, 4),
     ("accelerometer", "NeuroBEM", 0.0016, 3, 3),
     ("accelerometer", "imrc", 0.004, 8, 3),
@@ -84,21 +86,25 @@ SCATTER = (
     ("gyroscope_scale", "imrc", 0.0071, 8, 1),
     ("gyroscope_scale", "appius", 0.097, 1, 1),
     ("gyroscope_turn", "NeuroBEM", 0.019, 3, 3),
-    ("gyroscope_turn", "imrc", 0.0001, 8, 3),
-    ("gyroscope_turn", "appius", 0.0001, 1, 3),
+    ("gyroscope_turn", "imrc", 0.01, 8, 3),
+    ("gyroscope_turn", "appius", 0.015, 1, 3),
     ("drag", "NeuroBEM", 0.031, 3, 2),
     ("drag", "imrc", 0.0045, 8, 2),
     ("drag", "CrazyPAD", 0.051, 8, 2),
-    ("drag", "appius", 0.0001, 1, 2),
+    ("drag", "appius", 0.05, 1, 2),
     ("noise", "NeuroBEM", 0.43, 3, 6),
     ("noise", "imrc", 0.3, 8, 6),
     ("noise", "appius", 0.16, 1, 5),
 )
-"""Kind, laboratory, one-sigma from flight to flight where nothing changed, degrees of freedom, members of the kind."""
+"""Kind, laboratory, one-sigma from flight to flight where nothing changed, degrees of freedom, members of the kind.
+
+Of a slope what goes beyond the flights' own doubt, or half of that doubt where it explains all."""
 ASSUMED = {"lift_without_voltage": (0.1, 3)}
 """One-sigma and degrees of freedom of what no laboratory shows: here of a battery whose voltage is not recorded."""
 FEWEST_FLIGHTS, FEWEST_LABORATORIES = 3, 3
-"""A laboratory's largest scatter needs so many flights; where fewer laboratories have a kind, it is doubled."""
+"""A laboratory's largest scatter needs so many flights; of a kind that fewer laboratories have, it is doubled."""
+FREEDOM_OF_PIECES = 2.0
+"""As how many degrees of freedom between flights the doubt by a flight's own pieces counts."""
 KNOWN = 1e6
 """Degrees of freedom of a scatter that is taken as known."""
 FREEDOM = (2.0, 10.0)
@@ -272,13 +278,16 @@ def usual_scatter(without: str = "") -> dict[str, Usual]:
             out[kind] = Usual(sd, freedom, 2.0 * sd)
             continue
         sd, freedom, members = np.array([row[2:] for row in rows], float).T
-        mean = float(np.sqrt(np.average(sd**2, weights=freedom * members)))
-        apart = np.var(np.log(sd**2), ddof=1) if len(rows) > 1 else np.inf
-        apart -= float(np.mean(polygamma(1, 0.5 * freedom * members)))
+        half = 0.5 * freedom * members
+        logs = np.log(sd**2) - polygamma(0, half) + np.log(half)
+        apart = np.var(logs, ddof=1) if len(rows) > 1 else np.inf
+        apart -= float(np.mean(polygamma(1, half)))
         counts = 2.0 * brentq(lambda x, y=apart: polygamma(1, x) - np.clip(y, 0.1, 1e3), 1e-2, 1e2)
-        shown = sd[freedom >= FEWEST_FLIGHTS - 1]
-        most = max([mean, *shown]) * (1.0 if len(shown) >= FEWEST_LABORATORIES else 2.0)
-        out[kind] = Usual(mean, float(np.clip(counts, *FREEDOM)), float(most))
+        counts = float(np.clip(counts, *FREEDOM))
+        mean = float(np.exp(0.5 * (np.mean(logs) + polygamma(0, 0.5 * counts) - np.log(0.5 * counts))))
+        wider = 1.0 if len(rows) >= FEWEST_LABORATORIES else 2.0
+        most = max([mean, *sd[freedom >= FEWEST_FLIGHTS - 1]])
+        out[kind] = Usual(wider * mean, counts, float(wider * most))
     return out
 
 
@@ -353,6 +362,8 @@ def _means(q: Quantity, sides: list[list[Sequence[Flown]]], every: Sequence[Flow
     gram = np.concatenate([run.gram[:, at][:, :, at] for run in every])
     cross = np.concatenate([run.cross[q.key][:, at] for run in every])
     slope, without = _ridge(gram, cross, KINDS[q.kind].penalty)
+    for k in (at.index(k) for k in at if CONDITIONS[k] == "voltage"):
+        slope[k] = np.clip(slope[k], *BY_VOLTAGE)
     middle = np.mean([np.average(run.x[:, at], axis=0, weights=run.rows) for run in every], axis=0)
     values, own, where = [], [], []
     for side in sides:
@@ -367,8 +378,10 @@ def _means(q: Quantity, sides: list[list[Sequence[Flown]]], every: Sequence[Flow
         values.append(np.array(means))
         own.append(np.array(variances))
         where.append(np.mean(places, axis=0))
-    spread = (without - without.mean(axis=0)) @ (where[1] - where[0])
-    return _Numbers(values, own, float(spread @ spread) * (len(spread) - 1) / len(spread))
+    away = where[1] - where[0]
+    spread = (without - without.mean(axis=0)) @ away
+    doubt = sum((DOUBT_OF_VOLTAGE * away[at.index(k)]) ** 2 for k in at if CONDITIONS[k] == "voltage")
+    return _Numbers(values, own, float(spread @ spread) * (len(spread) - 1) / len(spread) + float(doubt))
 
 
 def _slope(q: Quantity, runs: Sequence[Flown]) -> tuple[float, float]:
@@ -404,8 +417,12 @@ def _difference(
     joint = (usual.freedom * usual.sd**2 + freedom * found) / total
     value = float(numbers.values[1].mean() - numbers.values[0].mean())
     tests = []
+    doubts = [overstated(numbers, found, freedom) * w for w in numbers.own]
     for variance, degrees in ((joint, total), (usual.most**2, KNOWN)):
-        each = [variance + w if q.kind in SLOPES else np.maximum(variance, w) for w in numbers.own]
+        each = [
+            variance + w if q.kind in SLOPES else np.maximum(variance, v)
+            for w, v in zip(numbers.own, doubts, strict=True)
+        ]
         sd = float(np.sqrt(sum(v.mean() / len(v) for v in each) + numbers.between))
         reach = -stdtrit(degrees, 0.25 * FALSE_ALARMS * share) - stdtrit(degrees, 0.05)
         tests.append((2.0 * float(stdtr(degrees, -abs(value) / sd)), sd, degrees, variance, float(reach) * sd))
@@ -416,6 +433,17 @@ def _difference(
     )
     rate, smallest = min(1.0, 2.0 * rate / share), min(test[-1] for test in tests)
     return Difference(q, good, new, value, sd, degrees, float(np.sqrt(variance)), rate, smallest)
+
+
+def overstated(numbers: _Numbers, found: float, freedom: int) -> float:
+    """What part of the variances by the flights' own pieces is believed, 0 to 1.
+
+    Pieces of a manoeuvre differ by more than flights that repeat it: where flights are known to differ by less (by
+    `found`, the variance between them), pieces are believed by so much less. Without such flights they are believed.
+    """
+    own = float(np.mean(np.concatenate(numbers.own)))
+    seen = min(1.0, found / own) if own > 0 else 1.0
+    return (FREEDOM_OF_PIECES + freedom * seen) / (FREEDOM_OF_PIECES + freedom)
 
 
 def scatter_of(numbers: _Numbers, kind: str) -> tuple[float, int]:

@@ -32,6 +32,10 @@ AXES = ("x", "y", "z")
 TURNS = ("roll", "pitch", "yaw")
 LEAST_FELT = 0.3
 """Least specific force along the rotors' axis, over gravity, that thrust is divided by."""
+BY_VOLTAGE, DOUBT_OF_VOLTAGE = (-2.0, 0.0), 0.5
+"""Bounds of the slope of the thrust asked for by the voltage, both logarithms (a motor's thrust goes with the voltage
+squared at most), and what it may be wrong by: under load the voltage falls, and a flight alone cannot tell which is
+cause."""
 PIECES, SHORTEST_PIECE_S, LONGEST_PIECE_S = 8, 1.5, 10.0
 """A run is cut into so many pieces of such a length: what is alike within one counts once."""
 SENSORS = {"gyroscope": c.ANGULAR_VELOCITY, "accelerometer": c.SPECIFIC_FORCE}
@@ -62,8 +66,8 @@ KINDS = {
         Kind("yaw_trim", "of the torque of all rotors", VELOCITY, 3.0),
         Kind("sideways", "of the weight", (*VELOCITY, "load"), 0.1),
         Kind("lift", "", VELOCITY, 1.0, logarithm=True),
-        Kind("lift_of_throttle", "", ("voltage",), 0.1, logarithm=True),
-        Kind("lift_without_voltage", "", logarithm=True),
+        Kind("lift_of_throttle", "", ("voltage", "load"), 0.1, logarithm=True),
+        Kind("lift_without_voltage", "", ("load",), 0.1, logarithm=True),
         Kind("follows", "", logarithm=True),
         Kind("accelerometer", "g"),
         Kind("gyroscope", "rad/s", ("p", "q", "r"), 0.1),
@@ -158,11 +162,11 @@ def grid_of(sets: Sequence[RecordingSet]) -> Grid:
 
 
 def flown(run: Run, vehicle: Vehicle, grid: Grid) -> Flown | None:
-    """What a run shows; None where it has no stretch long enough, or no rotors."""
+    """What a run shows; None where it has no stretch that is long enough."""
     segments = build_segments(run, vehicle, grid.rate_hz, grid.cutoff_hz, full_speed_rad_s=grid.full_speed_rad_s)
     thin = Thinner(grid.rate_hz, grid.cutoff_hz)
     parts = [_rows(s, vehicle, thin, grid) for s in segments if s.motion.size > 2 * len(thin.kernel)]
-    if not parts or not (grid.speeds or grid.commands):
+    if not parts:
         return None
     time_s = np.concatenate([part[0] for part in parts])
     x = np.concatenate([part[1] for part in parts])
@@ -185,48 +189,55 @@ def flown(run: Run, vehicle: Vehicle, grid: Grid) -> Flown | None:
 
 def _rows(segment: Segment, vehicle: Vehicle, thin: Thinner, grid: Grid):
     """Times, conditions (n, 10) and responses of a stretch, thinned."""
-    motion = segment.motion
-    asked = segment.command if grid.commands else motion.rotor_speed
-    turned = motion.rotor_speed if grid.speeds else asked
-    coefficient, count = vehicle.thrust_coefficients_n_s2(), vehicle.rotor_count
-    wanted, given = (thin(coefficient * w**2) for w in (asked, turned))
-    weight = vehicle.mass_kg * vehicle.gravity_m_s2
-    thrust = given.sum(axis=1)
-    y = {f"share/{i + 1}": wanted[:, i] / wanted.mean(axis=1) - 1.0 for i in range(count)} if count > 1 else {}
-    if grid.speeds and grid.commands:
-        pairs = zip(thin(turned).T, thin(asked).T, strict=True)
-        y |= {f"follows/{i + 1}": _log(a) - _log(b) for i, (a, b) in enumerate(pairs)}
-    x = np.full((len(thrust), len(CONDITIONS)), np.nan)
-    groups = residual(replace(segment, motion=replace(motion, rotor_speed=turned)), vehicle)
-    if "force" in groups:
-        felt = thin(motion.specific_force) / vehicle.gravity_m_s2
-        force = thin(groups["force"]) / weight
-        x[:, 6:8], x[:, 8] = felt[:, :2], -felt[:, 2] - 1.0
-        y |= {f"sideways/{a}": force[:, k] for k, a in enumerate(AXES[:2])}
-        y[f"{_lift_kind(motion.voltage, grid)}/all"] = _log(thrust / weight) - _log(np.maximum(-felt[:, 2], LEAST_FELT))
-    if "moment" in groups:
-        over, torque = _levers(vehicle)
-        turning = thin(groups["moment"]) / np.maximum(thrust, LEAST_FELT * weight)[:, None]
-        y |= {f"trim/{name}": turning[:, k] / over for k, name in enumerate(TURNS[:2])}
-        if torque:
-            y["yaw_trim/yaw"] = turning[:, 2] / torque
-    for name, unit in (("accelerometer", vehicle.gravity_m_s2), ("gyroscope", 1.0)):
-        if name in groups:
-            y |= {f"{name}/{a}": column / unit for a, column in zip(AXES, thin(groups[name]).T, strict=True)}
+    motion, time_s = segment.motion, thin.times(segment.motion.time_s)
+    x, y = np.full((len(time_s), len(CONDITIONS)), np.nan), {}
     if motion.velocity is not None:
         x[:, :3] = thin(motion.velocity) / hover_inflow_m_s(vehicle)
     if motion.angular_velocity is not None:
         x[:, 3:6] = thin(motion.angular_velocity)
+    if motion.specific_force is not None:
+        felt = thin(motion.specific_force) / vehicle.gravity_m_s2
+        x[:, 6:8], x[:, 8] = felt[:, :2], -felt[:, 2] - 1.0
     if motion.voltage is not None:
         x[:, 9] = _log(thin(motion.voltage))
-    return thin.times(motion.time_s), x, y
+    asked = segment.command if grid.commands else motion.rotor_speed
+    turned = motion.rotor_speed if grid.speeds else asked
+    groups = residual(replace(segment, motion=replace(motion, rotor_speed=turned)), vehicle)
+    if turned is not None:
+        y = _of_rotors(asked, turned, groups, x[:, CONDITIONS.index("load")], vehicle, thin, grid)
+    for name, unit in (("accelerometer", vehicle.gravity_m_s2), ("gyroscope", 1.0)):
+        if name in groups:
+            y |= {f"{name}/{a}": column / unit for a, column in zip(AXES, thin(groups[name]).T, strict=True)}
+    lift = "lift"
+    if grid.throttle and not grid.speeds:
+        # A throttle gives less thrust as the battery empties; a speed does not.
+        lift = "lift_without_voltage" if motion.voltage is None else "lift_of_throttle"
+    return time_s, x, {k.replace("lift/", f"{lift}/"): v for k, v in y.items()}
 
 
-def _lift_kind(voltage: np.ndarray | None, grid: Grid) -> str:
-    """A throttle gives less thrust as the battery empties; a speed does not."""
-    if grid.speeds or not grid.throttle:
-        return "lift"
-    return "lift_without_voltage" if voltage is None else "lift_of_throttle"
+def _of_rotors(asked, turned, groups, load, vehicle: Vehicle, thin: Thinner, grid: Grid) -> dict[str, np.ndarray]:
+    """Responses that the rotors' speeds are part of: speeds `asked` for and `turned`, (n, k), rad/s; `load` (m,)."""
+    coefficient, weight = vehicle.thrust_coefficients_n_s2(), vehicle.mass_kg * vehicle.gravity_m_s2
+    wanted, given = (thin(coefficient * w**2) for w in (asked, turned))
+    thrust = given.sum(axis=1)
+    y = {}
+    if len(coefficient) > 1:
+        shares = wanted / np.maximum(wanted.mean(axis=1), 1e-9 * weight)[:, None] - 1.0
+        y |= {f"share/{i + 1}": share for i, share in enumerate(shares.T)}
+    if grid.speeds and grid.commands:
+        pairs = zip(thin(turned).T, thin(asked).T, strict=True)
+        y |= {f"follows/{i + 1}": _log(a) - _log(b) for i, (a, b) in enumerate(pairs)}
+    if "force" in groups:
+        force = thin(groups["force"]) / weight
+        y |= {f"sideways/{a}": force[:, k] for k, a in enumerate(AXES[:2])}
+        y["lift/all"] = _log(thrust / weight) - _log(np.maximum(1.0 + load, LEAST_FELT))
+    if "moment" in groups:
+        arm, torque = _levers(vehicle)
+        turning = thin(groups["moment"]) / np.maximum(thrust, LEAST_FELT * weight)[:, None]
+        y |= {f"trim/{name}": turning[:, k] / arm for k, name in enumerate(TURNS[:2])}
+        if torque:
+            y["yaw_trim/yaw"] = turning[:, 2] / torque
+    return y
 
 
 def _levers(vehicle: Vehicle) -> tuple[float, float]:
