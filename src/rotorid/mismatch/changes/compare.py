@@ -31,7 +31,7 @@ from rotorid.mismatch.changes.joint import (
     moved_by,
     reference_of,
 )
-from rotorid.mismatch.changes.level_one import LevelOne, of_one_vehicle, seen_by
+from rotorid.mismatch.changes.level_one import CAUSES, LevelOne, of_one_vehicle, seen_by
 from rotorid.mismatch.changes.notes import command_notes, notes_of, refused_notes
 from rotorid.mismatch.changes.of_instruments import (
     InstrumentReference,
@@ -166,6 +166,8 @@ def changes_from(
     if seen is not None:
         changes, refused, explained = explaining(changes, seen, new.vehicle)
     changed = {i for c in changes for i in (c.id, *c.alternatives)}
+    # What level 1 states has a cause, found or not: none of those that it may have is limited.
+    changed |= {i for d in (seen.stated if seen else ()) for i in CAUSES[d.quantity.kind]}
     return Changes(
         base=base.name,
         new=new.name,

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from rotorid.mismatch.changes.level_one import Difference, LevelOne
+from rotorid.mismatch.changes.level_one import CAUSES, Difference, LevelOne
 from rotorid.mismatch.changes.quantities import KINDS, SENSORS
 from rotorid.mismatch.decision.words import capital, listed, number
 
@@ -196,6 +196,7 @@ def level_one_json(found: LevelOne, explained: Mapping[str, tuple[str, ...]]) ->
                 "scatter": d.scatter,
                 "false_alarm_rate": d.false_alarms,
                 "smallest_stated": d.smallest,
+                "may_be": list(CAUSES[d.quantity.kind]),
                 "explained_by": list(explained.get(d.quantity.key, ())),
                 "good": [{"flight": f.name, "value": f.value, "sd": f.sd} for f in d.good],
                 "new": [{"flight": f.name, "value": f.value, "sd": f.sd} for f in d.new],

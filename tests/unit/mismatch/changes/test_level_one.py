@@ -7,9 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
 from rotorid.mismatch.changes.compare import Change, explaining, predicted
 from rotorid.mismatch.changes.level_one import (
+    BUDGET,
+    CAUSES,
     FALSE_ALARMS,
     SCATTER,
     LevelOne,
@@ -19,6 +22,7 @@ from rotorid.mismatch.changes.level_one import (
     usual_scatter,
 )
 from rotorid.mismatch.changes.level_one_words import level_one_sentences
+from rotorid.mismatch.changes.problem import NAMES
 from rotorid.mismatch.changes.quantities import KINDS
 from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import RecordingSet, Run
@@ -170,6 +174,11 @@ def test_a_name_that_contradicts_the_trims_is_refused_and_one_that_predicts_them
     assert not left and refused == [wrong] and not explained
     left, refused, _ = explaining([right, wrong], found, later.vehicle)
     assert left == [right] and refused == [wrong]
+
+
+def test_every_kind_has_its_causes_its_share_of_the_false_alarms_and_ids_that_exist():
+    assert CAUSES.keys() == BUDGET.keys() == KINDS.keys()
+    assert {i for own in CAUSES.values() for i in own} <= catalogue().keys() | set(NAMES.values())
 
 
 def test_what_changes_predict_has_the_sign_of_what_is_seen(good, later):
