@@ -18,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rotorid.mismatch.changes.level_one import Difference, differences, flights_of, usual_scatter
-from rotorid.mismatch.changes.quantities import Flown, Grid, flown, grid_of
+from rotorid.mismatch.changes.level_one import Difference, differences, flights_of, found_in, usual_scatter
+from rotorid.mismatch.changes.quantities import KINDS, Flown, Grid, flown, grid_of
 from rotorid.recordings import RecordingSet, read_set
 from rotorid_proof.intervals import wilson
 from rotorid_proof.plantings import geometry, sensors, values
@@ -157,6 +157,20 @@ def described(d: Difference) -> str:
     return f"{d.quantity.key} {d.value:+.4f} ({low:+.4f} to {high:+.4f}), false alarms {d.false_alarms:.1g}"
 
 
+def learnt(shown: dict[str, Flights]) -> list[tuple[str, str, float, int, int]]:
+    """The rows of `level_one.SCATTER`: sets of one laboratory together, members of a kind by their mean variance."""
+    known: dict[tuple[str, str], dict[str, list[tuple[float, int]]]] = {}
+    for name, own in shown.items():
+        for q, (variance, freedom) in (found_in(own) if len(own) > 1 else {}).items():
+            known.setdefault((q.kind, LABORATORIES[name]), {}).setdefault(q.member, []).append((variance, freedom))
+    out = []
+    for (kind, laboratory), members in known.items():
+        variances = [sum(v * f for v, f in own) / sum(f for _, f in own) for own in members.values()]
+        freedom = sum(f for _, f in next(iter(members.values())))
+        out.append((kind, laboratory, float(np.sqrt(np.mean(variances))), freedom, len(members)))
+    return sorted(out, key=lambda row: list(KINDS).index(row[0]))
+
+
 def main(recordings: Path) -> None:
     """Print the tables."""
     start = time.process_time()
@@ -178,6 +192,10 @@ def main(recordings: Path) -> None:
                 first = min(found, key=lambda d: d.false_alarms)
                 print(f"  {n}, {what}: {len(alarms)} of {len(found)}; the rarest: {described(first)}")
     print(f"  all: {share(*total)}")
+
+    print("\nthe usual scatter that these flights show: kind, laboratory, one-sigma, degrees of freedom, members")
+    for kind, laboratory, sd, freedom, members in learnt(shown):
+        print(f"  {kind} {laboratory} {sd:.2g} {freedom} {members}")
 
     print("\nlabelled pairs")
     for first, second, rotor in (pair for pair in LABELLED if pair[0] in sets and pair[1] in sets):

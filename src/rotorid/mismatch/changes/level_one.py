@@ -326,6 +326,21 @@ def differences(
     return tuple(sorted(out, key=lambda d: (d.false_alarms, -abs(d.value) / d.sd)))
 
 
+def found_in(flights: Mapping[str, Sequence[Flown]]) -> dict[Quantity, tuple[float, int]]:
+    """Of each quantity the variance from flight to flight and its degrees of freedom: what SCATTER is made of.
+
+    Of a slope, where the flights' own doubt explains all, it is a quarter of that doubt's variance.
+    """
+    side = list(flights.values())
+    every = [run for runs in side for run in runs]
+    out = {}
+    for q in quantities(every):
+        both = _numbers(q, [side, side], every)
+        variance, freedom = scatter_of(replace(both, values=both.values[:1], own=both.own[:1]), q.kind)
+        out[q] = variance or 0.25 * float(both.own[0].mean()), freedom
+    return out
+
+
 def quantities(every: Sequence[Flown]) -> list[Quantity]:
     """All that every run has."""
     keys = [k for k, v in every[0].y.items() if all(k in run.y and np.isfinite(run.y[k]).all() for run in every)]

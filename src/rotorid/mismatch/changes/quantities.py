@@ -31,7 +31,7 @@ is felt less one, over gravity; logarithm of the battery's voltage."""
 AXES = ("x", "y", "z")
 TURNS = ("roll", "pitch", "yaw")
 LEAST_FELT = 0.3
-"""Least specific force along the rotors' axis, over gravity, that thrust is divided by."""
+"""Least specific force along the rotors' axis over gravity, and least thrust over its mean, that is divided by."""
 BY_VOLTAGE, DOUBT_OF_VOLTAGE = (-2.0, 0.0), 0.5
 """Bounds of the slope of the thrust asked for by the voltage, both logarithms (a motor's thrust goes with the voltage
 squared at most), and what it may be wrong by: under load the voltage falls, and a flight alone cannot tell which is
@@ -219,21 +219,20 @@ def _of_rotors(asked, turned, groups, load, vehicle: Vehicle, thin: Thinner, gri
     """Responses that the rotors' speeds are part of: speeds `asked` for and `turned`, (n, k), rad/s; `load` (m,)."""
     coefficient, weight = vehicle.thrust_coefficients_n_s2(), vehicle.mass_kg * vehicle.gravity_m_s2
     wanted, given = (thin(coefficient * w**2) for w in (asked, turned))
-    thrust = given.sum(axis=1)
-    y = {}
+    thrust, y = _not_idle(given.sum(axis=1)), {}
     if len(coefficient) > 1:
-        shares = wanted / np.maximum(wanted.mean(axis=1), 1e-9 * weight)[:, None] - 1.0
+        shares = wanted / _not_idle(wanted.mean(axis=1))[:, None] - 1.0
         y |= {f"share/{i + 1}": share for i, share in enumerate(shares.T)}
     if grid.speeds and grid.commands:
         pairs = zip(thin(turned).T, thin(asked).T, strict=True)
-        y |= {f"follows/{i + 1}": _log(a) - _log(b) for i, (a, b) in enumerate(pairs)}
+        y |= {f"follows/{i + 1}": _log(_not_idle(a)) - _log(_not_idle(b)) for i, (a, b) in enumerate(pairs)}
     if "force" in groups:
         force = thin(groups["force"]) / weight
         y |= {f"sideways/{a}": force[:, k] for k, a in enumerate(AXES[:2])}
         y["lift/all"] = _log(thrust / weight) - _log(np.maximum(1.0 + load, LEAST_FELT))
     if "moment" in groups:
         arm, torque = _levers(vehicle)
-        turning = thin(groups["moment"]) / np.maximum(thrust, LEAST_FELT * weight)[:, None]
+        turning = thin(groups["moment"]) / thrust[:, None]
         y |= {f"trim/{name}": turning[:, k] / arm for k, name in enumerate(TURNS[:2])}
         if torque:
             y["yaw_trim/yaw"] = turning[:, 2] / torque
@@ -244,6 +243,11 @@ def _levers(vehicle: Vehicle) -> tuple[float, float]:
     """The longest arm, and the rotors' mean torque over their thrust, m."""
     arm = float(np.linalg.norm(vehicle.rotor_positions_m()[:, :2], axis=1).max()) or 1.0
     return arm, float(vehicle.torque_coefficients_n_m_s2().sum() / vehicle.thrust_coefficients_n_s2().sum())
+
+
+def _not_idle(values: np.ndarray) -> np.ndarray:
+    """A thrust or speed (n,), at least a part of its mean: what is divided by it is of no use where rotors idle."""
+    return np.maximum(values, LEAST_FELT * max(float(values.mean()), 1e-9))
 
 
 def _log(values: np.ndarray) -> np.ndarray:

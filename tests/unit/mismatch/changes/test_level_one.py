@@ -150,6 +150,20 @@ def test_one_flight_against_one_is_held_against_the_usual_scatter(good, later):
     assert share.false_alarms > FALSE_ALARMS
 
 
+def test_a_while_with_idle_rotors_does_not_move_the_shares(good, later):
+    """Shares are divided by the rotors' mean thrust, which is next to nothing there."""
+
+    def idle(run: Run) -> Run:
+        names = [f"rotor_speed_{i}_rad_s" for i in range(1, 5)]
+        table = run.table.copy()
+        table.loc[200:260, names] = [1.0, 0.01, 0.01, 0.01]
+        return replace(run, table=table)
+
+    found = level_one(good, replace(later, runs=tuple(idle(run) for run in later.runs)))
+    assert all(abs(d.value) < 0.2 for d in found.differences if d.quantity.kind == "share")
+    assert not [d for d in found.stated if d.quantity.kind == "share"]
+
+
 def test_other_numbers_of_rotors_and_no_stretch_are_one_sentence(good, later):
     short = replace(later, runs=tuple(replace(r, table=r.table.iloc[:50].reset_index(drop=True)) for r in later.runs))
     with pytest.raises(InputError, match="set later: no stretch of flight"):
