@@ -159,15 +159,19 @@ def described(d: Difference) -> str:
 
 def learnt(shown: dict[str, Flights]) -> list[tuple[str, str, float, int, int]]:
     """The rows of `level_one.SCATTER`: sets of one laboratory together, members of a kind by their mean variance."""
-    known: dict[tuple[str, str], dict[str, list[tuple[float, int]]]] = {}
+    known: dict[tuple[str, str], dict[str, list[tuple[float, int, float]]]] = {}
     for name, own in shown.items():
-        for q, (variance, freedom) in (found_in(own) if len(own) > 1 else {}).items():
-            known.setdefault((q.kind, LABORATORIES[name]), {}).setdefault(q.member, []).append((variance, freedom))
+        for q, found in (found_in(own) if len(own) > 1 else {}).items():
+            known.setdefault((q.kind, LABORATORIES[name]), {}).setdefault(q.member, []).append(found)
     out = []
     for (kind, laboratory), members in known.items():
-        variances = [sum(v * f for v, f in own) / sum(f for _, f in own) for own in members.values()]
-        freedom = sum(f for _, f in next(iter(members.values())))
-        out.append((kind, laboratory, float(np.sqrt(np.mean(variances))), freedom, len(members)))
+        freedom = sum(f for _, f, _ in next(iter(members.values())))
+        variance, doubt = (
+            np.mean([sum(own[k] * own[1] for own in sets) / freedom for sets in members.values()]) for k in (0, 2)
+        )
+        # Where the flights' own doubt explains all, as little as half of it is not excluded.
+        sd = float(np.sqrt(variance)) if variance > 0 else 0.5 * float(np.sqrt(doubt))
+        out.append((kind, laboratory, sd, freedom, len(members)))
     return sorted(out, key=lambda row: list(KINDS).index(row[0]))
 
 

@@ -313,31 +313,28 @@ def differences(
     good: Mapping[str, Sequence[Flown]], new: Mapping[str, Sequence[Flown]], usual: Mapping[str, Usual]
 ) -> tuple[Difference, ...]:
     """What differs, the rarest first; `good` and `new` hold the runs of each flight by its name."""
-    sides = [list(own.values()) for own in (good, new)]
-    every = [run for side in sides for runs in side for run in runs]
-    asked = quantities(every)
-    kinds = [q.kind for q in asked]
+    return differences_at(len(good), measured([*good.values(), *new.values()]), [*good, *new], usual)
+
+
+def differences_at(
+    count: int, numbers: Mapping[Quantity, _Numbers], names: Sequence[str], usual: Mapping[str, Usual]
+) -> tuple[Difference, ...]:
+    """What differs between the first `count` flights and the others, the rarest first; `numbers` are of all."""
+    kinds = [q.kind for q in numbers]
     total = sum(BUDGET[kind] for kind in set(kinds))
     out = [
-        _difference(q, _numbers(q, sides, every), (tuple(good), tuple(new)), usual[q.kind], share)
-        for q in asked
-        for share in [BUDGET[q.kind] / total / kinds.count(q.kind)]
+        _difference(q, own, count, names, usual[q.kind], BUDGET[q.kind] / total / kinds.count(q.kind))
+        for q, own in numbers.items()
     ]
     return tuple(sorted(out, key=lambda d: (d.false_alarms, -abs(d.value) / d.sd)))
 
 
-def found_in(flights: Mapping[str, Sequence[Flown]]) -> dict[Quantity, tuple[float, int]]:
-    """Of each quantity the variance from flight to flight and its degrees of freedom: what SCATTER is made of.
-
-    Of a slope, where the flights' own doubt explains all, it is a quarter of that doubt's variance.
-    """
-    side = list(flights.values())
-    every = [run for runs in side for run in runs]
+def found_in(flights: Mapping[str, Sequence[Flown]]) -> dict[Quantity, tuple[float, int, float]]:
+    """What SCATTER is made of, by quantity: the variance from flight to flight, its degrees of freedom, and the mean
+    variance by the flights' own pieces."""
     out = {}
-    for q in quantities(every):
-        both = _numbers(q, [side, side], every)
-        variance, freedom = scatter_of(replace(both, values=both.values[:1], own=both.own[:1]), q.kind)
-        out[q] = variance or 0.25 * float(both.own[0].mean()), freedom
+    for q, numbers in measured(list(flights.values())).items():
+        out[q] = *scatter_of([numbers.values], [numbers.own], q.kind), float(numbers.own.mean())
     return out
 
 
@@ -366,55 +363,59 @@ def _known(kind: str, every: Sequence[Flown]) -> list[int]:
 
 @dataclass(frozen=True)
 class _Numbers:
-    """A quantity of the flights of two sets."""
+    """A quantity of some flights."""
 
-    values: list[np.ndarray]
-    """(F,) of each set."""
-    own: list[np.ndarray]
+    values: np.ndarray
+    """(F,) at the conditions that all of them share."""
+    own: np.ndarray
     """(F,) variances by the flights' own pieces."""
-    between: float = 0.0
-    """Variance of what the sets' conditions differ by."""
+    places: np.ndarray
+    """(F, k) mean conditions of each."""
+    doubt: np.ndarray
+    """(k, k) covariance of the slopes by those conditions."""
 
 
-def _numbers(q: Quantity, sides: list[list[Sequence[Flown]]], every: Sequence[Flown]) -> _Numbers:
+def measured(flights: Sequence[Sequence[Flown]]) -> dict[Quantity, _Numbers]:
+    """All quantities of some flights, each known by its runs."""
+    every = [run for runs in flights for run in runs]
+    return {q: _numbers(q, flights, every) for q in quantities(every)}
+
+
+def _numbers(q: Quantity, flights: Sequence[Sequence[Flown]], every: Sequence[Flown]) -> _Numbers:
+    if q.kind not in SLOPES and q.kind != "noise":
+        return _means(q, flights, every)
     if q.kind == "noise":
-        values = [np.array([np.mean([run.noise[q.key] for run in runs]) for runs in side]) for side in sides]
-        return _Numbers(values, [np.zeros(len(v)) for v in values])
-    if q.kind in SLOPES:
-        pairs = [np.array([_slope(q, runs) for runs in side]) for side in sides]
-        return _Numbers([p[:, 0] for p in pairs], [p[:, 1] for p in pairs])
-    return _means(q, sides, every)
+        pairs = [(np.mean([run.noise[q.key] for run in runs]), 0.0) for runs in flights]
+    else:
+        pairs = [_slope(q, runs) for runs in flights]
+    values, own = np.array(pairs, float).T
+    return _Numbers(values, own, np.zeros((len(values), 0)), np.zeros((0, 0)))
 
 
-def _means(q: Quantity, sides: list[list[Sequence[Flown]]], every: Sequence[Flown]) -> _Numbers:
+def _means(q: Quantity, flights: Sequence[Sequence[Flown]], every: Sequence[Flown]) -> _Numbers:
     """Means of a quantity at the conditions that all flights share.
 
-    How it depends on them is learnt within the runs of both sets together; what is between runs is no part of it.
+    How it depends on them is learnt within all runs together; what is between runs is no part of it.
     """
     at = _known(q.kind, every)
     gram = np.concatenate([run.gram[:, at][:, :, at] for run in every])
     cross = np.concatenate([run.cross[q.key][:, at] for run in every])
     slope, without = _ridge(gram, cross, KINDS[q.kind].penalty)
+    away = without - without.mean(axis=0)
+    doubt = away.T @ away * (len(away) - 1) / len(away)
     for k in (at.index(k) for k in at if CONDITIONS[k] == "voltage"):
         slope[k] = np.clip(slope[k], *BY_VOLTAGE)
+        doubt[k, k] += DOUBT_OF_VOLTAGE**2
     middle = np.mean([np.average(run.x[:, at], axis=0, weights=run.rows) for run in every], axis=0)
-    values, own, where = [], [], []
-    for side in sides:
-        means, variances, places = [], [], []
-        for runs in side:
-            rows = np.concatenate([run.rows for run in runs])
-            x = np.concatenate([run.x[:, at] for run in runs])
-            y = np.concatenate([run.y[q.key] for run in runs]) - (x - middle) @ slope
-            means.append(np.average(y, weights=rows))
-            variances.append(np.average((y - means[-1]) ** 2, weights=rows) / max(len(rows) - 1, 1))
-            places.append(np.average(x, axis=0, weights=rows))
-        values.append(np.array(means))
-        own.append(np.array(variances))
-        where.append(np.mean(places, axis=0))
-    away = where[1] - where[0]
-    spread = (without - without.mean(axis=0)) @ away
-    doubt = sum((DOUBT_OF_VOLTAGE * away[at.index(k)]) ** 2 for k in at if CONDITIONS[k] == "voltage")
-    return _Numbers(values, own, float(spread @ spread) * (len(spread) - 1) / len(spread) + float(doubt))
+    values, variances, places = [], [], []
+    for runs in flights:
+        rows = np.concatenate([run.rows for run in runs])
+        x = np.concatenate([run.x[:, at] for run in runs])
+        y = np.concatenate([run.y[q.key] for run in runs]) - (x - middle) @ slope
+        values.append(np.average(y, weights=rows))
+        variances.append(np.average((y - values[-1]) ** 2, weights=rows) / max(len(rows) - 1, 1))
+        places.append(np.average(x, axis=0, weights=rows))
+    return _Numbers(np.array(values), np.array(variances), np.array(places), doubt)
 
 
 def _slope(q: Quantity, runs: Sequence[Flown]) -> tuple[float, float]:
@@ -442,51 +443,51 @@ def _ridge(gram: np.ndarray, cross: np.ndarray, penalty: float) -> tuple[np.ndar
 
 
 def _difference(
-    q: Quantity, numbers: _Numbers, names: tuple[Sequence[str], Sequence[str]], usual: Usual, share: float
+    q: Quantity, numbers: _Numbers, count: int, names: Sequence[str], usual: Usual, share: float
 ) -> Difference:
     """The difference of two sets by the yardstick that makes it rarer; it has a `share` of the false alarms."""
-    found, freedom = scatter_of(numbers, q.kind)
+    first, second = slice(None, count), slice(count, None)
+    values, owns = ([column[part] for part in (first, second)] for column in (numbers.values, numbers.own))
+    found, freedom = scatter_of(values, owns, q.kind)
     total = usual.freedom + freedom
     joint = (usual.freedom * usual.sd**2 + freedom * found) / total
-    value = float(numbers.values[1].mean() - numbers.values[0].mean())
+    value = float(values[1].mean() - values[0].mean())
+    apart = numbers.places[second].mean(axis=0) - numbers.places[first].mean(axis=0)
+    believed = overstated(numbers.own, found, freedom)
     tests = []
-    doubts = [overstated(numbers, found, freedom) * w for w in numbers.own]
     for variance, degrees in ((joint, total), (usual.most**2, KNOWN)):
-        each = [
-            variance + w if q.kind in SLOPES else np.maximum(variance, v)
-            for w, v in zip(numbers.own, doubts, strict=True)
-        ]
-        sd = float(np.sqrt(sum(v.mean() / len(v) for v in each) + numbers.between))
+        each = [variance + w if q.kind in SLOPES else np.maximum(variance, believed * w) for w in owns]
+        sd = float(np.sqrt(sum(v.mean() / len(v) for v in each) + apart @ numbers.doubt @ apart))
         reach = -stdtrit(degrees, 0.25 * FALSE_ALARMS * share) - stdtrit(degrees, 0.05)
         tests.append((2.0 * float(stdtr(degrees, -abs(value) / sd)), sd, degrees, variance, float(reach) * sd))
     rate, sd, degrees, variance, _ = min(tests)
-    good, new = (
-        tuple(Flight(n, float(v), float(np.sqrt(w))) for n, v, w in zip(own, values, variances, strict=True))
-        for own, values, variances in zip(names, numbers.values, numbers.own, strict=True)
-    )
+    flights = [
+        Flight(n, float(v), float(np.sqrt(w))) for n, v, w in zip(names, numbers.values, numbers.own, strict=True)
+    ]
     rate, smallest = min(1.0, 2.0 * rate / share), min(test[-1] for test in tests)
-    return Difference(q, good, new, value, sd, degrees, float(np.sqrt(variance)), rate, smallest)
+    scatter = float(np.sqrt(variance))
+    return Difference(q, tuple(flights[first]), tuple(flights[second]), value, sd, degrees, scatter, rate, smallest)
 
 
-def overstated(numbers: _Numbers, found: float, freedom: int) -> float:
-    """What part of the variances by the flights' own pieces is believed, 0 to 1.
+def overstated(own: np.ndarray, found: float, freedom: int) -> float:
+    """What part of the variances (F,) by the flights' own pieces is believed, 0 to 1.
 
     Pieces of a manoeuvre differ by more than flights that repeat it: where flights are known to differ by less (by
     `found`, the variance between them), pieces are believed by so much less. Without such flights they are believed.
     """
-    own = float(np.mean(np.concatenate(numbers.own)))
-    seen = min(1.0, found / own) if own > 0 else 1.0
+    mean = float(own.mean())
+    seen = min(1.0, found / mean) if mean > 0 else 1.0
     return (FREEDOM_OF_PIECES + freedom * seen) / (FREEDOM_OF_PIECES + freedom)
 
 
-def scatter_of(numbers: _Numbers, kind: str) -> tuple[float, int]:
+def scatter_of(values: Sequence[np.ndarray], owns: Sequence[np.ndarray], kind: str) -> tuple[float, int]:
     """Variance of flights about the mean of their own set, and its degrees of freedom.
 
     Of a slope it is what goes beyond the flights' own doubt, which is as different as their excitation.
     """
-    freedom = sum(len(v) - 1 for v in numbers.values)
+    freedom = sum(len(v) - 1 for v in values)
     if not freedom:
         return 0.0, 0
-    squares = sum(float(((v - v.mean()) ** 2).sum()) for v in numbers.values)
-    doubt = sum(float(w.mean()) * (len(w) - 1) for w in numbers.own) if kind in SLOPES else 0.0
+    squares = sum(float(((v - v.mean()) ** 2).sum()) for v in values)
+    doubt = sum(float(w.mean()) * (len(w) - 1) for w in owns) if kind in SLOPES else 0.0
     return max(0.0, squares - doubt) / freedom, freedom

@@ -14,15 +14,17 @@ from rotorid.mismatch.changes.level_one import (
     Difference,
     as_one,
     differences,
+    differences_at,
+    measured,
     of_one_vehicle,
     usual_scatter,
 )
-from rotorid.mismatch.changes.level_one_words import difference_words, in_unit_of_words, unit_of
+from rotorid.mismatch.changes.level_one_words import difference_words, in_unit_of_words, quantity_words, unit_of
 from rotorid.mismatch.changes.quantities import Flown, flown, grid_of
 from rotorid.recordings import RecordingSet, read_set
 from rotorid.report.fleet.summary import day_of
 
-NUMBERS = ("vehicle", "set", "day", "name", "unit", "change", "low_95", "high_95")
+NUMBERS = ("vehicle", "set", "day", "good", "name", "quantity", "unit", "change", "low_95", "high_95", "limit")
 EVENTS = ("vehicle", "set", "day", "id", "lasts", "sentence")
 Z95 = 1.96
 
@@ -63,8 +65,9 @@ def history(
     Returns
     -------
     numbers
-        One row a set and quantity: `vehicle`, `set`, `day`, `name`, `unit`, `change` against the mean of the good ones,
-        `low_95`, `high_95` by the set's own pieces and the scatter from flight to flight.
+        One row a set and quantity: `vehicle`, `set`, `day`, `good` (1 of the first ones), `name`, `quantity` in words,
+        `unit`, `change` against the mean of the good ones, `low_95`, `high_95` by the set's own pieces and the scatter
+        from flight to flight, `limit` that the mean of the later sets must pass to be stated in 19 of 20 histories.
     events
         One row a quantity that differs from a set on: `vehicle`, `set`, `day`, `id` of the quantity, `lasts` (how many
         sets there are from this one to the next event), `sentence`.
@@ -131,9 +134,12 @@ def change_points(shown: Shown, good: int) -> list[ChangePoint]:
     """
     names = list(shown)
     places = range(good, len(names))
+    if not places:
+        return []
+    numbers = measured(list(shown.values()))
     best: tuple[float, float, int, tuple[Difference, ...]] | None = None
     for k in places:
-        found = differences({n: shown[n] for n in names[:k]}, {n: shown[n] for n in names[k:]}, usual_scatter())
+        found = differences_at(k, numbers, names, usual_scatter())
         stated = tuple(d for d in found if d.false_alarms * len(places) <= FALSE_ALARMS)
         if stated and (best is None or rarity(stated[0]) < best[:2]):
             best = (*rarity(stated[0]), k, stated)
@@ -152,19 +158,20 @@ def rarity(d: Difference) -> tuple[float, float]:
 
 
 def numbers_of(vehicle: str, shown: Shown, good: int) -> list[dict]:
-    """Rows of every quantity of the sets after the good ones."""
+    """Rows of every quantity of all sets."""
     first, later = dict(list(shown.items())[:good]), dict(list(shown.items())[good:])
     if not later:
         return []
     out = []
     for d in differences(first, later, usual_scatter()):
         middle = sum(f.value for f in d.good) / len(d.good)
-        for f in d.new:
+        for place, f in enumerate((*d.good, *d.new)):
             reach = Z95 * (d.scatter**2 * (1.0 + 1.0 / len(d.good)) + f.sd**2) ** 0.5
             ends = (f.value - middle, f.value - middle - reach, f.value - middle + reach)
-            change, low, high = (in_unit_of_words(d, end) for end in ends)
-            row = {"vehicle": vehicle, "set": f.name, "day": day_of(f.name), "name": d.quantity.key}
-            out.append(row | {"unit": unit_of(d), "change": change, "low_95": low, "high_95": high})
+            change, low, high, limit = (in_unit_of_words(d, end) for end in (*ends, d.smallest))
+            row = {"vehicle": vehicle, "set": f.name, "day": day_of(f.name), "good": int(place < len(d.good))}
+            row |= {"name": d.quantity.key, "quantity": quantity_words(d), "unit": unit_of(d)}
+            out.append(row | {"change": change, "low_95": low, "high_95": high, "limit": limit})
     return out
 
 

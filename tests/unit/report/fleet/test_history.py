@@ -13,6 +13,7 @@ from rotorid.recordings.templates import read
 from rotorid.report.fleet.history import by_vehicle, change_points, history, shown_by
 from rotorid.report.plots.fleet import draw_history
 from rotorid.vehicle.control.swings import swings
+from workflow.scripts import fleet_history
 
 DAYS = 6
 HEAVIER_FROM = 5
@@ -73,7 +74,8 @@ def test_a_set_without_what_the_first_ones_have_is_left_out_with_a_line():
 
 def test_every_later_set_has_its_numbers_with_intervals():
     numbers, _ = made()
-    assert list(dict.fromkeys(numbers["set"])) == [f"heron-2026-10-0{day}" for day in (4, 5, 6)]
+    assert list(dict.fromkeys(numbers["set"])) == [f"heron-2026-10-0{day}" for day in range(1, 7)]
+    assert (numbers["good"] == (numbers["day"] < "2026-10-04")).all() and (numbers["limit"] > 0).all()
     lift = numbers.pivot(index="set", columns="name", values="change")["lift/all"]
     assert abs(lift["heron-2026-10-04"]) < 2.0
     assert 8.0 < lift["heron-2026-10-06"] < 12.0 and set(numbers["unit"]) >= {"%"}
@@ -83,6 +85,15 @@ def test_every_later_set_has_its_numbers_with_intervals():
 def test_the_history_is_drawn(tmp_path: Path):
     draw_history(*made(), tmp_path / "history.svg")
     assert "heron" in (tmp_path / "history.svg").read_text(encoding="utf-8")
+
+
+def test_a_vehicle_has_a_page_with_its_events_and_every_quantity(tmp_path: Path):
+    numbers, events = made()
+    fleet_history.write_page("heron <1>", numbers, events, tmp_path / "heron.html")
+    page = (tmp_path / "heron.html").read_text(encoding="utf-8")
+    assert "heron &lt;1&gt;" in page and "6 sets, from heron-2026-10-01 to heron-2026-10-06" in page
+    assert page.count("<svg") == 1 and "heron, from heron-2026-10-05 on: " in page
+    assert fleet_history.file_of("a/b c") == "a-b-c"
 
 
 def test_sets_are_ordered_by_vehicle_and_day_and_a_broken_one_is_named(tmp_path: Path):
