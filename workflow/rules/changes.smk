@@ -2,7 +2,7 @@
 
 
 rule chapter_changes:
-    """What `rotorid compare` states of each labelled pair, and the figures of one of them."""
+    """What `rotorid compare` states of each labelled pair, and their figures."""
     message:
         "Chapter what changed: comparing labelled flights"
     input:
@@ -11,6 +11,18 @@ rule chapter_changes:
         cut=public_set("crazypad-cut"),
     output:
         found="results/report/changes/found.json",
+        differs_weight=report(
+            "results/report/changes/differs_weight.svg",
+            category="What changed",
+            caption="../report/captions/changes.rst",
+            labels={"figure": "what differs with the weight"},
+        ),
+        differs_cut=report(
+            "results/report/changes/differs_cut.svg",
+            category="What changed",
+            caption="../report/captions/changes.rst",
+            labels={"figure": "what differs with the cut propeller"},
+        ),
         values=report(
             "results/report/changes/values.svg",
             category="What changed",

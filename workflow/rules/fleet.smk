@@ -93,6 +93,7 @@ rule fleet_history:
         numbers="results/fleet/history.csv",
         events="results/fleet/events.csv",
         figure="results/fleet/history.svg",
+        pages=directory("results/fleet/vehicles"),
     params:
         folders=folders_of_fleet,
         stamp=stamp_of_fleet,

@@ -1,23 +1,46 @@
 """What changed in each vehicle of a fleet since its first sets.
 
-- Holds every later set of a vehicle against its first ones.
-- Writes each believed value's change with its interval, what changed and from which set on, and a figure.
+- Splits the history of each vehicle where trims, shares of the rotors, thrust, sensors or noise differ.
+- Writes every quantity with its interval, what differs and from which set on, a figure, and a page a vehicle.
 """
 
+import re
+import tempfile
 from pathlib import Path
+
+import pandas as pd
 
 from rotorid.report import log
 from rotorid.report.fleet.history import by_vehicle, history
-from rotorid.report.plots.fleet import draw_history
+from rotorid.report.fleet.page import make_vehicle_page
+from rotorid.report.plots.fleet import draw_history, draw_vehicle
 
 
-def main(folders: list[str], good: int, numbers: str, events: str, figure: str) -> None:
+def main(folders: list[str], good: int, numbers: str, events: str, figure: str, pages: str) -> None:
     """Write the history of the vehicles whose sets are in `folders`; the first `good` ones are the reference."""
     sets = by_vehicle([Path(f) for f in folders], log.progress)
     rows, found = history(sets, good, log.progress)
     rows.to_csv(numbers, index=False, float_format="%.6g")
     found.to_csv(events, index=False)
     draw_history(rows, found, Path(figure))
+    Path(pages).mkdir(parents=True, exist_ok=True)
+    for number, (vehicle, own) in enumerate(rows.groupby("vehicle", sort=False)):
+        write_page(
+            vehicle, own, found[found["vehicle"] == vehicle], Path(pages) / f"{number:04d}-{file_of(vehicle)}.html"
+        )
+
+
+def file_of(vehicle: str) -> str:
+    """A vehicle's name as part of a file's."""
+    return re.sub(r"[^A-Za-z0-9-]+", "-", vehicle).strip("-")[:60]
+
+
+def write_page(vehicle: str, numbers: pd.DataFrame, events: pd.DataFrame, page: Path) -> None:
+    """Write the page of one vehicle."""
+    with tempfile.TemporaryDirectory() as folder:
+        figure = Path(folder) / "figure.svg"
+        draw_vehicle(numbers, events, figure)
+        page.write_text(make_vehicle_page(vehicle, numbers, events, figure), encoding="utf-8")
 
 
 if __name__ == "__main__":
@@ -28,4 +51,5 @@ if __name__ == "__main__":
             numbers=snakemake.output.numbers,
             events=snakemake.output.events,
             figure=snakemake.output.figure,
+            pages=snakemake.output.pages,
         )

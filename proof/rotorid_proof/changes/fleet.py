@@ -11,6 +11,17 @@ from rotorid.report.fleet.history import history
 from rotorid_proof.changes.score import sought_in
 from rotorid_proof.row_by_row import as_read
 
+ROTORS = frozenset({"share", "trim", "yaw_trim", "lift"})
+SEEN_BY = {
+    **dict.fromkeys(("mass_kg", "thrust_coefficient_n_s2", "translational_lift"), frozenset({"lift"})),
+    **dict.fromkeys(("payload", "unequal_rotors", "com_offset"), ROTORS),
+    "torque_coefficient_n_m_s2": frozenset({"yaw_trim"}),
+    **dict.fromkeys(("rotor_drag", "frame_drag"), frozenset({"drag", "sideways"})),
+    "thrust_tilt": frozenset({"sideways", "drag"}),
+    "accelerometer_error": frozenset({"accelerometer", "sideways", "lift"}),
+    "gyro_error": frozenset({"gyroscope", "gyroscope_scale", "gyroscope_turn"}),
+}
+"""What a history shows of a change, by kind of quantity; of a change without an entry nothing."""
 GOOD, FLIGHTS = 3, 10
 """Flights of a vehicle that are the good ones, and all of them."""
 
@@ -25,11 +36,11 @@ class Row:
     since: str
     """The first flight with the change."""
     stated: str
-    """What the history states, `flight: id`, one after the other."""
+    """What the history states, `flight: quantity`, one after the other."""
     right: int
     """1 if the change is stated since the right flight, and nothing else."""
     others: int
-    """Events stated that are none: another id, or another flight."""
+    """Events stated that are none: a quantity that the change does not move, or another flight."""
     compared: int
     """Flights compared with the good ones."""
     seconds: float
@@ -59,8 +70,8 @@ def row_of(case: Case) -> Row:
     start = time.process_time()
     _, events = history({case.name: sets}, GOOD)
     sought = sought_in(own.truth)
-    fair = {i for s in sought for i in (s.id, *s.equivalent)} | set(own.truth["fair"])
-    true = [since_then(e, own.since) and e.id in fair for e in events.itertuples()]
+    fair = {kind for s in sought for i in (s.id, *s.equivalent) for kind in SEEN_BY.get(i, ())}
+    true = [since_then(e, own.since) and e.id.split("/")[0] in fair for e in events.itertuples()]
     return Row(
         vehicle=case.name,
         changed="; ".join(s.id for s in sought),

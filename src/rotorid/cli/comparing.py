@@ -35,7 +35,9 @@ def compare(
     vehicle: VehicleFile = None,
     mapping: MappingFile = None,
 ) -> None:
-    """Say what changed since the sets that were good, and by how much at most everything else.
+    """Say what differs from the sets that were good, then what changed, and by how much at most everything else.
+
+    What differs is stated within seconds and without a cause: trims, each rotor's share of the thrust, sensors, noise.
 
     Flights of one vehicle, or recordings of one stand or bench: there the answer is whether to calibrate it again.
     Each set is held against its own vehicle.yaml: what was changed on purpose and is written there is no change. With
@@ -60,12 +62,22 @@ def compare(
             raise InputError(
                 f"{sets[0]}: nothing to compare it with; expected two sets or more, the last one in question"
             )
-        with progress("compare", quiet):
-            from rotorid.mismatch.changes import as_one, changes_between, words
+        with progress("compare: what differs", quiet):
+            from rotorid.mismatch.changes.level_one import as_one, of_one_vehicle, seen_by
+            from rotorid.mismatch.changes.level_one_words import level_one_sentences
 
-            *known, second = read(sets, mass_kg, like, vehicle, mapping)
-            with step("comparing"):
-                found = changes_between(as_one(known), second)
+            *known, second = of_one_vehicle(read(sets, mass_kg, like, vehicle, mapping))
+            good = as_one(known)
+            seen = seen_by(good, second)
+        # What cannot be wrong comes first, and before the minutes that its explanation takes.
+        if seen is not None and not as_json:
+            for line in level_one_sentences(seen):
+                typer.echo(line)
+        with progress("compare", quiet), step("comparing"):
+            from rotorid.mismatch.changes import words
+            from rotorid.mismatch.changes.compare import changes_between
+
+            found = changes_between(good, second, seen=seen)
         text = json.dumps(words.as_json(found), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
         if out is not None:
             write(out, text)
@@ -76,9 +88,10 @@ def compare(
         if as_json:
             typer.echo(text, nl=False)
         else:
-            for line in words.sentences(found):
+            for line in words.level_two_sentences(found):
                 typer.echo(line)
-    if ci and any(c.status in ("established", "ambiguous") for c in found.changes):
+    differs = found.level_1 is not None and bool(found.level_1.stated)
+    if ci and (differs or any(c.status in ("established", "ambiguous") for c in found.changes)):
         raise typer.Exit(1)
 
 

@@ -44,6 +44,29 @@ def test_two_logs_are_compared(logs: list[Path], tmp_path: Path) -> None:
     assert "from monday to friday" in done.output
     found = json.loads((tmp_path / "changes.json").read_text())
     assert not [c for c in found["changes"] if c["status"] in ("established", "ambiguous")]
+    assert found["level_1"]["nothing_changed"] and found["level_1"]["sentences"][0] in done.output
+
+
+def test_what_differs_is_printed_before_its_explanation_is_sought(logs: list[Path], monkeypatch) -> None:
+    def stopped(*args, **options):
+        raise InputError("the explanation was sought")
+
+    monkeypatch.setattr("rotorid.mismatch.changes.compare.changes_between", stopped)
+    done = run("compare", *logs, "--like", "thesis", "--mass-kg", "0.652", "-q")
+    first, second = done.output.index("no trim, share of a rotor"), done.output.index("the explanation was sought")
+    assert done.exit_code == 1 and first < second
+
+
+def test_a_difference_without_a_name_fails_a_regression_test(logs: list[Path], tmp_path: Path) -> None:
+    """Rotor 2 turns a tenth faster than in the good flight: level 1 alone may say so."""
+    import pandas as pd
+
+    table = pd.read_csv(logs[1])
+    speeds = [name for name in table if name.startswith("rotor_") and "_2_" in name]
+    weak = tmp_path / "weak.csv"
+    table.assign(**{name: 1.15 * table[name] for name in speeds}).to_csv(weak, index=False)
+    done = run("compare", logs[0], weak, "--like", "thesis", "--mass-kg", "0.652", "-q", "--ci")
+    assert done.exit_code == 1 and "Rotor 2 is asked for" in done.output
 
 
 def test_one_set_or_no_set_is_one_sentence(logs: list[Path]) -> None:

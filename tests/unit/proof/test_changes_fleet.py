@@ -16,13 +16,13 @@ TRUTH = {
 @pytest.mark.parametrize(
     ("since", "events", "right", "others"),
     [
-        (4, [(4, "mass_kg")], 1, 0),
-        (4, [(4, "payload")], 1, 0),
+        (4, [(4, "lift/all")], 1, 0),
+        (4, [(4, "share/1")], 0, 1),
         (4, [], 0, 0),
-        (4, [(5, "mass_kg")], 0, 1),
-        (4, [(4, "mass_kg"), (6, "delay")], 0, 1),
+        (4, [(5, "lift/all")], 0, 1),
+        (4, [(4, "lift/all"), (6, "noise/gyroscope")], 0, 1),
         (None, [], 1, 0),
-        (None, [(7, "delay")], 0, 1),
+        (None, [(7, "lift/all")], 0, 1),
     ],
 )
 def test_the_change_since_its_first_flight_and_nothing_else(monkeypatch, since, events, right, others):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -31,7 +31,8 @@ from rotorid.mismatch.changes.joint import (
     moved_by,
     reference_of,
 )
-from rotorid.mismatch.changes.notes import command_notes, notes_of
+from rotorid.mismatch.changes.level_one import CAUSES, LevelOne, of_one_vehicle, seen_by
+from rotorid.mismatch.changes.notes import command_notes, notes_of, refused_notes
 from rotorid.mismatch.changes.of_instruments import (
     InstrumentReference,
     instrument_reference_of,
@@ -105,18 +106,38 @@ class Changes:
     """What keeps the two sets from being compared fully, in sentences."""
     kind: str = "flight"
     """Of both sets: `flight`, `stand` or `bench`."""
+    level_1: LevelOne | None = None
+    """What differs, without a cause; None of a stand or a bench."""
+    explained: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Key of a quantity that level 1 states to the ids that predict its difference."""
 
 
-def changes_between(base: RecordingSet, new: RecordingSet, prior: Prior = Prior()) -> Changes:  # noqa: B008
-    """What changed from the first set of flights to the second."""
+def changes_between(
+    base: RecordingSet,
+    new: RecordingSet,
+    prior: Prior = Prior(),  # noqa: B008
+    seen: LevelOne | None = None,
+) -> Changes:
+    """What changed from the first set of flights to the second; `seen` as in `changes_from`."""
+    base, new = of_one_vehicle((base, new))
     if base.vehicle.kind == "flight":
-        return changes_from(reference_of(base), new, prior)
+        return changes_from(reference_of(base), new, prior, seen or seen_by(base, new))
     return changes_from(instrument_reference_of(base), new, prior)
 
 
-def changes_from(reference: Reference | InstrumentReference, new: RecordingSet, prior: Prior = Prior()) -> Changes:  # noqa: B008
-    """What changed from the flights of a reference to another set of flights."""
+def changes_from(
+    reference: Reference | InstrumentReference,
+    new: RecordingSet,
+    prior: Prior = Prior(),  # noqa: B008
+    seen: LevelOne | None = None,
+) -> Changes:
+    """What changed from the flights of a reference to another set of flights; `seen` is what differs without a cause.
+
+    A name that predicts other trims, shares or thrust than what differs is not stated.
+    """
     base = reference.recordings
+    if seen is None and isinstance(reference, Reference):
+        seen = seen_by(reference.as_recorded, new)
     if new.vehicle.kind != base.vehicle.kind:
         raise InputError(
             f"{new.name}/vehicle.yaml: kind is {new.vehicle.kind}, expected {base.vehicle.kind} as in {base.name}"
@@ -140,7 +161,13 @@ def changes_from(reference: Reference | InstrumentReference, new: RecordingSet, 
         for s in stated
         if s.status != "not_established"
     ]
+    refused: list[Change] = []
+    explained: dict[str, tuple[str, ...]] = {}
+    if seen is not None:
+        changes, refused, explained = explaining(changes, seen, new.vehicle)
     changed = {i for c in changes for i in (c.id, *c.alternatives)}
+    # What level 1 states has a cause, found or not: none of those that it may have is limited.
+    changed |= {i for d in (seen.stated if seen else ()) for i in CAUSES[d.quantity.kind]}
     return Changes(
         base=base.name,
         new=new.name,
@@ -148,8 +175,14 @@ def changes_from(reference: Reference | InstrumentReference, new: RecordingSet, 
         limits=tuple(sorted((x for x in limits if x.id not in changed), key=lambda x: -x.share)),
         values=values_of(found, *vehicles),
         residuals=(residuals_of(reference.rows), residuals_of(joint.rows_of_new)),
-        notes=(*notes_of(joint, base.name, new.name), *notes),
+        notes=(
+            *refused_notes([c.alternatives or (c.id,) for c in refused]),
+            *notes_of(joint, base.name, new.name),
+            *notes,
+        ),
         kind=new.vehicle.kind,
+        level_1=seen,
+        explained=explained,
     )
 
 
@@ -283,26 +316,6 @@ def changes_in(options: Sequence[Option], prior: Prior) -> tuple[Statement, ...]
     return tuple(out)
 
 
-def as_one(sets: Sequence[RecordingSet]) -> RecordingSet:
-    """Several sets of one vehicle as one, each run named after its set.
-
-    Raises
-    ------
-    InputError
-        Their vehicles are not believed to be the same.
-    """
-    first, *others = sets
-    for other in others:
-        if other.vehicle != first.vehicle:
-            raise InputError(
-                f"{other.name}/vehicle.yaml: differs from that of {first.name}; expected one vehicle in all good sets"
-            )
-    if not others:
-        return first
-    runs = tuple(replace(run, name=f"{own.name}-{run.name}") for own in sets for run in own.runs)
-    return replace(first, name=" + ".join(own.name for own in sets), runs=runs, held_out=())
-
-
 def residuals_of(rows: Sequence[Rows]) -> dict[str, Residual]:
     """What is left in the longest stretch, by channel that the set has."""
     longest = max(rows, key=lambda own: len(own.time_s))
@@ -380,3 +393,66 @@ def later_by(first: Finding, second: Finding) -> Estimate | None:
     (old,), (new,) = first.parameters, second.parameters
     away, reach = second.late_s - first.late_s, float(np.hypot(new.high - new.low, old.high - old.low)) / 2.0
     return replace(new, value=away, low=away - reach, high=away + reach) if abs(away) > reach else None
+
+
+SURELY = 0.999
+"""Probability of the interval outside of which a prediction contradicts what differs."""
+
+
+def explaining(
+    changes: Sequence[Change], seen: LevelOne, vehicle: Vehicle
+) -> tuple[list[Change], list[Change], dict[str, tuple[str, ...]]]:
+    """Changes that agree with what differs, those that contradict it, and which differences the former predict.
+
+    Together they predict; where that lies outside of a difference's interval, the change that predicts most of it goes.
+    """
+    left, refused = list(changes), []
+    known = {d.quantity.key: d for d in seen.differences}
+    while True:
+        parts = [(c, key, size) for c in left for key, size in predicted(c, vehicle).items() if key in known]
+        sums = {key: sum(size for _, k, size in parts if k == key) for _, key, _ in parts}
+        wrong = [
+            (abs(size) / known[key].sd, c)
+            for c, key, size in parts
+            for low, high in [known[key].interval(SURELY)]
+            if not low <= sums[key] <= high and size * (sums[key] - known[key].value) > 0
+        ]
+        if not wrong:
+            break
+        gone = max(wrong, key=lambda w: w[0])[1]
+        left.remove(gone)
+        refused.append(gone)
+    explained = {
+        key: tuple(dict.fromkeys(c.id for c, k, size in parts if k == key and size * known[key].value > 0))
+        for key in sums
+        if known[key].stated and abs(sums[key]) > 0.5 * abs(known[key].value)
+    }
+    return left, refused, explained
+
+
+def predicted(change: Change, vehicle: Vehicle) -> dict[str, float]:
+    """Key of a quantity of level 1 to by how much a change makes it differ, of those changes that make a trim differ.
+
+    Rotors that weaken are asked for more, a centre of mass that moves takes the trims along, more weight asks for more.
+    """
+    size = {p.symbol: p.value for p in change.parameters}
+    places, count = vehicle.rotor_positions_m(), vehicle.rotor_count
+    arm = float(np.linalg.norm(places[:, :2], axis=1).max()) or 1.0
+    more, roll, pitch, shares = 0.0, 0.0, 0.0, {}
+    if change.id in ("mass_kg", "thrust_coefficient_n_s2") and change.id in size:
+        more = float(np.log1p(size[change.id])) * (1.0 if change.id == "mass_kg" else -1.0)
+    elif change.id == "com_offset":
+        roll, pitch = size.get("r_y", 0.0) / arm, -size.get("r_x", 0.0) / arm
+    elif change.id == "payload" and "m_p" in size:
+        more = float(np.log1p(size["m_p"] / vehicle.mass_kg))
+        roll, pitch = (
+            sign * size.get(f"m_p {axis}", 0.0) / vehicle.mass_kg / arm for axis, sign in (("y", 1.0), ("x", -1.0))
+        )
+    elif change.id == "unequal_rotors" and any(f"d_{i + 1}" in size for i in range(count)):
+        given = np.array([size.get(f"d_{i + 1}", np.nan) for i in range(count)])
+        given = np.where(np.isnan(given), -np.nansum(given) if np.isnan(given).sum() == 1 else 0.0, given)
+        roll, pitch = -float(places[:, 1] @ given) / (arm * count), float(places[:, 0] @ given) / (arm * count)
+        shares = {f"share/{i + 1}": float(given.mean() - d) for i, d in enumerate(given)}
+    out = {"trim/roll": roll, "trim/pitch": pitch, **shares}
+    out |= {f"{kind}/all": more for kind in ("lift", "lift_of_throttle", "lift_without_voltage")}
+    return {key: value for key, value in out.items() if value}

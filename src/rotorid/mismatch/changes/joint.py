@@ -98,6 +98,8 @@ class Reference:
     """The first set, fitted once: what other sets are compared with."""
 
     recordings: RecordingSet
+    """Corrected for its mistakes."""
+    as_recorded: RecordingSet
     found: Fitted
     chain: ChainTerms | None
     """From command to rotor speed; None where no commands are recorded."""
@@ -127,6 +129,7 @@ class Reference:
 @step("the first set")
 def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> Reference:
     """The first set as a verdict fits it, all of its runs."""
+    as_recorded = base
     base, mistakes, _ = find_mistakes(replace(base, held_out=()))
     found = fitted(prepare(base, cutoff_hz))
     model = found.model
@@ -148,6 +151,7 @@ def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> Reference:
     evidence, runs = evidence_of(regression, noise, known, *((chain, chain) if of_chain else ()))
     return Reference(
         recordings=base,
+        as_recorded=as_recorded,
         found=found,
         chain=chain,
         terms=tuple(terms),

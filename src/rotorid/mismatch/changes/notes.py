@@ -7,8 +7,17 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from rotorid.mismatch.changes.joint import FARTHER, Joint
+from rotorid.mismatch.changes.problem import NAMES
 from rotorid.mismatch.changes.usual import left_by_all
-from rotorid.mismatch.decision.words import channel_words, listed, number, regime_words
+from rotorid.mismatch.decision.words import (
+    capital,
+    channel_words,
+    effect_words,
+    listed,
+    number,
+    parameter_words,
+    regime_words,
+)
 from rotorid.mismatch.plant.channel_errors import CHANNELS_OF_WRENCH
 from rotorid.mismatch.plant.motion import Segment
 from rotorid.mismatch.plant.rows import CHANNELS
@@ -62,3 +71,17 @@ def regime_notes(first: Mapping[str, float], second: Mapping[str, float], base: 
         f"{new} goes farther ({listed(farther)}). Airspeeds more than {FARTHER} times as high are not compared; other "
         "flight is by the forms of the effects."
     ]
+
+
+def refused_notes(ids: Sequence[Sequence[str]]) -> list[str]:
+    """That a name was not stated because it contradicts what differs; `ids` holds the class of each."""
+    return [
+        f"{capital(listed([effect_or_value(i) for i in own], 'or'))} would explain the motion, but would change trims, "
+        "shares or thrust by other amounts than they differ by: not stated."
+        for own in ids
+    ]
+
+
+def effect_or_value(name: str) -> str:
+    """An effect, or a value by its contract name, in words."""
+    return f"the {parameter_words(name)[0]}" if name in NAMES.values() else effect_words(name)

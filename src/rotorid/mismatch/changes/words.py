@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.changes.compare import Change, Changes
+from rotorid.mismatch.changes.level_one_words import level_one_json, level_one_sentences
 from rotorid.mismatch.changes.problem import NAMES
 from rotorid.mismatch.decision.words import (
     capital,
@@ -29,9 +30,17 @@ MOST_LIMITS = 4
 
 
 def sentences(found: Changes) -> list[str]:
+    """What differs; then a sentence a change, the most probable first, and one on what did not change."""
+    first = [] if found.level_1 is None else level_one_sentences(found.level_1)
+    return [*first, *level_two_sentences(found)]
+
+
+def level_two_sentences(found: Changes) -> list[str]:
     """One sentence a change, the most probable first, and one on what did not change."""
     out = [change_words(c) for c in found.changes]
-    if not out:
+    if not out and found.level_1 is not None and found.level_1.stated:
+        out.append("No known effect explains this: it stays as it is stated.")
+    elif not out:
         out.append(f"Nothing changed from {found.base} to {found.new} as far as these recordings can tell.")
     limits = [unchanged_words(found.limits, WHOLE[found.kind])] if found.limits else []
     return [*out, *advice(found), *limits, *found.notes]
@@ -98,6 +107,7 @@ def as_json(found: Changes) -> dict:
         "kind": found.kind,
         "sentences": sentences(found),
         "notes": list(found.notes),
+        "level_1": None if found.level_1 is None else level_one_json(found.level_1, found.explained),
         "changes": [
             {
                 "id": c.id,

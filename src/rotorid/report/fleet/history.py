@@ -1,22 +1,32 @@
-"""Each vehicle of a fleet over its flights: what changed since the first ones, and from which flight on."""
+"""Each vehicle of a fleet over its flights: what differs since the first ones, and from which flight on."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
 
-from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
-from rotorid.mismatch.changes import Changes, as_one, changes_from, reference_of
-from rotorid.mismatch.changes.words import change_words
+from rotorid.mismatch.changes.level_one import (
+    FALSE_ALARMS,
+    Difference,
+    as_one,
+    differences,
+    differences_at,
+    measured,
+    of_one_vehicle,
+    usual_scatter,
+)
+from rotorid.mismatch.changes.level_one_words import difference_words, in_unit_of_words, quantity_words, unit_of
+from rotorid.mismatch.changes.quantities import Flown, flown, grid_of
 from rotorid.recordings import RecordingSet, read_set
 from rotorid.report.fleet.summary import day_of
 
-CLAIMED = ("established", "ambiguous")
-NUMBERS = ("vehicle", "set", "day", "name", "change", "low_95", "high_95")
+NUMBERS = ("vehicle", "set", "day", "good", "name", "quantity", "unit", "change", "low_95", "high_95", "limit")
 EVENTS = ("vehicle", "set", "day", "id", "lasts", "sentence")
+Z95 = 1.96
 
 
 def by_vehicle(
@@ -48,62 +58,125 @@ def history(
     sets
         By vehicle, in the order they were flown.
     good
-        How many of the first sets are the good ones, which all later ones are compared with.
+        How many of the first sets are surely good.
     progress
-        Gets one line a set.
+        Gets one line a vehicle, and one for each set that is left out.
 
     Returns
     -------
     numbers
-        One row a set and believed value: `vehicle`, `set`, `day`, `name`, `change` (relative), `low_95`, `high_95`.
+        One row a set and quantity: `vehicle`, `set`, `day`, `good` (1 of the first ones), `name`, `quantity` in words,
+        `unit`, `change` against the mean of the good ones, `low_95`, `high_95` by the set's own pieces and the scatter
+        from flight to flight, `limit` that the mean of the later sets must pass to be stated in 19 of 20 histories.
     events
-        One row a change that a set shows and no set before did: `vehicle`, `set`, `day`, `id`, `lasts` (in how
-        many of the sets from this one on it shows), `sentence`.
+        One row a quantity that differs from a set on: `vehicle`, `set`, `day`, `id` of the quantity, `lasts` (how many
+        sets there are from this one to the next event), `sentence`.
     """
     numbers, events = [], []
     for vehicle, own in sets.items():
         if len(own) <= good:
             continue
-        compared = {}
         try:
-            reference = reference_of(as_one(own[:good]))
+            own = of_one_vehicle(own)
+            as_one(own[:good])
+            shown = shown_by(own, good, lambda text, v=vehicle: progress(f"{v}: {text}"))
         except InputError as error:
             progress(f"{vehicle} is left out: {error}")
             continue
-        for later in own[good:]:
-            try:
-                compared[later.name] = changes_from(reference, later)
-                progress(f"{vehicle}: {later.name}")
-            except InputError as error:
-                progress(f"{vehicle}: {later.name} is left out: {error}")
-        numbers += [row for name, found in compared.items() for row in numbers_of(vehicle, name, found)]
-        events += events_of(vehicle, compared)
+        numbers += numbers_of(vehicle, shown, good)
+        events += [row for point in change_points(shown, good) for row in rows_of(vehicle, point)]
+        progress(f"{vehicle}: {len(shown)} sets")
     return pd.DataFrame(numbers, columns=NUMBERS), pd.DataFrame(events, columns=EVENTS)
 
 
-def numbers_of(vehicle: str, name: str, found: Changes) -> list[dict]:
-    """Rows of a set's numbers."""
-    head = {"vehicle": vehicle, "set": name, "day": day_of(name)}
-    return [head | {"name": p.symbol, "change": p.value, "low_95": p.low, "high_95": p.high} for p in found.values]
+Shown = Mapping[str, Sequence[Flown]]
+"""What the runs of each set show, in the order they were flown; each set counts as one flight."""
 
 
-def events_of(vehicle: str, compared: Mapping[str, Changes]) -> list[dict]:
-    """Rows of what a set shows and no set before it did; of a class its likeliest member.
+def shown_by(sets: Sequence[RecordingSet], good: int, progress: Callable[[str], None]) -> Shown:
+    """What each set shows; one that lacks something that the good ones have is left out, with a line.
 
-    A value that another change of the set would change by itself (a payload the inertias) is no event of its own.
+    Raises
+    ------
+    InputError
+        A good set has no stretch of flight that is long enough.
     """
-    names, out = list(compared), []
-    claimed = {name: [c for c in compared[name].changes if c.status in CLAIMED] for name in names}
-    shown = {name: {i for c in own for i in (c.id, *c.alternatives)} for name, own in claimed.items()}
-    for k, name in enumerate(names):
-        before = set().union(*(shown[earlier] for earlier in names[:k]))
-        before |= {value for i in shown[name] & set(catalogue()) for value in catalogue()[i].would_change}
-        for change in claimed[name]:
-            members = {change.id, *change.alternatives}
-            if members & before:
-                continue
-            lasts = sum(bool(members & shown[later]) for later in names[k:])
-            sentence = f"{vehicle}, from {name} on: {change_words(change)}"
-            row = {"set": name, "day": day_of(name), "id": change.id, "lasts": lasts, "sentence": sentence}
-            out.append({"vehicle": vehicle, **row})
+    first = tuple(sets[:good])
+    grid, out, needed = grid_of(first), {}, set()
+    for k, own in enumerate(sets):
+        runs = [flown(run, own.vehicle, grid) for run in own.runs] if grid_of((*first, own)).like(grid) else []
+        runs = [run for run in runs if run is not None]
+        if k < good:
+            if not runs:
+                raise InputError(f"set {own.name}: no stretch of flight is long enough; expected some seconds")
+            needed |= set(runs[0].y)
+        elif not runs or any(needed - set(run.y) for run in runs):
+            progress(f"{own.name} is left out: it lacks flight or columns that the first sets have")
+            continue
+        out[own.name] = runs
     return out
+
+
+@dataclass(frozen=True)
+class ChangePoint:
+    """A set from which on something differs."""
+
+    set: str
+    lasts: int
+    differences: tuple[Difference, ...]
+
+
+def change_points(shown: Shown, good: int) -> list[ChangePoint]:
+    """The sets from which on something differs, in their order; each splits the history in two parts, looked at again.
+
+    The false alarms of a vehicle are those of all sets at which it may have changed. A further change needs as many
+    good sets before it as the first one.
+    """
+    names = list(shown)
+    places = range(good, len(names))
+    if not places:
+        return []
+    numbers = measured(list(shown.values()))
+    best: tuple[float, float, int, tuple[Difference, ...]] | None = None
+    for k in places:
+        found = differences_at(k, numbers, names, usual_scatter())
+        stated = tuple(d for d in found if d.false_alarms * len(places) <= FALSE_ALARMS)
+        if stated and (best is None or rarity(stated[0]) < best[:2]):
+            best = (*rarity(stated[0]), k, stated)
+    if best is None:
+        return []
+    *_, k, stated = best
+    before, after = ({n: shown[n] for n in part} for part in (names[:k], names[k:]))
+    earlier, later = change_points(before, good), change_points(after, good)
+    first = list(after).index(later[0].set) if later else len(after)
+    return [*earlier, ChangePoint(names[k], first, stated), *later]
+
+
+def rarity(d: Difference) -> tuple[float, float]:
+    """How rare a difference is, the rarest first; of those that are equally rare, by their size."""
+    return d.false_alarms, -abs(d.value) / d.sd
+
+
+def numbers_of(vehicle: str, shown: Shown, good: int) -> list[dict]:
+    """Rows of every quantity of all sets."""
+    first, later = dict(list(shown.items())[:good]), dict(list(shown.items())[good:])
+    if not later:
+        return []
+    out = []
+    for d in differences(first, later, usual_scatter()):
+        middle = sum(f.value for f in d.good) / len(d.good)
+        for place, f in enumerate((*d.good, *d.new)):
+            reach = Z95 * (d.scatter**2 * (1.0 + 1.0 / len(d.good)) + f.sd**2) ** 0.5
+            ends = (f.value - middle, f.value - middle - reach, f.value - middle + reach)
+            change, low, high, limit = (in_unit_of_words(d, end) for end in (*ends, d.smallest))
+            row = {"vehicle": vehicle, "set": f.name, "day": day_of(f.name), "good": int(place < len(d.good))}
+            row |= {"name": d.quantity.key, "quantity": quantity_words(d), "unit": unit_of(d)}
+            out.append(row | {"change": change, "low_95": low, "high_95": high, "limit": limit})
+    return out
+
+
+def rows_of(vehicle: str, point: ChangePoint) -> list[dict]:
+    """Rows of what differs from a set on, the rarest first."""
+    head = {"vehicle": vehicle, "set": point.set, "day": day_of(point.set), "lasts": point.lasts}
+    on = f"{vehicle}, from {point.set} on: "
+    return [head | {"id": d.quantity.key, "sentence": on + difference_words(d)} for d in point.differences]

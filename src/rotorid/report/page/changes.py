@@ -8,10 +8,12 @@ from pathlib import Path
 from jinja2 import Environment
 from markupsafe import Markup
 
-from rotorid.mismatch.changes import Changes, words
+from rotorid.mismatch.changes import words
+from rotorid.mismatch.changes.compare import Changes
+from rotorid.mismatch.changes.level_one_words import level_one_sentences, quantity_words
 from rotorid.mismatch.decision.words import capital, channel_words
 from rotorid.report.page.make import policy_for
-from rotorid.report.plots.changes import draw_residuals, draw_values
+from rotorid.report.plots.changes import draw_differences, draw_residuals, draw_values
 
 TEMPLATE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>{{ new }} compared with {{ base }}</title>
@@ -27,6 +29,12 @@ svg { width: 100%; max-width: 50rem; height: auto; background: #fff; }
 .wide { overflow-x: auto; }
 </style></head><body>
 <h1>{{ new }} compared with {{ base }}</h1>
+{% if seen %}<h2>What differs</h2>
+<ul class="changes">{% for sentence in seen %}<li>{{ sentence }}</li>{% endfor %}</ul>
+<p>Each quantity over the flights in the order of their names. Shaded: the good flights. Dotted: by how much the mean of
+the new flights would have to differ to be stated in 19 of 20 comparisons. Red: stated.</p>
+{{ quantities }}
+<h2>What explains it</h2>{% endif %}
 <ul class="changes">{% for sentence in changes %}<li>{{ sentence }}</li>{% endfor %}</ul>
 {% if notes %}<h2>To bear in mind</h2><ul>{% for note in notes %}<li>{{ note }}</li>{% endfor %}</ul>{% endif %}
 <h2>Believed values</h2>
@@ -45,7 +53,9 @@ svg { width: 100%; max-width: 50rem; height: auto; background: #fff; }
 
 def make_changes_page(found: Changes) -> str:
     """The page of a comparison."""
-    sentences, flown = words.sentences(found), found.kind == "flight"
+    sentences, flown = words.level_two_sentences(found), found.kind == "flight"
+    seen = found.level_1
+    names = {} if seen is None else {d.quantity.key: quantity_words(d) for d in seen.differences}
     return (
         Environment(autoescape=True, trim_blocks=True)
         .from_string(TEMPLATE)
@@ -53,6 +63,8 @@ def make_changes_page(found: Changes) -> str:
             policy=policy_for(),
             base=found.base,
             new=found.new,
+            seen=[] if seen is None else level_one_sentences(seen),
+            quantities="" if seen is None else drawn(draw_differences, found, names),
             changes=sentences[: max(1, len(found.changes)) + len(words.advice(found))],
             notes=found.notes,
             whole=words.WHOLE[found.kind],

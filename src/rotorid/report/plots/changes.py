@@ -11,10 +11,11 @@ import numpy as np
 from rotorid.report.plots import style
 
 if TYPE_CHECKING:
-    from rotorid.mismatch.changes import Changes
-    from rotorid.mismatch.changes.compare import Residual
+    from rotorid.mismatch.changes.compare import Changes, Residual
 
 CLAIMED = ("established", "ambiguous")
+ABREAST = 4
+"""Quantities next to each other."""
 MOST_POINTS = 1500
 """Points of a line at most: more are not seen at the width of a page."""
 
@@ -59,3 +60,36 @@ def thinned(residual: Residual) -> tuple[np.ndarray, np.ndarray]:
     """Times from 0 and values of a line that is not longer than a page shows."""
     step = max(1, len(residual.time_s) // MOST_POINTS)
     return residual.time_s[::step] - residual.time_s[0], residual.values[::step]
+
+
+def draw_differences(found: Changes, names: Mapping[str, str], path: Path) -> None:
+    """Every quantity of level 1 over the flights in order: good ones shaded, with the limits of what is stated."""
+    differences = sorted(found.level_1.differences, key=lambda d: list(names).index(d.quantity.key))
+    rows = -(-len(differences) // ABREAST) or 1
+    fig, axes = style.figure(1.15 * rows + 0.3, rows, ABREAST, squeeze=False)
+    for axis in axes.ravel()[len(differences) :]:
+        axis.set_axis_off()
+    for axis, d in zip(axes.ravel(), differences, strict=False):
+        flights = [*d.good, *d.new]
+        place, count = np.arange(1, len(flights) + 1), len(d.good)
+        value, sd = (np.array([getattr(f, name) for f in flights]) for name in ("value", "sd"))
+        middle = value[:count].mean()
+        scale = (
+            100.0
+            if names[d.quantity.key].endswith("(%)")
+            else np.rad2deg(1.0)
+            if "(°)" in names[d.quantity.key]
+            else 1.0
+        )
+        value, sd, limit = scale * (value - middle), scale * sd, scale * d.smallest
+        axis.axvspan(0.5, count + 0.5, color=style.GREY, alpha=0.15, lw=0)
+        axis.axhline(0.0, color=style.GREY, lw=0.6)
+        for end in (-limit, limit):
+            axis.axhline(end, color=style.GREY, lw=0.7, ls=":")
+        colour = style.RED if d.stated else style.BLUE
+        axis.errorbar(place[:count], value[:count], 2.0 * sd[:count], fmt=".", ms=4, color=style.BLUE, elinewidth=0.7)
+        axis.errorbar(place[count:], value[count:], 2.0 * sd[count:], fmt=".", ms=4, color=colour, elinewidth=0.7)
+        axis.set_title(names[d.quantity.key], fontsize=8, color=colour if d.stated else style.BLACK)
+        axis.set_xticks([])
+        axis.set_xlim(0.5, len(flights) + 0.5)
+    style.save(fig, path)

@@ -90,10 +90,10 @@ MOST_HISTORIES = 8
 
 
 def draw_history(numbers: pd.DataFrame, events: pd.DataFrame, path: Path) -> None:
-    """Each vehicle's believed values over its sets, as changes since its first ones with intervals (95 %).
+    """Each vehicle's trims, shares and thrust over its sets, as changes since its first ones with intervals (95 %).
 
-    `numbers` and `events` are the tables of `rotorid.report.fleet.history.history`. A value that some set shows to have
-    changed has a colour, the others are grey; a line stands where an event begins.
+    `numbers` and `events` are the tables of `rotorid.report.fleet.history.history`. A quantity that differs from
+    some set on has a colour, the others are grey; a line stands where an event begins.
     """
     counts = events["vehicle"].value_counts()
     vehicles = sorted(numbers["vehicle"].unique(), key=lambda v: (-counts.get(v, 0), v))[:MOST_HISTORIES]
@@ -112,9 +112,13 @@ def one_history(axis, numbers: pd.DataFrame, events: pd.DataFrame) -> None:
     """One vehicle's values over its sets."""
     order = {name: place for place, name in enumerate(dict.fromkeys(numbers["set"]), 1)}
     changed = [name for name in dict.fromkeys(numbers["name"]) if name in set(events["id"])]
+    good = int(numbers.groupby("name")["good"].sum().max())
+    axis.axvspan(0.5, good + 0.5, color=style.GREY, alpha=0.15, lw=0)
+    first = numbers["name"].str.startswith(("share/", "trim/", "lift"))
+    numbers = numbers[first | numbers["name"].isin(changed)]
     for name, own in numbers.groupby("name", sort=False):
         place = own["set"].map(order).to_numpy()
-        value, low, high = (100 * own[c].to_numpy(float) for c in ("change", "low_95", "high_95"))
+        value, low, high = (own[c].to_numpy(float) for c in ("change", "low_95", "high_95"))
         colour = style.CYCLE[changed.index(name) % len(style.CYCLE)] if name in changed else style.GREY
         bars = [np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)]
         label = name if name in changed else None
@@ -122,7 +126,41 @@ def one_history(axis, numbers: pd.DataFrame, events: pd.DataFrame) -> None:
     for name in dict.fromkeys(events["set"]):
         axis.axvline(order[name] - 0.5, color=style.ORANGE, lw=0.8, ls="--")
     axis.set_xlim(0.5, len(order) + 0.5)
-    axis.set_ylabel("change (%)")
-    axis.set_xlabel("set after the good ones")
+    units = sorted(set(numbers["unit"])) or ["%"]
+    axis.set_ylabel(f"change ({', '.join(units)})")
+    axis.set_xlabel("set, the good ones shaded")
     if changed:
         axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+ABREAST = 4
+"""Quantities of a vehicle next to each other."""
+
+
+def draw_vehicle(numbers: pd.DataFrame, events: pd.DataFrame, path: Path) -> None:
+    """Every quantity of one vehicle over its sets: good ones shaded, limits dotted, a line where it has an event.
+
+    `numbers` and `events` are the vehicle's rows of the tables of `rotorid.report.fleet.history.history`.
+    """
+    names = list(dict.fromkeys(numbers["name"]))
+    rows = -(-len(names) // ABREAST) or 1
+    fig, axes = style.figure(1.15 * rows + 0.3, rows, ABREAST, squeeze=False)
+    for axis in axes.ravel()[len(names) :]:
+        axis.set_axis_off()
+    for axis, name in zip(axes.ravel(), names, strict=False):
+        own = numbers[numbers["name"] == name]
+        place = {s: k for k, s in enumerate(own["set"], 1)}
+        begins = [place[s] for s in events[events["id"] == name]["set"] if s in place]
+        value, low, high = (own[c].to_numpy(float) for c in ("change", "low_95", "high_95"))
+        colour = style.RED if begins else style.BLUE
+        axis.axvspan(0.5, own["good"].sum() + 0.5, color=style.GREY, alpha=0.15, lw=0)
+        for limit in (-own["limit"].iloc[0], own["limit"].iloc[0]):
+            axis.axhline(limit, color=style.GREY, lw=0.7, ls=":")
+        bars = [np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)]
+        axis.errorbar(list(place.values()), value, bars, fmt=".", ms=4, color=colour, elinewidth=0.7)
+        for begin in begins:
+            axis.axvline(begin - 0.5, color=style.ORANGE, lw=0.8, ls="--")
+        axis.set_title(own["quantity"].iloc[0], fontsize=8, color=colour if begins else style.BLACK)
+        axis.set_xticks([])
+        axis.set_xlim(0.5, len(place) + 0.5)
+    style.save(fig, path)

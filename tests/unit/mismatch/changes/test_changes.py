@@ -14,9 +14,9 @@ from typer.testing import CliRunner
 from rotorid.cli import app
 from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
-from rotorid.mismatch.changes import Changes, as_one, changes_between
-from rotorid.mismatch.changes.compare import Change, in_percent, price_of
+from rotorid.mismatch.changes.compare import Change, Changes, changes_between, in_percent, price_of
 from rotorid.mismatch.changes.joint import FARTHER, joints_of, lasting_effects, moved_by, reference_of, slower
+from rotorid.mismatch.changes.level_one import as_one
 from rotorid.mismatch.changes.notes import regime_notes
 from rotorid.mismatch.changes.words import as_json, sentences
 from rotorid.mismatch.posterior.prior import Prior
@@ -64,7 +64,9 @@ def test_between_two_days_of_one_vehicle_nothing_changed_though_both_lack_a_drag
     limits = {x.id: x.at_most for x in found.limits}
     assert {"mass_kg", "thrust_coefficient_n_s2", "inertia_xx_kg_m2"} <= limits.keys()
     assert 0.0 < limits["mass_kg"] < 0.05
-    assert sentences(found)[0].startswith("Nothing changed from monday to friday")
+    first, second, *_ = sentences(found)
+    assert first.startswith("From monday to friday no trim") and "Stated in 19 of 20" in first
+    assert second.startswith("Nothing changed from monday to friday")
 
 
 def test_a_vehicle_that_is_heavier_than_its_file_says_is_told_by_how_much():
@@ -112,7 +114,11 @@ def test_what_changed_moves_the_second_set_alone():
 def test_the_result_as_json_is_what_the_sentences_say():
     made = json.loads(json.dumps(as_json(compared("dragging"))))
     assert made["base"] == "monday" and made["changes"][0]["probability"] > 0.99
-    assert "drag" in made["sentences"][0].lower() and "probability" in made["sentences"][0]
+    seen = made["level_1"]
+    assert made["sentences"][: len(seen["sentences"])] == seen["sentences"] and not seen["nothing_changed"]
+    assert {q["id"] for q in seen["quantities"] if q["stated"]} == {"drag/x", "drag/y"}
+    first = made["sentences"][len(seen["sentences"])]
+    assert "drag" in first.lower() and "probability" in first
     assert {x["id"] for x in made["unchanged"]} >= {"mass_kg"}
 
 
@@ -197,7 +203,7 @@ def test_the_page_holds_sentences_limits_and_both_recordings(tmp_path):
     found = compared("believed lighter")
     page = make_changes_page(found)
     assert sentences(found)[0] in page and "<h1>friday compared with monday</h1>" in page
-    assert page.count("<svg") == 2 and "Rotor drag" in page
+    assert page.count("<svg") == 3 and "Rotor drag" in page
     assert {"force_z", "moment_x"} <= found.residuals[0].keys() & found.residuals[1].keys()
     script_free = page.lower()
     assert "<script" not in script_free and "content-security-policy" in script_free

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from rotorid.cli import app
 from rotorid.errors import InputError
-from rotorid.mismatch.changes import Changes, changes_between
+from rotorid.mismatch.changes.compare import Changes, changes_between
 from rotorid.mismatch.changes.of_instruments import Wander, between, wandering
 from rotorid.mismatch.changes.words import as_json, sentences
 from rotorid.mismatch.posterior.evidence import Evidence

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rotorid.mismatch.changes import changes_between
+from rotorid.mismatch.changes.compare import changes_between
 from tests.unit.mismatch.flights import recorded
 
 

@@ -5,16 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from types import SimpleNamespace
 
 import pandas as pd
 
-from rotorid.mismatch.changes.compare import Change
 from rotorid.recordings import RecordingSet, write_set
 from rotorid.recordings.templates import read
-from rotorid.report.fleet.history import by_vehicle, events_of, history
+from rotorid.report.fleet.history import by_vehicle, change_points, history, shown_by
 from rotorid.report.plots.fleet import draw_history
 from rotorid.vehicle.control.swings import swings
+from workflow.scripts import fleet_history
 
 DAYS = 6
 HEAVIER_FROM = 5
@@ -38,39 +37,63 @@ def test_the_heavier_vehicle_is_the_one_event_at_the_day_it_begins():
     _, events = made()
     (event,) = events.to_dict("records")
     assert event["set"] == "heron-2026-10-05" and event["day"] == "2026-10-05" and event["lasts"] == 2
-    assert event["id"] in ("mass_kg", "thrust_coefficient_n_s2")
-    assert event["sentence"].startswith("heron, from heron-2026-10-05 on: ")
+    assert event["id"] == "lift/all"
+    assert event["sentence"].startswith("heron, from heron-2026-10-05 on: ") and "heavier" in event["sentence"]
 
 
-def test_what_an_earlier_change_brings_about_is_no_event_of_its_own():
-    def claims(*ids, others=()):
-        return SimpleNamespace(changes=tuple(Change(i, "established", others, 0.999, ()) for i in ids))
+def test_a_second_change_is_an_event_of_its_own_and_the_first_ends_there():
+    def weak(day: int, factor: float) -> RecordingSet:
+        own = flown(day)
+        speed = "rotor_speed_2_rad_s"
+        runs = tuple(replace(r, table=r.table.assign(**{speed: factor * r.table[speed]})) for r in own.runs)
+        return replace(own, runs=runs)
 
-    compared = {
-        "a": claims("payload", "inertia_yy_kg_m2"),
-        "b": claims("payload", "inertia_xx_kg_m2"),
-        "c": claims("inertia_xx_kg_m2", "com_offset"),
-        "d": claims("mass_kg", others=("com_offset", "mass_kg")),
-    }
-    found = [(e["set"], e["id"]) for e in events_of("heron", compared)]
-    assert found == [("a", "payload"), ("c", "com_offset")]
-    alone = {"a": claims("com_offset"), "b": claims("inertia_xx_kg_m2")}
-    assert [e["id"] for e in events_of("heron", alone)] == ["com_offset", "inertia_xx_kg_m2"]
+    sets = [flown(1), flown(2), flown(3), weak(4, 1.1), replace(weak(3, 1.1), name="heron-2026-10-07")]
+    points = change_points(shown_by(sets, 2, print), 2)
+    assert [(p.set, p.lasts) for p in points] == [("heron-2026-10-04", 2)]
+    assert points[0].differences[0].quantity.key in ("share/2", "trim/roll", "trim/pitch")
+    mended = [*sets, *(replace(flown(day), name=f"heron-2026-11-0{day}") for day in (5, 6))]
+    points = change_points(shown_by(mended, 2, print), 2)
+    assert [(p.set, p.lasts) for p in points] == [("heron-2026-10-04", 2), ("heron-2026-11-05", 2)]
+    before, after = points
+    # The rotor is as it was: its trims go back.
+    back = {d.quantity.key: d.value for d in after.differences}
+    there = {d.quantity.key: d.value for d in before.differences}
+    assert back["trim/roll"] * there["trim/roll"] < 0
+
+
+def test_a_set_without_what_the_first_ones_have_is_left_out_with_a_line():
+    lacking = replace(
+        flown(4), runs=tuple(replace(r, table=r.table.filter(regex="^(?!angular_velocity)")) for r in flown(4).runs)
+    )
+    said: list[str] = []
+    shown = shown_by([flown(1), flown(2), lacking, flown(3)], 2, said.append)
+    assert list(shown) == [flown(k).name for k in (1, 2, 3)]
+    assert said == [f"{lacking.name} is left out: it lacks flight or columns that the first sets have"]
 
 
 def test_every_later_set_has_its_numbers_with_intervals():
     numbers, _ = made()
-    assert list(dict.fromkeys(numbers["set"])) == [f"heron-2026-10-0{day}" for day in (4, 5, 6)]
-    ratio = numbers.pivot(index="set", columns="name", values="change")
-    ratio = ratio["mass_kg"] - ratio["thrust_coefficient_n_s2"]
-    assert abs(ratio["heron-2026-10-04"]) < 0.02
-    assert 0.06 < ratio["heron-2026-10-06"] < 0.14
+    assert list(dict.fromkeys(numbers["set"])) == [f"heron-2026-10-0{day}" for day in range(1, 7)]
+    assert (numbers["good"] == (numbers["day"] < "2026-10-04")).all() and (numbers["limit"] > 0).all()
+    lift = numbers.pivot(index="set", columns="name", values="change")["lift/all"]
+    assert abs(lift["heron-2026-10-04"]) < 2.0
+    assert 8.0 < lift["heron-2026-10-06"] < 12.0 and set(numbers["unit"]) >= {"%"}
     assert (numbers["low_95"] < numbers["high_95"]).all()
 
 
 def test_the_history_is_drawn(tmp_path: Path):
     draw_history(*made(), tmp_path / "history.svg")
     assert "heron" in (tmp_path / "history.svg").read_text(encoding="utf-8")
+
+
+def test_a_vehicle_has_a_page_with_its_events_and_every_quantity(tmp_path: Path):
+    numbers, events = made()
+    fleet_history.write_page("heron <1>", numbers, events, tmp_path / "heron.html")
+    page = (tmp_path / "heron.html").read_text(encoding="utf-8")
+    assert "heron &lt;1&gt;" in page and "6 sets, from heron-2026-10-01 to heron-2026-10-06" in page
+    assert page.count("<svg") == 1 and "heron, from heron-2026-10-05 on: " in page
+    assert fleet_history.file_of("a/b c") == "a-b-c"
 
 
 def test_sets_are_ordered_by_vehicle_and_day_and_a_broken_one_is_named(tmp_path: Path):
