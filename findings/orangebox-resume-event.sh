@@ -6,9 +6,9 @@
 # them reads as a frame's letter (here the 0x49, I, of loop 9344), it is decoded as a frame, the full frame behind it
 # is lost, and the 30 frames up to the next full one go on with the clock of before the pause. 0.5.0 reads the event.
 #
-# Why it matters: the minutes between are missing from the time, without an error: a stretch after the pause is joined
-# to the one before it, and a rate or an attitude jumps within what looks like one run. It depends on the loop count,
-# so that most logs show nothing.
+# Why it matters: the first readings after the pause carry the times right after its start, minutes early, without an
+# error. They continue the stretch before it, and a rate or an attitude jumps within what looks like one run. It
+# depends on the loop count, so that most logs show nothing.
 #
 # Output seen:
 #   orangebox 0.4.0

@@ -5,7 +5,7 @@
 # and with the square of its speed, and turning as well. changeDynamics(linearDamping=0, angularDamping=0) ends it.
 #
 # Why it matters: drag that is identified from, or validated in, such a simulation contains Bullet's own: at 5 m/s a
-# deceleration of 1.2 m/s2, more than the rotor drag of most quadrotors. getDynamicsInfo does not show it.
+# deceleration of 1.2 m/s2, of the size of a quadrotor's rotor drag. getDynamicsInfo does not show it.
 #
 # Note: pybullet 3.2.7 has wheels for some versions of Python alone, 3.11 is one: PYTHON=python3.11 chooses it.
 #

@@ -6,8 +6,8 @@
 # hover is 469 rad/s, starts above its own rotor_speed_max of 1500. The key rI ("location of the IMU sensor") is read
 # by nothing; the sensor takes its place as Imu(p_BS=...).
 #
-# Why it matters: the first samples of a simulated flight hold a burst of thrust that no command asked for, which
-# identification of a motor lag sees as its best excitation; and an accelerometer placed by rI is still at the centre
+# Why it matters: the first samples of a simulated flight hold thrust that no command asked for and that decays with
+# the motors' time constant, which biases an identified lag; and an accelerometer placed by rI is still at the centre
 # of mass.
 #
 # Output seen:
