@@ -336,6 +336,7 @@ def mjcf(vehicle: Vehicle) -> Exported:
     name = quoteattr(vehicle.name)
     nl = "\n"
     text = f"""<mujoco model={name}>
+  <!-- Flies in MuJoCo and, unchanged, in MJX. -->
 {comments}  <!-- Control i is the thrust of rotor i in N: C_F times the square of its speed, C_F = {c_f} N s2. -->{late}
   <option timestep="0.001" gravity="0 0 -{vehicle.gravity_m_s2:g}" integrator="RK4"/>
   <worldbody>
