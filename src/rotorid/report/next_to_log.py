@@ -26,7 +26,7 @@ from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.attitude import normalised, quaternion_rate, rotation_from_quaternion
 from rotorid.vehicle.exports import ardupilot_frame, sih
 from rotorid.vehicle.exports.flown import multirotor_of, passive_forces, read_by
-from rotorid.vehicle.exports.forms import FLU, Exported, expressed, parts_of
+from rotorid.vehicle.exports.forms import FLU, KNOWS, Exported, expressed, parts_of
 from rotorid.vehicle.windows import States, plan_windows
 
 MOST_WINDOWS = 40
@@ -161,9 +161,12 @@ Wrench = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.nda
 
 def by_equations(
     windows: Sequence[Window], signals: np.ndarray, wrench: Wrench, mass_kg: float, inertia: np.ndarray,
-    gravity_m_s2: float, gyroscopic: bool,
+    gravity_m_s2: float, gyroscopic: bool, fastest_rad_s: float = np.inf,
 ) -> list[States]:  # fmt: skip
-    """Windows (all at once) of a rigid body under a tool's wrench; signals (w, m, k) go straight between samples."""
+    """Windows (all at once) of a rigid body under a tool's wrench; signals (w, m, k) go straight between samples.
+
+    Each body rate is held within ± `fastest_rad_s`.
+    """
     count, samples = signals.shape[:2]
     inverse = np.linalg.inv(inertia)
     start = [w.recorded for w in windows]
@@ -200,6 +203,7 @@ def by_equations(
             state = tuple(
                 x + length / 6 * (p + 2 * q + 2 * r + s) for x, p, q, r, s in zip(state, a, b, c, d, strict=True)
             )
+            state = (np.clip(state[0], -fastest_rad_s, fastest_rad_s), *state[1:])
         kept.append((state[0], normalised(state[1]), *state[2:]))
     series = [np.stack(parts, axis=1) for parts in zip(*kept, strict=True)]
     return [
@@ -215,19 +219,20 @@ def by_equations(
 def in_sih(vehicle: Vehicle, exported: Exported, windows: Sequence[Window]) -> list[States]:
     """By the equations of PX4's SIH, from the file's text."""
     values = sih.values_of(exported.text)
-    signals = _shares(vehicle, exported, windows, sih.KNOWS)
+    signals = _shares(vehicle, exported, windows, KNOWS["px4-sih"])
 
     def wrench(signal, velocity, rates):
         return sih.wrench(values, signal, velocity, rates)
 
     inertia = sih.inertia_of(values)
-    return by_equations(windows, signals, wrench, values["SIH_MASS"], inertia, vehicle.gravity_m_s2, True)
+    mass, gravity = values["SIH_MASS"], vehicle.gravity_m_s2
+    return by_equations(windows, signals, wrench, mass, inertia, gravity, True, sih.FASTEST_RAD_S)
 
 
 def in_ardupilot(vehicle: Vehicle, exported: Exported, windows: Sequence[Window]) -> list[States]:
     """By the equations of ArduPilot's simulated frame, from the file's text."""
     frame = ardupilot_frame.values_of(exported.text)
-    share, expo = _shares(vehicle, exported, windows, ardupilot_frame.KNOWS), frame["propExpo"]
+    share, expo = _shares(vehicle, exported, windows, KNOWS["ardupilot-json"]), frame["propExpo"]
     if expo != 0:
         share = (expo - 1 + np.sqrt((1 - expo) ** 2 + 4 * expo * share)) / (2 * expo)
 
@@ -326,13 +331,7 @@ def as_expressed(to: str) -> Callable[[Vehicle, Exported, Sequence[Window]], lis
     """Our simulator with the effects that a form expresses."""
 
     def fly(vehicle: Vehicle, exported: Exported, windows: Sequence[Window]) -> list[States]:
-        same = expressed(vehicle, to)
-        if to == "gym-pybullet-drones":  # has its drag there
-            effects = tuple(
-                e | {"form": "at the centre of mass"} if e["id"] == "rotor_drag" else e for e in same.effects
-            )
-            same = same.model_copy(update={"effects": effects})
-        return _ours(model_of(same), windows)
+        return _ours(model_of(expressed(vehicle, to)), windows)
 
     return fly
 

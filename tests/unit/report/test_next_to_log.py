@@ -84,6 +84,18 @@ def test_rotors_turn_it_the_way_they_do_here(form: str, axis: int, rotors: tuple
     assert there == pytest.approx(wanted, rel=0.02)
 
 
+def test_sih_turns_no_faster_than_its_limit_and_the_file_says_so() -> None:
+    vehicle = x500()
+    speed = np.tile(hover_speed_rad_s(vehicle) * np.array([0.6, 1.3, 1.3, 0.6]), (51, 1))  # rolls at 180 rad/s²
+    window = hovering(vehicle, speed=speed)
+    exported = export_vehicle(vehicle, "px4-sih")
+    (flown,) = next_to_log.in_sih(vehicle, exported, [window])
+    (ours,) = next_to_log._ours(next_to_log.Model(vehicle), [window])
+    assert flown.angular_velocity[-1, 0] == pytest.approx(6 * np.pi) and ours.angular_velocity[-1, 0] > 50
+    assert "# SIH holds each body rate within ±6π rad/s, ±1080 deg/s" in exported.text
+    assert "SIH_WIND_N = 3 blows towards the south" in exported.text
+
+
 def test_damping_and_inertia_go_along() -> None:
     made = x500(DAMPING)
     values = sih.values_of(export_vehicle(made, "px4-sih").text)

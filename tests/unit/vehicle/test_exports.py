@@ -4,6 +4,8 @@ Drake and pybullet are large and no dependency: `pip install drake pybullet` int
 """
 
 import dataclasses
+import re
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -15,7 +17,9 @@ from rotorid.errors import InputError
 from rotorid.recordings import Vehicle, templates, write_vehicle
 from rotorid.recordings.vehicle import Inertia, Rotor
 from rotorid.vehicle.exports import export_vehicle, flown, forms
+from rotorid.vehicle.exports.all_forms import NAMES
 from rotorid.vehicle.exports.flown import commands_of, in_drake, in_mujoco, in_pybullet, in_rotorpy, lagging
+from rotorid.vehicle.mixer import hover_speed_rad_s
 
 
 def with_effects(*effects: tuple[str, str, dict[str, float]]) -> Vehicle:
@@ -60,6 +64,80 @@ def test_mujoco_flies_the_same() -> None:
 
 
 LAG = ("motor_lag", "up and down", {"tau_up": 0.02, "tau_down": 0.04})
+
+
+def other_than_a_file_holds() -> Vehicle:
+    """Own products of inertia, coefficients of each rotor, another gravity, drag at the centre, a moved centre."""
+    own = with_effects(("rotor_drag", "at the centre of mass", {"k_d": 6e-5}), IN_SPACE)
+    products = own.inertia_kg_m2.model_copy(update={"xy": 1e-4, "xz": 2e-4, "yz": -1e-4})
+    each = np.array([1.0, 1.03, 0.98, 1.01])
+    return own.model_copy(
+        update={
+            "inertia_kg_m2": products,
+            "thrust_coefficient_n_s2": tuple(own.thrust_coefficients_n_s2() * each),
+            "torque_coefficient_n_m_s2": tuple(own.torque_coefficients_n_m_s2() * each),
+            "gravity_m_s2": 9.7,
+            "rotor_speed_limits_rad_s": (100.0, 1.01 * hover_speed_rad_s(own)),
+        }
+    )
+
+
+@pytest.mark.parametrize(("form", "fly"), [("rotorpy", in_rotorpy), ("mjcf", in_mujoco)])
+def test_a_trial_flight_compares_with_what_the_file_holds(form: str, fly) -> None:
+    pytest.importorskip({"rotorpy": "rotorpy", "mjcf": "mujoco"}[form])
+    vehicle = other_than_a_file_holds()
+    exported = export_vehicle(vehicle, form)
+    found = fly(vehicle, exported, 0.1)
+    assert found.position_m < 1e-8 * found.flown_m and found.angle_rad < 1e-7 * found.turned_rad
+    # With what the file leaves out ours parts from it: the comparison could fail.
+    time, speeds = commands_of(vehicle, 0.1)
+    held, whole = (flown.ours(v, speeds) for v in (forms.expressed(vehicle, form), vehicle))
+    assert flown.difference(held[:2], whole, form).angle_rad > 1e3 * found.angle_rad
+
+
+def test_what_the_urdf_and_the_frame_leave_of_the_vehicles_own_values_is_named() -> None:
+    vehicle = other_than_a_file_holds()
+    held = forms.expressed(vehicle, "gym-pybullet-drones")
+    np.testing.assert_array_equal(held.inertia_kg_m2.matrix(), np.diag(np.diag(vehicle.inertia_kg_m2.matrix())))
+    assert np.ptp(held.thrust_coefficients_n_s2()) == 0
+    assert held.effects[0]["form"] == "at the centre of mass"
+    in_x = vehicle.model_copy(update={"rotors": templates.read("x500").rotors})
+    for form in ("gym-pybullet-drones", "ardupilot-json", "px4"):
+        said = [s for s in export_vehicle(in_x, form).left_out if s.startswith("products of inertia")]
+        assert said == ["products of inertia (J_xy = 0.0001, J_xz = 0.0002, J_yz = -0.0001)"], form
+    for form in ("rotorpy", "mjcf", "sdf"):
+        assert not any("products" in s for s in export_vehicle(vehicle, form).left_out)
+
+
+def test_rotorpy_hovers_from_the_state_of_the_file() -> None:
+    multirotor = pytest.importorskip("rotorpy.vehicles.multirotor").Multirotor
+    vehicle = with_effects().model_copy(update={"accelerometer_position_m": (0.02, 0.01, -0.03)})
+    exported = export_vehicle(vehicle, "rotorpy")
+    scope: dict = {}
+    exec(exported.text, scope)
+    hover = {"cmd_motor_speeds": scope["initial_state"]["rotor_speeds"]}
+
+    def fallen(*state: dict) -> float:
+        flyer = multirotor(scope["quad_params"] | {"tau_m": 0.05}, *state)
+        return abs(flyer.step(flyer.initial_state, hover, 0.1)["v"][2])
+
+    assert fallen(scope["initial_state"]) < 1e-9
+    assert fallen() > 0.5  # it starts at a speed of its own: the file's state is needed
+    (said,) = [s for s in exported.left_out if "accelerometer" in s]
+    assert "p_BS" in said
+    np.testing.assert_allclose(scope["quad_params"]["rI"], [0.02, -0.01, 0.03])
+
+
+def test_the_page_lists_what_each_form_holds() -> None:
+    page = (Path(__file__).parents[3] / "docs/own-vehicle.md").read_text()
+    rows = [
+        line.strip("| ").split(" | ")
+        for line in page.split("| `FORM` |")[1].split("\n\n")[0].splitlines()
+        if line.startswith("| `")
+    ]
+    listed = {form.strip("`"): set(re.findall("`([a-z_]+)`", held)) for form, _, held in rows}
+    assert listed == forms.KNOWS
+    assert set(forms.KNOWS) == set(NAMES)
 
 
 def test_the_flights_beside_turn_about_every_axis() -> None:
@@ -288,7 +366,7 @@ def test_the_trial_flight_is_made_for_any_chain(tmp_path, monkeypatch, form: str
     pytest.importorskip(module)
     done = exported_by_command(tmp_path, with_effects(*CHAIN, NEAR_GROUND, DRAG), form, "vehicle")
     assert done.exit_code == 0, done.output
-    assert "next to ours, with what the file expresses" in done.output and (tmp_path / "out" / "vehicle").is_file()
+    assert "next to our own flight of what the file holds" in done.output and (tmp_path / "out" / "vehicle").is_file()
     fly = {"rotorpy": in_rotorpy, "mjcf": in_mujoco}[form]
     vehicle = with_effects(*CHAIN)
     exported = export_vehicle(vehicle, form)

@@ -14,13 +14,11 @@ from scipy.optimize import brentq
 
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.exports.derivatives import left_of_one_damping, own_damping
-from rotorid.vehicle.exports.forms import Exported, parts_of
+from rotorid.vehicle.exports.forms import KNOWS, Exported, parts_of
 from rotorid.vehicle.exports.four_in_x import SENSES, order_in_x
 from rotorid.vehicle.exports.sih import RICHEST, full_speed_rad_s, with_drag_of_hover
 from rotorid.vehicle.mixer import hover_speed_rad_s
 
-KNOWS = frozenset({"rotor_drag", "frame_drag", "rotational_damping", "com_offset", "command_saturation"})
-KNOWS |= {"throttle_curve", "derivatives"}
 GRAVITY = 9.80665
 """ArduPilot's."""
 DENSITY_KG_M3 = 1.225
@@ -36,7 +34,7 @@ YAW_PER_THRUST = 0.05
 
 def ardupilot_json(vehicle: Vehicle) -> Exported:
     """The frame as JSON, motors in ArduPilot's X order."""
-    parts = parts_of(with_drag_of_hover(vehicle), KNOWS)
+    parts = parts_of(with_drag_of_hover(vehicle), KNOWS["ardupilot-json"])
     order = order_in_x(parts.places, vehicle.yaw_signs(), vehicle.name, "ArduPilot's frame X")
     places, thrust, torque = parts.places[order], parts.thrust[order], parts.torque[order]
     left = [*parts.left_out, *left_of_one_damping(vehicle)]
@@ -44,10 +42,6 @@ def ardupilot_json(vehicle: Vehicle) -> Exported:
         left.append(
             f"full thrust: rotor_speed_limits_rad_s is not stated, {RICHEST:g} times the hover's speed is taken"
         )
-    if np.ptp(thrust) > 0:
-        left.append("thrust coefficients of each rotor: their mean is taken")
-    if np.ptp(np.diag(np.diag(parts.inertia)) - parts.inertia) > 0:
-        left.append("products of inertia: it takes the diagonal alone")
     weight = parts.mass_kg * GRAVITY
     share = weight / (len(order) * float(thrust.mean()) * full_speed_rad_s(vehicle, parts) ** 2)
     expo = 1.0 - parts.curve

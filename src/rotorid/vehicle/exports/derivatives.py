@@ -111,7 +111,8 @@ def mujoco_companion(vehicle: Vehicle) -> str:
 """Derivatives for MuJoCo: `mujoco.set_mjcb_passive(passive)` once, and every step adds them.
 
 Force, N, and moment, N m, are MATRIX @ x of x = (1, velocity through the air, m/s, body rates, rad/s), each held
-between LOW and HIGH. Body axes forward-left-up. MuJoCo has one such callback for all models; None takes it off.
+between LOW and HIGH. Body axes forward-left-up. MuJoCo has one such callback for all models; None takes it off;
+MJX calls none.
 """
 
 import mujoco

@@ -44,21 +44,22 @@ class Difference:
     @property
     def sentence(self) -> str:
         return (
-            f"flown in {self.where} next to ours, with what the file expresses, on the same commands: at most "
-            f"{self.position_m:.2g} m apart after {self.flown_m:.2g} m of way and "
+            f"flown in {self.where} next to our own flight of what the file holds, without what it does not express, "
+            f"on the same commands: at most {self.position_m:.2g} m apart after {self.flown_m:.2g} m of way and "
             f"{self.angle_rad:.2g} rad after {self.turned_rad:.2g} rad of turning"
         )
 
 
 def commands_of(vehicle: Vehicle, duration_s: float) -> tuple[np.ndarray, np.ndarray]:
-    """Times (n,) and rotor speeds (n, k), rad/s, about hover that turn the vehicle about every axis in turn."""
+    """Times (n,) and rotor speeds (n, k), rad/s, about hover and within the vehicle's limits that turn it about every
+    axis in turn."""
     time = np.arange(int(duration_s / STEP_S) + 1) * STEP_S
     hover = hover_speed_rad_s(vehicle)
     phase = 2 * np.pi * np.arange(vehicle.rotor_count) / vehicle.rotor_count
     # Phases around the vehicle roll and pitch it; their torques cancel, so yaw has a swing of its own.
     swing = 0.004 * np.sin(2 * np.pi * 1.5 * time[:, None] + phase) + 0.02 * np.sin(2 * np.pi * 0.7 * time)[:, None]
     swing = swing + 0.02 * np.sin(2 * np.pi * 1.1 * time)[:, None] * vehicle.yaw_signs()
-    return time, hover * (1 + swing)
+    return time, np.clip(hover * (1 + swing), *(vehicle.rotor_speed_limits_rad_s or (0.0, np.inf)))
 
 
 def ours(vehicle: Vehicle, speeds: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -130,7 +131,8 @@ def passive_forces(exported: Exported) -> Iterator[None]:
 
 def in_rotorpy(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> Difference:
     """Fly RotorPy's Multirotor with the exported parameters and their companion next to ours."""
-    time, speeds = commands_of(vehicle, duration_s)
+    same = expressed(vehicle, "rotorpy")
+    time, speeds = commands_of(same, duration_s)
     tau_s = exported.parameters["tau_m"]
     state = {
         "x": np.zeros(3), "v": np.array([START_M_S, -START_M_S, 0.0]), "q": np.array([0.0, 0.0, 0.0, 1.0]),
@@ -152,12 +154,11 @@ def in_rotorpy(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) ->
         position.append(state["x"])
         attitude.append(np.asarray(state["q"])[[3, 0, 1, 2]])
     turning = speeds if at_once else lagging(speeds, tau_s, tau_s)
-    here = ours(expressed(vehicle, "rotorpy"), turning)
-    return difference((np.array(position), np.array(attitude)), here, "RotorPy")
+    return difference((np.array(position), np.array(attitude)), ours(same, turning), "RotorPy")
 
 
 def in_mujoco(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> Difference:
-    """Fly the exported model and its companion in MuJoCo next to ours without the effects that they cannot express."""
+    """Fly the exported model and its companion in MuJoCo next to ours with what they hold."""
     import mujoco
 
     with read_by("MuJoCo"):
@@ -165,8 +166,9 @@ def in_mujoco(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> 
     data = mujoco.MjData(model)
     data.qpos[:] = [0, 0, 0, 1, 0, 0, 0]
     data.qvel[:3] = [START_M_S, -START_M_S, 0.0]
-    time, speeds = commands_of(vehicle, duration_s)
-    thrust = vehicle.thrust_coefficients_n_s2() * speeds**2
+    same = expressed(vehicle, "mjcf")
+    time, speeds = commands_of(same, duration_s)
+    thrust = same.thrust_coefficients_n_s2() * speeds**2
     tau_s = float(model.actuator_dynprm[0, 0]) if model.na else 0.0
     data.act[:] = thrust[0, : model.na]
     position, attitude = [data.qpos[:3].copy()], [data.qpos[3:7].copy()]
@@ -176,7 +178,7 @@ def in_mujoco(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> 
             mujoco.mj_step(model, data)
             position.append(data.qpos[:3].copy())
             attitude.append(data.qpos[3:7].copy())
-    here = ours(expressed(vehicle, "mjcf"), np.sqrt(lagging(speeds**2, tau_s, tau_s)))
+    here = ours(same, np.sqrt(lagging(speeds**2, tau_s, tau_s)))
     return difference((np.array(position), np.array(attitude)), here, "MuJoCo")
 
 
@@ -227,7 +229,7 @@ def gazebo_damping_of(text: str) -> np.ndarray:
 
 
 def in_drake(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> Difference:
-    """Fly the exported SDF model in Drake next to ours without the effects that the model cannot express.
+    """Fly the exported SDF model in Drake next to ours with what the model holds.
 
     Drake reads masses, inertias, places and joints. It has no motor model: thrust C_F ω² and drag −k ω v⊥ act on the
     rotor's link and the torque on the body, as in Gazebo's `MulticopterMotorModel::UpdateForcesAndMoments`, and the
@@ -242,7 +244,8 @@ def in_drake(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> D
     from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
     motors, damping = GazeboMotor.all_of(exported.text), gazebo_damping_of(exported.text)
-    time, speeds = commands_of(vehicle, duration_s)
+    same = expressed(vehicle, "sdf")
+    time, speeds = commands_of(same, duration_s)
     turning = np.stack(
         [
             speeds[:, i] if m.up_s == AT_ONCE_S else lagging(speeds[:, [i]], m.up_s, m.down_s)[:, 0]
@@ -305,7 +308,7 @@ def in_drake(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> D
         position.append(pose.translation() - start)
         attitude.append(RotationMatrix(pose.rotation()).ToQuaternion().wxyz())
     where = "Drake by the equations of Gazebo's motor model"
-    return difference((np.array(position), np.array(attitude)), ours(expressed(vehicle, "sdf"), turning), where)
+    return difference((np.array(position), np.array(attitude)), ours(same, turning), where)
 
 
 BULLET_DAMPING = 0.04
@@ -315,7 +318,7 @@ BULLET_DAMPING = 0.04
 def in_pybullet(
     vehicle: Vehicle, exported: Exported, duration_s: float = 0.3, damping: float = BULLET_DAMPING
 ) -> Difference:
-    """Fly the exported URDF in Bullet next to ours without the effects that gym-pybullet-drones cannot express.
+    """Fly the exported URDF in Bullet next to ours with what it holds.
 
     Forces on the rotors' links, torque and drag on the link at the centre of mass, all from the file's `properties`, as
     in that tool's `BaseAviary._physics` and `_drag`.
@@ -326,12 +329,8 @@ def in_pybullet(
     from pybullet_utils.bullet_client import BulletClient
 
     same = expressed(vehicle, "gym-pybullet-drones")
-    at_centre = {"form": "at the centre of mass"}  # where that tool has its drag
-    same = same.model_copy(
-        update={"effects": tuple(e | at_centre if e["id"] == "rotor_drag" else e for e in same.effects)}
-    )
     says = {k: float(v) for k, v in ElementTree.fromstring(exported.text)[0].attrib.items()}
-    time, speeds = commands_of(vehicle, duration_s)
+    time, speeds = commands_of(same, duration_s)
     order = exported.rotor_order
     substeps = 10  # its integrator is of first order
     client = BulletClient(pybullet.DIRECT)

@@ -78,35 +78,61 @@ class Parts:
     """Of turning about each axis, N m s/rad."""
     curve: float = 0.0
     """Linear share b of T/T_max = b u + (1 − b) u²."""
-    taken: tuple[dict, ...] = ()
-    """Entries of the vehicle's effects that found a place."""
     left_out: tuple[str, ...] = ()
 
 
 KNOWS = {
-    "rotorpy": frozenset(
-        {"rotor_drag", "axial_inflow", "translational_lift", "flapping_moment", "frame_drag", "motor_lag"}
-        | {"com_offset", "inertia_products", "command_saturation", "derivatives"}
-    ),
-    "mjcf": frozenset({"com_offset", "inertia_products", "motor_lag", "command_saturation", "derivatives"}),
-    "sdf": frozenset(
-        {"rotor_drag", "motor_lag", "com_offset", "inertia_products", "command_saturation", "derivatives"}
-    ),
-    "gym-pybullet-drones": frozenset({"rotor_drag", "com_offset", "command_saturation"}),
-    "px4": frozenset({"com_offset", "throttle_curve"}),
+    form: frozenset(ids.split())
+    for form, ids in {
+        "rotorpy": "rotor_drag axial_inflow translational_lift flapping_moment frame_drag motor_lag com_offset "
+        "inertia_products command_saturation derivatives",
+        "mjcf": "motor_lag com_offset inertia_products command_saturation derivatives each_thrust each_torque",
+        "sdf": "rotor_drag motor_lag com_offset inertia_products command_saturation derivatives each_thrust "
+        "each_torque",
+        "gym-pybullet-drones": "rotor_drag com_offset command_saturation",
+        "px4": "com_offset throttle_curve each_thrust each_torque",
+        "px4-sih": "rotor_drag rotational_damping motor_lag inertia_products command_saturation derivatives",
+        "ardupilot-json": "rotor_drag frame_drag rotational_damping com_offset command_saturation throttle_curve "
+        "derivatives each_torque",
+    }.items()
 }
-"""By form, ids of the effects that it has a place for, and `derivatives` where it says itself what it takes of them."""
+"""By form, ids of the effects that it has a place for; `each_thrust`, `each_torque` where it has coefficients of each
+rotor; `derivatives` where it says itself what it takes of them. `inertia_products` are the vehicle's own, too."""
+DRAG_AT_CENTRE = ("gym-pybullet-drones",)
+"""Forms whose rotor drag acts at the centre of mass."""
+GRAVITY_M_S2 = {"rotorpy": 9.81}
+"""Of tools that have their own, which no file changes and no caller of theirs sets."""
 
 
 def expressed(vehicle: Vehicle, to: str) -> Vehicle:
-    """The vehicle with those of its effects and derivatives that a form takes, and the file's limits.
+    """What the file of a form holds of a vehicle, as a vehicle that our simulator flies.
 
     The lag of the motors is left to who flies it: each tool has its own.
     """
     parts = parts_of(vehicle, KNOWS[to])
-    kept = tuple(e for e in parts.taken if e["id"] not in ("motor_lag", "command_saturation"))
-    taken = {"effects": kept, "derivatives": expressed_by(vehicle, to)}
-    return vehicle.model_copy(update=taken | {"rotor_speed_limits_rad_s": parts.limits_rad_s})
+    at = "at the centre of mass" if to in DRAG_AT_CENTRE else "at the hubs"
+    held = (
+        ("rotor_drag", at, {"k_d": parts.drag[0]}),
+        ("axial_inflow", "at the hubs", {"k_z": parts.inflow}),
+        ("translational_lift", "at the hubs", {"k_h": parts.lift}),
+        ("flapping_moment", "at the hubs", {"k_flap": parts.flap}),
+        ("frame_drag", "per axis", dict(zip(("c_x", "c_y", "c_z"), parts.frame, strict=True))),
+    )
+    j, axes = parts.inertia, ("x_m", "y_m", "z_m")
+    places = [dict(zip(axes, place, strict=True)) for place in parts.places.tolist()]
+    inertia = {a + b: float(j["xyz".index(a), "xyz".index(b)]) for a, b in ("xx", "yy", "zz", "xy", "xz", "yz")}
+    return vehicle.model_copy(
+        update={
+            "inertia_kg_m2": vehicle.inertia_kg_m2.model_copy(update=inertia),
+            "rotors": tuple(r.model_copy(update=p) for r, p in zip(vehicle.rotors, places, strict=True)),
+            "thrust_coefficient_n_s2": tuple(parts.thrust.tolist()),
+            "torque_coefficient_n_m_s2": tuple(parts.torque.tolist()),
+            "gravity_m_s2": GRAVITY_M_S2.get(to, vehicle.gravity_m_s2),
+            "rotor_speed_limits_rad_s": parts.limits_rad_s,
+            "effects": tuple({"id": i, "form": f, "parameters": p} for i, f, p in held if any(p.values())),
+            "derivatives": expressed_by(vehicle, to),
+        }
+    )
 
 
 def parts_of(vehicle: Vehicle, knows: frozenset[str]) -> Parts:
@@ -118,20 +144,35 @@ def parts_of(vehicle: Vehicle, knows: frozenset[str]) -> Parts:
         "thrust": vehicle.thrust_coefficients_n_s2(),
         "torque": vehicle.torque_coefficients_n_m_s2(),
     }
-    left, kept = [], []
+    left = _left_of_its_own(values, knows)
     for entry in vehicle.effects:
         name, form, p = entry["id"], entry.get("form", ""), {k: float(v) for k, v in entry["parameters"].items()}
         said = f"{name} ({form}: {', '.join(f'{k} = {v:.4g}' for k, v in p.items())})"
         taken = name in knows and _take(values, name, form, p)
         if not taken:
             left.append(said)
-            continue
-        kept.append(entry)
-        if isinstance(taken, str):
+        elif isinstance(taken, str):
             left.append(f"{said}: {taken}")
     if "derivatives" not in knows:
         left += left_of(vehicle, ())
-    return Parts(vehicle.mass_kg, taken=tuple(kept), left_out=tuple(left), **values)
+    return Parts(vehicle.mass_kg, left_out=tuple(left), **values)
+
+
+def _left_of_its_own(values: dict, knows: frozenset[str]) -> list[str]:
+    """Put what a form has of the vehicle's own values into the parts; sentences for what it has not."""
+    left = []
+    for name in ("thrust", "torque"):
+        own = values[name]
+        if f"each_{name}" not in knows and np.ptp(own) > 0:
+            shown = ", ".join(f"{v:.4g}" for v in own)
+            left.append(f"{name} coefficients differ between rotors ({shown}): their mean is taken")
+            values[name] = np.full(len(own), own.mean())
+    j = values["inertia"]
+    if "inertia_products" not in knows and np.any(products := j - np.diag(np.diag(j))):
+        shown = ", ".join(f"J_{k} = {products['xyz'.index(k[0]), 'xyz'.index(k[1])]:.4g}" for k in ("xy", "xz", "yz"))
+        left.append(f"products of inertia ({shown})")
+        values["inertia"] = np.diag(np.diag(j))
+    return left
 
 
 def _take(values: dict, name: str, form: str, p: dict[str, float]) -> bool | str:
@@ -205,16 +246,19 @@ def rotorpy(vehicle: Vehicle) -> Exported:
     parts = parts_of(vehicle, KNOWS["rotorpy"])
     added, companions = _companion(vehicle, ROTORPY_FILE, rotorpy_companion)
     left = [*parts.left_out, *added]
-    left += _left_of_each_rotor(parts)
     up, down = parts.tau_s
     if up != down:
         left.append(f"motor_lag: {up:.4g} s up and {down:.4g} s down: the mean is taken")
     if up == 0:
         left.append(f"rotors that follow at once: RotorPy needs a lag, {AT_ONCE_S:g} s is taken")
-    if vehicle.gravity_m_s2 != 9.81:
-        left.append(f"gravity of {vehicle.gravity_m_s2:g} m/s²: RotorPy has 9.81")
-    j = _in_flu(parts.inertia)
-    low, high = parts.limits_rad_s or (0.0, 10 * hover_speed_rad_s(vehicle))
+    if vehicle.gravity_m_s2 != GRAVITY_M_S2["rotorpy"]:
+        left.append(f"gravity of {vehicle.gravity_m_s2:g} m/s²: RotorPy has {GRAVITY_M_S2['rotorpy']:g}")
+    if any(vehicle.accelerometer_position_m):
+        left.append(
+            "place of the accelerometer: RotorPy reads rI nowhere, give it to its Imu: Imu(p_BS=quad_params['rI'])"
+        )
+    j, hover = _in_flu(parts.inertia), hover_speed_rad_s(expressed(vehicle, "rotorpy"))
+    low, high = parts.limits_rad_s or (0.0, 10 * hover)
     values = {
         "mass": parts.mass_kg,
         **{f"I{a}{b}": float(j["xyz".index(a), "xyz".index(b)]) for a, b in ("xx", "yy", "zz", "xy", "yz", "xz")},
@@ -241,8 +285,18 @@ def rotorpy(vehicle: Vehicle) -> Exported:
             lines.append("    },")
         else:
             shown = f"np.array({value!r})" if isinstance(value, list) else repr(value)
-            lines.append(f'    "{key}": {shown},')
-    lines += ["}", ""]
+            note = "  # read by nothing in RotorPy 3.0.0: Imu(p_BS=quad_params['rI'])" if key == "rI" else ""
+            lines.append(f'    "{key}": {shown},{note}')
+    lines += [
+        "}",
+        "# Without a state RotorPy 3.0.0 starts every vehicle at 1788.53 rad/s: Multirotor(quad_params, initial_state)",
+        "# starts this one at its hover's speed.",
+        "initial_state = {",
+        '    "x": np.zeros(3), "v": np.zeros(3), "q": np.array([0.0, 0.0, 0.0, 1.0]), "w": np.zeros(3),',
+        f'    "wind": np.zeros(3), "rotor_speeds": np.full({vehicle.rotor_count}, {float(hover)!r}),',
+        "}",
+        "",
+    ]
     arrays = {k: np.array(v) if isinstance(v, list) else v for k, v in values.items()}
     arrays["rotor_pos"] = {k: np.array(v) for k, v in values["rotor_pos"].items()}
     return Exported("\n".join(lines), "rotorpy_params.py", tuple(left), arrays, companions=companions)
@@ -256,9 +310,8 @@ def mjcf(vehicle: Vehicle) -> Exported:
     """
     parts = parts_of(vehicle, KNOWS["mjcf"])
     left = list(parts.left_out)
-    tau_s, lag = 0.0, next((e for e in parts.taken if e["id"] == "motor_lag"), None)
-    if lag is not None:
-        tau_s = sum(parts.tau_s) / 2
+    tau_s, lag = sum(parts.tau_s) / 2, next((e for e in vehicle.effects if e["id"] == "motor_lag"), None)
+    if tau_s > 0:
         if lag["form"] == "on thrust":  # what it has is just that
             left = [sentence for sentence in left if not sentence.startswith("motor_lag")]
         else:
@@ -283,6 +336,7 @@ def mjcf(vehicle: Vehicle) -> Exported:
     name = quoteattr(vehicle.name)
     nl = "\n"
     text = f"""<mujoco model={name}>
+  <!-- Flies in MuJoCo and, unchanged, in MJX. -->
 {comments}  <!-- Control i is the thrust of rotor i in N: C_F times the square of its speed, C_F = {c_f} N s2. -->{late}
   <option timestep="0.001" gravity="0 0 -{vehicle.gravity_m_s2:g}" integrator="RK4"/>
   <worldbody>
@@ -324,16 +378,6 @@ def px4(vehicle: Vehicle) -> Exported:
     lines = [f"1\t1\t{name}\t{value:d}\t{kind}" if kind == 6 else f"1\t1\t{name}\t{value:.9g}\t{kind}"
              for name, value, kind in rows]  # fmt: skip
     return Exported("\n".join([*comments, *lines]) + "\n", "vehicle.params", tuple(left))
-
-
-def _left_of_each_rotor(parts: Parts) -> list[str]:
-    """Sentences for tools that know one coefficient for all rotors."""
-    left = []
-    for words, values in (("thrust", parts.thrust), ("torque", parts.torque)):
-        if np.ptp(values) > 0:
-            shown = ", ".join(f"{v:.4g}" for v in values)
-            left.append(f"{words} coefficients differ between rotors ({shown}): their mean is taken")
-    return left
 
 
 def _left_of_the_lowest_speed(parts: Parts) -> list[str]:
@@ -435,7 +479,7 @@ def gym_pybullet_drones(vehicle: Vehicle) -> Exported:
     `BaseAviary._parseURDFParameters`, `_physics`, `_drag`, `_groundEffect`, and `cf2x.urdf`.
     """
     parts = parts_of(vehicle, KNOWS["gym-pybullet-drones"])
-    left = [*parts.left_out, *_left_of_each_rotor(parts), *_left_of_the_lowest_speed(parts)]
+    left = [*parts.left_out, *_left_of_the_lowest_speed(parts)]
     if parts.drag[0]:
         left.append("rotor drag at the hubs: it acts at the centre of mass there, and with Physics.PYB_DRAG alone")
     order, turned = _round_the_left(parts.places, vehicle.yaw_signs(), vehicle.name)
@@ -443,8 +487,6 @@ def gym_pybullet_drones(vehicle: Vehicle) -> Exported:
     if turned:
         left.append("senses of the rotors: they are those of its DroneModel.RACE, not CF2X; choose that one")
     j = parts.inertia
-    if np.abs(j - np.diag(np.diag(j))).max() > 0 or any(e["id"] == "inertia_products" for e in vehicle.effects):
-        left.append("products of inertia: it takes the diagonal alone")
     left.append(f"gravity of {vehicle.gravity_m_s2:g} m/s²: it has 9.8")
     left.append(
         "air without friction: it leaves on Bullet's damping, a deceleration of 0.04 (1 + |v|) v and so for turning"

@@ -10,14 +10,19 @@ import numpy as np
 
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.exports.derivatives import left_of_one_damping, own_damping
-from rotorid.vehicle.exports.forms import Exported, Parts, parts_of
+from rotorid.vehicle.exports.forms import KNOWS, Exported, Parts, parts_of
 from rotorid.vehicle.exports.four_in_x import order_in_x
 from rotorid.vehicle.mixer import hover_speed_rad_s
 
-KNOWS = frozenset({"rotor_drag", "rotational_damping", "motor_lag", "inertia_products", "command_saturation"})
-KNOWS |= {"derivatives"}
 FASTEST_S = 0.005
 """Shortest SIH_T_TAU that its Euler step of 4 ms stands."""
+FASTEST_RAD_S = 6 * np.pi
+"""SIH holds each body rate within ±6π rad/s (simulator_sih, `Sih::equations_of_motion`)."""
+OF_THE_TOOL = (
+    f"SIH holds each body rate within ±6π rad/s, ±{np.degrees(FASTEST_RAD_S):.0f} deg/s: no faster turn is simulated",
+    "SIH_WIND_N and SIH_WIND_E say where the wind comes from: SIH_WIND_N = 3 blows towards the south",
+)
+"""What flies otherwise there than a file's reader expects; sentences of the file."""
 RICHEST = 2.0
 """Full speed over that of the hover, where the vehicle states no limit."""
 
@@ -44,9 +49,9 @@ def px4_sih(vehicle: Vehicle) -> Exported:
     """SIH's parameters as QGroundControl loads them.
 
     SIH has thrust SIH_T_MAX u and torque SIH_Q_MAX u of a signal u that follows with SIH_T_TAU; arms SIH_L_ROLL and
-    SIH_L_PITCH; drag −SIH_KDV v and damping −SIH_KDW Ω.
+    SIH_L_PITCH; drag −SIH_KDV v and damping −SIH_KDW Ω. The file says what of the tool flies otherwise (`OF_THE_TOOL`).
     """
-    parts = parts_of(with_drag_of_hover(vehicle), KNOWS)
+    parts = parts_of(with_drag_of_hover(vehicle), KNOWS["px4-sih"])
     order = order_in_x(parts.places, vehicle.yaw_signs(), vehicle.name, "PX4's SIH")
     places, thrust, torque = parts.places[order], parts.thrust[order], parts.torque[order]
     left = [*parts.left_out, *left_of_one_damping(vehicle)]
@@ -55,9 +60,6 @@ def px4_sih(vehicle: Vehicle) -> Exported:
         left.append(
             f"full thrust: rotor_speed_limits_rad_s is not stated, {RICHEST:g} times the hover's speed is taken"
         )
-    for words, values in (("thrust", thrust), ("torque", torque)):
-        if np.ptp(values) > 0:
-            left.append(f"{words} coefficients of each rotor: their mean is taken")
     for words, values in (("roll", places[:, 1]), ("pitch", places[:, 0])):
         if np.ptp(np.abs(values)) > 1e-6:
             left.append(f"arms in {words} of each rotor: their mean is taken")
@@ -89,6 +91,7 @@ def px4_sih(vehicle: Vehicle) -> Exported:
         "SIH_KDV": drag, "SIH_KDW": damping, "SIH_T_TAU": tau_s, "THR_MDL_FAC": 0.0,
     }  # fmt: skip
     comments = [f"# {vehicle.name}, exported by rotorid for PX4's SIH", *(f"# Not expressed: {s}" for s in left)]
+    comments += [f"# {sentence}" for sentence in OF_THE_TOOL]
     rows = ["1\t1\tSIH_VEHICLE_TYPE\t0\t6", *(f"1\t1\t{name}\t{float(value):.9g}\t9" for name, value in values.items())]
     return Exported(
         "\n".join([*comments, *rows]) + "\n", "sih.params", tuple(left), parameters=values, rotor_order=tuple(order)
