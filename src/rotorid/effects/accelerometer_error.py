@@ -63,6 +63,7 @@ EFFECT = Effect(
     name="an error of the accelerometer",
     sentence="the accelerometer reads a constant, a factor or a tilt off",
     forms=forms,
+    shows_in=("lift", "lift_of_throttle", "lift_without_voltage", "sideways", "accelerometer"),
     source="Titterton and Weston, Strapdown Inertial Navigation Technology, 2nd ed., ch. 4; catalogue F21",
     sign=("positive b and s make the reading larger along the axis; θ is a right-handed turn of the reading"),
     validity=(

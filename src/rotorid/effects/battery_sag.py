@@ -59,6 +59,7 @@ EFFECT = Effect(
             excited_by="time",
         ),
     ),
+    shows_in=("lift_of_throttle", "lift_without_voltage", "follows"),
     source=(
         "Bitcraze, thrust against battery voltage of the Crazyflie; Quan, Introduction to Multicopter "
         "Design and Control, ch. 6; catalogue F4"

@@ -134,6 +134,7 @@ EFFECT = Effect(
     name="an offset of the centre of mass",
     sentence="a roll or pitch moment proportional to thrust",
     forms=forms,
+    shows_in=("share", "trim"),
     source="rigid-body mechanics; Titterton and Weston, ch. 4 (lever arm); catalogue F15",
     sign=(
         "r is where the true centre of mass lies from the believed one; positive r_x (forward) gives a "

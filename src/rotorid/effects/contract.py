@@ -343,6 +343,12 @@ class Effect:
     """Id from which it cannot be distinguished where rotor speeds are known from their commands alone."""
     contradiction: bool = False
     """Whether columns that contradict each other show it, whatever force and moment are."""
+    shows_in: tuple[str, ...] = ()
+    """Kinds of what two sets of flights are compared by without a model (`rotorid.mismatch.changes.quantities`) that
+    another amount of it changes."""
+    shows_in: tuple[str, ...] = ()
+    """Kinds of what two sets of flights are compared by without a model (`rotorid.mismatch.changes.quantities`) that
+    another amount of it changes."""
     curves_thrust: bool = False
     """Whether it adds to the square of the rotor speed, which the thrust coefficient has, too."""
     between_flights: Mapping[str, float] = field(default_factory=dict)

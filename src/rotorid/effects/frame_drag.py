@@ -115,6 +115,7 @@ EFFECT = Effect(
     name="drag of the airframe",
     sentence="the force grows with the square of the airspeed",
     forms=forms,
+    shows_in=("sideways", "drag"),
     source=(
         "RotorPy's parasitic drag (Folk et al., 2023); Leishman, Principles of Helicopter Aerodynamics, "
         "ch. 5; catalogue F7"

@@ -69,6 +69,7 @@ EFFECT = Effect(
     name="an error of the gyroscope",
     sentence="the gyroscope disagrees with the turning of the attitude",
     forms=forms,
+    shows_in=("gyroscope", "gyroscope_scale", "gyroscope_turn"),
     source="Titterton and Weston, Strapdown Inertial Navigation Technology, 2nd ed., ch. 4; catalogue F23",
     sign=("positive b and s make the reading larger about the axis; θ is a right-handed turn of the reading"),
     validity=(

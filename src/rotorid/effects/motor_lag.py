@@ -84,6 +84,7 @@ EFFECT = Effect(
         ),
         SpeedForm("on thrust", "dT/dt = (T_c − T)/τ", (_tau("tau"),), LAG, on_thrust, (0.0,), excited_by="change"),
     ),
+    shows_in=("follows",),
     source="Quan, Introduction to Multicopter Design and Control, ch. 6; catalogue F1",
     sign="positive τ follows later; τ_up for speeds that grow, τ_down for speeds that fall",
     validity=(

@@ -182,6 +182,7 @@ EFFECT = Effect(
     name="a payload",
     sentence="the vehicle is heavier than believed, off its centre, or carries a pendulum",
     forms=forms,
+    shows_in=("share", "trim", "lift", "lift_of_throttle", "lift_without_voltage"),
     source=("rigid-body mechanics; Sreenath, Lee and Kumar, CDC 2013 (suspended load); recording contract"),
     sign="positive m_p pulls down; r is where it sits from the believed centre of mass",
     validity=(

@@ -123,6 +123,7 @@ EFFECT = Effect(
     name="rotor drag",
     sentence="the sideways force grows with airspeed times rotor speed",
     forms=forms,
+    shows_in=("sideways", "drag"),
     source=("Faessler, Franchi and Scaramuzza, RA-L 2018; Mahony, Kumar and Corke, IEEE RAM 2012; catalogue F5 and F6"),
     sign="positive k_d opposes the hub's motion through the air in the rotor plane",
     validity=(

@@ -104,6 +104,7 @@ EFFECT = Effect(
     name="a steady wind",
     sentence="a force constant in world axes",
     forms=forms,
+    shows_in=("sideways",),
     source="drag on airspeed (Faessler et al., RA-L 2018) with v − Rᵀ w; catalogue F19",
     sign="positive pushes the vehicle to the north or east; w is the velocity of the air",
     validity=(

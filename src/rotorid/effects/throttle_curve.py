@@ -121,6 +121,7 @@ EFFECT = Effect(
             (0.0, 1.0),
         ),
     ),
+    shows_in=("lift_of_throttle", "lift_without_voltage", "follows"),
     source="PX4's THR_MDL_FAC; Quan, Introduction to Multicopter Design and Control, ch. 6; catalogue F2",
     sign=(
         "positive a_0 and a_1 turn faster than commanded; positive u_0 is a dead zone; b = 0 and n = 1 "

@@ -154,6 +154,7 @@ EFFECT = Effect(
     sentence="a sideways force proportional to thrust",
     forms=forms,
     reading_forms=reading_forms,
+    shows_in=("yaw_trim", "sideways"),
     source="rigid-body mechanics, small angles; catalogue F16",
     sign="positive ε_x pushes forward, positive ε_y to the right",
     validity="angles below about 0.3 rad (loss of lift of second order left out), constant",

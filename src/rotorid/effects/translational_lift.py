@@ -53,6 +53,7 @@ EFFECT = Effect(
     name="translational lift",
     sentence="the rotors lift more in forward flight",
     forms=forms,
+    shows_in=("lift", "lift_of_throttle", "lift_without_voltage"),
     source=(
         "Faessler, Franchi and Scaramuzza, RA-L 2018 (k_h); Leishman, ch. 2 (inflow in forward flight); catalogue F8"
     ),

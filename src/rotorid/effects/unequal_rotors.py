@@ -167,6 +167,7 @@ EFFECT = Effect(
     sentence="one or more rotors give more or less thrust than the others",
     forms=forms,
     reading_forms=reading_forms,
+    shows_in=("share", "trim", "yaw_trim"),
     source="rotor coefficients per rotor, no further assumption; catalogue F17",
     sign="positive d_i: rotor i gives more than the coefficient believed",
     validity="the same share over all speeds; equal shares of all rotors are a wrong coefficient (under parameters)",

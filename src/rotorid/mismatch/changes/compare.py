@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from rotorid.effects.catalogue import ids_of
+from rotorid.effects.catalogue import catalogue, ids_of
 from rotorid.errors import InputError
 from rotorid.mismatch.changes.chain import (
     ChainTerms,
@@ -436,19 +436,20 @@ def predicted(change: Change, vehicle: Vehicle) -> dict[str, float]:
     Rotors that weaken are asked for more, a centre of mass that moves takes the trims along, more weight asks for more.
     """
     size = {p.symbol: p.value for p in change.parameters}
+    shows = catalogue()[change.id].shows_in if change.id in catalogue() else ()
     places, count = vehicle.rotor_positions_m(), vehicle.rotor_count
     arm = float(np.linalg.norm(places[:, :2], axis=1).max()) or 1.0
     more, roll, pitch, shares = 0.0, 0.0, 0.0, {}
     if change.id in ("mass_kg", "thrust_coefficient_n_s2") and change.id in size:
         more = float(np.log1p(size[change.id])) * (1.0 if change.id == "mass_kg" else -1.0)
-    elif change.id == "com_offset":
+    elif "trim" in shows and "m_p" not in size and {"r_x", "r_y"} & size.keys():
         roll, pitch = size.get("r_y", 0.0) / arm, -size.get("r_x", 0.0) / arm
-    elif change.id == "payload" and "m_p" in size:
+    elif "trim" in shows and "m_p" in size:
         more = float(np.log1p(size["m_p"] / vehicle.mass_kg))
         roll, pitch = (
             sign * size.get(f"m_p {axis}", 0.0) / vehicle.mass_kg / arm for axis, sign in (("y", 1.0), ("x", -1.0))
         )
-    elif change.id == "unequal_rotors" and any(f"d_{i + 1}" in size for i in range(count)):
+    elif "share" in shows and any(f"d_{i + 1}" in size for i in range(count)):
         given = np.array([size.get(f"d_{i + 1}", np.nan) for i in range(count)])
         given = np.where(np.isnan(given), -np.nansum(given) if np.isnan(given).sum() == 1 else 0.0, given)
         roll, pitch = -float(places[:, 1] @ given) / (arm * count), float(places[:, 0] @ given) / (arm * count)

@@ -20,6 +20,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import polygamma, stdtr, stdtrit
 
+from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
 from rotorid.mismatch.changes.quantities import (
     BY_VOLTAGE,
@@ -55,24 +56,14 @@ BUDGET = {
     "noise": 0.05,
 }
 """Weight of each kind in the false alarms, shared evenly by its members: what pilots break has more."""
-_WEAKER = ("mass_kg", "thrust_coefficient_n_s2", "payload", "translational_lift")
-CAUSES = {
-    "share": ("unequal_rotors", "com_offset", "payload"),
-    "trim": ("unequal_rotors", "com_offset", "payload"),
-    "yaw_trim": ("unequal_rotors", "torque_coefficient_n_m_s2", "thrust_tilt"),
-    "lift": (*_WEAKER, "accelerometer_error"),
-    "lift_of_throttle": (*_WEAKER, "accelerometer_error", "throttle_curve", "battery_sag"),
-    "lift_without_voltage": (*_WEAKER, "accelerometer_error", "throttle_curve", "battery_sag"),
-    "sideways": ("thrust_tilt", "accelerometer_error", "steady_wind", "rotor_drag", "frame_drag"),
-    "follows": ("motor_lag", "throttle_curve", "battery_sag", "rotor_speed_limits_rad_s"),
-    "accelerometer": ("accelerometer_error",),
-    "gyroscope": ("gyro_error",),
-    "gyroscope_scale": ("gyro_error",),
-    "gyroscope_turn": ("gyro_error",),
-    "drag": ("rotor_drag", "frame_drag"),
-    "noise": (),
+_LIFT = ("mass_kg", "thrust_coefficient_n_s2")
+VALUES = {
+    "yaw_trim": ("torque_coefficient_n_m_s2",),
+    **dict.fromkeys(("lift", "lift_of_throttle", "lift_without_voltage"), _LIFT),
+    "follows": ("rotor_speed_limits_rad_s",),
 }
-"""Ids of what may be behind a kind of quantity. Where it is stated, no limit of theirs is."""
+CAUSES = {kind: (*VALUES.get(kind, ()), *(e.id for e in catalogue().values() if kind in e.shows_in)) for kind in BUDGET}
+"""Believed values and ids that may be behind a kind of quantity. Where it is stated, no limit of theirs is."""
 SCATTER = (
     ("share", "NeuroBEM", 0.018, 3, 4),
     ("share", "imrc", 0.008, 8, 4),

@@ -2,8 +2,9 @@
 
 The number is the mean, over the channels of force and moment and over what half a second of simulation from recorded
 states is off by, of the logarithm of the error on what was left out of the fit (`Regression.folds`): whole
-runs where there are three or more. Taken is the plainest candidate within one standard error of the best, or within
-three percent, among those that hover and fly. No channel has a veto, and no part is taken out by itself.
+runs where there are three or more. Taken is the plainest candidate within one standard error of the best, among those
+that hover and fly; without derivatives also one within three percent of one with them. No channel has a veto, and no
+part is taken out by itself.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ PLAINEST_FIRST = (
 place."""
 DRAWS = 400
 WORTH = 0.03
-"""Logarithm of an error below which a richer candidate gains nothing that shows in flight."""
+"""Logarithm of an error below which derivatives gain nothing that shows in flight."""
 
 
 @dataclass(frozen=True)
@@ -131,6 +132,11 @@ def compared(candidates: Sequence[Candidate], ground: Ground) -> list[Scored]:
     ]
 
 
+def least_gain(plain: Scored, best: Scored) -> float:
+    """By how much the best must be ahead of a plainer one, if by derivatives alone."""
+    return WORTH if best.candidate.learnt is not None and plain.candidate.learnt is None else 0.0
+
+
 def choose(
     candidates: Sequence[Candidate], ground: Ground, unfit: Callable[[Candidate], str]
 ) -> tuple[Scored, list[Scored]]:
@@ -139,7 +145,7 @@ def choose(
     while True:
         scored = compared(kept, ground)
         best = min(scored, key=lambda s: s.score)
-        first = next(s for s in scored if s.score - best.score <= max(s.standard_error, WORTH))
+        first = next(s for s in scored if s.score - best.score <= max(s.standard_error, least_gain(s, best)))
         # Only who may be chosen is flown; the best, too, for the others are measured by it.
         failing = {
             s.candidate.name: why
