@@ -116,7 +116,7 @@ class Instruments(Part):
 
 
 def conditions_of(analysis: Analysis) -> Conditions:
-    """What an analysis found of the conditions of each run."""
+    """What an analysis found of the conditions of each run, to the digits that its file states."""
     found: list[Condition] = []
     for finding in delivered(analysis, "conditions"):
         own, kind = _entry(finding).model_dump(), catalogue()[finding.id].air_moves
@@ -124,16 +124,21 @@ def conditions_of(analysis: Analysis) -> Conditions:
             found += [Condition(**own, **_blowing(b)) for b in analysis.winds if b.kind == kind]
         else:
             found += [Condition(**own, **_within(*window)) for window in finding.windows]
-    return Conditions(set=analysis.recordings.name, conditions=tuple(found))
+    return as_written(Conditions(set=analysis.recordings.name, conditions=tuple(found)))
 
 
 def instruments_of(analysis: Analysis) -> Instruments:
-    """What an analysis found of the instruments."""
+    """What an analysis found of the instruments, to the digits that its file states."""
     entries = tuple(
         Fault(**_entry(f).model_dump(), windows=tuple(Window(**_within(*w)) for w in f.windows))
         for f in delivered(analysis, "instruments")
     )
-    return Instruments(set=analysis.recordings.name, instruments=entries)
+    return as_written(Instruments(set=analysis.recordings.name, instruments=entries))
+
+
+def as_written(content: Conditions | Instruments):
+    """Content with its numbers as its file will state them: what is judged is what is read back."""
+    return type(content).model_validate(rounded(content.model_dump(mode="json")))
 
 
 def _within(run: str, start_s: float, stop_s: float) -> dict[str, str | float | None]:
