@@ -121,12 +121,9 @@ def output_error(segments: list[Segment], vehicle: Vehicle, part: Callable) -> V
         sums = squares_of_windows(able, model_of(changed(logs)), unit, 1)
         return float(0.5 * np.log(sums[:, 0, 0] / np.maximum(sums[:, 1, 0], 1.0)).mean())
 
-    found = minimize(cost, np.zeros(5), method="Nelder-Mead", options={"maxfev": 80, "initial_simplex": _simplex(5)})
+    simplex = np.vstack([np.zeros(5), 0.1 * np.eye(5)])
+    found = minimize(cost, np.zeros(5), method="Nelder-Mead", options={"maxfev": 80, "initial_simplex": simplex})
     return changed(found.x)
-
-
-def _simplex(size: int) -> np.ndarray:
-    return np.vstack([np.zeros(size), 0.1 * np.eye(size)])
 
 
 def _rms(left: np.ndarray) -> np.ndarray:

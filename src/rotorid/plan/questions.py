@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -14,13 +13,13 @@ from rotorid.mismatch.analyse import findings_inside, findings_outside
 from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.decision.probability import with_probabilities
 from rotorid.mismatch.decision.select import COST_PER_PARAMETER
-from rotorid.mismatch.delivery.derivatives import folds_of, learn
+from rotorid.mismatch.delivery.derivatives import learn
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.model.absent import chosen_already
 from rotorid.mismatch.model.fitted import Fitted, fitted
 from rotorid.mismatch.model.next_flight import CURVES, beyond_flying
 from rotorid.mismatch.model.prepare import Prepared, prepare
-from rotorid.mismatch.model.within_trust import settled, ways
+from rotorid.mismatch.model.within_trust import Way, ways
 from rotorid.mismatch.plant.motion import HIGHEST_CUTOFF_HZ
 from rotorid.mismatch.plant.regression import Regression
 from rotorid.mismatch.plant.rows import Term
@@ -78,21 +77,13 @@ class Known:
     """Classes that no flight with these columns can settle, with what it takes."""
     whitened: Regression | None = None
     """The set's normal equations through the filters that the engine would learn from it and a flight together."""
+    derivatives: tuple[tuple[Form, np.ndarray], ...] = ()
+    """Of what the fitted model leaves, as a form with its values; none where they do not predict."""
 
     @property
     def regression(self) -> Regression:
         """The engine's normal equations of the set."""
         return self.fitted.model.search.regression if self.whitened is None else self.whitened
-
-    @cached_property
-    def beside(self) -> tuple[tuple[Form, np.ndarray], ...]:
-        """Derivatives of what the fitted model leaves, as a form with its values; none where they do not predict."""
-        model, vehicle, thinner = self.fitted.model, self.prepared.vehicle, self.prepared.thinner
-        way = ways(model, self.fitted.values, model.selection.active)[0]
-        x = np.concatenate([thinner(quantities(s.motion, vehicle)) for s in model.segments])
-        learnt = learn(x, np.concatenate(way.left)[:, :6], folds_of(model.regression), own_controls(vehicle))
-        found = derivative_form(vehicle.model_copy(update={"derivatives": learnt.derivatives}))
-        return () if found is None else (found,)
 
 
 def known(
@@ -118,8 +109,8 @@ def known(
     fit_part, unseen = parts_of(recordings, split)
     prepared = prepare(fit_part, cutoff_hz, unseen=tuple(r.name for r in unseen.runs))
     found = fitted(prepared)
-    delivered, _ = settled(found.model, found.values, found.model.selection.active)
-    inside = with_probabilities(findings_inside(found, prepared, delivered), chosen_already(found.model))
+    way = ways(found.model, found.values, found.model.selection.active)[0]
+    inside = with_probabilities(findings_inside(found, prepared, way.fit), chosen_already(found.model))
     findings = (*mistakes, *findings_outside(found, prepared), *inside)
     chain = () if found.chain is None else tuple(k for k, _ in found.chain[0].fit.chain)
     if claimed is not None:
@@ -148,7 +139,19 @@ def known(
             questions.append(question)
         else:
             unanswerable.append((ids, "these columns give no model of the others to compare with"))
-    return Known(recordings, prepared, found, findings, tuple(questions), tuple(chains), tuple(unanswerable))
+    own = derivatives_of(found, way)
+    asked = tuple(questions), tuple(chains), tuple(unanswerable)
+    return Known(recordings, prepared, found, findings, *asked, derivatives=own)
+
+
+def derivatives_of(found: Fitted, way: Way) -> tuple[tuple[Form, np.ndarray], ...]:
+    """Derivatives of what a fit leaves where it was not fitted, as a form with its values."""
+    model, vehicle, thinner = found.model, found.prepared.vehicle, found.prepared.thinner
+    x = np.concatenate([thinner(quantities(s.motion, vehicle)) for s in model.segments])
+    folds = np.concatenate(model.regression.of_rows(model.regression.folds()))
+    learnt = learn(x, np.concatenate(way.left)[:, :6], folds, own_controls(vehicle))
+    form = derivative_form(vehicle.model_copy(update={"derivatives": learnt.derivatives}))
+    return () if form is None else (form,)
 
 
 def known_from(recordings: RecordingSet, verdict: dict) -> Known:

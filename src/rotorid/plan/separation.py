@@ -157,7 +157,7 @@ def world_of(known: Known, question: Question | None, hypothesis: Hypothesis | N
     return World(
         vehicle=known.prepared.vehicle,
         effects=effects,
-        beside=known.beside,
+        derivatives=known.derivatives,
         chain=chain,
         full_speed_rad_s=full,
         voltage_v=float(np.mean(voltages)) if voltages else None,

@@ -45,8 +45,8 @@ class World:
 
     vehicle: Vehicle
     effects: tuple[tuple[Form, np.ndarray], ...] = ()
-    beside: tuple[tuple[Form, np.ndarray], ...] = ()
-    """Derivatives of what the model leaves: they fly, and separate no model from another."""
+    derivatives: tuple[tuple[Form, np.ndarray], ...] = ()
+    """Of what the model leaves: they fly, and separate no model from another."""
     chain: tuple = ()
     """Speed forms with their values, in the order of their stages."""
     full_speed_rad_s: float = 1.0
@@ -156,7 +156,7 @@ def fly(
     speed = np.full((len(t), vehicle.rotor_count), hover)
     inner = slice(EDGE, -EDGE)
     rotation = attitude(-wanted, yaw)
-    for _ in range(ROUNDS if (*world.effects, *world.beside) else 1):
+    for _ in range(ROUNDS if (*world.effects, *world.derivatives) else 1):
         left = wanted - np.einsum("nij,nj->ni", rotation, force)
         rotation = attitude(-left, yaw)
         rates = body_rates(rotation, step)
@@ -201,7 +201,7 @@ def held_longer(reference: Reference, step_s: float) -> Reference:
 
 def _wrench(world: World, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     force, moment = np.zeros((motion.size, 3)), np.zeros((motion.size, 3))
-    for form, values in (*world.effects, *world.beside):
+    for form, values in (*world.effects, *world.derivatives):
         part = form.contribution(motion, world.vehicle, values)
         force = force if part.force is None else force + part.force
         moment = moment if part.moment is None else moment + part.moment

@@ -14,7 +14,7 @@ A sensor that comes evenly, however slow, stays as it is, and so does a hole of 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -45,6 +45,8 @@ USED_BAND = 0.4
 LINES_A_PERIOD = 4.0
 """Values a period on straight lines between readings: few would cut the corners off."""
 LEAST_READINGS = 20
+LEAST_VALUES = 4
+"""Complete readings from which a sensor counts as recorded."""
 CUBIC = 3
 STIFFNESS = 5e-4
 """Weight of the third differences of the spline: a smooth line where there are no readings. With half the cells empty
@@ -95,19 +97,31 @@ def _with_grids(
     return replace(recordings, runs=tuple(runs))
 
 
-def whole_share(run: Run, sensors: Sequence[tuple[str, ...]], long_s: float) -> float:
+def whole_stretches(run: Run, groups: Iterable[tuple[str, ...]]) -> tuple[list[tuple[float, float]], float]:
+    """Start and stop, s, of every stretch in which every sensor gives readings without a hole, and the slowest sensor's
+    period, s."""
+    time_s, holes, slowest = run.time_s, [], 0.0
+    for names in groups:
+        known = time_s[np.isfinite(run.array(names)).all(axis=1)]
+        if len(known) < LEAST_VALUES:
+            return [], float("inf")
+        steps = np.diff(known)
+        period = float(np.median(steps))
+        slowest = max(slowest, period)
+        holes += [(known[k], known[k + 1]) for k in np.flatnonzero(steps > HOLE_PERIODS * period)]
+        holes += [(-np.inf, known[0]), (known[-1], np.inf)]
+    found, reached = [], float(time_s[0])
+    for start, stop in [*sorted(holes), (float(time_s[-1]), np.inf)]:
+        if start > reached:
+            found.append((reached, float(min(start, time_s[-1]))))
+        reached = max(reached, float(stop))
+    return found, slowest
+
+
+def whole_share(run: Run, sensors: Iterable[tuple[str, ...]], long_s: float) -> float:
     """Share of a flight's time that lies in stretches of `long_s`, s, in which no sensor of it has a hole."""
-    ends = []
-    for names in sensors:
-        if is_read(run, names):
-            known = run.time_s[np.isfinite(run.array(names)).all(axis=1)]
-            steps = np.diff(known)
-            ends += [(known[k], known[k + 1]) for k in np.flatnonzero(steps > HOLE_PERIODS * np.median(steps))]
-    reached, whole, last = run.time_s[0], 0.0, run.time_s[-1]
-    for start, stop in [*sorted(ends), (last, last)]:
-        whole += start - reached if start - reached >= long_s else 0.0
-        reached = max(reached, stop)
-    return float(whole / max(last - run.time_s[0], 1e-9))
+    lasting = [stop - start for start, stop in whole_stretches(run, [n for n in sensors if is_read(run, n)])[0]]
+    return sum(s for s in lasting if s >= long_s) / max(float(run.time_s[-1] - run.time_s[0]), 1e-9)
 
 
 def _sentence(runs: list[Run], names: tuple[str, ...], period_s: float, jumps: bool) -> str:

@@ -20,7 +20,7 @@ NEAR = 4.0
 """Fewer readings than spikes lie between this and `FAR`, or the sensor's noise is what makes them."""
 MOST = 0.1
 """A sensor with a larger share of far readings is no sensor with spikes."""
-BESIDE = 3
+NEIGHBOURS = 3
 """Readings on each side whose medians a spike is far from: two of three may be spikes themselves."""
 AROUND = 31
 """Readings over which the scatter is local: a burst of vibration is none of spikes."""
@@ -57,10 +57,10 @@ def spikes(values: np.ndarray) -> np.ndarray:
     if len(known) < LEAST_READINGS:
         return found
     x = values[known]
-    beside = np.lib.stride_tricks.sliding_window_view(x, BESIDE)
-    medians = np.median(beside, axis=1)
-    inner = slice(BESIDE, len(x) - BESIDE)
-    rise, fall = x[inner] - medians[: len(x) - 2 * BESIDE], x[inner] - medians[BESIDE + 1 :]
+    windows = np.lib.stride_tricks.sliding_window_view(x, NEIGHBOURS)
+    medians = np.median(windows, axis=1)
+    inner = slice(NEIGHBOURS, len(x) - NEIGHBOURS)
+    rise, fall = x[inner] - medians[: len(x) - 2 * NEIGHBOURS], x[inner] - medians[NEIGHBOURS + 1 :]
     size = np.where(np.sign(rise) == np.sign(fall), np.minimum(np.abs(rise), np.abs(fall)), 0.0)
     scatter = _around(np.abs(rise + fall) / 2) * 1.4826
     scatter = np.maximum(scatter, FINEST * float(np.subtract(*np.quantile(x, [0.95, 0.05]))))
@@ -82,9 +82,9 @@ def _alone(far: np.ndarray, size: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Far readings (n,) that are far from the nearest others on both sides, too: no tops of pulses."""
     near = np.flatnonzero(~far)
     place = np.searchsorted(near, np.flatnonzero(far))
-    beside = x[near[np.maximum(place - 1, 0)]], x[near[np.minimum(place, len(near) - 1)]]
+    nearest = x[near[np.maximum(place - 1, 0)]], x[near[np.minimum(place, len(near) - 1)]]
     out = far.copy()
-    out[far] = np.minimum(*(np.abs(x[far] - b) for b in beside)) > size[far] / 2
+    out[far] = np.minimum(*(np.abs(x[far] - b) for b in nearest)) > size[far] / 2
     return out
 
 

@@ -14,7 +14,13 @@ import numpy as np
 from rotorid.errors import InputError
 from rotorid.io.text.names import listed, nearest, plain
 from rotorid.recordings import columns as c
-from rotorid.recordings.own_rates import HOLE_PERIODS, LEAST_SINGLE_S, LEAST_STRETCH_S, on_own_rates
+from rotorid.recordings.own_rates import (
+    LEAST_SINGLE_S,
+    LEAST_STRETCH_S,
+    LEAST_VALUES,
+    on_own_rates,
+    whole_stretches,
+)
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.spikes import without_spikes
 from rotorid.recordings.tables import clock_jump, place
@@ -29,8 +35,6 @@ SINGLE_GAP_S, HELD_OUT_SHARE = 2.0, 1 / 3
 """Of a single run this share is held out, after a gap."""
 LEAST_READINGS = 10
 """Readings of a stand or a bench that are there in every compared channel at once, in a run."""
-LEAST_VALUES = 4
-"""Complete readings from which a sensor counts as recorded."""
 LARGEST = {
     c.POSITION: 1e7,
     c.VELOCITY: 1e4,
@@ -360,27 +364,6 @@ def nothing_compared(run: Run, vehicle: Vehicle) -> str | None:
         f"{whereof(run)}: nothing can be compared without a force_x_n … and its reference_force_x_n …: {what}"
         f"{likely(run, (*c.FORCE, *c.REFERENCE_FORCE))}"
     )
-
-
-def whole_stretches(run: Run, groups: Iterable[tuple[str, ...]]) -> tuple[list[tuple[float, float]], float]:
-    """Start and stop, s, of every stretch in which every sensor gives readings without a hole, and the slowest sensor's
-    period, s."""
-    time_s, holes, slowest = run.time_s, [], 0.0
-    for names in groups:
-        known = time_s[np.isfinite(run.array(names)).all(axis=1)]
-        if len(known) < LEAST_VALUES:
-            return [], float("inf")
-        steps = np.diff(known)
-        period = float(np.median(steps))
-        slowest = max(slowest, period)
-        holes += [(known[k], known[k + 1]) for k in np.flatnonzero(steps > HOLE_PERIODS * period)]
-        holes += [(-np.inf, known[0]), (known[-1], np.inf)]
-    found, reached = [], float(time_s[0])
-    for start, stop in [*sorted(holes), (float(time_s[-1]), np.inf)]:
-        if start > reached:
-            found.append((reached, float(min(start, time_s[-1]))))
-        reached = max(reached, float(stop))
-    return found, slowest
 
 
 def longest_stretch_s(run: Run, groups: list[tuple[str, ...]]) -> tuple[float, float]:

@@ -15,7 +15,6 @@ from types import MappingProxyType
 import numpy as np
 from scipy.stats import t as student
 
-from rotorid.mismatch.plant.regression import Regression
 from rotorid.recordings.vehicle import Derivative
 from rotorid.vehicle.derivatives import CHANNELS, CONTROLS, QUANTITIES, table_of, unit_of, wrench
 
@@ -116,12 +115,6 @@ def learn(
         for own, changed in zip(apart, others[:, at], strict=True):
             own += [d.model_copy(update={"value": float(v)}) for d, v in zip(out[-len(at) :], changed, strict=True)]
     return Learnt(tuple(out), left_out, tuple(map(tuple, apart)))
-
-
-def folds_of(regression: Regression) -> np.ndarray:
-    """Of the rows of every stretch, one after another, what they are left out with, (n,); -1 for rows of no block."""
-    fold = np.append(regression.folds(), -1)
-    return np.concatenate([fold[b] for b in regression.blocks_of_rows])
 
 
 def _about_zero(beta: np.ndarray, middle: np.ndarray, scale: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 from rotorid.mismatch.decision.evidence import with_shares
 from rotorid.mismatch.decision.findings import Analysis, Delivery, Finding, Trace
 from rotorid.mismatch.delivery.candidates import Candidate, Ground, Scored, choose
-from rotorid.mismatch.delivery.derivatives import Learnt, folds_of, learn
+from rotorid.mismatch.delivery.derivatives import Learnt, learn
 from rotorid.mismatch.delivery.parts import claimed, improved_vehicle, place_of
 from rotorid.mismatch.delivery.stated import restated, value_correlations, value_rows
 from rotorid.mismatch.delivery.usable import exports_lost
@@ -110,13 +110,12 @@ def as_delivered(offered: Offered) -> Analysis:
 def ground_of(offered: Offered) -> Ground:
     """The fitted rows, by what is left out together."""
     regression = offered.model.regression
-    unit = np.append(regression.left_out_together(), -1)
-    rows = regression.blocks_of_rows
+    units = regression.of_rows(regression.left_out_together())
     places: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
-    for r, block in zip(offered.model.rows, rows, strict=True):
-        places.setdefault(r.run, []).append((r.time_s, unit[block]))
+    for r, unit in zip(offered.model.rows, units, strict=True):
+        places.setdefault(r.run, []).append((r.time_s, unit))
     joined = {run: tuple(map(np.concatenate, zip(*parts, strict=True))) for run, parts in places.items()}
-    return Ground(np.concatenate([unit[b] for b in rows]), joined)
+    return Ground(np.concatenate(units), joined)
 
 
 def fitted_candidate(name: str, offered: Offered, values: Values, active: Sequence[str]) -> Candidate:
@@ -130,7 +129,9 @@ def learnt_of(offered: Offered, candidate: Candidate) -> Learnt:
     """The derivatives of what a candidate leaves."""
     vehicle = offered.improved(candidate)
     x = about_hover_of(np.concatenate([x for _, _, x in offered.stretches]), offered.believed, vehicle)
-    return learn(x, candidate.left, folds_of(offered.model.regression), own_controls(vehicle))
+    regression = offered.model.regression
+    folds = np.concatenate(regression.of_rows(regression.folds()))
+    return learn(x, candidate.left, folds, own_controls(vehicle))
 
 
 def why_not(finding: Finding, taken: Candidate, scored: Sequence[Scored], offered: Offered) -> str:

@@ -91,8 +91,7 @@ def left_out_residuals(model: FittedModel, keys: Sequence[str], values: Values) 
     cols, betas = known.left_out(tuple(k for k in keys if k not in values), regression.leaves_runs)
     cols, betas = np.append(cols, stated), np.column_stack([betas, np.tile(beta, (len(betas), 1))])
     betas = np.where(model.unnamed(cols), 0.0, betas)
-    fold = np.append(regression.folds(), -1)  # the last stands for rows that are in no block
-    added = model.contributions.left_out(cols, betas, [fold[b] for b in regression.blocks_of_rows])
+    added = model.contributions.left_out(cols, betas, regression.of_rows(regression.folds()))
     return [r.y - part for r, part in zip(model.rows, added, strict=True)]
 
 

@@ -532,6 +532,11 @@ class Regression:
         out[self.training] = np.unique(pieces, return_inverse=True)[1]
         return out
 
+    def of_rows(self, of_block: np.ndarray) -> list[np.ndarray]:
+        """What is known of every block, (blocks,), at the rows of every stretch, (n,) each; -1 for rows of no block."""
+        known = np.append(of_block, -1)
+        return [known[b] for b in self.blocks_of_rows]
+
     def left_out(
         self, keys: Iterable[str], whole_runs: bool, loose: dict[str, float] | None = None
     ) -> tuple[np.ndarray, np.ndarray]:

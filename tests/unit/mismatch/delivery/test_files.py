@@ -51,6 +51,16 @@ def test_a_gust_blows_in_its_window_alone():
     assert (found.conditions[0].start_s, found.conditions[0].stop_s) == (4.0, 6.0)
 
 
+def test_what_is_judged_is_what_is_read_back(tmp_path):
+    """Numbers of more digits than the file states made the flight of the file another one."""
+    gust = replace(WIND, id="gust", windows=(("a", 4.0, 6.0),))
+    wind = RunWind("a", "in windows", np.array([4.0, 15.1234567, 26.0]), np.array([[0.0, 0.0], [np.pi, 1 / 3], [0, 0]]))
+    judged = conditions_of(replace(analysis(findings=[gust]), winds=(wind,)))
+    path = tmp_path / "conditions.yaml"
+    path.write_text(text_of(judged))
+    assert judged.conditions[0].air.north_m_s[1] != np.pi and read_conditions(path) == judged
+
+
 def test_the_simulation_run_forward_flies_in_the_wind_that_was_found():
     """At a steady velocity in a wind as fast there is no airspeed, so no drag: the vehicle goes straight on."""
     made = windy()
