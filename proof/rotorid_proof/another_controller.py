@@ -17,9 +17,8 @@ import numpy as np
 import pandas as pd
 
 from rotorid.mismatch.decision.findings import Analysis
-from rotorid.mismatch.delivery.flown import UNITS, squares_of_windows
-from rotorid.mismatch.delivery.model import model_of
-from rotorid.mismatch.delivery.parts import improved_vehicle
+from rotorid.mismatch.delivery.files import improved_vehicle
+from rotorid.mismatch.delivery.flown import UNITS, model_of, squares_of_windows
 from rotorid.mismatch.plant.motion import HIGHEST_CUTOFF_HZ, analysis_rate_hz, build_segments, full_speed
 from rotorid.recordings import Run, Vehicle, read_set
 from rotorid.report.deliver import analysis_of, verdict_of

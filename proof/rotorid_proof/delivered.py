@@ -13,7 +13,7 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.mismatch.decision.findings import Analysis
-from rotorid.mismatch.delivery.parts import delivered, improved_vehicle
+from rotorid.mismatch.delivery.files import delivered, improved_vehicle
 from rotorid.mismatch.delivery.usable import question_of
 from rotorid.mismatch.tell.verdict import Verdict
 from rotorid.recordings import RecordingSet, Vehicle, read_set

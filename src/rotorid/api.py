@@ -18,10 +18,8 @@ from rotorid.errors import InputError
 from rotorid.io.text.files import parse_yaml
 from rotorid.io.text.names import hint
 from rotorid.recordings import RecordingSet, Run, Vehicle, read_set, read_vehicle, templates, vehicle_of
-from rotorid.recordings.belief import check_belief
 from rotorid.recordings.check import SetCheck, check_recordings
-from rotorid.recordings.files import check_rotors, usable_runs
-from rotorid.recordings.proposed import proposed_in
+from rotorid.recordings.files import check_belief, check_rotors, proposed_in, usable_runs
 from rotorid.recordings.tables import check_table, numbers
 from rotorid.report.result import FILES, OTHERS, Result
 from rotorid.steps import heard_by
@@ -29,12 +27,12 @@ from rotorid.vehicle.exports import Exported, export_vehicle
 
 Believed = Vehicle | Mapping | str | Path
 """A vehicle, the keys of a `vehicle.yaml`, the path of one, or the name of a template."""
-Recorded = RecordingSet | pd.DataFrame | Mapping[str, pd.DataFrame] | Sequence | str | Path
+_Recorded = RecordingSet | pd.DataFrame | Mapping[str, pd.DataFrame] | Sequence | str | Path
 """A set, a table, tables by name, a folder, a log, or several tables or logs."""
 
 
 def verdict(
-    data: Recorded,
+    data: _Recorded,
     vehicle: Believed | None = None,
     *,
     name: str = "flights",
@@ -91,7 +89,7 @@ def verdict(
 
 
 def recording_set(
-    data: Recorded,
+    data: _Recorded,
     vehicle: Believed | None = None,
     *,
     name: str = "flights",
@@ -119,7 +117,7 @@ def recording_set(
         raise InputError(
             f"data is {type(data).__name__}, expected a table, tables by name, a folder, or one or more logs"
         )
-    believed = found.vehicle if vehicle is None else believed_vehicle(vehicle)
+    believed = found.vehicle if vehicle is None else _believed_vehicle(vehicle)
     for run in found.runs:
         check_rotors(run, believed)
     names = [run.name for run in found.runs]
@@ -134,14 +132,14 @@ def recording_set(
     )
 
 
-def believed_vehicle(vehicle: Believed) -> Vehicle:
+def _believed_vehicle(vehicle: Believed) -> Vehicle:
     """A vehicle of what `verdict` takes for one; InputError where nobody can believe it."""
-    found = vehicle_from(vehicle)
+    found = _vehicle_from(vehicle)
     check_belief(found, str(vehicle) if isinstance(vehicle, str | Path) else "vehicle")
     return found
 
 
-def vehicle_from(vehicle: Believed) -> Vehicle:
+def _vehicle_from(vehicle: Believed) -> Vehicle:
     """The same, be it believed or improved."""
     if isinstance(vehicle, Vehicle):
         return vehicle
@@ -161,7 +159,7 @@ def _of_tables(tables: Mapping[str, pd.DataFrame], name: str, vehicle: Believed 
     if not tables:
         raise InputError("data holds no table")
     runs, left_out = usable_runs((partial(_of_table, run, table) for run, table in sorted(tables.items())), name)
-    return RecordingSet(name, believed_vehicle(vehicle), runs, left_out=left_out)
+    return RecordingSet(name, _believed_vehicle(vehicle), runs, left_out=left_out)
 
 
 def _of_table(name: str, table: pd.DataFrame) -> Run:
@@ -180,7 +178,7 @@ def _of_logs(logs, name, vehicle, mass_kg, like, mapping) -> RecordingSet:
         like if vehicle is None or like else "thesis",  # the proposal is then not looked at
         mapping=read_mapping(Path(mapping)) if mapping else None,
     )
-    believed = believed_vehicle(vehicle) if vehicle is not None else vehicle_of(
+    believed = _believed_vehicle(vehicle) if vehicle is not None else vehicle_of(
         parse_yaml(found.vehicle_text, "the vehicle proposed"), "the vehicle proposed"
     )  # fmt: skip
     runs = tuple(Run(run, table) for run, table in sorted(found.runs.items()))
@@ -200,7 +198,7 @@ def template(name: str, **changes) -> Vehicle:
     return vehicle_of({**content, **changes}, f"template {name}")
 
 
-def check(data: Recorded, vehicle: Believed | None = None, **options) -> SetCheck:
+def check(data: _Recorded, vehicle: Believed | None = None, **options) -> SetCheck:
     """What recordings hold, what they lack, and what in them cannot be right; takes what `verdict` takes.
 
     `print(rotorid.check(...))` shows it as `rotorid check` does. `lacks` holds sentences; each of `doubts` names what
@@ -225,17 +223,17 @@ def simulate(vehicle: Believed, seconds: float = 20.0, flights: int = 2, seed: i
     """
     from rotorid.vehicle.control.swings import swings
 
-    return swings(vehicle_from(vehicle), "simulated", seconds, flights, seed)
+    return swings(_vehicle_from(vehicle), "simulated", seconds, flights, seed)
 
 
 def export(vehicle: Believed, to: str) -> Exported:
     """The vehicle for another tool (`rotorid export`): its `text`, `companions` (files next to it), and `left_out`.
 
     The last is what it cannot express."""
-    return export_vehicle(vehicle_from(vehicle), to)
+    return export_vehicle(_vehicle_from(vehicle), to)
 
 
-def parameters(data: Recorded, to: str, vehicle: Believed | None = None, **options) -> tuple:
+def parameters(data: _Recorded, to: str, vehicle: Believed | None = None, **options) -> tuple:
     """What flights say of an autopilot's parameters (`rotorid parameters`).
 
     Parameters

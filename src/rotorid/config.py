@@ -3,6 +3,8 @@
 Every value is written out in `config.yaml`; the model holds no defaults, so what the file says is what runs.
 A stage that needs settings adds one class here and one field to `Config`; the JSON schema in
 `workflow/schemas/config.schema.json` is generated from it (`python -m rotorid.config --write-schema`).
+
+Readings of the identification flight; apart from what flies it, so that the configuration is checked at once.
 """
 
 from __future__ import annotations
@@ -22,26 +24,27 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from rotorid.errors import InputError
 from rotorid.io.text.wording import LONGEST, explained
 from rotorid.mismatch.decision.rules import RULES
-from rotorid.vehicle.control.readings import READING_S
 
+READING_S = 0.004
+"""Time between readings, s."""
 SCHEMA_PATH = Path(__file__).parents[2] / "workflow" / "schemas" / "config.schema.json"
 
-LONGEST_WINDOW = 301
+_LONGEST_WINDOW = 301
 """Samples; the shortest recordings of a steady load have as many."""
-SMALLEST_RATE, LARGEST_RATE = 1e-6, 10.0
-MOST_EPOCHS, MOST_NODES, MOST_LAYERS = 10_000_000, 1000, 10
+_SMALLEST_RATE, _LARGEST_RATE = 1e-6, 10.0
+_MOST_EPOCHS, _MOST_NODES, _MOST_LAYERS = 10_000_000, 1000, 10
 """Bounds of a network's training; beyond them it does not converge, or not on one computer."""
-LONGEST_TITLE = 200
+_LONGEST_TITLE = 200
 """Characters; more do not fit on a title page."""
-MOST_SETS = 10_000
+_MOST_SETS = 10_000
 """Sets in one job: beyond that what a stopped job had done is lost for days."""
-FASTEST_ROTOR_RAD_S = 1e5
+_FASTEST_ROTOR_RAD_S = 1e5
 """A small turbine's speed, which no propeller reaches."""
-SLOWEST_REAL_FLIGHT_HZ = 400.0
+_SLOWEST_REAL_FLIGHT_HZ = 400.0
 """Lowest rate of the real flights that the grey box reads."""
 
 
-NARROWEST_BAND_HZ = 1.0
+_NARROWEST_BAND_HZ = 1.0
 """Oscillations in a narrower band have no room to differ."""
 _WHOLE, _NUMBER = (
     re.compile(r"[-+]?(0|[1-9][0-9]{0,17})"),
@@ -71,8 +74,8 @@ def _readable(text: str) -> str:
 
 
 def _short(text: str) -> str:
-    if len(text) > LONGEST_TITLE:
-        raise ValueError(f"found {_quoted(text)}, expected at most {LONGEST_TITLE} characters, not {len(text)}")
+    if len(text) > _LONGEST_TITLE:
+        raise ValueError(f"found {_quoted(text)}, expected at most {_LONGEST_TITLE} characters, not {len(text)}")
     return text
 
 
@@ -100,13 +103,13 @@ def _odd(window: int) -> int:
     return window
 
 
-SHORT_HASH = re.compile(r"(?=.*[a-f])[0-9a-f]{8}")
+_SHORT_HASH = re.compile(r"(?=.*[a-f])[0-9a-f]{8}")
 """First digits of a commit's hash, with a letter among them: a day without hyphens is none."""
 
 
 def _release(text: str) -> str:
     try:
-        known = text == "" or bool(SHORT_HASH.fullmatch(text)) or date.fromisoformat(text).isoformat() == text
+        known = text == "" or bool(_SHORT_HASH.fullmatch(text)) or date.fromisoformat(text).isoformat() == text
     except ValueError:
         known = False
     if not known:
@@ -151,12 +154,12 @@ class FilterSettings(Section):
     low_pass_hz: float = Field(ge=0.01, lt=25, description="Cutoff of the thesis's first-order low-pass [Hz].")
     zero_phase_hz: float = Field(ge=0.01, lt=25, description="Cutoff of the zero-phase low-pass [Hz].")
     spike_window: Annotated[int, AfterValidator(_odd)] = Field(
-        ge=3, le=LONGEST_WINDOW, description="Samples around one that its median is taken of [1]."
+        ge=3, le=_LONGEST_WINDOW, description="Samples around one that its median is taken of [1]."
     )
     spike_threshold: float = Field(
         ge=2, le=1000, description="Robust standard deviations beyond which a sample is a spike [1]."
     )
-    steady_window: int = Field(ge=2, le=LONGEST_WINDOW, description="Samples that have to be steady [1].")
+    steady_window: int = Field(ge=2, le=_LONGEST_WINDOW, description="Samples that have to be steady [1].")
 
 
 class CellFilterSettings(FilterSettings):
@@ -260,13 +263,15 @@ class GreyBox(Section):
     """Parameters of the equations of motion from data."""
 
     seed: int = Field(ge=0, description="Seed of weights, search and draws [1].")
-    rotor_rate: float = Field(ge=SMALLEST_RATE, le=LARGEST_RATE, description="Learning rate of the rotor networks [1].")
-    rotor_epochs: int = Field(ge=1, le=MOST_EPOCHS, description="Epochs of the rotor networks [1].")
-    rotor_hidden: int = Field(ge=1, le=MOST_NODES, description="Hidden nodes of the rotor networks [1].")
-    inertia_rate: float = Field(
-        ge=SMALLEST_RATE, le=LARGEST_RATE, description="Learning rate of the inertia network [1]."
+    rotor_rate: float = Field(
+        ge=_SMALLEST_RATE, le=_LARGEST_RATE, description="Learning rate of the rotor networks [1]."
     )
-    inertia_epochs: int = Field(ge=1, le=MOST_EPOCHS, description="Epochs of the inertia network [1].")
+    rotor_epochs: int = Field(ge=1, le=_MOST_EPOCHS, description="Epochs of the rotor networks [1].")
+    rotor_hidden: int = Field(ge=1, le=_MOST_NODES, description="Hidden nodes of the rotor networks [1].")
+    inertia_rate: float = Field(
+        ge=_SMALLEST_RATE, le=_LARGEST_RATE, description="Learning rate of the inertia network [1]."
+    )
+    inertia_epochs: int = Field(ge=1, le=_MOST_EPOCHS, description="Epochs of the inertia network [1].")
     inertia_every: int = Field(ge=1, le=100, description="Every how many samples the inertia network is shown [1].")
     speed_limits_rad_s: Limits = Field(
         strict=False, description="Lowest and highest rotor speed that the motors can hold [rad/s]."
@@ -294,8 +299,8 @@ class GreyBox(Section):
     @model_validator(mode="after")
     def _can_be_flown(self) -> GreyBox:
         (low, high), (slowest, fastest) = self.speed_limits_rad_s, self.design_limits_rad_s
-        if high > FASTEST_ROTOR_RAD_S:
-            raise ValueError(f"speed_limits_rad_s reaches {high:g}, expected at most {FASTEST_ROTOR_RAD_S:g}")
+        if high > _FASTEST_ROTOR_RAD_S:
+            raise ValueError(f"speed_limits_rad_s reaches {high:g}, expected at most {_FASTEST_ROTOR_RAD_S:g}")
         if not low <= slowest < fastest <= high:
             raise ValueError(
                 f"design_limits_rad_s is {[slowest, fastest]}, expected to lie within speed_limits_rad_s, {[low, high]}"
@@ -319,13 +324,15 @@ class GreyBox(Section):
             raise ValueError(
                 f"flight_s is {self.flight_s:g}, expected at least design_period_s, {self.design_period_s:g}"
             )
-        if not 0 < self.band_hz[0] < self.band_hz[1] < SLOWEST_REAL_FLIGHT_HZ / 2:
+        if not 0 < self.band_hz[0] < self.band_hz[1] < _SLOWEST_REAL_FLIGHT_HZ / 2:
             raise ValueError(
                 f"band_hz is {list(self.band_hz)}, expected to lie within 0 and "
-                f"{SLOWEST_REAL_FLIGHT_HZ / 2:g} Hz, both not in it"
+                f"{_SLOWEST_REAL_FLIGHT_HZ / 2:g} Hz, both not in it"
             )
-        if self.band_hz[1] - self.band_hz[0] < NARROWEST_BAND_HZ:
-            raise ValueError(f"band_hz is {list(self.band_hz)}, expected {NARROWEST_BAND_HZ:g} Hz between them or more")
+        if self.band_hz[1] - self.band_hz[0] < _NARROWEST_BAND_HZ:
+            raise ValueError(
+                f"band_hz is {list(self.band_hz)}, expected {_NARROWEST_BAND_HZ:g} Hz between them or more"
+            )
         return self
 
 
@@ -333,10 +340,10 @@ class BlackBox(Section):
     """The stand's wrench without knowledge of the vehicle."""
 
     seed: int = Field(ge=0, description="Seed of weights, folds and held-out samples [1].")
-    epochs: int = Field(ge=1, le=MOST_EPOCHS, description="Epochs of the network [1].")
-    rate: float = Field(ge=SMALLEST_RATE, le=LARGEST_RATE, description="Learning rate of the network [1].")
-    hidden: tuple[Annotated[int, Field(ge=1, le=MOST_NODES)], ...] = Field(
-        min_length=1, max_length=MOST_LAYERS, strict=False, description="Nodes of each hidden layer [1]."
+    epochs: int = Field(ge=1, le=_MOST_EPOCHS, description="Epochs of the network [1].")
+    rate: float = Field(ge=_SMALLEST_RATE, le=_LARGEST_RATE, description="Learning rate of the network [1].")
+    hidden: tuple[Annotated[int, Field(ge=1, le=_MOST_NODES)], ...] = Field(
+        min_length=1, max_length=_MOST_LAYERS, strict=False, description="Nodes of each hidden layer [1]."
     )
     held_out_samples: int = Field(
         ge=2, le=10_000, description="Samples held out at random, as the thesis does; of one alone nothing spreads [1]."
@@ -359,7 +366,7 @@ class Proof(Section):
         description="Repetitions taken of each family of drawn cases in a release proof [1]."
     )
     cases: list[Text] = Field(min_length=1, description="Shell patterns on case names; one must fit [names].")
-    batch: int = Field(ge=1, le=MOST_SETS, description="Cases that one job treats [1].")
+    batch: int = Field(ge=1, le=_MOST_SETS, description="Cases that one job treats [1].")
     delivered: int = Field(
         ge=1, description="Concealed cases, evenly over the list, whose delivered vehicle is put to the test [1]."
     )
@@ -377,7 +384,7 @@ class Plantings(Section):
     cases: list[Text] = Field(
         min_length=1, description="Shell patterns on the names in workflow/plantings.tsv; one must fit [names]."
     )
-    batch: int = Field(ge=1, le=MOST_SETS, description="Sets that one job judges [1].")
+    batch: int = Field(ge=1, le=_MOST_SETS, description="Sets that one job judges [1].")
     kept: Text = Field(
         description="Table whose rows are kept next to new ones, marked where older code judged them; a file that does "
         "not exist keeps none [path]."
@@ -431,9 +438,9 @@ class Ablation(Section):
 class Fleet(Section):
     """Every recording set of a folder, judged together."""
 
-    batch: int = Field(ge=1, le=MOST_SETS, description="Sets that one job judges [1].")
+    batch: int = Field(ge=1, le=_MOST_SETS, description="Sets that one job judges [1].")
     history: bool = Field(description="Whether each vehicle's later sets are compared with its first [true, false].")
-    good: int = Field(ge=1, le=MOST_SETS, description="First sets of each vehicle that count as good [1].")
+    good: int = Field(ge=1, le=_MOST_SETS, description="First sets of each vehicle that count as good [1].")
 
 
 class Config(Section):

@@ -6,15 +6,15 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-Listener = Callable[[tuple[str, ...]], None]
+_Listener = Callable[[tuple[str, ...]], None]
 """Takes the names of the steps that are open, the outermost first."""
 
 _open: ContextVar[tuple[str, ...]] = ContextVar("open", default=())
-_listener: ContextVar[Listener] = ContextVar("listener", default=lambda path: None)
+_listener: ContextVar[_Listener] = ContextVar("listener", default=lambda path: None)
 
 
 @contextmanager
-def heard_by(listener: Listener) -> Iterator[None]:
+def heard_by(listener: _Listener) -> Iterator[None]:
     """The listener is called with the open steps whenever one begins or ends."""
     outer = _listener.set(listener)
     try:

@@ -13,9 +13,8 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from rotorid.acquire import procedures
-from rotorid.acquire.cli import app
+from rotorid.acquire.cli import app, stable_name, udev_rule, who_is_there
 from rotorid.acquire.geometry import GF_N, body_forces, cell_forces
-from rotorid.acquire.identify import stable_name, udev_rule, who_is_there
 from rotorid.acquire.view import Plot, bench_forces, braille, panel, watch
 from rotorid.identify.stand import align
 from rotorid.identify.stand.recordings import read_pairs

@@ -7,10 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from rotorid.acquire.emulators.bench import BenchPhysics
+from rotorid.acquire.emulators.bench import BenchPhysics, LoadCells
 from rotorid.acquire.emulators.build import build
 from rotorid.acquire.emulators.devices import programme_share
-from rotorid.acquire.emulators.load_cell import LoadCells
 from rotorid.acquire.emulators.oscillator import Oscillator
 from rotorid.acquire.emulators.rotor import Battery, Rotors
 from rotorid.acquire.emulators.stand import StandPhysics, tilt_matrix
@@ -28,8 +27,7 @@ from rotorid.acquire.emulators.truth import (
     write_truth,
 )
 from rotorid.acquire.geometry import GF_N, M, body_forces, cell_forces, cell_response
-from rotorid.acquire.programmes import programme_of
-from rotorid.acquire.steady import LowPass, Steadiness
+from rotorid.acquire.procedures import LowPass, Steadiness, programme_of
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.wire.quadrotor import GREEN, RED, SINE, TRAPEZOID, YELLOW, Programme
 

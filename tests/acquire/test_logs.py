@@ -11,7 +11,7 @@ import pytest
 
 from rotorid.acquire import procedures
 from rotorid.acquire.emulators.faults import Faults
-from rotorid.acquire.log_writer import LogWriter
+from rotorid.acquire.recorder import LogWriter
 from rotorid.io import rawlog
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.index import COLUMNS, read_index, write_index

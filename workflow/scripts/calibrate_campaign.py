@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid.identify.bench import calibration_flags, outliers, recalibrate
+from rotorid.identify.bench import calibration_flags, recalibrate
+from rotorid.identify.bench.calibration_flags import LEVEL
 from rotorid.io.tables import read_sessions
 from rotorid.report import log
 
@@ -31,7 +32,7 @@ def main(prepared: str, samples: str, recordings: str, readings: str, coefficien
     for sentence in warnings:
         LOGGER.warning("%s", sentence)
     table.to_csv(readings, index=False)
-    result = {"flag_level": outliers.LEVEL, "readings": len(table), "warnings": warnings, "cells": cells}
+    result = {"flag_level": LEVEL, "readings": len(table), "warnings": warnings, "cells": cells}
     Path(coefficients).write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
 
 

@@ -13,7 +13,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid.identify.bench import calibration_flags, loadcell, outliers
+from rotorid.identify.bench import calibration_flags, loadcell
+from rotorid.identify.bench.calibration_flags import LEVEL
 from rotorid.report import log
 
 TUBE = "Carbon Fiber Tube"
@@ -75,7 +76,7 @@ def main(weights: str, readings: str, printed: str, out: str) -> None:
             for cell in fitted
             for name, key in (("a0", "a0_printed_gf"), ("a1", "a1_printed_gf_per_10uv"))
         ),
-        "flag_level": outliers.LEVEL,
+        "flag_level": LEVEL,
         "readings": len(flagged),
         "warnings": warnings,
         "cells": fitted,

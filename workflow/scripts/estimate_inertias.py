@@ -12,15 +12,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from rotorid.config import READING_S
 from rotorid.identify.estimate.consistency import check_consistency
 from rotorid.identify.estimate.excitation import WINDOW_S, ExcitedHold, Readings, Wanted, design, promised_errors
 from rotorid.identify.estimate.inertial import WEIGHT_NAMES, weights_of_inertias
 from rotorid.identify.estimate.output_error import cut_windows, fit_output_error, tied, untied
 from rotorid.recordings import read_vehicle
 from rotorid.report import log
-from rotorid.vehicle.control.pid import AttitudePid
-from rotorid.vehicle.control.readings import READING_S
-from rotorid.vehicle.control.references import training_reference, validation_reference
+from rotorid.vehicle.control.pid import AttitudePid, training_reference, validation_reference
 from rotorid.vehicle.mixer import wrench_matrix
 from rotorid.vehicle.simulator import Disturbance, Motors, Start, simulate
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from rotorid.io.public_list import read_manifest
 from rotorid.recordings.importers import public_sets
-from rotorid.recordings.importers.obtain import obtain
+from rotorid.recordings.importers.public_sets import obtain
 from rotorid.recordings.importers.report import read_report
 from rotorid.report import log
 

@@ -12,10 +12,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.identify.bench import matrix, static
+from rotorid.identify.bench import static
 from rotorid.identify.bench.channels import CELLS, FORCES
 from rotorid.identify.bench.recalibrate import line_of
 from rotorid.identify.bench.reconstruct import read_geometry
+from rotorid.identify.bench.static import as_dict
 from rotorid.io.tables import read_sessions
 from rotorid.report import log
 
@@ -54,7 +55,7 @@ def main(
     static.by_series(alone).to_csv(series, index=False, float_format="%.12g")
     found = {
         "matrix_largest_n": matrix_largest_n,
-        "matrix": matrix.as_dict(fitted),
+        "matrix": as_dict(fitted),
         "equations_matrix": distances.matrix.tolist(),
         "lateral_as_vertical": static.lateral_as_vertical(fitted, lines, distances),
         "methods": static.methods_compared(table),

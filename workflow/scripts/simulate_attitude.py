@@ -12,8 +12,7 @@ import pandas as pd
 
 from rotorid.recordings import read_vehicle
 from rotorid.report import log
-from rotorid.vehicle.control.pid import AttitudePid
-from rotorid.vehicle.control.references import training_reference
+from rotorid.vehicle.control.pid import AttitudePid, training_reference
 from rotorid.vehicle.mixer import wrench_matrix
 from rotorid.vehicle.simulator import Disturbance, simulate
 

@@ -16,8 +16,7 @@ from rotorid.recordings import Inertia, Run, Vehicle, read_set, read_vehicle
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.report import read_report
 from rotorid.report import log, thesis
-from rotorid.vehicle.control.pid import AttitudePid
-from rotorid.vehicle.control.references import validation_reference
+from rotorid.vehicle.control.pid import AttitudePid, validation_reference
 from rotorid.vehicle.simulator import simulate
 from rotorid.vehicle.windows import Inputs, States, simulate_windows
 

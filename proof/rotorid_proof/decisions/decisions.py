@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.problem import Prior
 from rotorid.mismatch.posterior.search import Found, decide, ranked
 from rotorid.mismatch.posterior.statements import Statement, statements_of
 from rotorid.mismatch.posterior.status import CLAIMED

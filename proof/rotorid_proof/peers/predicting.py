@@ -22,8 +22,7 @@ from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 from rotorid.mismatch.decision.findings import Analysis
 from rotorid.mismatch.decision.shares import fitted_part, segments_of
-from rotorid.mismatch.delivery.flown import squares_of_windows
-from rotorid.mismatch.delivery.model import model_of
+from rotorid.mismatch.delivery.flown import model_of, squares_of_windows
 from rotorid.mismatch.plant.motion import HIGHEST_CUTOFF_HZ, Segment, analysis_rate_hz
 from rotorid.mismatch.plant.rows import GROUPS, Thinner, residual
 from rotorid.recordings import Vehicle

@@ -16,7 +16,7 @@ import numpy as np
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.model.prepare import assemble_rows, prepare
 from rotorid.mismatch.model.values import believed_value
-from rotorid.mismatch.plant.regime import regime_variables
+from rotorid.mismatch.plant.motion import regime_variables
 from rotorid.mismatch.plant.rows import CHANNELS, PARAMETER_NAMES
 from rotorid.mismatch.plant.split import training_rule
 from rotorid.recordings import RecordingSet

@@ -2,6 +2,8 @@
 
 `python -m rotorid.acquire.campaign` writes `raw/campaign/` (logs packed, metadata next to them), the index
 `raw/sessions.tsv` and, outside `raw/`, the sealed truth. The same seed gives the same bytes.
+
+The calibration weights and their eight combinations (thesis tables 2.6 and 2.7), in gf.
 """
 
 from __future__ import annotations
@@ -37,37 +39,63 @@ from rotorid.acquire.emulators.stated import write_stated
 from rotorid.acquire.emulators.tensile import GAUGE_MM, SECTION_MM2, TensilePhysics
 from rotorid.acquire.emulators.truth import Truth, draw_truth, write_truth
 from rotorid.acquire.emulators.wire import WireHalf, World
-from rotorid.acquire.procedures import STEADY_JR3, SteadyRule
-from rotorid.acquire.programmes import programme_of
+from rotorid.acquire.procedures import STEADY_JR3, SteadyRule, programme_of
 from rotorid.acquire.recorder import Recorder, Timings
 from rotorid.acquire.transport import LoopbackTransport
-from rotorid.acquire.weights import COMBINATIONS, weight_gf
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.index import write_index
 from rotorid.io.session import Air, Session, Setup, session_path, write_session
 from rotorid.io.wire.quadrotor import TRAPEZOID, Programme
 
+_WEIGHTS_GF = {
+    "Carbon Fiber 1": 35.715,
+    "Carbon Fiber 2": 36.615,
+    "Carbon Fiber 3": 36.15,
+    "Carbon Fiber Tube": 343.445,
+    "Aluminum 1": 249.525,
+    "Aluminum 2": 250.955,
+    "Aluminum 3": 250.5525,
+    "Aluminum 4": 255.07,
+}
+
+COMBINATIONS: tuple[tuple[str, ...], ...] = (
+    ("Carbon Fiber 1",),
+    ("Carbon Fiber 1", "Carbon Fiber 2"),
+    ("Carbon Fiber 1", "Carbon Fiber 2", "Carbon Fiber 3"),
+    ("Aluminum 4",),
+    ("Carbon Fiber Tube",),
+    ("Aluminum 1", "Aluminum 2"),
+    ("Aluminum 1", "Aluminum 2", "Aluminum 3"),
+    (
+        "Aluminum 3",
+        "Aluminum 4",
+        "Carbon Fiber 1",
+        "Carbon Fiber 2",
+        "Carbon Fiber 3",
+        "Carbon Fiber Tube",
+    ),
+)
 SEED = 2024
 STATED = "campaign_stated.yaml"
 """Next to the sealed truth: the same in the words of the catalogue."""
-REPEATS = 10
-COMBINED_AXES = ("xy", "xz", "yz", "xyz")
-COMBINED_LOADS = (3, 4, 6)  # combinations of weights
-PLATFORMS_Z = ("al", "pla", "jr3")
-PROPELLER = "5040 three-blade"
-FIRST_DAY = datetime(2024, 3, 4, 9, 0, tzinfo=timezone(timedelta(hours=-6)))
-TESTS_PER_BATTERY = 6
-RADIO_FAULTS = 2e-4  # share of frames that each kind of fault befalls on the Bluetooth line
+_REPEATS = 10
+_COMBINED_AXES = ("xy", "xz", "yz", "xyz")
+_COMBINED_LOADS = (3, 4, 6)  # combinations of weights
+_PLATFORMS_Z = ("al", "pla", "jr3")
+_PROPELLER = "5040 three-blade"
+_FIRST_DAY = datetime(2024, 3, 4, 9, 0, tzinfo=timezone(timedelta(hours=-6)))
+_TESTS_PER_BATTERY = 6
+_RADIO_FAULTS = 2e-4  # share of frames that each kind of fault befalls on the Bluetooth line
 
 
 @dataclass
-class Campaign:
+class _Campaign:
     """Where it goes, what is true, and how far the day has come."""
 
     raw: Path
     truth: Truth
     seed: int
-    date: datetime = FIRST_DAY
+    date: datetime = _FIRST_DAY
     recordings: list[Session] = field(default_factory=list)
 
     def rng(self, name: str) -> np.random.Generator:
@@ -85,7 +113,7 @@ class Campaign:
 
     def air(self) -> Air:
         """Air of the hour: warmer in the afternoon, the pressure of 540 m."""
-        hours = (self.date - FIRST_DAY).total_seconds() / 3600
+        hours = (self.date - _FIRST_DAY).total_seconds() / 3600
         day = 2 * math.pi * (hours % 24) / 24
         return Air(
             temperature_c=round(23.5 + 2.0 * math.sin(day), 1),
@@ -177,7 +205,7 @@ def _operator(place: Callable[[float], None], load_gf: float, reaction_samples: 
 # ---- the tests -------------------------------------------------------------------------------------------
 
 
-def calibration(campaign: Campaign) -> None:
+def calibration(campaign: _Campaign) -> None:
     """Six cells, eight combinations of weights, three repeats, 400 samples each (fig. 2.34)."""
     for cell in range(1, 7):
         for number, items in enumerate(COMBINATIONS, start=1):
@@ -204,12 +232,12 @@ def calibration(campaign: Campaign) -> None:
                 )
 
 
-def static(campaign: Campaign) -> None:
+def static(campaign: _Campaign) -> None:
     """Weights along x and y on the aluminium bench, along z on all three platforms, ten repeats."""
-    series = [("al", "x"), ("al", "y"), *((platform, "z") for platform in PLATFORMS_Z)]
+    series = [("al", "x"), ("al", "y"), *((platform, "z") for platform in _PLATFORMS_Z)]
     for platform, axis in series:
         for number, items in enumerate(COMBINATIONS, start=1):
-            for repeat in range(1, REPEATS + 1):
+            for repeat in range(1, _REPEATS + 1):
                 name = f"static-{platform}-{axis}-w{number}-r{repeat:02d}"
                 rng = campaign.rng(name)
                 physics, device = _platform(campaign, platform, rng)
@@ -230,10 +258,10 @@ def static(campaign: Campaign) -> None:
                 )
 
 
-def dynamic(campaign: Campaign) -> None:
+def dynamic(campaign: _Campaign) -> None:
     """A small quadrotor flown on the bench in aluminium, in PLA and on the reference sensor, three sets."""
     for repeat in range(1, 4):
-        for platform in PLATFORMS_Z:
+        for platform in _PLATFORMS_Z:
             name = f"dynamic-{platform}-set{repeat}"
             rng = campaign.rng(name)
             physics, device = _platform(campaign, platform, rng)
@@ -257,7 +285,7 @@ def dynamic(campaign: Campaign) -> None:
             )
 
 
-def _platform(campaign: Campaign, platform: str, rng: np.random.Generator) -> tuple[Physics, Device]:
+def _platform(campaign: _Campaign, platform: str, rng: np.random.Generator) -> tuple[Physics, Device]:
     if platform == "jr3":
         sensor = LoadedSensor(campaign.truth.jr3, rng)
         return sensor, Jr3Device(sensor)
@@ -283,7 +311,7 @@ def _manoeuvre(set_rng: np.random.Generator, own_rng: np.random.Generator) -> Ca
     return force
 
 
-def thrust(campaign: Campaign) -> None:
+def thrust(campaign: _Campaign) -> None:
     """Motor 1 on the thrust tester at 1 to 50 % (50 tests)."""
     truth = campaign.truth
     for percent in range(1, 51):
@@ -297,7 +325,7 @@ def thrust(campaign: Campaign) -> None:
             axis="z",
             motor=1,
             throttle=percent / 100,
-            propeller=PROPELLER,
+            propeller=_PROPELLER,
             battery=f"4S 1500 mAh no. {(percent - 1) // 10 % 3 + 1}",
         )
         campaign.record(
@@ -310,7 +338,7 @@ def thrust(campaign: Campaign) -> None:
         )
 
 
-def torque(campaign: Campaign) -> None:
+def torque(campaign: _Campaign) -> None:
     """Motor 1 on the vehicle on the wrench sensor at 2 to 40 % (20 tests)."""
     truth = campaign.truth
     for percent in range(2, 41, 2):
@@ -322,7 +350,7 @@ def torque(campaign: Campaign) -> None:
             axis="z",
             motor=1,
             throttle=percent / 100,
-            propeller=PROPELLER,
+            propeller=_PROPELLER,
             battery=f"4S 1500 mAh no. {(percent // 10) % 3 + 1}",
             mount_roll_deg=0.0,
             mount_pitch_deg=0.0,
@@ -349,11 +377,11 @@ def torque(campaign: Campaign) -> None:
         )
 
 
-def dynamics(campaign: Campaign) -> None:
+def dynamics(campaign: _Campaign) -> None:
     """The 48 experiments of table A.1 on the stand, two loggers with their own clocks."""
     truth = campaign.truth
     for number, experiment in EXPERIMENTS.items():
-        if number % TESTS_PER_BATTERY == 1:
+        if number % _TESTS_PER_BATTERY == 1:
             battery = Battery(truth.battery)
         name = f"exp-{number:02d}"
         rng = campaign.rng(name)
@@ -363,15 +391,15 @@ def dynamics(campaign: Campaign) -> None:
         )
         world = World(
             stand,
-            campaign.line(QuadrotorDevice(rotors, rng), name, burst_s=0.04, share=RADIO_FAULTS),
+            campaign.line(QuadrotorDevice(rotors, rng), name, burst_s=0.04, share=_RADIO_FAULTS),
             campaign.line(WrenchDevice(stand), name),
         )
         letter, programme = programme_of(experiment)
         setup = Setup(
             platform="stand",
             experiment=number,
-            propeller=PROPELLER,
-            battery=f"4S 1500 mAh no. {(number - 1) // TESTS_PER_BATTERY % 3 + 1}",
+            propeller=_PROPELLER,
+            battery=f"4S 1500 mAh no. {(number - 1) // _TESTS_PER_BATTERY % 3 + 1}",
             mount_roll_deg=float(experiment.roll_deg),
             mount_pitch_deg=float(experiment.pitch_deg),
             sensor_position_m=list(SENSOR_POSITION_M),
@@ -392,7 +420,7 @@ def _plain(programme: Programme) -> dict:
     return programme._asdict() | {"shape": shape, "maxima": list(programme.maxima)}
 
 
-def tensile(campaign: Campaign) -> None:
+def tensile(campaign: _Campaign) -> None:
     """Printed specimens of four infill densities, three each."""
     for infill, plastic in campaign.truth.plastic.items():
         scatter = campaign.rng(f"specimens {infill}").permutation([-1.0, 0.0, 1.0])
@@ -420,13 +448,13 @@ def tensile(campaign: Campaign) -> None:
             )
 
 
-def combined(campaign: Campaign) -> None:
+def combined(campaign: _Campaign) -> None:
     """Weights that pull along two or three axes of the aluminium bench at once, five repeats.
 
     The thesis has none; they show how good a reconstruction is when loads are not along one axis at a time.
     """
-    for axis in COMBINED_AXES:
-        for number in COMBINED_LOADS:
+    for axis in _COMBINED_AXES:
+        for number in _COMBINED_LOADS:
             items = COMBINATIONS[number - 1]
             for repeat in range(1, 6):
                 name = f"combined-al-{axis}-w{number}-r{repeat}"
@@ -447,7 +475,7 @@ def combined(campaign: Campaign) -> None:
                 )
 
 
-PARTS: dict[str, Callable[[Campaign], None]] = {
+PARTS: dict[str, Callable[[_Campaign], None]] = {
     part.__name__: part for part in (calibration, static, dynamic, thrust, torque, dynamics, tensile, combined)
 }
 
@@ -464,10 +492,10 @@ def run_campaign(
     the recordings. The sealed file must lie outside `raw`; raises ValueError otherwise."""
     if sealed.resolve().is_relative_to(raw.resolve()):
         raise ValueError(f"{sealed}: the truth must lie outside {raw}, or it is not concealed")
-    campaign = Campaign(raw, truth or draw_truth(seed), seed)
+    campaign = _Campaign(raw, truth or draw_truth(seed), seed)
     for name in parts:
         shutil.rmtree(raw / "campaign" / name, ignore_errors=True)
-        campaign.date = FIRST_DAY + timedelta(days=list(PARTS).index(name))  # a day each, whichever are made
+        campaign.date = _FIRST_DAY + timedelta(days=list(PARTS).index(name))  # a day each, whichever are made
         PARTS[name](campaign)
         say(f"{name}: {sum(s.setup.kind == name for s in campaign.recordings)} recordings")
     write_index(raw)
@@ -493,3 +521,8 @@ def main() -> None:
 
 if __name__ == "__main__":
     main()
+
+
+def weight_gf(items: tuple[str, ...] | list[str]) -> float:
+    """Weight of a combination in gf."""
+    return round(sum(_WEIGHTS_GF[item] for item in items), 4)

@@ -1,39 +1,125 @@
-"""`rotorid-acquire`: record the instruments, or emulate them."""
+"""`rotorid-acquire`: record the instruments, or emulate them.
+
+Who is on a serial port: stable names, and the question that every instrument answers.
+
+The options that all recording commands share, in one place.
+"""
 
 from __future__ import annotations
 
+import functools
+import inspect
 import select
 import sys
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
 from datetime import datetime
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, get_type_hints
 
 import typer
 
 from rotorid.acquire import procedures, view
-from rotorid.acquire.errors import AcquireError, Interrupted, LimitExceeded
-from rotorid.acquire.options import Shared, with_shared
-from rotorid.acquire.programmes import HOLD_S, RAMP_S, programme_of
+from rotorid.acquire.errors import AcquireError, Interrupted, LimitExceeded, PortBusy, PortLost, PortMissing
+from rotorid.acquire.procedures import HOLD_S, RAMP_S, programme_of
 from rotorid.acquire.record import recorders_for, run_with
 from rotorid.acquire.recorder import Recorder
+from rotorid.acquire.transport import SerialTransport
 from rotorid.errors import InputError
+from rotorid.io import wire
 from rotorid.io.experiments import EXPERIMENTS
-from rotorid.io.session import SessionError, Setup
+from rotorid.io.frames import COMMAND, START, Frame, encode
+from rotorid.io.intake import Intake
+from rotorid.io.session import Air, SessionError, Setup
 from rotorid.io.wire import INSTRUMENTS, quadrotor
+from rotorid.io.wire.base import IDENTIFY
 
+_DEFAULT_OUT = Path("raw/local")
+_BY_ID = Path("/dev/serial/by-id")
+WAIT_S = 2.5  # an UNO restarts when its port is opened, and its boot loader keeps it for a second or two
 app = typer.Typer(no_args_is_help=True, add_completion=False, help=__doc__, pretty_exceptions_enable=False)
 
-Port = Annotated[str, typer.Option("--port", "-p", help="serial port; `rotorid-acquire ports` lists them")]
-Propeller = Annotated[str | None, typer.Option(help="propeller, e.g. '5040 three-blade'")]
-BatteryName = Annotated[str | None, typer.Option("--battery", help="battery, e.g. '4S 1500 mAh no. 1'")]
-PlaceS = Annotated[
+_Port = Annotated[str, typer.Option("--port", "-p", help="serial port; `rotorid-acquire ports` lists them")]
+_Propeller = Annotated[str | None, typer.Option(help="propeller, e.g. '5040 three-blade'")]
+_BatteryName = Annotated[str | None, typer.Option("--battery", help="battery, e.g. '4S 1500 mAh no. 1'")]
+_PlaceS = Annotated[
     float | None, typer.Option("--place-s", help="give a load so many seconds instead of waiting for Enter")
 ]
+
+
+@dataclass(frozen=True)
+class _Shared:
+    """Where a recording goes, what it is called, and what is seen meanwhile."""
+
+    out: Annotated[Path, typer.Option(help="folder for the log and its metadata")] = _DEFAULT_OUT
+    name: Annotated[str | None, typer.Option("--id", help="name of the recording; default: instrument and time")] = None
+    operator: Annotated[str | None, typer.Option(help="who records")] = None
+    air: Annotated[str | None, typer.Option("--air", help="temperature °C, pressure Pa, humidity: 23,95400,0.5")] = None
+    plot: Annotated[
+        list[str] | None, typer.Option("--plot", help="also draw this column, e.g. cell_1_v; repeatable")
+    ] = None
+    limit: Annotated[
+        list[str] | None,
+        typer.Option("--limit", help="stop when a column leaves its range: battery_current_a:0:30; repeatable"),
+    ] = None
+    source: Annotated[
+        str | None, typer.Option(help="instrument or emulator, where the device itself does not say it rightly")
+    ] = None
+
+    @property
+    def weather(self) -> Air | None:
+        """The air as metadata have it. Raises typer.BadParameter."""
+        if self.air is None:
+            return None
+        try:
+            temperature, pressure, humidity = (float(part) for part in self.air.split(","))
+            return Air(temperature_c=temperature, pressure_pa=pressure, relative_humidity=humidity)
+        except ValueError as error:
+            raise typer.BadParameter(
+                "--air is temperature in °C, pressure in Pa and humidity from 0 to 1, such as 23,95400,0.5"
+            ) from error
+
+    def limits(self, columns: list[str]) -> dict[str, tuple[float, float]]:
+        """Ranges by column. Raises typer.BadParameter."""
+        found = {}
+        for text in self.limit or []:
+            try:
+                column, low, high = text.split(":")
+                found[column] = (float(low), float(high))
+            except ValueError as error:
+                raise typer.BadParameter(
+                    f"--limit is COLUMN:LOW:HIGH, such as battery_current_a:0:30, not {text!r}"
+                ) from error
+            if column not in columns:
+                raise typer.BadParameter(f"--limit is for one of {', '.join(columns)}, not {column!r}")
+        return found
+
+
+def _with_shared(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the shared options; it gets them as its argument `shared`."""
+    hints = get_type_hints(command, include_extras=True)
+    own = [
+        parameter.replace(annotation=hints[name])
+        for name, parameter in inspect.signature(command).parameters.items()
+        if name != "shared"
+    ]
+    types = get_type_hints(_Shared, include_extras=True)
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    more = [inspect.Parameter(f.name, keyword, default=f.default, annotation=types[f.name]) for f in fields(_Shared)]
+
+    @functools.wraps(command)
+    def wrapped(**given) -> None:
+        shared = _Shared(**{field.name: given.pop(field.name) for field in fields(_Shared)})
+        command(**given, shared=shared)
+
+    parameters = [parameter.replace(kind=keyword) for parameter in own] + more
+    wrapped.__signature__ = inspect.Signature(parameters)
+    wrapped.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    del wrapped.__wrapped__  # its signature is not the one to look at
+    return wrapped
 
 
 @app.command()
@@ -45,7 +131,7 @@ def ports(
     """List the serial ports of this computer by names that stay the same, and who is on them."""
     from serial.tools import list_ports
 
-    from rotorid.acquire.identify import stable_name, udev_rule, who_is_there
+    from rotorid.acquire.cli import stable_name, udev_rule, who_is_there
 
     found = sorted(list_ports.comports())
     if udev is not None:
@@ -66,9 +152,9 @@ def ports(
 
 
 @app.command()
-@with_shared
+@_with_shared
 def bench(
-    port: Port,
+    port: _Port,
     test: Annotated[str, typer.Option(help="stream, calibrate, static or dynamic")] = "stream",
     wait_s: Annotated[float, typer.Option(help="longest wait for the load, and for a steady reading, s")] = (
         procedures.WAIT_S
@@ -83,9 +169,9 @@ def bench(
     axis: Annotated[str | None, typer.Option(help="x, y or z")] = None,
     load_gf: Annotated[float | None, typer.Option(help="the weight, gf")] = None,
     repeat: Annotated[int | None, typer.Option(help="number of the repeat")] = None,
-    place_s: PlaceS = None,
+    place_s: _PlaceS = None,
     *,
-    shared: Shared,
+    shared: _Shared,
 ) -> None:
     """Record the load-cell bench: settle, wait until steady, tare, load, read (thesis fig. 2.35)."""
     instrument, rule = ("jr3", procedures.STEADY_JR3) if platform == "jr3" else ("bench", procedures.SteadyRule())
@@ -113,16 +199,16 @@ def bench(
 
 
 @app.command()
-@with_shared
+@_with_shared
 def rotor(
-    port: Port,
+    port: _Port,
     throttle: Annotated[float, typer.Option(min=0, max=1, help="fraction of full throttle")],
     rest_s: Annotated[float, typer.Option(help="rest before and after, s")] = 1.0,
     hold_s: Annotated[float, typer.Option(help="throttle on, s")] = 4.0,
-    propeller: Propeller = None,
-    battery: BatteryName = None,
+    propeller: _Propeller = None,
+    battery: _BatteryName = None,
     *,
-    shared: Shared,
+    shared: _Shared,
 ) -> None:
     """Record the thrust tester: rest, throttle, rest. Keep clear of the propeller."""
     setup = Setup(
@@ -139,9 +225,9 @@ def rotor(
 
 
 @app.command()
-@with_shared
+@_with_shared
 def wrench(
-    port: Port,
+    port: _Port,
     interval: Annotated[float, typer.Option(help="sampling interval, s")] = 0.01,
     restart_times: Annotated[int, typer.Option(help="how often a measuring run starts anew")] = 0,
     measuring_times: Annotated[int, typer.Option(help="samples of a run, 0: until stopped")] = 0,
@@ -149,7 +235,7 @@ def wrench(
     samples: Annotated[int | None, typer.Option(help="stop after so many; default: Ctrl-C stops")] = None,
     only: Annotated[str | None, typer.Option(help="just this: power-on, power-off or offset")] = None,
     *,
-    shared: Shared,
+    shared: _Shared,
 ) -> None:
     """Record the six-axis sensor: power, initialise, offset, start, stop, save."""
     operations = {"power-on": ("P", b"\1"), "power-off": ("P", b"\0"), "offset": ("O", b"")}
@@ -174,19 +260,19 @@ def wrench(
 
 
 @app.command("quadrotor")
-@with_shared
+@_with_shared
 def quadrotor_command(
-    port: Port,
+    port: _Port,
     dynamics: Annotated[str, typer.Option(help=f"command character: {quadrotor.DYNAMICS}")] = "h",
     shape: Annotated[str, typer.Option(help="trapezoid or sine")] = "trapezoid",
     maxima: Annotated[str, typer.Option(help="maxima of motors 1–4, fractions")] = "0.1,0.1,0.1,0.1",
     ramp_s: Annotated[float, typer.Option(help="ramp up and down, s")] = RAMP_S,
     hold_s: Annotated[float, typer.Option(help="time at the maximum, or of the sine, s")] = HOLD_S,
     frequency: Annotated[float, typer.Option(help="of the sine, Hz")] = 0.25,
-    propeller: Propeller = None,
-    battery: BatteryName = None,
+    propeller: _Propeller = None,
+    battery: _BatteryName = None,
     *,
-    shared: Shared,
+    shared: _Shared,
 ) -> None:
     """Send the quadrotor a programme and record the commands of its motors."""
     if dynamics not in quadrotor.DYNAMICS:
@@ -212,15 +298,15 @@ def quadrotor_command(
 
 
 @app.command()
-@with_shared
+@_with_shared
 def experiment(
     number: Annotated[int, typer.Argument(min=1, max=48, help="number in the thesis's table A.1")],
     quadrotor_port: Annotated[str, typer.Option(help="serial port of the ESP32")],
     wrench_port: Annotated[str, typer.Option(help="serial port of the six-axis sensor")],
-    propeller: Propeller = None,
-    battery: BatteryName = None,
+    propeller: _Propeller = None,
+    battery: _BatteryName = None,
     *,
-    shared: Shared,
+    shared: _Shared,
 ) -> None:
     """Record experiment N of table A.1: quadrotor and wrench together, each with its own clock."""
     row = EXPERIMENTS[number]
@@ -251,17 +337,17 @@ def experiment(
 
 
 @app.command()
-@with_shared
+@_with_shared
 def torque(
     throttle: Annotated[float, typer.Option(min=0, max=1, help="fraction of full throttle")],
     rotor_port: Annotated[str, typer.Option(help="serial port of the thrust tester, which drives motor 1")],
     wrench_port: Annotated[str, typer.Option(help="serial port of the six-axis sensor below the vehicle")],
     rest_s: Annotated[float, typer.Option(help="rest before and after, s")] = 2.0,
     hold_s: Annotated[float, typer.Option(help="throttle on, s")] = 6.0,
-    propeller: Propeller = None,
-    battery: BatteryName = None,
+    propeller: _Propeller = None,
+    battery: _BatteryName = None,
     *,
-    shared: Shared,
+    shared: _Shared,
 ) -> None:
     """Record the torque of motor 1 by thrust tester and six-axis sensor. Keep clear of the propeller."""
     setup = Setup(
@@ -286,15 +372,15 @@ def torque(
 
 
 @app.command()
-@with_shared
+@_with_shared
 def tensile(
-    port: Port,
+    port: _Port,
     infill_percent: Annotated[int, typer.Option(help="infill density of the specimen")],
     repeat: Annotated[int, typer.Option(help="number of the specimen")] = 1,
     gauge_length_mm: Annotated[float, typer.Option(help="distance between the grips")] = 40.0,
     cross_section_mm2: Annotated[float, typer.Option(help="narrowest cross-section")] = 19.2,
     *,
-    shared: Shared,
+    shared: _Shared,
 ) -> None:
     """Record the tensile tester until the specimen is broken."""
     setup = Setup(
@@ -322,7 +408,7 @@ def check(
 ) -> None:
     """Read a log as the pipeline does and say what is in it. A recording that was cut off is completed: its
     metadata then say how far it goes."""
-    from rotorid.acquire.repair import repair
+    from rotorid.acquire.run_plan import repair
     from rotorid.io.logs import LogError, read_log
     from rotorid.io.metadata_checksum import without_checksum
     from rotorid.io.rawlog import NotALog
@@ -439,14 +525,14 @@ def emulate(
 
 
 @app.command()
-@with_shared
+@_with_shared
 def lines(
     description: Annotated[Path, typer.Argument(help="a file that says how its lines are read (docs/acquisition.md)")],
-    port: Port,
+    port: _Port,
     samples: Annotated[int | None, typer.Option(help="stop after so many lines; default: Ctrl-C stops")] = None,
     silence_s: Annotated[float, typer.Option(help="give up after so long without a byte, s")] = 60.0,
     *,
-    shared: Shared,
+    shared: _Shared,
 ) -> None:
     """Record an instrument that sends plain lines of text (CSV, key=value, fixed places) and knows no frames."""
     from rotorid.acquire.clock import SystemClock
@@ -570,7 +656,7 @@ def _record(
     setups: dict[str, Setup],
     run: Callable[..., None],
     procedure: dict,
-    shared: Shared,
+    shared: _Shared,
 ) -> None:
     """Open one recorder per instrument, run, show, and leave with a code: 0, 1 or (interrupted) 130."""
     console = view.stderr_console()
@@ -680,3 +766,51 @@ def _check_lines(log: Path, csv: Path | None) -> bool:
 def _fail(text: str) -> None:
     typer.echo(text, err=True)
     raise typer.Exit(1)
+
+
+def stable_name(device: str, folder: Path = _BY_ID) -> str:
+    """The name under /dev/serial/by-id that stays the same wherever the board is plugged in; else the device's own."""
+    if folder.is_dir():
+        for link in sorted(folder.iterdir()):
+            if link.resolve() == Path(device).resolve():
+                return str(link)
+    return device
+
+
+def who_is_there(port: str, wait_s: float = WAIT_S) -> str:
+    """One sentence about what answers on a port, asked at each baud rate that an instrument has. Nothing is started."""
+    heard = b""
+    for baud_rate in sorted({instrument.baud_rate for instrument in wire.INSTRUMENTS.values()}, reverse=True):
+        transport, intake = SerialTransport(port, baud_rate), Intake()
+        try:
+            transport.open()
+            deadline = time.monotonic() + wait_s
+            asked_s = 0.0
+            while time.monotonic() < deadline:
+                if time.monotonic() - asked_s > 0.5:
+                    transport.write(b"\0" + encode(Frame(COMMAND, 0, 0, IDENTIFY.encode())))
+                    asked_s = time.monotonic()
+                data = transport.read(0.1)
+                heard += data
+                for kind, _, content in intake.feed(data):
+                    if kind == START:
+                        known = "" if content.instrument in wire.INSTRUMENTS else " (not known to this version)"
+                        return (
+                            f"{content.instrument}{known}, firmware {content.firmware}, serial {content.serial_number}"
+                        )
+        except (PortMissing, PortBusy, PortLost) as error:
+            return str(error)
+        finally:
+            transport.close()
+    if not heard:
+        return "nothing answers"
+    return f"no instrument of ours; heard {len(heard)} bytes, the last of them {heard[-24:]!r}"
+
+
+def udev_rule(vendor: str, product: str, serial_number: str | None, name: str) -> str:
+    """A rule that gives a board the name /dev/NAME wherever it is plugged in."""
+    serial = f', ATTRS{{serial}}=="{serial_number}"' if serial_number else ""
+    return (
+        f'SUBSYSTEM=="tty", ATTRS{{idVendor}}=="{vendor}", ATTRS{{idProduct}}=="{product}"{serial}, '
+        f'SYMLINK+="{name}", GROUP="dialout", MODE="0660"'
+    )

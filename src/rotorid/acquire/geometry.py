@@ -2,6 +2,8 @@
 
 The recorder shows forces with it; the emulated bench uses the inverse. The pipeline has its own
 implementation, so that one can be checked against the other.
+
+Weights as an operator puts them down: never twice in quite the same place.
 """
 
 from __future__ import annotations
@@ -10,31 +12,33 @@ import math
 
 import numpy as np
 
+# a load "along z" pulls upwards, as thrust does
+AXES = {"x": np.array([1.0, 0, 0]), "y": np.array([0, 1.0, 0]), "z": np.array([0, 0, -1.0])}
 GF_N = 9.80665e-3
-L_M = 0.225
-D_135Z, D_246Z = 0.02120, 0.050457916
-D_2X, D_4X, D_6X = 0.068585472, 0.053814095, 0.014771377
-D_2Y, D_4Y, D_6Y = 0.022541324, 0.048126099, 0.070667423
+_L_M = 0.225
+_D_135Z, _D_246Z = 0.02120, 0.050457916
+_D_2X, _D_4X, _D_6X = 0.068585472, 0.053814095, 0.014771377
+_D_2Y, _D_4Y, _D_6Y = 0.022541324, 0.048126099, 0.070667423
 _C30, _C45, _C60 = (math.cos(math.radians(angle)) for angle in (30, 45, 60))
 
 # eq. 2.9, first two rows (forces along x and y) and the linear part of the third, shape (3, 6)
 M = np.array(
     [
         [
-            -D_135Z / (_C60 * L_M),
-            (D_246Z / _C30 - D_2X) / (_C45 * L_M),
-            D_135Z / L_M,
-            D_4X / (_C45 * L_M),
-            -D_135Z / (_C60 * L_M),
-            -(D_246Z / _C30 - D_6X) / (_C45 * L_M),
+            -_D_135Z / (_C60 * _L_M),
+            (_D_246Z / _C30 - _D_2X) / (_C45 * _L_M),
+            _D_135Z / _L_M,
+            _D_4X / (_C45 * _L_M),
+            -_D_135Z / (_C60 * _L_M),
+            -(_D_246Z / _C30 - _D_6X) / (_C45 * _L_M),
         ],
         [
-            D_135Z / (_C30 * L_M),
-            (D_246Z / _C60 + D_2Y) / (_C45 * L_M),
+            _D_135Z / (_C30 * _L_M),
+            (_D_246Z / _C60 + _D_2Y) / (_C45 * _L_M),
             0.0,
-            (D_4Y - D_246Z) / (_C45 * L_M),
-            -D_135Z / (_C30 * L_M),
-            (D_246Z / _C60 - D_6Y) / (_C45 * L_M),
+            (_D_4Y - _D_246Z) / (_C45 * _L_M),
+            -_D_135Z / (_C30 * _L_M),
+            (_D_246Z / _C60 - _D_6Y) / (_C45 * _L_M),
         ],
         [0.0, -1 / _C45, 0.0, -1 / _C45, 0.0, -1 / _C45],
     ]
@@ -74,3 +78,20 @@ def cell_response() -> np.ndarray:
     if (vertical[[0, 2, 4]] <= 0).any():
         raise AssertionError("cells 1, 3 and 5 must be pulled by a force along -z")
     return np.column_stack([lateral, vertical])
+
+
+def direction_of(axis: str) -> np.ndarray:
+    """Unit vector of a load along one axis, or along several alike (`xz`: halfway between x and z)."""
+    together = sum(AXES[letter] for letter in axis)
+    return together / np.linalg.norm(together)
+
+
+_SPREAD = 1e-4
+_SPREAD_GF = 0.08
+
+
+def put_down(load_gf: float, rng: np.random.Generator) -> float:
+    """Force in N that a weight in gf exerts this time; no weight exerts none."""
+    if load_gf == 0:
+        return 0.0
+    return (load_gf * (1 + _SPREAD * rng.standard_normal()) + _SPREAD_GF * rng.standard_normal()) * GF_N

@@ -17,7 +17,7 @@ from rotorid.io import rawlog, wire
 from rotorid.io.lines import Description, LineDecoder
 from rotorid.io.session import Counts, Ended, Session, Setup, write_session
 
-SILENCE_S = 60.0
+_SILENCE_S = 60.0
 
 
 def record_lines(
@@ -30,7 +30,7 @@ def record_lines(
     *,
     samples: int | None = None,
     stop_asked: threading.Event | None = None,
-    silence_s: float = SILENCE_S,
+    silence_s: float = _SILENCE_S,
     on_row: Callable[[tuple[float, ...]], None] = lambda values: None,
 ) -> Session:
     """Record `samples` lines, or until `stop_asked`. Returns the metadata; raises AcquireError, and then, too, log and

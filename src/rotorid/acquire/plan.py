@@ -25,7 +25,7 @@ from rotorid.io.text.wording import explain
 from rotorid.io.wire import INSTRUMENTS
 
 Kind = Literal["stream", "calibrate", "static", "dynamic", "thrust", "torque", "wrench", "experiment", "tensile"]
-NEEDS: dict[str, tuple[str, ...]] = {
+_NEEDS: dict[str, tuple[str, ...]] = {
     "calibrate": ("bench",),
     "static": ("bench",),
     "dynamic": ("bench",),
@@ -184,7 +184,7 @@ def _check_step(step: Step, place: int, operator: str | None) -> None:
 
 
 def _instruments(plan: Plan, place: int, group: Group) -> tuple[str, ...]:
-    needed = NEEDS.get(group.do, ())
+    needed = _NEEDS.get(group.do, ())
     if group.instrument is not None and len(needed) < 2:
         needed = (group.instrument,)
     if not needed:

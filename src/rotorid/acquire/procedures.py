@@ -1,20 +1,29 @@
 """What a recorder does with an instrument, step by step. Each procedure takes open recorders.
 
 Time in here is the device's: a procedure counts samples, so it is the same at any speed of the host.
+
+The recorder's own filter and its idea of steady (thesis 2.7.3, fig. 2.35).
 """
 
 from __future__ import annotations
 
+import math
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from rotorid.acquire.errors import GaveUp
 from rotorid.acquire.recorder import Recorder, Row
-from rotorid.acquire.steady import LowPass, Steadiness
+from rotorid.io.experiments import Experiment
 from rotorid.io.wire import quadrotor, rotor, wrench
 
-SETTLING_SAMPLES = 10  # fig. 2.35: voltage spikes dissipate
-TARE_SAMPLES = 25
+RAMP_S = 3.0
+HOLD_S = 8.0
+_PERIODS = 5
+_LETTERS = {"Hover": "h", "Bounce": "b", "Roll": "r", "Pitch": "p", "Yaw": "y"}
+
+_SETTLING_SAMPLES = 10  # fig. 2.35: voltage spikes dissipate
+_TARE_SAMPLES = 25
 
 Prompt = Callable[[str], Callable[[], bool]]
 """Asks a person for something and returns a function that says whether it is done, asked once per sample."""
@@ -143,7 +152,7 @@ def measure_wrench(
         recorder.command(wrench.OFFSET)
         recorder.start(interval_s, resumable=False)  # the zero is lost with the power
     else:
-        start_wrench(recorder, interval_s, arguments)
+        _start_wrench(recorder, interval_s, arguments)
     recorder.ends_by_itself = measuring_times > 0
     recorder.phase = "measuring"
     for _ in recorder.rows(samples):
@@ -152,7 +161,7 @@ def measure_wrench(
     recorder.command(wrench.POWER, b"\0")
 
 
-def start_wrench(recorder: Recorder, interval_s: float, initialise: bytes | None = None) -> None:
+def _start_wrench(recorder: Recorder, interval_s: float, initialise: bytes | None = None) -> None:
     """Power on, initialise and start, and all of it again should the sensor restart."""
     arguments = initialise or wrench.pack_initialise(interval_s, 0, 0)
 
@@ -193,7 +202,7 @@ def experiment(
 ) -> None:
     """Quadrotor and wrench together, each with its own clock: rest, programme, rest."""
     vehicle.guard()
-    start_wrench(sensor, interval_s)
+    _start_wrench(sensor, interval_s)
     _together(sensor, rest_s / interval_s, vehicle)
     start_programme(vehicle, letter, programme)
     sensor.phase = vehicle.phase
@@ -217,7 +226,7 @@ def torque_test(
 ) -> None:
     """Motor 1 of the vehicle on the wrench sensor, driven and counted by the thrust tester."""
     tester.guard()
-    start_wrench(sensor, interval_s)
+    _start_wrench(sensor, interval_s)
     tester.start(resumable=False)
     _together(sensor, rest_s / interval_s, tester)
     _throttle(tester, throttle, hold_s)
@@ -235,14 +244,14 @@ def torque_test(
 
 def _tare(recorder: Recorder, rule: SteadyRule, wait_s: float) -> None:
     recorder.phase = "settling"
-    for row in recorder.rows(SETTLING_SAMPLES):
+    for row in recorder.rows(_SETTLING_SAMPLES):
         last = row
     recorder.mark("settled", last)
     _wait_until_steady(recorder, rule, "steady", wait_s)
     recorder.phase = "taring"
     sums = [0.0] * len(recorder.instrument.channels)
     count = 0
-    for row in recorder.rows(TARE_SAMPLES):
+    for row in recorder.rows(_TARE_SAMPLES):
         if count == 0:
             recorder.mark("tare_start", row)
         sums = [total + value for total, value in zip(sums, row.values, strict=True)]
@@ -304,3 +313,47 @@ def _together(leader: Recorder, samples: float, *others: Recorder) -> None:
             other.pump()
             other.drop_rows()
         leader.drop_rows()
+
+
+class LowPass:
+    """First-order low-pass y += α (x − y) with α = 1 − exp(−2π f_c Δt), for tuples of channels."""
+
+    def __init__(self, cutoff_hz: float, interval_s: float) -> None:
+        self._alpha = 1 - math.exp(-2 * math.pi * cutoff_hz * interval_s)
+        self._state: list[float] | None = None
+
+    def update(self, values: tuple[float, ...]) -> list[float]:
+        """The filtered values; the first sample passes unchanged."""
+        if self._state is None:
+            self._state = list(values)
+        else:
+            self._state = [y + self._alpha * (x - y) for y, x in zip(self._state, values, strict=True)]
+        return self._state
+
+
+class Steadiness:
+    """Steady: over the last `window` samples no channel's filtered value spans more than `tolerance`."""
+
+    def __init__(self, window: int, tolerance: tuple[float, ...]) -> None:
+        self._last: deque[list[float]] = deque(maxlen=window)
+        self._tolerance = tolerance
+
+    def update(self, filtered: list[float]) -> bool:
+        """Take one more filtered sample; True once the window is full and steady."""
+        self._last.append(filtered)
+        if len(self._last) < self._last.maxlen:
+            return False
+        return all(span <= t for span, t in zip(self.spans(), self._tolerance, strict=True))
+
+    def spans(self) -> list[float]:
+        """What each channel spans over the window so far."""
+        return [max(channel) - min(channel) for channel in zip(*self._last, strict=True)]
+
+
+def programme_of(experiment: Experiment) -> tuple[str, quadrotor.Programme]:
+    """Command character and programme."""
+    letter = _LETTERS.get(experiment.dynamics.split()[0], "t")
+    if experiment.signal == "sine":
+        duration_s = _PERIODS / experiment.frequency_hz
+        return letter, quadrotor.Programme(quadrotor.SINE, experiment.maxima, 0.0, duration_s, experiment.frequency_hz)
+    return letter, quadrotor.Programme(quadrotor.TRAPEZOID, experiment.maxima, RAMP_S, HOLD_S, 0.0)

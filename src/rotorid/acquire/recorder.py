@@ -3,6 +3,8 @@
 A recording is a `with` block around a `Recorder`; what a procedure does with the instrument (tare, throttle,
 programme) stands in its own module and only uses `command`, `start`, `rows` and `stop`. However the block
 ends, the log is closed and the metadata next to it say how it ended.
+
+Appends chunks to a raw log. Bytes are on disk before anything looks at them.
 """
 
 from __future__ import annotations
@@ -35,7 +37,6 @@ from rotorid.acquire.errors import (
     PortMissing,
     Refused,
 )
-from rotorid.acquire.log_writer import FULL, LogWriter
 from rotorid.acquire.transport import Transport
 from rotorid.io import rawlog, wire
 from rotorid.io.frames import ANSWER, COMMAND, DATA, END, START, Frame, encode
@@ -44,10 +45,12 @@ from rotorid.io.session import Counts, Ended, GapEntry, Session, Setup, write_se
 from rotorid.io.session import Event as SessionEvent
 from rotorid.io.wire.base import COMPLETE, GO, IDENTIFY, KEEP, OK, STOP, STOPPED, UNHEARD, pack_keep
 
+_BALLAST_BYTES = 64 * 1024
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 NAME = re.compile(r"\w[\w.+-]{0,99}")  # of a recording: one file name, nothing that leads to another folder
-UNREADABLE_AT_MOST = 20  # samples of a wrong length before the first right one: the firmware is another
-MAX_GAPS_LISTED = 1000
-RATE_TOLERANCE = 0.02
+_UNREADABLE_AT_MOST = 20  # samples of a wrong length before the first right one: the firmware is another
+_MAX_GAPS_LISTED = 1000
+_RATE_TOLERANCE = 0.02
 
 
 @dataclass(frozen=True)
@@ -442,7 +445,7 @@ class Recorder:
             return
         if self._exceeded:
             raise LimitExceeded(self._exceeded)
-        if not self._samples and self._intake.malformed_samples >= UNREADABLE_AT_MOST:
+        if not self._samples and self._intake.malformed_samples >= _UNREADABLE_AT_MOST:
             raise Refused(
                 f"the {self.instrument.title} sends what this version cannot read ({self._intake.fault}): "
                 "update its firmware or this program"
@@ -710,8 +713,8 @@ class Recorder:
             malformed_samples=self._intake.malformed_samples or None,
             unknown_kinds=self._intake.unknown_kinds or None,
         )
-        session.gaps = [GapEntry(**vars(gap)) for gap in tracker.gaps[:MAX_GAPS_LISTED]]
-        session.gaps_left_out = max(0, len(tracker.gaps) - MAX_GAPS_LISTED)
+        session.gaps = [GapEntry(**vars(gap)) for gap in tracker.gaps[:_MAX_GAPS_LISTED]]
+        session.gaps_left_out = max(0, len(tracker.gaps) - _MAX_GAPS_LISTED)
         rate = self._measured_rate()
         if self.identity is not None and self.identity.interval_us:
             session.promised_rate_hz = round(1e6 / self.identity.interval_us, 6)
@@ -721,7 +724,7 @@ class Recorder:
             session.measured_rate_hz = round(rate, 6)
             session.duration_s = round(device_s + self._restart_device_s, 6)
             # bytes come up to one read late, so a short recording says little about the clock
-            if host_s > 4 * self._timings.poll_s / RATE_TOLERANCE:
+            if host_s > 4 * self._timings.poll_s / _RATE_TOLERANCE:
                 session.device_clock_ratio = round(device_s / host_s, 6)
         session.warnings = list(_warnings(session))
         with open(self.log_path, "rb") as log:
@@ -762,8 +765,101 @@ def _warnings(session: Session) -> Iterator[str]:
     if counts.device_skipped:
         yield f"the device itself skipped {counts.device_skipped} samples; ask for a lower rate"
     promised, measured = session.promised_rate_hz, session.measured_rate_hz
-    if promised and measured and abs(measured / promised - 1) > RATE_TOLERANCE:
+    if promised and measured and abs(measured / promised - 1) > _RATE_TOLERANCE:
         pace = "faster" if measured > promised else "slower"
         yield f"the device is {pace} than promised: {measured:.1f} instead of {promised:.1f} samples a second"
-    if session.device_clock_ratio and abs(session.device_clock_ratio - 1) > RATE_TOLERANCE:
+    if session.device_clock_ratio and abs(session.device_clock_ratio - 1) > _RATE_TOLERANCE:
         yield f"the device's clock runs at {session.device_clock_ratio:.3f} of the host's; one of them is off"
+
+
+class LogWriter:
+    """An open raw log.
+
+    A ballast keeps 64 KiB of the disk in reserve: a file that is open and has no name any more, so that it is gone with
+    this program, however that ends. When the disk runs full the ballast is given up, so that the chunk in hand and the
+    session's metadata still find room; then DiskFull is raised.
+    """
+
+    def __init__(self, path: Path, durable: bool = True) -> None:
+        """Creates the log. `durable` forces it to disk every second and at the end (a power cut loses no
+        more than that). Raises FileExistsError: a recording is never overwritten."""
+        self.path = path
+        self.bytes_written = 0
+        self.durable = durable
+        self._synced_ns = 0
+        self._ballast = -1
+        self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
+        try:
+            if durable:
+                self._take_ballast()
+            self._append(rawlog.MAGIC)
+        except OSError as error:
+            self.discard()
+            raise self._full(error) from error
+
+    def write(self, tag: int, host_ns: int, data: bytes) -> None:
+        """Append a chunk. Raises DiskFull; the chunk is whole on disk if the ballast gave room for it."""
+        self._write(rawlog.pack_chunk(tag, host_ns, data), host_ns)
+
+    def close(self) -> None:
+        if self._file < 0:
+            return
+        if self.durable:
+            os.fsync(self._file)
+        os.close(self._file)
+        self._file = -1
+        self._drop_ballast()
+
+    def discard(self) -> None:
+        """Leave nothing behind: for a recording that never began."""
+        self.durable = False
+        self.close()
+        self.path.unlink(missing_ok=True)
+
+    def _write(self, packed: bytes, host_ns: int) -> None:
+        start = self.bytes_written
+        try:
+            self._append(packed)
+            if self.durable and host_ns - self._synced_ns > 1_000_000_000:
+                os.fdatasync(self._file)
+                self._synced_ns = host_ns
+        except OSError as error:
+            if error.errno not in FULL:
+                raise
+            self._drop_ballast()
+            full = self._full(error)
+            try:
+                self._append(packed[self.bytes_written - start :])
+                full.stored = True
+            except OSError:  # not even the ballast's room was enough: the log ends in a cut chunk
+                pass
+            raise full from error
+
+    def _take_ballast(self) -> None:
+        try:
+            # Never with a name, however early this program is killed.
+            self._ballast = os.open(self.path.parent, os.O_WRONLY | os.O_TMPFILE, 0o600)
+        except (AttributeError, OSError):  # not every system, nor every file system, has such files
+            path = self.path.with_name(self.path.name + ".ballast")
+            self._ballast = os.open(path, os.O_WRONLY | os.O_CREAT, 0o600)
+            path.unlink()
+        data = bytes(_BALLAST_BYTES)
+        while data:
+            data = data[os.write(self._ballast, data) :]
+
+    def _drop_ballast(self) -> None:
+        if self._ballast >= 0:
+            os.close(self._ballast)
+            self._ballast = -1
+
+    def _append(self, data: bytes) -> None:
+        while data:
+            written = os.write(self._file, data)
+            self.bytes_written += written
+            data = data[written:]
+
+    def _full(self, error: OSError) -> DiskFull:
+        return DiskFull(
+            f"{self.path}: cannot be written any more ({os.strerror(error.errno)}). "
+            "What came before is safe. Free some space or use another disk (--out), then record again."
+        )

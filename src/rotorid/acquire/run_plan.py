@@ -1,11 +1,14 @@
-"""Carries out a campaign's plan: checks first, then step after step; the same with instruments and with emulators."""
+"""Carries out a campaign's plan: checks first, then step after step; the same with instruments and with emulators.
+
+Completes the metadata of a recording whose recorder was killed, from the log alone.
+"""
 
 from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -14,19 +17,18 @@ import numpy as np
 from rotorid.acquire import procedures
 from rotorid.acquire.errors import AcquireError
 from rotorid.acquire.plan import Plan, Step, attempts, is_done, next_attempt, stems, steps_of
-from rotorid.acquire.programmes import programme_of
+from rotorid.acquire.procedures import programme_of
 from rotorid.acquire.record import recorders_for, run_with
 from rotorid.acquire.recorder import Recorder
-from rotorid.acquire.repair import repair
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.index import write_index
-from rotorid.io.logs import LogError, read_log
-from rotorid.io.rawlog import NotALog
-from rotorid.io.session import Ended, SessionError, Setup, read_session
+from rotorid.io.logs import Log, LogError, read_log
+from rotorid.io.rawlog import RECEIVED, NotALog, read_raw
+from rotorid.io.session import Counts, Ended, GapEntry, SessionError, Setup, read_session, session_path, write_session
 
-Say = Callable[[str], None]
-Ask = Callable[[str], str]
-Prompts = Callable[[Step], Callable[[Recorder], procedures.Prompt]]
+_Say = Callable[[str], None]
+_Ask = Callable[[str], str]
+_Prompts = Callable[[Step], Callable[[Recorder], procedures.Prompt]]
 Watch = Callable[[list[Recorder], Callable[[], None]], None]
 
 
@@ -34,9 +36,9 @@ Watch = Callable[[list[Recorder], Callable[[], None]], None]
 class Desk:
     """Who sits there: how they are informed, asked and waited for."""
 
-    say: Say
-    ask: Ask  # a question; the answer is "", or a word
-    prompts: Prompts  # how a procedure asks for a load
+    say: _Say
+    ask: _Ask  # a question; the answer is "", or a word
+    prompts: _Prompts  # how a procedure asks for a load
     watch: Watch  # run with these recorders, showing them
 
 
@@ -100,7 +102,7 @@ def _rest_faults(plan: Plan, recorder: Recorder) -> Iterator[str]:
             yield f"{column}: reads {mean:.3g} at rest, allowed {plan.checks.zero[column]:g} (checks.zero); tare it"
 
 
-def record_step(plan: Plan, step: Step, ports: dict[str, str], desk: Desk) -> None:
+def _record_step(plan: Plan, step: Step, ports: dict[str, str], desk: Desk) -> None:
     """Record one step under the next free name. Raises AcquireError."""
     setup: Setup = step.setup(plan.operator)
     recorders = recorders_for(
@@ -151,7 +153,7 @@ def _carry_out(step: Step, desk: Desk, *recorders: Recorder) -> None:
         procedures.stream(first, None, moves=True)
 
 
-def complete_killed(plan: Plan, steps: list[Step], say: Say) -> None:
+def _complete_killed(plan: Plan, steps: list[Step], say: _Say) -> None:
     """Counts and gaps for the metadata of attempts whose recorder was killed; the attempts stay what they are."""
     for step in steps:
         for name in attempts(plan, step):
@@ -170,7 +172,7 @@ def run(plan: Plan, ports_of: Callable, desk: Desk, repeat: str | None = None, c
     a step fails: what was wrong has to be seen to before the next one.
     """
     steps = steps_of(plan)
-    complete_killed(plan, steps, desk.say)
+    _complete_killed(plan, steps, desk.say)
     done = {step.name for step in steps if is_done(plan, step)}
     wanted = [step for step in steps if step.name == repeat or (repeat is None and step.name not in done)]
     desk.say(f"{plan.name}: {len(done)} of {len(steps)} recordings are there")
@@ -188,7 +190,7 @@ def run(plan: Plan, ports_of: Callable, desk: Desk, repeat: str | None = None, c
         if word in ("s", "skip"):
             continue
         with ports_of(step) as ports:
-            record_step(plan, step, ports, desk)
+            _record_step(plan, step, ports, desk)
         write_index(plan.out)
         if is_done(plan, step):
             done.add(step.name)
@@ -227,3 +229,34 @@ def emulated_ports(
             emulated = stack.enter_context(EmulatedPorts(world, links, speed=speed))
             ports |= {line.device.instrument.name: port for line, port in zip(world.lines, emulated.names, strict=True)}
         yield ports
+
+
+def repair(log: Path, parsed: Log) -> bool:
+    """Fill in counts and gaps where the metadata still say `recording`. True if there was something to do.
+
+    A log whose recorder is still at work looks the same: the command is for logs, not for recordings.
+    """
+    session = parsed.session
+    if session is None or session.ended != Ended.RECORDING or session.duration_s is not None:
+        return False
+    table = parsed.table
+    raw = read_raw(log)
+    received = sum(len(chunk.data) for chunk in raw.chunks if chunk.tag == RECEIVED)
+    session.counts = Counts(
+        bytes_received=received,
+        samples=len(table),
+        missing=parsed.missing,
+        repeated=parsed.repeated,
+        checksum_errors=parsed.checksum_errors,
+        broken_frames=parsed.broken_frames,
+        resets=parsed.resets,
+        malformed=parsed.malformed or None,
+        unknown_kinds=parsed.unknown_kinds or None,
+    )
+    if not parsed.faults:  # from now on a change of the log is noticed
+        session.log_sha256 = raw.sha256
+    session.gaps = [GapEntry(**asdict(gap)) for gap in parsed.gaps[:1000]]
+    session.gaps_left_out = max(0, len(parsed.gaps) - 1000)
+    session.duration_s = round(float(table.time_s.iloc[-1]), 6) if len(table) else 0.0
+    write_session(session, session_path(log))
+    return True

@@ -19,8 +19,8 @@ from rich.text import Text
 
 from rotorid.acquire.recorder import Recorder, Status
 
-REFRESH_HZ = 5
-PLOT_SAMPLES = 600
+_REFRESH_HZ = 5
+_PLOT_SAMPLES = 600
 _DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # braille, rows by columns
 
 
@@ -48,7 +48,7 @@ class Plot:
     def __init__(self, column: str, number: int) -> None:
         self.column = column
         self._number = number
-        self._values: deque[float] = deque(maxlen=PLOT_SAMPLES)
+        self._values: deque[float] = deque(maxlen=_PLOT_SAMPLES)
 
     @classmethod
     def of(cls, recorder: Recorder, column: str) -> Plot:
@@ -196,7 +196,7 @@ def watch(
         try:
             with Live(picture(), console=console, auto_refresh=False) as live:
                 while thread.is_alive():
-                    thread.join(1 / REFRESH_HZ)
+                    thread.join(1 / _REFRESH_HZ)
                     live.update(picture(), refresh=True)
         except BaseException:  # nobody looks any more: the device must not go on for that
             stop.set()

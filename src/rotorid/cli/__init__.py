@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from rotorid.cli import (
-    checking,
     comparing,
     effects,
     exporting,
@@ -20,6 +19,7 @@ from rotorid.cli import (
     starting,
     verdicts,
 )
+from rotorid.cli.starting import check
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -66,7 +66,7 @@ app.command("plan")(planning.plan)
 app.command("together")(planning.together)
 app.command("import")(importing.import_logs)
 app.command("init")(starting.init)
-app.command("check")(checking.check)
+app.command("check")(check)
 app.command("simulate")(simulating.simulate)
 app.command("export")(exporting.export)
 app.command("model")(modelling.model)

@@ -44,11 +44,11 @@ def one_sentence() -> Iterator[None]:
     except Exception as error:
         if os.environ.get(TRACEBACK):
             raise
-        typer.echo(f"rotorid: {unexpected(error)}", err=True)
+        typer.echo(f"rotorid: {_unexpected(error)}", err=True)
         raise typer.Exit(1) from None
 
 
-def unexpected(error: Exception) -> str:
+def _unexpected(error: Exception) -> str:
     """The sentence on an error that nobody foresaw: what it is, where it arose, and what to do."""
     package = Path(__file__).parents[1]
     frames = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename).is_relative_to(package)]

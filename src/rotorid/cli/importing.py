@@ -97,8 +97,7 @@ def _as_dict(made: Made, durations: dict[str, float], refused: str) -> dict:
 
 
 def _write_mapping(logs: list[Path], target: Path, as_json: bool) -> None:
-    from rotorid.recordings.importers.guessing.guess import guess
-    from rotorid.recordings.importers.guessing.text import as_text
+    from rotorid.recordings.importers.guessing.guess import as_text, guess
     from rotorid.recordings.importers.logfile import format_of
     from rotorid.recordings.importers.mapping import read_columns
 

@@ -54,13 +54,13 @@ def model(
             folder = made.folder
             if not quiet:
                 print_notes(made)
-        written, said = write_model(folder, target, to, quiet)
+        written, said = _write_model(folder, target, to, quiet)
         for sentence in said:
             typer.echo(sentence)
         typer.echo(", ".join(str(path) for path in written))
 
 
-def write_model(folder: Path, target: Path, to: str, quiet: bool = True) -> tuple[list[Path], list[str]]:
+def _write_model(folder: Path, target: Path, to: str, quiet: bool = True) -> tuple[list[Path], list[str]]:
     """Judge the set in `folder`, write verdict, export and comparison into `target`; the files, and what to say."""
     with progress("model", quiet), warnings.catch_warnings():
         warnings.simplefilter("ignore")

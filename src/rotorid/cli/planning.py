@@ -1,18 +1,28 @@
-"""`rotorid plan` and `rotorid together`: the next flight, and what it settled."""
+"""`rotorid plan` and `rotorid together`: the next flight, and what it settled.
+
+The plan on the verdict's page: into the section on what to fly next, in place of an earlier plan.
+"""
 
 from __future__ import annotations
 
+import base64
 import json
+import re
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from markupsafe import Markup, escape
 
 from rotorid.cli.console import one_sentence, progress
 from rotorid.errors import InputError
 from rotorid.io.text.names import neighbour
 from rotorid.steps import step
+
+OPEN, _CLOSE = "<!-- plan -->", "<!-- end of the plan -->"
+SECTION = re.compile(r"(<section><h2>What to fly next</h2>.*?)(?:" + OPEN + ".*?" + _CLOSE + r")?(</section>)", re.S)
 
 
 def plan(
@@ -44,7 +54,7 @@ def plan(
         from rotorid.plan.limits import Limits, SessionLimits, read_limits
 
         wishes = wished(want or [])
-        folder, content = read_verdict(verdict)
+        folder, content = _read_verdict(verdict)
         flight = content["kind"] == "flight"
         allowed = read_limits(limits, Limits if flight else SessionLimits)
         if wishes and not flight:
@@ -52,18 +62,18 @@ def plan(
         sources = recordings or sets_of(folder, content)
         with progress("plan", quiet), step("planning"), warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            source = read_sets(sources)
+            source = _read_sets(sources)
             if flight:
-                said, files, picture = flight_plan(source, content, allowed, wishes, out or folder / "plan")
+                said, files, picture = _flight_plan(source, content, allowed, wishes, out or folder / "plan")
             else:
-                said, files, picture = session_plan(source, content, allowed, out or folder / "plan")
-            onto_page(folder / "report.html", source.name, said, picture)
+                said, files, picture = _session_plan(source, content, allowed, out or folder / "plan")
+            _onto_page(folder / "report.html", source.name, said, picture)
         for line in said:
             typer.echo(line)
         typer.echo(f"{files[0].parent}: {', '.join(f.name for f in files)}")
 
 
-def flight_plan(source, content: dict, allowed, wishes: dict[str, float], folder: Path):
+def _flight_plan(source, content: dict, allowed, wishes: dict[str, float], folder: Path):
     """Plan a flight and write it: sentences, files, and the picture where there is one."""
     from rotorid.plan.plan import plan as make_plan
     from rotorid.plan.questions import known_from
@@ -74,7 +84,7 @@ def flight_plan(source, content: dict, allowed, wishes: dict[str, float], folder
     return text(made), files, folder / "plan.png" if made.pieces else None
 
 
-def session_plan(source, content: dict, allowed, folder: Path):
+def _session_plan(source, content: dict, allowed, folder: Path):
     """Plan a session of a stand or bench and write it: sentences, files, and the picture where there is one."""
     from rotorid.plan.session import known_instrument_from, plan_session
     from rotorid.plan.write_session import text, write
@@ -84,10 +94,10 @@ def session_plan(source, content: dict, allowed, folder: Path):
     return text(made), files, folder / "plan.png" if made.steps else None
 
 
-def onto_page(page: Path, name: str, said: list[str], picture: Path | None) -> None:
+def _onto_page(page: Path, name: str, said: list[str], picture: Path | None) -> None:
     """Put the plan on the verdict's page, where there is one."""
+    from rotorid.cli.planning import with_plan
     from rotorid.io.text.writing import all_or_none
-    from rotorid.plan.page import with_plan
 
     if not page.is_file():
         return
@@ -113,7 +123,7 @@ def wished(texts: list[str]) -> dict[str, float]:
     return out
 
 
-def read_verdict(path: Path) -> tuple[Path, dict]:
+def _read_verdict(path: Path) -> tuple[Path, dict]:
     """Folder and content of a verdict."""
     file = path / "verdict.json" if path.is_dir() else path
     if not file.is_file():
@@ -143,7 +153,7 @@ def sets_of(folder: Path, content: dict) -> list[Path]:
     raise InputError(f"{folder}: the recording set {lacking} of this verdict is not next to it; name it with --set")
 
 
-def read_sets(paths: list[Path]):
+def _read_sets(paths: list[Path]):
     """A set, or several of one vehicle as one."""
     from rotorid.plan.together import joined_sets
     from rotorid.recordings import read_set
@@ -196,3 +206,25 @@ def together(
         if open_classes(analysis):
             typer.echo(f"  - Not all is settled: `rotorid plan {target}` plans the next flight.")
         typer.echo(f"{target / 'report.html'}")
+
+
+def section(name: str, said: Sequence[str], picture: bytes | None = None) -> Markup:
+    """The sentences of a plan for a set as HTML, and its picture (PNG) where there is one.
+
+    Sentences that are set in belong to the first: its steps.
+    """
+    first = Markup("<br>").join([said[0], *(line.strip() for line in said if line.startswith("  "))])
+    others = [line for line in said[1:] if not line.startswith("  ")]
+    lines = Markup("").join(Markup("<li>{}</li>").format(line) for line in (first, *others))
+    out = Markup("<ul>{}</ul>").format(lines)
+    if picture:
+        data = base64.b64encode(picture).decode()
+        words = f"What is planned for {name}, step by step, and the expected separations"
+        out += Markup('<img style="max-width:100%" alt="{}" src="data:image/png;base64,{}">').format(words, data)
+    return out
+
+
+def with_plan(page: str, name: str, said: Sequence[str], picture: bytes | None = None) -> str:
+    """A verdict's page with the plan in it; a page without that section as it is."""
+    made = f"{OPEN}{escape(section(name, said, picture))}{_CLOSE}"
+    return SECTION.sub(lambda found: found[1] + made + found[2], page, count=1)

@@ -20,32 +20,32 @@ from rotorid.io.text.writing import all_or_none
 
 Run = list[tuple[str, float]]
 """Steps one after the other, and the seconds of each."""
-KEPT, ALIKE, LEAST = 24, 5, 3
+KEPT, _ALIKE, _LEAST = 24, 5, 3
 """Runs that the record keeps of a command; those asked, the most alike in their steps so far; and how many at least."""
-AGREE, SOON_S = 2.0, 5.0
+_AGREE, SOON_S = 2.0, 5.0
 """Factor within which all but the shortest must agree; what is less than `SOON_S` counts as that."""
-UNMET, LONGER = 0.3, 0.3
+UNMET, _LONGER = 0.3, 0.3
 """Power of the pace at which a step not yet met is taken to follow it; share of its time that an overdue step lasts."""
-PAUSE_S = 10.0
+_PAUSE_S = 10.0
 """Between two lines where there is no terminal."""
 
 
 def left(runs: Sequence[Run], done: Run, name: str, spent_s: float) -> float | None:
     """Seconds left after `spent_s` in the step `name`; None where earlier runs do not say it."""
-    if not done or len(runs) < LEAST:  # while it reads, nothing is known of the recordings
+    if not done or len(runs) < _LEAST:  # while it reads, nothing is known of the recordings
         return None
-    alike = sorted((as_then(run, done, name, spent_s) for run in reversed(runs)), key=lambda then: then[0])[:ALIKE]
+    alike = sorted((_as_then(run, done, name, spent_s) for run in reversed(runs)), key=lambda then: then[0])[:_ALIKE]
     found = sorted(max(seconds, SOON_S) for _, seconds in alike)
     low, middle, high = (found[int(share * len(found))] for share in (0.2, 0.5, 0.8))
-    return middle if high <= AGREE * low else None
+    return middle if high <= _AGREE * low else None
 
 
-def as_then(run: Run, done: Run, name: str, spent_s: float) -> tuple[int, float]:
+def _as_then(run: Run, done: Run, name: str, spent_s: float) -> tuple[int, float]:
     """How many steps only one of two runs has met so far, and the seconds left if all goes on as in the earlier one.
 
     As many of each step follow as then, from the newest that both have met.
     """
-    now, then = times_of(done), times_of(run)
+    now, then = _times_of(done), _times_of(run)
     own, whole = [*(step for step, _ in done), name], [step for step, _ in run]
     newest = max(set(own) & set(whole), key=own.index, default=None)
     start = 0 if newest is None else whole.index(newest)
@@ -61,12 +61,12 @@ def as_then(run: Run, done: Run, name: str, spent_s: float) -> tuple[int, float]
     def again(step: str) -> float:
         return mean(now[step]) if step in now else mean(then.get(step, [0.0])) * (takes / took) ** UNMET
 
-    going = again(name) - spent_s if again(name) > spent_s else LONGER * spent_s
+    going = again(name) - spent_s if again(name) > spent_s else _LONGER * spent_s
     rest_s = sum(count * again(step) for step, count in rest.items() if count > 0)
     return len(set(own) ^ set(whole[: start + 1])), going + rest_s
 
 
-def times_of(run: Run) -> dict[str, list[float]]:
+def _times_of(run: Run) -> dict[str, list[float]]:
     """Seconds of each step, every time that it was met."""
     out = defaultdict(list)
     for step, seconds in run:
@@ -89,12 +89,12 @@ class Waiting:
     def __init__(
         self, runs: Sequence[Run], say: Callable[[str], None] | None = None, clock: Callable[[], float] = time.monotonic
     ):
-        """`say` takes a line when a step begins or ends, every `PAUSE_S` seconds at most."""
+        """`say` takes a line when a step begins or ends, every `_PAUSE_S` seconds at most."""
         self.runs, self.say, self.clock = runs, say, clock
         self.done: Run = []
         self.path: tuple[str, ...] = ()
         self.began = self.since = clock()
-        self.said = -PAUSE_S
+        self.said = -_PAUSE_S
 
     def heard(self, path: tuple[str, ...]) -> None:
         """A step began or ended."""
@@ -105,7 +105,7 @@ class Waiting:
 
     def speak(self) -> None:
         """Say the line, if it is time."""
-        if self.say and self.clock() - self.began - self.said >= PAUSE_S:
+        if self.say and self.clock() - self.began - self.said >= _PAUSE_S:
             self.said = self.clock() - self.began
             self.say(self.line())
 

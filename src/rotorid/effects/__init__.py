@@ -3,7 +3,6 @@
 OPEN = (
     "advice",
     "catalogue",
-    "compiling",
     "contract",
     "delay",
     "describe",

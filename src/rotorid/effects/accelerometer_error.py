@@ -20,7 +20,7 @@ def misalignment(motion, vehicle, values):
     return Contribution(specific_force=np.cross(np.asarray(values, float)[None, :], motion.accelerometer))
 
 
-def all_errors(motion, vehicle, values):
+def _all_errors(motion, vehicle, values):
     """a_m = (1 + s) a + θ × a + b."""
     total = (
         bias(motion, vehicle, values[:3]).specific_force
@@ -51,7 +51,7 @@ def forms(vehicle):
             "bias, scale and misalignment",
             "a_m = (1 + s) a + θ × a + b",
             b + s + t,
-            all_errors,
+            _all_errors,
             needs,
             excited_by=bias_too,
         ),

@@ -28,13 +28,13 @@ def followed_now(load, tau_s, dt_s):
     return late + lfilter([weight], [1.0, -(1.0 - share)], step, axis=0)
 
 
-def second_order(loading, vehicle, values):
+def _second_order(loading, vehicle, values):
     """Butterworth of second order with cutoff f_c: as a structure with a damping ratio of √½."""
     load = since_the_first(loading)
     return Contribution(reading=resonance(load, values[0], np.sqrt(0.5), loading.dt_s) - load)
 
 
-def fourth_order(loading, vehicle, values):
+def _fourth_order(loading, vehicle, values):
     """Bessel of fourth order with cutoff f_c, as amplifiers of strain gauges have: nearly a delay, and smooth."""
     load = since_the_first(loading)
     sos = bessel(4, values[0], fs=1.0 / loading.dt_s, output="sos", norm="mag")
@@ -55,8 +55,8 @@ def reading_forms(instrument):
 
     return (
         Form("first order", "y = F / (1 + i f/f_c)", (cutoff(first),), first_order),
-        Form("second order", "|y| = |F| / √(1 + (f/f_c)⁴)", (cutoff(second),), second_order),
-        Form("fourth order", "y = F / B₄(i f/f_c), B₄ the reverse Bessel polynomial", (cutoff(second),), fourth_order),
+        Form("second order", "|y| = |F| / √(1 + (f/f_c)⁴)", (cutoff(second),), _second_order),
+        Form("fourth order", "y = F / B₄(i f/f_c), B₄ the reverse Bessel polynomial", (cutoff(second),), _fourth_order),
     )
 
 

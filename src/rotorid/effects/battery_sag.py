@@ -10,7 +10,7 @@ def power(path, values):
     return path.speed * ((path.voltage / path.full_voltage) ** values[0])[:, None]
 
 
-def power_of_reference(path, values):
+def _power_of_reference(path, values):
     """ω = ω_c (1 + g) (V/V_0)^p: the command is right at another voltage than the largest."""
     return (1 + values[1]) * power(path, values[:1])
 
@@ -44,7 +44,7 @@ EFFECT = Effect(
             "ω = (1 + g) ω_c (V/V_0)^p",
             (P, Parameter("g", "1", -0.5, 1.0, meaning="excess of speed at the largest voltage")),
             SUPPLY,
-            power_of_reference,
+            _power_of_reference,
             (0.0, 0.0),
             ("voltage",),
             own_scale=True,

@@ -6,10 +6,10 @@ from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.hysteresis import play
 from rotorid.effects.loading import AXES, NO_ROTORS, UNITS
 
-LOOSE = 0.02
+_LOOSE = 0.02
 """Half width of the play by which friction turns over, as a share of the largest tilt: a cable that rubs does so
 within a little way, whatever the speed."""
-FRICTION = ((0, 1), (1, 0), (3, 0), (4, 1))
+_FRICTION = ((0, 1), (1, 0), (3, 0), (4, 1))
 """Channels and the tilt (0 roll, 1 pitch) whose friction they feel."""
 FORCE, MOMENT = "force per sine of the tilt", "moment per sine of the tilt"
 
@@ -60,7 +60,7 @@ def _full(pairs, rubbing=()):
 
 def friction(tilt_rad):
     """−1 to 1 by whether a tilt (n,) came from above or from below, turning over within a play; 0 without tilt."""
-    width = LOOSE * float(np.abs(tilt_rad).max())
+    width = _LOOSE * float(np.abs(tilt_rad).max())
     return (tilt_rad - play(tilt_rad, width)) / width if width > 0 else np.zeros(len(tilt_rad))
 
 
@@ -70,7 +70,7 @@ def reading_forms(instrument):
     names = ("k_x,pitch", "k_y,roll", "m_x,roll", "m_y,pitch", "k_x,roll", "k_y,pitch", "m_x,pitch", "m_y,roll")
     units = ("N/rad", "N/rad", "N m/rad", "N m/rad") * 2
     pairs = tuple((c, t) for c in instrument.channels for t in (0, 1))
-    rubbing = tuple((c, t) for c, t in FRICTION if c in instrument.channels)
+    rubbing = tuple((c, t) for c, t in _FRICTION if c in instrument.channels)
     matrix = tuple(
         Parameter(f"K_{AXES[c]},{n}", f"{UNITS[c]}/rad", meaning=MOMENT if c > 2 else FORCE)
         for c in instrument.channels

@@ -37,7 +37,7 @@ def _since_session(loading):
     return loading.session_time_s
 
 
-def other_rate(since_s):
+def _other_rate(since_s):
     """y(t) = F(t − e t), t = `since_s(loading)`."""
 
     def contribution(loading, vehicle, values):
@@ -46,7 +46,7 @@ def other_rate(since_s):
     return contribution
 
 
-def other_rate_and_start(since_s):
+def _other_rate_and_start(since_s):
     """y(t) = F(t − T − e t), t = `since_s(loading)`."""
 
     def contribution(loading, vehicle, values):
@@ -63,7 +63,7 @@ def _forms(instrument, name, span_s, since_s, t):
     skew = Parameter("e", "1", -0.1, 0.1, True, starts, "seconds lost per second", negligible=rate)
     at_start = tuple(k * dt for k in (-4.0, 4.0))
     late = Parameter("T", "s", -30 * dt, 60 * dt, True, at_start, "lateness at the start", negligible=2 * dt)
-    alone, both = other_rate(since_s), other_rate_and_start(since_s)
+    alone, both = _other_rate(since_s), _other_rate_and_start(since_s)
     return (
         Form(f"other rate{name}", f"y(t) = F(t − e {t})", (skew,), alone, excited_by=("load_change",)),
         Form(

@@ -1,34 +1,38 @@
-"""Centre of mass away from where the user believes it."""
+"""Centre of mass away from where the user believes it.
+
+Forces of what is fixed to the airframe.
+"""
+
+from __future__ import annotations
 
 import numpy as np
 
-from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.contract import Contribution, Effect, Form, Motion, Parameter
 from rotorid.effects.loading import NO_ROTORS, weight
-from rotorid.effects.rigid_body import force_of_lever
 
 
-def moment_only(motion, vehicle, values):
+def _moment_only(motion, vehicle, values):
     """M = -r_c × F_thrust: the rotors' arms are r_i - r_c; moments about the true centre of mass."""
     thrust = (vehicle.thrust_coefficients_n_s2() * motion.rotor_speed**2).sum(axis=1)
     return Contribution(moment=np.stack([values[1] * thrust, -values[0] * thrust, 0.0 * thrust], axis=1))
 
 
-def of_all_forces(motion, vehicle, values):
+def _of_all_forces(motion, vehicle, values):
     """M = -r_c × F: what drag and inflow do to the forces acts on that arm, too; F = m a, a the specific force."""
-    return Contribution(moment=-np.cross(first_moment(vehicle, values), motion.specific_force))
+    return Contribution(moment=-np.cross(_first_moment(vehicle, values), motion.specific_force))
 
 
-def with_lever_arm(motion, vehicle, values):
+def _with_lever_arm(motion, vehicle, values):
     """The same, and what is recorded is the motion of the believed centre of mass, at −r_c from the true one.
 
     F = −m (dΩ × r_c + Ω × (Ω × r_c)), r_c in the plane or in space: an accelerometer there and the recorded velocity
     both hold it.
     """
-    force = force_of_lever(motion, first_moment(vehicle, values))
-    return Contribution(force=force, moment=of_all_forces(motion, vehicle, values).moment)
+    force = force_of_lever(motion, _first_moment(vehicle, values))
+    return Contribution(force=force, moment=_of_all_forces(motion, vehicle, values).moment)
 
 
-def first_moment(vehicle, values):
+def _first_moment(vehicle, values):
     """m r_c (3,), kg m, of an offset in the plane or in space."""
     lever = np.zeros(3)
     lever[: len(values)] = vehicle.mass_kg * np.asarray(values)
@@ -43,7 +47,7 @@ def kernel(m, v, p, w):
     w.moment[1] -= p[0] * thrust
 
 
-def kernel_of_all_forces(m, v, p, w):
+def _kernel_of_all_forces(m, v, p, w):
     """`p` is r_x, r_y, r_z."""
     s = m.specific_force
     w.moment[0] -= v.mass * (p[1] * s[2] - p[2] * s[1])
@@ -51,7 +55,7 @@ def kernel_of_all_forces(m, v, p, w):
     w.moment[2] -= v.mass * (p[0] * s[1] - p[1] * s[0])
 
 
-def kernel_with_lever_arm(m, v, p, w):
+def _kernel_with_lever_arm(m, v, p, w):
     """`p` is r_x, r_y, r_z."""
     s, a, o = m.specific_force, m.angular_acceleration, m.angular_velocity
     w.moment[0] -= v.mass * (p[1] * s[2] - p[2] * s[1])
@@ -76,39 +80,39 @@ def forms(vehicle):
     known = ("rotor_speed", "angular_velocity")
     needs = (*known, "angular_acceleration", "specific_force")
     return (
-        Form("moment", "M = −r_c × F_thrust", plane, moment_only, known, excited_by=("rotor_speed",), kernel=kernel),
+        Form("moment", "M = −r_c × F_thrust", plane, _moment_only, known, excited_by=("rotor_speed",), kernel=kernel),
         Form(
             "moment of all forces",
             text,
             plane,
-            of_all_forces,
+            _of_all_forces,
             (*known, "specific_force"),
             excited_by=("specific_force",),
-            kernel=kernel_of_all_forces,
+            kernel=_kernel_of_all_forces,
             kernel_values=_in_the_plane,
         ),
         Form(
             "moment and lever arm",
             felt,
             plane,
-            with_lever_arm,
+            _with_lever_arm,
             needs,
-            kernel=kernel_with_lever_arm,
+            kernel=_kernel_with_lever_arm,
             kernel_values=_in_the_plane,
         ),
         Form(
             "moment and lever arm, in space",
             felt,
             space,
-            with_lever_arm,
+            _with_lever_arm,
             needs,
             must_show=(0, 1),
-            kernel=kernel_with_lever_arm,
+            kernel=_kernel_with_lever_arm,
         ),
     )
 
 
-def weight_moment(loading, vehicle, values):
+def _weight_moment(loading, vehicle, values):
     """On a stand the weight, not the thrust, moves with the centre of mass: M = r_c × m g."""
     offset = np.zeros(3)
     offset[: len(values)] = values
@@ -121,10 +125,10 @@ def reading_forms(instrument):
     if instrument.bench or vehicle.tared or not vehicle.mass_kg or not any(c >= 3 for c in instrument.channels):
         return ()
     space = tuple(Parameter(f"r_{a}", "m", -0.3, 0.3, meaning=f"centre of mass along {a}") for a in "xyz")
-    forms = [Form("moment of the weight", "M = r_c × m g", space[:2], weight_moment, excited_by=("always",))]
+    forms = [Form("moment of the weight", "M = r_c × m g", space[:2], _weight_moment, excited_by=("always",))]
     if instrument.tilts:
         forms.append(
-            Form("moment of the weight, in space", "M = r_c × m g", space, weight_moment, excited_by=("always",))
+            Form("moment of the weight, in space", "M = r_c × m g", space, _weight_moment, excited_by=("always",))
         )
     return tuple(forms)
 
@@ -155,3 +159,13 @@ EFFECT = Effect(
         else "no mass is stated or no moment is read"
     ),
 )
+
+
+def force_of_lever(motion: Motion, first_moment_kg_m: np.ndarray) -> np.ndarray:
+    """−(dΩ/dt × l + Ω × (Ω × l)), (n, 3), N, body axes: what turning adds to the force that moves a mass at a lever.
+
+    l is its first moment (3,), kg m. Source: Titterton and Weston, Strapdown Inertial Navigation Technology, ch. 4.
+    """
+    rate = motion.angular_velocity
+    turning = np.cross(motion.angular_acceleration, first_moment_kg_m)
+    return -turning - np.cross(rate, np.cross(rate, first_moment_kg_m))

@@ -26,7 +26,7 @@ def turning(loading, vehicle, values):
     return Contribution(reading=reading)
 
 
-TURNS = (
+_TURNS = (
     Parameter("b", "rad/N", meaning="turn per force across"),
     Parameter("e_x", "rad/N", meaning="turn about x per vertical force"),
     Parameter("e_y", "rad/N", meaning="turn about y per vertical force"),
@@ -58,7 +58,7 @@ def reading_forms(instrument):
         pairs = tuple((t, s) for s in sources for t in instrument.channels if t < 3)
         forms.append(_form("under all forces", pairs))
     if sources == (0, 1, 2) and set(sources) <= set(instrument.channels):
-        forms.append(Form("turning", "y = F + θ × F, θ = (−b F_y + e_x F_z, b F_x + e_y F_z, 0)", TURNS, turning))
+        forms.append(Form("turning", "y = F + θ × F, θ = (−b F_y + e_x F_z, b F_x + e_y F_z, 0)", _TURNS, turning))
     return tuple(forms)
 
 

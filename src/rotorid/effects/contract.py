@@ -6,6 +6,8 @@ the flight (`Motion`), the vehicle and parameter values to what it adds (`Contri
 linear in every parameter not marked `nonlinear`, which the selection relies on and a test holds.
 
 Frames: world north-east-down, body forward-right-down. All functions take n instants at once.
+
+Functions compiled to machine code that is kept between runs where there is a place for it.
 """
 
 from __future__ import annotations
@@ -13,9 +15,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from numba import njit
 
 from rotorid.recordings.run import RecordingSet
 from rotorid.recordings.vehicle import Vehicle
@@ -141,11 +144,11 @@ class Parameter:
     """No instrument is better than this: a form whose parameters are all below it is not worth a word."""
 
 
-Wrench = Callable[[Motion, Vehicle, np.ndarray], Contribution]
+_Wrench = Callable[[Motion, Vehicle, np.ndarray], Contribution]
 Kernel = Callable[..., None]
 """`kernel(m, v, p, w)`: adds to `w` (fields of `rotorid.vehicle.kernels.ADDED`) what a form does at the instant `m`
 (`INSTANT`) to the vehicle `v` (`BODY`) with the values `p`. Arithmetic and `math` alone: numba compiles it."""
-Residuals = Sequence[tuple[Motion, dict[str, np.ndarray]]]
+_Residuals = Sequence[tuple[Motion, dict[str, np.ndarray]]]
 """Motions of a recording, each with the `force` and `moment` that are not explained, (n, 3) in body axes."""
 
 
@@ -159,7 +162,7 @@ class Form:
     name: str
     equation: str
     parameters: tuple[Parameter, ...]
-    contribution: Wrench
+    contribution: _Wrench
     requires: tuple[str, ...] = ()
     """Fields of `Motion` that must be there."""
     vehicle_requires: tuple[str, ...] = ()
@@ -177,7 +180,7 @@ class Form:
     of_reading: tuple[tuple[int, int], ...] = ()
     """Linear parameters p of Ω_m = (1 + s) Ω + p (s itself, a bias) and the index of their s, where recordings give the
     reading Ω_m alone: a fit to it is of p/(1 + s)."""
-    guess: Callable[[Residuals, Vehicle], tuple[tuple[float, ...], ...]] | None = None
+    guess: Callable[[_Residuals, Vehicle], tuple[tuple[float, ...], ...]] | None = None
     """From what the believed vehicle leaves: starting values of the nonlinear parameters, where those stated are too
     far apart to find the right ones. They take the place of those stated; without any, those hold."""
 
@@ -222,8 +225,8 @@ class Form:
 CURVE, SUPPLY, LIMIT, DELAY, LAG = range(5)
 """Stages between command and rotor speed, in the order in which they act."""
 
-FormsFor = Callable[[Vehicle], tuple[Form, ...]]
-ReadingForms = "Callable[[Instrument], tuple[Form, ...]]"
+_FormsFor = Callable[[Vehicle], tuple[Form, ...]]
+_ReadingForms = "Callable[[Instrument], tuple[Form, ...]]"
 """Forms of an instrument (`rotorid.effects.loading.Instrument`); their contribution takes a `Loading` in place of a
 `Motion` and gives a `reading`."""
 
@@ -297,7 +300,7 @@ class Effect:
     """What a pilot would call it, fits into "… was left out"."""
     sentence: str
     """How it is observed, one clause."""
-    forms: FormsFor
+    forms: _FormsFor
     """The forms for a vehicle (their parameters may depend on its number of rotors)."""
     source: str
     sign: str = ""
@@ -324,7 +327,7 @@ class Effect:
     """Forms that spoil a recorded set."""
     form_named: Callable[[str], Form | None] = lambda name: None
     """A form that the data give rise to (a gust in its window), from its name in a vehicle file."""
-    reading_forms: ReadingForms | None = None
+    reading_forms: _ReadingForms | None = None
     """Forms of kinds `stand` and `bench`; None where the forms for a flight hold on a stand as well."""
 
     # What the decision asks of an effect
@@ -447,3 +450,19 @@ def lift_at_hubs(extra_n: np.ndarray, vehicle: Vehicle) -> Contribution:
     force, moment = np.zeros((len(extra_n), 3)), np.zeros((len(extra_n), 3))
     force[:, 2], moment[:, 0], moment[:, 1] = -sum(extra_n.T), -sum((extra_n * y).T), sum((extra_n * x).T)
     return Contribution(force=force, moment=moment)
+
+
+def compiled(**options: Any) -> Callable[[Callable], Callable]:
+    """A decorator like `numba.njit`, with its cache where numba finds a folder that it may write into.
+
+    An installation that cannot be written, for a user without a home directory, has none: there the function is
+    compiled in each process anew.
+    """
+
+    def decorated(function: Callable) -> Callable:
+        try:
+            return njit(cache=True, **options)(function)
+        except RuntimeError:
+            return njit(**options)(function)
+
+    return decorated

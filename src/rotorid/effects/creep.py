@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from rotorid.effects.compiling import compiled
-from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter, compiled
 from rotorid.effects.loading import TOO_SHORT, change_of_load, one_per_channel
 
 
@@ -28,7 +27,7 @@ def creeping(loading, tau_s):
     return followed(change_of_load(loading), tau_s, loading.dt_s)
 
 
-def all_alike(loading, vehicle, values):
+def _all_alike(loading, vehicle, values):
     """y = F + c LP(F), the share alike on all channels."""
     return Contribution(reading=values[0] * creeping(loading, values[1]))
 
@@ -70,7 +69,7 @@ def reading_forms(instrument):
     tau = Parameter("t_c", "s", shortest, 3 * span, nonlinear=True, starts=starts, meaning="time constant")
     share = Parameter("c", "1", 0.0, 0.3, meaning="share of the load")
     text = "y = F + c (F after a lag of t_c)"
-    forms = [Form("alike on all channels", text, (share, tau), all_alike)]
+    forms = [Form("alike on all channels", text, (share, tau), _all_alike)]
     loaded = tuple(c for c in instrument.channels if c in instrument.loaded)
     if len(loaded) > 1:
         own = one_per_channel("c", "1", loaded, low=-0.05, high=0.3, meaning="share of the load")

@@ -38,7 +38,7 @@ def set_forms(vehicle):
     return late_sensors(vehicle, "written at t: the value of t − T", parameters, (0.03,), lambda t, values: values[0])
 
 
-def late_reading(loading, vehicle, values):
+def _late_reading(loading, vehicle, values):
     """y(t) = F(t − T)."""
     return at_other_times(loading, values[0])
 
@@ -50,7 +50,7 @@ def reading_forms(instrument):
     late = Parameter(
         "T", "s", -30 * dt, 60 * dt, nonlinear=True, starts=starts, meaning="time behind", negligible=2 * dt
     )
-    return (Form("of the reading", "y(t) = F(t − T)", (late,), late_reading, excited_by=("load_change",)),)
+    return (Form("of the reading", "y(t) = F(t − T)", (late,), _late_reading, excited_by=("load_change",)),)
 
 
 EFFECT = Effect(

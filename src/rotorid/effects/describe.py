@@ -32,11 +32,11 @@ EXAMPLE = Vehicle(
 )
 """The thesis's quadrotor: forms depend on the number of rotors, bounds on the vehicle's size."""
 
-ALL_CHANNELS = tuple(range(len(AXES)))
+_ALL_CHANNELS = tuple(range(len(AXES)))
 EXAMPLE_STAND = Instrument(
     vehicle=EXAMPLE.model_copy(update={"kind": "stand", "tared": False, "sensor_mount": "level"}),
-    channels=ALL_CHANNELS,
-    loaded=ALL_CHANNELS,
+    channels=_ALL_CHANNELS,
+    loaded=_ALL_CHANNELS,
     rate_hz=100.0,
     duration_s=60.0,
     run_s=60.0,
@@ -46,7 +46,7 @@ EXAMPLE_STAND = Instrument(
     temperatures_c=(20.0, 30.0),
     session_s=200.0,
     session_clock=True,
-    returns=ALL_CHANNELS,
+    returns=_ALL_CHANNELS,
     distance="wall_distance_m",
 )
 """A stand that shows what stands show: its forms' parameters depend on its channels, bounds on rate and duration."""
@@ -83,7 +83,7 @@ EXCITATION = {
     "tilt": "a tilted mount",
 }
 KINDS = {"physics": "physics", "sensor": "sensor or logging", "mistake": "mistake in the set"}
-INTRODUCTION = """\
+_INTRODUCTION = """\
 # The catalogue of effects
 
 Written by `rotorid effects --markdown`; a test holds that this page is the catalogue. Symbols and axes as in the
@@ -108,7 +108,7 @@ How they are distinguished: [the mismatch stage](mismatch.md).
 
 
 @dataclass(frozen=True)
-class FormRow:
+class _FormRow:
     """Forms of one equation: names, equation, parameters and the columns they need."""
 
     names: tuple[str, ...]
@@ -135,13 +135,13 @@ def instrument_forms(effect: Effect) -> tuple[Form, ...]:
     return forms_of(effect, EXAMPLE_STAND) or forms_of(effect, EXAMPLE_BENCH)
 
 
-def reading_rows(effect: Effect) -> list[FormRow]:
+def _reading_rows(effect: Effect) -> list[_FormRow]:
     """Forms of an effect on a stand or bench, those of one equation in one row."""
     found: dict[str, list[Form]] = {}
     for form in instrument_forms(effect):
         found.setdefault(form.equation, []).append(form)
     return [
-        FormRow(
+        _FormRow(
             tuple(form.name for form in forms),
             equation,
             tuple(dict.fromkeys(p for form in forms for p in form.parameters)),
@@ -152,18 +152,18 @@ def reading_rows(effect: Effect) -> list[FormRow]:
     ]
 
 
-def rows(effect: Effect, vehicle: Vehicle = EXAMPLE) -> list[FormRow]:
+def rows(effect: Effect, vehicle: Vehicle = EXAMPLE) -> list[_FormRow]:
     """Forms of an effect, those that differ by a number or a sensor alone in one row."""
-    found: dict[tuple, FormRow] = {}
+    found: dict[tuple, _FormRow] = {}
     for form in (*effect.forms(vehicle), *effect.speed_forms, *effect.set_forms(vehicle)):
         excited = effect.excitation(form) if isinstance(form, Form) else (getattr(form, "excited_by", ""),)
         alike = (re.sub(r"(?<=[_,])\d+", "i", form.equation), len(form.parameters), type(form), form.parameters[0].unit)
         if alike in found and isinstance(form, SetForm | Form):
             row = found[alike]
             columns = tuple(dict.fromkeys((*row.columns, *columns_of(form))))
-            found[alike] = FormRow((*row.names, form.name), alike[0], row.parameters, columns, row.excited_by)
+            found[alike] = _FormRow((*row.names, form.name), alike[0], row.parameters, columns, row.excited_by)
         else:
-            found[(*alike, form.name) if isinstance(form, SpeedForm) else alike] = FormRow(
+            found[(*alike, form.name) if isinstance(form, SpeedForm) else alike] = _FormRow(
                 (form.name,), form.equation, form.parameters, columns_of(form), tuple(filter(None, excited))
             )
     return list(found.values())
@@ -174,7 +174,7 @@ def number(value: float) -> str:
     return f"{value:.3g}"
 
 
-def parameter_text(parameter: Parameter) -> str:
+def _parameter_text(parameter: Parameter) -> str:
     """Symbol, range, unit and meaning."""
     unit = "" if parameter.unit == "1" else f" {parameter.unit}"
     bounded = math.isfinite(parameter.low) and math.isfinite(parameter.high)
@@ -182,7 +182,7 @@ def parameter_text(parameter: Parameter) -> str:
     return f"{parameter.symbol}{span}: {parameter.meaning}" + (", fitted" if parameter.nonlinear else "")
 
 
-def parameter_texts(parameters: tuple[Parameter, ...]) -> list[str]:
+def _parameter_texts(parameters: tuple[Parameter, ...]) -> list[str]:
     """Parameters of a row, a long series of one letter, range and meaning by its ends."""
     series: dict[tuple, list[Parameter]] = {}
     for p in parameters:
@@ -192,18 +192,18 @@ def parameter_texts(parameters: tuple[Parameter, ...]) -> list[str]:
         if len(same) > 3:
             units = " or ".join(dict.fromkeys(p.unit for p in same))
             whole = replace(same[0], symbol=f"{same[0].symbol} … {same[-1].symbol}", unit=units)
-            texts.append(parameter_text(whole))
+            texts.append(_parameter_text(whole))
         else:
-            texts += [parameter_text(p) for p in same]
+            texts += [_parameter_text(p) for p in same]
     return texts
 
 
-def names_text(names: tuple[str, ...]) -> str:
+def _names_text(names: tuple[str, ...]) -> str:
     """Names of forms, a long list by its ends."""
     return "; ".join(names) if len(names) <= 8 else f"{'; '.join(names[:3])}; … ; {names[-1]} ({len(names)} in all)"
 
 
-def excitation_text(keys: tuple[str, ...]) -> str:
+def _excitation_text(keys: tuple[str, ...]) -> str:
     return " or ".join(dict.fromkeys(EXCITATION[key] for key in keys))
 
 
@@ -214,7 +214,7 @@ def listing() -> str:
     return "".join(f"{e.id:<{wide}}  {KINDS[e.kind]:<18}  {e.sentence}\n" for e in effects)
 
 
-def formless(effect: Effect) -> str:
+def _formless(effect: Effect) -> str:
     """Why an effect lists no form."""
     if effect.reading_forms is not None:
         return "it has no form to fit: it is recognised from the readings themselves"
@@ -225,17 +225,17 @@ def in_full(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
     """One effect as plain text."""
     out = [f"{effect.id}: {effect.name} ({KINDS[effect.kind]})", f"  {effect.sentence}", ""]
     every = [("form", row) for row in rows(effect, vehicle)]
-    every += [("on an instrument", row) for row in reading_rows(effect)]
+    every += [("on an instrument", row) for row in _reading_rows(effect)]
     for kind, row in every:
-        out.append(f"  {kind} {names_text(row.names)}")
+        out.append(f"  {kind} {_names_text(row.names)}")
         out.append(f"    {row.equation}")
-        out += [f"    {text}" for text in parameter_texts(row.parameters)]
+        out += [f"    {text}" for text in _parameter_texts(row.parameters)]
         out.append(f"    columns: {'; '.join(row.columns)}")
         if row.excited_by:
-            out.append(f"    shows with: {excitation_text(row.excited_by)}")
+            out.append(f"    shows with: {_excitation_text(row.excited_by)}")
         out.append("")
     if not every:
-        out += [f"  {formless(effect)}", ""]
+        out += [f"  {_formless(effect)}", ""]
     out += [
         f"  sign: {effect.sign}",
         f"  validity: {effect.validity}",
@@ -249,22 +249,22 @@ def in_full(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
 def section(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
     """One effect as a section of the page."""
     out = [f"### `{effect.id}`: {effect.name}\n", f"{KINDS[effect.kind].capitalize()}: {effect.sentence}.\n"]
-    table = [(names_text(row.names), row) for row in rows(effect, vehicle)]
-    table += [(f"on an instrument: {names_text(row.names)}", row) for row in reading_rows(effect)]
+    table = [(_names_text(row.names), row) for row in rows(effect, vehicle)]
+    table += [(f"on an instrument: {_names_text(row.names)}", row) for row in _reading_rows(effect)]
     if table:
         out.append("| form | equation | parameters | columns | shows with |\n| --- | --- | --- | --- | --- |")
         for names, row in table:
             cells = (
                 names,
                 row.equation,
-                "<br>".join(parameter_texts(row.parameters)),
+                "<br>".join(_parameter_texts(row.parameters)),
                 "<br>".join(f"`{c}`" if " " not in c else c for c in row.columns),
-                excitation_text(row.excited_by),
+                _excitation_text(row.excited_by),
             )
             out.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
         out.append("")
     else:
-        text = formless(effect)
+        text = _formless(effect)
         out.append(f"{text[0].upper()}{text[1:]}.\n")
     confusers = ", ".join(f"`{c}`" for c in effect.confusers) or "nothing known"
     out += [
@@ -278,7 +278,7 @@ def section(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
 
 def markdown() -> str:
     """The whole page."""
-    parts = [INTRODUCTION]
+    parts = [_INTRODUCTION]
     for kind, title in (("physics", "Physics"), ("sensor", "Sensors and logging"), ("mistake", "Mistakes in the set")):
         parts.append(f"## {title}\n")
         parts += [section(e) for e in catalogue().values() if e.kind == kind]

@@ -5,7 +5,7 @@ import numpy as np
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.scale import scale
 
-E3 = np.array([0.0, 0.0, 1.0])
+_E3 = np.array([0.0, 0.0, 1.0])
 
 
 def _weighted_airspeed(motion, vehicle):
@@ -17,20 +17,20 @@ def _weighted_airspeed(motion, vehicle):
 def hub_moment(motion, vehicle, values):
     """M = k_flap Σ ω_i (v_i × e3): the disc tilts back and pulls the nose up in forward flight."""
     # v × e3 with e3 down has y component -v_x; nose up is +y, hence the sign.
-    return Contribution(moment=-values[0] * np.cross(_weighted_airspeed(motion, vehicle), E3))
+    return Contribution(moment=-values[0] * np.cross(_weighted_airspeed(motion, vehicle), _E3))
 
 
-def independent_of_speed(motion, vehicle, values):
+def _independent_of_speed(motion, vehicle, values):
     """M = k_m (-v × e3) at the centre of mass."""
-    return Contribution(moment=-values[0] * np.cross(motion.air_velocity, E3))
+    return Contribution(moment=-values[0] * np.cross(motion.air_velocity, _E3))
 
 
 def rolling(motion, vehicle, values):
     """M = −k_roll Σ ω_i (v_i − (v_i · e3) e3): about the airspeed itself, whichever way a rotor spins."""
-    return Contribution(moment=-values[0] * _weighted_airspeed(motion, vehicle) * (1.0 - E3))
+    return Contribution(moment=-values[0] * _weighted_airspeed(motion, vehicle) * (1.0 - _E3))
 
 
-def kernel_hub_moment(m, v, p, w):
+def _kernel_hub_moment(m, v, p, w):
     along = across = 0.0
     for i in range(v.rotors):
         along += m.rotor_speed[i] * m.hub_velocity[i, 0]
@@ -39,12 +39,12 @@ def kernel_hub_moment(m, v, p, w):
     w.moment[1] += p[0] * along
 
 
-def kernel_independent_of_speed(m, v, p, w):
+def _kernel_independent_of_speed(m, v, p, w):
     w.moment[0] -= p[0] * m.air_velocity[1]
     w.moment[1] += p[0] * m.air_velocity[0]
 
 
-def kernel_rolling(m, v, p, w):
+def _kernel_rolling(m, v, p, w):
     along = across = 0.0
     for i in range(v.rotors):
         along += m.rotor_speed[i] * m.hub_velocity[i, 0]
@@ -64,15 +64,15 @@ def forms(vehicle):
             (Parameter("k_flap", "N m s2/(rad m)", 0.0, k_flap, meaning="moment per rotor speed and airspeed"),),
             hub_moment,
             ("velocity", "rotor_speed"),
-            kernel=kernel_hub_moment,
+            kernel=_kernel_hub_moment,
         ),
         Form(
             "independent of rotor speed",
             "M = k_m (e3 × v)",
             (Parameter("k_m", "N s", 0.0, k_m, meaning="moment per airspeed"),),
-            independent_of_speed,
+            _independent_of_speed,
             ("velocity",),
-            kernel=kernel_independent_of_speed,
+            kernel=_kernel_independent_of_speed,
         ),
         Form(
             "about the airspeed, at the hubs",
@@ -80,7 +80,7 @@ def forms(vehicle):
             (Parameter("k_roll", "N m s2/(rad m)", 0.0, k_flap, meaning="moment about the airspeed per rotor speed"),),
             rolling,
             ("velocity", "rotor_speed"),
-            kernel=kernel_rolling,
+            kernel=_kernel_rolling,
         ),
     )
 

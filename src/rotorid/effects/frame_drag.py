@@ -7,8 +7,8 @@ import numpy as np
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.scale import scale
 
-E3 = np.array([0.0, 0.0, 1.0])
-MOST_WEIGHTS_AT_10_M_S = 2.0
+_E3 = np.array([0.0, 0.0, 1.0])
+_MOST_WEIGHTS_AT_10_M_S = 2.0
 """Drag at 10 m/s beyond this many weights is no airframe's (published: 0.1 to 0.5)."""
 
 
@@ -18,18 +18,18 @@ def isotropic(motion, vehicle, values):
     return Contribution(force=-values[0] * np.linalg.norm(v, axis=1, keepdims=True) * v)
 
 
-def per_axis(motion, vehicle, values):
+def _per_axis(motion, vehicle, values):
     """F_j = -c_j |v| v_j at the centre of mass."""
     v = motion.air_velocity
     return Contribution(force=-np.asarray(values) * np.linalg.norm(v, axis=1, keepdims=True) * v)
 
 
-def isotropic_off_centre(motion, vehicle, values):
+def _isotropic_off_centre(motion, vehicle, values):
     """F = -c |v| v at a height of h above the centre of mass, M = −h e3 × F: linear in c and c h."""
     return _off_centre(motion, values[0], values[1])
 
 
-def per_axis_off_centre(motion, vehicle, values):
+def _per_axis_off_centre(motion, vehicle, values):
     """F_j = -c_j |v| v_j at a height of h above the centre of mass, M = −h e3 × F: linear in c_j, c_x h and c_y h."""
     return _off_centre(motion, np.asarray(values[:3]), np.array([*values[3:], 0.0]))
 
@@ -37,10 +37,10 @@ def per_axis_off_centre(motion, vehicle, values):
 def _off_centre(motion, c, c_h):
     v = motion.air_velocity
     square = np.linalg.norm(v, axis=1, keepdims=True) * v
-    return Contribution(force=-c * square, moment=np.cross(E3, c_h * square))
+    return Contribution(force=-c * square, moment=np.cross(_E3, c_h * square))
 
 
-def per_component(motion, vehicle, values):
+def _per_component(motion, vehicle, values):
     """F_j = -c_j |v_j| v_j at the centre of mass."""
     v = motion.air_velocity
     return Contribution(force=-np.asarray(values) * np.abs(v) * v)
@@ -55,7 +55,7 @@ def kernel(m, v, p, w):
     w.moment[1] += p[3] * speed * m.air_velocity[0]
 
 
-def kernel_per_component(m, v, p, w):
+def _kernel_per_component(m, v, p, w):
     for j in range(3):
         w.force[j] -= p[j] * abs(m.air_velocity[j]) * m.air_velocity[j]
 
@@ -74,7 +74,7 @@ def _each(values):
 def forms(vehicle):
     unit = "N s2/m2"
     size = scale(vehicle)
-    most = MOST_WEIGHTS_AT_10_M_S * size.weight_n / 100.0
+    most = _MOST_WEIGHTS_AT_10_M_S * size.weight_n / 100.0
     axes = tuple(Parameter(f"c_{a}", unit, 0.0, most, meaning=f"ρ C_D A / 2 along {a}") for a in "xyz")
     c = Parameter("c", unit, 0.0, most, meaning="ρ C_D A / 2")
     farthest = most * size.arm_m
@@ -85,13 +85,15 @@ def forms(vehicle):
     )
     return (
         Form("isotropic", "F = −c |v| v", (c,), isotropic, ("velocity",), kernel=kernel, kernel_values=_alike),
-        Form("per axis", "F_j = −c_j |v| v_j", axes, per_axis, ("velocity",), kernel=kernel, kernel_values=_each),
-        Form("per component", "F_j = −c_j |v_j| v_j", axes, per_component, ("velocity",), kernel=kernel_per_component),
+        Form("per axis", "F_j = −c_j |v| v_j", axes, _per_axis, ("velocity",), kernel=kernel, kernel_values=_each),
+        Form(
+            "per component", "F_j = −c_j |v_j| v_j", axes, _per_component, ("velocity",), kernel=_kernel_per_component
+        ),
         Form(
             "isotropic, off the centre of mass",
             "F = −c |v| v, M = −h e3 × F",
             (c, c_h),
-            isotropic_off_centre,
+            _isotropic_off_centre,
             ("velocity",),
             must_show=(0, 1),
             kernel=kernel,
@@ -101,7 +103,7 @@ def forms(vehicle):
             "per axis, off the centre of mass",
             "F_j = −c_j |v| v_j, M = −h e3 × F",
             (*axes, c_x_h, c_y_h),
-            per_axis_off_centre,
+            _per_axis_off_centre,
             ("velocity",),
             must_show=(0, 1, 3),
             kernel=kernel,

@@ -6,7 +6,7 @@ import numpy as np
 
 from rotorid.effects.contract import Effect, Form, Parameter, at_hubs
 
-MOST_N = 1000.0
+_MOST_N = 1000.0
 """Bound of a knot's force: the form is built without a vehicle, so it is one for any size."""
 NAME = re.compile(r"(-?\d+\.\d\d) s to (-?\d+\.\d\d) s, (\d+) knots")
 
@@ -31,7 +31,7 @@ def window_form(start_s: float, stop_s: float, knots: int) -> Form:
         return at_hubs(share[:, :, None] * body[:, None, :], vehicle.rotor_positions_m())
 
     parameters = tuple(
-        Parameter(f"f_{axis}_{k + 1}", "N", -MOST_N, MOST_N, meaning=f"force to the {axis} at knot {k + 1}")
+        Parameter(f"f_{axis}_{k + 1}", "N", -_MOST_N, _MOST_N, meaning=f"force to the {axis} at knot {k + 1}")
         for axis in ("north", "east")
         for k in range(knots)
     )

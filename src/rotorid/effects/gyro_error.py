@@ -27,7 +27,7 @@ def misalignment(motion, vehicle, values):
     )
 
 
-def bias_and_scale(motion, vehicle, values):
+def _bias_and_scale(motion, vehicle, values):
     """Ω_m = (1 + s) Ω + b."""
     scaled = scale(motion, vehicle, values[3:])
     return Contribution(
@@ -56,7 +56,7 @@ def forms(vehicle):
             "bias and scale",
             "Ω_m = (1 + s) Ω + b",
             b + s,
-            bias_and_scale,
+            _bias_and_scale,
             needs,
             of_reading=((0, 3), (1, 4), (2, 5), (3, 3), (4, 4), (5, 5)),
             excited_by=("always",),

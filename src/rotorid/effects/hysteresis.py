@@ -2,11 +2,10 @@
 
 import numpy as np
 
-from rotorid.effects.compiling import compiled
-from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter, compiled
 from rotorid.effects.loading import AXES, UNITS, change_of_load, cross_channels, on_channels, one_per_channel
 
-HALF = "half the height of the loop"
+_HALF = "half the height of the loop"
 NARROW, WIDE = 0.02, 0.15
 MIDDLE = (NARROW * WIDE) ** 0.5
 """Half widths of the play as shares of the largest load."""
@@ -50,7 +49,7 @@ def settling(load, width):
     return _settling(np.ascontiguousarray(load), width)
 
 
-def branches(instrument, share):
+def _branches(instrument, share):
     """Branch of each channel between −1 (load falling) and 1 (rising), (n, 6), by the play operator."""
 
     def signal(loading):
@@ -66,7 +65,7 @@ def branches(instrument, share):
 
 def lens(instrument, share):
     """The same loop, zero at no load and at the largest: what a spring of metal does, (n, 6)."""
-    branch = branches(instrument, share)
+    branch = _branches(instrument, share)
 
     def signal(loading):
         part = np.abs(change_of_load(loading)) / np.array(instrument.largest)
@@ -82,29 +81,29 @@ def reading_forms(instrument):
     text = "y = F + h (branch of F: 1 rising, −1 falling)"
     forms = []
     for name, share in (("narrow", NARROW), ("wide", WIDE)):
-        forms.append(on_channels(f"{name} play", text, "h", "{}", loaded, branches(instrument, share), meaning=HALF))
+        forms.append(on_channels(f"{name} play", text, "h", "{}", loaded, _branches(instrument, share), meaning=_HALF))
         forms.append(
             on_channels(
-                f"{name} lens", text + " × 4 f (1 − f)", "h", "{}", loaded, lens(instrument, share), meaning=HALF
+                f"{name} lens", text + " × 4 f (1 − f)", "h", "{}", loaded, lens(instrument, share), meaning=_HALF
             )
         )
         if 1 < len(loaded) <= 3:
             for c in loaded:
-                own = one_per_channel("h", "{}", (c,), meaning=HALF)
-                for shape, signal in (("play", branches(instrument, share)), ("lens", lens(instrument, share))):
+                own = one_per_channel("h", "{}", (c,), meaning=_HALF)
+                for shape, signal in (("play", _branches(instrument, share)), ("lens", lens(instrument, share))):
                     forms.append(Form(f"{name} {shape} of {AXES[c]}", text, own, cross_channels(((c, c),), signal)))
     forms += _exponential_forms(instrument, loaded)
-    shares = tuple(Parameter(f"h_{n}", "1", meaning=HALF + " by the largest load") for n in ("narrow", "wide"))
+    shares = tuple(Parameter(f"h_{n}", "1", meaning=_HALF + " by the largest load") for n in ("narrow", "wide"))
     forms.append(Form("two plays, alike on all channels", text, shares, _alike(instrument, loaded)))
     if len(loaded) == 1:
         for name, widths in (("two plays", ("narrow", "wide")), ("three plays", tuple(WIDTHS))):
-            own = tuple(Parameter(f"h_{n}", UNITS[loaded[0]], meaning=HALF) for n in widths)
+            own = tuple(Parameter(f"h_{n}", UNITS[loaded[0]], meaning=_HALF) for n in widths)
             forms.append(Form(name, text, own, _plays(instrument, loaded[0], widths)))
     else:
         # Not three for each channel: as many parameters would take in what other causes leave.
         groups = tuple(g for g in (tuple(c for c in loaded if c < 3), tuple(c for c in loaded if c >= 3)) if g)
         own = tuple(
-            Parameter(f"h_{n}_{'F' if g[0] < 3 else 'M'}", UNITS[g[0]], meaning=HALF) for g in groups for n in WIDTHS
+            Parameter(f"h_{n}_{'F' if g[0] < 3 else 'M'}", UNITS[g[0]], meaning=_HALF) for g in groups for n in WIDTHS
         )
         forms.append(Form("three plays, alike on forces and on moments", text, own, _of_a_range(instrument, groups)))
     return tuple(forms)
@@ -119,7 +118,7 @@ def _exponential_forms(instrument, loaded):
         return Parameter(name, "1", 0.002, 0.6, True, starts, meaning)
 
     def form(name, channels, widths):
-        own = one_per_channel("h", "{}", channels, meaning=HALF)
+        own = one_per_channel("h", "{}", channels, meaning=_HALF)
         return Form(name, text, (*own, *widths), _exponential(instrument, channels))
 
     forms = [form("exponential loop", loaded, (width("w", 0.02, 0.06, 0.2),))]
@@ -142,7 +141,7 @@ def _exponential(instrument, channels):
 
 
 def _alike(instrument, loaded):
-    signals = [branches(instrument, share) for share in (NARROW, WIDE)]
+    signals = [_branches(instrument, share) for share in (NARROW, WIDE)]
     scale = np.zeros(6)
     scale[list(loaded)] = np.array(instrument.largest)[list(loaded)]
 
@@ -154,7 +153,7 @@ def _alike(instrument, loaded):
 
 def _plays(instrument, channel, widths):
     """Plays of several widths on one channel."""
-    signals = [branches(instrument, WIDTHS[n]) for n in widths]
+    signals = [_branches(instrument, WIDTHS[n]) for n in widths]
 
     def contribution(loading, vehicle, values):
         reading = np.zeros((loading.size, 6))

@@ -5,13 +5,13 @@ import numpy as np
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.scale import scale
 
-PAIRS = (("J_xy", 0, 1), ("J_xz", 0, 2), ("J_yz", 1, 2))
+_PAIRS = (("J_xy", 0, 1), ("J_xz", 0, 2), ("J_yz", 1, 2))
 
 
 def products(motion, vehicle, values):
     """M = -(E dΩ + Ω × E Ω), E the symmetric matrix of J_xy, J_xz, J_yz to be added."""
     extra = np.zeros((3, 3))
-    for value, (_, i, j) in zip(values, PAIRS, strict=True):
+    for value, (_, i, j) in zip(values, _PAIRS, strict=True):
         extra[i, j] = extra[j, i] = value
     rate = motion.angular_velocity
     return Contribution(moment=-(motion.angular_acceleration @ extra + np.cross(rate, rate @ extra)))
@@ -31,7 +31,7 @@ def forms(vehicle):
         Form(
             "products",
             "M = −(E dΩ/dt + Ω × E Ω)",
-            tuple(Parameter(name, "kg m2", -bound, bound, meaning="entry of J to be added") for name, _, _ in PAIRS),
+            tuple(Parameter(name, "kg m2", -bound, bound, meaning="entry of J to be added") for name, _, _ in _PAIRS),
             products,
             ("angular_velocity", "angular_acceleration"),
             kernel=kernel,

@@ -12,8 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rotorid.effects.compiling import compiled
-from rotorid.effects.contract import Contribution, Effect, Form, Motion, Parameter
+from rotorid.effects.contract import Contribution, Effect, Form, Motion, Parameter, compiled
 from rotorid.recordings.vehicle import Vehicle
 
 CHANNELS = tuple(f"{g}_{a}" for g in ("force", "moment") for a in "xyz")

@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from rotorid.effects.compiling import compiled
-from rotorid.effects.contract import LAG, Effect, Parameter, SpeedForm
+from rotorid.effects.contract import LAG, Effect, Parameter, SpeedForm, compiled
 
-SLOWEST_S = 0.3
+_SLOWEST_S = 0.3
 """Longest time constant: rotors of half a metre reach 0.1 s; no attitude loop holds with motors three times slower."""
 
 
@@ -41,21 +40,21 @@ def _step(tau_s, dt_s, holds):
     return share, 0.0 if holds else 1.0 - share / ratio
 
 
-def one_constant(path, values):
+def _one_constant(path, values):
     return lagged(path.speed, values[0], values[0], path.dt_s, path.holds)
 
 
-def up_and_down(path, values):
+def _up_and_down(path, values):
     return lagged(path.speed, values[0], values[1], path.dt_s, path.holds)
 
 
-def on_thrust(path, values):
+def _on_thrust(path, values):
     """The thrust, not the speed, follows as a first-order lag."""
     return np.sqrt(np.maximum(lagged(path.speed**2, values[0], values[0], path.dt_s, path.holds), 0.0))
 
 
 def _tau(symbol):
-    return Parameter(symbol, "s", 0.0, SLOWEST_S, nonlinear=True, starts=(0.015, 0.05, 0.15), meaning="time constant")
+    return Parameter(symbol, "s", 0.0, _SLOWEST_S, nonlinear=True, starts=(0.015, 0.05, 0.15), meaning="time constant")
 
 
 EFFECT = Effect(
@@ -69,7 +68,7 @@ EFFECT = Effect(
             "dω/dt = (ω_c − ω)/τ",
             (_tau("tau"),),
             LAG,
-            one_constant,
+            _one_constant,
             (0.0,),
             excited_by="change",
         ),
@@ -78,11 +77,11 @@ EFFECT = Effect(
             "dω/dt = (ω_c − ω)/τ_up or τ_down",
             (_tau("tau_up"), _tau("tau_down")),
             LAG,
-            up_and_down,
+            _up_and_down,
             (0.0, 0.0),
             excited_by="change",
         ),
-        SpeedForm("on thrust", "dT/dt = (T_c − T)/τ", (_tau("tau"),), LAG, on_thrust, (0.0,), excited_by="change"),
+        SpeedForm("on thrust", "dT/dt = (T_c − T)/τ", (_tau("tau"),), LAG, _on_thrust, (0.0,), excited_by="change"),
     ),
     shows_in=("follows",),
     source="Quan, Introduction to Multicopter Design and Control, ch. 6; catalogue F1",

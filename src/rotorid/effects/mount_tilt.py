@@ -5,10 +5,10 @@ import numpy as np
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.loading import NO_ROTORS, at_sensor, rotation_of, weight
 
-STEP_RAD = 1e-3
+_STEP_RAD = 1e-3
 
 
-def sensor_turned(loading, vehicle, values):
+def _sensor_turned(loading, vehicle, values):
     """y = F − δ × F, y_M = M − δ × M: the sensor's axes are turned by a small δ."""
     delta = np.zeros(3)
     delta[: len(values)] = values
@@ -33,15 +33,15 @@ def _believed(loading, vehicle, roll, pitch):
     return wrench
 
 
-def vehicle_turned(loading, vehicle, values):
+def _vehicle_turned(loading, vehicle, values):
     """The vehicle stands (δφ, δθ) off the mount's angles: the derivative of the wrench by them."""
     roll, pitch = loading.attitude
     out = np.zeros((loading.size, 6))
     for value, (a, b) in zip(values, ((1.0, 0.0), (0.0, 1.0)), strict=True):
         if value:
-            up = _believed(loading, vehicle, roll + a * STEP_RAD, pitch + b * STEP_RAD)
-            down = _believed(loading, vehicle, roll - a * STEP_RAD, pitch - b * STEP_RAD)
-            out += value * (up - down) / (2 * STEP_RAD)
+            up = _believed(loading, vehicle, roll + a * _STEP_RAD, pitch + b * _STEP_RAD)
+            down = _believed(loading, vehicle, roll - a * _STEP_RAD, pitch - b * _STEP_RAD)
+            out += value * (up - down) / (2 * _STEP_RAD)
     return Contribution(reading=out)
 
 
@@ -50,13 +50,13 @@ def reading_forms(instrument):
     text = "y = F − δ × F"
     forms = []
     if len(instrument.channels) > 1:
-        forms.append(Form("sensor out of level", text, tilt[:2], sensor_turned))
+        forms.append(Form("sensor out of level", text, tilt[:2], _sensor_turned))
         sources = {s % 3 for s in instrument.loaded}
         if len(sources) > 1 or 2 not in sources:
-            forms.append(Form("sensor turned", text, tilt, sensor_turned))
+            forms.append(Form("sensor turned", text, tilt, _sensor_turned))
     if not instrument.bench:
         names = tuple(Parameter(f"delta_{n}", "rad", -0.3, 0.3, meaning=f"further {n}") for n in ("roll", "pitch"))
-        forms.append(Form("vehicle on the mount", "φ = φ_m + δ_φ, θ = θ_m + δ_θ", names, vehicle_turned))
+        forms.append(Form("vehicle on the mount", "φ = φ_m + δ_φ, θ = θ_m + δ_θ", names, _vehicle_turned))
     return tuple(forms)
 
 

@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from rotorid.effects.com_offset import force_of_lever
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.pendulum import cable_pull, likely_lengths
-from rotorid.effects.rigid_body import force_of_lever
 from rotorid.effects.scale import scale
 
-LENGTHS_M = (0.15, 6.0)
-DAMPING_RATIO = 0.03
+_LENGTHS_M = (0.15, 6.0)
+_DAMPING_RATIO = 0.03
 
 
 def slung(motion, vehicle, values):
@@ -29,7 +29,7 @@ def _pull(motion, vehicle, values, slowed):
     swung_by = None if motion.hung_by is None else motion.hung_by - slowed
     world = cable_pull(hanging, time_s, length_m, damping_ratio, vehicle.gravity_m_s2, motion.hung, swung_by)
     pull = np.einsum("nji,nj->ni", motion.rotation, world)
-    pull = aboard(motion) * pull
+    pull = _aboard(motion) * pull
     return Contribution(force=mass_kg * pull, moment=hook_kg_m * np.cross([0.0, 0.0, 1.0], pull))
 
 
@@ -38,7 +38,7 @@ def hanging_acceleration(motion):
     return -np.einsum("nij,nj->ni", motion.rotation, motion.specific_force)
 
 
-def slung_in_air(motion, vehicle, values):
+def _slung_in_air(motion, vehicle, values):
     """As `slung`, but slowed by the air that it moves through and not by its swing: e = g − a − 2 ζ ω v."""
     _, _, length_m, damping_ratio = values
     slowed = 2 * damping_ratio * np.sqrt(vehicle.gravity_m_s2 / length_m)
@@ -46,7 +46,7 @@ def slung_in_air(motion, vehicle, values):
     return _pull(motion, vehicle, values, slowed * through_air)
 
 
-def slung_starts(parts, vehicle):
+def _slung_starts(parts, vehicle):
     """The likeliest lengths of a cable, each with its damping."""
     stretches = []
     for motion, left in parts:
@@ -57,10 +57,10 @@ def slung_starts(parts, vehicle):
             pulls.append(np.cross(left["moment"], [0.0, 0.0, 1.0]))
         world = [np.einsum("nij,nj->ni", motion.rotation, x)[:, :2] for x in (velocity, *pulls)]
         stretches.append((motion.time_s, hanging_acceleration(motion), world[0], world[1:]))
-    return likely_lengths(stretches, LENGTHS_M, DAMPING_RATIO, vehicle.gravity_m_s2)
+    return likely_lengths(stretches, _LENGTHS_M, _DAMPING_RATIO, vehicle.gravity_m_s2)
 
 
-def aboard(motion):
+def _aboard(motion):
     """Share of the payload that is on board, (n, 1), or 1 throughout."""
     return 1.0 if motion.on_board is None else motion.on_board[:, None]
 
@@ -71,24 +71,24 @@ def rigid(motion, vehicle, values):
     a is the specific force at the believed centre of mass; `values` are m_p (kg) and m_p r (kg m).
     """
     lever = np.asarray(values[1:4])
-    on_board, force = aboard(motion), -values[0] * motion.specific_force
+    on_board, force = _aboard(motion), -values[0] * motion.specific_force
     if motion.angular_acceleration is not None:
         force = force + force_of_lever(motion, lever)
     return Contribution(force=on_board * force, moment=-np.cross(lever, on_board * motion.specific_force))
 
 
-def rigid_with_inertia(motion, vehicle, values):
+def _rigid_with_inertia(motion, vehicle, values):
     """The rigid payload and the products of inertia that it brings (its moments of inertia count as values)."""
     extra = np.zeros((3, 3))
     extra[0, 1], extra[0, 2], extra[1, 2] = values[4:]
     extra += extra.T
     rate = motion.angular_velocity
-    turning = aboard(motion) * (motion.angular_acceleration @ extra + np.cross(rate, rate @ extra))
+    turning = _aboard(motion) * (motion.angular_acceleration @ extra + np.cross(rate, rate @ extra))
     attached = rigid(motion, vehicle, values[:4])
     return Contribution(force=attached.force, moment=attached.moment - turning)
 
 
-def kernel_rigid(m, v, p, w):
+def _kernel_rigid(m, v, p, w):
     """A rigid payload; `p` is m_p, m_p x, m_p y, m_p z, J_xy, J_xz, J_yz."""
     s, a, o = m.specific_force, m.angular_acceleration, m.angular_velocity
     x, y, z = p[4] * o[1] + p[5] * o[2], p[4] * o[0] + p[6] * o[2], p[5] * o[0] + p[6] * o[1]
@@ -120,8 +120,8 @@ def forms(vehicle):
     cable = (
         m_p,
         Parameter("m_p z", "kg m", -reach, reach, meaning="its mass times how far below the centre its hook is"),
-        Parameter("L", "m", *LENGTHS_M, True, (0.3, 0.6, 1.2, 2.4), "length of the cable"),
-        Parameter("ζ", "1", 0.002, 0.3, True, (DAMPING_RATIO,), "damping of its swing, share of the critical"),
+        Parameter("L", "m", *_LENGTHS_M, True, (0.3, 0.6, 1.2, 2.4), "length of the cable"),
+        Parameter("ζ", "1", 0.002, 0.3, True, (_DAMPING_RATIO,), "damping of its swing, share of the critical"),
     )
     products = tuple(
         Parameter(name, "kg m2", -bound, bound, meaning="product of inertia that it adds")
@@ -133,12 +133,12 @@ def forms(vehicle):
             "rigid with its products of inertia",
             "F = −m_p (a + dΩ/dt × r + Ω × (Ω × r)), M = −m_p r × a − (E dΩ/dt + Ω × E Ω)",
             (m_p, *places, *products),
-            rigid_with_inertia,
+            _rigid_with_inertia,
             ("specific_force", "angular_velocity", "angular_acceleration"),
             must_show=(0,),
             comes_and_goes=True,
             brings=moments,
-            kernel=kernel_rigid,
+            kernel=_kernel_rigid,
         ),
         Form(
             "rigid",
@@ -149,7 +149,7 @@ def forms(vehicle):
             must_show=(0,),
             comes_and_goes=True,
             brings=moments,
-            kernel=kernel_rigid,
+            kernel=_kernel_rigid,
             kernel_values=_without_products,
         ),
         Form(
@@ -161,18 +161,18 @@ def forms(vehicle):
             memory=True,
             swings=True,
             excited_by=("always",),
-            guess=slung_starts,
+            guess=_slung_starts,
         ),
         Form(
             "slung, slowed by the air",
             "F = m_p (e·n + L |n'|²) n, M = z ẑ × F, n'' = (e − (e·n) n)/L − |n'|² n − 2ζω n', e = g − a − 2ζω v",
             cable,
-            slung_in_air,
+            _slung_in_air,
             ("specific_force", "rotation", "velocity"),
             memory=True,
             swings=True,
             excited_by=("always",),
-            guess=slung_starts,
+            guess=_slung_starts,
         ),
     )
 

@@ -6,26 +6,26 @@ from math import exp, sqrt
 
 import numpy as np
 
-from rotorid.effects.compiling import compiled
+from rotorid.effects.contract import compiled
 
-SWING_RATE_HZ = 100.0
+_SWING_RATE_HZ = 100.0
 """Rate of the pendulum's own steps: thirty a radian for the shortest cable allowed."""
-SCAN_RATE_HZ = 20.0
+_SCAN_RATE_HZ = 20.0
 """Rate at which lengths are tried: a swing has less than 2 Hz."""
-SHORTEST_SCAN = 40
+_SHORTEST_SCAN = 40
 """Instants that a stretch must have to say anything about a length."""
-PIECE_S = 10.0
+_PIECE_S = 10.0
 """Pieces that are scanned each by itself, two swings of the longest cable: what swings wildly in one manoeuvre, or hung
 otherwise before, does not drown the others."""
-LENGTHS_TRIED = 180
+_LENGTHS_TRIED = 180
 """Steps of two in a hundred: the phase of a swing of a minute determines the length so well."""
-MOST_LIKELY = 3
-LEAST_EXPLAINED = 0.1
+_MOST_LIKELY = 3
+_LEAST_EXPLAINED = 0.1
 """Share of the pulls' squares that small swings must explain for a length to be looked at more closely."""
-NEAR, LENGTHS_NEAR = 1.12, 17
+_NEAR, _LENGTHS_NEAR = 1.12, 17
 """A length of large swings is off by less in the scan of small ones; steps of 1.4 %."""
-RATIOS_TRIED = (0.005, 0.03)
-LEAST_HANG = 0.3
+_RATIOS_TRIED = (0.005, 0.03)
+_LEAST_HANG = 0.3
 """Share of gravity that must pull down for the small angles of the scan."""
 
 
@@ -54,8 +54,8 @@ def swing_states(hanging, time_s, length_m, damping_ratio, gravity_m_s2, hung=No
     `Motion.hung`) at their instants, or starts at rest.
     """
     size = len(hanging)
-    dt = float(np.median(np.diff(time_s))) if size > 1 else 1.0 / SWING_RATE_HZ
-    block = max(1, min(round(1.0 / (SWING_RATE_HZ * dt)), size))
+    dt = float(np.median(np.diff(time_s))) if size > 1 else 1.0 / _SWING_RATE_HZ
+    block = max(1, min(round(1.0 / (_SWING_RATE_HZ * dt)), size))
     edges = np.arange(0, size, block)
     counts = np.diff(np.append(edges, size))[:, None]
     coarse, instants = np.add.reduceat(hanging, edges) / counts, np.add.reduceat(time_s, edges) / counts[:, 0]
@@ -157,14 +157,14 @@ def pieces_of(parts, gravity_m_s2):
     for stretch, (time_s, *columns, pulls) in enumerate(parts):
         if len(time_s) < 2:
             continue
-        step, columns, pulls = in_blocks(time_s, [*columns, *pulls], len(columns))
+        step, columns, pulls = _in_blocks(time_s, [*columns, *pulls], len(columns))
         hanging, velocity = columns
-        slope = hanging[:, :2] / np.maximum(hanging[:, 2:], LEAST_HANG * gravity_m_s2)
-        size = max(1, round(PIECE_S / step))
+        slope = hanging[:, :2] / np.maximum(hanging[:, 2:], _LEAST_HANG * gravity_m_s2)
+        size = max(1, round(_PIECE_S / step))
         for first in range(0, max(len(hanging) - size, 0) + 1, size):
             cut = slice(first, first + size)
             count = len(hanging[cut])
-            if count < SHORTEST_SCAN:
+            if count < _SHORTEST_SCAN:
                 continue
             own = np.stack([p[cut] - p[cut].mean(axis=0) for p in pulls])
             own /= np.maximum(np.sqrt((own**2).sum(axis=(1, 2), keepdims=True)), 1e-300)
@@ -173,10 +173,10 @@ def pieces_of(parts, gravity_m_s2):
     return out
 
 
-def in_blocks(time_s, columns, keep):
+def _in_blocks(time_s, columns, keep):
     """Step in s of blocks at SCAN_RATE_HZ, and means over them: the first `keep` columns (n, k), and the rest."""
     step = float(np.median(np.diff(time_s)))
-    block = max(1, round(1.0 / (SCAN_RATE_HZ * step)))
+    block = max(1, round(1.0 / (_SCAN_RATE_HZ * step)))
     count = len(time_s) // block
     means = [x[: count * block].reshape(count, block, -1).mean(axis=1) for x in columns]
     return block * step, means[:keep], means[keep:]
@@ -203,11 +203,11 @@ def likely_lengths(parts, bounds_m, damping_ratio, gravity_m_s2):
     before the first instant of a piece to the cable's own free motion. The best peaks of a scan with small swings that
     explain something are looked at once more as they swing through the whole stretch, and come in that order.
     """
-    lengths = np.geomspace(*bounds_m, LENGTHS_TRIED)
+    lengths = np.geomspace(*bounds_m, _LENGTHS_TRIED)
     pieces = pieces_of(parts, gravity_m_s2)
     if not pieces:
         return ()
-    gain = np.zeros(LENGTHS_TRIED)
+    gain = np.zeros(_LENGTHS_TRIED)
     for piece in pieces:
         count, step = len(piece.since_s), piece.since_s[1]
         spectrum = np.fft.rfft(piece.lean - piece.lean.mean(axis=0), 2 * count, axis=0)
@@ -220,22 +220,22 @@ def likely_lengths(parts, bounds_m, damping_ratio, gravity_m_s2):
         gain += explained(piece, swings, lambda k, a, p=piece, f=free: np.hstack([p.others[a], f[k]]))
     gain /= len(pieces)
     inner = np.flatnonzero((gain[1:-1] > gain[:-2]) & (gain[1:-1] >= gain[2:])) + 1
-    best = inner[np.argsort(-gain[inner])][:MOST_LIKELY]
-    near = [nearest_swing(parts, pieces, lengths[k], gravity_m_s2) for k in best if gain[k] > LEAST_EXPLAINED]
-    far = [(float(lengths[k]), damping_ratio) for k in best if gain[k] <= LEAST_EXPLAINED]
+    best = inner[np.argsort(-gain[inner])][:_MOST_LIKELY]
+    near = [_nearest_swing(parts, pieces, lengths[k], gravity_m_s2) for k in best if gain[k] > _LEAST_EXPLAINED]
+    far = [(float(lengths[k]), damping_ratio) for k in best if gain[k] <= _LEAST_EXPLAINED]
     return (*((length, ratio) for _, length, ratio in sorted(near, reverse=True)), *far)
 
 
-def nearest_swing(parts, pieces, length_m, gravity_m_s2):
+def _nearest_swing(parts, pieces, length_m, gravity_m_s2):
     """What the swing through whole stretches explains at most for a length near `length_m`; that length, m, and the
     damping ratio."""
     found = []
-    for length in length_m * np.geomspace(1 / NEAR, NEAR, LENGTHS_NEAR):
-        for ratio in RATIOS_TRIED:
+    for length in length_m * np.geomspace(1 / _NEAR, _NEAR, _LENGTHS_NEAR):
+        for ratio in _RATIOS_TRIED:
             pulls = []
             for time_s, hanging, *_ in parts:
                 pull = cable_pull(hanging, time_s, length, ratio, gravity_m_s2)
-                pulls.append(in_blocks(time_s, [pull[:, :2]], 1)[1][0])
+                pulls.append(_in_blocks(time_s, [pull[:, :2]], 1)[1][0])
             gain = 0.0
             for piece in pieces:
                 own = pulls[piece.stretch][piece.first : piece.first + len(piece.since_s)]

@@ -27,7 +27,7 @@ def kernel(m, v, p, w):
         w.moment[j] -= p[j] * m.angular_velocity[j]
 
 
-def kernel_quadratic(m, v, p, w):
+def _kernel_quadratic(m, v, p, w):
     for j in range(3):
         w.moment[j] -= p[j] * abs(m.angular_velocity[j]) * m.angular_velocity[j]
 
@@ -46,7 +46,7 @@ def forms(vehicle):
     return (
         Form("one constant", "M = −c Ω", (one,), isotropic, needs, kernel=kernel, kernel_values=_alike),
         Form("linear", "M_j = −c_j Ω_j", each, linear, needs, kernel=kernel),
-        Form("quadratic", "M_j = −c_j |Ω_j| Ω_j", square, quadratic, needs, kernel=kernel_quadratic),
+        Form("quadratic", "M_j = −c_j |Ω_j| Ω_j", square, quadratic, needs, kernel=_kernel_quadratic),
     )
 
 

@@ -6,7 +6,7 @@ from rotorid.effects.contract import Contribution, Effect, Form
 from rotorid.effects.scale import rotor_inertia
 
 
-def spin_vector(vehicle):
+def _spin_vector(vehicle):
     """Sense of each rotor's angular momentum along body z (down): cw seen from above is +z."""
     return -vehicle.yaw_signs()
 
@@ -14,7 +14,7 @@ def spin_vector(vehicle):
 def gyroscopic(motion, vehicle, values):
     """M = -Ω × (J_r Σ s_i ω_i e3), s_i = +1 for clockwise seen from above (momentum along body +z)."""
     momentum = np.zeros((motion.size, 3))
-    momentum[:, 2] = values[0] * (motion.rotor_speed * spin_vector(vehicle)).sum(axis=1)
+    momentum[:, 2] = values[0] * (motion.rotor_speed * _spin_vector(vehicle)).sum(axis=1)
     return Contribution(moment=-np.cross(motion.angular_velocity, momentum))
 
 

@@ -21,7 +21,7 @@ def _loss(fraction, motion, vehicle):
     return lift_at_hubs(-fraction * rotor_thrusts(motion, vehicle), vehicle)
 
 
-def growing(motion, vehicle, values):
+def _growing(motion, vehicle, values):
     """T_rear = T (1 - e v_h): the loss grows with in-plane airspeed."""
     speed = np.linalg.norm(motion.air_velocity[:, :2], axis=1)[:, None]
     return _loss(values[0] * speed * _rear_weight(motion, vehicle), motion, vehicle)
@@ -34,7 +34,7 @@ def saturating(motion, vehicle, values):
     return _loss(values[0] * speed / (speed + inflow) * _rear_weight(motion, vehicle), motion, vehicle)
 
 
-def kernel_growing(m, v, p, w):
+def _kernel_growing(m, v, p, w):
     speed = sqrt(m.air_velocity[0] ** 2 + m.air_velocity[1] ** 2)
     x, y = m.air_velocity[0] / max(speed, 1e-6), m.air_velocity[1] / max(speed, 1e-6)
     lost, x, y = p[0] * speed, x / v.reach, y / v.reach
@@ -43,7 +43,7 @@ def kernel_growing(m, v, p, w):
         w.hub_force[i, 2] += lost * rear * m.thrust[i]
 
 
-def kernel_saturating(m, v, p, w):
+def _kernel_saturating(m, v, p, w):
     speed = sqrt(m.air_velocity[0] ** 2 + m.air_velocity[1] ** 2)
     x, y = m.air_velocity[0] / max(speed, 1e-6), m.air_velocity[1] / max(speed, 1e-6)
     lost, x, y = p[0] * speed / (speed + v.hover_inflow), x / v.reach, y / v.reach
@@ -59,11 +59,11 @@ def forms(vehicle):
             "growing with airspeed",
             "T_rear = T (1 − e v_h)",
             (Parameter("e", "s/m", 0.0, 0.2, meaning="share of thrust lost per airspeed"),),
-            growing,
+            _growing,
             needs,
             (),
             3,
-            kernel=kernel_growing,
+            kernel=_kernel_growing,
         ),
         Form(
             "saturating",
@@ -73,7 +73,7 @@ def forms(vehicle):
             needs,
             (),
             3,
-            kernel=kernel_saturating,
+            kernel=_kernel_saturating,
         ),
     )
 

@@ -9,14 +9,14 @@ import numpy as np
 from rotorid.effects.contract import Parameter
 from rotorid.recordings.vehicle import Vehicle
 
-AIR_DENSITY_KG_M3 = 1.2
-FASTEST_DECAY_1_S = 5.0
+_AIR_DENSITY_KG_M3 = 1.2
+_FASTEST_DECAY_1_S = 5.0
 """Drag stops no multirotor within less than a fifth of a second (published: 0.2 to 0.6 1/s)."""
-LEAST_ROTOR_SHARE = 2e-5
+_LEAST_ROTOR_SHARE = 2e-5
 """No rotor's inertia is a smaller share of its vehicle's (2e-3 in the example of the recording contract)."""
-MOST_OF_STATED = 4.0
+_MOST_OF_STATED = 4.0
 """A rotor's inertia is at most so many times the one stated."""
-FASTEST_DAMPING_1_S = 20.0
+_FASTEST_DAMPING_1_S = 20.0
 """Nor does air stop its turning within less than a twentieth."""
 
 
@@ -52,7 +52,7 @@ class Scale:
     @property
     def drag_per_speed(self) -> float:
         """Largest drag per airspeed of the whole vehicle, N s/m."""
-        return FASTEST_DECAY_1_S * self.mass_kg
+        return _FASTEST_DECAY_1_S * self.mass_kg
 
     @property
     def drag_per_rotor_speed(self) -> float:
@@ -62,7 +62,7 @@ class Scale:
     @property
     def damping(self) -> float:
         """Largest damping moment per body rate, N m s/rad."""
-        return FASTEST_DAMPING_1_S * self.inertia_kg_m2
+        return _FASTEST_DAMPING_1_S * self.inertia_kg_m2
 
 
 def scale(vehicle: Vehicle) -> Scale:
@@ -82,7 +82,7 @@ def scale(vehicle: Vehicle) -> Scale:
     )
 
 
-def hover_inflow_m_s(vehicle: Vehicle, density_kg_m3: float = AIR_DENSITY_KG_M3) -> float:
+def hover_inflow_m_s(vehicle: Vehicle, density_kg_m3: float = _AIR_DENSITY_KG_M3) -> float:
     """Momentum theory: v_h = sqrt(T / (2 ρ π R²)) of one rotor in hover, m/s."""
     thrust = vehicle.mass_kg * vehicle.gravity_m_s2 / vehicle.rotor_count
     return float(np.sqrt(thrust / (2 * density_kg_m3 * np.pi * rotor_radius_m(vehicle) ** 2)))
@@ -95,6 +95,6 @@ def rotor_inertia(vehicle: Vehicle) -> Parameter:
     one that is stated.
     """
     inertia = scale(vehicle).inertia_kg_m2
-    least = LEAST_ROTOR_SHARE * inertia
-    most = max(inertia / 4, MOST_OF_STATED * (vehicle.rotor_inertia_kg_m2 or 0.0))
+    least = _LEAST_ROTOR_SHARE * inertia
+    most = max(inertia / 4, _MOST_OF_STATED * (vehicle.rotor_inertia_kg_m2 or 0.0))
     return Parameter("J_r", "kg m2", 0.0, most, meaning="inertia of one rotor", negligible=least)

@@ -9,7 +9,7 @@ from rotorid.effects.contract import Effect, Parameter, SetForm
 from rotorid.effects.recorded import sensors, with_columns
 from rotorid.recordings import columns as c
 
-WINDOW = (
+_WINDOW = (
     Parameter("start", "s", 0.0, 1e5, meaning="begin, seconds from the run's start"),
     Parameter("stop", "s", 0.0, 1e5, meaning="end, seconds from the run's start"),
 )
@@ -39,7 +39,7 @@ def _lost(name, names, equation, spoil):
 
         return with_columns(recordings, names, change)
 
-    return SetForm(name, equation, WINDOW, apply, (0.0, 0.0), (8.0, 10.5), names)
+    return SetForm(name, equation, _WINDOW, apply, (0.0, 0.0), (8.0, 10.5), names)
 
 
 def set_forms(vehicle):

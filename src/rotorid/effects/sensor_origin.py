@@ -12,12 +12,12 @@ def displaced(loading, vehicle, values):
     return Contribution(reading=np.concatenate([np.zeros((loading.size, 3)), moment], axis=1))
 
 
-def in_plane(loading, vehicle, values):
+def _in_plane(loading, vehicle, values):
     """The same without an offset in height."""
     return displaced(loading, vehicle, (*values, 0.0))
 
 
-def with_the_body(loading, vehicle, values):
+def _with_the_body(loading, vehicle, values):
     """The same, the offset in body axes: it turns with the vehicle where the sensor stays level."""
     offset = np.zeros(3)
     offset[: len(values)] = values
@@ -31,12 +31,12 @@ def reading_forms(instrument):
         return ()
     d = tuple(Parameter(f"d_{a}", "m", -0.3, 0.3, meaning=f"stated less true origin along {a}") for a in "xyz")
     text = "M = M_0 + d × F"
-    forms = [Form("in the plane", text, d[:2], in_plane)]
+    forms = [Form("in the plane", text, d[:2], _in_plane)]
     if any(c in instrument.loaded for c in (0, 1)):
         forms.append(Form("in space", text, d, displaced))
     if instrument.tilts and instrument.vehicle.sensor_mount == "level":
-        forms.append(Form("in the plane, with the body", "M = M_0 + R d × F", d[:2], with_the_body))
-        forms.append(Form("in space, with the body", "M = M_0 + R d × F", d, with_the_body))
+        forms.append(Form("in the plane, with the body", "M = M_0 + R d × F", d[:2], _with_the_body))
+        forms.append(Form("in space, with the body", "M = M_0 + R d × F", d, _with_the_body))
     return tuple(forms)
 
 

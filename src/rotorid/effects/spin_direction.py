@@ -8,13 +8,13 @@ from dataclasses import replace
 from rotorid.effects.contract import Effect, Parameter, SetForm
 from rotorid.recordings import columns as c
 
-OTHER = {"ccw": "cw", "cw": "ccw"}
+_OTHER = {"ccw": "cw", "cw": "ccw"}
 
 
 def set_forms(vehicle):
     def apply(recordings, values):
         rotors = tuple(
-            rotor.model_copy(update={"spin": OTHER[rotor.spin]}) if value < 0 else rotor
+            rotor.model_copy(update={"spin": _OTHER[rotor.spin]}) if value < 0 else rotor
             for rotor, value in zip(recordings.vehicle.rotors, values, strict=True)
         )
         return replace(recordings, vehicle=recordings.vehicle.model_copy(update={"rotors": rotors}))

@@ -8,9 +8,9 @@ import numpy as np
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter, at_hubs
 from rotorid.effects.scale import scale
 
-IN_PLANE = np.array([1.0, 1.0, 0.0])
-MOST_WIND_M_S = 30.0
-MOST_WEIGHTS = 2.0
+_IN_PLANE = np.array([1.0, 1.0, 0.0])
+_MOST_WIND_M_S = 30.0
+_MOST_WEIGHTS = 2.0
 """No multirotor holds its place against a wind that pushes with more weights than this."""
 
 
@@ -20,23 +20,23 @@ def _world(motion, north, east):
     return np.einsum("nji,nj->ni", motion.rotation, vector)
 
 
-def world_force(motion, vehicle, values):
+def _world_force(motion, vehicle, values):
     """F = Rᵀ (f_N, f_E, 0): constant in world axes."""
     return Contribution(force=_world(motion, values[0], values[1]))
 
 
-def rotor_force(motion, vehicle, values):
+def _rotor_force(motion, vehicle, values):
     """F_i = ω_i P Rᵀ (k w_N, k w_E, 0) at each hub: the wind's part of rotor drag on airspeed."""
-    wind = _world(motion, values[0], values[1]) * IN_PLANE
+    wind = _world(motion, values[0], values[1]) * _IN_PLANE
     return at_hubs(motion.rotor_speed[:, :, None] * wind[:, None, :], vehicle.rotor_positions_m())
 
 
-def kernel_world_force(m, v, p, w):
+def _kernel_world_force(m, v, p, w):
     for j in range(3):
         w.force[j] += m.rotation[0, j] * p[0] + m.rotation[1, j] * p[1]
 
 
-def kernel_rotor_force(m, v, p, w):
+def _kernel_rotor_force(m, v, p, w):
     x = m.rotation[0, 0] * p[0] + m.rotation[1, 0] * p[1]
     y = m.rotation[0, 1] * p[0] + m.rotation[1, 1] * p[1]
     for i in range(v.rotors):
@@ -46,7 +46,7 @@ def kernel_rotor_force(m, v, p, w):
 
 def forms(vehicle):
     size = scale(vehicle)
-    force = MOST_WEIGHTS * size.weight_n
+    force = _MOST_WEIGHTS * size.weight_n
     share = force / (size.rotors * size.hover_speed_rad_s)
     directions = ("north", "east")
     on_rotors = tuple(
@@ -59,20 +59,20 @@ def forms(vehicle):
             "on the rotors",
             "F_i = ω_i P Rᵀ k_d w",
             on_rotors,
-            rotor_force,
+            _rotor_force,
             ("rotation", "rotor_speed"),
             linear_drag="times rotor speed",
-            kernel=kernel_rotor_force,
+            kernel=_kernel_rotor_force,
         ),
         Form(
             "on the airframe",
             "F = Rᵀ f_w",
             on_frame,
-            world_force,
+            _world_force,
             ("rotation",),
             linear_drag="of airspeed alone",
             excited_by=("always",),
-            kernel=kernel_world_force,
+            kernel=_kernel_world_force,
         ),
     )
 
@@ -95,7 +95,7 @@ def through_drag(drags: Sequence[tuple[Form, np.ndarray]]) -> Form:
                 moment += 0.0 if part.moment is None else sign * part.moment
         return Contribution(force=force, moment=moment)
 
-    parameters = tuple(Parameter(f"w_{d}", "m/s", -MOST_WIND_M_S, MOST_WIND_M_S) for d in ("north", "east"))
+    parameters = tuple(Parameter(f"w_{d}", "m/s", -_MOST_WIND_M_S, _MOST_WIND_M_S) for d in ("north", "east"))
     return Form("through the drag", "v_air = v − Rᵀ w", parameters, contribution, ("rotation", "velocity"))
 
 

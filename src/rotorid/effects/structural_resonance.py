@@ -11,12 +11,12 @@ from rotorid.effects.loading import TOO_SHORT, since_the_first, unsmoothed
 
 def resonance(signal, frequency_hz, damping, dt_s):
     """ω_n²/(s² + 2 ζ ω_n s + ω_n²) on (n, k), from rest; the gain holds far up to half the rate."""
-    b, a = recursion(float(frequency_hz), float(damping), float(dt_s))
+    b, a = _recursion(float(frequency_hz), float(damping), float(dt_s))
     return lfilter(b, a, unsmoothed(signal), axis=0)
 
 
 @lru_cache(maxsize=256)
-def recursion(frequency_hz, damping, dt_s):
+def _recursion(frequency_hz, damping, dt_s):
     """Coefficients of the recursion, exact for inputs that are linear between samples."""
     w = 2 * np.pi * max(frequency_hz, 1e-3)
     b, a, _ = cont2discrete(([w * w], [1.0, 2 * max(damping, 1e-4) * w, w * w]), dt_s, method="foh")

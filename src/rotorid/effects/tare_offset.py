@@ -7,8 +7,8 @@ import numpy as np
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.loading import AXES, UNITS, on_channels
 
-ZERO = "reading without a load"
-RESOLUTION, RESOLUTION_IN_EACH_RUN = 2.0, 4.0
+_ZERO = "reading without a load"
+_RESOLUTION, _RESOLUTION_IN_EACH_RUN = 2.0, 4.0
 """A tare is the mean of a few samples, and only as good: an offset must be so many times larger than other effects."""
 
 
@@ -21,8 +21,8 @@ def _own_in_each_run(instrument):
             reading[:, list(channels)] = np.reshape(values, (len(runs), len(channels)))[runs.index(loading.run)]
         return Contribution(reading=reading)
 
-    parameters = tuple(Parameter(f"b_{AXES[c]}({run})", UNITS[c], meaning=ZERO) for run in runs for c in channels)
-    return Form("own in each run", "y = F + b(run)", parameters, contribution, resolution=RESOLUTION_IN_EACH_RUN)
+    parameters = tuple(Parameter(f"b_{AXES[c]}({run})", UNITS[c], meaning=_ZERO) for run in runs for c in channels)
+    return Form("own in each run", "y = F + b(run)", parameters, contribution, resolution=_RESOLUTION_IN_EACH_RUN)
 
 
 def reading_forms(instrument):
@@ -30,17 +30,17 @@ def reading_forms(instrument):
         return np.ones(loading.size)
 
     channels = instrument.channels
-    forms = [on_channels("constant", "y = F + b", "b", "{}", channels, one, meaning=ZERO)]
+    forms = [on_channels("constant", "y = F + b", "b", "{}", channels, one, meaning=_ZERO)]
     forces = tuple(c for c in channels if c < 3)
     if forces and len(forces) < len(channels):
-        forms.append(on_channels("constant in the forces", "y = F + b", "b", "{}", forces, one, meaning=ZERO))
+        forms.append(on_channels("constant in the forces", "y = F + b", "b", "{}", forces, one, meaning=_ZERO))
         moments = tuple(c for c in channels if c >= 3)
-        forms.append(on_channels("constant in the moments", "y = F + b", "b", "{}", moments, one, meaning=ZERO))
+        forms.append(on_channels("constant in the moments", "y = F + b", "b", "{}", moments, one, meaning=_ZERO))
     if len(channels) > 1:
         forms += [
-            on_channels(f"constant in {AXES[c]}", "y = F + b", "b", "{}", (c,), one, meaning=ZERO) for c in channels
+            on_channels(f"constant in {AXES[c]}", "y = F + b", "b", "{}", (c,), one, meaning=_ZERO) for c in channels
         ]
-    forms = [replace(form, resolution=RESOLUTION) for form in forms]
+    forms = [replace(form, resolution=_RESOLUTION) for form in forms]
     if 1 < len(instrument.runs) <= 60 // len(channels):
         forms.append(_own_in_each_run(instrument))
     return tuple(forms)

@@ -18,7 +18,7 @@ def quadratic(path, values):
     return np.maximum(path.speed * (1 + values[0] + values[1] * path.speed / path.full_speed), 0.0)
 
 
-def dead_zone(path, values):
+def _dead_zone(path, values):
     """ω = ω_max (u - u_0)/(1 - u_0), zero below u_0; u = ω_c/ω_max."""
     start = values[0]
     return path.full_speed * np.maximum(path.speed / path.full_speed - start, 0.0) / (1.0 - start)
@@ -37,9 +37,9 @@ def power(path, values):
     return path.full_speed * u ** values[0]
 
 
-def power_from(path, values):
+def _power_from(path, values):
     """ω = ω_max ((u - u_0)/(1 - u_0))^n, zero below u_0."""
-    return path.full_speed * (dead_zone(path, values[:1]) / path.full_speed) ** values[1]
+    return path.full_speed * (_dead_zone(path, values[:1]) / path.full_speed) ** values[1]
 
 
 LINEAR = 0.005
@@ -81,7 +81,7 @@ EFFECT = Effect(
             "ω = ω_max (u − u_0)/(1 − u_0)",
             (Parameter("u_0", "1", -0.3, 0.5, meaning="command at which the rotors start", negligible=LINEAR),),
             CURVE,
-            dead_zone,
+            _dead_zone,
             (0.0,),
         ),
         SpeedForm(
@@ -117,7 +117,7 @@ EFFECT = Effect(
                 Parameter("n", "1", 0.2, 3.0, meaning="exponent", negligible=LINEAR),
             ),
             CURVE,
-            power_from,
+            _power_from,
             (0.0, 1.0),
         ),
     ),

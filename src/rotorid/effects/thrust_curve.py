@@ -8,36 +8,36 @@ from rotorid.effects.scale import scale
 
 SQUARE = "Δc_2"
 """Symbol of a squared term's excess over the coefficient believed."""
-NO_CURVE = 0.003
+_NO_CURVE = 0.003
 """Share of the hover thrust below which a term is none: no propeller is square to that."""
 
 
-def linear_term(motion, vehicle, values):
+def _linear_term(motion, vehicle, values):
     """T_i += c_1 ω_i."""
     return lift_at_hubs(values[0] * motion.rotor_speed, vehicle)
 
 
-def constant_term(motion, vehicle, values):
+def _constant_term(motion, vehicle, values):
     """T_i += c_0."""
     return lift_at_hubs(values[0] * np.ones_like(motion.rotor_speed), vehicle)
 
 
-def linear_and_constant(motion, vehicle, values):
+def _linear_and_constant(motion, vehicle, values):
     """T_i += c_0 + c_1 ω_i."""
     return lift_at_hubs(values[0] + values[1] * motion.rotor_speed, vehicle)
 
 
-def cubic_term(motion, vehicle, values):
+def _cubic_term(motion, vehicle, values):
     """T_i += c_3 ω_i³."""
     return lift_at_hubs(values[0] * motion.rotor_speed**3, vehicle)
 
 
-def linear_and_square(motion, vehicle, values):
+def _linear_and_square(motion, vehicle, values):
     """T_i += c_1 ω_i + Δc_2 ω_i²."""
     return lift_at_hubs(values[0] * motion.rotor_speed + values[1] * motion.rotor_speed**2, vehicle)
 
 
-def constant_and_square(motion, vehicle, values):
+def _constant_and_square(motion, vehicle, values):
     """T_i += c_0 + Δc_2 ω_i²."""
     return lift_at_hubs(values[0] + values[1] * motion.rotor_speed**2, vehicle)
 
@@ -67,7 +67,7 @@ def forms(vehicle):
     thrust, speed = size.thrust_n, size.hover_speed_rad_s
 
     def term(symbol: str, unit: str, bound: float, size: float, meaning: str) -> Parameter:
-        return Parameter(symbol, unit, -bound, bound, meaning=meaning, negligible=NO_CURVE * size)
+        return Parameter(symbol, unit, -bound, bound, meaning=meaning, negligible=_NO_CURVE * size)
 
     # A rotor at rest does not carry half the vehicle.
     c0 = term("c_0", "N", 0.5 * thrust, thrust, "thrust beyond the square at any speed")
@@ -82,7 +82,7 @@ def forms(vehicle):
             "linear term",
             "T_i = C_F ω_i² + c_1 ω_i",
             (c1,),
-            linear_term,
+            _linear_term,
             needs,
             kernel=kernel,
             kernel_values=_powers(1),
@@ -91,7 +91,7 @@ def forms(vehicle):
             "constant term",
             "T_i = C_F ω_i² + c_0",
             (c0,),
-            constant_term,
+            _constant_term,
             needs,
             excited_by=always,
             kernel=kernel,
@@ -101,7 +101,7 @@ def forms(vehicle):
             "linear and constant",
             "T_i = C_F ω_i² + c_1 ω_i + c_0",
             (c0, c1),
-            linear_and_constant,
+            _linear_and_constant,
             needs,
             excited_by=always,
             kernel=kernel,
@@ -111,7 +111,7 @@ def forms(vehicle):
             "linear term and its own square",
             "T_i = (C_F + Δc_2) ω_i² + c_1 ω_i",
             (c1, c2),
-            linear_and_square,
+            _linear_and_square,
             needs,
             must_show=(0, 1),
             kernel=kernel,
@@ -121,7 +121,7 @@ def forms(vehicle):
             "constant term and its own square",
             "T_i = (C_F + Δc_2) ω_i² + c_0",
             (c0, c2),
-            constant_and_square,
+            _constant_and_square,
             needs,
             must_show=(0, 1),
             excited_by=always,
@@ -132,7 +132,7 @@ def forms(vehicle):
             "cubic term",
             "T_i = C_F ω_i² + c_3 ω_i³",
             (c3,),
-            cubic_term,
+            _cubic_term,
             needs,
             kernel=kernel,
             kernel_values=_powers(3),
@@ -140,12 +140,12 @@ def forms(vehicle):
     )
 
 
-def cubic_and_square(motion, vehicle, values):
+def _cubic_and_square(motion, vehicle, values):
     """T_i += c_3 ω_i³ + Δc_2 ω_i²."""
     return lift_at_hubs(values[0] * motion.rotor_speed**3 + values[1] * motion.rotor_speed**2, vehicle)
 
 
-def power_of_speed(vehicle):
+def _power_of_speed(vehicle):
     """Contribution T_i = (1 + d) C_F ω_h² (ω_i/ω_h)^(2 + e), ω_h the hover speed.
 
     A coefficient of another power has no value to believe: where the two curves cross is as free as the power.
@@ -174,7 +174,7 @@ def reading_forms(instrument):
         "power of the speed",
         "T_i = (1 + d) C_F ω_h² (ω_i/ω_h)^(2+e), ω_h the hover speed",
         (excess, more),
-        power_of_speed(vehicle),
+        _power_of_speed(vehicle),
         ("rotor_speed",),
         takes_up=("thrust",),
     )
@@ -185,7 +185,7 @@ def reading_forms(instrument):
         "cubic term and its own square",
         "T_i = (C_F + Δc_2) ω_i² + c_3 ω_i³",
         cube + square,
-        cubic_and_square,
+        _cubic_and_square,
         ("rotor_speed",),
         must_show=(0, 1),
     )

@@ -22,17 +22,17 @@ def _tilted(motion, vehicle, tilt_x, tilt_y, weight):
     return Contribution(force=thrust.force, moment=thrust.moment + leaning)
 
 
-def at_the_hubs(motion, vehicle, values):
+def _at_the_hubs(motion, vehicle, values):
     """F_i += T_i (ε_x, ε_y, 0) at each hub, M_i −= ±Q_i (ε_x, ε_y, 0); small angles, all rotors alike."""
     return _tilted(motion, vehicle, values[0], values[1], np.ones(vehicle.rotor_count))
 
 
-def thrust_alone(motion, vehicle, values):
+def _thrust_alone(motion, vehicle, values):
     """F_i += T_i (ε_x, ε_y, 0) at each hub, reaction torques upright: what flows off the rotor leans, not the motor."""
     return at_hubs(_forces(motion, vehicle, values[0], values[1]), vehicle.rotor_positions_m())
 
 
-def force_only(motion, vehicle, values):
+def _force_only(motion, vehicle, values):
     """F = T (ε_x, ε_y, 0) at the centre of mass."""
     return Contribution(force=_forces(motion, vehicle, values[0], values[1]).sum(axis=1))
 
@@ -44,7 +44,7 @@ def _single(k):
     return one
 
 
-def kernel_at_the_hubs(m, v, p, w):
+def _kernel_at_the_hubs(m, v, p, w):
     """F_i += T_i (ε_x,i, ε_y,i, 0), M -= ±Q_i (ε_x,i, ε_y,i, 0); `p` is ε_x, ε_y of each rotor."""
     roll = pitch = 0.0
     for i in range(v.rotors):
@@ -57,13 +57,13 @@ def kernel_at_the_hubs(m, v, p, w):
     w.moment[1] -= pitch
 
 
-def kernel_thrust_alone(m, v, p, w):
+def _kernel_thrust_alone(m, v, p, w):
     for i in range(v.rotors):
         for j in range(2):
             w.hub_force[i, j] += m.thrust[i] * p[j]
 
 
-def kernel_force_only(m, v, p, w):
+def _kernel_force_only(m, v, p, w):
     for i in range(v.rotors):
         for j in range(2):
             w.force[j] += m.thrust[i] * p[j]
@@ -86,7 +86,7 @@ def forms(vehicle):
             needs,
             (),
             2,
-            kernel=kernel_at_the_hubs,
+            kernel=_kernel_at_the_hubs,
             kernel_values=_of_rotors(np.eye(vehicle.rotor_count)[k]),
         )
         for k in range(vehicle.rotor_count)
@@ -96,32 +96,32 @@ def forms(vehicle):
             "all rotors, at the hubs",
             "F_i = T_i (ε_x, ε_y, −1)",
             tilt,
-            at_the_hubs,
+            _at_the_hubs,
             needs,
-            kernel=kernel_at_the_hubs,
+            kernel=_kernel_at_the_hubs,
             kernel_values=_of_rotors(np.ones(vehicle.rotor_count)),
         ),
         Form(
             "all rotors, at the hubs, thrust alone",
             "F_i = T_i (ε_x, ε_y, −1), torques upright",
             tilt,
-            thrust_alone,
+            _thrust_alone,
             needs,
-            kernel=kernel_thrust_alone,
+            kernel=_kernel_thrust_alone,
         ),
         Form(
             "all rotors, at the centre of mass",
             "F = T (ε_x, ε_y, −1)",
             tilt,
-            force_only,
+            _force_only,
             needs,
-            kernel=kernel_force_only,
+            kernel=_kernel_force_only,
         ),
         *singles,
     )
 
 
-def each_its_own(motion, vehicle, values):
+def _each_its_own(motion, vehicle, values):
     """F_i += T_i (ε_x,i, ε_y,i, 0) at each hub, torques leaning with their axes; values (2k,): x of each, then y."""
     tilt_x, tilt_y = np.split(np.asarray(values, float), 2)
     parts = [
@@ -144,7 +144,7 @@ def reading_forms(instrument):
             for k in range(count)
         )
         text = "F_i = T_i (ε_x,i, ε_y,i, −1)"
-        found.append(Form("each rotor its own way", text, tilts, each_its_own, ("rotor_speed",)))
+        found.append(Form("each rotor its own way", text, tilts, _each_its_own, ("rotor_speed",)))
     return tuple(on_stand(form) for form in found)
 
 

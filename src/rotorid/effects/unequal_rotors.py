@@ -8,7 +8,7 @@ import numpy as np
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter, lift_at_hubs, rotor_thrusts
 from rotorid.effects.loading import NO_ROTORS, on_stand
 
-MOST_TWIST = 0.5
+_MOST_TWIST = 0.5
 """Largest share by which the torque of a rotor differs from that of the others at the same thrust."""
 
 
@@ -30,12 +30,12 @@ def both(motion, vehicle, values):
     return Contribution(wrench.force, wrench.moment + _torque(motion, vehicle, weights))
 
 
-def thrust_only(motion, vehicle, values):
+def _thrust_only(motion, vehicle, values):
     """C_F,i = C_F (1 + d_i)."""
     return _thrust(motion, vehicle, np.asarray(values))
 
 
-def torque_only(motion, vehicle, values):
+def _torque_only(motion, vehicle, values):
     """C_Q,i = C_Q (1 + d_i)."""
     return Contribution(moment=_torque(motion, vehicle, np.asarray(values)))
 
@@ -73,8 +73,8 @@ def kernel(m, v, p, w):
 
 def _excess(function, weights):
     """Kernel values of `function` (both, thrust_only or torque_only) for what each rotor has in excess."""
-    thrust = 0.0 if function is torque_only else 1.0
-    torque = 0.0 if function is thrust_only else 1.0
+    thrust = 0.0 if function is _torque_only else 1.0
+    torque = 0.0 if function is _thrust_only else 1.0
     return [share * weight for weight in weights for share in (thrust, torque)]
 
 
@@ -106,12 +106,12 @@ def forms(vehicle):
             kernel=kernel,
             kernel_values=partial(_of_one, i, count, function),
         )
-        for name, text, function in (("rotor {}", both_text, both), ("thrust of rotor {}", thrust_text, thrust_only))
+        for name, text, function in (("rotor {}", both_text, both), ("thrust of rotor {}", thrust_text, _thrust_only))
         for i in range(count)
     ]
     free, closed = symbols[:-1], ", Σ d_i = 0"
     # At the same thrust: blades of another twist or profile, no other propeller.
-    twisted = tuple(replace(p, low=-MOST_TWIST, high=MOST_TWIST) for p in free)
+    twisted = tuple(replace(p, low=-_MOST_TWIST, high=_MOST_TWIST) for p in free)
     return (
         *singles,
         *(
@@ -128,8 +128,8 @@ def forms(vehicle):
             )
             for name, text, function, parameters in (
                 ("thrust and torque", both_text, both, free),
-                ("thrust", thrust_text, thrust_only, free),
-                ("torque", torque_text, torque_only, twisted),
+                ("thrust", thrust_text, _thrust_only, free),
+                ("torque", torque_text, _torque_only, twisted),
             )
         ),
     )

@@ -7,11 +7,11 @@ from rotorid.effects.creep import followed
 from rotorid.effects.loading import NO_ROTORS, TOO_SHORT, at_sensor
 from rotorid.effects.scale import rotor_radius_m
 
-STOPPED_RAD_S = 1.0
+_STOPPED_RAD_S = 1.0
 """Below this speed a rotor counts as at rest."""
 
 
-def thrust_part(gain, loading, vehicle):
+def _thrust_part(gain, loading, vehicle):
     """Reading of the believed thrust times a gain (n, k)."""
     thrust = vehicle.thrust_coefficients_n_s2() * loading.motion.rotor_speed**2 * gain
     hubs = vehicle.rotor_positions_m()
@@ -28,11 +28,11 @@ def recirculation(loading, vehicle, values):
     """
     speed = loading.motion.rotor_speed
     late = followed(speed, values[1], loading.dt_s)
-    gain = np.where(speed > STOPPED_RAD_S, -values[0] * late / np.maximum(speed, STOPPED_RAD_S), 0.0)
-    return Contribution(reading=thrust_part(gain, loading, vehicle))
+    gain = np.where(speed > _STOPPED_RAD_S, -values[0] * late / np.maximum(speed, _STOPPED_RAD_S), 0.0)
+    return Contribution(reading=_thrust_part(gain, loading, vehicle))
 
 
-def of_all_rotors(largest_n):
+def _of_all_rotors(largest_n):
     """Contribution T_i = C_F ω_i² (1 − c LP_τ(Σ T)/T_max), T_max the largest total thrust, N.
 
     All rotors stir the same air: what it takes from each is a share that goes as the momentum all have thrown out.
@@ -42,13 +42,13 @@ def of_all_rotors(largest_n):
         total = (vehicle.thrust_coefficients_n_s2() * loading.motion.rotor_speed**2).sum(axis=1, keepdims=True)
         late = followed(total, values[1], loading.dt_s) / largest_n
         return Contribution(
-            reading=thrust_part(np.broadcast_to(-values[0] * late, (loading.size, 1)), loading, vehicle)
+            reading=_thrust_part(np.broadcast_to(-values[0] * late, (loading.size, 1)), loading, vehicle)
         )
 
     return contribution
 
 
-def by_power(largest_n):
+def _by_power(largest_n):
     """Contribution T_i = C_F ω_i² (1 − c LP_τ((ΣT/T_max)^(n/2))), T_max the largest total thrust, N.
 
     Air driven round a room goes as the speed that the rotors give it (n = 1) or as its momentum (n = 2): between the
@@ -59,15 +59,15 @@ def by_power(largest_n):
         share, tau_s, power = values
         total = (vehicle.thrust_coefficients_n_s2() * loading.motion.rotor_speed**2).sum(axis=1, keepdims=True)
         late = followed((total / largest_n) ** (power / 2.0), tau_s, loading.dt_s)
-        return Contribution(reading=thrust_part(np.broadcast_to(-share * late, (loading.size, 1)), loading, vehicle))
+        return Contribution(reading=_thrust_part(np.broadcast_to(-share * late, (loading.size, 1)), loading, vehicle))
 
     return contribution
 
 
-def by_distance(loading, vehicle, values):
+def _by_distance(loading, vehicle, values):
     """T_i = (1 + c (R/d)²) C_F ω_i², d the distance to the wall."""
     ratio = (rotor_radius_m(vehicle) / np.maximum(loading.distance, 1e-3)) ** 2
-    return Contribution(reading=thrust_part(values[0] * ratio[:, None], loading, vehicle))
+    return Contribution(reading=_thrust_part(values[0] * ratio[:, None], loading, vehicle))
 
 
 def reading_forms(instrument):
@@ -83,11 +83,11 @@ def reading_forms(instrument):
         forms.append(Form("recirculation", text, (share, tau), recirculation, ("rotor_speed",)))
         largest = Parameter("c_T", "1", 0.0, 0.5, meaning="share of the thrust when all have turned at their most")
         text = "T = C_F ω² (1 − c_T (ΣT after a lag of τ)/T_max)"
-        together = of_all_rotors(max(instrument.largest[2], 1e-6))
+        together = _of_all_rotors(max(instrument.largest[2], 1e-6))
         forms.append(Form("recirculation of all rotors' air", text, (largest, tau), together, ("rotor_speed",)))
         power = Parameter("n", "1", 0.3, 3.0, nonlinear=True, starts=(1.0,), meaning="power of the rotors' speed")
         text = "T = C_F ω² (1 − c_T ((ΣT/T_max)^(n/2) after a lag of τ))"
-        by = by_power(max(instrument.largest[2], 1e-6))
+        by = _by_power(max(instrument.largest[2], 1e-6))
         forms.append(Form("recirculation by a power of the speed", text, (largest, tau, power), by, ("rotor_speed",)))
     if instrument.distance:
         forms.append(
@@ -95,7 +95,7 @@ def reading_forms(instrument):
                 "by distance",
                 "T = C_F ω² (1 + c (R/d)²)",
                 (Parameter("c", "1", -20.0, 20.0, meaning="gain of thrust at d = R"),),
-                by_distance,
+                _by_distance,
             )
         )
     return tuple(forms)

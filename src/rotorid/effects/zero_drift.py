@@ -9,8 +9,8 @@ import numpy as np
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.loading import AXES, TOO_SHORT, on_channels, one_per_channel
 
-DRIFT = "drift of the zero"
-REACH = 1.0
+_DRIFT = "drift of the zero"
+_REACH = 1.0
 """How far outside the temperatures recorded, as a share of their span, the zero may have been right."""
 
 
@@ -26,11 +26,11 @@ def warming(instrument, name, equation, span_s, elapsed_s, shares):
 
     starts = tuple(share * span_s for share in shares)
     tau = Parameter("tau", "s", 0.08 * span_s, 5 * span_s, True, starts, "time of warming up")
-    own = one_per_channel("b", "{}", channels, meaning=DRIFT + " in the end")
+    own = one_per_channel("b", "{}", channels, meaning=_DRIFT + " in the end")
     return Form(name, equation, (*own, tau), contribution)
 
 
-def zeroed_at(instrument):
+def _zeroed_at(instrument):
     """y = F + b (T − T_0): zeroed at a temperature that nobody wrote down."""
     channels = instrument.channels
 
@@ -41,12 +41,12 @@ def zeroed_at(instrument):
         return Contribution(reading=reading)
 
     low, high = instrument.temperatures_c
-    reach = REACH * (high - low)
+    reach = _REACH * (high - low)
     guess = instrument.zero_temperature_c
     start = instrument.first_temperature_c if guess is None else guess
     starts = (float(np.clip(start, low - reach, high + reach)),)
     zero = Parameter("T_0", "°C", low - reach, high + reach, True, starts, "temperature at which the zero was right")
-    own = one_per_channel("b", "{}/K", channels, meaning=DRIFT)
+    own = one_per_channel("b", "{}/K", channels, meaning=_DRIFT)
     return Form("with temperature, zero at T_0", "y = F + b (T − T_0)", (*own, zero), contribution)
 
 
@@ -54,7 +54,7 @@ def reading_forms(instrument):
     channels = instrument.channels
 
     def of(name, equation, unit, signal, of_channels=channels):
-        return on_channels(name, equation, "b", unit, of_channels, signal, meaning=DRIFT)
+        return on_channels(name, equation, "b", unit, of_channels, signal, meaning=_DRIFT)
 
     def minutes(loading):
         return loading.run_time_s / 60.0
@@ -76,7 +76,7 @@ def reading_forms(instrument):
         first = instrument.first_temperature_c
         text = "with temperature over the session"
         forms.append(of(text, "y = F + b (T − T_first)", "{}/K", lambda x: x.temperature_c - first))
-        forms.append(zeroed_at(instrument))
+        forms.append(_zeroed_at(instrument))
     return tuple(forms)
 
 

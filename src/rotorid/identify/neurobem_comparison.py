@@ -27,18 +27,18 @@ from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.neurobem import ANGULAR_ACCELERATION, PREDICTED_FORCE, PREDICTED_MOMENT
 
-PAPER_MASS_KG = 0.752
-POINT_STEP = 40
+_PAPER_MASS_KG = 0.752
+_POINT_STEP = 40
 """Every so many samples become a point of the figure."""
-MODELS = ("rigid_body", "neurobem")
-FLIGHT_COLUMNS = ["flight", "model", "airspeed_mean_m_s", "airspeed_max_m_s", *CHANNELS, *TOTALS]
-BIN_COLUMNS = ["model", "channel", "airspeed_low_m_s", "airspeed_high_m_s", "samples"]
-BIN_COLUMNS += ["rms", "low_95", "high_95"]
-POINT_COLUMNS = ["flight", "airspeed_m_s", *CHANNELS]
+_MODELS = ("rigid_body", "neurobem")
+_FLIGHT_COLUMNS = ["flight", "model", "airspeed_mean_m_s", "airspeed_max_m_s", *CHANNELS, *TOTALS]
+_BIN_COLUMNS = ["model", "channel", "airspeed_low_m_s", "airspeed_high_m_s", "samples"]
+_BIN_COLUMNS += ["rms", "low_95", "high_95"]
+_POINT_COLUMNS = ["flight", "airspeed_m_s", *CHANNELS]
 
 
 @dataclass(frozen=True)
-class NeurobemTables:
+class _NeurobemTables:
     """Summary and tables; forces in N, moments in N m."""
 
     summary: dict
@@ -47,17 +47,17 @@ class NeurobemTables:
     points: pd.DataFrame
 
 
-def nothing() -> NeurobemTables:
+def nothing() -> _NeurobemTables:
     """Tables without a row, for recordings that are not there."""
-    tables = (pd.DataFrame(columns=names) for names in (FLIGHT_COLUMNS, BIN_COLUMNS, POINT_COLUMNS))
-    return NeurobemTables({}, *tables)
+    tables = (pd.DataFrame(columns=names) for names in (_FLIGHT_COLUMNS, _BIN_COLUMNS, _POINT_COLUMNS))
+    return _NeurobemTables({}, *tables)
 
 
 def residuals_of(run: Run, vehicle: Vehicle, cutoff_hz: float) -> dict[str, np.ndarray]:
     """What each model leaves over in one flight, shape (n, 6) each."""
     rate = 1 / float(np.median(np.diff(run.time_s)))
     acceleration = run.array(ANGULAR_ACCELERATION)
-    lighter = vehicle.model_copy(update={"mass_kg": PAPER_MASS_KG})
+    lighter = vehicle.model_copy(update={"mass_kg": _PAPER_MASS_KG})
 
     def filtered(wrench: np.ndarray) -> np.ndarray:
         return low_pass(wrench, rate, cutoff_hz)
@@ -98,13 +98,13 @@ def _bin_rows(model: str, found: Binned) -> list[tuple]:
 
 def compare(
     recordings: RecordingSet, cutoff_hz: float, airspeed_bin_m_s: float, block_s: float, seed: int
-) -> NeurobemTables:
+) -> _NeurobemTables:
     """RMS of every flight and model, and against airspeed with block-bootstrap intervals."""
     vehicle = recordings.vehicle
     left = {run.name: residuals_of(run, vehicle, cutoff_hz) for run in recordings.runs}
     speeds = {run.name: airspeed(run) for run in recordings.runs}
     times = {run.name: run.time_s for run in recordings.runs}
-    rows, summary = [], {"mass_kg": vehicle.mass_kg, "paper_mass_kg": PAPER_MASS_KG, "flights": {}}
+    rows, summary = [], {"mass_kg": vehicle.mass_kg, "paper_mass_kg": _PAPER_MASS_KG, "flights": {}}
     for flight, models in left.items():
         pace = {
             "airspeed_mean_m_s": float(speeds[flight].mean()),
@@ -117,12 +117,14 @@ def compare(
     summary["one_flight_above_m_s"] = tops[-2] if len(tops) > 1 else 0.0
     edges = np.arange(0.0, top + airspeed_bin_m_s, airspeed_bin_m_s)
     bins = []
-    for model in MODELS:
+    for model in _MODELS:
         mine = {flight: models[model] for flight, models in left.items()}
         found = by_airspeed(mine, speeds, times, edges, block_s, np.random.default_rng(seed))
         summary[model] = _growth(found)
         bins += _bin_rows(model, found)
-    cloud = [np.column_stack([speeds[flight], models["rigid_body"]])[::POINT_STEP] for flight, models in left.items()]
-    points = pd.DataFrame(np.concatenate(cloud), columns=POINT_COLUMNS[1:])
+    cloud = [np.column_stack([speeds[flight], models["rigid_body"]])[::_POINT_STEP] for flight, models in left.items()]
+    points = pd.DataFrame(np.concatenate(cloud), columns=_POINT_COLUMNS[1:])
     points.insert(0, "flight", np.repeat(list(left), [len(part) for part in cloud]))
-    return NeurobemTables(summary, pd.DataFrame(rows)[FLIGHT_COLUMNS], pd.DataFrame(bins, columns=BIN_COLUMNS), points)
+    return _NeurobemTables(
+        summary, pd.DataFrame(rows)[_FLIGHT_COLUMNS], pd.DataFrame(bins, columns=_BIN_COLUMNS), points
+    )

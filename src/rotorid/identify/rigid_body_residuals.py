@@ -22,7 +22,7 @@ from rotorid.recordings import columns as c
 CHANNELS = ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
 TOTALS = ("force", "moment")
 """Over three axes: sqrt(mean of the three squares), the convention of the NeuroBEM paper's table."""
-ORDER = 2
+_ORDER = 2
 
 
 def low_pass(values: np.ndarray, rate_hz: float, cutoff_hz: float) -> np.ndarray:
@@ -31,10 +31,10 @@ def low_pass(values: np.ndarray, rate_hz: float, cutoff_hz: float) -> np.ndarray
     Forward and backward passes each attenuate, so the one-way filter's corner is set higher by
     (√2 - 1)^(-1/4) for the second order used here.
     """
-    corner = cutoff_hz * (np.sqrt(2) - 1) ** (-1 / (2 * ORDER))
+    corner = cutoff_hz * (np.sqrt(2) - 1) ** (-1 / (2 * _ORDER))
     if corner >= rate_hz / 2:
         raise InputError(f"cutoff {cutoff_hz:g} Hz is too high for samples at {rate_hz:g} Hz")
-    return sosfiltfilt(butter(ORDER, corner, fs=rate_hz, output="sos"), values, axis=0)
+    return sosfiltfilt(butter(_ORDER, corner, fs=rate_hz, output="sos"), values, axis=0)
 
 
 def measured_wrench(run: Run, vehicle: Vehicle, angular_acceleration: np.ndarray) -> np.ndarray:

@@ -22,11 +22,11 @@ ANSWER = ord("A")  # the device's answer to a command
 COMMAND = ord("C")  # from the host to the device
 
 HEAD = struct.Struct("<BHI")
-TAIL = struct.Struct("<H")
+_TAIL = struct.Struct("<H")
 SEQUENCE_PERIOD = 1 << 16
 CLOCK_PERIOD_US = 1 << 32
-MAX_BODY = 253  # so that a COBS block never needs the special code 0xFF
-MAX_WIRE = MAX_BODY + 2
+_MAX_BODY = 253  # so that a COBS block never needs the special code 0xFF
+_MAX_WIRE = _MAX_BODY + 2
 
 
 class Frame(NamedTuple):
@@ -48,8 +48,8 @@ class ChecksumError(BrokenFrame):
 
 def cobs_encode(body: bytes) -> bytes:
     """Body without zero bytes, one byte longer. Raises ValueError beyond 253 bytes."""
-    if len(body) > MAX_BODY:
-        raise ValueError(f"a frame's body holds at most {MAX_BODY} bytes, not {len(body)}")
+    if len(body) > _MAX_BODY:
+        raise ValueError(f"a frame's body holds at most {_MAX_BODY} bytes, not {len(body)}")
     out = bytearray()
     for part in body.split(b"\0"):
         out.append(len(part) + 1)
@@ -77,13 +77,13 @@ def encode(frame: Frame) -> bytes:
     """The bytes of a frame on the wire, ending in the zero that delimits it."""
     body = HEAD.pack(frame.kind, frame.sequence % SEQUENCE_PERIOD, frame.clock_us % CLOCK_PERIOD_US)
     body += frame.payload
-    return cobs_encode(body + TAIL.pack(crc_hqx(body, 0xFFFF))) + b"\0"
+    return cobs_encode(body + _TAIL.pack(crc_hqx(body, 0xFFFF))) + b"\0"
 
 
 def decode(block: bytes) -> Frame:
     """A frame from the bytes between two zeros. Raises BrokenFrame or ChecksumError."""
     body = cobs_decode(block)
-    if len(body) < HEAD.size + TAIL.size:
+    if len(body) < HEAD.size + _TAIL.size:
         raise BrokenFrame(f"{len(body)} bytes are too short for a frame")
     # the CRC of a message followed by its own big-endian CRC is zero; ours is little-endian, so compare
     if crc_hqx(body[:-2], 0xFFFF) != body[-2] | body[-1] << 8:
@@ -109,9 +109,9 @@ class StreamDecoder:
     def feed(self, data: bytes) -> list[Frame]:
         """Frames completed by these bytes, in the order of arrival."""
         *blocks, self.pending = (self.pending + data).split(b"\0")
-        if len(self.pending) > MAX_WIRE:  # no frame is that long: forget the garbage, keep the count
-            self.lost_bytes += len(self.pending) - MAX_WIRE
-            self.pending = self.pending[-MAX_WIRE:]
+        if len(self.pending) > _MAX_WIRE:  # no frame is that long: forget the garbage, keep the count
+            self.lost_bytes += len(self.pending) - _MAX_WIRE
+            self.pending = self.pending[-_MAX_WIRE:]
         found = []
         for block in blocks:
             if not block:  # two zeros in a row: an empty block is a usual way to flush a line

@@ -27,11 +27,11 @@ COLUMNS = (
 NAME = "sessions.tsv"
 KEY = "sessions_sha256"
 _ROW = re.compile(rb"^sessions_sha256\t.*\n?", re.MULTILINE)
-LOCAL = "local"
+_LOCAL = "local"
 """Folder for recordings that no index takes unasked."""
 
 
-def index_row(session: Session, metadata: Path, raw: Path) -> dict[str, str]:
+def _index_row(session: Session, metadata: Path, raw: Path) -> dict[str, str]:
     """A row of the index; paths are relative to `raw`, what is not known is empty."""
     values = session.setup.model_dump() | session.model_dump(exclude={"setup"}) | session.counts.model_dump()
     values["file"] = metadata.with_name(session.log).relative_to(raw).as_posix()
@@ -46,7 +46,7 @@ def write_index(raw: Path) -> list[dict[str, str]]:
     Such a folder has an index of its own, by `write_index(raw / "local")`. Files that are no session metadata (vehicle
     files) are passed over. Raises SessionError for a session file that is damaged.
     """
-    rows = [index_row(read_session(path), path, raw) for path in metadata_files(raw)]
+    rows = [_index_row(read_session(path), path, raw) for path in metadata_files(raw)]
     rows.sort(key=lambda row: (row["started"], row["id"]))
     text = io.StringIO(newline="")
     writer = csv.DictWriter(text, COLUMNS, delimiter="\t", lineterminator="\n")
@@ -91,7 +91,7 @@ def renew_checksum(path: Path) -> bool:
 def metadata_files(raw: Path) -> list[Path]:
     """Metadata of the recordings below `raw`, those in `raw/local` left out."""
     return [
-        path for path in sorted(raw.rglob("*.yaml")) if path.relative_to(raw).parts[0] != LOCAL and _is_session(path)
+        path for path in sorted(raw.rglob("*.yaml")) if path.relative_to(raw).parts[0] != _LOCAL and _is_session(path)
     ]
 
 

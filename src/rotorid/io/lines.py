@@ -29,7 +29,7 @@ from rotorid.io.rawlog import RECEIVED, Damage, read_raw
 from rotorid.io.session import SessionError, read_session, session_path
 from rotorid.io.text.wording import explain
 
-MAX_LINE = 4096
+_MAX_LINE = 4096
 
 
 class DescriptionError(InputError):
@@ -123,7 +123,7 @@ class LineDecoder:
     def feed(self, data: bytes) -> list[tuple[float, ...]]:
         """Values of the lines that these bytes complete."""
         *whole, self._pending = (self._pending + data).replace(b"\r", b"\n").split(b"\n")
-        self._pending = self._pending[-MAX_LINE:]
+        self._pending = self._pending[-_MAX_LINE:]
         if self._broken and whole:
             self._broken = False
             del whole[0]
@@ -143,7 +143,7 @@ class LineDecoder:
 
 
 @dataclass(frozen=True)
-class LineLog:
+class _LineLog:
     """`table`: `host_time_s` (when the line's end was read, from the beginning of the log), `index` and the columns.
     `faults`: a sentence each, in what the file is not what the recorder wrote."""
 
@@ -154,7 +154,7 @@ class LineLog:
     faults: tuple[str, ...] = ()
 
 
-def read_line_log(path: Path, description: Description | None = None) -> LineLog:
+def read_line_log(path: Path, description: Description | None = None) -> _LineLog:
     """Read a log of plain lines by its own description or by another, around damage.
 
     Raises SessionError, NotALog, and LogError where log and metadata are of two recordings.
@@ -179,4 +179,4 @@ def read_line_log(path: Path, description: Description | None = None) -> LineLog
             rows += [(host_s, *values) for values in decoder.feed(piece.data)]
     table = pd.DataFrame(rows, columns=["host_time_s", *description.columns])
     table.insert(1, "index", range(len(table)))
-    return LineLog(table, decoder.unreadable, raw.cut_at, raw.lost_bytes, tuple(faults_of(raw, session)))
+    return _LineLog(table, decoder.unreadable, raw.cut_at, raw.lost_bytes, tuple(faults_of(raw, session)))

@@ -25,12 +25,12 @@ from rotorid.io.text.bounds import LARGEST_RAW_LOG, MOST_TRIED_BYTES
 from rotorid.io.text.files import read_bytes
 
 MAGIC = b"ROTORLOG1\n"
-CHUNK_HEAD = struct.Struct("<BQH")
-CHUNK_TAIL = struct.Struct("<H")
-MAX_CHUNK = 0xFFFF
+_CHUNK_HEAD = struct.Struct("<BQH")
+_CHUNK_TAIL = struct.Struct("<H")
+_MAX_CHUNK = 0xFFFF
 RECEIVED, SENT, NOTE = ord("R"), ord("T"), ord("N")
 _TAG = re.compile(b"[RTN]")
-LONGEST_PAUSE_NS = 30 * 86_400 * 10**9
+_LONGEST_PAUSE_NS = 30 * 86_400 * 10**9
 """Between two chunks of one log."""
 
 
@@ -87,10 +87,10 @@ class RawLog:
 def pack_chunk(tag: int, host_ns: int, data: bytes) -> bytes:
     """The bytes of one or (beyond 65,535 bytes) several chunks."""
     out = b""
-    for start in range(0, max(len(data), 1), MAX_CHUNK):
-        part = data[start : start + MAX_CHUNK]
-        chunk = CHUNK_HEAD.pack(tag, host_ns, len(part)) + part
-        out += chunk + CHUNK_TAIL.pack(crc_hqx(chunk, 0xFFFF))
+    for start in range(0, max(len(data), 1), _MAX_CHUNK):
+        part = data[start : start + _MAX_CHUNK]
+        chunk = _CHUNK_HEAD.pack(tag, host_ns, len(part)) + part
+        out += chunk + _CHUNK_TAIL.pack(crc_hqx(chunk, 0xFFFF))
     return out
 
 
@@ -141,18 +141,18 @@ def _walk(data: bytes, position: int) -> Iterator[tuple[Chunk, int, int]]:
     earliest, latest, tried, following = 0, 2**64, 0, position
     while (place := _TAG.search(data, position)) is not None and tried < MOST_TRIED_BYTES:
         position = place.start()
-        if position + CHUNK_HEAD.size + CHUNK_TAIL.size > len(data):
+        if position + _CHUNK_HEAD.size + _CHUNK_TAIL.size > len(data):
             return
-        tag, host_ns, length = CHUNK_HEAD.unpack_from(data, position)
-        begin = position + CHUNK_HEAD.size
+        tag, host_ns, length = _CHUNK_HEAD.unpack_from(data, position)
+        begin = position + _CHUNK_HEAD.size
         end = begin + length
         # behind a damage any two bytes may look like a checksum: the time, too, has to go on
         timely = earliest <= host_ns and (host_ns <= latest or position == following)
-        if timely and end + CHUNK_TAIL.size <= len(data):
-            if crc_hqx(data[position:end], 0xFFFF) == CHUNK_TAIL.unpack_from(data, end)[0]:
-                earliest, latest = host_ns, host_ns + LONGEST_PAUSE_NS
-                yield Chunk(tag, host_ns, data[begin:end]), position, end + CHUNK_TAIL.size
-                position = following = end + CHUNK_TAIL.size
+        if timely and end + _CHUNK_TAIL.size <= len(data):
+            if crc_hqx(data[position:end], 0xFFFF) == _CHUNK_TAIL.unpack_from(data, end)[0]:
+                earliest, latest = host_ns, host_ns + _LONGEST_PAUSE_NS
+                yield Chunk(tag, host_ns, data[begin:end]), position, end + _CHUNK_TAIL.size
+                position = following = end + _CHUNK_TAIL.size
                 continue
             tried += length
         position += 1
@@ -160,11 +160,11 @@ def _walk(data: bytes, position: int) -> Iterator[tuple[Chunk, int, int]]:
 
 def _rescued(data: bytes, start: int, stop: int, before: list[Chunk], following: Chunk) -> Chunk | None:
     """The content of one damaged chunk of received bytes whose length still leads to the next chunk."""
-    if stop - start < CHUNK_HEAD.size + CHUNK_TAIL.size:
+    if stop - start < _CHUNK_HEAD.size + _CHUNK_TAIL.size:
         return None
-    tag, host_ns, length = CHUNK_HEAD.unpack_from(data, start)
-    if tag != RECEIVED or start + CHUNK_HEAD.size + length + CHUNK_TAIL.size != stop:
+    tag, host_ns, length = _CHUNK_HEAD.unpack_from(data, start)
+    if tag != RECEIVED or start + _CHUNK_HEAD.size + length + _CHUNK_TAIL.size != stop:
         return None
     earliest = before[-1].host_ns if before else 0
-    content = data[start + CHUNK_HEAD.size : stop - CHUNK_TAIL.size]
+    content = data[start + _CHUNK_HEAD.size : stop - _CHUNK_TAIL.size]
     return Chunk(tag, min(max(host_ns, earliest), following.host_ns), content)

@@ -13,9 +13,9 @@ from rotorid.io import wire
 from rotorid.io.frames import CLOCK_PERIOD_US, DATA, SEQUENCE_PERIOD, START, Frame
 from rotorid.io.wire.base import BOOTED
 
-UNKNOWN_BOOT = -1  # a reset was noticed whose start record never came
-LATE_US = 1_000_000  # a frame that comes late or twice is not older than this
-LATEST_GAPS = 1000  # a late frame's gap is one of the last; looking through more would take for ever on a ruined line
+_UNKNOWN_BOOT = -1  # a reset was noticed whose start record never came
+_LATE_US = 1_000_000  # a frame that comes late or twice is not older than this
+_LATEST_GAPS = 1000  # a late frame's gap is one of the last; looking through more would take for ever on a ruined line
 
 
 class Quality(IntFlag):
@@ -86,7 +86,7 @@ class Tracker:
         record = _start_record(frame)
         if record is not None:
             self.interval_us = record.interval_us or self.interval_us
-            if self.boot_id == UNKNOWN_BOOT:
+            if self.boot_id == _UNKNOWN_BOOT:
                 self.boot_id = record.boot_id
             elif record.boot_id != self.boot_id:
                 self._begin_segment(record.boot_id)
@@ -97,10 +97,10 @@ class Tracker:
         if frame.kind == DATA == self._kind:  # between other frames the device may have idled for hours
             step += self._whole_periods(step, ticks)
             if self._contradicts(step, ticks):
-                self._begin_segment(UNKNOWN_BOOT)
+                self._begin_segment(_UNKNOWN_BOOT)
                 return self._first(frame)
         elif self._began_anew(step, ticks, record):
-            self._begin_segment(UNKNOWN_BOOT if record is None else record.boot_id)
+            self._begin_segment(_UNKNOWN_BOOT if record is None else record.boot_id)
             return self._first(frame)
         index, clock = self._index + step, self._clock + ticks
         if step <= 0:
@@ -159,14 +159,14 @@ class Tracker:
             return False
         if record is not None and record.reason == BOOTED:
             return (self._index + step, self._clock + ticks) != self._origin
-        return abs(ticks) > LATE_US + 50 * (self.interval_us or 0)
+        return abs(ticks) > _LATE_US + 50 * (self.interval_us or 0)
 
     def unreadable(self) -> None:
         """The frame just placed holds no sample: the next sample says that one is missing before it."""
         self._flags |= Quality.AFTER_GAP
 
     def _old(self, index: int, clock: int) -> Placed | None:
-        for i in range(len(self.gaps) - 1, max(len(self.gaps) - LATEST_GAPS, 0) - 1, -1):
+        for i in range(len(self.gaps) - 1, max(len(self.gaps) - _LATEST_GAPS, 0) - 1, -1):
             gap = self.gaps[i]
             if gap.segment == self.segment and gap.first_index <= index < gap.first_index + gap.count:
                 self.gaps[i : i + 1] = _split(gap, index, clock / 1e6)

@@ -17,7 +17,7 @@ from rotorid.errors import InputError
 from rotorid.io.logs import Log, read_log
 from rotorid.io.session import Ended
 
-SETUP = (
+_SETUP = (
     "platform axis load_gf cell repeat experiment throttle motor infill_percent specimen gauge_length_mm "
     "cross_section_mm2 mount_roll_deg mount_pitch_deg tared"
 ).split()
@@ -63,7 +63,7 @@ def _row(log: Log) -> dict:
         "source": session.source,
         "started": session.started,
         "host_start_s": session.host_start_ns / 1e9,
-        **{name: setup[name] for name in SETUP},
+        **{name: setup[name] for name in _SETUP},
         "sensor_x_m": _part(setup["sensor_position_m"], 0),
         "sensor_y_m": _part(setup["sensor_position_m"], 1),
         "sensor_z_m": _part(setup["sensor_position_m"], 2),

@@ -17,32 +17,37 @@ from rotorid.errors import InputError
 from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.decide import coefficients, throttle_or_thrust, wrench_findings
 from rotorid.mismatch.decision.evidence import weighed
-from rotorid.mismatch.decision.findings import Analysis, Finding, RunWind, Trace, by_channel, in_interval, not_held, rms
-from rotorid.mismatch.decision.probability import with_probabilities
+from rotorid.mismatch.decision.findings import (
+    Analysis,
+    Finding,
+    RunWind,
+    Trace,
+    by_channel,
+    in_interval,
+    not_held,
+    rms,
+    with_probabilities,
+)
 from rotorid.mismatch.decision.shares import fitted_part
 from rotorid.mismatch.delivery.candidates import Candidate, Ground
-from rotorid.mismatch.delivery.files import conditions_of, instruments_of
+from rotorid.mismatch.delivery.files import claimed, conditions_of, instruments_of, place_of, with_effects
 from rotorid.mismatch.delivery.final import Offered, Stretches, as_delivered
-from rotorid.mismatch.delivery.flown import squares_of_windows
-from rotorid.mismatch.delivery.model import model_of
-from rotorid.mismatch.delivery.parts import claimed, place_of, with_effects
-from rotorid.mismatch.delivery.reduce import chain_ids, with_only
-from rotorid.mismatch.delivery.usable import question_of
+from rotorid.mismatch.delivery.flown import model_of, squares_of_windows
+from rotorid.mismatch.delivery.usable import chain_ids, question_of, with_only
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.model import within_trust
-from rotorid.mismatch.model.absent import absent, chosen_already
-from rotorid.mismatch.model.absorbed import absorbed_findings
+from rotorid.mismatch.model.absent import absent, absorbed_findings, chosen_already
 from rotorid.mismatch.model.decided import Decided, Watch, unwatched
 from rotorid.mismatch.model.delivered import Values, believed_residuals, residuals_of
 from rotorid.mismatch.model.dependence import dependence
 from rotorid.mismatch.model.fitted import Fitted, fitted
+from rotorid.mismatch.model.gains import values_alone
 from rotorid.mismatch.model.gusts import gust_finding
 from rotorid.mismatch.model.leave_one_out import without_each
 from rotorid.mismatch.model.leftover import leftover
 from rotorid.mismatch.model.next_flight import next_flight
 from rotorid.mismatch.model.payload_windows import loads, on_board
 from rotorid.mismatch.model.prepare import Prepared, prepare
-from rotorid.mismatch.model.refitted import values_alone
 from rotorid.mismatch.model.report_runs import on_every_run, scaled_by_run
 from rotorid.mismatch.model.values import (
     changed_vehicle,
@@ -56,8 +61,7 @@ from rotorid.mismatch.model.values import (
 )
 from rotorid.mismatch.model.within_trust import beyond_trust, settled
 from rotorid.mismatch.model.wrench import WrenchModel, linear_drag, nonlinear_intervals
-from rotorid.mismatch.plant.motion import full_speed, stretches
-from rotorid.mismatch.plant.regime import regime_variables
+from rotorid.mismatch.plant.motion import full_speed, regime_variables, stretches
 from rotorid.mismatch.plant.regression import Fit
 from rotorid.mismatch.plant.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE
 from rotorid.mismatch.plant.speedpath import CommandChain, SpeedResult, commanded_path
@@ -69,12 +73,12 @@ from rotorid.vehicle.derivatives import quantities
 from rotorid.vehicle.improved import active_forms
 
 UNITS = {"force": "N", "moment": "N m"}
-SENSOR_UNITS = {2: "m/s2", 3: "rad/s"}
-NO_DEPENDENCE_P = 0.01
+_SENSOR_UNITS = {2: "m/s2", 3: "rad/s"}
+_NO_DEPENDENCE_P = 0.01
 """p-value of a residual's dependence on what is recorded from which it is taken for noise."""
-SURELY_HEAVIER = 2.0
+_SURELY_HEAVIER = 2.0
 """Standard errors by which a vehicle must be heavier than believed to carry a payload."""
-TIMING_FLOOR = 0.05
+_TIMING_FLOOR = 0.05
 """One-sigma, in samples, that no time is better known by: between two samples commands hold, or change, as nobody
 recorded."""
 
@@ -86,13 +90,13 @@ def analyse(recordings: RecordingSet, watch: Watch = unwatched) -> Analysis:
     `watch` is called with what was chosen, just before.
     """
     recordings, mistakes, remarks = find_mistakes(recordings)
-    analysis = analysed(recordings, mistakes, remarks, watch)
+    analysis = _analysed(recordings, mistakes, remarks, watch)
     left = [r for r in recordings.runs if r.name not in split_runs(recordings).held_out]
     if analysis is None and left:
         # What is held out lost a sensor throughout: something else must show what the model is worth.
         names = ", ".join(r.name for r in recordings.runs if r not in left)
         remarks = (*remarks, f"Nothing of {names} could be compared; other recordings were held out instead.")
-        analysis = analysed(replace(recordings, runs=tuple(left), held_out=None), mistakes, remarks, watch)
+        analysis = _analysed(replace(recordings, runs=tuple(left), held_out=None), mistakes, remarks, watch)
     if analysis is None:
         raise InputError(
             f"set {recordings.name}: no run can be held out with every column that the others are fitted by"
@@ -100,7 +104,7 @@ def analyse(recordings: RecordingSet, watch: Watch = unwatched) -> Analysis:
     return analysis
 
 
-def analysed(recordings: RecordingSet, mistakes, remarks, watch: Watch) -> Analysis | None:
+def _analysed(recordings: RecordingSet, mistakes, remarks, watch: Watch) -> Analysis | None:
     """The analysis of a set whose mistakes are undone; None where nothing of the runs held out can be compared."""
     split = split_runs(recordings)
     known, unseen = parts_of(recordings, split)
@@ -126,7 +130,7 @@ def analysed(recordings: RecordingSet, mistakes, remarks, watch: Watch) -> Analy
     findings = with_probabilities(together(findings), chosen)
     stated_ids = {i for f in findings for i in (f.id, *f.alternatives)}
     limits = tuple(limit for limit in absent(model, chosen) if limit.id not in stated_ids)
-    choice = Choice(recordings, split, found, to_state, scale, tuple(findings), limits, tuple(remarks))
+    choice = _Choice(recordings, split, found, to_state, scale, tuple(findings), limits, tuple(remarks))
 
     # The last decision is made: the runs held out are opened.
     stated = {**contract_values(prepared.vehicle, to_state), **scale}
@@ -134,16 +138,16 @@ def analysed(recordings: RecordingSet, mistakes, remarks, watch: Watch) -> Analy
     seen = on_every_run(found, recordings, split, unseen)
     if len(seen.rows) == len(model.rows):
         return None
-    choice = replace(choice, findings=with_windows(findings, seen))
+    choice = replace(choice, findings=_with_windows(findings, seen))
     plain = values_alone(model)
     plain_fit, plain_moved = settled(model, plain, ())
     first = account(choice, seen, fit, moved, plain_fit, {**plain_moved, **plain})
     words = with_values_in_question(weighed(first))
-    return with_noise_held_out(as_delivered(offered(choice, words, seen, unseen, moved, plain_moved)))
+    return with_noise_held_out(as_delivered(_offered(choice, words, seen, unseen, moved, plain_moved)))
 
 
 @dataclass(frozen=True)
-class Choice:
+class _Choice:
     """What was chosen on the fitted runs alone."""
 
     recordings: RecordingSet
@@ -166,19 +170,19 @@ class Choice:
         return changed
 
 
-def with_windows(findings: Sequence[Finding], seen: WrenchModel) -> tuple[Finding, ...]:
+def _with_windows(findings: Sequence[Finding], seen: WrenchModel) -> tuple[Finding, ...]:
     """Findings with the windows of every run in which they act: gusts, and a payload on board for a time."""
     windows = tuple(g.window for g in seen.gusts)
     blown = ids_of("air_moves", "in windows") if seen.gusts else ()
     out = [replace(f, windows=windows) if f.id in blown else f for f in findings]
     if aboard := on_board(seen.segments):
         comes_and_goes = {t.effect for t in loads(seen)}
-        out = [payload_for_a_time(f, aboard) if f.id in comes_and_goes else f for f in out]
+        out = [_payload_for_a_time(f, aboard) if f.id in comes_and_goes else f for f in out]
     return tuple(out)
 
 
 def account(
-    choice: Choice, seen: WrenchModel, fit: Fit, moved: Values, plain_fit: Fit, plain_values: Values
+    choice: _Choice, seen: WrenchModel, fit: Fit, moved: Values, plain_fit: Fit, plain_values: Values
 ) -> Analysis:
     """What a choice amounts to on every run, before any word is weighed.
 
@@ -201,8 +205,8 @@ def account(
         bool(values) or any(f.status in CLAIMED for f in findings),
     )
     refitted_left = residuals_of(seen, plain_fit)
-    traces = make_traces(seen, found, refitted_left, delivered)
-    between = sensor_traces(seen, refitted_left, delivered)
+    traces = _make_traces(seen, found, refitted_left, delivered)
+    between = _sensor_traces(seen, refitted_left, delivered)
     fly = next_flight(findings, choice.recordings, found)
     return Analysis(
         recordings=choice.recordings,
@@ -218,23 +222,23 @@ def account(
         traces=traces,
         between_sensors=between,
         without=without_each(found, seen, values, fit, findings, (*traces, *between)),
-        noise_floor=noise_floors(found),
+        noise_floor=_noise_floors(found),
         p_values={c: (before[c], after[c]) for c in before},
-        regimes=regimes_by_run(seen.segments, seen.prepared),
-        winds=winds_of(seen),
+        regimes=_regimes_by_run(seen.segments, seen.prepared),
+        winds=_winds_of(seen),
         unexplained_channels=left.channels,
         unexplained_depends_on=left.depends_on,
         unexplained_description=left.description,
         next_manoeuvre=fly.manoeuvre,
         next_separates=fly.separates,
         force_source=model.segments[0].force_source,
-        notes=(*choice.remarks, *run_scale_notes(model), *lag_alone_notes(found.chain)),
-        instead=instead_in_words(found.instead),
+        notes=(*choice.remarks, *run_scale_notes(model), *_lag_alone_notes(found.chain)),
+        instead=_instead_in_words(found.instead),
         corrected=within_trust.in_words(moved),
     )
 
 
-def winds_of(seen: WrenchModel) -> tuple[RunWind, ...]:
+def _winds_of(seen: WrenchModel) -> tuple[RunWind, ...]:
     """The winds in which a model flies its runs."""
     out = [RunWind(g.run, "in windows", g.knots_s, g.wind_m_s) for g in seen.gusts]
     if seen.wind is None:
@@ -246,8 +250,8 @@ def winds_of(seen: WrenchModel) -> tuple[RunWind, ...]:
     return tuple(out)
 
 
-def offered(
-    choice: Choice, words: Analysis, seen: WrenchModel, unseen: RecordingSet, moved: Values, plain_moved: Values
+def _offered(
+    choice: _Choice, words: Analysis, seen: WrenchModel, unseen: RecordingSet, moved: Values, plain_moved: Values
 ) -> Offered:
     """What a choice offers for delivery: what is claimed, fitted without effects that are only suggested.
 
@@ -331,11 +335,11 @@ def offered(
 def findings_outside(found: Fitted, prepared: Prepared) -> list[Finding]:
     """A finding for what is fitted outside of the regression of force and moment: winds, gusts, the command chain."""
     model = found.model
-    findings = [] if model.wind is None else [wind_finding(model)]
+    findings = [] if model.wind is None else [_wind_finding(model)]
     if model.gusts:
         findings.append(gust_finding(model.gusts))
     if found.chain is not None:
-        findings += speed_findings(found.chain.result, prepared, found.measured, found.chain.full_speed)
+        findings += _speed_findings(found.chain.result, prepared, found.measured, found.chain.full_speed)
     return [throttle_or_thrust(f) for f in findings] if found.commanded else findings
 
 
@@ -354,7 +358,7 @@ def findings_inside(found: Fitted, prepared: Prepared, delivered: Fit) -> list[F
     return [throttle_or_thrust(f) for f in findings] if found.commanded else findings
 
 
-def payload_for_a_time(finding: Finding, windows: tuple[tuple[str, float, float], ...]) -> Finding:
+def _payload_for_a_time(finding: Finding, windows: tuple[tuple[str, float, float], ...]) -> Finding:
     """A payload with when it is on board."""
     when = ", ".join(f"in {run} from {start:.1f} to {stop:.1f} s" for run, start, stop in windows)
     return replace(finding, windows=windows, sentence=f"{finding.sentence}: {when}")
@@ -371,7 +375,7 @@ def not_testable(prepared: Prepared, chain: CommandChain | None, findings: list[
     return {k: v for k, v in reasons.items() if k not in known}
 
 
-def instead_in_words(instead: Mapping[str, Sequence[Values]]) -> dict[str, tuple[str, ...]]:
+def _instead_in_words(instead: Mapping[str, Sequence[Values]]) -> dict[str, tuple[str, ...]]:
     """Contract name of a wrong value to others, in words, that would explain as much in its place."""
     return {
         PARAMETER_NAMES[key]: tuple(filter(None, (" with ".join(within_trust.in_words(x)) for x in as_well)))
@@ -379,7 +383,7 @@ def instead_in_words(instead: Mapping[str, Sequence[Values]]) -> dict[str, tuple
     }
 
 
-def lag_alone_notes(chain: CommandChain | None) -> list[str]:
+def _lag_alone_notes(chain: CommandChain | None) -> list[str]:
     """The lag as others state it, who fit neither a delay nor a throttle curve jointly, where it shares with them."""
     if chain is None or chain.result.lag_alone is None:
         return []
@@ -412,7 +416,7 @@ def run_scale_notes(model: WrenchModel) -> list[str]:
     ]
 
 
-def wind_finding(model: WrenchModel) -> Finding:
+def _wind_finding(model: WrenchModel) -> Finding:
     """The steady wind as a velocity, fitted through the drag."""
     effect = moving_air("all the time")
     w, sd = model.wind, model.wind_sd
@@ -434,7 +438,7 @@ def wind_finding(model: WrenchModel) -> Finding:
     )
 
 
-def speed_findings(result: SpeedResult, prepared: Prepared, measured: bool, full_speed: float) -> list[Finding]:
+def _speed_findings(result: SpeedResult, prepared: Prepared, measured: bool, full_speed: float) -> list[Finding]:
     """Findings between command and rotor speed."""
     effects = catalogue()
     out = []
@@ -442,7 +446,7 @@ def speed_findings(result: SpeedResult, prepared: Prepared, measured: bool, full
     for key, form in result.fit.chain:
         where = result.fit.slice_of(key)
         values = result.fit.values[where]
-        least = [TIMING_FLOOR / prepared.segments[0].rate_hz if p.unit == "s" else 0.0 for p in form.parameters]
+        least = [_TIMING_FLOOR / prepared.segments[0].rate_hz if p.unit == "s" else 0.0 for p in form.parameters]
         sd = np.hypot(np.sqrt(np.diag(result.fit.covariance)[where]), least)
         numbers = zip(form.parameters, values, sd, strict=True)
         alternatives = result.alternatives[key]
@@ -455,7 +459,7 @@ def speed_findings(result: SpeedResult, prepared: Prepared, measured: bool, full
             parameters=tuple(in_interval(p.symbol, v, p.unit, s) for p, v, s in numbers),
             p_value=result.p_values[key],
             channels=channels,
-            windows=limited_windows(prepared.segments, form, values, full_speed) if form.stage == LIMIT else (),
+            windows=_limited_windows(prepared.segments, form, values, full_speed) if form.stage == LIMIT else (),
         )
         out.append(found.or_else(alternatives) if alternatives else found)
     stated = {f.id for f in out}
@@ -467,7 +471,7 @@ def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
 
     The payload would bring products of inertia along: found with such an offset they belong to the same question.
     """
-    sure = {key: change for key, (change, sd) in values.items() if abs(change) > SURELY_HEAVIER * sd}
+    sure = {key: change for key, (change, sd) in values.items() if abs(change) > _SURELY_HEAVIER * sd}
     heavier = sure.get("mass", 0.0) > 0 or sure.get("thrust", 0.0) < 0
     stated = [f for f in findings if f.status in CLAIMED]
     load = next(e for e in catalogue().values() if e.like_on_heavier)
@@ -478,7 +482,7 @@ def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
     return [f.or_else([load.id]) if f is offset or (f.id in others and f in stated) else f for f in findings]
 
 
-def make_traces(
+def _make_traces(
     model: WrenchModel, found: Fitted, refitted: list[np.ndarray], delivered: list[np.ndarray]
 ) -> tuple[Trace, ...]:
     """Residual of every channel before refitting, after refitting and with the effects, (n, 12) each per stretch."""
@@ -508,29 +512,29 @@ def make_traces(
     return tuple(out)
 
 
-def sensor_traces(model: WrenchModel, refitted: list[np.ndarray], delivered: list[np.ndarray]) -> tuple[Trace, ...]:
+def _sensor_traces(model: WrenchModel, refitted: list[np.ndarray], delivered: list[np.ndarray]) -> tuple[Trace, ...]:
     """The same of two sensors of one quantity: reading of one less what the other makes of it.
 
     Offsets of the sensors, which no vehicle states, are taken out before, too.
     """
     return tuple(
-        Trace(r.run, CHANNELS[c], SENSOR_UNITS[c // 3], r.time_s, plain[:, c], plain[:, c], after[:, c], after[:, c])
+        Trace(r.run, CHANNELS[c], _SENSOR_UNITS[c // 3], r.time_s, plain[:, c], plain[:, c], after[:, c], after[:, c])
         for r, plain, after in zip(model.rows, refitted, delivered, strict=True)
         for c in range(6, 12)
         if np.isfinite(r.y[:, c]).all()
     )
 
 
-def noise_floors(found: Fitted) -> dict[str, float]:
+def _noise_floors(found: Fitted) -> dict[str, float]:
     """Noise of each channel in the band of the traces: what is left where the whole catalogue is free to explain.
 
     Never less than the sensors' own noise makes of the channel: the whole catalogue may fit that, too.
     """
     model, chain = found.model, found.chain
-    own = sensor_floor(model)
+    own = _sensor_floor(model)
     out = {name: float(max(model.floor[c], own[c])) for c, name in enumerate(CHANNELS) if np.isfinite(model.floor[c])}
     if chain is not None and found.measured:
-        out |= {f"rotor_speed_{i + 1}": float(sd) for i, sd in enumerate(speed_floor(found))}
+        out |= {f"rotor_speed_{i + 1}": float(sd) for i, sd in enumerate(_speed_floor(found))}
     return out
 
 
@@ -545,13 +549,13 @@ def with_noise_held_out(analysis: Analysis) -> Analysis:
     part, floors = fitted_part(analysis), dict(analysis.noise_floor)
     for channel, traces in by_channel(analysis.traces).items():
         left = rms(t.named[part(t.run, t.time_s) < 0] for t in traces)
-        noise = analysis.p_values.get(channel, (0.0, 0.0))[1] > NO_DEPENDENCE_P
+        noise = analysis.p_values.get(channel, (0.0, 0.0))[1] > _NO_DEPENDENCE_P
         if noise and channel not in analysis.unexplained_channels and not np.isnan(left):
             floors[channel] = max(floors.get(channel, 0.0), left)
     return replace(analysis, noise_floor=floors)
 
 
-def speed_floor(found: Fitted) -> np.ndarray:
+def _speed_floor(found: Fitted) -> np.ndarray:
     """Noise of the measured speed of each rotor in the band of the traces, (rotors,), rad/s.
 
     What the chain leaves less what a regression on the command, its square and derivatives and on the voltage still
@@ -577,7 +581,7 @@ def speed_floor(found: Fitted) -> np.ndarray:
     return out
 
 
-def sensor_floor(model: WrenchModel) -> np.ndarray:
+def _sensor_floor(model: WrenchModel) -> np.ndarray:
     """What the sensors' noise makes of each channel (12,), but no more than the model leaves; 0 where not known."""
     if model.contributions.noisy is None:
         return np.zeros(12)
@@ -591,7 +595,7 @@ def sensor_floor(model: WrenchModel) -> np.ndarray:
     return np.nan_to_num(np.minimum(*rms))
 
 
-def regimes_by_run(segments, prepared: Prepared) -> dict[str, dict[str, np.ndarray]]:
+def _regimes_by_run(segments, prepared: Prepared) -> dict[str, dict[str, np.ndarray]]:
     """Regime variables of every run, its stretches one after the other."""
     out: dict[str, dict[str, np.ndarray]] = {}
     for s in segments:
@@ -604,7 +608,7 @@ def regimes_by_run(segments, prepared: Prepared) -> dict[str, dict[str, np.ndarr
     return out
 
 
-def limited_windows(
+def _limited_windows(
     segments, form: SpeedForm, values: np.ndarray, full_speed: float
 ) -> tuple[tuple[str, float, float], ...]:
     """Stretches in which a limit holds a rotor's command (`full_speed` in rad/s), closer than 0.3 s taken together."""

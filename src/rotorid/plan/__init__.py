@@ -4,7 +4,6 @@ would."""
 OPEN = (
     "changed",
     "limits",
-    "page",
     "plan",
     "questions",
     "separation",

@@ -27,13 +27,13 @@ from rotorid.mismatch.plant.rows import residual
 from rotorid.mismatch.plant.speedpath import commanded_path, starts_of
 from rotorid.recordings.signal.kernels import causal
 
-MOST_EVALUATIONS = 40
-EDGE_S = 0.5
+_MOST_EVALUATIONS = 40
+_EDGE_S = 0.5
 """Left out at both ends of a flight: a command that leads has nothing to lead from there."""
 
 
 @dataclass(frozen=True)
-class ChainModel:
+class _ChainModel:
     """A chain that may be the true one, with its parameters on the set at hand."""
 
     id: str
@@ -48,15 +48,15 @@ class ChainQuestion:
     """Ids of which one lies between command and rotor speed."""
 
     ids: tuple[str, ...]
-    models: tuple[ChainModel, ...]
+    models: tuple[_ChainModel, ...]
 
     @property
-    def pairs(self) -> tuple[tuple[ChainModel, ChainModel], ...]:
+    def pairs(self) -> tuple[tuple[_ChainModel, _ChainModel], ...]:
         """Every model with every rival."""
         return tuple((a, b) for a in self.models for b in self.models if a.id != b.id)
 
 
-class Leftover:
+class _Leftover:
     """What a chain leaves of a set's recordings in whitened squares, the shared linear terms free."""
 
     def __init__(self, found: Fitted):
@@ -114,24 +114,26 @@ class Leftover:
     def _white(self, values: np.ndarray, channels: Sequence[int]) -> np.ndarray:
         """Channels (n, c, k) whitened and stacked, (m, k)."""
         longest = max(len(self.filters[c]) for c in channels)
-        edge = max(longest, int(EDGE_S * self.prepared.thinner.rate_hz))
+        edge = max(longest, int(_EDGE_S * self.prepared.thinner.rate_hz))
         return np.concatenate([causal(self.filters[c], values[:, c])[edge : len(values) - edge] for c in channels])
 
     def _white_speeds(self, segment, chain, values) -> np.ndarray:
         raw = self._speeds(segment, chain, values)
-        edge = max(max(len(f) for f in self.speed_filters), int(EDGE_S * segment.rate_hz))
+        edge = max(max(len(f) for f in self.speed_filters), int(_EDGE_S * segment.rate_hz))
         parts = [causal(f, raw[:, j])[edge : len(raw) - edge] for j, f in enumerate(self.speed_filters)]
         return np.concatenate(parts)
 
 
-def fitted_values(left, chain, starts: Sequence[np.ndarray]) -> tuple[np.ndarray, float]:
+def _fitted_values(left, chain, starts: Sequence[np.ndarray]) -> tuple[np.ndarray, float]:
     """Parameters of a chain that leave least, from the best of several starts, and the whitened squares left."""
     low = np.concatenate([[p.low for p in form.parameters] for _, form in chain])
     high = np.concatenate([[p.high for p in form.parameters] for _, form in chain])
     best = min(starts, key=lambda s: float((left(chain, s) ** 2).sum()))
     inside = np.clip(best, low + 1e-9, high - 1e-9)
     scale = np.maximum(np.abs(inside), 1e-3)
-    done = least_squares(lambda v: left(chain, v), inside, bounds=(low, high), x_scale=scale, max_nfev=MOST_EVALUATIONS)
+    done = least_squares(
+        lambda v: left(chain, v), inside, bounds=(low, high), x_scale=scale, max_nfev=_MOST_EVALUATIONS
+    )
     return done.x, float(2 * done.cost)
 
 
@@ -142,8 +144,8 @@ def chain_question(found: Fitted, finding: Finding, ids: Sequence[str]) -> Chain
     where = result.fit.slice_of(own)
     kept = np.delete(result.fit.values, np.arange(where.start, where.stop))
     spread = np.sqrt(np.diag(result.fit.covariance)[where]) / np.maximum(np.abs(result.fit.values[where]), 1e-12)
-    models = [ChainModel(own, result.fit.chain, result.fit.values, float(spread.min()))]
-    left = Leftover(found).of([s for s in found.prepared.segments if s.run in found.prepared.split.training])
+    models = [_ChainModel(own, result.fit.chain, result.fit.values, float(spread.min()))]
+    left = _Leftover(found).of([s for s in found.prepared.segments if s.run in found.prepared.split.training])
     for other in ids:
         forms = catalogue()[other].speed_forms if other in catalogue() else ()
         volts = all(s.motion.voltage is not None for s in found.prepared.segments)
@@ -152,18 +154,18 @@ def chain_question(found: Fitted, finding: Finding, ids: Sequence[str]) -> Chain
             if other == own or ("voltage" in form.requires and not volts):
                 continue
             chain = (*rest, (other, form))
-            values, square = fitted_values(left, chain, [np.append(kept, s) for s in starts_of(form)])
-            tries.append((square, ChainModel(other, chain, values, models[0].doubt)))
+            values, square = _fitted_values(left, chain, [np.append(kept, s) for s in starts_of(form)])
+            tries.append((square, _ChainModel(other, chain, values, models[0].doubt)))
         if tries:
             models.append(min(tries, key=lambda t: t[0])[1])
     return ChainQuestion(tuple(m.id for m in models), tuple(models)) if len(models) > 1 else None
 
 
-def squares(found: Fitted, segments: Sequence[Segment], true: ChainModel, rival: ChainModel) -> float:
+def squares(found: Fitted, segments: Sequence[Segment], true: _ChainModel, rival: _ChainModel) -> float:
     """λ of a true chain against its rival on segments that the true one made."""
-    left = Leftover(found).of(segments)
+    left = _Leftover(found).of(segments)
     own = float((left(true.chain, true.values) ** 2).sum())
-    _, other = fitted_values(left, rival.chain, [rival.values])
+    _, other = _fitted_values(left, rival.chain, [rival.values])
     return max(other - own, 0.0)
 
 

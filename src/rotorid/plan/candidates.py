@@ -14,23 +14,23 @@ import numpy as np
 
 from rotorid.plan.limits import Limits
 
-GRAVITY_M_S2 = 9.81
+_GRAVITY_M_S2 = 9.81
 RAMP_S = 2.0
-SLOW_RAMP_S = 4.0
+_SLOW_RAMP_S = 4.0
 """Of motions over ground: in RAMP_S a fast pass would tilt more to start than to turn round."""
 BANDS_HZ = ((0.3, 1.0), (0.8, 2.0), (1.5, 4.0), (0.3, 8.0))
 """Oscillations of the acceleration asked for. Of the fastest little is left in the path, but what the attitude loop
 makes of them turns the vehicle as hard as doublets do."""
-DOUBLET_S = 0.3
+_DOUBLET_S = 0.3
 """Half of a doublet."""
 STANDARD = {"eight": 0.3, "climb at 1": 0.2, "shake all to 8 Hz": 0.2, "turn": 0.15, "doublets": 0.15}
 """Parts of the standard flight, in their order, and the share of its time that each takes."""
-ROOM = 0.85
+_ROOM = 0.85
 """Share of the tilt allowed that a reference asks for: drag and the controller take some."""
-PIECE_S = 10.0
-HEAVE_RAD_S = 3.0
+_PIECE_S = 10.0
+_HEAVE_RAD_S = 3.0
 """Rate of the waves: thrust then changes by a good part while the speed over ground stays."""
-LONGEST_S = 30.0
+_LONGEST_S = 30.0
 """A turn that the rotors' torque makes more slowly is no candidate."""
 
 
@@ -55,7 +55,7 @@ class Piece:
     name: str
     words: str
     make: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
-    duration_s: float = PIECE_S
+    duration_s: float = _PIECE_S
 
     def reference(self, step_s: float) -> Reference:
         """The reference at steps of `step_s`."""
@@ -64,7 +64,7 @@ class Piece:
         return Reference(t, position, yaw)
 
 
-def envelope(t: np.ndarray, ramp_s: float = RAMP_S) -> np.ndarray:
+def _envelope(t: np.ndarray, ramp_s: float = RAMP_S) -> np.ndarray:
     """From 0 smoothly to 1 and back to 0, twice differentiable; `ramp_s` each way."""
     s = np.clip(np.minimum(t, t[-1] - t) / ramp_s, 0, 1)
     return s**3 * (10 - 15 * s + 6 * s**2)
@@ -72,13 +72,13 @@ def envelope(t: np.ndarray, ramp_s: float = RAMP_S) -> np.ndarray:
 
 def phase(t: np.ndarray, rate_rad_s: float, unit_rad: float = np.pi, ramp_s: float = RAMP_S) -> np.ndarray:
     """Phase that speeds up from rest and slows down to it, a whole number of units in all, (n,), rad."""
-    speed = envelope(t, ramp_s)
+    speed = _envelope(t, ramp_s)
     raw = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(t))])
     units = max(1.0, np.floor(rate_rad_s * raw[-1] / unit_rad + 0.02))
     return unit_rad * units * raw / raw[-1]
 
 
-def swing(t: np.ndarray, amplitude: float, rate_rad_s: float, ramp_s: float = SLOW_RAMP_S) -> tuple[float, np.ndarray]:
+def swing(t: np.ndarray, amplitude: float, rate_rad_s: float, ramp_s: float = _SLOW_RAMP_S) -> tuple[float, np.ndarray]:
     """Amplitude and phase (n,), rad, of a swing there and back; smaller where the time asks for a faster phase."""
     angle = phase(t, rate_rad_s, ramp_s=ramp_s)
     fastest = float(np.gradient(angle, t).max())
@@ -102,7 +102,7 @@ def multisine(t: np.ndarray, harmonics: np.ndarray, seed: int) -> np.ndarray:
 def largest(limits: Limits, room_m: float, share: float) -> tuple[float, float]:
     """Amplitude (m) and rate (rad/s) of a swing along a line at a share of the speed, within room and tilt."""
     speed = share * limits.speed_m_s
-    most = ROOM * GRAVITY_M_S2 * np.tan(np.radians(limits.tilt_deg))
+    most = _ROOM * _GRAVITY_M_S2 * np.tan(np.radians(limits.tilt_deg))
     amplitude = min(room_m, max(0.5, speed**2 / most * 1.2))
     return amplitude, min(speed / amplitude, np.sqrt(most / amplitude))
 
@@ -180,24 +180,24 @@ def _passes(limits: Limits) -> list[Piece]:
             amplitude, rate = largest(limits, room, share)
 
             def make(t, amplitude=amplitude, rate=rate, ahead=ahead):
-                return amplitude * np.sin(phase(t, rate, ramp_s=SLOW_RAMP_S))[:, None] * ahead, np.zeros(len(t))
+                return amplitude * np.sin(phase(t, rate, ramp_s=_SLOW_RAMP_S))[:, None] * ahead, np.zeros(len(t))
 
             way = {0: "along the nose", 45: "across the diagonal", 90: "sideways"}[degrees]
             words = f"to and fro {way}, {amplitude:.1f} m each way at up to {amplitude * rate:.1f} m/s, nose held"
-            out.append(Piece(f"pass {degrees} at {share:g}", words, make, whole(rate, 15.0, ramp_s=SLOW_RAMP_S)))
+            out.append(Piece(f"pass {degrees} at {share:g}", words, make, whole(rate, 15.0, ramp_s=_SLOW_RAMP_S)))
     for degrees, axis in ((0, 0), (90, 1)):
         amplitude, rate = largest(limits, limits.room_m[axis], 0.8)
-        heave = min(limits.room_m[2], 0.6 * limits.climb_m_s / HEAVE_RAD_S, 0.3 * GRAVITY_M_S2 / HEAVE_RAD_S**2)
+        heave = min(limits.room_m[2], 0.6 * limits.climb_m_s / _HEAVE_RAD_S, 0.3 * _GRAVITY_M_S2 / _HEAVE_RAD_S**2)
 
         def make(t, amplitude=amplitude, rate=rate, axis=axis, heave=heave):
             out = np.zeros((len(t), 3))
-            out[:, axis] = amplitude * np.sin(phase(t, rate, ramp_s=SLOW_RAMP_S))
-            out[:, 2] = heave * np.sin(phase(t, HEAVE_RAD_S))
+            out[:, axis] = amplitude * np.sin(phase(t, rate, ramp_s=_SLOW_RAMP_S))
+            out[:, 2] = heave * np.sin(phase(t, _HEAVE_RAD_S))
             return out, np.zeros(len(t))
 
         way = "along the nose" if axis == 0 else "sideways"
         words = f"to and fro {way} at up to {amplitude * rate:.1f} m/s in waves of {heave:.1f} m up and down"
-        out.append(Piece(f"waves {degrees}", words, make, whole(rate, 15.0, ramp_s=SLOW_RAMP_S)))
+        out.append(Piece(f"waves {degrees}", words, make, whole(rate, 15.0, ramp_s=_SLOW_RAMP_S)))
     return out
 
 
@@ -219,14 +219,14 @@ def _turns(limits: Limits, most_rad_s2: float) -> list[Piece]:
     def turn(t):
         # One way in the first half, back in the second: the nose ends where it was.
         half = t[: (len(t) + 1) // 2]
-        speed = yaw_rate * envelope(half)
+        speed = yaw_rate * _envelope(half)
         there = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(half))])
         return np.zeros((len(t), 3)), np.concatenate([there, there[: len(t) // 2][::-1]])
 
     def drift(t):
         # To and fro over ground while the nose turns: body axes and world axes part.
         out = np.zeros((len(t), 3))
-        out[:, 0] = amplitude * np.sin(phase(t, rate, ramp_s=SLOW_RAMP_S))
+        out[:, 0] = amplitude * np.sin(phase(t, rate, ramp_s=_SLOW_RAMP_S))
         return out, phase(t, 0.6 * yaw_rate, 2 * np.pi)
 
     pieces = [
@@ -234,7 +234,7 @@ def _turns(limits: Limits, most_rad_s2: float) -> list[Piece]:
             "eight",
             f"a figure of eight, {amplitude:.1f} m each way, nose held",
             eight,
-            whole(rate / np.sqrt(2), 15.0, ramp_s=SLOW_RAMP_S),
+            whole(rate / np.sqrt(2), 15.0, ramp_s=_SLOW_RAMP_S),
         )
     ]
     # Half a turn by a quintic: its largest rate is 1.875 π / T, its largest acceleration 5.77 π / T².
@@ -253,7 +253,7 @@ def _turns(limits: Limits, most_rad_s2: float) -> list[Piece]:
         ("drift", "to and fro over ground while the nose turns all round", drift, 0.6 * yaw_rate),
     ):
         duration = whole(speed, 12.0, 2 * np.pi)
-        if duration <= LONGEST_S:
+        if duration <= _LONGEST_S:
             pieces.append(Piece(name, words, make, duration))
     return pieces
 
@@ -272,13 +272,13 @@ def _climbs(limits: Limits) -> list[Piece]:
             return out, np.zeros(len(t))
 
         words = f"climb and descend by {amplitude:.1f} m each way at up to {amplitude * rate:.1f} m/s"
-        out.append(Piece(f"climb at {share:g}", words, make, whole(rate, PIECE_S)))
+        out.append(Piece(f"climb at {share:g}", words, make, whole(rate, _PIECE_S)))
     return out
 
 
 def _oscillations(limits: Limits, most_rad_s2: float) -> list[Piece]:
     """Multisines of the acceleration along some axes (and of yaw) with harmonics of their own each."""
-    most = ROOM * GRAVITY_M_S2 * np.tan(np.radians(limits.tilt_deg))
+    most = _ROOM * _GRAVITY_M_S2 * np.tan(np.radians(limits.tilt_deg))
     families = {
         "shake all": ("x", "y", "z", "yaw"),
         "shake sideways": ("x", "y"),
@@ -301,7 +301,7 @@ def _oscillations(limits: Limits, most_rad_s2: float) -> list[Piece]:
                 position, yaw = np.zeros((len(t), 3)), np.zeros(len(t))
                 for i, axis in enumerate(axes):
                     own = count[i :: len(axes)].astype(float)
-                    wave = multisine(t, own, i) * envelope(t)
+                    wave = multisine(t, own, i) * _envelope(t)
                     if axis == "yaw":
                         slope = np.gradient(wave, t)
                         bend = np.abs(np.gradient(slope, t)).max()
@@ -327,18 +327,20 @@ def _oscillations(limits: Limits, most_rad_s2: float) -> list[Piece]:
 
 def _doublets(limits: Limits, most_rad_s2: float) -> Piece:
     """Pushes of the tilt forwards, sideways and of the nose, each followed by its opposite, which leads back."""
-    most = ROOM * GRAVITY_M_S2 * np.tan(np.radians(limits.tilt_deg))
-    push = min(most, limits.speed_m_s / DOUBLET_S, min(limits.room_m[:2]) / DOUBLET_S**2)
-    turn = min(np.radians(20.0), 0.5 * np.radians(limits.yaw_rate_deg_s) * DOUBLET_S, most_rad_s2 * DOUBLET_S**2 / 5.77)
+    most = _ROOM * _GRAVITY_M_S2 * np.tan(np.radians(limits.tilt_deg))
+    push = min(most, limits.speed_m_s / _DOUBLET_S, min(limits.room_m[:2]) / _DOUBLET_S**2)
+    turn = min(
+        np.radians(20.0), 0.5 * np.radians(limits.yaw_rate_deg_s) * _DOUBLET_S, most_rad_s2 * _DOUBLET_S**2 / 5.77
+    )
 
     def make(t):
         position, yaw = np.zeros((len(t), 3)), np.zeros(len(t))
-        step, each = t[1] - t[0], 4.0 * DOUBLET_S
-        half = int(round(DOUBLET_S / step))
+        step, each = t[1] - t[0], 4.0 * _DOUBLET_S
+        half = int(round(_DOUBLET_S / step))
         edge = np.hanning(max(half // 3, 3))
-        for number in range(int((t[-1] - DOUBLET_S) / (2 * each))):
+        for number in range(int((t[-1] - _DOUBLET_S) / (2 * each))):
             # + - at once, - + a little later: at rest again, and back.
-            start = int(round((DOUBLET_S / 2 + 2 * each * number) / step))
+            start = int(round((_DOUBLET_S / 2 + 2 * each * number) / step))
             wave = np.zeros(len(t))
             for place, sign in ((0, 1.0), (half, -1.0), (4 * half, -1.0), (5 * half, 1.0)):
                 wave[start + place : start + place + half] = sign
@@ -351,7 +353,7 @@ def _doublets(limits: Limits, most_rad_s2: float) -> Piece:
         return position, yaw
 
     return Piece(
-        "doublets", "quick pushes to and fro: forwards, sideways, of the nose", make, 8.0 * DOUBLET_S * 6 + 1.0
+        "doublets", "quick pushes to and fro: forwards, sideways, of the nose", make, 8.0 * _DOUBLET_S * 6 + 1.0
     )
 
 

@@ -28,7 +28,7 @@ WITH_MASS_OF_ITS_OWN = ("payload",)
 """Effects whose parameters are of a further mass: with a known one attached their columns are not those of before."""
 MASS_SHARE = 0.05
 """A mass to attach over the vehicle's."""
-PLACE_SD_M, MASS_SD = 0.002, 0.01
+_PLACE_SD_M, _MASS_SD = 0.002, 0.01
 """How well the place of an attached mass is known, and its size as a share of it."""
 
 
@@ -116,7 +116,7 @@ def _by_propeller(form: Form, order: np.ndarray) -> Form:
     return replace(form, contribution=contribution)
 
 
-def attached(vehicle: Vehicle, place_m: tuple[float, float, float], words: str) -> Change:
+def _attached(vehicle: Vehicle, place_m: tuple[float, float, float], words: str) -> Change:
     """A mass of MASS_SHARE of the vehicle's attached at `place_m` (forward, right, down of the believed centre)."""
     mass, more = vehicle.mass_kg, MASS_SHARE * vehicle.mass_kg
     place = np.array(place_m)
@@ -145,7 +145,7 @@ def attached(vehicle: Vehicle, place_m: tuple[float, float, float], words: str) 
         return replace(form, contribution=lambda m, v, values: form.contribution(m, v, share * np.asarray(values)))
 
     # The mass sits next to where it should, or weighs other than stated: either moves the centre.
-    doubt = np.hypot(PLACE_SD_M, MASS_SD * np.linalg.norm(place)) * (1.0 - share)
+    doubt = np.hypot(_PLACE_SD_M, _MASS_SD * np.linalg.norm(place)) * (1.0 - share)
     plane = catalogue()[OF_CENTRE].forms(vehicle)[0]
     nuisance = Term("by hand/place", "effect", "", plane, (0.0, 0.0), 2, (doubt, doubt))
     inertias = {f"inertia_{a}{a}": own[i, i] / inertia[i, i] for i, a in enumerate("xyz")}
@@ -169,6 +169,6 @@ def masses(vehicle: Vehicle) -> list[Change]:
 
     def one(place, where):
         words = f"attach {grams:.3g} g ({100 * MASS_SHARE:.0f} % of the weight) {reach:.2g} m {where} of the middle"
-        return attached(vehicle, place, words)
+        return _attached(vehicle, place, words)
 
     return [one((reach, 0.0, 0.0), "in front"), one((0.0, reach, 0.0), "to the right")]

@@ -30,7 +30,7 @@ from rotorid.plan.separation import (
 )
 from rotorid.steps import step
 
-HANDLING_S = 300.0
+_HANDLING_S = 300.0
 """A step by hand takes this long: land, work, take off."""
 
 
@@ -56,7 +56,7 @@ class Handled:
     @property
     def minutes(self) -> float:
         """The work and the hover, min."""
-        return (HANDLING_S + self.hover_s) / 60.0
+        return (_HANDLING_S + self.hover_s) / 60.0
 
     @property
     def sigma(self) -> float | None:
@@ -64,7 +64,7 @@ class Handled:
         return smallest_separation(self.questions)
 
 
-def steps_for(known: Known) -> list[tuple[list[Change], list[Question]]]:
+def _steps_for(known: Known) -> list[tuple[list[Change], list[Question]]]:
     """Choices of each kind of step with the questions that it is there for."""
     vehicle, out = known.prepared.vehicle, []
     present = {known.fitted.model.search.terms[k].effect for k in known.fitted.model.selection.active}
@@ -89,7 +89,7 @@ def handled(known: Known, limits: Limits, hover: Piece, least_s: float, still_s:
     """
     found = []
     reference = joined([hover] * int(np.ceil(least_s / (hover.duration_s + still_s))), step_of(known), still_s)
-    for choices, questions in steps_for(known):
+    for choices, questions in _steps_for(known):
         made = []
         for change in choices:
             try:

@@ -32,7 +32,7 @@ class Width:
     wished: float | None = None
 
 
-def able(known: Known) -> dict[str, tuple[str, ...]]:
+def _able(known: Known) -> dict[str, tuple[str, ...]]:
     """To everything that can be wished for its terms: believed values, and effects that are not at work."""
     search, active = known.fitted.model.search, known.fitted.model.selection.active
     out = {name: (key,) for key, name in PARAMETER_NAMES.items() if key in search.always}
@@ -45,7 +45,7 @@ def able(known: Known) -> dict[str, tuple[str, ...]]:
 
 def check_wishes(known: Known, wishes: dict[str, float]) -> None:
     """InputError where something is wished for that these recordings do not show."""
-    names = able(known)
+    names = _able(known)
     for name in wishes:
         if reason := known.prepared.not_testable.get(name):
             raise InputError(f"--want {name}: not testable on this set: {reason}")
@@ -62,7 +62,7 @@ def widths(known: Known, before: Information, after: Information, wishes: dict[s
     A doubt that the engine found beyond the usual one (blocks that differ more than their noise) is taken to stay. Of
     the loops that the flight may be flown with the worse counts.
     """
-    model, regression, names = known.fitted.model, known.regression, able(known)
+    model, regression, names = known.fitted.model, known.regression, _able(known)
     out = []
     for name, wished in wishes.items():
         if name in PARAMETER_NAMES.values():

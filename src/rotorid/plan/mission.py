@@ -15,19 +15,19 @@ from rotorid.plan.candidates import Reference
 from rotorid.plan.plan import Plan
 
 EARTH_M = 6378137.0
-STRAIGHT = ("hover", "ladder", "pass", "climb", "face")
+_STRAIGHT = ("hover", "ladder", "pass", "climb", "face")
 """First words of the manoeuvres that are waypoints."""
-STILL = 0.03
+_STILL = 0.03
 """Share of the largest speed below which the vehicle turns round or waits."""
-HELD_S = 0.5
+_HELD_S = 0.5
 """Shorter rests are turns, not waits."""
 TAKE_OFF, WAYPOINT, SPEED, RETURN = 22, 16, 178, 20
-RELATIVE = 3
+_RELATIVE = 3
 """MAVLink frame: latitude, longitude, height above home."""
 
 
 @dataclass(frozen=True)
-class Stop:
+class _Stop:
     """A place to go to (north, east, down from the volume's middle), how long to stay, how fast to get there."""
 
     place_m: np.ndarray
@@ -38,7 +38,7 @@ class Stop:
 
 def not_a_mission(plan: Plan) -> str:
     """Why a plan is no mission; empty where it is one."""
-    others = [p.name for p in plan.pieces if p.name.split()[0] not in STRAIGHT]
+    others = [p.name for p in plan.pieces if p.name.split()[0] not in _STRAIGHT]
     if others:
         return f"no mission: {', '.join(dict.fromkeys(others))} cannot be given as waypoints; fly px4_offboard.csv"
     if plan.limits.home_deg is None:
@@ -46,19 +46,19 @@ def not_a_mission(plan: Plan) -> str:
     return ""
 
 
-def stops(reference: Reference) -> list[Stop]:
+def stops(reference: Reference) -> list[_Stop]:
     """Where a reference turns round or rests, in order."""
     t = reference.time_s
     speed = np.linalg.norm(np.gradient(reference.position_m, t, axis=0), axis=1)
     turning = np.abs(np.gradient(reference.yaw_rad, t))
-    still = (speed <= STILL * max(speed.max(), 1e-9)) & (turning <= STILL * max(turning.max(), 1e-9))
+    still = (speed <= _STILL * max(speed.max(), 1e-9)) & (turning <= _STILL * max(turning.max(), 1e-9))
     edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]]))).reshape(-1, 2)
     out, last = [], 0
     for start, stop in edges:
         middle, wait = (start + stop - 1) // 2, float(t[stop - 1] - t[start])
         way = float(speed[last : start + 1].max())
         out.append(
-            Stop(reference.position_m[middle], float(reference.yaw_rad[middle]), wait if wait > HELD_S else 0.0, way)
+            _Stop(reference.position_m[middle], float(reference.yaw_rad[middle]), wait if wait > _HELD_S else 0.0, way)
         )
         last = stop
     return out
@@ -69,7 +69,7 @@ def mission(plan: Plan) -> dict:
     home, middle = plan.limits.home_deg, plan.limits.middle_m
     items: list[dict] = []
 
-    def add(command: int, params: list, frame: int = RELATIVE) -> None:
+    def add(command: int, params: list, frame: int = _RELATIVE) -> None:
         height = {"Altitude": params[6], "AltitudeMode": 1, "AMSLAltAboveTerrain": None} if command == WAYPOINT else {}
         items.append(
             {

@@ -39,7 +39,7 @@ from rotorid.plan.simulate import Flown
 from rotorid.recordings import Vehicle
 from rotorid.steps import step
 
-YAW_SHARE = 0.2
+_YAW_SHARE = 0.2
 """Share of the hovering rotors' torque that a planned turn may ask for: the rest is kept for roll and pitch."""
 SIZES = (1.0, 0.75, 0.5)
 """Sizes of a manoeuvre that are tried, the largest that keeps the limits is taken."""
@@ -48,9 +48,9 @@ NOTHING = Reference(np.zeros(1), np.zeros((1, 3)), np.zeros(1))
 """Of a flight without pieces."""
 BETWEEN_S = 1.0
 """At rest between manoeuvres."""
-LEAST_S = LEAST_ENVIRONMENTS * ENVIRONMENT_S
-MOST_PIECES = 12
-LEAST_PROGRESS = 0.01
+_LEAST_S = LEAST_ENVIRONMENTS * ENVIRONMENT_S
+_MOST_PIECES = 12
+_LEAST_PROGRESS = 0.01
 """Share of the way to the goal that a further manoeuvre must bring."""
 
 
@@ -120,7 +120,7 @@ def yaw_acceleration(vehicle: Vehicle) -> float:
     """Yaw acceleration, rad/s2, that a share of the hovering rotors' torque makes."""
     weight = vehicle.mass_kg * vehicle.gravity_m_s2
     torque = weight * vehicle.torque_coefficients_n_m_s2().sum() / vehicle.thrust_coefficients_n_s2().sum()
-    return YAW_SHARE * torque / vehicle.inertia_kg_m2.zz
+    return _YAW_SHARE * torque / vehicle.inertia_kg_m2.zz
 
 
 def broken(flight: Flown, limits: Limits, vehicle: Vehicle) -> str:
@@ -197,7 +197,7 @@ def reached(known: Known, base: Information, information: Information, target: f
 
 @step("choosing")
 def chosen_pieces(
-    known: Known, limits: Limits, options: list[Tried], most: int = MOST_PIECES, wishes: dict[str, float] | None = None
+    known: Known, limits: Limits, options: list[Tried], most: int = _MOST_PIECES, wishes: dict[str, float] | None = None
 ) -> tuple[list[Tried], list[Tried]]:
     """The manoeuvres to fly, `most` at most, and all options with their progress."""
     base = of_set(known)
@@ -222,7 +222,7 @@ def chosen_pieces(
         if not offers:
             break
         _, then, best = max(offers, key=lambda o: o[0])
-        if then - share < LEAST_PROGRESS and then < 1.0 - 1e-9:
+        if then - share < _LEAST_PROGRESS and then < 1.0 - 1e-9:
             break
         taken.append(best)
         now, share = now + best.information, then
@@ -231,12 +231,12 @@ def chosen_pieces(
         total = base
         for o in rest:
             total = total + o.information
-        if rest and share_of(total) >= share - LEAST_PROGRESS / 2:
+        if rest and share_of(total) >= share - _LEAST_PROGRESS / 2:
             taken = rest
     return taken, judged
 
 
-def expecting_quick(known: Known, limits: Limits) -> Known:
+def _expecting_quick(known: Known, limits: Limits) -> Known:
     """The set as the engine would whiten it next to a quick flight: the first of QUICK that the limits allow."""
     world, step, vehicle = world_of(known, None, None), step_of(known), known.prepared.vehicle
     for share in SIZES:
@@ -251,7 +251,7 @@ def expecting_quick(known: Known, limits: Limits) -> Known:
     return known
 
 
-def standard_piece(known: Known, limits: Limits, options: list[Tried], duration_s: float) -> Piece | None:
+def _standard_piece(known: Known, limits: Limits, options: list[Tried], duration_s: float) -> Piece | None:
     """The standard flight of that length as large as the limits allow; None where they allow none."""
     world, step, vehicle = world_of(known, None, None), step_of(known), known.prepared.vehicle
     able = {t.piece.name: t.piece for t in options if t.information is not None}
@@ -270,7 +270,7 @@ def standard_piece(known: Known, limits: Limits, options: list[Tried], duration_
 
 
 @step("predicting a flight")
-def forecast(known: Known, limits: Limits, name: str, pieces: tuple[Piece, ...], wishes: dict[str, float]) -> Forecast:
+def _forecast(known: Known, limits: Limits, name: str, pieces: tuple[Piece, ...], wishes: dict[str, float]) -> Forecast:
     """What is expected of a flight of these pieces; without any, what the set holds. `known` is the set alone.
 
     Every competing model flies it, as it would be flown if that model were the true one.
@@ -309,11 +309,11 @@ def expected(known: Known, limits: Limits, name: str, taken: list[Tried], wishes
     """
     pieces = tuple(t.piece for t in taken)
     most = int((limits.duration_s - BETWEEN_S) / max(sum(t.flown_s for t in taken), BETWEEN_S)) if taken else 1
-    least = int(np.ceil((LEAST_S - BETWEEN_S) / sum(t.flown_s for t in taken))) if taken else 1
+    least = int(np.ceil((_LEAST_S - BETWEEN_S) / sum(t.flown_s for t in taken))) if taken else 1
     times = max(1, min(least, most))
-    made = forecast(known, limits, name, pieces * times, wishes)
+    made = _forecast(known, limits, name, pieces * times, wishes)
     if most > times and made.reached(limits.target_sigma) < 1.0:
-        return forecast(known, limits, name, pieces * most, wishes)
+        return _forecast(known, limits, name, pieces * most, wishes)
     return made
 
 
@@ -328,8 +328,8 @@ def plan(
     reasons = tuple(sorted(known.prepared.not_testable.items()))
     about = {"set": known.recordings.name, "limits": limits, "unanswerable": known.unanswerable}
     if not known.questions and not known.chains and not wishes:
-        return Plan(**vars(forecast(known, limits, "chosen", (), {})), **about, not_testable=reasons)
-    quick = expecting_quick(known, limits)
+        return Plan(**vars(_forecast(known, limits, "chosen", (), {})), **about, not_testable=reasons)
+    quick = _expecting_quick(known, limits)
     options = tried(quick, limits, wishes)
     taken, judged = chosen_pieces(quick, limits, options, wishes=wishes)
     others = [t for t in judged if not taken or t.piece is not taken[0].piece]
@@ -337,10 +337,10 @@ def plan(
     if taken and (second := chosen_pieces(quick, limits, others, wishes=wishes)[0]):
         found.append(expected(known, limits, "second", second, wishes))
     longest = found[0].duration_s or limits.duration_s
-    if (piece := standard_piece(known, limits, options, longest - 2 * BETWEEN_S)) is not None:
-        found.append(forecast(known, limits, "standard", (piece,), wishes))
+    if (piece := _standard_piece(known, limits, options, longest - 2 * BETWEEN_S)) is not None:
+        found.append(_forecast(known, limits, "standard", (piece,), wishes))
     found.sort(key=lambda f: (-round(f.reached(limits.target_sigma), 2), f.duration_s))
     hover = next((t.piece for t in options if t.piece.name == "hover" and t.information is not None), None)
-    hands = () if hover is None else handled(known, limits, hover, LEAST_S, BETWEEN_S)
+    hands = () if hover is None else handled(known, limits, hover, _LEAST_S, BETWEEN_S)
     about |= {"others": tuple(found[1:]), "by_hand": hands, "tried": tuple(judged), "not_testable": reasons}
     return Plan(**vars(found[0]), **about)

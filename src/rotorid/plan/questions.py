@@ -10,8 +10,7 @@ import numpy as np
 from rotorid.effects.contract import Form
 from rotorid.errors import InputError
 from rotorid.mismatch.analyse import findings_inside, findings_outside
-from rotorid.mismatch.decision.findings import Finding
-from rotorid.mismatch.decision.probability import with_probabilities
+from rotorid.mismatch.decision.findings import Finding, with_probabilities
 from rotorid.mismatch.decision.select import COST_PER_PARAMETER
 from rotorid.mismatch.delivery.derivatives import learn
 from rotorid.mismatch.mistakes import find_mistakes
@@ -30,7 +29,7 @@ from rotorid.recordings import RecordingSet
 from rotorid.recordings.sufficient import sufficient
 from rotorid.vehicle.derivatives import derivative_form, own_controls, quantities
 
-LEAST_WEIGHT = 0.05
+_LEAST_WEIGHT = 0.05
 """Relative probability from which a form may as well be the true one."""
 
 
@@ -139,12 +138,12 @@ def known(
             questions.append(question)
         else:
             unanswerable.append((ids, "these columns give no model of the others to compare with"))
-    own = derivatives_of(found, way)
+    own = _derivatives_of(found, way)
     asked = tuple(questions), tuple(chains), tuple(unanswerable)
     return Known(recordings, prepared, found, findings, *asked, derivatives=own)
 
 
-def derivatives_of(found: Fitted, way: Way) -> tuple[tuple[Form, np.ndarray], ...]:
+def _derivatives_of(found: Fitted, way: Way) -> tuple[tuple[Form, np.ndarray], ...]:
     """Derivatives of what a fit leaves where it was not fitted, as a form with its values."""
     model, vehicle, thinner = found.model, found.prepared.vehicle, found.prepared.thinner
     x = np.concatenate([thinner(quantities(s.motion, vehicle)) for s in model.segments])
@@ -188,7 +187,7 @@ def question_of(found: Fitted, finding: Finding, ids: tuple[str, ...]) -> Questi
         if not choices:
             continue
         rivals[i] = tuple(choices)
-        hypotheses.append(hypothesis_of(search.regression, shared, i, choices, search.terms, own))
+        hypotheses.append(_hypothesis_of(search.regression, shared, i, choices, search.terms, own))
     if len(ids) == 1:
         hypotheses.append(Hypothesis("nothing", (), np.zeros(0), np.zeros((0, 0))))
         rivals["nothing"] = ((),)
@@ -206,7 +205,7 @@ def best_of(regression: Regression, shared: Sequence[str], choices, terms: dict[
     return max(choices, key=worth)
 
 
-def hypothesis_of(
+def _hypothesis_of(
     regression: Regression, shared: Sequence[str], name: str, choices, terms: dict[str, Term], own: str
 ) -> Hypothesis:
     """The model of an id in its best form, `own` where that is one of its `choices`, with the forms nearly as good."""
@@ -217,7 +216,7 @@ def hypothesis_of(
     best = (own,) if (own,) in choices else best_of(regression, shared, choices, terms)
     weights = {keys: float(np.exp(min(worth(keys) - worth(best), 0.0) / 2)) for keys in choices if keys != best}
     others = (
-        replace(hypothesis(regression, shared, name, k), weight=w) for k, w in weights.items() if w > LEAST_WEIGHT
+        replace(hypothesis(regression, shared, name, k), weight=w) for k, w in weights.items() if w > _LEAST_WEIGHT
     )
     return replace(hypothesis(regression, shared, name, best), others=tuple(others))
 

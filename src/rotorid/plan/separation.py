@@ -30,7 +30,7 @@ from rotorid.mismatch.plant.motion import Segment
 from rotorid.mismatch.plant.regression import Regression, autoregression, build, ridge_inverse
 from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.mismatch.plant.split import HELD_OUT_SHARE, training_rule
-from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.problem import Prior
 from rotorid.plan.between import interval as chain_interval
 from rotorid.plan.between import squares
 from rotorid.plan.candidates import Reference
@@ -41,10 +41,10 @@ from rotorid.plan.simulate import Flown, World, commands, fly, recorded
 from rotorid.recordings import RecordingSet, Vehicle
 from rotorid.steps import step
 
-DRAWS = 400
-LEAST_RATE_HZ = 400.0
+_DRAWS = 400
+_LEAST_RATE_HZ = 400.0
 """Flights are simulated at least this finely."""
-SLOWER_LOOPS = (1.0, 0.7)
+_SLOWER_LOOPS = (1.0, 0.7)
 """Shares of the stated bandwidths that flights are simulated with: what is asked of quick motions only a loop as fast
 as stated flies."""
 FITTED_SHARE = 1.0 - HELD_OUT_SHARE
@@ -118,11 +118,11 @@ def of_set(known: Known) -> Information:
     regression = known.regression
     gram, _, bias, _ = regression._normal(np.arange(len(regression.precision)), regression.training)
     seconds = float(regression.training.sum() * regression.block_s)
-    shares = seconds * shares_of(known.fitted.model.rows, known.prepared.vehicle) if isinstance(known, Known) else 0.0
+    shares = seconds * _shares_of(known.fitted.model.rows, known.prepared.vehicle) if isinstance(known, Known) else 0.0
     return Information(gram - bias, None, seconds, shares)
 
 
-def shares_of(rows: Sequence[Rows], vehicle: Vehicle) -> np.ndarray:
+def _shares_of(rows: Sequence[Rows], vehicle: Vehicle) -> np.ndarray:
     """Products (K, K) of the columns of force and moment as shares of the weight, the mean over rows."""
     scale = scales(vehicle)[:, None]
     columns = [np.nan_to_num(r.x[:, :6]) / scale for r in rows]
@@ -149,7 +149,7 @@ def world_of(known: Known, question: Question | None, hypothesis: Hypothesis | N
 
     unnamed = {t.form.name for t in regression.terms if t.kind == "effect" and t.effect in UNKNOWNS}
     effects = tuple(e for e in effects if e[0].name not in unnamed)
-    chain, full, volt = (), full_speed_of(known), None
+    chain, full, volt = (), _full_speed_of(known), None
     if known.fitted.chain is not None:
         result, full, volt = known.fitted.chain
         chain = tuple((form, result.fit.of(key)[1]) for key, form in result.fit.chain)
@@ -166,7 +166,7 @@ def world_of(known: Known, question: Question | None, hypothesis: Hypothesis | N
     )
 
 
-def full_speed_of(known: Known) -> float:
+def _full_speed_of(known: Known) -> float:
     """Rotor speed, rad/s, of full throttle."""
     limits = known.prepared.vehicle.rotor_speed_limits_rad_s
     commands = [float(s.command.max()) for s in known.prepared.segments if s.command is not None]
@@ -176,7 +176,7 @@ def full_speed_of(known: Known) -> float:
 def step_of(known: Known) -> float:
     """Step of the simulation, s: the recording's own, or a whole part of it."""
     rate = own_rate_hz(known)
-    return 1.0 / (rate * int(np.ceil(LEAST_RATE_HZ / rate)))
+    return 1.0 / (rate * int(np.ceil(_LEAST_RATE_HZ / rate)))
 
 
 def columns_of(known: Known) -> tuple[str, ...]:
@@ -189,7 +189,7 @@ def columns_of(known: Known) -> tuple[str, ...]:
 def flown(world: World, reference: Reference, limits: Limits) -> tuple[Flown, ...]:
     """A reference flown by a competing model, with the loops as stated and slower (SLOWER_LOOPS)."""
     fast, slow = limits.attitude_bandwidth_rad_s, limits.position_bandwidth_rad_s
-    return tuple(fly(world, reference, s * fast, limits.middle_m, slow and s * slow) for s in SLOWER_LOOPS)
+    return tuple(fly(world, reference, s * fast, limits.middle_m, slow and s * slow) for s in _SLOWER_LOOPS)
 
 
 def of_flights(
@@ -199,14 +199,14 @@ def of_flights(
 
     After a `change` of the vehicle by hand all of the flight is compared with the set.
     """
-    found = [of_flight(known, flight, world, terms, change) for flight in flights]
+    found = [_of_flight(known, flight, world, terms, change) for flight in flights]
     squares = [i.squares for i in found if i.squares is not None]
     grams = np.stack([i.gram for i in found])
     whole = Information(grams, np.stack(squares) if squares else None, found[0].seconds, found[0].shares)
     return whole.share(FITTED_SHARE) if change is None else whole
 
 
-def of_flight(
+def _of_flight(
     known: Known, flight: Flown, world: World, terms: Sequence[Term], change: Change | None = None
 ) -> Information:
     """What a flight would hold, in the columns of the set's regression.
@@ -244,14 +244,14 @@ def of_flight(
     own = build(rows, acting, known.regression.filters, lambda run, t: True, block_seconds(rows, rate_hz), rate_hz)
     every = known.regression.columns([t.key for t in terms])
     gram, shares = np.zeros_like(known.regression.gram[0]), np.zeros_like(known.regression.gram[0])
-    gram[np.ix_(every, every)] = own.gram.sum(axis=0) if change is None else after_change(own, terms, change)
+    gram[np.ix_(every, every)] = own.gram.sum(axis=0) if change is None else _after_change(own, terms, change)
     seconds = float(flight.motion.time_s[-1] - flight.motion.time_s[0])
     if change is None:
-        shares[np.ix_(every, every)] = seconds * shares_of(rows, prepared.vehicle)
+        shares[np.ix_(every, every)] = seconds * _shares_of(rows, prepared.vehicle)
     return Information(gram, np.array(apart) if apart else None, seconds, shares)
 
 
-def after_change(own: Regression, terms: Sequence[Term], change: Change) -> np.ndarray:
+def _after_change(own: Regression, terms: Sequence[Term], change: Change) -> np.ndarray:
     """Normal equations (K, K) of terms in the parameters of before a change, its nuisances projected out."""
     share = np.concatenate([np.full(t.size, change.shares.get(t.key, 1.0)) for t in terms])
     kept, out = own.columns([t.key for t in terms]), own.columns([t.key for t in change.nuisances])
@@ -371,7 +371,7 @@ def apart(known: Known, question: Question, true: Hypothesis, gram: np.ndarray) 
     places, parts = {c: i for i, c in enumerate(columns)}, []
     for form in forms:
         own = regression.columns(form.keys)
-        draws = drawn(form, gram[np.ix_(own, own)], max(1, round(DRAWS * form.weight / whole)))
+        draws = drawn(form, gram[np.ix_(own, own)], max(1, round(_DRAWS * form.weight / whole)))
         parts.append(np.zeros((len(draws), len(columns))))
         parts[-1][:, [places[c] for c in own]] = draws
     theta = np.concatenate(parts)
@@ -388,7 +388,7 @@ def apart(known: Known, question: Question, true: Hypothesis, gram: np.ndarray) 
     return out
 
 
-def drawn(true: Hypothesis, gram: np.ndarray, count: int = DRAWS) -> np.ndarray:
+def drawn(true: Hypothesis, gram: np.ndarray, count: int = _DRAWS) -> np.ndarray:
     """Draws of a model's coefficients, `count` of DRAWS, (count, k).
 
     What the set does not know of them is not as large as its doubt: the columns of one model are taken to contribute
@@ -403,7 +403,7 @@ def drawn(true: Hypothesis, gram: np.ndarray, count: int = DRAWS) -> np.ndarray:
     fits = [-(np.log(values + v) + along**2 / (values + v)).sum() for v in variances]
     variance = variances[int(np.argmax(fits))]
     kept = variance / (values + variance)
-    normal = np.random.default_rng(0).standard_normal((DRAWS, len(unit)))[:count]
+    normal = np.random.default_rng(0).standard_normal((_DRAWS, len(unit)))[:count]
     return (kept * along + normal * np.sqrt(kept * values)) @ vectors.T * unit
 
 

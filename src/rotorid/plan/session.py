@@ -16,10 +16,10 @@ import pandas as pd
 
 from rotorid.effects.loading import CHANNELS
 from rotorid.errors import InputError
-from rotorid.mismatch.decision.probability import with_probabilities
+from rotorid.mismatch.decision.findings import with_probabilities
+from rotorid.mismatch.instrument.analyse import reading_findings, with_plainer_forms
 from rotorid.mismatch.instrument.chain import ChainResult, find_chain, moved
 from rotorid.mismatch.instrument.columns import make_terms, rows_of
-from rotorid.mismatch.instrument.decide import reading_findings, with_plainer_forms
 from rotorid.mismatch.instrument.mistakes import find_mistakes
 from rotorid.mismatch.instrument.model import (
     ReadingModel,
@@ -51,7 +51,7 @@ from rotorid.steps import step
 
 REST_S = 2.0
 """Unloaded before and after every step."""
-MOST_STEPS = 40
+_MOST_STEPS = 40
 STANDARD = "slow steps"
 STEP_S = 0.3
 """A change of the load from one level to the next takes this long."""
@@ -301,10 +301,10 @@ def asked(known: KnownInstrument) -> list[Term]:
 @step("predicting a step")
 def of_step(known: KnownInstrument, step: Step, terms: Sequence[Term]) -> Information:
     """What the fitted part of a step would hold, in the columns of the set's regression."""
-    return of_run(known, Run("planned", table_of(known, step)), terms).share(FITTED_SHARE)
+    return _of_run(known, Run("planned", table_of(known, step)), terms).share(FITTED_SHARE)
 
 
-def of_run(known: KnownInstrument, run: Run, terms: Sequence[Term]) -> Information:
+def _of_run(known: KnownInstrument, run: Run, terms: Sequence[Term]) -> Information:
     """What a run after the set would hold, in the columns of the set's regression."""
     model, name = known.model, run.name
     session, first = model.setup.session, known.recordings.runs[0].name
@@ -333,7 +333,7 @@ def of_run(known: KnownInstrument, run: Run, terms: Sequence[Term]) -> Informati
     return Information(gram, None, seconds)
 
 
-def fitted_runs(known: KnownInstrument, steps: Sequence[Step]) -> list[Run]:
+def _fitted_runs(known: KnownInstrument, steps: Sequence[Step]) -> list[Run]:
     """The runs of a session that the joint judgement fits: whole steps, or parts of the steps of a short session."""
     runs = tuple(Run(f"step{i + 1:02d}", table_of(known, s)) for i, s in enumerate(steps))
     whole = in_thirds(RecordingSet("planned", known.recordings.vehicle, runs, None))
@@ -341,24 +341,24 @@ def fitted_runs(known: KnownInstrument, steps: Sequence[Step]) -> list[Run]:
     return [r for r in whole.runs if r.name in fitted]
 
 
-def forecast(known: KnownInstrument, name: str, taken: Sequence[Tried]) -> SessionForecast:
+def _forecast(known: KnownInstrument, name: str, taken: Sequence[Tried]) -> SessionForecast:
     """What is expected of steps taken."""
     # What is mounted alike, and what is done alike, follows each other.
     taken = sorted(taken, key=lambda t: (t.piece.tilt_rad != (0.0, 0.0), t.piece.tilt_rad, t.piece.name))
     steps, terms, before = tuple(t.piece for t in taken), asked(known), of_set(known)
     after = before
-    for run in fitted_runs(known, steps) if steps else ():
-        after = after + of_run(known, run, terms)
+    for run in _fitted_runs(known, steps) if steps else ():
+        after = after + _of_run(known, run, terms)
     questions = tuple((q.ids, tuple(separations(known, q, before, after))) for q in known.questions)
     return SessionForecast(name, steps, questions)
 
 
-def standard_steps(tried: Sequence[Tried], limits: SessionLimits) -> list[Tried]:
+def _standard_steps(tried: Sequence[Tried], limits: SessionLimits) -> list[Tried]:
     """What is loaded without a plan: slowly up and down in every place, mounted level, as often as time allows."""
     once = [t for t in tried if t.information is not None and t.piece.name.startswith(STANDARD)]
     once = [t for t in once if t.piece.tilt_rad == (0.0, 0.0)]
     seconds = sum(t.flown_s for t in once)
-    return once * min(int(limits.duration_s / seconds), MOST_STEPS // len(once)) if once else []
+    return once * min(int(limits.duration_s / seconds), _MOST_STEPS // len(once)) if once else []
 
 
 def plan_session(known: KnownInstrument, limits: SessionLimits) -> SessionPlan:
@@ -373,13 +373,13 @@ def plan_session(known: KnownInstrument, limits: SessionLimits) -> SessionPlan:
             tried.append(Tried(tested, of_step(known, tested, terms), tested.duration_s))
         except InputError as error:
             tried.append(Tried(tested, None, tested.duration_s, str(error)))
-    taken, _ = chosen_pieces(known, limits, tried, MOST_STEPS)
-    found = [forecast(known, "chosen", taken)]
+    taken, _ = chosen_pieces(known, limits, tried, _MOST_STEPS)
+    found = [_forecast(known, "chosen", taken)]
     rest = [t for t in tried if taken and t.piece is not taken[0].piece]
-    if second := chosen_pieces(known, limits, rest, MOST_STEPS)[0] if rest else []:
-        found.append(forecast(known, "second", second))
-    if usual := standard_steps(tried, limits):
-        found.append(forecast(known, "standard", usual))
+    if second := chosen_pieces(known, limits, rest, _MOST_STEPS)[0] if rest else []:
+        found.append(_forecast(known, "second", second))
+    if usual := _standard_steps(tried, limits):
+        found.append(_forecast(known, "standard", usual))
     found.sort(key=lambda f: (-round(f.reached(limits.target_sigma), 2), f.duration_s))
     best, *others = found
     parts = [table_of(known, s).assign(run=f"step{i + 1:02d}") for i, s in enumerate(best.steps)]

@@ -26,16 +26,16 @@ from rotorid.recordings import Run, Vehicle
 from rotorid.recordings import columns as c
 from rotorid.vehicle.mixer import allocation_matrix
 
-DAMPING = 0.8
-FASTER = 5.0
+_DAMPING = 0.8
+_FASTER = 5.0
 """Bandwidth of rotors and filters over that of the attitude loop."""
-SLOWER = 0.2
+_SLOWER = 0.2
 """Bandwidth of the position loop over that of the attitude loop, where its bandwidth is not stated."""
-EDGE = 8
+_EDGE = 8
 """Samples by which a flight is longer on both sides while its derivatives are taken."""
-ROUNDS = 6
+_ROUNDS = 6
 """Times that rotor speeds and attitude are solved for with the effects at their last values."""
-STEPS_BACK = 8
+_STEPS_BACK = 8
 """Rounds of the inversion of what lies between command and speed."""
 
 
@@ -76,7 +76,7 @@ class Flown:
 
 def low_pass(natural_rad_s: float) -> np.ndarray:
     """Denominator of a second-order low-pass of unit gain, highest power first."""
-    return np.array([1.0 / natural_rad_s**2, 2 * DAMPING / natural_rad_s, 1.0])
+    return np.array([1.0 / natural_rad_s**2, 2 * _DAMPING / natural_rad_s, 1.0])
 
 
 def filtered(signal: np.ndarray, over: np.ndarray, under: np.ndarray, step_s: float) -> np.ndarray:
@@ -93,7 +93,7 @@ def followed(signal: np.ndarray, natural_rad_s: float, lag: np.ndarray, step_s: 
     The loop asks for the acceleration a_r + 2 ζ ω (v_r - v) + ω² (p_r - p); the vehicle has it a lag later, whose
     denominator is `lag`.
     """
-    loop = np.array([2 * DAMPING * natural_rad_s, natural_rad_s**2])
+    loop = np.array([2 * _DAMPING * natural_rad_s, natural_rad_s**2])
     asked = np.concatenate([[1.0], loop])
     held = np.polyadd(np.polymul([1.0, 0.0, 0.0], lag), loop)
     return filtered(signal - signal[:1], asked, held, step_s) + signal[:1]
@@ -101,7 +101,7 @@ def followed(signal: np.ndarray, natural_rad_s: float, lag: np.ndarray, step_s: 
 
 def turned(yaw_rad: np.ndarray, natural_rad_s: float, step_s: float) -> np.ndarray:
     """What a yaw loop leaves of a yaw reference (n,), rad, whose rate is fed forward."""
-    own, lag = low_pass(natural_rad_s), low_pass(FASTER * natural_rad_s)
+    own, lag = low_pass(natural_rad_s), low_pass(_FASTER * natural_rad_s)
     return filtered(yaw_rad - yaw_rad[:1], own[1:], np.polymul(own, lag), step_s) + yaw_rad[:1]
 
 
@@ -114,7 +114,7 @@ def attitude(thrust_direction: np.ndarray, yaw: np.ndarray) -> np.ndarray:
     return np.stack([np.cross(right, down), right, down], axis=2)
 
 
-def body_rates(rotation: np.ndarray, step_s: float) -> np.ndarray:
+def _body_rates(rotation: np.ndarray, step_s: float) -> np.ndarray:
     """Body rates (n, 3), rad/s, of rotations (n, 3, 3) at even instants."""
     turning = np.einsum("nji,njk->nik", rotation, np.gradient(rotation, step_s, axis=0))
     return np.stack([turning[:, 2, 1], turning[:, 0, 2], turning[:, 1, 0]], axis=1)
@@ -137,12 +137,12 @@ def fly(
         The rotors cannot do it: one would have to turn backwards.
     """
     vehicle, step = world.vehicle, float(reference.time_s[1] - reference.time_s[0])
-    gravity, reference = np.array([0.0, 0.0, vehicle.gravity_m_s2]), held_longer(reference, step)
+    gravity, reference = np.array([0.0, 0.0, vehicle.gravity_m_s2]), _held_longer(reference, step)
     t = reference.time_s
     ground = vehicle.ground_z_m or 0.0
     start = np.array([place_m[0], place_m[1], ground - place_m[2]])
-    outer = SLOWER * bandwidth_rad_s if position_rad_s is None else position_rad_s
-    rotors = low_pass(FASTER * bandwidth_rad_s)
+    outer = _SLOWER * bandwidth_rad_s if position_rad_s is None else position_rad_s
+    rotors = low_pass(_FASTER * bandwidth_rad_s)
     level = followed(reference.position_m[:, :2], outer, np.polymul(low_pass(bandwidth_rad_s), rotors), step)
     # The height needs no tilt.
     height = followed(reference.position_m[:, 2:], outer, rotors, step)
@@ -154,12 +154,12 @@ def fly(
     force = moment = np.zeros((len(t), 3))
     hover = np.sqrt(vehicle.mass_kg * vehicle.gravity_m_s2 / vehicle.thrust_coefficients_n_s2().sum())
     speed = np.full((len(t), vehicle.rotor_count), hover)
-    inner = slice(EDGE, -EDGE)
+    inner = slice(_EDGE, -_EDGE)
     rotation = attitude(-wanted, yaw)
-    for _ in range(ROUNDS if (*world.effects, *world.derivatives) else 1):
+    for _ in range(_ROUNDS if (*world.effects, *world.derivatives) else 1):
         left = wanted - np.einsum("nij,nj->ni", rotation, force)
         rotation = attitude(-left, yaw)
-        rates = body_rates(rotation, step)
+        rates = _body_rates(rotation, step)
         turning = np.gradient(rates, step, axis=0)
         asked = turning @ inertia + np.cross(rates, rates @ inertia) - moment
         thrust = np.linalg.norm(left, axis=1)
@@ -185,18 +185,18 @@ def fly(
         force, moment = _wrench(world, motion)
         # The tilt answers a force, and turning into it asks for moments that grow with the square of the frequency:
         # beyond what the rotors follow the rounds would not converge.
-        force = sosfiltfilt(butter(2, FASTER * bandwidth_rad_s * step / np.pi, output="sos"), force, axis=0)
+        force = sosfiltfilt(butter(2, _FASTER * bandwidth_rad_s * step / np.pi, output="sos"), force, axis=0)
     cut = {f.name: getattr(motion, f.name) for f in fields(motion)}
     cut = {name: v[inner] for name, v in cut.items() if isinstance(v, np.ndarray) and len(v) == len(t)}
     motion = replace(motion, **cut)
     return Flown(motion, commands(world, motion), velocity[inner])
 
 
-def held_longer(reference: Reference, step_s: float) -> Reference:
+def _held_longer(reference: Reference, step_s: float) -> Reference:
     """A reference held EDGE samples longer at both ends: derivatives at an end would be taken from one side."""
-    t = np.arange(-EDGE, len(reference.time_s) + EDGE) * step_s + reference.time_s[0]
-    ends = ((EDGE, EDGE), (0, 0))
-    return Reference(t, np.pad(reference.position_m, ends, "edge"), np.pad(reference.yaw_rad, EDGE, "edge"))
+    t = np.arange(-_EDGE, len(reference.time_s) + _EDGE) * step_s + reference.time_s[0]
+    ends = ((_EDGE, _EDGE), (0, 0))
+    return Reference(t, np.pad(reference.position_m, ends, "edge"), np.pad(reference.yaw_rad, _EDGE, "edge"))
 
 
 def _wrench(world: World, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
@@ -214,7 +214,7 @@ def commands(world: World, motion: Motion) -> np.ndarray:
     if not world.chain:
         return command
     start = SpeedPath(command, motion.time_s, world.full_speed_rad_s, motion.voltage, world.full_voltage_v)
-    for _ in range(STEPS_BACK):
+    for _ in range(_STEPS_BACK):
         path = replace(start, speed=command)
         for form, values in sorted(world.chain, key=lambda pair: pair[0].stage):
             path = replace(path, speed=form.apply(path, values))

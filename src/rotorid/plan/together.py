@@ -20,7 +20,7 @@ from rotorid.mismatch.plant.split import split_runs
 from rotorid.mismatch.posterior.status import CLAIMED
 from rotorid.recordings import RecordingSet, Run
 
-MAY_DIFFER = ("name", "noise", "effects", "ground_z_m")
+_MAY_DIFFER = ("name", "noise", "effects", "ground_z_m")
 """Keys of vehicle.yaml that say nothing of the vehicle itself."""
 
 
@@ -34,13 +34,13 @@ def joined_sets(first: RecordingSet, *others: RecordingSet) -> tuple[RecordingSe
     """
     others = tuple(in_thirds(s) for s in others)
     sets = (first, *others)
-    beliefs = [s.vehicle.model_dump(exclude=set(MAY_DIFFER)) for s in sets]
+    beliefs = [s.vehicle.model_dump(exclude=set(_MAY_DIFFER)) for s in sets]
     for other, belief in zip(others, beliefs[1:], strict=True):
         for key, value in beliefs[0].items():
             if value != belief[key]:
                 raise InputError(
-                    f"sets {first.name} and {other.name} differ in {key} of vehicle.yaml ({brief(value)} and "
-                    f"{brief(belief[key])}); judged together they must be of one vehicle as believed"
+                    f"sets {first.name} and {other.name} differ in {key} of vehicle.yaml ({_brief(value)} and "
+                    f"{_brief(belief[key])}); judged together they must be of one vehicle as believed"
                 )
     split = split_runs(first)
     held = [] if split.held_out == split.training else [f"1-{n}" for n in split.held_out]
@@ -74,7 +74,7 @@ def in_thirds(recordings: RecordingSet) -> RecordingSet:
     return replace(recordings, runs=tuple(runs))
 
 
-def brief(value) -> str:
+def _brief(value) -> str:
     """A value of vehicle.yaml, short."""
     text = str(value)
     return text if len(text) < 40 else text[:37] + "…"

@@ -4,11 +4,16 @@
 `px4_offboard.csv` holds the fields of PX4's TrajectorySetpoint, which has the same axes. `crazyflie.csv` is a
 polynomial trajectory of seventh order as the Crazyflie's high-level commander takes it: x forward, y left, z up, yaw
 against the clock.
+
+The picture of a plan: where to fly, how high and fast, and how far apart the competing models would be.
+
+Steps that no trajectory and no schedule can hold: what a person does between two recordings, and what it shows.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,23 +22,62 @@ import pandas as pd
 from rotorid.effects.catalogue import catalogue
 from rotorid.io.text.writing import all_or_none, rounded
 from rotorid.plan import mission
-from rotorid.plan.by_hand import steps_of
 from rotorid.plan.handled import Handled
 from rotorid.plan.intervals import SHARE
-from rotorid.plan.plan import Forecast, Plan
+from rotorid.plan.plan import BETWEEN_S, Forecast, Plan
 from rotorid.plan.separation import Questions, Separation
+from rotorid.report.plots.style import BLUE, GREY, ORANGE, RED, figure, use
 
-FILE_HZ = 100.0
-PIECES_AT_ONCE = 31
+STEPS: dict[str, str] = {
+    "unequal_rotors": (
+        "swap the propellers of two rotors that turn the same way and repeat the hover: the moment of a propeller goes "
+        "with it, that of an offset of the centre of mass or of a tilted rotor stays"
+    ),
+    "payload": (
+        "weigh the vehicle, take off what it carries and repeat the flight: the moment of a payload goes with it, an "
+        "offset of the empty vehicle's centre of mass stays"
+    ),
+    "com_offset": (
+        "hang a known weight on one side, as far from the middle as a rotor, and repeat the hover: an offset of the "
+        "centre of mass changes by weight times distance over the mass of both"
+    ),
+    "thrust_tilt": "align the motors' mounts and repeat the flight: only the force of a tilted rotor changes",
+    "accelerometer_error": (
+        "lay the vehicle at rest on each of its six faces, ten seconds each: the accelerometer must read gravity along "
+        "one axis and nothing along the others"
+    ),
+    "gyro_error": "record ten seconds at rest before take-off: what the gyroscope reads then is its own error",
+    "steady_wind": "repeat the flight in a hall or on a day without wind: only a wind goes away",
+    "gust": "repeat the flight in a hall or on a day without wind: only a gust goes away",
+    "battery_sag": "repeat the flight with a battery half empty: what the voltage makes changes with it",
+    "imu_lever_arm": "measure the place of the accelerometer from the centre of mass with a ruler",
+    "tare_offset": "take off every load and record ten seconds, zero the reading, and record ten seconds again",
+    "mount_tilt": "lay a spirit level on the sensor, and record the weight with the motors off, level and tilted",
+    "sensor_origin": "hang a known weight at two known distances from the sensor's axis",
+    "cable_stiffness": "lay the cable in another loop, or tape it to the vehicle, and repeat the tilts",
+    "wall_interference": "move the wall or the stand by a rotor's diameter and repeat the steps of the throttle",
+    "structural_resonance": "put half a kilogram on the stand and tap it: a ring of the structure becomes slower",
+    "crosstalk": "turn the sensor by a quarter about the load's axis and repeat: crosstalk turns with the sensor",
+    "zero_drift": "switch the instrument on an hour earlier and repeat: a drift with warmth is gone by then",
+    "load_nonlinearity": (
+        "put on dead weights that were weighed, motors off: a curve of the reading shows without rotors"
+    ),
+    "thrust_curve": (
+        "read a dead weight as heavy as the largest thrust: a curve of the thrust is not in it, one of the reading is"
+    ),
+}
+_SHOWN_HZ = 25.0
+_FILE_HZ = 100.0
+_PIECES_AT_ONCE = 31
 """Pieces that the trajectory memory of a Crazyflie (4096 bytes, 132 a piece) holds."""
-COARSEST_S, FINEST_S = 2.0, 0.1
-WORST_FIT_M, WORST_FIT_M_S2 = 0.01, 0.4
+_COARSEST_S, _FINEST_S = 2.0, 0.1
+_WORST_FIT_M, _WORST_FIT_M_S2 = 0.01, 0.4
 """Quick motions are millimetres large: that the path is met does not say that the acceleration is."""
-FLIP = np.array([1.0, -1.0, -1.0])
+_FLIP = np.array([1.0, -1.0, -1.0])
 """North-east-down to forward-left-up."""
 
 
-def sampled(plan: Plan, rate_hz: float = FILE_HZ) -> pd.DataFrame:
+def sampled(plan: Plan, rate_hz: float = _FILE_HZ) -> pd.DataFrame:
     """The reference in the project's axes: position, velocity, acceleration, yaw and its rate."""
     reference, middle = plan.reference, plan.limits.middle_m
     t = np.arange(0.0, reference.duration_s + 1e-9, 1.0 / rate_hz)
@@ -85,7 +129,7 @@ def crazyflie(plan: Plan) -> tuple[pd.DataFrame, float]:
     """
     reference, middle = plan.reference, plan.limits.middle_m
     t, step = reference.time_s, reference.time_s[1] - reference.time_s[0]
-    place = (reference.position_m + np.array([middle[0], middle[1], -middle[2]])) * FLIP
+    place = (reference.position_m + np.array([middle[0], middle[1], -middle[2]])) * _FLIP
     every = np.column_stack([place, -reference.yaw_rad])
     derivatives = [every]
     for _ in range(3):
@@ -93,7 +137,7 @@ def crazyflie(plan: Plan) -> tuple[pd.DataFrame, float]:
     states = np.stack(derivatives, axis=1)
     rows, worst, at = [], 0.0, 0
     while at < len(t) - 1:
-        length = int(round(COARSEST_S / step))
+        length = int(round(_COARSEST_S / step))
         while True:
             end = min(at + length, len(t) - 1)
             seconds = t[end] - t[at]
@@ -102,7 +146,7 @@ def crazyflie(plan: Plan) -> tuple[pd.DataFrame, float]:
             off = float(np.linalg.norm((powers @ fitted - every[at : end + 1])[:, :3], axis=1).max())
             bend = powers[:, :6] @ (fitted[2:] * (np.arange(2, 8) * np.arange(1, 7))[:, None])
             pushed = float(np.linalg.norm((bend - states[at : end + 1, 2])[:, :3], axis=1).max())
-            if (off <= WORST_FIT_M and pushed <= WORST_FIT_M_S2) or length <= FINEST_S / step:
+            if (off <= _WORST_FIT_M and pushed <= _WORST_FIT_M_S2) or length <= _FINEST_S / step:
                 break
             length //= 2
         worst, at = max(worst, off), end
@@ -149,7 +193,7 @@ def questions_as_data(questions: Questions, target: float) -> list[dict]:
     ]
 
 
-def forecast_as_data(flight: Forecast, target: float) -> dict:
+def _forecast_as_data(flight: Forecast, target: float) -> dict:
     """A flight and what is expected of it, for JSON."""
     known = {w.name: [s if np.isfinite(s) else None for s in (w.before, w.after)] for w in flight.widths}
     return {
@@ -173,10 +217,10 @@ def summary(plan: Plan) -> dict:
         {
             "set": plan.set,
             "settles": plan.settles,
-            **forecast_as_data(plan, plan.limits.target_sigma),
-            "others": [forecast_as_data(f, plan.limits.target_sigma) for f in plan.others],
+            **_forecast_as_data(plan, plan.limits.target_sigma),
+            "others": [_forecast_as_data(f, plan.limits.target_sigma) for f in plan.others],
             "not_by_flying": [{"ids": list(ids), "what_it_takes": what} for ids, what in plan.unanswerable],
-            "by_hand": by_hand_as_data(plan),
+            "by_hand": _by_hand_as_data(plan),
             "not_testable": [{"id": i, "reason": reason} for i, reason in plan.not_testable],
             "not_flown": [{"name": t.piece.name, "reason": t.reason} for t in plan.tried if t.reason],
             "limits": plan.limits.model_dump(mode="json"),
@@ -229,23 +273,23 @@ def why_none(plan: Plan) -> str:
     )
 
 
-def open_ids(plan: Plan) -> list[tuple[str, ...]]:
+def _open_ids(plan: Plan) -> list[tuple[str, ...]]:
     """Ids of every class that is open, whether a flight can settle it or not."""
     return [*(ids for ids, _ in plan.questions), *(ids for ids, _ in plan.unanswerable)]
 
 
 def in_words(plan: Plan) -> list[str]:
     """Manual steps, as sentences; with the separation where one is predicted."""
-    found = {h.of: f" {expected_by_hand(h, plan.limits.target_sigma)}" for h in plan.by_hand if h.sigma is not None}
-    return [f"By hand: {step}.{found.get(i, '')}" for i, step in manual_steps(plan).items()]
+    found = {h.of: f" {_expected_by_hand(h, plan.limits.target_sigma)}" for h in plan.by_hand if h.sigma is not None}
+    return [f"By hand: {step}.{found.get(i, '')}" for i, step in _manual_steps(plan).items()]
 
 
-def manual_steps(plan: Plan) -> dict[str, str]:
+def _manual_steps(plan: Plan) -> dict[str, str]:
     """Manual steps, to the id that each is there for."""
-    return steps_of([i for ids in open_ids(plan) for i in ids])
+    return steps_of([i for ids in _open_ids(plan) for i in ids])
 
 
-def expected_by_hand(step: Handled, target: float) -> str:
+def _expected_by_hand(step: Handled, target: float) -> str:
     """What a step by hand is expected to separate, as a sentence."""
     settles = "this settles it" if step.sigma >= target else "this alone does not settle it"
     words = step.words[0].upper() + step.words[1:]
@@ -255,7 +299,7 @@ def expected_by_hand(step: Handled, target: float) -> str:
     )
 
 
-def by_hand_as_data(plan: Plan) -> list[dict]:
+def _by_hand_as_data(plan: Plan) -> list[dict]:
     """Manual steps, for JSON; `predicted` is null where no separation is."""
     target, found = plan.limits.target_sigma, {h.of: h for h in plan.by_hand}
     return [
@@ -272,7 +316,7 @@ def by_hand_as_data(plan: Plan) -> list[dict]:
                 "questions": questions_as_data(found[i].questions, target),
             },
         }
-        for i, step in manual_steps(plan).items()
+        for i, step in _manual_steps(plan).items()
     ]
 
 
@@ -321,9 +365,9 @@ def write(plan: Plan, folder: Path) -> list[Path]:
             table, worst = crazyflie(plan)
             table.to_csv(parts[3], index=False, float_format="%.9g", lineterminator="\n")
             content["crazyflie"] = rounded(
-                {"pieces": len(table), "uploads": -(-len(table) // PIECES_AT_ONCE), "worst_fit_m": worst}
+                {"pieces": len(table), "uploads": -(-len(table) // _PIECES_AT_ONCE), "worst_fit_m": worst}
             )
-            from rotorid.plan.picture import draw
+            from rotorid.plan.write import draw
 
             draw(plan, parts[4])
             content["px4_mission"] = why or "px4_mission.plan"
@@ -331,3 +375,62 @@ def write(plan: Plan, folder: Path) -> list[Path]:
                 parts[5].write_text(json.dumps(mission.mission(plan), indent=1) + "\n", encoding="utf-8")
         parts[0].write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     return paths
+
+
+def draw(plan: Plan, path: Path) -> None:
+    """Write the picture as PNG."""
+    use()
+    flight = plan.flight
+    motion = flight.motion
+    every = max(1, int(round(1.0 / (_SHOWN_HZ * (motion.time_s[1] - motion.time_s[0])))))
+    t, place = motion.time_s[::every], motion.position[::every]
+    fig, axes = figure(6.4, 3, 2, width_ratios=(1.0, 1.25))
+    top, reference = axes[0, 0], plan.reference.position_m + np.array([*plan.limits.middle_m[:2], 0.0])
+    x, y = plan.limits.x_m, plan.limits.y_m
+    top.plot([y[0], y[1], y[1], y[0], y[0]], [x[0], x[0], x[1], x[1], x[0]], color=GREY, lw=0.8)
+    top.plot(reference[::every, 1], reference[::every, 0], color=ORANGE, lw=0.7, label="asked")
+    top.plot(place[:, 1], place[:, 0], color=BLUE, label="flown")
+    top.set(xlabel="east of the start [m]", ylabel="north [m]", title="From above, and the volume", aspect="equal")
+    top.legend(loc="upper right")
+    series = (
+        (axes[0, 1], motion.height[::every], "height [m]"),
+        (axes[1, 0], np.linalg.norm(flight.world_velocity[::every, :2], axis=1), "speed over ground [m/s]"),
+        (axes[1, 1], np.degrees(np.arccos(np.clip(motion.rotation[::every, 2, 2], -1, 1))), "tilt [°]"),
+        (axes[2, 0], np.degrees(plan.reference.yaw_rad[::every]), "yaw asked [°]"),
+    )
+    starts = np.cumsum([BETWEEN_S] + [p.duration_s + BETWEEN_S for p in plan.pieces])
+    for ax, values, label in series:
+        ax.plot(t, values[: len(t)], color=BLUE)
+        ax.set(xlabel="time [s]", ylabel=label, xlim=(0, t[-1]))
+        for i, start in enumerate(starts[:-1]):
+            ax.axvline(start, color=GREY, lw=0.5, ls=":")
+            if ax is axes[0, 1]:
+                ax.annotate(str(i + 1), (start, 1.0), xycoords=("data", "axes fraction"), va="bottom", fontsize=8)
+    ax = axes[2, 1]
+    found = [s for _, own in plan.questions for s in own]
+    if found:
+        rows = np.arange(len(found))[::-1]
+        for row, s in zip(rows, found, strict=True):
+            ax.plot(s.interval_95, [row, row], color=BLUE, lw=1.5)
+            ax.plot(s.sigma, row, "o", color=BLUE)
+            ax.plot(s.so_far, row, "o", color=ORANGE, mfc="none")
+        ax.axvline(plan.limits.target_sigma, color=RED, lw=0.8)
+        ax.set_yticks(rows, [f"{s.true} against {s.rival}".replace("_", " ") for s in found], fontsize=7)
+        ax.set_xscale("symlog", linthresh=3)
+        ax.tick_params(axis="x", which="minor", bottom=False)
+        most = max(s.interval_95[1] for s in found)
+        ax.set(xlabel="separation [standard errors]", ylim=(-0.6, len(found) - 0.4), xlim=(-0.3, 1.3 * most))
+        ax.set_title("Ring: so far. Dot: with this flight. Line: wanted", loc="right")
+    else:
+        ax.set_axis_off()
+    fig.savefig(path, format="png")
+
+
+def by_hand(ids: Sequence[str]) -> tuple[str, ...]:
+    """Manual steps that set one id of a class apart from the others, in the class's order, each once."""
+    return tuple(steps_of(ids).values())
+
+
+def steps_of(ids: Sequence[str]) -> dict[str, str]:
+    """The same, to the id that each step is there for."""
+    return {i: STEPS[i] for i in dict.fromkeys(ids) if i in STEPS}

@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from rotorid.io.text.writing import all_or_none, rounded
-from rotorid.plan.by_hand import steps_of
 from rotorid.plan.session import SessionForecast, SessionPlan, words_of_steps
-from rotorid.plan.write import outcome, questions_as_data, words_of
+from rotorid.plan.write import outcome, questions_as_data, steps_of, words_of
 from rotorid.recordings import columns as c
 from rotorid.report.plots.style import BLUE, GREY, ORANGE, RED, figure, use
 
@@ -44,10 +43,10 @@ def text(plan: SessionPlan) -> list[str]:
 
 def in_words(plan: SessionPlan) -> list[str]:
     """Manual steps, as sentences."""
-    return [f"By hand: {step}." for step in manual_steps(plan).values()]
+    return [f"By hand: {step}." for step in _manual_steps(plan).values()]
 
 
-def manual_steps(plan: SessionPlan) -> dict[str, str]:
+def _manual_steps(plan: SessionPlan) -> dict[str, str]:
     """Manual steps, to the id that each is there for."""
     every = [*(ids for ids, _ in plan.questions), *(ids for ids, _ in plan.unanswerable)]
     return steps_of([i for ids in every for i in ids])
@@ -62,26 +61,26 @@ def summary(plan: SessionPlan) -> dict:
             "settles": plan.settles,
             "duration_s": plan.duration_s,
             "predicted_separation_sigma": plan.sigma,
-            "steps": steps_as_data(plan),
+            "steps": _steps_as_data(plan),
             "questions": questions_as_data(plan.questions, plan.limits.target_sigma),
             "others": [
                 {
                     "name": other.name,
                     "duration_s": other.duration_s,
                     "predicted_separation_sigma": other.sigma,
-                    "steps": steps_as_data(other),
+                    "steps": _steps_as_data(other),
                     "questions": questions_as_data(other.questions, plan.limits.target_sigma),
                 }
                 for other in plan.others
             ],
             "not_by_loading": [{"ids": list(ids), "what_it_takes": what} for ids, what in plan.unanswerable],
-            "by_hand": [{"id": i, "step": step, "predicted": None} for i, step in manual_steps(plan).items()],
+            "by_hand": [{"id": i, "step": step, "predicted": None} for i, step in _manual_steps(plan).items()],
             "limits": plan.limits.model_dump(mode="json"),
         }
     )
 
 
-def steps_as_data(session: SessionForecast) -> list[dict]:
+def _steps_as_data(session: SessionForecast) -> list[dict]:
     """The steps of a session, in the order in which they are recorded."""
     return [
         {

@@ -12,15 +12,15 @@ from rotorid.recordings import columns as c
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.vehicle import Vehicle
 
-IDLE_SHARE, LARGEST_QUANTILE = 0.2, 0.98
+_IDLE_SHARE, _LARGEST_QUANTILE = 0.2, 0.98
 """Rotors idle below this share of nearly the largest thrust of their run, by the squares of their speeds."""
-GROUND_S = 1.0
+_GROUND_S = 1.0
 """Rotors that idle so long leave a vehicle on the ground: in the air it would have fallen five metres."""
-RESTING_G = 0.5
+_RESTING_G = 0.5
 """Specific force, over gravity, that the ground exerts on it at least; a vehicle that falls has next to none."""
-PAUSE_S, PAUSE_STEPS = 5.0, 20
+_PAUSE_S, _PAUSE_STEPS = 5.0, 20
 """A stand's or bench's samples that are further apart than both are of two recordings, and nothing between them."""
-MOST_NAMES = 12
+_MOST_NAMES = 12
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Basis:
             share = 100 * (self.ground_share or 0.0)
             ground = f"{share:.0f} % of the recordings {'is' if share < 1.5 else 'are'} on the ground"
             said = f"{self.in_the_air_s:.0f} s in the air; {ground if share >= 0.5 else 'none of it is on the ground'}"
-        lacks = f"not recorded: {listed(self.missing, MOST_NAMES)}" if self.missing else "no column is missing"
+        lacks = f"not recorded: {listed(self.missing, _MOST_NAMES)}" if self.missing else "no column is missing"
         return f"The verdict rests on {said}; {lacks}."
 
 
@@ -69,7 +69,7 @@ def recorded_s(time_s: np.ndarray) -> float:
     steps = np.diff(time_s)
     if not len(steps):
         return 0.0
-    return float(steps[steps <= max(PAUSE_S, PAUSE_STEPS * np.median(steps))].sum())
+    return float(steps[steps <= max(_PAUSE_S, _PAUSE_STEPS * np.median(steps))].sum())
 
 
 def on_the_ground_s(run: Run, vehicle: Vehicle) -> float | None:
@@ -79,15 +79,15 @@ def on_the_ground_s(run: Run, vehicle: Vehicle) -> float | None:
         return None
     rows, thrust = squares
     time_s, force = run.time_s[rows], run.array(c.SPECIFIC_FORCE)[rows]
-    idle = thrust < IDLE_SHARE * np.quantile(thrust, LARGEST_QUANTILE)
+    idle = thrust < _IDLE_SHARE * np.quantile(thrust, _LARGEST_QUANTILE)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], idle.astype(int), [0]])))
     total = 0.0
     for start, stop in zip(edges[::2], edges[1::2], strict=True):
         lasted = float(time_s[min(stop, len(time_s) - 1)] - time_s[start])
         felt = np.linalg.norm(force[start:stop], axis=1)
         felt = felt[np.isfinite(felt)]
-        rests = not len(felt) or float(np.median(felt)) > RESTING_G * vehicle.gravity_m_s2
-        total += lasted if lasted >= GROUND_S and rests else 0.0
+        rests = not len(felt) or float(np.median(felt)) > _RESTING_G * vehicle.gravity_m_s2
+        total += lasted if lasted >= _GROUND_S and rests else 0.0
     return total
 
 

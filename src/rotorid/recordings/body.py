@@ -6,6 +6,8 @@ the one value is sought that brings all of them inside, and the unit in which th
 
 Sources: momentum theory (figure of merit at most 1), tip speed below Mach 0.9, and the range of the vehicles in
 `templates` and `workflow/vehicles` with a margin of about a factor of three in each value.
+
+What `check` finds doubtful in a recording set, for a person to read and for a verdict to decide by.
 """
 
 from __future__ import annotations
@@ -16,63 +18,63 @@ from math import isclose, isfinite, pi, sqrt
 
 import numpy as np
 
-from rotorid.recordings.doubts import Doubt
 from rotorid.recordings.vehicle import Vehicle
 
-AIR_KG_M3 = 1.2
-USUAL_C_T = 0.012
+_AIR_KG_M3 = 1.2
+_USUAL_C_T = 0.012
 """Thrust over ρ π R⁴ ω² of a usual propeller: gives a radius within a factor of two where none is stated."""
-GYRATION_ARMS = (0.1, 1.5)
-SPAN_RADII = (0.6, 6.0)
-C_T = (0.002, 0.2)
-FIGURE_OF_MERIT = (0.07, 1.0)
-SURE_FIGURE_OF_MERIT = (0.07, 1.5)
+_GYRATION_ARMS = (0.1, 1.5)
+_SPAN_RADII = (0.6, 6.0)
+_C_T = (0.002, 0.2)
+_FIGURE_OF_MERIT = (0.07, 1.0)
+_SURE_FIGURE_OF_MERIT = (0.07, 1.5)
 """Between 1 and this coefficients are impossible, and by some tens of percent."""
-ROUGH_FIGURE_OF_MERIT = (0.05, 1.5)
+_ROUGH_FIGURE_OF_MERIT = (0.05, 1.5)
 """With a radius that is itself estimated from C_F."""
-DISC_LOADING_N_M2 = (3.0, 3000.0)
-HIGHEST_TIP_M_S = 306.0
+_DISC_LOADING_N_M2 = (3.0, 3000.0)
+_HIGHEST_TIP_M_S = 306.0
 """Mach 0.9."""
-WEIGHT = (0.55, 1.9)
+_WEIGHT = (0.55, 1.9)
 """Thrust over what carries the vehicle; outside, mass or thrust is wrong by about a factor of two."""
-WEIGHT_BY_THROTTLE = (0.2, 5.0)
+_WEIGHT_BY_THROTTLE = (0.2, 5.0)
 """The same where speed is throttle times limit, which no real throttle obeys."""
-LIMIT_OVER_HOVER = (0.8, 8.0)
-PLACE_ARMS = (0.0, 2.0)
-ROTOR_INERTIA = (0.0, 0.1)
+_LIMIT_OVER_HOVER = (0.8, 8.0)
+_PLACE_ARMS = (0.0, 2.0)
+_ROTOR_INERTIA = (0.0, 0.1)
 """Of one rotor, over mass times squared radius: with all the vehicle's mass in its rotors, and more."""
-FACTORS = np.logspace(-13, 13, 521)
-MOST_UNITS = 3
-PX4_UNSET_ARM_M = sqrt(2.0)
+_FACTORS = np.logspace(-13, 13, 521)
+_MOST_UNITS = 3
+_PX4_UNSET_ARM_M = sqrt(2.0)
 """Rotors at ±1 m along x and y."""
 
-RPM, REV_S = 2 * pi / 60, 2 * pi
-GF, LB = 9.80665e-3, 0.45359237
-LENGTHS = {"cm": 1e-2, "mm": 1e-3, "inch": 0.0254, "km": 1e3}
-SPEEDS = {"revolutions per minute": RPM, "revolutions per second": REV_S}
-INERTIAS = {
-    "g m²": 1e-3, "kg cm²": 1e-4, "kg mm²": 1e-6, "g cm²": 1e-7, "g mm²": 1e-9, "lb in²": LB * 0.0254**2,
+RPM, _REV_S = 2 * pi / 60, 2 * pi
+_GF, _LB = 9.80665e-3, 0.45359237
+_LENGTHS = {"cm": 1e-2, "mm": 1e-3, "inch": 0.0254, "km": 1e3}
+SPEEDS = {"revolutions per minute": RPM, "revolutions per second": _REV_S}
+_INERTIAS = {
+    "g m²": 1e-3, "kg cm²": 1e-4, "kg mm²": 1e-6, "g cm²": 1e-7, "g mm²": 1e-9, "lb in²": _LB * 0.0254**2,
 }  # fmt: skip
 UNITS: dict[tuple[str, ...], dict[str, float]] = {
-    ("mass_kg",): {"g": 1e-3, "lb": LB, "oz": LB / 16, "t": 1e3},
-    ("inertia_kg_m2",): INERTIAS,
-    ("rotor_inertia_kg_m2",): INERTIAS,
-    ("accelerometer_position_m",): LENGTHS,
-    ("rotors",): LENGTHS,
-    ("rotor_radius_m",): {**LENGTHS, "the diameter": 0.5},
+    ("mass_kg",): {"g": 1e-3, "lb": _LB, "oz": _LB / 16, "t": 1e3},
+    ("inertia_kg_m2",): _INERTIAS,
+    ("rotor_inertia_kg_m2",): _INERTIAS,
+    ("accelerometer_position_m",): _LENGTHS,
+    ("rotors",): _LENGTHS,
+    ("rotor_radius_m",): {**_LENGTHS, "the diameter": 0.5},
     ("thrust_coefficient_n_s2",): {
-        "gf s²": GF, "kgf s²": 1e3 * GF, "mN s²": 1e-3, "N per rpm²": RPM**-2,
-        "N per (rev/s)²": REV_S**-2,
+        "gf s²": _GF, "kgf s²": 1e3 * _GF, "mN s²": 1e-3, "N per rpm²": RPM**-2,
+        "N per (rev/s)²": _REV_S**-2,
     },
     ("torque_coefficient_n_m_s2",): {
-        "N mm s²": 1e-3, "gf cm s²": GF * 1e-2, "gf m s²": GF, "N m per rpm²": RPM**-2, "N m per (rev/s)²": REV_S**-2,
+        "N mm s²": 1e-3, "gf cm s²": _GF * 1e-2, "gf m s²": _GF,
+        "N m per rpm²": RPM**-2, "N m per (rev/s)²": _REV_S**-2,
     },
     ("rotor_speeds",): SPEEDS,
     ("rotor_speed_limits_rad_s",): SPEEDS,
-    ("rotors", "rotor_radius_m"): LENGTHS,
+    ("rotors", "rotor_radius_m"): _LENGTHS,
     ("mass_kg", "inertia_kg_m2"): {"g and g m²": 1e-3},
     ("thrust_coefficient_n_s2", "torque_coefficient_n_m_s2"): {
-        "N per rpm² and N m per rpm²": RPM**-2, "gf s² and gf m s²": GF,
+        "N per rpm² and N m per rpm²": RPM**-2, "gf s² and gf m s²": _GF,
     },
 }  # fmt: skip
 """Values that may be wrong together, each with units in which they may have been written, as factors to SI."""
@@ -127,7 +129,7 @@ class Body:
     @property
     def radius_m(self) -> float:
         """Radius of the rotors, stated or of a usual propeller with this C_F."""
-        return self.rotor_radius_m or (self.thrust_coefficient_n_s2 / (AIR_KG_M3 * pi * USUAL_C_T)) ** 0.25
+        return self.rotor_radius_m or (self.thrust_coefficient_n_s2 / (_AIR_KG_M3 * pi * _USUAL_C_T)) ** 0.25
 
 
 @dataclass(frozen=True)
@@ -192,36 +194,36 @@ def quantities(body: Body) -> Iterator[Quantity]:
             yield Quantity(
                 ("inertia_kg_m2", "mass_kg", "rotors"),
                 gyration / body.rotors,
-                GYRATION_ARMS,
+                _GYRATION_ARMS,
                 f"a radius of gyration of {gyration:.3g} m with arms of {body.rotors:.3g} m",
             )
     if body.rotors:
         yield Quantity(
             ("rotors", length),
             body.rotors / radius,
-            SPAN_RADII,
+            _SPAN_RADII,
             f"arms of {body.rotors:.3g} m with {disc}",
         )
     if stated:
         yield Quantity(
             ("rotor_radius_m", "thrust_coefficient_n_s2"),
-            c_f / (AIR_KG_M3 * pi * radius**4),
-            C_T,
-            f"a dimensionless C_T of {c_f / (AIR_KG_M3 * pi * radius**4):.3g} (C_F over ρ π R⁴, R {radius:.3g} m)",
+            c_f / (_AIR_KG_M3 * pi * radius**4),
+            _C_T,
+            f"a dimensionless C_T of {c_f / (_AIR_KG_M3 * pi * radius**4):.3g} (C_F over ρ π R⁴, R {radius:.3g} m)",
         )
     if body.torque_coefficient_n_m_s2:
-        merit = c_f**1.5 / (body.torque_coefficient_n_m_s2 * sqrt(2 * AIR_KG_M3 * pi) * radius)
+        merit = c_f**1.5 / (body.torque_coefficient_n_m_s2 * sqrt(2 * _AIR_KG_M3 * pi) * radius)
         yield Quantity(
             ("torque_coefficient_n_m_s2", "thrust_coefficient_n_s2", length),
             merit,
-            FIGURE_OF_MERIT if stated else ROUGH_FIGURE_OF_MERIT,
+            _FIGURE_OF_MERIT if stated else _ROUGH_FIGURE_OF_MERIT,
             f"a figure of merit of {merit:.3g} (C_F^1.5 over C_Q √(2 ρ π) R)",
-            sure=SURE_FIGURE_OF_MERIT if stated else None,
+            sure=_SURE_FIGURE_OF_MERIT if stated else None,
         )
     if body.mass_kg:
         loading = body.mass_kg * 9.81 / (body.count * pi * radius**2)
         yield Quantity(
-            ("mass_kg", length), loading, DISC_LOADING_N_M2, f"a disc loading of {loading:.3g} N/m² with {disc}"
+            ("mass_kg", length), loading, _DISC_LOADING_N_M2, f"a disc loading of {loading:.3g} N/m² with {disc}"
         )
     if body.rotor_speeds:
         yield from _turning(body, disc)
@@ -229,7 +231,7 @@ def quantities(body: Body) -> Iterator[Quantity]:
         yield Quantity(
             ("accelerometer_position_m", "rotors"),
             body.accelerometer_position_m / body.rotors,
-            PLACE_ARMS,
+            _PLACE_ARMS,
             f"an accelerometer {body.accelerometer_position_m:.3g} m from the origin with arms of {body.rotors:.3g} m",
         )
     if body.rotor_inertia_kg_m2 and body.mass_kg:
@@ -237,7 +239,7 @@ def quantities(body: Body) -> Iterator[Quantity]:
         yield Quantity(
             ("rotor_inertia_kg_m2", "mass_kg", length),
             share,
-            ROTOR_INERTIA,
+            _ROTOR_INERTIA,
             f"the inertia of a rotor is {share:.3g} times that of the whole mass at its tip, with {disc}",
         )
 
@@ -247,13 +249,15 @@ def _turning(body: Body, disc: str) -> Iterator[Quantity]:
     hover, top = body.rotor_speeds
     source = "rotor_speed_limits_rad_s" if body.by_throttle else "rotor_speeds"
     tip = top * body.radius_m
-    yield Quantity((source, "rotor_radius_m"), tip, (0.0, HIGHEST_TIP_M_S), f"a tip speed of {tip:.3g} m/s with {disc}")
+    yield Quantity(
+        (source, "rotor_radius_m"), tip, (0.0, _HIGHEST_TIP_M_S), f"a tip speed of {tip:.3g} m/s with {disc}"
+    )
     if body.mass_kg and body.lift_m_s2:
         ratio = body.count * body.thrust_coefficient_n_s2 * hover**2 / (body.mass_kg * body.lift_m_s2)
         yield Quantity(
             ("mass_kg", "thrust_coefficient_n_s2", source),
             ratio,
-            WEIGHT_BY_THROTTLE if body.by_throttle else WEIGHT,
+            _WEIGHT_BY_THROTTLE if body.by_throttle else _WEIGHT,
             f"the thrust is {ratio:.3g} times what carries the vehicle (C_F Σω² over mass times specific force)",
         )
         if body.rotor_speed_limits_rad_s and not body.by_throttle:
@@ -261,13 +265,13 @@ def _turning(body: Body, disc: str) -> Iterator[Quantity]:
             yield Quantity(
                 ("rotor_speed_limits_rad_s", "rotor_speeds"),
                 share,
-                LIMIT_OVER_HOVER,
+                _LIMIT_OVER_HOVER,
                 f"an upper limit of {share:.3g} times the hovering speed of {hover:.4g} rad/s",
             )
 
 
 @dataclass(frozen=True)
-class Remedy:
+class _Remedy:
     """Values that, multiplied by one factor, bring most of what does not fit inside its limits."""
 
     keys: tuple[str, ...]
@@ -279,7 +283,7 @@ class Remedy:
     """Units whose factor is one of them, the likeliest first."""
 
 
-def remedies(body: Body) -> Iterator[Remedy]:
+def _remedies(body: Body) -> Iterator[_Remedy]:
     """For each value that may be wrong alone, and for values wrong by one unit together, what a factor mends."""
     before = [q.fits for q in quantities(body)]
 
@@ -293,14 +297,14 @@ def remedies(body: Body) -> Iterator[Remedy]:
         if any(getattr(body, key) is None for key in keys) or (body.by_throttle and keys == ("rotor_speeds",)):
             continue
         by_unit = {unit: left(keys, factor) for unit, factor in units.items()}
-        grid = np.array(list(units.values()) if len(keys) > 1 else FACTORS)
+        grid = np.array(list(units.values()) if len(keys) > 1 else _FACTORS)
         rest = np.array([left(keys, factor) for factor in grid])
         least = min(rest.min(), *by_unit.values())
         fitting = [unit for unit, count in by_unit.items() if count == least]
         factors = np.sort([*grid[rest == least], *(units[u] for u in fitting)])
-        middle = float(np.log(factors[-1:] if factors[0] <= FACTORS[0] else factors).mean())
-        nearest = sorted(fitting, key=lambda unit: abs(np.log(units[unit]) - middle))[:MOST_UNITS]
-        yield Remedy(keys, factors, int(least), tuple(nearest))
+        middle = float(np.log(factors[-1:] if factors[0] <= _FACTORS[0] else factors).mean())
+        nearest = sorted(fitting, key=lambda unit: abs(np.log(units[unit]) - middle))[:_MOST_UNITS]
+        yield _Remedy(keys, factors, int(least), tuple(nearest))
 
 
 def unfit(body: Body) -> list[Quantity]:
@@ -315,10 +319,10 @@ def impossible(body: Body, column: str) -> Iterator[Doubt]:
     """
     while wrong := unfit(body):
         order = {key: place for place, key in enumerate(dict.fromkeys(key for q in wrong for key in q.keys))}
-        found = [r for r in remedies(body) if r.left < len(wrong) and r.keys[0] in order]
+        found = [r for r in _remedies(body) if r.left < len(wrong) and r.keys[0] in order]
         if not found:
             # Several values are wrong at once, and no single one of them improves anything.
-            yield _doubt(body, Remedy(wrong[0].keys[:1], np.array([]), 0, ()), wrong, (), column)
+            yield _doubt(body, _Remedy(wrong[0].keys[:1], np.array([]), 0, ()), wrong, (), column)
             return
         best = min(found, key=lambda r: (r.left, not r.units, len(r.keys), order[r.keys[0]]))
         mended = body.scaled(best.keys, float(np.exp(np.log(best.factors).mean())))
@@ -328,7 +332,7 @@ def impossible(body: Body, column: str) -> Iterator[Doubt]:
         body = mended
 
 
-def _doubt(body: Body, best: Remedy, raised_by: Sequence[Quantity], others: Sequence[str], column: str) -> Doubt:
+def _doubt(body: Body, best: _Remedy, raised_by: Sequence[Quantity], others: Sequence[str], column: str) -> Doubt:
     """The doubt of a value, with what raised it, what was expected and which unit would fit."""
 
     def name(key: str) -> str:
@@ -349,7 +353,7 @@ def _doubt(body: Body, best: Remedy, raised_by: Sequence[Quantity], others: Sequ
     ends = (best.factors[0], best.factors[-1]) if len(best.factors) else None
     if ends:
         low, high = value * ends[0], value * ends[1]
-        least = "at most " if ends[0] <= FACTORS[0] else f"{low:.3g} to " if high > low else "about "
+        least = "at most " if ends[0] <= _FACTORS[0] else f"{low:.3g} to " if high > low else "about "
         sentence += f"; expected {least}{high:.3g}"
     if key == "torque_coefficient_n_m_s2" and ends and _within(body.thrust_coefficient_n_s2, ends):
         sentence += "; the ratio of torque to thrust in m would fit"
@@ -358,6 +362,22 @@ def _doubt(body: Body, best: Remedy, raised_by: Sequence[Quantity], others: Sequ
         sentence += f"; {' or '.join(best.units)} would fit{both}"
     if others:
         sentence += f"; {' or '.join(map(name, others))} may be wrong in its place"
-    if key == "rotors" and isclose(value, PX4_UNSET_ARM_M):
+    if key == "rotors" and isclose(value, _PX4_UNSET_ARM_M):
         sentence += "; PX4 logs x and y of 1 m where its geometry was never set"
     return Doubt(name(key), sentence, stops=any(q.stops for q in raised_by))
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """One thing in a set that is probably not as stated."""
+
+    what: str
+    """Key of vehicle.yaml (`mass_kg`), column (`angular_velocity_x_rad_s`), file or run that is in doubt."""
+    sentence: str
+    """What was found, what was expected and, where one is known, what would explain it."""
+    stops: bool
+    """Whether a verdict would be about this mistake: a unit, an axis, an order, or mass or inertia by more than a
+    factor of two."""
+
+    def __str__(self) -> str:
+        return self.sentence

@@ -2,33 +2,84 @@
 
 For each run: samples, duration, rate, gaps and the share of empty cells; for the set: which columns are
 there, which are not and what that means for testing.
+
+Runs that hold the same samples: a run held out proves nothing if a fitted one repeats it.
+
+Two recordings of the same manoeuvre agree in what was done and differ in the noise of every sensor. Samples whose
+readings are equal to the last digit, whatever their time stamps, are a copy. A copy that was rounded or scaled anew is
+found by the noise itself: second differences of short blocks, correlated with every place of the other run.
+
+Files in a set's folder that look like recordings and are not read.
+
+Readings that stand still while others go on: nothing was read there.
+
+On a stand or bench a reading that keeps one value in every run; in flight a sensor that repeats one reading for a
+second or more.
 """
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
+from scipy.signal import fftconvolve
 
+from rotorid.io.text.names import listed
 from rotorid.recordings import columns as c
-from rotorid.recordings.copies import copies
-from rotorid.recordings.doubts import Doubt
-from rotorid.recordings.files import read_set
+from rotorid.recordings.body import Doubt
+from rotorid.recordings.files import RUN_SUFFIXES, read_set, run_name
+from rotorid.recordings.held import (
+    SHORTEST_FREEZE_PERIODS,
+    SHORTEST_FREEZE_S,
+    SHORTEST_GAP_PERIODS,
+    SHORTEST_GAP_S,
+    at_the_end,
+    contradiction,
+    held,
+    noisy_columns,
+    standing_together,
+)
 from rotorid.recordings.physics import gravity, impossible_values, near_names, physical_doubts, voltages
 from rotorid.recordings.run import RecordingSet, Run
-from rotorid.recordings.still import still_readings, still_sensors
-from rotorid.recordings.sufficient import sufficient
-from rotorid.recordings.unread import unread_files
+from rotorid.recordings.sufficient import SENSORS, compared_readings, rotor_groups, sufficient
+from rotorid.recordings.vehicle import Vehicle
 
-GAP_FACTOR = 3.0
+_STILL_S = 1.0
+"""A sensor of a flight that repeats one reading for so long is named."""
+_GO_ON = 0.5
+"""Share of the readings in which the other rotors' columns change while one stands still."""
+_TABLES = ("csv", "tsv", "parquet", "feather", "xlsx", "xls", "ods", "h5", "hdf5", "mat", "npz")
+LOGS = ("ulg", "bin", "bbl", "bfl", "mcap", "db3", "bag", "tlog")
+_PACKED = ("zip", "gz", "bz2", "xz", "zst", "7z", "tar", "tgz")
+_LEFT_BEHIND = ("bak", "old", "orig", "part", "tmp", "copy", "crdownload")
+RECORDING = re.compile(
+    rf"\.({'|'.join(_TABLES + LOGS + _PACKED)})(\.({'|'.join(_PACKED + _LEFT_BEHIND)})|~)*$", re.IGNORECASE
+)
+_NOISY = (*c.SPECIFIC_FORCE, *c.ANGULAR_VELOCITY, *c.FORCE, *c.MOMENT)
+"""Columns with white noise of their own; commands and loads may repeat truly, what a filter made is smooth."""
+_LEAST_EQUAL, _LEAST_NOISY = 2, 3
+"""Columns that must agree: to the last digit, or in their noise."""
+_LEAST_ROWS, LEAST_SHARE = 20, 0.05
+"""Equal samples, and their share of the shorter run, from which two runs overlap."""
+_BY_CHANCE = 3.0
+"""So many times as often as within one run: readings in coarse steps repeat by themselves."""
+_BLOCK, _BLOCKS, _JUMP = 256, 5, 4.0
+_SAME_NOISE = 0.95
+"""Correlation of second differences that independent noise does not reach in a block."""
+_MOST_CORRELATED = 5_000_000
+"""Samples by runs to correlate with, which take some seconds."""
+_GAP_FACTOR = 3.0
 """A step of the clock longer than this many median steps is a gap."""
-SLOWEST_SPEEDS_HZ = 20.0
+_SLOWEST_SPEEDS_HZ = 20.0
 """Rate of rotor speeds below which motors (time constants of some hundredths of a second) are faster than their log."""
 
 
 @dataclass(frozen=True)
-class RunCheck:
+class _RunCheck:
     """Sampling of one run."""
 
     name: str
@@ -50,7 +101,7 @@ class SetCheck:
     name: str
     kind: str
     rotors: int
-    runs: tuple[RunCheck, ...]
+    runs: tuple[_RunCheck, ...]
     columns: tuple[str, ...]
     other_columns: tuple[str, ...]
     lacks: tuple[str, ...]
@@ -65,14 +116,14 @@ class SetCheck:
         return as_text(self)
 
 
-def check_run(run: Run) -> RunCheck:
+def check_run(run: Run) -> _RunCheck:
     """Sampling of one run."""
     steps = np.diff(run.time_s)
     median = float(np.median(steps))
-    gaps = steps[steps > GAP_FACTOR * median]
+    gaps = steps[steps > _GAP_FACTOR * median]
     duration = float(run.time_s[-1] - run.time_s[0])
     empty = {n: float(run.table[n].isna().mean()) for n in run.table.columns if run.table[n].isna().any()}
-    return RunCheck(
+    return _RunCheck(
         name=run.name,
         samples=len(run.table),
         duration_s=duration,
@@ -127,14 +178,14 @@ def _lacks_of_flight(has, count: int) -> list[str]:
     return lacks
 
 
-def slow_speeds(recordings: RecordingSet) -> list[str]:
+def _slow_speeds(recordings: RecordingSet) -> list[str]:
     """A sentence where rotor speeds come too seldom to carry what is fast between command and speed."""
     names = c.rotor_columns("rotor_speed", recordings.vehicle.rotor_count)
     runs = [run for run in recordings.runs if run.has(*names)]
     if not runs:
         return []
     rate = min(float(run.table[names[0]].notna().sum() / (run.time_s[-1] - run.time_s[0])) for run in runs)
-    if rate >= SLOWEST_SPEEDS_HZ:
+    if rate >= _SLOWEST_SPEEDS_HZ:
         return []
     return [
         f"Rotor speeds come {rate:.2g} times a second only: a lag or delay of the motors shorter than "
@@ -157,7 +208,7 @@ def contents(recordings: RecordingSet) -> SetCheck:
     lacks: list[str] = []
     if vehicle.kind == "flight":
         lacks = _lacks_of_flight(has, vehicle.rotor_count)
-        lacks += slow_speeds(recordings)
+        lacks += _slow_speeds(recordings)
         if vehicle.ground_z_m is None and not has(c.HEIGHT):
             lacks.append("vehicle.yaml has no ground_z_m and no run has height_m: height is unknown.")
     elif vehicle.kind == "stand":
@@ -189,12 +240,12 @@ def contents(recordings: RecordingSet) -> SetCheck:
 
 def doubts_of(recordings: RecordingSet) -> tuple[Doubt, ...]:
     """What cannot be right in a set, its vehicle and its runs together; empty where nothing is in doubt."""
-    found = [*unread_files(recordings), *near_names(recordings), *copies(recordings), *voltages(recordings)]
+    found = [*_unread_files(recordings), *near_names(recordings), *copies(recordings), *voltages(recordings)]
     if recordings.vehicle.kind != "bench":
         found += [*gravity(recordings.vehicle), *impossible_values(recordings)]
     if recordings.vehicle.kind == "flight":
         found += physical_doubts(recordings)
-    found += [*still_readings(recordings), *still_sensors(recordings)]
+    found += [*_still_readings(recordings), *still_sensors(recordings)]
     return tuple(found)
 
 
@@ -234,3 +285,199 @@ def check_recordings(recordings: RecordingSet) -> SetCheck:
 def check_folder(folder: Path) -> SetCheck:
     """Read a set and check it; InputError if it does not fit the contract or nothing in it can be compared."""
     return check_recordings(read_set(Path(folder)))
+
+
+def copies(recordings: RecordingSet) -> tuple[Doubt, ...]:
+    """One doubt for each run that repeats samples of an earlier one."""
+    columns = dict.fromkeys(n for run in recordings.runs for n in run.table.columns if n != c.TIME)
+    names = [n for n in columns if all(run.has(n) for run in recordings.runs)]
+    if len(recordings.runs) < 2 or len(names) < _LEAST_EQUAL:
+        return ()
+    found: dict[str, tuple[str, str]] = {}
+    for first, second, share, shift_s in _equal_samples(recordings.runs, names):
+        later = f", {abs(shift_s):.4g} s {'later' if shift_s > 0 else 'earlier'}" if abs(shift_s) > 1e-6 else ""
+        found.setdefault(second, (first, f"{share:.0%} of its samples are equal to the last digit{later}"))
+    rest = [run for run in recordings.runs if run.name not in found]
+    noisy = [name for name in names if name in _NOISY]
+    if (
+        len(noisy) >= _LEAST_NOISY
+        and len(rest) > 1
+        and sum(len(run.table) for run in rest) * len(rest) <= _MOST_CORRELATED
+    ):
+        for first, second in _same_noise(rest, noisy):
+            found.setdefault(second, (first, "even the noise of its sensors is the same"))
+    return tuple(
+        Doubt(
+            second,
+            f"Run {second} repeats run {first}: {how}; such a run confirms nothing that was fitted to the other, leave "
+            "one of them out.",
+            stops=False,
+        )
+        for second, (first, how) in found.items()
+    )
+
+
+def _equal_samples(runs: tuple[Run, ...], names: list[str]) -> Iterator[tuple[str, str, float, float]]:
+    """Pairs of runs with equal samples: names, share of the shorter run, and how much later in the second, s."""
+    tables, repeated = [], []
+    for number, run in enumerate(runs):
+        values = run.table[names]
+        known = (values.notna().sum(axis=1) >= _LEAST_EQUAL).to_numpy()
+        hashes = pd.util.hash_pandas_object(values[known], index=False).to_numpy()
+        table = pd.DataFrame({"hash": hashes, "run": number, "time_s": run.time_s[known]})
+        tables.append(table.drop_duplicates("hash"))
+        repeated.append(1 - len(tables[-1]) / max(len(table), 1))
+    together = pd.concat(tables)
+    sizes = together.groupby("run").size()
+    shared = together[together.duplicated("hash", keep=False)]
+    first = shared.drop_duplicates("hash")
+    pairs = shared.merge(first, on="hash", suffixes=("", "_first"))
+    pairs = pairs[pairs["run"] != pairs["run_first"]]
+    for (a, b), equal in pairs.groupby(["run_first", "run"]):
+        share = len(equal) / min(sizes[a], sizes[b])
+        least = max(LEAST_SHARE, _BY_CHANCE * max(repeated[a], repeated[b]))
+        if len(equal) >= _LEAST_ROWS and share >= least:
+            yield runs[a].name, runs[b].name, share, float((equal["time_s"] - equal["time_s_first"]).median())
+
+
+def _same_noise(runs: list[Run], names: list[str]) -> Iterator[tuple[str, str]]:
+    """Names of pairs of runs of which a block of the first lies somewhere in the second."""
+    noises = [_noise(run, names) for run in runs]
+    for i, first in enumerate(noises):
+        for j in range(i + 1, len(noises)):
+            if any(_lies_in(block, noises[j]) for block in _blocks(first)):
+                yield runs[i].name, runs[j].name
+
+
+def _noise(run: Run, names: list[str]) -> np.ndarray:
+    """Second differences of the rows that are whole, clipped to a few of their usual size, (n, k)."""
+    values = run.array(tuple(names))
+    noise = np.diff(values[np.isfinite(values).all(axis=1)], n=2, axis=0)
+    if not len(noise):
+        return noise
+    # A single jump would correlate with every other jump.
+    most = _JUMP * np.median(np.abs(noise), axis=0)
+    return np.clip(noise, -most, most)
+
+
+def _blocks(noise: np.ndarray) -> Iterator[np.ndarray]:
+    """Short blocks spread over a run, (BLOCK, k)."""
+    if len(noise) >= _BLOCK:
+        for start in np.unique(np.linspace(0, len(noise) - _BLOCK, _BLOCKS).astype(int)):
+            yield noise[start : start + _BLOCK]
+
+
+def _lies_in(block: np.ndarray, noise: np.ndarray) -> bool:
+    """Whether at one place of `noise` enough columns of the block correlate as only a copy does."""
+    if len(noise) < _BLOCK:
+        return False
+    alike = np.zeros(len(noise) - _BLOCK + 1, int)
+    for own, other in zip(block.T, noise.T, strict=True):
+        energy = float(own @ own)
+        if energy == 0.0:
+            continue
+        total = np.concatenate([[0.0], np.cumsum(other**2)])
+        there = total[_BLOCK:] - total[:-_BLOCK]
+        product = fftconvolve(other, own[::-1], mode="valid")
+        # Where the other run stands still there is no noise to compare.
+        alike += (there > 0.01 * energy) & (product > _SAME_NOISE * np.sqrt(energy * np.maximum(there, 0.0)))
+    return bool((alike >= _LEAST_NOISY).any())
+
+
+def _unread_files(recordings: RecordingSet) -> tuple[Doubt, ...]:
+    """One doubt for each such file; none for a set that was never a folder."""
+    if not recordings.path or not Path(recordings.path).is_dir():
+        return ()
+    names = sorted(path.name for path in Path(recordings.path).iterdir() if not path.name.startswith("."))
+    return tuple(
+        Doubt(
+            name,
+            f"{name} looks like a recording and is not read: runs end in {', '.join(RUN_SUFFIXES)}; unpack, import or "
+            "rename it, or move it out of the set.",
+            stops=False,
+        )
+        for name in names
+        if RECORDING.search(name) and run_name(Path(name)) is None
+    )
+
+
+def still_sensors(recordings: RecordingSet) -> Iterator[Doubt]:
+    """One doubt for each sensor of a flight that stands still for a time, with the first run and its seconds."""
+    runs, vehicle = recordings.runs, recordings.vehicle
+    if vehicle.kind != "flight":
+        return
+    groups = (*SENSORS, *rotor_groups(vehicle).values())
+    noisy = noisy_columns(runs, [n for names in groups for n in names])
+    found: dict[tuple[str, ...], list[tuple[str, float, float]]] = {}
+    for run in runs:
+        for names in groups:
+            if not names or not run.has(*names):
+                continue
+            rotors = names not in SENSORS
+            whole = standing_together(run, vehicle, names) if rotors else _held(run, vehicle, names, noisy)
+            masks = {names: [mask for mask, _ in whole]}
+            if rotors and not whole:
+                masks = {(n,): _alone(run, vehicle, n, names, noisy) for n in names}
+            for own, stands in masks.items():
+                times = [(float(run.time_s[m][0]), float(run.time_s[m][-1])) for m in stands]
+                for start, stop in times:
+                    if stop - start >= _STILL_S:
+                        found.setdefault(own, []).append((run.name, start, stop))
+    for names, where in found.items():
+        run, start, stop = where[0]
+        more = f" and in {len(where) - 1} more stretches" if len(where) > 1 else ""
+        yield Doubt(
+            names[0],
+            f"{f'{names[0]} to {names[-1]} stand' if len(names) > 1 else f'{names[0]} stands'} still in {run} from "
+            f"{start:.2f} to {stop:.2f} s{more} while the vehicle flies on, expected at least the noise of a sensor: "
+            "its driver or its link stopped, and nothing was read there",
+            stops=False,
+        )
+
+
+def _held(run: Run, vehicle: Vehicle, names: tuple[str, ...], noisy: set[str]) -> list[tuple[np.ndarray, float]]:
+    """Stretches in which all columns of a sensor repeat one reading."""
+    shortest = (
+        (SHORTEST_FREEZE_S, SHORTEST_FREEZE_PERIODS) if len(names) > 1 else (SHORTEST_GAP_S, SHORTEST_GAP_PERIODS)
+    )
+    alive = not noisy.isdisjoint(names)
+    return held(run.time_s, run.array(names), *shortest, alive, contradiction(run, vehicle, names))
+
+
+def _alone(run: Run, vehicle: Vehicle, name: str, names: tuple[str, ...], noisy: set[str]) -> list[np.ndarray]:
+    """Stretches in which one rotor stands still, not at the end of its range, while all others go on."""
+    others = [run.column(n) for n in names if n != name]
+    out = []
+    for mask, _ in _held(run, vehicle, (name,), noisy):
+        read = [v[mask][np.isfinite(v[mask])] for v in others]
+        go_on = [len(v) > 1 and float((np.diff(v) != 0).mean()) > _GO_ON for v in read]
+        if go_on and all(go_on) and not at_the_end(run.column(name), mask):
+            out.append(mask)
+    return out
+
+
+def _still_readings(recordings: RecordingSet) -> Iterator[Doubt]:
+    """One doubt for all such readings; it stops a verdict where no reading of the instrument changes."""
+    runs, vehicle = recordings.runs, recordings.vehicle
+    if vehicle.kind == "flight":
+        return
+    names = list(dict.fromkeys(name for run in runs for name in compared_readings(run, vehicle)))
+    spans = {}
+    for name in names:
+        values = np.concatenate([run.column(name) for run in runs if run.has(name)])
+        values = values[np.isfinite(values)]
+        if len(values) > 1:
+            spans[name] = float(np.ptp(values)), float(values[0])
+    # A reference may be the weights that were put on, the same in every run.
+    own = [name for name in spans if name not in c.REFERENCE_FORCE]
+    still = [name for name in own if spans[name][0] == 0]
+    moving = [name for name, (span, _) in spans.items() if span > 0]
+    if still and moving:
+        values = list(dict.fromkeys(f"{spans[name][1]:.4g}" for name in still))
+        yield Doubt(
+            still[0],
+            f"{listed(still)} {'keeps' if len(still) == 1 else 'keep'} one value ({listed(values)}) in every run while "
+            f"{listed(moving)} {'changes' if len(moving) == 1 else 'change'}, expected at least the noise of a sensor: "
+            "not measured, or a sensor that stands still",
+            stops=len(still) == len(own),
+        )

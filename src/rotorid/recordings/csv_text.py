@@ -21,14 +21,14 @@ from rotorid.io.text.bounds import LARGEST_FILE, LEAST_UNPACKED, MOST_CELLS, MOS
 from rotorid.io.text.files import check_file, check_text
 from rotorid.io.text.wording import printable
 
-BLOCK = 1 << 20
-PACKED_BLOCK = 1 << 16
+_BLOCK = 1 << 20
+_PACKED_BLOCK = 1 << 16
 """Bytes taken from a gzipped file at once: what is left of them is copied for each of its parts."""
-SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
-BYTE_ORDER_MARK = b"\xef\xbb\xbf"
-MOST_ABOVE, ROWS_BELOW = 200, 3
+_SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+_MOST_ABOVE, _ROWS_BELOW = 200, 3
 """Lines that may stand above a heading, and rows of numbers below by which one is known."""
-DECIMAL_COMMAS = 1.5
+_DECIMAL_COMMAS = 1.5
 """A line with so many times the cells of its heading has commas in its numbers."""
 
 
@@ -51,7 +51,7 @@ class _Content(io.RawIOBase):
 
 def opened(path: Path) -> io.BufferedReader:
     """The file's unpacked content, to be read once `look_through` has found it sound."""
-    return io.BufferedReader(_Content(blocks(path)), BLOCK)
+    return io.BufferedReader(_Content(blocks(path)), _BLOCK)
 
 
 @dataclass(frozen=True)
@@ -112,9 +112,9 @@ def blocks(path: Path) -> Iterator[bytes]:
     try:
         with open(path, "rb") as file:
             if path.name.endswith(".gz"):
-                yield from _unpacked(iter(partial(file.read, PACKED_BLOCK), b""), size, path)
+                yield from _unpacked(iter(partial(file.read, _PACKED_BLOCK), b""), size, path)
             else:
-                yield from iter(partial(file.read, BLOCK), b"")
+                yield from iter(partial(file.read, _BLOCK), b"")
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
 
@@ -131,20 +131,22 @@ def _unpacked(packed_blocks: Iterator[bytes], size: int, path: Path) -> Iterator
             while packed or full:
                 if unpacker.eof:
                     padding += len(packed) - len(packed := packed.lstrip(b"\0"))
-                    if padding > BLOCK:
-                        raise InputError(f"{path}: has more than {BLOCK / 1e6:.0f} MB of zero bytes behind its content")
+                    if padding > _BLOCK:
+                        raise InputError(
+                            f"{path}: has more than {_BLOCK / 1e6:.0f} MB of zero bytes behind its content"
+                        )
                     if not packed:
                         break
                     unpacker, members = zlib.decompressobj(wbits=31), members + 1
                     if members > MOST_GZIP_MEMBERS:
                         raise InputError(f"{path}: has more than {MOST_GZIP_MEMBERS} gzipped parts, expected one")
-                part = unpacker.decompress(packed, BLOCK)
+                part = unpacker.decompress(packed, _BLOCK)
                 total += len(part)
                 if total > most:
                     raise InputError(f"{path}: unpacks to more than {most / 1e6:.0f} MB, far more than a log does")
                 if part:
                     yield part
-                full = len(part) == BLOCK
+                full = len(part) == _BLOCK
                 packed = unpacker.unused_data if unpacker.eof else unpacker.unconsumed_tail
     except zlib.error as error:
         raise InputError(f"{path}: is no whole gzip file ({error})") from None
@@ -156,18 +158,18 @@ def _whole_lines(path: Path) -> Iterator[tuple[int, bytes]]:
     """Parts of the text that end where a line ends, each with the number of its first line, counted from 1."""
     line, rest, end_of_line = 1, b"", b""
     for number, block in enumerate(blocks(path)):
-        text = rest + (block.removeprefix(BYTE_ORDER_MARK) if number == 0 else block)
+        text = rest + (block.removeprefix(_BYTE_ORDER_MARK) if number == 0 else block)
         end_of_line = end_of_line or next((sign for sign in (b"\n", b"\r") if sign in text), b"")
         stop = text.rfind(end_of_line) + 1 if end_of_line else 0
         if stop:
             yield line, text[:stop]
             line += text.count(end_of_line, 0, stop)
         rest = text[stop:]
-        if len(rest) > BLOCK:
+        if len(rest) > _BLOCK:
             if (zero := rest.find(b"\0")) >= 0:
                 check_text(rest[: zero + 2000], path, line)
             expected = "column names" if line == 1 else "a row of numbers"
-            raise InputError(f"{path}, line {line}: is longer than {BLOCK / 1e6:.0f} MB, expected {expected}")
+            raise InputError(f"{path}, line {line}: is longer than {_BLOCK / 1e6:.0f} MB, expected {expected}")
     if rest:
         yield line, rest
 
@@ -184,7 +186,7 @@ def _heading(text: bytes, path: Path, foreign: bool) -> tuple[Layout, bytes]:
     if not foreign:
         if separator != "," and widths[","] == 1:
             raise InputError(
-                f"{path}, line 1: columns are separated by {SEPARATORS[separator]}, expected commas (and decimal "
+                f"{path}, line 1: columns are separated by {_SEPARATORS[separator]}, expected commas (and decimal "
                 "points)"
             )
         separator = ","
@@ -197,7 +199,7 @@ def _heading(text: bytes, path: Path, foreign: bool) -> tuple[Layout, bytes]:
 
 def _separator(line: str) -> str:
     """The sign that parts a line into most cells."""
-    return max(SEPARATORS, key=lambda sign: len(_names(line, sign)))
+    return max(_SEPARATORS, key=lambda sign: len(_names(line, sign)))
 
 
 def _numbered(names: list[str]) -> list[str]:
@@ -210,19 +212,19 @@ def _below_other_lines(text: bytes, path: Path) -> tuple[Layout, bytes] | None:
     A heading is what stands above three rows of numbers with as many cells. Where it names columns alike, or nothing
     but units, the lines above with as many cells are a part of it.
     """
-    if b"\r" in text[:BLOCK].replace(b"\r\n", b"\n"):
+    if b"\r" in text[:_BLOCK].replace(b"\r\n", b"\n"):
         return None
-    lines = text[:BLOCK].split(b"\n")[: MOST_ABOVE + ROWS_BELOW + 1]
+    lines = text[:_BLOCK].split(b"\n")[: _MOST_ABOVE + _ROWS_BELOW + 1]
     cells = []
     for line in lines:
         decoded = line.decode("utf-8").rstrip("\r")
         sign = _separator(decoded)
         cells.append((_names(decoded, sign), sign))
-    for k in range(1, len(cells) - ROWS_BELOW):
-        if k > 1 and not _is_row(cells[k - 1][0]) and all(_is_row(row) for row, _ in cells[k : k + ROWS_BELOW]):
+    for k in range(1, len(cells) - _ROWS_BELOW):
+        if k > 1 and not _is_row(cells[k - 1][0]) and all(_is_row(row) for row, _ in cells[k : k + _ROWS_BELOW]):
             raise InputError(f"{path}, line {k + 1}: expected the names of the columns above, found numbers")
         names, sign = cells[k]
-        below = [_names(line.decode("utf-8").rstrip("\r"), sign) for line in lines[k + 1 : k + 1 + ROWS_BELOW]]
+        below = [_names(line.decode("utf-8").rstrip("\r"), sign) for line in lines[k + 1 : k + 1 + _ROWS_BELOW]]
         if _is_row(names) or not all(len(row) == len(names) and _is_row(row) for row in below):
             continue
         if k and len(cells[0][0]) == len(names) and _is_row(cells[1][0]):
@@ -322,6 +324,6 @@ def _wrong_cells(path: Path, line: int, found: int, count: int, last: bool) -> s
     why = ""
     if last and found < count:
         why = " (the file is cut off: delete its last line)"
-    elif found > DECIMAL_COMMAS * count:
+    elif found > _DECIMAL_COMMAS * count:
         why = " (are decimals written with commas? expected points)"
     return f"{path}, line {line}: has {found} cell{'s' * (found != 1)}, the heading has {count}{why}"

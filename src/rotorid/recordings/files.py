@@ -1,8 +1,21 @@
-"""Reading and writing recording sets: `vehicle.yaml`, runs (CSV, CSV.gz, Parquet) and `split.yaml`."""
+"""Reading and writing recording sets: `vehicle.yaml`, runs (CSV, CSV.gz, Parquet) and `split.yaml`.
+
+Values of a `vehicle.yaml` that nobody measured: lines that the importer marked as PROPOSED and nobody replaced.
+
+Whether what is believed of a vehicle can be true of any: bodies, rotors and names.
+
+The list of a set's runs with their SHA-256, which `rotorid import` leaves in the set.
+
+A set without such a list is what its files are. Where there is one, a run that is missing, changed or not listed is
+said, so that half an import is not taken for a whole one.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import hashlib
+import json
+import re
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 
@@ -13,13 +26,11 @@ from pydantic import ValidationError
 from rotorid.errors import InputError
 from rotorid.io.text.bounds import MOST_CELLS, MOST_RUNS
 from rotorid.io.text.files import check_file, read_text, read_yaml, with_exponents
-from rotorid.io.text.names import hint, neighbour
+from rotorid.io.text.names import hint, listed, neighbour
 from rotorid.io.text.wording import explain, printable
-from rotorid.io.text.writing import staging, take_name
+from rotorid.io.text.writing import all_or_none, staging, take_name
 from rotorid.recordings import columns as c
-from rotorid.recordings.belief import check_belief
-from rotorid.recordings.manifest import check_manifest
-from rotorid.recordings.proposed import proposed_in
+from rotorid.recordings.body import Doubt
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.tables import (
     UnusableRun,
@@ -31,8 +42,25 @@ from rotorid.recordings.tables import (
 )
 from rotorid.recordings.vehicle import Vehicle
 
+FILE_NAME = "manifest.json"
+_TRUSTED = (
+    "mass_kg",
+    "thrust_coefficient_n_s2",
+    "torque_coefficient_n_m_s2",
+    "inertia_kg_m2",
+    *(f"inertia_{axis}{unit}" for axis in ("xx", "yy", "zz") for unit in ("_kg_m2", "")),
+    "arm_scale",
+    "rotor_speed_limits_rad_s",
+    "reading_gain",
+    *(f"reading_gain_{axis}" for axis in "xyz"),
+)
+"""Names that `trust` may give a one-sigma of."""
+NO_BODY = 1.25
+"""A principal moment is at most the sum of the others; an inertia believed may be wrong by this factor."""
+_ONE_SPOT_M = 1e-4
+_LINE = re.compile(r"^(?P<key>\w+):.*?#\s*PROPOSED:?\s*(?P<why>.*)$")
 RUN_SUFFIXES = (".csv", ".csv.gz", ".parquet")
-VEHICLE, SPLIT = "vehicle.yaml", "split.yaml"
+VEHICLE, _SPLIT = "vehicle.yaml", "split.yaml"
 
 
 def read_vehicle(path: Path) -> Vehicle:
@@ -131,7 +159,7 @@ def run_files(folder: Path) -> list[Path]:
     return paths
 
 
-def read_split(path: Path, names: list[str]) -> tuple[str, ...]:
+def _read_split(path: Path, names: list[str]) -> tuple[str, ...]:
     """Runs that `split.yaml` holds out, each one of `names`."""
     content = read_yaml(path, as_written=True)
     for key in content:
@@ -142,7 +170,7 @@ def read_split(path: Path, names: list[str]) -> tuple[str, ...]:
         what = printable(held_out) if isinstance(held_out, str) and held_out else "nothing" if not held_out else "keys"
         raise InputError(f"{path}: held_out: found {what}, expected a list of runs: [{names[-1]}]")
     if not held_out:
-        raise InputError(f"{path}: held_out: names no run, expected at least one (or no {SPLIT})")
+        raise InputError(f"{path}: held_out: names no run, expected at least one (or no {_SPLIT})")
     for number, name in enumerate(held_out):
         if not isinstance(name, str):
             raise InputError(f"{path}: held_out: found a list or keys, expected names of runs")
@@ -205,11 +233,11 @@ def read_set(folder: Path) -> RecordingSet:
     for run in runs:
         check_rotors(run, vehicle)
     held_out = None
-    split = folder / SPLIT
+    split = folder / _SPLIT
     if split.exists() or split.is_symlink():
-        held_out = read_split(split, [run_name(p) for p in paths])
+        held_out = _read_split(split, [run_name(p) for p in paths])
     elif near := _misnamed(split):
-        raise InputError(f"{folder / near}: expected the name {SPLIT}")
+        raise InputError(f"{folder / near}: expected the name {_SPLIT}")
     proposed = proposed_in(read_text(folder / VEHICLE))
     return RecordingSet(folder.name, vehicle, runs, held_out, str(folder), left_out, proposed)
 
@@ -235,7 +263,7 @@ def _write_files(recordings: RecordingSet, folder: Path, suffix: str) -> None:
     for run in recordings.runs:
         write_table(run.table, folder / f"{run.name}{suffix}")
     if recordings.held_out is not None:
-        (folder / SPLIT).write_text(yaml.safe_dump({"held_out": list(recordings.held_out)}), encoding="utf-8")
+        (folder / _SPLIT).write_text(yaml.safe_dump({"held_out": list(recordings.held_out)}), encoding="utf-8")
 
 
 def list_sets(parent: Path) -> list[str]:
@@ -244,3 +272,98 @@ def list_sets(parent: Path) -> list[str]:
     if not parent.is_dir():
         return []
     return sorted(p.name for p in parent.iterdir() if (p / VEHICLE).is_file() and not p.name.startswith("."))
+
+
+def proposed_in(text: str) -> tuple[Doubt, ...]:
+    """A doubt for each value that the text of a `vehicle.yaml` marks as proposed, in the order of the file."""
+    return tuple(_doubts(text))
+
+
+def _doubts(text: str) -> Iterator[Doubt]:
+    for line in text.splitlines():
+        if found := _LINE.match(line):
+            why = found["why"].strip().rstrip(".")
+            yield Doubt(found["key"], f"{found['key']} is only proposed{f' ({why})' if why else ''}.", stops=False)
+
+
+def check_belief(vehicle: Vehicle, where: str) -> None:
+    """InputError in one sentence for what no vehicle of a recording set can be; `where` names its file."""
+    for key in ("effects", "derivatives", "reading_gain"):
+        if getattr(vehicle, key):
+            raise InputError(
+                f"{where}: {key}: belongs in improved_vehicle.yaml, which the simulator runs; a recording is compared "
+                f"with a believed vehicle without {key}"
+            )
+    for key in vehicle.trust:
+        if key not in _TRUSTED:
+            raise InputError(f"{where}: trust.{key}: no such value is known{hint(key, _TRUSTED)}")
+    _check_rotors(vehicle, where)
+    if vehicle.inertia_kg_m2 is not None:
+        least, middle, largest = np.linalg.eigvalsh(vehicle.inertia_kg_m2.matrix())
+        if largest > NO_BODY * (least + middle):
+            raise InputError(
+                f"{where}: inertia_kg_m2: found principal moments {least:.3g}, {middle:.3g} and {largest:.3g}; no body "
+                "has one that is larger than the sum of the others"
+            )
+
+
+def _check_rotors(vehicle: Vehicle, where: str) -> None:
+    hubs = vehicle.rotor_positions_m()
+    for first in range(len(hubs)):
+        near = np.flatnonzero(np.linalg.norm(hubs[first + 1 :] - hubs[first], axis=1) < _ONE_SPOT_M)
+        if len(near):
+            second = first + 1 + int(near[0])
+            spot = listed([f"{name} {value:g} m" for name, value in zip("xyz", hubs[first], strict=True)])
+            raise InputError(f"{where}: rotors {first + 1} and {second + 1} are on one spot ({spot})")
+
+
+def sha256(path: Path) -> str:
+    """SHA-256 of a file, hexadecimal."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def write_manifest(folder: Path, paths: Iterable[Path]) -> None:
+    """Write the list of a set's runs, whole or not at all; `paths` are their files."""
+    runs = {path.name: sha256(path) for path in sorted(paths)}
+    with all_or_none(folder / FILE_NAME) as (part,):
+        part.write_text(json.dumps({"runs": runs}, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def listed_runs(folder: Path) -> Mapping[str, str] | None:
+    """SHA-256 by the name of a run's file, None where the set has no list; InputError where it cannot be read."""
+    path = folder / FILE_NAME
+    if not path.exists() and not path.is_symlink():
+        return None
+    try:
+        runs = json.loads(read_text(path))["runs"]
+        if all(isinstance(digest, str) for digest in runs.values()):
+            return runs
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        if isinstance(error, InputError):
+            raise
+    raise InputError(f"{path}: is no list of runs{_renewed(folder)}")
+
+
+def check_manifest(folder: Path, paths: Iterable[Path], ignored: Collection[str] = ()) -> None:
+    """InputError where the set's runs are not those that its list holds; `ignored` files may be what they like."""
+    listed = listed_runs(folder)
+    if listed is None:
+        return
+    there = {path.name: path for path in paths if path.name not in ignored}
+    faults = [f"run {name} is missing" for name in listed if name not in there and name not in ignored]
+    faults += [f"run {name} is not listed" for name in there if name not in listed]
+    faults += [f"run {name} was changed" for name in there if name in listed and sha256(there[name]) != listed[name]]
+    if faults:
+        more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+        raise InputError(
+            f"{folder}: by {FILE_NAME}, {printable(faults[0])}{more}: an import that was stopped, or a change by hand"
+            f"{_renewed(folder)}"
+        )
+
+
+def _renewed(folder: Path) -> str:
+    """What to do about it, to end a sentence with."""
+    return (
+        f"; import again, or where the runs are as they should be, list them anew by `rotorid check {folder} --renew`"
+    )

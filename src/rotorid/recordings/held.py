@@ -18,22 +18,22 @@ SHORTEST_GAP_PERIODS = 12
 SHORTEST_FREEZE_PERIODS = 8
 SHORTEST_FREEZE_S = 0.04
 """Where all columns of a sensor stand still at once, a shorter stretch is no chance."""
-BY_CHANCE = 1e-9
+_BY_CHANCE = 1e-9
 """p-value above which repeated readings may be chance."""
-SMOOTH = 0.3
+_SMOOTH = 0.3
 """Second differences of a reading without noise are this share of its first ones at most; white noise has 1.7."""
-LEAST_JUMP = 5.0
+_LEAST_JUMP = 5.0
 """A jump is this many of the usual steps of a reading: what was held jumps back at its end."""
 
-LONG_S = 2.0
+_LONG_S = 2.0
 """Readings without noise that repeat for so long did not stand truly where what they must follow moves."""
 BLOCK_S = 0.2
-BEYOND_NOISE = 3.0
+_BEYOND_NOISE = 3.0
 """Times the scatter of means over `BLOCK_S` by noise alone from which a column moves."""
-ROUNDING = 1e-9
-DRIVEN = 0.5
+_ROUNDING = 1e-9
+_DRIVEN = 0.5
 """Share of what rotors are usually given from which on a vehicle flies."""
-FOLLOWED = {
+_FOLLOWED = {
     c.QUATERNION: c.ANGULAR_VELOCITY,
     c.ANGULAR_VELOCITY: c.QUATERNION,
     c.VELOCITY: c.SPECIFIC_FORCE,
@@ -83,40 +83,40 @@ def held(
         habit = np.quantile(others, 0.99) if len(others) > 20 else 1
         repeat = (others - 1).sum() / len(v)
         p = float(min(1.0, len(v) * max(repeat, 1.0 / len(v)) ** (length / max(habit, 1))))
-        if p > BY_CHANCE or length < 8 * habit:
+        if p > _BY_CHANCE or length < 8 * habit:
             continue
         mask = np.zeros(len(values), bool)
         # The first of the repeated readings is a true one, but where it is a jump (to zero) by itself.
-        mask[index[a] + int(not jumps_to(v, a)) : index[b - 1] + 1] = True
-        if may_stand(v, a, b, noisy) and not (duration >= LONG_S and contradicted is not None and contradicted(mask)):
+        mask[index[a] + int(not _jumps_to(v, a)) : index[b - 1] + 1] = True
+        if _may_stand(v, a, b, noisy) and not (duration >= _LONG_S and contradicted is not None and contradicted(mask)):
             continue
         out.append((mask, p))
     return out
 
 
-def may_stand(values: np.ndarray, start: int, stop: int, noisy: bool) -> bool:
+def _may_stand(values: np.ndarray, start: int, stop: int, noisy: bool) -> bool:
     """Whether columns (n, k) that repeat one reading from `start` to `stop` may truly have stood still.
 
     A sensor's own noise never does; `noisy` says that other runs show it. A simulator without noise hovers, or flies in
     a plane, with readings that are exactly constant, and leaves them without a jump.
     """
     outside = [values[: start + 1], values[stop:]]
-    usual, bend = steps_and_bends(outside)
+    usual, bend = _steps_and_bends(outside)
     if usual == 0.0:
         return not noisy
-    if bend > SMOOTH * usual:
+    if bend > _SMOOTH * usual:
         return False
     jump = float(np.abs(values[stop] - values[stop - 1]).max()) if stop < len(values) else 0.0
-    return jump < LEAST_JUMP * usual
+    return jump < _LEAST_JUMP * usual
 
 
-def jumps_to(values: np.ndarray, start: int) -> bool:
+def _jumps_to(values: np.ndarray, start: int) -> bool:
     """Whether columns (n, k) come to the reading at `start` by a step far beyond their usual ones."""
-    usual, _ = steps_and_bends([values[: start + 1]])
-    return start > 0 and bool(np.abs(values[start] - values[start - 1]).max() > LEAST_JUMP * usual > 0)
+    usual, _ = _steps_and_bends([values[: start + 1]])
+    return start > 0 and bool(np.abs(values[start] - values[start - 1]).max() > _LEAST_JUMP * usual > 0)
 
 
-def steps_and_bends(parts: list[np.ndarray]) -> tuple[float, float]:
+def _steps_and_bends(parts: list[np.ndarray]) -> tuple[float, float]:
     """Median size of the first and second differences of columns (n, k), where they move; 0 where they never do."""
     step, bend = [np.zeros(0)], [np.zeros(0)]
     for part in (p for p in parts if len(p) > 2):
@@ -131,8 +131,8 @@ def noisy_columns(runs: Iterable[Run], names: Iterable[str]) -> set[str]:
 
     def noisy(run: Run, name: str) -> bool:
         values = run.column(name)
-        usual, bend = steps_and_bends([values[np.isfinite(values)][:, None]])
-        return bend > SMOOTH * usual > 0
+        usual, bend = _steps_and_bends([values[np.isfinite(values)][:, None]])
+        return bend > _SMOOTH * usual > 0
 
     return {n for n in names if any(run.has(n) and noisy(run, n) for run in runs)}
 
@@ -145,7 +145,7 @@ def contradiction(run: Run, vehicle: Vehicle, names: Sequence[str]) -> Callable[
     names = tuple(names)
     kind = c.rotor_number(names[0])
     if kind is None:
-        others = driven_by(run, vehicle) if names == c.SPECIFIC_FORCE else FOLLOWED.get(names, ())
+        others = driven_by(run, vehicle) if names == c.SPECIFIC_FORCE else _FOLLOWED.get(names, ())
     elif len(names) > 1:
         others = (*c.SPECIFIC_FORCE, *c.ANGULAR_VELOCITY)
     else:
@@ -176,7 +176,7 @@ def moves(time_s: np.ndarray, values: np.ndarray) -> bool:
     full = count > 0.5 * count.max()
     means = np.bincount(block, values)[full] / count[full]
     scatter = np.std(values - (np.bincount(block, values) / np.maximum(count, 1))[block])
-    least = max(BEYOND_NOISE * scatter / np.sqrt(np.median(count[full])), ROUNDING * np.abs(values).max())
+    least = max(_BEYOND_NOISE * scatter / np.sqrt(np.median(count[full])), _ROUNDING * np.abs(values).max())
     return full.sum() > 4 and bool(np.std(means) > least)
 
 
@@ -185,11 +185,11 @@ def driven(run: Run, names: tuple[str, ...], mask: np.ndarray) -> bool:
     given = run.array(names).mean(axis=1)
     inside, outside = given[mask & np.isfinite(given)], given[~mask & np.isfinite(given)]
     usual = float(np.median(outside)) if len(outside) else 0.0
-    return bool(len(inside)) and float(inside.mean()) > DRIVEN * usual
+    return bool(len(inside)) and float(inside.mean()) > _DRIVEN * usual
 
 
 def standing_together(run: Run, vehicle: Vehicle, names: tuple[str, ...]) -> list[tuple[np.ndarray, float]]:
-    """Stretches of at least `LONG_S` in which all commands of one kind stand still in flight: the log of them stopped.
+    """Stretches of at least `_LONG_S` in which all commands of one kind stand still in flight: the log of them stopped.
 
     On the ground they stand still, too; as masks (n,) with their p-values.
     """
@@ -198,5 +198,5 @@ def standing_together(run: Run, vehicle: Vehicle, names: tuple[str, ...]) -> lis
     return [
         (mask, p)
         for mask, p in found
-        if np.ptp(run.time_s[mask]) >= LONG_S and driven(run, names, mask) and contradicted(mask)
+        if np.ptp(run.time_s[mask]) >= _LONG_S and driven(run, names, mask) and contradicted(mask)
     ]

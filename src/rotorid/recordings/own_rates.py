@@ -26,29 +26,29 @@ from scipy.sparse.linalg import spsolve
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import RecordingSet, Run
 
-HOLE_PERIODS = 6.0
+_HOLE_PERIODS = 6.0
 """Where a sensor gives nothing for longer than so many of its own periods, the flight is cut in two."""
-LONGEST_USUAL = 10.0
+_LONGEST_USUAL = 10.0
 """Steps longer than so many usual ones are holes, and count for no rate."""
-COVERED = 0.95
+_COVERED = 0.95
 """Share of the steps between readings that a step of the new grid is as long as."""
-LONG_STEP, SCATTERED = 1.5, 0.15
+_LONG_STEP, _SCATTERED = 1.5, 0.15
 """A sensor is scattered where more than such a share of its steps is longer than so many usual ones."""
-TORN = 0.8
+_TORN = 0.8
 """Share of a flight in long stretches in which every sensor has readings: below it, gaps are bridged."""
 LEAST_STRETCH_S, LEAST_SINGLE_S = 3.0, 9.0
 """A stretch that can be used lasts so long; of a single run, a third of which is held out."""
-RATE_ENOUGH_HZ = 50.0
+_RATE_ENOUGH_HZ = 50.0
 """What the analysis needs: its highest cutoff, 20 Hz, over USED_BAND."""
-USED_BAND = 0.4
+_USED_BAND = 0.4
 """Highest frequency, over the rate, that the analysis uses of a sensor."""
-LINES_A_PERIOD = 4.0
+_LINES_A_PERIOD = 4.0
 """Values a period on straight lines between readings: few would cut the corners off."""
-LEAST_READINGS = 20
+_LEAST_READINGS = 20
 LEAST_VALUES = 4
 """Complete readings from which a sensor counts as recorded."""
-CUBIC = 3
-STIFFNESS = 5e-4
+_CUBIC = 3
+_STIFFNESS = 5e-4
 """Weight of the third differences of the spline: a smooth line where there are no readings. With half the cells empty
 by chance noise then is as even over the band as of an even sensor, and the gain at 0.3 of the rate is right to 2 %."""
 
@@ -63,18 +63,18 @@ def on_own_rates(recordings: RecordingSet) -> RecordingSet:
     kinds = ("rotor_speed", "rotor_command", "throttle")
     rotors = [c.rotor_columns(kind, recordings.vehicle.rotor_count) for kind in kinds]
     sensors = (*rotors, c.POSITION, c.VELOCITY, c.QUATERNION, c.ANGULAR_VELOCITY, c.SPECIFIC_FORCE, (c.HEIGHT,))
-    there = {names: [run for run in recordings.runs if is_read(run, names)] for names in sensors}
+    there = {names: [run for run in recordings.runs if _is_read(run, names)] for names in sensors}
     scattered = [names for names, runs in there.items() if any(is_scattered(run, names) for run in runs)]
-    by_chance = any(cut_by_chance(run, names) for names in scattered for run in there[names])
+    by_chance = any(_cut_by_chance(run, names) for names in scattered for run in there[names])
     own = {n: max(own_period_s(run, n) for run in there[n]) for n in (scattered if by_chance else ())}
     even = _with_grids(recordings, own, rotors)
     read = [names for names, runs in there.items() if runs]
     long_s = LEAST_SINGLE_S if len(even.runs) == 1 else LEAST_STRETCH_S
-    if any(whole_share(run, read, long_s) < TORN for run in even.runs):
+    if any(_whole_share(run, read, long_s) < _TORN for run in even.runs):
         gaps = [n for n in read if n in own or any(_cuts(_whole_steps_s(run, n)) for run in there[n])]
-        wide = {n: max(1.0 / RATE_ENOUGH_HZ, *(own_period_s(run, n) for run in there[n])) for n in gaps}
+        wide = {n: max(1.0 / _RATE_ENOUGH_HZ, *(own_period_s(run, n) for run in there[n])) for n in gaps}
         bridged = _with_grids(recordings, wide, rotors)
-        before, after = (sum(whole_share(run, read, long_s) for run in made.runs) for made in (even, bridged))
+        before, after = (sum(_whole_share(run, read, long_s) for run in made.runs) for made in (even, bridged))
         even, own = (bridged, wide) if after > before else (even, own)
     if not own:
         return recordings
@@ -90,7 +90,7 @@ def _with_grids(
     for run in recordings.runs:
         new = {}
         for names, period in periods.items():
-            if is_read(run, names):
+            if _is_read(run, names):
                 values = evenly(run, names, period, jumps=names in rotors)
                 new |= dict(zip(names, values.T, strict=True))
         runs.append(replace(run, table=run.table.assign(**new)))
@@ -108,7 +108,7 @@ def whole_stretches(run: Run, groups: Iterable[tuple[str, ...]]) -> tuple[list[t
         steps = np.diff(known)
         period = float(np.median(steps))
         slowest = max(slowest, period)
-        holes += [(known[k], known[k + 1]) for k in np.flatnonzero(steps > HOLE_PERIODS * period)]
+        holes += [(known[k], known[k + 1]) for k in np.flatnonzero(steps > _HOLE_PERIODS * period)]
         holes += [(-np.inf, known[0]), (known[-1], np.inf)]
     found, reached = [], float(time_s[0])
     for start, stop in [*sorted(holes), (float(time_s[-1]), np.inf)]:
@@ -118,9 +118,9 @@ def whole_stretches(run: Run, groups: Iterable[tuple[str, ...]]) -> tuple[list[t
     return found, slowest
 
 
-def whole_share(run: Run, sensors: Iterable[tuple[str, ...]], long_s: float) -> float:
+def _whole_share(run: Run, sensors: Iterable[tuple[str, ...]], long_s: float) -> float:
     """Share of a flight's time that lies in stretches of `long_s`, s, in which no sensor of it has a hole."""
-    lasting = [stop - start for start, stop in whole_stretches(run, [n for n in sensors if is_read(run, n)])[0]]
+    lasting = [stop - start for start, stop in whole_stretches(run, [n for n in sensors if _is_read(run, n)])[0]]
     return sum(s for s in lasting if s >= long_s) / max(float(run.time_s[-1] - run.time_s[0]), 1e-9)
 
 
@@ -130,7 +130,7 @@ def _sentence(runs: list[Run], names: tuple[str, ...], period_s: float, jumps: b
     through = f"{names[0]} to {names[-1]} come" if len(names) > 1 else f"{names[0]} comes"
     return (
         f"{through} at random ({1 - share:.0%} of the cells are empty): brought to an even {1 / period_s:.0f} Hz, "
-        f"whose band to {USED_BAND / period_s:.0f} Hz can be used; there the noise is "
+        f"whose band to {_USED_BAND / period_s:.0f} Hz can be used; there the noise is "
         f"{noise_gain(runs[0], names, period_s, jumps):.2g} times that of full columns."
     )
 
@@ -141,19 +141,19 @@ def noise_gain(run: Run, names: tuple[str, ...], period_s: float, jumps: bool) -
     white = {n: np.where(np.isfinite(run.column(n)), rng.standard_normal(len(run.time_s)), np.nan) for n in names}
     made = evenly(Run("", pd.DataFrame({c.TIME: run.time_s} | white)), names, period_s, jumps)
     step = float(run.time_s[-1] - run.time_s[0]) / (len(run.time_s) - 1)
-    between = period_s / LINES_A_PERIOD if jumps else period_s
+    between = period_s / _LINES_A_PERIOD if jumps else period_s
     return float(np.sqrt(np.nanvar(made) * between / step))
 
 
-def is_read(run: Run, names: tuple[str, ...]) -> bool:
+def _is_read(run: Run, names: tuple[str, ...]) -> bool:
     """Whether each column of a sensor has enough readings to show how they come."""
-    return bool(names) and all(np.isfinite(run.column(name)).sum() > LEAST_READINGS for name in names)
+    return bool(names) and all(np.isfinite(run.column(name)).sum() > _LEAST_READINGS for name in names)
 
 
 def _steps_s(run: Run, names: tuple[str, ...]) -> list[np.ndarray]:
     """Steps between the readings of each column, s, without holes."""
     steps = [np.diff(run.time_s[np.isfinite(run.column(name))]) for name in names]
-    return [s[s <= LONGEST_USUAL * np.median(s)] for s in steps]
+    return [s[s <= _LONGEST_USUAL * np.median(s)] for s in steps]
 
 
 def _whole_steps_s(run: Run, names: tuple[str, ...]) -> np.ndarray:
@@ -163,35 +163,35 @@ def _whole_steps_s(run: Run, names: tuple[str, ...]) -> np.ndarray:
 
 def _cuts(steps_s: np.ndarray) -> int:
     """Number of steps that the rule of usual steps takes for holes."""
-    return int((steps_s > HOLE_PERIODS * np.median(steps_s)).sum()) if len(steps_s) else 0
+    return int((steps_s > _HOLE_PERIODS * np.median(steps_s)).sum()) if len(steps_s) else 0
 
 
-def cut_by_chance(run: Run, names: tuple[str, ...]) -> bool:
+def _cut_by_chance(run: Run, names: tuple[str, ...]) -> bool:
     """Whether a rule in usual steps cuts a sensor where no column of it has a hole of several of its own periods."""
     steps = _steps_s(run, names)
     whole = _whole_steps_s(run, names)
     cuts = _cuts(whole) if len(whole) else len(run.time_s)
     every = [np.diff(run.time_s[np.isfinite(run.column(name))]) for name in names]
     mean = max(float(s.mean()) for s in steps)
-    return cuts > sum(int((s > HOLE_PERIODS * mean).sum()) for s in every)
+    return cuts > sum(int((s > _HOLE_PERIODS * mean).sum()) for s in every)
 
 
 def is_scattered(run: Run, names: tuple[str, ...]) -> bool:
     """Whether the readings of a sensor come unevenly, or its columns not in the same rows."""
     steps = _steps_s(run, names)
-    uneven = max(float((s > LONG_STEP * np.median(s)).mean()) for s in steps)
-    return uneven > SCATTERED or len(_whole_steps_s(run, names)) < (1 - SCATTERED) * min(map(len, steps))
+    uneven = max(float((s > _LONG_STEP * np.median(s)).mean()) for s in steps)
+    return uneven > _SCATTERED or len(_whole_steps_s(run, names)) < (1 - _SCATTERED) * min(map(len, steps))
 
 
 def own_period_s(run: Run, names: tuple[str, ...]) -> float:
     """The step that covers nearly all steps between readings that come at random, s: what such a sensor resolves."""
-    return max(max(float(np.quantile(s, COVERED)), float(s.mean())) for s in _steps_s(run, names))
+    return max(max(float(np.quantile(s, _COVERED)), float(s.mean())) for s in _steps_s(run, names))
 
 
 def evenly(run: Run, names: tuple[str, ...], period_s: float, jumps: bool) -> np.ndarray:
     """Values of a sensor in the rows nearest to an even grid, (n, len(names)); NaN in the others and inside holes."""
     time_s = run.time_s
-    step = period_s / LINES_A_PERIOD if jumps else period_s
+    step = period_s / _LINES_A_PERIOD if jumps else period_s
     grid = np.arange(time_s[0], time_s[-1] + 1e-9, step)
     rows = np.unique(np.searchsorted((time_s[1:] + time_s[:-1]) / 2, grid))
     at = time_s[rows]
@@ -205,7 +205,7 @@ def evenly(run: Run, names: tuple[str, ...], period_s: float, jumps: bool) -> np
         made = np.interp(at, read_s, read) if jumps else _spline(read_s, read, period_s)(at)
         after = np.searchsorted(read_s, at).clip(1, len(read_s) - 1)
         inside = (at >= read_s[0]) & (at <= read_s[-1])
-        inside &= read_s[after] - read_s[after - 1] <= HOLE_PERIODS * period_s
+        inside &= read_s[after] - read_s[after - 1] <= _HOLE_PERIODS * period_s
         out[rows[inside], k] = made[inside]
     return out
 
@@ -213,16 +213,16 @@ def evenly(run: Run, names: tuple[str, ...], period_s: float, jumps: bool) -> np
 def _spline(time_s: np.ndarray, values: np.ndarray, period_s: float) -> BSpline:
     """The cubic least-squares spline through readings (n,) whose knots are a period apart."""
     count = int(np.ceil((time_s[-1] - time_s[0]) / period_s)) + 1
-    knots = time_s[0] + period_s * np.arange(-CUBIC, count + CUBIC)
-    design = BSpline.design_matrix(time_s, knots, CUBIC)
+    knots = time_s[0] + period_s * np.arange(-_CUBIC, count + _CUBIC)
+    design = BSpline.design_matrix(time_s, knots, _CUBIC)
     size = design.shape[1]
     difference = eye_array(size, format="csr")
-    for n in range(CUBIC):
+    for n in range(_CUBIC):
         difference = diags([-1.0, 1.0], [0, 1], shape=(size - n - 1, size - n)) @ difference
     normal = design.T @ design
-    weight = STIFFNESS * normal.diagonal().mean()
+    weight = _STIFFNESS * normal.diagonal().mean()
     found = spsolve((normal + weight * difference.T @ difference).tocsc(), design.T @ (values - values.mean()))
-    return BSpline(knots, found + values.mean(), CUBIC)
+    return BSpline(knots, found + values.mean(), _CUBIC)
 
 
 def on_one_side(quaternion: np.ndarray) -> np.ndarray:

@@ -17,38 +17,37 @@ from scipy.spatial.transform import Rotation
 
 from rotorid.io.text.names import listed
 from rotorid.recordings import columns as c
-from rotorid.recordings.body import Body, Flown, body_of, impossible, quantities
-from rotorid.recordings.doubts import Doubt
+from rotorid.recordings.body import Body, Doubt, Flown, body_of, impossible, quantities
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.vehicle import Vehicle
 
 STEP_S = 0.02
 """Step of the common clock; what is compared is slower than some hertz."""
-SMOOTH_S = 0.1
-LONGEST_GAP_S = 0.25
-GRAVITY_M_S2 = (9.5, 10.1)
-LIFT_M_S2 = (5.0, 20.0)
+_SMOOTH_S = 0.1
+_LONGEST_GAP_S = 0.25
+_GRAVITY_M_S2 = (9.5, 10.1)
+_LIFT_M_S2 = (5.0, 20.0)
 """Where the median of an accelerometer in flight lies, in its unit and axes."""
-HIGHEST_VOLTAGE_V = 120.0
-FASTEST_USUAL_RAD_S = 20.0
-LEAST_TURNING_RAD_S = 0.05
+_HIGHEST_VOLTAGE_V = 120.0
+_FASTEST_USUAL_RAD_S = 20.0
+_LEAST_TURNING_RAD_S = 0.05
 """Spread of a body rate below which nothing can be said of it."""
-AGREES, CONTRADICTS = 0.5, -0.3
+_AGREES, _CONTRADICTS = 0.5, -0.3
 """Correlations: above, two signals agree; below, one of them is turned round."""
 TOP = 0.99
 """Share of the rotor speeds below their highest that counts: single samples may be faults."""
-SAME_UNIT = (0.2, 5.0)
+_SAME_UNIT = (0.2, 5.0)
 """Of two signals that agree, the ratio of their spreads that noise and smoothing explain."""
-SLOW_S, LATEST_STEPS, LEAST_EXPLAINED = 0.5, 4, 0.4
+SLOW_S, _LATEST_STEPS, _LEAST_EXPLAINED = 0.5, 4, 0.4
 """Regression of turning on rotor speeds: slower changes left out, latest lag tried, least share explained."""
-SURE_Z, ALIKE, RIDGE = 6.0, 5.0, 0.02
+SURE_Z, _ALIKE, _RIDGE = 6.0, 5.0, 0.02
 """Standard errors by which a rotor's sign must be sure; samples that count as one; ridge, a share of the regressors."""
-DEGREE = np.pi / 180
-LEAST_RATE_HZ = {"rotor speeds": 25.0, "body rates": 50.0, "accelerometer": 50.0, "attitude": 20.0}
-LEAST_TIME_S = 20.0
+_DEGREE = np.pi / 180
+_LEAST_RATE_HZ = {"rotor speeds": 25.0, "body rates": 50.0, "accelerometer": 50.0, "attitude": 20.0}
+_LEAST_TIME_S = 20.0
 MOST_S = 7200.0
 """How much of a run is looked at: a clock that was set on the way would need more memory than there is."""
-AT_REST = 0.2
+_AT_REST = 0.2
 """Share of the median rotor speed below which a rotor counts as at rest."""
 
 
@@ -97,7 +96,7 @@ def _clock(run: Run) -> np.ndarray | None:
     return np.arange(run.time_s[0], run.time_s[0] + min(duration, MOST_S), STEP_S)
 
 
-def _on(run: Run, clock: np.ndarray, names: tuple[str, ...], smooth_s: float = SMOOTH_S) -> np.ndarray | None:
+def _on(run: Run, clock: np.ndarray, names: tuple[str, ...], smooth_s: float = _SMOOTH_S) -> np.ndarray | None:
     """Columns as means over `smooth_s` on the common clock, (n, k), NaN in gaps; None where one is missing."""
     if not run.has(*names):
         return None
@@ -115,11 +114,11 @@ def _on(run: Run, clock: np.ndarray, names: tuple[str, ...], smooth_s: float = S
     near = np.clip(np.searchsorted(time, clock), 1, len(time) - 1)
     gap = time[near] - time[near - 1]
     out = np.where((count > 0)[:, None], mean, line)
-    out[(gap > LONGEST_GAP_S) & (count == 0)] = np.nan
+    out[(gap > _LONGEST_GAP_S) & (count == 0)] = np.nan
     return out
 
 
-def _speeds(run: Run, clock: np.ndarray, vehicle: Vehicle, smooth_s: float = SMOOTH_S) -> np.ndarray | None:
+def _speeds(run: Run, clock: np.ndarray, vehicle: Vehicle, smooth_s: float = _SMOOTH_S) -> np.ndarray | None:
     """Rotor speeds (n, rotors), rad/s: measured, else commanded, else throttle times the upper limit."""
     for kind in ("rotor_speed", "rotor_command"):
         values = _on(run, clock, c.rotor_columns(kind, vehicle.rotor_count), smooth_s)
@@ -151,7 +150,7 @@ def flown(run: Run, vehicle: Vehicle) -> Flown | None:
         return None
     force = _on(run, clock, c.SPECIFIC_FORCE)
     lift = None if force is None else -float(np.nanmedian(force[:, 2]))
-    if lift is None or not LIFT_M_S2[0] < lift < LIFT_M_S2[1]:
+    if lift is None or not _LIFT_M_S2[0] < lift < _LIFT_M_S2[1]:
         lift = 9.81  # On average thrust balances weight in a flight; a wrong accelerometer is a doubt of its own.
     kinds = ("rotor_speed", "rotor_command", "throttle")
     column = next(n[0] for k in kinds if run.has(*(n := c.rotor_columns(k, vehicle.rotor_count))))
@@ -189,7 +188,7 @@ def impossible_values(recordings: RecordingSet) -> tuple[Doubt, ...]:
 
 def gravity(vehicle: Vehicle) -> tuple[Doubt, ...]:
     """A gravity that is not the earth's."""
-    value, (low, high) = vehicle.gravity_m_s2, GRAVITY_M_S2
+    value, (low, high) = vehicle.gravity_m_s2, _GRAVITY_M_S2
     if low <= value <= high:
         return ()
     units = [
@@ -207,11 +206,11 @@ def voltages(recordings: RecordingSet) -> tuple[Doubt, ...]:
         middle = float(np.nanmedian(run.column(name))) if run.has(name) else 0.0
         if middle < 0:
             said = "the sign is turned"
-        elif middle > HIGHEST_VOLTAGE_V:
-            said = "mV would fit" if 2 < middle / 1e3 < HIGHEST_VOLTAGE_V else "0.1 V would fit"
+        elif middle > _HIGHEST_VOLTAGE_V:
+            said = "mV would fit" if 2 < middle / 1e3 < _HIGHEST_VOLTAGE_V else "0.1 V would fit"
         else:
             continue
-        sentence = f"{run.name}: {name} has a median of {middle:.4g}, expected 0 to {HIGHEST_VOLTAGE_V:g} V: {said}"
+        sentence = f"{run.name}: {name} has a median of {middle:.4g}, expected 0 to {_HIGHEST_VOLTAGE_V:g} V: {said}"
         return (Doubt(name, sentence, stops=True),)
     return ()
 
@@ -245,7 +244,7 @@ def _accelerometer(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Do
             "specific force holds none",
             stops=True,
         )
-    elif size > LIFT_M_S2[1]:
+    elif size > _LIFT_M_S2[1]:
         unit = (
             "ft/s²"
             if 28 < size < 37
@@ -288,35 +287,35 @@ def _gyroscope(run: Run, clock: np.ndarray) -> Iterator[Doubt]:
         return
     if attitude is None:
         usual = float(np.nanmedian(np.linalg.norm(gyro, axis=1)))
-        if usual > FASTEST_USUAL_RAD_S:
+        if usual > _FASTEST_USUAL_RAD_S:
             yield Doubt(
                 c.ANGULAR_VELOCITY[0],
-                f"the vehicle turns at {usual:.3g} rad/s in the median, expected at most {FASTEST_USUAL_RAD_S:g}: the "
+                f"the vehicle turns at {usual:.3g} rad/s in the median, expected at most {_FASTEST_USUAL_RAD_S:g}: the "
                 "gyroscope is in degrees per second, in counts, or ten times too large",
                 stops=True,
             )
         return
     derived = _rates_of_attitude(attitude)
     for axis, k in (("x", 0), ("y", 1), ("z", 2)):
-        if not np.nanstd(derived[:, k]) > LEAST_TURNING_RAD_S:
+        if not np.nanstd(derived[:, k]) > _LEAST_TURNING_RAD_S:
             continue
         r = _correlation(gyro[:, k], derived[:, k])
         scale = float(np.nanstd(gyro[:, k]) / np.nanstd(derived[:, k]))
         name = f"angular_velocity_{axis}_rad_s"
-        if r < CONTRADICTS:
+        if r < _CONTRADICTS:
             yield Doubt(
                 name,
                 f"{name} turns against the attitude (correlation {r:.2f}): body axes of gyroscope and attitude differ, "
                 "or the quaternion is the inverse one",
                 stops=True,
             )
-        elif r > AGREES and 0.5 < scale * DEGREE < 2:
+        elif r > _AGREES and 0.5 < scale * _DEGREE < 2:
             yield Doubt(
                 name,
                 f"{name} is {scale:.3g} times the derivative of the attitude: it is in degrees per second",
                 stops=True,
             )
-        elif r > AGREES and not 0.5 < scale < 2:
+        elif r > _AGREES and not 0.5 < scale < 2:
             yield Doubt(name, f"{name} is {scale:.3g} times the derivative of the attitude", stops=True)
         elif np.isfinite(r) and r < 0.2:
             others = [abs(_correlation(gyro[:, k], derived[:, j])) for j in range(3)]
@@ -337,7 +336,7 @@ def _world(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
         for k, axis in enumerate("xyz"):
             if np.nanstd(velocity[:, k]) > 0.2:
                 r = _correlation(velocity[:, k], derived[:, k])
-                if r < CONTRADICTS:
+                if r < _CONTRADICTS:
                     yield Doubt(
                         f"velocity_{axis}_m_s",
                         f"velocity_{axis}_m_s goes against the derivative of position_{axis}_m (correlation {r:.2f})",
@@ -351,7 +350,7 @@ def _world(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
                         stops=True,
                     )
                 scale = float(np.nanstd(velocity[:, k]) / np.nanstd(derived[:, k]))
-                if r > AGREES and not SAME_UNIT[0] < scale < SAME_UNIT[1]:
+                if r > _AGREES and not _SAME_UNIT[0] < scale < _SAME_UNIT[1]:
                     # Units that are used as well as metres are smaller: the column with the larger numbers is the one.
                     yield Doubt(
                         f"velocity_{axis}_m_s" if scale > 1 else f"position_{axis}_m",
@@ -379,7 +378,7 @@ def _world(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
     for k, axis in enumerate("xy"):
         if np.nanstd(world[:, k]) > 0.5 and np.nanstd(change[:, k]) > 0.5:
             r = _correlation(world[:, k], change[:, k])
-            if r < CONTRADICTS:
+            if r < _CONTRADICTS:
                 yield Doubt(
                     f"velocity_{axis}_m_s",
                     f"the velocity along {axis} changes against the tilt of the thrust (correlation {r:.2f}): world "
@@ -410,9 +409,9 @@ def _pushes(speeds: np.ndarray, gyro: np.ndarray) -> np.ndarray | None:
     push, turning = _band(clean[0] / clean[0].mean()), np.gradient(_band(clean[1]), STEP_S, axis=0)[:, :2]
     # All rotors together turn nothing: what they share is left out, and a mixture hardly flown is held small (ridge).
     push = push - push.mean(axis=1, keepdims=True)
-    held = RIDGE * np.trace(push.T @ push) / push.shape[1] * np.eye(push.shape[1])
+    held = _RIDGE * np.trace(push.T @ push) / push.shape[1] * np.eye(push.shape[1])
     best: tuple[float, np.ndarray] | None = None
-    for late in range(LATEST_STEPS + 1):
+    for late in range(_LATEST_STEPS + 1):
         x, y = push[: len(push) - late], turning[late:]
         inverse = np.linalg.inv(x.T @ x + held)
         fit = inverse @ x.T @ y
@@ -420,9 +419,9 @@ def _pushes(speeds: np.ndarray, gyro: np.ndarray) -> np.ndarray | None:
         explained = float((1 - (rest**2).sum(axis=0) / (y**2).sum(axis=0)).min())
         if best is None or explained > best[0]:
             # Neighbours are alike over a few samples: errors by as many fewer.
-            spread = np.sqrt(np.diag(inverse @ x.T @ x @ inverse)[:, None] * rest.var(axis=0) * ALIKE)
+            spread = np.sqrt(np.diag(inverse @ x.T @ x @ inverse)[:, None] * rest.var(axis=0) * _ALIKE)
             best = explained, np.where(np.abs(fit) > SURE_Z * spread, np.sign(fit), 0.0).T
-    return best[1] if best is not None and best[0] > LEAST_EXPLAINED else None
+    return best[1] if best is not None and best[0] > _LEAST_EXPLAINED else None
 
 
 def _rotors(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
@@ -430,7 +429,7 @@ def _rotors(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
     speeds, gyro = _speeds(run, clock, vehicle, 2 * STEP_S), _on(run, clock, c.ANGULAR_VELOCITY, 2 * STEP_S)
     if speeds is None or gyro is None or vehicle.rotor_count < 3:
         return
-    if not (np.nanstd(gyro[:, :2], axis=0) > LEAST_TURNING_RAD_S).all():
+    if not (np.nanstd(gyro[:, :2], axis=0) > _LEAST_TURNING_RAD_S).all():
         return
     found = _pushes(speeds, gyro)
     if found is None or (np.abs(found).sum(axis=1) < vehicle.rotor_count - 1).any():
@@ -493,7 +492,7 @@ def _rest(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
         return
     values = run.array(c.rotor_columns(kinds[0], vehicle.rotor_count))
     mean = values[np.isfinite(values).all(axis=1)].mean(axis=1)
-    at_rest = float((mean < AT_REST * np.median(mean[mean > 0])).mean()) if (mean > 0).any() else 1.0
+    at_rest = float((mean < _AT_REST * np.median(mean[mean > 0])).mean()) if (mean > 0).any() else 1.0
     if at_rest > 0.02:
         yield Doubt(
             c.rotor_columns(kinds[0], 1)[0],
@@ -505,8 +504,8 @@ def _rest(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
 def _amount(recordings: RecordingSet) -> Iterator[Doubt]:
     """Doubts about how much there is and how often it was sampled."""
     total = sum(float(r.time_s[-1] - r.time_s[0]) for r in recordings.runs)
-    if total < LEAST_TIME_S:
-        sentence = f"Only {total:.0f} s are recorded: intervals will be wide; {LEAST_TIME_S:g} s and more are better."
+    if total < _LEAST_TIME_S:
+        sentence = f"Only {total:.0f} s are recorded: intervals will be wide; {_LEAST_TIME_S:g} s and more are better."
         yield Doubt(c.TIME, sentence, stops=False)
     groups = {
         "rotor speeds": c.rotor_columns("rotor_speed", recordings.vehicle.rotor_count),
@@ -526,10 +525,10 @@ def _amount(recordings: RecordingSet) -> Iterator[Doubt]:
             if run.has(*columns):
                 known = np.isfinite(run.array(columns)).all(axis=1)
                 rates.append(known.sum() / max(float(run.time_s[-1] - run.time_s[0]), 1e-9))
-        if rates and min(rates) < LEAST_RATE_HZ[name]:
+        if rates and min(rates) < _LEAST_RATE_HZ[name]:
             yield Doubt(
                 columns[0],
-                f"The {name} come at {min(rates):.3g} Hz, {LEAST_RATE_HZ[name]:g} Hz and more are better: "
+                f"The {name} come at {min(rates):.3g} Hz, {_LEAST_RATE_HZ[name]:g} Hz and more are better: "
                 f"{costs[name]}.",
                 stops=False,
             )

@@ -14,22 +14,22 @@ import pandas as pd
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import RecordingSet, Run
 
-FAR = 10.0
+_FAR = 10.0
 """Standard deviations of the readings about their neighbours from which one is a spike."""
-NEAR = 4.0
-"""Fewer readings than spikes lie between this and `FAR`, or the sensor's noise is what makes them."""
-MOST = 0.1
+_NEAR = 4.0
+"""Fewer readings than spikes lie between this and `_FAR`, or the sensor's noise is what makes them."""
+_MOST = 0.1
 """A sensor with a larger share of far readings is no sensor with spikes."""
-NEIGHBOURS = 3
+_NEIGHBOURS = 3
 """Readings on each side whose medians a spike is far from: two of three may be spikes themselves."""
-AROUND = 31
+_AROUND = 31
 """Readings over which the scatter is local: a burst of vibration is none of spikes."""
-FINEST = 1e-3
+_FINEST = 1e-3
 """Share of a sensor's usual span below which its scatter is not believed."""
-LEAST_READINGS = 60
-LEAST_SPIKES = 3
+_LEAST_READINGS = 60
+_LEAST_SPIKES = 3
 """Fewer in all runs may be what a vehicle does once: a bump, a touch of the ground."""
-REPEATED = 0.1
+_REPEATED = 0.1
 """Share of the spikes that one value must have to be named."""
 
 
@@ -39,7 +39,7 @@ def without_spikes(recordings: RecordingSet) -> RecordingSet:
     names = (*c.FORCE, *c.MOMENT, *c.SPECIFIC_FORCE, *c.ANGULAR_VELOCITY, *c.POSITION, *c.VELOCITY, *speeds, c.HEIGHT)
     masks = {(run.name, n): spikes(run.column(n)) for run in recordings.runs for n in names if run.has(n)}
     counts = {n: sum(int(mask.sum()) for (_, column), mask in masks.items() if column == n) for n in names}
-    masks = {(run, n): mask for (run, n), mask in masks.items() if mask.any() and counts[n] >= LEAST_SPIKES}
+    masks = {(run, n): mask for (run, n), mask in masks.items() if mask.any() and counts[n] >= _LEAST_SPIKES}
     if not masks:
         return recordings
     runs = []
@@ -54,27 +54,27 @@ def spikes(values: np.ndarray) -> np.ndarray:
     """Mask of the spikes among the readings of one sensor (n,); NaN where there is no reading."""
     found = np.zeros(len(values), bool)
     known = np.flatnonzero(np.isfinite(values))
-    if len(known) < LEAST_READINGS:
+    if len(known) < _LEAST_READINGS:
         return found
     x = values[known]
-    windows = np.lib.stride_tricks.sliding_window_view(x, NEIGHBOURS)
+    windows = np.lib.stride_tricks.sliding_window_view(x, _NEIGHBOURS)
     medians = np.median(windows, axis=1)
-    inner = slice(NEIGHBOURS, len(x) - NEIGHBOURS)
-    rise, fall = x[inner] - medians[: len(x) - 2 * NEIGHBOURS], x[inner] - medians[NEIGHBOURS + 1 :]
+    inner = slice(_NEIGHBOURS, len(x) - _NEIGHBOURS)
+    rise, fall = x[inner] - medians[: len(x) - 2 * _NEIGHBOURS], x[inner] - medians[_NEIGHBOURS + 1 :]
     size = np.where(np.sign(rise) == np.sign(fall), np.minimum(np.abs(rise), np.abs(fall)), 0.0)
     scatter = _around(np.abs(rise + fall) / 2) * 1.4826
-    scatter = np.maximum(scatter, FINEST * float(np.subtract(*np.quantile(x, [0.95, 0.05]))))
+    scatter = np.maximum(scatter, _FINEST * float(np.subtract(*np.quantile(x, [0.95, 0.05]))))
     size -= 2 * _around(np.maximum(np.abs(rise), np.abs(fall)))  # what moves fast turns round fast
-    far = _alone(size > FAR * scatter, size, x[inner])
-    between = (size > NEAR * scatter) & (size <= FAR * scatter)
-    if scatter.min() > 0 and between.sum() < far.sum() <= MOST * len(x):
+    far = _alone(size > _FAR * scatter, size, x[inner])
+    between = (size > _NEAR * scatter) & (size <= _FAR * scatter)
+    if scatter.min() > 0 and between.sum() < far.sum() <= _MOST * len(x):
         found[known[inner][far]] = True
     return found
 
 
 def _around(sizes: np.ndarray) -> np.ndarray:
     """The median of sizes (n,) around each of them, or of all where that is more."""
-    local = pd.Series(sizes).rolling(AROUND, center=True, min_periods=AROUND // 2).median()
+    local = pd.Series(sizes).rolling(_AROUND, center=True, min_periods=_AROUND // 2).median()
     return np.fmax(local.to_numpy(), np.median(sizes))
 
 
@@ -94,7 +94,7 @@ def _sentence(runs: tuple[Run, ...], name: str, masks: dict[tuple[str, str], np.
     read = sum(int(np.isfinite(run.column(name)).sum()) for run in there)
     values = np.concatenate([run.column(name)[masks[run.name, name]] for run in there if (run.name, name) in masks])
     often = pd.Series([f"{v:.3g}" for v in values]).value_counts()
-    often = [value for value, count in often.items() if count >= max(REPEATED * len(values), 3)]
+    often = [value for value, count in often.items() if count >= max(_REPEATED * len(values), 3)]
     repeated = f", most of them at {', '.join(sorted(often, key=float))}" if often else ""
     return (
         f"{name}: {len(values)} readings ({100 * len(values) / read:.2g} %) are spikes, single readings far from "

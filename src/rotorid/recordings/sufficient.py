@@ -26,16 +26,16 @@ from rotorid.recordings.spikes import without_spikes
 from rotorid.recordings.tables import clock_jump, place
 from rotorid.recordings.vehicle import Vehicle
 
-LEAST_FLIGHT_HZ = 2.0
+_LEAST_FLIGHT_HZ = 2.0
 """Slower flights show no motion of their own: between two samples a quadrotor has turned and come back."""
-LEAST_STRETCH_SAMPLES = 30
+_LEAST_STRETCH_SAMPLES = 30
 """A stretch of flight without a hole must last LEAST_STRETCH_S, and so many samples of its slowest sensor. Of a single
 run (LEAST_SINGLE_S) a third is held out, after a gap of two seconds; both parts need two seconds."""
-SINGLE_GAP_S, HELD_OUT_SHARE = 2.0, 1 / 3
+_SINGLE_GAP_S, HELD_OUT_SHARE = 2.0, 1 / 3
 """Of a single run this share is held out, after a gap."""
-LEAST_READINGS = 10
+_LEAST_READINGS = 10
 """Readings of a stand or a bench that are there in every compared channel at once, in a run."""
-LARGEST = {
+_LARGEST = {
     c.POSITION: 1e7,
     c.VELOCITY: 1e4,
     c.ANGULAR_VELOCITY: 1e5,
@@ -48,14 +48,14 @@ LARGEST = {
     (c.BATTERY_VOLTAGE, c.BATTERY_CURRENT, c.TEMPERATURE): 1e6,
 }
 """Largest size of a number in the column's unit, loose enough for values in a wrong unit (which is a finding)."""
-LARGEST_OF_ROTOR = 1e7
-LARGEST_UNKNOWN = 1e30
-QUATERNION_NORM = (0.5, 2.0)
+_LARGEST_OF_ROTOR = 1e7
+_LARGEST_UNKNOWN = 1e30
+_QUATERNION_NORM = (0.5, 2.0)
 SENSORS = (c.POSITION, c.VELOCITY, c.QUATERNION, c.ANGULAR_VELOCITY, c.SPECIFIC_FORCE)
-SURELY_MEANT = 0.85
+_SURELY_MEANT = 0.85
 """Likeness from which an unknown column is taken for the missing one of a sensor whose other columns are there."""
-LIFTING = 0.25
-LEAST_LIFT_N = 1.0
+_LIFTING = 0.25
+_LEAST_LIFT_N = 1.0
 """Share of the weight, and force, by which a stand's reading beyond the weight shows that its rotors turned."""
 
 
@@ -67,12 +67,12 @@ def sufficient(recordings: RecordingSet) -> RecordingSet:
     InputError
         One sentence with file and column, where a column is misspelled or what is left does not suffice.
     """
-    recordings = on_own_rates(without_spikes(without_dead_sensors(without_rotors_on_a_bench(recordings))))
+    recordings = on_own_rates(without_spikes(_without_dead_sensors(_without_rotors_on_a_bench(recordings))))
     for run in recordings.runs:
-        check_spelling(run, recordings.vehicle)
+        _check_spelling(run, recordings.vehicle)
     usable, reasons = [], []
     for run in recordings.runs:
-        reason = next((why for look in LOOKS if (why := look(run, recordings.vehicle))), None)
+        reason = next((why for look in _LOOKS if (why := look(run, recordings.vehicle))), None)
         if reason is None:
             usable.append(run)
         else:
@@ -81,15 +81,15 @@ def sufficient(recordings: RecordingSet) -> RecordingSet:
         raise InputError(reasons[0] + (f" (and {len(reasons) - 1} more runs likewise)" if len(reasons) > 1 else ""))
     left_out = (*recordings.left_out, *(f"Left out: {reason}." for reason in reasons))
     kept = replace(recordings, runs=tuple(usable), left_out=left_out)
-    kept = with_alike_runs(kept)
-    check_not_constant(kept)
+    kept = _with_alike_runs(kept)
+    _check_not_constant(kept)
     if len(kept.runs) == 1:
-        check_single(kept)
-    check_common(kept)
-    return with_split_of_the_rest(kept)
+        _check_single(kept)
+    _check_common(kept)
+    return _with_split_of_the_rest(kept)
 
 
-def without_rotors_on_a_bench(recordings: RecordingSet) -> RecordingSet:
+def _without_rotors_on_a_bench(recordings: RecordingSet) -> RecordingSet:
     """A bench compares readings with known loads: rotors that are listed but not recorded play no part."""
     vehicle = recordings.vehicle
     if vehicle.kind != "bench" or not vehicle.rotors or any(driven_by(r, vehicle) for r in recordings.runs):
@@ -98,7 +98,7 @@ def without_rotors_on_a_bench(recordings: RecordingSet) -> RecordingSet:
     return replace(recordings, vehicle=vehicle.model_copy(update=without))
 
 
-def without_dead_sensors(recordings: RecordingSet) -> RecordingSet:
+def _without_dead_sensors(recordings: RecordingSet) -> RecordingSet:
     """The flights without sensors that hold one value throughout every run: nothing was read from them."""
     if recordings.vehicle.kind != "flight":
         return recordings
@@ -126,7 +126,7 @@ def _holds_one_value(runs: Iterable[Run], names: tuple[str, ...], value: float |
     return any(len(v) > 1 for v in there) and all((v == (v[:1] if value is None else value)).all() for v in there)
 
 
-def with_alike_runs(recordings: RecordingSet) -> RecordingSet:
+def _with_alike_runs(recordings: RecordingSet) -> RecordingSet:
     """The flights with the same channels in every run: what is compared is compared in all of them.
 
     A few runs that lack a channel are left out; where half of them or more do, the sensor is left out of the others.
@@ -142,7 +142,7 @@ def with_alike_runs(recordings: RecordingSet) -> RecordingSet:
     if 2 * len(poor) < len(recordings.runs):
         for run in poor:
             lost = listed(sorted(every - channels[run.name]))
-            said.append(f"Left out: {whereof(run)}: lacks sensors that the other runs have (for {lost}).")
+            said.append(f"Left out: {_whereof(run)}: lacks sensors that the other runs have (for {lost}).")
         kept = tuple(run for run in recordings.runs if run not in poor)
         return replace(recordings, runs=kept, left_out=tuple(said))
     partly = [names for names in SENSORS if not all(reads(run, names) for run in recordings.runs)]
@@ -175,7 +175,7 @@ def channels_of(run: Run) -> set[str]:
     return {name for name, there in found.items() if there}
 
 
-def whereof(run: Run) -> str:
+def _whereof(run: Run) -> str:
     """The run's file, or its name where it was never one."""
     return run.path or f"run {run.name}"
 
@@ -190,7 +190,7 @@ def driven_by(run: Run, vehicle: Vehicle) -> tuple[str, ...]:
     return next((names for names in rotor_groups(vehicle).values() if names and run.has(*names)), ())
 
 
-def groups_of(vehicle: Vehicle) -> tuple[tuple[str, ...], ...]:
+def _groups_of(vehicle: Vehicle) -> tuple[tuple[str, ...], ...]:
     """Sensors whose columns only make sense together."""
     if vehicle.kind == "flight":
         return (*rotor_groups(vehicle).values(), *SENSORS)
@@ -199,41 +199,41 @@ def groups_of(vehicle: Vehicle) -> tuple[tuple[str, ...], ...]:
     return ()
 
 
-def known_names(vehicle: Vehicle) -> list[str]:
+def _known_names(vehicle: Vehicle) -> list[str]:
     """Every column that the contract knows for this vehicle."""
     return sorted(c.FIXED) + [name for names in rotor_groups(vehicle).values() for name in names]
 
 
-def check_spelling(run: Run, vehicle: Vehicle) -> None:
+def _check_spelling(run: Run, vehicle: Vehicle) -> None:
     """InputError where an unknown column can only be a known one that is missing."""
     there = set(run.table.columns)
-    missing = [name for name in known_names(vehicle) if name not in there]
+    missing = [name for name in _known_names(vehicle) if name not in there]
     halved = {
-        name for names in groups_of(vehicle) if any(n in there for n in names) for name in names if name not in there
+        name for names in _groups_of(vehicle) if any(n in there for n in names) for name in names if name not in there
     }
     for column in run.unknown_columns:
         meant = next((name for name in missing if plain(name) == plain(column)), None)
-        meant = meant or nearest(column, halved, SURELY_MEANT)
+        meant = meant or nearest(column, halved, _SURELY_MEANT)
         if meant:
             raise InputError(
-                f"{whereof(run)}: column {column} is not known and {meant} is missing; did you mean {meant}?"
+                f"{_whereof(run)}: column {column} is not known and {meant} is missing; did you mean {meant}?"
             )
 
 
-def absurd(run: Run, vehicle: Vehicle) -> str | None:
+def _absurd(run: Run, vehicle: Vehicle) -> str | None:
     """The first cell that no sensor can have written: infinite, or far beyond what its unit allows."""
-    limits = {name: most for names, most in LARGEST.items() for name in names}
+    limits = {name: most for names, most in _LARGEST.items() for name in names}
     for column in run.table.columns:
         values = run.column(column)
-        most = limits.get(column, LARGEST_OF_ROTOR if c.rotor_number(column) else LARGEST_UNKNOWN)
+        most = limits.get(column, _LARGEST_OF_ROTOR if c.rotor_number(column) else _LARGEST_UNKNOWN)
         if column in c.QUATERNION or column == c.TIME:
-            most = LARGEST_UNKNOWN
+            most = _LARGEST_UNKNOWN
         with np.errstate(invalid="ignore"):
             bad = np.flatnonzero(np.abs(values) > most)
         if len(bad):
             unit = c.unit_of(column)
             return (
-                f"{whereof(run)}, {place(run.path, bad[0])}, column {column}: found {values[bad[0]]:g}, expected a "
+                f"{_whereof(run)}, {place(run.path, bad[0])}, column {column}: found {values[bad[0]]:g}, expected a "
                 f"number of at most {most:g}{' ' + unit if unit else ''} (an empty cell where nothing was measured)"
             )
     return None
@@ -244,33 +244,34 @@ def no_attitude(run: Run, vehicle: Vehicle) -> str | None:
     if vehicle.kind != "flight" or not run.has(*c.QUATERNION):
         return None
     norm = np.linalg.norm(run.array(c.QUATERNION), axis=1)
-    low, high = QUATERNION_NORM
+    low, high = _QUATERNION_NORM
     bad = np.flatnonzero((norm < low) | (norm > high))
     if not len(bad):
         return None
     many = f" ({len(bad)} of {len(norm)} samples are like it)" if len(bad) > 1 else ""
     return (
-        f"{whereof(run)}, {place(run.path, bad[0])}, columns quaternion_w to quaternion_z: found the norm "
+        f"{_whereof(run)}, {place(run.path, bad[0])}, columns quaternion_w to quaternion_z: found the norm "
         f"{norm[bad[0]]:.3g}, expected 1{many}; leave the cells empty where the attitude is not known"
     )
 
 
-def uneven_clock(run: Run, vehicle: Vehicle) -> str | None:
+def _uneven_clock(run: Run, vehicle: Vehicle) -> str | None:
     """A clock that jumps so far, or counts in such a unit, that no even grid can hold the run."""
-    if jumped := clock_jump(run.time_s, whereof(run)):
+    if jumped := clock_jump(run.time_s, _whereof(run)):
         return jumped
     median = float(np.median(np.diff(run.time_s)))
-    if vehicle.kind == "flight" and median * LEAST_FLIGHT_HZ > 1:
+    if vehicle.kind == "flight" and median * _LEAST_FLIGHT_HZ > 1:
         unit = next((u for factor, u in ((1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds"))
                      if 1e-4 < median / factor < 0.2), None)  # fmt: skip
         return (
-            f"{whereof(run)}: {c.TIME} has a usual step of {median:.6g} s, expected at most {1 / LEAST_FLIGHT_HZ:g} s "
-            f"({LEAST_FLIGHT_HZ:g} samples a second)" + (f"; is it in {unit}?" if unit else "")
+            f"{_whereof(run)}: {c.TIME} has a usual step of {median:.6g} s, "
+            f"expected at most {1 / _LEAST_FLIGHT_HZ:g} s "
+            f"({_LEAST_FLIGHT_HZ:g} samples a second)" + (f"; is it in {unit}?" if unit else "")
         )
     return None
 
 
-def no_rotors(run: Run, vehicle: Vehicle) -> str | None:
+def _no_rotors(run: Run, vehicle: Vehicle) -> str | None:
     """Rotor columns that are missing where a thrust has to be predicted."""
     if vehicle.kind == "bench" or driven_by(run, vehicle):
         return None
@@ -283,20 +284,20 @@ def no_rotors(run: Run, vehicle: Vehicle) -> str | None:
         state = "empty" if len(empty) == len(lost) else "missing"
         found = len(names) - len(lost)
         return (
-            f"{whereof(run)}: {'columns' if len(lost) > 1 else 'column'} {listed(lost)} "
+            f"{_whereof(run)}: {'columns' if len(lost) > 1 else 'column'} {listed(lost)} "
             f"{'are' if len(lost) > 1 else 'is'} {state}: vehicle.yaml lists {len(names)} rotors, the run has "
-            f"the {kind.replace('_', ' ')} of {found}, and no other kind of rotor column is whole{likely(run, lost)}"
+            f"the {kind.replace('_', ' ')} of {found}, and no other kind of rotor column is whole{_likely(run, lost)}"
         )
     speeds, commands, throttles = rotor_groups(vehicle).values()
     empty = [n for n in (*speeds, *commands, *throttles) if n in there]
     found = f" ({listed(empty)} {'are' if len(empty) > 1 else 'is'} empty)" if empty else ""
     return (
-        f"{whereof(run)}: no thrust can be predicted without {speeds[0]} to {speeds[-1]}, {commands[0]} … or "
-        f"{throttles[0]} …: none of these columns has a value{found}{likely(run, (*speeds, *commands, *throttles))}"
+        f"{_whereof(run)}: no thrust can be predicted without {speeds[0]} to {speeds[-1]}, {commands[0]} … or "
+        f"{throttles[0]} …: none of these columns has a value{found}{_likely(run, (*speeds, *commands, *throttles))}"
     )
 
 
-def likely(run: Run, missing: Iterable[str]) -> str:
+def _likely(run: Run, missing: Iterable[str]) -> str:
     """Which unknown column of the run may be one of those that are missing, to end a sentence with."""
     for column in run.unknown_columns:
         meant = nearest(column, missing)
@@ -305,7 +306,7 @@ def likely(run: Run, missing: Iterable[str]) -> str:
     return ""
 
 
-def still_rotors(run: Run, vehicle: Vehicle) -> str | None:
+def _still_rotors(run: Run, vehicle: Vehicle) -> str | None:
     """Rotor speeds that are zero throughout although something lifts: they were not measured."""
     if vehicle.kind == "bench":
         return None
@@ -323,11 +324,11 @@ def still_rotors(run: Run, vehicle: Vehicle) -> str | None:
         largest = float(np.quantile(force, 0.9))
         ordered = [n for k, g in rotor_groups(vehicle).items() if k != "rotor_speed" and run.has(*g) for n in g]
         commanded = bool(ordered) and np.nanmax(np.abs(run.array(tuple(ordered)))) > 0
-        if largest <= supported + max(LIFTING * weight, LEAST_LIFT_N) and not commanded:
+        if largest <= supported + max(_LIFTING * weight, _LEAST_LIFT_N) and not commanded:
             return None
         because = f" although the sensor reads {largest:.3g} N" + (" and commands are given" if commanded else "")
     return (
-        f"{whereof(run)}: columns {names[0]} to {names[-1]} are 0 throughout{because}, expected the speeds that the "
+        f"{_whereof(run)}: columns {names[0]} to {names[-1]} are 0 throughout{because}, expected the speeds that the "
         "rotors turned at (leave the columns out where nothing was measured)"
     )
 
@@ -337,23 +338,23 @@ def moving_sensors(run: Run) -> list[tuple[str, ...]]:
     return [names for names in SENSORS if reads(run, names)]
 
 
-def nothing_compared(run: Run, vehicle: Vehicle) -> str | None:
+def _nothing_compared(run: Run, vehicle: Vehicle) -> str | None:
     """Sensors that are missing where a force, a moment or a reading has to be compared."""
     if vehicle.kind == "flight":
         if channels_of(run):
             return None
         wanted = (*c.SPECIFIC_FORCE, *c.ANGULAR_VELOCITY, *c.QUATERNION)
         return (
-            f"{whereof(run)}: nothing can be compared without {c.SPECIFIC_FORCE[0]} …, {c.ANGULAR_VELOCITY[0]} … or "
-            f"quaternion_w …: no such sensor has values in all its columns{likely(run, wanted)}"
+            f"{_whereof(run)}: nothing can be compared without {c.SPECIFIC_FORCE[0]} …, {c.ANGULAR_VELOCITY[0]} … or "
+            f"quaternion_w …: no such sensor has values in all its columns{_likely(run, wanted)}"
         )
     if vehicle.kind == "stand":
         names = c.FORCE + c.MOMENT
         if any(run.has(n) for n in names):
             return None
         return (
-            f"{whereof(run)}: nothing can be compared without {names[0]} … or {c.MOMENT[0]} …: none of these columns "
-            f"has a value{likely(run, names)}"
+            f"{_whereof(run)}: nothing can be compared without {names[0]} … or {c.MOMENT[0]} …: none of these columns "
+            f"has a value{_likely(run, names)}"
         )
     pairs = tuple(zip(c.FORCE, c.REFERENCE_FORCE, strict=True))
     if any(run.has(a, b) for a, b in pairs):
@@ -361,8 +362,8 @@ def nothing_compared(run: Run, vehicle: Vehicle) -> str | None:
     half = next(((b if run.has(a) else a, a if run.has(a) else b) for a, b in pairs if run.has(a) or run.has(b)), None)
     what = f"column {half[0]} is missing where {half[1]} is there" if half else "there is no such pair of columns"
     return (
-        f"{whereof(run)}: nothing can be compared without a force_x_n … and its reference_force_x_n …: {what}"
-        f"{likely(run, (*c.FORCE, *c.REFERENCE_FORCE))}"
+        f"{_whereof(run)}: nothing can be compared without a force_x_n … and its reference_force_x_n …: {what}"
+        f"{_likely(run, (*c.FORCE, *c.REFERENCE_FORCE))}"
     )
 
 
@@ -386,45 +387,45 @@ def too_short(run: Run, vehicle: Vehicle) -> str | None:
     """A run without a stretch that is long enough to be compared."""
     if vehicle.kind == "flight":
         longest, period = longest_stretch_s(run, [driven_by(run, vehicle), *moving_sensors(run)])
-        needed = max(LEAST_STRETCH_S, LEAST_STRETCH_SAMPLES * period) if np.isfinite(period) else LEAST_STRETCH_S
+        needed = max(LEAST_STRETCH_S, _LEAST_STRETCH_SAMPLES * period) if np.isfinite(period) else LEAST_STRETCH_S
         if longest >= needed:
             return None
         return (
-            f"{whereof(run)}: too little data: the longest stretch in which every sensor has readings lasts "
+            f"{_whereof(run)}: too little data: the longest stretch in which every sensor has readings lasts "
             f"{longest:.3g} s, expected at least {needed:.3g} s"
         )
     names = compared_readings(run, vehicle)
     count = int(np.isfinite(run.array(tuple(names))).all(axis=1).sum())
-    if count >= LEAST_READINGS:
+    if count >= _LEAST_READINGS:
         return None
     return (
-        f"{whereof(run)}: too little data: {count} samples have a value in {listed(names)} at once, expected at least "
-        f"{LEAST_READINGS}"
+        f"{_whereof(run)}: too little data: {count} samples have a value in {listed(names)} at once, expected at least "
+        f"{_LEAST_READINGS}"
     )
 
 
-def hardly_sampled(run: Run, vehicle: Vehicle) -> str | None:
+def _hardly_sampled(run: Run, vehicle: Vehicle) -> str | None:
     """A run of next to no samples."""
     count = len(run.table)
     if count >= LEAST_VALUES:
         return None
-    return f"{whereof(run)}: too little data: found {count} samples, expected some seconds of them"
+    return f"{_whereof(run)}: too little data: found {count} samples, expected some seconds of them"
 
 
-LOOKS: tuple[Callable[[Run, Vehicle], str | None], ...] = (
-    hardly_sampled,
-    absurd,
-    uneven_clock,
-    no_rotors,
-    nothing_compared,
+_LOOKS: tuple[Callable[[Run, Vehicle], str | None], ...] = (
+    _hardly_sampled,
+    _absurd,
+    _uneven_clock,
+    _no_rotors,
+    _nothing_compared,
     no_attitude,
-    still_rotors,
+    _still_rotors,
     too_short,
 )
 """What is looked at in each run, the cause before its consequences."""
 
 
-def check_not_constant(recordings: RecordingSet) -> None:
+def _check_not_constant(recordings: RecordingSet) -> None:
     """InputError where a stand or bench reads one value, and its load is one value, throughout every run."""
     vehicle, runs = recordings.vehicle, recordings.runs
     if vehicle.kind == "flight":
@@ -440,35 +441,35 @@ def check_not_constant(recordings: RecordingSet) -> None:
     )
 
 
-def check_single_of_instrument(run: Run, names: list[str]) -> None:
+def _check_single_of_instrument(run: Run, names: list[str]) -> None:
     """InputError where the last third of a single run, less half the gap before it, is next to nothing."""
     known = run.time_s[np.isfinite(run.array(tuple(names))).all(axis=1)]
-    needed = (SINGLE_GAP_S / 2 + LEAST_VALUES * float(np.median(np.diff(known)))) / HELD_OUT_SHARE
+    needed = (_SINGLE_GAP_S / 2 + LEAST_VALUES * float(np.median(np.diff(known)))) / HELD_OUT_SHARE
     lasts = float(known[-1] - known[0])
     if lasts < needed:
         raise InputError(
-            f"{whereof(run)}: too little data: a single run must last at least {needed:.3g} s, because its last third "
+            f"{_whereof(run)}: too little data: a single run must last at least {needed:.3g} s, because its last third "
             f"is held out, after a gap; found {lasts:.3g} s"
         )
 
 
-def check_single(recordings: RecordingSet) -> None:
+def _check_single(recordings: RecordingSet) -> None:
     """InputError where a single run is too short to hold out a part of it."""
     run, vehicle = recordings.runs[0], recordings.vehicle
     if vehicle.kind != "flight":
-        check_single_of_instrument(run, compared_readings(run, vehicle))
+        _check_single_of_instrument(run, compared_readings(run, vehicle))
         return
     longest, _ = longest_stretch_s(run, [driven_by(run, vehicle), *moving_sensors(run)])
     if longest < LEAST_SINGLE_S:
-        why = first_reason(recordings)
+        why = _first_reason(recordings)
         others = f", and the other runs cannot be used ({why})" if why else ""
         raise InputError(
-            f"{whereof(run)}: too little data: a single run must last at least {LEAST_SINGLE_S:g} s without a hole, "
+            f"{_whereof(run)}: too little data: a single run must last at least {LEAST_SINGLE_S:g} s without a hole, "
             f"because its last third is held out; found {longest:.3g} s{others}"
         )
 
 
-def check_common(recordings: RecordingSet) -> None:
+def _check_common(recordings: RecordingSet) -> None:
     """InputError where no channel is there in every run."""
     vehicle, runs = recordings.vehicle, recordings.runs
     if vehicle.kind == "flight":
@@ -483,19 +484,19 @@ def check_common(recordings: RecordingSet) -> None:
         raise InputError(f"{recordings.path or recordings.name}: no force or moment is compared in every run")
 
 
-def first_reason(recordings: RecordingSet) -> str:
+def _first_reason(recordings: RecordingSet) -> str:
     """Why the first of the runs left out cannot be used; empty where all are used."""
     said = (x.removeprefix("Left out: ").removesuffix(".") for x in recordings.left_out if x.startswith("Left out: "))
     return next((why for why in said if ": " in why), "")  # a run's file; a sensor has none
 
 
-def with_split_of_the_rest(recordings: RecordingSet) -> RecordingSet:
+def _with_split_of_the_rest(recordings: RecordingSet) -> RecordingSet:
     """The set with `held_out` less the runs left out; InputError where one side of the split is then empty."""
-    if not recordings.held_out or not first_reason(recordings):
+    if not recordings.held_out or not _first_reason(recordings):
         return recordings
     names = {run.name for run in recordings.runs}
     held_out = tuple(name for name in recordings.held_out if name in names)
     if held_out and set(held_out) != names:
         return replace(recordings, held_out=held_out)
     side = "left to fit" if held_out else "held out"
-    raise InputError(f"{first_reason(recordings)}; without it no run is {side}")
+    raise InputError(f"{_first_reason(recordings)}; without it no run is {side}")

@@ -23,9 +23,9 @@ from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.csv_text import check_heading, check_size, look_through, opened
 
-MISSING = frozenset(("", "nan", "na", "n/a", "null", "none", "<na>", "#n/a", "-nan"))
+_MISSING = frozenset(("", "nan", "na", "n/a", "null", "none", "<na>", "#n/a", "-nan"))
 """What stands for a missing sample, in small letters."""
-JUMP_STEPS = 10.0
+_JUMP_STEPS = 10.0
 """A step of the clock longer than so many usual ones is a jump; a slow clock has long steps throughout."""
 
 
@@ -158,7 +158,7 @@ def clock_jump(time_s: np.ndarray, where: str) -> str | None:
     if not len(steps):
         return None
     usual, row = float(np.median(steps)), int(np.argmax(steps))
-    long = steps[row] > max(LONGEST_JUMP_S, JUMP_STEPS * usual)
+    long = steps[row] > max(LONGEST_JUMP_S, _JUMP_STEPS * usual)
     if not long and steps.sum() <= usual * max(MOST_GRID, MOST_HOLES * len(steps)):
         return None
     return (
@@ -201,7 +201,7 @@ def _from_objects(column: pd.Series, path: object, name: str, heading_line: int)
     values = np.full(len(column), np.nan)
     decimals = not pd.api.types.is_datetime64_any_dtype(column.dtype)
     for row, cell in enumerate(_cells(column)):
-        if cell is None or cell is pd.NA or (isinstance(cell, str) and cell.strip().lower() in MISSING):
+        if cell is None or cell is pd.NA or (isinstance(cell, str) and cell.strip().lower() in _MISSING):
             continue
         try:
             if isinstance(cell, bool) and c.is_known(name) or not decimals:

@@ -97,11 +97,11 @@ class Derivative(_Strict):
         return self
 
 
-Length = Annotated[Number, Field(ge=-100, le=100)]
-Place = tuple[Length, Length, Length]
-SMALLEST_COEFFICIENT, LARGEST_COEFFICIENT = 1e-14, 1e2
-LARGEST_SPEED_RAD_S = 1e6
-LARGEST_TRUST = 100.0
+_Length = Annotated[Number, Field(ge=-100, le=100)]
+Place = tuple[_Length, _Length, _Length]
+_SMALLEST_COEFFICIENT, _LARGEST_COEFFICIENT = 1e-14, 1e2
+_LARGEST_SPEED_RAD_S = 1e6
+_LARGEST_TRUST = 100.0
 """Relative one-sigma with which a value says nothing any more."""
 _FLIGHT_NEEDS = ("mass_kg", "inertia_kg_m2", "rotors", "thrust_coefficient_n_s2", "torque_coefficient_n_m_s2")
 
@@ -138,9 +138,9 @@ class Vehicle(_Strict):
     @classmethod
     def _trust_is_positive(cls, trust: dict[str, float]) -> dict[str, float]:
         for key, sigma in trust.items():
-            if not 0 <= sigma <= LARGEST_TRUST:
+            if not 0 <= sigma <= _LARGEST_TRUST:
                 raise ValueError(
-                    f"trust of {key} is {sigma:g}, expected a relative one-sigma of 0 to {LARGEST_TRUST:g}"
+                    f"trust of {key} is {sigma:g}, expected a relative one-sigma of 0 to {_LARGEST_TRUST:g}"
                 )
         return trust
 
@@ -160,13 +160,13 @@ class Vehicle(_Strict):
             values = value if isinstance(value, tuple) else () if value is None else (value,)
             if any(v <= 0 for v in values):
                 raise ValueError(f"{key} must be positive")
-            if not all(SMALLEST_COEFFICIENT <= v <= LARGEST_COEFFICIENT for v in values):
-                raise ValueError(f"{key} must lie between {SMALLEST_COEFFICIENT:g} and {LARGEST_COEFFICIENT:g}")
+            if not all(_SMALLEST_COEFFICIENT <= v <= _LARGEST_COEFFICIENT for v in values):
+                raise ValueError(f"{key} must lie between {_SMALLEST_COEFFICIENT:g} and {_LARGEST_COEFFICIENT:g}")
         if self.rotor_speed_limits_rad_s is not None:
             low, high = self.rotor_speed_limits_rad_s
-            if not 0 <= low < high <= LARGEST_SPEED_RAD_S:
+            if not 0 <= low < high <= _LARGEST_SPEED_RAD_S:
                 raise ValueError(
-                    f"rotor_speed_limits_rad_s must be [low, high] with 0 <= low < high <= {LARGEST_SPEED_RAD_S:g}"
+                    f"rotor_speed_limits_rad_s must be [low, high] with 0 <= low < high <= {_LARGEST_SPEED_RAD_S:g}"
                 )
         if self.inertia_kg_m2 is not None and np.linalg.eigvalsh(self.inertia_kg_m2.matrix())[0] <= 0:
             raise ValueError("inertia_kg_m2 is not a positive definite matrix")

@@ -24,8 +24,8 @@ from typing import Any
 
 PACKAGES = {"rotorid": "src", "rotorid_proof": "proof"}
 """Each package of the project and the folder, from the top, that holds it."""
-RESOURCES = "importlib.resources"
-READ_BY_TESTS = (["OPEN"], ["ROOMS"])
+_RESOURCES = "importlib.resources"
+_READ_BY_TESTS = (["OPEN"], ["ROOMS"])
 
 
 class Code:
@@ -93,7 +93,7 @@ class Code:
 
     def _read_by(self, modules: list[Path]) -> list[Path]:
         """Files that are no code but shipped next to a module that reads such files (`importlib.resources`), sorted."""
-        folders = {m.parent for m in modules if RESOURCES in self._facts_of(m).names}
+        folders = {m.parent for m in modules if _RESOURCES in self._facts_of(m).names}
         beside = (p for folder in folders for p in folder.rglob("*") if p.is_file() and "__pycache__" not in p.parts)
         return sorted(p for p in beside if p.suffix not in (".py", ".pyc"))
 
@@ -174,7 +174,7 @@ def _imported_names(tree: ast.Module, package: str) -> Iterator[str]:
             continue
         if "pkgutil" in names and package:
             yield f"{package}.*"
-        yield from (name for name in names if name.split(".")[0] in PACKAGES or name == RESOURCES)
+        yield from (name for name in names if name.split(".")[0] in PACKAGES or name == _RESOURCES)
 
 
 def _from_names(node: ast.ImportFrom, package: str) -> list[str]:
@@ -215,4 +215,4 @@ def _parse(path: Path) -> ast.Module:
 
 def _of_rooms(node: ast.stmt) -> bool:
     """Whether a statement lists a package's modules that others may import, or its order, which only a test reads."""
-    return isinstance(node, ast.Assign) and [ast.unparse(target) for target in node.targets] in READ_BY_TESTS
+    return isinstance(node, ast.Assign) and [ast.unparse(target) for target in node.targets] in _READ_BY_TESTS

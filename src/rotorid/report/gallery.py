@@ -25,7 +25,7 @@ import pandas as pd
 from rotorid.errors import InputError
 
 WIDTH = 160
-MOST_LINES = 14
+_MOST_LINES = 14
 
 
 @dataclass(frozen=True)
@@ -134,8 +134,8 @@ def page(kind: Kind, outputs: Sequence[str], picture: str, following: str) -> st
     parts = [f"# {kind.title}", kind.source]
     for command, said in zip(kind.commands, outputs, strict=True):
         lines = [line[:WIDTH] + (" …" if len(line) > WIDTH else "") for line in said.splitlines()]
-        more = len(lines) - MOST_LINES
-        shown = lines[:MOST_LINES] + ([f"… ({more} more lines)"] if more > 0 else [])
+        more = len(lines) - _MOST_LINES
+        shown = lines[:_MOST_LINES] + ([f"… ({more} more lines)"] if more > 0 else [])
         parts.append("\n".join(["```", command, "```"]))
         parts.append("\n".join(["```text", *shown, "```"]))
     if picture:
@@ -144,7 +144,7 @@ def page(kind: Kind, outputs: Sequence[str], picture: str, following: str) -> st
     return "\n\n".join(parts) + "\n"
 
 
-def next_of(folder: Path) -> str:
+def _next_of(folder: Path) -> str:
     """What the verdict proposes to fly next; empty without a verdict or a proposal."""
     path = folder / "answer" / "verdict.json"
     if not path.is_file():
@@ -217,7 +217,7 @@ def make(kind: Kind, data: Path | None, target: Path) -> str:
                 shutil.copyfile(source, folder / source.name)
         outputs = [run(command, folder) for command in kind.commands]
         caption = draw(folder, target / f"{kind.name}.png")
-        text = page(kind, outputs, caption, next_of(folder))
+        text = page(kind, outputs, caption, _next_of(folder))
     (target / f"{kind.name}.md").write_text(text, encoding="utf-8")
     return ""
 

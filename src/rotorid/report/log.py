@@ -11,7 +11,7 @@ from pathlib import Path
 
 from rotorid.errors import InputError
 
-FORMAT = "%(levelname)s %(name)s: %(message)s"
+_FORMAT = "%(levelname)s %(name)s: %(message)s"
 
 
 @contextmanager
@@ -25,7 +25,7 @@ def to(path: str | Path) -> Iterator[None]:
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     handler = logging.FileHandler(path, mode="w", encoding="utf-8")
-    handler.setFormatter(logging.Formatter(FORMAT))
+    handler.setFormatter(logging.Formatter(_FORMAT))
     root = logging.getLogger()
     level = root.level
     root.addHandler(handler)

@@ -19,8 +19,7 @@ from rotorid.errors import InputError
 from rotorid.mismatch.decision.drift import WINDOW_S
 from rotorid.mismatch.decision.findings import Analysis
 from rotorid.mismatch.decision.shares import segments_of
-from rotorid.mismatch.delivery.flown import UNITS, driven_by
-from rotorid.mismatch.delivery.model import Model, model_of
+from rotorid.mismatch.delivery.flown import UNITS, Model, driven_by, model_of
 from rotorid.mismatch.tell.forward import delivered_model
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.attitude import normalised, quaternion_rate, rotation_from_quaternion
@@ -29,10 +28,10 @@ from rotorid.vehicle.exports.flown import multirotor_of, passive_forces, read_by
 from rotorid.vehicle.exports.forms import FLU, KNOWS, Exported, expressed, parts_of
 from rotorid.vehicle.windows import States, plan_windows
 
-MOST_WINDOWS = 40
+_MOST_WINDOWS = 40
 """Windows that are flown, spread evenly over the log: RotorPy takes a second for five."""
 STEP_S = 0.002
-SHOWN = ("velocity", "attitude", "position", "angular_velocity")
+_SHOWN = ("velocity", "attitude", "position", "angular_velocity")
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,7 @@ class NextToLog:
     def sentences(self) -> list[str]:
         """The numbers, a line a channel."""
         out = [f"flown in {self.how} on the log's rotor speeds, {len(self.windows)} windows of half a second:"]
-        for channel in SHOWN:
+        for channel in _SHOWN:
             if channel in self.errors["exported"]:
                 own, ours, before = (self.error(m, channel) for m in ("exported", "improved", "believed"))
                 out.append(
@@ -90,7 +89,7 @@ def next_to_log(analysis: Analysis, to: str, exported: Exported) -> NextToLog:
     how, package, fly = FLYERS[to]
     if package and find_spec(package) is None:
         raise InputError(f"{package} is not installed: the exported vehicle was not flown next to the log")
-    windows = windows_of(analysis, improved)
+    windows = _windows_of(analysis, improved)
     flown = tuple(fly(improved.vehicle, exported, windows))
     errors = {"exported": _errors(flown, windows)}
     for name, model in (("improved", improved), ("believed", Model(analysis.believed))):
@@ -98,8 +97,8 @@ def next_to_log(analysis: Analysis, to: str, exported: Exported) -> NextToLog:
     return NextToLog(how, windows, flown, errors)
 
 
-def windows_of(analysis: Analysis, model: Model) -> tuple[Window, ...]:
-    """At most `MOST_WINDOWS` windows of the flights; InputError where there is none."""
+def _windows_of(analysis: Analysis, model: Model) -> tuple[Window, ...]:
+    """At most `_MOST_WINDOWS` windows of the flights; InputError where there is none."""
     found = []
     usable = [
         s for s in segments_of(analysis) if s.motion.rotor_speed is not None and s.motion.angular_velocity is not None
@@ -119,7 +118,7 @@ def windows_of(analysis: Analysis, model: Model) -> tuple[Window, ...]:
         raise InputError(
             f"{analysis.recordings.name}: no half second in which rotors, attitude and body rates are recorded"
         )
-    chosen = np.unique(np.linspace(0, len(found) - 1, min(MOST_WINDOWS, len(found))).astype(int))
+    chosen = np.unique(np.linspace(0, len(found) - 1, min(_MOST_WINDOWS, len(found))).astype(int))
     first = found[0]
     return tuple(found[k] for k in chosen if len(found[k].time_s) == len(first.time_s))
 
@@ -155,12 +154,12 @@ def _errors(flown: Sequence[States], windows: Sequence[Window]) -> dict[str, np.
     return {name: np.array(rows) for name, rows in out.items()}
 
 
-Wrench = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+_Wrench = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 """Force and moment (n, 3) of signals (n, k), velocities through the air and rates (n, 3), body axes."""
 
 
 def by_equations(
-    windows: Sequence[Window], signals: np.ndarray, wrench: Wrench, mass_kg: float, inertia: np.ndarray,
+    windows: Sequence[Window], signals: np.ndarray, wrench: _Wrench, mass_kg: float, inertia: np.ndarray,
     gravity_m_s2: float, gyroscopic: bool, fastest_rad_s: float = np.inf,
 ) -> list[States]:  # fmt: skip
     """Windows (all at once) of a rigid body under a tool's wrench; signals (w, m, k) go straight between samples.

@@ -2,7 +2,8 @@
 
 A chapter's files are known in its text by the names that its rule gives them. A `.json` file is the object in
 it, a `.csv` file the list of its rows, a figure is placed with `figure("name", "caption", kind="...")` and a table with
-`table("name", "caption", columns, kind="...")`; the kind says what it is made of, one of `MADE_OF`. A name that no file
+`table("name", "caption", columns, kind="...")`; the kind says what it is made of, one of `_MADE_OF`. A name that no
+file
 gives is an error, so no number goes missing quietly.
 """
 
@@ -20,8 +21,8 @@ import jinja2
 
 from rotorid.errors import InputError
 
-FIGURES = {".svg", ".png"}
-MADE_OF = {
+_FIGURES = {".svg", ".png"}
+_MADE_OF = {
     "campaign": "Recorded on the instruments.",
     "emulated": "Emulated instruments.",
     "simulated": "Simulated.",
@@ -37,7 +38,7 @@ MADE_OF = {
 """What a figure or table is made of, as its caption says first."""
 _SIGNS = re.compile(r"""[\\`*_{}\[\]<>#|$^~@&'"]|(?<=-)-|(?<=\.)\.""")
 """What markdown reads as its own, with what pandoc would set as dashes, dots, quotation marks and entities."""
-WIDEST = 40
+_WIDEST = 40
 """A column longer than this many characters gets no more room in a table."""
 
 
@@ -77,14 +78,14 @@ def render(path: str | Path, files: Mapping[str, str], emulated: bool = False) -
     known: dict[str, Any] = {name: _read(Path(file)) for name, file in files.items()}
 
     def captioned(caption: str, kind: str) -> str:
-        if kind not in MADE_OF:
-            raise ProseError(f"{path}: a figure or table is made of {', '.join(MADE_OF)}, not {kind!r}.")
-        made_of = MADE_OF[kind.replace("campaign", "emulated") if emulated else kind]
+        if kind not in _MADE_OF:
+            raise ProseError(f"{path}: a figure or table is made of {', '.join(_MADE_OF)}, not {kind!r}.")
+        made_of = _MADE_OF[kind.replace("campaign", "emulated") if emulated else kind]
         return f"*{made_of}* {caption}" if made_of else caption
 
     def figure(name: str, caption: str, kind: str, width: str = "100%", moving: str = "") -> str:
         for shown in filter(None, (name, moving)):
-            if shown not in files or Path(files[shown]).suffix not in FIGURES:
+            if shown not in files or Path(files[shown]).suffix not in _FIGURES:
                 raise ProseError(f"{path}: there is no figure called {shown}.")
         label = f"fig:{path.stem}-{name}".replace("_", "-")
         on_page = f' moving="{files[moving]}"' if moving else ""
@@ -193,23 +194,23 @@ def table_of(rows: Sequence[Mapping[str, Any]], caption: str, columns: Sequence[
     # Where a table is too wide for one line a cell, pandoc takes the columns' shares from these dashes.
     longest_words = [max(map(len, heading.split())) for heading in headings]
     widths = [
-        max(3, word, *(min(len(line[place]), WIDEST) for line in cells)) for place, word in enumerate(longest_words)
+        max(3, word, *(min(len(line[place]), _WIDEST) for line in cells)) for place, word in enumerate(longest_words)
     ]
-    attributes = f" widths={shares_of(headings, cells)}" if too_wide(headings, cells) else ""
+    attributes = f" widths={_shares_of(headings, cells)}" if _too_wide(headings, cells) else ""
     rules = [
-        ":" + "-" * width if form in WORDS else "-" * width + ":" for width, form in zip(widths, forms, strict=True)
+        ":" + "-" * width if form in _WORDS else "-" * width + ":" for width, form in zip(widths, forms, strict=True)
     ]
     lines = [_row(headings), _row(rules), *(_row(line) for line in cells)]
     return "\n".join(lines) + f"\n\n: {caption} {{#{label}{attributes}}}\n"
 
 
-WORDS = ("text", "name", "unit", "symbol")
+_WORDS = ("text", "name", "unit", "symbol")
 """Forms of columns that are set from the left."""
 LINE_PT = 453.0
 """Width of the page's text, pt."""
-LETTER_PT, BOLD_PT, GAP_PT = 4.5, 5.0, 12.0
+LETTER_PT, _BOLD_PT, _GAP_PT = 4.5, 5.0, 12.0
 """Width of a letter in a table, of one in its bold heading, and space between columns, pt; about."""
-MOST_LETTERS = 100
+_MOST_LETTERS = 100
 """Text longer than this many letters gets no larger share of a wide table."""
 
 
@@ -220,11 +221,11 @@ def _columns_pt(
     out = []
     for heading, *column in zip(headings, *cells, strict=True):
         heading, column = _seen(heading), [_seen(entry) for entry in column]
-        words = [BOLD_PT * len(word) for word in heading.split()]
+        words = [_BOLD_PT * len(word) for word in heading.split()]
         words += [LETTER_PT * len(word) for entry in column for word in re.split("[ -]", entry)]
-        entries = [BOLD_PT * max((len(word) for word in heading.split()), default=0)]
+        entries = [_BOLD_PT * max((len(word) for word in heading.split()), default=0)]
         entries += [LETTER_PT * min(len(entry), widest) for entry in column]
-        out.append((max(words, default=0.0) + GAP_PT, max(*entries, *words, 0.0) + GAP_PT))
+        out.append((max(words, default=0.0) + _GAP_PT, max(*entries, *words, 0.0) + _GAP_PT))
     return out
 
 
@@ -233,14 +234,14 @@ def _seen(markdown: str) -> str:
     return re.sub(r"[$^{}\\_]", "", markdown)
 
 
-def too_wide(headings: Sequence[str], cells: Sequence[Sequence[str]]) -> bool:
+def _too_wide(headings: Sequence[str], cells: Sequence[Sequence[str]]) -> bool:
     """Whether a row would not fit on a line, so that the columns need shares of it."""
     return sum(whole for _, whole in _columns_pt(headings, cells)) > LINE_PT
 
 
-def shares_of(headings: Sequence[str], cells: Sequence[Sequence[str]]) -> str:
+def _shares_of(headings: Sequence[str], cells: Sequence[Sequence[str]]) -> str:
     """Shares of the line for each column, `0.20,0.80`: never less than its longest word, the rest by what is longer."""
-    columns = _columns_pt(headings, cells, MOST_LETTERS)
+    columns = _columns_pt(headings, cells, _MOST_LETTERS)
     least = [word for word, _ in columns]
     more = [whole - word for word, whole in columns]
     room = max(LINE_PT - sum(least), 0.0)
@@ -254,11 +255,11 @@ def _row(cells: Sequence[str]) -> str:
 
 def _formatted(value: Any, form: str) -> str:
     name, decimals = form.rstrip("0123456789"), form[len(form.rstrip("0123456789")) :]
-    if name in WORDS:
+    if name in _WORDS:
         return {"text": text, "name": one_line, "unit": unit, "symbol": symbol}[name](value)
     if name not in ("fix", "sci", "sig", "percent") or not decimals:
         raise ValueError(
-            f"{form} is not a form of a number; forms are {', '.join(WORDS)}, fixN, sciN, sigN and percentN"
+            f"{form} is not a form of a number; forms are {', '.join(_WORDS)}, fixN, sciN, sigN and percentN"
         )
     return {"fix": fix, "sci": sci, "sig": sig, "percent": percent}[name](value, int(decimals))
 
@@ -302,14 +303,14 @@ def interval(ends: Sequence[float], decimals: int, form: str = "fix") -> str:
     return f"{shown(ends[0], decimals)} to {shown(ends[1], decimals)}"
 
 
-GREEK = {"tau": "tau", "eps": "varepsilon", "alpha": "alpha", "beta": "beta", "zeta": "zeta", "omega": "omega"}
+_GREEK = {"tau": "tau", "eps": "varepsilon", "alpha": "alpha", "beta": "beta", "zeta": "zeta", "omega": "omega"}
 
 
 def symbol(value: str) -> str:
     """A symbol with its index as mathematics: `J_xx` is `$J_{xx}$`, `tau` a Greek letter, `gain_x` upright."""
     letter, _, index = value.partition("_")
-    if letter in GREEK:
-        letter = "\\" + GREEK[letter]
+    if letter in _GREEK:
+        letter = "\\" + _GREEK[letter]
     elif len(letter) > 1:
         letter = f"\\mathrm{{{letter}}}"
     index = index.replace("_", ",")

@@ -65,7 +65,7 @@ def own_commit() -> str:
     return commit(folder)
 
 
-def commit_date(folder: str | Path) -> str:
+def _commit_date(folder: str | Path) -> str:
     """The day of the commit of the working tree (ISO); empty where there is none."""
     command = ["git", "-C", str(folder), "log", "-1", "--format=%cs"]
     try:
@@ -87,7 +87,7 @@ def stored_with(folder: str | Path, path: str) -> str:
 
 def in_words(folder: str | Path, judging: str) -> str:
     """Commit, its date and the hash of the code that judges recordings, in one sentence for a title page."""
-    made, day = commit(folder), commit_date(folder)
+    made, day = commit(folder), _commit_date(folder)
     known = f"Made from commit {made[:10]}" + (" of " + day if day else "")
     known += ", with changes that are not committed" if made.endswith("-dirty") else ""
     source = known if day else "Made outside of a git checkout, so that no commit is known"

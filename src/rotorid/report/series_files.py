@@ -20,9 +20,9 @@ from rotorid.errors import InputError
 from rotorid.mismatch.decision.findings import Analysis
 from rotorid.mismatch.decision.shares import segments_of, shares
 
-COLOURS = ("#d55e00", "#e69f00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#000000", "#f0e442")
-PLOTS_A_TAB = 3
-NO_MCAP = "MCAP files need mcap, which is not installed: pip install 'rotorid[mcap]'"
+_COLOURS = ("#d55e00", "#e69f00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#000000", "#f0e442")
+_PLOTS_A_TAB = 3
+_NO_MCAP = "MCAP files need mcap, which is not installed: pip install 'rotorid[mcap]'"
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def plain(name: str) -> str:
 def write_mcap(series: Sequence[Series], path: Path) -> None:
     """Write the series as MCAP with JSON messages, in the order of time; InputError without the package `mcap`."""
     if find_spec("mcap") is None:
-        raise InputError(f"{path}: {NO_MCAP}")
+        raise InputError(f"{path}: {_NO_MCAP}")
     from mcap.writer import Writer
 
     with open(path, "wb") as file:
@@ -76,7 +76,7 @@ def write_mcap(series: Sequence[Series], path: Path) -> None:
                     topic=one.topic,
                     message_encoding="json",
                     schema_id=writer.register_schema(
-                        name=f"rotorid.residual ({one.unit})", encoding="jsonschema", data=schema_of(one)
+                        name=f"rotorid.residual ({one.unit})", encoding="jsonschema", data=_schema_of(one)
                     ),
                 )
             for k, now in enumerate(one.time_s):
@@ -89,7 +89,7 @@ def write_mcap(series: Sequence[Series], path: Path) -> None:
         writer.finish()
 
 
-def schema_of(one: Series) -> bytes:
+def _schema_of(one: Series) -> bytes:
     """The JSON schema of a topic's messages."""
     properties = {name: {"type": "number", "description": f"{name}, {one.unit}"} for name in one.fields}
     return json.dumps({"type": "object", "title": one.topic, "properties": properties}).encode()
@@ -112,7 +112,7 @@ def foxglove_layout(series: Sequence[Series]) -> str:
         name = f"Plot!{number:07d}"
         paths = [
             {"value": f"{topic}.{field}", "enabled": True, "timestampMethod": "receiveTime", "label": field,
-             "color": COLOURS[k % len(COLOURS)]}
+             "color": _COLOURS[k % len(_COLOURS)]}
             for k, field in enumerate(fields)
         ]  # fmt: skip
         panels[name] = {
@@ -140,11 +140,11 @@ def plotjuggler_layout(series: Sequence[Series]) -> str:
     tabs = []
     for run in dict.fromkeys(topic.split("/")[1] for topic, _ in topics):
         own = [pair for pair in topics if pair[0].split("/")[1] == run]
-        for start in range(0, len(own), PLOTS_A_TAB):
-            part = own[start : start + PLOTS_A_TAB]
+        for start in range(0, len(own), _PLOTS_A_TAB):
+            part = own[start : start + _PLOTS_A_TAB]
             sizes = ";".join(f"{1 / len(part):.6f}" for _ in part)
             areas = "".join(_plot(topic, fields) for topic, fields in part)
-            name = quoteattr(f"{run} {start // PLOTS_A_TAB + 1}")
+            name = quoteattr(f"{run} {start // _PLOTS_A_TAB + 1}")
             tabs.append(
                 f"""  <Tab containers="1" tab_name={name}>
    <Container>
@@ -166,7 +166,7 @@ def plotjuggler_layout(series: Sequence[Series]) -> str:
 
 def _plot(topic: str, fields: Sequence[str]) -> str:
     curves = "".join(
-        f"       <curve name={quoteattr(f'{topic}/{field}')} color={quoteattr(COLOURS[k % len(COLOURS)])}/>\n"
+        f"       <curve name={quoteattr(f'{topic}/{field}')} color={quoteattr(_COLOURS[k % len(_COLOURS)])}/>\n"
         for k, field in enumerate(fields)
     )
     return f"""     <DockArea name={quoteattr(topic)}>

@@ -11,7 +11,7 @@ from pathlib import Path
 from rotorid.errors import InputError
 
 # Raw TeX and HTML stay out, since only one of the two outputs would show them.
-MARKDOWN = "markdown-raw_tex-raw_html+table_attributes"
+_MARKDOWN = "markdown-raw_tex-raw_html+table_attributes"
 
 
 class TypesetError(InputError):
@@ -60,9 +60,9 @@ class Gap:
 
 MOST_EMPTY_PT = 70.0
 """A tenth of a page's text: a larger gap is filled with the text that follows, where some does."""
-MOST_STEPS = 4
+_MOST_STEPS = 4
 """A figure stands no further from its place than this many paragraphs."""
-ROUNDS = 12
+_ROUNDS = 12
 
 
 def without_gaps(document: Document, out: str | Path) -> None:
@@ -75,7 +75,7 @@ def without_gaps(document: Document, out: str | Path) -> None:
     found: list[Gap] = []
     seen: dict[str, dict[int, float]] = {}
     settled: set[str] = set()
-    for _ in range(ROUNDS):
+    for _ in range(_ROUNDS):
         moved = {name: steps for name, steps in later.items() if steps}
         if moved != written:
             typst_source(document, out, moved)
@@ -90,7 +90,7 @@ def without_gaps(document: Document, out: str | Path) -> None:
                 settled |= {name} if steps else set()
                 continue
             tried.add(gap.chapter)
-            if gap.movable and steps < MOST_STEPS:
+            if gap.movable and steps < _MOST_STEPS:
                 later[name] = steps + 1
             else:
                 later[name] = min(seen[name], key=lambda k: (seen[name][k], k))
@@ -140,7 +140,7 @@ def _pandoc(document: Document, options: Sequence[str]) -> None:
     parts = Path(document.parts)
     command = [
         pypandoc.get_pandoc_path(),
-        f"--from={MARKDOWN}",
+        f"--from={_MARKDOWN}",
         *(str(chapter) for chapter in document.chapters),
         "--fail-if-warnings",
         "--columns=10000",  # or tables with long lines would get columns of equal width

@@ -4,8 +4,6 @@ OPEN = (
     "attitude",
     "batch",
     "control.pid",
-    "control.readings",
-    "control.references",
     "control.swings",
     "derivatives",
     "exports",

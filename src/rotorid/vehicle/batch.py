@@ -31,7 +31,7 @@ from rotorid.vehicle.kernels import MOST_ROTORS, body_of, kernel_values, kernels
 
 
 @dataclass(frozen=True)
-class Trajectories:
+class _Trajectories:
     """What n vehicles did at the m instants kept, SI; attitudes scalar first, body to world."""
 
     time_s: np.ndarray
@@ -176,7 +176,7 @@ class Batch:
         wind_m_s: np.ndarray | None = None,
         pushes: np.ndarray | None = None,
         threads: int | None = None,
-    ) -> Trajectories:
+    ) -> _Trajectories:
         """Fly from `start` (n, 13 + k): rates, quaternion, velocity and position (world), rotor speeds, SI.
 
         `commands` are rotor speeds, rad/s, each held over its step, (m, k) for all or (n, m, k), or a controller with
@@ -220,7 +220,7 @@ class Batch:
             every=every,
             threads=threads,
         )
-        return Trajectories(step_s * every * np.arange(flown.states.shape[1]), flown)
+        return _Trajectories(step_s * every * np.arange(flown.states.shape[1]), flown)
 
     def step(
         self,

@@ -29,9 +29,9 @@ class CommandPath:
     full_voltage: float = 1.0
     """Voltage at which commands are right, V."""
 
-    def start(self, step_s: float, rotor_speed: np.ndarray | None = None) -> Stepper:
+    def start(self, step_s: float, rotor_speed: np.ndarray | None = None) -> _Stepper:
         """A flight's own path from its first instant; a lag starts at `rotor_speed` (n, k), rad/s, if that is given."""
-        return Stepper(self, step_s, rotor_speed)
+        return _Stepper(self, step_s, rotor_speed)
 
     def steady(self, command: np.ndarray) -> np.ndarray:
         """Rotor speeds (..., k), rad/s, that commands (..., k) lead to when they are held, at the first voltage."""
@@ -50,7 +50,7 @@ class CommandPath:
 
 
 @dataclass
-class Stepper:
+class _Stepper:
     """Where a flight is on its path: call `speed` once for every step, in order."""
 
     path: CommandPath

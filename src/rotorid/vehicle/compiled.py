@@ -15,13 +15,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from rotorid.effects.compiling import compiled
+from rotorid.effects.contract import compiled
 from rotorid.vehicle.kernels import call_kernel
 
-MOST_ROUNDS = 30
-CONVERGED = 1e-10
+_MOST_ROUNDS = 30
+_CONVERGED = 1e-10
 """Change of the accelerations, relative to their largest, at which they are taken as solved for."""
-UNKNOWN, FOUND, EXACT = 0, 1, 2
+_UNKNOWN, _FOUND, _EXACT = 0, 1, 2
 """What is known of how accelerations answer to themselves: nothing yet, the matrix of the flight, and that its step was
 exact at this step's beginning, so that one is enough at the step's other stages."""
 
@@ -174,7 +174,7 @@ def _stepped(x):
         for k in range(6):
             change += x.matrix[i, k] * (x.own[k] - x.at[k])
         x.now[i] = x.at[i] + change
-    return turning <= CONVERGED * most_turning and linear <= CONVERGED * most_linear
+    return turning <= _CONVERGED * most_turning and linear <= _CONVERGED * most_linear
 
 
 @compiled(error_model="numpy")
@@ -202,11 +202,11 @@ def _accelerate(count, first, alone, instant, body, added, scratch, addresses, e
     for c in range(count):
         x = scratch[c]
         x.open = 1
-        if x.known == UNKNOWN:
+        if x.known == _UNKNOWN:
             v = body[(first + c) * alone]
             _relaxation(instant[c], v, added[c], x, addresses, explicit, offsets, values, (first + c) * stride)
-            x.known = FOUND
-    for rounds in range(MOST_ROUNDS):
+            x.known = _FOUND
+    for rounds in range(_MOST_ROUNDS):
         for c in range(count):
             x = scratch[c]
             if x.open:
@@ -224,10 +224,10 @@ def _accelerate(count, first, alone, instant, body, added, scratch, addresses, e
             if x.open:
                 _follow(instant[c], body[(first + c) * alone], added[c], x)
                 settled = _stepped(x)
-                if x.known == EXACT or settled:
+                if x.known == _EXACT or settled:
                     x.open = 0
                     if rounds < 2:
-                        x.known = EXACT
+                        x.known = _EXACT
                 else:
                     left += 1
         if left == 0:
@@ -302,7 +302,7 @@ def _begin(x, start, n, size):
         x.state[i] = start[n, i]
     for i in range(6):
         x.now[i] = 0.0
-    x.known = UNKNOWN
+    x.known = _UNKNOWN
     for i in range(3):
         for j in range(3):
             x.memory[i, j] = 0.0
@@ -312,7 +312,7 @@ def _begin(x, start, n, size):
 def _try(x, size, stage, step_s):
     """The state at which a stage of Runge and Kutta's step is evaluated."""
     if stage == 0:
-        x.known = min(x.known, FOUND)
+        x.known = min(x.known, _FOUND)
         for i in range(size):
             x.trial[i] = x.state[i]
         return

@@ -1,19 +1,26 @@
-"""Accelerations of a vehicle with rotors and effects: what every simulation of this package steps forward."""
+"""Accelerations of a vehicle with rotors and effects: what every simulation of this package steps forward.
+
+Newton-Euler equations of a rigid body, thesis eqs 4.1-4.4, by quaternion.
+
+World north-east-down, body forward-right-down. Everything works on batches (..., 3).
+
+The constants of a rigid vehicle with rotors, as arrays that the equations of motion use.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from rotorid.effects.contract import LACK, Form, Motion
 from rotorid.errors import InputError
 from rotorid.recordings.vehicle import Vehicle
+from rotorid.vehicle.attitude import cross
 from rotorid.vehicle.mixer import wrench_matrix
-from rotorid.vehicle.params import RigidBody
-from rotorid.vehicle.rigid_body import angular_acceleration
 
-ALWAYS_KNOWN = frozenset(
+_ALWAYS_KNOWN = frozenset(
     {
         "rotor_speed",
         "angular_velocity",
@@ -26,8 +33,8 @@ ALWAYS_KNOWN = frozenset(
 )
 
 
-MOST_ROUNDS = 30
-CONVERGED = 1e-10
+_MOST_ROUNDS = 30
+_CONVERGED = 1e-10
 """Change of the accelerations, relative to their largest, at which a fixed point is taken as reached."""
 
 
@@ -44,7 +51,7 @@ class Dynamics:
         self.effects = [(form, np.asarray(values, float)) for form, values in effects]
         self._matrix = wrench_matrix(vehicle).T
         implicit = {"specific_force", "angular_acceleration", "accelerometer"}
-        self.rounds = MOST_ROUNDS if any(implicit & set(form.requires) for form, _ in self.effects) else 1
+        self.rounds = _MOST_ROUNDS if any(implicit & set(form.requires) for form, _ in self.effects) else 1
         self.last_acceleration = np.zeros((size, 3))
         self.last_specific_force = np.zeros((size, 3))
 
@@ -101,7 +108,9 @@ class Dynamics:
 
 def _same(before: tuple[np.ndarray, ...], after: tuple[np.ndarray, ...]) -> bool:
     """Whether two evaluations are equal for all purposes."""
-    return all(np.abs(b - a).max() <= CONVERGED * max(1.0, np.abs(a).max()) for b, a in zip(before, after, strict=True))
+    return all(
+        np.abs(b - a).max() <= _CONVERGED * max(1.0, np.abs(a).max()) for b, a in zip(before, after, strict=True)
+    )
 
 
 def has_memory(form: Form) -> bool:
@@ -113,6 +122,42 @@ def check_effects(effects: Sequence[tuple[Form, Sequence[float]]], known: set[st
     """InputError where a form needs a field of `Motion` that is neither in `known` nor always known."""
     for form, _ in effects:
         for name in form.requires:
-            if name not in known and name not in ALWAYS_KNOWN:
+            if name not in known and name not in _ALWAYS_KNOWN:
                 reason = LACK.get(name, f"no {name}")
                 raise InputError(f"effect form {form.name!r} cannot be simulated: {reason}")
+
+
+def world_acceleration(body: RigidBody, rotation: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """dV/dt = R F / m + g e3 (eq. 4.2), (..., 3), m/s2, world; force without weight, N, body axes."""
+    out = np.einsum("...ij,...j->...i", rotation, force) / body.mass_kg
+    out[..., 2] += body.gravity_m_s2
+    return out
+
+
+def angular_acceleration(body: RigidBody, rates: np.ndarray, moment: np.ndarray) -> np.ndarray:
+    """dΩ/dt = J⁻¹ (τ - Ω × J Ω) (eq. 4.4), (..., 3), rad/s2; rates in rad/s, moment in N m, body axes."""
+    momentum = rates @ body.inertia_kg_m2.T
+    return (moment - cross(rates, momentum)) @ body.inverse_inertia.T
+
+
+@dataclass(frozen=True)
+class RigidBody:
+    """Mass and inertia: what turns force and moment into motion."""
+
+    mass_kg: float
+    inertia_kg_m2: np.ndarray
+    """Matrix J about the body origin, (3, 3), kg m2."""
+    inverse_inertia: np.ndarray
+    """J⁻¹, (3, 3), 1/(kg m2)."""
+    gravity_m_s2: float = 9.81
+
+    @classmethod
+    def of(cls, mass_kg: float, inertia_kg_m2: np.ndarray, gravity_m_s2: float = 9.81) -> RigidBody:
+        inertia = np.asarray(inertia_kg_m2, float)
+        if inertia.ndim == 1:
+            inertia = np.diag(inertia)
+        return cls(float(mass_kg), inertia, np.linalg.inv(inertia), float(gravity_m_s2))
+
+    @classmethod
+    def of_vehicle(cls, vehicle: Vehicle) -> RigidBody:
+        return cls.of(vehicle.mass_kg, vehicle.inertia_kg_m2.matrix(), vehicle.gravity_m_s2)

@@ -11,7 +11,7 @@ import numpy as np
 from rotorid.vehicle import compiled
 from rotorid.vehicle.kernels import ADDED, INSTANT, MOST_ROTORS, SCRATCH, Kernels
 
-LOOP = np.dtype(
+_LOOP = np.dtype(
     [
         ("proportional", "f8", 3),
         ("integral", "f8", 3),
@@ -26,9 +26,9 @@ LOOP = np.dtype(
 )
 """The attitude controller's constants, SI; `allocation` gives squared rotor speeds of thrust and moments."""
 
-LEAST_PER_THREAD = 16
+_LEAST_PER_THREAD = 16
 """Vehicles below which a further thread is not worth its start."""
-BLOCK = 8
+_BLOCK = 8
 """Vehicles that fly together; their records fill half of a processor's first cache."""
 
 
@@ -55,7 +55,7 @@ class AttitudeLoop:
     def constants(self) -> np.ndarray:
         """As records (1 or n,) of LOOP."""
         gains = [np.atleast_2d(np.asarray(g, float)) for g in (self.proportional, self.integral, self.derivative)]
-        loops = np.zeros(max(len(g) for g in gains), LOOP)
+        loops = np.zeros(max(len(g) for g in gains), _LOOP)
         loops["proportional"], loops["integral"], loops["derivative"] = gains
         loops["limit"] = np.inf if self.limit_n_m is None else self.limit_n_m
         loops["derivative_time"] = self.derivative_time_s
@@ -111,7 +111,7 @@ def fly(
     lags = np.divide(1.0, lags, out=np.zeros((n, 2)), where=lags > 0)
     limits = np.broadcast_to(np.array([-np.inf, np.inf] if limits_rad_s is None else limits_rad_s), (n, 2))
     closed = isinstance(commands, AttitudeLoop)
-    loops, references, more = np.zeros(1, LOOP), np.zeros((1, 1, 4)), np.zeros((0, k))
+    loops, references, more = np.zeros(1, _LOOP), np.zeros((1, 1, 4)), np.zeros((0, k))
     series = np.zeros((1, 1, k))
     if closed:
         loops, references = commands.constants(), np.ascontiguousarray(commands.reference)[None]
@@ -194,13 +194,13 @@ def fly_windows(
 
 def _room(vehicles: int) -> dict[str, np.ndarray]:
     """Records of a block."""
-    count = min(BLOCK, vehicles)
+    count = min(_BLOCK, vehicles)
     return dict(instant=np.zeros(count, INSTANT), added=np.zeros(count, ADDED), scratch=np.zeros(count, SCRATCH))
 
 
 def _spread(part, n: int, threads: int | None) -> None:
     """Call `part(first, last)` on shares of n vehicles, in as many threads as pay."""
-    count = min(_cores() if threads is None else threads, max(n // LEAST_PER_THREAD, 1))
+    count = min(_cores() if threads is None else threads, max(n // _LEAST_PER_THREAD, 1))
     if count == 1:
         part(0, n)
         return

@@ -12,7 +12,7 @@ from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.improved import all_forms
 from rotorid.vehicle.mixer import hover_speed_rad_s
 
-FULL_OVER_HOVER = 2.0
+_FULL_OVER_HOVER = 2.0
 """Rotor speed of the full command over that of hover where no limits are stated: a thrust of four times the weight."""
 
 
@@ -37,11 +37,11 @@ def flyable(vehicle: Vehicle) -> tuple[Vehicle, tuple[str, ...]]:
     if any("voltage" in form.requires for form, _ in between):
         said.append("The battery stays at its full voltage.")
     if vehicle.rotor_speed_limits_rad_s is None and any(form.stage in (CURVE, LIMIT) for form, _ in between):
-        full = FULL_OVER_HOVER * hover_speed_rad_s(vehicle)
+        full = _FULL_OVER_HOVER * hover_speed_rad_s(vehicle)
         changes["rotor_speed_limits_rad_s"] = (0.0, full)
         said.append(
             f"The file states no rotor_speed_limits_rad_s: the full command is taken as {full:.0f} rad/s, "
-            f"{FULL_OVER_HOVER:g} times the speed of hover."
+            f"{_FULL_OVER_HOVER:g} times the speed of hover."
         )
     if vehicle.ground_z_m is None and any("height" in f.requires for f, _ in forms if isinstance(f, Form)):
         changes["ground_z_m"] = 0.0

@@ -18,15 +18,15 @@ from rotorid.vehicle.dynamics import Dynamics, has_memory
 from rotorid.vehicle.improved import active_forms
 from rotorid.vehicle.mixer import allocation_matrix
 
-LARGEST_SHARE = 10.0
+_LARGEST_SHARE = 10.0
 """Thrust, over the weight, up to which is asked where the file states no limits of the rotor speed."""
-SLOPE_SHARE = 0.02
+_SLOPE_SHARE = 0.02
 """Change of the thrust asked for, as a share of it, over which the gain is measured."""
-HUNG_S, HUNG_SAMPLES = 2.0, 100
+_HUNG_S, _HUNG_SAMPLES = 2.0, 100
 """Time at rest over which the force of what has a memory (a slung payload) is averaged, and its instants."""
-ROUNDS = 5
+_ROUNDS = 5
 """Evaluations until an added mass has settled in the accelerations that it depends on."""
-CLOSE = 1e-9
+_CLOSE = 1e-9
 """Share of the weight (and of the weight on a rotor's arm) within which a force or moment counts as none."""
 
 
@@ -52,7 +52,7 @@ def hover(vehicle: Vehicle, path: CommandPath | None, height_m: float) -> Hover:
     weight = vehicle.mass_kg * vehicle.gravity_m_s2
     units = weight * np.array([1.0, *np.repeat(np.linalg.norm(vehicle.rotor_positions_m(), axis=1).mean(), 3)])
     limits = vehicle.rotor_speed_limits_rad_s
-    most = LARGEST_SHARE * weight
+    most = _LARGEST_SHARE * weight
     if limits is not None:
         most = float((vehicle.thrust_coefficients_n_s2() * limits[1] ** 2).sum())
 
@@ -64,16 +64,16 @@ def hover(vehicle: Vehicle, path: CommandPath | None, height_m: float) -> Hover:
         return float(missing(np.array([share, 0.0, 0.0, 0.0]))[0])
 
     share = 1.0
-    if abs(rising(share)) > CLOSE:
+    if abs(rising(share)) > _CLOSE:
         if (highest := rising(most / weight)) <= 0:
             return Hover(most, (0.0, 0.0, 0.0), 1.0, 1.0 + highest)
         if rising(0.0) < 0:
-            share = brentq(rising, 0.0, most / weight, xtol=CLOSE)
+            share = brentq(rising, 0.0, most / weight, xtol=_CLOSE)
     asked = np.array([share, 0.0, 0.0, 0.0])
-    if np.abs(missing(asked)).max() > CLOSE:
+    if np.abs(missing(asked)).max() > _CLOSE:
         asked = least_squares(missing, asked).x
-    less = asked - [SLOPE_SHARE * asked[0], 0.0, 0.0, 0.0]
-    gain = float((missing(asked) - missing(less))[0] / (SLOPE_SHARE * asked[0]))
+    less = asked - [_SLOPE_SHARE * asked[0], 0.0, 0.0, 0.0]
+    gain = float((missing(asked) - missing(less))[0] / (_SLOPE_SHARE * asked[0]))
     thrust, *moments = (float(v) for v in asked * units)
     return Hover(thrust, tuple(moments), gain if gain > 0 else 1.0)
 
@@ -95,11 +95,11 @@ def wrench_of_command(vehicle: Vehicle, path: CommandPath | None, command: np.nd
     every = active_forms(vehicle)
     instant = Dynamics(vehicle, [pair for pair in every if not has_memory(pair[0])], 1)
     at_rest = _at_rest(vehicle, np.zeros(1), height_m)
-    for _ in range(ROUNDS if instant.rounds > 1 else 1):
+    for _ in range(_ROUNDS if instant.rounds > 1 else 1):
         turning, specific_force = instant.accelerations(np.zeros((1, 3)), speed, at_rest)
     up = -vehicle.mass_kg * specific_force[0, 2]
     moments = turning[0] @ vehicle.inertia_kg_m2.matrix().T
-    time_s = np.linspace(0.0, HUNG_S, HUNG_SAMPLES)
+    time_s = np.linspace(0.0, _HUNG_S, _HUNG_SAMPLES)
     hanging = Motion(
         rotor_speed=np.repeat(speed, len(time_s), axis=0),
         angular_velocity=np.zeros((len(time_s), 3)),

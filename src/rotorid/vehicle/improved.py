@@ -24,9 +24,9 @@ LAGS_OF_SPEED = frozenset({"one constant", "up and down"})
 
 ActiveForm = tuple[Form, np.ndarray]
 """A form of an effect and the values of its parameters, in order."""
-ActiveSpeedForm = tuple[SpeedForm, np.ndarray]
+_ActiveSpeedForm = tuple[SpeedForm, np.ndarray]
 """The same for a form that acts between command and rotor speed."""
-ActiveSetForm = tuple[SetForm, np.ndarray]
+_ActiveSetForm = tuple[SetForm, np.ndarray]
 """The same for a form that spoils the recorded set."""
 
 
@@ -43,13 +43,13 @@ def active_forms(vehicle: Vehicle) -> list[ActiveForm]:
     return found if derivatives is None else [*found, derivatives]
 
 
-def active_speed_forms(vehicle: Vehicle) -> list[ActiveSpeedForm]:
+def active_speed_forms(vehicle: Vehicle) -> list[_ActiveSpeedForm]:
     """Forms of `vehicle.effects` that act between command and rotor speed, in the order of the path."""
     found = [found for found in all_forms(vehicle) if isinstance(found[0], SpeedForm)]
     return sorted(found, key=lambda pair: pair[0].stage)
 
 
-def active_set_forms(vehicle: Vehicle) -> list[ActiveSetForm]:
+def active_set_forms(vehicle: Vehicle) -> list[_ActiveSetForm]:
     """Forms of `vehicle.effects` that spoil the recorded set, in the order of the file."""
     return [found for found in all_forms(vehicle) if isinstance(found[0], SetForm)]
 
@@ -77,7 +77,7 @@ def speeds_of_commands(
     return speed
 
 
-def all_forms(vehicle: Vehicle) -> list[ActiveForm | ActiveSpeedForm | ActiveSetForm]:
+def all_forms(vehicle: Vehicle) -> list[ActiveForm | _ActiveSpeedForm | _ActiveSetForm]:
     """Every form of `vehicle.effects` with its values, in the order of the file."""
     return [_active(entry, number, vehicle) for number, entry in enumerate(vehicle.effects, 1)]
 
@@ -88,7 +88,7 @@ def _forms(effect: Effect, vehicle: Vehicle, wanted: str | None) -> dict[str, Fo
     return {form.name: form for form in forms}
 
 
-def _active(entry: dict, number: int, vehicle: Vehicle) -> ActiveForm | ActiveSpeedForm | ActiveSetForm:
+def _active(entry: dict, number: int, vehicle: Vehicle) -> ActiveForm | _ActiveSpeedForm | _ActiveSetForm:
     where = f"vehicle {vehicle.name}: effects entry {number}"
     name = entry.get("id")
     effects = catalogue()
@@ -134,7 +134,7 @@ def command_path(
     return CommandPath(tuple(forms), 0.0 if limits is None else limits[1], voltage_v, full_voltage_v)
 
 
-def motors_of(vehicle: Vehicle, step_s: float) -> Motors | None:
+def _motors_of(vehicle: Vehicle, step_s: float) -> Motors | None:
     """The vehicle's speed forms as motors of the simulator, where one lag of the speed is all there is; else None.
 
     A lag below a step is left to `CommandPath`, whose law is exact for any step.
@@ -166,7 +166,7 @@ def simulate_as_stated(
     """
     steps = int(round(duration_s / step_s))
     voltage = np.broadcast_to(np.asarray(1.0 if voltage_v is None else voltage_v, float), (steps + 1,))
-    motors, path, command = motors_of(vehicle, step_s), None, None
+    motors, path, command = _motors_of(vehicle, step_s), None, None
     if isinstance(controller, Commands):
         time_s = step_s * np.arange(steps + 1)
         held = np.searchsorted(controller.time_s, time_s + 1e-9, side="right") - 1

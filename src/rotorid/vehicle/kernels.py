@@ -69,11 +69,11 @@ the largest distance of a hub from the body's z axis, m."""
 ADDED = np.dtype([("force", "f8", 3), ("moment", "f8", 3), ("hub_force", "f8", (MOST_ROTORS, 3))], align=True)
 """`w` of a kernel: force, N, moment about the believed centre of mass, N m, and a force at each hub, N, body axes."""
 
-STATE = 13 + MOST_ROTORS
+_STATE = 13 + MOST_ROTORS
 SCRATCH = np.dtype(
     [(name, "f8", 6) for name in ("base", "wrench", "own", "first", "at", "now")]
     + [("matrix", "f8", (6, 6)), ("known", "i8"), ("open", "i8")]
-    + [("state", "f8", STATE), ("trial", "f8", STATE), ("slopes", "f8", (4, STATE))]
+    + [("state", "f8", _STATE), ("trial", "f8", _STATE), ("slopes", "f8", (4, _STATE))]
     + [("angle", "f8", 3), ("wanted", "f8", 3), ("memory", "f8", (3, 3)), ("command", "f8", MOST_ROTORS)],
     align=True,
 )
@@ -138,13 +138,13 @@ def kernels_of(effects: Sequence[tuple[Form, Sequence[float]]], vehicle: Vehicle
             used.append((form, values))
         elif form.memory or _adds_wrench(form, vehicle, np.asarray(values, float)):
             return None
-    used.sort(key=lambda pair: reads_accelerations(pair[0]))
+    used.sort(key=lambda pair: _reads_accelerations(pair[0]))
     functions = [compiled(form.kernel) for form, _ in used]
     stated = [kernel_values(form, values) for form, values in used]
     sizes = np.array([len(v) for v in stated], dtype=np.int64)
     return Kernels(
         addresses=np.array([f.address for f in functions], dtype=np.int64),
-        explicit=sum(not reads_accelerations(form) for form, _ in used),
+        explicit=sum(not _reads_accelerations(form) for form, _ in used),
         offsets=np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64) if used else np.zeros(0, np.int64),
         values=np.concatenate([*stated, [0.0]]),
         forms=tuple(form for form, _ in used),
@@ -158,7 +158,7 @@ def kernel_values(form: Form, values: Sequence[float]) -> np.ndarray:
     return np.asarray(values if form.kernel_values is None else form.kernel_values(values), float)
 
 
-def reads_accelerations(form: Form) -> bool:
+def _reads_accelerations(form: Form) -> bool:
     """Whether a form depends on the accelerations that it changes."""
     return bool(_ACCELERATIONS & set(form.requires))
 

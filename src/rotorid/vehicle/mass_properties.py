@@ -16,11 +16,11 @@ import pandas as pd
 from rotorid.errors import InputError
 
 COLUMNS = ("component count mass_kg shape size_x_m size_y_m size_z_m x_m y_m z_m").split()
-SHAPES = ("point", "box", "cylinder")
+_SHAPES = ("point", "box", "cylinder")
 
 
 @dataclass(frozen=True)
-class MassProperties:
+class _MassProperties:
     """Mass, kg; centre of mass (3,), m, in the table's axes; inertia (3, 3), kg m2, about the centre of mass."""
 
     mass_kg: float
@@ -35,8 +35,8 @@ def read_components(path: str | Path) -> pd.DataFrame:
     if missing:
         raise InputError(f"{path}: column {missing[0]} is missing, expected {', '.join(COLUMNS)}")
     for number, row in enumerate(table.itertuples(), 2):
-        if row.shape not in SHAPES:
-            raise InputError(f"{path}, line {number}: shape {row.shape!r}, expected {', '.join(SHAPES)}")
+        if row.shape not in _SHAPES:
+            raise InputError(f"{path}, line {number}: shape {row.shape!r}, expected {', '.join(_SHAPES)}")
         if row.count not in (1, 4):
             raise InputError(f"{path}, line {number}: count {row.count}, expected 1 or 4 (the four corners)")
         sizes = (row.mass_kg, row.size_x_m, row.size_y_m, row.size_z_m)
@@ -56,7 +56,7 @@ def own_inertia(shape: str, mass_kg: float, size_m: np.ndarray) -> np.ndarray:
     return mass_kg / 12 * np.diag([y**2 + z**2, x**2 + z**2, x**2 + y**2])
 
 
-def compose(table: pd.DataFrame) -> MassProperties:
+def compose(table: pd.DataFrame) -> _MassProperties:
     """Mass properties of all components together."""
     masses, places, inertias = [], [], []
     for row in table.itertuples():
@@ -74,7 +74,7 @@ def compose(table: pd.DataFrame) -> MassProperties:
     total = np.zeros((3, 3))
     for mass, arm, own in zip(masses, places - centre, inertias, strict=True):
         total += own + mass * ((arm @ arm) * np.eye(3) - np.outer(arm, arm))
-    return MassProperties(float(masses.sum()), centre, total)
+    return _MassProperties(float(masses.sum()), centre, total)
 
 
 def _about_z(angle: float) -> np.ndarray:

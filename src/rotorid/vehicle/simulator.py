@@ -32,12 +32,12 @@ from rotorid.vehicle.attitude import (
 )
 from rotorid.vehicle.command_path import CommandPath
 from rotorid.vehicle.dynamics import Dynamics, check_effects, has_memory
-from rotorid.vehicle.integrate import rk4_step
 from rotorid.vehicle.kernels import body_of, kernels_of
+from rotorid.vehicle.windows import rk4_step
 
-MEMORY_ROUNDS = 12
+_MEMORY_ROUNDS = 12
 """Flights simulated in a row, at most, where an effect has a memory of its own; each takes its wrench from the last."""
-MEMORY_SETTLED = 1e-7
+_MEMORY_SETTLED = 1e-7
 """Change of that wrench, as a share of its largest, at which it has settled."""
 
 
@@ -194,10 +194,10 @@ def simulate(
     # A load as heavy as the vehicle would make plain repetition diverge: Aitken's relaxation (Küttler and Wall,
     # Computational Mechanics 43, 2008) takes the step from how the last one turned out.
     added, last, share = np.zeros_like(pushes), None, 1.0
-    for _ in range(MEMORY_ROUNDS if slow else 0):
+    for _ in range(_MEMORY_ROUNDS if slow else 0):
         wrench = _wrench_of_memory(trace, vehicle, slow, flight)
         gap = wrench - added
-        if np.abs(gap).max() <= MEMORY_SETTLED * np.abs(wrench).max():
+        if np.abs(gap).max() <= _MEMORY_SETTLED * np.abs(wrench).max():
             break
         if last is not None:
             change = gap - last

@@ -3,11 +3,13 @@
 A prediction over windows shows what a model is worth without letting its errors pile up over a whole flight.
 They fly compiled where every effect has a kernel, else all together by array code; a test holds that both give the
 same numbers.
+
+Integration in time.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,10 +20,9 @@ from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle import fast
 from rotorid.vehicle.attitude import normalised, quaternion_rate, rotation_from_quaternion
 from rotorid.vehicle.dynamics import Dynamics, check_effects, has_memory
-from rotorid.vehicle.integrate import rk4_step
 from rotorid.vehicle.kernels import body_of, kernels_of
 
-LONGEST_STEP_S = 0.01
+_LONGEST_STEP_S = 0.01
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ def plan_windows(
     if not np.all(dt > 0):
         raise InputError("time_s must be strictly increasing")
     period = float(np.median(dt))
-    longest = max(LONGEST_STEP_S if step_s is None else step_s, period)
+    longest = max(_LONGEST_STEP_S if step_s is None else step_s, period)
     stride = max(int(longest / period + 1e-6), 1)
     steps = max(int(round(window_s / (stride * period))), 1)
     length = steps * stride
@@ -339,3 +340,19 @@ class _Flight:
             velocity=out[..., 7:10] if self.translation else None,
             position=out[..., 10:13] if self.translation and self.recorded.position is not None else None,
         )
+
+
+def rk4_step(
+    derivative: Callable[[float, np.ndarray], np.ndarray], share: float, state: np.ndarray, step_s
+) -> np.ndarray:
+    """One step of the classical Runge-Kutta method (fourth order).
+
+    `derivative(share, state)` is evaluated at the beginning, middle and end of the step: `share` counts
+    steps, so that inputs known at samples can be read by index. `step_s` is a number or an array that
+    broadcasts with `state`.
+    """
+    k1 = derivative(share, state)
+    k2 = derivative(share + 0.5, state + (0.5 * step_s) * k1)
+    k3 = derivative(share + 0.5, state + (0.5 * step_s) * k2)
+    k4 = derivative(share + 1.0, state + step_s * k3)
+    return state + (step_s / 6.0) * (k1 + 2 * (k2 + k3) + k4)

@@ -11,8 +11,7 @@ from rotorid.io.public_list import of_one_motor
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.recordings import RecordingSet, read_set
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.obtain import obtain
-from rotorid.recordings.importers.public_sets import PUBLIC_SETS, build
+from rotorid.recordings.importers.public_sets import PUBLIC_SETS, build, obtain
 from rotorid.report.deliver import judge
 from rotorid_proof.concealed import build as concealed
 from rotorid_proof.concealed import cases

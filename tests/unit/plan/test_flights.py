@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rotorid.cli.planning import SECTION, with_plan
 from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
 from rotorid.mismatch.plant.motion import build_segments
 from rotorid.mismatch.plant.rows import residual
-from rotorid.plan import mission, page, write
+from rotorid.plan import mission, write
 from rotorid.plan.candidates import Reference, candidates, joined, smaller, standard
 from rotorid.plan.limits import Limits
 from rotorid.plan.plan import NOTHING, SIZES, Plan, Tried, broken, yaw_acceleration
@@ -210,11 +211,11 @@ def test_a_plan_is_written_whole(a_plan: Plan, tmp_path) -> None:
 def test_the_page_shows_the_last_plan_once(a_plan: Plan) -> None:
     bare = '<h1>x</h1><section><h2>What to fly next</h2>\n<p class="next">Fly.</p></section><section>rest</section>'
     said = write.text(a_plan)
-    once = page.with_plan(bare, "set", said, b"png")
+    once = with_plan(bare, "set", said, b"png")
     assert once.count("<img") == 1 and once.count("waves") == 0
     assert "Fly." in once and once.endswith("<section>rest</section>")
-    assert page.with_plan(once, "set", said) == page.with_plan(bare, "set", said)
-    assert page.with_plan("<p>another page</p>", "set", said) == "<p>another page</p>"
+    assert with_plan(once, "set", said) == with_plan(bare, "set", said)
+    assert with_plan("<p>another page</p>", "set", said) == "<p>another page</p>"
 
 
 def mission_of(names: tuple[str, ...], **limits) -> Plan:
@@ -254,4 +255,4 @@ def test_what_is_no_mission_says_why() -> None:
 def test_the_page_that_is_written_has_the_section() -> None:
     from rotorid.report.page.make import page_file
 
-    assert page.SECTION.search(page_file("page.html"))
+    assert SECTION.search(page_file("page.html"))

@@ -9,7 +9,6 @@ import pytest
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.plan import write_session
-from rotorid.plan.by_hand import STEPS, by_hand
 from rotorid.plan.limits import SessionLimits
 from rotorid.plan.questions import Hypothesis, Question
 from rotorid.plan.session import (
@@ -23,6 +22,7 @@ from rotorid.plan.session import (
     table_of,
     through,
 )
+from rotorid.plan.write import STEPS, by_hand
 from rotorid.recordings import RecordingSet, Run, Vehicle
 
 RATE_HZ = 20.0

@@ -8,7 +8,7 @@ import pytest
 
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
-from rotorid.recordings.copies import copies
+from rotorid.recordings.check import copies
 
 RATE_HZ = 100.0
 BENCH = Vehicle(name="b", kind="bench", tared=True)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rotorid.recordings.proposed import proposed_in
+from rotorid.recordings.files import proposed_in
 
 TEXT = """# Proposed from log. Lines marked PROPOSED are guesses.
 name: "log"

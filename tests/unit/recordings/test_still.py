@@ -8,8 +8,8 @@ import pytest
 
 from rotorid.recordings import RecordingSet, Run, templates
 from rotorid.recordings import columns as c
+from rotorid.recordings.check import still_sensors
 from rotorid.recordings.held import moves
-from rotorid.recordings.still import still_sensors
 
 SPEEDS, THROTTLES = c.rotor_columns("rotor_speed", 4), c.rotor_columns("throttle", 4)
 SENSORS = (c.ANGULAR_VELOCITY, c.SPECIFIC_FORCE, c.QUATERNION, c.VELOCITY, c.POSITION, SPEEDS, (SPEEDS[1],))

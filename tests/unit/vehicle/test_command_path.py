@@ -7,8 +7,7 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import SpeedForm
 from rotorid.errors import InputError
 from rotorid.recordings import Vehicle
-from rotorid.vehicle.control.pid import AttitudePid, Gains
-from rotorid.vehicle.control.references import AttitudeReference
+from rotorid.vehicle.control.pid import AttitudePid, AttitudeReference, Gains
 from rotorid.vehicle.flyable import flyable
 from rotorid.vehicle.improved import command_path, simulate_as_stated, speeds_of_commands
 from rotorid.vehicle.simulator import Commands, Start, Trace

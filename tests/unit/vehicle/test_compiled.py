@@ -16,8 +16,7 @@ from rotorid.vehicle import kernels
 from rotorid.vehicle.attitude import quaternion_from_euler, rotation_from_quaternion
 from rotorid.vehicle.batch import Batch
 from rotorid.vehicle.compiled import _invert
-from rotorid.vehicle.control.pid import AttitudePid, Gains
-from rotorid.vehicle.control.references import training_reference
+from rotorid.vehicle.control.pid import AttitudePid, Gains, training_reference
 from rotorid.vehicle.improved import simulate_as_stated
 from rotorid.vehicle.kernels import ADDED, INSTANT, body_of, kernel_values, kernels_of
 from rotorid.vehicle.simulator import Commands, Disturbance, Motors, Noise, Start, simulate

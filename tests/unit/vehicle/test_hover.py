@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from rotorid.recordings import Vehicle
-from rotorid.vehicle.control.pid import AttitudePid, Gains
-from rotorid.vehicle.control.references import AttitudeReference
+from rotorid.vehicle.control.pid import AttitudePid, AttitudeReference, Gains
 from rotorid.vehicle.hover import hover
 from rotorid.vehicle.improved import command_path, simulate_as_stated
 from rotorid.vehicle.simulator import Start

@@ -10,11 +10,9 @@ from rotorid.vehicle.attitude import (
     quaternion_from_euler,
     rotation_from_quaternion,
 )
-from rotorid.vehicle.control.pid import AttitudePid, Gains, Memory, pid_step
-from rotorid.vehicle.control.references import training_reference
+from rotorid.vehicle.control.pid import AttitudePid, Gains, Memory, pid_step, training_reference
+from rotorid.vehicle.dynamics import RigidBody, angular_acceleration
 from rotorid.vehicle.mixer import allocation_matrix, wrench_matrix
-from rotorid.vehicle.params import RigidBody
-from rotorid.vehicle.rigid_body import angular_acceleration
 from rotorid.vehicle.simulator import (
     Commands,
     Disturbance,
@@ -315,7 +313,7 @@ def test_pid_by_hand():
 
 def test_anti_windup_shortens_the_overshoot():
     """A roll step that saturates the moment: with the integral held the overshoot is smaller."""
-    from rotorid.vehicle.control.references import AttitudeReference
+    from rotorid.vehicle.control.pid import AttitudeReference
 
     vehicle = thesis_vehicle()
     step = AttitudeReference("step", 6.4, lambda t: np.array([0.8, 0.0, 0.0]))

@@ -16,7 +16,7 @@ from rotorid.io import wire
 from rotorid.io.wire import bench, jr3, quadrotor, rotor, tensile, wrench
 from rotorid.io.wire.base import GO, STOP
 
-FIRMWARE = "1.2 (emulated)"  # the committed campaign's
+_FIRMWARE = "1.2 (emulated)"  # the committed campaign's
 
 
 class CommandRefused(Exception):
@@ -37,7 +37,7 @@ class Device:
 
     def __init__(self, serial_number: str) -> None:
         self.serial_number = serial_number
-        self.firmware = f"{self.instrument.name} {FIRMWARE}"
+        self.firmware = f"{self.instrument.name} {_FIRMWARE}"
         self.interval_us = self.instrument.interval_us
         self.streaming = False
 

@@ -15,11 +15,11 @@ from pathlib import Path
 
 from rotorid.acquire.emulators.wire import WireHalf, World
 
-MAX_PENDING = 1 << 16  # bytes a device keeps when nobody reads; older ones are overrun, as in a real UART
-IDLE_S = 0.02
+_MAX_PENDING = 1 << 16  # bytes a device keeps when nobody reads; older ones are overrun, as in a real UART
+_IDLE_S = 0.02
 
 
-class PseudoTerminal:
+class _PseudoTerminal:
     """A pty pair; `link` is a name that stays the same when the device is unplugged and comes back."""
 
     def __init__(self, link: Path | None = None) -> None:
@@ -75,7 +75,7 @@ class EmulatedPorts:
     ) -> None:
         self._world = world
         self._speed, self._slice_s, self._replug_after_s = speed, slice_s, replug_after_s
-        self.terminals = [PseudoTerminal(link) for link in links or [None] * len(world.lines)]
+        self.terminals = [_PseudoTerminal(link) for link in links or [None] * len(world.lines)]
         for line in world.lines:  # a watchdog guards against a computer that is gone, and computers live in real time
             line.host_time_s = time.monotonic
         self._pending = [bytearray() for _ in world.lines]
@@ -148,7 +148,7 @@ class EmulatedPorts:
     def _patience_s(self) -> float:
         if self._speed is not None:
             return self._slice_s / max(self._speed, 1)
-        return 0.0 if self._may_go_on() else (2e-4 if self._busy() else IDLE_S)
+        return 0.0 if self._may_go_on() else (2e-4 if self._busy() else _IDLE_S)
 
     def _busy(self) -> bool:
         return bool(self._away_until) or any(line.busy for line in self._world.lines)
@@ -173,9 +173,9 @@ class EmulatedPorts:
     def _send(self, i: int, line: WireHalf) -> None:
         pending = self._pending[i]
         pending += line.take()
-        if len(pending) > MAX_PENDING:
-            self.overruns += len(pending) - MAX_PENDING
-            del pending[: len(pending) - MAX_PENDING]
+        if len(pending) > _MAX_PENDING:
+            self.overruns += len(pending) - _MAX_PENDING
+            del pending[: len(pending) - _MAX_PENDING]
         if pending:
             try:
                 del pending[: os.write(self.terminals[i].master, pending)]

@@ -1,4 +1,7 @@
-"""The vehicle on the experimental stand: four rotors, gravity, a level six-axis sensor below it."""
+"""The vehicle on the experimental stand: four rotors, gravity, a level six-axis sensor below it.
+
+A six-axis force-torque sensor: crosstalk, resonance of what stands on it, drift, noise.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +9,14 @@ import math
 
 import numpy as np
 
-from rotorid.acquire.emulators.loads import AXES, put_down
+from rotorid.acquire.emulators.oscillator import Oscillator
 from rotorid.acquire.emulators.rotor import Battery, Rotors, TesterPhysics
-from rotorid.acquire.emulators.sensor import SixAxis
 from rotorid.acquire.emulators.truth import RotorTruth, SensorTruth, Truth, VehicleTruth
+from rotorid.acquire.geometry import AXES, put_down
 
 GRAVITY = 9.81
 SENSOR_POSITION_M = (0.0, 0.0, 0.045)  # believed, body axes, from the believed centre of mass
-SPIN = np.array([1.0, -1.0, 1.0, -1.0])  # counter-clockwise from above: reaction about +z
+_SPIN = np.array([1.0, -1.0, 1.0, -1.0])  # counter-clockwise from above: reaction about +z
 CORNERS = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]], dtype=float)  # rotors 1–4: forward, right
 
 
@@ -49,7 +52,7 @@ class StandPhysics:
         arms = np.column_stack([vehicle.arm_m * CORNERS, np.zeros(4)]) - place
         self._arms = arms  # rotors from the sensor, body axes
         self._com_arm = self._body_to_sensor @ (np.array(vehicle.com_offset_m) - place)
-        self.sensor = SixAxis(sensor, rng, self.wrench())
+        self.sensor = _SixAxis(sensor, rng, self.wrench())
 
     def wrench(self) -> np.ndarray:
         """Force in N and moment in N m on the sensor, shape (6,)."""
@@ -57,7 +60,7 @@ class StandPhysics:
         force = self._body_to_sensor @ np.array([0.0, 0.0, -thrust.sum()])
         # arm × (0, 0, −F) = (−y F, x F, 0)
         moment = np.array([-(self._arms[:, 1] @ thrust), self._arms[:, 0] @ thrust, 0.0])
-        moment[2] = SPIN @ (self._torque * self.rotors.speed**2 + self._inertia * self.rotors.acceleration)
+        moment[2] = _SPIN @ (self._torque * self.rotors.speed**2 + self._inertia * self.rotors.acceleration)
         weight = self._weight_n * self._down
         moment = self._body_to_sensor @ moment + np.cross(self._com_arm, weight)
         return np.concatenate([force + weight, moment])
@@ -86,7 +89,7 @@ class LoadedSensor:
     """A six-axis sensor alone, with a weight or a vehicle on it (the reference in the bench's tests)."""
 
     def __init__(self, sensor: SensorTruth, rng: np.random.Generator) -> None:
-        self.sensor = SixAxis(sensor, rng, np.zeros(6))
+        self.sensor = _SixAxis(sensor, rng, np.zeros(6))
         self.rotors = None
         self._rng = rng
         self._load = np.zeros(6)
@@ -107,3 +110,33 @@ class LoadedSensor:
         self._time_s += dt_s
         load = self._load if self._drive is None else self._load + self._drive(self._time_s)
         self.sensor.process(dt_s, load)
+
+
+class _SixAxis:
+    """State of the sensor; wrenches have shape (6,): force in N, moment in N m, sensor axes."""
+
+    def __init__(self, truth: SensorTruth, rng: np.random.Generator, at_rest: np.ndarray) -> None:
+        self._truth = truth
+        self._rng = rng
+        self._crosstalk = np.array(truth.crosstalk)
+        self._noise, self._vibration = np.array(truth.noise), np.array(truth.vibration)
+        self._drift_per_s = np.array(truth.drift_per_s)
+        self._structure = Oscillator(6, truth.resonance_hz, truth.damping)
+        self._structure.position = at_rest.copy()
+        self._zero = np.zeros(6)
+        self._offset = np.zeros(6)
+
+    def process(self, dt_s: float, wrench: np.ndarray) -> None:
+        """Advance by `dt_s` under a wrench."""
+        self._structure.process(dt_s, wrench)
+        self._zero = self._zero + self._drift_per_s * dt_s
+
+    def read(self, speed_rad_s: float = 0.0) -> np.ndarray:
+        """A reading; rotors that turn at a mean speed shake it."""
+        noise = self._noise + self._vibration * (speed_rad_s / 1000) ** 2
+        felt = self._crosstalk @ self._structure.position
+        return felt + self._zero - self._offset + noise * self._rng.standard_normal(6)
+
+    def offset(self) -> None:
+        """Take the present mean reading as zero."""
+        self._offset = self._crosstalk @ self._structure.position + self._zero

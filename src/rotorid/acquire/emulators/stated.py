@@ -25,7 +25,7 @@ from rotorid.acquire.emulators.truth import Truth
 from rotorid.acquire.geometry import body_forces, cell_response
 
 CHANNELS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
-LOADS_N = np.linspace(0.35, 9.39, 8)
+_LOADS_N = np.linspace(0.35, 9.39, 8)
 """Of the static tests."""
 SENSES = {"x": 1.0, "y": 1.0, "z": -1.0}
 """In which sense weights pull along each axis; thrust is along −z."""
@@ -98,15 +98,15 @@ def _excess(letter: str, factors: list[float]) -> dict[str, float]:
 def readings(truth: Truth, material: str) -> dict[str, dict[str, float]]:
     """Crosstalk C and compliance k of the thesis's readings: y_i = F_i + C_ij F_j + k_ij F_j |F_j|.
 
-    Least squares over `LOADS_N` along one axis at a time, without noise, drift and slant; a cell beyond its range
+    Least squares over `_LOADS_N` along one axis at a time, without noise, drift and slant; a cell beyond its range
     reads too little.
     """
     bench = BenchPhysics(truth.cells, truth.bench[material], np.random.default_rng(0))
     response = cell_response() * np.array([1.0, 1.0, -1.0])
     crosstalk, compliance = {}, {}
     for source, (axis, sense) in enumerate(SENSES.items()):
-        load = np.zeros((len(LOADS_N), 3))
-        load[:, source] = sense * LOADS_N
+        load = np.zeros((len(_LOADS_N), 3))
+        load[:, source] = sense * _LOADS_N
         cells = np.array([response @ bench.bent(one) for one in load])
         beyond = np.maximum(np.abs(cells) - truth.cells.rated_n, 0.0)
         cells -= np.sign(cells) * truth.cells.overload_loss * beyond

@@ -8,10 +8,10 @@ from rotorid.acquire.emulators.truth import PlasticTruth
 
 GAUGE_MM = 40.0
 SECTION_MM2 = 19.2  # type IV: 6.0 mm × 3.2 mm
-SPEED_MM_S = 10 / 60
-ELASTIC_SHARE = 0.62  # of the yield strength: up to here the specimen is linear
-HARDENING = 1.2
-FORCE_NOISE_N = 0.25
+_SPEED_MM_S = 10 / 60
+_ELASTIC_SHARE = 0.62  # of the yield strength: up to here the specimen is linear
+_HARDENING = 1.2
+_FORCE_NOISE_N = 0.25
 
 
 class TensilePhysics:
@@ -22,9 +22,9 @@ class TensilePhysics:
         """`scale` multiplies all strengths and the modulus; the crosshead moves `slack_mm` before the force rises."""
         self._rng = rng
         stress = np.linspace(0, plastic.ultimate_pa * scale, 2000)
-        limit = ELASTIC_SHARE * plastic.yield_pa * scale
+        limit = _ELASTIC_SHARE * plastic.yield_pa * scale
         beyond = np.maximum(stress - limit, 0) / (plastic.yield_pa * scale - limit)
-        self._strain = stress / (plastic.modulus_pa * scale) + 0.002 * beyond**HARDENING
+        self._strain = stress / (plastic.modulus_pa * scale) + 0.002 * beyond**_HARDENING
         self._stress = stress
         self._slack_mm = slack_mm
         self.displacement_mm = 0.0
@@ -33,7 +33,7 @@ class TensilePhysics:
     def process(self, dt_s: float) -> None:
         """Advance by `dt_s`."""
         if self.moving:
-            self.displacement_mm += SPEED_MM_S * dt_s
+            self.displacement_mm += _SPEED_MM_S * dt_s
 
     def force_n(self) -> float:
         """Reading of the tester's force cell, N."""
@@ -45,7 +45,7 @@ class TensilePhysics:
             stress = self._stress[-1] * (1 - 0.5 * (strain / last - 1))
         else:
             stress = 0.0
-        return float(stress * SECTION_MM2 * 1e-6 + FORCE_NOISE_N * self._rng.standard_normal())
+        return float(stress * SECTION_MM2 * 1e-6 + _FORCE_NOISE_N * self._rng.standard_normal())
 
     @property
     def broken(self) -> bool:

@@ -17,13 +17,13 @@ from scipy.optimize import least_squares
 from scipy.signal import lfilter
 from scipy.stats import t as student
 
-LARGEST_ORDER = 20
-BLOCKS = 40
+_LARGEST_ORDER = 20
+_BLOCKS = 40
 LEVEL = 0.95
-ROUNDS = 2
+_ROUNDS = 2
 """Times that the residuals are whitened and the fit repeated."""
 
-Residuals = Callable[[np.ndarray], Sequence[np.ndarray]]
+_Residuals = Callable[[np.ndarray], Sequence[np.ndarray]]
 """From values (p,) to the residuals of each stretch, (n_i,) each."""
 
 
@@ -71,7 +71,7 @@ class Fit:
 
 
 def fit(
-    residuals: Residuals,
+    residuals: _Residuals,
     start: np.ndarray,
     bounds: tuple[np.ndarray, np.ndarray],
     scale: np.ndarray,
@@ -92,7 +92,7 @@ def fit(
         return np.concatenate([*white, spread * (v - start)[believed] / prior[believed]])
 
     solved = None
-    for turn in range(ROUNDS + 1):
+    for turn in range(_ROUNDS + 1):
         if turn:
             own = residuals(values)
             whiten = autoregression(own)
@@ -102,10 +102,10 @@ def fit(
         values = solved.x
     count = len(solved.fun) - int(believed.sum())
     white, jacobian = solved.fun[:count], solved.jac[:count]
-    return Fit(values, *covariances(jacobian, white, prior))
+    return Fit(values, *_covariances(jacobian, white, prior))
 
 
-def covariances(
+def _covariances(
     jacobian: np.ndarray, white: np.ndarray, prior: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, int, float]:
     """The two covariances (p, p), the number of blocks and the residuals' deviation, of whitened rows."""
@@ -113,7 +113,7 @@ def covariances(
     variance = float(white @ white) / freedom
     belief = np.diag(np.where(np.isfinite(prior), 1.0 / prior**2, 0.0))
     bread = np.linalg.pinv(jacobian.T @ jacobian / variance + belief, hermitian=True)
-    edges = np.linspace(0, len(white), min(BLOCKS, len(white)) + 1).astype(int)[:-1]
+    edges = np.linspace(0, len(white), min(_BLOCKS, len(white)) + 1).astype(int)[:-1]
     scores = np.add.reduceat(jacobian * white[:, None], edges, axis=0) / variance
     blocks = len(edges)
     meat = blocks / max(blocks - jacobian.shape[1], 1) * scores.T @ scores + belief
@@ -123,7 +123,7 @@ def covariances(
 def autoregression(stretches: Sequence[np.ndarray]) -> np.ndarray:
     """Coefficients (1, −φ_1, …) that whiten residuals; the order by Akaike's criterion (Yule and Walker)."""
     count = sum(len(r) for r in stretches)
-    most = min(LARGEST_ORDER, min(len(r) for r in stretches) // 10)
+    most = min(_LARGEST_ORDER, min(len(r) for r in stretches) // 10)
     lags = np.array([sum(float(r[: len(r) - k] @ r[k:]) for r in stretches) for k in range(most + 1)]) / count
     if lags[0] <= 0 or most < 1:
         return np.array([1.0])

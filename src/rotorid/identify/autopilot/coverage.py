@@ -22,7 +22,7 @@ FLIGHTS = 25
 SEED = 46
 
 
-def true_values(truth: Truth) -> dict[str, float]:
+def _true_values(truth: Truth) -> dict[str, float]:
     """What a flight was made with, by the names and in the units of `parameters_of`."""
     shapes = MAPS[truth.autopilot].shapes
     values = {s.name: s.factor * v for s, v in zip(shapes, truth.shapes, strict=True)}
@@ -43,7 +43,7 @@ def counted(autopilot: str, seeds: Sequence[int], seconds: float = 40.0) -> pd.D
         rng = np.random.default_rng([SEED, list(MAPS).index(autopilot), seed])
         truth = drawn(autopilot, rng)
         found: dict[str, Parameter] = {p.name: p for p in parameters_of(flight(truth, rng, seconds), autopilot)}
-        for name, true in true_values(truth).items():
+        for name, true in _true_values(truth).items():
             p = found[name]
             low, high = p.interval_95
             rows.append((autopilot, seed, name, true, p.value, low, high, p.determined, low <= true <= high))

@@ -20,11 +20,11 @@ from rotorid.identify.autopilot.correlated import Estimate, fit
 from rotorid.identify.autopilot.signals import Stretch
 from rotorid.identify.autopilot.thrust import averaged
 
-AIR_DENSITY_KG_M3 = 1.225
+_AIR_DENSITY_KG_M3 = 1.225
 RATE_HZ = 20.0
 """Residuals are averaged down to about so many a second: drag follows the velocity, which is slow."""
-LEAST_AIRSPEED_M_S = 1e-3
-ZERO_M_S2 = 0.3
+_LEAST_AIRSPEED_M_S = 1e-3
+_ZERO_M_S2 = 0.3
 """Believed deviation of the specific force at rest: the accelerometer's zero, and rotors whose axis is not quite z."""
 WIND_M_S = 5.0
 """Believed deviation of each component of the wind about none."""
@@ -46,17 +46,17 @@ class DragFit:
 
 
 def specific_drag(
-    through_air: np.ndarray, bluff_x: float, bluff_y: float, momentum: float, density_kg_m3: float = AIR_DENSITY_KG_M3
+    through_air: np.ndarray, bluff_x: float, bluff_y: float, momentum: float, density_kg_m3: float = _AIR_DENSITY_KG_M3
 ) -> np.ndarray:
     """Specific force (n, 2), m/s², along body x and y, of velocities through the air (n, 3), body axes."""
     across = through_air[:, :2]
-    speed = np.maximum(np.linalg.norm(across, axis=1), LEAST_AIRSPEED_M_S)
+    speed = np.maximum(np.linalg.norm(across, axis=1), _LEAST_AIRSPEED_M_S)
     bluff = np.linalg.norm(across * [bluff_x, bluff_y], axis=1) / speed
     quadratic = 0.5 * density_kg_m3 * bluff * np.linalg.norm(through_air, axis=1)
-    return -(quadratic + momentum * np.sqrt(density_kg_m3 / AIR_DENSITY_KG_M3))[:, None] * across
+    return -(quadratic + momentum * np.sqrt(density_kg_m3 / _AIR_DENSITY_KG_M3))[:, None] * across
 
 
-def fit_drag(stretches: Sequence[Stretch], density_kg_m3: float = AIR_DENSITY_KG_M3) -> DragFit | None:
+def fit_drag(stretches: Sequence[Stretch], density_kg_m3: float = _AIR_DENSITY_KG_M3) -> DragFit | None:
     """Drag and wind; None where no stretch has attitude and velocity."""
     used = [s for s in stretches if s.attitude is not None and s.velocity is not None]
     if not used:
@@ -67,8 +67,8 @@ def fit_drag(stretches: Sequence[Stretch], density_kg_m3: float = AIR_DENSITY_KG
     start[:3] = 0.02, 0.02, 0.1
     low = np.array([-0.2, -0.2, -1.0, -3, -3, *[-30.0] * (2 * len(runs))])
     high = np.array([1.0, 1.0, 3.0, 3, 3, *[30.0] * (2 * len(runs))])
-    scale = np.array([0.02, 0.02, 0.1, ZERO_M_S2, ZERO_M_S2, *[2.0] * (2 * len(runs))])
-    prior = np.array([np.inf, np.inf, np.inf, ZERO_M_S2, ZERO_M_S2, *[WIND_M_S] * (2 * len(runs))])
+    scale = np.array([0.02, 0.02, 0.1, _ZERO_M_S2, _ZERO_M_S2, *[2.0] * (2 * len(runs))])
+    prior = np.array([np.inf, np.inf, np.inf, _ZERO_M_S2, _ZERO_M_S2, *[WIND_M_S] * (2 * len(runs))])
 
     def residuals(values: np.ndarray) -> list[np.ndarray]:
         out = []

@@ -19,7 +19,7 @@ from rotorid.vehicle.attitude import quaternion_from_euler, rotation_from_quater
 from rotorid.vehicle.mixer import allocation_matrix
 
 GRAVITY = 9.81
-INNER_HZ = 500
+_INNER_HZ = 500
 STEP = 5
 LEAST_SHARE = 0.02
 
@@ -98,7 +98,7 @@ def signal_of(autopilot: str, thrust: np.ndarray, voltage: np.ndarray, shapes: t
 
 def flight(truth: Truth, rng: np.random.Generator, seconds: float = 40.0, rate_hz: int = 250) -> RecordingSet:
     """One flight as its sensors record it; the vehicle is of the right mass, its other values are the template's."""
-    time_s = np.arange(int(seconds * INNER_HZ) + 1) / INNER_HZ
+    time_s = np.arange(int(seconds * _INNER_HZ) + 1) / _INNER_HZ
     euler = _angles(time_s, truth, rng)
     rotation = rotation_from_quaternion(quaternion_from_euler(euler))
     up = _sines(time_s, [0.15, 0.5, 1.2, 3.0], [0.3, 0.8, 2.0, 5.0], truth.vigour_m_s2 * rng.uniform(0.3, 0.5, 4), rng)
@@ -108,7 +108,7 @@ def flight(truth: Truth, rng: np.random.Generator, seconds: float = 40.0, rate_h
     turning = _rates(rotation)
     vehicle = _vehicle(truth)
     inertia = vehicle.inertia_kg_m2.matrix()
-    moment = np.gradient(turning, 1 / INNER_HZ, axis=0) @ inertia + np.cross(turning, turning @ inertia)
+    moment = np.gradient(turning, 1 / _INNER_HZ, axis=0) @ inertia + np.cross(turning, turning @ inertia)
     climb = np.einsum("nji,nj->ni", rotation, velocity)[:, 2]
     wanted = np.column_stack([(-force[:, 2] - truth.axial * climb) * truth.mass_kg, moment])
     rotor_n = (allocation_matrix(vehicle) @ wanted.T).T * vehicle.thrust_coefficients_n_s2()
@@ -121,9 +121,9 @@ def flight(truth: Truth, rng: np.random.Generator, seconds: float = 40.0, rate_h
         # Full thrust goes with the voltage; the law of the share is at each voltage the same.
         unit = truth.full_m_s2 * truth.mass_kg / 4 * (voltage / voltage.mean()) ** 1.5
     root = np.sqrt(np.maximum(rotor_n / unit, LEAST_SHARE))
-    steady = np.maximum(root + truth.time_constant_s * np.gradient(root, 1 / INNER_HZ, axis=0), 1e-3) ** 2
+    steady = np.maximum(root + truth.time_constant_s * np.gradient(root, 1 / _INNER_HZ, axis=0), 1e-3) ** 2
     throttle = signal_of(truth.autopilot, steady, voltage, truth.shapes)
-    keep = np.arange(0, len(time_s), INNER_HZ // rate_hz)
+    keep = np.arange(0, len(time_s), _INNER_HZ // rate_hz)
     spread = truth.colour_m_s2 * _coloured(rng, (len(keep), 3), truth.colour_s * rate_hz)
     table = {c.TIME: time_s[keep]}
     table |= dict(zip(c.rotor_columns("throttle", 4), throttle[keep].T, strict=True))
@@ -177,13 +177,13 @@ def _velocity(time_s: np.ndarray, rotation: np.ndarray, thrust: np.ndarray, trut
     for row, k in enumerate(coarse):
         out[row] = now
         body = np.array([*_drag(rotation[[k]], now[None], truth)[0], -thrust[k]])
-        now = now + STEP / INNER_HZ * (rotation[k] @ body + [0, 0, GRAVITY])
+        now = now + STEP / _INNER_HZ * (rotation[k] @ body + [0, 0, GRAVITY])
     return np.stack([np.interp(time_s, time_s[coarse], out[:, j]) for j in range(3)], axis=1)
 
 
 def _rates(rotation: np.ndarray) -> np.ndarray:
     """Body rates (n, 3), rad/s."""
-    change = np.einsum("nji,njk->nik", rotation, np.gradient(rotation, 1 / INNER_HZ, axis=0))
+    change = np.einsum("nji,njk->nik", rotation, np.gradient(rotation, 1 / _INNER_HZ, axis=0))
     return np.column_stack([change[:, 2, 1], change[:, 0, 2], change[:, 1, 0]])
 
 

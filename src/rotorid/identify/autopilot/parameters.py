@@ -16,15 +16,15 @@ from rotorid.identify.autopilot.thrust import TIME_CONSTANTS_S, ThrustFit, fit_t
 from rotorid.identify.autopilot.thrust_maps import MAPS, ThrustMap
 from rotorid.recordings import RecordingSet
 
-WIDEST_SHARE = 0.5
+_WIDEST_SHARE = 0.5
 """Half width over the value beyond which a time constant or a drag is not determined."""
-WIDEST_HOVER = 0.1
-WIDEST_WIND_M_S = 1.0
-AT_A_BOUND = 0.01
+_WIDEST_HOVER = 0.1
+_WIDEST_WIND_M_S = 1.0
+_AT_A_BOUND = 0.01
 """Share of the range searched within which a value is at its end."""
-LARGEST_BCOEF = 200.0
+_LARGEST_BCOEF = 200.0
 """kg/m²: PX4 takes no more (EKF2_BCOEF_X, its range)."""
-HOVERS = {"px4": ("MPC_THR_HOVER", (0.1, 0.8)), "ardupilot": ("MOT_THST_HOVER", (0.125, 0.6875))}
+_HOVERS = {"px4": ("MPC_THR_HOVER", (0.1, 0.8)), "ardupilot": ("MOT_THST_HOVER", (0.125, 0.6875))}
 """By autopilot the parameter for the share of thrust that hovers, and what it may be."""
 
 
@@ -74,7 +74,7 @@ def _missing(chosen: ThrustMap, to: str) -> list[Parameter]:
     why = "it holds no signals of the motors (throttle_1 …)"
     if chosen.in_grams:
         why += " together with the battery's voltage"
-    names = [s.name for s in chosen.shapes] + ([HOVERS[to][0]] if to in HOVERS else [])
+    names = [s.name for s in chosen.shapes] + ([_HOVERS[to][0]] if to in _HOVERS else [])
     return [_nothing(name, "", why) for name in (*names, "hover_signal", "motor_time_constant_s")]
 
 
@@ -91,7 +91,7 @@ def _of_thrust(found: ThrustFit, chosen: ThrustMap, to: str) -> list[Parameter]:
         unit = {"volts_per_gram": "V/g", "volts_per_gram_squared": "V/g²"}.get(shape.name, "")
         low, high = (shape.factor * end for end in estimate.interval_95)
         outside = estimate.interval_95[1] < shape.allowed[0] or estimate.interval_95[0] > shape.allowed[1]
-        margin = AT_A_BOUND * (shape.high - shape.low)
+        margin = _AT_A_BOUND * (shape.high - shape.low)
         at_bound = not shape.low + margin < estimate.value < shape.high - margin
         wide = at_bound or not estimate.half_width <= shape.widest
         sentence = f"{chosen.equation}; {flown}"
@@ -110,10 +110,10 @@ def _of_thrust(found: ThrustFit, chosen: ThrustMap, to: str) -> list[Parameter]:
             )
         )
     curve = all(p.determined for p in out)
-    if to in HOVERS:
-        name, allowed = HOVERS[to]
+    if to in _HOVERS:
+        name, allowed = _HOVERS[to]
         share = found.hover_share
-        fine = share.half_width <= WIDEST_HOVER * share.value and curve
+        fine = share.half_width <= _WIDEST_HOVER * share.value and curve
         sentence = "weight over full thrust; it belongs to the thrust curve above"
         if not fine:
             sentence = "not determined by this flight: full thrust follows from the curve, which it does not determine"
@@ -124,11 +124,12 @@ def _of_thrust(found: ThrustFit, chosen: ThrustMap, to: str) -> list[Parameter]:
             )
         )  # fmt: skip
     hover, lag = found.hover_signal, found.time_constant_s
-    fine = hover.half_width <= WIDEST_HOVER * hover.value
+    fine = hover.half_width <= _WIDEST_HOVER * hover.value
     sentence = "signal of the motors that makes the weight" if fine else "not determined by this flight"
     out.append(Parameter("hover_signal", hover.value, hover.interval_95, "", fine, sentence))
     fine = (
-        lag.half_width <= WIDEST_SHARE * lag.value and 1.1 * TIME_CONSTANTS_S[0] < lag.value < TIME_CONSTANTS_S[1] / 1.1
+        lag.half_width <= _WIDEST_SHARE * lag.value
+        and 1.1 * TIME_CONSTANTS_S[0] < lag.value < TIME_CONSTANTS_S[1] / 1.1
     )
     sentence = "lag of the rotors' speed behind the signal, with that of the accelerometer's filter"
     if not fine:
@@ -144,16 +145,16 @@ def _of_drag(found: DragFit) -> list[Parameter]:
         low, high = estimate.interval_95
         ends = (1 / high if high > 0 else np.inf, 1 / low if low > 0 else np.inf)
         value = 1 / estimate.value if estimate.value > 0 else np.inf
-        fine = low > 0 and estimate.half_width <= WIDEST_SHARE * estimate.value
+        fine = low > 0 and estimate.half_width <= _WIDEST_SHARE * estimate.value
         sentence = f"mass over drag area, jointly with the wind; {flown}"
         if not fine:
             at_least = f"; at least {ends[0]:.3g} kg/m²" if np.isfinite(ends[0]) and ends[0] > 0 else ""
             sentence = f"not determined by this flight: {flown}; fly faster, there and back{at_least}"
         out.append(
-            Parameter(name, value, ends, "kg/m²", fine, sentence, min(value, LARGEST_BCOEF) if fine else None, 1)
+            Parameter(name, value, ends, "kg/m²", fine, sentence, min(value, _LARGEST_BCOEF) if fine else None, 1)
         )
     m = found.momentum
-    fine = m.half_width <= WIDEST_SHARE * abs(m.value)
+    fine = m.half_width <= _WIDEST_SHARE * abs(m.value)
     sentence = "drag of the rotors, jointly with the wind" if fine else "not determined by this flight"
     sentence = f"{sentence}; {flown}"
     out.append(
@@ -166,7 +167,7 @@ def _of_drag(found: DragFit) -> list[Parameter]:
 
 
 def _wind(name: str, part: Estimate) -> Parameter:
-    fine = part.half_width <= WIDEST_WIND_M_S
+    fine = part.half_width <= _WIDEST_WIND_M_S
     sentence = "towards which the air moved, on the mean of the run" if fine else "not determined by this flight"
     return Parameter(name, part.value, part.interval_95, "m/s", fine, sentence, decimals=2)
 

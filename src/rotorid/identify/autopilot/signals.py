@@ -13,7 +13,7 @@ from rotorid.recordings.own_rates import on_own_rates
 from rotorid.vehicle.attitude import normalised, rotation_from_quaternion
 
 LEAST_STRETCH_S = 3.0
-GAP_PERIODS = 6.0
+_GAP_PERIODS = 6.0
 """Where the accelerometer gives nothing for longer than so many of its periods, a stretch ends."""
 
 
@@ -65,7 +65,7 @@ def _of_run(run: Run, rotors: int) -> list[Stretch]:
     if len(time_s) < 2:
         return []
     dt = float(np.median(np.diff(time_s)))
-    cuts = np.flatnonzero(np.diff(time_s) > GAP_PERIODS * dt) + 1
+    cuts = np.flatnonzero(np.diff(time_s) > _GAP_PERIODS * dt) + 1
     out = []
     for part in np.split(np.arange(len(time_s)), cuts):
         span = time_s[part[-1]] - time_s[part[0]]

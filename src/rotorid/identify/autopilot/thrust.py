@@ -18,16 +18,16 @@ from rotorid.identify.autopilot.correlated import Estimate, Fit, fit
 from rotorid.identify.autopilot.signals import Stretch
 from rotorid.identify.autopilot.thrust_maps import ThrustMap
 
-STANDARD_GRAVITY = 9.80665
+_STANDARD_GRAVITY = 9.80665
 """m/s²: grams of thrust are by it."""
-ACCELEROMETER_ZERO_M_S2 = 0.1
+_ACCELEROMETER_ZERO_M_S2 = 0.1
 """Standard deviation of the error of an accelerometer's zero that is believed."""
 TIME_CONSTANTS_S = (0.002, 0.4)
 RATE_HZ = 100.0
 """Residuals are averaged down to about so many a second: there is nothing above that the motors could do."""
-VOLTAGE_MOVES = 0.01
+_VOLTAGE_MOVES = 0.01
 """Share of the voltage that it must vary by for its part to be estimated."""
-DRIFT, AXIAL, LIFT = 0.1, 1.0, 0.05
+_DRIFT, _AXIAL, _LIFT = 0.1, 1.0, 0.05
 """Usual sizes: share of thrust that drifts over a run, m/s² per m/s of axial speed, m/s² per (m/s)² across."""
 
 
@@ -91,7 +91,7 @@ def _exponential(found: Fit, index: int) -> Estimate:
 
 def _per_share(values: np.ndarray, chosen: ThrustMap, mass_kg: float, rotors: int) -> float:
     """m/s² that all rotors make by a share (or a gram a rotor)."""
-    return rotors * 1e-3 * STANDARD_GRAVITY / mass_kg if chosen.in_grams else float(np.exp(values[0]))
+    return rotors * 1e-3 * _STANDARD_GRAVITY / mass_kg if chosen.in_grams else float(np.exp(values[0]))
 
 
 def _solve(rising: Callable[[float], float], wanted: float) -> float:
@@ -135,20 +135,20 @@ def _layout(used: Sequence[Stretch], chosen: ThrustMap) -> _Layout:
         add(shape.start, shape.low, shape.high, (shape.high - shape.low) / 10, shape.believed)
     shapes = slice(first, len(rows))
     lag = add(np.log(0.04), *np.log(TIME_CONSTANTS_S), 0.3)
-    zero = add(0.0, -2.0, 2.0, ACCELEROMETER_ZERO_M_S2, ACCELEROMETER_ZERO_M_S2)
+    zero = add(0.0, -2.0, 2.0, _ACCELEROMETER_ZERO_M_S2, _ACCELEROMETER_ZERO_M_S2)
     voltage, drift, mean = None, {}, 1.0
     if not chosen.in_grams:
         if all(s.voltage is not None for s in used):
             volts = np.concatenate([s.voltage for s in used])
             mean = float(volts.mean())
-            if np.ptp(volts) > VOLTAGE_MOVES * mean:
+            if np.ptp(volts) > _VOLTAGE_MOVES * mean:
                 voltage = add(1.0, -2.0, 5.0, 0.5)
         else:
-            drift = {name: add(0.0, -1.0, 1.0, DRIFT) for name in dict.fromkeys(s.run for s in used)}
+            drift = {name: add(0.0, -1.0, 1.0, _DRIFT) for name in dict.fromkeys(s.run for s in used)}
     motion = None
     if all(s.attitude is not None and s.velocity is not None for s in used):
-        motion = add(0.0, -5.0, 5.0, AXIAL)
-        add(0.0, -1.0, 1.0, LIFT)
+        motion = add(0.0, -5.0, 5.0, _AXIAL)
+        add(0.0, -1.0, 1.0, _LIFT)
     columns = np.array(rows).T
     return _Layout(shapes, lag, zero, voltage, drift, motion, *columns, mean)
 

@@ -11,18 +11,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-MOST_SHARE = 1.5
+_MOST_SHARE = 1.5
 """Shares of thrust up to which Betaflight's curve is inverted: a signal above its range is no use."""
-CURVE_POINTS = 3001
-SPIN_MAX = 0.95
+_CURVE_POINTS = 3001
+_SPIN_MAX = 0.95
 """Default of ArduPilot's MOT_SPIN_MAX, at which its curve ends."""
-SPIN_MIN_BELIEVED = 0.3 / np.sqrt(12)
+_SPIN_MIN_BELIEVED = 0.3 / np.sqrt(12)
 """MOT_SPIN_MIN is believed to lie in what ArduPilot takes, 0 to 0.3: the deviation of an even spread. Without it a
 curve that is nearly a square (MOT_THST_EXPO near 1) leaves a line of pairs that fit alike."""
 
 
 @dataclass(frozen=True)
-class Shape:
+class _Shape:
     """A number of a map: its name in the autopilot, where its estimate starts, and between what it lies."""
 
     name: str
@@ -50,7 +50,7 @@ class ThrustMap:
     """
 
     autopilot: str
-    shapes: tuple[Shape, ...]
+    shapes: tuple[_Shape, ...]
     thrust: Callable[[np.ndarray, np.ndarray | None, np.ndarray], np.ndarray]
     equation: str
     source: str
@@ -67,13 +67,13 @@ def px4(signal: np.ndarray, voltage: np.ndarray | None, shape: np.ndarray) -> np
 def ardupilot(signal: np.ndarray, voltage: np.ndarray | None, shape: np.ndarray) -> np.ndarray:
     """T/T_max = e r² + (1 − e) r with r = (u − spin_min)/(spin_max − spin_min); none below spin_min."""
     expo, spin_min = shape
-    r = np.maximum(signal - spin_min, 0.0) / (SPIN_MAX - spin_min)
+    r = np.maximum(signal - spin_min, 0.0) / (_SPIN_MAX - spin_min)
     return expo * r**2 + (1 - expo) * r
 
 
 def betaflight(signal: np.ndarray, voltage: np.ndarray | None, shape: np.ndarray) -> np.ndarray:
     """T/T_max = x where u = x (1 + k (1 − x)²), k = thrust_linear/100; below k = 3 one x for each u."""
-    x = np.linspace(0.0, MOST_SHARE, CURVE_POINTS)
+    x = np.linspace(0.0, _MOST_SHARE, _CURVE_POINTS)
     return np.interp(signal, x * (1 + shape[0] * (1 - x) ** 2), x)
 
 
@@ -87,7 +87,7 @@ def crazyflie(signal: np.ndarray, voltage: np.ndarray | None, shape: np.ndarray)
 MAPS = {
     "px4": ThrustMap(
         "PX4",
-        (Shape("THR_MDL_FAC", 0.5, -0.5, 1.6, (0.0, 1.0), 0.25),),
+        (_Shape("THR_MDL_FAC", 0.5, -0.5, 1.6, (0.0, 1.0), 0.25),),
         px4,
         "T/T_max = f u² + (1 − f) u, f = THR_MDL_FAC",
         "PX4-Autopilot, src/lib/mixer_module/motor_params.c (THR_MDL_FAC) and functions/FunctionMotors.hpp",
@@ -95,17 +95,17 @@ MAPS = {
     "ardupilot": ThrustMap(
         "ArduPilot",
         (
-            Shape("MOT_THST_EXPO", 0.5, -0.9, 1.8, (-1.0, 1.0), 0.25),
-            Shape("MOT_SPIN_MIN", 0.15, -0.2, 0.4, (0.0, 0.3), 0.08, believed=SPIN_MIN_BELIEVED),
+            _Shape("MOT_THST_EXPO", 0.5, -0.9, 1.8, (-1.0, 1.0), 0.25),
+            _Shape("MOT_SPIN_MIN", 0.15, -0.2, 0.4, (0.0, 0.3), 0.08, believed=_SPIN_MIN_BELIEVED),
         ),
         ardupilot,
-        f"T/T_max = e r² + (1 − e) r, r = (u − MOT_SPIN_MIN)/({SPIN_MAX:g} − MOT_SPIN_MIN), e = MOT_THST_EXPO",
+        f"T/T_max = e r² + (1 − e) r, r = (u − MOT_SPIN_MIN)/({_SPIN_MAX:g} − MOT_SPIN_MIN), e = MOT_THST_EXPO",
         "ardupilot, libraries/AP_Motors/AP_Motors_Thrust_Linearization.cpp, with MOT_SPIN_MAX at its default",
-        full_signal=SPIN_MAX,
+        full_signal=_SPIN_MAX,
     ),
     "betaflight": ThrustMap(
         "Betaflight",
-        (Shape("thrust_linear", 0.3, -0.6, 2.5, (0.0, 1.5), 0.25, 0, 100.0),),
+        (_Shape("thrust_linear", 0.3, -0.6, 2.5, (0.0, 1.5), 0.25, 0, 100.0),),
         betaflight,
         "u = x (1 + k (1 − x)²), x = T/T_max, k = thrust_linear/100",
         "Betaflight 4.5, src/main/flight/pid.c, pidApplyThrustLinearization, and pid_init.c",
@@ -113,8 +113,8 @@ MAPS = {
     "crazyflie": ThrustMap(
         "Crazyflie",
         (
-            Shape("volts_per_gram", 0.088, 0.01, 0.5, (0.0, np.inf), 0.02, 5),
-            Shape("volts_per_gram_squared", -0.0006239, -0.004, 0.01, (-np.inf, np.inf), 0.0008, 7),
+            _Shape("volts_per_gram", 0.088, 0.01, 0.5, (0.0, np.inf), 0.02, 5),
+            _Shape("volts_per_gram_squared", -0.0006239, -0.004, 0.01, (-np.inf, np.inf), 0.0008, 7),
         ),
         crazyflie,
         "u V = c_1 t + c_2 t², t in grams a rotor, V the battery's voltage",

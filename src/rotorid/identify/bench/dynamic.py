@@ -11,15 +11,15 @@ import pandas as pd
 from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
+from rotorid.identify.stand.wrench import mean_and_error
 from rotorid.io.tables import by_recording
-from rotorid.recordings.signal.average import mean_and_error
 
 REST_S = 1.0
 """Length of the stretches at the beginning and the end that are taken as rest."""
-HELD_S = 0.8
-"""A thrust counts as held when it stays within ± `HELD_N` for that long."""
-HELD_N = 0.02
-MARGIN_S = 0.25
+_HELD_S = 0.8
+"""A thrust counts as held when it stays within ± `_HELD_N` for that long."""
+_HELD_N = 0.02
+_MARGIN_S = 0.25
 """Left off both ends of a held stretch before platforms are compared: the pilot's timing differs by that much."""
 
 
@@ -73,18 +73,18 @@ def flights(
 def held(time_s: np.ndarray, thrust_n: np.ndarray) -> list[tuple[float, float]]:
     """Stretches (start and stop, s) in which a smooth thrust above rest is held.
 
-    Over every `HELD_S` within a stretch the thrust spans less than twice `HELD_N`; stretches whose levels do not
+    Over every `_HELD_S` within a stretch the thrust spans less than twice `_HELD_N`; stretches whose levels do not
     differ by more than that are one.
     """
     step_s = float(np.median(np.diff(time_s)))
-    window = max(2, round(HELD_S / step_s))
+    window = max(2, round(_HELD_S / step_s))
     series = pd.Series(thrust_n)
-    flat = (series.rolling(window).max() - series.rolling(window).min() < 2 * HELD_N).to_numpy()
+    flat = (series.rolling(window).max() - series.rolling(window).min() < 2 * _HELD_N).to_numpy()
     found: list[tuple[float, float]] = []
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flat.astype(int), [0]])))
     for first, beyond in edges.reshape(-1, 2):
         start = first - window + 1
-        if np.mean(thrust_n[start:beyond]) > 5 * HELD_N:
+        if np.mean(thrust_n[start:beyond]) > 5 * _HELD_N:
             found.append((float(time_s[start]), float(time_s[beyond - 1])))
     return found
 
@@ -103,10 +103,10 @@ def agreement(flown: pd.DataFrame, base: str = "al") -> pd.DataFrame:
             continue
         stretches = held(steady["time_s"].to_numpy(), steady["zero_phase_n"].to_numpy())
         for place, (start, stop) in enumerate(stretches, start=1):
-            if stop - start <= 2 * MARGIN_S:
+            if stop - start <= 2 * _MARGIN_S:
                 continue
             for platform, flight in flights_of_set.groupby("platform"):
-                inside = flight["time_s"].between(start + MARGIN_S, stop - MARGIN_S)
+                inside = flight["time_s"].between(start + _MARGIN_S, stop - _MARGIN_S)
                 mean, error = mean_and_error(flight.loc[inside, "thrust_n"].to_numpy())
                 rows.append(
                     {

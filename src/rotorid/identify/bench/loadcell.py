@@ -122,7 +122,7 @@ def balance_disagreement(weights_path: str | Path) -> float:
 
 
 @dataclass(frozen=True)
-class SharedWeightError:
+class _SharedWeightError:
     """What all cells agree on about the error of one weight."""
 
     mean_gf: float
@@ -134,7 +134,7 @@ class SharedWeightError:
 
 def shared_weight_error(
     weights_gf: np.ndarray, readings: dict[int, np.ndarray], contains: np.ndarray
-) -> SharedWeightError:
+) -> _SharedWeightError:
     """Error of one weight, from the residuals that it would leave in every cell alike.
 
     Each cell's line is fitted with one unknown more, d: weight + d * contains = a0 + a1 * reading.
@@ -159,4 +159,4 @@ def shared_weight_error(
         found.append(float(solution[2]))
     mean = float(np.mean(found))
     half = student_quantile(len(found) - 1, 0.975) * np.std(found, ddof=1) / np.sqrt(len(found))
-    return SharedWeightError(mean, (mean - float(half), mean + float(half)), tuple(found))
+    return _SharedWeightError(mean, (mean - float(half), mean + float(half)), tuple(found))

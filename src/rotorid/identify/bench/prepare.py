@@ -17,7 +17,7 @@ from rotorid.io.tables import by_recording
 from rotorid.recordings.signal import filters
 
 SPIKE = 16
-SETTLING_SAMPLES = 10
+_SETTLING_SAMPLES = 10
 """Fig. 2.35: so many samples let the spikes of switching on dissipate."""
 
 
@@ -37,7 +37,7 @@ class Filter:
     """Span of the low-passed signal, unit of the channel."""
 
 
-def rest_range(session: pd.Series, table: pd.DataFrame) -> tuple[int, int]:
+def _rest_range(session: pd.Series, table: pd.DataFrame) -> tuple[int, int]:
     """First and last row of the rest reading: the recorder's tare, else what lies between settling and load.
 
     Marks are values of the table's column `index`.
@@ -50,20 +50,20 @@ def rest_range(session: pd.Series, table: pd.DataFrame) -> tuple[int, int]:
         load = session.get("mark_load")
         if pd.isna(load):
             raise InputError(f"{session['id']}: has neither a tare nor a mark where the load was put on")
-        first, last = SETTLING_SAMPLES, np.searchsorted(index, load) - 2
+        first, last = _SETTLING_SAMPLES, np.searchsorted(index, load) - 2
     if last < first:
         raise InputError(f"{session['id']}: no samples at rest before the load")
     return int(first), int(last)
 
 
-def prepare_recording(session: pd.Series, table: pd.DataFrame, channels: Sequence[str], settings: Filter):
+def _prepare_recording(session: pd.Series, table: pd.DataFrame, channels: Sequence[str], settings: Filter):
     """One recording made ready: columns `id time_s index quality steady`, and for each channel its tared values,
     `<channel>_low_pass` and `<channel>_zero_phase`."""
     rate_hz = float(session["rate_hz"])
     raw = table[list(channels)].to_numpy()
     jumped = filters.spikes(raw, settings.spike_window, settings.spike_threshold)
     clean = filters.without_spikes(raw, jumped)
-    clean = clean - filters.tare(clean, *rest_range(session, table))
+    clean = clean - filters.tare(clean, *_rest_range(session, table))
     low = filters.first_order(clean, settings.low_pass_hz, rate_hz)
     out = table[["id", "time_s", "index"]].copy()
     out["quality"] = table["quality"].to_numpy() | np.where(jumped.any(axis=1), SPIKE, 0).astype(np.uint8)
@@ -83,8 +83,8 @@ def prepare(samples: pd.DataFrame, sessions: pd.DataFrame, settings: Filter) -> 
         if session["kind"] == "calibration":
             name = f"cell_{int(session['cell'])}_v"
             table = table.rename(columns={name: "cell_v"})
-            out.append(prepare_recording(session, table, ["cell_v"], settings))
+            out.append(_prepare_recording(session, table, ["cell_v"], settings))
         else:
             channels = [name for name in (*CELLS, *FORCES) if name in table]
-            out.append(prepare_recording(session, table, channels, settings))
+            out.append(_prepare_recording(session, table, channels, settings))
     return pd.concat(out, ignore_index=True)

@@ -21,7 +21,7 @@ from rotorid.identify.bench.channels import CELLS
 from rotorid.identify.bench.loadcell import LineFit, fit_line
 from rotorid.io.tables import by_recording
 
-FEWEST_STEADY = 50
+_FEWEST_STEADY = 50
 
 
 def readings(prepared: pd.DataFrame, sessions: pd.DataFrame) -> pd.DataFrame:
@@ -38,8 +38,8 @@ def readings(prepared: pd.DataFrame, sessions: pd.DataFrame) -> pd.DataFrame:
         # Steady until the end: before the weight is really on, the reading at rest is steady too.
         unsteady = np.flatnonzero(~loaded["steady"].to_numpy())
         first = int(unsteady[-1]) + 1 if len(unsteady) else 0
-        if len(loaded) - first < FEWEST_STEADY:
-            raise InputError(f"{session.id}: the reading was not steady for the last {FEWEST_STEADY} samples")
+        if len(loaded) - first < _FEWEST_STEADY:
+            raise InputError(f"{session.id}: the reading was not steady for the last {_FEWEST_STEADY} samples")
         kept = loaded.iloc[first:]
         kept = kept[kept["quality"] == 0]
         volts, time_s = kept["cell_v"].to_numpy(), kept["time_s"].to_numpy()
@@ -66,7 +66,7 @@ def _slope(time_s: np.ndarray, values: np.ndarray) -> float:
 
 
 @dataclass(frozen=True)
-class Metrology:
+class _Metrology:
     """Figures of one cell; gf unless the name says otherwise."""
 
     line: LineFit
@@ -82,7 +82,7 @@ class Metrology:
     creep_interval_95: tuple[float, float]
 
 
-def calibrate_cell(table: pd.DataFrame, idle_slopes_v_s: np.ndarray) -> Metrology:
+def calibrate_cell(table: pd.DataFrame, idle_slopes_v_s: np.ndarray) -> _Metrology:
     """Line and figures of one cell from its rows of `readings` and its slopes where it was not loaded (V/s)."""
     weight, reading = table["weight_gf"].to_numpy(float), table["reading_10uv"].to_numpy(float)
     line = fit_line(reading, weight)
@@ -98,7 +98,7 @@ def calibrate_cell(table: pd.DataFrame, idle_slopes_v_s: np.ndarray) -> Metrolog
     share = float(growth @ volts / (volts @ volts))
     left = growth - share * volts
     half = student_quantile(len(volts) - 1, 0.975) * np.sqrt(left @ left / (len(volts) - 1) / (volts @ volts))
-    return Metrology(
+    return _Metrology(
         line=line,
         linearity_gf=float(np.abs(off).max()),
         repeatability_gf=spread,
@@ -136,7 +136,7 @@ def idle_slopes(samples: pd.DataFrame, sessions: pd.DataFrame) -> dict[int, np.n
     return {i: np.array(v) for i, v in out.items()}
 
 
-def as_dict(cell: int, metrology: Metrology) -> dict:
+def as_dict(cell: int, metrology: _Metrology) -> dict:
     """One cell's figures for a JSON file, units in the names."""
     line = metrology.line
     return {

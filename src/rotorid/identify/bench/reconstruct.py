@@ -19,9 +19,9 @@ from rotorid.identify.bench.loadcell import LineFit
 
 GF_N = 9.80665e-3
 """Newtons in a gram-force."""
-C30, C45, C60 = np.cos(np.radians([30.0, 45.0, 60.0]))
+_C30, _C45, _C60 = np.cos(np.radians([30.0, 45.0, 60.0]))
 
-DISTANCES = ("D_1x D_2x D_4x D_5x D_6x D_1y D_2y D_3y D_4y D_5y D_6y D_135z D_246z L").split()
+_DISTANCES = ("D_1x D_2x D_4x D_5x D_6x D_1y D_2y D_3y D_4y D_5y D_6y D_135z D_246z L").split()
 PULLED = (0, 2, 4)
 """Cells 1, 3, 5: their absolute value enters eq. 2.8."""
 
@@ -43,22 +43,22 @@ class Geometry:
         return np.array(
             [
                 [
-                    -d["D_135z"] / (C60 * length),
-                    (d["D_246z"] / C30 - d["D_2x"]) / (C45 * length),
+                    -d["D_135z"] / (_C60 * length),
+                    (d["D_246z"] / _C30 - d["D_2x"]) / (_C45 * length),
                     d["D_135z"] / length,
-                    d["D_4x"] / (C45 * length),
-                    -d["D_135z"] / (C60 * length),
-                    -(d["D_246z"] / C30 - d["D_6x"]) / (C45 * length),
+                    d["D_4x"] / (_C45 * length),
+                    -d["D_135z"] / (_C60 * length),
+                    -(d["D_246z"] / _C30 - d["D_6x"]) / (_C45 * length),
                 ],
                 [
-                    d["D_135z"] / (C30 * length),
-                    (d["D_246z"] / C60 + d["D_2y"]) / (C45 * length),
+                    d["D_135z"] / (_C30 * length),
+                    (d["D_246z"] / _C60 + d["D_2y"]) / (_C45 * length),
                     0.0,
-                    (d["D_4y"] - d["D_246z"]) / (C45 * length),
-                    -d["D_135z"] / (C30 * length),
-                    (d["D_246z"] / C60 - d["D_6y"]) / (C45 * length),
+                    (d["D_4y"] - d["D_246z"]) / (_C45 * length),
+                    -d["D_135z"] / (_C30 * length),
+                    (d["D_246z"] / _C60 - d["D_6y"]) / (_C45 * length),
                 ],
-                [0.0, -1 / C45, 0.0, -1 / C45, 0.0, -1 / C45],
+                [0.0, -1 / _C45, 0.0, -1 / _C45, 0.0, -1 / _C45],
             ]
         )
 
@@ -69,10 +69,10 @@ def read_geometry(path: str | Path) -> Geometry:
     if not {"distance", "value_mm"} <= set(table.columns):
         raise InputError(f"{path}: expected the columns distance and value_mm")
     values = dict(zip(table["distance"], table["value_mm"] / 1000, strict=True))
-    missing = [name for name in DISTANCES if name not in values]
+    missing = [name for name in _DISTANCES if name not in values]
     if missing:
         raise InputError(f"{path}: the distance {missing[0]} is missing")
-    return Geometry({name: float(values[name]) for name in DISTANCES})
+    return Geometry({name: float(values[name]) for name in _DISTANCES})
 
 
 def input_components(cells_n: np.ndarray) -> dict[str, np.ndarray]:
@@ -82,19 +82,19 @@ def input_components(cells_n: np.ndarray) -> dict[str, np.ndarray]:
     """
     f = {i + 1: np.asarray(cells_n, float)[..., i] for i in range(6)}
     return {
-        "f_1x": f[1] / C60,
-        "f_2x": f[2] / (C30 * C45),
+        "f_1x": f[1] / _C60,
+        "f_2x": f[2] / (_C30 * _C45),
         "f_3x": f[3],
-        "f_5x": f[5] / C60,
-        "f_6x": f[6] / (C30 * C45),
-        "f_1y": f[1] / C30,
-        "f_2y": f[2] / (C60 * C45),
-        "f_4y": f[4] / C45,
-        "f_5y": f[5] / C30,
-        "f_6y": f[6] / (C60 * C45),
-        "f_2z": f[2] / C45,
-        "f_4z": f[4] / C45,
-        "f_6z": f[6] / C45,
+        "f_5x": f[5] / _C60,
+        "f_6x": f[6] / (_C30 * _C45),
+        "f_1y": f[1] / _C30,
+        "f_2y": f[2] / (_C60 * _C45),
+        "f_4y": f[4] / _C45,
+        "f_5y": f[5] / _C30,
+        "f_6y": f[6] / (_C60 * _C45),
+        "f_2z": f[2] / _C45,
+        "f_4z": f[4] / _C45,
+        "f_6z": f[6] / _C45,
     }
 
 

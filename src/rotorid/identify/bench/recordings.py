@@ -19,7 +19,7 @@ from rotorid.recordings import columns as c
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.vehicle import Vehicle
 
-DIRECTION = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, -1.0)}
+_DIRECTION = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, -1.0)}
 """Unit vector of a load, body axes: along z it pulls upwards, as thrust does."""
 
 
@@ -40,7 +40,7 @@ def reference(session, table: pd.DataFrame, force_n: np.ndarray) -> np.ndarray:
     Nobody wrote down the very moment at which the weight came on: it is where the reading first exceeds half of
     its final value.
     """
-    direction = np.array(DIRECTION[session.axis])
+    direction = np.array(_DIRECTION[session.axis])
     along = force_n @ direction
     index = table["index"].to_numpy()
     final = along[(index >= session.mark_read_start) & (index <= session.mark_read_stop)].mean()

@@ -19,17 +19,17 @@ from rotorid.errors import InputError
 from rotorid.identify.bench.loadcell import fit_line
 from rotorid.io.tables import by_recording
 
-OFFSET_STRAIN = 0.002
-FOOT_SHARE = 0.04
+_OFFSET_STRAIN = 0.002
+_FOOT_SHARE = 0.04
 """The straight part is looked for from this share of the strength on: below it the slack is still being removed."""
-FIRST_SHARE = 0.12
+_FIRST_SHARE = 0.12
 """… and reaches at least up to this share."""
-NOISE_FACTOR = 4.0
+_NOISE_FACTOR = 4.0
 """Residuals beyond so many standard deviations of the noise end the straight part."""
 
 
 @dataclass(frozen=True)
-class Specimen:
+class _Specimen:
     """Curve and figures of one specimen; strain is compensated for the slack."""
 
     strain: np.ndarray
@@ -46,7 +46,7 @@ class Specimen:
     straight_samples: int
 
 
-def evaluate(displacement_mm: np.ndarray, force_n: np.ndarray, gauge_mm: float, section_mm2: float) -> Specimen:
+def evaluate(displacement_mm: np.ndarray, force_n: np.ndarray, gauge_mm: float, section_mm2: float) -> _Specimen:
     """Figures of one specimen.
 
     Parameters
@@ -65,15 +65,15 @@ def evaluate(displacement_mm: np.ndarray, force_n: np.ndarray, gauge_mm: float, 
     stress, strain = force / section_mm2 * 1e6, displacement / gauge_mm
     peak = int(np.argmax(stress))
     strength = float(stress[peak])
-    first = int(np.argmax(stress > FOOT_SHARE * strength))
-    last = int(np.argmax(stress > FIRST_SHARE * strength))
+    first = int(np.argmax(stress > _FOOT_SHARE * strength))
+    last = int(np.argmax(stress > _FIRST_SHARE * strength))
     noise = _noise(stress[: peak + 1])
     last = max(last, first + 4)
     if last >= peak:
         raise InputError("no straight part of at least five samples before the largest force")
     while last < peak:
         longer = fit_line(strain[first : last + 2], stress[first : last + 2])
-        if np.max(np.abs(longer.residuals)) > NOISE_FACTOR * noise:
+        if np.max(np.abs(longer.residuals)) > _NOISE_FACTOR * noise:
             break
         last += 1
     line = fit_line(strain[first : last + 1], stress[first : last + 1])
@@ -81,7 +81,7 @@ def evaluate(displacement_mm: np.ndarray, force_n: np.ndarray, gauge_mm: float, 
     strain = strain - zero
     broken = int(peak + np.argmax(np.append(stress[peak:], 0.0) < 0.5 * strength))
     yield_strain, yield_pa = _offset_yield(strain[: peak + 1], stress[: peak + 1], line.a1)
-    return Specimen(
+    return _Specimen(
         strain=strain[:broken],
         stress_pa=stress[:broken],
         modulus_pa=line.a1,
@@ -104,8 +104,8 @@ def _noise(stress: np.ndarray) -> float:
 
 def _offset_yield(strain: np.ndarray, stress: np.ndarray, modulus: float) -> tuple[float, float]:
     """Strain and stress where the curve falls below the line moved by 0.2 % of strain."""
-    above = stress - modulus * (strain - OFFSET_STRAIN)
-    loaded = np.flatnonzero(strain > OFFSET_STRAIN)
+    above = stress - modulus * (strain - _OFFSET_STRAIN)
+    loaded = np.flatnonzero(strain > _OFFSET_STRAIN)
     below = loaded[above[loaded] <= 0]
     if len(below) == 0:
         raise InputError("the curve never meets the line of 0.2 % plastic strain: the specimen broke before it yielded")

@@ -12,7 +12,7 @@ from rotorid.errors import InputError
 from rotorid.identify.blackbox.experiments import INPUTS, OUTPUTS
 from rotorid.identify.blackbox.models import Predict, Scale
 
-INPUT_NAMES = {f"force_{i}_n": f"the force of motor {i} (N)" for i in (1, 2, 3, 4)} | {
+_INPUT_NAMES = {f"force_{i}_n": f"the force of motor {i} (N)" for i in (1, 2, 3, 4)} | {
     "roll_rad": "roll (rad)",
     "pitch_rad": "pitch (rad)",
 }
@@ -123,7 +123,7 @@ class TrainingRange:
         """A sentence for one input (6,): inside, or what lies outside and by how much."""
         scaled = self.scale.apply(np.asarray(inputs, float))
         outside = [
-            f"{INPUT_NAMES[name]} is {value:.3g}, trained from {low:.3g} to {high:.3g}"
+            f"{_INPUT_NAMES[name]} is {value:.3g}, trained from {low:.3g} to {high:.3g}"
             for name, value, low, high, s in zip(INPUTS, inputs, self.scale.low, self.scale.high, scaled, strict=True)
             if s < -1e-9 or s > 1 + 1e-9
         ]

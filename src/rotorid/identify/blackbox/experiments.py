@@ -22,7 +22,7 @@ OUTPUTS = ("force_x_n", "force_y_n", "force_z_n", "moment_x_n_m", "moment_y_n_m"
 COLUMNS = ("experiment", "sample", *INPUTS, *OUTPUTS)
 PLATEAU_BLOCKS = 2
 SINE_BLOCKS = 12
-LARGEST_SHIFT_S = 1.0
+_LARGEST_SHIFT_S = 1.0
 
 
 def thrust_of_throttle(points: pd.DataFrame):
@@ -83,7 +83,7 @@ def samples_of(number: int, quadrotor: pd.DataFrame, wrench: pd.DataFrame, curve
 
 def _shift(grid, total, when, lift) -> float:
     """Seconds by which the wrench's clock is ahead, by the largest correlation of lift with thrust."""
-    shifts = np.arange(-LARGEST_SHIFT_S, LARGEST_SHIFT_S, 0.01)
+    shifts = np.arange(-_LARGEST_SHIFT_S, _LARGEST_SHIFT_S, 0.01)
     scores = [np.corrcoef(total, np.interp(grid + s, when, lift))[0, 1] for s in shifts]
     return float(shifts[int(np.argmax(scores))])
 

@@ -88,7 +88,7 @@ def fit_linear(table: pd.DataFrame) -> Predict:
     return lambda other: design(other) @ found
 
 
-def physical_features(table: pd.DataFrame) -> np.ndarray:
+def _physical_features(table: pd.DataFrame) -> np.ndarray:
     """Each motor's force times 1, sin and cos of roll and pitch and their product, (n, 24)."""
     forces = table[list(INPUTS[:4])].to_numpy()
     roll, pitch = table["roll_rad"].to_numpy(), table["pitch_rad"].to_numpy()
@@ -110,7 +110,7 @@ def fit_ridge_physics(table: pd.DataFrame, groups: np.ndarray) -> Predict:
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import StandardScaler
 
-    x, y = physical_features(table), table[list(OUTPUTS)].to_numpy()
+    x, y = _physical_features(table), table[list(OUTPUTS)].to_numpy()
     models = []
     for output in y.T:
         scores = {}
@@ -121,7 +121,7 @@ def fit_ridge_physics(table: pd.DataFrame, groups: np.ndarray) -> Predict:
             ).mean()
         best = max(scores, key=scores.get)
         models.append(make_pipeline(StandardScaler(), Ridge(alpha=best)).fit(x, output))
-    return lambda other: np.column_stack([m.predict(physical_features(other)) for m in models])
+    return lambda other: np.column_stack([m.predict(_physical_features(other)) for m in models])
 
 
 def fit_boosting(table: pd.DataFrame, seed: int = 0) -> Predict:

@@ -29,7 +29,7 @@ def coefficient(network: Network, scaling: Scaling) -> float:
 
 
 @dataclass(frozen=True)
-class AerodynamicFit:
+class _AerodynamicFit:
     coefficient: float
     scaling: Scaling
     trained: Trained
@@ -37,11 +37,11 @@ class AerodynamicFit:
 
 def fit_coefficient_network(
     speed_rad_s: np.ndarray, value: np.ndarray, hidden: int, training: Training
-) -> AerodynamicFit:
+) -> _AerodynamicFit:
     """Train on steady points: speeds (n,), rad/s, and thrusts (N) or torques (N m) (n,)."""
     scaling = Scaling.of(speed_rad_s, value)
     network = build((1, hidden, 1), ("linear", "linear"), np.random.default_rng(training.seed), bias=False)
     inputs = (scaling.k_x * np.asarray(speed_rad_s, float)[:, None]) ** 2
     targets = scaling.k_d * np.asarray(value, float)[:, None]
     trained = train(network, inputs, targets, training)
-    return AerodynamicFit(coefficient(trained.network, scaling), scaling, trained)
+    return _AerodynamicFit(coefficient(trained.network, scaling), scaling, trained)

@@ -14,7 +14,7 @@ from scipy.special import chdtrc
 
 
 @dataclass(frozen=True)
-class Consistency:
+class _Consistency:
     """`gap` (3,): trained minus implied gyroscopic weight; `sigma` its standard error (0 where unknown)."""
 
     trained: np.ndarray
@@ -44,7 +44,7 @@ def _slope(weights: np.ndarray) -> np.ndarray:
     return np.hstack([np.eye(3), -implied])
 
 
-def check_consistency(weights: np.ndarray, covariance: np.ndarray) -> Consistency:
+def check_consistency(weights: np.ndarray, covariance: np.ndarray) -> _Consistency:
     """Wald test of the three relations for weights (6,) with covariance (6, 6)."""
     weights = np.asarray(weights, float)
     implied = implied_gyroscopic(weights)
@@ -52,4 +52,4 @@ def check_consistency(weights: np.ndarray, covariance: np.ndarray) -> Consistenc
     slope = _slope(weights)
     spread = slope @ covariance @ slope.T
     statistic = float(gap @ np.linalg.solve(spread, gap))
-    return Consistency(weights[:3], implied, gap, np.sqrt(np.diag(spread)), statistic, float(chdtrc(3, statistic)))
+    return _Consistency(weights[:3], implied, gap, np.sqrt(np.diag(spread)), statistic, float(chdtrc(3, statistic)))

@@ -16,16 +16,15 @@ import numpy as np
 
 from rotorid.identify.estimate.inertial import regressors, weights_of_inertias
 from rotorid.recordings.vehicle import Vehicle
-from rotorid.vehicle.control.pid import AttitudePid, Gains
-from rotorid.vehicle.control.references import AttitudeReference
+from rotorid.vehicle.control.pid import AttitudePid, AttitudeReference, Gains
 from rotorid.vehicle.fast import AttitudeLoop
 from rotorid.vehicle.mixer import allocation_matrix, wrench_matrix
 
-HOLD_GAINS = Gains((0.04, 0.04, 0.04), (0.02, 0.02, 0.01), (0.015, 0.015, 0.02))
+_HOLD_GAINS = Gains((0.04, 0.04, 0.04), (0.02, 0.02, 0.01), (0.015, 0.015, 0.02))
 """A soft attitude hold, slower than the excitation: it keeps the attitude but does not undo the motion."""
 
 
-FIRST_SHARES_N_M = np.array([0.1, 0.1, 0.03])
+_FIRST_SHARES_N_M = np.array([0.1, 0.1, 0.03])
 """Where the search for the axes' shares begins: roll and pitch can be pushed far harder than yaw."""
 WINDOW_S = 0.25
 """Length of the windows that the estimate is expected to use."""
@@ -155,7 +154,7 @@ def design(
     mine = owner[:, None] == np.arange(3)
 
     def trial(levels, phases, share):
-        amplitude = np.where(mine, np.exp(levels), 0.0) * np.exp(share) * FIRST_SHARES_N_M
+        amplitude = np.where(mine, np.exp(levels), 0.0) * np.exp(share) * _FIRST_SHARES_N_M
         made = Multisine(wanted.period_s, harmonics.astype(float), amplitude, phases)
         return _largest(made, time_s, allocation, thrust, inertias, wanted)
 
@@ -188,7 +187,7 @@ class ExcitedHold:
 
     def __init__(self, vehicle: Vehicle, multisine: Multisine, limits_rad_s: tuple[float, float]):
         hold = AttitudeReference("level", vehicle.mass_kg * vehicle.gravity_m_s2, lambda t: np.zeros(3))
-        self._pid = AttitudePid(vehicle, hold, HOLD_GAINS, derivative_time_s=0.02)
+        self._pid = AttitudePid(vehicle, hold, _HOLD_GAINS, derivative_time_s=0.02)
         self._multisine = multisine
         self._allocation = allocation_matrix(vehicle)
         self._limits = limits_rad_s

@@ -22,7 +22,7 @@ from rotorid.vehicle.mixer import wrench_matrix
 
 
 @dataclass(frozen=True)
-class BandSignals:
+class _BandSignals:
     """Band-passed moment and angular acceleration of one stretch, (n, 3), N m and rad/s2, with the sample rate."""
 
     run: str
@@ -32,7 +32,7 @@ class BandSignals:
 
 
 @dataclass(frozen=True)
-class FlightInertia:
+class _FlightInertia:
     """Of one axis: bounds, estimate and its 95 % interval over blocks (kg m2), squared correlation."""
 
     lower: float
@@ -44,7 +44,7 @@ class FlightInertia:
 
 def band_signals(
     run: Run, vehicle: Vehicle, band_hz: tuple[float, float], delay_s: float, rate_hz: float
-) -> BandSignals | None:
+) -> _BandSignals | None:
     """Signals of a run on an even grid, rotor speeds taken `delay_s` earlier; None where columns are missing.
 
     The gyroscopic term Ω × JΩ, small here, is added to the moment's side with the believed inertia.
@@ -65,7 +65,7 @@ def band_signals(
     moment = (np.roll(moment, 1, 0) + 4 * moment + np.roll(moment, -1, 0)) / 6
     edge = int(rate_hz / band_hz[0])
     keep = slice(edge, -edge)
-    return BandSignals(
+    return _BandSignals(
         run.name,
         sosfiltfilt(filtered, moment, axis=0)[keep],
         sosfiltfilt(filtered, acceleration, axis=0)[keep],
@@ -79,8 +79,8 @@ def _on_grid(grid: np.ndarray, time_s: np.ndarray, values: np.ndarray) -> np.nda
 
 
 def fit_flights(
-    parts: Sequence[BandSignals], block_s: float, rng: np.random.Generator, draws: int = 500
-) -> list[FlightInertia]:
+    parts: Sequence[_BandSignals], block_s: float, rng: np.random.Generator, draws: int = 500
+) -> list[_FlightInertia]:
     """Inertia about x, y, z from several flights; intervals by drawing blocks of `block_s`."""
     sums = []
     for part in parts:
@@ -96,7 +96,7 @@ def fit_flights(
         positive = ma[k] > 0
         spread = np.sqrt(drawn[:, 2, k] / drawn[:, 1, k])
         found.append(
-            FlightInertia(
+            _FlightInertia(
                 float(ma[k] / aa[k]) if positive else float("nan"),
                 float(mm[k] / ma[k]) if positive else float("nan"),
                 float(np.sqrt(mm[k] / aa[k])),

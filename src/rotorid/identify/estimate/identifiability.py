@@ -10,7 +10,7 @@ from rotorid.identify.estimate.inertial import regressors, weights_of_inertias
 
 
 @dataclass(frozen=True)
-class Identifiability:
+class _Identifiability:
     """Relative standard errors that a manoeuvre allows, for accelerations with white noise of one sigma.
 
     `weights` (6,): w11, w22, w33, w14, w25, w36 free, relative to the weight where it is not small (else
@@ -25,7 +25,7 @@ class Identifiability:
 
 def identifiability(
     rates: np.ndarray, moments: np.ndarray, inertias: np.ndarray, noise_rad_s2: float
-) -> Identifiability:
+) -> _Identifiability:
     """Of rates (n, 3), rad/s, and moments (n, 3), N m, for noise `noise_rad_s2` of each acceleration."""
     inputs = regressors(rates, moments)
     true = weights_of_inertias(inertias)
@@ -46,4 +46,4 @@ def identifiability(
         columns.append(np.concatenate([inputs[:, [a, 3 + a]] @ slope[[a, 3 + a]] for a in range(3)]))
     sensitivity = np.column_stack(columns)
     inertia_errors = noise_rad_s2 * np.sqrt(np.diag(np.linalg.inv(sensitivity.T @ sensitivity)))
-    return Identifiability(errors / np.maximum(np.abs(true), 1e-300), inertia_errors, shares)
+    return _Identifiability(errors / np.maximum(np.abs(true), 1e-300), inertia_errors, shares)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rotorid.effects.compiling import compiled
+from rotorid.effects.contract import compiled
 from rotorid.identify.networks.training import Training
 
 MASK = np.array([[1, 0, 0, 1, 0, 0], [0, 1, 0, 0, 1, 0], [0, 0, 1, 0, 0, 1]], float)
@@ -29,7 +29,7 @@ def weights_of_inertias(inertias: np.ndarray) -> np.ndarray:
     return np.array([(y - z) / x, (z - x) / y, (x - y) / z, 1 / x, 1 / y, 1 / z])
 
 
-def six_weights(matrix: np.ndarray) -> np.ndarray:
+def _six_weights(matrix: np.ndarray) -> np.ndarray:
     """(w11, w22, w33, w14, w25, w36) of the weight matrix (3, 6)."""
     return np.array([matrix[i, i] for i in range(3)] + [matrix[i, 3 + i] for i in range(3)])
 
@@ -40,7 +40,7 @@ def inertias_of_weights(weights: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class WeightFit:
+class _WeightFit:
     """Six weights, their covariance (6, 6), residual of the accelerations (n, 3)."""
 
     weights: np.ndarray
@@ -128,10 +128,10 @@ def fit_masked_network(
     matrix = matrix * k_x / k_d[:, None]
     with np.errstate(divide="ignore"):  # an input that is always zero never settles
         settle = 1 / (training.rate * np.mean((inputs * k_x) ** 2, axis=0))
-    return NetworkFit(six_weights(matrix), np.arange(len(mse)) * training.every, mse, settle)
+    return NetworkFit(_six_weights(matrix), np.arange(len(mse)) * training.every, mse, settle)
 
 
-def fit_least_squares(rates: np.ndarray, accelerations: np.ndarray, moments: np.ndarray, block: int = 50) -> WeightFit:
+def fit_least_squares(rates: np.ndarray, accelerations: np.ndarray, moments: np.ndarray, block: int = 50) -> _WeightFit:
     """The weights where the network would end, with a covariance that holds for residuals correlated in time.
 
     Scores are summed over blocks of `block` samples (cluster-robust), so that correlation shorter than a
@@ -150,4 +150,4 @@ def fit_least_squares(rates: np.ndarray, accelerations: np.ndarray, moments: np.
         spread = len(edges) / max(len(edges) - 2, 1) * inverse @ (scores.T @ scores) @ inverse
         weights[[axis, 3 + axis]] = found
         covariance[np.ix_([axis, 3 + axis], [axis, 3 + axis])] = spread
-    return WeightFit(weights, covariance, residual)
+    return _WeightFit(weights, covariance, residual)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtrit as student_quantile
 
-from rotorid.effects.compiling import compiled
+from rotorid.effects.contract import compiled
 from rotorid.identify.estimate.inertial import weights_of_inertias
 
 
@@ -113,7 +113,7 @@ def untied(parameters: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class OutputErrorFit:
+class _OutputErrorFit:
     """Parameters (p,), covariance (p, p); residual rms per axis (3,), rad/s; share of variance explained."""
 
     parameters: np.ndarray
@@ -152,7 +152,7 @@ def fit_output_error(
     tolerance: float = 1e-7,
     cluster: int = 4,
     moment_noise_n_m: np.ndarray | None = None,
-) -> OutputErrorFit:
+) -> _OutputErrorFit:
     """Gauss-Newton with the windows' own unknowns projected out.
 
     Noise of the moments (3,), one sigma a sample, blurs the regressors and would make the inertias too large by
@@ -224,7 +224,7 @@ def fit_output_error(
     count = len(clustered)
     covariance = count / max(count - len(parameters), 1) * inverse @ spread_of_scores @ inverse
     spread = windows.rates - windows.rates.mean(axis=1, keepdims=True)
-    return OutputErrorFit(
+    return _OutputErrorFit(
         parameters,
         covariance,
         scale,

@@ -9,10 +9,9 @@ import numpy as np
 
 from rotorid.identify.bench.reconstruct import Geometry, forces
 from rotorid.identify.fem.bench import CELLS, PIECES
-from rotorid.identify.fem.gauges import bridge_strain
+from rotorid.identify.fem.gauges import bridge_strain, strain_per_newton
 from rotorid.identify.fem.model import Bench, Solved
 from rotorid.identify.fem.placement import LEGS
-from rotorid.identify.fem.single_cell import strain_per_newton
 from rotorid.identify.fem.sizes import MATERIALS, Assumed, Sizes, materials
 
 PARTS = (*CELLS, *PIECES)

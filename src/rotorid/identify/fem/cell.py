@@ -11,17 +11,17 @@ from rotorid.errors import InputError
 from rotorid.identify.fem.sizes import Sizes
 from rotorid.identify.fem.tets import Flat, Tets, between, block, count, joined, mirrored, stacked
 
-CORNER = np.pi / 4
+_CORNER = np.pi / 4
 """Angle about the hole's axis of the line from the hole to the corner of the block around it."""
 
-WALL = 1.5
+_WALL = 1.5
 """Distance from the hole's axis to the end of that block, over half the bar's side."""
 
 
 def profile(sizes: Sizes, fineness: float) -> Flat:
     """The bar from the side, with `fineness` times as many elements along each line as the coarsest has."""
     half, reach = sizes.cell_side_m / 2, sizes.cell_between_holes_m / 2
-    beyond = reach + WALL * half
+    beyond = reach + _WALL * half
     radius, slot, end = sizes.hole_radius_m, sizes.cell_slot_m / 2, sizes.cell_length_m / 2
     first = np.pi - np.arcsin(min(slot / radius, 1.0))
     inner = reach + radius * np.cos(first)
@@ -29,18 +29,18 @@ def profile(sizes: Sizes, fineness: float) -> Flat:
         raise InputError("the load cell's holes do not fit into its bar with these sizes")
     angles = np.r_[
         np.linspace(first, np.pi / 2, count(4, fineness) + 1),
-        np.linspace(np.pi / 2, CORNER, count(3, fineness) + 1)[1:],
+        np.linspace(np.pi / 2, _CORNER, count(3, fineness) + 1)[1:],
     ]
     arc = np.c_[reach + radius * np.cos(angles), radius * np.sin(angles)]
     # Straight above the hole's axis the lines between hole and surface stand upright: that is the narrow section.
-    above = np.interp(-angles, [-first, -np.pi / 2, -CORNER], [inner, reach, beyond])
+    above = np.interp(-angles, [-first, -np.pi / 2, -_CORNER], [inner, reach, beyond])
     straight = np.linspace(0, inner, count(1, fineness) + 1)[:-1]
     below = np.concatenate([np.c_[straight, np.full(len(straight), slot)], arc])
     top = np.c_[np.r_[straight, above], np.full(len(straight) + len(above), half)]
     layers = count(1, fineness)
-    angles = np.linspace(CORNER, 0, count(2, fineness) + 1)
+    angles = np.linspace(_CORNER, 0, count(2, fineness) + 1)
     side_in = np.c_[reach + radius * np.cos(angles), radius * np.sin(angles)]
-    height = half * angles / CORNER
+    height = half * angles / _CORNER
     side_out = np.c_[np.full(len(height), beyond), height]
     columns = np.linspace(beyond, end, count(2, fineness) + 1)
     rest = block(np.stack(np.meshgrid(columns, height, indexing="ij"), axis=-1))

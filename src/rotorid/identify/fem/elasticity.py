@@ -20,9 +20,9 @@ from rotorid.errors import InputError
 from rotorid.identify.fem.sizes import Material
 from rotorid.identify.fem.tets import Tets
 
-INTEGRATED = 3
+_INTEGRATED = 3
 """Degree of the polynomials that are integrated exactly."""
-LEFT_OVER = 1e-6
+_LEFT_OVER = 1e-6
 """Share of the forces that a solution may leave unbalanced."""
 OUTSIDE = 0.02
 """A point may lie outside of its tetrahedron by so much of its size: curved surfaces are meshed by flat ones."""
@@ -79,7 +79,7 @@ class Body:
     @cached_property
     def basis(self) -> Basis:
         """Quadratic shape functions of one component, with points that integrate products of their gradients."""
-        return Basis(self.mesh, ElementTetP2(), intorder=INTEGRATED)
+        return Basis(self.mesh, ElementTetP2(), intorder=_INTEGRATED)
 
     @property
     def nodes_m(self) -> np.ndarray:
@@ -103,7 +103,7 @@ class Body:
         found = {}
         for name in dict.fromkeys(self.groups):
             own = np.flatnonzero(self.group == name)
-            basis = Basis(self.mesh, ElementTetP2(), intorder=INTEGRATED, elements=own)
+            basis = Basis(self.mesh, ElementTetP2(), intorder=_INTEGRATED, elements=own)
             half = {(a, b): _product(a, b).assemble(basis) for a in range(3) for b in range(a, 3)}
             found[name] = half | {(b, a): matrix.T.tocsr() for (a, b), matrix in half.items() if a != b}
         return found
@@ -268,6 +268,6 @@ def solve(stiffness: sparse.csr_matrix, binding: sparse.csr_matrix, forces: np.n
         free = factors.solve(given)
     except RuntimeError:
         free = np.full_like(given, np.nan)
-    if not np.linalg.norm(reduced @ free - given) <= LEFT_OVER * np.linalg.norm(given):
+    if not np.linalg.norm(reduced @ free - given) <= _LEFT_OVER * np.linalg.norm(given):
         raise InputError("the parts are not held: the stiffness has no inverse")
     return binding @ free

@@ -15,7 +15,7 @@ import numpy as np
 THIRD = 2 * np.pi / 3
 LEGS = ((1, 2), (5, 6), (3, 4))
 """Upper and lower cell of each leg; each leg is the one before it turned by 120° about z, from x to y."""
-AZIMUTH = {"upper": np.radians(-60.0), "lower": np.radians(30.0)}
+_AZIMUTH = {"upper": np.radians(-60.0), "lower": np.radians(30.0)}
 """Direction outwards across the bar of the first leg's cells, from x to y, by the factors of table 2.2."""
 SLOPE = {"upper": 0.0, "lower": np.radians(45.0)}
 """Angle between the direction in which a cell gives way and the table."""
@@ -61,18 +61,18 @@ def cells(distances_m: Mapping[str, float]) -> dict[int, Place]:
 
 
 def _upper(distances_m: Mapping[str, float]) -> Place:
-    outwards = np.array([np.cos(AZIMUTH["upper"]), np.sin(AZIMUTH["upper"]), 0.0])
+    outwards = np.array([np.cos(_AZIMUTH["upper"]), np.sin(_AZIMUTH["upper"]), 0.0])
     place = np.array([distances_m["D_1x"], -distances_m["D_1y"], distances_m["D_135z"]])
-    return Place(place, _along(AZIMUTH["upper"]), outwards, -outwards)
+    return Place(place, _along(_AZIMUTH["upper"]), outwards, -outwards)
 
 
 def _lower(distances_m: Mapping[str, float]) -> Place:
     slope = SLOPE["lower"]
-    outwards = np.array([np.cos(AZIMUTH["lower"]), np.sin(AZIMUTH["lower"]), 0.0])
+    outwards = np.array([np.cos(_AZIMUTH["lower"]), np.sin(_AZIMUTH["lower"]), 0.0])
     up = np.array([0.0, 0.0, -1.0])
     sense = -np.cos(slope) * outwards + np.sin(slope) * up
     place = np.array([distances_m["D_2x"], -distances_m["D_2y"], distances_m["D_246z"]])
-    return Place(place, _along(AZIMUTH["lower"]), sense, sense)
+    return Place(place, _along(_AZIMUTH["lower"]), sense, sense)
 
 
 def _along(azimuth: float) -> np.ndarray:

@@ -1,4 +1,12 @@
-"""The tables of the report's chapter: loads, meshes, sizes, the signal chain."""
+"""The tables of the report's chapter: loads, meshes, sizes, the signal chain.
+
+From a cell's strain to the converter's counts (thesis 2.1, 2.2 and 2.7.2).
+
+Four active gauges in a full bridge give V = V_e k ε: excitation V_e, gauge factor k, and ε the mean of their strains,
+each with its sign. The ADS1256 resolves V in steps of 2 V_ref / gain / (2²³ - 1).
+
+Problems with a known answer, solved by the same code as the bench: a cantilever, and a plate with a round hole.
+"""
 
 from __future__ import annotations
 
@@ -11,28 +19,37 @@ from scipy.optimize import brentq
 
 from rotorid.errors import InputError
 from rotorid.identify.bench.reconstruct import GF_N, Geometry
-from rotorid.identify.fem import answers, bridge, closed_forms
+from rotorid.identify.fem import answers, elasticity
 from rotorid.identify.fem.answers import Answers, by_part, compare, ratios
+from rotorid.identify.fem.elasticity import Body, Hole
+from rotorid.identify.fem.gauges import strain_per_newton
 from rotorid.identify.fem.model import Bench, Solved
-from rotorid.identify.fem.single_cell import strain_per_newton
-from rotorid.identify.fem.sizes import MATERIALS, Assumed, Sizes, in_file, materials
+from rotorid.identify.fem.sizes import MATERIALS, Assumed, Material, Sizes, in_file, materials
+from rotorid.identify.fem.tets import block, count, stacked
+from rotorid.io.wire.bench import VOLTS_PER_COUNT
 
+_BEAM = Material(68.9e9, 0.0)
+"""Without contraction across, for which beam theory's clamped end is exact."""
+_PLATE = Material(68.9e9, 0.33)
+FINENESSES = (1.0, 2.0, 4.0)
+_PRINTED_STEP_V = 1e-5
+"""Unit of table 2.7's readings and of table 2.8's slopes."""
 SHORT = dict(zip(MATERIALS, ("aluminium", "pla"), strict=True))
 """Ending of a column that holds one material's value."""
-ELECTRIC = ("gauge_factor", "excitation_v")
+_ELECTRIC = ("gauge_factor", "excitation_v")
 """Assumed values that no stress depends on."""
-OF_THE_CELL = ("cell_", "gauge_length", "poisson_aluminium")
+_OF_THE_CELL = ("cell_", "gauge_length", "poisson_aluminium")
 """Beginnings of the names that a single cell's sensitivity depends on."""
 RATED_N = 1000 * GF_N
 """Load that the cells are rated for."""
-TRIES = 5
+_TRIES = 5
 """Times as many benches are drawn at most as are wanted."""
-LARGEST_LIGAMENT = 0.8
+_LARGEST_LIGAMENT = 0.8
 """Share of half the bar's side up to which a ligament is looked for that gives the printed sensitivity."""
 
 
 @dataclass(frozen=True)
-class Levels:
+class _Levels:
     """How fine the meshes are, as multiples of the coarsest."""
 
     study: tuple[float, ...]
@@ -44,14 +61,14 @@ class Levels:
 
 
 LEVELS = {
-    "coarse": Levels(study=(1.0, 1.5, 2.0), sizes=1.0, chain=2.0),
-    "full": Levels(study=(1.0, 1.5, 2.0, 3.0), sizes=1.5, chain=3.0),
+    "coarse": _Levels(study=(1.0, 1.5, 2.0), sizes=1.0, chain=2.0),
+    "full": _Levels(study=(1.0, 1.5, 2.0, 3.0), sizes=1.5, chain=3.0),
 }
 """By the setting `fem`."""
 
 
 @dataclass(frozen=True)
-class Finest:
+class _Finest:
     """The bench on the finest mesh of the study, with pieces of each material."""
 
     bench: Bench
@@ -61,7 +78,7 @@ class Finest:
 
 def mesh_study(
     assumed: Assumed, moduli_pa: Mapping[str, float], geometry: Geometry, finenesses: Sequence[float]
-) -> tuple[pd.DataFrame, Finest]:
+) -> tuple[pd.DataFrame, _Finest]:
     """A mesh a row with what it says per newton, and all of the last one."""
     rows = []
     for fineness in finenesses:
@@ -72,7 +89,7 @@ def mesh_study(
         found = {name: answers.ask(bench, solved[name], cell_strain, geometry) for name in MATERIALS}
         row = {"fineness": fineness, "elements": bench.body.mesh.nelements, "nodes": bench.body.basis.N}
         rows.append(row | {"cell_strain_per_n": cell_strain} | _row(found))
-    return pd.DataFrame(rows), Finest(bench, solved, found)
+    return pd.DataFrame(rows), _Finest(bench, solved, found)
 
 
 def _row(found: Mapping[str, Answers]) -> dict[str, float | str]:
@@ -92,12 +109,12 @@ def loads(found: Mapping[str, Answers], loads_gf: Sequence[float], area_m2: floa
     return pd.DataFrame(table)
 
 
-def parts(finest: Finest) -> dict[str, dict[str, dict[str, float]]]:
+def parts(finest: _Finest) -> dict[str, dict[str, dict[str, float]]]:
     """Largest displacement [m/N] and equivalent stress [Pa/N] by material and part."""
     return {SHORT[name]: by_part(finest.bench, finest.solved[name]) for name in MATERIALS}
 
 
-def surface(finest: Finest) -> pd.DataFrame:
+def surface(finest: _Finest) -> pd.DataFrame:
     """Triangles of the leg's surface: places of their corners [m], and per newton their mean displacement and stress.
 
     Columns: `part`, `x_1_m` to `z_3_m`, and `deformation_m` and `stress_pa` with the ending of each material.
@@ -119,7 +136,7 @@ def surface(finest: Finest) -> pd.DataFrame:
 
 def verification() -> pd.DataFrame:
     """Closed forms and what the solver says, a quantity and mesh a row."""
-    return pd.DataFrame([asdict(row) | {"error": row.error} for row in closed_forms.all_checks()])
+    return pd.DataFrame([asdict(row) | {"error": row.error} for row in _all_checks()])
 
 
 def size_study(
@@ -142,7 +159,7 @@ def size_study(
     """
     rows = []
     for name, end, sizes in [("", "", assumed.sizes), *assumed.variants()]:
-        if name in ELECTRIC:
+        if name in _ELECTRIC:
             continue
         try:
             found = compare(assumed, sizes, moduli_pa, geometry, fineness)
@@ -150,7 +167,7 @@ def size_study(
             raise InputError(f"{in_file(name)[0]} at its {end} end: {error}") from None
         rows.append(_named(name, end, sizes) | _row(found))
     wanted = len(rows) + draws
-    for _ in range(TRIES * draws):
+    for _ in range(_TRIES * draws):
         if len(rows) == wanted:
             break
         try:
@@ -179,9 +196,9 @@ def chain_study(
     fine, coarse = (strain_per_newton(assumed.sizes, of_cell, level) for level in (fineness, fineness_of_sizes))
     rows = [_named("", "", assumed.sizes) | _chain(assumed.sizes, fine)]
     for name, end, sizes in assumed.variants():
-        if name in ELECTRIC:
+        if name in _ELECTRIC:
             rows.append(_named(name, end, sizes) | _chain(sizes, fine))
-        elif name.startswith(OF_THE_CELL):
+        elif name.startswith(_OF_THE_CELL):
             of_cell = materials(sizes, moduli_pa, "PLA")["cells"]
             strain = strain_per_newton(sizes, of_cell, fineness_of_sizes)
             rows.append(_named(name, end, sizes) | _chain(sizes, fine * strain / coarse))
@@ -194,12 +211,12 @@ def sensitivity(sizes: Sizes, moduli_pa: Mapping[str, float], fineness: float) -
 
 
 def _chain(sizes: Sizes, strain_per_n: float) -> dict[str, float]:
-    volts = bridge.volts_per_newton(sizes, strain_per_n)
+    volts = volts_per_newton(sizes, strain_per_n)
     return {
         "strain_per_n": strain_per_n,
         "volts_per_n": volts,
-        "counts_per_n": bridge.counts_per_newton(volts),
-        "slope_gf_per_10uv": bridge.printed_slope(volts),
+        "counts_per_n": counts_per_newton(volts),
+        "slope_gf_per_10uv": printed_slope(volts),
         "rated_mv_per_v": 1e3 * volts * RATED_N / sizes.excitation_v,
     }
 
@@ -225,7 +242,7 @@ def ligament_for(sizes: Sizes, moduli_pa: Mapping[str, float], volts_per_n: floa
     InputError
         None between the assumed one and most of the bar's half side has.
     """
-    thickest = LARGEST_LIGAMENT * sizes.cell_side_m / 2
+    thickest = _LARGEST_LIGAMENT * sizes.cell_side_m / 2
 
     def excess(log_ligament: float) -> float:
         cell = replace(sizes, cell_ligament_m=float(np.exp(log_ligament)))
@@ -262,3 +279,128 @@ def strongest(table: pd.DataFrame, most: int = 3) -> dict[str, list[str]]:
         moved = ends["max"].clip(lower=table[name].iloc[0]) - ends["min"].clip(upper=table[name].iloc[0])
         found[name] = [str(size) for size in moved.nlargest(most).index]
     return found
+
+
+def volts_per_newton(sizes: Sizes, strain_per_newton: float) -> float:
+    """Voltage of the bridge per newton across the cell's end [V/N]."""
+    return sizes.excitation_v * sizes.gauge_factor * strain_per_newton
+
+
+def counts_per_newton(volts_per_n: float) -> float:
+    """Counts of the converter per newton [1/N]."""
+    return volts_per_n / VOLTS_PER_COUNT
+
+
+def printed_slope(volts_per_n: float) -> float:
+    """The same sensitivity as table 2.8 prints it [gf per 1e-5 V]."""
+    return _PRINTED_STEP_V / (volts_per_n * GF_N)
+
+
+def from_printed_slope(slope_gf: float) -> float:
+    """Sensitivity [V/N] of a slope as table 2.8 prints it [gf per 1e-5 V]."""
+    return _PRINTED_STEP_V / (slope_gf * GF_N)
+
+
+@dataclass(frozen=True)
+class _Checked:
+    """A computed number and the closed form's."""
+
+    case: str
+    quantity: str
+    """With its unit."""
+    fineness: float
+    nodes: int
+    computed: float
+    closed_form: float
+
+    @property
+    def error(self) -> float:
+        """Difference as a share of the closed form."""
+        return self.computed / self.closed_form - 1
+
+
+def cantilever(fineness: float, length_m: float = 0.08, side_m: float = 0.01, force_n: float = 1.0) -> list[_Checked]:
+    """A clamped square bar with a force across its free end: deflection there and stress halfway.
+
+    Deflection of a beam with shear, F l³ / (3 E I) + 6 F l / (5 G A); stress F (l/2) (h/2) / I.
+    """
+    across = np.linspace(0, side_m, count(1, fineness) + 1)
+    profile = block(np.stack(np.meshgrid(across, across, indexing="ij"), axis=-1))
+    along = np.linspace(0, length_m, 2 * count(4, fineness) + 1)
+    layers = np.stack([np.c_[np.full(len(profile.points_m), x), profile.points_m] for x in along])
+    body = Body.of({"beam": stacked(layers, profile.triangles)})
+    materials = {"beam": _BEAM}
+    nodes = body.nodes_m
+    end = body.mesh.facets_satisfying(lambda x: x[0] > length_m - 1e-9, boundaries_only=True)
+    load = body.traction(end, np.array([0.0, 0.0, force_n]))
+    binding = elasticity.constraints(len(nodes), [], np.tile(nodes[:, 0] < 1e-9, (3, 1)))
+    moved = elasticity.solve(body.stiffness(materials), binding, load[:, None])[:, 0]
+    stress = body.stress(moved, materials)[0, 0]
+    inertia = side_m**4 / 12
+    middle = np.argmin(np.abs(nodes - [length_m / 2, side_m / 2, 0.0]).sum(axis=1))
+    tip = np.argmin(np.abs(nodes - [length_m, side_m / 2, side_m / 2]).sum(axis=1))
+    shear = 1.2 * force_n * length_m / (_BEAM.lame_pa[1] * side_m**2)
+    deflection = force_n * length_m**3 / (3 * _BEAM.modulus_pa * inertia) + shear
+    return [
+        _Checked("cantilever", "deflection (m)", fineness, len(nodes), float(moved.reshape(3, -1)[2, tip]), deflection),
+        _Checked(
+            "cantilever",
+            "stress (Pa)",
+            fineness,
+            len(nodes),
+            float(stress[middle]),
+            force_n * (length_m - nodes[middle, 0]) * side_m / 2 / inertia,
+        ),
+    ]
+
+
+def plate_with_hole(fineness: float, radius_m: float = 0.005, pull_pa: float = 1e6) -> list[_Checked]:
+    """A quarter of a plate under tension along x, with Kirsch's displacements on a circle of four radii.
+
+    Plane strain, so that the contraction counts; stress at the hole across the tension is 3 times the tension, along it
+    -1 times (Kirsch 1898).
+    """
+    angles = np.linspace(0, np.pi / 2, count(4, fineness) + 1)
+    radii = np.geomspace(radius_m, 4 * radius_m, count(3, fineness) + 1)
+    profile = block(np.stack([np.outer(radii, np.cos(angles)), np.outer(radii, np.sin(angles))], axis=-1))
+    flat = profile.points_m
+    layers = np.stack([np.c_[flat, np.full(len(flat), z)] for z in (0, radius_m / 2)])
+    up = np.array([0.0, 0.0, 1.0])
+    holes = [Hole("plate", np.zeros(3), up, scale * radius_m) for scale in (1, 4)]
+    body = Body.of({"plate": stacked(layers, profile.triangles)}, holes)
+    materials = {"plate": _PLATE}
+    nodes = body.nodes_m
+    known = np.hypot(nodes[:, 0], nodes[:, 1]) > 4 * radius_m - 1e-9
+    given = np.zeros((3, len(nodes)))
+    given[:2, known] = kirsch_displacement_m(nodes[known, :2], radius_m, pull_pa, _PLATE).T
+    fixed = np.stack([known | (nodes[:, 0] < 1e-9), known | (nodes[:, 1] < 1e-9), np.ones(len(nodes), bool)])
+    stiffness = body.stiffness(materials)
+    binding = elasticity.constraints(len(nodes), [], fixed)
+    moved = given.ravel() + elasticity.solve(stiffness, binding, -(stiffness @ given.reshape(-1, 1)))[:, 0]
+    stress = body.stress(moved, materials)
+    above = np.flatnonzero(np.hypot(nodes[:, 0], nodes[:, 1] - radius_m) < 1e-9)
+    edge = np.flatnonzero(np.hypot(nodes[:, 0] - radius_m, nodes[:, 1]) < 1e-9)
+    return [
+        _Checked("plate with a hole", name, fineness, len(nodes), float(component[at].mean()), factor * pull_pa)
+        for name, component, at, factor in (
+            ("stress across (Pa)", stress[0, 0], above, 3.0),
+            ("stress along (Pa)", stress[1, 1], edge, -1.0),
+        )
+    ]
+
+
+def kirsch_displacement_m(places_m: np.ndarray, radius_m: float, pull_pa: float, material: Material) -> np.ndarray:
+    """Displacement [m], shape (k, 2), in an endless plate with a hole under tension along x, plane strain."""
+    mu, kappa = material.lame_pa[1], 3 - 4 * material.poisson
+    r, angle = np.hypot(*places_m.T) / radius_m, np.arctan2(places_m[:, 1], places_m[:, 0])
+    scale = pull_pa * radius_m / (8 * mu)
+    two = np.cos(2 * angle)
+    outwards = scale * (r * (kappa - 1 + 2 * two) + 2 / r * (1 + (kappa + 1) * two) - 2 / r**3 * two)
+    round_ = scale * (-2 * r + 2 / r * (1 - kappa) - 2 / r**3) * np.sin(2 * angle)
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([outwards * c - round_ * s, outwards * s + round_ * c], axis=-1)
+
+
+def _all_checks() -> list[_Checked]:
+    """Every problem on every mesh."""
+    return [row for case in (cantilever, plate_with_hole) for fineness in FINENESSES for row in case(fineness)]

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from rotorid.errors import InputError
 from rotorid.identify.fem.placement import Frame
 
-FLATTEST = 0.05
+_FLATTEST = 0.05
 """Volume that a column's element must have at least, as a share of the usual one: flatter ones spoil the stress."""
 
 
@@ -168,7 +168,7 @@ def _upright(layers_m: np.ndarray, triangles: np.ndarray) -> bool:
     rise = np.diff(a, axis=0), np.diff(b, axis=0), np.diff(c, axis=0)
     sides = np.array([np.sum(normal[part] * way, -1) for part in (slice(-1), slice(1, None)) for way in rise])
     sides = sides / np.median(sides)
-    return bool(np.all(sides > FLATTEST))
+    return bool(np.all(sides > _FLATTEST))
 
 
 def on(pad: Pad, points_m: np.ndarray, tolerance_m: float = 1e-7) -> np.ndarray:

@@ -17,7 +17,7 @@ def sigmoid(v: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Activation:
+class _Activation:
     """φ and its derivative written in terms of φ's value."""
 
     name: str
@@ -25,9 +25,9 @@ class Activation:
     slope_of_value: Callable[[np.ndarray], np.ndarray | float]
 
 
-LINEAR = Activation("linear", lambda v: v, lambda y: 1.0)
-SIGMOID = Activation("sigmoid", sigmoid, lambda y: y * (1.0 - y))
-ACTIVATIONS = {a.name: a for a in (LINEAR, SIGMOID)}
+LINEAR = _Activation("linear", lambda v: v, lambda y: 1.0)
+SIGMOID = _Activation("sigmoid", sigmoid, lambda y: y * (1.0 - y))
+_ACTIVATIONS = {a.name: a for a in (LINEAR, SIGMOID)}
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Network:
 
     weights: tuple[np.ndarray, ...]
     biases: tuple[np.ndarray | None, ...]
-    activations: tuple[Activation, ...]
+    activations: tuple[_Activation, ...]
     masks: tuple[np.ndarray | None, ...]
 
     def __call__(self, inputs: np.ndarray) -> np.ndarray:
@@ -61,7 +61,7 @@ def build(
         w = rng.uniform(-spread, spread, (n_out, n_in))
         weights.append(w if mask is None else w * mask)
         biases.append(rng.uniform(-spread, spread, n_out) if bias else None)
-    return Network(tuple(weights), tuple(biases), tuple(ACTIVATIONS[a] for a in activations), masks)
+    return Network(tuple(weights), tuple(biases), tuple(_ACTIVATIONS[a] for a in activations), masks)
 
 
 def outputs(network: Network, inputs: np.ndarray) -> list[np.ndarray]:

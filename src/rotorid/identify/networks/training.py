@@ -3,6 +3,8 @@
 Stochastic: one step for each sample. Batch: one step for all samples. Mini-batch: one step for each group.
 The order of samples is drawn anew each epoch, from the seed. Training can stop after any epoch and go on from
 its checkpoint to the very same weights.
+
+Epochs of the batch method compiled: the same rule as `network.gradients`, without numpy's cost of small arrays.
 """
 
 from __future__ import annotations
@@ -16,16 +18,17 @@ from typing import Literal
 from zipfile import BadZipFile, ZipFile
 
 import numpy as np
+from numba import njit
 
 from rotorid.errors import InputError
-from rotorid.identify.networks.compiled import batch_epochs
 from rotorid.identify.networks.network import Network, gradients
 from rotorid.io.text.bounds import LARGEST_CHECKPOINT
 from rotorid.io.text.files import check_file
 from rotorid.io.text.wording import printable
 
-LOGGER = logging.getLogger("rotorid.identify.networks")
-Method = Literal["batch", "stochastic", "mini-batch"]
+_CODES = {"linear": 0, "sigmoid": 1}
+_LOGGER = logging.getLogger("rotorid.identify.networks")
+_Method = Literal["batch", "stochastic", "mini-batch"]
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,7 @@ class Training:
 
     rate: float
     epochs: int
-    method: Method = "batch"
+    method: _Method = "batch"
     group: int = 8
     """Samples in a mini-batch."""
     seed: int = 0
@@ -75,7 +78,7 @@ def train(
     first = 0
     if checkpoint is not None and Path(checkpoint).exists():
         first = _restore(Path(checkpoint), weights, biases, history)
-        LOGGER.info("continued after epoch %d", first)
+        _LOGGER.info("continued after epoch %d", first)
     current = replace(network, weights=tuple(weights), biases=tuple(biases))
     run = _batch if training.method == "batch" else _by_groups
     for start in range(first, training.epochs, training.checkpoint_every):
@@ -83,7 +86,7 @@ def train(
         mse = run(current, inputs, targets, training, range(start, stop), history)
         if not all(np.isfinite(w).all() for w in weights):
             raise ValueError(f"training ran away by epoch {stop}: lower the rate {training.rate}")
-        LOGGER.info("epoch %d of %d, mse %s", stop, training.epochs, mse.round(9))
+        _LOGGER.info("epoch %d of %d, mse %s", stop, training.epochs, mse.round(9))
         if checkpoint is not None:
             _store(Path(checkpoint), stop, weights, biases, history)
     epochs = np.arange(kept) * training.every
@@ -92,7 +95,7 @@ def train(
 
 def _batch(network, inputs, targets, training: Training, epochs: range, history: np.ndarray) -> np.ndarray:
     """Train the network in place by some epochs, one step each; the last epoch's mean squared errors (n_out,)."""
-    errors = batch_epochs(network, inputs, targets, training.rate, len(epochs), training.every, epochs.start)
+    errors = _batch_epochs(network, inputs, targets, training.rate, len(epochs), training.every, epochs.start)
     start = -(-epochs.start // training.every)
     history[start : start + len(errors) - 1] = errors[:-1]
     return errors[-1]
@@ -168,3 +171,93 @@ def _stored_arrays(path: Path) -> dict[str, np.ndarray]:
     except (OSError, EOFError, BadZipFile, ValueError, TypeError, KeyError, RuntimeError, zlib.error) as error:
         what = printable(error)
         raise InputError(f"{path}: cannot be read as a checkpoint ({what}); delete it to start anew") from None
+
+
+def _batch_epochs(
+    network: Network, inputs: np.ndarray, targets: np.ndarray, rate: float, epochs: int, every: int, first: int
+) -> np.ndarray:
+    """Train in place by `epochs` epochs, the first of which has the number `first`.
+
+    Returns the mean squared errors (kept, n_out) before each epoch whose number is a multiple of `every`, and of the
+    last one as the last row. Activations are those of `_CODES`.
+    """
+    weights = tuple(np.ascontiguousarray(w.T) for w in network.weights)
+    biases = tuple(np.zeros(0) if b is None else b.copy() for b in network.biases)
+    masks = tuple(np.zeros((0, 0)) if m is None else np.ascontiguousarray(m.T, dtype=float) for m in network.masks)
+    codes = tuple(_CODES[a.name] for a in network.activations)
+    # A layer's values lie sample next to sample, so that one instruction works on several samples.
+    inputs, targets = np.ascontiguousarray(inputs.T), np.ascontiguousarray(targets.T)
+    values = tuple(np.empty((w.shape[1], inputs.shape[1])) for w in weights)
+    deltas = tuple(np.empty_like(v) for v in values)
+    kept = len(range(-(-first // every) * every, first + epochs, every))
+    history = np.empty((kept + 1, len(targets)))
+    _epochs(weights, biases, masks, codes, inputs, targets, rate, epochs, every, first, values, deltas, history)
+    for w, trained in zip(network.weights, weights, strict=True):
+        w[...] = trained.T
+    for b, trained in zip(network.biases, biases, strict=True):
+        if b is not None:
+            b[...] = trained
+    return history
+
+
+@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+def _epochs(weights, biases, masks, codes, inputs, targets, rate, epochs, every, first, values, deltas, history):
+    last, rows, row = len(weights) - 1, inputs.shape[1], 0
+    for epoch in range(first, first + epochs):
+        for layer in range(last + 1):
+            w, b, out = weights[layer], biases[layer], values[layer]
+            below = inputs if layer == 0 else values[layer - 1]
+            for j in range(w.shape[1]):
+                own = out[j]
+                own[:] = b[j] if len(b) else 0.0
+                for k in range(w.shape[0]):
+                    step, given = w[k, j], below[k]
+                    for i in range(rows):
+                        own[i] += step * given[i]
+                if codes[layer] == 1:
+                    for i in range(rows):
+                        own[i] = 1.0 / (1.0 + np.exp(-own[i]))
+        delta, out = deltas[last], values[last]
+        for j in range(targets.shape[0]):
+            summed = 0.0
+            for i in range(rows):
+                error = targets[j, i] - out[j, i]
+                summed += error * error
+                slope = out[j, i] * (1.0 - out[j, i]) if codes[last] == 1 else 1.0
+                delta[j, i] = error * slope
+            history[-1, j] = summed / rows
+        if epoch % every == 0:
+            for j in range(targets.shape[0]):
+                history[row, j] = history[-1, j]
+            row += 1
+        for layer in range(last, -1, -1):
+            w, b, mask, delta = weights[layer], biases[layer], masks[layer], deltas[layer]
+            below = inputs if layer == 0 else values[layer - 1]
+            if layer > 0:
+                lower = deltas[layer - 1]
+                for k in range(w.shape[0]):
+                    own, y = lower[k], below[k]
+                    own[:] = 0.0
+                    for j in range(w.shape[1]):
+                        back, passed = w[k, j], delta[j]
+                        for i in range(rows):
+                            own[i] += back * passed[i]
+                    if codes[layer - 1] == 1:
+                        for i in range(rows):
+                            own[i] *= y[i] * (1.0 - y[i])
+            step = rate / rows
+            for j in range(w.shape[1]):
+                own = delta[j]
+                for k in range(w.shape[0]):
+                    given, summed = below[k], 0.0
+                    for i in range(rows):
+                        summed += given[i] * own[i]
+                    w[k, j] += step * summed
+                if len(b):
+                    summed = 0.0
+                    for i in range(rows):
+                        summed += own[i]
+                    b[j] += step * summed
+            for k in range(len(mask)):
+                for j in range(w.shape[1]):
+                    w[k, j] *= mask[k, j]

@@ -18,7 +18,7 @@ from rotorid.identify.stand.clocks import device_time
 from rotorid.io.tables import by_recording
 
 RPM = 2 * np.pi / 60
-MARGIN_S = 0.6
+_MARGIN_S = 0.6
 COLUMNS = (
     *("test", "throttle", "speed_rad_s", "speed_sd_rad_s"),
     *("value", "value_sd", "samples", "rest_samples", "voltage_v"),
@@ -29,8 +29,8 @@ COLUMNS = (
 def _running(table: pd.DataFrame, name: str) -> pd.DataFrame:
     """First and last sample with the motor on."""
     on = table[table["throttle"] > 0]
-    if len(on) == 0 or on["time_s"].iloc[-1] - on["time_s"].iloc[0] <= 2 * MARGIN_S:
-        raise InputError(f"{name}: the motor never ran for more than {2 * MARGIN_S} s")
+    if len(on) == 0 or on["time_s"].iloc[-1] - on["time_s"].iloc[0] <= 2 * _MARGIN_S:
+        raise InputError(f"{name}: the motor never ran for more than {2 * _MARGIN_S} s")
     return on.iloc[[0, -1]]
 
 
@@ -44,7 +44,7 @@ def thrust_points(samples: pd.DataFrame, recordings: pd.DataFrame) -> pd.DataFra
     for name in recordings["id"]:
         table = tables[name]
         start, stop = _running(table, name)["time_s"]
-        steady = table[table["time_s"].between(start + MARGIN_S, stop - MARGIN_S / 3)]
+        steady = table[table["time_s"].between(start + _MARGIN_S, stop - _MARGIN_S / 3)]
         rest = table[table["time_s"] < start - 0.05]
         if len(rest) == 0:
             raise InputError(f"{name}: no sample before the motor started, so no tare")
@@ -70,14 +70,14 @@ def torque_points(rotor: tuple[pd.DataFrame, pd.DataFrame], wrench: tuple[pd.Dat
         table, reading = counted[drive.id], felt[read.id]
         ends = _running(table, drive.id)
         start, stop = ends["time_s"]
-        steady = table[table["time_s"].between(start + MARGIN_S, stop - MARGIN_S)]
+        steady = table[table["time_s"].between(start + _MARGIN_S, stop - _MARGIN_S)]
         # Each recording's times count from its own beginning.
         seen = reading["host_time_s"] + (read.host_start_s - drive.host_start_s)
         start, stop = device_time(reading["time_s"], seen, ends["host_time_s"])
         when = reading["time_s"]
-        loaded = reading.loc[when.between(start + MARGIN_S, stop - MARGIN_S), "moment_z_n_m"]
+        loaded = reading.loc[when.between(start + _MARGIN_S, stop - _MARGIN_S), "moment_z_n_m"]
         before = reading.loc[when < start - 0.1, "moment_z_n_m"]
-        after = reading.loc[when > stop + MARGIN_S, "moment_z_n_m"]
+        after = reading.loc[when > stop + _MARGIN_S, "moment_z_n_m"]
         if len(loaded) == 0 or len(before) == 0 or len(after) == 0:
             raise InputError(f"{read.id}: no samples while the rotor ran, or none at rest before or after")
         # The run lies in the middle between both rests, so that a steady drift of the zero drops out.

@@ -25,7 +25,7 @@ from scipy.optimize import brentq
 from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
-from rotorid.recordings.lost_speeds import lost_speed
+from rotorid.recordings.importers.rcbenchmark import lost_speed
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Points:
 
 
 @dataclass(frozen=True)
-class CoefficientFit:
+class _CoefficientFit:
     """A thrust coefficient with its interval; offsets are empty for a fit through the origin."""
 
     value: float
@@ -54,7 +54,7 @@ class CoefficientFit:
 
 
 @dataclass(frozen=True)
-class Pooled:
+class _Pooled:
     """Random-effects mean over motors."""
 
     value: float
@@ -144,7 +144,7 @@ def fit_coefficient(
     speed_noise_relative: float = 0.0,
     least_sd: float = LEAST_FORCE_SD_N,
     equal_noise: bool = False,
-) -> CoefficientFit:
+) -> _CoefficientFit:
     """C_F of one motor and propeller from its runs, with one offset a run where `offset`.
 
     Parameters
@@ -197,7 +197,7 @@ def fit_coefficient(
         freedoms = np.full(unknowns, float(freedom))
     half = student_quantile(freedoms, 0.975) * np.sqrt(np.diag(covariance))
     intervals = tuple((float(v - h), float(v + h)) for v, h in zip(values, half, strict=True))
-    return CoefficientFit(
+    return _CoefficientFit(
         value=float(values[0]),
         standard_error=float(np.sqrt(covariance[0, 0])),
         interval_95=intervals[0],
@@ -231,7 +231,7 @@ def fit_exponent(runs: Sequence[Points]) -> tuple[float, tuple[float, float]]:
     return float(exponent), (float(exponent - half), float(exponent + half))
 
 
-def pool(values: Sequence[float], standard_errors: Sequence[float]) -> Pooled:
+def pool(values: Sequence[float], standard_errors: Sequence[float]) -> _Pooled:
     """Random-effects mean of the motors' values.
 
     τ² solves Σ (C_i - C̄)² / (s_i² + τ²) = k - 1 (Paule and Mandel); the interval is Hartung's and Knapp's,
@@ -256,7 +256,7 @@ def pool(values: Sequence[float], standard_errors: Sequence[float]) -> Pooled:
     spread = np.sum(weight * (values - mean) ** 2) / ((k - 1) * np.sum(weight))
     half = student_quantile(k - 1, 0.975) * np.sqrt(spread)
     ahead = student_quantile(k - 1, 0.975) * np.sqrt(tau2 + spread)
-    return Pooled(
+    return _Pooled(
         value=float(mean),
         interval_95=(float(mean - half), float(mean + half)),
         between_sd=float(np.sqrt(tau2)),

@@ -17,7 +17,7 @@ from scipy.special import chdtrc, fdtri
 
 
 @dataclass(frozen=True)
-class SampleNoise:
+class _SampleNoise:
     """Noise of the samples, and the chi-square of a parabola through the origin with it."""
 
     sd: float
@@ -31,7 +31,7 @@ class SampleNoise:
     """Of a chi-square as large or larger, if the parabola holds and all samples are equally noisy."""
 
 
-def sample_noise(points: pd.DataFrame) -> SampleNoise:
+def sample_noise(points: pd.DataFrame) -> _SampleNoise:
     """Noise of tests with the columns of `rotorid.identify.rotor.campaign.COLUMNS`; at least four tests."""
     tests = points.sort_values("speed_rad_s")
     square, value = tests["speed_rad_s"].to_numpy() ** 2, tests["value"].to_numpy()
@@ -45,7 +45,7 @@ def sample_noise(points: pd.DataFrame) -> SampleNoise:
     left = value - square * np.sum(square * value / each) / np.sum(square**2 / each)
     total, freedom = float(np.sum(left**2 / each)), len(tests) - 1
     low, high = fdtri(freedoms[1], freedoms[0], [0.975, 0.025])
-    return SampleNoise(
+    return _SampleNoise(
         sd=variance**0.5,
         growth=(fast / slow) ** 0.5,
         growth_interval_95=(float((fast / slow / low) ** 0.5), float((fast / slow / high) ** 0.5)),

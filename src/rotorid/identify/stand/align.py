@@ -27,14 +27,14 @@ from rotorid.identify.stand.clocks import Lag, device_time, follow, lower_edge, 
 from rotorid.recordings.signal.filters import zero_phase
 
 STEP_S = 0.01
-SMOOTH_HZ = 5.0
+_SMOOTH_HZ = 5.0
 LARGEST_S = 0.5
 """Largest offset that the arrival times may leave."""
-FASTER_THAN_LIFE = 1.2
+_FASTER_THAN_LIFE = 1.2
 """Device seconds a host second that no clock's error explains."""
-LEAST_THRUST_N = 1e-3
+_LEAST_THRUST_N = 1e-3
 """A motor that is asked for more than this turns."""
-CURRENT_POWER = 1.5
+_CURRENT_POWER = 1.5
 """A propeller's current grows with ω³, its thrust with ω²."""
 THROTTLES = tuple(f"throttle_{i}" for i in (1, 2, 3, 4))
 
@@ -55,7 +55,7 @@ class Pair:
     """Host seconds per device second, quadrotor and wrench."""
 
 
-def on_host(table: pd.DataFrame, largest_error: float) -> tuple[pd.DataFrame, float]:
+def _on_host(table: pd.DataFrame, largest_error: float) -> tuple[pd.DataFrame, float]:
     """The table with `host_s`, when its samples were taken by the host's clock, and the device clock's rate."""
     line = lower_edge(table["time_s"].to_numpy(), table["host_time_s"].to_numpy(), largest_error)
     return table.assign(host_s=line.host(table["time_s"].to_numpy())), line.rate
@@ -64,15 +64,15 @@ def on_host(table: pd.DataFrame, largest_error: float) -> tuple[pd.DataFrame, fl
 def both_on_host(
     first: pd.DataFrame, second: pd.DataFrame, largest_error: float
 ) -> tuple[tuple[pd.DataFrame, float], tuple[pd.DataFrame, float]]:
-    """`on_host` of two recordings that one host made at once.
+    """`_on_host` of two recordings that one host made at once.
 
     Where the devices' time passes faster than the host's, as an emulator's can, the clock of the first device
     takes the place of the host's.
 
     Raises InputError where such recordings have no time in common.
     """
-    if _pace(second) < FASTER_THAN_LIFE:
-        return on_host(first, largest_error), on_host(second, largest_error)
+    if _pace(second) < _FASTER_THAN_LIFE:
+        return _on_host(first, largest_error), _on_host(second, largest_error)
     host = second["host_time_s"].to_numpy()
     both = (host >= first["host_time_s"].min()) & (host <= first["host_time_s"].max())
     if not both.any():
@@ -96,14 +96,14 @@ def pair_of(
     return Pair(name, experiment, sine, first, second, (rate_1, rate_2))
 
 
-def lift_cause(quadrotor: pd.DataFrame, when_s: np.ndarray, thrust_of: Callable) -> np.ndarray:
+def _lift_cause(quadrotor: pd.DataFrame, when_s: np.ndarray, thrust_of: Callable) -> np.ndarray:
     """Thrust that the throttles ask of each motor, N, shape (n, 4)."""
     sent = quadrotor["host_s"].to_numpy()
     throttle = np.column_stack([np.interp(when_s, sent, quadrotor[c], left=0.0, right=0.0) for c in THROTTLES])
     return np.clip(thrust_of(throttle), 0.0, None)
 
 
-def motor_delay(pair: Pair, thrust_of: Callable) -> Lag:
+def _motor_delay(pair: Pair, thrust_of: Callable) -> Lag:
     """By how much the battery's sag follows the throttles, on the quadrotor's own clock.
 
     The charge that has been drawn lowers the voltage as well, and so does the idle current of motors that turn at
@@ -112,13 +112,13 @@ def motor_delay(pair: Pair, thrust_of: Callable) -> Lag:
     sent = pair.quadrotor["host_s"].to_numpy()
     when = np.arange(sent[0], sent[-1], STEP_S)
     voltage = np.interp(when, sent, pair.quadrotor["battery_voltage_v"])
-    thrust = lift_cause(pair.quadrotor, when, thrust_of)
-    current = (thrust**CURRENT_POWER).sum(axis=1)
-    others = np.column_stack([np.cumsum(current) * STEP_S, (thrust > LEAST_THRUST_N).sum(axis=1)])
+    thrust = _lift_cause(pair.quadrotor, when, thrust_of)
+    current = (thrust**_CURRENT_POWER).sum(axis=1)
+    others = np.column_stack([np.cumsum(current) * STEP_S, (thrust > _LEAST_THRUST_N).sum(axis=1)])
     return follow(when, voltage, current, LARGEST_S, others)
 
 
-def lift_delay(pair: Pair, thrust_of: Callable, with_skew: bool = False) -> Lag:
+def _lift_delay(pair: Pair, thrust_of: Callable, with_skew: bool = False) -> Lag:
     """By how much the lift on the wrench's clock follows the throttles on the quadrotor's.
 
     The battery empties meanwhile, so that the same throttle gives less lift at the end: the thrust times the
@@ -126,8 +126,8 @@ def lift_delay(pair: Pair, thrust_of: Callable, with_skew: bool = False) -> Lag:
     """
     felt, sent = pair.wrench["host_s"].to_numpy(), pair.quadrotor["host_s"].to_numpy()
     when = np.arange(felt[0], felt[-1], STEP_S)
-    lift = zero_phase(-np.interp(when, felt, pair.wrench["force_z_n"]), SMOOTH_HZ, 1 / STEP_S)
-    cause = zero_phase(lift_cause(pair.quadrotor, when, thrust_of).sum(axis=1), SMOOTH_HZ, 1 / STEP_S)
+    lift = zero_phase(-np.interp(when, felt, pair.wrench["force_z_n"]), _SMOOTH_HZ, 1 / STEP_S)
+    cause = zero_phase(_lift_cause(pair.quadrotor, when, thrust_of).sum(axis=1), _SMOOTH_HZ, 1 / STEP_S)
     voltage = np.interp(when, sent, zero_phase(pair.quadrotor["battery_voltage_v"].to_numpy(), 0.5, 50.0))
     weaker = cause * (voltage - voltage.mean())
     return follow(when, lift, cause, LARGEST_S, weaker[:, None], with_skew)
@@ -158,15 +158,15 @@ def align(pairs: list[Pair], thrust_of: Callable) -> list[Aligned]:
     """Offsets of all pairs; the motors' delay is pooled over the sines, or over all where there is no sine."""
     if not pairs:
         raise InputError("no experiment has both a quadrotor's and a wrench sensor's recording")
-    sags = [motor_delay(pair, thrust_of) for pair in pairs]
+    sags = [_motor_delay(pair, thrust_of) for pair in pairs]
     of_sines = [sag for sag, pair in zip(sags, pairs, strict=True) if pair.sine]
     shared = pooled(of_sines or sags)
-    return [Aligned(pair, lift_delay(pair, thrust_of), sag, *shared) for pair, sag in zip(pairs, sags, strict=True)]
+    return [Aligned(pair, _lift_delay(pair, thrust_of), sag, *shared) for pair, sag in zip(pairs, sags, strict=True)]
 
 
 def skew(pairs: list[Pair], thrust_of: Callable) -> tuple[float, float]:
     """Relative skew of the two clocks and its standard error, from the sines' delays over time."""
-    lags = [lift_delay(pair, thrust_of, with_skew=True) for pair in pairs if pair.sine]
+    lags = [_lift_delay(pair, thrust_of, with_skew=True) for pair in pairs if pair.sine]
     if not lags:
         raise InputError("no experiment with a sine, so the clocks' skew cannot be distinguished from the motors' lag")
     weight = np.array([1 / lag.skew_error**2 for lag in lags])
@@ -180,8 +180,8 @@ def torque_offset(rotor: pd.DataFrame, wrench: pd.DataFrame) -> Lag:
     """
     felt, sent = wrench["host_s"].to_numpy(), rotor["host_s"].to_numpy()
     when = np.arange(max(felt[0], sent[0]), min(felt[-1], sent[-1]), STEP_S)
-    lift = zero_phase(-np.interp(when, felt, wrench["force_z_n"]), SMOOTH_HZ, 1 / STEP_S)
-    square = zero_phase(np.interp(when, sent, rotor["speed_rpm"].to_numpy(float) ** 2), SMOOTH_HZ, 1 / STEP_S)
+    lift = zero_phase(-np.interp(when, felt, wrench["force_z_n"]), _SMOOTH_HZ, 1 / STEP_S)
+    square = zero_phase(np.interp(when, sent, rotor["speed_rpm"].to_numpy(float) ** 2), _SMOOTH_HZ, 1 / STEP_S)
     return follow(when, lift, square, LARGEST_S)
 
 

@@ -17,7 +17,7 @@ from rotorid.errors import InputError
 
 
 @dataclass(frozen=True)
-class ClockLine:
+class _ClockLine:
     """host = offset_s + rate * device."""
 
     offset_s: float
@@ -29,7 +29,7 @@ class ClockLine:
         return self.offset_s + self.rate * np.asarray(device_s, float)
 
 
-def lower_edge(device_s: np.ndarray, host_s: np.ndarray, largest_error: float) -> ClockLine:
+def lower_edge(device_s: np.ndarray, host_s: np.ndarray, largest_error: float) -> _ClockLine:
     """The line below all samples that lies closest to them.
 
     Of all lines that no sample lies below, and whose rate is within 1 ± `largest_error`, the one with the
@@ -48,7 +48,7 @@ def lower_edge(device_s: np.ndarray, host_s: np.ndarray, largest_error: float) -
     slope = ((y - x)[right] - (y - x)[left]) / (x[right] - x[left])
     slope = float(np.clip(slope, -largest_error, largest_error))
     offset = float(np.min(y - x - slope * x))
-    return ClockLine(offset, 1 + slope)
+    return _ClockLine(offset, 1 + slope)
 
 
 def device_time(time_s: np.ndarray, seen_s: np.ndarray, host_s: np.ndarray) -> np.ndarray:
@@ -95,7 +95,7 @@ class Lag:
 
 
 STEPS = 20
-BLOCKS = 24
+_BLOCKS = 24
 """Parts of a record whose residuals are taken as independent of each other."""
 
 
@@ -174,9 +174,9 @@ def _robust_covariance(columns: np.ndarray, residual: np.ndarray) -> np.ndarray:
     scale = np.linalg.norm(columns, axis=0)
     unit = columns / scale
     inverse = np.linalg.pinv(unit.T @ unit)
-    parts = zip(np.array_split(unit, BLOCKS), np.array_split(residual, BLOCKS), strict=True)
+    parts = zip(np.array_split(unit, _BLOCKS), np.array_split(residual, _BLOCKS), strict=True)
     scores = np.array([part.T @ rest for part, rest in parts])
-    middle = scores.T @ scores * BLOCKS / (BLOCKS - columns.shape[1])
+    middle = scores.T @ scores * _BLOCKS / (_BLOCKS - columns.shape[1])
     return inverse @ middle @ inverse / np.outer(scale, scale)
 
 

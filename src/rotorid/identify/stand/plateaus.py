@@ -8,11 +8,11 @@ import numpy as np
 
 from rotorid.errors import InputError
 
-REST, RAMP, PLATEAU = "rest", "ramp", "plateau"
-SLOPE_1_S = 0.004
+_REST, _RAMP, PLATEAU = "rest", "ramp", "plateau"
+_SLOPE_1_S = 0.004
 """A throttle that changes by less than this per second is constant (the slowest ramp of table A.1: 0.0167)."""
 WINDOW_S = 0.1
-SHORTEST_S = 0.5
+_SHORTEST_S = 0.5
 """A plateau is at least that long; a sine's turning points are not."""
 
 
@@ -53,11 +53,11 @@ def segments(time_s: np.ndarray, throttle: np.ndarray) -> list[Segment]:
     behind = np.searchsorted(time_s, time_s - half)
     span_s = np.maximum(time_s[ahead] - time_s[behind], 1e-9)
     slope = np.abs(throttle[ahead] - throttle[behind]).max(axis=1) / span_s
-    kinds = np.where(~running, REST, np.where(slope < SLOPE_1_S, PLATEAU, RAMP)).astype(object)
+    kinds = np.where(~running, _REST, np.where(slope < _SLOPE_1_S, PLATEAU, _RAMP)).astype(object)
     found = _stretches(time_s, kinds)
-    short = [s for s in found if s.kind == PLATEAU and s.length_s < SHORTEST_S]
+    short = [s for s in found if s.kind == PLATEAU and s.length_s < _SHORTEST_S]
     for segment in short:
-        kinds[(time_s >= segment.start_s) & (time_s <= segment.stop_s)] = RAMP
+        kinds[(time_s >= segment.start_s) & (time_s <= segment.stop_s)] = _RAMP
     return _stretches(time_s, kinds)
 
 
@@ -76,5 +76,5 @@ def longest(found: list[Segment], kind: str) -> Segment | None:
 
 def programme(found: list[Segment]) -> Segment:
     """From the first moment at which a motor runs to the last."""
-    moving = [segment for segment in found if segment.kind != REST]
-    return Segment(RAMP, moving[0].start_s, moving[-1].stop_s)
+    moving = [segment for segment in found if segment.kind != _REST]
+    return Segment(_RAMP, moving[0].start_s, moving[-1].stop_s)

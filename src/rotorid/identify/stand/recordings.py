@@ -35,7 +35,7 @@ def _within(when: np.ndarray, times: np.ndarray, values: np.ndarray, outside: fl
     return np.interp(when, times, values, left=outside, right=outside)
 
 
-def experiment_run(session, aligned: Aligned) -> Run:
+def _experiment_run(session, aligned: Aligned) -> Run:
     """One of the 48 experiments: throttles, battery voltage, attitude of the mount, wrench."""
     quadrotor = aligned.pair.quadrotor
     when, felt = _felt(aligned.pair.wrench, aligned.offset_s)
@@ -50,7 +50,7 @@ def experiment_run(session, aligned: Aligned) -> Run:
     return Run(aligned.pair.name, table)
 
 
-def torque_run(name: str, rotor: pd.DataFrame, wrench: pd.DataFrame, offset_s: float) -> Run:
+def _torque_run(name: str, rotor: pd.DataFrame, wrench: pd.DataFrame, offset_s: float) -> Run:
     """One torque test: motor 1 alone turns, driven and counted by the thrust tester; both tables have `host_s`."""
     when, felt = _felt(wrench, offset_s)
     sent = rotor["host_s"].to_numpy()
@@ -67,7 +67,7 @@ def torque_run(name: str, rotor: pd.DataFrame, wrench: pd.DataFrame, offset_s: f
     return Run(name, table)
 
 
-def thrust_run(name: str, rotor: pd.DataFrame) -> Run:
+def _thrust_run(name: str, rotor: pd.DataFrame) -> Run:
     """One thrust test: a single rotor on the tester; its thrust pulls along −z."""
     table = pd.DataFrame(
         {
@@ -90,7 +90,7 @@ def stand_vehicle(name: str, believed: Vehicle, session, noise: dict[str, float]
     return Vehicle.model_validate(content)
 
 
-def tester_vehicle(name: str, believed: Vehicle, noise: dict[str, float]) -> Vehicle:
+def _tester_vehicle(name: str, believed: Vehicle, noise: dict[str, float]) -> Vehicle:
     """Motor 1 alone on the thrust tester, which claims to read zero at rest."""
     content = {
         "name": name,
@@ -132,12 +132,12 @@ def dynamics_set(
 ) -> RecordingSet:
     """The 48 experiments; `recordings` are the wrench sensor's."""
     session_of = {session.group: session for session in recordings.itertuples()}
-    runs = [experiment_run(session_of[entry.pair.name], entry) for entry in aligned]
+    runs = [_experiment_run(session_of[entry.pair.name], entry) for entry in aligned]
     first = session_of[aligned[0].pair.name]
     return RecordingSet(name, stand_vehicle(name, believed, first, noise), tuple(sorted(runs, key=_name)))
 
 
-LARGEST_OFFSET_ERROR_S = 0.01
+_LARGEST_OFFSET_ERROR_S = 0.01
 
 
 def torque_set(
@@ -150,10 +150,10 @@ def torque_set(
         (speed, _), (reading, _) = both_on_host(counted[drive.id], felt[read.id], largest_error)
         tests.append((drive.group, speed, reading))
     lags = [torque_offset(speed, reading) for _, speed, reading in tests]
-    clear = [lag.delay_s for lag in lags if lag.delay_error_s < LARGEST_OFFSET_ERROR_S]
+    clear = [lag.delay_s for lag in lags if lag.delay_error_s < _LARGEST_OFFSET_ERROR_S]
     usual = float(np.median(clear)) if clear else 0.0
     runs = [
-        torque_run(test, speed, reading, lag.delay_s if lag.delay_error_s < LARGEST_OFFSET_ERROR_S else usual)
+        _torque_run(test, speed, reading, lag.delay_s if lag.delay_error_s < _LARGEST_OFFSET_ERROR_S else usual)
         for (test, speed, reading), lag in zip(tests, lags, strict=True)
     ]
     first = next(wrench[1].itertuples())
@@ -162,8 +162,8 @@ def torque_set(
 
 def thrust_set(name: str, rotor: tuple, believed: Vehicle, noise: dict[str, float]) -> RecordingSet:
     """The 50 thrust tests."""
-    runs = [thrust_run(str(key), table) for key, table in by_recording(rotor[0]).items()]
-    return RecordingSet(name, tester_vehicle(name, believed, noise), tuple(sorted(runs, key=_name)))
+    runs = [_thrust_run(str(key), table) for key, table in by_recording(rotor[0]).items()]
+    return RecordingSet(name, _tester_vehicle(name, believed, noise), tuple(sorted(runs, key=_name)))
 
 
 def _name(run: Run) -> str:

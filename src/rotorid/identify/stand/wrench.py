@@ -2,6 +2,8 @@
 
 The sensor stays level and the vehicle is tilted on it, so the weight pulls along the sensor's z whatever the tilt;
 what turns with the vehicle is the arm from the sensor to the centre of mass, and with it the weight's moment.
+
+Mean of a steady stretch and how well it is known when neighbouring samples are not independent.
 """
 
 from __future__ import annotations
@@ -17,12 +19,11 @@ from rotorid.errors import InputError
 from rotorid.identify.stand import plateaus
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import Run
-from rotorid.recordings.signal.average import block_count, mean_and_error
 
 WRENCH = (*c.FORCE, *c.MOMENT)
-SETTLE_S = 0.5
+_SETTLE_S = 0.5
 """Left off the beginning of a plateau and of the rest after a programme: motors and structure settle."""
-REST_MARGIN_S = 0.15
+_REST_MARGIN_S = 0.15
 
 
 def tilt(roll_rad: float, pitch_rad: float) -> np.ndarray:
@@ -55,7 +56,7 @@ class Steady:
         return student_quantile(self.blocks - 1, 0.975) * self.error
 
 
-def steady_mean(run: Run, start_s: float, stop_s: float, periods: int | None = None) -> Steady:
+def _steady_mean(run: Run, start_s: float, stop_s: float, periods: int | None = None) -> Steady:
     """Mean wrench between two times, which hold `periods` of a periodic signal if given.
 
     Raises InputError for fewer than two samples.
@@ -69,7 +70,7 @@ def steady_mean(run: Run, start_s: float, stop_s: float, periods: int | None = N
 
 
 @dataclass(frozen=True)
-class Evaluated:
+class _Evaluated:
     """One experiment: rest before and after, and the steady stretch with the rest reading off."""
 
     name: str
@@ -89,7 +90,7 @@ class Evaluated:
     """plateau, or cycles where the programme has none (a sine)."""
 
 
-def evaluate(run: Run, frequency_hz: float | None) -> Evaluated:
+def evaluate(run: Run, frequency_hz: float | None) -> _Evaluated:
     """Steady wrench of one experiment.
 
     Of a trapezoid the plateau, of a sine (`frequency_hz` given) as many whole cycles as the programme holds, so
@@ -101,24 +102,24 @@ def evaluate(run: Run, frequency_hz: float | None) -> Evaluated:
     flat = plateaus.longest(found, plateaus.PLATEAU)
     cycles = None
     if frequency_hz:
-        cycles = int((active.length_s - SETTLE_S) * frequency_hz)
+        cycles = int((active.length_s - _SETTLE_S) * frequency_hz)
         if cycles < 2:
             raise InputError(f"{run.name}: less than two cycles of {frequency_hz:g} Hz")
-        start, stop, kind = active.start_s + SETTLE_S, active.start_s + SETTLE_S + cycles / frequency_hz, "cycles"
+        start, stop, kind = active.start_s + _SETTLE_S, active.start_s + _SETTLE_S + cycles / frequency_hz, "cycles"
     elif flat is not None:
-        start, stop, kind = flat.start_s + SETTLE_S, flat.stop_s - REST_MARGIN_S, "plateau"
+        start, stop, kind = flat.start_s + _SETTLE_S, flat.stop_s - _REST_MARGIN_S, "plateau"
     else:
         raise InputError(f"{run.name}: no plateau and no frequency of a sine")
-    before = steady_mean(run, -np.inf, active.start_s - REST_MARGIN_S)
-    after = steady_mean(run, active.stop_s + SETTLE_S, np.inf)
-    loaded = steady_mean(run, start, stop, cycles)
+    before = _steady_mean(run, -np.inf, active.start_s - _REST_MARGIN_S)
+    after = _steady_mean(run, active.stop_s + _SETTLE_S, np.inf)
+    loaded = _steady_mean(run, start, stop, cycles)
     first, last = active.start_s / 2, (active.stop_s + run.time_s[-1]) / 2
     share = ((start + stop) / 2 - first) / (last - first)
     rest = before.mean + share * (after.mean - before.mean)
     rest_error = np.hypot((1 - share) * before.error, share * after.error)
     steady = Steady(loaded.mean - rest, np.hypot(loaded.error, rest_error), loaded.samples, loaded.blocks)
     inside = (run.time_s >= start) & (run.time_s <= stop)
-    return Evaluated(
+    return _Evaluated(
         name=run.name,
         roll_rad=float(run.column("roll_rad")[0]),
         pitch_rad=float(run.column("pitch_rad")[0]),
@@ -133,7 +134,7 @@ def evaluate(run: Run, frequency_hz: float | None) -> Evaluated:
     )
 
 
-def mean_thrust(run: Run, entry: Evaluated, thrust_of: Callable) -> np.ndarray:
+def mean_thrust(run: Run, entry: _Evaluated, thrust_of: Callable) -> np.ndarray:
     """Thrust that the throttles ask of each motor, N, shape (4,), mean over the steady stretch.
 
     The mean of the thrust, not the thrust of the mean throttle: over a sine they differ.
@@ -143,7 +144,7 @@ def mean_thrust(run: Run, entry: Evaluated, thrust_of: Callable) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Weight:
+class _Weight:
     """What the readings at rest say of the vehicle: mass, centre of mass from the sensor, body axes."""
 
     mass_kg: float
@@ -157,12 +158,12 @@ class Weight:
     """… and of what the fitted one leaves."""
 
 
-def weights(evaluated: list[Evaluated], mass_kg: float, centre_m: np.ndarray, gravity_m_s2: float) -> np.ndarray:
+def weights(evaluated: list[_Evaluated], mass_kg: float, centre_m: np.ndarray, gravity_m_s2: float) -> np.ndarray:
     """The weight's wrench in the attitude of each experiment, shape (n, 6)."""
     return np.array([weight_wrench(mass_kg, gravity_m_s2, centre_m, tilt(e.roll_rad, e.pitch_rad)) for e in evaluated])
 
 
-def fit_weight(evaluated: list[Evaluated], mass_kg: float, centre_m: np.ndarray, gravity_m_s2: float) -> Weight:
+def fit_weight(evaluated: list[_Evaluated], mass_kg: float, centre_m: np.ndarray, gravity_m_s2: float) -> _Weight:
     """Mass and centre of mass from the readings at rest under all tilts, next to the believed ones.
 
     Fz gives the mass, the moments M = (R c) × W give c: under tilt also its height. The sensor's own zero is
@@ -190,7 +191,7 @@ def fit_weight(evaluated: list[Evaluated], mass_kg: float, centre_m: np.ndarray,
     def rms(m: float, place: np.ndarray) -> np.ndarray:
         return np.sqrt(((rest - weights(evaluated, m, place, gravity_m_s2)) ** 2).mean(axis=0))
 
-    return Weight(
+    return _Weight(
         mass_kg=float(mass),
         mass_interval_95=(float(mass - mass_half), float(mass + mass_half)),
         centre_m=centre,
@@ -201,7 +202,7 @@ def fit_weight(evaluated: list[Evaluated], mass_kg: float, centre_m: np.ndarray,
 
 
 def table(
-    evaluated: list[Evaluated],
+    evaluated: list[_Evaluated],
     numbers: list[int],
     expected: np.ndarray,
     believed_rest: np.ndarray,
@@ -242,7 +243,7 @@ def table(
     return pd.DataFrame(rows)
 
 
-def weight_as_dict(found: Weight, mass_kg: float, centre_m: np.ndarray, experiments: pd.DataFrame) -> dict:
+def weight_as_dict(found: _Weight, mass_kg: float, centre_m: np.ndarray, experiments: pd.DataFrame) -> dict:
     """The weight for a JSON file, next to the believed one, and how far the believed vehicle's steady wrench is off."""
     off = np.array([experiments[name] - experiments[f"{name}_model"] for name in WRENCH])
     half = np.array([experiments[f"{name}_half_95"] for name in WRENCH])
@@ -261,3 +262,24 @@ def weight_as_dict(found: Weight, mass_kg: float, centre_m: np.ndarray, experime
         "steady_rms_off_model": dict(zip(WRENCH, np.sqrt((off**2).mean(axis=1)).tolist(), strict=True)),
         "steady_half_width_95": dict(zip(WRENCH, half.mean(axis=1).tolist(), strict=True)),
     }
+
+
+def mean_and_error(values: np.ndarray, blocks: int | None = None) -> tuple[float, float]:
+    """Mean and its standard error, from the means of consecutive blocks, about √n of them by default.
+
+    Means of blocks are nearly independent where single samples are not: noise that is slow, drift and ringing
+    widen the error as they should. Of a periodic signal a block is one period. Fewer than 16 samples are taken
+    one by one.
+    """
+    values = np.asarray(values, float)
+    values = values[np.isfinite(values)]
+    if len(values) < 2:
+        return (float(values.mean()) if len(values) else float("nan")), float("nan")
+    count = blocks or block_count(len(values))
+    means = np.array([block.mean() for block in np.array_split(values, count)])
+    return float(values.mean()), float(means.std(ddof=1) / np.sqrt(count)) if count > 1 else float("nan")
+
+
+def block_count(samples: int) -> int:
+    """Into how many blocks so many samples are divided."""
+    return samples if samples < 16 else int(samples**0.5)

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
-ALIKE = 0.7
+_ALIKE = 0.7
 """Share of letters in common (difflib's ratio) from which one name is proposed for another."""
 
 
@@ -16,7 +16,7 @@ def plain(name: str) -> str:
     return re.sub(r"0+(?=\d)", "", re.sub(r"[^a-z0-9]", "", name.lower()))
 
 
-def nearest(name: str, known: Iterable[str], alike: float = ALIKE) -> str | None:
+def nearest(name: str, known: Iterable[str], alike: float = _ALIKE) -> str | None:
     """The known name that looks most like this one, None where none looks like it."""
     by_plain: dict[str, str] = {}
     for candidate in known:

@@ -39,7 +39,7 @@ _BRANCHES = ("float", "tuple[float, ...]", "constrained-float", "int", "str", "c
 """Parts of a pydantic location that name a kind of value, not a key."""
 LONGEST = 80
 """Characters of a value that is quoted."""
-MOST_KEYS = 8
+_MOST_KEYS = 8
 """Keys that are listed where none is like the one given."""
 
 
@@ -68,8 +68,8 @@ def _clause(entry: Mapping[str, Any], model: type[BaseModel]) -> str:
     location, kind = entry["loc"], entry["type"]
     key = printable(".".join(str(part) for part in location if part not in _BRANCHES))
     if kind == "extra_forbidden":
-        known = sorted(keys_at(model, location))
-        near = hint(str(location[-1]), known) or f"; known here are {listed(known, MOST_KEYS)}"
+        known = sorted(_keys_at(model, location))
+        near = hint(str(location[-1]), known) or f"; known here are {listed(known, _MOST_KEYS)}"
         return f"{key}: no such key is known{near}"
     if kind == "missing":
         return f"{key}: is missing"
@@ -92,7 +92,7 @@ def _reads_as_number(given: Any) -> bool:
     return True
 
 
-def keys_at(model: type[BaseModel], location: tuple[str | int, ...]) -> list[str]:
+def _keys_at(model: type[BaseModel], location: tuple[str | int, ...]) -> list[str]:
     """Keys that `model` knows where a location of a pydantic error lies."""
     for part in location[:-1]:
         if isinstance(part, str) and part in model.model_fields:

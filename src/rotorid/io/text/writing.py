@@ -13,9 +13,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-DIGITS = 6
+_DIGITS = 6
 """Significant digits that verdicts and vehicles state."""
-FORGOTTEN_S = 86400.0
+_FORGOTTEN_S = 86400.0
 """Age at which the part of a file written by another computer counts as left behind."""
 _HOST = platform.node().replace(".", "_")
 
@@ -95,7 +95,7 @@ def _sweep(path: Path) -> None:
     for part in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
         host, _, process = part.name.removesuffix(".part").rpartition(".")[2].rpartition("-")
         try:
-            gone = _dead(process) if host in (_HOST, "") else time.time() - part.stat().st_mtime > FORGOTTEN_S
+            gone = _dead(process) if host in (_HOST, "") else time.time() - part.stat().st_mtime > _FORGOTTEN_S
         except FileNotFoundError:
             continue
         if gone and part.is_dir():
@@ -131,5 +131,5 @@ def rounded(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return type(value)(rounded(v) for v in value)
     if isinstance(value, float) and math.isfinite(value):
-        return float(f"{value:.{DIGITS - 1}e}")
+        return float(f"{value:.{_DIGITS - 1}e}")
     return value

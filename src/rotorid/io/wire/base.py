@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 BOOTED, ASKED, STREAMING = 0, 1, 2  # why a start record is sent
-STOPPED, COMPLETE, FAULT, UNHEARD = 0, 1, 2, 3  # why a stream ended; 3: the watchdog heard no computer
-OK, REFUSED, UNKNOWN = 0, 1, 2  # how a command was taken
+STOPPED, COMPLETE, _FAULT, UNHEARD = 0, 1, 2, 3  # why a stream ended; 3: the watchdog heard no computer
+OK, REFUSED, _UNKNOWN = 0, 1, 2  # how a command was taken
 
 IDENTIFY, GO, STOP = "?", "G", "X"  # commands that every instrument knows
 KEEP = "K"  # the watchdog of everything that moves: u16 in ms

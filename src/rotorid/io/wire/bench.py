@@ -8,14 +8,14 @@ from rotorid.io.wire.base import COMMON_COMMANDS, Instrument, counts
 
 REFERENCE_V = 2.5
 GAIN = 64
-FULL_SCALE = (1 << 23) - 1
-VOLTS_PER_COUNT = 2 * REFERENCE_V / GAIN / FULL_SCALE
+_FULL_SCALE = (1 << 23) - 1
+VOLTS_PER_COUNT = 2 * REFERENCE_V / GAIN / _FULL_SCALE
 
 INSTRUMENT = Instrument(
     name="bench",
     title="load-cell bench",
     baud_rate=115200,
     interval_us=20_000,
-    channels=counts([f"cell_{i}_v" for i in range(1, 7)], "i", VOLTS_PER_COUNT, FULL_SCALE),
+    channels=counts([f"cell_{i}_v" for i in range(1, 7)], "i", VOLTS_PER_COUNT, _FULL_SCALE),
     commands=COMMON_COMMANDS,
 )

@@ -22,21 +22,21 @@ from rotorid.mismatch.plant.regression import autoregression, build
 from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.mismatch.plant.speedpath import Chain, candidate_forms, commanded_path
 from rotorid.mismatch.posterior.evidence import Evidence, LinearParameter, evidence_from
-from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.problem import Prior
 from rotorid.mismatch.posterior.search import Found
 
-SAME_TIME_SD, SAME_SHARE_SD = 0.03, 0.01
+_SAME_TIME_SD, _SAME_SHARE_SD = 0.03, 0.01
 """One-sigma between two flights in which nothing changed: of a time constant relative to itself, and of a number
 without unit (another charge of the battery)."""
-CHAIN_ROUNDS = 4
+_CHAIN_ROUNDS = 4
 """Times that the chain's columns are taken, at most."""
-SAME_PHASE_SD = 0.29
+_SAME_PHASE_SD = 0.29
 """One-sigma of the instant between two samples at which commands are stamped, in samples: evenly spread over one."""
 STEP_S, STEP = 0.002, 0.01
 """Changes of a time and of another parameter from which its column is taken."""
 START_S = 0.025
 """By how much longer or shorter time constants are from which a change is sought, too."""
-OF_ROTORS = "offset:rotors"
+_OF_ROTORS = "offset:rotors"
 """Start of the keys of offsets in time that are a delay of the commands: the chain has it."""
 
 
@@ -70,8 +70,8 @@ class ChainTerms:
         times = np.array([p.unit == "s" for p in self.parameters])
         least = np.array([p.negligible for p in self.parameters])
         late = np.array([form.stage == DELAY for _, form in self.chain for _ in form.parameters])
-        usual = np.where(times, SAME_TIME_SD * np.abs(self.values), SAME_SHARE_SD)
-        return np.sqrt(usual**2 + least**2 + np.where(late, SAME_PHASE_SD / self.rate_hz, 0.0) ** 2)
+        usual = np.where(times, _SAME_TIME_SD * np.abs(self.values), _SAME_SHARE_SD)
+        return np.sqrt(usual**2 + least**2 + np.where(late, _SAME_PHASE_SD / self.rate_hz, 0.0) ** 2)
 
     @property
     def steps(self) -> np.ndarray:
@@ -121,7 +121,7 @@ class ChainTerms:
             replace(t, form=known[t.key][0], linear=known[t.key][1], of_change=True) if t.key in known else t
             for t in evidence.terms
         )
-        offsets = {t.key for t in evidence.terms if t.key.startswith(OF_ROTORS)}
+        offsets = {t.key for t in evidence.terms if t.key.startswith(_OF_ROTORS)}
         return held(replace(evidence, terms=tuple(named)), offsets)
 
 
@@ -148,7 +148,7 @@ def turning(found: Fitted, chain: ChainTerms) -> Fitted:
     return replace(found, chain=found.chain._replace(result=replace(result, fit=fit)))
 
 
-def change_of_chain(found: Found, chain: ChainTerms) -> np.ndarray:
+def _change_of_chain(found: Found, chain: ChainTerms) -> np.ndarray:
     """By how much the chain's parameters (P,) changed in a model, 0 of those that did not."""
     change = change_of(found) * found.problem.unit
     return np.concatenate([change[found.problem.columns_of[t.key]] for t in chain.terms])
@@ -223,16 +223,16 @@ class Option:
     """Nats, less a constant of the first set."""
 
 
-Products = Callable[[ChainTerms | None], tuple[Evidence, Evidence]]
+_Products = Callable[[ChainTerms | None], tuple[Evidence, Evidence]]
 """Evidence of both sets with the second one's columns taken at a chain."""
-BaseAt = Callable[[ChainTerms], Evidence]
+_BaseAt = Callable[[ChainTerms], Evidence]
 """Evidence of the first set with its columns taken at another chain than its own."""
 
 
-def option_of(
+def _option_of(
     first: ChainTerms,
     start: ChainTerms,
-    products_at: Products,
+    products_at: _Products,
     spread: np.ndarray,
     prior: Prior,
     same: Collection[str] = (),
@@ -251,17 +251,17 @@ def option_of(
         Keys of the chain's forms that did not change, by assumption.
     """
     now = start
-    for _ in range(CHAIN_ROUNDS):
-        option = decided_at(now, products_at, spread, prior, same)
-        chain = first.at(first.values + change_of_chain(option.found, first))
+    for _ in range(_CHAIN_ROUNDS):
+        option = _decided_at(now, products_at, spread, prior, same)
+        chain = first.at(first.values + _change_of_chain(option.found, first))
         if np.all(np.abs(chain.values - now.values) < first.spread):
             break
         now = chain
     return option
 
 
-def decided_at(
-    chain: ChainTerms | None, products_at: Products, spread: np.ndarray, prior: Prior, same: Collection[str] = ()
+def _decided_at(
+    chain: ChainTerms | None, products_at: _Products, spread: np.ndarray, prior: Prior, same: Collection[str] = ()
 ) -> Option:
     """The most probable changes with the columns taken at a chain."""
     base, new = products_at(chain)
@@ -270,7 +270,7 @@ def decided_at(
 
 
 def options_of(
-    first: ChainTerms | None, products_at: Products, spread: np.ndarray, prior: Prior, base_at: BaseAt | None = None
+    first: ChainTerms | None, products_at: _Products, spread: np.ndarray, prior: Prior, base_at: _BaseAt | None = None
 ) -> list[Option]:
     """The most probable changes, and those without each form of the chain that changed in them; the best first.
 
@@ -279,7 +279,7 @@ def options_of(
     chain is found the first set is looked at with it, too (`base_at`): what suits both sets better is no change.
     """
     if first is None:
-        return [decided_at(None, products_at, spread, prior)]
+        return [_decided_at(None, products_at, spread, prior)]
     kept: dict[tuple[float, ...], tuple[Evidence, Evidence]] = {}
 
     def remembered(chain: ChainTerms) -> tuple[Evidence, Evidence]:
@@ -290,7 +290,7 @@ def options_of(
 
     def best(same: frozenset[str] = frozenset()) -> Option:
         starts = [chain for key, chain in first.starts() if key not in same]
-        tried = (option_of(first, start, remembered, spread, prior, same) for start in starts)
+        tried = (_option_of(first, start, remembered, spread, prior, same) for start in starts)
         return max(tried, key=lambda o: o.log_posterior)
 
     plain = best()

@@ -1,4 +1,12 @@
-"""What changed between two sets of flights: statements, and limits of all that did not."""
+"""What changed between two sets of flights: statements, and limits of all that did not.
+
+A payload that swings below the vehicle in the second set alone.
+
+How it swings depends on the length of its cable and on how it hung, and the first set tells neither. Both are read from
+the sideways force that the first set's model leaves in the second set.
+
+What keeps two sets of flights from being compared fully: a larger residual, and flight that the first has not.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +28,8 @@ from rotorid.mismatch.changes.chain import (
     speed_rows,
     squares_of_speeds,
 )
-from rotorid.mismatch.changes.hanging import carrying
 from rotorid.mismatch.changes.joint import (
+    FARTHER,
     Effects,
     Joint,
     Reference,
@@ -29,37 +37,60 @@ from rotorid.mismatch.changes.joint import (
     joined_at,
     joints_of,
     moved_by,
+    on_terms,
     reference_of,
 )
 from rotorid.mismatch.changes.level_one import CAUSES, LevelOne, of_one_vehicle, seen_by
-from rotorid.mismatch.changes.notes import command_notes, notes_of, refused_notes
 from rotorid.mismatch.changes.of_instruments import (
     InstrumentReference,
     instrument_reference_of,
     joint_of_instruments,
 )
 from rotorid.mismatch.changes.problem import MOST_CHANGE, NAMES, change_of
-from rotorid.mismatch.changes.usual import form_spread, spread_of_flights, usual_spread
+from rotorid.mismatch.changes.usual import form_spread, left_by_all, spread_of_flights, usual_spread
 from rotorid.mismatch.decision.decide import relative_change
 from rotorid.mismatch.decision.findings import Finding
+from rotorid.mismatch.decision.words import (
+    capital,
+    channel_words,
+    effect_words,
+    listed,
+    number,
+    parameter_words,
+    regime_words,
+)
 from rotorid.mismatch.model.fitted import Fitted
+from rotorid.mismatch.model.prepare import guesses
+from rotorid.mismatch.model.swinging import (
+    Cable,
+    as_effect,
+    hanging,
+    hanging_stretches,
+    hung_by,
+    likely_cable,
+    on_cable,
+    price,
+    share_left,
+)
 from rotorid.mismatch.model.values import believed_value
-from rotorid.mismatch.plant.channel_errors import CHANNELS_OF_WRENCH
+from rotorid.mismatch.plant.comparison import CHANNELS_OF_WRENCH
 from rotorid.mismatch.plant.motion import Segment
 from rotorid.mismatch.plant.rows import CHANNELS, Rows
-from rotorid.mismatch.posterior.chosen import FORM_SD
 from rotorid.mismatch.posterior.evidence import Evidence
+from rotorid.mismatch.posterior.leftover import TINY
 from rotorid.mismatch.posterior.limits import UpperLimit, limits_of
-from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.problem import Prior
 from rotorid.mismatch.posterior.score import scored
 from rotorid.mismatch.posterior.search import Found
-from rotorid.mismatch.posterior.statements import Statement, parameters, statements_of, widened
+from rotorid.mismatch.posterior.statements import FORM_SD, Statement, parameters, statements_of, widened
 from rotorid.mismatch.posterior.status import CLAIMED, Estimate, Status
 from rotorid.recordings import RecordingSet, Vehicle
 from rotorid.steps import step
 
-KEYS = {name: key for key, name in NAMES.items()}
-CONTRADICTION_NATS = 32.0
+_LARGER = 2.0
+"""How many times the residual of the first set that of the second must be, in some force or moment, to be noted."""
+_KEYS = {name: key for key, name in NAMES.items()}
+_CONTRADICTION_NATS = 32.0
 """What columns that contradict each other say for a mistake at least: an axis is named from eight standard errors."""
 
 
@@ -143,13 +174,13 @@ def changes_from(
             f"{new.name}/vehicle.yaml: kind is {new.vehicle.kind}, expected {base.vehicle.kind} as in {base.name}"
         )
     if isinstance(reference, Reference):
-        joint, options = most_alike(reference, new, prior)
-        stretches = reference.recorded, stretches_of_commands(reference, joint)
+        joint, options = _most_alike(reference, new, prior)
+        stretches = reference.recorded, _stretches_of_commands(reference, joint)
         found, of_speeds = options[0].found, decided_of_speeds(reference.found, reference.chain, stretches, prior)
         stated, notes = changes_in(options, prior), command_notes(*stretches, base.name, new.name)
     else:
         joint, of_speeds = joint_of_instruments(reference, new), None
-        found = joint.decide(joint.base, joint.new, yardstick(joint, reference.runs, prior), prior)
+        found = joint.decide(joint.base, joint.new, _yardstick(joint, reference.runs, prior), prior)
         stated, notes = statements_of(found, of_change=True), ()
     limits = limits_of(found, joint.squares)
     if of_speeds:
@@ -176,8 +207,8 @@ def changes_from(
         values=values_of(found, *vehicles),
         residuals=(residuals_of(reference.rows), residuals_of(joint.rows_of_new)),
         notes=(
-            *refused_notes([c.alternatives or (c.id,) for c in refused]),
-            *notes_of(joint, base.name, new.name),
+            *_refused_notes([c.alternatives or (c.id,) for c in refused]),
+            *_notes_of(joint, base.name, new.name),
             *notes,
         ),
         kind=new.vehicle.kind,
@@ -186,33 +217,33 @@ def changes_from(
     )
 
 
-def most_alike(reference: Reference, new: RecordingSet, prior: Prior) -> tuple[Joint, list[Option]]:
+def _most_alike(reference: Reference, new: RecordingSet, prior: Prior) -> tuple[Joint, list[Option]]:
     """Two sets of flights and what changed, the second set corrected for its mistakes or as recorded.
 
     A mistake is one change more: corrected for it the two sets must be alike by more than it costs, less what columns
     that contradict each other say for it by themselves. So must they be with a payload that swings in the second set.
     What changed is then known well enough to predict the accelerations in the columns with it.
     """
-    both = [(joint, flight_options(reference, joint, prior)) for joint in joints_of(reference, new)]
+    both = [(joint, _flight_options(reference, joint, prior)) for joint in joints_of(reference, new)]
     joint, options = max(both, key=lambda b: b[1][0].log_posterior - price_of(b[0].mistakes_of_new, prior))
     if (swinging := carrying(reference, joint)) is not None:
         other, with_it, nats = swinging
-        own = flight_options(other, with_it, prior)
+        own = _flight_options(other, with_it, prior)
         if own[0].log_posterior - nats > options[0].log_posterior:
             reference, joint, options = other, with_it, own
-    if changed := changed_effects(reference, options[0].found):
+    if changed := _changed_effects(reference, options[0].found):
         joint = moved_by(reference, joint, changed)
-        options = flight_options(reference, joint, prior)
+        options = _flight_options(reference, joint, prior)
     return joint, options
 
 
 def price_of(mistakes: Sequence[Finding], prior: Prior) -> float:
     """What mistakes in recordings cost, nats, less what their own columns say for them."""
     contradictions = ids_of("contradiction")
-    return prior.effect_nats * len(mistakes) - CONTRADICTION_NATS * sum(m.id in contradictions for m in mistakes)
+    return prior.effect_nats * len(mistakes) - _CONTRADICTION_NATS * sum(m.id in contradictions for m in mistakes)
 
 
-def changed_effects(reference: Reference, found: Found) -> Effects:
+def _changed_effects(reference: Reference, found: Found) -> Effects:
     """Effects that changed, by as much as they did, without those that swing: how that hangs is known before."""
     forms = {t.key: t for t in reference.terms if t.kind == "effect" and not t.form.swings}
     change, out = change_of(found) * found.problem.unit, []
@@ -225,7 +256,7 @@ def changed_effects(reference: Reference, found: Found) -> Effects:
 
 
 @step("what changed")
-def flight_options(reference: Reference, joint: Joint, prior: Prior) -> list[Option]:
+def _flight_options(reference: Reference, joint: Joint, prior: Prior) -> list[Option]:
     """The most probable changes of force, moment and sensors, and where the chain changed those without; best first."""
     first = reference.chain if reference.found.commanded else None
 
@@ -235,7 +266,7 @@ def flight_options(reference: Reference, joint: Joint, prior: Prior) -> list[Opt
         at = joined_at(reference, joint.recordings, joint.recorded, chain, joint.mistakes_of_new, joint.own_effects)
         return at.base, at.new
 
-    spread, base_at = yardstick(joint, reference.runs, prior), partial(evidence_at, reference)
+    spread, base_at = _yardstick(joint, reference.runs, prior), partial(evidence_at, reference)
     options = options_of(first, products_at, spread, prior, base_at)
     found = options[0].found
     if len(found.model) > 1:
@@ -246,7 +277,7 @@ def flight_options(reference: Reference, joint: Joint, prior: Prior) -> list[Opt
     return options
 
 
-def yardstick(joint: Joint, runs: Sequence[Evidence], prior: Prior) -> np.ndarray:
+def _yardstick(joint: Joint, runs: Sequence[Evidence], prior: Prior) -> np.ndarray:
     """One-sigma (K,) by which each coefficient differs where nothing changed; `runs` are those of the first set."""
     usual = usual_spread(joint.base, joint.new, joint.known, joint.inertia, joint.form_sd)
     usual = np.hypot(usual, joint.more_usual)
@@ -257,7 +288,7 @@ def yardstick(joint: Joint, runs: Sequence[Evidence], prior: Prior) -> np.ndarra
     return np.hypot(usual, spread_of_flights(runs, decide))
 
 
-def stretches_of_commands(reference: Reference, joint: Joint) -> Sequence[Segment]:
+def _stretches_of_commands(reference: Reference, joint: Joint) -> Sequence[Segment]:
     """Stretches of the second set from which its chain is estimated: corrected, or as recorded.
 
     Where the clock of the rotor speeds was late and is corrected, commands that it stamped, too, would seem early.
@@ -330,7 +361,7 @@ def values_of(found: Found, base: Vehicle, new: Vehicle) -> tuple[Estimate, ...]
     """
     out = []
     for key, term in found.problem.terms.items():
-        if term.effect not in KEYS or not found.problem.unit[found.problem.columns_of[key]].all():
+        if term.effect not in _KEYS or not found.problem.unit[found.problem.columns_of[key]].all():
             continue
         problem = widened(found.problem) if key in found.model else found.problem
         at = scored(problem, tuple(sorted({*found.model, key})))
@@ -344,10 +375,10 @@ def in_percent(name: str, changes: tuple[Estimate, ...], base: Vehicle, new: Veh
 
     An interval ends where the prior does: beyond, the coefficient of a mass is that of an infinite one, or a negative.
     """
-    key = KEYS.get(name)
+    key = _KEYS.get(name)
     if key is None:
         return changes
-    scale, flown = believed_over(key, base, new), new.kind == "flight"
+    scale, flown = _believed_over(key, base, new), new.kind == "flight"
 
     def relative(coefficient: float) -> float:
         coefficient = float(np.clip(coefficient, -MOST_CHANGE, MOST_CHANGE))
@@ -358,7 +389,7 @@ def in_percent(name: str, changes: tuple[Estimate, ...], base: Vehicle, new: Veh
     return tuple(replace(p, **{end: relative(getattr(p, end)) for end in ends}) for p in changes)
 
 
-def believed_over(key: str, base: Vehicle, new: Vehicle) -> float:
+def _believed_over(key: str, base: Vehicle, new: Vehicle) -> float:
     """The first vehicle's number over the second's, of a value whose column is in units of the first.
 
     The column of a mass or an inertia is in flight the force or moment itself, whatever was believed.
@@ -381,12 +412,12 @@ def mistakes_that_differ(base: tuple[Finding, ...], new: tuple[Finding, ...]) ->
         first = known.get(found.which)
         if first is None:
             out.append(Change(found.id, found.status, found.alternatives, None, found.parameters))
-        elif later := later_by(first, found):
+        elif later := _later_by(first, found):
             out.append(Change(found.id, found.status, found.alternatives, None, (later,)))
     return tuple(out)
 
 
-def later_by(first: Finding, second: Finding) -> Estimate | None:
+def _later_by(first: Finding, second: Finding) -> Estimate | None:
     """By how much more a clock is late in the second set; None of other mistakes, or where intervals allow zero."""
     if first.late_s is None or second.late_s is None:
         return None
@@ -395,7 +426,7 @@ def later_by(first: Finding, second: Finding) -> Estimate | None:
     return replace(new, value=away, low=away - reach, high=away + reach) if abs(away) > reach else None
 
 
-SURELY = 0.999
+_SURELY = 0.999
 """Probability of the interval outside of which a prediction contradicts what differs."""
 
 
@@ -414,7 +445,7 @@ def explaining(
         wrong = [
             (abs(size) / known[key].sd, c)
             for c, key, size in parts
-            for low, high in [known[key].interval(SURELY)]
+            for low, high in [known[key].interval(_SURELY)]
             if not low <= sums[key] <= high and size * (sums[key] - known[key].value) > 0
         ]
         if not wrong:
@@ -457,3 +488,98 @@ def predicted(change: Change, vehicle: Vehicle) -> dict[str, float]:
     out = {"trim/roll": roll, "trim/pitch": pitch, **shares}
     out |= {f"{kind}/all": more for kind in ("lift", "lift_of_throttle", "lift_without_voltage")}
     return {key: value for key, value in out.items() if value}
+
+
+def carrying(reference: Reference, joint: Joint) -> tuple[Reference, Joint, float] | None:
+    """Two sets with the columns of a payload on the cable that suits the second, hung as that set shows.
+
+    With what the states of the payload cost, nats. None where nothing seems to swing, or where it swings in the first
+    set already.
+    """
+    model, prepared = reference.found.model, reference.found.prepared
+    swings = [t for t in reference.terms if t.form and t.form.swings]
+    if not swings or any(t.key in model.selection.active for t in swings):
+        return None
+    width, vehicle = sum(t.size for t in reference.terms), prepared.vehicle
+    left = [r.y[:, :3] - r.x[:, :3, :width] @ reference.known[:width] for r in joint.rows_of_new]
+    times_s = [r.time_s for r in joint.rows_of_new]
+    stretches = hanging_stretches(joint.segments_of_new, times_s, left, prepared.thinner.rate_hz)
+    starts = guesses(swings[0].form, list(joint.segments_of_new), vehicle, prepared.groups)
+    cables = [Cable(*start, vehicle.gravity_m_s2) for start in starts]
+    best = min(cables, key=lambda c: share_left(stretches, c), default=None)
+    cable = None if best is None else likely_cable(best, stretches)
+    found = None if cable is None else hung_by(cable, joint.segments_of_new, stretches)
+    if found is None:
+        return None
+    hung, mass_kg = found
+    # One term of each form: the others keep the lengths that they have.
+    first = {t.form.name: t.key for t in reversed(swings)}
+    terms = [on_cable(t, cable) if t in swings and first[t.form.name] == t.key else t for t in reference.terms]
+    other = on_terms(reference, terms)
+    recorded = [hanging(s, h.motion.hung) for s, h in zip(joint.recorded, hung, strict=True)]
+    own = (as_effect(swings[0], cable, mass_kg),)
+    both = joined_at(other, joint.recordings, recorded, other.chain, joint.mistakes_of_new, own)
+    keys = {t.key for t in swings}
+    alone = tuple(replace(t, alone=t.key in keys) for t in both.new.terms)
+    return other, replace(both, new=replace(both.new, terms=alone), uncorrected=joint.uncorrected), 0.5 * price(hung)
+
+
+def _notes_of(joint: Joint, base: str, new: str) -> tuple[str, ...]:
+    """Notes on a comparison, in sentences."""
+    return (*_residual_notes(joint, base, new), *regime_notes(joint.flown_by_base, joint.flown_by_new, base, new))
+
+
+def command_notes(reference: Sequence[Segment], recorded: Sequence[Segment], base: str, new: str) -> tuple[str, ...]:
+    """That one of two sets has no commands, so that the chain from command to rotor speed was not compared."""
+    first, second = (any(s.command is not None for s in own) for own in (reference, recorded))
+    if first == second:
+        return ()
+    without = new if first else base
+    return (f"{without} has no commands: the motors' lag, delay, throttle curve and battery were not compared.",)
+
+
+def _residual_notes(joint: Joint, base: str, new: str) -> list[str]:
+    """That more is left unexplained in the second set than in the first: something outside the catalogue changed."""
+    per_block = [left_by_all(own) / own.blocks.sum() for own in (joint.base, joint.new)]
+    ratio = np.sqrt(per_block[1] / joint.inertia**2 / np.maximum(per_block[0], TINY))
+    larger = [
+        (r, int(c)) for r, c in zip(ratio, joint.base.channels, strict=True) if r > _LARGER and c < CHANNELS_OF_WRENCH
+    ]
+    if not larger:
+        return []
+    most = max(r for r, _ in larger)
+    where = listed([f"the {channel_words(CHANNELS[c])}" for _, c in larger])
+    return [
+        f"What no known effect explains is up to {most:.1f} times as large in {new} as in {base} ({where}): something "
+        f"differs there that is outside the catalogue, or noise and vibration are larger."
+    ]
+
+
+def regime_notes(first: Mapping[str, float], second: Mapping[str, float], base: str, new: str) -> list[str]:
+    """In what the second set goes farther than the first; one sentence or none."""
+    farther = []
+    for name, far in first.items():
+        if name in second and second[name] > FARTHER * far > 0:
+            words, unit = regime_words(name)
+            farther.append(f"{words} {number(second[name])} {unit} where {base} has {number(far)} {unit}")
+    if not farther:
+        return []
+    return [
+        f"{new} goes farther ({listed(farther)}). Airspeeds more than {FARTHER} times as high are not compared; other "
+        "flight is by the forms of the effects."
+    ]
+
+
+def _refused_notes(ids: Sequence[Sequence[str]]) -> list[str]:
+    """That a name was not stated because it contradicts what differs; `ids` holds the class of each."""
+    return [
+        f"{capital(listed([_effect_or_value(i) for i in own], 'or'))} "
+        "would explain the motion, but would change trims, "
+        "shares or thrust by other amounts than they differ by: not stated."
+        for own in ids
+    ]
+
+
+def _effect_or_value(name: str) -> str:
+    """An effect, or a value by its contract name, in words."""
+    return f"the {parameter_words(name)[0]}" if name in NAMES.values() else effect_words(name)

@@ -29,30 +29,29 @@ from rotorid.mismatch.model.fitted import Fitted, fitted
 from rotorid.mismatch.model.prepare import assemble_rows, prepare, prepare_like
 from rotorid.mismatch.model.report_runs import as_flown, comparable
 from rotorid.mismatch.model.wrench import WrenchModel, block_seconds, chosen, model_filters
-from rotorid.mismatch.plant.motion import Segment
-from rotorid.mismatch.plant.regime import regime_variables
+from rotorid.mismatch.plant.motion import Segment, regime_variables
 from rotorid.mismatch.plant.regression import NEVER_EXCITED, Regression, build
 from rotorid.mismatch.plant.rows import Rows, Term
-from rotorid.mismatch.posterior.chosen import FORM_SD
 from rotorid.mismatch.posterior.evidence import Evidence, EvidenceTerm, evidence_from
-from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.problem import Prior
 from rotorid.mismatch.posterior.search import Found
+from rotorid.mismatch.posterior.statements import FORM_SD
 from rotorid.recordings import RecordingSet, Vehicle
 from rotorid.steps import step
 
 Effects = Sequence[tuple[Form, np.ndarray]]
 """Forms with the values of their parameters."""
-FORCES, MOMENTS = (0, 1, 2), (3, 4, 5)
+FORCES, _MOMENTS = (0, 1, 2), (3, 4, 5)
 """Channels of the forces and of the moments."""
-REACH_OF_KNOWN = 3.0
+_REACH_OF_KNOWN = 3.0
 """Standard errors by which a coefficient of the first set may be other than its model has it."""
-AIRSPEED = "airspeed_m_s"
-REGIMES = (AIRSPEED, "rotor_speed_rad_s", "body_rate_rad_s", "tilt_rad")
+_AIRSPEED = "airspeed_m_s"
+_REGIMES = (_AIRSPEED, "rotor_speed_rad_s", "body_rate_rad_s", "tilt_rad")
 """Regime variables by which two sets are compared."""
 FARTHER = 1.5
 """How many times as far the second set must go in a regime variable to be noted. Airspeeds beyond that are not
 compared: the aerodynamic forms that suit the first set are not known to hold there, and their error is no change."""
-INERTIA_OF = {3: "inertia_xx", 4: "inertia_yy", 5: "inertia_zz"}
+_INERTIA_OF = {3: "inertia_xx", 4: "inertia_yy", 5: "inertia_zz"}
 """Channel of each moment to the inertia that it turns."""
 
 
@@ -135,19 +134,19 @@ def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> Reference:
     model = found.model
     terms = [t for t in model.terms if not t.run]
     # As another set's stretches are made: what making them leaves out is left out of both.
-    recorded, noisy = recorded_stretches(found, base)
+    recorded, noisy = _recorded_stretches(found, base)
     chain = chain_terms(found, recorded)
     segments, rows = rows_of(found, terms, chain, recorded)
     of_chain = chain.terms if found.commanded else []
-    known = np.append(known_effects(model, terms), np.zeros(sum(t.size for t in of_chain)))
+    known = np.append(_known_effects(model, terms), np.zeros(sum(t.size for t in of_chain)))
     block_s = block_seconds(rows, model.prepared.thinner.rate_hz)
     usual = np.zeros(len(known))
     if of_chain:
         usual[-len(chain.values) :] = chain.spread
     again = rows_of(found, terms, chain, noisy)[1] if noisy else []
     alike = [len(r.y) for r in rows] == [len(r.y) for r in again]
-    regression = regression_of(rows, [*terms, *of_chain], model, block_s, again if alike else None)
-    noise = noise_of_a_block(regression)
+    regression = _regression_of(rows, [*terms, *of_chain], model, block_s, again if alike else None)
+    noise = _noise_of_a_block(regression)
     evidence, runs = evidence_of(regression, noise, known, *((chain, chain) if of_chain else ()))
     return Reference(
         recordings=base,
@@ -163,7 +162,7 @@ def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> Reference:
         noise=noise,
         evidence=evidence,
         runs=runs,
-        flown=how_far([regime_variables(s, model.prepared) for s in segments]),
+        flown=_how_far([regime_variables(s, model.prepared) for s in segments]),
         recorded=tuple(recorded),
         mistakes=mistakes,
     )
@@ -174,7 +173,7 @@ def on_terms(reference: Reference, terms: Sequence[Term]) -> Reference:
     found, chain = reference.found, reference.chain
     _, rows = rows_of(found, terms, chain, reference.recorded)
     of_chain = chain.terms if found.commanded else []
-    regression = regression_of(rows, [*terms, *of_chain], found.model, reference.block_s)
+    regression = _regression_of(rows, [*terms, *of_chain], found.model, reference.block_s)
     chains = (chain, chain) if of_chain else ()
     evidence, runs = evidence_of(regression, reference.noise, reference.known, *chains)
     return replace(reference, terms=tuple(terms), rows=tuple(rows), evidence=evidence, runs=runs)
@@ -184,7 +183,7 @@ def evidence_at(reference: Reference, chain: ChainTerms) -> Evidence:
     """Evidence of the first set, known by commands, with its columns taken at another chain than its own."""
     found, first = reference.found, reference.chain
     _, rows = rows_of(found, reference.terms, chain, reference.recorded, first)
-    regression = regression_of(rows, [*reference.terms, *chain.terms], found.model, reference.block_s)
+    regression = _regression_of(rows, [*reference.terms, *chain.terms], found.model, reference.block_s)
     return evidence_of(regression, reference.noise, reference.known, chain, first)[0]
 
 
@@ -199,18 +198,18 @@ def evidence_of(
 
     `chain` is the one at which columns are taken, `first` the first set's; None where it has no columns.
     """
-    evidence = with_known_effects(noisy_evidence(regression, noise), known)
+    evidence = _with_known_effects(_noisy_evidence(regression, noise), known)
     evidence = evidence if chain is None else chain.named(evidence, first)
     return evidence, by_run(evidence, regression)
 
 
-def noise_of_a_block(regression: Regression) -> np.ndarray:
+def _noise_of_a_block(regression: Regression) -> np.ndarray:
     """What the sensors' noise adds to the products in a block, (C, K, K); nothing of rows without noisy ones."""
     evidence = evidence_from(regression)
     return evidence.bias_gram / evidence.blocks.sum()
 
 
-def noisy_evidence(regression: Regression, noise: np.ndarray) -> Evidence:
+def _noisy_evidence(regression: Regression, noise: np.ndarray) -> Evidence:
     """Evidence with the `noise` (C, K, K) of a block in its products."""
     evidence = evidence_from(regression)
     return replace(evidence, bias_gram=noise * evidence.blocks.sum())
@@ -234,7 +233,7 @@ def joints_of(reference: Reference, new: RecordingSet) -> list[Joint]:
     variants = (
         [(corrected, mistakes)] if all(m.which in known for m in mistakes) else [(corrected, mistakes), (new, ())]
     )
-    stretches = [(own, recorded_stretches(reference.found, own)[0], found) for own, found in variants]
+    stretches = [(own, _recorded_stretches(reference.found, own)[0], found) for own, found in variants]
     joints = [
         joined_at(reference, own, recorded, reference.chain, found) for own, recorded, found in stretches if recorded
     ]
@@ -258,17 +257,17 @@ def joined_at(
     """Two sets on the same columns, those of the second taken at a chain of its own; `own_effects` as `rows_of`."""
     found, model = reference.found, reference.found.model
     segments, rows = rows_of(found, reference.terms, chain, recorded, reference.chain, new.vehicle, own_effects)
-    rows = as_seen(rows, reference)
+    rows = _as_seen(rows, reference)
     terms = [*reference.terms, *(chain.terms if found.commanded else [])]
     regimes = [(s.run, regime_variables(s, model.prepared)) for s in segments]
     slow = slower(regimes, model.prepared.vehicle, reference.block_s, reference.flown)
-    of_new = regression_of(rows, terms, model, reference.block_s, within=slow)
+    of_new = _regression_of(rows, terms, model, reference.block_s, within=slow)
     if (of_new.by_channel.environment < 0).all():
         raise InputError(
             f"set {new.name}: all of it is more than {FARTHER} times as fast as {reference.recordings.name}; "
             "expected some flight at the same airspeeds in both"
         )
-    evidence = with_known_effects(noisy_evidence(of_new, reference.noise), reference.known)
+    evidence = _with_known_effects(_noisy_evidence(of_new, reference.noise), reference.known)
     evidence = within_bounds(evidence, reference)
     inertia, inertia_of_base = (
         inertia_of(v, reference.evidence.channels) for v in (new.vehicle, reference.recordings.vehicle)
@@ -280,7 +279,7 @@ def joined_at(
         more_usual=reference.usual_of_chain,
         inertia=inertia / inertia_of_base,
         flown_by_base=reference.flown,
-        flown_by_new=how_far([own for _, own in regimes]),
+        flown_by_new=_how_far([own for _, own in regimes]),
         recordings=new,
         recorded=tuple(recorded),
         segments_of_new=tuple(segments),
@@ -336,7 +335,7 @@ def rows_of(
         model.prepared, list(terms), segments, [*lasting_effects(model), *own_effects], for_comparison=True
     )
     columns = chain_columns(rows, recorded, found, chain) if found.commanded else None
-    rows = against_own(rows, model, segments, vehicle)
+    rows = _against_own(rows, model, segments, vehicle)
     if columns is not None:
         away = chain.values - (first or chain).values
         rows = [
@@ -364,29 +363,29 @@ def slower(
 
     `regimes` are run and regime variables of each stretch of the second set.
     """
-    if AIRSPEED not in flown:
+    if _AIRSPEED not in flown:
         return lambda run, time_s: True
-    most = max(FARTHER * flown[AIRSPEED], hover_inflow_m_s(vehicle))
+    most = max(FARTHER * flown[_AIRSPEED], hover_inflow_m_s(vehicle))
 
     def within(run: str, time_s: float) -> bool | None:
         for own_run, own in regimes:
             near = np.abs(own["time_s"] - time_s) <= 0.5 * block_s
-            if own_run == run and near.any() and np.median(own[AIRSPEED][near]) > most:
+            if own_run == run and near.any() and np.median(own[_AIRSPEED][near]) > most:
                 return None
         return True
 
     return within
 
 
-def how_far(known: Sequence[Mapping[str, np.ndarray]]) -> dict[str, float]:
+def _how_far(known: Sequence[Mapping[str, np.ndarray]]) -> dict[str, float]:
     """95th percentile of the magnitude of each variable in REGIMES that all stretches have, from those of each."""
-    names = [n for n in REGIMES if all(n in k for k in known)]
+    names = [n for n in _REGIMES if all(n in k for k in known)]
     return {n: float(np.nanquantile(np.abs(np.concatenate([k[n] for k in known])), 0.95)) for n in names}
 
 
 def inertia_of(vehicle: Vehicle, channels: np.ndarray) -> np.ndarray:
     """What turns each channel's acceleration into a force (kg) or a moment (kg m²), (C,); 1 for sensors' channels."""
-    of_moment = {channel: getattr(vehicle.inertia_kg_m2, name[-2:]) for channel, name in INERTIA_OF.items()}
+    of_moment = {channel: getattr(vehicle.inertia_kg_m2, name[-2:]) for channel, name in _INERTIA_OF.items()}
     return np.array([vehicle.mass_kg if c in FORCES else of_moment.get(int(c), 1.0) for c in channels])
 
 
@@ -399,7 +398,7 @@ def by_run(evidence: Evidence, regression: Regression) -> tuple[Evidence, ...]:
     return tuple(of_environments(evidence, runs == r) for r in dict.fromkeys(runs.tolist()))
 
 
-def known_effects(model: WrenchModel, terms: Sequence[Term]) -> np.ndarray:
+def _known_effects(model: WrenchModel, terms: Sequence[Term]) -> np.ndarray:
     """Coefficients (K,) of the effects that the first set's model holds, on the columns of `terms`."""
     columns, fit = model.regression.columns([t.key for t in terms]), model.selection.fit
     active = set(model.regression.columns(model.selection.active))
@@ -407,14 +406,14 @@ def known_effects(model: WrenchModel, terms: Sequence[Term]) -> np.ndarray:
     return np.array([found.get(c, 0.0) for c in columns])
 
 
-def with_known_effects(evidence: Evidence, known: np.ndarray) -> Evidence:
+def _with_known_effects(evidence: Evidence, known: np.ndarray) -> Evidence:
     """Evidence in which another mass or inertia turns all that is known of force and moment into motion.
 
     Its columns hold the rotors' part alone; a vehicle that is heavier is moved less by its drag, too.
     """
     gram, cross, bias = evidence.gram.copy(), evidence.cross.copy(), evidence.bias_gram.copy()
     for place, channel in enumerate(evidence.channels):
-        key = "mass" if channel in FORCES else INERTIA_OF.get(int(channel))
+        key = "mass" if channel in FORCES else _INERTIA_OF.get(int(channel))
         if key is None or key not in evidence.start:
             continue
         turn = np.eye(len(known))
@@ -431,7 +430,7 @@ def within_bounds(evidence: Evidence, reference: Reference) -> Evidence:
     What the first set has is known to a few standard errors of its column; where it never excites one, not at all.
     """
     energy = np.einsum("cekk->k", reference.evidence.gram)
-    reach = np.where(energy > NEVER_EXCITED, REACH_OF_KNOWN / np.sqrt(np.maximum(energy, NEVER_EXCITED)), np.inf)
+    reach = np.where(energy > NEVER_EXCITED, _REACH_OF_KNOWN / np.sqrt(np.maximum(energy, NEVER_EXCITED)), np.inf)
 
     def bounded(term: EvidenceTerm) -> EvidenceTerm:
         if term.kind != "effect" or term.of_change:
@@ -446,7 +445,7 @@ def within_bounds(evidence: Evidence, reference: Reference) -> Evidence:
     return replace(evidence, terms=tuple(bounded(t) for t in evidence.terms))
 
 
-def against_own(rows: list[Rows], model: WrenchModel, segments: list[Segment], vehicle: Vehicle | None) -> list[Rows]:
+def _against_own(rows: list[Rows], model: WrenchModel, segments: list[Segment], vehicle: Vehicle | None) -> list[Rows]:
     """Rows with what a set's own vehicle leaves of every channel."""
     if vehicle in (None, model.prepared.vehicle):
         return rows
@@ -454,20 +453,20 @@ def against_own(rows: list[Rows], model: WrenchModel, segments: list[Segment], v
     return [replace(r, y=o.y) for r, o in zip(rows, own, strict=True)]
 
 
-def recorded_stretches(found: Fitted, recordings: RecordingSet) -> tuple[list[Segment], list[Segment]]:
+def _recorded_stretches(found: Fitted, recordings: RecordingSet) -> tuple[list[Segment], list[Segment]]:
     """Stretches of a set with all that the first set's model needs: as recorded, and with noise added once more."""
     both = prepare_like(replace(found.prepared, vehicle=recordings.vehicle), recordings)
     as_it_is, noisy = ([s for s in own if comparable(s, found.model)] for own in both)
     return as_it_is, noisy
 
 
-def as_seen(rows: list[Rows], reference: Reference) -> list[Rows]:
+def _as_seen(rows: list[Rows], reference: Reference) -> list[Rows]:
     """Rows in which a column says something only in channels where it does in the first set."""
     seen = np.any([np.any(r.x != 0.0, axis=0) for r in reference.rows], axis=0)
     return [replace(r, x=r.x * seen) for r in rows]
 
 
-def regression_of(
+def _regression_of(
     rows: list[Rows],
     terms: list[Term],
     model: WrenchModel,

@@ -110,18 +110,18 @@ SCATTER = (
 Of a slope what goes beyond the flights' own doubt, or half of that doubt where it explains all."""
 ASSUMED = {"lift_without_voltage": (0.1, 3)}
 """One-sigma and degrees of freedom of what no laboratory shows: here of a battery whose voltage is not recorded."""
-FEWEST_FLIGHTS, FEWEST_LABORATORIES = 3, 3
+_FEWEST_FLIGHTS, _FEWEST_LABORATORIES = 3, 3
 """A laboratory's largest scatter needs so many flights; of a kind that fewer laboratories have, it is doubled."""
-FREEDOM_OF_PIECES = 2.0
+_FREEDOM_OF_PIECES = 2.0
 """As how many degrees of freedom between flights the doubt by a flight's own pieces counts."""
-KNOWN = 1e6
+_KNOWN = 1e6
 """Degrees of freedom of a scatter that is taken as known."""
-FREEDOM = (2.0, 10.0)
+_FREEDOM = (2.0, 10.0)
 """Bounds of the degrees of freedom that the usual scatter counts as."""
 
 
 @dataclass(frozen=True)
-class Usual:
+class _Usual:
     """How much a kind of quantity differs from flight to flight of one vehicle in which nothing changed."""
 
     sd: float
@@ -187,7 +187,7 @@ class LevelOne:
 
 
 @step("what differs")
-def level_one(base: RecordingSet, new: RecordingSet, usual: Mapping[str, Usual] | None = None) -> LevelOne:
+def level_one(base: RecordingSet, new: RecordingSet, usual: Mapping[str, _Usual] | None = None) -> LevelOne:
     """What differs between two sets of flights; `usual` is the scatter by kind, by default of all laboratories.
 
     Raises
@@ -273,7 +273,7 @@ def flights_of(recordings: RecordingSet) -> list[str]:
 
 
 @cache
-def usual_scatter(without: str = "") -> dict[str, Usual]:
+def usual_scatter(without: str = "") -> dict[str, _Usual]:
     """The usual scatter by kind, learnt from all laboratories but the one named.
 
     Its degrees of freedom follow from how much the logarithms of the laboratories' variances differ (Smyth, eq. 10).
@@ -284,7 +284,7 @@ def usual_scatter(without: str = "") -> dict[str, Usual]:
         rows = [row for row in every if row[1] != without] or every
         if not rows:
             sd, freedom = ASSUMED[kind]
-            out[kind] = Usual(sd, freedom, 2.0 * sd)
+            out[kind] = _Usual(sd, freedom, 2.0 * sd)
             continue
         sd, freedom, members = np.array([row[2:] for row in rows], float).T
         half = 0.5 * freedom * members
@@ -292,23 +292,23 @@ def usual_scatter(without: str = "") -> dict[str, Usual]:
         apart = np.var(logs, ddof=1) if len(rows) > 1 else np.inf
         apart -= float(np.mean(polygamma(1, half)))
         counts = 2.0 * brentq(lambda x, y=apart: polygamma(1, x) - np.clip(y, 0.1, 1e3), 1e-2, 1e2)
-        counts = float(np.clip(counts, *FREEDOM))
+        counts = float(np.clip(counts, *_FREEDOM))
         mean = float(np.exp(0.5 * (np.mean(logs) + polygamma(0, 0.5 * counts) - np.log(0.5 * counts))))
-        wider = 1.0 if len(rows) >= FEWEST_LABORATORIES else 2.0
-        most = max([mean, *sd[freedom >= FEWEST_FLIGHTS - 1]])
-        out[kind] = Usual(wider * mean, counts, float(wider * most))
+        wider = 1.0 if len(rows) >= _FEWEST_LABORATORIES else 2.0
+        most = max([mean, *sd[freedom >= _FEWEST_FLIGHTS - 1]])
+        out[kind] = _Usual(wider * mean, counts, float(wider * most))
     return out
 
 
 def differences(
-    good: Mapping[str, Sequence[Flown]], new: Mapping[str, Sequence[Flown]], usual: Mapping[str, Usual]
+    good: Mapping[str, Sequence[Flown]], new: Mapping[str, Sequence[Flown]], usual: Mapping[str, _Usual]
 ) -> tuple[Difference, ...]:
     """What differs, the rarest first; `good` and `new` hold the runs of each flight by its name."""
     return differences_at(len(good), measured([*good.values(), *new.values()]), [*good, *new], usual)
 
 
 def differences_at(
-    count: int, numbers: Mapping[Quantity, _Numbers], names: Sequence[str], usual: Mapping[str, Usual]
+    count: int, numbers: Mapping[Quantity, _Numbers], names: Sequence[str], usual: Mapping[str, _Usual]
 ) -> tuple[Difference, ...]:
     """What differs between the first `count` flights and the others, the rarest first; `numbers` are of all."""
     kinds = [q.kind for q in numbers]
@@ -325,7 +325,7 @@ def found_in(flights: Mapping[str, Sequence[Flown]]) -> dict[Quantity, tuple[flo
     variance by the flights' own pieces."""
     out = {}
     for q, numbers in measured(list(flights.values())).items():
-        out[q] = *scatter_of([numbers.values], [numbers.own], q.kind), float(numbers.own.mean())
+        out[q] = *_scatter_of([numbers.values], [numbers.own], q.kind), float(numbers.own.mean())
     return out
 
 
@@ -434,19 +434,19 @@ def _ridge(gram: np.ndarray, cross: np.ndarray, penalty: float) -> tuple[np.ndar
 
 
 def _difference(
-    q: Quantity, numbers: _Numbers, count: int, names: Sequence[str], usual: Usual, share: float
+    q: Quantity, numbers: _Numbers, count: int, names: Sequence[str], usual: _Usual, share: float
 ) -> Difference:
     """The difference of two sets by the yardstick that makes it rarer; it has a `share` of the false alarms."""
     first, second = slice(None, count), slice(count, None)
     values, owns = ([column[part] for part in (first, second)] for column in (numbers.values, numbers.own))
-    found, freedom = scatter_of(values, owns, q.kind)
+    found, freedom = _scatter_of(values, owns, q.kind)
     total = usual.freedom + freedom
     joint = (usual.freedom * usual.sd**2 + freedom * found) / total
     value = float(values[1].mean() - values[0].mean())
     apart = numbers.places[second].mean(axis=0) - numbers.places[first].mean(axis=0)
-    believed = overstated(numbers.own, found, freedom)
+    believed = _overstated(numbers.own, found, freedom)
     tests = []
-    for variance, degrees in ((joint, total), (usual.most**2, KNOWN)):
+    for variance, degrees in ((joint, total), (usual.most**2, _KNOWN)):
         each = [variance + w if q.kind in SLOPES else np.maximum(variance, believed * w) for w in owns]
         sd = float(np.sqrt(sum(v.mean() / len(v) for v in each) + apart @ numbers.doubt @ apart))
         reach = -stdtrit(degrees, 0.25 * FALSE_ALARMS * share) - stdtrit(degrees, 0.05)
@@ -460,7 +460,7 @@ def _difference(
     return Difference(q, tuple(flights[first]), tuple(flights[second]), value, sd, degrees, scatter, rate, smallest)
 
 
-def overstated(own: np.ndarray, found: float, freedom: int) -> float:
+def _overstated(own: np.ndarray, found: float, freedom: int) -> float:
     """What part of the variances (F,) by the flights' own pieces is believed, 0 to 1.
 
     Pieces of a manoeuvre differ by more than flights that repeat it: where flights are known to differ by less (by
@@ -468,10 +468,10 @@ def overstated(own: np.ndarray, found: float, freedom: int) -> float:
     """
     mean = float(own.mean())
     seen = min(1.0, found / mean) if mean > 0 else 1.0
-    return (FREEDOM_OF_PIECES + freedom * seen) / (FREEDOM_OF_PIECES + freedom)
+    return (_FREEDOM_OF_PIECES + freedom * seen) / (_FREEDOM_OF_PIECES + freedom)
 
 
-def scatter_of(values: Sequence[np.ndarray], owns: Sequence[np.ndarray], kind: str) -> tuple[float, int]:
+def _scatter_of(values: Sequence[np.ndarray], owns: Sequence[np.ndarray], kind: str) -> tuple[float, int]:
     """Variance of flights about the mean of their own set, and its degrees of freedom.
 
     Of a slope it is what goes beyond the flights' own doubt, which is as different as their excitation.

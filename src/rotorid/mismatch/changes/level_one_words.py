@@ -11,7 +11,7 @@ from rotorid.mismatch.changes.quantities import KINDS, SENSORS
 from rotorid.mismatch.decision.words import capital, listed, number
 
 THRUST = "it gives {} thrust, or there is {} weight near it"
-MEANS = {
+_MEANS = {
     "share": (
         "rotor {m} is asked for {size} {more} than in {good}",
         THRUST.format("less", "more"),
@@ -70,10 +70,10 @@ MEANS = {
     ),
 }
 """Of a kind, or of a trim, what is seen and what may be behind it: where it is more, and where it is less."""
-PERCENT = ("share", "trim", "yaw_trim", "sideways", "gyroscope_scale", "drag")
-SHOWN = ("share", "trim", "lift", "lift_of_throttle", "lift_without_voltage", "yaw_trim", "sideways")
+_PERCENT = ("share", "trim", "yaw_trim", "sideways", "gyroscope_scale", "drag")
+_SHOWN = ("share", "trim", "lift", "lift_of_throttle", "lift_without_voltage", "yaw_trim", "sideways")
 """Kinds whose smallest change is stated."""
-SMALLEST = {
+_SMALLEST = {
     "share": "a rotor's share of the thrust by {}",
     "trim": "the roll or pitch trim by {} of thrust times arm",
     "yaw_trim": "the yaw trim by {}",
@@ -88,13 +88,13 @@ def level_one_sentences(found: LevelOne) -> list[str]:
         return [difference_words(d) for d in found.stated]
     return [
         f"From {found.base} to {found.new} no trim, share of a rotor or sensor differs by more than flights of one "
-        f"vehicle do. {smallest_words(found)}".strip()
+        f"vehicle do. {_smallest_words(found)}".strip()
     ]
 
 
 def difference_words(d: Difference) -> str:
     """`Rotor 3 is asked for 7.3 ± 1.8 % more than in the 5 good flights (…): it gives less thrust, or …`"""
-    seen, *causes = MEANS[d.quantity.member if d.quantity.kind == "trim" else _family(d.quantity.kind)]
+    seen, *causes = _MEANS[d.quantity.member if d.quantity.kind == "trim" else _family(d.quantity.kind)]
     signed = "{more}" not in seen and "{faster}" not in seen
     text = seen.format(
         m=f"the {d.quantity.member}" if d.quantity.member in SENSORS else d.quantity.member,
@@ -107,22 +107,22 @@ def difference_words(d: Difference) -> str:
     )
     return (
         f"{capital(text)} (scatter from flight to flight {_amount(d, d.scatter)}, false-alarm rate "
-        f"{percent_of(d.false_alarms)}): {causes[-1] if d.value < 0 else causes[0]}."
+        f"{_percent_of(d.false_alarms)}): {causes[-1] if d.value < 0 else causes[0]}."
     )
 
 
-def percent_of(rate: float) -> str:
+def _percent_of(rate: float) -> str:
     """`0.03 %`; rates that no table of scatter can vouch for are all below a thousandth."""
     return f"{number(100.0 * rate)} %" if rate >= 1e-3 else "below 0.1 %"
 
 
-def smallest_words(found: LevelOne) -> str:
+def _smallest_words(found: LevelOne) -> str:
     """The smallest changes that would have been stated in 19 of 20 comparisons, of the kinds that a pilot looks at."""
     most: dict[str, Difference] = {}
     for d in found.differences:
-        if d.quantity.kind in SHOWN and d.smallest > getattr(most.get(d.quantity.kind), "smallest", 0.0):
+        if d.quantity.kind in _SHOWN and d.smallest > getattr(most.get(d.quantity.kind), "smallest", 0.0):
             most[d.quantity.kind] = d
-    named = [SMALLEST[_family(k)].format(_amount(most[k], most[k].smallest)) for k in SHOWN if k in most]
+    named = [_SMALLEST[_family(k)].format(_amount(most[k], most[k].smallest)) for k in _SHOWN if k in most]
     return f"Stated in 19 of 20 such comparisons would be: {listed(named)}." if named else ""
 
 

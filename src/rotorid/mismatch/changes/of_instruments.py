@@ -41,36 +41,35 @@ from rotorid.mismatch.plant.regression import Regression, build, ridge_inverse
 from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.mismatch.posterior.evidence import Evidence, evidence_from
 from rotorid.mismatch.posterior.leftover import TINY, spectrum_of, unit_of
-from rotorid.mismatch.posterior.prior import Prior
-from rotorid.mismatch.posterior.problem import Problem
+from rotorid.mismatch.posterior.problem import Prior, Problem
 from rotorid.mismatch.posterior.score import Model, Posterior
 from rotorid.mismatch.posterior.search import Found
 from rotorid.recordings import RecordingSet
 
-OTHER_RATE = 0.3
+_OTHER_RATE = 0.3
 """Relative difference of two sampling rates from which one set's columns are not the other's."""
-FEWEST_RUNS = 3
+_FEWEST_RUNS = 3
 """Runs that each set must have for its runs to be the environments in which a coefficient must be the same."""
-TARE_NOISE = 0.5
+_TARE_NOISE = 0.5
 """One-sigma of a zero over that of a row's noise, at least: it is the mean of a few samples."""
-WANDERS = {"zero": ("constant", "b_{own}"), "drift": ("linear in time", "b_{own}")}
+_WANDERS = {"zero": ("constant", "b_{own}"), "drift": ("linear in time", "b_{own}")}
 """To what differs from run to run (`Effect.differs_between_runs`) how the names of its forms begin, and its symbol."""
-OF_OTHER_AXES = "of other axes", ("", "C_{own},{load}")
+_OF_OTHER_AXES = "of other axes", ("", "C_{own},{load}")
 """The same of a load on another axis."""
-MOUNTED_RAD = 0.001
+_MOUNTED_RAD = 0.001
 """One-sigma of the angle by which a load, or the vehicle, stands otherwise on another day: a twentieth of a degree."""
 WIDE = 20.0
 """One-sigmas between days in which nothing changed that a change is believed to have at least: narrower, its estimate
 would be drawn to nothing by as much as the two differ."""
-FORM_SD_OF_READING = 0.1
+_FORM_SD_OF_READING = 0.1
 """Share of what the first set's effects add to a reading that their forms are wrong by: loops and creep hang on what
 was loaded before. Also the share of what effects that take time do together up to which the others may be the form of
 one of them."""
-HARDLY = 1e-3
+_HARDLY = 1e-3
 """Share of all runs' squares of a column below which one run says nothing of it."""
-MOST_REFINED = 4
+_MOST_REFINED = 4
 """Ids whose nonlinear parameters are refined on the second set, the most promising first."""
-LEAST_MOMENT_N_M = 1e-6
+_LEAST_MOMENT_N_M = 1e-6
 """Largest moment of the load below which none is put on."""
 
 
@@ -86,7 +85,7 @@ class Wander:
 
 
 @dataclass(frozen=True)
-class OnColumns:
+class _OnColumns:
     """A set on some columns."""
 
     rows: tuple[Rows, ...]
@@ -105,7 +104,7 @@ class InstrumentReference:
     chain: ChainResult | None
     """What lies between command and rotor speed, where speeds are not measured."""
     terms: tuple[Term, ...]
-    own: OnColumns
+    own: _OnColumns
     known: np.ndarray
     """(K,) coefficients of its model on the columns of the terms, 0 of what is not at work."""
     wander: Wander
@@ -128,8 +127,8 @@ def instrument_reference_of(base: RecordingSet) -> InstrumentReference:
     base, mistakes, _ = find_mistakes(replace(base, held_out=()))
     setup = set_up(base)
     model, chain, loadings = first_model(setup, make_terms(setup)[0])
-    terms = compared_terms(model.terms, setup)
-    own, known = on_columns(rows_like(model, terms, model.loadings), terms, model), known_effects(model, terms)
+    terms = _compared_terms(model.terms, setup)
+    own, known = _on_columns(_rows_like(model, terms, model.loadings), terms, model), _known_effects(model, terms)
     return InstrumentReference(
         recordings=base,
         model=model,
@@ -137,7 +136,7 @@ def instrument_reference_of(base: RecordingSet) -> InstrumentReference:
         terms=tuple(terms),
         own=own,
         known=known,
-        wander=wander_of(terms, own, known, model),
+        wander=_wander_of(terms, own, known, model),
         mistakes=(*mistakes, *steps_of(setup, model)),
     )
 
@@ -150,74 +149,74 @@ def joint_of_instruments(reference: InstrumentReference, new: RecordingSet) -> J
     InputError
         They have not the same channels, columns or rate.
     """
-    must_compare(reference.recordings, new)
+    _must_compare(reference.recordings, new)
     new, mistakes, _ = find_mistakes(replace(new, held_out=()))
     model = reference.model
-    setup = replace(model.setup, recordings=new, loadings=loadings_of(reference, new))
+    setup = replace(model.setup, recordings=new, loadings=_loadings_of(reference, new))
     if not any(pieces_of(x, setup.average) for x in setup.loadings):
         raise InputError(f"set {new.name}: no stretch is long enough to be compared with {reference.recordings.name}")
 
-    def of_new(terms: Sequence[Term]) -> OnColumns:
-        return on_columns(against_own(rows_like(model, terms, setup.loadings), reference, setup, new), terms, model)
+    def of_new(terms: Sequence[Term]) -> _OnColumns:
+        return _on_columns(_against_own(_rows_like(model, terms, setup.loadings), reference, setup, new), terms, model)
 
     terms, base, second = list(reference.terms), reference.own, of_new(reference.terms)
-    if more_terms := refined_on(second, setup, reference):
+    if more_terms := _refined_on(second, setup, reference):
         terms += more_terms
-        base, second = on_columns(rows_like(model, terms, model.loadings), terms, model), of_new(terms)
-    count, more = (len(base.by_run), len(second.by_run)), mounted_anew(terms, setup)
+        base, second = _on_columns(_rows_like(model, terms, model.loadings), terms, model), of_new(terms)
+    count, more = (len(base.by_run), len(second.by_run)), _mounted_anew(terms, setup)
     both: Sequence[Sequence[Evidence]] = (base.by_run, second.by_run)
-    if min(count) >= FEWEST_RUNS:
-        both = [[wandering(as_one_environment(run), reference.wander) for run in own] for own in both]
+    if min(count) >= _FEWEST_RUNS:
+        both = [[wandering(_as_one_environment(run), reference.wander) for run in own] for own in both]
     else:
-        more = np.hypot(more, between_sets(reference.wander, len(more), sum(1.0 / n for n in count)))
+        more = np.hypot(more, _between_sets(reference.wander, len(more), sum(1.0 / n for n in count)))
     channels, compared = setup.instrument.channels, [t for t in terms if t.kind in ("effect", "value")]
     return Joint(
         base=joined(both[0]),
         new=joined(both[1]),
         known=np.concatenate([reference.known, np.zeros(sum(t.size for t in terms) - len(reference.known))]),
         inertia=np.ones(len(channels)),
-        flown_by_base=how_large(model.loadings, channels),
-        flown_by_new=how_large(setup.loadings, channels),
+        flown_by_base=_how_large(model.loadings, channels),
+        flown_by_new=_how_large(setup.loadings, channels),
         recordings=new,
         recorded=(),
         rows_of_new=second.rows,
         mistakes_of_new=(*mistakes, *steps_of(setup, model)),
         squares=mean_squares(second.rows, second.regression, compared, scales(setup.instrument.largest)),
         more_usual=more,
-        form_sd=FORM_SD_OF_READING,
-        decide=partial(decide_instrument_changes, sizes=second.evidence.gram.sum(axis=1)),
+        form_sd=_FORM_SD_OF_READING,
+        decide=partial(_decide_instrument_changes, sizes=second.evidence.gram.sum(axis=1)),
     )
 
 
-def rows_like(model: ReadingModel, terms: Sequence[Term], loadings: Sequence[Loading]) -> list[Rows]:
+def _rows_like(model: ReadingModel, terms: Sequence[Term], loadings: Sequence[Loading]) -> list[Rows]:
     """Rows of stretches with columns of `terms`, what is at work in the model moved by its clock."""
     return rows_of(model.setup, list(terms), loadings, whole_reading(model.terms, model.selection.active))
 
 
-def on_columns(rows: Sequence[Rows], terms: Sequence[Term], model: ReadingModel) -> OnColumns:
+def _on_columns(rows: Sequence[Rows], terms: Sequence[Term], model: ReadingModel) -> _OnColumns:
     """What some rows hold, whitened as the model's, with its products by channel."""
     rate_hz = model.setup.rate_hz
     block_s = model.rows_per_block / rate_hz
     regression = build(list(rows), list(terms), model.regression.filters, everything, block_s, rate_hz, by_channel=True)
     evidence = evidence_from(regression)
-    return OnColumns(tuple(rows), regression, evidence, by_run(evidence, regression))
+    return _OnColumns(tuple(rows), regression, evidence, by_run(evidence, regression))
 
 
-def refined_on(second: OnColumns, setup: Setup, reference: InstrumentReference) -> list[Term]:
+def _refined_on(second: _OnColumns, setup: Setup, reference: InstrumentReference) -> list[Term]:
     """The forms that say most of a change by one id alone, with nonlinear parameters as the second set has them.
 
     A filter or a resonance at the first set's values, or at those a search starts from, would leave much of itself,
     and several others would be needed to make up for it. `setup` holds the second set's stretches.
     """
     model, terms = reference.model, {t.key: t for t in reference.terms}
-    problem = problem_without_leftover(reference.own.evidence, second.evidence)
+    problem = _problem_without_leftover(reference.own.evidence, second.evidence)
     posterior, best = Posterior(problem), {}
     for key, effect in problem.effects.items():
         if key in terms and terms[key].form is not None and terms[key].form.nonlinear:
             gain = posterior((key,)) - posterior(())
             if gain > best.get(effect, ("", 0.0))[1]:
                 best[effect] = key, gain
-    chosen = sorted(best.values(), key=lambda of: -of[1])[:MOST_REFINED]
+    chosen = sorted(best.values(), key=lambda of: -of[1])[:_MOST_REFINED]
     at_work = [k for k in model.selection.active if k in terms]
     own = replace(
         model,
@@ -237,14 +236,14 @@ def refined_on(second: OnColumns, setup: Setup, reference: InstrumentReference) 
     return out
 
 
-def problem_without_leftover(base: Evidence, new: Evidence) -> Problem:
+def _problem_without_leftover(base: Evidence, new: Evidence) -> Problem:
     """The problem of all changes between two sets where all that no change explains is white noise."""
     unit = unit_of(base, new)
     spectra = spectrum_of(base, unit), spectrum_of(new, unit)
     return problem_of_changes(new, spectra, np.zeros(len(new.channels)), np.zeros(len(unit)), Prior())
 
 
-def decide_instrument_changes(
+def _decide_instrument_changes(
     base: Evidence, new: Evidence, spread: np.ndarray, prior: Prior, sizes: np.ndarray
 ) -> Found:
     """The most probable changes between two sets on the same columns.
@@ -258,29 +257,29 @@ def decide_instrument_changes(
     spectra = spectrum_of(base, unit), spectrum_of(new, unit)
     starts = [np.zeros(len(unit)), difference_of(spectra)]
     white = Posterior(problem_of_changes(new, spectra, np.zeros(len(new.channels)), spread, prior))
-    if of_time := [k for k, effect in white.problem.effects.items() if takes_time(effect)]:
+    if of_time := [k for k, effect in white.problem.effects.items() if _takes_time(effect)]:
         best = max(of_time, key=lambda k: white((k,)))
         starts.append(change_of(Found(white, (best,), white((best,)))))
     best, *others = (settled(new, spectra, leftover_of(spectra, d), spread, prior, sizes) for d in starts)
     for found in others:
         if joint(spectra, found, spread) - joint(spectra, best, spread) > prior.leftover_nats:
             best = found
-    return with_one_of_time(best)
+    return _with_one_of_time(best)
 
 
-def with_one_of_time(found: Found) -> Found:
+def _with_one_of_time(found: Found) -> Found:
     """The same with one effect that takes time in place of several, where what it leaves may be its form's error.
 
     A filter of the fourth order is one of the second and a delay to the catalogue, at thousands of nats.
     """
     problem, posterior = found.problem, OneOfTime(found.problem)
-    of_time = [k for k in found.model if takes_time(problem.terms[k].effect)]
+    of_time = [k for k in found.model if _takes_time(problem.terms[k].effect)]
     if len(of_time) < 2:
         return found
     rest = tuple(k for k in found.model if k not in of_time)
-    plainer = [tuple(sorted((*rest, k))) for k, term in problem.terms.items() if takes_time(term.effect)]
+    plainer = [tuple(sorted((*rest, k))) for k, term in problem.terms.items() if _takes_time(term.effect)]
     best, none = max(plainer, key=posterior), posterior(rest)
-    if posterior(best) - none < (1.0 - FORM_SD_OF_READING) * (found.log_posterior - none):
+    if posterior(best) - none < (1.0 - _FORM_SD_OF_READING) * (found.log_posterior - none):
         return found
     return Found(posterior, best, posterior(best))
 
@@ -290,11 +289,11 @@ class OneOfTime(Posterior):
 
     def __call__(self, model: Model) -> float:
         """Log posterior of a model, nats; −∞ of one with several such effects."""
-        of_time = [k for k in model if takes_time(self.problem.terms[k].effect)]
+        of_time = [k for k in model if _takes_time(self.problem.terms[k].effect)]
         return -np.inf if len(of_time) > 1 else super().__call__(model)
 
 
-def takes_time(effect: str) -> bool:
+def _takes_time(effect: str) -> bool:
     """Whether an effect shows in what takes time alone: a filter, a delay, a resonance, a clock, creep."""
     return effect in catalogue() and bool(catalogue()[effect].shows)
 
@@ -305,7 +304,7 @@ def steps_of(setup: Setup, model: ReadingModel) -> tuple[Finding, ...]:
     return () if found is None else (found,)
 
 
-def must_compare(base: RecordingSet, new: RecordingSet) -> None:
+def _must_compare(base: RecordingSet, new: RecordingSet) -> None:
     """InputError unless both sets are of the same kind, with the same channels, rotors, columns and rate."""
     first, second = base.vehicle, new.vehicle
     alike = {
@@ -323,7 +322,7 @@ def must_compare(base: RecordingSet, new: RecordingSet) -> None:
     if compared_channels(base) != compared_channels(new):
         raise InputError(f"set {new.name}: other forces or moments are read in every run than in {base.name}")
     step_s = [float(np.median(np.concatenate([np.diff(r.time_s) for r in own.runs]))) for own in (base, new)]
-    if abs(step_s[1] / step_s[0] - 1.0) > OTHER_RATE:
+    if abs(step_s[1] / step_s[0] - 1.0) > _OTHER_RATE:
         raise InputError(
             f"set {new.name}: recorded at {1 / step_s[1]:.3g} Hz, expected {1 / step_s[0]:.3g} Hz as {base.name}"
         )
@@ -334,24 +333,24 @@ def columns_of(recordings: RecordingSet) -> set[str]:
     return set.intersection(*({n for n in r.table.columns if r.has(n)} for r in recordings.runs))
 
 
-def compared_terms(terms: Sequence[Term], setup: Setup) -> list[Term]:
+def _compared_terms(terms: Sequence[Term], setup: Setup) -> list[Term]:
     """The terms that both sets have: less numbers of single runs, and on a stand with the gains of the reading.
 
     A stand's gain is as good as its last calibration; a verdict takes it as it is, and asks of the rotors alone.
     """
-    kept = [t for t in terms if t.form is None or not of_single_runs(t, setup)]
+    kept = [t for t in terms if t.form is None or not _of_single_runs(t, setup)]
     there = {t.key for t in kept}
     loaded = [k for k in setup.instrument.loaded if k < 3]
     gains = ["gain", *(f"gain_{'xyz'[k]}" for k in loaded if len(loaded) > 1)]
     return [*(Term(key, "value", prior_sd=(1.0,)) for key in gains if key not in there), *kept]
 
 
-def of_single_runs(term: Term, setup: Setup) -> bool:
+def _of_single_runs(term: Term, setup: Setup) -> bool:
     """Whether parameters of a form are those of single runs, named after them."""
     return any(p.symbol.endswith(f"({run})") for p in term.form.parameters for run in setup.instrument.runs)
 
 
-def known_effects(model: ReadingModel, terms: Sequence[Term]) -> np.ndarray:
+def _known_effects(model: ReadingModel, terms: Sequence[Term]) -> np.ndarray:
     """Coefficients (K,) of what is at work in the first set's model, and of its values, on the columns of `terms`."""
     fit, keys = model.selection.fit, {t.key for t in model.regression.terms}
     found = {c: b for c, b in zip(fit.columns, fit.beta, strict=True)}
@@ -362,14 +361,14 @@ def known_effects(model: ReadingModel, terms: Sequence[Term]) -> np.ndarray:
     return np.array(out)
 
 
-def loadings_of(reference: InstrumentReference, new: RecordingSet) -> tuple[Loading, ...]:
+def _loadings_of(reference: InstrumentReference, new: RecordingSet) -> tuple[Loading, ...]:
     """Stretches of another set, prepared and loaded as the first set's, its rotors turning by the same chain."""
     setup = replace(reference.model.setup, session=session_of(new))
     own = with_unseen(setup, replace(new, vehicle=setup.vehicle)).loadings[len(setup.loadings) :]
     return own if reference.chain is None else moved(replace(setup, loadings=own), reference.chain)
 
 
-def against_own(rows: list[Rows], reference: InstrumentReference, setup: Setup, new: RecordingSet) -> list[Rows]:
+def _against_own(rows: list[Rows], reference: InstrumentReference, setup: Setup, new: RecordingSet) -> list[Rows]:
     """Rows of the second set with what its own vehicle.yaml leaves of every channel; the columns stay the first's."""
     if new.vehicle == setup.vehicle:
         return rows
@@ -377,7 +376,7 @@ def against_own(rows: list[Rows], reference: InstrumentReference, setup: Setup, 
     return [replace(r, y=o.y) for r, o in zip(rows, own, strict=True)]
 
 
-def wander_of(terms: Sequence[Term], own: OnColumns, known: np.ndarray, model: ReadingModel) -> Wander:
+def _wander_of(terms: Sequence[Term], own: _OnColumns, known: np.ndarray, model: ReadingModel) -> Wander:
     """How readings differ from run to run of the first set, by the estimates of each run given the set's model.
 
     The variance between runs is the moment estimate of DerSimonian and Laird (Controlled Clinical Trials 7, 1986). A
@@ -385,18 +384,18 @@ def wander_of(terms: Sequence[Term], own: OnColumns, known: np.ndarray, model: R
     """
     columns, variances = [], []
     for place, channel in enumerate(own.evidence.channels):
-        alike = wandering_columns(terms, own.evidence, model.setup.instrument.loaded, int(channel))
+        alike = _wandering_columns(terms, own.evidence, model.setup.instrument.loaded, int(channel))
         at = np.array([of_one[0] for of_one in alike])
         every = own.evidence.gram[place].sum(axis=0)[at, at]
-        found = [estimate_of_run(run, place, at, known, every) for run in own.by_run]
+        found = [_estimate_of_run(run, place, at, known, every) for run in own.by_run]
         variance = between(*(np.array(part) for part in zip(*found, strict=True)))
-        variance[0] = max(variance[0], (TARE_NOISE * model.noise[channel]) ** 2)
+        variance[0] = max(variance[0], (_TARE_NOISE * model.noise[channel]) ** 2)
         columns.append(tuple(alike))
         variances.append(variance)
     return Wander(tuple(columns), tuple(variances))
 
 
-def estimate_of_run(
+def _estimate_of_run(
     run: Evidence, place: int, at: np.ndarray, known: np.ndarray, every: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Coefficients of the columns `at` in one run and channel given those known of all, and their weights, (k,) each.
@@ -405,7 +404,7 @@ def estimate_of_run(
     """
     gram, cross = run.gram[place].sum(axis=0), run.cross[place].sum(axis=0)
     estimate, weight = np.zeros(len(at)), np.zeros(len(at))
-    shown = np.flatnonzero(gram[at, at] > HARDLY * every)
+    shown = np.flatnonzero(gram[at, at] > _HARDLY * every)
     if len(shown):
         of_shown = at[shown]
         inverse = ridge_inverse(gram[np.ix_(of_shown, of_shown)])
@@ -425,19 +424,19 @@ def between(estimates: np.ndarray, weights: np.ndarray) -> np.ndarray:
     return np.where(number > 1, found, 0.0)
 
 
-def role_of(effect: str) -> str:
+def _role_of(effect: str) -> str:
     """What of a reading an id says that differs from run to run; empty for nothing, and for what is no id."""
     return catalogue()[effect].differs_between_runs if effect in catalogue() else ""
 
 
-def wandering_columns(
+def _wandering_columns(
     terms: Sequence[Term], evidence: Evidence, loaded: Sequence[int], channel: int
 ) -> list[list[int]]:
     """Columns of a constant, of time, of the channel's own load and of each other load, all forms of each together."""
     own = AXES[channel]
-    wanted = [(role, form, symbol.format(own=own)) for role, (form, symbol) in WANDERS.items()]
+    wanted = [(role, form, symbol.format(own=own)) for role, (form, symbol) in _WANDERS.items()]
     wanted.append(("", "", f"gain_{'xyz'[channel % 3]}"))
-    role, (form, symbol) = OF_OTHER_AXES
+    role, (form, symbol) = _OF_OTHER_AXES
     wanted += [(role, form, symbol.format(own=own, load=AXES[source])) for source in loaded if source != channel]
     out = []
     for role, form, symbol in wanted:
@@ -445,7 +444,7 @@ def wandering_columns(
         for term in terms:
             if term.kind == "value" and not role and term.key in ("gain", symbol):
                 found.append(evidence.start[term.key])
-            elif term.kind == "effect" and role and role_of(term.effect) == role and term.form.name.startswith(form):
+            elif term.kind == "effect" and role and _role_of(term.effect) == role and term.form.name.startswith(form):
                 names = [term.form.parameters[i].symbol for i in term.form.linear]
                 found += [evidence.start[term.key] + k for k, name in enumerate(names) if name == symbol]
         if found:
@@ -467,7 +466,7 @@ def wandering(evidence: Evidence, wander: Wander) -> Evidence:
     return replace(evidence, gram=gram, cross=cross, square=square)
 
 
-def between_sets(wander: Wander, columns: int, shares: float) -> np.ndarray:
+def _between_sets(wander: Wander, columns: int, shares: float) -> np.ndarray:
     """One-sigma (K,) by which coefficients differ between two sets; `shares` is 1/n + 1/m of their runs."""
     out = np.zeros(columns)
     for alike, variance in zip(wander.columns, wander.variance, strict=True):
@@ -476,15 +475,15 @@ def between_sets(wander: Wander, columns: int, shares: float) -> np.ndarray:
     return out
 
 
-def mounted_anew(terms: Sequence[Term], setup: Setup) -> np.ndarray:
+def _mounted_anew(terms: Sequence[Term], setup: Setup) -> np.ndarray:
     """One-sigma (K,) by which crosstalk differs between two days, as a load is not put on quite alike.
 
     The forms in which a coefficient stands have it in equal shares, so that their sum has it once.
     """
     scale = dict(zip(AXES, scales(setup.instrument.largest), strict=True))
-    role, _ = OF_OTHER_AXES
+    role, _ = _OF_OTHER_AXES
     symbols = [
-        [t.form.parameters[i].symbol for i in t.form.linear] if role_of(t.effect) == role else [""] * t.size
+        [t.form.parameters[i].symbol for i in t.form.linear] if _role_of(t.effect) == role else [""] * t.size
         for t in terms
     ]
     every = [symbol for own in symbols for symbol in own]
@@ -492,17 +491,17 @@ def mounted_anew(terms: Sequence[Term], setup: Setup) -> np.ndarray:
     for k, symbol in enumerate(every):
         if symbol:
             target, source = symbol.removeprefix("C_").split(",")
-            out[k] = MOUNTED_RAD * scale[target] / scale[source] / np.sqrt(every.count(symbol))
+            out[k] = _MOUNTED_RAD * scale[target] / scale[source] / np.sqrt(every.count(symbol))
     return np.nan_to_num(out)
 
 
-def as_one_environment(evidence: Evidence) -> Evidence:
+def _as_one_environment(evidence: Evidence) -> Evidence:
     """Evidence of a run as that of one environment."""
     parts = {name: getattr(evidence, name).sum(axis=1, keepdims=True) for name in ("gram", "cross", "square")}
     return replace(evidence, **parts, blocks=evidence.blocks.sum(keepdims=True))
 
 
-def how_large(loadings: Sequence[Loading], channels: Sequence[int]) -> dict[str, float]:
+def _how_large(loadings: Sequence[Loading], channels: Sequence[int]) -> dict[str, float]:
     """95th percentile of the magnitude of the load on each channel, N and N m, by regime variable."""
     load = np.abs(np.concatenate([x.load for x in loadings]))
     return {f"load_{CHANNELS[c]}": float(np.quantile(load[:, c], 0.95)) for c in channels}
@@ -511,4 +510,4 @@ def how_large(loadings: Sequence[Loading], channels: Sequence[int]) -> dict[str,
 def scales(largest: Sequence[float]) -> np.ndarray:
     """The largest force, N, and the largest moment, N m, of each channel's kind, (6,)."""
     force, moment = max(largest[:3]), max(largest[3:])
-    return np.repeat([force, moment if moment > LEAST_MOMENT_N_M else np.inf], 3)
+    return np.repeat([force, moment if moment > _LEAST_MOMENT_N_M else np.inf], 3)

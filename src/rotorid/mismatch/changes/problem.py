@@ -26,28 +26,27 @@ from rotorid.mismatch.instrument.columns import VALUE_NAMES
 from rotorid.mismatch.plant.rows import PARAMETER_NAMES
 from rotorid.mismatch.posterior.evidence import Evidence, EvidenceTerm, LinearParameter
 from rotorid.mismatch.posterior.leftover import TINY, VARIANCES, Spectrum, Weighed, spectrum_of, unit_of
-from rotorid.mismatch.posterior.prior import Prior
-from rotorid.mismatch.posterior.problem import Problem, believed, limiting, log_priors
+from rotorid.mismatch.posterior.problem import Prior, Problem, believed, limiting, log_priors
 from rotorid.mismatch.posterior.score import Model, Posterior, scored
 from rotorid.mismatch.posterior.search import Found, most_probable, without
 
 NAMES = {**VALUE_NAMES, **PARAMETER_NAMES}
 """Key of every believed value, of a flight or an instrument, to the contract's name."""
-LEAST_CHANGE, MOST_CHANGE = 0.015, 0.6
+_LEAST_CHANGE, MOST_CHANGE = 0.015, 0.6
 """Relative change of a value up to which it does not matter, and the largest."""
-LEAST_GAIN = 0.005
+_LEAST_GAIN = 0.005
 """The least one of a reading's gain."""
-FREE = 10.0
+_FREE = 10.0
 """Variance of what is common to both sets, in units of what one row determines. With 1 more unseen pairs got a wrong
 name; with 100 a change of mass in gentle flight is halved (docs/compare.md)."""
-NOT_COMMON = 1e-9
+_NOT_COMMON = 1e-9
 """The same of what only one set can have."""
-UNCHANGED = "unchanged"
+_UNCHANGED = "unchanged"
 """Kind of a term that is common to both sets and did not change by assumption."""
-RIDGE = 1e-4
+_RIDGE = 1e-4
 """Ridge of the fit of all columns from which the leftover is learnt, in units of their length."""
-ROUNDS = 4
-HIDDEN_NATS = 1e4
+_ROUNDS = 4
+_HIDDEN_NATS = 1e4
 """Nats that a change costs without the parameter that makes its form that form (a payload without a mass): none may be
 stated. Two such forms share what one alone should have where their columns have different noise."""
 
@@ -100,7 +99,7 @@ def at_own_noise(base: Evidence, new: Evidence) -> tuple[Evidence, float]:
 
 def held(new: Evidence, keys: Collection[str]) -> Evidence:
     """Evidence of the second set in which the terms `keys` did not change, by assumption."""
-    terms = (replace(t, kind=UNCHANGED) if t.key in keys else t for t in new.terms)
+    terms = (replace(t, kind=_UNCHANGED) if t.key in keys else t for t in new.terms)
     return replace(new, terms=tuple(terms))
 
 
@@ -117,7 +116,7 @@ def settled(
     `sizes` (C, K, K) are products that the sizes of contributions are taken from where they are not those of `new`.
     """
     starts = [()]
-    for _ in range(ROUNDS):
+    for _ in range(_ROUNDS):
         found = most_probable(problem_of_changes(new, spectra, variance, spread, prior, sizes), starts)
         starts = [(), found.model]
         before, variance = variance, leftover_of(spectra, change_of(found))
@@ -140,7 +139,7 @@ def against_leftover(
     log posterior of changes and leftover together (`joint`), as is what is given back next to the changes; `at` gives
     the posterior at a model with a variance (C,).
     """
-    others = [with_own_leftover(spectra, without(found.model, k), found, spread, at) for k in found.model]
+    others = [_with_own_leftover(spectra, without(found.model, k), found, spread, at) for k in found.model]
     best, most = max(others, key=lambda other: other[1], default=(found, value))
     if most > value:
         return against_leftover(spectra, best, most, spread, at)
@@ -150,7 +149,7 @@ def against_leftover(
     return found, value
 
 
-def with_own_leftover(
+def _with_own_leftover(
     spectra: tuple[Spectrum, Spectrum],
     model: Model,
     near: Found,
@@ -159,7 +158,7 @@ def with_own_leftover(
 ) -> tuple[Found, float]:
     """The posterior at a model with the leftover that it leaves, from that of another one, and log joint posterior."""
     ends, variance = [], near.problem.variance
-    for _ in range(ROUNDS):
+    for _ in range(_ROUNDS):
         ends.append(at(model, variance))
         before, variance = variance, leftover_of(spectra, change_of(ends[-1]))
         if np.array_equal(before, variance):
@@ -173,9 +172,9 @@ def joint(spectra: tuple[Spectrum, Spectrum], found: Found, spread: np.ndarray) 
     """Log posterior of changes and leftover together, nats, less a constant."""
     variance = found.problem.variance
     base, new = (s.weighed(variance) for s in spectra)
-    free = free_of(found.problem.terms, found.problem.columns_of, spectra[1].rows)
+    free = _free_of(found.problem.terms, found.problem.columns_of, spectra[1].rows)
     of_common = integrated(base.gram + new.gram, base.cross + new.cross, free)
-    of_usual = integrated(*difference_products(base, new, free), in_units(spread, spectra[1].unit) ** 2)
+    of_usual = integrated(*_difference_products(base, new, free), _in_units(spread, spectra[1].unit) ** 2)
     return found.log_posterior + of_common + of_usual + sum(s.evidence_of(variance) for s in spectra)
 
 
@@ -194,7 +193,7 @@ def leftover_of(spectra: tuple[Spectrum, Spectrum], change: np.ndarray) -> np.nd
     """
     base, new = (s.weighed(np.zeros(len(s.channels))) for s in spectra)
     gram = base.gram + new.gram
-    common = np.linalg.solve(gram + RIDGE * np.eye(len(gram)), base.cross + new.cross - new.gram @ change)
+    common = np.linalg.solve(gram + _RIDGE * np.eye(len(gram)), base.cross + new.cross - new.gram @ change)
     gains = spectra[0].gains_of_leftover(common) + spectra[1].gains_of_leftover(common + change)
     return VARIANCES[np.argmax(gains, axis=1)]
 
@@ -202,7 +201,7 @@ def leftover_of(spectra: tuple[Spectrum, Spectrum], change: np.ndarray) -> np.nd
 def difference_of(spectra: tuple[Spectrum, Spectrum]) -> np.ndarray:
     """Coefficients (K,) of all columns in the second set less those in the first, each fitted alone, scaled."""
     base, new = (s.weighed(np.zeros(len(s.channels))) for s in spectra)
-    ridge = RIDGE * np.eye(len(base.cross))
+    ridge = _RIDGE * np.eye(len(base.cross))
     return np.linalg.solve(new.gram + ridge, new.cross) - np.linalg.solve(base.gram + ridge, base.cross)
 
 
@@ -225,19 +224,19 @@ def problem_of_changes(
 
     Every effect may have changed, in any direction, and every value.
     """
-    prior = replace(prior, small_nats=HIDDEN_NATS)
+    prior = replace(prior, small_nats=_HIDDEN_NATS)
     unit, size, rows = spectra[1].unit, len(spectra[1].unit), spectra[1].rows
-    terms = {t.key: as_change(t) for t in new.terms}
+    terms = {t.key: _as_change(t) for t in new.terms}
     columns_of = {key: new.start[key] + np.arange(t.size) for key, t in terms.items()}
-    gram, cross, bias, bias_cross = products_of_changes(spectra, variance, spread, free_of(terms, columns_of, rows))
+    gram, cross, bias, bias_cross = _products_of_changes(spectra, variance, spread, _free_of(terms, columns_of, rows))
     root = limiting(gram, bias, prior)
     effects = {key: t.effect for key, t in terms.items() if t.kind == "effect"}
     sd, low, high, is_value = believed(terms.values(), {}, columns_of, unit, rows, prior)
     # What one row says is little next to what flights differ by anyway: a narrower prior would shrink the change. What
     # is stated of a nuisance stays.
     own = np.concatenate([np.zeros(0, int), *(columns_of[key] for key in effects)])
-    usual = in_units(spread, unit)
-    alike = prior.change_reach * looks_like(spectra[1].weighed(variance).gram, usual)
+    usual = _in_units(spread, unit)
+    alike = prior.change_reach * _looks_like(spectra[1].weighed(variance).gram, usual)
     sd[own] = np.hypot(np.hypot(sd, prior.value_reach * usual), alike)[own]
     for key, effect in effects.items():
         if effect in NAMES.values() and (own := unit[columns_of[key]]).all():
@@ -245,7 +244,7 @@ def problem_of_changes(
     free = [columns_of[k] for k, effect in effects.items() if effect not in NAMES.values() and not terms[k].of_change]
     free = np.concatenate(free) if free else np.zeros(0, int)
     low[free], high[free] = -np.inf, np.inf
-    always = [columns_of[key] for key, t in terms.items() if t.kind not in ("effect", UNCHANGED)]
+    always = [columns_of[key] for key, t in terms.items() if t.kind not in ("effect", _UNCHANGED)]
     return Problem(
         terms=terms,
         columns_of=columns_of,
@@ -274,29 +273,29 @@ def problem_of_changes(
     )
 
 
-def products_of_changes(
+def _products_of_changes(
     spectra: tuple[Spectrum, Spectrum], variance: np.ndarray, spread: np.ndarray, free: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """S̃ (K, K) and s̃ (K,) of the module's equations, scaled, and what the regressors' noise adds to each."""
     base, new = (s.weighed(variance) for s in spectra)
-    gram, cross = difference_products(base, new, free)
-    usual = in_units(spread, spectra[1].unit) ** 2
+    gram, cross = _difference_products(base, new, free)
+    usual = _in_units(spread, spectra[1].unit) ** 2
     turn = np.linalg.inv(np.eye(len(cross)) + gram * usual)
-    bias = turn @ noise_of_difference(base, new, free) @ turn.T
+    bias = turn @ _noise_of_difference(base, new, free) @ turn.T
     turned = turn @ gram
     return 0.5 * (turned + turned.T), turn @ cross, bias, -bias @ (usual * cross)
 
 
-def free_of(terms: Mapping[str, EvidenceTerm], columns_of: Mapping[str, np.ndarray], rows: int | float) -> np.ndarray:
+def _free_of(terms: Mapping[str, EvidenceTerm], columns_of: Mapping[str, np.ndarray], rows: int | float) -> np.ndarray:
     """Variance (K,) of the coefficients common to both sets, scaled; next to none of what one set has alone."""
-    out = np.full(sum(t.size for t in terms.values()), FREE * rows)
+    out = np.full(sum(t.size for t in terms.values()), _FREE * rows)
     for key, term in terms.items():
         if term.alone:
-            out[columns_of[key]] = NOT_COMMON
+            out[columns_of[key]] = _NOT_COMMON
     return out
 
 
-def difference_products(base: Weighed, new: Weighed, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _difference_products(base: Weighed, new: Weighed, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """S (K, K) and s (K,): products of the second set with what is common to both integrated out, scaled.
 
     `free` (K,) is the variance of the common coefficients.
@@ -305,30 +304,30 @@ def difference_products(base: Weighed, new: Weighed, free: np.ndarray) -> tuple[
     return new.gram - new.gram @ inverse @ new.gram, new.cross - new.gram @ inverse @ (base.cross + new.cross)
 
 
-def noise_of_difference(base: Weighed, new: Weighed, free: np.ndarray) -> np.ndarray:
+def _noise_of_difference(base: Weighed, new: Weighed, free: np.ndarray) -> np.ndarray:
     """What the noise of the regressors adds to S, (K, K)."""
     taken = new.gram @ np.linalg.inv(base.gram + new.gram + np.diag(1.0 / free))
     rest = np.eye(len(free)) - taken
     return rest @ new.bias @ rest.T + taken @ base.bias @ taken.T
 
 
-def looks_like(gram: np.ndarray, spread: np.ndarray) -> np.ndarray:
+def _looks_like(gram: np.ndarray, spread: np.ndarray) -> np.ndarray:
     """One-sigma (K,) of each coefficient by itself where all coefficients differ by their `spread` (K,), scaled."""
     own = np.diag(gram)
     seen = np.sqrt((gram**2) @ spread**2)
     return np.divide(seen, own, out=np.zeros(len(own)), where=own > 0)
 
 
-def in_units(spread: np.ndarray, unit: np.ndarray) -> np.ndarray:
+def _in_units(spread: np.ndarray, unit: np.ndarray) -> np.ndarray:
     """Coefficients (K,) scaled; 0 of a column that is never excited."""
     return np.divide(spread, unit, out=np.zeros(len(unit)), where=unit > 0)
 
 
-def as_change(term: EvidenceTerm) -> EvidenceTerm:
+def _as_change(term: EvidenceTerm) -> EvidenceTerm:
     """A believed value as something that may have changed, named as the contract names it; another term as it is."""
     if term.kind != "value":
         return term
     name = NAMES[term.key]
-    least = LEAST_GAIN if term.key.startswith("gain") else LEAST_CHANGE
+    least = _LEAST_GAIN if term.key.startswith("gain") else _LEAST_CHANGE
     change = LinearParameter(name, "1", -MOST_CHANGE, MOST_CHANGE, least)
     return replace(term, kind="effect", effect=name, linear=(change,))

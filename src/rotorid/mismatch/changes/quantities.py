@@ -29,14 +29,14 @@ CONDITIONS = ("u", "v", "w", "p", "q", "r", "a_x", "a_y", "load", "voltage")
 """Velocity over the hover's inflow and body rates (rad/s), body axes; specific force along x and y, and the thrust that
 is felt less one, over gravity; logarithm of the battery's voltage."""
 AXES = ("x", "y", "z")
-TURNS = ("roll", "pitch", "yaw")
-LEAST_FELT = 0.3
+_TURNS = ("roll", "pitch", "yaw")
+_LEAST_FELT = 0.3
 """Least specific force along the rotors' axis over gravity, and least thrust over its mean, that is divided by."""
 BY_VOLTAGE, DOUBT_OF_VOLTAGE = (-2.0, 0.0), 0.5
 """Bounds of the slope of the thrust asked for by the voltage, both logarithms (a motor's thrust goes with the voltage
 squared at most), and what it may be wrong by: under load the voltage falls, and a flight alone cannot tell which is
 cause."""
-PIECES, SHORTEST_PIECE_S, LONGEST_PIECE_S = 8, 1.5, 10.0
+PIECES, _SHORTEST_PIECE_S, _LONGEST_PIECE_S = 8, 1.5, 10.0
 """A run is cut into so many pieces of such a length: what is alike within one counts once."""
 SENSORS = {"gyroscope": c.ANGULAR_VELOCITY, "accelerometer": c.SPECIFIC_FORCE}
 PART = re.compile(r"_\d+$")
@@ -171,7 +171,7 @@ def flown(run: Run, vehicle: Vehicle, grid: Grid) -> Flown | None:
     time_s = np.concatenate([part[0] for part in parts])
     x = np.concatenate([part[1] for part in parts])
     y = {k: np.concatenate([part[2][k] for part in parts]) for k in parts[0][2]}
-    length_s = np.clip(len(time_s) / thin.rate_hz / PIECES, SHORTEST_PIECE_S, LONGEST_PIECE_S)
+    length_s = np.clip(len(time_s) / thin.rate_hz / PIECES, _SHORTEST_PIECE_S, _LONGEST_PIECE_S)
     count = max(2, round(len(time_s) / thin.rate_hz / length_s))
     cuts = [np.arange(k * len(time_s) // count, (k + 1) * len(time_s) // count) for k in range(count)]
     cuts = [cut for cut in cuts if len(cut)]
@@ -229,11 +229,11 @@ def _of_rotors(asked, turned, groups, load, vehicle: Vehicle, thin: Thinner, gri
     if "force" in groups:
         force = thin(groups["force"]) / weight
         y |= {f"sideways/{a}": force[:, k] for k, a in enumerate(AXES[:2])}
-        y["lift/all"] = _log(thrust / weight) - _log(np.maximum(1.0 + load, LEAST_FELT))
+        y["lift/all"] = _log(thrust / weight) - _log(np.maximum(1.0 + load, _LEAST_FELT))
     if "moment" in groups:
         arm, torque = _levers(vehicle)
         turning = thin(groups["moment"]) / thrust[:, None]
-        y |= {f"trim/{name}": turning[:, k] / arm for k, name in enumerate(TURNS[:2])}
+        y |= {f"trim/{name}": turning[:, k] / arm for k, name in enumerate(_TURNS[:2])}
         if torque:
             y["yaw_trim/yaw"] = turning[:, 2] / torque
     return y
@@ -247,7 +247,7 @@ def _levers(vehicle: Vehicle) -> tuple[float, float]:
 
 def _not_idle(values: np.ndarray) -> np.ndarray:
     """A thrust or speed (n,), at least a part of its mean: what is divided by it is of no use where rotors idle."""
-    return np.maximum(values, LEAST_FELT * max(float(values.mean()), 1e-9))
+    return np.maximum(values, _LEAST_FELT * max(float(values.mean()), 1e-9))
 
 
 def _log(values: np.ndarray) -> np.ndarray:

@@ -17,21 +17,20 @@ import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.plant.regression import NEVER_EXCITED
-from rotorid.mismatch.posterior.chosen import FORM_SD
 from rotorid.mismatch.posterior.evidence import Evidence
 from rotorid.mismatch.posterior.leftover import FULL_RIDGE, TINY
 from rotorid.mismatch.posterior.score import places, scored
 from rotorid.mismatch.posterior.search import Found
-from rotorid.mismatch.posterior.statements import statements_of
+from rotorid.mismatch.posterior.statements import FORM_SD, statements_of
 
-SAME_SD, SAME_BODY_SD = 0.01, 0.003
+_SAME_SD, _SAME_BODY_SD = 0.01, 0.003
 """Relative one-sigma between two flights in which nothing changed of a rotor's coefficient (3 K of air change
 its density by a hundredth), and of mass, inertia and arm."""
-OF_THE_AIR = ("thrust", "torque")
+_OF_THE_AIR = ("thrust", "torque")
 """Values that the air's density changes."""
-DERIVED = "rotor_acceleration"
+_DERIVED = "rotor_acceleration"
 """What is a derivative of recorded speeds: how much of it is noise depends on the flight, and is not known."""
-FEWEST_FLIGHTS = 3
+_FEWEST_FLIGHTS = 3
 """Two good flights give one difference alone, of which no variance is known."""
 
 
@@ -44,17 +43,17 @@ def usual_spread(
     the inertia, of the second vehicle.yaml over the first one's in each channel: residual noise grows with it.
     `form_sd` is the share of what effects contribute that their forms are wrong by.
     """
-    hidden = hidden_by_noise(new, inertia) - hidden_by_noise(base, np.ones(len(inertia)))
+    hidden = _hidden_by_noise(new, inertia) - _hidden_by_noise(base, np.ones(len(inertia)))
     out = form_spread(base, known, form_sd)
     forms = Counter((t.effect, p.symbol) for t in base.terms for p in t.linear)
     for term in base.terms:
         at = base.start[term.key] + np.arange(term.size)
         if term.kind == "value":
-            out[at] = np.hypot(SAME_SD if term.key in OF_THE_AIR else SAME_BODY_SD, hidden[at])
+            out[at] = np.hypot(_SAME_SD if term.key in _OF_THE_AIR else _SAME_BODY_SD, hidden[at])
         elif term.effect in catalogue() and term.linear:
             effect = catalogue()[term.effect]
             usual = np.array([effect.between_flights.get(p.unit, 0.0) for p in term.linear])
-            if DERIVED in effect.excited_by:
+            if _DERIVED in effect.excited_by:
                 usual = np.hypot(usual, hidden_in(base, known)[at])
             # Several forms have the same parameter, and with it the same column.
             out[at] = np.hypot(out[at], usual / np.sqrt([forms[term.effect, p.symbol] for p in term.linear]))
@@ -104,7 +103,7 @@ def share_of_form(evidence: Evidence) -> np.ndarray:
     return out
 
 
-def hidden_by_noise(evidence: Evidence, inertia: np.ndarray) -> np.ndarray:
+def _hidden_by_noise(evidence: Evidence, inertia: np.ndarray) -> np.ndarray:
     """The share (K,) of each coefficient that noise of its own column may hide at most, 0 to 1.
 
     At worst all that the model of all columns leaves in the channel is noise of that column: errors in variables reduce
@@ -134,7 +133,7 @@ def spread_of_flights(flights: Sequence[Evidence], decide: Callable[[Evidence, E
     Of a class each member gets what makes it contribute as much. A variance of n flights is widened by (n + 1)/(n − 1).
     """
     number = len(flights)
-    if number < FEWEST_FLIGHTS:
+    if number < _FEWEST_FLIGHTS:
         return 0.0
     squares = np.zeros(flights[0].gram.shape[-1])
     for k, flight in enumerate(flights):

@@ -25,7 +25,7 @@ WHOLE = {"flight": "the weight", "stand": "the largest load", "bench": "the larg
 SHARE = {"flight": "share_of_weight", "stand": "share_of_largest_load", "bench": "share_of_largest_load"}
 GAINS = frozenset(name for name in VALUE_NAMES.values() if name.startswith("reading_gain"))
 """Values that a calibration measures, by dead weights on one axis after the other."""
-MOST_LIMITS = 4
+_MOST_LIMITS = 4
 """Things that did not change and are named with their limit; more are counted."""
 
 
@@ -37,12 +37,12 @@ def sentences(found: Changes) -> list[str]:
 
 def level_two_sentences(found: Changes) -> list[str]:
     """One sentence a change, the most probable first, and one on what did not change."""
-    out = [change_words(c) for c in found.changes]
+    out = [_change_words(c) for c in found.changes]
     if not out and found.level_1 is not None and found.level_1.stated:
         out.append("No known effect explains this: it stays as it is stated.")
     elif not out:
         out.append(f"Nothing changed from {found.base} to {found.new} as far as these recordings can tell.")
-    limits = [unchanged_words(found.limits, WHOLE[found.kind])] if found.limits else []
+    limits = [_unchanged_words(found.limits, WHOLE[found.kind])] if found.limits else []
     return [*out, *advice(found), *limits, *found.notes]
 
 
@@ -59,10 +59,10 @@ def advice(found: Changes) -> list[str]:
     return []
 
 
-def change_words(change: Change) -> str:
+def _change_words(change: Change) -> str:
     """`The mass changed: +8.3 ± 0.9 % (99.9 %).`"""
     names = listed([name_words(i) for i in change.alternatives or (change.id,)], "or")
-    sizes = [size_words(p) for p in change.parameters if p.low * p.high > 0]
+    sizes = [_size_words(p) for p in change.parameters if p.low * p.high > 0]
     of = f" of {name_words(change.id)}" if change.alternatives and sizes else ""
     size = f": {listed(sizes)}{of}" if sizes else ""
     surely = "" if change.probability is None else f" (probability {percent(change.probability)})"
@@ -75,7 +75,7 @@ def name_words(name: str) -> str:
     return f"the {parameter_words(name)[0]}" if name in VALUES else effect_words(name)
 
 
-def size_words(estimate: Estimate) -> str:
+def _size_words(estimate: Estimate) -> str:
     """A change with its 95 % interval: of a value in percent of it."""
     half = 0.5 * (estimate.high - estimate.low)
     if estimate.symbol in VALUES:
@@ -83,7 +83,7 @@ def size_words(estimate: Estimate) -> str:
     return f"{estimate.symbol} by {number(estimate.value)} ± {number(half)} {estimate.unit}".removesuffix(" 1").rstrip()
 
 
-def unchanged_words(limits: tuple[UpperLimit, ...], whole: str) -> str:
+def _unchanged_words(limits: tuple[UpperLimit, ...], whole: str) -> str:
     """What did not change: believed values with their limits, then the effects that may have changed most.
 
     `whole` is what shares are of, in words.
@@ -93,9 +93,9 @@ def unchanged_words(limits: tuple[UpperLimit, ...], whole: str) -> str:
     ]
     # A limit above the weight excludes nothing: the page has it in its table.
     others = [x for x in limits if x.id not in VALUES and 0 < x.share < 1]
-    named = [f"{name_words(x.id)} by at most {percent_words(x.share)} of {whole}" for x in others[:MOST_LIMITS]]
-    if len(others) > MOST_LIMITS:
-        named.append(f"{len(others) - MOST_LIMITS} others by less")
+    named = [f"{name_words(x.id)} by at most {percent_words(x.share)} of {whole}" for x in others[:_MOST_LIMITS]]
+    if len(others) > _MOST_LIMITS:
+        named.append(f"{len(others) - _MOST_LIMITS} others by less")
     return f"Not changed, with 95 % probability: {listed([*values, *named])}."
 
 

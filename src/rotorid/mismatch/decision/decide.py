@@ -21,18 +21,18 @@ from rotorid.mismatch.posterior.status import CLAIMED, Estimate
 
 COST_PER_VALUE = 12.0
 """Whitened squares that a further wrong value must explain."""
-MOST_VALUES = 3
-LEAST_ROOM = 0.6
+_MOST_VALUES = 3
+_LEAST_ROOM = 0.6
 """A value that is asked whether it is wrong may be so by this share at least; in the search it has less room, or it
 would take physics up."""
-MOST_DISTRUST = 9.0
+_MOST_DISTRUST = 9.0
 WIDEST_TRUST = 0.1
-VALUE_P = 5e-4
+_VALUE_P = 5e-4
 VALUE_Z = 3.5
 """A believed value is called wrong beyond this many standard errors: about 1 in 300 over seven values."""
 SMALLEST_CHANGE = 0.015
 """A relative change below this is no wrong value: no laboratory knows its numbers better."""
-BEST_KNOWN = 0.004
+_BEST_KNOWN = 0.004
 """Relative one-sigma that no believed value is taken to be better known than, while others are called wrong."""
 
 
@@ -178,7 +178,7 @@ def wrong_values(
     in units of the noise (`size_of(key, relative change)`). `moving` is False on a stand, where a mass only weighs;
     `refused` values are not called wrong.
     """
-    regression = regression.with_room(LEAST_ROOM)
+    regression = regression.with_room(_LEAST_ROOM)
     nuisance = regression.keys_of("nuisance", "wind")
     trust = {t.key: t.prior_sd[0] for t in regression.terms if t.kind == "value"}
     always = nuisance + selection.active
@@ -187,18 +187,18 @@ def wrong_values(
 
     def penalised(keys: list[str]) -> float:
         # The others give by a fraction of a percent, or a third value would be called wrong to make up for it.
-        room = {k: loose[k] if k in keys else min(BEST_KNOWN, sd) for k, sd in trust.items()}
+        room = {k: loose[k] if k in keys else min(_BEST_KNOWN, sd) for k, sd in trust.items()}
         fit = regression.fit([*always, *trust], loose=room)
         cost = 0.0
         for key in trust:
             change = coefficients(regression, fit, key)[0][0]
             if key in keys:
-                cost += COST_PER_VALUE + min((change / trust[key]) ** 2, MOST_DISTRUST)
+                cost += COST_PER_VALUE + min((change / trust[key]) ** 2, _MOST_DISTRUST)
             else:
                 cost += (change / room[key]) ** 2
         return fit.gain - cost
 
-    subsets = [list(c) for size in range(MOST_VALUES + 1) for c in combinations(trust, size)]
+    subsets = [list(c) for size in range(_MOST_VALUES + 1) for c in combinations(trust, size)]
     best_first = sorted(subsets, key=penalised, reverse=True)
     doubtful = set(refused)
     at_limits: list[list[str]] = []
@@ -212,7 +212,7 @@ def wrong_values(
             matters = abs(change) > SMALLEST_CHANGE and size_of(key, change) > SMALLEST_SIZE
             p = regression.wald(fit, regression.columns([key]), count)
             pinned |= abs(change) > NEAR_LIMIT * regression.limit[regression.start[key]]
-            if abs(change) < VALUE_Z * sd or p > VALUE_P or noisy or not matters:
+            if abs(change) < VALUE_Z * sd or p > _VALUE_P or noisy or not matters:
                 certainty[key] = abs(change) / sd
         if pinned:
             # Two values that run away together say nothing against either of them alone.

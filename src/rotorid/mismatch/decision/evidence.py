@@ -22,18 +22,18 @@ from rotorid.mismatch.plant.comparison import VOTES_FROM
 from rotorid.mismatch.posterior.statements import SURE
 from rotorid.mismatch.posterior.status import CLAIMED
 
-ACTS = 1 / 3
+_ACTS = 1 / 3
 """Contribution to a channel, in units of its noise and relative to the strongest, from which an effect acts there."""
-BLOCKS_S = (2.0, 1.0, 0.5, 0.25)
+_BLOCKS_S = (2.0, 1.0, 0.5, 0.25)
 """Lengths of the blocks that the bootstrap draws, the first that gives LEAST_BLOCKS: residuals are alike for less."""
-LEAST_BLOCKS = 6
-BOOTSTRAPS = 400
+_LEAST_BLOCKS = 6
+_BOOTSTRAPS = 400
 LEAST_SHARE = 0.01
 """Part of the explained error below which an effect is only suggested: names that fit unmodelled residual hold less
 than 0.7 % of what a model explains."""
-LARGE_GAIN = 0.9
+_LARGE_GAIN = 0.9
 """Error with an effect over that without up to which its gain in a channel is large, however small its share of all."""
-LEAST_EXCITED = 0.1
+_LEAST_EXCITED = 0.1
 """Size of a contribution on the held-out runs, relative to that on the fitted ones, below which they do not excite
 it."""
 
@@ -64,7 +64,7 @@ def weighed(analysis: Analysis) -> Analysis:
     ones."""
     part = fitted_part(analysis)
     fitted, held = ([sign * part(t.run, t.time_s) > 0 for t in analysis.compared] for sign in (1, -1))
-    shares = effect_shares(analysis, fitted)
+    shares = _effect_shares(analysis, fitted)
     return replace(
         analysis, findings=tuple(judged(f, analysis, fitted, held, shares.get(f.id, 0.0)) for f in analysis.findings)
     )
@@ -78,10 +78,10 @@ def with_shares(analysis: Analysis) -> Analysis:
     part = fitted_part(analysis)
     held = [part(t.run, t.time_s) < 0 for t in analysis.compared]
     units = {channel: scale.value for channel, scale in scales(analysis).items()}
-    return replace(analysis, shares=effect_shares(analysis, held, units), effect_sizes=effect_sizes(analysis, held))
+    return replace(analysis, shares=_effect_shares(analysis, held, units), effect_sizes=effect_sizes(analysis, held))
 
 
-def effect_shares(
+def _effect_shares(
     analysis: Analysis, rows: list[np.ndarray], units: Mapping[str, float] | None = None
 ) -> dict[str, float]:
     """To every stated effect the part of what goes from before to after on some rows that goes without it.
@@ -119,22 +119,22 @@ def judged(
     found, reported = (contribution(analysis, without, rows, acts_on) for rows in (fitted, held))
     if finding.windows and not reported.ratios:
         # What acts in a window of one run alone (a gust) belongs to that run and is reported there.
-        windows = [in_windows(t, finding.windows) for t in analysis.compared]
+        windows = [_in_windows(t, finding.windows) for t in analysis.compared]
         reported = contribution(analysis, without, windows, acts_on)
-    slight = found.ratios and found.ratios[0].value > LARGE_GAIN
+    slight = found.ratios and found.ratios[0].value > _LARGE_GAIN
     reason = ""
     if rules.BELOW_LEFTOVER(not found.beyond_leftover):
         reason = "it is smaller than what the model leaves over"
-    elif rules.MAY_BE_NOTHING(not away_from_nothing(finding)):
+    elif rules.MAY_BE_NOTHING(not _away_from_nothing(finding)):
         reason = "every number of it may be nothing"
     elif rules.SLIGHT(bool(share < LEAST_SHARE and slight and not finding.windows)):
         reason = f"it takes {100 * share:.1f} % of the error that goes"
     best = reported.ratios[0] if reported.ratios else None
     finding = replace(finding, gain=None if best is None else (best.value, best.low, best.high))
-    return lowered(finding, reason) if reason else finding
+    return _lowered(finding, reason) if reason else finding
 
 
-def lowered(finding: Finding, reason: str) -> Finding:
+def _lowered(finding: Finding, reason: str) -> Finding:
     """A claim that does not stand: suggested, or not established where it is at work and too small to matter."""
     if finding.probability is None or finding.probability < SURE:
         return replace(finding, status="suggested", objection=reason)
@@ -142,7 +142,7 @@ def lowered(finding: Finding, reason: str) -> Finding:
     return replace(finding, status="not_established", sentence=sentence, rule="too_small", alternatives=())
 
 
-def in_windows(trace: Trace, windows: tuple[tuple[str, float, float], ...]) -> np.ndarray:
+def _in_windows(trace: Trace, windows: tuple[tuple[str, float, float], ...]) -> np.ndarray:
     """Mask of a trace's instants that lie in one of the windows: what belongs to a run is judged there."""
     inside = np.zeros(len(trace.time_s), bool)
     for run, start_s, stop_s in windows:
@@ -170,17 +170,17 @@ def contribution(
     here = {c: np.sqrt(s[0] / max(s[1], 1)) / noise[c] for c, s in size.items()}
     there = {c: np.sqrt(s[2] / max(s[3], 1)) / noise[c] for c, s in size.items()}
     strongest = max(here.values(), default=0.0)
-    if strongest <= LEAST_EXCITED * max(there.values(), default=0.0):
+    if strongest <= _LEAST_EXCITED * max(there.values(), default=0.0):
         return Contribution()
     sensors = {t.channel for t in analysis.between_sensors}
-    differing = [c for c in here if here[c] > ACTS * strongest]
+    differing = [c for c in here if here[c] > _ACTS * strongest]
     acting = [c for c in here if c in acts_on or (c in sensors and c in differing)] or differing
     ratios = [r for r in (ratio_of(analysis, without, rows, c) for c in acting) if r is not None]
-    beyond = any(here[c] * noise[c] > leftover_rms(analysis, rows, c) for c in acting)
+    beyond = any(here[c] * noise[c] > _leftover_rms(analysis, rows, c) for c in acting)
     return Contribution(tuple(sorted(ratios, key=lambda r: r.high)), beyond)
 
 
-def leftover_rms(analysis: Analysis, rows: list[np.ndarray], channel: str) -> float:
+def _leftover_rms(analysis: Analysis, rows: list[np.ndarray], channel: str) -> float:
     """What the model leaves of a channel beyond its noise on masked rows, root mean square in the channel's unit."""
     pairs = [(t, m) for t, m in zip(analysis.compared, rows, strict=True) if t.channel == channel and m.any()]
     if not pairs:
@@ -196,20 +196,20 @@ def ratio_of(analysis: Analysis, without: tuple[np.ndarray, ...], rows: list[np.
     """
     parts = zip(analysis.compared, without, rows, strict=True)
     own = [(t, left - t.named, m) for t, left, m in parts if t.channel == channel]
-    for block_s in BLOCKS_S:
-        energies = np.array([e for t, added, m in own for e in block_energies(t, added, m, block_s)]).reshape(-1, 3)
+    for block_s in _BLOCKS_S:
+        energies = np.array([e for t, added, m in own for e in _block_energies(t, added, m, block_s)]).reshape(-1, 3)
         acting = energies[energies[:, 2] > VOTES_FROM * energies[:, 2].max(initial=0.0)]
-        if len(acting) >= LEAST_BLOCKS:
+        if len(acting) >= _LEAST_BLOCKS:
             break
     else:
         return None
-    draws = acting[np.random.default_rng(1).integers(0, len(acting), (BOOTSTRAPS, len(acting)))].sum(axis=1)
+    draws = acting[np.random.default_rng(1).integers(0, len(acting), (_BOOTSTRAPS, len(acting)))].sum(axis=1)
     low, high = np.quantile(np.sqrt(draws[:, 0] / np.maximum(draws[:, 1], 1e-300)), [0.025, 0.975])
     value = np.sqrt(acting[:, 0].sum() / max(acting[:, 1].sum(), 1e-300))
     return Ratio(channel, float(value), float(low), float(high))
 
 
-def block_energies(trace: Trace, added: np.ndarray, mask: np.ndarray, block_s: float):
+def _block_energies(trace: Trace, added: np.ndarray, mask: np.ndarray, block_s: float):
     """Energies of blocks of masked rows: with the effect, without it (its contribution `added` (n,) put back), and of
     the contribution alone."""
     index = np.flatnonzero(mask & np.isfinite(trace.named) & np.isfinite(added))
@@ -221,7 +221,7 @@ def block_energies(trace: Trace, added: np.ndarray, mask: np.ndarray, block_s: f
         yield float(after @ after), float((after + own) @ (after + own)), float(own @ own)
 
 
-def away_from_nothing(finding: Finding) -> bool:
+def _away_from_nothing(finding: Finding) -> bool:
     """Whether the interval of some number of a finding does not hold the value at which it does nothing."""
     if not finding.parameters:
         return True

@@ -25,18 +25,18 @@ class Limit(NamedTuple):
 
 
 @dataclass
-class Asked:
+class _Asked:
     """Which rules are switched off during an analysis, and how often each rule fired."""
 
     off: frozenset[str] = frozenset()
     fired: Counter[str] = field(default_factory=Counter)
 
 
-_ASKED: ContextVar[Asked | None] = ContextVar("asked", default=None)
+_ASKED: ContextVar[_Asked | None] = ContextVar("asked", default=None)
 
 
 @dataclass(frozen=True)
-class Rule:
+class _Rule:
     """One rule of the decision."""
 
     name: str
@@ -63,18 +63,18 @@ class Rule:
         return bool(holds) and self.name not in asked.off
 
 
-RULES: dict[str, Rule] = {}
+RULES: dict[str, _Rule] = {}
 
 
-def rule(name: str, decides: str, **limits: tuple[float, str]) -> Rule:
+def rule(name: str, decides: str, **limits: tuple[float, str]) -> _Rule:
     """A new rule, known under its name."""
-    made = Rule(name, decides, {key: Limit(*pair) for key, pair in limits.items()})
+    made = _Rule(name, decides, {key: Limit(*pair) for key, pair in limits.items()})
     RULES[name] = made
     return made
 
 
 @contextmanager
-def asking(off: Iterable[str] = ()) -> Iterator[Asked]:
+def asking(off: Iterable[str] = ()) -> Iterator[_Asked]:
     """Count what fires inside, with some rules switched off.
 
     Raises InputError for a name that no rule has.
@@ -82,7 +82,7 @@ def asking(off: Iterable[str] = ()) -> Iterator[Asked]:
     names = frozenset(off)
     if unknown := sorted(names - set(RULES)):
         raise InputError(f"rules.off: no rule is named {', '.join(unknown)}; the rules are {', '.join(RULES)}")
-    asked = Asked(names)
+    asked = _Asked(names)
     token = _ASKED.set(asked)
     try:
         yield asked

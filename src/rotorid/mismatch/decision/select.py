@@ -36,20 +36,20 @@ COST_PER_EFFECT = 20.0
 """Whitened squares that a further id must explain before two ids are preferred to one form of one of them."""
 COST_OF_UNKNOWN = 40.0
 """Whitened squares, and SHARE_OF_UNKNOWN of what it explains, that an empirical term pays for having no name."""
-SHARE_OF_UNKNOWN = 0.1
-ALTERNATIVE_P = 0.01
+_SHARE_OF_UNKNOWN = 0.1
+_ALTERNATIVE_P = 0.01
 """A term that given an alternative is less significant than this could be that alternative instead."""
-INSTEAD_P = 1e-3
+_INSTEAD_P = 1e-3
 """It must itself be as significant as this in the other's place."""
-MOST_EXTRA_PARAMETERS = 3
+_MOST_EXTRA_PARAMETERS = 3
 """An alternative with more further parameters than this explains by its freedom, not by its cause."""
-MOST_EFFECTS = 10
+_MOST_EFFECTS = 10
 VALUE_FLOOR = 0.002
 """Relative one-sigma that no estimate here is better than (filters, timing): of two effects that explain the same but
 for twice as much neither explains more."""
-MOST_JUDGED = 20_000
+_MOST_JUDGED = 20_000
 """Terms in models of which a search remembers what it said."""
-MOST_TRIALS = 12
+_MOST_TRIALS = 12
 """Exchanges looked at closely, the most promising first."""
 LEAST_TRANSFER = rules.TRANSFER["share"]
 LEAST_PROMISE = rules.TRANSFER["promise"]
@@ -77,7 +77,7 @@ class Candidate:
     def score(self) -> float:
         """Gain less what its parameters cost; noise that is larger than assumed makes both larger."""
         score = self.gain - COST_PER_PARAMETER * self.inflation * len(self.beta)
-        return score if self.named else (1 - SHARE_OF_UNKNOWN) * score - COST_OF_UNKNOWN * self.inflation
+        return score if self.named else (1 - _SHARE_OF_UNKNOWN) * score - COST_OF_UNKNOWN * self.inflation
 
 
 @dataclass
@@ -100,7 +100,7 @@ class Questions:
     """The same of a contribution as it is, of one term or several together (columns, coefficients), (12,)."""
 
 
-def named_first(term: Term) -> int:
+def _named_first(term: Term) -> int:
     """When a term is looked at: one without a name where nothing else enters."""
     return int(term.effect in UNKNOWNS)
 
@@ -158,7 +158,7 @@ class Search:
         """A term added to (or, if in `active`, kept in) the model; remembered."""
         asked = key, self.regression.set_of([*active, key])
         if asked not in self._judged:
-            making_room(self._judged, MOST_JUDGED)[asked] = self._judge(key, active)
+            making_room(self._judged, _MOST_JUDGED)[asked] = self._judge(key, active)
         return self._judged[asked]
 
     def _judge(self, key: str, active: list[str]) -> Candidate:
@@ -217,7 +217,7 @@ class Search:
             fit = self.regression.solution(self.always + active)
             beta = {key: fit.beta[fit.places(self.regression.columns([key]))] for key in active}
             sizes = [self.ask.sizes_of(key, own) for key, own in beta.items()]
-            making_room(self._largest, MOST_JUDGED)[asked] = np.max(sizes or [np.zeros(1)], axis=0)
+            making_room(self._largest, _MOST_JUDGED)[asked] = np.max(sizes or [np.zeros(1)], axis=0)
         return self._largest[asked]
 
     def without(self, key: str, active: list[str]) -> Solution:
@@ -301,7 +301,7 @@ class Search:
                     for other, worth in zip(others, worths, strict=True)
                     if worth > least
                 ]
-        for _, new, trial in sorted(trials, key=lambda t: -t[0])[:MOST_TRIALS]:
+        for _, new, trial in sorted(trials, key=lambda t: -t[0])[:_MOST_TRIALS]:
             if all(self.judge(key, trial).physical for key in trial) and self.failing(new, trial)[0] is None:
                 return trial
         return None
@@ -324,7 +324,7 @@ class Search:
         """Why a term of the model does not hold given the others (None where it does), and its score; remembered."""
         asked = key, self.regression.set_of(active)
         if asked not in self._failing:
-            making_room(self._failing, MOST_JUDGED)[asked] = self._fails(key, active)
+            making_room(self._failing, _MOST_JUDGED)[asked] = self._fails(key, active)
         return self._failing[asked]
 
     def _fails(self, key: str, active: list[str]) -> tuple[str | None, float]:
@@ -348,7 +348,7 @@ class Search:
         """Grow the model, take out what the held-out runs refute, and grow again without it until nothing changes."""
         active = list(active or [])
         refuted: dict[str, str] = dict(self.refused)
-        for _ in range(MOST_EFFECTS):
+        for _ in range(_MOST_EFFECTS):
             dropped = dict(refuted)
             active = self._grown(active, dropped)
             found = self._refuted(active)
@@ -367,7 +367,7 @@ class Search:
 
     def _grown(self, active: list[str], dropped: dict[str, str]) -> list[str]:
         """The model grown, its forms replaced and its weak terms taken out; `dropped` is filled."""
-        for _ in range(4 * MOST_EFFECTS):
+        for _ in range(4 * _MOST_EFFECTS):
             added = self._next(active, dropped) or []
             active = active + added
             for key in list(active):
@@ -389,9 +389,9 @@ class Search:
 
     def _next(self, active: list[str], dropped: dict[str, str]) -> list[str] | None:
         """The best term that may enter, in a list; terms too small to matter go to `dropped`."""
-        if len(active) >= MOST_EFFECTS:
+        if len(active) >= _MOST_EFFECTS:
             return None
-        for candidate in self.candidates(active, dropped, named_first):
+        for candidate in self.candidates(active, dropped, _named_first):
             effect = self.terms[candidate.key].once
             if candidate.score <= 0 or candidate.p_value > ENTER_P or not candidate.physical or effect in dropped:
                 continue
@@ -505,8 +505,8 @@ class Search:
     def _replaces(self, other: str, own: Candidate, rest: list[str]) -> bool:
         """Whether given another term alone one of the model is no longer needed."""
         instead = self.judge(other, rest)
-        if not instead.physical or instead.p_value > INSTEAD_P or instead.gain < 0.5 * own.gain:
+        if not instead.physical or instead.p_value > _INSTEAD_P or instead.gain < 0.5 * own.gain:
             return False
-        if len(instead.beta) > len(own.beta) + MOST_EXTRA_PARAMETERS:
+        if len(instead.beta) > len(own.beta) + _MOST_EXTRA_PARAMETERS:
             return False
-        return self.judge(own.key, [*rest, other]).p_value > ALTERNATIVE_P
+        return self.judge(own.key, [*rest, other]).p_value > _ALTERNATIVE_P

@@ -32,10 +32,10 @@ def scales(analysis: Analysis) -> dict[str, Scale]:
     """To every compared channel its scale; channels of which none is known are not among them."""
     if analysis.instrument is not None:
         return of_reading(analysis)
-    return of_flight(analysis.believed)
+    return _of_flight(analysis.believed)
 
 
-def of_flight(vehicle: Vehicle) -> dict[str, Scale]:
+def _of_flight(vehicle: Vehicle) -> dict[str, Scale]:
     """Weight for forces, and for moments what the rotors can make by differing while they carry the vehicle.
 
     Half of the rotors at twice the hover's thrust and the others at none: Σ |y_i| F_i, Σ |x_i| F_i and Σ Q_i at hover.

@@ -25,7 +25,7 @@ FORWARD_WORDS = {
     "attitude": "attitude after half a second",
     "angular_velocity": "body rates after half a second",
 }
-REGIME_WORDS = {
+_REGIME_WORDS = {
     "vertical_speed_over_hover_inflow": ("speed of descent over hover inflow", ""),
     "rotor_speed_rad_s": ("mean rotor speed", "rad/s"),
     "rotor_acceleration_rad_s2": ("rate of the rotor speed", "rad/s²"),
@@ -37,7 +37,7 @@ REGIME_WORDS = {
     "pitch_rad": ("pitch of the mount", "rad"),
 }
 """Regime variables in words, with their unit; any other is named from its column."""
-UNIT_SUFFIXES = (
+_UNIT_SUFFIXES = (
     ("_rad_s2", "rad/s²"),
     ("_rad_s", "rad/s"),
     ("_m_s2", "m/s²"),
@@ -52,7 +52,7 @@ UNIT_SUFFIXES = (
     ("_a", "A"),
     ("_c", "°C"),
 )
-PARAMETER_WORDS = {
+_PARAMETER_WORDS = {
     "mass_kg": ("mass", "kg"),
     "thrust_coefficient_n_s2": ("thrust coefficient", "N s²"),
     "torque_coefficient_n_m_s2": ("torque coefficient", "N m s²"),
@@ -66,7 +66,7 @@ PARAMETER_WORDS = {
 }
 
 
-GROUND_WORDS = (
+_GROUND_WORDS = (
     ("on flights not used", "on runs not used"),
     ("on the flight it was fitted to", "on the run it was fitted to"),
     ("on held-out flight", "on held-out runs"),
@@ -80,7 +80,7 @@ GROUND_WORDS = (
 
 def on_the_ground(text: str) -> str:
     """A text about flights for a stand or bench."""
-    for flown, still in GROUND_WORDS:
+    for flown, still in _GROUND_WORDS:
         text = text.replace(flown, still).replace(capital(flown), capital(still))
     return text
 
@@ -101,9 +101,9 @@ def channel_words(channel: str) -> str:
 
 def regime_words(variable: str) -> tuple[str, str]:
     """Name and unit of a regime variable."""
-    if variable in REGIME_WORDS:
-        return REGIME_WORDS[variable]
-    for suffix, unit in UNIT_SUFFIXES:
+    if variable in _REGIME_WORDS:
+        return _REGIME_WORDS[variable]
+    for suffix, unit in _UNIT_SUFFIXES:
         if variable.endswith(suffix):
             return variable.removesuffix(suffix).replace("_", " "), unit
     return variable.replace("_", " "), ""
@@ -111,7 +111,7 @@ def regime_words(variable: str) -> tuple[str, str]:
 
 def parameter_words(name: str) -> tuple[str, str]:
     """Name and unit of a value of vehicle.yaml."""
-    return PARAMETER_WORDS[name] if name in PARAMETER_WORDS else regime_words(name)
+    return _PARAMETER_WORDS[name] if name in _PARAMETER_WORDS else regime_words(name)
 
 
 def effect_words(effect_id: str) -> str:

@@ -19,7 +19,7 @@ from rotorid.mismatch.delivery.derivatives import Learnt
 from rotorid.mismatch.model.delivered import Values
 from rotorid.mismatch.plant.regression import Fit
 
-PLAINEST_FIRST = (
+_PLAINEST_FIRST = (
     ("believed", False),
     ("refitted", False),
     ("named", False),
@@ -29,8 +29,8 @@ PLAINEST_FIRST = (
 )
 """Candidates by how much of them has no cause: derivatives next to named physics have less to say than those in its
 place."""
-DRAWS = 400
-WORTH = 0.03
+_DRAWS = 400
+_WORTH = 0.03
 """Logarithm of an error below which derivatives gain nothing that shows in flight."""
 
 
@@ -108,21 +108,21 @@ class Ground:
         return np.all([np.isfinite(c.left[self.unit >= 0]).all(axis=0) for c in candidates], axis=0)
 
 
-def mean_logarithm(sums: np.ndarray) -> np.ndarray:
+def _mean_logarithm(sums: np.ndarray) -> np.ndarray:
     """Mean logarithm of the root mean squares, from squares and their numbers, (..., quantities, 2)."""
     return 0.5 * np.log(np.maximum(sums[..., 0], 1e-300) / np.maximum(sums[..., 1], 1.0)).mean(axis=-1)
 
 
 def compared(candidates: Sequence[Candidate], ground: Ground) -> list[Scored]:
     """Every candidate's number, the candidates in the order of PLAINEST_FIRST; the believed vehicle is among them."""
-    ordered = sorted(candidates, key=lambda c: PLAINEST_FIRST.index(c.name))
+    ordered = sorted(candidates, key=lambda c: _PLAINEST_FIRST.index(c.name))
     known = ground.compared(ordered)
     every = [[ground.squares(c.left[:, known]), *([c.flown] if len(c.flown) else [])] for c in ordered]
     squares = np.array([np.concatenate(parts) for parts in every])
     units = squares.shape[-1]
-    drawn = np.random.default_rng(0).integers(0, units, (DRAWS, units))
+    drawn = np.random.default_rng(0).integers(0, units, (_DRAWS, units))
     weights = np.array([np.ones(units), *(np.bincount(d, minlength=units) for d in drawn)])
-    scores = mean_logarithm((squares @ weights.T).transpose(0, 3, 1, 2))
+    scores = _mean_logarithm((squares @ weights.T).transpose(0, 3, 1, 2))
     best = int(np.argmin(scores[:, 0]))
     doubt = (scores[:, 1:] - scores[best, 1:]).std(axis=1)
     believed = next(i for i, c in enumerate(ordered) if c.name == ("believed", False))
@@ -132,9 +132,9 @@ def compared(candidates: Sequence[Candidate], ground: Ground) -> list[Scored]:
     ]
 
 
-def least_gain(plain: Scored, best: Scored) -> float:
+def _least_gain(plain: Scored, best: Scored) -> float:
     """By how much the best must be ahead of a plainer one, if by derivatives alone."""
-    return WORTH if best.candidate.learnt is not None and plain.candidate.learnt is None else 0.0
+    return _WORTH if best.candidate.learnt is not None and plain.candidate.learnt is None else 0.0
 
 
 def choose(
@@ -145,7 +145,7 @@ def choose(
     while True:
         scored = compared(kept, ground)
         best = min(scored, key=lambda s: s.score)
-        first = next(s for s in scored if s.score - best.score <= max(s.standard_error, least_gain(s, best)))
+        first = next(s for s in scored if s.score - best.score <= max(s.standard_error, _least_gain(s, best)))
         # Only who may be chosen is flown; the best, too, for the others are measured by it.
         failing = {
             s.candidate.name: why

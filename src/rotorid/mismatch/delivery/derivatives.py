@@ -18,18 +18,18 @@ from scipy.stats import t as student
 from rotorid.recordings.vehicle import Derivative
 from rotorid.vehicle.derivatives import CHANNELS, CONTROLS, QUANTITIES, table_of, unit_of, wrench
 
-PENALTIES = 10.0 ** np.arange(-4.0, 3.5, 0.5)
+_PENALTIES = 10.0 ** np.arange(-4.0, 3.5, 0.5)
 """Of the ridge, times the number of rows; quantities are standardised."""
-MOST_LEFT = 0.9
+_MOST_LEFT = 0.9
 """Share of the squares where not fitted that derivatives may leave of a channel."""
-HELPS_IN = 2 / 3
+_HELPS_IN = 2 / 3
 """Share of the folds in which they must leave less."""
-EDGE = 0.002
+_EDGE = 0.002
 """Share of the rows beyond each edge at which a quantity is held."""
-LEAST_FOLDS = 3
-LEAST_GAIN = 0.3
+_LEAST_FOLDS = 3
+_LEAST_GAIN = 0.3
 """Share of what is asked that rotors make at least: less is what a controller leaves that cancels a disturbance."""
-DAMPED_BY = ("u", "v", "w", "p", "q", "r")
+_DAMPED_BY = ("u", "v", "w", "p", "q", "r")
 """Of each channel the quantity that its own motion is: X_u, Y_v, Z_w, L_p, M_q and N_r are damping, or nothing."""
 
 
@@ -65,14 +65,14 @@ def learn(
     for channel, (quantity, unit) in controls.items():
         c, k = CHANNELS.index(channel), QUANTITIES.index(quantity)
         own = rows & np.isfinite(x[:, k]) & np.isfinite(y[:, c])
-        if own.any() and exogenous(x[own][:, state], unit * x[own, k], y[own, c]):
+        if own.any() and _exogenous(x[own][:, state], unit * x[own, k], y[own, c]):
             known[k], asked[channel] = True, quantity
     rows &= np.isfinite(x[:, known]).all(axis=1)
     folds = [np.flatnonzero(rows & (fold == k)) for k in np.unique(fold[rows])]
     left_out = np.zeros((len(x), len(CHANNELS)))
-    if len(folds) < LEAST_FOLDS or known.sum() < 2:
+    if len(folds) < _LEAST_FOLDS or known.sum() < 2:
         return Learnt((), left_out)
-    low, high = np.quantile(x[rows][:, known], [EDGE, 1.0 - EDGE], axis=0)
+    low, high = np.quantile(x[rows][:, known], [_EDGE, 1.0 - _EDGE], axis=0)
     held = np.clip(x[:, known], low, high)
     middle, scale = held[rows].mean(axis=0), held[rows].std(axis=0)
     middle[0], scale[0] = 0.0, 1.0
@@ -85,7 +85,7 @@ def learn(
             continue
         kept = np.array([q not in CONTROLS or q == asked.get(channel) for q in names])
         beta, without, penalty = _ridge([(z[f], y[f, c]) for f in folds], kept)
-        own = names.index(DAMPED_BY[c]) if DAMPED_BY[c] in names else 0
+        own = names.index(_DAMPED_BY[c]) if _DAMPED_BY[c] in names else 0
         if own and beta[own] > 0:
             # No air drives a motion on: a positive one is what a closed loop feigns, and flown it runs away.
             kept[own] = False
@@ -124,7 +124,7 @@ def _about_zero(beta: np.ndarray, middle: np.ndarray, scale: np.ndarray) -> np.n
     return slopes
 
 
-def exogenous(state: np.ndarray, asked: np.ndarray, left: np.ndarray) -> bool:
+def _exogenous(state: np.ndarray, asked: np.ndarray, left: np.ndarray) -> bool:
     """Whether what is left of a channel, (n,), says by how much more or less the rotors make than is `asked`, (n,).
 
     A controller that fights a disturbance asks against it: regressed on what is asked, what is felt then shows too
@@ -134,7 +134,7 @@ def exogenous(state: np.ndarray, asked: np.ndarray, left: np.ndarray) -> bool:
     """
     asked, felt = (v - state @ np.linalg.lstsq(state, v, rcond=None)[0] for v in (asked, asked + left))
     both = float(asked @ felt)
-    if both <= LEAST_GAIN * float(asked @ asked):
+    if both <= _LEAST_GAIN * float(asked @ asked):
         return False
     first, last = both / float(asked @ asked) - 1.0, float(felt @ felt) / both - 1.0
     return first * last > 0 and abs(first) <= 2.0 * abs(last)
@@ -152,15 +152,15 @@ def _ridge(parts: list[tuple[np.ndarray, np.ndarray]], kept: np.ndarray) -> tupl
         """(penalties, k)."""
         weight = np.ones(len(right))
         weight[0] = 0.0
-        normal = gram + count * (PENALTIES[:, None, None] * np.diag(weight) + 1e-9 * np.eye(len(right)))
-        return np.linalg.solve(normal, np.broadcast_to(right[:, None], (len(PENALTIES), len(right), 1)))[:, :, 0]
+        normal = gram + count * (_PENALTIES[:, None, None] * np.diag(weight) + 1e-9 * np.eye(len(right)))
+        return np.linalg.solve(normal, np.broadcast_to(right[:, None], (len(_PENALTIES), len(right), 1)))[:, :, 0]
 
     gram, right, size = grams.sum(axis=0), rights.sum(axis=0), int(sizes.sum())
     without = np.array([solved(gram - g, right - r, size - n) for g, r, n in zip(grams, rights, sizes, strict=True)])
     left = np.array([((y[:, None] - x @ b.T) ** 2).sum(axis=0) for (x, y), b in zip(parts, without, strict=True)])
     own = np.array([float(y @ y) for _, y in parts])
     best = int(np.argmin(left.sum(axis=0)))
-    pays = left[:, best].sum() < MOST_LEFT * own.sum() and np.mean(left[:, best] < own) >= HELPS_IN
+    pays = left[:, best].sum() < _MOST_LEFT * own.sum() and np.mean(left[:, best] < own) >= _HELPS_IN
     beta, others = np.zeros(len(kept)), np.zeros((len(parts), len(kept)))
     beta[kept], others[:, kept] = solved(gram, right, size)[best], without[:, best]
-    return beta, others, float(PENALTIES[best]) if pays else None
+    return beta, others, float(_PENALTIES[best]) if pays else None

@@ -3,25 +3,35 @@
 Wind, gusts and a payload for a time belong to a run and to its instants; errors of sensors, clocks and stamps belong to
 the instruments. The vehicle has a file of its own, which the simulator runs. All three are read back before they are
 delivered, and the simulation run forward uses each where it belongs.
+
+To which file a finding belongs: the vehicle, the conditions of a flight, or the instruments.
+
+Only what is established, or one member of a class, belongs anywhere. A wind blows on one afternoon and a gyroscope's
+bias is no property of the airframe: a vehicle that held them would fly worse than the one believed.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.effects.contract import Form, SpeedForm
 from rotorid.errors import InputError
 from rotorid.io.text.files import read_yaml
 from rotorid.io.text.writing import rounded
-from rotorid.mismatch.decision.findings import Analysis, Finding, RunWind
-from rotorid.mismatch.delivery.parts import delivered, form_of
+from rotorid.mismatch.decision.findings import Analysis, Finding, RunWind, one_per_class
+from rotorid.mismatch.posterior.status import CLAIMED
+from rotorid.recordings import Vehicle
 
+Place = Literal["vehicle", "conditions", "instruments"]
 CONDITIONS, INSTRUMENTS = "conditions.yaml", "instruments.yaml"
-ABOUT = {
+_ABOUT = {
     CONDITIONS: "Found in these recordings, no property of the vehicle: when the air moved, when a payload was aboard.",
     INSTRUMENTS: "Errors of sensors, clocks and stamps found in these recordings; no property of the vehicle.",
 }
@@ -124,7 +134,7 @@ def conditions_of(analysis: Analysis) -> Conditions:
             found += [Condition(**own, **_blowing(b)) for b in analysis.winds if b.kind == kind]
         else:
             found += [Condition(**own, **_within(*window)) for window in finding.windows]
-    return as_written(Conditions(set=analysis.recordings.name, conditions=tuple(found)))
+    return _as_written(Conditions(set=analysis.recordings.name, conditions=tuple(found)))
 
 
 def instruments_of(analysis: Analysis) -> Instruments:
@@ -133,10 +143,10 @@ def instruments_of(analysis: Analysis) -> Instruments:
         Fault(**_entry(f).model_dump(), windows=tuple(Window(**_within(*w)) for w in f.windows))
         for f in delivered(analysis, "instruments")
     )
-    return as_written(Instruments(set=analysis.recordings.name, instruments=entries))
+    return _as_written(Instruments(set=analysis.recordings.name, instruments=entries))
 
 
-def as_written(content: Conditions | Instruments):
+def _as_written(content: Conditions | Instruments):
     """Content with its numbers as its file will state them: what is judged is what is read back."""
     return type(content).model_validate(rounded(content.model_dump(mode="json")))
 
@@ -176,7 +186,7 @@ def text_of(content: Conditions | Instruments) -> str:
     """A file's text: a line on what it is, then YAML; numbers to the digits that a verdict states."""
     name = CONDITIONS if isinstance(content, Conditions) else INSTRUMENTS
     plain = rounded(content.model_dump(mode="json", exclude_defaults=True))
-    return f"# {ABOUT[name]}\n{yaml.safe_dump(plain, sort_keys=False, allow_unicode=True)}"
+    return f"# {_ABOUT[name]}\n{yaml.safe_dump(plain, sort_keys=False, allow_unicode=True)}"
 
 
 def read_conditions(path: Path) -> Conditions:
@@ -201,3 +211,61 @@ def _read(path: Path, kind):
 def empty(content: Conditions | Instruments) -> bool:
     """Whether there is nothing to write."""
     return not (content.conditions if isinstance(content, Conditions) else content.instruments)
+
+
+def form_of(finding: Finding) -> Form | SpeedForm | None:
+    """The form of a finding; one between command and rotor speed is known by its equation."""
+    if finding.form is not None or not finding.values or finding.id not in catalogue():
+        return finding.form
+    speed_forms = catalogue()[finding.id].speed_forms
+    return next((f for f in speed_forms if f.equation == finding.equation), None)
+
+
+def place_of(finding: Finding) -> Place | None:
+    """The file that a finding belongs to; None for a mistake in the set, which is corrected in the recordings."""
+    effect = catalogue()[finding.id]
+    if effect.kind == "mistake":
+        return None
+    if effect.air_moves:
+        return "conditions"
+    form = form_of(finding)
+    if isinstance(form, SpeedForm):
+        return "vehicle"
+    if effect.kind == "sensor" or effect.of_the_rig:
+        return "instruments"
+    return "conditions" if finding.windows else "vehicle"  # with a payload on board for a time, say
+
+
+def claimed(findings: Sequence[Finding]) -> list[Finding]:
+    """Established findings, and of each class of alternatives the most significant member."""
+    by_p = sorted((f for f in findings if f.status in CLAIMED), key=lambda f: (f.status != "established", f.p_value))
+    kept = {id(f) for f in one_per_class(by_p)}
+    return [f for f in findings if id(f) in kept]
+
+
+def delivered(analysis: Analysis, place: Place) -> list[Finding]:
+    """Findings that go into one of the files, in the order of the analysis, less what the chosen vehicle lacks.
+
+    A condition or an error of a sensor may have no form (a wind, a delay of stamps): its parameters describe it.
+    """
+    found = [f for f in claimed(analysis.findings) if f.delivered and place_of(f) == place]
+    return [f for f in found if form_of(f) is not None] if place == "vehicle" else found
+
+
+def with_effects(vehicle: Vehicle, findings: Sequence[Finding]) -> Vehicle:
+    """A vehicle with an entry under `effects` for each finding that has a form."""
+    return vehicle.model_copy(update={"effects": tuple(entry_of(f) for f in findings if form_of(f) is not None)})
+
+
+def entry_of(finding: Finding) -> dict:
+    """A finding as a vehicle file has it: id, form, parameters, and of a class the members it stands for."""
+    form = form_of(finding)
+    values = dict(zip((p.symbol for p in form.parameters), map(float, finding.values), strict=True))
+    entry = {"id": finding.id, "form": form.name, "parameters": values}
+    others = [i for i in finding.alternatives if i != finding.id]
+    return {**entry, "one_of": [finding.id, *others]} if finding.status == "ambiguous" and others else entry
+
+
+def improved_vehicle(analysis: Analysis) -> Vehicle:
+    """The vehicle that is taken home: values re-estimated, and the effects of the vehicle that stand."""
+    return with_effects(analysis.improved, delivered(analysis, "vehicle"))

@@ -1,27 +1,34 @@
-"""The analysis whose model holds what is claimed, and the vehicle that is taken home, for every kind of set."""
+"""The analysis whose model holds what is claimed, and the vehicle that is taken home, for every kind of set.
+
+What is stated is what is delivered: numbers of effects and believed values by the fit that goes into the files.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from math import exp
 
 import numpy as np
 
+from rotorid.mismatch.decision.decide import coefficients
 from rotorid.mismatch.decision.evidence import with_shares
-from rotorid.mismatch.decision.findings import Analysis, Delivery, Finding, Trace
+from rotorid.mismatch.decision.findings import Analysis, Delivery, Finding, Trace, ValueRow
 from rotorid.mismatch.delivery.candidates import Candidate, Ground, Scored, choose
 from rotorid.mismatch.delivery.derivatives import Learnt, learn
-from rotorid.mismatch.delivery.parts import claimed, improved_vehicle, place_of
-from rotorid.mismatch.delivery.stated import restated, value_correlations, value_rows
+from rotorid.mismatch.delivery.files import claimed, improved_vehicle, place_of
 from rotorid.mismatch.delivery.usable import exports_lost
 from rotorid.mismatch.model.delivered import FittedModel, Values
-from rotorid.mismatch.model.within_trust import ways
+from rotorid.mismatch.model.values import believed_value
+from rotorid.mismatch.model.within_trust import all_free, ways
 from rotorid.mismatch.plant.rows import CHANNELS
 from rotorid.recordings import Vehicle
 from rotorid.steps import step
 from rotorid.vehicle.derivatives import about_hover_of, own_controls
 
+_ONLY_A_RATIO = 0.9
+"""Correlation of two values' estimates from which little more than their ratio is known."""
 Stretches = Sequence[tuple[str, np.ndarray, np.ndarray]]
 """Of every stretch its run, the instants of its rows (n,), s, and the quantities of derivatives at them, (n, 12)."""
 
@@ -70,16 +77,16 @@ class Offered:
 def as_delivered(offered: Offered) -> Analysis:
     """What an offer amounts to once a vehicle is chosen; statuses, wrong values and their reasons stay."""
     words, model = offered.words, offered.model
-    ground = ground_of(offered)
+    ground = _ground_of(offered)
     believed = Candidate("believed", {}, (), None, {}, np.concatenate(offered.believed_left)[:, : len(CHANNELS) // 2])
-    refitted = fitted_candidate("refitted", offered, offered.plain, ())
-    named = fitted_candidate("named", offered, offered.values, offered.active)
+    refitted = _fitted_candidate("refitted", offered, offered.plain, ())
+    named = _fitted_candidate("named", offered, offered.values, offered.active)
     candidates = [believed, refitted]
     if offered.active or offered.values != offered.plain:
         candidates.append(named)
     if offered.stretches:
-        candidates += [c.with_derivatives(learnt) for c in candidates if (learnt := learnt_of(offered, c)).derivatives]
-    findings = restated(words.findings, model, named) if offered.restates or not offered.whole else words.findings
+        candidates += [c.with_derivatives(learnt) for c in candidates if (learnt := _learnt_of(offered, c)).derivatives]
+    findings = _restated(words.findings, model, named) if offered.restates or not offered.whole else words.findings
     candidates = [replace(c, flown=offered.flown(c, findings, ground)) for c in candidates]
     chosen, scored = choose(
         candidates,
@@ -87,7 +94,7 @@ def as_delivered(offered: Offered) -> Analysis:
         lambda c: "" if c.name == ("believed", False) else offered.unfit(offered.vehicle(c, findings)),
     )
     taken = chosen.candidate
-    findings = tuple(replace(f, withheld=why_not(f, taken, scored, offered)) for f in findings)
+    findings = tuple(replace(f, withheld=_why_not(f, taken, scored, offered)) for f in findings)
     accounted, stretches = offered.again(named, refitted, findings)
     last = replace(
         accounted,
@@ -98,16 +105,16 @@ def as_delivered(offered: Offered) -> Analysis:
         not_testable=words.not_testable,
         improved=offered.improved(taken),
     )
-    last = with_taken(last, taken, scored, stretches, offered.believed)
+    last = _with_taken(last, taken, scored, stretches, offered.believed)
     return replace(
         with_shares(last),
         notes=(*last.notes, *offered.remarks, *exports_lost(improved_vehicle(last), offered.believed)),
-        believed_values=value_rows(model, named, last.improved, offered.believed, offered.names),
+        believed_values=_value_rows(model, named, last.improved, offered.believed, offered.names),
         value_correlations=value_correlations(model, named, offered.names),
     )
 
 
-def ground_of(offered: Offered) -> Ground:
+def _ground_of(offered: Offered) -> Ground:
     """The fitted rows, by what is left out together."""
     regression = offered.model.regression
     units = regression.of_rows(regression.left_out_together())
@@ -118,14 +125,14 @@ def ground_of(offered: Offered) -> Ground:
     return Ground(np.concatenate(units), joined)
 
 
-def fitted_candidate(name: str, offered: Offered, values: Values, active: Sequence[str]) -> Candidate:
+def _fitted_candidate(name: str, offered: Offered, values: Values, active: Sequence[str]) -> Candidate:
     """A candidate with the other values as believed, or moved within their trust where that pays (`ways`)."""
     way = ways(offered.model, values, active)[0]
     left = np.concatenate(way.left)[:, : len(CHANNELS) // 2]
     return Candidate(name, values, tuple(active), way.fit, way.moved, left)
 
 
-def learnt_of(offered: Offered, candidate: Candidate) -> Learnt:
+def _learnt_of(offered: Offered, candidate: Candidate) -> Learnt:
     """The derivatives of what a candidate leaves."""
     vehicle = offered.improved(candidate)
     x = about_hover_of(np.concatenate([x for _, _, x in offered.stretches]), offered.believed, vehicle)
@@ -134,7 +141,7 @@ def learnt_of(offered: Offered, candidate: Candidate) -> Learnt:
     return learn(x, candidate.left, folds, own_controls(vehicle))
 
 
-def why_not(finding: Finding, taken: Candidate, scored: Sequence[Scored], offered: Offered) -> str:
+def _why_not(finding: Finding, taken: Candidate, scored: Sequence[Scored], offered: Offered) -> str:
     """Why a claimed property of the vehicle is not in the vehicle that is taken home; empty where it is."""
     if finding not in claimed([finding]) or place_of(finding) != "vehicle" or taken.model == "named":
         return ""
@@ -154,7 +161,7 @@ def why_not(finding: Finding, taken: Candidate, scored: Sequence[Scored], offere
     )
 
 
-def with_taken(
+def _with_taken(
     analysis: Analysis, taken: Candidate, scored: Sequence[Scored], stretches: Stretches, believed: Vehicle
 ) -> Analysis:
     """The analysis with the traces that the vehicle taken home leaves, and that vehicle's derivatives."""
@@ -179,3 +186,75 @@ def with_taken(
         traces=tuple(map(left, analysis.traces)),
         delivery=Delivery(taken.model, bool(derivatives), scores),
     )
+
+
+def _restated(findings: Sequence[Finding], model: FittedModel, named: Candidate) -> tuple[Finding, ...]:
+    """Findings with their linear parameters by a settled fit; intervals reach to where the findings had them."""
+    key_of = {model.search.terms[k].form: k for k in named.active}
+    out = []
+    for finding in findings:
+        key = key_of.get(finding.form)
+        if key is None or not finding.values or not finding.form.linear:
+            out.append(finding)
+            continue
+        form = finding.form
+        values = np.array(finding.values, float)
+        values[list(form.linear)] = form.stated(coefficients(model.regression, named.fit, key)[0])
+        now = dict(zip((p.symbol for p in form.parameters), values, strict=True))
+        parameters = tuple(
+            replace(e, value=v, low=min(e.low, e.low + v - e.value), high=max(e.high, e.high + v - e.value))
+            if (v := float(now.get(e.symbol, e.value))) != e.value
+            else e
+            for e in finding.parameters
+        )
+        out.append(replace(finding, values=tuple(map(float, values)), parameters=parameters))
+    return tuple(out)
+
+
+def _value_rows(
+    model: FittedModel,
+    named: Candidate,
+    improved: Vehicle,
+    believed: Vehicle,
+    names: Mapping[str, str],
+) -> tuple[ValueRow, ...]:
+    """Every believed value before and after: estimated jointly with the delivered effects, all free, and delivered."""
+    fit = all_free(model, named.values, list(named.active))[1]
+    rows = []
+    for key in model.values_beside(named.active):
+        beta, covariance = coefficients(model.regression, fit, key)
+        if key in named.values:
+            change, sd = named.values[key]
+        else:
+            change, sd = model.change(key, float(beta[0]), float(np.sqrt(covariance[0, 0])))
+        was = believed_value(believed, key)
+        low, high = (was * (1 + change + z * sd) for z in (-1.96, 1.96))
+        given = delivered_value(improved, believed, key)
+        rows.append(ValueRow(names[key], was, was * (1 + change), low, high, given))
+    return tuple(rows)
+
+
+def delivered_value(improved: Vehicle, believed: Vehicle, key: str) -> float:
+    """A value of the improved vehicle; of an arm and a reading's gain the factor on what was believed."""
+    if key == "arm":
+        was, now = (v.rotor_positions_m()[:, :2] for v in (believed, improved))
+        believed_m = float(np.linalg.norm(was))
+        return float(np.linalg.norm(now)) / believed_m if believed_m > 0 else 1.0
+    if key.startswith("gain"):
+        gains = improved.reading_gain or (1.0, 1.0, 1.0)
+        return float(gains["xyz".index(key[-1])] if key[-2:] in ("_x", "_y", "_z") else gains[0])
+    return believed_value(improved, key)
+
+
+def value_correlations(model: FittedModel, named: Candidate, names: Mapping[str, str]) -> dict[tuple[str, str], float]:
+    """Correlations of two values' estimates from ONLY_A_RATIO on, trust left out: what the recordings alone know."""
+    keys = model.values_beside(named.active)
+    loose = dict.fromkeys(keys, 1.0)
+    fit = model.regression.fit([*model.regression.keys_of("nuisance", "wind"), *keys, *named.active], loose=loose)
+    places = fit.places(model.regression.columns(keys))
+    covariance = fit.covariance[np.ix_(places, places)]
+    sd = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    correlation = covariance / np.outer(sd, sd)
+    pairs = combinations(range(len(keys)), 2)
+    known = {(names[keys[i]], names[keys[j]]): float(correlation[i, j]) for i, j in pairs}
+    return {pair: r for pair, r in known.items() if abs(r) > _ONLY_A_RATIO}

@@ -2,6 +2,8 @@
 
 An error is the length of the vector between simulation and recording (for attitude the angle of the rotation between
 them), taken over all samples of a window but the restart itself.
+
+A vehicle with its effects, ready to be simulated, and what belongs to the run and to the readings.
 """
 
 from __future__ import annotations
@@ -12,16 +14,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rotorid.effects.contract import Form, Motion, not_testable_reason
+from rotorid.effects.contract import Form, Motion, SpeedForm, not_testable_reason
 from rotorid.mismatch.decision.drift import WINDOW_S
-from rotorid.mismatch.delivery.model import Model
+from rotorid.mismatch.delivery.files import Condition, Conditions, Entry, Instruments
 from rotorid.mismatch.plant.motion import Segment
 from rotorid.mismatch.plant.speedpath import commanded_path
 from rotorid.recordings import Vehicle
+from rotorid.vehicle.improved import ActiveForm, active_forms, all_forms
 from rotorid.vehicle.windows import Inputs, States, Windows, plan_windows, simulate_windows, usable
 
 UNITS = {"position": "m", "velocity": "m/s", "attitude": "rad", "angular_velocity": "rad/s"}
-FARTHEST = 1e6
+_FARTHEST = 1e6
 """Error, in any unit, at which a simulation that runs away is taken to end."""
 
 
@@ -37,7 +40,7 @@ class WindowErrors:
 
 def errors_of(segments: Sequence[Segment], model: Model) -> list[WindowErrors]:
     """Errors of every stretch's windows."""
-    return [window_errors(*driven, model) for driven in zip(segments, *driven_by(segments, model), strict=True)]
+    return [_window_errors(*driven, model) for driven in zip(segments, *driven_by(segments, model), strict=True)]
 
 
 def driven_by(segments: Sequence[Segment], model: Model) -> tuple[list[Inputs], list[States]]:
@@ -56,7 +59,7 @@ def driven_by(segments: Sequence[Segment], model: Model) -> tuple[list[Inputs], 
             acceleration = np.gradient(speed, motion.time_s, axis=0)
         wind = model.conditions.wind(segment.run, motion.time_s) if model.conditions else None
         turning = replace(motion, rotor_speed=speed, wind=wind)
-        acting = [(form, v, turning) for form, v in model.forms if remembers(form, v, motion, model.vehicle)]
+        acting = [(form, v, turning) for form, v in model.forms if _remembers(form, v, motion, model.vehicle)]
         for condition, form, v in model.loads:
             aboard = model.conditions.present(condition, segment.run, motion.time_s)
             acting.append((form, v, replace(turning, on_board=aboard)))
@@ -82,7 +85,7 @@ def _states(segment: Segment, model: Model) -> States:
     return States(rates, quaternion, velocity, motion.position)
 
 
-def remembers(form: Form, values: np.ndarray, motion: Motion, vehicle: Vehicle) -> bool:
+def _remembers(form: Form, values: np.ndarray, motion: Motion, vehicle: Vehicle) -> bool:
     """Whether a form looks at the past: its value at an instant is not the same when the instant comes alone."""
     whole = motion.at(slice(0, min(motion.size, 64)))
     every = np.arange(0, whole.size, 3)
@@ -108,11 +111,11 @@ def predict(
     segment: Segment, model: Model, inputs: Inputs, states: States, sample: np.ndarray | None = None
 ) -> Windows:
     """Windows of a segment as the model predicts them; `sample` (w, m) takes windows planned before."""
-    quick = [(f, v) for f, v in model.forms if not remembers(f, v, segment.motion, model.vehicle)]
+    quick = [(f, v) for f, v in model.forms if not _remembers(f, v, segment.motion, model.vehicle)]
     return simulate_windows(model.vehicle, quick, segment.motion.time_s, inputs, states, WINDOW_S, sample=sample)
 
 
-def window_errors(
+def _window_errors(
     segment: Segment, inputs: Inputs, states: States, model: Model, sample: np.ndarray | None = None
 ) -> WindowErrors:
     """Errors of the windows of one stretch, or of those of `sample`."""
@@ -157,9 +160,58 @@ def squares_of_windows(
             if not part.any():
                 continue
             flown = model if of_unit is None else of_unit(int(own[part][0]))
-            errors = window_errors(segment, inputs, states, flown, plan[part]).channels
+            errors = _window_errors(segment, inputs, states, flown, plan[part]).channels
             for number, name in enumerate(UNITS):
                 if name in errors:
-                    square = (np.nan_to_num(np.minimum(errors[name], FARTHEST), nan=FARTHEST) ** 2).mean(axis=1)
+                    square = (np.nan_to_num(np.minimum(errors[name], _FARTHEST), nan=_FARTHEST) ** 2).mean(axis=1)
                     out[number] += [np.bincount(own[part], square, units), np.bincount(own[part], None, units)]
     return out[out[:, 1].sum(axis=1) > 0]
+
+
+@dataclass(frozen=True)
+class Model:
+    """A vehicle with its effects, and the conditions and instruments of the recordings that it is compared with."""
+
+    vehicle: Vehicle
+    forms: tuple[ActiveForm, ...] = ()
+    """Forms that add a wrench, with their values."""
+    chain: tuple[tuple[str, SpeedForm], ...] = ()
+    """Forms between command and rotor speed, with their ids."""
+    chain_values: tuple[float, ...] = ()
+    """Parameters of the chain, form after form."""
+    conditions: Conditions | None = None
+    loads: tuple[tuple[Condition, Form, np.ndarray], ...] = ()
+    """Conditions with a form (a payload for a time), and their values."""
+    readings: tuple[ActiveForm, ...] = ()
+    """Errors of sensors, with their values."""
+
+
+def model_of(vehicle: Vehicle, conditions: Conditions | None = None, instruments: Instruments | None = None) -> Model:
+    """What the three files say, as forms with values; InputError names a faulty entry."""
+    stated = [(entry["id"], *form) for entry, form in zip(vehicle.effects, all_forms(vehicle), strict=True)]
+    chain = [(effect_id, form, values) for effect_id, form, values in stated if isinstance(form, SpeedForm)]
+    loads = tuple(
+        (condition, *form)
+        for condition in (conditions.conditions if conditions else ())
+        for form in _forms(vehicle, condition)
+    )
+    readings = tuple(
+        form for entry in (instruments.instruments if instruments else ()) for form in _forms(vehicle, entry)
+    )
+    return Model(
+        vehicle,
+        tuple(active_forms(vehicle)),
+        tuple((effect_id, form) for effect_id, form, _ in chain),
+        tuple(float(v) for _, _, values in chain for v in values),
+        conditions,
+        loads,
+        readings,
+    )
+
+
+def _forms(vehicle: Vehicle, entry: Entry) -> list[ActiveForm]:
+    """The form of an entry with its values; none where the parameters themselves describe it."""
+    if not entry.form:
+        return []
+    effects = ({"id": entry.id, "form": entry.form, "parameters": entry.parameters},)
+    return active_forms(vehicle.model_copy(update={"effects": effects, "derivatives": ()}))

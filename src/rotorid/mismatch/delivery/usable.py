@@ -2,20 +2,37 @@
 
 A value can leave every channel better and still be that of no vehicle: a thrust coefficient that absorbs a drag may
 leave a maximum thrust below the weight.
+
+The model of a flight with fewer of its parts: what is only suggested takes no part in what is delivered.
+
+Believed values, nuisances and the effects that stay are fitted anew without it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rotorid.effects.catalogue import moving_air
 from rotorid.errors import InputError
+from rotorid.mismatch.decision.select import Selection
+from rotorid.mismatch.model.delivered import Values
+from rotorid.mismatch.model.fitted import Fitted
+from rotorid.mismatch.model.leave_one_out import chain_without, without_wind
+from rotorid.mismatch.model.prepare import assemble_rows
+from rotorid.mismatch.model.wrench import WrenchModel, block_seconds, path_segments
+from rotorid.mismatch.plant.contributions import Contributions
+from rotorid.mismatch.plant.motion import Segment
+from rotorid.mismatch.plant.regression import build
+from rotorid.mismatch.plant.rows import compared_alone
+from rotorid.mismatch.plant.split import training_rule
+from rotorid.mismatch.plant.unknowns import UNKNOWNS
 from rotorid.recordings import Run, Vehicle
 from rotorid.recordings import columns as c
-from rotorid.recordings.belief import NO_BODY
 from rotorid.recordings.body import body_of, unfit
+from rotorid.recordings.files import NO_BODY
 from rotorid.steps import step
 from rotorid.vehicle.control.swings import FLIGHTS, SECONDS, SEED, swings, turned_over
 from rotorid.vehicle.exports.forms import FORMS, export_vehicle
@@ -23,15 +40,15 @@ from rotorid.vehicle.flyable import flyable
 from rotorid.vehicle.hover import wrench_at_rest, wrench_of_command
 from rotorid.vehicle.improved import command_path
 
-MOST_HOVER_SHARE = 0.9
+_MOST_HOVER_SHARE = 0.9
 """Share of the full thrust at which a vehicle may hover: what steers it needs the rest."""
-HIGH_ABOVE_GROUND_M = 1e3
-BEYOND_ALL = 1e6
+_HIGH_ABOVE_GROUND_M = 1e3
+_BEYOND_ALL = 1e6
 """Weights that no rotors lift: asked for, each turns at its limit."""
-CARRIES = (0.7, 1.4)
+_CARRIES = (0.7, 1.4)
 """Upward force at the recorded rotor speeds, over what was felt with them, that a vehicle which flies like the recorded
 one may make: airspeed and climb change the thrust at the same speed by some ten percent."""
-LIGHT = 0.5
+_LIGHT = 0.5
 """Share of the largest recorded thrust below which a vehicle is not taken to be in the air."""
 
 
@@ -53,11 +70,11 @@ def question_of(believed: Vehicle, runs: Sequence[Run]) -> tuple[Question, tuple
 
 def questions(believed: Vehicle, runs: Sequence[Run]) -> tuple[Question, ...]:
     """Everything that is asked, the cheapest first."""
-    share, recorded = recorded_share(runs, believed), recorded_hover(runs, believed)
+    share, recorded = recorded_share(runs, believed), _recorded_hover(runs, believed)
     return (
         no_body,
         lambda vehicle: cannot_hover(vehicle, share),
-        lambda vehicle: off_as_recorded(vehicle, recorded),
+        lambda vehicle: _off_as_recorded(vehicle, recorded),
         cannot_fly,
     )
 
@@ -77,7 +94,7 @@ def cannot_hover(vehicle: Vehicle, recorded_share: float) -> str:
     if most is None:
         return ""
     weight = vehicle.mass_kg * vehicle.gravity_m_s2
-    allowed = max(MOST_HOVER_SHARE, recorded_share)
+    allowed = max(_MOST_HOVER_SHARE, recorded_share)
     if weight <= allowed * most:
         return ""
     return (
@@ -86,7 +103,7 @@ def cannot_hover(vehicle: Vehicle, recorded_share: float) -> str:
 
 
 @dataclass(frozen=True)
-class RecordedHover:
+class _RecordedHover:
     """What was recorded in the air, medians over time."""
 
     speed_rad_s: np.ndarray
@@ -96,7 +113,7 @@ class RecordedHover:
     """Upward."""
 
 
-def recorded_hover(runs: Sequence[Run], vehicle: Vehicle) -> RecordedHover | None:
+def _recorded_hover(runs: Sequence[Run], vehicle: Vehicle) -> _RecordedHover | None:
     """Rotor speeds in the air and the specific force that went with them; None where the runs do not have both."""
     limits, force = vehicle.rotor_speed_limits_rad_s, c.SPECIFIC_FORCE[2]
     for group in ("rotor_speed", "rotor_command", "throttle"):
@@ -106,22 +123,22 @@ def recorded_hover(runs: Sequence[Run], vehicle: Vehicle) -> RecordedHover | Non
             table = np.concatenate(own)
             table[:, :-1] *= limits[1] if group == "throttle" else 1.0
             square = (table[:, :-1] ** 2).mean(axis=1)
-            flying = table[square > LIGHT * np.nanquantile(square, 0.99)]
+            flying = table[square > _LIGHT * np.nanquantile(square, 0.99)]
             if len(flying):
                 middle = np.nanmedian(flying, axis=0)
-                return RecordedHover(middle[:-1], group == "rotor_speed", -float(middle[-1]))
+                return _RecordedHover(middle[:-1], group == "rotor_speed", -float(middle[-1]))
     return None
 
 
-def off_as_recorded(vehicle: Vehicle, recorded: RecordedHover | None) -> str:
+def _off_as_recorded(vehicle: Vehicle, recorded: _RecordedHover | None) -> str:
     """Why its force at the recorded rotor speeds is not the one that was felt; empty where it is."""
     if recorded is None or recorded.specific_force_m_s2 <= 0:
         return ""
     flown = flyable(vehicle)[0]
     path = None if recorded.measured else command_path(flown)
-    up = wrench_of_command(flown, path, recorded.speed_rad_s, HIGH_ABOVE_GROUND_M)[0]
+    up = wrench_of_command(flown, path, recorded.speed_rad_s, _HIGH_ABOVE_GROUND_M)[0]
     share = float(up) / (vehicle.mass_kg * recorded.specific_force_m_s2)
-    if CARRIES[0] <= share <= CARRIES[1]:
+    if _CARRIES[0] <= share <= _CARRIES[1]:
         return ""
     return f"at the rotor speeds that were recorded it makes {share:.2g} times the upward force that was felt"
 
@@ -135,9 +152,9 @@ def full_thrust_n(vehicle: Vehicle) -> float | None:
     if vehicle.rotor_speed_limits_rad_s is None:
         return None
     flown = flyable(vehicle)[0]
-    asked = np.array([BEYOND_ALL * vehicle.mass_kg * vehicle.gravity_m_s2, 0.0, 0.0, 0.0])
+    asked = np.array([_BEYOND_ALL * vehicle.mass_kg * vehicle.gravity_m_s2, 0.0, 0.0, 0.0])
     try:
-        return float(wrench_at_rest(flown, command_path(flown), asked, HIGH_ABOVE_GROUND_M)[0])
+        return float(wrench_at_rest(flown, command_path(flown), asked, _HIGH_ABOVE_GROUND_M)[0])
     except InputError:
         return None
 
@@ -169,7 +186,7 @@ def recorded_share(runs: Sequence[Run], vehicle: Vehicle) -> float:
         if tables:
             table = np.concatenate(tables)
             share = np.mean((scale * table[np.isfinite(table).all(axis=1)] / limits[1]) ** 2, axis=1)
-            flying = share[share > LIGHT * share.max(initial=0.0)]
+            flying = share[share > _LIGHT * share.max(initial=0.0)]
             return float(np.median(flying)) if len(flying) else 0.0
     return 0.0
 
@@ -187,3 +204,67 @@ def exports_lost(vehicle: Vehicle, believed: Vehicle) -> tuple[str, ...]:
         except InputError as error:
             out.append(f"The improved vehicle cannot be exported as {form}: {error}.")
     return tuple(out)
+
+
+def with_only(found: Fitted, ids: Collection[str], values: Values) -> Fitted:
+    """What was fitted with the effects `ids` and the wrong `values` alone; terms without a name stay.
+
+    Rows are built anew where what goes lies between command and speed, or is air that moves.
+    """
+    model, chain = found.model, found.chain
+    active = [k for k in model.selection.active if model.search.terms[k].effect in {*ids, *UNKNOWNS}]
+    gone = sorted(chain_ids(found) - set(ids))
+    for key in gone:
+        chain = chain_without(replace(found, chain=chain), key)
+    still = model.wind is not None and moving_air("all the time").id not in ids
+    calm = bool(model.gusts) and moving_air("in windows").id not in ids
+    if (gone and found.commanded) or still or calm:
+        segments, noisy = model.segments, model.noisy_segments
+        if gone and found.commanded:
+            cutoff = model.prepared.thinner.cutoff_hz
+            segments, noisy = (path_segments(s, *chain, cutoff) for s in (segments, noisy))
+        steady = None if model.wind is None else np.array([*model.wind, 0.0])
+        if calm:
+            segments, noisy = ([_in_air(s, steady) for s in own] for own in (segments, noisy))
+        if still:
+            segments, noisy = ([_in_air(s, without_wind(s, model.wind)) for s in own] for own in (segments, noisy))
+        own = {"wind": None if still else model.wind, "gusts": () if calm else model.gusts}
+        model = _rebuilt(replace(model, **own), segments, noisy, active)
+    fit = model.regression.fit([t.key for t in model.regression.terms if t.kind != "effect"] + active, jackknife=True)
+    model = replace(model, selection=replace(model.selection, active=active, fit=fit))
+    return replace(found, model=model, chain=chain, values=values)
+
+
+def _in_air(segment: Segment, wind: np.ndarray | None) -> Segment:
+    """A stretch in air that moves by `wind` (3,) or (n, 3), m/s, world axes; still for None."""
+    return replace(segment, motion=replace(segment.motion, wind=wind))
+
+
+def _rebuilt(
+    model: WrenchModel, segments: Sequence[Segment], noisy: Sequence[Segment], active: Sequence[str]
+) -> WrenchModel:
+    """A model's rows and regression on changed stretches, with its own noise and terms; nothing is searched."""
+    prepared, old = model.prepared, model.regression
+    kinds = {"effect"} if model.gusts else {"effect", "wind"}
+    terms = [t for t in old.terms if t.kind not in kinds or t.key in active]
+    rows = assemble_rows(prepared, terms, list(segments), model.effects)
+    again = assemble_rows(prepared, terms, list(noisy), model.effects) if noisy else None
+    rate = prepared.thinner.rate_hz
+    rule = training_rule(prepared.split, list(segments))
+    block_s, alone = block_seconds(rows, rate), compared_alone(terms, rows)
+    regression = build(rows, terms, old.filters, rule, block_s, rate, again, *alone)
+    return replace(
+        model,
+        terms=terms,
+        rows=rows,
+        regression=regression,
+        segments=list(segments),
+        noisy_segments=list(noisy),
+        contributions=Contributions(rows, again, rate),
+        selection=Selection(list(active), model.selection.fit),
+    )
+
+
+def chain_ids(found: Fitted) -> set[str]:
+    """Ids of the effects between command and rotor speed."""
+    return set() if found.chain is None else {key for key, _ in found.chain.result.fit.chain}

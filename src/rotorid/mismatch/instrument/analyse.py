@@ -2,11 +2,15 @@
 
 1. mistakes in the set, 2. what lies between command and rotor speed, 3. the grouped search over everything that acts
 on the load or on its reading, with the believed values free, 4. nonlinear parameters refined, 5. a word on each id.
+
+The runs held out of a stand or bench, opened once: what a model that was chosen without them makes of them.
+
+From the selected terms of an instrument to a word on each id.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,15 +19,14 @@ from rotorid.effects.catalogue import before_the_rotors, ids_of, ids_of_stage
 from rotorid.effects.contract import CURVE, SUPPLY
 from rotorid.effects.loading import CHANNELS, NO_ROTORS, UNITS, Loading
 from rotorid.mismatch.decision import rules
-from rotorid.mismatch.decision.decide import throttle_or_thrust, wrong_values
+from rotorid.mismatch.decision.decide import TermReport, estimates, findings_of, throttle_or_thrust, wrong_values
 from rotorid.mismatch.decision.evidence import weighed
-from rotorid.mismatch.decision.findings import Analysis, Finding, Trace
-from rotorid.mismatch.decision.probability import with_probabilities
+from rotorid.mismatch.decision.findings import Analysis, Finding, Trace, with_probabilities
 from rotorid.mismatch.decision.select import Selection
 from rotorid.mismatch.delivery.candidates import Candidate
+from rotorid.mismatch.delivery.files import claimed
 from rotorid.mismatch.delivery.final import Offered, Stretches, as_delivered
-from rotorid.mismatch.delivery.parts import claimed
-from rotorid.mismatch.instrument.approximate import needless_values
+from rotorid.mismatch.instrument.approximate import curved_gains, needless_values
 from rotorid.mismatch.instrument.chain import (
     ChainResult,
     find_chain,
@@ -32,16 +35,20 @@ from rotorid.mismatch.instrument.chain import (
     supply_reason,
     without_id,
 )
-from rotorid.mismatch.instrument.columns import VALUE_NAMES, make_terms
-from rotorid.mismatch.instrument.curved_gain import curved_gains
-from rotorid.mismatch.instrument.decide import reading_findings, with_plainer_forms
+from rotorid.mismatch.instrument.columns import VALUE_NAMES, make_terms, rows_of
 from rotorid.mismatch.instrument.mistakes import find_mistakes
-from rotorid.mismatch.instrument.model import ReadingModel, active_values, chosen_already, fitted_model
+from rotorid.mismatch.instrument.model import (
+    ReadingModel,
+    active_values,
+    chosen_already,
+    fitted_model,
+    nonlinear_deviation,
+    whole_reading,
+)
 from rotorid.mismatch.instrument.remainder import dependence, leftover, regimes
-from rotorid.mismatch.instrument.report_runs import on_every_run
 from rotorid.mismatch.instrument.sampling import quantisation
-from rotorid.mismatch.instrument.setup import Setup, set_up
-from rotorid.mismatch.model.absorbed import absorbed_findings
+from rotorid.mismatch.instrument.setup import Setup, set_up, with_unseen
+from rotorid.mismatch.model.absent import absorbed_findings
 from rotorid.mismatch.model.delivered import Values, residuals_of
 from rotorid.mismatch.model.fitted import TAKEN_UP
 from rotorid.mismatch.model.leave_one_out import first_s, on_traces
@@ -49,19 +56,22 @@ from rotorid.mismatch.model.next_flight import next_flight
 from rotorid.mismatch.model.values import changed_vehicle, contract_values, stated_of_commands
 from rotorid.mismatch.model.within_trust import in_words, settled
 from rotorid.mismatch.plant.regression import Fit
-from rotorid.mismatch.plant.rows import Term
+from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.mismatch.plant.split import parts_of, split_runs
 from rotorid.mismatch.plant.unknowns import UNKNOWNS
-from rotorid.mismatch.posterior.status import CLAIMED
+from rotorid.mismatch.posterior.status import CLAIMED, Estimate
 from rotorid.recordings import RecordingSet, Vehicle
 from rotorid.steps import step
 
-LOST_SHARE = 0.15
+_SHOWS = 0.33
+"""A channel counts where the contribution is at least this share of its strongest, in units of the noise."""
+_REACH = 1.96
+_LOST_SHARE = 0.15
 """Share of the rotor speeds' mismatch left on the runs held out from which it is said to be unexplained."""
-SPEED_LEFT = "what was found between command and rotor speed does not carry over to the runs held out"
+_SPEED_LEFT = "what was found between command and rotor speed does not carry over to the runs held out"
 
 
-def same_curve(chain: ChainResult) -> dict[str, str]:
+def _same_curve(chain: ChainResult) -> dict[str, str]:
     """Ids that given a curve of the throttle only say again what it leaves, where speeds are known from it alone."""
     if not any(f.id in ids_of_stage(CURVE) and f.status in CLAIMED for f in chain.findings):
         return {}
@@ -97,7 +107,7 @@ def first_model(setup: Setup, terms: list[Term]) -> tuple[ReadingModel, ChainRes
         others = [(model.search.terms[k].form, active_values(model, k)) for k in model.selection.active]
         chain = find_chain(setup, others)
         loadings = moved(setup, chain)
-        refused = same_curve(chain)
+        refused = _same_curve(chain)
         active = [k for k in model.selection.active if model.search.terms[k].effect not in refused]
         model = fitted_model(setup, terms, active, loadings, refused)
     return model, chain, loadings
@@ -153,17 +163,17 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     findings = with_probabilities(findings, chosen_already(model))
     fit, moved_values = settled(model, values, model.selection.active)
     to_state = values if measured else stated_of_commands(findings, values)
-    choice = Choice(setup, model, chain, measured, values, to_state, tuple(findings), reasons, tuple(remarks))
+    choice = _Choice(setup, model, chain, measured, values, to_state, tuple(findings), reasons, tuple(remarks))
 
     # The last decision is made: the runs held out are opened.
     seen = on_every_run(model, chain, unseen)
     refitted, moved_plain = settled(model, plain, [])
     first = account(choice, recordings, seen, fit, moved_values, refitted, {**moved_plain, **plain})
-    return as_delivered(offered(choice, weighed(first), seen, plain, moved_values, moved_plain))
+    return as_delivered(_offered(choice, weighed(first), seen, plain, moved_values, moved_plain))
 
 
 @dataclass(frozen=True)
-class Choice:
+class _Choice:
     """What was chosen on the fitted runs alone."""
 
     setup: Setup
@@ -186,7 +196,7 @@ class Choice:
 
 
 def account(
-    choice: Choice,
+    choice: _Choice,
     recordings: RecordingSet,
     seen: ReadingModel,
     fit: Fit,
@@ -202,15 +212,15 @@ def account(
     setup, model, chain, findings = choice.setup, choice.model, choice.chain, choice.findings
     # The most significant class first.
     step = next_flight(sorted(findings, key=lambda f: f.p_value), recordings)
-    traces, before, after = make_traces(seen, refitted, fit)
+    traces, before, after = _make_traces(seen, refitted, fit)
     p_before, p_after, depends = dependence(seen, before, after)
     channels, description = leftover(seen, after, p_after, depends)
     if chain is not None and choice.measured:
         traces += speed_traces(seen.setup, chain)
-        if speed_left(seen.setup, chain, traces) > LOST_SHARE:
+        if _speed_left(seen.setup, chain, traces) > _LOST_SHARE:
             channels = (*channels, *(f"rotor_speed_{i + 1}" for i in range(setup.vehicle.rotor_count)))
             depends = [*depends, "battery_voltage_v"] if supply_reason(setup) else depends
-            description = "; ".join([*([description] if description else []), SPEED_LEFT])
+            description = "; ".join([*([description] if description else []), _SPEED_LEFT])
     claimed_ids = {f.id for f in findings if f.status in CLAIMED}
     own_chain = chain if choice.measured else None
     return Analysis(
@@ -221,10 +231,10 @@ def account(
         improved=choice.vehicle({**moved_values, **choice.values}),
         named=choice.vehicle({**moved_values, **choice.values}),
         findings=findings,
-        values=contract_values(setup.vehicle, choice.stated, VALUE_NAMES) | full_speed_value(setup, chain),
+        values=contract_values(setup.vehicle, choice.stated, VALUE_NAMES) | _full_speed_value(setup, chain),
         not_testable={k: v for k, v in choice.reasons.items() if k not in claimed_ids},
         traces=traces,
-        noise_floor=noise_floors(setup, model, chain),
+        noise_floor=_noise_floors(setup, model, chain),
         p_values={c: (p_before[c], p_after[c]) for c in p_before},
         regimes=regimes(seen),
         unexplained_channels=channels,
@@ -236,14 +246,14 @@ def account(
         samples_per_row=setup.average,
         instrument=setup.instrument,
         loadings=seen.loadings,
-        notes=(*choice.remarks, *notes_of(setup)),
+        notes=(*choice.remarks, *_notes_of(setup)),
         corrected=in_words(moved_values, VALUE_NAMES),
         without=without_each(model, seen, choice.values, own_chain, list(findings), traces),
     )
 
 
-def offered(
-    choice: Choice, words: Analysis, seen: ReadingModel, plain: Values, moved: Values, plain_moved: Values
+def _offered(
+    choice: _Choice, words: Analysis, seen: ReadingModel, plain: Values, moved: Values, plain_moved: Values
 ) -> Offered:
     """What a choice offers for delivery: what is claimed, fitted without effects that are only suggested.
 
@@ -253,7 +263,7 @@ def offered(
     model, chain = choice.model, choice.chain
     ids = {f.id for f in claimed(words.findings)}
     active = [k for k in model.selection.active if model.search.terms[k].effect in {*ids, *UNKNOWNS}]
-    fewer = with_terms(model, active)
+    fewer = _with_terms(model, active)
     gone = [k for k, _ in chain.fit.chain if k not in ids] if chain is not None and choice.measured else []
 
     def again(named: Candidate, refitted: Candidate, findings: tuple[Finding, ...]) -> tuple[Analysis, Stretches]:
@@ -284,7 +294,7 @@ def offered(
     )
 
 
-def with_terms(model: ReadingModel, active: Sequence[str]) -> ReadingModel:
+def _with_terms(model: ReadingModel, active: Sequence[str]) -> ReadingModel:
     """A model with some of its terms alone at work, fitted anew."""
     always = [t.key for t in model.regression.terms if t.kind != "effect"]
     fit = model.regression.fit([*always, *active], jackknife=True)
@@ -312,7 +322,7 @@ def without_each(
     return out
 
 
-def speed_left(setup: Setup, chain: ChainResult, traces: tuple[Trace, ...]) -> float:
+def _speed_left(setup: Setup, chain: ChainResult, traces: tuple[Trace, ...]) -> float:
     """Share of the rotor speeds' mismatch that is left on the held-out runs, beyond the noise; 0 without such runs."""
     own = [t for t in traces if t.channel.startswith("rotor_speed") and t.run in setup.split.held_out]
     if not own or not chain.findings or set(setup.split.held_out) & set(setup.split.training):
@@ -322,7 +332,7 @@ def speed_left(setup: Setup, chain: ChainResult, traces: tuple[Trace, ...]) -> f
     return float(np.clip((left - floor) / max(start - floor, 1e-9), 0.0, 1.0)) if left > floor else 0.0
 
 
-def full_speed_value(setup: Setup, chain: ChainResult | None) -> dict[str, tuple[float, float, float, float]]:
+def _full_speed_value(setup: Setup, chain: ChainResult | None) -> dict[str, tuple[float, float, float, float]]:
     """The speed at full throttle, nothing believed, where no limits are stated."""
     if chain is None or not setup.estimated_full_speed:
         return {}
@@ -330,7 +340,7 @@ def full_speed_value(setup: Setup, chain: ChainResult | None) -> dict[str, tuple
     return {"rotor_speed_limits_rad_s": (float("nan"), full, full - reach, full + reach)}
 
 
-def noise_floors(setup: Setup, model: ReadingModel, chain: ChainResult | None) -> dict[str, float]:
+def _noise_floors(setup: Setup, model: ReadingModel, chain: ChainResult | None) -> dict[str, float]:
     """Noise of each channel."""
     out = {CHANNELS[c]: float(model.noise[c]) for c in setup.instrument.channels}
     if chain is not None and chain.noise_rad_s is not None:
@@ -338,7 +348,7 @@ def noise_floors(setup: Setup, model: ReadingModel, chain: ChainResult | None) -
     return out
 
 
-def notes_of(setup: Setup) -> list[str]:
+def _notes_of(setup: Setup) -> list[str]:
     """What a reader must know of how the readings were used."""
     notes = []
     if setup.settling_s:
@@ -360,7 +370,7 @@ def improved(vehicle: Vehicle, values: dict[str, tuple[float, float]]) -> Vehicl
     return changed if gain == [1.0, 1.0, 1.0] else changed.model_copy(update={"reading_gain": tuple(gain)})
 
 
-def make_traces(model: ReadingModel, refitted: Fit, fit: Fit):
+def _make_traces(model: ReadingModel, refitted: Fit, fit: Fit):
     """Traces, and residuals (n, 6) of every part as believed, and with what is delivered."""
     before = [np.nan_to_num(r.y) for r in model.rows]
     again, after = ([np.nan_to_num(x) for x in residuals_of(model, f)] for f in (refitted, fit))
@@ -370,3 +380,77 @@ def make_traces(model: ReadingModel, refitted: Fit, fit: Fit):
         for c in model.setup.instrument.channels
     ]
     return tuple(traces), before, after
+
+
+def on_every_run(model: ReadingModel, chain: ChainResult | None, unseen: RecordingSet) -> ReadingModel:
+    """The model with the rows of every run: those fitted as they were, those held out by the same equations.
+
+    Where only commands are known, `chain` says how the rotors turn.
+    """
+    setup = with_unseen(model.setup, unseen)
+    own = setup.loadings[len(model.setup.loadings) :]
+    if chain is not None and not all(x.measured for x in setup.loadings):
+        own = moved(replace(setup, loadings=own), chain)
+    kept = [t for t in model.terms if t.kind != "effect" or t.key in model.selection.active]
+    cols, width = model.regression.columns([t.key for t in kept]), model.rows[0].x.shape[2]
+    rows = []
+    for part in rows_of(model.setup, kept, own, whole_reading(model.terms, model.selection.active)):
+        x = np.zeros((*part.y.shape, width))
+        x[:, :, cols] = part.x
+        rows.append(Rows(part.run, part.time_s, part.y, x))
+    return replace(model, setup=setup, loadings=(*model.loadings, *own), rows=[*model.rows, *rows])
+
+
+def reading_findings(model: ReadingModel) -> list[Finding]:
+    """Findings of the terms of a reading, each with the channels that it shows in, the strongest first."""
+    fit, search = model.selection.fit, model.search
+
+    def report_of(key: str) -> TermReport:
+        size = search.ask.sizes_of(key, fit.beta[fit.places(model.regression.columns([key]))])
+        order = np.argsort(-size)
+        channels = tuple(CHANNELS[c] for c in order if size[c] > _SHOWS * size[order[0]])
+        others = search.alternatives(key, model.selection.active)
+        return TermReport(active_values(model, key), parameters_of(model, key), channels, others)
+
+    return findings_of(search, model.selection, report_of)
+
+
+def parameters_of(model: ReadingModel, key: str) -> tuple[Estimate, ...]:
+    """Parameters of a term at work with 95 % intervals."""
+    term = model.search.terms[key]
+    if not term.form.nonlinear:
+        return estimates(model.regression, model.selection.fit, model.search, key)
+    values, sd = active_values(model, key), nonlinear_deviation(model, key)
+    return tuple(
+        Estimate(p.symbol, float(v), p.unit, float(v - _REACH * s), float(v + _REACH * s))
+        for p, v, s in zip(term.form.parameters, values, sd, strict=True)
+    )
+
+
+def with_plainer_forms(model: ReadingModel, again: Callable[[ReadingModel, list[Term]], ReadingModel]) -> ReadingModel:
+    """The model with a plainer form of the same id wherever all numbers of a form may be nothing.
+
+    A form of two time constants explains more than one of one and says nothing of either. `again(model, terms)`
+    searches once more from a model's terms at work with others to choose from.
+    """
+    for key in list(model.selection.active):
+        term = model.search.terms[key]
+        if term.effect in UNKNOWNS or key not in model.selection.active:
+            continue
+        if not any(len(t.form.parameters) < len(term.form.parameters) for t in _forms_beside(model, key)):
+            continue
+        if rules.PLAINER_FORM(all(p.low <= 0.0 <= p.high for p in parameters_of(model, key))):
+            others = [t for t in model.terms if t.kind != "effect" or t.effect != term.effect or _plainer(t, term)]
+            model = again(model, others)
+    return model
+
+
+def _forms_beside(model: ReadingModel, key: str) -> list[Term]:
+    """Terms of the same id."""
+    effect = model.search.terms[key].effect
+    return [t for t in model.terms if t.kind == "effect" and t.effect == effect and t.key != key]
+
+
+def _plainer(one: Term, than: Term) -> bool:
+    """Whether a term's form has fewer parameters than another's."""
+    return len(one.form.parameters) < len(than.form.parameters)

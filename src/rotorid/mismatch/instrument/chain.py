@@ -27,30 +27,30 @@ from rotorid.mismatch.plant.speedpath import COST_PER_PARAMETER, ENTER_P, SMALLE
 from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings.signal.kernels import causal
 
-MOST_SAMPLES = 12_000
+_MOST_SAMPLES = 12_000
 RATE_HZ = 30.0
 """Rate at which wrenches are compared where no speed is measured."""
-MOST_STEPS, QUICK_FIT = 30, 6
+_MOST_STEPS, _QUICK_FIT = 30, 6
 """Evaluations of the Jacobian at most: of a fit, and of one that is to say whether another is worth it."""
-MOST = 4
+_MOST = 4
 """Forms of a chain, forms that are fitted to the end before the next one enters, and starts of each, at most."""
-MOST_DOUBT = 3.0
+_MOST_DOUBT = 3.0
 """Standard deviations by which a command may differ from the curve through its samples."""
-SUB_SAMPLE = 1.2
+_SUB_SAMPLE = 1.2
 """Offsets in time up to so many samples are a nuisance."""
-LEAST_SPAN = 0.02
+_LEAST_SPAN = 0.02
 """Relative span of the voltage below which its effect cannot be tested."""
-REMEMBERED = 24
+_REMEMBERED = 24
 """Speeds of each stretch that are remembered: those of one Jacobian."""
 BLOCK_S = 1.0
-LEAST_BLOCKS = 12
-MOST_BLOCKS = 400
-STEADY_BLOCKS = 40
-FINER = 4
+_LEAST_BLOCKS = 12
+_MOST_BLOCKS = 400
+_STEADY_BLOCKS = 40
+_FINER = 4
 """Steps of a chain that takes time to one sample."""
-FAR = 0.05
+_FAR = 0.05
 """Share of a cost by which a fit is still above it after a few steps when it will not come down to it."""
-ALIKE = rules.ELSEWHERE["squares"]
+_ALIKE = rules.ELSEWHERE["squares"]
 """Whitened squares within which another form explains as well."""
 
 
@@ -58,7 +58,7 @@ Chain = tuple[tuple[str, SpeedForm], ...]
 
 
 @dataclass(frozen=True)
-class ChainFit:
+class _ChainFit:
     """A fitted chain: full speed first where it is free, the parameters of every form, `unknown_courses` last."""
 
     chain: Chain
@@ -95,7 +95,7 @@ class ChainFit:
 class ChainResult:
     """What was found between command and speed."""
 
-    fit: ChainFit
+    fit: _ChainFit
     full_speed: float
     full_speed_sd: float
     findings: list[Finding] = field(default_factory=list)
@@ -104,7 +104,7 @@ class ChainResult:
     """Whether commands stand until their next sample."""
 
 
-def takes_time(chain: Chain) -> bool:
+def _takes_time(chain: Chain) -> bool:
     return any(form.excited_by == "change" for _, form in chain)
 
 
@@ -115,7 +115,7 @@ def unknown_courses(chain: Chain, dt_s: float) -> np.ndarray:
     samples (s²). A command that holds is late by half a sample and spread by dt²/12, a straight line across a kink is
     off by as much at most. A delay in the chain is the first moment already.
     """
-    if not takes_time(chain):
+    if not _takes_time(chain):
         return np.zeros(0)
     spread = dt_s**2 / 12.0
     late = any(form.stage == DELAY for _, form in chain)
@@ -138,7 +138,7 @@ def moved_between_samples(speed: np.ndarray, moments: np.ndarray, dt_s: float, f
 
 
 @dataclass(frozen=True)
-class Commanded:
+class _Commanded:
     """What a chain starts from, on the clock of the chain: a stretch's commands, voltage, V, and time.
 
     Rotors commanded alike turn alike: of each such command (n, u), rad/s, there is one, and of each rotor which.
@@ -150,12 +150,12 @@ class Commanded:
     voltage: np.ndarray | None
 
 
-def commanded(loading: Loading, finer: int, holds: bool) -> Commanded:
+def commanded(loading: Loading, finer: int, holds: bool) -> _Commanded:
     """A stretch's command on a clock `finer` times faster: between samples it is smooth, or `holds` until the next."""
     command, which = np.unique(loading.command, axis=1, return_inverse=True)
     command = held(command, finer) if holds else between(command, finer)
     voltage = None if loading.motion.voltage is None else between(loading.motion.voltage, finer)
-    return Commanded(command, which.ravel(), between(loading.time_s, finer), voltage)
+    return _Commanded(command, which.ravel(), between(loading.time_s, finer), voltage)
 
 
 def held(values: np.ndarray, finer: int) -> np.ndarray:
@@ -192,7 +192,7 @@ class Problem:
         self.scaled = setup.estimated_full_speed
         self.volts = setup.full_voltage
         self.measured = all(x.measured for x in setup.loadings)
-        self.fitted = thinned(list(setup.loadings))
+        self.fitted = _thinned(list(setup.loadings))
         self.others = list(others or [])
         # A lag of some hundredths of a second must still show: few stretches at a fine rate rather than all coarse.
         finest = max(1, int(setup.instrument.rate_hz / RATE_HZ))
@@ -204,10 +204,10 @@ class Problem:
         self.taps: list[np.ndarray] = []
         if not self.measured:
             self.leave_to_rotors()
-        self._starts: dict[tuple[int, int, bool], Commanded] = {}
+        self._starts: dict[tuple[int, int, bool], _Commanded] = {}
         self._made: dict[tuple, np.ndarray] = {}
 
-    def start_of(self, loading: Loading, finer: int) -> Commanded:
+    def start_of(self, loading: Loading, finer: int) -> _Commanded:
         """What a chain starts from on a stretch of the setup; remembered, for it is the same in every evaluation."""
         key = (id(loading), finer, self.holds)
         if key not in self._starts:
@@ -230,7 +230,7 @@ class Problem:
             # A curve may have no real value far from its truth; a rotor at rest is the honest limit.
             with np.errstate(invalid="ignore"):
                 speed = form.apply(path, np.array(values[own:]))
-            if len(self._made) > REMEMBERED * len(self.fitted):
+            if len(self._made) > _REMEMBERED * len(self.fitted):
                 del self._made[next(iter(self._made))]
             self._made[key] = speed if np.isfinite(speed).all() else np.nan_to_num(speed)
         return self._made[key]
@@ -240,7 +240,7 @@ class Problem:
 
         `values` are those of the forms, then what `unknown_courses` names.
         """
-        finer = FINER if takes_time(chain) else 1
+        finer = _FINER if _takes_time(chain) else 1
         own = sum(len(form.parameters) for _, form in chain)
         speed = self.made(loading, chain, tuple(float(v) for v in values[:own]), finer)
         speed = moved_between_samples(speed, np.asarray(values[own:]), loading.dt_s, finer)
@@ -320,18 +320,18 @@ class Problem:
         for _, form in chain:
             # Rotors do not turn before their command: a wrench that is early beyond a sample is on another clock.
             delays = form.stage == DELAY and not self.measured
-            early = -SUB_SAMPLE / self.setup.instrument.rate_hz if delays else -np.inf
+            early = -_SUB_SAMPLE / self.setup.instrument.rate_hz if delays else -np.inf
             low += [max(p.low, early) for p in form.parameters]
             high += [p.high for p in form.parameters]
-        reach = MOST_DOUBT * self.unknown(chain)
+        reach = _MOST_DOUBT * self.unknown(chain)
         return np.array([*low, *-reach]), np.array([*high, *reach])
 
-    def fit(self, chain: Chain, start: np.ndarray, most: int = MOST_STEPS) -> ChainFit:
+    def fit(self, chain: Chain, start: np.ndarray, most: int = _MOST_STEPS) -> _ChainFit:
         """Nonlinear least squares from a start, `most` evaluations of the Jacobian at most."""
         low, high = self.bounds(chain)
         if not len(start):
             w = self.white(chain, start)
-            return ChainFit(chain, start, float(w @ w), self.scaled)
+            return _ChainFit(chain, start, float(w @ w), self.scaled)
         span = np.where(np.isfinite(high - low), high - low, np.maximum(np.abs(start), 1.0))
         start = np.clip(start, low + 1e-9 * span, high - 1e-9 * span)
         unknown = self.unknown(chain)
@@ -345,22 +345,22 @@ class Problem:
             diff_step=1e-4,
             max_nfev=most,
         )
-        return ChainFit(chain, found.x, float(2 * found.cost), self.scaled)
+        return _ChainFit(chain, found.x, float(2 * found.cost), self.scaled)
 
-    def fit_to(self, chain: Chain, start: np.ndarray, cost: float) -> ChainFit:
+    def fit_to(self, chain: Chain, start: np.ndarray, cost: float) -> _ChainFit:
         """As `fit`, but left where a cost is reached, or where it would not be at the pace of the last few steps."""
-        fit = self.fit(chain, start, QUICK_FIT)
-        if fit.cost > (1 + FAR) * cost:
+        fit = self.fit(chain, start, _QUICK_FIT)
+        if fit.cost > (1 + _FAR) * cost:
             return fit
-        for more in reversed(range(MOST_STEPS // QUICK_FIT)):
+        for more in reversed(range(_MOST_STEPS // _QUICK_FIT)):
             if fit.cost < cost:
                 break
-            before, fit = fit, self.fit(chain, fit.theta, QUICK_FIT)
+            before, fit = fit, self.fit(chain, fit.theta, _QUICK_FIT)
             if fit.cost - more * (before.cost - fit.cost) >= cost:
                 break
         return fit
 
-    def covariance(self, fit: ChainFit) -> tuple[np.ndarray, int]:
+    def covariance(self, fit: _ChainFit) -> tuple[np.ndarray, int]:
         """Block-robust covariance of the parameters, and the number of blocks."""
         base = self.white(fit.chain, fit.theta)
         low, high = self.bounds(fit.chain)
@@ -389,26 +389,26 @@ class Problem:
             return np.array_split(np.arange(size), max(size // width, 2))
         rate = self.setup.instrument.rate_hz / self.average
         per = max(int(BLOCK_S * rate), 2) * width
-        most = STEADY_BLOCKS if self.plain else MOST_BLOCKS
-        count = max(min(size // per, most), min(LEAST_BLOCKS, size // (2 * width)), 2)
+        most = _STEADY_BLOCKS if self.plain else _MOST_BLOCKS
+        count = max(min(size // per, most), min(_LEAST_BLOCKS, size // (2 * width)), 2)
         return [b for b in np.array_split(np.arange(size), count) if len(b)]
 
 
 def supply_reason(setup: Setup) -> str | None:
     """Why the sag of the battery cannot be tested on the runs that are fitted; None if it can."""
-    known = [x.motion.voltage for x in thinned(list(setup.loadings)) if x.motion.voltage is not None]
+    known = [x.motion.voltage for x in _thinned(list(setup.loadings)) if x.motion.voltage is not None]
     # The lowest and highest hundredth of the samples left out.
     volts = np.concatenate(known) if known else np.ones(1)
     volts = volts[(volts >= np.quantile(volts, 0.01)) & (volts <= np.quantile(volts, 0.99))]
-    if not known or np.ptp(volts) >= LEAST_SPAN * volts.mean():
+    if not known or np.ptp(volts) >= _LEAST_SPAN * volts.mean():
         return None
     return f"the supply voltage hardly varies in the runs that are fitted ({volts.min():.1f} to {volts.max():.1f} V)"
 
 
-def thinned(loadings: list[Loading]) -> list[Loading]:
+def _thinned(loadings: list[Loading]) -> list[Loading]:
     """Stretches spread over the runs with MOST_SAMPLES at most."""
     total = sum(x.size for x in loadings)
-    step = max(1, int(np.ceil(total / MOST_SAMPLES)))
+    step = max(1, int(np.ceil(total / _MOST_SAMPLES)))
     return loadings[::step] if len(loadings) >= 4 * step else loadings
 
 
@@ -435,21 +435,21 @@ def starts(form: SpeedForm) -> list[np.ndarray]:
     options = [neutral + 0.01 * np.array([min(p.high - p.low, 1.0) for p in form.parameters])]
     for values in zip(*[p.starts or (n,) for p, n in zip(form.parameters, neutral, strict=True)], strict=False):
         options.append(np.array(values, float))
-    return options[:MOST]
+    return options[:_MOST]
 
 
-def ordered(chain: Chain) -> Chain:
+def _ordered(chain: Chain) -> Chain:
     return tuple(sorted(chain, key=lambda pair: pair[1].stage))
 
 
-def start_of(problem: Problem, chain: Chain, fit: ChainFit, new: str = "", values=()) -> np.ndarray:
+def start_of(problem: Problem, chain: Chain, fit: _ChainFit, new: str = "", values=()) -> np.ndarray:
     """Start of a chain from the fit of another that may lack one form, nothing having happened between its samples."""
     known = {key: fit.theta[fit.place(key)] for key, _ in fit.chain}
     theta = [values if key == new else known.get(key, form.neutral) for key, form in chain]
     return np.concatenate([fit.full, *theta, np.zeros(len(problem.unknown(chain)))])
 
 
-def start_with(problem: Problem, chain: Chain, fit: ChainFit, new: tuple[str, SpeedForm]) -> np.ndarray:
+def _start_with(problem: Problem, chain: Chain, fit: _ChainFit, new: tuple[str, SpeedForm]) -> np.ndarray:
     """Start of a chain with a new form from what is known of the others: of the form's starts that explains most."""
     options = [start_of(problem, chain, fit, new[0], v) for v in starts(new[1])]
     return min(options, key=lambda theta: float(np.sum(problem.white(chain, theta) ** 2)))
@@ -467,12 +467,12 @@ def find_chain(setup: Setup, others: list | None = None) -> ChainResult | None:
     problem.learn((), problem.neutral(), coloured=False)
     best = problem.fit((), problem.neutral())
     dropped: dict[str, str] = {}
-    best = richer(problem, holding_or_not(problem, grown(problem, best, forms, dropped)))
-    best = pruned(problem, best, dropped)
-    return worded(problem, without_mere_scale(problem, best, dropped), forms, dropped)
+    best = _richer(problem, _holding_or_not(problem, _grown(problem, best, forms, dropped)))
+    best = _pruned(problem, best, dropped)
+    return _worded(problem, _without_mere_scale(problem, best, dropped), forms, dropped)
 
 
-def without_mere_scale(problem: Problem, best: ChainFit, dropped: dict[str, str]) -> ChainFit:
+def _without_mere_scale(problem: Problem, best: _ChainFit, dropped: dict[str, str]) -> _ChainFit:
     """The chain without forms that only say what another thrust coefficient would.
 
     Where no speed is measured, speeds that are all a share higher than commanded are a thrust that is larger: a value
@@ -488,7 +488,7 @@ def without_mere_scale(problem: Problem, best: ChainFit, dropped: dict[str, str]
             rest = best.chain_without(key)
             fit = scaled.fit(rest, np.concatenate([[problem.first_full], start_of(problem, rest, best)]))
             if fit.cost < best.cost + COST_PER_PARAMETER * (len(form.parameters) - 1):
-                found = key, ChainFit(rest, fit.values, fit.cost, False)
+                found = key, _ChainFit(rest, fit.values, fit.cost, False)
         if found is None:
             return best
         dropped[found[0]] = "another thrust coefficient explains as much"
@@ -496,27 +496,27 @@ def without_mere_scale(problem: Problem, best: ChainFit, dropped: dict[str, str]
     return best
 
 
-def holding_or_not(problem: Problem, best: ChainFit) -> ChainFit:
+def _holding_or_not(problem: Problem, best: _ChainFit) -> _ChainFit:
     """The fit with commands that hold from sample to sample, or with smooth ones, whichever explains more.
 
     A chain that takes time sees the difference. Compared by sizes alone: whitened by its own residual, the poorer of
     the two would look as good. `problem` is left with the better one.
     """
-    if not takes_time(best.chain):
+    if not _takes_time(best.chain):
         return best
     problem.learn(best.chain, best.theta, coloured=False)
     own = problem.fit(best.chain, best.theta)
     problem.holds = not problem.holds
     other = problem.fit(best.chain, best.theta)
-    if other.cost > own.cost - ALIKE:
+    if other.cost > own.cost - _ALIKE:
         problem.holds = not problem.holds
         other = own
-    return richer(problem, other)
+    return _richer(problem, other)
 
 
-def grown(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> ChainFit:
+def _grown(problem: Problem, best: _ChainFit, forms, dropped: dict[str, str]) -> _ChainFit:
     """The chain with forms added one by one as long as they explain more; why others did not enter in `dropped`."""
-    for _ in range(MOST):
+    for _ in range(_MOST):
         # Whitening by the residual of the richest chain seen: by a poor one's, everything would look like noise.
         problem.learn(best.chain, best.theta, coloured=bool(best.chain))
         best = problem.fit(best.chain, best.theta)
@@ -524,16 +524,16 @@ def grown(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> C
         for pair in forms:
             if pair[0] in {k for k, _ in best.chain} or pair[0] in dropped:
                 continue
-            chain = ordered((*best.chain, pair))
-            fit = problem.fit(chain, start_with(problem, chain, best, pair), QUICK_FIT)
+            chain = _ordered((*best.chain, pair))
+            fit = problem.fit(chain, _start_with(problem, chain, best, pair), _QUICK_FIT)
             tried.append((best.cost - fit.cost - COST_PER_PARAMETER * len(pair[1].parameters), pair, fit))
         tried.sort(key=lambda t: -t[0])
         entered = False
-        for score, pair, fit in tried[:MOST]:
+        for score, pair, fit in tried[:_MOST]:
             if score <= 0:
                 break
             fit = problem.fit(fit.chain, fit.theta)
-            reason = weakness(problem, fit, best, pair)
+            reason = _weakness(problem, fit, best, pair)
             if reason is None:
                 best, entered = fit, True
                 break
@@ -543,9 +543,9 @@ def grown(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> C
     return best
 
 
-def weakness(problem: Problem, fit: ChainFit, without: ChainFit, pair) -> str | None:
+def _weakness(problem: Problem, fit: _ChainFit, without: _ChainFit, pair) -> str | None:
     """Why a form does not enter; None if it does."""
-    inner = richer(problem, fit)
+    inner = _richer(problem, fit)
     where = inner.place(pair[0])
     covariance, count = problem.covariance(inner)
     p = p_value(inner.theta[where] - np.array(pair[1].neutral), covariance[where, where], count)
@@ -559,7 +559,7 @@ def weakness(problem: Problem, fit: ChainFit, without: ChainFit, pair) -> str | 
     return None
 
 
-def pruned(problem: Problem, best: ChainFit, dropped: dict[str, str]) -> ChainFit:
+def _pruned(problem: Problem, best: _ChainFit, dropped: dict[str, str]) -> _ChainFit:
     """The chain without what is no longer significant given the forms that came after it."""
     while best.chain:
         covariance, count = problem.covariance(best)
@@ -574,7 +574,7 @@ def pruned(problem: Problem, best: ChainFit, dropped: dict[str, str]) -> ChainFi
         worst = max(doubtful, key=doubtful.get)
         dropped.setdefault(worst, f"p = {doubtful[worst]:.2g} given the others")
         kept = best.chain_without(worst)
-        best = richer(problem, replace(best, chain=kept, theta=start_of(problem, kept, best)))
+        best = _richer(problem, replace(best, chain=kept, theta=start_of(problem, kept, best)))
     return best
 
 
@@ -587,13 +587,13 @@ def p_value(offset: np.ndarray, covariance: np.ndarray, count: int) -> float:
     return float(f_distribution.sf(statistic * (count - q) / (q * (count - 1)), q, count - q))
 
 
-def richer(problem: Problem, fit: ChainFit) -> ChainFit:
+def _richer(problem: Problem, fit: _ChainFit) -> _ChainFit:
     """The fit once more, whitened by its own residual."""
     problem.learn(fit.chain, fit.theta)
     return problem.fit(fit.chain, fit.theta)
 
 
-def worded(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> ChainResult:
+def _worded(problem: Problem, best: _ChainFit, forms, dropped: dict[str, str]) -> ChainResult:
     """Findings of a chain with intervals, p-values and alternatives."""
     covariance, count = problem.covariance(best) if len(best.theta) else (np.zeros((0, 0)), 2)
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -605,7 +605,7 @@ def worded(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> 
     dt_s = 1.0 / setup.instrument.rate_hz
     for key, form in best.chain:
         where = best.place(key)
-        if form.stage == DELAY and abs(best.theta[where][0]) <= SUB_SAMPLE * dt_s:
+        if form.stage == DELAY and abs(best.theta[where][0]) <= _SUB_SAMPLE * dt_s:
             continue  # less than a sample: no finding
         values, deviation = best.theta[where], sd[where]
         p = p_value(values - np.array(form.neutral), covariance[where, where], count)
@@ -636,7 +636,7 @@ def worded(problem: Problem, best: ChainFit, forms, dropped: dict[str, str]) -> 
     return ChainResult(best, full, doubt, findings, noise, problem.holds)
 
 
-def alternatives(problem: Problem, best: ChainFit, key: str, forms) -> list[str]:
+def alternatives(problem: Problem, best: _ChainFit, key: str, forms) -> list[str]:
     """Ids that in a form's place explain as well."""
     out = []
     rest = best.chain_without(key)
@@ -645,15 +645,15 @@ def alternatives(problem: Problem, best: ChainFit, key: str, forms) -> list[str]
     for pair in forms:
         if pair[0] == key or pair[0] in taken or pair[0] in out or len(pair[1].parameters) > size + 1:
             continue
-        chain = ordered((*rest, pair))
-        if problem.fit_to(chain, start_with(problem, chain, best, pair), best.cost + ALIKE).cost < best.cost + ALIKE:
+        chain = _ordered((*rest, pair))
+        if problem.fit_to(chain, _start_with(problem, chain, best, pair), best.cost + _ALIKE).cost < best.cost + _ALIKE:
             out.append(pair[0])
     if not problem.measured:
-        out += reading_alternatives(problem, best, rest, key)
+        out += _reading_alternatives(problem, best, rest, key)
     return out
 
 
-def reading_alternatives(problem: Problem, best: ChainFit, rest: Chain, key: str) -> list[str]:
+def _reading_alternatives(problem: Problem, best: _ChainFit, rest: Chain, key: str) -> list[str]:
     """Effects of the reading that explain as well in a form's place, where no speed is measured."""
     out = sorted(ids_of("same_on_commands", key))
     known, low, high = start_of(problem, rest, best), *problem.bounds(rest)
@@ -674,7 +674,7 @@ def reading_alternatives(problem: Problem, best: ChainFit, rest: Chain, key: str
             diff_step=1e-4,
             max_nfev=15,
         )
-        return 2 * found.cost < best.cost + ALIKE
+        return 2 * found.cost < best.cost + _ALIKE
 
     for name in catalogue()[key].like_of_reading:
         forms = forms_of(catalogue()[name], problem.setup.instrument)

@@ -27,11 +27,11 @@ VALUE_NAMES = {
     "gain_y": "reading_gain_y",
     "gain_z": "reading_gain_z",
 }
-STILL = "the vehicle does not move on a stand"
+_STILL = "the vehicle does not move on a stand"
 OFFSET = "offset:load-reading"
-AtWork = Sequence[tuple[Form, np.ndarray]]
+_AtWork = Sequence[tuple[Form, np.ndarray]]
 """Forms with their parameter values."""
-DISPLACED = ("velocity", "angular_velocity", "angular_acceleration", "specific_force", "accelerometer", "gyroscope")
+_DISPLACED = ("velocity", "angular_velocity", "angular_acceleration", "specific_force", "accelerometer", "gyroscope")
 
 
 def value_keys(setup: Setup) -> list[str]:
@@ -84,15 +84,15 @@ def make_terms(setup: Setup) -> tuple[list[Term], dict[str, str]]:
             found += form_terms(effect.id, form)
         terms += found
         if not found and effect.id not in UNKNOWNS:
-            of_kind = NO_ROTORS if setup.instrument.bench else STILL
+            of_kind = NO_ROTORS if setup.instrument.bench else _STILL
             reasons[effect.id] = why or (of_kind if effect.lack_on is None else effect.lack_on(setup.instrument))
     return terms, reasons
 
 
 def lacks(form: Form, setup: Setup) -> str | None:
     """Why a form for a flight cannot be tested on this stand."""
-    if any(name in DISPLACED for name in form.requires):
-        return STILL
+    if any(name in _DISPLACED for name in form.requires):
+        return _STILL
     return next((r for x in setup.loadings if (r := not_testable_reason(form, x.motion, setup.vehicle))), None)
 
 
@@ -119,7 +119,7 @@ def value_column(key: str, loading: Loading, vehicle: Vehicle) -> np.ndarray:
     return rotor_wrench(loading.motion, still) - rotor_wrench(loading.motion, flat)
 
 
-def term_columns(term: Term, loading: Loading, vehicle: Vehicle, at_work: AtWork = ()) -> list[np.ndarray]:
+def _term_columns(term: Term, loading: Loading, vehicle: Vehicle, at_work: _AtWork = ()) -> list[np.ndarray]:
     """Columns of a term, (n, 6) each; the offset in time moves the load with what is `at_work` on its reading."""
     if term.kind == "value":
         return [value_column(term.key, loading, vehicle)]
@@ -144,7 +144,7 @@ def term_columns(term: Term, loading: Loading, vehicle: Vehicle, at_work: AtWork
     return columns
 
 
-def rows_of(setup: Setup, terms: list[Term], loadings=None, at_work: AtWork = ()) -> list[Rows]:
+def rows_of(setup: Setup, terms: list[Term], loadings=None, at_work: _AtWork = ()) -> list[Rows]:
     """Rows of every stretch's parts, averaged; a channel that is not compared is NaN in y and zero in x.
 
     `at_work` are the effects known so far: what a reading's clock is off moves their part of it as well.
@@ -161,7 +161,7 @@ def rows_of(setup: Setup, terms: list[Term], loadings=None, at_work: AtWork = ()
         x = np.zeros((len(small), 6, sum(t.size for t in terms)))
         at = 0
         for term in terms:
-            for column in term_columns(term, loading, setup.vehicle, at_work):
+            for column in _term_columns(term, loading, setup.vehicle, at_work):
                 x[:, channels, at] = averaged(column[:, channels], setup.average)
                 at += 1
         out += [Rows(loading.run, times[p], small[p], x[p]) for p in pieces]

@@ -19,22 +19,22 @@ from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import RecordingSet, Run
 from rotorid.recordings import columns as c
 
-CERTAIN = 0.9
+_CERTAIN = 0.9
 """Correlation of reading and load, in size, from which a slope means something."""
-FLIPPED = -0.4
-NEAR_UNIT = 0.12
+_FLIPPED = -0.4
+_NEAR_UNIT = 0.12
 """Relative distance of a slope to a unit's factor within which it is that unit."""
-FORCE_UNITS = {"kgf": 0.101972, "gf": 101.972, "mN": 1000.0, "lbf": 0.224809, "ozf": 3.59694}
-MOMENT_UNITS = {"N cm": 100.0, "N mm": 1000.0, "kgf cm": 10.1972, "mN m": 1000.0}
-SPEED_UNITS = {"rpm": 1.0 / 9.549297**2, "Hz": 6.283185**2, "krpm": (1000.0 / 9.549297) ** 2}
-LARGEST_ANGLE_RAD = 1.6
-BETTER = 4.0
+_FORCE_UNITS = {"kgf": 0.101972, "gf": 101.972, "mN": 1000.0, "lbf": 0.224809, "ozf": 3.59694}
+_MOMENT_UNITS = {"N cm": 100.0, "N mm": 1000.0, "kgf cm": 10.1972, "mN m": 1000.0}
+_SPEED_UNITS = {"rpm": 1.0 / 9.549297**2, "Hz": 6.283185**2, "krpm": (1000.0 / 9.549297) ** 2}
+_LARGEST_ANGLE_RAD = 1.6
+_BETTER = 4.0
 """Residual energy over the stated order's, below which another order of rotors is the true one."""
 NAMES = c.FORCE + c.MOMENT
 
 
 @dataclass(frozen=True)
-class Slope:
+class _Slope:
     """Slope of a channel's reading on its load in one run, and their correlation."""
 
     run: str
@@ -43,7 +43,7 @@ class Slope:
     correlation: float
 
 
-def slopes(setup: Setup) -> list[Slope]:
+def slopes(setup: Setup) -> list[_Slope]:
     """Slopes of every channel that is loaded, by run.
 
     Of a moment what goes with the forces across it is taken off first: a lever arm that nobody stated makes any sign.
@@ -55,16 +55,16 @@ def slopes(setup: Setup) -> list[Slope]:
         for k in setup.instrument.channels:
             across = [] if k < 3 else [axis for axis in range(3) if axis != k - 3]
             beside = np.column_stack([np.ones(len(loads)), loads[:, across]])
-            load, read = (rest_beside(beside, x[:, k]) for x in (loads, reads))
+            load, read = (_rest_beside(beside, x[:, k]) for x in (loads, reads))
             largest = max(float(x.load[:, k].std()) for x in setup.loadings) + 1e-12
             if load.std() < 0.2 * largest or read.std() == 0:
                 continue
             r = float(load @ read / np.sqrt((load @ load) * (read @ read)))
-            out.append(Slope(run, k, float(load @ read / (load @ load)), r))
+            out.append(_Slope(run, k, float(load @ read / (load @ load)), r))
     return out
 
 
-def rest_beside(columns: np.ndarray, values: np.ndarray) -> np.ndarray:
+def _rest_beside(columns: np.ndarray, values: np.ndarray) -> np.ndarray:
     """What a regression of values (n,) on columns (n, m) leaves."""
     return values - columns @ np.linalg.lstsq(columns, values, rcond=1e-9)[0]
 
@@ -75,7 +75,7 @@ def find_mistakes(recordings: RecordingSet) -> tuple[RecordingSet, list[Finding]
     recordings, lost = dropout.find(recordings)
     findings += [lost] if lost else []
     setup = set_up(recordings)
-    for find in (flipped, other_unit, wrong_rotors):
+    for find in (flipped, _other_unit, _wrong_rotors):
         found = find(recordings, setup)
         if found is not None:
             recordings, finding, note = found
@@ -94,7 +94,7 @@ def scaled(run: Run, factors: dict[str, float]) -> Run:
     return replace(run, table=table) if factors else run
 
 
-def with_runs(recordings: RecordingSet, runs) -> RecordingSet:
+def _with_runs(recordings: RecordingSet, runs) -> RecordingSet:
     return RecordingSet(recordings.name, recordings.vehicle, tuple(runs), recordings.held_out)
 
 
@@ -103,7 +103,7 @@ def degrees(recordings: RecordingSet) -> tuple[RecordingSet, list[Finding], list
     off = [
         n
         for n in c.MOUNT
-        if any(r.has(n) and np.nanmax(np.abs(r.column(n))) > LARGEST_ANGLE_RAD for r in recordings.runs)
+        if any(r.has(n) and np.nanmax(np.abs(r.column(n))) > _LARGEST_ANGLE_RAD for r in recordings.runs)
     ]
     if not off:
         return recordings, [], []
@@ -111,7 +111,7 @@ def degrees(recordings: RecordingSet) -> tuple[RecordingSet, list[Finding], list
     runs = [scaled(r, dict.fromkeys(names, np.pi / 180)) for r in recordings.runs]
     text = f"{' and '.join(names)} are in degrees, not in rad; they were converted"
     return (
-        with_runs(recordings, runs),
+        _with_runs(recordings, runs),
         [_finding("unit_error", text, ("force_x", "force_y"), np.pi / 180)],
         [text + "."],
     )
@@ -134,7 +134,7 @@ def _finding(key: str, sentence: str, channels, factor: float | None = None, oth
 
 def flipped(recordings: RecordingSet, setup: Setup):
     """Channels whose reading falls as the load rises, in all runs or in some."""
-    bad = [s for s in slopes(setup) if s.correlation < -CERTAIN and s.slope < FLIPPED]
+    bad = [s for s in slopes(setup) if s.correlation < -_CERTAIN and s.slope < _FLIPPED]
     if not bad:
         return None
     runs = []
@@ -153,28 +153,28 @@ def flipped(recordings: RecordingSet, setup: Setup):
     windows = []
     if not everywhere:
         windows = [(r.name, float(r.time_s[0]), float(r.time_s[-1])) for r in recordings.runs if r.name in named]
-    return with_runs(recordings, runs), _finding("axis_sign", text, channels, -1.0, others, windows), text + "."
+    return _with_runs(recordings, runs), _finding("axis_sign", text, channels, -1.0, others, windows), text + "."
 
 
 def nearest(slope: float, units: dict[str, float]) -> str | None:
     """The unit whose factor a slope is near; None if it is near to none."""
-    return next((name for name, factor in units.items() if abs(slope / factor - 1) < NEAR_UNIT), None)
+    return next((name for name, factor in units.items() if abs(slope / factor - 1) < _NEAR_UNIT), None)
 
 
-def other_unit(recordings: RecordingSet, setup: Setup):
+def _other_unit(recordings: RecordingSet, setup: Setup):
     """Forces, moments or rotor speeds in another unit, in every run."""
-    found = [s for s in slopes(setup) if s.correlation > CERTAIN]
+    found = [s for s in slopes(setup) if s.correlation > _CERTAIN]
     forces = [s.slope for s in found if s.channel < 3]
     moments = [s.slope for s in found if s.channel >= 3]
     speed_known = bool(setup.loadings) and setup.loadings[0].measured and recordings.vehicle.kind == "stand"
     both = forces + moments
-    if speed_known and both and (unit := nearest(np.median(both), SPEED_UNITS)):
+    if speed_known and both and (unit := nearest(np.median(both), _SPEED_UNITS)):
         names = c.rotor_columns("rotor_speed", recordings.vehicle.rotor_count)
-        factor = float(np.sqrt(SPEED_UNITS[unit]))
+        factor = float(np.sqrt(_SPEED_UNITS[unit]))
         return _converted(recordings, names, unit, factor, "rad/s", ("force_z",))
     for slope, units, names, wanted in (
-        (forces, FORCE_UNITS, c.FORCE, "N"),
-        (moments, MOMENT_UNITS, c.MOMENT, "N m"),
+        (forces, _FORCE_UNITS, c.FORCE, "N"),
+        (moments, _MOMENT_UNITS, c.MOMENT, "N m"),
     ):
         if slope and (unit := nearest(np.median(slope), units)):
             channels = [n for n, label in zip(CHANNELS, NAMES, strict=True) if label in names]
@@ -186,10 +186,10 @@ def _converted(recordings, names, unit, factor, wanted, channels):
     runs = [scaled(r, dict.fromkeys(names, factor)) for r in recordings.runs]
     present = [n for n in names if any(r.has(n) for r in recordings.runs)]
     text = f"{', '.join(present)} are in {unit}, not in {wanted}; they were converted"
-    return with_runs(recordings, runs), _finding("unit_error", text, channels, factor), text + "."
+    return _with_runs(recordings, runs), _finding("unit_error", text, channels, factor), text + "."
 
 
-def wrong_rotors(recordings: RecordingSet, setup: Setup):
+def _wrong_rotors(recordings: RecordingSet, setup: Setup):
     """Rotor columns in another order, or rotors that turn the other way."""
     vehicle = recordings.vehicle
     if vehicle.kind != "stand" or vehicle.rotor_count not in (3, 4) or not setup.loadings[0].measured:
@@ -210,7 +210,7 @@ def wrong_rotors(recordings: RecordingSet, setup: Setup):
 
     energy = {order: energy_of(order) for order in permutations(stated)}
     best = min(energy, key=energy.get)
-    if best != stated and energy[best] * BETTER < energy[stated]:
+    if best != stated and energy[best] * _BETTER < energy[stated]:
         moved = [i + 1 for i in stated if best[i] != i]
         text = f"the columns of rotors {', '.join(map(str, moved))} are exchanged; they were put in order"
         names = c.rotor_columns("rotor_speed", vehicle.rotor_count)
@@ -220,5 +220,5 @@ def wrong_rotors(recordings: RecordingSet, setup: Setup):
             for i in stated:
                 table[names[i]] = run.table[names[best[i]]]
             runs.append(replace(run, table=table))
-        return with_runs(recordings, runs), _finding("rotor_order", text, ("moment_x", "moment_y")), text + "."
+        return _with_runs(recordings, runs), _finding("rotor_order", text, ("moment_x", "moment_y")), text + "."
     return None

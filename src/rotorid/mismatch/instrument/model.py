@@ -26,23 +26,23 @@ from rotorid.mismatch.plant.regression import (
 )
 from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.mismatch.plant.unknowns import UNKNOWNS
-from rotorid.mismatch.posterior.chosen import posterior_at
 from rotorid.mismatch.posterior.search import Found
+from rotorid.mismatch.posterior.statements import posterior_at
 from rotorid.recordings.signal.kernels import causal
 
-MOST_BLOCKS = 150
-LEAST_BLOCKS = 40
+_MOST_BLOCKS = 150
+_LEAST_BLOCKS = 40
 BLOCK_S = 2.0
 MEMORY = 4
 """Blocks over which the noise of a sensor may be alike beyond what whitening takes away: 1/f noise has no end."""
-ROWS_PER_COLUMN = 8
-STRONGEST = 0.9
+_ROWS_PER_COLUMN = 8
+_STRONGEST = 0.9
 """Quantile of the seconds' energies above which a contribution's size is taken: what shows only after a change of load
 is in few of them."""
-ROUNDS = 4
+_ROUNDS = 4
 SETTLED = 1e-3
 """Relative change of nonlinear parameters from round to round below which they have settled."""
-MOST_AT_ONCE = 6
+_MOST_AT_ONCE = 6
 """More causes than this at once are not distinguished by six channels: what they leave is stated as unexplained."""
 MOST_OFFSET = 2.0
 """Samples by which reading and load may lie apart before it is a finding. The derivative of a reading that lags by τ is
@@ -70,7 +70,7 @@ class ReadingSearch(Search):
         return super().physical(term, beta, error)
 
     def candidates(self, active, *rest):
-        return iter(()) if len(active) >= MOST_AT_ONCE else super().candidates(active, *rest)
+        return iter(()) if len(active) >= _MOST_AT_ONCE else super().candidates(active, *rest)
 
     def unsteady(self, active):
         """None: an instrument's runs load different axes, and no coefficient could be asked of each."""
@@ -166,16 +166,16 @@ def block_length(setup: Setup, rows: list[Rows]) -> int:
     typical = float(np.median([len(r.y) for r in rows]))
     total = sum(len(r.y) for r in rows)
     if typical < SHORT:
-        return max(2, int(typical)) if len(rows) >= 12 else max(2, total // LEAST_BLOCKS)
+        return max(2, int(typical)) if len(rows) >= 12 else max(2, total // _LEAST_BLOCKS)
     wanted = BLOCK_S * setup.rate_hz
-    return int(np.clip(wanted, max(total / MOST_BLOCKS, 5), max(total / LEAST_BLOCKS, 5)))
+    return int(np.clip(wanted, max(total / _MOST_BLOCKS, 5), max(total / _LEAST_BLOCKS, 5)))
 
 
-def noise_and_filters(setup: Setup, terms: list[Term], rows: list[Rows]) -> tuple[np.ndarray, dict[int, np.ndarray]]:
+def _noise_and_filters(setup: Setup, terms: list[Term], rows: list[Rows]) -> tuple[np.ndarray, dict[int, np.ndarray]]:
     """Noise by channel (6,) and whitening filters, from what the whole catalogue leaves."""
     total = sum(len(r.y) for r in rows)
     size = rows[0].x.shape[2]
-    kept = modest(terms, total // ROWS_PER_COLUMN) if size > total // ROWS_PER_COLUMN else np.arange(size)
+    kept = _modest(terms, total // _ROWS_PER_COLUMN) if size > total // _ROWS_PER_COLUMN else np.arange(size)
     precision = np.concatenate([1.0 / np.square(np.asarray(t.prior_sd, float)) for t in terms])
     thin = [Rows(r.run, r.time_s, r.y, r.x[:, :, kept]) for r in rows]
     left, _ = full_fit_residuals(thin, precision[kept])
@@ -190,7 +190,7 @@ def noise_and_filters(setup: Setup, terms: list[Term], rows: list[Rows]) -> tupl
     return noise, filters
 
 
-def modest(terms: list[Term], most: int) -> np.ndarray:
+def _modest(terms: list[Term], most: int) -> np.ndarray:
     """Columns of the first form of each id, the short ones first, as many as the rows can bear."""
     at, places = 0, []
     seen: set[str] = set()
@@ -209,7 +209,7 @@ def modest(terms: list[Term], most: int) -> np.ndarray:
 
 def whole_reading(terms: list[Term], active) -> list[tuple[Form, np.ndarray]]:
     """Forms at work that change the reading as a whole, gain one: filters, resonances, other clocks."""
-    chosen = [t for t in terms if t.key in (active or ()) and changes_whole(t)]
+    chosen = [t for t in terms if t.key in (active or ()) and _changes_whole(t)]
     return [(t.form, np.array(t.values, float)) for t in chosen]
 
 
@@ -225,13 +225,13 @@ def reading_model(
     noisy = rows_of(setup, terms, setup.noisier, whole) if loadings is None and setup.noisier is not None else None
     loadings = setup.loadings if loadings is None else loadings
     rows = rows_of(setup, terms, loadings, whole)
-    noise, taps = noise_and_filters(setup, terms, rows) if filters is None else filters
+    noise, taps = _noise_and_filters(setup, terms, rows) if filters is None else filters
     short = np.median([len(r.y) for r in rows]) < SHORT
     per = block_length(setup, rows)
     regression = build(rows, terms, taps, everything, per / setup.rate_hz, setup.rate_hz, noisy)
     restrain(regression, setup)
     joint_sizes = size_of_columns(rows, noise, max(1, int(setup.rate_hz)) if not short else 1)
-    sizes = size_function(regression, joint_sizes)
+    sizes = _size_function(regression, joint_sizes)
     search = ReadingSearch(regression, Questions(sizes, joint_sizes), refused)
     selection = search.run(active)
     always = kept_values(search, selection.active)
@@ -267,12 +267,12 @@ def size_of_columns(rows: list[Rows], noise: np.ndarray, per: int):
             whole = len(square) // count * count
             energies.append(square[:whole].reshape(count, -1, 6).mean(axis=1))
         every = np.sort(np.concatenate(energies), axis=0)
-        return np.sqrt(every[int(STRONGEST * len(every)) :].mean(axis=0)) / unit_noise
+        return np.sqrt(every[int(_STRONGEST * len(every)) :].mean(axis=0)) / unit_noise
 
     return sizes
 
 
-def size_function(regression: Regression, of_columns):
+def _size_function(regression: Regression, of_columns):
     """Size of a term by channel, in units of the noise and of its form's resolution, (6,)."""
     resolution = {t.key: t.form.resolution if t.form else 1.0 for t in regression.terms}
     return lambda key, beta: of_columns(regression.columns([key]), beta) / resolution[key]
@@ -356,17 +356,17 @@ def fitted_model(
     the regression would be deaf at the very frequencies where the effect shows.
     """
     model = reading_model(setup, terms, active, loadings, refused=refused)
-    for number in range(ROUNDS):
-        before, start = model.selection.active, nonlinear_values(model)
+    for number in range(_ROUNDS):
+        before, start = model.selection.active, _nonlinear_values(model)
         if not len(start):
             break
         terms, _ = refined(model)
         kept = (model.noise, model.regression.filters) if number else None
         model = reading_model(setup, terms, before, loadings, kept, refused)
-        values = nonlinear_values(model)
+        values = _nonlinear_values(model)
         if set(model.selection.active) == set(before) and np.allclose(values, start, rtol=SETTLED):
             break
-    rivals = rivals_refined(model)
+    rivals = _rivals_refined(model)
     if not rivals:
         return model
     kept = (model.noise, model.regression.filters)
@@ -374,13 +374,13 @@ def fitted_model(
     return reading_model(setup, terms, model.selection.active, loadings, kept, refused)
 
 
-def rivals_refined(model: ReadingModel) -> dict[str, Term]:
+def _rivals_refined(model: ReadingModel) -> dict[str, Term]:
     """Of the terms that could change the reading in place of one at work those that leave no more, parameters fitted.
 
     A delay whose length was fitted explains more than any low-pass whose cutoff was not.
     """
     search, selection, found = model.search, model.selection, {}
-    whole = [k for k in selection.active if changes_whole(search.terms[k])]
+    whole = [k for k in selection.active if _changes_whole(search.terms[k])]
     most = refined(model)[1] + rules.ELSEWHERE["squares"] if whole else 0.0
     for key in whole:
         rest = [k for k in selection.active if k != key]
@@ -388,7 +388,7 @@ def rivals_refined(model: ReadingModel) -> dict[str, Term]:
         own = search.terms[key].effect, search.terms[key].form.name
         starts: dict[tuple[str, str], list[str]] = {}
         for term in model.terms:
-            if changes_whole(term) and term.effect not in taken and (term.effect, term.form.name) != own:
+            if _changes_whole(term) and term.effect not in taken and (term.effect, term.form.name) != own:
                 starts.setdefault((term.effect, term.form.name), []).append(term.key)
         for keys in starts.values():
             best = max(keys, key=lambda start: search.worth([*rest, start]))
@@ -398,12 +398,12 @@ def rivals_refined(model: ReadingModel) -> dict[str, Term]:
     return found
 
 
-def changes_whole(term: Term) -> bool:
+def _changes_whole(term: Term) -> bool:
     """Whether a term changes the reading as a whole: a filter, a resonance, another clock."""
     return term.kind == "effect" and not term.form.linear
 
 
-def nonlinear_values(model: ReadingModel) -> np.ndarray:
+def _nonlinear_values(model: ReadingModel) -> np.ndarray:
     """Nonlinear parameters of all terms at work, in their order."""
     terms = [model.search.terms[k] for k in sorted(model.selection.active)]
     return np.array([t.values[i] for t in terms for i in t.form.nonlinear])

@@ -1,15 +1,30 @@
-"""Does what is left of a reading depend on load, attitude, time or any other column, and how much of it?"""
+"""Does what is left of a reading depend on load, attitude, time or any other column, and how much of it?
+
+What a vehicle file with its effects says an instrument reads: the simulator of kinds `stand` and `bench`.
+"""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from rotorid.effects.loading import CHANNELS, Loading
+from rotorid.effects.catalogue import catalogue
+from rotorid.effects.contract import Form
+from rotorid.effects.loading import CHANNELS, Instrument, Loading, forms_of
+from rotorid.errors import InputError
+from rotorid.mismatch.decision.findings import Analysis
+from rotorid.mismatch.delivery.files import Instruments, instruments_of
 from rotorid.mismatch.instrument.model import MEMORY, ReadingModel
-from rotorid.mismatch.instrument.setup import averaged, pieces_of
+from rotorid.mismatch.instrument.setup import averaged, full_voltage_of, loaded_by, pieces_of, with_speed
 from rotorid.mismatch.model.dependence import ALARM_P, SMALLEST_SHARE_OF_NOISE, _wald
+from rotorid.mismatch.plant.readings import form_reading
+from rotorid.recordings import Vehicle
+from rotorid.vehicle.improved import speeds_of_commands
 
-LEAST_CHANGE = 0.02
+SAME = 1e-5
+"""Relative difference above which a vehicle read back is not the model written."""
+_LEAST_CHANGE = 0.02
 """Spread of a load in one run, by its spread over all, from which the run says what depends on it."""
 
 
@@ -34,7 +49,7 @@ def probes(loading: Loading, model: ReadingModel) -> dict[str, np.ndarray]:
     return {k: averaged(v, setup.average) for k, v in out.items()}
 
 
-def on_rows(model: ReadingModel) -> list[dict[str, np.ndarray]]:
+def _on_rows(model: ReadingModel) -> list[dict[str, np.ndarray]]:
     """Probes of every part that has rows, and the mean rotor speed, in the order of the rows."""
     out = []
     for loading in model.loadings:
@@ -48,7 +63,7 @@ def on_rows(model: ReadingModel) -> list[dict[str, np.ndarray]]:
 def regimes(model: ReadingModel) -> dict[str, dict[str, np.ndarray]]:
     """Run to regime variable on the instants of the rows (runs' stretches one after the other)."""
     out: dict[str, dict[str, np.ndarray]] = {}
-    for whole, rows in zip(on_rows(model), model.rows, strict=True):
+    for whole, rows in zip(_on_rows(model), model.rows, strict=True):
         own = {k: v for k, v in whole.items() if not k.endswith("_squared")} | {"time_s": rows.time_s}
         if rows.run in out:
             own = {k: np.concatenate([out[rows.run][k], own[k]]) for k in own if k in out[rows.run]}
@@ -57,7 +72,7 @@ def regimes(model: ReadingModel) -> dict[str, dict[str, np.ndarray]]:
 
 
 def _inputs(model: ReadingModel) -> tuple[list[str], list[np.ndarray]]:
-    parts = on_rows(model)
+    parts = _on_rows(model)
     names = [n for n in parts[0] if all(n in p for p in parts) and n != "rotor_speed_rad_s"]
     stacked = [np.stack([np.nan_to_num(p[n]) for n in names], axis=1) for p in parts]
     every = np.concatenate(stacked)
@@ -89,8 +104,8 @@ def dependence(model: ReadingModel, before: list[np.ndarray], after: list[np.nda
         taps, rate_hz = model.regression.filters[c], model.setup.rate_hz
         p_first, _ = _wald([b[:, c] for b in before], inputs, taps, rate_hz, memory=MEMORY)
         p_last, t = _wald([a[:, c] for a in after], inputs, taps, rate_hz, memory=MEMORY)
-        first[CHANNELS[c]] = min(1.0, 2 * min(p_first, in_a_run(model, before, c)))
-        p_run = in_a_run(model, after, c)
+        first[CHANNELS[c]] = min(1.0, 2 * min(p_first, _in_a_run(model, before, c)))
+        p_run = _in_a_run(model, after, c)
         last[CHANNELS[c]] = min(1.0, 2 * min(p_last, p_run))
         if p_last < ALARM_P:
             for i in np.argsort(-np.abs(t))[:2]:
@@ -110,12 +125,12 @@ def _runs(model: ReadingModel) -> list[tuple[list[int], list[np.ndarray]]]:
     for run in dict.fromkeys(r.run for r in model.rows):
         numbers = [k for k, r in enumerate(model.rows) if r.run == run]
         loads = [inputs[k][:, columns] for k in numbers]
-        keep = np.concatenate(loads).std(axis=0) > LEAST_CHANGE
+        keep = np.concatenate(loads).std(axis=0) > _LEAST_CHANGE
         out.append((numbers, [z[:, keep] for z in loads]))
     return out
 
 
-def in_a_run(model: ReadingModel, residuals: list[np.ndarray], channel: int) -> float:
+def _in_a_run(model: ReadingModel, residuals: list[np.ndarray], channel: int) -> float:
     """p-value that residuals (n, 6) depend on the loads in no run, of the run where it is smallest times their number.
 
     What changes from run to run (a clamp that slips, a gain that is set anew) cancels over all of them.
@@ -129,7 +144,7 @@ def in_a_run(model: ReadingModel, residuals: list[np.ndarray], channel: int) -> 
     return min(1.0, len(found) * min(found)) if found else 1.0
 
 
-def explained_in_runs(model: ReadingModel, after: list[np.ndarray], channel: int) -> np.ndarray:
+def _explained_in_runs(model: ReadingModel, after: list[np.ndarray], channel: int) -> np.ndarray:
     """Energy of residuals (n, 6) that each run's own dependence on the loads explains, by part of the rows, (k,)."""
     out = np.zeros(len(after))
     for numbers, loads in _runs(model):
@@ -161,7 +176,7 @@ def leftover(model: ReadingModel, after, p_after, depends):
         count = sum(len(after[i]) for i in judged)
         energy = sum(float(after[i][:, c] @ after[i][:, c]) for i in judged)
         flexible = min(sum(float(np.sum((after[i][:, c] - features[i] @ beta) ** 2)) for i in judged), energy)
-        flexible = min(flexible, energy - float(explained_in_runs(model, after, c)[judged].sum()))
+        flexible = min(flexible, energy - float(_explained_in_runs(model, after, c)[judged].sum()))
         gained = np.sqrt(max(energy - flexible, 0.0) / count)
         if p_after[CHANNELS[c]] < ALARM_P and gained > SMALLEST_SHARE_OF_NOISE * np.sqrt(flexible / count):
             channels.append(CHANNELS[c])
@@ -176,3 +191,74 @@ def _features(z: np.ndarray) -> np.ndarray:
     """A constant, inputs and their pairwise products."""
     i, j = np.triu_indices(z.shape[1])
     return np.concatenate([np.ones((len(z), 1)), z, z[:, i] * z[:, j]], axis=1)
+
+
+def entries(vehicle: Vehicle, instrument: Instrument) -> tuple[list[tuple[Form, np.ndarray]], bool]:
+    """Forms that act on load or reading with their values, and whether any acts between command and speed."""
+    found, chain = [], False
+    for number, entry in enumerate(vehicle.effects, 1):
+        where = f"vehicle {vehicle.name}: effects entry {number}"
+        effect = catalogue().get(entry.get("id"))
+        if effect is None:
+            raise InputError(f"{where} has id {entry.get('id')!r}, expected one of the catalogue")
+        if _is_chain(entry):
+            chain = True
+            continue
+        forms = {f.name: f for f in forms_of(effect, instrument)}
+        if entry.get("form") not in forms:
+            raise InputError(
+                f"{where} ({effect.id}) has form {entry.get('form')!r}, expected one of {', '.join(forms)}"
+            )
+        form, given = forms[entry["form"]], entry.get("parameters") or {}
+        symbols = [p.symbol for p in form.parameters]
+        if set(given) != set(symbols):
+            raise InputError(
+                f"{where} ({effect.id}) gives parameters {', '.join(given)}, expected {', '.join(symbols)}"
+            )
+        found.append((form, np.array([float(given[s]) for s in symbols])))
+    return found, chain
+
+
+def predicted(
+    vehicle: Vehicle,
+    instrument: Instrument,
+    loading: Loading,
+    full_voltage: float | None = None,
+    errors: Instruments | None = None,
+) -> np.ndarray:
+    """Reading that the vehicle with its effects predicts for a stretch by an instrument with its errors, (n, 6)."""
+    of_reading = [e.model_dump(include={"id", "form", "parameters"}) for e in (errors.instruments if errors else ())]
+    both = vehicle.model_copy(update={"effects": (*vehicle.effects, *(e for e in of_reading if e["form"]))})
+    forms, chain = entries(both, replace(instrument, vehicle=vehicle))
+    if not loading.measured and loading.command is not None:
+        speed = loading.command
+        if chain:
+            only = tuple(e for e in vehicle.effects if _is_chain(e))
+            bare = vehicle.model_copy(update={"effects": only})
+            speed = speeds_of_commands(bare, speed, loading.time_s, loading.motion.voltage, full_voltage)
+        loading = replace(loading, motion=with_speed(loading.motion, speed))
+    loaded = loaded_by(loading, vehicle)
+    out = loaded.load.copy()
+    if vehicle.reading_gain is not None:
+        out[:, :3] *= np.array(vehicle.reading_gain)
+    for form, values in forms:
+        out += form_reading(form, values, loaded, vehicle)
+    return out
+
+
+def _is_chain(entry: dict) -> bool:
+    """Whether an entry acts between command and rotor speed."""
+    effect = catalogue().get(entry.get("id"))
+    return effect is not None and any(f.name == entry.get("form") for f in effect.speed_forms)
+
+
+def prove(analysis: Analysis, written: Vehicle, reloaded: Vehicle, errors: Instruments) -> None:
+    """RuntimeError unless vehicle and instruments read back predict the readings that the model predicts."""
+    ours_of = instruments_of(analysis)
+    volts = full_voltage_of(analysis.loadings)
+    for loading in analysis.loadings:
+        ours = predicted(written, analysis.instrument, loading, volts, ours_of)
+        theirs = predicted(reloaded, analysis.instrument, loading, volts, errors)
+        scale = max(float(np.abs(ours).max()), 1e-12)
+        if not np.allclose(ours, theirs, rtol=0, atol=SAME * scale):
+            raise RuntimeError(f"improved_vehicle.yaml read back predicts another reading in {loading.run}")

@@ -10,11 +10,11 @@ from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import columns as c
 
-COARSE_SHARE = 0.25
+_COARSE_SHARE = 0.25
 """Share of the noise's variance that the steps must make, q²/12 relative to σ²."""
-LEAST_SAMPLES = 200
-ON_GRID = 0.99
-OFF_GRID = 0.02
+_LEAST_SAMPLES = 200
+_ON_GRID = 0.99
+_OFF_GRID = 0.02
 """Distance to the grid, as a share of a step, that still counts as on it."""
 
 
@@ -33,7 +33,7 @@ def step_of(values: np.ndarray) -> float:
     # Refine: the mean of all gaps in units of the step.
     step = float(np.sum(gaps) / np.sum(np.round(gaps / step)))
     off = np.abs(gaps / step - np.round(gaps / step))
-    return step if np.mean(off < OFF_GRID) >= ON_GRID else 0.0
+    return step if np.mean(off < _OFF_GRID) >= _ON_GRID else 0.0
 
 
 def quantisation(setup, noise: np.ndarray) -> tuple[Finding | None, str | None]:
@@ -41,14 +41,14 @@ def quantisation(setup, noise: np.ndarray) -> tuple[Finding | None, str | None]:
     effect = catalogue()["quantisation"]
     names = c.FORCE + c.MOMENT
     total = sum(len(r.table) for r in setup.recordings.runs)
-    if total < LEAST_SAMPLES:
+    if total < _LEAST_SAMPLES:
         return None, "too few samples to see the steps of the reading"
     found = []
     for k in setup.instrument.channels:
         values = np.concatenate([r.column(names[k]) for r in setup.recordings.runs])
         step = step_of(values)
-        sigma = noise_of_samples(setup.loadings, k)
-        if step and step**2 / 12 > COARSE_SHARE * max(sigma**2, 1e-300) and step < 1e3 * max(sigma, step / 12):
+        sigma = _noise_of_samples(setup.loadings, k)
+        if step and step**2 / 12 > _COARSE_SHARE * max(sigma**2, 1e-300) and step < 1e3 * max(sigma, step / 12):
             found.append((k, step, sigma))
     if not found:
         return None, None
@@ -69,7 +69,7 @@ def quantisation(setup, noise: np.ndarray) -> tuple[Finding | None, str | None]:
     )
 
 
-def noise_of_samples(loadings, channel: int) -> float:
+def _noise_of_samples(loadings, channel: int) -> float:
     """One sigma of a sample's noise by second differences of reading less load, robust against sudden changes."""
     parts = [np.diff((x.reading - x.load)[:, channel], 2) for x in loadings if x.size > 4]
     if not parts:

@@ -13,24 +13,24 @@ import numpy as np
 
 from rotorid.effects.loading import Loading
 
-STEP_SHARE = 0.02
+_STEP_SHARE = 0.02
 """Change from sample to sample, as a share of the largest load, from which a load jumps."""
-LEAST_STEPS = 4
-CALM_S, LOOK_S = 0.8, 3.0
+_LEAST_STEPS = 4
+_CALM_S, _LOOK_S = 0.8, 3.0
 """Time before and after a step without another, and time after it that is looked at."""
-BY_HAND, SETTLED = 1.5, 1.35
+_BY_HAND, SETTLED = 1.5, 1.35
 """Scatter relative to the later scatter, in the first moments, from which loads count as put on by hand, and from which
 a reading has not settled."""
-SMOOTH = 5
+_SMOOTH = 5
 """Samples over which the scatter is smoothed."""
-SLACK_S = 0.1
+_SLACK_S = 0.1
 """Time left out before a step, and after the readings have settled."""
 
 
 def steps_of(loading: Loading, channel: int, largest: float) -> np.ndarray:
     """Samples at which a load jumps from one sample to the next and does not before and after."""
-    jumps = np.abs(np.diff(loading.load[:, channel])) > STEP_SHARE * largest
-    calm = max(2, int(CALM_S / loading.dt_s))
+    jumps = np.abs(np.diff(loading.load[:, channel])) > _STEP_SHARE * largest
+    calm = max(2, int(_CALM_S / loading.dt_s))
     at = np.flatnonzero(jumps) + 1
     alone = [not jumps[max(0, k - 1 - calm) : k - 1].any() and not jumps[k : k + calm].any() for k in at]
     return at[np.array(alone, bool) & (at + calm < loading.size)]
@@ -38,7 +38,7 @@ def steps_of(loading: Loading, channel: int, largest: float) -> np.ndarray:
 
 def scatter(loadings: Sequence[Loading], channel: int, largest: float, dt_s: float) -> np.ndarray | None:
     """Scatter between steps of (reading − settled reading) by time after the step, own unit; None for few steps."""
-    look = int(LOOK_S / dt_s)
+    look = int(_LOOK_S / dt_s)
     shapes, jumps = [], []
     for x in loadings:
         at = steps_of(x, channel, largest)
@@ -49,7 +49,7 @@ def scatter(loadings: Sequence[Loading], channel: int, largest: float, dt_s: flo
             jumps.append(x.load[start, channel] - x.load[start - 1, channel])
             settled = np.median(x.reading[start + (stop - start) // 2 : stop, channel])
             shapes.append((part - settled) / jumps[-1])
-    if len(shapes) < LEAST_STEPS:
+    if len(shapes) < _LEAST_STEPS:
         return None
     normal = np.array([s[: min(map(len, shapes))] for s in shapes])
     usual = np.median(normal, axis=0)
@@ -63,13 +63,13 @@ def settling_s(loadings: Sequence[Loading], channels, largest, dt_s: float) -> f
         spread = scatter(loadings, c, largest[c], dt_s)
         if spread is None:
             continue
-        smooth = np.sqrt(np.convolve(spread**2, np.ones(SMOOTH) / SMOOTH, mode="same"))
+        smooth = np.sqrt(np.convolve(spread**2, np.ones(_SMOOTH) / _SMOOTH, mode="same"))
         late = float(np.median(spread[2 * len(spread) // 3 :]))
-        early = float(np.sqrt(np.mean(spread[: max(3, int(CALM_S / dt_s))] ** 2)))
-        if early < BY_HAND * late:
+        early = float(np.sqrt(np.mean(spread[: max(3, int(_CALM_S / dt_s))] ** 2)))
+        if early < _BY_HAND * late:
             continue
-        above = np.flatnonzero(smooth[:-SMOOTH] > SETTLED * late)
-        longest = max(longest, (above[-1] + 1) * dt_s + SLACK_S if len(above) else 0.0)
+        above = np.flatnonzero(smooth[:-_SMOOTH] > SETTLED * late)
+        longest = max(longest, (above[-1] + 1) * dt_s + _SLACK_S if len(above) else 0.0)
     return longest
 
 
@@ -81,6 +81,6 @@ def without_settling(loadings: Sequence[Loading], channels, largest, wait_s: flo
         for c in channels:
             for at in steps_of(x, c, largest[c]):
                 t = x.time_s[at]
-                keep &= ~((x.time_s > t - SLACK_S) & (x.time_s < t + wait_s))
+                keep &= ~((x.time_s > t - _SLACK_S) & (x.time_s < t + wait_s))
         out.append(replace(x, keep=keep))
     return tuple(out)

@@ -24,22 +24,22 @@ from rotorid.mismatch.plant.voltmeter import SLOW_S, expected_voltages, is_noise
 from rotorid.recordings import RecordingSet, Run, Split, Vehicle
 from rotorid.recordings import columns as c
 
-GAP_STEPS = 4.0
+_GAP_STEPS = 4.0
 """Where readings are missing for longer than this many median steps they are not compared."""
-UNEVEN = 0.3
+_UNEVEN = 0.3
 """Deviation of a step from the median, as a share of it, beyond which samples are interpolated to an even grid."""
-SHORTEST = 4
+_SHORTEST = 4
 SHORT = 60
 """Stretches of fewer samples or rows are blocks: too short to learn the colour of their noise from."""
-MOST_VALUES = 45_000
+_MOST_VALUES = 45_000
 """Samples times channels that are analysed; longer sets are averaged over several samples first."""
 LEAST_SHARE = 0.05
 """Share of the largest load from which a channel is loaded, or a sample is, and of the samples that come back."""
-LEAST_WARMTH_K = 0.1
+_LEAST_WARMTH_K = 0.1
 """A temperature that changes by less says nothing."""
-STEADY_HZ = 5.0
+_STEADY_HZ = 5.0
 """Below this rate a recording is a list of steady points: nothing that takes time can be seen."""
-QUARTIC = np.array([[-25.0, 48.0, -36.0, 16.0, -3.0], [-3.0, -10.0, 18.0, -6.0, 1.0]])
+_QUARTIC = np.array([[-25.0, 48.0, -36.0, 16.0, -3.0], [-3.0, -10.0, 18.0, -6.0, 1.0]])
 """Twelve times the slope at the first two of five samples of the quartic through them, per step."""
 
 
@@ -60,7 +60,7 @@ class Session:
 
 
 @dataclass(frozen=True)
-class Preparation:
+class _Preparation:
     """How runs become stretches: the same for all runs of a set."""
 
     vehicle: Vehicle
@@ -106,7 +106,7 @@ class Setup:
 
     @property
     def steady_points(self) -> bool:
-        return self.instrument.rate_hz < STEADY_HZ
+        return self.instrument.rate_hz < _STEADY_HZ
 
 
 def compared_channels(recordings: RecordingSet) -> tuple[int, ...]:
@@ -154,8 +154,8 @@ def commands(run: Run, count: int) -> tuple[np.ndarray | None, bool]:
 def _pieces(time_s: np.ndarray, keep: np.ndarray, dt_s: float) -> list[np.ndarray]:
     """Indices of stretches: over a short gap a sensor remembers the load, after a longer one it starts from rest."""
     index = np.flatnonzero(keep)
-    cuts = np.flatnonzero(np.diff(time_s[index]) > max(REST_S, GAP_STEPS * dt_s)) + 1
-    return [np.arange(p[0], p[-1] + 1) for p in np.split(index, cuts) if len(p) >= SHORTEST]
+    cuts = np.flatnonzero(np.diff(time_s[index]) > max(REST_S, _GAP_STEPS * dt_s)) + 1
+    return [np.arange(p[0], p[-1] + 1) for p in np.split(index, cuts) if len(p) >= _SHORTEST]
 
 
 def _within(time_s: np.ndarray, known_s: np.ndarray, longest_s: float) -> np.ndarray | None:
@@ -169,12 +169,12 @@ def _within(time_s: np.ndarray, known_s: np.ndarray, longest_s: float) -> np.nda
 def _even(time_s: np.ndarray, dt_s: float) -> np.ndarray | None:
     """An even grid to interpolate to, None where the samples are even already."""
     steps = np.diff(time_s)
-    if np.all(np.abs(steps - np.median(steps)) < UNEVEN * np.median(steps)):
+    if np.all(np.abs(steps - np.median(steps)) < _UNEVEN * np.median(steps)):
         return None
     return time_s[0] + dt_s * np.arange(int((time_s[-1] - time_s[0]) / dt_s) + 1)
 
 
-def stretches_of(run: Run, how: Preparation) -> list[Loading]:
+def stretches_of(run: Run, how: _Preparation) -> list[Loading]:
     """Loadings of one run, load still empty."""
     vehicle, channels, dt_s, session = how.vehicle, how.channels, how.dt_s, how.session
     names = c.FORCE + c.MOMENT
@@ -214,7 +214,7 @@ def stretches_of(run: Run, how: Preparation) -> list[Loading]:
             return np.stack([np.interp(grid, stamps, v) for v in values.T], axis=1)
 
         time_s = stamps if grid is None else grid
-        if len(time_s) < SHORTEST:
+        if len(time_s) < _SHORTEST:
             continue
         reading = np.stack([np.interp(time_s, stamps[good], v) for v in read[piece][good].T], axis=1)
         own = {name: at(values) for name, values in others.items()}
@@ -252,7 +252,7 @@ def stretches_of(run: Run, how: Preparation) -> list[Loading]:
                 command=ordered,
                 measured=speed is not None,
                 distance=own.get(how.distance),
-                keep=_within(time_s, stamps[good], GAP_STEPS * dt_s),
+                keep=_within(time_s, stamps[good], _GAP_STEPS * dt_s),
                 extra={k: v for k, v in own.items() if k not in (c.BATTERY_VOLTAGE, c.TEMPERATURE, c.HEIGHT)},
             )
         )
@@ -267,7 +267,7 @@ def turned(loading: Loading, change: Callable[[np.ndarray, float], np.ndarray]) 
     return replace(loading, motion=with_speed(loading.motion, change(read, 1.0 / loading.dt_s)), speed_read=read)
 
 
-def noised(speed: np.ndarray, rate_hz: float) -> np.ndarray:
+def _noised(speed: np.ndarray, rate_hz: float) -> np.ndarray:
     """Speeds with as much white noise as they have once more, less the noise of both."""
     draws = np.random.default_rng(1).standard_normal(speed.shape)
     return without_noise(speed + noise_of(speed, rate_hz) * draws, rate_hz)
@@ -282,15 +282,15 @@ def without_voltmeter_noise(loadings: list[Loading]) -> list[Loading]:
     read = [x.motion.voltage for x in loadings]
     if any(v is None or x.command is None or x.size * x.dt_s < SLOW_S for v, x in zip(read, loadings, strict=True)):
         return loadings
-    if 1 / loadings[0].dt_s < STEADY_HZ:
+    if 1 / loadings[0].dt_s < _STEADY_HZ:
         return loadings
     steps = [x.dt_s for x in loadings]
     expected = expected_voltages(read, [x.command for x in loadings], steps)
     noise = is_noise([a - b for a, b in zip(read, expected, strict=True)], steps)
-    return with_expected_voltages(loadings) if noise else loadings
+    return _with_expected_voltages(loadings) if noise else loadings
 
 
-def with_expected_voltages(loadings: list[Loading]) -> list[Loading]:
+def _with_expected_voltages(loadings: list[Loading]) -> list[Loading]:
     """The loadings with the voltage that the commands make expected in place of the reading, which is kept too."""
     read, steps = [x.motion.voltage for x in loadings], [x.dt_s for x in loadings]
     expected = expected_voltages(read, [x.command for x in loadings], steps)
@@ -312,7 +312,7 @@ def with_speed(motion: Motion, speed: np.ndarray | None) -> Motion:
     if motion.size >= 7:
         step = 12.0 * float(np.median(np.diff(motion.time_s)))
         middle = (speed[:-4] - speed[4:] + 8.0 * (speed[3:-1] - speed[1:-3])) / step
-        first, last = QUARTIC @ speed[:5] / step, -QUARTIC[::-1, ::-1] @ speed[-5:] / step
+        first, last = _QUARTIC @ speed[:5] / step, -_QUARTIC[::-1, ::-1] @ speed[-5:] / step
         acceleration = np.concatenate([first, middle, last])
     return replace(motion, rotor_speed=speed, rotor_acceleration=acceleration)
 
@@ -340,7 +340,7 @@ def loaded_by(loading: Loading, vehicle: Vehicle) -> Loading:
     return replace(loading, load=load, rest=rest)
 
 
-def first_full_speed(recordings: RecordingSet, channels: tuple[int, ...]) -> float:
+def _first_full_speed(recordings: RecordingSet, channels: tuple[int, ...]) -> float:
     """Speed at full throttle that explains the thrust read best, rad/s, a constant left free in each run."""
     vehicle = recordings.vehicle
     thrusts, reads = [], []
@@ -390,33 +390,33 @@ def set_up(recordings: RecordingSet, whole: RecordingSet | None = None) -> Setup
     vehicle, whole = recordings.vehicle, whole or recordings
     channels, session = compared_channels(whole), session_of(whole)
     dt_s = float(np.median(np.concatenate([np.diff(r.time_s) for r in recordings.runs])))
-    full, estimated = full_speed_of(recordings, channels)
-    how, noisier = Preparation(vehicle, channels, dt_s, full, session, distance_column(recordings)), None
+    full, estimated = _full_speed_of(recordings, channels)
+    how, noisier = _Preparation(vehicle, channels, dt_s, full, session, _distance_column(recordings)), None
     loadings = how.stretches(recordings)
     if vehicle.kind == "stand" and loadings:
         loadings = without_voltmeter_noise(loadings)
         calm = [loaded_by(turned(x, without_noise), vehicle) for x in loadings]
         if quieter(loadings, calm) is calm:
-            noisier = tuple(loaded_by(turned(x, noised), vehicle) for x in loadings)
+            noisier = tuple(loaded_by(turned(x, _noised), vehicle) for x in loadings)
             loadings = calm
     if not loadings:
-        raise InputError(f"{recordings.name}: no run has {SHORTEST} samples in a row with every channel")
-    instrument = instrument_of(recordings, how, loadings)
+        raise InputError(f"{recordings.name}: no run has {_SHORTEST} samples in a row with every channel")
+    instrument = _instrument_of(recordings, how, loadings)
     wait_s = 0.0
-    if instrument.bench and 1 / dt_s > STEADY_HZ:
+    if instrument.bench and 1 / dt_s > _STEADY_HZ:
         wait_s = settling_s(loadings, instrument.loaded, instrument.largest, dt_s)
         if wait_s:
             loadings = without_settling(loadings, instrument.loaded, instrument.largest, wait_s)
             instrument = replace(instrument, by_hand=True)
     total = sum(x.size for x in loadings) * len(channels)
-    average = max(1, int(np.ceil(total / MOST_VALUES)))
+    average = max(1, int(np.ceil(total / _MOST_VALUES)))
     return Setup(
         recordings=recordings,
         vehicle=vehicle,
         split=split_runs(whole),
         instrument=instrument,
         loadings=tuple(loadings),
-        average=average if 1 / dt_s / average > STEADY_HZ else 1,
+        average=average if 1 / dt_s / average > _STEADY_HZ else 1,
         full_speed=full,
         estimated_full_speed=estimated,
         settling_s=wait_s,
@@ -439,10 +439,10 @@ def with_unseen(setup: Setup, unseen: RecordingSet) -> Setup:
     runs = [r for r in unseen.runs if r.has(*needed)]
     runs = [r for r in runs if not commanded or commands(r, vehicle.rotor_count)[0] is not None]
     dt_s = 1.0 / instrument.rate_hz
-    how = Preparation(unseen.vehicle, instrument.channels, dt_s, setup.full_speed, setup.session, instrument.distance)
+    how = _Preparation(unseen.vehicle, instrument.channels, dt_s, setup.full_speed, setup.session, instrument.distance)
     own = how.stretches(replace(unseen, runs=tuple(runs)))
     if own and any(x.voltage_read is not None for x in setup.loadings):
-        own = with_expected_voltages(own)
+        own = _with_expected_voltages(own)
     if setup.noisier is not None:
         own = [loaded_by(turned(x, without_noise), vehicle) for x in own]
     if setup.settling_s:
@@ -458,7 +458,7 @@ def full_voltage_of(loadings: Sequence[Loading]) -> float | None:
     return max(known, default=None)
 
 
-def full_speed_of(recordings: RecordingSet, channels: tuple[int, ...]) -> tuple[float | None, bool]:
+def _full_speed_of(recordings: RecordingSet, channels: tuple[int, ...]) -> tuple[float | None, bool]:
     """Rotor speed at full throttle, rad/s (None where it is not stated and not needed), and whether it is estimated."""
     vehicle = recordings.vehicle
     if not vehicle.rotor_count:
@@ -471,10 +471,10 @@ def full_speed_of(recordings: RecordingSet, channels: tuple[int, ...]) -> tuple[
         return float(vehicle.rotor_speed_limits_rad_s[1]), False
     if not any(throttle for _, throttle in known):
         return None, False
-    return measured_full_speed(recordings) if measured else first_full_speed(recordings, channels), True
+    return _measured_full_speed(recordings) if measured else _first_full_speed(recordings, channels), True
 
 
-def measured_full_speed(recordings: RecordingSet) -> float:
+def _measured_full_speed(recordings: RecordingSet) -> float:
     """Speed per unit of throttle, robustly, from speeds that were measured with it."""
     count = recordings.vehicle.rotor_count
     ratios = []
@@ -487,7 +487,7 @@ def measured_full_speed(recordings: RecordingSet) -> float:
     return float(np.median(np.concatenate(ratios))) if ratios else 1000.0
 
 
-def distance_column(recordings: RecordingSet) -> str:
+def _distance_column(recordings: RecordingSet) -> str:
     """Unknown column that is a distance to a wall or fixture and differs between runs or within one."""
     for name in recordings.runs[0].unknown_columns:
         if name.endswith("_m") and any(w in name for w in ("distance", "wall", "fixture")):
@@ -497,7 +497,7 @@ def distance_column(recordings: RecordingSet) -> str:
     return ""
 
 
-def instrument_of(recordings: RecordingSet, how: Preparation, loadings: Sequence[Loading]) -> Instrument:
+def _instrument_of(recordings: RecordingSet, how: _Preparation, loadings: Sequence[Loading]) -> Instrument:
     """What the forms of effects need to know beforehand."""
     channels, session = how.channels, how.session
     load = np.concatenate([x.load for x in loadings])
@@ -525,13 +525,13 @@ def instrument_of(recordings: RecordingSet, how: Preparation, loadings: Sequence
         run_s=float(max(r.time_s[-1] - r.time_s[0] for r in recordings.runs)),
         largest=tuple(float(v) for v in largest),
         weighed=tuple(weighed),
-        returns=tuple(k for k in loaded if comes_back(loadings, k, float(largest[k]))),
+        returns=tuple(k for k in loaded if _comes_back(loadings, k, float(largest[k]))),
         tilts=any(np.ptp(a) > 0.02 for a in attitudes),
         temperature=all(x.temperature is not None for x in loadings)
-        and any(np.ptp(x.temperature) > LEAST_WARMTH_K for x in loadings),
-        temperatures_c=(float(warmth.min()), float(warmth.max())) if np.ptp(warmth) > LEAST_WARMTH_K else (0.0, 0.0),
+        and any(np.ptp(x.temperature) > _LEAST_WARMTH_K for x in loadings),
+        temperatures_c=(float(warmth.min()), float(warmth.max())) if np.ptp(warmth) > _LEAST_WARMTH_K else (0.0, 0.0),
         first_temperature_c=float(warmth[0]),
-        zero_temperature_c=zero_temperature(loadings, channels) if np.ptp(warmth) > LEAST_WARMTH_K else None,
+        zero_temperature_c=zero_temperature(loadings, channels) if np.ptp(warmth) > _LEAST_WARMTH_K else None,
         session_s=session.length_s,
         session_clock=session.clock,
         distance=how.distance,
@@ -556,7 +556,7 @@ def zero_temperature(loadings: Sequence[Loading], channels: tuple[int, ...]) -> 
     return float(warmth.mean() - above / below) if below > 0 else None
 
 
-def comes_back(loadings: Sequence[Loading], channel: int, largest: float) -> bool:
+def _comes_back(loadings: Sequence[Loading], channel: int, largest: float) -> bool:
     """Whether a load is met from above as well as from below at values other than none."""
     falling = total = 0
     for x in loadings:
@@ -575,7 +575,7 @@ def pieces_of(loading: Loading, count: int) -> list[np.ndarray]:
     if loading.keep is None:
         return [np.arange(total)] if total >= 2 else []
     good = np.flatnonzero(loading.keep[: total * count].reshape(total, count).all(axis=1))
-    return [p for p in np.split(good, np.flatnonzero(np.diff(good) > 1) + 1) if len(p) >= SHORTEST]
+    return [p for p in np.split(good, np.flatnonzero(np.diff(good) > 1) + 1) if len(p) >= _SHORTEST]
 
 
 def averaged(values: np.ndarray, count: int) -> np.ndarray:

@@ -17,17 +17,17 @@ from rotorid.effects.loading import Loading
 
 WIDTHS = (5, 9, 17, 33, 65, 129, 257)
 """Samples of the windows."""
-STEADY_WIDTH = 33
+_STEADY_WIDTH = 33
 """Samples that must agree for a reading to be replaced: near a step a window bends what it smooths."""
-GAMMA = 2.6
+_GAMMA = 2.6
 """Half-width of the confidence intervals, in standard errors."""
-BAND = (0.5, 0.75, 1.0)
+_BAND = (0.5, 0.75, 1.0)
 """Shares of the highest frequency in which the noise must be white, in two halves."""
 LEVEL = 2.0
 """Ratio of the power in the two halves beyond which there is signal up there, and nothing is done."""
-SMALLER, LARGER = 0.98, 1.01
+_SMALLER, _LARGER = 0.98, 1.01
 """Smoothed speeds are the better ones where they lower the quick errors of some load to this share, and raise none."""
-LOCAL_S = 1.0
+_LOCAL_S = 1.0
 """Time over which the size of the noise is read off: it may grow with the speed."""
 
 
@@ -51,7 +51,7 @@ def quieter(as_read: list[Loading], smoothed: list[Loading]) -> list[Loading]:
     Compared by the squares of the steps from sample to sample, in which effects of the instrument are small.
     """
     ratio = _steps(smoothed) / np.maximum(_steps(as_read), 1e-300)
-    better = len(ratio) > 0 and np.nanmin(ratio) < SMALLER and np.nanmax(ratio) < LARGER
+    better = len(ratio) > 0 and np.nanmin(ratio) < _SMALLER and np.nanmax(ratio) < _LARGER
     return smoothed if better else as_read
 
 
@@ -65,7 +65,7 @@ def _noisy(speed: np.ndarray) -> bool:
     """Whether the upper end of the spectrum is white."""
     frequency, power = welch(speed, nperseg=WIDTHS[-1] - 1, detrend="linear")
     share = frequency / frequency[-1]
-    lower, upper = (float(np.median(power[(share >= a) & (share < b)])) for a, b in zip(BAND, BAND[1:], strict=False))
+    lower, upper = (float(np.median(power[(share >= a) & (share < b)])) for a, b in zip(_BAND, _BAND[1:], strict=False))
     return upper > 0 and 1 / LEVEL < lower / upper < LEVEL
 
 
@@ -74,18 +74,18 @@ def _spread(speed: np.ndarray, rate_hz: float) -> np.ndarray:
     quick = np.abs(speed - savgol_filter(speed, WIDTHS[0], 2))
     # Of white noise a parabola over five samples leaves 1 − 17/35 of the variance at its middle.
     spread = 1.4826 / np.sqrt(1.0 - savgol_coeffs(WIDTHS[0], 2)[WIDTHS[0] // 2])
-    return spread * median_filter(quick, int(LOCAL_S * rate_hz) | 1, mode="nearest")
+    return spread * median_filter(quick, int(_LOCAL_S * rate_hz) | 1, mode="nearest")
 
 
 def _smoothed(speed: np.ndarray, rate_hz: float) -> np.ndarray:
     weights = [savgol_coeffs(width, 2) for width in WIDTHS]
     sd = _spread(speed, rate_hz)
-    best, low, high = speed.copy(), speed - GAMMA * sd, speed + GAMMA * sd
+    best, low, high = speed.copy(), speed - _GAMMA * sd, speed + _GAMMA * sd
     agrees = np.ones(len(speed), bool)
     for width, weight in zip(WIDTHS, weights, strict=True):
-        value, doubt = savgol_filter(speed, width, 2), GAMMA * sd * np.sqrt(weight @ weight)
+        value, doubt = savgol_filter(speed, width, 2), _GAMMA * sd * np.sqrt(weight @ weight)
         low, high = np.maximum(low, value - doubt), np.minimum(high, value + doubt)
         agrees &= low <= high
-        if width >= STEADY_WIDTH:
+        if width >= _STEADY_WIDTH:
             best = np.where(agrees, value, best)
     return best

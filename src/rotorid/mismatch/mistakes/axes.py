@@ -25,16 +25,16 @@ from rotorid.mismatch.mistakes.signals import (
 from rotorid.mismatch.mistakes.units import RATES, UnitError, corrected, nearest
 from rotorid.recordings import Vehicle
 
-LEAST_EXPLAINED = 0.4
+_LEAST_EXPLAINED = 0.4
 """Share of an axis that the other sensor must explain before anything is said of it."""
-LEAST_T = 8.0
+_LEAST_T = 8.0
 """Standard errors from zero of a gain that names an axis."""
-DOMINANCE = 3.0
+_DOMINANCE = 3.0
 """The largest entry of a row over the next, for an axis to be identified."""
-LEAST_GRAVITY = 0.6
+_LEAST_GRAVITY = 0.6
 """Share of gravity that the mean specific force must show along an axis for its sign to count."""
 
-ATTITUDES = {
+_ATTITUDES = {
     "conjugated": (np.array([1.0, -1.0, -1.0, -1.0]), (0, 1, 2, 3)),
     "forward-left-up in a north-west-up world": (np.array([1.0, 1.0, -1.0, -1.0]), (0, 1, 2, 3)),
     "forward-left-up in a north-west-up world, conjugated": (np.array([1.0, -1.0, 1.0, 1.0]), (0, 1, 2, 3)),
@@ -73,7 +73,7 @@ class Turn:
 
 
 @dataclass(frozen=True)
-class Reading:
+class _Reading:
     """What a fit of X to Y (both three axes) says: `turn` of X, `scale` of X, and how sure."""
 
     turn: Turn | None
@@ -83,7 +83,7 @@ class Reading:
     p_value: float
 
 
-def read(fit: LaggedFit | None) -> Reading | None:
+def read(fit: LaggedFit | None) -> _Reading | None:
     """Signed axes from the gains of a fit Y = M X, None where the motion determines too little.
 
     An axis that moves too little keeps the sign of the others' rule (itself).
@@ -95,9 +95,9 @@ def read(fit: LaggedFit | None) -> Reading | None:
         row, sd = fit.gain[j], np.maximum(fit.gain_sd[j], 1e-12)
         order = np.argsort(-np.abs(row))
         best = int(order[0])
-        if fit.explained[j] < LEAST_EXPLAINED or abs(row[best]) < LEAST_T * sd[best]:
+        if fit.explained[j] < _LEAST_EXPLAINED or abs(row[best]) < _LEAST_T * sd[best]:
             continue
-        if abs(row[best]) < DOMINANCE * abs(row[order[1]]):
+        if abs(row[best]) < _DOMINANCE * abs(row[order[1]]):
             continue
         # Row j of M names the column of X that is true axis j.
         source[best], sign[best] = j, int(np.sign(row[best]))
@@ -106,7 +106,7 @@ def read(fit: LaggedFit | None) -> Reading | None:
     if not gains or sorted(source) != [0, 1, 2]:
         return None
     scale, scale_sd = np.median(gains, axis=0)
-    return Reading(Turn(tuple(source), tuple(sign)), float(scale), float(scale_sd), max(p_values))
+    return _Reading(Turn(tuple(source), tuple(sign)), float(scale), float(scale_sd), max(p_values))
 
 
 def turned(recordings: ReadSet, sensor: str, turn: Turn, p_value: float) -> Result:
@@ -141,7 +141,7 @@ def _gravity(recordings: ReadSet) -> Result:
     mean = np.nanmean(np.concatenate([s.values["accelerometer"] for s in runs]), axis=0)
     mean = mean / -recordings.vehicle.gravity_m_s2
     axis = int(np.argmax(np.abs(mean)))
-    if not np.isfinite(mean).all() or abs(mean[axis]) < LEAST_GRAVITY or (axis == 2 and mean[2] > 0):
+    if not np.isfinite(mean).all() or abs(mean[axis]) < _LEAST_GRAVITY or (axis == 2 and mean[2] > 0):
         return Result(recordings)
     source, sign = [0, 1, 2], [1, 1, 1]
     source[axis], source[2] = 2, axis
@@ -167,7 +167,7 @@ UNITS = {
 """Of a sensor its quantity, the contract's unit, and other units with their factor."""
 
 
-def in_contract_units(recordings: ReadSet, sensor: str, reading: Reading, among: Collection[str] = ()) -> Result:
+def _in_contract_units(recordings: ReadSet, sensor: str, reading: _Reading, among: Collection[str] = ()) -> Result:
     """The set with a sensor's columns in the contract's unit, where their scale is that of another (`among` some)."""
     what, expected, factors = UNITS[sensor]
     unit = nearest(1.0 / reading.scale, {name: f for name, f in factors.items() if not among or name in among})
@@ -184,15 +184,15 @@ def _turning(recordings: ReadSet) -> Result:
     reading = read(lagged.fit(compare.turning(recordings.signals)))
     if reading is None:
         return _gyroscope_units(recordings)
-    result = in_contract_units(recordings, "gyroscope", reading)
+    result = _in_contract_units(recordings, "gyroscope", reading)
     if reading.turn.identity:
         return result
-    if not attitude_fits(result.recordings.signals, vehicle):
-        for name, (signs, order) in ATTITUDES.items():
+    if not _attitude_fits(result.recordings.signals, vehicle):
+        for name, (signs, order) in _ATTITUDES.items():
             undo = partial(_quaternions, signs=signs, order=order)
             trial = replace_sensor(result.recordings, "attitude", undo)
             again = read(lagged.fit(compare.turning(trial.signals)))
-            if again and again.turn.identity and attitude_fits(trial.signals, vehicle, strict=True):
+            if again and again.turn.identity and _attitude_fits(trial.signals, vehicle, strict=True):
                 finding = Finding(
                     id="axis_sign",
                     status="established",
@@ -216,7 +216,7 @@ def force_source(all_signals: list[Signals]) -> str | None:
     return next((n for n in map(compare.speeds_of, all_signals) if n in ("rotors", "commands")), None)
 
 
-def attitude_fits(all_signals: list[Signals], vehicle: Vehicle, strict: bool = False) -> bool:
+def _attitude_fits(all_signals: list[Signals], vehicle: Vehicle, strict: bool = False) -> bool:
     """Whether the attitude agrees with what carries the vehicle: gravity on average, and velocity's changes.
 
     `strict` asks for agreement, otherwise a lack of evidence counts as agreement.
@@ -225,17 +225,17 @@ def attitude_fits(all_signals: list[Signals], vehicle: Vehicle, strict: bool = F
     for s in all_signals:
         if "attitude" in s.values and "accelerometer" in s.values:
             world = np.einsum("nij,nj->ni", s.rotation(), s.values["accelerometer"])
-            agree.append(np.nanmean(world[:, 2]) < -LEAST_GRAVITY * vehicle.gravity_m_s2)
+            agree.append(np.nanmean(world[:, 2]) < -_LEAST_GRAVITY * vehicle.gravity_m_s2)
     if agree and not all(agree):
         return False
     source = force_source(all_signals)
     fit = lagged.fit(compare.accelerating(all_signals, vehicle, source)) if source else None
     if fit is None:
         return not strict or bool(agree)
-    gains = [(fit.gain[k, k], fit.gain_sd[k, k]) for k in (0, 1) if fit.explained[k] > LEAST_EXPLAINED]
+    gains = [(fit.gain[k, k], fit.gain_sd[k, k]) for k in (0, 1) if fit.explained[k] > _LEAST_EXPLAINED]
     if not gains:
         return not strict or not np.any(fit.explained[:2] > 0.2)
-    return all(gain > max(0.3, LEAST_T / 2 * max(sd, 1e-12)) for gain, sd in gains)
+    return all(gain > max(0.3, _LEAST_T / 2 * max(sd, 1e-12)) for gain, sd in gains)
 
 
 def _gyroscope_units(recordings: ReadSet) -> Result:
@@ -249,15 +249,15 @@ def _gyroscope_units(recordings: ReadSet) -> Result:
         # The motors' lag takes most of a quick moment away.
         _, blocks = lagged.through_motor(blocks)
     fit = lagged.fit(blocks)
-    if fit is None or np.min(fit.explained) < LEAST_EXPLAINED:
+    if fit is None or np.min(fit.explained) < _LEAST_EXPLAINED:
         return Result(recordings)
     gain, sd = np.abs(np.diag(fit.gain)), np.diag(fit.gain_sd)
-    if np.any(gain < LEAST_T * sd):
+    if np.any(gain < _LEAST_T * sd):
         return Result(recordings)
     p = float(student.sf(np.min(gain / sd), max(fit.block_count - 1, 1)))
     size = float(np.sqrt(gain[0] * gain[1]))
-    reading = Reading(None, 1.0 / size, float(np.max(sd / gain)) / size, p)
-    return in_contract_units(recordings, "gyroscope", reading, ("deg/s", "mrad/s"))
+    reading = _Reading(None, 1.0 / size, float(np.max(sd / gain)) / size, p)
+    return _in_contract_units(recordings, "gyroscope", reading, ("deg/s", "mrad/s"))
 
 
 def _accelerating(recordings: ReadSet) -> Result:
@@ -274,7 +274,7 @@ def _in_the_world(recordings: ReadSet, sensor: str, fit: LaggedFit | None) -> Re
     reading = read(_inverse(fit))
     if reading is None:
         return Result(recordings)
-    result = in_contract_units(recordings, sensor, reading)
+    result = _in_contract_units(recordings, sensor, reading)
     if reading.turn.identity:
         return result
     return result.then(partial(turned, sensor=sensor, turn=reading.turn, p_value=reading.p_value))
@@ -299,7 +299,7 @@ def _sideways(recordings: ReadSet) -> Result:
     sign, p_values = [1, 1, 1], []
     for k in (0, 1):
         gain, sd = fit.gain[k, k], max(fit.gain_sd[k, k], 1e-12)
-        if gain < 0 and -gain > LEAST_T * sd and 0.5 < -gain < 2.0 and fit.explained[k] > LEAST_EXPLAINED:
+        if gain < 0 and -gain > _LEAST_T * sd and 0.5 < -gain < 2.0 and fit.explained[k] > _LEAST_EXPLAINED:
             sign[k] = -1
             p_values.append(float(student.sf(-gain / sd, max(fit.block_count - 1, 1))))
     turn = Turn((0, 1, 2), tuple(sign))

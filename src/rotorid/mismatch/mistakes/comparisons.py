@@ -26,7 +26,7 @@ BANDS_HZ = {
     "following": (0.5, 15.0),
 }
 """Of each comparison the frequencies that are looked at."""
-NYQUIST_SHARE = 0.35
+_NYQUIST_SHARE = 0.35
 """Highest frequency used, as a share of the slower sensor's own rate."""
 
 
@@ -46,7 +46,7 @@ def squared_speeds(signals: Signals, vehicle: Vehicle, sensor: str) -> np.ndarra
 def band(all_signals: list[Signals], sensors: tuple[str, ...], wanted: tuple[float, float]) -> tuple[float, float]:
     """A band that the slowest of some sensors can follow in every run."""
     rates = [s.own_rate_hz[n] for s in all_signals for n in sensors if n in s.values and s.own_rate_hz[n] > 0]
-    return wanted[0], min(wanted[1], NYQUIST_SHARE * min(rates, default=0.0))
+    return wanted[0], min(wanted[1], _NYQUIST_SHARE * min(rates, default=0.0))
 
 
 def gather(all_signals: list[Signals], sensors: tuple[str, ...], wanted: tuple[float, float], make) -> Blocks | None:

@@ -8,7 +8,7 @@ from rotorid.mismatch.mistakes.signals import Result, replace_columns
 from rotorid.recordings import RecordingSet, Run
 from rotorid.recordings import columns as c
 
-LEAST_V = 0.5
+_LEAST_V = 0.5
 """No battery that turns a rotor has less."""
 
 
@@ -20,12 +20,12 @@ def connected(recordings: RecordingSet) -> Result:
         if not run.has(c.BATTERY_VOLTAGE):
             return {}
         voltage = run.table[c.BATTERY_VOLTAGE]
-        dead = voltage < LEAST_V
+        dead = voltage < _LEAST_V
         if not dead.any():
             return {}
         mostly = dead.sum() > voltage.notna().sum() / 2
         if mostly:
-            notes.append(f"{c.BATTERY_VOLTAGE} of {run.name} reads below {LEAST_V} V: taken as not connected.")
+            notes.append(f"{c.BATTERY_VOLTAGE} of {run.name} reads below {_LEAST_V} V: taken as not connected.")
         return {c.BATTERY_VOLTAGE: np.nan if mostly else voltage.mask(dead)}
 
     return Result(replace_columns(recordings, change), notes=tuple(notes))

@@ -35,26 +35,26 @@ from rotorid.recordings.sufficient import (
     whole_stretches,
 )
 
-SHORTEST_EMPTY_S = 1.0
+_SHORTEST_EMPTY_S = 1.0
 """Empty cells say themselves that nothing was read: a link that loses half a second now and then is no lost sensor."""
-SHORTEST_STAND_S = 0.15
-STANDING = 0.2
+_SHORTEST_STAND_S = 0.15
+_STANDING = 0.2
 """A rotor below this share of what the others turn at, relative to its own habit, stands still."""
-IMPLAUSIBLE_THRUST = 0.45
+_IMPLAUSIBLE_THRUST = 0.45
 """A rotor that at its fastest gives less than this share of its part of the others' thrust is not being read."""
-LARGEST_UNTOUCHED_SHARE = 0.5
-LEAST_OF_A_SIDE = 0.5
+_LARGEST_UNTOUCHED_SHARE = 0.5
+_LEAST_OF_A_SIDE = 0.5
 """Share of the fitted or held-out part of a single run in which every sensor must have readings."""
-PLAIN_CHANGE = 8.0
+_PLAIN_CHANGE = 8.0
 """Times the noise by which a reading should have changed to be called held."""
-PLAIN_STEPS = 2.0
+_PLAIN_STEPS = 2.0
 """The same in steps of a coarse reading, which stands still until the load has changed by one."""
-OTHERS_GO_ON = 0.5
+_OTHERS_GO_ON = 0.5
 """Share of the samples in which every other rotor's command changes while one stands still."""
 
 
 @dataclass(frozen=True)
-class Dropout:
+class _Dropout:
     """One dropout of one column."""
 
     run: str
@@ -127,7 +127,7 @@ def what_is_left(recordings: RecordingSet, before: RecordingSet, lost: Finding) 
         (run,) = recordings.runs
         found, _ = whole_stretches(run, sensors[run.name])
         sides = parts_of(recordings, split_runs(recordings))
-        if all(_share(side.runs[0], found) > LEAST_OF_A_SIDE for side in sides):
+        if all(_share(side.runs[0], found) > _LEAST_OF_A_SIDE for side in sides):
             return recordings, ()
         start, stop = max(found, key=lambda s: s[1] - s[0], default=(0.0, 0.0))
         if stop - start >= LEAST_SINGLE_S:
@@ -176,7 +176,7 @@ def _share(run: Run, stretches_s: list[tuple[float, float]]) -> float:
     return sum(max(min(stop, last) - max(start, first), 0.0) for start, stop in stretches_s) / (last - first)
 
 
-def in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[Dropout]:
+def in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[_Dropout]:
     """Every dropout of a run, column by column; `noisy` columns are known to have noise of their own."""
     found, flown = [], vehicle.kind == "flight"
     for sensor, names in sensor_columns(vehicle).items():
@@ -184,7 +184,7 @@ def in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[Dropout]:
         if not present or (not flown and sensor in (*COMMANDED, "rotors")):
             continue  # on a stand rotors rest and turn evenly
         if sensor in COMMANDED:
-            found += standing_commands(run, vehicle, present, noisy) if len(present) > 1 else []
+            found += _standing_commands(run, vehicle, present, noisy) if len(present) > 1 else []
             continue
         zero = standing_rotors(run, vehicle, names) if sensor == "rotors" and len(present) == len(names) > 2 else {}
         frozen = []
@@ -206,7 +206,7 @@ def in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[Dropout]:
     return found
 
 
-def standing_commands(run: Run, vehicle: Vehicle, names: list[str], noisy: set[str]) -> list[Dropout]:
+def _standing_commands(run: Run, vehicle: Vehicle, names: list[str], noisy: set[str]) -> list[_Dropout]:
     """Stretches in which one rotor's command stands still while all others go on, or all of them do in flight.
 
     A command at the end of its range may truly stand still: its motor gives all that it can. On the ground all commands
@@ -221,7 +221,7 @@ def standing_commands(run: Run, vehicle: Vehicle, names: list[str], noisy: set[s
         against = contradiction(run, vehicle, [name])
         for mask, p in held(run.time_s, own[:, None], noisy=name in noisy, contradicted=against):
             others = np.delete(moves[mask], k, axis=1).mean(axis=0)
-            if not at_the_end(own, mask) and others.min() > OTHERS_GO_ON:
+            if not at_the_end(own, mask) and others.min() > _OTHERS_GO_ON:
                 found += _as_dropouts(run, name, "held", mask, p)
     return found
 
@@ -249,10 +249,10 @@ def load_went_on(run: Run, vehicle: Vehicle, reading: np.ndarray, held_mask: np.
     step = float(steps[steps > 0].min()) if steps.any() else 0.0
     expected = x[inside] @ slopes
     off = np.abs(expected - reading[inside])
-    return bool(max(np.ptp(expected), np.nanmedian(off)) > max(PLAIN_CHANGE * noise, PLAIN_STEPS * step))
+    return bool(max(np.ptp(expected), np.nanmedian(off)) > max(_PLAIN_CHANGE * noise, _PLAIN_STEPS * step))
 
 
-def _as_dropouts(run: Run, name: str, kind: str, mask: np.ndarray, p_value: float = 0.0) -> list[Dropout]:
+def _as_dropouts(run: Run, name: str, kind: str, mask: np.ndarray, p_value: float = 0.0) -> list[_Dropout]:
     """A mask as stretches, close ones merged."""
     t, pieces = run.time_s, []
     for start, stop in stretches(mask):
@@ -262,7 +262,7 @@ def _as_dropouts(run: Run, name: str, kind: str, mask: np.ndarray, p_value: floa
             pieces.append((start, stop))
     index = np.arange(len(t))
     return [
-        Dropout(run.name, name, kind, float(t[a]), float(t[b - 1]), (index >= a) & (index < b), p_value)
+        _Dropout(run.name, name, kind, float(t[a]), float(t[b - 1]), (index >= a) & (index < b), p_value)
         for a, b in pieces
     ]
 
@@ -275,7 +275,7 @@ def missing(time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
         return mask
     gap = np.diff(time_s[index])
     # The second shortest tenth of the recording's habit: a sensor with many holes keeps its own period.
-    longest = max(SHORTEST_EMPTY_S, SHORTEST_GAP_PERIODS * float(np.median(gap)), 3 * float(np.quantile(gap, 0.98)))
+    longest = max(_SHORTEST_EMPTY_S, SHORTEST_GAP_PERIODS * float(np.median(gap)), 3 * float(np.quantile(gap, 0.98)))
     for k in np.flatnonzero(gap > longest):
         mask[index[k] + 1 : index[k + 1]] = True
     return mask
@@ -299,14 +299,14 @@ def standing_rotors(run: Run, vehicle: Vehicle, names: tuple[str, ...]) -> dict[
             continue
         read = speed[flying][:, np.isfinite(speed[flying]).any(axis=0)]
         thrust = np.nanquantile(speed[flying, i], 0.98) ** 2 / max(np.nanmedian(read, axis=0).max() ** 2, 1e-9)
-        if thrust < IMPLAUSIBLE_THRUST and _balanced(vehicle, i):
+        if thrust < _IMPLAUSIBLE_THRUST and _balanced(vehicle, i):
             out[name] = np.isfinite(speed[:, i])
             continue
-        zero = flying & (speed[:, i] < STANDING * top)
+        zero = flying & (speed[:, i] < _STANDING * top)
         sudden = np.zeros(len(zero), bool)
         for start, stop in stretches(zero):
             # A saturated motor may truly stand for a moment.
-            if run.time_s[stop - 1] - run.time_s[start] < SHORTEST_STAND_S:
+            if run.time_s[stop - 1] - run.time_s[start] < _SHORTEST_STAND_S:
                 continue
             # A rotor cannot stop and start within a sample or two: look at its readings just outside.
             near = np.concatenate([speed[max(start - 2, 0) : start, i], speed[stop : stop + 2, i]])
@@ -316,7 +316,7 @@ def standing_rotors(run: Run, vehicle: Vehicle, names: tuple[str, ...]) -> dict[
         if sudden.any():
             # Readings strewn between zeros are no better than the zeros.
             share = sudden[flying].mean()
-            out[name] = np.isfinite(speed[:, i]) if share > LARGEST_UNTOUCHED_SHARE else sudden
+            out[name] = np.isfinite(speed[:, i]) if share > _LARGEST_UNTOUCHED_SHARE else sudden
     return out
 
 

@@ -16,23 +16,23 @@ from rotorid.mismatch.plant.motion import stretches
 from rotorid.recordings.signal import kernels
 
 BLOCK_S = 2.56
-OVERSAMPLING = 5.0
+_OVERSAMPLING = 5.0
 """Rate of the thinned signals over the cutoff."""
-PERFECTION = 1e-3
+_PERFECTION = 1e-3
 """Share of an output's own power that is always taken as noise: files hold columns computed from each other."""
-SMOOTHED = 5
+_SMOOTHED = 5
 """Neighbouring frequencies over which powers are averaged."""
 OVERLAP = 1.94
 """Neighbouring frequencies of a Hann window are correlated: sums of squares vary by this more."""
 FEWEST_BLOCKS = 4
-PIECE_BINS = 6
+_PIECE_BINS = 6
 """Frequencies of a block that count as one piece: with Hann's window only next neighbours are correlated, so that the
 pieces of a block are nearly independent. Short flights have too few blocks to be judged by: what stands at eight
 standard errors is no chance, and yet 1 in 20,000 by Student's t of eight blocks."""
 LONGEST_LAG_S = 0.15
-MOTOR_LAGS_S = np.concatenate([[0.0], np.geomspace(0.004, 0.25, 24)])
-DEAD_TIMES_S = np.arange(-0.03, 0.061, 0.005)
-UNDECIDED = 12.0
+_MOTOR_LAGS_S = np.concatenate([[0.0], np.geomspace(0.004, 0.25, 24)])
+_DEAD_TIMES_S = np.arange(-0.03, 0.061, 0.005)
+_UNDECIDED = 12.0
 """Motor lags within this log-likelihood are not distinguished."""
 
 
@@ -102,7 +102,7 @@ def cut(
     parts = [y, x] + ([z] if z is not None else [])
     good = np.all([np.isfinite(p.values).all(axis=1) for p in parts], axis=0)
     # Analysis above the band is thinned away; all runs must share one grid of frequencies.
-    step = max(1, int(rate_hz / (OVERSAMPLING * cutoff)))
+    step = max(1, int(rate_hz / (_OVERSAMPLING * cutoff)))
     length = int(round(BLOCK_S * rate_hz / step))
     frequency = np.arange(1, int(np.ceil(band_hz[1] * BLOCK_S)) + 1) / BLOCK_S
     used = np.flatnonzero((frequency >= band_hz[0]) & (frequency <= band_hz[1]))
@@ -148,13 +148,13 @@ class LaggedFit:
     block_count: int
 
 
-def noise_weight(blocks: Blocks, left: np.ndarray) -> np.ndarray:
+def _noise_weight(blocks: Blocks, left: np.ndarray) -> np.ndarray:
     """1 / power of a residual (b, m, q), with a floor, (q, m)."""
     power, own = (smooth(np.mean(np.abs(v) ** 2, axis=0)).T for v in (left, blocks.y))
-    return 1.0 / (power + PERFECTION * own + 1e-30)
+    return 1.0 / (power + _PERFECTION * own + 1e-30)
 
 
-def coherence(blocks: Blocks) -> np.ndarray:
+def _coherence(blocks: Blocks) -> np.ndarray:
     """Share of every output's power at each frequency that X explains with any gain and phase, (q, m).
 
     What chance would explain is taken off. Where only noise is left in X, its size must not shrink the gains.
@@ -168,13 +168,13 @@ def coherence(blocks: Blocks) -> np.ndarray:
     cross = sxy / size[:, :, None]
     share = np.real(np.einsum("mkj,mkj->mj", cross.conj(), np.linalg.solve(scaled, cross))) / (syy + 1e-300)
     rank = np.mean(np.sum(np.linalg.eigvalsh(scaled) > 1e-3, axis=1))
-    chance = min(0.9, rank * OVERLAP / (SMOOTHED * blocks.count))
+    chance = min(0.9, rank * OVERLAP / (_SMOOTHED * blocks.count))
     return np.clip((share - chance) / (1 - chance), 0.0, 1.0).T
 
 
 def smooth(values: np.ndarray) -> np.ndarray:
     """Running mean along axis 0, over neighbouring frequencies."""
-    width = min(SMOOTHED, len(values))
+    width = min(_SMOOTHED, len(values))
     pad = [(width // 2, width - 1 - width // 2)] + [(0, 0)] * (values.ndim - 1)
     padded = np.pad(values, pad, mode="edge")
     return sum(padded[k : k + len(values)] for k in range(width)) / width
@@ -188,14 +188,14 @@ def _moments(x: np.ndarray, y: np.ndarray, weight: np.ndarray) -> tuple[np.ndarr
     return gram, cross
 
 
-def by_frequency(blocks: Blocks) -> tuple[np.ndarray, np.ndarray]:
+def _by_frequency(blocks: Blocks) -> tuple[np.ndarray, np.ndarray]:
     """Products of X and Z with each other, (m, K, K), and with Y, (m, K, q), summed over the blocks."""
     columns = np.concatenate([blocks.x, blocks.z], axis=2).transpose(1, 0, 2)
     turned = columns.conj().swapaxes(1, 2)
     return turned @ columns, turned @ blocks.y.transpose(1, 0, 2)
 
 
-def explained_at(products: tuple[np.ndarray, np.ndarray], weight: np.ndarray, transfer: np.ndarray) -> np.ndarray:
+def _explained_at(products: tuple[np.ndarray, np.ndarray], weight: np.ndarray, transfer: np.ndarray) -> np.ndarray:
     """Weighted squares that all columns explain together where they pass transfers (l, m, K), (l,)."""
     inside, with_y = products
     back = transfer.conj()
@@ -227,14 +227,14 @@ def fit(blocks: Blocks | None, lags_s: np.ndarray | None = None) -> LaggedFit | 
     if lags_s is None:
         step = 1.0 / (8 * frequency[-1])
         lags_s = np.arange(-LONGEST_LAG_S, LONGEST_LAG_S + step / 2, step)
-    trusted = coherence(blocks) + 1e-6
-    weight = trusted * noise_weight(blocks, blocks.y)
-    products = by_frequency(blocks)
+    trusted = _coherence(blocks) + 1e-6
+    weight = trusted * _noise_weight(blocks, blocks.y)
+    products = _by_frequency(blocks)
 
     def explained_by(lags: np.ndarray) -> np.ndarray:
         late = np.repeat(delay(frequency, lags)[:, :, None], blocks.x.shape[2], axis=2)
         not_late = np.ones((*late.shape[:2], blocks.z.shape[2]))
-        return explained_at(products, weight, np.concatenate([late, not_late], axis=2))
+        return _explained_at(products, weight, np.concatenate([late, not_late], axis=2))
 
     for _ in range(2):
         lag = _peak(lags_s, explained_by(lags_s))
@@ -245,7 +245,7 @@ def fit(blocks: Blocks | None, lags_s: np.ndarray | None = None) -> LaggedFit | 
             lags_s = lag + np.linspace(-3, 3, 13) * step
         x = np.concatenate([blocks.delayed(lag).x, blocks.z], axis=2)
         gram_b, cross_b = _moments(x, blocks.y, weight)
-        weight = trusted * noise_weight(blocks, blocks.y - x @ _solve(gram_b.sum(axis=0), cross_b.sum(axis=0)).T)
+        weight = trusted * _noise_weight(blocks, blocks.y - x @ _solve(gram_b.sum(axis=0), cross_b.sum(axis=0)).T)
     gram_b, cross_b = _moments(x, blocks.y, weight)
     gram, cross = gram_b.sum(axis=0), cross_b.sum(axis=0)
     beta = _solve(gram, cross)
@@ -273,7 +273,7 @@ def fit(blocks: Blocks | None, lags_s: np.ndarray | None = None) -> LaggedFit | 
 
 def pieces(frequency_hz: np.ndarray) -> list[np.ndarray]:
     """Places of the frequencies that make a piece each."""
-    return np.array_split(np.arange(frequency_hz.size), max(1, frequency_hz.size // PIECE_BINS))
+    return np.array_split(np.arange(frequency_hz.size), max(1, frequency_hz.size // _PIECE_BINS))
 
 
 def beyond_nuisances(turn: np.ndarray, z: np.ndarray, weight: np.ndarray) -> np.ndarray:
@@ -310,13 +310,13 @@ def through_motor(blocks: Blocks) -> tuple[float, Blocks]:
     def attempt(tau):
         through = 1.0 / (1.0 + 2j * np.pi * blocks.frequency_hz * tau)
         trial = replace(blocks, x=blocks.x * through[None, :, None])
-        found = fit(trial, DEAD_TIMES_S)
+        found = fit(trial, _DEAD_TIMES_S)
         left = trial.y - trial.delayed(found.lag_s).x @ found.gain.T - trial.z @ found.nuisance.T
         # By the weights of one fit, so that fits can be compared.
         squares = float(np.sum(np.sum(base.weight.T[None] * np.abs(left) ** 2, axis=1)))
         trials[float(tau)] = (squares, abs(found.lag_s), trial)
 
-    for tau in MOTOR_LAGS_S:
+    for tau in _MOTOR_LAGS_S:
         attempt(tau)
     for width in (0.09, 0.03):
         best = min(trials, key=lambda tau: trials[tau][0])
@@ -324,7 +324,7 @@ def through_motor(blocks: Blocks) -> tuple[float, Blocks]:
             attempt(best * factor)
     best = min(trials, key=lambda tau: trials[tau][0])
     # Slow motion cannot distinguish a lag from a dead time: where it fits as well with hardly any, there is none.
-    plausible = [tau for tau in trials if trials[tau][0] < trials[best][0] + UNDECIDED]
+    plausible = [tau for tau in trials if trials[tau][0] < trials[best][0] + _UNDECIDED]
     least = min(plausible, key=lambda tau: trials[tau][1])
     chosen = least if trials[least][1] < 0.5 * trials[best][1] else best
     return chosen, trials[chosen][2]

@@ -24,21 +24,21 @@ from rotorid.mismatch.mistakes.lagged import OVERLAP, Blocks, LaggedFit, Signal
 from rotorid.mismatch.mistakes.signals import ReadSet, Result, Signals, replace_columns, sensor_columns
 from rotorid.recordings import Run, Vehicle
 
-MOST_ROTORS_FOR_EVERY_ORDER = 6
-LEAST_LIKELIHOOD = 25.0
+_MOST_ROTORS_FOR_EVERY_ORDER = 6
+_LEAST_LIKELIHOOD = 25.0
 """Log-likelihood that the right layout must bring over none, and over the believed one."""
-LEAST_ADVANTAGE = 1.5
+_LEAST_ADVANTAGE = 1.5
 """What the right layout explains over what the believed one explains, at least."""
 LEAST_STEP = 0.6
 P_LIMIT = 1e-6
-LATER_S = np.arange(0.005, 0.1001, 0.005)
+_LATER_S = np.arange(0.005, 0.1001, 0.005)
 """By how much longer the torque of rotors may lag behind their commands than the delay that roll shows."""
-TIED_LIKELIHOOD, TIED_SHARE = 12.0, 0.02
+_TIED_LIKELIHOOD, _TIED_SHARE = 12.0, 0.02
 """Layouts within this log-likelihood, or this share of what is explained, are not distinguished."""
 
 
 @dataclass(frozen=True)
-class Moments:
+class _Moments:
     """Normal equations of an axis, piece by piece (a block's band of frequencies), nuisances already taken out."""
 
     square: np.ndarray
@@ -54,7 +54,7 @@ class Moments:
         return float(self.square.sum()), self.cross.sum(axis=0), self.gram.sum(axis=0)
 
 
-def moments(blocks: Blocks, output: int, lag_s: float, weight: np.ndarray) -> Moments:
+def moments(blocks: Blocks, output: int, lag_s: float, weight: np.ndarray) -> _Moments:
     """Moments of one output with the rotors delayed and Z projected out."""
     x = blocks.x * lagged.delay(blocks.frequency_hz, lag_s)[:, :, None]
     y, z = blocks.y[:, :, output], blocks.z
@@ -68,7 +68,7 @@ def moments(blocks: Blocks, output: int, lag_s: float, weight: np.ndarray) -> Mo
     square = [np.sum(w * np.abs(y) ** 2, axis=1) for _, y, w in parts]
     cross = [np.real(np.einsum("bmk,bm->bk", x.conj() * w[:, None], y)) for x, y, w in parts]
     gram = [np.real(np.einsum("bmk,bml->bkl", x.conj() * w[:, None], x)) for x, _, w in parts]
-    return Moments(*(np.concatenate(part) for part in (square, cross, gram)))
+    return _Moments(*(np.concatenate(part) for part in (square, cross, gram)))
 
 
 def rows_of(vehicle: Vehicle) -> np.ndarray:
@@ -77,25 +77,25 @@ def rows_of(vehicle: Vehicle) -> np.ndarray:
     return np.stack([-at[:, 1] / inertia.xx, at[:, 0] / inertia.yy])
 
 
-def best_gain(m: Moments, row: np.ndarray) -> np.ndarray:
+def _best_gain(m: _Moments, row: np.ndarray) -> np.ndarray:
     """A row (k,) times its best positive gain."""
     _, cross, gram = m.whole
     size = row @ gram @ row
     return row * (max(cross @ row / size, 0.0) if size > 0 else 0.0)
 
 
-def loss(m: Moments, row: np.ndarray) -> float:
+def _loss(m: _Moments, row: np.ndarray) -> float:
     """What a row (k,) leaves of an axis."""
     square, cross, gram = m.whole
     return float(square - 2 * cross @ row + row @ gram @ row)
 
 
-def tie(whole: float, best: float) -> float:
+def _tie(whole: float, best: float) -> float:
     """Largest loss that still counts as the best."""
-    return best + max(OVERLAP * TIED_LIKELIHOOD, TIED_SHARE * (whole - best))
+    return best + max(OVERLAP * _TIED_LIKELIHOOD, _TIED_SHARE * (whole - best))
 
 
-def losses_of_orders(m: list[Moments], rows: np.ndarray, orders: np.ndarray) -> np.ndarray:
+def _losses_of_orders(m: list[_Moments], rows: np.ndarray, orders: np.ndarray) -> np.ndarray:
     """What every order (h, k) leaves of roll and pitch, each with its best positive gain, (h,)."""
     total = np.zeros(len(orders))
     for axis, part in enumerate(m):
@@ -107,9 +107,9 @@ def losses_of_orders(m: list[Moments], rows: np.ndarray, orders: np.ndarray) -> 
     return total
 
 
-def orders_to_try(count: int) -> np.ndarray:
+def _orders_to_try(count: int) -> np.ndarray:
     """Orders of the columns: every one for few rotors, else every exchange of two; the believed one first."""
-    if count <= MOST_ROTORS_FOR_EVERY_ORDER:
+    if count <= _MOST_ROTORS_FOR_EVERY_ORDER:
         return np.array(list(permutations(range(count))))
     exchanges = np.tile(np.arange(count), (1 + count * (count - 1) // 2, 1))
     for order, (i, j) in zip(exchanges[1:], combinations(range(count), 2), strict=True):
@@ -123,7 +123,7 @@ def moves(order: np.ndarray) -> int:
     return len(order) - cycles
 
 
-def contest(axis_moments: list[Moments], believed: list[np.ndarray], other: list[np.ndarray]) -> tuple[float, float]:
+def _contest(axis_moments: list[_Moments], believed: list[np.ndarray], other: list[np.ndarray]) -> tuple[float, float]:
     """How far the data go from a believed prediction (rows (k,) an axis, gains included) towards another.
 
     The step (0: the believed one fits; 1: the other does), and the p-value that it is zero, for pieces that are
@@ -157,21 +157,21 @@ def find(recordings: ReadSet) -> Result:
         return Result(recordings)
     parts = [moments(blocks, axis, free.lag_s, free.weight[axis]) for axis in (0, 1)]
     rows = rows_of(vehicle)
-    orders = orders_to_try(vehicle.rotor_count)
+    orders = _orders_to_try(vehicle.rotor_count)
     yaw = _yaw_moments(signals, vehicle, sensor, free)
     believed = vehicle.yaw_signs()
     senses = np.array(list(product((1.0, -1.0), repeat=vehicle.rotor_count))) if yaw else believed[None]
     # Every layout with the delay that suits it best: half a period of an oscillation late is the other sense.
-    by_lag = np.array([[loss(m, _yaw_row(m, s)) for s in senses] for m in yaw]) if yaw else np.zeros((1, 1))
+    by_lag = np.array([[_loss(m, _yaw_row(m, s)) for s in senses] for m in yaw]) if yaw else np.zeros((1, 1))
     yaw_losses = by_lag.min(axis=0)
-    losses = losses_of_orders(parts, rows, orders)[:, None] + yaw_losses[None, :]
+    losses = _losses_of_orders(parts, rows, orders)[:, None] + yaw_losses[None, :]
     if not np.isfinite(losses).all():
         # Rotors that all turn alike make no moment that distinguishes them.
         return Result(recordings)
     whole = float(sum(m.square.sum() for m in parts) + (yaw[0].square.sum() if yaw else 0.0))
     costs = np.array([moves(o) for o in orders])[:, None] + (_turned_cost(senses, believed[orders]) if yaw else 0)
     least = float(losses.min())
-    tied = np.argwhere(losses <= tie(whole, least))
+    tied = np.argwhere(losses <= _tie(whole, least))
     ranked = sorted(tied.tolist(), key=lambda at: (costs[at[0], at[1]], losses[at[0], at[1]]))
     order, spun = ranked[0]
     if costs[order, spun] == 0:
@@ -181,26 +181,26 @@ def find(recordings: ReadSet) -> Result:
     for a, m in enumerate(parts):
         if not np.array_equal(rows[a], rows[a][orders[order]]):
             contested.append(m)
-            now.append(best_gain(m, rows[a]))
-            then.append(best_gain(m, rows[a][orders[order]]))
+            now.append(_best_gain(m, rows[a]))
+            then.append(_best_gain(m, rows[a][orders[order]]))
     same = int(np.flatnonzero((senses == believed).all(axis=1))[0])
-    as_believed, best = (sum(loss(m, row) for m, row in zip(contested, side, strict=True)) for side in (now, then))
+    as_believed, best = (sum(_loss(m, row) for m, row in zip(contested, side, strict=True)) for side in (now, then))
     if yaw and spun != same:
         own = yaw[int(by_lag[:, spun].argmin())]
         contested.append(own)
         now.append(_yaw_row(own, senses[same]))
         then.append(_yaw_row(own, senses[spun]))
         as_believed, best = as_believed + yaw_losses[same], best + yaw_losses[spun]
-    step, p_value = contest(contested, now, then)
+    step, p_value = _contest(contested, now, then)
     p_value = min(1.0, p_value * losses.size)
     disputed = float(sum(m.square.sum() for m in contested))
-    likely = (as_believed - best) / OVERLAP > LEAST_LIKELIHOOD
-    explains = disputed - best > LEAST_ADVANTAGE * (disputed - as_believed)
+    likely = (as_believed - best) / OVERLAP > _LEAST_LIKELIHOOD
+    explains = disputed - best > _LEAST_ADVANTAGE * (disputed - as_believed)
     if not (likely and explains and step > LEAST_STEP and p_value < P_LIMIT):
         return Result(recordings)
     cost = int(costs[order, spun])
     if not any({"attitude", "gyroscope"} <= set(s.values) for s in signals):
-        gyroscope = _turned_gyroscope(recordings, parts, rows, yaw, believed, tie(whole, least), cost, p_value)
+        gyroscope = _turned_gyroscope(recordings, parts, rows, yaw, believed, _tie(whole, least), cost, p_value)
         if gyroscope:
             return gyroscope
     rival = any(costs[a, b] == cost for a, b in ranked[1:])
@@ -223,9 +223,9 @@ def _turned_cost(senses: np.ndarray, expected: np.ndarray) -> np.ndarray:
 
 def _turned_gyroscope(
     recordings: ReadSet,
-    parts: list[Moments],
+    parts: list[_Moments],
     rows: np.ndarray,
-    yaw: list[Moments],
+    yaw: list[_Moments],
     believed: np.ndarray,
     enough: float,
     cost: int,
@@ -239,8 +239,8 @@ def _turned_gyroscope(
     best = None
     for source, signs in product(((0, 1, 2), (1, 0, 2)), product((1, -1), repeat=3)):
         true = [signs[i] * rows[source[i]] for i in (0, 1)]
-        total = sum(loss(m, best_gain(m, row)) for m, row in zip(parts, true, strict=True))
-        total += min((loss(m, _yaw_row(m, signs[2] * believed)) for m in yaw), default=0.0)
+        total = sum(_loss(m, _best_gain(m, row)) for m, row in zip(parts, true, strict=True))
+        total += min((_loss(m, _yaw_row(m, signs[2] * believed)) for m in yaw), default=0.0)
         changes = sum(s < 0 for s in signs) + (source != (0, 1, 2))
         if total <= enough and 0 < changes <= cost and (best is None or changes < best[0]):
             best = (changes, Turn(source, signs))
@@ -294,7 +294,7 @@ def _reordered(recordings: ReadSet, order: np.ndarray, p: float, ambiguous: bool
     return Result(recordings if ambiguous else replace_columns(recordings, change), (finding,))
 
 
-def _yaw_moments(signals: list[Signals], vehicle: Vehicle, sensor: str, roll: LaggedFit) -> list[Moments]:
+def _yaw_moments(signals: list[Signals], vehicle: Vehicle, sensor: str, roll: LaggedFit) -> list[_Moments]:
     """Yaw acceleration against every rotor's torque (k) and acceleration (k); none without a torque coefficient.
 
     Measured rotors are as late as roll says. Commands may be later: of rotors that lag, torque and acceleration are.
@@ -313,7 +313,7 @@ def _yaw_moments(signals: list[Signals], vehicle: Vehicle, sensor: str, roll: La
     sharp = roll.lag_sd < 0.005
     late = roll.lag_s if sharp else 0.0
     free = lagged.fit(blocks, np.array([late]))
-    lags = [late] if sensor == "rotors" else [late, *(late + LATER_S)]
+    lags = [late] if sensor == "rotors" else [late, *(late + _LATER_S)]
     return [moments(blocks, 0, lag, free.weight[0]) for lag in lags] if free else []
 
 
@@ -341,7 +341,7 @@ def _spun(recordings: ReadSet, rotors: list[int], p_value: float, ambiguous: boo
     return Result(fixed, (finding,))
 
 
-def _yaw_row(m: Moments, signs: np.ndarray) -> np.ndarray:
+def _yaw_row(m: _Moments, signs: np.ndarray) -> np.ndarray:
     """Best row (2k,) of torques and acceleration torques with these senses; neither gain negative."""
     k = len(signs)
     basis = np.zeros((2 * k, 2))

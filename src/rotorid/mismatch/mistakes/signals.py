@@ -18,7 +18,7 @@ COMMANDED = ("commands", "throttle")
 """Sensors that are what was asked of the rotors, not what was measured."""
 P_LIMIT = 1e-9
 """p-value below which the readings of a sensor show a mistake by themselves."""
-LONGEST_BRIDGED_SAMPLES = 6
+_LONGEST_BRIDGED_SAMPLES = 6
 """A hole of up to this many of a sensor's own periods is interpolated; a longer one stays missing."""
 
 
@@ -95,12 +95,12 @@ def on_grid(time_s: np.ndarray, values: np.ndarray, grid_s: np.ndarray) -> np.nd
         return v.astype(float)
     out = CubicSpline(t, v, axis=0, extrapolate=False)(grid_s)
     gap = np.diff(t)
-    for k in np.flatnonzero(gap > LONGEST_BRIDGED_SAMPLES * float(np.median(gap))):
+    for k in np.flatnonzero(gap > _LONGEST_BRIDGED_SAMPLES * float(np.median(gap))):
         out[(grid_s > t[k]) & (grid_s < t[k + 1])] = np.nan
     return out
 
 
-def read_signals(run: Run, vehicle: Vehicle) -> Signals:
+def _read_signals(run: Run, vehicle: Vehicle) -> Signals:
     """Every sensor of a run on the run's own median period."""
     t = run.time_s
     rate = 1.0 / float(np.median(np.diff(t)))
@@ -124,7 +124,7 @@ class ReadSet(RecordingSet):
     @cached_property
     def signals(self) -> list[Signals]:
         """Signals of every run."""
-        return [read_signals(run, self.vehicle) for run in self.runs]
+        return [_read_signals(run, self.vehicle) for run in self.runs]
 
 
 def replace_columns(recordings: RecordingSet, change) -> RecordingSet:

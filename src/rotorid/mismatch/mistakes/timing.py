@@ -31,45 +31,45 @@ from rotorid.mismatch.mistakes.signals import (
 )
 from rotorid.recordings import Run, Vehicle
 
-LEAST_ALONE = 0.9
+_LEAST_ALONE = 0.9
 """Share of the motion that commands must explain to show a constant lateness: below it the motors' lag, fitted later,
-shows their dead time better. A growth of it is bounded by what disturbances can feign (`disturbed_s`)."""
+shows their dead time better. A growth of it is bounded by what disturbances can feign (`_disturbed_s`)."""
 LEAST_SHARE = 0.1
 """A sensor that moves a comparison's lateness by less than this share of its own is not connected by it."""
-SHARE_STEP_S = 0.004
+_SHARE_STEP_S = 0.004
 """By how much a sensor is made late to see how far a comparison's lateness follows."""
-LEAST_EXPLAINED = 0.6
-P_LIMIT, P_LATE = 1e-6, 1e-4
+_LEAST_EXPLAINED = 0.6
+P_LIMIT, _P_LATE = 1e-6, 1e-4
 """Chance of a growth of lateness, and of a constant one beyond a sample; both have to bring LEAST_LIKELIHOOD too."""
-LEAST_LIKELIHOOD = 60.0
+_LEAST_LIKELIHOOD = 60.0
 """Rise of the log-likelihood that a delay, or its growth, must bring."""
-MOTOR_FORM = 0.15
+_MOTOR_FORM = 0.15
 """A dead time up to this share of a motor's lag is the lag's form (no motor is exactly first order)."""
-MOTOR_SLOWS_PER_S = 0.1 / 30.0
+_MOTOR_SLOWS_PER_S = 0.1 / 30.0
 """Share of itself by which a motor's lag grows in a second: no battery loses a tenth of its voltage within 30 s."""
-FILTER_SAMPLES, FILTER_S = 2.6, 0.008
+_FILTER_SAMPLES, _FILTER_S = 2.6, 0.008
 """One inertial sensor, or the commands, alone off by less than both is a filter or a controller, not a logger."""
-SMALL_LAGS = {
+_SMALL_LAGS = {
     "gyroscope": "as its built-in filter makes it; shifted, not counted as a finding",
     "accelerometer": "as its built-in filter makes it; shifted, not counted as a finding",
     "commands": "as motor controllers take; left as part of the motors' lag",
     "throttle": "as motor controllers take; left as part of the motors' lag",
 }
-RUN_AGREEMENT, RUN_SIGMAS = 0.1, 3.0
+_RUN_AGREEMENT, _RUN_SIGMAS = 0.1, 3.0
 """Share of a drift, and one-sigmas of its own, that a run's drift may be off all runs'."""
-AS_WELL = 9.0
+_AS_WELL = 9.0
 """Squared standard errors within which two explanations of all growths are as good."""
-LARGEST_SKEW = 1.2e-2
-LONGEST_DRIFT_S = 0.4
-COARSE_SKEWS = 6
-COARSE_LAGS_S = np.arange(-0.12, 0.121, 0.01)
-LAG_STEP_S = 0.001
-LATE_FLOOR_S = 2e-5
-BAND_STEP, LEAST_BAND = 1.5, 5.0
+_LARGEST_SKEW = 1.2e-2
+_LONGEST_DRIFT_S = 0.4
+_COARSE_SKEWS = 6
+_COARSE_LAGS_S = np.arange(-0.12, 0.121, 0.01)
+_LAG_STEP_S = 0.001
+_LATE_FLOOR_S = 2e-5
+_BAND_STEP, _LEAST_BAND = 1.5, 5.0
 """Ratio of the bands that are tried, and of the narrowest's ends (0.4 to 2 Hz)."""
-LEAST_GAIN = 0.97
+_LEAST_GAIN = 0.97
 """Gain between two readings of one quantity, over that at the lowest frequencies, below which noise decides."""
-SCALES = (0.85, 1.25)
+_SCALES = (0.85, 1.25)
 """Gain at the lowest frequencies that may be a sensor's scale (a filter's velocity of a fast flight: 1.15)."""
 
 
@@ -134,11 +134,11 @@ class Difference:
         of their number.
         """
         if key == 0:
-            return max(self.bias_s, MOTOR_FORM * self.of.motor_s)
+            return max(self.bias_s, _MOTOR_FORM * self.of.motor_s)
         blocks = self.of.blocks
         longest_s = float(blocks.time_s.max()) + lagged.BLOCK_S / 2
         disturbed = 2 * self.bias_s / np.sqrt(len(np.unique(blocks.run))) / longest_s
-        return max(disturbed, MOTOR_SLOWS_PER_S * self.of.motor_s)
+        return max(disturbed, _MOTOR_SLOWS_PER_S * self.of.motor_s)
 
 
 def find(recordings: ReadSet) -> Result:
@@ -188,7 +188,7 @@ def comparisons(recordings: ReadSet) -> list[Comparison]:
         if found is None:
             continue
         if late == "velocity":
-            shares = shares_of(all_signals, vehicle, source, [0, 1] if over == "attitude" else [2], found)
+            shares = _shares_of(all_signals, vehicle, source, [0, 1] if over == "attitude" else [2], found)
         out.append(Comparison(late, over, blocks, found, motor_s, shares))
     return out
 
@@ -201,7 +201,7 @@ def one_quantity(blocks: Blocks, own: Sequence[int]) -> Blocks | None:
     too, with a phase of its own. `own` says which column of X is the same quantity as each output.
     """
     lowest, top = blocks.frequency_hz[0], blocks.frequency_hz[-1]
-    tops = top / BAND_STEP ** np.arange(1 + int(np.log(top / (LEAST_BAND * lowest)) / np.log(BAND_STEP)))
+    tops = top / _BAND_STEP ** np.arange(1 + int(np.log(top / (_LEAST_BAND * lowest)) / np.log(_BAND_STEP)))
     bands = [b for b in (blocks.up_to(f) for f in tops) if b.frequency_hz.size > 1]
     gains = []
     for band in bands:
@@ -209,12 +209,12 @@ def one_quantity(blocks: Blocks, own: Sequence[int]) -> Blocks | None:
         if found is None:
             return blocks
         gains.append(float(np.mean(found.gain[range(len(own)), own])))
-    if not gains or not SCALES[0] < gains[-1] < SCALES[1]:
+    if not gains or not _SCALES[0] < gains[-1] < _SCALES[1]:
         return None
-    return next(b for b, gain in zip(bands, gains, strict=True) if gain > LEAST_GAIN * gains[-1])
+    return next(b for b, gain in zip(bands, gains, strict=True) if gain > _LEAST_GAIN * gains[-1])
 
 
-def shares_of(
+def _shares_of(
     all_signals: list[Signals], vehicle: Vehicle, source: str, outputs: list[int], found: LaggedFit
 ) -> tuple[tuple[str, float], ...]:
     """By how much the lateness of the velocity follows that of the attitude, and that of the force turned by it.
@@ -222,7 +222,7 @@ def shares_of(
     In gentle flight level motion follows the tilt; in a fast one the force itself changes more. Both late together move
     the velocity's lateness by all of it, so that the shares sum to one.
     """
-    steps = max(1, round(SHARE_STEP_S * all_signals[0].rate_hz))
+    steps = max(1, round(_SHARE_STEP_S * all_signals[0].rate_hz))
     moved = [_late(s, "attitude", steps) for s in all_signals]
     blocks = compare.accelerating(moved, vehicle, source)
     again = lagged.fit(blocks.outputs(outputs)) if blocks is not None else None
@@ -248,11 +248,11 @@ def difference(of: Comparison, drifting: bool, free: bool = True) -> Difference:
     first fit.
     """
     blocks, found = of.blocks, of.fit
-    longest = LONGEST_DRIFT_S if drifting else lagged.LONGEST_LAG_S
-    lags = np.arange(-longest, longest + 1e-9, LAG_STEP_S)
+    longest = _LONGEST_DRIFT_S if drifting else lagged.LONGEST_LAG_S
+    lags = np.arange(-longest, longest + 1e-9, _LAG_STEP_S)
     # Only the fast comparisons with the gyroscope blur beyond recognition.
-    if free and drifting and np.min(found.explained) < LEAST_EXPLAINED and "gyroscope" in (of.late, of.over):
-        found = unblurred(blocks, found)
+    if free and drifting and np.min(found.explained) < _LEAST_EXPLAINED and "gyroscope" in (of.late, of.over):
+        found = _unblurred(blocks, found)
     start, growth = found.lag_s, 0.0
     for _ in range(3 if drifting else 1):
         curves = likelihood(blocks, found, lags)
@@ -281,7 +281,7 @@ def difference(of: Comparison, drifting: bool, free: bool = True) -> Difference:
     size = design.shape[1]
     # The likelihood's own curvature counts as a floor.
     covariance[:size, :size] = robust if np.trace(robust) > np.trace(inverse) else inverse
-    covariance[0, 0] += LATE_FLOOR_S**2
+    covariance[0, 0] += _LATE_FLOOR_S**2
     unmoved = blocks.y - blocks.x @ found.gain.T - blocks.z @ found.nuisance.T
     rise = float(np.sum(weight * (np.abs(unmoved) ** 2 - np.abs(left) ** 2)))
     gained = 0.0
@@ -291,11 +291,11 @@ def difference(of: Comparison, drifting: bool, free: bool = True) -> Difference:
         gained = float(drift - likelihood(blocks, found, lags).sum(axis=0).max())
     explained = float(np.min(found.explained))
     answered = of.over == "rotors" or (of.over in COMMANDED and of.late != "rotors")
-    bias_s = disturbed_s(blocks, found) if answered else 0.0
+    bias_s = _disturbed_s(blocks, found) if answered else 0.0
     return Difference(of, start, growth, covariance, rise, len(time_s), explained, gained, bias_s)
 
 
-def disturbed_s(blocks: Blocks, found: LaggedFit) -> float:
+def _disturbed_s(blocks: Blocks, found: LaggedFit) -> float:
     """The most lateness that disturbances can feign where the rotors explain a share E of the motion, s.
 
     What disturbs a vehicle makes its controller answer, so that what is left of the motion is not independent of the
@@ -309,12 +309,12 @@ def disturbed_s(blocks: Blocks, found: LaggedFit) -> float:
     return float((phase[:, None] * power * angular).sum() / (power * angular**2).sum())
 
 
-def unblurred(blocks: Blocks, found: LaggedFit) -> LaggedFit:
+def _unblurred(blocks: Blocks, found: LaggedFit) -> LaggedFit:
     """The fit at the coarse growth that explains most, its delay that of the middle of the runs."""
     aside = blocks.time_s - blocks.time_s.mean()
     best = found
-    for rate in np.arange(-COARSE_SKEWS, COARSE_SKEWS + 1) * LARGEST_SKEW / COARSE_SKEWS:
-        trial = lagged.fit(blocks.delayed(rate * aside), COARSE_LAGS_S)
+    for rate in np.arange(-_COARSE_SKEWS, _COARSE_SKEWS + 1) * _LARGEST_SKEW / _COARSE_SKEWS:
+        trial = lagged.fit(blocks.delayed(rate * aside), _COARSE_LAGS_S)
         if np.min(trial.explained) > np.min(best.explained):
             best = trial
     return best
@@ -332,15 +332,15 @@ def likelihood(blocks: Blocks, found: LaggedFit, lags: np.ndarray) -> np.ndarray
 @lru_cache(maxsize=16)
 def _waves(frequency_hz: tuple[float, ...], first_s: float, count: int) -> tuple[np.ndarray, np.ndarray]:
     """cos and sin of 2π f τ on the grid of lags, (m, lags) each."""
-    angle = 2 * np.pi * np.outer(frequency_hz, first_s + LAG_STEP_S * np.arange(count))
+    angle = 2 * np.pi * np.outer(frequency_hz, first_s + _LAG_STEP_S * np.arange(count))
     return np.cos(angle), np.sin(angle)
 
 
 def differences(known: list[Comparison], drifting: bool) -> list[Difference]:
     """Every difference of lateness that a comparison is good enough to show."""
-    least = dict.fromkeys(COMMANDED, LEAST_EXPLAINED if drifting else LEAST_ALONE)
+    least = dict.fromkeys(COMMANDED, _LEAST_EXPLAINED if drifting else _LEAST_ALONE)
     found = [difference(c, drifting) for c in known]
-    return [d for d in found if d.explained > least.get(d.of.over, LEAST_EXPLAINED)]
+    return [d for d in found if d.explained > least.get(d.of.over, _LEAST_EXPLAINED)]
 
 
 def across(differences: Sequence[Difference], wrong: Sequence[str], key: int) -> tuple[float, float]:
@@ -357,7 +357,7 @@ def across(differences: Sequence[Difference], wrong: Sequence[str], key: int) ->
     return float(np.average(values, weights=weights)), float(1.0 / np.sqrt(np.sum(weights)))
 
 
-def remeasured(
+def _remeasured(
     recordings: ReadSet, wrong: Sequence[str], key: int, first: float, aside: Sequence[str] = ()
 ) -> tuple[float, float] | None:
     """What is left of the lateness (key 0) or growth (1) of some sensors of a set in which a `first` estimate of it is
@@ -373,7 +373,7 @@ def remeasured(
     return first + rest, sd
 
 
-def in_every_run(whole: Difference) -> bool:
+def _in_every_run(whole: Difference) -> bool:
     """Whether each run by itself shows the growth: what acts in part of a flight only must not pass for a clock."""
     blocks = whole.of.blocks
     agree, shown = [], []
@@ -384,8 +384,8 @@ def in_every_run(whole: Difference) -> bool:
         # A run of a few blocks cannot determine gains of its own.
         d = difference(replace(whole.of, blocks=own), drifting=True, free=own.count >= lagged.FEWEST_BLOCKS)
         sd = d.sd(1)
-        agree.append(abs(d.growth - whole.growth) < RUN_SIGMAS * sd + RUN_AGREEMENT * abs(whole.growth))
-        due = min(LEAST_LIKELIHOOD, whole.gained * own.count / blocks.count) / 4
+        agree.append(abs(d.growth - whole.growth) < _RUN_SIGMAS * sd + _RUN_AGREEMENT * abs(whole.growth))
+        due = min(_LEAST_LIKELIHOOD, whole.gained * own.count / blocks.count) / 4
         shown.append(d.growth * whole.growth > 0 and abs(d.growth) > 2 * sd and d.gained > due)
     return bool(agree) and all(agree) and np.mean(shown) >= 0.6
 
@@ -399,16 +399,16 @@ def _peak(lags: np.ndarray, curves: np.ndarray, time_s: np.ndarray, guess: float
 
     def best(starts, growths):
         """The pair with the highest sum, linear between the grid's lags."""
-        at = np.clip(starts[:, None] + growths[:, None] * time_s, lags[0], lags[-1] - LAG_STEP_S)
-        low = np.minimum(((at - lags[0]) / LAG_STEP_S).astype(int), len(lags) - 2)
-        share = (at - lags[low]) / LAG_STEP_S
+        at = np.clip(starts[:, None] + growths[:, None] * time_s, lags[0], lags[-1] - _LAG_STEP_S)
+        low = np.minimum(((at - lags[0]) / _LAG_STEP_S).astype(int), len(lags) - 2)
+        share = (at - lags[low]) / _LAG_STEP_S
         totals = (curves[rows, low] * (1 - share) + curves[rows, low + 1] * share).sum(axis=1)
         k = int(np.argmax(totals))
         return float(starts[k]), float(growths[k])
 
     start, growth, wide_start, wide_growth = guess, 0.0, 0.004, 0.0
     if drifting:
-        grid = np.meshgrid(np.arange(-LARGEST_SKEW, LARGEST_SKEW + 1e-9, 2e-4), np.arange(-0.06, 0.061, 0.005))
+        grid = np.meshgrid(np.arange(-_LARGEST_SKEW, _LARGEST_SKEW + 1e-9, 2e-4), np.arange(-0.06, 0.061, 0.005))
         rates, asides = (g.ravel() for g in grid)
         start, growth = best(guess + asides - rates * float(time_s.mean()), rates)
         wide_start, wide_growth = 0.005, 2e-4
@@ -445,7 +445,7 @@ class Lateness:
         return value, float(np.sqrt(np.sum((row * self.sd) ** 2))), float(np.abs(row) @ self.bound)
 
 
-def lateness(differences: list[Difference], key: int) -> Lateness:
+def _lateness(differences: list[Difference], key: int) -> Lateness:
     """Lateness (key 0) or growth (key 1) of every sensor by weighted least squares."""
     names = sorted({n for d in differences for n in d.of.sensors})
     rows = np.array([[d.of.part([n]) for n in names] for d in differences])
@@ -467,8 +467,8 @@ def _connected(names: list[str], differences: list[Difference]) -> list[list[str
     return [sorted(g) for g in groups]
 
 
-PREFERRED = ("gyroscope", "attitude", "accelerometer", "velocity", "rotors")
-INERTIAL = ("gyroscope", "accelerometer")
+_PREFERRED = ("gyroscope", "attitude", "accelerometer", "velocity", "rotors")
+_INERTIAL = ("gyroscope", "accelerometer")
 
 
 def in_agreement(solved: Lateness, group: list[str], least: dict[str, float], sigmas: float, filter_s: float):
@@ -483,7 +483,7 @@ def in_agreement(solved: Lateness, group: list[str], least: dict[str, float], si
         return abs(value) <= max(least[n], least[c], sigmas * sd)
 
     def filtered(n: str, c: str) -> bool:
-        return n in INERTIAL and c not in INERTIAL and 0.0 < solved.over(n, [c])[0] < filter_s
+        return n in _INERTIAL and c not in _INERTIAL and 0.0 < solved.over(n, [c])[0] < filter_s
 
     # Each two: one that is known badly is near to all, and would join sensors that surely part.
     alike = {pair for pair in combinations(group, 2) if near(*pair)}
@@ -492,7 +492,7 @@ def in_agreement(solved: Lateness, group: list[str], least: dict[str, float], si
     for candidate in group:
         own = list(next(s for s in sets if candidate in s))
         late = [n for n in group if n not in own and (filtered(n, candidate) or filtered(candidate, n))]
-        preferred = -min((PREFERRED.index(n) for n in own if n in PREFERRED), default=len(PREFERRED))
+        preferred = -min((_PREFERRED.index(n) for n in own if n in _PREFERRED), default=len(_PREFERRED))
         rank = (len(own) + len(late), len(own), preferred)
         if best is None or rank > best[0]:
             kept = own
@@ -502,7 +502,7 @@ def in_agreement(solved: Lateness, group: list[str], least: dict[str, float], si
     return best[1]
 
 
-def relative_to_most(
+def _relative_to_most(
     solved: Lateness, least: dict[str, float], sigmas: float, filter_s: float = 0.0
 ) -> dict[str, tuple[float, float, float]]:
     """Value of each sensor over the largest set of sensors that agree, its sigma, and what disturbances can feign.
@@ -553,7 +553,7 @@ def _listed(sensors: Sequence[str]) -> str:
     return listed([SENSOR_WORDS[s] for s in sensors])
 
 
-def one_clock(differences: list[Difference], growing: list[Difference]) -> tuple[str, ...]:
+def _one_clock(differences: list[Difference], growing: list[Difference]) -> tuple[str, ...]:
     """The sensor whose clock alone explains all growths best, and others that do so as well; none for no candidate.
 
     Candidates are the two sides of the comparisons with a significant growth. Nothing but height rests on the
@@ -566,8 +566,8 @@ def one_clock(differences: list[Difference], growing: list[Difference]) -> tuple
         left[name] = sum(
             (d.growth - d.of.part([name]) * rate) ** 2 / (d.sd(1) ** 2 + d.bound(1) ** 2) for d in differences
         )
-    trusted = {n: PREFERRED.index(n) if n in PREFERRED else len(PREFERRED) for n in names}
-    alike = [n for n in names if left[n] < min(left.values()) + AS_WELL]
+    trusted = {n: _PREFERRED.index(n) if n in _PREFERRED else len(_PREFERRED) for n in names}
+    alike = [n for n in names if left[n] < min(left.values()) + _AS_WELL]
     return tuple(sorted(alike, key=lambda n: (-trusted[n], n)))
 
 
@@ -582,14 +582,14 @@ def _skew(recordings: ReadSet, known: list[Comparison]) -> Result:
         beyond = abs(d.growth) - d.bound(1)
         p = float(2 * student.sf(beyond / max(d.sd(1), 1e-12), max(d.pieces - 2, 1)))
         slowest = max(periods[n] for n in d.of.sensors)
-        significant = p < P_LIMIT and abs(d.growth) * longest > slowest and d.gained > LEAST_LIKELIHOOD
-        if significant and in_every_run(d):
+        significant = p < P_LIMIT and abs(d.growth) * longest > slowest and d.gained > _LEAST_LIKELIHOOD
+        if significant and _in_every_run(d):
             growing.append((p, d))
     if not growing:
         return Result(recordings)
-    solved = lateness(found, 1)
+    solved = _lateness(found, 1)
     least = {n: 0.5 * max(periods[n], 2e-3) / longest for n in solved.names}
-    drift = relative_to_most(solved, least, 3.0)
+    drift = _relative_to_most(solved, least, 3.0)
     wrong = [
         n
         for n, (value, sd, bound) in drift.items()
@@ -599,7 +599,7 @@ def _skew(recordings: ReadSet, known: list[Comparison]) -> Result:
     other = ""
     if not wrong:
         # Two clocks surely part, and the rest cannot show which is right: the one that leaves least to explain.
-        blamed = one_clock(found, [d for _, d in growing])
+        blamed = _one_clock(found, [d for _, d in growing])
         if not blamed:
             return Result(recordings)
         drift = {blamed[0]: (across(found, [blamed[0]], 1)[0], 0.0, 0.0)}
@@ -612,7 +612,7 @@ def _skew(recordings: ReadSet, known: list[Comparison]) -> Result:
     wrong = max(sides, key=len)
     rate, sd = across(found, wrong, 1)
     # Large drifts move the motion out of its block: measured once more with the first estimate taken out.
-    rate, sd = remeasured(shifted(recordings, wrong, 0.0, rate), wrong, 1, rate) or (rate, sd)
+    rate, sd = _remeasured(shifted(recordings, wrong, 0.0, rate), wrong, 1, rate) or (rate, sd)
     change = "fall behind by" if rate > 0 else "gain"
     finding = Finding(
         id="clock_skew",
@@ -625,10 +625,10 @@ def _skew(recordings: ReadSet, known: list[Comparison]) -> Result:
         p_value=min(p for p, _ in growing),
         channels=tuple(sensor_columns(recordings.vehicle)[n][0] for n in wrong),
     )
-    return Result(shifted(recordings, with_position(wrong), 0.0, rate), (finding,))
+    return Result(shifted(recordings, _with_position(wrong), 0.0, rate), (finding,))
 
 
-def with_position(sensors: list[str]) -> list[str]:
+def _with_position(sensors: list[str]) -> list[str]:
     """Sensors, with the position where velocity and attitude are both among them: one clock stamps the three."""
     return [*sensors, "position"] if {"velocity", "attitude"} <= {*sensors} and "position" not in sensors else sensors
 
@@ -640,10 +640,10 @@ def _delay(recordings: ReadSet, known: list[Comparison]) -> Result:
     found = differences(known, drifting=False)
     if not found:
         return Result(recordings)
-    solved = lateness(found, 0)
+    solved = _lateness(found, 0)
     sample = max(1.0 / s.rate_hz for s in signals)
-    small = min(FILTER_S, FILTER_SAMPLES * sample)
-    relative = relative_to_most(solved, periods, 2.0, small)
+    small = min(_FILTER_S, _FILTER_SAMPLES * sample)
+    relative = _relative_to_most(solved, periods, 2.0, small)
     late = {n: value for n, (value, _, _) in relative.items()}
     tolerance = {n: max(periods[n], 3 * sd) for n, (_, sd, _) in relative.items()}
     wrong, notes, limits = [], [], {}
@@ -652,7 +652,7 @@ def _delay(recordings: ReadSet, known: list[Comparison]) -> Result:
         limit = limits[n] = max(periods[n], sample, bound)
         count = max(d.pieces for d in touching)
         p = float(student.sf((abs(value) - limit) / max(sd, 1e-9), max(count - 2, 1)))
-        if p > P_LATE or max(d.likelihood for d in touching) < LEAST_LIKELIHOOD:
+        if p > _P_LATE or max(d.likelihood for d in touching) < _LEAST_LIKELIHOOD:
             continue
         if n == "position":
             notes.append(
@@ -662,12 +662,12 @@ def _delay(recordings: ReadSet, known: list[Comparison]) -> Result:
             continue
         wrong.append((n, p))
     fixed, findings, clusters = recordings, [], _clusters([n for n, _ in wrong], late, tolerance)
-    own = [c[0] for c in clusters if len(c) == 1 and c[0] in SMALL_LAGS and abs(late[c[0]]) < small]
+    own = [c[0] for c in clusters if len(c) == 1 and c[0] in _SMALL_LAGS and abs(late[c[0]]) < small]
     for sensor in own:
         notes.append(
-            f"{capital(SENSOR_WORDS[sensor])}: {1e3 * late[sensor]:+.1f} ms against the rest, {SMALL_LAGS[sensor]}."
+            f"{capital(SENSOR_WORDS[sensor])}: {1e3 * late[sensor]:+.1f} ms against the rest, {_SMALL_LAGS[sensor]}."
         )
-        if sensor in INERTIAL:
+        if sensor in _INERTIAL:
             fixed = shifted(fixed, [sensor], late[sensor])
     unfiltered = fixed
     for cluster in clusters:
@@ -676,12 +676,12 @@ def _delay(recordings: ReadSet, known: list[Comparison]) -> Result:
         others = [n for n, _ in wrong if n not in cluster and n not in own]
         amount, sd = float(np.mean([late[n] for n in cluster])), max(relative[n][1] for n in cluster)
         steps = round(amount / sample) * sample
-        nearly = shifted(unfiltered, with_position(cluster), steps)
-        amount, sd = remeasured(nearly, cluster, 0, steps, others) or (amount, sd)
+        nearly = shifted(unfiltered, _with_position(cluster), steps)
+        amount, sd = _remeasured(nearly, cluster, 0, steps, others) or (amount, sd)
         if abs(amount) < min(limits[n] for n in cluster):
             notes.append(f"{capital(_listed(cluster))}: {1e3 * amount:+.1f} ms against the rest, below a sample.")
             continue
-        fixed = shifted(fixed, with_position(cluster), amount)
+        fixed = shifted(fixed, _with_position(cluster), amount)
         word = "late" if amount > 0 else "early"
         findings.append(
             Finding(

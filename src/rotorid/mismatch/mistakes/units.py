@@ -16,13 +16,13 @@ from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import Run
 from rotorid.recordings import columns as c
 
-CLOSE = np.log(1.6)
+_CLOSE = np.log(1.6)
 """A ratio is taken for a unit's factor within this (a wrong believed value is far smaller)."""
-FAR = np.log(3.0)
+_FAR = np.log(3.0)
 """Only ratios off by more than this are looked at."""
-ACCELERATIONS = {"g": 1 / g, "mg": 1000 / g, "cm/s²": 100.0, "mm/s²": 1000.0}
+_ACCELERATIONS = {"g": 1 / g, "mg": 1000 / g, "cm/s²": 100.0, "mm/s²": 1000.0}
 RATES = {"rpm": 60 / (2 * np.pi), "rev/s": 1 / (2 * np.pi), "deg/s": 180 / np.pi}
-PULSES = "pulses of 1000 to 2000 µs"
+_PULSES = "pulses of 1000 to 2000 µs"
 THROTTLES = {
     ("counts of 16 bits", 65535.0): (2300, 65535.5),
     ("per mille", 1000.0): (260, 1000.5),
@@ -50,16 +50,16 @@ class UnitError:
 
 def nearest(ratio: float, factors: Mapping[str, float]) -> tuple[str, float] | None:
     """The unit whose factor a measured ratio is, None if it is none of them or the contract's own."""
-    if not np.isfinite(ratio) or ratio <= 0 or abs(np.log(ratio)) < FAR:
+    if not np.isfinite(ratio) or ratio <= 0 or abs(np.log(ratio)) < _FAR:
         return None
     name = min(factors, key=lambda n: abs(np.log(ratio / factors[n])))
-    return (name, factors[name]) if abs(np.log(ratio / factors[name])) < CLOSE else None
+    return (name, factors[name]) if abs(np.log(ratio / factors[name])) < _CLOSE else None
 
 
 def find(recordings: ReadSet) -> Result:
     """The set in the contract's units, with every unit error that the mean sizes of columns give away."""
     result = Result(recordings)
-    for error in by_size(recordings):
+    for error in _by_size(recordings):
         result = result.then(partial(corrected, error=error))
     return result
 
@@ -77,7 +77,7 @@ def _spread(values: np.ndarray) -> float:
     return float(2.4 * np.std(np.log(np.maximum(parts, 1e-12))) / np.sqrt(len(parts)) + 1e-6)
 
 
-def by_size(recordings: ReadSet) -> list[UnitError]:
+def _by_size(recordings: ReadSet) -> list[UnitError]:
     """Every unit error that the mean sizes of columns give away."""
     vehicle, found = recordings.vehicle, []
     names = sensor_columns(vehicle)
@@ -93,7 +93,7 @@ def by_size(recordings: ReadSet) -> list[UnitError]:
     if len(force):
         size = np.linalg.norm(force, axis=1)
         ratio = float(np.median(size)) / vehicle.gravity_m_s2
-        unit = nearest(ratio, ACCELERATIONS)
+        unit = nearest(ratio, _ACCELERATIONS)
         add(names["accelerometer"], "the accelerometer", unit, "m/s²", ratio, _spread(size))
     for key, what in (("rotors", "the rotor speeds"), ("commands", "the commanded rotor speeds")):
         speed = _pooled(recordings, names[key])
@@ -107,7 +107,7 @@ def by_size(recordings: ReadSet) -> list[UnitError]:
     if len(throttle):
         low, high = (float(np.quantile(throttle, share)) for share in (0.001, 0.999))
         unit = next((unit for unit, (above, most) in THROTTLES.items() if above < high <= most), None)
-        add(names["throttle"], "the throttle", (PULSES, 1000.0) if 900 <= low and high <= 2300 else unit, "a fraction")
+        add(names["throttle"], "the throttle", (_PULSES, 1000.0) if 900 <= low and high <= 2300 else unit, "a fraction")
     voltage = _pooled(recordings, (c.BATTERY_VOLTAGE,))
     if len(voltage):
         middle = float(np.median(voltage))
@@ -127,7 +127,7 @@ def corrected(recordings: ReadSet, error: UnitError) -> Result:
 
     def change(run: Run) -> dict:
         own = {n: run.table[n] for n in error.columns if n in run.table.columns}
-        if error.unit == PULSES:
+        if error.unit == _PULSES:
             return {n: (pulse - 1000.0) / 1000.0 for n, pulse in own.items()}
         return {n: values * (1.0 / error.factor) for n, values in own.items()}
 

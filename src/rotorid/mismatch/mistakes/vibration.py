@@ -21,20 +21,20 @@ from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import columns as c
 
 WINDOW_S = 0.35
-SIDE_BINS = (-6, -5, -4, -3, 3, 4, 5, 6)
+_SIDE_BINS = (-6, -5, -4, -3, 3, 4, 5, 6)
 """Offsets from the order, in widths of the window, that give the level next to the line."""
 ORDERS = (1, 2)
-LEAST_MEDIAN = 3.0
+_LEAST_MEDIAN = 3.0
 """Power at the order over that next to it in half of the windows, at least."""
-LEAST_AMPLITUDE = 0.5
+_LEAST_AMPLITUDE = 0.5
 """Line over the reading's own scatter next to it (one sigma a sample), at least, to matter."""
-SCALES = np.arange(0.85, 1.151, 0.015)
+_SCALES = np.arange(0.85, 1.151, 0.015)
 """Factors on a commanded speed that are tried: the window distinguishes speeds of 18 rad/s."""
-COMMAND_LAG_S = 0.03
+_COMMAND_LAG_S = 0.03
 """How late rotors follow their commands, roughly."""
-MOST_WINDOWS = 30
+_MOST_WINDOWS = 30
 """Windows of a run that the factor is found from."""
-LOWEST_HZ = 8.0
+_LOWEST_HZ = 8.0
 """Aliases below this fall among the flight's own motion and are left out."""
 
 
@@ -63,8 +63,8 @@ def find(recordings: ReadSet) -> Result:
         have = [s for s in signals if sensor in s.values and s.own_rate_hz[sensor] > 0.9 * s.rate_hz]
         for axis, column in enumerate(columns):
             for order in ORDERS:
-                line = measure(have, sensor, axis, column, unit, order)
-                if line and line.p_value < P_LIMIT and line.over_noise > LEAST_AMPLITUDE:
+                line = _measure(have, sensor, axis, column, unit, order)
+                if line and line.p_value < P_LIMIT and line.over_noise > _LEAST_AMPLITUDE:
                     lines.append(line)
     if not lines:
         return Result(recordings)
@@ -96,14 +96,14 @@ def turning(recordings: ReadSet) -> list[Signals]:
     if read:
         return read
     full = full_speed(recordings.runs, recordings.vehicle)
-    commanded = [(s, speed) for s in everything if (speed := as_commanded(s, full)) is not None]
+    commanded = [(s, speed) for s in everything if (speed := _as_commanded(s, full)) is not None]
     if not any("accelerometer" in s.values for s, _ in commanded):
         return []
-    trials = ([replace(s, values={**s.values, "rotors": x * speed}) for s, speed in commanded] for x in SCALES)
-    return max(trials, key=strongest_line)
+    trials = ([replace(s, values={**s.values, "rotors": x * speed}) for s, speed in commanded] for x in _SCALES)
+    return max(trials, key=_strongest_line)
 
 
-def as_commanded(s: Signals, full_rad_s: float | None) -> np.ndarray | None:
+def _as_commanded(s: Signals, full_rad_s: float | None) -> np.ndarray | None:
     """Speeds (n, k) of rotors that turn as commanded, COMMAND_LAG_S late; None without commands."""
     if "commands" in s.values:
         speed = s.values["commands"]
@@ -111,12 +111,12 @@ def as_commanded(s: Signals, full_rad_s: float | None) -> np.ndarray | None:
         speed = full_rad_s * s.values["throttle"]
     else:
         return None
-    keep = np.exp(-1.0 / (s.rate_hz * COMMAND_LAG_S))
+    keep = np.exp(-1.0 / (s.rate_hz * _COMMAND_LAG_S))
     start = np.nan_to_num(speed[:1]) * keep
     return lfilter([1.0 - keep], [1.0, -keep], np.nan_to_num(speed), axis=0, zi=start)[0]
 
 
-def strongest_line(signals: list[Signals]) -> float:
+def _strongest_line(signals: list[Signals]) -> float:
     """Power at the order over that next to it, in half of the windows, of the accelerometer's clearest line."""
     best = 0.0
     for axis in range(3):
@@ -125,7 +125,7 @@ def strongest_line(signals: list[Signals]) -> float:
             for s in signals:
                 length = int(WINDOW_S * s.rate_hz)
                 if "accelerometer" in s.values and length >= 24:
-                    line, beside, _, _ = demodulated(s, "accelerometer", axis, order, length, MOST_WINDOWS)
+                    line, beside, _, _ = _demodulated(s, "accelerometer", axis, order, length, _MOST_WINDOWS)
                     ratios.append((line / beside).ravel())
             found = np.concatenate(ratios) if ratios else np.zeros(0)
             found = found[np.isfinite(found)]
@@ -133,14 +133,14 @@ def strongest_line(signals: list[Signals]) -> float:
     return best
 
 
-def measure(all_signals: list[Signals], sensor: str, axis: int, column: str, unit: str, order: int) -> Line | None:
+def _measure(all_signals: list[Signals], sensor: str, axis: int, column: str, unit: str, order: int) -> Line | None:
     """Power at the rotors' order over that next to it, summed over windows and rotors."""
     ratios, powers, levels, lengths = [], [], [], []
     for s in all_signals:
         length = int(WINDOW_S * s.rate_hz)
         if length < 24:
             continue
-        line, beside, crowd, floor = demodulated(s, sensor, axis, order, length)
+        line, beside, crowd, floor = _demodulated(s, sensor, axis, order, length)
         seen = np.isfinite(line) & np.isfinite(beside) & (beside > 0)
         good = seen.any(axis=1)
         if not good.any():
@@ -155,10 +155,10 @@ def measure(all_signals: list[Signals], sensor: str, axis: int, column: str, uni
         return None
     ratio, power, level, length = (np.concatenate(x) for x in (ratios, powers, levels, lengths))
     n = len(ratio)
-    if np.median(ratio) < LEAST_MEDIAN:
+    if np.median(ratio) < _LEAST_MEDIAN:
         return None  # a line is there as long as the rotors turn; single fierce moments are motion
     # Each ratio is about exponential, a little heavier because the level nearby is estimated from eight bins.
-    p = float(gamma.sf(float(ratio.sum()) * (1 - 1 / len(SIDE_BINS)), n))
+    p = float(gamma.sf(float(ratio.sum()) * (1 - 1 / len(_SIDE_BINS)), n))
     mean = float(power.mean())
     sd = float(power.std(ddof=1) / np.sqrt(n))
     amplitude, low, high = (np.sqrt(max(v, 0.0)) for v in (mean, mean - 1.96 * sd, mean + 1.96 * sd))
@@ -167,7 +167,7 @@ def measure(all_signals: list[Signals], sensor: str, axis: int, column: str, uni
     return Line(column, unit, order, float(amplitude), float(low), float(high), float(amplitude) / max(noise, 1e-12), p)
 
 
-def demodulated(
+def _demodulated(
     s: Signals, sensor: str, axis: int, order: int, length: int, most: int | None = None
 ) -> tuple[np.ndarray, ...]:
     """Squared amplitude at the order, next to it, number of rotors that share the line, and noise: (windows, rotors).
@@ -200,11 +200,11 @@ def demodulated(
         # Where the alias comes near zero frequency, flight motion would be taken for a line.
         turn = order * speed[:, :, i].mean(axis=1) * dt
         turned = np.abs((turn + np.pi) % (2 * np.pi) - np.pi)
-        clear = turned / (2 * np.pi * dt) > LOWEST_HZ + 6 / WINDOW_S
+        clear = turned / (2 * np.pi * dt) > _LOWEST_HZ + 6 / WINDOW_S
         line[clear, i] = spectrum[clear, 0]
         # Rotors of nearly one speed add to each other's line, with phases that wander: their powers add.
         together = np.mean(taper[:, None] * follow[:, :, i, None].conj() * follow, axis=1)
         crowd[clear, i] = np.sum(np.abs(together[clear]) ** 2, axis=1)
         floor[clear, i] = np.median(spectrum[clear], axis=1) / np.log(2)
-        beside[clear, i] = np.mean(spectrum[clear][:, list(SIDE_BINS)], axis=1)
+        beside[clear, i] = np.mean(spectrum[clear][:, list(_SIDE_BINS)], axis=1)
     return line, beside, crowd, floor

@@ -2,6 +2,8 @@
 
 A size is a share of the weight: root mean square force over the weight, and moment over the weight at the rotors' mean
 distance from the centre of mass.
+
+Effects that look significant while wrong values are held at their belief, and vanish with the right ones.
 """
 
 from __future__ import annotations
@@ -11,16 +13,24 @@ from dataclasses import replace
 
 import numpy as np
 
+from rotorid.effects.catalogue import catalogue
+from rotorid.mismatch.decision.findings import Finding
+from rotorid.mismatch.model.delivered import FittedModel, Values
 from rotorid.mismatch.model.wrench import WrenchModel, block_seconds
 from rotorid.mismatch.plant.regression import Regression, build
-from rotorid.mismatch.plant.rows import Rows, Term
+from rotorid.mismatch.plant.rows import Rows, Term, compared_alone
 from rotorid.mismatch.plant.split import training_rule
-from rotorid.mismatch.plant.two_sensors import compared_alone
-from rotorid.mismatch.posterior.chosen import posterior_at
+from rotorid.mismatch.plant.unknowns import UNKNOWNS
 from rotorid.mismatch.posterior.evidence import Evidence, evidence_from
 from rotorid.mismatch.posterior.limits import UpperLimit, limits_of
 from rotorid.mismatch.posterior.search import Found
+from rotorid.mismatch.posterior.statements import posterior_at
 from rotorid.recordings import Vehicle
+
+_ABSORBED_P = 1e-6
+"""About fifty terms are looked at."""
+_ABSORBED_GAIN = 50.0
+"""Whitened squares: what a reader would have taken for an effect."""
 
 
 def absent(model: WrenchModel, found: Found) -> tuple[UpperLimit, ...]:
@@ -81,3 +91,23 @@ def scales(vehicle: Vehicle) -> np.ndarray:
     weight_n = vehicle.mass_kg * vehicle.gravity_m_s2
     arm_m = float(np.linalg.norm(vehicle.rotor_positions_m()[:, :2], axis=1).mean())
     return np.repeat([weight_n, weight_n * arm_m if arm_m > 0 else np.inf], 3)
+
+
+def absorbed_findings(model: FittedModel, values: Values, findings: list[Finding]) -> list[Finding]:
+    """A finding for every such effect that `findings` do not hold; none where no value is wrong."""
+    if not values:
+        return []
+    search, regression, active = model.search, model.search.regression, model.selection.active
+    held = [k for k in search.always if k not in values]
+    base = regression.fit(held + active)
+    taken, out = {f.id for f in findings}, {}
+    for term in regression.terms:
+        if term.kind != "effect" or term.effect in taken or term.effect in out or term.effect in UNKNOWNS:
+            continue
+        fit = regression.fit([*held, *active, term.key])
+        p = regression.wald(fit, regression.columns([term.key]), search.blocks)
+        if p < _ABSORBED_P and fit.gain - base.gain > _ABSORBED_GAIN:
+            name = catalogue()[term.effect].name
+            text = f"{name} looked significant with the believed values; the refitted values explain it"
+            out[term.effect] = Finding(id=term.effect, status="absorbed", sentence=text, p_value=p)
+    return list(out.values())

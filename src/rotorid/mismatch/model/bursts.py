@@ -9,15 +9,15 @@ from rotorid.effects.catalogue import moving_air
 from rotorid.effects.gust import window_form
 from rotorid.mismatch.plant.rows import Term
 
-SMOOTHING_S = 0.6
-ALARM = 6.0
+_SMOOTHING_S = 0.6
+_ALARM = 6.0
 """Robust standard deviations of the smoothed world force that open a window."""
-EDGE = 2.5
+_EDGE = 2.5
 """A window reaches to where the smoothed force falls below this many."""
-SHORTEST_S, LONGEST_SHARE = 1.0, 0.5
+_SHORTEST_S, _LONGEST_SHARE = 1.0, 0.5
 """A window is never shorter than the smoothing itself; one of a blip is as short."""
-KNOT_S = 0.6
-MOST_WINDOWS = 3
+_KNOT_S = 0.6
+_MOST_WINDOWS = 3
 
 
 def windows(residual_body: np.ndarray, rotation: np.ndarray, time_s: np.ndarray):
@@ -28,23 +28,23 @@ def windows(residual_body: np.ndarray, rotation: np.ndarray, time_s: np.ndarray)
     """
     world = np.einsum("nij,nj->ni", rotation, residual_body)[:, :2]
     dt = float(np.median(np.diff(time_s)))
-    smooth = uniform_filter1d(world - np.median(world, axis=0), max(3, int(SMOOTHING_S / dt)), axis=0)
+    smooth = uniform_filter1d(world - np.median(world, axis=0), max(3, int(_SMOOTHING_S / dt)), axis=0)
     scale = max(1.4826 * np.median(np.abs(smooth - np.median(smooth, axis=0)), axis=0).max(), 1e-12)
     strength = np.linalg.norm(smooth, axis=1) / scale
     found = []
     left = strength.copy()
-    while len(found) < MOST_WINDOWS:
+    while len(found) < _MOST_WINDOWS:
         top = int(np.argmax(left))
-        if left[top] < ALARM:
+        if left[top] < _ALARM:
             break
         low, high = top, top
-        while low > 0 and strength[low - 1] > EDGE:
+        while low > 0 and strength[low - 1] > _EDGE:
             low -= 1
-        while high < len(strength) - 1 and strength[high + 1] > EDGE:
+        while high < len(strength) - 1 and strength[high + 1] > _EDGE:
             high += 1
         left[low : high + 1] = 0.0
         length = (high - low) * dt
-        if SHORTEST_S <= length <= LONGEST_SHARE * len(strength) * dt:
+        if _SHORTEST_S <= length <= _LONGEST_SHARE * len(strength) * dt:
             found.append((float(time_s[low]), float(time_s[high]), float(strength[top])))
     return found
 
@@ -53,7 +53,7 @@ def gust_terms(run: str, found) -> list[Term]:
     """Terms for the windows of one run."""
     terms, gust = [], moving_air("in windows").id
     for start, stop, _ in found:
-        knots = int(np.clip(round((stop - start) / KNOT_S), 2, 12))
+        knots = int(np.clip(round((stop - start) / _KNOT_S), 2, 12))
         form = window_form(start - 0.15, stop + 0.15, knots)
         size = len(form.parameters)
         terms.append(

@@ -49,7 +49,7 @@ class FittedModel(Protocol):
         """Coefficient of a relative change of a believed value."""
 
 
-def widely(values: Values) -> dict[str, float]:
+def _widely(values: Values) -> dict[str, float]:
     """Priors of the values called wrong."""
     return dict.fromkeys(values, WIDEST_TRUST)
 
@@ -60,8 +60,8 @@ def delivered_fit(model: FittedModel, keys: Sequence[str], values: Values) -> tu
     What the whole balance would make of those values is another number where slow moments of the air bias it, and
     effects fitted given that number would be those of a vehicle that nobody states.
     """
-    delivered = model.delivered_with(keys, widely(values))
-    known, cols, beta = at_stated_numbers(model, delivered, values)
+    delivered = model.delivered_with(keys, _widely(values))
+    known, cols, beta = _at_stated_numbers(model, delivered, values)
     fit = known.fit([k for k in delivered if k not in values])
     size = len(fit.beta)
     covariance = np.zeros((size + len(cols), size + len(cols)))
@@ -71,7 +71,7 @@ def delivered_fit(model: FittedModel, keys: Sequence[str], values: Values) -> tu
     )
 
 
-def at_stated_numbers(
+def _at_stated_numbers(
     model: FittedModel, keys: Sequence[str], values: Values
 ) -> tuple[Regression, np.ndarray, np.ndarray]:
     """The regression in which the wrong values among `keys` are known, their columns and their coefficients."""
@@ -87,7 +87,7 @@ def left_out_residuals(model: FittedModel, keys: Sequence[str], values: Values) 
     Each environment of the fitted runs is judged by coefficients found without it.
     """
     regression = model.regression
-    known, stated, beta = at_stated_numbers(model, keys, values)
+    known, stated, beta = _at_stated_numbers(model, keys, values)
     cols, betas = known.left_out(tuple(k for k in keys if k not in values), regression.leaves_runs)
     cols, betas = np.append(cols, stated), np.column_stack([betas, np.tile(beta, (len(betas), 1))])
     betas = np.where(model.unnamed(cols), 0.0, betas)

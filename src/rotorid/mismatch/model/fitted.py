@@ -52,14 +52,14 @@ from rotorid.recordings.signal.kernels import causal
 
 TAKEN_UP = "the curve between throttle and rotor speed takes it up"
 """Why an effect is not looked for that on commands alone is that curve."""
-RUN_P = 1e-6
-RUN_SPREAD = 0.007
+_RUN_P = 1e-6
+_RUN_SPREAD = 0.007
 """Relative spread of the thrust coefficient between runs below which one number serves all."""
-RUN_TRUST = 0.02
+_RUN_TRUST = 0.02
 """Relative one-sigma of a run's own thrust about the common one."""
 
-ROUNDS, CHAIN_ROUNDS = 4, 2
-MOVED = 0.3
+_ROUNDS, _CHAIN_ROUNDS = 4, 2
+_MOVED = 0.3
 """Standard errors by which coefficients may move between rounds: columns hang on accelerations that they predict."""
 
 
@@ -94,7 +94,7 @@ def fitted(prepared: Prepared) -> Fitted:
     if chain is None or measured:
         model = refined_model(prepared, *turning(prepared))
     else:
-        chain, model = with_chain(prepared, chain)
+        chain, model = _with_chain(prepared, chain)
     found = wrong_values_of(model)
     return Fitted(model, found.values, chain, measured, found.instead)
 
@@ -107,7 +107,7 @@ def turning(prepared: Prepared, chain: CommandChain | None = None):
     return tuple(path_segments(segments, *chain, prepared.thinner.cutoff_hz) for segments in both)
 
 
-def with_chain(prepared: Prepared, chain: CommandChain) -> tuple[CommandChain, WrenchModel]:
+def _with_chain(prepared: Prepared, chain: CommandChain) -> tuple[CommandChain, WrenchModel]:
     """The chain and the model where rotor speeds are known from commands alone."""
 
     def modelled(chain: CommandChain) -> WrenchModel:
@@ -115,7 +115,7 @@ def with_chain(prepared: Prepared, chain: CommandChain) -> tuple[CommandChain, W
 
     model = modelled(chain)
     known, trusted = bool(model.selection.active), strains(model)
-    for _ in range(CHAIN_ROUNDS if known or trusted else 0):
+    for _ in range(_CHAIN_ROUNDS if known or trusted else 0):
         # The wrench effects found change what the commands must explain, and what values beyond their trust made room
         # for is not delivered: once more with the effects known and such values as believed.
         chain = speed_path(prepared, chosen(model), trusted=trusted)
@@ -164,21 +164,21 @@ def only_scales(result: SpeedResult) -> bool:
 
 def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
     """The search, then nonlinear parameters refined and the search repeated from there."""
-    model = with_own_scales(prepared, segments, noisy)
+    model = _with_own_scales(prepared, segments, noisy)
     if rules.PAYLOAD_WINDOWS(bool(windows := payload_windows_of(model))):
-        segments, noisy, model = with_payload(prepared, model, windows)
-    segments, noisy, model = with_swing(prepared, model)
+        segments, noisy, model = _with_payload(prepared, model, windows)
+    segments, noisy, model = _with_swing(prepared, model)
     terms = list(model.terms)
     for number in range(
-        ROUNDS if any(changes_its_columns(model.search.terms[k].form) for k in model.selection.active) else 0
+        _ROUNDS if any(_changes_its_columns(model.search.terms[k].form) for k in model.selection.active) else 0
     ):
         refined = refine_nonlinear(prepared, model, segments, wide=number == 0)
         terms = [replace(t, values=tuple(refined[t.key])) if t.key in refined else t for t in terms]
         before = model
         if segments[0].motion.hung is not None:
-            segments, noisy = hung_anew(model, terms) or (segments, noisy)
+            segments, noisy = _hung_anew(model, terms) or (segments, noisy)
         model = wrench_model(prepared, terms, chosen(model), model.selection.active, segments, noisy)
-        if converged(before, model):
+        if _converged(before, model):
             break
     model = with_wind(prepared, model, segments, noisy, terms)
     if model.wind is not None:
@@ -186,42 +186,42 @@ def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
     return with_gusts(prepared, model, terms)
 
 
-def converged(before: WrenchModel, after: WrenchModel) -> bool:
+def _converged(before: WrenchModel, after: WrenchModel) -> bool:
     """Whether two rounds have the same terms at work, and no coefficient that moved by MOVED of its error."""
     if set(before.selection.active) != set(after.selection.active):
         return False
     for key in after.selection.active:
         (old, _), (new, covariance) = (coefficients(m.regression, m.selection.fit, key) for m in (before, after))
-        if np.any(np.abs(new - old) > MOVED * np.sqrt(np.diag(covariance))):
+        if np.any(np.abs(new - old) > _MOVED * np.sqrt(np.diag(covariance))):
             return False
     return True
 
 
-def with_own_scales(prepared: Prepared, segments, noisy, effects=None) -> WrenchModel:
+def _with_own_scales(prepared: Prepared, segments, noisy, effects=None) -> WrenchModel:
     """The search over all terms, with a scale for each run where thrust differs between them; `effects` as there."""
     model = wrench_model(prepared, prepared.terms, effects, segments=segments, noisy_segments=noisy)
-    if not rules.OWN_SCALES(thrust_differs(model)):
+    if not rules.OWN_SCALES(_thrust_differs(model)):
         return model
-    terms = with_run_scales(prepared.terms, prepared)
+    terms = _with_run_scales(prepared.terms, prepared)
     return wrench_model(prepared, terms, effects, segments=segments, noisy_segments=noisy)
 
 
-def with_payload(prepared: Prepared, model: WrenchModel, windows: list[Windows]):
+def _with_payload(prepared: Prepared, model: WrenchModel, windows: list[Windows]):
     """Segments, their noisy copies and the model with a payload on board in some windows, where that explains more.
 
     Each taking up and dropping costs as much as an effect; without a payload in the model everything is as it was.
     """
     segments, noisy = model.segments, model.noisy_segments
     both = with_payload_on_board(segments, windows), with_payload_on_board(noisy, windows) if noisy else noisy
-    with_it = with_own_scales(prepared, *both)
+    with_it = _with_own_scales(prepared, *both)
     carries = any(t.key in with_it.selection.active for t in loads(with_it))
     filters, price = model.regression.filters, COST_PER_EFFECT * changes(both[0])
-    if carries and cost_of(with_it, filters) + price < cost_of(model, filters):
+    if carries and _cost_of(with_it, filters) + price < _cost_of(model, filters):
         return *both, with_it
     return segments, noisy, model
 
 
-def with_swing(prepared: Prepared, model: WrenchModel):
+def _with_swing(prepared: Prepared, model: WrenchModel):
     """Segments, their noisy copies and the model with a payload that hung as each run says, if that explains more."""
     same = model.segments, model.noisy_segments, model
     start = swinging_term(model)
@@ -232,22 +232,22 @@ def with_swing(prepared: Prepared, model: WrenchModel):
         return same
     segments, mass_kg = found
     noisy = like(segments, model.noisy_segments)
-    terms = [replace(t, values=term.values) if is_like(t, start) else t for t in prepared.terms]
+    terms = [replace(t, values=term.values) if _is_like(t, start) else t for t in prepared.terms]
     effects = [*chosen(model), as_effect(term, cable, mass_kg)]
-    with_it = with_own_scales(replace(prepared, terms=terms), segments, noisy, effects)
+    with_it = _with_own_scales(replace(prepared, terms=terms), segments, noisy, effects)
     swings = any(with_it.search.terms[k].form.swings for k in with_it.selection.active)
     filters = model.regression.filters
-    if swings and cost_of(with_it, filters) + price(segments) < cost_of(model, filters):
+    if swings and _cost_of(with_it, filters) + price(segments) < _cost_of(model, filters):
         return segments, noisy, with_it
     return same
 
 
-def is_like(term: Term, other: Term) -> bool:
+def _is_like(term: Term, other: Term) -> bool:
     """Whether a term swings on the same cable as another."""
     return bool(term.form and term.form.swings) and term.values == other.values
 
 
-def hung_anew(model: WrenchModel, terms: Sequence[Term]):
+def _hung_anew(model: WrenchModel, terms: Sequence[Term]):
     """Segments and their noisy copies with a payload that hung as a model with other lengths of the cable says."""
     active = {k for k in model.selection.active if model.search.terms[k].form.swings}
     term = next((t for t in terms if t.key in active), None)
@@ -255,12 +255,12 @@ def hung_anew(model: WrenchModel, terms: Sequence[Term]):
     return None if segments is None else (segments, like(segments, model.noisy_segments))
 
 
-def changes_its_columns(form: Form) -> bool:
+def _changes_its_columns(form: Form) -> bool:
     """Whether a form's columns hang on what the model holds: nonlinear parameters, or the accelerations predicted."""
     return bool(form.nonlinear) or not {"angular_acceleration", "specific_force"}.isdisjoint(form.requires)
 
 
-def thrust_differs(model: WrenchModel) -> bool:
+def _thrust_differs(model: WrenchModel) -> bool:
     """Whether the thrust coefficient is not the same in every run, beyond doubt and by more than RUN_SPREAD."""
     if "thrust" not in model.search.terms or not all(s.measured_speed for s in model.prepared.segments):
         return False
@@ -268,16 +268,16 @@ def thrust_differs(model: WrenchModel) -> bool:
     fit = regression.fit(model.search.always + model.selection.active)
     spread, p = regression.between_runs(fit, "thrust")
     runs = len(np.unique(regression.run[regression.training]))
-    return p < RUN_P and float(np.sqrt(spread[0] * runs)) > RUN_SPREAD
+    return p < _RUN_P and float(np.sqrt(spread[0] * runs)) > _RUN_SPREAD
 
 
-def with_run_scales(terms: list[Term], prepared: Prepared) -> list[Term]:
+def _with_run_scales(terms: list[Term], prepared: Prepared) -> list[Term]:
     """Terms with a thrust scale for each run: air density, other propellers, a tachometer's own error."""
     runs = dict.fromkeys([*(s.run for s in prepared.segments), *prepared.unseen])
-    return [*terms, *(Term(f"{RUN_SCALE}{r}", "nuisance", prior_sd=(RUN_TRUST,), run=r) for r in runs)]
+    return [*terms, *(Term(f"{RUN_SCALE}{r}", "nuisance", prior_sd=(_RUN_TRUST,), run=r) for r in runs)]
 
 
-def cost_of(model: WrenchModel, filters: dict[int, np.ndarray]) -> float:
+def _cost_of(model: WrenchModel, filters: dict[int, np.ndarray]) -> float:
     """Whitened squares that a model leaves, and what its ids and parameters cost."""
     left = 0.0
     for part in after_residual(model):

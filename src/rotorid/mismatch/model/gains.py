@@ -8,47 +8,48 @@
 
 What bands and sides have in common is not seen in their differences: a bias that grows with the residual over the own
 part of the column (`merged`).
+
+The believed vehicle with values refitted and no physics added: what an effect must do better than.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.mismatch.decision.decide import SMALLEST_CHANGE, SMALLEST_SIZE, coefficients
+from rotorid.mismatch.decision.decide import SMALLEST_CHANGE, SMALLEST_SIZE, coefficients, wrong_values
+from rotorid.mismatch.decision.select import Selection
 from rotorid.mismatch.model.delivered import Values
 from rotorid.mismatch.model.prepare import assemble_rows
-from rotorid.mismatch.model.refitted import size_of_value
 from rotorid.mismatch.model.wrench import WrenchModel, after_residual, block_seconds, chosen, model_filters
 from rotorid.mismatch.plant.regression import DOUBT_OF_CORRECTION, Regression, build, ridge_inverse
-from rotorid.mismatch.plant.rows import winds_last
+from rotorid.mismatch.plant.rows import compared_alone, winds_last
 from rotorid.mismatch.plant.split import training_rule
-from rotorid.mismatch.plant.two_sensors import compared_alone
-from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.problem import Prior
 from rotorid.mismatch.posterior.statements import SURE
 from rotorid.mismatch.posterior.values import GAINS, Gain, called_wrong, in_place, options_of, same_ratio
 from rotorid.recordings.signal.kernels import low_pass
 
-VALUE_BAND = (0.2, 0.6)
+_VALUE_BAND = (0.2, 0.6)
 """Shares of the cutoff. Below, disturbances and what the controller does about them; above, mostly the noise of the
 body rates' derivative, and their sensor's own filter."""
-LEAST_REACHED = 0.5
+_LEAST_REACHED = 0.5
 """Share of the rows in stretches longer than the band-pass, without which all frequencies judge."""
-MOMENTS = (3, 4, 5)
+_MOMENTS = (3, 4, 5)
 """Channels of the moments."""
 LEAST_SHARE = 1e-3
 """Of a believed value what an estimate is at least: of what is not excited it may be anything."""
-NEVER_SHOWN = 1e-6
+_NEVER_SHOWN = 1e-6
 """Whitened squares of a value's column up to which the flight shows nothing of it."""
-FREE_SD = 3.0
+_FREE_SD = 3.0
 """Relative one-sigma of the value by which a gain is estimated."""
 
 
 @dataclass(frozen=True)
-class WrongValues:
+class _WrongValues:
     """Believed values that recordings contradict."""
 
     values: Values
@@ -56,19 +57,19 @@ class WrongValues:
     """To each of them what would explain as much in its place."""
 
 
-def wrong_values_of(model: WrenchModel, prior: Prior = Prior()) -> WrongValues:  # noqa: B008
+def wrong_values_of(model: WrenchModel, prior: Prior = Prior()) -> _WrongValues:  # noqa: B008
     """The believed values that the model's recordings contradict.
 
     Of two values of one ratio the one is named by which the regression explains more, where it does so beyond doubt.
     """
-    trust = trust_of(model)
+    trust = _trust_of(model)
     options, least = options_of(gains_of(model, prior), trust, prior), float(np.log(SURE / (1.0 - SURE)))
-    regression, size = model.search.regression, size_of_value(model)
+    regression, size = model.search.regression, _size_of_value(model)
     always = [*regression.keys_of("nuisance", "wind"), *model.selection.active]
 
     def explained(wrong: frozenset[str]) -> float:
         """Nats."""
-        return 0.5 * regression.fit([*always, *sorted(wrong)], loose=dict.fromkeys(wrong, FREE_SD)).gain
+        return 0.5 * regression.fit([*always, *sorted(wrong)], loose=dict.fromkeys(wrong, _FREE_SD)).gain
 
     refused: list[str] = []
     while wrong := called_wrong(options, least, refused):
@@ -80,10 +81,10 @@ def wrong_values_of(model: WrenchModel, prior: Prior = Prior()) -> WrongValues: 
         if not small:
             break
         refused += small
-    return WrongValues(dict(options[wrong].changes), in_place(options, wrong, least))
+    return _WrongValues(dict(options[wrong].changes), in_place(options, wrong, least))
 
 
-def trust_of(model: WrenchModel) -> dict[str, float]:
+def _trust_of(model: WrenchModel) -> dict[str, float]:
     """Relative one-sigma of every believed value.
 
     A payload may be aboard of a vehicle whose centre of mass is off its place: then its mass is the least known of all.
@@ -104,18 +105,18 @@ def gains_of(model: WrenchModel, prior: Prior) -> dict[str, Gain]:
     """
     every, free = model.search.regression, [k for k in GAINS if k in model.regression.keys_of("value")]
     measured = all(s.measured_speed for s in model.segments)
-    quick = band_filters(model, VALUE_BAND) if measured else {}
-    known = {None: model_filters(model)} | ({VALUE_BAND: {**model_filters(model), **quick}} if quick else {})
+    quick = _band_filters(model, _VALUE_BAND) if measured else {}
+    known = {None: model_filters(model)} | ({_VALUE_BAND: {**model_filters(model), **quick}} if quick else {})
     bands, answered = [], {}
     for (band, filters), bias in zip(known.items(), prior.gain_bias, strict=False):
-        forward = every if band is None else regression_of_gains(model, filters)
+        forward = every if band is None else _regression_of_gains(model, filters)
         both = [
-            side_of(forward, model.selection.active, free, False),
-            side_of(regression_of_gains(model, filters, measured_moment=True), model.selection.active, free, True),
+            _side_of(forward, model.selection.active, free, False),
+            _side_of(_regression_of_gains(model, filters, measured_moment=True), model.selection.active, free, True),
         ]
         if band is None:
             answered = {key: side.leftover for key, side in both[0].items()}
-        samples = samples_in(model, band)
+        samples = _samples_in(model, band)
         bands.append(
             {
                 key: merged([side[key] for side in both], answered[key], bias, samples[key])
@@ -143,19 +144,19 @@ class Side:
     controller answers and which makes environments differ."""
 
 
-def side_of(
+def _side_of(
     regression: Regression, active: Sequence[str], free: Sequence[str], measured_moment: bool
 ) -> dict[str, Side]:
     """Each gain by one regression."""
-    keys, loose = [*regression.keys_of("nuisance", "wind"), *active, *free], dict.fromkeys(free, FREE_SD)
+    keys, loose = [*regression.keys_of("nuisance", "wind"), *active, *free], dict.fromkeys(free, _FREE_SD)
     pair = [r.fit(keys, loose=loose) for r in (regression.with_room(np.inf), uncorrected(regression))]
     out = {}
     for key in free:
         (corrected, covariance), (plain, _) = (coefficients(regression, fit, key) for fit in pair)
         turned = key == "mass" or not measured_moment
-        gain = [gain_of(float(b[0]), turned) for b in (corrected, plain)]
+        gain = [_gain_of(float(b[0]), turned) for b in (corrected, plain)]
         slope = np.exp(-gain[0] if turned else gain[0])  # of the logarithm over the coefficient
-        own, noise = own_part_of(regression, keys, loose, key)
+        own, noise = _own_part_of(regression, keys, loose, key)
         shift = DOUBT_OF_CORRECTION * float(corrected[0] - plain[0])
         robust = max(float(covariance[0, 0]) - shift**2, 0.0)
         out[key] = Side(
@@ -169,7 +170,7 @@ def side_of(
     return out
 
 
-def gain_of(coefficient: float, turned: bool) -> float:
+def _gain_of(coefficient: float, turned: bool) -> float:
     """Logarithm of a gain over the believed one, from the coefficient of the value in its denominator.
 
     `turned` says that the column holds what the believed value makes of a force or moment (`decide.relative_change`).
@@ -220,7 +221,7 @@ def uncorrected(regression: Regression) -> Regression:
     return plain.with_room(np.inf)
 
 
-def own_part_of(
+def _own_part_of(
     regression: Regression, keys: Sequence[str], loose: Mapping[str, float], key: str
 ) -> tuple[float, float]:
     """Whitened squares of a value's column that no other of `keys` takes over, and the share of them that is noise."""
@@ -232,22 +233,22 @@ def own_part_of(
     inverse = ridge_inverse(gram[np.ix_(others, others)] + np.diag(precision[others]))
     energy = float(gram[own, own] - gram[own, others] @ inverse @ gram[others, own])
     noise = float(regression.bias_gram[own, own] * regression.training.mean())
-    return (energy, noise / energy) if energy > NEVER_SHOWN else (0.0, 1.0)
+    return (energy, noise / energy) if energy > _NEVER_SHOWN else (0.0, 1.0)
 
 
-def samples_in(model: WrenchModel, band: tuple[float, float] | None) -> dict[str, float]:
+def _samples_in(model: WrenchModel, band: tuple[float, float] | None) -> dict[str, float]:
     """Independent samples of the fitted rows in the channel of each gain."""
     thinner = model.prepared.thinner
     rows = float(model.regression.training.sum() * model.regression.block_s * thinner.rate_hz)
-    return {key: rows if band is None or key == "mass" else rows / copies_in(model, band) for key in GAINS}
+    return {key: rows if band is None or key == "mass" else rows / _copies_in(model, band) for key in GAINS}
 
 
-def copies_in(model: WrenchModel, band: tuple[float, float]) -> float:
+def _copies_in(model: WrenchModel, band: tuple[float, float]) -> float:
     """Samples of a band for each that is independent of its neighbours."""
     return model.prepared.thinner.rate_hz / (2 * (band[1] - band[0]) * model.prepared.thinner.cutoff_hz)
 
 
-def regression_of_gains(
+def _regression_of_gains(
     model: WrenchModel, filters: dict[int, np.ndarray], measured_moment: bool = False
 ) -> Regression:
     """Regression of the believed values and the selected effects, each channel filtered by its own of `filters`.
@@ -276,7 +277,7 @@ def regression_of_gains(
     return regression.without_winds()
 
 
-def band_filters(model: WrenchModel, band: tuple[float, float]) -> dict[int, np.ndarray]:
+def _band_filters(model: WrenchModel, band: tuple[float, float]) -> dict[int, np.ndarray]:
     """To each moment's channel the band-pass that makes its residual noise of one sigma; none for short stretches.
 
     Not whitened in addition: a filter learnt where a slow disturbance is by far the largest is hardly one for the band.
@@ -285,10 +286,30 @@ def band_filters(model: WrenchModel, band: tuple[float, float]) -> dict[int, np.
     slow, quick = (low_pass(thinner.rate_hz, share * thinner.cutoff_hz) for share in band)
     middle = np.convolve(np.eye(len(slow))[len(slow) // 2] - slow, quick)
     parts = [part for part in after_residual(model) if len(part) > len(middle)]
-    if sum(len(part) for part in parts) < LEAST_REACHED * sum(len(r.y) for r in model.rows):
+    if sum(len(part) for part in parts) < _LEAST_REACHED * sum(len(r.y) for r in model.rows):
         return {}
     out = {}
-    for c in set(MOMENTS) & set(model_filters(model)):
+    for c in set(_MOMENTS) & set(model_filters(model)):
         left = np.concatenate([np.convolve(part[:, c], middle, "valid") for part in parts])
-        out[c] = middle / (np.sqrt(copies_in(model, band)) * left.std())
+        out[c] = middle / (np.sqrt(_copies_in(model, band)) * left.std())
     return out
+
+
+def values_alone(model: WrenchModel) -> Values:
+    """The believed values that the recordings contradict where no effect is at work.
+
+    Given a wind no value is called wrong: it acts through the drag.
+    """
+    if model.wind is not None:
+        return {}
+    nothing = Selection([], model.selection.fit)
+    return wrong_values(model.search.regression, nothing, _size_of_value(model))
+
+
+def _size_of_value(model: WrenchModel) -> Callable[[str, float], float]:
+    """Function of a value and its relative change that gives the change's size in units of the noise."""
+
+    def size(key: str, change: float) -> float:
+        return float(model.search.ask.sizes_of(key, np.array([change])).max())
+
+    return size

@@ -28,35 +28,34 @@ from rotorid.mismatch.model.wrench import (
     with_linear,
     wrench_model,
 )
-from rotorid.mismatch.plant.excess_noise import NOISE_BAND, band_power
 from rotorid.mismatch.plant.motion import Segment
-from rotorid.mismatch.plant.regression import Fit, Regression, build
+from rotorid.mismatch.plant.regression import NOISE_BAND, Fit, Regression, band_power, build
 from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.mismatch.plant.split import training_rule
 from rotorid.mismatch.posterior.status import Estimate
 from rotorid.steps import step
 
-KNOT_S, RESTLESS_KNOT_S = 0.3, 1.0
+_KNOT_S, _RESTLESS_KNOT_S = 0.3, 1.0
 """Distance of knots in a window, where a gust may set in within a fraction of a second, and where the wind changes
 all the time."""
-MOST_KNOTS = 150
+_MOST_KNOTS = 150
 """Knots of all runs together: beyond, the recording is too long to ask for a wind everywhere, and of windows the
 strongest are looked at."""
-RESTLESS_SHARE = 0.5
+_RESTLESS_SHARE = 0.5
 """A wind that never rests must take away more than this share of the energy left in the horizontal force."""
-FOLLOWS = 0.5
+_FOLLOWS = 0.5
 """Share of the squares of a wind that the vehicle's own velocity may explain."""
-LASTING_S = 12.0
+_LASTING_S = 12.0
 """A wind that changes for longer has no one height: its root mean square is stated."""
-MOST_EXTRAPOLATION = 1.05
+_MOST_EXTRAPOLATION = 1.05
 """Speed in a window, relative to the fastest that is fitted, up to which the drag is known."""
-GUST_P = 1e-6
-BESIDE_A_BURST = 1.0
+_GUST_P = 1e-6
+_BESIDE_A_BURST = 1.0
 """Size, in units of the noise, of a gust that is believed where a stronger one blew: left out, it would be noise to the
 others."""
-STEPS, ROUNDS = 4, 2
+STEPS, _ROUNDS = 4, 2
 """Gauss-Newton steps for the wind alone, and searches repeated in it."""
-LARGEST_STEP_M_S = 4.0
+_LARGEST_STEP_M_S = 4.0
 
 
 @dataclass(frozen=True)
@@ -106,7 +105,7 @@ def knots_of(start_s: float, stop_s: float, spacing_s: float) -> np.ndarray:
     return np.linspace(start_s, stop_s, max(3, int(round((stop_s - start_s) / spacing_s)) + 1))
 
 
-def wind_term(run: str, knots_s: np.ndarray) -> Term:
+def _wind_term(run: str, knots_s: np.ndarray) -> Term:
     """Columns of one metre a second more wind at each knot, north then east."""
     size = 2 * len(knots_s)
     window = (run, float(knots_s[0]), float(knots_s[-1]))
@@ -115,7 +114,7 @@ def wind_term(run: str, knots_s: np.ndarray) -> Term:
     return Term(key, "wind", gust, None, tuple(knots_s), size, (np.inf,) * size, run=run, window=window)
 
 
-def in_gusts(segments: list[Segment], gusts: dict[str, tuple[Term, np.ndarray]]) -> list[Segment]:
+def _in_gusts(segments: list[Segment], gusts: dict[str, tuple[Term, np.ndarray]]) -> list[Segment]:
     """Segments with the wind of each term (its values (2 knots,), m/s) on top of what blows there already."""
     out = []
     for s in segments:
@@ -144,16 +143,16 @@ def with_gusts(prepared: Prepared, model: WrenchModel, terms: list[Term]) -> Wre
     if "force" not in prepared.groups or any(s.motion.rotation is None for s in segments):
         return model
     found = [
-        (s.run, windows(left[:, :3], rotation_at(s, rows), rows.time_s))
+        (s.run, windows(left[:, :3], _rotation_at(s, rows), rows.time_s))
         for s, rows, left in zip(segments, model.rows, after_residual(model), strict=True)
     ]
-    found = [(run, [w for w in own if not beyond_fitted(model, run, *w[:2])]) for run, own in found]
+    found = [(run, [w for w in own if not _beyond_fitted(model, run, *w[:2])]) for run, own in found]
     found = strongest(found)
-    asked = [wind_term(run, knots_of(a, b, KNOT_S)) for run, own in found for a, b, _ in own]
-    if feels_wind(model):
+    asked = [_wind_term(run, knots_of(a, b, _KNOT_S)) for run, own in found for a, b, _ in own]
+    if _feels_wind(model):
         # A force that no wind makes through the drag is no gust: it stays unexplained.
-        known = asked or restless(model)
-        return (in_moving_air(prepared, model, terms, known) if known else None) or model
+        known = asked or _restless(model)
+        return (_in_moving_air(prepared, model, terms, known) if known else None) or model
     forces = [t for run, own in found for t in gust_terms(run, own)]
     if not forces:
         return model
@@ -161,20 +160,20 @@ def with_gusts(prepared: Prepared, model: WrenchModel, terms: list[Term]) -> Wre
         prepared, terms + forces, chosen(model), model.selection.active, segments, model.noisy_segments
     )
     again = replace(again, wind=model.wind, wind_sd=model.wind_sd)
-    if feels_wind(again):
+    if _feels_wind(again):
         # A strong gust hides the drag through which it is felt; with the gust known as a force it shows.
-        return in_moving_air(prepared, again, terms, asked) or again
+        return _in_moving_air(prepared, again, terms, asked) or again
     return again
 
 
-def strongest(found: list[tuple[str, list]], most_knots: int = MOST_KNOTS) -> list[tuple[str, list]]:
+def strongest(found: list[tuple[str, list]], most_knots: int = _MOST_KNOTS) -> list[tuple[str, list]]:
     """The strongest windows (start_s, stop_s, strength) of all runs, as many as have `most_knots` in all.
 
     Every knot is two columns of the regression: their number must not grow with the recording.
     """
     kept, left = set(), most_knots
     for run, window in sorted(((r, w) for r, own in found for w in own), key=lambda rw: -rw[1][2]):
-        left -= len(knots_of(*window[:2], KNOT_S))
+        left -= len(knots_of(*window[:2], _KNOT_S))
         if left < 0:
             break
         kept.add((run, window))
@@ -186,38 +185,40 @@ def with_gusts_of_new_runs(model: WrenchModel, segments: list[Segment], noisy: l
 
     `rows` are those stretches' rows by the model. The vehicle's numbers stay as they are.
     """
-    if not feels_wind(model) or any(s.motion.rotation is None or s.motion.velocity is None for s in segments):
+    if not _feels_wind(model) or any(s.motion.rotation is None or s.motion.velocity is None for s in segments):
         return segments, noisy, ()
     full = model.full_fit()
     left = [r.y - r.x[:, :, full.columns] @ full.beta for r in rows]
     parts = zip(segments, rows, left, strict=True)
-    if any(g.window[2] - g.window[1] > 0.9 * length_of(model, g.run) for g in model.gusts):
+    if any(g.window[2] - g.window[1] > 0.9 * _length_of(model, g.run) for g in model.gusts):
         # The wind never rests in the fitted runs: it is looked for everywhere.
         times = [s.motion.time_s for s in segments]
-        asked = [wind_term(s.run, knots_of(t[0], t[-1], RESTLESS_KNOT_S)) for s, t in zip(segments, times, strict=True)]
+        asked = [
+            _wind_term(s.run, knots_of(t[0], t[-1], _RESTLESS_KNOT_S)) for s, t in zip(segments, times, strict=True)
+        ]
     else:
-        found = [(s.run, windows(part[:, :3], rotation_at(s, r), r.time_s)) for s, r, part in parts]
-        asked = [wind_term(run, knots_of(a, b, KNOT_S)) for run, own in strongest(found) for a, b, _ in own]
+        found = [(s.run, windows(part[:, :3], _rotation_at(s, r), r.time_s)) for s, r, part in parts]
+        asked = [_wind_term(run, knots_of(a, b, _KNOT_S)) for run, own in strongest(found) for a, b, _ in own]
     winds, gusts = {}, []
     for term in asked:
-        wind = wind_in(model, [s for s in segments if s.run == term.run], term)
+        wind = _wind_in(model, [s for s in segments if s.run == term.run], term)
         gust = Gust(term.run, np.array(term.values), wind.reshape(2, -1).T, np.eye(len(wind)), 1.0)
-        if size_of(gust, model, segments) > BESIDE_A_BURST:
+        if size_of(gust, model, segments) > _BESIDE_A_BURST:
             winds[term.key] = (term, wind)
             gusts.append(gust)
-    return in_gusts(segments, winds), in_gusts(noisy, winds) if noisy else noisy, tuple(gusts)
+    return _in_gusts(segments, winds), _in_gusts(noisy, winds) if noisy else noisy, tuple(gusts)
 
 
-def wind_in(model: WrenchModel, segments: list[Segment], term: Term) -> np.ndarray:
+def _wind_in(model: WrenchModel, segments: list[Segment], term: Term) -> np.ndarray:
     """Wind at a term's knots (2 knots,), m/s, by Gauss-Newton with everything else as it is in the model."""
-    full, felt, wind = model.full_fit(), felt_by(model), np.zeros(term.size)
-    active = [model.search.terms[k] for k in lasting(model)]
+    full, felt, wind = model.full_fit(), _felt_by(model), np.zeros(term.size)
+    active = [model.search.terms[k] for k in _lasting(model)]
     always = [t for t in model.terms if t.kind != "effect" and not t.run]
     kept = [*always, *active]
     cols = model.regression.columns([t.key for t in kept])
     beta = np.array([full.beta[full.columns == c][0] if c in full.columns else 0.0 for c in cols])
     for _ in range(STEPS):
-        moved = in_gusts(segments, {term.key: (term, wind)})
+        moved = _in_gusts(segments, {term.key: (term, wind)})
         rows = assemble_rows(model.prepared, [*kept, term], moved, felt)
         normal, right = 1e-9 * np.eye(term.size), np.zeros(term.size)
         for r in rows:
@@ -225,11 +226,11 @@ def wind_in(model: WrenchModel, segments: list[Segment], term: Term) -> np.ndarr
             own = r.x[:, :2, len(cols) :] / model.noise[:2, None]
             normal, right = normal + np.einsum("nci,ncj->ij", own, own), right + np.einsum("nci,nc->i", own, left)
         ridge = 1e-6 * np.trace(normal) / term.size * np.eye(term.size)
-        wind = wind + np.clip(np.linalg.solve(normal + ridge, right), -LARGEST_STEP_M_S, LARGEST_STEP_M_S)
+        wind = wind + np.clip(np.linalg.solve(normal + ridge, right), -_LARGEST_STEP_M_S, _LARGEST_STEP_M_S)
     return wind
 
 
-def beyond_fitted(model: WrenchModel, run: str, start_s: float, stop_s: float) -> bool:
+def _beyond_fitted(model: WrenchModel, run: str, start_s: float, stop_s: float) -> bool:
     """Whether a window of a run that is not fitted flies faster than all that is: drag extrapolated is no gust."""
     fitted, inside = [0.0], [0.0]
     rule = training_rule(model.prepared.split, model.segments)
@@ -243,74 +244,74 @@ def beyond_fitted(model: WrenchModel, run: str, start_s: float, stop_s: float) -
         window = (time_s >= start_s) & (time_s <= stop_s) & ~known
         if s.run == run and window.any():
             inside.append(float(speed[window].max()))
-    return max(inside) > MOST_EXTRAPOLATION * max(fitted)
+    return max(inside) > _MOST_EXTRAPOLATION * max(fitted)
 
 
-def feels_wind(model: WrenchModel) -> bool:
+def _feels_wind(model: WrenchModel) -> bool:
     """Whether a wind is identifiable: a drag is in the model, and the velocity over ground is known."""
     drag = any(model.search.terms[k].effect in ids_of("drag") for k in model.selection.active)
     return drag and all(s.motion.velocity is not None for s in model.segments)
 
 
-def lasting(model: WrenchModel) -> list[str]:
+def _lasting(model: WrenchModel) -> list[str]:
     """What is in the model of effects that no wind of a window or of the whole flight takes the place of."""
     winds = moving_air("all the time").id, moving_air("in windows").id
     return [k for k in model.selection.active if model.search.terms[k].effect not in winds]
 
 
-def rotation_at(segment: Segment, rows: Rows) -> np.ndarray:
+def _rotation_at(segment: Segment, rows: Rows) -> np.ndarray:
     """Attitude at the instants of the rows, (n, 3, 3)."""
     index = np.searchsorted(segment.motion.time_s, rows.time_s).clip(0, segment.motion.size - 1)
     return segment.motion.rotation[index]
 
 
-def restless(model: WrenchModel) -> list[Term]:
+def _restless(model: WrenchModel) -> list[Term]:
     """A wind over the whole of every stretch; nothing where it could not matter, or for very long recordings."""
     thinner = model.prepared.thinner
     band = tuple(share * thinner.cutoff_hz for share in NOISE_BAND)
     left = [part[:, :2] for part in after_residual(model)]
     white = sum(band_power([part[:, axis] for part in left], thinner.rate_hz, band) for axis in range(2)) / 2
-    if horizontal_energy(model) * (1 - RESTLESS_SHARE) < white * thinner.cutoff_hz:
+    if _horizontal_energy(model) * (1 - _RESTLESS_SHARE) < white * thinner.cutoff_hz:
         return []
     terms = []
     for s in model.segments:
         start, stop = float(s.motion.time_s[0]), float(s.motion.time_s[-1])
-        terms.append(wind_term(s.run, knots_of(start, stop, RESTLESS_KNOT_S)))
-    return terms if sum(len(t.values) for t in terms) <= MOST_KNOTS else []
+        terms.append(_wind_term(s.run, knots_of(start, stop, _RESTLESS_KNOT_S)))
+    return terms if sum(len(t.values) for t in terms) <= _MOST_KNOTS else []
 
 
-def in_moving_air(prepared: Prepared, model: WrenchModel, terms: list[Term], asked: list[Term]) -> WrenchModel | None:
+def _in_moving_air(prepared: Prepared, model: WrenchModel, terms: list[Term], asked: list[Term]) -> WrenchModel | None:
     """The search repeated with the wind of the windows asked for, as far as it is there; None where it is not."""
     still = {t.key: (t, np.zeros(t.size)) for t in asked}
     winds, _ = estimated(prepared, model, still, STEPS)
     kept = [t for t in terms if t.effect != moving_air("all the time").id]
     again = model
-    for _ in range(ROUNDS):
-        active = lasting(again)
-        moved = in_gusts(model.segments, winds)
-        noisy = in_gusts(model.noisy_segments, winds) if model.noisy_segments else model.noisy_segments
+    for _ in range(_ROUNDS):
+        active = _lasting(again)
+        moved = _in_gusts(model.segments, winds)
+        noisy = _in_gusts(model.noisy_segments, winds) if model.noisy_segments else model.noisy_segments
         again = wrench_model(prepared, [*kept, *asked], chosen(again), active, moved, noisy)
         if not any(again.search.terms[k].effect in ids_of("drag") for k in again.selection.active):
             return None
         steps, covariances = estimated(prepared, again, still, 1)
         winds = {k: (t, values + steps[k][1]) for k, (t, values) in winds.items()}
-        gusts = believed([gust_of(term, wind, covariances[key]) for key, (term, wind) in winds.items()], again)
+        gusts = believed([_gust_of(term, wind, covariances[key]) for key, (term, wind) in winds.items()], again)
         if not gusts:
             return None
-    everywhere = any(t.window[2] - t.window[1] > 0.9 * length_of(model, t.run) for t in asked)
-    if everywhere and follows_velocity(gusts, model):
+    everywhere = any(t.window[2] - t.window[1] > 0.9 * _length_of(model, t.run) for t in asked)
+    if everywhere and _follows_velocity(gusts, model):
         return None
-    if everywhere and horizontal_energy(again) > (1 - RESTLESS_SHARE) * horizontal_energy(model):
+    if everywhere and _horizontal_energy(again) > (1 - _RESTLESS_SHARE) * _horizontal_energy(model):
         return None
     if len(gusts) < len(asked):
         present = {g.window for g in gusts}
-        return in_moving_air(prepared, model, terms, [t for t in asked if t.window in present])
+        return _in_moving_air(prepared, model, terms, [t for t in asked if t.window in present])
     return replace(again, wind=model.wind, wind_sd=model.wind_sd, gusts=tuple(gusts))
 
 
-def gust_of(term: Term, wind: np.ndarray, covariance: np.ndarray) -> Gust:
+def _gust_of(term: Term, wind: np.ndarray, covariance: np.ndarray) -> Gust:
     """The gust of a term's knots with its wind, north then east (2 knots,), m/s."""
-    return Gust(term.run, np.array(term.values), wind.reshape(2, -1).T, covariance, chance(wind, covariance))
+    return Gust(term.run, np.array(term.values), wind.reshape(2, -1).T, covariance, _chance(wind, covariance))
 
 
 def believed(gusts: list[Gust], model: WrenchModel) -> list[Gust]:
@@ -319,14 +320,14 @@ def believed(gusts: list[Gust], model: WrenchModel) -> list[Gust]:
     A wind that is a small share of the airspeed is what the drag's form is wrong by.
     """
     share = rules.OVERSHADOWED["share_of_burst"]
-    known = [g for g in gusts if g.p_value < GUST_P]
+    known = [g for g in gusts if g.p_value < _GUST_P]
     sizes = [(g, size_of(g, model)) for g in known if not rules.OVERSHADOWED(share_of_airspeed(g, model) < share)]
     if max((size for _, size in sizes), default=0.0) <= rules.OVERSHADOWED["times_for_burst"]:
         return []
-    return [g for g, size in sizes if size > BESIDE_A_BURST]
+    return [g for g, size in sizes if size > _BESIDE_A_BURST]
 
 
-def follows_velocity(gusts: Sequence[Gust], model: WrenchModel) -> bool:
+def _follows_velocity(gusts: Sequence[Gust], model: WrenchModel) -> bool:
     """Whether most of a wind is a share of the velocity over ground, below one: a drag that is stated wrongly.
 
     What a wind blows along is slower than the wind.
@@ -341,7 +342,7 @@ def follows_velocity(gusts: Sequence[Gust], model: WrenchModel) -> bool:
     wind, velocity = np.concatenate(winds), np.concatenate(flown)
     share = float((wind * velocity).sum() / max(float((velocity**2).sum()), 1e-12))
     left = float(((wind - share * velocity) ** 2).sum())
-    return abs(share) < 1.0 and left < (1.0 - FOLLOWS) * float((wind**2).sum())
+    return abs(share) < 1.0 and left < (1.0 - _FOLLOWS) * float((wind**2).sum())
 
 
 def share_of_airspeed(gust: Gust, model: WrenchModel) -> float:
@@ -354,17 +355,17 @@ def share_of_airspeed(gust: Gust, model: WrenchModel) -> float:
     return float(np.sqrt(wind / max(flown, 1e-12)))
 
 
-def chance(wind: np.ndarray, covariance: np.ndarray) -> float:
+def _chance(wind: np.ndarray, covariance: np.ndarray) -> float:
     """Probability of as much wind at the knots where there is none."""
     return float(chi2.sf(wind @ np.linalg.solve(covariance, wind), len(wind)))
 
 
-def length_of(model: WrenchModel, run: str) -> float:
+def _length_of(model: WrenchModel, run: str) -> float:
     """Seconds of a run's stretches together."""
     return sum(s.motion.size / s.rate_hz for s in model.segments if s.run == run)
 
 
-def horizontal_energy(model: WrenchModel) -> float:
+def _horizontal_energy(model: WrenchModel) -> float:
     """Mean square of what is left in the force across the rotors' axis, N2."""
     left = np.concatenate([part[:, :2] for part in after_residual(model)])
     return float(np.mean(left**2))
@@ -374,9 +375,9 @@ def size_of(gust: Gust, model: WrenchModel, segments: list[Segment] | None = Non
     """Root mean square of a gust's force in its window, in units of the noise of the force; of the model's segments
     or of others."""
     knots, wind = gust.knots_s, gust.wind_m_s.T.ravel()
-    own = wind_term(gust.run, knots)
+    own = _wind_term(gust.run, knots)
     segments = [s for s in (model.segments if segments is None else segments) if s.run == gust.run]
-    felt = felt_by(model)
+    felt = _felt_by(model)
     total, count = 0.0, 0
     for rows in assemble_rows(model.prepared, [own], segments, felt):
         inside = (rows.time_s >= knots[0]) & (rows.time_s <= knots[-1])
@@ -385,7 +386,7 @@ def size_of(gust: Gust, model: WrenchModel, segments: list[Segment] | None = Non
     return float(np.sqrt(total / max(count, 1)))
 
 
-def felt_by(model: WrenchModel):
+def _felt_by(model: WrenchModel):
     """Forms in the model that feel the air, with their values."""
     pairs = zip(model.selection.active, chosen(model), strict=True)
     return [found for k, found in pairs if model.search.terms[k].effect in ids_of("feels_air")]
@@ -396,14 +397,14 @@ def estimated(prepared: Prepared, model: WrenchModel, winds: dict[str, tuple[Ter
     winds = dict(winds)
     asked = [term for term, _ in winds.values()]
     always = [t for t in model.terms if t.kind != "effect" and t.effect != moving_air("in windows").id]
-    active = [model.search.terms[k] for k in lasting(model)]
+    active = [model.search.terms[k] for k in _lasting(model)]
     values = dict(zip(model.selection.active, chosen(model), strict=True))
     effects = [values[t.key] for t in active]
     rate = prepared.thinner.rate_hz
     own = [*always, *active, *asked]
     covariances = {}
     for _ in range(steps):
-        moved = in_gusts(model.segments, winds)
+        moved = _in_gusts(model.segments, winds)
         rows = assemble_rows(prepared, own, moved, effects)
         rule = training_rule(prepared.split, moved)
         regression = build(rows, own, model_filters(model), rule, block_seconds(rows, rate), rate)
@@ -411,7 +412,7 @@ def estimated(prepared: Prepared, model: WrenchModel, winds: dict[str, tuple[Ter
         effects = [with_linear(e, regression, fit, t) for t, e in zip(active, effects, strict=True)]
         for term in asked:
             step, covariances[term.key] = step_of(regression, fit, term)
-            winds[term.key] = (term, winds[term.key][1] + np.clip(step, -LARGEST_STEP_M_S, LARGEST_STEP_M_S))
+            winds[term.key] = (term, winds[term.key][1] + np.clip(step, -_LARGEST_STEP_M_S, _LARGEST_STEP_M_S))
     return winds, covariances
 
 
@@ -433,7 +434,7 @@ def step_of(regression: Regression, fit: Fit, term: Term) -> tuple[np.ndarray, n
 def gust_finding(gusts: tuple[Gust, ...]) -> Finding:
     """All gusts of a set as one finding, the surest one's wind as its parameters."""
     first = min(gusts, key=lambda g: g.p_value)
-    lasting = first.knots_s[-1] - first.knots_s[0] > LASTING_S
+    lasting = first.knots_s[-1] - first.knots_s[0] > _LASTING_S
     height, sd = first.unrest() if lasting else first.height()
     symbol = "w_{}_rms" if lasting else "w_{}"
     effect = moving_air("in windows")

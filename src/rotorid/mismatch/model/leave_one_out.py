@@ -50,9 +50,9 @@ def without_each(
             left = residuals_of(seen, scaled_by_run(seen, fewer))
             out[finding.id] = on_traces(traces, seen.rows, left)
         elif in_chain and found.measured:
-            out[finding.id] = speeds_without(found, seen, finding.id, traces)
+            out[finding.id] = _speeds_without(found, seen, finding.id, traces)
         elif in_chain:
-            segments = path_segments(seen.prepared.segments, *chain_without(found, finding.id), cutoff_of(seen))
+            segments = path_segments(seen.prepared.segments, *chain_without(found, finding.id), _cutoff_of(seen))
             out[finding.id] = on_traces(traces, seen.rows, made_by(seen, segments, fit))
         elif finding.id in ids_of("air_moves", "all the time") and seen.wind is not None:
             still = [replace(s, motion=replace(s.motion, wind=without_wind(s, seen.wind))) for s in seen.segments]
@@ -64,7 +64,7 @@ def without_each(
     return out
 
 
-def cutoff_of(model: WrenchModel) -> float:
+def _cutoff_of(model: WrenchModel) -> float:
     return model.prepared.thinner.cutoff_hz
 
 
@@ -103,7 +103,7 @@ def on_traces(traces: Sequence[Trace], rows: Sequence[Rows], left: Sequence[np.n
     return tuple(known.get((t.run, first_s(t.time_s), t.channel), t.named) for t in traces)
 
 
-def speeds_without(found: Fitted, seen: WrenchModel, key: str, traces: tuple[Trace, ...]) -> tuple[np.ndarray, ...]:
+def _speeds_without(found: Fitted, seen: WrenchModel, key: str, traces: tuple[Trace, ...]) -> tuple[np.ndarray, ...]:
     """Measured less modelled rotor speeds on the traces, with one id less between command and speed."""
     result, *rest = chain_without(found, key)
     thinner, known = seen.prepared.thinner, {}

@@ -1,4 +1,7 @@
-"""What no named effect explains: in which channels, what it depends on, and a plain description."""
+"""What no named effect explains: in which channels, what it depends on, and a plain description.
+
+Slow changes of a residual that the sensors cannot have made: a mass that slides, a tank that slops.
+"""
 
 from __future__ import annotations
 
@@ -6,23 +9,33 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import welch
 
 from rotorid.mismatch.decision.words import WRENCH_WORDS, listed
-from rotorid.mismatch.model.dependence import ALARM_P, SMALLEST_SHARE_OF_NOISE, left_by, standardised
-from rotorid.mismatch.model.slow_changes import slow_excess
+from rotorid.mismatch.model.dependence import ALARM_P, SMALLEST_SHARE_OF_NOISE, added_noise, left_by, standardised
 from rotorid.mismatch.model.wrench import WORTH_STATING, channel_floor
 from rotorid.mismatch.plant.between_runs import DifferingMeans, apart
 from rotorid.mismatch.plant.rows import CHANNELS
 from rotorid.mismatch.plant.unknowns import DEPENDS_ON, UNKNOWNS
 
-UNCLAIMED = 3.0
+_SLOW_BANDS_HZ = ((0.15, 0.7), (0.7, 2.5))
+_FAST_BAND = (0.3, 0.75)
+"""Band, as shares of the cutoff, that shows by how much the sensors' noise is more than its white part."""
+_SLOW_EXCESS = 16.0
+"""Times more power than the sensors' noise, relative to the fast band, that slow changes must have to be noise no
+more: coloured noise of the sensors stays below four, see benchmarks/mismatch.md."""
+_WELCH_S = 8.0
+_ACROSS = (0, 1)
+"""Channels of the force across the rotors' axis: what rotors make of their commands is not known well enough for the
+others."""
+_UNCLAIMED = 3.0
 """Energy relative to the noise's from which what only free values explain counts by itself, without any claim."""
-LEAST_NOISE = 0.1
+_LEAST_NOISE = 0.1
 """Share of what a flexible regression leaves that is noise, whatever else moves in it."""
 
 
 @dataclass(frozen=True)
-class ChannelLeftover:
+class _ChannelLeftover:
     """What one channel holds on the stretches judged, as energies: sums of squares, N² or N² m²."""
 
     name: str
@@ -54,7 +67,7 @@ class ChannelLeftover:
 
 
 @dataclass(frozen=True)
-class Leftover:
+class _Leftover:
     """What stays unexplained: channels, inputs and a description."""
 
     channels: tuple[str, ...] = ()
@@ -62,7 +75,7 @@ class Leftover:
     description: str = ""
 
 
-def leftover(prepared, model, segments, noisy, p_after, depends, delivered=None, claimed=True) -> Leftover:
+def leftover(prepared, model, segments, noisy, p_after, depends, delivered=None, claimed=True) -> _Leftover:
     """What no named effect explains of the force and moment channels.
 
     Five things count: empirical terms that won against the catalogue, what a ridge regression on all inputs and
@@ -76,23 +89,23 @@ def leftover(prepared, model, segments, noisy, p_after, depends, delivered=None,
     added = model.contributions.of(full.columns, full.beta)
     slow = slow_excess(prepared, model, segments, noisy, added)
     channels = channels_of(
-        prepared, model, segments, full, added, slow, p_after, delivered, 1.0 if claimed else UNCLAIMED
+        prepared, model, segments, full, added, slow, p_after, delivered, 1.0 if claimed else _UNCLAIMED
     )
     left = [c for c in channels if c.counts]
     if not left:
-        return Leftover()
+        return _Leftover()
     unknown = [UNKNOWNS[e] for e in (model.search.terms[k].effect for k in model.selection.active) if e in UNKNOWNS]
     on = [v for e in unknown for v in DEPENDS_ON[e.id]] + ([] if unknown else list(depends))
     on += ["time_s"] if slow else []
     on += ["run"] if any(c.between for c in left) else []
-    return Leftover(
+    return _Leftover(
         tuple(c.name for c in left),
         tuple(dict.fromkeys(on)),
         description(left, [e.sentence for e in unknown], slow, list(depends)),
     )
 
 
-def channels_of(prepared, model, segments, full, added, slow, p_after, delivered, least) -> list[ChannelLeftover]:
+def channels_of(prepared, model, segments, full, added, slow, p_after, delivered, least) -> list[_ChannelLeftover]:
     """Every channel that has a p-value, taken apart; judged on the runs held out, fitted on the others.
 
     `full` is the fit of the whole model, `added` (n, 12) of each stretch what it makes of the channels; `least` is how
@@ -131,9 +144,9 @@ def channels_of(prepared, model, segments, full, added, slow, p_after, delivered
         moving = count * slow[name][0] ** 2 if name in slow else 0.0
         delivered_energy = energy if delivered is None else _energy(delivered[i][:, c] for i in judged)
         # What moves slowly, or between runs, is no noise.
-        noise = max(flexible - moving - shifted, LEAST_NOISE * flexible, 1e-300)
+        noise = max(flexible - moving - shifted, _LEAST_NOISE * flexible, 1e-300)
         out.append(
-            ChannelLeftover(
+            _ChannelLeftover(
                 name,
                 count,
                 noise,
@@ -149,7 +162,7 @@ def channels_of(prepared, model, segments, full, added, slow, p_after, delivered
 
 
 def description(
-    channels: Sequence[ChannelLeftover],
+    channels: Sequence[_ChannelLeftover],
     sentences: Sequence[str],
     slow: Mapping[str, tuple[float, float]],
     depends: Sequence[str],
@@ -205,3 +218,65 @@ def _features(z: np.ndarray) -> np.ndarray:
     """Inputs and their pairwise products, (n, p + p(p+1)/2)."""
     i, j = np.triu_indices(z.shape[1])
     return np.concatenate([z, z[:, i] * z[:, j]], axis=1)
+
+
+def slow_excess(prepared, model, segments, noisy, contributions) -> dict[str, tuple[float, float]]:
+    """Slow changes of the residual that the sensors cannot have made: channel to (rms in its unit, frequency in Hz).
+
+    A regression on known inputs cannot see a mass that slides or a tank that slops; the noise can: it is known what
+    the sensors' own noise does to each channel (`noisy` are the same segments with that noise added once more).
+    `contributions` (n, 12) of each stretch are the whole model's.
+    """
+    if not noisy:
+        return {}
+    rate = prepared.thinner.rate_hz
+    fast = tuple(share * prepared.thinner.cutoff_hz for share in _FAST_BAND)
+    noise = added_noise(prepared, segments, noisy)
+    out = {}
+    for c in range(6) if all(s.measured_speed for s in segments) else _ACROSS:
+        if not np.isfinite(model.noise[c]):
+            continue
+        left = left_by(model.rows, c, contributions)
+        added = [x[:, c] for x in noise]
+        frequency, found = _spectrum(left, rate)
+        if frequency is None:
+            continue
+        _, expected = _spectrum(added, rate)
+        at = (frequency >= fast[0]) & (frequency <= fast[1])
+        level = max(1.0, float(found[at].mean() / max(expected[at].mean(), 1e-300)))
+        found = np.minimum(found, _moving(prepared, model, contributions, c, left, rate))
+        for low, high in _SLOW_BANDS_HZ:
+            band = (frequency >= low) & (frequency < high)
+            if not band.any() or found[band].mean() < _SLOW_EXCESS * level * expected[band].mean():
+                continue
+            excess = float(np.sum((found - level * expected)[band]) * (frequency[1] - frequency[0]))
+            if np.sqrt(max(excess, 0.0)) < SMALLEST_SHARE_OF_NOISE * model.noise[c]:
+                continue
+            before = out.get(CHANNELS[c], (0.0, 0.0))[0]
+            peak = float(frequency[band][np.argmax(found[band])])
+            out[CHANNELS[c]] = (float(np.hypot(before, np.sqrt(excess))), peak)
+    return out
+
+
+def _moving(prepared, model, contributions, channel: int, left, rate_hz: float) -> np.ndarray | float:
+    """Spectrum of a force's residual as the velocity shows it, infinite where no accelerometer is compared with one.
+
+    What the accelerometer alone reads moves nothing: a vibration seen through a low sampling rate is slow.
+    """
+    compared = len(model.noise) // 2 + channel
+    if channel > 2 or not np.isfinite(model.noise[compared]):
+        return np.inf
+    alone = left_by(model.rows, compared, contributions)
+    moving = [own - prepared.vehicle.mass_kg * part for own, part in zip(left, alone, strict=True)]
+    return _spectrum(moving, rate_hz)[1]
+
+
+def _spectrum(parts, rate_hz: float):
+    """Mean power spectrum of stretches of at least WELCH_S: frequency in Hz and density; (None, None) without any."""
+    size = int(_WELCH_S * rate_hz)
+    long = [p for p in parts if len(p) >= size]
+    if not long:
+        return None, None
+    total = sum(len(p) for p in long)
+    spectra = [welch(p, fs=rate_hz, nperseg=size) for p in long]
+    return spectra[0][0], sum(s[1] * len(p) for s, p in zip(spectra, long, strict=True)) / total

@@ -14,7 +14,7 @@ import numpy as np
 
 from rotorid.effects.contract import Motion
 
-FIELDS = frozenset(f.name for f in fields(Motion))
+_FIELDS = frozenset(f.name for f in fields(Motion))
 MOST_BYTES = 256e6
 """Of all that is kept; what was made first is forgotten first."""
 
@@ -25,8 +25,8 @@ class Watched(Motion):
     def __getattribute__(self, name: str) -> Any:
         own = object.__getattribute__(self, "__dict__")
         if name == "__dict__":
-            own.get("read", set()).update(FIELDS)
-        elif name in FIELDS:
+            own.get("read", set()).update(_FIELDS)
+        elif name in _FIELDS:
             own.get("read", set()).add(name)
         return object.__getattribute__(self, name)
 
@@ -73,15 +73,15 @@ class Memory:
             self.size -= known.size
         seen, read = watched(motion)
         made = make(seen)
-        new = Made(given, {name: getattr(motion, name) for name in read}, made, bytes_of(made))
+        new = Made(given, {name: getattr(motion, name) for name in read}, made, _bytes_of(made))
         self.kept[place], self.size = new, self.size + new.size
         while self.size > MOST_BYTES:
             self.size -= self.kept.pop(next(iter(self.kept))).size
         return made
 
 
-def bytes_of(made: Any) -> int:
+def _bytes_of(made: Any) -> int:
     """Bytes of the arrays in lists and mappings."""
     if isinstance(made, np.ndarray):
         return made.nbytes
-    return sum(map(bytes_of, made.values() if isinstance(made, dict) else made))
+    return sum(map(_bytes_of, made.values() if isinstance(made, dict) else made))

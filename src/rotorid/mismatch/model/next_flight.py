@@ -46,7 +46,7 @@ def beyond_flying(found: Fitted, ids: Sequence[str]) -> str:
     """What it takes to settle a class that no flight with the columns of its set can settle; empty where one may."""
     if not (found.commanded and set(CURVES) <= set(ids)):
         return ""
-    throttle, thrust = speeds_in_hover(found)
+    throttle, thrust = _speeds_in_hover(found)
     return (
         f"record the rotor speeds, or hold an optical tachometer to a rotor in hover ({throttle:.0f} rad/s if the "
         f"throttle is curved, {thrust:.0f} rad/s if the thrust is): where speeds are known from their commands alone "
@@ -54,7 +54,7 @@ def beyond_flying(found: Fitted, ids: Sequence[str]) -> str:
     )
 
 
-def speeds_in_hover(found: Fitted) -> tuple[float, float]:
+def _speeds_in_hover(found: Fitted) -> tuple[float, float]:
     """Rotor speed, rad/s, in hover if a throttle curve is at work, and if a thrust curve is.
 
     With a throttle curve the rotors turn as fast as the believed C_F needs; with a thrust curve as commanded.

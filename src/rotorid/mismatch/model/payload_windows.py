@@ -20,19 +20,19 @@ from rotorid.mismatch.plant.motion import Segment, stretches
 from rotorid.mismatch.plant.rows import Term
 from rotorid.mismatch.plant.unknowns import UNKNOWNS
 
-SEEN_IN = ((2, 0), (4, 1), (3, 2))
+_SEEN_IN = ((2, 0), (4, 1), (3, 2))
 """Channel and parameter of a load: its mass in the vertical force, its places in the moments of pitch and roll."""
 BLOCK_S = 0.5
-SMOOTHED_BLOCKS = 9
+_SMOOTHED_BLOCKS = 9
 SWITCH_COST = 30.0
 """Squares, in units of the blocks' own scatter, that taking up or dropping must explain."""
-LEAST_BLOCKS = 8
+_LEAST_BLOCKS = 8
 """Blocks of either state, of all runs together."""
 LEAST_STEP = 3.0
 """Distance of the two plateaus in units of the scatter of a block."""
 MOST_DRIFT = 0.2
 """Share of the slow variation of the loads that the two plateaus may leave."""
-EDGE_S = 1.5
+_EDGE_S = 1.5
 """Distance from the border of two blocks within which the instant is looked for."""
 Windows = tuple[tuple[float, float], ...]
 """(start_s, stop_s) of what is on board in a stretch, without end where it is on board from or to its end."""
@@ -40,11 +40,11 @@ Windows = tuple[tuple[float, float], ...]
 
 def payload_windows_of(model: WrenchModel) -> list[Windows]:
     """When a payload seems to be on board in every stretch; empty where none is picked up or dropped in one's midst."""
-    if not loads(model) or not np.isfinite(model.rows[0].y[:, SEEN_IN[0][0]]).all():
+    if not loads(model) or not np.isfinite(model.rows[0].y[:, _SEEN_IN[0][0]]).all():
         return []
-    left, columns = unexplained_loads(model)
+    left, columns = _unexplained_loads(model)
     per = max(2, int(BLOCK_S * model.prepared.thinner.rate_hz))
-    aboard = two_plateaus([block_loads(y, x, per) for y, x in zip(left, columns, strict=True)])
+    aboard = two_plateaus([_block_loads(y, x, per) for y, x in zip(left, columns, strict=True)])
     if aboard is None:
         return []
     out = []
@@ -64,7 +64,7 @@ def loads(model: WrenchModel) -> list[Term]:
     return sorted(found, key=lambda t: (t.key not in model.selection.active, t.size))
 
 
-def unexplained_loads(model: WrenchModel) -> tuple[list[np.ndarray], list[np.ndarray]]:
+def _unexplained_loads(model: WrenchModel) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """What the named effects but a payload leave in the channels of SEEN_IN that there are, and a payload's columns
     there, each (n, channels) of every stretch."""
     regression, fit = model.regression, model.selection.fit
@@ -73,13 +73,13 @@ def unexplained_loads(model: WrenchModel) -> tuple[list[np.ndarray], list[np.nda
     others = [k for k in model.selection.active if terms[k].effect not in aside and not terms[k].run]
     cols, own = regression.columns(others), regression.columns([loads(model)[0].key])
     beta = fit.beta[fit.places(cols)]
-    present = [(c, p) for c, p in SEEN_IN if np.isfinite(model.rows[0].y[:, c]).all()]
+    present = [(c, p) for c, p in _SEEN_IN if np.isfinite(model.rows[0].y[:, c]).all()]
     left = [np.stack([r.y[:, c] - r.x[:, c][:, cols] @ beta for c, _ in present], axis=1) for r in model.rows]
     columns = [np.stack([r.x[:, c, own[p]] for c, p in present], axis=1) for r in model.rows]
     return left, columns
 
 
-def block_loads(left: np.ndarray, columns: np.ndarray, per: int) -> np.ndarray:
+def _block_loads(left: np.ndarray, columns: np.ndarray, per: int) -> np.ndarray:
     """Mass, and mass times place, (blocks, channels) of `per` rows each, from residual and columns (n, channels)."""
     count = len(left) // per
     y, x = (part[: count * per].reshape(count, per, part.shape[1]) for part in (left, columns))
@@ -89,21 +89,21 @@ def block_loads(left: np.ndarray, columns: np.ndarray, per: int) -> np.ndarray:
 def two_plateaus(loads: Sequence[np.ndarray]) -> list[np.ndarray] | None:
     """Whether a payload is on board by blocks of every stretch; None where loads (blocks, k) are not two plateaus."""
     steps = np.concatenate([np.diff(part, axis=0) for part in loads])
-    if len(steps) < 4 * LEAST_BLOCKS:
+    if len(steps) < 4 * _LEAST_BLOCKS:
         return None
     scatter = 1.4826 * np.median(np.abs(steps), axis=0) / np.sqrt(2)
     if not (scatter > 0).all():
         return None
     scaled = [part / scatter for part in loads]
-    smooth = [median_filter(part, (SMOOTHED_BLOCKS, 1), mode="nearest") for part in scaled]
+    smooth = [median_filter(part, (_SMOOTHED_BLOCKS, 1), mode="nearest") for part in scaled]
     low, high = np.quantile(np.concatenate(smooth)[:, 0], (0.05, 0.95))
     states = [part[:, 0] > (low + high) / 2 for part in smooth]
     for _ in range(20):
         everything, inside = np.concatenate(scaled), np.concatenate(states)
-        if min(inside.sum(), (~inside).sum()) < LEAST_BLOCKS:
+        if min(inside.sum(), (~inside).sum()) < _LEAST_BLOCKS:
             return None
         plateaus = np.stack([everything[~inside].mean(axis=0), everything[inside].mean(axis=0)])
-        again = [cheapest_states(part, plateaus) for part in scaled]
+        again = [_cheapest_states(part, plateaus) for part in scaled]
         same = all(np.array_equal(a, b) for a, b in zip(again, states, strict=True))
         states = again
         if same:
@@ -112,16 +112,16 @@ def two_plateaus(loads: Sequence[np.ndarray]) -> list[np.ndarray] | None:
     if not any(np.diff(s).any() for s in states) or step[0] < LEAST_STEP:
         return None
     rest = [part - plateaus[s.astype(int)] for part, s in zip(scaled, states, strict=True)]
-    return states if slow_variance(rest) < MOST_DRIFT * slow_variance(scaled) else None
+    return states if _slow_variance(rest) < MOST_DRIFT * _slow_variance(scaled) else None
 
 
-def slow_variance(parts: Sequence[np.ndarray]) -> float:
+def _slow_variance(parts: Sequence[np.ndarray]) -> float:
     """Variance of what is slower than SMOOTHED_BLOCKS in stretches (blocks, k), all k together."""
-    smooth = np.concatenate([uniform_filter1d(p, SMOOTHED_BLOCKS, axis=0, mode="nearest") for p in parts if len(p)])
+    smooth = np.concatenate([uniform_filter1d(p, _SMOOTHED_BLOCKS, axis=0, mode="nearest") for p in parts if len(p)])
     return float(smooth.var(axis=0).sum())
 
 
-def cheapest_states(loads: np.ndarray, plateaus: np.ndarray) -> np.ndarray:
+def _cheapest_states(loads: np.ndarray, plateaus: np.ndarray) -> np.ndarray:
     """States (blocks,) of least squares from two plateaus (2, k), each change at SWITCH_COST (Viterbi)."""
     costs = ((loads[:, None, :] - plateaus[None]) ** 2).sum(axis=2)
     total, came = np.zeros(2), np.zeros((len(costs), 2), int)
@@ -144,7 +144,7 @@ def change_rows(states: np.ndarray, left: np.ndarray, column: np.ndarray, per: i
     errors = np.stack([(y - m * x) ** 2 for m in mass])
     edges = []
     for block in np.flatnonzero(np.diff(states)) + 1:
-        middle, reach = block * per, int(EDGE_S / BLOCK_S * per)
+        middle, reach = block * per, int(_EDGE_S / BLOCK_S * per)
         start, stop = max(0, middle - reach), min(len(y), middle + reach)
         before, after = int(states[block - 1]), int(states[block])
         gain = np.cumsum(errors[after, start:stop] - errors[before, start:stop])

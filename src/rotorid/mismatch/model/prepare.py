@@ -16,8 +16,6 @@ from rotorid.effects.contract import Form, Motion, not_testable_reason, rotor_th
 from rotorid.errors import InputError
 from rotorid.mismatch.decision import rules
 from rotorid.mismatch.model.made import Memory
-from rotorid.mismatch.plant.estimated_velocity import made_from_accelerometer
-from rotorid.mismatch.plant.excess_noise import noise_factors
 from rotorid.mismatch.plant.motion import (
     HIGHEST_CUTOFF_HZ,
     SHORTEST_SEGMENT_S,
@@ -26,7 +24,9 @@ from rotorid.mismatch.plant.motion import (
     analysis_rate_hz,
     build_segments,
     full_speed,
+    made_from_accelerometer,
 )
+from rotorid.mismatch.plant.regression import noise_factors
 from rotorid.mismatch.plant.rows import (
     OFFSETS,
     PARAMETER_NAMES,
@@ -55,18 +55,18 @@ from rotorid.steps import step
 
 DEFAULT_TRUST = {"thrust": 0.1, "torque": 0.2, "mass": 0.05, "arm": 0.03, "inertia": 0.15}
 """Relative one-sigma belief where `trust` states none."""
-LOWEST_TO_MEAN = 1.08
-MOST_S, PIECE_S = 600.0, 20.0
+_LOWEST_TO_MEAN = 1.08
+MOST_S, _PIECE_S = 600.0, 20.0
 """Longer recordings are represented by pieces: memory must not grow with an hour's flight."""
-NOISE_REACH = 5.0
+_NOISE_REACH = 5.0
 """Highest frequency, over the cutoff of the analysis, that a sensor's noise is read from."""
-OF_THE_BODY = frozenset({"specific_force", "angular_acceleration"})
+_OF_THE_BODY = frozenset({"specific_force", "angular_acceleration"})
 """Fields of a motion that effects on the body read, and none on the rotors."""
-FINEST_HZ = 1.0
-PIECE_SAMPLES, SMOOTHED = 256, 9
+_FINEST_HZ = 1.0
+_PIECE_SAMPLES, _SMOOTHED = 256, 9
 """Samples of the pieces that spectra are averaged over (more where a bin would be wider than FINEST_HZ), and bins that
 are averaged."""
-MOST_NOISE_SAMPLES = 8192
+_MOST_NOISE_SAMPLES = 8192
 """Samples of a column that its noise level is read from."""
 
 
@@ -76,16 +76,16 @@ def white_level(values: np.ndarray, rate_hz: float, highest_hz: float = np.inf) 
     Above `highest_hz` nobody looks: a gyroscope that smooths its own reading has next to no noise there, and all the
     same noise below.
     """
-    pieces = max(1, int(np.ceil(rate_hz / FINEST_HZ / PIECE_SAMPLES)))
-    values = values[np.isfinite(values)][: MOST_NOISE_SAMPLES * pieces]
+    pieces = max(1, int(np.ceil(rate_hz / _FINEST_HZ / _PIECE_SAMPLES)))
+    values = values[np.isfinite(values)][: _MOST_NOISE_SAMPLES * pieces]
     if len(values) < 64:
         return 0.0
-    frequency, density = welch(values, fs=1.0, nperseg=min(PIECE_SAMPLES * pieces, len(values) // 2))
-    smooth = np.convolve(density[2:], np.ones(SMOOTHED) / SMOOTHED, mode="valid")
-    low = smooth[frequency[SMOOTHED + 1 :] * rate_hz <= highest_hz]
+    frequency, density = welch(values, fs=1.0, nperseg=min(_PIECE_SAMPLES * pieces, len(values) // 2))
+    smooth = np.convolve(density[2:], np.ones(_SMOOTHED) / _SMOOTHED, mode="valid")
+    low = smooth[frequency[_SMOOTHED + 1 :] * rate_hz <= highest_hz]
     smooth = low if len(low) else smooth[:1]
     # The lowest of some hundred smoothed levels lies below their mean.
-    return float(LOWEST_TO_MEAN * np.sqrt(max(smooth.min(), 0.0) / 2)) if len(smooth) else 0.0
+    return float(_LOWEST_TO_MEAN * np.sqrt(max(smooth.min(), 0.0) / 2)) if len(smooth) else 0.0
 
 
 def own_rate_hz(run: Run, column: str) -> float:
@@ -111,7 +111,7 @@ def sensor_noise(runs: tuple[Run, ...], vehicle: Vehicle, cutoff_hz: float = np.
     levels = {}
     for key, names in groups.items():
         found = [
-            [white_level(run.column(n), own_rate_hz(run, n), NOISE_REACH * cutoff_hz) for n in names]
+            [white_level(run.column(n), own_rate_hz(run, n), _NOISE_REACH * cutoff_hz) for n in names]
             for run in runs
             if names and run.has(*names)
         ]
@@ -128,9 +128,9 @@ def representative(segments: list[Segment]) -> list[Segment]:
     pieces = [
         (s, part[0], part[-1] + 1)
         for s in segments
-        for part in np.array_split(np.arange(s.motion.size), max(1, int(s.motion.size * s.dt_s / PIECE_S)))
+        for part in np.array_split(np.arange(s.motion.size), max(1, int(s.motion.size * s.dt_s / _PIECE_S)))
     ]
-    kept = np.unique(np.linspace(0, len(pieces) - 1, int(MOST_S / PIECE_S)).round().astype(int))
+    kept = np.unique(np.linspace(0, len(pieces) - 1, int(MOST_S / _PIECE_S)).round().astype(int))
     return [pieces[k][0].part(*pieces[k][1:]) for k in kept]
 
 
@@ -252,7 +252,7 @@ def prepare(
     segments, noisy, full = [], [], full_speed(recordings.runs, vehicle)
     for run in recordings.runs:
         segments += build_segments(run, vehicle, rate_hz, cutoff, shift_s, full_speed_rad_s=full)
-        noisy += build_segments(run, vehicle, rate_hz, cutoff, shift_s, noise, draws_of(run, 0), full)
+        noisy += build_segments(run, vehicle, rate_hz, cutoff, shift_s, noise, _draws_of(run, 0), full)
     if not segments:
         raise InputError(
             f"set {recordings.name}: no stretch of {SHORTEST_SEGMENT_S:g} s in which every sensor has readings is left "
@@ -265,7 +265,7 @@ def prepare(
         noise = {k: v * factors.get(k, 1.0) for k, v in noise.items()}
         noisy = []
         for run in recordings.runs:
-            noisy += build_segments(run, vehicle, rate_hz, cutoff, shift_s, noise, draws_of(run, 1), full)
+            noisy += build_segments(run, vehicle, rate_hz, cutoff, shift_s, noise, _draws_of(run, 1), full)
     noisy = representative(without_noise(noisy)) if len(noisy) == len(segments) else []
     segments = representative(without_noise(segments))
     if made_from_accelerometer(segments, cutoff):
@@ -275,7 +275,7 @@ def prepare(
     return replace(prepared, terms=terms, not_testable=reasons)
 
 
-def draws_of(run: Run, number: int) -> np.random.Generator:
+def _draws_of(run: Run, number: int) -> np.random.Generator:
     """The noise that is added to a run once more, by what the run holds: its name and its place change no number."""
     names = [n for n in c.ANGULAR_VELOCITY if run.has(n)]
     signs = run.array(tuple(names)) > 0.0 if names else np.zeros(0, bool)  # signs outlive rounding
@@ -290,7 +290,7 @@ def prepare_like(prepared: Prepared, recordings: RecordingSet) -> tuple[list[Seg
     for run in recordings.runs:
         own = run, vehicle, prepared.segments[0].rate_hz, prepared.thinner.cutoff_hz, None
         segments += build_segments(*own, full_speed_rad_s=full)
-        noisy += build_segments(*own, prepared.noise, draws_of(run, 1), full)
+        noisy += build_segments(*own, prepared.noise, _draws_of(run, 1), full)
     noisy = representative(without_noise(noisy)) if len(noisy) == len(segments) else []
     same = prepared.segments[0].independent_velocity
     segments, noisy = (
@@ -299,7 +299,7 @@ def prepare_like(prepared: Prepared, recordings: RecordingSet) -> tuple[list[Seg
     return segments, noisy
 
 
-def model_wrench(segment: Segment, vehicle: Vehicle, effects: list[tuple[Form, np.ndarray]]):
+def _model_wrench(segment: Segment, vehicle: Vehicle, effects: list[tuple[Form, np.ndarray]]):
     """Force and moment of the baseline plus effects, native rate, for the accelerations in regressors."""
     force, arm, torque = baseline_wrench(segment.motion, vehicle)
     total = {"force": force, "moment": arm + torque}
@@ -324,13 +324,13 @@ def with_predictions(segment: Segment, prepared: Prepared, effects: list[tuple[F
     vehicle, groups = prepared.vehicle, prepared.groups
 
     def predicted(motion: Motion) -> dict[str, np.ndarray]:
-        model = model_wrench(replace(segment, motion=motion), vehicle, [])
+        model = _model_wrench(replace(segment, motion=motion), vehicle, [])
         changed = accelerations(motion, model, model)
         if not effects:
             return changed
         # Effects that read accelerations are given predicted ones, too.
         at = replace(segment, motion=replace(motion, **changed))
-        return accelerations(motion, model_wrench(at, vehicle, effects), model)
+        return accelerations(motion, _model_wrench(at, vehicle, effects), model)
 
     def accelerations(motion: Motion, known: dict[str, np.ndarray], model: dict[str, np.ndarray]):
         changed = {}
@@ -359,14 +359,14 @@ def with_thrusts(motion: Motion, vehicle: Vehicle, effects: list[tuple[Form, np.
     total = believed.sum(axis=1)
     upward = total.copy()
     for form, values in effects:
-        if "rotor_speed" in form.requires and not OF_THE_BODY & set(form.requires):
+        if "rotor_speed" in form.requires and not _OF_THE_BODY & set(form.requires):
             force = form.contribution(motion, vehicle, values).force
             upward -= 0.0 if force is None else force[:, 2]
     share = np.divide(upward, total, out=np.ones_like(total), where=total > 0.0)
     return replace(motion, rotor_thrust=believed * share[:, None])
 
 
-def wind_columns(segment: Segment, vehicle: Vehicle, groups, effects) -> list[dict[str, np.ndarray]]:
+def _wind_columns(segment: Segment, vehicle: Vehicle, groups, effects) -> list[dict[str, np.ndarray]]:
     """What one metre a second more wind from each of north and east adds through the effects that feel the air."""
     wind = np.zeros(3) if segment.motion.wind is None else segment.motion.wind
     columns = []
@@ -385,7 +385,7 @@ def wind_columns(segment: Segment, vehicle: Vehicle, groups, effects) -> list[di
     return columns
 
 
-def at_knots(columns: list[dict[str, np.ndarray]], knots_s: np.ndarray, time_s: np.ndarray):
+def _at_knots(columns: list[dict[str, np.ndarray]], knots_s: np.ndarray, time_s: np.ndarray):
     """Columns (north, east) of a wind that is a line from knot to knot, of each knot in turn; nothing outside."""
     hats = [np.interp(time_s, knots_s, unit, left=0.0, right=0.0)[:, None] for unit in np.eye(len(knots_s))]
     return [{group: part * hat for group, part in column.items()} for column in columns for hat in hats]
@@ -443,7 +443,7 @@ def columns_of(
 
     def of_value(term: Term, motion: Motion) -> list[Block]:
         at = replace(flown, motion=motion)
-        model = model_wrench(at, vehicle, [])
+        model = _model_wrench(at, vehicle, [])
         reverse = moment_of(at, vehicle) if measured_moment and "moment" in groups else None
         return thinned([value_columns(term.key, at, vehicle, groups, model, reverse, for_comparison)])
 
@@ -451,8 +451,8 @@ def columns_of(
         if term.run and term.run != segment.run:
             yield [{}] * term.size
         elif term.kind == "wind":
-            columns = wind_columns(segment, vehicle, groups, effects)
-            yield thinned(at_knots(columns, np.array(term.values), segment.motion.time_s) if term.run else columns)
+            columns = _wind_columns(segment, vehicle, groups, effects)
+            yield thinned(_at_knots(columns, np.array(term.values), segment.motion.time_s) if term.run else columns)
         elif term.kind == "slope":
             yield thinned([slope_column(term, segment, vehicle, groups)])
         elif term.kind == "state":

@@ -23,7 +23,7 @@ from rotorid.mismatch.plant.regression import Fit
 from rotorid.mismatch.plant.rows import RUN_SCALE, Rows, Term
 from rotorid.recordings import RecordingSet, Split
 
-COMPARED = (
+_COMPARED = (
     "rotor_speed", "specific_force", "accelerometer", "angular_velocity", "gyroscope", "rotation", "velocity", "height",
     "voltage",
 )  # fmt: skip
@@ -87,7 +87,7 @@ def comparable(segment: Segment, model: WrenchModel) -> bool:
     own = ("command", "kinematic_specific_force", "kinematic_angular_velocity")
     if any(getattr(segment, n) is None and getattr(first, n) is not None for n in own):
         return False
-    return all(getattr(known, n) is None or getattr(segment.motion, n) is not None for n in COMPARED)
+    return all(getattr(known, n) is None or getattr(segment.motion, n) is not None for n in _COMPARED)
 
 
 def as_flown(segments: list[Segment], found: Fitted) -> list[Segment]:

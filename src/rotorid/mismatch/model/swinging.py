@@ -22,22 +22,22 @@ from rotorid.mismatch.plant.motion import Segment
 from rotorid.mismatch.plant.rows import UNKNOWNS_OF_A_STATE, Rows, Term
 from rotorid.steps import step
 
-PIECE_S, PERIODS, SHORTEST_PIECE_S = 5.0, 2.0, 1.2
+_PIECE_S, _PERIODS, _SHORTEST_PIECE_S = 5.0, 2.0, 1.2
 """A state is read for so long, and for so many swings at least; where it fails for less, but not for less than this."""
 RATE_HZ = 10.0
 """Rate at which the sideways force is looked at: a swing has less than 2 Hz."""
 LEAST_SHARE = 0.3
 """Share of the sideways force's squares that a swing must explain: four numbers of five seconds make 0.1 of noise."""
-CONVERGED = 1e-4
+_CONVERGED = 1e-4
 """Relative change of squares and state at which a fit ends: far below what noise makes of either."""
-MOST_STEPS = 40
-QUARTER, MOST_LEAN = np.pi / 2, 0.9
+_MOST_STEPS = 40
+_QUARTER, _MOST_LEAN = np.pi / 2, 0.9
 """Phase of a swing from which its first state is seen, rad, and the largest sideways part of a direction."""
-LOOKED_FOR = (("length_m", 4, 0.02), ("damping_ratio", 1, 1.0), ("length_m", 1, 0.01))
+_LOOKED_FOR = (("length_m", 4, 0.02), ("damping_ratio", 1, 1.0), ("length_m", 1, 0.01))
 """What of a cable is looked for in turn: steps to each side of where it is, and the logarithm of one."""
-HALVED_SHARE = 0.1
+_HALVED_SHARE = 0.1
 """Share of a stretch's mean square that the state of a piece may leave; with more the piece is halved."""
-LARGEST = 3
+_LARGEST = 3
 """Pieces that are looked at first: most flights have nothing that swings."""
 
 
@@ -57,7 +57,7 @@ class Cable:
     @property
     def piece_s(self) -> float:
         """How long a state of it is read, s."""
-        return max(PIECE_S, PERIODS * 2 * np.pi / self.rate)
+        return max(_PIECE_S, _PERIODS * 2 * np.pi / self.rate)
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class HangingStretch:
 
 
 @dataclass(frozen=True)
-class Swing:
+class _Swing:
     """How a payload hung in a stretch."""
 
     states: np.ndarray
@@ -123,7 +123,7 @@ def hung_by(
     cable: Cable, segments: Sequence[Segment], stretches: Sequence[HangingStretch]
 ) -> tuple[list[Segment], float] | None:
     """Stretches that say how a payload on a cable hung, and its mass, kg; None where hardly any sideways force does."""
-    mass_kg = likely_mass_kg(cable, stretches)
+    mass_kg = _likely_mass_kg(cable, stretches)
     if mass_kg <= 0.0:
         return None
     found = [swing_in(s, cable, mass_kg) for s in stretches]
@@ -159,7 +159,7 @@ def likely_cable(cable: Cable, stretches: Sequence[HangingStretch]) -> Cable | N
     """The cable near another one that explains most, the states free; None where nothing seems to swing."""
     if share_left(stretches, cable) > 1.0 - LEAST_SHARE:
         return None
-    for name, steps, apart in LOOKED_FOR:
+    for name, steps, apart in _LOOKED_FOR:
 
         def left(change: float, cable=cable, name=name) -> float:
             return sum(swing_in(s, scaled(cable, name, change), None).left_n2 for s in stretches)
@@ -171,7 +171,7 @@ def likely_cable(cable: Cable, stretches: Sequence[HangingStretch]) -> Cable | N
     return cable
 
 
-def likely_mass_kg(cable: Cable, stretches: Sequence[HangingStretch]) -> float:
+def _likely_mass_kg(cable: Cable, stretches: Sequence[HangingStretch]) -> float:
     """The mass that most pieces suggest, kg; 0 without any."""
     masses = np.concatenate([np.zeros(0), *(swing_in(s, cable, None).masses_kg for s in stretches)])
     return float(np.median(masses)) if len(masses) else 0.0
@@ -237,7 +237,7 @@ def largest_pieces(stretches: Sequence[HangingStretch], cable: Cable) -> list[Ha
         for s in stretches
         for start in np.arange(s.time_s[0], s.time_s[-1] - cable.piece_s, cable.piece_s)
     ]
-    return sorted(pieces, key=lambda p: -p.squares)[:LARGEST]
+    return sorted(pieces, key=lambda p: -p.squares)[:_LARGEST]
 
 
 def share_left(stretches: Sequence[HangingStretch], cable: Cable) -> float:
@@ -247,7 +247,7 @@ def share_left(stretches: Sequence[HangingStretch], cable: Cable) -> float:
     return sum(swing_in(p, cable, None).left_n2 for p in pieces) / squares if squares > 0.0 else 1.0
 
 
-def swing_in(stretch: HangingStretch, cable: Cable, mass_kg: float | None) -> Swing:
+def swing_in(stretch: HangingStretch, cable: Cable, mass_kg: float | None) -> _Swing:
     """How a payload hung in a stretch; its mass is free in each piece where it is None.
 
     Each piece starts from where the one before ends and is moved to what explains most of its force. A piece of known
@@ -262,8 +262,8 @@ def swing_in(stretch: HangingStretch, cable: Cable, mass_kg: float | None) -> Sw
         piece = stretch.part(first, last)
         if len(piece.at_s) > 2 * UNKNOWNS_OF_A_STATE and len(piece.time_s) > 2:
             own, mass, rest = fitted_piece(piece, cable, state, mass_kg)
-            usual = HALVED_SHARE * stretch.squares * len(piece.at_s) / len(stretch.at_s)
-            if mass_kg is not None and rest > usual and last - first > 2 * SHORTEST_PIECE_S:
+            usual = _HALVED_SHARE * stretch.squares * len(piece.at_s) / len(stretch.at_s)
+            if mass_kg is not None and rest > usual and last - first > 2 * _SHORTEST_PIECE_S:
                 middle = 0.5 * (first + last)
                 spans = [(first, middle), (middle, last), *spans]
                 continue
@@ -273,7 +273,7 @@ def swing_in(stretch: HangingStretch, cable: Cable, mass_kg: float | None) -> Sw
             state = piece.end(cable, own)
         else:
             states.append([first, *state])
-    return Swing(np.array(states), np.array(masses), left)
+    return _Swing(np.array(states), np.array(masses), left)
 
 
 def fitted_piece(piece: HangingStretch, cable: Cable, state: np.ndarray, mass_kg: float | None):
@@ -281,14 +281,14 @@ def fitted_piece(piece: HangingStretch, cable: Cable, state: np.ndarray, mass_kg
 
     It is looked for near `state` and near what the first quarter of a swing shows.
     """
-    near = fitted_near(piece, cable, state, mass_kg)
+    near = _fitted_near(piece, cable, state, mass_kg)
     if near[1] <= 0.0:
         return near
-    seen = fitted_near(piece, cable, seen_at_first(piece, cable, near[1]), mass_kg)
+    seen = _fitted_near(piece, cable, _seen_at_first(piece, cable, near[1]), mass_kg)
     return min(near, seen, key=lambda found: found[2])
 
 
-def fitted_near(piece: HangingStretch, cable: Cable, state: np.ndarray, mass_kg: float | None):
+def _fitted_near(piece: HangingStretch, cable: Cable, state: np.ndarray, mass_kg: float | None):
     """As `fitted_piece`, near a state.
 
     One-sigma of the state is a radian, and a radian in 1/ω: what is not excited stays where it was.
@@ -305,20 +305,20 @@ def fitted_near(piece: HangingStretch, cable: Cable, state: np.ndarray, mass_kg:
         return np.append(((piece.force - mass_of(pull) * pull) / size).ravel(), move)
 
     found = least_squares(
-        left, np.zeros(UNKNOWNS_OF_A_STATE), method="lm", ftol=CONVERGED, xtol=CONVERGED, max_nfev=MOST_STEPS
+        left, np.zeros(UNKNOWNS_OF_A_STATE), method="lm", ftol=_CONVERGED, xtol=_CONVERGED, max_nfev=_MOST_STEPS
     ).x
     own = moved(state, found, cable.rate)
     pull = piece.pull(cable, own)
     return own, mass_of(pull), float(((piece.force - mass_of(pull) * pull) ** 2).sum())
 
 
-def seen_at_first(piece: HangingStretch, cable: Cable, mass_kg: float) -> np.ndarray:
+def _seen_at_first(piece: HangingStretch, cable: Cable, mass_kg: float) -> np.ndarray:
     """The state (6,) in which a piece begins as its first quarter of a swing shows it: force is mass times lean."""
-    first = piece.at_s <= piece.at_s[0] + max(QUARTER / cable.rate, 3.0 / RATE_HZ)
+    first = piece.at_s <= piece.at_s[0] + max(_QUARTER / cable.rate, 3.0 / RATE_HZ)
     since_s = piece.at_s[first] - piece.time_s[0]
     weight = mass_kg * np.linalg.norm(piece.hanging, axis=1).mean()
     (rate, lean) = np.polyfit(since_s, piece.force[first] / weight, 1)
-    lean /= max(1.0, float(np.linalg.norm(lean)) / MOST_LEAN)
+    lean /= max(1.0, float(np.linalg.norm(lean)) / _MOST_LEAN)
     down = np.sqrt(1.0 - lean @ lean)
     return np.array([*lean, down, *rate, -(lean @ rate) / down])
 

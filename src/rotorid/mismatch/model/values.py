@@ -112,10 +112,10 @@ def throttle_scale(values: Values, model: WrenchModel, full_rad_s: float):
     trust = {t.key: t.prior_sd[0] for t in model.regression.terms if t.kind == "value"}
     full = full_rad_s * float(np.sqrt(1 + values.get("thrust", (0.0, 0.0))[0]))
     reach = 1.96 * full * 0.5 * float(np.hypot(trust.get("thrust", 0.0), trust.get("mass", 0.0)))
-    return without_common_scale(values), {PARAMETER_NAMES["speed"]: (float("nan"), full, full - reach, full + reach)}
+    return _without_common_scale(values), {PARAMETER_NAMES["speed"]: (float("nan"), full, full - reach, full + reach)}
 
 
-def without_common_scale(values: Values) -> Values:
+def _without_common_scale(values: Values) -> Values:
     """Values where the scale of the rotors' speed is not known: no thrust, nor the mass that it carries, and a torque
     less its part in the scale."""
     (thrust, thrust_sd), (torque, torque_sd) = (values.get(k, (0.0, 0.0)) for k in ("thrust", "torque"))
@@ -133,7 +133,7 @@ def stated_of_commands(findings: list[Finding], values: Values) -> Values:
     throttle has a slope of its own.
     """
     if any(f.id in ids_of_stage(SUPPLY) and f.status in CLAIMED for f in findings):
-        values = without_common_scale(values)
+        values = _without_common_scale(values)
     return without_scale_of_curve(findings, values)
 
 
@@ -144,7 +144,7 @@ def without_scale_of_curve(findings: list[Finding], values: Values) -> Values:
     """
     curve = next((f for f in findings if f.id in ids_of_stage(CURVE) and f.status in CLAIMED), None)
     has_scale = curve is not None and SLOPE in [p.symbol for p in curve.parameters]
-    return without_common_scale(values) if has_scale else values
+    return _without_common_scale(values) if has_scale else values
 
 
 def with_square_term(findings: list[Finding], values: dict, model: WrenchModel) -> tuple[list[Finding], dict]:

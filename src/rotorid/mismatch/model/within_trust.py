@@ -17,23 +17,23 @@ from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.decide import coefficients
 from rotorid.mismatch.decision.words import parameter_words
 from rotorid.mismatch.model.delivered import FittedModel, Values, delivered_fit, judged_rows, left_out_residuals
-from rotorid.mismatch.plant.channel_errors import growth
+from rotorid.mismatch.plant.comparison import growth
 from rotorid.mismatch.plant.regression import Fit
 from rotorid.mismatch.plant.rows import PARAMETER_NAMES
 
 BEYOND_TRUST = 2.0
 """Standard deviations of trust up to which a value may move: beyond, something else is missing that pulls at it."""
-BETTER_RATIO = 0.95
+_BETTER_RATIO = 0.95
 """Held-out error over that with the values as believed which some channel must reach for the values to move."""
-WORSE_RATIO = 1.01
-LEAST_Z = 2.0
+_WORSE_RATIO = 1.01
+_LEAST_Z = 2.0
 """Standard errors over blocks of a second by which squares must have changed, either way."""
-WORTH_A_WORD = 0.002
+_WORTH_A_WORD = 0.002
 
 
 def beyond_trust(model: FittedModel, values: Values, active: Sequence[str]) -> bool:
     """Whether the recordings ask a value not called wrong to move further than its trust allows."""
-    return pushed_beyond_trust(model, changes(model, values, active, all_free(model, values, active)[1]))
+    return _pushed_beyond_trust(model, changes(model, values, active, all_free(model, values, active)[1]))
 
 
 def all_free(model: FittedModel, values: Values, active: Sequence[str]) -> tuple[list[str], Fit]:
@@ -41,7 +41,7 @@ def all_free(model: FittedModel, values: Values, active: Sequence[str]) -> tuple
     return delivered_fit(model, [*model.values_beside(active), *active], values)
 
 
-def pushed_beyond_trust(model: FittedModel, moved: Values) -> bool:
+def _pushed_beyond_trust(model: FittedModel, moved: Values) -> bool:
     """Whether one of the changes of values not called wrong is beyond its trust."""
     trust = {t.key: t.prior_sd[0] for t in model.regression.terms if t.kind == "value"}
     return any(abs(change) > BEYOND_TRUST * trust[k] for k, (change, _) in moved.items())
@@ -84,10 +84,10 @@ def ways(model: FittedModel, values: Values, active: Sequence[str]) -> list[Way]
     held = Way(model, plain, values, as_believed, {})
     free, fit = all_free(model, values, active)
     moved = changes(model, values, active, fit)
-    if pushed_beyond_trust(model, moved):
+    if _pushed_beyond_trust(model, moved):
         return [held]
     loose = Way(model, free, values, fit, moved)
-    better = pays(held.left, loose.left, judged_rows(model), model.rows_per_block)
+    better = _pays(held.left, loose.left, judged_rows(model), model.rows_per_block)
     return [loose, held] if better else [held, loose]
 
 
@@ -97,13 +97,13 @@ def settled(model: FittedModel, values: Values, active: Sequence[str]) -> tuple[
     return best.fit, best.moved
 
 
-def pays(plain: list[np.ndarray], free: list[np.ndarray], held: list[np.ndarray], per: int) -> bool:
+def _pays(plain: list[np.ndarray], free: list[np.ndarray], held: list[np.ndarray], per: int) -> bool:
     """Whether values that move lower the held-out error of some channel and raise that of none.
 
     Residuals (n, 6 or more) of every stretch without and with it, masks of the held-out rows, rows of a block.
     """
     ratio, z = growth(plain, free, held, per)
-    worse, better = (ratio > WORSE_RATIO) & (z > LEAST_Z), (ratio < BETTER_RATIO) & (z < -LEAST_Z)
+    worse, better = (ratio > _WORSE_RATIO) & (z > _LEAST_Z), (ratio < _BETTER_RATIO) & (z < -_LEAST_Z)
     return rules.SETTLED(bool(better.any() and not worse.any()))
 
 
@@ -112,5 +112,5 @@ def in_words(moved: Values, names: Mapping[str, str] = PARAMETER_NAMES) -> tuple
     return tuple(
         f"{parameter_words(names[k])[0]} {100 * change:+.1f} ± {196 * sd:.1f} %".replace("-", "−")
         for k, (change, sd) in moved.items()
-        if abs(change) > max(WORTH_A_WORD, sd)
+        if abs(change) > max(_WORTH_A_WORD, sd)
     )

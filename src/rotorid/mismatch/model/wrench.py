@@ -1,4 +1,12 @@
-"""The model of force, moment and sensor effects: rows, whitening, search and refinement."""
+"""The model of force, moment and sensor effects: rows, whitening, search and refinement.
+
+How late a loop that answers the gyroscope's noise makes its rotors look.
+
+A controller turns the noise n of the gyroscope into commands, M = H n, and the recorded angular acceleration holds
+dn/dt: the two go together although no rotor did anything. Fitted as a lateness d of the commanded moment, I dn/dt =
+−d dM/dt, this is Σ −I Re(H) ω² S_n / Σ ω² S_M over the frequencies that are compared: the bias of the direct method in
+a closed loop (Ljung, System Identification, 2nd ed., ch. 13.4). A hover that does nothing else shows 10 ms of it.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +15,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
+from scipy.signal import csd, welch
 
 from rotorid.effects.catalogue import ids_of, moving_air
 from rotorid.effects.contract import Form
@@ -16,19 +25,19 @@ from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.decide import coefficient_of, coefficients, relative_change
 from rotorid.mismatch.decision.select import LEAST_PROMISE, LEAST_TRANSFER, Questions, Search, Selection
 from rotorid.mismatch.model.prepare import Prepared, assemble_rows, form_terms
-from rotorid.mismatch.plant.closed_loop_bias import closed_loop_bias_s
 from rotorid.mismatch.plant.contributions import Contributions
-from rotorid.mismatch.plant.excess_noise import NOISE_BAND, band_power
 from rotorid.mismatch.plant.motion import Segment
 from rotorid.mismatch.plant.regression import (
     AGREEMENT,
+    NOISE_BAND,
     Fit,
     Regression,
     autoregression,
+    band_power,
     build,
     full_fit_residuals,
 )
-from rotorid.mismatch.plant.rows import Rows, Term, baseline_wrench, residual, state_terms
+from rotorid.mismatch.plant.rows import Rows, Term, baseline_wrench, compared_alone, residual, state_terms
 from rotorid.mismatch.plant.speedpath import (
     CommandChain,
     MeasuredSpeed,
@@ -40,37 +49,38 @@ from rotorid.mismatch.plant.speedpath import (
     smoothed_acceleration,
 )
 from rotorid.mismatch.plant.split import training_rule
-from rotorid.mismatch.plant.two_sensors import compared_alone
 from rotorid.mismatch.plant.unknowns import UNKNOWNS
 from rotorid.recordings import Vehicle
 from rotorid.recordings.signal.kernels import causal
 from rotorid.steps import step
 from rotorid.vehicle.mixer import wrench_matrix
 
-LONGEST_BLOCKS = 400
-TRUSTED_SD = 1e-4
+WINDOW_S = 2.0
+_LOWEST_HZ = 0.5
+_LONGEST_BLOCKS = 400
+_TRUSTED_SD = 1e-4
 """Relative one-sigma of a believed value that is not to move."""
-MOST_NOISE = 0.3
+_MOST_NOISE = 0.3
 """Share of a column's energy in a channel that may be noise of the sensors it is made of."""
 SAME_WRENCH = 0.004
 """Share of the spread of the rotors' force or moment to which no model and no recording of them are known."""
-SIDEWAYS = 0.25
+_SIDEWAYS = 0.25
 WORTH_STATING = 3.0
 """Times that share which counts as noise where it is asked whether something matters."""
-STEADY_ARM = 0.1
+_STEADY_ARM = 0.1
 """One-sigma of a steady moment over thrust, as a share of the longest arm, while what lies between command and speed is
 searched: a centre of mass is seldom further off."""
-MEMORY_GRID = 37
+_MEMORY_GRID = 37
 """Points over a nonlinear parameter's range, a tenth apart, where its cost may have several minima."""
 
 
-MOST_P_OF_WIND = 1e-3
+_MOST_P_OF_WIND = 1e-3
 """p-value up to which a wind is seen by the fit through the drag."""
-WIND_ROUNDS = 3
+_WIND_ROUNDS = 3
 """Searches in a wind at most: in moving air another drag may explain more, and through it the wind is another."""
 SURE_Z = 3.0
 """Standard errors by which a nuisance must differ from nothing to be delivered."""
-MOST_INFLATION = 2.0
+_MOST_INFLATION = 2.0
 """A residual that the chosen model leaves this many times larger than the noise is itself the better noise."""
 
 
@@ -148,7 +158,7 @@ class WrenchModel:
 def block_seconds(rows: list[Rows], rate_hz: float) -> float:
     """Length of a block: a second, longer where a recording would give more than LONGEST_BLOCKS."""
     seconds = sum(len(r.y) for r in rows) / rate_hz
-    return max(1.0 if seconds > 40 else 0.5, seconds / LONGEST_BLOCKS)
+    return max(1.0 if seconds > 40 else 0.5, seconds / _LONGEST_BLOCKS)
 
 
 def channel_floor(segments: list[Segment], vehicle: Vehicle) -> np.ndarray:
@@ -164,7 +174,7 @@ def channel_floor(segments: list[Segment], vehicle: Vehicle) -> np.ndarray:
         moment = np.concatenate([arm + torque for _, arm, torque in parts])
         floor[:6] = SAME_WRENCH * np.nanstd(np.hstack([force, moment]), axis=0)
         # Along the rotors' axis a command held late is felt at once, sideways by what the vehicle turns meanwhile.
-        floor[:3] = np.maximum(floor[:3], SIDEWAYS * floor[:3].max())
+        floor[:3] = np.maximum(floor[:3], _SIDEWAYS * floor[:3].max())
     floor[6:9], floor[9:12] = AGREEMENT["accelerometer"], AGREEMENT["gyroscope"]
     return floor
 
@@ -189,7 +199,7 @@ def wrench_model(
     precision = np.concatenate([1 / np.square(np.broadcast_to(t.prior_sd, (t.size,)).astype(float)) for t in terms])
     left, beta = full_fit_residuals(rows, precision, colours)
     model = searched(prepared, terms, rows, noisy, left, start, segments)
-    model = replace(model, floor=np.fmin(model.noise, whole_floor(model, beta, segments)))
+    model = replace(model, floor=np.fmin(model.noise, _whole_floor(model, beta, segments)))
     # The whole catalogue at once may explain what no model of it does (noise of the rotor speeds, say, with no
     # thrust and a deaf gyroscope): such a channel would weigh as if it were exact, and pull at all values.
     remains = after_residual(model)
@@ -203,7 +213,7 @@ def wrench_model(
     return replace(model, segments=segments, noisy_segments=noisy_segments, effects=effects)
 
 
-def whole_floor(model: WrenchModel, beta: np.ndarray, segments: list[Segment]) -> np.ndarray:
+def _whole_floor(model: WrenchModel, beta: np.ndarray, segments: list[Segment]) -> np.ndarray:
     """What coefficients of the whole catalogue leave of each channel (12,), the noise of regressors aside."""
     added = model.contributions.of(np.arange(len(beta)), beta)
     left = np.concatenate([r.y - part for r, part in zip(model.rows, added, strict=True)])
@@ -214,7 +224,7 @@ def inflated_channels(remains: list[np.ndarray], noise: np.ndarray) -> np.ndarra
     """Mask of the channels in which residuals (n, 12) are by far larger than their noise (12,)."""
     rms = np.sqrt(sum((p**2).sum(axis=0) for p in remains) / max(1, sum(len(p) for p in remains)))
     with np.errstate(invalid="ignore"):
-        return rms > MOST_INFLATION * noise
+        return rms > _MOST_INFLATION * noise
 
 
 def searched(
@@ -286,11 +296,11 @@ def without_unseen(rows: list[Rows], noisy: list[Rows], rate_hz: float, cutoff_h
             power = band_power(added, rate_hz, band)
             more = max(1.0, band_power([r.y[:, c] for r in rows], rate_hz, band) / power) if power > 0 else 1.0
         columns = np.flatnonzero(np.any([r.x[:, c].any(axis=0) for r in rows], axis=0))
-        seen[c, columns] = noise_of_columns(rows, noisy, c, columns) * more <= MOST_NOISE
+        seen[c, columns] = _noise_of_columns(rows, noisy, c, columns) * more <= _MOST_NOISE
         doubtful = columns[~seen[c, columns]]
         if len(doubtful) and np.isfinite(np.concatenate(added)).all():
             taps = autoregression(added)
-            seen[c, doubtful] = noise_of_columns(rows, noisy, c, doubtful, taps) * more <= MOST_NOISE
+            seen[c, doubtful] = _noise_of_columns(rows, noisy, c, doubtful, taps) * more <= _MOST_NOISE
             if seen[c, doubtful].any():
                 colours[c] = taps
     # In place: the columns are the largest arrays of the whole analysis.
@@ -299,7 +309,7 @@ def without_unseen(rows: list[Rows], noisy: list[Rows], rate_hz: float, cutoff_h
     return colours
 
 
-def noise_of_columns(rows, noisy, channel: int, columns: np.ndarray, taps: np.ndarray | None = None) -> np.ndarray:
+def _noise_of_columns(rows, noisy, channel: int, columns: np.ndarray, taps: np.ndarray | None = None) -> np.ndarray:
     """Share of the energy of columns (k,) in a channel that is noise, after a whitening filter if one is given."""
     energy, noise = np.zeros(len(columns)), np.zeros(len(columns))
     for a, b in zip(rows, noisy, strict=True):
@@ -382,29 +392,29 @@ def speed_path(
             return None
         # The chain has a bounded shift of its own; a free time offset of the rotors would swallow any lag.
         terms = [t for t in prepared.terms if t.kind != "effect" and not t.key.startswith("offset:rotors")]
-        sure = TRUSTED_SD if trusted else np.inf
+        sure = _TRUSTED_SD if trusted else np.inf
         precision = np.concatenate(
             [1 / np.square(np.minimum(t.prior_sd, sure if t.kind == "value" else np.inf)) for t in terms]
         )
         if "moment" in groups:
             # A vehicle of one central rotor has no arm; its rotor's radius says how wide it is.
             arm_m = float(np.linalg.norm(vehicle.rotor_positions_m(), axis=1).max()) or rotor_radius_m(vehicle)
-            precision = np.append(precision, np.full(3, (STEADY_ARM * arm_m) ** -2.0))
+            precision = np.append(precision, np.full(3, (_STEADY_ARM * arm_m) ** -2.0))
         keep = np.concatenate([np.arange(3) + 3 * ("force", "moment").index(g) for g in groups])
 
         # The rotors' wrench is linear in the squared speeds, and all else that is measured stays as it is.
-        still = {id(s): thinned_residual(at_speed(s, 0.0 * s.command), prepared, groups) for s in segments}
+        still = {id(s): _thinned_residual(_at_speed(s, 0.0 * s.command), prepared, groups) for s in segments}
         thrust, *moments = wrench_matrix(vehicle)
         of_squares = np.stack([0 * thrust, 0 * thrust, -thrust, *moments])[keep].T
 
         def residual_of(segment: Segment, speed: np.ndarray, columns: bool):
             if columns:
-                moved = at_speed(segment, speed)
+                moved = _at_speed(segment, speed)
                 r = assemble_rows(prepared, terms, [moved], known)[0]
                 return r.y[:, keep], np.concatenate([r.x[:, keep], steady_moments(moved, prepared, groups)], axis=2)
             left = still[id(segment)] - prepared.thinner(speed**2) @ of_squares
             for form, values in known or []:
-                extra = form.contribution(at_speed(segment, speed).motion, vehicle, values)
+                extra = form.contribution(_at_speed(segment, speed).motion, vehicle, values)
                 for k, name in enumerate(groups):
                     if (part := getattr(extra, name)) is not None:
                         left[:, 3 * k : 3 * k + 3] -= prepared.thinner(part)
@@ -424,12 +434,12 @@ def speed_path(
     return CommandChain(SpeedSearch(problem, forms).run(), full_speed, full_voltage)
 
 
-def at_speed(segment: Segment, speed: np.ndarray) -> Segment:
+def _at_speed(segment: Segment, speed: np.ndarray) -> Segment:
     """A segment whose rotors turn at other speeds (n, k), rad/s."""
     return replace(segment, motion=replace(segment.motion, rotor_speed=speed))
 
 
-def thinned_residual(segment: Segment, prepared: Prepared, groups: Sequence[str]) -> np.ndarray:
+def _thinned_residual(segment: Segment, prepared: Prepared, groups: Sequence[str]) -> np.ndarray:
     """Measured minus baseline of a segment, (m, 3 groups), filtered and thinned."""
     parts = residual(segment, prepared.vehicle)
     return np.concatenate([prepared.thinner(parts[g]) for g in groups], axis=1)
@@ -494,15 +504,15 @@ def _profiled(prepared, model, others, term: Term, values: np.ndarray, index: in
         moved = replace(term, values=tuple(trial))
         own = assemble_rows(prepared, [moved], training, chosen(model))
         rows = [replace(a, x=np.concatenate([a.x, b.x], axis=2)) for a, b in zip(fixed, own, strict=True)]
-        return profile_cost(model, [*others, moved], rows, fixed_gain=not term.form.linear)
+        return _profile_cost(model, [*others, moved], rows, fixed_gain=not term.form.linear)
 
     low = np.log(max(parameter.low, start / 6, 1e-9) / start)
     high = np.log(min(parameter.high, start * 6) / start)
     if term.form.memory and len(parameter.starts) > 1:
         # What rings has several minima over its frequency: the search starts about the best of a grid.
-        grid = np.sort(np.append(np.linspace(low, high, MEMORY_GRID - 1), 0.0))
+        grid = np.sort(np.append(np.linspace(low, high, _MEMORY_GRID - 1), 0.0))
         best = int(np.argmin([cost(factor) for factor in grid])) if wide else int(np.searchsorted(grid, 0.0))
-        low, high = grid[max(best - 1, 0)], grid[min(best + 1, MEMORY_GRID - 1)]
+        low, high = grid[max(best - 1, 0)], grid[min(best + 1, _MEMORY_GRID - 1)]
     found = minimize_scalar(cost, bounds=(low, high), method="bounded", options={"xatol": 0.01, "maxiter": 18})
     return float(start * np.exp(found.x))
 
@@ -555,7 +565,7 @@ def nonlinear_intervals(prepared: Prepared, model: WrenchModel, segments) -> dic
     return out
 
 
-def profile_cost(model: WrenchModel, terms: list[Term], rows: list[Rows], fixed_gain: bool) -> float:
+def _profile_cost(model: WrenchModel, terms: list[Term], rows: list[Rows], fixed_gain: bool) -> float:
     """Whitened squares of rows with the linear coefficients of `terms` free (the last at gain one if asked)."""
     size = rows[0].x.shape[2]
     gram, cross, square = np.zeros((size, size)), np.zeros(size), 0.0
@@ -595,13 +605,13 @@ def with_wind(prepared: Prepared, model: WrenchModel, segments, noisy, terms: li
     if not ids_of("feels_air") & set(effects):
         return model
     if wind_id in effects:
-        return blown_by(prepared, model, segments, noisy, terms)
-    felt = with_felt_wind(prepared, model, segments, noisy)
-    blown = felt if felt is model else blown_by(prepared, felt, segments, noisy, terms)
+        return _blown_by(prepared, model, segments, noisy, terms)
+    felt = _with_felt_wind(prepared, model, segments, noisy)
+    blown = felt if felt is model else _blown_by(prepared, felt, segments, noisy, terms)
     return model if blown.wind is None else blown
 
 
-def with_felt_wind(prepared: Prepared, model: WrenchModel, segments, noisy) -> WrenchModel:
+def _with_felt_wind(prepared: Prepared, model: WrenchModel, segments, noisy) -> WrenchModel:
     """The model with a wind that shows through the drag alone, to first order, where the search takes it."""
     active, wind, forms = model.selection.active, moving_air("all the time"), chosen(model)
     effects = [model.search.terms[k].effect for k in active]
@@ -609,8 +619,8 @@ def with_felt_wind(prepared: Prepared, model: WrenchModel, segments, noisy) -> W
     if not known or not ids_of("drag") & set(effects):
         return model
     always = [t for t in model.terms if t.kind != "effect"]
-    asked = [*always, *[model.search.terms[k] for k in active], wind_term()]
-    regression = wind_regression(prepared, asked, forms, np.zeros(2), segments, model_filters(model))
+    asked = [*always, *[model.search.terms[k] for k in active], _wind_term()]
+    regression = _wind_regression(prepared, asked, forms, np.zeros(2), segments, model_filters(model))
     keys = [t.key for t in asked]
     seen = regression.compare(keys, keys[:-1])
     if seen.promised.sum() <= LEAST_PROMISE or seen.transfer < LEAST_TRANSFER:
@@ -621,30 +631,30 @@ def with_felt_wind(prepared: Prepared, model: WrenchModel, segments, noisy) -> W
     return again if any(again.search.terms[k].effect == wind.id for k in again.selection.active) else model
 
 
-def wind_term() -> Term:
+def _wind_term() -> Term:
     """Columns of one metre a second more wind, north and east, through every effect that feels the air."""
     return Term("wind", "wind", moving_air("all the time").id, size=2, prior_sd=(np.inf, np.inf))
 
 
-def blown_by(prepared: Prepared, model: WrenchModel, segments, noisy, terms: list[Term]) -> WrenchModel:
+def _blown_by(prepared: Prepared, model: WrenchModel, segments, noisy, terms: list[Term]) -> WrenchModel:
     """The model with its steady wind fitted through every effect that feels the air, and the search repeated in it.
 
     A linear wind column would leave part of the drag and lift to other names. The same model where the wind does not
     show through them, or no drag is left with it.
     """
     active = model.selection.active
-    wind_key = next(k for k in active if model.search.terms[k].effect == wind_term().effect)
-    wind = first_wind(model, wind_key)
+    wind_key = next(k for k in active if model.search.terms[k].effect == _wind_term().effect)
+    wind = _first_wind(model, wind_key)
     if wind is None:
         return model
-    kept = [*(t for t in terms if t.effect != wind_term().effect), wind_term()]
+    kept = [*(t for t in terms if t.effect != _wind_term().effect), _wind_term()]
     effects = [c for k, c in zip(active, chosen(model), strict=True) if k != wind_key]
     active = [k for k in active if k != wind_key]
     drags, always = ids_of("drag"), [t for t in terms if t.kind != "effect"]
     had = any(model.search.terms[k].effect in drags for k in active)
-    for _ in range(WIND_ROUNDS):
-        own = [*always, *[model.search.terms[k] for k in active], wind_term()]
-        found = fitted_wind(prepared, own, effects, wind, segments, model_filters(model))
+    for _ in range(_WIND_ROUNDS):
+        own = [*always, *[model.search.terms[k] for k in active], _wind_term()]
+        found = _fitted_wind(prepared, own, effects, wind, segments, model_filters(model))
         if found is None:
             return model
         wind, sd, effects = found
@@ -659,13 +669,13 @@ def blown_by(prepared: Prepared, model: WrenchModel, segments, noisy, terms: lis
     return again
 
 
-def wind_regression(prepared: Prepared, terms: list[Term], effects, wind: np.ndarray, segments, filters) -> Regression:
+def _wind_regression(prepared: Prepared, terms: list[Term], effects, wind: np.ndarray, segments, filters) -> Regression:
     """The regression of terms in a steady wind (north, east), m/s; `effects` are the forms that it acts through."""
     rows, rate = assemble_rows(prepared, terms, in_wind(segments, wind), effects), prepared.thinner.rate_hz
     return build(rows, terms, filters, training_rule(prepared.split, segments), block_seconds(rows, rate), rate)
 
 
-def fitted_wind(prepared: Prepared, terms: list[Term], effects, wind: np.ndarray, segments, filters):
+def _fitted_wind(prepared: Prepared, terms: list[Term], effects, wind: np.ndarray, segments, filters):
     """A steady wind (north, east), m/s, its one-sigma, and `effects` with their linear values jointly.
 
     By Gauss-Newton from `wind`; None for a wind that the fit through the drag does not see. `terms` end with those of
@@ -673,7 +683,7 @@ def fitted_wind(prepared: Prepared, terms: list[Term], effects, wind: np.ndarray
     """
     own = terms[-1 - len(effects) : -1]
     for _ in range(4):
-        regression = wind_regression(prepared, terms, effects, wind, segments, filters)
+        regression = _wind_regression(prepared, terms, effects, wind, segments, filters)
         fit = regression.fit([t.key for t in terms], jackknife=True)
         step = fit.beta[-2:]
         wind = wind + np.clip(step, -3.0, 3.0)
@@ -681,7 +691,7 @@ def fitted_wind(prepared: Prepared, terms: list[Term], effects, wind: np.ndarray
         if np.abs(step).max() < 0.01:
             break
     blown = replace(fit, beta=np.append(fit.beta[:-2], wind))  # the last step from it is all that the fit holds
-    if regression.wald(blown, regression.columns(["wind"]), int(regression.training.sum())) > MOST_P_OF_WIND:
+    if regression.wald(blown, regression.columns(["wind"]), int(regression.training.sum())) > _MOST_P_OF_WIND:
         return None
     return wind, np.sqrt(np.diag(fit.covariance)[-2:]), effects
 
@@ -695,7 +705,7 @@ def with_linear(effect: tuple[Form, np.ndarray], regression: Regression, fit: Fi
     return form, values
 
 
-def first_wind(model: WrenchModel, wind_key: str) -> np.ndarray | None:
+def _first_wind(model: WrenchModel, wind_key: str) -> np.ndarray | None:
     """Wind (north, east), m/s, from a linear wind column and the drag found with it; None without a drag."""
     values = dict(zip(model.selection.active, chosen(model), strict=True))
     form, force = values[wind_key]
@@ -727,3 +737,29 @@ def after_residual(model: WrenchModel) -> list[np.ndarray]:
 def model_filters(model: WrenchModel) -> dict[int, np.ndarray]:
     """Whitening filters that the model's regression was built with."""
     return model.regression.filters
+
+
+def closed_loop_bias_s(segments: list[Segment], noisy: list[Segment], vehicle: Vehicle, cutoff_hz: float) -> float:
+    """Seconds by which roll or pitch, whichever is worse, seem to follow their commands late through noise alone.
+
+    `noisy` are the same segments with the sensors' noise added once more. Zero without commands or body rates.
+    """
+    inertia = np.diag(vehicle.inertia_kg_m2.matrix())
+    late = [0.0]
+    for axis in (0, 1):
+        echoed = commanded = 0.0
+        for plain, again in zip(segments, noisy, strict=True):
+            rate = plain.motion.angular_velocity
+            if plain.command is None or rate is None or again.motion.angular_velocity is None:
+                continue
+            moment = baseline_wrench(replace(plain.motion, rotor_speed=plain.command), vehicle)[1][:, axis]
+            noise = again.motion.angular_velocity[:, axis] - rate[:, axis]
+            how = {"fs": plain.rate_hz, "nperseg": min(len(moment), int(WINDOW_S * plain.rate_hz))}
+            f_hz, s_rate = welch(rate[:, axis], **how)
+            answer = csd(rate[:, axis], moment, **how)[1] / np.maximum(s_rate, 1e-300)
+            weight = np.where((f_hz > _LOWEST_HZ) & (f_hz < cutoff_hz), f_hz**2, 0.0) * len(moment)
+            echoed -= float(weight @ (answer.real * welch(noise, **how)[1])) * inertia[axis]
+            commanded += float(weight @ welch(moment, **how)[1])
+        if commanded > 0.0:
+            late.append(echoed / commanded)
+    return max(late)

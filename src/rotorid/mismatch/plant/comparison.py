@@ -9,6 +9,8 @@ hardly excite it do not vote.
 An effect that is at work keeps what it promises, and does so in nearly every environment that excites it. One that
 fills a gap left by another cause gains on average only (Pfister, Bauer and Peters, Learning stable and predictive
 structures in kinetic systems, PNAS 2019, rank terms of differential equations by the same stability).
+
+Errors of channels compared on masked rows: whether squares have grown, by blocks of a second.
 """
 
 from __future__ import annotations
@@ -18,22 +20,24 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
+_LEAST_BLOCKS = 8
+CHANNELS_OF_WRENCH = 6
 ENVIRONMENT_S = 5.0
 LEAST_ENVIRONMENTS = 6
 """Fewer environments of ENVIRONMENT_S are made shorter ones, so that something is left to compare."""
-SHORTEST_S = 1.0
-MOST_FOLDS = 8
+_SHORTEST_S = 1.0
+_MOST_FOLDS = 8
 LEAST_RUNS = 3
 """Fitted runs from which whole runs are left out."""
 VOTES_FROM = 0.05
 """Predicted gain of an environment, relative to the largest of all, from which it votes."""
-LEAST_EXPECTED = 0.6
+_LEAST_EXPECTED = 0.6
 """Share of the promise that a true effect must be expected to keep on blocks left out, for these to judge: what one run
 alone excites cannot be learnt from the others."""
-SEEN_ELSEWHERE = 1.0
+_SEEN_ELSEWHERE = 1.0
 """What the fitted blocks must hold of the same change, relative to what is asked of the blocks left out: no form is
 so true that what slow flights say of it could be held against a fast one."""
-ANSWERED = 0.5
+_ANSWERED = 0.5
 """Share of all that is promised on environments that may judge, from which leaving out whole runs is an answer."""
 
 
@@ -61,13 +65,13 @@ class Comparison:
         more than there is and gains e less.
         """
         asked, off = (np.array([x[self.fold == f].sum() for f in self.fold]) for x in (self.promised, self.doubt))
-        return (self.seen >= SEEN_ELSEWHERE * asked) & (asked - 2 * off >= LEAST_EXPECTED * asked)
+        return (self.seen >= _SEEN_ELSEWHERE * asked) & (asked - 2 * off >= _LEAST_EXPECTED * asked)
 
     @property
     def answers(self) -> bool:
         """Whether enough of what is promised lies where it may be judged."""
         whole = float(self.promised.sum())
-        return float(self.promised[self.judges].sum()) >= ANSWERED * whole if whole > 0 else False
+        return float(self.promised[self.judges].sum()) >= _ANSWERED * whole if whole > 0 else False
 
     @property
     def votes(self) -> np.ndarray:
@@ -103,7 +107,7 @@ class Comparison:
 def environments(run: np.ndarray, seconds: float) -> np.ndarray:
     """Number of the environment of every block (n,), given its run's number and the blocks' length in seconds."""
     total = len(run) * seconds
-    length = max(SHORTEST_S, min(ENVIRONMENT_S, total / LEAST_ENVIRONMENTS))
+    length = max(_SHORTEST_S, min(ENVIRONMENT_S, total / LEAST_ENVIRONMENTS))
     per = max(1, int(round(length / seconds)))
     out, at = np.zeros(len(run), int), 0
     for number in np.unique(run):
@@ -117,5 +121,33 @@ def environments(run: np.ndarray, seconds: float) -> np.ndarray:
 def folds(environment: np.ndarray, run: np.ndarray, whole_runs: bool) -> np.ndarray:
     """Fold of every block (n,): blocks of one fold are left out together, whole runs or environments in turn."""
     if whole_runs:
-        return np.searchsorted(np.unique(run), run) % MOST_FOLDS
-    return environment % min(MOST_FOLDS, int(environment.max(initial=0)) + 1)
+        return np.searchsorted(np.unique(run), run) % _MOST_FOLDS
+    return environment % min(_MOST_FOLDS, int(environment.max(initial=0)) + 1)
+
+
+def growth(
+    before: list[np.ndarray], after: list[np.ndarray], held: list[np.ndarray], per: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Ratio of the held-out errors after and before of each wrench channel, and its growth in standard errors.
+
+    Squares are compared by blocks of `per` rows; without LEAST_BLOCKS of them nothing is said (ratio 1, growth 0).
+    """
+    blocks = []
+    for b, a, mask in zip(before, after, held, strict=True):
+        rows = np.flatnonzero(mask)
+        if len(rows) >= per:
+            parts = np.array_split(rows, len(rows) // per)
+            squares = [x[:, :CHANNELS_OF_WRENCH] ** 2 for x in (b, a)]
+            blocks += [[s[p].mean(axis=0) for s in squares] for p in parts]
+    if not _long_enough(held, per):
+        return np.ones(CHANNELS_OF_WRENCH), np.zeros(CHANNELS_OF_WRENCH)
+    was, now = np.array(blocks).transpose(1, 0, 2)
+    change = now - was
+    doubt = change.std(axis=0, ddof=1) / np.sqrt(len(change))
+    ratio = np.sqrt(now.mean(axis=0) / np.maximum(was.mean(axis=0), 1e-300))
+    return np.nan_to_num(ratio, nan=1.0), np.nan_to_num(change.mean(axis=0) / np.maximum(doubt, 1e-300))
+
+
+def _long_enough(held: list[np.ndarray], per: int) -> bool:
+    """Whether there are LEAST_BLOCKS of `per` rows held out."""
+    return sum(int(mask.sum()) // per for mask in held) >= _LEAST_BLOCKS

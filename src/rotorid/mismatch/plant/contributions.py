@@ -16,11 +16,11 @@ from scipy.signal import fftconvolve, welch
 
 from rotorid.mismatch.plant.rows import Rows
 
-LEAST_NOISE = 0.1
+_LEAST_NOISE = 0.1
 """Share of a contribution's energy in a channel of a run that must be noise before it is filtered."""
-PIECE_S = 4.0
+_PIECE_S = 4.0
 """Length of the pieces that spectra are averaged over, and of the filter."""
-SHORTEST = 16
+_SHORTEST = 16
 """Rows that a stretch must have to be filtered; in a shorter one the contribution stands."""
 
 
@@ -73,14 +73,14 @@ class Contributions:
     def cleared(self, parts: list[np.ndarray], noise: list[np.ndarray]) -> list[np.ndarray]:
         """Contributions (n,) to one channel of one run, through Wiener's filter if much of them is noise."""
         whole, own = sum(float(p @ p) for p in parts), sum(float(n @ n) for n in noise)
-        if own <= LEAST_NOISE * whole:
+        if own <= _LEAST_NOISE * whole:
             return parts
-        long = [k for k, p in enumerate(parts) if len(p) >= SHORTEST]
+        long = [k for k, p in enumerate(parts) if len(p) >= _SHORTEST]
         if not long:
             return parts
-        size = min(int(PIECE_S * self.rate_hz), max(len(parts[k]) for k in long)) // 2 * 2
+        size = min(int(_PIECE_S * self.rate_hz), max(len(parts[k]) for k in long)) // 2 * 2
         long = [k for k in long if len(parts[k]) >= size // 2]
-        power, of_noise = (spectrum([x[k] for k in long], size) for x in (parts, noise))
+        power, of_noise = (_spectrum([x[k] for k in long], size) for x in (parts, noise))
         passed = np.clip(1.0 - of_noise / np.maximum(power, 1e-300), 0.0, 1.0)
         taps = np.fft.fftshift(np.fft.irfft(passed, size))
         taps = np.append(taps, taps[0]) * np.hanning(size + 3)[1:-1]
@@ -93,7 +93,7 @@ def _product(x: np.ndarray, beta: np.ndarray) -> np.ndarray:
     return (x.reshape(-1, x.shape[2]) @ beta).reshape(x.shape[:2])
 
 
-def spectrum(parts: list[np.ndarray], size: int) -> np.ndarray:
+def _spectrum(parts: list[np.ndarray], size: int) -> np.ndarray:
     """Power spectrum of stretches in pieces of `size`, weighed by their lengths, (size / 2 + 1,)."""
     total = sum(len(p) for p in parts)
     padded = [p if len(p) >= size else np.pad(p, (0, size - len(p))) for p in parts]

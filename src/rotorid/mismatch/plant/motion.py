@@ -1,26 +1,51 @@
-"""From a recorded run to evenly sampled stretches of flight, with what is missing derived where that is honest."""
+"""From a recorded run to evenly sampled stretches of flight, with what is missing derived where that is honest.
+
+Whether a recorded velocity is an estimate made from the recorded accelerometer.
+
+An autopilot's filter integrates its accelerometer between the fixes of a slower sensor: the accelerometer's errors,
+its noise and the vibrations that it feels are then in the velocity, too, and comparing the two shows nothing of them.
+It shows at frequencies above those at which a vehicle moves: the change of an independent velocity is that sensor's
+own noise there and has nothing in common with the accelerometer.
+
+Height above ground without its sensor's flutter, which the steep laws of ground effect would take for thrust.
+
+Regime variables of a flight: what a mismatch may depend on.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter1d
+from scipy.signal import csd, welch
 
 from rotorid.effects.contract import Motion
-from rotorid.mismatch.plant.height import quiet_height
+from rotorid.effects.scale import hover_inflow_m_s
 from rotorid.recordings import Run, Vehicle
 from rotorid.recordings import columns as c
 from rotorid.recordings.held import stretches
 from rotorid.recordings.signal import kernels
 
+_SLOW_HZ = 1.0
+"""Below it the height is the sensor's, above it the climb integrated: half the power passes."""
+_SLOW_ALONE_HZ = 3.0
+"""The same where no climb is known; no vehicle near the ground changes its height faster."""
+_WINDOW = 128
+"""Samples of a window of the spectra."""
+_HIGHEST = 0.48
+"""Highest frequency compared, as a share of the rate."""
+_LEAST_COMMON = 0.15
+"""Coherence from which the two have a source in common: simulated autopilots have 0.2 to 1, independent sensors up to
+0.03, which is what chance alone makes of forty windows."""
 SensorNoise = dict[str, np.ndarray]
 """One-sigma per sample of white noise of each column of a sensor, (columns,), by the sensor's key."""
-LONGEST_BRIDGED_SAMPLES = 6
+_LONGEST_BRIDGED_SAMPLES = 6
 """A hole of up to this many of a column's own periods is interpolated; a longer one splits the run."""
 SHORTEST_SEGMENT_S = 2.0
-EVEN_SHARE = 0.85
+_EVEN_SHARE = 0.85
 
 
 @dataclass(frozen=True)
@@ -67,7 +92,7 @@ class Segment:
         )
 
 
-WIDEST_SLOPE = 0.4
+_WIDEST_SLOPE = 0.4
 """Highest cutoff of a derivative, as a share of the rate: at 0.45 its gain below 4 Hz is 1.5 to 3 % too large."""
 
 
@@ -93,20 +118,20 @@ def fresh_samples(values: np.ndarray) -> np.ndarray:
     changed = np.ones(len(index), bool)
     changed[1:] = np.any(np.diff(values[index], axis=0) != 0.0, axis=1)
     share = changed.mean()
-    if 0.02 < share < 0.6 and evenly_spaced(np.flatnonzero(changed)):
+    if 0.02 < share < 0.6 and _evenly_spaced(np.flatnonzero(changed)):
         present = np.zeros(len(values), bool)
         present[index[changed]] = True
     return present
 
 
-def evenly_spaced(index: np.ndarray) -> bool:
+def _evenly_spaced(index: np.ndarray) -> bool:
     """Whether the gaps between rising indices are nearly all one length, give or take a sample.
 
     Where each sample repeats by chance with a probability above 0.4, fewer than EVEN_SHARE of the (geometrically
     distributed) gaps lie within one sample of their median.
     """
     gaps = np.diff(index)
-    return bool(np.mean(np.abs(gaps - np.median(gaps)) <= 1) >= EVEN_SHARE)
+    return bool(np.mean(np.abs(gaps - np.median(gaps)) <= 1) >= _EVEN_SHARE)
 
 
 def _resample(time_s, values, grid_s, smooth):
@@ -124,7 +149,7 @@ def _resample(time_s, values, grid_s, smooth):
             [np.interp(grid_s, t, col, left=np.nan, right=np.nan) for col in v.reshape(len(t), -1).T], axis=1
         ).reshape((len(grid_s),) + values.shape[1:])
     gap = np.diff(t)
-    longest = LONGEST_BRIDGED_SAMPLES * float(np.median(gap))
+    longest = _LONGEST_BRIDGED_SAMPLES * float(np.median(gap))
     for k in np.flatnonzero(gap > longest):
         out[(grid_s > t[k]) & (grid_s < t[k + 1])] = np.nan
     return out
@@ -251,7 +276,7 @@ def build_segments(
         good &= np.isfinite(height).all(axis=1)
 
     segments = []
-    inner = min(WIDEST_SLOPE * rate_hz, 1.6 * cutoff_hz)
+    inner = min(_WIDEST_SLOPE * rate_hz, 1.6 * cutoff_hz)
     margin = kernels.half_length(rate_hz, inner)
     slope = kernels.derivative(rate_hz, inner)
     for start, stop in stretches(good):
@@ -321,7 +346,7 @@ def build_segments(
             velocity=body_velocity,
             position=core(position),
             height=above,
-            voltage=None if voltage is None else held_through_gaps(core(voltage)[:, 0]),
+            voltage=None if voltage is None else _held_through_gaps(core(voltage)[:, 0]),
         )
         extra = {n: between_readings(motion.time_s, t, run.column(n)) for n in run.unknown_columns}
         segments.append(
@@ -346,7 +371,7 @@ def between_readings(instants: np.ndarray, time_s: np.ndarray, values: np.ndarra
     return np.interp(instants, time_s[known], values[known]) if known.any() else np.zeros(len(instants))
 
 
-def held_through_gaps(values: np.ndarray) -> np.ndarray | None:
+def _held_through_gaps(values: np.ndarray) -> np.ndarray | None:
     """A slow signal (n,) with its missing samples interpolated, held at the ends; None where nothing is there."""
     known = np.isfinite(values)
     if not known.any():
@@ -369,3 +394,79 @@ def estimated_full_speed(vehicle: Vehicle, throttle: np.ndarray) -> float:
     weight = vehicle.mass_kg * vehicle.gravity_m_s2
     mean_square = float(np.nanmean(throttle**2, axis=0) @ vehicle.thrust_coefficients_n_s2())
     return float(np.sqrt(weight / mean_square))
+
+
+def made_from_accelerometer(segments: Iterable[Segment], cutoff_hz: float) -> bool:
+    """Whether velocity and accelerometer of these stretches share what is above `cutoff_hz`."""
+    cross = np.zeros((3, _WINDOW // 2 + 1), complex)
+    read, moved = np.zeros(cross.shape), np.zeros(cross.shape)
+    band = np.zeros(cross.shape[1], bool)
+    for s in segments:
+        motion = s.motion
+        both = motion.accelerometer is not None and motion.velocity is not None and motion.rotation is not None
+        if not both or motion.size <= _WINDOW:
+            continue
+        velocity, force = (
+            np.einsum("nij,nj->in", motion.rotation, own) for own in (motion.velocity, motion.accelerometer)
+        )
+        change, between = np.diff(velocity) * s.rate_hz, 0.5 * (force[:, 1:] + force[:, :-1])
+        how = {"fs": s.rate_hz, "nperseg": _WINDOW, "axis": 1}
+        f_hz, own = csd(between, change, **how)
+        band |= (f_hz > cutoff_hz) & (f_hz < _HIGHEST * s.rate_hz)
+        cross += motion.size * own
+        read += motion.size * welch(between, **how)[1]
+        moved += motion.size * welch(change, **how)[1]
+    if not band.any():
+        return False
+    coherence = np.abs(cross) ** 2 / np.maximum(read * moved, 1e-300)
+    return bool(coherence[:, band].mean() > _LEAST_COMMON)
+
+
+def quiet_height(height_m: np.ndarray, climb_m_s: np.ndarray | None, dt_s: float) -> np.ndarray:
+    """Height (n,), m, from readings (n,) and the vertical velocity upwards (n,), m/s; NaN stays NaN.
+
+    A complementary filter without phase: slow changes of `height_m` less the climb integrated, and the climb on top.
+    1/z² of a height with noise is more than of the height: 7 mm at 3 cm make a third of the ground effect.
+    """
+    known = np.isfinite(height_m)
+    if known.sum() < 2:
+        return height_m
+    cutoff_hz, climbed = _SLOW_ALONE_HZ, np.zeros(len(height_m))
+    if climb_m_s is not None and np.isfinite(climb_m_s).all():
+        cutoff_hz = _SLOW_HZ
+        climbed[1:] = np.cumsum((climb_m_s[1:] + climb_m_s[:-1]) / 2 * dt_s)
+    index = np.arange(len(height_m))
+    rest = np.interp(index, index[known], (height_m - climbed)[known])
+    sigma_s = np.sqrt(np.log(2.0)) / (2 * np.pi * cutoff_hz)
+    return np.where(known, gaussian_filter1d(rest, sigma_s / dt_s, mode="nearest") + climbed, np.nan)
+
+
+def regime_variables(segment: Segment, prepared) -> dict[str, np.ndarray]:
+    """Regime variables on the thinned instants of a segment, with units in their names."""
+    motion, vehicle, thin = segment.motion, prepared.vehicle, prepared.thinner
+    out = {"time_s": thin.times(motion.time_s)}
+
+    def add(name, values):
+        if values is not None:
+            out[name] = thin(np.asarray(values, float))
+
+    if motion.velocity is not None:
+        add("airspeed_m_s", np.linalg.norm(motion.velocity, axis=1))
+        add("forward_speed_m_s", motion.velocity[:, 0])
+        add("sideward_speed_m_s", motion.velocity[:, 1])
+        add("vertical_speed_over_hover_inflow", motion.velocity[:, 2] / hover_inflow_m_s(vehicle))
+    if motion.height is not None:
+        add("height_over_rotor_radius", motion.height / (vehicle.rotor_radius_m or 1.0))
+    if motion.rotor_speed is not None:
+        add("rotor_speed_rad_s", motion.rotor_speed.mean(axis=1))
+        if motion.rotor_acceleration is not None:
+            add("rotor_acceleration_rad_s2", motion.rotor_acceleration.mean(axis=1))
+    if motion.rotation is not None:
+        add("tilt_rad", np.arccos(np.clip(motion.rotation[:, 2, 2], -1, 1)))
+    if motion.angular_velocity is not None:
+        add("body_rate_rad_s", np.linalg.norm(motion.angular_velocity, axis=1))
+    add("battery_voltage_v", motion.voltage)
+    for name, values in segment.extra.items():
+        if np.ptp(values) > 0:
+            add(name, values)
+    return out

@@ -8,6 +8,18 @@ does not depend on the number of samples.
 Noisy regressors: `bias_gram` and `bias_cross` hold what the sensors' own noise adds to XᵀX and Xᵀy (learnt by
 adding the same noise once more); they are subtracted, which removes the attenuation (corrected least squares,
 Fuller, Measurement Error Models, 1987, ch. 2).
+
+What each of many further terms would explain given the same others: one solution of those, all terms at once.
+
+A further term borders the normal equations of the others by its few columns (Schur's complement), so what it explains
+follows from the inverse of theirs. It is what `Regression.explained` says of the two together, to rounding.
+
+Noise of the rotors' speeds and of the gyroscope that is more than its white part.
+
+The white part is read from the highest frequencies of each sensor. A tachometer that averages, or a filter before the
+log, leaves far more in the band that is analysed; as a regressor it would shrink every value that multiplies it. In
+that band the rotors' moment is often noise alone, and what is left of the balance shows it: noise of the modelled side
+is in the residual with the other sign, noise of the measured side with its own.
 """
 
 from __future__ import annotations
@@ -18,15 +30,27 @@ from functools import cached_property
 
 import numpy as np
 from scipy.linalg import solve_toeplitz
+from scipy.signal import csd
 from scipy.special import chdtrc, fdtrc
 
 from rotorid.mismatch.plant.comparison import LEAST_RUNS, Comparison, environments, folds
-from rotorid.mismatch.plant.further import Equations
-from rotorid.mismatch.plant.rows import Rows, Term
+from rotorid.mismatch.plant.motion import Segment
+from rotorid.mismatch.plant.rows import Rows, Term, Thinner, baseline_wrench, residual
+from rotorid.recordings import Vehicle
 from rotorid.recordings.signal.kernels import causal
 
-HIGHEST_AR_ORDER = 12
-WHITE_SHARE = 0.01
+NOISE_BAND = (0.5, 0.85)
+"""Band, as shares of the cutoff, in which noise is distinguished from motion."""
+_MOSTLY_NOISE = 0.3
+"""Share of a side's power in the band that must be noise before it says how much noise there is."""
+_SHORTEST_ROWS = 32
+_LEAST_FACTOR, _MOST_FACTOR = 1.2, 10.0
+"""A sensor with more noise than that was filtered before it was recorded: what is left in the band may be the model's
+own."""
+_MOST_ALIKE = 1e6
+"""Largest element of the inverse of scaled equations (1 / (1 - R²) of a column) of which rounding leaves enough."""
+_HIGHEST_AR_ORDER = 12
+_WHITE_SHARE = 0.01
 """White part assumed in every residual, as a share of its variance: recordings smoothed before they were stored
 have almost no energy at high frequency, and whitening must not make that corner decide."""
 AGREEMENT = {"accelerometer": 0.05, "gyroscope": 0.02}
@@ -34,27 +58,27 @@ AGREEMENT = {"accelerometer": 0.05, "gyroscope": 0.02}
 MOST_ATTENUATION = 0.3
 """Largest share of a direction's energy that may be noise of the regressors themselves; beyond it nothing is said."""
 DOUBT_OF_CORRECTION = 0.5
-MOST_REMEMBERED = 2000
+_MOST_REMEMBERED = 2000
 """Fits that a regression remembers."""
-MOST_LEFT_OUT = 200
+_MOST_LEFT_OUT = 200
 """Models of which a regression remembers the fits without each fold."""
-MOST_EXPLAINED = 100_000
+_MOST_EXPLAINED = 100_000
 """Models of which a regression remembers what they explain."""
-MOST_DISTRUST = 3.0
+_MOST_DISTRUST = 3.0
 """Standard deviations of trust that a believed value may be off."""
 VALUE_LIMITS = (0.15, 0.4)
 """A believed value moves by at most MOST_DISTRUST times its trust, but at least and at most by these shares: a
 mismatch that needs a third of the arm is no wrong ruler."""
-HOLD = 1e6
-RIDGE = 1e-10
+_HOLD = 1e6
+_RIDGE = 1e-10
 """Trace of ridge on every normal matrix, in units of its diagonal."""
 NEVER_EXCITED = 1e-24
 """Diagonal of a normal matrix up to which a column is not excited at all."""
-UNKNOWN = 1e12
+_UNKNOWN = 1e12
 """Variance of a coefficient of which nothing is known."""
 
 
-def autocovariance(parts: list[np.ndarray], order: int) -> np.ndarray:
+def _autocovariance(parts: list[np.ndarray], order: int) -> np.ndarray:
     """Pooled autocovariance at lags 0 to `order` of stretches that do not touch each other."""
     total = sum(len(p) for p in parts)
     return np.array([sum(float(p[k:] @ p[: len(p) - k]) for p in parts if len(p) > k) for k in range(order + 1)]) / max(
@@ -68,11 +92,11 @@ def autoregression(parts: list[np.ndarray], floor: float = 0.0) -> np.ndarray:
     `floor` is the one-sigma of white noise assumed on top.
     """
     total = sum(len(p) for p in parts)
-    highest = int(min(HIGHEST_AR_ORDER, max(1, total // 50)))
-    covariance = autocovariance(parts, highest)
+    highest = int(min(_HIGHEST_AR_ORDER, max(1, total // 50)))
+    covariance = _autocovariance(parts, highest)
     if covariance[0] <= 0:
         return np.array([1.0])
-    covariance[0] += WHITE_SHARE * covariance[0] + floor**2
+    covariance[0] += _WHITE_SHARE * covariance[0] + floor**2
     best = (np.inf, np.array([1.0 / np.sqrt(covariance[0])]))
     for order in range(0, highest + 1):
         a = solve_toeplitz(covariance[:order], covariance[1 : order + 1]) if order else np.zeros(0)
@@ -111,7 +135,7 @@ class Fit(Solution):
 
 
 @dataclass(frozen=True)
-class Apart:
+class _Apart:
     """Products of some channels alone, by which the coefficients of some terms are estimated.
 
     The normal equations of those terms hold these products; all others see every channel, with those terms as they
@@ -131,17 +155,17 @@ class Apart:
     channels: np.ndarray
     """Numbers of those channels."""
 
-    def before(self, kept: int) -> Apart:
+    def before(self, kept: int) -> _Apart:
         """The same without the columns from `kept` on."""
         return replace(self, gram=self.gram[:, :, :kept], bias_gram=self.bias_gram[:, :kept])
 
 
-MOST_ENVIRONMENTS = 120
+_MOST_ENVIRONMENTS = 120
 """Environments of which products are kept channel by channel; those of a longer flight are joined."""
 
 
 @dataclass(frozen=True)
-class ByChannel:
+class _ByChannel:
     """Products of the fitted blocks channel by channel, summed over environments."""
 
     channels: np.ndarray
@@ -159,7 +183,7 @@ class ByChannel:
     bias_cross: np.ndarray
     """(C, K)."""
 
-    def projected(self, kept: int, follows: np.ndarray, alone: np.ndarray) -> ByChannel:
+    def projected(self, kept: int, follows: np.ndarray, alone: np.ndarray) -> _ByChannel:
         """The same with what the columns from `kept` on take of the others taken out (`Regression.without_winds`)."""
         count, environments = self.square.shape
         gram = np.zeros((count, environments, kept, kept))
@@ -204,9 +228,9 @@ class Regression:
     """Length of a block, s."""
     blocks_of_rows: tuple[np.ndarray, ...] = ()
     """Of every stretch the block that each of its rows is in, (n,); -1 where it is in none."""
-    apart: Apart | None = None
+    apart: _Apart | None = None
     """Terms that some of the channels alone estimate; None where all channels estimate all."""
-    by_channel: ByChannel | None = None
+    by_channel: _ByChannel | None = None
     """Products of the fitted blocks channel by channel, where they were asked for."""
 
     def keys_of(self, *kinds: str) -> list[str]:
@@ -231,7 +255,7 @@ class Regression:
         self.limit = np.full(len(self._total_cross), np.inf)
         for term in self.terms:
             if term.kind == "value":
-                self.limit[self.start[term.key]] = np.clip(MOST_DISTRUST * term.prior_sd[0], *VALUE_LIMITS)
+                self.limit[self.start[term.key]] = np.clip(_MOST_DISTRUST * term.prior_sd[0], *VALUE_LIMITS)
         self._number = {t.key: 1 << i for i, t in enumerate(self.terms)}
         self._explained: dict[int, float] = {}
         self._solutions: dict[int, Solution] = {}
@@ -363,7 +387,7 @@ class Regression:
             return self._fit(keys, mask, jackknife, loose)
         asked = keys, jackknife, tuple(sorted((loose or {}).items()))
         if asked not in self._fits:
-            making_room(self._fits, MOST_REMEMBERED)[asked] = self._fit(keys, self.training, jackknife, loose)
+            making_room(self._fits, _MOST_REMEMBERED)[asked] = self._fit(keys, self.training, jackknife, loose)
         return self._fits[asked]
 
     def _fit(self, keys: tuple[str, ...], mask: np.ndarray, jackknife: bool, loose: dict[str, float] | None) -> Fit:
@@ -377,7 +401,7 @@ class Regression:
             for key, sd in loose.items():
                 precision[self.columns([key])] = 1.0 / sd**2
         prior = precision[cols]
-        normal = raised(gram - bias, prior)
+        normal = _raised(gram - bias, prior)
         beta, inverse, held, at = bounded(normal, cross - bias_cross, self.limit[cols])
         self._fit_held_out_scales(cols, beta, mask)
         count = int(mask.sum())
@@ -396,8 +420,8 @@ class Regression:
         spread = spread_of(scores, self.run[mask], self.memory) * count / max(count - 1, 1)
         robust = inverse @ spread @ inverse.T
         # With the ridge, or two columns that are copies of each other would seem to be known.
-        uncorrected = raised(gram, prior + held)
-        noise = raised(uncorrected, RIDGE * normal.diagonal())
+        uncorrected = _raised(gram, prior + held)
+        noise = _raised(uncorrected, _RIDGE * normal.diagonal())
         noise[:, where] = noise[where].T
         plain = inverse @ noise @ inverse.T
         # The noise level is itself an estimate: half of the correction is taken as its one-sigma.
@@ -434,7 +458,7 @@ class Regression:
         """
         asked = self.set_of(keys)
         if asked not in self._explained:
-            making_room(self._explained, MOST_EXPLAINED)[asked] = self._solved(asked).gain
+            making_room(self._explained, _MOST_EXPLAINED)[asked] = self._solved(asked).gain
         return self._explained[asked]
 
     def explained_with(self, keys: Sequence[str], further: Sequence[str]) -> list[float]:
@@ -442,7 +466,7 @@ class Regression:
         base = self.set_of(keys)
         sets = [base | self._number[key] for key in further]
         new = [i for i, asked in enumerate(sets) if asked not in self._explained]
-        known = making_room(self._explained, MOST_EXPLAINED)
+        known = making_room(self._explained, _MOST_EXPLAINED)
         if len(new) > 1:
             known.update(self._all_explained(base, [(sets[i], self._where[further[i]]) for i in new]))
         return [known[s] if s in known else self.explained([*keys, k]) for s, k in zip(sets, further, strict=True)]
@@ -451,31 +475,31 @@ class Regression:
         """What sets explain that are `base` and some columns more each, but for those with very noisy regressors."""
         padded = np.arange(max(len(own) for _, own in further)) + self._equations_of_all.count
         columns = np.array([np.append(own, padded[len(own) :]) for _, own in further])
-        found, noisy = self._equations_of_all.explained(self._columns_in(base), columns, HOLD, MOST_ATTENUATION)
+        found, noisy = self._equations_of_all.explained(self._columns_in(base), columns, _HOLD, MOST_ATTENUATION)
         return {asked: float(e) for (asked, _), e, unknown in zip(further, found, noisy, strict=True) if not unknown}
 
     @cached_property
-    def _equations_of_all(self) -> Equations:
+    def _equations_of_all(self) -> _Equations:
         """The equations of all columns, as `_solved` has them of some."""
         count = len(self.precision)
         every, size = np.arange(count), count + max(t.size for t in self.terms)
         noise, noise_cross = self.bias_gram * self.training.mean(), self.bias_cross * self.training.mean()
         whole = self._total_gram, self._total_cross, noise, noise_cross
         gram, cross, bias, bias_cross = self._equations(whole, every, self.training)
-        normal = raised(gram - bias, self.precision)
+        normal = _raised(gram - bias, self.precision)
         scale, unit = inverse_root(normal.diagonal()), inverse_root(self._total_gram.diagonal())
 
         def padded(matrix: np.ndarray, by: np.ndarray, ridge: float = 0.0) -> np.ndarray:
             out = np.zeros((size,) * matrix.ndim)
             out[(slice(count),) * matrix.ndim] = matrix * by[:, None] * by if matrix.ndim == 2 else matrix * by
             # What is never excited stays at nothing, and says nothing of the others.
-            return raised(out, np.append(np.where(by > 0, ridge, 1.0), np.ones(size - count))) if ridge else out
+            return _raised(out, np.append(np.where(by > 0, ridge, 1.0), np.ones(size - count))) if ridge else out
 
         with np.errstate(divide="ignore"):
             limit = np.append(self.limit / scale, np.full(size - count, np.inf))
-        return Equations(
+        return _Equations(
             count=count,
-            normal=padded(normal, scale, RIDGE),
+            normal=padded(normal, scale, _RIDGE),
             right=padded(cross - bias_cross, scale),
             gram=padded(self._total_gram - noise, scale),
             cross=padded(self._total_cross - noise_cross, scale),
@@ -488,14 +512,14 @@ class Regression:
         """What `fit` finds on the training blocks without how well it is known; columns ascend."""
         asked = self.set_of(keys)
         if asked not in self._solutions:
-            making_room(self._solutions, MOST_REMEMBERED)[asked] = self._solved(asked)
+            making_room(self._solutions, _MOST_REMEMBERED)[asked] = self._solved(asked)
         return self._solutions[asked]
 
     def _solved(self, asked: int) -> Solution:
         cols = self._columns_in(asked)
         whole = self._normal(cols, self.training)
         gram, cross, bias, bias_cross = self._equations(whole, cols, self.training)
-        beta = bounded(raised(gram - bias, self.precision[cols]), cross - bias_cross, self.limit[cols])[0]
+        beta = bounded(_raised(gram - bias, self.precision[cols]), cross - bias_cross, self.limit[cols])[0]
         gram, cross, bias, bias_cross = whole
         return Solution(cols, beta, float(2 * (cross - bias_cross) @ beta - beta @ (gram - bias) @ beta))
 
@@ -549,7 +573,7 @@ class Regression:
         """As `left_out`, with the covariance of the coefficients for white noise, (folds, k, k)."""
         asked = tuple(keys), whole_runs, tuple(sorted((loose or {}).items()))
         if asked not in self._left_out:
-            making_room(self._left_out, MOST_LEFT_OUT)[asked] = self._leave_out(*asked)
+            making_room(self._left_out, _MOST_LEFT_OUT)[asked] = self._leave_out(*asked)
         return self._left_out[asked]
 
     def _leave_out(self, keys, whole_runs, loose) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -567,12 +591,12 @@ class Regression:
         for out in range(fold.max() + 1):
             mask = self.training & (fold != out)
             gram, cross, bias, bias_cross = self._equations(self._normal(cols, mask), cols, mask)
-            normal = raised(gram - bias, precision[cols])
+            normal = _raised(gram - bias, precision[cols])
             beta, inverse = bounded(normal, cross - bias_cross, self.limit[cols])[:2]
             found.append(beta)
             # Of a column that only this fold excites nothing is known without it.
             dead = np.diag(normal) <= NEVER_EXCITED
-            inverses.append(np.where(np.diag(dead), UNKNOWN, inverse))
+            inverses.append(np.where(np.diag(dead), _UNKNOWN, inverse))
             self._fit_held_out_scales(cols, found[-1], mask)
         return cols, np.array(found), np.array(inverses)
 
@@ -710,9 +734,9 @@ class Regression:
         """
         others, own = self.columns(keys), self.columns([key])
         gram = self._total_gram
-        normal = raised(gram[others[:, None], others], self.precision[others])
+        normal = _raised(gram[others[:, None], others], self.precision[others])
         with np.errstate(divide="ignore"):
-            most = MOST_DISTRUST / np.sqrt(self.precision[others])
+            most = _MOST_DISTRUST / np.sqrt(self.precision[others])
         taken = bounded(normal, -gram[others[:, None], own] @ beta, most)[0]
         return np.concatenate([others, own]), np.concatenate([taken, beta])
 
@@ -790,7 +814,7 @@ def inverse_root(diagonal: np.ndarray) -> np.ndarray:
     return np.where(diagonal <= NEVER_EXCITED, 0.0, 1.0 / np.sqrt(np.maximum(diagonal, NEVER_EXCITED)))
 
 
-def raised(matrix: np.ndarray, by: np.ndarray | float) -> np.ndarray:
+def _raised(matrix: np.ndarray, by: np.ndarray | float) -> np.ndarray:
     """A square matrix with more on its diagonal."""
     out = matrix.copy()
     out.flat[:: len(out) + 1] += by
@@ -811,7 +835,7 @@ def bounded(normal: np.ndarray, right: np.ndarray, limit: np.ndarray):
         if out.max(initial=0.0) <= 1.0:
             break
         worst = int(out.argmax())
-        held[worst] = HOLD * max(normal[worst, worst], 1e-300)
+        held[worst] = _HOLD * max(normal[worst, worst], 1e-300)
         at[worst] = np.sign(solution[worst]) * limit[worst]
         # One more number on the diagonal is a change of rank one (Sherman and Morrison).
         column, row = inverse[:, worst], inverse[worst]
@@ -823,7 +847,7 @@ def ridge_inverse(matrix: np.ndarray) -> np.ndarray:
     """Inverse of a symmetric normal matrix, scaled to unit diagonal, with a trace of ridge."""
     scale = inverse_root(matrix.diagonal())
     units = scale[:, None] * scale
-    return np.linalg.inv(raised(matrix * units, RIDGE)) * units
+    return np.linalg.inv(_raised(matrix * units, _RIDGE)) * units
 
 
 def limited_bias(gram: np.ndarray, bias: np.ndarray) -> np.ndarray:
@@ -835,7 +859,7 @@ def limited_bias(gram: np.ndarray, bias: np.ndarray) -> np.ndarray:
     within = bias * units
     if within.trace() <= MOST_ATTENUATION * 1e-9:
         return bias  # less than the limit in any direction that is kept below
-    scaled = raised(gram * units, 1e-9)
+    scaled = _raised(gram * units, 1e-9)
     if np.linalg.solve(scaled, within).trace() <= MOST_ATTENUATION:
         return bias  # the shares of all directions together are no more
     values, vectors = np.linalg.eigh(scaled)
@@ -886,12 +910,12 @@ def quadratic_form(values: np.ndarray, covariance: np.ndarray) -> float:
     return float(((values / unit @ vectors)[known] ** 2 / size[known]).sum())
 
 
-def whiten(rows: Rows, channel: int, taps: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _whiten(rows: Rows, channel: int, taps: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Whitened y (n,) and `columns` of x (n, k) of one channel (one at a time: all would be large)."""
     return causal(taps, rows.y[:, channel]), causal(taps, rows.x[:, channel, columns])
 
 
-def acting(rows: Sequence[Rows], channel: int) -> np.ndarray:
+def _acting(rows: Sequence[Rows], channel: int) -> np.ndarray:
     """Columns that say something in a channel: many say nothing there (a moment in a force)."""
     return np.flatnonzero(np.any([r.x[:, channel].any(axis=0) for r in rows], axis=0))
 
@@ -909,14 +933,14 @@ def full_fit_residuals(
     size = rows[0].x.shape[2]
     beta = np.zeros(size)
     left = [r.y for r in rows]
-    used = {c: acting(rows, c) for c in channels}
+    used = {c: _acting(rows, c) for c in channels}
     for _ in range(2):
         gram, cross = np.zeros((size, size)), np.zeros(size)
         for c in channels:
             taps = colours.get(c, np.ones(1))
             weight = 1.0 / (np.concatenate([causal(taps, part[:, c]) for part in left]).std() + 1e-12)
             for r in rows:
-                y, x = whiten(r, c, taps, used[c])
+                y, x = _whiten(r, c, taps, used[c])
                 x = x * weight
                 gram[np.ix_(used[c], used[c])] += x.T @ x
                 cross[used[c]] += x.T @ (y * weight)
@@ -942,7 +966,7 @@ def build(
     """Gram matrices of whitened rows; `noisy` are the same rows with the sensors' noise added once more.
 
     `in_training(run, time_s)` says True for a block to fit, False for one held out, None for a gap. The channels
-    `estimated_by` alone estimate the terms `apart` (`Apart`). `by_channel` keeps the products channel by channel, too.
+    `estimated_by` alone estimate the terms `apart` (`_Apart`). `by_channel` keeps the products channel by channel, too.
     """
     start, at = {}, 0
     for term in terms:
@@ -952,29 +976,29 @@ def build(
     longest = max(len(f) for f in filters.values()) - 1
     own = np.sort([start[t.key] + i for t in terms if t.key in set(apart) for i in range(t.size)]).astype(int)
     names = {name: i for i, name in enumerate(dict.fromkeys(r.run for r in rows))}
-    parts_of, blocks_of_rows, runs, training = blocks_of(rows, names, per_block, longest, in_training)
+    parts_of, blocks_of_rows, runs, training = _blocks_of(rows, names, per_block, longest, in_training)
     count = len(runs)
     fitted = np.array([t is True for t in training])
     gram, cross, square = np.zeros((at, at, count)), np.zeros((count, at)), np.zeros(count)
     own_gram, own_cross = np.zeros((count, len(own), at)), np.zeros((count, len(own)))
     bias_gram, bias_cross = np.zeros((at, at)), np.zeros(at)
     own_bias, own_bias_cross = np.zeros((len(own), at)), np.zeros(len(own))
-    kept = empty_by_channel(np.array(list(filters)), runs, fitted, per_block / rate_hz, at) if by_channel else None
+    kept = _empty_by_channel(np.array(list(filters)), runs, fitted, per_block / rate_hz, at) if by_channel else None
     for k, (r, parts) in enumerate(zip(rows, parts_of, strict=True)):
         if not parts:
             continue  # shorter than the whitening reaches: it says nothing
         first = blocks_of_rows[k][0]
         here = slice(first, first + len(parts))
         for place, (channel, taps) in enumerate(filters.items()):
-            used = acting([r] if noisy is None else [r, noisy[k]], channel)
+            used = _acting([r] if noisy is None else [r, noisy[k]], channel)
             grid = np.ix_(used, used)
-            y, x = (values[longest:] for values in whiten(r, channel, taps, used))
+            y, x = (values[longest:] for values in _whiten(r, channel, taps, used))
             # Of the columns used those that this channel estimates apart: where they stand among them, and in `own`.
             ours = np.flatnonzero(np.isin(used, own)) if channel in estimated_by else np.zeros(0, int)
             ours_at = np.searchsorted(own, used[ours])
             ours_grid = np.ix_(ours_at, used)
             if noisy is not None:
-                y_again, x_again = (values[longest:] for values in whiten(noisy[k], channel, taps, used))
+                y_again, x_again = (values[longest:] for values in _whiten(noisy[k], channel, taps, used))
                 shift = x_again - x
                 noise, with_y = shift.T @ shift, shift.T @ (y_again - y)
                 bias_gram[grid] += noise
@@ -1015,14 +1039,14 @@ def build(
         names,
         block_s=per_block / rate_hz,
         blocks_of_rows=tuple(blocks_of_rows),
-        apart=Apart(own, own_gram, own_cross, own_bias, own_bias_cross, np.array(sorted(estimated_by), int))
+        apart=_Apart(own, own_gram, own_cross, own_bias, own_bias_cross, np.array(sorted(estimated_by), int))
         if len(own)
         else None,
         by_channel=kept,
     )
 
 
-def blocks_of(
+def _blocks_of(
     rows: list[Rows], names: dict[str, int], per_block: int, longest: int, in_training
 ) -> tuple[list[list[slice]], list[np.ndarray], list[int], list[bool | None]]:
     """Of every stretch its blocks as places behind the whitening's reach `longest`, and of each of its rows the block;
@@ -1047,16 +1071,16 @@ def blocks_of(
     return parts_of, blocks_of_rows, runs, training
 
 
-def empty_by_channel(
+def _empty_by_channel(
     channels: np.ndarray, runs: list[int], fitted: np.ndarray, block_s: float, columns: int
-) -> ByChannel:
+) -> _ByChannel:
     """Products of no rows yet, for every channel and environment of the fitted blocks."""
     environment = np.full(len(runs), -1)
     environment[fitted] = environments(np.array(runs)[fitted], block_s)
     count = int(environment.max(initial=0)) + 1
-    environment //= -(-count // MOST_ENVIRONMENTS)  # joined where they are more than that
+    environment //= -(-count // _MOST_ENVIRONMENTS)  # joined where they are more than that
     count = int(environment.max(initial=0)) + 1
-    return ByChannel(
+    return _ByChannel(
         channels=channels,
         environment=environment,
         gram=np.zeros((len(channels), count, columns, columns)),
@@ -1065,3 +1089,150 @@ def empty_by_channel(
         bias_gram=np.zeros((len(channels), columns, columns)),
         bias_cross=np.zeros((len(channels), columns)),
     )
+
+
+@dataclass(frozen=True)
+class _Equations:
+    """Normal equations of all K columns on the blocks fitted, and what they are judged by, in scaled columns.
+
+    After the K columns stand some that are nothing: terms of fewer columns than the largest are filled up with them.
+    """
+
+    count: int
+    """K."""
+    normal: np.ndarray
+    """(K, K) the noise of the regressors taken off, with priors and ridge."""
+    right: np.ndarray
+    """(K,)."""
+    gram: np.ndarray
+    """(K, K) of every channel, the noise of the regressors taken off."""
+    cross: np.ndarray
+    """(K,)."""
+    limit: np.ndarray
+    """(K,) the furthest that a coefficient may be."""
+    energy: np.ndarray
+    """(K, K) products as they are, scaled to a unit diagonal, with a trace of ridge."""
+    noise: np.ndarray
+    """(K, K) what the noise adds to `energy`."""
+
+    def explained(
+        self, base: np.ndarray, further: np.ndarray, hold: float, most_noise: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Squares explained by columns `base` (k,) with each of `further` (m, s), and where they are not known, (m,).
+
+        They are not known here where more than a share `most_noise` of all directions together is noise, or where
+        columns are so much alike that the complement is nothing but rounding. What is further out than its limit, the
+        worst first, is held there by a prior of precision `hold`.
+        """
+        shape, flat = further.shape, further.ravel()
+        diagonal = further[:, :, None], further[:, None, :]
+        inverse = np.linalg.inv(self.normal[base[:, None], base])
+        row, column = self.normal[flat[:, None], base], self.normal[base[:, None], flat]
+        behind = (inverse @ column).T.reshape(*shape, -1)
+        ahead = row.reshape(*shape, -1)
+        own = np.linalg.inv(self.normal[diagonal] - ahead @ behind.swapaxes(1, 2))
+        start = inverse @ self.right[base]
+        beta = (own @ (self.right[further] - ahead @ start)[:, :, None])[:, :, 0]
+        others = start - (beta[:, None] @ behind)[:, 0]
+        values = np.flatnonzero(np.isfinite(self.limit[base]))
+        # Columns of the inverse of all that belong to what is limited.
+        taken = own @ (row @ inverse[:, values]).reshape(*shape, -1)
+        rest = inverse[:, values] + behind.swapaxes(1, 2) @ taken
+        pull = _held_by(others[:, values], rest[:, values], self.limit[base[values]], hold)
+        others += (rest @ pull[:, :, None])[:, :, 0]
+        beta -= (taken @ pull[:, :, None])[:, :, 0]
+        mixed = self.gram[base[:, None], flat].T.reshape(*shape, -1)
+        towards = others @ self.gram[base[:, None], base] + 2 * (beta[:, None] @ mixed)[:, 0]
+        found = 2 * others @ self.cross[base] + 2 * (beta * self.cross[further]).sum(axis=1)
+        found -= (towards * others).sum(axis=1) + ((self.gram[diagonal] @ beta[:, :, None])[:, :, 0] * beta).sum(axis=1)
+        alike = np.maximum(np.abs(own).max(axis=(1, 2)), np.abs(inverse).max(initial=0.0)) > _MOST_ALIKE
+        return found, alike | (self._noise_share(base, further) > most_noise)
+
+    def _noise_share(self, base: np.ndarray, further: np.ndarray) -> np.ndarray:
+        """Shares of all directions of the columns that are noise, added up, (m,)."""
+        shape, flat, diagonal = further.shape, further.ravel(), (further[:, :, None], further[:, None, :])
+        if not self.noise.any():
+            return np.zeros(len(further))
+        inverse, noise = np.linalg.inv(self.energy[base[:, None], base]), self.noise[base[:, None], base]
+        mixed = self.energy[base[:, None], flat]
+        behind = inverse @ mixed
+        own = self.energy[diagonal] - mixed.T.reshape(*shape, -1) @ behind.T.reshape(*shape, -1).swapaxes(1, 2)
+        # vᵀ noise v of the directions v = (−behind, 1) of the further columns.
+        turned = (noise @ behind - 2 * self.noise[base[:, None], flat]).T.reshape(*shape, -1)
+        added = self.noise[diagonal] + turned @ behind.T.reshape(*shape, -1).swapaxes(1, 2)
+        return (inverse * noise).sum() + np.trace(np.linalg.solve(own, added), axis1=1, axis2=2)
+
+
+def _held_by(at: np.ndarray, inverse: np.ndarray, limit: np.ndarray, hold: float) -> np.ndarray:
+    """What pulls at coefficients `at` (m, q) so that none is beyond its limit (q,), (m, q).
+
+    The one that is furthest out is held, until none is out; `inverse` (m, q, q) says what a pull moves.
+    """
+    held, wanted, pull, moved = np.zeros(at.shape, bool), np.zeros(at.shape), np.zeros(at.shape), at
+    for _ in range(at.shape[1]):
+        out = np.where(held, 0.0, np.abs(moved) / limit)
+        beyond = np.flatnonzero(out.max(axis=1, initial=0.0) > 1.0)
+        if not len(beyond):
+            break
+        worst = out[beyond].argmax(axis=1)
+        held[beyond, worst] = True
+        wanted[beyond, worst] = np.sign(moved[beyond, worst]) * limit[worst]
+        system = np.where(held[:, :, None] & held[:, None], inverse, 0.0)
+        system[:, np.arange(len(limit)), np.arange(len(limit))] += np.where(held, 1.0 / hold, 1.0)
+        pull = np.linalg.solve(system, np.where(held, wanted - at, 0.0)[:, :, None])
+        moved, pull = at + (inverse @ pull)[:, :, 0], pull[:, :, 0]
+    return pull
+
+
+def noise_factors(
+    segments: list[Segment], noisy: list[Segment], vehicle: Vehicle, thinner: Thinner
+) -> dict[str, np.ndarray]:
+    """Sensor (`rotors`, `gyroscope`) to the factors by which its noise in the band exceeds that of the `noisy` copies.
+
+    The gyroscope's are of its axes, (3,); of the rotors, which are alike, one, (1,). Sensors without a word here are
+    as noisy as assumed, or their noise is hidden by motion in the band.
+    """
+    squares = {"rotors": np.full(3, np.nan), "gyroscope": np.full(3, np.nan)}
+    sides = [(_sides(a, vehicle, thinner), _sides(b, vehicle, thinner)) for a, b in zip(segments, noisy, strict=True)]
+    sides = [pair for pair in sides if None not in pair]
+    if not sides:
+        return {}
+    rate_hz, band = thinner.rate_hz, tuple(share * thinner.cutoff_hz for share in NOISE_BAND)
+    for c in range(3):
+        left = [measured[:, c] - modelled[:, c] for (measured, modelled), _ in sides]
+        whole = band_power(left, rate_hz, band)
+        for sensor, side, sign in (("gyroscope", 0, 1.0), ("rotors", 1, -1.0)):
+            own = [a[side][:, c] for a, _ in sides]
+            added = [b[side][:, c] - a[side][:, c] for a, b in sides]
+            power, assumed = band_power(own, rate_hz, band), band_power(added, rate_hz, band)
+            found = min(sign * band_power(left, rate_hz, band, own), whole)
+            if assumed > 0 and found > _MOSTLY_NOISE * power:
+                squares[sensor][c] = found / assumed
+    ratios = {"gyroscope": squares["gyroscope"], "rotors": squares["rotors"][np.isfinite(squares["rotors"])]}
+    ratios["rotors"] = np.median(ratios["rotors"], keepdims=True) if len(ratios["rotors"]) else np.ones(1)
+    factors = {sensor: np.sqrt(found) for sensor, found in ratios.items()}
+    plain = {s: np.where((f > _LEAST_FACTOR) & (f < _MOST_FACTOR), f, 1.0) for s, f in factors.items()}
+    return {sensor: factor for sensor, factor in plain.items() if (factor > 1.0).any()}
+
+
+def _sides(segment: Segment, vehicle: Vehicle, thinner: Thinner) -> tuple[np.ndarray, np.ndarray] | None:
+    """Measured and modelled moment of a segment's rows, (n, 3) each; None where either is unknown."""
+    groups = residual(segment, vehicle)
+    if "moment" not in groups or not segment.measured_speed:
+        return None
+    _, arm, torque = baseline_wrench(segment.motion, vehicle)
+    modelled = thinner(arm + torque)
+    return thinner(groups["moment"]) + modelled, modelled
+
+
+def band_power(
+    one: list[np.ndarray], rate_hz: float, band_hz: tuple[float, float], other: list[np.ndarray] | None = None
+) -> float:
+    """Mean power density of stretches in a band of frequency, or its real cross density with `other` stretches."""
+    total, weight = 0.0, 0
+    for a, b in zip(one, one if other is None else other, strict=True):
+        if len(a) >= _SHORTEST_ROWS:
+            frequency, density = csd(a, b, fs=rate_hz, nperseg=min(len(a), 256))
+            inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
+            total, weight = total + float(density[inside].real.mean()) * len(a), weight + len(a)
+    return total / max(weight, 1)

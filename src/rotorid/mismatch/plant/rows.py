@@ -3,6 +3,12 @@
 Channels (each (n, 3)): `force` N and `moment` N m by inverse dynamics, `accelerometer` m/s2 (reading against
 position or velocity) and `gyroscope` rad/s (reading against attitude), where the recording has both sources.
 Both sides pass the same low-pass and are then thinned, so that the equation stays exact.
+
+An error of a sensor is estimated by the comparison with another sensor, where there is one.
+
+The balance of forces and moments holds it, too, but only as far as the model of them is right. A moment that nobody
+modelled, which the controller answers, asks for a gyroscope that reads half of what it does; a cable that pulls at the
+tail turns the vehicle and pulls it sideways, as a lever arm of the accelerometer would.
 """
 
 from __future__ import annotations
@@ -13,12 +19,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.signal import upfirdn
 
+from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Contribution, Form, Motion
 from rotorid.effects.pendulum import moved
 from rotorid.mismatch.plant.motion import Segment
 from rotorid.recordings import Vehicle
 from rotorid.recordings.signal import kernels
 
+_COMPARISONS = range(6, 12)
+"""Channels in which two sensors are compared: accelerometer and velocity, gyroscope and attitude."""
 Block = dict[str, np.ndarray]
 """What a column adds to each channel group, (n, 3)."""
 GROUPS = ("force", "moment", "accelerometer", "gyroscope")
@@ -36,9 +45,9 @@ PARAMETER_NAMES = {
 
 UNKNOWNS_OF_A_STATE = 4
 """Of what swings, where a piece of a run begins: two angles and two rates."""
-STATE_STEP = 1e-3
+_STATE_STEP = 1e-3
 """Of a slope by a state, rad."""
-SUSTAINED_S = 6.0
+_SUSTAINED_S = 6.0
 """No vehicle keeps up an angular acceleration for longer: one-sigma of the mean in time that is taken away."""
 
 
@@ -211,12 +220,12 @@ def state_column(term: Term, segment: Segment, vehicle: Vehicle, groups) -> dict
         return {}
     rate = float(np.sqrt(vehicle.gravity_m_s2 / values[term.form.nonlinear[0]]))
     parts = []
-    for step in (STATE_STEP, -STATE_STEP):
+    for step in (_STATE_STEP, -_STATE_STEP):
         hung = motion.hung.copy()
         hung[pieces[0], 1:] = moved(hung[pieces[0], 1:], step * np.eye(UNKNOWNS_OF_A_STATE)[term.slope_of], rate)
         there = replace(motion, hung=hung)
         parts.append(project(term.form.contribution(there, vehicle, values), segment, vehicle, groups))
-    return {k: (parts[0][k] - parts[1][k]) / (2 * STATE_STEP) for k in parts[0]}
+    return {k: (parts[0][k] - parts[1][k]) / (2 * _STATE_STEP) for k in parts[0]}
 
 
 def measured_moment(segment: Segment, vehicle: Vehicle) -> np.ndarray:
@@ -232,7 +241,7 @@ def high_passed(angular_acceleration: np.ndarray, rate_hz: float) -> np.ndarray:
     window, which makes a fifth too much of what turns a little faster than it lasts, nor ends that are held: one wild
     instant would then last.)
     """
-    return angular_acceleration - kernels.gaussian(angular_acceleration, SUSTAINED_S * rate_hz)
+    return angular_acceleration - kernels.gaussian(angular_acceleration, _SUSTAINED_S * rate_hz)
 
 
 def value_columns(
@@ -371,3 +380,16 @@ def assemble(
                 of_group[:, k] = block[group].T
         x[:, own] = of_group.transpose(2, 0, 1)
     return Rows(segment.run, time_s, y, x)
+
+
+def compared_alone(terms: Sequence[Term], rows: Sequence[Rows]) -> tuple[list[int], list[str]]:
+    """Channels in which two sensors are compared, and keys of the errors of a sensor that act in them."""
+    channels = [c for c in _COMPARISONS if np.isfinite(rows[0].y[:, c]).all()]
+    sensors = {i for i, effect in catalogue().items() if effect.kind == "sensor"}
+    start, keys = 0, []
+    for term in terms:
+        own = slice(start, start + term.size)
+        if term.kind == "effect" and term.effect in sensors and any(r.x[:, channels, own].any() for r in rows):
+            keys.append(term.key)
+        start += term.size
+    return channels, keys

@@ -29,20 +29,20 @@ from rotorid.steps import step
 ENTER_P = 1e-5
 COST_PER_PARAMETER = 10.0
 SMALLEST_SIZE = 0.15
-LEAST_RESPONSE = 0.25
+_LEAST_RESPONSE = 0.25
 """Least slope of a throttle curve in units of its mean: thrust proportional to throttle has a half."""
 LIFT_SD = 0.02
 """One-sigma of mean thrust over mean weight with the values as fitted: a vehicle in flight is supported by its rotors.
 Whitened residuals of a hover say little of their mean, and a curve of too little thrust would explain moments that do
 not respond. Two percent are an accelerometer's scale."""
-PLAINLY_LESS = 0.98
+_PLAINLY_LESS = 0.98
 """Share of the squares that commands which hold leave, below which commands are smooth: a lag imitates either."""
-LIMIT_WAYS = (0.97, 0.9, 0.8, 0.65, 0.5)
-MOST_LIMITED = 0.5
+_LIMIT_WAYS = (0.97, 0.9, 0.8, 0.65, 0.5)
+_MOST_LIMITED = 0.5
 """Share of the time that a limit may hold a rotor."""
-AT_BOUND = 1e-3
+_AT_BOUND = 1e-3
 """Share of a parameter's range from its bound within which the bound holds it."""
-LEAST_INFORMATION = 1e-30
+_LEAST_INFORMATION = 1e-30
 """Inverse variance of a parameter that changes nothing."""
 
 Chain = tuple[tuple[str, SpeedForm], ...]
@@ -150,7 +150,7 @@ def moved(path: SpeedPath, values: np.ndarray) -> np.ndarray:
     return sum(w * held[first + i : first + i + count] for i, w in enumerate(weights) if w)
 
 
-class SpeedProblem:
+class _SpeedProblem:
     """Whitened residual of a chain over the training segments; subclasses say what the response is."""
 
     def __init__(self, segments: list[Segment], full_speed: float, full_voltage: float | None):
@@ -229,7 +229,7 @@ class SpeedProblem:
                 scores.append(flat.T @ residual[part].ravel())
         gram[-1, -1] += 1.0 / self.shift_prior_s**2
         # A limit that is never reached changes nothing: its variance is large, and finite.
-        gram += np.diag(np.where(np.diag(gram) < LEAST_INFORMATION, LEAST_INFORMATION, 0.0))
+        gram += np.diag(np.where(np.diag(gram) < _LEAST_INFORMATION, _LEAST_INFORMATION, 0.0))
         scale = 1.0 / np.sqrt(np.diag(gram))
         inverse = np.linalg.pinv(gram * np.outer(scale, scale), hermitian=True) * np.outer(scale, scale)
         scores = np.array(scores)
@@ -248,7 +248,7 @@ class SpeedProblem:
         return 0.0
 
 
-class MeasuredSpeed(SpeedProblem):
+class MeasuredSpeed(_SpeedProblem):
     """Response: the measured rotor speeds."""
 
     def __init__(self, segments, full_speed, full_voltage):
@@ -261,7 +261,7 @@ class MeasuredSpeed(SpeedProblem):
         return [s.motion.rotor_speed - self.path(s, chain, values, shift_s) for s in self.segments]
 
 
-class WrenchOnly(SpeedProblem):
+class WrenchOnly(_SpeedProblem):
     """Response: force and moment; `residual_of(segment, speed)` gives thinned rows (n, c) and columns (n, c, q)."""
 
     def __init__(
@@ -387,7 +387,7 @@ def starts_of(form: SpeedForm) -> list[np.ndarray]:
 class SpeedSearch:
     """Grow the chain one id at a time, replace forms, prune, and look for alternatives."""
 
-    def __init__(self, problem: SpeedProblem, forms: list[tuple[str, SpeedForm]]):
+    def __init__(self, problem: _SpeedProblem, forms: list[tuple[str, SpeedForm]]):
         self.problem, self.forms = problem, forms
 
     def best_fit(self, chain: Chain, base: SpeedFit, added: SpeedForm) -> SpeedFit:
@@ -407,7 +407,7 @@ class SpeedSearch:
         shares = np.concatenate([s.command.ravel() for s in self.problem.segments]) / self.problem.full_speed
         middle = float(np.median(shares))
         outermost = float(self.neutral(form)[0])
-        return [np.array([middle + way * (outermost - middle)]) for way in LIMIT_WAYS]
+        return [np.array([middle + way * (outermost - middle)]) for way in _LIMIT_WAYS]
 
     @step("how large the noise is")
     def rich_noise(self) -> None:
@@ -424,7 +424,7 @@ class SpeedSearch:
             fit = self.best_fit((*fit.chain, (key, form)), fit, form)
         self.problem.holds = False
         smooth = self.problem.fit(fit.chain, fit.values, fit.shift_s)
-        self.problem.holds = bool(smooth.cost > PLAINLY_LESS * fit.cost)
+        self.problem.holds = bool(smooth.cost > _PLAINLY_LESS * fit.cost)
         fit = fit if self.problem.holds else smooth
         if isinstance(self.problem, WrenchOnly):
             self.problem.refresh(fit)
@@ -552,7 +552,7 @@ class SpeedSearch:
             if form.stage == CURVE:
                 speed = form.apply(path, fit.values[fit.slice_of(key)])
                 slope = np.diff(speed, axis=0) / np.maximum(np.diff(grid, axis=0), 1e-9)
-                if (slope < LEAST_RESPONSE * (speed / np.maximum(grid, 1e-9))[1:]).any():
+                if (slope < _LEAST_RESPONSE * (speed / np.maximum(grid, 1e-9))[1:]).any():
                     return False
         return True
 
@@ -562,7 +562,7 @@ class SpeedSearch:
         segments = self.problem.segments
         paths = [SpeedPath(s.command, s.motion.time_s, self.problem.full_speed) for s in segments]
         held = np.concatenate([form.apply(p, values) != p.speed for p in paths])
-        return bool(held.mean(axis=0).max() > MOST_LIMITED)
+        return bool(held.mean(axis=0).max() > _MOST_LIMITED)
 
     def negligible(self, fit: SpeedFit, key: str) -> bool:
         """Whether an id's parameters are all closer to changing nothing than their own limits.
@@ -644,7 +644,7 @@ def at_its_bounds(form: SpeedForm, values: np.ndarray) -> bool:
     An edge at which a parameter does nothing (a lag of no time) is none.
     """
     for value, own, neutral in zip(values, form.parameters, form.neutral, strict=True):
-        reach = AT_BOUND * (own.high - own.low)
+        reach = _AT_BOUND * (own.high - own.low)
         if any(abs(value - edge) < reach < abs(neutral - edge) for edge in (own.low, own.high)):
             return True
     return False

@@ -22,14 +22,14 @@ from rotorid.recordings import RecordingSet, Run, Split
 from rotorid.recordings import columns as c
 
 HELD_OUT_SHARE = 1 / 3
-MOST_CHOICES = 500
-MOST_OF_A_KIND = 2 / 3
+_MOST_CHOICES = 500
+_MOST_OF_A_KIND = 2 / 3
 """Share of what is done of some kind from which a run does it alone: it cannot be shared, and is fitted."""
-LEAST_ON_A_SIDE = 0.05
+_LEAST_ON_A_SIDE = 0.05
 """Share of what is done of which a side of the split has hardly any: less is no worse."""
-WORTH_MOVING = 0.05
+_WORTH_MOVING = 0.05
 """Gain of a choice over the even one, nats, from which it is taken."""
-NEAR_GROUND_M = 0.3
+_NEAR_GROUND_M = 0.3
 GAP_S = 2.0
 """Gap between the fitted and the held-out part of a single run: longer than any memory tested."""
 
@@ -47,7 +47,7 @@ def split_runs(recordings: RecordingSet) -> Split:
         border_s = time_s[0] + (time_s[-1] - time_s[0]) * (1 - HELD_OUT_SHARE)
         return Split((names[0],), (names[0],), float(border_s))
     else:
-        held = [names[k] for k in chosen_runs(recordings)]
+        held = [names[k] for k in _chosen_runs(recordings)]
     return Split(tuple(n for n in names if n not in held), tuple(held))
 
 
@@ -84,41 +84,41 @@ def parts_of(recordings: RecordingSet, split: Split) -> tuple[RecordingSet, Reco
     return tuple(replace(recordings, runs=tuple(runs), held_out=()) for runs in (fitted, held))
 
 
-def chosen_runs(recordings: RecordingSet) -> tuple[int, ...]:
+def _chosen_runs(recordings: RecordingSet) -> tuple[int, ...]:
     """Numbers of the runs to hold out."""
     total = len(recordings.runs)
     count = max(1, round(total * HELD_OUT_SHARE))
     even = tuple(int((k + 0.5) * total / count) for k in range(count))
     if total < 3:
         return even
-    groups = [g / g.sum() for g in activity(recordings) if g.sum() > 0]
-    alone = {int(np.argmax(g)) for g in groups if g.max() > MOST_OF_A_KIND}
-    shared = [g for g in groups if g.max() <= MOST_OF_A_KIND]
+    groups = [g / g.sum() for g in _activity(recordings) if g.sum() > 0]
+    alone = {int(np.argmax(g)) for g in groups if g.max() > _MOST_OF_A_KIND}
+    shared = [g for g in groups if g.max() <= _MOST_OF_A_KIND]
 
     def score(choice: tuple[int, ...]) -> float:
         if alone.intersection(choice):
             return -np.inf
         held = np.array([share[list(choice)].sum() for share in shared])
-        logs = [np.log(np.maximum(x, LEAST_ON_A_SIDE)) for x in (held, 1.0 - held)]
+        logs = [np.log(np.maximum(x, _LEAST_ON_A_SIDE)) for x in (held, 1.0 - held)]
         return float(np.sum(HELD_OUT_SHARE * logs[0] + (1.0 - HELD_OUT_SHARE) * logs[1])) / max(len(groups), 1)
 
     chosen = even
     for number in range(count, max(count, total // 2) + 1):
         best = max(choices(total, number), key=score)
-        if score(best) > score(chosen) + WORTH_MOVING:
+        if score(best) > score(chosen) + _WORTH_MOVING:
             chosen = best
     return chosen
 
 
 def choices(total: int, count: int) -> list[tuple[int, ...]]:
     """Ways to take `count` of `total` runs: all of them, or as many drawn at random as are looked at."""
-    if comb(total, count) <= MOST_CHOICES:
+    if comb(total, count) <= _MOST_CHOICES:
         return list(combinations(range(total), count))
     draw = np.random.default_rng(0)
-    return [tuple(sorted(int(k) for k in draw.permutation(total)[:count])) for _ in range(MOST_CHOICES)]
+    return [tuple(sorted(int(k) for k in draw.permutation(total)[:count])) for _ in range(_MOST_CHOICES)]
 
 
-def kinds_of_activity(recordings: RecordingSet) -> list[tuple[str, ...]]:
+def _kinds_of_activity(recordings: RecordingSet) -> list[tuple[str, ...]]:
     """Groups of columns that show what is done: in flight each group is one kind, on an instrument each column."""
     count, flight = recordings.vehicle.rotor_count, recordings.vehicle.kind == "flight"
     families = (c.rotor_columns(f, count) for f in ("rotor_speed", "rotor_command", "throttle"))
@@ -129,26 +129,26 @@ def kinds_of_activity(recordings: RecordingSet) -> list[tuple[str, ...]]:
     return [(name,) for name in (*c.REFERENCE_FORCE, *c.MOUNT, *rotors, c.BATTERY_VOLTAGE, c.TEMPERATURE)]
 
 
-def activity(recordings: RecordingSet) -> list[np.ndarray]:
+def _activity(recordings: RecordingSet) -> list[np.ndarray]:
     """How much of what is done each run holds, (runs,) of each kind: energies about the mean of all runs.
 
-    In addition to `kinds_of_activity` nearness of the ground, and time itself.
+    In addition to `_kinds_of_activity` nearness of the ground, and time itself.
     """
-    vehicle, kinds = recordings.vehicle, kinds_of_activity(recordings)
+    vehicle, kinds = recordings.vehicle, _kinds_of_activity(recordings)
     out = [np.array([r.time_s[-1] - r.time_s[0] for r in recordings.runs])]
     for names in kinds:
         if all(run.has(*names) for run in recordings.runs):
-            shares = [energies([run.column(n) for run in recordings.runs], recordings.runs) for n in names]
+            shares = [_energies([run.column(n) for run in recordings.runs], recordings.runs) for n in names]
             out.append(
                 np.mean([x / x.sum() for x in shares if x.sum() > 0] or [np.zeros(len(recordings.runs))], axis=0)
             )
-    heights = [height_of(run, vehicle.ground_z_m) for run in recordings.runs]
+    heights = [_height_of(run, vehicle.ground_z_m) for run in recordings.runs]
     if all(h is not None for h in heights):
-        out.append(energies([1.0 / (NEAR_GROUND_M + np.maximum(h, 0.0)) ** 2 for h in heights], recordings.runs))
+        out.append(_energies([1.0 / (_NEAR_GROUND_M + np.maximum(h, 0.0)) ** 2 for h in heights], recordings.runs))
     return out
 
 
-def height_of(run: Run, ground_z_m: float | None) -> np.ndarray | None:
+def _height_of(run: Run, ground_z_m: float | None) -> np.ndarray | None:
     """Height above ground (n,), m, measured or from the position; None where neither is known."""
     if run.has("height_m"):
         return run.column("height_m")
@@ -157,7 +157,7 @@ def height_of(run: Run, ground_z_m: float | None) -> np.ndarray | None:
     return ground_z_m - run.column("position_z_m")
 
 
-def energies(parts: list[np.ndarray], runs: tuple[Run, ...]) -> np.ndarray:
+def _energies(parts: list[np.ndarray], runs: tuple[Run, ...]) -> np.ndarray:
     """Of one quantity in each run its squares about the mean of all, times the run's length, (runs,)."""
     middle = np.nanmean(np.concatenate(parts))
     return np.array(

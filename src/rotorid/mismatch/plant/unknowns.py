@@ -17,8 +17,8 @@ from scipy.signal import cont2discrete, lfilter
 from rotorid.effects.contract import Contribution, Effect, Form, Motion, Parameter
 from rotorid.effects.loading import AXES, on_channels
 
-SWING_DAMPING = 0.05
-SWING_STARTS_RAD_S = (4.0, 8.0, 16.0)
+_SWING_DAMPING = 0.05
+_SWING_STARTS_RAD_S = (4.0, 8.0, 16.0)
 
 
 def _to_body(motion, world):
@@ -32,13 +32,13 @@ def place(motion, vehicle, values, middle=0.0):
     return Contribution(force=_to_body(motion, world))
 
 
-def height_only(motion, vehicle, values, middle=0.0):
+def _height_only(motion, vehicle, values, middle=0.0):
     """F = Rᵀ (0, 0, k_z z), position in the world from `middle` (3,), m."""
     world = (motion.position - middle) * [0.0, 0.0, values[0]]
     return Contribution(force=_to_body(motion, world))
 
 
-def fixed_moment(motion, vehicle, values):
+def _fixed_moment(motion, vehicle, values):
     """M = Rᵀ (m_N, m_E, 0): a moment that keeps its direction in the world."""
     world = np.zeros((motion.size, 3))
     world[:, 0], world[:, 1] = values
@@ -55,7 +55,7 @@ def swinging(motion, vehicle, values):
     """q'' + 2 ζ ω q' + ω² q = -a in the rotor plane; F = k_f ω² q, M = k_m (q × e_D): a mass that swings inside."""
     k_f, k_m, omega = values
     dt = float(np.median(np.diff(motion.time_s))) if motion.size > 1 else 0.01
-    system = ([-1.0], [1.0, 2 * SWING_DAMPING * omega, omega**2])
+    system = ([-1.0], [1.0, 2 * _SWING_DAMPING * omega, omega**2])
     numerator, denominator, _ = cont2discrete(system, dt, method="bilinear")
     q = np.zeros((motion.size, 3))
     q[:, :2] = lfilter(numerator.ravel(), denominator, motion.specific_force[:, :2], axis=0)
@@ -66,7 +66,7 @@ def swinging(motion, vehicle, values):
 def _place_forms(vehicle):
     spring = (Parameter("k_h", "N/m"), Parameter("k_z", "N/m"), Parameter("f_N", "N"), Parameter("f_E", "N"))
     return (
-        Form("height", "F = Rᵀ (0, 0, k_z z)", (Parameter("k_z", "N/m"),), height_only, ("position", "rotation")),
+        Form("height", "F = Rᵀ (0, 0, k_z z)", (Parameter("k_z", "N/m"),), _height_only, ("position", "rotation")),
         Form("place", "F = Rᵀ (f + K p)", spring, place, ("position", "rotation")),
     )
 
@@ -75,13 +75,13 @@ def _heading_forms(vehicle):
     fixed = (Parameter("m_N", "N m"), Parameter("m_E", "N m"))
     body = tuple(Parameter(f"m_{a}", "N m") for a in "xyz") + tuple(Parameter(f"m'_{a}", "N m") for a in "xyz")
     return (
-        Form("fixed", "M = Rᵀ (m_N, m_E, 0)", fixed, fixed_moment, ("rotation",)),
+        Form("fixed", "M = Rᵀ (m_N, m_E, 0)", fixed, _fixed_moment, ("rotation",)),
         Form("dipole", "M = m × Rᵀ e_N + m' × Rᵀ e_D", body, dipole, ("rotation",)),
     )
 
 
 def _swing_forms(vehicle):
-    rate = Parameter("ω", "rad/s", 1.5, 40.0, nonlinear=True, starts=SWING_STARTS_RAD_S)
+    rate = Parameter("ω", "rad/s", 1.5, 40.0, nonlinear=True, starts=_SWING_STARTS_RAD_S)
     return (
         Form(
             "swing",
@@ -94,7 +94,7 @@ def _swing_forms(vehicle):
     )
 
 
-def gain_forms(instrument):
+def _gain_forms(instrument):
     """y = F + g x F on each loaded channel of a bench, x the temperature, the time, or one after the other each run.
 
     On a stand what turns the rotors changes with time and temperature, too.
@@ -142,7 +142,7 @@ def _gain(name, unit, channels, factor):
     return on_channels(name, "y = F + g x F", "g", unit, channels, signal)
 
 
-PLACE = Effect(
+_PLACE = Effect(
     id="unknown_place",
     name="a force that depends on the place in the room",
     sentence="a force in world axes follows the position, as of a cable to a fixed point",
@@ -156,7 +156,7 @@ HEADING = Effect(
     forms=_heading_forms,
     source="empirical",
 )
-SWING = Effect(
+_SWING = Effect(
     id="unknown_swing",
     name="a mass that swings inside",
     sentence="a force and a moment ring on after every acceleration",
@@ -168,10 +168,10 @@ GAIN = Effect(
     name="a gain that changes",
     sentence="what the reading makes of its load changes with time or temperature or from run to run",
     forms=lambda vehicle: (),
-    reading_forms=gain_forms,
+    reading_forms=_gain_forms,
     source="empirical",
 )
-UNKNOWNS = {e.id: e for e in (PLACE, HEADING, SWING, GAIN)}
+UNKNOWNS = {e.id: e for e in (_PLACE, HEADING, _SWING, GAIN)}
 DEPENDS_ON = {
     "unknown_place": ("position",),
     "unknown_heading": ("heading",),
@@ -179,10 +179,10 @@ DEPENDS_ON = {
     "unknown_gain": ("load", "time_s"),
 }
 """Regime variables that each depends on, for the verdict."""
-LEAST_CLIMB = 0.25
+_LEAST_CLIMB = 0.25
 """Spread of the height (one sigma) relative to its mean from which a force that follows it differs from a weight: six
 percent of its energy are its own."""
-LEAST_TURN_RAD = 0.25
+_LEAST_TURN_RAD = 0.25
 """Spread of the heading (one sigma) from which a moment that keeps its direction in the world differs from one that
 turns with the vehicle: 14 degrees move a quarter of it elsewhere."""
 
@@ -198,14 +198,14 @@ def empirical_effects(motions: Sequence[Motion]) -> list[Effect]:
         return kept
     places = np.concatenate([m.position for m in motions])
     middle = np.nanmean(places, axis=0)
-    if np.nanstd(places[:, 2]) > LEAST_CLIMB * abs(middle[2]):
+    if np.nanstd(places[:, 2]) > _LEAST_CLIMB * abs(middle[2]):
         return kept
 
     def about_middle(vehicle):
         forms = _place_forms(vehicle)
         return tuple(replace(form, contribution=partial(form.contribution, middle=middle)) for form in forms)
 
-    return [replace(e, forms=about_middle) if e is PLACE else e for e in kept]
+    return [replace(e, forms=about_middle) if e is _PLACE else e for e in kept]
 
 
 def can_show(effect_id: str, rotations: list[np.ndarray | None]) -> bool:
@@ -219,4 +219,4 @@ def can_show(effect_id: str, rotations: list[np.ndarray | None]) -> bool:
     noses = np.concatenate([r[:, 0, 0] + 1j * r[:, 1, 0] for r in rotations])
     noses = noses / np.maximum(np.abs(noses), 1e-12)
     # Of a normally spread heading the mean nose is exp(-sigma² / 2) long.
-    return bool(np.abs(noses.mean()) < np.exp(-0.5 * LEAST_TURN_RAD**2))
+    return bool(np.abs(noses.mean()) < np.exp(-0.5 * _LEAST_TURN_RAD**2))

@@ -18,9 +18,9 @@ from rotorid.mismatch.plant.motion import Segment
 
 SLOW_S = 5.0
 """Length of the mean that is taken for slow."""
-MEMORY_S, MOST_MEMORY = 1.0, 0.2
+_MEMORY_S, _MOST_MEMORY = 1.0, 0.2
 """Noise has forgotten itself after so long: means over it hold less than this share of its power."""
-RELAXATION_S = (0.0, 0.03, 0.1, 0.3, 1.0)
+_RELAXATION_S = (0.0, 0.03, 0.1, 0.3, 1.0)
 """Time constants with which the voltage may follow the load."""
 
 
@@ -41,7 +41,7 @@ def expected_voltages(voltages: list[np.ndarray], commands: list[np.ndarray], st
         size = min(len(voltage) - 1, int(SLOW_S / dt_s)) | 1
         slow.append(running_mean(voltage, size))
         quick.append(voltage - slow[-1])
-        columns = relaxed((command**3).sum(axis=1), dt_s)
+        columns = _relaxed((command**3).sum(axis=1), dt_s)
         loads.append(columns - np.stack([running_mean(c, size) for c in columns.T], axis=1))
     all_loads = np.concatenate(loads)
     scale = np.maximum(all_loads.std(axis=0), 1e-300)
@@ -56,16 +56,16 @@ def is_noise(rests: list[np.ndarray], steps_s: list[float]) -> bool:
     """
     power, kept = 0.0, 0.0
     for rest, dt_s in zip(rests, steps_s, strict=True):
-        size = max(int(MEMORY_S / dt_s), 1)
+        size = max(int(_MEMORY_S / dt_s), 1)
         count = len(rest) // size
         power += float(rest[: count * size] @ rest[: count * size]) / size
         kept += float(np.sum(rest[: count * size].reshape(count, size).mean(axis=1) ** 2))
-    return kept < MOST_MEMORY * power
+    return kept < _MOST_MEMORY * power
 
 
-def relaxed(load: np.ndarray, dt_s: float) -> np.ndarray:
+def _relaxed(load: np.ndarray, dt_s: float) -> np.ndarray:
     """A load (n,) through first-order lags of every time constant, settled at the start, (n, 5)."""
-    keeps = [np.exp(-dt_s / tau) if tau > 0 else 0.0 for tau in RELAXATION_S]
+    keeps = [np.exp(-dt_s / tau) if tau > 0 else 0.0 for tau in _RELAXATION_S]
     return np.stack([lfilter([1 - k], [1, -k], load, zi=[k * load[0]])[0] for k in keeps], axis=1)
 
 

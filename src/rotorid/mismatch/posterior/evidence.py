@@ -102,7 +102,7 @@ class Evidence:
     """Keys of the effects that the engine selected."""
 
 
-def term_of(term: Term) -> EvidenceTerm:
+def _term_of(term: Term) -> EvidenceTerm:
     """What is kept of a term of a regression."""
     prior = tuple(float(sd) for sd in np.broadcast_to(np.asarray(term.prior_sd, float), (term.size,)))
     if term.form is None:
@@ -135,7 +135,7 @@ def evidence_from(regression: Regression) -> Evidence:
     kept, apart = regression.by_channel, regression.apart
     share = float(regression.training.mean())
     return Evidence(
-        terms=tuple(term_of(t) for t in regression.terms),
+        terms=tuple(_term_of(t) for t in regression.terms),
         start=dict(regression.start),
         channels=kept.channels,
         gram=kept.gram,

@@ -26,7 +26,7 @@ from rotorid.mismatch.plant.regression import NEVER_EXCITED
 from rotorid.mismatch.posterior.evidence import Evidence
 
 TINY = 1e-300
-FEWEST_ROWS = 50.0
+_FEWEST_ROWS = 50.0
 """Rows that a flight is taken to have at least."""
 FULL_RIDGE = 1e-6
 """Ridge of the model of all columns, in units of their length."""
@@ -50,7 +50,7 @@ class Weighed:
 
 
 @dataclass(frozen=True)
-class ChannelSpectrum:
+class _ChannelSpectrum:
     """Products of one channel in the eigenvectors of each environment's Gram matrix, of the columns that act in it."""
 
     columns: np.ndarray
@@ -69,7 +69,7 @@ class Spectrum:
 
     unit: np.ndarray
     """(K,) coefficient in its own unit of a scaled one of 1; 0 for a column that is never excited."""
-    channels: tuple[ChannelSpectrum, ...]
+    channels: tuple[_ChannelSpectrum, ...]
     bias: np.ndarray
     """(C, K, K) what the noise of the regressors adds to the products."""
     rows: float
@@ -127,9 +127,9 @@ def spectrum_of(evidence: Evidence, unit: np.ndarray | None = None) -> Spectrum:
         at = unit[columns]
         values, vectors = np.linalg.eigh(gram[:, columns[:, None], columns] * np.outer(at, at))
         turned = np.einsum("eik,ei->ek", vectors, cross[:, columns] * at)
-        channels.append(ChannelSpectrum(columns, np.maximum(values, 0.0), vectors, turned))
+        channels.append(_ChannelSpectrum(columns, np.maximum(values, 0.0), vectors, turned))
     gram = evidence.gram.sum(axis=(0, 1)) * np.outer(unit, unit)
     total = evidence.cross.sum(axis=(0, 1)) * unit
     left = evidence.square.sum() - total @ np.linalg.solve(gram + FULL_RIDGE * np.eye(len(unit)), total)
     bias = evidence.bias_gram * np.outer(unit, unit)
-    return Spectrum(unit, tuple(channels), bias, max(float(left), FEWEST_ROWS))
+    return Spectrum(unit, tuple(channels), bias, max(float(left), _FEWEST_ROWS))

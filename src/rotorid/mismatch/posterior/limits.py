@@ -19,8 +19,8 @@ from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.posterior.statements import POSSIBLE, by_id
 
 PROBABILITY = 0.95
-DRAWS = 400
-LEAST_KNOWN = 1e-9
+_DRAWS = 400
+_LEAST_KNOWN = 1e-9
 """Least variance of scaled coefficients in any direction."""
 
 
@@ -52,13 +52,13 @@ def limits_of(found: Found, squares: Mapping[str, np.ndarray]) -> tuple[UpperLim
         if probability.get(effect, 0.0) >= POSSIBLE:
             continue
         forms = [k for k, t in problem.terms.items() if t.effect == effect and not t.run and k in squares]
-        limits = [limit for key in forms if (limit := limit_of(found, key, squares[key])) is not None]
+        limits = [limit for key in forms if (limit := _limit_of(found, key, squares[key])) is not None]
         if limits:
             out.append(max(limits, key=lambda limit: limit.share))
     return tuple(sorted(out, key=lambda limit: -limit.share))
 
 
-def limit_of(found: Found, key: str, squares: np.ndarray) -> UpperLimit | None:
+def _limit_of(found: Found, key: str, squares: np.ndarray) -> UpperLimit | None:
     """The limit of one form; None where its columns are not excited, or with which the model has no mode."""
     problem, term = found.problem, found.problem.terms[key]
     own = problem.columns_of[key]
@@ -87,6 +87,6 @@ def drawn(mean: np.ndarray, covariance: np.ndarray, low: np.ndarray, high: np.nd
     """
     unit = np.sqrt(np.maximum(np.diag(covariance), TINY))
     values, vectors = np.linalg.eigh(covariance / np.outer(unit, unit))
-    root = unit[:, None] * np.linalg.cholesky((vectors * np.maximum(values, LEAST_KNOWN)) @ vectors.T)
-    normal = np.random.default_rng(0).standard_normal((DRAWS, len(mean)))
+    root = unit[:, None] * np.linalg.cholesky((vectors * np.maximum(values, _LEAST_KNOWN)) @ vectors.T)
+    normal = np.random.default_rng(0).standard_normal((_DRAWS, len(mean)))
     return np.clip(mean + normal @ root.T, low, high)

@@ -1,4 +1,11 @@
-"""The evidence of a flight in the coordinates of the decision: columns of unit length, with their prior and bounds."""
+"""The evidence of a flight in the coordinates of the decision: columns of unit length, with their prior and bounds.
+
+The numbers of the decision, each with its unit and its reason.
+
+Cost of an id, leftover and least size were chosen among a few on the bench for decisions (`snakemake decisions`), by
+what is new and lost in planted flights and wrong in drawn ones; the others are those of a first sketch. How many of the
+statements hold that they make is for the bench to measure (docs/proof/README.md).
+"""
 
 from __future__ import annotations
 
@@ -10,15 +17,65 @@ import numpy as np
 from rotorid.mismatch.plant.unknowns import UNKNOWNS
 from rotorid.mismatch.posterior.evidence import Evidence, EvidenceTerm
 from rotorid.mismatch.posterior.leftover import TINY, Spectrum
-from rotorid.mismatch.posterior.prior import Prior
 
-RATIOS = {"mass": ("thrust",), "arm": ("inertia_xx", "inertia_yy"), "torque": ("inertia_zz",)}
+_RATIOS = {"mass": ("thrust",), "arm": ("inertia_xx", "inertia_yy"), "torque": ("inertia_zz",)}
 """Believed values of which a flight knows no more than the ratio to others. Were both free, noise alone would say what
 they have in common (the residual is itself their sum): the first stay as believed, their doubt is the others'."""
-HELD_SD = 1e-4
+_HELD_SD = 1e-4
 """Relative one-sigma of a value that stays as believed."""
-ALWAYS = ("value", "nuisance", "wind")
+_ALWAYS = ("value", "nuisance", "wind")
 """Kinds of terms that are in every model."""
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is believed before a recording is looked at."""
+
+    effect_nats: float = 6.0
+    """Nats that an id costs in addition to the logarithm of its number of forms: one of the catalogue's in four hundred
+    is at work by belief, so that the fifty of them together are found by chance in one flight of eight."""
+    nameless_nats: float = 6.0
+    """Further nats of an empirical term without a name: one of the catalogue explains as much more often."""
+    value_reach: float = 3.0
+    """Trusts (the user's one-sigma) that a believed value may move as long as it is not called wrong."""
+    freed_nats: float = 2.0
+    """Nats that a believed value costs which may be wrong by more than that."""
+    freed_sd: tuple[float, float] = (0.15, 0.5)
+    """Least and largest relative one-sigma of such a value, else `value_reach` times its trust."""
+    right_sd: float = 0.004
+    """Relative one-sigma of a believed value that is right: nobody knows one better."""
+    most_freed: int = 3
+    """Values that are called wrong at once at most."""
+    gain_bias: tuple[float, float] = (0.14, 0.10)
+    """One-sigma that a gain between force or moment and motion is biased by, over √(residual / own part of its column),
+    where all of the residual is leftover: of all frequencies, and of those of `model.gains.VALUE_BAND`. Measured on 44
+    sets: right values are biased by 0.2 % (rms) where that root is below 0.03, by 3 % up to 0.3, by 25 % above."""
+    gain_freedom: float = 30.0
+    """Degrees of freedom of a gain's variance."""
+    freed_reach: float = 0.6
+    """Relative change that such a value may have at most: one further off is a mistake of its own (`doubts`)."""
+    change_reach: float = 5.0
+    """One-sigma of a change between two sets of flights at least, in units of what it looks like where nothing changed:
+    an estimate that nothing else limits shrinks by four hundredths. Ten lets large changes be found that cancel."""
+    slack: float = 1.5
+    """Standard errors by which a coefficient may lie beyond its physical bound, as an estimate of one on the bound."""
+    shown: float = 2.0
+    """Standard errors from zero of a parameter without which its form is another effect."""
+    small_nats: float = 20.0
+    """Nats that a form costs with every parameter negligible, or with one that must show and does not."""
+    attenuation: float = 0.3
+    """Largest share of a column's energy that is taken for the noise of its regressor."""
+    leftover_nats: float = 10.0
+    """Nats by which a smaller leftover must be more probable to be believed: of a few environments its size is hardly
+    known, and every real flight has one."""
+    least_size: float = 0.03
+    """Squares of a contribution over those of the noise above which it matters: less changes an error by one and a half
+    percent at most."""
+    form_error: float = 0.15
+    """Share of an effect's contribution that its form is wrong by: what is less than that of another one in the same
+    channel may be what is wrong with that one's form. Chosen on 22 drawn flights (docs/proof/README.md)."""
+    open_nats: float = 5.0
+    """Nats that a model with another id in its place may be worse for that id to be looked at."""
 
 
 @dataclass(frozen=True)
@@ -110,20 +167,20 @@ def problem_of(evidence: Evidence, spectrum: Spectrum, variance: np.ndarray, pri
     """
     terms = {t.key: t for t in evidence.terms}
     columns_of = {t.key: evidence.start[t.key] + np.arange(t.size) for t in evidence.terms}
-    always = [columns_of[t.key] for kind in ALWAYS for t in evidence.terms if t.kind == kind]
+    always = [columns_of[t.key] for kind in _ALWAYS for t in evidence.terms if t.kind == kind]
     unit = spectrum.unit
     seen = spectrum.weighed(variance)
     bias_cross = (seen.kept @ evidence.bias_cross) * unit
     root = limiting(seen.gram, seen.bias, prior)
     rows = spectrum.rows
-    place, gram_apart, cross_apart = scaled_apart(evidence, unit)
-    sd, low, high, is_value = believed(evidence.terms, trusts_of(evidence.terms), columns_of, unit, rows, prior)
+    place, gram_apart, cross_apart = _scaled_apart(evidence, unit)
+    sd, low, high, is_value = believed(evidence.terms, _trusts_of(evidence.terms), columns_of, unit, rows, prior)
     effects = {t.key: t.key if t.run else t.effect for t in evidence.terms if t.kind == "effect"}
-    trusts = trusts_of(evidence.terms)
+    trusts = _trusts_of(evidence.terms)
     freed = {
         key: float(np.clip(prior.value_reach * trust, *prior.freed_sd) / unit[evidence.start[key]])
         for key, trust in trusts.items()
-        if trust > HELD_SD and unit[evidence.start[key]] > 0
+        if trust > _HELD_SD and unit[evidence.start[key]] > 0
     }
     return Problem(
         terms=terms,
@@ -158,7 +215,7 @@ def limiting(gram: np.ndarray, bias: np.ndarray, prior: Prior) -> np.ndarray:
     return np.sqrt(np.minimum(1.0, prior.attenuation * energy / np.maximum(np.diag(bias), TINY)))
 
 
-def scaled_apart(evidence: Evidence, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _scaled_apart(evidence: Evidence, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Place of the columns that some channels alone estimate, and those channels' products, scaled."""
     columns = evidence.apart_columns
     place = np.full(len(unit), -1)
@@ -180,15 +237,15 @@ def log_priors(effects: Mapping[str, str], terms: Mapping[str, EvidenceTerm], pr
     }
 
 
-def trusts_of(terms: Iterable[EvidenceTerm]) -> dict[str, float]:
+def _trusts_of(terms: Iterable[EvidenceTerm]) -> dict[str, float]:
     """Relative one-sigma of every believed value, those that stay held and their doubt the others'."""
     out = {t.key: float(t.prior_sd[0]) for t in terms if t.kind == "value"}
-    for held, others in RATIOS.items():
+    for held, others in _RATIOS.items():
         if held in out and any(other in out for other in others):
             for other in others:
                 if other in out:
                     out[other] = float(np.hypot(out[other], out[held]))
-            out[held] = HELD_SD
+            out[held] = _HELD_SD
     return out
 
 

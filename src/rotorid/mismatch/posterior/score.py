@@ -17,12 +17,12 @@ from rotorid.mismatch.posterior.problem import Problem
 
 Model = tuple[str, ...]
 """Keys of the effects at work, sorted."""
-RIDGE = 1e-9
+_RIDGE = 1e-9
 """Ridge, in units of the diagonal, where the correction for noisy regressors is left out."""
 
 
 @dataclass(frozen=True)
-class Mode:
+class _Mode:
     """Most probable coefficients of some columns, scaled, and what they are worth."""
 
     log_evidence: float
@@ -41,7 +41,7 @@ class Scored:
     """Nats, less a constant; −∞ for a model that has no mode."""
     columns: np.ndarray
     """(k,) of the model."""
-    mode: Mode | None
+    mode: _Mode | None
 
 
 @dataclass
@@ -93,33 +93,33 @@ def mode_of(
     columns: np.ndarray,
     believed: tuple[np.ndarray, np.ndarray, np.ndarray],
     exact: bool = True,
-) -> Mode | None:
+) -> _Mode | None:
     """The mode of some columns within their bounds; None where the normal equations have none.
 
     `believed` are one-sigma and bounds of every column (`Problem.believed`). `exact` limits the noise of the regressors
     in every direction of these columns, else column by column: faster, to rank moves by.
     """
     if not len(columns):
-        return Mode(0.0, np.zeros(0), np.zeros((0, 0)))
+        return _Mode(0.0, np.zeros(0), np.zeros((0, 0)))
     grid = np.ix_(columns, columns)
     gram, (sd, low, high) = problem.gram[grid], (own[columns] for own in believed)
     bias = limited_bias(gram, problem.bias[grid]) if exact else problem.limited_bias[grid]
     right = problem.cross[columns] - problem.limited_bias_cross[columns]
-    found = factorised([gram - bias, gram + RIDGE * np.diag(np.diag(gram))], sd)
+    found = _factorised([gram - bias, gram + _RIDGE * np.diag(np.diag(gram))], sd)
     if found is None:
         return None
     normal, triangle = found
     covariance = np.linalg.inv(normal * np.outer(sd, sd)) * np.outer(sd, sd)
     beta = within_bounds(
-        *with_apart(problem, columns, normal, right, sd), low, high, sd, slack_of(problem, columns, covariance)
+        *_with_apart(problem, columns, normal, right, sd), low, high, sd, _slack_of(problem, columns, covariance)
     )
     if beta is None:
         return None
     value = right @ beta - 0.5 * beta @ normal @ beta - np.log(np.diag(triangle)).sum()
-    return Mode(float(value), beta, covariance)
+    return _Mode(float(value), beta, covariance)
 
 
-def factorised(grams: list[np.ndarray], sd: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+def _factorised(grams: list[np.ndarray], sd: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     """Normal matrix of the first Gram matrix that makes a positive one, and its triangle in units of the prior.
 
     The correction for noisy regressors may overshoot; the second is without it.
@@ -133,7 +133,7 @@ def factorised(grams: list[np.ndarray], sd: np.ndarray) -> tuple[np.ndarray, np.
     return None
 
 
-def with_apart(
+def _with_apart(
     problem: Problem, columns: np.ndarray, normal: np.ndarray, right: np.ndarray, sd: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """The normal equations in which the columns that some channels alone estimate have those channels' rows."""
@@ -148,7 +148,7 @@ def with_apart(
     return normal, right
 
 
-def slack_of(problem: Problem, columns: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+def _slack_of(problem: Problem, columns: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     """How far each coefficient may lie beyond its bounds (k,); a believed value not at all."""
     errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     return np.where(problem.is_value[columns], 0.0, problem.prior.slack * errors)
@@ -180,7 +180,7 @@ def within_bounds(
     return beta
 
 
-def too_small(problem: Problem, model: Model, columns: np.ndarray, mode: Mode) -> float:
+def too_small(problem: Problem, model: Model, columns: np.ndarray, mode: _Mode) -> float:
     """Nats that forms cost which are negligible, or do not show what makes them that form."""
     prior, cost = problem.prior, 0.0
     for key in (k for k in model if k in problem.effects):

@@ -13,8 +13,7 @@ import numpy as np
 
 from rotorid.mismatch.posterior.evidence import Evidence
 from rotorid.mismatch.posterior.leftover import Spectrum, spectrum_of
-from rotorid.mismatch.posterior.prior import Prior
-from rotorid.mismatch.posterior.problem import Problem, problem_of
+from rotorid.mismatch.posterior.problem import Prior, Problem, problem_of
 from rotorid.mismatch.posterior.score import (
     Model,
     Posterior,
@@ -22,14 +21,14 @@ from rotorid.mismatch.posterior.score import (
     mode_of,
 )
 
-MOST_SCORED = 8
+_MOST_SCORED = 8
 """Moves of a kind that are scored exactly."""
-MOST_MOVES = 60
-LEFTOVER_ROUNDS = 5
+_MOST_MOVES = 60
+_LEFTOVER_ROUNDS = 5
 """Rounds of model and leftover at most, should the two go on in a circle."""
-LEAST_GAIN = 0.05
+_LEAST_GAIN = 0.05
 """Nats by which a move must be better, so that the search ends."""
-WORST_RANKED = -5.0
+_WORST_RANKED = -5.0
 """Nats below the present model, as ranked, from which a move is not scored: the ranking is off by less."""
 
 
@@ -72,7 +71,7 @@ def settled(
 ) -> Found:
     """The most probable model and its leftover, from a leftover of `variance` (C,) and each of the models `known`."""
     starts: dict[Model, None] = dict.fromkeys([(), *known])
-    for _ in range(LEFTOVER_ROUNDS):
+    for _ in range(_LEFTOVER_ROUNDS):
         found = most_probable(problem_of(evidence, spectrum, variance, prior), starts)
         before, variance = variance, found.posterior.leftover_of(found.model, spectrum)
         starts = dict.fromkeys([found.model, *starts])
@@ -84,17 +83,17 @@ def settled(
 def most_probable(problem: Problem, starts: Iterable[Model]) -> Found:
     """The best of the models that searches from several starts end in."""
     posterior = Posterior(problem)
-    ends = [climbed(posterior, start) for start in starts]
+    ends = [_climbed(posterior, start) for start in starts]
     best = max(ends, key=posterior)
     return Found(posterior, best, posterior(best))
 
 
-def climbed(posterior: Posterior, start: Model) -> Model:
+def _climbed(posterior: Posterior, start: Model) -> Model:
     """The model in which a search ends that starts from another; from nothing where that one has no mode."""
     model = tuple(sorted(start)) if np.isfinite(posterior(start)) else ()
-    for _ in range(MOST_MOVES):
-        better = best_of(posterior, model, single_moves(posterior.problem, model))
-        better = better or best_of(posterior, model, exchanges(posterior.problem, model))
+    for _ in range(_MOST_MOVES):
+        better = best_of(posterior, model, _single_moves(posterior.problem, model))
+        better = better or best_of(posterior, model, _exchanges(posterior.problem, model))
         if better is None:
             break
         model = better
@@ -112,15 +111,15 @@ def best_of(posterior: Posterior, model: Model, moves: Sequence[Model]) -> Model
     here = ranked(posterior.problem, model)
     gains = [ranked(posterior.problem, move) - here for move in moves]
     best, found = posterior(model), None
-    for k in sorted(range(len(moves)), key=lambda k: (gains[k], k), reverse=True)[:MOST_SCORED]:
-        if gains[k] < WORST_RANKED:
+    for k in sorted(range(len(moves)), key=lambda k: (gains[k], k), reverse=True)[:_MOST_SCORED]:
+        if gains[k] < _WORST_RANKED:
             break
-        if (value := posterior(moves[k])) > best + LEAST_GAIN:
+        if (value := posterior(moves[k])) > best + _LEAST_GAIN:
             best, found = value, moves[k]
     return found
 
 
-def single_moves(problem: Problem, model: Model) -> list[Model]:
+def _single_moves(problem: Problem, model: Model) -> list[Model]:
     """Models with one id more or less, or with another form of one."""
     choices = problem.choices
     of_id = {choices[key]: key for key in model}
@@ -131,7 +130,7 @@ def single_moves(problem: Problem, model: Model) -> list[Model]:
     return out + [without(model, key) for key in model]
 
 
-def exchanges(problem: Problem, model: Model) -> list[Model]:
+def _exchanges(problem: Problem, model: Model) -> list[Model]:
     """Models with one id in another's place, or with two less."""
     choices = problem.choices
     taken = {choices[key] for key in model}

@@ -1,32 +1,42 @@
-"""What the posterior says of each id at work: how sure, in place of which others, with which parameters."""
+"""What the posterior says of each id at work: how sure, in place of which others, with which parameters.
+
+The posterior at a model that was chosen from a regression by other means.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 
 import numpy as np
 
+from rotorid.mismatch.plant.regression import Regression
 from rotorid.mismatch.plant.unknowns import UNKNOWNS
-from rotorid.mismatch.posterior.problem import Problem
-from rotorid.mismatch.posterior.score import Model, Scored, places, scored
-from rotorid.mismatch.posterior.search import Found, ranked, without
+from rotorid.mismatch.posterior.evidence import evidence_from
+from rotorid.mismatch.posterior.leftover import spectrum_of
+from rotorid.mismatch.posterior.problem import Prior, Problem, problem_of
+from rotorid.mismatch.posterior.score import Model, Posterior, Scored, places, scored
+from rotorid.mismatch.posterior.search import Found, joint, ranked, without
 from rotorid.mismatch.posterior.status import CLAIMED, Estimate, Status
 
+FORM_SD = 0.02
+"""Share of what effects contribute that their forms are wrong by."""
+_ROUNDS = 3
+"""Rounds in which the leftover is learnt from what the model leaves."""
 Z95 = 1.959963984540054
-CONSIDERED = 10.0
+_CONSIDERED = 10.0
 """Nats below the best model up to which others count: together they hold less than a percent."""
-MOST_SUBSTITUTES = 6
+_MOST_SUBSTITUTES = 6
 """Ids that are tried exactly in another's place, the most promising first."""
-WORST_SUBSTITUTE = -8.0
+_WORST_SUBSTITUTE = -8.0
 """Nats, as ranked, from which one is not tried."""
 SURE, LIKELY, POSSIBLE = 0.99, 0.5, 0.05
 """Probabilities from which an id (a class) is established (ambiguous), suggested, or looked at and not established."""
-STATED_REACH = 10.0
+_STATED_REACH = 10.0
 """Times as wide a prior as models are compared by, for the numbers of a change: they shrink by a percent at most where
 they did by a half."""
-MOST_MEMBERS = 4
+_MOST_MEMBERS = 4
 """Ids of a class at most: more say no more than that something is off."""
 
 
@@ -71,7 +81,7 @@ def statements_of(found: Found, of_change: bool = False, form_sd: float = 0.0) -
     numbers = widened(found.problem) if of_change else found.problem
     named = [key for key in found.model if found.problem.terms[key].effect not in {"", *UNKNOWNS}]
     # Everything is visited before shares are taken over what was visited.
-    seen = [(key, substitutes(found, key), odds_of(found, key)) for key in named]
+    seen = [(key, _substitutes(found, key), _odds_of(found, key)) for key in named]
     weights = weights_of(found)
     if of_change:
         more = visited_instead(found, weights)
@@ -88,7 +98,7 @@ def widened(problem: Problem) -> Problem:
     """A problem with priors of all effects that are wide enough to state their numbers with."""
     sd = problem.prior_sd.copy()
     for key in problem.effects:
-        sd[problem.columns_of[key]] *= STATED_REACH
+        sd[problem.columns_of[key]] *= _STATED_REACH
     return replace(problem, prior_sd=sd)
 
 
@@ -103,7 +113,7 @@ def statement(
 ) -> Statement:
     """What is said of one effect of the most probable model, given the ids that could stand in its place."""
     effect = found.problem.terms[key].effect
-    members = smallest_class(found, weights, effect, others)
+    members = _smallest_class(found, weights, effect, others)
     alone, joint = (share_of(found, weights, own) for own in ({effect}, members))
     if not matters(found, at, key):
         status: Status = "not_established"  # sure or not, it is too small to matter
@@ -130,10 +140,10 @@ def visited_instead(found: Found, weights: Mapping[Model, float]) -> set[str]:
     return visited - own - {"", *UNKNOWNS}
 
 
-def smallest_class(found: Found, weights: Mapping[Model, float], effect: str, others: Sequence[str]) -> set[str]:
+def _smallest_class(found: Found, weights: Mapping[Model, float], effect: str, others: Sequence[str]) -> set[str]:
     """The fewest ids, an effect and some of `others`, of which one is surely at work; as sure as it gets."""
     members, left = {effect}, set(others) - {effect}
-    while left and share_of(found, weights, members) < SURE and len(members) < MOST_MEMBERS:
+    while left and share_of(found, weights, members) < SURE and len(members) < _MOST_MEMBERS:
         best = max(sorted(left), key=lambda other: share_of(found, weights, {*members, other}))
         members.add(best)
         left.remove(best)
@@ -142,7 +152,7 @@ def smallest_class(found: Found, weights: Mapping[Model, float], effect: str, ot
 
 def weights_of(found: Found) -> dict[Model, float]:
     """Probability of every visited model that is near the best."""
-    near = {m: v for m, v in found.posterior.visited.items() if v > found.log_posterior - CONSIDERED}
+    near = {m: v for m, v in found.posterior.visited.items() if v > found.log_posterior - _CONSIDERED}
     weight = {m: float(np.exp(v - found.log_posterior)) for m, v in near.items()}
     total = sum(weight.values())
     return {m: w / total for m, w in weight.items()}
@@ -157,12 +167,12 @@ def by_id(found: Found) -> dict[str, float]:
     return out
 
 
-def odds_of(found: Found, key: str) -> float:
+def _odds_of(found: Found, key: str) -> float:
     """Log odds of the best model against the same without a term, nats."""
     return found.log_posterior - found.posterior(without(found.model, key))
 
 
-def substitutes(found: Found, key: str) -> tuple[str, ...]:
+def _substitutes(found: Found, key: str) -> tuple[str, ...]:
     """Named ids with which in a term's place the model is nearly as probable."""
     problem, rest = found.problem, without(found.model, key)
     taken = {problem.choices[k] for k in found.model}
@@ -170,8 +180,8 @@ def substitutes(found: Found, key: str) -> tuple[str, ...]:
     here = ranked(problem, found.model)
     gains = {trial: ranked(problem, trial) - here for trial in trials}
     out = []
-    for trial in sorted(trials, key=lambda t: -gains[t])[:MOST_SUBSTITUTES]:
-        if gains[trial] <= WORST_SUBSTITUTE:
+    for trial in sorted(trials, key=lambda t: -gains[t])[:_MOST_SUBSTITUTES]:
+        if gains[trial] <= _WORST_SUBSTITUTE:
             break
         if found.posterior(trial) - found.log_posterior > -problem.prior.open_nats:
             (other,) = set(trial) - set(rest)
@@ -224,3 +234,33 @@ def parameters(problem: Problem, at: Scored, key: str, form_sd: float = 0.0) -> 
         value, low, high = (float(term.stated(b)[k]) for b in moved)
         out.append(Estimate(parameter.symbol, value, parameter.unit, low, high))
     return tuple(out)
+
+
+def posterior_at(regression: Regression, active: Iterable[str]) -> Found:
+    """The posterior at the model of the effects `active`, with the leftover that it leaves.
+
+    The leftover is learnt from none and from all being leftover, as in a search (`search.decide`): where both ends are
+    about as probable the larger is believed. What the effects' forms are wrong by, in nats half its whitened squares,
+    says nothing for the larger. The regression keeps its products by channel.
+    """
+    evidence, chosen, prior = evidence_from(regression), tuple(sorted(active)), Prior()
+    spectrum = spectrum_of(evidence)
+
+    def settled(variance: np.ndarray) -> Found:
+        for _ in range(_ROUNDS):
+            posterior = Posterior(problem_of(evidence, spectrum, variance, prior))
+            variance = posterior.leftover_of(chosen, spectrum)
+        return Found(posterior, chosen, posterior(chosen))
+
+    all_of_it = spectrum.variance_of_leftover(np.zeros(len(spectrum.unit)))
+    small, large = settled(np.zeros(len(all_of_it))), settled(all_of_it)
+    gain = joint(spectrum, small) - joint(spectrum, large) + 0.5 * FORM_SD**2 * _contributed(small)
+    return small if gain > prior.leftover_nats else large
+
+
+def _contributed(found: Found) -> float:
+    """Whitened squares of what the effects of a model contribute."""
+    at = scored(found.problem, found.model)
+    if at.mode is None:
+        return 0.0
+    return float(sum(squares_of(found, at, k).sum() for k in found.model if k in found.problem.effects))

@@ -17,11 +17,11 @@ from itertools import combinations
 
 import numpy as np
 
-from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.problem import Prior
 
 GAINS = ("mass", "inertia_xx", "inertia_yy", "inertia_zz")
 """To each gain the value that stands in its denominator."""
-OF_GAINS: Mapping[str, tuple[float, float, float, float]] = {
+_OF_GAINS: Mapping[str, tuple[float, float, float, float]] = {
     "mass": (-1, 0, 0, 0),
     "thrust": (1, 1, 1, 0),
     "torque": (0, 0, 0, 1),
@@ -55,17 +55,17 @@ class Option:
     """Of the values called wrong."""
 
 
-Options = Mapping[frozenset[str], Option]
+_Options = Mapping[frozenset[str], Option]
 
 
-def options_of(gains: Mapping[str, Gain], trust: Mapping[str, float], prior: Prior) -> Options:
+def options_of(gains: Mapping[str, Gain], trust: Mapping[str, float], prior: Prior) -> _Options:
     """Every subset of values that may be wrong.
 
     `gains` are those known, by the key of GAINS; `trust` is the relative one-sigma that each value was stated with.
     """
-    keys = [k for k in OF_GAINS if k in trust]
+    keys = [k for k in _OF_GAINS if k in trust]
     known = [i for i, k in enumerate(GAINS) if k in gains]
-    turn = np.array([OF_GAINS[k] for k in keys], float).reshape(len(keys), len(GAINS))[:, known].T
+    turn = np.array([_OF_GAINS[k] for k in keys], float).reshape(len(keys), len(GAINS))[:, known].T
     log = np.array([gains[GAINS[i]].log for i in known])
     variance = np.diag([gains[GAINS[i]].variance for i in known])
     sd = np.clip([prior.value_reach * trust[k] for k in keys], *prior.freed_sd)
@@ -89,7 +89,7 @@ def options_of(gains: Mapping[str, Gain], trust: Mapping[str, float], prior: Pri
     return out
 
 
-def called_wrong(options: Options, least_nats: float, refused: Sequence[str] = ()) -> frozenset[str]:
+def called_wrong(options: _Options, least_nats: float, refused: Sequence[str] = ()) -> frozenset[str]:
     """The most probable subset less each value without which it is hardly less probable (`least_nats`)."""
     possible = [w for w in options if not w.intersection(refused)]
     wrong = max(possible, key=lambda w: options[w].log_posterior)
@@ -107,12 +107,12 @@ def same_ratio(wrong: frozenset[str], known: Mapping[str, float]) -> list[frozen
     out = [wrong]
     for key in sorted(wrong):
         for other in known:
-            if other not in wrong and OF_GAINS[other] == tuple(-x for x in OF_GAINS[key]):
+            if other not in wrong and _OF_GAINS[other] == tuple(-x for x in _OF_GAINS[key]):
                 out.append(wrong - {key} | {other})
     return out
 
 
-def in_place(options: Options, wrong: frozenset[str], least_nats: float) -> dict[str, list[Values]]:
+def in_place(options: _Options, wrong: frozenset[str], least_nats: float) -> dict[str, list[Values]]:
     """To each value called wrong what explains as much in its place: the changes of others, one or two of them.
 
     Two only where no other does so alone (an arm is both inertias as well): they may be less probable by as much again,

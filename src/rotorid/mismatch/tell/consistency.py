@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 EXPLAINED_SHARE = 0.15
 """Up to this share of the mismatch's energy may be left for the word `explained`; from all but this share on the
 findings are said to explain nothing that matters."""
-PLAINLY_OFF = 1.5
+_PLAINLY_OFF = 1.5
 """Error of a force or moment in units of its noise floor, from which it is a mismatch, wherever it is."""
 
 
@@ -31,7 +31,7 @@ def quoted(channel: Channel) -> Errors:
     return channel.rmse.training if channel.rmse.held_out.named is None else channel.rmse.held_out
 
 
-def energies(channels: Mapping[str, Channel], located: Sequence[str]) -> tuple[float, float, float]:
+def _energies(channels: Mapping[str, Channel], located: Sequence[str]) -> tuple[float, float, float]:
     """Energies before, with what is named, and of the noise floor over located channels, each in units of its floor."""
     before = named = noise = 0.0
     for name in located:
@@ -44,7 +44,7 @@ def energies(channels: Mapping[str, Channel], located: Sequence[str]) -> tuple[f
 
 def share_left(channels: Mapping[str, Channel], located: Sequence[str]) -> float:
     """Share of the mismatch that is left, from the errors printed."""
-    before, named, noise = energies(channels, located)
+    before, named, noise = _energies(channels, located)
     return min(1.0, max(0.0, named - noise) / max(before - noise, noise)) if noise else 0.0
 
 
@@ -86,7 +86,7 @@ def missing_places(
         both = (channel.rmse.held_out, channel.rmse.training)
         errors = [x for e in both if (x := e.before if stated else e.named) is not None]
         wrench = name.split("_")[0] in ("force", "moment")
-        if wrench and name not in there and max(errors, default=0.0) > PLAINLY_OFF * (channel.noise_floor or np.inf):
+        if wrench and name not in there and max(errors, default=0.0) > _PLAINLY_OFF * (channel.noise_floor or np.inf):
             out.setdefault(name, analysis.p_values.get(name, (1.0, 1.0))[0])
     return [(c, p) for c, p in out.items() if c not in {location.channel for location in locations}]
 

@@ -16,10 +16,15 @@ import numpy as np
 from rotorid.errors import InputError
 from rotorid.mismatch.decision.findings import Analysis
 from rotorid.mismatch.decision.shares import fitted_part, segments_of
-from rotorid.mismatch.delivery.files import conditions_of, instruments_of
-from rotorid.mismatch.delivery.flown import UNITS, WindowErrors, between, driven_by, errors_of, predict
-from rotorid.mismatch.delivery.model import Model, model_of
-from rotorid.mismatch.delivery.parts import claimed, improved_vehicle, place_of, with_effects
+from rotorid.mismatch.delivery.files import (
+    claimed,
+    conditions_of,
+    improved_vehicle,
+    instruments_of,
+    place_of,
+    with_effects,
+)
+from rotorid.mismatch.delivery.flown import UNITS, Model, WindowErrors, between, driven_by, errors_of, model_of, predict
 from rotorid.mismatch.model.prepare import sensor_noise
 from rotorid.mismatch.plant.motion import Segment, SensorNoise
 from rotorid.mismatch.tell.verdict import Channel, Errors, PValues, SplitErrors, reached
@@ -50,7 +55,7 @@ def forward_channels(analysis: Analysis) -> Forward:
     models = {
         "before": Model(analysis.believed),
         "refitted": Model(analysis.refitted),
-        "named": named_model(analysis),
+        "named": _named_model(analysis),
         "after": delivered_model(analysis),
     }
     errors: dict[str, list[WindowErrors]] = {}
@@ -84,7 +89,7 @@ def delivered_model(analysis: Analysis) -> Model:
     return model_of(improved_vehicle(analysis), conditions_of(analysis), instruments_of(analysis))
 
 
-def named_model(analysis: Analysis) -> Model:
+def _named_model(analysis: Analysis) -> Model:
     """The vehicle with all that is claimed, in the conditions of its runs, whatever is delivered."""
     named = with_effects(analysis.named, [f for f in claimed(analysis.findings) if place_of(f) == "vehicle"])
     return model_of(named, conditions_of(analysis), instruments_of(analysis))

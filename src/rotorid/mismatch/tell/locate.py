@@ -37,52 +37,52 @@ from rotorid.mismatch.posterior.status import CLAIMED
 from rotorid.mismatch.tell.verdict import Location, Regime
 from rotorid.recordings.signal.kernels import causal
 
-FAMILY_ERROR = 0.002
+_FAMILY_ERROR = 0.002
 """Chance of any false interval in a whole set."""
-SCAN_ERROR = 1e-4
+_SCAN_ERROR = 1e-4
 """The same for the scan of what is left; smaller, because the tails of real noise are heavier than assumed."""
-LOCAL_S = 0.1
+_LOCAL_S = 0.1
 """Length over which the local size of an explained mismatch is taken."""
-MATTERS = 0.3
+_MATTERS = 0.3
 """Local size relative to the channel's noise from which an explained mismatch matters at all."""
-ON_SHARE_OF_PEAK = 0.2
-ON_SHARE_OF_NOISE = 0.15
-LOST_AT_ENDS_S = 1.0
-SMALLEST_SHARE = 0.03
+_ON_SHARE_OF_PEAK = 0.2
+_ON_SHARE_OF_NOISE = 0.15
+_LOST_AT_ENDS_S = 1.0
+_SMALLEST_SHARE = 0.03
 """Share of a run's mismatch energy below which an interval is not worth a line."""
 SHORTEST_GAP_S = 0.25
-LONGEST_GAP_S = 2.0
-THROUGHOUT = 0.7
+_LONGEST_GAP_S = 2.0
+_THROUGHOUT = 0.7
 """Covering more than this share of the flight counts as being there throughout."""
-CONFINED = 0.4
+_CONFINED = 0.4
 """Being at work for less than this share of the flight counts as acting in part of it."""
-AT_WORK = 0.03
+_AT_WORK = 0.03
 """Local size relative to its peak above which a contribution is at work: drag is small when slow, ground effect nil."""
-SCAN_S = (0.5, 1.0, 2.0, 4.0)
-LARGER = 4.0
+_SCAN_S = (0.5, 1.0, 2.0, 4.0)
+_LARGER = 4.0
 """Energy of a window over the usual, below which noise of higher variance is not called a mismatch."""
-MOVES_S = 0.2
+_MOVES_S = 0.2
 """Lags over which larger residuals may follow each other."""
-FIRST_LAGS = 4
+_FIRST_LAGS = 4
 MOVES_Z = 4.0
 """Standard errors (Fisher's transform) by which larger residuals must follow each other otherwise than usual."""
-WILD = 4.0
+_WILD = 4.0
 """Whitened residual beyond which a single sample counts no more."""
-SHIFTED = 0.4
+_SHIFTED = 0.4
 """Mean of a window relative to the residual's usual size, below which a shift does not matter."""
-HELD_BACK = 3.0
+_HELD_BACK = 3.0
 """Energy of a block over the noise expected there, beyond which it does not count as noise in full."""
 REGIME_BLOCK_S = 0.5
-REGIME_BINS = 8
-REGIME_P = 1e-3
-CONTRAST = 2.0
+_REGIME_BINS = 8
+_REGIME_P = 1e-3
+_CONTRAST = 2.0
 """Energy of the strongest bin over the weakest, below which a variable does not separate anything."""
-EXCESS_SHARE = 0.25
+_EXCESS_SHARE = 0.25
 """Bins with at least this share of the largest excess belong to the regime."""
 
 
 @dataclass(frozen=True)
-class Interval:
+class _Interval:
     """A stretch of one trace: samples start to stop (exclusive)."""
 
     trace: Trace
@@ -98,7 +98,7 @@ def locate(analysis: Analysis) -> list[Location]:
     """Locations of the mismatch, in the order of channels, runs and time; empty where there is none."""
     segments = segments_of(analysis)
     stated = _stated(analysis)
-    found: list[Interval] = []
+    found: list[_Interval] = []
     if with_status(analysis, *CLAIMED, "absorbed") or analysis.wrong_values:
         partial, throughout = _explained(analysis, segments)
         spoken_for = {loc.channel for loc in stated}
@@ -112,13 +112,13 @@ def locate(analysis: Analysis) -> list[Location]:
     return sorted(located, key=lambda loc: (order.get((loc.channel, loc.run), -1), loc.run, loc.start_s))
 
 
-def _worded(analysis: Analysis, intervals: Sequence[Interval]) -> list[Location]:
+def _worded(analysis: Analysis, intervals: Sequence[_Interval]) -> list[Location]:
     regimes: dict[tuple[str, bool], Regime | None] = {}
     out = []
     for i in intervals:
         key = (i.trace.channel, i.explained)
         if key not in regimes and not i.of_the_run:
-            regimes[key] = regime_of(analysis, *key)
+            regimes[key] = _regime_of(analysis, *key)
         out.append(
             Location(
                 run=i.trace.run,
@@ -126,7 +126,7 @@ def _worded(analysis: Analysis, intervals: Sequence[Interval]) -> list[Location]
                 start_s=_edge(analysis, i, i.start, 0),
                 stop_s=_edge(analysis, i, i.stop - 1, -1),
                 p_value=i.p_value,
-                energy_share=_energy_share(mismatch_of(i.trace, i.explained), slice(i.start, i.stop)),
+                energy_share=_energy_share(_mismatch_of(i.trace, i.explained), slice(i.start, i.stop)),
                 regime=None if i.of_the_run else regimes[key],
             )
         )
@@ -138,20 +138,20 @@ def _energy_share(signal: np.ndarray, part: slice) -> float:
     return min(float(np.nansum(signal[part] ** 2)) / total, 1.0) if total > 0 else 0.0
 
 
-def _edge(analysis: Analysis, interval: Interval, sample: int, end: int) -> float:
+def _edge(analysis: Analysis, interval: _Interval, sample: int, end: int) -> float:
     """Time of an interval's edge; at a trace's end that of the run, of which filtering cost a moment."""
     time_s, run_s = interval.trace.time_s, analysis.recordings.run(interval.trace.run).time_s
-    if time_s[sample] == time_s[end] and abs(run_s[end] - time_s[end]) < LOST_AT_ENDS_S:
+    if time_s[sample] == time_s[end] and abs(run_s[end] - time_s[end]) < _LOST_AT_ENDS_S:
         return float(run_s[end])
     return float(time_s[sample])
 
 
-def mismatch_of(trace: Trace, explained: bool) -> np.ndarray:
+def _mismatch_of(trace: Trace, explained: bool) -> np.ndarray:
     """The mismatch with as little noise as can be had: what the findings take away, else the residual itself."""
     return trace.before - trace.named if explained else trace.named
 
 
-def channel_noise(traces: Sequence[Trace]) -> float:
+def _channel_noise(traces: Sequence[Trace]) -> float:
     """Usual size of the residual after the effects, robust against stretches in which it is larger."""
     parts = [_blocks(t.named, _period(t)) for t in traces]
     sizes = [np.sqrt(np.nanmean(blocks**2, axis=1)) for blocks in parts if len(blocks)]
@@ -190,9 +190,9 @@ def _stated(analysis: Analysis) -> list[Location]:
                 for trace in analysis.traces:
                     inside = slice(*np.searchsorted(trace.time_s, [start_s, stop_s]))
                     if (trace.run, trace.channel) == (run, channel) and inside.stop > inside.start:
-                        share = _energy_share(mismatch_of(trace, True), inside)
+                        share = _energy_share(_mismatch_of(trace, True), inside)
                 if channel not in regimes:
-                    regimes[channel] = regime_of(analysis, channel, True)
+                    regimes[channel] = _regime_of(analysis, channel, True)
                 out.append(
                     Location(
                         run=run,
@@ -207,7 +207,7 @@ def _stated(analysis: Analysis) -> list[Location]:
     return out
 
 
-def _explained(analysis: Analysis, segments: list[Segment]) -> tuple[list[Interval], list[Interval]]:
+def _explained(analysis: Analysis, segments: list[Segment]) -> tuple[list[_Interval], list[_Interval]]:
     """Intervals of what acts in part of the flight, and of what acts for most of it.
 
     Each finding's own contribution says where it acts; for what lies between command and rotor speed all that was
@@ -216,7 +216,7 @@ def _explained(analysis: Analysis, segments: list[Segment]) -> tuple[list[Interv
     channels = _long_enough(analysis)
     causes = [{c: x for c, x in found.items() if c in channels} for found in shares(analysis, segments).values()]
     spoken_for = {channel for found in causes for channel in found}
-    rest = {c: [mismatch_of(t, True) for t in ts] for c, ts in channels.items() if c not in spoken_for}
+    rest = {c: [_mismatch_of(t, True) for t in ts] for c, ts in channels.items() if c not in spoken_for}
     at_work = with_status(analysis, *CLAIMED)
     formless = {c for f in at_work if f.form is None and not f.windows for c in f.channels}
     causes.append({c: x for c, x in rest.items() if c in formless})
@@ -230,7 +230,7 @@ def _explained(analysis: Analysis, segments: list[Segment]) -> tuple[list[Interv
         masks = {c: m for c, series in cause.items() if (m := _acting(channels[c], series)) is not None}
         if not masks:
             continue
-        confined = _share_at_work({c: (channels[c], cause[c]) for c in masks}) < CONFINED
+        confined = _share_at_work({c: (channels[c], cause[c]) for c in masks}) < _CONFINED
         for channel, parts in masks.items():
             here = _tested(channels[channel], parts, len(analysis.traces))
             (partial if confined else throughout).extend(here)
@@ -242,7 +242,7 @@ def _share_at_work(contributions: Mapping[str, tuple[Sequence[Trace], Sequence[n
     by_run: dict[tuple[str, float], list[np.ndarray]] = {}
     for traces, series in contributions.values():
         levels = [_local_size(x, _period(t)) for x, t in zip(series, traces, strict=True)]
-        nil = AT_WORK * float(np.quantile(np.concatenate(levels), 0.99))
+        nil = _AT_WORK * float(np.quantile(np.concatenate(levels), 0.99))
         for trace, level in zip(traces, levels, strict=True):
             by_run.setdefault((trace.run, float(trace.time_s[0])), []).append(level > nil)
     return float(np.concatenate([np.any(m, axis=0) for m in by_run.values()]).mean())
@@ -250,35 +250,35 @@ def _share_at_work(contributions: Mapping[str, tuple[Sequence[Trace], Sequence[n
 
 def _acting(traces: Sequence[Trace], series: Sequence[np.ndarray]) -> list[np.ndarray] | None:
     """Masks of where a contribution to a channel matters relative to its noise; None where it never does."""
-    noise = channel_noise(traces)
+    noise = _channel_noise(traces)
     levels = [_local_size(x, _period(t)) for x, t in zip(series, traces, strict=True)]
     peak = float(np.quantile(np.concatenate(levels), 0.99))
-    if not peak > MATTERS * noise:
+    if not peak > _MATTERS * noise:
         return None
-    threshold = max(ON_SHARE_OF_PEAK * peak, ON_SHARE_OF_NOISE * noise)
+    threshold = max(_ON_SHARE_OF_PEAK * peak, _ON_SHARE_OF_NOISE * noise)
     masks = [_closed(level > threshold, _period(t)) for level, t in zip(levels, traces, strict=True)]
-    if np.concatenate(masks).mean() > THROUGHOUT:
+    if np.concatenate(masks).mean() > _THROUGHOUT:
         return [np.ones(len(m), bool) for m in masks]
     return masks
 
 
-def _tested(traces: Sequence[Trace], masks: Sequence[np.ndarray], count: int) -> list[Interval]:
+def _tested(traces: Sequence[Trace], masks: Sequence[np.ndarray], count: int) -> list[_Interval]:
     """Intervals of the masks in which the residual before is larger than coloured noise allows."""
-    noise, freedom = channel_noise(traces), _freedom_per_sample(traces)
+    noise, freedom = _channel_noise(traces), _freedom_per_sample(traces)
     found = []
     for trace, mask in zip(traces, masks, strict=True):
-        energy = np.concatenate([[0.0], np.cumsum(np.nan_to_num(mismatch_of(trace, True)) ** 2)])
-        spans = [(a, b) for a, b in stretches(mask) if energy[b] - energy[a] >= SMALLEST_SHARE * energy[-1]]
+        energy = np.concatenate([[0.0], np.cumsum(np.nan_to_num(_mismatch_of(trace, True)) ** 2)])
+        spans = [(a, b) for a, b in stretches(mask) if energy[b] - energy[a] >= _SMALLEST_SHARE * energy[-1]]
         for start, stop in spans:
             p = _energy_p(trace.before[start:stop], noise, freedom)
-            if p < FAMILY_ERROR / max(len(spans) * count, 1):
-                found.append(Interval(trace, start, stop, p, True))
+            if p < _FAMILY_ERROR / max(len(spans) * count, 1):
+                found.append(_Interval(trace, start, stop, p, True))
     return found
 
 
 def _local_size(values: np.ndarray, period_s: float) -> np.ndarray:
     """Local root mean square, (n,)."""
-    return np.sqrt(_moving_mean(np.nan_to_num(values) ** 2, LOCAL_S / period_s))
+    return np.sqrt(_moving_mean(np.nan_to_num(values) ** 2, _LOCAL_S / period_s))
 
 
 def _moving_mean(values: np.ndarray, width: float) -> np.ndarray:
@@ -295,7 +295,7 @@ def _closed(mask: np.ndarray, period_s: float) -> np.ndarray:
     spans = stretches(mask)
     out = mask.copy()
     for (a, b), (c, d) in zip(spans, spans[1:], strict=False):
-        allowed = min(max(SHORTEST_GAP_S, min(b - a, d - c) * period_s), LONGEST_GAP_S)
+        allowed = min(max(SHORTEST_GAP_S, min(b - a, d - c) * period_s), _LONGEST_GAP_S)
         if (c - b) * period_s < allowed:
             out[b:c] = True
     return out
@@ -320,20 +320,20 @@ def _energy_p(values: np.ndarray, noise: float, freedom: float) -> float:
     return float(chi2.sf(degrees * np.mean(values**2) / max(noise, 1e-300) ** 2, degrees)) if len(values) else 1.0
 
 
-def _unexplained(analysis: Analysis, segments: list[Segment]) -> list[Interval]:
+def _unexplained(analysis: Analysis, segments: list[Segment]) -> list[_Interval]:
     """Stretches in which the residual after the effects is larger or shifted."""
     channels = _long_enough(analysis)
     windows = sum(
         2 * len(_window_starts(len(t.named), length)) for ts in channels.values() for t in ts for length in _lengths(t)
     )
-    limit = SCAN_ERROR / max(windows, 1)
+    limit = _SCAN_ERROR / max(windows, 1)
     found, hard = [], effort(segments)
     for traces in channels.values():
         parts = [np.nan_to_num(t.named) for t in traces]
         taps = autoregression(parts)
         white = [causal(taps, p) for p in parts]
         # One or two wild samples are a glitch; a mismatch lasts.
-        white = [np.clip(w, -WILD, WILD) for w in _evened(traces, white, hard)]
+        white = [np.clip(w, -_WILD, _WILD) for w in _evened(traces, white, hard)]
         for w in white:
             w[: len(taps)] = 0.0
         found += _louder(traces, white, limit) + _shifted(traces, white, parts, limit)
@@ -354,7 +354,7 @@ def _sensor_differences(analysis: Analysis) -> dict[tuple[str, str, float], np.n
     }
 
 
-def _of_one_sensor(interval: Interval, differences: Mapping[tuple[str, str, float], np.ndarray]) -> bool:
+def _of_one_sensor(interval: _Interval, differences: Mapping[tuple[str, str, float], np.ndarray]) -> bool:
     """Whether most of the residual there is a difference between the accelerometer and the velocity."""
     trace, part = interval.trace, slice(interval.start, interval.stop)
     difference = differences.get((trace.run, trace.channel, float(trace.time_s[0])))
@@ -364,15 +364,15 @@ def _of_one_sensor(interval: Interval, differences: Mapping[tuple[str, str, floa
     return left < 0.5 * whole
 
 
-def _apart(traces, parts) -> list[Interval]:
+def _apart(traces, parts) -> list[_Interval]:
     """Whole runs whose mean is off, where runs differ."""
-    noise = channel_noise(traces)
+    noise = _channel_noise(traces)
     between = apart([t.run for t in traces], parts, 1.0 / _period(traces[0]), noise)
     means = between.means if between else {}
     return [
-        Interval(t, 0, len(t.named), between.p_value, False, of_the_run=True)
+        _Interval(t, 0, len(t.named), between.p_value, False, of_the_run=True)
         for t in traces
-        if abs(means.get(t.run, 0.0)) > SHIFTED * noise
+        if abs(means.get(t.run, 0.0)) > _SHIFTED * noise
     ]
 
 
@@ -396,14 +396,14 @@ def _evened(traces: Sequence[Trace], white: list[np.ndarray], hard) -> list[np.n
     usual = np.full(len(y), max(float(np.median(y)), 1e-300))
     for _ in range(3):
         weight = 1.0 / usual
-        coefficients, _ = nnls(x / scale * weight[:, None], np.minimum(y, HELD_BACK * usual) * weight)
+        coefficients, _ = nnls(x / scale * weight[:, None], np.minimum(y, _HELD_BACK * usual) * weight)
         usual = np.maximum(x / scale @ coefficients, 1e-3 * float(np.median(y)) + 1e-300)
     floor = 1e-3 * float(np.median(y)) + 1e-300
     return [w / np.sqrt(np.maximum(e / scale @ coefficients, floor)) for w, e in zip(white, efforts, strict=True)]
 
 
 def _lengths(trace: Trace) -> list[int]:
-    return [n for s in SCAN_S if 4 < (n := int(round(s / _period(trace)))) <= len(trace.named) // 2]
+    return [n for s in _SCAN_S if 4 < (n := int(round(s / _period(trace)))) <= len(trace.named) // 2]
 
 
 def _window_starts(size: int, length: int) -> np.ndarray:
@@ -437,7 +437,7 @@ def _nearby(trace: Trace, start: int, stop: int) -> slice:
     return slice(max(start - reach, 0), min(stop + reach, len(trace.named)))
 
 
-def _louder(traces, white, limit) -> list[Interval]:
+def _louder(traces, white, limit) -> list[_Interval]:
     """Windows with more energy than the spread of the windows' energies allows."""
     hits = []
     for length in _lengths(min(traces, key=lambda t: len(t.named))):
@@ -448,7 +448,7 @@ def _louder(traces, white, limit) -> list[Interval]:
         degrees = max(min(2 * (usual / spread) ** 2, float(length)), 1.0)
         for k, mean in enumerate(means):
             p = chi2.sf(degrees * mean / usual, degrees)
-            hits.append((k, length, p, (p < limit) & (mean > LARGER * usual)))
+            hits.append((k, length, p, (p < limit) & (mean > _LARGER * usual)))
     out = []
     for k, start, stop, p in _flagged(white, hits):
         trace, w = traces[k], white[k]
@@ -456,8 +456,8 @@ def _louder(traces, white, limit) -> list[Interval]:
         variance = max(float(np.mean(w[start:stop] ** 2)), 1.2)
         likelihood = -0.5 * np.log(variance) + 0.5 * w[here] ** 2 * (1.0 - 1.0 / variance)
         first, last = (here.start + edge for edge in _best_segment(likelihood))
-        if _moves(w[first:last], w, int(MOVES_S / _period(trace))):
-            out.append(Interval(trace, first, last, p, False))
+        if _moves(w[first:last], w, int(_MOVES_S / _period(trace))):
+            out.append(_Interval(trace, first, last, p, False))
     return out
 
 
@@ -472,7 +472,7 @@ def _moves(part: np.ndarray, whole: np.ndarray, most: int) -> bool:
     lags = np.arange(1, min(most, count - 5) + 1)
     usual, here = (np.array([_correlation(x, lag) for lag in lags]).clip(-0.999, 0.999) for x in (whole, part))
     sure = (np.arctanh(here) - np.arctanh(usual)) * np.sqrt(count - lags - 3)
-    return len(lags) > 0 and max(np.abs(sure[:FIRST_LAGS]).max(), abs(sure.sum()) / np.sqrt(len(lags))) > MOVES_Z
+    return len(lags) > 0 and max(np.abs(sure[:_FIRST_LAGS]).max(), abs(sure.sum()) / np.sqrt(len(lags))) > MOVES_Z
 
 
 def _correlation(values: np.ndarray, lag: int) -> float:
@@ -480,9 +480,9 @@ def _correlation(values: np.ndarray, lag: int) -> float:
     return float(values[lag:] @ values[:-lag] / max(values @ values, 1e-300))
 
 
-def _shifted(traces, white, parts, limit) -> list[Interval]:
+def _shifted(traces, white, parts, limit) -> list[_Interval]:
     """Windows whose mean is further from zero than the windows' own spread allows, and far enough to matter."""
-    noise, least, hits = channel_noise(traces), 1.0, []
+    noise, least, hits = _channel_noise(traces), 1.0, []
     for length in _lengths(min(traces, key=lambda t: len(t.named))):
         sums = [_window_sums(w, length) / np.sqrt(length) for w in white]
         local = [_window_sums(p, length) / length for p in parts]
@@ -492,13 +492,13 @@ def _shifted(traces, white, parts, limit) -> list[Interval]:
             # Where noise has a higher variance for a while its means are, too.
             spread = (_window_sums(white[k] ** 2, length) - total**2) / (length - 1)
             p = f.sf(total**2 / (least * np.maximum(spread, 1.0)), 1, max(count - 1, 1))
-            hits.append((k, length, p, (p < limit) & (np.abs(local[k]) > SHIFTED * noise)))
+            hits.append((k, length, p, (p < limit) & (np.abs(local[k]) > _SHIFTED * noise)))
     out = []
     for k, start, stop, p in _flagged(white, hits):
         here = _nearby(traces[k], start, stop)
         level = float(np.mean(parts[k][start:stop]))
         first, last = (here.start + edge for edge in _best_segment(level * parts[k][here] - 0.5 * level**2))
-        out.append(Interval(traces[k], first, last, p, False))
+        out.append(_Interval(traces[k], first, last, p, False))
     return out
 
 
@@ -511,20 +511,20 @@ def _best_segment(gain: np.ndarray) -> tuple[int, int]:
     return start, max(stop, start + 1)
 
 
-def _disjoint(intervals: Sequence[Interval], order: Mapping[tuple[str, str], int]) -> list[Interval]:
+def _disjoint(intervals: Sequence[_Interval], order: Mapping[tuple[str, str], int]) -> list[_Interval]:
     """Intervals sorted by trace and start, overlaps on one trace merged."""
-    out: list[Interval] = []
+    out: list[_Interval] = []
     for i in sorted(intervals, key=lambda i: (order[i.trace.channel, i.trace.run], i.start)):
         last = out[-1] if out else None
         if last is not None and last.trace is i.trace and i.start <= last.stop:
             stop, p = max(last.stop, i.stop), min(last.p_value, i.p_value)
-            out[-1] = Interval(last.trace, last.start, stop, p, last.explained or i.explained)
+            out[-1] = _Interval(last.trace, last.start, stop, p, last.explained or i.explained)
         else:
             out.append(i)
     return out
 
 
-def regime_of(analysis: Analysis, channel: str, explained: bool) -> Regime | None:
+def _regime_of(analysis: Analysis, channel: str, explained: bool) -> Regime | None:
     """The variable and its range that separate the mismatch's energy best; None if none does.
 
     Analysis of variance of the log energy of half-second blocks over bins of equal counts, each variable in
@@ -534,13 +534,13 @@ def regime_of(analysis: Analysis, channel: str, explained: bool) -> Regime | Non
     traces = [t for t in analysis.traces if t.channel == channel]
     if not traces:
         return None
-    noise = max(channel_noise(traces), 1e-300)
+    noise = max(_channel_noise(traces), 1e-300)
 
     def by_block(values: Iterable[np.ndarray]) -> np.ndarray:
         means = [_blocks(x, _period(t)).mean(axis=1) for t, x in zip(traces, values, strict=True)]
         return np.concatenate(means)
 
-    energy = by_block(np.nan_to_num(mismatch_of(t, explained)) ** 2 for t in traces) / noise**2
+    energy = by_block(np.nan_to_num(_mismatch_of(t, explained)) ** 2 for t in traces) / noise**2
     flown = [analysis.regimes.get(t.run, {}) for t in traces]
     names, scored = set.intersection(*map(set, flown)), []
     for name in sorted(names):
@@ -548,7 +548,7 @@ def regime_of(analysis: Analysis, channel: str, explained: bool) -> Regime | Non
         found = _separation(energy, value)
         if found is not None:
             share, p, low, high = found
-            if p < REGIME_P / len(names):
+            if p < _REGIME_P / len(names):
                 scored.append((share * (0.5 if name == "time_s" else 1.0), name, low, high))
     if not scored:
         return None
@@ -562,7 +562,7 @@ def _separation(energy: np.ndarray, value: np.ndarray) -> tuple[float, float, fl
     energy, value = energy[good], value[good]
     # A load turned into other axes is 1e-17 where it should be nothing: two bins of nothing, and no words for either.
     value = np.where(np.abs(value) < 1e-9 * np.abs(value).max(initial=0.0), 0.0, value)
-    edges = np.unique(np.quantile(value, np.linspace(0, 1, REGIME_BINS + 1))) if len(value) else np.zeros(0)
+    edges = np.unique(np.quantile(value, np.linspace(0, 1, _REGIME_BINS + 1))) if len(value) else np.zeros(0)
     if len(edges) < 3 or len(value) < 3 * len(edges):
         return None
     which = np.clip(np.searchsorted(edges, value, side="right") - 1, 0, len(edges) - 2)
@@ -577,9 +577,9 @@ def _separation(energy: np.ndarray, value: np.ndarray) -> tuple[float, float, fl
     p = f.sf(between / between_free / max(within / within_free, 1e-300), between_free, within_free)
     means = np.array([energy[which == b].mean() for b in bins])
     floor = means.min()
-    if means.max() < CONTRAST * floor:
+    if means.max() < _CONTRAST * floor:
         return None
-    inside = means - floor >= EXCESS_SHARE * (means.max() - floor)
+    inside = means - floor >= _EXCESS_SHARE * (means.max() - floor)
     first = last = int(np.argmax(means))
     while first > 0 and inside[first - 1]:
         first -= 1

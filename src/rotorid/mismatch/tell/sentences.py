@@ -33,21 +33,21 @@ if TYPE_CHECKING:
     from rotorid.mismatch.tell.verdict import Channel, Location
 
 MOST_WORDS = 40
-NEARLY_ALL = 0.99
+_NEARLY_ALL = 0.99
 """Share that stays unexplained from which the causes named explain next to nothing."""
-MOST_LIMITS = 3
+_MOST_LIMITS = 3
 """Effects that were not found and are named with their limit; more are counted."""
-MOST_NAMES = 2
+_MOST_NAMES = 2
 """Effects or values that the sentence names; more are counted."""
-WORTH_SAYING_P = 0.05
-WORTH_A_WORD = 0.03
+_WORTH_SAYING_P = 0.05
+_WORTH_A_WORD = 0.03
 """Share of the weight, or of the moment that the rotors can make, that a channel must stay off to be named: what a
 pilot trims without noticing is less."""
-NO_BETTER = 0.02
+_NO_BETTER = 0.02
 """Relative change of an error run forward below which it is neither better nor worse."""
 
 
-SizeWords = Literal["both", "share", "metres", ""]
+_SizeWords = Literal["both", "share", "metres", ""]
 """Which sizes stand in a text: share of the weight and metres after half a second."""
 
 
@@ -123,8 +123,8 @@ def headline(contents: Contents) -> str:
 
 def unexplained_words(share: float) -> str:
     """What stays unexplained given the causes that were named, 0 to 1."""
-    if share >= NEARLY_ALL:
-        return f"that explains less than {100 * (1 - NEARLY_ALL):.0f} % of it"
+    if share >= _NEARLY_ALL:
+        return f"that explains less than {100 * (1 - _NEARLY_ALL):.0f} % of it"
     return f"{100 * share:.0f} % stays unexplained"
 
 
@@ -134,7 +134,7 @@ def main_size(analysis: Analysis, main: str, channels: Mapping[str, Channel]) ->
     return None if before is None else channel_size(analysis, main, before, "before")
 
 
-def _still_off(contents: Contents, main: str, how: SizeWords) -> str:
+def _still_off(contents: Contents, main: str, how: _SizeWords) -> str:
     """The channel that stays off most with what was found, as a clause, with its size as far as asked.
 
     Empty where none is worth a word, or where it is the main one, of which the sentence says so anyway.
@@ -146,11 +146,11 @@ def _still_off(contents: Contents, main: str, how: SizeWords) -> str:
         if channel in known and named is not None:
             left[channel] = math.sqrt(max(named**2 - (own.noise_floor or 0.0) ** 2, 0.0))
     most = max(left, key=lambda c: left[c] / known[c].value, default=None)
-    if most in (None, main) or left[most] < WORTH_A_WORD * known[most].value:
+    if most in (None, main) or left[most] < _WORTH_A_WORD * known[most].value:
         return ""
     size = channel_size(contents.analysis, most, left[most], "named")
     off = f"{number(left[most])} {contents.channels[most].unit}"
-    return f"; the {channel_words(most)} stays {off} off ({size_words(size, how)})"
+    return f"; the {channel_words(most)} stays {off} off ({_size_words(size, how)})"
 
 
 def details(contents: Contents) -> list[str]:
@@ -181,7 +181,7 @@ def _not_found(limits: Sequence[UpperLimit]) -> str:
     sized = [(effect_words(x.id), percent_words(x.share)) for x in limits if x.share > 0]
     if not sized:
         return ""
-    first, rest = sized[:MOST_LIMITS], sized[MOST_LIMITS:]
+    first, rest = sized[:_MOST_LIMITS], sized[_MOST_LIMITS:]
     named = [f"{name} (at most {share} of the weight)" for name, share in first]
     if rest:
         named.append(f"{len(rest)} others (at most {rest[0][1]})" if len(rest) > 1 else f"{rest[0][0]} ({rest[0][1]})")
@@ -198,10 +198,10 @@ def _causes(contents: Contents) -> str:
         names.append(listed([effect_words(i) for i in either], "or"))
     clauses = []
     if names:
-        more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-        shown = f"{', '.join(names[:MOST_NAMES])}{more}" if more else listed(names)
+        more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
+        shown = f"{', '.join(names[:_MOST_NAMES])}{more}" if more else listed(names)
         clauses.append(f"{shown} {'was' if len(names) == 1 else 'were'} left out")
-    wrong, most = list(analysis.wrong_values.items()), max(1, MOST_NAMES - len(names))
+    wrong, most = list(analysis.wrong_values.items()), max(1, _MOST_NAMES - len(names))
     for name, (believed, refitted, _, _) in wrong[:most]:
         words, unit = parameter_words(name)
         clauses.append(f"the {words} is {f'{number(refitted, 3)} {unit}'.rstrip()}, not {number(believed, 3)}")
@@ -216,16 +216,16 @@ def _corrected_mistakes(stated: Sequence[Finding]) -> str:
     return first_words("; ".join(texts), MOST_WORDS - 15) + ("." if len(texts) == 1 else f" ({len(texts)} faults).")
 
 
-def off_words(main: str, channels: Mapping[str, Channel], size: Size | None, how: SizeWords) -> str:
+def _off_words(main: str, channels: Mapping[str, Channel], size: Size | None, how: _SizeWords) -> str:
     """How much a channel is off, in words; with its size, as far as asked."""
     if not main:
         return "the model and the recordings differ"
-    said = size_words(size, how) if size is not None else ""
+    said = _size_words(size, how) if size is not None else ""
     off = f"{number(quoted(channels[main]).before)} {channels[main].unit} off"
     return f"the {channel_words(main)} is {off}{f', {said}' if said else ''}"
 
 
-def size_words(size: Size, how: SizeWords = "both") -> str:
+def _size_words(size: Size, how: _SizeWords = "both") -> str:
     """`6 % of the weight or 0.060 m after 0.5 s simulated`, or one of the two, or neither."""
     metres = metres_words(size) if how in ("both", "metres") else ""
     share = share_words(size) if how in ("both", "share") or (how == "metres" and not metres) else ""
@@ -254,7 +254,7 @@ def warnings_of(channels: Mapping[str, Channel]) -> list[str]:
         if errors.after is None or not known or errors.after <= (channel.noise_floor or 0.0):
             continue
         word, best = min(known, key=lambda pair: pair[1])
-        if errors.after > (1 + NO_BETTER) * best:
+        if errors.after > (1 + _NO_BETTER) * best:
             out.append(
                 f"On the held-out runs the error of the {channel_words(name)} is larger with the improved vehicle: "
                 f"{number(errors.after)} {channel.unit}; with the {word} values alone {number(best)} {channel.unit}."
@@ -270,7 +270,7 @@ def _run_forward(forward: Mapping[str, Channel]) -> list[str]:
         if not errors.before or errors.after is None:
             continue
         change = errors.after / errors.before - 1.0
-        word = "better" if change < -NO_BETTER else "worse" if change > NO_BETTER else "no better"
+        word = "better" if change < -_NO_BETTER else "worse" if change > _NO_BETTER else "no better"
         groups[word].append(
             f"{name.replace('_', ' ')} ({number(errors.before)} before, {number(errors.after)} {channel.unit} after)"
         )
@@ -317,12 +317,12 @@ def _places(main: str, contents: Contents) -> tuple[str, str, str, str, str, str
     """
     analysis, channels = contents.analysis, contents.channels
     size = main_size(analysis, main, channels)
-    both, metres, plain = (off_words(main, channels, size, how) for how in ("both", "metres", ""))
+    both, metres, plain = (_off_words(main, channels, size, how) for how in ("both", "metres", ""))
     here = [loc for loc in contents.locations if loc.channel == main]
     if not main or not here:
         return both, both, metres, both, metres, plain
     best = surest_location(here)
-    doubt = f" ({sure(best.p_value)})" if best.p_value is not None and best.p_value < WORTH_SAYING_P else ""
+    doubt = f" ({sure(best.p_value)})" if best.p_value is not None and best.p_value < _WORTH_SAYING_P else ""
     when = _when(best, here, analysis)
     return f"{when}{both}{doubt}", f"{when}{both}", f"{when}{metres}", both, metres, plain
 

@@ -16,17 +16,17 @@ from rotorid.mismatch.tell.verdict import Channel, Verdict
 from rotorid.recordings import Vehicle
 from rotorid.vehicle.derivatives import CHANNELS, QUANTITIES
 
-WORTH_SAYING = 0.02
+_WORTH_SAYING = 0.02
 """Share of the error below which a step takes nothing off that is worth a word."""
-AT_THE_NOISE = 1.1
+_AT_THE_NOISE = 1.1
 """Error over the noise floor up to which what is left is called noise."""
-MOST_NAMES = 2
-SWING = {**dict.fromkeys("uvw", 5.0), **dict.fromkeys("pqr", 2.0)}
+_MOST_NAMES = 2
+_SWING = {**dict.fromkeys("uvw", 5.0), **dict.fromkeys("pqr", 2.0)}
 """Of each quantity, m/s and rad/s, how far a catalogue form is moved to see what it makes of it."""
 
 
 @dataclass(frozen=True)
-class Steps:
+class _Steps:
     """Errors of one channel, or of several in the geometric mean, each over the believed vehicle's."""
 
     values: float
@@ -36,7 +36,7 @@ class Steps:
     noise: float
 
 
-def steps_of(channels: Mapping[str, Channel], model: str) -> dict[str, Steps]:
+def steps_of(channels: Mapping[str, Channel], model: str) -> dict[str, _Steps]:
     """Steps of every channel of force and moment, on the runs held out where there are any."""
     out = {}
     for name, channel in channels.items():
@@ -45,16 +45,16 @@ def steps_of(channels: Mapping[str, Channel], model: str) -> dict[str, Steps]:
             values = errors.before if model == "believed" else errors.refitted
             named = errors.named if model == "named" else values
             floor = channel.noise_floor or 0.0
-            out[name] = Steps(*(x / errors.before for x in (values, named, errors.after, floor)))
+            out[name] = _Steps(*(x / errors.before for x in (values, named, errors.after, floor)))
     return out
 
 
-def together(steps: Mapping[str, Steps]) -> Steps | None:
+def together(steps: Mapping[str, _Steps]) -> _Steps | None:
     """The geometric mean over channels; None of none."""
     if not steps:
         return None
     rows = np.array([[s.values, s.named, s.delivered, s.noise] for s in steps.values()])
-    return Steps(*np.exp(np.log(np.maximum(rows, 1e-9)).mean(axis=0)))
+    return _Steps(*np.exp(np.log(np.maximum(rows, 1e-9)).mean(axis=0)))
 
 
 def steps_sentence(verdict: Verdict) -> str:
@@ -79,17 +79,17 @@ def steps_sentence(verdict: Verdict) -> str:
     ]
     parts: list[str] = []
     for name, share, verb in taken:
-        if share >= WORTH_SAYING:
+        if share >= _WORTH_SAYING:
             what = f"{100 * share:.0f} %"
             parts.append(f"{name} another {what}" if parts else f"{name} {verb} {what} of the error off")
     nameless = whole.named - whole.delivered
-    if nameless >= WORTH_SAYING:
+    if nameless >= _WORTH_SAYING:
         parts.append(f"{100 * nameless:.0f} % {'more ' if parts else ''}is predictable and has no name yet")
     if not parts:
         parts.append("nothing that was found takes a part of the error off")
     left = (
         "the rest is noise"
-        if whole.delivered <= AT_THE_NOISE * whole.noise
+        if whole.delivered <= _AT_THE_NOISE * whole.noise
         else f"{100 * whole.delivered:.0f} % is left (noise alone: {100 * whole.noise:.0f} %)"
     )
     where = "On flights not used for fitting" if held else "On the flight that was fitted"
@@ -99,7 +99,7 @@ def steps_sentence(verdict: Verdict) -> str:
 def _named(words: Iterable[str]) -> str:
     """The first of some names and how many more there are."""
     names = list(words)
-    return listed(names if len(names) <= MOST_NAMES else [*names[: MOST_NAMES - 1], f"{len(names) - 1} more effects"])
+    return listed(names if len(names) <= _MOST_NAMES else [*names[: _MOST_NAMES - 1], f"{len(names) - 1} more effects"])
 
 
 @cache
@@ -123,12 +123,12 @@ def _moved_by() -> dict[str, frozenset[tuple[str, str]]]:
             ground_z_m=0.0,
         )
     )
-    quantities = [q for q in QUANTITIES if q in SWING]
+    quantities = [q for q in QUANTITIES if q in _SWING]
     n = 1 + 2 * len(quantities)
     velocity, rates = np.zeros((n, 3)), np.zeros((n, 3))
     for k, q in enumerate(quantities):
         for row, sign in ((1 + 2 * k, 1.0), (2 + 2 * k, -1.0)):
-            (velocity if q in "uvw" else rates)[row, k % 3] = sign * SWING[q]
+            (velocity if q in "uvw" else rates)[row, k % 3] = sign * _SWING[q]
     speed = np.full((n, 4), np.sqrt(9.81 / 4e-5))
     motion = Motion(
         time_s=0.01 * np.arange(n),

@@ -21,7 +21,7 @@ from rotorid.mismatch.tell.verdict import Channel, EffectVerdict, Errors, Locati
 
 
 @dataclass(frozen=True)
-class Tile:
+class _Tile:
     """A heading, what it says in large letters, and a line below."""
 
     heading: str
@@ -54,31 +54,31 @@ def _name(effect: EffectVerdict) -> str:
     return f"{effect_words(effect.id)} or one of {len(others)} others"
 
 
-def tiles(verdict: Verdict, main: str) -> list[Tile]:
+def tiles(verdict: Verdict, main: str) -> list[_Tile]:
     """What, where, and how large the error was before and after relative to the noise."""
     return [_what(verdict), _where(verdict, main), _how_much(verdict, main)]
 
 
-def _what(verdict: Verdict) -> Tile:
+def _what(verdict: Verdict) -> _Tile:
     named = claims(verdict)
     wrong = [parameter_words(n)[0].rstrip(",") for n in verdict.parameters]
     if not named and not wrong:
         if verdict.verdict == "no_mismatch":
-            return Tile("What", "Nothing left out", f"{len(verdict.not_testable)} effects could not be tested")
-        return Tile("What", "Not known", "none of the known effects explains it")
+            return _Tile("What", "Nothing left out", f"{len(verdict.not_testable)} effects could not be tested")
+        return _Tile("What", "Not known", "none of the known effects explains it")
     first, *rest = [*map(capital, named), *(f"{capital(w)} wrong" for w in wrong)]
-    return Tile("What", first, f"and {listed([r[0].lower() + r[1:] for r in rest])}" if rest else "")
+    return _Tile("What", first, f"and {listed([r[0].lower() + r[1:] for r in rest])}" if rest else "")
 
 
-def _where(verdict: Verdict, main: str) -> Tile:
+def _where(verdict: Verdict, main: str) -> _Tile:
     here = [loc for loc in verdict.locations if loc.channel == main] or list(verdict.locations)
     if not here:
-        return Tile("Where", "Nowhere", "no error above the sensors' noise")
+        return _Tile("Where", "Nowhere", "no error above the sensors' noise")
     channels = list(dict.fromkeys(loc.channel for loc in verdict.locations))
     best = surest_location(here)
     large = capital(channel_words(best.channel))
     others = f"; also in {len(channels) - 1} other channels" if len(channels) > 1 else ""
-    return Tile("Where", large, f"{_when(best, here)}{others}")
+    return _Tile("Where", large, f"{_when(best, here)}{others}")
 
 
 def _when(best: Location, here: Sequence[Location]) -> str:
@@ -92,9 +92,9 @@ def _when(best: Location, here: Sequence[Location]) -> str:
     return f"all through {best.run}" if len({loc.run for loc in here}) == 1 else "in every run"
 
 
-def _how_much(verdict: Verdict, main: str) -> Tile:
+def _how_much(verdict: Verdict, main: str) -> _Tile:
     if main not in verdict.channels:
-        return Tile("How much", "–")
+        return _Tile("How much", "–")
     channel = verdict.channels[main]
     errors, where = errors_of(channel)
     large = f"{number(errors.before)} → {number(errors.after)} {channel.unit}"
@@ -102,4 +102,4 @@ def _how_much(verdict: Verdict, main: str) -> Tile:
     metres = size.metres_after_half_a_second if size is not None and size.channel == main else None
     led = "" if metres is None else f"; as believed {number(metres)} m off after half a second of simulation"
     noise = f"noise {number(channel.noise_floor)} {channel.unit}, " if channel.noise_floor else ""
-    return Tile("Error before and after", large, f"{channel_words(main)}; {noise}{where}{led}")
+    return _Tile("Error before and after", large, f"{channel_words(main)}; {noise}{where}{led}")

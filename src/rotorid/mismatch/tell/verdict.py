@@ -2,6 +2,8 @@
 
 The JSON schema in `workflow/schemas/verdict.schema.json` is generated from this model
 (`python -m rotorid.mismatch.tell.verdict --write-schema`). A number that is not known is written as null.
+
+What stands in the way of believing a verdict: doubts of `check`, less those that the analysis corrected.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ import json
 import math
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -28,8 +31,7 @@ from rotorid.mismatch.decision.findings import (
     with_status,
 )
 from rotorid.mismatch.decision.shares import fitted_part
-from rotorid.mismatch.decision.sizes import Size
-from rotorid.mismatch.delivery.doubts import stopping
+from rotorid.mismatch.decision.sizes import Size, scales
 from rotorid.mismatch.tell.consistency import by_share, located_channels, missing_places, share_left, verdict_word
 from rotorid.mismatch.tell.sentences import (
     Contents,
@@ -41,12 +43,18 @@ from rotorid.mismatch.tell.sentences import (
     spoken,
     warnings_of,
 )
+from rotorid.recordings import RecordingSet
 from rotorid.recordings.basis import basis_of
+from rotorid.recordings.body import Doubt
+from rotorid.recordings.check import doubts_of
 
+_DESCRIBED = 0.1
+"""Share of the weight, or of the moment that the rotors can make, that may stay off in a channel where a mistake in the
+set counts as corrected: of wrong corrections seen a quarter to a half stayed, of right ones next to nothing."""
 __all__ = ["Verdict", "main_channel", "make_verdict", "one_per_class", "spoken", "with_status"]
 
 SCHEMA_PATH = Path(__file__).parents[4] / "workflow" / "schemas" / "verdict.schema.json"
-SMALLEST_P = 1e-300
+_SMALLEST_P = 1e-300
 """Stated of a place whose p-value is smaller."""
 
 
@@ -59,13 +67,13 @@ Number = Annotated[float | None, BeforeValidator(_rounded)]
 
 
 def _not_zero(p_value: float | None) -> float | None:
-    return None if p_value is None else min(max(float(p_value), SMALLEST_P), 1.0)
+    return None if p_value is None else min(max(float(p_value), _SMALLEST_P), 1.0)
 
 
-Probability = Annotated[Annotated[float, Field(ge=0, le=1)] | None, BeforeValidator(_rounded)]
-Share = Annotated[float, BeforeValidator(_rounded), Field(ge=0, le=1)]
-Magnitude = Annotated[Annotated[float, Field(ge=0)] | None, BeforeValidator(_rounded)]
-Interval = tuple[Number, Number]
+_Probability = Annotated[Annotated[float, Field(ge=0, le=1)] | None, BeforeValidator(_rounded)]
+_Share = Annotated[float, BeforeValidator(_rounded), Field(ge=0, le=1)]
+_Magnitude = Annotated[Annotated[float, Field(ge=0)] | None, BeforeValidator(_rounded)]
+_Interval = tuple[Number, Number]
 
 
 class Part(BaseModel):
@@ -85,10 +93,10 @@ class Errors(Part):
     """Root mean square errors of the believed vehicle, of values refitted, of values with the effects that are claimed
     (one member of each class), and of the vehicle that is delivered, derivatives included."""
 
-    before: Magnitude
-    refitted: Magnitude
-    named: Magnitude
-    after: Magnitude
+    before: _Magnitude
+    refitted: _Magnitude
+    named: _Magnitude
+    after: _Magnitude
 
 
 class SplitErrors(Part):
@@ -101,15 +109,15 @@ class SplitErrors(Part):
 class PValues(Part):
     """p-value that the residual does not depend on the inputs; null for simulation run forward."""
 
-    before: Probability
-    after: Probability
+    before: _Probability
+    after: _Probability
 
 
 class Channel(Part):
     """One channel's errors relative to its noise, in its unit."""
 
     unit: str
-    noise_floor: Magnitude
+    noise_floor: _Magnitude
     rmse: SplitErrors
     p_value: PValues
 
@@ -129,8 +137,8 @@ class Location(Part):
     channel: str
     start_s: Number
     stop_s: Number
-    p_value: Annotated[Probability, BeforeValidator(_not_zero)]
-    energy_share: Share = Field(description="Share of the channel's mismatch energy in this run that lies here.")
+    p_value: Annotated[_Probability, BeforeValidator(_not_zero)]
+    energy_share: _Share = Field(description="Share of the channel's mismatch energy in this run that lies here.")
     regime: Regime | None
 
 
@@ -140,25 +148,25 @@ class ParameterEstimate(Part):
     symbol: str
     value: Number
     unit: str
-    interval_95: Interval
+    interval_95: _Interval
 
 
 class Gain(Part):
     """Held-out rmse with the effect over that without it, block-bootstrap interval."""
 
-    rmse_ratio: Magnitude
-    interval_95: Interval
+    rmse_ratio: _Magnitude
+    interval_95: _Interval
 
 
 class SizeOfError(Part):
     """Root mean square of an error, or of what an effect does, in a channel's unit and in units that a pilot knows."""
 
     channel: str
-    rms: Magnitude
+    rms: _Magnitude
     unit: str
-    share: Magnitude
+    share: _Magnitude
     of: str
-    metres_after_half_a_second: Magnitude = Field(
+    metres_after_half_a_second: _Magnitude = Field(
         description="How far off it alone leads within half a second of simulation; null where it moves nothing."
     )
 
@@ -167,9 +175,9 @@ class BasisOfVerdict(Part):
     """What the verdict rests on, said before anything else."""
 
     sentence: str
-    recorded_s: Magnitude
-    in_the_air_s: Magnitude = Field(description="Null for a stand or bench, and where no rotors are recorded.")
-    ground_share: Magnitude = Field(description="Of the time recorded, on the ground with rotors that idle.")
+    recorded_s: _Magnitude
+    in_the_air_s: _Magnitude = Field(description="Null for a stand or bench, and where no rotors are recorded.")
+    ground_share: _Magnitude = Field(description="Of the time recorded, on the ground with rotors that idle.")
     not_recorded: tuple[str, ...]
 
 
@@ -183,15 +191,15 @@ class EffectVerdict(Part):
     alternatives: tuple[str, ...]
     sentence: str
     size: SizeOfError | None = Field(description="What it does where it does most, on the held-out runs.")
-    share: Share | None = Field(
+    share: _Share | None = Field(
         description="Part of the squared error between before and after on the held-out runs that goes without it, "
         "two sensors of one quantity compared among the channels."
     )
     equation: str
     channels: tuple[str, ...]
     parameters: tuple[ParameterEstimate, ...]
-    probability: Probability = Field(description="Posterior that the id is at work; null where none was computed.")
-    p_value: Probability
+    probability: _Probability = Field(description="Posterior that the id is at work; null where none was computed.")
+    p_value: _Probability
     held_out_gain: Gain | None
 
 
@@ -200,9 +208,9 @@ class Absent(Part):
 
     id: str
     symbol: str = Field(description="Of the parameter that does most; empty of a form whose size has none of its own.")
-    at_most: Magnitude = Field(description="Of the parameter's magnitude, with 95 % probability.")
+    at_most: _Magnitude = Field(description="Of the parameter's magnitude, with 95 % probability.")
     unit: str
-    share_of_weight: Magnitude = Field(
+    share_of_weight: _Magnitude = Field(
         description="Root mean square force over the weight, moment over the weight at the rotors' mean distance."
     )
 
@@ -220,7 +228,7 @@ class BelievedValue(Part):
 
     believed: Number
     estimate: Number
-    interval_95: Interval
+    interval_95: _Interval
     delivered: Number = Field(description="What stands in improved_vehicle.yaml.")
     wrong: bool = Field(description="Whether it is among `parameters`.")
 
@@ -241,7 +249,7 @@ class Score(Part):
         description="Mean over channels, and over what half a second of simulation is off by, of the logarithm of the "
         "error over the believed vehicle's; lower is better."
     )
-    standard_error: Magnitude = Field(description="Of the difference from the best candidate.")
+    standard_error: _Magnitude = Field(description="Of the difference from the best candidate.")
     unfit: str = Field(description="Why it does not hover or fly; empty where it does, or was not asked.")
 
 
@@ -260,7 +268,7 @@ class DerivativeOf(Part):
     quantity: str
     unit: str
     value: Number
-    interval_95: Interval
+    interval_95: _Interval
     low: Number
     high: Number
 
@@ -270,7 +278,7 @@ class WrongValue(Part):
 
     believed: Number
     refitted: Number
-    interval_95: Interval
+    interval_95: _Interval
 
 
 class NotTestable(Part):
@@ -283,7 +291,7 @@ class NotTestable(Part):
 class Unexplained(Part):
     """What the findings leave."""
 
-    share: Share
+    share: _Share
     channels: tuple[str, ...]
     depends_on: tuple[str, ...]
     description: str
@@ -297,7 +305,7 @@ class NextExperiment(Part):
 
     manoeuvre: str
     separates: tuple[str, ...]
-    predicted_separation_sigma: Magnitude
+    predicted_separation_sigma: _Magnitude
 
 
 class Verdict(Part):
@@ -341,19 +349,19 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
 
     Its word, the share left and the shares of the effects follow from the errors that it prints.
     """
-    inverse = inverse_channels(analysis)
-    locations = with_missing_places(analysis, locations, inverse)
+    inverse = _inverse_channels(analysis)
+    locations = _with_missing_places(analysis, locations, inverse)
     located = located_channels(locations, inverse)
     left = share_left(inverse, located)
     shares = analysis.shares
-    word = "not_judged" if stopping(analysis) else verdict_word(analysis, locations, left)
+    word = "not_judged" if _stopping(analysis) else verdict_word(analysis, locations, left)
     contents = Contents(analysis, word, locations, inverse, shares, left if word != "no_mismatch" else 0.0, forward)
     return Verdict(
         set=analysis.recordings.name,
         kind=analysis.recordings.vehicle.kind,
         runs=Runs(training=analysis.split.training, held_out=analysis.split.held_out),
         verdict=word,
-        basis=basis_of_verdict(analysis),
+        basis=_basis_of_verdict(analysis),
         doubts=tuple(DoubtOfSet.model_validate(d, from_attributes=True) for d in analysis.doubts),
         sentence=spoken(headline(contents), analysis),
         size=size_of(main_size(analysis, main_channel(analysis, locations, inverse), inverse)),
@@ -365,7 +373,7 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
             effect_verdict(f, shares.get(f.id), analysis.effect_sizes.get(f.id))
             for f in by_share(analysis.findings, shares)
         ),
-        delivered=delivered_of(analysis),
+        delivered=_delivered_of(analysis),
         derivatives=tuple(DerivativeOf(**d.model_dump()) for d in analysis.improved.derivatives),
         absent=tuple(
             Absent(id=a.id, symbol=a.symbol, at_most=a.at_most, unit=a.unit, share_of_weight=a.share or None)
@@ -375,7 +383,7 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
             name: WrongValue(believed=believed, refitted=refitted, interval_95=(low, high))
             for name, (believed, refitted, low, high) in analysis.values.items()
         },
-        believed_values={row.name: believed_value_of(row, analysis) for row in analysis.believed_values},
+        believed_values={row.name: _believed_value_of(row, analysis) for row in analysis.believed_values},
         correlations=tuple(Correlated(values=pair, correlation=r) for pair, r in analysis.value_correlations.items()),
         not_testable=tuple(NotTestable(id=i, reason=r) for i, r in sorted(analysis.not_testable.items())),
         unexplained=Unexplained(
@@ -392,7 +400,7 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
     )
 
 
-def basis_of_verdict(analysis: Analysis) -> BasisOfVerdict:
+def _basis_of_verdict(analysis: Analysis) -> BasisOfVerdict:
     """Time and columns of the recordings as analysed."""
     found = basis_of(analysis.recordings)
     return BasisOfVerdict(
@@ -418,7 +426,7 @@ def size_of(size: Size | None) -> SizeOfError | None:
     )
 
 
-def believed_value_of(row: ValueRow, analysis: Analysis) -> BelievedValue:
+def _believed_value_of(row: ValueRow, analysis: Analysis) -> BelievedValue:
     """One row of the table of all believed values."""
     return BelievedValue(
         believed=row.believed,
@@ -429,13 +437,13 @@ def believed_value_of(row: ValueRow, analysis: Analysis) -> BelievedValue:
     )
 
 
-def delivered_of(analysis: Analysis) -> Delivered:
+def _delivered_of(analysis: Analysis) -> Delivered:
     """Which candidate is taken home, and every candidate's number."""
     scores = tuple(Score(**dict(zip(Score.model_fields, s, strict=True))) for s in analysis.delivery.scores)
     return Delivered(model=analysis.delivery.model, derivatives=analysis.delivery.derivatives, scores=scores)
 
 
-def with_missing_places(
+def _with_missing_places(
     analysis: Analysis, locations: Sequence[Location], channels: Mapping[str, Channel]
 ) -> list[Location]:
     """Locations, and those that the rest of the verdict speaks of and nothing located."""
@@ -458,7 +466,7 @@ def with_missing_places(
     return out
 
 
-def inverse_channels(analysis: Analysis) -> dict[str, Channel]:
+def _inverse_channels(analysis: Analysis) -> dict[str, Channel]:
     """Errors of every channel that the traces hold, by inverse dynamics."""
     found, part = {}, fitted_part(analysis)
     for channel, traces in by_channel(analysis.traces).items():
@@ -521,3 +529,42 @@ if __name__ == "__main__":
         SCHEMA_PATH.write_text(schema_text())
     else:
         print(schema_text(), end="")
+
+
+def with_doubts(analysis: Analysis, recordings: RecordingSet) -> Analysis:
+    """The analysis with the doubts about the set as it was given, those that it corrected said to be so.
+
+    Corrected is a doubt that the recordings as analysed, with the improved vehicle, no longer raise, where the model
+    then describes them. Axes can be exchanged so that all sensors agree and the vehicle is another one.
+    """
+    found = doubts_of(recordings)
+    left = found
+    if any(d.stops for d in found) and _still_off(analysis) < _DESCRIBED:
+        left = doubts_of(replace(analysis.recordings, vehicle=corrected(analysis)))
+    standing = {d.what for d in left}
+    said = tuple(d if d.what in standing or not d.stops else _as_corrected(d) for d in found)
+    return replace(analysis, doubts=(*said, *recordings.proposed))
+
+
+def _still_off(analysis: Analysis) -> float:
+    """Largest error of a channel beyond its noise, over what a pilot knows: the weight, the moment at hand."""
+    known, off = scales(analysis), [0.0]
+    for channel, traces in by_channel(t for t in analysis.traces if t.channel in known).items():
+        square = rms(t.named for t in traces) ** 2
+        off.append(math.sqrt(max(square - analysis.noise_floor.get(channel, 0.0) ** 2, 0.0)) / known[channel].value)
+    return max(off)
+
+
+def corrected(analysis: Analysis):
+    """The vehicle as the analysis has it: mistakes undone and wrong values at their numbers, without effects."""
+    return analysis.improved.model_copy(update={"effects": (), "derivatives": ()})
+
+
+def _as_corrected(doubt: Doubt) -> Doubt:
+    """A doubt that no longer stands in the way."""
+    return replace(doubt, sentence=f"{doubt.sentence} The analysis found and corrected this.", stops=False)
+
+
+def _stopping(analysis: Analysis) -> tuple[Doubt, ...]:
+    """Doubts because of which the set is not judged."""
+    return tuple(d for d in analysis.doubts if d.stops)

@@ -32,9 +32,9 @@ from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import in_the_air
+from rotorid.recordings.importers.bag_records import needs
 from rotorid.recordings.importers.clean import one_sense, report_gaps
-from rotorid.recordings.importers.frames import continuous, quaternion_from_euler_frd
-from rotorid.recordings.importers.optional import needs
+from rotorid.recordings.importers.mapping import continuous, quaternion_from_euler_frd
 from rotorid.recordings.importers.parameters import Parameters, Values
 from rotorid.recordings.importers.report import Fault
 
@@ -42,14 +42,14 @@ KINDS = (
     "IMU", "ACC", "GYR", "XKQ", "NKQ", "ATT", "XKF1", "NKF1", "EKF1", "RCOU", "RCO2", "RCO3", "ESC", "BAT", "CURR",
     "BARO", "RFND", "EV", "PARM", "MSG", "VER",
 )  # fmt: skip
-MOTORS = {33 + i: i for i in range(8)} | {82 + i: 8 + i for i in range(4)} | {160 + i: 12 + i for i in range(20)}
+_MOTORS = {33 + i: i for i in range(8)} | {82 + i: 8 + i for i in range(4)} | {160 + i: 12 + i for i in range(20)}
 """`SERVOn_FUNCTION` to the number of the motor, from 0."""
 OUTPUTS = range(1, 33)
-MULTIROTORS = {1: 4, 2: 6, 3: 8, 4: 8, 5: 6, 12: 12, 14: 10}
+_MULTIROTORS = {1: 4, 2: 6, 3: 8, 4: 8, 5: 6, 12: 12, 14: 10}
 """`FRAME_CLASS` of multirotors of fixed rotors to their number of motors."""
-SCRIPTED = (0, 15, 17)
+_SCRIPTED = (0, 15, 17)
 """Frame classes whose motors are those that the output functions name: none chosen, a matrix of a script."""
-OTHER_CLASSES = {
+_OTHER_CLASSES = {
     6: "a helicopter, whose motor functions are the servos of its swash plate",
     7: "a tricopter, whose tail rotor a servo tilts",
     8: "a singlecopter, steered by vanes",
@@ -62,21 +62,21 @@ OTHER_CLASSES = {
 """`FRAME_CLASS` of what no vehicle.yaml can describe."""
 OTHER_BUILDS = {1: "a rover", 3: "a plane", 4: "an antenna tracker", 7: "a submarine", 12: "a blimp"}
 """Build of the firmware (`VER.BU`) for what is no copter; 2 is Copter, 13 its helicopters."""
-OTHER_FIRMWARE = {
+_OTHER_FIRMWARE = {
     r"(ArduPlane|APM:Plane)\b": "a plane",
     r"(ArduRover|APM:Rover|Rover)\b": "a rover",
     r"ArduSub\b": "a submarine",
     r"Blimp\b": "a blimp",
     r"AntennaTracker\b": "an antenna tracker",
-    r".*\bFrame: HELI": OTHER_CLASSES[6],
-    r".*\bFrame: TRI": OTHER_CLASSES[7],
-    r".*\bFrame: SINGLE": OTHER_CLASSES[8],
-    r".*\bFrame: COAX": OTHER_CLASSES[9],
+    r".*\bFrame: HELI": _OTHER_CLASSES[6],
+    r".*\bFrame: TRI": _OTHER_CLASSES[7],
+    r".*\bFrame: SINGLE": _OTHER_CLASSES[8],
+    r".*\bFrame: COAX": _OTHER_CLASSES[9],
 }
 """What a message of the start says where neither a parameter nor `VER` does (Copter 3.4 and before)."""
 TILTED_TYPES = {4: "V-tail", 5: "A-tail"}
 """`FRAME_TYPE` of quadrotors whose rear rotors lean outwards."""
-CHANGED = (
+_CHANGED = (
     (
         r"MOT_PWM_(MIN|MAX)|SERVO\d+_FUNCTION|RCMAP_THROTTLE|RC\d+_(MIN|MAX)",
         "throttle",
@@ -90,17 +90,17 @@ CHANGED = (
     (r"MOT_(THST_EXPO|SPIN_(MIN|MAX|ARM)|THST_HOVER|BAT_VOLT_(MIN|MAX))", "", "no column depends on it"),
 )
 """Parameters on which a value depends, or that `rotorid parameters` states: names, column, what a change means."""
-ORDER_OF_FRAME = {1: "ardupilot", 12: "betaflight"}
+_ORDER_OF_FRAME = {1: "ardupilot", 12: "betaflight"}
 """`FRAME_TYPE` of a quadrotor to the key of `known.ORDERS`: X, and X with Betaflight's order."""
-LANDED, FLYING = 18, 28
+_LANDED, _FLYING = 18, 28
 """Events LAND_COMPLETE and NOT_LANDED."""
 GOOD, DOWN = 4, 25
 """Status of a range finder that reads, and the orientation of one that looks down."""
-PULSE_US = (1000.0, 2000.0)
+_PULSE_US = (1000.0, 2000.0)
 RPM = 2 * np.pi / 60
 HEAD, END = b"\xa3\x95", "END"
 """First bytes of a message, and the key under which stands how many bytes of the last one came."""
-CLOCKS = {"TimeUS": 1e-6, "TimeMS": 1e-3}
+_CLOCKS = {"TimeUS": 1e-6, "TimeMS": 1e-3}
 """Fields of a message's clock, to the seconds that they count in."""
 
 Log = Mapping[str, pd.DataFrame]
@@ -118,7 +118,7 @@ def read_messages(path: Path) -> dict[str, pd.DataFrame]:
         log = reader.DFReader_binary(str(path), zero_time_base=True)
         while (message := log.recv_match(type=list(KINDS))) is not None:
             kind, row = message.get_type(), message.to_dict()
-            stamp = next((row[name] * unit for name, unit in CLOCKS.items() if name in row), None)
+            stamp = next((row[name] * unit for name, unit in _CLOCKS.items() if name in row), None)
             if stamp is not None or kind in ("EV", "PARM"):
                 latest_s = row[c.TIME] = latest_s if stamp is None else float(stamp)
             rows.setdefault(kind, []).append(row)
@@ -161,24 +161,24 @@ def parameters(log: Log) -> Parameters:
     return Parameters.of((t, n, float(v)) for t, n, v in rows if isinstance(v, int | float) and np.isfinite(v))
 
 
-def check_frame(log: Log, values: Values, where: object) -> None:
+def _check_frame(log: Log, values: Values, where: object) -> None:
     """InputError that names the vehicle where it is no multirotor of fixed rotors."""
     kind = int(values.get("FRAME_CLASS", 0))
     builds = log.get("VER", pd.DataFrame()).get("BU", [])
     said = [str(line) for line in log.get("MSG", pd.DataFrame()).get("Message", [])]
     build = next((int(b) for b in builds if b in OTHER_BUILDS), None)
-    other = next((name for text, name in OTHER_FIRMWARE.items() if any(re.match(text, line) for line in said)), None)
+    other = next((name for text, name in _OTHER_FIRMWARE.items() if any(re.match(text, line) for line in said)), None)
     if values.get("Q_ENABLE", 0) > 0:
         by, what = "Q_ENABLE 1", "a plane with rotors that lift it (a quadplane)"
     elif build is not None:
         by, what = f"VER.BU {build}", OTHER_BUILDS[build]
-    elif kind in OTHER_CLASSES:
-        by, what = f"FRAME_CLASS {kind}", OTHER_CLASSES[kind]
+    elif kind in _OTHER_CLASSES:
+        by, what = f"FRAME_CLASS {kind}", _OTHER_CLASSES[kind]
     elif other is not None:
         by, what = "its messages", other
     elif "FRAME_CLASS" not in values and any(name.startswith(("H_SW", "H_RSC")) for name in values):
-        by, what = "parameters H_*", OTHER_CLASSES[6]
-    elif kind not in MULTIROTORS and kind not in SCRIPTED:
+        by, what = "parameters H_*", _OTHER_CLASSES[6]
+    elif kind not in _MULTIROTORS and kind not in _SCRIPTED:
         by, what = f"FRAME_CLASS {kind}", "of a frame that is not known here"
     else:
         return
@@ -188,8 +188,8 @@ def check_frame(log: Log, values: Values, where: object) -> None:
 def order_of(values: Values) -> tuple[str, list[Fault]]:
     """Key of the rotors' order by frame class and type, empty where it is not known."""
     kind, form = int(values.get("FRAME_CLASS", 1)), int(values.get("FRAME_TYPE", values.get("FRAME", 1)))
-    if kind == 1 and form in ORDER_OF_FRAME:
-        return ORDER_OF_FRAME[form], []
+    if kind == 1 and form in _ORDER_OF_FRAME:
+        return _ORDER_OF_FRAME[form], []
     found = f"FRAME_CLASS {kind}, FRAME_TYPE {form}: the order of its rotors is not known here"
     faults = [Fault("order", "vehicle.yaml", found, "taken from the template: check it", 0)]
     if kind == 1 and form in TILTED_TYPES:
@@ -229,8 +229,8 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[Fault], np.ndar
     """Contract columns of a whole log, its faults, and where it flies (mask of rows)."""
     grid = _clock(log, where)
     stated, values = parameters(log), in_flight(log, where)
-    check_frame(log, values, where)
-    faults = stated.faults(CHANGED, grid[0])
+    _check_frame(log, values, where)
+    faults = stated.faults(_CHANGED, grid[0])
     if END in log:
         found = f"the file ends inside a message, after {int(log[END]['bytes'].iloc[0])} bytes of it"
         faults.append(Fault("cut_off", "", found, "what came before is kept; the log stopped before its end", 0))
@@ -296,10 +296,10 @@ def _outputs(log: Log) -> pd.DataFrame | None:
 
 def _channels(values: Values, outputs: pd.DataFrame) -> tuple[dict[int, int], list[Fault]]:
     """To each motor (from 0) its output (from 1) by frame class and output functions, and what of it is doubtful."""
-    count = MULTIROTORS.get(int(values.get("FRAME_CLASS", 0)), 0)
+    count = _MULTIROTORS.get(int(values.get("FRAME_CLASS", 0)), 0)
     by_motor: dict[int, int] = {}
     for number in OUTPUTS:
-        motor = MOTORS.get(int(values.get(f"SERVO{number}_FUNCTION", -1)))
+        motor = _MOTORS.get(int(values.get(f"SERVO{number}_FUNCTION", -1)))
         if motor is not None:
             by_motor.setdefault(motor, number)
     if not by_motor:
@@ -328,7 +328,7 @@ def _channels(values: Values, outputs: pd.DataFrame) -> tuple[dict[int, int], li
 def _throttles(outputs: pd.DataFrame, stated: Parameters, frame: float, faults: list[Fault]) -> list[tuple]:
     """Throttles with their times, each pulse by the parameters that held then."""
     times, throttles = outputs[c.TIME].to_numpy(float), {}
-    for start, stop, values in stated.spans(CHANGED[0][0]):
+    for start, stop, values in stated.spans(_CHANGED[0][0]):
         inside = (times >= start) & (times < stop)
         if not inside.any():
             continue
@@ -356,7 +356,7 @@ def _limits(values: Values, pulses: int) -> tuple[float, float, list[Fault]]:
         low, high = (values[name] for name in names)
         action = f"{' and '.join(names)} of the throttle channel hold, {low:g} and {high:g} µs"
     else:
-        low, high = PULSE_US
+        low, high = _PULSE_US
         action = f"taken as {low:g} and {high:g} µs"
     return low, high, [Fault("unit", "throttle", found, action, pulses)]
 
@@ -404,9 +404,9 @@ def _flying(log: Log, grid: np.ndarray) -> np.ndarray | None:
     """Rows in the air by the land detector's events; None where there are none."""
     events = log.get("EV")
     if events is not None and "Id" in events:
-        events = events[events["Id"].isin((LANDED, FLYING))]
-        if (events["Id"] == FLYING).any():
-            times, ups = events[c.TIME].to_numpy(float), (events["Id"] == FLYING).to_numpy()
+        events = events[events["Id"].isin((_LANDED, _FLYING))]
+        if (events["Id"] == _FLYING).any():
+            times, ups = events[c.TIME].to_numpy(float), (events["Id"] == _FLYING).to_numpy()
             index = np.searchsorted(times, grid, side="right") - 1
             return np.where(index >= 0, ups[np.maximum(index, 0)], False)
     return None

@@ -4,6 +4,8 @@ What is whole before a file ends is kept: a recorder whose battery goes off writ
 the file. Channels of MCAP that hold no ROS message are listed and passed over.
 
 Sources: the bag format 2.0; the MCAP specification; the tables of rosbag2's sqlite3 storage.
+
+Packages that only some logs need.
 """
 
 from __future__ import annotations
@@ -14,16 +16,18 @@ import struct
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
-from rotorid.recordings.importers.optional import needs
+from rotorid.errors import InputError
 
-MCAP, BAG = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n"
-FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK = 0x02, 0x03, 0x04, 0x05, 0x06
+MCAP, _BAG = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n"
+_FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 0x02, 0x03, 0x04, 0x05, 0x06
 """Codes of MCAP's records."""
-BAG_MESSAGE, BAG_HEADER, BAG_CHUNK, BAG_CONNECTION = 0x02, 0x03, 0x05, 0x07
+_BAG_MESSAGE, _BAG_HEADER, _BAG_CHUNK, _BAG_CONNECTION = 0x02, 0x03, 0x05, 0x07
 """Codes of the records of a bag."""
-ROS_ENCODINGS = {("ros1msg", "ros1"), ("ros2msg", "cdr"), ("ros2idl", "cdr"), ("omgidl", "cdr")}
+_ROS_ENCODINGS = {("ros1msg", "ros1"), ("ros2msg", "cdr"), ("ros2idl", "cdr"), ("omgidl", "cdr")}
 """Encodings of a schema and of its messages that are ROS's."""
 
 
@@ -40,7 +44,7 @@ class Channel:
 
     @property
     def of_ros(self) -> bool:
-        return (self.schema, self.encoding) in ROS_ENCODINGS
+        return (self.schema, self.encoding) in _ROS_ENCODINGS
 
 
 @dataclass
@@ -64,8 +68,8 @@ class Records:
             head = file.read(16)
         if head.startswith(MCAP):
             yield from self._of_mcap(self.path.read_bytes()[len(MCAP) :], False)
-        elif head.startswith(BAG):
-            yield from self._of_bag(self.path.read_bytes()[len(BAG) :], False)
+        elif head.startswith(_BAG):
+            yield from self._of_bag(self.path.read_bytes()[len(_BAG) :], False)
         else:
             yield from self._of_database()
 
@@ -75,22 +79,22 @@ class Records:
             code, size = data[at], struct.unpack_from("<Q", data, at + 1)[0]
             body = data[at + 9 : at + 9 + size]
             at += 9 + size
-            if code == FOOTER:
+            if code == _FOOTER:
                 return
-            if code == CHUNK:
+            if code == _CHUNK:
                 yield from self._of_mcap(self._unpacked_mcap(body), True)
             if len(body) < size:
                 self.cut = True
                 return
-            if code == SCHEMA:
+            if code == _SCHEMA:
                 name, place = _string(body, 2)
                 encoding, place = _string(body, place)
                 self.schemas[_u16(body, 0)] = name, encoding, _string(body, place)[0]
-            elif code == CHANNEL and (number := _u16(body, 0)) not in self.channels:
+            elif code == _CHANNEL and (number := _u16(body, 0)) not in self.channels:
                 name, schema, text = self.schemas.get(_u16(body, 2), ("", "", ""))
                 topic, place = _string(body, 4)
                 self.channels[number] = Channel(topic, _spelled(name), schema, text, _string(body, place)[0])
-            elif code == MESSAGE and (channel := self.channels.get(_u16(body, 0))) and channel.of_ros:
+            elif code == _MESSAGE and (channel := self.channels.get(_u16(body, 0))) and channel.of_ros:
                 yield channel, struct.unpack_from("<Q", body, 6)[0], body[22:]
         self.cut |= not in_chunk or at < len(data)
 
@@ -108,20 +112,20 @@ class Records:
             size = struct.unpack_from("<I", data, at)[0] if at + 4 <= len(data) else len(data)
             body, at = data[at + 4 : at + 4 + size], at + 4 + size
             code = fields.get("op", b"\0")[0]
-            if code == BAG_CHUNK:
+            if code == _BAG_CHUNK:
                 yield from self._of_bag(self._unpacked(body, fields["compression"].decode()), True)
             if len(body) < size:
                 self.cut = True
                 return
-            if code == BAG_HEADER:
+            if code == _BAG_HEADER:
                 indexed = struct.unpack("<Q", fields["index_pos"])[0] > 0
-            elif code == BAG_CONNECTION:
+            elif code == _BAG_CONNECTION:
                 own, _ = _fields(struct.pack("<I", len(body)) + body, 0)
                 kind, text = own["type"].decode(), own["message_definition"].decode(errors="replace")
                 self.channels[_u32(fields["conn"])] = Channel(
                     fields["topic"].decode(), _spelled(kind), "ros1msg", text, "ros1"
                 )
-            elif code == BAG_MESSAGE and (channel := self.channels.get(_u32(fields["conn"]))):
+            elif code == _BAG_MESSAGE and (channel := self.channels.get(_u32(fields["conn"]))):
                 seconds, rest = struct.unpack("<II", fields["time"])
                 yield channel, seconds * 10**9 + rest, body
         self.cut |= not indexed
@@ -215,3 +219,15 @@ def _spelled(msgtype: str) -> str:
     """A type's name as ROS 2 spells it: `sensor_msgs/Imu` is `sensor_msgs/msg/Imu`."""
     package, _, name = msgtype.rpartition("/")
     return f"{package}/msg/{name}" if package and "/" not in package else msgtype
+
+
+def needs(module: str, extra: str, path: object) -> ModuleType:
+    """The module, or an InputError that says how it is installed."""
+    try:
+        return import_module(module)
+    except ModuleNotFoundError as error:
+        if error.name and error.name.split(".")[0] != module.split(".")[0]:
+            raise
+        raise InputError(
+            f"{path}: reading it needs {module.split('.')[0]}, which is not installed: pip install 'rotorid[{extra}]'"
+        ) from None

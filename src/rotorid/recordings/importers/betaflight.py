@@ -27,27 +27,27 @@ from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import blackbox, in_the_air
 from rotorid.recordings.importers.clean import report_gaps
-from rotorid.recordings.importers.frames import half_turn_about_x, quaternion_to_frd_ned
+from rotorid.recordings.importers.mapping import half_turn_about_x, quaternion_to_frd_ned
 from rotorid.recordings.importers.report import Fault
 
-GRAVITY_M_S2 = 9.80665
-DEFAULT_POLES = 14
-QUATERNION_SCALE = 32767.0
+_GRAVITY_M_S2 = 9.80665
+_DEFAULT_POLES = 14
+_QUATERNION_SCALE = 32767.0
 """`imuQuaternion` holds x, y and z of the unit quaternion times this; w is what is missing to length 1."""
-OTHER_NAMES = {"gyroADC": ("gyroData",), "accSmooth": ("accADC",), "eRPM": ("eRPM(/100)",)}
+_OTHER_NAMES = {"gyroADC": ("gyroData",), "accSmooth": ("accADC",), "eRPM": ("eRPM(/100)",)}
 """To a field its names in other releases."""
-FEATURE_3D = 1 << 12
-DSHOT = (48.0, 2047.0)
-DSHOT_FORWARD = 1048.0
+_FEATURE_3D = 1 << 12
+_DSHOT = (48.0, 2047.0)
+_DSHOT_FORWARD = 1048.0
 """With 3D, DShot's commands below this turn a motor backwards, from 48 on the faster the larger."""
-DEADBAND_3D = (1406.0, 1514.0)
+_DEADBAND_3D = (1406.0, 1514.0)
 """Betaflight's own dead band of 3D where motors have pulses in µs; the header does not hold what was set."""
-SLOWEST_PULSE_US = 900.0
+_SLOWEST_PULSE_US = 900.0
 """Commands of motors that turn below this are none of pulses in µs."""
-VOLTS = (((4, 0), 100), ((3, 1), 10))
-AMPERES = (((3, 1), 100),)
+_VOLTS = (((4, 0), 100), ((3, 1), 10))
+_AMPERES = (((3, 1), 100),)
 """Since which version so many counts of a field are 1 V or 1 A; before that it counts steps of the converter."""
-CONVERTER_STEP_MV = 3300 / 4095
+_CONVERTER_STEP_MV = 3300 / 4095
 
 
 def read_betaflight(path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
@@ -160,13 +160,13 @@ def convert(
     acceleration = fields("accSmooth", 3)
     one_g = _number(headers, "acc_1G", 0)
     if acceleration is not None and one_g > 0:
-        table[list(c.SPECIFIC_FORCE)] = half_turn_about_x(acceleration / one_g * GRAVITY_M_S2)
+        table[list(c.SPECIFIC_FORCE)] = half_turn_about_x(acceleration / one_g * _GRAVITY_M_S2)
     else:
         found = "accSmooth is not logged" if acceleration is None else "the header does not state acc_1G"
         faults.append(Fault("missing", ", ".join(c.SPECIFIC_FORCE), found, "no specific force", 0))
     attitude = fields("imuQuaternion", 3)
     if attitude is not None:
-        xyz = attitude / QUATERNION_SCALE
+        xyz = attitude / _QUATERNION_SCALE
         w = np.sqrt(np.clip(1 - np.sum(xyz**2, axis=1), 0, None))
         table[list(c.QUATERNION)] = quaternion_to_frd_ned(np.column_stack([w, xyz]))
     motors = [n for i in range(8) if (n := f"motor[{i}]") in raw]
@@ -179,8 +179,8 @@ def convert(
     if turns is not None and np.nanmax(turns) > 0:
         poles = _number(headers, "motor_poles", 0)
         if not poles > 0:
-            poles, found = DEFAULT_POLES, "the header does not state motor_poles"
-            faults.append(Fault("unit", "rotor_speed", found, f"taken as {DEFAULT_POLES}", 0))
+            poles, found = _DEFAULT_POLES, "the header does not state motor_poles"
+            faults.append(Fault("unit", "rotor_speed", found, f"taken as {_DEFAULT_POLES}", 0))
         speeds = np.where(np.isnan(throttle), np.nan, turns * 100 / (poles / 2) * 2 * np.pi / 60)
         table[list(c.rotor_columns("rotor_speed", turns.shape[1]))] = speeds
     battery, more = _battery(raw, headers)
@@ -193,7 +193,7 @@ def convert(
 
 def _known_names(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
     """The fields under the names of today's releases; what looks like one of them and is none is named."""
-    names = {f"{other}[{i}]": f"{base}[{i}]" for base, others in OTHER_NAMES.items() for other in others
+    names = {f"{other}[{i}]": f"{base}[{i}]" for base, others in _OTHER_NAMES.items() for other in others
              for i in range(8) if f"{base}[{i}]" not in raw}  # fmt: skip
     raw = raw.rename(columns=names)
     faults = []
@@ -216,16 +216,16 @@ def throttles(motors: np.ndarray, headers: Mapping[str, str]) -> tuple[np.ndarra
     if not high > low:
         low, high = _number(headers, "minthrottle", 1000.0), _number(headers, "maxthrottle", 2000.0)
         turning = motors[motors > 0]
-        if len(turning) and np.quantile(turning, 0.01) < SLOWEST_PULSE_US:
-            low, high = DSHOT
+        if len(turning) and np.quantile(turning, 0.01) < _SLOWEST_PULSE_US:
+            low, high = _DSHOT
         found = "the header does not state motorOutput"
         faults.append(Fault("unit", "throttle", found, f"no and full throttle taken as {low:g} and {high:g}", 0))
     backwards = np.zeros(motors.shape, bool)
-    if int(_number(headers, "features", 0)) & FEATURE_3D:
-        if low < SLOWEST_PULSE_US:
-            backwards, low = (motors > 0) & (motors < DSHOT_FORWARD), DSHOT_FORWARD + low - DSHOT[0]
+    if int(_number(headers, "features", 0)) & _FEATURE_3D:
+        if low < _SLOWEST_PULSE_US:
+            backwards, low = (motors > 0) & (motors < _DSHOT_FORWARD), _DSHOT_FORWARD + low - _DSHOT[0]
         else:
-            backwards, low = motors < DEADBAND_3D[0], DEADBAND_3D[1]
+            backwards, low = motors < _DEADBAND_3D[0], _DEADBAND_3D[1]
             found = "pulses in µs with 3D, whose dead band the header does not state"
             faults.append(Fault("unit", "throttle", found, f"no throttle taken as {low:g} µs, Betaflight's own", 0))
     share = np.clip((motors - low) / (high - low), 0, 1)
@@ -240,8 +240,8 @@ def _battery(raw: pd.DataFrame, headers: Mapping[str, str]) -> tuple[dict[str, n
     version = _version(headers)
     found, faults = {}, []
     for field, column, since in (
-        ("vbatLatest", c.BATTERY_VOLTAGE, VOLTS),
-        ("amperageLatest", c.BATTERY_CURRENT, AMPERES),
+        ("vbatLatest", c.BATTERY_VOLTAGE, _VOLTS),
+        ("amperageLatest", c.BATTERY_CURRENT, _AMPERES),
     ):
         if field not in raw or not raw[field].max() > 0:
             continue
@@ -251,9 +251,9 @@ def _battery(raw: pd.DataFrame, headers: Mapping[str, str]) -> tuple[dict[str, n
         if counts is not None:
             found[column] = values / counts
         elif version and field == "vbatLatest" and (scale := _number(headers, "vbatscale", 0)) > 0:
-            found[column] = values * CONVERTER_STEP_MV * scale * 1e-4  # the divider in tenths, mV
+            found[column] = values * _CONVERTER_STEP_MV * scale * 1e-4  # the divider in tenths, mV
         elif version and field == "amperageLatest" and per_ampere > 0:
-            found[column] = (values * CONVERTER_STEP_MV - offset) * 10 / per_ampere
+            found[column] = (values * _CONVERTER_STEP_MV - offset) * 10 / per_ampere
         else:
             why = "the header does not state the version or the scale that its unit depends on"
             faults.append(Fault("unit", column, f"{field}: {why}", "left out", len(raw)))

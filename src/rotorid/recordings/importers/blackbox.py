@@ -18,15 +18,15 @@ import numpy as np
 
 from rotorid.errors import InputError
 
-FIRST_LINE = b"H Product:Blackbox"
-HEADER_LINE = re.compile(rb"H ([^:\n]{1,80}):([^\n]*)\n")
-FRAMES = b"IPGHSE"
-END_OF_LOG = b"End of log"
-LONGEST_FRAME = MOST_FIELDS = 256
-LARGEST_STEP = 5000
-LARGEST_STEP_US = 10_000_000
+_FIRST_LINE = b"H Product:Blackbox"
+_HEADER_LINE = re.compile(rb"H ([^:\n]{1,80}):([^\n]*)\n")
+_FRAMES = b"IPGHSE"
+_END_OF_LOG = b"End of log"
+_LONGEST_FRAME = _MOST_FIELDS = 256
+_LARGEST_STEP = 5000
+_LARGEST_STEP_US = 10_000_000
 """A main frame that leaps farther ahead in iterations or time than this, or back, is damaged."""
-TURN = 1 << 32
+_TURN = 1 << 32
 """Numbers have 32 bits: a clock in microseconds begins anew after 71.6 minutes."""
 
 
@@ -48,7 +48,7 @@ class Session:
 
 def sessions(data: bytes) -> list[Session | InputError]:
     """Every session of a blackbox file in its order; for one whose header cannot be read the reason."""
-    starts = [match.start() for match in re.finditer(re.escape(FIRST_LINE), data)]
+    starts = [match.start() for match in re.finditer(re.escape(_FIRST_LINE), data)]
     found: list[Session | InputError] = []
     for start, stop in zip(starts, [*starts[1:], len(data)], strict=True):
         try:
@@ -64,7 +64,7 @@ def _session(data: bytes) -> Session:
     whole = frames.read(at)
     values = np.array(frames.values, dtype=np.int64).reshape(-1, len(frames.names))
     time = values[:, frames.time]
-    values[:, frames.time] = time + TURN * np.cumsum(np.diff(time, prepend=time[:1]) < -TURN // 2)
+    values[:, frames.time] = time + _TURN * np.cumsum(np.diff(time, prepend=time[:1]) < -_TURN // 2)
     return Session(headers, frames.names, values, whole, frames.damaged)
 
 
@@ -73,11 +73,11 @@ def _headers(data: bytes) -> tuple[dict[str, str], int]:
     headers: dict[str, str] = {}
     at = 0
     while at < len(data):
-        if line := HEADER_LINE.match(data, at):
+        if line := _HEADER_LINE.match(data, at):
             name, value = (part.decode("utf-8", "replace").strip() for part in line.groups())
             headers[name] = value
             at = line.end()
-        elif data[at] in FRAMES.replace(b"H", b""):
+        elif data[at] in _FRAMES.replace(b"H", b""):
             break
         else:
             at += 1
@@ -95,7 +95,7 @@ def _unsigned(data: bytes, at: int) -> tuple[int, int]:
         at += 1
         value |= (byte & 127) << shift
         if byte < 128:
-            return value & TURN - 1, at
+            return value & _TURN - 1, at
         shift += 7
         if shift > 28:
             return 0, at
@@ -174,7 +174,7 @@ def _three(layouts: tuple) -> Callable[[bytes, int, int], tuple[list[int], int]]
     return read
 
 
-ENCODINGS: dict[int, tuple[Callable, int]] = {
+_ENCODINGS: dict[int, tuple[Callable, int]] = {
     0: (_one_signed, 1),
     1: (_one_unsigned, 1),
     3: (_one_negative, 1),
@@ -187,7 +187,7 @@ ENCODINGS: dict[int, tuple[Callable, int]] = {
 """To the number of an encoding its reader and how many fields it packs together (`_up_to_eight`: at most)."""
 EVENTS: dict[int, int] = {0: 1, 14: 2, 15: 1, 30: 2}
 """To an event how many unsigned numbers follow: beep, log resumed, disarmed, flight mode."""
-RESUMED, ADJUSTED, ENDED = 14, 13, 255
+_RESUMED, _ADJUSTED, _ENDED = 14, 13, 255
 
 
 # Frames -------------------------------------------------------------------------------------------
@@ -201,12 +201,12 @@ class _Frames:
         self.names = tuple(headers.get("Field I name", "").split(","))
         if not {"time", "loopIteration"} <= set(self.names):
             raise InputError("the header of the log is damaged: it does not name the fields loopIteration and time")
-        if len(self.names) > MOST_FIELDS:
+        if len(self.names) > _MOST_FIELDS:
             raise InputError(f"the header of the log is damaged: it names {len(self.names)} fields")
         self.time, self._iteration = self.names.index("time"), self.names.index("loopIteration")
         self._motor = self.names.index("motor[0]") if "motor[0]" in self.names else 0
         self._plans = {}
-        for letter in FRAMES.decode().replace("E", ""):
+        for letter in _FRAMES.decode().replace("E", ""):
             encodings = _numbers_of(headers, f"Field {letter} encoding")
             if encodings or letter == "I":
                 count = len(self.names) if letter in "IP" else len(encodings)
@@ -230,12 +230,12 @@ class _Frames:
         while at < size:
             letter, start = data[at], at
             if letter == ord("E"):
-                if data.startswith(END_OF_LOG, at + 2) and data[at + 1] == ENDED:
+                if data.startswith(_END_OF_LOG, at + 2) and data[at + 1] == _ENDED:
                     return True
                 after = self._event(at + 1)
             else:
                 after = self._frame(letter, at + 1) if letter in self._plans else None
-            if after is None or not self._begins(after) or after - start > LONGEST_FRAME:
+            if after is None or not self._begins(after) or after - start > _LONGEST_FRAME:
                 # What is no frame is looked through byte by byte for the next one.
                 self.damaged += sound or letter == ord("I")
                 at, sound = start + 1, False
@@ -247,7 +247,7 @@ class _Frames:
         return False
 
     def _begins(self, at: int) -> bool:
-        return at == len(self._data) or (at < len(self._data) and self._data[at] in FRAMES)
+        return at == len(self._data) or (at < len(self._data) and self._data[at] in _FRAMES)
 
     def _frame(self, letter: int, at: int) -> int | None:
         """Where the frame that begins here ends, its numbers in `_now`; None where the data end in it."""
@@ -265,7 +265,7 @@ class _Frames:
         data = self._data
         try:
             kind, at = data[at], at + 1
-            if kind == ADJUSTED:
+            if kind == _ADJUSTED:
                 return at + 5 if data[at] & 128 else _signed(data, at + 1)[1]
             if kind not in EVENTS:
                 return None
@@ -275,7 +275,7 @@ class _Frames:
                 values.append(value)
         except IndexError:
             return None
-        if kind == RESUMED and self._begins(at):
+        if kind == _RESUMED and self._begins(at):
             self._last = values[0], values[1]
         return at
 
@@ -286,7 +286,7 @@ class _Frames:
         now = self._predicted(letter)
         at = now[self._iteration], now[self.time]
         follows = self._last is None or (
-            0 <= at[0] - self._last[0] < LARGEST_STEP and (at[1] - self._last[1]) % TURN < LARGEST_STEP_US
+            0 <= at[0] - self._last[0] < _LARGEST_STEP and (at[1] - self._last[1]) % _TURN < _LARGEST_STEP_US
         )
         self._last = at  # a key frame after a true leap is not taken, the next one is
         if not follows:
@@ -316,9 +316,9 @@ class _Frames:
                 now[k] += self._fixed[predictor]
             else:
                 raise InputError(f"the header of the log is damaged: there is no predictor {predictor}")
-            if not -TURN // 2 <= now[k] < TURN // 2:
-                now[k] = now[k] % TURN if k == self.time else _extended(now[k], 32)
-        now[self.time] %= TURN
+            if not -_TURN // 2 <= now[k] < _TURN // 2:
+                now[k] = now[k] % _TURN if k == self.time else _extended(now[k], 32)
+        now[self.time] %= _TURN
         return now
 
     def _left_out(self) -> int:
@@ -334,9 +334,9 @@ def _plan(encodings: list[int], count: int, letter: str) -> list[tuple[Callable,
     """Readers of the fields of a kind of frame, each with the number of fields that it takes."""
     plan, k = [], 0
     while k < len(encodings):
-        if encodings[k] not in ENCODINGS:
+        if encodings[k] not in _ENCODINGS:
             raise InputError(f"the header of the log is damaged: there is no encoding {encodings[k]}")
-        read, takes = ENCODINGS[encodings[k]]
+        read, takes = _ENCODINGS[encodings[k]]
         if encodings[k] == 6:
             takes = next((n for n in range(1, 8) if encodings[k + n : k + n + 1] != [6]), 8)
         plan.append((read, takes))

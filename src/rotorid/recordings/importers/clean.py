@@ -10,9 +10,9 @@ import pandas as pd
 from rotorid.recordings.columns import TIME
 from rotorid.recordings.importers.report import Fault
 
-REVERSED = 0.02
+_REVERSED = 0.02
 """Share of the largest value that a value of the other sign must exceed to be one: less is noise about zero."""
-UNEXPLAINED = 0.2
+_UNEXPLAINED = 0.2
 """Share of its variance that the motors of a mixer may leave of another motor's signal."""
 
 
@@ -62,7 +62,7 @@ def one_sense(values: np.ndarray, names: Sequence[str], sense: float | None = No
     signs = np.sign(np.nansum(np.sign(values), axis=0)) if sense is None else np.full(values.shape[1], sense)
     own = values * np.where(signs == 0, 1.0, signs)
     largest = np.nanmax(np.abs(own), axis=0, initial=0.0, where=np.isfinite(own))
-    against = own < -REVERSED * largest
+    against = own < -_REVERSED * largest
     faults = [
         Fault(
             "reversed",
@@ -89,7 +89,7 @@ def further_motors(outputs: np.ndarray, motors: int) -> list[int]:
     basis = np.column_stack([known[:, :motors], np.ones(len(known))])
     rest = known[:, motors:] - basis @ np.linalg.lstsq(basis, known[:, motors:], rcond=None)[0]
     moves, left = known[:, motors:].var(axis=0), rest.var(axis=0)
-    return [motors + k for k in range(len(moves)) if moves[k] > 0 and left[k] < UNEXPLAINED * moves[k]]
+    return [motors + k for k in range(len(moves)) if moves[k] > 0 and left[k] < _UNEXPLAINED * moves[k]]
 
 
 def report_gaps(table: pd.DataFrame, factor: float = 3.0) -> list[Fault]:

@@ -1,4 +1,4 @@
-"""Crazyflie flights from decoded uSD logs (`crazyflie_usd`): columns, frames and the part in the air.
+r"""Crazyflie flights from decoded uSD logs (`crazyflie_usd`): columns, frames and the part in the air.
 
 The firmware's frames: body forward-left-up, world z up (north-west-up), quaternion body to world. Rotors:
 1 front right (ccw), 2 rear right (cw), 3 rear left (ccw), 4 front left (cw); the joint regression of the
@@ -9,12 +9,27 @@ A state is read in each form that the firmware logs (`FORMS`), the first that is
 old body frame, in which pitch is positive nose up and so the contract's; the same sign is on the compressed pitch rate.
 Sources: crazyflie-firmware `stabilizer.c` (log groups, `compressState`), `stabilizer_types.h`, `kalman_core.c`,
 `quatcompress.h`.
+
+Crazyflie uSD-deck logs: binary files of timed events (firmware `usddeck`, format versions 1 and 2).
+
+Layout, little-endian throughout::
+
+    u8 0xBC | u16 version | u16 number of event types
+    per event type: u16 id | name\0 | u16 number of variables | per variable: "name(type)\0"
+    per event: u16 id | u32 time in ms (version 1) or u64 time in µs (version 2) | its variables packed
+    u32 CRC-32 of everything before it
+
+Types are the characters of Python's `struct`: f float, e half a float, B H I unsigned, b h i signed integers.
+Source: bitcraze/crazyflie-firmware, `usddeck.c` and `tools/usdlog/cfusdlog.py` (the format, none of its code).
 """
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from zlib import crc32
 
 import numpy as np
 import pandas as pd
@@ -23,21 +38,25 @@ from scipy.spatial.transform import Rotation
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.clean import blank_held, cut, drop_repeated_times, report_gaps, true_stretches
-from rotorid.recordings.importers.crazyflie_usd import read_usd_log
-from rotorid.recordings.importers.frames import (
+from rotorid.recordings.importers.in_the_air import airborne, stretches_of
+from rotorid.recordings.importers.mapping import (
     continuous,
     half_turn_about_x,
     quaternion_from_euler_frd,
     quaternion_to_frd_ned,
 )
-from rotorid.recordings.importers.in_the_air import airborne, stretches_of
 from rotorid.recordings.importers.report import Fault
 
-STANDARD_GRAVITY_M_S2 = 9.81
+MAGIC = 0xBC
+_CHECKSUM = 4
+"""Bytes of it at the end of a log."""
+TIME = "time_s"
+TYPES = {"e": "<f2", "f": "<f4", "d": "<f8", "b": "i1", "B": "u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4"}
+_STANDARD_GRAVITY_M_S2 = 9.81
 """The firmware's g: accelerometer logs are in multiples of this."""
-FULL_SCALE = 65536.0
+_FULL_SCALE = 65536.0
 RPM = 2 * np.pi / 60
-ROTORS = range(1, 5)
+_ROTORS = range(1, 5)
 SPEEDS = list(c.rotor_columns("rotor_speed", 4))
 THROTTLES = list(c.rotor_columns("throttle", 4))
 
@@ -87,7 +106,7 @@ FORMS: dict[tuple[str, ...], tuple[tuple[tuple[str, ...], Callable[[np.ndarray],
         (_names("gyro", "x y z"), lambda v: half_turn_about_x(np.radians(v))),
         (_names("stateEstimateZ", "rateRoll ratePitch rateYaw"), lambda v: v / 1000 * np.array([1.0, 1.0, -1.0])),
     ),
-    c.SPECIFIC_FORCE: ((_names("acc", "x y z"), lambda v: half_turn_about_x(v) * STANDARD_GRAVITY_M_S2),),
+    c.SPECIFIC_FORCE: ((_names("acc", "x y z"), lambda v: half_turn_about_x(v) * _STANDARD_GRAVITY_M_S2),),
 }
 """Names of the firmware's variables, in the order in which they are preferred, and how they become the contract's."""
 BODY_VELOCITY = _names("kalman", "statePX statePY statePZ")
@@ -139,7 +158,7 @@ def convert(log: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
         quaternion, force_g = attitude_without_pitch(estimate + [0, 0, 1], roll, yaw)
         put(c.QUATERNION, continuous(quaternion_to_frd_ned(quaternion)))
         if c.SPECIFIC_FORCE[0] not in columns:
-            put(c.SPECIFIC_FORCE[1:], (half_turn_about_x(force_g) * STANDARD_GRAVITY_M_S2)[:, 1:])
+            put(c.SPECIFIC_FORCE[1:], (half_turn_about_x(force_g) * _STANDARD_GRAVITY_M_S2)[:, 1:])
         faults.append(
             Fault(
                 "no_pitch",
@@ -149,14 +168,14 @@ def convert(log: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
                 len(log),
             )
         )
-    output = [f"pwm.m{i}_pwm" for i in ROTORS]
-    request = [f"motor.m{i}" for i in ROTORS]
+    output = [f"pwm.m{i}_pwm" for i in _ROTORS]
+    request = [f"motor.m{i}" for i in _ROTORS]
     drive = output if set(output) <= set(log.columns) else request
     if set(drive) <= set(log.columns):
-        put(THROTTLES, log[drive].to_numpy(float) / FULL_SCALE)
+        put(THROTTLES, log[drive].to_numpy(float) / _FULL_SCALE)
         if drive is output and set(request) <= set(log.columns):
-            put([f"thrust_request_{i}" for i in ROTORS], log[request].to_numpy(float) / FULL_SCALE)
-    speeds = [f"rpm.m{i}" for i in ROTORS]
+            put([f"thrust_request_{i}" for i in _ROTORS], log[request].to_numpy(float) / _FULL_SCALE)
+    speeds = [f"rpm.m{i}" for i in _ROTORS]
     if set(speeds) <= set(log.columns):
         put(SPEEDS, log[speeds].to_numpy(float) * RPM)
     for name, a_volt in (("pm.vbatMV", 1000), ("pm.vbat", 1)):
@@ -178,14 +197,14 @@ def in_the_air(table: pd.DataFrame, shortest_s: float = 4.0, margin_s: float = 1
     return [(a + margin_s, b - margin_s) for a, b in true_stretches(flying, time, shortest_s)]
 
 
-def flown_stretches(table: pd.DataFrame) -> list[tuple[float, float]]:
+def _flown_stretches(table: pd.DataFrame) -> list[tuple[float, float]]:
     """Start and stop of every flight of a log by the detector of all importers, take-off and landing left out."""
     height = {} if "position_z_m" not in table else {c.HEIGHT: -table["position_z_m"]}
     flying, _ = airborne(table.assign(**height))
     return stretches_of(table[c.TIME].to_numpy(float), flying)
 
 
-def sensor_faults(table: pd.DataFrame) -> list[Fault]:
+def _sensor_faults(table: pd.DataFrame) -> list[Fault]:
     """Faults of rotor-speed sensors and a battery reading that never moves; values stay as recorded."""
     faults = []
     for name, throttle in zip(SPEEDS, THROTTLES, strict=True):
@@ -206,7 +225,7 @@ def flight_run(table: pd.DataFrame, start_s: float, stop_s: float) -> tuple[pd.D
     run = cut(table, start_s, stop_s)
     if len(run) < 2:
         raise InputError(f"no samples from {start_s:g} to {stop_s:g} s")
-    faults = sensor_faults(run)
+    faults = _sensor_faults(run)
     if any(f.kind == "stuck" for f in faults):
         run = run.drop(columns=c.BATTERY_VOLTAGE)
     gaps = report_gaps(run)
@@ -224,7 +243,7 @@ def flights(
     path: Path,
     prefix: str | None = None,
     stretches: list[tuple[float, float]] | None = None,
-    detect: Callable[[pd.DataFrame], list[tuple[float, float]]] = flown_stretches,
+    detect: Callable[[pd.DataFrame], list[tuple[float, float]]] = _flown_stretches,
 ) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
     """Every flight of a uSD log by name (`prefix`, default the file's), and the faults of log and flights.
 
@@ -252,3 +271,116 @@ def flights(
         runs[label] = run
         faults += [f.in_run(label) for f in (flown, *found)]
     return runs, faults
+
+
+TYPES |= {"q": "<i8", "Q": "<u8"}
+
+
+@dataclass(frozen=True)
+class _EventType:
+    """One kind of record in a log: its name and the names and numpy types of its variables."""
+
+    name: str
+    variables: tuple[str, ...]
+    dtype: np.dtype
+
+
+def _text(data: bytes, start: int, where: str) -> tuple[str, int]:
+    end = data.find(b"\0", start)
+    if end < 0:
+        raise InputError(f"{where}, byte {start}: header is cut off inside a name")
+    return data[start:end].decode("latin-1"), end + 1
+
+
+def _event_types(data: bytes, where: str) -> tuple[dict[int, _EventType], int, int]:
+    """Event types by id, format version and the offset of the first event."""
+    if len(data) < 9 or data[0] != MAGIC:
+        found = f"0x{data[0]:02X}" if data else "an empty file"
+        raise InputError(f"{where}: expected a Crazyflie uSD log starting with 0xBC, found {found}")
+    version, count = struct.unpack_from("<HH", data, 1)
+    if version not in (1, 2):
+        raise InputError(f"{where}: expected format version 1 or 2, found {version}")
+    clock = "<u8" if version == 2 else "<u4"
+    types, offset = {}, 5
+    try:
+        for _ in range(count):
+            (identifier,) = struct.unpack_from("<H", data, offset)
+            name, offset = _text(data, offset + 2, where)
+            (variables,) = struct.unpack_from("<H", data, offset)
+            offset += 2
+            fields = [("__id", "<u2"), ("__clock", clock)]
+            for _ in range(variables):
+                label, offset = _text(data, offset, where)
+                variable, _, letter = label.removesuffix(")").rpartition("(")
+                if letter not in TYPES or not variable:
+                    raise InputError(f"{where}: variable {label!r} has a type that is not known")
+                fields.append((variable, TYPES[letter]))
+            types[identifier] = _EventType(name, tuple(f for f, _ in fields[2:]), np.dtype(fields))
+    except struct.error:
+        raise InputError(f"{where}: header is cut off after {offset} bytes") from None
+    return types, version, offset
+
+
+def decode_usd_log(data: bytes, where: str = "log") -> tuple[dict[str, pd.DataFrame], list[Fault]]:
+    """Tables of a uSD log by event name, each with `time_s` (device clock) first, in file order.
+
+    A wrong checksum, an unknown event or a cut-off tail is reported as a Fault and everything before it
+    is kept; a file that is no uSD log raises InputError.
+    """
+    types, version, offset = _event_types(data, where)
+    whole = crc32(data[:-_CHECKSUM]) == struct.unpack("<I", data[-_CHECKSUM:])[0]
+    end = len(data) - _CHECKSUM * whole  # of a log that is cut off the last bytes are no checksum
+    offsets: dict[int, list[int]] = {identifier: [] for identifier in types}
+    unknown, inside = None, None
+    while offset + 2 <= end:
+        identifier = data[offset] | data[offset + 1] << 8
+        kind = types.get(identifier)
+        if kind is None:
+            unknown = identifier
+            break
+        if offset + kind.dtype.itemsize > end:
+            inside = kind
+            break
+        offsets[identifier].append(offset)
+        offset += kind.dtype.itemsize
+    faults = _faults_of_end(data, offset, whole, unknown, inside)
+    raw = np.frombuffer(data, np.uint8)
+    scale = 1e-6 if version == 2 else 1e-3
+    tables = {}
+    for identifier, kind in types.items():
+        starts = np.asarray(offsets[identifier], int)
+        rows = raw[starts[:, None] + np.arange(kind.dtype.itemsize)].copy().view(kind.dtype)[:, 0]
+        columns = {TIME: rows["__clock"].astype(float) * scale}
+        columns |= {name: rows[name].astype(float) for name in kind.variables}
+        tables[kind.name] = pd.DataFrame(columns)
+    return tables, faults
+
+
+def _faults_of_end(
+    data: bytes, offset: int, whole: bool, unknown: int | None, inside: _EventType | None
+) -> list[Fault]:
+    """What is wrong with a log whose events end at an offset: with an event that is not known, or inside one."""
+    rest, faults = len(data) - offset, []
+    checked = rest == _CHECKSUM  # exactly a checksum follows, right or wrong
+    if rest <= _CHECKSUM:
+        unknown = None  # bytes of a checksum are no event
+    if unknown is not None:
+        found = f"event id {unknown} at byte {offset} is not in the header"
+        faults.append(Fault("unknown_event", "", found, f"{rest - _CHECKSUM} bytes after it left out", 1))
+    if not whole and (checked or unknown is not None):
+        stored = struct.unpack("<I", data[-_CHECKSUM:])[0]
+        found = f"CRC-32 is {crc32(data[:-_CHECKSUM]):08x}, file says {stored:08x}"
+        faults.insert(0, Fault("checksum", "", found, "kept; bytes may be damaged", 1))
+    elif inside is not None or not (whole or unknown is not None):
+        found = f"the file ends inside an event ({inside.name})" if inside else "the file ends without its checksum"
+        faults.append(Fault("cut_off", "", found, "what came before is kept; the log stopped before its end", 1))
+    return faults
+
+
+def read_usd_log(path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
+    """Read a uSD log file; see `decode_usd_log`."""
+    try:
+        data = Path(path).read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{path}: file is missing") from None
+    return decode_usd_log(data, str(path))

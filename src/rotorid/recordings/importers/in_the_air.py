@@ -16,27 +16,27 @@ from rotorid.recordings import columns as c
 from rotorid.recordings.importers.clean import true_stretches
 from rotorid.recordings.importers.report import Fault
 
-SHORTEST_FLIGHT_S = 4.0
-AFTER_TAKE_OFF_S = 1.0
-BEFORE_LANDING_S = 0.5
-LONGEST_PAUSE_S = 1.0
+_SHORTEST_FLIGHT_S = 4.0
+_AFTER_TAKE_OFF_S = 1.0
+_BEFORE_LANDING_S = 0.5
+_LONGEST_PAUSE_S = 1.0
 """A dip of the throttle shorter than this does not end a flight."""
-DRIVEN = 0.05
+_DRIVEN = 0.05
 """Mean throttle below which nothing flies."""
-NEAR_WEIGHT = 0.85
+_NEAR_WEIGHT = 0.85
 """Share of the throttle of flight below which the rotors do not carry the weight."""
-LIFTS = 0.95
+_LIFTS = 0.95
 """Share of the throttle of flight that a stretch begins and ends with: less is spool-up or a vehicle that settles."""
-FALLING = 0.9
+_FALLING = 0.9
 """Share of the usual specific force below which a vehicle falls: on the ground it stays at 1 g."""
-NEAR_WEIGHT_ALONE = 0.7
+_NEAR_WEIGHT_ALONE = 0.7
 """The same where no accelerometer distinguishes a fall from the ground."""
-TURNS_RAD_S = 1.0
+_TURNS_RAD_S = 1.0
 """Root mean square of slow body rates above which a vehicle whose rotors turn is in the air. A public log has one that
 rocks on the ground at 0.3 to 0.8 with rotors at two thirds of what flight takes."""
-GROUND_M, CLEAR_M = 0.05, 0.5
+_GROUND_M, _CLEAR_M = 0.05, 0.5
 """Heights below which a vehicle is on the ground, and above which it is in the air."""
-SMOOTHED_S = 1.0
+_SMOOTHED_S = 1.0
 
 
 def on_grid(grid_s: np.ndarray, time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -74,7 +74,7 @@ def airborne(table: pd.DataFrame, stated: np.ndarray | None = None) -> tuple[np.
     def of(names) -> np.ndarray | None:
         return table[list(names)].to_numpy(float) if set(names) <= set(table) else None
 
-    drive, force = drive_of(table), of(c.SPECIFIC_FORCE)
+    drive, force = _drive_of(table), of(c.SPECIFIC_FORCE)
     if drive is None or len(table) < 2 or not flying.any() or (force is None and stated is not None):
         return flying, []
     height = of([c.HEIGHT])
@@ -84,15 +84,15 @@ def airborne(table: pd.DataFrame, stated: np.ndarray | None = None) -> tuple[np.
     lost = int((flying & ~found).sum())
     if stated is None or not lost:
         return found, []
-    lasts = np.minimum(np.diff(time_s, append=time_s[-1]), LONGEST_PAUSE_S)  # the clock stops between flights
+    lasts = np.minimum(np.diff(time_s, append=time_s[-1]), _LONGEST_PAUSE_S)  # the clock stops between flights
     seen = (
         f"{lasts[flying & ~found].sum():.0f} s of {lasts[flying].sum():.0f} s that the log calls flight are on the "
-        f"ground (rotors below {NEAR_WEIGHT:g} of those of flight, specific force of 1 g, no turning)"
+        f"ground (rotors below {_NEAR_WEIGHT:g} of those of flight, specific force of 1 g, no turning)"
     )
     return found, [Fault("on_ground", c.TIME, seen, "left out", lost)]
 
 
-def drive_of(table: pd.DataFrame) -> np.ndarray | None:
+def _drive_of(table: pd.DataFrame) -> np.ndarray | None:
     """What drives the rotors (n, k): throttles, else measured, else commanded speeds; None where none is recorded."""
     for kind in ("throttle", "rotor_speed", "rotor_command"):
         names = [n for n in table if c.rotor_number(n) and n.startswith(kind)]
@@ -129,7 +129,7 @@ def off_the_ground(
         Height above ground (n,), m, where a range finder or a motion capture says it; None elsewhere.
     """
     step_s = max(float(np.median(np.diff(time_s))), 1e-4)
-    rows = max(int(SMOOTHED_S / step_s), 1)
+    rows = max(int(_SMOOTHED_S / step_s), 1)
 
     def smooth(values: np.ndarray) -> np.ndarray:
         known = pd.Series(values).interpolate(limit_direction="both")
@@ -138,23 +138,23 @@ def off_the_ground(
     throttle = smooth(pd.DataFrame(drive).mean(axis=1).to_numpy())
     given = throttle[flying & np.isfinite(throttle)]
     full = float(np.quantile(given, 0.9)) if len(given) else 0.0
-    if full <= DRIVEN:
+    if full <= _DRIVEN:
         return flying
     of_flight = np.median(given[given > 0.5 * full])
-    turning = np.zeros(len(throttle), bool) if rates is None else _turning(rates, step_s) > TURNS_RAD_S
+    turning = np.zeros(len(throttle), bool) if rates is None else _turning(rates, step_s) > _TURNS_RAD_S
     up = np.zeros(len(throttle), bool)
     if force is not None and np.isfinite(force).any():
         pull = smooth(np.linalg.norm(force, axis=1))
-        flown = (throttle >= NEAR_WEIGHT * of_flight) | (pull < FALLING * np.nanmedian(pull[flying]))
+        flown = (throttle >= _NEAR_WEIGHT * of_flight) | (pull < _FALLING * np.nanmedian(pull[flying]))
     else:
-        flown = throttle >= NEAR_WEIGHT_ALONE * of_flight
+        flown = throttle >= _NEAR_WEIGHT_ALONE * of_flight
     if height is not None and np.isfinite(height).any():
         above = smooth(height)
-        up = above > CLEAR_M
-        flown &= ~(above < GROUND_M)
+        up = above > _CLEAR_M
+        flown &= ~(above < _GROUND_M)
     flown |= (turning | up) & (throttle >= 0.5 * of_flight)
     flown = flying & without_pauses(flown, time_s)
-    lifts, out = (throttle >= LIFTS * of_flight) | turning | up, np.zeros(len(flying), bool)
+    lifts, out = (throttle >= _LIFTS * of_flight) | turning | up, np.zeros(len(flying), bool)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flown.astype(int), [0]])))
     for start, stop in zip(edges[::2], edges[1::2], strict=True):
         lifting = np.flatnonzero(lifts[start:stop])
@@ -166,19 +166,19 @@ def off_the_ground(
 
 
 def _turning(rates: np.ndarray, step_s: float) -> np.ndarray:
-    """Root mean square over `SMOOTHED_S` of body rates (n, 3) that are averaged over a tenth of it, rad/s, (n,)."""
+    """Root mean square over `_SMOOTHED_S` of body rates (n, 3) that are averaged over a tenth of it, rad/s, (n,)."""
     known = pd.DataFrame(rates).interpolate(limit_direction="both")
-    few, many = max(int(0.1 * SMOOTHED_S / step_s), 1), max(int(SMOOTHED_S / step_s), 1)
+    few, many = max(int(0.1 * _SMOOTHED_S / step_s), 1), max(int(_SMOOTHED_S / step_s), 1)
     slow = known.rolling(few, center=True, min_periods=1).mean()
     return np.sqrt((slow**2).sum(axis=1).rolling(many, center=True, min_periods=1).mean()).to_numpy()
 
 
 def without_pauses(up: np.ndarray, time_s: np.ndarray) -> np.ndarray:
-    """The mask with pauses inside it that are shorter than `LONGEST_PAUSE_S` filled."""
+    """The mask with pauses inside it that are shorter than `_LONGEST_PAUSE_S` filled."""
     up = up.copy()
     edges = np.flatnonzero(np.diff(np.concatenate([[0], up.astype(int), [0]])))
     for stop, start in zip(edges[1:-1:2], edges[2::2], strict=True):
-        if time_s[start] - time_s[stop - 1] < LONGEST_PAUSE_S:
+        if time_s[start] - time_s[stop - 1] < _LONGEST_PAUSE_S:
             up[stop:start] = True
     return up
 
@@ -199,7 +199,7 @@ def flights(
     if not found:
         longest = max((b - a for a, b in true_stretches(flying, time_s, 0.0)), default=0.0)
         why = (
-            f"the longest stretch in the air is {longest:.1f} s, at least {SHORTEST_FLIGHT_S:g} s beyond take-off and "
+            f"the longest stretch in the air is {longest:.1f} s, at least {_SHORTEST_FLIGHT_S:g} s beyond take-off and "
             "landing are needed"
             if longest > 0
             else f"the vehicle never flies in this log of {time_s[-1]:.0f} s" + _undriven(table)
@@ -228,16 +228,16 @@ def stretches_of(time_s: np.ndarray, flying: np.ndarray) -> list[tuple[float, fl
 
 
 def _long_enough(flying: np.ndarray, time_s: np.ndarray) -> list[tuple[float, float]]:
-    every = true_stretches(flying, time_s, SHORTEST_FLIGHT_S)
-    return [s for s in every if np.diff(_inside(*s, time_s))[0] >= SHORTEST_FLIGHT_S]
+    every = true_stretches(flying, time_s, _SHORTEST_FLIGHT_S)
+    return [s for s in every if np.diff(_inside(*s, time_s))[0] >= _SHORTEST_FLIGHT_S]
 
 
 def _inside(start_s: float, stop_s: float, time_s: np.ndarray) -> tuple[float, float]:
     """A stretch in the air without take-off and landing, as far as these are in the table."""
-    first = start_s if start_s <= time_s[0] else start_s + AFTER_TAKE_OFF_S
-    return first, stop_s if stop_s >= time_s[-1] else stop_s - BEFORE_LANDING_S
+    first = start_s if start_s <= time_s[0] else start_s + _AFTER_TAKE_OFF_S
+    return first, stop_s if stop_s >= time_s[-1] else stop_s - _BEFORE_LANDING_S
 
 
 def _undriven(table: pd.DataFrame) -> str:
     throttles = [n for n in table if n.startswith("throttle_") and c.rotor_number(n)]
-    return ": no motor is ever driven" if throttles and not (table[throttles] > DRIVEN).any().any() else ""
+    return ": no motor is ever driven" if throttles and not (table[throttles] > _DRIVEN).any().any() else ""

@@ -25,9 +25,9 @@ ORDERS: dict[str, tuple[tuple[str, str], ...]] = {
 """Rotors 1 to 4 of a quadrotor in X shape by autopilot: place and turning sense (Betaflight: propellers in)."""
 
 
-TILTED_DEG = 1.0
+_TILTED_DEG = 1.0
 """Angle between a rotor's axis and body z from which on it is tilted."""
-ALIKE = 0.01
+_ALIKE = 0.01
 """Relative difference of a coefficient up to which rotors are alike."""
 
 
@@ -91,7 +91,7 @@ def _untaken(parameters: Mapping[str, float], rotors: int) -> list[Fault]:
     axes = np.column_stack([stated("AX", 0.0), stated("AY", 0.0), stated("AZ", -1.0)])
     size = np.linalg.norm(axes, axis=1)  # PX4 makes each axis a unit vector
     lean = np.degrees(np.arccos(np.clip(-axes[:, 2] / np.where(size > 0, size, 1.0), -1, 1)))
-    tilted = [i for i in range(rotors) if lean[i] > TILTED_DEG]
+    tilted = [i for i in range(rotors) if lean[i] > _TILTED_DEG]
     degrees = ", ".join(f"{lean[i]:.3g}" for i in tilted)
     found = f"{{}} tilted against body z by {degrees} degrees (CA_ROTOR*_AX, _AY, _AZ)"
     faults = fault("tilted_rotor", [i + 1 for i in tilted], found, "its thrust is taken along -z")
@@ -106,6 +106,6 @@ def _untaken(parameters: Mapping[str, float], rotors: int) -> list[Fault]:
     ):
         size = np.abs(stated(name, default))
         usual = float(np.median(size))
-        other = [i + 1 for i in range(rotors) if abs(size[i] - usual) > ALIKE * usual]
+        other = [i + 1 for i in range(rotors) if abs(size[i] - usual) > _ALIKE * usual]
         faults += fault("unequal_rotors", other, f"CA_ROTOR*_{name} of {{}} is not that of the others", action)
     return faults

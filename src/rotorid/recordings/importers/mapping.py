@@ -23,6 +23,13 @@ north, east, west, up, down.
 A value that is `?` is a question left open: nothing is imported until it is answered.
 `rotorid.recordings.importers.guessing` proposes such a mapping from the names of the columns and from what stands in
 them.
+
+Turning z-up laboratory frames into the contract's north-east-down and forward-right-down.
+
+Most laboratories log body axes forward-left-up (FLU) and a world with z up (north-west-up or
+east-north-up). Turning both by half a turn about the x axis gives forward-right-down (FRD) and a world with
+z down; x stays x, y and z change sign. A quaternion between the two then keeps w and x and changes the sign
+of y and z.
 """
 
 from __future__ import annotations
@@ -41,11 +48,11 @@ from rotorid.io.text.files import read_yaml
 from rotorid.io.text.wording import explain
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.clean import drop_repeated_times, join_rows, report_gaps
-from rotorid.recordings.importers.frames import continuous
 from rotorid.recordings.importers.report import Fault
 from rotorid.recordings.importers.units import UNITS, converted
 from rotorid.recordings.tables import clock_jump, numbers, read_cells, read_parquet_cells
 
+_HALF_TURN_ABOUT_X = np.array([1.0, -1.0, -1.0])
 CHANNELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "time": ("time", (c.TIME,)),
     "position": ("length", c.POSITION),
@@ -66,14 +73,14 @@ CHANNELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "moment": ("torque", c.MOMENT),
 }
 """Channels of a mapping: kind of unit and columns of the contract (none: one a rotor)."""
-Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-BODY = {"frd": np.eye(3), "flu": np.diag([1.0, -1.0, -1.0]), "fur": Y_UP}
+_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+BODY = {"frd": np.eye(3), "flu": np.diag([1.0, -1.0, -1.0]), "fur": _Y_UP}
 """Body axes as columns in forward-right-down."""
 WORLD = {
     "ned": np.eye(3),
     "nwu": np.diag([1.0, -1.0, -1.0]),
     "enu": np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]),
-    "nue": Y_UP,
+    "nue": _Y_UP,
 }
 """World axes as columns in north-east-down."""
 TRAVEL = WORLD | {"neu": np.diag([1.0, 1.0, -1.0])}
@@ -119,7 +126,7 @@ OPEN = "?"
 """What stands for an answer that only a person can give."""
 
 
-def open_questions(mapping: Mapping) -> list[str]:
+def _open_questions(mapping: Mapping) -> list[str]:
     """What of a mapping is still `?`, each with what is expected there."""
     found = [f"{key} ({' or '.join(known)})" for key, known in (("body", BODY), ("world", WORLD))
              if getattr(mapping, key) == OPEN]  # fmt: skip
@@ -144,9 +151,9 @@ def open_questions(mapping: Mapping) -> list[str]:
     return found
 
 
-def check_answered(mapping: Mapping, where: object) -> None:
+def _check_answered(mapping: Mapping, where: object) -> None:
     """InputError where a mapping still holds a question."""
-    if found := open_questions(mapping):
+    if found := _open_questions(mapping):
         raise InputError(
             f"{where}: still open ({OPEN}): {'; '.join(found)}; write the answer in its place, or remove the channel"
         )
@@ -158,7 +165,7 @@ def read_mapping(path: Path) -> Mapping:
         mapping = Mapping.model_validate(read_yaml(Path(path)))
     except ValidationError as error:
         raise InputError(f"{path}: {explain(error, Mapping)}") from None
-    check_answered(mapping, path)
+    _check_answered(mapping, path)
     for name, channel in mapping.channels.items():
         if name not in CHANNELS:
             raise InputError(f"{path}: channels: {name}: no such channel{_near(name, CHANNELS)}")
@@ -233,7 +240,7 @@ def _left_out(raw: pd.DataFrame) -> list[Fault]:
 
 def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFrame, list[Fault]]:
     """Contract columns of a table by a mapping; InputError names a column that is not there or no numbers."""
-    check_answered(mapping, f"the mapping of {where}")
+    _check_answered(mapping, f"the mapping of {where}")
     body, world = BODY[mapping.body], WORLD[mapping.world]
     wanted = [(name, channel.columns) for name, channel in mapping.channels.items()] + [("keep", mapping.keep)]
     table = pd.concat([_numbers(raw, columns, name, where) for name, columns in wanted if columns], axis=1)
@@ -316,3 +323,27 @@ def _attitude(values: np.ndarray, form: str, body: np.ndarray, world: np.ndarray
     turn = Rotation.from_matrix(world) * turn * Rotation.from_matrix(body).inv()
     out[known] = continuous(turn.as_quat()[:, [3, 0, 1, 2]])
     return out, out
+
+
+def half_turn_about_x(vectors: np.ndarray) -> np.ndarray:
+    """Vectors shape (n, 3) from FLU to FRD (or from z up to z down); its own inverse."""
+    return np.asarray(vectors, float) * _HALF_TURN_ABOUT_X
+
+
+def quaternion_to_frd_ned(wxyz: np.ndarray) -> np.ndarray:
+    """Quaternions (n, 4), scalar first, FLU body to z-up world, as FRD body to z-down world; unit length."""
+    wxyz = np.asarray(wxyz, float) * np.array([1.0, 1.0, -1.0, -1.0])
+    return continuous(wxyz / np.linalg.norm(wxyz, axis=1, keepdims=True))
+
+
+def continuous(wxyz: np.ndarray) -> np.ndarray:
+    """The same attitudes with signs chosen so that neighbours are close (q and -q are one attitude)."""
+    dots = np.sum(wxyz[1:] * wxyz[:-1], axis=1)
+    signs = np.cumprod(np.concatenate([[1.0], np.where(dots < 0, -1.0, 1.0)]))
+    return wxyz * signs[:, None]
+
+
+def quaternion_from_euler_frd(roll: np.ndarray, pitch: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+    """Quaternions (n, 4), scalar first, from FRD roll, pitch, yaw in rad (aerospace order z-y'-x'')."""
+    xyzw = Rotation.from_euler("ZYX", np.column_stack([yaw, pitch, roll])).as_quat()
+    return continuous(xyzw[:, [3, 0, 1, 2]])

@@ -20,21 +20,21 @@ from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.clean import drop_repeated_times, report_gaps
-from rotorid.recordings.importers.frames import half_turn_about_x, quaternion_to_frd_ned
+from rotorid.recordings.importers.mapping import half_turn_about_x, quaternion_to_frd_ned
 from rotorid.recordings.importers.report import Fault
 
-LAYOUT = (
+_LAYOUT = (
     ("time", 1), ("angular_acceleration", 3), ("angular_velocity", 3), ("quaternion_xyzw", 4),
     ("specific_force", 3), ("velocity_body", 3), ("position", 3), ("rotor_speed", 4),
     ("rotor_acceleration", 4), ("battery", 1), ("predicted_force", 3), ("predicted_moment", 3),
 )  # fmt: skip
-USED = sum(width for _, width in LAYOUT)
+USED = sum(width for _, width in _LAYOUT)
 PREDICTED_FORCE = tuple(f"neurobem_force_{a}_n" for a in "xyz")
 PREDICTED_MOMENT = tuple(f"neurobem_moment_{a}_n_m" for a in "xyz")
 ANGULAR_ACCELERATION = tuple(f"angular_acceleration_{a}_rad_s2" for a in "xyz")
 
 
-def read_matrix(path: Path) -> np.ndarray:
+def _read_matrix(path: Path) -> np.ndarray:
     """The one matrix in a NeuroBEM `.mat`, shape (n, at least 35)."""
     if not Path(path).is_file():
         raise InputError(f"{path}: file is missing")
@@ -54,7 +54,7 @@ def read_matrix(path: Path) -> np.ndarray:
 def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[Fault]]:
     """Contract columns of a NeuroBEM matrix; NeuroBEM's prediction and accelerations ride as own columns."""
     parts, start = {}, 0
-    for name, width in LAYOUT:
+    for name, width in _LAYOUT:
         parts[name] = matrix[:, start : start + width]
         start += width
     attitude = Rotation.from_quat(parts["quaternion_xyzw"])
@@ -113,4 +113,4 @@ def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[Fault]]:
 
 def read_neurobem(path: Path) -> tuple[pd.DataFrame, list[Fault]]:
     """One NeuroBEM flight in contract columns, and its faults."""
-    return convert(read_matrix(path))
+    return convert(_read_matrix(path))

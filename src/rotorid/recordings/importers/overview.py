@@ -13,7 +13,7 @@ from rotorid.recordings.check import check_set
 from rotorid.recordings.importers.public_sets import PUBLIC_SETS
 from rotorid.recordings.importers.report import read_report
 
-FAULT_NAMES = {
+_FAULT_NAMES = {
     "byte_order_mark": "byte-order mark",
     "encoding": "encoding",
     "line_ends": "line ends",
@@ -43,14 +43,14 @@ FAULT_NAMES = {
     "second_sensor": "second sensor",
     "estimate": "estimate that did not fly the vehicle",
 }
-HOW_TO_HAVE = {
+_HOW_TO_HAVE = {
     "folder": "ROTORID_PUBLIC_DATA names a folder and files are taken from there alone, so put the missing ones where "
     "the list says and run again, or unset it and run again where the network reaches their repositories",
     "network": "ROTORID_PUBLIC_DATA is not set and files are downloaded, so run again where the network reaches their "
     "repositories, after deleting results/public/<source>.json, or set it to a folder that holds the files",
 }
 """What to do about files that are missing, by where they were looked for."""
-CHOICES = {"cut", "on_ground"}
+_CHOICES = {"cut", "on_ground"}
 """Kinds that note what part of a log was kept, which is no fault of the log."""
 
 
@@ -105,14 +105,14 @@ def faults(folders: Sequence[Path]) -> pd.DataFrame:
     for folder in folders:
         report = read_report(Path(folder))
         for fault in report["faults"]:
-            if fault["kind"] in CHOICES:
+            if fault["kind"] in _CHOICES:
                 continue
             recipe = PUBLIC_SETS[report["set"]]
             row = rows.setdefault(
                 (recipe.source, fault["kind"]),
                 {
                     "source": recipe.source,
-                    "fault": FAULT_NAMES.get(fault["kind"], fault["kind"]),
+                    "fault": _FAULT_NAMES.get(fault["kind"], fault["kind"]),
                     "runs": set(),
                     "found": fault["found"],
                     "action": fault["action"],
@@ -132,5 +132,5 @@ def state(table: pd.DataFrame) -> dict:
         "sources": len(table),
         "obtained": int((table["obtained"] == "yes").sum()),
         "missing": missing[["source", "reason"]].to_dict("records"),
-        "how": "; ".join(how for place, how in HOW_TO_HAVE.items() if place in places),
+        "how": "; ".join(how for place, how in _HOW_TO_HAVE.items() if place in places),
     }

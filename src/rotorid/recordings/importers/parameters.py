@@ -12,7 +12,7 @@ import numpy as np
 from rotorid.recordings.importers.report import Fault
 
 Values = Mapping[str, float]
-MOST_LISTED = 4
+_MOST_LISTED = 4
 """Changes of one parameter that a sentence lists."""
 
 
@@ -70,8 +70,8 @@ class Parameters:
             if known is None:
                 continue
             own = [(t, v) for t, n, v in self.changes if n == name]
-            steps = ", ".join(f"to {v:g} at {(t - zero) * unit_s:.2f} s" for t, v in own[:MOST_LISTED])
-            more = f" and {len(own) - MOST_LISTED} times more" if len(own) > MOST_LISTED else ""
+            steps = ", ".join(f"to {v:g} at {(t - zero) * unit_s:.2f} s" for t, v in own[:_MOST_LISTED])
+            more = f" and {len(own) - _MOST_LISTED} times more" if len(own) > _MOST_LISTED else ""
             seen = f"{name} was set from {self.start[name]:g} {steps}{more} of the log"
             found.append(Fault("parameter_changed", known[0], seen, known[1], len(own)))
         return found

@@ -23,15 +23,15 @@ from rotorid.recordings.templates import names
 from rotorid.recordings.templates import read as read_template
 from rotorid.recordings.vehicle import Vehicle
 
-WEIGHED, GUESSED_MASS = 0.02, 0.3
-FROM_FLIGHT, GUESSED_COEFFICIENT = 0.1, 0.5
-GUESSED_INERTIA, GUESSED_TORQUE = 0.5, 0.5
-CALM_RAD_S = 1.0
+_WEIGHED, _GUESSED_MASS = 0.02, 0.3
+_FROM_FLIGHT, _GUESSED_COEFFICIENT = 0.1, 0.5
+_GUESSED_INERTIA, _GUESSED_TORQUE = 0.5, 0.5
+_CALM_RAD_S = 1.0
 """Body rate below which thrust and speeds of nearby instants are compared."""
 
 
 @dataclass(frozen=True)
-class Proposal:
+class _Proposal:
     """The text of a `vehicle.yaml`, and a sentence for each value that is proposed, not known."""
 
     text: str
@@ -49,7 +49,7 @@ def propose(
     template: Vehicle,
     template_name: str,
     mass_kg: float | None = None,
-) -> Proposal:
+) -> _Proposal:
     """A vehicle for flights in contract columns; InputError where the rotors of log and template do not agree."""
     remarks: list[str] = []
     mass, mass_trust, mass_note = _mass(mass_kg, template, template_name, remarks)
@@ -99,10 +99,10 @@ def propose(
         "# ground_z_m:   world z of the ground (down is positive), where no height above ground is recorded",
         "trust: "
         f"{{mass_kg: {mass_trust:g}, thrust_coefficient_n_s2: {thrust_trust:g}, "
-        f"torque_coefficient_n_m_s2: {GUESSED_TORQUE:g}, inertia_xx_kg_m2: {GUESSED_INERTIA:g}, "
-        f"inertia_yy_kg_m2: {GUESSED_INERTIA:g}, inertia_zz_kg_m2: {GUESSED_INERTIA:g}}}",
+        f"torque_coefficient_n_m_s2: {_GUESSED_TORQUE:g}, inertia_xx_kg_m2: {_GUESSED_INERTIA:g}, "
+        f"inertia_yy_kg_m2: {_GUESSED_INERTIA:g}, inertia_zz_kg_m2: {_GUESSED_INERTIA:g}}}",
     ]
-    return Proposal("\n".join(lines) + "\n", tuple(remarks))
+    return _Proposal("\n".join(lines) + "\n", tuple(remarks))
 
 
 def closer_template(lift_n_s2_kg: float, template: Vehicle, template_name: str) -> str | None:
@@ -127,12 +127,12 @@ def _mass(mass_kg, template: Vehicle, template_name: str, remarks: list[str]) ->
     if mass_kg is not None:
         if not mass_kg > 0:
             raise InputError(f"--mass-kg is {mass_kg:g}, expected more than 0")
-        return mass_kg, WEIGHED, "as you stated it"
+        return mass_kg, _WEIGHED, "as you stated it"
     remarks.append(
         f"the mass is {template.mass_kg:g} kg by template {template_name}: weigh the vehicle and give --mass-kg, "
         "since every force stands on it"
     )
-    return template.mass_kg, GUESSED_MASS, f"PROPOSED: template {template_name}; weigh it"
+    return template.mass_kg, _GUESSED_MASS, f"PROPOSED: template {template_name}; weigh it"
 
 
 def _rotors(known: Known, template: Vehicle, template_name: str, remarks: list[str]):
@@ -193,10 +193,10 @@ def _thrust(tables, mass: float, limit: float | None, template: Vehicle, count: 
     if value is None:
         remarks.append("the thrust coefficient is the template's: the flights hold nothing to take it from")
         value = float(template.thrust_coefficients_n_s2()[0])
-        return value, GUESSED_COEFFICIENT, "PROPOSED: template"
+        return value, _GUESSED_COEFFICIENT, "PROPOSED: template"
     what = "squared rotor speeds" if limit is None else "squared throttles times limit"
     remarks.append(f"the thrust coefficient is {value:.4g} N s2: thrust over the sum of {what} in these flights")
-    trust = FROM_FLIGHT if limit is None else 2 * FROM_FLIGHT
+    trust = _FROM_FLIGHT if limit is None else 2 * _FROM_FLIGHT
     return value, trust, f"PROPOSED: thrust over {what} in these flights; ground it by a thrust stand"
 
 
@@ -241,5 +241,5 @@ def _specific_lift(table: pd.DataFrame, time_s: np.ndarray) -> np.ndarray:
         rates = table[[c.TIME, *c.ANGULAR_VELOCITY]].dropna()
         size = np.linalg.norm(rates[list(c.ANGULAR_VELOCITY)].to_numpy(float), axis=1)
         if len(size):
-            lift = np.where(np.interp(time_s, rates[c.TIME], size) < CALM_RAD_S, lift, np.nan)
+            lift = np.where(np.interp(time_s, rates[c.TIME], size) < _CALM_RAD_S, lift, np.nan)
     return lift

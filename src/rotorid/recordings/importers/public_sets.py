@@ -2,12 +2,25 @@
 
 `build` writes one set: `vehicle.yaml` (copied with its comments on where each value comes from), one Parquet
 file a run, and `import_report.json` with every fault met on the way.
+
+Crazyflie on a scale (IMRCLab): CSV of PWM, battery, four rotor speeds and the thrust of the whole vehicle.
+
+Two layouts: `pwm,vbat[V],rpm1..4,thrust[g]` with steady points in random order, and
+`weight[g],pwm,vbat[V],rpm1..4,v[V],i[A],p[W]` as a sweep. Neither has a clock: rows are counted as seconds.
+
+Getting the public recordings: from a folder that is there or by download; SHA-256 is always checked.
+
+Nothing here is fatal: a file that cannot be had is named with the reason, and the pipeline goes on without.
 """
 
 from __future__ import annotations
 
+import hashlib
 import re
 import shutil
+import urllib.error
+import urllib.parse
+import urllib.request
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,26 +28,34 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from rotorid.errors import InputError
 from rotorid.recordings import RecordingSet, Run, read_vehicle, write_set
+from rotorid.recordings import columns as c
+from rotorid.recordings.files import sha256
 from rotorid.recordings.importers import crazyflie
-from rotorid.recordings.importers.imrc_bench_csv import read_imrc_bench
 from rotorid.recordings.importers.neurobem import read_neurobem
-from rotorid.recordings.importers.obtain import Obtained
 from rotorid.recordings.importers.rcbenchmark import read_rcbenchmark
 from rotorid.recordings.importers.report import Fault, ImportReport
 from rotorid.recordings.importers.vicon_csv import read_vicon_csv
+from rotorid.recordings.tables import place, read_csv
 
+_RAW_FILES = "https://raw.githubusercontent.com"
+_TIMEOUT_S = 20.0
+_GRAM_FORCE_N = 9.80665e-3
+RPM = 2 * np.pi / 60
+_FULL_SCALE = 65536.0
+SPEEDS = ("rpm1", "rpm2", "rpm3", "rpm4")
 Runs = dict[str, tuple[pd.DataFrame, list[Fault]]]
 
-PROPELLERS = {"1": "t5040c", "2": "t5045c", "5": "hq5x4", "6": "lumenier5x45"}
+_PROPELLERS = {"1": "t5040c", "2": "t5045c", "5": "hq5x4", "6": "lumenier5x45"}
 """5-inch propellers: Cyclone T5040C and T5045C (3 blades), HQ 5x4 (4 blades), Lumenier 5x4.5 (2 blades)."""
-MOTORS = "abcdefghijklm"
+_MOTORS = "abcdefghijklm"
 CELLS = {"7": "2s", "11": "3s"}
 FLU = "body forward-left-up and world z up, turned by half a turn about x into FRD and NED"
 
 
 @dataclass(frozen=True)
-class PublicSet:
+class _PublicSet:
     """Recipe of one set: source folder, files in it, how to read them, vehicle file, words for the report."""
 
     source: str
@@ -64,26 +85,27 @@ def _crazyflie(path: Path, prefix: str, stretches: list[tuple[float, float]] | N
 def _imrc_brushless(path: Path, name: str) -> Runs:
     """The controller's map of thrust to PWM is published: it gives the commanded speed of each rotor."""
     return {
-        run: (with_commanded_speed(table), faults) for run, (table, faults) in _crazyflie(path, Path(name).name).items()
+        run: (_with_commanded_speed(table), faults)
+        for run, (table, faults) in _crazyflie(path, Path(name).name).items()
     }
 
 
-PWM_OF_GRAMS = (0.16609668469985447, 0.02297914810965436, 0.0001878280261246769)
+_PWM_OF_GRAMS = (0.16609668469985447, 0.02297914810965436, 0.0001878280261246769)
 """Coefficients d00, d10, d20 of PWM fraction over grams of thrust, as flown (upstream README)."""
-BRUSHLESS_C_F = 3.91e-8
+_BRUSHLESS_C_F = 3.91e-8
 
 
-def with_commanded_speed(table: pd.DataFrame) -> pd.DataFrame:
+def _with_commanded_speed(table: pd.DataFrame) -> pd.DataFrame:
     """Throttles replaced by commanded rotor speeds, by the flight controller's own map from thrust to PWM.
 
     u = d00 + d10 f + d20 f² with f in grams of thrust; solved for f, and ω = sqrt(f g / C_F).
     """
-    d00, d10, d20 = PWM_OF_GRAMS
+    d00, d10, d20 = _PWM_OF_GRAMS
     table = table.copy()
     for i, throttle in enumerate(crazyflie.THROTTLES, start=1):
         u = table[throttle].to_numpy()
         grams = (-d10 + np.sqrt(d10**2 - 4 * d20 * np.minimum(d00 - u, 0))) / (2 * d20)
-        speed = np.sqrt(grams * 1e-3 * 9.81 / BRUSHLESS_C_F)
+        speed = np.sqrt(grams * 1e-3 * 9.81 / _BRUSHLESS_C_F)
         place = table.columns.get_loc(throttle)
         table.insert(place, f"rotor_command_{i}_rad_s", speed)
         table = table.rename(columns={throttle: f"pwm_fraction_{i}"})
@@ -103,7 +125,7 @@ def _bench(path: Path, name: str) -> Runs:
     return {f"{motor}_{CELLS[voltage]}": read_rcbenchmark(path)}
 
 
-def _public_sets() -> dict[str, PublicSet]:
+def _public_sets() -> dict[str, _PublicSet]:
     flights = ("20210218170320seg2", "20210218171908seg2", "20210223104803seg2", "20210223114138seg3")
     brushless = ("00", "01", "12", "13", "17", "18", "22", "24", "27")
     pad = {
@@ -112,7 +134,7 @@ def _public_sets() -> dict[str, PublicSet]:
         "cut": ("cut_propeller_M3_3mm", range(3)),
     }
     sets = {
-        "neurobem": PublicSet(
+        "neurobem": _PublicSet(
             "neurobem",
             tuple(f"bemnn{f}.mat" for f in flights),
             _neurobem,
@@ -123,7 +145,7 @@ def _public_sets() -> dict[str, PublicSet]:
                 "columns angular_acceleration_*_rad_s2 come from the files",
             ),
         ),
-        "appius-ground-effect": PublicSet(
+        "appius-ground-effect": _PublicSet(
             "appius-ground-effect",
             ("HOVERING.csv", "VERTICAL_SPEEDS.csv"),
             _whole(read_vicon_csv),
@@ -132,7 +154,7 @@ def _public_sets() -> dict[str, PublicSet]:
             "and +g roll); only z is turned over",
             notes=("rotor speeds arrive at about 3 Hz, poses at about 9 Hz: repeats are empty cells",),
         ),
-        "imrc-brushless": PublicSet(
+        "imrc-brushless": _PublicSet(
             "imrc-crazyflie-rpm",
             tuple(f"brushless_flights/eckart{n}" for n in brushless),
             _imrc_brushless,
@@ -143,14 +165,14 @@ def _public_sets() -> dict[str, PublicSet]:
                 "map of thrust to PWM; the PWM itself rides along as pwm_fraction",
             ),
         ),
-        "imrc-brushed": PublicSet(
+        "imrc-brushed": _PublicSet(
             "imrc-crazyflie-rpm",
             ("brushed_flights/jana01", "brushed_flights/jana24"),
             lambda path, name: _crazyflie(path, Path(name).name),
             "imrc-brushed",
             FLU,
         ),
-        "crazyflie-arpl-log10": PublicSet(
+        "crazyflie-arpl-log10": _PublicSet(
             "crazyflie-arpl",
             ("log10",),
             lambda path, name: _crazyflie(path, "log10", [(35.0, 65.0)]),
@@ -161,7 +183,7 @@ def _public_sets() -> dict[str, PublicSet]:
                 "upstream's notebook takes g as 9.18 (cell 6): its published thrust is 6.4 % low",
             ),
         ),
-        "crazyflie-arpl-log15": PublicSet(
+        "crazyflie-arpl-log15": _PublicSet(
             "crazyflie-arpl",
             ("log15",),
             lambda path, name: _crazyflie(path, "log15", [(55.0, 90.0)]),
@@ -183,7 +205,7 @@ def _public_sets() -> dict[str, PublicSet]:
         "guards": ("brushless", ("cf21bl_guards/feb25_2026_0",)),
     }
     for name, (vehicle, files) in scales.items():
-        sets[f"imrc-bench-{name}"] = PublicSet(
+        sets[f"imrc-bench-{name}"] = _PublicSet(
             "imrc-crazyflie-rpm",
             tuple(f"{bench}/{file}.csv" for file in files),
             _scale,
@@ -191,7 +213,7 @@ def _public_sets() -> dict[str, PublicSet]:
             "thrust of the whole vehicle along -z of the body",
         )
     for label, (folder, numbers) in pad.items():
-        sets[f"crazypad-{label}"] = PublicSet(
+        sets[f"crazypad-{label}"] = _PublicSet(
             "crazypad",
             tuple(f"{folder}/E9_log{n:02d}" for n in numbers),
             _crazypad,
@@ -199,17 +221,17 @@ def _public_sets() -> dict[str, PublicSet]:
             FLU,
             notes=("specific force is the state estimate's world acceleration turned into the body",),
         )
-    for digit, propeller in PROPELLERS.items():
-        for motor in (None, *MOTORS):
-            runs = [(m, v) for m in (motor or MOTORS) for v in CELLS]
+    for digit, propeller in _PROPELLERS.items():
+        for motor in (None, *_MOTORS):
+            runs = [(m, v) for m in (motor or _MOTORS) for v in CELLS]
             name = f"strawson-{propeller}" + (f"-{motor}" if motor else "")
-            sets[name] = PublicSet(
+            sets[name] = _PublicSet(
                 "strawson-5inch-bench",
                 tuple(f"rawdata/{m}{digit}_{v}.csv" for m, v in runs),
                 _bench,
                 "strawson-5inch-bench",
                 "thrust along -z of the body, passed on to the sensor",
-                held_out=(f"{motor}_2s",) if motor else tuple(f"{m}_2s" for m in MOTORS),
+                held_out=(f"{motor}_2s",) if motor else tuple(f"{m}_2s" for m in _MOTORS),
                 notes=("held out: the runs on two cells, so that supply voltage is predicted, not fitted",),
             )
     return sets
@@ -271,3 +293,122 @@ def build(name: str, obtained: Obtained, source: dict, vehicles: Path, parent: P
 def sets_of(source: str) -> list[str]:
     """Names of the sets made from one source."""
     return [name for name, recipe in PUBLIC_SETS.items() if recipe.source == source]
+
+
+def read_imrc_bench(path: Path) -> tuple[pd.DataFrame, list[Fault]]:
+    """One bench run in contract columns (kind stand, thrust along -z), and its faults."""
+    raw = read_csv(Path(path))
+    thrust = next((name for name in ("thrust[g]", "weight[g]") if name in raw), None)
+    missing = [name for name in ("pwm", "vbat[V]", *SPEEDS) if name not in raw]
+    if thrust is None or missing:
+        raise InputError(f"{path}, line 1: expected the column {missing[0] if missing else 'thrust[g]'}")
+    for name in ("pwm", "vbat[V]", *SPEEDS, thrust):
+        if raw[name].isna().any():
+            row = int(np.flatnonzero(raw[name].isna())[0])
+            raise InputError(f"{path}, {place(path, row)}, column {name}: is empty, expected a number")
+    columns = {c.TIME: np.arange(len(raw), dtype=float)}
+    throttle = raw["pwm"].to_numpy(float) / _FULL_SCALE
+    columns |= {name: throttle for name in c.rotor_columns("throttle", 4)}
+    for name, column in zip(SPEEDS, c.rotor_columns("rotor_speed", 4), strict=True):
+        columns[column] = raw[name].to_numpy(float) * RPM
+    columns["force_z_n"] = -raw[thrust].to_numpy(float) * _GRAM_FORCE_N
+    columns[c.BATTERY_VOLTAGE] = raw["vbat[V]"].to_numpy(float)
+    if "i[A]" in raw:
+        columns[c.BATTERY_CURRENT] = raw["i[A]"].to_numpy(float)
+    table = pd.DataFrame(columns)
+    faults = [Fault("no_clock", c.TIME, "rows have no time", "rows counted as seconds", len(table))]
+    for column in c.rotor_columns("rotor_speed", 4):
+        lost = (table[column] == 0) & (throttle > 0.3)
+        if lost.any():
+            found = f"speed reads 0 in {int(lost.sum())} rows while the motor is driven"
+            faults.append(Fault("speed_dropout", column, found, "kept as recorded", int(lost.sum())))
+    return table, faults
+
+
+@dataclass(frozen=True)
+class Obtained:
+    """What was had of one source: its folder, the files that are right, and why others are not."""
+
+    source: str
+    folder: Path
+    files: tuple[str, ...]
+    missing: dict[str, str]
+
+    @property
+    def complete(self) -> bool:
+        return not self.missing
+
+
+def address(source: dict, file: dict, base: str = _RAW_FILES) -> str:
+    """Where a file of the manifest is downloaded: repository, commit and path upstream."""
+    path = urllib.parse.quote(file.get("upstream", file["path"]))
+    return f"{base}/{source['repository']}/{source['commit']}/{path}"
+
+
+def _download(url: str, wanted: str, path: Path) -> None:
+    with urllib.request.urlopen(url, timeout=_TIMEOUT_S) as answer:
+        data = answer.read()
+    found = hashlib.sha256(data).hexdigest()
+    if found != wanted:
+        raise InputError(f"{url}: SHA-256 is {found}, expected {wanted}")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(path.name + ".part")
+    partial.write_bytes(data)
+    partial.rename(path)
+
+
+def _from_folder(name: str, source: dict, folder: Path) -> Obtained:
+    files, missing = [], {}
+    for file in source["files"]:
+        path = folder / name / file["path"]
+        if not path.is_file():
+            missing[file["path"]] = f"{path} is not there"
+        elif sha256(path) != file["sha256"]:
+            missing[file["path"]] = f"{path} is not the file of the manifest (SHA-256 differs)"
+        else:
+            files.append(file["path"])
+    return Obtained(name, folder / name, tuple(files), missing)
+
+
+def _from_network(name: str, source: dict, cache: Path, base: str) -> Obtained:
+    files, missing, offline = [], {}, ""
+    for file in source["files"]:
+        path = cache / name / file["path"]
+        if path.is_file() and sha256(path) == file["sha256"]:
+            files.append(file["path"])
+            continue
+        if offline:
+            missing[file["path"]] = offline
+            continue
+        url = address(source, file, base)
+        try:
+            _download(url, file["sha256"], path)
+            files.append(file["path"])
+        except InputError as error:
+            missing[file["path"]] = str(error)
+        except urllib.error.HTTPError as error:
+            missing[file["path"]] = f"{url}: the server answers {error.code}"
+        except OSError as error:
+            host = urllib.parse.urlsplit(base).netloc
+            offline = f"no answer from {host} ({getattr(error, 'reason', error)})"
+            missing[file["path"]] = offline
+    return Obtained(name, cache / name, tuple(files), missing)
+
+
+def obtain(name: str, source: dict, folder: Path | None, cache: Path, base: str = _RAW_FILES) -> Obtained:
+    """Files of one source of the manifest.
+
+    Parameters
+    ----------
+    name, source
+        Name and entry of the source in the manifest.
+    folder
+        A folder with the public recordings (what ROTORID_PUBLIC_DATA names), or None to download.
+    cache
+        Where downloads are kept.
+    base
+        Server of raw files.
+    """
+    if folder is not None:
+        return _from_folder(name, source, Path(folder))
+    return _from_network(name, source, Path(cache), base)

@@ -28,15 +28,15 @@ from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import in_the_air
 from rotorid.recordings.importers.clean import drop_repeated_times, further_motors, one_sense, report_gaps
-from rotorid.recordings.importers.frames import continuous
+from rotorid.recordings.importers.mapping import continuous
 from rotorid.recordings.importers.parameters import Parameters, Values
 from rotorid.recordings.importers.report import Fault
 
 RPM = 2 * np.pi / 60
-FIRST_MOTOR = 101
+_FIRST_MOTOR = 101
 """Number of motor 1 among PX4's output functions."""
-MOST_MOTORS = 12
-ROTORS_OF_TYPE = {0: 0, 2: 4, 13: 6, 14: 8, 29: 12, 35: 10, 43: 0}
+_MOST_MOTORS = 12
+_ROTORS_OF_TYPE = {0: 0, 2: 4, 13: 6, 14: 8, 29: 12, 35: 10, 43: 0}
 """Rotors by MAV_TYPE of multirotors; 0 where the type states no number."""
 OTHER_TYPES = {1: "a fixed wing", 3: "a coaxial helicopter", 4: "a helicopter", 7: "an airship", 10: "a rover"}
 OTHER_TYPES |= {11: "a boat", 12: "a submarine", 15: "a tricopter, whose tail rotor a servo tilts"}
@@ -45,16 +45,16 @@ OTHER_AIRFRAMES = {1: "a fixed wing", 2: "a VTOL", 3: "a VTOL", 4: "a VTOL", 5: 
 OTHER_AIRFRAMES |= {7: "a vehicle whose motors point in several directions", 8: "a multirotor with rotors that tilt"}
 OTHER_AIRFRAMES |= {n: "a helicopter" for n in (10, 11, 12)} | {n: "a spacecraft" for n in (14, 15)}
 """CA_AIRFRAME of what is no multirotor of fixed rotors."""
-CHANGED = (
+_CHANGED = (
     (r"THR_MDL_FAC|CA_R_REV|PWM_(MAIN|AUX)_\w+", "throttle", "each value is read by what held then"),
     (r"CA_ROTOR\w+|CA_AIRFRAME|MAV_TYPE", "vehicle.yaml", "the value that held for most of the flight is taken"),
     (r"MPC_THR_HOVER|EKF2_BCOEF_[XY]|EKF2_MCOEF", "", "no column depends on it"),
 )
 """Parameters on which a value depends, or that `rotorid parameters` states: names, column, what a change means."""
-PULSE_US = (1000.0, 2000.0)
+_PULSE_US = (1000.0, 2000.0)
 """Pulse widths of no and full throttle where no parameter states them."""
-PLAUSIBLE_PULSE_US = (500.0, 2500.0)
-AROUND_RESET_S = 0.2
+_PLAUSIBLE_PULSE_US = (500.0, 2500.0)
+_AROUND_RESET_S = 0.2
 RESETS = (
     ("vehicle_local_position", "xy_reset_counter", ("delta_xy[0]", "delta_xy[1]"), 0.02),
     ("vehicle_local_position", "z_reset_counter", ("delta_z",), 0.02),
@@ -65,9 +65,9 @@ RESETS = (
 )
 """What the estimator sets anew at once: topic, counter, the fields that hold by how much, and how much of it (m, m/s,
 rad; half of the angle) is within the noise of an estimate."""
-ARMED = 2
+_ARMED = 2
 
-Topics = Mapping[str, Sequence[Mapping[str, np.ndarray]]]
+_Topics = Mapping[str, Sequence[Mapping[str, np.ndarray]]]
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Px4Log:
     """What is read of a log: instances of each topic in order, parameters, seconds lost, damage, bytes of a message in
     which the file ends."""
 
-    topics: Topics
+    topics: _Topics
     parameters: Parameters = Parameters({})
     lost_s: tuple[float, ...] = ()
     damaged: bool = False
@@ -83,7 +83,7 @@ class Px4Log:
 
 
 @dataclass(frozen=True)
-class Converted:
+class _Converted:
     """A whole log in contract columns.
 
     `flying` (n,) says in which rows the vehicle is in the air, as far as the log shows; `jumps` (n,) in which the
@@ -174,19 +174,21 @@ def rotor_count(log: Px4Log) -> int:
     multirotor of fixed rotors."""
     values = in_flight(log)
     kind, airframe = int(values.get("MAV_TYPE", 2)), int(values.get("CA_AIRFRAME", 0))
-    if kind not in ROTORS_OF_TYPE or airframe in OTHER_AIRFRAMES:
+    if kind not in _ROTORS_OF_TYPE or airframe in OTHER_AIRFRAMES:
         what, by = OTHER_TYPES.get(kind, "a vehicle that is not known here"), f"MAV_TYPE {kind}"
-        if kind in ROTORS_OF_TYPE:
+        if kind in _ROTORS_OF_TYPE:
             what, by = OTHER_AIRFRAMES[airframe], f"CA_AIRFRAME {airframe}"
         raise InputError(f"the log is of {what} ({by}); only multirotors can be imported")
-    stated = int(values.get("CA_ROTOR_COUNT", 0)) or (ROTORS_OF_TYPE[kind] if "MAV_TYPE" in values else 0)
+    stated = int(values.get("CA_ROTOR_COUNT", 0)) or (_ROTORS_OF_TYPE[kind] if "MAV_TYPE" in values else 0)
     return stated or _driven_motors(log.topics) or 4
 
 
-def _driven_motors(topics: Topics) -> int:
+def _driven_motors(topics: _Topics) -> int:
     """Number of motors to which `actuator_motors` gives a value; the others are NaN throughout."""
     motors = _first(topics, "actuator_motors")
-    given = [i for i, name in enumerate(_indexed("control", MOST_MOTORS), 1) if np.isfinite(motors.get(name, [])).any()]
+    given = [
+        i for i, name in enumerate(_indexed("control", _MOST_MOTORS), 1) if np.isfinite(motors.get(name, [])).any()
+    ]
     return max(given, default=0)
 
 
@@ -225,7 +227,7 @@ def _stack(data: Mapping[str, np.ndarray], fields: Sequence[str]) -> np.ndarray 
     return np.column_stack([data[f] for f in fields]).astype(float) if set(fields) <= set(data) else None
 
 
-def _first(topics: Topics, name: str) -> Mapping[str, np.ndarray]:
+def _first(topics: _Topics, name: str) -> Mapping[str, np.ndarray]:
     return topics.get(name, [{}])[0]
 
 
@@ -241,7 +243,7 @@ def _throttles(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray,
         times = _time(motors, sampled=False)
         faults = _more_rotors("actuator_motors", _driven_motors(log.topics), rotors)
         values, reversed_ = one_sense(values, c.rotor_columns("throttle", rotors), 1.0)
-        for start, stop, stated in log.parameters.spans(CHANGED[0][0]):
+        for start, stop, stated in log.parameters.spans(_CHANGED[0][0]):
             inside, curve = (times >= start) & (times < stop), float(stated.get("THR_MDL_FAC", 0.0))
             if 0 < curve <= 1 and inside.any():  # PX4 turns the thrust asked for into the signal by this curve
                 half = (1 - curve) / (2 * curve)
@@ -286,11 +288,11 @@ def _from_pulses(log: Px4Log, instances, rotors: int, names: str):
         faults += _more_rotors("actuator_outputs", rotors + len(further_motors(every, rotors)), rotors)
     times, pulses = _time(instances[chosen], sampled=False), stacks[chosen]
     turning = pulses[pulses > 0]
-    if len(turning) and not (turning.min() >= PLAUSIBLE_PULSE_US[0] and turning.max() <= PLAUSIBLE_PULSE_US[1]):
+    if len(turning) and not (turning.min() >= _PLAUSIBLE_PULSE_US[0] and turning.max() <= _PLAUSIBLE_PULSE_US[1]):
         found = f"outputs from {turning.min():g} to {turning.max():g} are no pulse widths in µs"
         return None, np.zeros(0), [*faults, Fault("unit", names, found, "no throttle columns", len(pulses))]
     throttle = np.full(pulses.shape, np.nan)
-    for start, stop, values in log.parameters.spans(CHANGED[0][0]):
+    for start, stop, values in log.parameters.spans(_CHANGED[0][0]):
         inside = (times >= start) & (times < stop)
         low, high, stated = _pulse_range(values, port, outputs)
         throttle[inside] = (pulses[inside] - low) / (high - low)
@@ -316,7 +318,7 @@ def _outputs_of_motors(parameters: Values, rotors: int) -> tuple[str | int, list
     for port in ("MAIN", "AUX"):
         named = rf"PWM_{port}_FUNC(\d+)"
         functions = {int(v): int(m[1]) for k, v in parameters.items() if (m := re.fullmatch(named, k))}
-        by_port[port] = [functions.get(FIRST_MOTOR + i) for i in range(rotors)]
+        by_port[port] = [functions.get(_FIRST_MOTOR + i) for i in range(rotors)]
         stated |= bool(functions)
     if not stated:
         return "MAIN", list(range(rotors))
@@ -327,7 +329,7 @@ def _outputs_of_motors(parameters: Values, rotors: int) -> tuple[str | int, list
 def _pulse_range(parameters: Values, port: str, outputs: Sequence[int]) -> tuple[np.ndarray, np.ndarray, bool]:
     """Pulse widths of no and full throttle by output, µs, and whether a parameter states them."""
     ends, stated = [], True
-    for word, default in zip(("MIN", "MAX"), PULSE_US, strict=True):
+    for word, default in zip(("MIN", "MAX"), _PULSE_US, strict=True):
         common = next((parameters[k] for k in (f"PWM_{port}_{word}", f"PWM_{word}") if parameters.get(k, 0) > 0), None)
         own = [parameters.get(f"PWM_{port}_{word}{k + 1}", -1) for k in outputs]
         stated &= common is not None or all(v > 0 for v in own)
@@ -344,7 +346,7 @@ def _speeds(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray, li
         return None, np.zeros(0), []
     slots = [i for i in range(8) if f"esc[{i}].esc_rpm" in data]
     function = {i: int(np.median(data.get(f"esc[{i}].actuator_function", [0]))) for i in slots}
-    by_function = {f - FIRST_MOTOR: i for i, f in function.items() if f >= FIRST_MOTOR}
+    by_function = {f - _FIRST_MOTOR: i for i, f in function.items() if f >= _FIRST_MOTOR}
     place = {r: by_function.get(r, r) if by_function else r for r in range(rotors)}
     if not set(place.values()) <= set(slots):
         found = f"esc_status holds {len(slots)} controllers for {rotors} rotors"
@@ -368,7 +370,7 @@ def _speeds(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray, li
 # The rest -----------------------------------------------------------------------------------------
 
 
-def _inertial(topics: Topics) -> dict[str, tuple[tuple[str, ...], np.ndarray, np.ndarray]]:
+def _inertial(topics: _Topics) -> dict[str, tuple[tuple[str, ...], np.ndarray, np.ndarray]]:
     """Accelerometer and gyroscope: topic to (columns, time in µs, values), each from the topic with most samples."""
     combined = _first(topics, "sensor_combined")
     choices = {
@@ -422,7 +424,7 @@ def _local_position(data: Mapping[str, np.ndarray]) -> tuple[dict[tuple[str, ...
     return values, faults
 
 
-def _batteries(topics: Topics) -> tuple[list[tuple[tuple[str, ...], np.ndarray, np.ndarray]], list[Fault]]:
+def _batteries(topics: _Topics) -> tuple[list[tuple[tuple[str, ...], np.ndarray, np.ndarray]], list[Fault]]:
     """Voltage and current of every battery; those after the first under names of their own."""
     out, faults, number = [], [], 0
     for data in topics.get("battery_status", []):
@@ -447,7 +449,7 @@ def _batteries(topics: Topics) -> tuple[list[tuple[tuple[str, ...], np.ndarray, 
     return out, faults
 
 
-def _resets(topics: Topics) -> np.ndarray:
+def _resets(topics: _Topics) -> np.ndarray:
     """Times, µs, at which the estimator of PX4 jumped in position, velocity, heading or attitude."""
     jumps = [np.zeros(0, np.int64)]
     for topic, counter, fields, small in RESETS:
@@ -473,18 +475,18 @@ def _flying(log: Px4Log, grid: np.ndarray) -> np.ndarray | None:
             if name in land:
                 up &= _held(grid, time, land[name], 1.0) < 0.5
     if "arming_state" in status:
-        up &= _held(grid, _time(status), status["arming_state"], 0.0) == ARMED
+        up &= _held(grid, _time(status), status["arming_state"], 0.0) == _ARMED
     return in_the_air.without_pauses(up, (grid - grid[0]) * 1e-6)
 
 
-def _clock(topics: Topics) -> np.ndarray:
+def _clock(topics: _Topics) -> np.ndarray:
     """Times, µs, of the inertial topic with most samples, or of the attitude; empty where there is none."""
     attitude = _first(topics, "vehicle_attitude")
     clocks = [time for _, time, _ in _inertial(topics).values()] + ([_time(attitude)] if attitude else [])
     return max(clocks, key=len, default=np.zeros(0, np.int64))
 
 
-def convert(log: Px4Log, rotors: int) -> Converted:
+def convert(log: Px4Log, rotors: int) -> _Converted:
     """Contract columns of a whole log, its faults, and where it flies; InputError where there is no clock."""
     inertial = _inertial(log.topics)
     attitude = _first(log.topics, "vehicle_attitude")
@@ -525,12 +527,12 @@ def convert(log: Px4Log, rotors: int) -> Converted:
     faults += ground
     jumps = np.zeros(len(grid), bool)
     for reset in _resets(log.topics):
-        jumps |= np.abs(grid - reset) * 1e-6 <= AROUND_RESET_S
+        jumps |= np.abs(grid - reset) * 1e-6 <= _AROUND_RESET_S
     if jumps.any():
         times = int(np.count_nonzero(np.diff(jumps.astype(int), prepend=0) > 0))
         found = f"PX4's estimator jumped {times} times in position, velocity or attitude"
         faults.append(Fault("estimator_reset", "", found, "a run ends at each jump in the air", times))
-    faults += log.parameters.faults(CHANGED, float(grid[0]), 1e-6)
+    faults += log.parameters.faults(_CHANGED, float(grid[0]), 1e-6)
     if log.rest:
         found = f"the file ends inside a message, after {log.rest} bytes of it"
         faults.append(Fault("cut_off", "", found, "what came before is kept; the log stopped before its end", 0))
@@ -539,4 +541,4 @@ def convert(log: Px4Log, rotors: int) -> Converted:
     if log.lost_s:
         found = f"the logger lost {len(log.lost_s)} stretches, {sum(log.lost_s):.3g} s in all"
         faults.append(Fault("dropout", c.TIME, found, "left as gaps", len(log.lost_s)))
-    return Converted(table, faults + report_gaps(table), flying & ~jumps, jumps)
+    return _Converted(table, faults + report_gaps(table), flying & ~jumps, jumps)

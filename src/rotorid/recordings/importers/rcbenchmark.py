@@ -4,6 +4,8 @@ Files come as UTF-8 with a byte-order mark, UTF-8 without or latin-1, with LF, C
 writes each quantity in the unit that its user has chosen and names it in the heading: "Thrust (kgf)".
 "Motor Electrical Speed" holds mechanical revolutions (the program divided by the pole pairs already: it gives a
 plausible thrust coefficient). The 1520 has no torque.
+
+Points of a rotor test whose speed sensor lost pulses, found by their thrust.
 """
 
 from __future__ import annotations
@@ -19,10 +21,15 @@ from rotorid.recordings import columns as c
 from rotorid.recordings.importers.clean import drop_repeated_times
 from rotorid.recordings.importers.report import Fault
 from rotorid.recordings.importers.units import UNITS, bracketed, converted, unit_of
-from rotorid.recordings.lost_speeds import lost_speed
 from rotorid.recordings.vehicle import Vehicle
 
-ESC_LOW_US, ESC_HIGH_US = 1000.0, 2000.0
+_TOO_SLOW = 1.35
+"""A point whose F/ω² exceeds the run's median by this factor has lost part of its speed pulses.
+
+An offset of the balance or a curve that bends makes the low points' F/ω² smaller, not larger, in these data,
+so the rule is one-sided: it must not remove what the offset explains.
+"""
+_ESC_LOW_US, _ESC_HIGH_US = 1000.0, 2000.0
 HEADINGS: dict[str, tuple[str, str, str]] = {
     "Time": ("time", "time", "s"),
     "ESC signal": ("esc", "share", "us"),
@@ -34,8 +41,8 @@ HEADINGS: dict[str, tuple[str, str, str]] = {
     "Motor Optical Speed": ("optical", "rotor", "rpm"),
 }
 """To a heading the column here, the kind of its unit, and the unit where the heading names none."""
-NOT_ALWAYS = ("torque", "speed", "optical")
-TORQUE = c.MOMENT[2]
+_NOT_ALWAYS = ("torque", "speed", "optical")
+_TORQUE = c.MOMENT[2]
 
 
 def decode_text(data: bytes) -> tuple[str, list[Fault]]:
@@ -55,7 +62,7 @@ def decode_text(data: bytes) -> tuple[str, list[Fault]]:
     return text.replace("\r\n", "\n").replace("\r", "\n"), faults
 
 
-def read_table(text: str, where: str) -> tuple[pd.DataFrame, list[Fault]]:
+def _read_table(text: str, where: str) -> tuple[pd.DataFrame, list[Fault]]:
     """Columns of an export in SI units by the names of `HEADINGS`, and what was found.
 
     `time` s, `esc` from 0 to 1, `thrust` N, `torque` N m, `voltage` V, `current` A, `speed` and `optical` rad/s.
@@ -84,7 +91,7 @@ def read_table(text: str, where: str) -> tuple[pd.DataFrame, list[Fault]]:
                 raise InputError(f"{where}, line {line}, column {heading}: expected a number, found {cell!r}") from None
     read = {name: converted(np.array(columns[name]), kind, unit) for name, (_, kind, unit) in places.items()}
     if places["esc"][2] == "us":
-        read["esc"] = (read["esc"] - ESC_LOW_US) / (ESC_HIGH_US - ESC_LOW_US)
+        read["esc"] = (read["esc"] - _ESC_LOW_US) / (_ESC_HIGH_US - _ESC_LOW_US)
     return pd.DataFrame(read), faults
 
 
@@ -107,7 +114,7 @@ def _places(headings: list[str], where: str) -> tuple[dict[str, tuple[int, str, 
             faults.append(Fault("unit", "", f"the heading {title!r} names no unit", f"taken as {usual}", 0))
         places[name] = place, kind, unit
     for title, (name, _, _) in HEADINGS.items():
-        if name not in (*places, *NOT_ALWAYS):
+        if name not in (*places, *_NOT_ALWAYS):
             raise InputError(f"{where}, line 1: no column whose heading starts with {title!r}")
     if not {"speed", "optical"} & set(places):
         raise InputError(f"{where}, line 1: no column whose heading starts with 'Motor Electrical Speed'")
@@ -115,7 +122,7 @@ def _places(headings: list[str], where: str) -> tuple[dict[str, tuple[int, str, 
 
 
 def convert(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
-    """Contract columns of a stand with one rotor of what `read_table` gives; measured values are kept as recorded.
+    """Contract columns of a stand with one rotor of what `_read_table` gives; measured values are kept as recorded.
 
     The thrust is a force along -z of the body, which the rotor passes on to the sensor. The torque is positive while
     the rotor turns; `signed_by_spin` gives it the sign of its rotor.
@@ -178,7 +185,7 @@ def convert(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
     )
     if "torque" in raw and raw["torque"].notna().any():
         torque = raw["torque"].to_numpy()
-        table[TORQUE] = torque * (-1.0 if np.nansum(torque * speed) < 0 else 1.0)
+        table[_TORQUE] = torque * (-1.0 if np.nansum(torque * speed) < 0 else 1.0)
     table, repeated = drop_repeated_times(table)
     return table, faults + repeated
 
@@ -188,15 +195,15 @@ def signed_by_spin(runs: dict[str, pd.DataFrame], vehicle: Vehicle) -> tuple[dic
 
     The export does not say which way its torque counts: a rotor that turns ccw pushes its mount to positive z.
     """
-    mine = [name for name, table in runs.items() if TORQUE in table]
+    mine = [name for name, table in runs.items() if _TORQUE in table]
     spin = vehicle.rotors[0].spin if vehicle.rotors else "ccw"
     if not mine:
         return runs, []
     sign = 1.0 if spin == "ccw" else -1.0
     found = "an export does not say which way its torque counts"
     done = f"its sign is that of a rotor that turns {spin}, as the vehicle's file states"
-    signed = {name: runs[name].assign(**{TORQUE: sign * runs[name][TORQUE]}) for name in mine}
-    return {**runs, **signed}, [Fault("sign", TORQUE, found, done, 0)]
+    signed = {name: runs[name].assign(**{_TORQUE: sign * runs[name][_TORQUE]}) for name in mine}
+    return {**runs, **signed}, [Fault("sign", _TORQUE, found, done, 0)]
 
 
 def read_rcbenchmark(path: Path) -> tuple[pd.DataFrame, list[Fault]]:
@@ -206,6 +213,15 @@ def read_rcbenchmark(path: Path) -> tuple[pd.DataFrame, list[Fault]]:
     except FileNotFoundError:
         raise InputError(f"{path}: file is missing") from None
     text, faults = decode_text(data)
-    raw, more = read_table(text, str(path))
+    raw, more = _read_table(text, str(path))
     table, converted_ = convert(raw)
     return table, [*faults, *more, *converted_]
+
+
+def lost_speed(speed_rad_s: np.ndarray, thrust_n: np.ndarray) -> np.ndarray:
+    """Points that turn but whose speed is too low for their thrust, shape (n,), bool."""
+    turning = speed_rad_s > 0
+    if not turning.any():
+        return turning
+    ratio = np.where(turning, thrust_n, 0.0) / np.where(turning, speed_rad_s, 1.0) ** 2
+    return turning & (ratio > _TOO_SLOW * np.median(ratio[turning]))

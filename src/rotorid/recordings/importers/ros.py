@@ -7,7 +7,7 @@ that states most values is read:
 | quantity | types |
 | --- | --- |
 | body rates, specific force | `sensor_msgs/Imu`; `SensorCombined`, `VehicleAngularVelocity`, `VehicleAcceleration` |
-| attitude | poses (`POSES`), then `sensor_msgs/Imu`; `VehicleAttitude` |
+| attitude | poses (`_POSES`), then `sensor_msgs/Imu`; `VehicleAttitude` |
 | position, velocity | poses, `nav_msgs/Odometry` (twist in body axes), `TwistStamped`; `VehicleLocalPosition` |
 | rotor speeds, rad/s | `Actuators` of `mav_msgs` and `actuator_msgs`, `mav_msgs/MotorSpeed` |
 | rotor speeds, rpm | `mavros_msgs/ESCStatus`, `mavros_msgs/ESCTelemetry`; `EscStatus` |
@@ -38,14 +38,13 @@ from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import in_the_air
-from rotorid.recordings.importers.bag_records import Records, typestores
+from rotorid.recordings.importers.bag_records import Records, needs, typestores
 from rotorid.recordings.importers.clean import further_motors, one_sense, report_gaps
-from rotorid.recordings.importers.frames import half_turn_about_x, quaternion_to_frd_ned
-from rotorid.recordings.importers.optional import needs
+from rotorid.recordings.importers.mapping import half_turn_about_x, quaternion_to_frd_ned
 from rotorid.recordings.importers.report import Fault
 
 RPM = 2 * np.pi / 60
-PULSE_US = (1000.0, 2000.0)
+_PULSE_US = (1000.0, 2000.0)
 
 
 def _xyz(v) -> list[float]:
@@ -87,7 +86,7 @@ def _flipped(v) -> list[float]:
     return [v[0], -v[1], -v[2]]
 
 
-POSES: dict[str, Callable] = {
+_POSES: dict[str, Callable] = {
     "geometry_msgs/msg/PoseStamped": lambda m: _pose(m.pose),
     "geometry_msgs/msg/PoseWithCovarianceStamped": lambda m: _pose(m.pose.pose),
     "geometry_msgs/msg/TransformStamped": lambda m: {
@@ -95,7 +94,7 @@ POSES: dict[str, Callable] = {
     },
     "nav_msgs/msg/Odometry": lambda m: _pose(m.pose.pose) | {"body_velocity": _xyz(m.twist.twist.linear)},
 }  # fmt: skip
-READERS: dict[str, Callable] = POSES | {
+_READERS: dict[str, Callable] = _POSES | {
     "sensor_msgs/msg/Imu": _imu,
     "geometry_msgs/msg/TwistStamped": _twist,
     "mav_msgs/msg/Actuators": lambda m: {"speeds": list(m.angular_velocities), "throttle": list(m.normalized)},
@@ -118,20 +117,20 @@ READERS: dict[str, Callable] = POSES | {
     "px4_msgs/msg/EscStatus": lambda m: {"rpm": [e.esc_rpm for e in m.esc[: m.esc_count]]},
 }  # fmt: skip
 """To the type of a message what it states by quantity; several types may hold one."""
-WANTED = {
+_WANTED = {
     "body rates": ("rates",), "specific force": ("force",), "attitude": ("attitude", "imu_attitude"),
     "velocity": ("velocity", "body_velocity"), "rotors": ("speeds", "rpm", "commands", "throttle", "pulses"),
 }  # fmt: skip
 """What a verdict needs, to the quantities that give it."""
-UNSET = {"attitude": (1.0, 0.0, 0.0, 0.0), "imu_attitude": (1.0, 0.0, 0.0, 0.0)}
-UNSET |= dict.fromkeys(("rates", "force", "position", "velocity", "body_velocity"), (0.0, 0.0, 0.0))
+_UNSET = {"attitude": (1.0, 0.0, 0.0, 0.0), "imu_attitude": (1.0, 0.0, 0.0, 0.0)}
+_UNSET |= dict.fromkeys(("rates", "force", "position", "velocity", "body_velocity"), (0.0, 0.0, 0.0))
 """What a message holds of a quantity that nobody has set."""
 COMMANDED = re.compile(r"command|cmd|setpoint|desired|target|reference", re.IGNORECASE)
-SAME_CLOCK_S = 1.0
+_SAME_CLOCK_S = 1.0
 """Stamps further than this from those of the inertial sensor, or from one message to the next, are another clock."""
-STEADY_S = 0.2
+_STEADY_S = 0.2
 """Spread of the difference of two clocks up to which it is a constant."""
-MIXED = 4
+_MIXED = 4
 """Motors of a mixer whose signals say those of all others: it has four demands."""
 LISTED = 8
 
@@ -166,7 +165,7 @@ class Found:
     def add(self, topic: str, msgtype: str, recorded_ns: int, message) -> None:
         stamp = getattr(getattr(message, "header", None), "stamp", None)
         stamp_s = getattr(message, "timestamp", 0) * 1e-6 if stamp is None else stamp.sec + stamp.nanosec * 1e-9
-        for quantity, values in READERS[msgtype](message).items():
+        for quantity, values in _READERS[msgtype](message).items():
             self.rows.setdefault((quantity, topic), []).append((stamp_s, recorded_ns * 1e-9, values))
 
     def skip(self, topic: str, msgtype: str, messages: int) -> None:
@@ -179,11 +178,11 @@ def _by_rosbags(path: Path) -> Found:
     typesys = needs("rosbags.typesys", "ros", path)
     found = Found()
     with highlevel.AnyReader([path], default_typestore=typesys.get_typestore(typesys.Stores.LATEST)) as bag:
-        known = [k for k in bag.connections if k.msgtype in READERS]
+        known = [k for k in bag.connections if k.msgtype in _READERS]
         for k in bag.connections:
             if (encoding := getattr(k.ext, "serialization_format", "cdr")) != "cdr":
                 found.foreign[k.topic] = encoding
-            elif k.msgtype not in READERS:
+            elif k.msgtype not in _READERS:
                 found.skip(k.topic, k.msgtype, k.msgcount)
         for connection, recorded_ns, raw in bag.messages(connections=known) if known else ():
             found.add(connection.topic, connection.msgtype, recorded_ns, bag.deserialize(raw, connection.msgtype))
@@ -199,7 +198,7 @@ def _by_records(path: Path) -> Found:
         listed = list(records.messages())
         stores = typestores([k for k in records.channels.values() if k.of_ros], path)
         for channel, recorded_ns, raw in listed:
-            if channel.msgtype in READERS:
+            if channel.msgtype in _READERS:
                 store = stores[channel.encoding]
                 read = store.deserialize_ros1 if channel.encoding == "ros1" else store.deserialize_cdr
                 try:
@@ -238,7 +237,7 @@ def _found(path: Path) -> Found:
     return found
 
 
-def read_series(path: Path) -> tuple[dict[str, list[Series]], list[Fault]]:
+def _read_series(path: Path) -> tuple[dict[str, list[Series]], list[Fault]]:
     """Every known quantity of a bag by topic, those that state most first.
 
     InputError where it cannot be read or holds no known type.
@@ -292,15 +291,15 @@ def read_series(path: Path) -> tuple[dict[str, list[Series]], list[Fault]]:
         time_s, values = time_s[order], values[order]
         keep = in_the_air.increasing(time_s)
         own = Series(topic, time_s[keep], values[keep])
-        if quantity in UNSET and (own.values == UNSET[quantity]).all():
-            seen = f"{quantity.replace('_', ' ')} of {topic} was never set ({UNSET[quantity][0]:g}, 0, … throughout)"
+        if quantity in _UNSET and (own.values == _UNSET[quantity]).all():
+            seen = f"{quantity.replace('_', ' ')} of {topic} was never set ({_UNSET[quantity][0]:g}, 0, … throughout)"
             faults.append(Fault("stuck", quantity, seen, "states nothing, left out", len(values)))
         elif keep.sum() > 1:
             series.setdefault(quantity, []).append(own)
     for offered in series.values():
         offered.sort(key=lambda s: -s.changes)
     _set_commands_apart(series)
-    missing = [name for name, quantities in WANTED.items() if not set(quantities) & set(series)]
+    missing = [name for name, quantities in _WANTED.items() if not set(quantities) & set(series)]
     if missing and others:
         more = f" and {len(others) - LISTED} more" if len(others) > LISTED else ""
         seen = f"no topic of a type that is read states {', '.join(missing)}; not read are {', '.join(others[:LISTED])}"
@@ -349,11 +348,11 @@ def _times(found: Found) -> tuple[dict[tuple[str, str], np.ndarray], list[Fault]
         if key not in sound:
             times[key], seen = on_base, "its stamps jump" if own.any() else ""
             action = "the times at which its messages were recorded hold"
-        elif abs(off) < SAME_CLOCK_S:
+        elif abs(off) < _SAME_CLOCK_S:
             times[key], seen = own, ""
         else:
             seen = f"its stamps are {off:.4g} s from those of {base[1]}"
-            steady = np.ptp(np.quantile(own - on_base, [0.05, 0.95])) < STEADY_S
+            steady = np.ptp(np.quantile(own - on_base, [0.05, 0.95])) < _STEADY_S
             times[key] = own - off if steady else on_base
             action = "shifted by that" if steady else "the times at which its messages were recorded hold"
         if seen:
@@ -365,7 +364,7 @@ def _jumps(stamps: np.ndarray, recorded: np.ndarray) -> bool:
     """Whether the stamps of a topic go back, or run on by far more than the time between two recordings, s."""
     order = np.argsort(recorded, kind="stable")
     steps, waited = np.diff(stamps[order]), np.diff(recorded[order])
-    return bool(np.any(steps < -SAME_CLOCK_S) or np.any(steps > SAME_CLOCK_S + 10 * waited))
+    return bool(np.any(steps < -_SAME_CLOCK_S) or np.any(steps > _SAME_CLOCK_S + 10 * waited))
 
 
 def convert(series: dict[str, list[Series]], faults: list[Fault], where: object) -> tuple[pd.DataFrame, np.ndarray]:
@@ -429,8 +428,8 @@ def _of_pulses(outputs: Series, faults: list[Fault]) -> tuple:
     whose signal follows from theirs."""
     moving = np.flatnonzero(np.ptp(outputs.values, axis=0) > 0)
     pulses = outputs.values[:, moving]
-    used = [*range(min(MIXED, len(moving))), *further_motors(pulses, MIXED)]
-    low, high = PULSE_US
+    used = [*range(min(_MIXED, len(moving))), *further_motors(pulses, _MIXED)]
+    low, high = _PULSE_US
     seen = f"channels {', '.join(str(moving[k] + 1) for k in used)} of {outputs.topic} move"
     action = f"taken for motors in order, {low:g} to {high:g} µs"
     faults.append(Fault("unit", "throttle", seen, action, len(pulses)))
@@ -445,7 +444,7 @@ def _of_pulses(outputs: Series, faults: list[Fault]) -> tuple:
 def read_ros(path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault], str]:
     """Every flight of a bag (file or folder) or MCAP file by name, in contract columns, what was found, and the unit
     in which rotor speeds are stated."""
-    series, faults = read_series(path)
+    series, faults = _read_series(path)
     table, flying = convert(series, faults, path)
     runs, cuts = in_the_air.flights(table, flying, (path.resolve() if path.is_dir() else path).name.split(".")[0], path)
     unit = "rpm" if "rpm" in series and "speeds" not in series else "rad/s"

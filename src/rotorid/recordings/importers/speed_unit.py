@@ -17,10 +17,10 @@ from rotorid.recordings.importers.propose import thrust_coefficient
 from rotorid.recordings.importers.report import Fault
 from rotorid.recordings.importers.units import UNITS
 
-USUAL_COEFFICIENT = 1.7e-5
+_USUAL_COEFFICIENT = 1.7e-5
 """C_F / (mass of the vehicle a rotor)^(4/3), N s² kg^(-4/3): thrust grows with the fourth power of the size, mass with
 its third. The templates (Crazyflie to x500) have 1.4e-5 to 2.1e-5."""
-IMPOSSIBLE = 3.5
+_IMPOSSIBLE = 3.5
 """Speeds of hover so many times off, or more, are not in the unit that is stated."""
 POSSIBLE = 2.2
 """Speeds of hover within this factor are."""
@@ -28,7 +28,7 @@ POSSIBLE = 2.2
 
 def usual_coefficient(mass_kg: float, rotors: int) -> float:
     """C_F of a multirotor of usual propellers, N s²."""
-    return USUAL_COEFFICIENT * (mass_kg / rotors) ** (4 / 3)
+    return _USUAL_COEFFICIENT * (mass_kg / rotors) ** (4 / 3)
 
 
 def in_unit_of_weight(
@@ -59,7 +59,7 @@ def in_unit_of_weight(
             tables = [out[run] for run in mine]
             unit, off = carrying_unit(tables, kind, written, mass_kg, rotors, coefficient_n_s2)
             if unit == written:
-                if not 1 / IMPOSSIBLE < off < IMPOSSIBLE and np.isfinite(off):
+                if not 1 / _IMPOSSIBLE < off < _IMPOSSIBLE and np.isfinite(off):
                     found = (
                         f"in {written}, as stated, the rotors hover at {off:.2g} times the speed that carries "
                         f"{mass_kg:.3g} kg, which no unit explains: electrical turns (divide by half of the motor's "
@@ -96,7 +96,7 @@ def carrying_unit(
         return stated, np.nan
     expected = coefficient_n_s2 or usual_coefficient(mass_kg, rotors)
     off = float(np.sqrt(expected / flown))
-    if 1 / IMPOSSIBLE < off < IMPOSSIBLE:
+    if 1 / _IMPOSSIBLE < off < _IMPOSSIBLE:
         return stated, off
     others = {u: abs(np.log(off * f / UNITS["rotor"][stated])) for u, f in UNITS["rotor"].items() if u != stated}
     best = min(others, key=others.get)

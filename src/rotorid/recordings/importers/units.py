@@ -7,12 +7,12 @@ import re
 import numpy as np
 
 G = 9.80665
-POUND_N, OUNCE_N = 4.4482216152605, 0.27801385095378
-INCH_M, FOOT_M = 0.0254, 0.3048
+_POUND_N, _OUNCE_N = 4.4482216152605, 0.27801385095378
+_INCH_M, _FOOT_M = 0.0254, 0.3048
 
 UNITS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
-    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "ft": FOOT_M},
+    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "ft": _FOOT_M},
     "velocity": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
     "rate": {"rad/s": 1.0, "deg/s": np.pi / 180, "mrad/s": 1e-3},
     "angle": {"rad": 1.0, "deg": np.pi / 180, "mrad": 1e-3, "cdeg": np.pi / 18000},
@@ -23,14 +23,14 @@ UNITS: dict[str, dict[str, float]] = {
     "voltage": {"V": 1.0, "mV": 1e-3, "cV": 1e-2, "dV": 0.1},
     "current": {"A": 1.0, "mA": 1e-3, "cA": 1e-2, "dA": 0.1},
     "temperature": {"degC": 1.0, "degF": 5 / 9, "K": 1.0},
-    "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3, "kgf": G, "gf": 9.80665e-3, "lbf": POUND_N, "ozf": OUNCE_N},
+    "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3, "kgf": G, "gf": 9.80665e-3, "lbf": _POUND_N, "ozf": _OUNCE_N},
     "torque": {
         "N.m": 1.0, "N.cm": 1e-2, "N.mm": 1e-3, "mN.m": 1e-3, "kgf.m": G, "kgf.cm": G / 100, "gf.cm": G / 1e5,
-        "lbf.ft": POUND_N * FOOT_M, "lbf.in": POUND_N * INCH_M, "ozf.in": OUNCE_N * INCH_M,
+        "lbf.ft": _POUND_N * _FOOT_M, "lbf.in": _POUND_N * _INCH_M, "ozf.in": _OUNCE_N * _INCH_M,
     },
 }  # fmt: skip
 """To each kind of quantity its units, and the factor to the contract's (`turns`: electrical ones per pair of poles)."""
-ZEROS = {"degF": -32 * 5 / 9, "K": -273.15}
+_ZEROS = {"degF": -32 * 5 / 9, "K": -273.15}
 """What a reading of 0 is in the contract's unit, where that is not 0."""
 SPELLINGS: dict[str, dict[str, str]] = {
     "time": {"s": "sec secs second seconds", "ms": "msec millis millisecond milliseconds",
@@ -56,17 +56,19 @@ SPELLINGS: dict[str, dict[str, str]] = {
                "ozf.in": "ozin inoz inozf"},
 }  # fmt: skip
 """Other ways to write a unit, in small letters without blanks and signs of multiplication."""
-SIGNS = str.maketrans({"µ": "u", "μ": "u", "²": "2", "⁻": "", "¹": "1", "°": "deg", "º": "deg", "Â": "", "\ufffd": "u"})
+_SIGNS = str.maketrans(
+    {"µ": "u", "μ": "u", "²": "2", "⁻": "", "¹": "1", "°": "deg", "º": "deg", "Â": "", "\ufffd": "u"}
+)
 """Signs of units as letters; the last two are what a wrong encoding makes of `µ`."""
 
 
 def _plainly(text: str) -> str:
     """A unit in small letters, without blanks, powers' signs and signs of multiplication, seconds as `s`."""
-    plain = re.sub(r"[\s.·⋅∙•*×^_-]", "", str(text).translate(SIGNS).lower())
+    plain = re.sub(r"[\s.·⋅∙•*×^_-]", "", str(text).translate(_SIGNS).lower())
     return re.sub(r"(?<=/)(sec|second)s?$", "s", re.sub(r"(?<=/)minute$", "min", plain))
 
 
-WRITTEN: dict[str, dict[str, str]] = {
+_WRITTEN: dict[str, dict[str, str]] = {
     kind: {word: unit for unit, others in units.items() for word in (_plainly(unit), *others.split())}
     for kind, units in SPELLINGS.items()
 }
@@ -74,7 +76,7 @@ WRITTEN: dict[str, dict[str, str]] = {
 
 def unit_of(text: str, kind: str) -> str:
     """The unit of a kind that a text writes (`N·m`, `kg`, `°C`); empty where it writes none."""
-    return WRITTEN[kind].get(_plainly(text), "")
+    return _WRITTEN[kind].get(_plainly(text), "")
 
 
 def bracketed(heading: str) -> tuple[str, str]:
@@ -106,4 +108,4 @@ def stated(name: str, kind: str) -> str:
 
 def converted(values: np.ndarray, kind: str, unit: str) -> np.ndarray:
     """Values of a kind in the contract's unit; without a unit as they are."""
-    return values * UNITS[kind].get(unit, 1.0) + ZEROS.get(unit, 0.0)
+    return values * UNITS[kind].get(unit, 1.0) + _ZEROS.get(unit, 0.0)

@@ -16,16 +16,16 @@ import pandas as pd
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.clean import blank_held, cut, drop_repeated_times, report_gaps, true_stretches
-from rotorid.recordings.importers.frames import quaternion_from_euler_frd
+from rotorid.recordings.importers.mapping import quaternion_from_euler_frd
 from rotorid.recordings.importers.report import Fault
 
 COUNT = 25
 RPM = 2 * np.pi / 60
-GROUND_MARGIN_M = 0.015
+_GROUND_MARGIN_M = 0.015
 """Height above the resting height from which the vehicle counts as in the air."""
 
 
-def read_matrix(path: Path) -> tuple[np.ndarray, list[Fault]]:
+def _read_matrix(path: Path) -> tuple[np.ndarray, list[Fault]]:
     """The numbers of a header-less CSV, shape (n, 25); the last row may be cut off."""
     try:
         lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
@@ -109,7 +109,7 @@ def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[Fault]]:
     table, repeated = drop_repeated_times(table)
     height = table[c.HEIGHT].to_numpy()
     resting = np.nanmedian(height[: max(10, int(np.argmax(table[rotors[0]].to_numpy() > 3000 * RPM)))])
-    flying = (table[rotors].mean(axis=1) > 4000 * RPM).to_numpy() & (height > resting + GROUND_MARGIN_M)
+    flying = (table[rotors].mean(axis=1) > 4000 * RPM).to_numpy() & (height > resting + _GROUND_MARGIN_M)
     stretches = true_stretches(flying, table[c.TIME].to_numpy(), 5.0)
     if not stretches:
         raise InputError("no stretch of 5 s in the air found (rotors above 4000 rpm and off the ground)")
@@ -139,7 +139,7 @@ def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[Fault]]:
 
 def read_vicon_csv(path: Path) -> tuple[pd.DataFrame, list[Fault]]:
     """One flight in contract columns, and its faults."""
-    matrix, faults = read_matrix(path)
+    matrix, faults = _read_matrix(path)
     try:
         table, more = convert(matrix)
     except InputError as error:

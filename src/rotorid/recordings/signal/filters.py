@@ -11,9 +11,9 @@ from scipy.signal import butter, lfilter, sosfiltfilt
 
 from rotorid.errors import InputError
 
-ZERO_PHASE_ORDER = 2
+_ZERO_PHASE_ORDER = 2
 """Order of the Butterworth filter that runs forward and backward."""
-MAD_TO_SIGMA = 1.4826
+_MAD_TO_SIGMA = 1.4826
 
 
 def smoothing(cutoff_hz: float, rate_hz: float) -> float:
@@ -43,8 +43,8 @@ def zero_phase(values: np.ndarray, cutoff_hz: float, rate_hz: float) -> np.ndarr
     if not 0 < cutoff_hz < rate_hz / 2:
         raise InputError(f"a cutoff of {cutoff_hz:g} Hz must lie below half the rate of {rate_hz:g} Hz")
     # Two runs halve the power twice; the single run's cutoff is raised so that both together halve it once.
-    single = cutoff_hz / (np.sqrt(2) - 1) ** (1 / (2 * ZERO_PHASE_ORDER))
-    sections = butter(ZERO_PHASE_ORDER, min(single, 0.49 * rate_hz), fs=rate_hz, output="sos")
+    single = cutoff_hz / (np.sqrt(2) - 1) ** (1 / (2 * _ZERO_PHASE_ORDER))
+    sections = butter(_ZERO_PHASE_ORDER, min(single, 0.49 * rate_hz), fs=rate_hz, output="sos")
     pad = min(len(values) - 1, int(3 * rate_hz / cutoff_hz))
     return sosfiltfilt(sections, values, axis=0, padlen=max(pad, 0)) if len(values) > 1 else values.copy()
 
@@ -58,7 +58,7 @@ def spikes(values: np.ndarray, window: int, threshold: float) -> np.ndarray:
     values = np.asarray(values, float)
     size = (window,) + (1,) * (values.ndim - 1)
     off = values - median_filter(values, size=size, mode="nearest")
-    scale = MAD_TO_SIGMA * np.median(np.abs(off), axis=0)
+    scale = _MAD_TO_SIGMA * np.median(np.abs(off), axis=0)
     return np.abs(off) > threshold * np.where(scale > 0, scale, np.inf)
 
 

@@ -24,7 +24,7 @@ from rotorid.mismatch.changes.quantities import Flown, flown, grid_of
 from rotorid.recordings import RecordingSet, read_set
 from rotorid.report.fleet.summary import day_of
 
-NUMBERS = ("vehicle", "set", "day", "good", "name", "quantity", "unit", "change", "low_95", "high_95", "limit")
+_NUMBERS = ("vehicle", "set", "day", "good", "name", "quantity", "unit", "change", "low_95", "high_95", "limit")
 EVENTS = ("vehicle", "set", "day", "id", "lasts", "sentence")
 Z95 = 1.96
 
@@ -83,17 +83,17 @@ def history(
         except InputError as error:
             progress(f"{vehicle} is left out: {error}")
             continue
-        numbers += numbers_of(vehicle, shown, good)
+        numbers += _numbers_of(vehicle, shown, good)
         events += [row for point in change_points(shown, good) for row in rows_of(vehicle, point)]
         progress(f"{vehicle}: {len(shown)} sets")
-    return pd.DataFrame(numbers, columns=NUMBERS), pd.DataFrame(events, columns=EVENTS)
+    return pd.DataFrame(numbers, columns=_NUMBERS), pd.DataFrame(events, columns=EVENTS)
 
 
-Shown = Mapping[str, Sequence[Flown]]
+_Shown = Mapping[str, Sequence[Flown]]
 """What the runs of each set show, in the order they were flown; each set counts as one flight."""
 
 
-def shown_by(sets: Sequence[RecordingSet], good: int, progress: Callable[[str], None]) -> Shown:
+def shown_by(sets: Sequence[RecordingSet], good: int, progress: Callable[[str], None]) -> _Shown:
     """What each set shows; one that lacks something that the good ones have is left out, with a line.
 
     Raises
@@ -118,7 +118,7 @@ def shown_by(sets: Sequence[RecordingSet], good: int, progress: Callable[[str], 
 
 
 @dataclass(frozen=True)
-class ChangePoint:
+class _ChangePoint:
     """A set from which on something differs."""
 
     set: str
@@ -126,7 +126,7 @@ class ChangePoint:
     differences: tuple[Difference, ...]
 
 
-def change_points(shown: Shown, good: int) -> list[ChangePoint]:
+def change_points(shown: _Shown, good: int) -> list[_ChangePoint]:
     """The sets from which on something differs, in their order; each splits the history in two parts, looked at again.
 
     The false alarms of a vehicle are those of all sets at which it may have changed. A further change needs as many
@@ -141,23 +141,23 @@ def change_points(shown: Shown, good: int) -> list[ChangePoint]:
     for k in places:
         found = differences_at(k, numbers, names, usual_scatter())
         stated = tuple(d for d in found if d.false_alarms * len(places) <= FALSE_ALARMS)
-        if stated and (best is None or rarity(stated[0]) < best[:2]):
-            best = (*rarity(stated[0]), k, stated)
+        if stated and (best is None or _rarity(stated[0]) < best[:2]):
+            best = (*_rarity(stated[0]), k, stated)
     if best is None:
         return []
     *_, k, stated = best
     before, after = ({n: shown[n] for n in part} for part in (names[:k], names[k:]))
     earlier, later = change_points(before, good), change_points(after, good)
     first = list(after).index(later[0].set) if later else len(after)
-    return [*earlier, ChangePoint(names[k], first, stated), *later]
+    return [*earlier, _ChangePoint(names[k], first, stated), *later]
 
 
-def rarity(d: Difference) -> tuple[float, float]:
+def _rarity(d: Difference) -> tuple[float, float]:
     """How rare a difference is, the rarest first; of those that are equally rare, by their size."""
     return d.false_alarms, -abs(d.value) / d.sd
 
 
-def numbers_of(vehicle: str, shown: Shown, good: int) -> list[dict]:
+def _numbers_of(vehicle: str, shown: _Shown, good: int) -> list[dict]:
     """Rows of every quantity of all sets."""
     first, later = dict(list(shown.items())[:good]), dict(list(shown.items())[good:])
     if not later:
@@ -175,7 +175,7 @@ def numbers_of(vehicle: str, shown: Shown, good: int) -> list[dict]:
     return out
 
 
-def rows_of(vehicle: str, point: ChangePoint) -> list[dict]:
+def rows_of(vehicle: str, point: _ChangePoint) -> list[dict]:
     """Rows of what differs from a set on, the rarest first."""
     head = {"vehicle": vehicle, "set": point.set, "day": day_of(point.set), "lasts": point.lasts}
     on = f"{vehicle}, from {point.set} on: "

@@ -30,7 +30,7 @@ FILES = ("verdict.json", "report.html", "improved_vehicle.yaml", "ledger.json")
 """What a verdict consists of."""
 FAILED = "failed.json"
 """What stands in its place where there is none: `reason`, and `fault` where it is none of the set's."""
-WORTH_A_START = 4
+_WORTH_A_START = 4
 """Sets to judge from which on it pays to load beforehand what every one of them would load by itself."""
 
 
@@ -59,7 +59,7 @@ def judge_sets(
     """
     out.mkdir(parents=True, exist_ok=True)
     places = {folder: memory / code / content_of(folder) for folder in folders}
-    if sum(not known.is_dir() for known in places.values()) >= WORTH_A_START:
+    if sum(not known.is_dir() for known in places.values()) >= _WORTH_A_START:
         _load()
     for folder, known in places.items():
         start = time.monotonic()
@@ -102,9 +102,9 @@ def _judge_apart(folder: Path, known: Path, out: Path) -> None:
         process = context.Process(target=_judge_one, args=(folder, part))
         process.start()
         process.join()
-        if process.exitcode == DISK:
+        if process.exitcode == _DISK:
             raise OSError(f"{folder.name}: {(part / FAILED).read_text(encoding='utf-8')}")
-        if process.exitcode not in (0, UNREADABLE):
+        if process.exitcode not in (0, _UNREADABLE):
             _write_failure(part, f"its process ended by signal or exit code {process.exitcode}", fault=True)
         shutil.copytree(part, out, dirs_exist_ok=True)
         if process.exitcode == 0 and not known.is_dir():
@@ -113,7 +113,7 @@ def _judge_apart(folder: Path, known: Path, out: Path) -> None:
         shutil.rmtree(part, ignore_errors=True)
 
 
-DISK, UNREADABLE = 74, 66
+_DISK, _UNREADABLE = 74, 66
 """Exit codes of a process that could not write, and of one that could not read its set (sysexits.h)."""
 
 
@@ -123,7 +123,7 @@ def _judge_one(folder: Path, target: Path) -> None:
         recordings = read_set(folder)
     except OSError as error:
         _write_failure(target, str(error), fault=False)
-        sys.exit(UNREADABLE)
+        sys.exit(_UNREADABLE)
     except InputError as error:
         _write_failure(target, str(error), fault=False)
         return
@@ -133,7 +133,7 @@ def _judge_one(folder: Path, target: Path) -> None:
         _write_failure(target, str(error), fault=False)
     except OSError as error:
         (target / FAILED).write_text(str(error), encoding="utf-8")
-        sys.exit(DISK)
+        sys.exit(_DISK)
     except Exception as error:  # any fault of the stage costs this set alone
         traceback.print_exc()
         _write_failure(target, f"{type(error).__name__}: {error}", fault=True)

@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from rotorid.report.page.make import policy_for
 
-TEMPLATE = """<!doctype html>
+_TEMPLATE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>Fleet: {{ name }}</title>
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta http-equiv="Content-Security-Policy" content="{{ policy }}">
@@ -120,7 +120,7 @@ def make_page(
     words = sets["verdict"].value_counts()
     return (
         Environment(autoescape=True, trim_blocks=True)
-        .from_string(TEMPLATE)
+        .from_string(_TEMPLATE)
         .render(
             policy=policy_for(),
             name=name,

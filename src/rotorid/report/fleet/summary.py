@@ -15,7 +15,7 @@ from rotorid.errors import InputError
 from rotorid.io.text.files import read_yaml
 from rotorid.report.fleet.judge import FAILED
 
-SHOWN = ("established", "ambiguous", "suggested")
+_SHOWN = ("established", "ambiguous", "suggested")
 """Words of effects that a summary counts; what is absorbed or not established shows nothing."""
 DATE = re.compile(r"(?<!\d)(20\d\d)[-_]?(0[1-9]|1[0-2])[-_]?(0[1-9]|[12]\d|3[01])(?!\d)")
 """A day in the name of a set: 2026-11-22, 2026_11_22 or 20261122."""
@@ -50,7 +50,7 @@ def collect(folders: Sequence[Path], recordings: Path) -> tuple[pd.DataFrame, pd
             rows.append(own | {"verdict": "failed", "effects": "", "person": what, "sentence": reason["reason"]})
             continue
         verdict = json.loads((folder / "verdict.json").read_text(encoding="utf-8"))
-        found = [e for e in verdict["effects"] if e["status"] in SHOWN]
+        found = [e for e in verdict["effects"] if e["status"] in _SHOWN]
         rows.append(
             own
             | {
@@ -98,15 +98,15 @@ def by_effect(effects: pd.DataFrame, sets: pd.DataFrame) -> pd.DataFrame:
     `share` of the error that goes; the most frequent first."""
     rows = []
     for name, own in effects.groupby("effect"):
-        counts = {status: int((own["status"] == status).sum()) for status in SHOWN}
+        counts = {status: int((own["status"] == status).sum()) for status in _SHOWN}
         surely = own[own["status"] == "established"]
         rows.append(
             {"effect": name, **counts, "vehicles": surely["vehicle"].nunique(), "share": surely["share"].median()}
         )
-    table = pd.DataFrame(rows, columns=["effect", *SHOWN, "vehicles", "share"])
+    table = pd.DataFrame(rows, columns=["effect", *_SHOWN, "vehicles", "share"])
     judged = int((sets["verdict"] != "failed").sum())
     table.insert(1, "of_sets", judged)
-    return table.sort_values([*SHOWN, "effect"], ascending=[False] * 3 + [True], ignore_index=True)
+    return table.sort_values([*_SHOWN, "effect"], ascending=[False] * 3 + [True], ignore_index=True)
 
 
 def by_vehicle(effects: pd.DataFrame, sets: pd.DataFrame) -> pd.DataFrame:

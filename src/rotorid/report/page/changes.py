@@ -15,7 +15,7 @@ from rotorid.mismatch.decision.words import capital, channel_words
 from rotorid.report.page.make import policy_for
 from rotorid.report.plots.changes import draw_differences, draw_residuals, draw_values
 
-TEMPLATE = """<!doctype html>
+_TEMPLATE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>{{ new }} compared with {{ base }}</title>
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta http-equiv="Content-Security-Policy" content="{{ policy }}">
@@ -58,7 +58,7 @@ def make_changes_page(found: Changes) -> str:
     names = {} if seen is None else {d.quantity.key: quantity_words(d) for d in seen.differences}
     return (
         Environment(autoescape=True, trim_blocks=True)
-        .from_string(TEMPLATE)
+        .from_string(_TEMPLATE)
         .render(
             policy=policy_for(),
             base=found.base,
@@ -71,13 +71,13 @@ def make_changes_page(found: Changes) -> str:
             left="What each believed vehicle leaves" if flown else "Reading less load",
             measured="Measured less simulated force and moment" if flown else "Reading less the load that is believed",
             values=drawn(draw_values, found, {p.symbol: words.name_words(p.symbol) for p in found.values}),
-            limits=[limit_row(limit) for limit in found.limits],
+            limits=[_limit_row(limit) for limit in found.limits],
             residuals=drawn(draw_residuals, found, {c: channel_words(c) for c in found.residuals[0]}),
         )
     )
 
 
-def limit_row(limit) -> dict[str, str]:
+def _limit_row(limit) -> dict[str, str]:
     """A limit's name, size and share of the weight, in words."""
     share = words.percent_words(limit.share) if limit.share else ""
     if limit.id in words.VALUES:

@@ -2,29 +2,44 @@
 
 Series are stored as 16-bit integers times a scale, base64: the page reads them without a library. A long run is thinned
 to every k-th row, and the page says so.
+
+What the page's replay shows: attitude as recorded and as simulated, and the force and moment that a model leaves.
+
+What was measured in each channel, on the instants of the traces: a trace holds only what a model leaves of it.
 """
 
 from __future__ import annotations
 
 import base64
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from rotorid.effects.loading import Loading
+from rotorid.errors import InputError
 from rotorid.mismatch.decision.findings import Analysis, Trace
 from rotorid.mismatch.decision.shares import fitted_part, segments_of
 from rotorid.mismatch.decision.words import FORWARD_WORDS, channel_words, regime_words
+from rotorid.mismatch.delivery.flown import Model
+from rotorid.mismatch.instrument.setup import averaged
+from rotorid.mismatch.plant.motion import HIGHEST_CUTOFF_HZ, Segment, analysis_rate_hz
+from rotorid.mismatch.plant.rows import Thinner, at_centre
+from rotorid.mismatch.tell import forward
 from rotorid.mismatch.tell.locate import REGIME_BLOCK_S
 from rotorid.mismatch.tell.verdict import Verdict
-from rotorid.report.page.replay import replay
-from rotorid.report.page.signals import fit_percent, measured
+from rotorid.vehicle.windows import Windows
 
+Pieces = list[tuple[np.ndarray, dict[str, np.ndarray]]]
+"""Of each stretch of a run its instants (n,), s, and the channels' values (n,) by name."""
+_LONGEST_S = 20.0
+_FRAMES_PER_S = 25.0
 BUDGET = 800_000
 """Values that the page may hold of all traces together; 800 000 are 2.2 MB."""
-MOST_BLOCKS = 4000
+_MOST_BLOCKS = 4000
 LONGEST_LAG_S = 1.0
-MOST_LAGS = 60
-MISSING = -32768
+_MOST_LAGS = 60
+_MISSING = -32768
 
 
 def packed(values: np.ndarray) -> dict:
@@ -32,13 +47,13 @@ def packed(values: np.ndarray) -> dict:
     values = np.asarray(values, float)
     top = float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else 0.0
     scale = float(f"{top / 32767:.6e}") if top > 0 else 1.0
-    whole = np.full(len(values), MISSING, "<i2")
+    whole = np.full(len(values), _MISSING, "<i2")
     known = np.isfinite(values)
     whole[known] = np.clip(np.rint(values[known] / scale), -32767, 32767)
     return {"scale": scale, "data": base64.b64encode(whole.tobytes()).decode()}
 
 
-def packed_times(time_s: np.ndarray) -> str:
+def _packed_times(time_s: np.ndarray) -> str:
     """Instants as 32-bit floats."""
     return base64.b64encode(np.asarray(time_s, "<f4").tobytes()).decode()
 
@@ -106,7 +121,7 @@ def _series(run: str, channel: str, traces: Sequence[Trace], readings: Sequence[
     # A row between two stretches keeps their lines apart; it needs an instant of its own.
     holes = np.flatnonzero(np.isnan(time))
     time[holes] = (time[holes - 1] + time[holes + 1]) / 2
-    out = {"run": run, "channel": channel, "time": packed_times(time)}
+    out = {"run": run, "channel": channel, "time": _packed_times(time)}
     out |= {name: packed(joined([getattr(t, name) for t in traces])) for name in ("before", "after")}
     reading = joined(readings)
     return out | ({"measured": packed(reading)} if np.isfinite(reading).any() else {})
@@ -114,7 +129,7 @@ def _series(run: str, channel: str, traces: Sequence[Trace], readings: Sequence[
 
 def _frames(run: str, flown: dict[str, np.ndarray]) -> dict:
     """The replay's frames as the page's script reads them."""
-    out = {"run": run, "time": packed_times(flown["time_s"]), "rotors": np.round(flown["rotors"], 5).tolist()}
+    out = {"run": run, "time": _packed_times(flown["time_s"]), "rotors": np.round(flown["rotors"], 5).tolist()}
     names = [n for n in flown if n not in ("time_s", "rotors")]
     return out | {name: packed(flown[name].ravel()) for name in names}
 
@@ -148,7 +163,7 @@ def regimes(analysis: Analysis, by_pair: dict[tuple[str, str], list[Trace]]) -> 
     out: dict[str, dict] = {}
     for channel, columns in rows.items():
         joined = {k: np.concatenate(v) for k, v in columns.items()}
-        every = max(1, int(np.ceil(len(joined["before"]) / MOST_BLOCKS)))
+        every = max(1, int(np.ceil(len(joined["before"]) / _MOST_BLOCKS)))
         out[channel] = {k: packed(v[::every]) for k, v in joined.items() if np.isfinite(v).any()}
     names = {v: " ".join(filter(None, (regime_words(v)[0], f"({regime_words(v)[1]})" if regime_words(v)[1] else "")))
              for v in variables}  # fmt: skip
@@ -174,7 +189,7 @@ def correlations(
         if not held:
             continue
         period = float(np.median(np.diff(held[0].time_s)))
-        step = max(1, int(round(LONGEST_LAG_S / period / MOST_LAGS)))
+        step = max(1, int(round(LONGEST_LAG_S / period / _MOST_LAGS)))
         lags = np.arange(0, int(LONGEST_LAG_S / period) + 1, step)
         samples = sum(len(t.time_s) for t in held)
         out[channel] = {
@@ -191,3 +206,174 @@ def _correlation(series: Sequence[np.ndarray], lags: np.ndarray) -> list[float]:
     parts = [np.nan_to_num(s - centre) for s in series]
     power = sum(float(p @ p) for p in parts)
     return [sum(float(p[: len(p) - k] @ p[k:]) for p in parts if len(p) > k) / max(power, 1e-300) for k in lags]
+
+
+def replay(analysis: Analysis, verdict: Verdict, run: str, segments: Sequence[Segment]) -> dict[str, np.ndarray] | None:
+    """Frames of up to LONGEST_S of a run, about where most was located; None where attitudes cannot be simulated.
+
+    Returns
+    -------
+    `time_s` (n,), unit quaternions `recorded`, `before`, `after` (n, 4), body to world, scalar first; `force_before`,
+    `force_after`, `moment_before`, `moment_after` (n, 3), N and N m, body axes, where the traces have them; `rotors`
+    (k, 3), m, body axes. The simulations restart from the recording every half second.
+    """
+    if analysis.instrument is not None:
+        return None
+    usable = [
+        s
+        for s in segments
+        if s.motion.rotation is not None and s.motion.rotor_speed is not None and s.motion.angular_velocity is not None
+    ]
+    mine = [k for k, s in enumerate(usable) if s.run == run]
+    if not mine:
+        return None
+    centre = _busiest_s(verdict, run)
+    at = min(mine, key=lambda k: _distance(usable[k].motion.time_s, centre))
+    time_s = usable[at].motion.time_s
+    first = (
+        time_s[0]
+        if centre is None
+        else np.clip(centre - _LONGEST_S / 2, time_s[0], max(time_s[-1] - _LONGEST_S, time_s[0]))
+    )
+    out: dict[str, np.ndarray] = {}
+    for stage, model in (("before", Model(analysis.believed)), ("after", forward.delivered_model(analysis))):
+        found = _windows(usable, at, model)
+        if found is None:
+            return None
+        recorded, windows = found
+        if recorded is None or windows.predicted.quaternion is None or not windows.sample.size:
+            return None
+        starts = time_s[windows.sample[:, 0]]
+        chosen = np.flatnonzero((starts >= first) & (starts < first + _LONGEST_S))
+        period = float(np.median(np.diff(time_s[windows.sample[0]]))) if windows.sample.shape[1] > 1 else 1.0
+        every = max(1, round(1 / _FRAMES_PER_S / period))
+        sample = windows.sample[chosen][:, ::every].ravel()
+        if not len(sample) or ("time_s" in out and not np.array_equal(out["time_s"], time_s[sample])):
+            return None
+        out["time_s"] = time_s[sample]
+        out[stage] = windows.predicted.quaternion[chosen][:, ::every].reshape(-1, 4)
+        out["recorded"] = recorded[sample]
+    for group in ("force", "moment"):
+        for stage in ("before", "after"):
+            columns = [_trace(analysis, run, f"{group}_{axis}", stage, out["time_s"]) for axis in "xyz"]
+            if all(c is not None for c in columns):
+                out[f"{group}_{stage}"] = np.stack(columns, axis=1)
+    out["rotors"] = analysis.believed.rotor_positions_m()
+    return out
+
+
+def _windows(segments: Sequence[Segment], at: int, model: Model) -> tuple[np.ndarray | None, Windows] | None:
+    """Recorded attitudes of a segment, and its half seconds as a model predicts them.
+
+    Without the model's effects where they cannot be simulated; None where nothing can.
+    """
+    for tried in (model, replace(model, forms=(), chain=(), chain_values=())):
+        try:
+            inputs, states = forward.driven_by(segments, tried)
+            return states[at].quaternion, forward.predict(segments[at], tried, inputs[at], states[at])
+        except InputError:
+            continue
+    return None
+
+
+def _busiest_s(verdict: Verdict, run: str) -> float | None:
+    here = [loc for loc in verdict.locations if loc.run == run and loc.start_s is not None and loc.stop_s is not None]
+    if not here:
+        return None
+    best = max(here, key=lambda loc: loc.energy_share)
+    return 0.5 * (best.start_s + best.stop_s)
+
+
+def _distance(time_s: np.ndarray, centre: float | None) -> float:
+    """How far an instant lies outside a stretch; without one, long stretches first."""
+    if centre is None:
+        return -float(time_s[-1] - time_s[0])
+    return max(time_s[0] - centre, centre - time_s[-1], 0.0)
+
+
+def _trace(analysis: Analysis, run: str, channel: str, stage: str, time_s: np.ndarray) -> np.ndarray | None:
+    mine = [t for t in analysis.traces if t.run == run and t.channel == channel]
+    if not mine:
+        return None
+    known = np.concatenate([t.time_s for t in mine])
+    return np.interp(time_s, known, np.concatenate([getattr(t, stage) for t in mine]))
+
+
+def measured(analysis: Analysis, segments: Sequence[Segment] | Sequence[Loading]) -> list[np.ndarray]:
+    """The measured side of every trace, in the trace's unit, (n,) each; NaN where it is not known.
+
+    Of a flight the believed mass times the specific force, what the believed inertia makes of the rates, and the
+    rotors' speeds; of a stand or bench the reading. `segments` are those of `shares.segments_of`.
+    """
+    by_run: dict[str, Pieces] = {}
+    if analysis.instrument is None:
+        thinner = Thinner(*analysis_rate_hz(analysis.recordings.runs, analysis.believed, HIGHEST_CUTOFF_HZ))
+    for segment in segments:
+        if isinstance(segment, Loading):
+            piece = _of_loading(segment, analysis.samples_per_row)
+        else:
+            piece = _of_flight(segment, analysis, thinner)
+        by_run.setdefault(segment.run, []).append(piece)
+    return [_on(trace, by_run.get(trace.run, [])) for trace in analysis.traces]
+
+
+def _of_flight(segment: Segment, analysis: Analysis, thinner: Thinner) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    motion, vehicle = segment.motion, analysis.believed
+    groups: dict[str, np.ndarray] = {}
+    if motion.specific_force is not None:
+        groups["accelerometer"] = at_centre(segment, vehicle)
+        groups["force"] = vehicle.mass_kg * groups["accelerometer"]
+    if motion.angular_velocity is not None:
+        groups["gyroscope"] = rate = motion.angular_velocity
+        if motion.angular_acceleration is not None:
+            inertia = vehicle.inertia_kg_m2.matrix()
+            groups["moment"] = motion.angular_acceleration @ inertia + np.cross(rate, rate @ inertia)
+    out = {}
+    for group, values in groups.items():
+        out |= {f"{group}_{axis}": column for axis, column in zip("xyz", thinner(values).T, strict=True)}
+    if motion.rotor_speed is not None and segment.measured_speed:
+        out |= {f"rotor_speed_{i}": column for i, column in enumerate(thinner(motion.rotor_speed).T, 1)}
+    return thinner.times(motion.time_s), out
+
+
+def _of_loading(loading: Loading, count: int) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    names = [f"{group}_{axis}" for group in ("force", "moment") for axis in "xyz"]
+    out = dict(zip(names, averaged(loading.reading, count).T, strict=True))
+    speed = loading.speed_read if loading.speed_read is not None else loading.motion.rotor_speed
+    if speed is not None and loading.measured:
+        out |= {f"rotor_speed_{i}": column for i, column in enumerate(averaged(speed, count).T, 1)}
+    return averaged(loading.time_s, count), out
+
+
+def _on(trace: Trace, pieces: Pieces) -> np.ndarray:
+    """One channel on the instants of its trace, by linear interpolation within each stretch."""
+    out = np.full(len(trace.time_s), np.nan)
+    for time_s, channels in pieces:
+        if trace.channel in channels and len(time_s) > 1:
+            inside = (trace.time_s >= time_s[0] - 1e-6) & (trace.time_s <= time_s[-1] + 1e-6)
+            out[inside] = np.interp(trace.time_s[inside], time_s, channels[trace.channel])
+    return out
+
+
+def fit_percent(analysis: Analysis, readings: Sequence[np.ndarray]) -> dict[str, tuple[float, float]]:
+    """Channel to its fit as believed and improved, in per cent, on the runs held out (else on all).
+
+    One hundred times one less the error's root mean square over that of the measured signal about its mean: 100 is
+    perfect, 0 no better than the mean, negative worse.
+    """
+    part = fitted_part(analysis)
+    by_channel: dict[str, list[tuple[Trace, np.ndarray]]] = {}
+    for trace, reading in zip(analysis.traces, readings, strict=True):
+        by_channel.setdefault(trace.channel, []).append((trace, reading))
+    out = {}
+    for channel, pairs in by_channel.items():
+        chosen = [p for p in pairs if (part(p[0].run, p[0].time_s) < 0).mean() > 0.5] or pairs
+        signal = np.concatenate([reading for _, reading in chosen])
+        known = np.isfinite(signal)
+        spread = float(np.std(signal[known])) if known.sum() > 1 else 0.0
+        # What does not move by more than its noise has no fit.
+        if spread > analysis.noise_floor.get(channel, 0.0):
+            errors = [np.concatenate([getattr(t, name) for t, _ in chosen])[known] for name in ("before", "after")]
+            before, after = (100 * (1 - float(np.sqrt(np.mean(e**2))) / spread) for e in errors)
+            out[channel] = before, after
+    return out

@@ -33,7 +33,7 @@ from rotorid.mismatch.decision.words import (
     regime_words,
     sure,
 )
-from rotorid.mismatch.delivery.parts import form_of
+from rotorid.mismatch.delivery.files import form_of
 from rotorid.mismatch.tell.steps import steps_of, together, would_explain
 from rotorid.mismatch.tell.tiles import errors_of, tiles
 from rotorid.mismatch.tell.verdict import (
@@ -51,21 +51,21 @@ from rotorid.report.page.data import page_data
 from rotorid.steps import step
 from rotorid.vehicle.derivatives import symbol_of
 
-WORDS = {
+_WORDS = {
     "no_mismatch": "no mismatch",
     "explained": "mismatch, explained",
     "partly_explained": "mismatch, partly explained",
     "unexplained": "mismatch, unexplained",
     "not_judged": "not judged",
 }
-MOST_LOCATIONS = 12
-MOST_RUNS_IN_STRIP = 8
-STRIP_CELLS = 400
-NARROWEST = 0.03
+_MOST_LOCATIONS = 12
+_MOST_RUNS_IN_STRIP = 8
+_STRIP_CELLS = 400
+_NARROWEST = 0.03
 """Interval over plausible range below which the range is zoomed in."""
-LIMIT_DECADES = 5.0
+_LIMIT_DECADES = 5.0
 """Decades below the weight that the bars of the limits show."""
-SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @cache
@@ -84,14 +84,14 @@ def make_page(
     """The page's HTML. `ledger` holds the rules that decided something, each with a `sentence`."""
     main = main_channel(analysis, verdict.locations, verdict.channels)
     environment = Environment(autoescape=True, trim_blocks=False)
-    environment.globals.update(figure=figure_html, ranges=ranges_html)
-    shown, more = shown_locations(verdict.locations)
+    environment.globals.update(figure=_figure_html, ranges=_ranges_html)
+    shown, more = _shown_locations(verdict.locations)
     known = {row.id for row in (*verdict.effects, *verdict.not_testable, *verdict.absent)}
     known |= {i for e in verdict.effects for i in e.alternatives}
     flown = verdict.kind == "flight"
     silent = [effect_words(i) for i, e in catalogue().items() if i not in known and not (flown and e.of_the_rig)]
     data = page_data(analysis, verdict, main)
-    data["regimes"]["first"] = first_variable(verdict, main, data["regimes"]["variables"])
+    data["regimes"]["first"] = _first_variable(verdict, main, data["regimes"]["variables"])
     claimed = by_share([e for e in verdict.effects if e.status in ("established", "ambiguous")])
     scripts = page_file("uPlot.iife.min.js"), page_file("page.js")
     page = environment.from_string(page_file("page.html")).render(
@@ -99,13 +99,13 @@ def make_page(
         policy=policy_for(*scripts),
         library=Markup(scripts[0]),
         script=Markup(scripts[1]),
-        data=embedded(data),
+        data=_embedded(data),
         has_figure=bool(data["traces"]),
         has_regimes=bool(data["regimes"]["channels"]),
         has_replay=data["replay"] is not None,
         set=verdict.set,
-        runs=runs_text(verdict),
-        word=WORDS[verdict.verdict],
+        runs=_runs_text(verdict),
+        word=_WORDS[verdict.verdict],
         word_class=verdict.verdict,
         headline=pretty(verdict.sentence),
         basis=verdict.basis.sentence,
@@ -114,30 +114,30 @@ def make_page(
         tiles=[
             {"heading": t.heading, "large": pretty(t.large), "small": pretty(t.small)} for t in tiles(verdict, main)
         ],
-        steps=step_rows(verdict),
+        steps=_step_rows(verdict),
         details=[pretty(text) for text in verdict.details],
-        where_text=where_text(verdict),
+        where_text=_where_text(verdict),
         strip=strip(analysis, verdict),
-        locations=[location_row(loc) for loc in shown],
+        locations=[_location_row(loc) for loc in shown],
         more_locations=more,
-        what_text=what_text(verdict),
-        effects=[effect_block(e, finding_of(e, analysis)) for e in claimed],
-        suggested=[effect_block(e, finding_of(e, analysis)) for e in verdict.effects if e.status == "suggested"],
-        values=[value_range(name, *v) for name, v in analysis.values.items()],
-        all_values=[value_row(name, row) for name, row in verdict.believed_values.items()],
-        correlated=correlated_text(verdict),
-        derivatives=derivative_rows(verdict),
-        scores=score_rows(verdict),
-        better_text=better_text(verdict),
-        forward_text=forward_text(verdict),
-        table=error_table(verdict.channels, data["fit_percent"]),
-        rest=rest_text(verdict),
-        ruled_out=[ruled_out(e) for e in verdict.effects if e.status in ("absorbed", "not_established")],
+        what_text=_what_text(verdict),
+        effects=[_effect_block(e, _finding_of(e, analysis)) for e in claimed],
+        suggested=[_effect_block(e, _finding_of(e, analysis)) for e in verdict.effects if e.status == "suggested"],
+        values=[_value_range(name, *v) for name, v in analysis.values.items()],
+        all_values=[_value_row(name, row) for name, row in verdict.believed_values.items()],
+        correlated=_correlated_text(verdict),
+        derivatives=_derivative_rows(verdict),
+        scores=_score_rows(verdict),
+        better_text=_better_text(verdict),
+        forward_text=_forward_text(verdict),
+        table=_error_table(verdict.channels, data["fit_percent"]),
+        rest=_rest_text(verdict),
+        ruled_out=[_ruled_out(e) for e in verdict.effects if e.status in ("absorbed", "not_established")],
         silent=listed(silent),
-        limits=[limit_row(a) for a in verdict.absent],
+        limits=[_limit_row(a) for a in verdict.absent],
         not_testable=[{"name": capital(effect_words(n.id)), "reason": n.reason} for n in verdict.not_testable],
         next=next_text(verdict, analysis.recordings),
-        ledger=[ledger_row(row) for row in ledger],
+        ledger=[_ledger_row(row) for row in ledger],
         notes=notes(analysis, forward_notes),
     )
     return spoken(page, analysis)
@@ -156,7 +156,7 @@ def policy_for(*scripts: str) -> str:
     )
 
 
-def embedded(data: Mapping) -> Markup:
+def _embedded(data: Mapping) -> Markup:
     """Data as JSON that cannot end the script element that holds it, whatever names are in it."""
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
     return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
@@ -167,14 +167,14 @@ def by_share(effects: Sequence[EffectVerdict]) -> list[EffectVerdict]:
     return sorted(effects, key=lambda e: -(getattr(e, "share", None) or 0.0))
 
 
-def limit_row(limit: Absent) -> dict[str, str]:
+def _limit_row(limit: Absent) -> dict[str, str]:
     """A row of the table of what was not found; `bar` is a share of the scale from 0.001 % to 100 % of the weight."""
     share = limit.share_of_weight
-    decades = 0.0 if not share else float(np.clip(1.0 + np.log10(share) / LIMIT_DECADES, 0.0, 1.0))
+    decades = 0.0 if not share else float(np.clip(1.0 + np.log10(share) / _LIMIT_DECADES, 0.0, 1.0))
     size = Markup("")
     if limit.at_most is not None:
         size = Markup("|{}| ≤ {}").format(
-            subscripts(limit.symbol), pretty(f"{number(limit.at_most)} {limit.unit}".removesuffix(" 1").strip())
+            _subscripts(limit.symbol), pretty(f"{number(limit.at_most)} {limit.unit}".removesuffix(" 1").strip())
         )
     return {
         "name": capital(effect_words(limit.id)),
@@ -184,20 +184,20 @@ def limit_row(limit: Absent) -> dict[str, str]:
     }
 
 
-def finding_of(effect: EffectVerdict, analysis: Analysis) -> Finding:
+def _finding_of(effect: EffectVerdict, analysis: Analysis) -> Finding:
     """The finding behind an effect of the verdict."""
     same = [f for f in analysis.findings if f.id == effect.id]
     return next((f for f in same if f.status == effect.status), same[0])
 
 
-def first_variable(verdict: Verdict, main: str, known: Mapping[str, str]) -> str:
+def _first_variable(verdict: Verdict, main: str, known: Mapping[str, str]) -> str:
     """The variable that the regime figure opens with: the one that separates the mismatch best."""
     regimes = [(loc.channel, loc.regime.variable) for loc in verdict.locations if loc.regime is not None]
     ordered = [v for c, v in regimes if c == main] + [v for _, v in regimes]
     return next((v for v in ordered if v in known), next(iter(known), ""))
 
 
-def ledger_row(row: Mapping) -> Markup:
+def _ledger_row(row: Mapping) -> Markup:
     """A rule of the ledger: its name, what it decided on and its sentence, with its numbers."""
     head = " ".join(str(row[k]) for k in ("rule", "on", "subject", "id") if row.get(k))
     numbers = row.get("numbers") or {}
@@ -210,25 +210,25 @@ def pretty(text: str) -> Markup:
     """Text as HTML with powers of ten and units set as they are printed: 5.1e-5 ± 0.2e-5 → (5.1 ± 0.2) × 10⁻⁵."""
     text = re.sub(
         r"(-?[\d.]+)e(-?\d+) ± ([\d.]+)e\2\b",
-        lambda m: f"({m[1]} ± {m[3]}) × 10{m[2].translate(SUPERSCRIPTS)}",
+        lambda m: f"({m[1]} ± {m[3]}) × 10{m[2].translate(_SUPERSCRIPTS)}",
         text,
     )
-    text = re.sub(r"(\d)e([+-]?\d+)\b", lambda m: f"{m[1]} × 10{str(int(m[2])).translate(SUPERSCRIPTS)}", text)
+    text = re.sub(r"(\d)e([+-]?\d+)\b", lambda m: f"{m[1]} × 10{str(int(m[2])).translate(_SUPERSCRIPTS)}", text)
     text = re.sub(r"(?<![\w])-(?=\d)", "−", text)
-    return Markup(html.escape(unit_text(text), quote=False))
+    return Markup(html.escape(_unit_text(text), quote=False))
 
 
-def subscripts(text: str) -> Markup:
+def _subscripts(text: str) -> Markup:
     """`k_d,x` with what follows the underscore set low."""
     return Markup(re.sub(r"_([A-Za-z0-9⊥∥,]+)(?<!,)", r"<sub>\1</sub>", html.escape(text, quote=False)))
 
 
-def unit_text(text: str) -> str:
+def _unit_text(text: str) -> str:
     """Units with raised exponents: `N s2/(rad m)` → `N s²/(rad m)`."""
-    return re.sub(r"\b(rad|kg|m|s|A|V|K)(-?\d)\b", lambda m: m[1] + m[2].translate(SUPERSCRIPTS), text)
+    return re.sub(r"\b(rad|kg|m|s|A|V|K)(-?\d)\b", lambda m: m[1] + m[2].translate(_SUPERSCRIPTS), text)
 
 
-def figure_html(shown: tuple[str, str, str] | None) -> Markup:
+def _figure_html(shown: tuple[str, str, str] | None) -> Markup:
     """A figure from (svg, alternative text, caption); nothing for None."""
     if shown is None:
         return Markup("")
@@ -239,7 +239,7 @@ def figure_html(shown: tuple[str, str, str] | None) -> Markup:
     ).format(alternative, Markup(data), caption)
 
 
-def ranges_html(rows: Sequence[Mapping]) -> Markup:
+def _ranges_html(rows: Sequence[Mapping]) -> Markup:
     """Table of parameters, each with its interval drawn on the range that is physically plausible."""
     if not rows:
         return Markup("")
@@ -265,13 +265,13 @@ def ranges_html(rows: Sequence[Mapping]) -> Markup:
             ).format(at(first), wide, belief, at(row["value"]), pretty(number(low)), pretty(number(high)))
         out.append(
             Markup('<tr><td><em>{}</em></td><td class="text">{}</td><td class="text">{}</td><td>{}</td></tr>').format(
-                subscripts(row["symbol"]), pretty(row["meaning"]), pretty(row["text"]), marks
+                _subscripts(row["symbol"]), pretty(row["meaning"]), pretty(row["text"]), marks
             )
         )
     return Markup("").join([*out, Markup("</table>")])
 
 
-def runs_text(verdict: Verdict) -> str:
+def _runs_text(verdict: Verdict) -> str:
     held, training = verdict.runs.held_out, verdict.runs.training
     if set(held) == set(training):
         return f"one run, {training[0]}; its last third held out"
@@ -279,7 +279,7 @@ def runs_text(verdict: Verdict) -> str:
     return f"{fitted} to fit, {len(held)} held out ({', '.join(held)})"
 
 
-def where_text(verdict: Verdict) -> list[str]:
+def _where_text(verdict: Verdict) -> list[str]:
     if not verdict.locations:
         return ["Nowhere does the error rise above what the sensors' noise explains."]
     regimes = {}
@@ -307,7 +307,7 @@ def strip(analysis: Analysis, verdict: Verdict) -> tuple[str, str, str] | None:
     runs = list(dict.fromkeys(t.run for t in analysis.traces))
     located_runs = dict.fromkeys(loc.run for loc in verdict.locations)
     shown = list(dict.fromkeys([*[r for r in runs if r in verdict.runs.held_out], *located_runs, *runs]))
-    shown = [r for r in runs if r in shown[:MOST_RUNS_IN_STRIP]]
+    shown = [r for r in runs if r in shown[:_MOST_RUNS_IN_STRIP]]
     if not channels or not shown:
         return None
     sizes = {}
@@ -315,7 +315,7 @@ def strip(analysis: Analysis, verdict: Verdict) -> tuple[str, str, str] | None:
         if trace.run in shown and trace.channel in channels:
             noise = verdict.channels[trace.channel].noise_floor
             period = float(np.median(np.diff(trace.time_s)))
-            per = max(int(plots.STRIP_CELL_S / period), len(trace.time_s) // STRIP_CELLS, 1)
+            per = max(int(plots.STRIP_CELL_S / period), len(trace.time_s) // _STRIP_CELLS, 1)
             per = min(per, len(trace.time_s))  # A stretch that is shorter than a cell is one cell.
             count = len(trace.time_s) // per
             for stage in ("before", "after"):
@@ -342,16 +342,16 @@ def blocks(values: np.ndarray, per: int, count: int) -> np.ndarray:
     return values[: count * per].reshape(count, per).mean(axis=1)
 
 
-def shown_locations(locations: Sequence[Location]) -> tuple[list[Location], str]:
+def _shown_locations(locations: Sequence[Location]) -> tuple[list[Location], str]:
     """The locations with most of the energy, in their order, and a word on the others."""
-    if len(locations) <= MOST_LOCATIONS:
+    if len(locations) <= _MOST_LOCATIONS:
         return list(locations), ""
-    kept = sorted(locations, key=lambda loc: -loc.energy_share)[:MOST_LOCATIONS]
-    rest = len(locations) - MOST_LOCATIONS
+    kept = sorted(locations, key=lambda loc: -loc.energy_share)[:_MOST_LOCATIONS]
+    rest = len(locations) - _MOST_LOCATIONS
     return [loc for loc in locations if loc in kept], f"{rest} more are in verdict.json."
 
 
-def location_row(loc: Location) -> dict:
+def _location_row(loc: Location) -> dict:
     regime = ""
     if loc.regime is not None:
         name, unit = regime_words(loc.regime.variable)
@@ -363,17 +363,17 @@ def location_row(loc: Location) -> dict:
         "stop": f"{loc.stop_s:.1f}",
         "share": f"{100 * loc.energy_share:.0f} %",
         "regime": regime,
-        "p": chance(loc.p_value),
+        "p": _chance(loc.p_value),
     }
 
 
-def chance(p_value: float | None) -> str:
+def _chance(p_value: float | None) -> str:
     if p_value is None:
         return "–"
     return "< 0.001" if p_value < 1e-3 else f"{p_value:.3f}"
 
 
-def what_text(verdict: Verdict) -> list[str]:
+def _what_text(verdict: Verdict) -> list[str]:
     at_work = [e for e in verdict.effects if e.status in ("established", "ambiguous")]
     if at_work or verdict.parameters:
         return []
@@ -382,7 +382,7 @@ def what_text(verdict: Verdict) -> list[str]:
     return ["None of the known effects explains what was located."]
 
 
-def effect_block(e: EffectVerdict, finding: Finding) -> dict:
+def _effect_block(e: EffectVerdict, finding: Finding) -> dict:
     """One effect at work: name, equation, parameters on their plausible ranges, how sure, what else it could be."""
     effect = catalogue().get(e.id)
     share = getattr(e, "share", None)
@@ -429,9 +429,9 @@ def effect_block(e: EffectVerdict, finding: Finding) -> dict:
         "name": capital(effect_words(e.id)),
         "status": e.status,
         "sentence": capital(e.sentence).rstrip(".") + "." if e.sentence else "",
-        "equation": subscripts(e.equation),
+        "equation": _subscripts(e.equation),
         "parameters": [
-            parameter_range(
+            _parameter_range(
                 p.symbol,
                 p.value,
                 p.unit,
@@ -447,7 +447,7 @@ def effect_block(e: EffectVerdict, finding: Finding) -> dict:
     }
 
 
-def parameter_range(symbol, value, unit, low, high, plausible=None, meaning="", believed=None) -> dict:
+def _parameter_range(symbol, value, unit, low, high, plausible=None, meaning="", believed=None) -> dict:
     """A parameter with its interval and the range to draw it on: the physical bounds where they are finite."""
     text = plus_minus(value, low, high) if value is not None else "not determined"
     unit = unit if unit not in ("-", "1") else ""
@@ -463,7 +463,7 @@ def parameter_range(symbol, value, unit, low, high, plausible=None, meaning="", 
             bounds = f"plausible: {_bounds(*plausible)}"
             meaning = f"{meaning} ({bounds})" if meaning else bounds
             # Bounds so wide that the interval would be a hairline are stated, not drawn.
-            if high - low > NARROWEST * (ends[1] - ends[0]):
+            if high - low > _NARROWEST * (ends[1] - ends[0]):
                 first, last = ends
         scale = (first, last) if last > first else None
     return {
@@ -483,13 +483,13 @@ def _bounds(low: float, high: float) -> str:
     return f"to {number(high)}" if not math.isfinite(low) else f"{number(low)} to {number(high)}"
 
 
-def value_range(name: str, believed: float, refitted: float, low: float, high: float) -> dict:
+def _value_range(name: str, believed: float, refitted: float, low: float, high: float) -> dict:
     words, unit = parameter_words(name)
-    row = parameter_range(words.rstrip(","), refitted, unit, low, high, believed=believed)
+    row = _parameter_range(words.rstrip(","), refitted, unit, low, high, believed=believed)
     return row | {"meaning": pretty(f"believed {number(believed, 4)} {unit}".strip())}
 
 
-def value_row(name: str, row: BelievedValue) -> dict:
+def _value_row(name: str, row: BelievedValue) -> dict:
     """A line of the table of all believed values: before, estimate with interval, delivered."""
     words, unit = parameter_words(name)
     low, high = row.interval_95
@@ -498,7 +498,7 @@ def value_row(name: str, row: BelievedValue) -> dict:
         change = f"{100 * (row.delivered / row.believed - 1):+.2g} %"
     return {
         "name": words,
-        "unit": unit_text(unit),
+        "unit": _unit_text(unit),
         "believed": cell(row.believed),
         "estimate": pretty(plus_minus(row.estimate, low, high)) if row.estimate is not None else "–",
         "delivered": cell(row.delivered),
@@ -507,7 +507,7 @@ def value_row(name: str, row: BelievedValue) -> dict:
     }
 
 
-def correlated_text(verdict: Verdict) -> list[str]:
+def _correlated_text(verdict: Verdict) -> list[str]:
     """Sentences on the values of which little more than a ratio is known."""
     pairs: list[tuple[str, str, float]] = []
     for pair in verdict.correlations:
@@ -519,7 +519,7 @@ def correlated_text(verdict: Verdict) -> list[str]:
     ]
 
 
-def better_text(verdict: Verdict) -> str:
+def _better_text(verdict: Verdict) -> str:
     if verdict.verdict == "no_mismatch":
         return "There is nothing to gain that these recordings could show."
     if verdict.kind != "flight":
@@ -534,7 +534,7 @@ def better_text(verdict: Verdict) -> str:
     )
 
 
-def error_table(channels: Mapping[str, Channel], fits: Mapping[str, tuple[float, float]]) -> list[dict]:
+def _error_table(channels: Mapping[str, Channel], fits: Mapping[str, tuple[float, float]]) -> list[dict]:
     """Rows of errors, inverse dynamics and simulation run forward apart; `fits` in per cent, before and after."""
     groups = []
     for name, chosen in (
@@ -544,12 +544,12 @@ def error_table(channels: Mapping[str, Channel], fits: Mapping[str, tuple[float,
         rows = [
             {
                 "name": channel_words(c).removesuffix(" after half a second"),
-                "unit": unit_text(channels[c].unit),
+                "unit": _unit_text(channels[c].unit),
                 "noise": cell(channels[c].noise_floor),
                 "bars": bars(channels[c]),
                 "fit": pretty(" → ".join(f"{v:.0f}" for v in fits[c])) if c in fits else "–",
-                "held_out": [cell(getattr(channels[c].rmse.held_out, s)) for s in STAGES],
-                "training": [cell(getattr(channels[c].rmse.training, s)) for s in STAGES],
+                "held_out": [cell(getattr(channels[c].rmse.held_out, s)) for s in _STAGES],
+                "training": [cell(getattr(channels[c].rmse.training, s)) for s in _STAGES],
             }
             for c in chosen
         ]
@@ -558,11 +558,11 @@ def error_table(channels: Mapping[str, Channel], fits: Mapping[str, tuple[float,
     return groups
 
 
-STAGES = ("before", "refitted", "named", "after")
-MODELS = {"believed": "as believed", "refitted": "values refitted", "named": "values and named physics"}
+_STAGES = ("before", "refitted", "named", "after")
+_MODELS = {"believed": "as believed", "refitted": "values refitted", "named": "values and named physics"}
 
 
-def step_rows(verdict: Verdict) -> list[dict]:
+def _step_rows(verdict: Verdict) -> list[dict]:
     """A bar a channel: shares of its error, in percent of its length, that values, named physics and derivatives take
     off, noise, and what is left above it."""
     rows, steps = [], steps_of(verdict.channels, verdict.delivered.model)
@@ -576,7 +576,7 @@ def step_rows(verdict: Verdict) -> list[dict]:
                 "name": capital(channel_words(name)) if name in steps else "All, in the mean",
                 "parts": [
                     {"kind": kind, "width": f"{100 * w:.1f}", "said": f"{words} {100 * w:.0f} %"}
-                    for kind, words, w in zip(STEP_KINDS, STEP_WORDS, widths, strict=True)
+                    for kind, words, w in zip(_STEP_KINDS, _STEP_WORDS, widths, strict=True)
                 ],
                 "worse": s.delivered > 1.0,
             }
@@ -584,11 +584,11 @@ def step_rows(verdict: Verdict) -> list[dict]:
     return rows
 
 
-STEP_KINDS = ("values", "named", "derivatives", "left", "noise")
-STEP_WORDS = ("values take off", "named physics", "predictable, without a name", "left above the noise", "noise")
+_STEP_KINDS = ("values", "named", "derivatives", "left", "noise")
+_STEP_WORDS = ("values take off", "named physics", "predictable, without a name", "left above the noise", "noise")
 
 
-def derivative_rows(verdict: Verdict) -> list[dict]:
+def _derivative_rows(verdict: Verdict) -> list[dict]:
     """The table of derivatives, those first whose interval leaves out nothing."""
     rows = []
     for d in verdict.derivatives:
@@ -597,10 +597,10 @@ def derivative_rows(verdict: Verdict) -> list[dict]:
         names = [effect_words(i) for i in would_explain(d.channel, d.quantity, verdict)] if clear else []
         rows.append(
             {
-                "symbol": subscripts(symbol_of(d.channel, d.quantity)),
-                "words": derivative_words(d.channel, d.quantity),
+                "symbol": _subscripts(symbol_of(d.channel, d.quantity)),
+                "words": _derivative_words(d.channel, d.quantity),
                 "value": pretty(f"{number(d.value, 3)} ({number(low, 3)} to {number(high, 3)})"),
-                "unit": unit_text(d.unit),
+                "unit": _unit_text(d.unit),
                 "range": "" if d.quantity == "constant" else pretty(f"{number(d.low, 2)} to {number(d.high, 2)}"),
                 "clear": clear,
                 "names": listed(names, "or") if names else "",
@@ -609,26 +609,26 @@ def derivative_rows(verdict: Verdict) -> list[dict]:
     return sorted(rows, key=lambda row: not row["clear"])
 
 
-def derivative_words(channel: str, quantity: str) -> str:
+def _derivative_words(channel: str, quantity: str) -> str:
     """A derivative in words: `sideways force by sideways velocity`."""
     if quantity == "constant":
         return f"{channel_words(channel)}, constant"
-    return f"{channel_words(channel)} by {QUANTITY_WORDS[quantity]}"
+    return f"{channel_words(channel)} by {_QUANTITY_WORDS[quantity]}"
 
 
-QUANTITY_WORDS = {
+_QUANTITY_WORDS = {
     **{"u": "forward velocity", "v": "sideways velocity", "w": "downward velocity"},
     **{"p": "roll rate", "q": "pitch rate", "r": "yaw rate", "thrust": "thrust", "thrust_roll": "rolling thrust"},
     **{"thrust_pitch": "pitching thrust", "thrust_yaw": "thrust by spin", "speed": "rotor speed"},
 }
 
 
-def score_rows(verdict: Verdict) -> list[dict]:
+def _score_rows(verdict: Verdict) -> list[dict]:
     """Every candidate with its error over the believed vehicle's where nothing was fitted; the delivered one marked."""
     taken = verdict.delivered.model, verdict.delivered.derivatives
     return [
         {
-            "name": MODELS[s.model] + (", with derivatives" if s.derivatives else ""),
+            "name": _MODELS[s.model] + (", with derivatives" if s.derivatives else ""),
             "error": f"{100 * math.exp(s.score):.0f} %",
             "doubt": f"± {100 * math.exp(s.score) * (s.standard_error or 0.0):.0f} %",
             "taken": (s.model, s.derivatives) == taken,
@@ -638,7 +638,7 @@ def score_rows(verdict: Verdict) -> list[dict]:
     ]
 
 
-FARTHEST = 100.0
+_FARTHEST = 100.0
 """Error over noise at which the bar of the table of errors ends."""
 
 
@@ -649,8 +649,8 @@ def bars(channel: Channel) -> Markup:
         return Markup("")
 
     def at(value: float) -> float:
-        ratio = min(max(value / channel.noise_floor, 0.5), FARTHEST)
-        return 6 + 100 * math.log(ratio / 0.5) / math.log(FARTHEST / 0.5)
+        ratio = min(max(value / channel.noise_floor, 0.5), _FARTHEST)
+        return 6 + 100 * math.log(ratio / 0.5) / math.log(_FARTHEST / 0.5)
 
     return Markup(
         '<svg viewBox="0 0 112 14" role="img" aria-label="{}">'
@@ -667,7 +667,7 @@ def bars(channel: Channel) -> Markup:
     )
 
 
-def forward_text(verdict: Verdict) -> list[str]:
+def _forward_text(verdict: Verdict) -> list[str]:
     """The simulation run forward in words: how far it drifts off within half a second."""
     parts = []
     for name, words in (("position", "the position"), ("velocity", "the velocity"), ("attitude", "the attitude"),
@@ -689,7 +689,7 @@ def cell(value: float | None) -> str | Markup:
     return "–" if value is None else pretty(number(value, 3))
 
 
-def rest_text(verdict: Verdict) -> list[str]:
+def _rest_text(verdict: Verdict) -> list[str]:
     rest = verdict.unexplained
     if verdict.verdict == "no_mismatch" or (rest.share <= 0 and not rest.description):
         return ["Nothing that stands out from the noise."]
@@ -701,7 +701,7 @@ def rest_text(verdict: Verdict) -> list[str]:
     return texts + ([pretty(rest.description)] if rest.description else [])
 
 
-def ruled_out(e: EffectVerdict) -> Markup:
+def _ruled_out(e: EffectVerdict) -> Markup:
     name = effect_words(e.id)
     sentence = e.sentence or {"absorbed": "explained by the refitted values"}.get(e.status, "did not hold")
     if sentence.lower().startswith(name.lower()):

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PLATFORM = {"al": "aluminium", "pla": "PLA", "jr3": "reference sensor"}
-PLATFORM_COLOUR = {"al": style.BLUE, "pla": style.ORANGE, "jr3": style.GREY}
+_PLATFORM_COLOUR = {"al": style.BLUE, "pla": style.ORANGE, "jr3": style.GREY}
 AXES = "xyz"
 
 
@@ -94,7 +94,7 @@ def static_z(loads: pd.DataFrame) -> Figure:
     output.plot([0, largest], [0, largest], color=style.BLACK, linewidth=0.7, label="target")
     for platform, label in PLATFORM.items():
         part = own[own["platform"] == platform].sort_values("load_n")
-        colour = PLATFORM_COLOUR[platform]
+        colour = _PLATFORM_COLOUR[platform]
         output.plot(part["load_n"], part["load_n"] + part["error_n"], "o-", color=colour, label=label, linewidth=0.7)
         low, high = part["error_n"] - part["low_95_n"], part["high_95_n"] - part["error_n"]
         error.errorbar(part["load_n"], part["error_n"], (low, high), fmt="o-", color=colour, linewidth=0.7, capsize=2)
@@ -174,7 +174,7 @@ def dynamic(flights: pd.DataFrame) -> Figure:
             axis.plot(
                 flight["time_s"].to_numpy()[kept],
                 values[kept],
-                color=PLATFORM_COLOUR[platform],
+                color=_PLATFORM_COLOUR[platform],
                 linewidth=0.6 if platform == "jr3" else 1.0,
                 label=PLATFORM[platform],
             )

@@ -108,7 +108,7 @@ def held_out_rows(scores: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-EFFECTS = {
+_EFFECTS = {
     **{f"thrust_factor_{i}": (f"thrust of rotor {i}", "believed", 1.0) for i in (1, 2, 3, 4)},
     **{f"torque_factor_{i}": (f"torque of rotor {i}", "believed", 1.0) for i in (1, 2, 3, 4)},
     "sensor_origin_x_m": ("sensor origin, x", "mm", 1000.0),
@@ -121,7 +121,7 @@ EFFECTS = {
 def effect_rows(effects: dict) -> pd.DataFrame:
     """The fitted effects with their intervals as a table's rows."""
     rows = []
-    for name, (words, unit, scale) in EFFECTS.items():
+    for name, (words, unit, scale) in _EFFECTS.items():
         low, high = effects[name]["interval_95"]
         rows.append(
             {

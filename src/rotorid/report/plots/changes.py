@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from rotorid.mismatch.changes.compare import Changes, Residual
 
 CLAIMED = ("established", "ambiguous")
-ABREAST = 4
+_ABREAST = 4
 """Quantities next to each other."""
-MOST_POINTS = 1500
+_MOST_POINTS = 1500
 """Points of a line at most: more are not seen at the width of a page."""
 
 
@@ -47,7 +47,7 @@ def draw_residuals(found: Changes, names: Mapping[str, str], path: Path) -> None
             strict=True,
         )
         for residuals, name, colour in sets:
-            time_s, values = thinned(residuals[channel])
+            time_s, values = _thinned(residuals[channel])
             axis.plot(time_s, values, color=colour, lw=0.7, label=name)
         axis.set_ylabel(f"{names[channel]}\n({'N' if channel.startswith('force') else 'N m'})")
     if channels:
@@ -56,17 +56,17 @@ def draw_residuals(found: Changes, names: Mapping[str, str], path: Path) -> None
     style.save(fig, path)
 
 
-def thinned(residual: Residual) -> tuple[np.ndarray, np.ndarray]:
+def _thinned(residual: Residual) -> tuple[np.ndarray, np.ndarray]:
     """Times from 0 and values of a line that is not longer than a page shows."""
-    step = max(1, len(residual.time_s) // MOST_POINTS)
+    step = max(1, len(residual.time_s) // _MOST_POINTS)
     return residual.time_s[::step] - residual.time_s[0], residual.values[::step]
 
 
 def draw_differences(found: Changes, names: Mapping[str, str], path: Path) -> None:
     """Every quantity of level 1 over the flights in order: good ones shaded, with the limits of what is stated."""
     differences = sorted(found.level_1.differences, key=lambda d: list(names).index(d.quantity.key))
-    rows = -(-len(differences) // ABREAST) or 1
-    fig, axes = style.figure(1.15 * rows + 0.3, rows, ABREAST, squeeze=False)
+    rows = -(-len(differences) // _ABREAST) or 1
+    fig, axes = style.figure(1.15 * rows + 0.3, rows, _ABREAST, squeeze=False)
     for axis in axes.ravel()[len(differences) :]:
         axis.set_axis_off()
     for axis, d in zip(axes.ravel(), differences, strict=False):

@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NAMES = {"aluminium": "Al-6061", "pla": "PLA"}
-COLOURS = {"aluminium": style.BLUE, "pla": style.RED}
+_COLOURS = {"aluminium": style.BLUE, "pla": style.RED}
 LEGS = 3
 PARTS = ("upper cell", "lower cell", "A", "B", "C", "D")
-LIGHT = np.array([0.36, -0.48, 0.8])
+_LIGHT = np.array([0.36, -0.48, 0.8])
 """Direction from which the parts are lit."""
-TICKS_UV_N = (20, 50, 100, 200, 500)
-RATIOS = {
+_TICKS_UV_N = (20, 50, 100, 200, 500)
+_RATIOS = {
     "ratio_deformation": "deformation",
     "ratio_narrow_upper": "stress, upper cell",
     "ratio_narrow_lower": "stress, lower cell",
@@ -73,7 +73,7 @@ def parts(surface: pd.DataFrame) -> Figure:
     for axis, number in zip(axes, (LEGS, 1), strict=True):
         shown = legs[: number * len(triangles)]
         normal = np.cross(shown[:, 1] - shown[:, 0], shown[:, 2] - shown[:, 0])
-        light = 0.55 + 0.45 * np.abs(normal @ LIGHT) / np.linalg.norm(normal, axis=1)
+        light = 0.55 + 0.45 * np.abs(normal @ _LIGHT) / np.linalg.norm(normal, axis=1)
         plain = np.array([to_rgb(colours[name]) for name in np.tile(triangles, number)])
         _put(axis, shown, plain * light[:, None], legs, zoom=1.3)
     axes[0].set_title("the bench")
@@ -124,11 +124,11 @@ def against_load(loads: pd.DataFrame) -> Figure:
     )
     for axis, (column, factor, label, line) in zip(axes, panels, strict=True):
         for end, name in NAMES.items():
-            axis.plot(loads["load_gf"], factor * loads[f"{column}_{end}"], "o" + line, color=COLOURS[end], label=name)
+            axis.plot(loads["load_gf"], factor * loads[f"{column}_{end}"], "o" + line, color=_COLOURS[end], label=name)
         axis.set(xlabel="load (gf)", ylabel=label, xlim=(0, None), ylim=(0, None))
     for end, name in NAMES.items():
         upper = 1e-6 * loads[f"narrow_upper_pa_{end}"]
-        axes[2].plot(loads["load_gf"], upper, "s--", color=COLOURS[end], markerfacecolor="white", label=name)
+        axes[2].plot(loads["load_gf"], upper, "s--", color=_COLOURS[end], markerfacecolor="white", label=name)
     axes[0].legend(loc="upper left")
     handles, _ = axes[2].get_legend_handles_labels()
     axes[2].legend([handles[0], handles[2]], ["lower cell", "upper cell"], loc="upper left")
@@ -141,8 +141,8 @@ def over_sizes(benches: pd.DataFrame) -> Figure:
     alone = benches[benches["end"].isin(["low", "high"])]
     drawn = benches[benches["end"] == "drawn"]
     sizes = list(dict.fromkeys(alone["size"]))
-    fig, axes = style.figure(0.17 * len(sizes) + 1.2, 1, len(RATIOS), sharey=True)
-    for axis, (column, label) in zip(axes, RATIOS.items(), strict=True):
+    fig, axes = style.figure(0.17 * len(sizes) + 1.2, 1, len(_RATIOS), sharey=True)
+    for axis, (column, label) in zip(axes, _RATIOS.items(), strict=True):
         for place, size in enumerate(sizes):
             part = alone[alone["size"] == size].set_index("end")[column]
             for end, colour in (("low", style.BLUE), ("high", style.ORANGE)):
@@ -183,7 +183,7 @@ def sensitivity(variants: pd.DataFrame, measured_v_per_n: Sequence[float]) -> Fi
     for value in measured_v_per_n:
         axis.axvline(1e6 * value, color=style.GREEN, lw=0.7)
     axis.set(xscale="log", xlabel="sensitivity (µV/N)")
-    axis.set_xticks(TICKS_UV_N, [f"{value:g}" for value in TICKS_UV_N])
+    axis.set_xticks(_TICKS_UV_N, [f"{value:g}" for value in _TICKS_UV_N])
     axis.minorticks_off()
     axis.set_yticks(range(len(sizes)), [_plain(size) for size in sizes], fontsize=7.5)
     axis.invert_yaxis()

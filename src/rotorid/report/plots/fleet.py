@@ -9,11 +9,11 @@ import pandas as pd
 
 from rotorid.report.plots import style
 
-MOST_EFFECTS = 15
-MOST_PARAMETERS = 4
-MOST_NAMED = 6
+_MOST_EFFECTS = 15
+_MOST_PARAMETERS = 4
+_MOST_NAMED = 6
 """Vehicles that still have a colour each."""
-WORDS = {"established": style.BLUE, "ambiguous": style.ORANGE, "suggested": style.GREY}
+_WORDS = {"established": style.BLUE, "ambiguous": style.ORANGE, "suggested": style.GREY}
 
 
 def draw_fleet(counts: pd.DataFrame, parameters: pd.DataFrame, sets: pd.DataFrame, path: Path) -> None:
@@ -21,8 +21,8 @@ def draw_fleet(counts: pd.DataFrame, parameters: pd.DataFrame, sets: pd.DataFram
 
     Each number stands at its set's day, or its place in the order of day and name, with its interval (95 %).
     """
-    shown = counts.head(MOST_EFFECTS).iloc[::-1]
-    numbers = most_frequent(parameters)
+    shown = counts.head(_MOST_EFFECTS).iloc[::-1]
+    numbers = _most_frequent(parameters)
     rows = 1 + len(numbers)
     heights = [0.4 + 0.19 * max(len(shown), 1), *[1.5] * len(numbers)]
     fig, axes = style.figure(sum(heights) + 0.4 * rows, rows, 1, height_ratios=heights, squeeze=False)
@@ -33,19 +33,19 @@ def draw_fleet(counts: pd.DataFrame, parameters: pd.DataFrame, sets: pd.DataFram
     style.save(fig, path)
 
 
-def most_frequent(parameters: pd.DataFrame) -> list[str]:
+def _most_frequent(parameters: pd.DataFrame) -> list[str]:
     """Names of the numbers that most sets state and that an established effect or a wrong value has."""
     sure = parameters[parameters["status"].isin(["established", "wrong value"])]
     counts = sure["parameter"].value_counts()
     # Names in order of the alphabet where as many sets state them, so that two runs draw the same.
     ordered = sorted(counts.items(), key=lambda pair: (-pair[1], pair[0]))
-    return [name for name, _ in ordered[:MOST_PARAMETERS]]
+    return [name for name, _ in ordered[:_MOST_PARAMETERS]]
 
 
 def bars(axis, shown: pd.DataFrame, sets: pd.DataFrame) -> None:
     """How many sets show each effect, by the verdict's word."""
     left = np.zeros(len(shown))
-    for word, colour in WORDS.items():
+    for word, colour in _WORDS.items():
         values = shown[word].to_numpy(float)
         axis.barh(shown["effect"], values, left=left, color=colour, label=word)
         left += values
@@ -66,7 +66,7 @@ def over_time(axis, own: pd.DataFrame, order: dict[str, int], count: int) -> Non
     """
     dated = bool((own["day"] != "").all()) and own["day"].nunique() > 1
     vehicles = sorted(own["vehicle"].unique())
-    few = len(vehicles) <= MOST_NAMED
+    few = len(vehicles) <= _MOST_NAMED
     for number, vehicle in enumerate(vehicles):
         part = own[own["vehicle"] == vehicle].sort_values(["day", "set"])
         place = pd.to_datetime(part["day"]).to_numpy() if dated else part["set"].map(order).to_numpy()
@@ -85,7 +85,7 @@ def over_time(axis, own: pd.DataFrame, order: dict[str, int], count: int) -> Non
         axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
-MOST_HISTORIES = 8
+_MOST_HISTORIES = 8
 """Vehicles whose history is drawn, those with the most events first."""
 
 
@@ -96,19 +96,19 @@ def draw_history(numbers: pd.DataFrame, events: pd.DataFrame, path: Path) -> Non
     some set on has a colour, the others are grey; a line stands where an event begins.
     """
     counts = events["vehicle"].value_counts()
-    vehicles = sorted(numbers["vehicle"].unique(), key=lambda v: (-counts.get(v, 0), v))[:MOST_HISTORIES]
+    vehicles = sorted(numbers["vehicle"].unique(), key=lambda v: (-counts.get(v, 0), v))[:_MOST_HISTORIES]
     rows = max(1, len(vehicles))
     fig, axes = style.figure(1.7 * rows + 0.3, rows, 1, squeeze=False)
     if not vehicles:
         axes[0, 0].text(0.5, 0.5, "no vehicle has more sets than the good ones", ha="center")
         axes[0, 0].set_axis_off()
     for axis, vehicle in zip(axes[:, 0], vehicles, strict=False):
-        one_history(axis, numbers[numbers["vehicle"] == vehicle], events[events["vehicle"] == vehicle])
+        _one_history(axis, numbers[numbers["vehicle"] == vehicle], events[events["vehicle"] == vehicle])
         axis.set_title(vehicle, loc="left")
     style.save(fig, path)
 
 
-def one_history(axis, numbers: pd.DataFrame, events: pd.DataFrame) -> None:
+def _one_history(axis, numbers: pd.DataFrame, events: pd.DataFrame) -> None:
     """One vehicle's values over its sets."""
     order = {name: place for place, name in enumerate(dict.fromkeys(numbers["set"]), 1)}
     changed = [name for name in dict.fromkeys(numbers["name"]) if name in set(events["id"])]
@@ -133,7 +133,7 @@ def one_history(axis, numbers: pd.DataFrame, events: pd.DataFrame) -> None:
         axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
-ABREAST = 4
+_ABREAST = 4
 """Quantities of a vehicle next to each other."""
 
 
@@ -143,8 +143,8 @@ def draw_vehicle(numbers: pd.DataFrame, events: pd.DataFrame, path: Path) -> Non
     `numbers` and `events` are the vehicle's rows of the tables of `rotorid.report.fleet.history.history`.
     """
     names = list(dict.fromkeys(numbers["name"]))
-    rows = -(-len(names) // ABREAST) or 1
-    fig, axes = style.figure(1.15 * rows + 0.3, rows, ABREAST, squeeze=False)
+    rows = -(-len(names) // _ABREAST) or 1
+    fig, axes = style.figure(1.15 * rows + 0.3, rows, _ABREAST, squeeze=False)
     for axis in axes.ravel()[len(names) :]:
         axis.set_axis_off()
     for axis, name in zip(axes.ravel(), names, strict=False):

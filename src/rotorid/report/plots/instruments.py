@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
     from rotorid.recordings.vehicle import Vehicle
 
-BAR_MM = (70.0, 12.0)
+_BAR_MM = (70.0, 12.0)
 """Length and width of a cell as drawn; neither is printed in the thesis."""
-BELOW_MM = 25.0
+_BELOW_MM = 25.0
 """From the lower cells to the table, as drawn."""
 
 
@@ -48,7 +48,7 @@ def bench(distances_mm: Mapping[str, float]) -> Figure:
     from rotorid.identify.fem import placement
 
     fig, (top, side) = style.figure(3.3, 1, 2, width_ratios=(1.25, 1))
-    length, width = BAR_MM
+    length, width = _BAR_MM
     for cell, place in sorted(placement.cells(distances_mm).items(), reverse=True):
         colour = style.RED if cell % 2 else style.BLUE
         start, along = place.force_m[:2], place.axis[:2]
@@ -71,7 +71,7 @@ def bench(distances_mm: Mapping[str, float]) -> Figure:
     top.set_title("from above")
     _plain(top)
     length, upper, lower = (distances_mm[name] for name in ("L", "D_135z", "D_246z"))
-    table = -lower - BELOW_MM
+    table = -lower - _BELOW_MM
     side.add_patch(Rectangle((-80, table - 10), 160, 10, facecolor="#dddddd", edgecolor="black", lw=0.7))
     side.add_patch(Rectangle((-60, -6), 120, 6, facecolor="#eeeeee", edgecolor="black", lw=0.7))
     side.add_patch(Rectangle((-6, 0), 12, length, facecolor="#eeeeee", edgecolor="black", lw=0.7))
@@ -171,7 +171,7 @@ def stand(flown: Vehicle, tilt_deg: float) -> Figure:
     return fig
 
 
-CHAIN = (
+_CHAIN = (
     ("load-cell bench", "6 cells, 2 converters,\nArduino, serial port"),
     ("thrust tester", "thrust, speed,\ncurrent, serial port"),
     ("quadrotor", "throttles, voltage,\nESP32, radio"),
@@ -202,7 +202,7 @@ def signal_chain() -> Figure:
         )
         axis.text(x + width / 2, y + 0.25, text, ha="center", va="center", fontsize=7.5)
 
-    for row, (title, text) in enumerate(CHAIN):
+    for row, (title, text) in enumerate(_CHAIN):
         box(0, 3.3 - 1.1 * row, 1.75, title, text, "#e8f1f8")
         axis.annotate("", (2.25, 1.95), (1.8, 3.7 - 1.1 * row), arrowprops={"arrowstyle": "-|>", "lw": 0.9})
     for place, (title, text) in enumerate(STEPS):

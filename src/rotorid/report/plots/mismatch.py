@@ -15,24 +15,24 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 STRIP_CELL_S = 0.5
-LARGEST = 10.0
+_LARGEST = 10.0
 """Size relative to the noise at which the heat strip's colour ends."""
-SHADE = "#f3e6d8"
-STAGES = {"before": "as believed", "refitted": "values refitted", "after": "improved"}
+_SHADE = "#f3e6d8"
+_STAGES = {"before": "as believed", "refitted": "values refitted", "after": "improved"}
 
 
 def svg(fig: Figure) -> str:
     """The figure as SVG text, the same for the same data; closes it."""
     import matplotlib.pyplot as plt
 
-    names_are_names(fig)
+    _names_are_names(fig)
     text = io.StringIO()
     fig.savefig(text, format="svg", metadata={"Date": None})
     plt.close(fig)
     return text.getvalue()
 
 
-def names_are_names(fig: Figure) -> None:
+def _names_are_names(fig: Figure) -> None:
     """Let no text of the figure be read as mathematics: a run or a column may be called `$x$`.
 
     The numbers at a logarithmic axis, which matplotlib writes as powers of ten, stay what they are.
@@ -79,7 +79,7 @@ def heat_strip(
         sharey=True,
         gridspec_kw={"width_ratios": widths},
     )
-    norm = LogNorm(0.7, LARGEST)
+    norm = LogNorm(0.7, _LARGEST)
     for row, stage in enumerate(("before", "after")):
         for column, run in enumerate(runs):
             ax = axes[row, column]
@@ -89,7 +89,7 @@ def heat_strip(
                 time_s, size = sizes[stage, run, channel]
                 step = float(np.median(np.diff(time_s))) if len(time_s) > 1 else STRIP_CELL_S
                 edges = np.append(time_s - step / 2, time_s[-1] + step / 2)
-                image = np.clip(size, 0.7, LARGEST)[None, :]
+                image = np.clip(size, 0.7, _LARGEST)[None, :]
                 ax.pcolormesh(edges, [line - 0.44, line + 0.36], image, norm=norm, cmap="YlOrRd", rasterized=True, lw=0)
                 if row == 0:
                     for start, stop in located.get((run, channel), ()):
@@ -134,7 +134,7 @@ def gains(labels: Sequence[str], before, refitted, after) -> Figure:
     rows = np.arange(len(labels))
     before, refitted, after = (np.asarray(v, float) for v in (before, refitted, after))
     ax.hlines(rows, np.minimum(before, after), np.maximum(before, after), color="#cccccc", lw=1.5, zorder=1)
-    for (stage, label), values in zip(STAGES.items(), (before, refitted, after), strict=True):
+    for (stage, label), values in zip(_STAGES.items(), (before, refitted, after), strict=True):
         size = 3.5 if stage == "refitted" else None
         ax.plot(values, rows, "o", color=style.COLOUR[stage], ms=size, label=label)
     ax.axvline(1, color=style.GREY, ls="--", lw=1)
@@ -173,9 +173,9 @@ def errors_over_time(traces: pd.DataFrame, channels: Sequence[str], located: pd.
         part = traces[traces["channel"] == channel]
         here = located[(located["channel"] == channel) & located["run"].isin(part["run"])]
         for row in here.itertuples():
-            axis.axvspan(row.start_s, row.stop_s, color=SHADE, lw=0, zorder=0)
+            axis.axvspan(row.start_s, row.stop_s, color=_SHADE, lw=0, zorder=0)
         for stage in ("before", "after"):
-            axis.plot(part["time_s"], part[stage], color=style.COLOUR[stage], lw=0.8, label=STAGES[stage])
+            axis.plot(part["time_s"], part[stage], color=style.COLOUR[stage], lw=0.8, label=_STAGES[stage])
         label, unit = CHANNELS[channel]
         axis.set_ylabel(f"{label} ({unit})")
     axes[-1, 0].set_xlabel("time (s)")
@@ -190,7 +190,7 @@ def errors_by_channel(channels: pd.DataFrame) -> Figure:
     """
     fig, axis = style.figure(2.6)
     places = np.arange(len(channels))
-    for shift, (stage, name) in zip((-0.2, 0.0, 0.2), STAGES.items(), strict=True):
+    for shift, (stage, name) in zip((-0.2, 0.0, 0.2), _STAGES.items(), strict=True):
         error = channels[stage] / channels["noise_floor"]
         axis.plot(places + shift, error, "o", color=style.COLOUR[stage], label=name, markersize=5)
     axis.axhline(1, color=style.COLOUR["noise"], lw=1, ls="--")

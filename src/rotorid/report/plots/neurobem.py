@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 CHANNELS = ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
-LABEL = {
+_LABEL = {
     "force_x": "$F_x$ (N)",
     "force_y": "$F_y$ (N)",
     "force_z": "$F_z$ (N)",
@@ -47,7 +47,7 @@ def residual_against_airspeed(bins: pd.DataFrame, points: pd.DataFrame) -> Figur
         mine = bins[bins["channel"] == channel]
         axis.set_ylim(0, 1.15 * max(mine["high_95"].max(), size.quantile(0.99)))
         axis.set_xlim(0, None)
-        axis.set_ylabel(f"residual of {LABEL[channel]}")
+        axis.set_ylabel(f"residual of {_LABEL[channel]}")
     for axis in axes[-1]:
         axis.set_xlabel("airspeed (m/s)")
     handles, labels = axes[0, 0].get_legend_handles_labels()

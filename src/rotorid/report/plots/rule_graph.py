@@ -12,11 +12,11 @@ from rotorid.report.plots import style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-TOGETHER = ("import_public",)
+_TOGETHER = ("import_public",)
 """Rules whose names begin with one of these are drawn as one."""
-SWEEPS = 30
-LINE_CHARACTERS = 15
-COLOURS = {"ingest": "#dcefe6", "import": "#dcefe6", "prepare": "#dcefe6", "chapter": "#fdf0d5", "render": "#f4dfe9"}
+_SWEEPS = 30
+_LINE_CHARACTERS = 15
+_COLOURS = {"ingest": "#dcefe6", "import": "#dcefe6", "prepare": "#dcefe6", "chapter": "#fdf0d5", "render": "#f4dfe9"}
 """By the first word of a rule's name; others are pale blue."""
 
 
@@ -24,7 +24,7 @@ def merged(steps: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
     """Pairs with the rules of one kind drawn together."""
 
     def name(rule: str) -> str:
-        return next((kind for kind in TOGETHER if rule.startswith(kind)), rule)
+        return next((kind for kind in _TOGETHER if rule.startswith(kind)), rule)
 
     pairs = {(name(a), name(b)) for a, b in steps}
     return sorted((a, b) for a, b in pairs if a != b)
@@ -82,7 +82,7 @@ def heights(pairs: list[tuple[str, str]], place: dict[str, int]) -> dict[str, fl
 
     for rules in by_column.values():
         spread(rules)
-    for sweep in range(SWEEPS):
+    for sweep in range(_SWEEPS):
         for column in sorted(by_column, reverse=bool(sweep % 2)):
             middle = {}
             for rule in by_column[column]:
@@ -97,7 +97,7 @@ def wrapped(rule: str) -> str:
     """A rule's name on lines of a box's width."""
     lines, line = [], ""
     for word in rule.split("_"):
-        if line and len(line) + 1 + len(word) > LINE_CHARACTERS:
+        if line and len(line) + 1 + len(word) > _LINE_CHARACTERS:
             lines, line = [*lines, line], word
         else:
             line = f"{line} {word}".strip()
@@ -118,7 +118,7 @@ def rule_graph(steps: Iterable[tuple[str, str]]) -> Figure:
         arrow = {"arrowstyle": "-|>", "lw": 0.4, "color": "#8a8a8a", "shrinkA": 0, "shrinkB": 0, "mutation_scale": 6}
         axis.annotate("", stop, start, arrowprops=arrow, zorder=1)
     for rule, column in place.items():
-        colour = COLOURS.get(rule.split("_")[0], "#e8f1f8")
+        colour = _COLOURS.get(rule.split("_")[0], "#e8f1f8")
         axis.text(
             column, height[rule], wrapped(rule), ha="center", va="center", fontsize=7, linespacing=0.95, zorder=2,
             bbox={"boxstyle": "round,pad=0.25", "facecolor": colour, "edgecolor": "#555555", "linewidth": 0.5},

@@ -26,10 +26,10 @@ DURATION_S, RATE_HZ = 40.0, 50.0
 HOVER_RAD_S = float(np.sqrt(0.652 * 9.81 / (4 * 1.3877e-6)))
 SHARE = 0.1
 """Share of its physical bound at which a parameter is shown, where nothing better is stated."""
-BINS = 25
-LEAST_EXPLAINED = 0.35
+_BINS = 25
+_LEAST_EXPLAINED = 0.35
 """Share of the variance that a quantity must explain to be what an effect is shown over."""
-SHOWN_S = 4.0
+_SHOWN_S = 4.0
 """Length of what is shown over time, s."""
 
 
@@ -55,13 +55,13 @@ def signature(effect: Effect) -> Signature | None:
     for form in effect.forms(VEHICLE):
         if form.requires and not flight().has(form.requires):
             continue
-        found = of_wrench(effect, form)
+        found = _of_wrench(effect, form)
         if found is not None:
             return found
     for form in effect.speed_forms:
-        return of_speed(form)
+        return _of_speed(form)
     for form in effect.set_forms(VEHICLE):
-        return of_fault(form)
+        return _of_fault(form)
     if effect.reading_forms is not None:
         for instrument in (EXAMPLE_STAND, EXAMPLE_BENCH):
             for form in forms_of(effect, instrument):
@@ -111,7 +111,7 @@ def flight() -> Motion:
     )
 
 
-def typical(form: Form | SpeedForm) -> np.ndarray:
+def _typical(form: Form | SpeedForm) -> np.ndarray:
     """Plain values of a form's parameters: a start of the nonlinear ones, a tenth of the bound of the others."""
     values = []
     for number, p in enumerate(form.parameters):
@@ -158,7 +158,7 @@ def quantities(motion: Motion) -> dict[str, np.ndarray]:
 
 def explained(y: np.ndarray, x: np.ndarray) -> float:
     """Correlation ratio: the share of the variance of `y` (n,) that the mean in bins of `x` (n,) explains, 0 to 1."""
-    edges = np.unique(np.quantile(x, np.linspace(0, 1, BINS + 1)[1:-1]))
+    edges = np.unique(np.quantile(x, np.linspace(0, 1, _BINS + 1)[1:-1]))
     number = np.searchsorted(edges, x)
     counts = np.bincount(number, minlength=len(edges) + 1)
     means = np.bincount(number, y, minlength=len(edges) + 1) / np.maximum(counts, 1)
@@ -188,21 +188,21 @@ def strongest(added: Contribution) -> tuple[str, np.ndarray] | None:
     return None if best is None or best[0] < 1e-9 else best[1:]
 
 
-def of_wrench(effect: Effect, form: Form) -> Signature | None:
+def _of_wrench(effect: Effect, form: Form) -> Signature | None:
     """A form of a force, moment or inertial sensor, over the quantity that explains it best."""
-    motion, values = flight(), typical(form)
+    motion, values = flight(), _typical(form)
     shown = strongest(form.contribution(motion, VEHICLE, values))
     if shown is None:
         return None
     known = quantities(motion)
     over = max(known, key=lambda name: explained(shown[1], known[name]))
     # What is always the same, and what no single quantity explains, is shown as it goes on.
-    if np.ptp(shown[1]) < 1e-9 * np.abs(shown[1]).max() or explained(shown[1], known[over]) < LEAST_EXPLAINED:
+    if np.ptp(shown[1]) < 1e-9 * np.abs(shown[1]).max() or explained(shown[1], known[over]) < _LEAST_EXPLAINED:
         over, known = "time (s)", {"time (s)": motion.time_s}
     return Signature(form.name, form.equation, named(form, values), over, shown[0], known[over], shown[1])
 
 
-def of_speed(form: SpeedForm) -> Signature:
+def _of_speed(form: SpeedForm) -> Signature:
     """A form between command and rotor speed: the speed over time, or over the command where it is a map."""
     time_s = 0.01 * np.arange(200)
     steps = 1250 + 500 * np.sign(np.sin(2 * np.pi * 0.7 * time_s))
@@ -211,7 +211,7 @@ def of_speed(form: SpeedForm) -> Signature:
     command = ramp if static else steps
     if form.excited_by in ("voltage", "time"):
         command, time_s = np.full(200, 1800.0), 0.3 * np.arange(200)
-    values = typical(form)
+    values = _typical(form)
     path = SpeedPath(np.repeat(command[:, None], 4, 1), time_s, 2500.0, np.linspace(12.4, 10.4, 200), 12.4)
     speed = form.apply(path, values)[:, 0]
     over = ("commanded speed (rad/s)", command) if static else ("time (s)", time_s)
@@ -241,7 +241,7 @@ def recorded() -> RecordingSet:
     return RecordingSet("example", VEHICLE, (Run("first", pd.DataFrame(columns)), Run("second", pd.DataFrame(columns))))
 
 
-def of_fault(form: SetForm) -> Signature | None:
+def _of_fault(form: SetForm) -> Signature | None:
     """A fault of a set: the column that it changes most, as it should be and as it is."""
     sound = recorded()
     spoilt = form.apply(sound, np.array(form.example))
@@ -267,8 +267,8 @@ def of_fault(form: SetForm) -> Signature | None:
         return Signature(form.name, form.equation, values, "", "", nothing, nothing, layouts=both)
     _, name, time_s, sure, wrong = best
     first = int(np.argmax(np.abs(np.nan_to_num(wrong, nan=np.inf) - sure) > 0))
-    start = max(min(time_s[first] - 1.0, time_s[-1] - SHOWN_S), 0.0)
-    inside = (time_s >= start) & (time_s <= start + SHOWN_S)
+    start = max(min(time_s[first] - 1.0, time_s[-1] - _SHOWN_S), 0.0)
+    inside = (time_s >= start) & (time_s <= start + _SHOWN_S)
     return Signature(form.name, form.equation, values, "time (s)", name, time_s[inside], wrong[inside], sure[inside])
 
 
@@ -309,7 +309,7 @@ def loading(instrument: Instrument) -> Loading:
 
 def of_reading(effect: Effect, form: Form, instrument: Instrument) -> Signature | None:
     """A form of a stand or bench: the reading's error over what explains it best."""
-    test, values = loading(instrument), typical(form)
+    test, values = loading(instrument), _typical(form)
     contribution = form.contribution(test if form.on_loading else test.motion, instrument.vehicle, values)
     reading = contribution.reading
     if reading is None:

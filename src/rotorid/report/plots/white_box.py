@@ -12,8 +12,8 @@ from rotorid.report.plots import style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-ANGLES = ("roll", "pitch", "yaw")
-AXIS_COLOURS = tuple(style.COLOUR[a] for a in "xyz")
+_ANGLES = ("roll", "pitch", "yaw")
+_AXIS_COLOURS = tuple(style.COLOUR[a] for a in "xyz")
 
 
 def rotor_curves(thrust: pd.DataFrame, torque: pd.DataFrame, fits: dict) -> Figure:
@@ -52,7 +52,7 @@ def rotor_curves(thrust: pd.DataFrame, torque: pd.DataFrame, fits: dict) -> Figu
 def attitude(flight: pd.DataFrame) -> Figure:
     """Euler angles and their references over time (figure 4.9b)."""
     fig, axes = style.figure(2.6, 3, 1, sharex=True)
-    for axis, angle in zip(axes, ANGLES, strict=True):
+    for axis, angle in zip(axes, _ANGLES, strict=True):
         axis.plot(
             flight["time_s"],
             np.degrees(flight[f"{angle}_reference_rad"]),
@@ -80,40 +80,40 @@ def motion(flight: pd.DataFrame) -> Figure:
             place = axes[row, column]
             values = scale * flight[name.format(axis)].to_numpy()
             kept = style.thin(values, 800)
-            place.plot(flight["time_s"].to_numpy()[kept], values[kept], color=AXIS_COLOURS[column], linewidth=0.7)
+            place.plot(flight["time_s"].to_numpy()[kept], values[kept], color=_AXIS_COLOURS[column], linewidth=0.7)
             if column == 0:
                 place.set_ylabel(label)
             if row == 0:
-                place.set_title(ANGLES[column])
+                place.set_title(_ANGLES[column])
             if row == 2:
                 place.set_xlabel("time (s)")
     return fig
 
 
-TILTS_DRAWN = 3
+_TILTS_DRAWN = 3
 """Roll and pitch are drawn this many times as large: five degrees would hardly show."""
-ELEVATION_DEG, AZIMUTH_DEG = 24.0, 35.0
-ROTOR_SHARE = 0.62
+_ELEVATION_DEG, _AZIMUTH_DEG = 24.0, 35.0
+_ROTOR_SHARE = 0.62
 """Radius of a rotor over the distance of its hub from the centre."""
 
 
 def pose(roll_rad: float, pitch_rad: float, yaw_rad: float) -> list[np.ndarray]:
     """Lines of the vehicle at an attitude as a camera sees them, (n, 2) each: four arms, then four rotors' circles.
 
-    Unit: the distance of a hub from the centre; first across, then up. Tilts are drawn `TILTS_DRAWN` times as large.
+    Unit: the distance of a hub from the centre; first across, then up. Tilts are drawn `_TILTS_DRAWN` times as large.
     """
     from rotorid.vehicle.attitude import quaternion_from_euler, rotation_from_quaternion
 
-    angles = np.array([TILTS_DRAWN * roll_rad, TILTS_DRAWN * pitch_rad, yaw_rad])
+    angles = np.array([_TILTS_DRAWN * roll_rad, _TILTS_DRAWN * pitch_rad, yaw_rad])
     rotation = rotation_from_quaternion(quaternion_from_euler(angles))
-    lift, turn = np.radians(ELEVATION_DEG), np.radians(AZIMUTH_DEG)
+    lift, turn = np.radians(_ELEVATION_DEG), np.radians(_AZIMUTH_DEG)
     # North, east, down to across and up, from behind and above.
     across = np.array([-np.sin(turn), np.cos(turn), 0.0])
     up = np.array([np.sin(lift) * np.cos(turn), np.sin(lift) * np.sin(turn), -np.cos(lift)])
     camera = np.stack([across, up], axis=1)
     hubs = np.array([[1, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]]) / np.sqrt(2)
     around = np.linspace(0, 2 * np.pi, 21)
-    circle = ROTOR_SHARE * np.stack([np.cos(around), np.sin(around), 0 * around], axis=1)
+    circle = _ROTOR_SHARE * np.stack([np.cos(around), np.sin(around), 0 * around], axis=1)
     lines = [np.stack([np.zeros(3), hub]) for hub in hubs] + [hub + circle for hub in hubs]
     return [line @ rotation.T @ camera for line in lines]
 
@@ -133,8 +133,8 @@ def view(flight: pd.DataFrame, every_s: float = 1.0) -> Figure:
         axis.set_aspect("equal")
         axis.set_axis_off()
         axis.set_title(f"{row.time_s:.1f} s")
-        said = [f"{np.degrees(getattr(row, f'{angle}_rad')):.1f}°".replace("-", "−") for angle in ANGLES]
-        text = "\n".join(f"{angle} {value}" for angle, value in zip(ANGLES, said, strict=True))
+        said = [f"{np.degrees(getattr(row, f'{angle}_rad')):.1f}°".replace("-", "−") for angle in _ANGLES]
+        text = "\n".join(f"{angle} {value}" for angle, value in zip(_ANGLES, said, strict=True))
         axis.text(0.5, -0.02, text, transform=axis.transAxes, ha="center", va="top", fontsize=8.5)
     return fig
 
@@ -158,7 +158,7 @@ def animation(flight: pd.DataFrame, every_s: float = 0.1) -> str:
             points = " ".join(f"{315 + 110 * x:.1f},{125 - 110 * y:.1f}" for x, y in line)
             lines.append(f'<polyline points="{points}" stroke="{colour}"/>')
         said = ", ".join(
-            f"{angle} {np.degrees(getattr(row, f'{angle}_rad')):.1f}°".replace("-", "\u2212") for angle in ANGLES
+            f"{angle} {np.degrees(getattr(row, f'{angle}_rad')):.1f}°".replace("-", "\u2212") for angle in _ANGLES
         )
         frames.append(
             f'<g visibility="{"visible" if number == 0 else "hidden"}"><animate attributeName="visibility" '

@@ -12,32 +12,31 @@ from rotorid.effects.contract import DELAY, LAG
 from rotorid.errors import InputError
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
-from rotorid.vehicle.control.pid import AttitudePid, Gains
-from rotorid.vehicle.control.references import AttitudeReference
+from rotorid.vehicle.control.pid import AttitudePid, AttitudeReference, Gains
 from rotorid.vehicle.flyable import flyable
 from rotorid.vehicle.hover import hover
 from rotorid.vehicle.improved import active_speed_forms, command_path, record_as_stated, simulate_as_stated
 from rotorid.vehicle.mixer import allocation_matrix
 from rotorid.vehicle.simulator import Noise, Start
 
-STIFFNESS_RAD_S, DAMPING = 10.0, 0.8
+_STIFFNESS_RAD_S, _DAMPING = 10.0, 0.8
 """Natural frequency and damping of the attitude loop that flies the vehicle."""
-DERIVATIVE_S = 0.02
+_DERIVATIVE_S = 0.02
 """Time over which the pilot's rate of turn is smoothed."""
-LATE_RAD = 0.4
+_LATE_RAD = 0.4
 """Natural frequency times all that comes late, at most: at the crossover of such a loop, twice the natural frequency,
 this leaves half of its phase margin of about 70 degrees."""
-MEAN_TILT_COSINE = 0.96
+_MEAN_TILT_COSINE = 0.96
 """Of the swings, roughly."""
 SECONDS, FLIGHTS, SEED = 20.0, 2, 1
 """The flights that `rotorid simulate` makes by default, and that a vehicle must stand to be delivered."""
-YAW_SHARE = 0.6
+_YAW_SHARE = 0.6
 """Of what each rotor may turn faster or slower than in hover, by its square: what the yaw may ask for.
 
 A yaw that asks for all that the rotors can do leaves nothing to hold roll and pitch: such a pilot turns a sound vehicle
 over.
 """
-LEAST_ROOM = 0.05
+_LEAST_ROOM = 0.05
 """Of the square of the hover's speed: below it a vehicle that is at its limit could not be steered at all."""
 START_HEIGHT_M = 100.0
 """Above the ground at the start: out of its effect, and in the air until the end though nobody holds the height."""
@@ -63,13 +62,13 @@ def swings(vehicle: Vehicle, name: str, seconds: float, flights: int, seed: int,
         raise InputError("seconds must be more than 0 and flights at least 1")
     vehicle, _ = flyable(vehicle)
     steady = hover(vehicle, command_path(vehicle), START_HEIGHT_M)
-    stiffness = min(STIFFNESS_RAD_S, LATE_RAD / (DERIVATIVE_S + lateness_s(vehicle)))
+    stiffness = min(_STIFFNESS_RAD_S, _LATE_RAD / (_DERIVATIVE_S + _lateness_s(vehicle)))
     # Tilted by the swings a vehicle needs a little more than level.
-    tilted = (1 / MEAN_TILT_COSINE - 1) * vehicle.mass_kg * vehicle.gravity_m_s2
+    tilted = (1 / _MEAN_TILT_COSINE - 1) * vehicle.mass_kg * vehicle.gravity_m_s2
     thrust_n = steady.thrust_n + tilted / steady.gain
     j = np.diag(vehicle.inertia_kg_m2.matrix()) / steady.gain
-    gains = Gains(tuple(j * stiffness**2), (0.0,) * 3, tuple(2 * DAMPING * stiffness * j))
-    most = (np.inf, np.inf, most_yaw_n_m(vehicle, np.array([thrust_n, *steady.moments_n_m])))
+    gains = Gains(tuple(j * stiffness**2), (0.0,) * 3, tuple(2 * _DAMPING * stiffness * j))
+    most = (np.inf, np.inf, _most_yaw_n_m(vehicle, np.array([thrust_n, *steady.moments_n_m])))
     noise = Noise(
         angular_velocity_rad_s=0.01,
         specific_force_m_s2=0.1,
@@ -93,7 +92,7 @@ def swings(vehicle: Vehicle, name: str, seconds: float, flights: int, seed: int,
             return sizes * (swing + 0.3 * np.sin(fast * t + phase[::-1]))
 
         reference = AttitudeReference("swings", thrust_n, wanted, at_once=True)
-        pilot = AttitudePid(vehicle, reference, gains, DERIVATIVE_S, most, steady.moments_n_m)
+        pilot = AttitudePid(vehicle, reference, gains, _DERIVATIVE_S, most, steady.moments_n_m)
         trace = simulate_as_stated(vehicle, pilot, seconds, 0.002, start=start)
         made = record_as_stated(trace, vehicle, f"flight_{number + 1}", noise, rng, every=every)
         believed = made.vehicle
@@ -101,13 +100,13 @@ def swings(vehicle: Vehicle, name: str, seconds: float, flights: int, seed: int,
     return RecordingSet(name, believed, tuple(runs))
 
 
-def most_yaw_n_m(vehicle: Vehicle, hovering: np.ndarray) -> float:
+def _most_yaw_n_m(vehicle: Vehicle, hovering: np.ndarray) -> float:
     """Yaw moment, N m, that the pilot asks for at most, beyond the wrench (4,) of the hover."""
     asked, yaw = allocation_matrix(vehicle) @ hovering, allocation_matrix(vehicle)[:, 3]
     limits = vehicle.rotor_speed_limits_rad_s
     room = asked if limits is None else np.minimum(asked - limits[0] ** 2, limits[1] ** 2 - asked)
-    room = np.maximum(room, LEAST_ROOM * asked.mean())
-    return float(YAW_SHARE * (room / np.abs(yaw)).min())
+    room = np.maximum(room, _LEAST_ROOM * asked.mean())
+    return float(_YAW_SHARE * (room / np.abs(yaw)).min())
 
 
 def turned_over(recordings: RecordingSet) -> tuple[str, ...]:
@@ -122,6 +121,6 @@ def turned_over(recordings: RecordingSet) -> tuple[str, ...]:
     )
 
 
-def lateness_s(vehicle: Vehicle) -> float:
+def _lateness_s(vehicle: Vehicle) -> float:
     """Delays and time constants between command and rotor speed together, s."""
     return sum(float(max(values)) for form, values in active_speed_forms(vehicle) if form.stage in (DELAY, LAG))

@@ -15,20 +15,19 @@ from scipy.optimize import brentq
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.exports.derivatives import left_of_one_damping, own_damping
 from rotorid.vehicle.exports.forms import KNOWS, Exported, parts_of
-from rotorid.vehicle.exports.four_in_x import SENSES, order_in_x
-from rotorid.vehicle.exports.sih import RICHEST, full_speed_rad_s, with_drag_of_hover
+from rotorid.vehicle.exports.sih import RICHEST, SENSES, full_speed_rad_s, order_in_x, with_drag_of_hover
 from rotorid.vehicle.mixer import hover_speed_rad_s
 
 GRAVITY = 9.80665
 """ArduPilot's."""
 DENSITY_KG_M3 = 1.225
 """At `refAlt` 0, where the reference flight is put."""
-REFERENCE_M_S = 10.0
-VOLTAGE_V = 16.8
+_REFERENCE_M_S = 10.0
+_VOLTAGE_V = 16.8
 """Of a battery that never sags: the frame's thrust is by voltage over `maxVoltage`."""
-DAMPING_RAD_S = np.radians(400.0)
+_DAMPING_RAD_S = np.radians(400.0)
 """ArduPilot's damping is this over `refRotRate`, 1/s."""
-YAW_PER_THRUST = 0.05
+_YAW_PER_THRUST = 0.05
 """A motor's yaw torque is its yaw factor times this, `diagonal_size`, thrust, and the signal once more."""
 
 
@@ -65,7 +64,7 @@ def ardupilot_json(vehicle: Vehicle) -> Exported:
     inertia = np.diag(parts.inertia)
     damping = float(np.mean(np.array(parts.damping) / inertia) + np.average(own / inertia, weights=weights))
     if damping > 0:
-        rate = float(DAMPING_RAD_S / damping)
+        rate = float(_DAMPING_RAD_S / damping)
         left.append("damping about each axis: one rate for all is taken")
     if not any(entry["id"] == "motor_lag" for entry in vehicle.effects):
         left.append("motor lag: it has none but a limit of the signal's slope")
@@ -76,18 +75,18 @@ def ardupilot_json(vehicle: Vehicle) -> Exported:
         "gyroscopic moment Ω × J Ω: it has none",
     ]
     wake = np.sqrt(2 * weight / (DENSITY_KG_M3 * area))
-    yaw = torque / thrust / (YAW_PER_THRUST * diagonal * signal)
+    yaw = torque / thrust / (_YAW_PER_THRUST * diagonal * signal)
     content = {
         "mass": parts.mass_kg,
         "diagonal_size": diagonal,
-        "refSpd": REFERENCE_M_S,
+        "refSpd": _REFERENCE_M_S,
         "refAngle": _reference_angle_deg(weight, momentum, bluff, area),
-        "refVoltage": VOLTAGE_V,
-        "refCurrent": float(wake * weight / 2 / VOLTAGE_V),
+        "refVoltage": _VOLTAGE_V,
+        "refCurrent": float(wake * weight / 2 / _VOLTAGE_V),
         "refAlt": 0.0,
         "refTempC": 15.0,
         "refBatRes": 0.0,
-        "maxVoltage": VOLTAGE_V,
+        "maxVoltage": _VOLTAGE_V,
         "battCapacityAh": 0.0,
         "propExpo": expo,
         "refRotRate": rate,
@@ -121,7 +120,7 @@ def _signal(share: float, expo: float) -> float:
 
 def _momentum_n(weight: float, coefficient: float, area: float, tilt: float) -> float:
     """Horizontal drag of the rotors in the reference flight, N."""
-    speed = REFERENCE_M_S * np.cos(tilt)
+    speed = _REFERENCE_M_S * np.cos(tilt)
     return float(np.cos(tilt) * coefficient * speed * np.sqrt(weight / np.cos(tilt) * DENSITY_KG_M3 * area))
 
 
@@ -129,7 +128,7 @@ def _reference_angle_deg(weight: float, momentum: float, bluff: float, area: flo
     """The tilt, degrees, that holds the reference speed against both drags; ArduPilot finds the frame's drag by it."""
     if momentum == 0 and bluff == 0:
         return 0.0
-    frame = 0.5 * DENSITY_KG_M3 * bluff * REFERENCE_M_S**2
+    frame = 0.5 * DENSITY_KG_M3 * bluff * _REFERENCE_M_S**2
 
     def unbalanced(tilt: float) -> float:
         return weight * np.tan(tilt) - _momentum_n(weight, momentum, area, tilt) - frame
@@ -173,8 +172,8 @@ def wrench(frame: dict, signal: np.ndarray, velocity: np.ndarray, rates: np.ndar
         own[:, 2] -= thrust
         force += own
         moment += np.cross(place, own)
-        moment[:, 2] += frame[f"motor{i + 1}_yaw"] * u * YAW_PER_THRUST * frame["diagonal_size"] * thrust
+        moment[:, 2] += frame[f"motor{i + 1}_yaw"] * u * _YAW_PER_THRUST * frame["diagonal_size"] * thrust
     force -= 0.5 * DENSITY_KG_M3 * bluff * np.abs(velocity) * velocity
     if frame["refRotRate"] > 0:
-        moment -= DAMPING_RAD_S / frame["refRotRate"] * np.array(frame["moment_inertia"]) * rates
+        moment -= _DAMPING_RAD_S / frame["refRotRate"] * np.array(frame["moment_inertia"]) * rates
     return force, moment

@@ -13,19 +13,19 @@ import numpy as np
 from rotorid.recordings.vehicle import Derivative, Vehicle
 from rotorid.vehicle.derivatives import CHANNELS, QUANTITIES, symbol_of, table_of
 
-OF_STATE = QUANTITIES[:7]
+_OF_STATE = QUANTITIES[:7]
 """What a tool's step knows of the vehicle: 1, velocity through the air, body rates."""
-SIGNS = np.array([1.0, 1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
-"""Of `OF_STATE` in forward-left-up axes; those of the channels are the last six."""
-MOST_SHOWN = 6
+_SIGNS = np.array([1.0, 1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
+"""Of `_OF_STATE` in forward-left-up axes; those of the channels are the last six."""
+_MOST_SHOWN = 6
 ROTORPY_FILE, MUJOCO_FILE = "rotorpy_derivatives.py", "mujoco_derivatives.py"
-DAMPING = tuple(zip(CHANNELS, OF_STATE[1:], strict=True))
+_DAMPING = tuple(zip(CHANNELS, _OF_STATE[1:], strict=True))
 """X_u, Y_v, Z_w, L_p, M_q, N_r."""
 
 
 def of_state(vehicle: Vehicle, constants: bool = True) -> tuple[Derivative, ...]:
     """Those by what a tool's step knows of the vehicle."""
-    wanted = OF_STATE if constants else OF_STATE[1:]
+    wanted = _OF_STATE if constants else _OF_STATE[1:]
     return tuple(d for d in vehicle.derivatives if d.quantity in wanted)
 
 
@@ -38,7 +38,7 @@ def expressed_by(vehicle: Vehicle, to: str) -> tuple[Derivative, ...]:
     return ()
 
 
-def said_of(derivatives: Sequence[Derivative], vehicle: Vehicle) -> str:
+def _said_of(derivatives: Sequence[Derivative], vehicle: Vehicle) -> str:
     """Their name, with the largest by what they add within their range, over the weight and its moment on an arm."""
     weight = vehicle.mass_kg * vehicle.gravity_m_s2
     arm = np.linalg.norm(vehicle.rotor_positions_m(), axis=1).max() or 1.0
@@ -47,7 +47,7 @@ def said_of(derivatives: Sequence[Derivative], vehicle: Vehicle) -> str:
         reach = abs(d.value) * max(abs(d.low), abs(d.high))
         return reach / weight if d.channel.startswith("force") else reach / (weight * arm)
 
-    shown = sorted(derivatives, key=size, reverse=True)[:MOST_SHOWN]
+    shown = sorted(derivatives, key=size, reverse=True)[:_MOST_SHOWN]
     words = [f"{symbol_of(d.channel, d.quantity)} = {d.value:.3g}" for d in shown]
     words += [f"{len(derivatives) - len(shown)} smaller"] if len(derivatives) > len(shown) else []
     return f"derivatives ({', '.join(words)})"
@@ -56,14 +56,14 @@ def said_of(derivatives: Sequence[Derivative], vehicle: Vehicle) -> str:
 def left_of(vehicle: Vehicle, taken: Sequence[Derivative]) -> list[str]:
     """A sentence for the derivatives that are not `taken`; none where all are."""
     rest = [d for d in vehicle.derivatives if d not in taken]
-    return [said_of(rest, vehicle)] if rest else []
+    return [_said_of(rest, vehicle)] if rest else []
 
 
-def table_in_flu(derivatives: Sequence[Derivative]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _table_in_flu(derivatives: Sequence[Derivative]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Derivatives of the state as a matrix (6, 7) of forward-left-up axes, and the ends (7,) of each range."""
     matrix, held = table_of(tuple(derivatives))
-    ends = np.sort(held[: len(SIGNS)] * SIGNS[:, None], axis=1)
-    return SIGNS[1:, None] * matrix[:, : len(SIGNS)] * SIGNS, ends[:, 0], ends[:, 1]
+    ends = np.sort(held[: len(_SIGNS)] * _SIGNS[:, None], axis=1)
+    return _SIGNS[1:, None] * matrix[:, : len(_SIGNS)] * _SIGNS, ends[:, 0], ends[:, 1]
 
 
 def _number(value: float) -> str:
@@ -72,7 +72,7 @@ def _number(value: float) -> str:
 
 def _table(vehicle: Vehicle) -> str:
     """The Python lines that both companions share."""
-    matrix, low, high = table_in_flu(of_state(vehicle))
+    matrix, low, high = _table_in_flu(of_state(vehicle))
     rows = [
         f"    [{', '.join(map(_number, row + 0.0))}],  # {channel}"
         for channel, row in zip(CHANNELS, matrix, strict=True)
@@ -137,7 +137,7 @@ def passive(model, data):
 
 def gazebo_damping(vehicle: Vehicle) -> str:
     """Gazebo's Hydrodynamics system with the linear terms of the body's link, xU to nR; empty without any."""
-    matrix = table_in_flu(of_state(vehicle, constants=False))[0][:, 1:]
+    matrix = _table_in_flu(of_state(vehicle, constants=False))[0][:, 1:]
     terms = [
         f"      <{channel}{quantity}>{matrix[i, j]:.9g}</{channel}{quantity}>"
         for i, channel in enumerate("xyzkmn")
@@ -162,7 +162,7 @@ def left_of_gazebo(vehicle: Vehicle) -> list[str]:
     if not taken:
         return left_of(vehicle, ())
     near = "taken as linear terms of Gazebo's Hydrodynamics, which are not held beyond the flown range and know no wind"
-    return [f"{said_of(taken, vehicle)}: {near}", *left_of(vehicle, taken)]
+    return [f"{_said_of(taken, vehicle)}: {near}", *left_of(vehicle, taken)]
 
 
 def own_damping(vehicle: Vehicle, turning: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -179,8 +179,8 @@ def own_damping(vehicle: Vehicle, turning: bool) -> tuple[np.ndarray, np.ndarray
 
 def left_of_one_damping(vehicle: Vehicle) -> list[str]:
     """What one drag and one damping of all axes leave."""
-    taken = [d for d in vehicle.derivatives if (d.channel, d.quantity) in DAMPING]
+    taken = [d for d in vehicle.derivatives if (d.channel, d.quantity) in _DAMPING]
     if not taken:
         return left_of(vehicle, ())
     near = "taken as one drag and one damping of all axes, means by the squares of what was flown, without its range"
-    return [f"{said_of(taken, vehicle)}: {near}", *left_of(vehicle, taken)]
+    return [f"{_said_of(taken, vehicle)}: {near}", *left_of(vehicle, taken)]

@@ -27,7 +27,7 @@ from rotorid.vehicle.mixer import hover_speed_rad_s
 from rotorid.vehicle.simulator import Commands, Start
 
 STEP_S = 0.001
-START_M_S = 2.0
+_START_M_S = 2.0
 """Speed forward and to the right at the start, so that drag shows."""
 
 
@@ -67,7 +67,7 @@ def ours(vehicle: Vehicle, speeds: np.ndarray) -> tuple[np.ndarray, np.ndarray, 
 
     `speeds` (n, k), rad/s, are those of the rotors, each held for a step.
     """
-    start = Start(velocity_m_s=np.array([[START_M_S, START_M_S, 0.0]]), rotor_speed_rad_s=speeds[:1])
+    start = Start(velocity_m_s=np.array([[_START_M_S, _START_M_S, 0.0]]), rotor_speed_rad_s=speeds[:1])
     time = STEP_S * np.arange(len(speeds))
     trace = simulate_as_stated(vehicle, Commands(time, speeds), time[-1], STEP_S, start=start)
     quaternion = trace.quaternion[0] * np.array([1.0, *FLU])
@@ -85,7 +85,7 @@ def lagging(speeds: np.ndarray, up_s: float, down_s: float) -> np.ndarray:
     return out
 
 
-def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def _angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Angle (n,), rad, between attitudes (n, 4); exact for small ones, where an arc cosine is not."""
     a, b = (q / np.linalg.norm(q, axis=1, keepdims=True) for q in (a, b))
     apart = np.minimum(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))
@@ -98,9 +98,9 @@ def difference(
     """Largest differences of positions (n, 3) and attitudes (n, 4)."""
     return Difference(
         float(np.linalg.norm(there[0] - here[0], axis=1).max()),
-        float(angle_between(there[1], here[1]).max()),
+        float(_angle_between(there[1], here[1]).max()),
         float(np.linalg.norm(np.diff(here[0], axis=0), axis=1).sum()),
-        float(angle_between(here[1], here[1][:1]).max()),
+        float(_angle_between(here[1], here[1][:1]).max()),
         where,
     )
 
@@ -135,7 +135,7 @@ def in_rotorpy(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) ->
     time, speeds = commands_of(same, duration_s)
     tau_s = exported.parameters["tau_m"]
     state = {
-        "x": np.zeros(3), "v": np.array([START_M_S, -START_M_S, 0.0]), "q": np.array([0.0, 0.0, 0.0, 1.0]),
+        "x": np.zeros(3), "v": np.array([_START_M_S, -_START_M_S, 0.0]), "q": np.array([0.0, 0.0, 0.0, 1.0]),
         "w": np.zeros(3), "wind": np.zeros(3), "rotor_speeds": speeds[0],
     }  # fmt: skip
     tight = {"method": "RK45", "rtol": 1e-6, "atol": 1e-9}
@@ -165,7 +165,7 @@ def in_mujoco(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> 
         model = mujoco.MjModel.from_xml_string(exported.text)
     data = mujoco.MjData(model)
     data.qpos[:] = [0, 0, 0, 1, 0, 0, 0]
-    data.qvel[:3] = [START_M_S, -START_M_S, 0.0]
+    data.qvel[:3] = [_START_M_S, -_START_M_S, 0.0]
     same = expressed(vehicle, "mjcf")
     time, speeds = commands_of(same, duration_s)
     thrust = same.thrust_coefficients_n_s2() * speeds**2
@@ -192,7 +192,7 @@ def read_by(tool: str) -> Iterator[None]:
 
 
 @dataclass(frozen=True)
-class GazeboMotor:
+class _GazeboMotor:
     """What one `MulticopterMotorModel` of an SDF file says; SI units."""
 
     link: str
@@ -206,14 +206,14 @@ class GazeboMotor:
     drag: float
 
     @staticmethod
-    def all_of(text: str) -> list[GazeboMotor]:
+    def all_of(text: str) -> list[_GazeboMotor]:
         """The motors of a model, in the order of their numbers."""
 
-        def read(p: ElementTree.Element) -> GazeboMotor:
+        def read(p: ElementTree.Element) -> _GazeboMotor:
             value = {e.tag: e.text or "" for e in p}
             names = ("timeConstantUp", "timeConstantDown", "motorConstant", "momentConstant", "rotorDragCoefficient")
             sense = 1.0 if value["turningDirection"] == "ccw" else -1.0
-            return GazeboMotor(value["linkName"], sense, *(float(value[name]) for name in names))
+            return _GazeboMotor(value["linkName"], sense, *(float(value[name]) for name in names))
 
         plugins = [p for p in ElementTree.fromstring(text).iter("plugin") if p.find("motorNumber") is not None]
         return [read(p) for p in sorted(plugins, key=lambda p: int(p.findtext("motorNumber", "0")))]
@@ -243,7 +243,7 @@ def in_drake(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> D
     from pydrake.systems.analysis import Simulator
     from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
-    motors, damping = GazeboMotor.all_of(exported.text), gazebo_damping_of(exported.text)
+    motors, damping = _GazeboMotor.all_of(exported.text), gazebo_damping_of(exported.text)
     same = expressed(vehicle, "sdf")
     time, speeds = commands_of(same, duration_s)
     turning = np.stack(
@@ -299,7 +299,7 @@ def in_drake(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> D
     simulator.get_mutable_integrator().set_fixed_step_mode(True)
     simulator.get_mutable_integrator().set_maximum_step_size(STEP_S)
     context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
-    plant.SetFreeBodySpatialVelocity(context, base, SpatialVelocity([0, 0, 0], [START_M_S, -START_M_S, 0]))
+    plant.SetFreeBodySpatialVelocity(context, base, SpatialVelocity([0, 0, 0], [_START_M_S, -_START_M_S, 0]))
     start = plant.EvalBodyPoseInWorld(context, base).translation()
     position, attitude = [], []
     for now in time:
@@ -311,12 +311,12 @@ def in_drake(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> D
     return difference((np.array(position), np.array(attitude)), ours(same, turning), where)
 
 
-BULLET_DAMPING = 0.04
+_BULLET_DAMPING = 0.04
 """c of the deceleration c (1 + |v|) v, and the same for turning, that Bullet gives to a body by default."""
 
 
 def in_pybullet(
-    vehicle: Vehicle, exported: Exported, duration_s: float = 0.3, damping: float = BULLET_DAMPING
+    vehicle: Vehicle, exported: Exported, duration_s: float = 0.3, damping: float = _BULLET_DAMPING
 ) -> Difference:
     """Fly the exported URDF in Bullet next to ours with what it holds.
 
@@ -344,7 +344,7 @@ def in_pybullet(
             with read_by("Bullet"):
                 body = client.loadURDF(path, flags=pybullet.URDF_USE_INERTIA_FROM_FILE)
         client.changeDynamics(body, -1, linearDamping=damping, angularDamping=damping)
-        client.resetBaseVelocity(body, [START_M_S, -START_M_S, 0], [0, 0, 0])
+        client.resetBaseVelocity(body, [_START_M_S, -_START_M_S, 0], [0, 0, 0])
         position, attitude = [np.zeros(3)], [np.array([1.0, 0, 0, 0])]
         for k in range(len(time) - 1):
             turns = speeds[k][list(order)] * 60 / (2 * np.pi)

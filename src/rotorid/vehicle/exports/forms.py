@@ -2,6 +2,11 @@
 
 Those tools have the body forward-left-up: y and z of places change sign, and a rotor that turns counter-clockwise seen
 from above pushes the airframe about minus z.
+
+What other tools ask of a vehicle beyond that it is one: asked before a file for them is made.
+
+Whether a vehicle may be delivered is asked elsewhere (`rotorid.mismatch.delivery.usable`, with room for the error of an
+estimate). A tool that wants more takes nothing from the vehicle: its file is not written, and a sentence says why.
 """
 
 from __future__ import annotations
@@ -13,6 +18,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from rotorid.errors import InputError
+from rotorid.io.text.names import listed
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.exports.derivatives import (
     MUJOCO_FILE,
@@ -25,11 +31,14 @@ from rotorid.vehicle.exports.derivatives import (
     of_state,
     rotorpy_companion,
 )
-from rotorid.vehicle.exports.limits import refusal
 from rotorid.vehicle.mixer import hover_speed_rad_s
 
+_FOUR_ROTORS = {"rotorpy": "RotorPy", "gym-pybullet-drones": "gym-pybullet-drones"}
+"""Forms of tools that fly four rotors and no other number."""
+_EXACT_BODIES = {"mjcf": "MuJoCo", "sdf": "Gazebo"}
+"""Forms of tools that take no inertia with a principal moment above the sum of the others, by however little."""
 FLU = np.array([1.0, -1.0, -1.0])
-MOVED_CENTRES = ("moment", "moment and lever arm", "moment and lever arm, in space")
+_MOVED_CENTRES = ("moment", "moment and lever arm", "moment and lever arm, in space")
 """Forms of `com_offset` whose moment is that of rotors which sit elsewhere."""
 AT_ONCE_S = 1e-3
 """Time constant of a motor in tools that need one, where the vehicle states none."""
@@ -98,9 +107,9 @@ KNOWS = {
 }
 """By form, ids of the effects that it has a place for; `each_thrust`, `each_torque` where it has coefficients of each
 rotor; `derivatives` where it says itself what it takes of them. `inertia_products` are the vehicle's own, too."""
-DRAG_AT_CENTRE = ("gym-pybullet-drones",)
+_DRAG_AT_CENTRE = ("gym-pybullet-drones",)
 """Forms whose rotor drag acts at the centre of mass."""
-GRAVITY_M_S2 = {"rotorpy": 9.81}
+_GRAVITY_M_S2 = {"rotorpy": 9.81}
 """Of tools that have their own, which no file changes and no caller of theirs sets."""
 
 
@@ -110,7 +119,7 @@ def expressed(vehicle: Vehicle, to: str) -> Vehicle:
     The lag of the motors is left to who flies it: each tool has its own.
     """
     parts = parts_of(vehicle, KNOWS[to])
-    at = "at the centre of mass" if to in DRAG_AT_CENTRE else "at the hubs"
+    at = "at the centre of mass" if to in _DRAG_AT_CENTRE else "at the hubs"
     held = (
         ("rotor_drag", at, {"k_d": parts.drag[0]}),
         ("axial_inflow", "at the hubs", {"k_z": parts.inflow}),
@@ -127,7 +136,7 @@ def expressed(vehicle: Vehicle, to: str) -> Vehicle:
             "rotors": tuple(r.model_copy(update=p) for r, p in zip(vehicle.rotors, places, strict=True)),
             "thrust_coefficient_n_s2": tuple(parts.thrust.tolist()),
             "torque_coefficient_n_m_s2": tuple(parts.torque.tolist()),
-            "gravity_m_s2": GRAVITY_M_S2.get(to, vehicle.gravity_m_s2),
+            "gravity_m_s2": _GRAVITY_M_S2.get(to, vehicle.gravity_m_s2),
             "rotor_speed_limits_rad_s": parts.limits_rad_s,
             "effects": tuple({"id": i, "form": f, "parameters": p} for i, f, p in held if any(p.values())),
             "derivatives": expressed_by(vehicle, to),
@@ -214,7 +223,7 @@ def _take(values: dict, name: str, form: str, p: dict[str, float]) -> bool | str
     if name == "throttle_curve" and form == "thrust curve of the throttle" and 0 <= p["b"] <= 1:
         values["curve"] = p["b"]
         return True
-    if name == "com_offset" and form in MOVED_CENTRES:
+    if name == "com_offset" and form in _MOVED_CENTRES:
         values["places"] = values["places"] - np.array([p["r_x"], p["r_y"], 0.0])
         arm = "" if form == "moment" else "; the accelerometer stays where it was"
         return f"taken as rotors that sit elsewhere, so that their drag acts there, too{arm}"
@@ -251,8 +260,8 @@ def rotorpy(vehicle: Vehicle) -> Exported:
         left.append(f"motor_lag: {up:.4g} s up and {down:.4g} s down: the mean is taken")
     if up == 0:
         left.append(f"rotors that follow at once: RotorPy needs a lag, {AT_ONCE_S:g} s is taken")
-    if vehicle.gravity_m_s2 != GRAVITY_M_S2["rotorpy"]:
-        left.append(f"gravity of {vehicle.gravity_m_s2:g} m/s²: RotorPy has {GRAVITY_M_S2['rotorpy']:g}")
+    if vehicle.gravity_m_s2 != _GRAVITY_M_S2["rotorpy"]:
+        left.append(f"gravity of {vehicle.gravity_m_s2:g} m/s²: RotorPy has {_GRAVITY_M_S2['rotorpy']:g}")
     if any(vehicle.accelerometer_position_m):
         left.append(
             "place of the accelerometer: RotorPy reads rI nowhere, give it to its Imu: Imu(p_BS=quad_params['rI'])"
@@ -471,7 +480,7 @@ def sdf(vehicle: Vehicle) -> Exported:
     return Exported(text, "model.sdf", tuple(left))
 
 
-def gym_pybullet_drones(vehicle: Vehicle) -> Exported:
+def _gym_pybullet_drones(vehicle: Vehicle) -> Exported:
     """The URDF of gym-pybullet-drones: its `properties` hold what its physics is made of, links 0 to 3 are the rotors.
 
     It has the thrust kf n² and the yaw torque km n² (n in turns a minute) with the senses −, +, −, + of rotors 0 to 3
@@ -563,7 +572,7 @@ FORMS: dict[str, Callable[[Vehicle], Exported]] = {
     "rotorpy": rotorpy,
     "mjcf": mjcf,
     "sdf": sdf,
-    "gym-pybullet-drones": gym_pybullet_drones,
+    "gym-pybullet-drones": _gym_pybullet_drones,
     "px4": px4,
 }
 
@@ -580,3 +589,16 @@ def export_vehicle(vehicle: Vehicle, to: str) -> Exported:
     if why := refusal(to, vehicle.rotor_count, parts_of(vehicle, KNOWS[to]).inertia):
         raise InputError(f"{vehicle.name}: {why}")
     return FORMS[to](vehicle)
+
+
+def refusal(to: str, rotor_count: int, inertia_kg_m2: np.ndarray) -> str:
+    """Why the tool of a form does not take a vehicle with this inertia (3, 3); no full stop, empty where it does."""
+    if to in _FOUR_ROTORS and rotor_count != 4:
+        return f"{_FOUR_ROTORS[to]} knows four rotors, found {rotor_count}"
+    principal = np.linalg.eigvalsh(inertia_kg_m2)
+    if to in _EXACT_BODIES and (principal[0] <= 0 or principal[2] > (principal[0] + principal[1]) * (1 + 1e-9)):
+        shown = listed([f"{moment:.5g}" for moment in principal])
+        return (
+            f"{_EXACT_BODIES[to]} takes no principal moment of inertia above the sum of the others, found {shown} kg m2"
+        )
+    return ""

@@ -17,12 +17,12 @@ from rotorid.vehicle.exports.forms import Exported, parts_of, sdf
 from rotorid.vehicle.exports.sih import RICHEST
 from rotorid.vehicle.mixer import hover_speed_rad_s
 
-NUMBER = 22000
+_NUMBER = 22000
 """SYS_AUTOSTART: PX4 leaves 22000 to 22999 to airframes of one's own."""
-LOW_START = 0.05
+_LOW_START = 0.05
 """Share of the highest speed below which the lowest counts as none: PX4's curve has no start above 0."""
-GYROSCOPE_RAD_S = 8.7e-4
-ACCELEROMETER_M_S2 = (6.4e-3, 6.4e-3, 6.9e-3)
+_GYROSCOPE_RAD_S = 8.7e-4
+_ACCELEROMETER_M_S2 = (6.4e-3, 6.4e-3, 6.9e-3)
 """Noise of the sensors where the vehicle states none: that of the x500."""
 
 
@@ -32,7 +32,7 @@ def gazebo_airframe(vehicle: Vehicle) -> Exported:
     name = identifier(vehicle.name)
     text = model.text.replace("    </link>\n", f"{sensors(vehicle)}    </link>\n", 1)
     text = re.sub(r"<model name=(\"[^\"]*\"|'[^']*')>", f'<model name="{name}">', text, count=1)
-    companions = {"model.config": description(vehicle, name), f"{NUMBER}_gz_{name}": airframe(vehicle, name)}
+    companions = {"model.config": description(vehicle, name), f"{_NUMBER}_gz_{name}": airframe(vehicle, name)}
     said = f"places of the files: model.sdf and model.config in a folder {name} on GZ_SIM_RESOURCE_PATH"
     return replace(model, text=text, left_out=(*model.left_out, said), companions=companions)
 
@@ -44,9 +44,9 @@ def identifier(name: str) -> str:
 
 def sensors(vehicle: Vehicle) -> str:
     """IMU, barometer, magnetometer and satellite receiver of the body's link."""
-    gyro = vehicle.noise.angular_velocity_rad_s or GYROSCOPE_RAD_S
+    gyro = vehicle.noise.angular_velocity_rad_s or _GYROSCOPE_RAD_S
     stated = vehicle.noise.specific_force_m_s2
-    accelerometer = (stated,) * 3 if stated else ACCELEROMETER_M_S2
+    accelerometer = (stated,) * 3 if stated else _ACCELEROMETER_M_S2
     place = " ".join(f"{v:.9g}" for v in np.asarray(vehicle.accelerometer_position_m) * [1, -1, -1])
 
     def axes(values) -> str:
@@ -114,7 +114,7 @@ def airframe(vehicle: Vehicle, name: str) -> str:
             f"param set-default SIM_GZ_EC_MAX{i} {round(high)}",
         ]
     share = vehicle.mass_kg * vehicle.gravity_m_s2 / float((parts.thrust * high**2).sum())
-    squared = low < LOW_START * high
+    squared = low < _LOW_START * high
     hover = share if squared else _signal(share, low / high)
     lines += [
         "",

@@ -2,23 +2,29 @@
 
 Source: PX4-Autopilot, src/modules/simulation/simulator_sih: sih_params.c, and sih.cpp (read_motors,
 generate_force_and_torques, equations_of_motion) as of version 1.16. Written from them; no code of theirs is here.
+
+Four rotors in X shape in the order that PX4 and ArduPilot share: front right, rear left, front left, rear right.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from rotorid.errors import InputError
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.exports.derivatives import left_of_one_damping, own_damping
 from rotorid.vehicle.exports.forms import KNOWS, Exported, Parts, parts_of
-from rotorid.vehicle.exports.four_in_x import order_in_x
 from rotorid.vehicle.mixer import hover_speed_rad_s
 
-FASTEST_S = 0.005
+CORNERS = ((1, 1), (-1, -1), (1, -1), (-1, 1))
+"""Signs of the places (x forward, y right) in that order."""
+SENSES = (1, 1, -1, -1)
+"""Signs of the yaw moments: front right and rear left turn counter-clockwise."""
+_FASTEST_S = 0.005
 """Shortest SIH_T_TAU that its Euler step of 4 ms stands."""
 FASTEST_RAD_S = 6 * np.pi
 """SIH holds each body rate within ±6π rad/s (simulator_sih, `Sih::equations_of_motion`)."""
-OF_THE_TOOL = (
+_OF_THE_TOOL = (
     f"SIH holds each body rate within ±6π rad/s, ±{np.degrees(FASTEST_RAD_S):.0f} deg/s: no faster turn is simulated",
     "SIH_WIND_N and SIH_WIND_E say where the wind comes from: SIH_WIND_N = 3 blows towards the south",
 )
@@ -49,7 +55,8 @@ def px4_sih(vehicle: Vehicle) -> Exported:
     """SIH's parameters as QGroundControl loads them.
 
     SIH has thrust SIH_T_MAX u and torque SIH_Q_MAX u of a signal u that follows with SIH_T_TAU; arms SIH_L_ROLL and
-    SIH_L_PITCH; drag −SIH_KDV v and damping −SIH_KDW Ω. The file says what of the tool flies otherwise (`OF_THE_TOOL`).
+    SIH_L_PITCH; drag −SIH_KDV v and damping −SIH_KDW Ω. The file says what of the tool flies otherwise
+    (`_OF_THE_TOOL`).
     """
     parts = parts_of(with_drag_of_hover(vehicle), KNOWS["px4-sih"])
     order = order_in_x(parts.places, vehicle.yaw_signs(), vehicle.name, "PX4's SIH")
@@ -76,9 +83,9 @@ def px4_sih(vehicle: Vehicle) -> Exported:
     own, weights = own_damping(vehicle, turning=True)
     damping = max(float(np.mean(parts.damping) + np.average(own, weights=weights / np.diag(j) ** 2)), 0.0)
     up, down = parts.tau_s
-    tau_s = max((up + down) / 2, FASTEST_S)
+    tau_s = max((up + down) / 2, _FASTEST_S)
     if tau_s > (up + down) / 2:
-        left.append(f"rotors that follow within {(up + down) / 2:g} s: SIH's steps stand {FASTEST_S:g} s")
+        left.append(f"rotors that follow within {(up + down) / 2:g} s: SIH's steps stand {_FASTEST_S:g} s")
     left.append("motor signals: in SIH thrust is proportional to them, so THR_MDL_FAC belongs to 0 there")
     if vehicle.gravity_m_s2 != 9.81:
         left.append(f"gravity of {vehicle.gravity_m_s2:g} m/s²: SIH has that of its latitude")
@@ -91,7 +98,7 @@ def px4_sih(vehicle: Vehicle) -> Exported:
         "SIH_KDV": drag, "SIH_KDW": damping, "SIH_T_TAU": tau_s, "THR_MDL_FAC": 0.0,
     }  # fmt: skip
     comments = [f"# {vehicle.name}, exported by rotorid for PX4's SIH", *(f"# Not expressed: {s}" for s in left)]
-    comments += [f"# {sentence}" for sentence in OF_THE_TOOL]
+    comments += [f"# {sentence}" for sentence in _OF_THE_TOOL]
     rows = ["1\t1\tSIH_VEHICLE_TYPE\t0\t6", *(f"1\t1\t{name}\t{float(value):.9g}\t9" for name, value in values.items())]
     return Exported(
         "\n".join([*comments, *rows]) + "\n", "sih.params", tuple(left), parameters=values, rotor_order=tuple(order)
@@ -123,3 +130,20 @@ def inertia_of(values: dict[str, float]) -> np.ndarray:
     """The inertia (3, 3), kg m²."""
     xx, yy, zz, xy, xz, yz = (values[f"SIH_I{k}"] for k in ("XX", "YY", "ZZ", "XY", "XZ", "YZ"))
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def order_in_x(places: np.ndarray, yaw_signs: np.ndarray, name: str, tool: str) -> list[int]:
+    """Which of our rotors, from 0, are the tool's 1 to 4.
+
+    `places` (n, 3) and `yaw_signs` (n,) are those of the vehicle `name`. InputError where the rotors are not four in X
+    shape, or turn the other way.
+    """
+    corners = {(int(np.sign(x)), int(np.sign(y))): i for i, (x, y, _) in enumerate(places)}
+    if len(places) != 4 or set(corners) != set(CORNERS):
+        raise InputError(f"{name}: {tool} wants four rotors in X shape, found {len(places)} rotors")
+    order = [corners[corner] for corner in CORNERS]
+    if tuple(int(yaw_signs[i]) for i in order) != SENSES:
+        raise InputError(
+            f"{name}: {tool} wants front right and rear left counter-clockwise, seen from above, the others clockwise"
+        )
+    return order

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rotorid.identify.bench.outliers import LEVEL, find
+from rotorid.identify.bench.calibration_flags import LEVEL, find
 
 WEIGHTS = np.repeat([35.7, 72.3, 108.5, 255.1, 343.4, 500.5, 751.0, 957.5], 3)
 SLOPE, SCATTER_GF = 40.0, 0.07

@@ -8,11 +8,12 @@ import pandas as pd
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.identify.fem import bridge, statements, studies
+from rotorid.identify.fem import statements, studies
 from rotorid.identify.fem.answers import compare
+from rotorid.identify.fem.gauges import strain_per_newton
 from rotorid.identify.fem.model import DOWN, Bench
-from rotorid.identify.fem.single_cell import strain_per_newton
 from rotorid.identify.fem.sizes import Material, materials, read_assumed
+from rotorid.identify.fem.studies import counts_per_newton, from_printed_slope, printed_slope, volts_per_newton
 from rotorid.identify.fem.tets import on
 from rotorid.io.wire.bench import GAIN, REFERENCE_V
 
@@ -95,11 +96,11 @@ def test_a_cell_bends_as_four_hinges_do(assumed, moduli) -> None:
 def test_volts_and_counts_by_hand(assumed) -> None:
     """500 µε at 5 V and a gauge factor of 2 are 5 mV."""
     sizes = replace(assumed.sizes, excitation_v=5.0, gauge_factor=2.0)
-    volts = bridge.volts_per_newton(sizes, 500e-6)
+    volts = volts_per_newton(sizes, 500e-6)
     assert volts == pytest.approx(5e-3)
-    assert bridge.counts_per_newton(volts) == pytest.approx(5e-3 / (2 * REFERENCE_V / GAIN) * (2**23 - 1))
-    assert bridge.printed_slope(volts) == pytest.approx(1 / 500 / 9.80665e-3)
-    assert bridge.from_printed_slope(bridge.printed_slope(volts)) == pytest.approx(volts)
+    assert counts_per_newton(volts) == pytest.approx(5e-3 / (2 * REFERENCE_V / GAIN) * (2**23 - 1))
+    assert printed_slope(volts) == pytest.approx(1 / 500 / 9.80665e-3)
+    assert from_printed_slope(printed_slope(volts)) == pytest.approx(volts)
 
 
 def test_the_ligament_that_gives_a_sensitivity_does(assumed, moduli) -> None:

@@ -14,12 +14,11 @@ from typer.testing import CliRunner
 from rotorid.cli import app
 from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
-from rotorid.mismatch.changes.compare import Change, Changes, changes_between, in_percent, price_of
+from rotorid.mismatch.changes.compare import Change, Changes, changes_between, in_percent, price_of, regime_notes
 from rotorid.mismatch.changes.joint import FARTHER, joints_of, lasting_effects, moved_by, reference_of, slower
 from rotorid.mismatch.changes.level_one import as_one
-from rotorid.mismatch.changes.notes import regime_notes
 from rotorid.mismatch.changes.words import as_json, sentences
-from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.problem import Prior
 from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import RecordingSet, Vehicle, write_set
 from rotorid.report.page.changes import make_changes_page

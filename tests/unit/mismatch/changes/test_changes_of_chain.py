@@ -9,11 +9,16 @@ import numpy as np
 import pytest
 
 from rotorid.mismatch.changes.chain import chain_terms
-from rotorid.mismatch.changes.compare import changes_in, decided_of_speeds, mistakes_that_differ, most_like
-from rotorid.mismatch.changes.notes import command_notes
+from rotorid.mismatch.changes.compare import (
+    changes_in,
+    command_notes,
+    decided_of_speeds,
+    mistakes_that_differ,
+    most_like,
+)
 from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.plant.speedpath import CommandChain
-from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.problem import Prior
 from rotorid.mismatch.posterior.status import Estimate
 from tests.unit.mismatch.plant.test_speedpath import FULL, recorded, searched
 

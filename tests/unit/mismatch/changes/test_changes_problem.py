@@ -17,7 +17,7 @@ from rotorid.mismatch.changes.problem import (
 from rotorid.mismatch.changes.usual import hidden_in, usual_spread
 from rotorid.mismatch.posterior.evidence import EvidenceTerm, LinearParameter
 from rotorid.mismatch.posterior.leftover import spectrum_of, unit_of
-from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.problem import Prior
 from rotorid.mismatch.posterior.score import Posterior
 from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.posterior.statements import statements_of, visited_instead

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rotorid.mismatch.decision.findings import Finding
-from rotorid.mismatch.decision.probability import with_probabilities
+from rotorid.mismatch.decision.findings import Finding, with_probabilities
 from rotorid.mismatch.posterior.score import Posterior
 from rotorid.mismatch.posterior.search import Found
 from tests.unit.mismatch.posterior.test_posterior import effect, flight, problem

@@ -7,7 +7,7 @@ import pytest
 
 from rotorid.cli.simulating import fly
 from rotorid.errors import InputError
-from rotorid.mismatch.delivery.stated import delivered_value
+from rotorid.mismatch.delivery.final import delivered_value
 from rotorid.mismatch.delivery.usable import full_thrust_n
 from rotorid.recordings import RecordingSet, Run, read_set, templates
 from rotorid.recordings import columns as c

@@ -16,7 +16,7 @@ from rotorid.mismatch.delivery.files import (
     read_instruments,
     text_of,
 )
-from rotorid.mismatch.delivery.model import model_of
+from rotorid.mismatch.delivery.flown import model_of
 from rotorid.mismatch.tell.forward import delivered_model, errors_of, forward_channels
 from rotorid.report.deliver import write_files
 from tests.unit.mismatch.delivery.test_parts import WIND, sensor_error

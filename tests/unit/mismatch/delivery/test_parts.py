@@ -4,7 +4,7 @@ import pytest
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.decision.findings import Finding
-from rotorid.mismatch.delivery.parts import delivered, entry_of, improved_vehicle, place_of
+from rotorid.mismatch.delivery.files import delivered, entry_of, improved_vehicle, place_of
 from rotorid.mismatch.posterior.status import Estimate
 from tests.unit.mismatch.synthetic import analysis, drag_finding
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rotorid.mismatch.delivery.reduce import with_only
+from rotorid.mismatch.delivery.usable import with_only
 from rotorid.mismatch.model.fitted import fitted
 from rotorid.mismatch.model.prepare import prepare
 from rotorid.mismatch.plant.rows import Term

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from rotorid.cli import app, verdicts
 from rotorid.cli.simulating import fly
 from rotorid.mismatch.decision.findings import Analysis
-from rotorid.mismatch.delivery.parts import delivered, improved_vehicle
+from rotorid.mismatch.delivery.files import delivered, improved_vehicle
 from rotorid.mismatch.tell.verdict import Verdict
 from rotorid.recordings import RecordingSet, Vehicle, templates, write_set, write_vehicle
 from rotorid.recordings import columns as c

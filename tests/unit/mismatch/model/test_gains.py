@@ -13,7 +13,7 @@ from rotorid.mismatch.model.gains import Side, gains_of, mean_of, merged
 from rotorid.mismatch.model.prepare import prepare
 from rotorid.mismatch.model.within_trust import settled
 from rotorid.mismatch.plant.split import parts_of, split_runs
-from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.problem import Prior
 from rotorid.mismatch.posterior.values import Gain
 from tests.unit.mismatch.flights import DENSE_HZ, quad, recorded, smooth, with_table
 

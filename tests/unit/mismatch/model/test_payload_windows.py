@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rotorid.mismatch.analyse import analyse
-from rotorid.mismatch.delivery.parts import delivered
+from rotorid.mismatch.delivery.files import delivered
 from rotorid.mismatch.model.payload_windows import change_rows, two_plateaus
 from tests.unit.mismatch.flights import COLUMNS, quad, recorded
 

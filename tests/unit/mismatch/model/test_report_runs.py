@@ -18,9 +18,8 @@ from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.model.absent import evidence_of
 from rotorid.mismatch.plant.split import parts_of, split_runs
 from rotorid.mismatch.tell.consistency import EXPLAINED_SHARE
-from rotorid.mismatch.tell.ledger import ledger, text_of
 from rotorid.recordings import RecordingSet, Run, Vehicle
-from rotorid.report.deliver import verdict_of
+from rotorid.report.deliver import ledger, text_of, verdict_of
 from tests.unit.mismatch.flights import Flight
 
 HELD = "run02"

@@ -8,8 +8,8 @@ from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 from rotorid.mismatch.model.fitted import turning
+from rotorid.mismatch.model.leftover import slow_excess
 from rotorid.mismatch.model.prepare import prepare
-from rotorid.mismatch.model.slow_changes import slow_excess
 from rotorid.mismatch.model.wrench import wrench_model
 from rotorid.recordings.columns import QUATERNION, VELOCITY
 from tests.unit.mismatch.flights import COLUMNS, quad, recorded, with_table

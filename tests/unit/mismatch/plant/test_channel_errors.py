@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rotorid.mismatch.plant.channel_errors import growth
+from rotorid.mismatch.plant.comparison import growth
 
 PER = 10
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rotorid.mismatch.model.prepare import prepare
-from rotorid.mismatch.plant.closed_loop_bias import closed_loop_bias_s
+from rotorid.mismatch.model.wrench import closed_loop_bias_s
 from tests.unit.mismatch.flights import quad, recorded
 
 GAIN_N_M_S = 0.1

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotorid.mismatch.plant.estimated_velocity import made_from_accelerometer
-from rotorid.mismatch.plant.motion import Segment
+from rotorid.mismatch.plant.motion import Segment, made_from_accelerometer
 from tests.unit.mismatch.plant.test_rows import still
 
 RATE_HZ, COUNT = 100.0, 6000

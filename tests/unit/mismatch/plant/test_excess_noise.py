@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotorid.mismatch.plant.excess_noise import noise_factors
 from rotorid.mismatch.plant.motion import Segment
+from rotorid.mismatch.plant.regression import noise_factors
 from rotorid.mismatch.plant.rows import Thinner, baseline_wrench
 from tests.unit.mismatch.plant.test_rows import still
 from tests.unit.mismatch.synthetic import coloured

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rotorid.mismatch.plant.height import quiet_height
+from rotorid.mismatch.plant.motion import quiet_height
 
 DT_S = 0.004
 TIME_S = DT_S * np.arange(2500)

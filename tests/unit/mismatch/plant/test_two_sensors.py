@@ -10,7 +10,7 @@ import pandas as pd
 from rotorid.mismatch.decision.decide import coefficients
 from rotorid.mismatch.model.prepare import prepare
 from rotorid.mismatch.model.wrench import wrench_model
-from rotorid.mismatch.plant.two_sensors import compared_alone
+from rotorid.mismatch.plant.rows import compared_alone
 from rotorid.recordings import columns as c
 from tests.unit.mismatch.flights import recorded, with_table
 

@@ -10,8 +10,7 @@ from rotorid.mismatch.plant.comparison import environments
 from rotorid.mismatch.posterior.evidence import Evidence, EvidenceTerm, LinearParameter
 from rotorid.mismatch.posterior.leftover import spectrum_of
 from rotorid.mismatch.posterior.limits import limits_of
-from rotorid.mismatch.posterior.prior import Prior
-from rotorid.mismatch.posterior.problem import Problem, problem_of
+from rotorid.mismatch.posterior.problem import Prior, Problem, problem_of
 from rotorid.mismatch.posterior.score import Posterior, log_prior, scored
 from rotorid.mismatch.posterior.search import decide, most_probable
 from rotorid.mismatch.posterior.statements import statements_of

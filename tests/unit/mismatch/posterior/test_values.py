@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotorid.mismatch.posterior.prior import Prior
+from rotorid.mismatch.posterior.problem import Prior
 from rotorid.mismatch.posterior.values import GAINS, Gain, called_wrong, in_place, options_of, same_ratio
 
 TRUST = {

@@ -19,8 +19,7 @@ from rotorid.recordings import columns as c
 from rotorid.recordings import read_set, templates
 from rotorid.recordings.importers.clean import join_rows
 from rotorid.recordings.importers.guessing import names as column_names
-from rotorid.recordings.importers.guessing.guess import guess
-from rotorid.recordings.importers.guessing.text import as_text
+from rotorid.recordings.importers.guessing.guess import as_text, guess
 from rotorid.recordings.importers.mapping import BODY, TRAVEL, UNITS, WORLD, convert, read_mapping
 from tests.public_logs import LOGS, needs_logs
 

@@ -12,11 +12,17 @@ from scipy.spatial.transform import Rotation
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers import clean, crazyflie, crazyflie_usd, frames, in_the_air, known, px4_ulog
-from rotorid.recordings.importers.crazyflie_usd import decode_usd_log, read_usd_log
-from rotorid.recordings.importers.imrc_bench_csv import read_imrc_bench
+from rotorid.recordings.importers import clean, crazyflie, in_the_air, known, px4_ulog
+from rotorid.recordings.importers.crazyflie import TYPES, decode_usd_log, read_usd_log
+from rotorid.recordings.importers.mapping import (
+    continuous,
+    half_turn_about_x,
+    quaternion_from_euler_frd,
+    quaternion_to_frd_ned,
+)
 from rotorid.recordings.importers.neurobem import USED, read_neurobem
 from rotorid.recordings.importers.parameters import Parameters
+from rotorid.recordings.importers.public_sets import read_imrc_bench
 from rotorid.recordings.importers.rcbenchmark import decode_text, read_rcbenchmark
 from rotorid.recordings.importers.vicon_csv import read_vicon_csv
 
@@ -29,26 +35,26 @@ def kinds(faults) -> list[str]:
 
 
 def test_half_a_turn_about_x_keeps_forward_and_turns_left_and_up_over() -> None:
-    assert frames.half_turn_about_x([[1.0, 2.0, 3.0]]).tolist() == [[1.0, -2.0, -3.0]]
+    assert half_turn_about_x([[1.0, 2.0, 3.0]]).tolist() == [[1.0, -2.0, -3.0]]
 
 
 def test_a_quaternion_turned_over_turns_the_same_vectors() -> None:
     rng = np.random.default_rng(1)
     attitude = Rotation.random(20, rng=rng)
     body_flu = rng.normal(size=(20, 3))
-    wxyz = frames.quaternion_to_frd_ned(attitude.as_quat()[:, [3, 0, 1, 2]])
+    wxyz = quaternion_to_frd_ned(attitude.as_quat()[:, [3, 0, 1, 2]])
     turned = Rotation.from_quat(wxyz[:, [1, 2, 3, 0]])
-    expected = frames.half_turn_about_x(attitude.apply(body_flu))
-    np.testing.assert_allclose(turned.apply(frames.half_turn_about_x(body_flu)), expected, atol=1e-12)
+    expected = half_turn_about_x(attitude.apply(body_flu))
+    np.testing.assert_allclose(turned.apply(half_turn_about_x(body_flu)), expected, atol=1e-12)
 
 
 def test_quaternions_are_made_continuous_in_sign() -> None:
     once = np.array([[1.0, 0, 0, 0], [-1.0, 0, 0, 0], [-0.9, 0.1, 0, 0], [0.9, 0, 0, 0]])
-    assert (frames.continuous(once)[:, 0] > 0).all()
+    assert (continuous(once)[:, 0] > 0).all()
 
 
 def test_euler_angles_nose_up_is_positive_pitch() -> None:
-    wxyz = frames.quaternion_from_euler_frd(np.zeros(1), np.radians([90.0]), np.zeros(1))
+    wxyz = quaternion_from_euler_frd(np.zeros(1), np.radians([90.0]), np.zeros(1))
     nose = Rotation.from_quat(wxyz[:, [1, 2, 3, 0]]).apply([1.0, 0, 0])
     np.testing.assert_allclose(nose, [[0, 0, -1.0]], atol=1e-12)
 
@@ -544,7 +550,7 @@ def test_pitch_is_not_called_missing_where_it_is_in_the_log() -> None:
     np.testing.assert_allclose(along, 1, atol=1e-12)
 
 
-@pytest.mark.parametrize("letter", crazyflie_usd.TYPES)
+@pytest.mark.parametrize("letter", TYPES)
 def test_each_type_of_a_usd_variable_is_read(letter: str) -> None:
     value = 1.5 if letter in "efd" else 100
     tables, faults = decode_usd_log(usd_bytes([("before", "f"), ("a", letter), ("after", "H")], [(2.5, value, 7)] * 3))

@@ -18,10 +18,10 @@ from rotorid.cli import app
 from rotorid.errors import InputError
 from rotorid.io.text import writing
 from rotorid.recordings import list_sets, read_set, write_set
+from rotorid.recordings.files import FILE_NAME
 from rotorid.recordings.importers import set_of_logs as writer
 from rotorid.recordings.importers.report import read_report
 from rotorid.recordings.importers.set_of_logs import SetOfLogs
-from rotorid.recordings.manifest import FILE_NAME
 from tests.unit.recordings.wrong_inputs import RUN, VEHICLE, sound, table
 
 MOST_STEPS = 80

@@ -27,7 +27,7 @@ from rotorid.recordings.importers.guessing.names import Family
 from rotorid.recordings.importers.mapping import EULER, OPEN, from_angles
 from rotorid.recordings.importers.units import UNITS
 
-SAME_ORDER_RAD = np.radians(2.0)
+_SAME_ORDER_RAD = np.radians(2.0)
 """Where the two orders of roll, pitch and yaw are no farther apart, the usual one is taken without a question."""
 
 
@@ -137,7 +137,7 @@ def _confirmed(draft: Draft, turns: list[_Turn], found: dict, best: tuple[int, F
         question, form = "it turns the world into the body: change the signs of x, y, z (or that of w)", OPEN
     elif not is_clear(agreed, runner_up) and form in EULER:
         apart = _apart(turns, turn.unit)
-        form, question = ("euler", "") if apart < SAME_ORDER_RAD else (OPEN, _which_order(apart))
+        form, question = ("euler", "") if apart < _SAME_ORDER_RAD else (OPEN, _which_order(apart))
         why += f", {np.degrees(apart):.2g}° apart at most in the two orders"
     elif not is_clear(agreed, runner_up):
         question, form = f"the gyroscope hardly decides the order ({runner_up.correlation:.2f} for the other)", OPEN
@@ -225,7 +225,7 @@ def _attitude_alone(draft: Draft, turns: list[_Turn], why: str) -> None:
         units = list(dict.fromkeys(t.unit for t in straight_turns))
         unit = units[0] if len(units) == 1 else OPEN
         apart = max(_apart(straight_turns, u) for u in units)
-        form = "euler" if apart < SAME_ORDER_RAD else OPEN
+        form = "euler" if apart < _SAME_ORDER_RAD else OPEN
         asked = ["rad or deg: no gyroscope shows which"] * (unit == OPEN) + [_which_order(apart)] * (form == OPEN)
         draft.put("attitude", first.columns, why, "; ".join(asked), form=form, unit=unit)
         if not asked:

@@ -8,12 +8,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pandas as pd
 
-from rotorid.recordings.importers.frames import continuous
 from rotorid.recordings.importers.guessing import agreement as by
 from rotorid.recordings.importers.guessing import names as named
 from rotorid.recordings.importers.guessing.agreement import Agreement
 from rotorid.recordings.importers.guessing.names import Family
-from rotorid.recordings.importers.mapping import OPEN, Channel
+from rotorid.recordings.importers.mapping import OPEN, Channel, continuous
 from rotorid.recordings.importers.units import UNITS
 
 CONFIRMED = 0.8
@@ -21,19 +20,19 @@ CONFIRMED = 0.8
 BY_NUMBERS_ALONE = 0.95
 """The same where no name says it."""
 CONTRADICTED = 0.5
-CLEARLY = 0.5
+_CLEARLY = 0.5
 """Share of another reading's unexplained energy that a reading may leave to be taken without a question."""
 MOVES = {"angle": 0.02, "velocity": 0.1, "position": 0.05}
 """Changes over a step below which a table says nothing: rad, m/s, m."""
 FACTOR_OFF = 0.15
 """How far a factor may be from that of a unit."""
-FACTOR_OFF_COUNTS = 0.03
+_FACTOR_OFF_COUNTS = 0.03
 """The same where counts of usual sensors are near: 16.4 to 1 deg/s are 1.064 thousandths of rad/s each."""
-RATES_BY_NAME = {("p", "q", "r"): "", ("rollspeed", "pitchspeed", "yawspeed"): "rad/s"}
+_RATES_BY_NAME = {("p", "q", "r"): "", ("rollspeed", "pitchspeed", "yawspeed"): "rad/s"}
 """Names of body rates without a word in common, and their unit where it is fixed (MAVLink's `ATTITUDE`)."""
 RATES_HZ = (5.0, 8000.0)
 """Rates at which tables are recorded."""
-THOUSANDTHS = 100.0
+_THOUSANDTHS = 100.0
 """Median size of an accelerometer's reading above which it counts thousandths of g."""
 FASTEST_GYRO_RAD_S = 40.0
 G = 9.80665
@@ -79,7 +78,7 @@ def triples_of(draft: Draft) -> list[Family]:
     free = draft.free()
     found = [f for axes in named.AXES for f in named.families(free, axes)]
     last = {(named.words_of(n) or [""])[-1]: n for n in free}
-    for names, unit in RATES_BY_NAME.items():
+    for names, unit in _RATES_BY_NAME.items():
         if set(names) <= set(last):
             found.append(Family("omega", tuple(last[n] for n in names), "xyz", unit, frozenset(("omega",))))
     found += _with_units(draft, named.of_mavlink(free))
@@ -93,7 +92,7 @@ def _with_units(draft: Draft, families: list[Family]) -> list[Family]:
     for family in families:
         if (force := message.get(family.words - {family.stem})) is not None:
             sizes = np.linalg.norm(draft.values(force.columns), axis=1)
-            raw = bool(np.isfinite(sizes).any()) and float(np.nanmedian(sizes)) > THOUSANDTHS
+            raw = bool(np.isfinite(sizes).any()) and float(np.nanmedian(sizes)) > _THOUSANDTHS
             units = {"acc": ("m/s2", "mg"), "gyro": ("rad/s", "mrad/s")}[family.stem]
             family = replace(family, unit=units[raw])
         out.append(family)
@@ -110,12 +109,12 @@ def signed_continuous(wxyz: np.ndarray) -> np.ndarray:
 
 def is_clear(agreed: Agreement, other: Agreement) -> bool:
     """Whether a reading leaves so much less unexplained than another that it is taken without a question."""
-    return 1 - agreed.correlation**2 < CLEARLY * (1 - max(other.correlation, 0.0) ** 2)
+    return 1 - agreed.correlation**2 < _CLEARLY * (1 - max(other.correlation, 0.0) ** 2)
 
 
 def unit_by_factor(kind: str, slope: float) -> str | None:
     """The unit whose factor a slope is within `FACTOR_OFF` of; None where there is none."""
-    off = {"mrad/s": FACTOR_OFF_COUNTS}
+    off = {"mrad/s": _FACTOR_OFF_COUNTS}
     return next((u for u, f in UNITS[kind].items() if abs(slope / f - 1) < off.get(u, FACTOR_OFF)), None)
 
 

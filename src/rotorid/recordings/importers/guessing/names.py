@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-UNIT_WORDS: dict[str, str] = {
+_UNIT_WORDS: dict[str, str] = {
     "m_s_s": "m/s2",
     "m_s2": "m/s2", "m_s_2": "m/s2", "m_s^2": "m/s2", "ms2": "m/s2", "mps2": "m/s2", "mg": "mg", "g": "g",
     "m_s": "m/s", "mps": "m/s", "cm_s": "cm/s", "mm_s": "mm/s",
@@ -19,14 +19,14 @@ UNIT_WORDS: dict[str, str] = {
     "rad": "rad", "deg": "deg", "m": "m", "cm": "cm", "mm": "mm", "ft": "ft", "rpm": "rpm", "hz": "hz", "erpm": "erpm",
 }  # fmt: skip
 """Words of a unit at the end of a name to the mapping's unit."""
-QUALIFIERS = frozenset(
+_QUALIFIERS = frozenset(
     "adc b body bodyframe w world i inertial n frd flu ned enu nwu imu raw smooth smoothed filt filtered est estimate "
     "lin linear meas measured 0".split()
 )
 """Words at the end of a stem that do not change what it is."""
-AFTER_NUMBERS = frozenset("us usec pwm dshot pct percent raw".split())
+_AFTER_NUMBERS = frozenset("us usec pwm dshot pct percent raw".split())
 """Words that may stand behind the number of a rotor (`m1_us`, `servo1_raw`)."""
-IN_BODY = frozenset(("b", "body", "bodyframe", "frd", "flu"))
+_IN_BODY = frozenset(("b", "body", "bodyframe", "frd", "flu"))
 SOURCES = frozenset("state estimate est ekf odom odometry vicon mocap imu drone quad uav vehicle px4 mavros".split())
 """Words at the beginning of a stem that say where a value comes from."""
 OTHER_THINGS = frozenset(
@@ -34,7 +34,7 @@ OTHER_THINGS = frozenset(
     "desired cmd command target mag magnetometer thrust torque moment wind jerk alpha dot residual".split()
 )
 """Words in a name of three columns that make it no measurement of motion."""
-WISHED = frozenset("sp setpoint ref reference des desired cmd command commanded target".split())
+_WISHED = frozenset("sp setpoint ref reference des desired cmd command commanded target".split())
 
 TRIPLES: dict[str, tuple[frozenset[str], frozenset[str]]] = {
     "specific_force": (
@@ -51,7 +51,7 @@ TRIPLES: dict[str, tuple[frozenset[str], frozenset[str]]] = {
     "velocity": (frozenset("vel velocity".split()), frozenset("v".split())),
 }
 """To a quantity the words that a stem may end in, and those that must be the whole of it."""
-ROTORS: dict[str, frozenset[str]] = {
+_ROTORS: dict[str, frozenset[str]] = {
     "rotor_speed": frozenset("rpm erpm rotor_speed rotor_speeds motor_speed motor_speeds mot_speed".split()),
     "rotor_command": frozenset("rotor_command rotor_commands".split()),
     "throttle": frozenset(
@@ -59,8 +59,8 @@ ROTORS: dict[str, frozenset[str]] = {
     ),
 }  # fmt: skip
 QUATERNION = frozenset("q quat quaternion att_q attitude_q orientation rotation".split())
-ANGLES = ({"roll", "phi"}, {"pitch", "theta"}, {"yaw", "psi", "heading"})
-SCALARS: dict[str, tuple[str, ...]] = {
+_ANGLES = ({"roll", "phi"}, {"pitch", "theta"}, {"yaw", "psi", "heading"})
+_SCALARS: dict[str, tuple[str, ...]] = {
     "time": (r"t([ _(\[]*([munµ]?s)[)\]]?)?", r"time(stamp)?([ _(\[].*)?", r"time_.*", r".*timestamp.*"),
     "battery_voltage": (r"v_?bat(t|tery)?.*", r"battery_?v(olt(age)?)?.*", r"volt(age)?.*", r"u_?bat.*"),
     "battery_current": (r"amperage.*", r"current.*", r"i_?bat.*", r"battery_?current.*"),
@@ -71,7 +71,7 @@ SCALARS: dict[str, tuple[str, ...]] = {
     "rotor_speed": (r"(rotor|motor|prop\w*)?[ _]?(speed|rpm)([ _(\[,/].*)?", r".*[ _(\[]rpm.*", r".*rotation.*speed.*"),
     "throttle": (r"(throttle|esc|pwm|motor command)([ _(\[,/].*)?",),
 }
-MAVLINK = "xyz of MAVLink"
+_MAVLINK = "xyz of MAVLink"
 AXES = ("xyz", "012", "123", "ned", "enu")
 FOURS = ("wxyz", "0123", "1234")
 
@@ -91,7 +91,7 @@ class Family:
     @property
     def in_body(self) -> bool:
         """Whether a word of the names says body axes."""
-        return bool(self.words & IN_BODY)
+        return bool(self.words & _IN_BODY)
 
 
 def words_of(name: str) -> list[str]:
@@ -103,8 +103,8 @@ def words_of(name: str) -> list[str]:
 def _without_unit(words: list[str]) -> tuple[list[str], str]:
     for count in (3, 2, 1):
         ending = "_".join(words[-count:])
-        if len(words) > count and ending in UNIT_WORDS:
-            return words[:-count], UNIT_WORDS[ending]
+        if len(words) > count and ending in _UNIT_WORDS:
+            return words[:-count], _UNIT_WORDS[ending]
     return words, ""
 
 
@@ -114,7 +114,7 @@ def unit_of(name: str) -> str:
 
 
 def _without_qualifiers(words: list[str]) -> list[str]:
-    while len(words) > 1 and words[-1] in QUALIFIERS:
+    while len(words) > 1 and words[-1] in _QUALIFIERS:
         words = words[:-1]
     while words and words[0] in SOURCES:
         words = words[1:]
@@ -125,7 +125,7 @@ def _member(name: str, axes: str) -> tuple[str, str, str, frozenset[str]] | None
     """Stem, axis, stated unit and words of a name as a member of a family with `axes`; None where it is none."""
     words, unit = _without_unit(words_of(name))
     ends = words
-    while axes.isalpha() and len(ends) > 1 and ends[-1] in QUALIFIERS and ends[-1] not in axes:
+    while axes.isalpha() and len(ends) > 1 and ends[-1] in _QUALIFIERS and ends[-1] not in axes:
         ends = ends[:-1]
     if not ends or ends[-1][-1] not in axes:
         return None
@@ -146,7 +146,7 @@ def families(names: Iterable[str], axes: str) -> list[Family]:
         if (member := _member(name, axes)) is None:
             continue
         stem, axis, unit, words = member
-        key = stem, frozenset(w for w in words if w in QUALIFIERS and w not in axes and not w.isdigit())
+        key = stem, frozenset(w for w in words if w in _QUALIFIERS and w not in axes and not w.isdigit())
         found.setdefault(key, {}).setdefault(axis, (name, unit))
     result = []
     for (stem, qualifiers), members in found.items():
@@ -164,7 +164,7 @@ def numbered(names: Iterable[str]) -> list[Family]:
     for name in names:
         words, unit = _without_unit(words_of(name.replace("(/100)", "")))
         unit = "100erpm" if "(/100)" in name else unit
-        if words and words[-1] in AFTER_NUMBERS and len(words) > 1 and re.search(r"\d$", words[-2]):
+        if words and words[-1] in _AFTER_NUMBERS and len(words) > 1 and re.search(r"\d$", words[-2]):
             words = words[:-1]
         match = re.fullmatch(r"(.*?)(?:_m)?_?(\d{1,2})", "_".join(words))
         if match:
@@ -190,7 +190,7 @@ def of_mavlink(names: Iterable[str]) -> list[Family]:
         if last[:1] in ("x", "y", "z") and last[1:] in ("acc", "gyro"):
             found.setdefault((*before, last[1:]), {})[last[0]] = name
     return [
-        Family(words[-1], tuple(members[a] for a in "xyz"), MAVLINK, "", frozenset(words))
+        Family(words[-1], tuple(members[a] for a in "xyz"), _MAVLINK, "", frozenset(words))
         for words, members in found.items()
         if set(members) == set("xyz")
     ]
@@ -216,16 +216,16 @@ def is_named(family: Family, quantity: str) -> bool:
 def is_rotor(family: Family, quantity: str) -> bool:
     """Whether numbered columns are named as speeds, commanded speeds or throttles of rotors."""
     stem = family.stem
-    rest = [w for w in stem.split("_") if w not in WISHED]
+    rest = [w for w in stem.split("_") if w not in _WISHED]
     if quantity == "rotor_command":
-        return _ends_in(stem, ROTORS[quantity]) or (
-            bool(family.words & WISHED) and _ends_in("_".join(rest), ROTORS["rotor_speed"])
+        return _ends_in(stem, _ROTORS[quantity]) or (
+            bool(family.words & _WISHED) and _ends_in("_".join(rest), _ROTORS["rotor_speed"])
         )
-    if family.words & WISHED and quantity == "rotor_speed":
+    if family.words & _WISHED and quantity == "rotor_speed":
         return False
     if quantity == "rotor_speed" and family.unit in ("rpm", "rad/s", "hz", "erpm", "100erpm"):
-        return _ends_in(stem, ROTORS[quantity] | ROTORS["throttle"])
-    return _ends_in("_".join(rest), ROTORS[quantity])
+        return _ends_in(stem, _ROTORS[quantity] | _ROTORS["throttle"])
+    return _ends_in("_".join(rest), _ROTORS[quantity])
 
 
 def is_quaternion(family: Family) -> bool:
@@ -235,7 +235,7 @@ def is_quaternion(family: Family) -> bool:
 def angles(names: Sequence[str]) -> tuple[tuple[str, str, str], str] | None:
     """Roll, pitch and yaw by their names, and the unit that these state."""
     found, units = [], set()
-    for meant in ANGLES:
+    for meant in _ANGLES:
         for name in names:
             words, unit = _without_unit(words_of(name))
             if words and words[-1] in meant and not frozenset(words) & OTHER_THINGS and "rate" not in words:
@@ -249,7 +249,7 @@ def angles(names: Sequence[str]) -> tuple[tuple[str, str, str], str] | None:
 
 def scalar(names: Iterable[str], quantity: str) -> str | None:
     """The first column whose name is that of a scalar quantity, by the pattern that is most its own."""
-    for pattern in SCALARS[quantity]:
+    for pattern in _SCALARS[quantity]:
         for name in names:
             if re.fullmatch(pattern, str(name).lower()):
                 return name

@@ -17,7 +17,7 @@ from rotorid.recordings.importers.guessing.names import Family
 from rotorid.recordings.importers.mapping import CHANNELS, ELECTRICAL, OPEN
 from rotorid.recordings.importers.units import UNITS, bracketed, stated
 
-RANGES: dict[str, tuple[float, float]] = {
+_RANGES: dict[str, tuple[float, float]] = {
     "a share": (0.0, 1.0),
     "-1 to 1": (-1.0, 1.0),
     "per cent": (0.0, 100.0),
@@ -30,20 +30,20 @@ RANGES: dict[str, tuple[float, float]] = {
     "16 bits": (0.0, 65535.0),
 }
 """Readings of no and of full throttle; a motor that is off may read 0 in each."""
-RANGES_BY_NAME = {
+_RANGES_BY_NAME = {
     "pulses in µs": frozenset("us usec pwm pulse servo rcout".split()),
     "DShot": frozenset(("dshot",)),
     "per cent": frozenset("percent pct".split()),
 }
-BETAFLIGHTS = ("DShot", "pulses in µs")
-LOWEST_PULSE_US = 880.0
+_BETAFLIGHTS = ("DShot", "pulses in µs")
+_LOWEST_PULSE_US = 880.0
 """Pulses of motors that are disarmed go down to 900 µs."""
-PULSES_OF_HOVER_US = 1300.0
+_PULSES_OF_HOVER_US = 1300.0
 """Above this in hover and never below 1000, DShot would be a motor that never gets less than half of its power."""
-HOVERS = (0.12, 0.92)
+_HOVERS = (0.12, 0.92)
 """Shares of full throttle at which multirotors spend most of a flight."""
-SLOWEST_ELECTRICAL_RPM = 3000.0
-FASTEST_HUNDREDS = 12_000.0
+_SLOWEST_ELECTRICAL_RPM = 3000.0
+_FASTEST_HUNDREDS = 12_000.0
 """In hundreds of electrical turns a minute no motor turns faster than this in the middle of a flight."""
 
 
@@ -110,11 +110,11 @@ def _put(draft: Draft, quantity: str, family: Family, how: str) -> None:
     if found == ["a share"]:
         draft.put(quantity, family.columns, f"{evidence}, so a share", unit="1")
     elif len(found) == 1:
-        low, high = RANGES[found[0]]
+        low, high = _RANGES[found[0]]
         more = f"so {found[0]}: no throttle is taken as {low:g} and full throttle as {high:g}"
         draft.put(quantity, family.columns, f"{evidence}, {more}", unit="raw", range=(low, high))
     else:
-        kinds = " or ".join(f"[{RANGES[k][0]:g}, {RANGES[k][1]:g}] ({k})" for k in found)
+        kinds = " or ".join(f"[{_RANGES[k][0]:g}, {_RANGES[k][1]:g}] ({k})" for k in found)
         question = f"which readings are no and full throttle: {kinds or 'no usual range holds them'}?"
         draft.put(quantity, family.columns, evidence, question, unit="raw", range=OPEN)
 
@@ -134,7 +134,7 @@ def _is_betaflight(draft: Draft) -> bool:
 
 
 def _possible_ranges(values: np.ndarray, family: Family, betaflight: bool) -> list[str]:
-    """The `RANGES` that hold throttles (n, k) and leave a vehicle that hovers in their middle.
+    """The `_RANGES` that hold throttles (n, k) and leave a vehicle that hovers in their middle.
 
     Where several do, one whose end the throttles reach exactly.
     """
@@ -144,22 +144,22 @@ def _possible_ranges(values: np.ndarray, family: Family, betaflight: bool) -> li
         return []
     low, middle, high = np.quantile(given, [0.005, 0.5, 0.995])
     names = {w for column in family.columns for w in named.words_of(column)}
-    stated = next((kind for kind, words in RANGES_BY_NAME.items() if names & words), None)
-    among = (stated,) if stated else BETAFLIGHTS if betaflight else tuple(RANGES)
+    stated = next((kind for kind, words in _RANGES_BY_NAME.items() if names & words), None)
+    among = (stated,) if stated else _BETAFLIGHTS if betaflight else tuple(_RANGES)
     held = []
     for kind in among:
-        bottom, full = RANGES[kind]
-        below = LOWEST_PULSE_US if kind == "pulses in µs" else bottom - 0.02 * (full - bottom)
+        bottom, full = _RANGES[kind]
+        below = _LOWEST_PULSE_US if kind == "pulses in µs" else bottom - 0.02 * (full - bottom)
         if kind == "-1 to 1" and low >= 0:
             continue
         if below <= low and high <= full + 0.02 * (full - bottom):
             held.append(kind)
     if stated is None and not betaflight:
-        fits = [k for k in held if HOVERS[0] <= (middle - RANGES[k][0]) / np.ptp(RANGES[k]) <= HOVERS[1]]
+        fits = [k for k in held if _HOVERS[0] <= (middle - _RANGES[k][0]) / np.ptp(_RANGES[k]) <= _HOVERS[1]]
         held = fits or [k for k in held if k in ("a share", "-1 to 1")][:1] or held
-        if low >= RANGES["pulses in µs"][0] and middle > PULSES_OF_HOVER_US:
+        if low >= _RANGES["pulses in µs"][0] and middle > _PULSES_OF_HOVER_US:
             held = [k for k in held if k != "DShot"]
-    reached = [k for k in held if given.max() == RANGES[k][1] or (RANGES[k][0] > 0 and given.min() == RANGES[k][0])]
+    reached = [k for k in held if given.max() == _RANGES[k][1] or (_RANGES[k][0] > 0 and given.min() == _RANGES[k][0])]
     return reached if len(reached) == 1 and len(held) > 1 else held
 
 
@@ -172,9 +172,9 @@ def _speed_unit(family: Family, middle: float, betaflight: bool) -> tuple[str, s
     if _is_electrical(family):
         if family.unit == "100erpm" or betaflight:
             return "100erpm", "hundreds of electrical turns a minute, as Betaflight logs them"
-        if middle < SLOWEST_ELECTRICAL_RPM:
+        if middle < _SLOWEST_ELECTRICAL_RPM:
             return "100erpm", f"a median of {middle:.4g} electrical turns a minute is too slow: these are hundreds"
-        if middle > FASTEST_HUNDREDS:
+        if middle > _FASTEST_HUNDREDS:
             return "erpm", f"electrical turns a minute by the names; a median of {middle:.4g} is too fast for hundreds"
         return OPEN, f"a median of {middle:.4g} can be electrical turns a minute (erpm) or hundreds of them (100erpm)"
     if family.unit in UNITS["rotor"]:
