@@ -23,7 +23,7 @@ from rotorid.mismatch.model.delivered import Values
 from rotorid.mismatch.model.gains import wrong_values_of
 from rotorid.mismatch.model.gusts import with_gusts
 from rotorid.mismatch.model.payload_windows import Windows, changes, loads, payload_windows_of, with_payload_on_board
-from rotorid.mismatch.model.prepare import Prepared
+from rotorid.mismatch.model.prepare import Prepared, assemble_rows
 from rotorid.mismatch.model.swinging import (
     as_effect,
     cable_of,
@@ -39,6 +39,7 @@ from rotorid.mismatch.model.within_trust import beyond_trust
 from rotorid.mismatch.model.wrench import (
     WrenchModel,
     after_residual,
+    block_seconds,
     chosen,
     path_segments,
     refine_nonlinear,
@@ -46,8 +47,10 @@ from rotorid.mismatch.model.wrench import (
     with_wind,
     wrench_model,
 )
+from rotorid.mismatch.plant.regression import build
 from rotorid.mismatch.plant.rows import RUN_SCALE, Term
 from rotorid.mismatch.plant.speedpath import CommandChain, SpeedResult
+from rotorid.mismatch.plant.split import training_rule
 from rotorid.recordings.signal.kernels import causal
 
 TAKEN_UP = "the curve between throttle and rotor speed takes it up"
@@ -58,6 +61,8 @@ _RUN_SPREAD = 0.007
 _RUN_TRUST = 0.02
 """Relative one-sigma of a run's own thrust about the common one."""
 
+_ASKING = 0.5
+"""Share of what a swing costs that it must explain next to the model that stands for a search with it."""
 _ROUNDS, _CHAIN_ROUNDS = 4, 2
 _MOVED = 0.3
 """Standard errors by which coefficients may move between rounds: columns hang on accelerations that they predict."""
@@ -197,13 +202,16 @@ def _converged(before: WrenchModel, after: WrenchModel) -> bool:
     return True
 
 
-def _with_own_scales(prepared: Prepared, segments, noisy, effects=None) -> WrenchModel:
-    """The search over all terms, with a scale for each run where thrust differs between them; `effects` as there."""
-    model = wrench_model(prepared, prepared.terms, effects, segments=segments, noisy_segments=noisy)
+def _with_own_scales(prepared: Prepared, segments, noisy, effects=None, start=None) -> WrenchModel:
+    """The search over all terms, with a scale for each run where thrust differs between them.
+
+    `effects` and `start` as of `wrench_model`.
+    """
+    model = wrench_model(prepared, prepared.terms, effects, start, segments, noisy)
     if not rules.OWN_SCALES(_thrust_differs(model)):
         return model
     terms = _with_run_scales(prepared.terms, prepared)
-    return wrench_model(prepared, terms, effects, segments=segments, noisy_segments=noisy)
+    return wrench_model(prepared, terms, effects, model.selection.active, segments, noisy)
 
 
 def _with_payload(prepared: Prepared, model: WrenchModel, windows: list[Windows]):
@@ -225,21 +233,49 @@ def _with_swing(prepared: Prepared, model: WrenchModel):
     """Segments, their noisy copies and the model with a payload that hung as each run says, if that explains more."""
     same = model.segments, model.noisy_segments, model
     start = swinging_term(model)
-    term = None if start is None else with_likely_length(model, start)
-    cable = None if term is None else cable_of(model, term)
-    found = None if term is None else hung_by(cable, model.segments, stretches_of(model, model.segments, model.rows))
-    if found is None:
+    if start is None:
         return same
-    segments, mass_kg = found
+    stretches = stretches_of(model, model.segments, model.rows)
+
+    def hangs(term: Term):
+        cable = cable_of(model, term)
+        found = hung_by(cable, model.segments, stretches)
+        return None if found is None else (*found, [*chosen(model), as_effect(term, cable, found[1])])
+
+    # The length is looked for near the start's alone: what does not ask for a swing there does not ask for one.
+    first = hangs(start)
+    if first is not None and not _asks_for_a_swing(prepared, model, start, first[0], first[2]):
+        return same
+    term = with_likely_length(model, start)
+    found = None if term is None else hangs(term)
+    if found is None or not _asks_for_a_swing(prepared, model, term, found[0], found[2]):
+        return same
+    segments, _, effects = found
     noisy = like(segments, model.noisy_segments)
     terms = [replace(t, values=term.values) if _is_like(t, start) else t for t in prepared.terms]
-    effects = [*chosen(model), as_effect(term, cable, mass_kg)]
-    with_it = _with_own_scales(replace(prepared, terms=terms), segments, noisy, effects)
+    with_it = _with_own_scales(replace(prepared, terms=terms), segments, noisy, effects, model.selection.active)
     swings = any(with_it.search.terms[k].form.swings for k in with_it.selection.active)
     filters = model.regression.filters
     if swings and _cost_of(with_it, filters) + price(segments) < _cost_of(model, filters):
         return segments, noisy, with_it
     return same
+
+
+def _asks_for_a_swing(prepared: Prepared, model: WrenchModel, term: Term, segments, effects) -> bool:
+    """Whether what swings, next to the model that stands, explains a good part of what it costs.
+
+    A search anew may give it room, by what it makes needless, but takes seconds.
+    """
+    active = [model.search.terms[k] for k in model.selection.active]
+    if any(t.form.swings for t in active):
+        return True
+    asked = [*(t for t in model.terms if t.kind != "effect"), *active, term]
+    rows, rate = assemble_rows(prepared, asked, segments, effects), prepared.thinner.rate_hz
+    rule, block_s = training_rule(prepared.split, segments), block_seconds(rows, rate)
+    regression = build(rows, asked, model.regression.filters, rule, block_s, rate)
+    keys = [t.key for t in asked]
+    gain = regression.explained(keys) - regression.explained(keys[:-1])
+    return gain > _ASKING * price(segments)
 
 
 def _is_like(term: Term, other: Term) -> bool:
