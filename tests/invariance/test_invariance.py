@@ -63,7 +63,7 @@ def test_the_verdict_is_the_same(name: str, change: str, judged) -> None:
 def test_the_kept_table_is_what_the_page_says() -> None:
     """The page's summary is of the rows beside it."""
     kept = Path(__file__).parents[2] / "docs" / "proof"
-    assert summary(read(kept / "invariance.tsv")) in (kept / "README.md").read_text()
+    assert summary(read(kept / "invariance.tsv")) in (kept / "method.md").read_text()
 
 
 def flight() -> RecordingSet:

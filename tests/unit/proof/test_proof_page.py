@@ -7,6 +7,7 @@ import pandas as pd
 
 PROOF = Path(__file__).parents[3] / "docs" / "proof"
 PAGE = (PROOF / "README.md").read_text(encoding="utf-8")
+METHOD = (PROOF / "method.md").read_text(encoding="utf-8")
 ROW = re.compile(
     r"^\| (flights|stands|benches|all) \| (\d+) \| (\d+) \| (\d+) \| (\d+) \| (\d+) \|$", flags=re.MULTILINE
 )
@@ -32,8 +33,8 @@ def test_the_page_opens_with_what_the_last_release_counted() -> None:
     assert f"**{right} were right as a whole**" in PAGE and code in PAGE and released in PAGE
 
 
-def test_every_kept_table_is_on_the_page_and_every_table_that_it_lists_is_kept() -> None:
+def test_every_kept_table_is_in_the_method_and_every_table_that_it_lists_is_kept() -> None:
     kept = {path.name for path in PROOF.iterdir() if path.suffix in (".csv", ".tsv", ".json")}
-    listed = PAGE[PAGE.index("## The files") : PAGE.index("- `holds`")]
+    listed = METHOD[METHOD.index("## The files") : METHOD.index("- `holds`")]
     assert set(re.findall(r"`([\w.]+\.(?:csv|tsv|json))`", listed)) <= kept
-    assert not {name for name in kept if f"`{name}`" not in PAGE and f"/{name}" not in PAGE}
+    assert not {name for name in kept if f"`{name}`" not in METHOD and f"/{name}" not in METHOD}
