@@ -16,9 +16,9 @@ import pandas as pd
 from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.plant.regression import Regression
 from rotorid.mismatch.plant.rows import Term
-from rotorid.plan.changed import Change
+from rotorid.plan.changed import ChangedVehicle
 from rotorid.plan.plan import Plan
-from rotorid.plan.questions import Known, Question, best_of
+from rotorid.plan.questions import FittedSet, Question, best_of
 from rotorid.plan.separation import Separation, recorded_after
 from rotorid.plan.session import KnownInstrument, SessionPlan
 from rotorid.plan.together import answers, joined_sets
@@ -76,7 +76,7 @@ def judged(first: RecordingSet, second: RecordingSet, ids: tuple[str, ...], trut
     return (*outcome_of(ids, analysis_of(whole).findings, truth), whole)
 
 
-def classes_in(found: Known | KnownInstrument) -> list[tuple[str, ...]]:
+def classes_in(found: FittedSet | KnownInstrument) -> list[tuple[str, ...]]:
     """Ids of every class that is open; what is only suggested is compared with nothing and is no class."""
     classes = [q.ids for q in (*found.questions, *found.chains)] + [ids for ids, _ in found.unanswerable]
     return [ids for ids in classes if len(ids) > 1 and NOTHING not in ids]
@@ -98,7 +98,7 @@ def predicted(plan: Plan | SessionPlan, ids: tuple[str, ...], truth: set[str]) -
 
 
 def measured(
-    first: Known | KnownInstrument, joint: Known | KnownInstrument, question: Question | None, true: str
+    first: FittedSet | KnownInstrument, joint: FittedSet | KnownInstrument, question: Question | None, true: str
 ) -> float:
     """√ of the whitened squares that the true model still explains given its nearest rival, in both sets together.
 
@@ -146,7 +146,9 @@ def symbols(term: Term) -> list[str]:
     return [term.form.parameters[i].symbol for i in term.form.linear]
 
 
-def measured_after(found: Known, question: Question, change: Change, recorded: RecordingSet, true: str) -> float:
+def measured_after(
+    found: FittedSet, question: Question, change: ChangedVehicle, recorded: RecordingSet, true: str
+) -> float:
     """√ of the whitened squares that the true model explains given its nearest rival, in a set and a flight after a
     step by hand; `recorded` is that flight. As `measured`, by the linear terms that the class needs alone."""
     joint = recorded_after(found, change, recorded)

@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 from rotorid.acquire import procedures
 from rotorid.acquire.cli import app
 from rotorid.acquire.errors import AcquireError, LimitExceeded
-from rotorid.acquire.plan import Plan, PlanError, attempts, is_done, read_plan, steps_of
+from rotorid.acquire.plan import CampaignPlan, PlanError, attempts, is_done, read_plan, steps_of
 from rotorid.acquire.record import record
 from rotorid.acquire.run_plan import Desk, check, emulated_ports, run
 from rotorid.io.index import read_index
@@ -41,7 +41,7 @@ GROUP = {
 }
 
 
-def plan_with(tmp_path: Path, steps: list[dict] | None = None, **more) -> Plan:
+def plan_with(tmp_path: Path, steps: list[dict] | None = None, **more) -> CampaignPlan:
     text = {
         "name": "trial",
         "out": str(tmp_path / "out"),
@@ -67,7 +67,7 @@ def desk(told: list[str], answers: list[str] | None = None) -> Desk:
 
 @pytest.fixture
 def emulated(tmp_path):
-    def ports_for(plan: Plan, speed: float = 100.0):
+    def ports_for(plan: CampaignPlan, speed: float = 100.0):
         folder = tmp_path / "links"
         folder.mkdir(exist_ok=True)
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from rotorid.plan.limits import Limits, read_limits
 from rotorid.plan.plan import plan
-from rotorid.plan.questions import Known, known, known_from
+from rotorid.plan.questions import FittedSet, known, known_from
 from rotorid.plan.write import sampled
 from rotorid.recordings import RecordingSet
 from rotorid.report import log
@@ -22,7 +22,7 @@ from rotorid_proof import next_flight as proof
 from rotorid_proof.row_by_row import as_read, rows_of
 
 
-def by_hand(case, answer: dict, found: Known, made, question, true: str, simulator) -> dict:
+def by_hand(case, answer: dict, found: FittedSet, made, question, true: str, simulator) -> dict:
     """What the best step by hand is predicted to separate, and does as recorded; empty where none is predicted."""
     ids = None if question is None else question.ids
     separated = [
@@ -44,7 +44,7 @@ def row_of(case, answer: dict, first: RecordingSet, simulator, limits: Limits) -
     truth = {answer["effects"][0]["id"]}
     named = next(iter(truth))
     # As the command does: the plan asks what the verdict leaves open, and nothing that it does not claim.
-    found: Known = known_from(first, judge(first).model_dump(mode="json"))
+    found: FittedSet = known_from(first, judge(first).model_dump(mode="json"))
     classes = proof.classes_in(found)
     if not classes:
         return proof.Row(case=case.name, truth=named, open="", said="nothing was left open")

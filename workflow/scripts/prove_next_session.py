@@ -15,7 +15,14 @@ import numpy as np
 import pandas as pd
 
 from rotorid.plan.limits import SessionLimits
-from rotorid.plan.session import SessionPlan, Step, known_instrument, known_instrument_from, plan_session, table_of
+from rotorid.plan.session import (
+    SessionPlan,
+    SessionStep,
+    known_instrument,
+    known_instrument_from,
+    plan_session,
+    table_of,
+)
 from rotorid.recordings import RecordingSet
 from rotorid.report import log
 from rotorid.report.deliver import judge
@@ -23,11 +30,11 @@ from rotorid_proof import next_flight as proof
 from rotorid_proof.row_by_row import as_read, rows_of
 
 
-def standard_as_long(made: SessionPlan) -> list[Step]:
+def standard_as_long(made: SessionPlan) -> list[SessionStep]:
     """The standard steps in turn, each place as often as the others, about as long as the planned session."""
     usual = next((s for s in (made, *made.others) if s.name == "standard"), None)
     once = list({s.name: s for s in usual.steps}.values()) if usual else []
-    out: list[Step] = []
+    out: list[SessionStep] = []
     for step in cycle(once):
         longer = sum(s.duration_s for s in out) + step.duration_s
         if out and longer > made.duration_s + step.duration_s / 2:
@@ -36,7 +43,7 @@ def standard_as_long(made: SessionPlan) -> list[Step]:
     return out
 
 
-def as_table(found, steps: list[Step]) -> pd.DataFrame:
+def as_table(found, steps: list[SessionStep]) -> pd.DataFrame:
     """The columns of a session of these steps."""
     return pd.concat([table_of(found, s).assign(run=f"step{i + 1:02d}") for i, s in enumerate(steps)])
 

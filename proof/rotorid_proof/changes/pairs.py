@@ -10,7 +10,7 @@ from itertools import combinations
 from pathlib import Path
 
 from rotorid.mismatch.changes.compare import changes_from
-from rotorid.mismatch.changes.joint import Reference, reference_of
+from rotorid.mismatch.changes.joint import FittedReference, reference_of
 from rotorid.recordings import RecordingSet, read_set
 from rotorid_proof.changes import score
 from rotorid_proof.plantings.plan import Planting, read_list
@@ -150,7 +150,7 @@ def pairs_of(seed: str, recordings: Path, plantings: Path, drawn_pairs: int, dra
     return [*real(recordings), *drawn(seed, drawn_pairs), *halves(seed, drawn_halves), *planted(recordings, plantings)]
 
 
-def compared(pair: Pair, known: dict[str, Reference]) -> score.Row:
+def compared(pair: Pair, known: dict[str, FittedReference]) -> score.Row:
     """The row of one pair; `known` holds the first set that was fitted last."""
     made, start = pair.make(), time.process_time()
     if not pair.base or pair.base not in known:

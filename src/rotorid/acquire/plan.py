@@ -78,7 +78,7 @@ class Group(KnownKeys):
     settings: dict[str, Any] = {}  # of the procedure: samples, throttle, hold_s, number, …
 
 
-class Plan(KnownKeys):
+class CampaignPlan(KnownKeys):
     """A campaign."""
 
     name: str
@@ -91,7 +91,7 @@ class Plan(KnownKeys):
     steps: list[Group]
 
     @model_validator(mode="after")
-    def _fits(self) -> Plan:
+    def _fits(self) -> CampaignPlan:
         known = [column for instrument in INSTRUMENTS.values() for column in instrument.columns]
         for instrument in self.ports:
             if instrument not in INSTRUMENTS:
@@ -129,12 +129,12 @@ class Step:
         return self.values.get(name, self.group.settings.get(name, default))
 
 
-def read_plan(path: Path) -> Plan:
+def read_plan(path: Path) -> CampaignPlan:
     """Read and validate. Raises PlanError naming the file and the first thing that is wrong."""
-    return read_model(path, Plan, PlanError)
+    return read_model(path, CampaignPlan, PlanError)
 
 
-def steps_of(plan: Plan) -> list[Step]:
+def steps_of(plan: CampaignPlan) -> list[Step]:
     """All steps in the order in which they are recorded; the same plan gives the same order each time.
 
     Raises PlanError for names that are none or not each step's own, and for instruments without a port.
@@ -183,7 +183,7 @@ def _check_step(step: Step, place: int, operator: str | None) -> None:
             raise PlanError(f"steps.{place}: over.{name}: nothing reads it{hint(name, [*known, *Setup.model_fields])}")
 
 
-def _instruments(plan: Plan, place: int, group: Group) -> tuple[str, ...]:
+def _instruments(plan: CampaignPlan, place: int, group: Group) -> tuple[str, ...]:
     needed = _NEEDS.get(group.do, ())
     if group.instrument is not None and len(needed) < 2:
         needed = (group.instrument,)
@@ -195,7 +195,7 @@ def _instruments(plan: Plan, place: int, group: Group) -> tuple[str, ...]:
     return needed
 
 
-def attempts(plan: Plan, step: Step) -> list[str]:
+def attempts(plan: CampaignPlan, step: Step) -> list[str]:
     """Names of the step's attempts that have left anything in the folder, oldest first."""
     found = []
     for number in itertools.count(1):
@@ -206,13 +206,13 @@ def attempts(plan: Plan, step: Step) -> list[str]:
         found.append(name)
 
 
-def next_attempt(plan: Plan, step: Step) -> str:
+def next_attempt(plan: CampaignPlan, step: Step) -> str:
     """The name of the recording that would be made now."""
     number = len(attempts(plan, step)) + 1
     return step.name if number == 1 else f"{step.name}.{number}"
 
 
-def is_done(plan: Plan, step: Step) -> bool:
+def is_done(plan: CampaignPlan, step: Step) -> bool:
     """Whether one attempt has finished and its logs are as they were recorded."""
     return any(all(_whole(plan.out, stem) for stem in stems(step, name)) for name in attempts(plan, step))
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from rotorid.acquire import procedures
 from rotorid.acquire.errors import AcquireError
-from rotorid.acquire.plan import Plan, Step, attempts, is_done, next_attempt, stems, steps_of
+from rotorid.acquire.plan import CampaignPlan, Step, attempts, is_done, next_attempt, stems, steps_of
 from rotorid.acquire.procedures import programme_of
 from rotorid.acquire.record import recorders_for, run_with
 from rotorid.acquire.recorder import Recorder
@@ -42,7 +42,7 @@ class Desk:
     watch: Watch  # run with these recorders, showing them
 
 
-def check(plan: Plan, ports: dict[str, str], desk: Desk) -> list[str]:
+def check(plan: CampaignPlan, ports: dict[str, str], desk: Desk) -> list[str]:
     """Ports, identity, noise, tare, disk and clock; a sentence for each thing that is not as it should be."""
     faults = []
     plan.out.mkdir(parents=True, exist_ok=True)
@@ -64,7 +64,7 @@ def check(plan: Plan, ports: dict[str, str], desk: Desk) -> list[str]:
     return faults
 
 
-def _clock(plan: Plan) -> list[str]:
+def _clock(plan: CampaignPlan) -> list[str]:
     latest = datetime.now().astimezone() + timedelta(seconds=plan.checks.clock_s)
     for path in plan.out.glob("*.yaml"):
         for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
@@ -89,7 +89,7 @@ def _at_rest(recorder: Recorder, samples: int) -> None:
         procedures.stream(recorder, samples)
 
 
-def _rest_faults(plan: Plan, recorder: Recorder) -> Iterator[str]:
+def _rest_faults(plan: CampaignPlan, recorder: Recorder) -> Iterator[str]:
     table = read_log(recorder.log_path).table
     yield from recorder.session.warnings
     for column in recorder.instrument.columns:
@@ -102,7 +102,7 @@ def _rest_faults(plan: Plan, recorder: Recorder) -> Iterator[str]:
             yield f"{column}: reads {mean:.3g} at rest, allowed {plan.checks.zero[column]:g} (checks.zero); tare it"
 
 
-def _record_step(plan: Plan, step: Step, ports: dict[str, str], desk: Desk) -> None:
+def _record_step(plan: CampaignPlan, step: Step, ports: dict[str, str], desk: Desk) -> None:
     """Record one step under the next free name. Raises AcquireError."""
     setup: Setup = step.setup(plan.operator)
     recorders = recorders_for(
@@ -153,7 +153,7 @@ def _carry_out(step: Step, desk: Desk, *recorders: Recorder) -> None:
         procedures.stream(first, None, moves=True)
 
 
-def _complete_killed(plan: Plan, steps: list[Step], say: _Say) -> None:
+def _complete_killed(plan: CampaignPlan, steps: list[Step], say: _Say) -> None:
     """Counts and gaps for the metadata of attempts whose recorder was killed; the attempts stay what they are."""
     for step in steps:
         for name in attempts(plan, step):
@@ -165,7 +165,7 @@ def _complete_killed(plan: Plan, steps: list[Step], say: _Say) -> None:
                         say(f"{log}: its recorder was killed; the metadata now say what the log holds")
 
 
-def run(plan: Plan, ports_of: Callable, desk: Desk, repeat: str | None = None, checked: bool = False) -> int:
+def run(plan: CampaignPlan, ports_of: Callable, desk: Desk, repeat: str | None = None, checked: bool = False) -> int:
     """All steps that are not done, or `repeat` alone once more. Returns how many are left.
 
     `ports_of(step or None)` is a context that gives the ports of a step, or of the checks. Raises AcquireError where
@@ -198,14 +198,14 @@ def run(plan: Plan, ports_of: Callable, desk: Desk, repeat: str | None = None, c
 
 
 @contextmanager
-def real_ports(plan: Plan, step: Step | None) -> Iterator[dict[str, str]]:
+def real_ports(plan: CampaignPlan, step: Step | None) -> Iterator[dict[str, str]]:
     """The plan's own."""
     yield plan.ports
 
 
 @contextmanager
 def emulated_ports(
-    plan: Plan, step: Step | None, folder: Path, speed: float, place_s: float
+    plan: CampaignPlan, step: Step | None, folder: Path, speed: float, place_s: float
 ) -> Iterator[dict[str, str]]:
     """Emulators under the plan's instruments; a weight that the step asks for is put on by itself."""
     from contextlib import ExitStack

@@ -13,7 +13,7 @@ from rotorid.cli.console import one_sentence
 from rotorid.cli.importing import Like, MappingFile, MassKg, VehicleFile
 
 if TYPE_CHECKING:
-    from rotorid.identify.autopilot.parameters import Parameter
+    from rotorid.identify.autopilot.parameters import AutopilotParameter
 
 
 def parameters(
@@ -61,7 +61,7 @@ def parameters(
             typer.echo(f"{out}: {number} parameter{'' if number == 1 else 's'} to load")
 
 
-def line(p: Parameter) -> str:
+def line(p: AutopilotParameter) -> str:
     """`NAME = value [low, high] unit: sentence`; the sentence alone where nothing was estimated."""
     if math.isnan(p.value):
         return f"{p.name}: {p.sentence}"
@@ -73,7 +73,7 @@ def _number(value: float, decimals: int) -> str:
     return f"{value:.{decimals}f}" if math.isfinite(value) else ("∞" if value > 0 else "−∞")
 
 
-def _as_dict(p: Parameter) -> dict:
+def _as_dict(p: AutopilotParameter) -> dict:
     def plain(x: float) -> float | None:
         return x if math.isfinite(x) else None
 

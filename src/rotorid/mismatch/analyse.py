@@ -19,9 +19,9 @@ from rotorid.mismatch.decision.decide import coefficients, throttle_or_thrust, w
 from rotorid.mismatch.decision.evidence import weighed
 from rotorid.mismatch.decision.findings import (
     Analysis,
+    ChannelTrace,
     Finding,
     RunWind,
-    Trace,
     by_channel,
     in_interval,
     not_held,
@@ -484,7 +484,7 @@ def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
 
 def _make_traces(
     model: WrenchModel, found: Fitted, refitted: list[np.ndarray], delivered: list[np.ndarray]
-) -> tuple[Trace, ...]:
+) -> tuple[ChannelTrace, ...]:
     """Residual of every channel before refitting, after refitting and with the effects, (n, 12) each per stretch."""
     prepared, chain = model.prepared, found.chain
     believed_left = believed_residuals(prepared, model.rows, found.commanded)
@@ -495,7 +495,9 @@ def _make_traces(
             if np.isfinite(r.y[:, c]).all():
                 unit = UNITS[CHANNELS[c].split("_")[0]]
                 out.append(
-                    Trace(r.run, CHANNELS[c], unit, r.time_s, before[:, c], plain[:, c], after[:, c], after[:, c])
+                    ChannelTrace(
+                        r.run, CHANNELS[c], unit, r.time_s, before[:, c], plain[:, c], after[:, c], after[:, c]
+                    )
                 )
         if chain is not None and found.measured:
             result = chain.result
@@ -507,18 +509,22 @@ def _make_traces(
             for i in range(believed.shape[1]):
                 name = f"rotor_speed_{i + 1}"
                 out.append(
-                    Trace(r.run, name, "rad/s", r.time_s, believed[:, i], believed[:, i], left[:, i], left[:, i])
+                    ChannelTrace(r.run, name, "rad/s", r.time_s, believed[:, i], believed[:, i], left[:, i], left[:, i])
                 )
     return tuple(out)
 
 
-def _sensor_traces(model: WrenchModel, refitted: list[np.ndarray], delivered: list[np.ndarray]) -> tuple[Trace, ...]:
+def _sensor_traces(
+    model: WrenchModel, refitted: list[np.ndarray], delivered: list[np.ndarray]
+) -> tuple[ChannelTrace, ...]:
     """The same of two sensors of one quantity: reading of one less what the other makes of it.
 
     Offsets of the sensors, which no vehicle states, are taken out before, too.
     """
     return tuple(
-        Trace(r.run, CHANNELS[c], _SENSOR_UNITS[c // 3], r.time_s, plain[:, c], plain[:, c], after[:, c], after[:, c])
+        ChannelTrace(
+            r.run, CHANNELS[c], _SENSOR_UNITS[c // 3], r.time_s, plain[:, c], plain[:, c], after[:, c], after[:, c]
+        )
         for r, plain, after in zip(model.rows, refitted, delivered, strict=True)
         for c in range(6, 12)
         if np.isfinite(r.y[:, c]).all()

@@ -56,7 +56,7 @@ class ChainQuestion:
         return tuple((a, b) for a in self.models for b in self.models if a.id != b.id)
 
 
-class _Leftover:
+class _ChainLeftover:
     """What a chain leaves of a set's recordings in whitened squares, the shared linear terms free."""
 
     def __init__(self, found: Fitted):
@@ -145,7 +145,7 @@ def chain_question(found: Fitted, finding: Finding, ids: Sequence[str]) -> Chain
     kept = np.delete(result.fit.values, np.arange(where.start, where.stop))
     spread = np.sqrt(np.diag(result.fit.covariance)[where]) / np.maximum(np.abs(result.fit.values[where]), 1e-12)
     models = [_ChainModel(own, result.fit.chain, result.fit.values, float(spread.min()))]
-    left = _Leftover(found).of([s for s in found.prepared.segments if s.run in found.prepared.split.training])
+    left = _ChainLeftover(found).of([s for s in found.prepared.segments if s.run in found.prepared.split.training])
     for other in ids:
         forms = catalogue()[other].speed_forms if other in catalogue() else ()
         volts = all(s.motion.voltage is not None for s in found.prepared.segments)
@@ -163,7 +163,7 @@ def chain_question(found: Fitted, finding: Finding, ids: Sequence[str]) -> Chain
 
 def squares(found: Fitted, segments: Sequence[Segment], true: _ChainModel, rival: _ChainModel) -> float:
     """λ of a true chain against its rival on segments that the true one made."""
-    left = _Leftover(found).of(segments)
+    left = _ChainLeftover(found).of(segments)
     own = float((left(true.chain, true.values) ** 2).sum())
     _, other = _fitted_values(left, rival.chain, [rival.values])
     return max(other - own, 0.0)

@@ -49,7 +49,7 @@ class Reference:
 
 
 @dataclass(frozen=True)
-class Piece:
+class ManoeuvrePiece:
     """A manoeuvre: its name, what to do in words, and the reference at even instants (n,), s, from 0."""
 
     name: str
@@ -117,7 +117,7 @@ def smaller(limits: Limits, share: float) -> Limits:
     return limits.model_copy(update=ranges | scaled | {"wall_margin_m": 0.0})
 
 
-def candidates(limits: Limits, yaw_acceleration_rad_s2: float) -> tuple[Piece, ...]:
+def candidates(limits: Limits, yaw_acceleration_rad_s2: float) -> tuple[ManoeuvrePiece, ...]:
     """Every manoeuvre of the families, for these limits and what the rotors' torque can do about the yaw axis."""
     return (
         *_still(limits),
@@ -129,7 +129,7 @@ def candidates(limits: Limits, yaw_acceleration_rad_s2: float) -> tuple[Piece, .
     )
 
 
-def standard(parts: Mapping[str, Piece], duration_s: float) -> Piece:
+def standard(parts: Mapping[str, ManoeuvrePiece], duration_s: float) -> ManoeuvrePiece:
     """What a pilot flies who has no plan, in `duration_s`: an eight, climbs, quick motions, turns and doublets.
 
     `parts` are candidates by their names, of these at least those of STANDARD.
@@ -143,10 +143,10 @@ def standard(parts: Mapping[str, Piece], duration_s: float) -> Piece:
         return position, yaw
 
     words = "the standard flight: an eight, climbs, quick motions, turns to and fro, doublets"
-    return Piece("standard", words, make, duration_s)
+    return ManoeuvrePiece("standard", words, make, duration_s)
 
 
-def _still(limits: Limits) -> list[Piece]:
+def _still(limits: Limits) -> list[ManoeuvrePiece]:
     change_s = max(1.5, 2.0 * limits.room_m[2] / limits.climb_m_s)
 
     def hover(t):
@@ -165,12 +165,12 @@ def _still(limits: Limits) -> list[Piece]:
     low, high = limits.height_m[0], limits.height_m[1] - limits.wall_margin_m
     words = f"hover at held heights from {low:.1f} to {high:.1f} m"
     return [
-        Piece("hover", "hover on the spot", hover),
-        Piece("ladder", words, ladder, 7 * (change_s + 1.5)),
+        ManoeuvrePiece("hover", "hover on the spot", hover),
+        ManoeuvrePiece("ladder", words, ladder, 7 * (change_s + 1.5)),
     ]
 
 
-def _passes(limits: Limits) -> list[Piece]:
+def _passes(limits: Limits) -> list[ManoeuvrePiece]:
     out = []
     for share in (0.4, 0.7, 1.0):
         for degrees in (0, 45, 90):
@@ -184,7 +184,9 @@ def _passes(limits: Limits) -> list[Piece]:
 
             way = {0: "along the nose", 45: "across the diagonal", 90: "sideways"}[degrees]
             words = f"to and fro {way}, {amplitude:.1f} m each way at up to {amplitude * rate:.1f} m/s, nose held"
-            out.append(Piece(f"pass {degrees} at {share:g}", words, make, whole(rate, 15.0, ramp_s=_SLOW_RAMP_S)))
+            out.append(
+                ManoeuvrePiece(f"pass {degrees} at {share:g}", words, make, whole(rate, 15.0, ramp_s=_SLOW_RAMP_S))
+            )
     for degrees, axis in ((0, 0), (90, 1)):
         amplitude, rate = largest(limits, limits.room_m[axis], 0.8)
         heave = min(limits.room_m[2], 0.6 * limits.climb_m_s / _HEAVE_RAD_S, 0.3 * _GRAVITY_M_S2 / _HEAVE_RAD_S**2)
@@ -197,11 +199,11 @@ def _passes(limits: Limits) -> list[Piece]:
 
         way = "along the nose" if axis == 0 else "sideways"
         words = f"to and fro {way} at up to {amplitude * rate:.1f} m/s in waves of {heave:.1f} m up and down"
-        out.append(Piece(f"waves {degrees}", words, make, whole(rate, 15.0, ramp_s=_SLOW_RAMP_S)))
+        out.append(ManoeuvrePiece(f"waves {degrees}", words, make, whole(rate, 15.0, ramp_s=_SLOW_RAMP_S)))
     return out
 
 
-def _turns(limits: Limits, most_rad_s2: float) -> list[Piece]:
+def _turns(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
     room = min(limits.room_m[:2])
     amplitude, rate = largest(limits, room, 0.8)
     # The ramp of a turn reaches its rate in RAMP_S, at most 1.9 times as fast in its midst.
@@ -230,7 +232,7 @@ def _turns(limits: Limits, most_rad_s2: float) -> list[Piece]:
         return out, phase(t, 0.6 * yaw_rate, 2 * np.pi)
 
     pieces = [
-        Piece(
+        ManoeuvrePiece(
             "eight",
             f"a figure of eight, {amplitude:.1f} m each way, nose held",
             eight,
@@ -245,20 +247,20 @@ def _turns(limits: Limits, most_rad_s2: float) -> list[Piece]:
         s = np.minimum(there, back)
         return np.zeros((len(t), 3)), np.pi * s**3 * (10 - 15 * s + 6 * s**2)
 
-    pieces.append(Piece("face", "turn the nose half round, hover, turn it back", face, 2 * half_s + 4.0))
+    pieces.append(ManoeuvrePiece("face", "turn the nose half round, hover, turn it back", face, 2 * half_s + 4.0))
     degrees = np.degrees(yaw_rate)
-    pieces.append(Piece("turn", f"turn on the spot to and fro at up to {degrees:.0f} degrees a second", turn))
+    pieces.append(ManoeuvrePiece("turn", f"turn on the spot to and fro at up to {degrees:.0f} degrees a second", turn))
     for name, words, make, speed in (
         ("spin", f"turn on the spot at up to {degrees:.0f} degrees a second", spin, yaw_rate),
         ("drift", "to and fro over ground while the nose turns all round", drift, 0.6 * yaw_rate),
     ):
         duration = whole(speed, 12.0, 2 * np.pi)
         if duration <= _LONGEST_S:
-            pieces.append(Piece(name, words, make, duration))
+            pieces.append(ManoeuvrePiece(name, words, make, duration))
     return pieces
 
 
-def _climbs(limits: Limits) -> list[Piece]:
+def _climbs(limits: Limits) -> list[ManoeuvrePiece]:
     out = []
     for share in (0.5, 1.0):
         speed, room = share * limits.climb_m_s, limits.room_m[2]
@@ -272,11 +274,11 @@ def _climbs(limits: Limits) -> list[Piece]:
             return out, np.zeros(len(t))
 
         words = f"climb and descend by {amplitude:.1f} m each way at up to {amplitude * rate:.1f} m/s"
-        out.append(Piece(f"climb at {share:g}", words, make, whole(rate, _PIECE_S)))
+        out.append(ManoeuvrePiece(f"climb at {share:g}", words, make, whole(rate, _PIECE_S)))
     return out
 
 
-def _oscillations(limits: Limits, most_rad_s2: float) -> list[Piece]:
+def _oscillations(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
     """Multisines of the acceleration along some axes (and of yaw) with harmonics of their own each."""
     most = _ROOM * _GRAVITY_M_S2 * np.tan(np.radians(limits.tilt_deg))
     families = {
@@ -320,12 +322,14 @@ def _oscillations(limits: Limits, most_rad_s2: float) -> list[Piece]:
                 return position, yaw
 
             out.append(
-                Piece(f"{name} to {high_hz:g} Hz", f"{words[name]}, {low_hz:g} to {high_hz:g} times a second", make)
+                ManoeuvrePiece(
+                    f"{name} to {high_hz:g} Hz", f"{words[name]}, {low_hz:g} to {high_hz:g} times a second", make
+                )
             )
     return out
 
 
-def _doublets(limits: Limits, most_rad_s2: float) -> Piece:
+def _doublets(limits: Limits, most_rad_s2: float) -> ManoeuvrePiece:
     """Pushes of the tilt forwards, sideways and of the nose, each followed by its opposite, which leads back."""
     most = _ROOM * _GRAVITY_M_S2 * np.tan(np.radians(limits.tilt_deg))
     push = min(most, limits.speed_m_s / _DOUBLET_S, min(limits.room_m[:2]) / _DOUBLET_S**2)
@@ -352,12 +356,12 @@ def _doublets(limits: Limits, most_rad_s2: float) -> Piece:
                 yaw += turn * wave
         return position, yaw
 
-    return Piece(
+    return ManoeuvrePiece(
         "doublets", "quick pushes to and fro: forwards, sideways, of the nose", make, 8.0 * _DOUBLET_S * 6 + 1.0
     )
 
 
-def joined(pieces: tuple[Piece, ...] | list[Piece], step_s: float, still_s: float = 1.0) -> Reference:
+def joined(pieces: tuple[ManoeuvrePiece, ...] | list[ManoeuvrePiece], step_s: float, still_s: float = 1.0) -> Reference:
     """Pieces one after the other, `still_s` at rest before, between and after them; the nose keeps its last yaw."""
     position, yaw, turned = [np.zeros((1, 3))], [np.zeros(1)], 0.0
     rest = int(round(still_s / step_s))

@@ -17,7 +17,7 @@ import numpy as np
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form, Motion
 from rotorid.mismatch.plant.rows import Term
-from rotorid.plan.simulate import World
+from rotorid.plan.simulate import CompetingModel
 from rotorid.recordings import Vehicle
 from rotorid.recordings.vehicle import Inertia, Rotor
 
@@ -33,7 +33,7 @@ _PLACE_SD_M, _MASS_SD = 0.002, 0.01
 
 
 @dataclass(frozen=True)
-class Change:
+class ChangedVehicle:
     """A step by hand and the vehicle after it."""
 
     of: str
@@ -57,7 +57,7 @@ class Change:
         """A term of the set as it acts after the step."""
         return replace(term, form=self.moved[term.effect](term.form)) if term.effect in self.moved else term
 
-    def world(self, world: World, effect_of: Mapping[int, str]) -> World:
+    def world(self, world: CompetingModel, effect_of: Mapping[int, str]) -> CompetingModel:
         """A competing model after the step; `effect_of` has the effect of every form by the form's `id()`."""
         effects = tuple(
             (self.moved[effect_of[id(f)]](f) if effect_of.get(id(f)) in self.moved else f, values)
@@ -66,7 +66,7 @@ class Change:
         return replace(world, vehicle=self.vehicle, effects=effects)
 
 
-def swaps(vehicle: Vehicle) -> list[Change]:
+def swaps(vehicle: Vehicle) -> list[ChangedVehicle]:
     """Every swap of two propellers that turn the same way, and of all such pairs at once where there are several."""
     alike = [(i, j) for i, j in combinations(range(vehicle.rotor_count), 2) if _spins(vehicle, i, j)]
     choices = [(pair,) for pair in alike]
@@ -79,13 +79,13 @@ def _spins(vehicle: Vehicle, i: int, j: int) -> bool:
     return vehicle.rotors[i].spin == vehicle.rotors[j].spin
 
 
-def _swapped(vehicle: Vehicle, pairs: tuple[tuple[int, int], ...]) -> Change:
+def _swapped(vehicle: Vehicle, pairs: tuple[tuple[int, int], ...]) -> ChangedVehicle:
     order = np.arange(vehicle.rotor_count)
     for i, j in pairs:
         order[[i, j]] = j, i
     names = " and ".join(f"{i + 1} with {j + 1}" for i, j in pairs)
     words = f"swap the propellers of rotor{'s' if len(pairs) > 1 else ''} {names} (they turn the same way)"
-    return Change(
+    return ChangedVehicle(
         "unequal_rotors",
         words,
         _with_coefficients(vehicle, order),
@@ -116,7 +116,7 @@ def _by_propeller(form: Form, order: np.ndarray) -> Form:
     return replace(form, contribution=contribution)
 
 
-def _attached(vehicle: Vehicle, place_m: tuple[float, float, float], words: str) -> Change:
+def _attached(vehicle: Vehicle, place_m: tuple[float, float, float], words: str) -> ChangedVehicle:
     """A mass of MASS_SHARE of the vehicle's attached at `place_m` (forward, right, down of the believed centre)."""
     mass, more = vehicle.mass_kg, MASS_SHARE * vehicle.mass_kg
     place = np.array(place_m)
@@ -149,7 +149,7 @@ def _attached(vehicle: Vehicle, place_m: tuple[float, float, float], words: str)
     plane = catalogue()[OF_CENTRE].forms(vehicle)[0]
     nuisance = Term("by hand/place", "effect", "", plane, (0.0, 0.0), 2, (doubt, doubt))
     inertias = {f"inertia_{a}{a}": own[i, i] / inertia[i, i] for i, a in enumerate("xyz")}
-    return Change(
+    return ChangedVehicle(
         OF_CENTRE, words, after, {OF_CENTRE: smaller}, {"mass": share, **inertias}, (nuisance,), (), more, place_m
     )
 
@@ -159,7 +159,7 @@ def _of_point(mass_kg: float, at_m: np.ndarray) -> np.ndarray:
     return mass_kg * (at_m @ at_m * np.eye(3) - np.outer(at_m, at_m))
 
 
-def masses(vehicle: Vehicle) -> list[Change]:
+def masses(vehicle: Vehicle) -> list[ChangedVehicle]:
     """A known mass in front and at the side, as far from the middle as the rotors."""
     hubs = vehicle.rotor_positions_m()
     reach = float(np.linalg.norm(hubs[:, :2], axis=1).mean())

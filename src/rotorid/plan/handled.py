@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.plan.candidates import Piece, joined
-from rotorid.plan.changed import OF_CENTRE, OF_PROPELLER, WITH_MASS_OF_ITS_OWN, Change, masses, swaps
+from rotorid.plan.candidates import ManoeuvrePiece, joined
+from rotorid.plan.changed import OF_CENTRE, OF_PROPELLER, WITH_MASS_OF_ITS_OWN, ChangedVehicle, masses, swaps
 from rotorid.plan.limits import Limits
-from rotorid.plan.questions import Known, Question
+from rotorid.plan.questions import FittedSet, Question
 from rotorid.plan.separation import (
     Information,
     Questions,
@@ -38,7 +38,7 @@ _HANDLING_S = 300.0
 class Handled:
     """A step by hand with the hover after it, and what is expected of both next to the set at hand."""
 
-    change: Change
+    change: ChangedVehicle
     hover_s: float
     questions: Questions
     """Of the questions that the step is there for: ids, and how far apart their models will be."""
@@ -64,7 +64,7 @@ class Handled:
         return smallest_separation(self.questions)
 
 
-def _steps_for(known: Known) -> list[tuple[list[Change], list[Question]]]:
+def _steps_for(known: FittedSet) -> list[tuple[list[ChangedVehicle], list[Question]]]:
     """Choices of each kind of step with the questions that it is there for."""
     vehicle, out = known.prepared.vehicle, []
     present = {known.fitted.model.search.terms[k].effect for k in known.fitted.model.selection.active}
@@ -82,7 +82,9 @@ def _steps_for(known: Known) -> list[tuple[list[Change], list[Question]]]:
     return [(choices, questions) for choices, questions in out if choices]
 
 
-def handled(known: Known, limits: Limits, hover: Piece, least_s: float, still_s: float) -> tuple[Handled, ...]:
+def handled(
+    known: FittedSet, limits: Limits, hover: ManoeuvrePiece, least_s: float, still_s: float
+) -> tuple[Handled, ...]:
     """The best choice of each kind of step, the one with the largest smallest separation first.
 
     The piece `hover` is flown for `least_s` at least, `still_s` at rest before and after; `known` is the set alone.
@@ -103,7 +105,9 @@ def handled(known: Known, limits: Limits, hover: Piece, least_s: float, still_s:
 
 
 @step("predicting what is changed by hand")
-def of_change(known: Known, limits: Limits, reference, change: Change, questions: list[Question]) -> Questions:
+def of_change(
+    known: FittedSet, limits: Limits, reference, change: ChangedVehicle, questions: list[Question]
+) -> Questions:
     """Separations of each question's models with the flight after a change."""
     base = of_set(known)
     known = expecting(known, [])

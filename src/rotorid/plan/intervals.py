@@ -12,7 +12,7 @@ from rotorid.mismatch.plant.regression import NEVER_EXCITED, ridge_inverse
 from rotorid.mismatch.plant.rows import PARAMETER_NAMES
 from rotorid.mismatch.plant.unknowns import UNKNOWNS
 from rotorid.mismatch.posterior.limits import PROBABILITY, drawn
-from rotorid.plan.questions import Known
+from rotorid.plan.questions import FittedSet
 from rotorid.plan.separation import Information
 
 SHARE = "of the weight"
@@ -32,7 +32,7 @@ class Width:
     wished: float | None = None
 
 
-def _able(known: Known) -> dict[str, tuple[str, ...]]:
+def _able(known: FittedSet) -> dict[str, tuple[str, ...]]:
     """To everything that can be wished for its terms: believed values, and effects that are not at work."""
     search, active = known.fitted.model.search, known.fitted.model.selection.active
     out = {name: (key,) for key, name in PARAMETER_NAMES.items() if key in search.always}
@@ -43,7 +43,7 @@ def _able(known: Known) -> dict[str, tuple[str, ...]]:
     return out
 
 
-def check_wishes(known: Known, wishes: dict[str, float]) -> None:
+def check_wishes(known: FittedSet, wishes: dict[str, float]) -> None:
     """InputError where something is wished for that these recordings do not show."""
     names = _able(known)
     for name in wishes:
@@ -56,7 +56,7 @@ def check_wishes(known: Known, wishes: dict[str, float]) -> None:
             )
 
 
-def widths(known: Known, before: Information, after: Information, wishes: dict[str, float]) -> list[Width]:
+def widths(known: FittedSet, before: Information, after: Information, wishes: dict[str, float]) -> list[Width]:
     """Half widths and limits that are wished for, and half widths of the parameters of the effects in the model.
 
     A doubt that the engine found beyond the usual one (blocks that differ more than their noise) is taken to stay. Of
@@ -83,7 +83,7 @@ def widths(known: Known, before: Information, after: Information, wishes: dict[s
     return out
 
 
-def half(known: Known, before: Information, information: Information, column: int, floor: float = 0.0) -> float:
+def half(known: FittedSet, before: Information, information: Information, column: int, floor: float = 0.0) -> float:
     """Half the 95 % interval of a column of the model."""
     fit, at = known.fitted.model.selection.fit, np.array([column])
     plain = float(covariance(known, before.each[0], at)[0, 0])
@@ -93,7 +93,7 @@ def half(known: Known, before: Information, information: Information, column: in
     return 1.96 * float(np.sqrt(more * own + floor**2))
 
 
-def limit(known: Known, information: Information, flown: Information, key: str) -> float:
+def limit(known: FittedSet, information: Information, flown: Information, key: str) -> float:
     """What an absent effect's term may be at most with 95 % probability, a share of the weight (root mean square over
     `flown`); infinite where it is never excited."""
     columns = known.regression.columns([key])
@@ -108,7 +108,7 @@ def limit(known: Known, information: Information, flown: Information, key: str) 
     return float(max(sizes))
 
 
-def covariance(known: Known, gram: np.ndarray, columns: np.ndarray) -> np.ndarray:
+def covariance(known: FittedSet, gram: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """Plain covariance (k, k) of some columns next to the model, from normal equations (K, K)."""
     model, regression = known.fitted.model, known.regression
     every = np.union1d(regression.columns([*model.search.always, *model.selection.active]), columns)

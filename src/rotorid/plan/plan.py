@@ -16,11 +16,11 @@ import numpy as np
 
 from rotorid.errors import InputError
 from rotorid.mismatch.plant.comparison import ENVIRONMENT_S, LEAST_ENVIRONMENTS
-from rotorid.plan.candidates import STANDARD, Piece, Reference, candidates, joined, smaller, standard
+from rotorid.plan.candidates import STANDARD, ManoeuvrePiece, Reference, candidates, joined, smaller, standard
 from rotorid.plan.handled import Handled, handled
 from rotorid.plan.intervals import Width, check_wishes, widths
 from rotorid.plan.limits import Limits
-from rotorid.plan.questions import Known
+from rotorid.plan.questions import FittedSet
 from rotorid.plan.separation import (
     Information,
     Questions,
@@ -35,7 +35,7 @@ from rotorid.plan.separation import (
     step_of,
     world_of,
 )
-from rotorid.plan.simulate import Flown
+from rotorid.plan.simulate import SimulatedFlight
 from rotorid.recordings import Vehicle
 from rotorid.steps import step
 
@@ -58,7 +58,7 @@ _LEAST_PROGRESS = 0.01
 class Tried:
     """A candidate and what it does: the information it brings, or why it cannot be flown."""
 
-    piece: Piece
+    piece: ManoeuvrePiece
     information: Information | None
     flown_s: float
     reason: str = ""
@@ -72,10 +72,10 @@ class Forecast:
 
     name: str
     """`chosen`, `second` (the best without the chosen one's first manoeuvre), or `standard`."""
-    pieces: tuple[Piece, ...]
+    pieces: tuple[ManoeuvrePiece, ...]
     reference: Reference
     """From the middle of the volume."""
-    flight: Flown | None
+    flight: SimulatedFlight | None
     """As the vehicle would fly it."""
     questions: Questions
     """Ids of each open question, and how far apart their models will be."""
@@ -123,7 +123,7 @@ def yaw_acceleration(vehicle: Vehicle) -> float:
     return _YAW_SHARE * torque / vehicle.inertia_kg_m2.zz
 
 
-def broken(flight: Flown, limits: Limits, vehicle: Vehicle) -> str:
+def broken(flight: SimulatedFlight, limits: Limits, vehicle: Vehicle) -> str:
     """Which limit a flight does not keep, in words; empty where it keeps all."""
     north, east, height = flight.motion.position[:, 0], flight.motion.position[:, 1], flight.motion.height
     climb = float(np.abs(flight.world_velocity[:, 2]).max())
@@ -149,7 +149,7 @@ def broken(flight: Flown, limits: Limits, vehicle: Vehicle) -> str:
 
 
 def tried(
-    known: Known,
+    known: FittedSet,
     limits: Limits,
     wishes: Iterable[str] = (),
 ) -> list[Tried]:
@@ -188,7 +188,7 @@ def share_reached(sigmas: Iterable[float], wished: Iterable[Width], target_sigma
     return float(np.mean(found)) if found else 1.0
 
 
-def reached(known: Known, base: Information, information: Information, target: float, wishes: dict) -> float:
+def reached(known: FittedSet, base: Information, information: Information, target: float, wishes: dict) -> float:
     """Share of the way to the goals with the set (`base`) and more, as `share_reached`."""
     sigmas = [s.sigma for q in known.questions for s in separations(known, q, base, information)]
     sigmas += [s.sigma for _, own in chain_separations(known, information) for s in own]
@@ -197,7 +197,11 @@ def reached(known: Known, base: Information, information: Information, target: f
 
 @step("choosing")
 def chosen_pieces(
-    known: Known, limits: Limits, options: list[Tried], most: int = _MOST_PIECES, wishes: dict[str, float] | None = None
+    known: FittedSet,
+    limits: Limits,
+    options: list[Tried],
+    most: int = _MOST_PIECES,
+    wishes: dict[str, float] | None = None,
 ) -> tuple[list[Tried], list[Tried]]:
     """The manoeuvres to fly, `most` at most, and all options with their progress."""
     base = of_set(known)
@@ -236,7 +240,7 @@ def chosen_pieces(
     return taken, judged
 
 
-def _expecting_quick(known: Known, limits: Limits) -> Known:
+def _expecting_quick(known: FittedSet, limits: Limits) -> FittedSet:
     """The set as the engine would whiten it next to a quick flight: the first of QUICK that the limits allow."""
     world, step, vehicle = world_of(known, None, None), step_of(known), known.prepared.vehicle
     for share in SIZES:
@@ -251,7 +255,7 @@ def _expecting_quick(known: Known, limits: Limits) -> Known:
     return known
 
 
-def _standard_piece(known: Known, limits: Limits, options: list[Tried], duration_s: float) -> Piece | None:
+def _standard_piece(known: FittedSet, limits: Limits, options: list[Tried], duration_s: float) -> ManoeuvrePiece | None:
     """The standard flight of that length as large as the limits allow; None where they allow none."""
     world, step, vehicle = world_of(known, None, None), step_of(known), known.prepared.vehicle
     able = {t.piece.name: t.piece for t in options if t.information is not None}
@@ -270,7 +274,9 @@ def _standard_piece(known: Known, limits: Limits, options: list[Tried], duration
 
 
 @step("predicting a flight")
-def _forecast(known: Known, limits: Limits, name: str, pieces: tuple[Piece, ...], wishes: dict[str, float]) -> Forecast:
+def _forecast(
+    known: FittedSet, limits: Limits, name: str, pieces: tuple[ManoeuvrePiece, ...], wishes: dict[str, float]
+) -> Forecast:
     """What is expected of a flight of these pieces; without any, what the set holds. `known` is the set alone.
 
     Every competing model flies it, as it would be flown if that model were the true one.
@@ -302,7 +308,7 @@ def _forecast(known: Known, limits: Limits, name: str, pieces: tuple[Piece, ...]
     return Forecast(name, pieces, reference, flights[0], tuple(questions), tuple(widths(alone, base, after, wishes)))
 
 
-def expected(known: Known, limits: Limits, name: str, taken: list[Tried], wishes) -> Forecast:
+def expected(known: FittedSet, limits: Limits, name: str, taken: list[Tried], wishes) -> Forecast:
     """What is expected of manoeuvres taken; flown again and again where they do not suffice and time is left.
 
     They are flown for LEAST_S at least: an effect that one pass shows is none that the engine finds wherever it looks.
@@ -318,7 +324,7 @@ def expected(known: Known, limits: Limits, name: str, taken: list[Tried], wishes
 
 
 def plan(
-    known: Known,
+    known: FittedSet,
     limits: Limits,
     wishes: dict[str, float] | None = None,
 ) -> Plan:

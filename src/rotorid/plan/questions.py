@@ -62,7 +62,7 @@ class Question:
 
 
 @dataclass(frozen=True)
-class Known:
+class FittedSet:
     """A set as the engine fitted it, and what it leaves open."""
 
     recordings: RecordingSet
@@ -90,7 +90,7 @@ def known(
     suggested: Sequence[str] = (),
     claimed: Collection[str] | None = None,
     cutoff_hz: float = HIGHEST_CUTOFF_HZ,
-) -> Known:
+) -> FittedSet:
     """The set fitted, and its open questions: classes left open, and ids in `suggested` that may as well be nothing.
 
     Of ids that the verdict on the set does not claim (`claimed`, all members of its classes) nothing is asked: they are
@@ -140,7 +140,7 @@ def known(
             unanswerable.append((ids, "these columns give no model of the others to compare with"))
     own = _derivatives_of(found, way)
     asked = tuple(questions), tuple(chains), tuple(unanswerable)
-    return Known(recordings, prepared, found, findings, *asked, derivatives=own)
+    return FittedSet(recordings, prepared, found, findings, *asked, derivatives=own)
 
 
 def _derivatives_of(found: Fitted, way: Way) -> tuple[tuple[Form, np.ndarray], ...]:
@@ -153,7 +153,7 @@ def _derivatives_of(found: Fitted, way: Way) -> tuple[tuple[Form, np.ndarray], .
     return () if form is None else (form,)
 
 
-def known_from(recordings: RecordingSet, verdict: dict) -> Known:
+def known_from(recordings: RecordingSet, verdict: dict) -> FittedSet:
     """A set fitted, with the questions that its verdict leaves open; `verdict` is the content of its verdict.json.
 
     Raises

@@ -34,10 +34,10 @@ from rotorid.mismatch.posterior.problem import Prior
 from rotorid.plan.between import interval as chain_interval
 from rotorid.plan.between import squares
 from rotorid.plan.candidates import Reference
-from rotorid.plan.changed import Change
+from rotorid.plan.changed import ChangedVehicle
 from rotorid.plan.limits import Limits
-from rotorid.plan.questions import Hypothesis, Known, Question
-from rotorid.plan.simulate import Flown, World, commands, fly, recorded
+from rotorid.plan.questions import FittedSet, Hypothesis, Question
+from rotorid.plan.simulate import CompetingModel, SimulatedFlight, commands, fly, recorded
 from rotorid.recordings import RecordingSet, Vehicle
 from rotorid.steps import step
 
@@ -102,7 +102,7 @@ class Separation:
     """Expected log odds, nats, of the true model against its nearest rival."""
 
 
-def asked_terms(known: Known, ids: Iterable[str] = ()) -> list[Term]:
+def asked_terms(known: FittedSet, ids: Iterable[str] = ()) -> list[Term]:
     """Terms that any open question needs, or that stand for some `ids`, in the order of the regression."""
     wanted = {t.key for t in known.regression.terms if t.effect and t.effect in ids}
     for question in known.questions:
@@ -113,12 +113,14 @@ def asked_terms(known: Known, ids: Iterable[str] = ()) -> list[Term]:
     return [t for t in known.regression.terms if t.key in wanted]
 
 
-def of_set(known: Known) -> Information:
+def of_set(known: FittedSet) -> Information:
     """What the fitted runs of the set hold."""
     regression = known.regression
     gram, _, bias, _ = regression._normal(np.arange(len(regression.precision)), regression.training)
     seconds = float(regression.training.sum() * regression.block_s)
-    shares = seconds * _shares_of(known.fitted.model.rows, known.prepared.vehicle) if isinstance(known, Known) else 0.0
+    shares = (
+        seconds * _shares_of(known.fitted.model.rows, known.prepared.vehicle) if isinstance(known, FittedSet) else 0.0
+    )
     return Information(gram - bias, None, seconds, shares)
 
 
@@ -129,7 +131,7 @@ def _shares_of(rows: Sequence[Rows], vehicle: Vehicle) -> np.ndarray:
     return sum(np.einsum("nci,ncj->ij", x, x, optimize=True) for x in columns) / sum(len(x) for x in columns)
 
 
-def world_of(known: Known, question: Question | None, hypothesis: Hypothesis | None) -> World:
+def world_of(known: FittedSet, question: Question | None, hypothesis: Hypothesis | None) -> CompetingModel:
     """The model of a hypothesis, to fly; the model as fitted where none is given."""
     model, regression = known.fitted.model, known.regression
     if question is None or hypothesis is None:
@@ -154,7 +156,7 @@ def world_of(known: Known, question: Question | None, hypothesis: Hypothesis | N
         result, full, volt = known.fitted.chain
         chain = tuple((form, result.fit.of(key)[1]) for key, form in result.fit.chain)
     voltages = [s.motion.voltage.mean() for s in known.prepared.segments if s.motion.voltage is not None]
-    return World(
+    return CompetingModel(
         vehicle=known.prepared.vehicle,
         effects=effects,
         derivatives=known.derivatives,
@@ -166,34 +168,38 @@ def world_of(known: Known, question: Question | None, hypothesis: Hypothesis | N
     )
 
 
-def _full_speed_of(known: Known) -> float:
+def _full_speed_of(known: FittedSet) -> float:
     """Rotor speed, rad/s, of full throttle."""
     limits = known.prepared.vehicle.rotor_speed_limits_rad_s
     commands = [float(s.command.max()) for s in known.prepared.segments if s.command is not None]
     return limits[1] if limits else max(commands, default=1.0)
 
 
-def step_of(known: Known) -> float:
+def step_of(known: FittedSet) -> float:
     """Step of the simulation, s: the recording's own, or a whole part of it."""
     rate = own_rate_hz(known)
     return 1.0 / (rate * int(np.ceil(_LEAST_RATE_HZ / rate)))
 
 
-def columns_of(known: Known) -> tuple[str, ...]:
+def columns_of(known: FittedSet) -> tuple[str, ...]:
     """Columns that every run of the set has."""
     runs = known.recordings.runs
     return tuple(n for n in runs[0].table.columns if all(r.has(n) for r in runs))
 
 
 @step("flying a manoeuvre in simulation")
-def flown(world: World, reference: Reference, limits: Limits) -> tuple[Flown, ...]:
+def flown(world: CompetingModel, reference: Reference, limits: Limits) -> tuple[SimulatedFlight, ...]:
     """A reference flown by a competing model, with the loops as stated and slower (SLOWER_LOOPS)."""
     fast, slow = limits.attitude_bandwidth_rad_s, limits.position_bandwidth_rad_s
     return tuple(fly(world, reference, s * fast, limits.middle_m, slow and s * slow) for s in _SLOWER_LOOPS)
 
 
 def of_flights(
-    known: Known, flights: Sequence[Flown], world: World, terms: Sequence[Term], change: Change | None = None
+    known: FittedSet,
+    flights: Sequence[SimulatedFlight],
+    world: CompetingModel,
+    terms: Sequence[Term],
+    change: ChangedVehicle | None = None,
 ) -> Information:
     """What the fitted part of a flight would hold, flown with each of the loops.
 
@@ -207,7 +213,11 @@ def of_flights(
 
 
 def _of_flight(
-    known: Known, flight: Flown, world: World, terms: Sequence[Term], change: Change | None = None
+    known: FittedSet,
+    flight: SimulatedFlight,
+    world: CompetingModel,
+    terms: Sequence[Term],
+    change: ChangedVehicle | None = None,
 ) -> Information:
     """What a flight would hold, in the columns of the set's regression.
 
@@ -221,7 +231,7 @@ def _of_flight(
         prepared = replace(prepared, vehicle=change.vehicle)
         acting, nuisances = [change.term(t) for t in terms], list(change.nuisances)
 
-    def segments_of(flight: Flown) -> list[Segment]:
+    def segments_of(flight: SimulatedFlight) -> list[Segment]:
         run = recorded(flight, world, columns_of(known), rate, "planned")
         return prepare_like(prepared, RecordingSet("planned", prepared.vehicle, (run,), ()))[0]
 
@@ -251,7 +261,7 @@ def _of_flight(
     return Information(gram, np.array(apart) if apart else None, seconds, shares)
 
 
-def _after_change(own: Regression, terms: Sequence[Term], change: Change) -> np.ndarray:
+def _after_change(own: Regression, terms: Sequence[Term], change: ChangedVehicle) -> np.ndarray:
     """Normal equations (K, K) of terms in the parameters of before a change, its nuisances projected out."""
     share = np.concatenate([np.full(t.size, change.shares.get(t.key, 1.0)) for t in terms])
     kept, out = own.columns([t.key for t in terms]), own.columns([t.key for t in change.nuisances])
@@ -264,7 +274,7 @@ def _after_change(own: Regression, terms: Sequence[Term], change: Change) -> np.
     return share[:, None] * gram * share
 
 
-def recorded_after(known: Known, change: Change, recorded: RecordingSet) -> Regression:
+def recorded_after(known: FittedSet, change: ChangedVehicle, recorded: RecordingSet) -> Regression:
     """Normal equations of a set and of a flight `recorded` after a change by hand, in the terms that a question needs
     and the nuisances of the change; every block of both is fitted."""
     model, terms = known.fitted.model, asked_terms(known)
@@ -282,7 +292,7 @@ def recorded_after(known: Known, change: Change, recorded: RecordingSet) -> Regr
     return build(rows, acting, filters, lambda run, t: True, block_seconds(rows, rate_hz), rate_hz)
 
 
-def expecting(known: Known, flights: Sequence[tuple[Flown, World]]) -> Known:
+def expecting(known: FittedSet, flights: Sequence[tuple[SimulatedFlight, CompetingModel]]) -> FittedSet:
     """The set with its normal equations as the engine would have them once flights are joined to it.
 
     The engine learns its filters from what the whole catalogue leaves; of a calm set that is next to nothing in a
@@ -308,7 +318,7 @@ def expecting(known: Known, flights: Sequence[tuple[Flown, World]]) -> Known:
     return replace(known, whitened=whitened)
 
 
-def own_rate_hz(known: Known) -> float:
+def own_rate_hz(known: FittedSet) -> float:
     """Rate of the recordings."""
     return 1.0 / float(np.median(np.diff(known.recordings.runs[0].time_s)))
 
@@ -360,7 +370,7 @@ def within(normal: np.ndarray, right: np.ndarray, limit: np.ndarray) -> np.ndarr
     return solution
 
 
-def apart(known: Known, question: Question, true: Hypothesis, gram: np.ndarray) -> dict[str, np.ndarray]:
+def apart(known: FittedSet, question: Question, true: Hypothesis, gram: np.ndarray) -> dict[str, np.ndarray]:
     """√λ (n,) of a true model against every rival, the best of its forms in each draw of the coefficients.
 
     Which form of the true model it is the set may not know either: each has draws by its probability.
@@ -417,7 +427,7 @@ def log_odds(sigma: np.ndarray, seconds: float) -> float:
     return float(np.mean(sigma**2 / (1.0 + Prior().form_error ** 2 * sigma**2 / environments)) / 2)
 
 
-def separations(known: Known, question: Question, before: Information, after: Information) -> list[Separation]:
+def separations(known: FittedSet, question: Question, before: Information, after: Information) -> list[Separation]:
     """Every model of a question against its nearest rival.
 
     Which rival is nearest hangs on the model's coefficients, of which the set knows no more than their interval: the
@@ -448,7 +458,9 @@ def separations(known: Known, question: Question, before: Information, after: In
     return out
 
 
-def chain_separations(known: Known, information: Information) -> list[tuple[tuple[str, ...], tuple[Separation, ...]]]:
+def chain_separations(
+    known: FittedSet, information: Information
+) -> list[tuple[tuple[str, ...], tuple[Separation, ...]]]:
     """Every chain of every question between command and speed against its nearest rival."""
     out, at = [], 0
     for question in known.chains:

@@ -58,7 +58,7 @@ STEP_S = 0.3
 
 
 @dataclass(frozen=True)
-class Step:
+class SessionStep:
     """A part of a session: a load (n, 3) of a bench or speeds (n, rotors) of a stand, as shares of the largest."""
 
     name: str
@@ -97,7 +97,7 @@ class SessionForecast:
 
     name: str
     """`chosen`, `second` (the best without the chosen one's first step), or `standard`."""
-    steps: tuple[Step, ...]
+    steps: tuple[SessionStep, ...]
     questions: tuple[tuple[tuple[str, ...], tuple[Separation, ...]], ...]
 
     @property
@@ -241,7 +241,7 @@ def tilts(known: KnownInstrument, limits: SessionLimits) -> list[tuple[float, fl
     return [(0.0, 0.0), (angle, 0.0), (0.0, angle)] if angle > 0 else [(0.0, 0.0)]
 
 
-def options(known: KnownInstrument, limits: SessionLimits) -> list[Step]:
+def options(known: KnownInstrument, limits: SessionLimits) -> list[SessionStep]:
     """Every step of the families."""
     bench = known.recordings.vehicle.kind == "bench"
     out = []
@@ -260,14 +260,14 @@ def options(known: KnownInstrument, limits: SessionLimits) -> list[Step]:
                     level = course(t) if bench else np.sqrt(np.maximum(course(t), 0.0))
                     return level[:, None] * share
 
-                step = Step(
+                step = SessionStep(
                     f"{name} {where}{' ' + leaning if leaning else ''}", mounted + what + words, 0.0, make, tilt
                 )
                 out.append(replace(step, duration_s=seconds + 2 * REST_S))
     return out
 
 
-def table_of(known: KnownInstrument, step: Step) -> pd.DataFrame:
+def table_of(known: KnownInstrument, step: SessionStep) -> pd.DataFrame:
     """What the set's columns would hold of a step: times, load or speeds, mount; readings are nothing."""
     setup, vehicle = known.model.setup, known.recordings.vehicle
     t = np.arange(0.0, step.duration_s, 1.0 / setup.instrument.rate_hz)
@@ -299,7 +299,7 @@ def asked(known: KnownInstrument) -> list[Term]:
 
 
 @step("predicting a step")
-def of_step(known: KnownInstrument, step: Step, terms: Sequence[Term]) -> Information:
+def of_step(known: KnownInstrument, step: SessionStep, terms: Sequence[Term]) -> Information:
     """What the fitted part of a step would hold, in the columns of the set's regression."""
     return _of_run(known, Run("planned", table_of(known, step)), terms).share(FITTED_SHARE)
 
@@ -333,7 +333,7 @@ def _of_run(known: KnownInstrument, run: Run, terms: Sequence[Term]) -> Informat
     return Information(gram, None, seconds)
 
 
-def _fitted_runs(known: KnownInstrument, steps: Sequence[Step]) -> list[Run]:
+def _fitted_runs(known: KnownInstrument, steps: Sequence[SessionStep]) -> list[Run]:
     """The runs of a session that the joint judgement fits: whole steps, or parts of the steps of a short session."""
     runs = tuple(Run(f"step{i + 1:02d}", table_of(known, s)) for i, s in enumerate(steps))
     whole = in_thirds(RecordingSet("planned", known.recordings.vehicle, runs, None))
@@ -388,7 +388,7 @@ def plan_session(known: KnownInstrument, limits: SessionLimits) -> SessionPlan:
     return SessionPlan(**vars(best), **about, table=table.drop(columns=readings), others=tuple(others))
 
 
-def words_of_steps(steps: Sequence[Step]) -> list[str]:
+def words_of_steps(steps: Sequence[SessionStep]) -> list[str]:
     """The steps in their order, one that is done several times in a row once."""
     out, at = [], 0
     for words, same in groupby(steps, key=lambda s: s.words):
@@ -404,7 +404,7 @@ __all__ = [
     "CHANNELS",
     "KnownInstrument",
     "SessionPlan",
-    "Step",
+    "SessionStep",
     "known_instrument",
     "known_instrument_from",
     "plan_session",

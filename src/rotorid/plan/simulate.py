@@ -40,7 +40,7 @@ _STEPS_BACK = 8
 
 
 @dataclass(frozen=True)
-class World:
+class CompetingModel:
     """A competing model: the vehicle, effects with their values, and what lies between command and rotor speed."""
 
     vehicle: Vehicle
@@ -56,7 +56,7 @@ class World:
 
 
 @dataclass(frozen=True)
-class Flown:
+class SimulatedFlight:
     """A flight as it would be: the motion, the commands (n, k), rad/s, and the reference it came from."""
 
     motion: Motion
@@ -121,12 +121,12 @@ def _body_rates(rotation: np.ndarray, step_s: float) -> np.ndarray:
 
 
 def fly(
-    world: World,
+    world: CompetingModel,
     reference: Reference,
     bandwidth_rad_s: float,
     place_m: Sequence[float],
     position_rad_s: float | None = None,
-) -> Flown:
+) -> SimulatedFlight:
     """The flight of a reference whose zero lies at `place_m` (north, east, height above ground).
 
     `bandwidth_rad_s` is of the attitude loop, `position_rad_s` of the position loop (a share of it where not stated).
@@ -189,7 +189,7 @@ def fly(
     cut = {f.name: getattr(motion, f.name) for f in fields(motion)}
     cut = {name: v[inner] for name, v in cut.items() if isinstance(v, np.ndarray) and len(v) == len(t)}
     motion = replace(motion, **cut)
-    return Flown(motion, commands(world, motion), velocity[inner])
+    return SimulatedFlight(motion, commands(world, motion), velocity[inner])
 
 
 def _held_longer(reference: Reference, step_s: float) -> Reference:
@@ -199,7 +199,7 @@ def _held_longer(reference: Reference, step_s: float) -> Reference:
     return Reference(t, np.pad(reference.position_m, ends, "edge"), np.pad(reference.yaw_rad, _EDGE, "edge"))
 
 
-def _wrench(world: World, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+def _wrench(world: CompetingModel, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     force, moment = np.zeros((motion.size, 3)), np.zeros((motion.size, 3))
     for form, values in (*world.effects, *world.derivatives):
         part = form.contribution(motion, world.vehicle, values)
@@ -208,7 +208,7 @@ def _wrench(world: World, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     return force, moment
 
 
-def commands(world: World, motion: Motion) -> np.ndarray:
+def commands(world: CompetingModel, motion: Motion) -> np.ndarray:
     """Commands (n, k), rad/s, that make the rotor speeds of a motion through the model's chain."""
     wanted = command = motion.rotor_speed
     if not world.chain:
@@ -222,7 +222,7 @@ def commands(world: World, motion: Motion) -> np.ndarray:
     return command
 
 
-def recorded(flown: Flown, world: World, columns: Sequence[str], rate_hz: float, name: str) -> Run:
+def recorded(flown: SimulatedFlight, world: CompetingModel, columns: Sequence[str], rate_hz: float, name: str) -> Run:
     """What the set's columns would hold of a flight, without noise; a column that a flight cannot give is left out."""
     motion, k = flown.motion, world.vehicle.rotor_count
     every = max(1, int(round(1.0 / (rate_hz * (motion.time_s[1] - motion.time_s[0])))))

@@ -91,7 +91,7 @@ def present(run: Run) -> set[str]:
 
 
 @dataclass(frozen=True)
-class Answer:
+class Outcome:
     """What became of a question that the first set left open."""
 
     ids: tuple[str, ...]
@@ -100,7 +100,7 @@ class Answer:
     sentence: str
 
 
-def answers(open_before: Sequence[tuple[str, ...]], findings: Sequence[Finding]) -> list[Answer]:
+def answers(open_before: Sequence[tuple[str, ...]], findings: Sequence[Finding]) -> list[Outcome]:
     """What the findings of all sets together say of each class that was left open."""
     out = []
     for ids in open_before:
@@ -109,15 +109,15 @@ def answers(open_before: Sequence[tuple[str, ...]], findings: Sequence[Finding])
         still = [f for f in findings if f.status == "ambiguous" and set(f.alternatives) & set(ids)]
         if sure and not still:
             what = " and ".join(sure)
-            out.append(Answer(ids, sure[0], f"{named}: all sets together say {what}"))
+            out.append(Outcome(ids, sure[0], f"{named}: all sets together say {what}"))
         elif still:
             left = still[0].alternatives
             fewer = set(left) < set(ids)
-            out.append(Answer(ids, "", f"{named}: {'narrowed to' if fewer else 'still'} {' or '.join(left)}"))
+            out.append(Outcome(ids, "", f"{named}: {'narrowed to' if fewer else 'still'} {' or '.join(left)}"))
         else:
             weaker = [f.id for f in findings if f.status == "suggested" and f.id in ids]
             said = f"suggested is {weaker[0]}" if weaker else "neither is established"
-            out.append(Answer(ids, "", f"{named}: {said}"))
+            out.append(Outcome(ids, "", f"{named}: {said}"))
     return out
 
 

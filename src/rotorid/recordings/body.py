@@ -81,7 +81,7 @@ UNITS: dict[tuple[str, ...], dict[str, float]] = {
 
 
 @dataclass(frozen=True)
-class Flown:
+class RotorsInAir:
     """What a run says about the rotors in the air."""
 
     hover_rad_s: float
@@ -133,7 +133,7 @@ class Body:
 
 
 @dataclass(frozen=True)
-class Quantity:
+class CoupledNumber:
     """A number that couples believed values, and where it has to lie."""
 
     keys: tuple[str, ...]
@@ -157,7 +157,7 @@ def _within(value: float, limits: tuple[float, float]) -> bool:
     return isfinite(value) and limits[0] <= value <= limits[1]
 
 
-def body_of(vehicle: Vehicle, flown: Flown | None) -> Body | None:
+def body_of(vehicle: Vehicle, flown: RotorsInAir | None) -> Body | None:
     """The vehicle's values that are coupled, with the rotor speeds of a run where there is one; None without rotors."""
     if not vehicle.rotors or vehicle.thrust_coefficient_n_s2 is None:
         return None
@@ -182,7 +182,7 @@ def body_of(vehicle: Vehicle, flown: Flown | None) -> Body | None:
     )
 
 
-def quantities(body: Body) -> Iterator[Quantity]:
+def quantities(body: Body) -> Iterator[CoupledNumber]:
     """What couples the believed values, as far as they are stated."""
     radius, c_f = body.radius_m, body.thrust_coefficient_n_s2
     stated = body.rotor_radius_m is not None
@@ -191,21 +191,21 @@ def quantities(body: Body) -> Iterator[Quantity]:
     if body.mass_kg and body.inertia_kg_m2 and body.rotors:
         for moment in (min(body.inertia_kg_m2), max(body.inertia_kg_m2)):
             gyration = sqrt(moment / body.mass_kg)
-            yield Quantity(
+            yield CoupledNumber(
                 ("inertia_kg_m2", "mass_kg", "rotors"),
                 gyration / body.rotors,
                 _GYRATION_ARMS,
                 f"a radius of gyration of {gyration:.3g} m with arms of {body.rotors:.3g} m",
             )
     if body.rotors:
-        yield Quantity(
+        yield CoupledNumber(
             ("rotors", length),
             body.rotors / radius,
             _SPAN_RADII,
             f"arms of {body.rotors:.3g} m with {disc}",
         )
     if stated:
-        yield Quantity(
+        yield CoupledNumber(
             ("rotor_radius_m", "thrust_coefficient_n_s2"),
             c_f / (_AIR_KG_M3 * pi * radius**4),
             _C_T,
@@ -213,7 +213,7 @@ def quantities(body: Body) -> Iterator[Quantity]:
         )
     if body.torque_coefficient_n_m_s2:
         merit = c_f**1.5 / (body.torque_coefficient_n_m_s2 * sqrt(2 * _AIR_KG_M3 * pi) * radius)
-        yield Quantity(
+        yield CoupledNumber(
             ("torque_coefficient_n_m_s2", "thrust_coefficient_n_s2", length),
             merit,
             _FIGURE_OF_MERIT if stated else _ROUGH_FIGURE_OF_MERIT,
@@ -222,13 +222,13 @@ def quantities(body: Body) -> Iterator[Quantity]:
         )
     if body.mass_kg:
         loading = body.mass_kg * 9.81 / (body.count * pi * radius**2)
-        yield Quantity(
+        yield CoupledNumber(
             ("mass_kg", length), loading, _DISC_LOADING_N_M2, f"a disc loading of {loading:.3g} N/m² with {disc}"
         )
     if body.rotor_speeds:
         yield from _turning(body, disc)
     if body.accelerometer_position_m and body.rotors:
-        yield Quantity(
+        yield CoupledNumber(
             ("accelerometer_position_m", "rotors"),
             body.accelerometer_position_m / body.rotors,
             _PLACE_ARMS,
@@ -236,7 +236,7 @@ def quantities(body: Body) -> Iterator[Quantity]:
         )
     if body.rotor_inertia_kg_m2 and body.mass_kg:
         share = body.rotor_inertia_kg_m2 / (body.mass_kg * radius**2)
-        yield Quantity(
+        yield CoupledNumber(
             ("rotor_inertia_kg_m2", "mass_kg", length),
             share,
             _ROTOR_INERTIA,
@@ -244,17 +244,17 @@ def quantities(body: Body) -> Iterator[Quantity]:
         )
 
 
-def _turning(body: Body, disc: str) -> Iterator[Quantity]:
+def _turning(body: Body, disc: str) -> Iterator[CoupledNumber]:
     """What couples the values with the rotor speeds."""
     hover, top = body.rotor_speeds
     source = "rotor_speed_limits_rad_s" if body.by_throttle else "rotor_speeds"
     tip = top * body.radius_m
-    yield Quantity(
+    yield CoupledNumber(
         (source, "rotor_radius_m"), tip, (0.0, _HIGHEST_TIP_M_S), f"a tip speed of {tip:.3g} m/s with {disc}"
     )
     if body.mass_kg and body.lift_m_s2:
         ratio = body.count * body.thrust_coefficient_n_s2 * hover**2 / (body.mass_kg * body.lift_m_s2)
-        yield Quantity(
+        yield CoupledNumber(
             ("mass_kg", "thrust_coefficient_n_s2", source),
             ratio,
             _WEIGHT_BY_THROTTLE if body.by_throttle else _WEIGHT,
@@ -262,7 +262,7 @@ def _turning(body: Body, disc: str) -> Iterator[Quantity]:
         )
         if body.rotor_speed_limits_rad_s and not body.by_throttle:
             share = body.rotor_speed_limits_rad_s / hover
-            yield Quantity(
+            yield CoupledNumber(
                 ("rotor_speed_limits_rad_s", "rotor_speeds"),
                 share,
                 _LIMIT_OVER_HOVER,
@@ -307,7 +307,7 @@ def _remedies(body: Body) -> Iterator[_Remedy]:
         yield _Remedy(keys, factors, int(least), tuple(nearest))
 
 
-def unfit(body: Body) -> list[Quantity]:
+def unfit(body: Body) -> list[CoupledNumber]:
     """The quantities that lie outside their limits."""
     return [q for q in quantities(body) if not q.fits]
 
@@ -332,7 +332,7 @@ def impossible(body: Body, column: str) -> Iterator[Doubt]:
         body = mended
 
 
-def _doubt(body: Body, best: _Remedy, raised_by: Sequence[Quantity], others: Sequence[str], column: str) -> Doubt:
+def _doubt(body: Body, best: _Remedy, raised_by: Sequence[CoupledNumber], others: Sequence[str], column: str) -> Doubt:
     """The doubt of a value, with what raised it, what was expected and which unit would fit."""
 
     def name(key: str) -> str:

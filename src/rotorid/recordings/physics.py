@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from rotorid.io.text.names import listed
 from rotorid.recordings import columns as c
-from rotorid.recordings.body import Body, Doubt, Flown, body_of, impossible, quantities
+from rotorid.recordings.body import Body, Doubt, RotorsInAir, body_of, impossible, quantities
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.vehicle import Vehicle
 
@@ -138,7 +138,7 @@ def _correlation(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.corrcoef(a, b)[0, 1])
 
 
-def flown(run: Run, vehicle: Vehicle) -> Flown | None:
+def flown(run: Run, vehicle: Vehicle) -> RotorsInAir | None:
     """What a run says about the rotors in the air (on a stand: turning); None where it is short or says nothing."""
     clock = _clock(run)
     speeds = None if clock is None else _speeds(run, clock, vehicle)
@@ -154,7 +154,7 @@ def flown(run: Run, vehicle: Vehicle) -> Flown | None:
         lift = 9.81  # On average thrust balances weight in a flight; a wrong accelerometer is a doubt of its own.
     kinds = ("rotor_speed", "rotor_command", "throttle")
     column = next(n[0] for k in kinds if run.has(*(n := c.rotor_columns(k, vehicle.rotor_count))))
-    return Flown(
+    return RotorsInAir(
         hover_rad_s=float(np.sqrt(thrust / coefficients.sum())),
         top_rad_s=float(np.nanquantile(speeds, TOP)),
         lift_m_s2=lift if vehicle.kind == "flight" else None,

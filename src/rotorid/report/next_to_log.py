@@ -35,7 +35,7 @@ _SHOWN = ("velocity", "attitude", "position", "angular_velocity")
 
 
 @dataclass(frozen=True)
-class Window:
+class LogWindow:
     """Half a second of a log: where it starts, and what turned the rotors; axes north-east-down and body."""
 
     run: str
@@ -55,7 +55,7 @@ class NextToLog:
 
     how: str
     """What flew: `RotorPy`, `PX4's SIH by its published equations`."""
-    windows: tuple[Window, ...]
+    windows: tuple[LogWindow, ...]
     flown: tuple[States, ...]
     """What the tool predicts, by window."""
     errors: dict[str, dict[str, np.ndarray]]
@@ -97,7 +97,7 @@ def next_to_log(analysis: Analysis, to: str, exported: Exported) -> NextToLog:
     return NextToLog(how, windows, flown, errors)
 
 
-def _windows_of(analysis: Analysis, model: Model) -> tuple[Window, ...]:
+def _windows_of(analysis: Analysis, model: Model) -> tuple[LogWindow, ...]:
     """At most `_MOST_WINDOWS` windows of the flights; InputError where there is none."""
     found = []
     usable = [
@@ -113,7 +113,7 @@ def _windows_of(analysis: Analysis, model: Model) -> tuple[Window, ...]:
             wind = np.zeros(3) if inputs.wind is None else np.asarray(inputs.wind, float)
             wind = wind if wind.ndim == 1 else wind[sample].mean(axis=0)
             own = States(**{n: None if v is None else v[sample] for n, v in vars(states).items()})
-            found.append(Window(segment.run, time_s[sample], inputs.rotor_speed[sample], own, wind))
+            found.append(LogWindow(segment.run, time_s[sample], inputs.rotor_speed[sample], own, wind))
     if not found:
         raise InputError(
             f"{analysis.recordings.name}: no half second in which rotors, attitude and body rates are recorded"
@@ -123,7 +123,7 @@ def _windows_of(analysis: Analysis, model: Model) -> tuple[Window, ...]:
     return tuple(found[k] for k in chosen if len(found[k].time_s) == len(first.time_s))
 
 
-def _ours(model: Model, windows: Sequence[Window]) -> list[States]:
+def _ours(model: Model, windows: Sequence[LogWindow]) -> list[States]:
     """The windows flown by our own simulator: the wrench of the model's forms at each instant."""
     vehicle = model.vehicle
     from rotorid.vehicle.windows import Inputs, simulate_windows
@@ -137,7 +137,7 @@ def _ours(model: Model, windows: Sequence[Window]) -> list[States]:
     return out
 
 
-def _errors(flown: Sequence[States], windows: Sequence[Window]) -> dict[str, np.ndarray]:
+def _errors(flown: Sequence[States], windows: Sequence[LogWindow]) -> dict[str, np.ndarray]:
     """To each channel that both sides have the length of the difference, (windows, m)."""
     out: dict[str, list[np.ndarray]] = {}
     for made, window in zip(flown, windows, strict=True):
@@ -159,7 +159,7 @@ _Wrench = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.nd
 
 
 def by_equations(
-    windows: Sequence[Window], signals: np.ndarray, wrench: _Wrench, mass_kg: float, inertia: np.ndarray,
+    windows: Sequence[LogWindow], signals: np.ndarray, wrench: _Wrench, mass_kg: float, inertia: np.ndarray,
     gravity_m_s2: float, gyroscopic: bool, fastest_rad_s: float = np.inf,
 ) -> list[States]:  # fmt: skip
     """Windows (all at once) of a rigid body under a tool's wrench; signals (w, m, k) go straight between samples.
@@ -215,7 +215,7 @@ def by_equations(
     ]  # fmt: skip
 
 
-def in_sih(vehicle: Vehicle, exported: Exported, windows: Sequence[Window]) -> list[States]:
+def in_sih(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow]) -> list[States]:
     """By the equations of PX4's SIH, from the file's text."""
     values = sih.values_of(exported.text)
     signals = _shares(vehicle, exported, windows, KNOWS["px4-sih"])
@@ -228,7 +228,7 @@ def in_sih(vehicle: Vehicle, exported: Exported, windows: Sequence[Window]) -> l
     return by_equations(windows, signals, wrench, mass, inertia, gravity, True, sih.FASTEST_RAD_S)
 
 
-def in_ardupilot(vehicle: Vehicle, exported: Exported, windows: Sequence[Window]) -> list[States]:
+def in_ardupilot(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow]) -> list[States]:
     """By the equations of ArduPilot's simulated frame, from the file's text."""
     frame = ardupilot_frame.values_of(exported.text)
     share, expo = _shares(vehicle, exported, windows, KNOWS["ardupilot-json"]), frame["propExpo"]
@@ -242,14 +242,14 @@ def in_ardupilot(vehicle: Vehicle, exported: Exported, windows: Sequence[Window]
     return by_equations(windows, share, wrench, frame["mass"], inertia, ardupilot_frame.GRAVITY, False)
 
 
-def _shares(vehicle: Vehicle, exported: Exported, windows: Sequence[Window], knows: frozenset[str]) -> np.ndarray:
+def _shares(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow], knows: frozenset[str]) -> np.ndarray:
     """Shares of full thrust, (w, m, 4), in the tool's order."""
     full = sih.full_speed_rad_s(vehicle, parts_of(sih.with_drag_of_hover(vehicle), knows))
     speed = np.array([w.speed for w in windows])[:, :, list(exported.rotor_order)]
     return (speed / full) ** 2
 
 
-def in_rotorpy(vehicle: Vehicle, exported: Exported, windows: Sequence[Window]) -> list[States]:
+def in_rotorpy(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow]) -> list[States]:
     """RotorPy's Multirotor with the exported parameters and their companion; the speeds are set at every sample and
     held over a step."""
     out, multirotor = [], multirotor_of(exported)
@@ -274,7 +274,7 @@ def in_rotorpy(vehicle: Vehicle, exported: Exported, windows: Sequence[Window]) 
     return out
 
 
-def in_mujoco(vehicle: Vehicle, exported: Exported, windows: Sequence[Window]) -> list[States]:
+def in_mujoco(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow]) -> list[States]:
     """MuJoCo with the exported model and its companion; the thrusts are set at every step."""
     import mujoco
 
@@ -284,7 +284,7 @@ def in_mujoco(vehicle: Vehicle, exported: Exported, windows: Sequence[Window]) -
         return _in_mujoco(vehicle, model, windows)
 
 
-def _in_mujoco(vehicle: Vehicle, model, windows: Sequence[Window]) -> list[States]:
+def _in_mujoco(vehicle: Vehicle, model, windows: Sequence[LogWindow]) -> list[States]:
     """Windows of a MuJoCo model."""
     import mujoco
 
@@ -326,16 +326,16 @@ def _from_flu(position, velocity, quaternion, rates, start: States) -> States:
     )
 
 
-def as_expressed(to: str) -> Callable[[Vehicle, Exported, Sequence[Window]], list[States]]:
+def as_expressed(to: str) -> Callable[[Vehicle, Exported, Sequence[LogWindow]], list[States]]:
     """Our simulator with the effects that a form expresses."""
 
-    def fly(vehicle: Vehicle, exported: Exported, windows: Sequence[Window]) -> list[States]:
+    def fly(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow]) -> list[States]:
         return _ours(model_of(expressed(vehicle, to)), windows)
 
     return fly
 
 
-FLYERS: dict[str, tuple[str, str, Callable[[Vehicle, Exported, Sequence[Window]], list[States]]]] = {
+FLYERS: dict[str, tuple[str, str, Callable[[Vehicle, Exported, Sequence[LogWindow]], list[States]]]] = {
     "px4-sih": ("PX4's SIH by its published equations", "", in_sih),
     "ardupilot-json": ("ArduPilot's simulated frame by its published equations", "", in_ardupilot),
     "rotorpy": ("RotorPy", "rotorpy", in_rotorpy),

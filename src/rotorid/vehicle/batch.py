@@ -19,7 +19,7 @@ from rotorid.effects.contract import Form
 from rotorid.errors import InputError
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle import fast
-from rotorid.vehicle.fast import AttitudeLoop, Flown
+from rotorid.vehicle.fast import AttitudeLoop, KeptStates
 from rotorid.vehicle.improved import (
     LAGS_OF_SPEED,
     active_forms,
@@ -36,7 +36,7 @@ class _Trajectories:
 
     time_s: np.ndarray
     """(m,)."""
-    flown: Flown
+    flown: KeptStates
 
     @property
     def angular_velocity(self) -> np.ndarray:

@@ -65,7 +65,7 @@ class AttitudeLoop:
 
 
 @dataclass(frozen=True)
-class Flown:
+class KeptStates:
     """What n vehicles did at the instants kept, each (n, kept, ...), SI."""
 
     states: np.ndarray
@@ -95,7 +95,7 @@ def fly(
     first_s: float = 0.0,
     every: int = 1,
     threads: int | None = None,
-) -> Flown:
+) -> KeptStates:
     """Fly n vehicles with constants `body` (1 or n,) from `start` (n, 13 + k) over `steps` steps.
 
     `commands` are rotor speeds (steps + 1, k) for all or (n, steps + 1, k), or a controller; `values` (n, p) are the
@@ -159,7 +159,7 @@ def fly(
         compiled.fly(*(given[name] for name in _ORDER))
 
     _spread(part, n, threads)
-    return Flown(own["states"], own["accelerations_out"], own["commands_out"])
+    return KeptStates(own["states"], own["accelerations_out"], own["commands_out"])
 
 
 _ORDER = compiled.fly.py_func.__code__.co_varnames[: compiled.fly.py_func.__code__.co_argcount]

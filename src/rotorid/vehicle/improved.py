@@ -17,7 +17,7 @@ from rotorid.recordings.run import RecordingSet
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.command_path import CommandPath
 from rotorid.vehicle.derivatives import derivative_form
-from rotorid.vehicle.simulator import Commands, Controller, Motors, Noise, Trace, recording, simulate
+from rotorid.vehicle.simulator import Commands, Controller, Motors, Trace, WhiteNoise, recording, simulate
 
 LAGS_OF_SPEED = frozenset({"one constant", "up and down"})
 """Forms of `motor_lag` that the simulator's own motors fly."""
@@ -194,7 +194,7 @@ def record_as_stated(
     trace: Trace,
     vehicle: Vehicle,
     name: str,
-    noise: Noise | None = None,
+    noise: WhiteNoise | None = None,
     rng: np.random.Generator | None = None,
     index: int = 0,
     every: int = 1,

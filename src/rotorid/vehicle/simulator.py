@@ -94,7 +94,7 @@ class Disturbance:
 
 
 @dataclass(frozen=True)
-class Noise:
+class WhiteNoise:
     """One sigma of white noise on each reading; 0 reads the truth."""
 
     attitude_rad: float = 0.0
@@ -155,7 +155,7 @@ def simulate(
     motors: Motors | None = None,
     effects: Sequence[tuple[Form, Sequence[float]]] = (),
     disturbance: Disturbance | None = None,
-    noise: Noise | None = None,
+    noise: WhiteNoise | None = None,
     rng: np.random.Generator | None = None,
     wind_m_s: np.ndarray | None = None,
     voltage_v: float | None = None,
@@ -172,7 +172,7 @@ def simulate(
     flown compiled.
     """
     start, motors = start or Start(), motors or Motors()
-    noise, disturbance = noise or Noise(), disturbance or Disturbance()
+    noise, disturbance = noise or WhiteNoise(), disturbance or Disturbance()
     random = noise.attitude_rad > 0 or disturbance.force_n > 0 or disturbance.moment_n_m > 0
     if random and rng is None:
         raise InputError("a simulation with noise or disturbance needs a random generator (rng)")
@@ -466,7 +466,7 @@ def recording(
     trace: Trace,
     vehicle: Vehicle,
     name: str,
-    noise: Noise | None = None,
+    noise: WhiteNoise | None = None,
     rng: np.random.Generator | None = None,
     index: int = 0,
     effects: Sequence[tuple[Form, Sequence[float]]] = (),
@@ -478,7 +478,7 @@ def recording(
     White `noise` on each reading; `effects` that act on sensors (bias, misalignment, lever arm) are added
     first.
     """
-    noise = noise or Noise()
+    noise = noise or WhiteNoise()
     rng = rng or np.random.default_rng(0)
     specific_force, rates = trace.specific_force[index].copy(), trace.angular_velocity[index].copy()
     motion = motion_of(trace, index, vehicle)

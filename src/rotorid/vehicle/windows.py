@@ -122,7 +122,7 @@ def simulate_windows(
     time_s = np.asarray(time_s, float)
     if sample is None:
         sample = plan_windows(time_s, window_s, step_s, usable(inputs, recorded))
-    flight = _Flight(vehicle, effects, time_s, inputs, recorded, sample)
+    flight = _WindowsFlight(vehicle, effects, time_s, inputs, recorded, sample)
     kernels = kernels_of(effects, vehicle) if compiled else None
     if kernels is not None:
         return Windows(sample, flight.states(flight.compiled(kernels)))
@@ -180,7 +180,7 @@ def halfway(values: np.ndarray, time_s: np.ndarray, sample: np.ndarray) -> np.nd
     return linear + np.where(even.reshape(even.shape + (1,) * (values.ndim - 1)), bend, 0.0)
 
 
-class _Flight:
+class _WindowsFlight:
     """Derivative of the state of all windows.
 
     State columns: rates 0:3, quaternion 3:7, velocity 7:10, position 10:13 (as far as they can be simulated).

@@ -7,7 +7,7 @@ import pandas as pd
 from scipy.signal import lfilter
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.mismatch.decision.findings import Analysis, Finding, Trace
+from rotorid.mismatch.decision.findings import Analysis, ChannelTrace, Finding
 from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import RecordingSet, Run, Split
 from tests.unit.vehicle.thesis import thesis_vehicle
@@ -89,7 +89,7 @@ def analysis(seed: int = 0, findings=(), bursts=(), dash: bool = True, pole: flo
             taken = np.zeros(len(time))
             if any(f.id == "rotor_drag" for f in findings) and channel == "force_x":
                 taken = -K_D * 4 * HOVER * speed
-            traces.append(Trace(r.name, channel, unit, time, after + taken, after + taken, after, after))
+            traces.append(ChannelTrace(r.name, channel, unit, time, after + taken, after + taken, after, after))
     vehicle = thesis_vehicle()
     values = dict(
         recordings=RecordingSet("made", vehicle, runs, ("b",)),

@@ -14,7 +14,7 @@ from rotorid.plan import mission, write
 from rotorid.plan.candidates import Reference, candidates, joined, smaller, standard
 from rotorid.plan.limits import Limits
 from rotorid.plan.plan import NOTHING, SIZES, Plan, Tried, broken, yaw_acceleration
-from rotorid.plan.simulate import World, commands, fly, followed, low_pass, recorded
+from rotorid.plan.simulate import CompetingModel, commands, fly, followed, low_pass, recorded
 from rotorid.recordings import templates
 
 LIMITS = Limits(x_m=(-8, 8), y_m=(-8, 8), height_m=(1, 8), speed_m_s=5, climb_m_s=2, tilt_deg=35)
@@ -42,7 +42,7 @@ def test_a_piece_starts_and_ends_at_rest_in_one_place(piece) -> None:
 @pytest.mark.parametrize("piece", PIECES, ids=lambda p: p.name)
 def test_a_candidate_keeps_the_limits_or_says_which_it_does_not(piece) -> None:
     try:
-        flight = fly(World(VEHICLE), joined([piece], 0.01), LIMITS.attitude_bandwidth_rad_s, LIMITS.middle_m)
+        flight = fly(CompetingModel(VEHICLE), joined([piece], 0.01), LIMITS.attitude_bandwidth_rad_s, LIMITS.middle_m)
     except InputError as error:
         assert "rotors" in str(error)
         return
@@ -58,7 +58,9 @@ def test_every_manoeuvre_can_be_flown_in_some_size() -> None:
     for share in SIZES:
         for piece in candidates(smaller(LIMITS, share), share * yaw_acceleration(VEHICLE)):
             try:
-                flight = fly(World(VEHICLE), joined([piece], 0.01), LIMITS.attitude_bandwidth_rad_s, LIMITS.middle_m)
+                flight = fly(
+                    CompetingModel(VEHICLE), joined([piece], 0.01), LIMITS.attitude_bandwidth_rad_s, LIMITS.middle_m
+                )
             except InputError:
                 continue
             kept |= set() if broken(flight, LIMITS, VEHICLE) else {piece.name}
@@ -74,7 +76,7 @@ def test_the_standard_flight_is_as_long_as_asked_and_ends_where_it_starts(second
     velocity = np.gradient(reference.position_m, reference.time_s, axis=0)
     assert np.abs(reference.position_m[[0, -1]]).max() < 1e-9 and np.abs(velocity[[0, -1]]).max() < 0.02
     assert reference.yaw_rad[-1] == pytest.approx(0.0, abs=1e-9)
-    flight = fly(World(VEHICLE), joined([made], 0.01), LIMITS.attitude_bandwidth_rad_s, LIMITS.middle_m)
+    flight = fly(CompetingModel(VEHICLE), joined([made], 0.01), LIMITS.attitude_bandwidth_rad_s, LIMITS.middle_m)
     assert broken(flight, LIMITS, VEHICLE) == ""
 
 
@@ -130,7 +132,7 @@ def left_of(flight, world) -> dict[str, np.ndarray]:
 
 
 def test_without_an_effect_nothing_is_left_of_the_rigid_body() -> None:
-    world = World(VEHICLE)
+    world = CompetingModel(VEHICLE)
     flight = fly(world, joined([piece("eight")], 0.002), 9.0, LIMITS.middle_m)
     left = left_of(flight, world)
     assert np.abs(left["force"]).max() < 2e-3 * VEHICLE.mass_kg * 9.81
@@ -140,7 +142,7 @@ def test_without_an_effect_nothing_is_left_of_the_rigid_body() -> None:
 def test_an_effect_of_the_model_is_what_is_left() -> None:
     form = next(f for f in catalogue()["frame_drag"].forms(VEHICLE) if f.name == "isotropic")
     values = np.array([0.01])
-    world = World(VEHICLE, ((form, values),))
+    world = CompetingModel(VEHICLE, ((form, values),))
     flight = fly(world, joined([piece("pass 0 at 1")], 0.002), 9.0, LIMITS.middle_m)
     left = left_of(flight, world)["force"]
     wanted = form.contribution(flight.motion, VEHICLE, values).force
@@ -152,7 +154,7 @@ def test_an_effect_of_the_model_is_what_is_left() -> None:
 
 def test_commands_lead_the_rotors_by_their_lag() -> None:
     form = next(f for f in catalogue()["motor_lag"].speed_forms if f.name == "one constant")
-    world = World(VEHICLE, chain=((form, np.array([0.05])),), full_speed_rad_s=2500.0)
+    world = CompetingModel(VEHICLE, chain=((form, np.array([0.05])),), full_speed_rad_s=2500.0)
     flight = fly(world, joined([piece("shake height to 1 Hz")], 0.002), 9.0, LIMITS.middle_m)
     motion = flight.motion
     lead = commands(world, motion) - motion.rotor_speed
@@ -167,14 +169,14 @@ def test_rotors_that_would_turn_backwards_are_refused() -> None:
     falls = np.zeros((len(t), 3))
     falls[:, 2] = 20.0 * np.clip(t - 1, 0, None) ** 2
     with pytest.raises(InputError, match="backwards"):
-        fly(World(VEHICLE), Reference(t, falls, 2.0 * np.sin(30 * t)), 30.0, (0, 0, 100))
+        fly(CompetingModel(VEHICLE), Reference(t, falls, 2.0 * np.sin(30 * t)), 30.0, (0, 0, 100))
 
 
 @pytest.fixture(scope="module")
 def a_plan() -> Plan:
     pieces = (piece("drift"), piece("pass 45 at 1"))
     reference = joined(pieces, 0.004)
-    flight = fly(World(VEHICLE), reference, 9.0, LIMITS.middle_m)
+    flight = fly(CompetingModel(VEHICLE), reference, 9.0, LIMITS.middle_m)
     return Plan("chosen", pieces, reference, flight, (), (), "set", LIMITS)
 
 

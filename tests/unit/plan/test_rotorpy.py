@@ -8,7 +8,7 @@ from rotorid.plan import write
 from rotorid.plan.candidates import candidates, joined, smaller
 from rotorid.plan.limits import Limits
 from rotorid.plan.plan import Plan, yaw_acceleration
-from rotorid.plan.simulate import World, fly
+from rotorid.plan.simulate import CompetingModel, fly
 from rotorid.recordings import Vehicle
 
 STEP_S = 0.01
@@ -66,7 +66,7 @@ def test_rotorpy_flies_a_plan_within_the_limits(names: tuple[str, ...]) -> None:
     options = {p.name: p for p in candidates(smaller(LIMITS, SIZE), SIZE * yaw_acceleration(vehicle))}
     pieces = tuple(options[n] for n in names)
     reference = joined(pieces, 0.004)
-    expected = fly(World(vehicle), reference, bandwidth, LIMITS.middle_m, position)
+    expected = fly(CompetingModel(vehicle), reference, bandwidth, LIMITS.middle_m, position)
     table, _ = write.crazyflie(Plan("chosen", pieces, reference, expected, (), (), "set", LIMITS))
 
     first = flat(table, 0.0)

@@ -14,7 +14,7 @@ from rotorid.cli import app
 from rotorid.errors import InputError
 from rotorid.recordings import Vehicle, write_set
 from rotorid.report import next_to_log
-from rotorid.report.next_to_log import Window, by_equations
+from rotorid.report.next_to_log import LogWindow, by_equations
 from rotorid.vehicle.exports import ardupilot_frame, export_vehicle, sih
 from rotorid.vehicle.exports.gazebo_airframe import gazebo_airframe
 from rotorid.vehicle.mixer import hover_speed_rad_s
@@ -28,7 +28,7 @@ def x500(*effects: dict) -> Vehicle:
     return rotorid.template("x500", effects=list(effects))
 
 
-def hovering(vehicle: Vehicle, velocity=(0.0, 0.0, 0.0), speed: np.ndarray | None = None) -> Window:
+def hovering(vehicle: Vehicle, velocity=(0.0, 0.0, 0.0), speed: np.ndarray | None = None) -> LogWindow:
     """Half a second from a level start at the hover's rotor speed."""
     time = np.arange(51) * 0.01
     speeds = np.full((51, vehicle.rotor_count), hover_speed_rad_s(vehicle)) if speed is None else speed
@@ -38,7 +38,7 @@ def hovering(vehicle: Vehicle, velocity=(0.0, 0.0, 0.0), speed: np.ndarray | Non
         np.tile(np.array(velocity, float), (51, 1)),
         np.zeros((51, 3)),
     )
-    return Window("run", time, speeds, level, np.zeros(3))
+    return LogWindow("run", time, speeds, level, np.zeros(3))
 
 
 FORMS = {"px4-sih": next_to_log.in_sih, "ardupilot-json": next_to_log.in_ardupilot}

@@ -19,7 +19,7 @@ from rotorid.vehicle.compiled import _invert
 from rotorid.vehicle.control.pid import AttitudePid, Gains, training_reference
 from rotorid.vehicle.improved import simulate_as_stated
 from rotorid.vehicle.kernels import ADDED, INSTANT, body_of, kernel_values, kernels_of
-from rotorid.vehicle.simulator import Commands, Disturbance, Motors, Noise, Start, simulate
+from rotorid.vehicle.simulator import Commands, Disturbance, Motors, Start, WhiteNoise, simulate
 from rotorid.vehicle.windows import Inputs, States, simulate_windows
 from tests.unit.effects.flown import audit_vehicle, commands, start, typical_values
 
@@ -198,7 +198,7 @@ def test_a_controller_flies_compiled_as_it_is_called(kind):
             begin,
             Motors(0.03),
             held,
-            noise=Noise(attitude_rad=0.01),
+            noise=WhiteNoise(attitude_rad=0.01),
             rng=np.random.default_rng(1),
             compiled=c,
         )

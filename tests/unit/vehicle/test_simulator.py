@@ -17,8 +17,8 @@ from rotorid.vehicle.simulator import (
     Commands,
     Disturbance,
     Motors,
-    Noise,
     Start,
+    WhiteNoise,
     recording,
     simulate,
 )
@@ -347,7 +347,7 @@ def test_thesis_attitude_control_follows_its_reference():
 def test_noise_and_disturbance_have_their_stated_size_and_seed():
     vehicle = thesis_vehicle()
     hold = Commands(np.array([0.0]), np.full((1, 4), 1073.0))
-    noise = Noise(angular_velocity_rad_s=0.02, specific_force_m_s2=0.15, rotor_speed_relative=0.01)
+    noise = WhiteNoise(angular_velocity_rad_s=0.02, specific_force_m_s2=0.15, rotor_speed_relative=0.01)
     quiet = simulate(vehicle, hold, 2.0, 0.001)
     run = recording(quiet, vehicle, "hover", noise, np.random.default_rng(1))
     assert np.std(run.column("angular_velocity_x_rad_s")) == pytest.approx(0.02, rel=0.06)

@@ -28,7 +28,7 @@ _Residuals = Callable[[np.ndarray], Sequence[np.ndarray]]
 
 
 @dataclass(frozen=True)
-class Estimate:
+class EstimatedNumber:
     """A number with its 95 % interval."""
 
     value: float
@@ -40,7 +40,7 @@ class Estimate:
 
 
 @dataclass(frozen=True)
-class Fit:
+class CorrelatedFit:
     """Values with what their errors are known by."""
 
     values: np.ndarray
@@ -52,7 +52,7 @@ class Fit:
     innovation: float
     """Standard deviation of the whitened residuals."""
 
-    def of(self, quantity: Callable[[np.ndarray], float]) -> Estimate:
+    def of(self, quantity: Callable[[np.ndarray], float]) -> EstimatedNumber:
         """A quantity of the values with its 95 % interval, by its derivative (numerical)."""
         value = float(quantity(self.values))
         steps = 1e-3 * np.sqrt(np.maximum(np.diag(self.classical), 1e-24))
@@ -67,7 +67,7 @@ class Fit:
             np.sqrt(slope @ self.classical @ slope) * student.ppf(0.5 + LEVEL / 2, 1000),
             np.sqrt(slope @ self.sandwich @ slope) * student.ppf(0.5 + LEVEL / 2, free),
         )
-        return Estimate(value, (value - float(half), value + float(half)))
+        return EstimatedNumber(value, (value - float(half), value + float(half)))
 
 
 def fit(
@@ -76,7 +76,7 @@ def fit(
     bounds: tuple[np.ndarray, np.ndarray],
     scale: np.ndarray,
     prior: np.ndarray,
-) -> Fit:
+) -> CorrelatedFit:
     """Values (p,) that make the residuals small.
 
     `bounds`, `scale` and `prior` are by value: where it may lie, its usual size, and the standard deviation of what is
@@ -102,7 +102,7 @@ def fit(
         values = solved.x
     count = len(solved.fun) - int(believed.sum())
     white, jacobian = solved.fun[:count], solved.jac[:count]
-    return Fit(values, *_covariances(jacobian, white, prior))
+    return CorrelatedFit(values, *_covariances(jacobian, white, prior))
 
 
 def _covariances(

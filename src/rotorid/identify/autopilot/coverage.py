@@ -14,15 +14,15 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.identify.autopilot.known_flights import GRAVITY, Truth, drawn, flight
-from rotorid.identify.autopilot.parameters import Parameter, parameters_of
+from rotorid.identify.autopilot.known_flights import GRAVITY, FlightTruth, drawn, flight
+from rotorid.identify.autopilot.parameters import AutopilotParameter, parameters_of
 from rotorid.identify.autopilot.thrust_maps import MAPS
 
 FLIGHTS = 25
 SEED = 46
 
 
-def _true_values(truth: Truth) -> dict[str, float]:
+def _true_values(truth: FlightTruth) -> dict[str, float]:
     """What a flight was made with, by the names and in the units of `parameters_of`."""
     shapes = MAPS[truth.autopilot].shapes
     values = {s.name: s.factor * v for s, v in zip(shapes, truth.shapes, strict=True)}
@@ -42,7 +42,9 @@ def counted(autopilot: str, seeds: Sequence[int], seconds: float = 40.0) -> pd.D
     for seed in seeds:
         rng = np.random.default_rng([SEED, list(MAPS).index(autopilot), seed])
         truth = drawn(autopilot, rng)
-        found: dict[str, Parameter] = {p.name: p for p in parameters_of(flight(truth, rng, seconds), autopilot)}
+        found: dict[str, AutopilotParameter] = {
+            p.name: p for p in parameters_of(flight(truth, rng, seconds), autopilot)
+        }
         for name, true in _true_values(truth).items():
             p = found[name]
             low, high = p.interval_95

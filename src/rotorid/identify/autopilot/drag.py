@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rotorid.identify.autopilot.correlated import Estimate, fit
+from rotorid.identify.autopilot.correlated import EstimatedNumber, fit
 from rotorid.identify.autopilot.signals import Stretch
 from rotorid.identify.autopilot.thrust import averaged
 
@@ -34,12 +34,12 @@ WIND_M_S = 5.0
 class DragFit:
     """Drag by PX4's law."""
 
-    bluff_x: Estimate
+    bluff_x: EstimatedNumber
     """1/EKF2_BCOEF_X, m²/kg."""
-    bluff_y: Estimate
-    momentum: Estimate
+    bluff_y: EstimatedNumber
+    momentum: EstimatedNumber
     """EKF2_MCOEF, 1/s."""
-    wind: dict[str, tuple[Estimate, Estimate]]
+    wind: dict[str, tuple[EstimatedNumber, EstimatedNumber]]
     """By run the wind towards north and east, m/s."""
     fastest_m_s: float
     """99 % quantile of the horizontal speed."""

@@ -25,7 +25,7 @@ LEAST_SHARE = 0.02
 
 
 @dataclass(frozen=True)
-class Truth:
+class FlightTruth:
     """What a flight is made with; SI units unless named."""
 
     autopilot: str
@@ -51,7 +51,7 @@ class Truth:
     """Vertical acceleration of the climbs."""
 
 
-def drawn(autopilot: str, rng: np.random.Generator) -> Truth:
+def drawn(autopilot: str, rng: np.random.Generator) -> FlightTruth:
     """A truth of usual size for an autopilot."""
     u = rng.uniform
     shapes = {
@@ -61,7 +61,7 @@ def drawn(autopilot: str, rng: np.random.Generator) -> Truth:
         "crazyflie": lambda: (u(0.075, 0.1), u(-0.0008, -0.0004)),
     }[autopilot]()
     small = autopilot == "crazyflie"
-    return Truth(
+    return FlightTruth(
         autopilot,
         shapes,
         mass_kg=u(0.027, 0.036) if small else u(0.5, 2.5),
@@ -96,7 +96,7 @@ def signal_of(autopilot: str, thrust: np.ndarray, voltage: np.ndarray, shapes: t
     return (shapes[1] * thrust**2 + shapes[0] * thrust) / voltage  # motorsCompensateBatteryVoltage
 
 
-def flight(truth: Truth, rng: np.random.Generator, seconds: float = 40.0, rate_hz: int = 250) -> RecordingSet:
+def flight(truth: FlightTruth, rng: np.random.Generator, seconds: float = 40.0, rate_hz: int = 250) -> RecordingSet:
     """One flight as its sensors record it; the vehicle is of the right mass, its other values are the template's."""
     time_s = np.arange(int(seconds * _INNER_HZ) + 1) / _INNER_HZ
     euler = _angles(time_s, truth, rng)
@@ -137,7 +137,7 @@ def flight(truth: Truth, rng: np.random.Generator, seconds: float = 40.0, rate_h
     return RecordingSet("known", vehicle, (Run("flight", pd.DataFrame(table)),))
 
 
-def _vehicle(truth: Truth) -> Vehicle:
+def _vehicle(truth: FlightTruth) -> Vehicle:
     """A template of about the right size with the true mass and an inertia that goes with it."""
     name = "crazyflie-2.1" if truth.autopilot == "crazyflie" else "x500"
     template = templates.read(name)
@@ -155,7 +155,7 @@ def _sines(time_s: np.ndarray, lowest_hz, highest_hz, sizes, rng: np.random.Gene
     return np.sin(time_s[:, None] * omega + phase) @ np.asarray(sizes)
 
 
-def _angles(time_s: np.ndarray, truth: Truth, rng: np.random.Generator) -> np.ndarray:
+def _angles(time_s: np.ndarray, truth: FlightTruth, rng: np.random.Generator) -> np.ndarray:
     """Roll, pitch, yaw (n, 3), rad: slow tilts that make speed, small quick ones, and a yaw that turns."""
     tilts = [
         _sines(time_s, [0.04, 0.1, 0.5], [0.09, 0.2, 1.0], rng.uniform([0.1, 0.05, 0.02], [0.25, 0.1, 0.05]), rng)
@@ -164,13 +164,13 @@ def _angles(time_s: np.ndarray, truth: Truth, rng: np.random.Generator) -> np.nd
     return np.column_stack([*tilts, rng.uniform(-3, 3) + _sines(time_s, [0.03], [0.07], [1.0], rng)])
 
 
-def _drag(rotation: np.ndarray, velocity: np.ndarray, truth: Truth) -> np.ndarray:
+def _drag(rotation: np.ndarray, velocity: np.ndarray, truth: FlightTruth) -> np.ndarray:
     """Specific force along body x and y, (n, 2), m/s²."""
     through = np.einsum("nji,nj->ni", rotation, velocity - np.array([*truth.wind_m_s, 0.0]))
     return specific_drag(through, *truth.bluff, truth.momentum)
 
 
-def _velocity(time_s: np.ndarray, rotation: np.ndarray, thrust: np.ndarray, truth: Truth) -> np.ndarray:
+def _velocity(time_s: np.ndarray, rotation: np.ndarray, thrust: np.ndarray, truth: FlightTruth) -> np.ndarray:
     """Velocity (n, 3), m/s, by Euler's steps of `STEP` samples, joined by straight lines."""
     coarse = np.arange(0, len(time_s), STEP)
     out, now = np.empty((len(coarse), 3)), np.zeros(3)

@@ -9,7 +9,7 @@ from difflib import get_close_matches
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.identify.autopilot.correlated import Estimate
+from rotorid.identify.autopilot.correlated import EstimatedNumber
 from rotorid.identify.autopilot.drag import DragFit, fit_drag
 from rotorid.identify.autopilot.signals import stretches_of
 from rotorid.identify.autopilot.thrust import TIME_CONSTANTS_S, ThrustFit, fit_thrust
@@ -29,7 +29,7 @@ _HOVERS = {"px4": ("MPC_THR_HOVER", (0.1, 0.8)), "ardupilot": ("MOT_THST_HOVER",
 
 
 @dataclass(frozen=True)
-class Parameter:
+class AutopilotParameter:
     """One number for an autopilot."""
 
     name: str
@@ -45,7 +45,7 @@ class Parameter:
     decimals: int = 3
 
 
-def parameters_of(recordings: RecordingSet, to: str) -> tuple[Parameter, ...]:
+def parameters_of(recordings: RecordingSet, to: str) -> tuple[AutopilotParameter, ...]:
     """The parameters of an autopilot (`px4`, `ardupilot`, `betaflight`, `crazyflie`) by a set of flights.
 
     InputError names the autopilots there are, or what the recordings lack for all of it.
@@ -66,11 +66,11 @@ def parameters_of(recordings: RecordingSet, to: str) -> tuple[Parameter, ...]:
     return tuple(out)
 
 
-def _nothing(name: str, unit: str, why: str) -> Parameter:
-    return Parameter(name, np.nan, (-np.inf, np.inf), unit, False, f"not determined by this flight: {why}")
+def _nothing(name: str, unit: str, why: str) -> AutopilotParameter:
+    return AutopilotParameter(name, np.nan, (-np.inf, np.inf), unit, False, f"not determined by this flight: {why}")
 
 
-def _missing(chosen: ThrustMap, to: str) -> list[Parameter]:
+def _missing(chosen: ThrustMap, to: str) -> list[AutopilotParameter]:
     why = "it holds no signals of the motors (throttle_1 …)"
     if chosen.in_grams:
         why += " together with the battery's voltage"
@@ -78,13 +78,13 @@ def _missing(chosen: ThrustMap, to: str) -> list[Parameter]:
     return [_nothing(name, "", why) for name in (*names, "hover_signal", "motor_time_constant_s")]
 
 
-def _no_drag() -> list[Parameter]:
+def _no_drag() -> list[AutopilotParameter]:
     why = "drag needs attitude and velocity"
     units = {"EKF2_BCOEF_X": "kg/m²", "EKF2_BCOEF_Y": "kg/m²", "EKF2_MCOEF": "1/s"}
     return [_nothing(name, unit, why) for name, unit in units.items()]
 
 
-def _of_thrust(found: ThrustFit, chosen: ThrustMap, to: str) -> list[Parameter]:
+def _of_thrust(found: ThrustFit, chosen: ThrustMap, to: str) -> list[AutopilotParameter]:
     flown = "signals from {:.2f} to {:.2f} were flown".format(*found.throttle_range)
     out = []
     for shape, estimate in zip(chosen.shapes, found.shapes, strict=True):
@@ -105,7 +105,7 @@ def _of_thrust(found: ThrustFit, chosen: ThrustMap, to: str) -> list[Parameter]:
         value = shape.factor * estimate.value
         settable = shape.factor * float(np.clip(estimate.value, *shape.allowed))
         out.append(
-            Parameter(
+            AutopilotParameter(
                 shape.name, value, (low, high), unit, not wide, sentence, None if wide else settable, shape.decimals
             )
         )
@@ -118,7 +118,7 @@ def _of_thrust(found: ThrustFit, chosen: ThrustMap, to: str) -> list[Parameter]:
         if not fine:
             sentence = "not determined by this flight: full thrust follows from the curve, which it does not determine"
         out.append(
-            Parameter(
+            AutopilotParameter(
                 name, share.value, share.interval_95, "", fine, sentence,
                 float(np.clip(share.value, *allowed)) if fine else None,
             )
@@ -126,7 +126,7 @@ def _of_thrust(found: ThrustFit, chosen: ThrustMap, to: str) -> list[Parameter]:
     hover, lag = found.hover_signal, found.time_constant_s
     fine = hover.half_width <= _WIDEST_HOVER * hover.value
     sentence = "signal of the motors that makes the weight" if fine else "not determined by this flight"
-    out.append(Parameter("hover_signal", hover.value, hover.interval_95, "", fine, sentence))
+    out.append(AutopilotParameter("hover_signal", hover.value, hover.interval_95, "", fine, sentence))
     fine = (
         lag.half_width <= _WIDEST_SHARE * lag.value
         and 1.1 * TIME_CONSTANTS_S[0] < lag.value < TIME_CONSTANTS_S[1] / 1.1
@@ -134,11 +134,11 @@ def _of_thrust(found: ThrustFit, chosen: ThrustMap, to: str) -> list[Parameter]:
     sentence = "lag of the rotors' speed behind the signal, with that of the accelerometer's filter"
     if not fine:
         sentence = "not determined by this flight: the thrust changed too slowly, or the log is too coarse, to see it"
-    out.append(Parameter("motor_time_constant_s", lag.value, lag.interval_95, "s", fine, sentence, decimals=4))
+    out.append(AutopilotParameter("motor_time_constant_s", lag.value, lag.interval_95, "s", fine, sentence, decimals=4))
     return out
 
 
-def _of_drag(found: DragFit) -> list[Parameter]:
+def _of_drag(found: DragFit) -> list[AutopilotParameter]:
     flown = f"speeds up to {found.fastest_m_s:.1f} m/s were flown"
     out = []
     for name, estimate in (("EKF2_BCOEF_X", found.bluff_x), ("EKF2_BCOEF_Y", found.bluff_y)):
@@ -151,14 +151,18 @@ def _of_drag(found: DragFit) -> list[Parameter]:
             at_least = f"; at least {ends[0]:.3g} kg/m²" if np.isfinite(ends[0]) and ends[0] > 0 else ""
             sentence = f"not determined by this flight: {flown}; fly faster, there and back{at_least}"
         out.append(
-            Parameter(name, value, ends, "kg/m²", fine, sentence, min(value, _LARGEST_BCOEF) if fine else None, 1)
+            AutopilotParameter(
+                name, value, ends, "kg/m²", fine, sentence, min(value, _LARGEST_BCOEF) if fine else None, 1
+            )
         )
     m = found.momentum
     fine = m.half_width <= _WIDEST_SHARE * abs(m.value)
     sentence = "drag of the rotors, jointly with the wind" if fine else "not determined by this flight"
     sentence = f"{sentence}; {flown}"
     out.append(
-        Parameter("EKF2_MCOEF", m.value, m.interval_95, "1/s", fine, sentence, max(m.value, 0.0) if fine else None)
+        AutopilotParameter(
+            "EKF2_MCOEF", m.value, m.interval_95, "1/s", fine, sentence, max(m.value, 0.0) if fine else None
+        )
     )
     for run, wind in found.wind.items():
         for word, part in zip(("north", "east"), wind, strict=True):
@@ -166,13 +170,13 @@ def _of_drag(found: DragFit) -> list[Parameter]:
     return out
 
 
-def _wind(name: str, part: Estimate) -> Parameter:
+def _wind(name: str, part: EstimatedNumber) -> AutopilotParameter:
     fine = part.half_width <= _WIDEST_WIND_M_S
     sentence = "towards which the air moved, on the mean of the run" if fine else "not determined by this flight"
-    return Parameter(name, part.value, part.interval_95, "m/s", fine, sentence, decimals=2)
+    return AutopilotParameter(name, part.value, part.interval_95, "m/s", fine, sentence, decimals=2)
 
 
-def as_text(found: Sequence[Parameter], to: str) -> str:
+def as_text(found: Sequence[AutopilotParameter], to: str) -> str:
     """A file that the autopilot's tools load: what is determined as settings, the rest as comments.
 
     PX4: QGroundControl's parameter file; ArduPilot: `NAME,VALUE`; Betaflight: CLI; Crazyflie: the constants of

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from rotorid.identify.autopilot.correlated import Estimate, Fit, fit
+from rotorid.identify.autopilot.correlated import CorrelatedFit, EstimatedNumber, fit
 from rotorid.identify.autopilot.signals import Stretch
 from rotorid.identify.autopilot.thrust_maps import ThrustMap
 
@@ -35,12 +35,12 @@ _DRIFT, _AXIAL, _LIFT = 0.1, 1.0, 0.05
 class ThrustFit:
     """The estimates of a thrust curve."""
 
-    shapes: tuple[Estimate, ...]
+    shapes: tuple[EstimatedNumber, ...]
     """Of the map's numbers, in its order."""
-    time_constant_s: Estimate
-    hover_signal: Estimate
+    time_constant_s: EstimatedNumber
+    hover_signal: EstimatedNumber
     """Signal of the motors at which they make the weight, 0 to 1."""
-    hover_share: Estimate
+    hover_share: EstimatedNumber
     """Weight over the thrust at full signal."""
     throttle_range: tuple[float, float]
     """1 % and 99 % quantile of the signals flown."""
@@ -82,11 +82,11 @@ def fit_thrust(
     )
 
 
-def _exponential(found: Fit, index: int) -> Estimate:
+def _exponential(found: CorrelatedFit, index: int) -> EstimatedNumber:
     """exp of a value, with an interval that stays positive."""
     log = found.of(lambda v: float(v[index]))
     low, high = np.exp(np.clip(log.interval_95, -50, 50))
-    return Estimate(float(np.exp(log.value)), (float(low), float(high)))
+    return EstimatedNumber(float(np.exp(log.value)), (float(low), float(high)))
 
 
 def _per_share(values: np.ndarray, chosen: ThrustMap, mass_kg: float, rotors: int) -> float:

@@ -10,7 +10,7 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.identify.blackbox.experiments import INPUTS, OUTPUTS
-from rotorid.identify.blackbox.models import Predict, Scale
+from rotorid.identify.blackbox.models import ColumnScale, Predict
 
 _INPUT_NAMES = {f"force_{i}_n": f"the force of motor {i} (N)" for i in (1, 2, 3, 4)} | {
     "roll_rad": "roll (rad)",
@@ -104,7 +104,7 @@ def conformal_coverage(
 class TrainingRange:
     """Where the training samples lie; says when an input is outside."""
 
-    scale: Scale
+    scale: ColumnScale
     points: np.ndarray
     reach: float
     """Distance to the nearest other experiment's sample within which 99 % of the training samples lie, scaled."""
@@ -112,7 +112,7 @@ class TrainingRange:
     @classmethod
     def of(cls, table: pd.DataFrame) -> TrainingRange:
         values = table[list(INPUTS)].to_numpy()
-        scale = Scale.of(values)
+        scale = ColumnScale.of(values)
         points = scale.apply(values)
         experiments = table["experiment"].to_numpy()
         gap = np.linalg.norm(points[:, None] - points[None], axis=2)

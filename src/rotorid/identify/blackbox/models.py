@@ -38,14 +38,14 @@ NAMES = {
 
 
 @dataclass(frozen=True)
-class Scale:
+class ColumnScale:
     """Even scaling of columns to 0-1 over the training data, as networks want it."""
 
     low: np.ndarray
     high: np.ndarray
 
     @classmethod
-    def of(cls, values: np.ndarray) -> Scale:
+    def of(cls, values: np.ndarray) -> ColumnScale:
         low, high = values.min(axis=0), values.max(axis=0)
         return cls(low, np.where(high > low, high, low + 1.0))
 
@@ -67,7 +67,7 @@ def fit_thesis_network(
 ) -> tuple[Predict, Trained]:
     """Train the network of thesis 4.4 on a table with `INPUTS` and `OUTPUTS`."""
     x, y = table[list(INPUTS)].to_numpy(), table[list(OUTPUTS)].to_numpy()
-    scale_x, scale_y = Scale.of(x), Scale.of(y)
+    scale_x, scale_y = ColumnScale.of(x), ColumnScale.of(y)
     sizes = (len(INPUTS), *hidden, len(OUTPUTS))
     activations = ("sigmoid",) * len(hidden) + ("linear",)
     network = build(sizes, activations, np.random.default_rng(seed))

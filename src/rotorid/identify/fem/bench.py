@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from rotorid.errors import InputError
 from rotorid.identify.fem import cell, placement
-from rotorid.identify.fem.placement import THIRD, Frame
+from rotorid.identify.fem.placement import THIRD, PartFrame
 from rotorid.identify.fem.sizes import Assumed, Sizes
 from rotorid.identify.fem.tets import Flat, Pad, Tets, block, column, count, joined, stacked
 
@@ -40,7 +40,7 @@ class Leg:
     """The model's geometry, in frame {T} (z down, origin on top of plate D)."""
 
     parts: Mapping[str, Tets]
-    frames: Mapping[str, Frame]
+    frames: Mapping[str, PartFrame]
     """Own frames of the cells and of plate D."""
     bonds: tuple[_Bond, ...]
     base: Pad
@@ -93,7 +93,7 @@ def build(assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fine
     base = Pad(np.append(ground[:2], sizes.foot_depth_m), UP, lower.axis, (sizes.foot_side_m, sizes.cell_side_m))
     counts = (count(1, fineness) + 1, count(1, fineness) + 1, count(3, fineness))
     frames = {name: _frame(place, sizes) for name, place in zip(CELLS, (upper, lower), strict=True)}
-    frames["D"] = Frame(np.zeros(3), placement.turn(np.arctan2(under[1], under[0])).T)
+    frames["D"] = PartFrame(np.zeros(3), placement.turn(np.arctan2(under[1], under[0])).T)
     parts = {
         **{name: cell.mesh(sizes, fineness).put(frames[name]) for name in CELLS},
         "A": column("A", base, held, counts),
@@ -115,9 +115,9 @@ def _other_end(place: placement.Place, sizes: Sizes) -> np.ndarray:
     return place.force_m + sizes.cell_between_pads_m * place.axis
 
 
-def _frame(place: placement.Place, sizes: Sizes) -> Frame:
+def _frame(place: placement.Place, sizes: Sizes) -> PartFrame:
     middle = place.force_m + sizes.cell_between_pads_m / 2 * place.axis
-    return Frame(middle, np.stack([place.axis, place.sense, np.cross(place.axis, place.sense)]))
+    return PartFrame(middle, np.stack([place.axis, place.sense, np.cross(place.axis, place.sense)]))
 
 
 def _seat_radius_m(area_m2: float, fineness: float) -> float:

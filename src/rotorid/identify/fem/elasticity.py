@@ -46,7 +46,7 @@ class Hole:
 
 
 @dataclass(frozen=True)
-class Body:
+class LooseParts:
     """Parts with a mesh each, not yet held together."""
 
     names: tuple[str, ...]
@@ -58,7 +58,9 @@ class Body:
     """Name of the material of each part."""
 
     @classmethod
-    def of(cls, parts: Mapping[str, Tets], holes: Sequence[Hole] = (), groups: Mapping[str, str] | None = None) -> Body:
+    def of(
+        cls, parts: Mapping[str, Tets], holes: Sequence[Hole] = (), groups: Mapping[str, str] | None = None
+    ) -> LooseParts:
         """All parts in one mesh; edges between corners on the wall of a hole are bent onto it.
 
         `groups` names the material of each part; without it each part has one of its own name.

@@ -8,15 +8,15 @@ from __future__ import annotations
 import numpy as np
 
 from rotorid.identify.fem import cell, elasticity
-from rotorid.identify.fem.elasticity import Body, Hole
-from rotorid.identify.fem.placement import Frame
+from rotorid.identify.fem.elasticity import Hole, LooseParts
+from rotorid.identify.fem.placement import PartFrame
 from rotorid.identify.fem.sizes import Material, Sizes
 from rotorid.identify.fem.tets import Pad, on
 
 NAME = "cell"
 
 
-def holes(name: str, sizes: Sizes, frame: Frame) -> list[Hole]:
+def holes(name: str, sizes: Sizes, frame: PartFrame) -> list[Hole]:
     """The two holes of the cell `name` with this own frame."""
     reach = sizes.cell_between_holes_m / 2
     return [
@@ -25,7 +25,7 @@ def holes(name: str, sizes: Sizes, frame: Frame) -> list[Hole]:
     ]
 
 
-def gauge_strains(body: Body, name: str, sizes: Sizes, frame: Frame, moved_m: np.ndarray) -> np.ndarray:
+def gauge_strains(body: LooseParts, name: str, sizes: Sizes, frame: PartFrame, moved_m: np.ndarray) -> np.ndarray:
     """Strain of the four gauges of the cell `name`, shape (4,): change of length of each grid over its length.
 
     Parameters
@@ -49,8 +49,8 @@ def bridge_strain(strains: np.ndarray) -> float:
 
 def strain_per_newton(sizes: Sizes, material: Material, fineness: float) -> float:
     """Strain of the bridge per newton across the free end [1/N]."""
-    frame = Frame(np.zeros(3), np.eye(3))
-    body = Body.of({NAME: cell.mesh(sizes, fineness)}, holes(NAME, sizes, frame))
+    frame = PartFrame(np.zeros(3), np.eye(3))
+    body = LooseParts.of({NAME: cell.mesh(sizes, fineness)}, holes(NAME, sizes, frame))
     half, reach = sizes.cell_side_m / 2, sizes.cell_between_pads_m / 2
     pad = Pad(np.array([reach, -half, 0.0]), frame.axes[1], frame.axes[0], (sizes.cell_pad_m, sizes.cell_side_m))
     end = np.array([-reach, half, 0.0])

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from rotorid.errors import InputError
 from rotorid.identify.fem import bench, elasticity, placement
 from rotorid.identify.fem.bench import CELLS, PIECES, UP, Leg
-from rotorid.identify.fem.elasticity import Body, Bound
+from rotorid.identify.fem.elasticity import Bound, LooseParts
 from rotorid.identify.fem.gauges import gauge_strains, holes
 from rotorid.identify.fem.sizes import Assumed, Material, Sizes
 from rotorid.identify.fem.tets import on
@@ -40,14 +40,14 @@ class Bench:
 
     leg: Leg
     sizes: Sizes
-    body: Body
+    body: LooseParts
 
     @classmethod
     def of(cls, assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fineness: float) -> Bench:
         """The bench of these sizes; InputError where they do not go together."""
         leg = bench.build(assumed, sizes, distances_m, fineness)
         walls = [hole for name in CELLS for hole in holes(name, sizes, leg.frames[name])]
-        return cls(leg, sizes, Body.of(leg.parts, walls, GROUPS))
+        return cls(leg, sizes, LooseParts.of(leg.parts, walls, GROUPS))
 
     @cached_property
     def binding(self) -> sparse.csr_matrix:

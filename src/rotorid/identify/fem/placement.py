@@ -22,7 +22,7 @@ SLOPE = {"upper": 0.0, "lower": np.radians(45.0)}
 
 
 @dataclass(frozen=True)
-class Frame:
+class PartFrame:
     """A part's own frame in the bench's: own coordinates are (point - origin) @ axes.T."""
 
     origin_m: np.ndarray

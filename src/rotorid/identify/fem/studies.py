@@ -21,7 +21,7 @@ from rotorid.errors import InputError
 from rotorid.identify.bench.reconstruct import GF_N, Geometry
 from rotorid.identify.fem import answers, elasticity
 from rotorid.identify.fem.answers import Answers, by_part, compare, ratios
-from rotorid.identify.fem.elasticity import Body, Hole
+from rotorid.identify.fem.elasticity import Hole, LooseParts
 from rotorid.identify.fem.gauges import strain_per_newton
 from rotorid.identify.fem.model import Bench, Solved
 from rotorid.identify.fem.sizes import MATERIALS, Assumed, Material, Sizes, in_file, materials
@@ -328,7 +328,7 @@ def cantilever(fineness: float, length_m: float = 0.08, side_m: float = 0.01, fo
     profile = block(np.stack(np.meshgrid(across, across, indexing="ij"), axis=-1))
     along = np.linspace(0, length_m, 2 * count(4, fineness) + 1)
     layers = np.stack([np.c_[np.full(len(profile.points_m), x), profile.points_m] for x in along])
-    body = Body.of({"beam": stacked(layers, profile.triangles)})
+    body = LooseParts.of({"beam": stacked(layers, profile.triangles)})
     materials = {"beam": _BEAM}
     nodes = body.nodes_m
     end = body.mesh.facets_satisfying(lambda x: x[0] > length_m - 1e-9, boundaries_only=True)
@@ -367,7 +367,7 @@ def plate_with_hole(fineness: float, radius_m: float = 0.005, pull_pa: float = 1
     layers = np.stack([np.c_[flat, np.full(len(flat), z)] for z in (0, radius_m / 2)])
     up = np.array([0.0, 0.0, 1.0])
     holes = [Hole("plate", np.zeros(3), up, scale * radius_m) for scale in (1, 4)]
-    body = Body.of({"plate": stacked(layers, profile.triangles)}, holes)
+    body = LooseParts.of({"plate": stacked(layers, profile.triangles)}, holes)
     materials = {"plate": _PLATE}
     nodes = body.nodes_m
     known = np.hypot(nodes[:, 0], nodes[:, 1]) > 4 * radius_m - 1e-9

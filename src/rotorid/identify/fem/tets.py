@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from rotorid.errors import InputError
-from rotorid.identify.fem.placement import Frame
+from rotorid.identify.fem.placement import PartFrame
 
 _FLATTEST = 0.05
 """Volume that a column's element must have at least, as a share of the usual one: flatter ones spoil the stress."""
@@ -28,7 +28,7 @@ class Tets:
     cells: np.ndarray
     """Indices of the corners of each tetrahedron, shape (m, 4)."""
 
-    def put(self, frame: Frame) -> Tets:
+    def put(self, frame: PartFrame) -> Tets:
         """The same mesh in the frame in which its own is `frame`."""
         return Tets(frame.origin_m + self.points_m @ frame.axes, self.cells)
 

@@ -17,7 +17,7 @@ _SHORTEST_S = 0.5
 
 
 @dataclass(frozen=True)
-class Segment:
+class StandStretch:
     """A stretch of one kind, from `start_s` to `stop_s`."""
 
     kind: str
@@ -29,7 +29,7 @@ class Segment:
         return self.stop_s - self.start_s
 
 
-def segments(time_s: np.ndarray, throttle: np.ndarray) -> list[Segment]:
+def segments(time_s: np.ndarray, throttle: np.ndarray) -> list[StandStretch]:
     """Stretches of a programme in the order of time.
 
     Parameters
@@ -61,20 +61,20 @@ def segments(time_s: np.ndarray, throttle: np.ndarray) -> list[Segment]:
     return _stretches(time_s, kinds)
 
 
-def _stretches(time_s: np.ndarray, kinds: np.ndarray) -> list[Segment]:
+def _stretches(time_s: np.ndarray, kinds: np.ndarray) -> list[StandStretch]:
     """Runs of equal kind."""
     edges = np.flatnonzero(kinds[1:] != kinds[:-1]) + 1
     starts, stops = np.concatenate([[0], edges]), np.concatenate([edges - 1, [len(kinds) - 1]])
-    return [Segment(str(kinds[a]), float(time_s[a]), float(time_s[b])) for a, b in zip(starts, stops, strict=True)]
+    return [StandStretch(str(kinds[a]), float(time_s[a]), float(time_s[b])) for a, b in zip(starts, stops, strict=True)]
 
 
-def longest(found: list[Segment], kind: str) -> Segment | None:
+def longest(found: list[StandStretch], kind: str) -> StandStretch | None:
     """The longest stretch of a kind, None where there is none."""
     those = [segment for segment in found if segment.kind == kind]
     return max(those, key=lambda segment: segment.length_s) if those else None
 
 
-def programme(found: list[Segment]) -> Segment:
+def programme(found: list[StandStretch]) -> StandStretch:
     """From the first moment at which a motor runs to the last."""
     moving = [segment for segment in found if segment.kind != _REST]
-    return Segment(_RAMP, moving[0].start_s, moving[-1].stop_s)
+    return StandStretch(_RAMP, moving[0].start_s, moving[-1].stop_s)

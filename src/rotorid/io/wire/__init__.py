@@ -2,10 +2,10 @@
 and parser. `INSTRUMENTS` finds them by name."""
 
 from rotorid.io.wire import bench, jr3, quadrotor, rotor, tensile, wrench
-from rotorid.io.wire.base import Answer, Channel, EndRecord, Instrument, Malformed, StartRecord
+from rotorid.io.wire.base import Answer, EndRecord, Instrument, Malformed, StartRecord, WireChannel
 
 INSTRUMENTS: dict[str, Instrument] = {
     module.INSTRUMENT.name: module.INSTRUMENT for module in (bench, jr3, quadrotor, rotor, tensile, wrench)
 }
 
-__all__ = ["INSTRUMENTS", "Answer", "Channel", "EndRecord", "Instrument", "Malformed", "StartRecord"]
+__all__ = ["INSTRUMENTS", "Answer", "EndRecord", "Instrument", "Malformed", "StartRecord", "WireChannel"]

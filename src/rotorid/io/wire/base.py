@@ -102,7 +102,7 @@ class Answer(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Channel:
+class WireChannel:
     """One number of a sample. `column` carries the unit; value = scale × count. `low` and `high` are the
     counts at which the channel saturates; a command or a state (`reading=False`) does not saturate."""
 
@@ -122,7 +122,7 @@ class Instrument:
     title: str
     baud_rate: int
     interval_us: int  # when nothing else is asked for
-    channels: tuple[Channel, ...]
+    channels: tuple[WireChannel, ...]
     commands: dict[str, str]  # letter: what it does and its arguments
 
     @cached_property
@@ -154,7 +154,7 @@ class Instrument:
 
 def counts(columns: list[str], code: str, scale: float, high: int, low: int | None = None) -> tuple:
     """Channels of one kind; the range is symmetric unless `low` is given."""
-    return tuple(Channel(name, code, scale, -high if low is None else low, high) for name in columns)
+    return tuple(WireChannel(name, code, scale, -high if low is None else low, high) for name in columns)
 
 
 COMMON_COMMANDS = {

@@ -7,7 +7,7 @@ what each motor does: a trapezoid (ramp up, hold, ramp down) or a sine between z
 import struct
 from typing import NamedTuple
 
-from rotorid.io.wire.base import COMMON_COMMANDS, WATCHDOG, Channel, Instrument
+from rotorid.io.wire.base import COMMON_COMMANDS, WATCHDOG, Instrument, WireChannel
 
 THROTTLE_SCALE = 1e-4
 RED, YELLOW, GREEN = 0, 1, 2  # no motor turns, speeds change, speeds constant
@@ -28,9 +28,9 @@ INSTRUMENT = Instrument(
     baud_rate=115200,
     interval_us=20_000,
     channels=(
-        *(Channel(f"throttle_{i}", "H", THROTTLE_SCALE, 0, 10_000, reading=False) for i in range(1, 5)),
-        Channel("battery_voltage_v", "H", 1e-3, 0, 30_000),
-        Channel("led", "B", 1, 0, 3, reading=False),
+        *(WireChannel(f"throttle_{i}", "H", THROTTLE_SCALE, 0, 10_000, reading=False) for i in range(1, 5)),
+        WireChannel("battery_voltage_v", "H", 1e-3, 0, 30_000),
+        WireChannel("led", "B", 1, 0, 3, reading=False),
     ),
     commands={letter: text for letter, text in COMMON_COMMANDS.items() if letter != "G"}
     | WATCHDOG

@@ -2,7 +2,7 @@
 
 import struct
 
-from rotorid.io.wire.base import COMMON_COMMANDS, WATCHDOG, Channel, Instrument
+from rotorid.io.wire.base import COMMON_COMMANDS, WATCHDOG, Instrument, WireChannel
 
 THROTTLE = "T"
 _THROTTLE = struct.Struct("<HH")
@@ -14,11 +14,11 @@ INSTRUMENT = Instrument(
     baud_rate=115200,
     interval_us=20_000,
     channels=(
-        Channel("throttle", "H", THROTTLE_SCALE, 0, 10_000, reading=False),
-        Channel("speed_rpm", "H", 1.0, 0, 0xFFFF),
-        Channel("thrust_n", "i", 1e-3, -50_000, 50_000),
-        Channel("battery_voltage_v", "H", 1e-3, 0, 30_000),
-        Channel("battery_current_a", "H", 1e-3, 0, 50_000),
+        WireChannel("throttle", "H", THROTTLE_SCALE, 0, 10_000, reading=False),
+        WireChannel("speed_rpm", "H", 1.0, 0, 0xFFFF),
+        WireChannel("thrust_n", "i", 1e-3, -50_000, 50_000),
+        WireChannel("battery_voltage_v", "H", 1e-3, 0, 30_000),
+        WireChannel("battery_current_a", "H", 1e-3, 0, 50_000),
     ),
     commands=COMMON_COMMANDS
     | WATCHDOG

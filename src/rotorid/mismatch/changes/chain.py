@@ -214,7 +214,7 @@ def squares_of_speeds(rows: list[Rows], segments: Sequence[Segment], chain: Chai
 
 
 @dataclass(frozen=True)
-class Option:
+class ChainOption:
     """Changes found with the chain's columns taken where they lead to."""
 
     found: Found
@@ -236,7 +236,7 @@ def _option_of(
     spread: np.ndarray,
     prior: Prior,
     same: Collection[str] = (),
-) -> Option:
+) -> ChainOption:
     """The most probable changes with the columns of the chain taken anew at what was found (Gauss and Newton).
 
     Parameters
@@ -262,16 +262,16 @@ def _option_of(
 
 def _decided_at(
     chain: ChainTerms | None, products_at: _Products, spread: np.ndarray, prior: Prior, same: Collection[str] = ()
-) -> Option:
+) -> ChainOption:
     """The most probable changes with the columns taken at a chain."""
     base, new = products_at(chain)
     found, log_posterior = weighed_changes(base, held(new, same), spread, prior)
-    return Option(found, chain, log_posterior)
+    return ChainOption(found, chain, log_posterior)
 
 
 def options_of(
     first: ChainTerms | None, products_at: _Products, spread: np.ndarray, prior: Prior, base_at: _BaseAt | None = None
-) -> list[Option]:
+) -> list[ChainOption]:
     """The most probable changes, and those without each form of the chain that changed in them; the best first.
 
     `first` is None where the chain's columns are not among those compared. Each is sought from several chains: a delay
@@ -288,7 +288,7 @@ def options_of(
             kept[key] = products_at(chain)
         return kept[key]
 
-    def best(same: frozenset[str] = frozenset()) -> Option:
+    def best(same: frozenset[str] = frozenset()) -> ChainOption:
         starts = [chain for key, chain in first.starts() if key not in same]
         tried = (_option_of(first, start, remembered, spread, prior, same) for start in starts)
         return max(tried, key=lambda o: o.log_posterior)
@@ -299,14 +299,14 @@ def options_of(
         base, moved, new = remembered(first)[0], base_at(plain.chain), remembered(plain.chain)[1]
         found, log_posterior = weighed_changes(moved, new, spread, prior)
         gained = 0.5 * float(base.square.sum() - moved.square.sum())
-        others.append(Option(found, plain.chain, log_posterior + gained))
+        others.append(ChainOption(found, plain.chain, log_posterior + gained))
     return sorted([plain, *others], key=lambda o: -o.log_posterior)
 
 
-def others_in_place(options: Sequence[Option], effect: str, prior: Prior) -> frozenset[str]:
+def others_in_place(options: Sequence[ChainOption], effect: str, prior: Prior) -> frozenset[str]:
     """Ids that changed, in place of `effect`, in an option nearly as probable as the best one."""
 
-    def ids(option: Option) -> set[str]:
+    def ids(option: ChainOption) -> set[str]:
         return {option.found.problem.terms[key].effect for key in option.found.model}
 
     best = options[0]

@@ -19,8 +19,8 @@ import numpy as np
 from rotorid.effects.catalogue import catalogue, ids_of
 from rotorid.errors import InputError
 from rotorid.mismatch.changes.chain import (
+    ChainOption,
     ChainTerms,
-    Option,
     options_of,
     others_in_place,
     speed_evidence,
@@ -31,8 +31,8 @@ from rotorid.mismatch.changes.chain import (
 from rotorid.mismatch.changes.joint import (
     FARTHER,
     Effects,
+    FittedReference,
     Joint,
-    Reference,
     evidence_at,
     joined_at,
     joints_of,
@@ -157,7 +157,7 @@ def changes_between(
 
 
 def changes_from(
-    reference: Reference | InstrumentReference,
+    reference: FittedReference | InstrumentReference,
     new: RecordingSet,
     prior: Prior = Prior(),  # noqa: B008
     seen: LevelOne | None = None,
@@ -167,13 +167,13 @@ def changes_from(
     A name that predicts other trims, shares or thrust than what differs is not stated.
     """
     base = reference.recordings
-    if seen is None and isinstance(reference, Reference):
+    if seen is None and isinstance(reference, FittedReference):
         seen = seen_by(reference.as_recorded, new)
     if new.vehicle.kind != base.vehicle.kind:
         raise InputError(
             f"{new.name}/vehicle.yaml: kind is {new.vehicle.kind}, expected {base.vehicle.kind} as in {base.name}"
         )
-    if isinstance(reference, Reference):
+    if isinstance(reference, FittedReference):
         joint, options = _most_alike(reference, new, prior)
         stretches = reference.recorded, _stretches_of_commands(reference, joint)
         found, of_speeds = options[0].found, decided_of_speeds(reference.found, reference.chain, stretches, prior)
@@ -217,7 +217,7 @@ def changes_from(
     )
 
 
-def _most_alike(reference: Reference, new: RecordingSet, prior: Prior) -> tuple[Joint, list[Option]]:
+def _most_alike(reference: FittedReference, new: RecordingSet, prior: Prior) -> tuple[Joint, list[ChainOption]]:
     """Two sets of flights and what changed, the second set corrected for its mistakes or as recorded.
 
     A mistake is one change more: corrected for it the two sets must be alike by more than it costs, less what columns
@@ -243,7 +243,7 @@ def price_of(mistakes: Sequence[Finding], prior: Prior) -> float:
     return prior.effect_nats * len(mistakes) - _CONTRADICTION_NATS * sum(m.id in contradictions for m in mistakes)
 
 
-def _changed_effects(reference: Reference, found: Found) -> Effects:
+def _changed_effects(reference: FittedReference, found: Found) -> Effects:
     """Effects that changed, by as much as they did, without those that swing: how that hangs is known before."""
     forms = {t.key: t for t in reference.terms if t.kind == "effect" and not t.form.swings}
     change, out = change_of(found) * found.problem.unit, []
@@ -256,7 +256,7 @@ def _changed_effects(reference: Reference, found: Found) -> Effects:
 
 
 @step("what changed")
-def _flight_options(reference: Reference, joint: Joint, prior: Prior) -> list[Option]:
+def _flight_options(reference: FittedReference, joint: Joint, prior: Prior) -> list[ChainOption]:
     """The most probable changes of force, moment and sensors, and where the chain changed those without; best first."""
     first = reference.chain if reference.found.commanded else None
 
@@ -288,7 +288,7 @@ def _yardstick(joint: Joint, runs: Sequence[Evidence], prior: Prior) -> np.ndarr
     return np.hypot(usual, spread_of_flights(runs, decide))
 
 
-def _stretches_of_commands(reference: Reference, joint: Joint) -> Sequence[Segment]:
+def _stretches_of_commands(reference: FittedReference, joint: Joint) -> Sequence[Segment]:
     """Stretches of the second set from which its chain is estimated: corrected, or as recorded.
 
     Where the clock of the rotor speeds was late and is corrected, commands that it stamped, too, would seem early.
@@ -311,7 +311,7 @@ def most_like(found: Fitted, chain: ChainTerms, variants: Sequence[Sequence[Segm
 @step("what changed between command and speed")
 def decided_of_speeds(
     found: Fitted, first: ChainTerms | None, both: tuple[Sequence[Segment], Sequence[Segment]], prior: Prior
-) -> tuple[list[Option], Mapping[str, np.ndarray]] | None:
+) -> tuple[list[ChainOption], Mapping[str, np.ndarray]] | None:
     """The changes between command and measured rotor speed, and what the columns amount to; None without both.
 
     `first` is the chain of the first set's model, `both` the stretches of each set as recorded.
@@ -335,7 +335,7 @@ def decided_of_speeds(
     return options, squares_of_speeds(speed_rows(both[1], found, now, first), both[1], now)
 
 
-def changes_in(options: Sequence[Option], prior: Prior) -> tuple[Statement, ...]:
+def changes_in(options: Sequence[ChainOption], prior: Prior) -> tuple[Statement, ...]:
     """What is stated of the best option; a part of the chain in whose place another would do is one of a class."""
     out = []
     for stated in statements_of(options[0].found, of_change=True, form_sd=FORM_SD):
@@ -490,7 +490,7 @@ def predicted(change: Change, vehicle: Vehicle) -> dict[str, float]:
     return {key: value for key, value in out.items() if value}
 
 
-def carrying(reference: Reference, joint: Joint) -> tuple[Reference, Joint, float] | None:
+def carrying(reference: FittedReference, joint: Joint) -> tuple[FittedReference, Joint, float] | None:
     """Two sets with the columns of a payload on the cable that suits the second, hung as that set shows.
 
     With what the states of the payload cost, nats. None where nothing seems to swing, or where it swings in the first

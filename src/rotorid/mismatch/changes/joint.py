@@ -93,7 +93,7 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Reference:
+class FittedReference:
     """The first set, fitted once: what other sets are compared with."""
 
     recordings: RecordingSet
@@ -126,7 +126,7 @@ class Reference:
 
 
 @step("the first set")
-def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> Reference:
+def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> FittedReference:
     """The first set as a verdict fits it, all of its runs."""
     as_recorded = base
     base, mistakes, _ = find_mistakes(replace(base, held_out=()))
@@ -148,7 +148,7 @@ def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> Reference:
     regression = _regression_of(rows, [*terms, *of_chain], model, block_s, again if alike else None)
     noise = _noise_of_a_block(regression)
     evidence, runs = evidence_of(regression, noise, known, *((chain, chain) if of_chain else ()))
-    return Reference(
+    return FittedReference(
         recordings=base,
         as_recorded=as_recorded,
         found=found,
@@ -168,7 +168,7 @@ def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> Reference:
     )
 
 
-def on_terms(reference: Reference, terms: Sequence[Term]) -> Reference:
+def on_terms(reference: FittedReference, terms: Sequence[Term]) -> FittedReference:
     """The first set with the nonlinear parameters of its columns at other values."""
     found, chain = reference.found, reference.chain
     _, rows = rows_of(found, terms, chain, reference.recorded)
@@ -179,7 +179,7 @@ def on_terms(reference: Reference, terms: Sequence[Term]) -> Reference:
     return replace(reference, terms=tuple(terms), rows=tuple(rows), evidence=evidence, runs=runs)
 
 
-def evidence_at(reference: Reference, chain: ChainTerms) -> Evidence:
+def evidence_at(reference: FittedReference, chain: ChainTerms) -> Evidence:
     """Evidence of the first set, known by commands, with its columns taken at another chain than its own."""
     found, first = reference.found, reference.chain
     _, rows = rows_of(found, reference.terms, chain, reference.recorded, first)
@@ -216,7 +216,7 @@ def _noisy_evidence(regression: Regression, noise: np.ndarray) -> Evidence:
 
 
 @step("the second set")
-def joints_of(reference: Reference, new: RecordingSet) -> list[Joint]:
+def joints_of(reference: FittedReference, new: RecordingSet) -> list[Joint]:
     """Two sets of flights on the same columns: corrected for the second set's mistakes, and as recorded.
 
     Each is compared with its own vehicle.yaml: what was changed on purpose and is written there is no change. Mistakes
@@ -247,7 +247,7 @@ def joints_of(reference: Reference, new: RecordingSet) -> list[Joint]:
 
 
 def joined_at(
-    reference: Reference,
+    reference: FittedReference,
     new: RecordingSet,
     recorded: Sequence[Segment],
     chain: ChainTerms | None,
@@ -292,7 +292,7 @@ def joined_at(
     )
 
 
-def moved_by(reference: Reference, joint: Joint, effects: Effects) -> Joint:
+def moved_by(reference: FittedReference, joint: Joint, effects: Effects) -> Joint:
     """Two sets of which the second has some effects more, for the accelerations in its columns."""
     own = (*joint.own_effects, *effects)
     again = joined_at(reference, joint.recordings, joint.recorded, reference.chain, joint.mistakes_of_new, own)
@@ -424,7 +424,7 @@ def _with_known_effects(evidence: Evidence, known: np.ndarray) -> Evidence:
     return replace(evidence, gram=gram, cross=cross, bias_gram=bias)
 
 
-def within_bounds(evidence: Evidence, reference: Reference) -> Evidence:
+def within_bounds(evidence: Evidence, reference: FittedReference) -> Evidence:
     """Evidence of the second set whose effects stay physical: no drag may be lost that the first set has not.
 
     What the first set has is known to a few standard errors of its column; where it never excites one, not at all.
@@ -460,7 +460,7 @@ def _recorded_stretches(found: Fitted, recordings: RecordingSet) -> tuple[list[S
     return as_it_is, noisy
 
 
-def _as_seen(rows: list[Rows], reference: Reference) -> list[Rows]:
+def _as_seen(rows: list[Rows], reference: FittedReference) -> list[Rows]:
     """Rows in which a column says something only in channels where it does in the first set."""
     seen = np.any([np.any(r.x != 0.0, axis=0) for r in reference.rows], axis=0)
     return [replace(r, x=r.x * seen) for r in rows]

@@ -28,7 +28,7 @@ from rotorid.mismatch.instrument.mistakes import find_mistakes
 from rotorid.mismatch.instrument.model import ReadingModel, ReadingSearch, everything, refined, whole_reading
 from rotorid.mismatch.instrument.sampling import quantisation
 from rotorid.mismatch.instrument.setup import (
-    Setup,
+    PreparedInstrument,
     compared_channels,
     loaded_by,
     pieces_of,
@@ -202,7 +202,7 @@ def _on_columns(rows: Sequence[Rows], terms: Sequence[Term], model: ReadingModel
     return _OnColumns(tuple(rows), regression, evidence, by_run(evidence, regression))
 
 
-def _refined_on(second: _OnColumns, setup: Setup, reference: InstrumentReference) -> list[Term]:
+def _refined_on(second: _OnColumns, setup: PreparedInstrument, reference: InstrumentReference) -> list[Term]:
     """The forms that say most of a change by one id alone, with nonlinear parameters as the second set has them.
 
     A filter or a resonance at the first set's values, or at those a search starts from, would leave much of itself,
@@ -298,7 +298,7 @@ def _takes_time(effect: str) -> bool:
     return effect in catalogue() and bool(catalogue()[effect].shows)
 
 
-def steps_of(setup: Setup, model: ReadingModel) -> tuple[Finding, ...]:
+def steps_of(setup: PreparedInstrument, model: ReadingModel) -> tuple[Finding, ...]:
     """That a set's readings are rounded to steps that are coarse next to the noise: one finding or none."""
     found, _ = quantisation(setup, model.noise)
     return () if found is None else (found,)
@@ -333,7 +333,7 @@ def columns_of(recordings: RecordingSet) -> set[str]:
     return set.intersection(*({n for n in r.table.columns if r.has(n)} for r in recordings.runs))
 
 
-def _compared_terms(terms: Sequence[Term], setup: Setup) -> list[Term]:
+def _compared_terms(terms: Sequence[Term], setup: PreparedInstrument) -> list[Term]:
     """The terms that both sets have: less numbers of single runs, and on a stand with the gains of the reading.
 
     A stand's gain is as good as its last calibration; a verdict takes it as it is, and asks of the rotors alone.
@@ -345,7 +345,7 @@ def _compared_terms(terms: Sequence[Term], setup: Setup) -> list[Term]:
     return [*(Term(key, "value", prior_sd=(1.0,)) for key in gains if key not in there), *kept]
 
 
-def _of_single_runs(term: Term, setup: Setup) -> bool:
+def _of_single_runs(term: Term, setup: PreparedInstrument) -> bool:
     """Whether parameters of a form are those of single runs, named after them."""
     return any(p.symbol.endswith(f"({run})") for p in term.form.parameters for run in setup.instrument.runs)
 
@@ -368,7 +368,9 @@ def _loadings_of(reference: InstrumentReference, new: RecordingSet) -> tuple[Loa
     return own if reference.chain is None else moved(replace(setup, loadings=own), reference.chain)
 
 
-def _against_own(rows: list[Rows], reference: InstrumentReference, setup: Setup, new: RecordingSet) -> list[Rows]:
+def _against_own(
+    rows: list[Rows], reference: InstrumentReference, setup: PreparedInstrument, new: RecordingSet
+) -> list[Rows]:
     """Rows of the second set with what its own vehicle.yaml leaves of every channel; the columns stay the first's."""
     if new.vehicle == setup.vehicle:
         return rows
@@ -475,7 +477,7 @@ def _between_sets(wander: Wander, columns: int, shares: float) -> np.ndarray:
     return out
 
 
-def _mounted_anew(terms: Sequence[Term], setup: Setup) -> np.ndarray:
+def _mounted_anew(terms: Sequence[Term], setup: PreparedInstrument) -> np.ndarray:
     """One-sigma (K,) by which crosstalk differs between two days, as a load is not put on quite alike.
 
     The forms in which a coefficient stands have it in equal shares, so that their sum has it once.

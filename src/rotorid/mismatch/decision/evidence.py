@@ -15,7 +15,7 @@ import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.decision import rules
-from rotorid.mismatch.decision.findings import Analysis, Finding, Trace
+from rotorid.mismatch.decision.findings import Analysis, ChannelTrace, Finding
 from rotorid.mismatch.decision.shares import fitted_part
 from rotorid.mismatch.decision.sizes import effect_sizes, scales
 from rotorid.mismatch.plant.comparison import VOTES_FROM
@@ -49,7 +49,7 @@ class Ratio:
 
 
 @dataclass(frozen=True)
-class Contribution:
+class RowsEvidence:
     """What some rows say of one effect."""
 
     ratios: tuple[Ratio, ...] = ()
@@ -142,7 +142,7 @@ def _lowered(finding: Finding, reason: str) -> Finding:
     return replace(finding, status="not_established", sentence=sentence, rule="too_small", alternatives=())
 
 
-def _in_windows(trace: Trace, windows: tuple[tuple[str, float, float], ...]) -> np.ndarray:
+def _in_windows(trace: ChannelTrace, windows: tuple[tuple[str, float, float], ...]) -> np.ndarray:
     """Mask of a trace's instants that lie in one of the windows: what belongs to a run is judged there."""
     inside = np.zeros(len(trace.time_s), bool)
     for run, start_s, stop_s in windows:
@@ -153,7 +153,7 @@ def _in_windows(trace: Trace, windows: tuple[tuple[str, float, float], ...]) -> 
 
 def contribution(
     analysis: Analysis, without: tuple[np.ndarray, ...], rows: list[np.ndarray], acts_on: Collection[str] = ()
-) -> Contribution:
+) -> RowsEvidence:
     """What some rows (masks of the traces) say of an effect, given what is left of the traces without it.
 
     Judged are the channels that the effect `acts_on`, others change by what the rest of the model is fitted to
@@ -171,13 +171,13 @@ def contribution(
     there = {c: np.sqrt(s[2] / max(s[3], 1)) / noise[c] for c, s in size.items()}
     strongest = max(here.values(), default=0.0)
     if strongest <= _LEAST_EXCITED * max(there.values(), default=0.0):
-        return Contribution()
+        return RowsEvidence()
     sensors = {t.channel for t in analysis.between_sensors}
     differing = [c for c in here if here[c] > _ACTS * strongest]
     acting = [c for c in here if c in acts_on or (c in sensors and c in differing)] or differing
     ratios = [r for r in (ratio_of(analysis, without, rows, c) for c in acting) if r is not None]
     beyond = any(here[c] * noise[c] > _leftover_rms(analysis, rows, c) for c in acting)
-    return Contribution(tuple(sorted(ratios, key=lambda r: r.high)), beyond)
+    return RowsEvidence(tuple(sorted(ratios, key=lambda r: r.high)), beyond)
 
 
 def _leftover_rms(analysis: Analysis, rows: list[np.ndarray], channel: str) -> float:
@@ -209,7 +209,7 @@ def ratio_of(analysis: Analysis, without: tuple[np.ndarray, ...], rows: list[np.
     return Ratio(channel, float(value), float(low), float(high))
 
 
-def _block_energies(trace: Trace, added: np.ndarray, mask: np.ndarray, block_s: float):
+def _block_energies(trace: ChannelTrace, added: np.ndarray, mask: np.ndarray, block_s: float):
     """Energies of blocks of masked rows: with the effect, without it (its contribution `added` (n,) put back), and of
     the contribution alone."""
     index = np.flatnonzero(mask & np.isfinite(trace.named) & np.isfinite(added))

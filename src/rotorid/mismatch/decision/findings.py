@@ -17,7 +17,7 @@ import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form
-from rotorid.effects.loading import Instrument, Loading
+from rotorid.effects.loading import KnownInstrument, Loading
 from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.posterior.statements import LIKELY, SURE, Statement, share_of, statements_of, weights_of
 from rotorid.mismatch.posterior.status import CLAIMED, Estimate, Status
@@ -128,7 +128,7 @@ class ValueRow:
 
 
 @dataclass(frozen=True)
-class Trace:
+class ChannelTrace:
     """Residual of one channel of one run, thinned."""
 
     run: str
@@ -154,9 +154,9 @@ class Delivery:
     standard error of its difference from the best, and why it was not fit to be flown (or nothing)."""
 
 
-def by_channel(traces: Iterable[Trace]) -> dict[str, list[Trace]]:
+def by_channel(traces: Iterable[ChannelTrace]) -> dict[str, list[ChannelTrace]]:
     """Traces of each channel, in their order."""
-    out: dict[str, list[Trace]] = {}
+    out: dict[str, list[ChannelTrace]] = {}
     for trace in traces:
         out.setdefault(trace.channel, []).append(trace)
     return out
@@ -187,7 +187,7 @@ class Analysis:
     values: dict[str, tuple[float, float, float, float]]
     """Wrong values: contract name to (believed, refitted, low, high)."""
     not_testable: dict[str, str]
-    traces: tuple[Trace, ...]
+    traces: tuple[ChannelTrace, ...]
     noise_floor: dict[str, float]
     """Measured noise of each channel, its own unit, in the band of the traces."""
     p_values: dict[str, tuple[float, float]]
@@ -198,7 +198,7 @@ class Analysis:
     """Ids that were tested and not found, and how large they may be."""
     winds: tuple[RunWind, ...] = ()
     """Winds that the model flies in, by run."""
-    between_sensors: tuple[Trace, ...] = ()
+    between_sensors: tuple[ChannelTrace, ...] = ()
     """Two sensors of one quantity compared (`accelerometer_x` … `gyroscope_z`): effects are judged by them, too."""
     without: Mapping[str, tuple[np.ndarray, ...]] = field(default_factory=dict)
     """To the id of a stated effect what is left of every trace of `compared` without it, all else fitted anew."""
@@ -216,7 +216,7 @@ class Analysis:
     force_source: str = "accelerometer"
     samples_per_row: int = 1
     """How many samples a row of a stand's or bench's traces is the mean of."""
-    instrument: Instrument | None = None
+    instrument: KnownInstrument | None = None
     """Kinds `stand` and `bench`: what is known of the instrument."""
     loadings: tuple[Loading, ...] = ()
     """Kinds `stand` and `bench`: loads and readings as analysed, rotor speeds as the improved model has them."""
@@ -238,7 +238,7 @@ class Analysis:
     """Correlation of the estimates of two values of which little more than a ratio is known."""
 
     @property
-    def compared(self) -> tuple[Trace, ...]:
+    def compared(self) -> tuple[ChannelTrace, ...]:
         """Everything that effects are judged by: the traces that are shown, and those between sensors."""
         return (*self.traces, *self.between_sensors)
 

@@ -58,7 +58,7 @@ NEAR_LIMIT = 0.98
 
 
 @dataclass(frozen=True)
-class Candidate:
+class JudgedTerm:
     """A term judged given the present model."""
 
     key: str
@@ -127,7 +127,7 @@ class Search:
         self.always = [t.key for t in regression.terms if t.kind != "effect"]
         self.ask = ask
         self.blocks = int(regression.training.sum())
-        self._judged: dict[tuple, Candidate] = {}
+        self._judged: dict[tuple, JudgedTerm] = {}
         self._failing: dict[tuple, tuple[str | None, float]] = {}
         self._largest: dict[int, np.ndarray] = {}
         self._place = {key: i for i, key in enumerate(self.terms)}.__getitem__
@@ -154,14 +154,14 @@ class Search:
         limits = [term.form.parameters[i].negligible for i in term.form.linear]
         return not rules.NEGLIGIBLE(not any(abs(value) > limit for value, limit in zip(beta, limits, strict=True)))
 
-    def judge(self, key: str, active: list[str]) -> Candidate:
+    def judge(self, key: str, active: list[str]) -> JudgedTerm:
         """A term added to (or, if in `active`, kept in) the model; remembered."""
         asked = key, self.regression.set_of([*active, key])
         if asked not in self._judged:
             making_room(self._judged, _MOST_JUDGED)[asked] = self._judge(key, active)
         return self._judged[asked]
 
-    def _judge(self, key: str, active: list[str]) -> Candidate:
+    def _judge(self, key: str, active: list[str]) -> JudgedTerm:
         base = self.without(key, active)
         keys = self.always + sorted({*active, key}, key=self._place)
         fit = self.regression.fit(keys)
@@ -180,7 +180,7 @@ class Search:
                 own, _ = self.regression.own_part(others, key, beta)
             physical = not rules.OWN_PART(own <= SHARE_OF_LARGEST**2 or noise >= MOST_ATTENUATION)
         physical = physical and not rules.STRAIN(self.strains(fit, base))
-        return Candidate(key, beta, p_value, gain, inflation, physical, self.terms[key].effect not in UNKNOWNS)
+        return JudgedTerm(key, beta, p_value, gain, inflation, physical, self.terms[key].effect not in UNKNOWNS)
 
     def exact(self, key: str) -> bool:
         """Whether a term's equation is geometry or a definition, so that its form cannot be wrong."""
@@ -231,7 +231,7 @@ class Search:
 
     def judged(
         self, terms: Iterable[Term], active: list[str], turn: Callable[[Term], int] = lambda _: 0
-    ) -> Iterator[Candidate]:
+    ) -> Iterator[JudgedTerm]:
         """Terms judged given a model, by their turn, then the best first.
 
         To judge one costs many times what `most` does: it is done only where no other is sure to be better.
@@ -242,7 +242,7 @@ class Search:
         heapify(waiting)
         while waiting:
             own, _, number, found = heappop(waiting)
-            if isinstance(found, Candidate):
+            if isinstance(found, JudgedTerm):
                 yield found
             else:
                 candidate = self.judge(found.key, active)
@@ -250,7 +250,7 @@ class Search:
 
     def candidates(
         self, active: list[str], dropped: Collection[str] = (), turn: Callable[[Term], int] = lambda _: 0
-    ) -> Iterator[Candidate]:
+    ) -> Iterator[JudgedTerm]:
         """Terms whose id is neither in the model yet nor dropped and that are worth their parameters, judged."""
         taken = {self.terms[k].once for k in active} | set(dropped)
         free = [t for t in self.terms.values() if t.kind == "effect" and t.once not in taken]
@@ -502,7 +502,7 @@ class Search:
                 found += [term.effect] if self._replaces(term.key, own, rest) else []
         return found
 
-    def _replaces(self, other: str, own: Candidate, rest: list[str]) -> bool:
+    def _replaces(self, other: str, own: JudgedTerm, rest: list[str]) -> bool:
         """Whether given another term alone one of the model is no longer needed."""
         instead = self.judge(other, rest)
         if not instead.physical or instead.p_value > _INSTEAD_P or instead.gain < 0.5 * own.gain:

@@ -14,28 +14,28 @@ from typing import Literal
 import numpy as np
 
 from rotorid.mismatch.decision.drift import drift_m
-from rotorid.mismatch.decision.findings import Analysis, Trace, rms
+from rotorid.mismatch.decision.findings import Analysis, ChannelTrace, rms
 from rotorid.mismatch.decision.shares import fitted_part
 from rotorid.mismatch.decision.words import channel_words, number
 from rotorid.recordings import Vehicle
 
 
 @dataclass(frozen=True)
-class Scale:
+class ChannelScale:
     """What a channel's errors are stated as a share of: a number in the channel's unit, and its name."""
 
     value: float
     words: str
 
 
-def scales(analysis: Analysis) -> dict[str, Scale]:
+def scales(analysis: Analysis) -> dict[str, ChannelScale]:
     """To every compared channel its scale; channels of which none is known are not among them."""
     if analysis.instrument is not None:
         return of_reading(analysis)
     return _of_flight(analysis.believed)
 
 
-def _of_flight(vehicle: Vehicle) -> dict[str, Scale]:
+def _of_flight(vehicle: Vehicle) -> dict[str, ChannelScale]:
     """Weight for forces, and for moments what the rotors can make by differing while they carry the vehicle.
 
     Half of the rotors at twice the hover's thrust and the others at none: Σ |y_i| F_i, Σ |x_i| F_i and Σ Q_i at hover.
@@ -46,28 +46,28 @@ def _of_flight(vehicle: Vehicle) -> dict[str, Scale]:
     thrust = coefficients * hover**2
     x, y, _ = np.abs(vehicle.rotor_positions_m()).T
     moments = (y @ thrust, x @ thrust, vehicle.torque_coefficients_n_m_s2().sum() * hover**2)
-    out = {f"force_{axis}": Scale(weight, "of the weight") for axis in "xyz"}
+    out = {f"force_{axis}": ChannelScale(weight, "of the weight") for axis in "xyz"}
     for axis, moment in zip("xyz", moments, strict=True):
         if moment > 0:
-            out[f"moment_{axis}"] = Scale(float(moment), f"of the available {channel_words(f'moment_{axis}')}")
-    out |= {f"rotor_speed_{i + 1}": Scale(hover, "of the hover speed") for i in range(vehicle.rotor_count)}
-    out |= {f"accelerometer_{axis}": Scale(vehicle.gravity_m_s2, "of gravity") for axis in "xyz"}
-    return out | {f"gyroscope_{axis}": Scale(1.0, "of 1 rad/s") for axis in "xyz"}
+            out[f"moment_{axis}"] = ChannelScale(float(moment), f"of the available {channel_words(f'moment_{axis}')}")
+    out |= {f"rotor_speed_{i + 1}": ChannelScale(hover, "of the hover speed") for i in range(vehicle.rotor_count)}
+    out |= {f"accelerometer_{axis}": ChannelScale(vehicle.gravity_m_s2, "of gravity") for axis in "xyz"}
+    return out | {f"gyroscope_{axis}": ChannelScale(1.0, "of 1 rad/s") for axis in "xyz"}
 
 
-def of_reading(analysis: Analysis) -> dict[str, Scale]:
+def of_reading(analysis: Analysis) -> dict[str, ChannelScale]:
     """The largest load of the recordings, of forces and of moments."""
-    out: dict[str, Scale] = {}
+    out: dict[str, ChannelScale] = {}
     for group, columns in (("force", slice(0, 3)), ("moment", slice(3, 6))):
         largest = max((float(np.abs(x.load[:, columns]).max()) for x in analysis.loadings if x.size), default=0.0)
         if largest > 0:
-            out |= {f"{group}_{axis}": Scale(largest, f"of the largest {group}") for axis in "xyz"}
+            out |= {f"{group}_{axis}": ChannelScale(largest, f"of the largest {group}") for axis in "xyz"}
     if analysis.believed.rotors:
         speeds = [x.motion.rotor_speed for x in analysis.loadings if x.motion.rotor_speed is not None]
         top = max((float(np.nanmax(s)) for s in speeds if s.size), default=0.0)
         if top > 0:
             count = analysis.believed.rotor_count
-            out |= {f"rotor_speed_{i + 1}": Scale(top, "of the largest speed") for i in range(count)}
+            out |= {f"rotor_speed_{i + 1}": ChannelScale(top, "of the largest speed") for i in range(count)}
     return out
 
 
@@ -111,7 +111,9 @@ def channel_metres(analysis: Analysis, channel: str, stage: Literal["before", "n
     return _metres(analysis, channel, [(t, error, sign < 0 if held else sign > 0) for t, error, sign in own])
 
 
-def _metres(analysis: Analysis, channel: str, errors: Iterable[tuple[Trace, np.ndarray, np.ndarray]]) -> float | None:
+def _metres(
+    analysis: Analysis, channel: str, errors: Iterable[tuple[ChannelTrace, np.ndarray, np.ndarray]]
+) -> float | None:
     """Drift of one channel's errors, each with its trace and the mask of the rows that count."""
     if analysis.instrument is not None:
         return None

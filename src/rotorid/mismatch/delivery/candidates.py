@@ -64,7 +64,7 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Scored:
+class CandidateScore:
     """A candidate's number."""
 
     candidate: Candidate
@@ -113,7 +113,7 @@ def _mean_logarithm(sums: np.ndarray) -> np.ndarray:
     return 0.5 * np.log(np.maximum(sums[..., 0], 1e-300) / np.maximum(sums[..., 1], 1.0)).mean(axis=-1)
 
 
-def compared(candidates: Sequence[Candidate], ground: Ground) -> list[Scored]:
+def compared(candidates: Sequence[Candidate], ground: Ground) -> list[CandidateScore]:
     """Every candidate's number, the candidates in the order of PLAINEST_FIRST; the believed vehicle is among them."""
     ordered = sorted(candidates, key=lambda c: _PLAINEST_FIRST.index(c.name))
     known = ground.compared(ordered)
@@ -127,19 +127,19 @@ def compared(candidates: Sequence[Candidate], ground: Ground) -> list[Scored]:
     doubt = (scores[:, 1:] - scores[best, 1:]).std(axis=1)
     believed = next(i for i, c in enumerate(ordered) if c.name == ("believed", False))
     return [
-        Scored(c, float(s - scores[believed, 0]), float(d))
+        CandidateScore(c, float(s - scores[believed, 0]), float(d))
         for c, s, d in zip(ordered, scores[:, 0], doubt, strict=True)
     ]
 
 
-def _least_gain(plain: Scored, best: Scored) -> float:
+def _least_gain(plain: CandidateScore, best: CandidateScore) -> float:
     """By how much the best must be ahead of a plainer one, if by derivatives alone."""
     return _WORTH if best.candidate.learnt is not None and plain.candidate.learnt is None else 0.0
 
 
 def choose(
     candidates: Sequence[Candidate], ground: Ground, unfit: Callable[[Candidate], str]
-) -> tuple[Scored, list[Scored]]:
+) -> tuple[CandidateScore, list[CandidateScore]]:
     """The candidate to deliver, and all with their numbers; the believed vehicle where none hovers and flies."""
     kept, faults = list(candidates), {}
     while True:

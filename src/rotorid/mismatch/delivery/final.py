@@ -14,8 +14,8 @@ import numpy as np
 
 from rotorid.mismatch.decision.decide import coefficients
 from rotorid.mismatch.decision.evidence import with_shares
-from rotorid.mismatch.decision.findings import Analysis, Delivery, Finding, Trace, ValueRow
-from rotorid.mismatch.delivery.candidates import Candidate, Ground, Scored, choose
+from rotorid.mismatch.decision.findings import Analysis, ChannelTrace, Delivery, Finding, ValueRow
+from rotorid.mismatch.delivery.candidates import Candidate, CandidateScore, Ground, choose
 from rotorid.mismatch.delivery.derivatives import Learnt, learn
 from rotorid.mismatch.delivery.files import claimed, improved_vehicle, place_of
 from rotorid.mismatch.delivery.usable import exports_lost
@@ -141,7 +141,7 @@ def _learnt_of(offered: Offered, candidate: Candidate) -> Learnt:
     return learn(x, candidate.left, folds, own_controls(vehicle))
 
 
-def _why_not(finding: Finding, taken: Candidate, scored: Sequence[Scored], offered: Offered) -> str:
+def _why_not(finding: Finding, taken: Candidate, scored: Sequence[CandidateScore], offered: Offered) -> str:
     """Why a claimed property of the vehicle is not in the vehicle that is taken home; empty where it is."""
     if finding not in claimed([finding]) or place_of(finding) != "vehicle" or taken.model == "named":
         return ""
@@ -162,7 +162,7 @@ def _why_not(finding: Finding, taken: Candidate, scored: Sequence[Scored], offer
 
 
 def _with_taken(
-    analysis: Analysis, taken: Candidate, scored: Sequence[Scored], stretches: Stretches, believed: Vehicle
+    analysis: Analysis, taken: Candidate, scored: Sequence[CandidateScore], stretches: Stretches, believed: Vehicle
 ) -> Analysis:
     """The analysis with the traces that the vehicle taken home leaves, and that vehicle's derivatives."""
     derivatives = taken.learnt.derivatives if taken.learnt else ()
@@ -172,7 +172,7 @@ def _with_taken(
         if len(time_s) and derivatives
     }
 
-    def left(trace: Trace) -> Trace:
+    def left(trace: ChannelTrace) -> ChannelTrace:
         if trace.channel not in CHANNELS[:6]:
             return trace
         base = {"believed": trace.before, "refitted": trace.refitted, "named": trace.named}[taken.model]

@@ -21,7 +21,7 @@ from rotorid.effects.loading import CHANNELS, NO_ROTORS, UNITS, Loading
 from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.decide import TermReport, estimates, findings_of, throttle_or_thrust, wrong_values
 from rotorid.mismatch.decision.evidence import weighed
-from rotorid.mismatch.decision.findings import Analysis, Finding, Trace, with_probabilities
+from rotorid.mismatch.decision.findings import Analysis, ChannelTrace, Finding, with_probabilities
 from rotorid.mismatch.decision.select import Selection
 from rotorid.mismatch.delivery.candidates import Candidate
 from rotorid.mismatch.delivery.files import claimed
@@ -47,7 +47,7 @@ from rotorid.mismatch.instrument.model import (
 )
 from rotorid.mismatch.instrument.remainder import dependence, leftover, regimes
 from rotorid.mismatch.instrument.sampling import quantisation
-from rotorid.mismatch.instrument.setup import Setup, set_up, with_unseen
+from rotorid.mismatch.instrument.setup import PreparedInstrument, set_up, with_unseen
 from rotorid.mismatch.model.absent import absorbed_findings
 from rotorid.mismatch.model.delivered import Values, residuals_of
 from rotorid.mismatch.model.fitted import TAKEN_UP
@@ -78,7 +78,7 @@ def _same_curve(chain: ChainResult) -> dict[str, str]:
     return dict.fromkeys(sorted(ids_of("curve_of_load")), TAKEN_UP)
 
 
-def one_load(finding: Finding, setup: Setup) -> Finding:
+def one_load(finding: Finding, setup: PreparedInstrument) -> Finding:
     """Thrust and reading of one rotor that does not tilt are curves of one load: which of them is curved stays open."""
     alone = setup.recordings.vehicle.rotor_count == 1 and not setup.instrument.tilts
     if not alone or finding.id not in ids_of("curve_of_load") or finding.status not in CLAIMED:
@@ -93,7 +93,9 @@ def one_load(finding: Finding, setup: Setup) -> Finding:
 
 
 @step("searching what acts")
-def first_model(setup: Setup, terms: list[Term]) -> tuple[ReadingModel, ChainResult | None, tuple[Loading, ...] | None]:
+def first_model(
+    setup: PreparedInstrument, terms: list[Term]
+) -> tuple[ReadingModel, ChainResult | None, tuple[Loading, ...] | None]:
     """The model of the reading as the search ends, what lies between command and rotor speed, and the loads by that.
 
     The loads are None where rotor speeds are measured, or no rotor turns: they stay as they were prepared.
@@ -163,7 +165,9 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     findings = with_probabilities(findings, chosen_already(model))
     fit, moved_values = settled(model, values, model.selection.active)
     to_state = values if measured else stated_of_commands(findings, values)
-    choice = _Choice(setup, model, chain, measured, values, to_state, tuple(findings), reasons, tuple(remarks))
+    choice = _InstrumentChoice(
+        setup, model, chain, measured, values, to_state, tuple(findings), reasons, tuple(remarks)
+    )
 
     # The last decision is made: the runs held out are opened.
     seen = on_every_run(model, chain, unseen)
@@ -173,10 +177,10 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
 
 
 @dataclass(frozen=True)
-class _Choice:
+class _InstrumentChoice:
     """What was chosen on the fitted runs alone."""
 
-    setup: Setup
+    setup: PreparedInstrument
     model: ReadingModel
     chain: ChainResult | None
     measured: bool
@@ -196,7 +200,7 @@ class _Choice:
 
 
 def account(
-    choice: _Choice,
+    choice: _InstrumentChoice,
     recordings: RecordingSet,
     seen: ReadingModel,
     fit: Fit,
@@ -253,7 +257,7 @@ def account(
 
 
 def _offered(
-    choice: _Choice, words: Analysis, seen: ReadingModel, plain: Values, moved: Values, plain_moved: Values
+    choice: _InstrumentChoice, words: Analysis, seen: ReadingModel, plain: Values, moved: Values, plain_moved: Values
 ) -> Offered:
     """What a choice offers for delivery: what is claimed, fitted without effects that are only suggested.
 
@@ -322,7 +326,7 @@ def without_each(
     return out
 
 
-def _speed_left(setup: Setup, chain: ChainResult, traces: tuple[Trace, ...]) -> float:
+def _speed_left(setup: PreparedInstrument, chain: ChainResult, traces: tuple[ChannelTrace, ...]) -> float:
     """Share of the rotor speeds' mismatch that is left on the held-out runs, beyond the noise; 0 without such runs."""
     own = [t for t in traces if t.channel.startswith("rotor_speed") and t.run in setup.split.held_out]
     if not own or not chain.findings or set(setup.split.held_out) & set(setup.split.training):
@@ -332,7 +336,9 @@ def _speed_left(setup: Setup, chain: ChainResult, traces: tuple[Trace, ...]) -> 
     return float(np.clip((left - floor) / max(start - floor, 1e-9), 0.0, 1.0)) if left > floor else 0.0
 
 
-def _full_speed_value(setup: Setup, chain: ChainResult | None) -> dict[str, tuple[float, float, float, float]]:
+def _full_speed_value(
+    setup: PreparedInstrument, chain: ChainResult | None
+) -> dict[str, tuple[float, float, float, float]]:
     """The speed at full throttle, nothing believed, where no limits are stated."""
     if chain is None or not setup.estimated_full_speed:
         return {}
@@ -340,7 +346,7 @@ def _full_speed_value(setup: Setup, chain: ChainResult | None) -> dict[str, tupl
     return {"rotor_speed_limits_rad_s": (float("nan"), full, full - reach, full + reach)}
 
 
-def _noise_floors(setup: Setup, model: ReadingModel, chain: ChainResult | None) -> dict[str, float]:
+def _noise_floors(setup: PreparedInstrument, model: ReadingModel, chain: ChainResult | None) -> dict[str, float]:
     """Noise of each channel."""
     out = {CHANNELS[c]: float(model.noise[c]) for c in setup.instrument.channels}
     if chain is not None and chain.noise_rad_s is not None:
@@ -348,7 +354,7 @@ def _noise_floors(setup: Setup, model: ReadingModel, chain: ChainResult | None) 
     return out
 
 
-def _notes_of(setup: Setup) -> list[str]:
+def _notes_of(setup: PreparedInstrument) -> list[str]:
     """What a reader must know of how the readings were used."""
     notes = []
     if setup.settling_s:
@@ -375,7 +381,7 @@ def _make_traces(model: ReadingModel, refitted: Fit, fit: Fit):
     before = [np.nan_to_num(r.y) for r in model.rows]
     again, after = ([np.nan_to_num(x) for x in residuals_of(model, f)] for f in (refitted, fit))
     traces = [
-        Trace(r.run, CHANNELS[c], UNITS[c], r.time_s, y[:, c], values[:, c], left[:, c], left[:, c])
+        ChannelTrace(r.run, CHANNELS[c], UNITS[c], r.time_s, y[:, c], values[:, c], left[:, c], left[:, c])
         for r, y, values, left in zip(model.rows, before, again, after, strict=True)
         for c in model.setup.instrument.channels
     ]

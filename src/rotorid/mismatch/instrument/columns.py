@@ -9,7 +9,7 @@ import numpy as np
 from rotorid.effects.catalogue import before_the_rotors, catalogue
 from rotorid.effects.contract import Form, not_testable_reason
 from rotorid.effects.loading import NO_ROTORS, Loading, forms_of, weight
-from rotorid.mismatch.instrument.setup import Setup, averaged, has_weight, pieces_of, rotor_wrench
+from rotorid.mismatch.instrument.setup import PreparedInstrument, averaged, has_weight, pieces_of, rotor_wrench
 from rotorid.mismatch.model.prepare import form_terms
 from rotorid.mismatch.plant.readings import form_reading
 from rotorid.mismatch.plant.rows import Rows, Term
@@ -34,7 +34,7 @@ _AtWork = Sequence[tuple[Form, np.ndarray]]
 _DISPLACED = ("velocity", "angular_velocity", "angular_acceleration", "specific_force", "accelerometer", "gyroscope")
 
 
-def value_keys(setup: Setup) -> list[str]:
+def value_keys(setup: PreparedInstrument) -> list[str]:
     """Believed values that this set can contradict."""
     vehicle, channels = setup.vehicle, setup.instrument.channels
     if vehicle.kind == "bench":
@@ -53,7 +53,7 @@ def value_keys(setup: Setup) -> list[str]:
     return keys
 
 
-def make_terms(setup: Setup) -> tuple[list[Term], dict[str, str]]:
+def make_terms(setup: PreparedInstrument) -> tuple[list[Term], dict[str, str]]:
     """Every term that this set can test, and the ids that it cannot, with the reason."""
     trust = setup.vehicle.trust
     sd = {k: max(trust.get(VALUE_NAMES[k], DEFAULT_TRUST[k.split("_")[0]]), 1e-6) for k in value_keys(setup)}
@@ -89,7 +89,7 @@ def make_terms(setup: Setup) -> tuple[list[Term], dict[str, str]]:
     return terms, reasons
 
 
-def lacks(form: Form, setup: Setup) -> str | None:
+def lacks(form: Form, setup: PreparedInstrument) -> str | None:
     """Why a form for a flight cannot be tested on this stand."""
     if any(name in _DISPLACED for name in form.requires):
         return _STILL
@@ -144,7 +144,7 @@ def _term_columns(term: Term, loading: Loading, vehicle: Vehicle, at_work: _AtWo
     return columns
 
 
-def rows_of(setup: Setup, terms: list[Term], loadings=None, at_work: _AtWork = ()) -> list[Rows]:
+def rows_of(setup: PreparedInstrument, terms: list[Term], loadings=None, at_work: _AtWork = ()) -> list[Rows]:
     """Rows of every stretch's parts, averaged; a channel that is not compared is NaN in y and zero in x.
 
     `at_work` are the effects known so far: what a reading's clock is off moves their part of it as well.

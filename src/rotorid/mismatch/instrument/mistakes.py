@@ -13,7 +13,7 @@ import numpy as np
 
 from rotorid.effects.loading import CHANNELS
 from rotorid.mismatch.decision.findings import Finding
-from rotorid.mismatch.instrument.setup import Setup, loaded_by, set_up, with_speed
+from rotorid.mismatch.instrument.setup import PreparedInstrument, loaded_by, set_up, with_speed
 from rotorid.mismatch.mistakes import dropout
 from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import RecordingSet, Run
@@ -43,7 +43,7 @@ class _Slope:
     correlation: float
 
 
-def slopes(setup: Setup) -> list[_Slope]:
+def slopes(setup: PreparedInstrument) -> list[_Slope]:
     """Slopes of every channel that is loaded, by run.
 
     Of a moment what goes with the forces across it is taken off first: a lever arm that nobody stated makes any sign.
@@ -132,7 +132,7 @@ def _finding(key: str, sentence: str, channels, factor: float | None = None, oth
     )
 
 
-def flipped(recordings: RecordingSet, setup: Setup):
+def flipped(recordings: RecordingSet, setup: PreparedInstrument):
     """Channels whose reading falls as the load rises, in all runs or in some."""
     bad = [s for s in slopes(setup) if s.correlation < -_CERTAIN and s.slope < _FLIPPED]
     if not bad:
@@ -161,7 +161,7 @@ def nearest(slope: float, units: dict[str, float]) -> str | None:
     return next((name for name, factor in units.items() if abs(slope / factor - 1) < _NEAR_UNIT), None)
 
 
-def _other_unit(recordings: RecordingSet, setup: Setup):
+def _other_unit(recordings: RecordingSet, setup: PreparedInstrument):
     """Forces, moments or rotor speeds in another unit, in every run."""
     found = [s for s in slopes(setup) if s.correlation > _CERTAIN]
     forces = [s.slope for s in found if s.channel < 3]
@@ -189,7 +189,7 @@ def _converted(recordings, names, unit, factor, wanted, channels):
     return _with_runs(recordings, runs), _finding("unit_error", text, channels, factor), text + "."
 
 
-def _wrong_rotors(recordings: RecordingSet, setup: Setup):
+def _wrong_rotors(recordings: RecordingSet, setup: PreparedInstrument):
     """Rotor columns in another order, or rotors that turn the other way."""
     vehicle = recordings.vehicle
     if vehicle.kind != "stand" or vehicle.rotor_count not in (3, 4) or not setup.loadings[0].measured:

@@ -13,7 +13,7 @@ from rotorid.effects.loading import Loading
 from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.select import Questions, Search, Selection
 from rotorid.mismatch.instrument.columns import OFFSET, rows_of
-from rotorid.mismatch.instrument.setup import SHORT, Setup
+from rotorid.mismatch.instrument.setup import SHORT, PreparedInstrument
 from rotorid.mismatch.plant.comparison import LEAST_RUNS
 from rotorid.mismatch.plant.contributions import Contributions
 from rotorid.mismatch.plant.regression import (
@@ -98,7 +98,7 @@ class ReadingSearch(Search):
 class ReadingModel:
     """A fitted model of an instrument's reading."""
 
-    setup: Setup
+    setup: PreparedInstrument
     loadings: tuple[Loading, ...]
     terms: list[Term]
     rows: list[Rows]
@@ -161,7 +161,7 @@ def everything(run: str, time_s: float) -> bool:
     return True
 
 
-def block_length(setup: Setup, rows: list[Rows]) -> int:
+def block_length(setup: PreparedInstrument, rows: list[Rows]) -> int:
     """Rows of a block: short stretches whole, else about BLOCK_S, within bounds on their number."""
     typical = float(np.median([len(r.y) for r in rows]))
     total = sum(len(r.y) for r in rows)
@@ -171,7 +171,9 @@ def block_length(setup: Setup, rows: list[Rows]) -> int:
     return int(np.clip(wanted, max(total / _MOST_BLOCKS, 5), max(total / _LEAST_BLOCKS, 5)))
 
 
-def _noise_and_filters(setup: Setup, terms: list[Term], rows: list[Rows]) -> tuple[np.ndarray, dict[int, np.ndarray]]:
+def _noise_and_filters(
+    setup: PreparedInstrument, terms: list[Term], rows: list[Rows]
+) -> tuple[np.ndarray, dict[int, np.ndarray]]:
     """Noise by channel (6,) and whitening filters, from what the whole catalogue leaves."""
     total = sum(len(r.y) for r in rows)
     size = rows[0].x.shape[2]
@@ -214,7 +216,12 @@ def whole_reading(terms: list[Term], active) -> list[tuple[Form, np.ndarray]]:
 
 
 def reading_model(
-    setup: Setup, terms: list[Term], active: list[str] | None = None, loadings=None, filters=None, refused=None
+    setup: PreparedInstrument,
+    terms: list[Term],
+    active: list[str] | None = None,
+    loadings=None,
+    filters=None,
+    refused=None,
 ) -> ReadingModel:
     """Rows, regression and search from what is `active`; `filters` (noise, taps) of an earlier round may be kept.
 
@@ -240,7 +247,7 @@ def reading_model(
     return ReadingModel(setup, tuple(loadings), terms, rows, regression, search, selection, noise)
 
 
-def restrain(regression: Regression, setup: Setup) -> None:
+def restrain(regression: Regression, setup: PreparedInstrument) -> None:
     """Say, in place, how long noise is alike, and limit an offset in time and believed values that nothing excites.
 
     What is more of an offset is a delay or a filter. Of a value whose column is mostly the speeds' noise (the arm while
@@ -348,7 +355,7 @@ def refined(model: ReadingModel) -> tuple[list[Term], float]:
 
 
 def fitted_model(
-    setup: Setup, terms: list[Term], active: list[str] | None = None, loadings=None, refused=None
+    setup: PreparedInstrument, terms: list[Term], active: list[str] | None = None, loadings=None, refused=None
 ) -> ReadingModel:
     """Search and refinement in turn until the same terms with the same values come out.
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from rotorid.effects.contract import Motion
 from rotorid.effects.hysteresis import NARROW, play
-from rotorid.effects.loading import CHANNELS, REST_S, Instrument, Loading, at_sensor, rotation_of, weight
+from rotorid.effects.loading import CHANNELS, REST_S, KnownInstrument, Loading, at_sensor, rotation_of, weight
 from rotorid.errors import InputError
 from rotorid.mismatch.instrument.settling import settling_s, without_settling
 from rotorid.mismatch.instrument.tachometer import noise_of, quieter, without_noise
@@ -44,7 +44,7 @@ _QUARTIC = np.array([[-25.0, 48.0, -36.0, 16.0, -3.0], [-3.0, -10.0, 18.0, -6.0,
 
 
 @dataclass(frozen=True)
-class Session:
+class SessionTimes:
     """When the runs of a set were recorded, and how warm each was at its start."""
 
     first_s: Mapping[str, float]
@@ -67,7 +67,7 @@ class _Preparation:
     channels: tuple[int, ...]
     dt_s: float
     full_speed: float | None
-    session: Session
+    session: SessionTimes
     distance: str
     """Name of the column of a distance to a wall or fixture; empty where there is none."""
 
@@ -77,13 +77,13 @@ class _Preparation:
 
 
 @dataclass(frozen=True)
-class Setup:
+class PreparedInstrument:
     """A set of kind `stand` or `bench` ready for analysis."""
 
     recordings: RecordingSet
     vehicle: Vehicle
     split: Split
-    instrument: Instrument
+    instrument: KnownInstrument
     loadings: tuple[Loading, ...]
     average: int
     """Samples that one row of the analysis is the mean of."""
@@ -96,7 +96,7 @@ class Setup:
     """The same loadings with the noise of measured rotor speeds added once more; None where there is none."""
     full_voltage: float | None = None
     """Voltage, V, at which the full speed is reached; None where none is recorded."""
-    session: Session | None = None
+    session: SessionTimes | None = None
     """When each run was recorded."""
 
     @property
@@ -358,7 +358,7 @@ def _first_full_speed(recordings: RecordingSet, channels: tuple[int, ...]) -> fl
     return float(np.sqrt(abs(square))) if square else 1000.0
 
 
-def session_of(recordings: RecordingSet) -> Session:
+def session_of(recordings: RecordingSet) -> SessionTimes:
     """When each run of a set was recorded: its runs are in the order of time.
 
     Where each has a clock of its own the pauses between them are not known, and the next is taken to start when the one
@@ -373,10 +373,10 @@ def session_of(recordings: RecordingSet) -> Session:
     warmth = {r.name: float(_filled(r, c.TEMPERATURE)[0]) for r in runs if r.has(c.TEMPERATURE)}
     length = starts[-1] + lengths[-1] if len(runs) > 1 else 0.0
     times = {r.name: float(r.time_s[0]) for r in runs}
-    return Session(times, dict(zip(names, starts, strict=True)), length, clock, warmth)
+    return SessionTimes(times, dict(zip(names, starts, strict=True)), length, clock, warmth)
 
 
-def set_up(recordings: RecordingSet, whole: RecordingSet | None = None) -> Setup:
+def set_up(recordings: RecordingSet, whole: RecordingSet | None = None) -> PreparedInstrument:
     """Stretches and loads of the runs of a set.
 
     Parameters
@@ -410,7 +410,7 @@ def set_up(recordings: RecordingSet, whole: RecordingSet | None = None) -> Setup
             instrument = replace(instrument, by_hand=True)
     total = sum(x.size for x in loadings) * len(channels)
     average = max(1, int(np.ceil(total / _MOST_VALUES)))
-    return Setup(
+    return PreparedInstrument(
         recordings=recordings,
         vehicle=vehicle,
         split=split_runs(whole),
@@ -426,7 +426,7 @@ def set_up(recordings: RecordingSet, whole: RecordingSet | None = None) -> Setup
     )
 
 
-def with_unseen(setup: Setup, unseen: RecordingSet) -> Setup:
+def with_unseen(setup: PreparedInstrument, unseen: RecordingSet) -> PreparedInstrument:
     """The setup with the stretches of other runs behind its own, prepared by what was decided on its own.
 
     Runs that lack a column which the model needs are left out.
@@ -497,7 +497,7 @@ def _distance_column(recordings: RecordingSet) -> str:
     return ""
 
 
-def _instrument_of(recordings: RecordingSet, how: _Preparation, loadings: Sequence[Loading]) -> Instrument:
+def _instrument_of(recordings: RecordingSet, how: _Preparation, loadings: Sequence[Loading]) -> KnownInstrument:
     """What the forms of effects need to know beforehand."""
     channels, session = how.channels, how.session
     load = np.concatenate([x.load for x in loadings])
@@ -515,7 +515,7 @@ def _instrument_of(recordings: RecordingSet, how: _Preparation, loadings: Sequen
     attitudes = [np.concatenate([x.attitude[i] for x in loadings]) for i in (0, 1)] if loadings[0].attitude else []
     known = [x.temperature_c for x in loadings if x.temperature_c is not None]
     warmth = np.concatenate(known) if len(known) == len(loadings) else np.zeros(1)
-    return Instrument(
+    return KnownInstrument(
         vehicle=how.vehicle,
         channels=channels,
         loaded=tuple(loaded),
@@ -586,4 +586,4 @@ def averaged(values: np.ndarray, count: int) -> np.ndarray:
     return values[:whole].reshape(len(values) // count, count, *values.shape[1:]).mean(axis=1)
 
 
-__all__ = ["CHANNELS", "Setup", "averaged", "set_up"]
+__all__ = ["CHANNELS", "PreparedInstrument", "averaged", "set_up"]

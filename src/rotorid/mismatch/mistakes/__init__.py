@@ -5,7 +5,7 @@ from __future__ import annotations
 from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.mistakes import axes, dropout, rotor_layout, timing, units, vibration
 from rotorid.mismatch.mistakes.dead_voltmeter import connected
-from rotorid.mismatch.mistakes.signals import ReadSet, Result
+from rotorid.mismatch.mistakes.signals import Corrected, ReadSet
 from rotorid.recordings import RecordingSet
 from rotorid.steps import step
 
@@ -18,7 +18,7 @@ def find_mistakes(recordings: RecordingSet) -> tuple[RecordingSet, tuple[Finding
     notes: tuple[str, ...] = ()
     if lost:
         recordings, notes = dropout.what_is_left(recordings, before, lost)
-    result = Result(recordings, (lost,) if lost else (), notes)
+    result = Corrected(recordings, (lost,) if lost else (), notes)
     for find in (units.find, connected, axes.find, rotor_layout.find, timing.find, vibration.find):
         result = result.then(find)
     last = result.recordings

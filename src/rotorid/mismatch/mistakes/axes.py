@@ -16,8 +16,8 @@ from rotorid.mismatch.mistakes import lagged
 from rotorid.mismatch.mistakes.lagged import LaggedFit
 from rotorid.mismatch.mistakes.signals import (
     SENSOR_WORDS,
+    Corrected,
     ReadSet,
-    Result,
     Signals,
     replace_sensor,
     sensor_columns,
@@ -109,7 +109,7 @@ def read(fit: LaggedFit | None) -> _Reading | None:
     return _Reading(Turn(tuple(source), tuple(sign)), float(scale), float(scale_sd), max(p_values))
 
 
-def turned(recordings: ReadSet, sensor: str, turn: Turn, p_value: float) -> Result:
+def turned(recordings: ReadSet, sensor: str, turn: Turn, p_value: float) -> Corrected:
     """The set with a sensor's columns in the contract's axes, and the finding that they were not."""
     names = sensor_columns(recordings.vehicle)[sensor]
     touched = [n for i, n in enumerate(names) if turn.sign[i] < 0 or turn.source[i] != i]
@@ -121,28 +121,28 @@ def turned(recordings: ReadSet, sensor: str, turn: Turn, p_value: float) -> Resu
         p_value=p_value,
         channels=tuple(touched),
     )
-    return Result(replace_sensor(recordings, sensor, turn.undo), (finding,))
+    return Corrected(replace_sensor(recordings, sensor, turn.undo), (finding,))
 
 
-def find(recordings: ReadSet) -> Result:
+def find(recordings: ReadSet) -> Corrected:
     """Wrong axes and units of inertial sensors, attitude, velocity and position."""
-    result = Result(recordings)
+    result = Corrected(recordings)
     for step in (_gravity, _turning, _accelerating, _sideways, _moving):
         result = result.then(step)
     return result
 
 
-def _gravity(recordings: ReadSet) -> Result:
+def _gravity(recordings: ReadSet) -> Corrected:
     """The accelerometer's z axis by gravity: a flying vehicle is supported by thrust along −z."""
     runs = [s for s in recordings.signals if "accelerometer" in s.values]
     if not runs:
-        return Result(recordings)
+        return Corrected(recordings)
     # Over −g along body z: about (0, 0, 1) where all is well.
     mean = np.nanmean(np.concatenate([s.values["accelerometer"] for s in runs]), axis=0)
     mean = mean / -recordings.vehicle.gravity_m_s2
     axis = int(np.argmax(np.abs(mean)))
     if not np.isfinite(mean).all() or abs(mean[axis]) < _LEAST_GRAVITY or (axis == 2 and mean[2] > 0):
-        return Result(recordings)
+        return Corrected(recordings)
     source, sign = [0, 1, 2], [1, 1, 1]
     source[axis], source[2] = 2, axis
     sign[axis] = int(np.sign(mean[axis]))
@@ -167,18 +167,18 @@ UNITS = {
 """Of a sensor its quantity, the contract's unit, and other units with their factor."""
 
 
-def _in_contract_units(recordings: ReadSet, sensor: str, reading: _Reading, among: Collection[str] = ()) -> Result:
+def _in_contract_units(recordings: ReadSet, sensor: str, reading: _Reading, among: Collection[str] = ()) -> Corrected:
     """The set with a sensor's columns in the contract's unit, where their scale is that of another (`among` some)."""
     what, expected, factors = UNITS[sensor]
     unit = nearest(1.0 / reading.scale, {name: f for name, f in factors.items() if not among or name in among})
     if unit is None:
-        return Result(recordings)
+        return Corrected(recordings)
     measured, spread = 1.0 / reading.scale, 1.96 * reading.scale_sd / reading.scale
     columns = sensor_columns(recordings.vehicle)[sensor]
     return corrected(recordings, UnitError(columns, what, *unit, expected, measured, spread, reading.p_value))
 
 
-def _turning(recordings: ReadSet) -> Result:
+def _turning(recordings: ReadSet) -> Corrected:
     """The gyroscope against the attitude, and who of the two is wrong."""
     vehicle = recordings.vehicle
     reading = read(lagged.fit(compare.turning(recordings.signals)))
@@ -200,7 +200,7 @@ def _turning(recordings: ReadSet) -> Result:
                     p_value=again.p_value,
                     channels=sensor_columns(vehicle)["attitude"],
                 )
-                return Result(trial, (*result.findings, finding))
+                return Corrected(trial, (*result.findings, finding))
     return result.then(partial(turned, sensor="gyroscope", turn=reading.turn, p_value=reading.p_value))
 
 
@@ -238,42 +238,42 @@ def _attitude_fits(all_signals: list[Signals], vehicle: Vehicle, strict: bool = 
     return all(gain > max(0.3, _LEAST_T / 2 * max(sd, 1e-12)) for gain, sd in gains)
 
 
-def _gyroscope_units(recordings: ReadSet) -> Result:
+def _gyroscope_units(recordings: ReadSet) -> Corrected:
     """Without an attitude that shows it: the gyroscope's unit from the size of the believed moments."""
     signals = recordings.signals
     sensor = next((n for n in map(compare.speeds_of, signals) if n), None)
     if sensor is None or sensor == "throttle" and not recordings.vehicle.rotor_speed_limits_rad_s:
-        return Result(recordings)
+        return Corrected(recordings)
     blocks = compare.rolling(signals, recordings.vehicle, sensor)
     if blocks is not None and sensor != "rotors":
         # The motors' lag takes most of a quick moment away.
         _, blocks = lagged.through_motor(blocks)
     fit = lagged.fit(blocks)
     if fit is None or np.min(fit.explained) < _LEAST_EXPLAINED:
-        return Result(recordings)
+        return Corrected(recordings)
     gain, sd = np.abs(np.diag(fit.gain)), np.diag(fit.gain_sd)
     if np.any(gain < _LEAST_T * sd):
-        return Result(recordings)
+        return Corrected(recordings)
     p = float(student.sf(np.min(gain / sd), max(fit.block_count - 1, 1)))
     size = float(np.sqrt(gain[0] * gain[1]))
     reading = _Reading(None, 1.0 / size, float(np.max(sd / gain)) / size, p)
     return _in_contract_units(recordings, "gyroscope", reading, ("deg/s", "mrad/s"))
 
 
-def _accelerating(recordings: ReadSet) -> Result:
+def _accelerating(recordings: ReadSet) -> Corrected:
     """The velocity against the specific force turned into the world."""
     source = force_source(recordings.signals)
     if source is None:
-        return Result(recordings)
+        return Corrected(recordings)
     fit = lagged.fit(compare.accelerating(recordings.signals, recordings.vehicle, source))
     return _in_the_world(recordings, "velocity", fit)
 
 
-def _in_the_world(recordings: ReadSet, sensor: str, fit: LaggedFit | None) -> Result:
+def _in_the_world(recordings: ReadSet, sensor: str, fit: LaggedFit | None) -> Corrected:
     """Unit and axes of a sensor Y = M X with X sound."""
     reading = read(_inverse(fit))
     if reading is None:
-        return Result(recordings)
+        return Corrected(recordings)
     result = _in_contract_units(recordings, sensor, reading)
     if reading.turn.identity:
         return result
@@ -291,11 +291,11 @@ def _inverse(fit: LaggedFit | None) -> LaggedFit | None:
     return replace(fit, gain=(fit.gain / size**2).T, gain_sd=(fit.gain_sd / size**2).T, explained=explained)
 
 
-def _sideways(recordings: ReadSet) -> Result:
+def _sideways(recordings: ReadSet) -> Corrected:
     """The accelerometer's x and y, where there is enough sideways force to decide."""
     fit = lagged.fit(compare.sideways(recordings.signals, recordings.vehicle.gravity_m_s2), np.zeros(1))
     if fit is None:
-        return Result(recordings)
+        return Corrected(recordings)
     sign, p_values = [1, 1, 1], []
     for k in (0, 1):
         gain, sd = fit.gain[k, k], max(fit.gain_sd[k, k], 1e-12)
@@ -304,10 +304,10 @@ def _sideways(recordings: ReadSet) -> Result:
             p_values.append(float(student.sf(-gain / sd, max(fit.block_count - 1, 1))))
     turn = Turn((0, 1, 2), tuple(sign))
     if turn.identity:
-        return Result(recordings)
+        return Corrected(recordings)
     return turned(recordings, "accelerometer", turn, max(p_values))
 
 
-def _moving(recordings: ReadSet) -> Result:
+def _moving(recordings: ReadSet) -> Corrected:
     """The position against the velocity (already checked against the forces where there were any)."""
     return _in_the_world(recordings, "position", lagged.fit(compare.moving(recordings.signals)))

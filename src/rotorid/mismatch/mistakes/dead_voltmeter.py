@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rotorid.mismatch.mistakes.signals import Result, replace_columns
+from rotorid.mismatch.mistakes.signals import Corrected, replace_columns
 from rotorid.recordings import RecordingSet, Run
 from rotorid.recordings import columns as c
 
@@ -12,7 +12,7 @@ _LEAST_V = 0.5
 """No battery that turns a rotor has less."""
 
 
-def connected(recordings: RecordingSet) -> Result:
+def connected(recordings: RecordingSet) -> Corrected:
     """The set without voltages that no battery has, and a note for every run whose voltmeter read mostly such."""
     notes = []
 
@@ -28,4 +28,4 @@ def connected(recordings: RecordingSet) -> Result:
             notes.append(f"{c.BATTERY_VOLTAGE} of {run.name} reads below {_LEAST_V} V: taken as not connected.")
         return {c.BATTERY_VOLTAGE: np.nan if mostly else voltage.mask(dead)}
 
-    return Result(replace_columns(recordings, change), notes=tuple(notes))
+    return Corrected(replace_columns(recordings, change), notes=tuple(notes))

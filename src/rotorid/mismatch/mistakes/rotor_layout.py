@@ -21,7 +21,7 @@ from rotorid.mismatch.mistakes import comparisons as compare
 from rotorid.mismatch.mistakes import lagged
 from rotorid.mismatch.mistakes.axes import Turn, turned
 from rotorid.mismatch.mistakes.lagged import OVERLAP, Blocks, LaggedFit, Signal
-from rotorid.mismatch.mistakes.signals import ReadSet, Result, Signals, replace_columns, sensor_columns
+from rotorid.mismatch.mistakes.signals import Corrected, ReadSet, Signals, replace_columns, sensor_columns
 from rotorid.recordings import Run, Vehicle
 
 _MOST_ROTORS_FOR_EVERY_ORDER = 6
@@ -144,17 +144,17 @@ def _contest(axis_moments: list[_Moments], believed: list[np.ndarray], other: li
     return step, float(student.sf(step / sd, max(count - 1, 1)))
 
 
-def find(recordings: ReadSet) -> Result:
+def find(recordings: ReadSet) -> Corrected:
     """The layout (order of the columns, turning senses) that needs the fewest changes among those that fit."""
     vehicle = recordings.vehicle
     if not 3 <= vehicle.rotor_count <= 8:
-        return Result(recordings)
+        return Corrected(recordings)
     signals = recordings.signals
     sensor = next((n for n in map(compare.speeds_of, signals) if n), None)
     blocks = _thrust_blocks(signals, vehicle, sensor) if sensor else None
     free = lagged.fit(blocks)
     if free is None:
-        return Result(recordings)
+        return Corrected(recordings)
     parts = [moments(blocks, axis, free.lag_s, free.weight[axis]) for axis in (0, 1)]
     rows = rows_of(vehicle)
     orders = _orders_to_try(vehicle.rotor_count)
@@ -167,7 +167,7 @@ def find(recordings: ReadSet) -> Result:
     losses = _losses_of_orders(parts, rows, orders)[:, None] + yaw_losses[None, :]
     if not np.isfinite(losses).all():
         # Rotors that all turn alike make no moment that distinguishes them.
-        return Result(recordings)
+        return Corrected(recordings)
     whole = float(sum(m.square.sum() for m in parts) + (yaw[0].square.sum() if yaw else 0.0))
     costs = np.array([moves(o) for o in orders])[:, None] + (_turned_cost(senses, believed[orders]) if yaw else 0)
     least = float(losses.min())
@@ -175,7 +175,7 @@ def find(recordings: ReadSet) -> Result:
     ranked = sorted(tied.tolist(), key=lambda at: (costs[at[0], at[1]], losses[at[0], at[1]]))
     order, spun = ranked[0]
     if costs[order, spun] == 0:
-        return Result(recordings)
+        return Corrected(recordings)
     # Only axes on which the two layouts differ can distinguish them.
     contested, now, then = [], [], []
     for a, m in enumerate(parts):
@@ -197,14 +197,14 @@ def find(recordings: ReadSet) -> Result:
     likely = (as_believed - best) / OVERLAP > _LEAST_LIKELIHOOD
     explains = disputed - best > _LEAST_ADVANTAGE * (disputed - as_believed)
     if not (likely and explains and step > LEAST_STEP and p_value < P_LIMIT):
-        return Result(recordings)
+        return Corrected(recordings)
     cost = int(costs[order, spun])
     if not any({"attitude", "gyroscope"} <= set(s.values) for s in signals):
         gyroscope = _turned_gyroscope(recordings, parts, rows, yaw, believed, _tie(whole, least), cost, p_value)
         if gyroscope:
             return gyroscope
     rival = any(costs[a, b] == cost for a, b in ranked[1:])
-    result = Result(recordings)
+    result = Corrected(recordings)
     if order:
         result = _reordered(recordings, orders[order], p_value, rival)
     turning = np.flatnonzero(senses[spun] != believed[orders[order]]) if yaw else []
@@ -230,7 +230,7 @@ def _turned_gyroscope(
     enough: float,
     cost: int,
     p_value: float,
-) -> Result | None:
+) -> Corrected | None:
     """A gyroscope with flipped or exchanged axes that takes no more changes than a layout's `cost`; None if none.
 
     For sets without an attitude. `enough` is the loss up to which it fits as well. Roll and pitch exchanged are, on a
@@ -257,7 +257,7 @@ def _turned_gyroscope(
             alternatives=("axis_sign", "rotor_order"),
             sentence=finding.sentence.removesuffix(".") + words,
         )
-    return Result(found.recordings, (finding,), (note,))
+    return Corrected(found.recordings, (finding,), (note,))
 
 
 def _thrust_blocks(signals: list[Signals], vehicle: Vehicle, sensor: str) -> Blocks | None:
@@ -269,7 +269,7 @@ def _thrust_blocks(signals: list[Signals], vehicle: Vehicle, sensor: str) -> Blo
     return compare.gather(signals, ("gyroscope", sensor), compare.BANDS_HZ["rolling"], make)
 
 
-def _reordered(recordings: ReadSet, order: np.ndarray, p: float, ambiguous: bool) -> Result:
+def _reordered(recordings: ReadSet, order: np.ndarray, p: float, ambiguous: bool) -> Corrected:
     """Column i belongs to rotor order[i] of vehicle.yaml."""
     names = sensor_columns(recordings.vehicle)
 
@@ -291,7 +291,7 @@ def _reordered(recordings: ReadSet, order: np.ndarray, p: float, ambiguous: bool
         channels=tuple(names["rotors"][i] for i in wrong),
         alternatives=("rotor_order", "spin_direction") if ambiguous else (),
     )
-    return Result(recordings if ambiguous else replace_columns(recordings, change), (finding,))
+    return Corrected(recordings if ambiguous else replace_columns(recordings, change), (finding,))
 
 
 def _yaw_moments(signals: list[Signals], vehicle: Vehicle, sensor: str, roll: LaggedFit) -> list[_Moments]:
@@ -317,7 +317,7 @@ def _yaw_moments(signals: list[Signals], vehicle: Vehicle, sensor: str, roll: La
     return [moments(blocks, 0, lag, free.weight[0]) for lag in lags] if free else []
 
 
-def _spun(recordings: ReadSet, rotors: list[int], p_value: float, ambiguous: bool) -> Result:
+def _spun(recordings: ReadSet, rotors: list[int], p_value: float, ambiguous: bool) -> Corrected:
     """The believed turning senses of some rotors reversed."""
     vehicle = recordings.vehicle
     every = len(rotors) == vehicle.rotor_count
@@ -338,7 +338,7 @@ def _spun(recordings: ReadSet, rotors: list[int], p_value: float, ambiguous: boo
     fixed = recordings
     if not ambiguous:
         fixed = replace(recordings, vehicle=vehicle.model_copy(update={"rotors": new}))
-    return Result(fixed, (finding,))
+    return Corrected(fixed, (finding,))
 
 
 def _yaw_row(m: _Moments, signs: np.ndarray) -> np.ndarray:

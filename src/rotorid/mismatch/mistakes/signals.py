@@ -147,14 +147,14 @@ def replace_sensor(recordings: RecordingSet, sensor: str, change: Callable[[np.n
 
 
 @dataclass(frozen=True)
-class Result:
+class Corrected:
     """A set as corrected so far, and what was found."""
 
     recordings: ReadSet
     findings: tuple[Finding, ...] = ()
     notes: tuple[str, ...] = ()
 
-    def then(self, step: Callable[[ReadSet], Result]) -> Result:
+    def then(self, step: Callable[[ReadSet], Corrected]) -> Corrected:
         """The same after a further step, which looks at the set as corrected so far."""
         found = step(self.recordings)
-        return Result(found.recordings, self.findings + found.findings, self.notes + found.notes)
+        return Corrected(found.recordings, self.findings + found.findings, self.notes + found.notes)

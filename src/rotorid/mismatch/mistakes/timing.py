@@ -22,8 +22,8 @@ from rotorid.mismatch.mistakes.lagged import Blocks, LaggedFit
 from rotorid.mismatch.mistakes.signals import (
     COMMANDED,
     SENSOR_WORDS,
+    Corrected,
     ReadSet,
-    Result,
     Signals,
     on_grid,
     replace_columns,
@@ -74,7 +74,7 @@ _SCALES = (0.85, 1.25)
 
 
 @dataclass(frozen=True)
-class Comparison:
+class SensorPair:
     """Two sensors that may show each other's time."""
 
     late: str
@@ -99,10 +99,10 @@ class Comparison:
 
 
 @dataclass(frozen=True)
-class Difference:
+class LatenessFound:
     """Lateness of one sensor over another at the start of a run, and how it grows."""
 
-    of: Comparison
+    of: SensorPair
     start_s: float
     growth: float
     """s/s."""
@@ -141,14 +141,14 @@ class Difference:
         return max(disturbed, _MOTOR_SLOWS_PER_S * self.of.motor_s)
 
 
-def find(recordings: ReadSet) -> Result:
+def find(recordings: ReadSet) -> Corrected:
     """Clocks that drift first, then constant delays."""
     known = comparisons(recordings)
     result = _skew(recordings, known)
     return result.then(partial(_delay, known=comparisons(result.recordings) if result.findings else known))
 
 
-def comparisons(recordings: ReadSet) -> list[Comparison]:
+def comparisons(recordings: ReadSet) -> list[SensorPair]:
     """Every comparison of two sensors that may show time."""
     all_signals, vehicle = recordings.signals, recordings.vehicle
     have = set().union(*(s.values for s in all_signals))
@@ -189,7 +189,7 @@ def comparisons(recordings: ReadSet) -> list[Comparison]:
             continue
         if late == "velocity":
             shares = _shares_of(all_signals, vehicle, source, [0, 1] if over == "attitude" else [2], found)
-        out.append(Comparison(late, over, blocks, found, motor_s, shares))
+        out.append(SensorPair(late, over, blocks, found, motor_s, shares))
     return out
 
 
@@ -241,7 +241,7 @@ def _late(signals: Signals, sensor: str, steps: int) -> Signals:
     return replace(signals, values={**signals.values, sensor: _moved(signals.values[sensor], -steps)})
 
 
-def difference(of: Comparison, drifting: bool, free: bool = True) -> Difference:
+def difference(of: SensorPair, drifting: bool, free: bool = True) -> LatenessFound:
     """Lateness, and its growth if asked for, at the likelihood's peak.
 
     Where `free`, gains and weights are fitted again with the blocks put on one time, because a drifting clock blurs the
@@ -292,7 +292,7 @@ def difference(of: Comparison, drifting: bool, free: bool = True) -> Difference:
     explained = float(np.min(found.explained))
     answered = of.over == "rotors" or (of.over in COMMANDED and of.late != "rotors")
     bias_s = _disturbed_s(blocks, found) if answered else 0.0
-    return Difference(of, start, growth, covariance, rise, len(time_s), explained, gained, bias_s)
+    return LatenessFound(of, start, growth, covariance, rise, len(time_s), explained, gained, bias_s)
 
 
 def _disturbed_s(blocks: Blocks, found: LaggedFit) -> float:
@@ -336,14 +336,14 @@ def _waves(frequency_hz: tuple[float, ...], first_s: float, count: int) -> tuple
     return np.cos(angle), np.sin(angle)
 
 
-def differences(known: list[Comparison], drifting: bool) -> list[Difference]:
+def differences(known: list[SensorPair], drifting: bool) -> list[LatenessFound]:
     """Every difference of lateness that a comparison is good enough to show."""
     least = dict.fromkeys(COMMANDED, _LEAST_EXPLAINED if drifting else _LEAST_ALONE)
     found = [difference(c, drifting) for c in known]
     return [d for d in found if d.explained > least.get(d.of.over, _LEAST_EXPLAINED)]
 
 
-def across(differences: Sequence[Difference], wrong: Sequence[str], key: int) -> tuple[float, float]:
+def across(differences: Sequence[LatenessFound], wrong: Sequence[str], key: int) -> tuple[float, float]:
     """Lateness (key 0) or growth (1) of some sensors over the rest, and one sigma, from comparisons between the two.
 
     What disturbances can feign counts as another one sigma: it is a bound, and seldom met.
@@ -373,7 +373,7 @@ def _remeasured(
     return first + rest, sd
 
 
-def _in_every_run(whole: Difference) -> bool:
+def _in_every_run(whole: LatenessFound) -> bool:
     """Whether each run by itself shows the growth: what acts in part of a flight only must not pass for a clock."""
     blocks = whole.of.blocks
     agree, shown = [], []
@@ -445,7 +445,7 @@ class Lateness:
         return value, float(np.sqrt(np.sum((row * self.sd) ** 2))), float(np.abs(row) @ self.bound)
 
 
-def _lateness(differences: list[Difference], key: int) -> Lateness:
+def _lateness(differences: list[LatenessFound], key: int) -> Lateness:
     """Lateness (key 0) or growth (key 1) of every sensor by weighted least squares."""
     names = sorted({n for d in differences for n in d.of.sensors})
     rows = np.array([[d.of.part([n]) for n in names] for d in differences])
@@ -455,7 +455,7 @@ def _lateness(differences: list[Difference], key: int) -> Lateness:
     return Lateness(names, operator @ target, operator, sd, bound, _connected(names, differences))
 
 
-def _connected(names: list[str], differences: list[Difference]) -> list[list[str]]:
+def _connected(names: list[str], differences: list[LatenessFound]) -> list[list[str]]:
     groups = [{n} for n in names]
     for d in differences:
         for name, _ in d.of.shares:
@@ -553,7 +553,7 @@ def _listed(sensors: Sequence[str]) -> str:
     return listed([SENSOR_WORDS[s] for s in sensors])
 
 
-def _one_clock(differences: list[Difference], growing: list[Difference]) -> tuple[str, ...]:
+def _one_clock(differences: list[LatenessFound], growing: list[LatenessFound]) -> tuple[str, ...]:
     """The sensor whose clock alone explains all growths best, and others that do so as well; none for no candidate.
 
     Candidates are the two sides of the comparisons with a significant growth. Nothing but height rests on the
@@ -571,7 +571,7 @@ def _one_clock(differences: list[Difference], growing: list[Difference]) -> tupl
     return tuple(sorted(alike, key=lambda n: (-trusted[n], n)))
 
 
-def _skew(recordings: ReadSet, known: list[Comparison]) -> Result:
+def _skew(recordings: ReadSet, known: list[SensorPair]) -> Corrected:
     """Sensors whose lateness grows."""
     signals = recordings.signals
     found = differences(known, drifting=True)
@@ -586,7 +586,7 @@ def _skew(recordings: ReadSet, known: list[Comparison]) -> Result:
         if significant and _in_every_run(d):
             growing.append((p, d))
     if not growing:
-        return Result(recordings)
+        return Corrected(recordings)
     solved = _lateness(found, 1)
     least = {n: 0.5 * max(periods[n], 2e-3) / longest for n in solved.names}
     drift = _relative_to_most(solved, least, 3.0)
@@ -601,7 +601,7 @@ def _skew(recordings: ReadSet, known: list[Comparison]) -> Result:
         # Two clocks surely part, and the rest cannot show which is right: the one that leaves least to explain.
         blamed = _one_clock(found, [d for _, d in growing])
         if not blamed:
-            return Result(recordings)
+            return Corrected(recordings)
         drift = {blamed[0]: (across(found, [blamed[0]], 1)[0], 0.0, 0.0)}
         wrong = [blamed[0]]
         if len(blamed) > 1:
@@ -625,7 +625,7 @@ def _skew(recordings: ReadSet, known: list[Comparison]) -> Result:
         p_value=min(p for p, _ in growing),
         channels=tuple(sensor_columns(recordings.vehicle)[n][0] for n in wrong),
     )
-    return Result(shifted(recordings, _with_position(wrong), 0.0, rate), (finding,))
+    return Corrected(shifted(recordings, _with_position(wrong), 0.0, rate), (finding,))
 
 
 def _with_position(sensors: list[str]) -> list[str]:
@@ -633,13 +633,13 @@ def _with_position(sensors: list[str]) -> list[str]:
     return [*sensors, "position"] if {"velocity", "attitude"} <= {*sensors} and "position" not in sensors else sensors
 
 
-def _delay(recordings: ReadSet, known: list[Comparison]) -> Result:
+def _delay(recordings: ReadSet, known: list[SensorPair]) -> Corrected:
     """Sensors that are late by a constant of more than one sample."""
     signals = recordings.signals
     periods = own_period_s(signals)
     found = differences(known, drifting=False)
     if not found:
-        return Result(recordings)
+        return Corrected(recordings)
     solved = _lateness(found, 0)
     sample = max(1.0 / s.rate_hz for s in signals)
     small = min(_FILTER_S, _FILTER_SAMPLES * sample)
@@ -698,7 +698,7 @@ def _delay(recordings: ReadSet, known: list[Comparison]) -> Result:
                 channels=tuple(sensor_columns(recordings.vehicle)[n][0] for n in cluster),
             )
         )
-    return Result(fixed, tuple(findings), tuple(notes))
+    return Corrected(fixed, tuple(findings), tuple(notes))
 
 
 def _clusters(names: list[str], values: dict[str, float], tolerance: dict[str, float]) -> list[list[str]]:

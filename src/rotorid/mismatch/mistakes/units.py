@@ -11,7 +11,7 @@ from scipy.constants import g
 from scipy.stats import norm
 
 from rotorid.mismatch.decision.findings import Finding
-from rotorid.mismatch.mistakes.signals import ReadSet, Result, replace_columns, sensor_columns
+from rotorid.mismatch.mistakes.signals import Corrected, ReadSet, replace_columns, sensor_columns
 from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import Run
 from rotorid.recordings import columns as c
@@ -56,9 +56,9 @@ def nearest(ratio: float, factors: Mapping[str, float]) -> tuple[str, float] | N
     return (name, factors[name]) if abs(np.log(ratio / factors[name])) < _CLOSE else None
 
 
-def find(recordings: ReadSet) -> Result:
+def find(recordings: ReadSet) -> Corrected:
     """The set in the contract's units, with every unit error that the mean sizes of columns give away."""
-    result = Result(recordings)
+    result = Corrected(recordings)
     for error in _by_size(recordings):
         result = result.then(partial(corrected, error=error))
     return result
@@ -119,7 +119,7 @@ def _by_size(recordings: ReadSet) -> list[UnitError]:
     return found
 
 
-def corrected(recordings: ReadSet, error: UnitError) -> Result:
+def corrected(recordings: ReadSet, error: UnitError) -> Corrected:
     """The set with the columns in the contract's unit, and the finding of a unit error.
 
     It states the unit's own factor, and in its interval what the recording itself gives.
@@ -144,4 +144,4 @@ def corrected(recordings: ReadSet, error: UnitError) -> Result:
         p_value=error.p_value,
         channels=error.columns,
     )
-    return Result(replace_columns(recordings, change), (finding,))
+    return Corrected(replace_columns(recordings, change), (finding,))

@@ -15,7 +15,7 @@ from scipy.signal import lfilter
 from scipy.stats import gamma
 
 from rotorid.mismatch.decision.findings import Finding
-from rotorid.mismatch.mistakes.signals import P_LIMIT, ReadSet, Result, Signals
+from rotorid.mismatch.mistakes.signals import P_LIMIT, Corrected, ReadSet, Signals
 from rotorid.mismatch.plant.motion import full_speed
 from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import columns as c
@@ -52,7 +52,7 @@ class Line:
     p_value: float
 
 
-def find(recordings: ReadSet) -> Result:
+def find(recordings: ReadSet) -> Corrected:
     """A vibration that follows the rotors, if there is a clear one; the set stays as it is."""
     signals = turning(recordings)
     lines = []
@@ -67,7 +67,7 @@ def find(recordings: ReadSet) -> Result:
                 if line and line.p_value < P_LIMIT and line.over_noise > _LEAST_AMPLITUDE:
                     lines.append(line)
     if not lines:
-        return Result(recordings)
+        return Corrected(recordings)
     lines.sort(key=lambda x: x.p_value)
     strongest = max(lines, key=lambda x: (x.column.startswith("specific"), x.amplitude))
     where = ", ".join(dict.fromkeys(x.column for x in lines))
@@ -83,7 +83,7 @@ def find(recordings: ReadSet) -> Result:
         p_value=lines[0].p_value,
         channels=tuple(dict.fromkeys(x.column for x in lines)),
     )
-    return Result(recordings, (finding,))
+    return Corrected(recordings, (finding,))
 
 
 def turning(recordings: ReadSet) -> list[Signals]:

@@ -30,7 +30,7 @@ from rotorid.mismatch.plant.rows import compared_alone, winds_last
 from rotorid.mismatch.plant.split import training_rule
 from rotorid.mismatch.posterior.problem import Prior
 from rotorid.mismatch.posterior.statements import SURE
-from rotorid.mismatch.posterior.values import GAINS, Gain, called_wrong, in_place, options_of, same_ratio
+from rotorid.mismatch.posterior.values import GAINS, LogGain, called_wrong, in_place, options_of, same_ratio
 from rotorid.recordings.signal.kernels import low_pass
 
 _VALUE_BAND = (0.2, 0.6)
@@ -98,7 +98,7 @@ def _trust_of(model: WrenchModel) -> dict[str, float]:
     return trust
 
 
-def gains_of(model: WrenchModel, prior: Prior) -> dict[str, Gain]:
+def gains_of(model: WrenchModel, prior: Prior) -> dict[str, LogGain]:
     """The gains that a flight shows, by the key of the value in their denominator.
 
     Where commands alone say how fast rotors turn, a lag that is not quite theirs changes what is quick: no band judges.
@@ -180,7 +180,7 @@ def _gain_of(coefficient: float, turned: bool) -> float:
     )
 
 
-def merged(sides: Sequence[Side], leftover: float, bias: float, samples: float) -> Gain:
+def merged(sides: Sequence[Side], leftover: float, bias: float, samples: float) -> LogGain:
     """A gain of one band by both sides, the forward one first; along the thrust both are one.
 
     With u² the residual over the column's own part, a controller's answer to a leftover biases both sides by `bias` u
@@ -198,16 +198,16 @@ def merged(sides: Sequence[Side], leftover: float, bias: float, samples: float) 
     mean = float(weights @ log)
     spread = float(variance.min() + weights @ (log - mean) ** 2)
     # The column is that of the believed value: of a smaller gain it is too large.
-    return Gain(mean, spread + common * float(np.exp(-2.0 * min(mean, 0.0))))
+    return LogGain(mean, spread + common * float(np.exp(-2.0 * min(mean, 0.0))))
 
 
-def mean_of(gains: Sequence[Gain]) -> Gain:
+def mean_of(gains: Sequence[LogGain]) -> LogGain:
     """One gain of several independent ones, less certain where they differ by more than they should (Birge, The
     calculation of errors by the method of least squares, Physical Review 40, 1932)."""
     log, weights = np.array([g.log for g in gains]), np.array([1.0 / g.variance for g in gains])
     mean = float(weights @ log / weights.sum())
     excess = float(weights @ (log - mean) ** 2) / max(len(gains) - 1, 1)
-    return Gain(mean, max(1.0, excess) / float(weights.sum()))
+    return LogGain(mean, max(1.0, excess) / float(weights.sum()))
 
 
 def uncorrected(regression: Regression) -> Regression:

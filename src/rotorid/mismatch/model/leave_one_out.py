@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from rotorid.effects.catalogue import ids_of
-from rotorid.mismatch.decision.findings import Finding, Trace
+from rotorid.mismatch.decision.findings import ChannelTrace, Finding
 from rotorid.mismatch.model.delivered import Values, residuals_of
 from rotorid.mismatch.model.fitted import Fitted
 from rotorid.mismatch.model.report_runs import rows_of, scaled_by_run
@@ -25,7 +25,12 @@ from rotorid.mismatch.posterior.status import CLAIMED
 
 
 def without_each(
-    found: Fitted, seen: WrenchModel, values: Values, fit: Fit, findings: list[Finding], traces: tuple[Trace, ...]
+    found: Fitted,
+    seen: WrenchModel,
+    values: Values,
+    fit: Fit,
+    findings: list[Finding],
+    traces: tuple[ChannelTrace, ...],
 ) -> dict[str, tuple[np.ndarray, ...]]:
     """To the id of every stated effect the residual (n,) of every trace without it, in the traces' order.
 
@@ -95,7 +100,9 @@ def made_by(model: WrenchModel, segments, fit: Fit) -> list[np.ndarray]:
     return [r.y - r.x[:, :, fit.columns] @ named for r in rows]
 
 
-def on_traces(traces: Sequence[Trace], rows: Sequence[Rows], left: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
+def on_traces(
+    traces: Sequence[ChannelTrace], rows: Sequence[Rows], left: Sequence[np.ndarray]
+) -> tuple[np.ndarray, ...]:
     """Residuals (n, channels) of every stretch on the traces; what is delivered where a trace is of none of them."""
     known = {}
     for r, part in zip(rows, left, strict=True):
@@ -103,7 +110,9 @@ def on_traces(traces: Sequence[Trace], rows: Sequence[Rows], left: Sequence[np.n
     return tuple(known.get((t.run, first_s(t.time_s), t.channel), t.named) for t in traces)
 
 
-def _speeds_without(found: Fitted, seen: WrenchModel, key: str, traces: tuple[Trace, ...]) -> tuple[np.ndarray, ...]:
+def _speeds_without(
+    found: Fitted, seen: WrenchModel, key: str, traces: tuple[ChannelTrace, ...]
+) -> tuple[np.ndarray, ...]:
     """Measured less modelled rotor speeds on the traces, with one id less between command and speed."""
     result, *rest = chain_without(found, key)
     thinner, known = seen.prepared.thinner, {}

@@ -56,7 +56,7 @@ class Made:
 
 
 @dataclass
-class Memory:
+class LastMade:
     """What was made last of each stretch of flight, under keys of those who made it."""
 
     kept: dict[tuple, Made] = field(default_factory=dict)

@@ -15,7 +15,7 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form, Motion, not_testable_reason, rotor_thrusts
 from rotorid.errors import InputError
 from rotorid.mismatch.decision import rules
-from rotorid.mismatch.model.made import Memory
+from rotorid.mismatch.model.made import LastMade
 from rotorid.mismatch.plant.motion import (
     HIGHEST_CUTOFF_HZ,
     SHORTEST_SEGMENT_S,
@@ -149,7 +149,7 @@ class Prepared:
     not_testable: dict[str, str] = field(default_factory=dict)
     unseen: tuple[str, ...] = ()
     """Names of the runs held out, of which nothing else is known here."""
-    memory: Memory = field(default_factory=Memory)
+    memory: LastMade = field(default_factory=LastMade)
     """Columns of the terms and what they are made of, as they were made last."""
 
     @cached_property

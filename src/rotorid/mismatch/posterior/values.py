@@ -38,7 +38,7 @@ Values = dict[str, tuple[float, float]]
 
 
 @dataclass(frozen=True)
-class Gain:
+class LogGain:
     """The logarithm of a gain over the believed one, as a flight shows it."""
 
     log: float
@@ -58,7 +58,7 @@ class Option:
 _Options = Mapping[frozenset[str], Option]
 
 
-def options_of(gains: Mapping[str, Gain], trust: Mapping[str, float], prior: Prior) -> _Options:
+def options_of(gains: Mapping[str, LogGain], trust: Mapping[str, float], prior: Prior) -> _Options:
     """Every subset of values that may be wrong.
 
     `gains` are those known, by the key of GAINS; `trust` is the relative one-sigma that each value was stated with.

@@ -27,7 +27,7 @@ import numpy as np
 from scipy.optimize import nnls
 from scipy.stats import chi2, f
 
-from rotorid.mismatch.decision.findings import Analysis, Trace, by_channel, rms, with_status
+from rotorid.mismatch.decision.findings import Analysis, ChannelTrace, by_channel, rms, with_status
 from rotorid.mismatch.decision.shares import effort, segments_of, shares
 from rotorid.mismatch.mistakes.signals import channel_of
 from rotorid.mismatch.plant.between_runs import apart
@@ -85,7 +85,7 @@ _EXCESS_SHARE = 0.25
 class _Interval:
     """A stretch of one trace: samples start to stop (exclusive)."""
 
-    trace: Trace
+    trace: ChannelTrace
     start: int
     stop: int
     p_value: float
@@ -146,12 +146,12 @@ def _edge(analysis: Analysis, interval: _Interval, sample: int, end: int) -> flo
     return float(time_s[sample])
 
 
-def _mismatch_of(trace: Trace, explained: bool) -> np.ndarray:
+def _mismatch_of(trace: ChannelTrace, explained: bool) -> np.ndarray:
     """The mismatch with as little noise as can be had: what the findings take away, else the residual itself."""
     return trace.before - trace.named if explained else trace.named
 
 
-def _channel_noise(traces: Sequence[Trace]) -> float:
+def _channel_noise(traces: Sequence[ChannelTrace]) -> float:
     """Usual size of the residual after the effects, robust against stretches in which it is larger."""
     parts = [_blocks(t.named, _period(t)) for t in traces]
     sizes = [np.sqrt(np.nanmean(blocks**2, axis=1)) for blocks in parts if len(blocks)]
@@ -165,11 +165,11 @@ def _blocks(values: np.ndarray, period_s: float) -> np.ndarray:
     return values[: count * per].reshape(count, per)
 
 
-def _period(trace: Trace) -> float:
+def _period(trace: ChannelTrace) -> float:
     return float(np.median(np.diff(trace.time_s)))
 
 
-def _long_enough(analysis: Analysis) -> dict[str, list[Trace]]:
+def _long_enough(analysis: Analysis) -> dict[str, list[ChannelTrace]]:
     """Channels to their traces of more than a few samples."""
     return by_channel(t for t in analysis.traces if len(t.time_s) > 8)
 
@@ -237,7 +237,7 @@ def _explained(analysis: Analysis, segments: list[Segment]) -> tuple[list[_Inter
     return partial, throughout
 
 
-def _share_at_work(contributions: Mapping[str, tuple[Sequence[Trace], Sequence[np.ndarray]]]) -> float:
+def _share_at_work(contributions: Mapping[str, tuple[Sequence[ChannelTrace], Sequence[np.ndarray]]]) -> float:
     """Share of the flight in which a cause's contribution to any channel (traces and their series) is more than nil."""
     by_run: dict[tuple[str, float], list[np.ndarray]] = {}
     for traces, series in contributions.values():
@@ -248,7 +248,7 @@ def _share_at_work(contributions: Mapping[str, tuple[Sequence[Trace], Sequence[n
     return float(np.concatenate([np.any(m, axis=0) for m in by_run.values()]).mean())
 
 
-def _acting(traces: Sequence[Trace], series: Sequence[np.ndarray]) -> list[np.ndarray] | None:
+def _acting(traces: Sequence[ChannelTrace], series: Sequence[np.ndarray]) -> list[np.ndarray] | None:
     """Masks of where a contribution to a channel matters relative to its noise; None where it never does."""
     noise = _channel_noise(traces)
     levels = [_local_size(x, _period(t)) for x, t in zip(series, traces, strict=True)]
@@ -262,7 +262,7 @@ def _acting(traces: Sequence[Trace], series: Sequence[np.ndarray]) -> list[np.nd
     return masks
 
 
-def _tested(traces: Sequence[Trace], masks: Sequence[np.ndarray], count: int) -> list[_Interval]:
+def _tested(traces: Sequence[ChannelTrace], masks: Sequence[np.ndarray], count: int) -> list[_Interval]:
     """Intervals of the masks in which the residual before is larger than coloured noise allows."""
     noise, freedom = _channel_noise(traces), _freedom_per_sample(traces)
     found = []
@@ -301,7 +301,7 @@ def _closed(mask: np.ndarray, period_s: float) -> np.ndarray:
     return out
 
 
-def _freedom_per_sample(traces: Sequence[Trace]) -> float:
+def _freedom_per_sample(traces: Sequence[ChannelTrace]) -> float:
     """Degrees of freedom that a sample's square adds in coloured noise: 1 / Σ ρ² over lags of up to 1 s (Bartlett)."""
     count = int(1.0 / _period(traces[0]))
     covariance = np.zeros(count + 1)
@@ -376,7 +376,7 @@ def _apart(traces, parts) -> list[_Interval]:
     ]
 
 
-def _evened(traces: Sequence[Trace], white: list[np.ndarray], hard) -> list[np.ndarray]:
+def _evened(traces: Sequence[ChannelTrace], white: list[np.ndarray], hard) -> list[np.ndarray]:
     """Residuals divided by the size that noise has at that moment: a constant and a part that grows with effort.
 
     The energy of half-second blocks is fitted by non-negative least squares on the effort, twice, blocks far above
@@ -402,7 +402,7 @@ def _evened(traces: Sequence[Trace], white: list[np.ndarray], hard) -> list[np.n
     return [w / np.sqrt(np.maximum(e / scale @ coefficients, floor)) for w, e in zip(white, efforts, strict=True)]
 
 
-def _lengths(trace: Trace) -> list[int]:
+def _lengths(trace: ChannelTrace) -> list[int]:
     return [n for s in _SCAN_S if 4 < (n := int(round(s / _period(trace)))) <= len(trace.named) // 2]
 
 
@@ -431,7 +431,7 @@ def _flagged(series: Sequence[np.ndarray], hits: Iterable[tuple[int, int, np.nda
     return [(k, a, b, lowest[k]) for k, mask in enumerate(flagged) for a, b in stretches(mask)]
 
 
-def _nearby(trace: Trace, start: int, stop: int) -> slice:
+def _nearby(trace: ChannelTrace, start: int, stop: int) -> slice:
     """A stretch and a second on either side: where its edges are looked for."""
     reach = int(round(1.0 / _period(trace)))
     return slice(max(start - reach, 0), min(stop + reach, len(trace.named)))

@@ -22,8 +22,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from rotorid.io.text.writing import rounded
 from rotorid.mismatch.decision.findings import (
     Analysis,
+    ChannelTrace,
     Finding,
-    Trace,
     ValueRow,
     by_channel,
     one_per_class,
@@ -494,7 +494,7 @@ def reached(floor: float | None, held_out: Errors) -> float | None:
     return None if floor is None else min([floor, *errors])
 
 
-def _errors(traces: Sequence[Trace], masks: Sequence[np.ndarray]) -> Errors:
+def _errors(traces: Sequence[ChannelTrace], masks: Sequence[np.ndarray]) -> Errors:
     own = list(zip(traces, masks, strict=True))
     return Errors(**{stage: rms([getattr(t, stage)[mask] for t, mask in own]) for stage in Errors.model_fields})
 

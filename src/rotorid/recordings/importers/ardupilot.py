@@ -36,7 +36,7 @@ from rotorid.recordings.importers.bag_records import needs
 from rotorid.recordings.importers.clean import one_sense, report_gaps
 from rotorid.recordings.importers.mapping import continuous, quaternion_from_euler_frd
 from rotorid.recordings.importers.parameters import Parameters, Values
-from rotorid.recordings.importers.report import Fault
+from rotorid.recordings.importers.report import ImportFault
 
 KINDS = (
     "IMU", "ACC", "GYR", "XKQ", "NKQ", "ATT", "XKF1", "NKF1", "EKF1", "RCOU", "RCO2", "RCO3", "ESC", "BAT", "CURR",
@@ -185,16 +185,16 @@ def _check_frame(log: Log, values: Values, where: object) -> None:
     raise InputError(f"{where}: the log is of {what} ({by}); only multirotors of fixed rotors can be imported")
 
 
-def order_of(values: Values) -> tuple[str, list[Fault]]:
+def order_of(values: Values) -> tuple[str, list[ImportFault]]:
     """Key of the rotors' order by frame class and type, empty where it is not known."""
     kind, form = int(values.get("FRAME_CLASS", 1)), int(values.get("FRAME_TYPE", values.get("FRAME", 1)))
     if kind == 1 and form in _ORDER_OF_FRAME:
         return _ORDER_OF_FRAME[form], []
     found = f"FRAME_CLASS {kind}, FRAME_TYPE {form}: the order of its rotors is not known here"
-    faults = [Fault("order", "vehicle.yaml", found, "taken from the template: check it", 0)]
+    faults = [ImportFault("order", "vehicle.yaml", found, "taken from the template: check it", 0)]
     if kind == 1 and form in TILTED_TYPES:
         found = f"FRAME_TYPE {form} is a {TILTED_TYPES[form]}, whose rear rotors lean outwards"
-        faults.append(Fault("tilted_rotor", "vehicle.yaml", found, "their thrust is taken along -z", 0))
+        faults.append(ImportFault("tilted_rotor", "vehicle.yaml", found, "their thrust is taken along -z", 0))
     return "", faults
 
 
@@ -225,7 +225,7 @@ def in_flight(log: Log, where: object) -> Values:
     return parameters(log).mostly(grid if flown is None or not flown.any() else grid[flown])
 
 
-def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[Fault], np.ndarray]:
+def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[ImportFault], np.ndarray]:
     """Contract columns of a whole log, its faults, and where it flies (mask of rows)."""
     grid = _clock(log, where)
     stated, values = parameters(log), in_flight(log, where)
@@ -233,11 +233,11 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[Fault], np.ndar
     faults = stated.faults(_CHANGED, grid[0])
     if END in log:
         found = f"the file ends inside a message, after {int(log[END]['bytes'].iloc[0])} bytes of it"
-        faults.append(Fault("cut_off", "", found, "what came before is kept; the log stopped before its end", 0))
+        faults.append(ImportFault("cut_off", "", found, "what came before is kept; the log stopped before its end", 0))
     keep = in_the_air.increasing(grid)
     if not keep.all():
         found = f"{int((~keep).sum())} messages do not move the clock on"
-        faults.append(Fault("repeated_time", c.TIME, found, "left out", int((~keep).sum())))
+        faults.append(ImportFault("repeated_time", c.TIME, found, "left out", int((~keep).sum())))
     grid = grid[keep]
     parts: list[tuple] = []
 
@@ -262,7 +262,7 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[Fault], np.ndar
     estimate = next((t for k in ("XKF1", "NKF1") if (t := _of_first(log.get(k), "C")) is not None), None)
     if estimate is None and (estimate := log.get("EKF1")) is not None and values.get("AHRS_EKF_USE") != 1:
         found = "EKF1 did not fly the vehicle (AHRS_EKF_USE is not 1)"
-        faults.append(Fault("estimate", "velocity, position", found, "columns left out", len(estimate)))
+        faults.append(ImportFault("estimate", "velocity, position", found, "columns left out", len(estimate)))
         estimate = None
     put(c.VELOCITY, estimate, ("VN", "VE", "VD"))
     put(c.POSITION, estimate, ("PN", "PE", "PD"))
@@ -272,7 +272,7 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[Fault], np.ndar
         put((c.HEIGHT,), below[(below["Stat"] == GOOD) & (below["Orient"] == DOWN)], ("Dist",))
     outputs = _outputs(log)
     if outputs is None:
-        faults.append(Fault("no_command", "", "RCOU is not logged", "no throttle columns", 0))
+        faults.append(ImportFault("no_command", "", "RCOU is not logged", "no throttle columns", 0))
     else:
         channels, more = _channels(values, outputs)
         faults += more
@@ -294,7 +294,7 @@ def _outputs(log: Log) -> pd.DataFrame | None:
     return outputs
 
 
-def _channels(values: Values, outputs: pd.DataFrame) -> tuple[dict[int, int], list[Fault]]:
+def _channels(values: Values, outputs: pd.DataFrame) -> tuple[dict[int, int], list[ImportFault]]:
     """To each motor (from 0) its output (from 1) by frame class and output functions, and what of it is doubtful."""
     count = _MULTIROTORS.get(int(values.get("FRAME_CLASS", 0)), 0)
     by_motor: dict[int, int] = {}
@@ -307,13 +307,13 @@ def _channels(values: Values, outputs: pd.DataFrame) -> tuple[dict[int, int], li
         found = "no SERVOn_FUNCTION is a motor"
         action = f"channels 1 to {count} taken for motors 1 to {count}"
         logged = {i: i + 1 for i in range(count) if f"C{i + 1}" in outputs}
-        return logged, [Fault("order", "throttle", found, action, 0)]
+        return logged, [ImportFault("order", "throttle", found, action, 0)]
     faults = []
     count = count or max(by_motor) + 1
     unused = [number for motor, number in sorted(by_motor.items()) if motor >= count]
     if unused:
         found = f"outputs {', '.join(map(str, unused))} have the functions of motors beyond the {count} of the frame"
-        faults.append(Fault("order", "throttle", found, "left out", 0))
+        faults.append(ImportFault("order", "throttle", found, "left out", 0))
     for motor in range(count):
         if (number := by_motor.get(motor)) is None:
             found = f"no SERVOn_FUNCTION is motor {motor + 1} of {count}"
@@ -321,11 +321,11 @@ def _channels(values: Values, outputs: pd.DataFrame) -> tuple[dict[int, int], li
             found = f"output {number} is not logged"
         else:
             continue
-        faults.append(Fault("no_command", f"throttle_{motor + 1}", found, "column left out", 0))
+        faults.append(ImportFault("no_command", f"throttle_{motor + 1}", found, "column left out", 0))
     return {m: n for m, n in sorted(by_motor.items()) if m < count and f"C{n}" in outputs}, faults
 
 
-def _throttles(outputs: pd.DataFrame, stated: Parameters, frame: float, faults: list[Fault]) -> list[tuple]:
+def _throttles(outputs: pd.DataFrame, stated: Parameters, frame: float, faults: list[ImportFault]) -> list[tuple]:
     """Throttles with their times, each pulse by the parameters that held then."""
     times, throttles = outputs[c.TIME].to_numpy(float), {}
     for start, stop, values in stated.spans(_CHANGED[0][0]):
@@ -341,7 +341,7 @@ def _throttles(outputs: pd.DataFrame, stated: Parameters, frame: float, faults: 
     return [((name,), times, own) for name, own in sorted(throttles.items())]
 
 
-def _limits(values: Values, pulses: int) -> tuple[float, float, list[Fault]]:
+def _limits(values: Values, pulses: int) -> tuple[float, float, list[ImportFault]]:
     """Pulses (µs) of no and of full throttle, and a fault where the motors' own limits do not state them."""
 
     def stated(low: str, high: str) -> bool:
@@ -358,10 +358,10 @@ def _limits(values: Values, pulses: int) -> tuple[float, float, list[Fault]]:
     else:
         low, high = _PULSE_US
         action = f"taken as {low:g} and {high:g} µs"
-    return low, high, [Fault("unit", "throttle", found, action, pulses)]
+    return low, high, [ImportFault("unit", "throttle", found, action, pulses)]
 
 
-def _battery(log: Log, faults: list[Fault]) -> list[tuple]:
+def _battery(log: Log, faults: list[ImportFault]) -> list[tuple]:
     """Voltage (V) and current (A) of `BAT`, of `CURR` where there is none; what is 0 throughout is not measured.
 
     `CURR` counts in hundredths where its format holds whole numbers (Copter 3.3 and before).
@@ -376,13 +376,15 @@ def _battery(log: Log, faults: list[Fault]) -> list[tuple]:
             continue  # damaged: no numbers
         values = values.astype(float) * (0.01 if kind == "CURR" and values.dtype.kind in "iu" else 1.0)
         if (values == 0).all():
-            faults.append(Fault("stuck", column, f"{kind}.{name} is 0 throughout", "column left out", len(values)))
+            faults.append(
+                ImportFault("stuck", column, f"{kind}.{name} is 0 throughout", "column left out", len(values))
+            )
             continue
         parts.append(((column,), table[c.TIME].to_numpy(float), values))
     return parts
 
 
-def _speeds(esc: pd.DataFrame | None, channels: Mapping[int, int], faults: list[Fault]) -> list[tuple]:
+def _speeds(esc: pd.DataFrame | None, channels: Mapping[int, int], faults: list[ImportFault]) -> list[tuple]:
     """Rotor speeds of `ESC` messages, whose instance is the output's number from 0."""
     if esc is None or not {"Instance", "RPM"} <= set(esc):
         return []
@@ -392,7 +394,7 @@ def _speeds(esc: pd.DataFrame | None, channels: Mapping[int, int], faults: list[
         own = esc[esc["Instance"] == channel - 1]
         if not len(own) or not own["RPM"].abs().max() > 0:
             seen = f"ESC holds no speed of output {channel}"
-            faults.append(Fault("speed_missing", name, seen, "column left out", 0))
+            faults.append(ImportFault("speed_missing", name, seen, "column left out", 0))
             continue
         speeds, more = one_sense(own[["RPM"]].to_numpy(float) * RPM, (name,))
         faults += more
@@ -412,7 +414,7 @@ def _flying(log: Log, grid: np.ndarray) -> np.ndarray | None:
     return None
 
 
-def read_ardupilot(path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault], str]:
+def read_ardupilot(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault], str]:
     """Every flight of a DataFlash log by name, what was found, and the key of the rotors' order."""
     log = read_messages(path)
     table, faults, flying = convert(log, path)

@@ -28,7 +28,7 @@ from rotorid.recordings import columns as c
 from rotorid.recordings.importers import blackbox, in_the_air
 from rotorid.recordings.importers.clean import report_gaps
 from rotorid.recordings.importers.mapping import half_turn_about_x, quaternion_to_frd_ned
-from rotorid.recordings.importers.report import Fault
+from rotorid.recordings.importers.report import ImportFault
 
 _GRAVITY_M_S2 = 9.80665
 _DEFAULT_POLES = 14
@@ -50,7 +50,7 @@ _AMPERES = (((3, 1), 100),)
 _CONVERTER_STEP_MV = 3300 / 4095
 
 
-def read_betaflight(path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
+def read_betaflight(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
     """Every flight of every session in a blackbox file by name, in contract columns, and what was found.
 
     InputError where the file is of another firmware, cannot be read, or holds no flight.
@@ -58,7 +58,7 @@ def read_betaflight(path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
     data = Path(path).read_bytes()
     found = [_exported(data, path)] if data.startswith(b'"Product"') else blackbox.sessions(data)
     runs: dict[str, pd.DataFrame] = {}
-    faults: list[Fault] = []
+    faults: list[ImportFault] = []
     reasons: list[str] = []
     for number, session in enumerate(found, 1):
         name = path.name.split(".")[0] + (f"_{number}" if len(found) > 1 else "")
@@ -68,7 +68,7 @@ def read_betaflight(path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
             flown, more = _flights(session, name, path)
         except InputError as error:
             reasons.append(str(error).removeprefix(f"{path}: "))
-            faults.append(Fault("no_flight", c.TIME, f"session {number}: {reasons[-1]}", "left out", 0))
+            faults.append(ImportFault("no_flight", c.TIME, f"session {number}: {reasons[-1]}", "left out", 0))
             continue
         runs |= flown
         faults += more
@@ -77,7 +77,7 @@ def read_betaflight(path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
     return runs, faults
 
 
-def _exported(data: bytes, path: Path) -> blackbox.Session:
+def _exported(data: bytes, path: Path) -> blackbox.BlackboxSession:
     """The session in a table that Blackbox Explorer exports: its header, a line each, then frames as logged."""
     rows = csv.reader(io.StringIO(data.decode("utf-8", "replace")))
     headers: dict[str, str] = {}
@@ -98,7 +98,7 @@ def _exported(data: bytes, path: Path) -> blackbox.Session:
         raise InputError(f"{path}: Blackbox Explorer's header is there, but no heading with a column time below it")
     if scale := _number(headers, "gyroScale", 0.0):  # the Explorer turns deg/s into rad/µs
         headers.setdefault("gyro_scale", f"{np.degrees(scale) * 1e6:.9f}")
-    return blackbox.Session(headers, names, np.array(values).reshape(-1, len(names)), whole, 0)
+    return blackbox.BlackboxSession(headers, names, np.array(values).reshape(-1, len(names)), whole, 0)
 
 
 def _cell(text: str) -> float:
@@ -108,7 +108,9 @@ def _cell(text: str) -> float:
         return np.nan
 
 
-def _flights(session: blackbox.Session, name: str, path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
+def _flights(
+    session: blackbox.BlackboxSession, name: str, path: Path
+) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
     headers = session.headers
     firmware = headers.get("Firmware revision", headers.get("Firmware type", ""))
     if "betaflight" not in firmware.lower():
@@ -122,18 +124,18 @@ def _flights(session: blackbox.Session, name: str, path: Path) -> tuple[dict[str
     faults = []
     if session.damaged:
         found = f"{session.damaged} frames are damaged or count from one that is"
-        faults.append(Fault("damaged", c.TIME, found, "left out", session.damaged, name))
+        faults.append(ImportFault("damaged", c.TIME, found, "left out", session.damaged, name))
     if not session.whole:
         found = "the log breaks off without its end event (power lost, or a full memory)"
         lasts = (raw["time"].iloc[-1] - raw["time"].iloc[0]) * 1e-6
-        faults.append(Fault("cut_off", c.TIME, found, f"{len(raw)} frames up to {lasts:.2f} s kept", 0, name))
+        faults.append(ImportFault("cut_off", c.TIME, found, f"{len(raw)} frames up to {lasts:.2f} s kept", 0, name))
     runs, more = convert(raw, headers, name, path)
     return runs, faults + more
 
 
 def convert(
     raw: pd.DataFrame, headers: Mapping[str, str], name: str, where: object
-) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
+) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
     """Flights in contract columns of the main frames of one session (`time` in µs) and its header."""
     if "time" not in raw:
         raise InputError(f"{where}: the log has no field time")
@@ -142,7 +144,7 @@ def convert(
     keep = np.isfinite(time) & in_the_air.increasing(np.nan_to_num(time, nan=-np.inf))
     if not keep.all():
         found = f"{int((~keep).sum())} frames do not move the clock on"
-        faults.append(Fault("repeated_time", c.TIME, found, "left out", int((~keep).sum())))
+        faults.append(ImportFault("repeated_time", c.TIME, found, "left out", int((~keep).sum())))
     raw, time = raw[keep].reset_index(drop=True), time[keep]
     table = pd.DataFrame({c.TIME: time - time[0]})
 
@@ -156,14 +158,16 @@ def convert(
         scale /= 10 if _number(headers, "blackbox_high_resolution", 0) > 0 else 1
         table[list(c.ANGULAR_VELOCITY)] = half_turn_about_x(np.radians(gyro * scale))
     else:
-        faults.append(Fault("missing", ", ".join(c.ANGULAR_VELOCITY), "gyroADC is not logged", "no body rates", 0))
+        faults.append(
+            ImportFault("missing", ", ".join(c.ANGULAR_VELOCITY), "gyroADC is not logged", "no body rates", 0)
+        )
     acceleration = fields("accSmooth", 3)
     one_g = _number(headers, "acc_1G", 0)
     if acceleration is not None and one_g > 0:
         table[list(c.SPECIFIC_FORCE)] = half_turn_about_x(acceleration / one_g * _GRAVITY_M_S2)
     else:
         found = "accSmooth is not logged" if acceleration is None else "the header does not state acc_1G"
-        faults.append(Fault("missing", ", ".join(c.SPECIFIC_FORCE), found, "no specific force", 0))
+        faults.append(ImportFault("missing", ", ".join(c.SPECIFIC_FORCE), found, "no specific force", 0))
     attitude = fields("imuQuaternion", 3)
     if attitude is not None:
         xyz = attitude / _QUATERNION_SCALE
@@ -180,7 +184,7 @@ def convert(
         poles = _number(headers, "motor_poles", 0)
         if not poles > 0:
             poles, found = _DEFAULT_POLES, "the header does not state motor_poles"
-            faults.append(Fault("unit", "rotor_speed", found, f"taken as {_DEFAULT_POLES}", 0))
+            faults.append(ImportFault("unit", "rotor_speed", found, f"taken as {_DEFAULT_POLES}", 0))
         speeds = np.where(np.isnan(throttle), np.nan, turns * 100 / (poles / 2) * 2 * np.pi / 60)
         table[list(c.rotor_columns("rotor_speed", turns.shape[1]))] = speeds
     battery, more = _battery(raw, headers)
@@ -191,7 +195,7 @@ def convert(
     return runs, [*faults, *cuts]
 
 
-def _known_names(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
+def _known_names(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
     """The fields under the names of today's releases; what looks like one of them and is none is named."""
     names = {f"{other}[{i}]": f"{base}[{i}]" for base, others in _OTHER_NAMES.items() for other in others
              for i in range(8) if f"{base}[{i}]" not in raw}  # fmt: skip
@@ -202,11 +206,11 @@ def _known_names(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
         like = [n for n in raw if core in n.lower() and not re.search(r"unfilt|legacy", n.lower())]
         if like and not any(n.split("[")[0] == base for n in raw):
             found = f"{base} is not logged, but {', '.join(like)} looks like it under a name that is not known"
-            faults.append(Fault("unknown_name", base, found, "left out", 0))
+            faults.append(ImportFault("unknown_name", base, found, "left out", 0))
     return raw, faults
 
 
-def throttles(motors: np.ndarray, headers: Mapping[str, str]) -> tuple[np.ndarray, list[Fault]]:
+def throttles(motors: np.ndarray, headers: Mapping[str, str]) -> tuple[np.ndarray, list[ImportFault]]:
     """Commands of motors (n, k) as fractions of the range that the header states, and what was found.
 
     With 3D a motor also turns backwards; the contract has no fraction for that, so these are NaN.
@@ -219,7 +223,7 @@ def throttles(motors: np.ndarray, headers: Mapping[str, str]) -> tuple[np.ndarra
         if len(turning) and np.quantile(turning, 0.01) < _SLOWEST_PULSE_US:
             low, high = _DSHOT
         found = "the header does not state motorOutput"
-        faults.append(Fault("unit", "throttle", found, f"no and full throttle taken as {low:g} and {high:g}", 0))
+        faults.append(ImportFault("unit", "throttle", found, f"no and full throttle taken as {low:g} and {high:g}", 0))
     backwards = np.zeros(motors.shape, bool)
     if int(_number(headers, "features", 0)) & _FEATURE_3D:
         if low < _SLOWEST_PULSE_US:
@@ -227,15 +231,17 @@ def throttles(motors: np.ndarray, headers: Mapping[str, str]) -> tuple[np.ndarra
         else:
             backwards, low = motors < _DEADBAND_3D[0], _DEADBAND_3D[1]
             found = "pulses in µs with 3D, whose dead band the header does not state"
-            faults.append(Fault("unit", "throttle", found, f"no throttle taken as {low:g} µs, Betaflight's own", 0))
+            faults.append(
+                ImportFault("unit", "throttle", found, f"no throttle taken as {low:g} µs, Betaflight's own", 0)
+            )
     share = np.clip((motors - low) / (high - low), 0, 1)
     if backwards.any():
         found = f"{int(backwards.any(axis=1).sum())} samples have a motor that turns backwards (3D)"
-        faults.append(Fault("backwards", "throttle", found, "made empty cells", int(backwards.sum())))
+        faults.append(ImportFault("backwards", "throttle", found, "made empty cells", int(backwards.sum())))
     return np.where(backwards, np.nan, share), faults
 
 
-def _battery(raw: pd.DataFrame, headers: Mapping[str, str]) -> tuple[dict[str, np.ndarray], list[Fault]]:
+def _battery(raw: pd.DataFrame, headers: Mapping[str, str]) -> tuple[dict[str, np.ndarray], list[ImportFault]]:
     """Voltage and current of the battery in contract columns, as far as they are logged and their unit is known."""
     version = _version(headers)
     found, faults = {}, []
@@ -256,7 +262,7 @@ def _battery(raw: pd.DataFrame, headers: Mapping[str, str]) -> tuple[dict[str, n
             found[column] = (values * _CONVERTER_STEP_MV - offset) * 10 / per_ampere
         else:
             why = "the header does not state the version or the scale that its unit depends on"
-            faults.append(Fault("unit", column, f"{field}: {why}", "left out", len(raw)))
+            faults.append(ImportFault("unit", column, f"{field}: {why}", "left out", len(raw)))
     return found, faults
 
 

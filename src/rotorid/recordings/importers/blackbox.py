@@ -31,7 +31,7 @@ _TURN = 1 << 32
 
 
 @dataclass(frozen=True)
-class Session:
+class BlackboxSession:
     """One session of a blackbox file.
 
     `names` and `values` (n, k), whole numbers: the main frames in the order of the file, `time` in µs without the
@@ -46,10 +46,10 @@ class Session:
     damaged: int
 
 
-def sessions(data: bytes) -> list[Session | InputError]:
+def sessions(data: bytes) -> list[BlackboxSession | InputError]:
     """Every session of a blackbox file in its order; for one whose header cannot be read the reason."""
     starts = [match.start() for match in re.finditer(re.escape(_FIRST_LINE), data)]
-    found: list[Session | InputError] = []
+    found: list[BlackboxSession | InputError] = []
     for start, stop in zip(starts, [*starts[1:], len(data)], strict=True):
         try:
             found.append(_session(data[start:stop]))
@@ -58,14 +58,14 @@ def sessions(data: bytes) -> list[Session | InputError]:
     return found
 
 
-def _session(data: bytes) -> Session:
+def _session(data: bytes) -> BlackboxSession:
     headers, at = _headers(data)
     frames = _Frames(headers, data)
     whole = frames.read(at)
     values = np.array(frames.values, dtype=np.int64).reshape(-1, len(frames.names))
     time = values[:, frames.time]
     values[:, frames.time] = time + _TURN * np.cumsum(np.diff(time, prepend=time[:1]) < -_TURN // 2)
-    return Session(headers, frames.names, values, whole, frames.damaged)
+    return BlackboxSession(headers, frames.names, values, whole, frames.damaged)
 
 
 def _headers(data: bytes) -> tuple[dict[str, str], int]:

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.recordings.columns import TIME
-from rotorid.recordings.importers.report import Fault
+from rotorid.recordings.importers.report import ImportFault
 
 _REVERSED = 0.02
 """Share of the largest value that a value of the other sign must exceed to be one: less is noise about zero."""
@@ -16,7 +16,7 @@ _UNEXPLAINED = 0.2
 """Share of its variance that the motors of a mixer may leave of another motor's signal."""
 
 
-def drop_repeated_times(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
+def drop_repeated_times(table: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
     """Rows whose time is not later than every row before are left out and reported."""
     time = table[TIME].to_numpy(float)
     latest = np.maximum.accumulate(np.where(np.isnan(time), -np.inf, time))
@@ -25,7 +25,7 @@ def drop_repeated_times(table: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]
     if not lost:
         return table, []
     first = float(time[np.flatnonzero(~keep)[0]])
-    fault = Fault(
+    fault = ImportFault(
         "repeated_time",
         TIME,
         f"{lost} rows do not move the clock on (first at {first:.6g} s)",
@@ -52,7 +52,9 @@ def join_rows(table: pd.DataFrame, time: str) -> pd.DataFrame:
     return joined.reset_index(drop=True)
 
 
-def one_sense(values: np.ndarray, names: Sequence[str], sense: float | None = None) -> tuple[np.ndarray, list[Fault]]:
+def one_sense(
+    values: np.ndarray, names: Sequence[str], sense: float | None = None
+) -> tuple[np.ndarray, list[ImportFault]]:
     """Magnitudes of signed speeds or commands (n, k) and a fault for each column that is reversed for a time.
 
     A sign is a turning sense where a rotor keeps it. A cell against the usual sense of its column, or against `sense`
@@ -64,7 +66,7 @@ def one_sense(values: np.ndarray, names: Sequence[str], sense: float | None = No
     largest = np.nanmax(np.abs(own), axis=0, initial=0.0, where=np.isfinite(own))
     against = own < -_REVERSED * largest
     faults = [
-        Fault(
+        ImportFault(
             "reversed",
             name,
             f"against its usual sign in {lost.mean():.1%} of the samples",
@@ -92,19 +94,19 @@ def further_motors(outputs: np.ndarray, motors: int) -> list[int]:
     return [motors + k for k in range(len(moves)) if moves[k] > 0 and left[k] < _UNEXPLAINED * moves[k]]
 
 
-def report_gaps(table: pd.DataFrame, factor: float = 3.0) -> list[Fault]:
+def report_gaps(table: pd.DataFrame, factor: float = 3.0) -> list[ImportFault]:
     """A fault where the clock steps by more than `factor` times its median step; nothing is filled in."""
     steps = np.diff(table[TIME].to_numpy(float))
     long = steps > factor * np.median(steps)
     if not long.any():
         return []
     found = f"{int(long.sum())} gaps longer than {factor:g} samples, the longest {steps.max():.3g} s"
-    return [Fault("gap", TIME, found, "left as a gap", int(long.sum()))]
+    return [ImportFault("gap", TIME, found, "left as a gap", int(long.sum()))]
 
 
 def blank_held(
     table: pd.DataFrame, groups: dict[str, list[str]], share: float = 0.1
-) -> tuple[pd.DataFrame, list[Fault]]:
+) -> tuple[pd.DataFrame, list[ImportFault]]:
     """Empty the repeats of sample-and-hold groups of columns.
 
     A logger that runs faster than a sensor writes the last reading again and again. Where more than `share`
@@ -124,7 +126,7 @@ def blank_held(
         table.loc[same, columns] = np.nan
         rate = (~same).sum() / (table[TIME].iloc[-1] - table[TIME].iloc[0])
         found = f"{name} repeats its last value in {same.mean():.0%} of the rows (new values at {rate:.3g} Hz)"
-        faults.append(Fault("held", ", ".join(columns), found, "repeats made empty cells", int(same.sum())))
+        faults.append(ImportFault("held", ", ".join(columns), found, "repeats made empty cells", int(same.sum())))
     empty = table.drop(columns=TIME).isna().all(axis=1)
     return table[~empty].reset_index(drop=True), faults
 

@@ -45,7 +45,7 @@ from rotorid.recordings.importers.mapping import (
     quaternion_from_euler_frd,
     quaternion_to_frd_ned,
 )
-from rotorid.recordings.importers.report import Fault
+from rotorid.recordings.importers.report import ImportFault
 
 MAGIC = 0xBC
 _CHECKSUM = 4
@@ -132,10 +132,10 @@ def attitude_without_pitch(
     return attitude.as_quat()[:, [3, 0, 1, 2]], attitude.inv().apply(specific_force_world_g)
 
 
-def convert(log: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
+def convert(log: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
     """Contract columns of the table `fixedFrequency` of a uSD log, the whole log with its own clock."""
     columns: dict[str, np.ndarray] = {c.TIME: log["time_s"].to_numpy(float)}
-    faults: list[Fault] = []
+    faults: list[ImportFault] = []
 
     def put(names, values):
         columns.update(zip(names, values.T, strict=True))
@@ -160,7 +160,7 @@ def convert(log: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
         if c.SPECIFIC_FORCE[0] not in columns:
             put(c.SPECIFIC_FORCE[1:], (half_turn_about_x(force_g) * _STANDARD_GRAVITY_M_S2)[:, 1:])
         faults.append(
-            Fault(
+            ImportFault(
                 "no_pitch",
                 ", ".join(c.QUATERNION),
                 "pitch is not recorded",
@@ -204,7 +204,7 @@ def _flown_stretches(table: pd.DataFrame) -> list[tuple[float, float]]:
     return stretches_of(table[c.TIME].to_numpy(float), flying)
 
 
-def _sensor_faults(table: pd.DataFrame) -> list[Fault]:
+def _sensor_faults(table: pd.DataFrame) -> list[ImportFault]:
     """Faults of rotor-speed sensors and a battery reading that never moves; values stay as recorded."""
     faults = []
     for name, throttle in zip(SPEEDS, THROTTLES, strict=True):
@@ -213,14 +213,14 @@ def _sensor_faults(table: pd.DataFrame) -> list[Fault]:
         lost = (table[name] == 0) & (table[throttle] > 0.1)
         if lost.mean() > 0.001:
             found = f"speed reads 0 in {lost.mean():.1%} of the samples while the motor is driven"
-            faults.append(Fault("speed_dropout", name, found, "kept as recorded", int(lost.sum())))
+            faults.append(ImportFault("speed_dropout", name, found, "kept as recorded", int(lost.sum())))
     if c.BATTERY_VOLTAGE in table and table[c.BATTERY_VOLTAGE].nunique() == 1:
         found = f"reads {table[c.BATTERY_VOLTAGE].iloc[0]:g} V throughout: not measured"
-        faults.append(Fault("stuck", c.BATTERY_VOLTAGE, found, "column left out", len(table)))
+        faults.append(ImportFault("stuck", c.BATTERY_VOLTAGE, found, "column left out", len(table)))
     return faults
 
 
-def flight_run(table: pd.DataFrame, start_s: float, stop_s: float) -> tuple[pd.DataFrame, list[Fault]]:
+def flight_run(table: pd.DataFrame, start_s: float, stop_s: float) -> tuple[pd.DataFrame, list[ImportFault]]:
     """One flight of a converted log: cut, held samples emptied, sensor faults flagged."""
     run = cut(table, start_s, stop_s)
     if len(run) < 2:
@@ -244,7 +244,7 @@ def flights(
     prefix: str | None = None,
     stretches: list[tuple[float, float]] | None = None,
     detect: Callable[[pd.DataFrame], list[tuple[float, float]]] = _flown_stretches,
-) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
+) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
     """Every flight of a uSD log by name (`prefix`, default the file's), and the faults of log and flights.
 
     `stretches` (start and stop, s) in place of what `detect` finds to be in the air. InputError where the log holds no
@@ -267,7 +267,9 @@ def flights(
     for number, (start, stop) in enumerate(stretches):
         run, found = flight_run(table, start, stop)
         label = prefix if len(stretches) == 1 else f"{prefix}_{number + 1}"
-        flown = Fault("cut", c.TIME, f"flight from {start:.2f} to {stop:.2f} s of the log", "the rest left out", 0)
+        flown = ImportFault(
+            "cut", c.TIME, f"flight from {start:.2f} to {stop:.2f} s of the log", "the rest left out", 0
+        )
         runs[label] = run
         faults += [f.in_run(label) for f in (flown, *found)]
     return runs, faults
@@ -321,7 +323,7 @@ def _event_types(data: bytes, where: str) -> tuple[dict[int, _EventType], int, i
     return types, version, offset
 
 
-def decode_usd_log(data: bytes, where: str = "log") -> tuple[dict[str, pd.DataFrame], list[Fault]]:
+def decode_usd_log(data: bytes, where: str = "log") -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
     """Tables of a uSD log by event name, each with `time_s` (device clock) first, in file order.
 
     A wrong checksum, an unknown event or a cut-off tail is reported as a Fault and everything before it
@@ -358,7 +360,7 @@ def decode_usd_log(data: bytes, where: str = "log") -> tuple[dict[str, pd.DataFr
 
 def _faults_of_end(
     data: bytes, offset: int, whole: bool, unknown: int | None, inside: _EventType | None
-) -> list[Fault]:
+) -> list[ImportFault]:
     """What is wrong with a log whose events end at an offset: with an event that is not known, or inside one."""
     rest, faults = len(data) - offset, []
     checked = rest == _CHECKSUM  # exactly a checksum follows, right or wrong
@@ -366,18 +368,18 @@ def _faults_of_end(
         unknown = None  # bytes of a checksum are no event
     if unknown is not None:
         found = f"event id {unknown} at byte {offset} is not in the header"
-        faults.append(Fault("unknown_event", "", found, f"{rest - _CHECKSUM} bytes after it left out", 1))
+        faults.append(ImportFault("unknown_event", "", found, f"{rest - _CHECKSUM} bytes after it left out", 1))
     if not whole and (checked or unknown is not None):
         stored = struct.unpack("<I", data[-_CHECKSUM:])[0]
         found = f"CRC-32 is {crc32(data[:-_CHECKSUM]):08x}, file says {stored:08x}"
-        faults.insert(0, Fault("checksum", "", found, "kept; bytes may be damaged", 1))
+        faults.insert(0, ImportFault("checksum", "", found, "kept; bytes may be damaged", 1))
     elif inside is not None or not (whole or unknown is not None):
         found = f"the file ends inside an event ({inside.name})" if inside else "the file ends without its checksum"
-        faults.append(Fault("cut_off", "", found, "what came before is kept; the log stopped before its end", 1))
+        faults.append(ImportFault("cut_off", "", found, "what came before is kept; the log stopped before its end", 1))
     return faults
 
 
-def read_usd_log(path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
+def read_usd_log(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
     """Read a uSD log file; see `decode_usd_log`."""
     try:
         data = Path(path).read_bytes()

@@ -14,7 +14,7 @@ import pandas as pd
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.clean import true_stretches
-from rotorid.recordings.importers.report import Fault
+from rotorid.recordings.importers.report import ImportFault
 
 _SHORTEST_FLIGHT_S = 4.0
 _AFTER_TAKE_OFF_S = 1.0
@@ -62,7 +62,7 @@ def table_on(grid_s: np.ndarray, parts: Sequence[tuple[Sequence[str], np.ndarray
     return pd.DataFrame({k: v for k, v in columns.items() if k == c.TIME or np.isfinite(v).any()})
 
 
-def airborne(table: pd.DataFrame, stated: np.ndarray | None = None) -> tuple[np.ndarray, list[Fault]]:
+def airborne(table: pd.DataFrame, stated: np.ndarray | None = None) -> tuple[np.ndarray, list[ImportFault]]:
     """Rows of a table in contract columns in which the vehicle flies, (n,), and what of a stated flight is ground.
 
     `stated` is what the log itself calls flight, (n,); None where it says nothing. It holds where no rotors are
@@ -89,7 +89,7 @@ def airborne(table: pd.DataFrame, stated: np.ndarray | None = None) -> tuple[np.
         f"{lasts[flying & ~found].sum():.0f} s of {lasts[flying].sum():.0f} s that the log calls flight are on the "
         f"ground (rotors below {_NEAR_WEIGHT:g} of those of flight, specific force of 1 g, no turning)"
     )
-    return found, [Fault("on_ground", c.TIME, seen, "left out", lost)]
+    return found, [ImportFault("on_ground", c.TIME, seen, "left out", lost)]
 
 
 def _drive_of(table: pd.DataFrame) -> np.ndarray | None:
@@ -185,7 +185,7 @@ def without_pauses(up: np.ndarray, time_s: np.ndarray) -> np.ndarray:
 
 def flights(
     table: pd.DataFrame, flying: np.ndarray, name: str, where: object, jumps: np.ndarray | None = None
-) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
+) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
     """Every flight of a table by name, take-off and landing left out, its clock at zero; InputError where none is.
 
     Where the table begins or ends in the air nothing is left out there. No run holds a row of `jumps` (n,), however
@@ -216,7 +216,7 @@ def flights(
         cut[c.TIME] -= cut[c.TIME].iloc[0]
         runs[run] = cut.dropna(axis=1, how="all")
         seen = f"in the air from {start:.2f} to {stop:.2f} s of {time_s[-1]:.0f} s"
-        cuts.append(Fault("cut", c.TIME, seen, f"{first:.2f} to {last:.2f} s kept", int((~inside).sum()), run))
+        cuts.append(ImportFault("cut", c.TIME, seen, f"{first:.2f} to {last:.2f} s kept", int((~inside).sum()), run))
     if not runs:
         raise InputError(f"{where}: next to no samples of its {len(found)} flights are there")
     return runs, cuts

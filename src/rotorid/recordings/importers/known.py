@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rotorid.recordings.importers.report import Fault
+from rotorid.recordings.importers.report import ImportFault
 from rotorid.recordings.vehicle import Rotor
 
 PLACES = {"front right": (1, 1), "rear left": (-1, -1), "front left": (1, -1), "rear right": (-1, 1)}
@@ -52,7 +52,7 @@ def quad_x(order: str, x_m: float, y_m: float) -> tuple[Rotor, ...]:
     )
 
 
-def px4_vehicle(parameters: Mapping[str, float], rotors: int) -> tuple[Known, list[Fault]]:
+def px4_vehicle(parameters: Mapping[str, float], rotors: int) -> tuple[Known, list[ImportFault]]:
     """Places, turning senses and torque ratio of PX4's control allocation (`CA_ROTOR*`), where a log holds them, and
     what it states of the rotors that a vehicle.yaml cannot hold.
 
@@ -76,17 +76,17 @@ def px4_vehicle(parameters: Mapping[str, float], rotors: int) -> tuple[Known, li
     return Known("px4", rotor, round(ratio, 6) or None, where), faults
 
 
-def _untaken(parameters: Mapping[str, float], rotors: int) -> list[Fault]:
+def _untaken(parameters: Mapping[str, float], rotors: int) -> list[ImportFault]:
     """A fault for each thing that control allocation states of the rotors and a vehicle.yaml has no place for."""
 
     def stated(name: str, default: float) -> list[float]:
         return [float(parameters.get(f"CA_ROTOR{i}_{name}", default)) for i in range(rotors)]
 
-    def fault(kind: str, which: list[int], found: str, action: str) -> list[Fault]:
+    def fault(kind: str, which: list[int], found: str, action: str) -> list[ImportFault]:
         if not which:
             return []
         who = f"rotor{'s' * (len(which) > 1)} {', '.join(map(str, which))}"
-        return [Fault(kind, "vehicle.yaml", found.format(who), action, 0)]
+        return [ImportFault(kind, "vehicle.yaml", found.format(who), action, 0)]
 
     axes = np.column_stack([stated("AX", 0.0), stated("AY", 0.0), stated("AZ", -1.0)])
     size = np.linalg.norm(axes, axis=1)  # PX4 makes each axis a unit vector
@@ -99,7 +99,7 @@ def _untaken(parameters: Mapping[str, float], rotors: int) -> list[Fault]:
     faults += fault("tilted_rotor", by_servo, "a servo tilts {} (CA_ROTOR*_TILT)", "its thrust is taken along -z")
     if parameters.get("CA_SV_CS_COUNT", 0) > 0 or parameters.get("CA_SV_TL_COUNT", 0) > 0:
         found = "the vehicle has servos (CA_SV_CS_COUNT, CA_SV_TL_COUNT)"
-        faults.append(Fault("servo", "vehicle.yaml", found, "what they move is not taken", 0))
+        faults.append(ImportFault("servo", "vehicle.yaml", found, "what they move is not taken", 0))
     for name, default, action in (
         ("KM", 0.05, "their mean size is taken for the ratio of torque to thrust"),
         ("CT", 6.5, "one thrust coefficient is taken for all"),

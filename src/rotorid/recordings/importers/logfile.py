@@ -36,7 +36,7 @@ from rotorid.recordings.importers import (
 )
 from rotorid.recordings.importers.known import Known, px4_vehicle
 from rotorid.recordings.importers.mapping import ELECTRICAL, Mapping, read_by_mapping
-from rotorid.recordings.importers.report import Fault
+from rotorid.recordings.importers.report import ImportFault
 
 _GZIP = b"\x1f\x8b"
 _BY_FIRST_BYTES = (
@@ -57,7 +57,7 @@ class _Imported:
 
     format: str
     runs: dict[str, pd.DataFrame]
-    faults: tuple[Fault, ...]
+    faults: tuple[ImportFault, ...]
     axes: str
     known: Known = Known("")
     kind: str = "flight"
@@ -166,7 +166,7 @@ def _read(path: Path, kind: str, mapping: Mapping | None) -> _Imported:
     return _Imported(kind, runs, (*faults, *cuts), axes, kind="stand" if stand else "flight", speed_unit=unit)
 
 
-def _in_the_air(table: pd.DataFrame, name: str, path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
+def _in_the_air(table: pd.DataFrame, name: str, path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
     """The flights of a table in contract columns; the table as it is where all of it is in the air, or of a stand."""
     if set(table) & {*c.FORCE, *c.MOMENT}:
         return {name: table}, []

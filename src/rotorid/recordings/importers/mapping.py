@@ -48,7 +48,7 @@ from rotorid.io.text.files import read_yaml
 from rotorid.io.text.wording import explain
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.clean import drop_repeated_times, join_rows, report_gaps
-from rotorid.recordings.importers.report import Fault
+from rotorid.recordings.importers.report import ImportFault
 from rotorid.recordings.importers.units import UNITS, converted
 from rotorid.recordings.tables import clock_jump, numbers, read_cells, read_parquet_cells
 
@@ -206,7 +206,7 @@ def read_columns(path: Path) -> pd.DataFrame:
     return table
 
 
-def read_by_mapping(path: Path, mapping: Mapping | None) -> tuple[pd.DataFrame, list[Fault], str]:
+def read_by_mapping(path: Path, mapping: Mapping | None) -> tuple[pd.DataFrame, list[ImportFault], str]:
     """A table in contract columns, its faults and its axes in words.
 
     Without a mapping the columns must have the contract's names; InputError says how to get a mapping.
@@ -225,20 +225,20 @@ def read_by_mapping(path: Path, mapping: Mapping | None) -> tuple[pd.DataFrame, 
     return table, lost + faults, f"body {mapping.body.upper()}, world {mapping.world.upper()}, turned into FRD and NED"
 
 
-def _left_out(raw: pd.DataFrame) -> list[Fault]:
+def _left_out(raw: pd.DataFrame) -> list[ImportFault]:
     """What of the file of a table is none of its rows."""
     layout = raw.attrs.get("layout")
     faults = []
     if layout and layout.above:
         found = f"{len(layout.above)} lines above the heading in line {layout.heading_line}"
-        faults.append(Fault("above", "", found, "left out", 0))
+        faults.append(ImportFault("above", "", found, "left out", 0))
     if layout and layout.cut_off:
         found = "the last line is cut off"
-        faults.append(Fault("cut_off", c.TIME, found, "left out", 1))
+        faults.append(ImportFault("cut_off", c.TIME, found, "left out", 1))
     return faults
 
 
-def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFrame, list[Fault]]:
+def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFrame, list[ImportFault]]:
     """Contract columns of a table by a mapping; InputError names a column that is not there or no numbers."""
     _check_answered(mapping, f"the mapping of {where}")
     body, world = BODY[mapping.body], WORLD[mapping.world]
@@ -288,7 +288,7 @@ def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFra
     return _clocked(pd.DataFrame({c.TIME: out.pop(c.TIME), **out}), where)
 
 
-def _clocked(table: pd.DataFrame, where: object) -> tuple[pd.DataFrame, list[Fault]]:
+def _clocked(table: pd.DataFrame, where: object) -> tuple[pd.DataFrame, list[ImportFault]]:
     """The rows that move the clock on, and what is wrong with the others; InputError where the clock was set."""
     known = table[c.TIME].notna().to_numpy()
     if known.all() and (jumped := clock_jump(table[c.TIME].to_numpy(float), str(where))):

@@ -21,7 +21,7 @@ from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.clean import drop_repeated_times, report_gaps
 from rotorid.recordings.importers.mapping import half_turn_about_x, quaternion_to_frd_ned
-from rotorid.recordings.importers.report import Fault
+from rotorid.recordings.importers.report import ImportFault
 
 _LAYOUT = (
     ("time", 1), ("angular_acceleration", 3), ("angular_velocity", 3), ("quaternion_xyzw", 4),
@@ -51,7 +51,7 @@ def _read_matrix(path: Path) -> np.ndarray:
     return np.asarray(matrices[0], float)
 
 
-def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[Fault]]:
+def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[ImportFault]]:
     """Contract columns of a NeuroBEM matrix; NeuroBEM's prediction and accelerations ride as own columns."""
     parts, start = {}, 0
     for name, width in _LAYOUT:
@@ -77,7 +77,7 @@ def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[Fault]]:
     faults = []
     if np.nanmedian(battery) > 60:  # no quadrotor of this size flies on more than 14 cells
         faults.append(
-            Fault(
+            ImportFault(
                 "unit",
                 c.BATTERY_VOLTAGE,
                 f"battery reads {np.nanmedian(battery):.0f}, a tenth of a volt",
@@ -89,7 +89,7 @@ def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[Fault]]:
     columns[c.BATTERY_VOLTAGE] = battery
     if matrix.shape[1] > USED:
         faults.append(
-            Fault(
+            ImportFault(
                 "superseded",
                 "",
                 f"{matrix.shape[1] - USED} columns of residuals made with a mass of 0.752 kg",
@@ -100,7 +100,7 @@ def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[Fault]]:
     table, repeated = drop_repeated_times(pd.DataFrame(columns))
     table[c.TIME] -= table[c.TIME].iloc[0]
     faults.append(
-        Fault(
+        ImportFault(
             "derived",
             ", ".join(c.SPECIFIC_FORCE),
             "acceleration agrees with the derivative of the velocity: not an independent accelerometer",
@@ -111,6 +111,6 @@ def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[Fault]]:
     return table, faults + repeated + report_gaps(table)
 
 
-def read_neurobem(path: Path) -> tuple[pd.DataFrame, list[Fault]]:
+def read_neurobem(path: Path) -> tuple[pd.DataFrame, list[ImportFault]]:
     """One NeuroBEM flight in contract columns, and its faults."""
     return convert(_read_matrix(path))

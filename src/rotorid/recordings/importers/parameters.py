@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rotorid.recordings.importers.report import Fault
+from rotorid.recordings.importers.report import ImportFault
 
 Values = Mapping[str, float]
 _MOST_LISTED = 4
@@ -58,7 +58,9 @@ class Parameters:
             values[name] = max(counts, key=counts.get)
         return values
 
-    def faults(self, actions: Sequence[tuple[str, str, str]], zero: float = 0.0, unit_s: float = 1.0) -> list[Fault]:
+    def faults(
+        self, actions: Sequence[tuple[str, str, str]], zero: float = 0.0, unit_s: float = 1.0
+    ) -> list[ImportFault]:
         """One fault for each parameter that changes and matters.
 
         `actions` hold a pattern of names, the column and what is done about a change; `zero` is the time, in the
@@ -73,5 +75,5 @@ class Parameters:
             steps = ", ".join(f"to {v:g} at {(t - zero) * unit_s:.2f} s" for t, v in own[:_MOST_LISTED])
             more = f" and {len(own) - _MOST_LISTED} times more" if len(own) > _MOST_LISTED else ""
             seen = f"{name} was set from {self.start[name]:g} {steps}{more} of the log"
-            found.append(Fault("parameter_changed", known[0], seen, known[1], len(own)))
+            found.append(ImportFault("parameter_changed", known[0], seen, known[1], len(own)))
         return found

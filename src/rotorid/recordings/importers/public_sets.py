@@ -35,7 +35,7 @@ from rotorid.recordings.files import sha256
 from rotorid.recordings.importers import crazyflie
 from rotorid.recordings.importers.neurobem import read_neurobem
 from rotorid.recordings.importers.rcbenchmark import read_rcbenchmark
-from rotorid.recordings.importers.report import Fault, ImportReport
+from rotorid.recordings.importers.report import ImportFault, ImportReport
 from rotorid.recordings.importers.vicon_csv import read_vicon_csv
 from rotorid.recordings.tables import place, read_csv
 
@@ -45,7 +45,7 @@ _GRAM_FORCE_N = 9.80665e-3
 RPM = 2 * np.pi / 60
 _FULL_SCALE = 65536.0
 SPEEDS = ("rpm1", "rpm2", "rpm3", "rpm4")
-Runs = dict[str, tuple[pd.DataFrame, list[Fault]]]
+Runs = dict[str, tuple[pd.DataFrame, list[ImportFault]]]
 
 _PROPELLERS = {"1": "t5040c", "2": "t5045c", "5": "hq5x4", "6": "lumenier5x45"}
 """5-inch propellers: Cyclone T5040C and T5045C (3 blades), HQ 5x4 (4 blades), Lumenier 5x4.5 (2 blades)."""
@@ -67,7 +67,7 @@ class _PublicSet:
     notes: tuple[str, ...] = ()
 
 
-def _whole(reader: Callable[[Path], tuple[pd.DataFrame, list[Fault]]]) -> Callable[[Path, str], Runs]:
+def _whole(reader: Callable[[Path], tuple[pd.DataFrame, list[ImportFault]]]) -> Callable[[Path, str], Runs]:
     """A file is one run, named after the file."""
     return lambda path, name: {name.rsplit("/")[-1].split(".")[0].lower(): reader(path)}
 
@@ -295,7 +295,7 @@ def sets_of(source: str) -> list[str]:
     return [name for name, recipe in PUBLIC_SETS.items() if recipe.source == source]
 
 
-def read_imrc_bench(path: Path) -> tuple[pd.DataFrame, list[Fault]]:
+def read_imrc_bench(path: Path) -> tuple[pd.DataFrame, list[ImportFault]]:
     """One bench run in contract columns (kind stand, thrust along -z), and its faults."""
     raw = read_csv(Path(path))
     thrust = next((name for name in ("thrust[g]", "weight[g]") if name in raw), None)
@@ -316,12 +316,12 @@ def read_imrc_bench(path: Path) -> tuple[pd.DataFrame, list[Fault]]:
     if "i[A]" in raw:
         columns[c.BATTERY_CURRENT] = raw["i[A]"].to_numpy(float)
     table = pd.DataFrame(columns)
-    faults = [Fault("no_clock", c.TIME, "rows have no time", "rows counted as seconds", len(table))]
+    faults = [ImportFault("no_clock", c.TIME, "rows have no time", "rows counted as seconds", len(table))]
     for column in c.rotor_columns("rotor_speed", 4):
         lost = (table[column] == 0) & (throttle > 0.3)
         if lost.any():
             found = f"speed reads 0 in {int(lost.sum())} rows while the motor is driven"
-            faults.append(Fault("speed_dropout", column, found, "kept as recorded", int(lost.sum())))
+            faults.append(ImportFault("speed_dropout", column, found, "kept as recorded", int(lost.sum())))
     return table, faults
 
 

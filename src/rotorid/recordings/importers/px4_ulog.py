@@ -30,7 +30,7 @@ from rotorid.recordings.importers import in_the_air
 from rotorid.recordings.importers.clean import drop_repeated_times, further_motors, one_sense, report_gaps
 from rotorid.recordings.importers.mapping import continuous
 from rotorid.recordings.importers.parameters import Parameters, Values
-from rotorid.recordings.importers.report import Fault
+from rotorid.recordings.importers.report import ImportFault
 
 RPM = 2 * np.pi / 60
 _FIRST_MOTOR = 101
@@ -91,7 +91,7 @@ class _Converted:
     """
 
     table: pd.DataFrame
-    faults: list[Fault]
+    faults: list[ImportFault]
     flying: np.ndarray
     jumps: np.ndarray
 
@@ -234,7 +234,7 @@ def _first(topics: _Topics, name: str) -> Mapping[str, np.ndarray]:
 # Rotors -------------------------------------------------------------------------------------------
 
 
-def _throttles(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray, list[Fault]]:
+def _throttles(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray, list[ImportFault]]:
     """Throttles (n, rotors) with their times, µs, from either generation of actuator topics."""
     names = ", ".join(c.rotor_columns("throttle", rotors))
     motors = _first(log.topics, "actuator_motors")
@@ -249,21 +249,23 @@ def _throttles(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray,
                 half = (1 - curve) / (2 * curve)
                 values[inside] = np.sqrt(half**2 + values[inside] / curve) - half
                 seen = f"THR_MDL_FAC is {curve:g}: actuator_motors holds thrusts"
-                faults.append(Fault("unit", names, seen, "turned into signals by PX4's own curve", int(inside.sum())))
+                faults.append(
+                    ImportFault("unit", names, seen, "turned into signals by PX4's own curve", int(inside.sum()))
+                )
         return values, times, faults + reversed_
     instances = log.topics.get("actuator_outputs", [])
     if not instances:
         found = "neither actuator_motors nor actuator_outputs is logged"
-        return None, np.zeros(0), [Fault("no_command", "", found, "no throttle columns", 0)]
+        return None, np.zeros(0), [ImportFault("no_command", "", found, "no throttle columns", 0)]
     return _from_pulses(log, instances, rotors, names)
 
 
-def _more_rotors(topic: str, driven: int, rotors: int) -> list[Fault]:
+def _more_rotors(topic: str, driven: int, rotors: int) -> list[ImportFault]:
     """A fault where a topic has motors beyond the vehicle's."""
     if driven <= rotors:
         return []
     found = f"{topic} drives {driven} motors, the log's parameters state {rotors}"
-    return [Fault("order", "", found, "the others are left out; check CA_ROTOR_COUNT and MAV_TYPE", 0)]
+    return [ImportFault("order", "", found, "the others are left out; check CA_ROTOR_COUNT and MAV_TYPE", 0)]
 
 
 def _from_pulses(log: Px4Log, instances, rotors: int, names: str):
@@ -272,17 +274,17 @@ def _from_pulses(log: Px4Log, instances, rotors: int, names: str):
     port, outputs = _outputs_of_motors(flown, rotors)
     if outputs is None:
         found = f"no output of PWM_MAIN_FUNC* or PWM_AUX_FUNC* is motor {port}, and actuator_motors is not logged"
-        return None, np.zeros(0), [Fault("no_command", "", found, "no throttle columns", 0)]
+        return None, np.zeros(0), [ImportFault("no_command", "", found, "no throttle columns", 0)]
     faults = []
     stacks = [_stack(data, [f"output[{k}]" for k in outputs]) for data in instances]
     usable = [i for i, s in enumerate(stacks) if s is not None]
     if not usable:
         found = f"actuator_outputs holds fewer than {rotors} outputs"
-        return None, np.zeros(0), [Fault("no_command", "", found, "no throttle columns", 0)]
+        return None, np.zeros(0), [ImportFault("no_command", "", found, "no throttle columns", 0)]
     chosen = max(usable, key=lambda i: float(np.nanstd(stacks[i], axis=0).min()))
     if len(instances) > 1:
         found = f"{len(instances)} instances of actuator_outputs"
-        faults.append(Fault("instances", names, found, f"instance {chosen}, whose outputs move, taken", 0))
+        faults.append(ImportFault("instances", names, found, f"instance {chosen}, whose outputs move, taken", 0))
     if not any("_FUNC" in name for name in flown):  # no output states what it is
         every = _stack(instances[chosen], [f for f in _indexed("output", 16) if f in instances[chosen]])
         faults += _more_rotors("actuator_outputs", rotors + len(further_motors(every, rotors)), rotors)
@@ -290,7 +292,7 @@ def _from_pulses(log: Px4Log, instances, rotors: int, names: str):
     turning = pulses[pulses > 0]
     if len(turning) and not (turning.min() >= _PLAUSIBLE_PULSE_US[0] and turning.max() <= _PLAUSIBLE_PULSE_US[1]):
         found = f"outputs from {turning.min():g} to {turning.max():g} are no pulse widths in µs"
-        return None, np.zeros(0), [*faults, Fault("unit", names, found, "no throttle columns", len(pulses))]
+        return None, np.zeros(0), [*faults, ImportFault("unit", names, found, "no throttle columns", len(pulses))]
     throttle = np.full(pulses.shape, np.nan)
     for start, stop, values in log.parameters.spans(_CHANGED[0][0]):
         inside = (times >= start) & (times < stop)
@@ -299,7 +301,7 @@ def _from_pulses(log: Px4Log, instances, rotors: int, names: str):
         if not stated and inside.any():
             found = "no parameter states the pulse widths of no and full throttle"
             action = f"taken as {low[0]:g} and {high[0]:g} µs"
-            faults.append(Fault("unit", names, found, action, int(inside.sum())))
+            faults.append(ImportFault("unit", names, found, action, int(inside.sum())))
     both = [i for i in range(rotors) if int(flown.get("CA_R_REV", 0)) >> i & 1]  # 0 in the middle of their range
     throttle[:, both], backwards = one_sense(
         2 * throttle[:, both] - 1, [c.rotor_columns("throttle", rotors)[i] for i in both], 1.0
@@ -307,7 +309,7 @@ def _from_pulses(log: Px4Log, instances, rotors: int, names: str):
     outside = (throttle < -0.01) | (throttle > 1.01)
     if outside.any():
         found = f"{outside.any(axis=1).mean():.0%} of the rows lie outside the range (disarmed motors get less)"
-        faults.append(Fault("range", names, found, "cut off at 0 and 1", int(outside.any(axis=1).sum())))
+        faults.append(ImportFault("range", names, found, "cut off at 0 and 1", int(outside.any(axis=1).sum())))
     return np.clip(throttle, 0, 1), times, faults + backwards
 
 
@@ -339,7 +341,7 @@ def _pulse_range(parameters: Values, port: str, outputs: Sequence[int]) -> tuple
     return np.where(reverse, high, low), np.where(reverse, low, high), stated
 
 
-def _speeds(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray, list[Fault]]:
+def _speeds(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray, list[ImportFault]]:
     """Rotor speeds (n, rotors), rad/s, of `esc_status`, NaN where a controller is not heard."""
     data = _first(log.topics, "esc_status")
     if not data:
@@ -350,7 +352,7 @@ def _speeds(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray, li
     place = {r: by_function.get(r, r) if by_function else r for r in range(rotors)}
     if not set(place.values()) <= set(slots):
         found = f"esc_status holds {len(slots)} controllers for {rotors} rotors"
-        return None, np.zeros(0), [Fault("speed_missing", "rotor_speed", found, "no rotor speeds", 0)]
+        return None, np.zeros(0), [ImportFault("speed_missing", "rotor_speed", found, "no rotor speeds", 0)]
     online = np.asarray(data.get("esc_online_flags", np.full(len(data["timestamp"]), -1))).astype(np.int64)
     values = np.column_stack([np.asarray(data[f"esc[{place[r]}].esc_rpm"], float) for r in range(rotors)]) * RPM
     values, faults = one_sense(values, c.rotor_columns("rotor_speed", rotors))
@@ -359,11 +361,11 @@ def _speeds(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray, li
     faults += _more_rotors("esc_status", rotors + len(turning), rotors)
     if not np.nan_to_num(values).any():
         found = "every speed in esc_status is 0"
-        return None, np.zeros(0), [Fault("speed_missing", "rotor_speed", found, "no rotor speeds", len(values))]
+        return None, np.zeros(0), [ImportFault("speed_missing", "rotor_speed", found, "no rotor speeds", len(values))]
     if not heard.all():
         lost = int((~heard).any(axis=1).sum())
         found = f"a speed controller is offline in {lost} messages"
-        faults.append(Fault("speed_missing", "rotor_speed", found, "made empty cells", lost))
+        faults.append(ImportFault("speed_missing", "rotor_speed", found, "made empty cells", lost))
     return np.where(heard, values, np.nan), _time(data, sampled=False), faults
 
 
@@ -398,7 +400,7 @@ def _inertial(topics: _Topics) -> dict[str, tuple[tuple[str, ...], np.ndarray, n
     return found
 
 
-def _local_position(data: Mapping[str, np.ndarray]) -> tuple[dict[tuple[str, ...], np.ndarray], list[Fault]]:
+def _local_position(data: Mapping[str, np.ndarray]) -> tuple[dict[tuple[str, ...], np.ndarray], list[ImportFault]]:
     """Position, velocity and height of `vehicle_local_position`, NaN where PX4 calls them invalid."""
     count = len(data["timestamp"])
     values: dict[tuple[str, ...], np.ndarray] = {}
@@ -419,12 +421,14 @@ def _local_position(data: Mapping[str, np.ndarray]) -> tuple[dict[tuple[str, ...
         if lost.any():
             bad = [n for n, column in zip(names, lost.T, strict=True) if column.any()]
             found = f"PX4 calls it invalid in {lost.any(axis=1).mean():.0%} of the messages"
-            faults.append(Fault("invalid", ", ".join(bad), found, "made empty cells", int(lost.any(axis=1).sum())))
+            faults.append(
+                ImportFault("invalid", ", ".join(bad), found, "made empty cells", int(lost.any(axis=1).sum()))
+            )
         values[names] = np.where(known, raw, np.nan)
     return values, faults
 
 
-def _batteries(topics: _Topics) -> tuple[list[tuple[tuple[str, ...], np.ndarray, np.ndarray]], list[Fault]]:
+def _batteries(topics: _Topics) -> tuple[list[tuple[tuple[str, ...], np.ndarray, np.ndarray]], list[ImportFault]]:
     """Voltage and current of every battery; those after the first under names of their own."""
     out, faults, number = [], [], 0
     for data in topics.get("battery_status", []):
@@ -439,11 +443,11 @@ def _batteries(topics: _Topics) -> tuple[list[tuple[tuple[str, ...], np.ndarray,
         if number > 1:
             names = (f"battery_{number}_voltage_v", f"battery_{number}_current_a")
             found = f"battery {number} is logged, too, at {np.nanmedian(voltage):.4g} V"
-            faults.append(Fault("instances", names[0], found, "kept under a name of its own", len(voltage)))
+            faults.append(ImportFault("instances", names[0], found, "kept under a name of its own", len(voltage)))
         time = _time(data)
         out.append(((names[0],), time, voltage[:, None]))
         if unknown.all():
-            faults.append(Fault("not_measured", names[1], "-1 A throughout: not measured", "column left out", 0))
+            faults.append(ImportFault("not_measured", names[1], "-1 A throughout: not measured", "column left out", 0))
         else:
             out.append(((names[1],), time, np.where(unknown, np.nan, current)[:, None]))
     return out, faults
@@ -531,14 +535,14 @@ def convert(log: Px4Log, rotors: int) -> _Converted:
     if jumps.any():
         times = int(np.count_nonzero(np.diff(jumps.astype(int), prepend=0) > 0))
         found = f"PX4's estimator jumped {times} times in position, velocity or attitude"
-        faults.append(Fault("estimator_reset", "", found, "a run ends at each jump in the air", times))
+        faults.append(ImportFault("estimator_reset", "", found, "a run ends at each jump in the air", times))
     faults += log.parameters.faults(_CHANGED, float(grid[0]), 1e-6)
     if log.rest:
         found = f"the file ends inside a message, after {log.rest} bytes of it"
-        faults.append(Fault("cut_off", "", found, "what came before is kept; the log stopped before its end", 0))
+        faults.append(ImportFault("cut_off", "", found, "what came before is kept; the log stopped before its end", 0))
     if log.damaged:
-        faults.append(Fault("damaged", "", "the file is damaged", "what could be read is kept", 0))
+        faults.append(ImportFault("damaged", "", "the file is damaged", "what could be read is kept", 0))
     if log.lost_s:
         found = f"the logger lost {len(log.lost_s)} stretches, {sum(log.lost_s):.3g} s in all"
-        faults.append(Fault("dropout", c.TIME, found, "left as gaps", len(log.lost_s)))
+        faults.append(ImportFault("dropout", c.TIME, found, "left as gaps", len(log.lost_s)))
     return _Converted(table, faults + report_gaps(table), flying & ~jumps, jumps)

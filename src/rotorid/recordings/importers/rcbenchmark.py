@@ -19,7 +19,7 @@ import pandas as pd
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.clean import drop_repeated_times
-from rotorid.recordings.importers.report import Fault
+from rotorid.recordings.importers.report import ImportFault
 from rotorid.recordings.importers.units import UNITS, bracketed, converted, unit_of
 from rotorid.recordings.vehicle import Vehicle
 
@@ -45,24 +45,24 @@ _NOT_ALWAYS = ("torque", "speed", "optical")
 _TORQUE = c.MOMENT[2]
 
 
-def decode_text(data: bytes) -> tuple[str, list[Fault]]:
+def decode_text(data: bytes) -> tuple[str, list[ImportFault]]:
     """Text of an export whatever its encoding, with `\\n` line ends, and what had to be mended."""
     faults = []
     if data.startswith(b"\xef\xbb\xbf"):
         text = data.decode("utf-8-sig")
-        faults.append(Fault("byte_order_mark", "", "file starts with a byte-order mark", "read as UTF-8", 0))
+        faults.append(ImportFault("byte_order_mark", "", "file starts with a byte-order mark", "read as UTF-8", 0))
     else:
         try:
             text = data.decode("utf-8")
         except UnicodeDecodeError:
             text = data.decode("latin-1")
-            faults.append(Fault("encoding", "", "file is not UTF-8", "read as latin-1", 0))
+            faults.append(ImportFault("encoding", "", "file is not UTF-8", "read as latin-1", 0))
     if "\r" in text and "\n" not in text:
-        faults.append(Fault("line_ends", "", "lines end with a bare carriage return", "read as line ends", 0))
+        faults.append(ImportFault("line_ends", "", "lines end with a bare carriage return", "read as line ends", 0))
     return text.replace("\r\n", "\n").replace("\r", "\n"), faults
 
 
-def _read_table(text: str, where: str) -> tuple[pd.DataFrame, list[Fault]]:
+def _read_table(text: str, where: str) -> tuple[pd.DataFrame, list[ImportFault]]:
     """Columns of an export in SI units by the names of `HEADINGS`, and what was found.
 
     `time` s, `esc` from 0 to 1, `thrust` N, `torque` N m, `voltage` V, `current` A, `speed` and `optical` rad/s.
@@ -76,7 +76,7 @@ def _read_table(text: str, where: str) -> tuple[pd.DataFrame, list[Fault]]:
     places, faults = _places(rows[0], where)
     if len(rows) > 2 and len(rows[-1]) < len(rows[0]):
         found = f"line {len(rows)} is cut off after {len(rows[-1])} of {len(rows[0])} cells"
-        faults.append(Fault("cut_off", c.TIME, found, "left out", 1))
+        faults.append(ImportFault("cut_off", c.TIME, found, "left out", 1))
         rows.pop()
     columns: dict[str, list[float]] = {name: [] for name in places}
     for line, row in enumerate(rows[1:], start=2):
@@ -95,7 +95,7 @@ def _read_table(text: str, where: str) -> tuple[pd.DataFrame, list[Fault]]:
     return pd.DataFrame(read), faults
 
 
-def _places(headings: list[str], where: str) -> tuple[dict[str, tuple[int, str, str]], list[Fault]]:
+def _places(headings: list[str], where: str) -> tuple[dict[str, tuple[int, str, str]], list[ImportFault]]:
     """To a column here its place in the file, its kind and its unit; InputError names a heading that is not there."""
     places, faults = {}, []
     for place, heading in enumerate(headings):
@@ -111,7 +111,7 @@ def _places(headings: list[str], where: str) -> tuple[dict[str, tuple[int, str, 
                 f"{', '.join(UNITS[kind])}"
             )
         if not text:
-            faults.append(Fault("unit", "", f"the heading {title!r} names no unit", f"taken as {usual}", 0))
+            faults.append(ImportFault("unit", "", f"the heading {title!r} names no unit", f"taken as {usual}", 0))
         places[name] = place, kind, unit
     for title, (name, _, _) in HEADINGS.items():
         if name not in (*places, *_NOT_ALWAYS):
@@ -121,7 +121,7 @@ def _places(headings: list[str], where: str) -> tuple[dict[str, tuple[int, str, 
     return places, faults
 
 
-def convert(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
+def convert(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
     """Contract columns of a stand with one rotor of what `_read_table` gives; measured values are kept as recorded.
 
     The thrust is a force along -z of the body, which the rotor passes on to the sensor. The torque is positive while
@@ -136,7 +136,7 @@ def convert(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
     turning = speed > 0
     if turning.sum() >= 2 and np.corrcoef(speed[turning] ** 2, thrust_n[turning])[0, 1] < -0.5:
         faults.append(
-            Fault(
+            ImportFault(
                 "flipped_sign",
                 "force_z_n",
                 "thrust falls as the rotor speed rises: the load cell's sign is flipped",
@@ -147,7 +147,7 @@ def convert(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
     silent = (speed == 0) & (np.abs(thrust_n) > 0) & (raw["esc"].to_numpy() > 0)
     if silent.any():
         faults.append(
-            Fault(
+            ImportFault(
                 "speed_missing",
                 "rotor_speed_1_rad_s",
                 f"speed 0 while the rotor gives thrust ({int(silent.sum())} rows)",
@@ -158,11 +158,11 @@ def convert(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
     slow = lost_speed(speed, np.abs(thrust_n))
     if slow.any():
         found = f"speed far too low for its thrust ({int(slow.sum())} rows): pulses lost"
-        faults.append(Fault("speed_lost", "rotor_speed_1_rad_s", found, "kept as recorded", int(slow.sum())))
+        faults.append(ImportFault("speed_lost", "rotor_speed_1_rad_s", found, "kept as recorded", int(slow.sum())))
     negative = (thrust_n < 0) & ~turning
     if negative.any():
         faults.append(
-            Fault(
+            ImportFault(
                 "tare",
                 "force_z_n",
                 f"thrust {thrust_n[negative].min():.4f} N with the rotor at rest",
@@ -172,7 +172,7 @@ def convert(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
         )
     if both:
         found, count = "an optical speed is recorded too", int((optical > 0).sum())
-        faults.append(Fault("second_sensor", "", found, "left out", count))
+        faults.append(ImportFault("second_sensor", "", found, "left out", count))
     table = pd.DataFrame(
         {
             c.TIME: raw["time"],
@@ -190,7 +190,9 @@ def convert(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[Fault]]:
     return table, faults + repeated
 
 
-def signed_by_spin(runs: dict[str, pd.DataFrame], vehicle: Vehicle) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
+def signed_by_spin(
+    runs: dict[str, pd.DataFrame], vehicle: Vehicle
+) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
     """Runs of `read_rcbenchmark` whose torque has the sign that the stated spin of the rotor gives it.
 
     The export does not say which way its torque counts: a rotor that turns ccw pushes its mount to positive z.
@@ -203,10 +205,10 @@ def signed_by_spin(runs: dict[str, pd.DataFrame], vehicle: Vehicle) -> tuple[dic
     found = "an export does not say which way its torque counts"
     done = f"its sign is that of a rotor that turns {spin}, as the vehicle's file states"
     signed = {name: runs[name].assign(**{_TORQUE: sign * runs[name][_TORQUE]}) for name in mine}
-    return {**runs, **signed}, [Fault("sign", _TORQUE, found, done, 0)]
+    return {**runs, **signed}, [ImportFault("sign", _TORQUE, found, done, 0)]
 
 
-def read_rcbenchmark(path: Path) -> tuple[pd.DataFrame, list[Fault]]:
+def read_rcbenchmark(path: Path) -> tuple[pd.DataFrame, list[ImportFault]]:
     """One stand run in contract columns, and its faults."""
     try:
         data = Path(path).read_bytes()

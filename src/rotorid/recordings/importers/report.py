@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 @dataclass(frozen=True)
-class Fault:
+class ImportFault:
     """One fault of a recording: its kind and column, what was seen and done, how many samples it touches."""
 
     kind: str
@@ -18,7 +18,7 @@ class Fault:
     samples: int
     run: str = ""
 
-    def in_run(self, run: str) -> Fault:
+    def in_run(self, run: str) -> ImportFault:
         return replace(self, run=run)
 
     @property
@@ -43,12 +43,14 @@ class ImportReport:
     files: dict[str, str] = field(default_factory=dict)
     """SHA-256 of each file read."""
     axes: str = ""
-    faults: tuple[Fault, ...] = ()
+    faults: tuple[ImportFault, ...] = ()
     notes: tuple[str, ...] = ()
 
     def after(self, earlier: dict) -> ImportReport:
         """The report of a set that holds what was imported now and, as its earlier report says, before."""
-        faults = tuple(Fault(**{f.name: fault[f.name] for f in fields(Fault)}) for fault in earlier["faults"])
+        faults = tuple(
+            ImportFault(**{f.name: fault[f.name] for f in fields(ImportFault)}) for fault in earlier["faults"]
+        )
         files = {**earlier["files"], **self.files}
         return replace(
             self,

@@ -41,7 +41,7 @@ from rotorid.recordings.importers import in_the_air
 from rotorid.recordings.importers.bag_records import Records, needs, typestores
 from rotorid.recordings.importers.clean import further_motors, one_sense, report_gaps
 from rotorid.recordings.importers.mapping import half_turn_about_x, quaternion_to_frd_ned
-from rotorid.recordings.importers.report import Fault
+from rotorid.recordings.importers.report import ImportFault
 
 RPM = 2 * np.pi / 60
 _PULSE_US = (1000.0, 2000.0)
@@ -136,7 +136,7 @@ LISTED = 8
 
 
 @dataclass(frozen=True)
-class Series:
+class TopicSeries:
     """One quantity of one topic: instants (n,), s, and values (n, k)."""
 
     topic: str
@@ -150,7 +150,7 @@ class Series:
 
 
 @dataclass
-class Found:
+class BagContent:
     """What a bag holds: (stamp, time of recording, values) of each quantity of a topic, the topics that are not read
     with their type and number of messages, and whether the file ends early. Stamps are 0 where there are none."""
 
@@ -172,11 +172,11 @@ class Found:
         self.unread[topic] = msgtype, self.unread.get(topic, ("", 0))[1] + messages
 
 
-def _by_rosbags(path: Path) -> Found:
+def _by_rosbags(path: Path) -> BagContent:
     """A bag, MCAP file or folder of one that is whole and holds ROS alone."""
     highlevel = needs("rosbags.highlevel", "ros", path)
     typesys = needs("rosbags.typesys", "ros", path)
-    found = Found()
+    found = BagContent()
     with highlevel.AnyReader([path], default_typestore=typesys.get_typestore(typesys.Stores.LATEST)) as bag:
         known = [k for k in bag.connections if k.msgtype in _READERS]
         for k in bag.connections:
@@ -189,10 +189,10 @@ def _by_rosbags(path: Path) -> Found:
     return found
 
 
-def _by_records(path: Path) -> Found:
+def _by_records(path: Path) -> BagContent:
     """What can be read, record by record, of a file or folder that rosbags refuses."""
     files = [path] if path.is_file() else sorted(p for p in path.iterdir() if p.suffix in (".db3", ".mcap"))
-    found = Found()
+    found = BagContent()
     for file in files:
         records = Records(file)
         listed = list(records.messages())
@@ -217,7 +217,7 @@ def _by_records(path: Path) -> Found:
     return found
 
 
-def _found(path: Path) -> Found:
+def _found(path: Path) -> BagContent:
     """InputError where nothing of a bag can be read."""
     needs("rosbags.highlevel", "ros", path)
     try:
@@ -231,13 +231,13 @@ def _found(path: Path) -> Found:
     except MemoryError:
         raise
     except Exception:
-        found = Found()
+        found = BagContent()
     if not (found.rows or found.unread or found.foreign):
         raise InputError(f"{path}: not a bag or MCAP file that can be read ({why})")
     return found
 
 
-def _read_series(path: Path) -> tuple[dict[str, list[Series]], list[Fault]]:
+def _read_series(path: Path) -> tuple[dict[str, list[TopicSeries]], list[ImportFault]]:
     """Every known quantity of a bag by topic, those that state most first.
 
     InputError where it cannot be read or holds no known type.
@@ -257,26 +257,26 @@ def _read_series(path: Path) -> tuple[dict[str, list[Series]], list[Fault]]:
     faults = []
     if found.cut:
         seen = "the file ends early, without its index"
-        faults.append(Fault("cut_off", "", seen, "what came before is kept; the log stopped before its end", 0))
+        faults.append(ImportFault("cut_off", "", seen, "what came before is kept; the log stopped before its end", 0))
     if found.broken:
         seen = f"{found.broken} messages cannot be decoded"
-        faults.append(Fault("damaged", "", seen, "left out", found.broken))
+        faults.append(ImportFault("damaged", "", seen, "left out", found.broken))
     if found.lost_chunks:
         seen = f"{found.lost_chunks} chunks of messages cannot be unpacked"
-        faults.append(Fault("damaged", "", seen, "left out; their time is a gap", found.lost_chunks))
+        faults.append(ImportFault("damaged", "", seen, "left out; their time is a gap", found.lost_chunks))
     if foreign:
         seen = f"{', '.join(foreign[:LISTED])} hold no messages of ROS"
-        faults.append(Fault("unread", "", seen, "left out", 0))
+        faults.append(ImportFault("unread", "", seen, "left out", 0))
     times, more = _times(found)
     faults += more
-    series: dict[str, list[Series]] = {}
+    series: dict[str, list[TopicSeries]] = {}
     for (quantity, topic), rows in found.rows.items():
         widths = [len(values) for *_, values in rows]
         width = max(set(widths), key=widths.count)
         odd = len(widths) - widths.count(width)
         if odd:
             seen = f"{odd} of {len(widths)} messages of {topic} do not hold {width} values as the others do"
-            faults.append(Fault("shape", quantity, seen, "left out", odd))
+            faults.append(ImportFault("shape", quantity, seen, "left out", odd))
         keep = np.array(widths) == width
         if not width:
             continue
@@ -290,10 +290,10 @@ def _read_series(path: Path) -> tuple[dict[str, list[Series]], list[Fault]]:
         order = np.argsort(time_s, kind="stable")
         time_s, values = time_s[order], values[order]
         keep = in_the_air.increasing(time_s)
-        own = Series(topic, time_s[keep], values[keep])
+        own = TopicSeries(topic, time_s[keep], values[keep])
         if quantity in _UNSET and (own.values == _UNSET[quantity]).all():
             seen = f"{quantity.replace('_', ' ')} of {topic} was never set ({_UNSET[quantity][0]:g}, 0, … throughout)"
-            faults.append(Fault("stuck", quantity, seen, "states nothing, left out", len(values)))
+            faults.append(ImportFault("stuck", quantity, seen, "states nothing, left out", len(values)))
         elif keep.sum() > 1:
             series.setdefault(quantity, []).append(own)
     for offered in series.values():
@@ -303,16 +303,18 @@ def _read_series(path: Path) -> tuple[dict[str, list[Series]], list[Fault]]:
     if missing and others:
         more = f" and {len(others) - LISTED} more" if len(others) > LISTED else ""
         seen = f"no topic of a type that is read states {', '.join(missing)}; not read are {', '.join(others[:LISTED])}"
-        faults.append(Fault("unread", "", seen + more, "export what is missing as a CSV", 0))
+        faults.append(ImportFault("unread", "", seen + more, "export what is missing as a CSV", 0))
     faults += [
-        Fault("instances", quantity, f"{', '.join(s.topic for s in offered)} hold it", f"{offered[0].topic} taken", 0)
+        ImportFault(
+            "instances", quantity, f"{', '.join(s.topic for s in offered)} hold it", f"{offered[0].topic} taken", 0
+        )
         for quantity, offered in series.items()
         if len(offered) > 1
     ]
     return series, faults
 
 
-def _set_commands_apart(series: dict[str, list[Series]]) -> None:
+def _set_commands_apart(series: dict[str, list[TopicSeries]]) -> None:
     """Speeds of a topic that is called a command are commands, where another topic has speeds."""
     speeds = series.get("speeds", [])
     asked = [s for s in speeds if COMMANDED.search(s.topic)]
@@ -321,7 +323,7 @@ def _set_commands_apart(series: dict[str, list[Series]]) -> None:
         series["commands"] = [*series.get("commands", []), *asked]
 
 
-def _times(found: Found) -> tuple[dict[tuple[str, str], np.ndarray], list[Fault]]:
+def _times(found: BagContent) -> tuple[dict[tuple[str, str], np.ndarray], list[ImportFault]]:
     """Times of the rows of each quantity of a topic, s, on the clock of the inertial sensor's stamps.
 
     A topic whose stamps are all zero, jump, or run at another rate has those at which its messages were recorded.
@@ -356,7 +358,7 @@ def _times(found: Found) -> tuple[dict[tuple[str, str], np.ndarray], list[Fault]
             times[key] = own - off if steady else on_base
             action = "shifted by that" if steady else "the times at which its messages were recorded hold"
         if seen:
-            faults[key[1]] = Fault("two_clocks", c.TIME, f"{key[1]}: {seen}", action, len(own))
+            faults[key[1]] = ImportFault("two_clocks", c.TIME, f"{key[1]}: {seen}", action, len(own))
     return times, list(faults.values())
 
 
@@ -367,7 +369,9 @@ def _jumps(stamps: np.ndarray, recorded: np.ndarray) -> bool:
     return bool(np.any(steps < -_SAME_CLOCK_S) or np.any(steps > _SAME_CLOCK_S + 10 * waited))
 
 
-def convert(series: dict[str, list[Series]], faults: list[Fault], where: object) -> tuple[pd.DataFrame, np.ndarray]:
+def convert(
+    series: dict[str, list[TopicSeries]], faults: list[ImportFault], where: object
+) -> tuple[pd.DataFrame, np.ndarray]:
     """Contract columns and where it flies (mask of rows), of the first series of each quantity."""
     first = {quantity: offered[0] for quantity, offered in series.items()}
     if "attitude" not in first and "imu_attitude" in first:
@@ -411,19 +415,19 @@ def convert(series: dict[str, list[Series]], faults: list[Fault], where: object)
     return table, in_the_air.airborne(table)[0]
 
 
-def _turned(velocity: Series, attitudes: list[Series], faults: list[Fault]) -> list[tuple]:
+def _turned(velocity: TopicSeries, attitudes: list[TopicSeries], faults: list[ImportFault]) -> list[tuple]:
     """A velocity in body axes turned into the world by the attitude of its own topic, else by the nearest in time."""
     attitude = next((s for s in attitudes if s.topic == velocity.topic), attitudes[0] if attitudes else None)
     if attitude is None:
         seen = f"the velocity of {velocity.topic} is in body axes, and no topic states an attitude"
-        faults.append(Fault("no_attitude", ", ".join(c.VELOCITY), seen, "columns left out", len(velocity.time_s)))
+        faults.append(ImportFault("no_attitude", ", ".join(c.VELOCITY), seen, "columns left out", len(velocity.time_s)))
         return []
     nearest = np.searchsorted((attitude.time_s[1:] + attitude.time_s[:-1]) / 2, velocity.time_s)
     turn = Rotation.from_quat(attitude.values[nearest][:, [1, 2, 3, 0]])
     return [(c.VELOCITY, velocity.time_s, half_turn_about_x(turn.apply(velocity.values)))]
 
 
-def _of_pulses(outputs: Series, faults: list[Fault]) -> tuple:
+def _of_pulses(outputs: TopicSeries, faults: list[ImportFault]) -> tuple:
     """Throttles of an array of all outputs, which names no motors: the first four that move are motors, and each other
     whose signal follows from theirs."""
     moving = np.flatnonzero(np.ptp(outputs.values, axis=0) > 0)
@@ -432,16 +436,16 @@ def _of_pulses(outputs: Series, faults: list[Fault]) -> tuple:
     low, high = _PULSE_US
     seen = f"channels {', '.join(str(moving[k] + 1) for k in used)} of {outputs.topic} move"
     action = f"taken for motors in order, {low:g} to {high:g} µs"
-    faults.append(Fault("unit", "throttle", seen, action, len(pulses)))
+    faults.append(ImportFault("unit", "throttle", seen, action, len(pulses)))
     others = [str(moving[k] + 1) for k in range(len(moving)) if k not in used]
     if others:
         seen = f"channels {', '.join(others)} of {outputs.topic} move, too, but not with the motors"
-        faults.append(Fault("servo", "throttle", seen, "taken for no motors", len(pulses)))
+        faults.append(ImportFault("servo", "throttle", seen, "taken for no motors", len(pulses)))
     throttle = np.clip((pulses[:, used] - low) / (high - low), 0, 1)
     return c.rotor_columns("throttle", len(used)), outputs.time_s, throttle
 
 
-def read_ros(path: Path) -> tuple[dict[str, pd.DataFrame], list[Fault], str]:
+def read_ros(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault], str]:
     """Every flight of a bag (file or folder) or MCAP file by name, in contract columns, what was found, and the unit
     in which rotor speeds are stated."""
     series, faults = _read_series(path)

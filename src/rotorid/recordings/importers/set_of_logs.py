@@ -36,7 +36,7 @@ from rotorid.recordings.importers.mapping import Mapping
 from rotorid.recordings.importers.propose import propose
 from rotorid.recordings.importers.rcbenchmark import signed_by_spin
 from rotorid.recordings.importers.report import FILE_NAME as REPORT
-from rotorid.recordings.importers.report import Fault, ImportReport
+from rotorid.recordings.importers.report import ImportFault, ImportReport
 from rotorid.recordings.importers.speed_unit import in_unit_of_weight
 from rotorid.recordings.tables import check_table, parquet_is_here, write_table
 from rotorid.recordings.vehicle import Vehicle
@@ -53,7 +53,7 @@ class SetOfLogs:
     """The `vehicle.yaml`, comments and all."""
     remarks: tuple[str, ...] = ()
     """One sentence for each value that is proposed, not known."""
-    faults: tuple[Fault, ...] = ()
+    faults: tuple[ImportFault, ...] = ()
     """What was found in the logs."""
     axes: str = ""
     files: Names[str, str] = field(default_factory=dict)

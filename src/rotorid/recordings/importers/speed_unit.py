@@ -14,7 +14,7 @@ import pandas as pd
 
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.propose import thrust_coefficient
-from rotorid.recordings.importers.report import Fault
+from rotorid.recordings.importers.report import ImportFault
 from rotorid.recordings.importers.units import UNITS
 
 _USUAL_COEFFICIENT = 1.7e-5
@@ -37,7 +37,7 @@ def in_unit_of_weight(
     mass_kg: float,
     rotors: int,
     coefficient_n_s2: float | None = None,
-) -> tuple[dict[str, pd.DataFrame], list[Fault]]:
+) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
     """Flights whose rotor speeds are in the unit that carries the weight, and what was changed.
 
     Parameters
@@ -65,7 +65,7 @@ def in_unit_of_weight(
                         f"{mass_kg:.3g} kg, which no unit explains: electrical turns (divide by half of the motor's "
                         "poles), or another vehicle"
                     )
-                    faults.append(Fault("unit", kind, found, "kept as recorded", sum(len(t) for t in tables)))
+                    faults.append(ImportFault("unit", kind, found, "kept as recorded", sum(len(t) for t in tables)))
                 continue
             factor = UNITS["rotor"][unit] / UNITS["rotor"][written]
             for run in mine:
@@ -75,7 +75,7 @@ def in_unit_of_weight(
                 f"in {written}, as the log states, the rotors hover at {off:.2g} times the speed that carries "
                 f"{mass_kg:.3g} kg, in {unit} at {off * factor:.2g} times"
             )
-            faults.append(Fault("unit", kind, found, f"taken as {unit}", sum(len(t) for t in tables)))
+            faults.append(ImportFault("unit", kind, found, f"taken as {unit}", sum(len(t) for t in tables)))
     return out, faults
 
 

@@ -17,7 +17,7 @@ from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.clean import blank_held, cut, drop_repeated_times, report_gaps, true_stretches
 from rotorid.recordings.importers.mapping import quaternion_from_euler_frd
-from rotorid.recordings.importers.report import Fault
+from rotorid.recordings.importers.report import ImportFault
 
 COUNT = 25
 RPM = 2 * np.pi / 60
@@ -25,7 +25,7 @@ _GROUND_MARGIN_M = 0.015
 """Height above the resting height from which the vehicle counts as in the air."""
 
 
-def _read_matrix(path: Path) -> tuple[np.ndarray, list[Fault]]:
+def _read_matrix(path: Path) -> tuple[np.ndarray, list[ImportFault]]:
     """The numbers of a header-less CSV, shape (n, 25); the last row may be cut off."""
     try:
         lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
@@ -49,7 +49,7 @@ def _read_matrix(path: Path) -> tuple[np.ndarray, list[Fault]]:
         if len(values) != COUNT:
             if not last:
                 raise InputError(f"{path}, line {number}: expected {COUNT} columns, found {len(values)}")
-            faults.append(Fault("cut_off", "", f"last line has {len(cells)} of {COUNT} columns", "left out", 1))
+            faults.append(ImportFault("cut_off", "", f"last line has {len(cells)} of {COUNT} columns", "left out", 1))
             continue
         rows.append(values)
     if len(rows) < 2:
@@ -65,7 +65,7 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[Fault]]:
+def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[ImportFault]]:
     """Contract columns of the flown part of a log, clock from zero at its start."""
     time, position, velocity = matrix[:, 0], matrix[:, 1:4], matrix[:, 4:7]
     roll, pitch, yaw = np.radians(matrix[:, 7:10]).T
@@ -85,7 +85,7 @@ def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[Fault]]:
     if unlocked.any():
         table.loc[unlocked, [*c.POSITION, *c.VELOCITY, c.HEIGHT]] = np.nan
         faults.append(
-            Fault(
+            ImportFault(
                 "no_lock",
                 ", ".join(c.POSITION),
                 "motion capture not locked (nan)",
@@ -97,7 +97,7 @@ def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[Fault]]:
     unpowered = (table[c.BATTERY_VOLTAGE] == 0) & (table[rotors].abs().sum(axis=1) == 0)
     if unpowered.any():
         faults.append(
-            Fault(
+            ImportFault(
                 "no_telemetry",
                 c.BATTERY_VOLTAGE,
                 "speed controllers report 0 V",
@@ -118,7 +118,7 @@ def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[Fault]]:
     table = cut(table, start + 1.0, stop)
     faults += repeated
     faults.append(
-        Fault(
+        ImportFault(
             "on_ground",
             "",
             f"in the air from {start:.1f} to {stop:.1f} s",
@@ -137,7 +137,7 @@ def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[Fault]]:
     return table, faults + held
 
 
-def read_vicon_csv(path: Path) -> tuple[pd.DataFrame, list[Fault]]:
+def read_vicon_csv(path: Path) -> tuple[pd.DataFrame, list[ImportFault]]:
     """One flight in contract columns, and its faults."""
     matrix, faults = _read_matrix(path)
     try:

@@ -18,7 +18,7 @@ import numpy as np
 
 from rotorid.effects.loading import Loading
 from rotorid.errors import InputError
-from rotorid.mismatch.decision.findings import Analysis, Trace
+from rotorid.mismatch.decision.findings import Analysis, ChannelTrace
 from rotorid.mismatch.decision.shares import fitted_part, segments_of
 from rotorid.mismatch.decision.words import FORWARD_WORDS, channel_words, regime_words
 from rotorid.mismatch.delivery.flown import Model
@@ -63,7 +63,7 @@ def page_data(analysis: Analysis, verdict: Verdict, main: str) -> dict:
     channels = [c for c in verdict.channels if c not in FORWARD_WORDS]
     segments = segments_of(analysis)
     readings = measured(analysis, segments)
-    by_pair: dict[tuple[str, str], list[Trace]] = {}
+    by_pair: dict[tuple[str, str], list[ChannelTrace]] = {}
     read_by_pair: dict[tuple[str, str], list[np.ndarray]] = {}
     for trace, reading in zip(analysis.traces, readings, strict=True):
         if trace.channel in channels:
@@ -106,7 +106,7 @@ def _largest_run(analysis: Analysis, verdict: Verdict, main: str) -> str:
     return max(held, key=lambda t: float(np.nanmean(t.before**2) - np.nanmean(t.after**2))).run
 
 
-def _series(run: str, channel: str, traces: Sequence[Trace], readings: Sequence[np.ndarray], every: int) -> dict:
+def _series(run: str, channel: str, traces: Sequence[ChannelTrace], readings: Sequence[np.ndarray], every: int) -> dict:
     """One channel of one run: what was measured, and what the believed and the improved model leave of it."""
 
     def joined(series: Sequence[np.ndarray]) -> np.ndarray:
@@ -134,7 +134,7 @@ def _frames(run: str, flown: dict[str, np.ndarray]) -> dict:
     return out | {name: packed(flown[name].ravel()) for name in names}
 
 
-def regimes(analysis: Analysis, by_pair: dict[tuple[str, str], list[Trace]]) -> dict:
+def regimes(analysis: Analysis, by_pair: dict[tuple[str, str], list[ChannelTrace]]) -> dict:
     """Size of the error by half seconds next to what was flown: variables and, by channel, before and after."""
     variables = sorted({v for known in analysis.regimes.values() for v in known if v != "time_s"})
     channels = list(dict.fromkeys(c for _, c in by_pair))
@@ -175,7 +175,7 @@ def _blocks(values: np.ndarray, per: int, count: int) -> np.ndarray:
 
 
 def correlations(
-    analysis: Analysis, by_pair: dict[tuple[str, str], list[Trace]], channels: Sequence[str]
+    analysis: Analysis, by_pair: dict[tuple[str, str], list[ChannelTrace]], channels: Sequence[str]
 ) -> dict[str, dict]:
     """Correlation of each channel's error with itself some time later, before and after, on runs held out.
 
@@ -345,7 +345,7 @@ def _of_loading(loading: Loading, count: int) -> tuple[np.ndarray, dict[str, np.
     return averaged(loading.time_s, count), out
 
 
-def _on(trace: Trace, pieces: Pieces) -> np.ndarray:
+def _on(trace: ChannelTrace, pieces: Pieces) -> np.ndarray:
     """One channel on the instants of its trace, by linear interpolation within each stretch."""
     out = np.full(len(trace.time_s), np.nan)
     for time_s, channels in pieces:
@@ -362,7 +362,7 @@ def fit_percent(analysis: Analysis, readings: Sequence[np.ndarray]) -> dict[str,
     perfect, 0 no better than the mean, negative worse.
     """
     part = fitted_part(analysis)
-    by_channel: dict[str, list[tuple[Trace, np.ndarray]]] = {}
+    by_channel: dict[str, list[tuple[ChannelTrace, np.ndarray]]] = {}
     for trace, reading in zip(analysis.traces, readings, strict=True):
         by_channel.setdefault(trace.channel, []).append((trace, reading))
     out = {}

@@ -17,7 +17,7 @@ from rotorid.vehicle.flyable import flyable
 from rotorid.vehicle.hover import hover
 from rotorid.vehicle.improved import active_speed_forms, command_path, record_as_stated, simulate_as_stated
 from rotorid.vehicle.mixer import allocation_matrix
-from rotorid.vehicle.simulator import Noise, Start
+from rotorid.vehicle.simulator import Start, WhiteNoise
 
 _STIFFNESS_RAD_S, _DAMPING = 10.0, 0.8
 """Natural frequency and damping of the attitude loop that flies the vehicle."""
@@ -69,7 +69,7 @@ def swings(vehicle: Vehicle, name: str, seconds: float, flights: int, seed: int,
     j = np.diag(vehicle.inertia_kg_m2.matrix()) / steady.gain
     gains = Gains(tuple(j * stiffness**2), (0.0,) * 3, tuple(2 * _DAMPING * stiffness * j))
     most = (np.inf, np.inf, _most_yaw_n_m(vehicle, np.array([thrust_n, *steady.moments_n_m])))
-    noise = Noise(
+    noise = WhiteNoise(
         angular_velocity_rad_s=0.01,
         specific_force_m_s2=0.1,
         velocity_m_s=0.02,

@@ -5,7 +5,7 @@ import pytest
 
 from rotorid.errors import InputError
 from rotorid.identify.fem import elasticity
-from rotorid.identify.fem.elasticity import Body, Bound
+from rotorid.identify.fem.elasticity import Bound, LooseParts
 from rotorid.identify.fem.sizes import Material
 from rotorid.identify.fem.studies import FINENESSES, cantilever, kirsch_displacement_m, plate_with_hole
 from rotorid.identify.fem.tets import Pad, block, column, stacked
@@ -45,7 +45,7 @@ def test_tetrahedra_fill_a_box_and_share_their_faces() -> None:
 
 def test_pure_bending_is_exact() -> None:
     """Quadratic elements hold the quadratic displacements of a bent bar, contraction across included."""
-    body = Body.of({"bar": box((0.3, 0.1, 0.1), (3, 2, 2))})
+    body = LooseParts.of({"bar": box((0.3, 0.1, 0.1), (3, 2, 2))})
     x, y, z = body.nodes_m.T
     bend, nu = 0.01, STEEL.poisson
     exact = bend * np.array([x * z, -nu * y * z, (-(x**2) - nu * (z**2 - y**2)) / 2])
@@ -62,7 +62,7 @@ def test_pure_bending_is_exact() -> None:
 def test_bonded_boxes_stretch_as_one(counts, tolerance) -> None:
     """Exact where the meshes meet, and nearly where they do not: nodes that follow a surface load it in points."""
     upper, lower = box((1.0, 1.0, 1.0), counts, (0.0, 0.0, 1.0)), box((1.0, 1.0, 1.0), (2, 2, 2))
-    body = Body.of({"lower": lower, "upper": upper})
+    body = LooseParts.of({"lower": lower, "upper": upper})
     nodes = body.nodes_m
     own = body.nodes_of("upper")
     own = own[np.abs(nodes[own, 2] - 1) < 1e-9]
@@ -82,14 +82,14 @@ def test_bonded_boxes_stretch_as_one(counts, tolerance) -> None:
 
 
 def test_what_is_not_held_is_refused() -> None:
-    body = Body.of({"box": box((1.0, 1.0, 1.0), (1, 1, 1))})
+    body = LooseParts.of({"box": box((1.0, 1.0, 1.0), (1, 1, 1))})
     free = elasticity.constraints(body.basis.N, [], np.zeros((3, body.basis.N), bool))
     with pytest.raises(InputError, match="not held"):
         elasticity.solve(body.stiffness({"box": STEEL}), free, np.ones((3 * body.basis.N, 1)))
 
 
 def test_a_point_off_the_part_is_refused() -> None:
-    body = Body.of({"box": box((1.0, 1.0, 1.0), (1, 1, 1))})
+    body = LooseParts.of({"box": box((1.0, 1.0, 1.0), (1, 1, 1))})
     assert body.weights(np.array([[0.2, 0.3, 1.0]]), "box").sum() == pytest.approx(1.0)
     with pytest.raises(InputError, match="box is not"):
         body.weights(np.array([[0.2, 0.3, 1.2]]), "box")

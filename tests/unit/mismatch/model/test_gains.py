@@ -14,7 +14,7 @@ from rotorid.mismatch.model.prepare import prepare
 from rotorid.mismatch.model.within_trust import settled
 from rotorid.mismatch.plant.split import parts_of, split_runs
 from rotorid.mismatch.posterior.problem import Prior
-from rotorid.mismatch.posterior.values import Gain
+from rotorid.mismatch.posterior.values import LogGain
 from tests.unit.mismatch.flights import DENSE_HZ, quad, recorded, smooth, with_table
 
 CUTOFF_HZ = 10.0
@@ -73,8 +73,8 @@ def test_the_column_of_a_smaller_gain_is_larger_than_that_of_the_believed_one():
 
 
 def test_bands_that_differ_by_more_than_they_should_are_less_certain_together():
-    assert mean_of([Gain(0.1, 0.01), Gain(0.1, 0.01)]).variance == pytest.approx(0.005)
-    apart = mean_of([Gain(0.0, 0.01), Gain(0.6, 0.01)])
+    assert mean_of([LogGain(0.1, 0.01), LogGain(0.1, 0.01)]).variance == pytest.approx(0.005)
+    apart = mean_of([LogGain(0.0, 0.01), LogGain(0.6, 0.01)])
     assert (apart.log, apart.variance) == (pytest.approx(0.3), pytest.approx(0.005 * 18))
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from rotorid.effects.contract import Motion
 from rotorid.mismatch.model import made as module
-from rotorid.mismatch.model.made import Memory
+from rotorid.mismatch.model.made import LastMade
 
 
 def flown(size: int = 50) -> Motion:
@@ -35,7 +35,7 @@ def counted():
 
 def test_only_what_was_read_counts(counted):
     make, asked = counted
-    motion, memory = flown(), Memory()
+    motion, memory = flown(), LastMade()
     first = memory.made(("plate",), (1.0,), motion, make)
     again = memory.made(("plate",), (1.0,), replace(motion, angular_acceleration=np.ones((motion.size, 3))), make)
     assert again is first and len(asked) == 1
@@ -45,7 +45,7 @@ def test_only_what_was_read_counts(counted):
 
 def test_other_values_are_made_anew_and_take_the_place_of_the_first(counted):
     make, asked = counted
-    motion, memory = flown(), Memory()
+    motion, memory = flown(), LastMade()
     for value in (1.0, 2.0, 2.0, 1.0):
         memory.made(("plate",), (value,), motion, make)
     assert len(asked) == 3 and len(memory.kept) == 1
@@ -54,7 +54,7 @@ def test_other_values_are_made_anew_and_take_the_place_of_the_first(counted):
 
 def test_what_was_made_first_is_forgotten_first(counted, monkeypatch):
     make, asked = counted
-    motion, memory = flown(), Memory()
+    motion, memory = flown(), LastMade()
     monkeypatch.setattr(module, "MOST_BYTES", 2.5 * motion.velocity.nbytes)
     for key in ("a", "b", "c", "c", "b", "a"):
         memory.made((key,), (), motion, make)

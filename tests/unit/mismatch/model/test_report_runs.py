@@ -13,7 +13,7 @@ import pytest
 
 from rotorid.mismatch.analyse import analyse, with_noise_held_out
 from rotorid.mismatch.decision.evidence import contribution, ratio_of, weighed
-from rotorid.mismatch.decision.findings import Trace
+from rotorid.mismatch.decision.findings import ChannelTrace
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.model.absent import evidence_of
 from rotorid.mismatch.plant.split import parts_of, split_runs
@@ -195,7 +195,7 @@ def test_the_ratio_is_that_of_errors_with_and_without_where_the_effect_acts():
     time_s = np.arange(0.0, 120.0, 0.025)
     noise = rng.standard_normal(len(time_s))
     added = np.where(time_s > 80.0, rng.standard_normal(len(time_s)), 0.0)
-    trace = Trace("a", "force_x", "N", time_s, noise + added, noise + added, noise, noise)
+    trace = ChannelTrace("a", "force_x", "N", time_s, noise + added, noise + added, noise, noise)
     analysis = SimpleNamespace(compared=(trace,))
     every, nothing = np.ones(len(time_s), bool), np.zeros(len(time_s), bool)
     ratio = ratio_of(analysis, (noise + added,), [every], "force_x")
@@ -209,8 +209,8 @@ def test_an_error_of_a_sensor_is_judged_by_what_two_sensors_say():
     rng = np.random.default_rng(2)
     time_s = np.arange(0.0, 60.0, 0.025)
     noise, missed = rng.standard_normal((2, len(time_s)))
-    force = Trace("a", "force_z", "N", time_s, noise + missed, noise, noise, noise)
-    between = Trace("a", "accelerometer_z", "m/s2", time_s, noise + missed, noise + missed, noise, noise)
+    force = ChannelTrace("a", "force_z", "N", time_s, noise + missed, noise, noise, noise)
+    between = ChannelTrace("a", "accelerometer_z", "m/s2", time_s, noise + missed, noise + missed, noise, noise)
     analysis = SimpleNamespace(
         compared=(force, between), between_sensors=(between,), noise_floor={"force_z": 1.0, "accelerometer_z": 1.0}
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotorid.mismatch.posterior.problem import Prior
-from rotorid.mismatch.posterior.values import GAINS, Gain, called_wrong, in_place, options_of, same_ratio
+from rotorid.mismatch.posterior.values import GAINS, LogGain, called_wrong, in_place, options_of, same_ratio
 
 TRUST = {
     "mass": 0.02,
@@ -23,7 +23,7 @@ LEAST_NATS = float(np.log(99.0))
 def options(logs, sd=0.01, trust=TRUST):
     """Of gains that a flight shows each to `sd`."""
     sds = np.broadcast_to(sd, len(logs))
-    gains = {key: Gain(log, float(s) ** 2) for key, log, s in zip(GAINS, logs, sds, strict=True)}
+    gains = {key: LogGain(log, float(s) ** 2) for key, log, s in zip(GAINS, logs, sds, strict=True)}
     return options_of(gains, trust, Prior())
 
 
@@ -75,9 +75,9 @@ def test_a_refused_value_leaves_room_for_the_other_of_its_ratio():
 
 def test_without_gains_or_values_nothing_is_wrong():
     assert called_wrong(options_of({}, TRUST, Prior()), LEAST_NATS) == frozenset()
-    assert called_wrong(options_of({"mass": Gain(-0.2, 1e-4)}, {}, Prior()), LEAST_NATS) == frozenset()
+    assert called_wrong(options_of({"mass": LogGain(-0.2, 1e-4)}, {}, Prior()), LEAST_NATS) == frozenset()
 
 
 def test_gains_that_are_not_known_say_nothing():
-    only_thrust = options_of({"mass": Gain(-0.2, 1e-4)}, TRUST, Prior())
+    only_thrust = options_of({"mass": LogGain(-0.2, 1e-4)}, TRUST, Prior())
     assert called_wrong(only_thrust, LEAST_NATS) in ({"mass"}, {"thrust"})

@@ -115,9 +115,9 @@ def header(names, encodings_i, predictors_i, encodings_p=None, predictors_p=None
     return "".join(f"H {line}\n" for line in lines).encode()
 
 
-def only(data: bytes) -> format_.Session:
+def only(data: bytes) -> format_.BlackboxSession:
     (session,) = format_.sessions(data)
-    assert isinstance(session, format_.Session), session
+    assert isinstance(session, format_.BlackboxSession), session
     return session
 
 
