@@ -1,14 +1,12 @@
-"""Centre of mass away from where the user believes it.
-
-Forces of what is fixed to the airframe.
-"""
+"""Centre of mass away from where the user believes it."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from rotorid.effects.contract import Contribution, Effect, Form, Motion, Parameter
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.loading import NO_ROTORS, weight
+from rotorid.effects.rigid_body import force_of_lever
 
 
 def _moment_only(motion, vehicle, values):
@@ -159,13 +157,3 @@ EFFECT = Effect(
         else "no mass is stated or no moment is read"
     ),
 )
-
-
-def force_of_lever(motion: Motion, first_moment_kg_m: np.ndarray) -> np.ndarray:
-    """−(dΩ/dt × l + Ω × (Ω × l)), (n, 3), N, body axes: what turning adds to the force that moves a mass at a lever.
-
-    l is its first moment (3,), kg m. Source: Titterton and Weston, Strapdown Inertial Navigation Technology, ch. 4.
-    """
-    rate = motion.angular_velocity
-    turning = np.cross(motion.angular_acceleration, first_moment_kg_m)
-    return -turning - np.cross(rate, np.cross(rate, first_moment_kg_m))

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from rotorid.effects.com_offset import force_of_lever
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.pendulum import cable_pull, likely_lengths
+from rotorid.effects.rigid_body import force_of_lever
 from rotorid.effects.scale import scale
 
 _LENGTHS_M = (0.15, 6.0)

@@ -6,8 +6,6 @@ the one value is sought that brings all of them inside, and the unit in which th
 
 Sources: momentum theory (figure of merit at most 1), tip speed below Mach 0.9, and the range of the vehicles in
 `templates` and `workflow/vehicles` with a margin of about a factor of three in each value.
-
-What `check` finds doubtful in a recording set, for a person to read and for a verdict to decide by.
 """
 
 from __future__ import annotations
@@ -18,6 +16,7 @@ from math import isclose, isfinite, pi, sqrt
 
 import numpy as np
 
+from rotorid.recordings.doubts import Doubt
 from rotorid.recordings.vehicle import Vehicle
 
 _AIR_KG_M3 = 1.2
@@ -365,19 +364,3 @@ def _doubt(body: Body, best: _Remedy, raised_by: Sequence[CoupledNumber], others
     if key == "rotors" and isclose(value, _PX4_UNSET_ARM_M):
         sentence += "; PX4 logs x and y of 1 m where its geometry was never set"
     return Doubt(name(key), sentence, stops=any(q.stops for q in raised_by))
-
-
-@dataclass(frozen=True)
-class Doubt:
-    """One thing in a set that is probably not as stated."""
-
-    what: str
-    """Key of vehicle.yaml (`mass_kg`), column (`angular_velocity_x_rad_s`), file or run that is in doubt."""
-    sentence: str
-    """What was found, what was expected and, where one is known, what would explain it."""
-    stops: bool
-    """Whether a verdict would be about this mistake: a unit, an axis, an order, or mass or inertia by more than a
-    factor of two."""
-
-    def __str__(self) -> str:
-        return self.sentence

@@ -30,9 +30,10 @@ from scipy.signal import fftconvolve
 
 from rotorid.io.text.names import listed
 from rotorid.recordings import columns as c
-from rotorid.recordings.body import Doubt
+from rotorid.recordings.doubts import Doubt
 from rotorid.recordings.files import RUN_SUFFIXES, read_set, run_name
 from rotorid.recordings.held import (
+    OTHERS_GO_ON,
     SHORTEST_FREEZE_PERIODS,
     SHORTEST_FREEZE_S,
     SHORTEST_GAP_PERIODS,
@@ -50,8 +51,6 @@ from rotorid.recordings.vehicle import Vehicle
 
 _STILL_S = 1.0
 """A sensor of a flight that repeats one reading for so long is named."""
-_GO_ON = 0.5
-"""Share of the readings in which the other rotors' columns change while one stands still."""
 _TABLES = ("csv", "tsv", "parquet", "feather", "xlsx", "xls", "ods", "h5", "hdf5", "mat", "npz")
 LOGS = ("ulg", "bin", "bbl", "bfl", "mcap", "db3", "bag", "tlog")
 _PACKED = ("zip", "gz", "bz2", "xz", "zst", "7z", "tar", "tgz")
@@ -450,7 +449,7 @@ def _alone(run: Run, vehicle: Vehicle, name: str, names: tuple[str, ...], noisy:
     out = []
     for mask, _ in _held(run, vehicle, (name,), noisy):
         read = [v[mask][np.isfinite(v[mask])] for v in others]
-        go_on = [len(v) > 1 and float((np.diff(v) != 0).mean()) > _GO_ON for v in read]
+        go_on = [len(v) > 1 and float((np.diff(v) != 0).mean()) > OTHERS_GO_ON for v in read]
         if go_on and all(go_on) and not at_the_end(run.column(name), mask):
             out.append(mask)
     return out

@@ -30,7 +30,7 @@ from rotorid.io.text.names import hint, listed, neighbour
 from rotorid.io.text.wording import explain, printable
 from rotorid.io.text.writing import all_or_none, staging, take_name
 from rotorid.recordings import columns as c
-from rotorid.recordings.body import Doubt
+from rotorid.recordings.doubts import Doubt
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.tables import (
     UnusableRun,

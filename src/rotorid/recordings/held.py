@@ -11,6 +11,8 @@ from rotorid.recordings.run import Run
 from rotorid.recordings.sufficient import driven_by
 from rotorid.recordings.vehicle import Vehicle
 
+OTHERS_GO_ON = 0.5
+"""Share of the readings in which every other rotor's column changes while one stands still."""
 SHORTEST_GAP_S = 0.3
 """A held stretch counts from this length on; two that are closer are one."""
 SHORTEST_GAP_PERIODS = 12

@@ -17,7 +17,8 @@ from scipy.spatial.transform import Rotation
 
 from rotorid.io.text.names import listed
 from rotorid.recordings import columns as c
-from rotorid.recordings.body import Body, Doubt, RotorsInAir, body_of, impossible, quantities
+from rotorid.recordings.body import Body, RotorsInAir, body_of, impossible, quantities
+from rotorid.recordings.doubts import Doubt
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.vehicle import Vehicle
 

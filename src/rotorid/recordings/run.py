@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.recordings import columns as c
-from rotorid.recordings.body import Doubt
+from rotorid.recordings.doubts import Doubt
 from rotorid.recordings.vehicle import Vehicle
 
 

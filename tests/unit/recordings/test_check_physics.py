@@ -9,8 +9,8 @@ import pytest
 from rotorid.cli.simulating import fly
 from rotorid.recordings import RecordingSet, Run, read_set, templates
 from rotorid.recordings import columns as c
-from rotorid.recordings.body import Doubt
 from rotorid.recordings.check import doubts_of
+from rotorid.recordings.doubts import Doubt
 from rotorid.recordings.physics import near_names
 
 RPM = 60 / (2 * np.pi)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.identify.stand.wrench import mean_and_error
 from rotorid.recordings.signal import filters
+from rotorid.recordings.signal.average import mean_and_error
 
 
 def test_first_order_by_hand() -> None:

@@ -11,8 +11,8 @@ import pandas as pd
 from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
-from rotorid.identify.stand.wrench import mean_and_error
 from rotorid.io.tables import by_recording
+from rotorid.recordings.signal.average import mean_and_error
 
 REST_S = 1.0
 """Length of the stretches at the beginning and the end that are taken as rest."""

@@ -25,7 +25,7 @@ from scipy.optimize import brentq
 from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
-from rotorid.recordings.importers.rcbenchmark import lost_speed
+from rotorid.recordings.lost_speeds import lost_speed
 
 
 @dataclass(frozen=True)

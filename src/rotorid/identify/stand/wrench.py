@@ -2,8 +2,6 @@
 
 The sensor stays level and the vehicle is tilted on it, so the weight pulls along the sensor's z whatever the tilt;
 what turns with the vehicle is the arm from the sensor to the centre of mass, and with it the weight's moment.
-
-Mean of a steady stretch and how well it is known when neighbouring samples are not independent.
 """
 
 from __future__ import annotations
@@ -19,6 +17,7 @@ from rotorid.errors import InputError
 from rotorid.identify.stand import plateaus
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import Run
+from rotorid.recordings.signal.average import block_count, mean_and_error
 
 WRENCH = (*c.FORCE, *c.MOMENT)
 _SETTLE_S = 0.5
@@ -262,24 +261,3 @@ def weight_as_dict(found: _Weight, mass_kg: float, centre_m: np.ndarray, experim
         "steady_rms_off_model": dict(zip(WRENCH, np.sqrt((off**2).mean(axis=1)).tolist(), strict=True)),
         "steady_half_width_95": dict(zip(WRENCH, half.mean(axis=1).tolist(), strict=True)),
     }
-
-
-def mean_and_error(values: np.ndarray, blocks: int | None = None) -> tuple[float, float]:
-    """Mean and its standard error, from the means of consecutive blocks, about √n of them by default.
-
-    Means of blocks are nearly independent where single samples are not: noise that is slow, drift and ringing
-    widen the error as they should. Of a periodic signal a block is one period. Fewer than 16 samples are taken
-    one by one.
-    """
-    values = np.asarray(values, float)
-    values = values[np.isfinite(values)]
-    if len(values) < 2:
-        return (float(values.mean()) if len(values) else float("nan")), float("nan")
-    count = blocks or block_count(len(values))
-    means = np.array([block.mean() for block in np.array_split(values, count)])
-    return float(values.mean()), float(means.std(ddof=1) / np.sqrt(count)) if count > 1 else float("nan")
-
-
-def block_count(samples: int) -> int:
-    """Into how many blocks so many samples are divided."""
-    return samples if samples < 16 else int(samples**0.5)

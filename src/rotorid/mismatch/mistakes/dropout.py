@@ -13,6 +13,7 @@ from rotorid.mismatch.plant.split import parts_of, split_runs
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
 from rotorid.recordings.held import (
+    OTHERS_GO_ON,
     SHORTEST_FREEZE_PERIODS,
     SHORTEST_FREEZE_S,
     SHORTEST_GAP_PERIODS,
@@ -49,8 +50,6 @@ _PLAIN_CHANGE = 8.0
 """Times the noise by which a reading should have changed to be called held."""
 _PLAIN_STEPS = 2.0
 """The same in steps of a coarse reading, which stands still until the load has changed by one."""
-_OTHERS_GO_ON = 0.5
-"""Share of the samples in which every other rotor's command changes while one stands still."""
 
 
 @dataclass(frozen=True)
@@ -221,7 +220,7 @@ def _standing_commands(run: Run, vehicle: Vehicle, names: list[str], noisy: set[
         against = contradiction(run, vehicle, [name])
         for mask, p in held(run.time_s, own[:, None], noisy=name in noisy, contradicted=against):
             others = np.delete(moves[mask], k, axis=1).mean(axis=0)
-            if not at_the_end(own, mask) and others.min() > _OTHERS_GO_ON:
+            if not at_the_end(own, mask) and others.min() > OTHERS_GO_ON:
                 found += _as_dropouts(run, name, "held", mask, p)
     return found
 

@@ -23,7 +23,7 @@ from rotorid.mismatch.model.delivered import Values
 from rotorid.mismatch.model.gains import wrong_values_of
 from rotorid.mismatch.model.gusts import with_gusts
 from rotorid.mismatch.model.payload_windows import Windows, changes, loads, payload_windows_of, with_payload_on_board
-from rotorid.mismatch.model.prepare import Prepared, assemble_rows
+from rotorid.mismatch.model.prepare import Prepared
 from rotorid.mismatch.model.swinging import (
     as_effect,
     cable_of,
@@ -39,18 +39,16 @@ from rotorid.mismatch.model.within_trust import beyond_trust
 from rotorid.mismatch.model.wrench import (
     WrenchModel,
     after_residual,
-    block_seconds,
     chosen,
     path_segments,
     refine_nonlinear,
+    regression_of,
     speed_path,
     with_wind,
     wrench_model,
 )
-from rotorid.mismatch.plant.regression import build
 from rotorid.mismatch.plant.rows import RUN_SCALE, Term
 from rotorid.mismatch.plant.speedpath import CommandChain, SpeedResult
-from rotorid.mismatch.plant.split import training_rule
 from rotorid.recordings.signal.kernels import causal
 
 TAKEN_UP = "the curve between throttle and rotor speed takes it up"
@@ -270,9 +268,7 @@ def _asks_for_a_swing(prepared: Prepared, model: WrenchModel, term: Term, segmen
     if any(t.form.swings for t in active):
         return True
     asked = [*(t for t in model.terms if t.kind != "effect"), *active, term]
-    rows, rate = assemble_rows(prepared, asked, segments, effects), prepared.thinner.rate_hz
-    rule, block_s = training_rule(prepared.split, segments), block_seconds(rows, rate)
-    regression = build(rows, asked, model.regression.filters, rule, block_s, rate)
+    regression = regression_of(prepared, asked, effects, segments, model.regression.filters)
     keys = [t.key for t in asked]
     gain = regression.explained(keys) - regression.explained(keys[:-1])
     return gain > _ASKING * price(segments)

@@ -620,7 +620,7 @@ def _with_felt_wind(prepared: Prepared, model: WrenchModel, segments, noisy) -> 
         return model
     always = [t for t in model.terms if t.kind != "effect"]
     asked = [*always, *[model.search.terms[k] for k in active], _wind_term()]
-    regression = _wind_regression(prepared, asked, forms, np.zeros(2), segments, model_filters(model))
+    regression = regression_of(prepared, asked, forms, in_wind(segments, np.zeros(2)), model_filters(model))
     keys = [t.key for t in asked]
     seen = regression.compare(keys, keys[:-1])
     if seen.promised.sum() <= LEAST_PROMISE or seen.transfer < LEAST_TRANSFER:
@@ -669,9 +669,9 @@ def _blown_by(prepared: Prepared, model: WrenchModel, segments, noisy, terms: li
     return again
 
 
-def _wind_regression(prepared: Prepared, terms: list[Term], effects, wind: np.ndarray, segments, filters) -> Regression:
-    """The regression of terms in a steady wind (north, east), m/s; `effects` are the forms that it acts through."""
-    rows, rate = assemble_rows(prepared, terms, in_wind(segments, wind), effects), prepared.thinner.rate_hz
+def regression_of(prepared: Prepared, terms: list[Term], effects, segments, filters) -> Regression:
+    """The regression of these terms alone, whitened as a model's was; `effects` are the forms at work."""
+    rows, rate = assemble_rows(prepared, terms, segments, effects), prepared.thinner.rate_hz
     return build(rows, terms, filters, training_rule(prepared.split, segments), block_seconds(rows, rate), rate)
 
 
@@ -683,7 +683,7 @@ def _fitted_wind(prepared: Prepared, terms: list[Term], effects, wind: np.ndarra
     """
     own = terms[-1 - len(effects) : -1]
     for _ in range(4):
-        regression = _wind_regression(prepared, terms, effects, wind, segments, filters)
+        regression = regression_of(prepared, terms, effects, in_wind(segments, wind), filters)
         fit = regression.fit([t.key for t in terms], jackknife=True)
         step = fit.beta[-2:]
         wind = wind + np.clip(step, -3.0, 3.0)

@@ -4,8 +4,6 @@ Files come as UTF-8 with a byte-order mark, UTF-8 without or latin-1, with LF, C
 writes each quantity in the unit that its user has chosen and names it in the heading: "Thrust (kgf)".
 "Motor Electrical Speed" holds mechanical revolutions (the program divided by the pole pairs already: it gives a
 plausible thrust coefficient). The 1520 has no torque.
-
-Points of a rotor test whose speed sensor lost pulses, found by their thrust.
 """
 
 from __future__ import annotations
@@ -21,14 +19,9 @@ from rotorid.recordings import columns as c
 from rotorid.recordings.importers.clean import drop_repeated_times
 from rotorid.recordings.importers.report import ImportFault
 from rotorid.recordings.importers.units import UNITS, bracketed, converted, unit_of
+from rotorid.recordings.lost_speeds import lost_speed
 from rotorid.recordings.vehicle import Vehicle
 
-_TOO_SLOW = 1.35
-"""A point whose F/ω² exceeds the run's median by this factor has lost part of its speed pulses.
-
-An offset of the balance or a curve that bends makes the low points' F/ω² smaller, not larger, in these data,
-so the rule is one-sided: it must not remove what the offset explains.
-"""
 _ESC_LOW_US, _ESC_HIGH_US = 1000.0, 2000.0
 HEADINGS: dict[str, tuple[str, str, str]] = {
     "Time": ("time", "time", "s"),
@@ -218,12 +211,3 @@ def read_rcbenchmark(path: Path) -> tuple[pd.DataFrame, list[ImportFault]]:
     raw, more = _read_table(text, str(path))
     table, converted_ = convert(raw)
     return table, [*faults, *more, *converted_]
-
-
-def lost_speed(speed_rad_s: np.ndarray, thrust_n: np.ndarray) -> np.ndarray:
-    """Points that turn but whose speed is too low for their thrust, shape (n,), bool."""
-    turning = speed_rad_s > 0
-    if not turning.any():
-        return turning
-    ratio = np.where(turning, thrust_n, 0.0) / np.where(turning, speed_rad_s, 1.0) ** 2
-    return turning & (ratio > _TOO_SLOW * np.median(ratio[turning]))
