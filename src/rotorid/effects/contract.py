@@ -24,7 +24,7 @@ from rotorid.recordings.run import RecordingSet
 from rotorid.recordings.vehicle import Vehicle
 
 if TYPE_CHECKING:
-    from rotorid.effects.loading import KnownInstrument
+    from rotorid.effects.loading import InstrumentFacts
 
 
 @dataclass(frozen=True)
@@ -370,7 +370,7 @@ class Effect:
     """Whether the search fits it; else it is found in the recordings themselves."""
     like_of_reading: tuple[str, ...] = ()
     """Ids of an instrument's effects that do to its reading what the speed forms do to a speed nobody measured."""
-    lack_on: Callable[[KnownInstrument], str] | None = None
+    lack_on: Callable[[InstrumentFacts], str] | None = None
     """Why an instrument (`rotorid.effects.loading`) gives nothing to test it on, where it has no form there."""
 
     def excitation(self, form: Form) -> tuple[str, ...]:

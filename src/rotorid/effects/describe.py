@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from rotorid.effects.advice import advice
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import COLUMNS_OF, Effect, Form, Parameter, SetForm, SpeedForm
-from rotorid.effects.loading import AXES, KnownInstrument, forms_of
+from rotorid.effects.loading import AXES, InstrumentFacts, forms_of
 from rotorid.recordings.vehicle import Vehicle
 
 EXAMPLE = Vehicle(
@@ -33,7 +33,7 @@ EXAMPLE = Vehicle(
 """The thesis's quadrotor: forms depend on the number of rotors, bounds on the vehicle's size."""
 
 _ALL_CHANNELS = tuple(range(len(AXES)))
-EXAMPLE_STAND = KnownInstrument(
+EXAMPLE_STAND = InstrumentFacts(
     vehicle=EXAMPLE.model_copy(update={"kind": "stand", "tared": False, "sensor_mount": "level"}),
     channels=_ALL_CHANNELS,
     loaded=_ALL_CHANNELS,

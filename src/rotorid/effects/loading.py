@@ -25,7 +25,7 @@ REST_S = 3.0
 
 
 @dataclass(frozen=True)
-class KnownInstrument:
+class InstrumentFacts:
     """What is known of an instrument and its set before any number is fitted."""
 
     vehicle: Vehicle
@@ -216,7 +216,7 @@ def cross_channels(pairs: tuple[tuple[int, int], ...], signal: Callable[[Loading
     return contribution
 
 
-def forms_of(effect: Effect, instrument: KnownInstrument) -> tuple[Form, ...]:
+def forms_of(effect: Effect, instrument: InstrumentFacts) -> tuple[Form, ...]:
     """Forms of an effect on an instrument; those for a flight hold on a stand, not on a bench."""
     if effect.reading_forms is not None:
         return tuple(replace(form, on_loading=True) for form in effect.reading_forms(instrument))

@@ -17,7 +17,7 @@ import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form
-from rotorid.effects.loading import KnownInstrument, Loading
+from rotorid.effects.loading import InstrumentFacts, Loading
 from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.posterior.statements import LIKELY, SURE, Statement, share_of, statements_of, weights_of
 from rotorid.mismatch.posterior.status import CLAIMED, Estimate, Status
@@ -216,7 +216,7 @@ class Analysis:
     force_source: str = "accelerometer"
     samples_per_row: int = 1
     """How many samples a row of a stand's or bench's traces is the mean of."""
-    instrument: KnownInstrument | None = None
+    instrument: InstrumentFacts | None = None
     """Kinds `stand` and `bench`: what is known of the instrument."""
     loadings: tuple[Loading, ...] = ()
     """Kinds `stand` and `bench`: loads and readings as analysed, rotor speeds as the improved model has them."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form
-from rotorid.effects.loading import CHANNELS, KnownInstrument, Loading, forms_of
+from rotorid.effects.loading import CHANNELS, InstrumentFacts, Loading, forms_of
 from rotorid.errors import InputError
 from rotorid.mismatch.decision.findings import Analysis
 from rotorid.mismatch.delivery.files import Instruments, instruments_of
@@ -193,7 +193,7 @@ def _features(z: np.ndarray) -> np.ndarray:
     return np.concatenate([np.ones((len(z), 1)), z, z[:, i] * z[:, j]], axis=1)
 
 
-def entries(vehicle: Vehicle, instrument: KnownInstrument) -> tuple[list[tuple[Form, np.ndarray]], bool]:
+def entries(vehicle: Vehicle, instrument: InstrumentFacts) -> tuple[list[tuple[Form, np.ndarray]], bool]:
     """Forms that act on load or reading with their values, and whether any acts between command and speed."""
     found, chain = [], False
     for number, entry in enumerate(vehicle.effects, 1):
@@ -221,7 +221,7 @@ def entries(vehicle: Vehicle, instrument: KnownInstrument) -> tuple[list[tuple[F
 
 def predicted(
     vehicle: Vehicle,
-    instrument: KnownInstrument,
+    instrument: InstrumentFacts,
     loading: Loading,
     full_voltage: float | None = None,
     errors: Instruments | None = None,

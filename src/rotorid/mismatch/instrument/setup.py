@@ -14,7 +14,7 @@ import numpy as np
 
 from rotorid.effects.contract import Motion
 from rotorid.effects.hysteresis import NARROW, play
-from rotorid.effects.loading import CHANNELS, REST_S, KnownInstrument, Loading, at_sensor, rotation_of, weight
+from rotorid.effects.loading import CHANNELS, REST_S, InstrumentFacts, Loading, at_sensor, rotation_of, weight
 from rotorid.errors import InputError
 from rotorid.mismatch.instrument.settling import settling_s, without_settling
 from rotorid.mismatch.instrument.tachometer import noise_of, quieter, without_noise
@@ -83,7 +83,7 @@ class PreparedInstrument:
     recordings: RecordingSet
     vehicle: Vehicle
     split: Split
-    instrument: KnownInstrument
+    instrument: InstrumentFacts
     loadings: tuple[Loading, ...]
     average: int
     """Samples that one row of the analysis is the mean of."""
@@ -497,7 +497,7 @@ def _distance_column(recordings: RecordingSet) -> str:
     return ""
 
 
-def _instrument_of(recordings: RecordingSet, how: _Preparation, loadings: Sequence[Loading]) -> KnownInstrument:
+def _instrument_of(recordings: RecordingSet, how: _Preparation, loadings: Sequence[Loading]) -> InstrumentFacts:
     """What the forms of effects need to know beforehand."""
     channels, session = how.channels, how.session
     load = np.concatenate([x.load for x in loadings])
@@ -515,7 +515,7 @@ def _instrument_of(recordings: RecordingSet, how: _Preparation, loadings: Sequen
     attitudes = [np.concatenate([x.attitude[i] for x in loadings]) for i in (0, 1)] if loadings[0].attitude else []
     known = [x.temperature_c for x in loadings if x.temperature_c is not None]
     warmth = np.concatenate(known) if len(known) == len(loadings) else np.zeros(1)
-    return KnownInstrument(
+    return InstrumentFacts(
         vehicle=how.vehicle,
         channels=channels,
         loaded=tuple(loaded),

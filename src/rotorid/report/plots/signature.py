@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from rotorid.effects.contract import Contribution, Effect, Form, Motion, SetForm, SpeedForm, SpeedPath
 from rotorid.effects.describe import EXAMPLE, EXAMPLE_BENCH, EXAMPLE_STAND
-from rotorid.effects.loading import CHANNELS, UNITS, KnownInstrument, Loading, forms_of
+from rotorid.effects.loading import CHANNELS, UNITS, InstrumentFacts, Loading, forms_of
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.vehicle import Rotor
@@ -272,7 +272,7 @@ def _of_fault(form: SetForm) -> Signature | None:
     return Signature(form.name, form.equation, values, "time (s)", name, time_s[inside], wrong[inside], sure[inside])
 
 
-def loading(instrument: KnownInstrument) -> Loading:
+def loading(instrument: InstrumentFacts) -> Loading:
     """The made-up test on a stand or bench: loads up and down in every channel, a tilting mount, a warming sensor."""
     time_s = instants()
     triangles = [2 * np.abs(2 * ((time_s / p) % 1) - 1) - 1 for p in (9.0, 7.0, 5.0, 6.1, 4.3, 3.7)]
@@ -307,7 +307,7 @@ def loading(instrument: KnownInstrument) -> Loading:
     )
 
 
-def of_reading(effect: Effect, form: Form, instrument: KnownInstrument) -> Signature | None:
+def of_reading(effect: Effect, form: Form, instrument: InstrumentFacts) -> Signature | None:
     """A form of a stand or bench: the reading's error over what explains it best."""
     test, values = loading(instrument), _typical(form)
     contribution = form.contribution(test if form.on_loading else test.motion, instrument.vehicle, values)

@@ -10,7 +10,7 @@ from scipy.signal import bessel, sosfilt
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Motion
 from rotorid.effects.hysteresis import settling
-from rotorid.effects.loading import KnownInstrument, Loading, forms_of
+from rotorid.effects.loading import InstrumentFacts, Loading, forms_of
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.instrument.columns import make_terms
 from rotorid.mismatch.instrument.model import kept_values, reading_model
@@ -23,7 +23,7 @@ RATE_HZ = 50.0
 BENCH = Vehicle.model_validate({"name": "bench", "kind": "bench", "tared": True})
 
 
-def instrument(**changes) -> KnownInstrument:
+def instrument(**changes) -> InstrumentFacts:
     given = dict(
         vehicle=BENCH,
         channels=(0, 1, 2),
@@ -40,7 +40,7 @@ def instrument(**changes) -> KnownInstrument:
         session_s=100.0,
         session_clock=True,
     )
-    return KnownInstrument(**given | changes)
+    return InstrumentFacts(**given | changes)
 
 
 def loading(force_z: np.ndarray, run: str = "a", start_s: float = 0.0, temperature_c: float = 20.0) -> Loading:

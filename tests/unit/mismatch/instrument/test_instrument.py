@@ -8,7 +8,7 @@ import pytest
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Motion
-from rotorid.effects.loading import KnownInstrument, Loading, at_sensor, forms_of, rotation_of, weight
+from rotorid.effects.loading import InstrumentFacts, Loading, at_sensor, forms_of, rotation_of, weight
 from rotorid.errors import InputError
 from rotorid.mismatch.delivery.files import read_instruments
 from rotorid.mismatch.instrument.analyse import analyse_instrument
@@ -81,11 +81,11 @@ def stand_loading(vehicle: Vehicle, seconds: float = 30.0, tilt=(0.2, -0.1), see
     )
 
 
-def instrument_for(loading: Loading, vehicle: Vehicle) -> KnownInstrument:
+def instrument_for(loading: Loading, vehicle: Vehicle) -> InstrumentFacts:
     largest = tuple(np.abs(loading.load - loading.rest).max(axis=0))
     every = (0, 1, 2, 3, 4, 5)
     span = float(loading.time_s[-1])
-    return KnownInstrument(
+    return InstrumentFacts(
         vehicle=vehicle,
         channels=every,
         loaded=every,
