@@ -47,8 +47,8 @@ from rotorid.mismatch.model.leave_one_out import without_each
 from rotorid.mismatch.model.leftover import leftover
 from rotorid.mismatch.model.next_flight import next_flight
 from rotorid.mismatch.model.payload_windows import loads, on_board
-from rotorid.mismatch.model.prepare import Prepared, prepare
-from rotorid.mismatch.model.report_runs import on_every_run, scaled_by_run
+from rotorid.mismatch.model.prepare import Prepared, prepare, prepare_like
+from rotorid.mismatch.model.report_runs import comparable, on_every_run, scaled_by_run
 from rotorid.mismatch.model.values import (
     changed_vehicle,
     contract_values,
@@ -109,6 +109,8 @@ def _analysed(recordings: RecordingSet, mistakes, remarks, watch: Watch) -> Anal
     split = split_runs(recordings)
     known, unseen = parts_of(recordings, split)
     prepared = prepare(known, unseen=tuple(r.name for r in unseen.runs))
+    if not any(comparable(s, prepared.segments[0]) for s in prepare_like(prepared, unseen)[0]):
+        return None
     found = fitted(prepared)
     model, values = found.model, found.values
 
@@ -136,8 +138,6 @@ def _analysed(recordings: RecordingSet, mistakes, remarks, watch: Watch) -> Anal
     stated = {**contract_values(prepared.vehicle, to_state), **scale}
     watch(Decided(found, tuple(outside), tuple(findings), stated))
     seen = on_every_run(found, recordings, split, unseen)
-    if len(seen.rows) == len(model.rows):
-        return None
     choice = replace(choice, findings=_with_windows(findings, seen))
     plain = values_alone(model)
     plain_fit, plain_moved = settled(model, plain, ())

@@ -84,6 +84,23 @@ def test_a_band_of_signal_and_the_noise_of_what_is_there_remain() -> None:
     assert np.sqrt(2) < gain < 1.8  # half the readings have twice the density, their uneven steps cost the rest
 
 
+def test_commands_that_jitter_faster_than_the_grid_are_averaged_not_sampled() -> None:
+    """A throttle at 1 kHz, packets lost several at a time, brought to 50 Hz: its jitter was folded into the band."""
+    rng = np.random.default_rng(4)
+    time_s = np.arange(20000) / 1000
+    slow = 0.5 + 0.1 * np.sin(2 * np.pi * 2 * time_s)
+    names = c.rotor_columns("throttle", 4)
+    jitter = 0.05 * rng.standard_normal((len(time_s), 4))
+    lost = np.repeat(rng.random(len(time_s) // 4) < 0.1, 4)
+    table = dict(zip(names, np.where(lost, np.nan, (slow[:, None] + jitter).T), strict=True))
+    run = Run("run", pd.DataFrame({c.TIME: time_s} | table))
+    values = evenly(run, names, 0.02, jumps=True)
+    rows = np.isfinite(values).all(axis=1)
+    off = values[rows] - slow[rows, None]
+    assert np.std(off) < 0.05 / np.sqrt(3)  # five readings of a jitter of 0.05 are averaged, less where some are lost
+    assert abs(np.mean(off)) < 0.001 and noise_gain(run, names, 0.02, jumps=True) < 1.3
+
+
 def test_a_hole_of_several_periods_stays_one_and_what_is_even_stays_as_it_is(flown: RecordingSet) -> None:
     holed = with_holes(flown, 0.4, False)
     table = holed.runs[0].table.copy()

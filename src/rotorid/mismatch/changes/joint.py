@@ -456,7 +456,7 @@ def _against_own(rows: list[Rows], model: WrenchModel, segments: list[Segment], 
 def _recorded_stretches(found: Fitted, recordings: RecordingSet) -> tuple[list[Segment], list[Segment]]:
     """Stretches of a set with all that the first set's model needs: as recorded, and with noise added once more."""
     both = prepare_like(replace(found.prepared, vehicle=recordings.vehicle), recordings)
-    as_it_is, noisy = ([s for s in own if comparable(s, found.model)] for own in both)
+    as_it_is, noisy = ([s for s in own if comparable(s, found.model.segments[0])] for own in both)
     return as_it_is, noisy
 
 

@@ -280,7 +280,9 @@ def with_probabilities(findings: Iterable[Finding], found: Found) -> list[Findin
         probability = min(1.0, share_of(found, weights, members(one)))
         return _with_probability(one, probability, stated.get(one.id))
 
-    return [weighed(one) for one in findings]
+    out = [weighed(one) for one in findings]
+    rivals = set().union(*(one.alternatives for one in out if one.status in CLAIMED))
+    return [one for one in out if one.status != "not_established" or one.id not in rivals]
 
 
 def members(finding: Finding) -> set[str]:

@@ -46,7 +46,7 @@ def on_every_run(found: Fitted, recordings: RecordingSet, split: Split, unseen: 
     prepared = model.prepared
     own, noisy = prepare_like(prepared, unseen)
     # Columns that the fitted runs' sensors do not have are not in the model; a run without theirs cannot be compared.
-    pairs = [(s, n) for s, n in zip(own, noisy or own, strict=True) if comparable(s, model)]
+    pairs = [(s, n) for s, n in zip(own, noisy or own, strict=True) if comparable(s, model.segments[0])]
     own = as_flown([s for s, _ in pairs], found)
     noisy = as_flown([n for _, n in pairs], found) if noisy else []
     if model.segments and model.segments[0].motion.on_board is not None:
@@ -80,14 +80,11 @@ def on_every_run(found: Fitted, recordings: RecordingSet, split: Split, unseen: 
     )
 
 
-def comparable(segment: Segment, model: WrenchModel) -> bool:
-    """Whether a stretch has every quantity that the model's rows are made of."""
-    known = model.segments[0].motion
-    first = model.segments[0]
+def comparable(segment: Segment, fitted: Segment) -> bool:
+    """Whether a stretch has every quantity that one of those fitted has: the model's rows are made of them."""
     own = ("command", "kinematic_specific_force", "kinematic_angular_velocity")
-    if any(getattr(segment, n) is None and getattr(first, n) is not None for n in own):
-        return False
-    return all(getattr(known, n) is None or getattr(segment.motion, n) is not None for n in _COMPARED)
+    pairs = [(segment, fitted, n) for n in own] + [(segment.motion, fitted.motion, n) for n in _COMPARED]
+    return all(getattr(known, n) is None or getattr(new, n) is not None for new, known, n in pairs)
 
 
 def as_flown(segments: list[Segment], found: Fitted) -> list[Segment]:

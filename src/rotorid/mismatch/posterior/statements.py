@@ -23,7 +23,7 @@ from rotorid.mismatch.posterior.status import CLAIMED, Estimate, Status
 FORM_SD = 0.02
 """Share of what effects contribute that their forms are wrong by."""
 _ROUNDS = 3
-"""Rounds in which the leftover is learnt from what the model leaves."""
+"""Rounds of learning the leftover from what the model leaves, and of looking at better models nearby."""
 Z95 = 1.959963984540054
 _CONSIDERED = 10.0
 """Nats below the best model up to which others count: together they hold less than a percent."""
@@ -79,9 +79,9 @@ def statements_of(found: Found, of_change: bool = False, form_sd: float = 0.0) -
     """
     at = scored(found.problem, found.model)
     numbers = widened(found.problem) if of_change else found.problem
-    named = [key for key in found.model if found.problem.terms[key].effect not in {"", *UNKNOWNS}]
     # Everything is visited before shares are taken over what was visited.
-    seen = [(key, _substitutes(found, key), _odds_of(found, key)) for key in named]
+    instead = _instead_of_each(found)
+    seen = [(key, instead[found.problem.terms[key].effect], _odds_of(found, key)) for key in _named(found)]
     weights = weights_of(found)
     if of_change:
         more = visited_instead(found, weights)
@@ -172,21 +172,59 @@ def _odds_of(found: Found, key: str) -> float:
     return found.log_posterior - found.posterior(without(found.model, key))
 
 
+def _named(found: Found) -> list[str]:
+    """Keys of the terms of a model that have a name."""
+    return [key for key in found.model if found.problem.terms[key].effect not in {"", *UNKNOWNS}]
+
+
+def _instead_of_each(found: Found) -> dict[str, set[str]]:
+    """To every named id of a model, and of better ones met on the way, those that could stand in its place."""
+    out: dict[str, set[str]] = {}
+    here = found
+    for _ in range(_ROUNDS):
+        for key in _named(here):
+            here.posterior(without(here.model, key))
+            out.setdefault(here.problem.terms[key].effect, set()).update(_substitutes(here, key))
+        best = max(here.posterior.visited, key=here.posterior.visited.__getitem__)
+        if here.posterior(best) <= here.log_posterior:
+            break
+        here = Found(here.posterior, best, here.posterior(best))
+    return out
+
+
 def _substitutes(found: Found, key: str) -> tuple[str, ...]:
     """Named ids with which in a term's place the model is nearly as probable."""
-    problem, rest = found.problem, without(found.model, key)
-    taken = {problem.choices[k] for k in found.model}
-    trials = [tuple(sorted((*rest, k))) for k, once in problem.effects.items() if once not in taken]
-    here = ranked(problem, found.model)
-    gains = {trial: ranked(problem, trial) - here for trial in trials}
-    out = []
-    for trial in sorted(trials, key=lambda t: -gains[t])[:_MOST_SUBSTITUTES]:
+    problem, here = found.problem, ranked(found.problem, found.model)
+    instead = _instead(problem, found.model, key)
+    gains = {trial: ranked(problem, trial) - here for trial in instead}
+    out = set()
+    for trial in sorted(instead, key=lambda t: -gains[t])[:_MOST_SUBSTITUTES]:
         if gains[trial] <= _WORST_SUBSTITUTE:
             break
         if found.posterior(trial) - found.log_posterior > -problem.prior.open_nats:
-            (other,) = set(trial) - set(rest)
-            out.append(problem.terms[other].effect)
-    return tuple(sorted(set(out) - set(UNKNOWNS)))
+            out.add(instead[trial])
+    return tuple(sorted(out - set(UNKNOWNS)))
+
+
+def _instead(problem: Problem, model: Model, key: str) -> dict[Model, str]:
+    """Models without a term, each with the id that takes its place.
+
+    That is another id; another id next to a plainer form of the term's own; or an id that is in the model anyway, in a
+    richer form: an offset of the centre of mass and unequal torques are unequal thrusts and torques.
+    """
+    rest, size = without(model, key), {k: len(problem.columns_of[k]) for k in problem.effects}
+    taken = {problem.choices[k] for k in model}
+    own = [k for k, once in problem.effects.items() if once == problem.choices[key] and k != key]
+    out: dict[Model, str] = {}
+    for k, once in problem.effects.items():
+        if once not in taken:
+            for kept in (rest, *((*rest, form) for form in own if size[form] < size[key])):
+                out[tuple(sorted((*kept, k)))] = problem.terms[k].effect
+    for other in rest:
+        for k, once in problem.effects.items():
+            if once == problem.choices[other] and k != other and size[k] >= size.get(other, 0):
+                out[tuple(sorted((*without(rest, other), k)))] = problem.terms[k].effect
+    return out
 
 
 def share_of(found: Found, weights: Mapping[Model, float], members: set[str]) -> float:

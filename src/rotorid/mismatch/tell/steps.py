@@ -63,16 +63,20 @@ def steps_sentence(verdict: Verdict) -> str:
     if whole is None or verdict.kind != "flight":
         return ""
     held = any(c.rmse.held_out.after is not None for c in verdict.channels.values())
-    claimed = list(dict.fromkeys(e.id for e in verdict.effects if e.delivered))
+    claimed = {
+        e.id: " or ".join(map(effect_words, dict.fromkeys((e.id, *e.alternatives))))
+        for e in verdict.effects
+        if e.delivered
+    }
     # Without measured rotor speeds the values are fitted with what lies between command and speed.
     measured = any(name.startswith("rotor_speed") for name in verdict.channels)
     between = [] if measured else [i for i in claimed if i in before_the_rotors()]
     rest = [i for i in claimed if i not in between]
     values = min(whole.values, 1.0)  # values alone that do not help take nothing off
     taken = [
-        (_named(["values", *map(effect_words, between)]), 1.0 - values, "take"),
+        (_named(["values", *map(claimed.get, between)]), 1.0 - values, "take"),
         (
-            _named(map(effect_words, rest)) or "named physics",
+            _named(map(claimed.get, rest)) or "named physics",
             values - whole.named,
             "takes" if len(rest) < 2 else "take",
         ),

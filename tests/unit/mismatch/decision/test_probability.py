@@ -7,9 +7,16 @@ import pytest
 from rotorid.mismatch.decision.findings import Finding, with_probabilities
 from rotorid.mismatch.posterior.score import Posterior
 from rotorid.mismatch.posterior.search import Found
-from tests.unit.mismatch.posterior.test_posterior import effect, flight, problem
+from tests.unit.mismatch.posterior.test_posterior import Flight, effect, flight, problem
 
 TERMS = (effect("rotor_drag/a"), effect("ground_effect/a"), effect("frame_drag/a"))
+
+
+def shaped(x):
+    """Columns of torques, of thrusts and torques, and of an offset that pushes as the thrusts do."""
+    own = x.copy()
+    own[..., 1] = x[..., 0] + x[..., 2]
+    return own
 
 
 def found(beta, active, alike=0.0) -> Found:
@@ -40,6 +47,27 @@ def test_a_claim_with_collinear_rivals_becomes_a_class_with_them():
     for one in (alone, as_class):
         assert one.status == "ambiguous" and one.probability > 0.99
         assert "rotor_drag" in one.alternatives and set(one.alternatives) <= set(members)
+
+
+@pytest.mark.parametrize("active", [("com_offset/a", "unequal_rotors/torque"), ("unequal_rotors/both",)])
+def test_an_id_next_to_a_plain_form_of_another_is_a_class_with_its_richer_form(active):
+    terms = (effect("unequal_rotors/torque"), effect("unequal_rotors/both"), effect("com_offset/a"))
+    made = flight([0.0, 0.0, 0.0], terms)
+    x = shaped(made.x)
+    same = Posterior(problem(Flight(x, made.y + 0.5 * x[..., 1], terms)))
+    stated = {f.id: f for f in with_probabilities(
+        claims(*(key.split("/")[0] for key in active)), Found(same, active, same(active))
+    )}  # fmt: skip
+    assert stated["unequal_rotors"].status == "established"
+    if "com_offset" in stated:
+        assert stated["com_offset"].status == "ambiguous"
+        assert stated["com_offset"].alternatives == ("com_offset", "unequal_rotors")
+
+
+def test_what_a_better_model_nearby_makes_likely_counts_though_it_was_not_chosen():
+    chosen = found([0.05, 0.0, 0.0], ["rotor_drag", "frame_drag"], alike=10.0)
+    (drag,) = [f for f in with_probabilities(claims("rotor_drag"), chosen) if f.id == "rotor_drag"]
+    assert drag.status == "ambiguous" and "ground_effect" in drag.alternatives
 
 
 @pytest.mark.parametrize(("size", "status"), [(0.15, "not_established"), (0.235, "suggested"), (0.4, "established")])
