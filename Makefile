@@ -103,5 +103,7 @@ sbom: $(READY) ## what is installed as a CycloneDX bill of materials: results/sb
 		--output-file results/sbom.json $(BIN)/python
 	@echo "The bill of materials: results/sbom.json"
 
-licences: $(READY) ## write docs/licences.md anew after the lock has changed
-	@$(BIN)/python docs/hooks/licences.py
+licences: $(READY) ## what each locked package is licensed under: results/licences.md
+	@mkdir -p results
+	@$(BIN)/python docs/hooks/licences.py > results/licences.md
+	@echo "The licences: results/licences.md"

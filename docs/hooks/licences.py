@@ -1,23 +1,20 @@
 """What each locked package is licensed under, as a page of the site, from what the packages themselves state.
 
-python docs/hooks/licences.py            # writes docs/licences.md
-python docs/hooks/licences.py --print
+python docs/hooks/licences.py            # prints it
 """
 
 from __future__ import annotations
 
 import re
-import sys
 from importlib.metadata import Distribution, PackageNotFoundError, distribution
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs" / "licences.md"
 HEAD = """# Licences of what rotorid needs
 
 rotorid is under the MIT licence. Below is every package of `requirements.lock`, with the licence that it states itself.
 The plain install needs the first table alone; the second serves the workflow, the report, the site and the checks.
-`make licences` writes this page anew; `make sbom` writes what is installed as a CycloneDX bill of materials.
+`make licences` writes this page alone; `make sbom` writes what is installed as a CycloneDX bill of materials.
 """
 WORDS = (
     ("Apache", "Apache-2.0"), ("Mozilla Public", "MPL-2.0"), ("MIT License", "MIT"), ("Redistribution and use", "BSD"),
@@ -106,7 +103,4 @@ def page() -> str:
 
 
 if __name__ == "__main__":
-    if "--print" in sys.argv:
-        print(page())
-    else:
-        PAGE.write_text(page(), encoding="utf-8")
+    print(page())

@@ -1,12 +1,14 @@
-"""Pages of the site that are not written by hand: results by the rules, commands, pictures of effects.
+"""Pages of the site that are not written by hand: results by the rules, commands, effects, the decision, licences.
 
 MkDocs calls the functions named `on_*`. Nothing here is part of an analysis.
 """
 
 from __future__ import annotations
 
+import ast
 import html
 import re
+import sys
 import tempfile
 import textwrap
 from pathlib import Path
@@ -21,11 +23,28 @@ RESULT = re.compile(r"\"(results/[^\"]+)\"")
 
 def on_files(files: Files, config) -> Files:
     """Add the pages and pictures that are made of the code, and the measurements kept next to the benchmarks."""
-    made = {"results.md": results_page(), "commands.md": commands_page()}
-    made |= {f"benchmarks/{p.name}": p.read_text(encoding="utf-8") for p in sorted((ROOT / "benchmarks").glob("*.md"))}
-    for name, text in (made | signatures()).items():
+    for name, text in (pages() | signatures()).items():
         files.append(File.generated(config, name, content=text))
     return files
+
+
+def pages() -> dict[str, str]:
+    """To the path of each page that is not in `docs/` its markdown."""
+    from rotorid.effects.describe import markdown as effects_page
+
+    sys.path.insert(0, str(Path(__file__).parent))
+    from licences import page as licences_page
+
+    made = {
+        "results.md": results_page(),
+        "commands.md": commands_page(),
+        "effects.md": effects_page(),
+        "decision-reference.md": decision_page(),
+        "licences.md": licences_page(),
+    }
+    return made | {
+        f"benchmarks/{p.name}": p.read_text(encoding="utf-8") for p in sorted((ROOT / "benchmarks").glob("*.md"))
+    }
 
 
 def on_page_markdown(markdown: str, page, config, files) -> str:
@@ -142,6 +161,66 @@ def commands_page() -> str:
             lines.append(f"| {shown} | {meaning} |")
         lines.append("")
     return "\n".join(lines)
+
+
+# The decision -------------------------------------------------------------------------------------
+
+DECISION = """# Reference of the decision
+
+This page is made of the code of `rotorid.mismatch` and lists what [how it decides](mismatch.md) leaves out; terms are
+explained there.
+
+## Rules
+
+A rule decides where the comparison of two models by their fit cannot. It can be switched off
+(`snakemake --config 'rules={"off": ["cancels"]}'`); `ledger.json` counts how often each one decided something.
+"""
+
+
+def decision_page() -> str:
+    """The page of the decision: its rules with their limits, its modules and its constants."""
+    from rotorid.mismatch import ROOMS
+    from rotorid.mismatch.decision.rules import markdown
+
+    lines = [DECISION, markdown(), "## Modules and constants", ""]
+    lines += ["Rooms in their order: each uses those above it.", ""]
+    for room in ROOMS:
+        lines += [f"### {room}", "", "| module | what it does |", "| --- | --- |"]
+        found = modules_of(room)
+        for name, tree in found.items():
+            first = ast.get_docstring(tree).split("\n\n")[0]
+            lines.append(f"| `{name}` | {cell(first)} |")
+        constants = [(name, *one) for name, tree in found.items() for one in constants_of(tree)]
+        if constants:
+            lines += ["", "| constant | value | meaning |", "| --- | --- | --- |"]
+            lines += [f"| `{name}.{constant}` | {value:g} | {cell(why)} |" for name, constant, value, why in constants]
+        lines.append("")
+    return "\n".join(lines)
+
+
+def modules_of(room: str) -> dict[str, ast.Module]:
+    """To the name of each module of a room of the mismatch stage, as below `rotorid.mismatch`, its syntax tree."""
+    home = ROOT / "src" / "rotorid" / "mismatch"
+    paths = [home / f"{room}.py"] if (home / f"{room}.py").is_file() else sorted((home / room).rglob("*.py"))
+    names = {p: ".".join(p.relative_to(home).with_suffix("").parts).removesuffix(".__init__") for p in paths}
+    return {name: ast.parse(path.read_text(encoding="utf-8")) for path, name in names.items()}
+
+
+def constants_of(tree: ast.Module) -> list[tuple[str, float, str]]:
+    """Numbers of a module that have a docstring: name, value, docstring."""
+    found = []
+    for line, after in zip(tree.body, tree.body[1:], strict=False):
+        name = line.targets[0].id if isinstance(line, ast.Assign) and isinstance(line.targets[0], ast.Name) else ""
+        value, why = (getattr(getattr(x, "value", None), "value", None) for x in (line, after))
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if name.isupper() and number and isinstance(after, ast.Expr) and isinstance(why, str):
+            found.append((name, value, why))
+    return found
+
+
+def cell(text: str) -> str:
+    """A text as a cell of a table."""
+    return " ".join(text.split()).replace("|", "\\|")
 
 
 # Effects ------------------------------------------------------------------------------------------

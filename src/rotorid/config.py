@@ -421,7 +421,7 @@ class Rules(Section):
     @classmethod
     def _known(cls, names):
         if unknown := [name for name in names if name not in RULES]:
-            raise ValueError(f"no rule is named {', '.join(unknown)}; docs/decision-reference.md lists the rules")
+            raise ValueError(f"no rule is named {', '.join(unknown)}; the rules are {', '.join(RULES)}")
         return names
 
 

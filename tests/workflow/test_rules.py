@@ -1,6 +1,5 @@
 """What every rule must have, read from the rule files; and what every chapter must."""
 
-import importlib.util
 import json
 import re
 import textwrap
@@ -10,6 +9,8 @@ import nbformat
 import papermill
 import pytest
 import yaml
+
+from tests.hooks import hook
 
 ROOT = Path(__file__).parents[2]
 FILES = [ROOT / "Snakefile", *sorted((ROOT / "workflow" / "rules").glob("*.smk"))]
@@ -29,15 +30,7 @@ def rules() -> dict[str, str]:
     return found
 
 
-def site():
-    """The hook that makes the site's pages."""
-    spec = importlib.util.spec_from_file_location("site_hook", ROOT / "docs" / "hooks" / "site.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-SITE = site()
+SITE = hook("site")
 DESCRIBED = SITE.described()
 RULES = rules()
 WORKING = {name: text for name, text in RULES.items() if "script:" in text}
@@ -94,6 +87,15 @@ def test_nothing_is_described_that_no_rule_makes_and_the_page_lists_all() -> Non
     }
     page = SITE.results_page()
     assert [entry for entry in DESCRIBED if entry not in made and f"`{entry}`" not in page] == []
+
+
+def test_every_page_of_the_site_is_kept_or_made_and_none_is_both() -> None:
+    listed = set(re.findall(r"[\w/-]+\.md", (ROOT / "mkdocs.yml").read_text().split("\nnav:")[1]))
+    kept = {str(p.relative_to(ROOT / "docs")) for p in (ROOT / "docs").rglob("*.md")}
+    made = SITE.pages()
+    assert {"commands.md", "effects.md", "decision-reference.md", "licences.md", "results.md"} <= set(made)
+    assert not kept & set(made)
+    assert kept <= listed <= kept | set(made)
 
 
 def test_every_script_belongs_to_a_rule() -> None:

@@ -11,7 +11,7 @@ import typer
 
 def effects(
     effect_id: Annotated[str | None, typer.Argument(metavar="[ID]", help="One effect in full.")] = None,
-    as_markdown: Annotated[bool, typer.Option("--markdown", help="The page docs/effects.md.")] = False,
+    as_markdown: Annotated[bool, typer.Option("--markdown", help="All in full, as a page of Markdown.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Ids with names and sentences as JSON.")] = False,
 ) -> None:
     """Print the catalogue of effects: a line each, or one with its equations, parameters, bounds and sources.

@@ -1,4 +1,4 @@
-"""The catalogue in words: a list, one effect in full, and the page `docs/effects.md`."""
+"""The catalogue in words: a list, one effect in full, and the page of all, which the site has as `effects.md`."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ KINDS = {"physics": "physics", "sensor": "sensor or logging", "mistake": "mistak
 _INTRODUCTION = """\
 # The catalogue of effects
 
-Written by `rotorid effects --markdown`; a test holds that this page is the catalogue. Symbols and axes as in the
+Made of the code (`rotorid effects --markdown` prints it). Symbols and axes as in the
 [conventions](conventions.md): body x forward, y right, z down; v velocity through the air, Ω body rates, R attitude
 (body to world), ω_i rotor speed, T_i thrust C_F ω_i², Q_i torque C_Q ω_i², r_i place of a hub, v_i = v + Ω × r_i its
 velocity. The number after "catalogue" in a source is the row of the project's list of omitted physics. Ranges are

@@ -25,7 +25,8 @@ import pandas as pd
 from rotorid.errors import InputError
 
 WIDTH = 160
-_MOST_LINES = 14
+_MOST_LINES = 3
+"""Of what a command prints so many lines are shown from either end."""
 
 
 @dataclass(frozen=True)
@@ -134,8 +135,9 @@ def page(kind: GalleryPage, outputs: Sequence[str], picture: str, following: str
     parts = [f"# {kind.title}", kind.source]
     for command, said in zip(kind.commands, outputs, strict=True):
         lines = [line[:WIDTH] + (" …" if len(line) > WIDTH else "") for line in said.splitlines()]
-        more = len(lines) - _MOST_LINES
-        shown = lines[:_MOST_LINES] + ([f"… ({more} more lines)"] if more > 0 else [])
+        more = len(lines) - 2 * _MOST_LINES
+        between = [f"… ({more} more lines)", *lines[-_MOST_LINES:]] if more > 1 else lines[_MOST_LINES:]
+        shown = lines[:_MOST_LINES] + between
         parts.append("\n".join(["```", command, "```"]))
         parts.append("\n".join(["```text", *shown, "```"]))
     if picture:

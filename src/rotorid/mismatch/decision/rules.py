@@ -203,7 +203,7 @@ MAY_BE_NOTHING = rule("may_be_nothing", "An effect without a significant paramet
 
 
 def markdown() -> str:
-    """The rules as a table, for docs/decision-reference.md."""
+    """The rules as a table, for the site's reference of the decision."""
     lines = ["| rule | decides | limits |", "| --- | --- | --- |"]
     for one in RULES.values():
         limits = "; ".join(f"`{name}` {limit.value:g}: {limit.why}" for name, limit in one.limits.items())

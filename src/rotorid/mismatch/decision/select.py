@@ -28,6 +28,7 @@ from rotorid.mismatch.plant.unknowns import UNKNOWNS
 ENTER_P = 5e-5
 """A term enters below this: about 0.5 % over some fifty terms that are not copies of each other."""
 KEEP_P = 1e-4
+"""A term stays below this."""
 COST_PER_PARAMETER = 8.0
 """Whitened squares that each further parameter must explain before a richer form is preferred."""
 SMALLEST_SIZE = rules.SIZE["least"]

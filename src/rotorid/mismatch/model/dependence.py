@@ -20,6 +20,7 @@ from rotorid.mismatch.plant.rows import CHANNELS
 from rotorid.recordings.signal.kernels import causal
 
 ALARM_P = 1e-5
+"""A residual depends on the inputs where the p-value is below this."""
 SMALLEST_SHARE_OF_NOISE = 0.3
 """A left-over dependence below this share of the noise is not worth a word."""
 BLOCK_S = 2.0

@@ -23,6 +23,7 @@ from scipy.stats import norm
 _LEAST_BLOCKS = 8
 CHANNELS_OF_WRENCH = 6
 ENVIRONMENT_S = 5.0
+"""Length of an environment, s."""
 LEAST_ENVIRONMENTS = 6
 """Fewer environments of ENVIRONMENT_S are made shorter ones, so that something is left to compare."""
 _SHORTEST_S = 1.0

@@ -27,6 +27,7 @@ from rotorid.recordings.signal.kernels import causal
 from rotorid.steps import step
 
 ENTER_P = 1e-5
+"""A form between command and speed enters below this."""
 COST_PER_PARAMETER = 10.0
 SMALLEST_SIZE = 0.15
 _LEAST_RESPONSE = 0.25
