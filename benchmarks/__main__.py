@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).parent
-SCRIPTS = ("simulator", "verdict", "selection", "importing", "networks", "fem", "mismatch")
+SCRIPTS = ("simulator", "selection", "importing", "networks", "fem", "mismatch")
 
 if __name__ == "__main__":
     for name in sys.argv[1:] or SCRIPTS:

@@ -142,6 +142,10 @@ class ChannelTrace:
     after: np.ndarray
     """Of the vehicle that is delivered, derivatives included."""
 
+    def of_model(self, model: str) -> np.ndarray:
+        """What a candidate (`Delivery.model`) leaves without derivatives, (n,)."""
+        return {"believed": self.before, "refitted": self.refitted, "named": self.named}[model]
+
 
 @dataclass(frozen=True)
 class Delivery:

@@ -175,7 +175,7 @@ def _with_taken(
     def left(trace: ChannelTrace) -> ChannelTrace:
         if trace.channel not in CHANNELS[:6]:
             return trace
-        base = {"believed": trace.before, "refitted": trace.refitted, "named": trace.named}[taken.model]
+        base = trace.of_model(taken.model)
         part = added.get((trace.run, float(trace.time_s[0])) if len(trace.time_s) else None)
         return replace(trace, after=base if part is None else base - part[:, CHANNELS.index(trace.channel)])
 

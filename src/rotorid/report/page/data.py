@@ -18,13 +18,13 @@ import numpy as np
 
 from rotorid.effects.loading import Loading
 from rotorid.errors import InputError
-from rotorid.mismatch.decision.findings import Analysis, ChannelTrace
+from rotorid.mismatch.decision.findings import Analysis, ChannelTrace, Delivery
 from rotorid.mismatch.decision.shares import fitted_part, segments_of
 from rotorid.mismatch.decision.words import FORWARD_WORDS, channel_words, regime_words
 from rotorid.mismatch.delivery.flown import Model
 from rotorid.mismatch.instrument.setup import averaged
 from rotorid.mismatch.plant.motion import HIGHEST_CUTOFF_HZ, Segment, analysis_rate_hz
-from rotorid.mismatch.plant.rows import Thinner, at_centre
+from rotorid.mismatch.plant.rows import CHANNELS, Thinner, at_centre
 from rotorid.mismatch.tell import forward
 from rotorid.mismatch.tell.locate import REGIME_BLOCK_S
 from rotorid.mismatch.tell.verdict import Verdict
@@ -33,6 +33,8 @@ from rotorid.vehicle.windows import Windows
 Pieces = list[tuple[np.ndarray, dict[str, np.ndarray]]]
 """Of each stretch of a run its instants (n,), s, and the channels' values (n,) by name."""
 _LONGEST_S = 20.0
+_FIRST_SHOWN_S = 10.0
+"""Of the run that is shown first, the stretch in which the most error was removed."""
 _FRAMES_PER_S = 25.0
 BUDGET = 800_000
 """Values that the page may hold of all traces together; 800 000 are 2.2 MB."""
@@ -69,13 +71,14 @@ def page_data(analysis: Analysis, verdict: Verdict, main: str) -> dict:
         if trace.channel in channels:
             by_pair.setdefault((trace.run, trace.channel), []).append(trace)
             read_by_pair.setdefault((trace.run, trace.channel), []).append(reading)
-    total = sum(4 * len(t.time_s) for traces in by_pair.values() for t in traces)
+    series = 5 if analysis.delivery.derivatives else 4
+    total = sum(series * len(t.time_s) for traces in by_pair.values() for t in traces)
     every = max(1, int(np.ceil(total / BUDGET)))
     runs = list(dict.fromkeys(run for run, _ in by_pair))
     largest = _largest_run(analysis, verdict, main)
     flown = replay(analysis, verdict, largest, segments)
     return {
-        "main": {"channel": main, "run": largest},
+        "main": {"channel": main, "run": largest, "shown_s": _first_shown(by_pair.get((largest, main), []))},
         "every": every,
         "channels": {
             c: {"name": channel_words(c), "unit": verdict.channels[c].unit, "noise": verdict.channels[c].noise_floor}
@@ -84,7 +87,9 @@ def page_data(analysis: Analysis, verdict: Verdict, main: str) -> dict:
         },
         "runs": {r: {"held_out": r in verdict.runs.held_out and verdict.runs.held_out != verdict.runs.training}
                  for r in runs},
-        "traces": [_series(*pair, traces, read_by_pair[pair], every) for pair, traces in by_pair.items()],
+        "traces": [
+            _series(*pair, traces, read_by_pair[pair], every, analysis.delivery) for pair, traces in by_pair.items()
+        ],
         "fit_percent": {c: [round(v, 2) for v in fit] for c, fit in fit_percent(analysis, readings).items()},
         "replay": None if flown is None else _frames(largest, flown),
         "locations": [
@@ -106,8 +111,31 @@ def _largest_run(analysis: Analysis, verdict: Verdict, main: str) -> str:
     return max(held, key=lambda t: float(np.nanmean(t.before**2) - np.nanmean(t.after**2))).run
 
 
-def _series(run: str, channel: str, traces: Sequence[ChannelTrace], readings: Sequence[np.ndarray], every: int) -> dict:
-    """One channel of one run: what was measured, and what the believed and the improved model leave of it."""
+def _first_shown(traces: Sequence[ChannelTrace]) -> list[float] | None:
+    """Start and stop, s, of the ten seconds of a run in which the most error was removed; None of a shorter run."""
+    best = None
+    for t in traces:
+        stop = np.searchsorted(t.time_s, t.time_s + _FIRST_SHOWN_S)
+        total = np.concatenate([[0.0], np.cumsum(np.nan_to_num(t.before**2 - t.after**2))])
+        removed = np.where(stop < len(t.time_s), total[np.minimum(stop, len(t.time_s))] - total[:-1], -np.inf)
+        k = int(np.argmax(removed)) if len(removed) else 0
+        if len(removed) and np.isfinite(removed[k]) and (best is None or removed[k] > best[0]):
+            best = float(removed[k]), [round(float(t.time_s[k]), 3), round(float(t.time_s[k]) + _FIRST_SHOWN_S, 3)]
+    return None if best is None else best[1]
+
+
+def _series(
+    run: str,
+    channel: str,
+    traces: Sequence[ChannelTrace],
+    readings: Sequence[np.ndarray],
+    every: int,
+    delivery: Delivery,
+) -> dict:
+    """One channel of one run: what was measured, and what the believed and the improved model leave of it.
+
+    Where derivatives are delivered, also what the same vehicle leaves without them.
+    """
 
     def joined(series: Sequence[np.ndarray]) -> np.ndarray:
         parts = []
@@ -123,6 +151,8 @@ def _series(run: str, channel: str, traces: Sequence[ChannelTrace], readings: Se
     time[holes] = (time[holes - 1] + time[holes + 1]) / 2
     out = {"run": run, "channel": channel, "time": _packed_times(time)}
     out |= {name: packed(joined([getattr(t, name) for t in traces])) for name in ("before", "after")}
+    if delivery.derivatives and channel in CHANNELS[:6]:
+        out["without"] = packed(joined([t.of_model(delivery.model) for t in traces]))
     reading = joined(readings)
     return out | ({"measured": packed(reading)} if np.isfinite(reading).any() else {})
 

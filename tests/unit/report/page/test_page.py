@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotorid.mismatch.decision.findings import ValueRow
+from rotorid.mismatch.decision.findings import Delivery, ValueRow
 from rotorid.mismatch.decision.shares import segments_of
 from rotorid.mismatch.tell.sentences import MOST_WORDS
 from rotorid.mismatch.tell.tiles import tiles
@@ -17,7 +17,7 @@ from rotorid.mismatch.tell.verdict import main_channel
 from rotorid.recordings import Run
 from rotorid.recordings.doubts import Doubt
 from rotorid.report.deliver import verdict_of, write_files
-from rotorid.report.page.data import fit_percent, measured, packed
+from rotorid.report.page.data import _first_shown, fit_percent, measured, packed
 from rotorid.report.page.make import by_share, make_page, next_text, pretty, strip
 from tests.browser import CHROMIUM, Browser
 from tests.unit.mismatch.synthetic import analysis, drag_finding
@@ -229,3 +229,27 @@ def test_a_suggested_effect_asks_for_no_column_that_is_there() -> None:
     runs = tuple(Run(r.name, r.table.assign(battery_voltage_v=12.0)) for r in made.recordings.runs)
     said = next_text(verdict, replace(made.recordings, runs=runs))
     assert said.startswith("Rest the battery and repeat the same hover.") and "record" not in said
+
+
+def test_a_vehicle_with_derivatives_is_shown_with_and_without_them_where_most_was_removed():
+    made = analysis(findings=[drag_finding()], dash=True)
+    plain = data_of(page_of(made))
+    assert all("without" not in t for t in plain["traces"])
+    start, stop = plain["main"]["shown_s"]
+    (trace,) = [
+        t for t in made.traces if (t.run, t.channel) == (plain["main"]["run"], plain["main"]["channel"])
+    ][:1]  # fmt: skip
+    removed = trace.before**2 - trace.after**2
+    inside = (trace.time_s >= start - 1e-3) & (trace.time_s < stop)
+    assert stop - start == pytest.approx(10.0) and removed[inside].mean() >= removed.mean()
+    with_them = data_of(page_of(replace(made, delivery=Delivery("named", True, made.delivery.scores))))
+    forces = [t for t in with_them["traces"] if t["channel"].startswith(("force", "moment"))]
+    assert forces and all("without" in t for t in forces)
+
+
+def test_a_run_of_less_than_ten_seconds_is_shown_whole():
+    made = analysis(findings=[drag_finding()], dash=True)
+    short = replace(made, traces=tuple(
+        replace(t, time_s=t.time_s[:20], before=t.before[:20], refitted=t.refitted[:20], named=t.named[:20],
+                after=t.after[:20]) for t in made.traces))  # fmt: skip
+    assert _first_shown([t for t in short.traces if t.channel == "force_x"]) is None

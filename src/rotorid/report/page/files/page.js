@@ -12,7 +12,7 @@
   const short = (v) => (v === null || v === undefined ? "–" : Number(v.toPrecision(3)).toString());
   const height = () => (window.innerWidth < 600 ? 240 : 320);
 
-  const chosen = { run: data.main.run, channel: data.main.channel };
+  const chosen = { run: data.main.run, channel: data.main.channel, shown: data.main.shown_s };
   if (!trace(chosen.run, chosen.channel)) {
     chosen.run = data.traces[0].run;
     chosen.channel = data.traces[0].channel;
@@ -75,6 +75,9 @@
     const line = (label, colour, width, more) => ({ label, stroke: css(colour), width, spanGaps: false,
       value: (u, v) => short(v), ...more });
     const when = times(t.time), before = series(t.before), after = series(t.after);
+    // A vehicle with derivatives is shown without them, too.
+    const without = t.without ? [series(t.without)] : [];
+    const plain = (width, more) => without.map(() => line("without derivatives", "--soft", width, more));
     // Both figures show the same stretch of time, whichever of them is zoomed.
     const together = { setScale: [(u, key) => {
       const other = u === plots.signal ? plots.time : plots.signal;
@@ -92,18 +95,20 @@
         scales: { x: { time: false } },
         axes: [axis("", 26), axis(`${about.name} (${about.unit})`, 58)],
         series: [{ label: "time (s)", value: (u, v) => short(v) }, line("measured", "--ink", 1.2),
-          line("as believed", "--before", 1.2), line("improved", "--after", 1.2, { dash: [6, 3] })],
+          line("as believed", "--before", 1.2), ...plain(1.2, { dash: [2, 3] }),
+          line("improved", "--after", 1.2, { dash: [6, 3] })],
         hooks: { drawClear: [behind(0, windows)], ...together },
-      }, [when, read, less(before), less(after)]);
+      }, [when, read, less(before), ...without.map(less), less(after)]);
     }
     put("time", {
       cursor: { drag: { x: true, y: false }, sync: { key: "time" } },
       scales: { x: { time: false } },
       axes: [axis("time (s)", 38), axis(`error (${about.unit})`, 58)],
       series: [{ label: "time (s)", value: (u, v) => short(v) }, line("as believed", "--before", 1),
-        line("improved", "--after", 1)],
+        ...plain(1), line("improved", "--after", 1)],
       hooks: { drawClear: [behind(about.noise ? 2 * about.noise : 0, windows)], ...together },
-    }, [when, before, after]);
+    }, [when, before, ...without, after]);
+    if (chosen.shown) { plots.time.setScale("x", { min: chosen.shown[0], max: chosen.shown[1] }); chosen.shown = null; }
     const thin = data.every > 1 ? ` Every ${data.every}th row is shown.` : "";
     const kind = data.runs[chosen.run].held_out ? "held out" : "fitted";
     el("time-caption").textContent =
