@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from rotorid_proof.intervals import bootstrap_mean, bootstrap_ratio, wilson
 from rotorid_proof.score import kind_and_rest
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Score = Mapping[str, Any]
 NOTHING, OTHER_VALUE, AMBIGUOUS = "nothing", "a value", "several"
@@ -491,6 +494,23 @@ def case_rows(scores: Sequence[Score]) -> list[dict[str, Any]]:
             else:
                 row[key] = value
         out.append(row)
+    return out
+
+
+def scores_from(cases: pd.DataFrame, parameters: pd.DataFrame) -> list[dict[str, Any]]:
+    """The scores behind stored rows of `case_rows` and `parameter_rows`, for the functions above to count anew."""
+    known = parameters.astype(object).where(parameters.notna(), None)
+    by_case: dict[str, list[dict[str, Any]]] = {}
+    for row in known.to_dict("records"):
+        by_case.setdefault(row["case"], []).append(row)
+    out = []
+    for row in cases.astype(object).where(cases.notna(), None).to_dict("records"):
+        f1 = row.pop("location_f1")
+        out.append(
+            row
+            | {name: row[name] or "" for name in ("truth", "claims", "false_names", "missed", "released")}
+            | {"location": None if f1 is None else {"f1": f1}, "parameters": by_case.get(row["case"], [])}
+        )
     return out
 
 

@@ -34,12 +34,11 @@ QUOTED = {
 }
 # What the abstract counts is what the proof's chapter prints.
 PRINTED = {
-    "targets": rules.chapter_proof.output.rows,
+    "fresh": rules.chapter_proof.output.fresh,
     "plantings": rules.chapter_proof.output.planted,
     "planned_flights": rules.chapter_proof.output.flights,
     "proof_real": f"{CONFIG.proof.tables}/real.csv",
     "proof_coefficients": f"{CONFIG.proof.tables}/coefficients.csv",
-    "proof_cases": f"{CONFIG.proof.tables}/cases.csv",
 }
 QUOTED_BY = {
     "fem": {"both_meshes": rules.chapter_speed.output.fem},
