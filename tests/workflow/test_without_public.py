@@ -19,7 +19,7 @@ SAID = {
     "public_recordings": "Of 6 sources 0 could be obtained for this report. What was left out, and why:",
     "rotor_coefficients": "which could not be obtained: ",
     "neurobem": "which could not be obtained:",
-    "changes": "which could not be obtained:",
+    "changes": "because the flights could not be obtained: ",
     "mismatch": "a piece of real flights, was left out: ",
 }
 

@@ -43,6 +43,7 @@ PRINTED = {
 QUOTED_BY = {
     "fem": {"both_meshes": rules.chapter_speed.output.fem},
     "white_box": {"truth": rules.score_campaign.output.state},
+    "changes": {"measured": "docs/proof/changes_summary.csv"},
     "abstract": QUOTED | PRINTED,
     "conclusions": QUOTED | PRINTED | {"propellers": "results/rotor/coefficients.json"},
 }
