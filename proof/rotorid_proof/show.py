@@ -289,16 +289,16 @@ def of_studies(real: pd.DataFrame) -> pd.DataFrame:
             {
                 "study": row["study"],
                 "about": row["about"],
-                "subject": f"{row['study']}: {row['about']}",
                 "found": "the stage stopped" if row["word"] == "stopped" else "; ".join(found) or "nothing",
-                "expected": "; ".join(f"{one}: {'found' if one in confirmed else 'no'}" for one in expected) or "–",
+                "expected": "; ".join(expected) or "–",
+                "lacking": "; ".join(one for one in expected if one not in confirmed) or "–",
                 "confirmed": len(confirmed) if expected else "",
                 "error": error.replace(" ", "\u00a0"),
                 "unexplained": "–" if pd.isna(share) else f"{100 * share:.0f} %",
             }
         )
     return pd.DataFrame(
-        rows, columns=["study", "about", "subject", "expected", "confirmed", "found", "error", "unexplained"]
+        rows, columns=["study", "about", "expected", "lacking", "confirmed", "found", "error", "unexplained"]
     )
 
 

@@ -140,7 +140,8 @@ def test_what_was_expected_of_a_real_set_is_shown_and_whether_it_was_found() -> 
     rows = [row | {"expected": "unequal_rotors; com_offset", "expected_found": None}]
     rows += [row | {"expected": "motor_lag", "expected_found": "motor_lag"}, row | {"expected": None}]
     shown = show.of_studies(pd.DataFrame(rows))
-    assert shown["expected"].tolist() == ["unequal rotors: no; com offset: no", "motor lag: found", "–"]
+    assert shown["expected"].tolist() == ["unequal rotors; com offset", "motor lag", "–"]
+    assert shown["lacking"].tolist() == ["unequal rotors; com offset", "–", "–"]
     assert shown["confirmed"].tolist() == [0, 1, ""]
     halted = show.of_studies(pd.DataFrame([rows[0] | {"word": "stopped"}])).iloc[0]
     assert (halted["found"], halted["error"], halted["confirmed"]) == ("the stage stopped", "–", 0)
