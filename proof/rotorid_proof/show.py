@@ -337,7 +337,7 @@ def of_effects(effects: pd.DataFrame) -> pd.DataFrame:
         decimals = max(0, 2 - math.floor(math.log10(largest / 10**power))) if largest else 0
         form = f".{decimals}f" if abs(numbers[0]) < 0.01 * largest else ".3g"
         value, low, high = (f"{x / 10**power:{form}}".replace("-", "−") for x in numbers)
-        others = words(row.alternatives)
+        others = " or ".join(x for x in words(row.alternatives).split(" or ") if x != words(row.effect))
         rows.append(
             {
                 "effect": words(row.effect) + (f" (or: {others})" if others else ""),

@@ -270,15 +270,14 @@ rule draw_proof:
 
 
 rule chapter_proof:
-    """Figures and tables of the proof's chapter, from the folder that the configuration names."""
+    """Tables of the proof's chapter, from the folder that the configuration names."""
     message:
-        "Chapter proof: figures and tables"
+        "Chapter proof: tables"
     input:
         notebook="notebooks/proof.ipynb",
         summary=f"{CONFIG.proof.tables}/summary.csv",
         cases=f"{CONFIG.proof.tables}/cases.csv",
         parameters=f"{CONFIG.proof.tables}/parameters.csv",
-        power=f"{CONFIG.proof.tables}/power.csv",
         peers=f"{CONFIG.proof.tables}/peers.csv",
         state=f"{CONFIG.proof.tables}/state.json",
         real=f"{CONFIG.proof.tables}/real.csv",
@@ -289,12 +288,6 @@ rule chapter_proof:
         plantings_rows="docs/proof/plantings.csv",
         plantings="docs/proof/plantings_summary.csv",
     output:
-        power_figure=report(
-            "results/report/proof/power.svg",
-            category="Proof",
-            caption="../report/captions/proof.rst",
-            labels={"figure": "power"},
-        ),
         fresh="results/report/proof/fresh.csv",
         releases="results/report/proof/releases.csv",
         questions="results/report/proof/questions.csv",

@@ -43,6 +43,10 @@ PRINTED = {
 QUOTED_BY = {
     "fem": {"both_meshes": rules.chapter_speed.output.fem},
     "white_box": {"truth": rules.score_campaign.output.state},
+    "proof": {
+        "power": f"{CONFIG.proof.tables}/power.csv",
+        "families": f"{CONFIG.proof.tables}/families.csv",
+    },
     "changes": {"measured": "docs/proof/changes_summary.csv"},
     "abstract": QUOTED | PRINTED,
     "conclusions": QUOTED | PRINTED | {"propellers": "results/rotor/coefficients.json"},

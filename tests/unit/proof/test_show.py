@@ -194,7 +194,7 @@ def test_the_numbers_of_the_campaign_say_how_many_are_inside() -> None:
 def test_an_effect_stands_with_its_class_and_its_interval_in_one_cell() -> None:
     effects = pd.DataFrame(
         [
-            ("rotor_drag", "established", "", "k_d", 4.08e-5, 3.9e-5, 4.34e-5, "N s2"),
+            ("rotor_drag", "established", None, "k_d", 4.08e-5, 3.9e-5, 4.34e-5, "N s2"),
             ("axial_inflow", "suggested", "axial_inflow or frame_drag", None, None, None, None, None),
         ],
         columns=["effect", "status", "alternatives", "symbol", "value", "low_95", "high_95", "unit"],
@@ -203,4 +203,4 @@ def test_an_effect_stands_with_its_class_and_its_interval_in_one_cell() -> None:
     assert shown.iloc[0].tolist() == ["rotor drag", "established", "k_d", "40.8 (39 to 43.4)", "1e-6 N s2"]
     unsure = pd.DataFrame([{**effects.iloc[0], "value": -4.38e-5, "low_95": -0.0052, "high_95": 0.0051}])
     assert show.of_effects(unsure)["value"].item() == "−0.00004 (−0.00520 to 0.00510)"
-    assert shown.iloc[1].tolist() == ["axial inflow (or: axial inflow or frame drag)", "suggested", "", "", ""]
+    assert shown.iloc[1].tolist() == ["axial inflow (or: frame drag)", "suggested", "", "", ""]
