@@ -52,8 +52,6 @@ def commits(releases: pd.DataFrame) -> dict[str, str]:
     return {str(row.released): str(row.commit)[:7] for row in releases.itertuples()}
 
 
-MOST_ALARMS, MOST_WRONG = 0.01, 0.05
-"""Targets of drawn cases: share of clean sets that raise an alarm, share of names that are wrong."""
 DRAWN_KINDS = {"flights": ("flight",), "stands": ("stand",), "benches": ("bench",), "all": table.KINDS}
 
 
@@ -69,7 +67,9 @@ def of_drawn(cases: pd.DataFrame, released: str) -> pd.DataFrame:
     rows = [row for row in rows if row["hidden"]]
     if rows:
         states = _states_of_drawn(own)
-        rows.append({"kind": "target", "alarms": f"≤ {100 * MOST_ALARMS:g} %", "names": f"≤ {100 * MOST_WRONG:g} %"})
+        rows.append(
+            {"kind": "target", "alarms": f"≤ {100 * table.MOST_ALARMS:g} %", "names": f"≤ {100 * table.MOST_WRONG:g} %"}
+        )
         rows.append({"kind": "state", **states})
     return pd.DataFrame(rows, columns=["kind", "hidden", "right", "share", "wrong", "alarms", "names"]).fillna("")
 
@@ -113,7 +113,7 @@ def _states_of_drawn(own: pd.DataFrame) -> dict[str, str]:
     wrong = table.false_discoveries(scores)
     return {
         name: table.finished(name, "", None, most, found)["holds"] or ""
-        for name, most, found in (("alarms", MOST_ALARMS, alarms), ("names", MOST_WRONG, wrong))
+        for name, most, found in (("alarms", table.MOST_ALARMS, alarms), ("names", table.MOST_WRONG, wrong))
     }
 
 
