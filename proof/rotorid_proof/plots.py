@@ -1,4 +1,4 @@
-"""Figures of the proof: targets, confusion, power, held-out error against the oracle's, the next flight."""
+"""Figures of the proof: confusion, power, held-out error against the oracle's."""
 
 from __future__ import annotations
 
@@ -7,51 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotorid.report.plots import style
-from rotorid_proof.next_flight import WITHIN
-from rotorid_proof.show import in_words
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     import pandas as pd
     from matplotlib.figure import Figure
 
 FEWEST_CASES = 10
 """Cases behind each point of an effect's own power curve: with fewer it goes up and down by chance."""
 LAST_COLUMNS = ("several", "a value", "nothing")
-
-
-RATIO_ROWS = "oracle"
-"""End of the ids of targets that are a ratio and no share."""
-
-
-def targets(summary: pd.DataFrame, names: Mapping[str, str] | None = None) -> Figure:
-    """Every row that has a target, its 95 % interval, and the stretch that the target allows.
-
-    Above the shares, below the ratios of errors. Green: the target holds; red: it fails; grey: not refuted. A release
-    is called by its commit in `names`.
-    """
-    rows = summary[(summary["at_least"].notna() | summary["at_most"].notna()) & summary["value"].notna()].iloc[::-1]
-    ratio = rows["id"].str.endswith(RATIO_ROWS)
-    shares, ratios = rows[~ratio], rows[ratio]
-    heights = [max(len(shares), 1), max(len(ratios), 1)]
-    fig, axes = style.figure(1.0 + 0.115 * sum(heights), rows=2, gridspec_kw={"height_ratios": heights})
-    for ax, part, label in ((axes[0], shares, "share"), (axes[1], ratios, "error over the oracle's")):
-        top = 1.0 if part is shares else 1.05 * max([1.05, *part["high_95"].dropna()])
-        for k, row in enumerate(part.itertuples()):
-            low = row.at_least if np.isfinite(row.at_least) else (0.0 if part is shares else 0.95)
-            high = row.at_most if np.isfinite(row.at_most) else top
-            ax.barh(k, high - low, left=low, height=0.8, color="#dcefe6", zorder=0)
-            colour = {"holds": style.COLOUR["after"], "fails": style.COLOUR["before"]}.get(row.holds, style.GREY)
-            ax.plot([row.low_95, row.high_95], [k, k], color=colour, lw=1.6)
-            ax.plot(row.value, k, "o", color=colour, markersize=3)
-        labels = [f"{in_words(r.what, names or {})} ({int(r.cases)})" for r in part.itertuples()]
-        ax.set_yticks(range(len(part)), labels, fontsize=6)
-        ax.set_ylim(-0.7, len(part) - 0.3)
-        ax.set_xlabel(f"{label} (in brackets: cases)")
-        ax.grid(axis="y", visible=False)
-    axes[0].set_xlim(-0.02, 1.02)
-    return fig
 
 
 def confusion(table: pd.DataFrame) -> Figure:
@@ -131,39 +94,6 @@ def oracle(cases: pd.DataFrame) -> Figure:
     ax.set_xticks(range(len(families)), [plain(f) for f in families], rotation=45, ha="right")
     ax.set_ylabel("held-out error / true model's")
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.0, markerscale=3)
-    return fig
-
-
-def next_flight(rows: pd.DataFrame) -> Figure:
-    """Separation predicted by the plan against that found in both sets together, and what became of the question.
-
-    One point a set that was open and whose truth was among what was asked; bars: the interval that the plan stated.
-    """
-    number = {
-        n: rows[n].astype(float) for n in ("predicted_sigma", "predicted_low", "predicted_high", "measured_sigma")
-    }
-    rows = rows.assign(**number).dropna(subset=["predicted_sigma", "measured_sigma"])
-    if rows.empty:
-        return nothing("No planned flight in this proof.")
-    fig, ax = style.figure(3.2)
-    most = 1.3 * float(rows[["predicted_high", "measured_sigma"]].to_numpy().max())
-    line = np.geomspace(0.5, most, 50)
-    ax.fill_between(
-        line, line / WITHIN, line * WITHIN, color="#dcefe6", zorder=0, label=f"within a factor of {WITHIN:g}"
-    )
-    colours = {"right": style.COLOUR["after"], "wrong": style.COLOUR["before"], "open": style.GREY}
-    words = {"right": "settled rightly", "wrong": "settled wrongly", "open": "still open"}
-    for outcome, own in rows.groupby("outcome"):
-        at = own["predicted_sigma"].clip(lower=0.5), own["measured_sigma"].clip(lower=0.5)
-        low, high = own["predicted_low"].clip(lower=0.5, upper=at[0]), own["predicted_high"].clip(lower=at[0])
-        colour = colours.get(outcome, style.GREY)
-        ax.errorbar(
-            *at, xerr=[at[0] - low, high - at[0]], fmt="o", color=colour, lw=0.8, label=words.get(outcome, outcome)
-        )
-    ax.set(xscale="log", yscale="log", xlim=(0.5, most), ylim=(0.4, most))
-    ax.set_xlabel("predicted separation [standard errors]")
-    ax.set_ylabel("found [standard errors; 0.5: or less]")
-    ax.legend(loc="upper left")
     return fig
 
 

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 
 import pandas as pd
 
+from rotorid_proof import table
 from rotorid_proof.intervals import wilson
-from rotorid_proof.table import SIMULATORS, row_prefix
 
 RATIOS = ("location_f1", "oracle")
 """Rows whose value is no share."""
@@ -21,10 +21,6 @@ METHODS = {
     "boosting": "gradient boosting",
     "sample_split": "sample-split F-test",
 }
-RELEASE_ROW = re.compile(r"(?P<simulator>\w+)_(?P<date>\d{4}-\d\d-\d\d)_(?P<score>right|clean_alarms|false)")
-"""Id of a release's row."""
-
-
 NOT_KEPT = "not kept"
 DEVELOPMENT = "development"
 """In the place of a release's date: the commit that stored the development cases, of which no hash was kept."""
@@ -43,9 +39,9 @@ def codes_of(tables: Mapping[str, pd.DataFrame], stored_with: str = "") -> dict[
     """
     unknown = f"{NOT_KEPT} (of commit {stored_with} or before)" if stored_with else NOT_KEPT
     found = {}
-    for name, table in tables.items():
-        column = "judged_by" if "judged_by" in table else "code"
-        rows = table[column] if column in table else pd.Series([None])
+    for name, stored in tables.items():
+        column = "judged_by" if "judged_by" in stored else "code"
+        rows = stored[column] if column in stored else pd.Series([None])
         codes = sorted({short_code(code) for code in rows}, key=lambda code: (code == NOT_KEPT, code))
         found[name] = ", ".join(unknown if code == NOT_KEPT else code for code in codes)
     return found
@@ -56,63 +52,104 @@ def commits(releases: pd.DataFrame) -> dict[str, str]:
     return {str(row.released): str(row.commit)[:7] for row in releases.itertuples()}
 
 
-def of_releases(summary: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
-    """A row for each release and simulator of the release proof, as text, and one for all of them.
+DRAWN_KINDS = {"flights": ("flight",), "stands": ("stand",), "benches": ("bench",), "all": table.KINDS}
 
-    `names` has each release's commit by the date that its cases are drawn from.
 
-    `right` counts the sets in which all that is hidden was named and nothing else, with the 95 % interval of their
-    share (Wilson); `alarms` the clean sets that raised one; `false` is the share of names that are wrong.
+def of_drawn(cases: pd.DataFrame, released: str) -> pd.DataFrame:
+    """Drawn cases of one release, judged once by one code, as text: a row a kind, one of all, their target and state.
+
+    `right`: of the sets with something hidden (`hidden`), those in which all of it was named and nothing else;
+    `share`, with its 95 % interval (Wilson); `wrong`: those with a wrong name; `alarms`: of the clean sets; `names`:
+    wrong ones of all.
     """
-    short = {row_prefix(*key): simulator.short for key, simulator in SIMULATORS.items()}
-    groups: dict[tuple[str, str], dict[str, pd.Series]] = {}
-    for _, row in summary.iterrows():
-        if found := RELEASE_ROW.fullmatch(row["id"]):
-            groups.setdefault((found["date"], found["simulator"]), {})[found["score"]] = row
-    rows = [
-        {
-            "released": names.get(date, date),
-            "simulator": short.get(simulator, words(simulator)),
-            "right": _of(scores["right"]),
-            "share": _span_of(scores["right"]),
-            "alarms": _of(scores["clean_alarms"]),
-            "false": f"{number('', scores['false']['value'])} of {_count(scores['false'])}",
-        }
-        for (date, simulator), scores in groups.items()
-    ]
-    if len(rows) > 1:
-        right = [scores["right"] for scores in groups.values()]
-        alarms = [scores["clean_alarms"] for scores in groups.values()]
-        hits, of = sum(map(_hits, right)), sum(map(_count, right))
+    own = cases[cases["released"].astype(str) == released]
+    rows = [{"kind": name, **_drawn(own[own["kind"].isin(kinds)])} for name, kinds in DRAWN_KINDS.items()]
+    rows = [row for row in rows if row["hidden"]]
+    if rows:
+        states = _states_of_drawn(own)
         rows.append(
-            {
-                "released": "all",
-                "simulator": "",
-                "right": f"{hits} of {of}",
-                "share": span("", *wilson(hits, of)) if of else "–",
-                "alarms": f"{sum(map(_hits, alarms))} of {sum(map(_count, alarms))}",
-                "false": "",
-            }
+            {"kind": "target", "alarms": f"≤ {100 * table.MOST_ALARMS:g} %", "names": f"≤ {100 * table.MOST_WRONG:g} %"}
         )
-    return pd.DataFrame(rows, columns=["released", "simulator", "right", "share", "alarms", "false"])
+        rows.append({"kind": "state", **states})
+    return pd.DataFrame(rows, columns=["kind", "hidden", "right", "share", "wrong", "alarms", "names"]).fillna("")
 
 
-def _count(score: pd.Series) -> int:
-    """Cases behind a share; of plantings the column is `count`."""
-    return int(score["count"] if "count" in score else score["cases"])
+def of_releases(cases: pd.DataFrame, releases: pd.DataFrame) -> pd.DataFrame:
+    """The same for each release, a row each, all its kinds together, and one for all releases; `releases`: their code.
+
+    `state`: what the alarms are, held against their target.
+    """
+    drawn = cases[cases["released"].notna()]
+    rows = []
+    for release in releases.itertuples():
+        own = drawn[drawn["released"].astype(str) == str(release.released)]
+        if len(own):
+            named = {"released": str(release.commit)[:7], "by": short_code(release.code)}
+            rows.append({**named, **_drawn(own), "state": _states_of_drawn(own)["alarms"]})
+    if len(rows) > 1:
+        rows.append({"released": "all", "by": "each its own", **_drawn(drawn), "state": ""})
+    columns = ["released", "by", "hidden", "right", "share", "wrong", "alarms", "state", "names"]
+    return pd.DataFrame(rows, columns=columns)
 
 
-def _hits(score: pd.Series) -> int:
-    return round(float(score["value"]) * _count(score)) if _count(score) else 0
+def _drawn(own: pd.DataFrame) -> dict[str, str]:
+    """Counts of drawn cases as text."""
+    clean = own["clean"].astype(bool)
+    hidden, nothing = own[~clean], own[clean]
+    right = int(hidden["right"].astype(bool).sum())
+    return {
+        "hidden": str(len(hidden)) if len(hidden) else "",
+        "right": str(right),
+        "share": span("", *wilson(right, len(hidden))) if len(hidden) else "–",
+        "wrong": str(int((hidden["false_count"] > 0).sum())),
+        "alarms": f"{int(nothing['false_alarm'].astype(bool).sum())} of {len(nothing)}" if len(nothing) else "–",
+        "names": f"{int(own['false_count'].sum())} of {int(own['claim_count'].sum())}",
+    }
 
 
-def _span_of(score: pd.Series) -> str:
-    return span("", score["low_95"], score["high_95"]) if _count(score) else "–"
+def _states_of_drawn(own: pd.DataFrame) -> dict[str, str]:
+    scores = own.to_dict("records")
+    alarms = table.rate([s for s in scores if s["clean"]], lambda s: s["false_alarm"])
+    wrong = table.false_discoveries(scores)
+    return {
+        name: table.finished(name, "", None, most, found)["holds"] or ""
+        for name, most, found in (("alarms", table.MOST_ALARMS, alarms), ("names", table.MOST_WRONG, wrong))
+    }
+
+
+def of_questions(cases: pd.DataFrame, parameters: pd.DataFrame, better: pd.DataFrame) -> pd.DataFrame:
+    """Cases for development as text, a row a question: those of flights, stands and benches together where all have it.
+
+    `kinds`: what was measured of each kind of recordings alone, where more than one has the question. `better`: rows
+    of the summary that count no cases, put below.
+    """
+    listed = [s for s in table.scores_from(cases, parameters) if (s["kind"], s["family"]) not in table.SIMULATORS]
+    by_kind = [table.rows_of([s for s in listed if s["kind"] == kind]) for kind in table.KINDS]
+    together = table.rows_of(listed)
+    rows = []
+    for k, whole in enumerate(together):
+        shared = whole["id"] in table.GROUND_ROWS
+        own = [of_one[k] for of_one in by_kind]
+        known = [number(row["id"], row["value"]) for row in own if row["cases"]] if shared else []
+        rows.append({**(whole if shared else own[0]), "kinds": _side_by_side(known)})
+    measured = pd.DataFrame([*(row for row in rows if row["cases"]), *better.to_dict("records")])
+    shown = _shown(measured).assign(kinds=measured["kinds"].fillna(""))
+    # What has a target stands first.
+    return shown.loc[(shown["target"] == "").sort_values(kind="stable").index]
+
+
+def _side_by_side(numbers: list[str]) -> str:
+    """Numbers of several kinds in one cell, the unit once; nothing where they are one."""
+    if len(numbers) < 2:
+        return ""
+    unit = " %" if numbers[-1].endswith(" %") else ""
+    return " / ".join(text.removesuffix(" %").removesuffix(".0") for text in numbers) + unit
 
 
 def _of(score: pd.Series) -> str:
     """A share as `14 of 25`."""
-    return f"{_hits(score)} of {_count(score)}" if _count(score) else "–"
+    count = int(score["count"])
+    return f"{round(float(score['value']) * count)} of {count}" if count else "–"
 
 
 PLANTED = {
@@ -122,65 +159,41 @@ PLANTED = {
     "values new or lost a set": "values",
 }
 """Scores of the planted sets that the report shows, and their columns."""
+PLANTED_KINDS = ("code", "all", "target", "state", "flight", "family")
+"""What a row of the plantings is of, in the order shown; those of single causes stay in the stored table."""
 
 
 def of_plantings(now: pd.DataFrame) -> pd.DataFrame:
-    """What was planted in real flights at the larger size, as text: by flight, and by family of cause.
+    """What was planted in real flights at the larger size, as text: by one code, by all; then by flight and family.
 
-    `named`, `covered` (size inside the 95 % interval) as counts, `moved` and `values` a set. Below the row of all
-    stand their targets and whether these hold.
+    `named`, `covered` (size inside the 95 % interval) as counts, `moved` and `values` a set. Below the first two stand
+    the targets, and whether these hold by the one code. `kind` says what a row is of.
     """
-    rows = []
-    for group, own in now[now["size"] == "large"].groupby("group", sort=False):
+    large = now[now["size"] == "large"]
+    rows, judged = [], large[large["group"] == "all"]
+    for group, own in large.groupby("group", sort=False):
         kind, _, name = str(group).partition(" ")
-        if kind not in ("all", "flight", "family"):
+        if kind not in PLANTED_KINDS:
             continue
-        row = {"group": words(name) or "all", "kind": kind}
+        row = {"group": {"code": group, "all": "all codes"}.get(kind) or words(name), "kind": kind}
         for what, column in PLANTED.items():
             score = own[own["what"] == what].iloc[0]
             share = what in ("named", "size covered")
             row[column] = _of(score) if share else f"{score['value']:.2f}"
         rows.append(row)
-    whole = now[(now["size"] == "large") & (now["group"] == "all")].set_index("what")
-    for name, cell in (("target", _target_of_planting), ("verdict", lambda score: score["state"])):
+        judged = own if kind == "code" else judged
+    by_score = judged.set_index("what")
+    for name, cell in (("target", _target_of_planting), ("state", lambda score: score["state"])):
         rows.append({"group": name, "kind": name})
-        rows[-1].update({column: cell(whole.loc[what]) for what, column in PLANTED.items()})
+        rows[-1].update({column: cell(by_score.loc[what]) for what, column in PLANTED.items()})
     out = pd.DataFrame(rows, columns=["group", "kind", *PLANTED.values()]).fillna("")
-    order = out["kind"].map({"all": 0, "target": 1, "verdict": 2, "flight": 3, "family": 4})
-    return out.loc[order.sort_values(kind="stable").index].drop(columns="kind")
+    return out.loc[out["kind"].map(PLANTED_KINDS.index).sort_values(kind="stable").index]
 
 
 def _target_of_planting(score: pd.Series) -> str:
     if pd.notna(score["at_least"]):
         return f"≥ {number('', score['at_least'])}"
     return f"≤ {score['at_most']:g}" if pd.notna(score["at_most"]) else ""
-
-
-def with_target(summary: pd.DataFrame, names: Mapping[str, str] | None = None) -> pd.DataFrame:
-    """`what`, `measured`, `interval`, `cases`, `target`, `holds`, `by` as text: every row that has a target.
-
-    `by` says which code judged the row's cases, and how many of them had been looked at. A release is called by its
-    commit in `names`.
-    """
-    shown = _shown(summary[summary["at_least"].notna() | summary["at_most"].notna()])
-    shown["what"] = [in_words(what, names or {}) for what in shown["what"]]
-    return shown
-
-
-def in_words(what: str, names: Mapping[str, str]) -> str:
-    """What a row is about in few words; a release is called by its commit, not by the date its cases are drawn from."""
-    for date, commit in names.items():
-        what = what.replace(f"released {date}", commit)
-    for simulator in SIMULATORS.values():
-        what = what.replace(simulator.what, f"Drawn {simulator.short}")
-    return what
-
-
-def without_target(summary: pd.DataFrame) -> pd.DataFrame:
-    """The same for rows without one; those of releases are left to `of_releases`."""
-    others = summary["at_least"].isna() & summary["at_most"].isna()
-    others &= ~summary["id"].map(lambda key: RELEASE_ROW.fullmatch(key) is not None)
-    return _shown(summary[others]).drop(columns=["target", "holds"])
 
 
 def _shown(rows: pd.DataFrame) -> pd.DataFrame:
@@ -195,7 +208,6 @@ def _shown(rows: pd.DataFrame) -> pd.DataFrame:
                 "cases": "" if pd.isna(row["cases"]) else str(int(row["cases"])),
                 "target": target(row).replace("\u00a0", " "),
                 "holds": "" if pd.isna(row["holds"]) else row["holds"],
-                "by": provenance(row),
             }
             for _, row in rows.iterrows()
         ]
@@ -204,60 +216,6 @@ def _shown(rows: pd.DataFrame) -> pd.DataFrame:
         f"{row.measured} ({row.interval})" if row.interval else row.measured for row in out.itertuples()
     ]
     return out
-
-
-def provenance(row: pd.Series) -> str:
-    """The code that judged a row's cases; of cases of which some had been looked at, how many."""
-    looked, cases = row["looked_at"], row["cases"]
-    part = looked > 0 and pd.notna(cases) and looked < cases
-    return short_code(row["judged_by"]) + (f", {int(looked)} seen" if part else "")
-
-
-def of_families(families: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
-    """Drawn cases as text: a row for each family and release with something wrong, its other families in one row."""
-    known = families.astype(object).fillna("")
-    whole = (known["cases"] == known["right"]) & (known["false_alarms"] == 0)
-    rows = []
-    for (simulator, released), own in known.groupby(["simulator", "released"], sort=False):
-        right = own[whole[own.index]]
-        rows += own[~whole[own.index]].to_dict("records")
-        if len(right):
-            others = {"simulator": simulator, "released": released, "wrong_names": "", "missed": ""}
-            sums = {name: right[name].sum() for name in ("cases", "right", "false_alarms")}
-            rows.append({"family": f"{len(right)} families, all right", **others, **sums})
-    out = pd.DataFrame(rows, columns=[c for c in known.columns if c not in ("judged_by", "looked_at")]).astype(str)
-    out["released"] = out["released"].replace({"": "development", **names})
-    short = {simulator.what: simulator.short for simulator in SIMULATORS.values()}
-    out["simulator"] = [short.get(name, name) for name in out["simulator"]]
-    for column in ("family", "wrong_names", "missed"):
-        out[column] = out[column].str.replace("_", " ")
-    return out
-
-
-def asked_of_flights(rows: pd.DataFrame) -> pd.DataFrame:
-    """Sets of the next flight's proof that left something open: what was hidden, planned and came out, as text."""
-    asked = rows[rows["open"].fillna("") != ""]
-
-    def sigma(value) -> str:
-        return "" if pd.isna(value) else f"{float(value):.1f}"
-
-    return pd.DataFrame(
-        [
-            {
-                "case": row["case"],
-                "truth": words(row["truth"]),
-                "open": words(" or ".join(str(row["open"]).split())),
-                "planned_s": "" if pd.isna(row["planned_s"]) else f"{float(row['planned_s']):.0f}",
-                "predicted": sigma(row["predicted_sigma"]),
-                "found": sigma(row["measured_sigma"]),
-                "standard": sigma(row["standard_sigma"]),
-                "outcome": row["outcome"],
-                "code": short_code(row["judged_by"]),
-            }
-            for _, row in asked.iterrows()
-        ],
-        columns=["case", "truth", "open", "planned_s", "predicted", "found", "standard", "outcome", "code"],
-    )
 
 
 def of_next_flights(summary: pd.DataFrame) -> pd.DataFrame:
@@ -331,16 +289,16 @@ def of_studies(real: pd.DataFrame) -> pd.DataFrame:
             {
                 "study": row["study"],
                 "about": row["about"],
-                "subject": f"{row['study']}: {row['about']}",
                 "found": "the stage stopped" if row["word"] == "stopped" else "; ".join(found) or "nothing",
-                "expected": "; ".join(f"{one}: {'found' if one in confirmed else 'no'}" for one in expected) or "–",
+                "expected": "; ".join(expected) or "–",
+                "lacking": "; ".join(one for one in expected if one not in confirmed) or "–",
                 "confirmed": len(confirmed) if expected else "",
                 "error": error.replace(" ", "\u00a0"),
                 "unexplained": "–" if pd.isna(share) else f"{100 * share:.0f} %",
             }
         )
     return pd.DataFrame(
-        rows, columns=["study", "about", "subject", "expected", "confirmed", "found", "error", "unexplained"]
+        rows, columns=["study", "about", "expected", "lacking", "confirmed", "found", "error", "unexplained"]
     )
 
 
@@ -379,7 +337,7 @@ def of_effects(effects: pd.DataFrame) -> pd.DataFrame:
         decimals = max(0, 2 - math.floor(math.log10(largest / 10**power))) if largest else 0
         form = f".{decimals}f" if abs(numbers[0]) < 0.01 * largest else ".3g"
         value, low, high = (f"{x / 10**power:{form}}".replace("-", "−") for x in numbers)
-        others = words(row.alternatives)
+        others = " or ".join(x for x in words(row.alternatives).split(" or ") if x != words(row.effect))
         rows.append(
             {
                 "effect": words(row.effect) + (f" (or: {others})" if others else ""),

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotorid_proof.intervals import bootstrap_mean, bootstrap_ratio, wilson
 from rotorid_proof.score import kind_and_rest
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Score = Mapping[str, Any]
 NOTHING, OTHER_VALUE, AMBIGUOUS = "nothing", "a value", "several"
@@ -286,20 +289,15 @@ def holds(
     return OPEN
 
 
-class Simulator(NamedTuple):
-    """What rows of drawn cases call the simulator, in full and in a narrow column."""
-
-    what: str
-    short: str
-
-
 SIMULATORS = {
-    ("flight", "multibody"): Simulator("Drawn flights, multibody engine", "flights (multibody)"),
-    ("flight", "continuous"): Simulator("Drawn flights, differential equations", "flights (equations)"),
-    ("stand", "rig"): Simulator("Drawn stands", "stands"),
-    ("bench", "rig"): Simulator("Drawn benches", "benches"),
+    ("flight", "multibody"): "Drawn flights, multibody engine",
+    ("flight", "continuous"): "Drawn flights, differential equations",
+    ("stand", "rig"): "Drawn stands",
+    ("bench", "rig"): "Drawn benches",
 }
-"""Kind and family of cases that are drawn whole from one seed, with their own rows."""
+"""Kind and family of cases that are drawn whole from one seed, and what their own rows call them."""
+MOST_ALARMS, MOST_WRONG = 0.01, 0.05
+"""Targets of drawn cases: share of clean sets that raise an alarm, share of names that are wrong."""
 
 
 def row_prefix(kind: str, name: str) -> str:
@@ -310,7 +308,7 @@ def row_prefix(kind: str, name: str) -> str:
 def drawn_rows(scores: Sequence[Score]) -> list[dict[str, Any]]:
     """Rows of the simulators whose cases are drawn, for development and for each release's date by themselves."""
     rows = []
-    for (kind, name), (what, _) in SIMULATORS.items():
+    for (kind, name), what in SIMULATORS.items():
         own = [s for s in scores if (s["kind"], s["family"]) == (kind, name)]
         for date in sorted({s["released"] for s in own}):
             part = [s for s in own if s["released"] == date]
@@ -319,14 +317,18 @@ def drawn_rows(scores: Sequence[Score]) -> list[dict[str, Any]]:
             when = f"released {date}" if date else "development"
             key = "_".join(x for x in (row_prefix(kind, name), date) if x)
             rows += [
-                finished(f"{key}_clean_alarms", f"{what}, {when}: false alarms", None, 0.01, rate(clean, _alarmed)),
+                finished(
+                    f"{key}_clean_alarms", f"{what}, {when}: false alarms", None, MOST_ALARMS, rate(clean, _alarmed)
+                ),
                 finished(f"{key}_right", f"{what}, {when}: all that is hidden right", None, None, rate(hidden, _right)),
-                finished(f"{key}_false", f"{what}, {when}: false discoveries", None, 0.05, false_discoveries(part)),
+                finished(
+                    f"{key}_false", f"{what}, {when}: false discoveries", None, MOST_WRONG, false_discoveries(part)
+                ),
             ]
     at_rates = _family(scores, "rate")
     if at_rates:
         what = "Clean flights at 25, 50, 100 and 1000 Hz: false alarms"
-        rows.append(finished("rate_alarms", what, None, 0.01, rate(at_rates, _alarmed)))
+        rows.append(finished("rate_alarms", what, None, MOST_ALARMS, rate(at_rates, _alarmed)))
     return rows
 
 
@@ -336,7 +338,7 @@ def drawn_families(scores: Sequence[Score]) -> list[dict[str, Any]]:
     for s in scores:
         if (s["kind"], s["family"]) in SIMULATORS:
             rest = kind_and_rest(s["case"])[1]
-            simulator = SIMULATORS[s["kind"], s["family"]].what
+            simulator = SIMULATORS[s["kind"], s["family"]]
             groups.setdefault((simulator, rest.split("/")[1], s["released"]), []).append(s)
     return [
         {
@@ -491,6 +493,23 @@ def case_rows(scores: Sequence[Score]) -> list[dict[str, Any]]:
             else:
                 row[key] = value
         out.append(row)
+    return out
+
+
+def scores_from(cases: pd.DataFrame, parameters: pd.DataFrame) -> list[dict[str, Any]]:
+    """The scores behind stored rows of `case_rows` and `parameter_rows`, for the functions above to count anew."""
+    known = parameters.astype(object).where(parameters.notna(), None)
+    by_case: dict[str, list[dict[str, Any]]] = {}
+    for row in known.to_dict("records"):
+        by_case.setdefault(row["case"], []).append(row)
+    out = []
+    for row in cases.astype(object).where(cases.notna(), None).to_dict("records"):
+        f1 = row.pop("location_f1")
+        out.append(
+            row
+            | {name: row[name] or "" for name in ("truth", "claims", "false_names", "missed", "released")}
+            | {"location": None if f1 is None else {"f1": f1}, "parameters": by_case.get(row["case"], [])}
+        )
     return out
 
 

@@ -51,7 +51,8 @@ STATED = {
     "white_box": {"4"},  # the number of a rotor
     "rotor_coefficients": {"2"},  # the exponent of the law
     "public_recordings": {"256"},  # of SHA-256
-    "proof": {"1", "5"},  # the ratio with nothing left to gain, and its target
+    "changes": {"3"},  # the number of a rotor
+    "proof": {"1"},  # what counts as yes
     "appendix": {"256"},
     "mismatch": set(),
 }

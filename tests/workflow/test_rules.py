@@ -1,5 +1,7 @@
 """What every rule must have, read from the rule files; and what every chapter must."""
 
+import ast
+import importlib.util
 import json
 import re
 import textwrap
@@ -117,6 +119,21 @@ def test_a_notebook_is_stripped_has_parameters_and_computes_nothing(path: Path) 
     assert papermill.inspect_notebook(str(path)), "a cell tagged parameters sets what the rule passes"
     text = "\n".join(cell.source for cell in code)
     assert not re.search(r"^\s*(import|from) (scipy|sklearn|matplotlib)", text, flags=re.MULTILINE)
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_what_a_notebook_takes_from_the_library_is_there(path: Path) -> None:
+    """A module that moved was missed only when the whole report was made."""
+    code = (cell.source for cell in nbformat.read(path, as_version=4).cells if cell.cell_type == "code")
+    tree = ast.parse("\n".join(code))
+    known = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module.startswith("rotorid"):
+            for name in node.names:
+                exec(f"from {node.module} import {name.name} as {name.asname or name.name}", known)
+    used = [node for node in ast.walk(tree) if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name)]
+    taken = [(known[n.value.id], n) for n in used if n.value.id in known]
+    assert taken and [f"{n.value.id}.{n.attr}" for module, n in taken if not hasattr(module, n.attr)] == []
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

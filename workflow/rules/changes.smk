@@ -23,18 +23,6 @@ rule chapter_changes:
             caption="../report/captions/changes.rst",
             labels={"figure": "what differs with the cut propeller"},
         ),
-        values=report(
-            "results/report/changes/values.svg",
-            category="What changed",
-            caption="../report/captions/changes.rst",
-            labels={"figure": "values"},
-        ),
-        residuals=report(
-            "results/report/changes/residuals.svg",
-            category="What changed",
-            caption="../report/captions/changes.rst",
-            labels={"figure": "residuals"},
-        ),
     params:
         code=code_of("compare_labelled"),
     log:

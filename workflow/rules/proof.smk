@@ -253,12 +253,10 @@ rule draw_proof:
     message:
         "Proof: drawing"
     input:
-        summary=rules.score_proof.output.summary,
         confusion=rules.score_proof.output.confusion,
         power=rules.score_proof.output.power,
         cases=rules.score_proof.output.cases,
     output:
-        targets="results/proof/targets.svg",
         confusion="results/proof/confusion.svg",
         instruments="results/proof/instruments.svg",
         power="results/proof/power.svg",
@@ -272,17 +270,14 @@ rule draw_proof:
 
 
 rule chapter_proof:
-    """Figures and tables of the proof's chapter, from the folder that the configuration names."""
+    """Tables of the proof's chapter, from the folder that the configuration names."""
     message:
-        "Chapter proof: figures and tables"
+        "Chapter proof: tables"
     input:
         notebook="notebooks/proof.ipynb",
         summary=f"{CONFIG.proof.tables}/summary.csv",
         cases=f"{CONFIG.proof.tables}/cases.csv",
-        families=f"{CONFIG.proof.tables}/families.csv",
-        effects=f"{CONFIG.proof.tables}/effects.csv",
-        confusion=f"{CONFIG.proof.tables}/confusion.csv",
-        power=f"{CONFIG.proof.tables}/power.csv",
+        parameters=f"{CONFIG.proof.tables}/parameters.csv",
         peers=f"{CONFIG.proof.tables}/peers.csv",
         state=f"{CONFIG.proof.tables}/state.json",
         real=f"{CONFIG.proof.tables}/real.csv",
@@ -293,52 +288,14 @@ rule chapter_proof:
         plantings_rows="docs/proof/plantings.csv",
         plantings="docs/proof/plantings_summary.csv",
     output:
-        next_flight_figure=report(
-            "results/report/proof/next_flight.svg",
-            category="Proof",
-            caption="../report/captions/proof.rst",
-            labels={"figure": "next flight"},
-        ),
-        targets=report(
-            "results/report/proof/targets.svg",
-            category="Proof",
-            caption="../report/captions/proof.rst",
-            labels={"figure": "targets"},
-        ),
-        confusion_figure=report(
-            "results/report/proof/confusion.svg",
-            category="Proof",
-            caption="../report/captions/proof.rst",
-            labels={"figure": "confusion"},
-        ),
-        instruments_figure=report(
-            "results/report/proof/instruments.svg",
-            category="Proof",
-            caption="../report/captions/proof.rst",
-            labels={"figure": "instruments"},
-        ),
-        power_figure=report(
-            "results/report/proof/power.svg",
-            category="Proof",
-            caption="../report/captions/proof.rst",
-            labels={"figure": "power"},
-        ),
-        oracle=report(
-            "results/report/proof/oracle.svg",
-            category="Proof",
-            caption="../report/captions/proof.rst",
-            labels={"figure": "oracle"},
-        ),
-        rows="results/report/proof/rows.csv",
-        others="results/report/proof/others.csv",
+        fresh="results/report/proof/fresh.csv",
+        releases="results/report/proof/releases.csv",
+        questions="results/report/proof/questions.csv",
         methods="results/report/proof/methods.csv",
         studies="results/report/proof/studies.csv",
         published="results/report/proof/published.csv",
-        drawn="results/report/proof/drawn.csv",
-        releases="results/report/proof/releases.csv",
         planted="results/report/proof/planted.csv",
         flights="results/report/proof/flights.csv",
-        asked="results/report/proof/asked.csv",
         stored="results/report/proof/stored.json",
     params:
         code=code_of_chapter("proof"),

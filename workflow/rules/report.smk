@@ -34,16 +34,20 @@ QUOTED = {
 }
 # What the abstract counts is what the proof's chapter prints.
 PRINTED = {
-    "targets": rules.chapter_proof.output.rows,
+    "fresh": rules.chapter_proof.output.fresh,
     "plantings": rules.chapter_proof.output.planted,
     "planned_flights": rules.chapter_proof.output.flights,
     "proof_real": f"{CONFIG.proof.tables}/real.csv",
     "proof_coefficients": f"{CONFIG.proof.tables}/coefficients.csv",
-    "proof_cases": f"{CONFIG.proof.tables}/cases.csv",
 }
 QUOTED_BY = {
     "fem": {"both_meshes": rules.chapter_speed.output.fem},
     "white_box": {"truth": rules.score_campaign.output.state},
+    "proof": {
+        "power": f"{CONFIG.proof.tables}/power.csv",
+        "families": f"{CONFIG.proof.tables}/families.csv",
+    },
+    "changes": {"measured": "docs/proof/changes_summary.csv"},
     "abstract": QUOTED | PRINTED,
     "conclusions": QUOTED | PRINTED | {"propellers": "results/rotor/coefficients.json"},
 }

@@ -9,7 +9,7 @@ def stored_benchmarks(wildcards, input):
 
 
 rule chapter_speed:
-    """Tables of the benchmarks, and how time grows with the recording."""
+    """Tables of the benchmarks."""
     message:
         "Chapter speed: tables"
     input:
@@ -29,12 +29,6 @@ rule chapter_speed:
         fleet="results/report/speed/fleet.csv",
         fem="results/report/speed/fem.csv",
         stored="results/report/speed/stored.json",
-        growth=report(
-            "results/report/speed/growth.svg",
-            category="Appendix",
-            caption="../report/captions/appendix.rst",
-            labels={"figure": "growth with the recording"},
-        ),
     params:
         stored=stored_benchmarks,
         code=code_of("tabulate_speed"),

@@ -1,8 +1,7 @@
 """What changed between flights whose authors say what they changed.
 
 - The good flights are fitted once; flights with a weight and with a cut propeller are compared with them.
-- Figures of both: every quantity of level 1 over the flights. Of the flights with a weight: change of every believed
-  value, and what both believed vehicles leave.
+- Figures of both: every quantity of level 1 over the flights.
 - Where the recordings are not there, the result says so.
 """
 
@@ -13,26 +12,23 @@ from rotorid.mismatch.changes import words
 from rotorid.mismatch.changes.compare import changes_from
 from rotorid.mismatch.changes.joint import reference_of
 from rotorid.mismatch.changes.level_one_words import quantity_words
-from rotorid.mismatch.decision.words import channel_words
 from rotorid.recordings import read_set
 from rotorid.recordings.importers.report import read_report
 from rotorid.report import log
 from rotorid.report.plots import style
-from rotorid.report.plots.changes import draw_differences, draw_residuals, draw_values
+from rotorid.report.plots.changes import draw_differences
 
 
-def main(
-    normal: str, changed: dict[str, str], found: str, differences: dict[str, str], values: str, residuals: str
-) -> None:
+def main(normal: str, changed: dict[str, str], found: str, differences: dict[str, str]) -> None:
     """Compare the sets in the folders `changed`, by what was changed, with that in `normal`.
 
-    `differences` are the figures of level 1, by what was changed; `values` and `residuals` are those of the first.
+    `differences` are the figures of level 1, by what was changed.
     """
     reports = [read_report(Path(folder)) for folder in (normal, *changed.values())]
     reasons = [report["reason"] for report in reports if not report["available"]]
     out = {"available": not reasons, "reason": reasons[0] if reasons else "", "pairs": {}}
     if reasons:
-        for path in (*differences.values(), values, residuals):
+        for path in differences.values():
             style.placeholder(Path(path), reasons[0])
     else:
         reference = reference_of(read_set(normal))
@@ -41,9 +37,6 @@ def main(
         for name, own in compared.items():
             names = {d.quantity.key: quantity_words(d) for d in own.level_1.differences}
             draw_differences(own, names, Path(differences[name]))
-        first = next(iter(compared.values()))
-        draw_values(first, {p.symbol: words.name_words(p.symbol) for p in first.values}, Path(values))
-        draw_residuals(first, {c: channel_words(c) for c in first.residuals[0]}, Path(residuals))
     Path(found).write_text(json.dumps(out, indent=1) + "\n", encoding="utf-8")
 
 
@@ -54,6 +47,4 @@ if __name__ == "__main__":
             changed={name: snakemake.input[name] for name in ("weight", "cut")},
             found=snakemake.output.found,
             differences={name: snakemake.output[f"differs_{name}"] for name in ("weight", "cut")},
-            values=snakemake.output.values,
-            residuals=snakemake.output.residuals,
         )

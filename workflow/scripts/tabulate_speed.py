@@ -1,19 +1,15 @@
-"""Tables and figure of the chapter on speed, from what the benchmarks wrote.
+"""Tables of the chapter on speed, from what the benchmarks wrote.
 
 - One table (CSV) of each benchmark, its columns by short names.
 - The commit that each table was stored with (JSON).
-- Time and memory of the mismatch stage against the length of the recording (SVG).
 """
 
 import json
 from collections.abc import Mapping
 from pathlib import Path
 
-import pandas as pd
-
 from rotorid.io.text.markdown_table import first_table
 from rotorid.report import log
-from rotorid.report.plots import speed, style
 
 COLUMNS = {
     "simulator": ["what", "seconds", "times"],
@@ -27,7 +23,7 @@ COLUMNS = {
 
 
 def main(files: Mapping[str, str], stored: Mapping[str, str], out: Mapping[str, str]) -> None:
-    """Write the table of each benchmark in `files` to the file of the same name in `out`; `stored` and `growth` too."""
+    """Write the table of each benchmark in `files` to the file of the same name in `out`; `stored` too."""
     tables = {
         name: first_table(Path(files[name]).read_text(), columns, files[name]) for name, columns in COLUMNS.items()
     }
@@ -35,9 +31,7 @@ def main(files: Mapping[str, str], stored: Mapping[str, str], out: Mapping[str, 
         tables["selection"][column] = tables["selection"][column].str.replace("_", " ")
     for name, table in tables.items():
         table.to_csv(out[name], index=False)
-    numbers = tables["mismatch"][["samples", "analysis_s", "memory_mb"]].apply(pd.to_numeric)
     Path(out["stored"]).write_text(json.dumps(dict(stored), indent=1) + "\n", encoding="utf-8")
-    style.save(speed.growth(numbers), out["growth"])
 
 
 if __name__ == "__main__":

@@ -93,12 +93,12 @@ def state(value: float | None, low: float, high: float, at_least: float | None, 
 
 
 def summary(rows: pd.DataFrame, code: str) -> pd.DataFrame:
-    """Shares named, sizes covered and ids new or lost a set: over all, by family, by kind and by flight.
+    """Shares named, sizes covered and ids new or lost a set: over all, by the code of now, by family, kind and flight.
 
     Causes that a flight's columns cannot show are counted apart. `code` is the hash of the code of now: `older_rows` of
-    a line were judged by another.
+    a line were judged by another, and the lines of the group `code …` leave these out.
     """
-    groups = [("all", rows)]
+    groups = [("all", rows), (f"code {code[:7]}", rows[rows["code"] == code])]
     groups += [(f"of {s}s", part) for s, part in rows.groupby("set_of")]
     groups += [(f"family {f}", part) for f, part in rows.groupby("family")]
     groups += [(f"flight {f}", part) for f, part in rows.groupby("flight")]

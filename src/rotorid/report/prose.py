@@ -91,13 +91,15 @@ def render(path: str | Path, files: Mapping[str, str], emulated: bool = False) -
         on_page = f' moving="{files[moving]}"' if moving else ""
         return f"![{captioned(caption, kind)}]({files[name]}){{#{label} width={width}{on_page}}}"
 
-    def table(name: str, caption: str, columns: Sequence[Sequence[str]], kind: str) -> str:
-        rows = known.get(name)
-        if not isinstance(rows, list):
+    def table(
+        name: str, caption: str, columns: Sequence[Sequence[str]], kind: str, rows: Sequence[Mapping] | None = None
+    ) -> str:
+        whole = known.get(name)
+        if not isinstance(whole, list):
             raise ProseError(f"{path}: there is no table called {name}.")
         label = f"tbl:{path.stem}-{name}".replace("_", "-")
         try:
-            return table_of(rows, captioned(caption, kind), columns, label)
+            return table_of(whole if rows is None else rows, captioned(caption, kind), columns, label)
         except KeyError as missing:
             raise ProseError(f"{path}: the table {name} has no column {missing}.") from None
 

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
-from rotorid_proof import plots as proof
-from rotorid_proof import show
+from rotorid_proof import show, table
 
 
 def test_small_coefficients_stand_in_units_of_a_power_of_ten() -> None:
@@ -41,62 +41,80 @@ def test_a_wrong_value_is_named_without_its_unit() -> None:
     assert shown["error"] == "0.100 / 0.100 / 0.100 N".replace(" ", "\u00a0")
 
 
-def test_families_in_which_nothing_was_wrong_stand_together():
-    families = pd.DataFrame(
-        [
-            ("Drawn", "late", "2026-11-30", 1, 1, 0, None, None, "aa", 0),
-            ("Drawn", "steady_wind", "2026-11-30", 2, 1, 0, None, "steady_wind 1", "aa", 0),
-            ("Drawn", "clean", "2026-11-30", 4, 4, 0, None, None, "aa", 0),
-        ],
-        columns="simulator family released cases right false_alarms wrong_names missed judged_by looked_at".split(),
+STORED = Path(__file__).parents[3] / "docs" / "proof"
+MOST_ROWS = {"of_questions": 28, "of_releases": 12, "of_drawn": 6, "of_plantings": 4}
+"""Rows of the tables in the proof's chapter: all of them together fill two pages, and it stays one that is read."""
+
+
+def stored(name: str) -> pd.DataFrame:
+    return pd.read_csv(STORED / f"{name}.csv", low_memory=False)
+
+
+def drawn(released: str, kind: str, clean: bool, right: bool = True, false: int = 0) -> dict:
+    counts = {"claim_count": 0 if clean else 1, "false_count": false, "false_alarm": clean and not right}
+    return {"released": released, "kind": kind, "clean": clean, "right": right, "judged_by": "c87a46b88923", **counts}
+
+
+def test_drawn_cases_have_a_row_for_each_kind_and_the_state_of_their_targets() -> None:
+    cases = [drawn("aa", "flight", clean=False, right=k > 0, false=int(k == 0)) for k in range(8)]
+    cases += [drawn("aa", "bench", clean=False)] + [drawn("aa", "flight", clean=True, right=k > 9) for k in range(20)]
+    cases = pd.DataFrame([*cases, drawn("bb", "stand", clean=False), {"released": None, "kind": "flight"}])
+    shown = show.of_drawn(cases, "aa")
+    assert shown["kind"].tolist() == ["flights", "benches", "all", "target", "state"]
+    assert shown["hidden"].tolist() == ["8", "1", "9", "", ""] and shown["right"].tolist()[:3] == ["7", "1", "8"]
+    assert shown["alarms"].tolist() == ["10 of 20", "–", "10 of 20", "≤ 1 %", "fails"]
+    assert shown["names"].tolist()[2:] == ["1 of 9", "≤ 5 %", "not refuted"] and shown["wrong"][2] == "1"
+    assert show.of_drawn(cases, "cc").empty
+
+
+def test_a_release_has_one_row_and_all_releases_one_more() -> None:
+    cases = pd.DataFrame([drawn(r, kind, clean) for r in "ab" for kind in ("flight", "stand") for clean in (0, 1)])
+    named = pd.DataFrame(
+        [("development", "24d4aceab5", None), ("a", "40ff225aa7", "c87a46b8"), ("b", "dfbaf78b", "c9fa")]
     )
-    shown = show.of_families(families, {"2026-11-30": "6319ce1"})
-    assert set(shown["released"]) == {"6319ce1"}
-    assert shown["family"].tolist() == ["steady wind", "2 families, all right"]
-    assert shown["cases"].tolist() == ["2", "5"] and shown["missed"].tolist() == ["steady wind 1", ""]
+    shown = show.of_releases(cases, named.set_axis(["released", "commit", "code"], axis=1))
+    assert shown["released"].tolist() == ["40ff225", "dfbaf78", "all"]
+    assert shown["by"].tolist() == ["c87a46b", "c9fa", "each its own"]
+    assert shown["right"].tolist() == ["2", "2", "4"] and shown["alarms"].tolist() == ["0 of 2", "0 of 2", "0 of 4"]
 
 
-def release_row(key: str, value: float, cases: int) -> dict:
-    blank = {"what": key, "at_least": None, "at_most": 0.05, "low_95": 0.0, "high_95": 1.0, "holds": "not refuted"}
-    return {"id": key, "value": value, "cases": cases, "judged_by": "", "looked_at": 0, **blank}
-
-
-def test_releases_have_a_row_for_each_date_and_simulator_and_one_for_all():
-    rows = []
-    for date, right in (("2026-11-26", 0.75), ("2026-11-27", 0.5)):
-        for simulator in ("multibody", "stand_rig"):
-            rows += [
-                release_row(f"{simulator}_{date}_clean_alarms", 0.25, 4),
-                release_row(f"{simulator}_{date}_right", right, 8),
-                release_row(f"{simulator}_{date}_false", 0.1, 10),
-            ]
-    summary = pd.DataFrame([*rows, release_row("clean_alarms", 0.0, 20)])
-    shown = show.of_releases(summary, {"2026-11-26": "40ff225"})
-    assert shown["released"].tolist() == ["40ff225", "40ff225", "2026-11-27", "2026-11-27", "all"]
-    assert list(shown["simulator"]) == ["flights (multibody)", "stands", "flights (multibody)", "stands", ""]
-    assert list(shown["right"]) == ["6 of 8", "6 of 8", "4 of 8", "4 of 8", "20 of 32"]
-    assert shown.iloc[-1]["alarms"] == "4 of 16"
-    assert shown.iloc[-1]["share"] == "45.3 to 77.1 %".replace(" ", "\u00a0")
-    # All targets stand in one table, those of releases too; further scores leave releases out.
-    assert len(show.with_target(summary)) == len(summary)
-    assert list(show.without_target(summary.assign(at_most=float("nan")))["what"]) == ["clean_alarms"]
-
-
-def test_a_row_says_which_code_judged_it_and_what_was_looked_at() -> None:
-    row = release_row("multibody_2026-11-26_false", 0.1, 10) | {"what": "Drawn stands, released 2026-11-26: wrong"}
-    rows = pd.DataFrame(
-        [
-            row | {"judged_by": "c87a46b88923cd47"},
-            row | {"judged_by": "unknown", "looked_at": 10},
-            row | {"judged_by": None, "looked_at": 4},
-        ]
+def test_questions_are_the_stored_summary_with_the_kinds_together() -> None:
+    summary, better = stored("summary").set_index("id"), stored("summary").tail(0)
+    shown = show.of_questions(stored("cases"), stored("parameters"), better).set_index("what")
+    row = shown.loc["Single effects, weak: right one named"]
+    prefixes = ("", "stand_", "bench_")
+    assert row["kinds"] == " / ".join(f"{100 * summary['value'][f'{p}single_weak']:.3g}" for p in prefixes) + " %"
+    assert int(row["cases"]) == sum(summary["cases"][f"{p}single_weak"] for p in prefixes)
+    of_flights_alone = shown.loc["Location: stated regime is the effect's"]
+    assert (
+        of_flights_alone["kinds"] == "" and of_flights_alone["measured"] == f"{100 * summary['value']['regime']:.1f} %"
     )
-    shown = show.with_target(rows, {"2026-11-26": "40ff225"})
-    assert shown["by"].tolist() == ["c87a46b", "not kept", "not kept, 4 seen"]
-    assert shown["what"].unique().tolist() == ["Drawn stands, 40ff225: wrong"]
-    assert shown["with_interval"][0] == "10.0 % (0.0 to 100.0 %)".replace(
-        "0.0 to 100.0 %", "0.0\u00a0to\u00a0100.0\u00a0%"
-    )
+    # What has a target stands first.
+    assert (shown["target"] != "").tolist() == sorted(shown["target"] != "", reverse=True)
+
+
+def test_the_stored_summary_follows_from_the_stored_cases() -> None:
+    rows = pd.DataFrame(table.summary(table.scores_from(stored("cases"), stored("parameters")))).set_index("id")
+    kept = stored("summary").set_index("id").drop(index="better")
+    assert sorted(rows.index) == sorted(kept.index)
+    kept = kept.loc[rows.index]
+    assert (rows["holds"].fillna("") == kept["holds"].fillna("")).all() and (rows["cases"] == kept["cases"]).all()
+    for column in ("value", "low_95", "high_95"):
+        np.testing.assert_allclose(rows[column].astype(float), kept[column], rtol=1e-5)
+
+
+def test_the_chapter_stays_one_that_is_read_to_the_end() -> None:
+    """Before: thirteen pages of 94 targets, one for each family of each release."""
+    releases = stored("releases")
+    planted = show.of_plantings(stored("plantings_summary"))
+    sizes = {
+        "of_questions": len(show.of_questions(stored("cases"), stored("parameters"), stored("summary").tail(0))),
+        "of_releases": len(show.of_releases(stored("cases"), releases)),
+        "of_drawn": len(show.of_drawn(stored("cases"), str(releases["released"].iloc[-1]))),
+        "of_plantings": int(planted["kind"].isin(["code", "all", "target", "state"]).sum()),
+    }
+    assert {name: most for name, most in MOST_ROWS.items() if sizes[name] > most} == {}
+    assert min(sizes.values()) > 3
 
 
 def test_codes_of_stored_tables() -> None:
@@ -106,23 +124,14 @@ def test_codes_of_stored_tables() -> None:
 
 
 def test_every_stored_table_of_the_repository_has_a_code_or_a_commit() -> None:
-    stored = Path(__file__).parents[3] / "docs" / "proof"
-    names = show.commits(pd.read_csv(stored / "releases.csv"))
-    tables = {name: pd.read_csv(stored / f"{name}.csv") for name in ("cases", "confusion", "power", "peers", "real")}
+    names = show.commits(stored("releases"))
+    tables = {name: stored(name) for name in ("cases", "confusion", "power", "peers", "real")}
     codes = show.codes_of(tables, names[show.DEVELOPMENT])
     assert codes["confusion"] == codes["power"] == codes["peers"] == "not kept (of commit 24d4ace or before)"
     assert codes["cases"].endswith(codes["power"]) and "not kept" not in codes["real"]
     drawn = tables["cases"].dropna(subset="released")
-    by_release = pd.read_csv(stored / "releases.csv").set_index("released")["code"]
+    by_release = stored("releases").set_index("released")["code"]
     assert (drawn["judged_by"] == drawn["released"].map(by_release)).all()
-
-
-def test_the_figure_of_the_targets_has_every_target() -> None:
-    rows = [release_row("clean_alarms", 0.0, 20), release_row("multibody_2026-11-26_right", 0.9, 4)]
-    rows += [release_row("oracle", 1.01, 9) | {"at_most": 1.05, "low_95": 1.0, "high_95": 1.02}]
-    fig = proof.targets(pd.DataFrame(rows).astype({"at_least": float}))
-    labels = [text.get_text() for axis in fig.axes for text in axis.get_yticklabels()]
-    assert sorted(labels) == ["clean_alarms (20)", "multibody_2026-11-26_right (4)", "oracle (9)"]
 
 
 def test_what_was_expected_of_a_real_set_is_shown_and_whether_it_was_found() -> None:
@@ -131,7 +140,8 @@ def test_what_was_expected_of_a_real_set_is_shown_and_whether_it_was_found() -> 
     rows = [row | {"expected": "unequal_rotors; com_offset", "expected_found": None}]
     rows += [row | {"expected": "motor_lag", "expected_found": "motor_lag"}, row | {"expected": None}]
     shown = show.of_studies(pd.DataFrame(rows))
-    assert shown["expected"].tolist() == ["unequal rotors: no; com offset: no", "motor lag: found", "–"]
+    assert shown["expected"].tolist() == ["unequal rotors; com offset", "motor lag", "–"]
+    assert shown["lacking"].tolist() == ["unequal rotors; com offset", "–", "–"]
     assert shown["confirmed"].tolist() == [0, 1, ""]
     halted = show.of_studies(pd.DataFrame([rows[0] | {"word": "stopped"}])).iloc[0]
     assert (halted["found"], halted["error"], halted["confirmed"]) == ("the stage stopped", "–", 0)
@@ -143,10 +153,10 @@ def test_plantings_are_counted_by_flight_and_family():
         rated = {"size": "large", "count": count, "at_least": float("nan"), "at_most": 0.1, "state": "fails"}
         return [{"group": group, "what": w, "value": v, **rated} for w, v in values.items()]
 
-    now = pd.DataFrame([*scores("family air", 1.0, 2), *scores("all", 0.56, 25), *scores("kind mass", 0.0, 2)])
-    shown = show.of_plantings(now)
-    assert list(shown["group"]) == ["all", "target", "verdict", "air"]
-    assert list(shown["named"]) == ["14 of 25", "≤ 0.1", "fails", "2 of 2"]
+    groups = [("family air", 1.0, 2), ("all", 0.56, 25), ("code 07ac8cc", 0.5, 10), ("kind mass", 0.0, 2)]
+    shown = show.of_plantings(pd.DataFrame([score for group in groups for score in scores(*group)]))
+    assert list(shown["group"]) == ["code 07ac8cc", "all codes", "target", "state", "air"]
+    assert list(shown["named"]) == ["5 of 10", "14 of 25", "≤ 0.1", "fails", "2 of 2"]
     assert shown.iloc[0]["moved"] == "0.68"
 
 
@@ -184,7 +194,7 @@ def test_the_numbers_of_the_campaign_say_how_many_are_inside() -> None:
 def test_an_effect_stands_with_its_class_and_its_interval_in_one_cell() -> None:
     effects = pd.DataFrame(
         [
-            ("rotor_drag", "established", "", "k_d", 4.08e-5, 3.9e-5, 4.34e-5, "N s2"),
+            ("rotor_drag", "established", None, "k_d", 4.08e-5, 3.9e-5, 4.34e-5, "N s2"),
             ("axial_inflow", "suggested", "axial_inflow or frame_drag", None, None, None, None, None),
         ],
         columns=["effect", "status", "alternatives", "symbol", "value", "low_95", "high_95", "unit"],
@@ -193,4 +203,4 @@ def test_an_effect_stands_with_its_class_and_its_interval_in_one_cell() -> None:
     assert shown.iloc[0].tolist() == ["rotor drag", "established", "k_d", "40.8 (39 to 43.4)", "1e-6 N s2"]
     unsure = pd.DataFrame([{**effects.iloc[0], "value": -4.38e-5, "low_95": -0.0052, "high_95": 0.0051}])
     assert show.of_effects(unsure)["value"].item() == "−0.00004 (−0.00520 to 0.00510)"
-    assert shown.iloc[1].tolist() == ["axial inflow (or: axial inflow or frame drag)", "suggested", "", "", ""]
+    assert shown.iloc[1].tolist() == ["axial inflow (or: frame drag)", "suggested", "", "", ""]
