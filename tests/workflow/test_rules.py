@@ -1,7 +1,6 @@
 """What every rule must have, read from the rule files; and what every chapter must."""
 
 import ast
-import importlib.util
 import json
 import re
 import textwrap
