@@ -23,7 +23,7 @@ _PENALTIES = 10.0 ** np.arange(-4.0, 3.5, 0.5)
 _MOST_LEFT = 0.9
 """Share of the squares where not fitted that derivatives may leave of a channel."""
 _HELPS_IN = 1 / 2
-"""Share of the folds in which they must leave less. Of 1/2, 2/3 and 4/5 each of eight laboratories' others choose 1/2."""
+"""Share of the folds in which they must leave less: what seven laboratories choose for the eighth, each in turn."""
 _EDGE = 0.002
 """Share of the rows beyond each edge at which a quantity is held."""
 _LEAST_FOLDS = 3
