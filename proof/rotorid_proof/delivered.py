@@ -13,8 +13,10 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.mismatch.decision.findings import Analysis
+from rotorid.mismatch.decision.shares import fitted_part
 from rotorid.mismatch.delivery.files import delivered, improved_vehicle
 from rotorid.mismatch.delivery.usable import question_of
+from rotorid.mismatch.plant.rows import CHANNELS
 from rotorid.mismatch.tell.verdict import Verdict
 from rotorid.recordings import RecordingSet, Vehicle, read_set
 from rotorid.report.deliver import analysis_of, verdict_of
@@ -29,6 +31,8 @@ CANDIDATES = ("believed", "refitted", "named", "believed+d", "refitted+d", "name
 """Vehicles that may be delivered; with `+d` with derivatives."""
 STAGES = ("refitted", "named", "after", "noise")
 """Errors on runs held out, in the geometric mean over channels of force and moment over the believed vehicle's."""
+HALF_S = 0.5
+"""Over which errors are averaged: what half a second of simulation accumulates."""
 WORSE = 1.05
 """Error over the better of the believed and the refitted vehicle's from which a channel is worse."""
 COLUMNS = (
@@ -42,6 +46,7 @@ COLUMNS = (
     "not_delivered",
     *(f"score_{name}" for name in CANDIDATES),
     *(f"held_out_{stage}" for stage in STAGES),
+    *(f"half_second_{stage}" for stage in STAGES[:3]),
     *(f"peer_{name}" for name in predicting.PEERS),
     "channels",
     "channels_worse",
@@ -86,6 +91,7 @@ def row_of(recordings: RecordingSet, analysis: Analysis, verdict: Verdict) -> di
         "not_delivered": "; ".join(f"{f.id}: {f.withheld}" for f in analysis.findings if f.withheld),
         **{f"score_{candidate_name(s.model, s.derivatives)}": s.score for s in verdict.delivered.scores},
         **held_out_errors(verdict),
+        **(half_second_errors(analysis) if flies else {}),
         **({f"peer_{n}": e for n, e in predicting.errors(analysis).items()} if flies else {}),
         "unfit": question_of(analysis.believed, analysis.recordings.runs)[0](vehicle) if flies else "",
         "not_exported": " ".join(refused_by(vehicle)) if flies else "",
@@ -115,6 +121,29 @@ def held_out_errors(verdict: Verdict) -> dict[str, float | int]:
     worse = table[:, 2] > WORSE * np.minimum(1.0, table[:, 0])
     stages = {f"held_out_{stage}": round(float(m), 4) for stage, m in zip(STAGES, means, strict=True)}
     return {**stages, "channels": len(rows), "channels_worse": int(worse.sum())}
+
+
+def half_second_errors(analysis: Analysis) -> dict[str, float]:
+    """Means over half a second of what each stage leaves of the runs held out, as `held_out_errors` states errors."""
+    part = fitted_part(analysis)
+    squares: dict[str, list[np.ndarray]] = {}
+    for t in analysis.traces:
+        held = part(t.run, t.time_s) < 0
+        if t.channel not in CHANNELS[:6] or held.sum() < 2:
+            continue
+        rows = max(1, round(HALF_S / float(np.median(np.diff(t.time_s)))))
+        left = np.array([t.before, t.refitted, t.named, t.after])[:, held]
+        count = left.shape[1] // rows
+        means = left[:, : count * rows].reshape(4, count, rows).mean(axis=2)
+        squares.setdefault(t.channel, []).append(means**2)
+    sizes = [np.sqrt(np.nanmean(np.concatenate(own, axis=1), axis=1)) for own in squares.values()]
+    over = np.array([own[1:] / own[0] for own in sizes if np.all(own > 0)])
+    if not len(over):
+        return {}
+    return {
+        f"half_second_{stage}": round(float(m), 4)
+        for stage, m in zip(STAGES[:3], np.exp(np.log(over).mean(axis=0)), strict=True)
+    }
 
 
 def not_flown_by(vehicle: Vehicle) -> list[str]:
