@@ -529,7 +529,7 @@ def _amount(recordings: RecordingSet) -> Iterator[Doubt]:
         if rates and min(rates) < _LEAST_RATE_HZ[name]:
             yield Doubt(
                 columns[0],
-                f"The {name} come at {min(rates):.3g} Hz, {_LEAST_RATE_HZ[name]:g} Hz and more are better: "
+                f"The {name} {'come' if name.endswith('s') else 'comes'} at {min(rates):.3g} Hz, {_LEAST_RATE_HZ[name]:g} Hz and more are better: "
                 f"{costs[name]}.",
                 stops=False,
             )

@@ -119,6 +119,11 @@ def test_few_and_rare_samples_are_named(flown) -> None:
     assert "Only 12 s are recorded" in found[0].sentence
     assert "rotor speeds come at 2.5" in found[1].sentence
 
+    def slow(table):
+        table.loc[table.index % 100 != 0, list(c.SPECIFIC_FORCE)] = np.nan
+
+    assert any("The accelerometer comes at 2.5" in doubt.sentence for doubt in doubts_of(changed(flown, slow)))
+
 
 def test_a_nearly_right_name_is_named(flown) -> None:
     misspelt = changed(flown, lambda t: t.insert(1, "velocity_x_ms", t.pop("velocity_x_m_s")))

@@ -206,7 +206,8 @@ def _causes(contents: Contents) -> str:
         words, unit = parameter_words(name)
         clauses.append(f"the {words} is {f'{number(refitted, 3)} {unit}'.rstrip()}, not {number(believed, 3)}")
     if len(wrong) > most:
-        clauses.append(f"{len(wrong) - most} more values are wrong")
+        left = len(wrong) - most
+        clauses.append(f"{left} more values are wrong" if left > 1 else "one more value is wrong")
     return listed(clauses)
 
 

@@ -207,3 +207,10 @@ def test_a_floor_is_no_larger_than_an_error_that_is_reached_where_nothing_was_fi
     assert reached(1.0, reached_there) == 0.2 and reached(0.1, reached_there) == 0.1
     assert reached(1.0, Errors(before=None, refitted=None, named=None, after=None)) == 1.0
     assert reached(None, reached_there) is None
+
+
+def test_of_many_wrong_values_the_others_are_counted():
+    values = {"mass_kg": (0.6, 0.652, 0.65, 0.654), "thrust_coefficient_n_s2": (1e-6, 2e-6, 1.9e-6, 2.1e-6)}
+    values |= {f"inertia_{a}{a}_kg_m2": (0.01, 0.012, 0.011, 0.013) for a in "xy"}
+    one, two = (verdict_of(analysis(values=dict(list(values.items())[:n]))).sentence for n in (3, 4))
+    assert one.endswith("and one more value is wrong.") and two.endswith("and 2 more values are wrong.")
