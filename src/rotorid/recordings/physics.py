@@ -527,9 +527,10 @@ def _amount(recordings: RecordingSet) -> Iterator[Doubt]:
                 known = np.isfinite(run.array(columns)).all(axis=1)
                 rates.append(known.sum() / max(float(run.time_s[-1] - run.time_s[0]), 1e-9))
         if rates and min(rates) < _LEAST_RATE_HZ[name]:
+            come = "come" if name.endswith("s") else "comes"
             yield Doubt(
                 columns[0],
-                f"The {name} {'come' if name.endswith('s') else 'comes'} at {min(rates):.3g} Hz, {_LEAST_RATE_HZ[name]:g} Hz and more are better: "
+                f"The {name} {come} at {min(rates):.3g} Hz, {_LEAST_RATE_HZ[name]:g} Hz and more are better: "
                 f"{costs[name]}.",
                 stops=False,
             )
