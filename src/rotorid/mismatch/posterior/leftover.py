@@ -18,11 +18,11 @@ and t_c is the most probable one given what the best model leaves.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from rotorid.mismatch.plant.regression import NEVER_EXCITED
+from rotorid.mismatch.plant.regression import NEVER_EXCITED, making_room
 from rotorid.mismatch.posterior.evidence import Evidence
 
 TINY = 1e-300
@@ -63,6 +63,10 @@ class _ChannelSpectrum:
     """(E, k) cross products along them."""
 
 
+_MOST_REMEMBERED = 64
+"""Variances of the leftover of which a spectrum remembers the sums: they are of a few (VARIANCES)."""
+
+
 @dataclass(frozen=True)
 class Spectrum:
     """The evidence of a flight in the eigenvectors of each channel's and environment's Gram matrix."""
@@ -75,8 +79,16 @@ class Spectrum:
     rows: float
     """Whitened squares that the model of all columns leaves: the number of rows, as the whitening counts them."""
 
+    _weighed: dict[bytes, Weighed] = field(default_factory=dict, compare=False, repr=False)
+
     def weighed(self, variance: np.ndarray) -> Weighed:
-        """Sums over channels with a leftover of `variance` (C,) taken out."""
+        """Sums over channels with a leftover of `variance` (C,) taken out; remembered, not to be written to."""
+        asked = np.asarray(variance, float).tobytes()
+        if asked not in self._weighed:
+            making_room(self._weighed, _MOST_REMEMBERED)[asked] = self._sums(variance)
+        return self._weighed[asked]
+
+    def _sums(self, variance: np.ndarray) -> Weighed:
         size = len(self.unit)
         gram, cross, kept = np.zeros((size, size)), np.zeros(size), np.ones(len(self.channels))
         for c, (own, t) in enumerate(zip(self.channels, variance, strict=True)):

@@ -88,70 +88,88 @@ def places(columns: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     return np.array([at[c] for c in wanted], int)
 
 
-def mode_of(
-    problem: Problem,
-    columns: np.ndarray,
-    believed: tuple[np.ndarray, np.ndarray, np.ndarray],
-    exact: bool = True,
-) -> _Mode | None:
+def mode_of(problem: Problem, columns: np.ndarray, believed: tuple[np.ndarray, np.ndarray, np.ndarray]) -> _Mode | None:
     """The mode of some columns within their bounds; None where the normal equations have none.
 
-    `believed` are one-sigma and bounds of every column (`Problem.believed`). `exact` limits the noise of the regressors
-    in every direction of these columns, else column by column: faster, to rank moves by.
+    `believed` are one-sigma and bounds of every column (`Problem.believed`). The noise of the regressors is limited in
+    every direction of these columns.
     """
-    if not len(columns):
-        return _Mode(0.0, np.zeros(0), np.zeros((0, 0)))
     grid = np.ix_(columns, columns)
-    gram, (sd, low, high) = problem.gram[grid], (own[columns] for own in believed)
-    bias = limited_bias(gram, problem.bias[grid]) if exact else problem.limited_bias[grid]
-    right = problem.cross[columns] - problem.limited_bias_cross[columns]
-    found = _factorised([gram - bias, gram + _RIDGE * np.diag(np.diag(gram))], sd)
-    if found is None:
-        return None
-    normal, triangle = found
-    covariance = np.linalg.inv(normal * np.outer(sd, sd)) * np.outer(sd, sd)
-    beta = within_bounds(
-        *_with_apart(problem, columns, normal, right, sd), low, high, sd, _slack_of(problem, columns, covariance)
-    )
-    if beta is None:
-        return None
-    value = right @ beta - 0.5 * beta @ normal @ beta - np.log(np.diag(triangle)).sum()
-    return _Mode(float(value), beta, covariance)
+    bias = limited_bias(problem.gram[grid], problem.bias[grid])
+    return _modes(problem, columns[None], bias[None], believed)[0]
 
 
-def _factorised(grams: list[np.ndarray], sd: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """Normal matrix of the first Gram matrix that makes a positive one, and its triangle in units of the prior.
+def log_evidences(
+    problem: Problem, columns: np.ndarray, believed: tuple[np.ndarray, np.ndarray, np.ndarray]
+) -> np.ndarray:
+    """About the log evidence of each of many sets of columns (m, k); −∞ where there is no mode.
 
-    The correction for noisy regressors may overshoot; the second is without it.
+    The noise of the regressors is limited column by column: faster, to rank moves by.
     """
-    for gram in grams:
-        normal = gram + np.diag(1.0 / sd**2)
+    bias = problem.limited_bias[columns[:, :, None], columns[:, None, :]]
+    return np.array([-np.inf if m is None else m.log_evidence for m in _modes(problem, columns, bias, believed)])
+
+
+def _modes(
+    problem: Problem, columns: np.ndarray, bias: np.ndarray, believed: tuple[np.ndarray, np.ndarray, np.ndarray]
+) -> list[_Mode | None]:
+    """The modes of many sets of columns (m, k) at once, whose regressors' noise is `bias` (m, k, k)."""
+    count, size = columns.shape
+    if not size:
+        return [_Mode(0.0, np.zeros(0), np.zeros((0, 0)))] * count
+
+    def one_by_one() -> list[_Mode | None]:
+        return [m for c, b in zip(columns, bias, strict=True) for m in _modes(problem, c[None], b[None], believed)]
+
+    gram, (sd, low, high) = problem.gram[columns[:, :, None], columns[:, None, :]], (own[columns] for own in believed)
+    right, units, at = problem.cross[columns] - problem.limited_bias_cross[columns], sd[:, :, None] * sd[:, None, :], (
+        slice(None), np.arange(size), np.arange(size))  # fmt: skip
+    normal = gram - bias
+    normal[at] += 1.0 / sd**2
+    try:
+        triangle = np.linalg.cholesky(normal * units)
+    except np.linalg.LinAlgError:
+        if count > 1:
+            return one_by_one()
+        # The correction for noisy regressors may overshoot: without it.
+        normal = gram.copy()
+        normal[at] += _RIDGE * gram[at] + 1.0 / sd**2
         try:
-            return normal, np.linalg.cholesky(normal * np.outer(sd, sd))
+            triangle = np.linalg.cholesky(normal * units)
         except np.linalg.LinAlgError:
+            return [None]
+    covariance = np.linalg.inv(normal * units) * units
+    errors = np.sqrt(np.maximum(covariance[at], 0.0))
+    slack = np.where(problem.is_value[columns], 0.0, problem.prior.slack * errors)
+    own, asked = _with_apart(problem, columns, normal, right, sd)
+    try:
+        free = np.linalg.solve(own * sd[:, None, :], asked[:, :, None])[:, :, 0] * sd
+    except np.linalg.LinAlgError:
+        return one_by_one() if count > 1 else [None]
+    out = []
+    for i, beta in enumerate(free):
+        beta = within_bounds(own[i], asked[i], low[i], high[i], sd[i], slack[i], beta)
+        if beta is None:
+            out.append(None)
             continue
-    return None
+        value = right[i] @ beta - 0.5 * beta @ normal[i] @ beta - np.log(np.diag(triangle[i])).sum()
+        out.append(_Mode(float(value), beta, covariance[i]))
+    return out
 
 
 def _with_apart(
     problem: Problem, columns: np.ndarray, normal: np.ndarray, right: np.ndarray, sd: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The normal equations in which the columns that some channels alone estimate have those channels' rows."""
+    """The normal equations (m, k, k), (m, k), in which columns that some channels alone estimate have their rows."""
     place = problem.place_apart[columns]
-    at = np.flatnonzero(place >= 0)
+    model, at = np.nonzero(place >= 0)
     if not len(at):
         return normal, right
-    normal, right, own = normal.copy(), right.copy(), place[at]
-    normal[at] = problem.gram_apart[np.ix_(own, columns)]
-    normal[at, at] += 1.0 / sd[at] ** 2
-    right[at] = problem.cross_apart[own]
+    normal, right, own = normal.copy(), right.copy(), place[model, at]
+    normal[model, at] = problem.gram_apart[own[:, None], columns[model]]
+    normal[model, at, at] += 1.0 / sd[model, at] ** 2
+    right[model, at] = problem.cross_apart[own]
     return normal, right
-
-
-def _slack_of(problem: Problem, columns: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """How far each coefficient may lie beyond its bounds (k,); a believed value not at all."""
-    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    return np.where(problem.is_value[columns], 0.0, problem.prior.slack * errors)
 
 
 def within_bounds(
@@ -161,22 +179,26 @@ def within_bounds(
     high: np.ndarray,
     sd: np.ndarray,
     slack: np.ndarray,
+    beta: np.ndarray,
 ) -> np.ndarray | None:
-    """Solution of normal equations within the bounds: the furthest out is held there, until none is out."""
+    """Solution of normal equations within the bounds: the furthest out is held there, until none is out.
+
+    `beta` is the solution without bounds; each may lie beyond its bounds by `slack` (k,).
+    """
     held, at = np.zeros(len(right), bool), np.zeros(len(right))
-    for _ in range(len(right) + 1):
-        free, beta = ~held, at.copy()
-        try:
-            rest = right[free] - normal[np.ix_(free, held)] @ at[held]
-            beta[free] = np.linalg.solve(normal[np.ix_(free, free)] * sd[free][None, :], rest) * sd[free]
-        except np.linalg.LinAlgError:
-            return None
+    for _ in range(len(right)):
         out = np.maximum(low - slack - beta, beta - high - slack)
         out[held] = -1.0
         worst = int(np.argmax(out / sd))
         if out[worst] <= 0:
             break
         held[worst], at[worst] = True, low[worst] if beta[worst] < low[worst] else high[worst]
+        free, beta = ~held, at.copy()
+        try:
+            rest = right[free] - normal[np.ix_(free, held)] @ at[held]
+            beta[free] = np.linalg.solve(normal[np.ix_(free, free)] * sd[free][None, :], rest) * sd[free]
+        except np.linalg.LinAlgError:
+            return None
     return beta
 
 

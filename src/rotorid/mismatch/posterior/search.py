@@ -17,13 +17,15 @@ from rotorid.mismatch.posterior.problem import Prior, Problem, problem_of
 from rotorid.mismatch.posterior.score import (
     Model,
     Posterior,
+    log_evidences,
     log_prior,
-    mode_of,
 )
 
 _MOST_SCORED = 8
 """Moves of a kind that are scored exactly."""
 _MOST_MOVES = 60
+_AT_ONCE = 64
+"""Models that are ranked in one call: what stays in the processor's memory."""
 _LEFTOVER_ROUNDS = 5
 """Rounds of model and leftover at most, should the two go on in a circle."""
 _LEAST_GAIN = 0.05
@@ -100,16 +102,25 @@ def _climbed(posterior: Posterior, start: Model) -> Model:
     return model
 
 
-def ranked(problem: Problem, model: Model) -> float:
-    """About a model's log posterior, nats, less a constant; −∞ where it has no mode."""
-    mode = mode_of(problem, problem.columns(model), problem.believed(model), exact=False)
-    return -np.inf if mode is None else mode.log_evidence + log_prior(problem, model)
+def ranked(problem: Problem, models: Sequence[Model]) -> np.ndarray:
+    """About the log posterior of each model (m,), nats, less a constant; −∞ where it has no mode."""
+    out = np.empty(len(models))
+    alike: dict[tuple[int, tuple[str, ...]], list[tuple[int, np.ndarray]]] = {}
+    for i, model in enumerate(models):
+        columns = problem.columns(model)
+        freed = tuple(k for k in model if k in problem.freed)
+        alike.setdefault((len(columns), freed), []).append((i, columns))
+    for (_, freed), own in alike.items():
+        for first in range(0, len(own), _AT_ONCE):
+            at, columns = zip(*own[first : first + _AT_ONCE], strict=True)
+            out[list(at)] = log_evidences(problem, np.array(columns), problem.believed(freed))
+    return out + np.array([log_prior(problem, model) for model in models])
 
 
 def best_of(posterior: Posterior, model: Model, moves: Sequence[Model]) -> Model | None:
     """The best of the most promising moves; None where none is better than the present model."""
-    here = ranked(posterior.problem, model)
-    gains = [ranked(posterior.problem, move) - here for move in moves]
+    here, *others = ranked(posterior.problem, [model, *moves])
+    gains = [value - here for value in others]
     best, found = posterior(model), None
     for k in sorted(range(len(moves)), key=lambda k: (gains[k], k), reverse=True)[:_MOST_SCORED]:
         if gains[k] < _WORST_RANKED:

@@ -194,9 +194,10 @@ def _instead_of_each(found: Found) -> dict[str, set[str]]:
 
 def _substitutes(found: Found, key: str) -> tuple[str, ...]:
     """Named ids with which in a term's place the model is nearly as probable."""
-    problem, here = found.problem, ranked(found.problem, found.model)
+    problem = found.problem
     instead = _instead(problem, found.model, key)
-    gains = {trial: ranked(problem, trial) - here for trial in instead}
+    here, *others = ranked(problem, [found.model, *instead])
+    gains = {trial: value - here for trial, value in zip(instead, others, strict=True)}
     out = set()
     for trial in sorted(instead, key=lambda t: -gains[t])[:_MOST_SUBSTITUTES]:
         if gains[trial] <= _WORST_SUBSTITUTE:

@@ -1,6 +1,7 @@
 """The posterior on small made-up flights: against the plain normal distribution, and what it finds and states."""
 
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from rotorid.mismatch.posterior.leftover import spectrum_of
 from rotorid.mismatch.posterior.limits import limits_of
 from rotorid.mismatch.posterior.problem import Prior, Problem, problem_of
 from rotorid.mismatch.posterior.score import Posterior, log_prior, scored
-from rotorid.mismatch.posterior.search import decide, most_probable
+from rotorid.mismatch.posterior.search import decide, most_probable, ranked
 from rotorid.mismatch.posterior.statements import statements_of
 
 BLOCKS, ROWS = 90, 8
@@ -150,6 +151,19 @@ def test_what_is_at_work_is_found_and_nothing_else():
     found = decide(flight([0.01, 0.0, 0.8, 0.0, -0.6]).evidence(), Prior())
     assert found.model == ("drag/plain", "tilt/plain")
     assert decide(flight([0.01, 0.0, 0.0, 0.0, 0.0]).evidence(), Prior()).model == ()
+
+
+def test_models_ranked_together_are_ranked_as_each_alone():
+    """Some beyond their bounds, some with a believed value freed, of different sizes."""
+    terms = (EvidenceTerm("mass", "value", "", 1, (0.05,)), OFFSET, effect("drag/plain", low=0.0, high=0.1))
+    terms = (*terms, effect("drag/free"), effect("lift/plain", high=0.0), effect("tilt/plain"))
+    asked = problem(flight([0.3, 0.1, 0.4, 0.0, 0.3, -0.2], terms))
+    keys = ["drag/plain", "drag/free", "lift/plain", "tilt/plain", *asked.freed]
+    models = [tuple(sorted(m)) for n in range(4) for m in combinations(keys, n)]
+    alone = np.concatenate([ranked(asked, [m]) for m in models])
+    assert len(models) > 20 and np.array_equal(ranked(asked, models), alone) and np.isfinite(alone).all()
+    best = max(models, key=lambda m: scored(asked, m).log_posterior)
+    assert alone[models.index(best)] > np.max(alone) - 1.0
 
 
 def test_a_start_is_left_where_it_is_wrong():
