@@ -44,7 +44,7 @@ class AttitudeLoop:
     allocation: np.ndarray
     """(k, 4), squared rotor speeds of thrust and moments."""
     reference: np.ndarray
-    """(steps + 1, 4): roll, pitch, yaw, rad, and thrust, N."""
+    """(steps + 1, 4), or (n, steps + 1, 4) of n vehicles: roll, pitch, yaw, rad, and thrust, N."""
     derivative_time_s: float = 0.0
     limit_n_m: np.ndarray | None = None
     """(3,), largest moments."""
@@ -114,7 +114,8 @@ def fly(
     loops, references, more = np.zeros(1, _LOOP), np.zeros((1, 1, 4)), np.zeros((0, k))
     series = np.zeros((1, 1, k))
     if closed:
-        loops, references = commands.constants(), np.ascontiguousarray(commands.reference)[None]
+        loops, references = commands.constants(), np.ascontiguousarray(commands.reference)
+        references = references[None] if references.ndim == 2 else references
         more = more if commands.more is None else np.ascontiguousarray(commands.more, float)
     else:
         series = np.ascontiguousarray(commands, float)

@@ -147,11 +147,8 @@ def choose(
         best = min(scored, key=lambda s: s.score)
         first = next(s for s in scored if s.score - best.score <= max(s.standard_error, _least_gain(s, best)))
         # Only who may be chosen is flown; the best, too, for the others are measured by it.
-        failing = {
-            s.candidate.name: why
-            for s in (best, first)
-            if s.candidate.name != ("believed", False) and (why := unfit(s.candidate))
-        }
+        asked = {s.candidate.name: s.candidate for s in (best, first) if s.candidate.name != ("believed", False)}
+        failing = {name: why for name, candidate in asked.items() if (why := unfit(candidate))}
         if not failing:
             known = {s.candidate.name: s for s in scored}
             every = [

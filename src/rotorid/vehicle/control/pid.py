@@ -116,10 +116,11 @@ class AttitudePid:
         """The controller laid out for instants (m,), s, so that it flies compiled; None once it has been called."""
         if self._memory is not None:
             return None
+        angles = self.reference.at(time_s)
         return AttitudeLoop(
             *(np.asarray(g) for g in (self.gains.proportional, self.gains.integral, self.gains.derivative)),
             allocation=self._allocation.T,
-            reference=np.column_stack([self.reference.at(time_s), np.full(len(time_s), self.reference.thrust_n)]),
+            reference=np.concatenate([angles, np.full((*angles.shape[:-1], 1), self.reference.thrust_n)], axis=-1),
             derivative_time_s=self.derivative_time_s,
             limit_n_m=self.limit_n_m,
             more=np.tile(self._trim, (len(time_s), 1)) if self._trim.any() else None,
@@ -128,16 +129,16 @@ class AttitudePid:
 
 @dataclass(frozen=True)
 class AttitudeReference:
-    """Total thrust, N, and a function of time (s) that gives roll, pitch, yaw (3,), rad."""
+    """Total thrust, N, and a function of time (s) that gives roll, pitch, yaw (3,), or (n, 3) of n vehicles, rad."""
 
     name: str
     thrust_n: float
     euler_rad: Callable[[float], np.ndarray]
     at_once: bool = False
-    """Whether the function takes many times (m,), too, and gives (m, 3)."""
+    """Whether the function takes many times (m,), too, and gives (m, 3), or (n, m, 3)."""
 
     def at(self, time_s: np.ndarray) -> np.ndarray:
-        """Roll, pitch and yaw at many times, (m, 3), rad."""
+        """Roll, pitch and yaw at many times, (m, 3) or (n, m, 3), rad."""
         return self.euler_rad(time_s) if self.at_once else np.array([self.euler_rad(t) for t in time_s], float)
 
 

@@ -76,25 +76,27 @@ def swings(vehicle: Vehicle, name: str, seconds: float, flights: int, seed: int,
         position_m=0.01,
         rotor_speed_relative=0.003,
     )
-    start = Start()
+    start = np.zeros((flights, 3))
     if vehicle.ground_z_m is not None:
-        start = Start(position_m=np.array([[0.0, 0.0, vehicle.ground_z_m - START_HEIGHT_M]]))
+        start[:, 2] = vehicle.ground_z_m - START_HEIGHT_M
+    drawn = [np.random.default_rng([seed, number]) for number in range(flights)]
+    phases = np.array([rng.uniform(0, 2 * np.pi, 3) for rng in drawn])
+    slow, middle, fast, sizes = np.array([[0.9, 0.7, 0.5], [3.1, 3.7, 1.3], [9.1, 11.3, 7.1], [0.25, 0.25, 0.4]])
+
+    def wanted(t: float | np.ndarray) -> np.ndarray:
+        """Angles of all flights, (flights, 3), or at instants (m,) (flights, m, 3)."""
+        t = np.asarray(t)[..., None]
+        phase = phases.reshape(flights, *[1] * (t.ndim - 1), 3)
+        swing = np.sin(slow * t + phase) + 0.5 * np.sin(middle * t)
+        return sizes * (swing + 0.3 * np.sin(fast * t + phase[..., ::-1]))
+
+    reference = AttitudeReference("swings", thrust_n, wanted, at_once=True)
+    pilot = AttitudePid(vehicle, reference, gains, _DERIVATIVE_S, most, steady.moments_n_m)
+    trace = simulate_as_stated(vehicle, pilot, seconds, 0.002, start=Start(position_m=start))
     runs: list[Run] = []
     believed = vehicle
-    slow, middle, fast, sizes = np.array([[0.9, 0.7, 0.5], [3.1, 3.7, 1.3], [9.1, 11.3, 7.1], [0.25, 0.25, 0.4]])
-    for number in range(flights):
-        rng = np.random.default_rng([seed, number])
-        phase = rng.uniform(0, 2 * np.pi, 3)
-
-        def wanted(t: float | np.ndarray, phase=phase) -> np.ndarray:
-            t = np.asarray(t)[..., None]
-            swing = np.sin(slow * t + phase) + 0.5 * np.sin(middle * t)
-            return sizes * (swing + 0.3 * np.sin(fast * t + phase[::-1]))
-
-        reference = AttitudeReference("swings", thrust_n, wanted, at_once=True)
-        pilot = AttitudePid(vehicle, reference, gains, _DERIVATIVE_S, most, steady.moments_n_m)
-        trace = simulate_as_stated(vehicle, pilot, seconds, 0.002, start=start)
-        made = record_as_stated(trace, vehicle, f"flight_{number + 1}", noise, rng, every=every)
+    for number, rng in enumerate(drawn):
+        made = record_as_stated(trace, vehicle, f"flight_{number + 1}", noise, rng, number, every)
         believed = made.vehicle
         runs += made.runs
     return RecordingSet(name, believed, tuple(runs))
