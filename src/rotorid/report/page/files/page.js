@@ -108,7 +108,12 @@
         ...plain(1), line("improved", "--after", 1)],
       hooks: { drawClear: [behind(about.noise ? 2 * about.noise : 0, windows)], ...together },
     }, [when, before, ...without, after]);
-    if (chosen.shown) { plots.time.setScale("x", { min: chosen.shown[0], max: chosen.shown[1] }); chosen.shown = null; }
+    if (chosen.shown) {
+      // Once both figures have scaled themselves, which they do after this.
+      const [min, max] = chosen.shown;
+      setTimeout(() => plots.time.setScale("x", { min, max }));
+      chosen.shown = null;
+    }
     const thin = data.every > 1 ? ` Every ${data.every}th row is shown.` : "";
     const kind = data.runs[chosen.run].held_out ? "held out" : "fitted";
     el("time-caption").textContent =
