@@ -64,9 +64,10 @@ def starts(found: Found, truth: Iterable[str]) -> list[tuple[str, ...]]:
     """Models of the ids that are true, each in one of its forms; the most probable first."""
     terms = found.problem.terms
     forms = [[key for key, t in terms.items() if t.kind == "effect" and t.effect == one] for one in sorted(truth)]
-    models = itertools.islice(itertools.product(*(own for own in forms if own)), MOST_RANKED)
-    best = sorted((tuple(sorted(model)) for model in models), key=lambda model: -ranked(found.problem, model))
-    return best[:MOST_STARTS]
+    every = itertools.islice(itertools.product(*(own for own in forms if own)), MOST_RANKED)
+    models = [tuple(sorted(model)) for model in every]
+    values = ranked(found.problem, models)
+    return [models[k] for k in sorted(range(len(models)), key=lambda k: -values[k])[:MOST_STARTS]]
 
 
 def stated(kept: Kept, found: Found) -> Said:

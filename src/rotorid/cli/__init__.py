@@ -73,5 +73,5 @@ app.command("model")(modelling.model)
 app.command("parameters")(parameters.parameters)
 app.command("effects")(effects.effects)
 
-OPEN = ("simulating", "waiting")
+OPEN = ("waiting",)
 """Modules that other rooms may import; all else is this room's own."""
