@@ -122,8 +122,8 @@ def _modes(
         return [m for c, b in zip(columns, bias, strict=True) for m in _modes(problem, c[None], b[None], believed)]
 
     gram, (sd, low, high) = problem.gram[columns[:, :, None], columns[:, None, :]], (own[columns] for own in believed)
-    right, units, at = problem.cross[columns] - problem.limited_bias_cross[columns], sd[:, :, None] * sd[:, None, :], (
-        slice(None), np.arange(size), np.arange(size))  # fmt: skip
+    right = problem.cross[columns] - problem.limited_bias_cross[columns]
+    units, at = sd[:, :, None] * sd[:, None, :], (slice(None), np.arange(size), np.arange(size))
     normal = gram - bias
     normal[at] += 1.0 / sd**2
     try:
