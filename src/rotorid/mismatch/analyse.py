@@ -61,7 +61,7 @@ from rotorid.mismatch.model.values import (
 )
 from rotorid.mismatch.model.within_trust import beyond_trust, settled
 from rotorid.mismatch.model.wrench import WrenchModel, linear_drag, nonlinear_intervals
-from rotorid.mismatch.plant.motion import full_speed, regime_variables, stretches
+from rotorid.mismatch.plant.motion import Segment, full_speed, regime_variables, stretches
 from rotorid.mismatch.plant.regression import Fit
 from rotorid.mismatch.plant.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE
 from rotorid.mismatch.plant.speedpath import CommandChain, SpeedResult, commanded_path
@@ -107,9 +107,10 @@ def analyse(recordings: RecordingSet, watch: Watch = unwatched) -> Analysis:
 def _analysed(recordings: RecordingSet, mistakes, remarks, watch: Watch) -> Analysis | None:
     """The analysis of a set whose mistakes are undone; None where nothing of the runs held out can be compared."""
     split = split_runs(recordings)
-    known, unseen = parts_of(recordings, split)
-    prepared = prepare(known, unseen=tuple(r.name for r in unseen.runs))
-    if not any(comparable(s, prepared.segments[0]) for s in prepare_like(prepared, unseen)[0]):
+    known, held_out = parts_of(recordings, split)
+    prepared = prepare(known, unseen=tuple(r.name for r in held_out.runs))
+    unseen = prepare_like(prepared, held_out)
+    if not any(comparable(s, prepared.segments[0]) for s in unseen[0]):
         return None
     found = fitted(prepared)
     model, values = found.model, found.values
@@ -251,7 +252,12 @@ def _winds_of(seen: WrenchModel) -> tuple[RunWind, ...]:
 
 
 def _offered(
-    choice: _Choice, words: Analysis, seen: WrenchModel, unseen: RecordingSet, moved: Values, plain_moved: Values
+    choice: _Choice,
+    words: Analysis,
+    seen: WrenchModel,
+    unseen: tuple[list[Segment], list[Segment]],
+    moved: Values,
+    plain_moved: Values,
 ) -> Offered:
     """What a choice offers for delivery: what is claimed, fitted without effects that are only suggested.
 

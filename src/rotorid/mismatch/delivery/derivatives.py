@@ -22,7 +22,7 @@ _PENALTIES = 10.0 ** np.arange(-4.0, 3.5, 0.5)
 """Of the ridge, times the number of rows; quantities are standardised."""
 _MOST_LEFT = 0.9
 """Share of the squares where not fitted that derivatives may leave of a channel."""
-_HELPS_IN = 1 / 2
+_HELPS_IN = 0.5
 """Share of the folds in which they must leave less: what seven laboratories choose for the eighth, each in turn."""
 _EDGE = 0.002
 """Share of the rows beyond each edge at which a quantity is held."""

@@ -14,7 +14,7 @@ import numpy as np
 from rotorid.mismatch.model.fitted import Fitted
 from rotorid.mismatch.model.gusts import with_gusts_of_new_runs
 from rotorid.mismatch.model.payload_windows import payload_windows_of, with_payload_on_board
-from rotorid.mismatch.model.prepare import assemble_rows, prepare_like
+from rotorid.mismatch.model.prepare import assemble_rows
 from rotorid.mismatch.model.swinging import hung, like, swinging_term
 from rotorid.mismatch.model.wrench import WrenchModel, in_wind, path_segments
 from rotorid.mismatch.plant.contributions import Contributions
@@ -30,7 +30,9 @@ _COMPARED = (
 """Quantities of a stretch that a model may need."""
 
 
-def on_every_run(found: Fitted, recordings: RecordingSet, split: Split, unseen: RecordingSet) -> WrenchModel:
+def on_every_run(
+    found: Fitted, recordings: RecordingSet, split: Split, unseen: tuple[list[Segment], list[Segment]]
+) -> WrenchModel:
     """The model with the rows of every run: those fitted as they were, those held out by the same equations.
 
     Parameters
@@ -40,11 +42,11 @@ def on_every_run(found: Fitted, recordings: RecordingSet, split: Split, unseen: 
     recordings, split
         The whole set and how it is split.
     unseen
-        The runs held out; of a single run its last part.
+        Stretches of the runs held out, and the same with noise added once more (`prepare_like`).
     """
     model = found.model
     prepared = model.prepared
-    own, noisy = prepare_like(prepared, unseen)
+    own, noisy = unseen
     # Columns that the fitted runs' sensors do not have are not in the model; a run without theirs cannot be compared.
     pairs = [(s, n) for s, n in zip(own, noisy or own, strict=True) if comparable(s, model.segments[0])]
     own = as_flown([s for s, _ in pairs], found)

@@ -64,7 +64,7 @@ def steps_sentence(verdict: Verdict) -> str:
         return ""
     held = any(c.rmse.held_out.after is not None for c in verdict.channels.values())
     claimed = {
-        e.id: " or ".join(map(effect_words, dict.fromkeys((e.id, *e.alternatives))))
+        e.id: listed([effect_words(i) for i in dict.fromkeys((e.id, *e.alternatives))], "or")
         for e in verdict.effects
         if e.delivered
     }

@@ -41,6 +41,14 @@ def test_without_rotor_speeds_what_is_between_command_and_speed_counts_with_the_
     assert "values and the lag of the motors take 35 % of the error off, rotor drag another 20 %" in said
 
 
+def test_a_class_is_named_as_one_of_its_members():
+    verdict = shrunk("named", 0.65, 0.45, 0.45)
+    members = ("frame_drag", "ground_effect", "rotor_drag")
+    drag = verdict.effects[0].model_copy(update={"status": "ambiguous", "alternatives": members})
+    said = steps_sentence(verdict.model_copy(update={"effects": [drag]}))
+    assert "rotor drag, drag of the airframe or ground effect another 20 %" in said
+
+
 def test_what_is_not_delivered_takes_nothing_off():
     verdict = shrunk("refitted", 0.65, 0.45, 0.50)
     whole = together(steps_of(verdict.channels, "refitted"))
