@@ -31,6 +31,7 @@ from rotorid.mismatch.model.swinging import (
     hung_by,
     like,
     price,
+    seems_to_swing,
     stretches_of,
     swinging_term,
     with_likely_length,
@@ -116,8 +117,12 @@ def _with_chain(prepared: Prepared, chain: CommandChain) -> tuple[CommandChain, 
     def modelled(chain: CommandChain) -> WrenchModel:
         return refined_model(without_same_curves(prepared, chain), *turning(prepared, chain))
 
-    model = modelled(chain)
+    # Which effects the commands are to be explained next to, one search says; only the last model is refined.
+    model = _with_own_scales(without_same_curves(prepared, chain), *turning(prepared, chain))
     known, trusted = bool(model.selection.active), strains(model)
+    if not known and not trusted:
+        model = modelled(chain)
+        known, trusted = bool(model.selection.active), strains(model)
     for _ in range(_CHAIN_ROUNDS if known or trusted else 0):
         # The wrench effects found change what the commands must explain, and what values beyond their trust made room
         # for is not delivered: once more with the effects known and such values as believed.
@@ -180,7 +185,7 @@ def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:
         before = model
         if segments[0].motion.hung is not None:
             segments, noisy = _hung_anew(model, terms) or (segments, noisy)
-        model = wrench_model(prepared, terms, chosen(model), model.selection.active, segments, noisy)
+        model = wrench_model(prepared, terms, chosen(model), model.selection.active, segments, noisy, model)
         if _converged(before, model):
             break
     model = with_wind(prepared, model, segments, noisy, terms)
@@ -209,7 +214,7 @@ def _with_own_scales(prepared: Prepared, segments, noisy, effects=None, start=No
     if not rules.OWN_SCALES(_thrust_differs(model)):
         return model
     terms = _with_run_scales(prepared.terms, prepared)
-    return wrench_model(prepared, terms, effects, model.selection.active, segments, noisy)
+    return wrench_model(prepared, terms, effects, model.selection.active, segments, noisy, model)
 
 
 def _with_payload(prepared: Prepared, model: WrenchModel, windows: list[Windows]):
@@ -234,6 +239,8 @@ def _with_swing(prepared: Prepared, model: WrenchModel):
     if start is None:
         return same
     stretches = stretches_of(model, model.segments, model.rows)
+    if not seems_to_swing(stretches, cable_of(model, start)):
+        return same
 
     def hangs(term: Term):
         cable = cable_of(model, term)

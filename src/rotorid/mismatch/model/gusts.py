@@ -157,7 +157,7 @@ def with_gusts(prepared: Prepared, model: WrenchModel, terms: list[Term]) -> Wre
     if not forces:
         return model
     again = wrench_model(
-        prepared, terms + forces, chosen(model), model.selection.active, segments, model.noisy_segments
+        prepared, terms + forces, chosen(model), model.selection.active, segments, model.noisy_segments, model
     )
     again = replace(again, wind=model.wind, wind_sd=model.wind_sd)
     if _feels_wind(again):
@@ -283,14 +283,16 @@ def _restless(model: WrenchModel) -> list[Term]:
 def _in_moving_air(prepared: Prepared, model: WrenchModel, terms: list[Term], asked: list[Term]) -> WrenchModel | None:
     """The search repeated with the wind of the windows asked for, as far as it is there; None where it is not."""
     still = {t.key: (t, np.zeros(t.size)) for t in asked}
-    winds, _ = estimated(prepared, model, still, STEPS)
+    winds, covariances = estimated(prepared, model, still, STEPS)
+    if not believed([_gust_of(term, wind, covariances[key]) for key, (term, wind) in winds.items()], model):
+        return None
     kept = [t for t in terms if t.effect != moving_air("all the time").id]
     again = model
     for _ in range(_ROUNDS):
         active = _lasting(again)
         moved = _in_gusts(model.segments, winds)
         noisy = _in_gusts(model.noisy_segments, winds) if model.noisy_segments else model.noisy_segments
-        again = wrench_model(prepared, [*kept, *asked], chosen(again), active, moved, noisy)
+        again = wrench_model(prepared, [*kept, *asked], chosen(again), active, moved, noisy, again)
         if not any(again.search.terms[k].effect in ids_of("drag") for k in again.selection.active):
             return None
         steps, covariances = estimated(prepared, again, still, 1)

@@ -157,7 +157,7 @@ def with_likely_length(model: WrenchModel, term: Term) -> Term | None:
 
 def likely_cable(cable: Cable, stretches: Sequence[HangingStretch]) -> Cable | None:
     """The cable near another one that explains most, the states free; None where nothing seems to swing."""
-    if share_left(stretches, cable) > 1.0 - LEAST_SHARE:
+    if not seems_to_swing(stretches, cable):
         return None
     for name, steps, apart in _LOOKED_FOR:
 
@@ -238,6 +238,11 @@ def largest_pieces(stretches: Sequence[HangingStretch], cable: Cable) -> list[Ha
         for start in np.arange(s.time_s[0], s.time_s[-1] - cable.piece_s, cable.piece_s)
     ]
     return sorted(pieces, key=lambda p: -p.squares)[:_LARGEST]
+
+
+def seems_to_swing(stretches: Sequence[HangingStretch], cable: Cable) -> bool:
+    """Whether a swing explains anything of the largest pieces."""
+    return share_left(stretches, cable) <= 1.0 - LEAST_SHARE
 
 
 def share_left(stretches: Sequence[HangingStretch], cable: Cable) -> float:

@@ -110,6 +110,8 @@ class WrenchModel:
     """What the terms add to the channels as far as their regressors are more than noise."""
     effects: list[tuple[Form, np.ndarray]] | None = None
     """Effects that shape the accelerations in the rows' regressors."""
+    inflated: np.ndarray | None = None
+    """Mask of the channels (12,) whose noise is what the model itself leaves."""
 
     def full_fit(self) -> Fit:
         """The fit of everything in the model, winds of single runs and all."""
@@ -187,8 +189,10 @@ def wrench_model(
     start: list[str] | None = None,
     segments: list[Segment] | None = None,
     noisy_segments: list[Segment] | None = None,
+    before: WrenchModel | None = None,
 ) -> WrenchModel:
-    """Assemble, whiten, reduce and search."""
+    """Assemble, whiten, reduce and search; `before` is a model of the same rows that says in which channels noise is
+    what a model leaves."""
     segments = prepared.segments if segments is None else segments
     noisy_segments = prepared.noisy_segments if noisy_segments is None else noisy_segments
     rows = assemble_rows(prepared, terms, segments, effects)
@@ -198,6 +202,9 @@ def wrench_model(
         colours = without_unseen(rows, noisy, prepared.thinner.rate_hz, prepared.thinner.cutoff_hz)
     precision = np.concatenate([1 / np.square(np.broadcast_to(t.prior_sd, (t.size,)).astype(float)) for t in terms])
     left, beta = full_fit_residuals(rows, precision, colours)
+    louder = np.zeros(12, bool) if before is None or before.inflated is None else before.inflated
+    if louder.any():
+        left = [np.where(louder, own, full) for own, full in zip(after_residual(before), left, strict=True)]
     model = searched(prepared, terms, rows, noisy, left, start, segments)
     model = replace(model, floor=np.fmin(model.noise, _whole_floor(model, beta, segments)))
     # The whole catalogue at once may explain what no model of it does (noise of the rotor speeds, say, with no
@@ -210,6 +217,7 @@ def wrench_model(
         active = model.selection.active
         again = searched(prepared, terms, rows, noisy, left, active, segments)
         model = replace(again, floor=model.floor)
+    model = replace(model, inflated=inflated | louder)
     return replace(model, segments=segments, noisy_segments=noisy_segments, effects=effects)
 
 
@@ -403,21 +411,19 @@ def speed_path(
         keep = np.concatenate([np.arange(3) + 3 * ("force", "moment").index(g) for g in groups])
 
         # The rotors' wrench is linear in the squared speeds, and all else that is measured stays as it is.
-        still = {id(s): _thinned_residual(_at_speed(s, 0.0 * s.command), prepared, groups) for s in segments}
         thrust, *moments = wrench_matrix(vehicle)
         of_squares = np.stack([0 * thrust, 0 * thrust, -thrust, *moments])[keep].T
+        laws = {id(s): _in_squares(s, prepared, known or [], of_squares, groups) for s in segments}
 
         def residual_of(segment: Segment, speed: np.ndarray, columns: bool):
             if columns:
                 moved = _at_speed(segment, speed)
                 r = assemble_rows(prepared, terms, [moved], known)[0]
                 return r.y[:, keep], np.concatenate([r.x[:, keep], steady_moments(moved, prepared, groups)], axis=2)
-            left = still[id(segment)] - prepared.thinner(speed**2) @ of_squares
-            for form, values in known or []:
-                extra = form.contribution(_at_speed(segment, speed).motion, vehicle, values)
-                for k, name in enumerate(groups):
-                    if (part := getattr(extra, name)) is not None:
-                        left[:, 3 * k : 3 * k + 3] -= prepared.thinner(part)
+            still, per_square, others = laws[id(segment)]
+            left = still - prepared.thinner(speed**2) @ per_square
+            for effect in others:
+                left -= prepared.thinner(_wrench_of(_at_speed(segment, speed), effect, vehicle, groups))
             return left, None
 
         force_z = 2 if "force" in groups else None
@@ -437,6 +443,40 @@ def speed_path(
 def _at_speed(segment: Segment, speed: np.ndarray) -> Segment:
     """A segment whose rotors turn at other speeds (n, k), rad/s."""
     return replace(segment, motion=replace(segment.motion, rotor_speed=speed))
+
+
+def _wrench_of(
+    segment: Segment, effect: tuple[Form, np.ndarray], vehicle: Vehicle, groups: Sequence[str]
+) -> np.ndarray:
+    """What a form with its values adds to force and moment, (n, 3 groups), at the native rate."""
+    form, values = effect
+    extra = form.contribution(segment.motion, vehicle, values)
+    parts = [getattr(extra, name) for name in groups]
+    nothing = np.zeros((len(segment.motion.time_s), 3))
+    return np.concatenate([nothing if part is None else part for part in parts], axis=1)
+
+
+def _in_squares(segment: Segment, prepared: Prepared, known, of_squares: np.ndarray, groups: Sequence[str]):
+    """What is left of a segment's rows with rotors at rest (m, 3 groups), what each squared rotor speed takes of it
+    (k, 3 groups), and the effects of `known` that are no such law here.
+
+    Of a rotor that is tilted or weak, a swinging load, a gust elsewhere: asked once, not at every path that is tried.
+    """
+    at_rest = _at_speed(segment, 0.0 * segment.command)
+    still, others = _thinned_residual(at_rest, prepared, groups), []
+    count, rotors = segment.command.shape
+    wobble = np.sin(np.outer(np.arange(count), 0.9 + 0.17 * np.arange(rotors)))
+    speed = segment.command * (1.0 + 0.4 * wobble)
+    for effect in known:
+        alone = _wrench_of(at_rest, effect, prepared.vehicle, groups)
+        moved = _wrench_of(_at_speed(segment, speed), effect, prepared.vehicle, groups) - alone
+        per_square = np.linalg.lstsq(speed**2, moved, rcond=None)[0]
+        least = 1e-9 * max(1.0, float(np.abs(moved).max()))
+        if np.allclose(speed**2 @ per_square, moved, rtol=1e-7, atol=least):
+            still, of_squares = still - prepared.thinner(alone), of_squares + per_square
+        else:
+            others.append(effect)
+    return still, of_squares, others
 
 
 def _thinned_residual(segment: Segment, prepared: Prepared, groups: Sequence[str]) -> np.ndarray:
@@ -627,7 +667,7 @@ def _with_felt_wind(prepared: Prepared, model: WrenchModel, segments, noisy) -> 
         return model  # what asks for a wind here does not find it elsewhere
     felt = through_drag([f for effect, f in zip(effects, forms, strict=True) if effect in ids_of("feels_air")])
     terms = [*model.terms, *form_terms(wind.id, felt)]
-    again = wrench_model(prepared, terms, forms, active, segments, noisy)
+    again = wrench_model(prepared, terms, forms, active, segments, noisy, model)
     return again if any(again.search.terms[k].effect == wind.id for k in again.selection.active) else model
 
 
@@ -658,7 +698,7 @@ def _blown_by(prepared: Prepared, model: WrenchModel, segments, noisy, terms: li
         if found is None:
             return model
         wind, sd, effects = found
-        again = wrench_model(prepared, kept, effects, active, in_wind(segments, wind), in_wind(noisy, wind))
+        again = wrench_model(prepared, kept, effects, active, in_wind(segments, wind), in_wind(noisy, wind), model)
         has = {again.search.terms[k].effect for k in again.selection.active}
         if not has & ids_of("feels_air") or (had and not drags & has):
             return model

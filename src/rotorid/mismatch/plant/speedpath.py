@@ -38,6 +38,7 @@ Whitened residuals of a hover say little of their mean, and a curve of too littl
 not respond. Two percent are an accelerometer's scale."""
 _PLAINLY_LESS = 0.98
 """Share of the squares that commands which hold leave, below which commands are smooth: a lag imitates either."""
+_HARDLY_FOLLOWS = "rotors would hardly follow their commands with it"
 _LIMIT_WAYS = (0.97, 0.9, 0.8, 0.65, 0.5)
 _MOST_LIMITED = 0.5
 """Share of the time that a limit may hold a rotor."""
@@ -477,12 +478,14 @@ class SpeedSearch:
         current = self.problem.fit((), np.zeros(0))
         dropped: dict[str, str] = {}
         for _ in range(5):
-            taken = {k for k, _ in current.chain}
+            taken = {k for k, _ in current.chain} | set(dropped)
+            others = {
+                (key, form): self.problem.with_covariance(self.best_fit((*current.chain, (key, form)), current, form))
+                for key, form in self.forms
+                if key not in taken
+            }
             options = []
-            for key, form in self.forms:
-                if key in taken or key in dropped:
-                    continue
-                fit = self.problem.with_covariance(self.best_fit((*current.chain, (key, form)), current, form))
+            for (key, _), fit in others.items():
                 p, score, _ = self.judge(current, fit, key)
                 options.append((score, p, key, fit))
             options.sort(key=lambda o: -o[0])
@@ -497,18 +500,16 @@ class SpeedSearch:
                     dropped[key] = f"its size is {size:.2g} of the noise"
                     continue
                 grown = True
-                refitted = self._with_new_columns(self._better_forms(fit))
+                refitted = self._with_new_columns(self._better_forms(fit, key, current, others))
                 if self.responds(refitted):
                     current = refitted
                 else:
-                    dropped[key] = "rotors would hardly follow their commands with it"
+                    dropped[key] = _HARDLY_FOLLOWS
                     self._with_new_columns(current)
                 break
             if not grown:
                 break
         current, bases = self._pruned(current, dropped)
-        if current.covariance is None:
-            current = self.problem.with_covariance(current)
         p_values, alternatives, sizes, fewer = {}, {}, {}, {}
         for key, _ in current.chain:
             base = bases[key]
@@ -585,15 +586,20 @@ class SpeedSearch:
         return self.problem.fit(chain, values, fit.shift_s)
 
     @step("other forms")
-    def _better_forms(self, fit: SpeedFit) -> SpeedFit:
-        """Try the other forms of each id in the chain; the cheapest for its parameters stays."""
+    def _better_forms(self, fit: SpeedFit, new: str, current: SpeedFit, others) -> SpeedFit:
+        """Try the other forms of each id in the chain; the cheapest for its parameters stays.
+
+        `others` are fits of `current` plus a form, of which that of the id `new` is `fit`.
+        """
         for key in [k for k, _ in fit.chain]:
-            base = self._without(fit, key)
+            known = key == new and fit.chain[:-1] == current.chain
+            base = current if known else self._without(fit, key)
             best = fit
             for other, form in self.forms:
                 if other != key or form is fit.of(key)[0]:
                     continue
-                tried = self.problem.with_covariance(self.best_fit((*base.chain, (key, form)), base, form))
+                chain = (*base.chain, (key, form))
+                tried = others[key, form] if known else self.problem.with_covariance(self.best_fit(chain, base, form))
                 # By one inflation for both: its own would charge a form for what it alone explains.
                 saved = (best.cost - tried.cost) / max(best.inflation, tried.inflation)
                 more = len(tried.values) - len(best.values)
@@ -605,21 +611,25 @@ class SpeedSearch:
     @step("less what does not hold")
     def _pruned(self, fit: SpeedFit, dropped: dict[str, str]) -> tuple[SpeedFit, dict[str, SpeedFit]]:
         """The chain less what does not hold, and to each id that stays the chain fitted without it."""
-        changed, bases = True, {}
-        while changed and fit.chain:
-            changed = False
-            for key, _ in fit.chain:
-                base = bases[key] = self._without(fit, key)
-                if fit.covariance is None:
-                    fit = self.problem.with_covariance(fit)
+        while True:
+            fit = fit if fit.covariance is not None else self.problem.with_covariance(fit)
+            bases = {key: self._without(fit, key) for key, _ in fit.chain}
+            failing = {}
+            for key, base in bases.items():
                 p, score, _ = self.judge(base, fit, key)
                 if p > ENTER_P or score <= 0 or self.negligible(fit, key):
-                    dropped[key] = (
-                        "it is too slight to matter" if self.negligible(fit, key) else f"p = {p:.2g} given the others"
-                    )
-                    fit, changed = self.problem.with_covariance(base) if base.chain else base, True
-                    break
-        return fit, bases
+                    failing[key] = p
+            if not failing:
+                return fit, bases
+            # What is left must follow its commands: a flat curve would do without any lag.
+            worst = max(bases, key=lambda key: (self.responds(bases[key]), failing.get(key, -1.0)))
+            if worst not in failing:
+                dropped[worst] = _HARDLY_FOLLOWS
+            elif self.negligible(fit, worst):
+                dropped[worst] = "it is too slight to matter"
+            else:
+                dropped[worst] = f"p = {failing[worst]:.2g} given the others"
+            fit = bases[worst]
 
     @step("what else would do")
     def _alternatives(self, fit: SpeedFit, base: SpeedFit, key: str) -> tuple[str, ...]:

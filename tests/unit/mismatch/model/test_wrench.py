@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
 
+import numpy as np
+import pytest
+
+from rotorid.effects.catalogue import catalogue
+from rotorid.mismatch.model import wrench
 from rotorid.mismatch.model.prepare import prepare
 from rotorid.mismatch.model.wrench import (
     SAME_WRENCH,
@@ -17,6 +22,7 @@ from rotorid.mismatch.plant.motion import Segment
 from rotorid.mismatch.plant.regression import full_fit_residuals
 from rotorid.mismatch.plant.rows import Rows
 from rotorid.recordings import Vehicle
+from rotorid.vehicle.mixer import wrench_matrix
 from tests.unit.mismatch.flights import recorded
 from tests.unit.mismatch.plant.test_rows import still
 
@@ -129,3 +135,49 @@ def test_steady_moments_go_with_the_thrust_about_each_axis():
     for axis in range(3):
         np.testing.assert_allclose(columns[:, 3 + axis], np.outer(thrust, np.eye(3)[axis]), rtol=1e-9)
     assert steady_moments(segment, prepared, ("force",)).shape == (len(thrust), 3, 0)
+
+
+@pytest.mark.parametrize(
+    ("effect", "name", "values", "others"),
+    [
+        ("thrust_tilt", "rotor 3", (0.02, -0.05), 0),
+        ("inertia_products", "products", (1e-4, 2e-4, -1e-4), 0),
+        ("rotor_drag", "at the centre of mass", (1e-4,), 1),
+    ],
+)
+def test_what_is_known_beside_commands_costs_a_path_nothing_where_it_follows_squared_speeds(
+    effect, name, values, others
+):
+    """What is left of the rows at any speeds is the same as where each effect is asked anew; a drag follows the
+    speeds themselves and stays apart."""
+    prepared = prepare(recorded(1))
+    segment = prepared.segments[0]
+    segment = replace(segment, command=segment.motion.rotor_speed)
+    form = next(f for f in catalogue()[effect].forms(prepared.vehicle) if f.name == name)
+    known, groups = [(form, np.array(values))], ("force", "moment")
+    thrust, *moments = wrench_matrix(prepared.vehicle)
+    of_squares = np.stack([0 * thrust, 0 * thrust, -thrust, *moments]).T
+    still, per_square, apart = wrench._in_squares(segment, prepared, known, of_squares, groups)
+    assert len(apart) == others
+    speed = segment.command * (1.0 + 0.1 * np.cos(segment.motion.time_s)[:, None])
+    moved = wrench._at_speed(segment, speed)
+    left = still - prepared.thinner(speed**2) @ per_square
+    for one in apart:
+        left = left - prepared.thinner(wrench._wrench_of(moved, one, prepared.vehicle, groups))
+    asked_anew = wrench._thinned_residual(moved, prepared, groups)
+    asked_anew = asked_anew - prepared.thinner(wrench._wrench_of(moved, known[0], prepared.vehicle, groups))
+    np.testing.assert_allclose(left, asked_anew, atol=1e-8)
+
+
+def test_a_channel_known_to_be_louder_than_the_catalogue_leaves_it_is_searched_once(monkeypatch):
+    """One search says in which channels the model's own residual is the noise; the next begins with it."""
+    prepared = prepare(recorded(1))
+    before = wrench.wrench_model(prepared, prepared.terms)
+    searches = []
+    monkeypatch.setattr(wrench, "searched", lambda *given: searches.append(given[4]) or before)
+    loud = replace(before, inflated=np.arange(12) == 0)
+    again = wrench.wrench_model(prepared, prepared.terms, before=loud)
+    assert len(searches) == 1 and again.inflated[0]
+    own = wrench.after_residual(before)
+    assert all(np.array_equal(left[:, 0], part[:, 0]) for left, part in zip(searches[0], own, strict=True))
+    assert not np.array_equal(searches[0][0][:, 1], own[0][:, 1])

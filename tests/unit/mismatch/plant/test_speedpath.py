@@ -242,3 +242,30 @@ def test_commands_hold_or_are_smooth_as_the_recording_says(holds):
     result = searched(segment)
     assert result.fit.holds is holds
     assert result.fit.of("motor_lag")[1][0] == pytest.approx(tau, rel=0.15)
+
+
+def pruned(monkeypatch, p_values: dict[str, float], follows=lambda keys: True):
+    """What pruning leaves of a lag and a curve that fail beside each other with these p-values and hold alone."""
+    search = SpeedSearch(MeasuredSpeed([recorded(0)], FULL, None), [])
+    chain = (("motor_lag", form("motor_lag", "one constant")), ("throttle_curve", form("throttle_curve", "affine")))
+    fit = search.problem.fit(chain, np.array([0.02, 0.0, 0.0]))
+    monkeypatch.setattr(search, "judge", lambda base, fit, key: (p_values[key] if base.chain else 0.0, 1.0, 1.0))
+    monkeypatch.setattr(search, "negligible", lambda fit, key: False)
+    monkeypatch.setattr(search, "responds", lambda fit: follows([k for k, _ in fit.chain]))
+    dropped = {}
+    left, bases = search._pruned(fit, dropped)
+    assert [k for k, _ in left.chain] == list(bases)
+    return list(bases), dropped
+
+
+def test_of_two_that_fail_beside_each_other_the_less_significant_goes(monkeypatch):
+    assert pruned(monkeypatch, {"motor_lag": 1e-3, "throttle_curve": 0.9})[0] == ["motor_lag"]
+    assert pruned(monkeypatch, {"motor_lag": 0.9, "throttle_curve": 1e-3})[0] == ["throttle_curve"]
+
+
+def test_no_curve_stays_behind_with_which_rotors_would_not_follow(monkeypatch):
+    """A flat curve does without a lag: next to it the lag fails, and without the lag rotors do not move."""
+    p_values = {"motor_lag": 0.6, "throttle_curve": 0.0}
+    kept, dropped = pruned(monkeypatch, p_values, follows=lambda keys: keys != ["throttle_curve"])
+    assert kept == ["motor_lag"]
+    assert "hardly follow" in dropped["throttle_curve"]
