@@ -24,6 +24,8 @@ _C30, _C45, _C60 = np.cos(np.radians([30.0, 45.0, 60.0]))
 _DISTANCES = ("D_1x D_2x D_4x D_5x D_6x D_1y D_2y D_3y D_4y D_5y D_6y D_135z D_246z L").split()
 PULLED = (0, 2, 4)
 """Cells 1, 3, 5: their absolute value enters eq. 2.8."""
+CELLS = tuple(f"cell_{i}_v" for i in range(1, 7))
+FORCES = ("force_x_n", "force_y_n", "force_z_n")
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import stdtrit as student_quantile
 
 from rotorid.effects.contract import compiled
-from rotorid.identify.estimate.inertial import weights_of_inertias
+from rotorid.identify.estimate.grey_box import weights_of_inertias
 
 
 @dataclass(frozen=True)

@@ -21,9 +21,9 @@ from rotorid.errors import InputError
 from rotorid.identify.bench.reconstruct import GF_N, Geometry
 from rotorid.identify.fem import answers, elasticity
 from rotorid.identify.fem.answers import Answers, by_part, compare, ratios
+from rotorid.identify.fem.bench import Bench, Solved
+from rotorid.identify.fem.cell import strain_per_newton
 from rotorid.identify.fem.elasticity import Hole, LooseParts
-from rotorid.identify.fem.gauges import strain_per_newton
-from rotorid.identify.fem.model import Bench, Solved
 from rotorid.identify.fem.sizes import MATERIALS, Assumed, Material, Sizes, in_file, materials
 from rotorid.identify.fem.tets import block, count, stacked
 from rotorid.io.wire.bench import VOLTS_PER_COUNT

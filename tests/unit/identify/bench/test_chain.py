@@ -6,10 +6,8 @@ import pytest
 
 from rotorid.errors import InputError
 from rotorid.identify.bench import recalibrate, static
-from rotorid.identify.bench.channels import CELLS
-from rotorid.identify.bench.prepare import SPIKE, Filter, prepare
-from rotorid.identify.bench.reconstruct import GF_N, forces_by_matrix
-from rotorid.identify.bench.recordings import bench_force, bench_set
+from rotorid.identify.bench.prepare import SPIKE, Filter, bench_force, bench_set, prepare
+from rotorid.identify.bench.reconstruct import CELLS, GF_N, forces_by_matrix
 from rotorid.io.session import Ended, Setup
 from rotorid.io.tables import read_sessions, read_tables
 

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.identify.rotor.sample_noise import sample_noise
+from rotorid.identify.rotor.campaign import sample_noise
 
 SPEED = 1600 * (np.arange(1, 21) / 20) ** 0.669
 

@@ -7,10 +7,9 @@ import pytest
 import yaml
 
 from rotorid.identify.blackbox.experiments import thrust_of_throttle
-from rotorid.identify.rotor.campaign import thrust_points, torque_points
+from rotorid.identify.rotor.campaign import speed_law, thrust_points, torque_points
 from rotorid.identify.rotor.coefficients import Points, fit_coefficient
 from rotorid.identify.stand import align
-from rotorid.identify.stand.characteristic import speed_law
 from rotorid.identify.stand.recordings import read_pairs
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.tables import read_tables
