@@ -12,10 +12,7 @@ from rotorid.acquire.transport import ReplayTransport
 from rotorid.io.frames import COMMAND, decode
 from rotorid.io.logs import read_log
 from rotorid.io.rawlog import SENT, read_raw
-from rotorid.io.wire import INSTRUMENTS
-from rotorid.io.wire.quadrotor import TRAPEZOID, Programme
-from rotorid.io.wire.rotor import pack_throttle
-from rotorid.io.wire.wrench import pack_initialise
+from rotorid.io.wire import INSTRUMENTS, TRAPEZOID, Programme, pack_initialise, pack_throttle
 
 
 def said(path) -> list[str]:

@@ -29,7 +29,7 @@ from rotorid.acquire.emulators.truth import (
 from rotorid.acquire.geometry import GF_N, M, body_forces, cell_forces, cell_response
 from rotorid.acquire.procedures import LowPass, Steadiness, programme_of
 from rotorid.io.experiments import EXPERIMENTS
-from rotorid.io.wire.quadrotor import GREEN, RED, SINE, TRAPEZOID, YELLOW, Programme
+from rotorid.io.wire import GREEN, RED, SINE, TRAPEZOID, YELLOW, Programme
 
 RNG = np.random.default_rng
 

@@ -45,7 +45,7 @@ from rotorid.acquire.transport import LoopbackTransport
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.index import write_index
 from rotorid.io.session import Air, Session, Setup, session_path, write_session
-from rotorid.io.wire.quadrotor import TRAPEZOID, Programme
+from rotorid.io.wire import TRAPEZOID, Programme
 
 _WEIGHTS_GF = {
     "Carbon Fiber 1": 35.715,

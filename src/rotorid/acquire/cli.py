@@ -32,10 +32,9 @@ from rotorid.errors import InputError
 from rotorid.io import wire
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.frames import COMMAND, START, Frame, encode
-from rotorid.io.intake import Intake
+from rotorid.io.sequence import Intake
 from rotorid.io.session import Air, SessionError, Setup
-from rotorid.io.wire import INSTRUMENTS, quadrotor
-from rotorid.io.wire.base import IDENTIFY
+from rotorid.io.wire import IDENTIFY, INSTRUMENTS
 
 _DEFAULT_OUT = Path("raw/local")
 _BY_ID = Path("/dev/serial/by-id")
@@ -263,7 +262,7 @@ def wrench(
 @_with_shared
 def quadrotor_command(
     port: _Port,
-    dynamics: Annotated[str, typer.Option(help=f"command character: {quadrotor.DYNAMICS}")] = "h",
+    dynamics: Annotated[str, typer.Option(help=f"command character: {wire.DYNAMICS}")] = "h",
     shape: Annotated[str, typer.Option(help="trapezoid or sine")] = "trapezoid",
     maxima: Annotated[str, typer.Option(help="maxima of motors 1–4, fractions")] = "0.1,0.1,0.1,0.1",
     ramp_s: Annotated[float, typer.Option(help="ramp up and down, s")] = RAMP_S,
@@ -275,14 +274,14 @@ def quadrotor_command(
     shared: _Shared,
 ) -> None:
     """Send the quadrotor a programme and record the commands of its motors."""
-    if dynamics not in quadrotor.DYNAMICS:
-        raise typer.BadParameter(f"--dynamics is one of {', '.join(quadrotor.DYNAMICS)}, not {dynamics!r}")
+    if dynamics not in wire.DYNAMICS:
+        raise typer.BadParameter(f"--dynamics is one of {', '.join(wire.DYNAMICS)}, not {dynamics!r}")
     if shape not in ("trapezoid", "sine"):
         raise typer.BadParameter(f"--shape is trapezoid or sine, not {shape!r}")
     try:
         four = tuple(float(value) for value in maxima.split(","))
-        number = quadrotor.SINE if shape == "sine" else quadrotor.TRAPEZOID
-        programme = quadrotor.Programme(number, four, ramp_s, hold_s, frequency)
+        number = wire.SINE if shape == "sine" else wire.TRAPEZOID
+        programme = wire.Programme(number, four, ramp_s, hold_s, frequency)
         programme.pack()
     except ValueError as error:
         raise typer.BadParameter(f"--maxima are four fractions such as 0.1,0.1,0.1,0.1 ({error})") from error

@@ -20,8 +20,7 @@ from rotorid.io.logs import LogError, read_log
 from rotorid.io.models import KnownKeys, read_model
 from rotorid.io.rawlog import NotALog
 from rotorid.io.session import Ended, SessionError, Setup, read_session
-from rotorid.io.text.names import hint
-from rotorid.io.text.wording import explain
+from rotorid.io.text.wording import explain, hint
 from rotorid.io.wire import INSTRUMENTS
 
 Kind = Literal["stream", "calibrate", "static", "dynamic", "thrust", "torque", "wrench", "experiment", "tensile"]

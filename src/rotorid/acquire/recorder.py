@@ -40,10 +40,10 @@ from rotorid.acquire.errors import (
 from rotorid.acquire.transport import Transport
 from rotorid.io import rawlog, wire
 from rotorid.io.frames import ANSWER, COMMAND, DATA, END, START, Frame, encode
-from rotorid.io.intake import Intake, Taken
+from rotorid.io.sequence import Intake, Taken
 from rotorid.io.session import Counts, Ended, GapEntry, Session, Setup, write_session
 from rotorid.io.session import Event as SessionEvent
-from rotorid.io.wire.base import COMPLETE, GO, IDENTIFY, KEEP, OK, STOP, STOPPED, UNHEARD, pack_keep
+from rotorid.io.wire import COMPLETE, GO, IDENTIFY, KEEP, OK, STOP, STOPPED, UNHEARD, pack_keep
 
 _BALLAST_BYTES = 64 * 1024
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)

@@ -18,7 +18,7 @@ from markupsafe import Markup, escape
 
 from rotorid.cli.console import one_sentence, progress
 from rotorid.errors import InputError
-from rotorid.io.text.names import neighbour
+from rotorid.io.text.wording import neighbour
 from rotorid.steps import step
 
 OPEN, _CLOSE = "<!-- plan -->", "<!-- end of the plan -->"

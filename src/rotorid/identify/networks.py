@@ -23,8 +23,7 @@ import numpy as np
 from numba import njit
 
 from rotorid.errors import InputError
-from rotorid.io.text.bounds import LARGEST_CHECKPOINT
-from rotorid.io.text.files import check_file
+from rotorid.io.text.files import LARGEST_CHECKPOINT, check_file
 from rotorid.io.text.wording import printable
 
 _CODES = {"linear": 0, "sigmoid": 1}

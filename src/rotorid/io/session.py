@@ -14,8 +14,7 @@ from pydantic import Field, field_validator
 from rotorid.errors import InputError
 from rotorid.io import metadata_checksum
 from rotorid.io.models import KnownKeys, Number, Whole, read_model
-from rotorid.io.text.bounds import LARGEST_METADATA, MOST_METADATA_VALUES
-from rotorid.io.text.files import read_bytes
+from rotorid.io.text.files import LARGEST_METADATA, MOST_METADATA_VALUES, read_bytes
 
 
 class Ended(StrEnum):

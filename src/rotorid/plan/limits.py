@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from rotorid.errors import InputError
 from rotorid.io.text.files import read_yaml, with_exponents
-from rotorid.io.text.names import hint
+from rotorid.io.text.wording import hint
 
 Range = tuple[float, float]
 T = TypeVar("T", bound=BaseModel)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rotorid.io.text.names import listed
+from rotorid.io.text.wording import listed
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.vehicle import Vehicle

@@ -28,7 +28,7 @@ import numpy as np
 import pandas as pd
 from scipy.signal import fftconvolve
 
-from rotorid.io.text.names import listed
+from rotorid.io.text.wording import listed
 from rotorid.recordings import columns as c
 from rotorid.recordings.doubts import Doubt
 from rotorid.recordings.files import RUN_SUFFIXES, read_set, run_name

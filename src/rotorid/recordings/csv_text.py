@@ -17,8 +17,16 @@ from pathlib import Path
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.io.text.bounds import LARGEST_FILE, LEAST_UNPACKED, MOST_CELLS, MOST_GZIP_MEMBERS, MOST_ROWS, MOST_UNPACKED
-from rotorid.io.text.files import check_file, check_text
+from rotorid.io.text.files import (
+    LARGEST_FILE,
+    LEAST_UNPACKED,
+    MOST_CELLS,
+    MOST_GZIP_MEMBERS,
+    MOST_ROWS,
+    MOST_UNPACKED,
+    check_file,
+    check_text,
+)
 from rotorid.io.text.wording import printable
 
 _BLOCK = 1 << 20

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rotorid.io.text.names import listed
+from rotorid.io.text.wording import listed
 from rotorid.recordings import columns as c
 from rotorid.recordings.body import Body, RotorsInAir, body_of, impossible, quantities
 from rotorid.recordings.doubts import Doubt

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.io.text.names import listed, nearest, plain
+from rotorid.io.text.wording import listed, nearest, plain
 from rotorid.recordings import columns as c
 from rotorid.recordings.own_rates import (
     LEAST_SINGLE_S,

@@ -13,7 +13,7 @@ from rotorid.acquire.emulators.devices import CommandRefused, Device, Physics
 from rotorid.acquire.emulators.faults import Faults, FaultyLine
 from rotorid.io import wire
 from rotorid.io.frames import ANSWER, COMMAND, DATA, END, START, Frame, StreamDecoder, encode
-from rotorid.io.wire.base import (
+from rotorid.io.wire import (
     ASKED,
     BOOTED,
     COMPLETE,

@@ -26,7 +26,7 @@ from rotorid.identify.fem.cell import strain_per_newton
 from rotorid.identify.fem.elasticity import Hole, LooseParts
 from rotorid.identify.fem.sizes import MATERIALS, Assumed, Material, Sizes, in_file, materials
 from rotorid.identify.fem.tets import block, count, stacked
-from rotorid.io.wire.bench import VOLTS_PER_COUNT
+from rotorid.io.wire import VOLTS_PER_COUNT
 
 _BEAM = Material(68.9e9, 0.0)
 """Without contraction across, for which beam theory's clamped end is exact."""

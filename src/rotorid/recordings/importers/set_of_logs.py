@@ -16,8 +16,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.errors import InputError
-from rotorid.io.text.bounds import LARGEST_METADATA, MOST_RUNS
-from rotorid.io.text.files import read_text
+from rotorid.io.text.files import LARGEST_METADATA, MOST_RUNS, read_text
 from rotorid.io.text.writing import staging, take_name, take_place
 from rotorid.recordings import Run, read_vehicle, templates
 from rotorid.recordings import columns as c

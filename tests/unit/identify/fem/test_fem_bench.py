@@ -15,7 +15,7 @@ from rotorid.identify.fem.cell import strain_per_newton
 from rotorid.identify.fem.sizes import Material, materials, read_assumed
 from rotorid.identify.fem.studies import counts_per_newton, from_printed_slope, printed_slope, volts_per_newton
 from rotorid.identify.fem.tets import on
-from rotorid.io.wire.bench import GAIN, REFERENCE_V
+from rotorid.io.wire import GAIN, REFERENCE_V
 
 ROOT = Path(__file__).parents[4]
 
