@@ -7,13 +7,20 @@ import math
 import numpy as np
 import pytest
 
-from rotorid.acquire.emulators.bench import BenchPhysics, LoadCells
 from rotorid.acquire.emulators.build import build
 from rotorid.acquire.emulators.devices import programme_share
-from rotorid.acquire.emulators.oscillator import Oscillator
-from rotorid.acquire.emulators.rotor import Battery, Rotors
-from rotorid.acquire.emulators.stand import StandPhysics, tilt_matrix
-from rotorid.acquire.emulators.tensile import GAUGE_MM, SECTION_MM2, TensilePhysics
+from rotorid.acquire.emulators.physics import (
+    GAUGE_MM,
+    SECTION_MM2,
+    Battery,
+    BenchPhysics,
+    LoadCells,
+    Oscillator,
+    Rotors,
+    StandPhysics,
+    TensilePhysics,
+    tilt_matrix,
+)
 from rotorid.acquire.emulators.truth import (
     BatteryTruth,
     BenchTruth,

@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 
 from rotorid.acquire import procedures
 from rotorid.acquire.cli import app
-from rotorid.acquire.emulators.faults import Faults
+from rotorid.acquire.emulators.wire import Faults
 from rotorid.acquire.errors import AcquireError, DeviceSilent
 from rotorid.acquire.recorder import Recorder, Timings
 from rotorid.errors import InputError

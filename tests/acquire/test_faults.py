@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from rotorid.acquire import procedures
-from rotorid.acquire.emulators.faults import Faults
+from rotorid.acquire.emulators.wire import Faults
 from rotorid.acquire.errors import (
     BadName,
     DeviceReset,

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from rotorid.acquire import procedures
-from rotorid.acquire.emulators.faults import Faults
+from rotorid.acquire.emulators.wire import Faults
 from rotorid.acquire.recorder import LogWriter
 from rotorid.io import rawlog
 from rotorid.io.experiments import EXPERIMENTS

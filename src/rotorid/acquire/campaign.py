@@ -21,7 +21,6 @@ import numpy as np
 
 from rotorid.acquire import procedures
 from rotorid.acquire.clock import VirtualClock
-from rotorid.acquire.emulators.bench import BenchPhysics, CellClamp
 from rotorid.acquire.emulators.devices import (
     BenchDevice,
     Device,
@@ -32,13 +31,23 @@ from rotorid.acquire.emulators.devices import (
     TensileDevice,
     WrenchDevice,
 )
-from rotorid.acquire.emulators.faults import Faults
-from rotorid.acquire.emulators.rotor import Battery, Rotors, TesterPhysics
-from rotorid.acquire.emulators.stand import SENSOR_POSITION_M, LoadedSensor, StandPhysics, TorqueRig
+from rotorid.acquire.emulators.physics import (
+    GAUGE_MM,
+    SECTION_MM2,
+    SENSOR_POSITION_M,
+    Battery,
+    BenchPhysics,
+    CellClamp,
+    LoadedSensor,
+    Rotors,
+    StandPhysics,
+    TensilePhysics,
+    TesterPhysics,
+    TorqueRig,
+)
 from rotorid.acquire.emulators.stated import write_stated
-from rotorid.acquire.emulators.tensile import GAUGE_MM, SECTION_MM2, TensilePhysics
 from rotorid.acquire.emulators.truth import Truth, draw_truth, write_truth
-from rotorid.acquire.emulators.wire import WireHalf, World
+from rotorid.acquire.emulators.wire import Faults, WireHalf, World
 from rotorid.acquire.procedures import STEADY_JR3, SteadyRule, programme_of
 from rotorid.acquire.recorder import Recorder, Timings
 from rotorid.acquire.transport import LoopbackTransport

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from rotorid.acquire.emulators.bench import BenchPhysics, CellClamp
 from rotorid.acquire.emulators.devices import (
     BenchDevice,
     Jr3Device,
@@ -13,12 +12,19 @@ from rotorid.acquire.emulators.devices import (
     TensileDevice,
     WrenchDevice,
 )
-from rotorid.acquire.emulators.faults import Faults
-from rotorid.acquire.emulators.rotor import Battery, Rotors, TesterPhysics
-from rotorid.acquire.emulators.stand import LoadedSensor, StandPhysics, TorqueRig
-from rotorid.acquire.emulators.tensile import TensilePhysics
+from rotorid.acquire.emulators.physics import (
+    Battery,
+    BenchPhysics,
+    CellClamp,
+    LoadedSensor,
+    Rotors,
+    StandPhysics,
+    TensilePhysics,
+    TesterPhysics,
+    TorqueRig,
+)
 from rotorid.acquire.emulators.truth import Truth
-from rotorid.acquire.emulators.wire import WireHalf, World
+from rotorid.acquire.emulators.wire import Faults, WireHalf, World
 from rotorid.io.experiments import EXPERIMENTS
 
 NAMES = ("bench", "rotor", "wrench", "quadrotor", "stand", "torque", "jr3", "tensile")

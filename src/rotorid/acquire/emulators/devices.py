@@ -8,10 +8,15 @@ from typing import Protocol
 
 import numpy as np
 
-from rotorid.acquire.emulators.bench import BenchPhysics, CellClamp
-from rotorid.acquire.emulators.rotor import Rotors, TesterPhysics
-from rotorid.acquire.emulators.stand import LoadedSensor, StandPhysics
-from rotorid.acquire.emulators.tensile import TensilePhysics
+from rotorid.acquire.emulators.physics import (
+    BenchPhysics,
+    CellClamp,
+    LoadedSensor,
+    Rotors,
+    StandPhysics,
+    TensilePhysics,
+    TesterPhysics,
+)
 from rotorid.io import wire
 from rotorid.io.wire import GO, STOP
 

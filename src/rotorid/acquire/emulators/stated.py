@@ -19,8 +19,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from rotorid.acquire.emulators.bench import BenchPhysics
-from rotorid.acquire.emulators.stand import CORNERS
+from rotorid.acquire.emulators.physics import CORNERS, BenchPhysics
 from rotorid.acquire.emulators.truth import Truth
 from rotorid.acquire.geometry import body_forces, cell_response
 
