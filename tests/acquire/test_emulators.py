@@ -16,9 +16,9 @@ from rotorid.acquire.emulators.physics import (
     BenchPhysics,
     LoadCells,
     Oscillator,
-    Rotors,
     StandPhysics,
     TensilePhysics,
+    TurningRotors,
     tilt_matrix,
 )
 from rotorid.acquire.emulators.truth import (
@@ -119,7 +119,7 @@ def test_pla_reads_ever_further_off_and_aluminium_less():
 
 def test_rotor_lag_curve_and_battery():
     truth = RotorTruth(rise_s=0.05)
-    rotors = Rotors(truth, Battery(BatteryTruth(resistance_ohm=0.0)), 1)
+    rotors = TurningRotors(truth, Battery(BatteryTruth(resistance_ohm=0.0)), 1)
     rotors.throttle[0] = 0.5
     for _ in range(50):
         rotors.process(0.001)  # 50 ms: one time constant
@@ -135,7 +135,7 @@ def test_rotor_lag_curve_and_battery():
 
 
 def stand(roll=0.0, pitch=0.0, vehicle=None, speeds=(0, 0, 0, 0)):
-    rotors = Rotors(RotorTruth(), Battery(BatteryTruth()), 4)
+    rotors = TurningRotors(RotorTruth(), Battery(BatteryTruth()), 4)
     rotors.speed = np.array(speeds, dtype=float)
     return StandPhysics(vehicle or VehicleTruth(), RotorTruth(), SensorTruth(), rotors, roll, pitch, RNG(0)).wrench()
 

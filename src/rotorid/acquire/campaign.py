@@ -39,11 +39,11 @@ from rotorid.acquire.emulators.physics import (
     BenchPhysics,
     CellClamp,
     LoadedSensor,
-    Rotors,
     StandPhysics,
     TensilePhysics,
     TesterPhysics,
     TorqueRig,
+    TurningRotors,
 )
 from rotorid.acquire.emulators.stated import write_stated
 from rotorid.acquire.emulators.truth import Truth, draw_truth, write_truth
@@ -53,7 +53,7 @@ from rotorid.acquire.recorder import Recorder, Timings
 from rotorid.acquire.transport import LoopbackTransport
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.index import write_index
-from rotorid.io.session import Air, Session, Setup, session_path, write_session
+from rotorid.io.session import RoomAir, Session, Setup, session_path, write_session
 from rotorid.io.wire import TRAPEZOID, Programme
 
 _WEIGHTS_GF = {
@@ -120,11 +120,11 @@ class _Campaign:
         faults = Faults(clock_start_us=start_us, share=share)
         return WireHalf(device, rng, clock_error=error, faults=faults, **options)
 
-    def air(self) -> Air:
+    def air(self) -> RoomAir:
         """Air of the hour: warmer in the afternoon, the pressure of 540 m."""
         hours = (self.date - _FIRST_DAY).total_seconds() / 3600
         day = 2 * math.pi * (hours % 24) / 24
-        return Air(
+        return RoomAir(
             temperature_c=round(23.5 + 2.0 * math.sin(day), 1),
             pressure_pa=round(95_400 + 150 * math.sin(0.37 * day + 0.05 * hours), 0),
             relative_humidity=round(0.48 - 0.06 * math.sin(day), 2),
@@ -327,7 +327,7 @@ def thrust(campaign: _Campaign) -> None:
         if percent % 10 == 1:
             battery = Battery(truth.battery)
         name = f"thrust-{percent:02d}"
-        rotors = Rotors(truth.rotor, battery, 1)
+        rotors = TurningRotors(truth.rotor, battery, 1)
         physics = TesterPhysics(rotors, truth.rotor, truth.tester, campaign.rng(name))
         setup = Setup(
             platform="tester",
@@ -394,7 +394,7 @@ def dynamics(campaign: _Campaign) -> None:
             battery = Battery(truth.battery)
         name = f"exp-{number:02d}"
         rng = campaign.rng(name)
-        rotors = Rotors(truth.rotor, battery, 4)
+        rotors = TurningRotors(truth.rotor, battery, 4)
         stand = StandPhysics(
             truth.vehicle, truth.rotor, truth.wrench, rotors, experiment.roll_deg, experiment.pitch_deg, rng
         )

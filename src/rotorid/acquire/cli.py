@@ -33,7 +33,7 @@ from rotorid.io import wire
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.frames import COMMAND, START, Frame, encode
 from rotorid.io.sequence import Intake
-from rotorid.io.session import Air, SessionError, Setup
+from rotorid.io.session import RoomAir, SessionError, Setup
 from rotorid.io.wire import IDENTIFY, INSTRUMENTS
 
 _DEFAULT_OUT = Path("raw/local")
@@ -69,13 +69,13 @@ class _Shared:
     ] = None
 
     @property
-    def weather(self) -> Air | None:
+    def weather(self) -> RoomAir | None:
         """The air as metadata have it. Raises typer.BadParameter."""
         if self.air is None:
             return None
         try:
             temperature, pressure, humidity = (float(part) for part in self.air.split(","))
-            return Air(temperature_c=temperature, pressure_pa=pressure, relative_humidity=humidity)
+            return RoomAir(temperature_c=temperature, pressure_pa=pressure, relative_humidity=humidity)
         except ValueError as error:
             raise typer.BadParameter(
                 "--air is temperature in °C, pressure in Pa and humidity from 0 to 1, such as 23,95400,0.5"
@@ -129,8 +129,6 @@ def ports(
 ) -> None:
     """List the serial ports of this computer by names that stay the same, and who is on them."""
     from serial.tools import list_ports
-
-    from rotorid.acquire.cli import stable_name, udev_rule, who_is_there
 
     found = sorted(list_ports.comports())
     if udev is not None:

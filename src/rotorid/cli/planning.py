@@ -96,7 +96,6 @@ def _session_plan(source, content: dict, allowed, folder: Path):
 
 def _onto_page(page: Path, name: str, said: list[str], picture: Path | None) -> None:
     """Put the plan on the verdict's page, where there is one."""
-    from rotorid.cli.planning import with_plan
     from rotorid.io.text.writing import all_or_none
 
     if not page.is_file():

@@ -37,7 +37,7 @@ class Ended(StrEnum):
 Place = Annotated[list[Number], Field(min_length=3, max_length=3)]
 
 
-class Air(KnownKeys):
+class RoomAir(KnownKeys):
     """Air during the recording."""
 
     temperature_c: Number = Field(ge=-90, le=70)
@@ -79,7 +79,7 @@ class Setup(KnownKeys):
         None  # body axes, from the believed centre of mass
     )
     tared: bool | None = None  # the reading was zeroed with the vehicle in place
-    air: Air | None = None
+    air: RoomAir | None = None
     remarks: str | None = None
 
 

@@ -33,7 +33,6 @@ OPEN = (
     "body",
     "check",
     "columns",
-    "doubts",
     "files",
     "held",
     "importers.guessing.guess",

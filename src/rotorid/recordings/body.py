@@ -16,7 +16,7 @@ from math import isclose, isfinite, pi, sqrt
 
 import numpy as np
 
-from rotorid.recordings.doubts import Doubt
+from rotorid.recordings.run import Doubt
 from rotorid.recordings.vehicle import Vehicle
 
 _AIR_KG_M3 = 1.2

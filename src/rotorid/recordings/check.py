@@ -30,7 +30,6 @@ from scipy.signal import fftconvolve
 
 from rotorid.io.text.wording import listed
 from rotorid.recordings import columns as c
-from rotorid.recordings.doubts import Doubt
 from rotorid.recordings.files import RUN_SUFFIXES, read_set, run_name
 from rotorid.recordings.held import (
     OTHERS_GO_ON,
@@ -45,7 +44,7 @@ from rotorid.recordings.held import (
     standing_together,
 )
 from rotorid.recordings.physics import gravity, impossible_values, near_names, physical_doubts, voltages
-from rotorid.recordings.run import RecordingSet, Run
+from rotorid.recordings.run import Doubt, RecordingSet, Run
 from rotorid.recordings.sufficient import SENSORS, compared_readings, rotor_groups, sufficient
 from rotorid.recordings.vehicle import Vehicle
 

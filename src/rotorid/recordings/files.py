@@ -28,8 +28,7 @@ from rotorid.io.text.files import MOST_CELLS, MOST_RUNS, check_file, read_text, 
 from rotorid.io.text.wording import explain, hint, listed, neighbour, printable
 from rotorid.io.text.writing import all_or_none, staging, take_name
 from rotorid.recordings import columns as c
-from rotorid.recordings.doubts import Doubt
-from rotorid.recordings.run import RecordingSet, Run
+from rotorid.recordings.run import Doubt, RecordingSet, Run
 from rotorid.recordings.tables import (
     UnusableRun,
     check_table,

@@ -18,8 +18,7 @@ from scipy.spatial.transform import Rotation
 from rotorid.io.text.wording import listed
 from rotorid.recordings import columns as c
 from rotorid.recordings.body import Body, RotorsInAir, body_of, impossible, quantities
-from rotorid.recordings.doubts import Doubt
-from rotorid.recordings.run import RecordingSet, Run
+from rotorid.recordings.run import Doubt, RecordingSet, Run
 from rotorid.recordings.vehicle import Vehicle
 
 STEP_S = 0.02

@@ -17,11 +17,11 @@ from rotorid.acquire.emulators.physics import (
     BenchPhysics,
     CellClamp,
     LoadedSensor,
-    Rotors,
     StandPhysics,
     TensilePhysics,
     TesterPhysics,
     TorqueRig,
+    TurningRotors,
 )
 from rotorid.acquire.emulators.truth import Truth
 from rotorid.acquire.emulators.wire import Faults, WireHalf, World
@@ -71,7 +71,7 @@ def build(
         physics = TensilePhysics(truth.plastic[infill_percent], 1.0, 0.05, rng)
         return World(physics, line(TensileDevice(physics)))
     if what == "rotor":
-        rotors = Rotors(truth.rotor, Battery(truth.battery), 1)
+        rotors = TurningRotors(truth.rotor, Battery(truth.battery), 1)
         physics = TesterPhysics(rotors, truth.rotor, truth.tester, rng)
         return World(physics, line(RotorDevice(physics)))
     if what == "torque":
@@ -82,7 +82,7 @@ def build(
     if experiment not in EXPERIMENTS:
         raise ValueError(f"table A.1 has experiments 1 to 48, not {experiment}")
     row = EXPERIMENTS[experiment]
-    rotors = Rotors(truth.rotor, Battery(truth.battery), 4)
+    rotors = TurningRotors(truth.rotor, Battery(truth.battery), 4)
     stand = StandPhysics(truth.vehicle, truth.rotor, truth.wrench, rotors, row.roll_deg, row.pitch_deg, rng)
     vehicle = line(QuadrotorDevice(rotors, rng), burst_s=0.04)
     sensor = line(WrenchDevice(stand))

@@ -12,10 +12,10 @@ from rotorid.acquire.emulators.physics import (
     BenchPhysics,
     CellClamp,
     LoadedSensor,
-    Rotors,
     StandPhysics,
     TensilePhysics,
     TesterPhysics,
+    TurningRotors,
 )
 from rotorid.io import wire
 from rotorid.io.wire import GO, STOP
@@ -211,7 +211,7 @@ class QuadrotorDevice(Device):
 
     instrument = wire.QUADROTOR
 
-    def __init__(self, rotors: Rotors, rng: np.random.Generator, serial_number: str = "EMU-ESP32-1") -> None:
+    def __init__(self, rotors: TurningRotors, rng: np.random.Generator, serial_number: str = "EMU-ESP32-1") -> None:
         super().__init__(serial_number)
         self._rotors = rotors
         self._rng = rng

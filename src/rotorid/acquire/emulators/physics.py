@@ -202,7 +202,7 @@ class Battery:
         return open_v - self.current_a * t.resistance_ohm
 
 
-class Rotors:
+class TurningRotors:
     """Any number of rotors on one battery; arrays have shape (n,)."""
 
     def __init__(self, truth: RotorTruth, battery: Battery, count: int) -> None:
@@ -236,7 +236,7 @@ class TesterPhysics:
 
     def __init__(
         self,
-        rotors: Rotors,
+        rotors: TurningRotors,
         rotor: RotorTruth,
         truth: TesterTruth,
         rng: np.random.Generator,
@@ -277,7 +277,7 @@ class StandPhysics:
         vehicle: VehicleTruth,
         rotor: RotorTruth,
         sensor: SensorTruth,
-        rotors: Rotors,
+        rotors: TurningRotors,
         roll_deg: float,
         pitch_deg: float,
         rng: np.random.Generator,
@@ -318,7 +318,7 @@ class TorqueRig:
     """Vehicle on the wrench sensor, motor 1 driven and counted by the thrust tester (fig. 3.20b)."""
 
     def __init__(self, truth: Truth, battery: Battery, rng: np.random.Generator) -> None:
-        rotors = Rotors(truth.rotor, battery, 4)
+        rotors = TurningRotors(truth.rotor, battery, 4)
         level = truth.wrench.model_copy(update={"tilt_rad": [0.0, 0.0]})  # a fixture of its own, levelled
         self.stand = StandPhysics(truth.vehicle, truth.rotor, level, rotors, 0.0, 0.0, rng)
         self.tester = TesterPhysics(rotors, truth.rotor, truth.tester, rng, loaded=False)

@@ -34,8 +34,8 @@ from rotorid.recordings import columns as c
 from rotorid.recordings.importers import in_the_air
 from rotorid.recordings.importers.bag_records import needs
 from rotorid.recordings.importers.clean import one_sense, report_gaps
+from rotorid.recordings.importers.known import Parameters, Values
 from rotorid.recordings.importers.mapping import continuous, quaternion_from_euler_frd
-from rotorid.recordings.importers.parameters import Parameters, Values
 from rotorid.recordings.importers.report import ImportFault
 
 KINDS = (

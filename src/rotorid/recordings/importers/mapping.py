@@ -88,7 +88,7 @@ TRAVEL = WORLD | {"neu": np.diag([1.0, 1.0, -1.0])}
 ELECTRICAL = ("erpm", "100erpm")
 
 
-class Channel(BaseModel):
+class MappedChannel(BaseModel):
     """Columns that make one channel."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -116,7 +116,7 @@ class Mapping(BaseModel):
 
     body: Literal["frd", "flu", "fur", "?"] = "frd"
     world: Literal["ned", "enu", "nwu", "nue", "?"] = "ned"
-    channels: dict[str, Channel]
+    channels: dict[str, MappedChannel]
     keep: tuple[str, ...] = ()
 
 

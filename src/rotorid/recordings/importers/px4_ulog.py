@@ -28,8 +28,8 @@ from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import in_the_air
 from rotorid.recordings.importers.clean import drop_repeated_times, further_motors, one_sense, report_gaps
+from rotorid.recordings.importers.known import Parameters, Values
 from rotorid.recordings.importers.mapping import continuous
-from rotorid.recordings.importers.parameters import Parameters, Values
 from rotorid.recordings.importers.report import ImportFault
 
 RPM = 2 * np.pi / 60

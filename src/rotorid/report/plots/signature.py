@@ -1,4 +1,4 @@
-"""How each effect of the catalogue shows: its own equations evaluated on one made-up recording, the same for all.
+"""How each effect of the catalogue shows: its own equations evaluated on one made-up recording, and drawn.
 
 The recording is no flight: each quantity swings at a frequency of its own, so that what an effect hangs on can be seen
 from the numbers alone. Of all channels the one that it changes most is shown, over the quantity that explains it best.
@@ -7,6 +7,7 @@ from the numbers alone. Of all channels the one that it changes most is shown, o
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -18,6 +19,7 @@ from rotorid.effects.loading import CHANNELS, UNITS, InstrumentFacts, Loading, f
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.vehicle import Rotor
+from rotorid.report.plots import style
 
 VEHICLE = EXAMPLE.model_copy(
     update={"rotor_inertia_kg_m2": 8.5e-6, "ground_z_m": 0.0, "rotor_speed_limits_rad_s": (0.0, 2500.0)}
@@ -337,3 +339,43 @@ def of_reading(effect: Effect, form: Form, instrument: InstrumentFacts) -> Signa
         known[over],
         y,
     )
+
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def signature_figure(shown: Signature) -> Figure:
+    """The signature of an effect: points over what it hangs on, or lines with and without it over time."""
+    if shown.layouts is not None:
+        figure, axes = style.figure(2.4, 1, 2)
+        for axis, rotors, title in zip(axes, shown.layouts, ("as it is", "as vehicle.yaml says"), strict=True):
+            _draw_rotors(axis, rotors, title)
+        return figure
+    figure, axis = style.figure(2.1)
+    if shown.without is not None:
+        axis.plot(shown.x, shown.without, color=style.COLOUR["noise"], label="without")
+        axis.plot(shown.x, shown.y, color=style.COLOUR["model"], label="with")
+        axis.legend()
+    elif shown.over.startswith("time"):
+        axis.plot(shown.x, shown.y, color=style.COLOUR["model"])
+    else:
+        axis.plot(shown.x, shown.y, ".", markersize=1.5, color=style.COLOUR["model"], rasterized=True)
+    axis.set_xlabel(shown.over)
+    axis.set_ylabel(shown.shows)
+    if np.ptp(shown.y) == 0:
+        middle = float(shown.y[0]) if len(shown.y) else 0.0
+        axis.set_ylim(min(0.0, 2 * middle), max(0.0, 2 * middle))
+    return figure
+
+
+def _draw_rotors(axis, rotors, title: str) -> None:
+    for number, rotor in enumerate(rotors, 1):
+        colour = style.COLOUR["x"] if rotor.spin == "ccw" else style.COLOUR["y"]
+        axis.plot(rotor.y_m, rotor.x_m, "o", markersize=22, markerfacecolor="none", color=colour)
+        axis.annotate(f"{number}\n{rotor.spin}", (rotor.y_m, rotor.x_m), ha="center", va="center", fontsize=7.5)
+    axis.set_aspect("equal")
+    axis.margins(0.35)
+    axis.set_title(f"{title}, seen from above")
+    axis.set_xlabel("y, to the right (m)")
+    axis.set_ylabel("x, forward (m)")

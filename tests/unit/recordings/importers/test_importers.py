@@ -14,6 +14,7 @@ from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import clean, crazyflie, in_the_air, known, px4_ulog
 from rotorid.recordings.importers.crazyflie import TYPES, decode_usd_log, read_usd_log
+from rotorid.recordings.importers.known import Parameters
 from rotorid.recordings.importers.mapping import (
     continuous,
     half_turn_about_x,
@@ -21,7 +22,6 @@ from rotorid.recordings.importers.mapping import (
     quaternion_to_frd_ned,
 )
 from rotorid.recordings.importers.neurobem import USED, read_neurobem
-from rotorid.recordings.importers.parameters import Parameters
 from rotorid.recordings.importers.public_sets import read_imrc_bench
 from rotorid.recordings.importers.rcbenchmark import decode_text, read_rcbenchmark
 from rotorid.recordings.importers.vicon_csv import read_vicon_csv
