@@ -38,7 +38,7 @@ from rotorid.io.wire import IDENTIFY, INSTRUMENTS
 
 _DEFAULT_OUT = Path("raw/local")
 _BY_ID = Path("/dev/serial/by-id")
-WAIT_S = 2.5  # an UNO restarts when its port is opened, and its boot loader keeps it for a second or two
+_WAIT_S = 2.5  # an UNO restarts when its port is opened, and its boot loader keeps it for a second or two
 app = typer.Typer(no_args_is_help=True, add_completion=False, help=__doc__, pretty_exceptions_enable=False)
 
 _Port = Annotated[str, typer.Option("--port", "-p", help="serial port; `rotorid-acquire ports` lists them")]
@@ -774,7 +774,7 @@ def stable_name(device: str, folder: Path = _BY_ID) -> str:
     return device
 
 
-def who_is_there(port: str, wait_s: float = WAIT_S) -> str:
+def who_is_there(port: str, wait_s: float = _WAIT_S) -> str:
     """One sentence about what answers on a port, asked at each baud rate that an instrument has. Nothing is started."""
     heard = b""
     for baud_rate in sorted({instrument.baud_rate for instrument in wire.INSTRUMENTS.values()}, reverse=True):

@@ -207,7 +207,7 @@ def together(
         typer.echo(f"{target / 'report.html'}")
 
 
-def section(name: str, said: Sequence[str], picture: bytes | None = None) -> Markup:
+def _section(name: str, said: Sequence[str], picture: bytes | None = None) -> Markup:
     """The sentences of a plan for a set as HTML, and its picture (PNG) where there is one.
 
     Sentences that are set in belong to the first: its steps.
@@ -225,5 +225,5 @@ def section(name: str, said: Sequence[str], picture: bytes | None = None) -> Mar
 
 def with_plan(page: str, name: str, said: Sequence[str], picture: bytes | None = None) -> str:
     """A verdict's page with the plan in it; a page without that section as it is."""
-    made = f"{OPEN}{escape(section(name, said, picture))}{_CLOSE}"
+    made = f"{OPEN}{escape(_section(name, said, picture))}{_CLOSE}"
     return SECTION.sub(lambda found: found[1] + made + found[2], page, count=1)

@@ -25,18 +25,18 @@ from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.neurobem import ANGULAR_ACCELERATION, PREDICTED_FORCE, PREDICTED_MOMENT
 
-CHANNELS = ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
-TOTALS = ("force", "moment")
+_CHANNELS = ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
+_TOTALS = ("force", "moment")
 """Over three axes: sqrt(mean of the three squares), the convention of the NeuroBEM paper's table."""
 _ORDER = 2
 _PAPER_MASS_KG = 0.752
 _POINT_STEP = 40
 """Every so many samples become a point of the figure."""
 _MODELS = ("rigid_body", "neurobem")
-_FLIGHT_COLUMNS = ["flight", "model", "airspeed_mean_m_s", "airspeed_max_m_s", *CHANNELS, *TOTALS]
+_FLIGHT_COLUMNS = ["flight", "model", "airspeed_mean_m_s", "airspeed_max_m_s", *_CHANNELS, *_TOTALS]
 _BIN_COLUMNS = ["model", "channel", "airspeed_low_m_s", "airspeed_high_m_s", "samples"]
 _BIN_COLUMNS += ["rms", "low_95", "high_95"]
-_POINT_COLUMNS = ["flight", "airspeed_m_s", *CHANNELS]
+_POINT_COLUMNS = ["flight", "airspeed_m_s", *_CHANNELS]
 
 
 def low_pass(values: np.ndarray, rate_hz: float, cutoff_hz: float) -> np.ndarray:
@@ -87,7 +87,7 @@ def airspeed(run: Run) -> np.ndarray:
 def rmse(residual: np.ndarray) -> dict[str, float]:
     """Root mean square of each channel and of the totals, residual of shape (n, 6)."""
     squares = np.mean(_squares(residual), axis=0)
-    return {name: float(np.sqrt(v)) for name, v in zip(CHANNELS + TOTALS, squares, strict=True)}
+    return {name: float(np.sqrt(v)) for name, v in zip(_CHANNELS + _TOTALS, squares, strict=True)}
 
 
 def _squares(residual: np.ndarray) -> np.ndarray:
@@ -97,7 +97,7 @@ def _squares(residual: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Binned:
+class _Binned:
     """RMS residual in bins of airspeed with 95 % intervals; rows are bins, columns
     the six channels and the two totals."""
 
@@ -122,7 +122,7 @@ def by_airspeed(
     rng: np.random.Generator,
     repeats: int = 400,
     fewest_blocks: int = 5,
-) -> Binned:
+) -> _Binned:
     """RMS residual against airspeed over all runs, intervals by resampling blocks of time.
 
     Residuals are correlated in time, so whole blocks of `block_s` are drawn, not samples.
@@ -165,7 +165,7 @@ def by_airspeed(
     low, high = np.nanpercentile(spread, [2.5, 97.5], axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):  # a channel may have nothing left over
         ratio, growth = spread[:, -1] / spread[:, 0], centre[-1] / centre[0]
-    return Binned(
+    return _Binned(
         low_m_s=edges[:-1][kept],
         high_m_s=edges[1:][kept],
         samples=counts.sum(axis=0).astype(int),
@@ -193,7 +193,7 @@ def no_neurobem() -> _NeurobemTables:
     return _NeurobemTables({}, *tables)
 
 
-def residuals_of(run: Run, vehicle: Vehicle, cutoff_hz: float) -> dict[str, np.ndarray]:
+def _residuals_of(run: Run, vehicle: Vehicle, cutoff_hz: float) -> dict[str, np.ndarray]:
     """What each model leaves over in one flight, shape (n, 6) each."""
     rate = 1 / float(np.median(np.diff(run.time_s)))
     acceleration = run.array(ANGULAR_ACCELERATION)
@@ -212,7 +212,7 @@ def residuals_of(run: Run, vehicle: Vehicle, cutoff_hz: float) -> dict[str, np.n
     }
 
 
-def _growth(found: Binned) -> dict[str, dict]:
+def _growth(found: _Binned) -> dict[str, dict]:
     """RMS in the slowest and the fastest bin, and their ratio, of each channel and total."""
     return {
         channel: {
@@ -223,13 +223,13 @@ def _growth(found: Binned) -> dict[str, dict]:
             "growth": float(found.growth[place]),
             "growth_95": [float(v) for v in found.growth_95[place]],
         }
-        for place, channel in enumerate(CHANNELS + TOTALS)
+        for place, channel in enumerate(_CHANNELS + _TOTALS)
     }
 
 
-def _bin_rows(model: str, found: Binned) -> list[tuple]:
+def _bin_rows(model: str, found: _Binned) -> list[tuple]:
     rows = []
-    for place, channel in enumerate(CHANNELS + TOTALS):
+    for place, channel in enumerate(_CHANNELS + _TOTALS):
         for b in range(len(found.low_m_s)):
             where = (model, channel, found.low_m_s[b], found.high_m_s[b], found.samples[b])
             rows.append((*where, found.rms[b, place], found.rms_low[b, place], found.rms_high[b, place]))
@@ -241,7 +241,7 @@ def compare_with_neurobem(
 ) -> _NeurobemTables:
     """RMS of every flight and model, and against airspeed with block-bootstrap intervals."""
     vehicle = recordings.vehicle
-    left = {run.name: residuals_of(run, vehicle, cutoff_hz) for run in recordings.runs}
+    left = {run.name: _residuals_of(run, vehicle, cutoff_hz) for run in recordings.runs}
     speeds = {run.name: airspeed(run) for run in recordings.runs}
     times = {run.name: run.time_s for run in recordings.runs}
     rows, summary = [], {"mass_kg": vehicle.mass_kg, "paper_mass_kg": _PAPER_MASS_KG, "flights": {}}

@@ -34,7 +34,7 @@ class Ended(StrEnum):
     FAILED = "failed"
 
 
-Place = Annotated[list[Number], Field(min_length=3, max_length=3)]
+_Place = Annotated[list[Number], Field(min_length=3, max_length=3)]
 
 
 class RoomAir(KnownKeys):

@@ -106,7 +106,7 @@ class Answer(NamedTuple):
 
 
 @dataclass(frozen=True)
-class WireChannel:
+class _WireChannel:
     """One number of a sample. `column` carries the unit; value = scale × count. `low` and `high` are the
     counts at which the channel saturates; a command or a state (`reading=False`) does not saturate."""
 
@@ -126,7 +126,7 @@ class Instrument:
     title: str
     baud_rate: int
     interval_us: int  # when nothing else is asked for
-    channels: tuple[WireChannel, ...]
+    channels: tuple[_WireChannel, ...]
     commands: dict[str, str]  # letter: what it does and its arguments
 
     @cached_property
@@ -158,15 +158,15 @@ class Instrument:
 
 def counts(columns: list[str], code: str, scale: float, high: int, low: int | None = None) -> tuple:
     """Channels of one kind; the range is symmetric unless `low` is given."""
-    return tuple(WireChannel(name, code, scale, -high if low is None else low, high) for name in columns)
+    return tuple(_WireChannel(name, code, scale, -high if low is None else low, high) for name in columns)
 
 
-COMMON_COMMANDS = {
+_COMMON_COMMANDS = {
     IDENTIFY: "say who you are (a start record)",
     GO: "start to stream; interval u32 in µs, 0 for the instrument's own",
     STOP: "stop the stream",
 }
-WATCHDOG = {
+_WATCHDOG = {
     KEEP: "watchdog, u16 in ms: when no intact command has come for so long, what moves is stopped and the stream ended"
 }
 
@@ -191,7 +191,7 @@ BENCH = Instrument(
     baud_rate=115200,
     interval_us=20_000,
     channels=counts([f"cell_{i}_v" for i in range(1, 7)], "i", VOLTS_PER_COUNT, _FULL_SCALE),
-    commands=COMMON_COMMANDS,
+    commands=_COMMON_COMMANDS,
 )
 
 
@@ -205,7 +205,7 @@ BENCH = Instrument(
 POWER, INITIALISE, OFFSET = "P", "I", "O"
 FORCE_RESOLUTION_N = 0.1
 MOMENT_RESOLUTION_N_M = 0.001
-WRENCH_COLUMNS = ["force_x_n", "force_y_n", "force_z_n", "moment_x_n_m", "moment_y_n_m", "moment_z_n_m"]
+_WRENCH_COLUMNS = ["force_x_n", "force_y_n", "force_z_n", "moment_x_n_m", "moment_y_n_m", "moment_z_n_m"]
 _INITIALISE = struct.Struct("<IHI")
 
 WRENCH = Instrument(
@@ -213,9 +213,9 @@ WRENCH = Instrument(
     title="six-axis force-torque sensor",
     baud_rate=115200,
     interval_us=10_000,
-    channels=counts(WRENCH_COLUMNS[:3], "h", FORCE_RESOLUTION_N, 2000)  # load capacity 200 N
-    + counts(WRENCH_COLUMNS[3:], "h", MOMENT_RESOLUTION_N_M, 1800),  # and 1.8 N m
-    commands=COMMON_COMMANDS
+    channels=counts(_WRENCH_COLUMNS[:3], "h", FORCE_RESOLUTION_N, 2000)  # load capacity 200 N
+    + counts(_WRENCH_COLUMNS[3:], "h", MOMENT_RESOLUTION_N_M, 1800),  # and 1.8 N m
+    commands=_COMMON_COMMANDS
     | {
         POWER: "power, u8: 1 on, 0 off",
         INITIALISE: "sampling interval u32 in µs, restart times u16, measuring times u32",
@@ -244,8 +244,8 @@ JR3 = Instrument(
     title="reference force-torque sensor",
     baud_rate=115200,
     interval_us=20_000,
-    channels=counts(WRENCH_COLUMNS[:3], "i", 0.01, 20_000) + counts(WRENCH_COLUMNS[3:], "i", 1e-3, 10_000),
-    commands=COMMON_COMMANDS | {OFFSET: "take the present reading as zero"},
+    channels=counts(_WRENCH_COLUMNS[:3], "i", 0.01, 20_000) + counts(_WRENCH_COLUMNS[3:], "i", 1e-3, 10_000),
+    commands=_COMMON_COMMANDS | {OFFSET: "take the present reading as zero"},
 )
 
 
@@ -261,14 +261,14 @@ ROTOR = Instrument(
     baud_rate=115200,
     interval_us=20_000,
     channels=(
-        WireChannel("throttle", "H", THROTTLE_SCALE, 0, 10_000, reading=False),
-        WireChannel("speed_rpm", "H", 1.0, 0, 0xFFFF),
-        WireChannel("thrust_n", "i", 1e-3, -50_000, 50_000),
-        WireChannel("battery_voltage_v", "H", 1e-3, 0, 30_000),
-        WireChannel("battery_current_a", "H", 1e-3, 0, 50_000),
+        _WireChannel("throttle", "H", THROTTLE_SCALE, 0, 10_000, reading=False),
+        _WireChannel("speed_rpm", "H", 1.0, 0, 0xFFFF),
+        _WireChannel("thrust_n", "i", 1e-3, -50_000, 50_000),
+        _WireChannel("battery_voltage_v", "H", 1e-3, 0, 30_000),
+        _WireChannel("battery_current_a", "H", 1e-3, 0, 50_000),
     ),
-    commands=COMMON_COMMANDS
-    | WATCHDOG
+    commands=_COMMON_COMMANDS
+    | _WATCHDOG
     | {
         THROTTLE: "throttle u16 in 1e-4, hold u16 in ms; the motor stops by itself when the time is over, "
         "so that a host that died leaves no motor running"
@@ -315,12 +315,12 @@ QUADROTOR = Instrument(
     baud_rate=115200,
     interval_us=20_000,
     channels=(
-        *(WireChannel(f"throttle_{i}", "H", THROTTLE_SCALE, 0, 10_000, reading=False) for i in range(1, 5)),
-        WireChannel("battery_voltage_v", "H", 1e-3, 0, 30_000),
-        WireChannel("led", "B", 1, 0, 3, reading=False),
+        *(_WireChannel(f"throttle_{i}", "H", THROTTLE_SCALE, 0, 10_000, reading=False) for i in range(1, 5)),
+        _WireChannel("battery_voltage_v", "H", 1e-3, 0, 30_000),
+        _WireChannel("led", "B", 1, 0, 3, reading=False),
     ),
-    commands={letter: text for letter, text in COMMON_COMMANDS.items() if letter != "G"}
-    | WATCHDOG
+    commands={letter: text for letter, text in _COMMON_COMMANDS.items() if letter != "G"}
+    | _WATCHDOG
     | {letter: f"run a programme: {text}" for letter, text in DYNAMICS.items()},
 )
 
@@ -367,10 +367,10 @@ TENSILE = Instrument(
     baud_rate=9600,
     interval_us=100_000,
     channels=(
-        WireChannel("displacement_mm", "i", 1e-4, -1_000_000, 1_000_000),
-        WireChannel("force_n", "i", 0.1, -50_000, 50_000),
+        _WireChannel("displacement_mm", "i", 1e-4, -1_000_000, 1_000_000),
+        _WireChannel("force_n", "i", 0.1, -50_000, 50_000),
     ),
-    commands=COMMON_COMMANDS | WATCHDOG,
+    commands=_COMMON_COMMANDS | _WATCHDOG,
 )
 
 

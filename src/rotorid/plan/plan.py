@@ -43,7 +43,7 @@ _YAW_SHARE = 0.2
 """Share of the hovering rotors' torque that a planned turn may ask for: the rest is kept for roll and pitch."""
 SIZES = (1.0, 0.75, 0.5)
 """Sizes of a manoeuvre that are tried, the largest that keeps the limits is taken."""
-QUICK = ("shake all to 2 Hz", "shake all to 4 Hz")
+_QUICK = ("shake all to 2 Hz", "shake all to 4 Hz")
 NOTHING = Reference(np.zeros(1), np.zeros((1, 3)), np.zeros(1))
 """Of a flight without pieces."""
 BETWEEN_S = 1.0
@@ -245,7 +245,7 @@ def _expecting_quick(known: FittedSet, limits: Limits) -> FittedSet:
     world, step, vehicle = world_of(known, None, None), step_of(known), known.prepared.vehicle
     for share in SIZES:
         options = {p.name: p for p in candidates(smaller(limits, share), share * yaw_acceleration(vehicle))}
-        for piece in (options[n] for n in QUICK if n in options):
+        for piece in (options[n] for n in _QUICK if n in options):
             try:
                 flight, *_ = flown(world, joined([piece], step, BETWEEN_S), limits)
             except InputError:

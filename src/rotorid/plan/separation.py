@@ -49,7 +49,7 @@ _SLOWER_LOOPS = (1.0, 0.7)
 as stated flies."""
 FITTED_SHARE = 1.0 - HELD_OUT_SHARE
 """Share of a later recording that the joint judgement fits: the rest is held out (`rotorid.plan.together`)."""
-SIZES = np.geomspace(1e-2, 1e2, 41)
+_SIZES = np.geomspace(1e-2, 1e2, 41)
 """Sizes, of the coefficients found, among which that of a model's coefficients is looked for."""
 
 
@@ -409,7 +409,7 @@ def drawn(true: Hypothesis, gram: np.ndarray, count: int = _DRAWS) -> np.ndarray
     found, doubt = true.beta / unit, true.covariance / np.outer(unit, unit)
     values, vectors = np.linalg.eigh(doubt)
     values, along = np.maximum(values, 1e-12 * max(values.max(), 1e-300)), vectors.T @ found
-    variances = np.square(SIZES * max(float(np.abs(found).max()), 1e-300))
+    variances = np.square(_SIZES * max(float(np.abs(found).max()), 1e-300))
     fits = [-(np.log(values + v) + along**2 / (values + v)).sum() for v in variances]
     variance = variances[int(np.argmax(fits))]
     kept = variance / (values + variance)

@@ -52,8 +52,8 @@ from rotorid.steps import step
 REST_S = 2.0
 """Unloaded before and after every step."""
 _MOST_STEPS = 40
-STANDARD = "slow steps"
-STEP_S = 0.3
+_STANDARD = "slow steps"
+_STEP_S = 0.3
 """A change of the load from one level to the next takes this long."""
 
 
@@ -186,7 +186,7 @@ def through(t: np.ndarray, levels: Sequence[float]) -> np.ndarray:
     cuts = REST_S + (t[-1] - 2 * REST_S) * np.arange(len(held) - 1) / (len(held) - 2)
     out = np.zeros(len(t))
     for a, b, cut in zip(held[:-1], held[1:], cuts, strict=True):
-        out += (b - a) * 0.5 * (1 - np.cos(np.pi * np.clip((t - cut) / STEP_S + 0.5, 0, 1)))
+        out += (b - a) * 0.5 * (1 - np.cos(np.pi * np.clip((t - cut) / _STEP_S + 0.5, 0, 1)))
     return out
 
 
@@ -355,7 +355,7 @@ def _forecast(known: KnownInstrument, name: str, taken: Sequence[Tried]) -> Sess
 
 def _standard_steps(tried: Sequence[Tried], limits: SessionLimits) -> list[Tried]:
     """What is loaded without a plan: slowly up and down in every place, mounted level, as often as time allows."""
-    once = [t for t in tried if t.information is not None and t.piece.name.startswith(STANDARD)]
+    once = [t for t in tried if t.information is not None and t.piece.name.startswith(_STANDARD)]
     once = [t for t in once if t.piece.tilt_rad == (0.0, 0.0)]
     seconds = sum(t.flown_s for t in once)
     return once * min(int(limits.duration_s / seconds), _MOST_STEPS // len(once)) if once else []

@@ -111,7 +111,7 @@ def px4_offboard(plan: Plan) -> pd.DataFrame:
     return out
 
 
-def polynomial(start: np.ndarray, stop: np.ndarray, seconds: float) -> np.ndarray:
+def _polynomial(start: np.ndarray, stop: np.ndarray, seconds: float) -> np.ndarray:
     """Coefficients (8, k), lowest order first, that take value and three derivatives (4, k) from start to stop."""
     powers = np.arange(8)
 
@@ -145,7 +145,7 @@ def crazyflie(plan: Plan) -> tuple[pd.DataFrame, float]:
         while True:
             end = min(at + length, len(t) - 1)
             seconds = t[end] - t[at]
-            fitted = polynomial(states[at], states[end], seconds)
+            fitted = _polynomial(states[at], states[end], seconds)
             powers = np.power(t[at : end + 1, None] - t[at], np.arange(8))
             off = float(np.linalg.norm((powers @ fitted - every[at : end + 1])[:, :3], axis=1).max())
             bend = powers[:, :6] @ (fitted[2:] * (np.arange(2, 8) * np.arange(1, 7))[:, None])

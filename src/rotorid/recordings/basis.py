@@ -24,7 +24,7 @@ _MOST_NAMES = 12
 
 
 @dataclass(frozen=True)
-class Basis:
+class _Basis:
     """Time and columns of a set, as they are used."""
 
     recorded_s: float
@@ -49,14 +49,14 @@ class Basis:
         return f"The verdict rests on {said}; {lacks}."
 
 
-def basis_of(recordings: RecordingSet) -> Basis:
+def basis_of(recordings: RecordingSet) -> _Basis:
     """What a set offers to a verdict."""
     with_pauses = recordings.vehicle.kind == "flight"
     recorded = sum(float(np.ptp(run.time_s)) if with_pauses else recorded_s(run.time_s) for run in recordings.runs)
     grounded = [on_the_ground_s(run, recordings.vehicle) for run in recordings.runs]
     known = recordings.vehicle.kind == "flight" and any(g is not None for g in grounded)
     ground = sum(g for g in grounded if g is not None)
-    return Basis(
+    return _Basis(
         recorded,
         recorded - ground if known else None,
         ground / recorded if known and recorded > 0 else None,

@@ -27,7 +27,7 @@ from rotorid.acquire.emulators.truth import Truth
 from rotorid.acquire.emulators.wire import Faults, WireHalf, World
 from rotorid.io.experiments import EXPERIMENTS
 
-NAMES = ("bench", "rotor", "wrench", "quadrotor", "stand", "torque", "jr3", "tensile")
+_NAMES = ("bench", "rotor", "wrench", "quadrotor", "stand", "torque", "jr3", "tensile")
 
 
 def build(
@@ -77,8 +77,8 @@ def build(
     if what == "torque":
         rig = TorqueRig(truth, Battery(truth.battery), rng)
         return World(rig, line(RotorDevice(rig.tester)), line(WrenchDevice(rig.stand)))
-    if what not in NAMES:
-        raise ValueError(f"there is no emulator {what!r}; there are {', '.join(NAMES)}")
+    if what not in _NAMES:
+        raise ValueError(f"there is no emulator {what!r}; there are {', '.join(_NAMES)}")
     if experiment not in EXPERIMENTS:
         raise ValueError(f"table A.1 has experiments 1 to 48, not {experiment}")
     row = EXPERIMENTS[experiment]

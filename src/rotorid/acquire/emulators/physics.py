@@ -29,8 +29,8 @@ from rotorid.acquire.emulators.truth import (
 )
 from rotorid.acquire.geometry import AXES, GF_N, cell_response, direction_of, put_down
 
-RPM = 60 / (2 * math.pi)
-GRAVITY = 9.81
+_RPM = 60 / (2 * math.pi)
+_GRAVITY = 9.81
 SENSOR_POSITION_M = (0.0, 0.0, 0.045)  # believed, body axes, from the believed centre of mass
 _SPIN = np.array([1.0, -1.0, 1.0, -1.0])  # counter-clockwise from above: reaction about +z
 CORNERS = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]], dtype=float)  # rotors 1–4: forward, right
@@ -259,7 +259,7 @@ class TesterPhysics:
 
     def speed_rpm(self) -> float:
         """Reading of the optical counter, rpm."""
-        speed = float(self.rotors.speed[0]) * RPM
+        speed = float(self.rotors.speed[0]) * _RPM
         return speed + self._truth.speed_noise_rpm * self._rng.standard_normal() if speed > 60 else 0.0
 
 
@@ -286,7 +286,7 @@ class StandPhysics:
         self._thrust = rotor.thrust_coefficient_n_s2 * np.array(vehicle.thrust_factors)
         self._torque = rotor.torque_coefficient_n_m_s2 * np.array(vehicle.torque_factors)
         self._inertia = rotor.inertia_kg_m2
-        self._weight_n = vehicle.mass_kg * GRAVITY
+        self._weight_n = vehicle.mass_kg * _GRAVITY
         sensor_roll, sensor_pitch = sensor.tilt_rad
         level_to_sensor = tilt_matrix(sensor_roll, sensor_pitch).T
         self._body_to_sensor = level_to_sensor @ tilt_matrix(math.radians(roll_deg), math.radians(pitch_deg))

@@ -52,25 +52,25 @@ class Faults:
     clock_start_us: int = 0  # the device clock at power-up
 
 
-KINDS = ("drop", "repeat", "swap", "corrupt", "half", "garbage")
+_KINDS = ("drop", "repeat", "swap", "corrupt", "half", "garbage")
 
 
 @dataclass
-class FaultyLine:
+class _FaultyLine:
     """Applies the faults of the line to encoded frames."""
 
     faults: Faults
     rng: np.random.Generator
     count: int = 0  # data frames so far
-    done: dict[str, int] = field(default_factory=lambda: dict.fromkeys(KINDS, 0))
+    done: dict[str, int] = field(default_factory=lambda: dict.fromkeys(_KINDS, 0))
     _held: bytes = b""
 
     def send(self, encoded: bytes) -> bytes:
         """What reaches the other end when this data frame is sent."""
         number, self.count = self.count, self.count + 1
-        befalls = {kind for kind in KINDS if number in getattr(self.faults, kind)}
+        befalls = {kind for kind in _KINDS if number in getattr(self.faults, kind)}
         if self.faults.share:
-            befalls |= {kind for kind in KINDS if self.rng.random() < self.faults.share}
+            befalls |= {kind for kind in _KINDS if self.rng.random() < self.faults.share}
         for kind in befalls:
             self.done[kind] += 1
         out = b""
@@ -111,7 +111,7 @@ class WireHalf:
         self.due_s: float | None = None  # true time of the next sample
         self.unplugged = False
         self.at_rest = False  # the cable carries nothing, either way, and no port notices
-        self.line = FaultyLine(faults, rng)
+        self.line = _FaultyLine(faults, rng)
         self._faults = faults
         self._rng = rng
         self._clock_rate = 1 + clock_error

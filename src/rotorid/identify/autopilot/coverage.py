@@ -26,16 +26,16 @@ from rotorid.recordings import columns as c
 from rotorid.vehicle.attitude import quaternion_from_euler, rotation_from_quaternion
 from rotorid.vehicle.mixer import allocation_matrix
 
-GRAVITY = 9.81
+_GRAVITY = 9.81
 _INNER_HZ = 500
-STEP = 5
-LEAST_SHARE = 0.02
-FLIGHTS = 25
-SEED = 46
+_STEP = 5
+_LEAST_SHARE = 0.02
+_FLIGHTS = 25
+_SEED = 46
 
 
 @dataclass(frozen=True)
-class FlightTruth:
+class _FlightTruth:
     """What a flight is made with; SI units unless named."""
 
     autopilot: str
@@ -61,7 +61,7 @@ class FlightTruth:
     """Vertical acceleration of the climbs."""
 
 
-def drawn(autopilot: str, rng: np.random.Generator) -> FlightTruth:
+def drawn(autopilot: str, rng: np.random.Generator) -> _FlightTruth:
     """A truth of usual size for an autopilot."""
     u = rng.uniform
     shapes = {
@@ -71,11 +71,11 @@ def drawn(autopilot: str, rng: np.random.Generator) -> FlightTruth:
         "crazyflie": lambda: (u(0.075, 0.1), u(-0.0008, -0.0004)),
     }[autopilot]()
     small = autopilot == "crazyflie"
-    return FlightTruth(
+    return _FlightTruth(
         autopilot,
         shapes,
         mass_kg=u(0.027, 0.036) if small else u(0.5, 2.5),
-        full_m_s2=GRAVITY / u(0.2, 0.45),
+        full_m_s2=_GRAVITY / u(0.2, 0.45),
         time_constant_s=u(0.015, 0.06),
         bluff=(u(0.01, 0.05), u(0.01, 0.05)),
         momentum=u(0.05, 0.3),
@@ -106,13 +106,13 @@ def signal_of(autopilot: str, thrust: np.ndarray, voltage: np.ndarray, shapes: t
     return (shapes[1] * thrust**2 + shapes[0] * thrust) / voltage  # motorsCompensateBatteryVoltage
 
 
-def flight(truth: FlightTruth, rng: np.random.Generator, seconds: float = 40.0, rate_hz: int = 250) -> RecordingSet:
+def flight(truth: _FlightTruth, rng: np.random.Generator, seconds: float = 40.0, rate_hz: int = 250) -> RecordingSet:
     """One flight as its sensors record it; the vehicle is of the right mass, its other values are the template's."""
     time_s = np.arange(int(seconds * _INNER_HZ) + 1) / _INNER_HZ
     euler = _angles(time_s, truth, rng)
     rotation = rotation_from_quaternion(quaternion_from_euler(euler))
     up = _sines(time_s, [0.15, 0.5, 1.2, 3.0], [0.3, 0.8, 2.0, 5.0], truth.vigour_m_s2 * rng.uniform(0.3, 0.5, 4), rng)
-    thrust = (GRAVITY + up) / rotation[:, 2, 2]
+    thrust = (_GRAVITY + up) / rotation[:, 2, 2]
     velocity = _velocity(time_s, rotation, thrust, truth)
     force = np.column_stack([_drag(rotation, velocity, truth), -thrust])
     turning = _rates(rotation)
@@ -130,7 +130,7 @@ def flight(truth: FlightTruth, rng: np.random.Generator, seconds: float = 40.0, 
     else:
         # Full thrust goes with the voltage; the law of the share is at each voltage the same.
         unit = truth.full_m_s2 * truth.mass_kg / 4 * (voltage / voltage.mean()) ** 1.5
-    root = np.sqrt(np.maximum(rotor_n / unit, LEAST_SHARE))
+    root = np.sqrt(np.maximum(rotor_n / unit, _LEAST_SHARE))
     steady = np.maximum(root + truth.time_constant_s * np.gradient(root, 1 / _INNER_HZ, axis=0), 1e-3) ** 2
     throttle = signal_of(truth.autopilot, steady, voltage, truth.shapes)
     keep = np.arange(0, len(time_s), _INNER_HZ // rate_hz)
@@ -147,7 +147,7 @@ def flight(truth: FlightTruth, rng: np.random.Generator, seconds: float = 40.0, 
     return RecordingSet("known", vehicle, (Run("flight", pd.DataFrame(table)),))
 
 
-def _vehicle(truth: FlightTruth) -> Vehicle:
+def _vehicle(truth: _FlightTruth) -> Vehicle:
     """A template of about the right size with the true mass and an inertia that goes with it."""
     name = "crazyflie-2.1" if truth.autopilot == "crazyflie" else "x500"
     template = templates.read(name)
@@ -165,7 +165,7 @@ def _sines(time_s: np.ndarray, lowest_hz, highest_hz, sizes, rng: np.random.Gene
     return np.sin(time_s[:, None] * omega + phase) @ np.asarray(sizes)
 
 
-def _angles(time_s: np.ndarray, truth: FlightTruth, rng: np.random.Generator) -> np.ndarray:
+def _angles(time_s: np.ndarray, truth: _FlightTruth, rng: np.random.Generator) -> np.ndarray:
     """Roll, pitch, yaw (n, 3), rad: slow tilts that make speed, small quick ones, and a yaw that turns."""
     tilts = [
         _sines(time_s, [0.04, 0.1, 0.5], [0.09, 0.2, 1.0], rng.uniform([0.1, 0.05, 0.02], [0.25, 0.1, 0.05]), rng)
@@ -174,20 +174,20 @@ def _angles(time_s: np.ndarray, truth: FlightTruth, rng: np.random.Generator) ->
     return np.column_stack([*tilts, rng.uniform(-3, 3) + _sines(time_s, [0.03], [0.07], [1.0], rng)])
 
 
-def _drag(rotation: np.ndarray, velocity: np.ndarray, truth: FlightTruth) -> np.ndarray:
+def _drag(rotation: np.ndarray, velocity: np.ndarray, truth: _FlightTruth) -> np.ndarray:
     """Specific force along body x and y, (n, 2), m/s²."""
     through = np.einsum("nji,nj->ni", rotation, velocity - np.array([*truth.wind_m_s, 0.0]))
     return specific_drag(through, *truth.bluff, truth.momentum)
 
 
-def _velocity(time_s: np.ndarray, rotation: np.ndarray, thrust: np.ndarray, truth: FlightTruth) -> np.ndarray:
-    """Velocity (n, 3), m/s, by Euler's steps of `STEP` samples, joined by straight lines."""
-    coarse = np.arange(0, len(time_s), STEP)
+def _velocity(time_s: np.ndarray, rotation: np.ndarray, thrust: np.ndarray, truth: _FlightTruth) -> np.ndarray:
+    """Velocity (n, 3), m/s, by Euler's steps of `_STEP` samples, joined by straight lines."""
+    coarse = np.arange(0, len(time_s), _STEP)
     out, now = np.empty((len(coarse), 3)), np.zeros(3)
     for row, k in enumerate(coarse):
         out[row] = now
         body = np.array([*_drag(rotation[[k]], now[None], truth)[0], -thrust[k]])
-        now = now + STEP / _INNER_HZ * (rotation[k] @ body + [0, 0, GRAVITY])
+        now = now + _STEP / _INNER_HZ * (rotation[k] @ body + [0, 0, _GRAVITY])
     return np.stack([np.interp(time_s, time_s[coarse], out[:, j]) for j in range(3)], axis=1)
 
 
@@ -210,13 +210,13 @@ def _smooth(rng: np.random.Generator, time_s: np.ndarray) -> np.ndarray:
     return np.sin(2 * np.pi * time_s / rng.uniform(8, 20) + rng.uniform(0, 6))
 
 
-def _true_values(truth: FlightTruth) -> dict[str, float]:
+def _true_values(truth: _FlightTruth) -> dict[str, float]:
     """What a flight was made with, by the names and in the units of `parameters_of`."""
     shapes = MAPS[truth.autopilot].shapes
     values = {s.name: s.factor * v for s, v in zip(shapes, truth.shapes, strict=True)}
     values["motor_time_constant_s"] = truth.time_constant_s
     if truth.autopilot in ("px4", "ardupilot"):
-        values["MPC_THR_HOVER" if truth.autopilot == "px4" else "MOT_THST_HOVER"] = GRAVITY / truth.full_m_s2
+        values["MPC_THR_HOVER" if truth.autopilot == "px4" else "MOT_THST_HOVER"] = _GRAVITY / truth.full_m_s2
     if truth.autopilot == "px4":
         values |= {"EKF2_BCOEF_X": 1 / truth.bluff[0], "EKF2_BCOEF_Y": 1 / truth.bluff[1]}
         values |= {"EKF2_MCOEF": truth.momentum}
@@ -228,7 +228,7 @@ def counted(autopilot: str, seeds: Sequence[int], seconds: float = 40.0) -> pd.D
     """A row a flight and parameter: true, value, low, high, whether it is determined, whether it is in."""
     rows = []
     for seed in seeds:
-        rng = np.random.default_rng([SEED, list(MAPS).index(autopilot), seed])
+        rng = np.random.default_rng([_SEED, list(MAPS).index(autopilot), seed])
         truth = drawn(autopilot, rng)
         found: dict[str, AutopilotParameter] = {
             p.name: p for p in parameters_of(flight(truth, rng, seconds), autopilot)
@@ -251,4 +251,4 @@ def main(path: Path, flights: int) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else FLIGHTS)
+    main(Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else _FLIGHTS)

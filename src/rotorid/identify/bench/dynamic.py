@@ -14,7 +14,7 @@ from rotorid.errors import InputError
 from rotorid.io.tables import by_recording
 from rotorid.recordings.signal.average import mean_and_error
 
-REST_S = 1.0
+_REST_S = 1.0
 """Length of the stretches at the beginning and the end that are taken as rest."""
 _HELD_S = 0.8
 """A thrust counts as held when it stays within ± `_HELD_N` for that long."""
@@ -156,7 +156,7 @@ def figures(flown: pd.DataFrame) -> pd.DataFrame:
     rows = []
     for (number, platform), flight in flown.groupby(["set", "platform"]):
         time_s = flight["time_s"].to_numpy()
-        before, after = time_s < REST_S, time_s > time_s[-1] - REST_S
+        before, after = time_s < _REST_S, time_s > time_s[-1] - _REST_S
         rest = flight.loc[before, "thrust_n"]
         rows.append(
             {

@@ -264,7 +264,7 @@ def flag_warnings(cells: Sequence[Mapping], flagged: pd.DataFrame) -> list[str]:
     return sentences
 
 
-FLAG_COLUMNS = "cell id weight_gf reading_says_gf studentised flag a1_with a1_without r_with r_without".split()
+_FLAG_COLUMNS = "cell id weight_gf reading_says_gf studentised flag a1_with a1_without r_with r_without".split()
 
 
 def flags_as_table(cells: Sequence[Mapping]) -> pd.DataFrame:
@@ -281,7 +281,7 @@ def flags_as_table(cells: Sequence[Mapping]) -> pd.DataFrame:
         for cell in cells
         for reading in cell["flagged"]
     ]
-    return pd.DataFrame(rows, columns=FLAG_COLUMNS)
+    return pd.DataFrame(rows, columns=_FLAG_COLUMNS)
 
 
 @dataclass(frozen=True)

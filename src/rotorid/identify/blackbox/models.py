@@ -28,7 +28,7 @@ from rotorid.identify.networks import Trained, Training, build, train
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.attitude import quaternion_from_euler, rotation_from_quaternion
 
-Predict = Callable[[pd.DataFrame], np.ndarray]
+_Predict = Callable[[pd.DataFrame], np.ndarray]
 NAMES = {
     "thesis_network": "thesis's network",
     "linear": "least squares",
@@ -42,18 +42,18 @@ _INPUT_NAMES = {f"force_{i}_n": f"the force of motor {i} (N)" for i in (1, 2, 3,
     "pitch_rad": "pitch (rad)",
 }
 
-Fit = Callable[[pd.DataFrame], Predict]
+_Fit = Callable[[pd.DataFrame], _Predict]
 
 
 @dataclass(frozen=True)
-class ColumnScale:
+class _ColumnScale:
     """Even scaling of columns to 0-1 over the training data, as networks want it."""
 
     low: np.ndarray
     high: np.ndarray
 
     @classmethod
-    def of(cls, values: np.ndarray) -> ColumnScale:
+    def of(cls, values: np.ndarray) -> _ColumnScale:
         low, high = values.min(axis=0), values.max(axis=0)
         return cls(low, np.where(high > low, high, low + 1.0))
 
@@ -72,10 +72,10 @@ def fit_thesis_network(
     seed: int = 0,
     every: int = 10,
     checkpoint: Path | None = None,
-) -> tuple[Predict, Trained]:
+) -> tuple[_Predict, Trained]:
     """Train the network of thesis 4.4 on a table with `INPUTS` and `OUTPUTS`."""
     x, y = table[list(INPUTS)].to_numpy(), table[list(OUTPUTS)].to_numpy()
-    scale_x, scale_y = ColumnScale.of(x), ColumnScale.of(y)
+    scale_x, scale_y = _ColumnScale.of(x), _ColumnScale.of(y)
     sizes = (len(INPUTS), *hidden, len(OUTPUTS))
     activations = ("sigmoid",) * len(hidden) + ("linear",)
     network = build(sizes, activations, np.random.default_rng(seed))
@@ -88,7 +88,7 @@ def fit_thesis_network(
     return predict, trained
 
 
-def fit_linear(table: pd.DataFrame) -> Predict:
+def fit_linear(table: pd.DataFrame) -> _Predict:
     def design(t):
         return np.column_stack([t[list(INPUTS)].to_numpy(), np.ones(len(t))])
 
@@ -111,7 +111,7 @@ def _physical_features(table: pd.DataFrame) -> np.ndarray:
     return np.concatenate([forces * way[:, None] for way in ways], axis=1)
 
 
-def fit_ridge_physics(table: pd.DataFrame, groups: np.ndarray) -> Predict:
+def fit_ridge_physics(table: pd.DataFrame, groups: np.ndarray) -> _Predict:
     """Ridge with the penalty chosen per output by leaving whole experiments out."""
     from sklearn.linear_model import Ridge
     from sklearn.model_selection import GroupKFold, cross_val_score
@@ -132,7 +132,7 @@ def fit_ridge_physics(table: pd.DataFrame, groups: np.ndarray) -> Predict:
     return lambda other: np.column_stack([m.predict(_physical_features(other)) for m in models])
 
 
-def fit_boosting(table: pd.DataFrame, seed: int = 0) -> Predict:
+def fit_boosting(table: pd.DataFrame, seed: int = 0) -> _Predict:
     from sklearn.ensemble import GradientBoostingRegressor
 
     x = table[list(INPUTS)].to_numpy()
@@ -145,7 +145,7 @@ def fit_boosting(table: pd.DataFrame, seed: int = 0) -> Predict:
     return lambda other: np.column_stack([m.predict(other[list(INPUTS)].to_numpy()) for m in models])
 
 
-def white_box(vehicle: Vehicle) -> Predict:
+def white_box(vehicle: Vehicle) -> _Predict:
     return lambda other: stand_wrench(
         vehicle,
         other[list(INPUTS[:4])].to_numpy(),
@@ -189,7 +189,7 @@ def effects_wrench(vehicle: Vehicle, table: pd.DataFrame, values: np.ndarray) ->
     return np.concatenate([np.einsum("nij,nj->ni", turn, v) for v in (force, moment)], axis=1)
 
 
-def fit_white_box_effects(vehicle: Vehicle, table: pd.DataFrame) -> tuple[Predict, np.ndarray, np.ndarray]:
+def fit_white_box_effects(vehicle: Vehicle, table: pd.DataFrame) -> tuple[_Predict, np.ndarray, np.ndarray]:
     """Effects by least squares: model, `EFFECT_PARAMETERS` and their standard errors, shape (12,) each.
 
     Forces are weighted by 0.1 N and moments by 0.001 N m, the sensor's resolution. The errors hold for residuals that
@@ -220,7 +220,7 @@ def folds(experiments: np.ndarray, count: int, rng: np.random.Generator) -> list
     return [np.isin(experiments, part) for part in np.array_split(numbers, count)]
 
 
-def out_of_fold(table: pd.DataFrame, fits: Mapping[str, Fit], masks: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
+def out_of_fold(table: pd.DataFrame, fits: Mapping[str, _Fit], masks: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
     """Predictions (n, 6) of each model for samples that its training did not hold."""
     found = {name: np.full((len(table), len(OUTPUTS)), np.nan) for name in fits}
     for held_out in masks:
@@ -293,7 +293,7 @@ def conformal_coverage(
 class TrainingRange:
     """Where the training samples lie; says when an input is outside."""
 
-    scale: ColumnScale
+    scale: _ColumnScale
     points: np.ndarray
     reach: float
     """Distance to the nearest other experiment's sample within which 99 % of the training samples lie, scaled."""
@@ -301,7 +301,7 @@ class TrainingRange:
     @classmethod
     def of(cls, table: pd.DataFrame) -> TrainingRange:
         values = table[list(INPUTS)].to_numpy()
-        scale = ColumnScale.of(values)
+        scale = _ColumnScale.of(values)
         points = scale.apply(values)
         experiments = table["experiment"].to_numpy()
         gap = np.linalg.norm(points[:, None] - points[None], axis=2)

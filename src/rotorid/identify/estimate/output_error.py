@@ -98,7 +98,7 @@ def simulate_rates(weights: np.ndarray, start: np.ndarray, moments: np.ndarray, 
     return out
 
 
-Model = Callable[[np.ndarray], np.ndarray]
+_Model = Callable[[np.ndarray], np.ndarray]
 """From the parameters to the nine weights of `simulate_rates`."""
 
 
@@ -145,7 +145,7 @@ def _walk_power(samples: int) -> float:
 
 def fit_output_error(
     windows: RateWindows,
-    model: Model,
+    model: _Model,
     start: np.ndarray,
     window_moment: bool = False,
     iterations: int = 30,

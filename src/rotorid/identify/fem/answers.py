@@ -118,7 +118,7 @@ def ratios(found: Mapping[str, Answers]) -> dict[str, float]:
 
 
 @dataclass(frozen=True)
-class Judged:
+class _Judged:
     """A sentence and on how many benches it holds."""
 
     statement: str
@@ -135,7 +135,7 @@ class Judged:
         return "does not follow" if self.holds == 0 else "depends on the assumed sizes"
 
 
-def judge_statements(table: pd.DataFrame) -> list[Judged]:
+def judge_statements(table: pd.DataFrame) -> list[_Judged]:
     """Each sentence on each bench.
 
     Parameters
@@ -154,7 +154,7 @@ def judge_statements(table: pd.DataFrame) -> list[Judged]:
         "the stress in an upper cell's narrow section is nearly the same": _nearly(table["ratio_narrow_upper"]),
         "the stress in a lower cell's narrow section is nearly the same": _nearly(table["ratio_narrow_lower"]),
     }
-    return [Judged(name, bool(holds.iloc[0]), int(holds.sum()), len(holds)) for name, holds in held.items()]
+    return [_Judged(name, bool(holds.iloc[0]), int(holds.sum()), len(holds)) for name, holds in held.items()]
 
 
 def _nearly(ratio: pd.Series) -> pd.Series:

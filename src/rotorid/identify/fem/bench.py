@@ -28,8 +28,8 @@ UP = np.array([0.0, 0.0, -1.0])
 CELLS = ("upper cell", "lower cell")
 PIECES = ("A", "B", "C", "D")
 DOWN = -UP
-LEGS = len(placement.LEGS)
-GROUPS = dict.fromkeys(CELLS, "cells") | dict.fromkeys(PIECES, "pieces")
+_LEGS = len(placement.LEGS)
+_GROUPS = dict.fromkeys(CELLS, "cells") | dict.fromkeys(PIECES, "pieces")
 """Material of each part."""
 
 
@@ -43,7 +43,7 @@ class _Bond:
 
 
 @dataclass(frozen=True)
-class Leg:
+class _Leg:
     """The model's geometry, in frame {T} (z down, origin on top of plate D)."""
 
     parts: Mapping[str, Tets]
@@ -56,7 +56,7 @@ class Leg:
     """Height of the surface that bears the load above the plate's top."""
 
 
-def build(assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fineness: float) -> Leg:
+def build(assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fineness: float) -> _Leg:
     """Meshes of one leg.
 
     Parameters
@@ -115,7 +115,7 @@ def build(assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fine
         _Bond("C", "upper cell", hung),
         _Bond("C", "D", top),
     )
-    return Leg(parts, frames, bonds, base, sizes.boss_height_m)
+    return _Leg(parts, frames, bonds, base, sizes.boss_height_m)
 
 
 def _other_end(place: placement.Place, sizes: Sizes) -> np.ndarray:
@@ -186,7 +186,7 @@ class Solved:
 class Bench:
     """A leg's mesh with all that binds it, for one set of sizes."""
 
-    leg: Leg
+    leg: _Leg
     sizes: Sizes
     body: LooseParts
 
@@ -195,7 +195,7 @@ class Bench:
         """The bench of these sizes; InputError where they do not go together."""
         leg = build(assumed, sizes, distances_m, fineness)
         walls = [hole for name in CELLS for hole in holes(name, sizes, leg.frames[name])]
-        return cls(leg, sizes, LooseParts.of(leg.parts, walls, GROUPS))
+        return cls(leg, sizes, LooseParts.of(leg.parts, walls, _GROUPS))
 
     @cached_property
     def binding(self) -> sparse.csr_matrix:
@@ -241,7 +241,7 @@ class Bench:
     @cached_property
     def load(self) -> np.ndarray:
         """Nodal forces [N], shape (3 n,), of this leg's share of 1 N downwards on the seat."""
-        return self.body.traction(self.seat, DOWN / LEGS)
+        return self.body.traction(self.seat, DOWN / _LEGS)
 
     def solve(self, of: Mapping[str, Material]) -> Solved:
         """Displacements and equivalent stresses of a bench of these materials (`cells`, `pieces`)."""

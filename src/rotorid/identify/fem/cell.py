@@ -62,11 +62,11 @@ def mesh(sizes: Sizes, fineness: float) -> Tets:
     return stacked(layers, flat.triangles)
 
 
-GAUGE_SIGNS = np.array([1.0, -1.0, 1.0, -1.0])
+_GAUGE_SIGNS = np.array([1.0, -1.0, 1.0, -1.0])
 """Sign of each gauge's strain under a positive force: it is also its sign in the bridge."""
 
 
-def gauge_ends_m(sizes: Sizes) -> tuple[np.ndarray, np.ndarray]:
+def _gauge_ends_m(sizes: Sizes) -> tuple[np.ndarray, np.ndarray]:
     """Ends of the four gauges' grids [m] in the cell's own frame, shape (4, 3) each.
 
     Each lies along the bar on the surface over a narrow section, at mid-width. A force in +y on the end towards the
@@ -98,14 +98,15 @@ def gauge_strains(body: LooseParts, name: str, sizes: Sizes, frame: PartFrame, m
         Displacements of all nodes [m], shape (n, 3).
     """
     first, last = (
-        body.weights(frame.origin_m + ends @ frame.axes, name) @ moved_m @ frame.axes[0] for ends in gauge_ends_m(sizes)
+        body.weights(frame.origin_m + ends @ frame.axes, name) @ moved_m @ frame.axes[0]
+        for ends in _gauge_ends_m(sizes)
     )
     return (last - first) / sizes.gauge_length_m
 
 
 def bridge_strain(strains: np.ndarray) -> float:
     """What a full bridge makes of its four gauges: the mean of their strains, each with its sign."""
-    return float(GAUGE_SIGNS @ strains / len(GAUGE_SIGNS))
+    return float(_GAUGE_SIGNS @ strains / len(_GAUGE_SIGNS))
 
 
 def strain_per_newton(sizes: Sizes, material: Material, fineness: float) -> float:

@@ -31,7 +31,7 @@ from rotorid.errors import InputError
 from rotorid.identify.stand.clocks import device_time
 from rotorid.io.tables import by_recording
 
-RPM = 2 * np.pi / 60
+_RPM = 2 * np.pi / 60
 _MARGIN_S = 0.6
 COLUMNS = (
     *("test", "throttle", "speed_rad_s", "speed_sd_rad_s"),
@@ -108,7 +108,7 @@ def _sorted(rows: list[dict]) -> pd.DataFrame:
 
 
 def _row(test: str, steady: pd.DataFrame, value: pd.Series, rest_samples: float) -> dict:
-    speed = steady["speed_rpm"] * RPM
+    speed = steady["speed_rpm"] * _RPM
     return {
         "test": test,
         "throttle": float(steady["throttle"].mean()),

@@ -26,7 +26,7 @@ from rotorid.errors import InputError
 from rotorid.identify.stand.clocks import Lag, device_time, follow, lower_edge, pooled
 from rotorid.recordings.signal.filters import zero_phase
 
-STEP_S = 0.01
+_STEP_S = 0.01
 _SMOOTH_HZ = 5.0
 LARGEST_S = 0.5
 """Largest offset that the arrival times may leave."""
@@ -110,11 +110,11 @@ def _motor_delay(pair: Pair, thrust_of: Callable) -> Lag:
     all; both are fitted jointly with the sag.
     """
     sent = pair.quadrotor["host_s"].to_numpy()
-    when = np.arange(sent[0], sent[-1], STEP_S)
+    when = np.arange(sent[0], sent[-1], _STEP_S)
     voltage = np.interp(when, sent, pair.quadrotor["battery_voltage_v"])
     thrust = _lift_cause(pair.quadrotor, when, thrust_of)
     current = (thrust**_CURRENT_POWER).sum(axis=1)
-    others = np.column_stack([np.cumsum(current) * STEP_S, (thrust > _LEAST_THRUST_N).sum(axis=1)])
+    others = np.column_stack([np.cumsum(current) * _STEP_S, (thrust > _LEAST_THRUST_N).sum(axis=1)])
     return follow(when, voltage, current, LARGEST_S, others)
 
 
@@ -125,9 +125,9 @@ def _lift_delay(pair: Pair, thrust_of: Callable, with_skew: bool = False) -> Lag
     drop of the (smoothed) voltage is fitted jointly with the thrust.
     """
     felt, sent = pair.wrench["host_s"].to_numpy(), pair.quadrotor["host_s"].to_numpy()
-    when = np.arange(felt[0], felt[-1], STEP_S)
-    lift = zero_phase(-np.interp(when, felt, pair.wrench["force_z_n"]), _SMOOTH_HZ, 1 / STEP_S)
-    cause = zero_phase(_lift_cause(pair.quadrotor, when, thrust_of).sum(axis=1), _SMOOTH_HZ, 1 / STEP_S)
+    when = np.arange(felt[0], felt[-1], _STEP_S)
+    lift = zero_phase(-np.interp(when, felt, pair.wrench["force_z_n"]), _SMOOTH_HZ, 1 / _STEP_S)
+    cause = zero_phase(_lift_cause(pair.quadrotor, when, thrust_of).sum(axis=1), _SMOOTH_HZ, 1 / _STEP_S)
     voltage = np.interp(when, sent, zero_phase(pair.quadrotor["battery_voltage_v"].to_numpy(), 0.5, 50.0))
     weaker = cause * (voltage - voltage.mean())
     return follow(when, lift, cause, LARGEST_S, weaker[:, None], with_skew)
@@ -179,9 +179,9 @@ def torque_offset(rotor: pd.DataFrame, wrench: pd.DataFrame) -> Lag:
     Both tables have `host_s`; the counter's speed is in `speed_rpm`.
     """
     felt, sent = wrench["host_s"].to_numpy(), rotor["host_s"].to_numpy()
-    when = np.arange(max(felt[0], sent[0]), min(felt[-1], sent[-1]), STEP_S)
-    lift = zero_phase(-np.interp(when, felt, wrench["force_z_n"]), _SMOOTH_HZ, 1 / STEP_S)
-    square = zero_phase(np.interp(when, sent, rotor["speed_rpm"].to_numpy(float) ** 2), _SMOOTH_HZ, 1 / STEP_S)
+    when = np.arange(max(felt[0], sent[0]), min(felt[-1], sent[-1]), _STEP_S)
+    lift = zero_phase(-np.interp(when, felt, wrench["force_z_n"]), _SMOOTH_HZ, 1 / _STEP_S)
+    square = zero_phase(np.interp(when, sent, rotor["speed_rpm"].to_numpy(float) ** 2), _SMOOTH_HZ, 1 / _STEP_S)
     return follow(when, lift, square, LARGEST_S)
 
 

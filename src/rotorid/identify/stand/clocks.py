@@ -94,7 +94,7 @@ class Lag:
     """Of the signal, per unit of the cause."""
 
 
-STEPS = 20
+_STEPS = 20
 _BLOCKS = 24
 """Parts of a record whose residuals are taken as independent of each other."""
 
@@ -137,7 +137,7 @@ def follow(
     delay, skew = _coarse(time_s, signal, cause, at_once, np.arange(-largest_s, largest_s + step, 2 * step)), 0.0
     centred = time_s - time_s.mean()
     slope = np.gradient(cause, time_s)
-    for _ in range(STEPS):
+    for _ in range(_STEPS):
         when = time_s - delay - skew * centred
         steep = np.interp(when, time_s, slope)
         base = np.column_stack([np.interp(when, time_s, cause), at_once])

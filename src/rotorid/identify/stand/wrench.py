@@ -22,7 +22,7 @@ from rotorid.recordings.signal.average import block_count, mean_and_error
 _REST, _RAMP, PLATEAU = "rest", "ramp", "plateau"
 _SLOPE_1_S = 0.004
 """A throttle that changes by less than this per second is constant (the slowest ramp of table A.1: 0.0167)."""
-WINDOW_S = 0.1
+_WINDOW_S = 0.1
 _SHORTEST_S = 0.5
 """A plateau is at least that long; a sine's turning points are not."""
 WRENCH = (*c.FORCE, *c.MOMENT)
@@ -32,7 +32,7 @@ _REST_MARGIN_S = 0.15
 
 
 @dataclass(frozen=True)
-class StandStretch:
+class _StandStretch:
     """A stretch of one kind, from `start_s` to `stop_s`."""
 
     kind: str
@@ -44,7 +44,7 @@ class StandStretch:
         return self.stop_s - self.start_s
 
 
-def segments(time_s: np.ndarray, throttle: np.ndarray) -> list[StandStretch]:
+def segments(time_s: np.ndarray, throttle: np.ndarray) -> list[_StandStretch]:
     """Stretches of a programme in the order of time.
 
     Parameters
@@ -63,7 +63,7 @@ def segments(time_s: np.ndarray, throttle: np.ndarray) -> list[StandStretch]:
     running = (throttle > 0).any(axis=1)
     if not running.any():
         raise InputError("the motors never ran")
-    half = WINDOW_S / 2
+    half = _WINDOW_S / 2
     ahead = np.minimum(np.searchsorted(time_s, time_s + half, side="right") - 1, len(time_s) - 1)
     behind = np.searchsorted(time_s, time_s - half)
     span_s = np.maximum(time_s[ahead] - time_s[behind], 1e-9)
@@ -76,23 +76,25 @@ def segments(time_s: np.ndarray, throttle: np.ndarray) -> list[StandStretch]:
     return _stretches(time_s, kinds)
 
 
-def _stretches(time_s: np.ndarray, kinds: np.ndarray) -> list[StandStretch]:
+def _stretches(time_s: np.ndarray, kinds: np.ndarray) -> list[_StandStretch]:
     """Runs of equal kind."""
     edges = np.flatnonzero(kinds[1:] != kinds[:-1]) + 1
     starts, stops = np.concatenate([[0], edges]), np.concatenate([edges - 1, [len(kinds) - 1]])
-    return [StandStretch(str(kinds[a]), float(time_s[a]), float(time_s[b])) for a, b in zip(starts, stops, strict=True)]
+    return [
+        _StandStretch(str(kinds[a]), float(time_s[a]), float(time_s[b])) for a, b in zip(starts, stops, strict=True)
+    ]
 
 
-def longest(found: list[StandStretch], kind: str) -> StandStretch | None:
+def longest(found: list[_StandStretch], kind: str) -> _StandStretch | None:
     """The longest stretch of a kind, None where there is none."""
     those = [segment for segment in found if segment.kind == kind]
     return max(those, key=lambda segment: segment.length_s) if those else None
 
 
-def programme(found: list[StandStretch]) -> StandStretch:
+def programme(found: list[_StandStretch]) -> _StandStretch:
     """From the first moment at which a motor runs to the last."""
     moving = [segment for segment in found if segment.kind != _REST]
-    return StandStretch(_RAMP, moving[0].start_s, moving[-1].stop_s)
+    return _StandStretch(_RAMP, moving[0].start_s, moving[-1].stop_s)
 
 
 def tilt(roll_rad: float, pitch_rad: float) -> np.ndarray:

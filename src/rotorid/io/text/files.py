@@ -31,7 +31,7 @@ except ImportError:  # pragma: no cover - depends on the platform
 
 LARGEST_YAML = 1_000_000
 """Bytes of a YAML file: that of a vehicle has some thousand."""
-DEEPEST_YAML = 50
+_DEEPEST_YAML = 50
 """Levels of a YAML file: a vehicle has three, and the reader descends by calling itself."""
 MOST_YAML_VALUES = 20_000
 """Values of a YAML file with all its aliases written out: nine lines of aliases can stand for a thousand million."""
@@ -196,7 +196,7 @@ def parse_yaml(
     except InputError:
         raise
     except RecursionError:
-        raise InputError(f"{where}: is nested too deeply, expected at most {DEEPEST_YAML} levels") from None
+        raise InputError(f"{where}: is nested too deeply, expected at most {_DEEPEST_YAML} levels") from None
     except (ValueError, OverflowError) as error:  # dates and numbers that cannot be
         raise InputError(f"{where}: not valid YAML ({printable(error)})") from None
     finally:
@@ -235,8 +235,8 @@ def _check_node(root: yaml.Node, loader: Any, where: str, most_values: int) -> N
         line = f"{where}, line {node.start_mark.line + 1}"
         if id(node) in open_nodes:
             raise InputError(f"{line}: an alias refers to itself")
-        if depth > DEEPEST_YAML:
-            raise InputError(f"{line}: is nested too deeply, expected at most {DEEPEST_YAML} levels")
+        if depth > _DEEPEST_YAML:
+            raise InputError(f"{line}: is nested too deeply, expected at most {_DEEPEST_YAML} levels")
         if id(node) in sizes:
             return sizes[id(node)]
         open_nodes.add(id(node))

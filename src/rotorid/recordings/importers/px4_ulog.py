@@ -32,7 +32,7 @@ from rotorid.recordings.importers.known import Parameters, Values
 from rotorid.recordings.importers.mapping import continuous
 from rotorid.recordings.importers.report import ImportFault
 
-RPM = 2 * np.pi / 60
+_RPM = 2 * np.pi / 60
 _FIRST_MOTOR = 101
 """Number of motor 1 among PX4's output functions."""
 _MOST_MOTORS = 12
@@ -354,7 +354,7 @@ def _speeds(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray, li
         found = f"esc_status holds {len(slots)} controllers for {rotors} rotors"
         return None, np.zeros(0), [ImportFault("speed_missing", "rotor_speed", found, "no rotor speeds", 0)]
     online = np.asarray(data.get("esc_online_flags", np.full(len(data["timestamp"]), -1))).astype(np.int64)
-    values = np.column_stack([np.asarray(data[f"esc[{place[r]}].esc_rpm"], float) for r in range(rotors)]) * RPM
+    values = np.column_stack([np.asarray(data[f"esc[{place[r]}].esc_rpm"], float) for r in range(rotors)]) * _RPM
     values, faults = one_sense(values, c.rotor_columns("rotor_speed", rotors))
     heard = np.column_stack([(online >> place[r]) & 1 for r in range(rotors)]).astype(bool)
     turning = [i for i in slots if i not in place.values() and np.any(data[f"esc[{i}].esc_rpm"])]

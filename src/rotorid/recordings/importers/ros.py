@@ -43,7 +43,7 @@ from rotorid.recordings.importers.clean import further_motors, one_sense, report
 from rotorid.recordings.importers.mapping import half_turn_about_x, quaternion_to_frd_ned
 from rotorid.recordings.importers.report import ImportFault
 
-RPM = 2 * np.pi / 60
+_RPM = 2 * np.pi / 60
 _PULSE_US = (1000.0, 2000.0)
 
 
@@ -125,7 +125,7 @@ _WANTED = {
 _UNSET = {"attitude": (1.0, 0.0, 0.0, 0.0), "imu_attitude": (1.0, 0.0, 0.0, 0.0)}
 _UNSET |= dict.fromkeys(("rates", "force", "position", "velocity", "body_velocity"), (0.0, 0.0, 0.0))
 """What a message holds of a quantity that nobody has set."""
-COMMANDED = re.compile(r"command|cmd|setpoint|desired|target|reference", re.IGNORECASE)
+_COMMANDED = re.compile(r"command|cmd|setpoint|desired|target|reference", re.IGNORECASE)
 _SAME_CLOCK_S = 1.0
 """Stamps further than this from those of the inertial sensor, or from one message to the next, are another clock."""
 _STEADY_S = 0.2
@@ -136,7 +136,7 @@ LISTED = 8
 
 
 @dataclass(frozen=True)
-class TopicSeries:
+class _TopicSeries:
     """One quantity of one topic: instants (n,), s, and values (n, k)."""
 
     topic: str
@@ -150,7 +150,7 @@ class TopicSeries:
 
 
 @dataclass
-class BagContent:
+class _BagContent:
     """What a bag holds: (stamp, time of recording, values) of each quantity of a topic, the topics that are not read
     with their type and number of messages, and whether the file ends early. Stamps are 0 where there are none."""
 
@@ -172,11 +172,11 @@ class BagContent:
         self.unread[topic] = msgtype, self.unread.get(topic, ("", 0))[1] + messages
 
 
-def _by_rosbags(path: Path) -> BagContent:
+def _by_rosbags(path: Path) -> _BagContent:
     """A bag, MCAP file or folder of one that is whole and holds ROS alone."""
     highlevel = needs("rosbags.highlevel", "ros", path)
     typesys = needs("rosbags.typesys", "ros", path)
-    found = BagContent()
+    found = _BagContent()
     with highlevel.AnyReader([path], default_typestore=typesys.get_typestore(typesys.Stores.LATEST)) as bag:
         known = [k for k in bag.connections if k.msgtype in _READERS]
         for k in bag.connections:
@@ -189,10 +189,10 @@ def _by_rosbags(path: Path) -> BagContent:
     return found
 
 
-def _by_records(path: Path) -> BagContent:
+def _by_records(path: Path) -> _BagContent:
     """What can be read, record by record, of a file or folder that rosbags refuses."""
     files = [path] if path.is_file() else sorted(p for p in path.iterdir() if p.suffix in (".db3", ".mcap"))
-    found = BagContent()
+    found = _BagContent()
     for file in files:
         records = Records(file)
         listed = list(records.messages())
@@ -217,7 +217,7 @@ def _by_records(path: Path) -> BagContent:
     return found
 
 
-def _found(path: Path) -> BagContent:
+def _found(path: Path) -> _BagContent:
     """InputError where nothing of a bag can be read."""
     needs("rosbags.highlevel", "ros", path)
     try:
@@ -231,13 +231,13 @@ def _found(path: Path) -> BagContent:
     except MemoryError:
         raise
     except Exception:
-        found = BagContent()
+        found = _BagContent()
     if not (found.rows or found.unread or found.foreign):
         raise InputError(f"{path}: not a bag or MCAP file that can be read ({why})")
     return found
 
 
-def _read_series(path: Path) -> tuple[dict[str, list[TopicSeries]], list[ImportFault]]:
+def _read_series(path: Path) -> tuple[dict[str, list[_TopicSeries]], list[ImportFault]]:
     """Every known quantity of a bag by topic, those that state most first.
 
     InputError where it cannot be read or holds no known type.
@@ -269,7 +269,7 @@ def _read_series(path: Path) -> tuple[dict[str, list[TopicSeries]], list[ImportF
         faults.append(ImportFault("unread", "", seen, "left out", 0))
     times, more = _times(found)
     faults += more
-    series: dict[str, list[TopicSeries]] = {}
+    series: dict[str, list[_TopicSeries]] = {}
     for (quantity, topic), rows in found.rows.items():
         widths = [len(values) for *_, values in rows]
         width = max(set(widths), key=widths.count)
@@ -290,7 +290,7 @@ def _read_series(path: Path) -> tuple[dict[str, list[TopicSeries]], list[ImportF
         order = np.argsort(time_s, kind="stable")
         time_s, values = time_s[order], values[order]
         keep = in_the_air.increasing(time_s)
-        own = TopicSeries(topic, time_s[keep], values[keep])
+        own = _TopicSeries(topic, time_s[keep], values[keep])
         if quantity in _UNSET and (own.values == _UNSET[quantity]).all():
             seen = f"{quantity.replace('_', ' ')} of {topic} was never set ({_UNSET[quantity][0]:g}, 0, … throughout)"
             faults.append(ImportFault("stuck", quantity, seen, "states nothing, left out", len(values)))
@@ -314,16 +314,16 @@ def _read_series(path: Path) -> tuple[dict[str, list[TopicSeries]], list[ImportF
     return series, faults
 
 
-def _set_commands_apart(series: dict[str, list[TopicSeries]]) -> None:
+def _set_commands_apart(series: dict[str, list[_TopicSeries]]) -> None:
     """Speeds of a topic that is called a command are commands, where another topic has speeds."""
     speeds = series.get("speeds", [])
-    asked = [s for s in speeds if COMMANDED.search(s.topic)]
+    asked = [s for s in speeds if _COMMANDED.search(s.topic)]
     if asked and len(asked) < len(speeds):
         series["speeds"] = [s for s in speeds if s not in asked]
         series["commands"] = [*series.get("commands", []), *asked]
 
 
-def _times(found: BagContent) -> tuple[dict[tuple[str, str], np.ndarray], list[ImportFault]]:
+def _times(found: _BagContent) -> tuple[dict[tuple[str, str], np.ndarray], list[ImportFault]]:
     """Times of the rows of each quantity of a topic, s, on the clock of the inertial sensor's stamps.
 
     A topic whose stamps are all zero, jump, or run at another rate has those at which its messages were recorded.
@@ -370,7 +370,7 @@ def _jumps(stamps: np.ndarray, recorded: np.ndarray) -> bool:
 
 
 def convert(
-    series: dict[str, list[TopicSeries]], faults: list[ImportFault], where: object
+    series: dict[str, list[_TopicSeries]], faults: list[ImportFault], where: object
 ) -> tuple[pd.DataFrame, np.ndarray]:
     """Contract columns and where it flies (mask of rows), of the first series of each quantity."""
     first = {quantity: offered[0] for quantity, offered in series.items()}
@@ -393,7 +393,7 @@ def convert(
     if "body_velocity" in first and "velocity" not in first:
         parts += _turned(first["body_velocity"], [*series.get("attitude", []), *series.get("imu_attitude", [])], faults)
     for quantity, kind, unit in (
-        ("speeds", "rotor_speed", 1.0), ("rpm", "rotor_speed", RPM), ("commands", "rotor_command", 1.0)
+        ("speeds", "rotor_speed", 1.0), ("rpm", "rotor_speed", _RPM), ("commands", "rotor_command", 1.0)
     ):  # fmt: skip
         if quantity in first and not (quantity == "rpm" and "speeds" in first):
             names = c.rotor_columns(kind, first[quantity].values.shape[1])
@@ -415,7 +415,7 @@ def convert(
     return table, in_the_air.airborne(table)[0]
 
 
-def _turned(velocity: TopicSeries, attitudes: list[TopicSeries], faults: list[ImportFault]) -> list[tuple]:
+def _turned(velocity: _TopicSeries, attitudes: list[_TopicSeries], faults: list[ImportFault]) -> list[tuple]:
     """A velocity in body axes turned into the world by the attitude of its own topic, else by the nearest in time."""
     attitude = next((s for s in attitudes if s.topic == velocity.topic), attitudes[0] if attitudes else None)
     if attitude is None:
@@ -427,7 +427,7 @@ def _turned(velocity: TopicSeries, attitudes: list[TopicSeries], faults: list[Im
     return [(c.VELOCITY, velocity.time_s, half_turn_about_x(turn.apply(velocity.values)))]
 
 
-def _of_pulses(outputs: TopicSeries, faults: list[ImportFault]) -> tuple:
+def _of_pulses(outputs: _TopicSeries, faults: list[ImportFault]) -> tuple:
     """Throttles of an array of all outputs, which names no motors: the first four that move are motors, and each other
     whose signal follows from theirs."""
     moving = np.flatnonzero(np.ptp(outputs.values, axis=0) > 0)

@@ -19,8 +19,8 @@ from rotorid.recordings.importers.clean import blank_held, cut, drop_repeated_ti
 from rotorid.recordings.importers.mapping import quaternion_from_euler_frd
 from rotorid.recordings.importers.report import ImportFault
 
-COUNT = 25
-RPM = 2 * np.pi / 60
+_COUNT = 25
+_RPM = 2 * np.pi / 60
 _GROUND_MARGIN_M = 0.015
 """Height above the resting height from which the vehicle counts as in the air."""
 
@@ -46,14 +46,14 @@ def _read_matrix(path: Path) -> tuple[np.ndarray, list[ImportFault]]:
                     f"{path}, line {number}, column {bad + 1}: expected a number, found {cells[bad]!r}"
                 ) from None
             values = []
-        if len(values) != COUNT:
+        if len(values) != _COUNT:
             if not last:
-                raise InputError(f"{path}, line {number}: expected {COUNT} columns, found {len(values)}")
-            faults.append(ImportFault("cut_off", "", f"last line has {len(cells)} of {COUNT} columns", "left out", 1))
+                raise InputError(f"{path}, line {number}: expected {_COUNT} columns, found {len(values)}")
+            faults.append(ImportFault("cut_off", "", f"last line has {len(cells)} of {_COUNT} columns", "left out", 1))
             continue
         rows.append(values)
     if len(rows) < 2:
-        raise InputError(f"{path}: expected at least two rows of {COUNT} numbers")
+        raise InputError(f"{path}: expected at least two rows of {_COUNT} numbers")
     return np.array(rows), faults
 
 
@@ -76,7 +76,7 @@ def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[ImportFault]]:
     quaternion = quaternion_from_euler_frd(roll, pitch, yaw)
     columns |= dict(zip(c.QUATERNION, quaternion.T, strict=True))
     columns |= dict(zip(c.ANGULAR_VELOCITY, matrix[:, 10:13].T, strict=True))
-    columns |= dict(zip(c.rotor_columns("rotor_speed", 4), (matrix[:, 13:17] * RPM).T, strict=True))
+    columns |= dict(zip(c.rotor_columns("rotor_speed", 4), (matrix[:, 13:17] * _RPM).T, strict=True))
     columns[c.BATTERY_VOLTAGE] = matrix[:, 17:21].mean(axis=1)
     columns[c.BATTERY_CURRENT] = matrix[:, 21:25].sum(axis=1)
     table = pd.DataFrame(columns)
@@ -108,8 +108,8 @@ def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[ImportFault]]:
         table.loc[unpowered, [c.BATTERY_VOLTAGE, c.BATTERY_CURRENT]] = np.nan
     table, repeated = drop_repeated_times(table)
     height = table[c.HEIGHT].to_numpy()
-    resting = np.nanmedian(height[: max(10, int(np.argmax(table[rotors[0]].to_numpy() > 3000 * RPM)))])
-    flying = (table[rotors].mean(axis=1) > 4000 * RPM).to_numpy() & (height > resting + _GROUND_MARGIN_M)
+    resting = np.nanmedian(height[: max(10, int(np.argmax(table[rotors[0]].to_numpy() > 3000 * _RPM)))])
+    flying = (table[rotors].mean(axis=1) > 4000 * _RPM).to_numpy() & (height > resting + _GROUND_MARGIN_M)
     stretches = true_stretches(flying, table[c.TIME].to_numpy(), 5.0)
     if not stretches:
         raise InputError("no stretch of 5 s in the air found (rotors above 4000 rpm and off the ground)")

@@ -17,7 +17,7 @@ from rotorid.report.fleet.judge import FAILED
 
 _SHOWN = ("established", "ambiguous", "suggested")
 """Words of effects that a summary counts; what is absorbed or not established shows nothing."""
-DATE = re.compile(r"(?<!\d)(20\d\d)[-_]?(0[1-9]|1[0-2])[-_]?(0[1-9]|[12]\d|3[01])(?!\d)")
+_DATE = re.compile(r"(?<!\d)(20\d\d)[-_]?(0[1-9]|1[0-2])[-_]?(0[1-9]|[12]\d|3[01])(?!\d)")
 """A day in the name of a set: 2026-11-22, 2026_11_22 or 20261122."""
 
 
@@ -132,7 +132,7 @@ def by_vehicle(effects: pd.DataFrame, sets: pd.DataFrame) -> pd.DataFrame:
 
 def day_of(name: str) -> str:
     """Day in the name of a set as YYYY-MM-DD, else empty."""
-    found = DATE.search(name)
+    found = _DATE.search(name)
     return "-".join(found.groups()) if found else ""
 
 

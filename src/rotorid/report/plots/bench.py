@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 PLATFORM = {"al": "aluminium", "pla": "PLA", "jr3": "reference sensor"}
 _PLATFORM_COLOUR = {"al": style.BLUE, "pla": style.ORANGE, "jr3": style.GREY}
-AXES = "xyz"
+_AXES = "xyz"
 
 
 def reading(recording: pd.DataFrame, load_time_s: float, mean_from_s: float, mean_10uv: float) -> Figure:
@@ -108,7 +108,7 @@ def static_z(loads: pd.DataFrame) -> Figure:
 def static_axes(points: pd.DataFrame, series: pd.DataFrame) -> Figure:
     """Aluminium along x, y and z: every measurement against the target with r (fig. 2.45), and below its error."""
     fig, axes = style.figure(4.1, 2, 3, sharex=True, height_ratios=(1.5, 1))
-    for column, name in enumerate(AXES):
+    for column, name in enumerate(_AXES):
         part = points[(points["platform"] == "al") & (points["axis"] == name) & (points["method"] == "equations")]
         found = series[(series["platform"] == "al") & (series["axis"] == name) & (series["method"] == "equations")]
         top, low = axes[0, column], axes[1, column]
@@ -138,7 +138,7 @@ def methods(points: pd.DataFrame) -> Figure:
     fig, axes = style.figure(2.9, columns=3)
     several = points[points["axis"].str.len() > 1]
     unit = {axis: _units(axis) for axis in several["axis"].unique()}
-    for k, (axis, name) in enumerate(zip(axes, AXES, strict=True)):
+    for k, (axis, name) in enumerate(zip(axes, _AXES, strict=True)):
         applied = several["load_n"] * several["axis"].map({label: part[k] for label, part in unit.items()})
         for method, colour, marker, label in (
             ("equations", style.RED, "o", "thesis's equations"),

@@ -13,7 +13,7 @@ from rotorid.report.plots import style
 if TYPE_CHECKING:
     from rotorid.mismatch.changes.compare import Changes, Residual
 
-CLAIMED = ("established", "ambiguous")
+_CLAIMED = ("established", "ambiguous")
 _ABREAST = 4
 """Quantities next to each other."""
 _MOST_POINTS = 1500
@@ -22,7 +22,7 @@ _MOST_POINTS = 1500
 
 def draw_values(found: Changes, names: Mapping[str, str], path: Path) -> None:
     """The change of every believed value with its 95 % interval, in percent; `names` are their names in words."""
-    changed = {i for c in found.changes if c.status in CLAIMED for i in (c.id, *c.alternatives)}
+    changed = {i for c in found.changes if c.status in _CLAIMED for i in (c.id, *c.alternatives)}
     values = found.values[::-1]
     fig, axis = style.figure(0.6 + 0.28 * max(1, len(values)))
     for place, p in enumerate(values):

@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _AXIS_COLOURS = tuple(style.COLOUR[a] for a in "xyz")
-NAMES = {"c_f": ("thrust", "N", 1.0), "c_q": ("torque", "mN m", 1000.0)}
+_NAMES = {"c_f": ("thrust", "N", 1.0), "c_q": ("torque", "mN m", 1000.0)}
 
 
 def rotor_networks(points: dict[str, pd.DataFrame], history: pd.DataFrame, fits: dict) -> Figure:
     """Error by epoch and the network's curve with the tests, thrust and torque (figures 4.18, 4.19)."""
     fig, axes = style.figure(4.4, 2, 2)
-    for row, (key, (label, unit, scale)) in enumerate(NAMES.items()):
+    for row, (key, (label, unit, scale)) in enumerate(_NAMES.items()):
         if key not in fits:
             _not_recorded(axes[row], label)
             continue
@@ -57,7 +57,7 @@ def _not_recorded(axes: Iterable[Axes], label: str) -> None:
 def hidden_sizes(sizes: pd.DataFrame) -> Figure:
     """Median error by epoch for several sizes of the hidden layer (figure 4.20)."""
     fig, axes = style.figure(2.6, 1, 2)
-    for axis, (key, (label, _, _)) in zip(axes, NAMES.items(), strict=True):
+    for axis, (key, (label, _, _)) in zip(axes, _NAMES.items(), strict=True):
         if not (sizes["coefficient"] == key).any():
             _not_recorded([axis], label)
             continue

@@ -12,7 +12,7 @@ from rotorid.report.plots import style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-CHANNELS = ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
+_CHANNELS = ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
 _LABEL = {
     "force_x": "$F_x$ (N)",
     "force_y": "$F_y$ (N)",
@@ -34,7 +34,7 @@ def residual_against_airspeed(bins: pd.DataFrame, points: pd.DataFrame) -> Figur
         Columns `airspeed_m_s` and the six channels: residual of the rigid body (N, N m).
     """
     fig, axes = style.figure(4.6, rows=2, columns=3, sharex=True)
-    for axis, channel in zip(axes.flat, CHANNELS, strict=True):
+    for axis, channel in zip(axes.flat, _CHANNELS, strict=True):
         size = points[channel].abs()
         axis.plot(points["airspeed_m_s"], size, ".", markersize=1.6, color="#bbbbbb", rasterized=True, zorder=0)
         for model, colour, label in (

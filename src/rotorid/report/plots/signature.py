@@ -24,9 +24,9 @@ from rotorid.report.plots import style
 VEHICLE = EXAMPLE.model_copy(
     update={"rotor_inertia_kg_m2": 8.5e-6, "ground_z_m": 0.0, "rotor_speed_limits_rad_s": (0.0, 2500.0)}
 )
-DURATION_S, RATE_HZ = 40.0, 50.0
+_DURATION_S, _RATE_HZ = 40.0, 50.0
 HOVER_RAD_S = float(np.sqrt(0.652 * 9.81 / (4 * 1.3877e-6)))
-SHARE = 0.1
+_SHARE = 0.1
 """Share of its physical bound at which a parameter is shown, where nothing better is stated."""
 _BINS = 25
 _LEAST_EXPLAINED = 0.35
@@ -36,7 +36,7 @@ _SHOWN_S = 4.0
 
 
 @dataclass(frozen=True)
-class Signature:
+class _Signature:
     """One picture: `y` over `x` with the effect; `without` is the same without it, where that is not nothing."""
 
     form: str
@@ -52,7 +52,7 @@ class Signature:
     """Rotors as they are and as the vehicle's file has them, where no column changes."""
 
 
-def signature(effect: Effect) -> Signature | None:
+def signature(effect: Effect) -> _Signature | None:
     """The picture of an effect's first form that shows anything on the example; None where none does."""
     for form in effect.forms(VEHICLE):
         if form.requires and not flight().has(form.requires):
@@ -73,26 +73,26 @@ def signature(effect: Effect) -> Signature | None:
     return None
 
 
-def swing(period_s: float, phase: float = 0.0) -> np.ndarray:
+def _swing(period_s: float, phase: float = 0.0) -> np.ndarray:
     """A sine over the recording, (n,)."""
     return np.sin(2 * np.pi * instants() / period_s + phase)
 
 
 def instants() -> np.ndarray:
     """The recording's instants, (n,), s."""
-    return np.arange(int(DURATION_S * RATE_HZ)) / RATE_HZ
+    return np.arange(int(_DURATION_S * _RATE_HZ)) / _RATE_HZ
 
 
 def flight() -> Motion:
     """The made-up flight: every field of `Motion` that a recording of flight can give."""
     time_s = instants()
     speed = HOVER_RAD_S * (
-        1 + 0.05 * swing(7.3)[:, None] + 0.06 * np.stack([swing(1.1 + 0.23 * i, i) for i in range(4)], 1)
+        1 + 0.05 * _swing(7.3)[:, None] + 0.06 * np.stack([_swing(1.1 + 0.23 * i, i) for i in range(4)], 1)
     )
-    rates = np.stack([1.5 * swing(2.9), 1.2 * swing(3.7, 1.0), 1.0 * swing(5.3, 2.0)], 1)
-    angles = np.stack([0.35 * swing(9.1), 0.3 * swing(11.3, 0.5), 0.8 * swing(17.0)], 1)
-    velocity = np.stack([6.0 * swing(19.0), 5.0 * swing(13.0, 1.0), 4.0 * swing(23.0, 0.7)], 1)
-    height = 0.08 + 0.6 * (1 + swing(29.0, -1.5)) / 2
+    rates = np.stack([1.5 * _swing(2.9), 1.2 * _swing(3.7, 1.0), 1.0 * _swing(5.3, 2.0)], 1)
+    angles = np.stack([0.35 * _swing(9.1), 0.3 * _swing(11.3, 0.5), 0.8 * _swing(17.0)], 1)
+    velocity = np.stack([6.0 * _swing(19.0), 5.0 * _swing(13.0, 1.0), 4.0 * _swing(23.0, 0.7)], 1)
+    height = 0.08 + 0.6 * (1 + _swing(29.0, -1.5)) / 2
     thrust = (EXAMPLE.thrust_coefficients_n_s2() * speed**2).sum(1) / EXAMPLE.mass_kg
     force = np.stack([-0.4 * velocity[:, 0] / 6, -0.4 * velocity[:, 1] / 6, -thrust], 1)
     rotation = Rotation.from_euler("ZYX", angles[:, ::-1]).as_matrix()
@@ -107,7 +107,7 @@ def flight() -> Motion:
         rates,
         rotation,
         velocity,
-        position=np.stack([3 * swing(19.0, 1.6), 3 * swing(13.0, 2.6), -height], 1),
+        position=np.stack([3 * _swing(19.0, 1.6), 3 * _swing(13.0, 2.6), -height], 1),
         height=height,
         voltage=np.linspace(12.4, 10.8, len(time_s)),
     )
@@ -120,9 +120,9 @@ def _typical(form: Form | SpeedForm) -> np.ndarray:
         if p.nonlinear and p.starts:
             values.append(p.starts[len(p.starts) // 2])
         elif p.low < 0:
-            values.append(SHARE * min(p.high, -p.low, 10.0) * (1.0, -0.7, 0.4, -0.25)[number % 4])
+            values.append(_SHARE * min(p.high, -p.low, 10.0) * (1.0, -0.7, 0.4, -0.25)[number % 4])
         else:
-            values.append(SHARE * min(p.high, 10.0) * (1.0, 0.7, 0.5)[number % 3])
+            values.append(_SHARE * min(p.high, 10.0) * (1.0, 0.7, 0.5)[number % 3])
     return np.array(values)
 
 
@@ -167,7 +167,7 @@ def explained(y: np.ndarray, x: np.ndarray) -> float:
     return float(1 - np.mean((y - means[number]) ** 2) / max(np.var(y), 1e-300))
 
 
-def strongest(added: Contribution) -> tuple[str, np.ndarray] | None:
+def _strongest(added: Contribution) -> tuple[str, np.ndarray] | None:
     """Name and values of the channel that a contribution changes most, each group measured by what is large for it."""
     weight = EXAMPLE.mass_kg * EXAMPLE.gravity_m_s2
     arm = float(np.hypot(EXAMPLE.rotors[0].x_m, EXAMPLE.rotors[0].y_m))
@@ -190,10 +190,10 @@ def strongest(added: Contribution) -> tuple[str, np.ndarray] | None:
     return None if best is None or best[0] < 1e-9 else best[1:]
 
 
-def _of_wrench(effect: Effect, form: Form) -> Signature | None:
+def _of_wrench(effect: Effect, form: Form) -> _Signature | None:
     """A form of a force, moment or inertial sensor, over the quantity that explains it best."""
     motion, values = flight(), _typical(form)
-    shown = strongest(form.contribution(motion, VEHICLE, values))
+    shown = _strongest(form.contribution(motion, VEHICLE, values))
     if shown is None:
         return None
     known = quantities(motion)
@@ -201,10 +201,10 @@ def _of_wrench(effect: Effect, form: Form) -> Signature | None:
     # What is always the same, and what no single quantity explains, is shown as it goes on.
     if np.ptp(shown[1]) < 1e-9 * np.abs(shown[1]).max() or explained(shown[1], known[over]) < _LEAST_EXPLAINED:
         over, known = "time (s)", {"time (s)": motion.time_s}
-    return Signature(form.name, form.equation, named(form, values), over, shown[0], known[over], shown[1])
+    return _Signature(form.name, form.equation, named(form, values), over, shown[0], known[over], shown[1])
 
 
-def _of_speed(form: SpeedForm) -> Signature:
+def _of_speed(form: SpeedForm) -> _Signature:
     """A form between command and rotor speed: the speed over time, or over the command where it is a map."""
     time_s = 0.01 * np.arange(200)
     steps = 1250 + 500 * np.sign(np.sin(2 * np.pi * 0.7 * time_s))
@@ -217,7 +217,7 @@ def _of_speed(form: SpeedForm) -> Signature:
     path = SpeedPath(np.repeat(command[:, None], 4, 1), time_s, 2500.0, np.linspace(12.4, 10.4, 200), 12.4)
     speed = form.apply(path, values)[:, 0]
     over = ("commanded speed (rad/s)", command) if static else ("time (s)", time_s)
-    return Signature(
+    return _Signature(
         form.name, form.equation, named(form, values), over[0], "rotor speed (rad/s)", over[1], speed, command
     )
 
@@ -243,7 +243,7 @@ def recorded() -> RecordingSet:
     return RecordingSet("example", VEHICLE, (Run("first", pd.DataFrame(columns)), Run("second", pd.DataFrame(columns))))
 
 
-def _of_fault(form: SetForm) -> Signature | None:
+def _of_fault(form: SetForm) -> _Signature | None:
     """A fault of a set: the column that it changes most, as it should be and as it is."""
     sound = recorded()
     spoilt = form.apply(sound, np.array(form.example))
@@ -266,12 +266,12 @@ def _of_fault(form: SetForm) -> Signature | None:
             return None
         nothing = np.zeros(0)
         both = (sound.vehicle.rotors, spoilt.vehicle.rotors)
-        return Signature(form.name, form.equation, values, "", "", nothing, nothing, layouts=both)
+        return _Signature(form.name, form.equation, values, "", "", nothing, nothing, layouts=both)
     _, name, time_s, sure, wrong = best
     first = int(np.argmax(np.abs(np.nan_to_num(wrong, nan=np.inf) - sure) > 0))
     start = max(min(time_s[first] - 1.0, time_s[-1] - _SHOWN_S), 0.0)
     inside = (time_s >= start) & (time_s <= start + _SHOWN_S)
-    return Signature(form.name, form.equation, values, "time (s)", name, time_s[inside], wrong[inside], sure[inside])
+    return _Signature(form.name, form.equation, values, "time (s)", name, time_s[inside], wrong[inside], sure[inside])
 
 
 def loading(instrument: InstrumentFacts) -> Loading:
@@ -279,7 +279,7 @@ def loading(instrument: InstrumentFacts) -> Loading:
     time_s = instants()
     triangles = [2 * np.abs(2 * ((time_s / p) % 1) - 1) - 1 for p in (9.0, 7.0, 5.0, 6.1, 4.3, 3.7)]
     load = np.stack([size * tri for size, tri in zip((2.0, 2.0, 6.0, 0.1, 0.1, 0.05), triangles, strict=True)], 1)
-    roll, pitch = 0.3 * swing(17.0), 0.25 * swing(13.0, 1.0)
+    roll, pitch = 0.3 * _swing(17.0), 0.25 * _swing(13.0, 1.0)
     rotation = Rotation.from_euler("ZYX", np.stack([0 * roll, pitch, roll], 1)).as_matrix()
     gravity = np.broadcast_to([0.0, 0.0, 9.81], (len(time_s), 3))
     moving = flight()
@@ -291,7 +291,7 @@ def loading(instrument: InstrumentFacts) -> Loading:
         tilt_gravity=gravity,
         voltage=moving.voltage,
     )
-    warm = 5.0 * time_s / DURATION_S
+    warm = 5.0 * time_s / _DURATION_S
     return Loading(
         "first",
         time_s,
@@ -304,12 +304,12 @@ def loading(instrument: InstrumentFacts) -> Loading:
         warm,
         22.0 + warm,
         time_s,
-        0.2 + 0.15 * swing(19.0),
+        0.2 + 0.15 * _swing(19.0),
         moving.rotor_speed,
     )
 
 
-def of_reading(effect: Effect, form: Form, instrument: InstrumentFacts) -> Signature | None:
+def of_reading(effect: Effect, form: Form, instrument: InstrumentFacts) -> _Signature | None:
     """A form of a stand or bench: the reading's error over what explains it best."""
     test, values = loading(instrument), _typical(form)
     contribution = form.contribution(test if form.on_loading else test.motion, instrument.vehicle, values)
@@ -330,7 +330,7 @@ def of_reading(effect: Effect, form: Form, instrument: InstrumentFacts) -> Signa
     elif excited and set(excited) <= {"load", "load_change"}:
         known = loads
     over = max(known, key=lambda name: explained(y, known[name]))
-    return Signature(
+    return _Signature(
         form.name,
         form.equation,
         named(form, values),
@@ -345,7 +345,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def signature_figure(shown: Signature) -> Figure:
+def signature_figure(shown: _Signature) -> Figure:
     """The signature of an effect: points over what it hangs on, or lines with and without it over time."""
     if shown.layouts is not None:
         figure, axes = style.figure(2.4, 1, 2)
