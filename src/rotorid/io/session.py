@@ -34,9 +34,6 @@ class Ended(StrEnum):
     FAILED = "failed"
 
 
-_Place = Annotated[list[Number], Field(min_length=3, max_length=3)]
-
-
 class RoomAir(KnownKeys):
     """Air during the recording."""
 

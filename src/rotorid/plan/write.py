@@ -428,13 +428,8 @@ def draw(plan: Plan, path: Path) -> None:
     fig.savefig(path, format="png")
 
 
-def by_hand(ids: Sequence[str]) -> tuple[str, ...]:
-    """Manual steps that set one id of a class apart from the others, in the class's order, each once."""
-    return tuple(steps_of(ids).values())
-
-
 def steps_of(ids: Sequence[str]) -> dict[str, str]:
-    """The same, to the id that each step is there for."""
+    """Manual steps that set one id of a class apart from the others, by the id that each is there for, in order."""
     return {i: STEPS[i] for i in dict.fromkeys(ids) if i in STEPS}
 
 

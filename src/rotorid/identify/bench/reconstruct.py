@@ -141,14 +141,6 @@ def forces(cells_n: np.ndarray, geometry: Geometry) -> np.ndarray:
     return np.stack([-sums[..., 1] / geometry["L"], sums[..., 0] / geometry["L"], along_z], axis=-1)
 
 
-def forces_by_matrix(cells_n: np.ndarray, geometry: Geometry) -> np.ndarray:
-    """Eq. 2.9: the same as `forces`, by the matrix; N, shape (n, 3)."""
-    cells_n = np.asarray(cells_n, float)
-    force = cells_n @ geometry.matrix.T
-    force[..., 2] -= np.abs(cells_n[..., PULLED]).sum(axis=-1)
-    return force
-
-
 def cell_forces(volts: np.ndarray, coefficients_gf: np.ndarray) -> np.ndarray:
     """Cells' forces, N, shape (n, 6), of tared voltages (n, 6), V, by eq. 2.10.
 

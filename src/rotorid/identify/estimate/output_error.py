@@ -36,13 +36,6 @@ def cut_windows(rates: np.ndarray, moments: np.ndarray, dt_s: float, window_s: f
     return RateWindows(rates[index[good]], moments[index[good]], dt_s)
 
 
-def joined(parts: list[RateWindows]) -> RateWindows:
-    """Windows of several flights with the same sample time and length."""
-    return RateWindows(
-        np.concatenate([p.rates for p in parts]), np.concatenate([p.moments for p in parts]), parts[0].dt_s
-    )
-
-
 @compiled(error_model="numpy")
 def _slope(weights, p, q, r, a, b, c, out):
     out[0] = weights[0] * q * r + weights[3] * a - weights[6] * p
