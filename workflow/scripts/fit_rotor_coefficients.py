@@ -13,7 +13,7 @@ import pandas as pd
 
 from rotorid.identify.rotor.coefficients import PROPELLER_COLUMNS, summarise_propeller
 from rotorid.recordings import read_set
-from rotorid.recordings.importers.report import read_report
+from rotorid.recordings.importers.faults import read_report
 from rotorid.report import log
 
 

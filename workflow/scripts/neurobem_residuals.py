@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rotorid.identify.rigid_body_residuals import compare_with_neurobem, no_neurobem
 from rotorid.recordings import read_set
-from rotorid.recordings.importers.report import read_report
+from rotorid.recordings.importers.faults import read_report
 from rotorid.report import log
 
 

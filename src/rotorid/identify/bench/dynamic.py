@@ -12,7 +12,7 @@ from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
 from rotorid.io.tables import by_recording
-from rotorid.recordings.signal.average import mean_and_error
+from rotorid.recordings.signal.filters import mean_and_error
 
 _REST_S = 1.0
 """Length of the stretches at the beginning and the end that are taken as rest."""

@@ -26,7 +26,7 @@ from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
 from rotorid.recordings import RecordingSet
-from rotorid.recordings.lost_speeds import lost_speed
+from rotorid.recordings.spikes import lost_speed
 
 _FORMS = {"origin": False, "offset": True}
 _PROPELLERS = {

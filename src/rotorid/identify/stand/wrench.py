@@ -17,7 +17,7 @@ from scipy.special import stdtrit as student_quantile
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import Run
-from rotorid.recordings.signal.average import block_count, mean_and_error
+from rotorid.recordings.signal.filters import block_count, mean_and_error
 
 _REST, _RAMP, PLATEAU = "rest", "ramp", "plateau"
 _SLOPE_1_S = 0.004

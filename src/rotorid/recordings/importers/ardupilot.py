@@ -33,10 +33,9 @@ from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import in_the_air
 from rotorid.recordings.importers.bag_records import needs
-from rotorid.recordings.importers.clean import one_sense, report_gaps
+from rotorid.recordings.importers.faults import ImportFault, one_sense, report_gaps
 from rotorid.recordings.importers.known import Parameters, Values
 from rotorid.recordings.importers.mapping import continuous, quaternion_from_euler_frd
-from rotorid.recordings.importers.report import ImportFault
 
 _KINDS = (
     "IMU", "ACC", "GYR", "XKQ", "NKQ", "ATT", "XKF1", "NKF1", "EKF1", "RCOU", "RCO2", "RCO3", "ESC", "BAT", "CURR",

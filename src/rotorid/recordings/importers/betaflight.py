@@ -26,9 +26,8 @@ import pandas as pd
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import blackbox, in_the_air
-from rotorid.recordings.importers.clean import report_gaps
+from rotorid.recordings.importers.faults import ImportFault, report_gaps
 from rotorid.recordings.importers.mapping import half_turn_about_x, quaternion_to_frd_ned
-from rotorid.recordings.importers.report import ImportFault
 
 _GRAVITY_M_S2 = 9.80665
 _DEFAULT_POLES = 14

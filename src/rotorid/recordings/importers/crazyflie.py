@@ -37,7 +37,14 @@ from scipy.spatial.transform import Rotation
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.clean import blank_held, cut, drop_repeated_times, report_gaps, true_stretches
+from rotorid.recordings.importers.faults import (
+    ImportFault,
+    blank_held,
+    cut,
+    drop_repeated_times,
+    report_gaps,
+    true_stretches,
+)
 from rotorid.recordings.importers.in_the_air import airborne, stretches_of
 from rotorid.recordings.importers.mapping import (
     continuous,
@@ -45,7 +52,6 @@ from rotorid.recordings.importers.mapping import (
     quaternion_from_euler_frd,
     quaternion_to_frd_ned,
 )
-from rotorid.recordings.importers.report import ImportFault
 
 _MAGIC = 0xBC
 _CHECKSUM = 4

@@ -13,8 +13,7 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.clean import true_stretches
-from rotorid.recordings.importers.report import ImportFault
+from rotorid.recordings.importers.faults import ImportFault, true_stretches
 
 _SHORTEST_FLIGHT_S = 4.0
 _AFTER_TAKE_OFF_S = 1.0

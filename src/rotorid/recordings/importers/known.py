@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rotorid.recordings.importers.report import ImportFault
+from rotorid.recordings.importers.faults import ImportFault
 from rotorid.recordings.vehicle import Rotor
 
 PLACES = {"front right": (1, 1), "rear left": (-1, -1), "front left": (1, -1), "rear right": (-1, 1)}

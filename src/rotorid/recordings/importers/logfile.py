@@ -33,9 +33,9 @@ from rotorid.recordings.importers import (
     rcbenchmark,
     ros,
 )
+from rotorid.recordings.importers.faults import ImportFault
 from rotorid.recordings.importers.known import Known, px4_vehicle
 from rotorid.recordings.importers.mapping import ELECTRICAL, Mapping, read_by_mapping
-from rotorid.recordings.importers.report import ImportFault
 
 _GZIP = b"\x1f\x8b"
 _BY_FIRST_BYTES = (

@@ -33,9 +33,9 @@ from rotorid.recordings import RecordingSet, Run, read_vehicle, write_set
 from rotorid.recordings import columns as c
 from rotorid.recordings.files import sha256
 from rotorid.recordings.importers import crazyflie
+from rotorid.recordings.importers.faults import ImportFault, ImportReport
 from rotorid.recordings.importers.neurobem import read_neurobem
 from rotorid.recordings.importers.rcbenchmark import read_rcbenchmark
-from rotorid.recordings.importers.report import ImportFault, ImportReport
 from rotorid.recordings.importers.vicon_csv import read_vicon_csv
 from rotorid.recordings.tables import place, read_csv
 

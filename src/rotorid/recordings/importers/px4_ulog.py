@@ -27,10 +27,9 @@ from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import in_the_air
-from rotorid.recordings.importers.clean import drop_repeated_times, further_motors, one_sense, report_gaps
+from rotorid.recordings.importers.faults import ImportFault, drop_repeated_times, further_motors, one_sense, report_gaps
 from rotorid.recordings.importers.known import Parameters, Values
 from rotorid.recordings.importers.mapping import continuous
-from rotorid.recordings.importers.report import ImportFault
 
 _RPM = 2 * np.pi / 60
 _FIRST_MOTOR = 101

@@ -39,9 +39,8 @@ from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import in_the_air
 from rotorid.recordings.importers.bag_records import Records, needs, typestores
-from rotorid.recordings.importers.clean import further_motors, one_sense, report_gaps
+from rotorid.recordings.importers.faults import ImportFault, further_motors, one_sense, report_gaps
 from rotorid.recordings.importers.mapping import half_turn_about_x, quaternion_to_frd_ned
-from rotorid.recordings.importers.report import ImportFault
 
 _RPM = 2 * np.pi / 60
 _PULSE_US = (1000.0, 2000.0)

@@ -34,12 +34,12 @@ from rotorid.recordings.files import (
     usable_runs,
     write_manifest,
 )
+from rotorid.recordings.importers.faults import FILE_NAME as REPORT
+from rotorid.recordings.importers.faults import ImportFault, ImportReport
 from rotorid.recordings.importers.logfile import TEMPLATES, files_of, read_log
 from rotorid.recordings.importers.mapping import Mapping
 from rotorid.recordings.importers.propose import propose, thrust_coefficient
 from rotorid.recordings.importers.rcbenchmark import signed_by_spin
-from rotorid.recordings.importers.report import FILE_NAME as REPORT
-from rotorid.recordings.importers.report import ImportFault, ImportReport
 from rotorid.recordings.importers.units import UNITS
 from rotorid.recordings.tables import check_table, parquet_is_here, write_table
 from rotorid.recordings.vehicle import Vehicle

@@ -15,9 +15,15 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.clean import blank_held, cut, drop_repeated_times, report_gaps, true_stretches
+from rotorid.recordings.importers.faults import (
+    ImportFault,
+    blank_held,
+    cut,
+    drop_repeated_times,
+    report_gaps,
+    true_stretches,
+)
 from rotorid.recordings.importers.mapping import quaternion_from_euler_frd
-from rotorid.recordings.importers.report import ImportFault
 
 _COUNT = 25
 _RPM = 2 * np.pi / 60

@@ -13,7 +13,7 @@ from rotorid.mismatch.changes.compare import Changes
 from rotorid.mismatch.changes.level_one_words import level_one_sentences, quantity_words
 from rotorid.mismatch.decision.words import capital, channel_words
 from rotorid.report.page.make import policy_for
-from rotorid.report.plots.changes import draw_differences, draw_residuals, draw_values
+from rotorid.report.plots.mismatch import draw_differences, draw_residuals, draw_values
 
 _TEMPLATE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>{{ new }} compared with {{ base }}</title>

@@ -21,7 +21,7 @@ import pandas as pd
 import yaml
 
 from rotorid.errors import InputError
-from rotorid.recordings.importers.clean import join_rows
+from rotorid.recordings.importers.faults import join_rows
 from rotorid.recordings.importers.guessing import agreement as by
 from rotorid.recordings.importers.guessing import names as named
 from rotorid.recordings.importers.guessing.attitude import guess_attitude_and_rates
