@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.errors import InputError
-from rotorid.identify.bench.reconstruct import CELLS, FORCES, GF_N, Geometry, cell_forces, forces
+from rotorid.identify.bench.reconstruct import CELLS, DIRECTION, FORCES, GF_N, Geometry, cell_forces, forces
 from rotorid.io.tables import by_recording
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import RecordingSet, Run
@@ -27,8 +27,6 @@ from rotorid.recordings.vehicle import Vehicle
 SPIKE = 16
 _SETTLING_SAMPLES = 10
 """Fig. 2.35: so many samples let the spikes of switching on dissipate."""
-_DIRECTION = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, -1.0)}
-"""Unit vector of a load, body axes: along z it pulls upwards, as thrust does."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +115,7 @@ def reference(session, table: pd.DataFrame, force_n: np.ndarray) -> np.ndarray:
     Nobody wrote down the very moment at which the weight came on: it is where the reading first exceeds half of
     its final value.
     """
-    direction = np.array(_DIRECTION[session.axis])
+    direction = np.array(DIRECTION[session.axis])
     along = force_n @ direction
     index = table["index"].to_numpy()
     final = along[(index >= session.mark_read_start) & (index <= session.mark_read_stop)].mean()

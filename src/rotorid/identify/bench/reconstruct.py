@@ -26,6 +26,8 @@ PULLED = (0, 2, 4)
 """Cells 1, 3, 5: their absolute value enters eq. 2.8."""
 CELLS = tuple(f"cell_{i}_v" for i in range(1, 7))
 FORCES = ("force_x_n", "force_y_n", "force_z_n")
+DIRECTION = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, -1.0)}
+"""Unit vector of a load, body axes: along z it pulls upwards, as thrust does."""
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from scipy.special import stdtrit as student_quantile
 from rotorid.errors import InputError
 from rotorid.identify.bench.loadcell import LineFit, fit_line
 from rotorid.identify.bench.reconstruct import (
+    DIRECTION,
     GF_N,
     PULLED,
     Geometry,
@@ -32,15 +33,14 @@ from rotorid.identify.bench.reconstruct import (
 )
 from rotorid.io.tables import by_recording
 
-_UNIT = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, -1.0)}
 _AXES = "xyz"
 
 
 def direction(axis: str) -> np.ndarray:
     """Unit vector of a load, shape (3,), body axes; `xz` is halfway between x and z. Loads along z pull up, −z."""
-    if not axis or any(letter not in _UNIT for letter in axis):
+    if not axis or any(letter not in DIRECTION for letter in axis):
         raise InputError(f"a load's axis is x, y, z or several of them, not {axis!r}")
-    together = np.sum([_UNIT[letter] for letter in axis], axis=0)
+    together = np.sum([DIRECTION[letter] for letter in axis], axis=0)
     return together / np.linalg.norm(together)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.identify.stand.align import Aligned, Pair, both_on_host, pair_of, torque_offset
+from rotorid.identify.stand.wrench import WRENCH
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.sequence import Quality
 from rotorid.io.tables import by_recording
@@ -19,13 +20,12 @@ from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.vehicle import Vehicle
 
 _RPM = 2 * np.pi / 60
-_WRENCH = (*c.FORCE, *c.MOMENT)
 _THROTTLES = c.rotor_columns("throttle", 4)
 
 
 def _felt(wrench: pd.DataFrame, offset_s: float) -> tuple[np.ndarray, pd.DataFrame]:
     """Times of the sensor's samples, s, its offset taken off, and their wrench; a saturated channel's are empty."""
-    out = wrench[list(_WRENCH)].astype(float).reset_index(drop=True)
+    out = wrench[list(WRENCH)].astype(float).reset_index(drop=True)
     out.loc[(wrench["quality"].to_numpy() & int(Quality.SATURATED)) != 0] = np.nan
     return wrench["host_s"].to_numpy() - offset_s, out
 
@@ -46,7 +46,7 @@ def _experiment_run(session, aligned: Aligned) -> Run:
     table[c.BATTERY_VOLTAGE] = _within(when, sent, quadrotor["battery_voltage_v"].to_numpy(), np.nan)
     table["roll_rad"] = np.radians(session.mount_roll_deg)
     table["pitch_rad"] = np.radians(session.mount_pitch_deg)
-    table[list(_WRENCH)] = felt
+    table[list(WRENCH)] = felt
     return Run(aligned.pair.name, table)
 
 
@@ -63,7 +63,7 @@ def _torque_run(name: str, rotor: pd.DataFrame, wrench: pd.DataFrame, offset_s: 
     table[c.BATTERY_VOLTAGE] = _within(when, sent, rotor["battery_voltage_v"].to_numpy(), np.nan)
     table[c.BATTERY_CURRENT] = _within(when, sent, rotor["battery_current_a"].to_numpy(), np.nan)
     table["roll_rad"] = table["pitch_rad"] = 0.0
-    table[list(_WRENCH)] = felt
+    table[list(WRENCH)] = felt
     return Run(name, table)
 
 

@@ -36,6 +36,7 @@ from rotorid.recordings.importers.bag_records import needs
 from rotorid.recordings.importers.faults import ImportFault, one_sense, report_gaps
 from rotorid.recordings.importers.known import Parameters, Values
 from rotorid.recordings.importers.mapping import continuous, quaternion_from_euler_frd
+from rotorid.recordings.importers.units import PULSE_US, RPM
 
 _KINDS = (
     "IMU", "ACC", "GYR", "XKQ", "NKQ", "ATT", "XKF1", "NKF1", "EKF1", "RCOU", "RCO2", "RCO3", "ESC", "BAT", "CURR",
@@ -95,8 +96,6 @@ _LANDED, _FLYING = 18, 28
 """Events LAND_COMPLETE and NOT_LANDED."""
 _GOOD, _DOWN = 4, 25
 """Status of a range finder that reads, and the orientation of one that looks down."""
-_PULSE_US = (1000.0, 2000.0)
-RPM = 2 * np.pi / 60
 _HEAD, END = b"\xa3\x95", "END"
 """First bytes of a message, and the key under which stands how many bytes of the last one came."""
 _CLOCKS = {"TimeUS": 1e-6, "TimeMS": 1e-3}
@@ -355,7 +354,7 @@ def _limits(values: Values, pulses: int) -> tuple[float, float, list[ImportFault
         low, high = (values[name] for name in names)
         action = f"{' and '.join(names)} of the throttle channel hold, {low:g} and {high:g} µs"
     else:
-        low, high = _PULSE_US
+        low, high = PULSE_US
         action = f"taken as {low:g} and {high:g} µs"
     return low, high, [ImportFault("unit", "throttle", found, action, pulses)]
 

@@ -52,6 +52,7 @@ from rotorid.recordings.importers.mapping import (
     quaternion_from_euler_frd,
     quaternion_to_frd_ned,
 )
+from rotorid.recordings.importers.units import RPM
 
 _MAGIC = 0xBC
 _CHECKSUM = 4
@@ -61,7 +62,6 @@ TYPES = {"e": "<f2", "f": "<f4", "d": "<f8", "b": "i1", "B": "u1", "h": "<i2", "
 _STANDARD_GRAVITY_M_S2 = 9.81
 """The firmware's g: accelerometer logs are in multiples of this."""
 _FULL_SCALE = 65536.0
-_RPM = 2 * np.pi / 60
 _ROTORS = range(1, 5)
 _SPEEDS = list(c.rotor_columns("rotor_speed", 4))
 THROTTLES = list(c.rotor_columns("throttle", 4))
@@ -183,7 +183,7 @@ def convert(log: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
             put([f"thrust_request_{i}" for i in _ROTORS], log[request].to_numpy(float) / _FULL_SCALE)
     speeds = [f"rpm.m{i}" for i in _ROTORS]
     if set(speeds) <= set(log.columns):
-        put(_SPEEDS, log[speeds].to_numpy(float) * _RPM)
+        put(_SPEEDS, log[speeds].to_numpy(float) * RPM)
     for name, a_volt in (("pm.vbatMV", 1000), ("pm.vbat", 1)):
         if name in log and c.BATTERY_VOLTAGE not in columns:
             columns[c.BATTERY_VOLTAGE] = log[name].to_numpy(float) / a_volt

@@ -36,13 +36,13 @@ from rotorid.recordings.importers import crazyflie
 from rotorid.recordings.importers.faults import ImportFault, ImportReport
 from rotorid.recordings.importers.neurobem import read_neurobem
 from rotorid.recordings.importers.rcbenchmark import read_rcbenchmark
+from rotorid.recordings.importers.units import RPM
 from rotorid.recordings.importers.vicon_csv import read_vicon_csv
 from rotorid.recordings.tables import place, read_csv
 
 _RAW_FILES = "https://raw.githubusercontent.com"
 _TIMEOUT_S = 20.0
 _GRAM_FORCE_N = 9.80665e-3
-_RPM = 2 * np.pi / 60
 _FULL_SCALE = 65536.0
 _SPEEDS = ("rpm1", "rpm2", "rpm3", "rpm4")
 Runs = dict[str, tuple[pd.DataFrame, list[ImportFault]]]
@@ -310,7 +310,7 @@ def read_imrc_bench(path: Path) -> tuple[pd.DataFrame, list[ImportFault]]:
     throttle = raw["pwm"].to_numpy(float) / _FULL_SCALE
     columns |= {name: throttle for name in c.rotor_columns("throttle", 4)}
     for name, column in zip(_SPEEDS, c.rotor_columns("rotor_speed", 4), strict=True):
-        columns[column] = raw[name].to_numpy(float) * _RPM
+        columns[column] = raw[name].to_numpy(float) * RPM
     columns["force_z_n"] = -raw[thrust].to_numpy(float) * _GRAM_FORCE_N
     columns[c.BATTERY_VOLTAGE] = raw["vbat[V]"].to_numpy(float)
     if "i[A]" in raw:

@@ -41,9 +41,7 @@ from rotorid.recordings.importers import in_the_air
 from rotorid.recordings.importers.bag_records import Records, needs, typestores
 from rotorid.recordings.importers.faults import ImportFault, further_motors, one_sense, report_gaps
 from rotorid.recordings.importers.mapping import half_turn_about_x, quaternion_to_frd_ned
-
-_RPM = 2 * np.pi / 60
-_PULSE_US = (1000.0, 2000.0)
+from rotorid.recordings.importers.units import PULSE_US, RPM
 
 
 def _xyz(v) -> list[float]:
@@ -392,7 +390,7 @@ def convert(
     if "body_velocity" in first and "velocity" not in first:
         parts += _turned(first["body_velocity"], [*series.get("attitude", []), *series.get("imu_attitude", [])], faults)
     for quantity, kind, unit in (
-        ("speeds", "rotor_speed", 1.0), ("rpm", "rotor_speed", _RPM), ("commands", "rotor_command", 1.0)
+        ("speeds", "rotor_speed", 1.0), ("rpm", "rotor_speed", RPM), ("commands", "rotor_command", 1.0)
     ):  # fmt: skip
         if quantity in first and not (quantity == "rpm" and "speeds" in first):
             names = c.rotor_columns(kind, first[quantity].values.shape[1])
@@ -432,7 +430,7 @@ def _of_pulses(outputs: _TopicSeries, faults: list[ImportFault]) -> tuple:
     moving = np.flatnonzero(np.ptp(outputs.values, axis=0) > 0)
     pulses = outputs.values[:, moving]
     used = [*range(min(_MIXED, len(moving))), *further_motors(pulses, _MIXED)]
-    low, high = _PULSE_US
+    low, high = PULSE_US
     seen = f"channels {', '.join(str(moving[k] + 1) for k in used)} of {outputs.topic} move"
     action = f"taken for motors in order, {low:g} to {high:g} µs"
     faults.append(ImportFault("unit", "throttle", seen, action, len(pulses)))

@@ -24,9 +24,9 @@ from rotorid.recordings.importers.faults import (
     true_stretches,
 )
 from rotorid.recordings.importers.mapping import quaternion_from_euler_frd
+from rotorid.recordings.importers.units import RPM
 
 _COUNT = 25
-_RPM = 2 * np.pi / 60
 _GROUND_MARGIN_M = 0.015
 """Height above the resting height from which the vehicle counts as in the air."""
 
@@ -82,7 +82,7 @@ def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[ImportFault]]:
     quaternion = quaternion_from_euler_frd(roll, pitch, yaw)
     columns |= dict(zip(c.QUATERNION, quaternion.T, strict=True))
     columns |= dict(zip(c.ANGULAR_VELOCITY, matrix[:, 10:13].T, strict=True))
-    columns |= dict(zip(c.rotor_columns("rotor_speed", 4), (matrix[:, 13:17] * _RPM).T, strict=True))
+    columns |= dict(zip(c.rotor_columns("rotor_speed", 4), (matrix[:, 13:17] * RPM).T, strict=True))
     columns[c.BATTERY_VOLTAGE] = matrix[:, 17:21].mean(axis=1)
     columns[c.BATTERY_CURRENT] = matrix[:, 21:25].sum(axis=1)
     table = pd.DataFrame(columns)
@@ -114,8 +114,8 @@ def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[ImportFault]]:
         table.loc[unpowered, [c.BATTERY_VOLTAGE, c.BATTERY_CURRENT]] = np.nan
     table, repeated = drop_repeated_times(table)
     height = table[c.HEIGHT].to_numpy()
-    resting = np.nanmedian(height[: max(10, int(np.argmax(table[rotors[0]].to_numpy() > 3000 * _RPM)))])
-    flying = (table[rotors].mean(axis=1) > 4000 * _RPM).to_numpy() & (height > resting + _GROUND_MARGIN_M)
+    resting = np.nanmedian(height[: max(10, int(np.argmax(table[rotors[0]].to_numpy() > 3000 * RPM)))])
+    flying = (table[rotors].mean(axis=1) > 4000 * RPM).to_numpy() & (height > resting + _GROUND_MARGIN_M)
     stretches = true_stretches(flying, table[c.TIME].to_numpy(), 5.0)
     if not stretches:
         raise InputError("no stretch of 5 s in the air found (rotors above 4000 rpm and off the ground)")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotorid.identify.fem.placement import turn
 from rotorid.report.plots import style
 
 if TYPE_CHECKING:
@@ -88,7 +89,7 @@ def parts(surface: pd.DataFrame) -> Figure:
 def _legs_mm(surface: pd.DataFrame) -> np.ndarray:
     """Triangles of all legs [mm], shape (k, 3, 3), seen from above in a right-handed view: y to the left, z upwards."""
     corners = np.stack([surface[[f"x_{k}_m", f"y_{k}_m", f"z_{k}_m"]].to_numpy() for k in (1, 2, 3)], axis=1)
-    legs = np.concatenate([1e3 * corners @ _turn(2 * np.pi / _LEGS * leg).T for leg in range(_LEGS)])
+    legs = np.concatenate([1e3 * corners @ turn(2 * np.pi / _LEGS * leg).T for leg in range(_LEGS)])
     return legs * np.array([1.0, -1.0, -1.0])
 
 
@@ -107,11 +108,6 @@ def _put(
     axis.set_box_aspect((2 * reach, 2 * reach, high - low), zoom=zoom)
     axis.view_init(elev=28, azim=-62)
     axis.set_axis_off()
-
-
-def _turn(angle: float) -> np.ndarray:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def against_load(loads: pd.DataFrame) -> Figure:

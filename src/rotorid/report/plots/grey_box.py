@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_AXIS_COLOURS = tuple(style.COLOUR[a] for a in "xyz")
 _NAMES = {"c_f": ("thrust", "N", 1.0), "c_q": ("torque", "mN m", 1000.0)}
 
 
@@ -75,7 +74,7 @@ def hidden_sizes(sizes: pd.DataFrame) -> Figure:
 def inertia_training(history: pd.DataFrame, fits: dict) -> Figure:
     """Error by epoch (figure 4.22) and, right, trained gyroscopic weights next to what their inertias imply."""
     fig, axes = style.figure(2.9, 1, 2)
-    for colour, rate in zip(_AXIS_COLOURS, "pqr", strict=True):
+    for colour, rate in zip(style.AXIS_COLOURS, "pqr", strict=True):
         axes[0].loglog(history["epoch"] + 1, history[rate], color=colour, label=rf"$\dot {rate}$")
         axes[0].loglog(history["epoch"] + 1, history[f"{rate}_scaled"], color=colour, linestyle="--")
     axes[0].set_xlabel("epoch")
@@ -123,7 +122,7 @@ def identifiability(promises: pd.DataFrame) -> Figure:
 def excitation(traces: pd.DataFrame) -> Figure:
     """Moments and body rates of the designed manoeuvre."""
     fig, axes = style.figure(3.4, 2, 1, sharex=True)
-    for colour, axis, label in zip(_AXIS_COLOURS, "xyz", ("roll", "pitch", "yaw"), strict=True):
+    for colour, axis, label in zip(style.AXIS_COLOURS, "xyz", ("roll", "pitch", "yaw"), strict=True):
         axes[0].plot(traces["time_s"], 1000 * traces[f"moment_{axis}_n_m"], color=colour, label=label, linewidth=0.7)
         axes[1].plot(traces["time_s"], traces[f"angular_velocity_{axis}_rad_s"], color=colour, linewidth=0.7)
     axes[0].set_ylabel("moment (mN m)")

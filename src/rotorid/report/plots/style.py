@@ -39,6 +39,7 @@ COLOUR = {
     "z": GREEN,
 }
 """Colour of a quantity, the same in every figure."""
+AXIS_COLOURS = tuple(COLOUR[axis] for axis in "xyz")
 
 CYCLE = (BLUE, RED, GREEN, ORANGE, _PURPLE, SKY, BLACK, _YELLOW)
 """Colours in order for things without a fixed one (cells, motors, flights)."""

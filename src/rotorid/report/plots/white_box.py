@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ANGLES = ("roll", "pitch", "yaw")
-_AXIS_COLOURS = tuple(style.COLOUR[a] for a in "xyz")
 
 
 def rotor_curves(thrust: pd.DataFrame, torque: pd.DataFrame, fits: dict) -> Figure:
@@ -80,7 +79,7 @@ def motion(flight: pd.DataFrame) -> Figure:
             place = axes[row, column]
             values = scale * flight[name.format(axis)].to_numpy()
             kept = style.thin(values, 800)
-            place.plot(flight["time_s"].to_numpy()[kept], values[kept], color=_AXIS_COLOURS[column], linewidth=0.7)
+            place.plot(flight["time_s"].to_numpy()[kept], values[kept], color=style.AXIS_COLOURS[column], linewidth=0.7)
             if column == 0:
                 place.set_ylabel(label)
             if row == 0:

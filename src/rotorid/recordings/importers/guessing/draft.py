@@ -35,7 +35,6 @@ RATES_HZ = (5.0, 8000.0)
 _THOUSANDTHS = 100.0
 """Median size of an accelerometer's reading above which it counts thousandths of g."""
 FASTEST_GYRO_RAD_S = 40.0
-G = 9.80665
 
 
 @dataclass
