@@ -56,7 +56,7 @@ def joined_sets(first: RecordingSet, *others: RecordingSet) -> tuple[RecordingSe
     for number, own in enumerate(columns, 1):
         if extra := sorted(own - shared):
             notes.append(f"Not all sets have {', '.join(extra[:4])}{' …' if len(extra) > 4 else ''} of set {number}.")
-    runs = [_renamed(r, str(number)) for number, s in enumerate(sets, 1) for r in s.runs]
+    runs = [replace(r, name=f"{number}-{r.name}") for number, s in enumerate(sets, 1) for r in s.runs]
     runs = [replace(r, table=r.table[[n for n in r.table.columns if n in shared]]) for r in runs]
     return RecordingSet(name, first.vehicle, tuple(runs), tuple(held) or None), tuple(notes)
 
@@ -78,11 +78,6 @@ def _brief(value) -> str:
     """A value of vehicle.yaml, short."""
     text = str(value)
     return text if len(text) < 40 else text[:37] + "…"
-
-
-def _renamed(run: Run, number: str) -> Run:
-    """A run that carries its set's number."""
-    return replace(run, name=f"{number}-{run.name}")
 
 
 def present(run: Run) -> set[str]:

@@ -277,11 +277,6 @@ def why_none(plan: Plan) -> str:
     )
 
 
-def _open_ids(plan: Plan) -> list[tuple[str, ...]]:
-    """Ids of every class that is open, whether a flight can settle it or not."""
-    return [*(ids for ids, _ in plan.questions), *(ids for ids, _ in plan.unanswerable)]
-
-
 def in_words(plan: Plan) -> list[str]:
     """Manual steps, as sentences; with the separation where one is predicted."""
     found = {h.of: f" {_expected_by_hand(h, plan.limits.target_sigma)}" for h in plan.by_hand if h.sigma is not None}
@@ -290,7 +285,8 @@ def in_words(plan: Plan) -> list[str]:
 
 def _manual_steps(plan: Plan) -> dict[str, str]:
     """Manual steps, to the id that each is there for."""
-    return steps_of([i for ids in _open_ids(plan) for i in ids])
+    every = [*(ids for ids, _ in plan.questions), *(ids for ids, _ in plan.unanswerable)]
+    return steps_of([i for ids in every for i in ids])
 
 
 def _expected_by_hand(step: Handled, target: float) -> str:

@@ -71,7 +71,8 @@ def both_on_host(
 
     Raises InputError where such recordings have no time in common.
     """
-    if _pace(second) < _FASTER_THAN_LIFE:
+    pace = np.ptp(second["time_s"]) / max(np.ptp(second["host_time_s"]), 1e-9)
+    if pace < _FASTER_THAN_LIFE:
         return _on_host(first, largest_error), _on_host(second, largest_error)
     host = second["host_time_s"].to_numpy()
     both = (host >= first["host_time_s"].min()) & (host <= first["host_time_s"].max())
@@ -81,11 +82,6 @@ def both_on_host(
     seen = device_time(first["time_s"], first["host_time_s"], host[both])
     offset = float(np.median(seen - second["time_s"].to_numpy()[both]))
     return (first.assign(host_s=first["time_s"]), 1.0), (second.assign(host_s=second["time_s"] + offset), 1.0)
-
-
-def _pace(table: pd.DataFrame) -> float:
-    """Device seconds that pass in a second of the host."""
-    return float(np.ptp(table["time_s"]) / max(np.ptp(table["host_time_s"]), 1e-9))
 
 
 def pair_of(

@@ -291,12 +291,9 @@ def _where_text(verdict: Verdict) -> list[str]:
         name, unit = regime_words(regime.variable)
         span = f"{number(regime.low)} to {number(regime.high)} {unit}".strip()
         texts.append(f"{channel_words(channel)}: {name} {span}")
-    first = f"The mismatch shows in {listed([channel_words(c) for c in dict.fromkeys(_channels(verdict))])}."
+    channels = dict.fromkeys(loc.channel for loc in verdict.locations)
+    first = f"The mismatch shows in {listed([channel_words(channel) for channel in channels])}."
     return [first] + ([pretty(f"What separates it best: {'; '.join(texts)}.")] if texts else [])
-
-
-def _channels(verdict: Verdict) -> list[str]:
-    return [loc.channel for loc in verdict.locations]
 
 
 def strip(analysis: Analysis, verdict: Verdict) -> tuple[str, str, str] | None:
