@@ -23,7 +23,7 @@ OPEN = (
     "rigid_body_residuals",
     "rotor.campaign",
     "rotor.coefficients",
-    "stand.align",
+    "stand.clocks",
     "stand.recordings",
     "stand.wrench",
 )

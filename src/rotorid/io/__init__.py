@@ -14,7 +14,6 @@ OPEN = (
     "session",
     "tables",
     "text.files",
-    "text.markdown_table",
     "text.wording",
     "text.writing",
     "wire",

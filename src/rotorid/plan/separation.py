@@ -31,12 +31,10 @@ from rotorid.mismatch.plant.regression import Regression, autoregression, build,
 from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.mismatch.plant.split import HELD_OUT_SHARE, training_rule
 from rotorid.mismatch.posterior.problem import Prior
-from rotorid.plan.between import interval as chain_interval
-from rotorid.plan.between import squares
 from rotorid.plan.candidates import Reference
 from rotorid.plan.changed import ChangedVehicle
 from rotorid.plan.limits import Limits
-from rotorid.plan.questions import FittedSet, Hypothesis, Question
+from rotorid.plan.questions import FittedSet, Hypothesis, Question, chain_interval, chain_squares
 from rotorid.plan.simulate import CompetingModel, SimulatedFlight, commands, fly, recorded
 from rotorid.recordings import RecordingSet, Vehicle
 from rotorid.steps import step
@@ -244,7 +242,7 @@ def _of_flight(
                 chain.append((form, true.values[at : at + len(form.parameters)]))
                 at += len(form.parameters)
             asked = commands(replace(world, chain=tuple(chain)), flight.motion)
-            apart.append(squares(known.fitted, segments_of(replace(flight, command_rad_s=asked)), true, rival))
+            apart.append(chain_squares(known.fitted, segments_of(replace(flight, command_rad_s=asked)), true, rival))
     if known.fitted.commanded:
         segments = path_segments(segments, *known.fitted.chain, prepared.thinner.cutoff_hz)
     effects = model.effects if model.effects is not None else chosen(model)

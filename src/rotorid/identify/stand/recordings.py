@@ -1,6 +1,6 @@
 """The stand's tests as recording sets of kind `stand`.
 
-Two instruments with their own clocks are put on one (`rotorid.identify.stand.align`); a run's samples are the wrench
+Two instruments with their own clocks are put on one (`rotorid.identify.stand.clocks`); a run's samples are the wrench
 sensor's, with throttle, speed and voltage interpolated to them. Before and after a programme the vehicle sends nothing:
 its motors stand.
 """
@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from rotorid.identify.stand.align import Aligned, Pair, both_on_host, pair_of, torque_offset
+from rotorid.identify.stand.clocks import Aligned, Pair, both_on_host, pair_of, torque_offset
 from rotorid.identify.stand.wrench import WRENCH
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.sequence import Quality
