@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -353,23 +354,21 @@ def question_of(found: Fitted, finding: Finding, ids: tuple[str, ...]) -> Questi
     return Question(tuple(h.id for h in hypotheses), tuple(hypotheses), shared, rivals)
 
 
+def _worth(regression: Regression, shared: Sequence[str], terms: dict[str, Term], keys: tuple[str, ...]) -> float:
+    """What terms explain next to the shared ones, less the cost of their parameters."""
+    return regression.explained([*shared, *keys]) - COST_PER_PARAMETER * sum(terms[k].size for k in keys)
+
+
 def best_of(regression: Regression, shared: Sequence[str], choices, terms: dict[str, Term]) -> tuple[str, ...]:
     """The terms that explain most for their parameters."""
-
-    def worth(keys: tuple[str, ...]) -> float:
-        return regression.explained([*shared, *keys]) - COST_PER_PARAMETER * sum(terms[k].size for k in keys)
-
-    return max(choices, key=worth)
+    return max(choices, key=partial(_worth, regression, shared, terms))
 
 
 def _hypothesis_of(
     regression: Regression, shared: Sequence[str], name: str, choices, terms: dict[str, Term], own: str
 ) -> Hypothesis:
     """The model of an id in its best form, `own` where that is one of its `choices`, with the forms nearly as good."""
-
-    def worth(keys: tuple[str, ...]) -> float:
-        return regression.explained([*shared, *keys]) - COST_PER_PARAMETER * sum(terms[k].size for k in keys)
-
+    worth = partial(_worth, regression, shared, terms)
     best = (own,) if (own,) in choices else best_of(regression, shared, choices, terms)
     weights = {keys: float(np.exp(min(worth(keys) - worth(best), 0.0) / 2)) for keys in choices if keys != best}
     others = (
