@@ -165,7 +165,7 @@ class _Campaign:
         ]
         _within(recorders, run)
         for recorder in recorders:
-            pack(recorder.log_path, recorder.session)
+            _pack(recorder.log_path, recorder.session)
             self.recordings.append(recorder.session)
         self.date += timedelta(seconds=round(clock.now_ns() / 1e9 + pause_s))
 
@@ -180,7 +180,7 @@ def _within(recorders: list[Recorder], run: Callable[..., None]) -> None:
             run(first, second)
 
 
-def pack(log: Path, session: Session) -> Path:
+def _pack(log: Path, session: Session) -> Path:
     """Replace a finished log by its gzipped form (same bytes inside, no name and no date in the header)."""
     packed = log.with_name(log.name + ".gz")
     with open(packed, "wb") as raw, gzip.GzipFile("", "wb", 9, raw, mtime=0) as out:

@@ -26,7 +26,7 @@ from rotorid.errors import InputError
 from rotorid.io.text.writing import all_or_none
 from rotorid.steps import heard_by
 
-Run = list[tuple[str, float]]
+_Run = list[tuple[str, float]]
 """Steps one after the other, and the seconds of each."""
 KEPT, _ALIKE, _LEAST = 24, 5, 3
 """Runs that the record keeps of a command; those asked, the most alike in their steps so far; and how many at least."""
@@ -41,7 +41,7 @@ TRACEBACK = "ROTORID_TRACEBACK"
 """Environment variable with which an unexpected error shows its traceback."""
 
 
-def time_left(runs: Sequence[Run], done: Run, name: str, spent_s: float) -> float | None:
+def time_left(runs: Sequence[_Run], done: _Run, name: str, spent_s: float) -> float | None:
     """Seconds left after `spent_s` in the step `name`; None where earlier runs do not say it."""
     if not done or len(runs) < _LEAST:  # while it reads, nothing is known of the recordings
         return None
@@ -51,7 +51,7 @@ def time_left(runs: Sequence[Run], done: Run, name: str, spent_s: float) -> floa
     return middle if high <= _AGREE * low else None
 
 
-def _as_then(run: Run, done: Run, name: str, spent_s: float) -> tuple[int, float]:
+def _as_then(run: _Run, done: _Run, name: str, spent_s: float) -> tuple[int, float]:
     """How many steps only one of two runs has met so far, and the seconds left if all goes on as in the earlier one.
 
     As many of each step follow as then, from the newest that both have met.
@@ -77,7 +77,7 @@ def _as_then(run: Run, done: Run, name: str, spent_s: float) -> tuple[int, float
     return len(set(own) ^ set(whole[: start + 1])), going + rest_s
 
 
-def _times_of(run: Run) -> dict[str, list[float]]:
+def _times_of(run: _Run) -> dict[str, list[float]]:
     """Seconds of each step, every time that it was met."""
     out = defaultdict(list)
     for step, seconds in run:
@@ -98,11 +98,14 @@ class Waiting:
     """Hears of the steps of a command, and says at which it is, since when and how long is left."""
 
     def __init__(
-        self, runs: Sequence[Run], say: Callable[[str], None] | None = None, clock: Callable[[], float] = time.monotonic
+        self,
+        runs: Sequence[_Run],
+        say: Callable[[str], None] | None = None,
+        clock: Callable[[], float] = time.monotonic,
     ):
         """`say` takes a line when a step begins or ends, every `_PAUSE_S` seconds at most."""
         self.runs, self.say, self.clock = runs, say, clock
-        self.done: Run = []
+        self.done: _Run = []
         self.path: tuple[str, ...] = ()
         self.began = self.since = clock()
         self.said = -_PAUSE_S
@@ -133,7 +136,7 @@ def record_file() -> Path:
     return Path(cache) / "rotorid" / "waiting.json"
 
 
-def read_record() -> dict[str, list[Run]]:
+def read_record() -> dict[str, list[_Run]]:
     """The last runs by command; none where the file is missing, broken or of another version."""
     with suppress(Exception):
         content = json.loads(record_file().read_text(encoding="utf-8"))
@@ -145,7 +148,7 @@ def read_record() -> dict[str, list[Run]]:
     return {}
 
 
-def keep(command: str, done: Run) -> None:
+def keep(command: str, done: _Run) -> None:
     """Add a run to the record, where it can be written."""
     runs = read_record()
     runs[command] = [*runs.get(command, []), [(step, round(seconds, 2)) for step, seconds in done]][-KEPT:]

@@ -53,7 +53,7 @@ def plan(
     with one_sentence():
         from rotorid.plan.limits import Limits, SessionLimits, read_limits
 
-        wishes = wished(want or [])
+        wishes = _wished(want or [])
         folder, content = _read_verdict(verdict)
         flight = content["kind"] == "flight"
         allowed = read_limits(limits, Limits if flight else SessionLimits)
@@ -105,7 +105,7 @@ def _onto_page(page: Path, name: str, said: list[str], picture: Path | None) -> 
         part.write_text(content, encoding="utf-8")
 
 
-def wished(texts: list[str]) -> dict[str, float]:
+def _wished(texts: list[str]) -> dict[str, float]:
     """Wishes as `name=1%` or `name=0.01`; an effect's share is one of the weight."""
     out = {}
     for text in texts:

@@ -61,7 +61,7 @@ class Network:
 
     def __call__(self, inputs: np.ndarray) -> np.ndarray:
         """Outputs (n, n_out) for inputs (n, n_in)."""
-        return outputs(self, inputs)[-1]
+        return _outputs(self, inputs)[-1]
 
 
 def build(
@@ -84,7 +84,7 @@ def build(
     return Network(tuple(weights), tuple(biases), tuple(_ACTIVATIONS[a] for a in activations), masks)
 
 
-def outputs(network: Network, inputs: np.ndarray) -> list[np.ndarray]:
+def _outputs(network: Network, inputs: np.ndarray) -> list[np.ndarray]:
     """Values of every layer, the inputs first: list of (n, size)."""
     values = [inputs]
     for w, b, activation in zip(network.weights, network.biases, network.activations, strict=True):
@@ -104,7 +104,7 @@ def gradients(
     is δ_i x_j. The steps are the means over the samples: the batch method; with one sample the stochastic
     one. For a single layer this is the generalised delta rule.
     """
-    values = outputs(network, inputs)
+    values = _outputs(network, inputs)
     errors = targets - values[-1]
     count = len(inputs)
     delta = errors * network.activations[-1].slope_of_value(values[-1])

@@ -156,7 +156,7 @@ class Instrument:
             raise Malformed(f"a {self.name} sample has {self.layout.size} bytes, this one has {len(payload)}")
 
 
-def counts(columns: list[str], code: str, scale: float, high: int, low: int | None = None) -> tuple:
+def _counts(columns: list[str], code: str, scale: float, high: int, low: int | None = None) -> tuple:
     """Channels of one kind; the range is symmetric unless `low` is given."""
     return tuple(_WireChannel(name, code, scale, -high if low is None else low, high) for name in columns)
 
@@ -190,7 +190,7 @@ BENCH = Instrument(
     title="load-cell bench",
     baud_rate=115200,
     interval_us=20_000,
-    channels=counts([f"cell_{i}_v" for i in range(1, 7)], "i", VOLTS_PER_COUNT, _FULL_SCALE),
+    channels=_counts([f"cell_{i}_v" for i in range(1, 7)], "i", VOLTS_PER_COUNT, _FULL_SCALE),
     commands=_COMMON_COMMANDS,
 )
 
@@ -213,8 +213,8 @@ WRENCH = Instrument(
     title="six-axis force-torque sensor",
     baud_rate=115200,
     interval_us=10_000,
-    channels=counts(_WRENCH_COLUMNS[:3], "h", FORCE_RESOLUTION_N, 2000)  # load capacity 200 N
-    + counts(_WRENCH_COLUMNS[3:], "h", MOMENT_RESOLUTION_N_M, 1800),  # and 1.8 N m
+    channels=_counts(_WRENCH_COLUMNS[:3], "h", FORCE_RESOLUTION_N, 2000)  # load capacity 200 N
+    + _counts(_WRENCH_COLUMNS[3:], "h", MOMENT_RESOLUTION_N_M, 1800),  # and 1.8 N m
     commands=_COMMON_COMMANDS
     | {
         POWER: "power, u8: 1 on, 0 off",
@@ -244,7 +244,7 @@ JR3 = Instrument(
     title="reference force-torque sensor",
     baud_rate=115200,
     interval_us=20_000,
-    channels=counts(_WRENCH_COLUMNS[:3], "i", 0.01, 20_000) + counts(_WRENCH_COLUMNS[3:], "i", 1e-3, 10_000),
+    channels=_counts(_WRENCH_COLUMNS[:3], "i", 0.01, 20_000) + _counts(_WRENCH_COLUMNS[3:], "i", 1e-3, 10_000),
     commands=_COMMON_COMMANDS | {OFFSET: "take the present reading as zero"},
 )
 

@@ -372,12 +372,12 @@ def _hypothesis_of(
     best = (own,) if (own,) in choices else best_of(regression, shared, choices, terms)
     weights = {keys: float(np.exp(min(worth(keys) - worth(best), 0.0) / 2)) for keys in choices if keys != best}
     others = (
-        replace(hypothesis(regression, shared, name, k), weight=w) for k, w in weights.items() if w > _LEAST_WEIGHT
+        replace(_hypothesis(regression, shared, name, k), weight=w) for k, w in weights.items() if w > _LEAST_WEIGHT
     )
-    return replace(hypothesis(regression, shared, name, best), others=tuple(others))
+    return replace(_hypothesis(regression, shared, name, best), others=tuple(others))
 
 
-def hypothesis(regression: Regression, shared: Sequence[str], name: str, keys: tuple[str, ...]) -> Hypothesis:
+def _hypothesis(regression: Regression, shared: Sequence[str], name: str, keys: tuple[str, ...]) -> Hypothesis:
     """A competing model with its coefficients as this set has them."""
     fit = regression.fit([*shared, *keys])
     where = fit.places(regression.columns(keys))

@@ -210,11 +210,11 @@ def courses(limits: SessionLimits) -> dict[str, tuple[str, float, Callable[[np.n
     }
 
 
-def places(known: KnownInstrument) -> list[tuple[str, np.ndarray]]:
+def _places(known: KnownInstrument) -> list[tuple[str, np.ndarray]]:
     """To a name the shares (k,) of every axis of a bench or rotor of a stand that is loaded together."""
     vehicle = known.recordings.vehicle
     if vehicle.kind == "bench":
-        loaded = [k for k in known.model.setup.instrument.channels if np.abs(largest(known)[k]) > 0]
+        loaded = [k for k in known.model.setup.instrument.channels if np.abs(_largest(known)[k]) > 0]
         alone = [(f"along {'xyz'[k]}", np.eye(3)[k]) for k in loaded]
         return [*alone, *([("along all axes", np.eye(3)[loaded].sum(axis=0))] if len(loaded) > 1 else [])]
     count = vehicle.rotor_count
@@ -222,7 +222,7 @@ def places(known: KnownInstrument) -> list[tuple[str, np.ndarray]]:
     return [("of all rotors" if count > 1 else "of the rotor", np.ones(count)), *alone]
 
 
-def largest(known: KnownInstrument) -> np.ndarray:
+def _largest(known: KnownInstrument) -> np.ndarray:
     """Largest load along x, y, z of a bench, N with its sign, or speed of a stand's rotors, rad/s, in the set."""
     loadings = known.model.setup.loadings
     if known.recordings.vehicle.kind == "bench":
@@ -232,7 +232,7 @@ def largest(known: KnownInstrument) -> np.ndarray:
     return np.full(speeds.shape[1], np.nanmax(speeds))
 
 
-def tilts(known: KnownInstrument, limits: SessionLimits) -> list[tuple[float, float]]:
+def _tilts(known: KnownInstrument, limits: SessionLimits) -> list[tuple[float, float]]:
     """Roll and pitch, rad, that the mount can be set to: level, and a tilt about either axis."""
     runs = known.recordings.runs
     if known.recordings.vehicle.kind == "bench" or not all(r.has(*c.MOUNT) for r in runs):
@@ -245,10 +245,10 @@ def options(known: KnownInstrument, limits: SessionLimits) -> list[SessionStep]:
     """Every step of the families."""
     bench = known.recordings.vehicle.kind == "bench"
     out = []
-    for tilt in tilts(known, limits):
+    for tilt in _tilts(known, limits):
         leaning = ", ".join(f"{a} {np.degrees(x):.0f}°" for a, x in zip(("roll", "pitch"), tilt, strict=True) if x)
         mounted = f"mount the vehicle with {leaning}, then " if leaning else ""
-        for where, shares in places(known):
+        for where, shares in _places(known):
             for name, (words, seconds, course) in courses(limits).items():
                 if leaning and (name not in ("slow steps", "rested") or where.endswith("alone")):
                     continue
@@ -271,7 +271,7 @@ def table_of(known: KnownInstrument, step: SessionStep) -> pd.DataFrame:
     """What the set's columns would hold of a step: times, load or speeds, mount; readings are nothing."""
     setup, vehicle = known.model.setup, known.recordings.vehicle
     t = np.arange(0.0, step.duration_s, 1.0 / setup.instrument.rate_hz)
-    asked = step.make(t) * largest(known)
+    asked = step.make(t) * _largest(known)
     table = {c.TIME: t} | {(c.FORCE + c.MOMENT)[k]: np.zeros(len(t)) for k in setup.instrument.channels}
     if vehicle.kind == "bench":
         return pd.DataFrame(table | {n: asked[:, k] for k, n in enumerate(c.REFERENCE_FORCE)})

@@ -48,7 +48,7 @@ def joined_sets(first: RecordingSet, *others: RecordingSet) -> tuple[RecordingSe
     for number, other in enumerate(others, 2):
         if len(other.runs) >= 3:
             held += [f"{number}-{n}" for n in split_runs(other).held_out]
-    columns = [set.intersection(*(present(r) for r in s.runs)) for s in sets]
+    columns = [set.intersection(*(_present(r) for r in s.runs)) for s in sets]
     shared = set.intersection(*columns)
     name = "+".join(s.name for s in sets)
     if shared <= {"time_s"}:
@@ -80,7 +80,7 @@ def _brief(value) -> str:
     return text if len(text) < 40 else text[:37] + "…"
 
 
-def present(run: Run) -> set[str]:
+def _present(run: Run) -> set[str]:
     """Columns with anything in them."""
     return {n for n in run.table.columns if run.has(n)}
 

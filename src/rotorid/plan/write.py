@@ -215,7 +215,7 @@ def _forecast_as_data(flight: Forecast, target: float) -> dict:
     }
 
 
-def summary(plan: Plan) -> dict:
+def _summary(plan: Plan) -> dict:
     """The plan as data, for `plan.json` and for pages."""
     return rounded(
         {
@@ -237,7 +237,7 @@ def text(plan: Plan) -> list[str]:
     out = []
     if plan.pieces:
         out.append(f"Fly for {plan.duration_s:.0f} s (without take-off and landing):")
-        out += [f"  {line}" for line in steps(plan)]
+        out += [f"  {line}" for line in _steps(plan)]
     elif plan.questions:
         out.append(f"No manoeuvre within the limits separates what is open any further: {why_none(plan)}.")
     for _, found in plan.questions:
@@ -253,8 +253,8 @@ def text(plan: Plan) -> list[str]:
             words = "" if other.name == "standard" else f" ({', '.join(dict.fromkeys(p.name for p in other.pieces))})"
             out.append(f"{name}{words}, {other.duration_s:.0f} s: {other.sigma:.1f} standard errors at the least.")
     out += [
-        f"{w.name}: {size(w.before, w.unit)} now, {size(w.after, w.unit)} with this flight"
-        + (f" (wished: {share(w.wished, w.unit)})" if w.wished else "")
+        f"{w.name}: {_size(w.before, w.unit)} now, {_size(w.after, w.unit)} with this flight"
+        + (f" (wished: {_share(w.wished, w.unit)})" if w.wished else "")
         for w in plan.widths
         if plan.pieces or w.wished
     ]
@@ -262,7 +262,7 @@ def text(plan: Plan) -> list[str]:
         out.append(f"No flight with these columns settles {' or '.join(words_of(i) for i in ids)}: {what}.")
     if not out:
         out.append("Nothing is open: no flight is needed to distinguish effects.")
-    return out + in_words(plan)
+    return out + _in_words(plan)
 
 
 def why_none(plan: Plan) -> str:
@@ -277,7 +277,7 @@ def why_none(plan: Plan) -> str:
     )
 
 
-def in_words(plan: Plan) -> list[str]:
+def _in_words(plan: Plan) -> list[str]:
     """Manual steps, as sentences; with the separation where one is predicted."""
     found = {h.of: f" {_expected_by_hand(h, plan.limits.target_sigma)}" for h in plan.by_hand if h.sigma is not None}
     return [f"By hand: {step}.{found.get(i, '')}" for i, step in _manual_steps(plan).items()]
@@ -320,7 +320,7 @@ def _by_hand_as_data(plan: Plan) -> list[dict]:
     ]
 
 
-def steps(plan: Plan) -> list[str]:
+def _steps(plan: Plan) -> list[str]:
     """The manoeuvres in their order, one that is flown several times in a row once."""
     out, at = [], 0
     while at < len(plan.pieces):
@@ -334,14 +334,14 @@ def steps(plan: Plan) -> list[str]:
     return out
 
 
-def size(value: float, unit: str) -> str:
+def _size(value: float, unit: str) -> str:
     """A half width, or an upper limit, in words."""
     if not np.isfinite(value):
         return "unknown"
-    return f"{'at most' if unit == SHARE else '±'} {share(value, unit)}"
+    return f"{'at most' if unit == SHARE else '±'} {_share(value, unit)}"
 
 
-def share(value: float, unit: str) -> str:
+def _share(value: float, unit: str) -> str:
     """A half width with its unit; relative ones and shares in percent."""
     if unit in ("relative", SHARE):
         return f"{100 * value:.2g} % {unit if unit == SHARE else ''}".rstrip()
@@ -358,7 +358,7 @@ def write(plan: Plan, folder: Path) -> list[Path]:
         names.append("px4_mission.plan")
     paths = [folder / name for name in names]
     with all_or_none(*paths) as parts:
-        content = summary(plan)
+        content = _summary(plan)
         if plan.pieces:
             sampled(plan).to_csv(parts[1], index=False, float_format="%.6g", lineterminator="\n")
             px4_offboard(plan).to_csv(parts[2], index=False, float_format="%.6g", lineterminator="\n")
@@ -461,7 +461,7 @@ def not_a_mission(plan: Plan) -> str:
     return ""
 
 
-def stops(reference: Reference) -> list[_Stop]:
+def _stops(reference: Reference) -> list[_Stop]:
     """Where a reference turns round or rests, in order."""
     t = reference.time_s
     speed = np.linalg.norm(np.gradient(reference.position_m, t, axis=0), axis=1)
@@ -506,7 +506,7 @@ def mission(plan: Plan) -> dict:
 
     add(TAKE_OFF, [0, 0, 0, 0, *place(np.zeros(3))])
     fastest = 0.0
-    for stop in stops(plan.reference):
+    for stop in _stops(plan.reference):
         if stop.speed_m_s > 0.1 and abs(stop.speed_m_s - fastest) > 0.05:
             fastest = stop.speed_m_s
             add(SPEED, [1, round(fastest, 2), -1, 0, 0, 0, 0], frame=2)

@@ -59,7 +59,7 @@ class _Content(io.RawIOBase):
 
 def opened(path: Path) -> io.BufferedReader:
     """The file's unpacked content, to be read once `look_through` has found it sound."""
-    return io.BufferedReader(_Content(blocks(path)), _BLOCK)
+    return io.BufferedReader(_Content(_blocks(path)), _BLOCK)
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def check_size(rows: int, columns: int, where: object) -> None:
             raise InputError(f"{where}: has more than {most} {what}, expected at most that; cut it into several runs")
 
 
-def blocks(path: Path) -> Iterator[bytes]:
+def _blocks(path: Path) -> Iterator[bytes]:
     """The file's content, unpacked, block by block; InputError where it is too large or no whole gzip file."""
     size = check_file(path)
     if size > LARGEST_FILE:
@@ -165,7 +165,7 @@ def _unpacked(packed_blocks: Iterator[bytes], size: int, path: Path) -> Iterator
 def _whole_lines(path: Path) -> Iterator[tuple[int, bytes]]:
     """Parts of the text that end where a line ends, each with the number of its first line, counted from 1."""
     line, rest, end_of_line = 1, b"", b""
-    for number, block in enumerate(blocks(path)):
+    for number, block in enumerate(_blocks(path)):
         text = rest + (block.removeprefix(_BYTE_ORDER_MARK) if number == 0 else block)
         end_of_line = end_of_line or next((sign for sign in (b"\n", b"\r") if sign in text), b"")
         stop = text.rfind(end_of_line) + 1 if end_of_line else 0

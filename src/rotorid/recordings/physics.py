@@ -45,7 +45,7 @@ _SURE_Z, _ALIKE, _RIDGE = 6.0, 5.0, 0.02
 _DEGREE = np.pi / 180
 _LEAST_RATE_HZ = {"rotor speeds": 25.0, "body rates": 50.0, "accelerometer": 50.0, "attitude": 20.0}
 _LEAST_TIME_S = 20.0
-MOST_S = 7200.0
+_MOST_S = 7200.0
 """How much of a run is looked at: a clock that was set on the way would need more memory than there is."""
 _AT_REST = 0.2
 """Share of the median rotor speed below which a rotor counts as at rest."""
@@ -93,7 +93,7 @@ def _clock(run: Run) -> np.ndarray | None:
     duration = float(run.time_s[-1] - run.time_s[0])
     if not duration > 2.0:
         return None
-    return np.arange(run.time_s[0], run.time_s[0] + min(duration, MOST_S), _STEP_S)
+    return np.arange(run.time_s[0], run.time_s[0] + min(duration, _MOST_S), _STEP_S)
 
 
 def _on(run: Run, clock: np.ndarray, names: tuple[str, ...], smooth_s: float = _SMOOTH_S) -> np.ndarray | None:
@@ -138,7 +138,7 @@ def _correlation(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.corrcoef(a, b)[0, 1])
 
 
-def flown(run: Run, vehicle: Vehicle) -> RotorsInAir | None:
+def _flown(run: Run, vehicle: Vehicle) -> RotorsInAir | None:
     """What a run says about the rotors in the air (on a stand: turning); None where it is short or says nothing."""
     clock = _clock(run)
     speeds = None if clock is None else _speeds(run, clock, vehicle)
@@ -165,7 +165,7 @@ def flown(run: Run, vehicle: Vehicle) -> RotorsInAir | None:
 def impossible_values(recordings: RecordingSet) -> tuple[Doubt, ...]:
     """Believed values that no multirotor has together, by the rotor speeds of each run; each value once."""
     vehicle = recordings.vehicle
-    speeds = {run.name: x for run in recordings.runs if (x := flown(run, vehicle))} or {"": None}
+    speeds = {run.name: x for run in recordings.runs if (x := _flown(run, vehicle))} or {"": None}
     alike: dict[tuple[int, ...], list[str]] = {}
     bodies: dict[tuple[int, ...], tuple[Body, str]] = {}
     for run, turning in speeds.items():

@@ -145,17 +145,17 @@ def _with_alike_runs(recordings: RecordingSet) -> RecordingSet:
             said.append(f"Left out: {_whereof(run)}: lacks sensors that the other runs have (for {lost}).")
         kept = tuple(run for run in recordings.runs if run not in poor)
         return replace(recordings, runs=kept, left_out=tuple(said))
-    partly = [names for names in SENSORS if not all(reads(run, names) for run in recordings.runs)]
-    if all(reads(run, c.VELOCITY) or reads(run, c.POSITION) for run in recordings.runs):
+    partly = [names for names in SENSORS if not all(_reads(run, names) for run in recordings.runs)]
+    if all(_reads(run, c.VELOCITY) or _reads(run, c.POSITION) for run in recordings.runs):
         partly = [names for names in partly if names not in (c.VELOCITY, c.POSITION)]
-    dropped = [names for names in partly if any(reads(run, names) for run in recordings.runs)]
+    dropped = [names for names in partly if any(_reads(run, names) for run in recordings.runs)]
     said += [f"Left out: {names[0]} to {names[-1]} are not recorded in every run." for names in dropped]
     gone = {name for names in partly for name in names}
     runs = (replace(r, table=r.table.drop(columns=[n for n in gone if n in r.table])) for r in recordings.runs)
     return replace(recordings, runs=tuple(runs), left_out=tuple(said))
 
 
-def reads(run: Run, names: tuple[str, ...]) -> bool:
+def _reads(run: Run, names: tuple[str, ...]) -> bool:
     """Whether a sensor has enough complete readings in a run to count as recorded."""
     if not run.has(*names):
         return False
@@ -164,8 +164,8 @@ def reads(run: Run, names: tuple[str, ...]) -> bool:
 
 def channels_of(run: Run) -> set[str]:
     """Channels of a flight that a run can be compared in, besides those of its rotors."""
-    force, turning, attitude = (reads(run, n) for n in (c.SPECIFIC_FORCE, c.ANGULAR_VELOCITY, c.QUATERNION))
-    moving = attitude and (reads(run, c.VELOCITY) or reads(run, c.POSITION))
+    force, turning, attitude = (_reads(run, n) for n in (c.SPECIFIC_FORCE, c.ANGULAR_VELOCITY, c.QUATERNION))
+    moving = attitude and (_reads(run, c.VELOCITY) or _reads(run, c.POSITION))
     found = {
         "force": force or moving,
         "moment": turning or attitude,
@@ -335,7 +335,7 @@ def _still_rotors(run: Run, vehicle: Vehicle) -> str | None:
 
 def moving_sensors(run: Run) -> list[tuple[str, ...]]:
     """Sensors of a flight that have readings in all their columns."""
-    return [names for names in SENSORS if reads(run, names)]
+    return [names for names in SENSORS if _reads(run, names)]
 
 
 def _nothing_compared(run: Run, vehicle: Vehicle) -> str | None:

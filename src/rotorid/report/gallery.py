@@ -130,7 +130,7 @@ def run(command: str, folder: Path) -> str:
     return (done.stdout + done.stderr).replace(f"{folder}/", "").strip()
 
 
-def page(kind: _GalleryPage, outputs: Sequence[str], picture: str, following: str) -> str:
+def _page(kind: _GalleryPage, outputs: Sequence[str], picture: str, following: str) -> str:
     """The page as Markdown."""
     parts = [f"# {kind.title}", kind.source]
     for command, said in zip(kind.commands, outputs, strict=True):
@@ -155,7 +155,7 @@ def _next_of(folder: Path) -> str:
     return f"The verdict proposes: {proposed['manoeuvre']}." if proposed and proposed["manoeuvre"] else ""
 
 
-def gain(table: pd.DataFrame, channel: str) -> float:
+def _gain(table: pd.DataFrame, channel: str) -> float:
     """How many times larger the residual of a channel is before than after; 0 for one without values."""
     before, after = (float(np.sqrt(np.nanmean(table[f"{channel}_{w}"] ** 2))) for w in ("before", "after"))
     return before / after if after > 0 else 0.0
@@ -174,7 +174,9 @@ def draw(folder: Path, target: Path) -> str:
     series = folder / "answer" / "series.parquet"
     if series.is_file():
         table, verdict = pd.read_parquet(series), json.loads((folder / "answer" / "verdict.json").read_text())
-        channel = max((c.removesuffix("_before") for c in table if c.endswith("_before")), key=lambda c: gain(table, c))
+        channel = max(
+            (c.removesuffix("_before") for c in table if c.endswith("_before")), key=lambda c: _gain(table, c)
+        )
         own = table[table["run"] == table["run"].iloc[0]].dropna(subset=[f"{channel}_before"])
         lines = {word: own[f"{channel}_{word}"].to_numpy() for word in ("before", "after")}
         unit = verdict["channels"].get(channel, {}).get("unit", "")
@@ -219,7 +221,7 @@ def make(kind: _GalleryPage, data: Path | None, target: Path) -> str:
                 shutil.copyfile(source, folder / source.name)
         outputs = [run(command, folder) for command in kind.commands]
         caption = draw(folder, target / f"{kind.name}.png")
-        text = page(kind, outputs, caption, _next_of(folder))
+        text = _page(kind, outputs, caption, _next_of(folder))
     (target / f"{kind.name}.md").write_text(text, encoding="utf-8")
     return ""
 

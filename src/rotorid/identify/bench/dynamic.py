@@ -70,7 +70,7 @@ def flights(
     return pd.concat(out, ignore_index=True)
 
 
-def held(time_s: np.ndarray, thrust_n: np.ndarray) -> list[tuple[float, float]]:
+def _held(time_s: np.ndarray, thrust_n: np.ndarray) -> list[tuple[float, float]]:
     """Stretches (start and stop, s) in which a smooth thrust above rest is held.
 
     Over every `_HELD_S` within a stretch the thrust spans less than twice `_HELD_N`; stretches whose levels do not
@@ -101,7 +101,7 @@ def agreement(flown: pd.DataFrame, base: str = "al") -> pd.DataFrame:
         steady = flights_of_set[flights_of_set["platform"] == base]
         if steady.empty:
             continue
-        stretches = held(steady["time_s"].to_numpy(), steady["zero_phase_n"].to_numpy())
+        stretches = _held(steady["time_s"].to_numpy(), steady["zero_phase_n"].to_numpy())
         for place, (start, stop) in enumerate(stretches, start=1):
             if stop - start <= 2 * _MARGIN_S:
                 continue

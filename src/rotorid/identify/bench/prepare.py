@@ -109,7 +109,7 @@ def bench_force(coefficients_gf: np.ndarray, geometry: Geometry) -> Callable[[pd
     return force
 
 
-def reference(session, table: pd.DataFrame, force_n: np.ndarray) -> np.ndarray:
+def _reference(session, table: pd.DataFrame, force_n: np.ndarray) -> np.ndarray:
     """The known load at each sample, N, shape (n, 3).
 
     Nobody wrote down the very moment at which the weight came on: it is where the reading first exceeds half of
@@ -152,7 +152,7 @@ def bench_set(
         force = force_of(whole)
         table = pd.DataFrame({c.TIME: whole["time_s"].to_numpy() + offset_s})
         table[list(c.FORCE)] = force
-        table[list(c.REFERENCE_FORCE)] = reference(session, whole, force)
+        table[list(c.REFERENCE_FORCE)] = _reference(session, whole, force)
         kept = whole["index"].between(session.mark_tare_start, session.mark_read_stop).to_numpy()
         runs.setdefault(f"{session.axis}-r{int(session.repeat):02d}", []).append(table[kept])
     vehicle = Vehicle.model_validate({"name": name, "kind": "bench", "tared": True, "noise": {"force_n": noise_n}})

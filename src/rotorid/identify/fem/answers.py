@@ -18,7 +18,7 @@ from rotorid.identify.fem.cell import bridge_strain, strain_per_newton
 from rotorid.identify.fem.placement import LEGS
 from rotorid.identify.fem.sizes import MATERIALS, Assumed, Sizes, materials
 
-PARTS = (*CELLS, *PIECES)
+_PARTS = (*CELLS, *PIECES)
 EVEN = 0.9
 """A plate moves evenly where its least displacement is at least this share of its largest."""
 MIDDLE = 0.99
@@ -93,7 +93,7 @@ def by_part(bench: Bench, solved: Solved) -> dict[str, dict[str, float]]:
     moved = np.linalg.norm(solved.displacement_m, axis=1)
     return {
         name: {"deformation_m": float(moved[own].max()), "stress_pa": float(solved.von_mises_pa[own].max())}
-        for name in PARTS
+        for name in _PARTS
         for own in [bench.body.nodes_of(name)]
     }
 

@@ -24,10 +24,10 @@ from rotorid.identify.fem.placement import THIRD, PartFrame
 from rotorid.identify.fem.sizes import Assumed, Material, Sizes
 from rotorid.identify.fem.tets import Flat, Pad, Tets, block, column, count, joined, on, stacked
 
-UP = np.array([0.0, 0.0, -1.0])
+_UP = np.array([0.0, 0.0, -1.0])
 CELLS = ("upper cell", "lower cell")
 PIECES = ("A", "B", "C", "D")
-DOWN = -UP
+DOWN = -_UP
 _LEGS = len(placement.LEGS)
 _GROUPS = dict.fromkeys(CELLS, "cells") | dict.fromkeys(PIECES, "pieces")
 """Material of each part."""
@@ -56,7 +56,7 @@ class _Leg:
     """Height of the surface that bears the load above the plate's top."""
 
 
-def build(assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fineness: float) -> _Leg:
+def _build(assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fineness: float) -> _Leg:
     """Meshes of one leg.
 
     Parameters
@@ -83,11 +83,11 @@ def build(assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fine
     pad = (sizes.cell_pad_m, sizes.cell_side_m)
     hung = Pad(upper.force_m + half * upper.inwards, upper.inwards, upper.axis, pad)
     under = np.append((hung.centre_m + sizes.post_in_m * upper.inwards)[:2], sizes.plate_thickness_m)
-    top = Pad(under, UP, upper.axis, (sizes.post_side_m, sizes.cell_side_m))
+    top = Pad(under, _UP, upper.axis, (sizes.post_side_m, sizes.cell_side_m))
     if np.linalg.norm(under[:2]) + np.hypot(*top.sides_m) / 2 > sizes.plate_radius_m:
         raise InputError("plate D does not cover the posts, expected a larger plate_radius_mm")
     # Under the upper cell's far end, not on a bolted face: from there a column would have to double back.
-    leaves = Pad(_other_end(upper, sizes) - half * UP, -UP, upper.axis, (sizes.bracket_side_m, sizes.cell_side_m))
+    leaves = Pad(_other_end(upper, sizes) - half * _UP, -_UP, upper.axis, (sizes.bracket_side_m, sizes.cell_side_m))
     arrives = Pad(
         lower.force_m + half * lower.inwards,
         -lower.inwards,
@@ -97,7 +97,7 @@ def build(assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fine
     held = Pad(_other_end(lower, sizes) - half * lower.inwards, lower.inwards, lower.axis, pad)
     outwards = -np.append(lower.inwards[:2], 0.0)
     ground = held.centre_m + sizes.foot_out_m * outwards / np.linalg.norm(outwards)
-    base = Pad(np.append(ground[:2], sizes.foot_depth_m), UP, lower.axis, (sizes.foot_side_m, sizes.cell_side_m))
+    base = Pad(np.append(ground[:2], sizes.foot_depth_m), _UP, lower.axis, (sizes.foot_side_m, sizes.cell_side_m))
     counts = (count(1, fineness) + 1, count(1, fineness) + 1, count(3, fineness))
     frames = {name: _frame(place, sizes) for name, place in zip(CELLS, (upper, lower), strict=True)}
     frames["D"] = PartFrame(np.zeros(3), placement.turn(np.arctan2(under[1], under[0])).T)
@@ -106,7 +106,7 @@ def build(assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fine
         "A": column("A", base, held, counts),
         "B": column("B", leaves, arrives, counts),
         "C": column("C", hung, top, counts),
-        "D": mesh(sizes, assumed.pressed_area_m2, fineness).put(frames["D"]),
+        "D": _mesh(sizes, assumed.pressed_area_m2, fineness).put(frames["D"]),
     }
     bonds = (
         _Bond("A", "lower cell", held),
@@ -133,7 +133,7 @@ def _seat_radius_m(area_m2: float, fineness: float) -> float:
     return float(np.sqrt(2 * area_m2 / (corners * np.sin(2 * np.pi / corners))))
 
 
-def mesh(sizes: Sizes, area_m2: float, fineness: float) -> Tets:
+def _mesh(sizes: Sizes, area_m2: float, fineness: float) -> Tets:
     """The part between -60° and +60° about the x axis; z points down, the plate's top is at 0."""
     core, whole = _flat(_seat_radius_m(area_m2, fineness), sizes.plate_radius_m, fineness)
     plate = _raised(whole, np.linspace(sizes.plate_thickness_m, 0, count(1, fineness) + 1))
@@ -193,7 +193,7 @@ class Bench:
     @classmethod
     def of(cls, assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fineness: float) -> Bench:
         """The bench of these sizes; InputError where they do not go together."""
-        leg = build(assumed, sizes, distances_m, fineness)
+        leg = _build(assumed, sizes, distances_m, fineness)
         walls = [hole for name in CELLS for hole in holes(name, sizes, leg.frames[name])]
         return cls(leg, sizes, LooseParts.of(leg.parts, walls, _GROUPS))
 

@@ -23,7 +23,7 @@ _WALL = 1.5
 _NAME = "cell"
 
 
-def profile(sizes: Sizes, fineness: float) -> Flat:
+def _profile(sizes: Sizes, fineness: float) -> Flat:
     """The bar from the side, with `fineness` times as many elements along each line as the coarsest has."""
     half, reach = sizes.cell_side_m / 2, sizes.cell_between_holes_m / 2
     beyond = reach + _WALL * half
@@ -56,7 +56,7 @@ def profile(sizes: Sizes, fineness: float) -> Flat:
 
 def mesh(sizes: Sizes, fineness: float) -> Tets:
     """The bar in its own frame."""
-    flat = profile(sizes, fineness)
+    flat = _profile(sizes, fineness)
     across = np.linspace(-0.5, 0.5, count(1, fineness) + 2) * sizes.cell_side_m
     layers = np.stack([np.c_[flat.points_m, np.full(len(flat.points_m), z)] for z in across])
     return stacked(layers, flat.triangles)

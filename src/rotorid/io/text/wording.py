@@ -122,8 +122,8 @@ def _clause(entry: Mapping[str, Any], model: type[BaseModel]) -> str:
         return f"{key}: is missing"
     if kind == "value_error":
         return ": ".join(x for x in (key, printable(entry["ctx"]["error"])) if x)
-    wanted = expected(entry)
-    clause = f"{key}: found {found(entry)}, expected {wanted}"
+    wanted = _expected(entry)
+    clause = f"{key}: found {_found(entry)}, expected {wanted}"
     if "number" in wanted and _reads_as_number(entry.get("input")):
         clause += " (without quotes, and where it has an exponent with a point and a sign: 1.0e-3)"
     return clause
@@ -155,7 +155,7 @@ def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
         yield from _models_in(inner)
 
 
-def expected(entry: Mapping[str, Any]) -> str:
+def _expected(entry: Mapping[str, Any]) -> str:
     """What an entry of `ValidationError.errors()` would have accepted."""
     kind, context = entry["type"], entry.get("ctx") or {}
     if kind == "too_short" and context["min_length"] == 1:
@@ -165,7 +165,7 @@ def expected(entry: Mapping[str, Any]) -> str:
     return next((text for start, text in _BY_START if kind.startswith(start)), "another value")
 
 
-def found(entry: Mapping[str, Any]) -> str:
+def _found(entry: Mapping[str, Any]) -> str:
     """The value that was refused, short and in one line."""
     text = printable(_as_in_yaml(entry.get("input")))
     return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."

@@ -216,7 +216,7 @@ def _clock(log: Log, where: object) -> np.ndarray:
     return clock[c.TIME].to_numpy(float)
 
 
-def in_flight(log: Log, where: object) -> Values:
+def _in_flight(log: Log, where: object) -> Values:
     """The parameters as they held for most of the flight."""
     grid = _clock(log, where)
     flown = _flying(log, grid)
@@ -226,7 +226,7 @@ def in_flight(log: Log, where: object) -> Values:
 def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[ImportFault], np.ndarray]:
     """Contract columns of a whole log, its faults, and where it flies (mask of rows)."""
     grid = _clock(log, where)
-    stated, values = parameters(log), in_flight(log, where)
+    stated, values = parameters(log), _in_flight(log, where)
     _check_frame(log, values, where)
     faults = stated.faults(_CHANGED, grid[0])
     if END in log:
@@ -416,6 +416,6 @@ def read_ardupilot(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFaul
     """Every flight of a DataFlash log by name, what was found, and the key of the rotors' order."""
     log = read_messages(path)
     table, faults, flying = convert(log, path)
-    order, more = order_of(in_flight(log, path))
+    order, more = order_of(_in_flight(log, path))
     runs, cuts = in_the_air.flights(table, flying, path.name.split(".")[0], path)
     return runs, [*faults, *more, *cuts], order

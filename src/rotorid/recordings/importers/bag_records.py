@@ -22,7 +22,7 @@ from types import ModuleType
 
 from rotorid.errors import InputError
 
-MCAP, _BAG = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n"
+_MCAP, _BAG = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n"
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 0x02, 0x03, 0x04, 0x05, 0x06
 """Codes of MCAP's records."""
 _BAG_MESSAGE, _BAG_HEADER, _BAG_CHUNK, _BAG_CONNECTION = 0x02, 0x03, 0x05, 0x07
@@ -66,8 +66,8 @@ class Records:
         """(channel, time of recording in ns, bytes) of each message of ROS."""
         with open(self.path, "rb") as file:
             head = file.read(16)
-        if head.startswith(MCAP):
-            yield from self._of_mcap(self.path.read_bytes()[len(MCAP) :], False)
+        if head.startswith(_MCAP):
+            yield from self._of_mcap(self.path.read_bytes()[len(_MCAP) :], False)
         elif head.startswith(_BAG):
             yield from self._of_bag(self.path.read_bytes()[len(_BAG) :], False)
         else:

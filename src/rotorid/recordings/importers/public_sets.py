@@ -45,7 +45,7 @@ _TIMEOUT_S = 20.0
 _GRAM_FORCE_N = 9.80665e-3
 _FULL_SCALE = 65536.0
 _SPEEDS = ("rpm1", "rpm2", "rpm3", "rpm4")
-Runs = dict[str, tuple[pd.DataFrame, list[ImportFault]]]
+_Runs = dict[str, tuple[pd.DataFrame, list[ImportFault]]]
 
 _PROPELLERS = {"1": "t5040c", "2": "t5045c", "5": "hq5x4", "6": "lumenier5x45"}
 """5-inch propellers: Cyclone T5040C and T5045C (3 blades), HQ 5x4 (4 blades), Lumenier 5x4.5 (2 blades)."""
@@ -60,29 +60,29 @@ class _PublicSet:
 
     source: str
     files: tuple[str, ...]
-    read: Callable[[Path, str], Runs]
+    read: Callable[[Path, str], _Runs]
     vehicle: str
     axes: str
     held_out: tuple[str, ...] | None = None
     notes: tuple[str, ...] = ()
 
 
-def _whole(reader: Callable[[Path], tuple[pd.DataFrame, list[ImportFault]]]) -> Callable[[Path, str], Runs]:
+def _whole(reader: Callable[[Path], tuple[pd.DataFrame, list[ImportFault]]]) -> Callable[[Path, str], _Runs]:
     """A file is one run, named after the file."""
     return lambda path, name: {name.rsplit("/")[-1].split(".")[0].lower(): reader(path)}
 
 
-def _neurobem(path: Path, name: str) -> Runs:
+def _neurobem(path: Path, name: str) -> _Runs:
     return {Path(name).stem.removeprefix("bemnn"): read_neurobem(path)}
 
 
-def _crazyflie(path: Path, prefix: str, stretches: list[tuple[float, float]] | None = None) -> Runs:
+def _crazyflie(path: Path, prefix: str, stretches: list[tuple[float, float]] | None = None) -> _Runs:
     """Flights of a uSD log, each with the faults of the whole log and its own."""
     tables, faults = crazyflie.flights(path, prefix, stretches, crazyflie.in_the_air)
     return {run: (table, [f for f in faults if f.run in ("", run)]) for run, table in tables.items()}
 
 
-def _imrc_brushless(path: Path, name: str) -> Runs:
+def _imrc_brushless(path: Path, name: str) -> _Runs:
     """The controller's map of thrust to PWM is published: it gives the commanded speed of each rotor."""
     return {
         run: (_with_commanded_speed(table), faults)
@@ -112,15 +112,15 @@ def _with_commanded_speed(table: pd.DataFrame) -> pd.DataFrame:
     return table
 
 
-def _crazypad(path: Path, name: str) -> Runs:
+def _crazypad(path: Path, name: str) -> _Runs:
     return _crazyflie(path, Path(name).name)
 
 
-def _scale(path: Path, name: str) -> Runs:
+def _scale(path: Path, name: str) -> _Runs:
     return {Path(name).name.removesuffix(".csv").replace(".", "_"): read_imrc_bench(path)}
 
 
-def _bench(path: Path, name: str) -> Runs:
+def _bench(path: Path, name: str) -> _Runs:
     motor, voltage = re.fullmatch(r"([a-m])\d_(7|11)\.csv", Path(name).name).groups()
     return {f"{motor}_{_CELLS[voltage]}": read_rcbenchmark(path)}
 

@@ -129,7 +129,7 @@ _STEADY_S = 0.2
 """Spread of the difference of two clocks up to which it is a constant."""
 _MIXED = 4
 """Motors of a mixer whose signals say those of all others: it has four demands."""
-LISTED = 8
+_LISTED = 8
 
 
 @dataclass(frozen=True)
@@ -249,7 +249,7 @@ def _read_series(path: Path) -> tuple[dict[str, list[_TopicSeries]], list[Import
     ]
     foreign = [f"{topic} ({encoding})" for topic, encoding in sorted(found.foreign.items())]
     if not found.rows:
-        listed = ", ".join([*others, *foreign][:LISTED]) or "none"
+        listed = ", ".join([*others, *foreign][:_LISTED]) or "none"
         raise InputError(f"{path}: no topic of a type that is known; found {listed}")
     faults = []
     if found.cut:
@@ -262,7 +262,7 @@ def _read_series(path: Path) -> tuple[dict[str, list[_TopicSeries]], list[Import
         seen = f"{found.lost_chunks} chunks of messages cannot be unpacked"
         faults.append(ImportFault("damaged", "", seen, "left out; their time is a gap", found.lost_chunks))
     if foreign:
-        seen = f"{', '.join(foreign[:LISTED])} hold no messages of ROS"
+        seen = f"{', '.join(foreign[:_LISTED])} hold no messages of ROS"
         faults.append(ImportFault("unread", "", seen, "left out", 0))
     times, more = _times(found)
     faults += more
@@ -298,8 +298,10 @@ def _read_series(path: Path) -> tuple[dict[str, list[_TopicSeries]], list[Import
     _set_commands_apart(series)
     missing = [name for name, quantities in _WANTED.items() if not set(quantities) & set(series)]
     if missing and others:
-        more = f" and {len(others) - LISTED} more" if len(others) > LISTED else ""
-        seen = f"no topic of a type that is read states {', '.join(missing)}; not read are {', '.join(others[:LISTED])}"
+        more = f" and {len(others) - _LISTED} more" if len(others) > _LISTED else ""
+        seen = (
+            f"no topic of a type that is read states {', '.join(missing)}; not read are {', '.join(others[:_LISTED])}"
+        )
         faults.append(ImportFault("unread", "", seen + more, "export what is missing as a CSV", 0))
     faults += [
         ImportFault(

@@ -63,7 +63,7 @@ def collect(folders: Sequence[Path], recordings: Path) -> tuple[pd.DataFrame, pd
                 "verdict": verdict["verdict"],
                 "unexplained": verdict["unexplained"]["share"],
                 "effects": " ".join(e["id"] for e in found if e["status"] != "suggested"),
-                "person": "; ".join(reasons(verdict)),
+                "person": "; ".join(_reasons(verdict)),
                 "sentence": verdict["sentence"],
             }
         )
@@ -79,7 +79,7 @@ def collect(folders: Sequence[Path], recordings: Path) -> tuple[pd.DataFrame, pd
 _OWN = ("set", "vehicle", "day")
 
 
-def reasons(verdict: dict[str, Any]) -> list[str]:
+def _reasons(verdict: dict[str, Any]) -> list[str]:
     """Why a person should look at a verdict; nothing where it stands by itself."""
     out = []
     if verdict["verdict"] == "not_judged":

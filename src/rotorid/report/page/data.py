@@ -96,8 +96,8 @@ def page_data(analysis: Analysis, verdict: Verdict, main: str) -> dict:
             {"run": loc.run, "channel": loc.channel, "start": loc.start_s, "stop": loc.stop_s}
             for loc in verdict.locations
         ],
-        "regimes": regimes(analysis, by_pair),
-        "correlation": correlations(analysis, by_pair, channels),
+        "regimes": _regimes(analysis, by_pair),
+        "correlation": _correlations(analysis, by_pair, channels),
     }  # fmt: skip
 
 
@@ -164,7 +164,7 @@ def _frames(run: str, flown: dict[str, np.ndarray]) -> dict:
     return out | {name: packed(flown[name].ravel()) for name in names}
 
 
-def regimes(analysis: Analysis, by_pair: dict[tuple[str, str], list[ChannelTrace]]) -> dict:
+def _regimes(analysis: Analysis, by_pair: dict[tuple[str, str], list[ChannelTrace]]) -> dict:
     """Size of the error by half seconds next to what was flown: variables and, by channel, before and after."""
     variables = sorted({v for known in analysis.regimes.values() for v in known if v != "time_s"})
     channels = list(dict.fromkeys(c for _, c in by_pair))
@@ -204,7 +204,7 @@ def _blocks(values: np.ndarray, per: int, count: int) -> np.ndarray:
     return values[: count * per].reshape(count, per).mean(axis=1)
 
 
-def correlations(
+def _correlations(
     analysis: Analysis, by_pair: dict[tuple[str, str], list[ChannelTrace]], channels: Sequence[str]
 ) -> dict[str, dict]:
     """Correlation of each channel's error with itself some time later, before and after, on runs held out.

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _NAMES = {"aluminium": "Al-6061", "pla": "PLA"}
 _COLOURS = {"aluminium": style.BLUE, "pla": style.RED}
 _LEGS = 3
-PARTS = ("upper cell", "lower cell", "A", "B", "C", "D")
+_PARTS = ("upper cell", "lower cell", "A", "B", "C", "D")
 _LIGHT = np.array([0.36, -0.48, 0.8])
 """Direction from which the parts are lit."""
 _TICKS_UV_N = (20, 50, 100, 200, 500)
@@ -69,7 +69,7 @@ def parts(surface: pd.DataFrame) -> Figure:
 
     fig, axes = style.figure(2.9, 1, 2, subplot_kw={"projection": "3d"})
     legs = _legs_mm(surface)
-    colours = dict(zip(PARTS, style.CYCLE, strict=False))
+    colours = dict(zip(_PARTS, style.CYCLE, strict=False))
     triangles = surface["part"].to_numpy()
     for axis, number in zip(axes, (_LEGS, 1), strict=True):
         shown = legs[: number * len(triangles)]

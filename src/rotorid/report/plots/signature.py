@@ -21,7 +21,7 @@ from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.vehicle import Rotor
 from rotorid.report.plots import style
 
-VEHICLE = EXAMPLE.model_copy(
+_VEHICLE = EXAMPLE.model_copy(
     update={"rotor_inertia_kg_m2": 8.5e-6, "ground_z_m": 0.0, "rotor_speed_limits_rad_s": (0.0, 2500.0)}
 )
 _DURATION_S, _RATE_HZ = 40.0, 50.0
@@ -54,20 +54,20 @@ class _Signature:
 
 def signature(effect: Effect) -> _Signature | None:
     """The picture of an effect's first form that shows anything on the example; None where none does."""
-    for form in effect.forms(VEHICLE):
-        if form.requires and not flight().has(form.requires):
+    for form in effect.forms(_VEHICLE):
+        if form.requires and not _flight().has(form.requires):
             continue
         found = _of_wrench(effect, form)
         if found is not None:
             return found
     for form in effect.speed_forms:
         return _of_speed(form)
-    for form in effect.set_forms(VEHICLE):
+    for form in effect.set_forms(_VEHICLE):
         return _of_fault(form)
     if effect.reading_forms is not None:
         for instrument in (EXAMPLE_STAND, EXAMPLE_BENCH):
             for form in forms_of(effect, instrument):
-                found = of_reading(effect, form, instrument)
+                found = _of_reading(effect, form, instrument)
                 if found is not None:
                     return found
     return None
@@ -75,17 +75,17 @@ def signature(effect: Effect) -> _Signature | None:
 
 def _swing(period_s: float, phase: float = 0.0) -> np.ndarray:
     """A sine over the recording, (n,)."""
-    return np.sin(2 * np.pi * instants() / period_s + phase)
+    return np.sin(2 * np.pi * _instants() / period_s + phase)
 
 
-def instants() -> np.ndarray:
+def _instants() -> np.ndarray:
     """The recording's instants, (n,), s."""
     return np.arange(int(_DURATION_S * _RATE_HZ)) / _RATE_HZ
 
 
-def flight() -> Motion:
+def _flight() -> Motion:
     """The made-up flight: every field of `Motion` that a recording of flight can give."""
-    time_s = instants()
+    time_s = _instants()
     speed = HOVER_RAD_S * (
         1 + 0.05 * _swing(7.3)[:, None] + 0.06 * np.stack([_swing(1.1 + 0.23 * i, i) for i in range(4)], 1)
     )
@@ -126,12 +126,12 @@ def _typical(form: Form | SpeedForm) -> np.ndarray:
     return np.array(values)
 
 
-def named(form: Form | SpeedForm | SetForm, values) -> tuple[tuple[str, float, str], ...]:
+def _named(form: Form | SpeedForm | SetForm, values) -> tuple[tuple[str, float, str], ...]:
     """Symbols, values and units of a form's parameters."""
     return tuple((p.symbol, float(v), p.unit) for p, v in zip(form.parameters, values, strict=True))
 
 
-def quantities(motion: Motion) -> dict[str, np.ndarray]:
+def _quantities(motion: Motion) -> dict[str, np.ndarray]:
     """What an effect may hang on, by its words."""
     spin = motion.rotor_speed @ EXAMPLE.yaw_signs()
     return {
@@ -192,16 +192,16 @@ def _strongest(added: Contribution) -> tuple[str, np.ndarray] | None:
 
 def _of_wrench(effect: Effect, form: Form) -> _Signature | None:
     """A form of a force, moment or inertial sensor, over the quantity that explains it best."""
-    motion, values = flight(), _typical(form)
-    shown = _strongest(form.contribution(motion, VEHICLE, values))
+    motion, values = _flight(), _typical(form)
+    shown = _strongest(form.contribution(motion, _VEHICLE, values))
     if shown is None:
         return None
-    known = quantities(motion)
+    known = _quantities(motion)
     over = max(known, key=lambda name: explained(shown[1], known[name]))
     # What is always the same, and what no single quantity explains, is shown as it goes on.
     if np.ptp(shown[1]) < 1e-9 * np.abs(shown[1]).max() or explained(shown[1], known[over]) < _LEAST_EXPLAINED:
         over, known = "time (s)", {"time (s)": motion.time_s}
-    return _Signature(form.name, form.equation, named(form, values), over, shown[0], known[over], shown[1])
+    return _Signature(form.name, form.equation, _named(form, values), over, shown[0], known[over], shown[1])
 
 
 def _of_speed(form: SpeedForm) -> _Signature:
@@ -218,13 +218,13 @@ def _of_speed(form: SpeedForm) -> _Signature:
     speed = form.apply(path, values)[:, 0]
     over = ("commanded speed (rad/s)", command) if static else ("time (s)", time_s)
     return _Signature(
-        form.name, form.equation, named(form, values), over[0], "rotor speed (rad/s)", over[1], speed, command
+        form.name, form.equation, _named(form, values), over[0], "rotor speed (rad/s)", over[1], speed, command
     )
 
 
-def recorded() -> RecordingSet:
+def _recorded() -> RecordingSet:
     """The made-up flight as a recording set with every column that a fault may spoil."""
-    motion = flight()
+    motion = _flight()
     quaternion = Rotation.from_matrix(motion.rotation).as_quat()[:, [3, 0, 1, 2]]
     world = np.einsum("nij,nj->ni", motion.rotation, motion.velocity)
     columns = {c.TIME: motion.time_s}
@@ -240,12 +240,14 @@ def recorded() -> RecordingSet:
     ):
         columns |= dict(zip(names, values.T, strict=True))
     columns |= {c.HEIGHT: motion.height, c.BATTERY_VOLTAGE: motion.voltage}
-    return RecordingSet("example", VEHICLE, (Run("first", pd.DataFrame(columns)), Run("second", pd.DataFrame(columns))))
+    return RecordingSet(
+        "example", _VEHICLE, (Run("first", pd.DataFrame(columns)), Run("second", pd.DataFrame(columns)))
+    )
 
 
 def _of_fault(form: SetForm) -> _Signature | None:
     """A fault of a set: the column that it changes most, as it should be and as it is."""
-    sound = recorded()
+    sound = _recorded()
     spoilt = form.apply(sound, np.array(form.example))
     best: tuple[float, str, np.ndarray, np.ndarray, np.ndarray] | None = None
     for before, after in zip(sound.runs, spoilt.runs, strict=True):
@@ -260,7 +262,7 @@ def _of_fault(form: SetForm) -> _Signature | None:
             change = np.nanmean(np.abs(np.nan_to_num(wrong, nan=0.0) - sure)) / max(np.nanstd(sure), 1e-9)
             if best is None or change > best[0]:
                 best = (float(change), name, shared[c.TIME].to_numpy(), sure, wrong)
-    values = named(form, form.example)
+    values = _named(form, form.example)
     if best is None or best[0] == 0.0:
         if sound.vehicle.rotors == spoilt.vehicle.rotors:
             return None
@@ -274,15 +276,15 @@ def _of_fault(form: SetForm) -> _Signature | None:
     return _Signature(form.name, form.equation, values, "time (s)", name, time_s[inside], wrong[inside], sure[inside])
 
 
-def loading(instrument: InstrumentFacts) -> Loading:
+def _loading(instrument: InstrumentFacts) -> Loading:
     """The made-up test on a stand or bench: loads up and down in every channel, a tilting mount, a warming sensor."""
-    time_s = instants()
+    time_s = _instants()
     triangles = [2 * np.abs(2 * ((time_s / p) % 1) - 1) - 1 for p in (9.0, 7.0, 5.0, 6.1, 4.3, 3.7)]
     load = np.stack([size * tri for size, tri in zip((2.0, 2.0, 6.0, 0.1, 0.1, 0.05), triangles, strict=True)], 1)
     roll, pitch = 0.3 * _swing(17.0), 0.25 * _swing(13.0, 1.0)
     rotation = Rotation.from_euler("ZYX", np.stack([0 * roll, pitch, roll], 1)).as_matrix()
     gravity = np.broadcast_to([0.0, 0.0, 9.81], (len(time_s), 3))
-    moving = flight()
+    moving = _flight()
     on = Motion(
         time_s,
         moving.rotor_speed,
@@ -309,9 +311,9 @@ def loading(instrument: InstrumentFacts) -> Loading:
     )
 
 
-def of_reading(effect: Effect, form: Form, instrument: InstrumentFacts) -> _Signature | None:
+def _of_reading(effect: Effect, form: Form, instrument: InstrumentFacts) -> _Signature | None:
     """A form of a stand or bench: the reading's error over what explains it best."""
-    test, values = loading(instrument), _typical(form)
+    test, values = _loading(instrument), _typical(form)
     contribution = form.contribution(test if form.on_loading else test.motion, instrument.vehicle, values)
     reading = contribution.reading
     if reading is None:
@@ -333,7 +335,7 @@ def of_reading(effect: Effect, form: Form, instrument: InstrumentFacts) -> _Sign
     return _Signature(
         form.name,
         form.equation,
-        named(form, values),
+        _named(form, values),
         over,
         f"error of {CHANNELS[channel]} ({UNITS[channel]})",
         known[over],
