@@ -131,35 +131,6 @@ def _span(sizes, run: str) -> tuple[float, float]:
     return (start, stop) if stop > start else (start - STRIP_CELL_S / 2, stop + STRIP_CELL_S / 2)
 
 
-def gains(labels: Sequence[str], before, refitted, after) -> Figure:
-    """Error over noise of every channel: as believed, refitted, improved (each (n,), NaN where unknown)."""
-    fig, ax = style.figure(0.75 + 0.2 * len(labels))
-    rows = np.arange(len(labels))
-    before, refitted, after = (np.asarray(v, float) for v in (before, refitted, after))
-    ax.hlines(rows, np.minimum(before, after), np.maximum(before, after), color="#cccccc", lw=1.5, zorder=1)
-    for (stage, label), values in zip(_STAGES.items(), (before, refitted, after), strict=True):
-        size = 3.5 if stage == "refitted" else None
-        ax.plot(values, rows, "o", color=style.COLOUR[stage], ms=size, label=label)
-    ax.axvline(1, color=style.GREY, ls="--", lw=1)
-    ax.set_xscale("log")
-    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
-
-    shown = np.concatenate([before, refitted, after, [1.0]])
-    shown = shown[np.isfinite(shown) & (shown > 0)]
-    low, high = 0.8 * shown.min(), 1.25 * shown.max()
-    ticks = [t for t in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000) if low <= t <= high]
-    ax.xaxis.set_major_locator(FixedLocator(ticks))
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
-    ax.xaxis.set_minor_locator(NullLocator())
-    ax.set_xlim(low, high)
-    ax.set_yticks(rows, labels)
-    ax.set_ylim(len(labels) - 0.5, -0.5)
-    ax.grid(axis="y", visible=False)
-    ax.set_xlabel("error / sensors' noise (1: nothing left to gain)")
-    ax.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, borderaxespad=0.1)
-    return fig
-
-
 CHANNELS = {
     **{f"force_{axis}": (f"$F_{axis}$", "N") for axis in "xyz"},
     **{f"moment_{axis}": (f"$M_{axis}$", "N m") for axis in "xyz"},
