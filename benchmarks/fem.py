@@ -23,8 +23,8 @@ import numpy as np
 import skfem
 
 from rotorid.identify.bench.reconstruct import read_geometry
-from rotorid.identify.fem import statements, studies
-from rotorid.identify.fem.answers import ratios
+from rotorid.identify.fem import studies
+from rotorid.identify.fem.answers import judge_statements, ratios
 from rotorid.identify.fem.sizes import read_assumed, read_moduli
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -60,7 +60,7 @@ def measure(mesh: str) -> dict[str, str]:
         rows[f"{what}: range over the sizes"] = " to ".join(f"{end:.2f}" for end in ranges[name])
     for name, found in finest.answers.items():
         rows[f"eq. 2.8 for one newton, {studies.SHORT[name]}, N"] = f"{found.equation_n:.3f}"
-    for row in statements.judge(benches):
+    for row in judge_statements(benches):
         rows[f"{row.statement}: holds on"] = f"{row.holds} of {row.benches}"
     return rows
 

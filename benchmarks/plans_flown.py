@@ -27,6 +27,7 @@ from rotorid.plan.write import write
 from rotorid.report.deliver import judge
 from rotorid_proof import next_flight as proof
 from rotorid_proof.concealed.elsewhere import InMujoco, InRotorpy, write_set
+from rotorid_proof.row_by_row import as_read
 
 ROOT = Path(__file__).resolve().parents[1]
 LISTED = (
@@ -63,7 +64,7 @@ def main(out: Path | None, pictures: Path | None) -> None:
 
 def flown(case: InRotorpy | InMujoco, room: Limits, pictures: Path | None) -> str:
     """A row of the table; empty where nothing was left open or planned."""
-    first = proof.as_read(case.first, write_set, "first")
+    first = as_read(case.first, write_set, "first")
     fast, slow = case.bandwidths_rad_s
     limits = room.model_copy(update={"attitude_bandwidth_rad_s": fast, "position_bandwidth_rad_s": slow})
     found = known_from(first, judge(first).model_dump(mode="json"))
@@ -76,7 +77,7 @@ def flown(case: InRotorpy | InMujoco, room: Limits, pictures: Path | None) -> st
         write(made, Path(folder) / "plan")
         trajectory = pd.read_csv(Path(folder) / "plan" / "trajectory.csv")
     recording, times, position, velocity = case.fly(trajectory)
-    second = proof.as_read(recording, write_set, "second")
+    second = as_read(recording, write_set, "second")
     outcome, said, _ = proof.judged(first, second, classes[0], {case.truth})
     asked = np.stack([np.interp(times, trajectory["time_s"], trajectory[f"position_{a}_m"]) for a in "xyz"], axis=1)
     motion = made.flight.motion

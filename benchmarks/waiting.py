@@ -18,7 +18,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from rotorid.cli.waiting import SOON_S, left
+from rotorid.cli.console import SOON_S, time_left
 
 TIMES = [share / 50 for share in range(10, 50)]
 
@@ -49,7 +49,7 @@ def ratios(run: list, others: list) -> dict[float, float | None]:
         done, spent = 0, share * whole
         while spent > run[done][1]:
             spent, done = spent - run[done][1], done + 1
-        known = left(others, run[:done], run[done][0], spent)
+        known = time_left(others, run[:done], run[done][0], spent)
         out[share] = None if known is None else max(known, SOON_S) / max((1 - share) * whole, SOON_S)
     return out
 

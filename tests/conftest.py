@@ -36,4 +36,4 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator:
 @pytest.fixture(autouse=True)
 def no_record_of_the_user(monkeypatch, tmp_path_factory) -> None:
     """Commands run by a test neither read nor write the user's record of earlier runs."""
-    monkeypatch.setattr("rotorid.cli.waiting.record_file", lambda: tmp_path_factory.getbasetemp() / "waiting.json")
+    monkeypatch.setattr("rotorid.cli.console.record_file", lambda: tmp_path_factory.getbasetemp() / "waiting.json")

@@ -18,7 +18,7 @@ from functools import cached_property
 from pathlib import Path
 
 from rotorid.errors import InputError
-from rotorid.io.text.names import listed
+from rotorid.io.text.wording import listed
 
 BUILD_S, JUDGE_S, PEERS_S, START_S = 6.0, 8.0, 3.0, 4.0
 """Usual seconds of one core: to fly and record a case, to judge it, to ask the peers, to start a job."""

@@ -16,7 +16,7 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.io.text.files import parse_yaml
-from rotorid.io.text.names import hint
+from rotorid.io.text.wording import hint
 from rotorid.recordings import RecordingSet, Run, Vehicle, read_set, read_vehicle, templates, vehicle_of
 from rotorid.recordings.check import SetCheck, check_recordings
 from rotorid.recordings.files import check_belief, check_rotors, proposed_in, usable_runs

@@ -62,7 +62,7 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 
-Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
+_Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
 
 
 def _readable(text: str) -> str:
@@ -83,8 +83,8 @@ def _quoted(text: str) -> str:
     return repr(text if len(text) <= LONGEST else text[: LONGEST - 3] + "...")
 
 
-Text = Annotated[str, Field(min_length=1), AfterValidator(_readable)]
-Title = Annotated[Text, AfterValidator(_short)]
+_Text = Annotated[str, Field(min_length=1), AfterValidator(_readable)]
+_Title = Annotated[_Text, AfterValidator(_short)]
 
 
 def _rising(limits: tuple[float, float]) -> tuple[float, float]:
@@ -93,8 +93,8 @@ def _rising(limits: tuple[float, float]) -> tuple[float, float]:
     return limits
 
 
-Limits = Annotated[tuple[float, float], AfterValidator(_rising)]
-Counts = Annotated[tuple[int, int], AfterValidator(_rising)]
+_Limits = Annotated[tuple[float, float], AfterValidator(_rising)]
+_Counts = Annotated[tuple[int, int], AfterValidator(_rising)]
 
 
 def _odd(window: int) -> int:
@@ -132,9 +132,9 @@ def _part_of_a_reading(step_s: float) -> float:
 class Report(Section):
     """What the report is called and which chapters it has, in their order."""
 
-    title: Title = Field(description="Title on the first page [text].")
-    subtitle: Title = Field(description="Line under the title [text].")
-    chapters: list[Name] = Field(
+    title: _Title = Field(description="Title on the first page [text].")
+    subtitle: _Title = Field(description="Line under the title [text].")
+    chapters: list[_Name] = Field(
         min_length=1,
         description="Chapters in reading order; each has notebooks/<name>.ipynb, notebooks/<name>.md and a "
         "rule chapter_<name> [names].",
@@ -273,14 +273,14 @@ class GreyBox(Section):
     )
     inertia_epochs: int = Field(ge=1, le=_MOST_EPOCHS, description="Epochs of the inertia network [1].")
     inertia_every: int = Field(ge=1, le=100, description="Every how many samples the inertia network is shown [1].")
-    speed_limits_rad_s: Limits = Field(
+    speed_limits_rad_s: _Limits = Field(
         strict=False, description="Lowest and highest rotor speed that the motors can hold [rad/s]."
     )
-    design_limits_rad_s: Limits = Field(
+    design_limits_rad_s: _Limits = Field(
         strict=False, description="Rotor speeds that the excitation may use, room left for control [rad/s]."
     )
     design_tilt_deg: float = Field(ge=0.1, lt=60, description="Largest tilt that the excitation may cause [deg].")
-    design_harmonics: Counts = Field(
+    design_harmonics: _Counts = Field(
         strict=False, description="Lowest and highest harmonic of the excitation's period [1]."
     )
     design_period_s: float = Field(gt=0, le=3600, description="Period of the excitation [s].")
@@ -293,7 +293,7 @@ class GreyBox(Section):
     draws: int = Field(
         ge=1, le=1000, description="Identification flights, each with its own disturbance and noise [1]."
     )
-    band_hz: Limits = Field(strict=False, description="Band in which real flights determine their inertia [Hz].")
+    band_hz: _Limits = Field(strict=False, description="Band in which real flights determine their inertia [Hz].")
     block_s: float = Field(ge=0.1, le=60, description="Blocks of flight that the bootstrap draws [s].")
 
     @model_validator(mode="after")
@@ -365,14 +365,14 @@ class Proof(Section):
     released: dict[str, Annotated[int, Field(ge=0)]] = Field(
         description="Repetitions taken of each family of drawn cases in a release proof [1]."
     )
-    cases: list[Text] = Field(min_length=1, description="Shell patterns on case names; one must fit [names].")
+    cases: list[_Text] = Field(min_length=1, description="Shell patterns on case names; one must fit [names].")
     batch: int = Field(ge=1, le=_MOST_SETS, description="Cases that one job treats [1].")
     delivered: int = Field(
         ge=1, description="Concealed cases, evenly over the list, whose delivered vehicle is put to the test [1]."
     )
     peers: bool = Field(description="Whether other methods are asked about the same recordings [true, false].")
     real: bool = Field(description="Whether the public real recordings are studied [true, false].")
-    tables: Text = Field(
+    tables: _Text = Field(
         description="Folder whose tables the report's chapter shows: docs/proof holds those of the last full proof, "
         "results/proof makes the proof part of the report [path]."
     )
@@ -381,11 +381,11 @@ class Proof(Section):
 class Plantings(Section):
     """Something exact put into real flights."""
 
-    cases: list[Text] = Field(
+    cases: list[_Text] = Field(
         min_length=1, description="Shell patterns on the names in workflow/plantings.tsv; one must fit [names]."
     )
     batch: int = Field(ge=1, le=_MOST_SETS, description="Sets that one job judges [1].")
-    kept: Text = Field(
+    kept: _Text = Field(
         description="Table whose rows are kept next to new ones, marked where older code judged them; a file that does "
         "not exist keeps none [path]."
     )
@@ -398,7 +398,7 @@ class Decisions(Section):
         description="Repetitions kept of each family of cases in proof/rotorid_proof/concealed/cases.tsv; 0 leaves it "
         "out [1]."
     )
-    plantings: list[Text] = Field(
+    plantings: list[_Text] = Field(
         description="Shell patterns on the names in workflow/plantings.tsv of those kept [names]."
     )
     studies: bool = Field(description="Whether the studies of real recordings are kept, too [true, false].")
@@ -407,7 +407,7 @@ class Decisions(Section):
 class Rules(Section):
     """Rules of the mismatch stage (`rotorid.mismatch.decision.rules`)."""
 
-    off: list[Text] = Field(description="Rules that are left out of every verdict [names].")
+    off: list[_Text] = Field(description="Rules that are left out of every verdict [names].")
 
     @model_validator(mode="before")
     @classmethod
@@ -428,7 +428,7 @@ class Rules(Section):
 class Ablation(Section):
     """What each rule of the mismatch stage is worth."""
 
-    cases: list[Text] = Field(
+    cases: list[_Text] = Field(
         min_length=1,
         description="Shell patterns on the cases of proof/rotorid_proof/concealed/cases.tsv; one must fit [names].",
     )
@@ -446,8 +446,8 @@ class Fleet(Section):
 class Config(Section):
     """The whole of `config.yaml`."""
 
-    recordings: Text = Field(description="Folder that holds the recording sets, one folder each [path].")
-    raw: Text = Field(description="Folder of the raw logs, with sessions.tsv [path].")
+    recordings: _Text = Field(description="Folder that holds the recording sets, one folder each [path].")
+    raw: _Text = Field(description="Folder of the raw logs, with sessions.tsv [path].")
     filter: Filters = Field(description="Filters of the bench's instruments.")
     bench: BenchSettings = Field(description="The load-cell bench.")
     fem: FemSettings = Field(description="Finite elements of the load-cell bench.")

@@ -11,9 +11,9 @@ import pytest
 
 from rotorid.acquire.clock import SystemClock, VirtualClock
 from rotorid.acquire.emulators.build import build
-from rotorid.acquire.emulators.faults import Faults
 from rotorid.acquire.emulators.ports import EmulatedPorts
 from rotorid.acquire.emulators.truth import Truth
+from rotorid.acquire.emulators.wire import Faults
 from rotorid.acquire.recorder import Recorder, Timings
 from rotorid.acquire.transport import LoopbackTransport, SerialTransport
 from rotorid.io.wire import INSTRUMENTS

@@ -16,7 +16,7 @@ from rotorid.acquire import procedures
 from rotorid.acquire.cli import app, stable_name, udev_rule, who_is_there
 from rotorid.acquire.geometry import GF_N, body_forces, cell_forces
 from rotorid.acquire.view import Plot, bench_forces, braille, panel, watch
-from rotorid.identify.stand import align
+from rotorid.identify.stand import clocks
 from rotorid.identify.stand.recordings import read_pairs
 from rotorid.io.index import read_index
 from rotorid.io.logs import read_log
@@ -115,8 +115,8 @@ def test_an_experiment_at_five_times_the_speed_of_life_is_ingested_and_aligned(e
     tables = {name: read_tables([tmp_path / f"e27-{name}.rlog"]) for name in ("quadrotor", "wrench")}
     assert all(sessions["finished"].all() for _, sessions in tables.values())
     (pair,) = read_pairs(tables["quadrotor"], tables["wrench"], 2e-4)
-    (entry,) = align.align([pair], lambda throttle: 30 * throttle**1.4)
-    assert abs(entry.lift.delay_s) < align.LARGEST_S and entry.lift.gain > 10 * entry.lift.delay_error_s
+    (entry,) = clocks.align([pair], lambda throttle: 30 * throttle**1.4)
+    assert abs(entry.lift.delay_s) < clocks.LARGEST_S and entry.lift.gain > 10 * entry.lift.delay_error_s
     # In device time the programme lasts as long on both clocks.
     throttle = pair.quadrotor.set_index("host_s")["throttle_1"]
     lift = -pair.wrench.set_index("host_s")["force_z_n"]

@@ -7,13 +7,20 @@ import math
 import numpy as np
 import pytest
 
-from rotorid.acquire.emulators.bench import BenchPhysics, LoadCells
 from rotorid.acquire.emulators.build import build
 from rotorid.acquire.emulators.devices import programme_share
-from rotorid.acquire.emulators.oscillator import Oscillator
-from rotorid.acquire.emulators.rotor import Battery, Rotors
-from rotorid.acquire.emulators.stand import StandPhysics, tilt_matrix
-from rotorid.acquire.emulators.tensile import GAUGE_MM, SECTION_MM2, TensilePhysics
+from rotorid.acquire.emulators.physics import (
+    GAUGE_MM,
+    SECTION_MM2,
+    Battery,
+    BenchPhysics,
+    LoadCells,
+    Oscillator,
+    StandPhysics,
+    TensilePhysics,
+    TurningRotors,
+    tilt_matrix,
+)
 from rotorid.acquire.emulators.truth import (
     BatteryTruth,
     BenchTruth,
@@ -29,7 +36,7 @@ from rotorid.acquire.emulators.truth import (
 from rotorid.acquire.geometry import GF_N, M, body_forces, cell_forces, cell_response
 from rotorid.acquire.procedures import LowPass, Steadiness, programme_of
 from rotorid.io.experiments import EXPERIMENTS
-from rotorid.io.wire.quadrotor import GREEN, RED, SINE, TRAPEZOID, YELLOW, Programme
+from rotorid.io.wire import GREEN, RED, SINE, TRAPEZOID, YELLOW, Programme
 
 RNG = np.random.default_rng
 
@@ -112,7 +119,7 @@ def test_pla_reads_ever_further_off_and_aluminium_less():
 
 def test_rotor_lag_curve_and_battery():
     truth = RotorTruth(rise_s=0.05)
-    rotors = Rotors(truth, Battery(BatteryTruth(resistance_ohm=0.0)), 1)
+    rotors = TurningRotors(truth, Battery(BatteryTruth(resistance_ohm=0.0)), 1)
     rotors.throttle[0] = 0.5
     for _ in range(50):
         rotors.process(0.001)  # 50 ms: one time constant
@@ -128,7 +135,7 @@ def test_rotor_lag_curve_and_battery():
 
 
 def stand(roll=0.0, pitch=0.0, vehicle=None, speeds=(0, 0, 0, 0)):
-    rotors = Rotors(RotorTruth(), Battery(BatteryTruth()), 4)
+    rotors = TurningRotors(RotorTruth(), Battery(BatteryTruth()), 4)
     rotors.speed = np.array(speeds, dtype=float)
     return StandPhysics(vehicle or VehicleTruth(), RotorTruth(), SensorTruth(), rotors, roll, pitch, RNG(0)).wrench()
 

@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 
 from rotorid.acquire import procedures
 from rotorid.acquire.cli import app
-from rotorid.acquire.emulators.faults import Faults
+from rotorid.acquire.emulators.wire import Faults
 from rotorid.acquire.errors import AcquireError, DeviceSilent
 from rotorid.acquire.recorder import Recorder, Timings
 from rotorid.errors import InputError
@@ -28,7 +28,7 @@ from rotorid.io.logs import LogError, read_log
 from rotorid.io.rawlog import read_raw
 from rotorid.io.session import Ended, read_session, session_path, write_session
 from rotorid.io.tables import read_tables
-from rotorid.io.wire.quadrotor import TRAPEZOID, Programme
+from rotorid.io.wire import TRAPEZOID, Programme
 from tests.acquire.conftest import QUICK
 from tests.acquire.fault_table import seen
 from tests.acquire.test_faults import assert_metadata_agree, record, start_recorder, wait_for_bytes

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from rotorid.acquire import procedures
-from rotorid.acquire.emulators.faults import Faults
+from rotorid.acquire.emulators.wire import Faults
 from rotorid.acquire.errors import (
     BadName,
     DeviceReset,
@@ -28,11 +28,11 @@ from rotorid.acquire.errors import (
     Refused,
 )
 from rotorid.acquire.transport import SerialTransport
+from rotorid.io import wire
 from rotorid.io.logs import read_log
 from rotorid.io.sequence import Quality
 from rotorid.io.session import Ended, read_session
-from rotorid.io.wire import rotor
-from rotorid.io.wire.quadrotor import TRAPEZOID, Programme
+from rotorid.io.wire import TRAPEZOID, Programme
 from tests.acquire.conftest import QUICK
 from tests.acquire.fault_table import seen
 
@@ -222,7 +222,7 @@ def test_a_reset_before_the_command_is_a_reset_and_no_refusal(plugged, recorder_
         with recorder_on("rotor", port) as recorder:
             recorder.guard()
             recorder.start(resumable=False)
-            recorder.command(rotor.THROTTLE, rotor.pack_throttle(0.2, 1.0))
+            recorder.command(wire.THROTTLE, wire.pack_throttle(0.2, 1.0))
 
 
 @seen("clock rollover")

@@ -20,8 +20,7 @@ from rotorid.acquire.errors import DeviceFault, Refused
 from rotorid.acquire.recorder import Timings
 from rotorid.io.logs import Log, read_log
 from rotorid.io.session import Ended
-from rotorid.io.wire.bench import VOLTS_PER_COUNT
-from rotorid.io.wire.quadrotor import SINE, TRAPEZOID, Programme
+from rotorid.io.wire import SINE, TRAPEZOID, VOLTS_PER_COUNT, Programme
 from tests.acquire.conftest import QUICK
 from tests.acquire.fault_table import seen
 from tests.acquire.test_faults import assert_metadata_agree

@@ -10,14 +10,14 @@ import pandas as pd
 import pytest
 
 from rotorid.acquire import procedures
-from rotorid.acquire.emulators.faults import Faults
+from rotorid.acquire.emulators.wire import Faults
 from rotorid.acquire.recorder import LogWriter
 from rotorid.io import rawlog
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.index import COLUMNS, read_index, write_index
 from rotorid.io.logs import LogError, read_log
 from rotorid.io.rawlog import NotALog, read_raw
-from rotorid.io.session import Air, Session, SessionError, read_session, session_path, write_session
+from rotorid.io.session import RoomAir, Session, SessionError, read_session, session_path, write_session
 
 
 def short_log(loopback, samples):
@@ -152,10 +152,10 @@ def test_metadata_errors_name_file_and_key(tmp_path):
 
 def test_air_density():
     # dry air at 15 °C and 101,325 Pa: 1.225 kg/m³; moist air is lighter
-    assert Air(temperature_c=15, pressure_pa=101325, relative_humidity=0).density_kg_m3 == pytest.approx(
+    assert RoomAir(temperature_c=15, pressure_pa=101325, relative_humidity=0).density_kg_m3 == pytest.approx(
         1.225, abs=1e-3
     )
-    assert Air(temperature_c=30, pressure_pa=101325, relative_humidity=1).density_kg_m3 == pytest.approx(
+    assert RoomAir(temperature_c=30, pressure_pa=101325, relative_humidity=1).density_kg_m3 == pytest.approx(
         1.146, abs=2e-3
     )
 

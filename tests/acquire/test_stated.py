@@ -7,7 +7,7 @@ import pytest
 
 from rotorid.acquire.campaign import STATED
 from rotorid.acquire.emulators import stated
-from rotorid.acquire.emulators.stand import CORNERS
+from rotorid.acquire.emulators.physics import CORNERS
 from rotorid.acquire.emulators.truth import BenchTruth, SensorTruth, Truth, VehicleTruth, read_truth
 
 SEALED = Path(__file__).parents[1] / "sealed"

@@ -14,7 +14,7 @@ import pytest
 import slurm
 from copied_project import Project
 
-from rotorid.cli.simulating import fly
+from rotorid.cli.modelling import fly
 from rotorid.recordings.templates import read
 
 SETTINGS = ("--config", "recordings=sets")

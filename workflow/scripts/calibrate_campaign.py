@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid.identify.bench import calibration_flags, recalibrate
-from rotorid.identify.bench.calibration_flags import LEVEL
+from rotorid.identify.bench import loadcell, recalibrate
+from rotorid.identify.bench.loadcell import FLAG_LEVEL
 from rotorid.io.tables import read_sessions
 from rotorid.report import log
 
@@ -21,18 +21,17 @@ LOGGER = logging.getLogger("rotorid.calibration")
 def main(prepared: str, samples: str, recordings: str, readings: str, coefficients: str) -> None:
     """Write the readings (CSV) and each cell's calibration (JSON)."""
     sessions = read_sessions(recordings)
-    table = calibration_flags.flag(recalibrate.readings(pd.read_parquet(prepared), sessions))
+    table = loadcell.flag_readings(recalibrate.readings(pd.read_parquet(prepared), sessions))
     idle = recalibrate.idle_slopes(pd.read_parquet(samples), sessions)
     cells = [
-        recalibrate.as_dict(int(cell), recalibrate.calibrate_cell(part, idle[int(cell)]))
-        | calibration_flags.as_dict(part)
+        recalibrate.as_dict(int(cell), recalibrate.calibrate_cell(part, idle[int(cell)])) | loadcell.flags_as_dict(part)
         for cell, part in table.groupby("cell")
     ]
-    warnings = calibration_flags.warnings(cells, table)
+    warnings = loadcell.flag_warnings(cells, table)
     for sentence in warnings:
         LOGGER.warning("%s", sentence)
     table.to_csv(readings, index=False)
-    result = {"flag_level": LEVEL, "readings": len(table), "warnings": warnings, "cells": cells}
+    result = {"flag_level": FLAG_LEVEL, "readings": len(table), "warnings": warnings, "cells": cells}
     Path(coefficients).write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
 
 

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid.identify.bench import calibration_flags, loadcell
-from rotorid.identify.bench.calibration_flags import LEVEL
+from rotorid.identify.bench import loadcell
+from rotorid.identify.bench.loadcell import FLAG_LEVEL
 from rotorid.report import log
 
 TUBE = "Carbon Fiber Tube"
@@ -27,7 +27,7 @@ def main(weights: str, readings: str, printed: str, out: str) -> None:
     with_tube = pd.read_csv(readings)["elements"].str.contains(TUBE, regex=False).to_numpy(float)
     tube = loadcell.shared_weight_error(known_gf, cells, with_tube)
     table = pd.read_csv(printed).set_index("coefficient")
-    flagged = calibration_flags.flag(loadcell.as_readings(known_gf, cells))
+    flagged = loadcell.flag_readings(loadcell.as_readings(known_gf, cells))
     fitted = []
     for cell, reading in cells.items():
         line = loadcell.fit_line(reading, known_gf)
@@ -46,9 +46,9 @@ def main(weights: str, readings: str, printed: str, out: str) -> None:
                 "residual_rms_gf": line.residual_rms,
                 "residuals_gf": line.residuals,
             }
-            | calibration_flags.as_dict(flagged[flagged["cell"] == cell])
+            | loadcell.flags_as_dict(flagged[flagged["cell"] == cell])
         )
-    warnings = calibration_flags.warnings(fitted, flagged)
+    warnings = loadcell.flag_warnings(fitted, flagged)
     for sentence in warnings:
         LOGGER.warning("%s", sentence)
     result = {
@@ -76,7 +76,7 @@ def main(weights: str, readings: str, printed: str, out: str) -> None:
             for cell in fitted
             for name, key in (("a0", "a0_printed_gf"), ("a1", "a1_printed_gf_per_10uv"))
         ),
-        "flag_level": LEVEL,
+        "flag_level": FLAG_LEVEL,
         "readings": len(flagged),
         "warnings": warnings,
         "cells": fitted,

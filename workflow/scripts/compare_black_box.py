@@ -13,8 +13,8 @@ import pandas as pd
 from scipy.special import stdtrit as student_quantile
 
 from rotorid.identify.blackbox import models
-from rotorid.identify.blackbox.compare import TrainingRange, conformal_coverage, folds, out_of_fold, scores
 from rotorid.identify.blackbox.experiments import INPUTS, OUTPUTS
+from rotorid.identify.blackbox.models import TrainingRange, conformal_coverage, folds, out_of_fold, scores
 from rotorid.recordings import read_vehicle
 from rotorid.report import log
 

@@ -13,10 +13,10 @@ from rotorid.mismatch.changes.compare import changes_from
 from rotorid.mismatch.changes.joint import reference_of
 from rotorid.mismatch.changes.level_one_words import quantity_words
 from rotorid.recordings import read_set
-from rotorid.recordings.importers.report import read_report
+from rotorid.recordings.importers.faults import read_report
 from rotorid.report import log
 from rotorid.report.plots import style
-from rotorid.report.plots.changes import draw_differences
+from rotorid.report.plots.mismatch import draw_differences
 
 
 def main(normal: str, changed: dict[str, str], found: str, differences: dict[str, str]) -> None:

@@ -12,7 +12,7 @@ import pandas as pd
 
 from rotorid.identify.estimate.flights import band_signals, fit_flights
 from rotorid.recordings import read_set
-from rotorid.recordings.importers.report import read_report
+from rotorid.recordings.importers.faults import read_report
 from rotorid.report import log
 
 DELAYS_S = np.arange(0.0, 0.0201, 0.0025)

@@ -13,9 +13,8 @@ import numpy as np
 import pandas as pd
 
 from rotorid.config import READING_S
-from rotorid.identify.estimate.consistency import check_consistency
 from rotorid.identify.estimate.excitation import WINDOW_S, ExcitedHold, Readings, Wanted, design, promised_errors
-from rotorid.identify.estimate.inertial import WEIGHT_NAMES, weights_of_inertias
+from rotorid.identify.estimate.grey_box import WEIGHT_NAMES, check_consistency, weights_of_inertias
 from rotorid.identify.estimate.output_error import cut_windows, fit_output_error, tied, untied
 from rotorid.recordings import read_vehicle
 from rotorid.report import log

@@ -12,8 +12,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.identify.bench import dynamic
-from rotorid.identify.bench.channels import CELLS
-from rotorid.identify.bench.reconstruct import Geometry, cell_forces, forces, read_geometry
+from rotorid.identify.bench.reconstruct import CELLS, Geometry, cell_forces, forces, read_geometry
 from rotorid.io.tables import by_recording, read_sessions
 from rotorid.report import log
 

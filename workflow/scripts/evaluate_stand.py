@@ -13,8 +13,8 @@ import numpy as np
 import pandas as pd
 
 from rotorid.identify.blackbox.experiments import stand_wrench, thrust_of_throttle
+from rotorid.identify.rotor.campaign import SPEED_LAW_PARAMETERS, speed_by_law, speed_law
 from rotorid.identify.stand import wrench
-from rotorid.identify.stand.characteristic import PARAMETERS, law, speed_law
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.tables import read_sessions
 from rotorid.recordings import read_set
@@ -64,8 +64,8 @@ def main(
     both = pd.concat([points, pd.read_csv(torque)], ignore_index=True)
     speed = speed_law(both)
     throttle = np.linspace(0.01, 0.5, 50)
-    shape = np.array([speed[name] for name in PARAMETERS])
-    pd.DataFrame({"throttle": throttle, "speed_rad_s": law(shape, throttle, np.ones(50))}).to_csv(
+    shape = np.array([speed[name] for name in SPEED_LAW_PARAMETERS])
+    pd.DataFrame({"throttle": throttle, "speed_rad_s": speed_by_law(shape, throttle, np.ones(50))}).to_csv(
         curve_of_throttle, index=False, float_format="%.9g"
     )
     laws = {"c_f": fits["c_f"], "c_q": fits["c_q"], "speed": speed}

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid.identify.rotor.propellers import COLUMNS, summarise
+from rotorid.identify.rotor.coefficients import PROPELLER_COLUMNS, summarise_propeller
 from rotorid.recordings import read_set
-from rotorid.recordings.importers.report import read_report
+from rotorid.recordings.importers.faults import read_report
 from rotorid.report import log
 
 
@@ -37,12 +37,12 @@ def main(
     rows, scattered = [], []
     if result["available"]:
         for folder in sets:
-            found, more, cloud = summarise(read_set(folder), speed_noise_relative, outlying_above)
+            found, more, cloud = summarise_propeller(read_set(folder), speed_noise_relative, outlying_above)
             result["propellers"][Path(folder).name.removeprefix("strawson-")] = found
             rows += more
             scattered += cloud
     Path(summary).write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-    pd.DataFrame(rows, columns=COLUMNS).to_csv(motors, index=False)
+    pd.DataFrame(rows, columns=PROPELLER_COLUMNS).to_csv(motors, index=False)
     cloud_columns = ["propeller", "run", "speed_rad_s", "thrust_n", "used"]
     pd.DataFrame(scattered, columns=cloud_columns).to_csv(points, index=False)
 

@@ -12,7 +12,7 @@ import pandas as pd
 
 from rotorid.report import log
 from rotorid.report.fleet.history import by_vehicle, history
-from rotorid.report.fleet.page import make_vehicle_page
+from rotorid.report.fleet.summary import make_vehicle_page
 from rotorid.report.plots.fleet import draw_history, draw_vehicle
 
 

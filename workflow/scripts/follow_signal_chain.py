@@ -13,7 +13,7 @@ import numpy as np
 from rotorid.identify.fem import studies
 from rotorid.identify.fem.sizes import read_assumed, read_moduli
 from rotorid.identify.fem.studies import from_printed_slope
-from rotorid.io.wire import bench as wire
+from rotorid.io import wire
 from rotorid.report import log
 
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from rotorid.io.public_list import read_manifest
 from rotorid.recordings.importers import public_sets
+from rotorid.recordings.importers.faults import read_report
 from rotorid.recordings.importers.public_sets import obtain
-from rotorid.recordings.importers.report import read_report
 from rotorid.report import log
 
 LOGGER = logging.getLogger("rotorid.public")

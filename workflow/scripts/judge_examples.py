@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.recordings import RecordingSet, Run, read_set
-from rotorid.recordings.importers.report import read_report
+from rotorid.recordings.importers.faults import read_report
 from rotorid.report import log
 from rotorid.report.deliver import analysis_of, write_files
 from rotorid_proof import quoted

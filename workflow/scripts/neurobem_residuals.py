@@ -8,16 +8,16 @@
 import json
 from pathlib import Path
 
-from rotorid.identify.neurobem_comparison import compare, nothing
+from rotorid.identify.rigid_body_residuals import compare_with_neurobem, no_neurobem
 from rotorid.recordings import read_set
-from rotorid.recordings.importers.report import read_report
+from rotorid.recordings.importers.faults import read_report
 from rotorid.report import log
 
 
 def main(folder: str, settings: dict, summary: str, flights: str, bins: str, points: str) -> None:
     """Compare the flights in `folder`; `settings` holds cutoff_hz, airspeed_bin_m_s, block_s and seed."""
     report = read_report(Path(folder))
-    found = compare(read_set(folder), **settings) if report["available"] else nothing()
+    found = compare_with_neurobem(read_set(folder), **settings) if report["available"] else no_neurobem()
     result = {"available": report["available"], "reason": report["reason"], **settings, **found.summary}
     Path(summary).write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     found.flights.to_csv(flights, index=False)

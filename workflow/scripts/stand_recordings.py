@@ -12,8 +12,8 @@ from pathlib import Path
 import pandas as pd
 
 from rotorid.identify.blackbox.experiments import thrust_of_throttle
-from rotorid.identify.stand import align
 from rotorid.identify.stand import recordings as sets
+from rotorid.identify.stand.clocks import align, clock_summary, clock_table, skew
 from rotorid.io.tables import read_sessions
 from rotorid.recordings import read_vehicle, write_set
 from rotorid.report import log
@@ -47,7 +47,7 @@ def main(
     )
     curve = thrust_of_throttle(pd.read_csv(thrust_points))
     pairs = sets.read_pairs(quadrotor, wrench, clock_error)
-    aligned = align.align(pairs, curve)
+    aligned = align(pairs, curve)
     made = [
         sets.dynamics_set(name["dynamics"], aligned, wrench[1], believed, wrench_noise),
         sets.torque_set(
@@ -57,9 +57,9 @@ def main(
     ]
     for recordings, folder in zip(made, folders.values(), strict=True):
         write_set(recordings, Path(folder).parent)
-    table = align.table(aligned)
+    table = clock_table(aligned)
     table.to_csv(clocks, index=False, float_format="%.9g")
-    found = align.summary(aligned, align.skew(pairs, curve))
+    found = clock_summary(aligned, skew(pairs, curve))
     LOGGER.info("motors lag %.4f s, clocks differ by %.4f s", found["motor_delay_s"], found["offset_median_s"])
     Path(summary).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 

@@ -10,7 +10,7 @@ import traceback
 from pathlib import Path
 
 from rotorid.recordings import read_set
-from rotorid.recordings.importers.report import read_report
+from rotorid.recordings.importers.faults import read_report
 from rotorid.report import log
 from rotorid.report.deliver import judge
 from rotorid_proof import real

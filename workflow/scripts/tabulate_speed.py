@@ -8,7 +8,9 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
-from rotorid.io.text.markdown_table import first_table
+import pandas as pd
+
+from rotorid.errors import InputError
 from rotorid.report import log
 
 COLUMNS = {
@@ -32,6 +34,26 @@ def main(files: Mapping[str, str], stored: Mapping[str, str], out: Mapping[str, 
     for name, table in tables.items():
         table.to_csv(out[name], index=False)
     Path(out["stored"]).write_text(json.dumps(dict(stored), indent=1) + "\n", encoding="utf-8")
+
+
+def first_table(text: str, columns: list[str], name: str) -> pd.DataFrame:
+    """The first pipe table of a markdown text, its columns renamed in order; every cell is text.
+
+    `name` is what the file is called in an error. Raises InputError for no table, or another number of columns.
+    """
+    lines = [line.strip() for line in text.splitlines()]
+    start = next((i for i, line in enumerate(lines) if line.startswith("|")), None)
+    if start is None:
+        raise InputError(f"{name}: no table in it (a line that begins with |)")
+    rows = []
+    for line in lines[start:]:
+        if not line.startswith("|"):
+            break
+        rows.append([cell.strip() for cell in line.strip("|").split("|")])
+    found = len(rows[0])
+    if found != len(columns) or any(len(row) != found for row in rows):
+        raise InputError(f"{name}: its table has {found} columns, expected {len(columns)} in each row")
+    return pd.DataFrame(rows[2:], columns=columns)
 
 
 if __name__ == "__main__":

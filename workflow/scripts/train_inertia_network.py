@@ -16,16 +16,16 @@ import numpy as np
 import pandas as pd
 from scipy.special import chdtri
 
-from rotorid.identify.estimate.consistency import check_consistency
-from rotorid.identify.estimate.inertial import (
+from rotorid.identify.estimate.grey_box import (
     WEIGHT_NAMES,
     NetworkFit,
+    check_consistency,
     fit_least_squares,
     fit_masked_network,
     inertias_of_weights,
     weights_of_inertias,
 )
-from rotorid.identify.networks.training import Training
+from rotorid.identify.networks import Training
 from rotorid.recordings import read_vehicle
 from rotorid.report import log, thesis
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.identify.estimate.aerodynamic import fit_coefficient_network
-from rotorid.identify.networks.training import Training
+from rotorid.identify.estimate.grey_box import fit_coefficient_network
+from rotorid.identify.networks import Training
 from rotorid.identify.rotor.coefficients import Points, fit_coefficient
 from rotorid.report import log, thesis
 

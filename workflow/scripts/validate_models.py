@@ -14,7 +14,7 @@ import pandas as pd
 from rotorid.identify.estimate.flights import band_signals, fit_flights
 from rotorid.recordings import Inertia, Run, Vehicle, read_set, read_vehicle
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.report import read_report
+from rotorid.recordings.importers.faults import read_report
 from rotorid.report import log, thesis
 from rotorid.vehicle.control.pid import AttitudePid, validation_reference
 from rotorid.vehicle.simulator import simulate

@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from rotorid.identify.bench.reconstruct import read_geometry
-from rotorid.identify.fem import statements, studies
+from rotorid.identify.fem import studies
+from rotorid.identify.fem.answers import EVEN, MIDDLE, NEARLY, judge_statements
 from rotorid.identify.fem.sizes import read_assumed, read_moduli
 from rotorid.report import log
 
@@ -31,10 +32,10 @@ def main(sizes: str, moduli: str, geometry: str, mesh: str, draws: int, seed: in
         "fineness": studies.LEVELS[mesh].sizes,
         "benches": len(table),
         "drawn": int((table["end"] == "drawn").sum()),
-        "even": statements.EVEN,
-        "middle": statements.MIDDLE,
-        "nearly": statements.NEARLY,
-        "statements": [asdict(row) | {"word": row.word} for row in statements.judge(table)],
+        "even": EVEN,
+        "middle": MIDDLE,
+        "nearly": NEARLY,
+        "statements": [asdict(row) | {"word": row.word} for row in judge_statements(table)],
         "ranges": studies.ranges(table),
         "strongest": studies.strongest(table),
     }

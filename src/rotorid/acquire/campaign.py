@@ -21,7 +21,6 @@ import numpy as np
 
 from rotorid.acquire import procedures
 from rotorid.acquire.clock import VirtualClock
-from rotorid.acquire.emulators.bench import BenchPhysics, CellClamp
 from rotorid.acquire.emulators.devices import (
     BenchDevice,
     Device,
@@ -32,20 +31,30 @@ from rotorid.acquire.emulators.devices import (
     TensileDevice,
     WrenchDevice,
 )
-from rotorid.acquire.emulators.faults import Faults
-from rotorid.acquire.emulators.rotor import Battery, Rotors, TesterPhysics
-from rotorid.acquire.emulators.stand import SENSOR_POSITION_M, LoadedSensor, StandPhysics, TorqueRig
+from rotorid.acquire.emulators.physics import (
+    GAUGE_MM,
+    SECTION_MM2,
+    SENSOR_POSITION_M,
+    Battery,
+    BenchPhysics,
+    CellClamp,
+    LoadedSensor,
+    StandPhysics,
+    TensilePhysics,
+    TesterPhysics,
+    TorqueRig,
+    TurningRotors,
+)
 from rotorid.acquire.emulators.stated import write_stated
-from rotorid.acquire.emulators.tensile import GAUGE_MM, SECTION_MM2, TensilePhysics
 from rotorid.acquire.emulators.truth import Truth, draw_truth, write_truth
-from rotorid.acquire.emulators.wire import WireHalf, World
+from rotorid.acquire.emulators.wire import Faults, WireHalf, World
 from rotorid.acquire.procedures import STEADY_JR3, SteadyRule, programme_of
 from rotorid.acquire.recorder import Recorder, Timings
 from rotorid.acquire.transport import LoopbackTransport
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.index import write_index
-from rotorid.io.session import Air, Session, Setup, session_path, write_session
-from rotorid.io.wire.quadrotor import TRAPEZOID, Programme
+from rotorid.io.session import RoomAir, Session, Setup, session_path, write_session
+from rotorid.io.wire import TRAPEZOID, Programme
 
 _WEIGHTS_GF = {
     "Carbon Fiber 1": 35.715,
@@ -111,11 +120,11 @@ class _Campaign:
         faults = Faults(clock_start_us=start_us, share=share)
         return WireHalf(device, rng, clock_error=error, faults=faults, **options)
 
-    def air(self) -> Air:
+    def air(self) -> RoomAir:
         """Air of the hour: warmer in the afternoon, the pressure of 540 m."""
         hours = (self.date - _FIRST_DAY).total_seconds() / 3600
         day = 2 * math.pi * (hours % 24) / 24
-        return Air(
+        return RoomAir(
             temperature_c=round(23.5 + 2.0 * math.sin(day), 1),
             pressure_pa=round(95_400 + 150 * math.sin(0.37 * day + 0.05 * hours), 0),
             relative_humidity=round(0.48 - 0.06 * math.sin(day), 2),
@@ -156,7 +165,7 @@ class _Campaign:
         ]
         _within(recorders, run)
         for recorder in recorders:
-            pack(recorder.log_path, recorder.session)
+            _pack(recorder.log_path, recorder.session)
             self.recordings.append(recorder.session)
         self.date += timedelta(seconds=round(clock.now_ns() / 1e9 + pause_s))
 
@@ -171,7 +180,7 @@ def _within(recorders: list[Recorder], run: Callable[..., None]) -> None:
             run(first, second)
 
 
-def pack(log: Path, session: Session) -> Path:
+def _pack(log: Path, session: Session) -> Path:
     """Replace a finished log by its gzipped form (same bytes inside, no name and no date in the header)."""
     packed = log.with_name(log.name + ".gz")
     with open(packed, "wb") as raw, gzip.GzipFile("", "wb", 9, raw, mtime=0) as out:
@@ -318,7 +327,7 @@ def thrust(campaign: _Campaign) -> None:
         if percent % 10 == 1:
             battery = Battery(truth.battery)
         name = f"thrust-{percent:02d}"
-        rotors = Rotors(truth.rotor, battery, 1)
+        rotors = TurningRotors(truth.rotor, battery, 1)
         physics = TesterPhysics(rotors, truth.rotor, truth.tester, campaign.rng(name))
         setup = Setup(
             platform="tester",
@@ -385,7 +394,7 @@ def dynamics(campaign: _Campaign) -> None:
             battery = Battery(truth.battery)
         name = f"exp-{number:02d}"
         rng = campaign.rng(name)
-        rotors = Rotors(truth.rotor, battery, 4)
+        rotors = TurningRotors(truth.rotor, battery, 4)
         stand = StandPhysics(
             truth.vehicle, truth.rotor, truth.wrench, rotors, experiment.roll_deg, experiment.pitch_deg, rng
         )

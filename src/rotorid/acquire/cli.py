@@ -32,14 +32,13 @@ from rotorid.errors import InputError
 from rotorid.io import wire
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.frames import COMMAND, START, Frame, encode
-from rotorid.io.intake import Intake
-from rotorid.io.session import Air, SessionError, Setup
-from rotorid.io.wire import INSTRUMENTS, quadrotor
-from rotorid.io.wire.base import IDENTIFY
+from rotorid.io.sequence import Intake
+from rotorid.io.session import RoomAir, SessionError, Setup
+from rotorid.io.wire import IDENTIFY, INSTRUMENTS
 
 _DEFAULT_OUT = Path("raw/local")
 _BY_ID = Path("/dev/serial/by-id")
-WAIT_S = 2.5  # an UNO restarts when its port is opened, and its boot loader keeps it for a second or two
+_WAIT_S = 2.5  # an UNO restarts when its port is opened, and its boot loader keeps it for a second or two
 app = typer.Typer(no_args_is_help=True, add_completion=False, help=__doc__, pretty_exceptions_enable=False)
 
 _Port = Annotated[str, typer.Option("--port", "-p", help="serial port; `rotorid-acquire ports` lists them")]
@@ -70,13 +69,13 @@ class _Shared:
     ] = None
 
     @property
-    def weather(self) -> Air | None:
+    def weather(self) -> RoomAir | None:
         """The air as metadata have it. Raises typer.BadParameter."""
         if self.air is None:
             return None
         try:
             temperature, pressure, humidity = (float(part) for part in self.air.split(","))
-            return Air(temperature_c=temperature, pressure_pa=pressure, relative_humidity=humidity)
+            return RoomAir(temperature_c=temperature, pressure_pa=pressure, relative_humidity=humidity)
         except ValueError as error:
             raise typer.BadParameter(
                 "--air is temperature in °C, pressure in Pa and humidity from 0 to 1, such as 23,95400,0.5"
@@ -130,8 +129,6 @@ def ports(
 ) -> None:
     """List the serial ports of this computer by names that stay the same, and who is on them."""
     from serial.tools import list_ports
-
-    from rotorid.acquire.cli import stable_name, udev_rule, who_is_there
 
     found = sorted(list_ports.comports())
     if udev is not None:
@@ -263,7 +260,7 @@ def wrench(
 @_with_shared
 def quadrotor_command(
     port: _Port,
-    dynamics: Annotated[str, typer.Option(help=f"command character: {quadrotor.DYNAMICS}")] = "h",
+    dynamics: Annotated[str, typer.Option(help=f"command character: {wire.DYNAMICS}")] = "h",
     shape: Annotated[str, typer.Option(help="trapezoid or sine")] = "trapezoid",
     maxima: Annotated[str, typer.Option(help="maxima of motors 1–4, fractions")] = "0.1,0.1,0.1,0.1",
     ramp_s: Annotated[float, typer.Option(help="ramp up and down, s")] = RAMP_S,
@@ -275,14 +272,14 @@ def quadrotor_command(
     shared: _Shared,
 ) -> None:
     """Send the quadrotor a programme and record the commands of its motors."""
-    if dynamics not in quadrotor.DYNAMICS:
-        raise typer.BadParameter(f"--dynamics is one of {', '.join(quadrotor.DYNAMICS)}, not {dynamics!r}")
+    if dynamics not in wire.DYNAMICS:
+        raise typer.BadParameter(f"--dynamics is one of {', '.join(wire.DYNAMICS)}, not {dynamics!r}")
     if shape not in ("trapezoid", "sine"):
         raise typer.BadParameter(f"--shape is trapezoid or sine, not {shape!r}")
     try:
         four = tuple(float(value) for value in maxima.split(","))
-        number = quadrotor.SINE if shape == "sine" else quadrotor.TRAPEZOID
-        programme = quadrotor.Programme(number, four, ramp_s, hold_s, frequency)
+        number = wire.SINE if shape == "sine" else wire.TRAPEZOID
+        programme = wire.Programme(number, four, ramp_s, hold_s, frequency)
         programme.pack()
     except ValueError as error:
         raise typer.BadParameter(f"--maxima are four fractions such as 0.1,0.1,0.1,0.1 ({error})") from error
@@ -777,7 +774,7 @@ def stable_name(device: str, folder: Path = _BY_ID) -> str:
     return device
 
 
-def who_is_there(port: str, wait_s: float = WAIT_S) -> str:
+def who_is_there(port: str, wait_s: float = _WAIT_S) -> str:
     """One sentence about what answers on a port, asked at each baud rate that an instrument has. Nothing is started."""
     heard = b""
     for baud_rate in sorted({instrument.baud_rate for instrument in wire.INSTRUMENTS.values()}, reverse=True):

@@ -20,11 +20,10 @@ from rotorid.io.logs import LogError, read_log
 from rotorid.io.models import KnownKeys, read_model
 from rotorid.io.rawlog import NotALog
 from rotorid.io.session import Ended, SessionError, Setup, read_session
-from rotorid.io.text.names import hint
-from rotorid.io.text.wording import explain
+from rotorid.io.text.wording import explain, hint
 from rotorid.io.wire import INSTRUMENTS
 
-Kind = Literal["stream", "calibrate", "static", "dynamic", "thrust", "torque", "wrench", "experiment", "tensile"]
+_Kind = Literal["stream", "calibrate", "static", "dynamic", "thrust", "torque", "wrench", "experiment", "tensile"]
 _NEEDS: dict[str, tuple[str, ...]] = {
     "calibrate": ("bench",),
     "static": ("bench",),
@@ -36,7 +35,7 @@ _NEEDS: dict[str, tuple[str, ...]] = {
     "tensile": ("tensile",),
 }
 
-SETTINGS: dict[str, tuple[str, ...]] = {
+_SETTINGS: dict[str, tuple[str, ...]] = {
     "stream": ("samples", "interval_s"),
     "calibrate": ("samples",),
     "static": ("samples", "axis", "load_gf"),
@@ -68,7 +67,7 @@ class Group(KnownKeys):
     """Steps of one kind: all combinations of `over`, each `repeats` times."""
 
     name: str  # of the recordings; {key} stands for a value of `over`, {repeat} for the repeat
-    do: Kind
+    do: _Kind
     instrument: str | None = None  # of `stream`; of bench tests: bench or jr3
     over: dict[str, list[Any]] = {}
     repeats: int = Field(default=1, ge=1)
@@ -170,7 +169,7 @@ def steps_of(plan: CampaignPlan) -> list[Step]:
 
 def _check_step(step: Step, place: int, operator: str | None) -> None:
     """PlanError where a setup does not fit, or where a setting or a value of `over` is one that nothing reads."""
-    group, known = step.group, (*SETTINGS[step.group.do], "tolerance", "wait_s")
+    group, known = step.group, (*_SETTINGS[step.group.do], "tolerance", "wait_s")
     try:
         step.setup(operator)
     except ValidationError as error:

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 from rotorid.acquire.errors import GaveUp
 from rotorid.acquire.recorder import Recorder, Row
+from rotorid.io import wire
 from rotorid.io.experiments import Experiment
-from rotorid.io.wire import quadrotor, rotor, wrench
 
 RAMP_S = 3.0
 HOLD_S = 8.0
@@ -145,11 +145,11 @@ def measure_wrench(
 ) -> None:
     """Power on, initialise, offset if wanted, start, read, stop, power off."""
     recorder.phase = "initialising"
-    arguments = wrench.pack_initialise(interval_s, restart_times, measuring_times)
-    recorder.command(wrench.POWER, b"\1")
-    recorder.command(wrench.INITIALISE, arguments)
+    arguments = wire.pack_initialise(interval_s, restart_times, measuring_times)
+    recorder.command(wire.POWER, b"\1")
+    recorder.command(wire.INITIALISE, arguments)
     if offset:
-        recorder.command(wrench.OFFSET)
+        recorder.command(wire.OFFSET)
         recorder.start(interval_s, resumable=False)  # the zero is lost with the power
     else:
         _start_wrench(recorder, interval_s, arguments)
@@ -158,37 +158,37 @@ def measure_wrench(
     for _ in recorder.rows(samples):
         pass
     recorder.stop()
-    recorder.command(wrench.POWER, b"\0")
+    recorder.command(wire.POWER, b"\0")
 
 
 def _start_wrench(recorder: Recorder, interval_s: float, initialise: bytes | None = None) -> None:
     """Power on, initialise and start, and all of it again should the sensor restart."""
-    arguments = initialise or wrench.pack_initialise(interval_s, 0, 0)
+    arguments = initialise or wire.pack_initialise(interval_s, 0, 0)
 
     def begin() -> None:
-        recorder.command(wrench.POWER, b"\1")
-        recorder.command(wrench.INITIALISE, arguments)
+        recorder.command(wire.POWER, b"\1")
+        recorder.command(wire.INITIALISE, arguments)
         recorder.start(interval_s)
 
     recorder.resume = begin
     begin()
 
 
-def fly_programme(recorder: Recorder, letter: str, programme: quadrotor.Programme) -> None:
+def fly_programme(recorder: Recorder, letter: str, programme: wire.Programme) -> None:
     """Command character and programme; the vehicle streams until the programme is over."""
     start_programme(recorder, letter, programme)
     for _ in recorder.rows():
         pass
 
 
-def start_programme(recorder: Recorder, letter: str, programme: quadrotor.Programme) -> None:
+def start_programme(recorder: Recorder, letter: str, programme: wire.Programme) -> None:
     """Send the programme and expect the stream. A vehicle that restarts makes the run void."""
     recorder.guard()
     recorder.command(letter, programme.pack())
     recorder.begin_stream()
     recorder.resume = None
     recorder.ends_by_itself = True
-    recorder.phase = quadrotor.DYNAMICS[letter]
+    recorder.phase = wire.DYNAMICS[letter]
     recorder.wanted = round((programme.duration_s + 0.5) * 1e6 / recorder.instrument.interval_us)
 
 
@@ -196,7 +196,7 @@ def experiment(
     vehicle: Recorder,
     sensor: Recorder,
     letter: str,
-    programme: quadrotor.Programme,
+    programme: wire.Programme,
     rest_s: float = 2.0,
     interval_s: float = 0.01,
 ) -> None:
@@ -213,7 +213,7 @@ def experiment(
         sensor.drop_rows()
     _together(sensor, rest_s / interval_s)
     sensor.stop()
-    sensor.command(wrench.POWER, b"\0")
+    sensor.command(wire.POWER, b"\0")
 
 
 def torque_test(
@@ -236,7 +236,7 @@ def torque_test(
     _together(sensor, rest_s / interval_s, tester)
     tester.stop()
     sensor.stop()
-    sensor.command(wrench.POWER, b"\0")
+    sensor.command(wire.POWER, b"\0")
 
 
 # ---- steps ---------------------------------------------------------------------------------------------
@@ -301,7 +301,7 @@ def _rest(recorder: Recorder, rest_s: float, rate_hz: float) -> None:
 
 def _throttle(recorder: Recorder, throttle: float, hold_s: float) -> None:
     # the tester's own limit lies a little later, for the case that we are gone by then
-    recorder.command(rotor.THROTTLE, rotor.pack_throttle(throttle, hold_s + 0.5 if hold_s else 0.0))
+    recorder.command(wire.THROTTLE, wire.pack_throttle(throttle, hold_s + 0.5 if hold_s else 0.0))
 
 
 def _together(leader: Recorder, samples: float, *others: Recorder) -> None:
@@ -350,10 +350,10 @@ class Steadiness:
         return [max(channel) - min(channel) for channel in zip(*self._last, strict=True)]
 
 
-def programme_of(experiment: Experiment) -> tuple[str, quadrotor.Programme]:
+def programme_of(experiment: Experiment) -> tuple[str, wire.Programme]:
     """Command character and programme."""
     letter = _LETTERS.get(experiment.dynamics.split()[0], "t")
     if experiment.signal == "sine":
         duration_s = _PERIODS / experiment.frequency_hz
-        return letter, quadrotor.Programme(quadrotor.SINE, experiment.maxima, 0.0, duration_s, experiment.frequency_hz)
-    return letter, quadrotor.Programme(quadrotor.TRAPEZOID, experiment.maxima, RAMP_S, HOLD_S, 0.0)
+        return letter, wire.Programme(wire.SINE, experiment.maxima, 0.0, duration_s, experiment.frequency_hz)
+    return letter, wire.Programme(wire.TRAPEZOID, experiment.maxima, RAMP_S, HOLD_S, 0.0)

@@ -20,7 +20,7 @@ from rotorid.acquire.transport import SerialTransport
 from rotorid.io.session import Session, Setup
 from rotorid.io.wire import INSTRUMENTS
 
-Limits = Mapping[str, tuple[float, float]]
+_Limits = Mapping[str, tuple[float, float]]
 
 
 def recorders_for(
@@ -30,7 +30,7 @@ def recorders_for(
     setups: Mapping[str, Setup] | None = None,
     *,
     procedure: dict | None = None,
-    limits: Limits | None = None,
+    limits: _Limits | None = None,
     say: Callable[[str], None] = lambda text: None,
     stop_asked: threading.Event | None = None,
     source: str | None = None,

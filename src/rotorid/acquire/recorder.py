@@ -40,13 +40,13 @@ from rotorid.acquire.errors import (
 from rotorid.acquire.transport import Transport
 from rotorid.io import rawlog, wire
 from rotorid.io.frames import ANSWER, COMMAND, DATA, END, START, Frame, encode
-from rotorid.io.intake import Intake, Taken
+from rotorid.io.sequence import Intake, Taken
 from rotorid.io.session import Counts, Ended, GapEntry, Session, Setup, write_session
 from rotorid.io.session import Event as SessionEvent
-from rotorid.io.wire.base import COMPLETE, GO, IDENTIFY, KEEP, OK, STOP, STOPPED, UNHEARD, pack_keep
+from rotorid.io.wire import COMPLETE, GO, IDENTIFY, KEEP, OK, STOP, STOPPED, UNHEARD, pack_keep
 
 _BALLAST_BYTES = 64 * 1024
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 NAME = re.compile(r"\w[\w.+-]{0,99}")  # of a recording: one file name, nothing that leads to another folder
 _UNREADABLE_AT_MOST = 20  # samples of a wrong length before the first right one: the firmware is another
 _MAX_GAPS_LISTED = 1000
@@ -223,7 +223,7 @@ class Recorder:
         except OSError as error:
             if writer is not None:
                 writer.discard()
-            if error.errno in FULL:
+            if error.errno in _FULL:
                 raise DiskFull(f"{folder}: the disk is full; free some space or choose another --out.") from error
             raise CannotWrite(
                 f"{error.filename or folder}: cannot be written ({os.strerror(error.errno or errno.EIO)}); "
@@ -824,7 +824,7 @@ class LogWriter:
                 os.fdatasync(self._file)
                 self._synced_ns = host_ns
         except OSError as error:
-            if error.errno not in FULL:
+            if error.errno not in _FULL:
                 raise
             self._drop_ballast()
             full = self._full(error)

@@ -29,7 +29,7 @@ from rotorid.io.session import Counts, Ended, GapEntry, SessionError, Setup, rea
 _Say = Callable[[str], None]
 _Ask = Callable[[str], str]
 _Prompts = Callable[[Step], Callable[[Recorder], procedures.Prompt]]
-Watch = Callable[[list[Recorder], Callable[[], None]], None]
+_Watch = Callable[[list[Recorder], Callable[[], None]], None]
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Desk:
     say: _Say
     ask: _Ask  # a question; the answer is "", or a word
     prompts: _Prompts  # how a procedure asks for a load
-    watch: Watch  # run with these recorders, showing them
+    watch: _Watch  # run with these recorders, showing them
 
 
 def check(plan: CampaignPlan, ports: dict[str, str], desk: Desk) -> list[str]:

@@ -1,4 +1,4 @@
-"""Where bytes come from: a serial port, an emulator in the same process, or an old log.
+"""Where bytes come from: a serial port, or an emulator in the same process.
 
 The seam below the recorder: a transport knows bytes and ports, nothing of frames.
 """
@@ -7,14 +7,12 @@ from __future__ import annotations
 
 import errno
 import select
-from pathlib import Path
 from typing import Protocol
 
 import serial
 
 from rotorid.acquire.clock import VirtualClock
 from rotorid.acquire.errors import PortBusy, PortLost, PortMissing
-from rotorid.io.rawlog import RECEIVED, read_raw
 
 
 class Transport(Protocol):
@@ -127,30 +125,6 @@ class LoopbackTransport:
 
     def write(self, data: bytes) -> None:
         self._device.receive(data)
-
-    def close(self) -> None:
-        pass
-
-
-class ReplayTransport:
-    """What a log received, once more, chunk by chunk; commands go nowhere."""
-
-    baud_rate = None
-
-    def __init__(self, log: str | Path) -> None:
-        self.name = str(log)
-        self._chunks = [chunk.data for chunk in read_raw(log).chunks if chunk.tag == RECEIVED]
-
-    def open(self) -> None:
-        pass
-
-    def read(self, timeout_s: float) -> bytes:
-        if not self._chunks:
-            raise PortLost(f"{self.name}: the log is at its end")
-        return self._chunks.pop(0)
-
-    def write(self, data: bytes) -> None:
-        pass
 
     def close(self) -> None:
         pass

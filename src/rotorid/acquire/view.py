@@ -17,7 +17,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from rotorid.acquire.recorder import Recorder, Status
+from rotorid.acquire.recorder import Recorder
 
 _REFRESH_HZ = 5
 _PLOT_SAMPLES = 600
@@ -118,17 +118,14 @@ def panel(recorder: Recorder) -> Table:
     table.add_row(
         f"{status.samples}" + (f"/{status.wanted}" if status.wanted else ""),
         f"{status.rate_hz:.1f}" if status.rate_hz else "–",
-        str(status.missing) + (f" ({_share(status):.2%})" if status.missing else ""),
+        str(status.missing)
+        + (f" ({status.missing / (status.samples + status.missing):.2%})" if status.missing else ""),
         str(status.bad_frames),
         f"{status.elapsed_s:.1f}",
         f"{status.remaining_s:.0f}" if status.remaining_s is not None else "–",
         *(f"{value:.5g}" for value in status.values or [float("nan")] * len(recorder.instrument.columns)),
     )
     return table
-
-
-def _share(status: Status) -> float:
-    return status.missing / max(status.samples + status.missing, 1)
 
 
 def bench_forces(recorder: Recorder) -> Text | None:

@@ -1,4 +1,4 @@
-"""Command line for people: from a log file to an answer. One module a command."""
+"""Command line for people: from a log file to an answer. A module for the commands of one subject."""
 
 from __future__ import annotations
 
@@ -7,18 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli import (
-    comparing,
-    effects,
-    exporting,
-    importing,
-    modelling,
-    parameters,
-    planning,
-    simulating,
-    starting,
-    verdicts,
-)
+from rotorid.cli import comparing, effects, importing, modelling, parameters, planning, starting, verdicts
 from rotorid.cli.starting import check
 
 app = typer.Typer(
@@ -67,11 +56,11 @@ app.command("together")(planning.together)
 app.command("import")(importing.import_logs)
 app.command("init")(starting.init)
 app.command("check")(check)
-app.command("simulate")(simulating.simulate)
-app.command("export")(exporting.export)
+app.command("simulate")(modelling.simulate)
+app.command("export")(modelling.export)
 app.command("model")(modelling.model)
 app.command("parameters")(parameters.parameters)
 app.command("effects")(effects.effects)
 
-OPEN = ("waiting",)
+OPEN = ("console",)
 """Modules that other rooms may import; all else is this room's own."""

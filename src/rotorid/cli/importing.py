@@ -24,7 +24,7 @@ MappingFile = Annotated[Path | None, typer.Option("--mapping", help="What the co
 
 
 @dataclass(frozen=True)
-class MadeSet:
+class _MadeSet:
     """A recording set that was made of logs, and what a person should know of it."""
 
     folder: Path
@@ -66,7 +66,7 @@ def import_logs(
         if write_mapping is not None:
             _write_mapping(logs, write_mapping, as_json)
             return
-        made = make_set(logs, out or Path(set_name(logs[0])), mass_kg, like, vehicle, mapping, as_csv)
+        made = make_set(logs, out or Path(_set_name(logs[0])), mass_kg, like, vehicle, mapping, as_csv)
         from rotorid.recordings.sufficient import LEAST_SINGLE_S
 
         durations, refused = _contents(made.folder)
@@ -84,7 +84,7 @@ def import_logs(
             typer.echo(f"Next: look through {made.folder / 'vehicle.yaml'}, then `rotorid verdict {made.folder}`")
 
 
-def _as_dict(made: MadeSet, durations: dict[str, float], refused: str) -> dict:
+def _as_dict(made: _MadeSet, durations: dict[str, float], refused: str) -> dict:
     """What `--json` prints: the set, its runs with their lengths, s, and the sentences that the text has."""
     return {
         "set": str(made.folder),
@@ -137,7 +137,7 @@ def make_set(
     vehicle_file: Path | None = None,
     mapping_file: Path | None = None,
     as_csv: bool = False,
-) -> MadeSet:
+) -> _MadeSet:
     """Write the set `folder` of logs of one vehicle; a `vehicle.yaml` that is there already stays."""
     from rotorid.recordings.importers.mapping import read_mapping
     from rotorid.recordings.importers.set_of_logs import set_of_logs
@@ -145,10 +145,10 @@ def make_set(
     mapping = read_mapping(mapping_file) if mapping_file else None
     found = set_of_logs(logs, folder.name, mass_kg, like, vehicle_file, mapping, folder / "vehicle.yaml")
     found.write(folder, as_csv)
-    return MadeSet(folder, found.remarks, found.sentences, found.kept_vehicle)
+    return _MadeSet(folder, found.remarks, found.sentences, found.kept_vehicle)
 
 
-def print_notes(made: MadeSet) -> None:
+def print_notes(made: _MadeSet) -> None:
     """Print what was found in the logs and what is only proposed."""
     if made.faults:
         typer.echo("Found in the logs:")
@@ -162,7 +162,7 @@ def print_notes(made: MadeSet) -> None:
             typer.echo(f"  - {remark}")
 
 
-def set_name(log: Path) -> str:
+def _set_name(log: Path) -> str:
     """The name of a set after its first log: `flight` of flight.ulg, `flight-set` of the bag in the folder flight."""
     if log.is_dir():
         return f"{log.resolve().name.split('.')[0] or 'flights'}-set"

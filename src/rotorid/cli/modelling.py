@@ -1,10 +1,16 @@
-"""`rotorid model`: from logs to a vehicle in a simulator, in one go."""
+"""A vehicle in a simulator.
+
+- `rotorid model`: from logs to a vehicle in a simulator, in one go.
+- `rotorid export`: the identified vehicle in the forms that other tools know.
+- `rotorid simulate`: a flight of a vehicle with every effect its file states.
+"""
 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -112,3 +118,90 @@ def comparison(found, target: Path) -> list[Path]:
     pd.DataFrame(rows, columns=["model", "channel", "rms_error", "unit", "windows"]).to_csv(table, index=False)
     draw(found, figure)
     return [table, figure]
+
+
+if TYPE_CHECKING:
+    from rotorid.recordings import Vehicle
+
+
+def simulate(
+    vehicle_file: Annotated[Path, typer.Argument(metavar="VEHICLE", help="vehicle.yaml or improved_vehicle.yaml.")],
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder of the set; default NAME-simulated.")] = None,
+    seconds: Annotated[float, typer.Option(help="Length of each flight, s.")] = 20.0,
+    flights: Annotated[int, typer.Option(help="Number of flights; two or more let one be held out.")] = 2,
+    seed: Annotated[int, typer.Option(help="Seed of the sensors' noise.")] = 1,
+) -> None:
+    """Fly a vehicle, with the effects its file states, and write the flights as a recording set.
+
+    The vehicle swings in roll and pitch about hover under an attitude controller; sensors are noisy. The set's own
+    vehicle.yaml is the one without the effects, so that `rotorid verdict` has something to find. What cannot be flown
+    as the file says is named.
+
+    Example: `rotorid simulate flights-verdict/improved_vehicle.yaml -o simulated`
+    """
+    with one_sentence():
+        from rotorid.recordings import read_vehicle
+
+        vehicle = read_vehicle(vehicle_file)
+        folder = out or Path(f"{vehicle_file.resolve().parent.name}-simulated")
+        if (folder / "vehicle.yaml").exists():
+            raise InputError(f"{folder / 'vehicle.yaml'} is there already; choose another folder with -o")
+        written = fly(vehicle, folder, seconds, flights, seed, lambda sentence: typer.echo(f"  - {sentence}"))
+        typer.echo(f"{written}: {flights} flights of {seconds:g} s. Next: `rotorid verdict {written}`")
+
+
+def fly(
+    vehicle: Vehicle,
+    folder: Path,
+    seconds: float,
+    flights: int,
+    seed: int,
+    say: Callable[[str], None] = lambda sentence: None,
+) -> Path:
+    """Write `flights` simulated flights of a vehicle as the set `folder`; `say` takes what a reader must know."""
+    from rotorid.recordings import write_set
+    from rotorid.vehicle.control.swings import remarks, swings, turned_over
+
+    for sentence in remarks(vehicle):
+        say(sentence)
+    flown = swings(vehicle, folder.name, seconds, flights, seed)
+    for sentence in turned_over(flown):
+        say(sentence)
+    return write_set(flown, folder.parent)
+
+
+def export(
+    vehicle_file: Annotated[Path, typer.Argument(metavar="VEHICLE", help="vehicle.yaml or improved_vehicle.yaml.")],
+    to: Annotated[
+        str, typer.Option("--to", help="rotorpy, mjcf, sdf, gym-pybullet-drones, px4, px4-sih or ardupilot-json.")
+    ],
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="File to write; default by the form.")] = None,
+) -> None:
+    """Write the vehicle, with its effects as far as the form knows them, for another tool.
+
+    What the form cannot express is named, on the screen and in the file. Derivatives that the tool can add in its own
+    step are a further file next to it. Where the tool is installed the vehicle is flown there and compared with ours
+    first: a file that the tool does not read is not written.
+
+    Example: `rotorid export flights-verdict/improved_vehicle.yaml --to rotorpy`
+    """
+    with one_sentence():
+        from rotorid.io.text.writing import all_or_none
+        from rotorid.recordings import read_vehicle
+        from rotorid.vehicle.exports import export_vehicle
+        from rotorid.vehicle.exports.flown import try_out
+
+        vehicle = read_vehicle(vehicle_file)
+        exported = export_vehicle(vehicle, to)
+        flown = try_out(vehicle, to, exported)
+        path = out or Path(exported.file_name)
+        texts = {path: exported.text} | {path.parent / name: text for name, text in exported.companions.items()}
+        with all_or_none(*texts) as parts:
+            for part, text in zip(parts, texts.values(), strict=True):
+                part.write_text(text, encoding="utf-8")
+        for written in texts:
+            typer.echo(f"{written}: written for {to}")
+        for sentence in exported.left_out:
+            typer.echo(f"  - not expressed: {sentence}")
+        if flown:
+            typer.echo(f"  {flown}")

@@ -18,7 +18,7 @@ from markupsafe import Markup, escape
 
 from rotorid.cli.console import one_sentence, progress
 from rotorid.errors import InputError
-from rotorid.io.text.names import neighbour
+from rotorid.io.text.wording import neighbour
 from rotorid.steps import step
 
 OPEN, _CLOSE = "<!-- plan -->", "<!-- end of the plan -->"
@@ -53,7 +53,7 @@ def plan(
     with one_sentence():
         from rotorid.plan.limits import Limits, SessionLimits, read_limits
 
-        wishes = wished(want or [])
+        wishes = _wished(want or [])
         folder, content = _read_verdict(verdict)
         flight = content["kind"] == "flight"
         allowed = read_limits(limits, Limits if flight else SessionLimits)
@@ -96,7 +96,6 @@ def _session_plan(source, content: dict, allowed, folder: Path):
 
 def _onto_page(page: Path, name: str, said: list[str], picture: Path | None) -> None:
     """Put the plan on the verdict's page, where there is one."""
-    from rotorid.cli.planning import with_plan
     from rotorid.io.text.writing import all_or_none
 
     if not page.is_file():
@@ -106,7 +105,7 @@ def _onto_page(page: Path, name: str, said: list[str], picture: Path | None) -> 
         part.write_text(content, encoding="utf-8")
 
 
-def wished(texts: list[str]) -> dict[str, float]:
+def _wished(texts: list[str]) -> dict[str, float]:
     """Wishes as `name=1%` or `name=0.01`; an effect's share is one of the weight."""
     out = {}
     for text in texts:
@@ -208,7 +207,7 @@ def together(
         typer.echo(f"{target / 'report.html'}")
 
 
-def section(name: str, said: Sequence[str], picture: bytes | None = None) -> Markup:
+def _section(name: str, said: Sequence[str], picture: bytes | None = None) -> Markup:
     """The sentences of a plan for a set as HTML, and its picture (PNG) where there is one.
 
     Sentences that are set in belong to the first: its steps.
@@ -226,5 +225,5 @@ def section(name: str, said: Sequence[str], picture: bytes | None = None) -> Mar
 
 def with_plan(page: str, name: str, said: Sequence[str], picture: bytes | None = None) -> str:
     """A verdict's page with the plan in it; a page without that section as it is."""
-    made = f"{OPEN}{escape(section(name, said, picture))}{_CLOSE}"
+    made = f"{OPEN}{escape(_section(name, said, picture))}{_CLOSE}"
     return SECTION.sub(lambda found: found[1] + made + found[2], page, count=1)

@@ -70,7 +70,7 @@ def init(
                 raise InputError(f"--mass-kg is {mass_kg:g}, expected a finite number of more than 0")
             text = re.sub(r"(?m)^mass_kg:.*$", lambda _: f"mass_kg: {as_yaml(mass_kg)}   # as you stated it", text)
         if name is not None:
-            check_name(name)
+            _check_name(name)
             text = re.sub(r"(?m)^name:.*$", lambda _: f"name: {as_yaml(name)}", text)
         # What is written must be read again: a mass beyond the contract's bounds is refused here, not by `check`.
         vehicle_of(parse_yaml(text, str(path)), str(path))
@@ -82,7 +82,7 @@ def init(
         )
 
 
-def check_name(name: str) -> None:
+def _check_name(name: str) -> None:
     """InputError where a vehicle cannot be called so: a blank name, or one that is no Unicode text."""
     if not name.strip():
         raise InputError(f"--name is {name!r}, expected text")

@@ -5,6 +5,10 @@ eqs 4.10 to 4.19). Believed: F = (0, 0, -Σ C_F ω²), M = Σ (r_i × F_i) + Σ 
 
 Measured and modelled wrench pass the same zero-phase filter, so neither amplitude nor delay differs between
 the two sides.
+
+Of the NeuroBEM flights three differences are taken: measured minus the believed rotors (`rigid_body`), measured minus
+NeuroBEM's prediction (`neurobem`), and the latter with the mass that its paper prints (`neurobem_paper_mass`), since
+the two published masses differ.
 """
 
 from __future__ import annotations
@@ -13,16 +17,26 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 from scipy.signal import butter, sosfiltfilt
 
 from rotorid.errors import InputError
-from rotorid.recordings import Run, Vehicle
+from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
+from rotorid.recordings.importers.neurobem import ANGULAR_ACCELERATION, PREDICTED_FORCE, PREDICTED_MOMENT
 
-CHANNELS = ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
-TOTALS = ("force", "moment")
+_CHANNELS = ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
+_TOTALS = ("force", "moment")
 """Over three axes: sqrt(mean of the three squares), the convention of the NeuroBEM paper's table."""
 _ORDER = 2
+_PAPER_MASS_KG = 0.752
+_POINT_STEP = 40
+"""Every so many samples become a point of the figure."""
+_MODELS = ("rigid_body", "neurobem")
+_FLIGHT_COLUMNS = ["flight", "model", "airspeed_mean_m_s", "airspeed_max_m_s", *_CHANNELS, *_TOTALS]
+_BIN_COLUMNS = ["model", "channel", "airspeed_low_m_s", "airspeed_high_m_s", "samples"]
+_BIN_COLUMNS += ["rms", "low_95", "high_95"]
+_POINT_COLUMNS = ["flight", "airspeed_m_s", *_CHANNELS]
 
 
 def low_pass(values: np.ndarray, rate_hz: float, cutoff_hz: float) -> np.ndarray:
@@ -65,7 +79,7 @@ def rotor_wrench(rotor_speeds: np.ndarray, vehicle: Vehicle) -> np.ndarray:
     return np.column_stack([zero, zero, -thrust.sum(axis=1), -thrust @ y, thrust @ x, torque.sum(axis=1)])
 
 
-def airspeed(run: Run) -> np.ndarray:
+def _airspeed(run: Run) -> np.ndarray:
     """Speed in still air, m/s, shape (n,)."""
     return np.linalg.norm(run.array(c.VELOCITY), axis=1)
 
@@ -73,7 +87,7 @@ def airspeed(run: Run) -> np.ndarray:
 def rmse(residual: np.ndarray) -> dict[str, float]:
     """Root mean square of each channel and of the totals, residual of shape (n, 6)."""
     squares = np.mean(_squares(residual), axis=0)
-    return {name: float(np.sqrt(v)) for name, v in zip(CHANNELS + TOTALS, squares, strict=True)}
+    return {name: float(np.sqrt(v)) for name, v in zip(_CHANNELS + _TOTALS, squares, strict=True)}
 
 
 def _squares(residual: np.ndarray) -> np.ndarray:
@@ -83,7 +97,7 @@ def _squares(residual: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Binned:
+class _Binned:
     """RMS residual in bins of airspeed with 95 % intervals; rows are bins, columns
     the six channels and the two totals."""
 
@@ -108,7 +122,7 @@ def by_airspeed(
     rng: np.random.Generator,
     repeats: int = 400,
     fewest_blocks: int = 5,
-) -> Binned:
+) -> _Binned:
     """RMS residual against airspeed over all runs, intervals by resampling blocks of time.
 
     Residuals are correlated in time, so whole blocks of `block_s` are drawn, not samples.
@@ -151,7 +165,7 @@ def by_airspeed(
     low, high = np.nanpercentile(spread, [2.5, 97.5], axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):  # a channel may have nothing left over
         ratio, growth = spread[:, -1] / spread[:, 0], centre[-1] / centre[0]
-    return Binned(
+    return _Binned(
         low_m_s=edges[:-1][kept],
         high_m_s=edges[1:][kept],
         samples=counts.sum(axis=0).astype(int),
@@ -160,4 +174,97 @@ def by_airspeed(
         rms_high=high,
         growth=growth,
         growth_95=np.nanpercentile(ratio, [2.5, 97.5], axis=0).T,
+    )
+
+
+@dataclass(frozen=True)
+class _NeurobemTables:
+    """Summary and tables; forces in N, moments in N m."""
+
+    summary: dict
+    flights: pd.DataFrame
+    bins: pd.DataFrame
+    points: pd.DataFrame
+
+
+def no_neurobem() -> _NeurobemTables:
+    """Tables without a row, for recordings that are not there."""
+    tables = (pd.DataFrame(columns=names) for names in (_FLIGHT_COLUMNS, _BIN_COLUMNS, _POINT_COLUMNS))
+    return _NeurobemTables({}, *tables)
+
+
+def _residuals_of(run: Run, vehicle: Vehicle, cutoff_hz: float) -> dict[str, np.ndarray]:
+    """What each model leaves over in one flight, shape (n, 6) each."""
+    rate = 1 / float(np.median(np.diff(run.time_s)))
+    acceleration = run.array(ANGULAR_ACCELERATION)
+    lighter = vehicle.model_copy(update={"mass_kg": _PAPER_MASS_KG})
+
+    def filtered(wrench: np.ndarray) -> np.ndarray:
+        return low_pass(wrench, rate, cutoff_hz)
+
+    measured = filtered(measured_wrench(run, vehicle, acceleration))
+    rotor_speeds = run.array(c.rotor_columns("rotor_speed", vehicle.rotor_count))
+    predicted = filtered(run.array(PREDICTED_FORCE + PREDICTED_MOMENT))
+    return {
+        "rigid_body": measured - filtered(rotor_wrench(rotor_speeds, vehicle)),
+        "neurobem": measured - predicted,
+        "neurobem_paper_mass": filtered(measured_wrench(run, lighter, acceleration)) - predicted,
+    }
+
+
+def _growth(found: _Binned) -> dict[str, dict]:
+    """RMS in the slowest and the fastest bin, and their ratio, of each channel and total."""
+    return {
+        channel: {
+            "slowest_m_s": [float(found.low_m_s[0]), float(found.high_m_s[0])],
+            "fastest_m_s": [float(found.low_m_s[-1]), float(found.high_m_s[-1])],
+            "rms_slowest": float(found.rms[0, place]),
+            "rms_fastest": float(found.rms[-1, place]),
+            "growth": float(found.growth[place]),
+            "growth_95": [float(v) for v in found.growth_95[place]],
+        }
+        for place, channel in enumerate(_CHANNELS + _TOTALS)
+    }
+
+
+def _bin_rows(model: str, found: _Binned) -> list[tuple]:
+    rows = []
+    for place, channel in enumerate(_CHANNELS + _TOTALS):
+        for b in range(len(found.low_m_s)):
+            where = (model, channel, found.low_m_s[b], found.high_m_s[b], found.samples[b])
+            rows.append((*where, found.rms[b, place], found.rms_low[b, place], found.rms_high[b, place]))
+    return rows
+
+
+def compare_with_neurobem(
+    recordings: RecordingSet, cutoff_hz: float, airspeed_bin_m_s: float, block_s: float, seed: int
+) -> _NeurobemTables:
+    """RMS of every flight and model, and against airspeed with block-bootstrap intervals."""
+    vehicle = recordings.vehicle
+    left = {run.name: _residuals_of(run, vehicle, cutoff_hz) for run in recordings.runs}
+    speeds = {run.name: _airspeed(run) for run in recordings.runs}
+    times = {run.name: run.time_s for run in recordings.runs}
+    rows, summary = [], {"mass_kg": vehicle.mass_kg, "paper_mass_kg": _PAPER_MASS_KG, "flights": {}}
+    for flight, models in left.items():
+        pace = {
+            "airspeed_mean_m_s": float(speeds[flight].mean()),
+            "airspeed_max_m_s": float(speeds[flight].max()),
+        }
+        summary["flights"][flight] = {**pace, **{model: rmse(r) for model, r in models.items()}}
+        rows += [{"flight": flight, "model": model, **pace, **rmse(r)} for model, r in models.items()]
+    tops = sorted(float(speed.max()) for speed in speeds.values())
+    top = tops[-1]
+    summary["one_flight_above_m_s"] = tops[-2] if len(tops) > 1 else 0.0
+    edges = np.arange(0.0, top + airspeed_bin_m_s, airspeed_bin_m_s)
+    bins = []
+    for model in _MODELS:
+        mine = {flight: models[model] for flight, models in left.items()}
+        found = by_airspeed(mine, speeds, times, edges, block_s, np.random.default_rng(seed))
+        summary[model] = _growth(found)
+        bins += _bin_rows(model, found)
+    cloud = [np.column_stack([speeds[flight], models["rigid_body"]])[::_POINT_STEP] for flight, models in left.items()]
+    points = pd.DataFrame(np.concatenate(cloud), columns=_POINT_COLUMNS[1:])
+    points.insert(0, "flight", np.repeat(list(left), [len(part) for part in cloud]))
+    return _NeurobemTables(
+        summary, pd.DataFrame(rows)[_FLIGHT_COLUMNS], pd.DataFrame(bins, columns=_BIN_COLUMNS), points
     )

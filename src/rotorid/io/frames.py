@@ -21,7 +21,7 @@ END = ord("E")  # the stream ended, with the number of frames sent
 ANSWER = ord("A")  # the device's answer to a command
 COMMAND = ord("C")  # from the host to the device
 
-HEAD = struct.Struct("<BHI")
+_HEAD = struct.Struct("<BHI")
 _TAIL = struct.Struct("<H")
 SEQUENCE_PERIOD = 1 << 16
 CLOCK_PERIOD_US = 1 << 32
@@ -75,7 +75,7 @@ def cobs_decode(block: bytes) -> bytes:
 
 def encode(frame: Frame) -> bytes:
     """The bytes of a frame on the wire, ending in the zero that delimits it."""
-    body = HEAD.pack(frame.kind, frame.sequence % SEQUENCE_PERIOD, frame.clock_us % CLOCK_PERIOD_US)
+    body = _HEAD.pack(frame.kind, frame.sequence % SEQUENCE_PERIOD, frame.clock_us % CLOCK_PERIOD_US)
     body += frame.payload
     return cobs_encode(body + _TAIL.pack(crc_hqx(body, 0xFFFF))) + b"\0"
 
@@ -83,13 +83,13 @@ def encode(frame: Frame) -> bytes:
 def decode(block: bytes) -> Frame:
     """A frame from the bytes between two zeros. Raises BrokenFrame or ChecksumError."""
     body = cobs_decode(block)
-    if len(body) < HEAD.size + _TAIL.size:
+    if len(body) < _HEAD.size + _TAIL.size:
         raise BrokenFrame(f"{len(body)} bytes are too short for a frame")
     # the CRC of a message followed by its own big-endian CRC is zero; ours is little-endian, so compare
     if crc_hqx(body[:-2], 0xFFFF) != body[-2] | body[-1] << 8:
         raise ChecksumError("checksum does not fit")
-    kind, sequence, clock_us = HEAD.unpack_from(body)
-    return Frame(kind, sequence, clock_us, body[HEAD.size : -2])
+    kind, sequence, clock_us = _HEAD.unpack_from(body)
+    return Frame(kind, sequence, clock_us, body[_HEAD.size : -2])
 
 
 class StreamDecoder:

@@ -15,9 +15,8 @@ from pathlib import Path, PurePosixPath
 
 from rotorid.errors import InputError
 from rotorid.io.session import Session, SessionError, read_session, replace_bytes
-from rotorid.io.text.bounds import LARGEST_INDEX
-from rotorid.io.text.files import check_text, read_bytes
-from rotorid.io.text.names import hint, listed
+from rotorid.io.text.files import LARGEST_INDEX, check_text, read_bytes
+from rotorid.io.text.wording import hint, listed
 
 COLUMNS = (
     "id group kind instrument platform axis load_gf cell experiment mount_roll_deg mount_pitch_deg throttle "

@@ -17,10 +17,9 @@ import pandas as pd
 from rotorid.errors import InputError
 from rotorid.io import rawlog, wire
 from rotorid.io.frames import DATA, END, START
-from rotorid.io.intake import Intake
-from rotorid.io.sequence import Gap, Quality
+from rotorid.io.sequence import Gap, Intake, Quality
 from rotorid.io.session import Ended, Session, SessionError, read_session, session_path
-from rotorid.io.wire.base import STREAMING
+from rotorid.io.wire import STREAMING
 
 
 class LogError(InputError):

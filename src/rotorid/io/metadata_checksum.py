@@ -14,7 +14,7 @@ from pathlib import Path
 
 from rotorid.errors import InputError
 
-KEY = "metadata_sha256"
+_KEY = "metadata_sha256"
 _LINE = re.compile(rb"^metadata_sha256:.*\n?", re.MULTILINE)
 
 
@@ -24,7 +24,7 @@ def with_checksum(data: bytes) -> bytes:
     if not rest.endswith(b"\n"):
         rest += b"\n"
     # In quotes: to YAML a digest such as 12e4… may be a number.
-    return rest + f"{KEY}: '{sha256(rest).hexdigest()}'\n".encode()
+    return rest + f"{_KEY}: '{sha256(rest).hexdigest()}'\n".encode()
 
 
 def check(data: bytes, path: Path) -> bool:
@@ -33,7 +33,7 @@ def check(data: bytes, path: Path) -> bool:
         return False
     if with_checksum(data) != data:
         raise InputError(
-            f"{path}: the metadata were changed after recording, their checksum ({KEY}, the last line) does not fit; "
+            f"{path}: the metadata were changed after recording, their checksum ({_KEY}, the last line) does not fit; "
             f"put the recorded file back, or, if the change is meant, renew the checksum: "
             f"rotorid-acquire checksum --renew {path}"
         )

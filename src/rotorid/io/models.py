@@ -8,8 +8,7 @@ from typing import Annotated, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from rotorid.errors import InputError
-from rotorid.io.text.bounds import LARGEST_YAML, MOST_YAML_VALUES
-from rotorid.io.text.files import read_yaml
+from rotorid.io.text.files import LARGEST_YAML, MOST_YAML_VALUES, read_yaml
 from rotorid.io.text.wording import explain
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]

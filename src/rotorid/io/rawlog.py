@@ -21,8 +21,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rotorid.errors import InputError
-from rotorid.io.text.bounds import LARGEST_RAW_LOG, MOST_TRIED_BYTES
-from rotorid.io.text.files import read_bytes
+from rotorid.io.text.files import LARGEST_RAW_LOG, MOST_TRIED_BYTES, read_bytes
 
 MAGIC = b"ROTORLOG1\n"
 _CHUNK_HEAD = struct.Struct("<BQH")

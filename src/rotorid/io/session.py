@@ -14,8 +14,7 @@ from pydantic import Field, field_validator
 from rotorid.errors import InputError
 from rotorid.io import metadata_checksum
 from rotorid.io.models import KnownKeys, Number, Whole, read_model
-from rotorid.io.text.bounds import LARGEST_METADATA, MOST_METADATA_VALUES
-from rotorid.io.text.files import read_bytes
+from rotorid.io.text.files import LARGEST_METADATA, MOST_METADATA_VALUES, read_bytes
 
 
 class Ended(StrEnum):
@@ -35,10 +34,7 @@ class Ended(StrEnum):
     FAILED = "failed"
 
 
-Place = Annotated[list[Number], Field(min_length=3, max_length=3)]
-
-
-class Air(KnownKeys):
+class RoomAir(KnownKeys):
     """Air during the recording."""
 
     temperature_c: Number = Field(ge=-90, le=70)
@@ -80,7 +76,7 @@ class Setup(KnownKeys):
         None  # body axes, from the believed centre of mass
     )
     tared: bool | None = None  # the reading was zeroed with the vehicle in place
-    air: Air | None = None
+    air: RoomAir | None = None
     remarks: str | None = None
 
 

@@ -15,10 +15,10 @@ import numpy as np
 from rotorid.plan.limits import Limits
 
 _GRAVITY_M_S2 = 9.81
-RAMP_S = 2.0
+_RAMP_S = 2.0
 _SLOW_RAMP_S = 4.0
 """Of motions over ground: in RAMP_S a fast pass would tilt more to start than to turn round."""
-BANDS_HZ = ((0.3, 1.0), (0.8, 2.0), (1.5, 4.0), (0.3, 8.0))
+_BANDS_HZ = ((0.3, 1.0), (0.8, 2.0), (1.5, 4.0), (0.3, 8.0))
 """Oscillations of the acceleration asked for. Of the fastest little is left in the path, but what the attitude loop
 makes of them turns the vehicle as hard as doublets do."""
 _DOUBLET_S = 0.3
@@ -64,13 +64,13 @@ class ManoeuvrePiece:
         return Reference(t, position, yaw)
 
 
-def _envelope(t: np.ndarray, ramp_s: float = RAMP_S) -> np.ndarray:
+def _envelope(t: np.ndarray, ramp_s: float = _RAMP_S) -> np.ndarray:
     """From 0 smoothly to 1 and back to 0, twice differentiable; `ramp_s` each way."""
     s = np.clip(np.minimum(t, t[-1] - t) / ramp_s, 0, 1)
     return s**3 * (10 - 15 * s + 6 * s**2)
 
 
-def phase(t: np.ndarray, rate_rad_s: float, unit_rad: float = np.pi, ramp_s: float = RAMP_S) -> np.ndarray:
+def _phase(t: np.ndarray, rate_rad_s: float, unit_rad: float = np.pi, ramp_s: float = _RAMP_S) -> np.ndarray:
     """Phase that speeds up from rest and slows down to it, a whole number of units in all, (n,), rad."""
     speed = _envelope(t, ramp_s)
     raw = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(t))])
@@ -78,20 +78,22 @@ def phase(t: np.ndarray, rate_rad_s: float, unit_rad: float = np.pi, ramp_s: flo
     return unit_rad * units * raw / raw[-1]
 
 
-def swing(t: np.ndarray, amplitude: float, rate_rad_s: float, ramp_s: float = _SLOW_RAMP_S) -> tuple[float, np.ndarray]:
+def _swing(
+    t: np.ndarray, amplitude: float, rate_rad_s: float, ramp_s: float = _SLOW_RAMP_S
+) -> tuple[float, np.ndarray]:
     """Amplitude and phase (n,), rad, of a swing there and back; smaller where the time asks for a faster phase."""
-    angle = phase(t, rate_rad_s, ramp_s=ramp_s)
+    angle = _phase(t, rate_rad_s, ramp_s=ramp_s)
     fastest = float(np.gradient(angle, t).max())
     return amplitude * min(1.0, (1.05 * rate_rad_s / fastest) ** 2), angle
 
 
-def whole(rate_rad_s: float, about_s: float, unit_rad: float = np.pi, ramp_s: float = RAMP_S) -> float:
+def _whole(rate_rad_s: float, about_s: float, unit_rad: float = np.pi, ramp_s: float = _RAMP_S) -> float:
     """Duration near `about_s`, s, in which a phase of that rate goes through a whole number of units."""
     units = max(1, round(rate_rad_s * (about_s - ramp_s) / unit_rad))
     return ramp_s + units * unit_rad / rate_rad_s
 
 
-def multisine(t: np.ndarray, harmonics: np.ndarray, seed: int) -> np.ndarray:
+def _multisine(t: np.ndarray, harmonics: np.ndarray, seed: int) -> np.ndarray:
     """Sum of cosines of the piece's harmonics with Schroeder's phases (a low crest), largest 1, (n,)."""
     k = np.arange(1, len(harmonics) + 1)
     angles = -np.pi * k * (k - 1) / len(harmonics) + seed
@@ -99,7 +101,7 @@ def multisine(t: np.ndarray, harmonics: np.ndarray, seed: int) -> np.ndarray:
     return wave / np.abs(wave).max()
 
 
-def largest(limits: Limits, room_m: float, share: float) -> tuple[float, float]:
+def _largest(limits: Limits, room_m: float, share: float) -> tuple[float, float]:
     """Amplitude (m) and rate (rad/s) of a swing along a line at a share of the speed, within room and tilt."""
     speed = share * limits.speed_m_s
     most = _ROOM * _GRAVITY_M_S2 * np.tan(np.radians(limits.tilt_deg))
@@ -177,43 +179,43 @@ def _passes(limits: Limits) -> list[ManoeuvrePiece]:
             angle = np.radians(degrees)
             ahead = np.array([np.cos(angle), np.sin(angle), 0.0])
             room = min(r / abs(a) for r, a in zip(limits.room_m[:2], ahead[:2], strict=True) if abs(a) > 1e-9)
-            amplitude, rate = largest(limits, room, share)
+            amplitude, rate = _largest(limits, room, share)
 
             def make(t, amplitude=amplitude, rate=rate, ahead=ahead):
-                return amplitude * np.sin(phase(t, rate, ramp_s=_SLOW_RAMP_S))[:, None] * ahead, np.zeros(len(t))
+                return amplitude * np.sin(_phase(t, rate, ramp_s=_SLOW_RAMP_S))[:, None] * ahead, np.zeros(len(t))
 
             way = {0: "along the nose", 45: "across the diagonal", 90: "sideways"}[degrees]
             words = f"to and fro {way}, {amplitude:.1f} m each way at up to {amplitude * rate:.1f} m/s, nose held"
             out.append(
-                ManoeuvrePiece(f"pass {degrees} at {share:g}", words, make, whole(rate, 15.0, ramp_s=_SLOW_RAMP_S))
+                ManoeuvrePiece(f"pass {degrees} at {share:g}", words, make, _whole(rate, 15.0, ramp_s=_SLOW_RAMP_S))
             )
     for degrees, axis in ((0, 0), (90, 1)):
-        amplitude, rate = largest(limits, limits.room_m[axis], 0.8)
+        amplitude, rate = _largest(limits, limits.room_m[axis], 0.8)
         heave = min(limits.room_m[2], 0.6 * limits.climb_m_s / _HEAVE_RAD_S, 0.3 * _GRAVITY_M_S2 / _HEAVE_RAD_S**2)
 
         def make(t, amplitude=amplitude, rate=rate, axis=axis, heave=heave):
             out = np.zeros((len(t), 3))
-            out[:, axis] = amplitude * np.sin(phase(t, rate, ramp_s=_SLOW_RAMP_S))
-            out[:, 2] = heave * np.sin(phase(t, _HEAVE_RAD_S))
+            out[:, axis] = amplitude * np.sin(_phase(t, rate, ramp_s=_SLOW_RAMP_S))
+            out[:, 2] = heave * np.sin(_phase(t, _HEAVE_RAD_S))
             return out, np.zeros(len(t))
 
         way = "along the nose" if axis == 0 else "sideways"
         words = f"to and fro {way} at up to {amplitude * rate:.1f} m/s in waves of {heave:.1f} m up and down"
-        out.append(ManoeuvrePiece(f"waves {degrees}", words, make, whole(rate, 15.0, ramp_s=_SLOW_RAMP_S)))
+        out.append(ManoeuvrePiece(f"waves {degrees}", words, make, _whole(rate, 15.0, ramp_s=_SLOW_RAMP_S)))
     return out
 
 
 def _turns(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
     room = min(limits.room_m[:2])
-    amplitude, rate = largest(limits, room, 0.8)
+    amplitude, rate = _largest(limits, room, 0.8)
     # The ramp of a turn reaches its rate in RAMP_S, at most 1.9 times as fast in its midst.
-    yaw_rate = min(0.8 * np.radians(limits.yaw_rate_deg_s), most_rad_s2 * RAMP_S / 1.9)
+    yaw_rate = min(0.8 * np.radians(limits.yaw_rate_deg_s), most_rad_s2 * _RAMP_S / 1.9)
 
     def spin(t):
-        return np.zeros((len(t), 3)), phase(t, yaw_rate, 2 * np.pi)
+        return np.zeros((len(t), 3)), _phase(t, yaw_rate, 2 * np.pi)
 
     def eight(t):
-        size, angle = swing(t, amplitude, rate / np.sqrt(2))
+        size, angle = _swing(t, amplitude, rate / np.sqrt(2))
         out = np.zeros((len(t), 3))
         out[:, 0], out[:, 1] = size * np.sin(angle), size / 2 * np.sin(2 * angle)
         return out, np.zeros(len(t))
@@ -228,15 +230,15 @@ def _turns(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
     def drift(t):
         # To and fro over ground while the nose turns: body axes and world axes part.
         out = np.zeros((len(t), 3))
-        out[:, 0] = amplitude * np.sin(phase(t, rate, ramp_s=_SLOW_RAMP_S))
-        return out, phase(t, 0.6 * yaw_rate, 2 * np.pi)
+        out[:, 0] = amplitude * np.sin(_phase(t, rate, ramp_s=_SLOW_RAMP_S))
+        return out, _phase(t, 0.6 * yaw_rate, 2 * np.pi)
 
     pieces = [
         ManoeuvrePiece(
             "eight",
             f"a figure of eight, {amplitude:.1f} m each way, nose held",
             eight,
-            whole(rate / np.sqrt(2), 15.0, ramp_s=_SLOW_RAMP_S),
+            _whole(rate / np.sqrt(2), 15.0, ramp_s=_SLOW_RAMP_S),
         )
     ]
     # Half a turn by a quintic: its largest rate is 1.875 π / T, its largest acceleration 5.77 π / T².
@@ -254,7 +256,7 @@ def _turns(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
         ("spin", f"turn on the spot at up to {degrees:.0f} degrees a second", spin, yaw_rate),
         ("drift", "to and fro over ground while the nose turns all round", drift, 0.6 * yaw_rate),
     ):
-        duration = whole(speed, 12.0, 2 * np.pi)
+        duration = _whole(speed, 12.0, 2 * np.pi)
         if duration <= _LONGEST_S:
             pieces.append(ManoeuvrePiece(name, words, make, duration))
     return pieces
@@ -268,13 +270,13 @@ def _climbs(limits: Limits) -> list[ManoeuvrePiece]:
         rate = min(speed / amplitude, np.sqrt(4.0 / amplitude))
 
         def make(t, amplitude=amplitude, rate=rate):
-            size, angle = swing(t, amplitude, rate, RAMP_S)
+            size, angle = _swing(t, amplitude, rate, _RAMP_S)
             out = np.zeros((len(t), 3))
             out[:, 2] = -size * np.sin(angle)
             return out, np.zeros(len(t))
 
         words = f"climb and descend by {amplitude:.1f} m each way at up to {amplitude * rate:.1f} m/s"
-        out.append(ManoeuvrePiece(f"climb at {share:g}", words, make, whole(rate, _PIECE_S)))
+        out.append(ManoeuvrePiece(f"climb at {share:g}", words, make, _whole(rate, _PIECE_S)))
     return out
 
 
@@ -295,7 +297,7 @@ def _oscillations(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
     }
     out = []
     for name, axes in families.items():
-        for low_hz, high_hz in BANDS_HZ:
+        for low_hz, high_hz in _BANDS_HZ:
 
             def make(t, axes=axes, low_hz=low_hz, high_hz=high_hz):
                 inner = t[-1]
@@ -303,7 +305,7 @@ def _oscillations(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
                 position, yaw = np.zeros((len(t), 3)), np.zeros(len(t))
                 for i, axis in enumerate(axes):
                     own = count[i :: len(axes)].astype(float)
-                    wave = multisine(t, own, i) * _envelope(t)
+                    wave = _multisine(t, own, i) * _envelope(t)
                     if axis == "yaw":
                         slope = np.gradient(wave, t)
                         bend = np.abs(np.gradient(slope, t)).max()

@@ -68,15 +68,12 @@ class ChangedVehicle:
 
 def swaps(vehicle: Vehicle) -> list[ChangedVehicle]:
     """Every swap of two propellers that turn the same way, and of all such pairs at once where there are several."""
-    alike = [(i, j) for i, j in combinations(range(vehicle.rotor_count), 2) if _spins(vehicle, i, j)]
+    spins = [rotor.spin for rotor in vehicle.rotors]
+    alike = [(i, j) for i, j in combinations(range(vehicle.rotor_count), 2) if spins[i] == spins[j]]
     choices = [(pair,) for pair in alike]
     if len(alike) > 1 and len({i for pair in alike for i in pair}) == 2 * len(alike):
         choices.append(tuple(alike))
     return [_swapped(vehicle, pairs) for pairs in choices]
-
-
-def _spins(vehicle: Vehicle, i: int, j: int) -> bool:
-    return vehicle.rotors[i].spin == vehicle.rotors[j].spin
 
 
 def _swapped(vehicle: Vehicle, pairs: tuple[tuple[int, int], ...]) -> ChangedVehicle:

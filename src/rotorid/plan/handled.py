@@ -95,7 +95,7 @@ def handled(
         made = []
         for change in choices:
             try:
-                own = of_change(known, limits, reference, change, questions)
+                own = _of_change(known, limits, reference, change, questions)
             except InputError:
                 continue
             made.append(Handled(change, reference.duration_s, own))
@@ -105,7 +105,7 @@ def handled(
 
 
 @step("predicting what is changed by hand")
-def of_change(
+def _of_change(
     known: FittedSet, limits: Limits, reference, change: ChangedVehicle, questions: list[Question]
 ) -> Questions:
     """Separations of each question's models with the flight after a change."""

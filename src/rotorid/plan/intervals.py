@@ -67,10 +67,10 @@ def widths(known: FittedSet, before: Information, after: Information, wishes: di
     for name, wished in wishes.items():
         if name in PARAMETER_NAMES.values():
             (column,) = regression.columns(names[name])
-            sizes = [half(known, before, i, int(column), VALUE_FLOOR) for i in (before, after)]
+            sizes = [_half(known, before, i, int(column), VALUE_FLOOR) for i in (before, after)]
             out.append(Width(name, "relative", *sizes, wished))
         else:
-            sizes = [max(limit(known, i, after, key) for key in names[name]) for i in (before, after)]
+            sizes = [max(_limit(known, i, after, key) for key in names[name]) for i in (before, after)]
             out.append(Width(name, SHARE, *sizes, wished))
     for key in model.selection.active:
         term = model.search.terms[key]
@@ -78,22 +78,22 @@ def widths(known: FittedSet, before: Information, after: Information, wishes: di
             continue
         for index, column in zip(term.form.linear, regression.columns([key]), strict=True):
             parameter = term.form.parameters[index]
-            sizes = [half(known, before, i, int(column)) for i in (before, after)]
+            sizes = [_half(known, before, i, int(column)) for i in (before, after)]
             out.append(Width(f"{term.effect} {parameter.symbol}", parameter.unit, *sizes))
     return out
 
 
-def half(known: FittedSet, before: Information, information: Information, column: int, floor: float = 0.0) -> float:
+def _half(known: FittedSet, before: Information, information: Information, column: int, floor: float = 0.0) -> float:
     """Half the 95 % interval of a column of the model."""
     fit, at = known.fitted.model.selection.fit, np.array([column])
-    plain = float(covariance(known, before.each[0], at)[0, 0])
-    own = max(float(covariance(known, gram, at)[0, 0]) for gram in information.each)
+    plain = float(_covariance(known, before.each[0], at)[0, 0])
+    own = max(float(_covariance(known, gram, at)[0, 0]) for gram in information.each)
     (place,) = fit.places(at)
     more = max(1.0, float(fit.covariance[place, place]) / max(plain, 1e-300))
     return 1.96 * float(np.sqrt(more * own + floor**2))
 
 
-def limit(known: FittedSet, information: Information, flown: Information, key: str) -> float:
+def _limit(known: FittedSet, information: Information, flown: Information, key: str) -> float:
     """What an absent effect's term may be at most with 95 % probability, a share of the weight (root mean square over
     `flown`); infinite where it is never excited."""
     columns = known.regression.columns([key])
@@ -103,12 +103,12 @@ def limit(known: FittedSet, information: Information, flown: Information, key: s
     for gram in information.each:
         if (np.diag(gram)[columns] <= NEVER_EXCITED).any():
             return np.inf
-        beta = drawn(zero, covariance(known, gram, columns), -bound, bound)
+        beta = drawn(zero, _covariance(known, gram, columns), -bound, bound)
         sizes.append(np.quantile(np.sqrt(np.maximum(np.einsum("di,ij,dj->d", beta, squares, beta), 0.0)), PROBABILITY))
     return float(max(sizes))
 
 
-def covariance(known: FittedSet, gram: np.ndarray, columns: np.ndarray) -> np.ndarray:
+def _covariance(known: FittedSet, gram: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """Plain covariance (k, k) of some columns next to the model, from normal equations (K, K)."""
     model, regression = known.fitted.model, known.regression
     every = np.union1d(regression.columns([*model.search.always, *model.selection.active]), columns)

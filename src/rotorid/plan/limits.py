@@ -9,9 +9,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from rotorid.errors import InputError
 from rotorid.io.text.files import read_yaml, with_exponents
-from rotorid.io.text.names import hint
+from rotorid.io.text.wording import hint
 
-Range = tuple[float, float]
+_Range = tuple[float, float]
 T = TypeVar("T", bound=BaseModel)
 
 
@@ -30,11 +30,11 @@ class Limits(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    x_m: Range = (-3.0, 3.0)
+    x_m: _Range = (-3.0, 3.0)
     """North of the start, lowest and highest."""
-    y_m: Range = (-3.0, 3.0)
+    y_m: _Range = (-3.0, 3.0)
     """East of the start, lowest and highest."""
-    height_m: Range = (0.8, 3.0)
+    height_m: _Range = (0.8, 3.0)
     """Above the ground, lowest and highest."""
     wall_margin_m: float = Field(0.5, ge=0)
     """Kept from every side of that volume but the lowest height."""
@@ -51,21 +51,21 @@ class Limits(BaseModel):
     target_sigma: float = Field(6.0, gt=0, le=100)
     """Separation, in standard errors, at which a question counts as settled."""
 
-    home_deg: Range | None = None
+    home_deg: _Range | None = None
     """Latitude and longitude of the start, for a mission; without them none is written."""
 
     _numbers = field_validator("*", mode="before")(number)
 
     @field_validator("x_m", "y_m", "height_m")
     @classmethod
-    def _in_order(cls, value: Range) -> Range:
+    def _in_order(cls, value: _Range) -> _Range:
         if not value[0] < value[1]:
             raise ValueError(f"found [{value[0]:g}, {value[1]:g}], expected the lower number first")
         return value
 
     @field_validator("home_deg")
     @classmethod
-    def _on_earth(cls, value: Range | None) -> Range | None:
+    def _on_earth(cls, value: _Range | None) -> _Range | None:
         if value is not None and not (abs(value[0]) < 85 and abs(value[1]) <= 180):
             raise ValueError(f"found [{value[0]:g}, {value[1]:g}], expected latitude and longitude in degrees")
         return value

@@ -43,7 +43,7 @@ _YAW_SHARE = 0.2
 """Share of the hovering rotors' torque that a planned turn may ask for: the rest is kept for roll and pitch."""
 SIZES = (1.0, 0.75, 0.5)
 """Sizes of a manoeuvre that are tried, the largest that keeps the limits is taken."""
-QUICK = ("shake all to 2 Hz", "shake all to 4 Hz")
+_QUICK = ("shake all to 2 Hz", "shake all to 4 Hz")
 NOTHING = Reference(np.zeros(1), np.zeros((1, 3)), np.zeros(1))
 """Of a flight without pieces."""
 BETWEEN_S = 1.0
@@ -148,7 +148,7 @@ def broken(flight: SimulatedFlight, limits: Limits, vehicle: Vehicle) -> str:
     return ""
 
 
-def tried(
+def _tried(
     known: FittedSet,
     limits: Limits,
     wishes: Iterable[str] = (),
@@ -188,7 +188,7 @@ def share_reached(sigmas: Iterable[float], wished: Iterable[Width], target_sigma
     return float(np.mean(found)) if found else 1.0
 
 
-def reached(known: FittedSet, base: Information, information: Information, target: float, wishes: dict) -> float:
+def _reached(known: FittedSet, base: Information, information: Information, target: float, wishes: dict) -> float:
     """Share of the way to the goals with the set (`base`) and more, as `share_reached`."""
     sigmas = [s.sigma for q in known.questions for s in separations(known, q, base, information)]
     sigmas += [s.sigma for _, own in chain_separations(known, information) for s in own]
@@ -207,7 +207,7 @@ def chosen_pieces(
     base = of_set(known)
 
     def share_of(information: Information) -> float:
-        return reached(known, base, information, limits.target_sigma, wishes or {})
+        return _reached(known, base, information, limits.target_sigma, wishes or {})
 
     start = share_of(base)
     judged = [
@@ -245,7 +245,7 @@ def _expecting_quick(known: FittedSet, limits: Limits) -> FittedSet:
     world, step, vehicle = world_of(known, None, None), step_of(known), known.prepared.vehicle
     for share in SIZES:
         options = {p.name: p for p in candidates(smaller(limits, share), share * yaw_acceleration(vehicle))}
-        for piece in (options[n] for n in QUICK if n in options):
+        for piece in (options[n] for n in _QUICK if n in options):
             try:
                 flight, *_ = flown(world, joined([piece], step, BETWEEN_S), limits)
             except InputError:
@@ -308,7 +308,7 @@ def _forecast(
     return Forecast(name, pieces, reference, flights[0], tuple(questions), tuple(widths(alone, base, after, wishes)))
 
 
-def expected(known: FittedSet, limits: Limits, name: str, taken: list[Tried], wishes) -> Forecast:
+def _expected(known: FittedSet, limits: Limits, name: str, taken: list[Tried], wishes) -> Forecast:
     """What is expected of manoeuvres taken; flown again and again where they do not suffice and time is left.
 
     They are flown for LEAST_S at least: an effect that one pass shows is none that the engine finds wherever it looks.
@@ -336,12 +336,12 @@ def plan(
     if not known.questions and not known.chains and not wishes:
         return Plan(**vars(_forecast(known, limits, "chosen", (), {})), **about, not_testable=reasons)
     quick = _expecting_quick(known, limits)
-    options = tried(quick, limits, wishes)
+    options = _tried(quick, limits, wishes)
     taken, judged = chosen_pieces(quick, limits, options, wishes=wishes)
     others = [t for t in judged if not taken or t.piece is not taken[0].piece]
-    found = [expected(known, limits, "chosen", taken, wishes)]
+    found = [_expected(known, limits, "chosen", taken, wishes)]
     if taken and (second := chosen_pieces(quick, limits, others, wishes=wishes)[0]):
-        found.append(expected(known, limits, "second", second, wishes))
+        found.append(_expected(known, limits, "second", second, wishes))
     longest = found[0].duration_s or limits.duration_s
     if (piece := _standard_piece(known, limits, options, longest - 2 * BETWEEN_S)) is not None:
         found.append(_forecast(known, limits, "standard", (piece,), wishes))

@@ -31,12 +31,10 @@ from rotorid.mismatch.plant.regression import Regression, autoregression, build,
 from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.mismatch.plant.split import HELD_OUT_SHARE, training_rule
 from rotorid.mismatch.posterior.problem import Prior
-from rotorid.plan.between import interval as chain_interval
-from rotorid.plan.between import squares
 from rotorid.plan.candidates import Reference
 from rotorid.plan.changed import ChangedVehicle
 from rotorid.plan.limits import Limits
-from rotorid.plan.questions import FittedSet, Hypothesis, Question
+from rotorid.plan.questions import FittedSet, Hypothesis, Question, chain_interval, chain_squares
 from rotorid.plan.simulate import CompetingModel, SimulatedFlight, commands, fly, recorded
 from rotorid.recordings import RecordingSet, Vehicle
 from rotorid.steps import step
@@ -49,7 +47,7 @@ _SLOWER_LOOPS = (1.0, 0.7)
 as stated flies."""
 FITTED_SHARE = 1.0 - HELD_OUT_SHARE
 """Share of a later recording that the joint judgement fits: the rest is held out (`rotorid.plan.together`)."""
-SIZES = np.geomspace(1e-2, 1e2, 41)
+_SIZES = np.geomspace(1e-2, 1e2, 41)
 """Sizes, of the coefficients found, among which that of a model's coefficients is looked for."""
 
 
@@ -177,11 +175,11 @@ def _full_speed_of(known: FittedSet) -> float:
 
 def step_of(known: FittedSet) -> float:
     """Step of the simulation, s: the recording's own, or a whole part of it."""
-    rate = own_rate_hz(known)
+    rate = _own_rate_hz(known)
     return 1.0 / (rate * int(np.ceil(_LEAST_RATE_HZ / rate)))
 
 
-def columns_of(known: FittedSet) -> tuple[str, ...]:
+def _columns_of(known: FittedSet) -> tuple[str, ...]:
     """Columns that every run of the set has."""
     runs = known.recordings.runs
     return tuple(n for n in runs[0].table.columns if all(r.has(n) for r in runs))
@@ -224,7 +222,7 @@ def _of_flight(
     After a `change` by hand the columns are those of the changed vehicle in the parameters of the set, less what the
     nuisances of the change take over.
     """
-    rate = own_rate_hz(known)
+    rate = _own_rate_hz(known)
     model, prepared = known.fitted.model, known.prepared
     acting, nuisances = list(terms), []
     if change is not None:
@@ -232,7 +230,7 @@ def _of_flight(
         acting, nuisances = [change.term(t) for t in terms], list(change.nuisances)
 
     def segments_of(flight: SimulatedFlight) -> list[Segment]:
-        run = recorded(flight, world, columns_of(known), rate, "planned")
+        run = recorded(flight, world, _columns_of(known), rate, "planned")
         return prepare_like(prepared, RecordingSet("planned", prepared.vehicle, (run,), ()))[0]
 
     segments = segments_of(flight)
@@ -244,7 +242,7 @@ def _of_flight(
                 chain.append((form, true.values[at : at + len(form.parameters)]))
                 at += len(form.parameters)
             asked = commands(replace(world, chain=tuple(chain)), flight.motion)
-            apart.append(squares(known.fitted, segments_of(replace(flight, command_rad_s=asked)), true, rival))
+            apart.append(chain_squares(known.fitted, segments_of(replace(flight, command_rad_s=asked)), true, rival))
     if known.fitted.commanded:
         segments = path_segments(segments, *known.fitted.chain, prepared.thinner.cutoff_hz)
     effects = model.effects if model.effects is not None else chosen(model)
@@ -301,10 +299,10 @@ def expecting(known: FittedSet, flights: Sequence[tuple[SimulatedFlight, Competi
     but no less than the share of the flight's own forces and moments below which the engine distinguishes nothing.
     """
     model, prepared = known.fitted.model, known.prepared
-    rate, regression = own_rate_hz(known), model.search.regression
+    rate, regression = _own_rate_hz(known), model.search.regression
     segments = list(model.segments)
     for number, (flight, world) in enumerate(flights):
-        run = recorded(flight, world, columns_of(known), rate, f"planned {number}")
+        run = recorded(flight, world, _columns_of(known), rate, f"planned {number}")
         segments += prepare_like(prepared, RecordingSet("planned", prepared.vehicle, (run,), ()))[0]
     floor, remains = channel_floor(segments, prepared.vehicle), after_residual(model)
     # What is steady in a run is no noise: a filter that takes it out would see nothing slow.
@@ -318,7 +316,7 @@ def expecting(known: FittedSet, flights: Sequence[tuple[SimulatedFlight, Competi
     return replace(known, whitened=whitened)
 
 
-def own_rate_hz(known: FittedSet) -> float:
+def _own_rate_hz(known: FittedSet) -> float:
     """Rate of the recordings."""
     return 1.0 / float(np.median(np.diff(known.recordings.runs[0].time_s)))
 
@@ -370,7 +368,7 @@ def within(normal: np.ndarray, right: np.ndarray, limit: np.ndarray) -> np.ndarr
     return solution
 
 
-def apart(known: FittedSet, question: Question, true: Hypothesis, gram: np.ndarray) -> dict[str, np.ndarray]:
+def _apart(known: FittedSet, question: Question, true: Hypothesis, gram: np.ndarray) -> dict[str, np.ndarray]:
     """√λ (n,) of a true model against every rival, the best of its forms in each draw of the coefficients.
 
     Which form of the true model it is the set may not know either: each has draws by its probability.
@@ -409,7 +407,7 @@ def drawn(true: Hypothesis, gram: np.ndarray, count: int = _DRAWS) -> np.ndarray
     found, doubt = true.beta / unit, true.covariance / np.outer(unit, unit)
     values, vectors = np.linalg.eigh(doubt)
     values, along = np.maximum(values, 1e-12 * max(values.max(), 1e-300)), vectors.T @ found
-    variances = np.square(SIZES * max(float(np.abs(found).max()), 1e-300))
+    variances = np.square(_SIZES * max(float(np.abs(found).max()), 1e-300))
     fits = [-(np.log(values + v) + along**2 / (values + v)).sum() for v in variances]
     variance = variances[int(np.argmax(fits))]
     kept = variance / (values + variance)
@@ -435,13 +433,13 @@ def separations(known: FittedSet, question: Question, before: Information, after
     """
     out = []
     for true in question.hypotheses:
-        found = [apart(known, question, true, gram) for gram in after.each] if true.keys else []
+        found = [_apart(known, question, true, gram) for gram in after.each] if true.keys else []
         if not any(found):
             continue
         nearest = [np.min(list(f.values()), axis=0) for f in found]
         worst = int(np.argmin([np.median(n) for n in nearest]))
         rival = min(found[worst], key=lambda r: float(np.median(found[worst][r])))
-        so_far = apart(known, question, true, before.each[0])[rival]
+        so_far = _apart(known, question, true, before.each[0])[rival]
         every = np.concatenate(nearest)
         noise = np.random.default_rng(1).standard_normal(len(every))
         low, high = np.quantile(np.maximum(every + noise, 0.0), [0.025, 0.975])

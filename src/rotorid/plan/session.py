@@ -52,8 +52,8 @@ from rotorid.steps import step
 REST_S = 2.0
 """Unloaded before and after every step."""
 _MOST_STEPS = 40
-STANDARD = "slow steps"
-STEP_S = 0.3
+_STANDARD = "slow steps"
+_STEP_S = 0.3
 """A change of the load from one level to the next takes this long."""
 
 
@@ -186,7 +186,7 @@ def through(t: np.ndarray, levels: Sequence[float]) -> np.ndarray:
     cuts = REST_S + (t[-1] - 2 * REST_S) * np.arange(len(held) - 1) / (len(held) - 2)
     out = np.zeros(len(t))
     for a, b, cut in zip(held[:-1], held[1:], cuts, strict=True):
-        out += (b - a) * 0.5 * (1 - np.cos(np.pi * np.clip((t - cut) / STEP_S + 0.5, 0, 1)))
+        out += (b - a) * 0.5 * (1 - np.cos(np.pi * np.clip((t - cut) / _STEP_S + 0.5, 0, 1)))
     return out
 
 
@@ -210,11 +210,11 @@ def courses(limits: SessionLimits) -> dict[str, tuple[str, float, Callable[[np.n
     }
 
 
-def places(known: KnownInstrument) -> list[tuple[str, np.ndarray]]:
+def _places(known: KnownInstrument) -> list[tuple[str, np.ndarray]]:
     """To a name the shares (k,) of every axis of a bench or rotor of a stand that is loaded together."""
     vehicle = known.recordings.vehicle
     if vehicle.kind == "bench":
-        loaded = [k for k in known.model.setup.instrument.channels if np.abs(largest(known)[k]) > 0]
+        loaded = [k for k in known.model.setup.instrument.channels if np.abs(_largest(known)[k]) > 0]
         alone = [(f"along {'xyz'[k]}", np.eye(3)[k]) for k in loaded]
         return [*alone, *([("along all axes", np.eye(3)[loaded].sum(axis=0))] if len(loaded) > 1 else [])]
     count = vehicle.rotor_count
@@ -222,7 +222,7 @@ def places(known: KnownInstrument) -> list[tuple[str, np.ndarray]]:
     return [("of all rotors" if count > 1 else "of the rotor", np.ones(count)), *alone]
 
 
-def largest(known: KnownInstrument) -> np.ndarray:
+def _largest(known: KnownInstrument) -> np.ndarray:
     """Largest load along x, y, z of a bench, N with its sign, or speed of a stand's rotors, rad/s, in the set."""
     loadings = known.model.setup.loadings
     if known.recordings.vehicle.kind == "bench":
@@ -232,7 +232,7 @@ def largest(known: KnownInstrument) -> np.ndarray:
     return np.full(speeds.shape[1], np.nanmax(speeds))
 
 
-def tilts(known: KnownInstrument, limits: SessionLimits) -> list[tuple[float, float]]:
+def _tilts(known: KnownInstrument, limits: SessionLimits) -> list[tuple[float, float]]:
     """Roll and pitch, rad, that the mount can be set to: level, and a tilt about either axis."""
     runs = known.recordings.runs
     if known.recordings.vehicle.kind == "bench" or not all(r.has(*c.MOUNT) for r in runs):
@@ -245,10 +245,10 @@ def options(known: KnownInstrument, limits: SessionLimits) -> list[SessionStep]:
     """Every step of the families."""
     bench = known.recordings.vehicle.kind == "bench"
     out = []
-    for tilt in tilts(known, limits):
+    for tilt in _tilts(known, limits):
         leaning = ", ".join(f"{a} {np.degrees(x):.0f}°" for a, x in zip(("roll", "pitch"), tilt, strict=True) if x)
         mounted = f"mount the vehicle with {leaning}, then " if leaning else ""
-        for where, shares in places(known):
+        for where, shares in _places(known):
             for name, (words, seconds, course) in courses(limits).items():
                 if leaning and (name not in ("slow steps", "rested") or where.endswith("alone")):
                     continue
@@ -271,7 +271,7 @@ def table_of(known: KnownInstrument, step: SessionStep) -> pd.DataFrame:
     """What the set's columns would hold of a step: times, load or speeds, mount; readings are nothing."""
     setup, vehicle = known.model.setup, known.recordings.vehicle
     t = np.arange(0.0, step.duration_s, 1.0 / setup.instrument.rate_hz)
-    asked = step.make(t) * largest(known)
+    asked = step.make(t) * _largest(known)
     table = {c.TIME: t} | {(c.FORCE + c.MOMENT)[k]: np.zeros(len(t)) for k in setup.instrument.channels}
     if vehicle.kind == "bench":
         return pd.DataFrame(table | {n: asked[:, k] for k, n in enumerate(c.REFERENCE_FORCE)})
@@ -355,7 +355,7 @@ def _forecast(known: KnownInstrument, name: str, taken: Sequence[Tried]) -> Sess
 
 def _standard_steps(tried: Sequence[Tried], limits: SessionLimits) -> list[Tried]:
     """What is loaded without a plan: slowly up and down in every place, mounted level, as often as time allows."""
-    once = [t for t in tried if t.information is not None and t.piece.name.startswith(STANDARD)]
+    once = [t for t in tried if t.information is not None and t.piece.name.startswith(_STANDARD)]
     once = [t for t in once if t.piece.tilt_rad == (0.0, 0.0)]
     seconds = sum(t.flown_s for t in once)
     return once * min(int(limits.duration_s / seconds), _MOST_STEPS // len(once)) if once else []

@@ -79,7 +79,7 @@ def low_pass(natural_rad_s: float) -> np.ndarray:
     return np.array([1.0 / natural_rad_s**2, 2 * _DAMPING / natural_rad_s, 1.0])
 
 
-def filtered(signal: np.ndarray, over: np.ndarray, under: np.ndarray, step_s: float) -> np.ndarray:
+def _filtered(signal: np.ndarray, over: np.ndarray, under: np.ndarray, step_s: float) -> np.ndarray:
     """A signal (n, …) through a transfer function `over` / `under` in s, at rest before; second-order sections, as
     poles thousands of times slower than the step lose all digits in one polynomial."""
     zeros, poles = np.roots(over), np.roots(under)
@@ -96,16 +96,16 @@ def followed(signal: np.ndarray, natural_rad_s: float, lag: np.ndarray, step_s: 
     loop = np.array([2 * _DAMPING * natural_rad_s, natural_rad_s**2])
     asked = np.concatenate([[1.0], loop])
     held = np.polyadd(np.polymul([1.0, 0.0, 0.0], lag), loop)
-    return filtered(signal - signal[:1], asked, held, step_s) + signal[:1]
+    return _filtered(signal - signal[:1], asked, held, step_s) + signal[:1]
 
 
-def turned(yaw_rad: np.ndarray, natural_rad_s: float, step_s: float) -> np.ndarray:
+def _turned(yaw_rad: np.ndarray, natural_rad_s: float, step_s: float) -> np.ndarray:
     """What a yaw loop leaves of a yaw reference (n,), rad, whose rate is fed forward."""
     own, lag = low_pass(natural_rad_s), low_pass(_FASTER * natural_rad_s)
-    return filtered(yaw_rad - yaw_rad[:1], own[1:], np.polymul(own, lag), step_s) + yaw_rad[:1]
+    return _filtered(yaw_rad - yaw_rad[:1], own[1:], np.polymul(own, lag), step_s) + yaw_rad[:1]
 
 
-def attitude(thrust_direction: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+def _attitude(thrust_direction: np.ndarray, yaw: np.ndarray) -> np.ndarray:
     """Rotations of body vectors into the world (n, 3, 3) with body z along a direction (n, 3) and the nose at a yaw."""
     down = thrust_direction / np.linalg.norm(thrust_direction, axis=1, keepdims=True)
     nose = np.stack([np.cos(yaw), np.sin(yaw), np.zeros(len(yaw))], axis=1)
@@ -147,7 +147,7 @@ def fly(
     # The height needs no tilt.
     height = followed(reference.position_m[:, 2:], outer, rotors, step)
     position = np.concatenate([level, height], axis=1) + start
-    yaw = turned(reference.yaw_rad, bandwidth_rad_s / 2, step)
+    yaw = _turned(reference.yaw_rad, bandwidth_rad_s / 2, step)
     velocity = np.gradient(position, step, axis=0)
     wanted = vehicle.mass_kg * (np.gradient(velocity, step, axis=0) - gravity)
     inertia, allocation = vehicle.inertia_kg_m2.matrix(), allocation_matrix(vehicle)
@@ -155,10 +155,10 @@ def fly(
     hover = np.sqrt(vehicle.mass_kg * vehicle.gravity_m_s2 / vehicle.thrust_coefficients_n_s2().sum())
     speed = np.full((len(t), vehicle.rotor_count), hover)
     inner = slice(_EDGE, -_EDGE)
-    rotation = attitude(-wanted, yaw)
+    rotation = _attitude(-wanted, yaw)
     for _ in range(_ROUNDS if (*world.effects, *world.derivatives) else 1):
         left = wanted - np.einsum("nij,nj->ni", rotation, force)
-        rotation = attitude(-left, yaw)
+        rotation = _attitude(-left, yaw)
         rates = _body_rates(rotation, step)
         turning = np.gradient(rates, step, axis=0)
         asked = turning @ inertia + np.cross(rates, rates @ inertia) - moment

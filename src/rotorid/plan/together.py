@@ -48,7 +48,7 @@ def joined_sets(first: RecordingSet, *others: RecordingSet) -> tuple[RecordingSe
     for number, other in enumerate(others, 2):
         if len(other.runs) >= 3:
             held += [f"{number}-{n}" for n in split_runs(other).held_out]
-    columns = [set.intersection(*(present(r) for r in s.runs)) for s in sets]
+    columns = [set.intersection(*(_present(r) for r in s.runs)) for s in sets]
     shared = set.intersection(*columns)
     name = "+".join(s.name for s in sets)
     if shared <= {"time_s"}:
@@ -56,7 +56,7 @@ def joined_sets(first: RecordingSet, *others: RecordingSet) -> tuple[RecordingSe
     for number, own in enumerate(columns, 1):
         if extra := sorted(own - shared):
             notes.append(f"Not all sets have {', '.join(extra[:4])}{' …' if len(extra) > 4 else ''} of set {number}.")
-    runs = [renamed(r, str(number)) for number, s in enumerate(sets, 1) for r in s.runs]
+    runs = [replace(r, name=f"{number}-{r.name}") for number, s in enumerate(sets, 1) for r in s.runs]
     runs = [replace(r, table=r.table[[n for n in r.table.columns if n in shared]]) for r in runs]
     return RecordingSet(name, first.vehicle, tuple(runs), tuple(held) or None), tuple(notes)
 
@@ -80,18 +80,13 @@ def _brief(value) -> str:
     return text if len(text) < 40 else text[:37] + "…"
 
 
-def renamed(run: Run, number: str) -> Run:
-    """A run that carries its set's number."""
-    return replace(run, name=f"{number}-{run.name}")
-
-
-def present(run: Run) -> set[str]:
+def _present(run: Run) -> set[str]:
     """Columns with anything in them."""
     return {n for n in run.table.columns if run.has(n)}
 
 
 @dataclass(frozen=True)
-class Outcome:
+class _Outcome:
     """What became of a question that the first set left open."""
 
     ids: tuple[str, ...]
@@ -100,7 +95,7 @@ class Outcome:
     sentence: str
 
 
-def answers(open_before: Sequence[tuple[str, ...]], findings: Sequence[Finding]) -> list[Outcome]:
+def answers(open_before: Sequence[tuple[str, ...]], findings: Sequence[Finding]) -> list[_Outcome]:
     """What the findings of all sets together say of each class that was left open."""
     out = []
     for ids in open_before:
@@ -109,15 +104,15 @@ def answers(open_before: Sequence[tuple[str, ...]], findings: Sequence[Finding])
         still = [f for f in findings if f.status == "ambiguous" and set(f.alternatives) & set(ids)]
         if sure and not still:
             what = " and ".join(sure)
-            out.append(Outcome(ids, sure[0], f"{named}: all sets together say {what}"))
+            out.append(_Outcome(ids, sure[0], f"{named}: all sets together say {what}"))
         elif still:
             left = still[0].alternatives
             fewer = set(left) < set(ids)
-            out.append(Outcome(ids, "", f"{named}: {'narrowed to' if fewer else 'still'} {' or '.join(left)}"))
+            out.append(_Outcome(ids, "", f"{named}: {'narrowed to' if fewer else 'still'} {' or '.join(left)}"))
         else:
             weaker = [f.id for f in findings if f.status == "suggested" and f.id in ids]
             said = f"suggested is {weaker[0]}" if weaker else "neither is established"
-            out.append(Outcome(ids, "", f"{named}: {said}"))
+            out.append(_Outcome(ids, "", f"{named}: {said}"))
     return out
 
 

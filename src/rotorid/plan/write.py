@@ -1,19 +1,23 @@
-"""A plan as files: trajectories for the vehicle's software, a picture, and what each outcome would mean.
+"""A plan as files: trajectories for the vehicle's software, a mission, a picture, and what each outcome would mean.
 
-`trajectory.csv` is in the project's axes (north-east-down from the place of the start, heights as −z).
-`px4_offboard.csv` holds the fields of PX4's TrajectorySetpoint, which has the same axes. `crazyflie.csv` is a
-polynomial trajectory of seventh order as the Crazyflie's high-level commander takes it: x forward, y left, z up, yaw
-against the clock.
-
-The picture of a plan: where to fly, how high and fast, and how far apart the competing models would be.
-
-Steps that no trajectory and no schedule can hold: what a person does between two recordings, and what it shows.
+- `trajectory.csv` is in the project's axes (north-east-down from the place of the start, heights as −z).
+- `px4_offboard.csv` holds the fields of PX4's TrajectorySetpoint, which has the same axes.
+- `crazyflie.csv` is a polynomial trajectory of seventh order as the Crazyflie's high-level commander takes it: x
+  forward, y left, z up, yaw against the clock.
+- A mission for PX4 (a file of QGroundControl), where the plan is one. It holds waypoints; how fast the vehicle goes
+  between them PX4 shapes itself. Passes to and fro, climbs, held heights and turns on the spot are waypoints. Curves
+  and quick motions are not, and the trajectory flown offboard is what the separations are predicted for. Format:
+  https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html
+- The picture shows where to fly, how high and fast, and how far apart the competing models would be.
+- Steps by hand, which no trajectory and no schedule can hold: what a person does between two recordings, and what it
+  shows.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +25,7 @@ import pandas as pd
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.io.text.writing import all_or_none, rounded
-from rotorid.plan import mission
+from rotorid.plan.candidates import Reference
 from rotorid.plan.handled import Handled
 from rotorid.plan.intervals import SHARE
 from rotorid.plan.plan import BETWEEN_S, Forecast, Plan
@@ -107,7 +111,7 @@ def px4_offboard(plan: Plan) -> pd.DataFrame:
     return out
 
 
-def polynomial(start: np.ndarray, stop: np.ndarray, seconds: float) -> np.ndarray:
+def _polynomial(start: np.ndarray, stop: np.ndarray, seconds: float) -> np.ndarray:
     """Coefficients (8, k), lowest order first, that take value and three derivatives (4, k) from start to stop."""
     powers = np.arange(8)
 
@@ -141,7 +145,7 @@ def crazyflie(plan: Plan) -> tuple[pd.DataFrame, float]:
         while True:
             end = min(at + length, len(t) - 1)
             seconds = t[end] - t[at]
-            fitted = polynomial(states[at], states[end], seconds)
+            fitted = _polynomial(states[at], states[end], seconds)
             powers = np.power(t[at : end + 1, None] - t[at], np.arange(8))
             off = float(np.linalg.norm((powers @ fitted - every[at : end + 1])[:, :3], axis=1).max())
             bend = powers[:, :6] @ (fitted[2:] * (np.arange(2, 8) * np.arange(1, 7))[:, None])
@@ -211,7 +215,7 @@ def _forecast_as_data(flight: Forecast, target: float) -> dict:
     }
 
 
-def summary(plan: Plan) -> dict:
+def _summary(plan: Plan) -> dict:
     """The plan as data, for `plan.json` and for pages."""
     return rounded(
         {
@@ -233,7 +237,7 @@ def text(plan: Plan) -> list[str]:
     out = []
     if plan.pieces:
         out.append(f"Fly for {plan.duration_s:.0f} s (without take-off and landing):")
-        out += [f"  {line}" for line in steps(plan)]
+        out += [f"  {line}" for line in _steps(plan)]
     elif plan.questions:
         out.append(f"No manoeuvre within the limits separates what is open any further: {why_none(plan)}.")
     for _, found in plan.questions:
@@ -249,8 +253,8 @@ def text(plan: Plan) -> list[str]:
             words = "" if other.name == "standard" else f" ({', '.join(dict.fromkeys(p.name for p in other.pieces))})"
             out.append(f"{name}{words}, {other.duration_s:.0f} s: {other.sigma:.1f} standard errors at the least.")
     out += [
-        f"{w.name}: {size(w.before, w.unit)} now, {size(w.after, w.unit)} with this flight"
-        + (f" (wished: {share(w.wished, w.unit)})" if w.wished else "")
+        f"{w.name}: {_size(w.before, w.unit)} now, {_size(w.after, w.unit)} with this flight"
+        + (f" (wished: {_share(w.wished, w.unit)})" if w.wished else "")
         for w in plan.widths
         if plan.pieces or w.wished
     ]
@@ -258,7 +262,7 @@ def text(plan: Plan) -> list[str]:
         out.append(f"No flight with these columns settles {' or '.join(words_of(i) for i in ids)}: {what}.")
     if not out:
         out.append("Nothing is open: no flight is needed to distinguish effects.")
-    return out + in_words(plan)
+    return out + _in_words(plan)
 
 
 def why_none(plan: Plan) -> str:
@@ -273,12 +277,7 @@ def why_none(plan: Plan) -> str:
     )
 
 
-def _open_ids(plan: Plan) -> list[tuple[str, ...]]:
-    """Ids of every class that is open, whether a flight can settle it or not."""
-    return [*(ids for ids, _ in plan.questions), *(ids for ids, _ in plan.unanswerable)]
-
-
-def in_words(plan: Plan) -> list[str]:
+def _in_words(plan: Plan) -> list[str]:
     """Manual steps, as sentences; with the separation where one is predicted."""
     found = {h.of: f" {_expected_by_hand(h, plan.limits.target_sigma)}" for h in plan.by_hand if h.sigma is not None}
     return [f"By hand: {step}.{found.get(i, '')}" for i, step in _manual_steps(plan).items()]
@@ -286,7 +285,8 @@ def in_words(plan: Plan) -> list[str]:
 
 def _manual_steps(plan: Plan) -> dict[str, str]:
     """Manual steps, to the id that each is there for."""
-    return steps_of([i for ids in _open_ids(plan) for i in ids])
+    every = [*(ids for ids, _ in plan.questions), *(ids for ids, _ in plan.unanswerable)]
+    return steps_of([i for ids in every for i in ids])
 
 
 def _expected_by_hand(step: Handled, target: float) -> str:
@@ -320,7 +320,7 @@ def _by_hand_as_data(plan: Plan) -> list[dict]:
     ]
 
 
-def steps(plan: Plan) -> list[str]:
+def _steps(plan: Plan) -> list[str]:
     """The manoeuvres in their order, one that is flown several times in a row once."""
     out, at = [], 0
     while at < len(plan.pieces):
@@ -334,14 +334,14 @@ def steps(plan: Plan) -> list[str]:
     return out
 
 
-def size(value: float, unit: str) -> str:
+def _size(value: float, unit: str) -> str:
     """A half width, or an upper limit, in words."""
     if not np.isfinite(value):
         return "unknown"
-    return f"{'at most' if unit == SHARE else '±'} {share(value, unit)}"
+    return f"{'at most' if unit == SHARE else '±'} {_share(value, unit)}"
 
 
-def share(value: float, unit: str) -> str:
+def _share(value: float, unit: str) -> str:
     """A half width with its unit; relative ones and shares in percent."""
     if unit in ("relative", SHARE):
         return f"{100 * value:.2g} % {unit if unit == SHARE else ''}".rstrip()
@@ -353,12 +353,12 @@ def write(plan: Plan, folder: Path) -> list[Path]:
     names = ["plan.json"]
     if plan.pieces:
         names += ["trajectory.csv", "px4_offboard.csv", "crazyflie.csv", "plan.png"]
-    why = mission.not_a_mission(plan)
+    why = not_a_mission(plan)
     if plan.pieces and not why:
         names.append("px4_mission.plan")
     paths = [folder / name for name in names]
     with all_or_none(*paths) as parts:
-        content = summary(plan)
+        content = _summary(plan)
         if plan.pieces:
             sampled(plan).to_csv(parts[1], index=False, float_format="%.6g", lineterminator="\n")
             px4_offboard(plan).to_csv(parts[2], index=False, float_format="%.6g", lineterminator="\n")
@@ -367,12 +367,10 @@ def write(plan: Plan, folder: Path) -> list[Path]:
             content["crazyflie"] = rounded(
                 {"pieces": len(table), "uploads": -(-len(table) // _PIECES_AT_ONCE), "worst_fit_m": worst}
             )
-            from rotorid.plan.write import draw
-
             draw(plan, parts[4])
             content["px4_mission"] = why or "px4_mission.plan"
             if not why:
-                parts[5].write_text(json.dumps(mission.mission(plan), indent=1) + "\n", encoding="utf-8")
+                parts[5].write_text(json.dumps(mission(plan), indent=1) + "\n", encoding="utf-8")
         parts[0].write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     return paths
 
@@ -426,11 +424,111 @@ def draw(plan: Plan, path: Path) -> None:
     fig.savefig(path, format="png")
 
 
-def by_hand(ids: Sequence[str]) -> tuple[str, ...]:
-    """Manual steps that set one id of a class apart from the others, in the class's order, each once."""
-    return tuple(steps_of(ids).values())
-
-
 def steps_of(ids: Sequence[str]) -> dict[str, str]:
-    """The same, to the id that each step is there for."""
+    """Manual steps that set one id of a class apart from the others, by the id that each is there for, in order."""
     return {i: STEPS[i] for i in dict.fromkeys(ids) if i in STEPS}
+
+
+EARTH_M = 6378137.0
+_STRAIGHT = ("hover", "ladder", "pass", "climb", "face")
+"""First words of the manoeuvres that are waypoints."""
+_STILL = 0.03
+"""Share of the largest speed below which the vehicle turns round or waits."""
+_HELD_S = 0.5
+"""Shorter rests are turns, not waits."""
+TAKE_OFF, WAYPOINT, SPEED, RETURN = 22, 16, 178, 20
+_RELATIVE = 3
+"""MAVLink frame: latitude, longitude, height above home."""
+
+
+@dataclass(frozen=True)
+class _Stop:
+    """A place to go to (north, east, down from the volume's middle), how long to stay, how fast to get there."""
+
+    place_m: np.ndarray
+    yaw_rad: float
+    wait_s: float
+    speed_m_s: float
+
+
+def not_a_mission(plan: Plan) -> str:
+    """Why a plan is no mission; empty where it is one."""
+    others = [p.name for p in plan.pieces if p.name.split()[0] not in _STRAIGHT]
+    if others:
+        return f"no mission: {', '.join(dict.fromkeys(others))} cannot be given as waypoints; fly px4_offboard.csv"
+    if plan.limits.home_deg is None:
+        return "no mission: limits state no home_deg (latitude and longitude of the start)"
+    return ""
+
+
+def _stops(reference: Reference) -> list[_Stop]:
+    """Where a reference turns round or rests, in order."""
+    t = reference.time_s
+    speed = np.linalg.norm(np.gradient(reference.position_m, t, axis=0), axis=1)
+    turning = np.abs(np.gradient(reference.yaw_rad, t))
+    still = (speed <= _STILL * max(speed.max(), 1e-9)) & (turning <= _STILL * max(turning.max(), 1e-9))
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]]))).reshape(-1, 2)
+    out, last = [], 0
+    for start, stop in edges:
+        middle, wait = (start + stop - 1) // 2, float(t[stop - 1] - t[start])
+        way = float(speed[last : start + 1].max())
+        out.append(
+            _Stop(reference.position_m[middle], float(reference.yaw_rad[middle]), wait if wait > _HELD_S else 0.0, way)
+        )
+        last = stop
+    return out
+
+
+def mission(plan: Plan) -> dict:
+    """The plan in the format of a QGroundControl plan file: take-off, waypoints with their speeds, return."""
+    home, middle = plan.limits.home_deg, plan.limits.middle_m
+    items: list[dict] = []
+
+    def add(command: int, params: list, frame: int = _RELATIVE) -> None:
+        height = {"Altitude": params[6], "AltitudeMode": 1, "AMSLAltAboveTerrain": None} if command == WAYPOINT else {}
+        items.append(
+            {
+                "type": "SimpleItem",
+                "autoContinue": True,
+                "command": command,
+                "doJumpId": len(items) + 1,
+                "frame": frame,
+                "params": params,
+            }
+            | height
+        )
+
+    def place(at: np.ndarray) -> list[float]:
+        north, east, height = at[0] + middle[0], at[1] + middle[1], middle[2] - at[2]
+        latitude = home[0] + np.degrees(north / EARTH_M)
+        longitude = home[1] + np.degrees(east / (EARTH_M * np.cos(np.radians(home[0]))))
+        return [round(float(latitude), 8), round(float(longitude), 8), round(float(height), 2)]
+
+    add(TAKE_OFF, [0, 0, 0, 0, *place(np.zeros(3))])
+    fastest = 0.0
+    for stop in _stops(plan.reference):
+        if stop.speed_m_s > 0.1 and abs(stop.speed_m_s - fastest) > 0.05:
+            fastest = stop.speed_m_s
+            add(SPEED, [1, round(fastest, 2), -1, 0, 0, 0, 0], frame=2)
+        add(
+            WAYPOINT,
+            [round(stop.wait_s, 1), 0, 0, round(float(np.degrees(stop.yaw_rad)) % 360, 1), *place(stop.place_m)],
+        )
+    add(RETURN, [0, 0, 0, 0, 0, 0, 0], frame=2)
+    return {
+        "fileType": "Plan",
+        "groundStation": "QGroundControl",
+        "version": 1,
+        "geoFence": {"circles": [], "polygons": [], "version": 2},
+        "rallyPoints": {"points": [], "version": 2},
+        "mission": {
+            "version": 2,
+            "firmwareType": 12,
+            "vehicleType": 2,
+            "cruiseSpeed": plan.limits.speed_m_s,
+            "hoverSpeed": plan.limits.speed_m_s,
+            "globalPlanAltitudeMode": 1,
+            "plannedHomePosition": [*home, 0.0],
+            "items": items,
+        },
+    }

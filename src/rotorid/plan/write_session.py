@@ -38,10 +38,10 @@ def text(plan: SessionPlan) -> list[str]:
         out.append(f"No schedule with these columns settles {' or '.join(words_of(i) for i in ids)}: {what}.")
     if not out:
         out.append("Nothing is open: no further measurement is needed to distinguish effects.")
-    return out + in_words(plan)
+    return out + _in_words(plan)
 
 
-def in_words(plan: SessionPlan) -> list[str]:
+def _in_words(plan: SessionPlan) -> list[str]:
     """Manual steps, as sentences."""
     return [f"By hand: {step}." for step in _manual_steps(plan).values()]
 
@@ -52,7 +52,7 @@ def _manual_steps(plan: SessionPlan) -> dict[str, str]:
     return steps_of([i for ids in every for i in ids])
 
 
-def summary(plan: SessionPlan) -> dict:
+def _summary(plan: SessionPlan) -> dict:
     """The session as data, for `plan.json`."""
     return rounded(
         {
@@ -141,5 +141,5 @@ def write(plan: SessionPlan, folder: Path) -> list[Path]:
             table = plan.table[[*first, *(n for n in plan.table.columns if n not in first)]]
             table.to_csv(parts[1], index=False, float_format="%.6g", lineterminator="\n")
             draw(plan, parts[2])
-        parts[0].write_text(json.dumps(summary(plan), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        parts[0].write_text(json.dumps(_summary(plan), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     return paths

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rotorid.io.text.names import listed
+from rotorid.io.text.wording import listed
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.vehicle import Vehicle
@@ -24,7 +24,7 @@ _MOST_NAMES = 12
 
 
 @dataclass(frozen=True)
-class Basis:
+class _Basis:
     """Time and columns of a set, as they are used."""
 
     recorded_s: float
@@ -49,14 +49,14 @@ class Basis:
         return f"The verdict rests on {said}; {lacks}."
 
 
-def basis_of(recordings: RecordingSet) -> Basis:
+def basis_of(recordings: RecordingSet) -> _Basis:
     """What a set offers to a verdict."""
     with_pauses = recordings.vehicle.kind == "flight"
-    recorded = sum(float(np.ptp(run.time_s)) if with_pauses else recorded_s(run.time_s) for run in recordings.runs)
+    recorded = sum(float(np.ptp(run.time_s)) if with_pauses else _recorded_s(run.time_s) for run in recordings.runs)
     grounded = [on_the_ground_s(run, recordings.vehicle) for run in recordings.runs]
     known = recordings.vehicle.kind == "flight" and any(g is not None for g in grounded)
     ground = sum(g for g in grounded if g is not None)
-    return Basis(
+    return _Basis(
         recorded,
         recorded - ground if known else None,
         ground / recorded if known and recorded > 0 else None,
@@ -64,7 +64,7 @@ def basis_of(recordings: RecordingSet) -> Basis:
     )
 
 
-def recorded_s(time_s: np.ndarray) -> float:
+def _recorded_s(time_s: np.ndarray) -> float:
     """Length of a run, s, without its pauses; `time_s` has shape (n,)."""
     steps = np.diff(time_s)
     if not len(steps):
@@ -105,7 +105,7 @@ def _squares(run: Run, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray] | None
 def missing(recordings: RecordingSet) -> Iterator[str]:
     """Names of what the contract knows for this kind of set and no run has; with a count where some runs have it."""
     runs = recordings.runs
-    for name, ways in wanted(recordings).items():
+    for name, ways in _wanted(recordings).items():
         having = sum(any(run.has(*way) for way in ways) for run in runs)
         if having == 0:
             yield name
@@ -113,7 +113,7 @@ def missing(recordings: RecordingSet) -> Iterator[str]:
             yield f"{name} in {len(runs) - having} of {len(runs)} runs"
 
 
-def wanted(recordings: RecordingSet) -> dict[str, list[tuple[str, ...]]]:
+def _wanted(recordings: RecordingSet) -> dict[str, list[tuple[str, ...]]]:
     """Name of each thing that may be recorded to the columns, any of which in full are it."""
     vehicle, runs = recordings.vehicle, recordings.runs
 

@@ -16,7 +16,7 @@ from math import isclose, isfinite, pi, sqrt
 
 import numpy as np
 
-from rotorid.recordings.doubts import Doubt
+from rotorid.recordings.run import Doubt
 from rotorid.recordings.vehicle import Vehicle
 
 _AIR_KG_M3 = 1.2
@@ -46,14 +46,14 @@ _MOST_UNITS = 3
 _PX4_UNSET_ARM_M = sqrt(2.0)
 """Rotors at ±1 m along x and y."""
 
-RPM, _REV_S = 2 * pi / 60, 2 * pi
+_RPM, _REV_S = 2 * pi / 60, 2 * pi
 _GF, _LB = 9.80665e-3, 0.45359237
 _LENGTHS = {"cm": 1e-2, "mm": 1e-3, "inch": 0.0254, "km": 1e3}
-SPEEDS = {"revolutions per minute": RPM, "revolutions per second": _REV_S}
+_SPEEDS = {"revolutions per minute": _RPM, "revolutions per second": _REV_S}
 _INERTIAS = {
     "g m²": 1e-3, "kg cm²": 1e-4, "kg mm²": 1e-6, "g cm²": 1e-7, "g mm²": 1e-9, "lb in²": _LB * 0.0254**2,
 }  # fmt: skip
-UNITS: dict[tuple[str, ...], dict[str, float]] = {
+_UNITS: dict[tuple[str, ...], dict[str, float]] = {
     ("mass_kg",): {"g": 1e-3, "lb": _LB, "oz": _LB / 16, "t": 1e3},
     ("inertia_kg_m2",): _INERTIAS,
     ("rotor_inertia_kg_m2",): _INERTIAS,
@@ -61,19 +61,19 @@ UNITS: dict[tuple[str, ...], dict[str, float]] = {
     ("rotors",): _LENGTHS,
     ("rotor_radius_m",): {**_LENGTHS, "the diameter": 0.5},
     ("thrust_coefficient_n_s2",): {
-        "gf s²": _GF, "kgf s²": 1e3 * _GF, "mN s²": 1e-3, "N per rpm²": RPM**-2,
+        "gf s²": _GF, "kgf s²": 1e3 * _GF, "mN s²": 1e-3, "N per rpm²": _RPM**-2,
         "N per (rev/s)²": _REV_S**-2,
     },
     ("torque_coefficient_n_m_s2",): {
         "N mm s²": 1e-3, "gf cm s²": _GF * 1e-2, "gf m s²": _GF,
-        "N m per rpm²": RPM**-2, "N m per (rev/s)²": _REV_S**-2,
+        "N m per rpm²": _RPM**-2, "N m per (rev/s)²": _REV_S**-2,
     },
-    ("rotor_speeds",): SPEEDS,
-    ("rotor_speed_limits_rad_s",): SPEEDS,
+    ("rotor_speeds",): _SPEEDS,
+    ("rotor_speed_limits_rad_s",): _SPEEDS,
     ("rotors", "rotor_radius_m"): _LENGTHS,
     ("mass_kg", "inertia_kg_m2"): {"g and g m²": 1e-3},
     ("thrust_coefficient_n_s2", "torque_coefficient_n_m_s2"): {
-        "N per rpm² and N m per rpm²": RPM**-2, "gf s² and gf m s²": _GF,
+        "N per rpm² and N m per rpm²": _RPM**-2, "gf s² and gf m s²": _GF,
     },
 }  # fmt: skip
 """Values that may be wrong together, each with units in which they may have been written, as factors to SI."""
@@ -132,7 +132,7 @@ class Body:
 
 
 @dataclass(frozen=True)
-class CoupledNumber:
+class _CoupledNumber:
     """A number that couples believed values, and where it has to lie."""
 
     keys: tuple[str, ...]
@@ -181,7 +181,7 @@ def body_of(vehicle: Vehicle, flown: RotorsInAir | None) -> Body | None:
     )
 
 
-def quantities(body: Body) -> Iterator[CoupledNumber]:
+def quantities(body: Body) -> Iterator[_CoupledNumber]:
     """What couples the believed values, as far as they are stated."""
     radius, c_f = body.radius_m, body.thrust_coefficient_n_s2
     stated = body.rotor_radius_m is not None
@@ -190,21 +190,21 @@ def quantities(body: Body) -> Iterator[CoupledNumber]:
     if body.mass_kg and body.inertia_kg_m2 and body.rotors:
         for moment in (min(body.inertia_kg_m2), max(body.inertia_kg_m2)):
             gyration = sqrt(moment / body.mass_kg)
-            yield CoupledNumber(
+            yield _CoupledNumber(
                 ("inertia_kg_m2", "mass_kg", "rotors"),
                 gyration / body.rotors,
                 _GYRATION_ARMS,
                 f"a radius of gyration of {gyration:.3g} m with arms of {body.rotors:.3g} m",
             )
     if body.rotors:
-        yield CoupledNumber(
+        yield _CoupledNumber(
             ("rotors", length),
             body.rotors / radius,
             _SPAN_RADII,
             f"arms of {body.rotors:.3g} m with {disc}",
         )
     if stated:
-        yield CoupledNumber(
+        yield _CoupledNumber(
             ("rotor_radius_m", "thrust_coefficient_n_s2"),
             c_f / (_AIR_KG_M3 * pi * radius**4),
             _C_T,
@@ -212,7 +212,7 @@ def quantities(body: Body) -> Iterator[CoupledNumber]:
         )
     if body.torque_coefficient_n_m_s2:
         merit = c_f**1.5 / (body.torque_coefficient_n_m_s2 * sqrt(2 * _AIR_KG_M3 * pi) * radius)
-        yield CoupledNumber(
+        yield _CoupledNumber(
             ("torque_coefficient_n_m_s2", "thrust_coefficient_n_s2", length),
             merit,
             _FIGURE_OF_MERIT if stated else _ROUGH_FIGURE_OF_MERIT,
@@ -221,13 +221,13 @@ def quantities(body: Body) -> Iterator[CoupledNumber]:
         )
     if body.mass_kg:
         loading = body.mass_kg * 9.81 / (body.count * pi * radius**2)
-        yield CoupledNumber(
+        yield _CoupledNumber(
             ("mass_kg", length), loading, _DISC_LOADING_N_M2, f"a disc loading of {loading:.3g} N/m² with {disc}"
         )
     if body.rotor_speeds:
         yield from _turning(body, disc)
     if body.accelerometer_position_m and body.rotors:
-        yield CoupledNumber(
+        yield _CoupledNumber(
             ("accelerometer_position_m", "rotors"),
             body.accelerometer_position_m / body.rotors,
             _PLACE_ARMS,
@@ -235,7 +235,7 @@ def quantities(body: Body) -> Iterator[CoupledNumber]:
         )
     if body.rotor_inertia_kg_m2 and body.mass_kg:
         share = body.rotor_inertia_kg_m2 / (body.mass_kg * radius**2)
-        yield CoupledNumber(
+        yield _CoupledNumber(
             ("rotor_inertia_kg_m2", "mass_kg", length),
             share,
             _ROTOR_INERTIA,
@@ -243,17 +243,17 @@ def quantities(body: Body) -> Iterator[CoupledNumber]:
         )
 
 
-def _turning(body: Body, disc: str) -> Iterator[CoupledNumber]:
+def _turning(body: Body, disc: str) -> Iterator[_CoupledNumber]:
     """What couples the values with the rotor speeds."""
     hover, top = body.rotor_speeds
     source = "rotor_speed_limits_rad_s" if body.by_throttle else "rotor_speeds"
     tip = top * body.radius_m
-    yield CoupledNumber(
+    yield _CoupledNumber(
         (source, "rotor_radius_m"), tip, (0.0, _HIGHEST_TIP_M_S), f"a tip speed of {tip:.3g} m/s with {disc}"
     )
     if body.mass_kg and body.lift_m_s2:
         ratio = body.count * body.thrust_coefficient_n_s2 * hover**2 / (body.mass_kg * body.lift_m_s2)
-        yield CoupledNumber(
+        yield _CoupledNumber(
             ("mass_kg", "thrust_coefficient_n_s2", source),
             ratio,
             _WEIGHT_BY_THROTTLE if body.by_throttle else _WEIGHT,
@@ -261,7 +261,7 @@ def _turning(body: Body, disc: str) -> Iterator[CoupledNumber]:
         )
         if body.rotor_speed_limits_rad_s and not body.by_throttle:
             share = body.rotor_speed_limits_rad_s / hover
-            yield CoupledNumber(
+            yield _CoupledNumber(
                 ("rotor_speed_limits_rad_s", "rotor_speeds"),
                 share,
                 _LIMIT_OVER_HOVER,
@@ -292,7 +292,7 @@ def _remedies(body: Body) -> Iterator[_Remedy]:
         spoils = any(a and not b for a, b in zip(before, after, strict=True))
         return len(before) if spoils else after.count(False)
 
-    for keys, units in UNITS.items():
+    for keys, units in _UNITS.items():
         if any(getattr(body, key) is None for key in keys) or (body.by_throttle and keys == ("rotor_speeds",)):
             continue
         by_unit = {unit: left(keys, factor) for unit, factor in units.items()}
@@ -306,7 +306,7 @@ def _remedies(body: Body) -> Iterator[_Remedy]:
         yield _Remedy(keys, factors, int(least), tuple(nearest))
 
 
-def unfit(body: Body) -> list[CoupledNumber]:
+def unfit(body: Body) -> list[_CoupledNumber]:
     """The quantities that lie outside their limits."""
     return [q for q in quantities(body) if not q.fits]
 
@@ -331,7 +331,7 @@ def impossible(body: Body, column: str) -> Iterator[Doubt]:
         body = mended
 
 
-def _doubt(body: Body, best: _Remedy, raised_by: Sequence[CoupledNumber], others: Sequence[str], column: str) -> Doubt:
+def _doubt(body: Body, best: _Remedy, raised_by: Sequence[_CoupledNumber], others: Sequence[str], column: str) -> Doubt:
     """The doubt of a value, with what raised it, what was expected and which unit would fit."""
 
     def name(key: str) -> str:

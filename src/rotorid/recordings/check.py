@@ -28,9 +28,8 @@ import numpy as np
 import pandas as pd
 from scipy.signal import fftconvolve
 
-from rotorid.io.text.names import listed
+from rotorid.io.text.wording import listed
 from rotorid.recordings import columns as c
-from rotorid.recordings.doubts import Doubt
 from rotorid.recordings.files import RUN_SUFFIXES, read_set, run_name
 from rotorid.recordings.held import (
     OTHERS_GO_ON,
@@ -45,24 +44,24 @@ from rotorid.recordings.held import (
     standing_together,
 )
 from rotorid.recordings.physics import gravity, impossible_values, near_names, physical_doubts, voltages
-from rotorid.recordings.run import RecordingSet, Run
+from rotorid.recordings.run import Doubt, RecordingSet, Run
 from rotorid.recordings.sufficient import SENSORS, compared_readings, rotor_groups, sufficient
 from rotorid.recordings.vehicle import Vehicle
 
 _STILL_S = 1.0
 """A sensor of a flight that repeats one reading for so long is named."""
 _TABLES = ("csv", "tsv", "parquet", "feather", "xlsx", "xls", "ods", "h5", "hdf5", "mat", "npz")
-LOGS = ("ulg", "bin", "bbl", "bfl", "mcap", "db3", "bag", "tlog")
+_LOGS = ("ulg", "bin", "bbl", "bfl", "mcap", "db3", "bag", "tlog")
 _PACKED = ("zip", "gz", "bz2", "xz", "zst", "7z", "tar", "tgz")
 _LEFT_BEHIND = ("bak", "old", "orig", "part", "tmp", "copy", "crdownload")
-RECORDING = re.compile(
-    rf"\.({'|'.join(_TABLES + LOGS + _PACKED)})(\.({'|'.join(_PACKED + _LEFT_BEHIND)})|~)*$", re.IGNORECASE
+_RECORDING = re.compile(
+    rf"\.({'|'.join(_TABLES + _LOGS + _PACKED)})(\.({'|'.join(_PACKED + _LEFT_BEHIND)})|~)*$", re.IGNORECASE
 )
 _NOISY = (*c.SPECIFIC_FORCE, *c.ANGULAR_VELOCITY, *c.FORCE, *c.MOMENT)
 """Columns with white noise of their own; commands and loads may repeat truly, what a filter made is smooth."""
 _LEAST_EQUAL, _LEAST_NOISY = 2, 3
 """Columns that must agree: to the last digit, or in their noise."""
-_LEAST_ROWS, LEAST_SHARE = 20, 0.05
+_LEAST_ROWS, _LEAST_SHARE = 20, 0.05
 """Equal samples, and their share of the shorter run, from which two runs overlap."""
 _BY_CHANCE = 3.0
 """So many times as often as within one run: readings in coarse steps repeat by themselves."""
@@ -194,10 +193,10 @@ def _slow_speeds(recordings: RecordingSet) -> list[str]:
 
 def check_set(recordings: RecordingSet) -> SetCheck:
     """What a set contains, lacks, and what in it is in doubt."""
-    return replace(contents(recordings), doubts=doubts_of(recordings))
+    return replace(_contents(recordings), doubts=doubts_of(recordings))
 
 
-def contents(recordings: RecordingSet) -> SetCheck:
+def _contents(recordings: RecordingSet) -> SetCheck:
     """What a set contains and lacks; what cannot be right is not looked for."""
     vehicle = recordings.vehicle
 
@@ -276,7 +275,7 @@ def as_text(check: SetCheck) -> str:
 def check_recordings(recordings: RecordingSet) -> SetCheck:
     """What a set contains and lacks, useless runs named; InputError if nothing in it can be compared."""
     usable = sufficient(recordings)
-    found = contents(recordings)
+    found = _contents(recordings)
     # A run that is left out would raise doubts about values that no verdict takes from it.
     return replace(found, lacks=(*usable.left_out, *found.lacks), doubts=doubts_of(usable))
 
@@ -334,7 +333,7 @@ def _equal_samples(runs: tuple[Run, ...], names: list[str]) -> Iterator[tuple[st
     pairs = pairs[pairs["run"] != pairs["run_first"]]
     for (a, b), equal in pairs.groupby(["run_first", "run"]):
         share = len(equal) / min(sizes[a], sizes[b])
-        least = max(LEAST_SHARE, _BY_CHANCE * max(repeated[a], repeated[b]))
+        least = max(_LEAST_SHARE, _BY_CHANCE * max(repeated[a], repeated[b]))
         if len(equal) >= _LEAST_ROWS and share >= least:
             yield runs[a].name, runs[b].name, share, float((equal["time_s"] - equal["time_s_first"]).median())
 
@@ -396,7 +395,7 @@ def _unread_files(recordings: RecordingSet) -> tuple[Doubt, ...]:
             stops=False,
         )
         for name in names
-        if RECORDING.search(name) and run_name(Path(name)) is None
+        if _RECORDING.search(name) and run_name(Path(name)) is None
     )
 
 

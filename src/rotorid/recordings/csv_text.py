@@ -17,8 +17,16 @@ from pathlib import Path
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.io.text.bounds import LARGEST_FILE, LEAST_UNPACKED, MOST_CELLS, MOST_GZIP_MEMBERS, MOST_ROWS, MOST_UNPACKED
-from rotorid.io.text.files import check_file, check_text
+from rotorid.io.text.files import (
+    LARGEST_FILE,
+    LEAST_UNPACKED,
+    MOST_CELLS,
+    MOST_GZIP_MEMBERS,
+    MOST_ROWS,
+    MOST_UNPACKED,
+    check_file,
+    check_text,
+)
 from rotorid.io.text.wording import printable
 
 _BLOCK = 1 << 20
@@ -51,11 +59,11 @@ class _Content(io.RawIOBase):
 
 def opened(path: Path) -> io.BufferedReader:
     """The file's unpacked content, to be read once `look_through` has found it sound."""
-    return io.BufferedReader(_Content(blocks(path)), _BLOCK)
+    return io.BufferedReader(_Content(_blocks(path)), _BLOCK)
 
 
 @dataclass(frozen=True)
-class Layout:
+class _CsvLayout:
     """How a table is written: names of its columns, the sign between them, and what is no row of it."""
 
     names: list[str]
@@ -68,7 +76,7 @@ class Layout:
     """Whether the last line ends before its last cell."""
 
 
-def look_through(path: Path, foreign: bool = False) -> Layout:
+def look_through(path: Path, foreign: bool = False) -> _CsvLayout:
     """How the table of a file is written.
 
     `foreign`: a table of one's own, not of a recording set. Its columns may be separated by semicolons, tabs, bars or
@@ -104,7 +112,7 @@ def check_size(rows: int, columns: int, where: object) -> None:
             raise InputError(f"{where}: has more than {most} {what}, expected at most that; cut it into several runs")
 
 
-def blocks(path: Path) -> Iterator[bytes]:
+def _blocks(path: Path) -> Iterator[bytes]:
     """The file's content, unpacked, block by block; InputError where it is too large or no whole gzip file."""
     size = check_file(path)
     if size > LARGEST_FILE:
@@ -157,7 +165,7 @@ def _unpacked(packed_blocks: Iterator[bytes], size: int, path: Path) -> Iterator
 def _whole_lines(path: Path) -> Iterator[tuple[int, bytes]]:
     """Parts of the text that end where a line ends, each with the number of its first line, counted from 1."""
     line, rest, end_of_line = 1, b"", b""
-    for number, block in enumerate(blocks(path)):
+    for number, block in enumerate(_blocks(path)):
         text = rest + (block.removeprefix(_BYTE_ORDER_MARK) if number == 0 else block)
         end_of_line = end_of_line or next((sign for sign in (b"\n", b"\r") if sign in text), b"")
         stop = text.rfind(end_of_line) + 1 if end_of_line else 0
@@ -174,7 +182,7 @@ def _whole_lines(path: Path) -> Iterator[tuple[int, bytes]]:
         yield line, rest
 
 
-def _heading(text: bytes, path: Path, foreign: bool) -> tuple[Layout, bytes]:
+def _heading(text: bytes, path: Path, foreign: bool) -> tuple[_CsvLayout, bytes]:
     """How the table is written by the beginning of its text, and the text from the last line of the heading on."""
     if foreign and (below := _below_other_lines(text, path)) is not None:
         layout, rest = below
@@ -194,7 +202,7 @@ def _heading(text: bytes, path: Path, foreign: bool) -> tuple[Layout, bytes]:
         separator = " "
     names = _names(first, separator)
     check_heading(_numbered(names) if foreign else names, path)
-    return Layout(_numbered(names) if foreign else names, separator), text
+    return _CsvLayout(_numbered(names) if foreign else names, separator), text
 
 
 def _separator(line: str) -> str:
@@ -206,7 +214,7 @@ def _numbered(names: list[str]) -> list[str]:
     return [name or f"column_{number}" for number, name in enumerate(names, 1)]
 
 
-def _below_other_lines(text: bytes, path: Path) -> tuple[Layout, bytes] | None:
+def _below_other_lines(text: bytes, path: Path) -> tuple[_CsvLayout, bytes] | None:
     """The layout of a table with other lines above its heading, or several of heading; None where line 1 is all.
 
     A heading is what stands above three rows of numbers with as many cells. Where it names columns alike, or nothing
@@ -238,7 +246,7 @@ def _below_other_lines(text: bytes, path: Path) -> tuple[Layout, bytes] | None:
             first -= 1
             names = [" ".join(filter(None, pair)) for pair in zip(cells[first][0], names, strict=True)]
         above = tuple(line.decode("utf-8").strip() for line in lines[:first] if line.strip())
-        return Layout(_numbered(names), sign, above, k + 1), b"\n".join(text.split(b"\n", k)[k:])
+        return _CsvLayout(_numbered(names), sign, above, k + 1), b"\n".join(text.split(b"\n", k)[k:])
     return None
 
 
@@ -300,7 +308,7 @@ def _check_cells(text: bytes, first_line: int, count: int, separator: str, path:
     return False
 
 
-def _check_quoted(path: Path, layout: Layout, foreign: bool) -> bool:
+def _check_quoted(path: Path, layout: _CsvLayout, foreign: bool) -> bool:
     """The same where some cells stand in quotes."""
     count, short = len(layout.names), None
     with io.TextIOWrapper(opened(path), "utf-8-sig", newline="") as text:

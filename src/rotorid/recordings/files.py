@@ -24,14 +24,11 @@ import yaml
 from pydantic import ValidationError
 
 from rotorid.errors import InputError
-from rotorid.io.text.bounds import MOST_CELLS, MOST_RUNS
-from rotorid.io.text.files import check_file, read_text, read_yaml, with_exponents
-from rotorid.io.text.names import hint, listed, neighbour
-from rotorid.io.text.wording import explain, printable
+from rotorid.io.text.files import MOST_CELLS, MOST_RUNS, check_file, read_text, read_yaml, with_exponents
+from rotorid.io.text.wording import explain, hint, listed, neighbour, printable
 from rotorid.io.text.writing import all_or_none, staging, take_name
 from rotorid.recordings import columns as c
-from rotorid.recordings.doubts import Doubt
-from rotorid.recordings.run import RecordingSet, Run
+from rotorid.recordings.run import Doubt, RecordingSet, Run
 from rotorid.recordings.tables import (
     UnusableRun,
     check_table,

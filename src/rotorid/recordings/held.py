@@ -29,9 +29,9 @@ _LEAST_JUMP = 5.0
 
 _LONG_S = 2.0
 """Readings without noise that repeat for so long did not stand truly where what they must follow moves."""
-BLOCK_S = 0.2
+_BLOCK_S = 0.2
 _BEYOND_NOISE = 3.0
-"""Times the scatter of means over `BLOCK_S` by noise alone from which a column moves."""
+"""Times the scatter of means over `_BLOCK_S` by noise alone from which a column moves."""
 _ROUNDING = 1e-9
 _DRIVEN = 0.5
 """Share of what rotors are usually given from which on a vehicle flies."""
@@ -168,12 +168,12 @@ def at_the_end(values: np.ndarray, mask: np.ndarray) -> bool:
 
 
 def moves(time_s: np.ndarray, values: np.ndarray) -> bool:
-    """Whether a column (n,) changes by more than its noise: by means over `BLOCK_S`, against the scatter in them."""
+    """Whether a column (n,) changes by more than its noise: by means over `_BLOCK_S`, against the scatter in them."""
     known = np.isfinite(values)
     time_s, values = time_s[known], values[known]
     if len(values) < 10:
         return False
-    block = ((time_s - time_s[0]) / BLOCK_S).astype(int)
+    block = ((time_s - time_s[0]) / _BLOCK_S).astype(int)
     count = np.bincount(block)
     full = count > 0.5 * count.max()
     means = np.bincount(block, values)[full] / count[full]
@@ -182,7 +182,7 @@ def moves(time_s: np.ndarray, values: np.ndarray) -> bool:
     return full.sum() > 4 and bool(np.std(means) > least)
 
 
-def driven(run: Run, names: tuple[str, ...], mask: np.ndarray) -> bool:
+def _driven(run: Run, names: tuple[str, ...], mask: np.ndarray) -> bool:
     """Whether rotors are given in a mask (n,) at least half of what they usually are elsewhere, and something."""
     given = run.array(names).mean(axis=1)
     inside, outside = given[mask & np.isfinite(given)], given[~mask & np.isfinite(given)]
@@ -200,5 +200,5 @@ def standing_together(run: Run, vehicle: Vehicle, names: tuple[str, ...]) -> lis
     return [
         (mask, p)
         for mask, p in found
-        if np.ptp(run.time_s[mask]) >= _LONG_S and driven(run, names, mask) and contradicted(mask)
+        if np.ptp(run.time_s[mask]) >= _LONG_S and _driven(run, names, mask) and contradicted(mask)
     ]

@@ -15,14 +15,13 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rotorid.io.text.names import listed
+from rotorid.io.text.wording import listed
 from rotorid.recordings import columns as c
 from rotorid.recordings.body import Body, RotorsInAir, body_of, impossible, quantities
-from rotorid.recordings.doubts import Doubt
-from rotorid.recordings.run import RecordingSet, Run
+from rotorid.recordings.run import Doubt, RecordingSet, Run
 from rotorid.recordings.vehicle import Vehicle
 
-STEP_S = 0.02
+_STEP_S = 0.02
 """Step of the common clock; what is compared is slower than some hertz."""
 _SMOOTH_S = 0.1
 _LONGEST_GAP_S = 0.25
@@ -35,18 +34,18 @@ _LEAST_TURNING_RAD_S = 0.05
 """Spread of a body rate below which nothing can be said of it."""
 _AGREES, _CONTRADICTS = 0.5, -0.3
 """Correlations: above, two signals agree; below, one of them is turned round."""
-TOP = 0.99
+_TOP = 0.99
 """Share of the rotor speeds below their highest that counts: single samples may be faults."""
 _SAME_UNIT = (0.2, 5.0)
 """Of two signals that agree, the ratio of their spreads that noise and smoothing explain."""
-SLOW_S, _LATEST_STEPS, _LEAST_EXPLAINED = 0.5, 4, 0.4
+_SLOW_S, _LATEST_STEPS, _LEAST_EXPLAINED = 0.5, 4, 0.4
 """Regression of turning on rotor speeds: slower changes left out, latest lag tried, least share explained."""
-SURE_Z, _ALIKE, _RIDGE = 6.0, 5.0, 0.02
+_SURE_Z, _ALIKE, _RIDGE = 6.0, 5.0, 0.02
 """Standard errors by which a rotor's sign must be sure; samples that count as one; ridge, a share of the regressors."""
 _DEGREE = np.pi / 180
 _LEAST_RATE_HZ = {"rotor speeds": 25.0, "body rates": 50.0, "accelerometer": 50.0, "attitude": 20.0}
 _LEAST_TIME_S = 20.0
-MOST_S = 7200.0
+_MOST_S = 7200.0
 """How much of a run is looked at: a clock that was set on the way would need more memory than there is."""
 _AT_REST = 0.2
 """Share of the median rotor speed below which a rotor counts as at rest."""
@@ -94,7 +93,7 @@ def _clock(run: Run) -> np.ndarray | None:
     duration = float(run.time_s[-1] - run.time_s[0])
     if not duration > 2.0:
         return None
-    return np.arange(run.time_s[0], run.time_s[0] + min(duration, MOST_S), STEP_S)
+    return np.arange(run.time_s[0], run.time_s[0] + min(duration, _MOST_S), _STEP_S)
 
 
 def _on(run: Run, clock: np.ndarray, names: tuple[str, ...], smooth_s: float = _SMOOTH_S) -> np.ndarray | None:
@@ -139,7 +138,7 @@ def _correlation(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.corrcoef(a, b)[0, 1])
 
 
-def flown(run: Run, vehicle: Vehicle) -> RotorsInAir | None:
+def _flown(run: Run, vehicle: Vehicle) -> RotorsInAir | None:
     """What a run says about the rotors in the air (on a stand: turning); None where it is short or says nothing."""
     clock = _clock(run)
     speeds = None if clock is None else _speeds(run, clock, vehicle)
@@ -157,7 +156,7 @@ def flown(run: Run, vehicle: Vehicle) -> RotorsInAir | None:
     column = next(n[0] for k in kinds if run.has(*(n := c.rotor_columns(k, vehicle.rotor_count))))
     return RotorsInAir(
         hover_rad_s=float(np.sqrt(thrust / coefficients.sum())),
-        top_rad_s=float(np.nanquantile(speeds, TOP)),
+        top_rad_s=float(np.nanquantile(speeds, _TOP)),
         lift_m_s2=lift if vehicle.kind == "flight" else None,
         column=column,
     )
@@ -166,7 +165,7 @@ def flown(run: Run, vehicle: Vehicle) -> RotorsInAir | None:
 def impossible_values(recordings: RecordingSet) -> tuple[Doubt, ...]:
     """Believed values that no multirotor has together, by the rotor speeds of each run; each value once."""
     vehicle = recordings.vehicle
-    speeds = {run.name: x for run in recordings.runs if (x := flown(run, vehicle))} or {"": None}
+    speeds = {run.name: x for run in recordings.runs if (x := _flown(run, vehicle))} or {"": None}
     alike: dict[tuple[int, ...], list[str]] = {}
     bodies: dict[tuple[int, ...], tuple[Body, str]] = {}
     for run, turning in speeds.items():
@@ -278,7 +277,7 @@ def _rates_of_attitude(attitude: np.ndarray) -> np.ndarray:
     both = known[:-2] & known[2:]
     first, last = attitude[:-2][both], attitude[2:][both]
     turn = Rotation.from_quat(first[:, [1, 2, 3, 0]]).inv() * Rotation.from_quat(last[:, [1, 2, 3, 0]])
-    out[1:-1][both] = turn.as_rotvec() / (2 * STEP_S)
+    out[1:-1][both] = turn.as_rotvec() / (2 * _STEP_S)
     return out
 
 
@@ -333,7 +332,7 @@ def _world(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
     attitude, force = _on(run, clock, c.QUATERNION), _on(run, clock, c.SPECIFIC_FORCE)
     velocity, position = _on(run, clock, c.VELOCITY), _on(run, clock, c.POSITION)
     if velocity is not None and position is not None:
-        derived = np.gradient(position, STEP_S, axis=0)
+        derived = np.gradient(position, _STEP_S, axis=0)
         for k, axis in enumerate("xyz"):
             if np.nanstd(velocity[:, k]) > 0.2:
                 r = _correlation(velocity[:, k], derived[:, k])
@@ -375,7 +374,7 @@ def _world(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
         )
     if velocity is None:
         return
-    change = np.gradient(velocity, STEP_S, axis=0)[known]
+    change = np.gradient(velocity, _STEP_S, axis=0)[known]
     for k, axis in enumerate("xy"):
         if np.nanstd(world[:, k]) > 0.5 and np.nanstd(change[:, k]) > 0.5:
             r = _correlation(world[:, k], change[:, k])
@@ -389,8 +388,8 @@ def _world(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
 
 
 def _band(values: np.ndarray) -> np.ndarray:
-    """What is faster than `SLOW_S`: the values less their mean over it, (n, k)."""
-    width = int(SLOW_S / STEP_S)
+    """What is faster than `_SLOW_S`: the values less their mean over it, (n, k)."""
+    width = int(_SLOW_S / _STEP_S)
     total = np.vstack([np.zeros(values.shape[1]), np.cumsum(values, axis=0)])
     index = np.arange(len(values))
     first, last = np.maximum(index - width // 2, 0), np.minimum(index + width // 2 + 1, len(values))
@@ -407,7 +406,7 @@ def _pushes(speeds: np.ndarray, gyro: np.ndarray) -> np.ndarray | None:
     if known.mean() < 0.8 or not (np.ptp(speeds[known], axis=0) > 0).any():
         return None
     clean = [np.where(known[:, None], x, np.nanmean(x, axis=0)) for x in (speeds**2, gyro)]
-    push, turning = _band(clean[0] / clean[0].mean()), np.gradient(_band(clean[1]), STEP_S, axis=0)[:, :2]
+    push, turning = _band(clean[0] / clean[0].mean()), np.gradient(_band(clean[1]), _STEP_S, axis=0)[:, :2]
     # All rotors together turn nothing: what they share is left out, and a mixture hardly flown is held small (ridge).
     push = push - push.mean(axis=1, keepdims=True)
     held = _RIDGE * np.trace(push.T @ push) / push.shape[1] * np.eye(push.shape[1])
@@ -421,13 +420,13 @@ def _pushes(speeds: np.ndarray, gyro: np.ndarray) -> np.ndarray | None:
         if best is None or explained > best[0]:
             # Neighbours are alike over a few samples: errors by as many fewer.
             spread = np.sqrt(np.diag(inverse @ x.T @ x @ inverse)[:, None] * rest.var(axis=0) * _ALIKE)
-            best = explained, np.where(np.abs(fit) > SURE_Z * spread, np.sign(fit), 0.0).T
+            best = explained, np.where(np.abs(fit) > _SURE_Z * spread, np.sign(fit), 0.0).T
     return best[1] if best is not None and best[0] > _LEAST_EXPLAINED else None
 
 
 def _rotors(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
     """Whether each rotor turns the vehicle as its place says; if not, where it seems to sit."""
-    speeds, gyro = _speeds(run, clock, vehicle, 2 * STEP_S), _on(run, clock, c.ANGULAR_VELOCITY, 2 * STEP_S)
+    speeds, gyro = _speeds(run, clock, vehicle, 2 * _STEP_S), _on(run, clock, c.ANGULAR_VELOCITY, 2 * _STEP_S)
     if speeds is None or gyro is None or vehicle.rotor_count < 3:
         return
     if not (np.nanstd(gyro[:, :2], axis=0) > _LEAST_TURNING_RAD_S).all():

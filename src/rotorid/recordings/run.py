@@ -1,4 +1,4 @@
-"""A run (one recording) and a recording set (one vehicle with its runs)."""
+"""A run (one recording), a recording set (one vehicle with its runs), and what is doubtful in a set."""
 
 from __future__ import annotations
 
@@ -9,8 +9,23 @@ import numpy as np
 import pandas as pd
 
 from rotorid.recordings import columns as c
-from rotorid.recordings.doubts import Doubt
 from rotorid.recordings.vehicle import Vehicle
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """One thing in a set that is probably not as stated."""
+
+    what: str
+    """Key of vehicle.yaml (`mass_kg`), column (`angular_velocity_x_rad_s`), file or run that is in doubt."""
+    sentence: str
+    """What was found, what was expected and, where one is known, what would explain it."""
+    stops: bool
+    """Whether a verdict would be about this mistake: a unit, an axis, an order, or mass or inertia by more than a
+    factor of two."""
+
+    def __str__(self) -> str:
+        return self.sentence
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,8 @@
-"""Single wrong readings of a sensor: bits lost on a serial line, a telemetry frame that reads 0 or double.
+"""Single wrong readings of a sensor: bits lost on a serial line, a telemetry frame that reads 0 or double, lost pulses.
 
-They are few, alone or in pairs, and far from the readings before and after. What a fast motion or a vibration gives
-changes with its neighbours and differs from spikes in that there is no gap between usual and far.
+Spikes are few, alone or in pairs, and far from the readings before and after. What a fast motion or a vibration gives
+changes with its neighbours and differs from spikes in that there is no gap between usual and far. The points of a rotor
+test whose speed sensor lost pulses are found by their thrust.
 """
 
 from __future__ import annotations
@@ -31,6 +32,12 @@ _LEAST_SPIKES = 3
 """Fewer in all runs may be what a vehicle does once: a bump, a touch of the ground."""
 _REPEATED = 0.1
 """Share of the spikes that one value must have to be named."""
+_TOO_SLOW = 1.35
+"""A point whose F/ω² exceeds the run's median by this factor has lost part of its speed pulses.
+
+An offset of the balance or a curve that bends makes the low points' F/ω² smaller, not larger, in these data,
+so the rule is one-sided: it must not remove what the offset explains.
+"""
 
 
 def without_spikes(recordings: RecordingSet) -> RecordingSet:
@@ -100,3 +107,12 @@ def _sentence(runs: tuple[Run, ...], name: str, masks: dict[tuple[str, str], np.
         f"{name}: {len(values)} readings ({100 * len(values) / read:.2g} %) are spikes, single readings far from "
         f"those before and after them{repeated}: left out."
     )
+
+
+def lost_speed(speed_rad_s: np.ndarray, thrust_n: np.ndarray) -> np.ndarray:
+    """Points that turn but whose speed is too low for their thrust, shape (n,), bool."""
+    turning = speed_rad_s > 0
+    if not turning.any():
+        return turning
+    ratio = np.where(turning, thrust_n, 0.0) / np.where(turning, speed_rad_s, 1.0) ** 2
+    return turning & (ratio > _TOO_SLOW * np.median(ratio[turning]))

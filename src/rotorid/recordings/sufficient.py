@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.io.text.names import listed, nearest, plain
+from rotorid.io.text.wording import listed, nearest, plain
 from rotorid.recordings import columns as c
 from rotorid.recordings.own_rates import (
     LEAST_SINGLE_S,
@@ -31,7 +31,7 @@ _LEAST_FLIGHT_HZ = 2.0
 _LEAST_STRETCH_SAMPLES = 30
 """A stretch of flight without a hole must last LEAST_STRETCH_S, and so many samples of its slowest sensor. Of a single
 run (LEAST_SINGLE_S) a third is held out, after a gap of two seconds; both parts need two seconds."""
-_SINGLE_GAP_S, HELD_OUT_SHARE = 2.0, 1 / 3
+_SINGLE_GAP_S, _HELD_OUT_SHARE = 2.0, 1 / 3
 """Of a single run this share is held out, after a gap."""
 _LEAST_READINGS = 10
 """Readings of a stand or a bench that are there in every compared channel at once, in a run."""
@@ -106,7 +106,7 @@ def _without_dead_sensors(recordings: RecordingSet) -> RecordingSet:
     speeds, *ordered = rotor_groups(recordings.vehicle).values()
     turn = any(run.has(*speeds) and np.nanmax(run.array(speeds)) > 0 for run in recordings.runs)
     dead += [names for names in ordered if turn and _holds_one_value(recordings.runs, names, 0.0)]
-    if c.QUATERNION in dead and any(no_attitude(run, recordings.vehicle) for run in recordings.runs):
+    if c.QUATERNION in dead and any(_no_attitude(run, recordings.vehicle) for run in recordings.runs):
         dead.remove(c.QUATERNION)
     if not dead:
         return recordings
@@ -145,17 +145,17 @@ def _with_alike_runs(recordings: RecordingSet) -> RecordingSet:
             said.append(f"Left out: {_whereof(run)}: lacks sensors that the other runs have (for {lost}).")
         kept = tuple(run for run in recordings.runs if run not in poor)
         return replace(recordings, runs=kept, left_out=tuple(said))
-    partly = [names for names in SENSORS if not all(reads(run, names) for run in recordings.runs)]
-    if all(reads(run, c.VELOCITY) or reads(run, c.POSITION) for run in recordings.runs):
+    partly = [names for names in SENSORS if not all(_reads(run, names) for run in recordings.runs)]
+    if all(_reads(run, c.VELOCITY) or _reads(run, c.POSITION) for run in recordings.runs):
         partly = [names for names in partly if names not in (c.VELOCITY, c.POSITION)]
-    dropped = [names for names in partly if any(reads(run, names) for run in recordings.runs)]
+    dropped = [names for names in partly if any(_reads(run, names) for run in recordings.runs)]
     said += [f"Left out: {names[0]} to {names[-1]} are not recorded in every run." for names in dropped]
     gone = {name for names in partly for name in names}
     runs = (replace(r, table=r.table.drop(columns=[n for n in gone if n in r.table])) for r in recordings.runs)
     return replace(recordings, runs=tuple(runs), left_out=tuple(said))
 
 
-def reads(run: Run, names: tuple[str, ...]) -> bool:
+def _reads(run: Run, names: tuple[str, ...]) -> bool:
     """Whether a sensor has enough complete readings in a run to count as recorded."""
     if not run.has(*names):
         return False
@@ -164,8 +164,8 @@ def reads(run: Run, names: tuple[str, ...]) -> bool:
 
 def channels_of(run: Run) -> set[str]:
     """Channels of a flight that a run can be compared in, besides those of its rotors."""
-    force, turning, attitude = (reads(run, n) for n in (c.SPECIFIC_FORCE, c.ANGULAR_VELOCITY, c.QUATERNION))
-    moving = attitude and (reads(run, c.VELOCITY) or reads(run, c.POSITION))
+    force, turning, attitude = (_reads(run, n) for n in (c.SPECIFIC_FORCE, c.ANGULAR_VELOCITY, c.QUATERNION))
+    moving = attitude and (_reads(run, c.VELOCITY) or _reads(run, c.POSITION))
     found = {
         "force": force or moving,
         "moment": turning or attitude,
@@ -239,7 +239,7 @@ def _absurd(run: Run, vehicle: Vehicle) -> str | None:
     return None
 
 
-def no_attitude(run: Run, vehicle: Vehicle) -> str | None:
+def _no_attitude(run: Run, vehicle: Vehicle) -> str | None:
     """The first quaternion that is no attitude."""
     if vehicle.kind != "flight" or not run.has(*c.QUATERNION):
         return None
@@ -335,7 +335,7 @@ def _still_rotors(run: Run, vehicle: Vehicle) -> str | None:
 
 def moving_sensors(run: Run) -> list[tuple[str, ...]]:
     """Sensors of a flight that have readings in all their columns."""
-    return [names for names in SENSORS if reads(run, names)]
+    return [names for names in SENSORS if _reads(run, names)]
 
 
 def _nothing_compared(run: Run, vehicle: Vehicle) -> str | None:
@@ -383,7 +383,7 @@ def compared_readings(run: Run, vehicle: Vehicle) -> list[str]:
     return names
 
 
-def too_short(run: Run, vehicle: Vehicle) -> str | None:
+def _too_short(run: Run, vehicle: Vehicle) -> str | None:
     """A run without a stretch that is long enough to be compared."""
     if vehicle.kind == "flight":
         longest, period = longest_stretch_s(run, [driven_by(run, vehicle), *moving_sensors(run)])
@@ -418,9 +418,9 @@ _LOOKS: tuple[Callable[[Run, Vehicle], str | None], ...] = (
     _uneven_clock,
     _no_rotors,
     _nothing_compared,
-    no_attitude,
+    _no_attitude,
     _still_rotors,
-    too_short,
+    _too_short,
 )
 """What is looked at in each run, the cause before its consequences."""
 
@@ -444,7 +444,7 @@ def _check_not_constant(recordings: RecordingSet) -> None:
 def _check_single_of_instrument(run: Run, names: list[str]) -> None:
     """InputError where the last third of a single run, less half the gap before it, is next to nothing."""
     known = run.time_s[np.isfinite(run.array(tuple(names))).all(axis=1)]
-    needed = (_SINGLE_GAP_S / 2 + LEAST_VALUES * float(np.median(np.diff(known)))) / HELD_OUT_SHARE
+    needed = (_SINGLE_GAP_S / 2 + LEAST_VALUES * float(np.median(np.diff(known)))) / _HELD_OUT_SHARE
     lasts = float(known[-1] - known[0])
     if lasts < needed:
         raise InputError(

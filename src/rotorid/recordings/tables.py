@@ -10,15 +10,15 @@ import numpy as np
 import pandas as pd
 
 from rotorid.errors import InputError
-from rotorid.io.text.bounds import (
+from rotorid.io.text.files import (
     LARGEST_FILE,
     LEAST_UNPACKED,
     LONGEST_JUMP_S,
     MOST_GRID,
     MOST_HOLES,
     MOST_UNPACKED,
+    check_file,
 )
-from rotorid.io.text.files import check_file
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.csv_text import check_heading, check_size, look_through, opened

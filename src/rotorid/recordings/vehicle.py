@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-Number = Annotated[float, Field(strict=True)]
+_Number = Annotated[float, Field(strict=True)]
 """A number: no text, no `true`."""
 
 
@@ -23,12 +23,12 @@ class _Strict(BaseModel):
 class Inertia(_Strict):
     """Entries of the inertia matrix J about the centre of mass, kg m2 (J_xz = -∫ x z dm)."""
 
-    xx: Number = Field(ge=1e-12, le=1e6)
-    yy: Number = Field(ge=1e-12, le=1e6)
-    zz: Number = Field(ge=1e-12, le=1e6)
-    xy: Number = Field(0.0, ge=-1e6, le=1e6)
-    xz: Number = Field(0.0, ge=-1e6, le=1e6)
-    yz: Number = Field(0.0, ge=-1e6, le=1e6)
+    xx: _Number = Field(ge=1e-12, le=1e6)
+    yy: _Number = Field(ge=1e-12, le=1e6)
+    zz: _Number = Field(ge=1e-12, le=1e6)
+    xy: _Number = Field(0.0, ge=-1e6, le=1e6)
+    xz: _Number = Field(0.0, ge=-1e6, le=1e6)
+    yz: _Number = Field(0.0, ge=-1e6, le=1e6)
 
     def matrix(self) -> np.ndarray:
         """Inertia matrix, shape (3, 3), kg m2, body axes."""
@@ -38,9 +38,9 @@ class Inertia(_Strict):
 class Rotor(_Strict):
     """Where a rotor sits (body axes, m) and how it spins seen from above."""
 
-    x_m: Number = Field(ge=-100, le=100)
-    y_m: Number = Field(ge=-100, le=100)
-    z_m: Number = Field(0.0, ge=-100, le=100)
+    x_m: _Number = Field(ge=-100, le=100)
+    y_m: _Number = Field(ge=-100, le=100)
+    z_m: _Number = Field(0.0, ge=-100, le=100)
     spin: Literal["ccw", "cw"]
 
     @property
@@ -52,13 +52,13 @@ class Rotor(_Strict):
 class Noise(_Strict):
     """One-sigma sensor noise as the user believes it; a hint that the tool checks."""
 
-    specific_force_m_s2: Number | None = Field(None, ge=0)
-    angular_velocity_rad_s: Number | None = Field(None, ge=0)
-    rotor_speed_relative: Number | None = Field(None, ge=0)
-    velocity_m_s: Number | None = Field(None, ge=0)
-    position_m: Number | None = Field(None, ge=0)
-    force_n: Number | None = Field(None, ge=0)
-    moment_n_m: Number | None = Field(None, ge=0)
+    specific_force_m_s2: _Number | None = Field(None, ge=0)
+    angular_velocity_rad_s: _Number | None = Field(None, ge=0)
+    rotor_speed_relative: _Number | None = Field(None, ge=0)
+    velocity_m_s: _Number | None = Field(None, ge=0)
+    position_m: _Number | None = Field(None, ge=0)
+    force_n: _Number | None = Field(None, ge=0)
+    moment_n_m: _Number | None = Field(None, ge=0)
 
 
 def unit_of(channel: str, quantity: str) -> str:
@@ -79,10 +79,10 @@ class Derivative(_Strict):
         "constant", "u", "v", "w", "p", "q", "r", "thrust", "thrust_roll", "thrust_pitch", "thrust_yaw", "speed"
     ]
     unit: str
-    value: Number
-    interval_95: tuple[Number, Number]
-    low: Number
-    high: Number
+    value: _Number
+    interval_95: tuple[_Number, _Number]
+    low: _Number
+    high: _Number
     """Range in which it holds; beyond, the quantity is held at the edge."""
 
     @model_validator(mode="after")
@@ -97,8 +97,8 @@ class Derivative(_Strict):
         return self
 
 
-_Length = Annotated[Number, Field(ge=-100, le=100)]
-Place = tuple[_Length, _Length, _Length]
+_Length = Annotated[_Number, Field(ge=-100, le=100)]
+_Place = tuple[_Length, _Length, _Length]
 _SMALLEST_COEFFICIENT, _LARGEST_COEFFICIENT = 1e-14, 1e2
 _LARGEST_SPEED_RAD_S = 1e6
 _LARGEST_TRUST = 100.0
@@ -111,23 +111,23 @@ class Vehicle(_Strict):
 
     name: str
     kind: Literal["flight", "stand", "bench"]
-    mass_kg: Number | None = Field(None, ge=1e-6, le=1e5)
+    mass_kg: _Number | None = Field(None, ge=1e-6, le=1e5)
     inertia_kg_m2: Inertia | None = None
     rotors: tuple[Rotor, ...] = ()
-    thrust_coefficient_n_s2: Number | tuple[Number, ...] | None = None
-    torque_coefficient_n_m_s2: Number | tuple[Number, ...] | None = None
-    gravity_m_s2: Number = Field(9.81, ge=0.01, le=1000)
-    rotor_radius_m: Number | None = Field(None, ge=1e-4, le=100)
-    rotor_inertia_kg_m2: Number | None = Field(None, ge=0, le=1e6)
-    ground_z_m: Number | None = Field(None, ge=-1e7, le=1e7)
-    accelerometer_position_m: Place = (0.0, 0.0, 0.0)
-    sensor_position_m: Place = (0.0, 0.0, 0.0)
+    thrust_coefficient_n_s2: _Number | tuple[_Number, ...] | None = None
+    torque_coefficient_n_m_s2: _Number | tuple[_Number, ...] | None = None
+    gravity_m_s2: _Number = Field(9.81, ge=0.01, le=1000)
+    rotor_radius_m: _Number | None = Field(None, ge=1e-4, le=100)
+    rotor_inertia_kg_m2: _Number | None = Field(None, ge=0, le=1e6)
+    ground_z_m: _Number | None = Field(None, ge=-1e7, le=1e7)
+    accelerometer_position_m: _Place = (0.0, 0.0, 0.0)
+    sensor_position_m: _Place = (0.0, 0.0, 0.0)
     sensor_mount: Literal["level", "tilting"] = "level"
     tared: Annotated[bool, Field(strict=True)] | None = None
-    rotor_speed_limits_rad_s: tuple[Number, Number] | None = None
+    rotor_speed_limits_rad_s: tuple[_Number, _Number] | None = None
     noise: Noise = Noise()
-    trust: dict[str, Number] = Field(default_factory=dict)
-    reading_gain: tuple[Number, Number, Number] | None = None
+    trust: dict[str, _Number] = Field(default_factory=dict)
+    reading_gain: tuple[_Number, _Number, _Number] | None = None
     """Factors of a bench's force readings by axis (`improved_vehicle.yaml` only)."""
     effects: tuple[dict[str, Any], ...] = ()
     """Established effects (`improved_vehicle.yaml` only): id, form and parameters each."""

@@ -5,7 +5,6 @@ OPEN = (
     "deliver",
     "fleet.history",
     "fleet.judge",
-    "fleet.page",
     "fleet.summary",
     "log",
     "next_to_log",

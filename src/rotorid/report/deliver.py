@@ -150,15 +150,15 @@ def write_files(
 
 def ledger(analysis: Analysis, verdict: Verdict) -> list[dict]:
     """Entries of `rule`, `on`, `numbers` and `sentence`, in the order of the decisions."""
-    out = [entry("enough_to_compare", "runs", sentence=text) for text in analysis.recordings.left_out]
+    out = [_entry("enough_to_compare", "runs", sentence=text) for text in analysis.recordings.left_out]
     out += [_of_finding(f, analysis) for f in analysis.findings]
     for name, (believed, refitted, low, high) in analysis.wrong_values.items():
         numbers = {"believed": believed, "refitted": refitted, "low_95": low, "high_95": high}
-        out.append(entry("wrong_value", name, numbers, "the fitted runs contradict what is believed"))
-    out += [entry("within_trust", "values", sentence=text) for text in analysis.corrected]
+        out.append(_entry("wrong_value", name, numbers, "the fitted runs contradict what is believed"))
+    out += [_entry("within_trust", "values", sentence=text) for text in analysis.corrected]
     left = {"share_left": verdict.unexplained.share}
-    out.append(entry("word_from_numbers", verdict.verdict, left, verdict.unexplained.description))
-    out += [entry(name, "search", {"fired": n}, RULES[name].decides) for name, n in sorted(analysis.fired.items())]
+    out.append(_entry("word_from_numbers", verdict.verdict, left, verdict.unexplained.description))
+    out += [_entry(name, "search", {"fired": n}, RULES[name].decides) for name, n in sorted(analysis.fired.items())]
     return [e for e in out if e]
 
 
@@ -172,19 +172,19 @@ def _of_finding(finding: Finding, analysis: Analysis) -> dict:
     if finding.gain is not None:
         numbers |= dict(zip(("rmse_ratio", "low_95", "high_95"), finding.gain, strict=True))
     if finding.status == "not_established":
-        return entry(finding.rule or "search", finding.id, numbers, finding.sentence)
+        return _entry(finding.rule or "search", finding.id, numbers, finding.sentence)
     if finding.status == "absorbed":
-        return entry("absorbed_by_values", finding.id, numbers, finding.sentence)
+        return _entry("absorbed_by_values", finding.id, numbers, finding.sentence)
     if finding.status == "suggested":
-        return entry("suggested", finding.id, numbers, finding.objection)
+        return _entry("suggested", finding.id, numbers, finding.objection)
     if finding.id not in analysis.without:
-        return entry("mistakes_first", finding.id, numbers, finding.sentence)
+        return _entry("mistakes_first", finding.id, numbers, finding.sentence)
     if finding.status == "ambiguous":
-        return entry("class", finding.id, numbers, f"these data cannot distinguish {', '.join(finding.alternatives)}")
-    return entry("established", finding.id, numbers, "it passed every rule")
+        return _entry("class", finding.id, numbers, f"these data cannot distinguish {', '.join(finding.alternatives)}")
+    return _entry("established", finding.id, numbers, "it passed every rule")
 
 
-def entry(rule: str, on: str, numbers: dict | None = None, sentence: str = "") -> dict:
+def _entry(rule: str, on: str, numbers: dict | None = None, sentence: str = "") -> dict:
     """One line of the ledger."""
     known = {name: value for name, value in (numbers or {}).items() if math.isfinite(value)}
     return {"rule": rule, "on": on, "numbers": rounded(known), "sentence": str(sentence)}

@@ -24,13 +24,13 @@ import pandas as pd
 
 from rotorid.errors import InputError
 
-WIDTH = 160
+_WIDTH = 160
 _MOST_LINES = 3
 """Of what a command prints so many lines are shown from either end."""
 
 
 @dataclass(frozen=True)
-class GalleryPage:
+class _GalleryPage:
     """One page."""
 
     name: str
@@ -45,13 +45,13 @@ class GalleryPage:
 
 
 KINDS = (
-    GalleryPage(
+    _GalleryPage(
         "example", "A table of one's own (shipped)", (),
         "Two simulated flights with a rotor drag, shipped with rotorid.",
         ("rotorid init set --example", "rotorid check set", "rotorid verdict set -o answer --series -q"),
         "Fly the improved vehicle: `rotorid simulate answer/improved_vehicle.yaml`.",
     ),
-    GalleryPage(
+    _GalleryPage(
         "px4", "PX4 ULog", ("px4-ulog/sample_px4_events.ulg",),
         "PX4/pyulog, `test/sample_px4_events.ulg` (BSD-3-Clause): 6.5 s in the air, flown in jMAVSim.",
         (
@@ -62,7 +62,7 @@ KINDS = (
         "A single flight of less than 9 s is not judged: import a second one into the same set, then "
         "`rotorid verdict set`.",
     ),
-    GalleryPage(
+    _GalleryPage(
         "ardupilot", "ArduPilot DataFlash", ("logs/ardupilot/copter-3.4_22.BIN",),
         "erlerobot/logs, `erlebrain/APM/22.BIN` (Copter 3.4; no licence stated, not shipped). Its mass is not known: "
         "1.5 kg is a guess.",
@@ -74,7 +74,7 @@ KINDS = (
         "Log faster (`LOG_BITMASK` with fast attitude and raw IMU) and state mass and geometry: what is only "
         "proposed is listed above.",
     ),
-    GalleryPage(
+    _GalleryPage(
         "betaflight", "Betaflight blackbox", ("logs/betaflight/shortLog.BFL",),
         "Ricardo-Marques/betaflight-tuning-helper, `test-logs/shortLog.BFL` (4.5.1 with eRPM; no licence stated, not "
         "shipped). Its mass is not known: 0.65 kg is a guess.",
@@ -85,7 +85,7 @@ KINDS = (
         ),
         "Record a minute in place of seconds, and state mass and geometry.",
     ),
-    GalleryPage(
+    _GalleryPage(
         "crazyflie", "Crazyflie uSD log",
         ("imrc-crazyflie-rpm/brushless_flights/eckart00", "imrc-crazyflie-rpm/brushless_flights/eckart01"),
         "IMRCLab/crazyflie-data-collection, two flights of a brushless Crazyflie of 37 g with measured rotor speeds "
@@ -97,7 +97,7 @@ KINDS = (
         ),
         "The last command says what MuJoCo's form leaves out, and what that costs over half a second.",
     ),
-    GalleryPage(
+    _GalleryPage(
         "csv", "Any CSV, by a mapping", ("logs/csv-ddd/quadrotor_model.csv",),
         "ethz-asl/data-driven-dynamics, `resources/quadrotor_model.csv` (BSD-3-Clause).",
         (
@@ -107,7 +107,7 @@ KINDS = (
         ),
         "Answer what is open (`?`) in `mapping.yaml`: nothing is imported that was only guessed at.",
     ),
-    GalleryPage(
+    _GalleryPage(
         "ros", "ROS 2 bag", ("logs/ros2-plotjuggler",),
         "facontidavide/PlotJuggler, `datasamples/rosbag2_test` (MPL-2.0): a bag as a folder. "
         "It holds attitudes and no rotors, and that is said.",
@@ -121,7 +121,7 @@ KINDS = (
 def run(command: str, folder: Path) -> str:
     """What a command prints, paths of the folder left out; a refusal is part of a page, too."""
     words = shlex.split(command)
-    environment = os.environ | {"COLUMNS": str(WIDTH), "NO_COLOR": "1"}
+    environment = os.environ | {"COLUMNS": str(_WIDTH), "NO_COLOR": "1"}
     done = subprocess.run(
         [sys.executable, "-m", "rotorid", *words[1:]], cwd=folder, env=environment, capture_output=True, text=True
     )
@@ -130,11 +130,11 @@ def run(command: str, folder: Path) -> str:
     return (done.stdout + done.stderr).replace(f"{folder}/", "").strip()
 
 
-def page(kind: GalleryPage, outputs: Sequence[str], picture: str, following: str) -> str:
+def _page(kind: _GalleryPage, outputs: Sequence[str], picture: str, following: str) -> str:
     """The page as Markdown."""
     parts = [f"# {kind.title}", kind.source]
     for command, said in zip(kind.commands, outputs, strict=True):
-        lines = [line[:WIDTH] + (" …" if len(line) > WIDTH else "") for line in said.splitlines()]
+        lines = [line[:_WIDTH] + (" …" if len(line) > _WIDTH else "") for line in said.splitlines()]
         more = len(lines) - 2 * _MOST_LINES
         between = [f"… ({more} more lines)", *lines[-_MOST_LINES:]] if more > 1 else lines[_MOST_LINES:]
         shown = lines[:_MOST_LINES] + between
@@ -155,7 +155,7 @@ def _next_of(folder: Path) -> str:
     return f"The verdict proposes: {proposed['manoeuvre']}." if proposed and proposed["manoeuvre"] else ""
 
 
-def gain(table: pd.DataFrame, channel: str) -> float:
+def _gain(table: pd.DataFrame, channel: str) -> float:
     """How many times larger the residual of a channel is before than after; 0 for one without values."""
     before, after = (float(np.sqrt(np.nanmean(table[f"{channel}_{w}"] ** 2))) for w in ("before", "after"))
     return before / after if after > 0 else 0.0
@@ -174,7 +174,9 @@ def draw(folder: Path, target: Path) -> str:
     series = folder / "answer" / "series.parquet"
     if series.is_file():
         table, verdict = pd.read_parquet(series), json.loads((folder / "answer" / "verdict.json").read_text())
-        channel = max((c.removesuffix("_before") for c in table if c.endswith("_before")), key=lambda c: gain(table, c))
+        channel = max(
+            (c.removesuffix("_before") for c in table if c.endswith("_before")), key=lambda c: _gain(table, c)
+        )
         own = table[table["run"] == table["run"].iloc[0]].dropna(subset=[f"{channel}_before"])
         lines = {word: own[f"{channel}_{word}"].to_numpy() for word in ("before", "after")}
         unit = verdict["channels"].get(channel, {}).get("unit", "")
@@ -205,7 +207,7 @@ def draw(folder: Path, target: Path) -> str:
     return caption
 
 
-def make(kind: GalleryPage, data: Path | None, target: Path) -> str:
+def make(kind: _GalleryPage, data: Path | None, target: Path) -> str:
     """Write a page and its picture into `target`; a sentence where its log is not there, else nothing."""
     with TemporaryDirectory() as name:
         folder = Path(name).resolve()
@@ -219,7 +221,7 @@ def make(kind: GalleryPage, data: Path | None, target: Path) -> str:
                 shutil.copyfile(source, folder / source.name)
         outputs = [run(command, folder) for command in kind.commands]
         caption = draw(folder, target / f"{kind.name}.png")
-        text = page(kind, outputs, caption, _next_of(folder))
+        text = _page(kind, outputs, caption, _next_of(folder))
     (target / f"{kind.name}.md").write_text(text, encoding="utf-8")
     return ""
 

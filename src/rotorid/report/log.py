@@ -52,14 +52,14 @@ def to(path: str | Path) -> Iterator[None]:
             handler.close()
 
 
-REFUSED = "ERROR rotorid: "
+_REFUSED = "ERROR rotorid: "
 """How the last line of the log of a refused job begins."""
 
 
 def refusal(path: str | Path) -> str | None:
     """The sentence that a job ended with, from its log; None where it ended otherwise."""
     lines = Path(path).read_text(encoding="utf-8", errors="replace").splitlines()
-    return lines[-1].removeprefix(REFUSED) if lines and lines[-1].startswith(REFUSED) else None
+    return lines[-1].removeprefix(_REFUSED) if lines and lines[-1].startswith(_REFUSED) else None
 
 
 def progress(text: str) -> None:

@@ -30,7 +30,7 @@ from rotorid.vehicle.windows import States, plan_windows
 
 _MOST_WINDOWS = 40
 """Windows that are flown, spread evenly over the log: RotorPy takes a second for five."""
-STEP_S = 0.002
+_STEP_S = 0.002
 _SHOWN = ("velocity", "attitude", "position", "angular_velocity")
 
 
@@ -190,7 +190,7 @@ def by_equations(
 
     state = (rates, quaternion, velocity, position)
     kept = [state]
-    steps = max(int(np.ceil((windows[0].time_s[1] - windows[0].time_s[0]) / STEP_S)), 1)
+    steps = max(int(np.ceil((windows[0].time_s[1] - windows[0].time_s[0]) / _STEP_S)), 1)
     length = np.array([w.time_s[1] - w.time_s[0] for w in windows])[:, None] / steps
     for k in range(samples - 1):
         for step in range(steps):
@@ -249,7 +249,7 @@ def _shares(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow], 
     return (speed / full) ** 2
 
 
-def in_rotorpy(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow]) -> list[States]:
+def _in_rotorpy(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow]) -> list[States]:
     """RotorPy's Multirotor with the exported parameters and their companion; the speeds are set at every sample and
     held over a step."""
     out, multirotor = [], multirotor_of(exported)
@@ -298,7 +298,7 @@ def _in_mujoco(vehicle: Vehicle, model, windows: Sequence[LogWindow]) -> list[St
         kept = [(data.qpos.copy(), data.qvel.copy())]
         for k in range(len(window.time_s) - 1):
             gap = window.time_s[k + 1] - window.time_s[k]
-            steps = max(int(np.ceil(gap / STEP_S)), 1)
+            steps = max(int(np.ceil(gap / _STEP_S)), 1)
             model.opt.timestep = gap / steps
             for step in range(steps):
                 share = (step + 0.5) / steps
@@ -338,7 +338,7 @@ def as_expressed(to: str) -> Callable[[Vehicle, Exported, Sequence[LogWindow]], 
 FLYERS: dict[str, tuple[str, str, Callable[[Vehicle, Exported, Sequence[LogWindow]], list[States]]]] = {
     "px4-sih": ("PX4's SIH by its published equations", "", in_sih),
     "ardupilot-json": ("ArduPilot's simulated frame by its published equations", "", in_ardupilot),
-    "rotorpy": ("RotorPy", "rotorpy", in_rotorpy),
+    "rotorpy": ("RotorPy", "rotorpy", _in_rotorpy),
     "mjcf": ("MuJoCo", "mujoco", in_mujoco),
     "sdf": ("our simulator with what the SDF file expresses", "", as_expressed("sdf")),
     "gym-pybullet-drones": ("our simulator with what the URDF expresses", "", as_expressed("gym-pybullet-drones")),

@@ -26,7 +26,7 @@ _NO_MCAP = "MCAP files need mcap, which is not installed: pip install 'rotorid[m
 
 
 @dataclass(frozen=True)
-class Series:
+class _Series:
     """One stretch of a channel of a run."""
 
     topic: str
@@ -36,7 +36,7 @@ class Series:
     """`before`, `refitted`, `after`, `model`, and each effect by its id; (n,) each, in the unit."""
 
 
-def series_of(analysis: Analysis) -> list[Series]:
+def series_of(analysis: Analysis) -> list[_Series]:
     """Every channel of every run, in the order of time."""
     added = shares(analysis, segments_of(analysis))
     seen: dict[str, int] = {}
@@ -51,7 +51,7 @@ def series_of(analysis: Analysis) -> list[Series]:
             if place < len(parts):
                 name = analysis.findings[number].id
                 fields[name] = fields.get(name, 0.0) + parts[place]
-        out.append(Series(f"/{plain(trace.run)}/{plain(trace.channel)}", trace.unit, trace.time_s, fields))
+        out.append(_Series(f"/{plain(trace.run)}/{plain(trace.channel)}", trace.unit, trace.time_s, fields))
     return sorted(out, key=lambda s: (s.topic, s.time_s[0] if len(s.time_s) else 0.0))
 
 
@@ -60,7 +60,7 @@ def plain(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9_]+", "_", name).strip("_") or "run"
 
 
-def write_mcap(series: Sequence[Series], path: Path) -> None:
+def write_mcap(series: Sequence[_Series], path: Path) -> None:
     """Write the series as MCAP with JSON messages, in the order of time; InputError without the package `mcap`."""
     if find_spec("mcap") is None:
         raise InputError(f"{path}: {_NO_MCAP}")
@@ -89,13 +89,13 @@ def write_mcap(series: Sequence[Series], path: Path) -> None:
         writer.finish()
 
 
-def _schema_of(one: Series) -> bytes:
+def _schema_of(one: _Series) -> bytes:
     """The JSON schema of a topic's messages."""
     properties = {name: {"type": "number", "description": f"{name}, {one.unit}"} for name in one.fields}
     return json.dumps({"type": "object", "title": one.topic, "properties": properties}).encode()
 
 
-def topics_of(series: Sequence[Series]) -> dict[str, list[str]]:
+def topics_of(series: Sequence[_Series]) -> dict[str, list[str]]:
     """To each topic its fields."""
     out: dict[str, list[str]] = {}
     for one in series:
@@ -104,7 +104,7 @@ def topics_of(series: Sequence[Series]) -> dict[str, list[str]]:
     return out
 
 
-def foxglove_layout(series: Sequence[Series]) -> str:
+def foxglove_layout(series: Sequence[_Series]) -> str:
     """A layout of Foxglove: a tab a run, in it a plot a channel with its fields."""
     panels: dict[str, dict] = {}
     tabs: dict[str, list[str]] = {}
@@ -120,21 +120,21 @@ def foxglove_layout(series: Sequence[Series]) -> str:
             "legendDisplay": "floating", "isSynced": True, "xAxisVal": "timestamp",
         }  # fmt: skip
         tabs.setdefault(topic.split("/")[1], []).append(name)
-    pages = [{"title": run, "layout": stacked(names)} for run, names in tabs.items()]
+    pages = [{"title": run, "layout": _stacked(names)} for run, names in tabs.items()]
     panels["Tab!0000000"] = {"activeTabIdx": 0, "tabs": pages}
     content = {"configById": panels, "globalVariables": {}, "userNodes": {}, "layout": "Tab!0000000"}
     return json.dumps(content, indent=1) + "\n"
 
 
-def stacked(names: Sequence[str]):
+def _stacked(names: Sequence[str]):
     """Panels one above the other, as Foxglove nests them: halves of halves."""
     if len(names) == 1:
         return names[0]
     half = len(names) // 2
-    return {"direction": "column", "first": stacked(names[:half]), "second": stacked(names[half:])}
+    return {"direction": "column", "first": _stacked(names[:half]), "second": _stacked(names[half:])}
 
 
-def plotjuggler_layout(series: Sequence[Series]) -> str:
+def plotjuggler_layout(series: Sequence[_Series]) -> str:
     """A layout of PlotJuggler for the MCAP: tabs of a few plots, a plot a channel."""
     topics = list(topics_of(series).items())
     tabs = []
@@ -177,7 +177,7 @@ def _plot(topic: str, fields: Sequence[str]) -> str:
 """
 
 
-def write_rrd(series: Sequence[Series], path: Path) -> None:
+def write_rrd(series: Sequence[_Series], path: Path) -> None:
     """Write the series for rerun, an entity a field; needs the package `rerun`."""
     import rerun
 

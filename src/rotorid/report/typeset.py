@@ -46,7 +46,7 @@ def typst_source(document: Document, out: str | Path, later: Mapping[str, int] |
 
 
 @dataclass(frozen=True)
-class EmptySpace:
+class _EmptySpace:
     """Empty space at the foot of a page since a figure or table did not fit there."""
 
     identifier: str
@@ -72,7 +72,7 @@ def without_gaps(document: Document, out: str | Path) -> None:
     """
     later: dict[str, int] = {}
     written: dict[str, int] | None = None
-    found: list[EmptySpace] = []
+    found: list[_EmptySpace] = []
     seen: dict[str, dict[int, float]] = {}
     settled: set[str] = set()
     for _ in range(_ROUNDS):
@@ -100,7 +100,7 @@ def without_gaps(document: Document, out: str | Path) -> None:
     typst_source(document, out, later)
 
 
-def gaps(source: str | Path) -> list[EmptySpace]:
+def gaps(source: str | Path) -> list[_EmptySpace]:
     """The gap before each figure and table that follows text, in reading order, from a typst source's own marks."""
     import typst
 
@@ -111,7 +111,7 @@ def gaps(source: str | Path) -> list[EmptySpace]:
     places = json.loads(found)
     page_of = dict(places["shown"])
     return [
-        EmptySpace(name, chapter, places["bottom"] - below_pt if page_of[name] > page else 0.0, movable)
+        _EmptySpace(name, chapter, places["bottom"] - below_pt if page_of[name] > page else 0.0, movable)
         for (name, movable, chapter), page, below_pt in places["text"]
     ]
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from rotorid.cli import app
-from rotorid.cli.simulating import fly
+from rotorid.cli.modelling import fly
 from rotorid.errors import InputError
 from rotorid.recordings import read_set, read_vehicle, templates
 from rotorid.report.deliver import deliver

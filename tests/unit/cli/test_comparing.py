@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from rotorid.cli import app
 from rotorid.cli.comparing import read
-from rotorid.cli.simulating import fly
+from rotorid.cli.modelling import fly
 from rotorid.errors import InputError
 from rotorid.recordings import read_set, templates
 

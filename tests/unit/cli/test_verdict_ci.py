@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rotorid.cli import app
-from rotorid.cli.simulating import fly
+from rotorid.cli.modelling import fly
 from rotorid.cli.verdicts import faults_of, share_of
 from rotorid.errors import InputError
 from rotorid.recordings import read_set, templates, write_vehicle

@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from rotorid.cli import waiting
-from rotorid.cli.waiting import SOON_S, Waiting, keep, left, read_record, words
+from rotorid.cli import console
+from rotorid.cli.console import SOON_S, Waiting, keep, read_record, time_left, words_left
 from rotorid.steps import heard_by, step
 
 RUN = [("", 4.0), ("flight/prepare", 2.0), ("flight/search", 10.0), ("flight/search", 10.0), ("draw", 4.0)]
@@ -27,40 +27,40 @@ def slower(by: float) -> list[tuple[str, float]]:
 
 def test_without_earlier_runs_no_number_is_shown() -> None:
     for known in ([], [RUN], [RUN, RUN]):
-        assert left(known, RUN[:2], "flight/search", 1.0) is None
-    assert words(None) == ""
+        assert time_left(known, RUN[:2], "flight/search", 1.0) is None
+    assert words_left(None) == ""
 
 
 def test_while_it_reads_no_number_is_shown() -> None:
-    assert left([RUN] * 5, [], "", 3.0) is None
+    assert time_left([RUN] * 5, [], "", 3.0) is None
 
 
 def test_the_rest_goes_as_in_earlier_runs_at_the_pace_of_now() -> None:
-    assert left([RUN] * 3, RUN[:2], "flight/search", 4.0) == pytest.approx(20.0, rel=0.05)
+    assert time_left([RUN] * 3, RUN[:2], "flight/search", 4.0) == pytest.approx(20.0, rel=0.05)
     measured = [*slower(3.0)[:3]]
-    then = left([RUN] * 3, measured, "flight/search", 0.0)
-    assert then == pytest.approx(30.0 + 4.0 * 3.0**waiting.UNMET, rel=0.05)
+    then = time_left([RUN] * 3, measured, "flight/search", 0.0)
+    assert then == pytest.approx(30.0 + 4.0 * 3.0**console.UNMET, rel=0.05)
 
 
 def test_a_step_that_takes_longer_than_ever_renews_the_estimate() -> None:
-    told = [left([RUN] * 3, RUN[:2], "flight/search", spent) for spent in (5.0, 30.0, 100.0)]
+    told = [time_left([RUN] * 3, RUN[:2], "flight/search", spent) for spent in (5.0, 30.0, 100.0)]
     assert told == sorted(told) and told[0] < told[-1]
 
 
 def test_runs_that_disagree_say_nothing() -> None:
     long = [*RUN[:3], *[("flight/search", 10.0)] * 20, RUN[-1]]
-    assert left([RUN, RUN, RUN, long, long], RUN[:3], "flight/search", 1.0) is None
+    assert time_left([RUN, RUN, RUN, long, long], RUN[:3], "flight/search", 1.0) is None
 
 
 def test_the_runs_most_alike_are_asked() -> None:
     other = [("", 4.0), ("stand/prepare", 1.0), ("draw", 1.0)]
     known = [*[other] * 9, *[RUN] * 5]
-    assert left(known, RUN[:3], "flight/search", 0.0) == left([RUN] * 5, RUN[:3], "flight/search", 0.0)
+    assert time_left(known, RUN[:3], "flight/search", 0.0) == time_left([RUN] * 5, RUN[:3], "flight/search", 0.0)
 
 
 def test_what_ends_soon_is_said_in_words() -> None:
-    assert left([RUN] * 3, RUN[:-1], "draw", 3.0) == SOON_S
-    assert [words(s) for s in (SOON_S, 43.0, 150.0)] == [
+    assert time_left([RUN] * 3, RUN[:-1], "draw", 3.0) == SOON_S
+    assert [words_left(s) for s in (SOON_S, 43.0, 150.0)] == [
         "; a few seconds left",
         "; about 40 s left",
         "; about 2 min left",
@@ -90,11 +90,11 @@ def test_without_a_terminal_lines_are_few() -> None:
 
 
 def test_the_record_holds_the_last_runs_and_survives_what_is_broken() -> None:
-    for _ in range(waiting.KEPT + 3):
+    for _ in range(console.KEPT + 3):
         keep("verdict", RUN)
     record = read_record()
-    assert len(record["verdict"]) == waiting.KEPT and record["verdict"][0] == RUN
-    good = json.loads(waiting.record_file().read_text())
+    assert len(record["verdict"]) == console.KEPT and record["verdict"][0] == RUN
+    good = json.loads(console.record_file().read_text())
     broken = [
         "",
         "[]",
@@ -103,7 +103,7 @@ def test_the_record_holds_the_last_runs_and_survives_what_is_broken() -> None:
         json.dumps(good | {"runs": {"a": [[["b", -1]]]}}),
     ]
     for text in broken:
-        waiting.record_file().write_text(text)
+        console.record_file().write_text(text)
         assert read_record() == {}
     keep("verdict", RUN)
     assert read_record() == {"verdict": [RUN]}
@@ -111,7 +111,7 @@ def test_the_record_holds_the_last_runs_and_survives_what_is_broken() -> None:
 
 def test_a_record_that_cannot_be_written_stops_nothing(monkeypatch, tmp_path) -> None:
     (tmp_path / "file").touch()
-    monkeypatch.setattr(waiting, "record_file", lambda: tmp_path / "file" / "waiting.json")
+    monkeypatch.setattr(console, "record_file", lambda: tmp_path / "file" / "waiting.json")
     keep("verdict", RUN)
     assert read_record() == {}
 

@@ -5,8 +5,14 @@ import pandas as pd
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.identify.neurobem_comparison import compare
-from rotorid.identify.rigid_body_residuals import by_airspeed, low_pass, measured_wrench, rmse, rotor_wrench
+from rotorid.identify.rigid_body_residuals import (
+    by_airspeed,
+    compare_with_neurobem,
+    low_pass,
+    measured_wrench,
+    rmse,
+    rotor_wrench,
+)
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.neurobem import ANGULAR_ACCELERATION, PREDICTED_FORCE, PREDICTED_MOMENT
@@ -102,7 +108,7 @@ def test_the_comparison_finds_a_drag_that_neurobem_knows_and_the_rigid_body_does
         table |= dict(zip(PREDICTED_FORCE, (-0.5 * speed, zero, zero - 19.62), strict=True))
         table |= {n: zero + np.sqrt(19.62 / 4e-6) for n in c.rotor_columns("rotor_speed", 4)}
         runs.append(Run(name, pd.DataFrame(table)))
-    found = compare(RecordingSet("s", VEHICLE, tuple(runs)), 20.0, 1.0, 1.0, seed=1)
+    found = compare_with_neurobem(RecordingSet("s", VEHICLE, tuple(runs)), 20.0, 1.0, 1.0, seed=1)
     assert found.summary["one_flight_above_m_s"] == pytest.approx(6.0)
     assert found.summary["flights"]["b"]["rigid_body"]["force_x"] == pytest.approx(0.5 * 10 * np.sqrt(3 / 8), rel=1e-3)
     assert found.summary["flights"]["b"]["neurobem"]["force"] == pytest.approx(0, abs=1e-9)

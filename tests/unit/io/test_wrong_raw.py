@@ -21,8 +21,7 @@ import pytest
 
 from rotorid.acquire.plan import read_plan, steps_of
 from rotorid.errors import InputError
-from rotorid.identify.networks.network import build
-from rotorid.identify.networks.training import Training, train
+from rotorid.identify.networks import Training, build, train
 from rotorid.io import rawlog
 from rotorid.io.index import COLUMNS, read_index, with_checksum, write_index
 from rotorid.io.lines import read_description

@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rotorid.cli import app
-from rotorid.cli.simulating import fly
+from rotorid.cli.modelling import fly
 from rotorid.recordings import templates
 
 

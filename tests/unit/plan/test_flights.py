@@ -10,7 +10,7 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
 from rotorid.mismatch.plant.motion import build_segments
 from rotorid.mismatch.plant.rows import residual
-from rotorid.plan import mission, write
+from rotorid.plan import write
 from rotorid.plan.candidates import Reference, candidates, joined, smaller, standard
 from rotorid.plan.limits import Limits
 from rotorid.plan.plan import NOTHING, SIZES, Plan, Tried, broken, yaw_acceleration
@@ -228,30 +228,30 @@ def mission_of(names: tuple[str, ...], **limits) -> Plan:
 
 def test_a_mission_goes_to_where_the_reference_turns_round() -> None:
     plan = mission_of(("pass 0 at 0.4", "ladder"), home_deg=(47.0, 8.0))
-    assert mission.not_a_mission(plan) == ""
-    items = mission.mission(plan)["mission"]["items"]
-    assert items[0]["command"] == mission.TAKE_OFF and items[-1]["command"] == mission.RETURN
+    assert write.not_a_mission(plan) == ""
+    items = write.mission(plan)["mission"]["items"]
+    assert items[0]["command"] == write.TAKE_OFF and items[-1]["command"] == write.RETURN
     assert [i["doJumpId"] for i in items] == list(range(1, len(items) + 1))
-    places = np.array([i["params"][4:] for i in items if i["command"] == mission.WAYPOINT])
-    north = np.radians(places[:, 0] - 47.0) * mission.EARTH_M
+    places = np.array([i["params"][4:] for i in items if i["command"] == write.WAYPOINT])
+    north = np.radians(places[:, 0] - 47.0) * write.EARTH_M
     reference = plan.reference.position_m
     assert north.max() == pytest.approx(reference[:, 0].max(), abs=0.05)
     assert north.min() == pytest.approx(reference[:, 0].min(), abs=0.05)
     assert np.allclose(places[:, 1], 8.0)
     assert places[:, 2].max() == pytest.approx(LIMITS.height_m[1] - LIMITS.wall_margin_m, abs=0.05)
-    speeds = [i["params"][1] for i in items if i["command"] == mission.SPEED]
+    speeds = [i["params"][1] for i in items if i["command"] == write.SPEED]
     assert max(speeds) == pytest.approx(0.4 * LIMITS.speed_m_s, rel=0.05)
 
 
 def test_half_a_turn_is_two_waypoints_in_one_place() -> None:
-    items = mission.mission(mission_of(("face",), home_deg=(-30.0, 20.0)))["mission"]["items"]
-    yaws = [i["params"][3] for i in items if i["command"] == mission.WAYPOINT]
+    items = write.mission(mission_of(("face",), home_deg=(-30.0, 20.0)))["mission"]["items"]
+    yaws = [i["params"][3] for i in items if i["command"] == write.WAYPOINT]
     assert 180.0 in yaws and yaws[-1] == 0.0
 
 
 def test_what_is_no_mission_says_why() -> None:
-    assert "shake" in mission.not_a_mission(mission_of(("shake all to 2 Hz", "hover"), home_deg=(47.0, 8.0)))
-    assert "home_deg" in mission.not_a_mission(mission_of(("hover",)))
+    assert "shake" in write.not_a_mission(mission_of(("shake all to 2 Hz", "hover"), home_deg=(47.0, 8.0)))
+    assert "home_deg" in write.not_a_mission(mission_of(("hover",)))
 
 
 def test_the_page_that_is_written_has_the_section() -> None:

@@ -22,7 +22,7 @@ from rotorid.plan.session import (
     table_of,
     through,
 )
-from rotorid.plan.write import STEPS, by_hand
+from rotorid.plan.write import STEPS, steps_of
 from rotorid.recordings import RecordingSet, Run, Vehicle
 
 RATE_HZ = 20.0
@@ -50,8 +50,8 @@ def test_levels_are_held_for_equal_times() -> None:
 
 def test_steps_by_hand_are_of_ids_that_exist_and_said_once() -> None:
     assert set(STEPS) <= set(catalogue())
-    assert len(by_hand(("unequal_rotors", "com_offset", "unequal_rotors"))) == 2
-    assert by_hand(("vortex_ring",)) == ()
+    assert len(steps_of(("unequal_rotors", "com_offset", "unequal_rotors"))) == 2
+    assert steps_of(("vortex_ring",)) == {}
 
 
 def crept(load: np.ndarray) -> np.ndarray:

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotorid.cli.simulating import fly
+from rotorid.cli.modelling import fly
 from rotorid.recordings import RecordingSet, Run, read_set, templates
 from rotorid.recordings import columns as c
 from rotorid.recordings.check import doubts_of
-from rotorid.recordings.doubts import Doubt
 from rotorid.recordings.physics import near_names
+from rotorid.recordings.run import Doubt
 
 RPM = 60 / (2 * np.pi)
 

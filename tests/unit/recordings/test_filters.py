@@ -5,7 +5,7 @@ import pytest
 
 from rotorid.errors import InputError
 from rotorid.recordings.signal import filters
-from rotorid.recordings.signal.average import mean_and_error
+from rotorid.recordings.signal.filters import mean_and_error
 
 
 def test_first_order_by_hand() -> None:

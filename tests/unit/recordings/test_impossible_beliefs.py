@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotorid.cli.simulating import fly
+from rotorid.cli.modelling import fly
 from rotorid.recordings import RecordingSet, Run, Vehicle, read_set, read_vehicle, templates
 from rotorid.recordings import columns as c
 from rotorid.recordings.body import body_of, impossible
 from rotorid.recordings.check import doubts_of
-from rotorid.recordings.doubts import Doubt
+from rotorid.recordings.run import Doubt
 
 ROOT = Path(__file__).parents[3]
 RPM = 2 * np.pi / 60

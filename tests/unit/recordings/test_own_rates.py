@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.cli.simulating import fly
+from rotorid.cli.modelling import fly
 from rotorid.errors import InputError
 from rotorid.mismatch.plant.motion import between_readings
 from rotorid.recordings import RecordingSet, Run, read_set, templates

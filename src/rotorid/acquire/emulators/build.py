@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from rotorid.acquire.emulators.bench import BenchPhysics, CellClamp
 from rotorid.acquire.emulators.devices import (
     BenchDevice,
     Jr3Device,
@@ -13,15 +12,22 @@ from rotorid.acquire.emulators.devices import (
     TensileDevice,
     WrenchDevice,
 )
-from rotorid.acquire.emulators.faults import Faults
-from rotorid.acquire.emulators.rotor import Battery, Rotors, TesterPhysics
-from rotorid.acquire.emulators.stand import LoadedSensor, StandPhysics, TorqueRig
-from rotorid.acquire.emulators.tensile import TensilePhysics
+from rotorid.acquire.emulators.physics import (
+    Battery,
+    BenchPhysics,
+    CellClamp,
+    LoadedSensor,
+    StandPhysics,
+    TensilePhysics,
+    TesterPhysics,
+    TorqueRig,
+    TurningRotors,
+)
 from rotorid.acquire.emulators.truth import Truth
-from rotorid.acquire.emulators.wire import WireHalf, World
+from rotorid.acquire.emulators.wire import Faults, WireHalf, World
 from rotorid.io.experiments import EXPERIMENTS
 
-NAMES = ("bench", "rotor", "wrench", "quadrotor", "stand", "torque", "jr3", "tensile")
+_NAMES = ("bench", "rotor", "wrench", "quadrotor", "stand", "torque", "jr3", "tensile")
 
 
 def build(
@@ -65,18 +71,18 @@ def build(
         physics = TensilePhysics(truth.plastic[infill_percent], 1.0, 0.05, rng)
         return World(physics, line(TensileDevice(physics)))
     if what == "rotor":
-        rotors = Rotors(truth.rotor, Battery(truth.battery), 1)
+        rotors = TurningRotors(truth.rotor, Battery(truth.battery), 1)
         physics = TesterPhysics(rotors, truth.rotor, truth.tester, rng)
         return World(physics, line(RotorDevice(physics)))
     if what == "torque":
         rig = TorqueRig(truth, Battery(truth.battery), rng)
         return World(rig, line(RotorDevice(rig.tester)), line(WrenchDevice(rig.stand)))
-    if what not in NAMES:
-        raise ValueError(f"there is no emulator {what!r}; there are {', '.join(NAMES)}")
+    if what not in _NAMES:
+        raise ValueError(f"there is no emulator {what!r}; there are {', '.join(_NAMES)}")
     if experiment not in EXPERIMENTS:
         raise ValueError(f"table A.1 has experiments 1 to 48, not {experiment}")
     row = EXPERIMENTS[experiment]
-    rotors = Rotors(truth.rotor, Battery(truth.battery), 4)
+    rotors = TurningRotors(truth.rotor, Battery(truth.battery), 4)
     stand = StandPhysics(truth.vehicle, truth.rotor, truth.wrench, rotors, row.roll_deg, row.pitch_deg, rng)
     vehicle = line(QuadrotorDevice(rotors, rng), burst_s=0.04)
     sensor = line(WrenchDevice(stand))

@@ -8,13 +8,17 @@ from typing import Protocol
 
 import numpy as np
 
-from rotorid.acquire.emulators.bench import BenchPhysics, CellClamp
-from rotorid.acquire.emulators.rotor import Rotors, TesterPhysics
-from rotorid.acquire.emulators.stand import LoadedSensor, StandPhysics
-from rotorid.acquire.emulators.tensile import TensilePhysics
+from rotorid.acquire.emulators.physics import (
+    BenchPhysics,
+    CellClamp,
+    LoadedSensor,
+    StandPhysics,
+    TensilePhysics,
+    TesterPhysics,
+    TurningRotors,
+)
 from rotorid.io import wire
-from rotorid.io.wire import bench, jr3, quadrotor, rotor, tensile, wrench
-from rotorid.io.wire.base import GO, STOP
+from rotorid.io.wire import GO, STOP
 
 _FIRMWARE = "1.2 (emulated)"  # the committed campaign's
 
@@ -77,20 +81,20 @@ class Device:
 class BenchDevice(Device):
     """Arduino UNO with two ADS1256."""
 
-    instrument = bench.INSTRUMENT
+    instrument = wire.BENCH
 
     def __init__(self, physics: BenchPhysics | CellClamp, serial_number: str = "EMU-BENCH-1") -> None:
         super().__init__(serial_number)
         self._physics = physics
 
     def counts(self) -> list[int]:
-        return [round(volt / bench.VOLTS_PER_COUNT) for volt in self._physics.volts().tolist()]
+        return [round(volt / wire.VOLTS_PER_COUNT) for volt in self._physics.volts().tolist()]
 
 
 class RotorDevice(Device):
     """Thrust tester."""
 
-    instrument = rotor.INSTRUMENT
+    instrument = wire.ROTOR
 
     def __init__(self, physics: TesterPhysics, serial_number: str = "EMU-ROTOR-1") -> None:
         super().__init__(serial_number)
@@ -98,12 +102,12 @@ class RotorDevice(Device):
         self._left_s = 0.0
 
     def moves(self, letter: str, arguments: bytes) -> bool:
-        return letter == rotor.THROTTLE and arguments[:2] != b"\0\0"
+        return letter == wire.THROTTLE and arguments[:2] != b"\0\0"
 
     def operate(self, letter: str, arguments: bytes) -> None:
-        if letter != rotor.THROTTLE:
+        if letter != wire.THROTTLE:
             super().operate(letter, arguments)
-        throttle, self._left_s = rotor.unpack_throttle(arguments)
+        throttle, self._left_s = wire.unpack_throttle(arguments)
         if throttle > 1:
             raise CommandRefused("throttle above 1")
         self._physics.rotors.throttle[0] = throttle
@@ -120,7 +124,7 @@ class RotorDevice(Device):
     def counts(self) -> list[int]:
         rotors = self._physics.rotors
         return [
-            round(rotors.throttle[0] / rotor.THROTTLE_SCALE),
+            round(rotors.throttle[0] / wire.THROTTLE_SCALE),
             round(self._physics.speed_rpm()),
             round(self._physics.thrust_n() * 1e3),
             round(rotors.battery.voltage_v * 1e3),
@@ -131,7 +135,7 @@ class RotorDevice(Device):
 class WrenchDevice(Device):
     """Miniature six-axis sensor: needs power and initialisation before it measures."""
 
-    instrument = wrench.INSTRUMENT
+    instrument = wire.WRENCH
 
     def __init__(self, physics: StandPhysics | LoadedSensor, serial_number: str = "EMU-WRENCH-1") -> None:
         super().__init__(serial_number)
@@ -147,15 +151,15 @@ class WrenchDevice(Device):
             self._samples_left = self._measuring_times
 
     def operate(self, letter: str, arguments: bytes) -> None:
-        if letter == wrench.POWER:
+        if letter == wire.POWER:
             self._powered = arguments == b"\1"
             self._initialised = self._initialised and self._powered
         elif not self._powered:
             raise CommandRefused("the sensor is not powered")
-        elif letter == wrench.INITIALISE:
-            self.interval_us, self._runs_left, self._measuring_times = wrench.unpack_initialise(arguments)
+        elif letter == wire.INITIALISE:
+            self.interval_us, self._runs_left, self._measuring_times = wire.unpack_initialise(arguments)
             self._initialised = True
-        elif letter == wrench.OFFSET:
+        elif letter == wire.OFFSET:
             self._physics.sensor.offset()
         else:
             super().operate(letter, arguments)
@@ -172,8 +176,8 @@ class WrenchDevice(Device):
         rotors = self._physics.rotors
         speed = float(rotors.speed.mean()) if rotors is not None else 0.0
         reading = self._physics.sensor.read(speed).tolist()
-        force = [round(value / wrench.FORCE_RESOLUTION_N) for value in reading[:3]]
-        return force + [round(value / wrench.MOMENT_RESOLUTION_N_M) for value in reading[3:]]
+        force = [round(value / wire.FORCE_RESOLUTION_N) for value in reading[:3]]
+        return force + [round(value / wire.MOMENT_RESOLUTION_N_M) for value in reading[3:]]
 
     def _next_run(self) -> None:
         if self._runs_left > 0:
@@ -186,14 +190,14 @@ class WrenchDevice(Device):
 class Jr3Device(Device):
     """Large six-axis sensor."""
 
-    instrument = jr3.INSTRUMENT
+    instrument = wire.JR3
 
     def __init__(self, physics: LoadedSensor, serial_number: str = "EMU-JR3-1") -> None:
         super().__init__(serial_number)
         self._physics = physics
 
     def operate(self, letter: str, arguments: bytes) -> None:
-        if letter != wrench.OFFSET:
+        if letter != wire.OFFSET:
             super().operate(letter, arguments)
         self._physics.sensor.offset()
 
@@ -205,18 +209,18 @@ class Jr3Device(Device):
 class QuadrotorDevice(Device):
     """ESP32: a command character starts a programme, which ends by itself."""
 
-    instrument = quadrotor.INSTRUMENT
+    instrument = wire.QUADROTOR
 
-    def __init__(self, rotors: Rotors, rng: np.random.Generator, serial_number: str = "EMU-ESP32-1") -> None:
+    def __init__(self, rotors: TurningRotors, rng: np.random.Generator, serial_number: str = "EMU-ESP32-1") -> None:
         super().__init__(serial_number)
         self._rotors = rotors
         self._rng = rng
-        self._programme: quadrotor.Programme | None = None
+        self._programme: wire.Programme | None = None
         self._time_s = 0.0
-        self._led = quadrotor.RED
+        self._led = wire.RED
 
     def moves(self, letter: str, arguments: bytes) -> bool:
-        return letter in quadrotor.DYNAMICS
+        return letter in wire.DYNAMICS
 
     def command(self, letter: str, arguments: bytes) -> None:
         if letter == GO:
@@ -226,11 +230,11 @@ class QuadrotorDevice(Device):
             self._cut()
 
     def operate(self, letter: str, arguments: bytes) -> None:
-        if letter not in quadrotor.DYNAMICS:
+        if letter not in wire.DYNAMICS:
             super().operate(letter, arguments)
         if self._programme is not None:
             raise CommandRefused("a programme is running; stop it first")
-        self._programme = quadrotor.Programme.unpack(arguments)
+        self._programme = wire.Programme.unpack(arguments)
         self._time_s = 0.0
         self.streaming = True
 
@@ -250,34 +254,34 @@ class QuadrotorDevice(Device):
 
     def counts(self) -> list[int]:
         voltage = self._rotors.battery.voltage_v + 0.01 * self._rng.standard_normal()
-        throttle = [round(value / quadrotor.THROTTLE_SCALE) for value in self._rotors.throttle.tolist()]
+        throttle = [round(value / wire.THROTTLE_SCALE) for value in self._rotors.throttle.tolist()]
         # a 12-bit converter behind a divider that makes 20 V of its full scale
         return [*throttle, round(round(voltage / 20 * 4095) * 20 / 4095 * 1e3), self._led]
 
     def _cut(self) -> None:
         self._programme = None
         self._rotors.throttle[:] = 0.0
-        self._led = quadrotor.RED
+        self._led = wire.RED
 
 
-def programme_share(programme: quadrotor.Programme, time_s: float) -> tuple[float, int]:
+def programme_share(programme: wire.Programme, time_s: float) -> tuple[float, int]:
     """Share of each motor's maximum at a time since the programme's beginning, and the LED's colour."""
     if time_s < 0 or time_s > programme.duration_s:
-        return 0.0, quadrotor.RED
-    if programme.shape == quadrotor.SINE:
-        return 0.5 * (1 - math.cos(2 * math.pi * programme.frequency_hz * time_s)), quadrotor.YELLOW
+        return 0.0, wire.RED
+    if programme.shape == wire.SINE:
+        return 0.5 * (1 - math.cos(2 * math.pi * programme.frequency_hz * time_s)), wire.YELLOW
     if time_s < programme.ramp_s:
-        return time_s / programme.ramp_s, quadrotor.YELLOW
+        return time_s / programme.ramp_s, wire.YELLOW
     down_s = time_s - programme.ramp_s - programme.hold_s
     if down_s <= 0:
-        return 1.0, quadrotor.GREEN
-    return max(0.0, 1 - down_s / programme.ramp_s), quadrotor.YELLOW
+        return 1.0, wire.GREEN
+    return max(0.0, 1 - down_s / programme.ramp_s), wire.YELLOW
 
 
 class TensileDevice(Device):
     """Tensile tester: starting it starts the crosshead; it stops when the specimen is broken."""
 
-    instrument = tensile.INSTRUMENT
+    instrument = wire.TENSILE
 
     def __init__(self, physics: TensilePhysics, serial_number: str = "EMU-AGSX-1") -> None:
         super().__init__(serial_number)

@@ -19,15 +19,14 @@ from typing import Any
 import numpy as np
 import yaml
 
-from rotorid.acquire.emulators.bench import BenchPhysics
-from rotorid.acquire.emulators.stand import CORNERS
+from rotorid.acquire.emulators.physics import CORNERS, BenchPhysics
 from rotorid.acquire.emulators.truth import Truth
 from rotorid.acquire.geometry import body_forces, cell_response
 
-CHANNELS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+_CHANNELS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 _LOADS_N = np.linspace(0.35, 9.39, 8)
 """Of the static tests."""
-SENSES = {"x": 1.0, "y": 1.0, "z": -1.0}
+_SENSES = {"x": 1.0, "y": 1.0, "z": -1.0}
 """In which sense weights pull along each axis; thrust is along −z."""
 
 
@@ -86,7 +85,7 @@ def _rounded(value: Any) -> Any:
 
 def _off_diagonal(matrix: list[list[float]]) -> dict[str, float]:
     """`C_to,from` of each pair of channels."""
-    return {f"C_{CHANNELS[t]},{CHANNELS[s]}": matrix[t][s] for t in range(6) for s in range(6) if t != s}
+    return {f"C_{_CHANNELS[t]},{_CHANNELS[s]}": matrix[t][s] for t in range(6) for s in range(6) if t != s}
 
 
 def _excess(letter: str, factors: list[float]) -> dict[str, float]:
@@ -104,7 +103,7 @@ def readings(truth: Truth, material: str) -> dict[str, dict[str, float]]:
     bench = BenchPhysics(truth.cells, truth.bench[material], np.random.default_rng(0))
     response = cell_response() * np.array([1.0, 1.0, -1.0])
     crosstalk, compliance = {}, {}
-    for source, (axis, sense) in enumerate(SENSES.items()):
+    for source, (axis, sense) in enumerate(_SENSES.items()):
         load = np.zeros((len(_LOADS_N), 3))
         load[:, source] = sense * _LOADS_N
         cells = np.array([response @ bench.bent(one) for one in load])
@@ -112,7 +111,7 @@ def readings(truth: Truth, material: str) -> dict[str, dict[str, float]]:
         cells -= np.sign(cells) * truth.cells.overload_loss * beyond
         columns = np.column_stack([load[:, source], load[:, source] * np.abs(load[:, source])])
         linear, square = np.linalg.lstsq(columns, np.array([body_forces(one) for one in cells]) - load, rcond=None)[0]
-        for target, other in enumerate(SENSES):
+        for target, other in enumerate(_SENSES):
             if other != axis:
                 crosstalk[f"C_F{other},F{axis}"] = float(linear[target])
             compliance[f"k_F{other},F{axis}"] = float(square[target])

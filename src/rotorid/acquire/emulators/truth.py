@@ -154,7 +154,7 @@ def draw_truth(seed: int) -> Truth:
         return [float(f"{value:.4g}") for value in rng.uniform(low, high, count)]
 
     def signed(low: float, high: float, count: int) -> list[float]:
-        return [float(f"{value:.4g}") for value in rng.uniform(low, high, count) * _signs(rng, count)]
+        return [float(f"{value:.4g}") for value in rng.uniform(low, high, count) * rng.choice([-1.0, 1.0], count)]
 
     vertical, *lateral = spread(0.0028, 0.0034, 1) + spread(0.06, 0.09, 2)  # the long tube bends sideways
     turn = spread(0.0010, 0.0014, 1)[0]
@@ -218,10 +218,6 @@ def draw_truth(seed: int) -> Truth:
         specimen_scatter=0.012,
         clocks=ClockTruth(**dict(zip(ClockTruth.model_fields, (v * 1e-6 for v in signed(30, 120, 6)), strict=True))),
     )
-
-
-def _signs(rng: np.random.Generator, count: int) -> np.ndarray:
-    return rng.choice([-1.0, 1.0], count)
 
 
 def _crosstalk(rng: np.random.Generator) -> list[list[float]]:

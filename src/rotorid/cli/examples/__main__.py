@@ -9,7 +9,7 @@ from rotorid.recordings import templates, write_vehicle
 from rotorid.recordings.tables import write_table
 from rotorid.vehicle.control.swings import swings
 
-HEADING = """\
+_HEADING = """\
 # Two flights of {seconds:g} s of the thesis's quadrotor, simulated by rotorid with seed {seed}. What the vehicle
 # really does is not all in this file: `rotorid verdict` is to find it.
 """
@@ -21,7 +21,7 @@ def main(folder: Path) -> None:
     flown = swings(vehicle, "example", SECONDS, FLIGHTS, SEED, every=EVERY)
     write_vehicle(flown.vehicle, folder / "vehicle.yaml")
     path = folder / "vehicle.yaml"
-    path.write_text(HEADING.format(seconds=SECONDS, seed=SEED) + path.read_text(encoding="utf-8"), encoding="utf-8")
+    path.write_text(_HEADING.format(seconds=SECONDS, seed=SEED) + path.read_text(encoding="utf-8"), encoding="utf-8")
     for run in flown.runs:
         table = run.table.astype(np.float32).assign(time_s=run.time_s.round(6))
         write_table(table, folder / f"{run.name}.csv.gz")

@@ -19,7 +19,7 @@ from scipy.stats import t as student
 
 _LARGEST_ORDER = 20
 _BLOCKS = 40
-LEVEL = 0.95
+_LEVEL = 0.95
 _ROUNDS = 2
 """Times that the residuals are whitened and the fit repeated."""
 
@@ -64,8 +64,8 @@ class CorrelatedFit:
         )
         free = max(self.blocks - len(self.values), 2)
         half = max(
-            np.sqrt(slope @ self.classical @ slope) * student.ppf(0.5 + LEVEL / 2, 1000),
-            np.sqrt(slope @ self.sandwich @ slope) * student.ppf(0.5 + LEVEL / 2, free),
+            np.sqrt(slope @ self.classical @ slope) * student.ppf(0.5 + _LEVEL / 2, 1000),
+            np.sqrt(slope @ self.sandwich @ slope) * student.ppf(0.5 + _LEVEL / 2, free),
         )
         return EstimatedNumber(value, (value - float(half), value + float(half)))
 

@@ -21,12 +21,12 @@ from rotorid.identify.autopilot.signals import Stretch
 from rotorid.identify.autopilot.thrust import averaged
 
 _AIR_DENSITY_KG_M3 = 1.225
-RATE_HZ = 20.0
+_RATE_HZ = 20.0
 """Residuals are averaged down to about so many a second: drag follows the velocity, which is slow."""
 _LEAST_AIRSPEED_M_S = 1e-3
 _ZERO_M_S2 = 0.3
 """Believed deviation of the specific force at rest: the accelerometer's zero, and rotors whose axis is not quite z."""
-WIND_M_S = 5.0
+_WIND_M_S = 5.0
 """Believed deviation of each component of the wind about none."""
 
 
@@ -68,7 +68,7 @@ def fit_drag(stretches: Sequence[Stretch], density_kg_m3: float = _AIR_DENSITY_K
     low = np.array([-0.2, -0.2, -1.0, -3, -3, *[-30.0] * (2 * len(runs))])
     high = np.array([1.0, 1.0, 3.0, 3, 3, *[30.0] * (2 * len(runs))])
     scale = np.array([0.02, 0.02, 0.1, _ZERO_M_S2, _ZERO_M_S2, *[2.0] * (2 * len(runs))])
-    prior = np.array([np.inf, np.inf, np.inf, _ZERO_M_S2, _ZERO_M_S2, *[WIND_M_S] * (2 * len(runs))])
+    prior = np.array([np.inf, np.inf, np.inf, _ZERO_M_S2, _ZERO_M_S2, *[_WIND_M_S] * (2 * len(runs))])
 
     def residuals(values: np.ndarray) -> list[np.ndarray]:
         out = []
@@ -77,7 +77,7 @@ def fit_drag(stretches: Sequence[Stretch], density_kg_m3: float = _AIR_DENSITY_K
             moving = s.velocity - np.array([*values[at : at + 2], 0.0])
             through = np.einsum("nji,nj->ni", s.attitude, moving)
             force = specific_drag(through, *values[:3], density_kg_m3) + values[3:5]
-            every = max(int(round(1 / (RATE_HZ * s.dt_s))), 1)
+            every = max(int(round(1 / (_RATE_HZ * s.dt_s))), 1)
             out += [averaged(s.specific_force[:, j] - force[:, j], every) for j in range(2)]
         return out
 

@@ -12,7 +12,7 @@ from rotorid.recordings import columns as c
 from rotorid.recordings.own_rates import on_own_rates
 from rotorid.vehicle.attitude import normalised, rotation_from_quaternion
 
-LEAST_STRETCH_S = 3.0
+_LEAST_STRETCH_S = 3.0
 _GAP_PERIODS = 6.0
 """Where the accelerometer gives nothing for longer than so many of its periods, a stretch ends."""
 
@@ -37,7 +37,7 @@ class Stretch:
 
 
 def stretches_of(recordings: RecordingSet) -> list[Stretch]:
-    """The stretches of a set's runs that last at least `LEAST_STRETCH_S`.
+    """The stretches of a set's runs that last at least `_LEAST_STRETCH_S`.
 
     InputError where the set is no flight, or none of its runs has an accelerometer.
     """
@@ -51,7 +51,7 @@ def stretches_of(recordings: RecordingSet) -> list[Stretch]:
     found = [s for run in even.runs for s in _of_run(run, even.vehicle.rotor_count)]
     if not found:
         raise InputError(
-            f"{recordings.name}: too little data: no stretch with accelerometer readings lasts {LEAST_STRETCH_S:g} s"
+            f"{recordings.name}: too little data: no stretch with accelerometer readings lasts {_LEAST_STRETCH_S:g} s"
         )
     return found
 
@@ -69,7 +69,7 @@ def _of_run(run: Run, rotors: int) -> list[Stretch]:
     out = []
     for part in np.split(np.arange(len(time_s)), cuts):
         span = time_s[part[-1]] - time_s[part[0]]
-        if span < LEAST_STRETCH_S:
+        if span < _LEAST_STRETCH_S:
             continue
         grid = time_s[part[0]] + dt * np.arange(int(span / dt) + 1)
         quaternion = _on(grid, run, c.QUATERNION)

@@ -23,7 +23,7 @@ _STANDARD_GRAVITY = 9.80665
 _ACCELEROMETER_ZERO_M_S2 = 0.1
 """Standard deviation of the error of an accelerometer's zero that is believed."""
 TIME_CONSTANTS_S = (0.002, 0.4)
-RATE_HZ = 100.0
+_RATE_HZ = 100.0
 """Residuals are averaged down to about so many a second: there is nothing above that the motors could do."""
 _VOLTAGE_MOVES = 0.01
 """Share of the voltage that it must vary by for its part to be estimated."""
@@ -154,7 +154,7 @@ def _layout(used: Sequence[Stretch], chosen: ThrustMap) -> _Layout:
 
 
 def _residuals(used: Sequence[Stretch], chosen: ThrustMap, layout: _Layout, mass_kg: float):
-    """The function from values to the residuals of each stretch, m/s², averaged down to `RATE_HZ`."""
+    """The function from values to the residuals of each stretch, m/s², averaged down to `_RATE_HZ`."""
     prepared = []
     for s in used:
         through = None
@@ -162,7 +162,7 @@ def _residuals(used: Sequence[Stretch], chosen: ThrustMap, layout: _Layout, mass
             body = np.einsum("nji,nj->ni", s.attitude, s.velocity)
             through = np.stack([body[:, 2], body[:, 0] ** 2 + body[:, 1] ** 2], axis=1)
         middle, length = s.time_s.mean(), max(np.ptp(s.time_s), 1e-9)
-        prepared.append((s, through, (s.time_s - middle) / length, max(int(round(1 / (RATE_HZ * s.dt_s))), 1)))
+        prepared.append((s, through, (s.time_s - middle) / length, max(int(round(1 / (_RATE_HZ * s.dt_s))), 1)))
 
     def residuals(values: np.ndarray) -> list[np.ndarray]:
         out = []

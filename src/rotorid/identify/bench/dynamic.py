@@ -12,9 +12,9 @@ from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
 from rotorid.io.tables import by_recording
-from rotorid.recordings.signal.average import mean_and_error
+from rotorid.recordings.signal.filters import mean_and_error
 
-REST_S = 1.0
+_REST_S = 1.0
 """Length of the stretches at the beginning and the end that are taken as rest."""
 _HELD_S = 0.8
 """A thrust counts as held when it stays within ± `_HELD_N` for that long."""
@@ -70,7 +70,7 @@ def flights(
     return pd.concat(out, ignore_index=True)
 
 
-def held(time_s: np.ndarray, thrust_n: np.ndarray) -> list[tuple[float, float]]:
+def _held(time_s: np.ndarray, thrust_n: np.ndarray) -> list[tuple[float, float]]:
     """Stretches (start and stop, s) in which a smooth thrust above rest is held.
 
     Over every `_HELD_S` within a stretch the thrust spans less than twice `_HELD_N`; stretches whose levels do not
@@ -101,7 +101,7 @@ def agreement(flown: pd.DataFrame, base: str = "al") -> pd.DataFrame:
         steady = flights_of_set[flights_of_set["platform"] == base]
         if steady.empty:
             continue
-        stretches = held(steady["time_s"].to_numpy(), steady["zero_phase_n"].to_numpy())
+        stretches = _held(steady["time_s"].to_numpy(), steady["zero_phase_n"].to_numpy())
         for place, (start, stop) in enumerate(stretches, start=1):
             if stop - start <= 2 * _MARGIN_S:
                 continue
@@ -156,7 +156,7 @@ def figures(flown: pd.DataFrame) -> pd.DataFrame:
     rows = []
     for (number, platform), flight in flown.groupby(["set", "platform"]):
         time_s = flight["time_s"].to_numpy()
-        before, after = time_s < REST_S, time_s > time_s[-1] - REST_S
+        before, after = time_s < _REST_S, time_s > time_s[-1] - _REST_S
         rest = flight.loc[before, "thrust_n"]
         rows.append(
             {

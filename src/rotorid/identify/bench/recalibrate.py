@@ -17,8 +17,8 @@ import pandas as pd
 from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
-from rotorid.identify.bench.channels import CELLS
 from rotorid.identify.bench.loadcell import LineFit, fit_line
+from rotorid.identify.bench.reconstruct import CELLS
 from rotorid.io.tables import by_recording
 
 _FEWEST_STEADY = 50

@@ -24,6 +24,10 @@ _C30, _C45, _C60 = np.cos(np.radians([30.0, 45.0, 60.0]))
 _DISTANCES = ("D_1x D_2x D_4x D_5x D_6x D_1y D_2y D_3y D_4y D_5y D_6y D_135z D_246z L").split()
 PULLED = (0, 2, 4)
 """Cells 1, 3, 5: their absolute value enters eq. 2.8."""
+CELLS = tuple(f"cell_{i}_v" for i in range(1, 7))
+FORCES = ("force_x_n", "force_y_n", "force_z_n")
+DIRECTION = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, -1.0)}
+"""Unit vector of a load, body axes: along z it pulls upwards, as thrust does."""
 
 
 @dataclass(frozen=True)
@@ -137,14 +141,6 @@ def forces(cells_n: np.ndarray, geometry: Geometry) -> np.ndarray:
     pulled = np.abs(cells_n[..., PULLED]).sum(axis=-1)
     along_z = -(pulled + f["f_2z"] + f["f_4z"] + f["f_6z"])
     return np.stack([-sums[..., 1] / geometry["L"], sums[..., 0] / geometry["L"], along_z], axis=-1)
-
-
-def forces_by_matrix(cells_n: np.ndarray, geometry: Geometry) -> np.ndarray:
-    """Eq. 2.9: the same as `forces`, by the matrix; N, shape (n, 3)."""
-    cells_n = np.asarray(cells_n, float)
-    force = cells_n @ geometry.matrix.T
-    force[..., 2] -= np.abs(cells_n[..., PULLED]).sum(axis=-1)
-    return force
 
 
 def cell_forces(volts: np.ndarray, coefficients_gf: np.ndarray) -> np.ndarray:

@@ -22,6 +22,7 @@ from scipy.special import stdtrit as student_quantile
 from rotorid.errors import InputError
 from rotorid.identify.bench.loadcell import LineFit, fit_line
 from rotorid.identify.bench.reconstruct import (
+    DIRECTION,
     GF_N,
     PULLED,
     Geometry,
@@ -32,15 +33,14 @@ from rotorid.identify.bench.reconstruct import (
 )
 from rotorid.io.tables import by_recording
 
-_UNIT = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, -1.0)}
-AXES = "xyz"
+_AXES = "xyz"
 
 
 def direction(axis: str) -> np.ndarray:
     """Unit vector of a load, shape (3,), body axes; `xz` is halfway between x and z. Loads along z pull up, −z."""
-    if not axis or any(letter not in _UNIT for letter in axis):
+    if not axis or any(letter not in DIRECTION for letter in axis):
         raise InputError(f"a load's axis is x, y, z or several of them, not {axis!r}")
-    together = np.sum([_UNIT[letter] for letter in axis], axis=0)
+    together = np.sum([DIRECTION[letter] for letter in axis], axis=0)
     return together / np.linalg.norm(together)
 
 
@@ -126,7 +126,7 @@ def points(means: Means, force_n: np.ndarray, uncertainty_n: np.ndarray, method:
     out["error_n"] = along - load
     out["across_n"] = across
     out["uncertainty_n"] = np.sqrt(np.einsum("ij,ij->i", unit**2, uncertainty_n**2))
-    for k, axis in enumerate(AXES):
+    for k, axis in enumerate(_AXES):
         out[f"error_{axis}_n"] = force_n[:, k] - means.applied_n[:, k]
     return out
 
@@ -214,7 +214,7 @@ def methods_compared(table: pd.DataFrame) -> dict:
         entry = {"recordings": len(seen), "largest_load_n": float(seen["load_n"].max())}
         for method in ("equations", "matrix"):
             part = table[(table["method"] == method) & table["id"].isin(seen["id"])]
-            squares = part[[f"error_{axis}_n" for axis in AXES]].to_numpy() ** 2
+            squares = part[[f"error_{axis}_n" for axis in _AXES]].to_numpy() ** 2
             entry[method] = {
                 "rms_n": np.sqrt(squares.mean(axis=0)).tolist(),
                 "rms_share_of_load": float(np.sqrt(squares.sum() / (part["load_n"] ** 2).sum())),

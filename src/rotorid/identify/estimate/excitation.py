@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rotorid.identify.estimate.inertial import regressors, weights_of_inertias
+from rotorid.identify.estimate.grey_box import regressors, weights_of_inertias
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.control.pid import AttitudePid, AttitudeReference, Gains
 from rotorid.vehicle.fast import AttitudeLoop

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import stdtrit as student_quantile
 
 from rotorid.effects.contract import compiled
-from rotorid.identify.estimate.inertial import weights_of_inertias
+from rotorid.identify.estimate.grey_box import weights_of_inertias
 
 
 @dataclass(frozen=True)
@@ -34,13 +34,6 @@ def cut_windows(rates: np.ndarray, moments: np.ndarray, dt_s: float, window_s: f
     index = first[:, None] + np.arange(length)
     good = np.isfinite(rates[index]).all((1, 2)) & np.isfinite(moments[index]).all((1, 2))
     return RateWindows(rates[index[good]], moments[index[good]], dt_s)
-
-
-def joined(parts: list[RateWindows]) -> RateWindows:
-    """Windows of several flights with the same sample time and length."""
-    return RateWindows(
-        np.concatenate([p.rates for p in parts]), np.concatenate([p.moments for p in parts]), parts[0].dt_s
-    )
 
 
 @compiled(error_model="numpy")
@@ -98,7 +91,7 @@ def simulate_rates(weights: np.ndarray, start: np.ndarray, moments: np.ndarray, 
     return out
 
 
-Model = Callable[[np.ndarray], np.ndarray]
+_Model = Callable[[np.ndarray], np.ndarray]
 """From the parameters to the nine weights of `simulate_rates`."""
 
 
@@ -145,7 +138,7 @@ def _walk_power(samples: int) -> float:
 
 def fit_output_error(
     windows: RateWindows,
-    model: Model,
+    model: _Model,
     start: np.ndarray,
     window_moment: bool = False,
     iterations: int = 30,

@@ -1,4 +1,8 @@
-"""What a solved bench says: deformation, equivalent stress, stress in the narrow sections, and what its cells read."""
+"""What a solved bench says: deformation, equivalent stress, stress in the narrow sections, and what its cells read.
+
+The thesis's four sentences on its simulations (2.5.2) are held to a table of such answers, for benches of different
+sizes.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +10,21 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 
 import numpy as np
+import pandas as pd
 
 from rotorid.identify.bench.reconstruct import Geometry, forces
-from rotorid.identify.fem.bench import CELLS, PIECES
-from rotorid.identify.fem.gauges import bridge_strain, strain_per_newton
-from rotorid.identify.fem.model import Bench, Solved
+from rotorid.identify.fem.bench import CELLS, PIECES, Bench, Solved
+from rotorid.identify.fem.cell import bridge_strain, strain_per_newton
 from rotorid.identify.fem.placement import LEGS
 from rotorid.identify.fem.sizes import MATERIALS, Assumed, Sizes, materials
 
-PARTS = (*CELLS, *PIECES)
+_PARTS = (*CELLS, *PIECES)
+EVEN = 0.9
+"""A plate moves evenly where its least displacement is at least this share of its largest."""
+MIDDLE = 0.99
+"""Its largest displacement is in its middle where the middle has at least this share of it."""
+NEARLY = 0.1
+"""Two stresses are nearly the same where they differ by at most this share."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +93,7 @@ def by_part(bench: Bench, solved: Solved) -> dict[str, dict[str, float]]:
     moved = np.linalg.norm(solved.displacement_m, axis=1)
     return {
         name: {"deformation_m": float(moved[own].max()), "stress_pa": float(solved.von_mises_pa[own].max())}
-        for name in PARTS
+        for name in _PARTS
         for own in [bench.body.nodes_of(name)]
     }
 
@@ -105,3 +115,47 @@ def ratios(found: Mapping[str, Answers]) -> dict[str, float]:
         name.removesuffix("_m").removesuffix("_pa"): plastic[name] / metal[name]
         for name in ("deformation_m", "stress_pa", "narrow_upper_pa", "narrow_lower_pa")
     }
+
+
+@dataclass(frozen=True)
+class _Judged:
+    """A sentence and on how many benches it holds."""
+
+    statement: str
+    on_assumed: bool
+    """Whether it holds with all sizes as assumed."""
+    holds: int
+    benches: int
+
+    @property
+    def word(self) -> str:
+        """What follows from that."""
+        if self.holds == self.benches:
+            return "follows"
+        return "does not follow" if self.holds == 0 else "depends on the assumed sizes"
+
+
+def judge_statements(table: pd.DataFrame) -> list[_Judged]:
+    """Each sentence on each bench.
+
+    Parameters
+    ----------
+    table
+        A bench a row, the first with all sizes as assumed; columns `ratio_deformation`, `ratio_narrow_upper`,
+        `ratio_narrow_lower`; `plate_evenness`, `plate_middle` and `stressed_most` with `_aluminium` and with `_pla`.
+    """
+    even = table["plate_evenness_aluminium"] >= EVEN
+    middle = (table["plate_middle_pla"] >= MIDDLE) & (table["plate_evenness_pla"] < table["plate_evenness_aluminium"])
+    held = {
+        "PLA deforms more than aluminium": table["ratio_deformation"] > 1,
+        "aluminium's piece D deforms evenly": even,
+        "PLA's piece D deforms most in its middle, and less evenly": middle,
+        "the largest stresses lie in different pieces": table["stressed_most_aluminium"] != table["stressed_most_pla"],
+        "the stress in an upper cell's narrow section is nearly the same": _nearly(table["ratio_narrow_upper"]),
+        "the stress in a lower cell's narrow section is nearly the same": _nearly(table["ratio_narrow_lower"]),
+    }
+    return [_Judged(name, bool(holds.iloc[0]), int(holds.sum()), len(holds)) for name, holds in held.items()]
+
+
+def _nearly(ratio: pd.Series) -> pd.Series:
+    return (ratio - 1).abs() <= NEARLY

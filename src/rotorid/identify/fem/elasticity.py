@@ -24,7 +24,7 @@ _INTEGRATED = 3
 """Degree of the polynomials that are integrated exactly."""
 _LEFT_OVER = 1e-6
 """Share of the forces that a solution may leave unbalanced."""
-OUTSIDE = 0.02
+_OUTSIDE = 0.02
 """A point may lie outside of its tetrahedron by so much of its size: curved surfaces are meshed by flat ones."""
 
 
@@ -152,7 +152,7 @@ class LooseParts:
         inside = np.minimum(local.min(axis=-1), 1 - local.sum(axis=-1))
         best = inside.argmax(axis=1)
         rows = np.arange(len(points_m))
-        if (inside[rows, best] < -OUTSIDE).any():
+        if (inside[rows, best] < -_OUTSIDE).any():
             raise InputError(f"a part is bonded to {name} where {name} is not; the sizes do not go together")
         elements, local = own[best], local[rows, best].T
         shape = np.array([self.basis.elem.lbasis(local, i)[0] for i in range(self.basis.Nbfun)])

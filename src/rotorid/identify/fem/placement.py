@@ -17,7 +17,7 @@ LEGS = ((1, 2), (5, 6), (3, 4))
 """Upper and lower cell of each leg; each leg is the one before it turned by 120° about z, from x to y."""
 _AZIMUTH = {"upper": np.radians(-60.0), "lower": np.radians(30.0)}
 """Direction outwards across the bar of the first leg's cells, from x to y, by the factors of table 2.2."""
-SLOPE = {"upper": 0.0, "lower": np.radians(45.0)}
+_SLOPE = {"upper": 0.0, "lower": np.radians(45.0)}
 """Angle between the direction in which a cell gives way and the table."""
 
 
@@ -67,7 +67,7 @@ def _upper(distances_m: Mapping[str, float]) -> Place:
 
 
 def _lower(distances_m: Mapping[str, float]) -> Place:
-    slope = SLOPE["lower"]
+    slope = _SLOPE["lower"]
     outwards = np.array([np.cos(_AZIMUTH["lower"]), np.sin(_AZIMUTH["lower"]), 0.0])
     up = np.array([0.0, 0.0, -1.0])
     sense = -np.cos(slope) * outwards + np.sin(slope) * up

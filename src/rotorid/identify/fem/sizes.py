@@ -12,7 +12,7 @@ import pandas as pd
 from rotorid.errors import InputError
 from rotorid.io.text.files import read_yaml
 
-UNITS = {"_m2": ("_mm2", 1e-6), "_m": ("_mm", 1e-3), "_pa": ("_gpa", 1e9)}
+_UNITS = {"_m2": ("_mm2", 1e-6), "_m": ("_mm", 1e-3), "_pa": ("_gpa", 1e9)}
 """Unit of a size, by the end of its name, in the file and as a share of the SI unit."""
 MATERIALS = ("Al-6061", "PLA")
 
@@ -90,7 +90,7 @@ class Material:
 
 def in_file(name: str) -> tuple[str, float]:
     """Name of a size in the file, with the unit that it has there, and that unit in SI."""
-    for end, (written, factor) in UNITS.items():
+    for end, (written, factor) in _UNITS.items():
         if name.endswith(end):
             return name.removesuffix(end) + written, factor
     return name, 1.0

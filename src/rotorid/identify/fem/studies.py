@@ -21,12 +21,12 @@ from rotorid.errors import InputError
 from rotorid.identify.bench.reconstruct import GF_N, Geometry
 from rotorid.identify.fem import answers, elasticity
 from rotorid.identify.fem.answers import Answers, by_part, compare, ratios
+from rotorid.identify.fem.bench import Bench, Solved
+from rotorid.identify.fem.cell import strain_per_newton
 from rotorid.identify.fem.elasticity import Hole, LooseParts
-from rotorid.identify.fem.gauges import strain_per_newton
-from rotorid.identify.fem.model import Bench, Solved
 from rotorid.identify.fem.sizes import MATERIALS, Assumed, Material, Sizes, in_file, materials
 from rotorid.identify.fem.tets import block, count, stacked
-from rotorid.io.wire.bench import VOLTS_PER_COUNT
+from rotorid.io.wire import VOLTS_PER_COUNT
 
 _BEAM = Material(68.9e9, 0.0)
 """Without contraction across, for which beam theory's clamped end is exact."""
@@ -136,7 +136,8 @@ def surface(finest: _Finest) -> pd.DataFrame:
 
 def verification() -> pd.DataFrame:
     """Closed forms and what the solver says, a quantity and mesh a row."""
-    return pd.DataFrame([asdict(row) | {"error": row.error} for row in _all_checks()])
+    rows = [row for case in (cantilever, plate_with_hole) for fineness in FINENESSES for row in case(fineness)]
+    return pd.DataFrame([asdict(row) | {"error": row.error} for row in rows])
 
 
 def size_study(
@@ -399,8 +400,3 @@ def kirsch_displacement_m(places_m: np.ndarray, radius_m: float, pull_pa: float,
     round_ = scale * (-2 * r + 2 / r * (1 - kappa) - 2 / r**3) * np.sin(2 * angle)
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([outwards * c - round_ * s, outwards * s + round_ * c], axis=-1)
-
-
-def _all_checks() -> list[_Checked]:
-    """Every problem on every mesh."""
-    return [row for case in (cantilever, plate_with_hole) for fineness in FINENESSES for row in case(fineness)]

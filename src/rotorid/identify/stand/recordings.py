@@ -1,6 +1,6 @@
 """The stand's tests as recording sets of kind `stand`.
 
-Two instruments with their own clocks are put on one (`rotorid.identify.stand.align`); a run's samples are the wrench
+Two instruments with their own clocks are put on one (`rotorid.identify.stand.clocks`); a run's samples are the wrench
 sensor's, with throttle, speed and voltage interpolated to them. Before and after a programme the vehicle sends nothing:
 its motors stand.
 """
@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from rotorid.identify.stand.align import Aligned, Pair, both_on_host, pair_of, torque_offset
+from rotorid.identify.stand.clocks import Aligned, Pair, both_on_host, pair_of, torque_offset
+from rotorid.identify.stand.wrench import WRENCH
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.sequence import Quality
 from rotorid.io.tables import by_recording
@@ -18,9 +19,8 @@ from rotorid.recordings import columns as c
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.vehicle import Vehicle
 
-RPM = 2 * np.pi / 60
-WRENCH = (*c.FORCE, *c.MOMENT)
-THROTTLES = c.rotor_columns("throttle", 4)
+_RPM = 2 * np.pi / 60
+_THROTTLES = c.rotor_columns("throttle", 4)
 
 
 def _felt(wrench: pd.DataFrame, offset_s: float) -> tuple[np.ndarray, pd.DataFrame]:
@@ -41,7 +41,7 @@ def _experiment_run(session, aligned: Aligned) -> Run:
     when, felt = _felt(aligned.pair.wrench, aligned.offset_s)
     sent = quadrotor["host_s"].to_numpy()
     table = pd.DataFrame({c.TIME: when - when[0]})
-    for column in THROTTLES:
+    for column in _THROTTLES:
         table[column] = _within(when, sent, quadrotor[column].to_numpy(), 0.0)
     table[c.BATTERY_VOLTAGE] = _within(when, sent, quadrotor["battery_voltage_v"].to_numpy(), np.nan)
     table["roll_rad"] = np.radians(session.mount_roll_deg)
@@ -56,7 +56,7 @@ def _torque_run(name: str, rotor: pd.DataFrame, wrench: pd.DataFrame, offset_s: 
     sent = rotor["host_s"].to_numpy()
     table = pd.DataFrame({c.TIME: when - when[0]})
     table["throttle_1"] = _within(when, sent, rotor["throttle"].to_numpy(), 0.0)
-    table["rotor_speed_1_rad_s"] = _within(when, sent, rotor["speed_rpm"].to_numpy() * RPM, 0.0)
+    table["rotor_speed_1_rad_s"] = _within(when, sent, rotor["speed_rpm"].to_numpy() * _RPM, 0.0)
     for i in (2, 3, 4):
         table[f"throttle_{i}"] = 0.0
         table[f"rotor_speed_{i}_rad_s"] = 0.0
@@ -73,7 +73,7 @@ def _thrust_run(name: str, rotor: pd.DataFrame) -> Run:
         {
             c.TIME: rotor["time_s"].to_numpy(),
             "throttle_1": rotor["throttle"].to_numpy(float),
-            "rotor_speed_1_rad_s": rotor["speed_rpm"].to_numpy() * RPM,
+            "rotor_speed_1_rad_s": rotor["speed_rpm"].to_numpy() * _RPM,
             "force_z_n": -rotor["thrust_n"].to_numpy(),
             c.BATTERY_VOLTAGE: rotor["battery_voltage_v"].to_numpy(),
             c.BATTERY_CURRENT: rotor["battery_current_a"].to_numpy(),
@@ -82,7 +82,7 @@ def _thrust_run(name: str, rotor: pd.DataFrame) -> Run:
     return Run(name, table)
 
 
-def stand_vehicle(name: str, believed: Vehicle, session, noise: dict[str, float]) -> Vehicle:
+def _stand_vehicle(name: str, believed: Vehicle, session, noise: dict[str, float]) -> Vehicle:
     """The believed vehicle as it stands on the sensor, from its flight file and the recording's metadata."""
     content = believed.model_dump(exclude_defaults=True)
     content.update(name=name, kind="stand", tared=bool(session.tared), sensor_mount="level", noise=noise)
@@ -134,7 +134,7 @@ def dynamics_set(
     session_of = {session.group: session for session in recordings.itertuples()}
     runs = [_experiment_run(session_of[entry.pair.name], entry) for entry in aligned]
     first = session_of[aligned[0].pair.name]
-    return RecordingSet(name, stand_vehicle(name, believed, first, noise), tuple(sorted(runs, key=_name)))
+    return RecordingSet(name, _stand_vehicle(name, believed, first, noise), tuple(sorted(runs, key=_name)))
 
 
 _LARGEST_OFFSET_ERROR_S = 0.01
@@ -157,7 +157,7 @@ def torque_set(
         for (test, speed, reading), lag in zip(tests, lags, strict=True)
     ]
     first = next(wrench[1].itertuples())
-    return RecordingSet(name, stand_vehicle(name, believed, first, noise), tuple(sorted(runs, key=_name)))
+    return RecordingSet(name, _stand_vehicle(name, believed, first, noise), tuple(sorted(runs, key=_name)))
 
 
 def thrust_set(name: str, rotor: tuple, believed: Vehicle, noise: dict[str, float]) -> RecordingSet:

@@ -1,7 +1,8 @@
 """Steady wrenches of the experiments on the stand: means with intervals, rest reading, weight under tilt.
 
-The sensor stays level and the vehicle is tilted on it, so the weight pulls along the sensor's z whatever the tilt;
-what turns with the vehicle is the arm from the sensor to the centre of mass, and with it the weight's moment.
+The throttles alone say where a programme rests, ramps and holds. The sensor stays level and the vehicle is tilted on
+it, so the weight pulls along the sensor's z whatever the tilt; what turns with the vehicle is the arm from the sensor
+to the centre of mass, and with it the weight's moment.
 """
 
 from __future__ import annotations
@@ -14,15 +15,86 @@ import pandas as pd
 from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
-from rotorid.identify.stand import plateaus
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import Run
-from rotorid.recordings.signal.average import block_count, mean_and_error
+from rotorid.recordings.signal.filters import block_count, mean_and_error
 
+_REST, _RAMP, PLATEAU = "rest", "ramp", "plateau"
+_SLOPE_1_S = 0.004
+"""A throttle that changes by less than this per second is constant (the slowest ramp of table A.1: 0.0167)."""
+_WINDOW_S = 0.1
+_SHORTEST_S = 0.5
+"""A plateau is at least that long; a sine's turning points are not."""
 WRENCH = (*c.FORCE, *c.MOMENT)
 _SETTLE_S = 0.5
 """Left off the beginning of a plateau and of the rest after a programme: motors and structure settle."""
 _REST_MARGIN_S = 0.15
+
+
+@dataclass(frozen=True)
+class _StandStretch:
+    """A stretch of one kind, from `start_s` to `stop_s`."""
+
+    kind: str
+    start_s: float
+    stop_s: float
+
+    @property
+    def length_s(self) -> float:
+        return self.stop_s - self.start_s
+
+
+def segments(time_s: np.ndarray, throttle: np.ndarray) -> list[_StandStretch]:
+    """Stretches of a programme in the order of time.
+
+    Parameters
+    ----------
+    time_s
+        Shape (n,), increasing.
+    throttle
+        Fractions 0 to 1, shape (n, motors).
+
+    Raises
+    ------
+    InputError
+        The motors never run.
+    """
+    time_s, throttle = np.asarray(time_s, float), np.atleast_2d(np.asarray(throttle, float))
+    running = (throttle > 0).any(axis=1)
+    if not running.any():
+        raise InputError("the motors never ran")
+    half = _WINDOW_S / 2
+    ahead = np.minimum(np.searchsorted(time_s, time_s + half, side="right") - 1, len(time_s) - 1)
+    behind = np.searchsorted(time_s, time_s - half)
+    span_s = np.maximum(time_s[ahead] - time_s[behind], 1e-9)
+    slope = np.abs(throttle[ahead] - throttle[behind]).max(axis=1) / span_s
+    kinds = np.where(~running, _REST, np.where(slope < _SLOPE_1_S, PLATEAU, _RAMP)).astype(object)
+    found = _stretches(time_s, kinds)
+    short = [s for s in found if s.kind == PLATEAU and s.length_s < _SHORTEST_S]
+    for segment in short:
+        kinds[(time_s >= segment.start_s) & (time_s <= segment.stop_s)] = _RAMP
+    return _stretches(time_s, kinds)
+
+
+def _stretches(time_s: np.ndarray, kinds: np.ndarray) -> list[_StandStretch]:
+    """Runs of equal kind."""
+    edges = np.flatnonzero(kinds[1:] != kinds[:-1]) + 1
+    starts, stops = np.concatenate([[0], edges]), np.concatenate([edges - 1, [len(kinds) - 1]])
+    return [
+        _StandStretch(str(kinds[a]), float(time_s[a]), float(time_s[b])) for a, b in zip(starts, stops, strict=True)
+    ]
+
+
+def longest(found: list[_StandStretch], kind: str) -> _StandStretch | None:
+    """The longest stretch of a kind, None where there is none."""
+    those = [segment for segment in found if segment.kind == kind]
+    return max(those, key=lambda segment: segment.length_s) if those else None
+
+
+def programme(found: list[_StandStretch]) -> _StandStretch:
+    """From the first moment at which a motor runs to the last."""
+    moving = [segment for segment in found if segment.kind != _REST]
+    return _StandStretch(_RAMP, moving[0].start_s, moving[-1].stop_s)
 
 
 def tilt(roll_rad: float, pitch_rad: float) -> np.ndarray:
@@ -96,9 +168,9 @@ def evaluate(run: Run, frequency_hz: float | None) -> _Evaluated:
     that the mean is one over the cycle.
     """
     throttle = run.array(c.rotor_columns("throttle", 4))
-    found = plateaus.segments(run.time_s, throttle)
-    active = plateaus.programme(found)
-    flat = plateaus.longest(found, plateaus.PLATEAU)
+    found = segments(run.time_s, throttle)
+    active = programme(found)
+    flat = longest(found, PLATEAU)
     cycles = None
     if frequency_hz:
         cycles = int((active.length_s - _SETTLE_S) * frequency_hz)

@@ -1,11 +1,58 @@
-"""Faults that a pydantic model finds, in plain words: no wording of the validator's own reaches a user."""
+"""Sentences to people: the name that was probably meant, faults that a pydantic model finds, values in one line.
+
+No wording of the validator's own reaches a user.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import difflib
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-from rotorid.io.text.names import hint, listed
+_ALIKE = 0.7
+"""Share of letters in common (difflib's ratio) from which one name is proposed for another."""
+
+
+def plain(name: str) -> str:
+    """A name without what people vary: case, separators, zeros before a number."""
+    return re.sub(r"0+(?=\d)", "", re.sub(r"[^a-z0-9]", "", name.lower()))
+
+
+def nearest(name: str, known: Iterable[str], alike: float = _ALIKE) -> str | None:
+    """The known name that looks most like this one, None where none looks like it."""
+    by_plain: dict[str, str] = {}
+    for candidate in known:
+        by_plain.setdefault(plain(candidate), candidate)
+    found = difflib.get_close_matches(plain(name), by_plain, n=1, cutoff=alike)
+    return by_plain[found[0]] if found else None
+
+
+def listed(names: Iterable[str], most: int = 4) -> str:
+    """`a, b and c`; of more than `most` names the first ones and how many more there are."""
+    names = list(names)
+    if len(names) > most:
+        return f"{', '.join(names[: most - 1])} and {len(names) - most + 1} more"
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}" if names else "none"
+
+
+def neighbour(path: Path) -> str:
+    """`; did you mean flights?` by what lies next to a path that is missing, or nothing."""
+    path = Path(path)
+    try:
+        there = sorted(p.name for p in path.parent.iterdir() if p.name.isprintable() and not p.name.startswith("."))
+    except OSError:
+        return ""
+    found = nearest(path.name, there)
+    return f"; did you mean {path.with_name(found)}?" if found else ""
+
+
+def hint(name: str, known: Iterable[str]) -> str:
+    """`; did you mean x?` or nothing, to end a sentence with."""
+    found = nearest(name, known)
+    return f"; did you mean {found}?" if found else ""
+
 
 if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
@@ -75,8 +122,8 @@ def _clause(entry: Mapping[str, Any], model: type[BaseModel]) -> str:
         return f"{key}: is missing"
     if kind == "value_error":
         return ": ".join(x for x in (key, printable(entry["ctx"]["error"])) if x)
-    wanted = expected(entry)
-    clause = f"{key}: found {found(entry)}, expected {wanted}"
+    wanted = _expected(entry)
+    clause = f"{key}: found {_found(entry)}, expected {wanted}"
     if "number" in wanted and _reads_as_number(entry.get("input")):
         clause += " (without quotes, and where it has an exponent with a point and a sign: 1.0e-3)"
     return clause
@@ -108,7 +155,7 @@ def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
         yield from _models_in(inner)
 
 
-def expected(entry: Mapping[str, Any]) -> str:
+def _expected(entry: Mapping[str, Any]) -> str:
     """What an entry of `ValidationError.errors()` would have accepted."""
     kind, context = entry["type"], entry.get("ctx") or {}
     if kind == "too_short" and context["min_length"] == 1:
@@ -118,7 +165,7 @@ def expected(entry: Mapping[str, Any]) -> str:
     return next((text for start, text in _BY_START if kind.startswith(start)), "another value")
 
 
-def found(entry: Mapping[str, Any]) -> str:
+def _found(entry: Mapping[str, Any]) -> str:
     """The value that was refused, short and in one line."""
     text = printable(_as_in_yaml(entry.get("input")))
     return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."

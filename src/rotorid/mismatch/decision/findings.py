@@ -22,7 +22,7 @@ from rotorid.mismatch.posterior.search import Found
 from rotorid.mismatch.posterior.statements import LIKELY, SURE, Statement, share_of, statements_of, weights_of
 from rotorid.mismatch.posterior.status import CLAIMED, Estimate, Status
 from rotorid.recordings import RecordingSet, Split, Vehicle
-from rotorid.recordings.doubts import Doubt
+from rotorid.recordings.run import Doubt
 
 if TYPE_CHECKING:
     from rotorid.mismatch.decision.sizes import Size

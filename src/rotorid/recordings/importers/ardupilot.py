@@ -33,18 +33,18 @@ from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import in_the_air
 from rotorid.recordings.importers.bag_records import needs
-from rotorid.recordings.importers.clean import one_sense, report_gaps
+from rotorid.recordings.importers.faults import ImportFault, one_sense, report_gaps
+from rotorid.recordings.importers.known import Parameters, Values
 from rotorid.recordings.importers.mapping import continuous, quaternion_from_euler_frd
-from rotorid.recordings.importers.parameters import Parameters, Values
-from rotorid.recordings.importers.report import ImportFault
+from rotorid.recordings.importers.units import PULSE_US, RPM
 
-KINDS = (
+_KINDS = (
     "IMU", "ACC", "GYR", "XKQ", "NKQ", "ATT", "XKF1", "NKF1", "EKF1", "RCOU", "RCO2", "RCO3", "ESC", "BAT", "CURR",
     "BARO", "RFND", "EV", "PARM", "MSG", "VER",
 )  # fmt: skip
 _MOTORS = {33 + i: i for i in range(8)} | {82 + i: 8 + i for i in range(4)} | {160 + i: 12 + i for i in range(20)}
 """`SERVOn_FUNCTION` to the number of the motor, from 0."""
-OUTPUTS = range(1, 33)
+_OUTPUTS = range(1, 33)
 _MULTIROTORS = {1: 4, 2: 6, 3: 8, 4: 8, 5: 6, 12: 12, 14: 10}
 """`FRAME_CLASS` of multirotors of fixed rotors to their number of motors."""
 _SCRIPTED = (0, 15, 17)
@@ -94,11 +94,9 @@ _ORDER_OF_FRAME = {1: "ardupilot", 12: "betaflight"}
 """`FRAME_TYPE` of a quadrotor to the key of `known.ORDERS`: X, and X with Betaflight's order."""
 _LANDED, _FLYING = 18, 28
 """Events LAND_COMPLETE and NOT_LANDED."""
-GOOD, DOWN = 4, 25
+_GOOD, _DOWN = 4, 25
 """Status of a range finder that reads, and the orientation of one that looks down."""
-_PULSE_US = (1000.0, 2000.0)
-RPM = 2 * np.pi / 60
-HEAD, END = b"\xa3\x95", "END"
+_HEAD, END = b"\xa3\x95", "END"
 """First bytes of a message, and the key under which stands how many bytes of the last one came."""
 _CLOCKS = {"TimeUS": 1e-6, "TimeMS": 1e-3}
 """Fields of a message's clock, to the seconds that they count in."""
@@ -116,7 +114,7 @@ def read_messages(path: Path) -> dict[str, pd.DataFrame]:
     latest_s = 0.0
     try:
         log = reader.DFReader_binary(str(path), zero_time_base=True)
-        while (message := log.recv_match(type=list(KINDS))) is not None:
+        while (message := log.recv_match(type=list(_KINDS))) is not None:
             kind, row = message.get_type(), message.to_dict()
             stamp = next((row[name] * unit for name, unit in _CLOCKS.items() if name in row), None)
             if stamp is not None or kind in ("EV", "PARM"):
@@ -146,9 +144,9 @@ def _cut_message(data, offset: int) -> int:
 
     A single byte of a head is not looked for: every 256th whole file ends with it.
     """
-    if bytes(data[max(offset - 3, 0) : max(offset - 1, 0)]) == HEAD:  # a head whose message did not come
+    if bytes(data[max(offset - 3, 0) : max(offset - 1, 0)]) == _HEAD:  # a head whose message did not come
         return len(data) - offset + 3
-    return len(HEAD) if bytes(data[len(data) - len(HEAD) :]) == HEAD else 0
+    return len(_HEAD) if bytes(data[len(data) - len(_HEAD) :]) == _HEAD else 0
 
 
 def parameters(log: Log) -> Parameters:
@@ -218,7 +216,7 @@ def _clock(log: Log, where: object) -> np.ndarray:
     return clock[c.TIME].to_numpy(float)
 
 
-def in_flight(log: Log, where: object) -> Values:
+def _in_flight(log: Log, where: object) -> Values:
     """The parameters as they held for most of the flight."""
     grid = _clock(log, where)
     flown = _flying(log, grid)
@@ -228,7 +226,7 @@ def in_flight(log: Log, where: object) -> Values:
 def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[ImportFault], np.ndarray]:
     """Contract columns of a whole log, its faults, and where it flies (mask of rows)."""
     grid = _clock(log, where)
-    stated, values = parameters(log), in_flight(log, where)
+    stated, values = parameters(log), _in_flight(log, where)
     _check_frame(log, values, where)
     faults = stated.faults(_CHANGED, grid[0])
     if END in log:
@@ -269,7 +267,7 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[ImportFault], n
     parts += _battery(log, faults)
     below = log.get("RFND")
     if below is not None and {"Dist", "Stat", "Orient"} <= set(below):
-        put((c.HEIGHT,), below[(below["Stat"] == GOOD) & (below["Orient"] == DOWN)], ("Dist",))
+        put((c.HEIGHT,), below[(below["Stat"] == _GOOD) & (below["Orient"] == _DOWN)], ("Dist",))
     outputs = _outputs(log)
     if outputs is None:
         faults.append(ImportFault("no_command", "", "RCOU is not logged", "no throttle columns", 0))
@@ -298,7 +296,7 @@ def _channels(values: Values, outputs: pd.DataFrame) -> tuple[dict[int, int], li
     """To each motor (from 0) its output (from 1) by frame class and output functions, and what of it is doubtful."""
     count = _MULTIROTORS.get(int(values.get("FRAME_CLASS", 0)), 0)
     by_motor: dict[int, int] = {}
-    for number in OUTPUTS:
+    for number in _OUTPUTS:
         motor = _MOTORS.get(int(values.get(f"SERVO{number}_FUNCTION", -1)))
         if motor is not None:
             by_motor.setdefault(motor, number)
@@ -356,7 +354,7 @@ def _limits(values: Values, pulses: int) -> tuple[float, float, list[ImportFault
         low, high = (values[name] for name in names)
         action = f"{' and '.join(names)} of the throttle channel hold, {low:g} and {high:g} µs"
     else:
-        low, high = _PULSE_US
+        low, high = PULSE_US
         action = f"taken as {low:g} and {high:g} µs"
     return low, high, [ImportFault("unit", "throttle", found, action, pulses)]
 
@@ -418,6 +416,6 @@ def read_ardupilot(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFaul
     """Every flight of a DataFlash log by name, what was found, and the key of the rotors' order."""
     log = read_messages(path)
     table, faults, flying = convert(log, path)
-    order, more = order_of(in_flight(log, path))
+    order, more = order_of(_in_flight(log, path))
     runs, cuts = in_the_air.flights(table, flying, path.name.split(".")[0], path)
     return runs, [*faults, *more, *cuts], order

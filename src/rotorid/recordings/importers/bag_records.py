@@ -22,7 +22,7 @@ from types import ModuleType
 
 from rotorid.errors import InputError
 
-MCAP, _BAG = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n"
+_MCAP, _BAG = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n"
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 0x02, 0x03, 0x04, 0x05, 0x06
 """Codes of MCAP's records."""
 _BAG_MESSAGE, _BAG_HEADER, _BAG_CHUNK, _BAG_CONNECTION = 0x02, 0x03, 0x05, 0x07
@@ -32,7 +32,7 @@ _ROS_ENCODINGS = {("ros1msg", "ros1"), ("ros2msg", "cdr"), ("ros2idl", "cdr"), (
 
 
 @dataclass(frozen=True)
-class Topic:
+class _Topic:
     """One topic of a file: its type in ROS 2's spelling, the definition of it, and how its messages are encoded."""
 
     topic: str
@@ -55,25 +55,25 @@ class Records:
     """
 
     path: Path
-    channels: dict[int, Topic] = field(default_factory=dict)
+    channels: dict[int, _Topic] = field(default_factory=dict)
     schemas: dict[int, tuple[str, str, str]] = field(default_factory=dict)
     """Name, encoding and text of each schema of an MCAP file."""
     cut: bool = False
     lost_chunks: int = 0
     """Chunks that cannot be unpacked."""
 
-    def messages(self) -> Iterator[tuple[Topic, int, bytes]]:
+    def messages(self) -> Iterator[tuple[_Topic, int, bytes]]:
         """(channel, time of recording in ns, bytes) of each message of ROS."""
         with open(self.path, "rb") as file:
             head = file.read(16)
-        if head.startswith(MCAP):
-            yield from self._of_mcap(self.path.read_bytes()[len(MCAP) :], False)
+        if head.startswith(_MCAP):
+            yield from self._of_mcap(self.path.read_bytes()[len(_MCAP) :], False)
         elif head.startswith(_BAG):
             yield from self._of_bag(self.path.read_bytes()[len(_BAG) :], False)
         else:
             yield from self._of_database()
 
-    def _of_mcap(self, data: bytes, in_chunk: bool) -> Iterator[tuple[Topic, int, bytes]]:
+    def _of_mcap(self, data: bytes, in_chunk: bool) -> Iterator[tuple[_Topic, int, bytes]]:
         at = 0
         while at + 9 <= len(data):
             code, size = data[at], struct.unpack_from("<Q", data, at + 1)[0]
@@ -93,7 +93,7 @@ class Records:
             elif code == _CHANNEL and (number := _u16(body, 0)) not in self.channels:
                 name, schema, text = self.schemas.get(_u16(body, 2), ("", "", ""))
                 topic, place = _string(body, 4)
-                self.channels[number] = Topic(topic, _spelled(name), schema, text, _string(body, place)[0])
+                self.channels[number] = _Topic(topic, _spelled(name), schema, text, _string(body, place)[0])
             elif code == _MESSAGE and (channel := self.channels.get(_u16(body, 0))) and channel.of_ros:
                 yield channel, struct.unpack_from("<Q", body, 6)[0], body[22:]
         self.cut |= not in_chunk or at < len(data)
@@ -105,7 +105,7 @@ class Records:
         compression, place = _string(body, 28)
         return self._unpacked(body[place + 8 :], compression)
 
-    def _of_bag(self, data: bytes, in_chunk: bool) -> Iterator[tuple[Topic, int, bytes]]:
+    def _of_bag(self, data: bytes, in_chunk: bool) -> Iterator[tuple[_Topic, int, bytes]]:
         at, indexed = 0, in_chunk
         while at < len(data):
             fields, at = _fields(data, at)
@@ -122,7 +122,7 @@ class Records:
             elif code == _BAG_CONNECTION:
                 own, _ = _fields(struct.pack("<I", len(body)) + body, 0)
                 kind, text = own["type"].decode(), own["message_definition"].decode(errors="replace")
-                self.channels[_u32(fields["conn"])] = Topic(
+                self.channels[_u32(fields["conn"])] = _Topic(
                     fields["topic"].decode(), _spelled(kind), "ros1msg", text, "ros1"
                 )
             elif code == _BAG_MESSAGE and (channel := self.channels.get(_u32(fields["conn"]))):
@@ -146,7 +146,7 @@ class Records:
             self.lost_chunks += 1
             return b""
 
-    def _of_database(self) -> Iterator[tuple[Topic, int, bytes]]:
+    def _of_database(self) -> Iterator[tuple[_Topic, int, bytes]]:
         with closing(sqlite3.connect(f"{self.path.resolve().as_uri()}?immutable=1", uri=True)) as base:
             base.execute("PRAGMA writable_schema = ON")  # or a file that is shorter than it says is refused at once
             texts = {}
@@ -157,7 +157,7 @@ class Records:
                 "SELECT id, name, type, serialization_format FROM topics"
             ):
                 schema, text = texts.get(kind, ("ros2msg", ""))
-                self.channels[number] = Topic(topic, kind, schema or "ros2msg", text, encoding)
+                self.channels[number] = _Topic(topic, kind, schema or "ros2msg", text, encoding)
             try:
                 for number, at, body in base.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY id"):
                     if (channel := self.channels.get(number)) and channel.of_ros:
@@ -166,7 +166,7 @@ class Records:
                 self.cut = True
 
 
-def typestores(channels: list[Topic], path: Path) -> dict[str, object]:
+def typestores(channels: list[_Topic], path: Path) -> dict[str, object]:
     """rosbags' stores of types by encoding (`ros1`, `cdr`) with what the channels define; a definition that cannot be
     read leaves its type to those that are known."""
     typesys = needs("rosbags.typesys", "ros", path)

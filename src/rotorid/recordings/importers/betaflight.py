@@ -26,11 +26,10 @@ import pandas as pd
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import blackbox, in_the_air
-from rotorid.recordings.importers.clean import report_gaps
+from rotorid.recordings.importers.faults import ImportFault, report_gaps
 from rotorid.recordings.importers.mapping import half_turn_about_x, quaternion_to_frd_ned
-from rotorid.recordings.importers.report import ImportFault
+from rotorid.recordings.importers.units import G
 
-_GRAVITY_M_S2 = 9.80665
 _DEFAULT_POLES = 14
 _QUATERNION_SCALE = 32767.0
 """`imuQuaternion` holds x, y and z of the unit quaternion times this; w is what is missing to length 1."""
@@ -164,7 +163,7 @@ def convert(
     acceleration = fields("accSmooth", 3)
     one_g = _number(headers, "acc_1G", 0)
     if acceleration is not None and one_g > 0:
-        table[list(c.SPECIFIC_FORCE)] = half_turn_about_x(acceleration / one_g * _GRAVITY_M_S2)
+        table[list(c.SPECIFIC_FORCE)] = half_turn_about_x(acceleration / one_g * G)
     else:
         found = "accSmooth is not logged" if acceleration is None else "the header does not state acc_1G"
         faults.append(ImportFault("missing", ", ".join(c.SPECIFIC_FORCE), found, "no specific force", 0))

@@ -185,7 +185,7 @@ _ENCODINGS: dict[int, tuple[Callable, int]] = {
     10: (_three(((1, ((4, 2), (2, 2), (0, 2))), (2, ((9, 5), (4, 5), (0, 4))), (3, ((14, 8), (7, 7), (0, 7))))), 3),
 }
 """To the number of an encoding its reader and how many fields it packs together (`_up_to_eight`: at most)."""
-EVENTS: dict[int, int] = {0: 1, 14: 2, 15: 1, 30: 2}
+_EVENTS: dict[int, int] = {0: 1, 14: 2, 15: 1, 30: 2}
 """To an event how many unsigned numbers follow: beep, log resumed, disarmed, flight mode."""
 _RESUMED, _ADJUSTED, _ENDED = 14, 13, 255
 
@@ -267,10 +267,10 @@ class _Frames:
             kind, at = data[at], at + 1
             if kind == _ADJUSTED:
                 return at + 5 if data[at] & 128 else _signed(data, at + 1)[1]
-            if kind not in EVENTS:
+            if kind not in _EVENTS:
                 return None
             values = []
-            for _ in range(EVENTS[kind]):
+            for _ in range(_EVENTS[kind]):
                 value, at = _unsigned(data, at)
                 values.append(value)
         except IndexError:

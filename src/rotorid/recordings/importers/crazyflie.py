@@ -37,7 +37,14 @@ from scipy.spatial.transform import Rotation
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.clean import blank_held, cut, drop_repeated_times, report_gaps, true_stretches
+from rotorid.recordings.importers.faults import (
+    ImportFault,
+    blank_held,
+    cut,
+    drop_repeated_times,
+    report_gaps,
+    true_stretches,
+)
 from rotorid.recordings.importers.in_the_air import airborne, stretches_of
 from rotorid.recordings.importers.mapping import (
     continuous,
@@ -45,19 +52,18 @@ from rotorid.recordings.importers.mapping import (
     quaternion_from_euler_frd,
     quaternion_to_frd_ned,
 )
-from rotorid.recordings.importers.report import ImportFault
+from rotorid.recordings.importers.units import RPM
 
-MAGIC = 0xBC
+_MAGIC = 0xBC
 _CHECKSUM = 4
 """Bytes of it at the end of a log."""
-TIME = "time_s"
+_TIME = "time_s"
 TYPES = {"e": "<f2", "f": "<f4", "d": "<f8", "b": "i1", "B": "u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4"}
 _STANDARD_GRAVITY_M_S2 = 9.81
 """The firmware's g: accelerometer logs are in multiples of this."""
 _FULL_SCALE = 65536.0
-RPM = 2 * np.pi / 60
 _ROTORS = range(1, 5)
-SPEEDS = list(c.rotor_columns("rotor_speed", 4))
+_SPEEDS = list(c.rotor_columns("rotor_speed", 4))
 THROTTLES = list(c.rotor_columns("throttle", 4))
 
 
@@ -177,7 +183,7 @@ def convert(log: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
             put([f"thrust_request_{i}" for i in _ROTORS], log[request].to_numpy(float) / _FULL_SCALE)
     speeds = [f"rpm.m{i}" for i in _ROTORS]
     if set(speeds) <= set(log.columns):
-        put(SPEEDS, log[speeds].to_numpy(float) * RPM)
+        put(_SPEEDS, log[speeds].to_numpy(float) * RPM)
     for name, a_volt in (("pm.vbatMV", 1000), ("pm.vbat", 1)):
         if name in log and c.BATTERY_VOLTAGE not in columns:
             columns[c.BATTERY_VOLTAGE] = log[name].to_numpy(float) / a_volt
@@ -207,7 +213,7 @@ def _flown_stretches(table: pd.DataFrame) -> list[tuple[float, float]]:
 def _sensor_faults(table: pd.DataFrame) -> list[ImportFault]:
     """Faults of rotor-speed sensors and a battery reading that never moves; values stay as recorded."""
     faults = []
-    for name, throttle in zip(SPEEDS, THROTTLES, strict=True):
+    for name, throttle in zip(_SPEEDS, THROTTLES, strict=True):
         if name not in table:
             continue
         lost = (table[name] == 0) & (table[throttle] > 0.1)
@@ -296,7 +302,7 @@ def _text(data: bytes, start: int, where: str) -> tuple[str, int]:
 
 def _event_types(data: bytes, where: str) -> tuple[dict[int, _EventType], int, int]:
     """Event types by id, format version and the offset of the first event."""
-    if len(data) < 9 or data[0] != MAGIC:
+    if len(data) < 9 or data[0] != _MAGIC:
         found = f"0x{data[0]:02X}" if data else "an empty file"
         raise InputError(f"{where}: expected a Crazyflie uSD log starting with 0xBC, found {found}")
     version, count = struct.unpack_from("<HH", data, 1)
@@ -352,7 +358,7 @@ def decode_usd_log(data: bytes, where: str = "log") -> tuple[dict[str, pd.DataFr
     for identifier, kind in types.items():
         starts = np.asarray(offsets[identifier], int)
         rows = raw[starts[:, None] + np.arange(kind.dtype.itemsize)].copy().view(kind.dtype)[:, 0]
-        columns = {TIME: rows["__clock"].astype(float) * scale}
+        columns = {_TIME: rows["__clock"].astype(float) * scale}
         columns |= {name: rows[name].astype(float) for name in kind.variables}
         tables[kind.name] = pd.DataFrame(columns)
     return tables, faults

@@ -13,8 +13,7 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.clean import true_stretches
-from rotorid.recordings.importers.report import ImportFault
+from rotorid.recordings.importers.faults import ImportFault, true_stretches
 
 _SHORTEST_FLIGHT_S = 4.0
 _AFTER_TAKE_OFF_S = 1.0
@@ -39,7 +38,7 @@ _GROUND_M, _CLEAR_M = 0.05, 0.5
 _SMOOTHED_S = 1.0
 
 
-def on_grid(grid_s: np.ndarray, time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
+def _on_grid(grid_s: np.ndarray, time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Values (n, k) put into the row of the grid nearest in time; NaN elsewhere (the last one wins a shared row)."""
     values = np.asarray(values, float).reshape(len(time_s), -1)
     out = np.full((len(grid_s), values.shape[1]), np.nan)
@@ -58,7 +57,7 @@ def table_on(grid_s: np.ndarray, parts: Sequence[tuple[Sequence[str], np.ndarray
     """A table on a grid (n,), s, of parts: names, times (m,), s, and values (m, k); empty columns are left out."""
     columns = {c.TIME: grid_s - grid_s[0]}
     for names, time_s, values in parts:
-        columns.update(zip(names, on_grid(grid_s, time_s, values).T, strict=True))
+        columns.update(zip(names, _on_grid(grid_s, time_s, values).T, strict=True))
     return pd.DataFrame({k: v for k, v in columns.items() if k == c.TIME or np.isfinite(v).any()})
 
 

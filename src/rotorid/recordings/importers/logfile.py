@@ -20,8 +20,7 @@ from pathlib import Path
 import pandas as pd
 
 from rotorid.errors import InputError
-from rotorid.io.text.bounds import LARGEST_FILE, LEAST_MEMORY, MEMORY_TIMES_FILE
-from rotorid.io.text.files import check_file
+from rotorid.io.text.files import LARGEST_FILE, LEAST_MEMORY, MEMORY_TIMES_FILE, check_file
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import (
@@ -34,9 +33,9 @@ from rotorid.recordings.importers import (
     rcbenchmark,
     ros,
 )
+from rotorid.recordings.importers.faults import ImportFault
 from rotorid.recordings.importers.known import Known, px4_vehicle
 from rotorid.recordings.importers.mapping import ELECTRICAL, Mapping, read_by_mapping
-from rotorid.recordings.importers.report import ImportFault
 
 _GZIP = b"\x1f\x8b"
 _BY_FIRST_BYTES = (

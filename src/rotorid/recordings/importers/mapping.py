@@ -47,8 +47,7 @@ from rotorid.errors import InputError
 from rotorid.io.text.files import read_yaml
 from rotorid.io.text.wording import explain
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.clean import drop_repeated_times, join_rows, report_gaps
-from rotorid.recordings.importers.report import ImportFault
+from rotorid.recordings.importers.faults import ImportFault, drop_repeated_times, join_rows, report_gaps
 from rotorid.recordings.importers.units import UNITS, converted
 from rotorid.recordings.tables import clock_jump, numbers, read_cells, read_parquet_cells
 
@@ -88,7 +87,7 @@ TRAVEL = WORLD | {"neu": np.diag([1.0, 1.0, -1.0])}
 ELECTRICAL = ("erpm", "100erpm")
 
 
-class Channel(BaseModel):
+class MappedChannel(BaseModel):
     """Columns that make one channel."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -116,7 +115,7 @@ class Mapping(BaseModel):
 
     body: Literal["frd", "flu", "fur", "?"] = "frd"
     world: Literal["ned", "enu", "nwu", "nue", "?"] = "ned"
-    channels: dict[str, Channel]
+    channels: dict[str, MappedChannel]
     keep: tuple[str, ...] = ()
 
 

@@ -19,9 +19,8 @@ from scipy.spatial.transform import Rotation
 from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.clean import drop_repeated_times, report_gaps
+from rotorid.recordings.importers.faults import ImportFault, drop_repeated_times, report_gaps
 from rotorid.recordings.importers.mapping import half_turn_about_x, quaternion_to_frd_ned
-from rotorid.recordings.importers.report import ImportFault
 
 _LAYOUT = (
     ("time", 1), ("angular_acceleration", 3), ("angular_velocity", 3), ("quaternion_xyzw", 4),

@@ -10,8 +10,8 @@ import pandas as pd
 
 from rotorid.recordings import read_set
 from rotorid.recordings.check import check_set
+from rotorid.recordings.importers.faults import read_report
 from rotorid.recordings.importers.public_sets import PUBLIC_SETS
-from rotorid.recordings.importers.report import read_report
 
 _FAULT_NAMES = {
     "byte_order_mark": "byte-order mark",

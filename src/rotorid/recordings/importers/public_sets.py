@@ -33,25 +33,25 @@ from rotorid.recordings import RecordingSet, Run, read_vehicle, write_set
 from rotorid.recordings import columns as c
 from rotorid.recordings.files import sha256
 from rotorid.recordings.importers import crazyflie
+from rotorid.recordings.importers.faults import ImportFault, ImportReport
 from rotorid.recordings.importers.neurobem import read_neurobem
 from rotorid.recordings.importers.rcbenchmark import read_rcbenchmark
-from rotorid.recordings.importers.report import ImportFault, ImportReport
+from rotorid.recordings.importers.units import RPM
 from rotorid.recordings.importers.vicon_csv import read_vicon_csv
 from rotorid.recordings.tables import place, read_csv
 
 _RAW_FILES = "https://raw.githubusercontent.com"
 _TIMEOUT_S = 20.0
 _GRAM_FORCE_N = 9.80665e-3
-RPM = 2 * np.pi / 60
 _FULL_SCALE = 65536.0
-SPEEDS = ("rpm1", "rpm2", "rpm3", "rpm4")
-Runs = dict[str, tuple[pd.DataFrame, list[ImportFault]]]
+_SPEEDS = ("rpm1", "rpm2", "rpm3", "rpm4")
+_Runs = dict[str, tuple[pd.DataFrame, list[ImportFault]]]
 
 _PROPELLERS = {"1": "t5040c", "2": "t5045c", "5": "hq5x4", "6": "lumenier5x45"}
 """5-inch propellers: Cyclone T5040C and T5045C (3 blades), HQ 5x4 (4 blades), Lumenier 5x4.5 (2 blades)."""
 _MOTORS = "abcdefghijklm"
-CELLS = {"7": "2s", "11": "3s"}
-FLU = "body forward-left-up and world z up, turned by half a turn about x into FRD and NED"
+_CELLS = {"7": "2s", "11": "3s"}
+_FLU = "body forward-left-up and world z up, turned by half a turn about x into FRD and NED"
 
 
 @dataclass(frozen=True)
@@ -60,29 +60,29 @@ class _PublicSet:
 
     source: str
     files: tuple[str, ...]
-    read: Callable[[Path, str], Runs]
+    read: Callable[[Path, str], _Runs]
     vehicle: str
     axes: str
     held_out: tuple[str, ...] | None = None
     notes: tuple[str, ...] = ()
 
 
-def _whole(reader: Callable[[Path], tuple[pd.DataFrame, list[ImportFault]]]) -> Callable[[Path, str], Runs]:
+def _whole(reader: Callable[[Path], tuple[pd.DataFrame, list[ImportFault]]]) -> Callable[[Path, str], _Runs]:
     """A file is one run, named after the file."""
     return lambda path, name: {name.rsplit("/")[-1].split(".")[0].lower(): reader(path)}
 
 
-def _neurobem(path: Path, name: str) -> Runs:
+def _neurobem(path: Path, name: str) -> _Runs:
     return {Path(name).stem.removeprefix("bemnn"): read_neurobem(path)}
 
 
-def _crazyflie(path: Path, prefix: str, stretches: list[tuple[float, float]] | None = None) -> Runs:
+def _crazyflie(path: Path, prefix: str, stretches: list[tuple[float, float]] | None = None) -> _Runs:
     """Flights of a uSD log, each with the faults of the whole log and its own."""
     tables, faults = crazyflie.flights(path, prefix, stretches, crazyflie.in_the_air)
     return {run: (table, [f for f in faults if f.run in ("", run)]) for run, table in tables.items()}
 
 
-def _imrc_brushless(path: Path, name: str) -> Runs:
+def _imrc_brushless(path: Path, name: str) -> _Runs:
     """The controller's map of thrust to PWM is published: it gives the commanded speed of each rotor."""
     return {
         run: (_with_commanded_speed(table), faults)
@@ -112,17 +112,17 @@ def _with_commanded_speed(table: pd.DataFrame) -> pd.DataFrame:
     return table
 
 
-def _crazypad(path: Path, name: str) -> Runs:
+def _crazypad(path: Path, name: str) -> _Runs:
     return _crazyflie(path, Path(name).name)
 
 
-def _scale(path: Path, name: str) -> Runs:
+def _scale(path: Path, name: str) -> _Runs:
     return {Path(name).name.removesuffix(".csv").replace(".", "_"): read_imrc_bench(path)}
 
 
-def _bench(path: Path, name: str) -> Runs:
+def _bench(path: Path, name: str) -> _Runs:
     motor, voltage = re.fullmatch(r"([a-m])\d_(7|11)\.csv", Path(name).name).groups()
-    return {f"{motor}_{CELLS[voltage]}": read_rcbenchmark(path)}
+    return {f"{motor}_{_CELLS[voltage]}": read_rcbenchmark(path)}
 
 
 def _public_sets() -> dict[str, _PublicSet]:
@@ -139,7 +139,7 @@ def _public_sets() -> dict[str, _PublicSet]:
             tuple(f"bemnn{f}.mat" for f in flights),
             _neurobem,
             "neurobem",
-            FLU,
+            _FLU,
             notes=(
                 "columns neurobem_force_*_n and neurobem_moment_*_n_m are NeuroBEM's own prediction",
                 "columns angular_acceleration_*_rad_s2 come from the files",
@@ -159,7 +159,7 @@ def _public_sets() -> dict[str, _PublicSet]:
             tuple(f"brushless_flights/eckart{n}" for n in brushless),
             _imrc_brushless,
             "imrc-brushless",
-            FLU,
+            _FLU,
             notes=(
                 "rotor_command is the speed for the thrust that the controller asked for, from its published "
                 "map of thrust to PWM; the PWM itself rides along as pwm_fraction",
@@ -170,14 +170,14 @@ def _public_sets() -> dict[str, _PublicSet]:
             ("brushed_flights/jana01", "brushed_flights/jana24"),
             lambda path, name: _crazyflie(path, Path(name).name),
             "imrc-brushed",
-            FLU,
+            _FLU,
         ),
         "crazyflie-arpl-log10": _PublicSet(
             "crazyflie-arpl",
             ("log10",),
             lambda path, name: _crazyflie(path, "log10", [(35.0, 65.0)]),
             "crazyflie-arpl",
-            FLU,
+            _FLU,
             notes=(
                 "thrust window 35-65 s as upstream",
                 "upstream's notebook takes g as 9.18 (cell 6): its published thrust is 6.4 % low",
@@ -188,7 +188,7 @@ def _public_sets() -> dict[str, _PublicSet]:
             ("log15",),
             lambda path, name: _crazyflie(path, "log15", [(55.0, 90.0)]),
             "crazyflie-arpl",
-            FLU,
+            _FLU,
             notes=("roll and pitch window 55-90 s as upstream",),
         ),
     }
@@ -218,12 +218,12 @@ def _public_sets() -> dict[str, _PublicSet]:
             tuple(f"{folder}/E9_log{n:02d}" for n in numbers),
             _crazypad,
             "crazypad",
-            FLU,
+            _FLU,
             notes=("specific force is the state estimate's world acceleration turned into the body",),
         )
     for digit, propeller in _PROPELLERS.items():
         for motor in (None, *_MOTORS):
-            runs = [(m, v) for m in (motor or _MOTORS) for v in CELLS]
+            runs = [(m, v) for m in (motor or _MOTORS) for v in _CELLS]
             name = f"strawson-{propeller}" + (f"-{motor}" if motor else "")
             sets[name] = _PublicSet(
                 "strawson-5inch-bench",
@@ -299,17 +299,17 @@ def read_imrc_bench(path: Path) -> tuple[pd.DataFrame, list[ImportFault]]:
     """One bench run in contract columns (kind stand, thrust along -z), and its faults."""
     raw = read_csv(Path(path))
     thrust = next((name for name in ("thrust[g]", "weight[g]") if name in raw), None)
-    missing = [name for name in ("pwm", "vbat[V]", *SPEEDS) if name not in raw]
+    missing = [name for name in ("pwm", "vbat[V]", *_SPEEDS) if name not in raw]
     if thrust is None or missing:
         raise InputError(f"{path}, line 1: expected the column {missing[0] if missing else 'thrust[g]'}")
-    for name in ("pwm", "vbat[V]", *SPEEDS, thrust):
+    for name in ("pwm", "vbat[V]", *_SPEEDS, thrust):
         if raw[name].isna().any():
             row = int(np.flatnonzero(raw[name].isna())[0])
             raise InputError(f"{path}, {place(path, row)}, column {name}: is empty, expected a number")
     columns = {c.TIME: np.arange(len(raw), dtype=float)}
     throttle = raw["pwm"].to_numpy(float) / _FULL_SCALE
     columns |= {name: throttle for name in c.rotor_columns("throttle", 4)}
-    for name, column in zip(SPEEDS, c.rotor_columns("rotor_speed", 4), strict=True):
+    for name, column in zip(_SPEEDS, c.rotor_columns("rotor_speed", 4), strict=True):
         columns[column] = raw[name].to_numpy(float) * RPM
     columns["force_z_n"] = -raw[thrust].to_numpy(float) * _GRAM_FORCE_N
     columns[c.BATTERY_VOLTAGE] = raw["vbat[V]"].to_numpy(float)

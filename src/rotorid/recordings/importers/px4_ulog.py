@@ -27,12 +27,11 @@ from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import in_the_air
-from rotorid.recordings.importers.clean import drop_repeated_times, further_motors, one_sense, report_gaps
+from rotorid.recordings.importers.faults import ImportFault, drop_repeated_times, further_motors, one_sense, report_gaps
+from rotorid.recordings.importers.known import Parameters, Values
 from rotorid.recordings.importers.mapping import continuous
-from rotorid.recordings.importers.parameters import Parameters, Values
-from rotorid.recordings.importers.report import ImportFault
+from rotorid.recordings.importers.units import PULSE_US, RPM
 
-RPM = 2 * np.pi / 60
 _FIRST_MOTOR = 101
 """Number of motor 1 among PX4's output functions."""
 _MOST_MOTORS = 12
@@ -51,8 +50,6 @@ _CHANGED = (
     (r"MPC_THR_HOVER|EKF2_BCOEF_[XY]|EKF2_MCOEF", "", "no column depends on it"),
 )
 """Parameters on which a value depends, or that `rotorid parameters` states: names, column, what a change means."""
-_PULSE_US = (1000.0, 2000.0)
-"""Pulse widths of no and full throttle where no parameter states them."""
 _PLAUSIBLE_PULSE_US = (500.0, 2500.0)
 _AROUND_RESET_S = 0.2
 RESETS = (
@@ -331,7 +328,7 @@ def _outputs_of_motors(parameters: Values, rotors: int) -> tuple[str | int, list
 def _pulse_range(parameters: Values, port: str, outputs: Sequence[int]) -> tuple[np.ndarray, np.ndarray, bool]:
     """Pulse widths of no and full throttle by output, µs, and whether a parameter states them."""
     ends, stated = [], True
-    for word, default in zip(("MIN", "MAX"), _PULSE_US, strict=True):
+    for word, default in zip(("MIN", "MAX"), PULSE_US, strict=True):
         common = next((parameters[k] for k in (f"PWM_{port}_{word}", f"PWM_{word}") if parameters.get(k, 0) > 0), None)
         own = [parameters.get(f"PWM_{port}_{word}{k + 1}", -1) for k in outputs]
         stated &= common is not None or all(v > 0 for v in own)

@@ -16,10 +16,9 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.clean import drop_repeated_times
-from rotorid.recordings.importers.report import ImportFault
+from rotorid.recordings.importers.faults import ImportFault, drop_repeated_times
 from rotorid.recordings.importers.units import UNITS, bracketed, converted, unit_of
-from rotorid.recordings.lost_speeds import lost_speed
+from rotorid.recordings.spikes import lost_speed
 from rotorid.recordings.vehicle import Vehicle
 
 _ESC_LOW_US, _ESC_HIGH_US = 1000.0, 2000.0

@@ -39,12 +39,9 @@ from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import in_the_air
 from rotorid.recordings.importers.bag_records import Records, needs, typestores
-from rotorid.recordings.importers.clean import further_motors, one_sense, report_gaps
+from rotorid.recordings.importers.faults import ImportFault, further_motors, one_sense, report_gaps
 from rotorid.recordings.importers.mapping import half_turn_about_x, quaternion_to_frd_ned
-from rotorid.recordings.importers.report import ImportFault
-
-RPM = 2 * np.pi / 60
-_PULSE_US = (1000.0, 2000.0)
+from rotorid.recordings.importers.units import PULSE_US, RPM
 
 
 def _xyz(v) -> list[float]:
@@ -125,18 +122,18 @@ _WANTED = {
 _UNSET = {"attitude": (1.0, 0.0, 0.0, 0.0), "imu_attitude": (1.0, 0.0, 0.0, 0.0)}
 _UNSET |= dict.fromkeys(("rates", "force", "position", "velocity", "body_velocity"), (0.0, 0.0, 0.0))
 """What a message holds of a quantity that nobody has set."""
-COMMANDED = re.compile(r"command|cmd|setpoint|desired|target|reference", re.IGNORECASE)
+_COMMANDED = re.compile(r"command|cmd|setpoint|desired|target|reference", re.IGNORECASE)
 _SAME_CLOCK_S = 1.0
 """Stamps further than this from those of the inertial sensor, or from one message to the next, are another clock."""
 _STEADY_S = 0.2
 """Spread of the difference of two clocks up to which it is a constant."""
 _MIXED = 4
 """Motors of a mixer whose signals say those of all others: it has four demands."""
-LISTED = 8
+_LISTED = 8
 
 
 @dataclass(frozen=True)
-class TopicSeries:
+class _TopicSeries:
     """One quantity of one topic: instants (n,), s, and values (n, k)."""
 
     topic: str
@@ -150,7 +147,7 @@ class TopicSeries:
 
 
 @dataclass
-class BagContent:
+class _BagContent:
     """What a bag holds: (stamp, time of recording, values) of each quantity of a topic, the topics that are not read
     with their type and number of messages, and whether the file ends early. Stamps are 0 where there are none."""
 
@@ -172,11 +169,11 @@ class BagContent:
         self.unread[topic] = msgtype, self.unread.get(topic, ("", 0))[1] + messages
 
 
-def _by_rosbags(path: Path) -> BagContent:
+def _by_rosbags(path: Path) -> _BagContent:
     """A bag, MCAP file or folder of one that is whole and holds ROS alone."""
     highlevel = needs("rosbags.highlevel", "ros", path)
     typesys = needs("rosbags.typesys", "ros", path)
-    found = BagContent()
+    found = _BagContent()
     with highlevel.AnyReader([path], default_typestore=typesys.get_typestore(typesys.Stores.LATEST)) as bag:
         known = [k for k in bag.connections if k.msgtype in _READERS]
         for k in bag.connections:
@@ -189,10 +186,10 @@ def _by_rosbags(path: Path) -> BagContent:
     return found
 
 
-def _by_records(path: Path) -> BagContent:
+def _by_records(path: Path) -> _BagContent:
     """What can be read, record by record, of a file or folder that rosbags refuses."""
     files = [path] if path.is_file() else sorted(p for p in path.iterdir() if p.suffix in (".db3", ".mcap"))
-    found = BagContent()
+    found = _BagContent()
     for file in files:
         records = Records(file)
         listed = list(records.messages())
@@ -217,7 +214,7 @@ def _by_records(path: Path) -> BagContent:
     return found
 
 
-def _found(path: Path) -> BagContent:
+def _found(path: Path) -> _BagContent:
     """InputError where nothing of a bag can be read."""
     needs("rosbags.highlevel", "ros", path)
     try:
@@ -231,13 +228,13 @@ def _found(path: Path) -> BagContent:
     except MemoryError:
         raise
     except Exception:
-        found = BagContent()
+        found = _BagContent()
     if not (found.rows or found.unread or found.foreign):
         raise InputError(f"{path}: not a bag or MCAP file that can be read ({why})")
     return found
 
 
-def _read_series(path: Path) -> tuple[dict[str, list[TopicSeries]], list[ImportFault]]:
+def _read_series(path: Path) -> tuple[dict[str, list[_TopicSeries]], list[ImportFault]]:
     """Every known quantity of a bag by topic, those that state most first.
 
     InputError where it cannot be read or holds no known type.
@@ -252,7 +249,7 @@ def _read_series(path: Path) -> tuple[dict[str, list[TopicSeries]], list[ImportF
     ]
     foreign = [f"{topic} ({encoding})" for topic, encoding in sorted(found.foreign.items())]
     if not found.rows:
-        listed = ", ".join([*others, *foreign][:LISTED]) or "none"
+        listed = ", ".join([*others, *foreign][:_LISTED]) or "none"
         raise InputError(f"{path}: no topic of a type that is known; found {listed}")
     faults = []
     if found.cut:
@@ -265,11 +262,11 @@ def _read_series(path: Path) -> tuple[dict[str, list[TopicSeries]], list[ImportF
         seen = f"{found.lost_chunks} chunks of messages cannot be unpacked"
         faults.append(ImportFault("damaged", "", seen, "left out; their time is a gap", found.lost_chunks))
     if foreign:
-        seen = f"{', '.join(foreign[:LISTED])} hold no messages of ROS"
+        seen = f"{', '.join(foreign[:_LISTED])} hold no messages of ROS"
         faults.append(ImportFault("unread", "", seen, "left out", 0))
     times, more = _times(found)
     faults += more
-    series: dict[str, list[TopicSeries]] = {}
+    series: dict[str, list[_TopicSeries]] = {}
     for (quantity, topic), rows in found.rows.items():
         widths = [len(values) for *_, values in rows]
         width = max(set(widths), key=widths.count)
@@ -290,7 +287,7 @@ def _read_series(path: Path) -> tuple[dict[str, list[TopicSeries]], list[ImportF
         order = np.argsort(time_s, kind="stable")
         time_s, values = time_s[order], values[order]
         keep = in_the_air.increasing(time_s)
-        own = TopicSeries(topic, time_s[keep], values[keep])
+        own = _TopicSeries(topic, time_s[keep], values[keep])
         if quantity in _UNSET and (own.values == _UNSET[quantity]).all():
             seen = f"{quantity.replace('_', ' ')} of {topic} was never set ({_UNSET[quantity][0]:g}, 0, … throughout)"
             faults.append(ImportFault("stuck", quantity, seen, "states nothing, left out", len(values)))
@@ -301,8 +298,10 @@ def _read_series(path: Path) -> tuple[dict[str, list[TopicSeries]], list[ImportF
     _set_commands_apart(series)
     missing = [name for name, quantities in _WANTED.items() if not set(quantities) & set(series)]
     if missing and others:
-        more = f" and {len(others) - LISTED} more" if len(others) > LISTED else ""
-        seen = f"no topic of a type that is read states {', '.join(missing)}; not read are {', '.join(others[:LISTED])}"
+        more = f" and {len(others) - _LISTED} more" if len(others) > _LISTED else ""
+        seen = (
+            f"no topic of a type that is read states {', '.join(missing)}; not read are {', '.join(others[:_LISTED])}"
+        )
         faults.append(ImportFault("unread", "", seen + more, "export what is missing as a CSV", 0))
     faults += [
         ImportFault(
@@ -314,16 +313,16 @@ def _read_series(path: Path) -> tuple[dict[str, list[TopicSeries]], list[ImportF
     return series, faults
 
 
-def _set_commands_apart(series: dict[str, list[TopicSeries]]) -> None:
+def _set_commands_apart(series: dict[str, list[_TopicSeries]]) -> None:
     """Speeds of a topic that is called a command are commands, where another topic has speeds."""
     speeds = series.get("speeds", [])
-    asked = [s for s in speeds if COMMANDED.search(s.topic)]
+    asked = [s for s in speeds if _COMMANDED.search(s.topic)]
     if asked and len(asked) < len(speeds):
         series["speeds"] = [s for s in speeds if s not in asked]
         series["commands"] = [*series.get("commands", []), *asked]
 
 
-def _times(found: BagContent) -> tuple[dict[tuple[str, str], np.ndarray], list[ImportFault]]:
+def _times(found: _BagContent) -> tuple[dict[tuple[str, str], np.ndarray], list[ImportFault]]:
     """Times of the rows of each quantity of a topic, s, on the clock of the inertial sensor's stamps.
 
     A topic whose stamps are all zero, jump, or run at another rate has those at which its messages were recorded.
@@ -370,7 +369,7 @@ def _jumps(stamps: np.ndarray, recorded: np.ndarray) -> bool:
 
 
 def convert(
-    series: dict[str, list[TopicSeries]], faults: list[ImportFault], where: object
+    series: dict[str, list[_TopicSeries]], faults: list[ImportFault], where: object
 ) -> tuple[pd.DataFrame, np.ndarray]:
     """Contract columns and where it flies (mask of rows), of the first series of each quantity."""
     first = {quantity: offered[0] for quantity, offered in series.items()}
@@ -415,7 +414,7 @@ def convert(
     return table, in_the_air.airborne(table)[0]
 
 
-def _turned(velocity: TopicSeries, attitudes: list[TopicSeries], faults: list[ImportFault]) -> list[tuple]:
+def _turned(velocity: _TopicSeries, attitudes: list[_TopicSeries], faults: list[ImportFault]) -> list[tuple]:
     """A velocity in body axes turned into the world by the attitude of its own topic, else by the nearest in time."""
     attitude = next((s for s in attitudes if s.topic == velocity.topic), attitudes[0] if attitudes else None)
     if attitude is None:
@@ -427,13 +426,13 @@ def _turned(velocity: TopicSeries, attitudes: list[TopicSeries], faults: list[Im
     return [(c.VELOCITY, velocity.time_s, half_turn_about_x(turn.apply(velocity.values)))]
 
 
-def _of_pulses(outputs: TopicSeries, faults: list[ImportFault]) -> tuple:
+def _of_pulses(outputs: _TopicSeries, faults: list[ImportFault]) -> tuple:
     """Throttles of an array of all outputs, which names no motors: the first four that move are motors, and each other
     whose signal follows from theirs."""
     moving = np.flatnonzero(np.ptp(outputs.values, axis=0) > 0)
     pulses = outputs.values[:, moving]
     used = [*range(min(_MIXED, len(moving))), *further_motors(pulses, _MIXED)]
-    low, high = _PULSE_US
+    low, high = PULSE_US
     seen = f"channels {', '.join(str(moving[k] + 1) for k in used)} of {outputs.topic} move"
     action = f"taken for motors in order, {low:g} to {high:g} µs"
     faults.append(ImportFault("unit", "throttle", seen, action, len(pulses)))

@@ -7,6 +7,11 @@ import re
 import numpy as np
 
 G = 9.80665
+"""Standard gravity, m/s²."""
+RPM = np.pi / 30
+"""One turn a minute, rad/s."""
+PULSE_US = (1000.0, 2000.0)
+"""Pulse widths of no and full throttle where nothing states them."""
 _POUND_N, _OUNCE_N = 4.4482216152605, 0.27801385095378
 _INCH_M, _FOOT_M = 0.0254, 0.3048
 
@@ -17,8 +22,8 @@ UNITS: dict[str, dict[str, float]] = {
     "rate": {"rad/s": 1.0, "deg/s": np.pi / 180, "mrad/s": 1e-3},
     "angle": {"rad": 1.0, "deg": np.pi / 180, "mrad": 1e-3, "cdeg": np.pi / 18000},
     "acceleration": {"m/s2": 1.0, "g": G, "mg": G / 1000},
-    "rotor": {"rad/s": 1.0, "rpm": np.pi / 30, "hz": 2 * np.pi},
-    "turns": {"rad/s": 1.0, "rpm": np.pi / 30, "hz": 2 * np.pi, "erpm": np.pi / 30, "100erpm": 100 * np.pi / 30},
+    "rotor": {"rad/s": 1.0, "rpm": RPM, "hz": 2 * np.pi},
+    "turns": {"rad/s": 1.0, "rpm": RPM, "hz": 2 * np.pi, "erpm": RPM, "100erpm": 100 * np.pi / 30},
     "share": {"1": 1.0, "%": 0.01, "us": 1.0, "raw": 1.0},
     "voltage": {"V": 1.0, "mV": 1e-3, "cV": 1e-2, "dV": 0.1},
     "current": {"A": 1.0, "mA": 1e-3, "cA": 1e-2, "dA": 0.1},

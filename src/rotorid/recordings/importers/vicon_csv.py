@@ -15,12 +15,18 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.clean import blank_held, cut, drop_repeated_times, report_gaps, true_stretches
+from rotorid.recordings.importers.faults import (
+    ImportFault,
+    blank_held,
+    cut,
+    drop_repeated_times,
+    report_gaps,
+    true_stretches,
+)
 from rotorid.recordings.importers.mapping import quaternion_from_euler_frd
-from rotorid.recordings.importers.report import ImportFault
+from rotorid.recordings.importers.units import RPM
 
-COUNT = 25
-RPM = 2 * np.pi / 60
+_COUNT = 25
 _GROUND_MARGIN_M = 0.015
 """Height above the resting height from which the vehicle counts as in the air."""
 
@@ -46,14 +52,14 @@ def _read_matrix(path: Path) -> tuple[np.ndarray, list[ImportFault]]:
                     f"{path}, line {number}, column {bad + 1}: expected a number, found {cells[bad]!r}"
                 ) from None
             values = []
-        if len(values) != COUNT:
+        if len(values) != _COUNT:
             if not last:
-                raise InputError(f"{path}, line {number}: expected {COUNT} columns, found {len(values)}")
-            faults.append(ImportFault("cut_off", "", f"last line has {len(cells)} of {COUNT} columns", "left out", 1))
+                raise InputError(f"{path}, line {number}: expected {_COUNT} columns, found {len(values)}")
+            faults.append(ImportFault("cut_off", "", f"last line has {len(cells)} of {_COUNT} columns", "left out", 1))
             continue
         rows.append(values)
     if len(rows) < 2:
-        raise InputError(f"{path}: expected at least two rows of {COUNT} numbers")
+        raise InputError(f"{path}: expected at least two rows of {_COUNT} numbers")
     return np.array(rows), faults
 
 

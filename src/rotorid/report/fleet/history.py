@@ -26,7 +26,7 @@ from rotorid.report.fleet.summary import day_of
 
 _NUMBERS = ("vehicle", "set", "day", "good", "name", "quantity", "unit", "change", "low_95", "high_95", "limit")
 EVENTS = ("vehicle", "set", "day", "id", "lasts", "sentence")
-Z95 = 1.96
+_Z95 = 1.96
 
 
 def by_vehicle(
@@ -84,7 +84,7 @@ def history(
             progress(f"{vehicle} is left out: {error}")
             continue
         numbers += _numbers_of(vehicle, shown, good)
-        events += [row for point in change_points(shown, good) for row in rows_of(vehicle, point)]
+        events += [row for point in change_points(shown, good) for row in _rows_of(vehicle, point)]
         progress(f"{vehicle}: {len(shown)} sets")
     return pd.DataFrame(numbers, columns=_NUMBERS), pd.DataFrame(events, columns=EVENTS)
 
@@ -166,7 +166,7 @@ def _numbers_of(vehicle: str, shown: _Shown, good: int) -> list[dict]:
     for d in differences(first, later, usual_scatter()):
         middle = sum(f.value for f in d.good) / len(d.good)
         for place, f in enumerate((*d.good, *d.new)):
-            reach = Z95 * (d.scatter**2 * (1.0 + 1.0 / len(d.good)) + f.sd**2) ** 0.5
+            reach = _Z95 * (d.scatter**2 * (1.0 + 1.0 / len(d.good)) + f.sd**2) ** 0.5
             ends = (f.value - middle, f.value - middle - reach, f.value - middle + reach)
             change, low, high, limit = (in_unit_of_words(d, end) for end in (*ends, d.smallest))
             row = {"vehicle": vehicle, "set": f.name, "day": day_of(f.name), "good": int(place < len(d.good))}
@@ -175,7 +175,7 @@ def _numbers_of(vehicle: str, shown: _Shown, good: int) -> list[dict]:
     return out
 
 
-def rows_of(vehicle: str, point: _ChangePoint) -> list[dict]:
+def _rows_of(vehicle: str, point: _ChangePoint) -> list[dict]:
     """Rows of what differs from a set on, the rarest first."""
     head = {"vehicle": vehicle, "set": point.set, "day": day_of(point.set), "lasts": point.lasts}
     on = f"{vehicle}, from {point.set} on: "

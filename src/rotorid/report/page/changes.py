@@ -13,7 +13,7 @@ from rotorid.mismatch.changes.compare import Changes
 from rotorid.mismatch.changes.level_one_words import level_one_sentences, quantity_words
 from rotorid.mismatch.decision.words import capital, channel_words
 from rotorid.report.page.make import policy_for
-from rotorid.report.plots.changes import draw_differences, draw_residuals, draw_values
+from rotorid.report.plots.mismatch import draw_differences, draw_residuals, draw_values
 
 _TEMPLATE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>{{ new }} compared with {{ base }}</title>
@@ -64,15 +64,15 @@ def make_changes_page(found: Changes) -> str:
             base=found.base,
             new=found.new,
             seen=[] if seen is None else level_one_sentences(seen),
-            quantities="" if seen is None else drawn(draw_differences, found, names),
+            quantities="" if seen is None else _drawn(draw_differences, found, names),
             changes=sentences[: max(1, len(found.changes)) + len(words.advice(found))],
             notes=found.notes,
             whole=words.WHOLE[found.kind],
             left="What each believed vehicle leaves" if flown else "Reading less load",
             measured="Measured less simulated force and moment" if flown else "Reading less the load that is believed",
-            values=drawn(draw_values, found, {p.symbol: words.name_words(p.symbol) for p in found.values}),
+            values=_drawn(draw_values, found, {p.symbol: words.name_words(p.symbol) for p in found.values}),
             limits=[_limit_row(limit) for limit in found.limits],
-            residuals=drawn(draw_residuals, found, {c: channel_words(c) for c in found.residuals[0]}),
+            residuals=_drawn(draw_residuals, found, {c: channel_words(c) for c in found.residuals[0]}),
         )
     )
 
@@ -86,7 +86,7 @@ def _limit_row(limit) -> dict[str, str]:
     return {"name": capital(words.name_words(limit.id)), "at_most": size, "share": share}
 
 
-def drawn(draw, found: Changes, names: dict[str, str]) -> Markup:
+def _drawn(draw, found: Changes, names: dict[str, str]) -> Markup:
     """A figure as SVG within the page."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "figure.svg"

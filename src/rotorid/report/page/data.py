@@ -30,16 +30,16 @@ from rotorid.mismatch.tell.locate import REGIME_BLOCK_S
 from rotorid.mismatch.tell.verdict import Verdict
 from rotorid.vehicle.windows import Windows
 
-Pieces = list[tuple[np.ndarray, dict[str, np.ndarray]]]
+_Pieces = list[tuple[np.ndarray, dict[str, np.ndarray]]]
 """Of each stretch of a run its instants (n,), s, and the channels' values (n,) by name."""
 _LONGEST_S = 20.0
 _FIRST_SHOWN_S = 10.0
 """Of the run that is shown first, the stretch in which the most error was removed."""
 _FRAMES_PER_S = 25.0
-BUDGET = 800_000
+_BUDGET = 800_000
 """Values that the page may hold of all traces together; 800 000 are 2.2 MB."""
 _MOST_BLOCKS = 4000
-LONGEST_LAG_S = 1.0
+_LONGEST_LAG_S = 1.0
 _MOST_LAGS = 60
 _MISSING = -32768
 
@@ -73,7 +73,7 @@ def page_data(analysis: Analysis, verdict: Verdict, main: str) -> dict:
             read_by_pair.setdefault((trace.run, trace.channel), []).append(reading)
     series = 5 if analysis.delivery.derivatives else 4
     total = sum(series * len(t.time_s) for traces in by_pair.values() for t in traces)
-    every = max(1, int(np.ceil(total / BUDGET)))
+    every = max(1, int(np.ceil(total / _BUDGET)))
     runs = list(dict.fromkeys(run for run, _ in by_pair))
     largest = _largest_run(analysis, verdict, main)
     flown = replay(analysis, verdict, largest, segments)
@@ -96,8 +96,8 @@ def page_data(analysis: Analysis, verdict: Verdict, main: str) -> dict:
             {"run": loc.run, "channel": loc.channel, "start": loc.start_s, "stop": loc.stop_s}
             for loc in verdict.locations
         ],
-        "regimes": regimes(analysis, by_pair),
-        "correlation": correlations(analysis, by_pair, channels),
+        "regimes": _regimes(analysis, by_pair),
+        "correlation": _correlations(analysis, by_pair, channels),
     }  # fmt: skip
 
 
@@ -164,7 +164,7 @@ def _frames(run: str, flown: dict[str, np.ndarray]) -> dict:
     return out | {name: packed(flown[name].ravel()) for name in names}
 
 
-def regimes(analysis: Analysis, by_pair: dict[tuple[str, str], list[ChannelTrace]]) -> dict:
+def _regimes(analysis: Analysis, by_pair: dict[tuple[str, str], list[ChannelTrace]]) -> dict:
     """Size of the error by half seconds next to what was flown: variables and, by channel, before and after."""
     variables = sorted({v for known in analysis.regimes.values() for v in known if v != "time_s"})
     channels = list(dict.fromkeys(c for _, c in by_pair))
@@ -204,7 +204,7 @@ def _blocks(values: np.ndarray, per: int, count: int) -> np.ndarray:
     return values[: count * per].reshape(count, per).mean(axis=1)
 
 
-def correlations(
+def _correlations(
     analysis: Analysis, by_pair: dict[tuple[str, str], list[ChannelTrace]], channels: Sequence[str]
 ) -> dict[str, dict]:
     """Correlation of each channel's error with itself some time later, before and after, on runs held out.
@@ -219,8 +219,8 @@ def correlations(
         if not held:
             continue
         period = float(np.median(np.diff(held[0].time_s)))
-        step = max(1, int(round(LONGEST_LAG_S / period / _MOST_LAGS)))
-        lags = np.arange(0, int(LONGEST_LAG_S / period) + 1, step)
+        step = max(1, int(round(_LONGEST_LAG_S / period / _MOST_LAGS)))
+        lags = np.arange(0, int(_LONGEST_LAG_S / period) + 1, step)
         samples = sum(len(t.time_s) for t in held)
         out[channel] = {
             "lag_s": [round(float(x), 5) for x in lags * period],
@@ -335,7 +335,7 @@ def measured(analysis: Analysis, segments: Sequence[Segment] | Sequence[Loading]
     Of a flight the believed mass times the specific force, what the believed inertia makes of the rates, and the
     rotors' speeds; of a stand or bench the reading. `segments` are those of `shares.segments_of`.
     """
-    by_run: dict[str, Pieces] = {}
+    by_run: dict[str, _Pieces] = {}
     if analysis.instrument is None:
         thinner = Thinner(*analysis_rate_hz(analysis.recordings.runs, analysis.believed, HIGHEST_CUTOFF_HZ))
     for segment in segments:
@@ -375,7 +375,7 @@ def _of_loading(loading: Loading, count: int) -> tuple[np.ndarray, dict[str, np.
     return averaged(loading.time_s, count), out
 
 
-def _on(trace: ChannelTrace, pieces: Pieces) -> np.ndarray:
+def _on(trace: ChannelTrace, pieces: _Pieces) -> np.ndarray:
     """One channel on the instants of its trace, by linear interpolation within each stretch."""
     out = np.full(len(trace.time_s), np.nan)
     for time_s, channels in pieces:

@@ -138,7 +138,7 @@ def make_page(
         not_testable=[{"name": capital(effect_words(n.id)), "reason": n.reason} for n in verdict.not_testable],
         next=next_text(verdict, analysis.recordings),
         ledger=[_ledger_row(row) for row in ledger],
-        notes=notes(analysis, forward_notes),
+        notes=_notes(analysis, forward_notes),
     )
     return spoken(page, analysis)
 
@@ -291,12 +291,9 @@ def _where_text(verdict: Verdict) -> list[str]:
         name, unit = regime_words(regime.variable)
         span = f"{number(regime.low)} to {number(regime.high)} {unit}".strip()
         texts.append(f"{channel_words(channel)}: {name} {span}")
-    first = f"The mismatch shows in {listed([channel_words(c) for c in dict.fromkeys(_channels(verdict))])}."
+    channels = dict.fromkeys(loc.channel for loc in verdict.locations)
+    first = f"The mismatch shows in {listed([channel_words(channel) for channel in channels])}."
     return [first] + ([pretty(f"What separates it best: {'; '.join(texts)}.")] if texts else [])
-
-
-def _channels(verdict: Verdict) -> list[str]:
-    return [loc.channel for loc in verdict.locations]
 
 
 def strip(analysis: Analysis, verdict: Verdict) -> tuple[str, str, str] | None:
@@ -319,9 +316,9 @@ def strip(analysis: Analysis, verdict: Verdict) -> tuple[str, str, str] | None:
             per = min(per, len(trace.time_s))  # A stretch that is shorter than a cell is one cell.
             count = len(trace.time_s) // per
             for stage in ("before", "after"):
-                size = np.sqrt(blocks(getattr(trace, stage) ** 2, per, count)) / noise
+                size = np.sqrt(_blocks(getattr(trace, stage) ** 2, per, count)) / noise
                 key = (stage, trace.run, trace.channel)
-                time_s = blocks(trace.time_s, per, count)
+                time_s = _blocks(trace.time_s, per, count)
                 if key in sizes:
                     time_s, size = np.append(sizes[key][0], time_s), np.append(sizes[key][1], size)
                 sizes[key] = (time_s, size)
@@ -337,7 +334,7 @@ def strip(analysis: Analysis, verdict: Verdict) -> tuple[str, str, str] | None:
     return picture, "error over noise by channel and time, before and after", caption
 
 
-def blocks(values: np.ndarray, per: int, count: int) -> np.ndarray:
+def _blocks(values: np.ndarray, per: int, count: int) -> np.ndarray:
     """Means of `count` blocks of `per` samples."""
     return values[: count * per].reshape(count, per).mean(axis=1)
 
@@ -499,9 +496,9 @@ def _value_row(name: str, row: BelievedValue) -> dict:
     return {
         "name": words,
         "unit": _unit_text(unit),
-        "believed": cell(row.believed),
+        "believed": _cell(row.believed),
         "estimate": pretty(plus_minus(row.estimate, low, high)) if row.estimate is not None else "–",
-        "delivered": cell(row.delivered),
+        "delivered": _cell(row.delivered),
         "change": pretty(change),
         "note": pretty("wrong" if row.wrong else ""),
     }
@@ -545,11 +542,11 @@ def _error_table(channels: Mapping[str, Channel], fits: Mapping[str, tuple[float
             {
                 "name": channel_words(c).removesuffix(" after half a second"),
                 "unit": _unit_text(channels[c].unit),
-                "noise": cell(channels[c].noise_floor),
+                "noise": _cell(channels[c].noise_floor),
                 "bars": bars(channels[c]),
                 "fit": pretty(" → ".join(f"{v:.0f}" for v in fits[c])) if c in fits else "–",
-                "held_out": [cell(getattr(channels[c].rmse.held_out, s)) for s in _STAGES],
-                "training": [cell(getattr(channels[c].rmse.training, s)) for s in _STAGES],
+                "held_out": [_cell(getattr(channels[c].rmse.held_out, s)) for s in _STAGES],
+                "training": [_cell(getattr(channels[c].rmse.training, s)) for s in _STAGES],
             }
             for c in chosen
         ]
@@ -685,7 +682,7 @@ def _forward_text(verdict: Verdict) -> list[str]:
     ]
 
 
-def cell(value: float | None) -> str | Markup:
+def _cell(value: float | None) -> str | Markup:
     return "–" if value is None else pretty(number(value, 3))
 
 
@@ -735,7 +732,7 @@ def next_text(verdict: Verdict, recordings: RecordingSet) -> str:
     return text
 
 
-def notes(analysis: Analysis, forward_notes: Sequence[str]) -> list[str]:
+def _notes(analysis: Analysis, forward_notes: Sequence[str]) -> list[str]:
     source = {
         "accelerometer": "Forces come from the accelerometer.",
         "velocity": "No accelerometer is recorded: forces come from velocity and attitude, with the noise that costs.",

@@ -1,4 +1,4 @@
-"""Figures of the load-cell bench: calibration, static, dynamic and tensile tests."""
+"""Figures of the load-cell bench: calibrations, static, dynamic and tensile tests."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 PLATFORM = {"al": "aluminium", "pla": "PLA", "jr3": "reference sensor"}
 _PLATFORM_COLOUR = {"al": style.BLUE, "pla": style.ORANGE, "jr3": style.GREY}
-AXES = "xyz"
+_AXES = "xyz"
 
 
 def reading(recording: pd.DataFrame, load_time_s: float, mean_from_s: float, mean_10uv: float) -> Figure:
@@ -108,7 +108,7 @@ def static_z(loads: pd.DataFrame) -> Figure:
 def static_axes(points: pd.DataFrame, series: pd.DataFrame) -> Figure:
     """Aluminium along x, y and z: every measurement against the target with r (fig. 2.45), and below its error."""
     fig, axes = style.figure(4.1, 2, 3, sharex=True, height_ratios=(1.5, 1))
-    for column, name in enumerate(AXES):
+    for column, name in enumerate(_AXES):
         part = points[(points["platform"] == "al") & (points["axis"] == name) & (points["method"] == "equations")]
         found = series[(series["platform"] == "al") & (series["axis"] == name) & (series["method"] == "equations")]
         top, low = axes[0, column], axes[1, column]
@@ -138,7 +138,7 @@ def methods(points: pd.DataFrame) -> Figure:
     fig, axes = style.figure(2.9, columns=3)
     several = points[points["axis"].str.len() > 1]
     unit = {axis: _units(axis) for axis in several["axis"].unique()}
-    for k, (axis, name) in enumerate(zip(axes, AXES, strict=True)):
+    for k, (axis, name) in enumerate(zip(axes, _AXES, strict=True)):
         applied = several["load_n"] * several["axis"].map({label: part[k] for label, part in unit.items()})
         for method, colour, marker, label in (
             ("equations", style.RED, "o", "thesis's equations"),
@@ -200,4 +200,80 @@ def tensile(curves: pd.DataFrame, specimens: pd.DataFrame) -> Figure:
     whole.set(xlim=(0, None), ylim=(0, None), ylabel="stress (MPa)")
     whole.legend(title="infill")
     close.set(xlim=(0, 1.6), ylim=(0, 24), title="0.2 % yield")
+    return fig
+
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def lines_and_residuals(
+    weights_gf: Sequence[float],
+    readings: Mapping[str, Sequence[float]],
+    lines: Mapping[str, tuple[float, float]],
+    flagged_gf: Mapping[str, Sequence[float]],
+) -> Figure:
+    """Calibration lines of all cells, and below them what the lines leave over.
+
+    Parameters
+    ----------
+    weights_gf
+        Known weights [gf], shape (n,).
+    readings
+        Reading of each cell [1e-5 V], shape (n,) each.
+    lines
+        Intercept [gf] and slope [gf per 1e-5 V] of each cell.
+    flagged_gf
+        Weights [gf] of each cell whose readings do not match them; drawn as crosses.
+    """
+    weights = np.asarray(weights_gf, float)
+    fig, (above, below) = style.figure(4.6, rows=2, gridspec_kw={"height_ratios": [1.6, 1]})
+    for colour, (cell, values) in zip(style.CYCLE, readings.items(), strict=False):
+        reading = np.asarray(values, float)
+        a0, a1 = lines[cell]
+        ends = np.array([0.0, reading.max() * 1.04])
+        above.plot(ends, a0 + a1 * ends, color=colour, linewidth=0.8)
+        above.plot(reading, weights, "o", color=colour, label=f"cell {cell}")
+        residual = weights - (a0 + a1 * reading)
+        below.plot(weights, residual, "o-", color=colour, linewidth=0.7)
+        wrong = np.isin(weights, flagged_gf[cell])
+        below.plot(weights[wrong], residual[wrong], "x", color=style.RED, markersize=8)
+    above.set(xlabel=r"reading ($10^{-5}$ V)", ylabel="weight (gf)", xlim=(0, None), ylim=(0, None))
+    above.legend(ncols=2, loc="upper left")
+    below.axhline(0, color=style.BLACK, linewidth=0.7)
+    below.set(xlabel="weight (gf)", ylabel="residual (gf)", xlim=(0, None))
+    return fig
+
+
+def against_printed(
+    cells: Sequence[str],
+    estimates: Mapping[str, Sequence[float]],
+    intervals: Mapping[str, Sequence[Sequence[float]]],
+    printed: Mapping[str, Sequence[float]],
+) -> Figure:
+    """Coefficients with 95 % intervals as differences from printed ones.
+
+    Parameters
+    ----------
+    cells
+        Names of the cells, k of them.
+    estimates, printed
+        Values of `a0` [gf] and `a1` [gf per 1e-5 V], shape (k,) each.
+    intervals
+        95 % intervals of the same, shape (k, 2) each.
+    """
+    fig, axes = style.figure(2.5, columns=2, sharey=True)
+    places = np.arange(len(cells))
+    labels = {"a0": r"$a_0$ minus table (gf)", "a1": r"$a_1$ minus table (gf per $10^{-5}$ V)"}
+    for panel, (name, label) in zip(axes, labels.items(), strict=True):
+        base = np.asarray(printed[name], float)
+        middle = np.asarray(estimates[name], float) - base
+        ends = np.asarray(intervals[name], float) - base[:, None]
+        panel.axvline(0, color=style.COLOUR["reference"], linewidth=1.2)
+        panel.hlines(places, ends[:, 0], ends[:, 1], color=style.COLOUR["after"])
+        panel.plot(middle, places, "o", color=style.COLOUR["after"])
+        panel.set_xlabel(label)
+        panel.locator_params(axis="x", nbins=5)
+    axes[0].set_yticks(places, [f"cell {cell}" for cell in cells])
+    axes[0].invert_yaxis()
     return fig

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotorid.identify.fem.placement import turn
 from rotorid.report.plots import style
 
 if TYPE_CHECKING:
@@ -14,10 +15,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-NAMES = {"aluminium": "Al-6061", "pla": "PLA"}
+_NAMES = {"aluminium": "Al-6061", "pla": "PLA"}
 _COLOURS = {"aluminium": style.BLUE, "pla": style.RED}
-LEGS = 3
-PARTS = ("upper cell", "lower cell", "A", "B", "C", "D")
+_LEGS = 3
+_PARTS = ("upper cell", "lower cell", "A", "B", "C", "D")
 _LIGHT = np.array([0.36, -0.48, 0.8])
 """Direction from which the parts are lit."""
 _TICKS_UV_N = (20, 50, 100, 200, 500)
@@ -51,8 +52,8 @@ def whole_bench(surface: pd.DataFrame, column: str, factor: float, label: str, g
     fig, axes = style.figure(2.8, 1, 2, subplot_kw={"projection": "3d"})
     legs = _legs_mm(surface)
     colours = colormaps["viridis"]
-    for axis, (end, name) in zip(axes, NAMES.items(), strict=True):
-        values = np.tile(surface[f"{column}_{end}"].to_numpy() * factor, LEGS)
+    for axis, (end, name) in zip(axes, _NAMES.items(), strict=True):
+        values = np.tile(surface[f"{column}_{end}"].to_numpy() * factor, _LEGS)
         scale = PowerNorm(gamma, 0, values.max())
         _put(axis, legs, colours(scale(values)))
         axis.set_title(name)
@@ -68,9 +69,9 @@ def parts(surface: pd.DataFrame) -> Figure:
 
     fig, axes = style.figure(2.9, 1, 2, subplot_kw={"projection": "3d"})
     legs = _legs_mm(surface)
-    colours = dict(zip(PARTS, style.CYCLE, strict=False))
+    colours = dict(zip(_PARTS, style.CYCLE, strict=False))
     triangles = surface["part"].to_numpy()
-    for axis, number in zip(axes, (LEGS, 1), strict=True):
+    for axis, number in zip(axes, (_LEGS, 1), strict=True):
         shown = legs[: number * len(triangles)]
         normal = np.cross(shown[:, 1] - shown[:, 0], shown[:, 2] - shown[:, 0])
         light = 0.55 + 0.45 * np.abs(normal @ _LIGHT) / np.linalg.norm(normal, axis=1)
@@ -88,7 +89,7 @@ def parts(surface: pd.DataFrame) -> Figure:
 def _legs_mm(surface: pd.DataFrame) -> np.ndarray:
     """Triangles of all legs [mm], shape (k, 3, 3), seen from above in a right-handed view: y to the left, z upwards."""
     corners = np.stack([surface[[f"x_{k}_m", f"y_{k}_m", f"z_{k}_m"]].to_numpy() for k in (1, 2, 3)], axis=1)
-    legs = np.concatenate([1e3 * corners @ _turn(2 * np.pi / LEGS * leg).T for leg in range(LEGS)])
+    legs = np.concatenate([1e3 * corners @ turn(2 * np.pi / _LEGS * leg).T for leg in range(_LEGS)])
     return legs * np.array([1.0, -1.0, -1.0])
 
 
@@ -109,11 +110,6 @@ def _put(
     axis.set_axis_off()
 
 
-def _turn(angle: float) -> np.ndarray:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
 def against_load(loads: pd.DataFrame) -> Figure:
     """Deformation, largest stress and stress in the narrow sections against the load (thesis fig. 2.18)."""
     fig, axes = style.figure(2.4, 1, 3)
@@ -123,10 +119,10 @@ def against_load(loads: pd.DataFrame) -> Figure:
         ("narrow_lower_pa", 1e-6, "narrow section (MPa)", "-"),
     )
     for axis, (column, factor, label, line) in zip(axes, panels, strict=True):
-        for end, name in NAMES.items():
+        for end, name in _NAMES.items():
             axis.plot(loads["load_gf"], factor * loads[f"{column}_{end}"], "o" + line, color=_COLOURS[end], label=name)
         axis.set(xlabel="load (gf)", ylabel=label, xlim=(0, None), ylim=(0, None))
-    for end, name in NAMES.items():
+    for end, name in _NAMES.items():
         upper = 1e-6 * loads[f"narrow_upper_pa_{end}"]
         axes[2].plot(loads["load_gf"], upper, "s--", color=_COLOURS[end], markerfacecolor="white", label=name)
     axes[0].legend(loc="upper left")

@@ -26,10 +26,10 @@ def draw_fleet(counts: pd.DataFrame, parameters: pd.DataFrame, sets: pd.DataFram
     rows = 1 + len(numbers)
     heights = [0.4 + 0.19 * max(len(shown), 1), *[1.5] * len(numbers)]
     fig, axes = style.figure(sum(heights) + 0.4 * rows, rows, 1, height_ratios=heights, squeeze=False)
-    bars(axes[0, 0], shown, sets)
+    _bars(axes[0, 0], shown, sets)
     order = {name: place for place, name in enumerate(sets.sort_values(["day", "set"])["set"], 1)}
     for axis, name in zip(axes[1:, 0], numbers, strict=True):
-        over_time(axis, parameters[parameters["parameter"] == name], order, len(sets))
+        _over_time(axis, parameters[parameters["parameter"] == name], order, len(sets))
     style.save(fig, path)
 
 
@@ -42,7 +42,7 @@ def _most_frequent(parameters: pd.DataFrame) -> list[str]:
     return [name for name, _ in ordered[:_MOST_PARAMETERS]]
 
 
-def bars(axis, shown: pd.DataFrame, sets: pd.DataFrame) -> None:
+def _bars(axis, shown: pd.DataFrame, sets: pd.DataFrame) -> None:
     """How many sets show each effect, by the verdict's word."""
     left = np.zeros(len(shown))
     for word, colour in _WORDS.items():
@@ -58,7 +58,7 @@ def bars(axis, shown: pd.DataFrame, sets: pd.DataFrame) -> None:
         axis.set_yticks([])
 
 
-def over_time(axis, own: pd.DataFrame, order: dict[str, int], count: int) -> None:
+def _over_time(axis, own: pd.DataFrame, order: dict[str, int], count: int) -> None:
     """One number with its interval in each set that states it, the sets of a vehicle joined by a line.
 
     Over the day where every set has one, else over the place in the order of day and name. Vehicles have a colour and a

@@ -15,14 +15,13 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_AXIS_COLOURS = tuple(style.COLOUR[a] for a in "xyz")
-NAMES = {"c_f": ("thrust", "N", 1.0), "c_q": ("torque", "mN m", 1000.0)}
+_NAMES = {"c_f": ("thrust", "N", 1.0), "c_q": ("torque", "mN m", 1000.0)}
 
 
 def rotor_networks(points: dict[str, pd.DataFrame], history: pd.DataFrame, fits: dict) -> Figure:
     """Error by epoch and the network's curve with the tests, thrust and torque (figures 4.18, 4.19)."""
     fig, axes = style.figure(4.4, 2, 2)
-    for row, (key, (label, unit, scale)) in enumerate(NAMES.items()):
+    for row, (key, (label, unit, scale)) in enumerate(_NAMES.items()):
         if key not in fits:
             _not_recorded(axes[row], label)
             continue
@@ -57,7 +56,7 @@ def _not_recorded(axes: Iterable[Axes], label: str) -> None:
 def hidden_sizes(sizes: pd.DataFrame) -> Figure:
     """Median error by epoch for several sizes of the hidden layer (figure 4.20)."""
     fig, axes = style.figure(2.6, 1, 2)
-    for axis, (key, (label, _, _)) in zip(axes, NAMES.items(), strict=True):
+    for axis, (key, (label, _, _)) in zip(axes, _NAMES.items(), strict=True):
         if not (sizes["coefficient"] == key).any():
             _not_recorded([axis], label)
             continue
@@ -75,7 +74,7 @@ def hidden_sizes(sizes: pd.DataFrame) -> Figure:
 def inertia_training(history: pd.DataFrame, fits: dict) -> Figure:
     """Error by epoch (figure 4.22) and, right, trained gyroscopic weights next to what their inertias imply."""
     fig, axes = style.figure(2.9, 1, 2)
-    for colour, rate in zip(_AXIS_COLOURS, "pqr", strict=True):
+    for colour, rate in zip(style.AXIS_COLOURS, "pqr", strict=True):
         axes[0].loglog(history["epoch"] + 1, history[rate], color=colour, label=rf"$\dot {rate}$")
         axes[0].loglog(history["epoch"] + 1, history[f"{rate}_scaled"], color=colour, linestyle="--")
     axes[0].set_xlabel("epoch")
@@ -123,7 +122,7 @@ def identifiability(promises: pd.DataFrame) -> Figure:
 def excitation(traces: pd.DataFrame) -> Figure:
     """Moments and body rates of the designed manoeuvre."""
     fig, axes = style.figure(3.4, 2, 1, sharex=True)
-    for colour, axis, label in zip(_AXIS_COLOURS, "xyz", ("roll", "pitch", "yaw"), strict=True):
+    for colour, axis, label in zip(style.AXIS_COLOURS, "xyz", ("roll", "pitch", "yaw"), strict=True):
         axes[0].plot(traces["time_s"], 1000 * traces[f"moment_{axis}_n_m"], color=colour, label=label, linewidth=0.7)
         axes[1].plot(traces["time_s"], traces[f"angular_velocity_{axis}_rad_s"], color=colour, linewidth=0.7)
     axes[0].set_ylabel("moment (mN m)")

@@ -177,7 +177,7 @@ _CHAIN = (
     ("quadrotor", "throttles, voltage,\nESP32, radio"),
     ("six-axis sensor", "forces, moments,\nconversion board"),
 )
-STEPS = (
+_STEPS = (
     ("recorder", "frames checked,\nraw log, metadata"),
     ("ingest", "units, gaps, flags,\none clock"),
     ("stages", "calibrate, filter,\nidentify"),
@@ -205,7 +205,7 @@ def signal_chain() -> Figure:
     for row, (title, text) in enumerate(_CHAIN):
         box(0, 3.3 - 1.1 * row, 1.75, title, text, "#e8f1f8")
         axis.annotate("", (2.25, 1.95), (1.8, 3.7 - 1.1 * row), arrowprops={"arrowstyle": "-|>", "lw": 0.9})
-    for place, (title, text) in enumerate(STEPS):
+    for place, (title, text) in enumerate(_STEPS):
         box(2.3 + 1.72 * place, 1.55, 1.35 if text else 0.8, title, text, "#f4f4f4")
         if place:
             axis.annotate(

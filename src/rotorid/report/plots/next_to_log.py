@@ -11,7 +11,7 @@ from rotorid.report.next_to_log import NextToLog
 from rotorid.report.plots import style
 
 _SHOWN_WINDOWS = 8
-LINES = {"believed": ("before", "believed vehicle"), "improved": ("after", "improved vehicle, here")}
+_LINES = {"believed": ("before", "believed vehicle"), "improved": ("after", "improved vehicle, here")}
 
 
 def draw(found: NextToLog, path: Path) -> None:
@@ -23,7 +23,7 @@ def draw(found: NextToLog, path: Path) -> None:
     fig, axes = plt.subplots(1, len(channels) + 1, figsize=(style.TEXT_WIDTH_IN * 1.35, 2.7))
     elapsed = found.windows[0].time_s - found.windows[0].time_s[0]
     for ax, channel in zip(axes, channels, strict=False):
-        for model, (colour, label) in LINES.items():
+        for model, (colour, label) in _LINES.items():
             rms = np.sqrt(np.mean(found.errors[model][channel] ** 2, axis=0))
             ax.plot(elapsed, rms, color=style.COLOUR[colour], label=label)
         rms = np.sqrt(np.mean(found.errors["exported"][channel] ** 2, axis=0))

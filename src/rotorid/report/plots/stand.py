@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WRENCH = ("force_x_n", "force_y_n", "force_z_n", "moment_x_n_m", "moment_y_n_m", "moment_z_n_m")
-NAMES = ("$F_x$", "$F_y$", "$F_z$", "$M_x$", "$M_y$", "$M_z$")
+_NAMES = ("$F_x$", "$F_y$", "$F_z$", "$M_x$", "$M_y$", "$M_z$")
 
 
 def clocks(arrivals: Mapping[str, pd.DataFrame], table: pd.DataFrame) -> Figure:
@@ -68,7 +68,7 @@ def experiment(run: pd.DataFrame, start_s: float, stop_s: float) -> Figure:
 def steady(table: pd.DataFrame) -> Figure:
     """Steady wrench of the 48 experiments: measured with 95 % intervals, and what the believed vehicle gives."""
     fig, axes = style.figure(3.7, 3, 2, sharex=True)
-    for k, (name, label) in enumerate(zip(WRENCH, NAMES, strict=True)):
+    for k, (name, label) in enumerate(zip(WRENCH, _NAMES, strict=True)):
         axis = axes[k % 3, k // 3]
         scale = 1.0 if k < 3 else 1e3
         axis.plot(
@@ -100,7 +100,7 @@ def steady(table: pd.DataFrame) -> Figure:
 def weight(table: pd.DataFrame) -> Figure:
     """Moments of the weight at rest: measured, of the believed centre of mass, of the fitted one."""
     fig, axes = style.figure(2.8, columns=2)
-    for axis, name, label in zip(axes, WRENCH[3:5], NAMES[3:5], strict=True):
+    for axis, name, label in zip(axes, WRENCH[3:5], _NAMES[3:5], strict=True):
         measured = 1e3 * table[f"{name}_rest"]
         for kind, colour, marker, what in (
             ("believed", style.RED, "x", "believed centre of mass"),

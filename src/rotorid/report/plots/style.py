@@ -14,7 +14,7 @@ TEXT_WIDTH_IN = 6.3
 """Width of the report's text [in]; a figure of this width is printed at its own size."""
 
 # Okabe and Ito's palette, legible to colour-blind readers.
-BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, RED, _PURPLE = (
+BLACK, ORANGE, SKY, GREEN, _YELLOW, BLUE, RED, _PURPLE = (
     "#000000",
     "#e69f00",
     "#56b4e9",
@@ -39,8 +39,9 @@ COLOUR = {
     "z": GREEN,
 }
 """Colour of a quantity, the same in every figure."""
+AXIS_COLOURS = tuple(COLOUR[axis] for axis in "xyz")
 
-CYCLE = (BLUE, RED, GREEN, ORANGE, _PURPLE, SKY, BLACK, YELLOW)
+CYCLE = (BLUE, RED, GREEN, ORANGE, _PURPLE, SKY, BLACK, _YELLOW)
 """Colours in order for things without a fixed one (cells, motors, flights)."""
 
 _RC = {

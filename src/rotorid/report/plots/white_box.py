@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ANGLES = ("roll", "pitch", "yaw")
-_AXIS_COLOURS = tuple(style.COLOUR[a] for a in "xyz")
 
 
 def rotor_curves(thrust: pd.DataFrame, torque: pd.DataFrame, fits: dict) -> Figure:
@@ -80,7 +79,7 @@ def motion(flight: pd.DataFrame) -> Figure:
             place = axes[row, column]
             values = scale * flight[name.format(axis)].to_numpy()
             kept = style.thin(values, 800)
-            place.plot(flight["time_s"].to_numpy()[kept], values[kept], color=_AXIS_COLOURS[column], linewidth=0.7)
+            place.plot(flight["time_s"].to_numpy()[kept], values[kept], color=style.AXIS_COLOURS[column], linewidth=0.7)
             if column == 0:
                 place.set_ylabel(label)
             if row == 0:
@@ -97,7 +96,7 @@ _ROTOR_SHARE = 0.62
 """Radius of a rotor over the distance of its hub from the centre."""
 
 
-def pose(roll_rad: float, pitch_rad: float, yaw_rad: float) -> list[np.ndarray]:
+def _pose(roll_rad: float, pitch_rad: float, yaw_rad: float) -> list[np.ndarray]:
     """Lines of the vehicle at an attitude as a camera sees them, (n, 2) each: four arms, then four rotors' circles.
 
     Unit: the distance of a hub from the centre; first across, then up. Tilts are drawn `_TILTS_DRAWN` times as large.
@@ -124,7 +123,7 @@ def view(flight: pd.DataFrame, every_s: float = 1.0) -> Figure:
     rows = flight.iloc[:: max(int(round(every_s / step)), 1)]
     fig, axes = style.figure(1.75, 1, len(rows), gridspec_kw={"wspace": 0.02})
     for axis, row in zip(np.atleast_1d(axes), rows.itertuples(), strict=True):
-        for number, line in enumerate(pose(row.roll_rad, row.pitch_rad, row.yaw_rad)):
+        for number, line in enumerate(_pose(row.roll_rad, row.pitch_rad, row.yaw_rad)):
             front = number % 4 < 2
             colour = style.BLACK if number < 4 else style.RED if front else style.BLUE
             axis.plot(*line.T, color=colour, linewidth=1.5 if number < 4 else 1.1)
@@ -153,7 +152,7 @@ def animation(flight: pd.DataFrame, every_s: float = 0.1) -> str:
         if number == len(rows) - 1:
             values, times = "hidden;visible", f"0;{start:.4f}"
         lines = []
-        for k, line in enumerate(pose(row.roll_rad, row.pitch_rad, row.yaw_rad)):
+        for k, line in enumerate(_pose(row.roll_rad, row.pitch_rad, row.yaw_rad)):
             colour = style.BLACK if k < 4 else style.RED if k % 4 < 2 else style.BLUE
             points = " ".join(f"{315 + 110 * x:.1f},{125 - 110 * y:.1f}" for x, y in line)
             lines.append(f'<polyline points="{points}" stroke="{colour}"/>')

@@ -18,7 +18,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.io.text.names import listed
+from rotorid.io.text.wording import listed
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.exports.derivatives import (
     MUJOCO_FILE,

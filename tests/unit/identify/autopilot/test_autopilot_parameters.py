@@ -12,9 +12,8 @@ import rotorid
 from rotorid.cli import app
 from rotorid.errors import InputError
 from rotorid.identify.autopilot.correlated import autoregression, fit
-from rotorid.identify.autopilot.coverage import counted
+from rotorid.identify.autopilot.coverage import counted, drawn, flight, signal_of
 from rotorid.identify.autopilot.drag import specific_drag
-from rotorid.identify.autopilot.known_flights import drawn, flight, signal_of
 from rotorid.identify.autopilot.parameters import as_text, parameters_of
 from rotorid.identify.autopilot.thrust import lagging
 from rotorid.identify.autopilot.thrust_maps import MAPS

@@ -6,15 +6,13 @@ import pytest
 
 from rotorid.errors import InputError
 from rotorid.identify.bench import recalibrate, static
-from rotorid.identify.bench.channels import CELLS
-from rotorid.identify.bench.prepare import SPIKE, Filter, prepare
-from rotorid.identify.bench.reconstruct import GF_N, forces_by_matrix
-from rotorid.identify.bench.recordings import bench_force, bench_set
+from rotorid.identify.bench.prepare import SPIKE, Filter, bench_force, bench_set, prepare
+from rotorid.identify.bench.reconstruct import CELLS, GF_N
 from rotorid.io.session import Ended, Setup
 from rotorid.io.tables import read_sessions, read_tables
 
 from .logs import cells, write_log
-from .test_reconstruct import GEOMETRY
+from .test_reconstruct import GEOMETRY, forces_by_matrix
 
 SETTINGS = Filter(1.5, 5.0, 5, 12.0, 25, 2e-7)
 WEIGHTS = (50.0, 100.0, 250.0, 500.0)
@@ -180,7 +178,7 @@ def test_a_static_series_becomes_a_bench_set(tmp_path) -> None:
     loaded = run.column("reference_force_z_n")
     assert sorted(set(np.round(loaded / GF_N, 6))) == [-80.0, -40.0, 0.0]
     # Cell 3 alone: 40 gf push along −z with its absolute value, and Fx = D_135z/L of it.
-    expected = forces_by_matrix(np.array([[0, 0, 80 * GF_N, 0, 0, 0]]), GEOMETRY)[0]
+    expected = forces_by_matrix(np.array([[0.0, 0, 80 * GF_N, 0, 0, 0]]), GEOMETRY)[0]
     found = run.array(("force_x_n", "force_y_n", "force_z_n"))[loaded < -0.6].mean(axis=0)
     # Half a count of the converter is 0.18 mN, and those of the idle cells 1 and 5 count with their absolute value.
     assert found == pytest.approx(expected, abs=2 * 0.19e-3)

@@ -1,4 +1,4 @@
-"""The calibration line against hand-computed numbers and the thesis's tables."""
+"""The calibration line against hand-computed numbers and the thesis's tables; the error of one weight."""
 
 from pathlib import Path
 
@@ -6,13 +6,22 @@ import numpy as np
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.identify.bench.loadcell import check_weights, fit_line, read_calibration_table
+from rotorid.identify.bench.loadcell import (
+    balance_disagreement,
+    check_weights,
+    fit_line,
+    read_calibration_table,
+    shared_weight_error,
+)
 
 THESIS = Path(__file__).parents[4] / "raw" / "thesis"
 
 # Least squares on tables 2.6 and 2.7 as printed, from the project's map of the thesis.
 EXPECTED_A1 = [39.7564, 37.2655, 40.8995, 39.9265, 42.4705, 39.4702]
 EXPECTED_A0 = [-0.0743, -0.3463, 0.1056, 0.0245, 0.1179, 0.0856]
+# Six loads, and those that one element is part of.
+WEIGHTS = np.array([100.0, 200.0, 300.0, 400.0, 500.0, 600.0])
+WITH_IT = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 1.0])
 
 
 def test_a_line_by_hand() -> None:
@@ -64,3 +73,33 @@ def test_messages(tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text("a,b\n1,2\n")
     with pytest.raises(InputError, match="expected the columns weight_gf and cell_1"):
         read_calibration_table(tmp_path / "t.csv")
+
+
+def readings_off_by(errors_gf: dict[int, float]) -> dict[int, np.ndarray]:
+    """What cells with slopes 40, 41, ... read when the weight is off by so much on each."""
+    return {cell: (WEIGHTS + error * WITH_IT - 0.1 * cell) / (39 + cell) for cell, error in errors_gf.items()}
+
+
+def test_an_error_seen_by_every_cell_is_recovered() -> None:
+    found = shared_weight_error(WEIGHTS, readings_off_by({1: -0.3, 2: -0.3, 3: -0.3}), WITH_IT)
+    assert found.mean_gf == pytest.approx(-0.3, abs=1e-9)
+    assert found.interval_95_gf == pytest.approx((-0.3, -0.3), abs=1e-9)
+
+
+def test_the_interval_is_students_over_the_cells() -> None:
+    # Mean -0.2, standard deviation 0.1, three cells: half width 4.30265 * 0.1 / sqrt(3) = 0.24841.
+    found = shared_weight_error(WEIGHTS, readings_off_by({1: -0.3, 2: -0.2, 3: -0.1}), WITH_IT)
+    assert found.by_cell_gf == pytest.approx((-0.3, -0.2, -0.1), abs=1e-9)
+    assert found.interval_95_gf == pytest.approx((-0.44841, 0.04841), abs=1e-5)
+
+
+def test_a_weight_in_every_load_cannot_be_told() -> None:
+    with pytest.raises(InputError, match="part of some loads and not of others"):
+        shared_weight_error(WEIGHTS, readings_off_by({1: 0.0, 2: 0.0}), np.ones(6))
+
+
+def test_the_balances_are_compared_where_both_weighed(tmp_path) -> None:
+    path = tmp_path / "weights.csv"
+    path.write_text("element,ohaus_gf,mettler_gf,average_gf\na,101,99,100\nb,202,200,201\nc,50,,50\n")
+    # (2 / 100 + 2 / 201) / 2
+    assert balance_disagreement(path) == pytest.approx(0.0149751, abs=1e-7)

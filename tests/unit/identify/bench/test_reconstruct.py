@@ -10,11 +10,12 @@ from rotorid.errors import InputError
 from rotorid.identify.bench.loadcell import fit_line
 from rotorid.identify.bench.reconstruct import (
     GF_N,
+    PULLED,
+    Geometry,
     cell_forces,
     cell_variance,
     force_covariance,
     forces,
-    forces_by_matrix,
     input_components,
     moments,
     read_geometry,
@@ -75,6 +76,13 @@ def test_a_lateral_load_becomes_vertical_by_absolute_values() -> None:
     found = lateral_as_vertical(SimpleNamespace(response_v_n=answer), [line] * 6, GEOMETRY)
     assert found["x"] == pytest.approx({"force_z_n": -1.25, "absolute_n": -1.25})
     assert found["y"] == pytest.approx({"force_z_n": -np.sqrt(2), "absolute_n": 0.0})
+
+
+def forces_by_matrix(cells_n: np.ndarray, geometry: Geometry) -> np.ndarray:
+    """Eq. 2.9: the same as `forces`, by the matrix; N, shape (n, 3)."""
+    force = cells_n @ geometry.matrix.T
+    force[..., 2] -= np.abs(cells_n[..., PULLED]).sum(axis=-1)
+    return force
 
 
 def test_the_matrix_of_eq_2_9_is_the_same_as_the_equations() -> None:

@@ -2,7 +2,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.identify.blackbox.compare import TrainingRange, conformal_coverage, conformal_half_width, folds, scores
 from rotorid.identify.blackbox.experiments import (
     INPUTS,
     OUTPUTS,
@@ -12,11 +11,16 @@ from rotorid.identify.blackbox.experiments import (
     thrust_of_throttle,
 )
 from rotorid.identify.blackbox.models import (
+    TrainingRange,
+    conformal_coverage,
+    conformal_half_width,
     effects_wrench,
     fit_linear,
     fit_ridge_physics,
     fit_thesis_network,
     fit_white_box_effects,
+    folds,
+    scores,
     white_box,
 )
 from tests.unit.identify.blackbox.samples import generated_experiments

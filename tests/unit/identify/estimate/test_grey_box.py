@@ -3,17 +3,19 @@
 import numpy as np
 import pytest
 
-from rotorid.identify.estimate.aerodynamic import Scaling, coefficient, fit_coefficient_network
-from rotorid.identify.estimate.consistency import check_consistency, implied_gyroscopic
-from rotorid.identify.estimate.inertial import (
+from rotorid.identify.estimate.grey_box import (
     MASK,
+    Scaling,
+    check_consistency,
+    coefficient,
+    fit_coefficient_network,
     fit_least_squares,
     fit_masked_network,
+    implied_gyroscopic,
     inertias_of_weights,
     weights_of_inertias,
 )
-from rotorid.identify.networks.network import LINEAR, Network
-from rotorid.identify.networks.training import Training
+from rotorid.identify.networks import LINEAR, Network, Training
 
 THESIS_INERTIAL = np.array([-1.7592, 0.0076, 4.0810, 401.5602, 388.2557, 218.0455])
 TRUE = np.array([2.489e-3, 2.5743e-3, 4.6838e-3])

@@ -8,14 +8,14 @@ import pandas as pd
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.identify.fem import statements, studies
-from rotorid.identify.fem.answers import compare
-from rotorid.identify.fem.gauges import strain_per_newton
-from rotorid.identify.fem.model import DOWN, Bench
+from rotorid.identify.fem import studies
+from rotorid.identify.fem.answers import compare, judge_statements
+from rotorid.identify.fem.bench import DOWN, Bench
+from rotorid.identify.fem.cell import strain_per_newton
 from rotorid.identify.fem.sizes import Material, materials, read_assumed
 from rotorid.identify.fem.studies import counts_per_newton, from_printed_slope, printed_slope, volts_per_newton
 from rotorid.identify.fem.tets import on
-from rotorid.io.wire.bench import GAIN, REFERENCE_V
+from rotorid.io.wire import GAIN, REFERENCE_V
 
 ROOT = Path(__file__).parents[4]
 
@@ -177,6 +177,6 @@ def test_a_statement_follows_depends_or_does_not(number, changed) -> None:
         ([held, not_held], "depends on the assumed sizes"),
         ([not_held, not_held], "does not follow"),
     ):
-        judged = statements.judge(pd.DataFrame(rows))[number]
+        judged = judge_statements(pd.DataFrame(rows))[number]
         assert judged.word == word
         assert judged.on_assumed == (rows[0] is held)

@@ -7,10 +7,9 @@ import pytest
 import yaml
 
 from rotorid.identify.blackbox.experiments import thrust_of_throttle
-from rotorid.identify.rotor.campaign import thrust_points, torque_points
+from rotorid.identify.rotor.campaign import speed_law, thrust_points, torque_points
 from rotorid.identify.rotor.coefficients import Points, fit_coefficient
-from rotorid.identify.stand import align
-from rotorid.identify.stand.characteristic import speed_law
+from rotorid.identify.stand import clocks
 from rotorid.identify.stand.recordings import read_pairs
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.tables import read_tables
@@ -74,12 +73,12 @@ def test_the_clocks_of_the_experiments(thrust, truth) -> None:
     pairs = read_pairs(*tables, 2e-4)
     assert [pair.sine for pair in pairs] == [EXPERIMENTS[n].signal == "sine" for n in numbers]
     curve = thrust_of_throttle(thrust)
-    skew, error = align.skew(pairs, curve)
+    skew, error = clocks.skew(pairs, curve)
     told = truth["clocks"]["wrench"] - truth["clocks"]["quadrotor"]
     assert abs(skew - told) < 3 * error
     assert error < 2e-4
-    for entry in align.align(pairs, curve):
+    for entry in clocks.align(pairs, curve):
         # The emulators' samples were taken 0.07 s apart from what the arrival times of these recordings say.
         assert entry.offset_s == pytest.approx(-0.07, abs=0.012)
-    lag = align.align(pairs, curve)[0].motor_delay_s
+    lag = clocks.align(pairs, curve)[0].motor_delay_s
     assert min(truth["rotor"]["rise_s"], truth["rotor"]["fall_s"]) - 0.005 < lag < 0.07

@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.identify.stand import plateaus, wrench
-from rotorid.identify.stand.characteristic import speed_law
+from rotorid.identify.rotor.campaign import speed_law
+from rotorid.identify.stand import wrench
 from rotorid.recordings.run import Run
 
 WRENCH = wrench.WRENCH
@@ -22,22 +22,22 @@ def programme(time_s: np.ndarray) -> np.ndarray:
 
 def test_segments_of_a_trapezoid() -> None:
     time_s = np.arange(0, 18, 0.01)
-    found = plateaus.segments(time_s, programme(time_s))
+    found = wrench.segments(time_s, programme(time_s))
     assert [s.kind for s in found] == ["rest", "ramp", "plateau", "ramp", "rest"]
-    flat = plateaus.longest(found, plateaus.PLATEAU)
+    flat = wrench.longest(found, wrench.PLATEAU)
     assert flat.start_s == pytest.approx(5.0, abs=0.06)
     assert flat.stop_s == pytest.approx(13.0, abs=0.06)
-    whole = plateaus.programme(found)
+    whole = wrench.programme(found)
     assert (whole.start_s, whole.stop_s) == pytest.approx((2.0, 16.0), abs=0.02)
 
 
 def test_a_sine_has_no_plateau_and_rest_alone_is_refused() -> None:
     time_s = np.arange(0, 12, 0.02)
     sine = 0.1 * (1 - np.cos(2 * np.pi * 0.25 * time_s))
-    found = plateaus.segments(time_s, np.column_stack([sine] * 4))
-    assert plateaus.longest(found, plateaus.PLATEAU) is None
+    found = wrench.segments(time_s, np.column_stack([sine] * 4))
+    assert wrench.longest(found, wrench.PLATEAU) is None
     with pytest.raises(InputError, match="never ran"):
-        plateaus.segments(time_s, np.zeros((len(time_s), 4)))
+        wrench.segments(time_s, np.zeros((len(time_s), 4)))
 
 
 def test_tilt_and_weight_by_hand() -> None:

@@ -27,7 +27,7 @@ from rotorid.mismatch.changes.quantities import KINDS
 from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import RecordingSet, Run
 from rotorid.recordings import columns as c
-from rotorid.recordings.doubts import Doubt
+from rotorid.recordings.run import Doubt
 from tests.unit.mismatch.flights import Flight, quad
 
 

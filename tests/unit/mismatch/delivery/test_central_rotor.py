@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotorid.cli.simulating import fly
+from rotorid.cli.modelling import fly
 from rotorid.errors import InputError
 from rotorid.mismatch.delivery.final import delivered_value
 from rotorid.mismatch.delivery.usable import full_thrust_n

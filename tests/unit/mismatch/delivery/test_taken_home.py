@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 from rotorid.cli import app, verdicts
-from rotorid.cli.simulating import fly
+from rotorid.cli.modelling import fly
 from rotorid.mismatch.decision.findings import Analysis
 from rotorid.mismatch.delivery.files import delivered, improved_vehicle
 from rotorid.mismatch.tell.verdict import Verdict

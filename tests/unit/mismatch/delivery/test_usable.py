@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.cli.simulating import simulate
+from rotorid.cli.modelling import simulate
 from rotorid.mismatch.delivery import usable
 from rotorid.mismatch.delivery.usable import (
     cannot_fly,

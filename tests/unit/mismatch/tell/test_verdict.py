@@ -20,7 +20,7 @@ from rotorid.mismatch.tell.verdict import (
     reached,
     schema_text,
 )
-from rotorid.recordings.doubts import Doubt
+from rotorid.recordings.run import Doubt
 from tests.unit.mismatch.synthetic import analysis, drag_finding
 
 

@@ -13,11 +13,11 @@ from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 from rotorid.cli import app
-from rotorid.cli.simulating import fly
+from rotorid.cli.modelling import fly
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings import read_set, templates
-from rotorid.recordings.importers.clean import join_rows
+from rotorid.recordings.importers.faults import join_rows
 from rotorid.recordings.importers.guessing import names as column_names
 from rotorid.recordings.importers.guessing.guess import as_text, guess
 from rotorid.recordings.importers.mapping import BODY, TRAVEL, UNITS, WORLD, convert, read_mapping

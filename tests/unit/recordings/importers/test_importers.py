@@ -12,8 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers import clean, crazyflie, in_the_air, known, px4_ulog
+from rotorid.recordings.importers import crazyflie, in_the_air, known, px4_ulog
 from rotorid.recordings.importers.crazyflie import TYPES, decode_usd_log, read_usd_log
+from rotorid.recordings.importers.faults import blank_held, cut, drop_repeated_times, report_gaps, true_stretches
+from rotorid.recordings.importers.known import Parameters
 from rotorid.recordings.importers.mapping import (
     continuous,
     half_turn_about_x,
@@ -21,7 +23,6 @@ from rotorid.recordings.importers.mapping import (
     quaternion_to_frd_ned,
 )
 from rotorid.recordings.importers.neurobem import USED, read_neurobem
-from rotorid.recordings.importers.parameters import Parameters
 from rotorid.recordings.importers.public_sets import read_imrc_bench
 from rotorid.recordings.importers.rcbenchmark import decode_text, read_rcbenchmark
 from rotorid.recordings.importers.vicon_csv import read_vicon_csv
@@ -64,7 +65,7 @@ def test_euler_angles_nose_up_is_positive_pitch() -> None:
 
 def test_rows_that_do_not_move_the_clock_on_are_dropped_and_counted() -> None:
     table = pd.DataFrame({"time_s": [0.0, 1.0, 1.0, 0.5, 2.0, np.nan], "x": range(6)})
-    kept, faults = clean.drop_repeated_times(table)
+    kept, faults = drop_repeated_times(table)
     assert kept["x"].tolist() == [0, 1, 4]
     assert kinds(faults) == ["repeated_time"]
     assert faults[0].samples == 3
@@ -80,26 +81,26 @@ def test_held_values_become_empty_cells_and_rows_with_nothing_go() -> None:
             "d": [1, 1, 1, 1, 1, 1.0],
         }
     )
-    kept, faults = clean.blank_held(table, {"slow": ["a"], "fast": ["b"]}, share=0.3)
+    kept, faults = blank_held(table, {"slow": ["a"], "fast": ["b"]}, share=0.3)
     assert kept["a"].isna().tolist() == [False, True, False, True, False, True]
     assert kept["b"].tolist() == [1, 2, 3, 4, 5, 5]
     assert kinds(faults) == ["held"]
-    dropped, _ = clean.blank_held(table[["time_s", "a"]], {"slow": ["a"]})
+    dropped, _ = blank_held(table[["time_s", "a"]], {"slow": ["a"]})
     assert dropped["time_s"].tolist() == [0, 2, 4]
 
 
 def test_gaps_are_reported_and_left() -> None:
     time = np.array([0, 1, 2, 3, 8, 9.0])
-    assert kinds(clean.report_gaps(pd.DataFrame({"time_s": time}))) == ["gap"]
-    assert clean.report_gaps(pd.DataFrame({"time_s": np.arange(5.0)})) == []
+    assert kinds(report_gaps(pd.DataFrame({"time_s": time}))) == ["gap"]
+    assert report_gaps(pd.DataFrame({"time_s": np.arange(5.0)})) == []
 
 
 def test_stretches_of_true_and_cutting() -> None:
     time = np.arange(10.0)
     mask = np.array([0, 1, 1, 1, 0, 0, 1, 1, 1, 1], bool)
-    assert clean.true_stretches(mask, time, 2.5) == [(6.0, 9.0)]
-    assert clean.true_stretches(mask, time, 2.0) == [(1.0, 3.0), (6.0, 9.0)]
-    assert clean.cut(pd.DataFrame({"time_s": time}), 1.0, 3.0)["time_s"].tolist() == [0, 1, 2]
+    assert true_stretches(mask, time, 2.5) == [(6.0, 9.0)]
+    assert true_stretches(mask, time, 2.0) == [(1.0, 3.0), (6.0, 9.0)]
+    assert cut(pd.DataFrame({"time_s": time}), 1.0, 3.0)["time_s"].tolist() == [0, 1, 2]
 
 
 # RCbenchmark --------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rotorid.cli import app
-from rotorid.cli.simulating import fly
+from rotorid.cli.modelling import fly
 from rotorid.recordings import columns as c
 from rotorid.recordings import read_set, templates
 from rotorid.recordings.importers.in_the_air import airborne

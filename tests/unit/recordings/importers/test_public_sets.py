@@ -17,8 +17,8 @@ from rotorid.io.public_list import of_one_motor, read_manifest
 from rotorid.recordings import columns as c
 from rotorid.recordings import read_set, read_vehicle
 from rotorid.recordings.importers import overview
+from rotorid.recordings.importers.faults import read_report
 from rotorid.recordings.importers.public_sets import PUBLIC_SETS, Obtained, address, build, obtain, sets_of, sha256
-from rotorid.recordings.importers.report import read_report
 from rotorid_proof.plantings import sow
 from rotorid_proof.plantings.flights import FLIGHTS as PLANTED
 

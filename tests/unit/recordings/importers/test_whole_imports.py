@@ -20,7 +20,7 @@ from rotorid.io.text import writing
 from rotorid.recordings import list_sets, read_set, write_set
 from rotorid.recordings.files import FILE_NAME
 from rotorid.recordings.importers import set_of_logs as writer
-from rotorid.recordings.importers.report import read_report
+from rotorid.recordings.importers.faults import read_report
 from rotorid.recordings.importers.set_of_logs import SetOfLogs
 from tests.unit.recordings.wrong_inputs import RUN, VEHICLE, sound, table
 

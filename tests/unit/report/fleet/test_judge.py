@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from rotorid.cli.simulating import fly
+from rotorid.cli.modelling import fly
 from rotorid.errors import InputError
 from rotorid.recordings import read_set
 from rotorid.recordings.templates import read

@@ -15,7 +15,7 @@ from rotorid.mismatch.tell.sentences import MOST_WORDS
 from rotorid.mismatch.tell.tiles import tiles
 from rotorid.mismatch.tell.verdict import main_channel
 from rotorid.recordings import Run
-from rotorid.recordings.doubts import Doubt
+from rotorid.recordings.run import Doubt
 from rotorid.report.deliver import verdict_of, write_files
 from rotorid.report.page.data import _first_shown, fit_percent, measured, packed
 from rotorid.report.page.make import by_share, make_page, next_text, pretty, strip

@@ -56,7 +56,7 @@ def steps_of(time_s: np.ndarray) -> np.ndarray:
     return np.arange(time_s[0], time_s[-1] + 1e-9, step)
 
 
-def at(instants: np.ndarray, time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
+def _at(instants: np.ndarray, time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Values (n, k) at instants (m,) by straight lines between the samples that are there; NaN where none is."""
     out = np.full((len(instants), values.shape[1]), np.nan)
     known = np.isfinite(values).all(axis=1)
@@ -68,7 +68,7 @@ def at(instants: np.ndarray, time_s: np.ndarray, values: np.ndarray) -> np.ndarr
 
 def changes(instants: np.ndarray, time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Changes (m − 1, k) of values (n, k) between instants (m,)."""
-    return np.diff(at(instants, time_s, values), axis=0)
+    return np.diff(_at(instants, time_s, values), axis=0)
 
 
 def integrated(instants: np.ndarray, time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -82,7 +82,7 @@ def integrated(instants: np.ndarray, time_s: np.ndarray, values: np.ndarray) -> 
 
 def turned(instants: np.ndarray, time_s: np.ndarray, wxyz: np.ndarray) -> np.ndarray:
     """Rotations in body axes (m − 1, 3), rad, between instants by quaternions (n, 4), scalar first, body to world."""
-    turns = rotations(at(instants, time_s, wxyz))
+    turns = rotations(_at(instants, time_s, wxyz))
     if turns is None:
         return np.full((len(instants) - 1, 3), np.nan)
     rotation, known = turns
@@ -104,7 +104,7 @@ def rotations(wxyz: np.ndarray) -> tuple[Rotation, np.ndarray] | None:
 def into_world(time_s: np.ndarray, wxyz: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """Vectors (n, 3) of the body turned into the world by quaternions (n, 4) with gaps, which are bridged."""
     out = np.full(vectors.shape, np.nan)
-    turns = rotations(at(time_s, time_s, wxyz))
+    turns = rotations(_at(time_s, time_s, wxyz))
     if turns is not None:
         rotation, known = turns
         out[known] = rotation.apply(vectors[known])

@@ -12,7 +12,7 @@ from rotorid.recordings.importers.guessing import agreement as by
 from rotorid.recordings.importers.guessing import names as named
 from rotorid.recordings.importers.guessing.agreement import Agreement
 from rotorid.recordings.importers.guessing.names import Family
-from rotorid.recordings.importers.mapping import OPEN, Channel, continuous
+from rotorid.recordings.importers.mapping import OPEN, MappedChannel, continuous
 from rotorid.recordings.importers.units import UNITS
 
 CONFIRMED = 0.8
@@ -35,7 +35,6 @@ RATES_HZ = (5.0, 8000.0)
 _THOUSANDTHS = 100.0
 """Median size of an accelerometer's reading above which it counts thousandths of g."""
 FASTEST_GYRO_RAD_S = 40.0
-G = 9.80665
 
 
 @dataclass
@@ -45,7 +44,7 @@ class Draft:
     table: pd.DataFrame
     time_s: np.ndarray | None = None
     """(n,); None where no clock is recognised."""
-    channels: dict[str, Channel] = field(default_factory=dict)
+    channels: dict[str, MappedChannel] = field(default_factory=dict)
     evidence: dict[str, str] = field(default_factory=dict)
     open: dict[str, str] = field(default_factory=dict)
     wxyz: np.ndarray | None = None
@@ -62,7 +61,7 @@ class Draft:
         return [n for n in self.table.columns if n not in taken]
 
     def put(self, name: str, columns: Sequence[str], evidence: str, question: str = "", **more) -> None:
-        self.channels[name] = Channel(columns=tuple(columns), **more)
+        self.channels[name] = MappedChannel(columns=tuple(columns), **more)
         self.evidence[name] = evidence
         if question:
             self.open[name] = question

@@ -21,7 +21,7 @@ import pandas as pd
 import yaml
 
 from rotorid.errors import InputError
-from rotorid.recordings.importers.clean import join_rows
+from rotorid.recordings.importers.faults import join_rows
 from rotorid.recordings.importers.guessing import agreement as by
 from rotorid.recordings.importers.guessing import names as named
 from rotorid.recordings.importers.guessing.attitude import guess_attitude_and_rates
@@ -29,14 +29,13 @@ from rotorid.recordings.importers.guessing.draft import (
     CONFIRMED,
     RATES_HZ,
     Draft,
-    G,
     triples_of,
 )
 from rotorid.recordings.importers.guessing.names import Family
 from rotorid.recordings.importers.guessing.rotors import guess_rotors, guess_stand
 from rotorid.recordings.importers.guessing.travel import guess_height, guess_position, guess_velocity
 from rotorid.recordings.importers.mapping import BODY, CHANNELS, OPEN, WORLD, Mapping
-from rotorid.recordings.importers.units import UNITS, converted, stated
+from rotorid.recordings.importers.units import UNITS, G, converted, stated
 from rotorid.recordings.tables import numbers
 
 _USUAL = {"voltage": (60.0, 2.5, 60.0), "current": (60.0, 0.0, 150.0), "temperature": (60.0, -30.0, 130.0)}

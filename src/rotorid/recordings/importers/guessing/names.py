@@ -58,7 +58,7 @@ _ROTORS: dict[str, frozenset[str]] = {
         "motor motors throttle throttles pwm m mot output outputs thr control u act actuator actuators servo".split()
     ),
 }  # fmt: skip
-QUATERNION = frozenset("q quat quaternion att_q attitude_q orientation rotation".split())
+_QUATERNION = frozenset("q quat quaternion att_q attitude_q orientation rotation".split())
 _ANGLES = ({"roll", "phi"}, {"pitch", "theta"}, {"yaw", "psi", "heading"})
 _SCALARS: dict[str, tuple[str, ...]] = {
     "time": (r"t([ _(\[]*([munµ]?s)[)\]]?)?", r"time(stamp)?([ _(\[].*)?", r"time_.*", r".*timestamp.*"),
@@ -229,7 +229,7 @@ def is_rotor(family: Family, quantity: str) -> bool:
 
 
 def is_quaternion(family: Family) -> bool:
-    return not family.words & OTHER_THINGS and _ends_in(family.stem, QUATERNION)
+    return not family.words & OTHER_THINGS and _ends_in(family.stem, _QUATERNION)
 
 
 def angles(names: Sequence[str]) -> tuple[tuple[str, str, str], str] | None:

@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from rotorid.identify.networks.network import LINEAR, SIGMOID, Network, build, gradients, sigmoid
-from rotorid.identify.networks.training import Training, train
+from rotorid.identify.networks import LINEAR, SIGMOID, Network, Training, build, gradients, sigmoid, train
 
 
 def test_delta_rule_by_hand():

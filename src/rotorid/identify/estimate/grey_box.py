@@ -1,6 +1,11 @@
-"""Principal inertias by the masked single-layer network (thesis 4.3.2, eqs 4.74-4.80), and by least squares.
+"""Weights of networks that are numbers of physics (thesis 4.3): rotor coefficients and principal inertias.
 
-Both fit dp/dt = w11 qr + w14 τ_φ and its two companions; inertias are the reciprocals of the torque weights.
+- C_F and C_Q by a linear 1-n-1 network without bias (eqs 4.58-4.73).
+- Principal inertias by the masked single-layer network (eqs 4.74-4.80), and by least squares. Both fit
+  dp/dt = w11 qr + w14 τ_φ and its two companions; inertias are the reciprocals of the torque weights.
+- Six weights describe three inertias, so three relations must hold: w11 = w14 (1/w25 - 1/w36), w22 = w25 (1/w36
+  - 1/w14), w33 = w36 (1/w14 - 1/w25). A Wald test asks whether their violation is more than the weights' own
+  uncertainty.
 """
 
 from __future__ import annotations
@@ -8,9 +13,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import chdtrc
 
 from rotorid.effects.contract import compiled
-from rotorid.identify.networks.training import Training
+from rotorid.identify.networks import Network, Trained, Training, build, train
 
 MASK = np.array([[1, 0, 0, 1, 0, 0], [0, 1, 0, 0, 1, 0], [0, 0, 1, 0, 0, 1]], float)
 """Which weights of eq. 4.74 are there."""
@@ -151,3 +157,82 @@ def fit_least_squares(rates: np.ndarray, accelerations: np.ndarray, moments: np.
         weights[[axis, 3 + axis]] = found
         covariance[np.ix_([axis, 3 + axis], [axis, 3 + axis])] = spread
     return _WeightFit(weights, covariance, residual)
+
+
+@dataclass(frozen=True)
+class _Consistency:
+    """`gap` (3,): trained minus implied gyroscopic weight; `sigma` its standard error (0 where unknown)."""
+
+    trained: np.ndarray
+    implied: np.ndarray
+    gap: np.ndarray
+    sigma: np.ndarray
+    statistic: float
+    p_value: float
+
+
+def implied_gyroscopic(weights: np.ndarray) -> np.ndarray:
+    """w11, w22, w33 as the torque weights imply them, (3,)."""
+    a, b, c = np.asarray(weights)[3:]
+    return np.array([a * (1 / b - 1 / c), b * (1 / c - 1 / a), c * (1 / a - 1 / b)])
+
+
+def _slope(weights: np.ndarray) -> np.ndarray:
+    """Derivative of the gaps (3,) by the six weights, (3, 6)."""
+    a, b, c = np.asarray(weights)[3:]
+    implied = np.array(
+        [
+            [1 / b - 1 / c, -a / b**2, a / c**2],
+            [b / a**2, 1 / c - 1 / a, -b / c**2],
+            [-c / a**2, c / b**2, 1 / a - 1 / b],
+        ]
+    )
+    return np.hstack([np.eye(3), -implied])
+
+
+def check_consistency(weights: np.ndarray, covariance: np.ndarray) -> _Consistency:
+    """Wald test of the three relations for weights (6,) with covariance (6, 6)."""
+    weights = np.asarray(weights, float)
+    implied = implied_gyroscopic(weights)
+    gap = weights[:3] - implied
+    slope = _slope(weights)
+    spread = slope @ covariance @ slope.T
+    statistic = float(gap @ np.linalg.solve(spread, gap))
+    return _Consistency(weights[:3], implied, gap, np.sqrt(np.diag(spread)), statistic, float(chdtrc(3, statistic)))
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """k_x = 1 / max|ω|, k_d = 1 / max|d| (eq. 4.68)."""
+
+    k_x: float
+    k_d: float
+
+    @classmethod
+    def of(cls, speed_rad_s: np.ndarray, value: np.ndarray) -> Scaling:
+        return cls(float(1 / np.max(np.abs(speed_rad_s))), float(1 / np.max(np.abs(value))))
+
+
+def coefficient(network: Network, scaling: Scaling) -> float:
+    """C = w⁽²⁾ w⁽¹⁾ k_x² / k_d (eq. 4.73), N s2 or N m s2."""
+    product = network.weights[1] @ network.weights[0]
+    return float(product[0, 0] * scaling.k_x**2 / scaling.k_d)
+
+
+@dataclass(frozen=True)
+class _AerodynamicFit:
+    coefficient: float
+    scaling: Scaling
+    trained: Trained
+
+
+def fit_coefficient_network(
+    speed_rad_s: np.ndarray, value: np.ndarray, hidden: int, training: Training
+) -> _AerodynamicFit:
+    """Train on steady points: speeds (n,), rad/s, and thrusts (N) or torques (N m) (n,)."""
+    scaling = Scaling.of(speed_rad_s, value)
+    network = build((1, hidden, 1), ("linear", "linear"), np.random.default_rng(training.seed), bias=False)
+    inputs = (scaling.k_x * np.asarray(speed_rad_s, float)[:, None]) ** 2
+    targets = scaling.k_d * np.asarray(value, float)[:, None]
+    trained = train(network, inputs, targets, training)
+    return _AerodynamicFit(coefficient(trained.network, scaling), scaling, trained)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.io.text.markdown_table import first_table
+from workflow.scripts.tabulate_speed import first_table
 
 TEXT = "# Speed\n\nWords.\n\n| a, s | b |\n| --- | ---: |\n| x | 1.5 |\n| y | 2 |\n\n| other | table |\n"
 

@@ -1,1 +1,0 @@
-"""Neural networks from first principles, as the thesis writes them (chapter 4.2)."""
