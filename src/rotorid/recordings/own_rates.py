@@ -184,8 +184,15 @@ def is_scattered(run: Run, names: tuple[str, ...]) -> bool:
 
 
 def own_period_s(run: Run, names: tuple[str, ...]) -> float:
-    """The step that covers nearly all steps between readings that come at random, s: what such a sensor resolves."""
-    return max(max(float(np.quantile(s, _COVERED)), float(s.mean())) for s in _steps_s(run, names))
+    """The step that covers nearly all steps between readings that come at random, s: what such a sensor resolves.
+
+    One that then has less than the analysis needs has as many knots as readings: a spline's stiffness leads over the
+    longer steps, and half of its band would be lost with one reading in ten.
+    """
+    steps = _steps_s(run, names)
+    mean = max(float(s.mean()) for s in steps)
+    covering = max(mean, *(float(np.quantile(s, _COVERED)) for s in steps))
+    return min(covering, max(1.0 / _RATE_ENOUGH_HZ, mean))
 
 
 def evenly(run: Run, names: tuple[str, ...], period_s: float, jumps: bool) -> np.ndarray:

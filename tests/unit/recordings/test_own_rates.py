@@ -84,6 +84,20 @@ def test_a_band_of_signal_and_the_noise_of_what_is_there_remain() -> None:
     assert np.sqrt(2) < gain < 1.8  # half the readings have twice the density, their uneven steps cost the rest
 
 
+def test_a_slow_sensor_keeps_its_band_where_one_reading_in_ten_is_lost() -> None:
+    """At 20 Hz a lost reading makes a step of a tenth of a second: a grid of such steps would halve the band."""
+    rng = np.random.default_rng(5)
+    time_s = np.arange(2000) / 20
+    tone = np.sin(2 * np.pi * 3 * time_s)
+    table = dict.fromkeys(c.ANGULAR_VELOCITY, np.where(rng.random(len(time_s)) < 0.1, np.nan, tone))
+    run = Run("run", pd.DataFrame({c.TIME: time_s} | table))
+    period = own_period_s(run, c.ANGULAR_VELOCITY)
+    assert 1.0 / period > 17.0
+    values = evenly(run, c.ANGULAR_VELOCITY, period, jumps=False)[:, 0]
+    inner = np.flatnonzero(np.isfinite(values))[10:-10]
+    assert np.sqrt(np.mean((values[inner] - tone[inner]) ** 2)) < 0.06 * np.sqrt(0.5)
+
+
 def test_commands_that_jitter_faster_than_the_grid_are_averaged_not_sampled() -> None:
     """A throttle at 1 kHz, packets lost several at a time, brought to 50 Hz: its jitter was folded into the band."""
     rng = np.random.default_rng(4)
