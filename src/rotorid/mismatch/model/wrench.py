@@ -202,9 +202,9 @@ def wrench_model(
         colours = without_unseen(rows, noisy, prepared.thinner.rate_hz, prepared.thinner.cutoff_hz)
     precision = np.concatenate([1 / np.square(np.broadcast_to(t.prior_sd, (t.size,)).astype(float)) for t in terms])
     left, beta = full_fit_residuals(rows, precision, colours)
-    louder = np.zeros(12, bool) if before is None or before.inflated is None else before.inflated
-    if louder.any():
-        left = [np.where(louder, own, full) for own, full in zip(after_residual(before), left, strict=True)]
+    above = np.zeros(12, bool) if before is None or before.inflated is None else before.inflated
+    if above.any():
+        left = [np.where(above, own, full) for own, full in zip(after_residual(before), left, strict=True)]
     model = searched(prepared, terms, rows, noisy, left, start, segments)
     model = replace(model, floor=np.fmin(model.noise, _whole_floor(model, beta, segments)))
     # The whole catalogue at once may explain what no model of it does (noise of the rotor speeds, say, with no
@@ -217,7 +217,7 @@ def wrench_model(
         active = model.selection.active
         again = searched(prepared, terms, rows, noisy, left, active, segments)
         model = replace(again, floor=model.floor)
-    model = replace(model, inflated=inflated | louder)
+    model = replace(model, inflated=inflated | above)
     return replace(model, segments=segments, noisy_segments=noisy_segments, effects=effects)
 
 

@@ -169,14 +169,14 @@ def test_what_is_known_beside_commands_costs_a_path_nothing_where_it_follows_squ
     np.testing.assert_allclose(left, asked_anew, atol=1e-8)
 
 
-def test_a_channel_known_to_be_louder_than_the_catalogue_leaves_it_is_searched_once(monkeypatch):
+def test_a_channel_known_to_be_above_what_the_catalogue_leaves_is_searched_once(monkeypatch):
     """One search says in which channels the model's own residual is the noise; the next begins with it."""
     prepared = prepare(recorded(1))
     before = wrench.wrench_model(prepared, prepared.terms)
     searches = []
     monkeypatch.setattr(wrench, "searched", lambda *given: searches.append(given[4]) or before)
-    loud = replace(before, inflated=np.arange(12) == 0)
-    again = wrench.wrench_model(prepared, prepared.terms, before=loud)
+    known = replace(before, inflated=np.arange(12) == 0)
+    again = wrench.wrench_model(prepared, prepared.terms, before=known)
     assert len(searches) == 1 and again.inflated[0]
     own = wrench.after_residual(before)
     assert all(np.array_equal(left[:, 0], part[:, 0]) for left, part in zip(searches[0], own, strict=True))
