@@ -135,7 +135,7 @@ def _leapfrog(hanging, start, dt, length_m, damping):
 
 
 @dataclass(frozen=True)
-class Piece:
+class _Piece:
     """A piece of a stretch at SCAN_RATE_HZ, in world axes."""
 
     stretch: int
@@ -169,7 +169,7 @@ def pieces_of(parts, gravity_m_s2):
             own = np.stack([p[cut] - p[cut].mean(axis=0) for p in pulls])
             own /= np.maximum(np.sqrt((own**2).sum(axis=(1, 2), keepdims=True)), 1e-300)
             others = np.stack([np.column_stack([np.ones(count), slope[cut, a], velocity[cut, a]]) for a in (0, 1)])
-            out.append(Piece(stretch, first, np.arange(count) * step, slope[cut], others, own))
+            out.append(_Piece(stretch, first, np.arange(count) * step, slope[cut], others, own))
     return out
 
 

@@ -186,7 +186,7 @@ def between(values: np.ndarray, finer: int) -> np.ndarray:
     return out
 
 
-class ChainProblem:
+class _ChainProblem:
     """Residuals of a chain on the stretches that are fitted."""
 
     def __init__(self, setup: PreparedInstrument, others: list | None = None, holds: bool = False):
@@ -450,14 +450,14 @@ def _ordered(chain: Chain) -> Chain:
     return tuple(sorted(chain, key=lambda pair: pair[1].stage))
 
 
-def start_of(problem: ChainProblem, chain: Chain, fit: _ChainFit, new: str = "", values=()) -> np.ndarray:
+def start_of(problem: _ChainProblem, chain: Chain, fit: _ChainFit, new: str = "", values=()) -> np.ndarray:
     """Start of a chain from the fit of another that may lack one form, nothing having happened between its samples."""
     known = {key: fit.theta[fit.place(key)] for key, _ in fit.chain}
     theta = [values if key == new else known.get(key, form.neutral) for key, form in chain]
     return np.concatenate([fit.full, *theta, np.zeros(len(problem.unknown(chain)))])
 
 
-def _start_with(problem: ChainProblem, chain: Chain, fit: _ChainFit, new: tuple[str, SpeedForm]) -> np.ndarray:
+def _start_with(problem: _ChainProblem, chain: Chain, fit: _ChainFit, new: tuple[str, SpeedForm]) -> np.ndarray:
     """Start of a chain with a new form from what is known of the others: of the form's starts that explains most."""
     options = [start_of(problem, chain, fit, new[0], v) for v in starts(new[1])]
     return min(options, key=lambda theta: float(np.sum(problem.white(chain, theta) ** 2)))
@@ -469,7 +469,7 @@ def find_chain(setup: PreparedInstrument, others: list | None = None) -> ChainRe
         return None
     if not any(np.any(x.command > 0) for x in setup.loadings):
         return None
-    problem = ChainProblem(setup, others)
+    problem = _ChainProblem(setup, others)
     forms = candidates(setup)
     # What no form explains yet is no noise: whitened by it, slow steps of the command would leave their jumps alone.
     problem.learn((), problem.neutral(), coloured=False)
@@ -480,7 +480,7 @@ def find_chain(setup: PreparedInstrument, others: list | None = None) -> ChainRe
     return _worded(problem, _without_mere_scale(problem, best, dropped), forms, dropped)
 
 
-def _without_mere_scale(problem: ChainProblem, best: _ChainFit, dropped: dict[str, str]) -> _ChainFit:
+def _without_mere_scale(problem: _ChainProblem, best: _ChainFit, dropped: dict[str, str]) -> _ChainFit:
     """The chain without forms that only say what another thrust coefficient would.
 
     Where no speed is measured, speeds that are all a share higher than commanded are a thrust that is larger: a value
@@ -504,7 +504,7 @@ def _without_mere_scale(problem: ChainProblem, best: _ChainFit, dropped: dict[st
     return best
 
 
-def _holding_or_not(problem: ChainProblem, best: _ChainFit) -> _ChainFit:
+def _holding_or_not(problem: _ChainProblem, best: _ChainFit) -> _ChainFit:
     """The fit with commands that hold from sample to sample, or with smooth ones, whichever explains more.
 
     A chain that takes time sees the difference. Compared by sizes alone: whitened by its own residual, the poorer of
@@ -522,7 +522,7 @@ def _holding_or_not(problem: ChainProblem, best: _ChainFit) -> _ChainFit:
     return _richer(problem, other)
 
 
-def _grown(problem: ChainProblem, best: _ChainFit, forms, dropped: dict[str, str]) -> _ChainFit:
+def _grown(problem: _ChainProblem, best: _ChainFit, forms, dropped: dict[str, str]) -> _ChainFit:
     """The chain with forms added one by one as long as they explain more; why others did not enter in `dropped`."""
     for _ in range(_MOST):
         # Whitening by the residual of the richest chain seen: by a poor one's, everything would look like noise.
@@ -551,7 +551,7 @@ def _grown(problem: ChainProblem, best: _ChainFit, forms, dropped: dict[str, str
     return best
 
 
-def _weakness(problem: ChainProblem, fit: _ChainFit, without: _ChainFit, pair) -> str | None:
+def _weakness(problem: _ChainProblem, fit: _ChainFit, without: _ChainFit, pair) -> str | None:
     """Why a form does not enter; None if it does."""
     inner = _richer(problem, fit)
     where = inner.place(pair[0])
@@ -567,7 +567,7 @@ def _weakness(problem: ChainProblem, fit: _ChainFit, without: _ChainFit, pair) -
     return None
 
 
-def _pruned(problem: ChainProblem, best: _ChainFit, dropped: dict[str, str]) -> _ChainFit:
+def _pruned(problem: _ChainProblem, best: _ChainFit, dropped: dict[str, str]) -> _ChainFit:
     """The chain without what is no longer significant given the forms that came after it."""
     while best.chain:
         covariance, count = problem.covariance(best)
@@ -595,13 +595,13 @@ def p_value(offset: np.ndarray, covariance: np.ndarray, count: int) -> float:
     return float(f_distribution.sf(statistic * (count - q) / (q * (count - 1)), q, count - q))
 
 
-def _richer(problem: ChainProblem, fit: _ChainFit) -> _ChainFit:
+def _richer(problem: _ChainProblem, fit: _ChainFit) -> _ChainFit:
     """The fit once more, whitened by its own residual."""
     problem.learn(fit.chain, fit.theta)
     return problem.fit(fit.chain, fit.theta)
 
 
-def _worded(problem: ChainProblem, best: _ChainFit, forms, dropped: dict[str, str]) -> ChainResult:
+def _worded(problem: _ChainProblem, best: _ChainFit, forms, dropped: dict[str, str]) -> ChainResult:
     """Findings of a chain with intervals, p-values and alternatives."""
     covariance, count = problem.covariance(best) if len(best.theta) else (np.zeros((0, 0)), 2)
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -644,7 +644,7 @@ def _worded(problem: ChainProblem, best: _ChainFit, forms, dropped: dict[str, st
     return ChainResult(best, full, doubt, findings, noise, problem.holds)
 
 
-def alternatives(problem: ChainProblem, best: _ChainFit, key: str, forms) -> list[str]:
+def alternatives(problem: _ChainProblem, best: _ChainFit, key: str, forms) -> list[str]:
     """Ids that in a form's place explain as well."""
     out = []
     rest = best.chain_without(key)
@@ -661,7 +661,7 @@ def alternatives(problem: ChainProblem, best: _ChainFit, key: str, forms) -> lis
     return out
 
 
-def _reading_alternatives(problem: ChainProblem, best: _ChainFit, rest: Chain, key: str) -> list[str]:
+def _reading_alternatives(problem: _ChainProblem, best: _ChainFit, rest: Chain, key: str) -> list[str]:
     """Effects of the reading that explain as well in a form's place, where no speed is measured."""
     out = sorted(ids_of("same_on_commands", key))
     known, low, high = start_of(problem, rest, best), *problem.bounds(rest)
@@ -693,7 +693,7 @@ def _reading_alternatives(problem: ChainProblem, best: _ChainFit, rest: Chain, k
 
 def moved(setup: PreparedInstrument, result: ChainResult) -> tuple[Loading, ...]:
     """Loadings with the speeds that the chain makes of the commands (where none are measured)."""
-    problem, fit = ChainProblem(setup, holds=result.holds), result.fit
+    problem, fit = _ChainProblem(setup, holds=result.holds), result.fit
     out = []
     for x in setup.loadings:
         speed = problem.speed(x, fit.chain, fit.values, result.full_speed)
@@ -712,7 +712,7 @@ def without_id(result: ChainResult, key: str) -> ChainResult:
 
 def speed_traces(setup: PreparedInstrument, result: ChainResult) -> tuple[ChannelTrace, ...]:
     """Measured less commanded and less modelled speed of every rotor, where both are recorded."""
-    problem = ChainProblem(setup, holds=result.holds)
+    problem = _ChainProblem(setup, holds=result.holds)
     start = problem.neutral()
     if problem.scaled:
         start = np.array([result.full_speed])

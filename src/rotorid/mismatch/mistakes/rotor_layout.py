@@ -29,7 +29,7 @@ _LEAST_LIKELIHOOD = 25.0
 """Log-likelihood that the right layout must bring over none, and over the believed one."""
 _LEAST_ADVANTAGE = 1.5
 """What the right layout explains over what the believed one explains, at least."""
-LEAST_STEP = 0.6
+_LEAST_STEP = 0.6
 P_LIMIT = 1e-6
 _LATER_S = np.arange(0.005, 0.1001, 0.005)
 """By how much longer the torque of rotors may lag behind their commands than the delay that roll shows."""
@@ -196,7 +196,7 @@ def find(recordings: ReadSet) -> Corrected:
     disputed = float(sum(m.square.sum() for m in contested))
     likely = (as_believed - best) / OVERLAP > _LEAST_LIKELIHOOD
     explains = disputed - best > _LEAST_ADVANTAGE * (disputed - as_believed)
-    if not (likely and explains and step > LEAST_STEP and p_value < P_LIMIT):
+    if not (likely and explains and step > _LEAST_STEP and p_value < P_LIMIT):
         return Corrected(recordings)
     cost = int(costs[order, spun])
     if not any({"attitude", "gyroscope"} <= set(s.values) for s in signals):

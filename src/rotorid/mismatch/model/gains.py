@@ -40,7 +40,7 @@ _LEAST_REACHED = 0.5
 """Share of the rows in stretches longer than the band-pass, without which all frequencies judge."""
 _MOMENTS = (3, 4, 5)
 """Channels of the moments."""
-LEAST_SHARE = 1e-3
+_LEAST_SHARE = 1e-3
 """Of a believed value what an estimate is at least: of what is not excited it may be anything."""
 _NEVER_SHOWN = 1e-6
 """Whitened squares of a value's column up to which the flight shows nothing of it."""
@@ -176,7 +176,7 @@ def _gain_of(coefficient: float, turned: bool) -> float:
     `turned` says that the column holds what the believed value makes of a force or moment (`decide.relative_change`).
     """
     return float(
-        np.log(max(1.0 - coefficient, LEAST_SHARE)) if turned else -np.log(max(1.0 + coefficient, LEAST_SHARE))
+        np.log(max(1.0 - coefficient, _LEAST_SHARE)) if turned else -np.log(max(1.0 + coefficient, _LEAST_SHARE))
     )
 
 

@@ -24,13 +24,13 @@ _SEEN_IN = ((2, 0), (4, 1), (3, 2))
 """Channel and parameter of a load: its mass in the vertical force, its places in the moments of pitch and roll."""
 BLOCK_S = 0.5
 _SMOOTHED_BLOCKS = 9
-SWITCH_COST = 30.0
+_SWITCH_COST = 30.0
 """Squares, in units of the blocks' own scatter, that taking up or dropping must explain."""
 _LEAST_BLOCKS = 8
 """Blocks of either state, of all runs together."""
-LEAST_STEP = 3.0
+_LEAST_STEP = 3.0
 """Distance of the two plateaus in units of the scatter of a block."""
-MOST_DRIFT = 0.2
+_MOST_DRIFT = 0.2
 """Share of the slow variation of the loads that the two plateaus may leave."""
 _EDGE_S = 1.5
 """Distance from the border of two blocks within which the instant is looked for."""
@@ -109,10 +109,10 @@ def two_plateaus(loads: Sequence[np.ndarray]) -> list[np.ndarray] | None:
         if same:
             break
     step = plateaus[1] - plateaus[0]
-    if not any(np.diff(s).any() for s in states) or step[0] < LEAST_STEP:
+    if not any(np.diff(s).any() for s in states) or step[0] < _LEAST_STEP:
         return None
     rest = [part - plateaus[s.astype(int)] for part, s in zip(scaled, states, strict=True)]
-    return states if _slow_variance(rest) < MOST_DRIFT * _slow_variance(scaled) else None
+    return states if _slow_variance(rest) < _MOST_DRIFT * _slow_variance(scaled) else None
 
 
 def _slow_variance(parts: Sequence[np.ndarray]) -> float:
@@ -126,7 +126,7 @@ def _cheapest_states(loads: np.ndarray, plateaus: np.ndarray) -> np.ndarray:
     costs = ((loads[:, None, :] - plateaus[None]) ** 2).sum(axis=2)
     total, came = np.zeros(2), np.zeros((len(costs), 2), int)
     for i, cost in enumerate(costs):
-        moved = total[::-1] + SWITCH_COST
+        moved = total[::-1] + _SWITCH_COST
         came[i] = np.where(moved < total, [1, 0], [0, 1])
         total = np.minimum(total, moved) + cost
     state, out = int(np.argmin(total)), np.zeros(len(costs), bool)

@@ -26,7 +26,7 @@ _PIECE_S, _PERIODS, _SHORTEST_PIECE_S = 5.0, 2.0, 1.2
 """A state is read for so long, and for so many swings at least; where it fails for less, but not for less than this."""
 RATE_HZ = 10.0
 """Rate at which the sideways force is looked at: a swing has less than 2 Hz."""
-LEAST_SHARE = 0.3
+_LEAST_SHARE = 0.3
 """Share of the sideways force's squares that a swing must explain: four numbers of five seconds make 0.1 of noise."""
 _CONVERGED = 1e-4
 """Relative change of squares and state at which a fit ends: far below what noise makes of either."""
@@ -127,7 +127,7 @@ def hung_by(
     if mass_kg <= 0.0:
         return None
     found = [swing_in(s, cable, mass_kg) for s in stretches]
-    if sum(f.left_n2 for f in found) > (1.0 - LEAST_SHARE) * sum(s.squares for s in stretches):
+    if sum(f.left_n2 for f in found) > (1.0 - _LEAST_SHARE) * sum(s.squares for s in stretches):
         return None
     return [hanging(s, f.states) for s, f in zip(segments, found, strict=True)], mass_kg
 
@@ -242,7 +242,7 @@ def largest_pieces(stretches: Sequence[HangingStretch], cable: Cable) -> list[Ha
 
 def seems_to_swing(stretches: Sequence[HangingStretch], cable: Cable) -> bool:
     """Whether a swing explains anything of the largest pieces."""
-    return share_left(stretches, cable) <= 1.0 - LEAST_SHARE
+    return share_left(stretches, cable) <= 1.0 - _LEAST_SHARE
 
 
 def share_left(stretches: Sequence[HangingStretch], cable: Cable) -> float:

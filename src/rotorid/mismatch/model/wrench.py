@@ -78,7 +78,7 @@ _MOST_P_OF_WIND = 1e-3
 """p-value up to which a wind is seen by the fit through the drag."""
 _WIND_ROUNDS = 3
 """Searches in a wind at most: in moving air another drag may explain more, and through it the wind is another."""
-SURE_Z = 3.0
+_SURE_Z = 3.0
 """Standard errors by which a nuisance must differ from nothing to be delivered."""
 _MOST_INFLATION = 2.0
 """A residual that the chosen model leaves this many times larger than the noise is itself the better noise."""
@@ -140,7 +140,7 @@ class WrenchModel:
 
         def sure(key: str) -> bool:
             beta, covariance = coefficients(self.regression, fit, key)
-            return abs(float(beta[0])) > SURE_Z * float(np.sqrt(covariance[0, 0]))
+            return abs(float(beta[0])) > _SURE_Z * float(np.sqrt(covariance[0, 0]))
 
         return [*filter(sure, nuisances), *always]
 

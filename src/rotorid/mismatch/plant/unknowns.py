@@ -51,7 +51,7 @@ def dipole(motion, vehicle, values):
     return Contribution(moment=np.cross(np.asarray(values[:3]), north) + np.cross(np.asarray(values[3:]), down))
 
 
-def swinging(motion, vehicle, values):
+def _swinging(motion, vehicle, values):
     """q'' + 2 ζ ω q' + ω² q = -a in the rotor plane; F = k_f ω² q, M = k_m (q × e_D): a mass that swings inside."""
     k_f, k_m, omega = values
     dt = float(np.median(np.diff(motion.time_s))) if motion.size > 1 else 0.01
@@ -87,7 +87,7 @@ def _swing_forms(vehicle):
             "swing",
             "q'' + 2ζωq' + ω²q = −a, F = k_f ω² q, M = k_m ω² q × e_D",
             (Parameter("k_f", "kg"), Parameter("k_m", "kg m"), rate),
-            swinging,
+            _swinging,
             ("specific_force",),
             memory=True,
         ),

@@ -69,7 +69,7 @@ class Posterior:
 def scored(problem: Problem, model: Model) -> Scored:
     """A model's log posterior and mode."""
     columns = problem.columns(model)
-    mode = mode_of(problem, columns, problem.believed(model))
+    mode = _mode_of(problem, columns, problem.believed(model))
     if mode is None:
         return Scored(-np.inf, columns, None)
     value = mode.log_evidence + log_prior(problem, model) - too_small(problem, model, columns, mode)
@@ -88,7 +88,7 @@ def places(columns: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     return np.array([at[c] for c in wanted], int)
 
 
-def mode_of(problem: Problem, columns: np.ndarray, believed: tuple[np.ndarray, np.ndarray, np.ndarray]) -> _Mode | None:
+def _mode_of(problem: Problem, columns: np.ndarray, believed: tuple[np.ndarray, np.ndarray, np.ndarray]) -> _Mode | None:
     """The mode of some columns within their bounds; None where the normal equations have none.
 
     `believed` are one-sigma and bounds of every column (`Problem.believed`). The noise of the regressors is limited in

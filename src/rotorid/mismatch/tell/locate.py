@@ -64,7 +64,7 @@ _LARGER = 4.0
 _MOVES_S = 0.2
 """Lags over which larger residuals may follow each other."""
 _FIRST_LAGS = 4
-MOVES_Z = 4.0
+_MOVES_Z = 4.0
 """Standard errors (Fisher's transform) by which larger residuals must follow each other otherwise than usual."""
 _WILD = 4.0
 """Whitened residual beyond which a single sample counts no more."""
@@ -472,7 +472,7 @@ def _moves(part: np.ndarray, whole: np.ndarray, most: int) -> bool:
     lags = np.arange(1, min(most, count - 5) + 1)
     usual, here = (np.array([_correlation(x, lag) for lag in lags]).clip(-0.999, 0.999) for x in (whole, part))
     sure = (np.arctanh(here) - np.arctanh(usual)) * np.sqrt(count - lags - 3)
-    return len(lags) > 0 and max(np.abs(sure[:_FIRST_LAGS]).max(), abs(sure.sum()) / np.sqrt(len(lags))) > MOVES_Z
+    return len(lags) > 0 and max(np.abs(sure[:_FIRST_LAGS]).max(), abs(sure.sum()) / np.sqrt(len(lags))) > _MOVES_Z
 
 
 def _correlation(values: np.ndarray, lag: int) -> float:

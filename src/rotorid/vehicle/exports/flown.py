@@ -32,7 +32,7 @@ _START_M_S = 2.0
 
 
 @dataclass(frozen=True)
-class FlightDifference:
+class _FlightDifference:
     """How far two simulations part: largest distance and angle, next to how far ours flew and turned."""
 
     position_m: float
@@ -94,9 +94,9 @@ def _angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def difference(
     there: tuple[np.ndarray, np.ndarray], here: tuple[np.ndarray, np.ndarray, np.ndarray], where: str
-) -> FlightDifference:
+) -> _FlightDifference:
     """Largest differences of positions (n, 3) and attitudes (n, 4)."""
-    return FlightDifference(
+    return _FlightDifference(
         float(np.linalg.norm(there[0] - here[0], axis=1).max()),
         float(_angle_between(there[1], here[1]).max()),
         float(np.linalg.norm(np.diff(here[0], axis=0), axis=1).sum()),
@@ -129,7 +129,7 @@ def passive_forces(exported: Exported) -> Iterator[None]:
         mujoco.set_mjcb_passive(before)
 
 
-def in_rotorpy(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> FlightDifference:
+def in_rotorpy(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> _FlightDifference:
     """Fly RotorPy's Multirotor with the exported parameters and their companion next to ours."""
     same = expressed(vehicle, "rotorpy")
     time, speeds = commands_of(same, duration_s)
@@ -157,7 +157,7 @@ def in_rotorpy(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) ->
     return difference((np.array(position), np.array(attitude)), ours(same, turning), "RotorPy")
 
 
-def in_mujoco(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> FlightDifference:
+def in_mujoco(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> _FlightDifference:
     """Fly the exported model and its companion in MuJoCo next to ours with what they hold."""
     import mujoco
 
@@ -228,7 +228,7 @@ def gazebo_damping_of(text: str) -> np.ndarray:
     return np.array([[float(own.findtext(channel + quantity, "0")) for quantity in "UVWPQR"] for channel in "xyzkmn"])
 
 
-def in_drake(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> FlightDifference:
+def in_drake(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> _FlightDifference:
     """Fly the exported SDF model in Drake next to ours with what the model holds.
 
     Drake reads masses, inertias, places and joints. It has no motor model: thrust C_F ω² and drag −k ω v⊥ act on the
@@ -317,7 +317,7 @@ _BULLET_DAMPING = 0.04
 
 def in_pybullet(
     vehicle: Vehicle, exported: Exported, duration_s: float = 0.3, damping: float = _BULLET_DAMPING
-) -> FlightDifference:
+) -> _FlightDifference:
     """Fly the exported URDF in Bullet next to ours with what it holds.
 
     Forces on the rotors' links, torque and drag on the link at the centre of mass, all from the file's `properties`, as
@@ -370,7 +370,7 @@ def in_pybullet(
     return difference((np.array(position), np.array(attitude)), ours(same, speeds), where)
 
 
-FLYERS: dict[str, tuple[str, Callable[[Vehicle, Exported], FlightDifference]]] = {
+FLYERS: dict[str, tuple[str, Callable[[Vehicle, Exported], _FlightDifference]]] = {
     "rotorpy": ("rotorpy", in_rotorpy),
     "mjcf": ("mujoco", in_mujoco),
     "sdf": ("pydrake", in_drake),
