@@ -51,13 +51,13 @@ EXAMPLE_STAND = InstrumentFacts(
 )
 """A stand that shows what stands show: its forms' parameters depend on its channels, bounds on rate and duration."""
 
-FORCES = (0, 1, 2)
+_FORCES = (0, 1, 2)
 EXAMPLE_BENCH = replace(
     EXAMPLE_STAND,
     vehicle=Vehicle(name="bench", kind="bench"),
-    channels=FORCES,
-    loaded=FORCES,
-    returns=FORCES,
+    channels=_FORCES,
+    loaded=_FORCES,
+    returns=_FORCES,
     tilts=False,
     distance="",
 )
@@ -82,7 +82,7 @@ EXCITATION = {
     "load_change": "a load that changes",
     "tilt": "a tilted mount",
 }
-KINDS = {"physics": "physics", "sensor": "sensor or logging", "mistake": "mistake in the set"}
+_KINDS = {"physics": "physics", "sensor": "sensor or logging", "mistake": "mistake in the set"}
 _INTRODUCTION = """\
 # The catalogue of effects
 
@@ -211,7 +211,7 @@ def listing() -> str:
     """A line for every effect: id, kind and how it shows."""
     effects = catalogue().values()
     wide = max(len(e.id) for e in effects)
-    return "".join(f"{e.id:<{wide}}  {KINDS[e.kind]:<18}  {e.sentence}\n" for e in effects)
+    return "".join(f"{e.id:<{wide}}  {_KINDS[e.kind]:<18}  {e.sentence}\n" for e in effects)
 
 
 def _formless(effect: Effect) -> str:
@@ -223,7 +223,7 @@ def _formless(effect: Effect) -> str:
 
 def in_full(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
     """One effect as plain text."""
-    out = [f"{effect.id}: {effect.name} ({KINDS[effect.kind]})", f"  {effect.sentence}", ""]
+    out = [f"{effect.id}: {effect.name} ({_KINDS[effect.kind]})", f"  {effect.sentence}", ""]
     every = [("form", row) for row in rows(effect, vehicle)]
     every += [("on an instrument", row) for row in _reading_rows(effect)]
     for kind, row in every:
@@ -248,7 +248,7 @@ def in_full(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
 
 def section(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
     """One effect as a section of the page."""
-    out = [f"### `{effect.id}`: {effect.name}\n", f"{KINDS[effect.kind].capitalize()}: {effect.sentence}.\n"]
+    out = [f"### `{effect.id}`: {effect.name}\n", f"{_KINDS[effect.kind].capitalize()}: {effect.sentence}.\n"]
     table = [(_names_text(row.names), row) for row in rows(effect, vehicle)]
     table += [(f"on an instrument: {_names_text(row.names)}", row) for row in _reading_rows(effect)]
     if table:

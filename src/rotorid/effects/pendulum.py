@@ -151,7 +151,7 @@ class _Piece:
     """Residuals that the swing may be seen in, in units of their own size, (ways, n, 2)."""
 
 
-def pieces_of(parts, gravity_m_s2):
+def _pieces_of(parts, gravity_m_s2):
     """Stretches (time_s (n,), hanging (n, 3), velocity (n, 2), pulls (n, 2) each) as pieces of PIECE_S."""
     out = []
     for stretch, (time_s, *columns, pulls) in enumerate(parts):
@@ -204,7 +204,7 @@ def likely_lengths(parts, bounds_m, damping_ratio, gravity_m_s2):
     explain something are looked at once more as they swing through the whole stretch, and come in that order.
     """
     lengths = np.geomspace(*bounds_m, _LENGTHS_TRIED)
-    pieces = pieces_of(parts, gravity_m_s2)
+    pieces = _pieces_of(parts, gravity_m_s2)
     if not pieces:
         return ()
     gain = np.zeros(_LENGTHS_TRIED)

@@ -127,13 +127,6 @@ def check_effects(effects: Sequence[tuple[Form, Sequence[float]]], known: set[st
                 raise InputError(f"effect form {form.name!r} cannot be simulated: {reason}")
 
 
-def world_acceleration(body: RigidBody, rotation: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """dV/dt = R F / m + g e3 (eq. 4.2), (..., 3), m/s2, world; force without weight, N, body axes."""
-    out = np.einsum("...ij,...j->...i", rotation, force) / body.mass_kg
-    out[..., 2] += body.gravity_m_s2
-    return out
-
-
 def angular_acceleration(body: RigidBody, rates: np.ndarray, moment: np.ndarray) -> np.ndarray:
     """dΩ/dt = J⁻¹ (τ - Ω × J Ω) (eq. 4.4), (..., 3), rad/s2; rates in rad/s, moment in N m, body axes."""
     momentum = rates @ body.inertia_kg_m2.T

@@ -39,7 +39,7 @@ it."""
 
 
 @dataclass(frozen=True)
-class Ratio:
+class _Ratio:
     """Error of a channel with an effect over that without it, with its 95 % interval."""
 
     channel: str
@@ -52,7 +52,7 @@ class Ratio:
 class _RowsEvidence:
     """What some rows say of one effect."""
 
-    ratios: tuple[Ratio, ...] = ()
+    ratios: tuple[_Ratio, ...] = ()
     """Of every channel that the effect acts on, the most significant gain first; empty where the rows do not excite
     it."""
     beyond_leftover: bool = True
@@ -189,7 +189,9 @@ def _leftover_rms(analysis: Analysis, rows: list[np.ndarray], channel: str) -> f
     return float(np.sqrt(max(0.0, np.nanmean(left**2) - (analysis.noise_floor.get(channel) or 0.0) ** 2)))
 
 
-def ratio_of(analysis: Analysis, without: tuple[np.ndarray, ...], rows: list[np.ndarray], channel: str) -> Ratio | None:
+def ratio_of(
+    analysis: Analysis, without: tuple[np.ndarray, ...], rows: list[np.ndarray], channel: str
+) -> _Ratio | None:
     """Error of a channel with an effect over that without it, in the blocks in which it acts; None where these are few.
 
     Blocks are drawn anew for the interval. What acts for a short time is judged in shorter blocks.
@@ -206,7 +208,7 @@ def ratio_of(analysis: Analysis, without: tuple[np.ndarray, ...], rows: list[np.
     draws = acting[np.random.default_rng(1).integers(0, len(acting), (_BOOTSTRAPS, len(acting)))].sum(axis=1)
     low, high = np.quantile(np.sqrt(draws[:, 0] / np.maximum(draws[:, 1], 1e-300)), [0.025, 0.975])
     value = np.sqrt(acting[:, 0].sum() / max(acting[:, 1].sum(), 1e-300))
-    return Ratio(channel, float(value), float(low), float(high))
+    return _Ratio(channel, float(value), float(low), float(high))
 
 
 def _block_energies(trace: ChannelTrace, added: np.ndarray, mask: np.ndarray, block_s: float):

@@ -106,7 +106,7 @@ def _named_first(term: Term) -> int:
     return int(term.effect in UNKNOWNS)
 
 
-def price(term: Term) -> float:
+def _price(term: Term) -> float:
     """Whitened squares that a term costs by its parameters, by its id and by its want of a name."""
     return COST_PER_PARAMETER * term.size + COST_PER_EFFECT + _COST_OF_UNKNOWN * (term.effect in UNKNOWNS)
 
@@ -268,13 +268,13 @@ class Search:
 
     def worth(self, keys: list[str]) -> float:
         """Whitened squares that a model explains, less what its parameters and ids cost."""
-        return self.regression.explained(self.always + keys) - sum(price(self.terms[k]) for k in keys)
+        return self.regression.explained(self.always + keys) - sum(_price(self.terms[k]) for k in keys)
 
     def worth_with(self, keys: list[str], further: Sequence[Term]) -> list[float]:
         """The same of a model with each of further terms."""
         gains = self.regression.explained_with(self.always + keys, keys_of(further))
-        cost = sum(price(self.terms[k]) for k in keys)
-        return [gain - cost - price(term) for gain, term in zip(gains, further, strict=True)]
+        cost = sum(_price(self.terms[k]) for k in keys)
+        return [gain - cost - _price(term) for gain, term in zip(gains, further, strict=True)]
 
     def swapped(self, active: list[str], dropped: dict[str, str]) -> list[str] | None:
         """A model with one id in another's place, if it explains clearly more: the first to enter may be wrong.

@@ -31,7 +31,7 @@ class _ChannelScale:
 def scales(analysis: Analysis) -> dict[str, _ChannelScale]:
     """To every compared channel its scale; channels of which none is known are not among them."""
     if analysis.instrument is not None:
-        return of_reading(analysis)
+        return _of_reading(analysis)
     return _of_flight(analysis.believed)
 
 
@@ -55,7 +55,7 @@ def _of_flight(vehicle: Vehicle) -> dict[str, _ChannelScale]:
     return out | {f"gyroscope_{axis}": _ChannelScale(1.0, "of 1 rad/s") for axis in "xyz"}
 
 
-def of_reading(analysis: Analysis) -> dict[str, _ChannelScale]:
+def _of_reading(analysis: Analysis) -> dict[str, _ChannelScale]:
     """The largest load of the recordings, of forces and of moments."""
     out: dict[str, _ChannelScale] = {}
     for group, columns in (("force", slice(0, 3)), ("moment", slice(3, 6))):

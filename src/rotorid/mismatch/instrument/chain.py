@@ -36,7 +36,7 @@ from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings.signal.kernels import causal
 
 _MOST_SAMPLES = 12_000
-RATE_HZ = 30.0
+_RATE_HZ = 30.0
 """Rate at which wrenches are compared where no speed is measured."""
 _MOST_STEPS, _QUICK_FIT = 30, 6
 """Evaluations of the Jacobian at most: of a fit, and of one that is to say whether another is worth it."""
@@ -50,7 +50,7 @@ _LEAST_SPAN = 0.02
 """Relative span of the voltage below which its effect cannot be tested."""
 _REMEMBERED = 24
 """Speeds of each stretch that are remembered: those of one Jacobian."""
-BLOCK_S = 1.0
+_BLOCK_S = 1.0
 _LEAST_BLOCKS = 12
 _MOST_BLOCKS = 400
 _STEADY_BLOCKS = 40
@@ -62,14 +62,14 @@ _ALIKE = rules.ELSEWHERE["squares"]
 """Whitened squares within which another form explains as well."""
 
 
-Chain = tuple[tuple[str, SpeedForm], ...]
+_Chain = tuple[tuple[str, SpeedForm], ...]
 
 
 @dataclass(frozen=True)
 class _ChainFit:
     """A fitted chain: full speed first where it is free, the parameters of every form, `unknown_courses` last."""
 
-    chain: Chain
+    chain: _Chain
     theta: np.ndarray
     cost: float
     scaled: bool
@@ -94,7 +94,7 @@ class _ChainFit:
             at += len(form.parameters)
         raise KeyError(key)
 
-    def chain_without(self, key: str) -> Chain:
+    def chain_without(self, key: str) -> _Chain:
         """The chain without an id."""
         return tuple((k, f) for k, f in self.chain if k != key)
 
@@ -112,11 +112,11 @@ class ChainResult:
     """Whether commands stand until their next sample."""
 
 
-def _takes_time(chain: Chain) -> bool:
+def _takes_time(chain: _Chain) -> bool:
     return any(form.excited_by == "change" for _, form in chain)
 
 
-def unknown_courses(chain: Chain, dt_s: float) -> np.ndarray:
+def unknown_courses(chain: _Chain, dt_s: float) -> np.ndarray:
     """One-sigma of what a chain's command did between its samples, which nobody recorded: its first two moments.
 
     By how much it was late (s), and by which variance in time it was smoother or sharper than the curve through its
@@ -158,7 +158,7 @@ class _Commanded:
     voltage: np.ndarray | None
 
 
-def commanded(loading: Loading, finer: int, holds: bool) -> _Commanded:
+def _commanded(loading: Loading, finer: int, holds: bool) -> _Commanded:
     """A stretch's command on a clock `finer` times faster: between samples it is smooth, or `holds` until the next."""
     command, which = np.unique(loading.command, axis=1, return_inverse=True)
     command = held(command, finer) if holds else between(command, finer)
@@ -203,7 +203,7 @@ class _ChainProblem:
         self.fitted = _thinned(list(setup.loadings))
         self.others = list(others or [])
         # A lag of some hundredths of a second must still show: few stretches at a fine rate rather than all coarse.
-        finest = max(1, int(setup.instrument.rate_hz / RATE_HZ))
+        finest = max(1, int(setup.instrument.rate_hz / _RATE_HZ))
         self.average = 1 if self.measured else min(setup.average, finest)
         self.channels = list(setup.instrument.channels)
         # Of steady points the colour is what the curve leaves, not noise: blocks alone allow for it.
@@ -219,10 +219,10 @@ class _ChainProblem:
         """What a chain starts from on a stretch of the setup; remembered, for it is the same in every evaluation."""
         key = (id(loading), finer, self.holds)
         if key not in self._starts:
-            self._starts[key] = commanded(loading, finer, self.holds)
+            self._starts[key] = _commanded(loading, finer, self.holds)
         return self._starts[key]
 
-    def made(self, loading: Loading, chain: Chain, values: tuple[float, ...], finer: int) -> np.ndarray:
+    def made(self, loading: Loading, chain: _Chain, values: tuple[float, ...], finer: int) -> np.ndarray:
         """Speeds (n, u), rad/s, that a chain's forms make of a stretch's commands, on a clock `finer` times faster.
 
         Remembered for a while: a Jacobian moves one value after another, and what the forms before it make stays.
@@ -243,7 +243,7 @@ class _ChainProblem:
             self._made[key] = speed if np.isfinite(speed).all() else np.nan_to_num(speed)
         return self._made[key]
 
-    def speed(self, loading: Loading, chain: Chain, values, full_speed: float) -> np.ndarray:
+    def speed(self, loading: Loading, chain: _Chain, values, full_speed: float) -> np.ndarray:
         """Rotor speeds (n, k), rad/s, that a chain makes of a stretch's commands; they scale with the full speed.
 
         `values` are those of the forms, then what `unknown_courses` names.
@@ -273,7 +273,7 @@ class _ChainProblem:
         self.others = acting
         self.fitted = [replace(x, load=x.load - rotor_wrench(x.motion, vehicle)) for x in own]
 
-    def raw(self, chain: Chain, theta, loadings=None) -> list[np.ndarray]:
+    def raw(self, chain: _Chain, theta, loadings=None) -> list[np.ndarray]:
         """Measured minus modelled response of every stretch, (rows, channels or rotors), not whitened."""
         full, values = (theta[0], theta[1:]) if self.scaled else (self.first_full, theta)
         accelerating = any("rotor_acceleration" in form.requires for form, _ in self.others)
@@ -298,7 +298,7 @@ class _ChainProblem:
         mean = np.concatenate(parts).mean(axis=0)
         return [p - mean for p in parts]
 
-    def learn(self, chain: Chain, theta, coloured: bool = True) -> None:
+    def learn(self, chain: _Chain, theta, coloured: bool = True) -> None:
         """Whitening filters of the residual of a chain; not `coloured`: its size alone counts."""
         parts = self.free(self.raw(chain, theta))
         width = parts[0].shape[1]
@@ -309,7 +309,7 @@ class _ChainProblem:
             self.taps.append(np.array([1.0 / sigma]) if self.plain or not coloured else autoregression(own))
         self.noise = np.array([np.sqrt(np.mean(np.concatenate([p[:, c] for p in parts]) ** 2)) for c in range(width)])
 
-    def white(self, chain: Chain, theta) -> np.ndarray:
+    def white(self, chain: _Chain, theta) -> np.ndarray:
         """Whitened residuals of all stretches in a row."""
         parts = self.free(self.raw(chain, theta))
         return np.concatenate(
@@ -319,10 +319,10 @@ class _ChainProblem:
     def neutral(self) -> np.ndarray:
         return np.array([self.first_full]) if self.scaled else np.zeros(0)
 
-    def unknown(self, chain: Chain) -> np.ndarray:
+    def unknown(self, chain: _Chain) -> np.ndarray:
         return unknown_courses(chain, 1.0 / self.setup.instrument.rate_hz)
 
-    def bounds(self, chain: Chain) -> tuple[np.ndarray, np.ndarray]:
+    def bounds(self, chain: _Chain) -> tuple[np.ndarray, np.ndarray]:
         low = [0.2 * self.first_full] if self.scaled else []
         high = [5.0 * self.first_full] if self.scaled else []
         for _, form in chain:
@@ -334,7 +334,7 @@ class _ChainProblem:
         reach = _MOST_DOUBT * self.unknown(chain)
         return np.array([*low, *-reach]), np.array([*high, *reach])
 
-    def fit(self, chain: Chain, start: np.ndarray, most: int = _MOST_STEPS) -> _ChainFit:
+    def fit(self, chain: _Chain, start: np.ndarray, most: int = _MOST_STEPS) -> _ChainFit:
         """Nonlinear least squares from a start, `most` evaluations of the Jacobian at most."""
         low, high = self.bounds(chain)
         if not len(start):
@@ -355,7 +355,7 @@ class _ChainProblem:
         )
         return _ChainFit(chain, found.x, float(2 * found.cost), self.scaled)
 
-    def fit_to(self, chain: Chain, start: np.ndarray, cost: float) -> _ChainFit:
+    def fit_to(self, chain: _Chain, start: np.ndarray, cost: float) -> _ChainFit:
         """As `fit`, but left where a cost is reached, or where it would not be at the pace of the last few steps."""
         fit = self.fit(chain, start, _QUICK_FIT)
         if fit.cost > (1 + _FAR) * cost:
@@ -396,7 +396,7 @@ class _ChainProblem:
         if self.short:
             return np.array_split(np.arange(size), max(size // width, 2))
         rate = self.setup.instrument.rate_hz / self.average
-        per = max(int(BLOCK_S * rate), 2) * width
+        per = max(int(_BLOCK_S * rate), 2) * width
         most = _STEADY_BLOCKS if self.plain else _MOST_BLOCKS
         count = max(min(size // per, most), min(_LEAST_BLOCKS, size // (2 * width)), 2)
         return [b for b in np.array_split(np.arange(size), count) if len(b)]
@@ -446,18 +446,18 @@ def starts(form: SpeedForm) -> list[np.ndarray]:
     return options[:_MOST]
 
 
-def _ordered(chain: Chain) -> Chain:
+def _ordered(chain: _Chain) -> _Chain:
     return tuple(sorted(chain, key=lambda pair: pair[1].stage))
 
 
-def start_of(problem: _ChainProblem, chain: Chain, fit: _ChainFit, new: str = "", values=()) -> np.ndarray:
+def start_of(problem: _ChainProblem, chain: _Chain, fit: _ChainFit, new: str = "", values=()) -> np.ndarray:
     """Start of a chain from the fit of another that may lack one form, nothing having happened between its samples."""
     known = {key: fit.theta[fit.place(key)] for key, _ in fit.chain}
     theta = [values if key == new else known.get(key, form.neutral) for key, form in chain]
     return np.concatenate([fit.full, *theta, np.zeros(len(problem.unknown(chain)))])
 
 
-def _start_with(problem: _ChainProblem, chain: Chain, fit: _ChainFit, new: tuple[str, SpeedForm]) -> np.ndarray:
+def _start_with(problem: _ChainProblem, chain: _Chain, fit: _ChainFit, new: tuple[str, SpeedForm]) -> np.ndarray:
     """Start of a chain with a new form from what is known of the others: of the form's starts that explains most."""
     options = [start_of(problem, chain, fit, new[0], v) for v in starts(new[1])]
     return min(options, key=lambda theta: float(np.sum(problem.white(chain, theta) ** 2)))
@@ -661,7 +661,7 @@ def alternatives(problem: _ChainProblem, best: _ChainFit, key: str, forms) -> li
     return out
 
 
-def _reading_alternatives(problem: _ChainProblem, best: _ChainFit, rest: Chain, key: str) -> list[str]:
+def _reading_alternatives(problem: _ChainProblem, best: _ChainFit, rest: _Chain, key: str) -> list[str]:
     """Effects of the reading that explain as well in a form's place, where no speed is measured."""
     out = sorted(ids_of("same_on_commands", key))
     known, low, high = start_of(problem, rest, best), *problem.bounds(rest)

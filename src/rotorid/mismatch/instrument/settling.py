@@ -18,7 +18,7 @@ _STEP_SHARE = 0.02
 _LEAST_STEPS = 4
 _CALM_S, _LOOK_S = 0.8, 3.0
 """Time before and after a step without another, and time after it that is looked at."""
-_BY_HAND, SETTLED = 1.5, 1.35
+_BY_HAND, _SETTLED = 1.5, 1.35
 """Scatter relative to the later scatter, in the first moments, from which loads count as put on by hand, and from which
 a reading has not settled."""
 _SMOOTH = 5
@@ -27,7 +27,7 @@ _SLACK_S = 0.1
 """Time left out before a step, and after the readings have settled."""
 
 
-def steps_of(loading: Loading, channel: int, largest: float) -> np.ndarray:
+def _steps_of(loading: Loading, channel: int, largest: float) -> np.ndarray:
     """Samples at which a load jumps from one sample to the next and does not before and after."""
     jumps = np.abs(np.diff(loading.load[:, channel])) > _STEP_SHARE * largest
     calm = max(2, int(_CALM_S / loading.dt_s))
@@ -36,12 +36,12 @@ def steps_of(loading: Loading, channel: int, largest: float) -> np.ndarray:
     return at[np.array(alone, bool) & (at + calm < loading.size)]
 
 
-def scatter(loadings: Sequence[Loading], channel: int, largest: float, dt_s: float) -> np.ndarray | None:
+def _scatter(loadings: Sequence[Loading], channel: int, largest: float, dt_s: float) -> np.ndarray | None:
     """Scatter between steps of (reading − settled reading) by time after the step, own unit; None for few steps."""
     look = int(_LOOK_S / dt_s)
     shapes, jumps = [], []
     for x in loadings:
-        at = steps_of(x, channel, largest)
+        at = _steps_of(x, channel, largest)
         for start, stop in zip(at, np.append(at, x.size)[1:], strict=True):
             if stop - start < look // 2 + 4:
                 continue
@@ -60,7 +60,7 @@ def settling_s(loadings: Sequence[Loading], channels, largest, dt_s: float) -> f
     """How long after a step the stated load cannot be relied on, s; 0 where it can."""
     longest = 0.0
     for c in channels:
-        spread = scatter(loadings, c, largest[c], dt_s)
+        spread = _scatter(loadings, c, largest[c], dt_s)
         if spread is None:
             continue
         smooth = np.sqrt(np.convolve(spread**2, np.ones(_SMOOTH) / _SMOOTH, mode="same"))
@@ -68,7 +68,7 @@ def settling_s(loadings: Sequence[Loading], channels, largest, dt_s: float) -> f
         early = float(np.sqrt(np.mean(spread[: max(3, int(_CALM_S / dt_s))] ** 2)))
         if early < _BY_HAND * late:
             continue
-        above = np.flatnonzero(smooth[:-_SMOOTH] > SETTLED * late)
+        above = np.flatnonzero(smooth[:-_SMOOTH] > _SETTLED * late)
         longest = max(longest, (above[-1] + 1) * dt_s + _SLACK_S if len(above) else 0.0)
     return longest
 
@@ -79,7 +79,7 @@ def without_settling(loadings: Sequence[Loading], channels, largest, wait_s: flo
     for x in loadings:
         keep = np.ones(x.size, bool) if x.keep is None else x.keep.copy()
         for c in channels:
-            for at in steps_of(x, c, largest[c]):
+            for at in _steps_of(x, c, largest[c]):
                 t = x.time_s[at]
                 keep &= ~((x.time_s > t - _SLACK_S) & (x.time_s < t + wait_s))
         out.append(replace(x, keep=keep))

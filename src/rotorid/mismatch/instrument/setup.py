@@ -73,7 +73,7 @@ class _Preparation:
 
     def stretches(self, recordings: RecordingSet) -> list[Loading]:
         """The stretches of all runs with their loads predicted."""
-        return [loaded_by(x, self.vehicle) for run in recordings.runs for x in stretches_of(run, self)]
+        return [loaded_by(x, self.vehicle) for run in recordings.runs for x in _stretches_of(run, self)]
 
 
 @dataclass(frozen=True)
@@ -174,7 +174,7 @@ def _even(time_s: np.ndarray, dt_s: float) -> np.ndarray | None:
     return time_s[0] + dt_s * np.arange(int((time_s[-1] - time_s[0]) / dt_s) + 1)
 
 
-def stretches_of(run: Run, how: _Preparation) -> list[Loading]:
+def _stretches_of(run: Run, how: _Preparation) -> list[Loading]:
     """Loadings of one run, load still empty."""
     vehicle, channels, dt_s, session = how.vehicle, how.channels, how.dt_s, how.session
     names = c.FORCE + c.MOMENT

@@ -39,7 +39,7 @@ _LEAST_SHARE = 0.1
 _SHARE_STEP_S = 0.004
 """By how much a sensor is made late to see how far a comparison's lateness follows."""
 _LEAST_EXPLAINED = 0.6
-P_LIMIT, _P_LATE = 1e-6, 1e-4
+_P_LIMIT, _P_LATE = 1e-6, 1e-4
 """Chance of a growth of lateness, and of a constant one beyond a sample; both have to bring LEAST_LIKELIHOOD too."""
 _LEAST_LIKELIHOOD = 60.0
 """Rise of the log-likelihood that a delay, or its growth, must bring."""
@@ -343,7 +343,7 @@ def differences(known: list[_SensorPair], drifting: bool) -> list[_LatenessFound
     return [d for d in found if d.explained > least.get(d.of.over, _LEAST_EXPLAINED)]
 
 
-def across(differences: Sequence[_LatenessFound], wrong: Sequence[str], key: int) -> tuple[float, float]:
+def _across(differences: Sequence[_LatenessFound], wrong: Sequence[str], key: int) -> tuple[float, float]:
     """Lateness (key 0) or growth (1) of some sensors over the rest, and one sigma, from comparisons between the two.
 
     What disturbances can feign counts as another one sigma: it is a bound, and seldom met.
@@ -369,7 +369,7 @@ def _remeasured(
     again = [d for d in differences(comparisons(recordings), drifting=bool(key)) if not {*aside} & {*d.of.sensors}]
     if not any(abs(d.of.part(wrong)) > _LEAST_SHARE for d in again):
         return None
-    rest, sd = across(again, wrong, key)
+    rest, sd = _across(again, wrong, key)
     return first + rest, sd
 
 
@@ -539,7 +539,7 @@ def _opposite(one: tuple[float, float, float], other: tuple[float, float, float]
     return one[0] * other[0] < 0 and abs(one[0] + other[0]) < max(slack, sigmas * np.hypot(one[1], other[1]))
 
 
-def own_period_s(all_signals: list[Signals]) -> dict[str, float]:
+def _own_period_s(all_signals: list[Signals]) -> dict[str, float]:
     """Longest own period of every sensor over the runs."""
     out = {}
     for s in all_signals:
@@ -562,7 +562,7 @@ def _one_clock(differences: list[_LatenessFound], growing: list[_LatenessFound])
     names = {n for d in growing for n in d.of.sensors} - {"position"}
     left = {}
     for name in names:
-        rate, _ = across(differences, [name], 1)
+        rate, _ = _across(differences, [name], 1)
         left[name] = sum(
             (d.growth - d.of.part([name]) * rate) ** 2 / (d.sd(1) ** 2 + d.bound(1) ** 2) for d in differences
         )
@@ -576,13 +576,13 @@ def _skew(recordings: ReadSet, known: list[_SensorPair]) -> Corrected:
     signals = recordings.signals
     found = differences(known, drifting=True)
     longest = max((s.time_s[-1] - s.time_s[0] for s in signals), default=0.0)
-    periods = own_period_s(signals)
+    periods = _own_period_s(signals)
     growing = []
     for d in found:
         beyond = abs(d.growth) - d.bound(1)
         p = float(2 * student.sf(beyond / max(d.sd(1), 1e-12), max(d.pieces - 2, 1)))
         slowest = max(periods[n] for n in d.of.sensors)
-        significant = p < P_LIMIT and abs(d.growth) * longest > slowest and d.gained > _LEAST_LIKELIHOOD
+        significant = p < _P_LIMIT and abs(d.growth) * longest > slowest and d.gained > _LEAST_LIKELIHOOD
         if significant and _in_every_run(d):
             growing.append((p, d))
     if not growing:
@@ -602,7 +602,7 @@ def _skew(recordings: ReadSet, known: list[_SensorPair]) -> Corrected:
         blamed = _one_clock(found, [d for _, d in growing])
         if not blamed:
             return Corrected(recordings)
-        drift = {blamed[0]: (across(found, [blamed[0]], 1)[0], 0.0, 0.0)}
+        drift = {blamed[0]: (_across(found, [blamed[0]], 1)[0], 0.0, 0.0)}
         wrong = [blamed[0]]
         if len(blamed) > 1:
             other = f" (or that of {_listed(list(blamed[1:]))} the other way: nothing else recorded shows which)"
@@ -610,9 +610,9 @@ def _skew(recordings: ReadSet, known: list[_SensorPair]) -> Corrected:
     rates = {n: value for n, (value, _, _) in drift.items()}
     sides = [[n for n in wrong if rates[n] > 0], [n for n in wrong if rates[n] < 0]]
     wrong = max(sides, key=len)
-    rate, sd = across(found, wrong, 1)
+    rate, sd = _across(found, wrong, 1)
     # Large drifts move the motion out of its block: measured once more with the first estimate taken out.
-    rate, sd = _remeasured(shifted(recordings, wrong, 0.0, rate), wrong, 1, rate) or (rate, sd)
+    rate, sd = _remeasured(_shifted(recordings, wrong, 0.0, rate), wrong, 1, rate) or (rate, sd)
     change = "fall behind by" if rate > 0 else "gain"
     finding = Finding(
         id="clock_skew",
@@ -625,7 +625,7 @@ def _skew(recordings: ReadSet, known: list[_SensorPair]) -> Corrected:
         p_value=min(p for p, _ in growing),
         channels=tuple(sensor_columns(recordings.vehicle)[n][0] for n in wrong),
     )
-    return Corrected(shifted(recordings, _with_position(wrong), 0.0, rate), (finding,))
+    return Corrected(_shifted(recordings, _with_position(wrong), 0.0, rate), (finding,))
 
 
 def _with_position(sensors: list[str]) -> list[str]:
@@ -636,7 +636,7 @@ def _with_position(sensors: list[str]) -> list[str]:
 def _delay(recordings: ReadSet, known: list[_SensorPair]) -> Corrected:
     """Sensors that are late by a constant of more than one sample."""
     signals = recordings.signals
-    periods = own_period_s(signals)
+    periods = _own_period_s(signals)
     found = differences(known, drifting=False)
     if not found:
         return Corrected(recordings)
@@ -668,7 +668,7 @@ def _delay(recordings: ReadSet, known: list[_SensorPair]) -> Corrected:
             f"{capital(SENSOR_WORDS[sensor])}: {1e3 * late[sensor]:+.1f} ms against the rest, {_SMALL_LAGS[sensor]}."
         )
         if sensor in _INERTIAL:
-            fixed = shifted(fixed, [sensor], late[sensor])
+            fixed = _shifted(fixed, [sensor], late[sensor])
     unfiltered = fixed
     for cluster in clusters:
         if cluster[0] in own:
@@ -676,12 +676,12 @@ def _delay(recordings: ReadSet, known: list[_SensorPair]) -> Corrected:
         others = [n for n, _ in wrong if n not in cluster and n not in own]
         amount, sd = float(np.mean([late[n] for n in cluster])), max(relative[n][1] for n in cluster)
         steps = round(amount / sample) * sample
-        nearly = shifted(unfiltered, _with_position(cluster), steps)
+        nearly = _shifted(unfiltered, _with_position(cluster), steps)
         amount, sd = _remeasured(nearly, cluster, 0, steps, others) or (amount, sd)
         if abs(amount) < min(limits[n] for n in cluster):
             notes.append(f"{capital(_listed(cluster))}: {1e3 * amount:+.1f} ms against the rest, below a sample.")
             continue
-        fixed = shifted(fixed, _with_position(cluster), amount)
+        fixed = _shifted(fixed, _with_position(cluster), amount)
         word = "late" if amount > 0 else "early"
         findings.append(
             Finding(
@@ -711,7 +711,7 @@ def _clusters(names: list[str], values: dict[str, float], tolerance: dict[str, f
     return out
 
 
-def shifted(recordings: ReadSet, sensors: Sequence[str], late_s: float, growth: float = 0.0) -> ReadSet:
+def _shifted(recordings: ReadSet, sensors: Sequence[str], late_s: float, growth: float = 0.0) -> ReadSet:
     """The set with some sensors' columns moved earlier by `late_s` + `growth` × time since the run's start.
 
     Evenly sampled columns move by whole samples, which leaves their noise as it is; the rest (below half a

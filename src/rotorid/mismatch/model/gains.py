@@ -149,7 +149,7 @@ def _side_of(
 ) -> dict[str, Side]:
     """Each gain by one regression."""
     keys, loose = [*regression.keys_of("nuisance", "wind"), *active, *free], dict.fromkeys(free, _FREE_SD)
-    pair = [r.fit(keys, loose=loose) for r in (regression.with_room(np.inf), uncorrected(regression))]
+    pair = [r.fit(keys, loose=loose) for r in (regression.with_room(np.inf), _uncorrected(regression))]
     out = {}
     for key in free:
         (corrected, covariance), (plain, _) = (coefficients(regression, fit, key) for fit in pair)
@@ -210,7 +210,7 @@ def mean_of(gains: Sequence[LogGain]) -> LogGain:
     return LogGain(mean, max(1.0, excess) / float(weights.sum()))
 
 
-def uncorrected(regression: Regression) -> Regression:
+def _uncorrected(regression: Regression) -> Regression:
     """The same without a correction for the noise of regressors, and with room for any value."""
     apart = regression.apart
     if apart is not None:

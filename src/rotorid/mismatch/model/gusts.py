@@ -53,7 +53,7 @@ _GUST_P = 1e-6
 _BESIDE_A_BURST = 1.0
 """Size, in units of the noise, of a gust that is believed where a stronger one blew: left out, it would be noise to the
 others."""
-STEPS, _ROUNDS = 4, 2
+_STEPS, _ROUNDS = 4, 2
 """Gauss-Newton steps for the wind alone, and searches repeated in it."""
 _LARGEST_STEP_M_S = 4.0
 
@@ -217,7 +217,7 @@ def _wind_in(model: WrenchModel, segments: list[Segment], term: Term) -> np.ndar
     kept = [*always, *active]
     cols = model.regression.columns([t.key for t in kept])
     beta = np.array([full.beta[full.columns == c][0] if c in full.columns else 0.0 for c in cols])
-    for _ in range(STEPS):
+    for _ in range(_STEPS):
         moved = _in_gusts(segments, {term.key: (term, wind)})
         rows = assemble_rows(model.prepared, [*kept, term], moved, felt)
         normal, right = 1e-9 * np.eye(term.size), np.zeros(term.size)
@@ -283,7 +283,7 @@ def _restless(model: WrenchModel) -> list[Term]:
 def _in_moving_air(prepared: Prepared, model: WrenchModel, terms: list[Term], asked: list[Term]) -> WrenchModel | None:
     """The search repeated with the wind of the windows asked for, as far as it is there; None where it is not."""
     still = {t.key: (t, np.zeros(t.size)) for t in asked}
-    winds, covariances = estimated(prepared, model, still, STEPS)
+    winds, covariances = estimated(prepared, model, still, _STEPS)
     if not believed([_gust_of(term, wind, covariances[key]) for key, (term, wind) in winds.items()], model):
         return None
     kept = [t for t in terms if t.effect != moving_air("all the time").id]
@@ -413,12 +413,12 @@ def estimated(prepared: Prepared, model: WrenchModel, winds: dict[str, tuple[Ter
         fit = regression.fit([t.key for t in own])
         effects = [with_linear(e, regression, fit, t) for t, e in zip(active, effects, strict=True)]
         for term in asked:
-            step, covariances[term.key] = step_of(regression, fit, term)
+            step, covariances[term.key] = _step_of(regression, fit, term)
             winds[term.key] = (term, winds[term.key][1] + np.clip(step, -_LARGEST_STEP_M_S, _LARGEST_STEP_M_S))
     return winds, covariances
 
 
-def step_of(regression: Regression, fit: Fit, term: Term) -> tuple[np.ndarray, np.ndarray]:
+def _step_of(regression: Regression, fit: Fit, term: Term) -> tuple[np.ndarray, np.ndarray]:
     """Change of a term's wind and its covariance; of a run that is not fitted from the run itself, all else fixed."""
     cols = regression.columns([term.key])
     where = np.flatnonzero(np.isin(fit.columns, cols))

@@ -39,7 +39,7 @@ def watched(motion: Motion) -> tuple[Watched, set[str]]:
 
 
 @dataclass(frozen=True)
-class Made:
+class _Made:
     """Something made of a motion."""
 
     given: tuple
@@ -59,7 +59,7 @@ class Made:
 class LastMade:
     """What was made last of each stretch of flight, under keys of those who made it."""
 
-    kept: dict[tuple, Made] = field(default_factory=dict)
+    kept: dict[tuple, _Made] = field(default_factory=dict)
     size: int = 0
 
     def made(self, key: tuple, given: tuple, motion: Motion, make: Callable[[Motion], Any]) -> Any:
@@ -73,7 +73,7 @@ class LastMade:
             self.size -= known.size
         seen, read = watched(motion)
         made = make(seen)
-        new = Made(given, {name: getattr(motion, name) for name in read}, made, _bytes_of(made))
+        new = _Made(given, {name: getattr(motion, name) for name in read}, made, _bytes_of(made))
         self.kept[place], self.size = new, self.size + new.size
         while self.size > MOST_BYTES:
             self.size -= self.kept.pop(next(iter(self.kept))).size

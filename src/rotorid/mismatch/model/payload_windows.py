@@ -22,7 +22,7 @@ from rotorid.mismatch.plant.unknowns import UNKNOWNS
 
 _SEEN_IN = ((2, 0), (4, 1), (3, 2))
 """Channel and parameter of a load: its mass in the vertical force, its places in the moments of pitch and roll."""
-BLOCK_S = 0.5
+_BLOCK_S = 0.5
 _SMOOTHED_BLOCKS = 9
 _SWITCH_COST = 30.0
 """Squares, in units of the blocks' own scatter, that taking up or dropping must explain."""
@@ -43,7 +43,7 @@ def payload_windows_of(model: WrenchModel) -> list[Windows]:
     if not loads(model) or not np.isfinite(model.rows[0].y[:, _SEEN_IN[0][0]]).all():
         return []
     left, columns = _unexplained_loads(model)
-    per = max(2, int(BLOCK_S * model.prepared.thinner.rate_hz))
+    per = max(2, int(_BLOCK_S * model.prepared.thinner.rate_hz))
     aboard = two_plateaus([_block_loads(y, x, per) for y, x in zip(left, columns, strict=True)])
     if aboard is None:
         return []
@@ -144,7 +144,7 @@ def change_rows(states: np.ndarray, left: np.ndarray, column: np.ndarray, per: i
     errors = np.stack([(y - m * x) ** 2 for m in mass])
     edges = []
     for block in np.flatnonzero(np.diff(states)) + 1:
-        middle, reach = block * per, int(_EDGE_S / BLOCK_S * per)
+        middle, reach = block * per, int(_EDGE_S / _BLOCK_S * per)
         start, stop = max(0, middle - reach), min(len(y), middle + reach)
         before, after = int(states[block - 1]), int(states[block])
         gain = np.cumsum(errors[after, start:stop] - errors[before, start:stop])

@@ -88,7 +88,7 @@ def white_level(values: np.ndarray, rate_hz: float, highest_hz: float = np.inf) 
     return float(_LOWEST_TO_MEAN * np.sqrt(max(smooth.min(), 0.0) / 2)) if len(smooth) else 0.0
 
 
-def own_rate_hz(run: Run, column: str) -> float:
+def _own_rate_hz(run: Run, column: str) -> float:
     """Readings of a column per second."""
     count = int(np.isfinite(run.column(column)).sum())
     return count / max(float(run.time_s[-1] - run.time_s[0]), 1e-9)
@@ -111,7 +111,7 @@ def sensor_noise(runs: tuple[Run, ...], vehicle: Vehicle, cutoff_hz: float = np.
     levels = {}
     for key, names in groups.items():
         found = [
-            [white_level(run.column(n), own_rate_hz(run, n), _NOISE_REACH * cutoff_hz) for n in names]
+            [white_level(run.column(n), _own_rate_hz(run, n), _NOISE_REACH * cutoff_hz) for n in names]
             for run in runs
             if names and run.has(*names)
         ]

@@ -55,7 +55,7 @@ from rotorid.recordings.signal.kernels import causal
 from rotorid.steps import step
 from rotorid.vehicle.mixer import wrench_matrix
 
-WINDOW_S = 2.0
+_WINDOW_S = 2.0
 _LOWEST_HZ = 0.5
 _LONGEST_BLOCKS = 400
 _TRUSTED_SD = 1e-4
@@ -794,7 +794,7 @@ def closed_loop_bias_s(segments: list[Segment], noisy: list[Segment], vehicle: V
                 continue
             moment = baseline_wrench(replace(plain.motion, rotor_speed=plain.command), vehicle)[1][:, axis]
             noise = again.motion.angular_velocity[:, axis] - rate[:, axis]
-            how = {"fs": plain.rate_hz, "nperseg": min(len(moment), int(WINDOW_S * plain.rate_hz))}
+            how = {"fs": plain.rate_hz, "nperseg": min(len(moment), int(_WINDOW_S * plain.rate_hz))}
             f_hz, s_rate = welch(rate[:, axis], **how)
             answer = csd(rate[:, axis], moment, **how)[1] / np.maximum(s_rate, 1e-300)
             weight = np.where((f_hz > _LOWEST_HZ) & (f_hz < cutoff_hz), f_hz**2, 0.0) * len(moment)

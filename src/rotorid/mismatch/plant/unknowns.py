@@ -149,7 +149,7 @@ _PLACE = Effect(
     forms=_place_forms,
     source="empirical",
 )
-HEADING = Effect(
+_HEADING = Effect(
     id="unknown_heading",
     name="a moment that depends on the heading",
     sentence="a moment keeps its direction in the world while the vehicle turns",
@@ -163,7 +163,7 @@ _SWING = Effect(
     forms=_swing_forms,
     source="empirical",
 )
-GAIN = Effect(
+_GAIN = Effect(
     id="unknown_gain",
     name="a gain that changes",
     sentence="what the reading makes of its load changes with time or temperature or from run to run",
@@ -171,7 +171,7 @@ GAIN = Effect(
     reading_forms=_gain_forms,
     source="empirical",
 )
-UNKNOWNS = {e.id: e for e in (_PLACE, HEADING, _SWING, GAIN)}
+UNKNOWNS = {e.id: e for e in (_PLACE, _HEADING, _SWING, _GAIN)}
 DEPENDS_ON = {
     "unknown_place": ("position",),
     "unknown_heading": ("heading",),
@@ -214,7 +214,7 @@ def can_show(effect_id: str, rotations: list[np.ndarray | None]) -> bool:
     On a vehicle that keeps its heading a moment fixed in the world is one fixed in the body: it would take the place
     of a centre of mass or a rotor that is off.
     """
-    if effect_id != HEADING.id or any(r is None for r in rotations):
+    if effect_id != _HEADING.id or any(r is None for r in rotations):
         return True
     noses = np.concatenate([r[:, 0, 0] + 1j * r[:, 1, 0] for r in rotations])
     noses = noses / np.maximum(np.abs(noses), 1e-12)

@@ -50,7 +50,7 @@ _ON_SHARE_OF_NOISE = 0.15
 _LOST_AT_ENDS_S = 1.0
 _SMALLEST_SHARE = 0.03
 """Share of a run's mismatch energy below which an interval is not worth a line."""
-SHORTEST_GAP_S = 0.25
+_SHORTEST_GAP_S = 0.25
 _LONGEST_GAP_S = 2.0
 _THROUGHOUT = 0.7
 """Covering more than this share of the flight counts as being there throughout."""
@@ -295,7 +295,7 @@ def _closed(mask: np.ndarray, period_s: float) -> np.ndarray:
     spans = stretches(mask)
     out = mask.copy()
     for (a, b), (c, d) in zip(spans, spans[1:], strict=False):
-        allowed = min(max(SHORTEST_GAP_S, min(b - a, d - c) * period_s), _LONGEST_GAP_S)
+        allowed = min(max(_SHORTEST_GAP_S, min(b - a, d - c) * period_s), _LONGEST_GAP_S)
         if (c - b) * period_s < allowed:
             out[b:c] = True
     return out

@@ -12,8 +12,8 @@ from rotorid.vehicle.exports.ardupilot_frame import ardupilot_json
 from rotorid.vehicle.exports.forms import Exported, check_exportable
 from rotorid.vehicle.exports.sih import px4_sih
 
-SIMULATORS: dict[str, Callable[[Vehicle], Exported]] = {"px4-sih": px4_sih, "ardupilot-json": ardupilot_json}
-NAMES = (*forms.FORMS, *SIMULATORS)
+_SIMULATORS: dict[str, Callable[[Vehicle], Exported]] = {"px4-sih": px4_sih, "ardupilot-json": ardupilot_json}
+NAMES = (*forms.FORMS, *_SIMULATORS)
 
 
 def export_vehicle(vehicle: Vehicle, to: str) -> Exported:
@@ -25,4 +25,4 @@ def export_vehicle(vehicle: Vehicle, to: str) -> Exported:
     if to in forms.FORMS:
         return forms.export_vehicle(vehicle, to)
     check_exportable(vehicle)
-    return SIMULATORS[to](vehicle)
+    return _SIMULATORS[to](vehicle)
