@@ -134,7 +134,7 @@ class _Usual:
 
 
 @dataclass(frozen=True)
-class _Flight:
+class _OneFlight:
     """A quantity of one flight."""
 
     name: str
@@ -148,8 +148,8 @@ class Difference:
     """By how much a quantity differs between two sets, in its unit; of a logarithm relative."""
 
     quantity: Quantity
-    good: tuple[_Flight, ...]
-    new: tuple[_Flight, ...]
+    good: tuple[_OneFlight, ...]
+    new: tuple[_OneFlight, ...]
     value: float
     sd: float
     freedom: float
@@ -455,7 +455,7 @@ def _difference(
         tests.append((2.0 * float(stdtr(degrees, -abs(value) / sd)), sd, degrees, variance, float(reach) * sd))
     rate, sd, degrees, variance, _ = min(tests)
     flights = [
-        _Flight(n, float(v), float(np.sqrt(w))) for n, v, w in zip(names, numbers.values, numbers.own, strict=True)
+        _OneFlight(n, float(v), float(np.sqrt(w))) for n, v, w in zip(names, numbers.values, numbers.own, strict=True)
     ]
     rate, smallest = min(1.0, 2.0 * rate / share), min(test[-1] for test in tests)
     scatter = float(np.sqrt(variance))

@@ -36,9 +36,8 @@ from rotorid.recordings.files import NO_BODY
 from rotorid.steps import step
 from rotorid.vehicle.control.swings import FLIGHTS, SECONDS, SEED, swings, turned_over
 from rotorid.vehicle.exports.forms import FORMS, export_vehicle
-from rotorid.vehicle.flyable import flyable
 from rotorid.vehicle.hover import wrench_at_rest, wrench_of_command
-from rotorid.vehicle.improved import command_path
+from rotorid.vehicle.improved import command_path, flyable
 
 _MOST_HOVER_SHARE = 0.9
 """Share of the full thrust at which a vehicle may hover: what steers it needs the rest."""

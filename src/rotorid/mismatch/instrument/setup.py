@@ -16,7 +16,7 @@ from rotorid.effects.contract import Motion
 from rotorid.effects.hysteresis import NARROW, play
 from rotorid.effects.loading import CHANNELS, REST_S, InstrumentFacts, Loading, at_sensor, rotation_of, weight
 from rotorid.errors import InputError
-from rotorid.mismatch.instrument.settling import settling_s, without_settling
+from rotorid.mismatch.instrument.sampling import settling_s, without_settling
 from rotorid.mismatch.instrument.tachometer import noise_of, quieter, without_noise
 from rotorid.mismatch.plant.rows import baseline_wrench
 from rotorid.mismatch.plant.split import split_runs

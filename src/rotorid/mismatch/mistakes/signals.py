@@ -1,4 +1,4 @@
-"""The columns of a run on one even grid, sensor by sensor, nothing derived and nothing dropped."""
+"""The columns of a run on one even grid, nothing derived and nothing dropped but voltages that no battery has."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from rotorid.mismatch.plant.motion import continuous, fresh_samples, own_rate_hz
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
 
+_LEAST_V = 0.5
+"""No battery that turns a rotor has less."""
 COMMANDED = ("commands", "throttle")
 """Sensors that are what was asked of the rotors, not what was measured."""
 P_LIMIT = 1e-9
@@ -158,3 +160,22 @@ class Corrected:
         """The same after a further step, which looks at the set as corrected so far."""
         found = step(self.recordings)
         return Corrected(found.recordings, self.findings + found.findings, self.notes + found.notes)
+
+
+def connected(recordings: RecordingSet) -> Corrected:
+    """The set without voltages that no battery has, and a note for every run whose voltmeter read mostly such."""
+    notes = []
+
+    def change(run: Run):
+        if not run.has(c.BATTERY_VOLTAGE):
+            return {}
+        voltage = run.table[c.BATTERY_VOLTAGE]
+        dead = voltage < _LEAST_V
+        if not dead.any():
+            return {}
+        mostly = dead.sum() > voltage.notna().sum() / 2
+        if mostly:
+            notes.append(f"{c.BATTERY_VOLTAGE} of {run.name} reads below {_LEAST_V} V: taken as not connected.")
+        return {c.BATTERY_VOLTAGE: np.nan if mostly else voltage.mask(dead)}
+
+    return Corrected(replace_columns(recordings, change), notes=tuple(notes))
