@@ -31,7 +31,7 @@ from rotorid.mismatch.instrument.setup import (
 )
 from rotorid.mismatch.plant.readings import form_reading, forms_reading
 from rotorid.mismatch.plant.regression import at_least, autoregression, quadratic_form
-from rotorid.mismatch.plant.speedpath import COST_PER_PARAMETER, ENTER_P, SMALLEST_SIZE
+from rotorid.mismatch.plant.speedpath import COST_PER_PARAMETER, ENTER_P, SMALLEST_SIZE, Chain
 from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings.signal.kernels import causal
 
@@ -62,14 +62,11 @@ _ALIKE = rules.ELSEWHERE["squares"]
 """Whitened squares within which another form explains as well."""
 
 
-_Chain = tuple[tuple[str, SpeedForm], ...]
-
-
 @dataclass(frozen=True)
 class _ChainFit:
     """A fitted chain: full speed first where it is free, the parameters of every form, `unknown_courses` last."""
 
-    chain: _Chain
+    chain: Chain
     theta: np.ndarray
     cost: float
     scaled: bool
@@ -94,7 +91,7 @@ class _ChainFit:
             at += len(form.parameters)
         raise KeyError(key)
 
-    def chain_without(self, key: str) -> _Chain:
+    def chain_without(self, key: str) -> Chain:
         """The chain without an id."""
         return tuple((k, f) for k, f in self.chain if k != key)
 
@@ -112,11 +109,11 @@ class ChainResult:
     """Whether commands stand until their next sample."""
 
 
-def _takes_time(chain: _Chain) -> bool:
+def _takes_time(chain: Chain) -> bool:
     return any(form.excited_by == "change" for _, form in chain)
 
 
-def unknown_courses(chain: _Chain, dt_s: float) -> np.ndarray:
+def unknown_courses(chain: Chain, dt_s: float) -> np.ndarray:
     """One-sigma of what a chain's command did between its samples, which nobody recorded: its first two moments.
 
     By how much it was late (s), and by which variance in time it was smoother or sharper than the curve through its
@@ -222,7 +219,7 @@ class _ChainProblem:
             self._starts[key] = _commanded(loading, finer, self.holds)
         return self._starts[key]
 
-    def made(self, loading: Loading, chain: _Chain, values: tuple[float, ...], finer: int) -> np.ndarray:
+    def made(self, loading: Loading, chain: Chain, values: tuple[float, ...], finer: int) -> np.ndarray:
         """Speeds (n, u), rad/s, that a chain's forms make of a stretch's commands, on a clock `finer` times faster.
 
         Remembered for a while: a Jacobian moves one value after another, and what the forms before it make stays.
@@ -243,7 +240,7 @@ class _ChainProblem:
             self._made[key] = speed if np.isfinite(speed).all() else np.nan_to_num(speed)
         return self._made[key]
 
-    def speed(self, loading: Loading, chain: _Chain, values, full_speed: float) -> np.ndarray:
+    def speed(self, loading: Loading, chain: Chain, values, full_speed: float) -> np.ndarray:
         """Rotor speeds (n, k), rad/s, that a chain makes of a stretch's commands; they scale with the full speed.
 
         `values` are those of the forms, then what `unknown_courses` names.
@@ -273,7 +270,7 @@ class _ChainProblem:
         self.others = acting
         self.fitted = [replace(x, load=x.load - rotor_wrench(x.motion, vehicle)) for x in own]
 
-    def raw(self, chain: _Chain, theta, loadings=None) -> list[np.ndarray]:
+    def raw(self, chain: Chain, theta, loadings=None) -> list[np.ndarray]:
         """Measured minus modelled response of every stretch, (rows, channels or rotors), not whitened."""
         full, values = (theta[0], theta[1:]) if self.scaled else (self.first_full, theta)
         accelerating = any("rotor_acceleration" in form.requires for form, _ in self.others)
@@ -298,7 +295,7 @@ class _ChainProblem:
         mean = np.concatenate(parts).mean(axis=0)
         return [p - mean for p in parts]
 
-    def learn(self, chain: _Chain, theta, coloured: bool = True) -> None:
+    def learn(self, chain: Chain, theta, coloured: bool = True) -> None:
         """Whitening filters of the residual of a chain; not `coloured`: its size alone counts."""
         parts = self.free(self.raw(chain, theta))
         width = parts[0].shape[1]
@@ -309,7 +306,7 @@ class _ChainProblem:
             self.taps.append(np.array([1.0 / sigma]) if self.plain or not coloured else autoregression(own))
         self.noise = np.array([np.sqrt(np.mean(np.concatenate([p[:, c] for p in parts]) ** 2)) for c in range(width)])
 
-    def white(self, chain: _Chain, theta) -> np.ndarray:
+    def white(self, chain: Chain, theta) -> np.ndarray:
         """Whitened residuals of all stretches in a row."""
         parts = self.free(self.raw(chain, theta))
         return np.concatenate(
@@ -319,10 +316,10 @@ class _ChainProblem:
     def neutral(self) -> np.ndarray:
         return np.array([self.first_full]) if self.scaled else np.zeros(0)
 
-    def unknown(self, chain: _Chain) -> np.ndarray:
+    def unknown(self, chain: Chain) -> np.ndarray:
         return unknown_courses(chain, 1.0 / self.setup.instrument.rate_hz)
 
-    def bounds(self, chain: _Chain) -> tuple[np.ndarray, np.ndarray]:
+    def bounds(self, chain: Chain) -> tuple[np.ndarray, np.ndarray]:
         low = [0.2 * self.first_full] if self.scaled else []
         high = [5.0 * self.first_full] if self.scaled else []
         for _, form in chain:
@@ -334,7 +331,7 @@ class _ChainProblem:
         reach = _MOST_DOUBT * self.unknown(chain)
         return np.array([*low, *-reach]), np.array([*high, *reach])
 
-    def fit(self, chain: _Chain, start: np.ndarray, most: int = _MOST_STEPS) -> _ChainFit:
+    def fit(self, chain: Chain, start: np.ndarray, most: int = _MOST_STEPS) -> _ChainFit:
         """Nonlinear least squares from a start, `most` evaluations of the Jacobian at most."""
         low, high = self.bounds(chain)
         if not len(start):
@@ -355,7 +352,7 @@ class _ChainProblem:
         )
         return _ChainFit(chain, found.x, float(2 * found.cost), self.scaled)
 
-    def fit_to(self, chain: _Chain, start: np.ndarray, cost: float) -> _ChainFit:
+    def fit_to(self, chain: Chain, start: np.ndarray, cost: float) -> _ChainFit:
         """As `fit`, but left where a cost is reached, or where it would not be at the pace of the last few steps."""
         fit = self.fit(chain, start, _QUICK_FIT)
         if fit.cost > (1 + _FAR) * cost:
@@ -446,18 +443,18 @@ def starts(form: SpeedForm) -> list[np.ndarray]:
     return options[:_MOST]
 
 
-def _ordered(chain: _Chain) -> _Chain:
+def _ordered(chain: Chain) -> Chain:
     return tuple(sorted(chain, key=lambda pair: pair[1].stage))
 
 
-def start_of(problem: _ChainProblem, chain: _Chain, fit: _ChainFit, new: str = "", values=()) -> np.ndarray:
+def start_of(problem: _ChainProblem, chain: Chain, fit: _ChainFit, new: str = "", values=()) -> np.ndarray:
     """Start of a chain from the fit of another that may lack one form, nothing having happened between its samples."""
     known = {key: fit.theta[fit.place(key)] for key, _ in fit.chain}
     theta = [values if key == new else known.get(key, form.neutral) for key, form in chain]
     return np.concatenate([fit.full, *theta, np.zeros(len(problem.unknown(chain)))])
 
 
-def _start_with(problem: _ChainProblem, chain: _Chain, fit: _ChainFit, new: tuple[str, SpeedForm]) -> np.ndarray:
+def _start_with(problem: _ChainProblem, chain: Chain, fit: _ChainFit, new: tuple[str, SpeedForm]) -> np.ndarray:
     """Start of a chain with a new form from what is known of the others: of the form's starts that explains most."""
     options = [start_of(problem, chain, fit, new[0], v) for v in starts(new[1])]
     return min(options, key=lambda theta: float(np.sum(problem.white(chain, theta) ** 2)))
@@ -661,7 +658,7 @@ def alternatives(problem: _ChainProblem, best: _ChainFit, key: str, forms) -> li
     return out
 
 
-def _reading_alternatives(problem: _ChainProblem, best: _ChainFit, rest: _Chain, key: str) -> list[str]:
+def _reading_alternatives(problem: _ChainProblem, best: _ChainFit, rest: Chain, key: str) -> list[str]:
     """Effects of the reading that explain as well in a form's place, where no speed is measured."""
     out = sorted(ids_of("same_on_commands", key))
     known, low, high = start_of(problem, rest, best), *problem.bounds(rest)

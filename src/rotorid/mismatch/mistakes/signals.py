@@ -10,7 +10,13 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from rotorid.mismatch.decision.findings import Finding
-from rotorid.mismatch.plant.motion import continuous, fresh_samples, own_rate_hz, rotation_matrices
+from rotorid.mismatch.plant.motion import (
+    LONGEST_BRIDGED_SAMPLES,
+    continuous,
+    fresh_samples,
+    own_rate_hz,
+    rotation_matrices,
+)
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
 
@@ -20,8 +26,6 @@ COMMANDED = ("commands", "throttle")
 """Sensors that are what was asked of the rotors, not what was measured."""
 P_LIMIT = 1e-9
 """p-value below which the readings of a sensor show a mistake by themselves."""
-_LONGEST_BRIDGED_SAMPLES = 6
-"""A hole of up to this many of a sensor's own periods is interpolated; a longer one stays missing."""
 
 
 def sensor_columns(vehicle: Vehicle) -> dict[str, tuple[str, ...]]:
@@ -97,7 +101,7 @@ def on_grid(time_s: np.ndarray, values: np.ndarray, grid_s: np.ndarray) -> np.nd
         return v.astype(float)
     out = CubicSpline(t, v, axis=0, extrapolate=False)(grid_s)
     gap = np.diff(t)
-    for k in np.flatnonzero(gap > _LONGEST_BRIDGED_SAMPLES * float(np.median(gap))):
+    for k in np.flatnonzero(gap > LONGEST_BRIDGED_SAMPLES * float(np.median(gap))):
         out[(grid_s > t[k]) & (grid_s < t[k + 1])] = np.nan
     return out
 

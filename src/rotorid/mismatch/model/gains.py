@@ -48,17 +48,8 @@ _FREE_SD = 3.0
 """Relative one-sigma of the value by which a gain is estimated."""
 
 
-@dataclass(frozen=True)
-class _WrongValues:
-    """Believed values that recordings contradict."""
-
-    values: Values
-    instead: dict[str, list[Values]]
-    """To each of them what would explain as much in its place."""
-
-
-def wrong_values_of(model: WrenchModel, prior: Prior = Prior()) -> _WrongValues:  # noqa: B008
-    """The believed values that the model's recordings contradict.
+def wrong_values_of(model: WrenchModel, prior: Prior = Prior()) -> tuple[Values, dict[str, list[Values]]]:  # noqa: B008
+    """The believed values that the model's recordings contradict, and to each what would explain as much in its place.
 
     Of two values of one ratio the one is named by which the regression explains more, where it does so beyond doubt.
     """
@@ -81,7 +72,7 @@ def wrong_values_of(model: WrenchModel, prior: Prior = Prior()) -> _WrongValues:
         if not small:
             break
         refused += small
-    return _WrongValues(dict(options[wrong].changes), in_place(options, wrong, least))
+    return dict(options[wrong].changes), in_place(options, wrong, least)
 
 
 def _trust_of(model: WrenchModel) -> dict[str, float]:
