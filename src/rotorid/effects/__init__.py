@@ -1,7 +1,6 @@
 """Omitted physics, one effect a file."""
 
 OPEN = (
-    "advice",
     "catalogue",
     "contract",
     "delay",

@@ -9,7 +9,7 @@ from rotorid.effects.loading import TOO_SHORT, since_the_first, unsmoothed
 from rotorid.effects.structural_resonance import resonance
 
 
-def first_order(loading, vehicle, values):
+def _first_order(loading, vehicle, values):
     """y = F / (1 + i f/f_c)."""
     load = since_the_first(loading)
     return Contribution(reading=followed_now(load, 1.0 / (2 * np.pi * max(values[0], 1e-3)), loading.dt_s) - load)
@@ -54,7 +54,7 @@ def reading_forms(instrument):
         return Parameter("f_c", "Hz", lowest, high, nonlinear=True, starts=own or (0.5 * high,), meaning="cutoff")
 
     return (
-        Form("first order", "y = F / (1 + i f/f_c)", (cutoff(first),), first_order),
+        Form("first order", "y = F / (1 + i f/f_c)", (cutoff(first),), _first_order),
         Form("second order", "|y| = |F| / √(1 + (f/f_c)⁴)", (cutoff(second),), _second_order),
         Form("fourth order", "y = F / B₄(i f/f_c), B₄ the reverse Bessel polynomial", (cutoff(second),), _fourth_order),
     )

@@ -25,7 +25,7 @@ def _reading(loading, k):
     return Contribution(reading=out)
 
 
-def alike(loading, vehicle, values):
+def _alike(loading, vehicle, values):
     """F = k_F (sin θ, −sin φ), M = k_M (sin φ, sin θ)."""
     f, m = values
     return _reading(loading, (f, -f, m, m, 0, 0, 0, 0))
@@ -85,7 +85,7 @@ def reading_forms(instrument):
             "alike about both axes",
             "F = k_F (sin θ, −sin φ), M = k_M (sin φ, sin θ)",
             (Parameter("k_F", "N/rad", meaning=FORCE), Parameter("k_M", "N m/rad", meaning=MOMENT)),
-            alike,
+            _alike,
             must_show=(0,),
         ),
         Form(

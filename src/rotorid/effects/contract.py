@@ -314,7 +314,7 @@ class Effect:
     separating_manoeuvre: str = ""
     """What distinguishes it from its confusers, one clause, without the columns that this takes."""
     separating_columns: tuple[str, ...] = ()
-    """What to record for this (`rotorid.effects.advice.RECORDABLE`)."""
+    """What to record for this (`rotorid.effects.describe.RECORDABLE`)."""
     kind: Literal["physics", "sensor", "mistake"] = "physics"
     exact: bool = False
     """Whether its equation is geometry or a definition and can have no other form; else what it leaves of a reading

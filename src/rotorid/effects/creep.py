@@ -22,20 +22,20 @@ def followed(load, tau_s, dt_s):
     return _follow(np.ascontiguousarray(load), 1.0 - np.exp(-dt_s / max(tau_s, 1e-6)))
 
 
-def creeping(loading, tau_s):
+def _creeping(loading, tau_s):
     """What creep adds per unit of its share, (n, 6)."""
     return followed(change_of_load(loading), tau_s, loading.dt_s)
 
 
 def _all_alike(loading, vehicle, values):
     """y = F + c LP(F), the share alike on all channels."""
-    return Contribution(reading=values[0] * creeping(loading, values[1]))
+    return Contribution(reading=values[0] * _creeping(loading, values[1]))
 
 
 def _own(channels):
     def contribution(loading, vehicle, values):
         reading = np.zeros((loading.size, 6))
-        reading[:, list(channels)] = creeping(loading, values[-1])[:, list(channels)] * np.asarray(values[:-1])
+        reading[:, list(channels)] = _creeping(loading, values[-1])[:, list(channels)] * np.asarray(values[:-1])
         return Contribution(reading=reading)
 
     return contribution
@@ -48,7 +48,7 @@ def _two_times(channels, alike):
         reading = np.zeros((loading.size, 6))
         shares = np.reshape(values[:-2], (2, -1))
         for own, tau_s in zip(shares, values[-2:], strict=True):
-            reading[:, list(channels)] += creeping(loading, tau_s)[:, list(channels)] * own
+            reading[:, list(channels)] += _creeping(loading, tau_s)[:, list(channels)] * own
         return Contribution(reading=reading)
 
     if alike:

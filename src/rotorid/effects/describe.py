@@ -1,17 +1,26 @@
-"""The catalogue in words: a list, one effect in full, and the page of all, which the site has as `effects.md`."""
+"""The catalogue in words: a list, one effect in full, the page of all (`effects.md`), and what to record next."""
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from rotorid.effects.advice import advice
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import COLUMNS_OF, Effect, Form, Parameter, SetForm, SpeedForm
 from rotorid.effects.loading import AXES, InstrumentFacts, forms_of
+from rotorid.recordings import columns as c
+from rotorid.recordings.run import RecordingSet
 from rotorid.recordings.vehicle import Vehicle
 
+RECORDABLE: dict[str, tuple[str, Callable[[int], tuple[str, ...]]]] = {
+    "position": ("the position", lambda rotors: c.POSITION),
+    "rotor_speed": ("the rotor speeds", lambda rotors: c.rotor_columns("rotor_speed", rotors)),
+    "temperature": ("the temperature", lambda rotors: (c.TEMPERATURE,)),
+    "voltage": ("the battery's voltage", lambda rotors: (c.BATTERY_VOLTAGE,)),
+}
+"""What `Effect.separating_columns` may name: in words, and the columns of a run for a number of rotors."""
 EXAMPLE = Vehicle(
     name="thesis",
     kind="flight",
@@ -51,13 +60,13 @@ EXAMPLE_STAND = InstrumentFacts(
 )
 """A stand that shows what stands show: its forms' parameters depend on its channels, bounds on rate and duration."""
 
-FORCES = (0, 1, 2)
+_FORCES = (0, 1, 2)
 EXAMPLE_BENCH = replace(
     EXAMPLE_STAND,
     vehicle=Vehicle(name="bench", kind="bench"),
-    channels=FORCES,
-    loaded=FORCES,
-    returns=FORCES,
+    channels=_FORCES,
+    loaded=_FORCES,
+    returns=_FORCES,
     tilts=False,
     distance="",
 )
@@ -82,7 +91,7 @@ EXCITATION = {
     "load_change": "a load that changes",
     "tilt": "a tilted mount",
 }
-KINDS = {"physics": "physics", "sensor": "sensor or logging", "mistake": "mistake in the set"}
+_KINDS = {"physics": "physics", "sensor": "sensor or logging", "mistake": "mistake in the set"}
 _INTRODUCTION = """\
 # The catalogue of effects
 
@@ -211,7 +220,7 @@ def listing() -> str:
     """A line for every effect: id, kind and how it shows."""
     effects = catalogue().values()
     wide = max(len(e.id) for e in effects)
-    return "".join(f"{e.id:<{wide}}  {KINDS[e.kind]:<18}  {e.sentence}\n" for e in effects)
+    return "".join(f"{e.id:<{wide}}  {_KINDS[e.kind]:<18}  {e.sentence}\n" for e in effects)
 
 
 def _formless(effect: Effect) -> str:
@@ -223,7 +232,7 @@ def _formless(effect: Effect) -> str:
 
 def in_full(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
     """One effect as plain text."""
-    out = [f"{effect.id}: {effect.name} ({KINDS[effect.kind]})", f"  {effect.sentence}", ""]
+    out = [f"{effect.id}: {effect.name} ({_KINDS[effect.kind]})", f"  {effect.sentence}", ""]
     every = [("form", row) for row in rows(effect, vehicle)]
     every += [("on an instrument", row) for row in _reading_rows(effect)]
     for kind, row in every:
@@ -248,7 +257,7 @@ def in_full(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
 
 def section(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
     """One effect as a section of the page."""
-    out = [f"### `{effect.id}`: {effect.name}\n", f"{KINDS[effect.kind].capitalize()}: {effect.sentence}.\n"]
+    out = [f"### `{effect.id}`: {effect.name}\n", f"{_KINDS[effect.kind].capitalize()}: {effect.sentence}.\n"]
     table = [(_names_text(row.names), row) for row in rows(effect, vehicle)]
     table += [(f"on an instrument: {_names_text(row.names)}", row) for row in _reading_rows(effect)]
     if table:
@@ -283,3 +292,19 @@ def markdown() -> str:
         parts.append(f"## {title}\n")
         parts += [section(e) for e in catalogue().values() if e.kind == kind]
     return "\n".join(parts).rstrip() + "\n"
+
+
+def advice(effect: Effect, recordings: RecordingSet | None = None) -> str:
+    """What would distinguish an effect from its confusers, one clause; it asks for no column that every run has.
+
+    Without recordings it asks for every column that helps.
+    """
+    wanted = [name for name in effect.separating_columns if recordings is None or not _recorded(name, recordings)]
+    words = " and ".join(RECORDABLE[name][0] for name in wanted)
+    return f"{effect.separating_manoeuvre}; record {words} as well" if words else effect.separating_manoeuvre
+
+
+def _recorded(name: str, recordings: RecordingSet) -> bool:
+    """Whether every run has the columns."""
+    columns = RECORDABLE[name][1](recordings.vehicle.rotor_count)
+    return all(run.has(*columns) for run in recordings.runs)

@@ -14,7 +14,7 @@ def _weighted_airspeed(motion, vehicle):
     return (motion.rotor_speed[:, :, None] * hub).sum(axis=1)
 
 
-def hub_moment(motion, vehicle, values):
+def _hub_moment(motion, vehicle, values):
     """M = k_flap Σ ω_i (v_i × e3): the disc tilts back and pulls the nose up in forward flight."""
     # v × e3 with e3 down has y component -v_x; nose up is +y, hence the sign.
     return Contribution(moment=-values[0] * np.cross(_weighted_airspeed(motion, vehicle), _E3))
@@ -25,7 +25,7 @@ def _independent_of_speed(motion, vehicle, values):
     return Contribution(moment=-values[0] * np.cross(motion.air_velocity, _E3))
 
 
-def rolling(motion, vehicle, values):
+def _rolling(motion, vehicle, values):
     """M = −k_roll Σ ω_i (v_i − (v_i · e3) e3): about the airspeed itself, whichever way a rotor spins."""
     return Contribution(moment=-values[0] * _weighted_airspeed(motion, vehicle) * (1.0 - _E3))
 
@@ -62,7 +62,7 @@ def forms(vehicle):
             "at the hubs",
             "M = k_flap Σ ω_i (e3 × v_i)",
             (Parameter("k_flap", "N m s2/(rad m)", 0.0, k_flap, meaning="moment per rotor speed and airspeed"),),
-            hub_moment,
+            _hub_moment,
             ("velocity", "rotor_speed"),
             kernel=_kernel_hub_moment,
         ),
@@ -78,7 +78,7 @@ def forms(vehicle):
             "about the airspeed, at the hubs",
             "M = −k_roll Σ ω_i (v_i − (v_i · e3) e3)",
             (Parameter("k_roll", "N m s2/(rad m)", 0.0, k_flap, meaning="moment about the airspeed per rotor speed"),),
-            rolling,
+            _rolling,
             ("velocity", "rotor_speed"),
             kernel=_kernel_rolling,
         ),

@@ -8,7 +8,7 @@ from rotorid.effects.contract import Effect, Form, Parameter, at_hubs
 
 _MOST_N = 1000.0
 """Bound of a knot's force: the form is built without a vehicle, so it is one for any size."""
-NAME = re.compile(r"(-?\d+\.\d\d) s to (-?\d+\.\d\d) s, (\d+) knots")
+_NAME = re.compile(r"(-?\d+\.\d\d) s to (-?\d+\.\d\d) s, (\d+) knots")
 
 
 def window_form(start_s: float, stop_s: float, knots: int) -> Form:
@@ -70,7 +70,7 @@ def kernel(m, v, p, w):
 
 def form_named(name: str) -> Form | None:
     """The form of a window, from the name that `window_form` gave it."""
-    found = NAME.fullmatch(name)
+    found = _NAME.fullmatch(name)
     return window_form(float(found[1]), float(found[2]), int(found[3])) if found else None
 
 

@@ -9,7 +9,7 @@ _HALF = "half the height of the loop"
 NARROW, WIDE = 0.02, 0.15
 MIDDLE = (NARROW * WIDE) ** 0.5
 """Half widths of the play as shares of the largest load."""
-WIDTHS = {"narrow": NARROW, "middle": MIDDLE, "wide": WIDE}
+_WIDTHS = {"narrow": NARROW, "middle": MIDDLE, "wide": WIDE}
 
 
 @compiled()
@@ -96,14 +96,14 @@ def reading_forms(instrument):
     shares = tuple(Parameter(f"h_{n}", "1", meaning=_HALF + " by the largest load") for n in ("narrow", "wide"))
     forms.append(Form("two plays, alike on all channels", text, shares, _alike(instrument, loaded)))
     if len(loaded) == 1:
-        for name, widths in (("two plays", ("narrow", "wide")), ("three plays", tuple(WIDTHS))):
+        for name, widths in (("two plays", ("narrow", "wide")), ("three plays", tuple(_WIDTHS))):
             own = tuple(Parameter(f"h_{n}", UNITS[loaded[0]], meaning=_HALF) for n in widths)
             forms.append(Form(name, text, own, _plays(instrument, loaded[0], widths)))
     else:
         # Not three for each channel: as many parameters would take in what other causes leave.
         groups = tuple(g for g in (tuple(c for c in loaded if c < 3), tuple(c for c in loaded if c >= 3)) if g)
         own = tuple(
-            Parameter(f"h_{n}_{'F' if g[0] < 3 else 'M'}", UNITS[g[0]], meaning=_HALF) for g in groups for n in WIDTHS
+            Parameter(f"h_{n}_{'F' if g[0] < 3 else 'M'}", UNITS[g[0]], meaning=_HALF) for g in groups for n in _WIDTHS
         )
         forms.append(Form("three plays, alike on forces and on moments", text, own, _of_a_range(instrument, groups)))
     return tuple(forms)
@@ -153,7 +153,7 @@ def _alike(instrument, loaded):
 
 def _plays(instrument, channel, widths):
     """Plays of several widths on one channel."""
-    signals = [_branches(instrument, WIDTHS[n]) for n in widths]
+    signals = [_branches(instrument, _WIDTHS[n]) for n in widths]
 
     def contribution(loading, vehicle, values):
         reading = np.zeros((loading.size, 6))
@@ -169,8 +169,8 @@ def _of_a_range(instrument, groups):
 
     def contribution(loading, vehicle, values):
         reading, load = np.zeros((loading.size, 6)), change_of_load(loading)
-        for group, heights in zip(groups, np.reshape(values, (len(groups), len(WIDTHS))), strict=True):
-            for share, height in zip(WIDTHS.values(), heights, strict=True):
+        for group, heights in zip(groups, np.reshape(values, (len(groups), len(_WIDTHS))), strict=True):
+            for share, height in zip(_WIDTHS.values(), heights, strict=True):
                 width = share * largest[group]
                 for c in group:
                     reading[:, c] += height * (load[:, c] - play(load[:, c], width)) / width

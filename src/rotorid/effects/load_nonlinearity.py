@@ -7,7 +7,7 @@ import numpy as np
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.loading import AXES, UNITS, bracketed, cross_channels, one_per_channel
 
-CURVE = "curvature of the characteristic"
+_CURVE = "curvature of the characteristic"
 
 
 def reading_forms(instrument):
@@ -25,19 +25,19 @@ def reading_forms(instrument):
         pairs = tuple((c, c) for c in group)
         for name, text, symbol, unit, signal in shapes:
             own = tuple(
-                Parameter(f"{symbol}_{AXES[c]}", unit.format(bracketed(UNITS[c])), meaning=CURVE) for c in group
+                Parameter(f"{symbol}_{AXES[c]}", unit.format(bracketed(UNITS[c])), meaning=_CURVE) for c in group
             )
             forms.append(Form(name + suffix, text, own, cross_channels(pairs, signal)))
-        both = tuple(Parameter(f"a_2_{AXES[c]}", f"1/{bracketed(UNITS[c])}", meaning=CURVE) for c in group) + tuple(
-            Parameter(f"a_3_{AXES[c]}", f"1/{bracketed(UNITS[c])}2", meaning=CURVE) for c in group
+        both = tuple(Parameter(f"a_2_{AXES[c]}", f"1/{bracketed(UNITS[c])}", meaning=_CURVE) for c in group) + tuple(
+            Parameter(f"a_3_{AXES[c]}", f"1/{bracketed(UNITS[c])}2", meaning=_CURVE) for c in group
         )
         forms.append(Form("square and cube" + suffix, "y = F + a_2 F² + a_3 F³", both, _both(pairs)))
         gains = tuple(f"gain_{AXES[c][-1].lower()}" for c in group if c < 3) + (("gain",) if group == loaded else ())
         forms.append(replace(_s_shape(instrument, group, "S-shape" + suffix), takes_up=gains))
         if group != loaded:
             continue
-        fifth = tuple(Parameter(f"a_3_{AXES[c]}", f"1/{bracketed(UNITS[c])}2", meaning=CURVE) for c in group) + tuple(
-            Parameter(f"a_5_{AXES[c]}", f"1/{bracketed(UNITS[c])}4", meaning=CURVE) for c in group
+        fifth = tuple(Parameter(f"a_3_{AXES[c]}", f"1/{bracketed(UNITS[c])}2", meaning=_CURVE) for c in group) + tuple(
+            Parameter(f"a_5_{AXES[c]}", f"1/{bracketed(UNITS[c])}4", meaning=_CURVE) for c in group
         )
         odd = _both(pairs, lambda x: x.load**3, lambda x: x.load**5)
         forms.append(Form("cube and fifth power", "y = F + a_3 F³ + a_5 F⁵", fifth, odd))
@@ -57,7 +57,7 @@ def _s_shape(instrument, group, name):
         reading[:, list(group)] = turn[:, list(group)] * np.asarray(values[:-1])
         return Contribution(reading=reading)
 
-    own = one_per_channel("a", "{}", group, meaning=CURVE)
+    own = one_per_channel("a", "{}", group, meaning=_CURVE)
     starts = (0.9, 1.4) if len(group) > 1 else (1.2,)
     scale = Parameter("s", "1", 0.7, 3.0, True, starts, "full scale by the largest load")
     return Form(name, "y = F + a sin(π F/(s F_max))", (*own, scale), contribution)

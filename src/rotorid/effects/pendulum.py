@@ -135,7 +135,7 @@ def _leapfrog(hanging, start, dt, length_m, damping):
 
 
 @dataclass(frozen=True)
-class Piece:
+class _Piece:
     """A piece of a stretch at SCAN_RATE_HZ, in world axes."""
 
     stretch: int
@@ -151,7 +151,7 @@ class Piece:
     """Residuals that the swing may be seen in, in units of their own size, (ways, n, 2)."""
 
 
-def pieces_of(parts, gravity_m_s2):
+def _pieces_of(parts, gravity_m_s2):
     """Stretches (time_s (n,), hanging (n, 3), velocity (n, 2), pulls (n, 2) each) as pieces of PIECE_S."""
     out = []
     for stretch, (time_s, *columns, pulls) in enumerate(parts):
@@ -169,7 +169,7 @@ def pieces_of(parts, gravity_m_s2):
             own = np.stack([p[cut] - p[cut].mean(axis=0) for p in pulls])
             own /= np.maximum(np.sqrt((own**2).sum(axis=(1, 2), keepdims=True)), 1e-300)
             others = np.stack([np.column_stack([np.ones(count), slope[cut, a], velocity[cut, a]]) for a in (0, 1)])
-            out.append(Piece(stretch, first, np.arange(count) * step, slope[cut], others, own))
+            out.append(_Piece(stretch, first, np.arange(count) * step, slope[cut], others, own))
     return out
 
 
@@ -204,7 +204,7 @@ def likely_lengths(parts, bounds_m, damping_ratio, gravity_m_s2):
     explain something are looked at once more as they swing through the whole stretch, and come in that order.
     """
     lengths = np.geomspace(*bounds_m, _LENGTHS_TRIED)
-    pieces = pieces_of(parts, gravity_m_s2)
+    pieces = _pieces_of(parts, gravity_m_s2)
     if not pieces:
         return ()
     gain = np.zeros(_LENGTHS_TRIED)

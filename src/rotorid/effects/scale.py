@@ -32,7 +32,7 @@ def rotor_radius_m(vehicle: Vehicle) -> float:
 
 
 @dataclass(frozen=True)
-class Scale:
+class _Scale:
     """What a vehicle weighs, how fast its rotors turn in hover, and how far out they sit."""
 
     mass_kg: float
@@ -65,14 +65,14 @@ class Scale:
         return _FASTEST_DAMPING_1_S * self.inertia_kg_m2
 
 
-def scale(vehicle: Vehicle) -> Scale:
+def scale(vehicle: Vehicle) -> _Scale:
     """Sizes of a vehicle; what it does not state is taken as one, so that bounds stay finite."""
     mass = vehicle.mass_kg or 1.0
     weight = mass * vehicle.gravity_m_s2
     lift = float(vehicle.thrust_coefficients_n_s2().sum()) if vehicle.rotors else 0.0
     inertia = vehicle.inertia_kg_m2
     hubs = vehicle.rotor_positions_m() if vehicle.rotors else np.zeros((1, 3))
-    return Scale(
+    return _Scale(
         mass_kg=mass,
         weight_n=weight,
         hover_speed_rad_s=float(np.sqrt(weight / lift)) if lift > 0 else 1.0,

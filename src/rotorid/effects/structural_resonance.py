@@ -23,7 +23,7 @@ def _recursion(frequency_hz, damping, dt_s):
     return b[0], a
 
 
-def ringing(loading, vehicle, values):
+def _ringing(loading, vehicle, values):
     """y = F + p (H(s) − 1) F: of a structure's modes one rings in the band, and bends under a part p of the load."""
     load = since_the_first(loading)
     return Contribution(reading=values[2] * (resonance(load, values[0], values[1], loading.dt_s) - load))
@@ -44,7 +44,7 @@ def reading_forms(instrument):
             "second order",
             "y = F + p (H − 1) F, H = f_n² / (f_n² − f² + 2 i ζ f_n f)",
             (frequency, damping, part),
-            ringing,
+            _ringing,
         ),
     )
 

@@ -42,7 +42,7 @@ def _power_from(path, values):
     return path.full_speed * (_dead_zone(path, values[:1]) / path.full_speed) ** values[1]
 
 
-LINEAR = 0.005
+_LINEAR = 0.005
 """No speed controller is proportional to its command within less, and a calibration of its throttle is no better."""
 
 
@@ -56,8 +56,8 @@ EFFECT = Effect(
             "affine",
             "ω = (1 + a_1) ω_c + a_0 ω_max",
             (
-                Parameter("a_0", "1", -0.8, 0.8, meaning="speed at no command, share of ω_max", negligible=LINEAR),
-                Parameter(SLOPE, "1", -0.8, 2.0, meaning="excess of the slope", negligible=LINEAR),
+                Parameter("a_0", "1", -0.8, 0.8, meaning="speed at no command, share of ω_max", negligible=_LINEAR),
+                Parameter(SLOPE, "1", -0.8, 2.0, meaning="excess of the slope", negligible=_LINEAR),
             ),
             CURVE,
             affine,
@@ -68,8 +68,8 @@ EFFECT = Effect(
             "quadratic",
             "ω = (1 + a_1 + a_2 ω_c/ω_max) ω_c",
             (
-                Parameter(SLOPE, "1", -0.8, 2.0, meaning="excess of the slope at no command", negligible=LINEAR),
-                Parameter("a_2", "1", -2.0, 2.0, meaning="growth of the slope with the command", negligible=LINEAR),
+                Parameter(SLOPE, "1", -0.8, 2.0, meaning="excess of the slope at no command", negligible=_LINEAR),
+                Parameter("a_2", "1", -2.0, 2.0, meaning="growth of the slope with the command", negligible=_LINEAR),
             ),
             CURVE,
             quadratic,
@@ -79,7 +79,7 @@ EFFECT = Effect(
         SpeedForm(
             "dead zone",
             "ω = ω_max (u − u_0)/(1 − u_0)",
-            (Parameter("u_0", "1", -0.3, 0.5, meaning="command at which the rotors start", negligible=LINEAR),),
+            (Parameter("u_0", "1", -0.3, 0.5, meaning="command at which the rotors start", negligible=_LINEAR),),
             CURVE,
             _dead_zone,
             (0.0,),
@@ -87,7 +87,7 @@ EFFECT = Effect(
         SpeedForm(
             "thrust curve of the throttle",
             "T/T_max = b u + (1 − b) u²",
-            (Parameter("b", "1", -0.3, 1.0, meaning="linear share of thrust", negligible=2 * LINEAR),),
+            (Parameter("b", "1", -0.3, 1.0, meaning="linear share of thrust", negligible=2 * _LINEAR),),
             CURVE,
             root,
             (0.0,),
@@ -102,7 +102,7 @@ EFFECT = Effect(
                     0.2,
                     3.0,
                     meaning="exponent; 0.5 for a thrust proportional to the throttle",
-                    negligible=LINEAR,
+                    negligible=_LINEAR,
                 ),
             ),
             CURVE,
@@ -113,8 +113,8 @@ EFFECT = Effect(
             "power above a dead zone",
             "ω = ω_max ((u − u_0)/(1 − u_0))^n",
             (
-                Parameter("u_0", "1", -0.05, 0.5, meaning="command at which the rotors start", negligible=LINEAR),
-                Parameter("n", "1", 0.2, 3.0, meaning="exponent", negligible=LINEAR),
+                Parameter("u_0", "1", -0.05, 0.5, meaning="command at which the rotors start", negligible=_LINEAR),
+                Parameter("n", "1", 0.2, 3.0, meaning="exponent", negligible=_LINEAR),
             ),
             CURVE,
             _power_from,

@@ -8,7 +8,7 @@ from rotorid.effects.contract import Effect, Form, Parameter, lift_at_hubs, roto
 from rotorid.effects.scale import hover_inflow_m_s
 
 
-def mean_loss(motion, vehicle, values):
+def _mean_loss(motion, vehicle, values):
     """T_i = T (1 - k g(x)), x = descent speed over hover inflow.
 
     g = 1 - ((x - 1)/0.7)² where positive, fading with in-plane speed.
@@ -33,7 +33,7 @@ def forms(vehicle):
             "mean loss",
             "T_i = T (1 − k g(v_z/v_h))",
             (Parameter("k", "1", 0.0, 0.8, meaning="largest share of thrust lost"),),
-            mean_loss,
+            _mean_loss,
             ("velocity", "rotor_speed"),
             kernel=kernel,
         ),

@@ -14,7 +14,7 @@ _REACH = 1.0
 """How far outside the temperatures recorded, as a share of their span, the zero may have been right."""
 
 
-def warming(instrument, name, equation, span_s, elapsed_s, shares):
+def _warming(instrument, name, equation, span_s, elapsed_s, shares):
     """y = F + b (1 − exp(−t/τ)), t = `elapsed_s(loading)`; τ is sought about these shares of `span_s`."""
     channels = instrument.channels
 
@@ -64,12 +64,12 @@ def reading_forms(instrument):
         forms += [of(f"linear in time, {AXES[c]}", "y = F + b t", "{}/min", minutes, (c,)) for c in channels]
     text = "y = F + b (1 − exp(−t/τ))"
     if instrument.run_s > 5.0:
-        forms.append(warming(instrument, "warming up", text, instrument.run_s, lambda x: x.run_time_s, (0.15, 0.5)))
+        forms.append(_warming(instrument, "warming up", text, instrument.run_s, lambda x: x.run_time_s, (0.15, 0.5)))
     if instrument.session_s > 5.0:
         forms.append(of("linear in the session's time", "y = F + b t_s", "{}/min", lambda x: x.session_time_s / 60.0))
         text, span_s, shares = "y = F + b (1 − exp(−t_s/τ))", instrument.session_s, (0.15, 0.5)
         name = "warming up over the session"
-        forms.append(warming(instrument, name, text, span_s, lambda x: x.session_time_s, shares))
+        forms.append(_warming(instrument, name, text, span_s, lambda x: x.session_time_s, shares))
     if instrument.temperature:
         forms.append(of("with temperature", "y = F + b ΔT", "{}/K", lambda x: x.temperature))
     if instrument.temperatures_c[1] > instrument.temperatures_c[0]:

@@ -72,7 +72,7 @@ from rotorid.recordings import RecordingSet, Split, Vehicle
 from rotorid.vehicle.derivatives import quantities
 from rotorid.vehicle.improved import active_forms
 
-UNITS = {"force": "N", "moment": "N m"}
+_UNITS = {"force": "N", "moment": "N m"}
 _SENSOR_UNITS = {2: "m/s2", 3: "rad/s"}
 _NO_DEPENDENCE_P = 0.01
 """p-value of a residual's dependence on what is recorded from which it is taken for noise."""
@@ -142,7 +142,7 @@ def _analysed(recordings: RecordingSet, mistakes, remarks, watch: Watch) -> Anal
     choice = replace(choice, findings=_with_windows(findings, seen))
     plain = values_alone(model)
     plain_fit, plain_moved = settled(model, plain, ())
-    first = account(choice, seen, fit, moved, plain_fit, {**plain_moved, **plain})
+    first = _account(choice, seen, fit, moved, plain_fit, {**plain_moved, **plain})
     words = with_values_in_question(weighed(first))
     return with_noise_held_out(as_delivered(_offered(choice, words, seen, unseen, moved, plain_moved)))
 
@@ -182,7 +182,7 @@ def _with_windows(findings: Sequence[Finding], seen: WrenchModel) -> tuple[Findi
     return tuple(out)
 
 
-def account(
+def _account(
     choice: _Choice, seen: WrenchModel, fit: Fit, moved: Values, plain_fit: Fit, plain_values: Values
 ) -> Analysis:
     """What a choice amounts to on every run, before any word is weighed.
@@ -301,7 +301,7 @@ def _offered(
         last = replace(choice, found=fewer, stated=stated_of(named), findings=findings)
         every = seen if whole else on_every_run(fewer, choice.recordings, choice.split, unseen)
         plain = {**refitted.moved, **refitted.values}
-        return account(last, every, named.fit, named.moved, refitted.fit, plain), stretches_of(every)
+        return _account(last, every, named.fit, named.moved, refitted.fit, plain), stretches_of(every)
 
     def flown(candidate: Candidate, findings: Sequence[Finding], ground: Ground) -> np.ndarray:
         """Each window by derivatives that were learnt without its run or piece."""
@@ -499,7 +499,7 @@ def _make_traces(
     for r, segment, before, plain, after in zip(*parts, strict=True):
         for c in range(6):
             if np.isfinite(r.y[:, c]).all():
-                unit = UNITS[CHANNELS[c].split("_")[0]]
+                unit = _UNITS[CHANNELS[c].split("_")[0]]
                 out.append(
                     ChannelTrace(
                         r.run, CHANNELS[c], unit, r.time_s, before[:, c], plain[:, c], after[:, c], after[:, c]

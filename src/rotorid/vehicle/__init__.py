@@ -13,7 +13,6 @@ OPEN = (
     "exports.gazebo_airframe",
     "exports.sih",
     "fast",
-    "flyable",
     "hover",
     "improved",
     "mass_properties",

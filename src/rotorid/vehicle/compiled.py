@@ -16,11 +16,9 @@ from __future__ import annotations
 import numpy as np
 
 from rotorid.effects.contract import compiled
+from rotorid.vehicle.dynamics import CONVERGED, MOST_ROUNDS
 from rotorid.vehicle.kernels import call_kernel
 
-_MOST_ROUNDS = 30
-_CONVERGED = 1e-10
-"""Change of the accelerations, relative to their largest, at which they are taken as solved for."""
 _UNKNOWN, _FOUND, _EXACT = 0, 1, 2
 """What is known of how accelerations answer to themselves: nothing yet, the matrix of the flight, and that its step was
 exact at this step's beginning, so that one is enough at the step's other stages."""
@@ -174,7 +172,7 @@ def _stepped(x):
         for k in range(6):
             change += x.matrix[i, k] * (x.own[k] - x.at[k])
         x.now[i] = x.at[i] + change
-    return turning <= _CONVERGED * most_turning and linear <= _CONVERGED * most_linear
+    return turning <= CONVERGED * most_turning and linear <= CONVERGED * most_linear
 
 
 @compiled(error_model="numpy")
@@ -206,7 +204,7 @@ def _accelerate(count, first, alone, instant, body, added, scratch, addresses, e
             v = body[(first + c) * alone]
             _relaxation(instant[c], v, added[c], x, addresses, explicit, offsets, values, (first + c) * stride)
             x.known = _FOUND
-    for rounds in range(_MOST_ROUNDS):
+    for rounds in range(MOST_ROUNDS):
         for c in range(count):
             x = scratch[c]
             if x.open:

@@ -33,8 +33,8 @@ _ALWAYS_KNOWN = frozenset(
 )
 
 
-_MOST_ROUNDS = 30
-_CONVERGED = 1e-10
+MOST_ROUNDS = 30
+CONVERGED = 1e-10
 """Change of the accelerations, relative to their largest, at which a fixed point is taken as reached."""
 
 
@@ -51,7 +51,7 @@ class Dynamics:
         self.effects = [(form, np.asarray(values, float)) for form, values in effects]
         self._matrix = wrench_matrix(vehicle).T
         implicit = {"specific_force", "angular_acceleration", "accelerometer"}
-        self.rounds = _MOST_ROUNDS if any(implicit & set(form.requires) for form, _ in self.effects) else 1
+        self.rounds = MOST_ROUNDS if any(implicit & set(form.requires) for form, _ in self.effects) else 1
         self.last_acceleration = np.zeros((size, 3))
         self.last_specific_force = np.zeros((size, 3))
 
@@ -108,9 +108,7 @@ class Dynamics:
 
 def _same(before: tuple[np.ndarray, ...], after: tuple[np.ndarray, ...]) -> bool:
     """Whether two evaluations are equal for all purposes."""
-    return all(
-        np.abs(b - a).max() <= _CONVERGED * max(1.0, np.abs(a).max()) for b, a in zip(before, after, strict=True)
-    )
+    return all(np.abs(b - a).max() <= CONVERGED * max(1.0, np.abs(a).max()) for b, a in zip(before, after, strict=True))
 
 
 def has_memory(form: Form) -> bool:
@@ -125,13 +123,6 @@ def check_effects(effects: Sequence[tuple[Form, Sequence[float]]], known: set[st
             if name not in known and name not in _ALWAYS_KNOWN:
                 reason = LACK.get(name, f"no {name}")
                 raise InputError(f"effect form {form.name!r} cannot be simulated: {reason}")
-
-
-def world_acceleration(body: RigidBody, rotation: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """dV/dt = R F / m + g e3 (eq. 4.2), (..., 3), m/s2, world; force without weight, N, body axes."""
-    out = np.einsum("...ij,...j->...i", rotation, force) / body.mass_kg
-    out[..., 2] += body.gravity_m_s2
-    return out
 
 
 def angular_acceleration(body: RigidBody, rates: np.ndarray, moment: np.ndarray) -> np.ndarray:

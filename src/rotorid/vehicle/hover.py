@@ -31,7 +31,7 @@ _CLOSE = 1e-9
 
 
 @dataclass(frozen=True)
-class Hover:
+class _Hover:
     """What to ask for."""
 
     thrust_n: float
@@ -43,7 +43,7 @@ class Hover:
     """Upward force over what hover needs; below 1 where all that the rotors can do does not support the vehicle."""
 
 
-def hover(vehicle: Vehicle, path: CommandPath | None, height_m: float) -> Hover:
+def hover(vehicle: Vehicle, path: CommandPath | None, height_m: float) -> _Hover:
     """The hover of a vehicle with the effects that its file states, at a height above its ground, m.
 
     `path` is what lies between its command and rotor speed. Where the rotors cannot balance every moment, what is
@@ -66,7 +66,7 @@ def hover(vehicle: Vehicle, path: CommandPath | None, height_m: float) -> Hover:
     share = 1.0
     if abs(rising(share)) > _CLOSE:
         if (highest := rising(most / weight)) <= 0:
-            return Hover(most, (0.0, 0.0, 0.0), 1.0, 1.0 + highest)
+            return _Hover(most, (0.0, 0.0, 0.0), 1.0, 1.0 + highest)
         if rising(0.0) < 0:
             share = brentq(rising, 0.0, most / weight, xtol=_CLOSE)
     asked = np.array([share, 0.0, 0.0, 0.0])
@@ -75,7 +75,7 @@ def hover(vehicle: Vehicle, path: CommandPath | None, height_m: float) -> Hover:
     less = asked - [_SLOPE_SHARE * asked[0], 0.0, 0.0, 0.0]
     gain = float((missing(asked) - missing(less))[0] / (_SLOPE_SHARE * asked[0]))
     thrust, *moments = (float(v) for v in asked * units)
-    return Hover(thrust, tuple(moments), gain if gain > 0 else 1.0)
+    return _Hover(thrust, tuple(moments), gain if gain > 0 else 1.0)
 
 
 def wrench_at_rest(vehicle: Vehicle, path: CommandPath | None, asked: np.ndarray, height_m: float) -> np.ndarray:

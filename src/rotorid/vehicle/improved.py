@@ -2,6 +2,11 @@
 
 What adds a wrench or an error of a sensor flies in `simulate_as_stated`, and so does what lies between command and
 rotor speed; `record_as_stated` writes what the sensors of such a flight read, with the faults of sensors and logging.
+
+A vehicle file as a controller can fly it: what the file leaves open is set, what nobody can fly is left out.
+
+A vehicle of a recording may lack what its effects refer to (where the ground is, the rotor speed of the full command),
+and a delay fitted to stamps may be negative. Such a vehicle is flown all the same, and a sentence says each difference.
 """
 
 from __future__ import annotations
@@ -11,14 +16,17 @@ from dataclasses import replace
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.effects.contract import CURVE, LIMIT, Effect, Form, SetForm, SpeedForm, SpeedPath
+from rotorid.effects.contract import CURVE, DELAY, LIMIT, Effect, Form, SetForm, SpeedForm, SpeedPath
 from rotorid.errors import InputError
 from rotorid.recordings.run import RecordingSet
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.command_path import CommandPath
 from rotorid.vehicle.derivatives import derivative_form
+from rotorid.vehicle.mixer import hover_speed_rad_s
 from rotorid.vehicle.simulator import Commands, Controller, Motors, Trace, WhiteNoise, recording, simulate
 
+_FULL_OVER_HOVER = 2.0
+"""Rotor speed of the full command over that of hover where no limits are stated: a thrust of four times the weight."""
 LAGS_OF_SPEED = frozenset({"one constant", "up and down"})
 """Forms of `motor_lag` that the simulator's own motors fly."""
 
@@ -127,7 +135,7 @@ def command_path(
     if unscaled and limits is None:
         raise InputError(
             f"vehicle {vehicle.name}: effect form {unscaled[0]!r} needs rotor_speed_limits_rad_s, the speed of the "
-            "full command (rotorid.vehicle.flyable states it)"
+            "full command (rotorid.vehicle.improved states it)"
         )
     if full_voltage_v is None:
         full_voltage_v = 1.0 if voltage_v is None else float(np.max(voltage_v))
@@ -162,7 +170,7 @@ def simulate_as_stated(
     What lies between command and rotor speed is applied to the whole series where the commands are known
     (`Commands`), and step by step under any other controller. `voltage_v` is constant or a series over the steps,
     (steps + 1,), the full one without any; `full_voltage_v` is the voltage at which commands are right (default the
-    largest). What a file may lack for this, `rotorid.vehicle.flyable` states.
+    largest). What a file may lack for this, `rotorid.vehicle.improved` states.
     """
     steps = int(round(duration_s / step_s))
     voltage = np.broadcast_to(np.asarray(1.0 if voltage_v is None else voltage_v, float), (steps + 1,))
@@ -208,3 +216,41 @@ def record_as_stated(
     for form, values in active_set_forms(vehicle):
         recordings = form.apply(recordings, values)
     return recordings
+
+
+def flyable(vehicle: Vehicle) -> tuple[Vehicle, tuple[str, ...]]:
+    """The vehicle as a controller can fly it, and a sentence for each thing that is other than its file says.
+
+    InputError for a stand or bench, and for an effect that the catalogue does not have.
+    """
+    if vehicle.kind != "flight":
+        raise InputError(f"{vehicle.name}: a {vehicle.kind} does not fly, so that there is no flight to simulate")
+    forms = all_forms(vehicle)
+    between = [(form, values) for form, values in forms if isinstance(form, SpeedForm)]
+    changes: dict = {}
+    said: list[str] = []
+    early = [i for i, (form, values) in enumerate(forms) if _is_early(form, values)]
+    if early:
+        changes["effects"] = tuple(e for i, e in enumerate(vehicle.effects) if i not in early)
+        said.append(
+            f"The delay of the command of {forms[early[0]][1][0]:.3g} s is left out: "
+            "rotors do not follow a command before it is given."
+        )
+    if any("voltage" in form.requires for form, _ in between):
+        said.append("The battery stays at its full voltage.")
+    if vehicle.rotor_speed_limits_rad_s is None and any(form.stage in (CURVE, LIMIT) for form, _ in between):
+        full = _FULL_OVER_HOVER * hover_speed_rad_s(vehicle)
+        changes["rotor_speed_limits_rad_s"] = (0.0, full)
+        said.append(
+            f"The file states no rotor_speed_limits_rad_s: the full command is taken as {full:.0f} rad/s, "
+            f"{_FULL_OVER_HOVER:g} times the speed of hover."
+        )
+    if vehicle.ground_z_m is None and any("height" in f.requires for f, _ in forms if isinstance(f, Form)):
+        changes["ground_z_m"] = 0.0
+        said.append("The file states no ground_z_m: the ground is taken at z = 0.")
+    return vehicle.model_copy(update=changes), tuple(said)
+
+
+def _is_early(form, values) -> bool:
+    """Whether a form is a negative delay of the command."""
+    return isinstance(form, SpeedForm) and form.stage == DELAY and values[0] < 0

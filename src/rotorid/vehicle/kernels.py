@@ -45,7 +45,7 @@ INSTANT = np.dtype(
 """`m` of a kernel: the fields of `Motion` at one instant, `thrust` being C_F ω² of each rotor, N, and `hub_velocity`
 each hub's velocity through the air, m/s, body axes."""
 
-BODY = np.dtype(
+_BODY = np.dtype(
     [
         ("rotors", "i8"),
         ("mass", "f8"),
@@ -81,7 +81,7 @@ SCRATCH = np.dtype(
 its state, that at which a step is tried, and the slopes of a step's four stages; its controller. In a record because a
 slice of an array costs two atomic counts of references, as long as a kernel."""
 
-_SIGNATURE = types.void(from_dtype(INSTANT), from_dtype(BODY), types.CPointer(types.float64), from_dtype(ADDED))
+_SIGNATURE = types.void(from_dtype(INSTANT), from_dtype(_BODY), types.CPointer(types.float64), from_dtype(ADDED))
 _ACCELERATIONS = frozenset({"specific_force", "angular_acceleration", "accelerometer"})
 
 
@@ -189,7 +189,7 @@ def _adds_wrench(form: Form, vehicle: Vehicle, values: np.ndarray) -> bool:
 def body_of(vehicle: Vehicle) -> np.ndarray:
     """The constants of a vehicle, (1,) of BODY."""
     k = vehicle.rotor_count
-    body = np.zeros(1, BODY)
+    body = np.zeros(1, _BODY)
     one = body[0]
     one["rotors"], one["mass"], one["gravity"] = k, vehicle.mass_kg, vehicle.gravity_m_s2
     one["radius"], one["hover_inflow"] = rotor_radius_m(vehicle), hover_inflow_m_s(vehicle)

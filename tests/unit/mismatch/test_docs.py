@@ -22,7 +22,7 @@ def test_the_numbers_that_decide_are_those_of_the_code():
 
 def test_the_modules_named_exist():
     names = re.findall(r"^\| `([a-z_.]+)` \| [^|]+ \|$", PAGE.split("## Modules and constants")[1], flags=re.M)
-    assert len(names) > 100 and set(OPEN) <= set(names)
+    assert len(names) > 90 and set(OPEN) <= set(names)
     for name in names:
         importlib.import_module(f"rotorid.mismatch.{name}")
 

@@ -29,13 +29,11 @@ from rotorid.vehicle.derivatives import (
     table_of,
     wrench,
 )
-from rotorid.vehicle.exports import ardupilot_frame, export_vehicle, sih
-from rotorid.vehicle.exports.all_forms import NAMES
+from rotorid.vehicle.exports import NAMES, ardupilot_frame, export_vehicle, sih
 from rotorid.vehicle.exports.derivatives import MUJOCO_FILE, ROTORPY_FILE
 from rotorid.vehicle.exports.flown import gazebo_damping_of, in_drake, in_mujoco, in_rotorpy
-from rotorid.vehicle.flyable import flyable
 from rotorid.vehicle.hover import hover, wrench_at_rest
-from rotorid.vehicle.improved import active_forms, record_as_stated, simulate_as_stated
+from rotorid.vehicle.improved import active_forms, flyable, record_as_stated, simulate_as_stated
 from rotorid.vehicle.kernels import ADDED, body_of
 from rotorid.vehicle.simulator import Commands, simulate
 from rotorid.vehicle.windows import simulate_windows

@@ -16,8 +16,7 @@ from rotorid.cli import app
 from rotorid.errors import InputError
 from rotorid.recordings import Vehicle, templates, write_vehicle
 from rotorid.recordings.vehicle import Inertia, Rotor
-from rotorid.vehicle.exports import export_vehicle, flown, forms
-from rotorid.vehicle.exports.all_forms import NAMES
+from rotorid.vehicle.exports import NAMES, export_vehicle, flown, forms
 from rotorid.vehicle.exports.flown import commands_of, in_drake, in_mujoco, in_pybullet, in_rotorpy, lagging
 from rotorid.vehicle.mixer import hover_speed_rad_s
 

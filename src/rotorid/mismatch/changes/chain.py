@@ -32,9 +32,9 @@ _CHAIN_ROUNDS = 4
 """Times that the chain's columns are taken, at most."""
 _SAME_PHASE_SD = 0.29
 """One-sigma of the instant between two samples at which commands are stamped, in samples: evenly spread over one."""
-STEP_S, STEP = 0.002, 0.01
+_STEP_S, _STEP = 0.002, 0.01
 """Changes of a time and of another parameter from which its column is taken."""
-START_S = 0.025
+_START_S = 0.025
 """By how much longer or shorter time constants are from which a change is sought, too."""
 _OF_ROTORS = "offset:rotors"
 """Start of the keys of offsets in time that are a delay of the commands: the chain has it."""
@@ -77,7 +77,7 @@ class ChainTerms:
     def steps(self) -> np.ndarray:
         """(P,) changes from which columns are taken, away from the upper bound."""
         own = self.parameters
-        size = np.array([STEP_S if p.unit == "s" else STEP for p in own])
+        size = np.array([_STEP_S if p.unit == "s" else _STEP for p in own])
         return np.where(self.values + size > [p.high for p in own], -size, size)
 
     def at(self, values: np.ndarray) -> ChainTerms:
@@ -92,7 +92,7 @@ class ChainTerms:
             own = np.arange(at, at + term.size)
             times = [i for i in own if self.parameters[i].unit == "s"]
             at += term.size
-            for away in (START_S, -START_S) if times else ():
+            for away in (_START_S, -_START_S) if times else ():
                 values = self.values.copy()
                 values[times] += away
                 moved = self.at(values)

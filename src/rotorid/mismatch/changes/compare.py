@@ -204,8 +204,8 @@ def changes_from(
         new=new.name,
         changes=(*mistakes_that_differ(reference.mistakes, joint.mistakes_of_new), *changes),
         limits=tuple(sorted((x for x in limits if x.id not in changed), key=lambda x: -x.share)),
-        values=values_of(found, *vehicles),
-        residuals=(residuals_of(reference.rows), residuals_of(joint.rows_of_new)),
+        values=_values_of(found, *vehicles),
+        residuals=(_residuals_of(reference.rows), _residuals_of(joint.rows_of_new)),
         notes=(
             *_refused_notes([c.alternatives or (c.id,) for c in refused]),
             *_notes_of(joint, base.name, new.name),
@@ -226,7 +226,7 @@ def _most_alike(reference: FittedReference, new: RecordingSet, prior: Prior) -> 
     """
     both = [(joint, _flight_options(reference, joint, prior)) for joint in joints_of(reference, new)]
     joint, options = max(both, key=lambda b: b[1][0].log_posterior - price_of(b[0].mistakes_of_new, prior))
-    if (swinging := carrying(reference, joint)) is not None:
+    if (swinging := _carrying(reference, joint)) is not None:
         other, with_it, nats = swinging
         own = _flight_options(other, with_it, prior)
         if own[0].log_posterior - nats > options[0].log_posterior:
@@ -347,14 +347,14 @@ def changes_in(options: Sequence[ChainOption], prior: Prior) -> tuple[Statement,
     return tuple(out)
 
 
-def residuals_of(rows: Sequence[Rows]) -> dict[str, Residual]:
+def _residuals_of(rows: Sequence[Rows]) -> dict[str, Residual]:
     """What is left in the longest stretch, by channel that the set has."""
     longest = max(rows, key=lambda own: len(own.time_s))
     known = [c for c in range(CHANNELS_OF_WRENCH) if np.isfinite(longest.y[:, c]).all()]
     return {CHANNELS[c]: Residual(longest.time_s, longest.y[:, c]) for c in known}
 
 
-def values_of(found: Found, base: Vehicle, new: Vehicle) -> tuple[Estimate, ...]:
+def _values_of(found: Found, base: Vehicle, new: Vehicle) -> tuple[Estimate, ...]:
     """By how much each believed value changed, relative, with its 95 % interval, changed or not.
 
     One that did not change is known by the prior that its limit is of (`limits_of`), so that both agree.
@@ -490,7 +490,7 @@ def predicted(change: Change, vehicle: Vehicle) -> dict[str, float]:
     return {key: value for key, value in out.items() if value}
 
 
-def carrying(reference: FittedReference, joint: Joint) -> tuple[FittedReference, Joint, float] | None:
+def _carrying(reference: FittedReference, joint: Joint) -> tuple[FittedReference, Joint, float] | None:
     """Two sets with the columns of a payload on the cable that suits the second, hung as that set shows.
 
     With what the states of the payload cost, nats. None where nothing seems to swing, or where it swings in the first

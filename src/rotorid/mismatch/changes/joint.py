@@ -41,8 +41,8 @@ from rotorid.steps import step
 
 Effects = Sequence[tuple[Form, np.ndarray]]
 """Forms with the values of their parameters."""
-FORCES, _MOMENTS = (0, 1, 2), (3, 4, 5)
-"""Channels of the forces and of the moments."""
+_FORCES = (0, 1, 2)
+"""Channels of the forces."""
 _REACH_OF_KNOWN = 3.0
 """Standard errors by which a coefficient of the first set may be other than its model has it."""
 _AIRSPEED = "airspeed_m_s"
@@ -136,18 +136,18 @@ def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> FittedReference
     # As another set's stretches are made: what making them leaves out is left out of both.
     recorded, noisy = _recorded_stretches(found, base)
     chain = chain_terms(found, recorded)
-    segments, rows = rows_of(found, terms, chain, recorded)
+    segments, rows = _rows_of(found, terms, chain, recorded)
     of_chain = chain.terms if found.commanded else []
     known = np.append(_known_effects(model, terms), np.zeros(sum(t.size for t in of_chain)))
     block_s = block_seconds(rows, model.prepared.thinner.rate_hz)
     usual = np.zeros(len(known))
     if of_chain:
         usual[-len(chain.values) :] = chain.spread
-    again = rows_of(found, terms, chain, noisy)[1] if noisy else []
+    again = _rows_of(found, terms, chain, noisy)[1] if noisy else []
     alike = [len(r.y) for r in rows] == [len(r.y) for r in again]
     regression = _regression_of(rows, [*terms, *of_chain], model, block_s, again if alike else None)
     noise = _noise_of_a_block(regression)
-    evidence, runs = evidence_of(regression, noise, known, *((chain, chain) if of_chain else ()))
+    evidence, runs = _evidence_of(regression, noise, known, *((chain, chain) if of_chain else ()))
     return FittedReference(
         recordings=base,
         as_recorded=as_recorded,
@@ -171,23 +171,23 @@ def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> FittedReference
 def on_terms(reference: FittedReference, terms: Sequence[Term]) -> FittedReference:
     """The first set with the nonlinear parameters of its columns at other values."""
     found, chain = reference.found, reference.chain
-    _, rows = rows_of(found, terms, chain, reference.recorded)
+    _, rows = _rows_of(found, terms, chain, reference.recorded)
     of_chain = chain.terms if found.commanded else []
     regression = _regression_of(rows, [*terms, *of_chain], found.model, reference.block_s)
     chains = (chain, chain) if of_chain else ()
-    evidence, runs = evidence_of(regression, reference.noise, reference.known, *chains)
+    evidence, runs = _evidence_of(regression, reference.noise, reference.known, *chains)
     return replace(reference, terms=tuple(terms), rows=tuple(rows), evidence=evidence, runs=runs)
 
 
 def evidence_at(reference: FittedReference, chain: ChainTerms) -> Evidence:
     """Evidence of the first set, known by commands, with its columns taken at another chain than its own."""
     found, first = reference.found, reference.chain
-    _, rows = rows_of(found, reference.terms, chain, reference.recorded, first)
+    _, rows = _rows_of(found, reference.terms, chain, reference.recorded, first)
     regression = _regression_of(rows, [*reference.terms, *chain.terms], found.model, reference.block_s)
-    return evidence_of(regression, reference.noise, reference.known, chain, first)[0]
+    return _evidence_of(regression, reference.noise, reference.known, chain, first)[0]
 
 
-def evidence_of(
+def _evidence_of(
     regression: Regression,
     noise: np.ndarray,
     known: np.ndarray,
@@ -254,9 +254,9 @@ def joined_at(
     mistakes: tuple[Finding, ...],
     own_effects: Effects = (),
 ) -> Joint:
-    """Two sets on the same columns, those of the second taken at a chain of its own; `own_effects` as `rows_of`."""
+    """Two sets on the same columns, those of the second taken at a chain of its own; `own_effects` as `_rows_of`."""
     found, model = reference.found, reference.found.model
-    segments, rows = rows_of(found, reference.terms, chain, recorded, reference.chain, new.vehicle, own_effects)
+    segments, rows = _rows_of(found, reference.terms, chain, recorded, reference.chain, new.vehicle, own_effects)
     rows = _as_seen(rows, reference)
     terms = [*reference.terms, *(chain.terms if found.commanded else [])]
     regimes = [(s.run, regime_variables(s, model.prepared)) for s in segments]
@@ -270,7 +270,7 @@ def joined_at(
     evidence = _with_known_effects(_noisy_evidence(of_new, reference.noise), reference.known)
     evidence = within_bounds(evidence, reference)
     inertia, inertia_of_base = (
-        inertia_of(v, reference.evidence.channels) for v in (new.vehicle, reference.recordings.vehicle)
+        _inertia_of(v, reference.evidence.channels) for v in (new.vehicle, reference.recordings.vehicle)
     )
     return Joint(
         base=reference.evidence,
@@ -299,7 +299,7 @@ def moved_by(reference: FittedReference, joint: Joint, effects: Effects) -> Join
     return replace(again, uncorrected=joint.uncorrected)
 
 
-def rows_of(
+def _rows_of(
     found: Fitted,
     terms: Sequence[Term],
     chain: ChainTerms | None,
@@ -383,10 +383,10 @@ def _how_far(known: Sequence[Mapping[str, np.ndarray]]) -> dict[str, float]:
     return {n: float(np.nanquantile(np.abs(np.concatenate([k[n] for k in known])), 0.95)) for n in names}
 
 
-def inertia_of(vehicle: Vehicle, channels: np.ndarray) -> np.ndarray:
+def _inertia_of(vehicle: Vehicle, channels: np.ndarray) -> np.ndarray:
     """What turns each channel's acceleration into a force (kg) or a moment (kg m²), (C,); 1 for sensors' channels."""
     of_moment = {channel: getattr(vehicle.inertia_kg_m2, name[-2:]) for channel, name in _INERTIA_OF.items()}
-    return np.array([vehicle.mass_kg if c in FORCES else of_moment.get(int(c), 1.0) for c in channels])
+    return np.array([vehicle.mass_kg if c in _FORCES else of_moment.get(int(c), 1.0) for c in channels])
 
 
 def by_run(evidence: Evidence, regression: Regression) -> tuple[Evidence, ...]:
@@ -413,7 +413,7 @@ def _with_known_effects(evidence: Evidence, known: np.ndarray) -> Evidence:
     """
     gram, cross, bias = evidence.gram.copy(), evidence.cross.copy(), evidence.bias_gram.copy()
     for place, channel in enumerate(evidence.channels):
-        key = "mass" if channel in FORCES else _INERTIA_OF.get(int(channel))
+        key = "mass" if channel in _FORCES else _INERTIA_OF.get(int(channel))
         if key is None or key not in evidence.start:
             continue
         turn = np.eye(len(known))

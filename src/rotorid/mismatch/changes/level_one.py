@@ -57,12 +57,14 @@ BUDGET = {
 }
 """Weight of each kind in the false alarms, shared evenly by its members: what pilots break has more."""
 _LIFT = ("mass_kg", "thrust_coefficient_n_s2")
-VALUES = {
+_VALUES = {
     "yaw_trim": ("torque_coefficient_n_m_s2",),
     **dict.fromkeys(("lift", "lift_of_throttle", "lift_without_voltage"), _LIFT),
     "follows": ("rotor_speed_limits_rad_s",),
 }
-CAUSES = {kind: (*VALUES.get(kind, ()), *(e.id for e in catalogue().values() if kind in e.shows_in)) for kind in BUDGET}
+CAUSES = {
+    kind: (*_VALUES.get(kind, ()), *(e.id for e in catalogue().values() if kind in e.shows_in)) for kind in BUDGET
+}
 """Believed values and ids that may be behind a kind of quantity. Where it is stated, no limit of theirs is."""
 SCATTER = (
     ("share", "NeuroBEM", 0.018, 3, 4),
@@ -132,7 +134,7 @@ class _Usual:
 
 
 @dataclass(frozen=True)
-class Flight:
+class _OneFlight:
     """A quantity of one flight."""
 
     name: str
@@ -146,8 +148,8 @@ class Difference:
     """By how much a quantity differs between two sets, in its unit; of a logarithm relative."""
 
     quantity: Quantity
-    good: tuple[Flight, ...]
-    new: tuple[Flight, ...]
+    good: tuple[_OneFlight, ...]
+    new: tuple[_OneFlight, ...]
     value: float
     sd: float
     freedom: float
@@ -453,7 +455,7 @@ def _difference(
         tests.append((2.0 * float(stdtr(degrees, -abs(value) / sd)), sd, degrees, variance, float(reach) * sd))
     rate, sd, degrees, variance, _ = min(tests)
     flights = [
-        Flight(n, float(v), float(np.sqrt(w))) for n, v, w in zip(names, numbers.values, numbers.own, strict=True)
+        _OneFlight(n, float(v), float(np.sqrt(w))) for n, v, w in zip(names, numbers.values, numbers.own, strict=True)
     ]
     rate, smallest = min(1.0, 2.0 * rate / share), min(test[-1] for test in tests)
     scatter = float(np.sqrt(variance))

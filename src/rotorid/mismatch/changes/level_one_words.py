@@ -10,12 +10,12 @@ from rotorid.mismatch.changes.level_one import CAUSES, Difference, LevelOne
 from rotorid.mismatch.changes.quantities import KINDS, SENSORS
 from rotorid.mismatch.decision.words import capital, listed, number
 
-THRUST = "it gives {} thrust, or there is {} weight near it"
+_THRUST = "it gives {} thrust, or there is {} weight near it"
 _MEANS = {
     "share": (
         "rotor {m} is asked for {size} {more} than in {good}",
-        THRUST.format("less", "more"),
-        THRUST.format("more", "less"),
+        _THRUST.format("less", "more"),
+        _THRUST.format("more", "less"),
     ),
     "roll": (
         "the roll trim differs from that of {good} by {size} of thrust times arm",
@@ -70,7 +70,6 @@ _MEANS = {
     ),
 }
 """Of a kind, or of a trim, what is seen and what may be behind it: where it is more, and where it is less."""
-_PERCENT = ("share", "trim", "yaw_trim", "sideways", "gyroscope_scale", "drag")
 _SHOWN = ("share", "trim", "lift", "lift_of_throttle", "lift_without_voltage", "yaw_trim", "sideways")
 """Kinds whose smallest change is stated."""
 _SMALLEST = {

@@ -58,7 +58,7 @@ _OF_OTHER_AXES = "of other axes", ("", "C_{own},{load}")
 """The same of a load on another axis."""
 _MOUNTED_RAD = 0.001
 """One-sigma of the angle by which a load, or the vehicle, stands otherwise on another day: a twentieth of a degree."""
-WIDE = 20.0
+_WIDE = 20.0
 """One-sigmas between days in which nothing changed that a change is believed to have at least: narrower, its estimate
 would be drawn to nothing by as much as the two differ."""
 _FORM_SD_OF_READING = 0.1
@@ -137,7 +137,7 @@ def instrument_reference_of(base: RecordingSet) -> InstrumentReference:
         own=own,
         known=known,
         wander=_wander_of(terms, own, known, model),
-        mistakes=(*mistakes, *steps_of(setup, model)),
+        mistakes=(*mistakes, *_steps_of(setup, model)),
     )
 
 
@@ -180,7 +180,7 @@ def joint_of_instruments(reference: InstrumentReference, new: RecordingSet) -> J
         recordings=new,
         recorded=(),
         rows_of_new=second.rows,
-        mistakes_of_new=(*mistakes, *steps_of(setup, model)),
+        mistakes_of_new=(*mistakes, *_steps_of(setup, model)),
         squares=mean_squares(second.rows, second.regression, compared, scales(setup.instrument.largest)),
         more_usual=more,
         form_sd=_FORM_SD_OF_READING,
@@ -252,7 +252,7 @@ def _decide_instrument_changes(
     much, and a leftover is learnt, too, from what the most promising of these leaves: `sizes` (C, K, K) are products
     that sizes of contributions are taken from.
     """
-    prior = replace(prior, value_reach=WIDE, change_reach=0.0)
+    prior = replace(prior, value_reach=_WIDE, change_reach=0.0)
     unit = unit_of(base, new)
     spectra = spectrum_of(base, unit), spectrum_of(new, unit)
     starts = [np.zeros(len(unit)), difference_of(spectra)]
@@ -298,7 +298,7 @@ def _takes_time(effect: str) -> bool:
     return effect in catalogue() and bool(catalogue()[effect].shows)
 
 
-def steps_of(setup: PreparedInstrument, model: ReadingModel) -> tuple[Finding, ...]:
+def _steps_of(setup: PreparedInstrument, model: ReadingModel) -> tuple[Finding, ...]:
     """That a set's readings are rounded to steps that are coarse next to the noise: one finding or none."""
     found, _ = quantisation(setup, model.noise)
     return () if found is None else (found,)

@@ -173,12 +173,12 @@ def joint(spectra: tuple[Spectrum, Spectrum], found: Found, spread: np.ndarray) 
     variance = found.problem.variance
     base, new = (s.weighed(variance) for s in spectra)
     free = _free_of(found.problem.terms, found.problem.columns_of, spectra[1].rows)
-    of_common = integrated(base.gram + new.gram, base.cross + new.cross, free)
-    of_usual = integrated(*_difference_products(base, new, free), _in_units(spread, spectra[1].unit) ** 2)
+    of_common = _integrated(base.gram + new.gram, base.cross + new.cross, free)
+    of_usual = _integrated(*_difference_products(base, new, free), _in_units(spread, spectra[1].unit) ** 2)
     return found.log_posterior + of_common + of_usual + sum(s.evidence_of(variance) for s in spectra)
 
 
-def integrated(gram: np.ndarray, cross: np.ndarray, variance: np.ndarray) -> float:
+def _integrated(gram: np.ndarray, cross: np.ndarray, variance: np.ndarray) -> float:
     """Log of the integral over coefficients (K,) with normal priors of a `variance` (K,), nats."""
     root = np.sqrt(variance)
     inner = np.eye(len(cross)) + root[:, None] * gram * root

@@ -28,7 +28,7 @@ from rotorid.recordings import columns as c
 CONDITIONS = ("u", "v", "w", "p", "q", "r", "a_x", "a_y", "load", "voltage")
 """Velocity over the hover's inflow and body rates (rad/s), body axes; specific force along x and y, and the thrust that
 is felt less one, over gravity; logarithm of the battery's voltage."""
-AXES = ("x", "y", "z")
+_AXES = ("x", "y", "z")
 _TURNS = ("roll", "pitch", "yaw")
 _LEAST_FELT = 0.3
 """Least specific force along the rotors' axis over gravity, and least thrust over its mean, that is divided by."""
@@ -36,7 +36,7 @@ BY_VOLTAGE, DOUBT_OF_VOLTAGE = (-2.0, 0.0), 0.5
 """Bounds of the slope of the thrust asked for by the voltage, both logarithms (a motor's thrust goes with the voltage
 squared at most), and what it may be wrong by: under load the voltage falls, and a flight alone cannot tell which is
 cause."""
-PIECES, _SHORTEST_PIECE_S, _LONGEST_PIECE_S = 8, 1.5, 10.0
+_PIECES, _SHORTEST_PIECE_S, _LONGEST_PIECE_S = 8, 1.5, 10.0
 """A run is cut into so many pieces of such a length: what is alike within one counts once."""
 SENSORS = {"gyroscope": c.ANGULAR_VELOCITY, "accelerometer": c.SPECIFIC_FORCE}
 PART = re.compile(r"_\d+$")
@@ -44,7 +44,7 @@ PART = re.compile(r"_\d+$")
 
 
 @dataclass(frozen=True)
-class Kind:
+class _Kind:
     """Quantities of one kind: what they are counted in, and at which conditions they are compared."""
 
     name: str
@@ -57,36 +57,36 @@ class Kind:
     """Whether it is one: differences are relative."""
 
 
-VELOCITY = ("u", "v", "w")
+_VELOCITY = ("u", "v", "w")
 KINDS = {
     k.name: k
     for k in (
-        Kind("share", "of its own mean share", VELOCITY, 3.0),
-        Kind("trim", "of the thrust times the arm", VELOCITY, 3.0),
-        Kind("yaw_trim", "of the torque of all rotors", VELOCITY, 3.0),
-        Kind("sideways", "of the weight", (*VELOCITY, "load"), 0.1),
-        Kind("lift", "", VELOCITY, 1.0, logarithm=True),
-        Kind("lift_of_throttle", "", ("voltage", "load"), 0.1, logarithm=True),
-        Kind("lift_without_voltage", "", ("load",), 0.1, logarithm=True),
-        Kind("follows", "", logarithm=True),
-        Kind("accelerometer", "g"),
-        Kind("gyroscope", "rad/s", ("p", "q", "r"), 0.1),
-        Kind("gyroscope_scale", "of the rate", ("p", "q", "r")),
-        Kind("gyroscope_turn", "rad", ("p", "q", "r")),
-        Kind("drag", "of the weight per hover's inflow", VELOCITY),
-        Kind("noise", "", logarithm=True),
+        _Kind("share", "of its own mean share", _VELOCITY, 3.0),
+        _Kind("trim", "of the thrust times the arm", _VELOCITY, 3.0),
+        _Kind("yaw_trim", "of the torque of all rotors", _VELOCITY, 3.0),
+        _Kind("sideways", "of the weight", (*_VELOCITY, "load"), 0.1),
+        _Kind("lift", "", _VELOCITY, 1.0, logarithm=True),
+        _Kind("lift_of_throttle", "", ("voltage", "load"), 0.1, logarithm=True),
+        _Kind("lift_without_voltage", "", ("load",), 0.1, logarithm=True),
+        _Kind("follows", "", logarithm=True),
+        _Kind("accelerometer", "g"),
+        _Kind("gyroscope", "rad/s", ("p", "q", "r"), 0.1),
+        _Kind("gyroscope_scale", "of the rate", ("p", "q", "r")),
+        _Kind("gyroscope_turn", "rad", ("p", "q", "r")),
+        _Kind("drag", "of the weight per hover's inflow", _VELOCITY),
+        _Kind("noise", "", logarithm=True),
     )
 }
 
 _TURNED = {"x": ("y", "z"), "y": ("z", "x"), "z": ("x", "y")}
-_RATE = dict(zip(AXES, "pqr", strict=True))
+_RATE = dict(zip(_AXES, "pqr", strict=True))
 SLOPES: dict[str, dict[str, tuple[tuple[str, str, float], ...]]] = {
-    "gyroscope_scale": {"all": tuple((f"gyroscope/{a}", _RATE[a], 1.0) for a in AXES)},
+    "gyroscope_scale": {"all": tuple((f"gyroscope/{a}", _RATE[a], 1.0) for a in _AXES)},
     # Of θ in Ω_m = Ω + θ × Ω: the part of the slopes that is not symmetric.
     "gyroscope_turn": {
         a: ((f"gyroscope/{j}", _RATE[i], 0.5), (f"gyroscope/{i}", _RATE[j], -0.5)) for a, (i, j) in _TURNED.items()
     },
-    "drag": {a: ((f"sideways/{a}", by, 1.0),) for a, by in zip(AXES[:2], "uv", strict=True)},
+    "drag": {a: ((f"sideways/{a}", by, 1.0),) for a, by in zip(_AXES[:2], "uv", strict=True)},
 }
 """Of each kind of slope, by member: of which response, by which condition, with which sign. Body rates' own moments
 (L_p, M_q) are none: a closed loop feigns them."""
@@ -171,7 +171,7 @@ def flown(run: Run, vehicle: Vehicle, grid: Grid) -> Flown | None:
     time_s = np.concatenate([part[0] for part in parts])
     x = np.concatenate([part[1] for part in parts])
     y = {k: np.concatenate([part[2][k] for part in parts]) for k in parts[0][2]}
-    length_s = np.clip(len(time_s) / thin.rate_hz / PIECES, _SHORTEST_PIECE_S, _LONGEST_PIECE_S)
+    length_s = np.clip(len(time_s) / thin.rate_hz / _PIECES, _SHORTEST_PIECE_S, _LONGEST_PIECE_S)
     count = max(2, round(len(time_s) / thin.rate_hz / length_s))
     cuts = [np.arange(k * len(time_s) // count, (k + 1) * len(time_s) // count) for k in range(count)]
     cuts = [cut for cut in cuts if len(cut)]
@@ -207,7 +207,7 @@ def _rows(segment: Segment, vehicle: Vehicle, thin: Thinner, grid: Grid):
         y = _of_rotors(asked, turned, groups, x[:, CONDITIONS.index("load")], vehicle, thin, grid)
     for name, unit in (("accelerometer", vehicle.gravity_m_s2), ("gyroscope", 1.0)):
         if name in groups:
-            y |= {f"{name}/{a}": column / unit for a, column in zip(AXES, thin(groups[name]).T, strict=True)}
+            y |= {f"{name}/{a}": column / unit for a, column in zip(_AXES, thin(groups[name]).T, strict=True)}
     lift = "lift"
     if grid.throttle and not grid.speeds:
         # A throttle gives less thrust as the battery empties; a speed does not.
@@ -228,7 +228,7 @@ def _of_rotors(asked, turned, groups, load, vehicle: Vehicle, thin: Thinner, gri
         y |= {f"follows/{i + 1}": _log(_not_idle(a)) - _log(_not_idle(b)) for i, (a, b) in enumerate(pairs)}
     if "force" in groups:
         force = thin(groups["force"]) / weight
-        y |= {f"sideways/{a}": force[:, k] for k, a in enumerate(AXES[:2])}
+        y |= {f"sideways/{a}": force[:, k] for k, a in enumerate(_AXES[:2])}
         y["lift/all"] = _log(thrust / weight) - _log(np.maximum(1.0 + load, _LEAST_FELT))
     if "moment" in groups:
         arm, torque = _levers(vehicle)
@@ -267,9 +267,9 @@ def _noise(run: Run, vehicle: Vehicle, grid: Grid) -> dict[str, float]:
     for name, own in names.items():
         values = run.array(own)
         third = np.diff(values[fresh_samples(values)], n=3, axis=0) ** 2
-        if len(third) < 8 * PIECES:
+        if len(third) < 8 * _PIECES:
             continue
-        size = np.quantile([part.mean() for part in np.array_split(third, 4 * PIECES)], 0.25)
+        size = np.quantile([part.mean() for part in np.array_split(third, 4 * _PIECES)], 0.25)
         if size > 0:
             out[f"noise/{name}"] = 0.5 * float(np.log(size / 20.0))
     return out

@@ -22,8 +22,8 @@ from rotorid.mismatch.posterior.status import CLAIMED, Estimate
 VALUES = frozenset(NAMES.values())
 WHOLE = {"flight": "the weight", "stand": "the largest load", "bench": "the largest load"}
 """Kind of the sets to what shares are of."""
-SHARE = {"flight": "share_of_weight", "stand": "share_of_largest_load", "bench": "share_of_largest_load"}
-GAINS = frozenset(name for name in VALUE_NAMES.values() if name.startswith("reading_gain"))
+_SHARE = {"flight": "share_of_weight", "stand": "share_of_largest_load", "bench": "share_of_largest_load"}
+_GAINS = frozenset(name for name in VALUE_NAMES.values() if name.startswith("reading_gain"))
 """Values that a calibration measures, by dead weights on one axis after the other."""
 _MOST_LIMITS = 4
 """Things that did not change and are named with their limit; more are counted."""
@@ -52,7 +52,7 @@ def advice(found: Changes) -> list[str]:
         return []
     ids = {i for c in found.changes if c.status in CLAIMED for i in (c.id, *c.alternatives)}
     remedies = {effect.remedy for effect in catalogue().values() if effect.id in ids}
-    if ids & GAINS or "calibrate" in remedies:
+    if ids & _GAINS or "calibrate" in remedies:
         return ["Calibrate it again before its readings are used: what was found is part of the calibration."]
     if "zero" in remedies:
         return ["Zero it again before each run; the calibration itself has not changed."]
@@ -128,7 +128,7 @@ def as_json(found: Changes) -> dict:
                 "symbol": x.symbol,
                 "at_most": x.at_most,
                 "unit": x.unit,
-                SHARE[found.kind]: x.share or None,
+                _SHARE[found.kind]: x.share or None,
             }
             for x in found.limits
         ],

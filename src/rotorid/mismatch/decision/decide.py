@@ -19,7 +19,7 @@ from rotorid.mismatch.plant.rows import CHANNELS, Rows
 from rotorid.mismatch.plant.unknowns import UNKNOWNS
 from rotorid.mismatch.posterior.status import CLAIMED, Estimate
 
-COST_PER_VALUE = 12.0
+_COST_PER_VALUE = 12.0
 """Whitened squares that a further wrong value must explain."""
 _MOST_VALUES = 3
 _LEAST_ROOM = 0.6
@@ -193,7 +193,7 @@ def wrong_values(
         for key in trust:
             change = coefficients(regression, fit, key)[0][0]
             if key in keys:
-                cost += COST_PER_VALUE + min((change / trust[key]) ** 2, _MOST_DISTRUST)
+                cost += _COST_PER_VALUE + min((change / trust[key]) ** 2, _MOST_DISTRUST)
             else:
                 cost += (change / room[key]) ** 2
         return fit.gain - cost

@@ -19,7 +19,7 @@ from rotorid.mismatch.decision.findings import rms
 from rotorid.recordings import Vehicle
 
 WINDOW_S = 0.5
-AXES = {"moment_x": "xx", "moment_y": "yy"}
+_AXES = {"moment_x": "xx", "moment_y": "yy"}
 
 
 def drift_m(vehicle: Vehicle, channel: str, stretches: Iterable[tuple[np.ndarray, np.ndarray]]) -> float | None:
@@ -30,8 +30,8 @@ def drift_m(vehicle: Vehicle, channel: str, stretches: Iterable[tuple[np.ndarray
     """
     if channel.startswith("force_"):
         power, scale = 1, 1.0 / vehicle.mass_kg
-    elif channel in AXES:
-        inertia = getattr(vehicle.inertia_kg_m2, AXES[channel])
+    elif channel in _AXES:
+        inertia = getattr(vehicle.inertia_kg_m2, _AXES[channel])
         power, scale = 3, vehicle.gravity_m_s2 / (6.0 * inertia)
     else:
         return None

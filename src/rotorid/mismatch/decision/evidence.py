@@ -28,7 +28,7 @@ _BLOCKS_S = (2.0, 1.0, 0.5, 0.25)
 """Lengths of the blocks that the bootstrap draws, the first that gives LEAST_BLOCKS: residuals are alike for less."""
 _LEAST_BLOCKS = 6
 _BOOTSTRAPS = 400
-LEAST_SHARE = 0.01
+_LEAST_SHARE = 0.01
 """Part of the explained error below which an effect is only suggested: names that fit unmodelled residual hold less
 than 0.7 % of what a model explains."""
 _LARGE_GAIN = 0.9
@@ -39,7 +39,7 @@ it."""
 
 
 @dataclass(frozen=True)
-class Ratio:
+class _Ratio:
     """Error of a channel with an effect over that without it, with its 95 % interval."""
 
     channel: str
@@ -49,10 +49,10 @@ class Ratio:
 
 
 @dataclass(frozen=True)
-class RowsEvidence:
+class _RowsEvidence:
     """What some rows say of one effect."""
 
-    ratios: tuple[Ratio, ...] = ()
+    ratios: tuple[_Ratio, ...] = ()
     """Of every channel that the effect acts on, the most significant gain first; empty where the rows do not excite
     it."""
     beyond_leftover: bool = True
@@ -127,7 +127,7 @@ def judged(
         reason = "it is smaller than what the model leaves over"
     elif rules.MAY_BE_NOTHING(not _away_from_nothing(finding)):
         reason = "every number of it may be nothing"
-    elif rules.SLIGHT(bool(share < LEAST_SHARE and slight and not finding.windows)):
+    elif rules.SLIGHT(bool(share < _LEAST_SHARE and slight and not finding.windows)):
         reason = f"it takes {100 * share:.1f} % of the error that goes"
     best = reported.ratios[0] if reported.ratios else None
     finding = replace(finding, gain=None if best is None else (best.value, best.low, best.high))
@@ -153,7 +153,7 @@ def _in_windows(trace: ChannelTrace, windows: tuple[tuple[str, float, float], ..
 
 def contribution(
     analysis: Analysis, without: tuple[np.ndarray, ...], rows: list[np.ndarray], acts_on: Collection[str] = ()
-) -> RowsEvidence:
+) -> _RowsEvidence:
     """What some rows (masks of the traces) say of an effect, given what is left of the traces without it.
 
     Judged are the channels that the effect `acts_on`, others change by what the rest of the model is fitted to
@@ -171,13 +171,13 @@ def contribution(
     there = {c: np.sqrt(s[2] / max(s[3], 1)) / noise[c] for c, s in size.items()}
     strongest = max(here.values(), default=0.0)
     if strongest <= _LEAST_EXCITED * max(there.values(), default=0.0):
-        return RowsEvidence()
+        return _RowsEvidence()
     sensors = {t.channel for t in analysis.between_sensors}
     differing = [c for c in here if here[c] > _ACTS * strongest]
     acting = [c for c in here if c in acts_on or (c in sensors and c in differing)] or differing
     ratios = [r for r in (ratio_of(analysis, without, rows, c) for c in acting) if r is not None]
     beyond = any(here[c] * noise[c] > _leftover_rms(analysis, rows, c) for c in acting)
-    return RowsEvidence(tuple(sorted(ratios, key=lambda r: r.high)), beyond)
+    return _RowsEvidence(tuple(sorted(ratios, key=lambda r: r.high)), beyond)
 
 
 def _leftover_rms(analysis: Analysis, rows: list[np.ndarray], channel: str) -> float:
@@ -189,7 +189,9 @@ def _leftover_rms(analysis: Analysis, rows: list[np.ndarray], channel: str) -> f
     return float(np.sqrt(max(0.0, np.nanmean(left**2) - (analysis.noise_floor.get(channel) or 0.0) ** 2)))
 
 
-def ratio_of(analysis: Analysis, without: tuple[np.ndarray, ...], rows: list[np.ndarray], channel: str) -> Ratio | None:
+def ratio_of(
+    analysis: Analysis, without: tuple[np.ndarray, ...], rows: list[np.ndarray], channel: str
+) -> _Ratio | None:
     """Error of a channel with an effect over that without it, in the blocks in which it acts; None where these are few.
 
     Blocks are drawn anew for the interval. What acts for a short time is judged in shorter blocks.
@@ -206,7 +208,7 @@ def ratio_of(analysis: Analysis, without: tuple[np.ndarray, ...], rows: list[np.
     draws = acting[np.random.default_rng(1).integers(0, len(acting), (_BOOTSTRAPS, len(acting)))].sum(axis=1)
     low, high = np.quantile(np.sqrt(draws[:, 0] / np.maximum(draws[:, 1], 1e-300)), [0.025, 0.975])
     value = np.sqrt(acting[:, 0].sum() / max(acting[:, 1].sum(), 1e-300))
-    return Ratio(channel, float(value), float(low), float(high))
+    return _Ratio(channel, float(value), float(low), float(high))
 
 
 def _block_energies(trace: ChannelTrace, added: np.ndarray, mask: np.ndarray, block_s: float):

@@ -279,9 +279,9 @@ def with_probabilities(findings: Iterable[Finding], found: Found) -> list[Findin
     decided = {found.problem.terms[key].effect for key in found.model if key in found.problem.effects}
 
     def weighed(one: Finding) -> Finding:
-        if not decided & members(one):
+        if not decided & _members(one):
             return one
-        probability = min(1.0, share_of(found, weights, members(one)))
+        probability = min(1.0, share_of(found, weights, _members(one)))
         return _with_probability(one, probability, stated.get(one.id))
 
     out = [weighed(one) for one in findings]
@@ -289,7 +289,7 @@ def with_probabilities(findings: Iterable[Finding], found: Found) -> list[Findin
     return [one for one in out if one.status != "not_established" or one.id not in rivals]
 
 
-def members(finding: Finding) -> set[str]:
+def _members(finding: Finding) -> set[str]:
     """The ids of a claim: its own, and its class."""
     return {finding.id, *finding.alternatives} if finding.status in CLAIMED else set()
 

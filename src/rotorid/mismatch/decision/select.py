@@ -35,7 +35,7 @@ SMALLEST_SIZE = rules.SIZE["least"]
 SHARE_OF_LARGEST = rules.OVERSHADOWED["share"]
 COST_PER_EFFECT = 20.0
 """Whitened squares that a further id must explain before two ids are preferred to one form of one of them."""
-COST_OF_UNKNOWN = 40.0
+_COST_OF_UNKNOWN = 40.0
 """Whitened squares, and SHARE_OF_UNKNOWN of what it explains, that an empirical term pays for having no name."""
 _SHARE_OF_UNKNOWN = 0.1
 _ALTERNATIVE_P = 0.01
@@ -59,7 +59,7 @@ NEAR_LIMIT = 0.98
 
 
 @dataclass(frozen=True)
-class JudgedTerm:
+class _JudgedTerm:
     """A term judged given the present model."""
 
     key: str
@@ -78,7 +78,7 @@ class JudgedTerm:
     def score(self) -> float:
         """Gain less what its parameters cost; noise that is larger than assumed makes both larger."""
         score = self.gain - COST_PER_PARAMETER * self.inflation * len(self.beta)
-        return score if self.named else (1 - _SHARE_OF_UNKNOWN) * score - COST_OF_UNKNOWN * self.inflation
+        return score if self.named else (1 - _SHARE_OF_UNKNOWN) * score - _COST_OF_UNKNOWN * self.inflation
 
 
 @dataclass
@@ -106,9 +106,9 @@ def _named_first(term: Term) -> int:
     return int(term.effect in UNKNOWNS)
 
 
-def price(term: Term) -> float:
+def _price(term: Term) -> float:
     """Whitened squares that a term costs by its parameters, by its id and by its want of a name."""
-    return COST_PER_PARAMETER * term.size + COST_PER_EFFECT + COST_OF_UNKNOWN * (term.effect in UNKNOWNS)
+    return COST_PER_PARAMETER * term.size + COST_PER_EFFECT + _COST_OF_UNKNOWN * (term.effect in UNKNOWNS)
 
 
 def keys_of(terms: Iterable[Term]) -> list[str]:
@@ -128,7 +128,7 @@ class Search:
         self.always = [t.key for t in regression.terms if t.kind != "effect"]
         self.ask = ask
         self.blocks = int(regression.training.sum())
-        self._judged: dict[tuple, JudgedTerm] = {}
+        self._judged: dict[tuple, _JudgedTerm] = {}
         self._failing: dict[tuple, tuple[str | None, float]] = {}
         self._largest: dict[int, np.ndarray] = {}
         self._place = {key: i for i, key in enumerate(self.terms)}.__getitem__
@@ -155,14 +155,14 @@ class Search:
         limits = [term.form.parameters[i].negligible for i in term.form.linear]
         return not rules.NEGLIGIBLE(not any(abs(value) > limit for value, limit in zip(beta, limits, strict=True)))
 
-    def judge(self, key: str, active: list[str]) -> JudgedTerm:
+    def judge(self, key: str, active: list[str]) -> _JudgedTerm:
         """A term added to (or, if in `active`, kept in) the model; remembered."""
         asked = key, self.regression.set_of([*active, key])
         if asked not in self._judged:
             making_room(self._judged, _MOST_JUDGED)[asked] = self._judge(key, active)
         return self._judged[asked]
 
-    def _judge(self, key: str, active: list[str]) -> JudgedTerm:
+    def _judge(self, key: str, active: list[str]) -> _JudgedTerm:
         base = self.without(key, active)
         keys = self.always + sorted({*active, key}, key=self._place)
         fit = self.regression.fit(keys)
@@ -181,7 +181,7 @@ class Search:
                 own, _ = self.regression.own_part(others, key, beta)
             physical = not rules.OWN_PART(own <= SHARE_OF_LARGEST**2 or noise >= MOST_ATTENUATION)
         physical = physical and not rules.STRAIN(self.strains(fit, base))
-        return JudgedTerm(key, beta, p_value, gain, inflation, physical, self.terms[key].effect not in UNKNOWNS)
+        return _JudgedTerm(key, beta, p_value, gain, inflation, physical, self.terms[key].effect not in UNKNOWNS)
 
     def exact(self, key: str) -> bool:
         """Whether a term's equation is geometry or a definition, so that its form cannot be wrong."""
@@ -232,7 +232,7 @@ class Search:
 
     def judged(
         self, terms: Iterable[Term], active: list[str], turn: Callable[[Term], int] = lambda _: 0
-    ) -> Iterator[JudgedTerm]:
+    ) -> Iterator[_JudgedTerm]:
         """Terms judged given a model, by their turn, then the best first.
 
         To judge one costs many times what `most` does: it is done only where no other is sure to be better.
@@ -243,7 +243,7 @@ class Search:
         heapify(waiting)
         while waiting:
             own, _, number, found = heappop(waiting)
-            if isinstance(found, JudgedTerm):
+            if isinstance(found, _JudgedTerm):
                 yield found
             else:
                 candidate = self.judge(found.key, active)
@@ -251,7 +251,7 @@ class Search:
 
     def candidates(
         self, active: list[str], dropped: Collection[str] = (), turn: Callable[[Term], int] = lambda _: 0
-    ) -> Iterator[JudgedTerm]:
+    ) -> Iterator[_JudgedTerm]:
         """Terms whose id is neither in the model yet nor dropped and that are worth their parameters, judged."""
         taken = {self.terms[k].once for k in active} | set(dropped)
         free = [t for t in self.terms.values() if t.kind == "effect" and t.once not in taken]
@@ -268,13 +268,13 @@ class Search:
 
     def worth(self, keys: list[str]) -> float:
         """Whitened squares that a model explains, less what its parameters and ids cost."""
-        return self.regression.explained(self.always + keys) - sum(price(self.terms[k]) for k in keys)
+        return self.regression.explained(self.always + keys) - sum(_price(self.terms[k]) for k in keys)
 
     def worth_with(self, keys: list[str], further: Sequence[Term]) -> list[float]:
         """The same of a model with each of further terms."""
         gains = self.regression.explained_with(self.always + keys, keys_of(further))
-        cost = sum(price(self.terms[k]) for k in keys)
-        return [gain - cost - price(term) for gain, term in zip(gains, further, strict=True)]
+        cost = sum(_price(self.terms[k]) for k in keys)
+        return [gain - cost - _price(term) for gain, term in zip(gains, further, strict=True)]
 
     def swapped(self, active: list[str], dropped: dict[str, str]) -> list[str] | None:
         """A model with one id in another's place, if it explains clearly more: the first to enter may be wrong.
@@ -503,7 +503,7 @@ class Search:
                 found += [term.effect] if self._replaces(term.key, own, rest) else []
         return found
 
-    def _replaces(self, other: str, own: JudgedTerm, rest: list[str]) -> bool:
+    def _replaces(self, other: str, own: _JudgedTerm, rest: list[str]) -> bool:
         """Whether given another term alone one of the model is no longer needed."""
         instead = self.judge(other, rest)
         if not instead.physical or instead.p_value > _INSTEAD_P or instead.gain < 0.5 * own.gain:

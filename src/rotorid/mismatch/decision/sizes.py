@@ -21,21 +21,21 @@ from rotorid.recordings import Vehicle
 
 
 @dataclass(frozen=True)
-class ChannelScale:
+class _ChannelScale:
     """What a channel's errors are stated as a share of: a number in the channel's unit, and its name."""
 
     value: float
     words: str
 
 
-def scales(analysis: Analysis) -> dict[str, ChannelScale]:
+def scales(analysis: Analysis) -> dict[str, _ChannelScale]:
     """To every compared channel its scale; channels of which none is known are not among them."""
     if analysis.instrument is not None:
-        return of_reading(analysis)
+        return _of_reading(analysis)
     return _of_flight(analysis.believed)
 
 
-def _of_flight(vehicle: Vehicle) -> dict[str, ChannelScale]:
+def _of_flight(vehicle: Vehicle) -> dict[str, _ChannelScale]:
     """Weight for forces, and for moments what the rotors can make by differing while they carry the vehicle.
 
     Half of the rotors at twice the hover's thrust and the others at none: Σ |y_i| F_i, Σ |x_i| F_i and Σ Q_i at hover.
@@ -46,28 +46,28 @@ def _of_flight(vehicle: Vehicle) -> dict[str, ChannelScale]:
     thrust = coefficients * hover**2
     x, y, _ = np.abs(vehicle.rotor_positions_m()).T
     moments = (y @ thrust, x @ thrust, vehicle.torque_coefficients_n_m_s2().sum() * hover**2)
-    out = {f"force_{axis}": ChannelScale(weight, "of the weight") for axis in "xyz"}
+    out = {f"force_{axis}": _ChannelScale(weight, "of the weight") for axis in "xyz"}
     for axis, moment in zip("xyz", moments, strict=True):
         if moment > 0:
-            out[f"moment_{axis}"] = ChannelScale(float(moment), f"of the available {channel_words(f'moment_{axis}')}")
-    out |= {f"rotor_speed_{i + 1}": ChannelScale(hover, "of the hover speed") for i in range(vehicle.rotor_count)}
-    out |= {f"accelerometer_{axis}": ChannelScale(vehicle.gravity_m_s2, "of gravity") for axis in "xyz"}
-    return out | {f"gyroscope_{axis}": ChannelScale(1.0, "of 1 rad/s") for axis in "xyz"}
+            out[f"moment_{axis}"] = _ChannelScale(float(moment), f"of the available {channel_words(f'moment_{axis}')}")
+    out |= {f"rotor_speed_{i + 1}": _ChannelScale(hover, "of the hover speed") for i in range(vehicle.rotor_count)}
+    out |= {f"accelerometer_{axis}": _ChannelScale(vehicle.gravity_m_s2, "of gravity") for axis in "xyz"}
+    return out | {f"gyroscope_{axis}": _ChannelScale(1.0, "of 1 rad/s") for axis in "xyz"}
 
 
-def of_reading(analysis: Analysis) -> dict[str, ChannelScale]:
+def _of_reading(analysis: Analysis) -> dict[str, _ChannelScale]:
     """The largest load of the recordings, of forces and of moments."""
-    out: dict[str, ChannelScale] = {}
+    out: dict[str, _ChannelScale] = {}
     for group, columns in (("force", slice(0, 3)), ("moment", slice(3, 6))):
         largest = max((float(np.abs(x.load[:, columns]).max()) for x in analysis.loadings if x.size), default=0.0)
         if largest > 0:
-            out |= {f"{group}_{axis}": ChannelScale(largest, f"of the largest {group}") for axis in "xyz"}
+            out |= {f"{group}_{axis}": _ChannelScale(largest, f"of the largest {group}") for axis in "xyz"}
     if analysis.believed.rotors:
         speeds = [x.motion.rotor_speed for x in analysis.loadings if x.motion.rotor_speed is not None]
         top = max((float(np.nanmax(s)) for s in speeds if s.size), default=0.0)
         if top > 0:
             count = analysis.believed.rotor_count
-            out |= {f"rotor_speed_{i + 1}": ChannelScale(top, "of the largest speed") for i in range(count)}
+            out |= {f"rotor_speed_{i + 1}": _ChannelScale(top, "of the largest speed") for i in range(count)}
     return out
 
 

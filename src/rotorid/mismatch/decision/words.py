@@ -15,7 +15,7 @@ WRENCH_WORDS = {
     "moment_z": ("yaw moment", "moment about z"),
 }
 """Channels of force and moment in words: of a flight, and of a stand or bench."""
-SENSOR_WORDS = {
+_SENSOR_WORDS = {
     "accelerometer": "accelerometer against the velocity along",
     "gyroscope": "gyroscope against the attitude about",
 }
@@ -94,8 +94,8 @@ def channel_words(channel: str) -> str:
     group, _, last = channel.rpartition("_")
     if group == "rotor_speed":
         return f"speed of rotor {last}"
-    if group in SENSOR_WORDS:
-        return f"{SENSOR_WORDS[group]} {last}"
+    if group in _SENSOR_WORDS:
+        return f"{_SENSOR_WORDS[group]} {last}"
     return channel.replace("_", " ")
 
 

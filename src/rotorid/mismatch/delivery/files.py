@@ -29,7 +29,7 @@ from rotorid.mismatch.decision.findings import Analysis, Finding, RunWind, one_p
 from rotorid.mismatch.posterior.status import CLAIMED
 from rotorid.recordings import Vehicle
 
-Place = Literal["vehicle", "conditions", "instruments"]
+_Place = Literal["vehicle", "conditions", "instruments"]
 CONDITIONS, INSTRUMENTS = "conditions.yaml", "instruments.yaml"
 _ABOUT = {
     CONDITIONS: "Found in these recordings, no property of the vehicle: when the air moved, when a payload was aboard.",
@@ -37,13 +37,13 @@ _ABOUT = {
 }
 
 
-class Part(BaseModel):
+class _KeysOfFile(BaseModel):
     """A group of keys of a file: none unknown."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class Entry(Part):
+class Entry(_KeysOfFile):
     """One finding as a file has it."""
 
     id: str
@@ -58,7 +58,7 @@ class Entry(Part):
     interval_95: dict[str, tuple[float, float]] = Field(default_factory=dict)
 
 
-class Air(Part):
+class Air(_KeysOfFile):
     """Wind of a run, straight lines between instants; outside of the condition's own the air is still."""
 
     time_s: tuple[float, ...]
@@ -76,7 +76,7 @@ class Condition(Entry):
     air: Air | None = None
 
 
-class Conditions(Part):
+class Conditions(_KeysOfFile):
     """The whole of `conditions.yaml`."""
 
     set: str
@@ -103,7 +103,7 @@ class Conditions(Part):
         return ((condition.run == run) & (time_s >= start) & (time_s <= stop)).astype(float)
 
 
-class Window(Part):
+class Window(_KeysOfFile):
     """A part of a run, s on its clock."""
 
     run: str
@@ -118,7 +118,7 @@ class Fault(Entry):
     """When it was so; empty for always."""
 
 
-class Instruments(Part):
+class Instruments(_KeysOfFile):
     """The whole of `instruments.yaml`."""
 
     set: str
@@ -221,7 +221,7 @@ def form_of(finding: Finding) -> Form | SpeedForm | None:
     return next((f for f in speed_forms if f.equation == finding.equation), None)
 
 
-def place_of(finding: Finding) -> Place | None:
+def place_of(finding: Finding) -> _Place | None:
     """The file that a finding belongs to; None for a mistake in the set, which is corrected in the recordings."""
     effect = catalogue()[finding.id]
     if effect.kind == "mistake":
@@ -243,7 +243,7 @@ def claimed(findings: Sequence[Finding]) -> list[Finding]:
     return [f for f in findings if id(f) in kept]
 
 
-def delivered(analysis: Analysis, place: Place) -> list[Finding]:
+def delivered(analysis: Analysis, place: _Place) -> list[Finding]:
     """Findings that go into one of the files, in the order of the analysis, less what the chosen vehicle lacks.
 
     A condition or an error of a sensor may have no form (a wind, a delay of stamps): its parameters describe it.

@@ -110,7 +110,7 @@ def as_delivered(offered: Offered) -> Analysis:
         with_shares(last),
         notes=(*last.notes, *offered.remarks, *exports_lost(improved_vehicle(last), offered.believed)),
         believed_values=_value_rows(model, named, last.improved, offered.believed, offered.names),
-        value_correlations=value_correlations(model, named, offered.names),
+        value_correlations=_value_correlations(model, named, offered.names),
     )
 
 
@@ -246,7 +246,7 @@ def delivered_value(improved: Vehicle, believed: Vehicle, key: str) -> float:
     return believed_value(improved, key)
 
 
-def value_correlations(model: FittedModel, named: Candidate, names: Mapping[str, str]) -> dict[tuple[str, str], float]:
+def _value_correlations(model: FittedModel, named: Candidate, names: Mapping[str, str]) -> dict[tuple[str, str], float]:
     """Correlations of two values' estimates from ONLY_A_RATIO on, trust left out: what the recordings alone know."""
     keys = model.values_beside(named.active)
     loose = dict.fromkeys(keys, 1.0)

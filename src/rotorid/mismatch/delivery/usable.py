@@ -36,9 +36,8 @@ from rotorid.recordings.files import NO_BODY
 from rotorid.steps import step
 from rotorid.vehicle.control.swings import FLIGHTS, SECONDS, SEED, swings, turned_over
 from rotorid.vehicle.exports.forms import FORMS, export_vehicle
-from rotorid.vehicle.flyable import flyable
 from rotorid.vehicle.hover import wrench_at_rest, wrench_of_command
-from rotorid.vehicle.improved import command_path
+from rotorid.vehicle.improved import command_path, flyable
 
 _MOST_HOVER_SHARE = 0.9
 """Share of the full thrust at which a vehicle may hover: what steers it needs the rest."""
@@ -52,11 +51,11 @@ _LIGHT = 0.5
 """Share of the largest recorded thrust below which a vehicle is not taken to be in the air."""
 
 
-Question = Callable[[Vehicle], str]
+_Question = Callable[[Vehicle], str]
 """Takes a vehicle of kind `flight`; gives why it is not fit for use, without a full stop, or nothing."""
 
 
-def question_of(believed: Vehicle, runs: Sequence[Run]) -> tuple[Question, tuple[str, ...]]:
+def question_of(believed: Vehicle, runs: Sequence[Run]) -> tuple[_Question, tuple[str, ...]]:
     """What is asked of a vehicle derived from a believed one (a body, that hovers, that flies), and what the believed
     vehicle fails itself, a sentence each.
 
@@ -68,7 +67,7 @@ def question_of(believed: Vehicle, runs: Sequence[Run]) -> tuple[Question, tuple
     return lambda vehicle: next((why for question in asked if (why := question(vehicle))), ""), tuple(faults)
 
 
-def questions(believed: Vehicle, runs: Sequence[Run]) -> tuple[Question, ...]:
+def questions(believed: Vehicle, runs: Sequence[Run]) -> tuple[_Question, ...]:
     """Everything that is asked, the cheapest first."""
     share, recorded = recorded_share(runs, believed), _recorded_hover(runs, believed)
     return (

@@ -78,7 +78,7 @@ def _same_curve(chain: ChainResult) -> dict[str, str]:
     return dict.fromkeys(sorted(ids_of("curve_of_load")), TAKEN_UP)
 
 
-def one_load(finding: Finding, setup: PreparedInstrument) -> Finding:
+def _one_load(finding: Finding, setup: PreparedInstrument) -> Finding:
     """Thrust and reading of one rotor that does not tilt are curves of one load: which of them is curved stays open."""
     alone = setup.recordings.vehicle.rotor_count == 1 and not setup.instrument.tilts
     if not alone or finding.id not in ids_of("curve_of_load") or finding.status not in CLAIMED:
@@ -152,7 +152,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     while needless := (needless_values(model, values) | curved_gains(model, values)) - refused:
         refused |= needless
         values = values_of(model.selection, refused)
-    found = [one_load(f, setup) for f in reading_findings(model)]
+    found = [_one_load(f, setup) for f in reading_findings(model)]
     findings += found if measured else [throttle_or_thrust(f) for f in found]
     coarse, why = quantisation(setup, model.noise)
     if coarse is not None:
@@ -170,9 +170,9 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     )
 
     # The last decision is made: the runs held out are opened.
-    seen = on_every_run(model, chain, unseen)
+    seen = _on_every_run(model, chain, unseen)
     refitted, moved_plain = settled(model, plain, [])
-    first = account(choice, recordings, seen, fit, moved_values, refitted, {**moved_plain, **plain})
+    first = _account(choice, recordings, seen, fit, moved_values, refitted, {**moved_plain, **plain})
     return as_delivered(_offered(choice, weighed(first), seen, plain, moved_values, moved_plain))
 
 
@@ -199,7 +199,7 @@ class _InstrumentChoice:
         return vehicle.model_copy(update={"rotor_speed_limits_rad_s": (0.0, self.chain.full_speed)})
 
 
-def account(
+def _account(
     choice: _InstrumentChoice,
     recordings: RecordingSet,
     seen: ReadingModel,
@@ -252,7 +252,7 @@ def account(
         loadings=seen.loadings,
         notes=(*choice.remarks, *_notes_of(setup)),
         corrected=in_words(moved_values, VALUE_NAMES),
-        without=without_each(model, seen, choice.values, own_chain, list(findings), traces),
+        without=_without_each(model, seen, choice.values, own_chain, list(findings), traces),
     )
 
 
@@ -280,7 +280,7 @@ def _offered(
         stated = {k: v for k, v in choice.stated.items() if k in named.values}
         own = replace(choice, model=fewer, chain=shorter, values=named.values, stated=stated, findings=findings)
         every, changed = replace(seen, selection=fewer.selection), {**refitted.moved, **refitted.values}
-        return account(own, words.recordings, every, named.fit, named.moved, refitted.fit, changed), ()
+        return _account(own, words.recordings, every, named.fit, named.moved, refitted.fit, changed), ()
 
     return Offered(
         words=words,
@@ -305,7 +305,7 @@ def _with_terms(model: ReadingModel, active: Sequence[str]) -> ReadingModel:
     return replace(model, selection=replace(model.selection, active=list(active), fit=fit))
 
 
-def without_each(
+def _without_each(
     model: ReadingModel, seen: ReadingModel, values: Values, chain: ChainResult | None, findings: list[Finding], traces
 ) -> dict[str, tuple[np.ndarray, ...]]:
     """To the id of every stated effect what is left of every trace without it, all else fitted anew.
@@ -388,7 +388,7 @@ def _make_traces(model: ReadingModel, refitted: Fit, fit: Fit):
     return tuple(traces), before, after
 
 
-def on_every_run(model: ReadingModel, chain: ChainResult | None, unseen: RecordingSet) -> ReadingModel:
+def _on_every_run(model: ReadingModel, chain: ChainResult | None, unseen: RecordingSet) -> ReadingModel:
     """The model with the rows of every run: those fitted as they were, those held out by the same equations.
 
     Where only commands are known, `chain` says how the rotors turn.
@@ -416,12 +416,12 @@ def reading_findings(model: ReadingModel) -> list[Finding]:
         order = np.argsort(-size)
         channels = tuple(CHANNELS[c] for c in order if size[c] > _SHOWS * size[order[0]])
         others = search.alternatives(key, model.selection.active)
-        return TermReport(active_values(model, key), parameters_of(model, key), channels, others)
+        return TermReport(active_values(model, key), _parameters_of(model, key), channels, others)
 
     return findings_of(search, model.selection, report_of)
 
 
-def parameters_of(model: ReadingModel, key: str) -> tuple[Estimate, ...]:
+def _parameters_of(model: ReadingModel, key: str) -> tuple[Estimate, ...]:
     """Parameters of a term at work with 95 % intervals."""
     term = model.search.terms[key]
     if not term.form.nonlinear:
@@ -445,7 +445,7 @@ def with_plainer_forms(model: ReadingModel, again: Callable[[ReadingModel, list[
             continue
         if not any(len(t.form.parameters) < len(term.form.parameters) for t in _forms_beside(model, key)):
             continue
-        if rules.PLAINER_FORM(all(p.low <= 0.0 <= p.high for p in parameters_of(model, key))):
+        if rules.PLAINER_FORM(all(p.low <= 0.0 <= p.high for p in _parameters_of(model, key))):
             others = [t for t in model.terms if t.kind != "effect" or t.effect != term.effect or _plainer(t, term)]
             model = again(model, others)
     return model

@@ -36,7 +36,7 @@ needed where less than this share of what it adds remains given the effect's fre
 _LATE_ROWS = (1, 2, 4, 8)
 """Rows by which a free form may also be late."""
 _FREE = "free form"
-GAIN = "gain"
+_GAIN = "gain"
 
 
 def hats(values: np.ndarray) -> np.ndarray:
@@ -85,7 +85,7 @@ def _with_free(model: ReadingModel, keys: list[str], free: list[np.ndarray]) -> 
     return out
 
 
-def left_of(model: ReadingModel, value: str, strong: str, active: list[str], channels: list[int]) -> float:
+def _left_of(model: ReadingModel, value: str, strong: str, active: list[str], channels: list[int]) -> float:
     """Share of what a believed value explains that remains given a free form of `strong`; 0 if it is not significant.
 
     The value is as free as one that is called wrong.
@@ -141,8 +141,8 @@ def needless_values(model: ReadingModel, values: Iterable[str]) -> set[str]:
     settled = {v for k in active for v in model.search.terms[k].form.takes_up}
     out = settled & set(values)
     # Any smooth characteristic has a slope of its own: of gains the curve itself is asked (`curved_gain`).
-    for key in (v for v in set(values) - settled if not v.startswith(GAIN)):
-        if any(left_of(model, key, s, active, c) < _MOST_SHARE for s, c in _stronger_ones(model, key, active)):
+    for key in (v for v in set(values) - settled if not v.startswith(_GAIN)):
+        if any(_left_of(model, key, s, active, c) < _MOST_SHARE for s, c in _stronger_ones(model, key, active)):
             out.add(key)
     return out if rules.NEEDLESS_VALUE(bool(out)) else set()
 
@@ -161,7 +161,7 @@ def curved_gains(model: ReadingModel, values: Values) -> set[str]:
         of_key = [c for c in instrument.loaded if c < 3 and key in ("gain", f"gain_{'xyz'[c]}")]
         for share in (_SMALL_LOADS, 1.0) if of_key else ():
             # Channels may curve to either side: what they have in common is the gain.
-            slope = np.mean([slope_of(model, c, share * instrument.largest[c]) for c in of_key])
+            slope = np.mean([_slope_of(model, c, share * instrument.largest[c]) for c in of_key])
             if np.sign(change) * slope < SMALLEST_CHANGE:
                 out.add(key)
     return out if rules.CURVED_GAIN(bool(out)) else set()
@@ -172,7 +172,7 @@ def characteristics() -> frozenset[str]:
     return ids_of("curve_of_load") & ids_of("kind", "sensor")
 
 
-def slope_of(model: ReadingModel, channel: int, most: float) -> float:
+def _slope_of(model: ReadingModel, channel: int, most: float) -> float:
     """Slope, less one, of a reading over loads up to `most` in size, less all effects but a curved characteristic."""
     fit, search = model.selection.fit, model.search
     others = [k for k in model.selection.active if search.terms[k].effect not in characteristics()]

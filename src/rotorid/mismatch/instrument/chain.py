@@ -31,12 +31,12 @@ from rotorid.mismatch.instrument.setup import (
 )
 from rotorid.mismatch.plant.readings import form_reading, forms_reading
 from rotorid.mismatch.plant.regression import at_least, autoregression, quadratic_form
-from rotorid.mismatch.plant.speedpath import COST_PER_PARAMETER, ENTER_P, SMALLEST_SIZE
+from rotorid.mismatch.plant.speedpath import COST_PER_PARAMETER, ENTER_P, SMALLEST_SIZE, Chain
 from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings.signal.kernels import causal
 
 _MOST_SAMPLES = 12_000
-RATE_HZ = 30.0
+_RATE_HZ = 30.0
 """Rate at which wrenches are compared where no speed is measured."""
 _MOST_STEPS, _QUICK_FIT = 30, 6
 """Evaluations of the Jacobian at most: of a fit, and of one that is to say whether another is worth it."""
@@ -50,7 +50,7 @@ _LEAST_SPAN = 0.02
 """Relative span of the voltage below which its effect cannot be tested."""
 _REMEMBERED = 24
 """Speeds of each stretch that are remembered: those of one Jacobian."""
-BLOCK_S = 1.0
+_BLOCK_S = 1.0
 _LEAST_BLOCKS = 12
 _MOST_BLOCKS = 400
 _STEADY_BLOCKS = 40
@@ -60,9 +60,6 @@ _FAR = 0.05
 """Share of a cost by which a fit is still above it after a few steps when it will not come down to it."""
 _ALIKE = rules.ELSEWHERE["squares"]
 """Whitened squares within which another form explains as well."""
-
-
-Chain = tuple[tuple[str, SpeedForm], ...]
 
 
 @dataclass(frozen=True)
@@ -158,7 +155,7 @@ class _Commanded:
     voltage: np.ndarray | None
 
 
-def commanded(loading: Loading, finer: int, holds: bool) -> _Commanded:
+def _commanded(loading: Loading, finer: int, holds: bool) -> _Commanded:
     """A stretch's command on a clock `finer` times faster: between samples it is smooth, or `holds` until the next."""
     command, which = np.unique(loading.command, axis=1, return_inverse=True)
     command = held(command, finer) if holds else between(command, finer)
@@ -186,7 +183,7 @@ def between(values: np.ndarray, finer: int) -> np.ndarray:
     return out
 
 
-class ChainProblem:
+class _ChainProblem:
     """Residuals of a chain on the stretches that are fitted."""
 
     def __init__(self, setup: PreparedInstrument, others: list | None = None, holds: bool = False):
@@ -203,7 +200,7 @@ class ChainProblem:
         self.fitted = _thinned(list(setup.loadings))
         self.others = list(others or [])
         # A lag of some hundredths of a second must still show: few stretches at a fine rate rather than all coarse.
-        finest = max(1, int(setup.instrument.rate_hz / RATE_HZ))
+        finest = max(1, int(setup.instrument.rate_hz / _RATE_HZ))
         self.average = 1 if self.measured else min(setup.average, finest)
         self.channels = list(setup.instrument.channels)
         # Of steady points the colour is what the curve leaves, not noise: blocks alone allow for it.
@@ -219,7 +216,7 @@ class ChainProblem:
         """What a chain starts from on a stretch of the setup; remembered, for it is the same in every evaluation."""
         key = (id(loading), finer, self.holds)
         if key not in self._starts:
-            self._starts[key] = commanded(loading, finer, self.holds)
+            self._starts[key] = _commanded(loading, finer, self.holds)
         return self._starts[key]
 
     def made(self, loading: Loading, chain: Chain, values: tuple[float, ...], finer: int) -> np.ndarray:
@@ -396,7 +393,7 @@ class ChainProblem:
         if self.short:
             return np.array_split(np.arange(size), max(size // width, 2))
         rate = self.setup.instrument.rate_hz / self.average
-        per = max(int(BLOCK_S * rate), 2) * width
+        per = max(int(_BLOCK_S * rate), 2) * width
         most = _STEADY_BLOCKS if self.plain else _MOST_BLOCKS
         count = max(min(size // per, most), min(_LEAST_BLOCKS, size // (2 * width)), 2)
         return [b for b in np.array_split(np.arange(size), count) if len(b)]
@@ -450,14 +447,14 @@ def _ordered(chain: Chain) -> Chain:
     return tuple(sorted(chain, key=lambda pair: pair[1].stage))
 
 
-def start_of(problem: ChainProblem, chain: Chain, fit: _ChainFit, new: str = "", values=()) -> np.ndarray:
+def start_of(problem: _ChainProblem, chain: Chain, fit: _ChainFit, new: str = "", values=()) -> np.ndarray:
     """Start of a chain from the fit of another that may lack one form, nothing having happened between its samples."""
     known = {key: fit.theta[fit.place(key)] for key, _ in fit.chain}
     theta = [values if key == new else known.get(key, form.neutral) for key, form in chain]
     return np.concatenate([fit.full, *theta, np.zeros(len(problem.unknown(chain)))])
 
 
-def _start_with(problem: ChainProblem, chain: Chain, fit: _ChainFit, new: tuple[str, SpeedForm]) -> np.ndarray:
+def _start_with(problem: _ChainProblem, chain: Chain, fit: _ChainFit, new: tuple[str, SpeedForm]) -> np.ndarray:
     """Start of a chain with a new form from what is known of the others: of the form's starts that explains most."""
     options = [start_of(problem, chain, fit, new[0], v) for v in starts(new[1])]
     return min(options, key=lambda theta: float(np.sum(problem.white(chain, theta) ** 2)))
@@ -469,7 +466,7 @@ def find_chain(setup: PreparedInstrument, others: list | None = None) -> ChainRe
         return None
     if not any(np.any(x.command > 0) for x in setup.loadings):
         return None
-    problem = ChainProblem(setup, others)
+    problem = _ChainProblem(setup, others)
     forms = candidates(setup)
     # What no form explains yet is no noise: whitened by it, slow steps of the command would leave their jumps alone.
     problem.learn((), problem.neutral(), coloured=False)
@@ -480,7 +477,7 @@ def find_chain(setup: PreparedInstrument, others: list | None = None) -> ChainRe
     return _worded(problem, _without_mere_scale(problem, best, dropped), forms, dropped)
 
 
-def _without_mere_scale(problem: ChainProblem, best: _ChainFit, dropped: dict[str, str]) -> _ChainFit:
+def _without_mere_scale(problem: _ChainProblem, best: _ChainFit, dropped: dict[str, str]) -> _ChainFit:
     """The chain without forms that only say what another thrust coefficient would.
 
     Where no speed is measured, speeds that are all a share higher than commanded are a thrust that is larger: a value
@@ -504,7 +501,7 @@ def _without_mere_scale(problem: ChainProblem, best: _ChainFit, dropped: dict[st
     return best
 
 
-def _holding_or_not(problem: ChainProblem, best: _ChainFit) -> _ChainFit:
+def _holding_or_not(problem: _ChainProblem, best: _ChainFit) -> _ChainFit:
     """The fit with commands that hold from sample to sample, or with smooth ones, whichever explains more.
 
     A chain that takes time sees the difference. Compared by sizes alone: whitened by its own residual, the poorer of
@@ -522,7 +519,7 @@ def _holding_or_not(problem: ChainProblem, best: _ChainFit) -> _ChainFit:
     return _richer(problem, other)
 
 
-def _grown(problem: ChainProblem, best: _ChainFit, forms, dropped: dict[str, str]) -> _ChainFit:
+def _grown(problem: _ChainProblem, best: _ChainFit, forms, dropped: dict[str, str]) -> _ChainFit:
     """The chain with forms added one by one as long as they explain more; why others did not enter in `dropped`."""
     for _ in range(_MOST):
         # Whitening by the residual of the richest chain seen: by a poor one's, everything would look like noise.
@@ -551,7 +548,7 @@ def _grown(problem: ChainProblem, best: _ChainFit, forms, dropped: dict[str, str
     return best
 
 
-def _weakness(problem: ChainProblem, fit: _ChainFit, without: _ChainFit, pair) -> str | None:
+def _weakness(problem: _ChainProblem, fit: _ChainFit, without: _ChainFit, pair) -> str | None:
     """Why a form does not enter; None if it does."""
     inner = _richer(problem, fit)
     where = inner.place(pair[0])
@@ -567,7 +564,7 @@ def _weakness(problem: ChainProblem, fit: _ChainFit, without: _ChainFit, pair) -
     return None
 
 
-def _pruned(problem: ChainProblem, best: _ChainFit, dropped: dict[str, str]) -> _ChainFit:
+def _pruned(problem: _ChainProblem, best: _ChainFit, dropped: dict[str, str]) -> _ChainFit:
     """The chain without what is no longer significant given the forms that came after it."""
     while best.chain:
         covariance, count = problem.covariance(best)
@@ -595,13 +592,13 @@ def p_value(offset: np.ndarray, covariance: np.ndarray, count: int) -> float:
     return float(f_distribution.sf(statistic * (count - q) / (q * (count - 1)), q, count - q))
 
 
-def _richer(problem: ChainProblem, fit: _ChainFit) -> _ChainFit:
+def _richer(problem: _ChainProblem, fit: _ChainFit) -> _ChainFit:
     """The fit once more, whitened by its own residual."""
     problem.learn(fit.chain, fit.theta)
     return problem.fit(fit.chain, fit.theta)
 
 
-def _worded(problem: ChainProblem, best: _ChainFit, forms, dropped: dict[str, str]) -> ChainResult:
+def _worded(problem: _ChainProblem, best: _ChainFit, forms, dropped: dict[str, str]) -> ChainResult:
     """Findings of a chain with intervals, p-values and alternatives."""
     covariance, count = problem.covariance(best) if len(best.theta) else (np.zeros((0, 0)), 2)
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -644,7 +641,7 @@ def _worded(problem: ChainProblem, best: _ChainFit, forms, dropped: dict[str, st
     return ChainResult(best, full, doubt, findings, noise, problem.holds)
 
 
-def alternatives(problem: ChainProblem, best: _ChainFit, key: str, forms) -> list[str]:
+def alternatives(problem: _ChainProblem, best: _ChainFit, key: str, forms) -> list[str]:
     """Ids that in a form's place explain as well."""
     out = []
     rest = best.chain_without(key)
@@ -661,7 +658,7 @@ def alternatives(problem: ChainProblem, best: _ChainFit, key: str, forms) -> lis
     return out
 
 
-def _reading_alternatives(problem: ChainProblem, best: _ChainFit, rest: Chain, key: str) -> list[str]:
+def _reading_alternatives(problem: _ChainProblem, best: _ChainFit, rest: Chain, key: str) -> list[str]:
     """Effects of the reading that explain as well in a form's place, where no speed is measured."""
     out = sorted(ids_of("same_on_commands", key))
     known, low, high = start_of(problem, rest, best), *problem.bounds(rest)
@@ -693,7 +690,7 @@ def _reading_alternatives(problem: ChainProblem, best: _ChainFit, rest: Chain, k
 
 def moved(setup: PreparedInstrument, result: ChainResult) -> tuple[Loading, ...]:
     """Loadings with the speeds that the chain makes of the commands (where none are measured)."""
-    problem, fit = ChainProblem(setup, holds=result.holds), result.fit
+    problem, fit = _ChainProblem(setup, holds=result.holds), result.fit
     out = []
     for x in setup.loadings:
         speed = problem.speed(x, fit.chain, fit.values, result.full_speed)
@@ -712,7 +709,7 @@ def without_id(result: ChainResult, key: str) -> ChainResult:
 
 def speed_traces(setup: PreparedInstrument, result: ChainResult) -> tuple[ChannelTrace, ...]:
     """Measured less commanded and less modelled speed of every rotor, where both are recorded."""
-    problem = ChainProblem(setup, holds=result.holds)
+    problem = _ChainProblem(setup, holds=result.holds)
     start = problem.neutral()
     if problem.scaled:
         start = np.array([result.full_speed])

@@ -16,7 +16,7 @@ from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.mismatch.plant.unknowns import UNKNOWNS
 from rotorid.recordings import Vehicle
 
-DEFAULT_TRUST = {"thrust": 0.1, "torque": 0.2, "mass": 0.05, "arm": 0.03, "gain": 0.03}
+_DEFAULT_TRUST = {"thrust": 0.1, "torque": 0.2, "mass": 0.05, "arm": 0.03, "gain": 0.03}
 VALUE_NAMES = {
     "thrust": "thrust_coefficient_n_s2",
     "torque": "torque_coefficient_n_m_s2",
@@ -56,7 +56,7 @@ def value_keys(setup: PreparedInstrument) -> list[str]:
 def make_terms(setup: PreparedInstrument) -> tuple[list[Term], dict[str, str]]:
     """Every term that this set can test, and the ids that it cannot, with the reason."""
     trust = setup.vehicle.trust
-    sd = {k: max(trust.get(VALUE_NAMES[k], DEFAULT_TRUST[k.split("_")[0]]), 1e-6) for k in value_keys(setup)}
+    sd = {k: max(trust.get(VALUE_NAMES[k], _DEFAULT_TRUST[k.split("_")[0]]), 1e-6) for k in value_keys(setup)}
     terms = [Term(key, "value", prior_sd=(relative,)) for key, relative in sd.items()]
     reasons: dict[str, str] = {}
     if not setup.steady_points and not setup.instrument.by_hand:

@@ -75,7 +75,7 @@ def find_mistakes(recordings: RecordingSet) -> tuple[RecordingSet, list[Finding]
     recordings, lost = dropout.find(recordings)
     findings += [lost] if lost else []
     setup = set_up(recordings)
-    for find in (flipped, _other_unit, _wrong_rotors):
+    for find in (_flipped, _other_unit, _wrong_rotors):
         found = find(recordings, setup)
         if found is not None:
             recordings, finding, note = found
@@ -132,7 +132,7 @@ def _finding(key: str, sentence: str, channels, factor: float | None = None, oth
     )
 
 
-def flipped(recordings: RecordingSet, setup: PreparedInstrument):
+def _flipped(recordings: RecordingSet, setup: PreparedInstrument):
     """Channels whose reading falls as the load rises, in all runs or in some."""
     bad = [s for s in slopes(setup) if s.correlation < -_CERTAIN and s.slope < _FLIPPED]
     if not bad:
@@ -156,7 +156,7 @@ def flipped(recordings: RecordingSet, setup: PreparedInstrument):
     return _with_runs(recordings, runs), _finding("axis_sign", text, channels, -1.0, others, windows), text + "."
 
 
-def nearest(slope: float, units: dict[str, float]) -> str | None:
+def _nearest(slope: float, units: dict[str, float]) -> str | None:
     """The unit whose factor a slope is near; None if it is near to none."""
     return next((name for name, factor in units.items() if abs(slope / factor - 1) < _NEAR_UNIT), None)
 
@@ -168,7 +168,7 @@ def _other_unit(recordings: RecordingSet, setup: PreparedInstrument):
     moments = [s.slope for s in found if s.channel >= 3]
     speed_known = bool(setup.loadings) and setup.loadings[0].measured and recordings.vehicle.kind == "stand"
     both = forces + moments
-    if speed_known and both and (unit := nearest(np.median(both), _SPEED_UNITS)):
+    if speed_known and both and (unit := _nearest(np.median(both), _SPEED_UNITS)):
         names = c.rotor_columns("rotor_speed", recordings.vehicle.rotor_count)
         factor = float(np.sqrt(_SPEED_UNITS[unit]))
         return _converted(recordings, names, unit, factor, "rad/s", ("force_z",))
@@ -176,7 +176,7 @@ def _other_unit(recordings: RecordingSet, setup: PreparedInstrument):
         (forces, _FORCE_UNITS, c.FORCE, "N"),
         (moments, _MOMENT_UNITS, c.MOMENT, "N m"),
     ):
-        if slope and (unit := nearest(np.median(slope), units)):
+        if slope and (unit := _nearest(np.median(slope), units)):
             channels = [n for n, label in zip(CHANNELS, NAMES, strict=True) if label in names]
             return _converted(recordings, names, unit, 1.0 / units[unit], wanted, channels)
     return None

@@ -32,7 +32,7 @@ from rotorid.recordings.signal.kernels import causal
 
 _MOST_BLOCKS = 150
 _LEAST_BLOCKS = 40
-BLOCK_S = 2.0
+_BLOCK_S = 2.0
 MEMORY = 4
 """Blocks over which the noise of a sensor may be alike beyond what whitening takes away: 1/f noise has no end."""
 _ROWS_PER_COLUMN = 8
@@ -40,7 +40,7 @@ _STRONGEST = 0.9
 """Quantile of the seconds' energies above which a contribution's size is taken: what shows only after a change of load
 is in few of them."""
 _ROUNDS = 4
-SETTLED = 1e-3
+_SETTLED = 1e-3
 """Relative change of nonlinear parameters from round to round below which they have settled."""
 _MOST_AT_ONCE = 6
 """More causes than this at once are not distinguished by six channels: what they leave is stated as unexplained."""
@@ -167,7 +167,7 @@ def block_length(setup: PreparedInstrument, rows: list[Rows]) -> int:
     total = sum(len(r.y) for r in rows)
     if typical < SHORT:
         return max(2, int(typical)) if len(rows) >= 12 else max(2, total // _LEAST_BLOCKS)
-    wanted = BLOCK_S * setup.rate_hz
+    wanted = _BLOCK_S * setup.rate_hz
     return int(np.clip(wanted, max(total / _MOST_BLOCKS, 5), max(total / _LEAST_BLOCKS, 5)))
 
 
@@ -371,7 +371,7 @@ def fitted_model(
         kept = (model.noise, model.regression.filters) if number else None
         model = reading_model(setup, terms, before, loadings, kept, refused)
         values = _nonlinear_values(model)
-        if set(model.selection.active) == set(before) and np.allclose(values, start, rtol=SETTLED):
+        if set(model.selection.active) == set(before) and np.allclose(values, start, rtol=_SETTLED):
             break
     rivals = _rivals_refined(model)
     if not rivals:

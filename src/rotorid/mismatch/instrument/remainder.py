@@ -22,13 +22,13 @@ from rotorid.mismatch.plant.readings import form_reading
 from rotorid.recordings import Vehicle
 from rotorid.vehicle.improved import speeds_of_commands
 
-SAME = 1e-5
+_SAME = 1e-5
 """Relative difference above which a vehicle read back is not the model written."""
 _LEAST_CHANGE = 0.02
 """Spread of a load in one run, by its spread over all, from which the run says what depends on it."""
 
 
-def probes(loading: Loading, model: ReadingModel) -> dict[str, np.ndarray]:
+def _probes(loading: Loading, model: ReadingModel) -> dict[str, np.ndarray]:
     """Generic inputs on the rows of a stretch, by the names that a person knows."""
     setup, out = model.setup, {}
     for k in setup.instrument.loaded:
@@ -53,7 +53,7 @@ def _on_rows(model: ReadingModel) -> list[dict[str, np.ndarray]]:
     """Probes of every part that has rows, and the mean rotor speed, in the order of the rows."""
     out = []
     for loading in model.loadings:
-        whole = probes(loading, model)
+        whole = _probes(loading, model)
         if loading.motion.rotor_speed is not None:
             whole["rotor_speed_rad_s"] = averaged(loading.motion.rotor_speed.mean(axis=1), model.setup.average)
         out += [{k: v[p] for k, v in whole.items()} for p in pieces_of(loading, model.setup.average)]
@@ -260,5 +260,5 @@ def prove(analysis: Analysis, written: Vehicle, reloaded: Vehicle, errors: Instr
         ours = predicted(written, analysis.instrument, loading, volts, ours_of)
         theirs = predicted(reloaded, analysis.instrument, loading, volts, errors)
         scale = max(float(np.abs(ours).max()), 1e-12)
-        if not np.allclose(ours, theirs, rtol=0, atol=SAME * scale):
+        if not np.allclose(ours, theirs, rtol=0, atol=_SAME * scale):
             raise RuntimeError(f"improved_vehicle.yaml read back predicts another reading in {loading.run}")

@@ -16,7 +16,7 @@ from rotorid.effects.contract import Motion
 from rotorid.effects.hysteresis import NARROW, play
 from rotorid.effects.loading import CHANNELS, REST_S, InstrumentFacts, Loading, at_sensor, rotation_of, weight
 from rotorid.errors import InputError
-from rotorid.mismatch.instrument.settling import settling_s, without_settling
+from rotorid.mismatch.instrument.sampling import settling_s, without_settling
 from rotorid.mismatch.instrument.tachometer import noise_of, quieter, without_noise
 from rotorid.mismatch.plant.rows import baseline_wrench
 from rotorid.mismatch.plant.split import split_runs
@@ -33,7 +33,7 @@ SHORT = 60
 """Stretches of fewer samples or rows are blocks: too short to learn the colour of their noise from."""
 _MOST_VALUES = 45_000
 """Samples times channels that are analysed; longer sets are averaged over several samples first."""
-LEAST_SHARE = 0.05
+_LEAST_SHARE = 0.05
 """Share of the largest load from which a channel is loaded, or a sample is, and of the samples that come back."""
 _LEAST_WARMTH_K = 0.1
 """A temperature that changes by less says nothing."""
@@ -44,7 +44,7 @@ _QUARTIC = np.array([[-25.0, 48.0, -36.0, 16.0, -3.0], [-3.0, -10.0, 18.0, -6.0,
 
 
 @dataclass(frozen=True)
-class SessionTimes:
+class _SessionTimes:
     """When the runs of a set were recorded, and how warm each was at its start."""
 
     first_s: Mapping[str, float]
@@ -67,13 +67,13 @@ class _Preparation:
     channels: tuple[int, ...]
     dt_s: float
     full_speed: float | None
-    session: SessionTimes
+    session: _SessionTimes
     distance: str
     """Name of the column of a distance to a wall or fixture; empty where there is none."""
 
     def stretches(self, recordings: RecordingSet) -> list[Loading]:
         """The stretches of all runs with their loads predicted."""
-        return [loaded_by(x, self.vehicle) for run in recordings.runs for x in stretches_of(run, self)]
+        return [loaded_by(x, self.vehicle) for run in recordings.runs for x in _stretches_of(run, self)]
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class PreparedInstrument:
     """The same loadings with the noise of measured rotor speeds added once more; None where there is none."""
     full_voltage: float | None = None
     """Voltage, V, at which the full speed is reached; None where none is recorded."""
-    session: SessionTimes | None = None
+    session: _SessionTimes | None = None
     """When each run was recorded."""
 
     @property
@@ -174,7 +174,7 @@ def _even(time_s: np.ndarray, dt_s: float) -> np.ndarray | None:
     return time_s[0] + dt_s * np.arange(int((time_s[-1] - time_s[0]) / dt_s) + 1)
 
 
-def stretches_of(run: Run, how: _Preparation) -> list[Loading]:
+def _stretches_of(run: Run, how: _Preparation) -> list[Loading]:
     """Loadings of one run, load still empty."""
     vehicle, channels, dt_s, session = how.vehicle, how.channels, how.dt_s, how.session
     names = c.FORCE + c.MOMENT
@@ -358,7 +358,7 @@ def _first_full_speed(recordings: RecordingSet, channels: tuple[int, ...]) -> fl
     return float(np.sqrt(abs(square))) if square else 1000.0
 
 
-def session_of(recordings: RecordingSet) -> SessionTimes:
+def session_of(recordings: RecordingSet) -> _SessionTimes:
     """When each run of a set was recorded: its runs are in the order of time.
 
     Where each has a clock of its own the pauses between them are not known, and the next is taken to start when the one
@@ -373,7 +373,7 @@ def session_of(recordings: RecordingSet) -> SessionTimes:
     warmth = {r.name: float(_filled(r, c.TEMPERATURE)[0]) for r in runs if r.has(c.TEMPERATURE)}
     length = starts[-1] + lengths[-1] if len(runs) > 1 else 0.0
     times = {r.name: float(r.time_s[0]) for r in runs}
-    return SessionTimes(times, dict(zip(names, starts, strict=True)), length, clock, warmth)
+    return _SessionTimes(times, dict(zip(names, starts, strict=True)), length, clock, warmth)
 
 
 def set_up(recordings: RecordingSet, whole: RecordingSet | None = None) -> PreparedInstrument:
@@ -507,8 +507,8 @@ def _instrument_of(recordings: RecordingSet, how: _Preparation, loadings: Sequen
     for group in ((0, 1, 2), (3, 4, 5)):
         top = max(spread[list(group)].max(), 1e-12)
         moved = [k for k in group if not still[k] and k in channels]
-        loaded += [k for k in moved if spread[k] > LEAST_SHARE * top]
-        weighed += [k for k in moved if spread[k] <= LEAST_SHARE * top < load[:, k].std()]
+        loaded += [k for k in moved if spread[k] > _LEAST_SHARE * top]
+        weighed += [k for k in moved if spread[k] <= _LEAST_SHARE * top < load[:, k].std()]
     if not any(k < 3 for k in loaded) and spread[:3].max() > 1e-9:
         loaded.insert(0, int(np.argmax(spread[:3])))
     largest = np.maximum(np.abs(np.concatenate([x.load - x.rest for x in loadings])).max(axis=0), 1e-9)
@@ -563,10 +563,10 @@ def _comes_back(loadings: Sequence[Loading], channel: int, largest: float) -> bo
         load = x.load[:, channel] - x.rest[channel]
         width = NARROW * largest
         branch = (load - play(load, width)) / width * np.sign(load)
-        at_work = np.abs(load) > LEAST_SHARE * largest
+        at_work = np.abs(load) > _LEAST_SHARE * largest
         falling += int(np.sum(at_work & (branch < -0.5)))
         total += int(np.sum(at_work))
-    return falling > LEAST_SHARE * max(total, 1)
+    return falling > _LEAST_SHARE * max(total, 1)
 
 
 def pieces_of(loading: Loading, count: int) -> list[np.ndarray]:

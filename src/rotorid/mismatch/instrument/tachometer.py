@@ -23,7 +23,7 @@ _GAMMA = 2.6
 """Half-width of the confidence intervals, in standard errors."""
 _BAND = (0.5, 0.75, 1.0)
 """Shares of the highest frequency in which the noise must be white, in two halves."""
-LEVEL = 2.0
+_LEVEL = 2.0
 """Ratio of the power in the two halves beyond which there is signal up there, and nothing is done."""
 _SMALLER, _LARGER = 0.98, 1.01
 """Smoothed speeds are the better ones where they lower the quick errors of some load to this share, and raise none."""
@@ -66,7 +66,7 @@ def _noisy(speed: np.ndarray) -> bool:
     frequency, power = welch(speed, nperseg=WIDTHS[-1] - 1, detrend="linear")
     share = frequency / frequency[-1]
     lower, upper = (float(np.median(power[(share >= a) & (share < b)])) for a, b in zip(_BAND, _BAND[1:], strict=False))
-    return upper > 0 and 1 / LEVEL < lower / upper < LEVEL
+    return upper > 0 and 1 / _LEVEL < lower / upper < _LEVEL
 
 
 def _spread(speed: np.ndarray, rate_hz: float) -> np.ndarray:

@@ -159,7 +159,7 @@ def _gravity_p(runs: list[Signals], axis: int) -> float:
     return float(ttest_1samp(means, 0.0).pvalue / 2) if len(means) > 2 else 1.0
 
 
-UNITS = {
+_UNITS = {
     "gyroscope": ("the body rates", "rad/s", {**RATES, "mrad/s": 1000.0}),
     "velocity": ("the velocity", "m/s", {"cm/s": 100.0, "mm/s": 1000.0, "km/h": 3.6, "ft/s": 3.28084}),
     "position": ("the position", "m", {"cm": 100.0, "mm": 1000.0, "ft": 3.28084}),
@@ -169,7 +169,7 @@ UNITS = {
 
 def _in_contract_units(recordings: ReadSet, sensor: str, reading: _Reading, among: Collection[str] = ()) -> Corrected:
     """The set with a sensor's columns in the contract's unit, where their scale is that of another (`among` some)."""
-    what, expected, factors = UNITS[sensor]
+    what, expected, factors = _UNITS[sensor]
     unit = nearest(1.0 / reading.scale, {name: f for name, f in factors.items() if not among or name in among})
     if unit is None:
         return Corrected(recordings)
@@ -209,7 +209,7 @@ def _quaternions(recorded: np.ndarray, signs: np.ndarray, order: tuple[int, ...]
     return recorded[:, list(order)] * signs
 
 
-def force_source(all_signals: list[Signals]) -> str | None:
+def _force_source(all_signals: list[Signals]) -> str | None:
     """What the velocity's changes are compared with: the accelerometer, else rotor speeds read or commanded."""
     if any("accelerometer" in s.values for s in all_signals):
         return "accelerometer"
@@ -228,7 +228,7 @@ def _attitude_fits(all_signals: list[Signals], vehicle: Vehicle, strict: bool = 
             agree.append(np.nanmean(world[:, 2]) < -_LEAST_GRAVITY * vehicle.gravity_m_s2)
     if agree and not all(agree):
         return False
-    source = force_source(all_signals)
+    source = _force_source(all_signals)
     fit = lagged.fit(compare.accelerating(all_signals, vehicle, source)) if source else None
     if fit is None:
         return not strict or bool(agree)
@@ -262,7 +262,7 @@ def _gyroscope_units(recordings: ReadSet) -> Corrected:
 
 def _accelerating(recordings: ReadSet) -> Corrected:
     """The velocity against the specific force turned into the world."""
-    source = force_source(recordings.signals)
+    source = _force_source(recordings.signals)
     if source is None:
         return Corrected(recordings)
     fit = lagged.fit(compare.accelerating(recordings.signals, recordings.vehicle, source))

@@ -43,7 +43,7 @@ def squared_speeds(signals: Signals, vehicle: Vehicle, sensor: str) -> np.ndarra
     return values**2 * vehicle.thrust_coefficients_n_s2()
 
 
-def band(all_signals: list[Signals], sensors: tuple[str, ...], wanted: tuple[float, float]) -> tuple[float, float]:
+def _band(all_signals: list[Signals], sensors: tuple[str, ...], wanted: tuple[float, float]) -> tuple[float, float]:
     """A band that the slowest of some sensors can follow in every run."""
     rates = [s.own_rate_hz[n] for s in all_signals for n in sensors if n in s.values and s.own_rate_hz[n] > 0]
     return wanted[0], min(wanted[1], _NYQUIST_SHARE * min(rates, default=0.0))
@@ -51,7 +51,7 @@ def band(all_signals: list[Signals], sensors: tuple[str, ...], wanted: tuple[flo
 
 def gather(all_signals: list[Signals], sensors: tuple[str, ...], wanted: tuple[float, float], make) -> Blocks | None:
     """Blocks of all runs that have the sensors; `make(signals)` gives Y, X and Z."""
-    limits = band([s for s in all_signals if set(sensors) <= set(s.values)], sensors, wanted)
+    limits = _band([s for s in all_signals if set(sensors) <= set(s.values)], sensors, wanted)
     if limits[1] < 2.5 * limits[0]:
         return None
     parts = []
@@ -135,7 +135,7 @@ def lifting(all_signals: list[Signals], vehicle: Vehicle, sensor: str) -> Blocks
 def following(all_signals: list[Signals], sensor: str) -> Blocks | None:
     """Y: one rotor's measured speed; X: its command (or throttle), all rotors stacked as blocks."""
     parts = []
-    limits = band(all_signals, ("rotors", sensor), BANDS_HZ["following"])
+    limits = _band(all_signals, ("rotors", sensor), BANDS_HZ["following"])
     if limits[1] < 2.5 * limits[0]:
         return None
     for number, s in enumerate(all_signals):

@@ -70,7 +70,7 @@ def find(recordings: RecordingSet) -> tuple[RecordingSet, Finding | None]:
     """The set with dropouts blanked, and the finding."""
     names = [n for own in sensor_columns(recordings.vehicle).values() for n in own]
     noisy = noisy_columns(recordings.runs, names)
-    found = [s for run in recordings.runs for s in in_run(run, recordings.vehicle, noisy)]
+    found = [s for run in recordings.runs for s in _in_run(run, recordings.vehicle, noisy)]
     if not found:
         return recordings, None
 
@@ -175,7 +175,7 @@ def _share(run: Run, stretches_s: list[tuple[float, float]]) -> float:
     return sum(max(min(stop, last) - max(start, first), 0.0) for start, stop in stretches_s) / (last - first)
 
 
-def in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[_Dropout]:
+def _in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[_Dropout]:
     """Every dropout of a run, column by column; `noisy` columns are known to have noise of their own."""
     found, flown = [], vehicle.kind == "flight"
     for sensor, names in sensor_columns(vehicle).items():

@@ -150,7 +150,7 @@ class LaggedFit:
 
 def _noise_weight(blocks: Blocks, left: np.ndarray) -> np.ndarray:
     """1 / power of a residual (b, m, q), with a floor, (q, m)."""
-    power, own = (smooth(np.mean(np.abs(v) ** 2, axis=0)).T for v in (left, blocks.y))
+    power, own = (_smooth(np.mean(np.abs(v) ** 2, axis=0)).T for v in (left, blocks.y))
     return 1.0 / (power + _PERFECTION * own + 1e-30)
 
 
@@ -160,9 +160,9 @@ def _coherence(blocks: Blocks) -> np.ndarray:
     What chance would explain is taken off. Where only noise is left in X, its size must not shrink the gains.
     """
     x, y = blocks.x, blocks.y
-    sxx = smooth(np.einsum("bmk,bml->mkl", x.conj(), x))
-    sxy = smooth(np.einsum("bmk,bmj->mkj", x.conj(), y))
-    syy = smooth(np.sum(np.abs(y) ** 2, axis=0))
+    sxx = _smooth(np.einsum("bmk,bml->mkl", x.conj(), x))
+    sxy = _smooth(np.einsum("bmk,bmj->mkj", x.conj(), y))
+    syy = _smooth(np.sum(np.abs(y) ** 2, axis=0))
     size = np.sqrt(np.real(np.einsum("mkk->mk", sxx)) + 1e-300)
     scaled = sxx / size[:, :, None] / size[:, None, :] + 1e-9 * np.eye(x.shape[2])
     cross = sxy / size[:, :, None]
@@ -172,7 +172,7 @@ def _coherence(blocks: Blocks) -> np.ndarray:
     return np.clip((share - chance) / (1 - chance), 0.0, 1.0).T
 
 
-def smooth(values: np.ndarray) -> np.ndarray:
+def _smooth(values: np.ndarray) -> np.ndarray:
     """Running mean along axis 0, over neighbouring frequencies."""
     width = min(_SMOOTHED, len(values))
     pad = [(width // 2, width - 1 - width // 2)] + [(0, 0)] * (values.ndim - 1)

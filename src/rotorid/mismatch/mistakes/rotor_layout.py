@@ -29,8 +29,8 @@ _LEAST_LIKELIHOOD = 25.0
 """Log-likelihood that the right layout must bring over none, and over the believed one."""
 _LEAST_ADVANTAGE = 1.5
 """What the right layout explains over what the believed one explains, at least."""
-LEAST_STEP = 0.6
-P_LIMIT = 1e-6
+_LEAST_STEP = 0.6
+_P_LIMIT = 1e-6
 _LATER_S = np.arange(0.005, 0.1001, 0.005)
 """By how much longer the torque of rotors may lag behind their commands than the delay that roll shows."""
 _TIED_LIKELIHOOD, _TIED_SHARE = 12.0, 0.02
@@ -71,7 +71,7 @@ def moments(blocks: Blocks, output: int, lag_s: float, weight: np.ndarray) -> _M
     return _Moments(*(np.concatenate(part) for part in (square, cross, gram)))
 
 
-def rows_of(vehicle: Vehicle) -> np.ndarray:
+def _rows_of(vehicle: Vehicle) -> np.ndarray:
     """Roll and pitch acceleration of one newton at every rotor, (2, k), rad/s²/N."""
     at, inertia = vehicle.rotor_positions_m(), vehicle.inertia_kg_m2
     return np.stack([-at[:, 1] / inertia.xx, at[:, 0] / inertia.yy])
@@ -117,7 +117,7 @@ def _orders_to_try(count: int) -> np.ndarray:
     return exchanges
 
 
-def moves(order: np.ndarray) -> int:
+def _moves(order: np.ndarray) -> int:
     """How many exchanges of two columns an order takes."""
     cycles, _ = connected_components(np.eye(len(order))[order])
     return len(order) - cycles
@@ -156,7 +156,7 @@ def find(recordings: ReadSet) -> Corrected:
     if free is None:
         return Corrected(recordings)
     parts = [moments(blocks, axis, free.lag_s, free.weight[axis]) for axis in (0, 1)]
-    rows = rows_of(vehicle)
+    rows = _rows_of(vehicle)
     orders = _orders_to_try(vehicle.rotor_count)
     yaw = _yaw_moments(signals, vehicle, sensor, free)
     believed = vehicle.yaw_signs()
@@ -169,7 +169,7 @@ def find(recordings: ReadSet) -> Corrected:
         # Rotors that all turn alike make no moment that distinguishes them.
         return Corrected(recordings)
     whole = float(sum(m.square.sum() for m in parts) + (yaw[0].square.sum() if yaw else 0.0))
-    costs = np.array([moves(o) for o in orders])[:, None] + (_turned_cost(senses, believed[orders]) if yaw else 0)
+    costs = np.array([_moves(o) for o in orders])[:, None] + (_turned_cost(senses, believed[orders]) if yaw else 0)
     least = float(losses.min())
     tied = np.argwhere(losses <= _tie(whole, least))
     ranked = sorted(tied.tolist(), key=lambda at: (costs[at[0], at[1]], losses[at[0], at[1]]))
@@ -196,7 +196,7 @@ def find(recordings: ReadSet) -> Corrected:
     disputed = float(sum(m.square.sum() for m in contested))
     likely = (as_believed - best) / OVERLAP > _LEAST_LIKELIHOOD
     explains = disputed - best > _LEAST_ADVANTAGE * (disputed - as_believed)
-    if not (likely and explains and step > LEAST_STEP and p_value < P_LIMIT):
+    if not (likely and explains and step > _LEAST_STEP and p_value < _P_LIMIT):
         return Corrected(recordings)
     cost = int(costs[order, spun])
     if not any({"attitude", "gyroscope"} <= set(s.values) for s in signals):

@@ -1,4 +1,4 @@
-"""The columns of a run on one even grid, sensor by sensor, nothing derived and nothing dropped."""
+"""The columns of a run on one even grid, nothing derived and nothing dropped but voltages that no battery has."""
 
 from __future__ import annotations
 
@@ -10,16 +10,22 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from rotorid.mismatch.decision.findings import Finding
-from rotorid.mismatch.plant.motion import continuous, fresh_samples, own_rate_hz, rotation_matrices
+from rotorid.mismatch.plant.motion import (
+    LONGEST_BRIDGED_SAMPLES,
+    continuous,
+    fresh_samples,
+    own_rate_hz,
+    rotation_matrices,
+)
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
 
+_LEAST_V = 0.5
+"""No battery that turns a rotor has less."""
 COMMANDED = ("commands", "throttle")
 """Sensors that are what was asked of the rotors, not what was measured."""
 P_LIMIT = 1e-9
 """p-value below which the readings of a sensor show a mistake by themselves."""
-_LONGEST_BRIDGED_SAMPLES = 6
-"""A hole of up to this many of a sensor's own periods is interpolated; a longer one stays missing."""
 
 
 def sensor_columns(vehicle: Vehicle) -> dict[str, tuple[str, ...]]:
@@ -95,7 +101,7 @@ def on_grid(time_s: np.ndarray, values: np.ndarray, grid_s: np.ndarray) -> np.nd
         return v.astype(float)
     out = CubicSpline(t, v, axis=0, extrapolate=False)(grid_s)
     gap = np.diff(t)
-    for k in np.flatnonzero(gap > _LONGEST_BRIDGED_SAMPLES * float(np.median(gap))):
+    for k in np.flatnonzero(gap > LONGEST_BRIDGED_SAMPLES * float(np.median(gap))):
         out[(grid_s > t[k]) & (grid_s < t[k + 1])] = np.nan
     return out
 
@@ -158,3 +164,22 @@ class Corrected:
         """The same after a further step, which looks at the set as corrected so far."""
         found = step(self.recordings)
         return Corrected(found.recordings, self.findings + found.findings, self.notes + found.notes)
+
+
+def connected(recordings: RecordingSet) -> Corrected:
+    """The set without voltages that no battery has, and a note for every run whose voltmeter read mostly such."""
+    notes = []
+
+    def change(run: Run):
+        if not run.has(c.BATTERY_VOLTAGE):
+            return {}
+        voltage = run.table[c.BATTERY_VOLTAGE]
+        dead = voltage < _LEAST_V
+        if not dead.any():
+            return {}
+        mostly = dead.sum() > voltage.notna().sum() / 2
+        if mostly:
+            notes.append(f"{c.BATTERY_VOLTAGE} of {run.name} reads below {_LEAST_V} V: taken as not connected.")
+        return {c.BATTERY_VOLTAGE: np.nan if mostly else voltage.mask(dead)}
+
+    return Corrected(replace_columns(recordings, change), notes=tuple(notes))

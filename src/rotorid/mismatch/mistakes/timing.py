@@ -34,12 +34,12 @@ from rotorid.recordings import Run, Vehicle
 _LEAST_ALONE = 0.9
 """Share of the motion that commands must explain to show a constant lateness: below it the motors' lag, fitted later,
 shows their dead time better. A growth of it is bounded by what disturbances can feign (`_disturbed_s`)."""
-LEAST_SHARE = 0.1
+_LEAST_SHARE = 0.1
 """A sensor that moves a comparison's lateness by less than this share of its own is not connected by it."""
 _SHARE_STEP_S = 0.004
 """By how much a sensor is made late to see how far a comparison's lateness follows."""
 _LEAST_EXPLAINED = 0.6
-P_LIMIT, _P_LATE = 1e-6, 1e-4
+_P_LIMIT, _P_LATE = 1e-6, 1e-4
 """Chance of a growth of lateness, and of a constant one beyond a sample; both have to bring LEAST_LIKELIHOOD too."""
 _LEAST_LIKELIHOOD = 60.0
 """Rise of the log-likelihood that a delay, or its growth, must bring."""
@@ -74,7 +74,7 @@ _SCALES = (0.85, 1.25)
 
 
 @dataclass(frozen=True)
-class SensorPair:
+class _SensorPair:
     """Two sensors that may show each other's time."""
 
     late: str
@@ -99,10 +99,10 @@ class SensorPair:
 
 
 @dataclass(frozen=True)
-class LatenessFound:
+class _LatenessFound:
     """Lateness of one sensor over another at the start of a run, and how it grows."""
 
-    of: SensorPair
+    of: _SensorPair
     start_s: float
     growth: float
     """s/s."""
@@ -148,7 +148,7 @@ def find(recordings: ReadSet) -> Corrected:
     return result.then(partial(_delay, known=comparisons(result.recordings) if result.findings else known))
 
 
-def comparisons(recordings: ReadSet) -> list[SensorPair]:
+def comparisons(recordings: ReadSet) -> list[_SensorPair]:
     """Every comparison of two sensors that may show time."""
     all_signals, vehicle = recordings.signals, recordings.vehicle
     have = set().union(*(s.values for s in all_signals))
@@ -189,7 +189,7 @@ def comparisons(recordings: ReadSet) -> list[SensorPair]:
             continue
         if late == "velocity":
             shares = _shares_of(all_signals, vehicle, source, [0, 1] if over == "attitude" else [2], found)
-        out.append(SensorPair(late, over, blocks, found, motor_s, shares))
+        out.append(_SensorPair(late, over, blocks, found, motor_s, shares))
     return out
 
 
@@ -229,7 +229,7 @@ def _shares_of(
     if again is None:
         return (("attitude", 1.0),) if outputs == [0, 1] else ((source, 1.0),)
     attitude = float(np.clip((found.lag_s - again.lag_s) * all_signals[0].rate_hz / steps, 0.0, 1.0))
-    if attitude < LEAST_SHARE or attitude > 1.0 - LEAST_SHARE:
+    if attitude < _LEAST_SHARE or attitude > 1.0 - _LEAST_SHARE:
         attitude = round(attitude)
     return tuple((n, x) for n, x in (("attitude", attitude), (source, 1.0 - attitude)) if x > 0)
 
@@ -241,7 +241,7 @@ def _late(signals: Signals, sensor: str, steps: int) -> Signals:
     return replace(signals, values={**signals.values, sensor: _moved(signals.values[sensor], -steps)})
 
 
-def difference(of: SensorPair, drifting: bool, free: bool = True) -> LatenessFound:
+def difference(of: _SensorPair, drifting: bool, free: bool = True) -> _LatenessFound:
     """Lateness, and its growth if asked for, at the likelihood's peak.
 
     Where `free`, gains and weights are fitted again with the blocks put on one time, because a drifting clock blurs the
@@ -292,7 +292,7 @@ def difference(of: SensorPair, drifting: bool, free: bool = True) -> LatenessFou
     explained = float(np.min(found.explained))
     answered = of.over == "rotors" or (of.over in COMMANDED and of.late != "rotors")
     bias_s = _disturbed_s(blocks, found) if answered else 0.0
-    return LatenessFound(of, start, growth, covariance, rise, len(time_s), explained, gained, bias_s)
+    return _LatenessFound(of, start, growth, covariance, rise, len(time_s), explained, gained, bias_s)
 
 
 def _disturbed_s(blocks: Blocks, found: LaggedFit) -> float:
@@ -336,14 +336,14 @@ def _waves(frequency_hz: tuple[float, ...], first_s: float, count: int) -> tuple
     return np.cos(angle), np.sin(angle)
 
 
-def differences(known: list[SensorPair], drifting: bool) -> list[LatenessFound]:
+def differences(known: list[_SensorPair], drifting: bool) -> list[_LatenessFound]:
     """Every difference of lateness that a comparison is good enough to show."""
     least = dict.fromkeys(COMMANDED, _LEAST_EXPLAINED if drifting else _LEAST_ALONE)
     found = [difference(c, drifting) for c in known]
     return [d for d in found if d.explained > least.get(d.of.over, _LEAST_EXPLAINED)]
 
 
-def across(differences: Sequence[LatenessFound], wrong: Sequence[str], key: int) -> tuple[float, float]:
+def _across(differences: Sequence[_LatenessFound], wrong: Sequence[str], key: int) -> tuple[float, float]:
     """Lateness (key 0) or growth (1) of some sensors over the rest, and one sigma, from comparisons between the two.
 
     What disturbances can feign counts as another one sigma: it is a bound, and seldom met.
@@ -351,7 +351,7 @@ def across(differences: Sequence[LatenessFound], wrong: Sequence[str], key: int)
     values, weights = [], []
     for d in differences:
         part = d.of.part(wrong)
-        if abs(part) > LEAST_SHARE:
+        if abs(part) > _LEAST_SHARE:
             values.append(d.value(key) / part)
             weights.append(part**2 / (d.sd(key) ** 2 + d.bound(key) ** 2))
     return float(np.average(values, weights=weights)), float(1.0 / np.sqrt(np.sum(weights)))
@@ -367,13 +367,13 @@ def _remeasured(
     None where none is left.
     """
     again = [d for d in differences(comparisons(recordings), drifting=bool(key)) if not {*aside} & {*d.of.sensors}]
-    if not any(abs(d.of.part(wrong)) > LEAST_SHARE for d in again):
+    if not any(abs(d.of.part(wrong)) > _LEAST_SHARE for d in again):
         return None
-    rest, sd = across(again, wrong, key)
+    rest, sd = _across(again, wrong, key)
     return first + rest, sd
 
 
-def _in_every_run(whole: LatenessFound) -> bool:
+def _in_every_run(whole: _LatenessFound) -> bool:
     """Whether each run by itself shows the growth: what acts in part of a flight only must not pass for a clock."""
     blocks = whole.of.blocks
     agree, shown = [], []
@@ -445,7 +445,7 @@ class Lateness:
         return value, float(np.sqrt(np.sum((row * self.sd) ** 2))), float(np.abs(row) @ self.bound)
 
 
-def _lateness(differences: list[LatenessFound], key: int) -> Lateness:
+def _lateness(differences: list[_LatenessFound], key: int) -> Lateness:
     """Lateness (key 0) or growth (key 1) of every sensor by weighted least squares."""
     names = sorted({n for d in differences for n in d.of.sensors})
     rows = np.array([[d.of.part([n]) for n in names] for d in differences])
@@ -455,7 +455,7 @@ def _lateness(differences: list[LatenessFound], key: int) -> Lateness:
     return Lateness(names, operator @ target, operator, sd, bound, _connected(names, differences))
 
 
-def _connected(names: list[str], differences: list[LatenessFound]) -> list[list[str]]:
+def _connected(names: list[str], differences: list[_LatenessFound]) -> list[list[str]]:
     groups = [{n} for n in names]
     for d in differences:
         for name, _ in d.of.shares:
@@ -539,7 +539,7 @@ def _opposite(one: tuple[float, float, float], other: tuple[float, float, float]
     return one[0] * other[0] < 0 and abs(one[0] + other[0]) < max(slack, sigmas * np.hypot(one[1], other[1]))
 
 
-def own_period_s(all_signals: list[Signals]) -> dict[str, float]:
+def _own_period_s(all_signals: list[Signals]) -> dict[str, float]:
     """Longest own period of every sensor over the runs."""
     out = {}
     for s in all_signals:
@@ -553,7 +553,7 @@ def _listed(sensors: Sequence[str]) -> str:
     return listed([SENSOR_WORDS[s] for s in sensors])
 
 
-def _one_clock(differences: list[LatenessFound], growing: list[LatenessFound]) -> tuple[str, ...]:
+def _one_clock(differences: list[_LatenessFound], growing: list[_LatenessFound]) -> tuple[str, ...]:
     """The sensor whose clock alone explains all growths best, and others that do so as well; none for no candidate.
 
     Candidates are the two sides of the comparisons with a significant growth. Nothing but height rests on the
@@ -562,7 +562,7 @@ def _one_clock(differences: list[LatenessFound], growing: list[LatenessFound]) -
     names = {n for d in growing for n in d.of.sensors} - {"position"}
     left = {}
     for name in names:
-        rate, _ = across(differences, [name], 1)
+        rate, _ = _across(differences, [name], 1)
         left[name] = sum(
             (d.growth - d.of.part([name]) * rate) ** 2 / (d.sd(1) ** 2 + d.bound(1) ** 2) for d in differences
         )
@@ -571,18 +571,18 @@ def _one_clock(differences: list[LatenessFound], growing: list[LatenessFound]) -
     return tuple(sorted(alike, key=lambda n: (-trusted[n], n)))
 
 
-def _skew(recordings: ReadSet, known: list[SensorPair]) -> Corrected:
+def _skew(recordings: ReadSet, known: list[_SensorPair]) -> Corrected:
     """Sensors whose lateness grows."""
     signals = recordings.signals
     found = differences(known, drifting=True)
     longest = max((s.time_s[-1] - s.time_s[0] for s in signals), default=0.0)
-    periods = own_period_s(signals)
+    periods = _own_period_s(signals)
     growing = []
     for d in found:
         beyond = abs(d.growth) - d.bound(1)
         p = float(2 * student.sf(beyond / max(d.sd(1), 1e-12), max(d.pieces - 2, 1)))
         slowest = max(periods[n] for n in d.of.sensors)
-        significant = p < P_LIMIT and abs(d.growth) * longest > slowest and d.gained > _LEAST_LIKELIHOOD
+        significant = p < _P_LIMIT and abs(d.growth) * longest > slowest and d.gained > _LEAST_LIKELIHOOD
         if significant and _in_every_run(d):
             growing.append((p, d))
     if not growing:
@@ -602,7 +602,7 @@ def _skew(recordings: ReadSet, known: list[SensorPair]) -> Corrected:
         blamed = _one_clock(found, [d for _, d in growing])
         if not blamed:
             return Corrected(recordings)
-        drift = {blamed[0]: (across(found, [blamed[0]], 1)[0], 0.0, 0.0)}
+        drift = {blamed[0]: (_across(found, [blamed[0]], 1)[0], 0.0, 0.0)}
         wrong = [blamed[0]]
         if len(blamed) > 1:
             other = f" (or that of {_listed(list(blamed[1:]))} the other way: nothing else recorded shows which)"
@@ -610,9 +610,9 @@ def _skew(recordings: ReadSet, known: list[SensorPair]) -> Corrected:
     rates = {n: value for n, (value, _, _) in drift.items()}
     sides = [[n for n in wrong if rates[n] > 0], [n for n in wrong if rates[n] < 0]]
     wrong = max(sides, key=len)
-    rate, sd = across(found, wrong, 1)
+    rate, sd = _across(found, wrong, 1)
     # Large drifts move the motion out of its block: measured once more with the first estimate taken out.
-    rate, sd = _remeasured(shifted(recordings, wrong, 0.0, rate), wrong, 1, rate) or (rate, sd)
+    rate, sd = _remeasured(_shifted(recordings, wrong, 0.0, rate), wrong, 1, rate) or (rate, sd)
     change = "fall behind by" if rate > 0 else "gain"
     finding = Finding(
         id="clock_skew",
@@ -625,7 +625,7 @@ def _skew(recordings: ReadSet, known: list[SensorPair]) -> Corrected:
         p_value=min(p for p, _ in growing),
         channels=tuple(sensor_columns(recordings.vehicle)[n][0] for n in wrong),
     )
-    return Corrected(shifted(recordings, _with_position(wrong), 0.0, rate), (finding,))
+    return Corrected(_shifted(recordings, _with_position(wrong), 0.0, rate), (finding,))
 
 
 def _with_position(sensors: list[str]) -> list[str]:
@@ -633,10 +633,10 @@ def _with_position(sensors: list[str]) -> list[str]:
     return [*sensors, "position"] if {"velocity", "attitude"} <= {*sensors} and "position" not in sensors else sensors
 
 
-def _delay(recordings: ReadSet, known: list[SensorPair]) -> Corrected:
+def _delay(recordings: ReadSet, known: list[_SensorPair]) -> Corrected:
     """Sensors that are late by a constant of more than one sample."""
     signals = recordings.signals
-    periods = own_period_s(signals)
+    periods = _own_period_s(signals)
     found = differences(known, drifting=False)
     if not found:
         return Corrected(recordings)
@@ -648,7 +648,7 @@ def _delay(recordings: ReadSet, known: list[SensorPair]) -> Corrected:
     tolerance = {n: max(periods[n], 3 * sd) for n, (_, sd, _) in relative.items()}
     wrong, notes, limits = [], [], {}
     for n, (value, sd, bound) in relative.items():
-        touching = [d for d in found if abs(d.of.part([n])) > LEAST_SHARE]
+        touching = [d for d in found if abs(d.of.part([n])) > _LEAST_SHARE]
         limit = limits[n] = max(periods[n], sample, bound)
         count = max(d.pieces for d in touching)
         p = float(student.sf((abs(value) - limit) / max(sd, 1e-9), max(count - 2, 1)))
@@ -668,7 +668,7 @@ def _delay(recordings: ReadSet, known: list[SensorPair]) -> Corrected:
             f"{capital(SENSOR_WORDS[sensor])}: {1e3 * late[sensor]:+.1f} ms against the rest, {_SMALL_LAGS[sensor]}."
         )
         if sensor in _INERTIAL:
-            fixed = shifted(fixed, [sensor], late[sensor])
+            fixed = _shifted(fixed, [sensor], late[sensor])
     unfiltered = fixed
     for cluster in clusters:
         if cluster[0] in own:
@@ -676,12 +676,12 @@ def _delay(recordings: ReadSet, known: list[SensorPair]) -> Corrected:
         others = [n for n, _ in wrong if n not in cluster and n not in own]
         amount, sd = float(np.mean([late[n] for n in cluster])), max(relative[n][1] for n in cluster)
         steps = round(amount / sample) * sample
-        nearly = shifted(unfiltered, _with_position(cluster), steps)
+        nearly = _shifted(unfiltered, _with_position(cluster), steps)
         amount, sd = _remeasured(nearly, cluster, 0, steps, others) or (amount, sd)
         if abs(amount) < min(limits[n] for n in cluster):
             notes.append(f"{capital(_listed(cluster))}: {1e3 * amount:+.1f} ms against the rest, below a sample.")
             continue
-        fixed = shifted(fixed, _with_position(cluster), amount)
+        fixed = _shifted(fixed, _with_position(cluster), amount)
         word = "late" if amount > 0 else "early"
         findings.append(
             Finding(
@@ -711,7 +711,7 @@ def _clusters(names: list[str], values: dict[str, float], tolerance: dict[str, f
     return out
 
 
-def shifted(recordings: ReadSet, sensors: Sequence[str], late_s: float, growth: float = 0.0) -> ReadSet:
+def _shifted(recordings: ReadSet, sensors: Sequence[str], late_s: float, growth: float = 0.0) -> ReadSet:
     """The set with some sensors' columns moved earlier by `late_s` + `growth` × time since the run's start.
 
     Evenly sampled columns move by whole samples, which leaves their noise as it is; the rest (below half a

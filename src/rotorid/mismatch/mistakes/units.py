@@ -23,7 +23,7 @@ _FAR = np.log(3.0)
 _ACCELERATIONS = {"g": 1 / g, "mg": 1000 / g, "cm/s²": 100.0, "mm/s²": 1000.0}
 RATES = {"rpm": 60 / (2 * np.pi), "rev/s": 1 / (2 * np.pi), "deg/s": 180 / np.pi}
 _PULSES = "pulses of 1000 to 2000 µs"
-THROTTLES = {
+_THROTTLES = {
     ("counts of 16 bits", 65535.0): (2300, 65535.5),
     ("per mille", 1000.0): (260, 1000.5),
     ("percent", 100.0): (1.5, 100.5),
@@ -106,7 +106,7 @@ def _by_size(recordings: ReadSet) -> list[UnitError]:
     throttle = _pooled(recordings, names["throttle"])
     if len(throttle):
         low, high = (float(np.quantile(throttle, share)) for share in (0.001, 0.999))
-        unit = next((unit for unit, (above, most) in THROTTLES.items() if above < high <= most), None)
+        unit = next((unit for unit, (above, most) in _THROTTLES.items() if above < high <= most), None)
         add(names["throttle"], "the throttle", (_PULSES, 1000.0) if 900 <= low and high <= 2300 else unit, "a fraction")
     voltage = _pooled(recordings, (c.BATTERY_VOLTAGE,))
     if len(voltage):

@@ -20,10 +20,10 @@ from rotorid.mismatch.plant.motion import full_speed
 from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import columns as c
 
-WINDOW_S = 0.35
+_WINDOW_S = 0.35
 _SIDE_BINS = (-6, -5, -4, -3, 3, 4, 5, 6)
 """Offsets from the order, in widths of the window, that give the level next to the line."""
-ORDERS = (1, 2)
+_ORDERS = (1, 2)
 _LEAST_MEDIAN = 3.0
 """Power at the order over that next to it in half of the windows, at least."""
 _LEAST_AMPLITUDE = 0.5
@@ -62,7 +62,7 @@ def find(recordings: ReadSet) -> Corrected:
     ):
         have = [s for s in signals if sensor in s.values and s.own_rate_hz[sensor] > 0.9 * s.rate_hz]
         for axis, column in enumerate(columns):
-            for order in ORDERS:
+            for order in _ORDERS:
                 line = _measure(have, sensor, axis, column, unit, order)
                 if line and line.p_value < P_LIMIT and line.over_noise > _LEAST_AMPLITUDE:
                     lines.append(line)
@@ -120,10 +120,10 @@ def _strongest_line(signals: list[Signals]) -> float:
     """Power at the order over that next to it, in half of the windows, of the accelerometer's clearest line."""
     best = 0.0
     for axis in range(3):
-        for order in ORDERS:
+        for order in _ORDERS:
             ratios = []
             for s in signals:
-                length = int(WINDOW_S * s.rate_hz)
+                length = int(_WINDOW_S * s.rate_hz)
                 if "accelerometer" in s.values and length >= 24:
                     line, beside, _, _ = _demodulated(s, "accelerometer", axis, order, length, _MOST_WINDOWS)
                     ratios.append((line / beside).ravel())
@@ -137,7 +137,7 @@ def _measure(all_signals: list[Signals], sensor: str, axis: int, column: str, un
     """Power at the rotors' order over that next to it, summed over windows and rotors."""
     ratios, powers, levels, lengths = [], [], [], []
     for s in all_signals:
-        length = int(WINDOW_S * s.rate_hz)
+        length = int(_WINDOW_S * s.rate_hz)
         if length < 24:
             continue
         line, beside, crowd, floor = _demodulated(s, sensor, axis, order, length)
@@ -200,7 +200,7 @@ def _demodulated(
         # Where the alias comes near zero frequency, flight motion would be taken for a line.
         turn = order * speed[:, :, i].mean(axis=1) * dt
         turned = np.abs((turn + np.pi) % (2 * np.pi) - np.pi)
-        clear = turned / (2 * np.pi * dt) > _LOWEST_HZ + 6 / WINDOW_S
+        clear = turned / (2 * np.pi * dt) > _LOWEST_HZ + 6 / _WINDOW_S
         line[clear, i] = spectrum[clear, 0]
         # Rotors of nearly one speed add to each other's line, with phases that wander: their powers add.
         together = np.mean(taper[:, None] * follow[:, :, i, None].conj() * follow, axis=1)

@@ -23,7 +23,7 @@ ALARM_P = 1e-5
 """A residual depends on the inputs where the p-value is below this."""
 SMALLEST_SHARE_OF_NOISE = 0.3
 """A left-over dependence below this share of the noise is not worth a word."""
-BLOCK_S = 2.0
+_BLOCK_S = 2.0
 
 
 def probes(segment: Segment, prepared) -> dict[str, np.ndarray]:
@@ -148,7 +148,7 @@ def _wald(parts, inputs, taps, rate_hz, shared=None, most=1.0, memory=0):
     """
     size = inputs[0].shape[1]
     blocks, stretches, noise = [], [], np.zeros(size)
-    per = max(2, int(BLOCK_S * rate_hz))
+    per = max(2, int(_BLOCK_S * rate_hz))
     for k, (y, z) in enumerate(zip(parts, inputs, strict=True)):
         yw, zw = _whitened(y, taps), _whitened(z, taps)
         y_noise, z_noise = (0 * yw, 0 * zw) if shared is None else (_whitened(x, taps) for x in shared[k])

@@ -99,8 +99,8 @@ def fitted(prepared: Prepared) -> Fitted:
         model = refined_model(prepared, *turning(prepared))
     else:
         chain, model = _with_chain(prepared, chain)
-    found = wrong_values_of(model)
-    return Fitted(model, found.values, chain, measured, found.instead)
+    values, instead = wrong_values_of(model)
+    return Fitted(model, values, chain, measured, instead)
 
 
 def turning(prepared: Prepared, chain: CommandChain | None = None):
@@ -155,7 +155,7 @@ def without_same_curves(prepared: Prepared, chain: CommandChain) -> Prepared:
 
 def strains(model: WrenchModel) -> bool:
     """Whether the recordings ask a value that is not called wrong to move beyond its trust."""
-    return beyond_trust(model, wrong_values_of(model).values, model.selection.active)
+    return beyond_trust(model, wrong_values_of(model)[0], model.selection.active)
 
 
 def only_scales(result: SpeedResult) -> bool:

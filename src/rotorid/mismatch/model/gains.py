@@ -40,7 +40,7 @@ _LEAST_REACHED = 0.5
 """Share of the rows in stretches longer than the band-pass, without which all frequencies judge."""
 _MOMENTS = (3, 4, 5)
 """Channels of the moments."""
-LEAST_SHARE = 1e-3
+_LEAST_SHARE = 1e-3
 """Of a believed value what an estimate is at least: of what is not excited it may be anything."""
 _NEVER_SHOWN = 1e-6
 """Whitened squares of a value's column up to which the flight shows nothing of it."""
@@ -48,17 +48,8 @@ _FREE_SD = 3.0
 """Relative one-sigma of the value by which a gain is estimated."""
 
 
-@dataclass(frozen=True)
-class _WrongValues:
-    """Believed values that recordings contradict."""
-
-    values: Values
-    instead: dict[str, list[Values]]
-    """To each of them what would explain as much in its place."""
-
-
-def wrong_values_of(model: WrenchModel, prior: Prior = Prior()) -> _WrongValues:  # noqa: B008
-    """The believed values that the model's recordings contradict.
+def wrong_values_of(model: WrenchModel, prior: Prior = Prior()) -> tuple[Values, dict[str, list[Values]]]:  # noqa: B008
+    """The believed values that the model's recordings contradict, and to each what would explain as much in its place.
 
     Of two values of one ratio the one is named by which the regression explains more, where it does so beyond doubt.
     """
@@ -81,7 +72,7 @@ def wrong_values_of(model: WrenchModel, prior: Prior = Prior()) -> _WrongValues:
         if not small:
             break
         refused += small
-    return _WrongValues(dict(options[wrong].changes), in_place(options, wrong, least))
+    return dict(options[wrong].changes), in_place(options, wrong, least)
 
 
 def _trust_of(model: WrenchModel) -> dict[str, float]:
@@ -149,7 +140,7 @@ def _side_of(
 ) -> dict[str, Side]:
     """Each gain by one regression."""
     keys, loose = [*regression.keys_of("nuisance", "wind"), *active, *free], dict.fromkeys(free, _FREE_SD)
-    pair = [r.fit(keys, loose=loose) for r in (regression.with_room(np.inf), uncorrected(regression))]
+    pair = [r.fit(keys, loose=loose) for r in (regression.with_room(np.inf), _uncorrected(regression))]
     out = {}
     for key in free:
         (corrected, covariance), (plain, _) = (coefficients(regression, fit, key) for fit in pair)
@@ -176,7 +167,7 @@ def _gain_of(coefficient: float, turned: bool) -> float:
     `turned` says that the column holds what the believed value makes of a force or moment (`decide.relative_change`).
     """
     return float(
-        np.log(max(1.0 - coefficient, LEAST_SHARE)) if turned else -np.log(max(1.0 + coefficient, LEAST_SHARE))
+        np.log(max(1.0 - coefficient, _LEAST_SHARE)) if turned else -np.log(max(1.0 + coefficient, _LEAST_SHARE))
     )
 
 
@@ -210,7 +201,7 @@ def mean_of(gains: Sequence[LogGain]) -> LogGain:
     return LogGain(mean, max(1.0, excess) / float(weights.sum()))
 
 
-def uncorrected(regression: Regression) -> Regression:
+def _uncorrected(regression: Regression) -> Regression:
     """The same without a correction for the noise of regressors, and with room for any value."""
     apart = regression.apart
     if apart is not None:

@@ -4,6 +4,8 @@ Where a drag is in the model, the wind north and east is a line from knot to kno
 residual shows (or over a whole run, where it never rests). Its knots are columns of the same regression as the drag,
 so the drag's interval knows of them. A run's wind is found in that run, held out or not: it is no property of the
 vehicle, and nothing else is learnt from held-out runs.
+
+Windows of a run in which a force in world axes comes and goes (a gust), found in the residual itself.
 """
 
 from __future__ import annotations
@@ -12,12 +14,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 from scipy.stats import chi2
 
 from rotorid.effects.catalogue import ids_of, moving_air
+from rotorid.effects.gust import window_form
 from rotorid.mismatch.decision import rules
 from rotorid.mismatch.decision.findings import Finding
-from rotorid.mismatch.model.bursts import gust_terms, windows
 from rotorid.mismatch.model.prepare import Prepared, assemble_rows
 from rotorid.mismatch.model.wrench import (
     WrenchModel,
@@ -35,6 +38,15 @@ from rotorid.mismatch.plant.split import training_rule
 from rotorid.mismatch.posterior.status import Estimate
 from rotorid.steps import step
 
+_SMOOTHING_S = 0.6
+_ALARM = 6.0
+"""Robust standard deviations of the smoothed world force that open a window."""
+_EDGE = 2.5
+"""A window reaches to where the smoothed force falls below this many."""
+_SHORTEST_S, _LONGEST_SHARE = 1.0, 0.5
+"""A window is never shorter than the smoothing itself; one of a blip is as short."""
+_BURST_KNOT_S = 0.6
+_MOST_WINDOWS = 3
 _KNOT_S, _RESTLESS_KNOT_S = 0.3, 1.0
 """Distance of knots in a window, where a gust may set in within a fraction of a second, and where the wind changes
 all the time."""
@@ -53,7 +65,7 @@ _GUST_P = 1e-6
 _BESIDE_A_BURST = 1.0
 """Size, in units of the noise, of a gust that is believed where a stronger one blew: left out, it would be noise to the
 others."""
-STEPS, _ROUNDS = 4, 2
+_STEPS, _ROUNDS = 4, 2
 """Gauss-Newton steps for the wind alone, and searches repeated in it."""
 _LARGEST_STEP_M_S = 4.0
 
@@ -217,7 +229,7 @@ def _wind_in(model: WrenchModel, segments: list[Segment], term: Term) -> np.ndar
     kept = [*always, *active]
     cols = model.regression.columns([t.key for t in kept])
     beta = np.array([full.beta[full.columns == c][0] if c in full.columns else 0.0 for c in cols])
-    for _ in range(STEPS):
+    for _ in range(_STEPS):
         moved = _in_gusts(segments, {term.key: (term, wind)})
         rows = assemble_rows(model.prepared, [*kept, term], moved, felt)
         normal, right = 1e-9 * np.eye(term.size), np.zeros(term.size)
@@ -283,7 +295,7 @@ def _restless(model: WrenchModel) -> list[Term]:
 def _in_moving_air(prepared: Prepared, model: WrenchModel, terms: list[Term], asked: list[Term]) -> WrenchModel | None:
     """The search repeated with the wind of the windows asked for, as far as it is there; None where it is not."""
     still = {t.key: (t, np.zeros(t.size)) for t in asked}
-    winds, covariances = estimated(prepared, model, still, STEPS)
+    winds, covariances = estimated(prepared, model, still, _STEPS)
     if not believed([_gust_of(term, wind, covariances[key]) for key, (term, wind) in winds.items()], model):
         return None
     kept = [t for t in terms if t.effect != moving_air("all the time").id]
@@ -413,12 +425,12 @@ def estimated(prepared: Prepared, model: WrenchModel, winds: dict[str, tuple[Ter
         fit = regression.fit([t.key for t in own])
         effects = [with_linear(e, regression, fit, t) for t, e in zip(active, effects, strict=True)]
         for term in asked:
-            step, covariances[term.key] = step_of(regression, fit, term)
+            step, covariances[term.key] = _step_of(regression, fit, term)
             winds[term.key] = (term, winds[term.key][1] + np.clip(step, -_LARGEST_STEP_M_S, _LARGEST_STEP_M_S))
     return winds, covariances
 
 
-def step_of(regression: Regression, fit: Fit, term: Term) -> tuple[np.ndarray, np.ndarray]:
+def _step_of(regression: Regression, fit: Fit, term: Term) -> tuple[np.ndarray, np.ndarray]:
     """Change of a term's wind and its covariance; of a run that is not fitted from the run itself, all else fixed."""
     cols = regression.columns([term.key])
     where = np.flatnonzero(np.isin(fit.columns, cols))
@@ -453,3 +465,55 @@ def gust_finding(gusts: tuple[Gust, ...]) -> Finding:
         channels=("force_x", "force_y"),
         windows=tuple(g.window for g in gusts),
     )
+
+
+def windows(residual_body: np.ndarray, rotation: np.ndarray, time_s: np.ndarray):
+    """Windows (start_s, stop_s, strength) of one stretch, strongest first.
+
+    `residual_body` (n, 3) N; `rotation` (n, 3, 3). The scale is the median absolute deviation of the smoothed
+    force over the stretch itself, so a lasting force does not count: that is a steady wind.
+    """
+    world = np.einsum("nij,nj->ni", rotation, residual_body)[:, :2]
+    dt = float(np.median(np.diff(time_s)))
+    smooth = uniform_filter1d(world - np.median(world, axis=0), max(3, int(_SMOOTHING_S / dt)), axis=0)
+    scale = max(1.4826 * np.median(np.abs(smooth - np.median(smooth, axis=0)), axis=0).max(), 1e-12)
+    strength = np.linalg.norm(smooth, axis=1) / scale
+    found = []
+    left = strength.copy()
+    while len(found) < _MOST_WINDOWS:
+        top = int(np.argmax(left))
+        if left[top] < _ALARM:
+            break
+        low, high = top, top
+        while low > 0 and strength[low - 1] > _EDGE:
+            low -= 1
+        while high < len(strength) - 1 and strength[high + 1] > _EDGE:
+            high += 1
+        left[low : high + 1] = 0.0
+        length = (high - low) * dt
+        if _SHORTEST_S <= length <= _LONGEST_SHARE * len(strength) * dt:
+            found.append((float(time_s[low]), float(time_s[high]), float(strength[top])))
+    return found
+
+
+def gust_terms(run: str, found) -> list[Term]:
+    """Terms for the windows of one run."""
+    terms, gust = [], moving_air("in windows").id
+    for start, stop, _ in found:
+        knots = int(np.clip(round((stop - start) / _BURST_KNOT_S), 2, 12))
+        form = window_form(start - 0.15, stop + 0.15, knots)
+        size = len(form.parameters)
+        terms.append(
+            Term(
+                f"{gust}/{run}/{start:.2f}",
+                "effect",
+                gust,
+                form,
+                (0.0,) * size,
+                size,
+                (np.inf,) * size,
+                run=run,
+                window=(run, start, stop),
+            )
+        )
+    return terms

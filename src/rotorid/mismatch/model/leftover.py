@@ -88,7 +88,7 @@ def leftover(prepared, model, segments, noisy, p_after, depends, delivered=None,
     full = model.full_fit()
     added = model.contributions.of(full.columns, full.beta)
     slow = slow_excess(prepared, model, segments, noisy, added)
-    channels = channels_of(
+    channels = _channels_of(
         prepared, model, segments, full, added, slow, p_after, delivered, 1.0 if claimed else _UNCLAIMED
     )
     left = [c for c in channels if c.counts]
@@ -105,7 +105,7 @@ def leftover(prepared, model, segments, noisy, p_after, depends, delivered=None,
     )
 
 
-def channels_of(prepared, model, segments, full, added, slow, p_after, delivered, least) -> list[_ChannelLeftover]:
+def _channels_of(prepared, model, segments, full, added, slow, p_after, delivered, least) -> list[_ChannelLeftover]:
     """Every channel that has a p-value, taken apart; judged on the runs held out, fitted on the others.
 
     `full` is the fit of the whole model, `added` (n, 12) of each stretch what it makes of the channels; `least` is how

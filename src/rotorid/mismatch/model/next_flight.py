@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rotorid.effects.advice import advice
 from rotorid.effects.catalogue import catalogue, ids_of, ids_of_stage
 from rotorid.effects.contract import CURVE
+from rotorid.effects.describe import advice
 from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.model.fitted import Fitted
 from rotorid.recordings import RecordingSet

@@ -22,15 +22,15 @@ from rotorid.mismatch.plant.unknowns import UNKNOWNS
 
 _SEEN_IN = ((2, 0), (4, 1), (3, 2))
 """Channel and parameter of a load: its mass in the vertical force, its places in the moments of pitch and roll."""
-BLOCK_S = 0.5
+_BLOCK_S = 0.5
 _SMOOTHED_BLOCKS = 9
-SWITCH_COST = 30.0
+_SWITCH_COST = 30.0
 """Squares, in units of the blocks' own scatter, that taking up or dropping must explain."""
 _LEAST_BLOCKS = 8
 """Blocks of either state, of all runs together."""
-LEAST_STEP = 3.0
+_LEAST_STEP = 3.0
 """Distance of the two plateaus in units of the scatter of a block."""
-MOST_DRIFT = 0.2
+_MOST_DRIFT = 0.2
 """Share of the slow variation of the loads that the two plateaus may leave."""
 _EDGE_S = 1.5
 """Distance from the border of two blocks within which the instant is looked for."""
@@ -43,7 +43,7 @@ def payload_windows_of(model: WrenchModel) -> list[Windows]:
     if not loads(model) or not np.isfinite(model.rows[0].y[:, _SEEN_IN[0][0]]).all():
         return []
     left, columns = _unexplained_loads(model)
-    per = max(2, int(BLOCK_S * model.prepared.thinner.rate_hz))
+    per = max(2, int(_BLOCK_S * model.prepared.thinner.rate_hz))
     aboard = two_plateaus([_block_loads(y, x, per) for y, x in zip(left, columns, strict=True)])
     if aboard is None:
         return []
@@ -109,10 +109,10 @@ def two_plateaus(loads: Sequence[np.ndarray]) -> list[np.ndarray] | None:
         if same:
             break
     step = plateaus[1] - plateaus[0]
-    if not any(np.diff(s).any() for s in states) or step[0] < LEAST_STEP:
+    if not any(np.diff(s).any() for s in states) or step[0] < _LEAST_STEP:
         return None
     rest = [part - plateaus[s.astype(int)] for part, s in zip(scaled, states, strict=True)]
-    return states if _slow_variance(rest) < MOST_DRIFT * _slow_variance(scaled) else None
+    return states if _slow_variance(rest) < _MOST_DRIFT * _slow_variance(scaled) else None
 
 
 def _slow_variance(parts: Sequence[np.ndarray]) -> float:
@@ -126,7 +126,7 @@ def _cheapest_states(loads: np.ndarray, plateaus: np.ndarray) -> np.ndarray:
     costs = ((loads[:, None, :] - plateaus[None]) ** 2).sum(axis=2)
     total, came = np.zeros(2), np.zeros((len(costs), 2), int)
     for i, cost in enumerate(costs):
-        moved = total[::-1] + SWITCH_COST
+        moved = total[::-1] + _SWITCH_COST
         came[i] = np.where(moved < total, [1, 0], [0, 1])
         total = np.minimum(total, moved) + cost
     state, out = int(np.argmin(total)), np.zeros(len(costs), bool)
@@ -144,7 +144,7 @@ def change_rows(states: np.ndarray, left: np.ndarray, column: np.ndarray, per: i
     errors = np.stack([(y - m * x) ** 2 for m in mass])
     edges = []
     for block in np.flatnonzero(np.diff(states)) + 1:
-        middle, reach = block * per, int(_EDGE_S / BLOCK_S * per)
+        middle, reach = block * per, int(_EDGE_S / _BLOCK_S * per)
         start, stop = max(0, middle - reach), min(len(y), middle + reach)
         before, after = int(states[block - 1]), int(states[block])
         gain = np.cumsum(errors[after, start:stop] - errors[before, start:stop])

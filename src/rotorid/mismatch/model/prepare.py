@@ -1,12 +1,19 @@
-"""From a recording set to what the analysis works on: split, segments, sensor noise, terms and rows."""
+"""From a recording set to what the analysis works on: split, segments, sensor noise, terms and rows.
+
+What is made of a stretch of flight, made once and again only where something changed that it is made of.
+
+Between two assemblies only a wind, the hang of a payload, the rotors' speeds, the accelerations that a model predicts
+or a term's own values change. What was read of the motion while a column was made says whether any of it matters.
+"""
 
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 from itertools import chain
+from typing import Any
 
 import numpy as np
 from scipy.signal import welch
@@ -15,7 +22,6 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form, Motion, not_testable_reason, rotor_thrusts
 from rotorid.errors import InputError
 from rotorid.mismatch.decision import rules
-from rotorid.mismatch.model.made import LastMade
 from rotorid.mismatch.plant.motion import (
     HIGHEST_CUTOFF_HZ,
     SHORTEST_SEGMENT_S,
@@ -53,6 +59,9 @@ from rotorid.recordings import RecordingSet, Run, Split, Vehicle
 from rotorid.recordings import columns as c
 from rotorid.steps import step
 
+_FIELDS = frozenset(f.name for f in fields(Motion))
+MOST_BYTES = 256e6
+"""Of all that is kept; what was made first is forgotten first."""
 DEFAULT_TRUST = {"thrust": 0.1, "torque": 0.2, "mass": 0.05, "arm": 0.03, "inertia": 0.15}
 """Relative one-sigma belief where `trust` states none."""
 _LOWEST_TO_MEAN = 1.08
@@ -68,6 +77,74 @@ _PIECE_SAMPLES, _SMOOTHED = 256, 9
 are averaged."""
 _MOST_NOISE_SAMPLES = 8192
 """Samples of a column that its noise level is read from."""
+
+
+class Watched(Motion):
+    """A motion that notes which of its fields are read."""
+
+    def __getattribute__(self, name: str) -> Any:
+        own = object.__getattribute__(self, "__dict__")
+        if name == "__dict__":
+            own.get("read", set()).update(_FIELDS)
+        elif name in _FIELDS:
+            own.get("read", set()).add(name)
+        return object.__getattribute__(self, name)
+
+
+def watched(motion: Motion) -> tuple[Watched, set[str]]:
+    """A motion whose reader is watched, and the names of the fields read so far."""
+    out, read = object.__new__(Watched), {"time_s"}
+    object.__getattribute__(out, "__dict__").update(motion.__dict__, read=read)
+    return out, read
+
+
+@dataclass(frozen=True)
+class _Made:
+    """Something made of a motion."""
+
+    given: tuple
+    """What else it was made of."""
+    read: dict[str, Any]
+    """Fields of the motion that were read."""
+    made: Any
+    size: int
+    """Bytes."""
+
+    def holds(self, given: tuple, motion: Motion) -> bool:
+        """Whether the same would be made again."""
+        return self.given == given and all(getattr(motion, name) is value for name, value in self.read.items())
+
+
+@dataclass
+class LastMade:
+    """What was made last of each stretch of flight, under keys of those who made it."""
+
+    kept: dict[tuple, _Made] = field(default_factory=dict)
+    size: int = 0
+
+    def made(self, key: tuple, given: tuple, motion: Motion, make: Callable[[Motion], Any]) -> Any:
+        """What `make` makes of a motion and of what is `given`: remembered under a key, or made."""
+        place = id(motion.time_s), *key
+        if place in self.kept:
+            known = self.kept.pop(place)
+            if known.holds(given, motion):
+                self.kept[place] = known
+                return known.made
+            self.size -= known.size
+        seen, read = watched(motion)
+        made = make(seen)
+        new = _Made(given, {name: getattr(motion, name) for name in read}, made, _bytes_of(made))
+        self.kept[place], self.size = new, self.size + new.size
+        while self.size > MOST_BYTES:
+            self.size -= self.kept.pop(next(iter(self.kept))).size
+        return made
+
+
+def _bytes_of(made: Any) -> int:
+    """Bytes of the arrays in lists and mappings."""
+    if isinstance(made, np.ndarray):
+        return made.nbytes
+    return sum(map(_bytes_of, made.values() if isinstance(made, dict) else made))
 
 
 def white_level(values: np.ndarray, rate_hz: float, highest_hz: float = np.inf) -> float:
@@ -88,7 +165,7 @@ def white_level(values: np.ndarray, rate_hz: float, highest_hz: float = np.inf) 
     return float(_LOWEST_TO_MEAN * np.sqrt(max(smooth.min(), 0.0) / 2)) if len(smooth) else 0.0
 
 
-def own_rate_hz(run: Run, column: str) -> float:
+def _own_rate_hz(run: Run, column: str) -> float:
     """Readings of a column per second."""
     count = int(np.isfinite(run.column(column)).sum())
     return count / max(float(run.time_s[-1] - run.time_s[0]), 1e-9)
@@ -111,7 +188,7 @@ def sensor_noise(runs: tuple[Run, ...], vehicle: Vehicle, cutoff_hz: float = np.
     levels = {}
     for key, names in groups.items():
         found = [
-            [white_level(run.column(n), own_rate_hz(run, n), _NOISE_REACH * cutoff_hz) for n in names]
+            [white_level(run.column(n), _own_rate_hz(run, n), _NOISE_REACH * cutoff_hz) for n in names]
             for run in runs
             if names and run.has(*names)
         ]

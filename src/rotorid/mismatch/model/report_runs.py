@@ -52,7 +52,7 @@ def on_every_run(
     own = as_flown([s for s, _ in pairs], found)
     noisy = as_flown([n for _, n in pairs], found) if noisy else []
     if model.segments and model.segments[0].motion.on_board is not None:
-        own, noisy = carrying(model, own, noisy)
+        own, noisy = _carrying(model, own, noisy)
     if model.segments and model.segments[0].motion.hung is not None:
         own = hung(model, own, rows_of(model, own), swinging_term(model)) or own
         noisy = like(own, noisy)
@@ -97,7 +97,7 @@ def as_flown(segments: list[Segment], found: Fitted) -> list[Segment]:
     return segments if model.wind is None else in_wind(segments, model.wind)
 
 
-def carrying(model: WrenchModel, segments: list[Segment], noisy: list[Segment]):
+def _carrying(model: WrenchModel, segments: list[Segment], noisy: list[Segment]):
     """Stretches that say when a payload is on board, found in their own loads."""
     every = [*model.segments, *segments]
     rows = rows_of(model, with_payload_on_board(every, [((-np.inf, np.inf),)] * len(every)))
@@ -141,12 +141,12 @@ def scaled_by_run(model: WrenchModel, fit: Fit) -> Fit:
         fit = replace(
             fit,
             columns=np.append(fit.columns[others], start[term.key]),
-            beta=np.append(fit.beta[others], own_scale(model, rows, fit, start[term.key], term)),
+            beta=np.append(fit.beta[others], _own_scale(model, rows, fit, start[term.key], term)),
         )
     return fit
 
 
-def own_scale(model: WrenchModel, rows: list[Rows], fit: Fit, column: int, term: Term) -> float:
+def _own_scale(model: WrenchModel, rows: list[Rows], fit: Fit, column: int, term: Term) -> float:
     """The scale that leaves least of a run's force and moment, channels weighed by their noise."""
     known = np.isfinite(model.noise)
     others = np.where(fit.columns == column, 0.0, fit.beta)

@@ -24,9 +24,9 @@ from rotorid.steps import step
 
 _PIECE_S, _PERIODS, _SHORTEST_PIECE_S = 5.0, 2.0, 1.2
 """A state is read for so long, and for so many swings at least; where it fails for less, but not for less than this."""
-RATE_HZ = 10.0
+_RATE_HZ = 10.0
 """Rate at which the sideways force is looked at: a swing has less than 2 Hz."""
-LEAST_SHARE = 0.3
+_LEAST_SHARE = 0.3
 """Share of the sideways force's squares that a swing must explain: four numbers of five seconds make 0.1 of noise."""
 _CONVERGED = 1e-4
 """Relative change of squares and state at which a fit ends: far below what noise makes of either."""
@@ -127,7 +127,7 @@ def hung_by(
     if mass_kg <= 0.0:
         return None
     found = [swing_in(s, cable, mass_kg) for s in stretches]
-    if sum(f.left_n2 for f in found) > (1.0 - LEAST_SHARE) * sum(s.squares for s in stretches):
+    if sum(f.left_n2 for f in found) > (1.0 - _LEAST_SHARE) * sum(s.squares for s in stretches):
         return None
     return [hanging(s, f.states) for s, f in zip(segments, found, strict=True)], mass_kg
 
@@ -219,7 +219,7 @@ def hanging_stretches(
     if any(s.motion.rotation is None for s in segments) or not all(np.isfinite(own).all() for own in left):
         return []
     out = []
-    per = max(1, round(rate_hz / RATE_HZ))
+    per = max(1, round(rate_hz / _RATE_HZ))
     for s, time_s, own in zip(segments, times_s, left, strict=True):
         index = np.searchsorted(s.motion.time_s, time_s).clip(0, s.motion.size - 1)
         world = np.einsum("nij,nj->ni", s.motion.rotation[index], own)[:, :2]
@@ -242,7 +242,7 @@ def largest_pieces(stretches: Sequence[HangingStretch], cable: Cable) -> list[Ha
 
 def seems_to_swing(stretches: Sequence[HangingStretch], cable: Cable) -> bool:
     """Whether a swing explains anything of the largest pieces."""
-    return share_left(stretches, cable) <= 1.0 - LEAST_SHARE
+    return share_left(stretches, cable) <= 1.0 - _LEAST_SHARE
 
 
 def share_left(stretches: Sequence[HangingStretch], cable: Cable) -> float:
@@ -261,7 +261,7 @@ def swing_in(stretch: HangingStretch, cable: Cable, mass_kg: float | None) -> _S
     start, stop = stretch.time_s[0], stretch.time_s[-1]
     edges = np.linspace(start, stop + 1e-9, max(1, int((stop - start) / cable.piece_s)) + 1)
     spans = list(zip(edges[:-1], edges[1:], strict=True))
-    state, states, masses, left = at_rest(stretch.hanging[0]), [], [], 0.0
+    state, states, masses, left = _at_rest(stretch.hanging[0]), [], [], 0.0
     while spans:
         first, last = spans.pop(0)
         piece = stretch.part(first, last)
@@ -319,7 +319,7 @@ def _fitted_near(piece: HangingStretch, cable: Cable, state: np.ndarray, mass_kg
 
 def _seen_at_first(piece: HangingStretch, cable: Cable, mass_kg: float) -> np.ndarray:
     """The state (6,) in which a piece begins as its first quarter of a swing shows it: force is mass times lean."""
-    first = piece.at_s <= piece.at_s[0] + max(_QUARTER / cable.rate, 3.0 / RATE_HZ)
+    first = piece.at_s <= piece.at_s[0] + max(_QUARTER / cable.rate, 3.0 / _RATE_HZ)
     since_s = piece.at_s[first] - piece.time_s[0]
     weight = mass_kg * np.linalg.norm(piece.hanging, axis=1).mean()
     (rate, lean) = np.polyfit(since_s, piece.force[first] / weight, 1)
@@ -328,6 +328,6 @@ def _seen_at_first(piece: HangingStretch, cable: Cable, mass_kg: float) -> np.nd
     return np.array([*lean, down, *rate, -(lean @ rate) / down])
 
 
-def at_rest(hanging: np.ndarray) -> np.ndarray:
+def _at_rest(hanging: np.ndarray) -> np.ndarray:
     """The state (6,) of what hangs at rest along `hanging` (3,)."""
     return np.array([*hanging / max(np.linalg.norm(hanging), 1e-9), 0.0, 0.0, 0.0])

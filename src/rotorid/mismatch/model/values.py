@@ -74,11 +74,6 @@ def contract_values(
     return out
 
 
-def names_of(values: Values, names: Mapping[str, str] = PARAMETER_NAMES) -> dict[str, tuple[str, ...]]:
-    """Contract name of every value to the keys that it stands for: a full speed scales both coefficients."""
-    return {names[k]: ("thrust", "torque") if k == "speed" else (k,) for k in values}
-
-
 def only_throttle(recordings: RecordingSet) -> bool:
     """Whether rotor speeds are known from the throttle and a believed full speed alone."""
     count = recordings.vehicle.rotor_count

@@ -21,7 +21,7 @@ from rotorid.mismatch.plant.comparison import growth
 from rotorid.mismatch.plant.regression import Fit
 from rotorid.mismatch.plant.rows import PARAMETER_NAMES
 
-BEYOND_TRUST = 2.0
+_BEYOND_TRUST = 2.0
 """Standard deviations of trust up to which a value may move: beyond, something else is missing that pulls at it."""
 _BETTER_RATIO = 0.95
 """Held-out error over that with the values as believed which some channel must reach for the values to move."""
@@ -44,7 +44,7 @@ def all_free(model: FittedModel, values: Values, active: Sequence[str]) -> tuple
 def _pushed_beyond_trust(model: FittedModel, moved: Values) -> bool:
     """Whether one of the changes of values not called wrong is beyond its trust."""
     trust = {t.key: t.prior_sd[0] for t in model.regression.terms if t.kind == "value"}
-    return any(abs(change) > BEYOND_TRUST * trust[k] for k, (change, _) in moved.items())
+    return any(abs(change) > _BEYOND_TRUST * trust[k] for k, (change, _) in moved.items())
 
 
 def changes(model: FittedModel, values: Values, active: Sequence[str], fit: Fit) -> Values:

@@ -55,7 +55,7 @@ from rotorid.recordings.signal.kernels import causal
 from rotorid.steps import step
 from rotorid.vehicle.mixer import wrench_matrix
 
-WINDOW_S = 2.0
+_WINDOW_S = 2.0
 _LOWEST_HZ = 0.5
 _LONGEST_BLOCKS = 400
 _TRUSTED_SD = 1e-4
@@ -78,7 +78,7 @@ _MOST_P_OF_WIND = 1e-3
 """p-value up to which a wind is seen by the fit through the drag."""
 _WIND_ROUNDS = 3
 """Searches in a wind at most: in moving air another drag may explain more, and through it the wind is another."""
-SURE_Z = 3.0
+_SURE_Z = 3.0
 """Standard errors by which a nuisance must differ from nothing to be delivered."""
 _MOST_INFLATION = 2.0
 """A residual that the chosen model leaves this many times larger than the noise is itself the better noise."""
@@ -140,7 +140,7 @@ class WrenchModel:
 
         def sure(key: str) -> bool:
             beta, covariance = coefficients(self.regression, fit, key)
-            return abs(float(beta[0])) > SURE_Z * float(np.sqrt(covariance[0, 0]))
+            return abs(float(beta[0])) > _SURE_Z * float(np.sqrt(covariance[0, 0]))
 
         return [*filter(sure, nuisances), *always]
 
@@ -794,7 +794,7 @@ def closed_loop_bias_s(segments: list[Segment], noisy: list[Segment], vehicle: V
                 continue
             moment = baseline_wrench(replace(plain.motion, rotor_speed=plain.command), vehicle)[1][:, axis]
             noise = again.motion.angular_velocity[:, axis] - rate[:, axis]
-            how = {"fs": plain.rate_hz, "nperseg": min(len(moment), int(WINDOW_S * plain.rate_hz))}
+            how = {"fs": plain.rate_hz, "nperseg": min(len(moment), int(_WINDOW_S * plain.rate_hz))}
             f_hz, s_rate = welch(rate[:, axis], **how)
             answer = csd(rate[:, axis], moment, **how)[1] / np.maximum(s_rate, 1e-300)
             weight = np.where((f_hz > _LOWEST_HZ) & (f_hz < cutoff_hz), f_hz**2, 0.0) * len(moment)

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as f_distribution
 
-BLOCK_S = 2.0
-ALARM_P = 1e-6
-SMALLEST_SHARE_OF_NOISE = 0.5
+_BLOCK_S = 2.0
+_ALARM_P = 1e-6
+_SMALLEST_SHARE_OF_NOISE = 0.5
 """Distance of a run's mean from the others', in units of the noise, below which it is not worth a word."""
 
 
@@ -34,7 +34,7 @@ class DifferingMeans:
 def apart(runs: Sequence[str], parts: Sequence[np.ndarray], rate_hz: float, noise: float) -> DifferingMeans | None:
     """Means of stretches (n,), each of a run, where runs differ beyond doubt and matter; None where they do not."""
     means, p_value = compared(runs, parts, rate_hz)
-    if p_value > ALARM_P or np.ptp(list(means.values())) < 2 * SMALLEST_SHARE_OF_NOISE * noise:
+    if p_value > _ALARM_P or np.ptp(list(means.values())) < 2 * _SMALLEST_SHARE_OF_NOISE * noise:
         return None
     return DifferingMeans(means, p_value)
 
@@ -45,7 +45,7 @@ def compared(runs: Sequence[str], parts: Sequence[np.ndarray], rate_hz: float) -
     Of three runs and more each may be left out (the p-value counts every trial): in the run in which something changed
     the blocks differ too, and would pass for a noise that walks.
     """
-    size = max(2, int(BLOCK_S * rate_hz))
+    size = max(2, int(_BLOCK_S * rate_hz))
     blocks: dict[str, list[np.ndarray]] = {}
     for run, part in zip(runs, parts, strict=True):
         count = len(part) // size

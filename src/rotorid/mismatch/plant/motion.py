@@ -42,8 +42,8 @@ _LEAST_COMMON = 0.15
 0.03, which is what chance alone makes of forty windows."""
 SensorNoise = dict[str, np.ndarray]
 """One-sigma per sample of white noise of each column of a sensor, (columns,), by the sensor's key."""
-_LONGEST_BRIDGED_SAMPLES = 6
-"""A hole of up to this many of a column's own periods is interpolated; a longer one splits the run."""
+LONGEST_BRIDGED_SAMPLES = 6
+"""A hole of up to this many of a column's own periods is interpolated; a longer one splits the run or stays a hole."""
 SHORTEST_SEGMENT_S = 2.0
 _EVEN_SHARE = 0.85
 
@@ -149,7 +149,7 @@ def _resample(time_s, values, grid_s, smooth):
             [np.interp(grid_s, t, col, left=np.nan, right=np.nan) for col in v.reshape(len(t), -1).T], axis=1
         ).reshape((len(grid_s),) + values.shape[1:])
     gap = np.diff(t)
-    longest = _LONGEST_BRIDGED_SAMPLES * float(np.median(gap))
+    longest = LONGEST_BRIDGED_SAMPLES * float(np.median(gap))
     for k in np.flatnonzero(gap > longest):
         out[(grid_s > t[k]) & (grid_s < t[k + 1])] = np.nan
     return out

@@ -104,13 +104,13 @@ def _chosen_runs(recordings: RecordingSet) -> tuple[int, ...]:
 
     chosen = even
     for number in range(count, max(count, total // 2) + 1):
-        best = max(choices(total, number), key=score)
+        best = max(_choices(total, number), key=score)
         if score(best) > score(chosen) + _WORTH_MOVING:
             chosen = best
     return chosen
 
 
-def choices(total: int, count: int) -> list[tuple[int, ...]]:
+def _choices(total: int, count: int) -> list[tuple[int, ...]]:
     """Ways to take `count` of `total` runs: all of them, or as many drawn at random as are looked at."""
     if comb(total, count) <= _MOST_CHOICES:
         return list(combinations(range(total), count))

@@ -51,7 +51,7 @@ def dipole(motion, vehicle, values):
     return Contribution(moment=np.cross(np.asarray(values[:3]), north) + np.cross(np.asarray(values[3:]), down))
 
 
-def swinging(motion, vehicle, values):
+def _swinging(motion, vehicle, values):
     """q'' + 2 ζ ω q' + ω² q = -a in the rotor plane; F = k_f ω² q, M = k_m (q × e_D): a mass that swings inside."""
     k_f, k_m, omega = values
     dt = float(np.median(np.diff(motion.time_s))) if motion.size > 1 else 0.01
@@ -87,7 +87,7 @@ def _swing_forms(vehicle):
             "swing",
             "q'' + 2ζωq' + ω²q = −a, F = k_f ω² q, M = k_m ω² q × e_D",
             (Parameter("k_f", "kg"), Parameter("k_m", "kg m"), rate),
-            swinging,
+            _swinging,
             ("specific_force",),
             memory=True,
         ),
@@ -149,7 +149,7 @@ _PLACE = Effect(
     forms=_place_forms,
     source="empirical",
 )
-HEADING = Effect(
+_HEADING = Effect(
     id="unknown_heading",
     name="a moment that depends on the heading",
     sentence="a moment keeps its direction in the world while the vehicle turns",
@@ -163,7 +163,7 @@ _SWING = Effect(
     forms=_swing_forms,
     source="empirical",
 )
-GAIN = Effect(
+_GAIN = Effect(
     id="unknown_gain",
     name="a gain that changes",
     sentence="what the reading makes of its load changes with time or temperature or from run to run",
@@ -171,7 +171,7 @@ GAIN = Effect(
     reading_forms=_gain_forms,
     source="empirical",
 )
-UNKNOWNS = {e.id: e for e in (_PLACE, HEADING, _SWING, GAIN)}
+UNKNOWNS = {e.id: e for e in (_PLACE, _HEADING, _SWING, _GAIN)}
 DEPENDS_ON = {
     "unknown_place": ("position",),
     "unknown_heading": ("heading",),
@@ -214,7 +214,7 @@ def can_show(effect_id: str, rotations: list[np.ndarray | None]) -> bool:
     On a vehicle that keeps its heading a moment fixed in the world is one fixed in the body: it would take the place
     of a centre of mass or a rotor that is off.
     """
-    if effect_id != HEADING.id or any(r is None for r in rotations):
+    if effect_id != _HEADING.id or any(r is None for r in rotations):
         return True
     noses = np.concatenate([r[:, 0, 0] + 1j * r[:, 1, 0] for r in rotations])
     noses = noses / np.maximum(np.abs(noses), 1e-12)

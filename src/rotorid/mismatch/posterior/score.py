@@ -69,10 +69,10 @@ class Posterior:
 def scored(problem: Problem, model: Model) -> Scored:
     """A model's log posterior and mode."""
     columns = problem.columns(model)
-    mode = mode_of(problem, columns, problem.believed(model))
+    mode = _mode_of(problem, columns, problem.believed(model))
     if mode is None:
         return Scored(-np.inf, columns, None)
-    value = mode.log_evidence + log_prior(problem, model) - too_small(problem, model, columns, mode)
+    value = mode.log_evidence + log_prior(problem, model) - _too_small(problem, model, columns, mode)
     return Scored(value, columns, mode)
 
 
@@ -88,7 +88,9 @@ def places(columns: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     return np.array([at[c] for c in wanted], int)
 
 
-def mode_of(problem: Problem, columns: np.ndarray, believed: tuple[np.ndarray, np.ndarray, np.ndarray]) -> _Mode | None:
+def _mode_of(
+    problem: Problem, columns: np.ndarray, believed: tuple[np.ndarray, np.ndarray, np.ndarray]
+) -> _Mode | None:
     """The mode of some columns within their bounds; None where the normal equations have none.
 
     `believed` are one-sigma and bounds of every column (`Problem.believed`). The noise of the regressors is limited in
@@ -148,7 +150,7 @@ def _modes(
         return one_by_one() if count > 1 else [None]
     out = []
     for i, beta in enumerate(free):
-        beta = within_bounds(own[i], asked[i], low[i], high[i], sd[i], slack[i], beta)
+        beta = _within_bounds(own[i], asked[i], low[i], high[i], sd[i], slack[i], beta)
         if beta is None:
             out.append(None)
             continue
@@ -172,7 +174,7 @@ def _with_apart(
     return normal, right
 
 
-def within_bounds(
+def _within_bounds(
     normal: np.ndarray,
     right: np.ndarray,
     low: np.ndarray,
@@ -202,7 +204,7 @@ def within_bounds(
     return beta
 
 
-def too_small(problem: Problem, model: Model, columns: np.ndarray, mode: _Mode) -> float:
+def _too_small(problem: Problem, model: Model, columns: np.ndarray, mode: _Mode) -> float:
     """Nats that forms cost which are negligible, or do not show what makes them that form."""
     prior, cost = problem.prior, 0.0
     for key in (k for k in model if k in problem.effects):

@@ -94,8 +94,8 @@ def _climbed(posterior: Posterior, start: Model) -> Model:
     """The model in which a search ends that starts from another; from nothing where that one has no mode."""
     model = tuple(sorted(start)) if np.isfinite(posterior(start)) else ()
     for _ in range(_MOST_MOVES):
-        better = best_of(posterior, model, _single_moves(posterior.problem, model))
-        better = better or best_of(posterior, model, _exchanges(posterior.problem, model))
+        better = _best_of(posterior, model, _single_moves(posterior.problem, model))
+        better = better or _best_of(posterior, model, _exchanges(posterior.problem, model))
         if better is None:
             break
         model = better
@@ -117,7 +117,7 @@ def ranked(problem: Problem, models: Sequence[Model]) -> np.ndarray:
     return out + np.array([log_prior(problem, model) for model in models])
 
 
-def best_of(posterior: Posterior, model: Model, moves: Sequence[Model]) -> Model | None:
+def _best_of(posterior: Posterior, model: Model, moves: Sequence[Model]) -> Model | None:
     """The best of the most promising moves; None where none is better than the present model."""
     here, *others = ranked(posterior.problem, [model, *moves])
     gains = [value - here for value in others]

@@ -24,7 +24,7 @@ FORM_SD = 0.02
 """Share of what effects contribute that their forms are wrong by."""
 _ROUNDS = 3
 """Rounds of learning the leftover from what the model leaves, and of looking at better models nearby."""
-Z95 = 1.959963984540054
+_Z95 = 1.959963984540054
 _CONSIDERED = 10.0
 """Nats below the best model up to which others count: together they hold less than a percent."""
 _MOST_SUBSTITUTES = 6
@@ -88,7 +88,7 @@ def statements_of(found: Found, of_change: bool = False, form_sd: float = 0.0) -
         seen = [(key, (*others, *more), odds) for key, others, odds in seen]
     known = scored(numbers, found.model)
     stated = [
-        statement(found, at, weights, key, others, odds, parameters(numbers, known, key, form_sd))
+        _statement(found, at, weights, key, others, odds, parameters(numbers, known, key, form_sd))
         for key, others, odds in seen
     ]
     return tuple(sorted(stated, key=lambda s: -s.odds))
@@ -102,7 +102,7 @@ def widened(problem: Problem) -> Problem:
     return replace(problem, prior_sd=sd)
 
 
-def statement(
+def _statement(
     found: Found,
     at: Scored,
     weights: Mapping[Model, float],
@@ -244,13 +244,13 @@ def matters(found: Found, at: Scored, key: str) -> bool:
     That is more than a share of the noise, and more than what the form of a larger effect there is wrong by.
     """
     prior = found.problem.prior
-    own = squares_of(found, at, key)
-    others = [squares_of(found, at, other) for other in found.model if other in found.problem.effects and other != key]
+    own = _squares_of(found, at, key)
+    others = [_squares_of(found, at, other) for other in found.model if other in found.problem.effects and other != key]
     known_to = prior.form_error**2 * np.max(others, axis=0, initial=0.0)
     return bool(np.any((own * len(own) > prior.least_size * found.problem.rows) & (own > known_to)))
 
 
-def squares_of(found: Found, at: Scored, key: str) -> np.ndarray:
+def _squares_of(found: Found, at: Scored, key: str) -> np.ndarray:
     """Whitened squares of what an effect contributes to each channel, (C,)."""
     own = found.problem.columns_of[key]
     beta = at.mode.beta[places(at.columns, own)]
@@ -266,7 +266,7 @@ def parameters(problem: Problem, at: Scored, key: str, form_sd: float = 0.0) -> 
     where, unit = places(at.columns, own), problem.unit[own]
     beta = at.mode.beta[where] * unit
     sd = np.sqrt(np.maximum(np.diag(at.mode.covariance)[where], 0.0)) * unit
-    reach = Z95 * np.hypot(sd, form_sd * beta)
+    reach = _Z95 * np.hypot(sd, form_sd * beta)
     out = []
     for k, parameter in enumerate(term.linear):
         moved = (np.where(np.arange(len(beta)) == k, beta + step, beta) for step in (0.0, -reach, reach))
@@ -302,4 +302,4 @@ def _contributed(found: Found) -> float:
     at = scored(found.problem, found.model)
     if at.mode is None:
         return 0.0
-    return float(sum(squares_of(found, at, k).sum() for k in found.model if k in found.problem.effects))
+    return float(sum(_squares_of(found, at, k).sum() for k in found.model if k in found.problem.effects))

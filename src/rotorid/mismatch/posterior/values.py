@@ -46,7 +46,7 @@ class LogGain:
 
 
 @dataclass(frozen=True)
-class Option:
+class _Option:
     """Some values called wrong, the others right."""
 
     log_posterior: float
@@ -55,7 +55,7 @@ class Option:
     """Of the values called wrong."""
 
 
-_Options = Mapping[frozenset[str], Option]
+_Options = Mapping[frozenset[str], _Option]
 
 
 def options_of(gains: Mapping[str, LogGain], trust: Mapping[str, float], prior: Prior) -> _Options:
@@ -85,7 +85,7 @@ def options_of(gains: Mapping[str, LogGain], trust: Mapping[str, float], prior: 
             changes = {
                 keys[k]: (float(np.expm1(mean[k])), float(np.exp(mean[k]) * np.sqrt(max(own[k], 0.0)))) for k in wrong
             }
-            out[frozenset(changes)] = Option(float(evidence), changes)
+            out[frozenset(changes)] = _Option(float(evidence), changes)
     return out
 
 

@@ -31,7 +31,7 @@ from rotorid.mismatch.tell.verdict import Channel, Errors, PValues, SplitErrors,
 from rotorid.steps import step
 from rotorid.vehicle.windows import States
 
-SAME = 1e-5
+_SAME = 1e-5
 """Relative difference above which a vehicle read back is not the model written (errors are stated to six digits)."""
 
 
@@ -105,7 +105,7 @@ def prove(analysis: Analysis, reloaded: Model, forward: Forward) -> None:
         for sign, stated in ((1, channel.rmse.training.after), (-1, channel.rmse.held_out.after)):
             found = _rms(errors, name, part, sign)
             unknown = found is None or stated is None
-            if not (found is stated if unknown else abs(found - stated) <= SAME * abs(stated) + 1e-12):
+            if not (found is stated if unknown else abs(found - stated) <= _SAME * abs(stated) + 1e-12):
                 raise RuntimeError(
                     f"improved_vehicle.yaml read back gives an error of {found} in {name}, the model gave {stated}"
                 )

@@ -50,7 +50,7 @@ _ON_SHARE_OF_NOISE = 0.15
 _LOST_AT_ENDS_S = 1.0
 _SMALLEST_SHARE = 0.03
 """Share of a run's mismatch energy below which an interval is not worth a line."""
-SHORTEST_GAP_S = 0.25
+_SHORTEST_GAP_S = 0.25
 _LONGEST_GAP_S = 2.0
 _THROUGHOUT = 0.7
 """Covering more than this share of the flight counts as being there throughout."""
@@ -64,7 +64,7 @@ _LARGER = 4.0
 _MOVES_S = 0.2
 """Lags over which larger residuals may follow each other."""
 _FIRST_LAGS = 4
-MOVES_Z = 4.0
+_MOVES_Z = 4.0
 """Standard errors (Fisher's transform) by which larger residuals must follow each other otherwise than usual."""
 _WILD = 4.0
 """Whitened residual beyond which a single sample counts no more."""
@@ -295,7 +295,7 @@ def _closed(mask: np.ndarray, period_s: float) -> np.ndarray:
     spans = stretches(mask)
     out = mask.copy()
     for (a, b), (c, d) in zip(spans, spans[1:], strict=False):
-        allowed = min(max(SHORTEST_GAP_S, min(b - a, d - c) * period_s), _LONGEST_GAP_S)
+        allowed = min(max(_SHORTEST_GAP_S, min(b - a, d - c) * period_s), _LONGEST_GAP_S)
         if (c - b) * period_s < allowed:
             out[b:c] = True
     return out
@@ -472,7 +472,7 @@ def _moves(part: np.ndarray, whole: np.ndarray, most: int) -> bool:
     lags = np.arange(1, min(most, count - 5) + 1)
     usual, here = (np.array([_correlation(x, lag) for lag in lags]).clip(-0.999, 0.999) for x in (whole, part))
     sure = (np.arctanh(here) - np.arctanh(usual)) * np.sqrt(count - lags - 3)
-    return len(lags) > 0 and max(np.abs(sure[:_FIRST_LAGS]).max(), abs(sure.sum()) / np.sqrt(len(lags))) > MOVES_Z
+    return len(lags) > 0 and max(np.abs(sure[:_FIRST_LAGS]).max(), abs(sure.sum()) / np.sqrt(len(lags))) > _MOVES_Z
 
 
 def _correlation(values: np.ndarray, lag: int) -> float:

@@ -37,7 +37,7 @@ _NEARLY_ALL = 0.99
 """Share that stays unexplained from which the causes named explain next to nothing."""
 _MOST_LIMITS = 3
 """Effects that were not found and are named with their limit; more are counted."""
-_MOST_NAMES = 2
+MOST_NAMES = 2
 """Effects or values that the sentence names; more are counted."""
 _WORTH_SAYING_P = 0.05
 _WORTH_A_WORD = 0.03
@@ -198,10 +198,10 @@ def _causes(contents: Contents) -> str:
         names.append(listed([effect_words(i) for i in either], "or"))
     clauses = []
     if names:
-        more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
-        shown = f"{', '.join(names[:_MOST_NAMES])}{more}" if more else listed(names)
+        more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+        shown = f"{', '.join(names[:MOST_NAMES])}{more}" if more else listed(names)
         clauses.append(f"{shown} {'was' if len(names) == 1 else 'were'} left out")
-    wrong, most = list(analysis.wrong_values.items()), max(1, _MOST_NAMES - len(names))
+    wrong, most = list(analysis.wrong_values.items()), max(1, MOST_NAMES - len(names))
     for name, (believed, refitted, _, _) in wrong[:most]:
         words, unit = parameter_words(name)
         clauses.append(f"the {words} is {f'{number(refitted, 3)} {unit}'.rstrip()}, not {number(believed, 3)}")

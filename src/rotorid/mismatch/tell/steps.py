@@ -12,6 +12,7 @@ from rotorid.effects.catalogue import before_the_rotors, catalogue
 from rotorid.effects.contract import Motion
 from rotorid.mismatch.decision.words import effect_words, listed
 from rotorid.mismatch.tell.consistency import quoted
+from rotorid.mismatch.tell.sentences import MOST_NAMES
 from rotorid.mismatch.tell.verdict import Channel, Verdict
 from rotorid.recordings import Vehicle
 from rotorid.vehicle.derivatives import CHANNELS, QUANTITIES
@@ -20,7 +21,6 @@ _WORTH_SAYING = 0.02
 """Share of the error below which a step takes nothing off that is worth a word."""
 _AT_THE_NOISE = 1.1
 """Error over the noise floor up to which what is left is called noise."""
-_MOST_NAMES = 2
 _SWING = {**dict.fromkeys("uvw", 5.0), **dict.fromkeys("pqr", 2.0)}
 """Of each quantity, m/s and rad/s, how far a catalogue form is moved to see what it makes of it."""
 
@@ -103,7 +103,7 @@ def steps_sentence(verdict: Verdict) -> str:
 def _named(words: Iterable[str]) -> str:
     """The first of some names and how many more there are."""
     names = list(words)
-    return listed(names if len(names) <= _MOST_NAMES else [*names[: _MOST_NAMES - 1], f"{len(names) - 1} more effects"])
+    return listed(names if len(names) <= MOST_NAMES else [*names[: MOST_NAMES - 1], f"{len(names) - 1} more effects"])
 
 
 @cache

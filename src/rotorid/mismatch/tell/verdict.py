@@ -63,7 +63,7 @@ def _rounded(value: float | None) -> float | None:
     return None if value is None or not math.isfinite(value) else rounded(float(value))
 
 
-Number = Annotated[float | None, BeforeValidator(_rounded)]
+_Number = Annotated[float | None, BeforeValidator(_rounded)]
 
 
 def _not_zero(p_value: float | None) -> float | None:
@@ -73,23 +73,23 @@ def _not_zero(p_value: float | None) -> float | None:
 _Probability = Annotated[Annotated[float, Field(ge=0, le=1)] | None, BeforeValidator(_rounded)]
 _Share = Annotated[float, BeforeValidator(_rounded), Field(ge=0, le=1)]
 _Magnitude = Annotated[Annotated[float, Field(ge=0)] | None, BeforeValidator(_rounded)]
-_Interval = tuple[Number, Number]
+_Interval = tuple[_Number, _Number]
 
 
-class Part(BaseModel):
+class _KeysOfVerdict(BaseModel):
     """A group of keys of the verdict: none unknown, none missing."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-class Runs(Part):
+class Runs(_KeysOfVerdict):
     """Runs used to fit and runs held out."""
 
     training: tuple[str, ...]
     held_out: tuple[str, ...]
 
 
-class Errors(Part):
+class Errors(_KeysOfVerdict):
     """Root mean square errors of the believed vehicle, of values refitted, of values with the effects that are claimed
     (one member of each class), and of the vehicle that is delivered, derivatives included."""
 
@@ -99,21 +99,21 @@ class Errors(Part):
     after: _Magnitude
 
 
-class SplitErrors(Part):
+class SplitErrors(_KeysOfVerdict):
     """Errors on the runs of each kind; null where there is none."""
 
     training: Errors
     held_out: Errors
 
 
-class PValues(Part):
+class PValues(_KeysOfVerdict):
     """p-value that the residual does not depend on the inputs; null for simulation run forward."""
 
     before: _Probability
     after: _Probability
 
 
-class Channel(Part):
+class Channel(_KeysOfVerdict):
     """One channel's errors relative to its noise, in its unit."""
 
     unit: str
@@ -122,43 +122,43 @@ class Channel(Part):
     p_value: PValues
 
 
-class Regime(Part):
+class Regime(_KeysOfVerdict):
     """Range of a variable in which the mismatch shows."""
 
     variable: str
-    low: Number
-    high: Number
+    low: _Number
+    high: _Number
 
 
-class Location(Part):
+class Location(_KeysOfVerdict):
     """Where the mismatch shows: a channel of a run, from when to when, in which regime."""
 
     run: str
     channel: str
-    start_s: Number
-    stop_s: Number
+    start_s: _Number
+    stop_s: _Number
     p_value: Annotated[_Probability, BeforeValidator(_not_zero)]
     energy_share: _Share = Field(description="Share of the channel's mismatch energy in this run that lies here.")
     regime: Regime | None
 
 
-class ParameterEstimate(Part):
+class ParameterEstimate(_KeysOfVerdict):
     """A parameter of an effect with its 95 % interval."""
 
     symbol: str
-    value: Number
+    value: _Number
     unit: str
     interval_95: _Interval
 
 
-class Gain(Part):
+class Gain(_KeysOfVerdict):
     """Held-out rmse with the effect over that without it, block-bootstrap interval."""
 
     rmse_ratio: _Magnitude
     interval_95: _Interval
 
 
-class SizeOfError(Part):
+class SizeOfError(_KeysOfVerdict):
     """Root mean square of an error, or of what an effect does, in a channel's unit and in units that a pilot knows."""
 
     channel: str
@@ -171,7 +171,7 @@ class SizeOfError(Part):
     )
 
 
-class BasisOfVerdict(Part):
+class BasisOfVerdict(_KeysOfVerdict):
     """What the verdict rests on, said before anything else."""
 
     sentence: str
@@ -181,7 +181,7 @@ class BasisOfVerdict(Part):
     not_recorded: tuple[str, ...]
 
 
-class EffectVerdict(Part):
+class EffectVerdict(_KeysOfVerdict):
     """What the data say of one id."""
 
     id: str
@@ -203,7 +203,7 @@ class EffectVerdict(Part):
     held_out_gain: Gain | None
 
 
-class Absent(Part):
+class Absent(_KeysOfVerdict):
     """An id that was tested and not found, and how large it may be all the same."""
 
     id: str
@@ -215,7 +215,7 @@ class Absent(Part):
     )
 
 
-class DoubtOfSet(Part):
+class DoubtOfSet(_KeysOfVerdict):
     """Something that stands in the way of believing the verdict."""
 
     what: str
@@ -223,29 +223,29 @@ class DoubtOfSet(Part):
     stops: bool = Field(description="Whether the set is not judged because of it.")
 
 
-class BelievedValue(Part):
+class BelievedValue(_KeysOfVerdict):
     """One believed value before and after, with all values free, jointly with the delivered effects."""
 
-    believed: Number
-    estimate: Number
+    believed: _Number
+    estimate: _Number
     interval_95: _Interval
-    delivered: Number = Field(description="What stands in improved_vehicle.yaml.")
+    delivered: _Number = Field(description="What stands in improved_vehicle.yaml.")
     wrong: bool = Field(description="Whether it is among `parameters`.")
 
 
-class Correlated(Part):
+class Correlated(_KeysOfVerdict):
     """Two believed values of which these recordings know little more than a ratio."""
 
     values: tuple[str, str]
-    correlation: Number
+    correlation: _Number
 
 
-class Score(Part):
+class Score(_KeysOfVerdict):
     """How well a candidate predicts what was left out of the fit."""
 
     model: Literal["believed", "refitted", "named"]
     derivatives: bool
-    score: Number = Field(
+    score: _Number = Field(
         description="Mean over channels, and over what half a second of simulation is off by, of the logarithm of the "
         "error over the believed vehicle's; lower is better."
     )
@@ -253,7 +253,7 @@ class Score(Part):
     unfit: str = Field(description="Why it does not hover or fly; empty where it does, or was not asked.")
 
 
-class Delivered(Part):
+class Delivered(_KeysOfVerdict):
     """Which candidate stands in improved_vehicle.yaml."""
 
     model: Literal["believed", "refitted", "named"]
@@ -261,34 +261,34 @@ class Delivered(Part):
     scores: tuple[Score, ...]
 
 
-class DerivativeOf(Part):
+class DerivativeOf(_KeysOfVerdict):
     """What a channel gains per unit of a quantity, predictive and without a cause."""
 
     channel: str
     quantity: str
     unit: str
-    value: Number
+    value: _Number
     interval_95: _Interval
-    low: Number
-    high: Number
+    low: _Number
+    high: _Number
 
 
-class WrongValue(Part):
+class WrongValue(_KeysOfVerdict):
     """A value of vehicle.yaml that the data contradict."""
 
-    believed: Number
-    refitted: Number
+    believed: _Number
+    refitted: _Number
     interval_95: _Interval
 
 
-class NotTestable(Part):
+class NotTestable(_KeysOfVerdict):
     """An id that no column of the recording allows to test."""
 
     id: str
     reason: str
 
 
-class Unexplained(Part):
+class Unexplained(_KeysOfVerdict):
     """What the findings leave."""
 
     share: _Share
@@ -297,7 +297,7 @@ class Unexplained(Part):
     description: str
 
 
-class NextExperiment(Part):
+class NextExperiment(_KeysOfVerdict):
     """What to fly to distinguish the alternatives; empty where nothing is open.
 
     The separation, in standard errors, is None: `rotorid plan` alone computes it, for what can be flown.
@@ -308,7 +308,7 @@ class NextExperiment(Part):
     predicted_separation_sigma: _Magnitude
 
 
-class Verdict(Part):
+class Verdict(_KeysOfVerdict):
     """The whole of `verdict.json`."""
 
     set: str
@@ -364,7 +364,7 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
         basis=_basis_of_verdict(analysis),
         doubts=tuple(DoubtOfSet.model_validate(d, from_attributes=True) for d in analysis.doubts),
         sentence=spoken(headline(contents), analysis),
-        size=size_of(main_size(analysis, main_channel(analysis, locations, inverse), inverse)),
+        size=_size_of(main_size(analysis, main_channel(analysis, locations, inverse), inverse)),
         details=tuple(spoken(text, analysis) for text in details(contents)),
         warnings=tuple(spoken(text, analysis) for text in warnings_of({**inverse, **forward})),
         channels=inverse | dict(forward),
@@ -412,7 +412,7 @@ def _basis_of_verdict(analysis: Analysis) -> BasisOfVerdict:
     )
 
 
-def size_of(size: Size | None) -> SizeOfError | None:
+def _size_of(size: Size | None) -> SizeOfError | None:
     """A size as the file has it."""
     if size is None:
         return None
@@ -508,7 +508,7 @@ def effect_verdict(finding: Finding, share: float | None, size: Size | None = No
         withheld=finding.withheld,
         alternatives=finding.alternatives,
         sentence=first_words(f"only suggested: {finding.objection}" if finding.objection else finding.sentence),
-        size=size_of(size),
+        size=_size_of(size),
         share=share,
         equation=finding.equation or (finding.form.equation if finding.form else ""),
         channels=finding.channels,

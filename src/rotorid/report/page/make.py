@@ -16,8 +16,8 @@ import numpy as np
 from jinja2 import Environment
 from markupsafe import Markup
 
-from rotorid.effects.advice import advice
 from rotorid.effects.catalogue import catalogue
+from rotorid.effects.describe import advice
 from rotorid.mismatch.decision.findings import Analysis, Finding
 from rotorid.mismatch.decision.words import (
     FORWARD_WORDS,

@@ -13,9 +13,8 @@ from rotorid.errors import InputError
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
 from rotorid.vehicle.control.pid import AttitudePid, AttitudeReference, Gains
-from rotorid.vehicle.flyable import flyable
 from rotorid.vehicle.hover import hover
-from rotorid.vehicle.improved import active_speed_forms, command_path, record_as_stated, simulate_as_stated
+from rotorid.vehicle.improved import active_speed_forms, command_path, flyable, record_as_stated, simulate_as_stated
 from rotorid.vehicle.mixer import allocation_matrix
 from rotorid.vehicle.simulator import Start, WhiteNoise
 

@@ -26,13 +26,13 @@ from rotorid.vehicle.improved import simulate_as_stated
 from rotorid.vehicle.mixer import hover_speed_rad_s
 from rotorid.vehicle.simulator import Commands, Start
 
-STEP_S = 0.001
+_STEP_S = 0.001
 _START_M_S = 2.0
 """Speed forward and to the right at the start, so that drag shows."""
 
 
 @dataclass(frozen=True)
-class FlightDifference:
+class _FlightDifference:
     """How far two simulations part: largest distance and angle, next to how far ours flew and turned."""
 
     position_m: float
@@ -53,7 +53,7 @@ class FlightDifference:
 def commands_of(vehicle: Vehicle, duration_s: float) -> tuple[np.ndarray, np.ndarray]:
     """Times (n,) and rotor speeds (n, k), rad/s, about hover and within the vehicle's limits that turn it about every
     axis in turn."""
-    time = np.arange(int(duration_s / STEP_S) + 1) * STEP_S
+    time = np.arange(int(duration_s / _STEP_S) + 1) * _STEP_S
     hover = hover_speed_rad_s(vehicle)
     phase = 2 * np.pi * np.arange(vehicle.rotor_count) / vehicle.rotor_count
     # Phases around the vehicle roll and pitch it; their torques cancel, so yaw has a swing of its own.
@@ -68,8 +68,8 @@ def ours(vehicle: Vehicle, speeds: np.ndarray) -> tuple[np.ndarray, np.ndarray, 
     `speeds` (n, k), rad/s, are those of the rotors, each held for a step.
     """
     start = Start(velocity_m_s=np.array([[_START_M_S, _START_M_S, 0.0]]), rotor_speed_rad_s=speeds[:1])
-    time = STEP_S * np.arange(len(speeds))
-    trace = simulate_as_stated(vehicle, Commands(time, speeds), time[-1], STEP_S, start=start)
+    time = _STEP_S * np.arange(len(speeds))
+    trace = simulate_as_stated(vehicle, Commands(time, speeds), time[-1], _STEP_S, start=start)
     quaternion = trace.quaternion[0] * np.array([1.0, *FLU])
     return trace.position[0] * FLU, quaternion, trace.rotor_speed[0]
 
@@ -80,7 +80,7 @@ def lagging(speeds: np.ndarray, up_s: float, down_s: float) -> np.ndarray:
         return speeds
     out = speeds.copy()
     for k in range(1, len(out)):
-        keep = np.exp(-STEP_S / np.where(speeds[k - 1] > out[k - 1], up_s, down_s))
+        keep = np.exp(-_STEP_S / np.where(speeds[k - 1] > out[k - 1], up_s, down_s))
         out[k] = keep * out[k - 1] + (1 - keep) * speeds[k - 1]
     return out
 
@@ -94,9 +94,9 @@ def _angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def difference(
     there: tuple[np.ndarray, np.ndarray], here: tuple[np.ndarray, np.ndarray, np.ndarray], where: str
-) -> FlightDifference:
+) -> _FlightDifference:
     """Largest differences of positions (n, 3) and attitudes (n, 4)."""
-    return FlightDifference(
+    return _FlightDifference(
         float(np.linalg.norm(there[0] - here[0], axis=1).max()),
         float(_angle_between(there[1], here[1]).max()),
         float(np.linalg.norm(np.diff(here[0], axis=0), axis=1).sum()),
@@ -129,7 +129,7 @@ def passive_forces(exported: Exported) -> Iterator[None]:
         mujoco.set_mjcb_passive(before)
 
 
-def in_rotorpy(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> FlightDifference:
+def in_rotorpy(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> _FlightDifference:
     """Fly RotorPy's Multirotor with the exported parameters and their companion next to ours."""
     same = expressed(vehicle, "rotorpy")
     time, speeds = commands_of(same, duration_s)
@@ -150,14 +150,14 @@ def in_rotorpy(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) ->
     for k in range(len(time) - 1):
         if at_once:
             state["rotor_speeds"] = speeds[k]
-        state = flyer.step(state, {"cmd_motor_speeds": speeds[k]}, STEP_S)
+        state = flyer.step(state, {"cmd_motor_speeds": speeds[k]}, _STEP_S)
         position.append(state["x"])
         attitude.append(np.asarray(state["q"])[[3, 0, 1, 2]])
     turning = speeds if at_once else lagging(speeds, tau_s, tau_s)
     return difference((np.array(position), np.array(attitude)), ours(same, turning), "RotorPy")
 
 
-def in_mujoco(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> FlightDifference:
+def in_mujoco(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> _FlightDifference:
     """Fly the exported model and its companion in MuJoCo next to ours with what they hold."""
     import mujoco
 
@@ -228,7 +228,7 @@ def gazebo_damping_of(text: str) -> np.ndarray:
     return np.array([[float(own.findtext(channel + quantity, "0")) for quantity in "UVWPQR"] for channel in "xyzkmn"])
 
 
-def in_drake(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> FlightDifference:
+def in_drake(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> _FlightDifference:
     """Fly the exported SDF model in Drake next to ours with what the model holds.
 
     Drake reads masses, inertias, places and joints. It has no motor model: thrust C_F ω² and drag −k ω v⊥ act on the
@@ -271,7 +271,7 @@ def in_drake(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> F
 
         def push(self, context: Any, out: Any) -> None:
             plant.SetPositionsAndVelocities(inside, self.get_input_port().Eval(context))
-            step = min(int(context.get_time() / STEP_S + 1e-6), len(turning) - 1)
+            step = min(int(context.get_time() / _STEP_S + 1e-6), len(turning) - 1)
             turned = plant.EvalBodyPoseInWorld(inside, base).rotation().matrix()
             moving = plant.EvalBodySpatialVelocityInWorld(inside, base)
             state = np.concatenate([turned.T @ moving.translational(), turned.T @ moving.rotational()])
@@ -297,7 +297,7 @@ def in_drake(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> F
     builder.Connect(rotors.get_output_port(), plant.get_applied_spatial_force_input_port())
     simulator = Simulator(builder.Build())
     simulator.get_mutable_integrator().set_fixed_step_mode(True)
-    simulator.get_mutable_integrator().set_maximum_step_size(STEP_S)
+    simulator.get_mutable_integrator().set_maximum_step_size(_STEP_S)
     context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
     plant.SetFreeBodySpatialVelocity(context, base, SpatialVelocity([0, 0, 0], [_START_M_S, -_START_M_S, 0]))
     start = plant.EvalBodyPoseInWorld(context, base).translation()
@@ -317,7 +317,7 @@ _BULLET_DAMPING = 0.04
 
 def in_pybullet(
     vehicle: Vehicle, exported: Exported, duration_s: float = 0.3, damping: float = _BULLET_DAMPING
-) -> FlightDifference:
+) -> _FlightDifference:
     """Fly the exported URDF in Bullet next to ours with what it holds.
 
     Forces on the rotors' links, torque and drag on the link at the centre of mass, all from the file's `properties`, as
@@ -336,7 +336,7 @@ def in_pybullet(
     client = BulletClient(pybullet.DIRECT)
     try:
         client.setGravity(0, 0, -vehicle.gravity_m_s2)
-        client.setTimeStep(STEP_S / substeps)
+        client.setTimeStep(_STEP_S / substeps)
         with TemporaryDirectory() as folder:
             path = f"{folder}/{exported.file_name}"
             with open(path, "w", encoding="utf-8") as file:
@@ -370,7 +370,7 @@ def in_pybullet(
     return difference((np.array(position), np.array(attitude)), ours(same, speeds), where)
 
 
-FLYERS: dict[str, tuple[str, Callable[[Vehicle, Exported], FlightDifference]]] = {
+FLYERS: dict[str, tuple[str, Callable[[Vehicle, Exported], _FlightDifference]]] = {
     "rotorpy": ("rotorpy", in_rotorpy),
     "mjcf": ("mujoco", in_mujoco),
     "sdf": ("pydrake", in_drake),

@@ -29,7 +29,7 @@ _ACCELEROMETER_M_S2 = (6.4e-3, 6.4e-3, 6.9e-3)
 def gazebo_airframe(vehicle: Vehicle) -> Exported:
     """The model with sensors, `model.config`, and the airframe script, the last two as companions."""
     model = sdf(vehicle)
-    name = identifier(vehicle.name)
+    name = _identifier(vehicle.name)
     text = model.text.replace("    </link>\n", f"{sensors(vehicle)}    </link>\n", 1)
     text = re.sub(r"<model name=(\"[^\"]*\"|'[^']*')>", f'<model name="{name}">', text, count=1)
     companions = {"model.config": description(vehicle, name), f"{_NUMBER}_gz_{name}": airframe(vehicle, name)}
@@ -37,7 +37,7 @@ def gazebo_airframe(vehicle: Vehicle) -> Exported:
     return replace(model, text=text, left_out=(*model.left_out, said), companions=companions)
 
 
-def identifier(name: str) -> str:
+def _identifier(name: str) -> str:
     """A name that a shell and Gazebo take."""
     return re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_") or "vehicle"
 

@@ -16,7 +16,7 @@ from rotorid.vehicle.exports.derivatives import left_of_one_damping, own_damping
 from rotorid.vehicle.exports.forms import KNOWS, Exported, Parts, parts_of
 from rotorid.vehicle.mixer import hover_speed_rad_s
 
-CORNERS = ((1, 1), (-1, -1), (1, -1), (-1, 1))
+_CORNERS = ((1, 1), (-1, -1), (1, -1), (-1, 1))
 """Signs of the places (x forward, y right) in that order."""
 SENSES = (1, 1, -1, -1)
 """Signs of the yaw moments: front right and rear left turn counter-clockwise."""
@@ -139,9 +139,9 @@ def order_in_x(places: np.ndarray, yaw_signs: np.ndarray, name: str, tool: str) 
     shape, or turn the other way.
     """
     corners = {(int(np.sign(x)), int(np.sign(y))): i for i, (x, y, _) in enumerate(places)}
-    if len(places) != 4 or set(corners) != set(CORNERS):
+    if len(places) != 4 or set(corners) != set(_CORNERS):
         raise InputError(f"{name}: {tool} wants four rotors in X shape, found {len(places)} rotors")
-    order = [corners[corner] for corner in CORNERS]
+    order = [corners[corner] for corner in _CORNERS]
     if tuple(int(yaw_signs[i]) for i in order) != SENSES:
         raise InputError(
             f"{name}: {tool} wants front right and rear left counter-clockwise, seen from above, the others clockwise"

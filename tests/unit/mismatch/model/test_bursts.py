@@ -7,7 +7,7 @@ import pytest
 
 from rotorid.effects.contract import Motion
 from rotorid.effects.gust import form_named, window_form
-from rotorid.mismatch.model.bursts import gust_terms, windows
+from rotorid.mismatch.model.gusts import gust_terms, windows
 from tests.unit.mismatch.synthetic import coloured
 from tests.unit.vehicle.thesis import thesis_vehicle
 

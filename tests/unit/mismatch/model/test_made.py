@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import rotorid.mismatch.model.prepare as module
 from rotorid.effects.contract import Motion
-from rotorid.mismatch.model import made as module
-from rotorid.mismatch.model.made import LastMade
+from rotorid.mismatch.model.prepare import LastMade
 
 
 def flown(size: int = 50) -> Motion:

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rotorid.effects.advice import RECORDABLE, advice
 from rotorid.effects.catalogue import catalogue
+from rotorid.effects.describe import RECORDABLE, advice
 from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.model.next_flight import NextFlight, next_flight
 from rotorid.recordings import RecordingSet, Run

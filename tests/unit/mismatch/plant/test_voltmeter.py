@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from rotorid.effects.contract import Motion
-from rotorid.mismatch.mistakes.dead_voltmeter import connected
+from rotorid.mismatch.mistakes.signals import connected
 from rotorid.mismatch.plant.motion import Segment
 from rotorid.mismatch.plant.voltmeter import running_mean, without_noise
 from rotorid.recordings import RecordingSet, Run
