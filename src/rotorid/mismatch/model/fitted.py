@@ -117,12 +117,8 @@ def _with_chain(prepared: Prepared, chain: CommandChain) -> tuple[CommandChain, 
     def modelled(chain: CommandChain) -> WrenchModel:
         return refined_model(without_same_curves(prepared, chain), *turning(prepared, chain))
 
-    # Which effects the commands are to be explained next to, one search says; only the last model is refined.
-    model = _with_own_scales(without_same_curves(prepared, chain), *turning(prepared, chain))
+    model = modelled(chain)
     known, trusted = bool(model.selection.active), strains(model)
-    if not known and not trusted:
-        model = modelled(chain)
-        known, trusted = bool(model.selection.active), strains(model)
     for _ in range(_CHAIN_ROUNDS if known or trusted else 0):
         # The wrench effects found change what the commands must explain, and what values beyond their trust made room
         # for is not delivered: once more with the effects known and such values as believed.
