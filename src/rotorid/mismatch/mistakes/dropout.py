@@ -126,7 +126,7 @@ def what_is_left(recordings: RecordingSet, before: RecordingSet, lost: Finding) 
         (run,) = recordings.runs
         found, _ = whole_stretches(run, sensors[run.name])
         sides = parts_of(recordings, split_runs(recordings))
-        if all(_share(side.runs[0], found) > _LEAST_OF_A_SIDE for side in sides):
+        if all(_share(part, found) > _LEAST_OF_A_SIDE for side in sides for part in side.runs):
             return recordings, ()
         start, stop = max(found, key=lambda s: s[1] - s[0], default=(0.0, 0.0))
         if stop - start >= LEAST_SINGLE_S:

@@ -41,6 +41,14 @@ def test_a_short_loss_cuts_nothing() -> None:
     assert len(kept.runs[0].table) == COUNT and notes == ()
 
 
+def test_a_single_run_of_a_comparison_holds_nothing_out() -> None:
+    """Both sides of a comparison are used whole: a side of the split without any run lacks no sensor."""
+    kept, notes = left(frozen(flown(), c.ANGULAR_VELOCITY, slice(700, 800)), held_out=())
+    assert len(kept.runs[0].table) == COUNT and notes == ()
+    kept, (note,) = left(frozen(flown(), c.ANGULAR_VELOCITY, FIRST), held_out=())
+    assert kept.runs[0].time_s[0] >= 9.0 and "every sensor has readings" in note
+
+
 def test_a_single_run_without_a_long_stretch_loses_the_sensor() -> None:
     kept, (note,) = left(frozen(flown(), c.ANGULAR_VELOCITY, slice(500, None)))
     assert not set(c.ANGULAR_VELOCITY) & set(kept.runs[0].table) and len(kept.runs[0].table) == COUNT
