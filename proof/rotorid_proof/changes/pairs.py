@@ -99,11 +99,15 @@ def halves(seed: str, count: int) -> Iterator[Pair]:
 
 def planted(recordings: Path, plantings: Path) -> Iterator[Pair]:
     """Plantings against the flight untouched, and those of the larger size against another flight of the vehicle."""
+    from rotorid_proof.plantings.commands import commanded
     from rotorid_proof.plantings.flights import flight
     from rotorid_proof.plantings.judge import cut
 
     def made(one: Planting, others: tuple[Sequence[str], Sequence[str]] | None) -> Made:
         whole = cut(recordings / flight(one.flight).set, one.flight)
+        if one.family == "commands":
+            # A flight that is given commands is compared with itself under the same ones.
+            whole, _ = commanded(whole)
         base, own = (whole, whole) if others is None else (score.some_runs(whole, runs) for runs in others)
         new, truths = plant(own, one)
         sought = tuple(
@@ -117,10 +121,11 @@ def planted(recordings: Path, plantings: Path) -> Iterator[Pair]:
         if one.family == "pair" or not (recordings / flight(one.flight).set / "vehicle.yaml").is_file():
             continue
         kind = "planted" if one.size == "large" else "planted, smaller"
-        yield Pair(f"{kind}/{one.name}", kind, partial(made, one, None), one.flight)
+        flown = f"{one.flight} under commands" if one.family == "commands" else one.flight
+        yield Pair(f"{kind}/{one.name}", kind, partial(made, one, None), flown)
         if one.flight in OTHERS and one.size == "large":
             kind = "planted in another"
-            yield Pair(f"{kind}/{one.name}", kind, partial(made, one, OTHERS[one.flight]), f"some of {one.flight}")
+            yield Pair(f"{kind}/{one.name}", kind, partial(made, one, OTHERS[one.flight]), f"some of {flown}")
 
 
 def real(recordings: Path) -> Iterator[Pair]:

@@ -47,7 +47,7 @@ from rotorid.mismatch.changes.of_instruments import (
     joint_of_instruments,
 )
 from rotorid.mismatch.changes.problem import MOST_CHANGE, NAMES, change_of
-from rotorid.mismatch.changes.usual import form_spread, left_by_all, spread_of_flights, usual_spread
+from rotorid.mismatch.changes.usual import feigned, form_spread, left_by_all, spread_of_flights, usual_spread
 from rotorid.mismatch.decision.decide import relative_change
 from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.decision.words import (
@@ -269,6 +269,12 @@ def _flight_options(reference: FittedReference, joint: Joint, prior: Prior) -> l
     spread, base_at = _yardstick(joint, reference.runs, prior), partial(evidence_at, reference)
     options = options_of(first, products_at, spread, prior, base_at)
     found = options[0].found
+    if first is not None and found.model:
+        own = slice(-len(first.values), None)
+        loop = feigned(*products_at(options[0].chain), joint.inertia)
+        spread[own] = np.hypot(spread[own], loop[own])
+        options = options_of(first, products_at, spread, prior, base_at)
+        found = options[0].found
     if len(found.model) > 1:
         # What changed is known by its form, too, and what its form is wrong by is no second change.
         change = change_of(found) * found.problem.unit
@@ -318,10 +324,11 @@ def decided_of_speeds(
     """
     if first is None or found.commanded or any(s.command is None for own in both for s in own):
         return None
-    base, now = speed_rows(both[0], found, first, first), first
-    for _ in range(2):
-        # Whitened by what the chains leave in both sets: what no lag of first order explains is large in the second.
-        filters = speed_filters([*base, *speed_rows(both[1], found, now, now)])
+    base, rows, now = speed_rows(both[0], found, first, first), [], first
+    for _ in range(3):
+        # Whitened by what the chains leave in both sets: what no lag of first order explains is large in the second. At
+        # first by the first set alone: a change that is still to be found is no noise.
+        filters = speed_filters([*base, *rows])
         own = speed_evidence(base, filters, first, first)
 
         def products_at(chain: ChainTerms, filters=filters, own=own) -> tuple[Evidence, Evidence]:
@@ -332,6 +339,7 @@ def decided_of_speeds(
 
         options = options_of(first, products_at, first.spread, prior, base_at)
         now = options[0].chain
+        rows = speed_rows(both[1], found, now, now)
     return options, squares_of_speeds(speed_rows(both[1], found, now, first), both[1], now)
 
 

@@ -116,6 +116,19 @@ def _hidden_by_noise(evidence: Evidence, inertia: np.ndarray) -> np.ndarray:
     return np.clip(left[main] / np.maximum(own[main, column], NEVER_EXCITED), 0.0, 1.0)
 
 
+def feigned(base: Evidence, new: Evidence, inertia: np.ndarray) -> np.ndarray:
+    """One-sigma (K,) of what a closed loop feigns of a change of each coefficient, where commands alone tell it.
+
+    Commands answer to what no model explains: with it a delay is found where none is, the same in both sets. What the
+    second set has more of is at most all in step with the column (Cauchy and Schwarz): two standard errors. `inertia`
+    (C,) as of `usual_spread`.
+    """
+    own = np.einsum("cekk->ck", new.gram) / new.blocks.sum()
+    left = left_by_all(new) / inertia**2 / new.blocks.sum() - left_by_all(base) / base.blocks.sum()
+    most = np.sqrt(own * np.maximum(left, 0.0)[:, None]).sum(axis=0)
+    return 0.5 * most / np.maximum(own.sum(axis=0), NEVER_EXCITED)
+
+
 def left_by_all(evidence: Evidence) -> np.ndarray:
     """Whitened squares (C,) that the model of all columns leaves in each channel."""
     gram, cross = evidence.gram.sum(axis=1), evidence.cross.sum(axis=1)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.mismatch.changes.usual import form_spread, share_of_form, usual_spread
+from rotorid.mismatch.changes.usual import feigned, form_spread, share_of_form, usual_spread
 from rotorid.mismatch.posterior.evidence import EvidenceTerm, LinearParameter
 from tests.unit.mismatch.posterior.test_posterior import flight
 
@@ -36,3 +36,12 @@ def test_the_error_of_a_form_is_shared_by_the_forms_that_it_may_look_like():
     three = flight([0.0, 0.0, 0.0], TERMS, seed=3).evidence()
     shared = form_spread(three, np.array([0.0, 0.0, 1.0]), 0.02)
     assert np.hypot(shared[0], shared[1]) == pytest.approx(one[0], rel=0.1)
+
+
+def test_a_closed_loop_feigns_a_delay_by_what_the_second_set_leaves_unexplained_more_than_the_first():
+    calm, shaken = (flight([0.0, 0.0, 0.0], TERMS, seed=3, noise=noise).evidence() for noise in (1.0, 3.0))
+    assert feigned(calm, calm, np.ones(1)) == pytest.approx(np.zeros(3), abs=1e-9)
+    # Columns of a variance of 1.09; what moves a heavier vehicle as much is three times as large a force.
+    assert feigned(calm, shaken, np.ones(1)) == pytest.approx(np.full(3, 0.5 * (8 / 1.09) ** 0.5), rel=0.1)
+    assert feigned(shaken, calm, np.ones(1)) == pytest.approx(np.zeros(3), abs=1e-9)
+    assert (feigned(calm, shaken, np.full(1, 3.0)) < 0.2 * feigned(calm, shaken, np.ones(1))).all()
