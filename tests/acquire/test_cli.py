@@ -55,19 +55,7 @@ def test_static_test_in_two_terminals(emulator, tmp_path):
     (port,) = emulator("bench", "ttyBENCH", more=("--load", "z:500.48@3", "--speed", "20"))
     out = tmp_path / "raw" / "campaign" / "local"
     done = run(
-        *(
-            "bench",
-            "--port",
-            port,
-            "--test",
-            "static",
-            "--axis",
-            "z",
-            "--load-gf",
-            "500.48",
-            "--place-s",
-            "4",
-        ),
+        *("bench", "--port", port, "--test", "static", "--axis", "z", "--load-gf", "500.48", "--place-s", "4"),
         *("--out", str(out), "--id", "mine", "--air", "23,95400,0.5", "--operator", "me"),
     )
     assert done.returncode == 0, done.stderr

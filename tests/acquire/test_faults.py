@@ -156,10 +156,7 @@ def test_wrong_checksum(plugged, recorder_on):
     assert set(range(SAMPLES)) - set(frame_numbers(log)) == bad
     # a flipped bit may also make or break a delimiter's neighbour, but never let a wrong value through
     assert log.checksum_errors + log.broken_frames >= len(bad)
-    assert [(gap.first_index - log.table["index"].iloc[0], gap.count) for gap in log.gaps] == [
-        (10, 2),
-        (170, 1),
-    ]
+    assert [(gap.first_index - log.table["index"].iloc[0], gap.count) for gap in log.gaps] == [(10, 2), (170, 1)]
     assert_metadata_agree(log)
 
 

@@ -62,11 +62,7 @@ REAL = {  # as such instruments print it, with the lines that are none
         [(0.0, 0.0, -0.2), (0.1, 0.012, 15.3)],
         4,
     ),
-    "scale-fixed": (
-        b"+  500.48 g  \r\n+  500.4? g ?\r\n-    0.02 g  \r\n           g \r\n",
-        [(500.48,), (-0.02,)],
-        2,
-    ),
+    "scale-fixed": (b"+  500.48 g  \r\n+  500.4? g ?\r\n-    0.02 g  \r\n           g \r\n", [(500.48,), (-0.02,)], 2),
 }
 
 

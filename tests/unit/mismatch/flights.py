@@ -103,11 +103,7 @@ class Flight:
         w, x, y, z = q.T
         dw, dx, dy, dz = slope.T
         rate = 2 * np.stack(
-            [
-                w * dx - x * dw - y * dz + z * dy,
-                w * dy - y * dw - z * dx + x * dz,
-                w * dz - z * dw - x * dy + y * dx,
-            ],
+            [w * dx - x * dw - y * dz + z * dy, w * dy - y * dw - z * dx + x * dz, w * dz - z * dw - x * dy + y * dx],
             axis=1,
         )
         thrust = self.vehicle.mass_kg * GRAVITY * (1 + smooth(rng, count, 0.08 * excitation, 3.0))

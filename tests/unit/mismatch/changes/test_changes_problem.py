@@ -7,13 +7,7 @@ import numpy as np
 import pytest
 
 from rotorid.mismatch.changes.joint import within_bounds
-from rotorid.mismatch.changes.problem import (
-    against_leftover,
-    at_own_noise,
-    decide_changes,
-    joint,
-    problem_of_changes,
-)
+from rotorid.mismatch.changes.problem import against_leftover, at_own_noise, decide_changes, joint, problem_of_changes
 from rotorid.mismatch.changes.usual import hidden_in, usual_spread
 from rotorid.mismatch.posterior.evidence import EvidenceTerm, LinearParameter
 from rotorid.mismatch.posterior.leftover import spectrum_of, unit_of

@@ -59,11 +59,7 @@ def test_clean_thrust_and_moments_are_those_of_the_contract():
     f = CF * speeds**2
     q = CQ * speeds**2
     assert force == pytest.approx([0, 0, -f.sum()], abs=1e-12)
-    expected = [
-        (-f[0] + f[1] + f[2] - f[3]) * ARM,
-        (f[0] + f[1] - f[2] - f[3]) * ARM,
-        q[0] - q[1] + q[2] - q[3],
-    ]
+    expected = [(-f[0] + f[1] + f[2] - f[3]) * ARM, (f[0] + f[1] - f[2] - f[3]) * ARM, q[0] - q[1] + q[2] - q[3]]
     assert moment == pytest.approx(expected, abs=1e-12)
 
 
