@@ -10,7 +10,8 @@ from rotorid.effects.motor_lag import lagged
 from rotorid.mismatch.instrument.chain import find_chain, moved_between_samples, unknown_courses
 from rotorid.mismatch.instrument.setup import set_up, with_speed
 from rotorid.mismatch.plant.split import parts_of, split_runs
-from rotorid.recordings import RecordingSet, Run, Vehicle
+from rotorid.recordings import RecordingSet, Run
+from tests.unit.mismatch.instrument.stands import C_F, one_rotor
 
 DT_S, TAU_S = 0.01, 0.03
 FINE = 20
@@ -18,18 +19,13 @@ LAG = next(f for f in catalogue()["motor_lag"].speed_forms if f.name == "one con
 DELAY = catalogue()["delay"].speed_forms[0]
 
 
-def test_a_lag_of_a_ramp_is_exact_between_samples():
-    """ω = t − τ (1 − exp(−t/τ)) for ω_c = t from rest."""
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_lag_of_a_ramp_is_exact_between_samples_and_has_its_own_constant_up_and_down(sign):
+    """ω = t − τ (1 − exp(−t/τ)) for ω_c = t from rest, and down by the other constant."""
     t = np.arange(40) * DT_S
-    found = lagged(t[:, None], TAU_S, TAU_S, DT_S, holds=False)[:, 0]
-    np.testing.assert_allclose(found, t - TAU_S * (1 - np.exp(-t / TAU_S)), atol=1e-12)
-
-
-def test_a_lag_has_its_own_constant_up_and_down_for_a_smooth_command():
-    """Up by the time constant of speeds that grow, down by the other; both from rest on a ramp."""
-    t = np.arange(40) * DT_S
-    down = lagged(-t[:, None], 0.01, TAU_S, DT_S, holds=False)[:, 0]
-    np.testing.assert_allclose(down, -(t - TAU_S * (1 - np.exp(-t / TAU_S))), atol=1e-12)
+    up_s, down_s = (TAU_S, 0.01)[:: int(sign)]
+    found = lagged(sign * t[:, None], up_s, down_s, DT_S, holds=False)[:, 0]
+    np.testing.assert_allclose(found, sign * (t - TAU_S * (1 - np.exp(-t / TAU_S))), atol=1e-12)
 
 
 def test_a_smooth_command_is_delayed_without_being_smoothed():
@@ -73,18 +69,10 @@ def lagging_set(between) -> RecordingSet:
             "time_s": t[::FINE],
             "rotor_command_1_rad_s": course[::FINE],
             "rotor_speed_1_rad_s": read,
-            "force_z_n": -1.4e-6 * speed**2 + 0.003 * rng.standard_normal(len(speed)),
+            "force_z_n": -C_F * speed**2 + 0.003 * rng.standard_normal(len(speed)),
         }
         runs.append(Run(f"run{number}", pd.DataFrame(table)))
-    content = {
-        "name": "scale",
-        "kind": "stand",
-        "rotors": [{"x_m": 0.0, "y_m": 0.0, "spin": "ccw"}],
-        "thrust_coefficient_n_s2": 1.4e-6,
-        "rotor_radius_m": 0.06,
-        "tared": True,
-    }
-    return RecordingSet("scale", Vehicle.model_validate(content), tuple(runs), ("run2",))
+    return one_rotor(runs, ("run2",))
 
 
 @pytest.mark.parametrize("between", [lambda x: x, lambda x: np.repeat(x[::FINE], FINE)], ids=["smooth", "holds"])
