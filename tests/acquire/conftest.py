@@ -1,7 +1,5 @@
 """Emulated instruments on real pseudo-terminals, and recorders that do not wait long."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack

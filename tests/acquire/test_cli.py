@@ -1,7 +1,5 @@
 """The newcomer's way: an emulator in one process, a recorder in another, a log that the pipeline reads."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """What is said to each instrument, command by command, and that a log can be played back."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

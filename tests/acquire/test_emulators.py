@@ -1,7 +1,5 @@
 """The physics behind the emulated instruments, against numbers computed by hand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

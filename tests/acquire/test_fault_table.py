@@ -1,7 +1,5 @@
 """Faults that once went unnoticed, or cost more than they had to; each row says what was seen before."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import os

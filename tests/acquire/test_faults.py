@@ -1,7 +1,5 @@
 """Everything that goes wrong on a serial line, through real pseudo-terminals."""
 
-from __future__ import annotations
-
 import os
 import resource
 import signal

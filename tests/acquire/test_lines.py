@@ -1,7 +1,5 @@
 """Instruments that send plain lines: read by a description, their bytes kept as they came."""
 
-from __future__ import annotations
-
 import io
 import os
 import threading

@@ -1,7 +1,5 @@
 """Raw logs and their metadata: readable up to any cut, atomic, validated, indexed."""
 
-from __future__ import annotations
-
 import gzip
 import os
 

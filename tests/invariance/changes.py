@@ -4,8 +4,6 @@ Each change takes a set and the names of the runs held out of it, and gives the 
 it back into one on the set itself.
 """
 
-from __future__ import annotations
-
 import gzip
 import tempfile
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """Flights made by hand for tests: a prescribed turning and thrust, everything else follows by rigid-body mechanics."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from scipy.integrate import cumulative_trapezoid

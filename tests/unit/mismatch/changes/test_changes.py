@@ -1,7 +1,5 @@
 """What changed between two sets of flights of one vehicle."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from functools import cache

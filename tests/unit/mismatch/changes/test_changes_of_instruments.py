@@ -1,7 +1,5 @@
 """What changed on a stand or a bench since its last calibration."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -1,7 +1,5 @@
 """The probability of each effect of a model that was chosen otherwise, and the status that it leaves it."""
 
-from __future__ import annotations
-
 import pytest
 
 from rotorid.mismatch.decision.findings import Finding, with_probabilities

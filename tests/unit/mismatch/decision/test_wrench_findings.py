@@ -1,7 +1,5 @@
 """Every form of the catalogue that the search may choose can be reported: parameters, gain and channels."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The model of a flight with fewer of its parts."""
 
-from __future__ import annotations
-
 from rotorid.mismatch.delivery.usable import with_only
 from rotorid.mismatch.model.fitted import fitted
 from rotorid.mismatch.model.prepare import prepare

@@ -1,7 +1,5 @@
 """Measured rotor speeds without their noise: plateaus are averaged, steps stay steps."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.signal import lfilter

@@ -1,7 +1,5 @@
 """Mistakes in a set are found, named with the right correction and undone; sound sets are left alone."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the analysis works on: the split, the noise measured from the data, the terms a set can test."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The runs held out change no model, and a verdict says what its own numbers say."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """What is said about a believed value where something beside it would make up for it."""
 
-from __future__ import annotations
-
 import pytest
 
 from rotorid.mismatch.decision.findings import Finding

@@ -1,7 +1,5 @@
 """Wrong believed values: the fewest that explain the residual, only where they are certain and matter."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

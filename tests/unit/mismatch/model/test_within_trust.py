@@ -1,7 +1,5 @@
 """Believed values move within their trust, without a word, where environments not used for fitting confirm it."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Errors of channels compared by blocks of time."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from rotorid.mismatch.plant.comparison import growth

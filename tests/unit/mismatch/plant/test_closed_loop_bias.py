@@ -1,7 +1,5 @@
 """Commands that answer the gyroscope's noise look late although the rotors are not."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

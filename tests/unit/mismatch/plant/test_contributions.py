@@ -1,7 +1,5 @@
 """A contribution stands as it is unless much of it is noise; then the noise goes and what is plain stays."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A velocity that an autopilot made from its accelerometer is distinguished from one that another sensor measured."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

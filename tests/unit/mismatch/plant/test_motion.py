@@ -1,7 +1,5 @@
 """From columns to even stretches: rates, holes, derived quantities and time offsets, by hand."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The joint regression: whitening, intervals, noisy regressors, agreement between runs, by hand and by repetition."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.signal import lfilter

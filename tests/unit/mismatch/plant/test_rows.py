@@ -1,7 +1,5 @@
 """Rows of the regression by hand: rotor-level physics, both sides filtered alike, columns of believed values."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

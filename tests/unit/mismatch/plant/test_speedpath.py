@@ -1,7 +1,5 @@
 """Between command and rotor speed: what the search finds on made commands, and what it leaves alone."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

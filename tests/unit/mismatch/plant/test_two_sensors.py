@@ -1,7 +1,5 @@
 """Which errors of sensors the comparison with another sensor estimates alone."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which believed values are wrong, given the gains that a flight shows."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A channel far above its noise floor is located, whatever was found; what values within their trust mend is none."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import pytest

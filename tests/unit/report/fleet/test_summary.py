@@ -1,7 +1,5 @@
 """Tables, figure and page of a fleet from verdicts written by hand."""
 
-from __future__ import annotations
-
 import html
 import json
 import re
