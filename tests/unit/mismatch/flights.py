@@ -148,14 +148,8 @@ class Flight:
     def record(self, rate_hz: float = 200.0, late_s=None, growth=None, vibration: float = 0.0, name="run01") -> Run:
         """A run with noise. `late_s` and `growth` (sensor to s, s/s) put a sensor's stamps behind."""
         t = np.arange(int(self.duration_s * rate_hz)) / rate_hz
-        noise = {
-            "rotors": 5.0,
-            "position": 0.001,
-            "velocity": 0.02,
-            "attitude": 0.001,
-            "gyroscope": 0.012,
-            "accelerometer": 0.12,
-        }
+        noise = {"rotors": 5.0, "position": 0.001, "velocity": 0.02, "attitude": 0.001}
+        noise |= {"gyroscope": 0.012, "accelerometer": 0.12}
         columns = {"time_s": t}
         for sensor, names in COLUMNS.items():
             when = 1.0 + t - (late_s or {}).get(sensor, 0.0) - (growth or {}).get(sensor, 0.0) * t

@@ -1,17 +1,25 @@
-"""What a command did between its samples, which nobody recorded, is free within what it can be."""
+"""What a command did between its samples, which nobody recorded, is free within what it can be. Readings that are
+missing for a while: a sensor goes on remembering the load, and nothing is compared there.
+"""
+
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from rotorid.effects.amplifier_filter import EFFECT as AMPLIFIER
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Motion, SpeedPath
+from rotorid.effects.loading import forms_of
 from rotorid.effects.motor_lag import lagged
 from rotorid.mismatch.instrument.chain import find_chain, moved_between_samples, unknown_courses
-from rotorid.mismatch.instrument.setup import set_up, with_speed
+from rotorid.mismatch.instrument.setup import pieces_of, set_up, with_speed
+from rotorid.mismatch.plant.readings import form_reading
 from rotorid.mismatch.plant.split import parts_of, split_runs
 from rotorid.recordings import RecordingSet, Run
 from tests.unit.mismatch.instrument.stands import C_F, one_rotor
+from tests.unit.mismatch.instrument.test_instrument import RATE_HZ, bench_set
 
 DT_S, TAU_S = 0.01, 0.03
 FINE = 20
@@ -90,3 +98,39 @@ def test_the_acceleration_of_a_cubic_is_exact():
     t = np.arange(30) * 0.005
     motion = with_speed(Motion(time_s=t, rotor_speed=None), (t**3)[:, None])
     np.testing.assert_allclose(motion.rotor_acceleration[2:-2, 0], 3 * t[2:-2] ** 2, atol=1e-12)
+
+
+def with_a_gap(start_s: float, stop_s: float):
+    recordings = bench_set()
+    first = recordings.runs[0]
+    table = first.table.copy()
+    table.loc[(table.time_s > start_s) & (table.time_s < stop_s), "force_z_n"] = np.nan
+    return replace(recordings, runs=(Run(first.name, table), *recordings.runs[1:]))
+
+
+def test_a_short_gap_stays_in_its_stretch_and_is_not_compared():
+    """Half a second from 10 s on at 50 Hz: 24 samples lack between 10.00 and 10.50 s."""
+    (x,) = [x for x in set_up(with_a_gap(10.0, 10.5)).loadings if x.run == "run1"]
+    assert x.size == 30 * RATE_HZ and np.isfinite(x.reading[:, :3]).all()
+    missing = x.time_s[~x.keep]
+    assert len(missing) == 24 and missing[0] == pytest.approx(10.02) and missing[-1] == pytest.approx(10.48)
+    assert [len(p) for p in pieces_of(x, 1)] == [501, 975]
+
+
+def test_after_a_long_gap_a_new_stretch_begins():
+    spans = [(x.time_s[0], x.time_s[-1]) for x in set_up(with_a_gap(10.0, 14.0)).loadings if x.run == "run1"]
+    assert np.allclose(spans, [(0.0, 10.0), (14.0, 29.98)])
+
+
+def test_one_missing_sample_is_filled():
+    (x,) = [x for x in set_up(with_a_gap(10.0, 10.03)).loadings if x.run == "run1"]
+    assert x.keep is None
+    assert x.reading[501, 2] == pytest.approx((x.reading[500, 2] + x.reading[502, 2]) / 2)
+
+
+def test_a_filter_has_settled_on_the_load_that_a_stretch_begins_with():
+    setup = set_up(bench_set())
+    x = setup.loadings[0]
+    still = replace(x, load=np.broadcast_to(np.array([1.0, -2.0, 5.0, 0, 0, 0]), x.load.shape).copy())
+    for form in forms_of(AMPLIFIER, setup.instrument):
+        assert np.abs(form_reading(form, [2.0], still, setup.vehicle)).max() < 1e-12
