@@ -24,8 +24,15 @@ def options(logs, sd=0.01, trust=TRUST):
         ([-0.15, -0.15, -0.15, 0.0], 0.01, {"thrust"}),
         ([-0.15, 0.0, 0.0, 0.0], 0.01, {"mass"}),
         ([0.0, -0.7, 0.0, 0.0], [0.01, 0.35, 0.01, 0.01], set()),
+        ([0.0, -0.05, 0.0, 0.0], 0.01, set()),  # ten times more probable, of 99 times that are asked for
     ],
-    ids=["as believed", "a thrust coefficient changes the moments too", "a mass the thrust alone", "hardly shown"],
+    ids=[
+        "as believed",
+        "a thrust coefficient changes the moments too",
+        "a mass the thrust alone",
+        "hardly shown",
+        "not sure",
+    ],
 )
 def test_what_gains_call_wrong(logs, sd, wrong):
     assert called_wrong(options(logs, sd), LEAST_NATS) == wrong
