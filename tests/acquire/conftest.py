@@ -1,7 +1,6 @@
 """Emulated instruments on real pseudo-terminals, and recorders that do not wait long."""
 
-from __future__ import annotations
-
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from datetime import UTC, datetime
@@ -18,6 +17,7 @@ from rotorid.acquire.recorder import Recorder, Timings
 from rotorid.acquire.transport import LoopbackTransport, SerialTransport
 from rotorid.io.wire import INSTRUMENTS
 
+ACQUIRE = (sys.executable, "-m", "rotorid.acquire")
 QUICK = Timings(poll_s=0.02, reply_s=0.5, tries=3, silence_s=2.0, retry_open_s=0.002, reconnect_s=5.0)
 
 

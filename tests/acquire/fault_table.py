@@ -3,8 +3,6 @@
 `python -c "from tests.acquire.fault_table import show; show()"` prints it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path

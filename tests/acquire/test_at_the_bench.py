@@ -1,7 +1,5 @@
 """The files that lie ready for the person at the bench, and what an installed package holds of all this."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """The campaign: the same bytes twice, all of it there, and the thesis's numbers in it."""
 
-from __future__ import annotations
-
 import csv
 import gzip
 import hashlib

@@ -1,11 +1,10 @@
 """The newcomer's way: an emulator in one process, a recorder in another, a log that the pipeline reads."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,9 +20,8 @@ from rotorid.identify.stand.recordings import read_pairs
 from rotorid.io.index import read_index
 from rotorid.io.logs import read_log
 from rotorid.io.tables import read_tables
+from tests.acquire.conftest import ACQUIRE
 from tests.acquire.fault_table import seen
-
-ACQUIRE = [sys.executable, "-m", "rotorid.acquire"]
 
 
 @pytest.fixture
@@ -51,27 +49,19 @@ def run(*arguments: str) -> subprocess.CompletedProcess:
     return subprocess.run([*ACQUIRE, *arguments], capture_output=True, text=True, timeout=60)
 
 
+def recorded(arguments: str, folder: Path, name: str) -> str:
+    """Record by the command line into a folder; what it said."""
+    done = run(*arguments.split(), "--out", str(folder), "--id", name)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
 def test_static_test_in_two_terminals(emulator, tmp_path):
     (port,) = emulator("bench", "ttyBENCH", more=("--load", "z:500.48@3", "--speed", "20"))
     out = tmp_path / "raw" / "campaign" / "local"
-    done = run(
-        *(
-            "bench",
-            "--port",
-            port,
-            "--test",
-            "static",
-            "--axis",
-            "z",
-            "--load-gf",
-            "500.48",
-            "--place-s",
-            "4",
-        ),
-        *("--out", str(out), "--id", "mine", "--air", "23,95400,0.5", "--operator", "me"),
-    )
-    assert done.returncode == 0, done.stderr
-    assert "mine.rlog: " in done.stdout and "0 missing" in done.stdout
+    words = f"bench --port {port} --test static --axis z --load-gf 500.48 --place-s 4 --air 23,95400,0.5 --operator me"
+    said = recorded(words, out, "mine")
+    assert "mine.rlog: " in said and "0 missing" in said
     log = read_log(out / "mine.rlog")
     table, marks = log.table.set_index("index"), log.session.marks
     cells = list(log.instrument.columns)
@@ -89,11 +79,7 @@ def test_static_test_in_two_terminals(emulator, tmp_path):
 
 def test_experiment_with_two_instruments_and_two_clocks(emulator, tmp_path):
     ports = emulator("stand", "ttyQUAD", "ttyWRENCH", more=("--experiment", "27", "--speed", "20"))
-    done = run(
-        *("experiment", "27", "--quadrotor-port", ports[0], "--wrench-port", ports[1]),
-        *("--out", str(tmp_path), "--id", "e27"),
-    )
-    assert done.returncode == 0, done.stderr
+    recorded(f"experiment 27 --quadrotor-port {ports[0]} --wrench-port {ports[1]}", tmp_path, "e27")
     vehicle, sensor = read_log(tmp_path / "e27-quadrotor.rlog"), read_log(tmp_path / "e27-wrench.rlog")
     assert vehicle.session.group == sensor.session.group == "e27"
     assert vehicle.session.setup.mount_roll_deg == 15
@@ -107,11 +93,7 @@ def test_experiment_with_two_instruments_and_two_clocks(emulator, tmp_path):
 
 def test_an_experiment_at_five_times_the_speed_of_life_is_ingested_and_aligned(emulator, tmp_path):
     ports = emulator("stand", "ttyQUAD", "ttyWRENCH", more=("--experiment", "27", "--speed", "5"))
-    done = run(
-        *("experiment", "27", "--quadrotor-port", ports[0], "--wrench-port", ports[1]),
-        *("--out", str(tmp_path), "--id", "e27"),
-    )
-    assert done.returncode == 0, done.stderr
+    recorded(f"experiment 27 --quadrotor-port {ports[0]} --wrench-port {ports[1]}", tmp_path, "e27")
     tables = {name: read_tables([tmp_path / f"e27-{name}.rlog"]) for name in ("quadrotor", "wrench")}
     assert all(sessions["finished"].all() for _, sessions in tables.values())
     (pair,) = read_pairs(tables["quadrotor"], tables["wrench"], 2e-4)
@@ -128,30 +110,25 @@ def test_an_experiment_at_five_times_the_speed_of_life_is_ingested_and_aligned(e
 
 def test_rotor_and_tensile(emulator, tmp_path):
     (port,) = emulator("rotor", "ttyROTOR", more=("--speed", "20"))
-    done = run("rotor", "--port", port, "--throttle", "0.3", "--out", str(tmp_path), "--id", "r")
-    assert done.returncode == 0, done.stderr
+    recorded(f"rotor --port {port} --throttle 0.3", tmp_path, "r")
     table = read_log(tmp_path / "r.rlog").table
     assert table.throttle.max() == pytest.approx(0.3) and table.throttle.iloc[-1] == 0
     assert table.thrust_n.max() > 1.5
     (port,) = emulator("tensile", "ttyTENSILE", more=("--speed", "40", "--infill-percent", "25"))
-    done = run("tensile", "--port", port, "--infill-percent", "25", "--out", str(tmp_path), "--id", "t")
-    assert done.returncode == 0, done.stderr
+    recorded(f"tensile --port {port} --infill-percent 25", tmp_path, "t")
     assert read_log(tmp_path / "t.rlog").table.force_n.max() == pytest.approx(36.811 * 19.2, rel=0.02)
 
 
 def test_wrench_operations(emulator, tmp_path):
     (port,) = emulator("wrench", "ttyWRENCH", more=("--speed", "20"))
     for step in ("power-on", "offset"):
-        assert run("wrench", "--port", port, "--only", step, "--out", str(tmp_path), "--id", step).returncode == 0
-    done = run(
-        *("wrench", "--port", port, "--interval", "0.02", "--measuring-times", "40", "--restart-times", "1"),
-        *("--offset", "--out", str(tmp_path), "--id", "w"),
-    )
-    assert done.returncode == 0, done.stderr
+        recorded(f"wrench --port {port} --only {step}", tmp_path, step)
+    words = f"wrench --port {port} --interval 0.02 --measuring-times 40 --restart-times 1 --offset"
+    recorded(words, tmp_path, "w")
     log = read_log(tmp_path / "w.rlog")
     assert len(log.table) == 80 and log.end.sent == 80  # one run and one restart of forty
     assert abs(log.table.force_z_n.mean()) < 0.1  # the weight is offset away
-    assert run("wrench", "--port", port, "--only", "power-off", "--out", str(tmp_path), "--id", "off").returncode == 0
+    recorded(f"wrench --port {port} --only power-off", tmp_path, "off")
 
 
 @pytest.mark.parametrize(
@@ -219,11 +196,7 @@ def test_ports_lists_or_says_what_to_do():
 
 def test_torque_test_with_tester_and_sensor(emulator, tmp_path):
     ports = emulator("torque", "ttyROTOR", "ttyWRENCH", more=("--speed", "20"))
-    done = run(
-        *("torque", "--throttle", "0.4", "--rotor-port", ports[0], "--wrench-port", ports[1]),
-        *("--out", str(tmp_path), "--id", "q"),
-    )
-    assert done.returncode == 0, done.stderr
+    recorded(f"torque --throttle 0.4 --rotor-port {ports[0]} --wrench-port {ports[1]}", tmp_path, "q")
     tester, sensor = read_log(tmp_path / "q-rotor.rlog").table, read_log(tmp_path / "q-wrench.rlog").table
     speed = tester.speed_rpm.max() * np.pi / 30
     moment = sensor.moment_z_n_m
@@ -234,11 +207,7 @@ def test_torque_test_with_tester_and_sensor(emulator, tmp_path):
 
 def test_reference_sensor_on_the_bench_command(emulator, tmp_path):
     (port,) = emulator("jr3", "ttyJR3", more=("--load", "z:957.5475@3", "--speed", "20"))
-    done = run(
-        *("bench", "--platform", "jr3", "--port", port, "--test", "static", "--place-s", "4"),
-        *("--out", str(tmp_path), "--id", "j"),
-    )
-    assert done.returncode == 0, done.stderr
+    recorded(f"bench --platform jr3 --port {port} --test static --place-s 4", tmp_path, "j")
     log = read_log(tmp_path / "j.rlog")
     table, marks = log.table.set_index("index"), log.session.marks
     read = table.force_z_n.loc[marks["read_start"] : marks["read_stop"]].mean() - log.session.tare["force_z_n"]

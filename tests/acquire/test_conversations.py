@@ -1,7 +1,5 @@
 """What is said to each instrument, command by command, and that a log can be played back."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -28,15 +26,7 @@ def test_wrench(loopback):
     with recorder:
         procedures.measure_wrench(recorder, 0.02, restart_times=2, measuring_times=30, offset=True)
     # 20,000 µs = 0x4e20; 2; 30; all little-endian
-    assert said(recorder.log_path) == [
-        "?",
-        "P 01",
-        "I 204e000002001e000000",
-        "O",
-        "G 204e0000",
-        "X",
-        "P 00",
-    ]
+    assert said(recorder.log_path) == ["?", "P 01", "I 204e000002001e000000", "O", "G 204e0000", "X", "P 00"]
     assert len(read_log(recorder.log_path).table) == 90  # thirty samples and two restarts
 
 

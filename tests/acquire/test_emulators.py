@@ -1,7 +1,5 @@
 """The physics behind the emulated instruments, against numbers computed by hand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -152,15 +150,8 @@ def test_stand_feels_thrust_and_torques_in_the_thesis_signs():
     speeds = np.array([1000.0, 800, 900, 700])
     force, torque = 1.3877e-6 * speeds**2, 1.8558e-8 * speeds**2
     wrench = stand(speeds=speeds)
-    d = 0.0884
-    expected = [
-        0,
-        0,
-        6.39612 - force.sum(),
-        (-force[0] + force[1] + force[2] - force[3]) * d,
-        (force[0] + force[1] - force[2] - force[3]) * d,
-        torque[0] - torque[1] + torque[2] - torque[3],
-    ]
+    roll, pitch = np.array([[-1, 1, 1, -1], [1, 1, -1, -1]]) @ force * 0.0884
+    expected = [0, 0, 6.39612 - force.sum(), roll, pitch, torque @ [1, -1, 1, -1]]
     np.testing.assert_allclose(wrench, expected, atol=1e-12)
 
 

@@ -1,7 +1,6 @@
 """Faults that once went unnoticed, or cost more than they had to; each row says what was seen before."""
 
-from __future__ import annotations
-
+import gzip
 import json
 import os
 import pty
@@ -18,20 +17,21 @@ from typer.testing import CliRunner
 
 from rotorid.acquire import procedures
 from rotorid.acquire.cli import app
+from rotorid.acquire.clock import SystemClock
 from rotorid.acquire.emulators.wire import Faults
-from rotorid.acquire.errors import AcquireError, DeviceSilent
-from rotorid.acquire.recorder import Recorder, Timings
+from rotorid.acquire.errors import AcquireError
+from rotorid.acquire.recorder import Recorder, Timings, _source
 from rotorid.errors import InputError
 from rotorid.io import rawlog, wire
-from rotorid.io.frames import ANSWER, DATA, END, START, Frame, encode
+from rotorid.io.frames import ANSWER, DATA, END, START, Frame, StreamDecoder, encode
 from rotorid.io.logs import LogError, read_log
 from rotorid.io.rawlog import read_raw
-from rotorid.io.session import Ended, read_session, session_path, write_session
+from rotorid.io.session import Ended, Session, read_session, session_path, write_session
 from rotorid.io.tables import read_tables
 from rotorid.io.wire import TRAPEZOID, Programme
-from tests.acquire.conftest import QUICK
-from tests.acquire.fault_table import seen
-from tests.acquire.test_faults import assert_metadata_agree, record, start_recorder, wait_for_bytes
+from tests.acquire.conftest import ACQUIRE, QUICK
+from tests.acquire.fault_table import TABLE, seen
+from tests.acquire.test_faults import assert_metadata_agree, record
 
 
 def recorded(loopback, samples: int = 250, name: str = "bench") -> Path:
@@ -82,8 +82,6 @@ def test_a_damaged_length_costs_a_chunk(loopback):
 
 @seen("a bit of a packed log flipped", "NotALog: nothing of it could be read")
 def test_a_damaged_packed_log_is_read_up_to_the_damage(loopback):
-    import gzip
-
     path = recorded(loopback)
     had = len(read_log(path).table)
     packed = path.with_name(path.name + ".gz")
@@ -180,7 +178,7 @@ class Script:
         self._odd = odd
         self._out, self._number, self._sent = b"", 0, 0
         self._streaming = False
-        self._decoder = rawlog_free_decoder()
+        self._decoder = StreamDecoder()
 
     def open(self) -> None: ...
 
@@ -212,12 +210,6 @@ class Script:
         return out
 
 
-def rawlog_free_decoder():
-    from rotorid.io.frames import StreamDecoder
-
-    return StreamDecoder()
-
-
 ODD = {
     "short start record": (START, b"\1\2\3"),
     "start record with two strings": (START, start_record()[:-3]),
@@ -233,8 +225,6 @@ ODD = {
 @pytest.mark.parametrize("what", ODD)
 @seen("a malformed frame with a right checksum", "recorder and reader crashed (struct.error, ValueError, IndexError)")
 def test_a_malformed_frame_is_counted_and_nothing_else_is_lost(tmp_path, what):
-    from rotorid.acquire.clock import SystemClock
-
     bench = wire.INSTRUMENTS["bench"]
     recorder = Recorder(bench, Script([ODD[what]]), SystemClock(), tmp_path, "run", durable=False)
     with recorder:
@@ -243,18 +233,14 @@ def test_a_malformed_frame_is_counted_and_nothing_else_is_lost(tmp_path, what):
     assert log.session.ended == Ended.FINISHED and len(log.table) >= 29
     unknown = what == "unknown kind"
     assert (log.malformed, log.unknown_kinds) == (int(not unknown), int(unknown))
-    assert (log.session.counts.malformed, log.session.counts.unknown_kinds) == (
-        None if unknown else 1,
-        1 if unknown else None,
-    )
+    counts = log.session.counts
+    assert (counts.malformed, counts.unknown_kinds) == ((None, 1) if unknown else (1, None))
     assert log.missing == 0 and log.session.warnings
     assert_metadata_agree(log)
 
 
 @seen("samples that are all of another length", "recorder stopped at the first; the reader raised for the whole log")
 def test_a_firmware_of_another_layout_is_told_and_its_log_is_readable(tmp_path):
-    from rotorid.acquire.clock import SystemClock
-
     script = Script([(DATA, b"\1\2\3\4")] * 25)
     script._number = 9
     recorder = Recorder(wire.INSTRUMENTS["bench"], script, SystemClock(), tmp_path, "run", durable=False)
@@ -290,8 +276,6 @@ def test_a_log_of_an_unknown_instrument_is_readable(tmp_path):
     session_free(path, [(START, start_record(name="toaster")), (DATA, b"\1\2"), (END, end_record(1))])
     with pytest.raises(LogError, match="unknown instrument 'toaster'; known are bench"):
         read_log(path)  # nothing says what was expected
-    from rotorid.io.session import Session
-
     write_session(
         Session(id="run", instrument="bench", started="2024-03-04T09:00:00-06:00", host_start_ns=0, log=path.name),
         tmp_path / "run.yaml",
@@ -303,19 +287,6 @@ def test_a_log_of_an_unknown_instrument_is_readable(tmp_path):
 # ---- 4. every end stops the device ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGTERM])
-@seen("SIGHUP: the terminal is closed", "the recorder died, the device streamed on, metadata said 'recording'")
-def test_hang_up_stops_the_device(plugged, tmp_path, number):
-    ports = plugged("bench", speed=20.0)
-    process = start_recorder(ports.names[0], tmp_path)
-    wait_for_bytes(process, tmp_path / "run.rlog", 3000)
-    process.send_signal(number)
-    process.communicate(timeout=20)
-    log = read_log(tmp_path / "run.rlog")
-    assert log.complete and log.session.ended == Ended.INTERRUPTED
-    assert not ports._world.lines[0].device.streaming
-
-
 @seen("the terminal itself goes away", "traceback (EIO), the device streamed on")
 def test_a_terminal_that_goes_away_stops_the_device(plugged, tmp_path):
     ports = plugged("bench", speed=20.0)
@@ -323,21 +294,7 @@ def test_a_terminal_that_goes_away_stops_the_device(plugged, tmp_path):
     if child == 0:
         # Started under nohup the tests ignore the signal, and so would the recorder, rightly.
         signal.signal(signal.SIGHUP, signal.SIG_DFL)
-        os.execv(
-            sys.executable,
-            [
-                sys.executable,
-                "-m",
-                "rotorid.acquire",
-                "bench",
-                "--port",
-                ports.names[0],
-                "--out",
-                str(tmp_path),
-                "--id",
-                "run",
-            ],
-        )
+        os.execv(sys.executable, [*ACQUIRE, "bench", "--port", ports.names[0], "--out", str(tmp_path), "--id", "run"])
     stop = threading.Event()
 
     def drain() -> None:
@@ -365,7 +322,7 @@ def test_a_terminal_that_goes_away_stops_the_device(plugged, tmp_path):
 @seen("SIGKILL while a motor turns", "the motor turned on to its hold time (up to 65 s), the tester streamed on")
 def test_a_killed_recorder_leaves_no_motor_running(plugged, tmp_path):
     ports = plugged("rotor", speed=1.0)
-    command = [sys.executable, "-m", "rotorid.acquire", "rotor", "--port", ports.names[0], "--throttle", "0.3"]
+    command = [*ACQUIRE, "rotor", "--port", ports.names[0], "--throttle", "0.3"]
     process = subprocess.Popen(
         [*command, "--hold-s", "60", "--rest-s", "0.1", "--out", str(tmp_path), "--id", "run"],
         stdout=subprocess.DEVNULL,
@@ -481,7 +438,7 @@ def test_a_weight_that_never_comes_ends_with_a_sentence(loopback):
 @seen("standard input at its end while Enter is waited for", "the recorder waited for ever")
 def test_standard_input_at_its_end_is_an_answer(plugged, tmp_path):
     done = subprocess.run(
-        [sys.executable, "-m", "rotorid.acquire", "bench", "--port", plugged("bench", speed=20.0).names[0]]
+        [*ACQUIRE, "bench", "--port", plugged("bench", speed=20.0).names[0]]
         + ["--test", "static", "--out", str(tmp_path), "--id", "run"],
         stdin=subprocess.DEVNULL,
         capture_output=True,
@@ -493,14 +450,6 @@ def test_standard_input_at_its_end_is_an_answer(plugged, tmp_path):
 
 
 # ---- 6. what the metadata say -----------------------------------------------------------------------------
-
-
-@seen("a reset with the boot id it had before", "'gone silent', although the device answered")
-def test_a_reset_with_the_same_boot_id_is_a_reset(plugged, recorder_on):
-    port = plugged("bench", Faults(reset_at=frozenset({120}), same_boot_id=True)).names[0]
-    log = record(recorder_on("bench", port))
-    assert log.resets == 1 and (log.table.segment == 0).sum() == 120 and log.session.ended == Ended.FINISHED
-    assert_metadata_agree(log)
 
 
 @seen("a cable at rest for a while", "given up after 5 s, where an unplugged one has 60 s")
@@ -523,30 +472,9 @@ def test_a_cable_at_rest_has_as_long_as_an_unplugged_one(plugged, recorder_on):
     assert_metadata_agree(log)
 
 
-@seen("metadata after a full disk", "'3 missing; check the cable', although the line was clean")
-def test_metadata_after_a_full_disk_are_those_of_the_log(plugged, recorder_on):
-    import resource
-
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    port = plugged("bench").names[0]
-    try:
-        with pytest.raises(AcquireError, match="Free some space"):
-            with recorder_on("bench", port) as recorder:
-                resource.setrlimit(resource.RLIMIT_FSIZE, (60_001, hard))
-                procedures.stream(recorder, 100_000)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-    log = read_log(recorder.log_path)
-    assert log.missing == 0 and log.session.counts.missing == 0 and log.session.warnings == []
-    assert recorder.ended is not None  # the device was stopped and said so
-    assert_metadata_agree(log)
-
-
 @pytest.mark.parametrize(("firmware", "port"), [("bench 1.0 (simulated)", "/dev/ttyACM0"), ("bench 1.0", "/dev/pts/3")])
 @seen("a simulated board", "recorded as source: instrument")
 def test_a_simulated_board_is_no_instrument(firmware, port):
-    from rotorid.acquire.recorder import _source
-
     assert _source(wire.StartRecord(1, 1, 1, "bench", firmware, "7"), port) == "emulator"
     assert _source(wire.StartRecord(1, 1, 1, "bench", "bench 1.0", "7"), "/dev/ttyACM0") == "instrument"
 
@@ -559,17 +487,7 @@ def test_a_slow_instrument_is_not_silent(loopback):
     assert recorder.session.ended == Ended.FINISHED and not recorder.session.events
 
 
-@seen("a device that never comes back", "5 s, three questions")
-def test_a_silent_device_is_given_up_in_the_end(plugged, recorder_on):
-    port = plugged("bench", Faults(silent_from=100)).names[0]
-    quick = replace(QUICK, silence_s=0.03, reply_s=0.03, reconnect_s=0.2)
-    with pytest.raises(DeviceSilent, match="gone silent"):
-        record(recorder_on("bench", port, quick))
-
-
 def test_the_table_names_every_test_here_and_says_what_was_seen():
-    from tests.acquire.fault_table import TABLE
-
     names = {name for name in globals() if name.startswith("test_") and "the_table" not in name}
     assert names <= {row[2] for row in TABLE}
     assert all(fault and before for fault, before, _ in TABLE)

@@ -1,12 +1,9 @@
 """Everything that goes wrong on a serial line, through real pseudo-terminals."""
 
-from __future__ import annotations
-
 import os
 import resource
 import signal
 import subprocess
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -29,11 +26,11 @@ from rotorid.acquire.errors import (
 )
 from rotorid.acquire.transport import SerialTransport
 from rotorid.io import wire
-from rotorid.io.logs import read_log
+from rotorid.io.logs import Log, read_log
 from rotorid.io.sequence import Quality
 from rotorid.io.session import Ended, read_session
 from rotorid.io.wire import TRAPEZOID, Programme
-from tests.acquire.conftest import QUICK
+from tests.acquire.conftest import ACQUIRE, QUICK
 from tests.acquire.fault_table import seen
 
 SAMPLES = 300
@@ -156,10 +153,7 @@ def test_wrong_checksum(plugged, recorder_on):
     assert set(range(SAMPLES)) - set(frame_numbers(log)) == bad
     # a flipped bit may also make or break a delimiter's neighbour, but never let a wrong value through
     assert log.checksum_errors + log.broken_frames >= len(bad)
-    assert [(gap.first_index - log.table["index"].iloc[0], gap.count) for gap in log.gaps] == [
-        (10, 2),
-        (170, 1),
-    ]
+    assert [(gap.first_index - log.table["index"].iloc[0], gap.count) for gap in log.gaps] == [(10, 2), (170, 1)]
     assert_metadata_agree(log)
 
 
@@ -194,14 +188,18 @@ def test_everything_at_once_at_random(plugged, recorder_on, seed):
     assert_metadata_agree(log)
 
 
+@pytest.mark.parametrize("same_boot_id", [False, True])
 @seen("device resets and the recording goes on")
-def test_device_resets_and_the_recording_goes_on(plugged, recorder_on):
-    log = record(recorder_on("bench", plugged("bench", Faults(reset_at=frozenset({120}))).names[0]))
+@seen("a reset with the boot id it had before", "'gone silent', although the device answered")
+def test_device_resets_and_the_recording_goes_on(plugged, recorder_on, same_boot_id):
+    faults = Faults(reset_at=frozenset({120}), same_boot_id=same_boot_id)
+    log = record(recorder_on("bench", plugged("bench", faults).names[0]))
     assert log.resets == 1
     assert (log.table.segment == 0).sum() == 120
     assert (np.diff(log.table.time_s) > 0).all()
     assert log.session.ended == Ended.FINISHED
-    assert [event.what for event in log.session.events] == ["reset"]
+    # A reset with the boot id it had before may first be noticed by the silence.
+    assert [event.what for event in log.session.events if not (same_boot_id and event.what == "silence")] == ["reset"]
     assert_metadata_agree(log)
 
 
@@ -245,10 +243,11 @@ def test_device_slower_or_faster_than_promised(plugged, recorder_on, pace, word,
 
 
 @seen("silent device")
+@seen("a device that never comes back", "5 s, three questions")
 def test_silent_device(plugged, recorder_on):
     port = plugged("bench", Faults(silent_from=100)).names[0]
     with pytest.raises(DeviceSilent, match="gone silent.*power and cable"):
-        record(recorder_on("bench", port, replace(QUICK, silence_s=0.03, reply_s=0.03)))
+        record(recorder_on("bench", port, replace(QUICK, silence_s=0.03, reply_s=0.03, reconnect_s=0.2)))
     log = read_log(Path(port).with_name("run.rlog"))
     assert len(log.table) == 100 and log.session.ended == Ended.DEVICE_SILENT
 
@@ -305,12 +304,13 @@ def test_a_programme_whose_end_record_is_lost_still_ends(plugged, recorder_on):
     assert [event.what for event in log.session.events] == ["silence", "end_lost"]
 
 
+@pytest.mark.parametrize("limit", [60_001, 80_000])
 @seen("disk full")
-def test_disk_full(plugged, recorder_on):
+@seen("metadata after a full disk", "'3 missing; check the cable', although the line was clean")
+def test_disk_full(plugged, recorder_on, limit):
     """The kernel refuses to let the file grow (EFBIG), as a full disk does (ENOSPC)."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     port = plugged("bench").names[0]
-    limit = 80_000
     try:
         with pytest.raises(DiskFull, match="Free some space"):
             with recorder_on("bench", port) as recorder:
@@ -321,7 +321,8 @@ def test_disk_full(plugged, recorder_on):
     assert recorder.log_path.stat().st_size == limit  # filled to the last byte
     log = read_log(recorder.log_path)
     assert log.cut_at is not None and len(log.table) > 1000 and log.missing == 0
-    assert log.session.ended == Ended.DISK_FULL
+    assert log.session.ended == Ended.DISK_FULL and log.session.warnings == []
+    assert_metadata_agree(log)
     # the device got the command to stop, and its answer was still listened to
     assert recorder.ended is not None
 
@@ -353,19 +354,7 @@ def hang_up_as_usual() -> None:
 
 def start_recorder(port: str, folder: Path, *more: str) -> subprocess.Popen:
     """The command line in a process of its own."""
-    command = [
-        sys.executable,
-        "-m",
-        "rotorid.acquire",
-        "bench",
-        "--port",
-        port,
-        "--out",
-        str(folder),
-        "--id",
-        "run",
-        *more,
-    ]
+    command = [*ACQUIRE, "bench", "--port", port, "--out", str(folder), "--id", "run", *more]
     return subprocess.Popen(
         command, preexec_fn=hang_up_as_usual, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
@@ -378,32 +367,39 @@ def wait_for_bytes(process: subprocess.Popen, path: Path, count: int) -> None:
         time.sleep(0.002)
 
 
+def ended_by(number: signal.Signals, port: str, folder: Path) -> tuple[subprocess.Popen, str, str, Log]:
+    """A recorder that is sent this signal in the midst: the ended process, what it said, and its log."""
+    process = start_recorder(port, folder)
+    wait_for_bytes(process, folder / "run.rlog", 3000)
+    process.send_signal(number)
+    out, err = process.communicate(timeout=20)
+    return process, out, err, read_log(folder / "run.rlog")
+
+
 @seen("ctrl c")
 def test_ctrl_c(plugged, tmp_path):
-    process = start_recorder(plugged("bench", speed=20.0).names[0], tmp_path)
-    wait_for_bytes(process, tmp_path / "run.rlog", 3000)
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=20)
+    process, out, err, log = ended_by(signal.SIGINT, plugged("bench", speed=20.0).names[0], tmp_path)
     assert process.returncode == 130
     assert "stopped at your wish" in err and "samples, 0 missing" in out
-    log = read_log(tmp_path / "run.rlog")
     assert log.complete and log.session.ended == Ended.INTERRUPTED
     assert_metadata_agree(log)
 
 
+@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGTERM])
+@seen("SIGHUP: the terminal is closed", "the recorder died, the device streamed on, metadata said 'recording'")
+def test_hang_up_stops_the_device(plugged, tmp_path, number):
+    ports = plugged("bench", speed=20.0)
+    *_, log = ended_by(number, ports.names[0], tmp_path)
+    assert log.complete and log.session.ended == Ended.INTERRUPTED
+    assert not ports._world.lines[0].device.streaming
+
+
 @seen("sigkill", "log and metadata held; a ballast of 64 KiB stayed beside them")
 def test_sigkill(plugged, tmp_path):
-    ports = plugged("bench", speed=20.0)
-    process = start_recorder(ports.names[0], tmp_path)
-    wait_for_bytes(process, tmp_path / "run.rlog", 3000)
-    process.kill()
-    process.communicate(timeout=20)
+    *_, log = ended_by(signal.SIGKILL, plugged("bench", speed=20.0).names[0], tmp_path)
     assert sorted(path.name for path in tmp_path.glob("run*")) == ["run.rlog", "run.yaml"]  # no ballast
-    log = read_log(tmp_path / "run.rlog")
     assert len(log.table) > 10 and log.missing == 0
     assert log.session.ended == Ended.RECORDING and "killed" in log.session.message
-    check = subprocess.run(
-        [sys.executable, "-m", "rotorid.acquire", "check", str(tmp_path / "run.rlog")], capture_output=True, text=True
-    )
+    check = subprocess.run([*ACQUIRE, "check", str(log.path)], capture_output=True, text=True)
     assert check.returncode == 0 and "completed now" in check.stdout
     assert read_session(tmp_path / "run.yaml").counts.samples == len(log.table)

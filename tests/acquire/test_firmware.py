@@ -1,7 +1,5 @@
 """The reference firmware: its protocol core on this computer, and the program for the UNO in a simulated one."""
 
-from __future__ import annotations
-
 import errno
 import os
 import shutil

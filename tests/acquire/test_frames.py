@@ -1,7 +1,5 @@
 """The wire codec: golden bytes, round trips, resynchronisation, sequence and clock."""
 
-from __future__ import annotations
-
 import struct
 
 import pytest

@@ -1,7 +1,5 @@
 """Instruments that send plain lines: read by a description, their bytes kept as they came."""
 
-from __future__ import annotations
-
 import io
 import os
 import threading
@@ -62,11 +60,7 @@ REAL = {  # as such instruments print it, with the lines that are none
         [(0.0, 0.0, -0.2), (0.1, 0.012, 15.3)],
         4,
     ),
-    "scale-fixed": (
-        b"+  500.48 g  \r\n+  500.4? g ?\r\n-    0.02 g  \r\n           g \r\n",
-        [(500.48,), (-0.02,)],
-        2,
-    ),
+    "scale-fixed": (b"+  500.48 g  \r\n+  500.4? g ?\r\n-    0.02 g  \r\n           g \r\n", [(500.48,), (-0.02,)], 2),
 }
 
 
@@ -123,19 +117,26 @@ def test_every_byte_is_kept_and_the_log_is_read_by_its_own_description(line, tmp
         record_lines(description, transport, SystemClock(), tmp_path, "run", samples=1)
 
 
-def test_by_the_command_line(line, tmp_path):
+def spoken(line, folder: Path, description: str, said: bytes, *more: str):
+    """What `lines` makes of a line that speaks once its log is begun: an opened port forgets what came before."""
     master, port = line
-    description = tmp_path / "d.yaml"
-    description.write_text("name: x\nseparator: ','\ncolumns: {force_z_n: {field: 1}}\n")
+    (folder / "d.yaml").write_text(description)
 
-    def speak() -> None:  # an opened port forgets what came before
-        while not (tmp_path / "run.rlog").exists():
+    def speak() -> None:
+        while not (folder / "run.rlog").exists():
             time.sleep(0.005)
-        os.write(master, b"0,1.5\n1,2.5\noops\n2,3.5\n")
+        os.write(master, said)
 
     threading.Thread(target=speak, daemon=True).start()
-    words = ["lines", str(description), "--port", port, "--samples", "3", "--out", str(tmp_path), "--id", "run"]
-    assert CliRunner().invoke(app, words).exit_code == 0
+    words = ["lines", str(folder / "d.yaml"), "--port", port, "--out", str(folder), "--id", "run", *more]
+    return CliRunner().invoke(app, words)
+
+
+PLAIN = "name: x\nseparator: ','\nend: S\ncolumns: {force_z_n: {field: 1}}\n"
+
+
+def test_by_the_command_line(line, tmp_path):
+    assert spoken(line, tmp_path, PLAIN, b"0,1.5\n1,2.5\noops\n2,3.5\n", "--samples", "3").exit_code == 0
     shown = CliRunner().invoke(app, ["check", str(tmp_path / "run.rlog"), "--csv", str(tmp_path / "t.csv")])
     assert "3 lines read, 1 could not be" in shown.output
     assert (tmp_path / "t.csv").read_text().splitlines()[-1].endswith(",3.5")
@@ -185,21 +186,11 @@ def test_damage_joins_no_halves_of_lines_and_is_told(tmp_path):
 
 
 def test_a_limit_ends_the_recording_and_columns_are_those_of_the_description(line, tmp_path):
-    master, port = line
-    description = tmp_path / "d.yaml"
-    description.write_text("name: x\nseparator: ','\nend: S\ncolumns: {force_z_n: {field: 1}}\n")
-
-    def speak() -> None:
-        while not (tmp_path / "run.rlog").exists():
-            time.sleep(0.005)
-        os.write(master, b"0,1.5\n1,99\n2,3.5\n")
-
-    threading.Thread(target=speak, daemon=True).start()
-    words = ["lines", str(description), "--port", port, "--out", str(tmp_path), "--id", "run"]
-    done = CliRunner().invoke(app, [*words, "--limit", "force_z_n:-10:10"])
+    done = spoken(line, tmp_path, PLAIN, b"0,1.5\n1,99\n2,3.5\n", "--limit", "force_z_n:-10:10")
     assert done.exit_code == 1 and "force_z_n is 99, allowed are -10 to 10: stopped" in done.output
     assert read_session(tmp_path / "run.yaml").ended == Ended.LIMIT_EXCEEDED
-    assert os.read(master, 100) == b"S"
+    assert os.read(line[0], 100) == b"S"
+    words = ["lines", str(tmp_path / "d.yaml"), "--port", line[1], "--out", str(tmp_path), "--id", "run"]
     assert CliRunner().invoke(app, [*words, "--plot", "force"]).exit_code == 2
 
 

@@ -1,7 +1,5 @@
 """Raw logs and their metadata: readable up to any cut, atomic, validated, indexed."""
 
-from __future__ import annotations
-
 import gzip
 import os
 
@@ -152,12 +150,9 @@ def test_metadata_errors_name_file_and_key(tmp_path):
 
 def test_air_density():
     # dry air at 15 °C and 101,325 Pa: 1.225 kg/m³; moist air is lighter
-    assert RoomAir(temperature_c=15, pressure_pa=101325, relative_humidity=0).density_kg_m3 == pytest.approx(
-        1.225, abs=1e-3
-    )
-    assert RoomAir(temperature_c=30, pressure_pa=101325, relative_humidity=1).density_kg_m3 == pytest.approx(
-        1.146, abs=2e-3
-    )
+    for celsius, humidity, density in ((15, 0, 1.225), (30, 1, 1.146)):
+        air = RoomAir(temperature_c=celsius, pressure_pa=101325, relative_humidity=humidity)
+        assert air.density_kg_m3 == pytest.approx(density, abs=1e-3)
 
 
 def test_index(log_path):

@@ -1,8 +1,6 @@
 """Metadata of raw logs and their index carry a checksum: a changed bit is reported, an edit can be meant, old ones
 read."""
 
-from __future__ import annotations
-
 import logging
 import random
 import shutil

@@ -1,7 +1,5 @@
 """A campaign by its plan: order, checks, resuming after anything, one recording again, limits."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import pty

@@ -1,7 +1,5 @@
 """Recording at 1 kHz: nothing lost, less than a tenth of a core."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

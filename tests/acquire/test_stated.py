@@ -34,8 +34,7 @@ def test_a_bench_that_gives_way_under_thrust_grows_by_its_compliance() -> None:
 def test_a_displaced_sensor_moves_the_moments_as_these_rotors_and_this_centre_do() -> None:
     """All four rotors alike, level mount: the moments about the displaced sensor, by hand and by what stands for it."""
     truth = Truth(
-        vehicle=VehicleTruth(com_offset_m=[0.004, 0.0, 0.0]),
-        wrench=SensorTruth(position_error_m=[0.001, -0.003, 0.0]),
+        vehicle=VehicleTruth(com_offset_m=[0.004, 0.0, 0.0]), wrench=SensorTruth(position_error_m=[0.001, -0.003, 0.0])
     )
     found = stated.displaced(truth)
     x, y = CORNERS[:, 0] * truth.vehicle.arm_m, CORNERS[:, 1] * truth.vehicle.arm_m

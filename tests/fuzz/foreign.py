@@ -5,8 +5,6 @@ The first byte chooses a small sound log of one format, the rest says where it i
 stands behind the head of the format instead.
 """
 
-from __future__ import annotations
-
 import io
 import tempfile
 from collections.abc import Callable

@@ -4,8 +4,6 @@ The first byte says how the rest becomes a log, since hardly any random byte pas
 contents of chunks, as frames, or as a damaged log of frames.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

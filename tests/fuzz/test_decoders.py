@@ -1,7 +1,5 @@
 """The fuzzing's own check, by hypothesis for some seconds, and on all that its corpus holds."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Logs of other makers: sound ones are read, damaged ones read or refused in one sentence, bombs refused."""
 
-from __future__ import annotations
-
 import bz2
 import gzip
 import os

@@ -4,8 +4,6 @@ Each change takes a set and the names of the runs held out of it, and gives the 
 it back into one on the set itself.
 """
 
-from __future__ import annotations
-
 import gzip
 import tempfile
 from collections.abc import Callable, Mapping
@@ -49,8 +47,7 @@ def _called(recordings: RecordingSet, names: Mapping[str, str], held_out: tuple[
     runs = sorted((replace(run, name=names[run.name]) for run in recordings.runs), key=lambda run: run.name)
     held = None if held_out is None else tuple(names[name] for name in held_out)
     return Changed(
-        replace(recordings, name="another", runs=tuple(runs), held_out=held),
-        {new: old for old, new in names.items()},
+        replace(recordings, name="another", runs=tuple(runs), held_out=held), {new: old for old, new in names.items()}
     )
 
 

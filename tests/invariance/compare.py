@@ -1,7 +1,5 @@
 """What differs between the verdict on a set and the one on its changed copy."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass

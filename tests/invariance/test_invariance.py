@@ -3,8 +3,6 @@
 `ROTORID_INVARIANCE_SETS` may name a folder of recording sets: all in it are judged then, changed in each way.
 """
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -58,12 +58,7 @@ class Project:
             "PYTHONDONTWRITEBYTECODE": "1",
         }
         done = subprocess.run(
-            command,
-            cwd=self.root,
-            env=environment,
-            text=True,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
+            command, cwd=self.root, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
         )
         assert (done.returncode == 0) == succeeds, done.stdout
         return done.stdout

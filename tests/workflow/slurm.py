@@ -4,8 +4,6 @@ Everything it writes lies in one folder, its ports are free ones, and nothing of
 or changed. It starts without systemd and needs root.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import socket

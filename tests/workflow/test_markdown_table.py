@@ -1,7 +1,5 @@
 """The first table of a benchmark's file."""
 
-from __future__ import annotations
-
 import pytest
 
 from rotorid.errors import InputError

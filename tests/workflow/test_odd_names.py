@@ -1,7 +1,5 @@
 """Names and bad input through Snakemake, two workflows at once, and a job that is killed."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

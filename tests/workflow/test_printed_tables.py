@@ -4,8 +4,6 @@ The means here are plainer than the pipeline's (no filters, no search for what i
 a stated part of their own uncertainty, and not to the last digit.
 """
 
-from __future__ import annotations
-
 import binascii
 import csv
 import gzip

@@ -49,15 +49,26 @@ def chapters(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return ["one.md", "two.md"]
 
 
+def html_of(chapters: list[str], **options) -> str:
+    """The report of these chapters as a page."""
+    typeset.html(typeset.Document(chapters, "Title", "Subtitle", PARTS, **options), "report.html")
+    return Path("report.html").read_text()
+
+
+def typst_of(chapters: list[str], later=None, **options) -> str:
+    """The report of these chapters as typst's source."""
+    document = typeset.Document(chapters, "Title", "Subtitle", PARTS, **options)
+    typeset.typst_source(document, "report.typ", **({} if later is None else {"later": later}))
+    return Path("report.typ").read_text()
+
+
 def plain(page: str) -> str:
     """Text of an HTML page, spaces made single."""
     return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", "", page))
 
 
 def test_html_numbers_by_chapter_and_refers_to_the_numbers(chapters: list[str]) -> None:
-    typeset.html(typeset.Document(chapters, "Title", "Subtitle", PARTS), "report.html")
-    page = Path("report.html").read_text()
-    text = plain(page).replace("\u00a0", " ")
+    text = plain(html_of(chapters)).replace("\u00a0", " ")
     assert "See Figure 1.1, Table 1.1, Equation 1.1, Chapter 2 and Section 2.1;" in text
     assert "Figure 1.1. A box." in text
     assert "Table 1.1. Cells." in text
@@ -67,16 +78,14 @@ def test_html_numbers_by_chapter_and_refers_to_the_numbers(chapters: list[str]) 
 
 
 def test_html_needs_no_other_file(chapters: list[str]) -> None:
-    typeset.html(typeset.Document(chapters, "Title", "Subtitle", PARTS), "report.html")
-    page = Path("report.html").read_text()
+    page = html_of(chapters)
     assert "<math" in page
     assert "data:image/svg+xml" in page or "<svg" in page
     assert not re.search(r'(?:src|href)="(?!#|data:|https://doi)[^"]+"', page)
 
 
 def test_typst_says_the_same_numbers_and_makes_a_pdf(chapters: list[str]) -> None:
-    typeset.typst_source(typeset.Document(chapters, "Title", "Subtitle", PARTS), "report.typ")
-    source = Path("report.typ").read_text()
+    source = typst_of(chapters)
     assert "#link(<fig:first-box>)[Figure~1.1]" in source
     assert "math.equation(numbering: _ => [(1.1)])" in source
     typeset.pdf("report.typ", "report.pdf")
@@ -87,12 +96,9 @@ def test_typst_says_the_same_numbers_and_makes_a_pdf(chapters: list[str]) -> Non
 
 
 def test_both_forms_say_on_their_first_page_from_which_commit_they_are(chapters: list[str]) -> None:
-    document = typeset.Document(chapters, "Title", "Subtitle", PARTS, origin="Made from commit abc of 2026-01-02.")
-    typeset.typst_source(document, "report.typ")
-    source = Path("report.typ").read_text()
+    origin = "Made from commit abc of 2026-01-02."
+    source, page = typst_of(chapters, origin=origin), html_of(chapters, origin=origin)
     assert "Made from commit abc" in source[: source.index("Contents")]
-    typeset.html(document, "report.html")
-    page = Path("report.html").read_text()
     assert "Made from commit abc" in page[: page.index('id="contents"')]
 
 
@@ -108,16 +114,14 @@ def test_both_forms_say_on_their_first_page_from_which_commit_they_are(chapters:
 def test_what_leads_nowhere_stops_the_report(chapters: list[str], text: str, message: str) -> None:
     Path("bad.md").write_text(text)
     with pytest.raises(typeset.TypesetError, match=message):
-        typeset.html(typeset.Document(["bad.md"], "Title", "Subtitle", PARTS), "report.html")
+        html_of(["bad.md"])
 
 
 def test_a_figure_that_moves_stands_still_in_print(chapters: list[str]) -> None:
     Path("moving.svg").write_text(FIGURE.replace("<rect", "<circle r='4'/><rect"))
     Path("two.md").write_text(TWO.replace("{#fig:second-box}", '{#fig:second-box moving="moving.svg"}'))
-    typeset.typst_source(typeset.Document(chapters, "Title", "Subtitle", PARTS), "report.typ")
-    assert "moving.svg" not in Path("report.typ").read_text()
-    typeset.html(typeset.Document(chapters, "Title", "Subtitle", PARTS), "report.html")
-    page = Path("report.html").read_text()
+    assert "moving.svg" not in typst_of(chapters)
+    page = html_of(chapters)
     assert "moving=" not in page
     assert base64.b64encode(Path("moving.svg").read_bytes()).decode() in page or "circle" in page
 
@@ -137,7 +141,7 @@ def a_chapter(after: list[str], before: int = 4) -> list[str]:
 def test_a_figure_that_does_not_fit_lets_the_text_go_on(chapters: list[str]) -> None:
     """Before: a page ended half empty."""
     texts = a_chapter([SAID] * 5)
-    typeset.typst_source(typeset.Document(texts, "Title", "Subtitle", PARTS), "report.typ")
+    typst_of(texts)
     (gap,) = typeset.gaps("report.typ")
     assert gap.identifier == "fig:tall" and gap.movable and gap.height_pt > 3 * typeset.MOST_EMPTY_PT
     typeset.without_gaps(typeset.Document(texts, "Title", "Subtitle", PARTS), "report.typ")
@@ -149,7 +153,7 @@ def test_a_figure_that_does_not_fit_lets_the_text_go_on(chapters: list[str]) -> 
 
 def test_a_figure_right_after_another_is_looked_at_too(chapters: list[str]) -> None:
     texts = a_chapter(["![Second.](tall.svg){#fig:tall-second width=100%}", SAID, SAID], before=1)
-    typeset.typst_source(typeset.Document(texts, "Title", "Subtitle", PARTS), "report.typ")
+    typst_of(texts)
     first, second = typeset.gaps("report.typ")
     assert first.height_pt == 0 and not first.movable
     assert second.height_pt > 2 * typeset.MOST_EMPTY_PT and second.movable
@@ -157,10 +161,7 @@ def test_a_figure_right_after_another_is_looked_at_too(chapters: list[str]) -> N
 
 def test_a_figure_passes_no_heading_and_cuts_no_sentence(chapters: list[str]) -> None:
     law = "The law, which is\n\n[$$ F = C_F\\,\\omega^2 , $$]{#eq:law}\n\nholds at all speeds."
-    typeset.typst_source(
-        typeset.Document(a_chapter([law, SAID]), "Title", "Subtitle", PARTS), "report.typ", later={"fig:tall": 1}
-    )
-    source = Path("report.typ").read_text()
+    source = typst_of(a_chapter([law, SAID]), later={"fig:tall": 1})
     assert source.index("holds at all speeds.") < source.index("#figure(") < source.rindex("Some words")
     texts = a_chapter(["## Next {#sec:next}", SAID])
     typeset.without_gaps(typeset.Document(texts, "Title", "Subtitle", PARTS), "report.typ")
@@ -171,8 +172,7 @@ def test_a_figure_passes_no_heading_and_cuts_no_sentence(chapters: list[str]) ->
 
 
 def test_nothing_is_fetched_and_no_script_runs_in_the_html(chapters: list[str]) -> None:
-    typeset.html(typeset.Document(chapters, "Title", "Subtitle", PARTS), "report.html")
-    page = Path("report.html").read_text()
+    page = html_of(chapters)
     policy = html.unescape(re.search(r'http-equiv="Content-Security-Policy" content="([^"]+)"', page)[1])
     assert "default-src 'none'" in policy and "script" not in policy
     assert "<script" not in page
@@ -187,7 +187,7 @@ def test_the_html_is_as_wide_as_the_window_and_says_nothing_to_the_console(chapt
         f"| {' | '.join(['n'] * 40)} |\n| {' | '.join(['---:'] * 40)} |\n| {cells} |\n\n: Wide. {{#tbl:second-wide}}\n"
     )
     Path("two.md").write_text(TWO + "\n" + wide)
-    typeset.html(typeset.Document(chapters, "Title", "Subtitle", PARTS), "report.html")
+    html_of(chapters)
     with Browser(Path.cwd()) as browser:
         browser.open(Path("report.html"), width)
         assert browser.said == []
@@ -223,8 +223,7 @@ def named(chapters: list[str]) -> list[str]:
 
 
 def test_names_with_markup_are_text_in_the_html(named: list[str]) -> None:
-    typeset.html(typeset.Document(named, "Title", "Subtitle", PARTS), "report.html")
-    page = Path("report.html").read_text()
+    page = html_of(named)
     seen = re.sub(r"\s+", " ", html.unescape(re.sub(r"<[^>]+>", "", page)))
     assert [name for name in NASTY if name not in seen] == []
     assert not re.search(r"<(img|script|a)[^>]*(taken|javascript|x\.png)", page)
@@ -233,7 +232,7 @@ def test_names_with_markup_are_text_in_the_html(named: list[str]) -> None:
 @pytest.mark.skipif(shutil.which("pdftotext") is None, reason="needs pdftotext")
 def test_names_with_markup_are_text_in_the_pdf(named: list[str]) -> None:
     """Before: an entity became its sign, quotation marks and dashes others."""
-    typeset.typst_source(typeset.Document(named, "Title", "Subtitle", PARTS), "report.typ")
+    typst_of(named)
     typeset.pdf("report.typ", "report.pdf")
     seen = subprocess.run(["pdftotext", "-layout", "report.pdf", "-"], capture_output=True, text=True).stdout
     letters = re.sub(r"[\s-]", "", seen.replace("…", "..."))  # lines break inside names; typst sets three dots as one
@@ -243,8 +242,7 @@ def test_names_with_markup_are_text_in_the_pdf(named: list[str]) -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
 def test_a_browser_runs_nothing_in_the_html(named: list[str]) -> None:
-    typeset.html(typeset.Document(named, "Title", "Subtitle", PARTS), "report.html")
-    page = Path("report.html").read_text()
+    page = html_of(named)
     for put in ("<script>document.title = 'taken'</script>", "<img src=x onerror=\"document.title = 'taken'\">"):
         Path("put.html").write_text(page.replace("</main>", put + "</main>").replace("</body>", put + "</body>"))
         with Browser(Path.cwd()) as browser:

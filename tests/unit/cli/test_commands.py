@@ -47,35 +47,9 @@ def test_every_template_is_a_vehicle_and_init_writes_it(tmp_path: Path, name: st
 
 
 NAMES = [
-    'a "b" c',
-    "a: b",
-    "a\\b",
-    "line\nline",
-    "tab\t",
-    "é 四 🚁",
-    "0652",
-    "1:30",
-    "yes",
-    "null",
-    "~",
-    "# no",
-    "- a",
-    "'x'",
-]
-NAMES += [
-    "{a: 1}",
-    "[a]",
-    "&a",
-    "*a",
-    "!x",
-    "%y",
-    "a #b",
-    " a ",
-    "\\1",
-    "\\g<0>",
-    "\u2028\ufeff\x7f\x85",
-    "x" * 5000,
-    "a " * 999,
+    *('a "b" c', "a: b", "a\\b", "line\nline", "tab\t", "é 四 🚁", "0652", "1:30", "yes", "null", "~", "# no", "- a"),
+    *("'x'", "{a: 1}", "[a]", "&a", "*a", "!x", "%y", "a #b", " a ", "\\1", "\\g<0>", "\u2028\ufeff\x7f\x85"),
+    *("x" * 5000, "a " * 999),
 ]
 
 
@@ -325,13 +299,11 @@ def test_help_by_its_short_name_and_by_python(tmp_path: Path) -> None:
     assert done.returncode == 0 and "Usage: rotorid " in done.stdout, done.stderr
 
 
-@pytest.mark.parametrize(
-    "words", [("verdict", "flihgts"), ("import", "flihgts"), ("check", "flihgts"), ("plan", "flihgts")]
-)
-def test_a_misspelt_path_gets_a_suggestion(tmp_path: Path, monkeypatch, words) -> None:
+@pytest.mark.parametrize("word", ["verdict", "import", "check", "plan"])
+def test_a_misspelt_path_gets_a_suggestion(tmp_path: Path, monkeypatch, word: str) -> None:
     (tmp_path / "flights").mkdir()
     monkeypatch.chdir(tmp_path)
-    done = run(*words)
+    done = run(word, "flihgts")
     assert done.exit_code == 1 and done.output.endswith("; did you mean flights?\n"), done.output
     assert len(done.output.splitlines()) == 1
 

@@ -1,7 +1,5 @@
 """`rotorid compare`: what may stand on its command line."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 Mounts and networks of its own are made by `unshare`, where the system lets this user.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -95,14 +95,8 @@ def test_the_record_holds_the_last_runs_and_survives_what_is_broken() -> None:
     record = read_record()
     assert len(record["verdict"]) == console.KEPT and record["verdict"][0] == RUN
     good = json.loads(console.record_file().read_text())
-    broken = [
-        "",
-        "[]",
-        '{"runs": 3}',
-        json.dumps(good | {"version": "0"}),
-        json.dumps(good | {"runs": {"a": [[["b", -1]]]}}),
-    ]
-    for text in broken:
+    outdated, negative = good | {"version": "0"}, good | {"runs": {"a": [[["b", -1]]]}}
+    for text in ("", "[]", '{"runs": 3}', json.dumps(outdated), json.dumps(negative)):
         console.record_file().write_text(text)
         assert read_record() == {}
     keep("verdict", RUN)

@@ -1,7 +1,5 @@
 """Flights made by hand for tests: a prescribed turning and thrust, everything else follows by rigid-body mechanics."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from scipy.integrate import cumulative_trapezoid
@@ -103,11 +101,7 @@ class Flight:
         w, x, y, z = q.T
         dw, dx, dy, dz = slope.T
         rate = 2 * np.stack(
-            [
-                w * dx - x * dw - y * dz + z * dy,
-                w * dy - y * dw - z * dx + x * dz,
-                w * dz - z * dw - x * dy + y * dx,
-            ],
+            [w * dx - x * dw - y * dz + z * dy, w * dy - y * dw - z * dx + x * dz, w * dz - z * dw - x * dy + y * dx],
             axis=1,
         )
         thrust = self.vehicle.mass_kg * GRAVITY * (1 + smooth(rng, count, 0.08 * excitation, 3.0))
@@ -154,14 +148,8 @@ class Flight:
     def record(self, rate_hz: float = 200.0, late_s=None, growth=None, vibration: float = 0.0, name="run01") -> Run:
         """A run with noise. `late_s` and `growth` (sensor to s, s/s) put a sensor's stamps behind."""
         t = np.arange(int(self.duration_s * rate_hz)) / rate_hz
-        noise = {
-            "rotors": 5.0,
-            "position": 0.001,
-            "velocity": 0.02,
-            "attitude": 0.001,
-            "gyroscope": 0.012,
-            "accelerometer": 0.12,
-        }
+        noise = {"rotors": 5.0, "position": 0.001, "velocity": 0.02, "attitude": 0.001}
+        noise |= {"gyroscope": 0.012, "accelerometer": 0.12}
         columns = {"time_s": t}
         for sensor, names in COLUMNS.items():
             when = 1.0 + t - (late_s or {}).get(sensor, 0.0) - (growth or {}).get(sensor, 0.0) * t

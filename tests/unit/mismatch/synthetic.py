@@ -1,7 +1,5 @@
 """An analysis made by hand: a straight flight with known drag, residuals of coloured noise."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from scipy.signal import lfilter

@@ -1,7 +1,5 @@
 """A recording may lack any group of its columns: the stage gives a verdict, or one sentence, never a traceback."""
 
-from __future__ import annotations
-
 import functools
 
 import pytest

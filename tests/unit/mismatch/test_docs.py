@@ -1,7 +1,5 @@
 """The reference of the decision quotes the numbers that the code uses, and modules that exist."""
 
-from __future__ import annotations
-
 import importlib
 import re
 

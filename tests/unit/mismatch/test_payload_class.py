@@ -1,7 +1,5 @@
 """A centre of mass off its place may be a payload where the vehicle is heavier than believed."""
 
-from __future__ import annotations
-
 from rotorid.mismatch.analyse import payload_or_offset
 from rotorid.mismatch.decision.findings import Finding
 

@@ -20,32 +20,19 @@ from rotorid_proof.plantings.kinds import Ratio, Size, named
 from tests.unit.mismatch.posterior.test_posterior import effect as term
 from tests.unit.mismatch.posterior.test_posterior import flight
 
+DRAG = {"id": "rotor_drag", "form": "", "equivalent": [], "size_over_noise": 1.0}
 ANSWER = {
     "set": "set-1",
     "case": "mixture/00/0",
     "expected": ["mass_kg", "rotor_drag"],
-    "effects": [
-        {
-            "id": "rotor_drag",
-            "form": "",
-            "equivalent": [],
-            "parameters": [{"symbol": "k_d", "value": 2.0, "unit": "N"}],
-            "size_over_noise": 1.0,
-        }
-    ],
+    "effects": [DRAG | {"parameters": [{"symbol": "k_d", "value": 2.0, "unit": "N"}]}],
     "wrong_parameters": {"mass_kg": {"true": 1.1, "believed": 1.0}},
     "outside_catalogue": [],
     "locations": [],
     "verdict": ["explained"],
 }
-CLEAN = {
-    **ANSWER,
-    "case": "clean/000",
-    "expected": [],
-    "effects": [],
-    "wrong_parameters": {},
-    "verdict": ["no_mismatch"],
-}
+NOTHING = {"expected": [], "effects": [], "wrong_parameters": {}, "verdict": ["no_mismatch"]}
+CLEAN = ANSWER | NOTHING | {"case": "clean/000"}
 
 
 def effect(name, status="established", probability=None, value=2.0, symbol="k_d", alternatives=()):

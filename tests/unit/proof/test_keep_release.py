@@ -1,7 +1,5 @@
 """A release proof goes into the kept tables once, beside what is there."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -81,6 +81,17 @@ def sizes(truth: Truth) -> dict[str, float]:
     return {s.symbol: s.value for s in truth.sizes[0]}
 
 
+def without(recordings: RecordingSet, *names: str) -> RecordingSet:
+    return replace(recordings, runs=tuple(Run(r.name, r.table.drop(columns=list(names))) for r in recordings.runs))
+
+
+def by_throttle(recordings: RecordingSet, throttle) -> RecordingSet:
+    """The set with a throttle, alike for all rotors, in place of speeds and commands."""
+    columns = dict.fromkeys(c.rotor_columns("throttle", 4), throttle)
+    bare = without(recordings, *SPEEDS, *COMMANDS)
+    return replace(bare, runs=tuple(Run(r.name, r.table.assign(**columns)) for r in bare.runs))
+
+
 def wrench(recordings: RecordingSet, run: int = 0, about: np.ndarray | None = None) -> np.ndarray:
     """Thrust, roll, pitch and yaw moment (n, 4) of the rotors as believed, moments about a point, N and N m."""
     v, speed = recordings.vehicle, recordings.runs[run].array(SPEEDS)
@@ -112,12 +123,7 @@ def test_a_weak_rotor_gives_its_share_less_at_the_recorded_speed(recorded: Recor
 
 
 def test_of_a_throttle_alone_the_believed_coefficients_make_a_weak_rotor(recorded: RecordingSet) -> None:
-    names = c.rotor_columns("throttle", 4)
-    runs = tuple(
-        Run(r.name, r.table.drop(columns=[*SPEEDS, *COMMANDS]).assign(**dict.fromkeys(names, 0.5)))
-        for r in recorded.runs
-    )
-    bare = replace(recorded, runs=runs)
+    bare = by_throttle(recorded, 0.5)
     out, truth = planted(bare, "weak_rotor")
     share = out.vehicle.thrust_coefficients_n_s2() / 1.5e-6
     assert sorted(share)[:3] == [1.0, 1.0, 1.0]
@@ -188,16 +194,9 @@ def test_a_lag_brings_the_planted_command_back(recorded: RecordingSet) -> None:
 
 def test_a_throttle_that_no_pilot_could_give_says_nothing(recorded: RecordingSet) -> None:
     """A lag of 40 ms before a throttle that goes up in steps asks for more than all of it."""
-    names = c.rotor_columns("throttle", 4)
     steps = np.repeat([0.2, 0.9] * 20, 100)
-
-    def with_throttle(run: Run, u: np.ndarray) -> Run:
-        own = run.table.drop(columns=[*SPEEDS, *COMMANDS], errors="ignore")
-        return Run(run.name, own.assign(**dict.fromkeys(names, u)))
-
     for u, unseen in ((steps, True), (0.5 + 0.01 * np.sin(np.arange(4000) / 200.0), False)):
-        flown = replace(recorded, runs=tuple(with_throttle(run, u) for run in recorded.runs))
-        _, (truth,) = sow.plant(flown, plan.parsed("x/commands/motor_lag/large/0"))
+        _, (truth,) = sow.plant(by_throttle(recorded, u), plan.parsed("x/commands/motor_lag/large/0"))
         assert bool(truth.unseen) == unseen
 
 
@@ -214,16 +213,13 @@ def test_a_curve_of_the_throttle_brings_the_planted_command_back(recorded: Recor
 @pytest.mark.parametrize("kind", ["motor_lag", "dead_time", "throttle_curve"])
 def test_commands_that_are_made_are_numbers(recorded: RecordingSet, kind: str) -> None:
     """Where no limit of the speed is believed the curve is over the largest command that was made."""
-    silent = replace(
-        recorded, runs=tuple(Run(r.name, r.table.drop(columns=list(COMMANDS), errors="ignore")) for r in recorded.runs)
-    )
-    planted, _ = sow.plant(silent, plan.parsed(f"x/commands/{kind}/large/0"))
+    planted, _ = sow.plant(without(recorded, *COMMANDS), plan.parsed(f"x/commands/{kind}/large/0"))
     for run in planted.runs:
         assert np.isfinite(run.array(COMMANDS)).mean() > 0.9
 
 
 def test_a_flight_without_commands_is_given_some(recorded: RecordingSet) -> None:
-    bare = replace(recorded, runs=tuple(Run(r.name, r.table.drop(columns=list(COMMANDS))) for r in recorded.runs))
+    bare = without(recorded, *COMMANDS)
     out, truth = planted(bare, "dead_time")
     steps = round(truth.sizes[0][0].value * RATE_HZ)
     inside = slice(200, -200)
@@ -374,12 +370,8 @@ def test_what_is_new_and_what_is_lost_beside_it() -> None:
         arm_scale=(1.0, 1.2, 0.01),
     )
     found = score.beside(now, untouched, (OFFSET,))
-    assert found == {
-        "new": ("payload",),
-        "lost": ("gyro_error",),
-        "values_new": ("arm_scale",),
-        "values_lost": ("mass_kg",),
-    }
+    new = {"new": ("payload",), "values_new": ("arm_scale",)}
+    assert found == new | {"lost": ("gyro_error",), "values_lost": ("mass_kg",)}
 
 
 def row(planting: str, named: str = score.ALONE, covered=True, new: str = "", code: str = "now"):

@@ -54,59 +54,45 @@ def changed(project: Path, name: str, old: str, new: str) -> set[str]:
     return {script for script in before if before[script] != after[script]}
 
 
-def test_a_constant_two_imports_away_counts(project: Path) -> None:
-    assert changed(project, "src/rotorid/constants.py", "9.81", "9.82") == {"fit"}
+EFFECTS = "src/rotorid/effects/__init__.py"
+EDITS = {
+    "a constant two imports away": ("src/rotorid/constants.py", "9.81", "9.82", {"fit"}),
+    "a comment at the end of a line": ("src/rotorid/constants.py", "G = 9.81", "G = 9.81  # gravity", set()),
+    "another docstring and layout": ("src/rotorid/fit.py", '"""Fit."""', '"""Fit a line."""\n\n', set()),
+    "a comment before a function": ("workflow/scripts/fit.py", "def main", "# here\ndef main", set()),
+    "a docstring where there was none": ("src/rotorid/fit.py", "(x):\n", '(x):\n    """Say what."""\n', set()),
+    "the modules that others may import": (EFFECTS, "import", 'OPEN = ("drag",)\nROOMS = ("a", "b")\nimport', set()),
+    "another constant of a package": (EFFECTS, "import", "CLOSED = ()\nimport", {"choose"}),
+    "an import inside a function": ("src/rotorid/plots/style.py", "3", "4", {"draw"}),
+    "a module of a package that looks up its modules": ("src/rotorid/effects/drag.py", "1", "2", {"choose"}),
+    "a module imported by a constant name": ("src/rotorid/other.py", "1", "2", {"late"}),
+}
+"""What is edited: file, old and new text, and the scripts for which that counts."""
 
 
-def test_a_comment_or_a_docstring_or_layout_does_not(project: Path) -> None:
-    assert changed(project, "src/rotorid/constants.py", "G = 9.81", "G = 9.81  # gravity") == set()
-    assert changed(project, "src/rotorid/fit.py", '"""Fit."""', '"""Fit a line."""\n\n') == set()
-    assert changed(project, "workflow/scripts/fit.py", "def main", "# here\ndef main") == set()
-
-
-def test_a_docstring_added_where_there_was_none_does_not(project: Path) -> None:
-    assert changed(project, "src/rotorid/fit.py", "(x):\n", '(x):\n    """Say what."""\n') == set()
-
-
-def test_the_list_of_modules_that_others_may_import_does_not(project: Path) -> None:
-    effects = "src/rotorid/effects/__init__.py"
-    assert changed(project, effects, "import pkgutil", 'OPEN = ("drag",)\nROOMS = ("a", "b")\nimport pkgutil') == set()
-    assert changed(project, effects, "import pkgutil", "CLOSED = ()\nimport pkgutil") == {"choose"}
+@pytest.mark.parametrize("what", EDITS)
+def test_what_runs_counts_and_nothing_else_does(project: Path, what: str) -> None:
+    *edited, counts_for = EDITS[what]
+    assert changed(project, *edited) == counts_for
 
 
 def test_a_second_package_of_the_project_is_followed(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rotorid.report.codehash.PACKAGES", {"rotorid": "src", "second": "beside"})
-    for name, text in {
-        "__init__": "",
-        "one": "from .two import X",
-        "two": "from rotorid.constants import G as X",
-    }.items():
-        path = project / f"beside/second/{name}.py"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
+    texts = {"__init__": "", "one": "from .two import X", "two": "from rotorid.constants import G as X"}
+    (project / "beside/second").mkdir(parents=True)
+    for name, text in texts.items():
+        (project / f"beside/second/{name}.py").write_text(text)
     script = project / "workflow/scripts/second.py"
     script.write_text("from second.one import X\n")
     reached = [str(path.relative_to(project)) for path in Code(project).reached_modules(script)]
-    assert [name for name in reached if name.startswith("beside")] == [
-        f"beside/second/{n}.py" for n in ("__init__", "one", "two")
-    ]
+    assert [name for name in reached if name.startswith("beside")] == [f"beside/second/{n}.py" for n in texts]
     assert "src/rotorid/constants.py" in reached
 
 
-def test_an_import_inside_a_function_counts(project: Path) -> None:
-    assert changed(project, "src/rotorid/plots/style.py", "3", "4") == {"draw"}
-
-
-def test_a_package_that_looks_up_its_modules_is_reached_whole(project: Path) -> None:
-    assert changed(project, "src/rotorid/effects/drag.py", "1", "2") == {"choose"}
-    new = project / "src/rotorid/effects/sag.py"
+def test_a_new_module_of_a_package_that_looks_up_its_modules_counts(project: Path) -> None:
     before = hashes(project)
-    new.write_text("S = 1\n")
+    (project / "src/rotorid/effects/sag.py").write_text("S = 1\n")
     assert {name for name, value in hashes(project).items() if value != before[name]} == {"choose"}
-
-
-def test_import_module_with_a_constant_name_counts(project: Path) -> None:
-    assert changed(project, "src/rotorid/other.py", "1", "2") == {"late"}
 
 
 def test_a_relative_import_is_followed(project: Path) -> None:

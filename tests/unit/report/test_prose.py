@@ -132,34 +132,34 @@ def test_no_column_of_a_wide_table_is_narrower_than_its_longest_word() -> None:
     assert "widths" not in prose.table_of([{"a": "1"}], "All.", [("a", "A")], "tbl:x")
 
 
-def test_symbols_are_set_as_mathematics() -> None:
-    assert [prose.symbol(name) for name in ("m", "J_xx", "w_11")] == ["$m$", "$J_{xx}$", "$w_{11}$"]
+def three_digits(value: float | None) -> str:
+    return prose.sig(value, 3)
+
+
+def test_a_symbol_in_a_table_is_set_as_mathematics() -> None:
     row = prose.table_of([{"name": "C_F"}], "Values.", [("name", "Parameter", "symbol")], "tbl:x").splitlines()[2]
     assert row == "| $C_{F}$ |"
 
 
-def test_units_and_names_stay_on_one_line_and_small_numbers_keep_their_digits() -> None:
-    assert [prose.unit(u) for u in ("kg m2", "N s2/(rad m)", "1e-6 kg/rad", 1.0, "1e-6 1", "N/(N)2")] == [
-        "kg\u00a0m²",
-        "N\u00a0s²/(rad\u00a0m)",
-        "10⁻⁶\u00a0kg/rad",
-        "1",
-        "10⁻⁶",
-        "1/N",
-    ]
-    assert prose.one_line("imrc-brushless a") == "imrc\u2011brushless\u00a0a"
-    assert [prose.sig(x, 3) for x in (0.20613, -0.00421, 12.0, 1.44e-6, None)] == [
-        "0.206",
-        "−0.00421",
-        "12.0",
-        "1.44\u00a0×\u00a010^−6^",
-        "–",
-    ]
-    assert [prose.symbol(s) for s in ("tau", "eps_x", "gain_x")] == [
-        "$\\tau$",
-        "$\\varepsilon_{x}$",
-        "$\\mathrm{gain}_{x}$",
-    ]
+@pytest.mark.parametrize(
+    ("form", "given", "shown"),
+    [
+        (
+            prose.unit,
+            ("kg m2", "N s2/(rad m)", "1e-6 kg/rad"),
+            ("kg\u00a0m²", "N\u00a0s²/(rad\u00a0m)", "10⁻⁶\u00a0kg/rad"),
+        ),
+        (prose.unit, (1.0, "1e-6 1", "N/(N)2"), ("1", "10⁻⁶", "1/N")),
+        (prose.one_line, ("imrc-brushless a",), ("imrc\u2011brushless\u00a0a",)),
+        (three_digits, (0.20613, -0.00421, 12.0, None), ("0.206", "−0.00421", "12.0", "–")),
+        (three_digits, (1.44e-6,), ("1.44\u00a0×\u00a010^−6^",)),
+        (prose.symbol, ("tau", "eps_x", "gain_x"), ("$\\tau$", "$\\varepsilon_{x}$", "$\\mathrm{gain}_{x}$")),
+        (prose.symbol, ("m", "J_xx", "w_11"), ("$m$", "$J_{xx}$", "$w_{11}$")),
+    ],
+    ids=["units", "units of a power of ten and of nothing", "names", "numbers", "small numbers", "words", "letters"],
+)
+def test_units_names_numbers_and_symbols_stay_on_one_line(form, given, shown) -> None:
+    assert tuple(form(one) for one in given) == shown
 
 
 def test_a_caption_of_two_kinds_says_that_instruments_were_emulated(tmp_path: Path, files: dict[str, str]) -> None:

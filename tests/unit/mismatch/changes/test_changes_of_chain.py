@@ -1,7 +1,5 @@
 """What changed between command and rotor speed from one set to another, on made commands."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """What changed on a stand or a bench since its last calibration."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 
@@ -18,17 +16,11 @@ from rotorid.mismatch.changes.words import as_json, sentences
 from rotorid.mismatch.posterior.evidence import Evidence
 from rotorid.recordings import RecordingSet, write_set
 from rotorid.report.page.changes import make_changes_page
-from tests.unit.mismatch.instrument.test_instrument import RATE_HZ, bench_set
-from tests.unit.mismatch.instrument.test_stand import C_F, one_rotor, steady_run
+from tests.unit.mismatch.instrument.stands import C_F, one_rotor
+from tests.unit.mismatch.instrument.test_instrument import RATE_HZ, bench_set, crosstalk
+from tests.unit.mismatch.instrument.test_stand import steady_run
 
 TARES_N = (0.05, -0.04, 0.02)
-
-
-def crosstalk(load: np.ndarray) -> np.ndarray:
-    """Two per cent of the load along z read along x as well."""
-    out = load.copy()
-    out[:, 0] += 0.02 * load[:, 2]
-    return out
 
 
 def sluggish(load: np.ndarray) -> np.ndarray:

@@ -1,7 +1,5 @@
 """What differs between flights before any cause is sought, and what is said of it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

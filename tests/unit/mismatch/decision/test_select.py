@@ -1,7 +1,5 @@
 """The search over candidates, on rows made by hand: what enters, what must not, and what cannot be distinguished."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

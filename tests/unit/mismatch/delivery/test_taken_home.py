@@ -3,8 +3,6 @@
 A handful of sets of every kind of finding, each analysed once. `snakemake delivered` asks the same of all sets.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -1,13 +1,18 @@
-"""A delivered vehicle is a body that hovers and flies."""
+"""A delivered vehicle is a body that hovers and flies. The model of a flight with fewer of its parts. A vehicle of
+one central rotor, of which the collective alone is known.
+"""
 
 import inspect
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.cli.modelling import simulate
+from rotorid.cli.modelling import fly, simulate
+from rotorid.errors import InputError
 from rotorid.mismatch.delivery import usable
+from rotorid.mismatch.delivery.final import delivered_value
 from rotorid.mismatch.delivery.usable import (
     cannot_fly,
     cannot_hover,
@@ -16,9 +21,18 @@ from rotorid.mismatch.delivery.usable import (
     no_body,
     question_of,
     recorded_share,
+    with_only,
 )
-from rotorid.recordings import Run, templates
+from rotorid.mismatch.model.fitted import fitted
+from rotorid.mismatch.model.prepare import prepare
+from rotorid.mismatch.plant.rows import Term
+from rotorid.mismatch.plant.split import parts_of, split_runs
+from rotorid.recordings import RecordingSet, Run, read_set, templates
+from rotorid.recordings import columns as c
+from rotorid.report.deliver import analysis_of
 from rotorid.vehicle.control.swings import FLIGHTS, SECONDS, SEED
+from rotorid.vehicle.mixer import allocation_matrix
+from tests.unit.mismatch.flights import recorded
 from tests.unit.vehicle.thesis import thesis_vehicle
 
 LIMITS = {"rotor_speed_limits_rad_s": (0.0, 1600.0)}
@@ -121,3 +135,51 @@ def test_an_export_that_the_estimates_cost_is_said_and_the_vehicle_stays():
         f"The improved vehicle cannot be exported as {f}" for f in ("mjcf", "sdf")
     ]
     assert exports_lost(flat, flat) == ()
+
+
+def test_a_model_without_its_wind_has_the_terms_of_its_rows():
+    """Terms that no column belongs to any more stopped the stage where believed values were judged anew."""
+    made = recorded(1, 2, 3, flight={"square_drag": 0.06, "excitation": 1.5, "wind": (-1.0, 3.0)})
+    found = fitted(prepare(parts_of(made, split_runs(made))[0]))
+    assert found.model.wind is not None and "wind" in {t.kind for t in found.model.terms}
+    calm = with_only(found, {"frame_drag"}, {}).model
+    assert calm.wind is None and keys(calm.terms) == keys(calm.regression.terms)
+    assert "wind" not in {t.kind for t in calm.terms}
+
+
+def keys(terms: list[Term]) -> list[str]:
+    """Keys of terms."""
+    return [t.key for t in terms]
+
+
+FULL_RAD_S = 1500.0
+
+
+def central(folder: Path) -> RecordingSet:
+    """A flight of the thesis quadrotor as that of one rotor in the middle with the four's thrust."""
+    flown = read_set(fly(templates.read("thesis"), folder / "flight", 14.0, 1, 1))
+    vehicle, (run,) = flown.vehicle, flown.runs
+    rotor = vehicle.rotors[0].model_copy(update={"x_m": 0.0, "y_m": 0.0})
+    own = {
+        "rotors": (rotor,),
+        "thrust_coefficient_n_s2": 4 * vehicle.thrust_coefficient_n_s2,
+        "torque_coefficient_n_m_s2": 4 * vehicle.torque_coefficient_n_m_s2,
+        "rotor_radius_m": None,
+        "rotor_speed_limits_rad_s": (0.0, FULL_RAD_S),
+    }
+    names = list(c.rotor_columns("rotor_command", 4))
+    table = run.table.drop(columns=[n for n in run.table if n.startswith("rotor_")])
+    table["throttle_1"] = np.sqrt((run.table[names] ** 2).mean(axis=1)) / FULL_RAD_S
+    return RecordingSet("central", vehicle.model_copy(update=own), (Run(run.name, table),))
+
+
+def test_one_central_rotor_is_judged_and_what_cannot_be_is_said(tmp_path: Path) -> None:
+    made = central(tmp_path)
+    with pytest.raises(InputError):
+        allocation_matrix(made.vehicle)
+    assert full_thrust_n(made.vehicle) is None
+    assert delivered_value(made.vehicle, made.vehicle, "arm") == 1.0
+    analysis = analysis_of(made)
+    assert "its 1 rotor cannot set thrust, roll, pitch and yaw independently" in " ".join(analysis.notes), (
+        analysis.notes
+    )

@@ -18,10 +18,11 @@ from rotorid.mismatch.instrument.setup import set_up, without_voltmeter_noise
 from rotorid.mismatch.plant.readings import form_reading
 from rotorid.mismatch.plant.voltmeter import is_noise
 from rotorid.recordings import RecordingSet, Run, Vehicle
-from tests.unit.mismatch.instrument.test_instrument import instrument_for, stand_loading, stand_vehicle
+from rotorid.recordings import columns as c
+from tests.unit.mismatch.instrument.stands import C_F, C_Q, HUBS, claimed, claims, stand_vehicle
+from tests.unit.mismatch.instrument.test_instrument import instrument_for, stand_loading
 
-C_F, RATE_HZ = 1.4e-6, 50.0
-HUBS = ((0.09, 0.09, "ccw"), (0.09, -0.09, "cw"), (-0.09, -0.09, "ccw"), (-0.09, 0.09, "cw"))
+RATE_HZ = 50.0
 SIX = tuple((0.12 * np.cos(k * np.pi / 3), 0.12 * np.sin(k * np.pi / 3), ("ccw", "cw")[k % 2]) for k in range(6))
 PLACES = {1: ((0.0, 0.0, "ccw"),), 4: HUBS, 6: SIX}
 
@@ -47,9 +48,7 @@ def test_a_power_of_the_speed_by_hand() -> None:
     found = form_reading(form, (-0.1, 0.05), twice, vehicle)
     assert found[0, 2] == pytest.approx(-4 * 1.594125 * (1.05 * 2**1.9 - 4.0))
     rest = still(loading, rotor_speed=np.zeros((loading.size, 4)))
-    assert not form_reading(
-        form_named("thrust_curve", "power of the speed", vehicle), (-0.1, 0.05), rest, vehicle
-    ).any()
+    assert not form_reading(form, (-0.1, 0.05), rest, vehicle).any()
 
 
 def test_each_rotor_leans_its_own_way() -> None:
@@ -127,31 +126,17 @@ def runs_of(change, rotors: int = 4, count: int = 3, seconds: float = 40.0, nois
         wrench = np.zeros((len(t), 6))
         wrench[:, 2] = -thrust.sum(axis=1)
         wrench[:, 3], wrench[:, 4] = -thrust @ hubs[:, 1], thrust @ hubs[:, 0]
-        wrench[:, 5] = 1.9e-8 * speed**2 @ spin
+        wrench[:, 5] = C_Q * speed**2 @ spin
         read = change(speed, wrench, t) + rng.standard_normal(wrench.shape) * np.repeat(noise, 3)
         table = {"time_s": t} | {f"rotor_speed_{i + 1}_rad_s": speed[:, i] for i in range(rotors)}
-        table |= {f"force_{a}_n": read[:, k] for k, a in enumerate("xyz")}
-        table |= {f"moment_{a}_n_m": read[:, 3 + k] for k, a in enumerate("xyz")}
+        table |= dict(zip((*c.FORCE, *c.MOMENT), read.T, strict=True))
         made.append(Run(f"run{number + 1}", pd.DataFrame(table)))
     return made
 
 
 def stand_set(change, rotors: int = 4, **more) -> RecordingSet:
-    content = {
-        "name": "stand",
-        "kind": "stand",
-        "mass_kg": 0.65,
-        "rotors": [{"x_m": x, "y_m": y, "spin": s} for x, y, s in PLACES[rotors]],
-        "thrust_coefficient_n_s2": C_F,
-        "torque_coefficient_n_m_s2": 1.9e-8,
-        "rotor_radius_m": 0.06,
-        "tared": True,
-    }
-    return RecordingSet("stand", Vehicle.model_validate(content), tuple(runs_of(change, rotors, **more)))
-
-
-def named(analysis) -> dict:
-    return {f.id: f for f in analysis.findings if f.status in ("established", "ambiguous")}
+    vehicle = stand_vehicle(PLACES[rotors], sensor_position_m=[0.0, 0.0, 0.0], tared=True)
+    return RecordingSet("stand", vehicle, tuple(runs_of(change, rotors, **more)))
 
 
 def test_thrust_of_another_power_is_a_curve_alone() -> None:
@@ -162,7 +147,7 @@ def test_thrust_of_another_power_is_a_curve_alone() -> None:
         return wrench
 
     analysis = analyse_instrument(stand_set(change, rotors=1))
-    found = named(analysis)
+    found = claims(analysis)
     assert set(found) == {"thrust_curve"} and not analysis.values
     excess = next(p for p in found["thrust_curve"].parameters if p.symbol == "e")
     assert excess.low < -0.12 < excess.high and excess.high - excess.low < 0.05
@@ -197,7 +182,7 @@ def bowed(speed, wrench, t):
 
 
 def test_what_is_left_of_a_form_is_not_sold_as_another_effect() -> None:
-    found = named(analyse_instrument(stand_set(bowed, rotors=1)))
+    found = claims(analyse_instrument(stand_set(bowed, rotors=1)))
     classes = {frozenset(f.alternatives) or frozenset([f.id]) for f in found.values()}
     assert len(classes) == 1 and "thrust_curve" in next(iter(classes))
 
@@ -259,7 +244,7 @@ def test_a_coefficient_that_makes_up_for_a_curve_is_not_called_wrong() -> None:
 
     analysis = analyse_instrument(stand_set(change, rotors=1))
     # Of one rotor the curve of the thrust and that of the sensor are functions of the same load.
-    assert set(named(analysis)) in ({"thrust_curve"}, {"load_nonlinearity"}) and not analysis.values
+    assert claimed(analysis) in ({"thrust_curve"}, {"load_nonlinearity"}) and not analysis.values
 
 
 def test_a_wrong_coefficient_alone_is_called_wrong() -> None:
@@ -269,7 +254,7 @@ def test_a_wrong_coefficient_alone_is_called_wrong() -> None:
 
     analysis = analyse_instrument(stand_set(change, rotors=1))
     believed, _, low, high = analysis.values["thrust_coefficient_n_s2"]
-    assert not named(analysis) and low < 1.08 * believed < high
+    assert not claimed(analysis) and low < 1.08 * believed < high
 
 
 def test_rotors_that_lean_apart_come_before_a_newcomer() -> None:
@@ -280,10 +265,10 @@ def test_rotors_that_lean_apart_come_before_a_newcomer() -> None:
         force = C_F * speed**2 * lean
         wrench[:, 0] += force.sum(axis=1)
         wrench[:, 5] -= force @ np.array([h[1] for h in SIX])
-        wrench[:, 3] -= (1.9e-8 * speed**2 * lean) @ np.array([1.0, -1.0] * 3)  # torques lean with their axes
+        wrench[:, 3] -= (C_Q * speed**2 * lean) @ np.array([1.0, -1.0] * 3)  # torques lean with their axes
         return wrench
 
-    found = named(analyse_instrument(stand_set(change, rotors=6)))
+    found = claims(analyse_instrument(stand_set(change, rotors=6)))
     assert set(found) == {"thrust_tilt"}
     values = {p.symbol: p.value for p in found["thrust_tilt"].parameters}
     assert [values[f"eps_x{k + 1}"] for k in range(6)] == pytest.approx(lean.tolist(), abs=1.5e-3)

@@ -17,10 +17,10 @@ from rotorid.mismatch.instrument.model import kept_values, reading_model
 from rotorid.mismatch.instrument.setup import session_of, set_up, zero_temperature
 from rotorid.mismatch.plant.readings import form_reading
 from rotorid.mismatch.plant.unknowns import UNKNOWNS
-from rotorid.recordings import RecordingSet, Run, Vehicle
+from rotorid.recordings import RecordingSet, Run
+from tests.unit.mismatch.instrument.stands import BENCH, bench_run, claimed
 
 RATE_HZ = 50.0
-BENCH = Vehicle.model_validate({"name": "bench", "kind": "bench", "tared": True})
 
 
 def instrument(**changes) -> InstrumentFacts:
@@ -85,9 +85,8 @@ def test_a_zero_that_goes_with_the_temperature_was_right_at_one():
     given = loading(np.zeros(10), temperature_c=23.5)
     reading = added("zero_drift", "with temperature, zero at T_0", [0.1, -0.2, 0.4, 21.0], given)
     assert reading[0, :3] == pytest.approx([0.25, -0.5, 1.0])
-    assert added("zero_drift", "with temperature over the session", [0.1, -0.2, 0.4], given)[0, :3] == pytest.approx(
-        [0.35, -0.7, 1.4]
-    )
+    over_session = added("zero_drift", "with temperature over the session", [0.1, -0.2, 0.4], given)
+    assert over_session[0, :3] == pytest.approx([0.35, -0.7, 1.4])
 
 
 def test_the_temperature_of_the_zero_is_read_off_the_readings():
@@ -145,15 +144,13 @@ def test_creep_with_two_time_constants_is_the_sum_of_two():
 
 def test_loads_mixed_anew_in_each_run_are_no_crosstalk():
     """With entries 0.02 in the first of three runs: 0.02 F there, nothing in the second, −0.02 F in the last."""
-    mixed = next(
-        f for f in UNKNOWNS["unknown_gain"].reading_forms(instrument()) if f.name == "loads mixed anew in each run"
-    )
+    forms = UNKNOWNS["unknown_gain"].reading_forms(instrument())
+    mixed = next(f for f in forms if f.name == "loads mixed anew in each run")
     names = [p.symbol for p in mixed.parameters]
     values = np.zeros(len(names))
     values[names.index("M_Fx,Fz(a)")] = 0.02
-    found = [
-        mixed.contribution(loading(np.array([5.0]), run=run), BENCH, values).reading[0, 0] for run in ("a", "b", "c")
-    ]
+    loads = (loading(np.array([5.0]), run=run) for run in "abc")
+    found = [mixed.contribution(own, BENCH, values).reading[0, 0] for own in loads]
     assert found == pytest.approx([0.1, 0.0, -0.1])
 
 
@@ -166,9 +163,8 @@ def test_crosstalk_mixes_what_the_weight_loads_where_the_mount_tilts():
     assert sorted(names) == ["C_Fx,Fz", "C_Fy,Fx", "C_Fy,Fz", "C_Fz,Fx"]
     given = loading(np.array([5.0]))
     given.load[:, 0] = 2.0
-    assert mixed.contribution(given, BENCH, np.eye(4)[names.index("C_Fz,Fx")] * 0.02).reading[0, 2] == pytest.approx(
-        0.04
-    )
+    values = np.eye(4)[names.index("C_Fz,Fx")] * 0.02
+    assert mixed.contribution(given, BENCH, values).reading[0, 2] == pytest.approx(0.04)
 
 
 def recorded(change, runs: int = 5, noise_n: float = 0.05, seed: int = 0, step_n: float = 0.0) -> RecordingSet:
@@ -186,15 +182,8 @@ def recorded(change, runs: int = 5, noise_n: float = 0.05, seed: int = 0, step_n
         warmth = 20.0 + 4.0 * (1 - np.exp(-since / 150.0))
         read = change(load.copy(), number, warmth) + noise_n * rng.standard_normal(load.shape)
         read = np.round(read / step_n) * step_n if step_n else read
-        table = pd.DataFrame({"time_s": since, "temperature_c": warmth})
-        for k, a in enumerate("xyz"):
-            table[f"force_{a}_n"], table[f"reference_force_{a}_n"] = read[:, k], load[:, k]
-        made.append(Run(f"run{number + 1}", table))
+        made.append(bench_run(f"run{number + 1}", since, load, read, temperature_c=warmth))
     return RecordingSet("bench", BENCH, tuple(made))
-
-
-def named(analysis) -> set[str]:
-    return {f.id for f in analysis.findings if f.status in ("established", "ambiguous")}
 
 
 def mixed_loop(load, run, warmth):
@@ -208,7 +197,7 @@ def test_a_drift_with_temperature_is_no_tare_of_each_run():
     drift = np.array([0.14, -0.2, 0.25])
     analysis = analyse_instrument(recorded(lambda load, run, warmth: load + drift * (warmth - 22.0)[:, None]))
     found = next(f for f in analysis.findings if f.id == "zero_drift")
-    assert named(analysis) == {"zero_drift"}
+    assert claimed(analysis) == {"zero_drift"}
     values = {p.symbol: p for p in found.parameters}
     assert values["b_Fz"].low < 0.25 < values["b_Fz"].high and values["T_0"].low < 22.0 < values["T_0"].high
 
@@ -216,7 +205,7 @@ def test_a_drift_with_temperature_is_no_tare_of_each_run():
 @pytest.mark.slow
 def test_a_gain_that_goes_with_the_temperature_has_no_name_and_is_left_over():
     analysis = analyse_instrument(recorded(lambda load, run, warmth: load * (1 + 0.004 * (warmth - 22.0))[:, None]))
-    assert named(analysis) == set() and not analysis.values
+    assert claimed(analysis) == set() and not analysis.values
     assert "temperature_c" in analysis.unexplained_depends_on
 
 
@@ -229,20 +218,20 @@ def test_loads_that_mix_differently_in_each_run_are_left_over():
         return load
 
     analysis = analyse_instrument(recorded(change))
-    assert named(analysis) == set()
+    assert claimed(analysis) == set()
     assert "run" in analysis.unexplained_depends_on
 
 
 @pytest.mark.slow
 def test_crosstalk_and_a_loop_on_the_mixed_load_bring_no_company():
-    assert named(analyse_instrument(recorded(mixed_loop))) == {"crosstalk", "hysteresis"}
+    assert claimed(analyse_instrument(recorded(mixed_loop))) == {"crosstalk", "hysteresis"}
 
 
 @pytest.mark.slow
 def test_beside_an_s_shape_the_gains_stay_at_their_belief():
     """y = F + 0.3 sin(π F/30 N): slope 0.031 at no load, no wrong gain; a and the full scale come out."""
     analysis = analyse_instrument(recorded(lambda load, run, warmth: load + 0.3 * np.sin(np.pi * load / 30.0)))
-    assert named(analysis) == {"load_nonlinearity"} and not analysis.values
+    assert claimed(analysis) == {"load_nonlinearity"} and not analysis.values
     found = next(f for f in analysis.findings if f.id == "load_nonlinearity")
     assert found.form.name == "S-shape"
     assert found.values[:3] == pytest.approx([0.3] * 3, abs=0.01)
@@ -255,7 +244,7 @@ def test_beside_an_s_shape_the_gains_stay_at_their_belief():
 def test_a_reading_that_saturates_has_no_wrong_gain():
     """Right up to 15 N of 20 N: its slope is one at small loads, and 0.9 or so over all."""
     analysis = analyse_instrument(recorded(lambda load, run, warmth: np.clip(load, -15.0, 15.0)))
-    assert named(analysis) == {"load_nonlinearity"} and not analysis.values
+    assert claimed(analysis) == {"load_nonlinearity"} and not analysis.values
 
 
 def test_an_amplifier_that_is_nearly_a_delay_is_no_delay():
@@ -271,11 +260,11 @@ def test_a_wrong_gain_stays_wrong_beside_a_curve():
     analysis = analyse_instrument(
         recorded(lambda load, run, warmth: 1.035 * load + 0.3 * np.array([1, -0.8, 0.9]) * (load / 20.0) ** 3)
     )
-    assert named(analysis) == {"load_nonlinearity"}
+    assert claimed(analysis) == {"load_nonlinearity"}
     assert analysis.values["reading_gain"][2] < 1.035 < analysis.values["reading_gain"][3]
 
 
 @pytest.mark.slow
 def test_rounding_is_no_curved_characteristic():
     analysis = analyse_instrument(recorded(lambda load, run, warmth: load, noise_n=0.02, step_n=0.3))
-    assert named(analysis) == {"quantisation"}
+    assert claimed(analysis) == {"quantisation"}

@@ -21,42 +21,14 @@ from rotorid.mismatch.plant.readings import form_reading
 from rotorid.mismatch.plant.rows import Rows
 from rotorid.recordings import RecordingSet, Run, Vehicle, read_vehicle
 from rotorid.report.deliver import deliver
+from tests.unit.mismatch.instrument.stands import BENCH, bench_run, claimed, stand_vehicle
 
 NEW = (
-    "zero_drift",
-    "creep",
-    "hysteresis",
-    "load_nonlinearity",
-    "crosstalk",
-    "tare_offset",
-    "cable_stiffness",
-    "structural_resonance",
-    "mount_tilt",
-    "wall_interference",
-    "amplifier_filter",
-    "sensor_origin",
-    "compliance",
-    "clock_skew",
-    "com_offset",
-    "delay",
+    *("zero_drift", "creep", "hysteresis", "load_nonlinearity", "crosstalk", "tare_offset", "cable_stiffness"),
+    *("structural_resonance", "mount_tilt", "wall_interference", "amplifier_filter", "sensor_origin", "compliance"),
+    *("clock_skew", "com_offset", "delay"),
 )
 RATE_HZ = 50.0
-
-
-def stand_vehicle(**changes) -> Vehicle:
-    hubs = ((0.09, 0.09, "ccw"), (0.09, -0.09, "cw"), (-0.09, -0.09, "ccw"), (-0.09, 0.09, "cw"))
-    content = {
-        "name": "stand",
-        "kind": "stand",
-        "mass_kg": 0.65,
-        "rotors": [{"x_m": x, "y_m": y, "spin": s} for x, y, s in hubs],
-        "thrust_coefficient_n_s2": 1.4e-6,
-        "torque_coefficient_n_m_s2": 1.9e-8,
-        "rotor_radius_m": 0.06,
-        "sensor_position_m": [0.0, 0.0, 0.05],
-        "tared": False,
-    }
-    return Vehicle.model_validate(content | changes)
 
 
 def stand_loading(vehicle: Vehicle, seconds: float = 30.0, tilt=(0.2, -0.1), seed: int = 0) -> Loading:
@@ -105,9 +77,7 @@ def instrument_for(loading: Loading, vehicle: Vehicle) -> InstrumentFacts:
 
 
 def bench_instrument():
-    vehicle = stand_vehicle()
-    instrument = instrument_for(stand_loading(vehicle), vehicle)
-    return replace(instrument, vehicle=Vehicle.model_validate({"name": "b", "kind": "bench"}))
+    return replace(instrument_for(stand_loading(stand_vehicle()), stand_vehicle()), vehicle=BENCH)
 
 
 def forms():
@@ -197,48 +167,38 @@ def bench_set(change=lambda f: f, runs: int = 4, seed: int = 0, noise_n: float =
             [np.interp(t, np.linspace(0, 30, 13), np.r_[0, rng.uniform(-8, 8, 11), 0]) for _ in range(3)], axis=1
         )
         read = change(load.copy()) + noise_n * rng.standard_normal(load.shape)
-        table = pd.DataFrame({"time_s": t})
-        for k, a in enumerate("xyz"):
-            table[f"force_{a}_n"], table[f"reference_force_{a}_n"] = read[:, k], load[:, k]
-        made.append(Run(f"run{number + 1}", table))
-    vehicle = Vehicle.model_validate({"name": "bench", "kind": "bench", "tared": True})
-    return RecordingSet("bench", vehicle, tuple(made))
-
-
-def named(analysis) -> set[str]:
-    return {f.id for f in analysis.findings if f.status in ("established", "ambiguous")}
+        made.append(bench_run(f"run{number + 1}", t, load, read))
+    return RecordingSet("bench", BENCH, tuple(made))
 
 
 def test_a_bench_without_a_fault_has_none():
     analysis = analyse_instrument(bench_set())
-    assert named(analysis) == set() and not analysis.values
+    assert claimed(analysis) == set() and not analysis.values
+
+
+def crosstalk(load: np.ndarray) -> np.ndarray:
+    """Two per cent of the load along z read along x as well."""
+    load[:, 0] += 0.02 * load[:, 2]
+    return load
 
 
 def test_crosstalk_of_a_bench_with_its_number():
-    def change(load):
-        load[:, 0] += 0.02 * load[:, 2]
-        return load
-
-    analysis = analyse_instrument(bench_set(change, seed=1))
+    analysis = analyse_instrument(bench_set(crosstalk, seed=1))
     found = next(f for f in analysis.findings if f.id == "crosstalk")
-    assert found.status == "established" and named(analysis) == {"crosstalk"}
+    assert found.status == "established" and claimed(analysis) == {"crosstalk"}
     estimate = next(e for e in found.parameters if e.symbol == "C_Fx,Fz")
     assert estimate.low < 0.02 < estimate.high and estimate.high - estimate.low < 0.001
 
 
 def test_a_wrong_gain_is_a_value_and_no_effect():
     analysis = analyse_instrument(bench_set(lambda load: 1.04 * load))
-    assert named(analysis) == set()
+    assert claimed(analysis) == set()
     believed, refitted, low, high = analysis.values["reading_gain"]
     assert believed == 1.0 and low < 1.04 < high
 
 
 def test_a_flipped_channel_is_named_and_turned_round():
-    def change(load):
-        load[:, 1] *= -1
-        return load
-
-    corrected, findings, _ = find_mistakes(bench_set(change))
+    corrected, findings, _ = find_mistakes(bench_set(lambda load: load * [1.0, -1.0, 1.0]))
     assert [f.id for f in findings] == ["axis_sign"] and findings[0].channels == ("force_y",)
     run = corrected.runs[0]
     assert np.corrcoef(run.column("force_y_n"), run.column("reference_force_y_n"))[0, 1] > 0.99
@@ -250,18 +210,14 @@ def test_gram_force_is_recognised():
 
 
 def test_nothing_to_compare_is_one_sentence():
-    vehicle = Vehicle.model_validate({"name": "b", "kind": "bench"})
     run = Run("a", pd.DataFrame({"time_s": np.arange(10.0), "force_x_n": np.zeros(10)}))
     with pytest.raises(InputError, match="no force or moment is recorded in every run together with its reference"):
-        set_up(RecordingSet("b", vehicle, (run,)))
+        set_up(RecordingSet("b", BENCH, (run,)))
 
 
 def test_the_files_of_a_bench_hold_its_model(tmp_path):
-    def change(load):
-        return 1.03 * load + np.array([0.05, 0.0, -0.05])
-
     paths = [tmp_path / n for n in ("verdict.json", "report.html", "improved_vehicle.yaml")]
-    verdict = deliver(bench_set(change), *paths)
+    verdict = deliver(bench_set(lambda load: 1.03 * load + np.array([0.05, 0.0, -0.05])), *paths)
     assert verdict.kind == "bench" and verdict.verdict == "explained"
     assert {e.id for e in verdict.effects if e.status == "established"} == {"tare_offset"}
     errors = verdict.channels["force_x"].rmse.held_out

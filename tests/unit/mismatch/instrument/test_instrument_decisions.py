@@ -15,14 +15,11 @@ from rotorid.mismatch.instrument.setup import set_up
 from rotorid.mismatch.model.wrench import WrenchModel
 from rotorid.mismatch.plant.regression import Fit, build, spread_of
 from rotorid.mismatch.plant.rows import Rows, Term
-from rotorid.recordings import RecordingSet, Run, Vehicle
-from tests.unit.mismatch.instrument.test_stand import C_F, FULL_RAD_S, four_rotors, one_rotor, tilted_run
+from rotorid.recordings import RecordingSet, Run
+from tests.unit.mismatch.instrument.stands import BENCH, C_F, C_Q, claimed, one_rotor, stand_vehicle
+from tests.unit.mismatch.instrument.test_stand import FULL_RAD_S, TILTS, tilted
 
-CLAIMED = ("established", "ambiguous")
-
-
-def claimed(analysis) -> set[str]:
-    return {f.id for f in analysis.findings if f.status in CLAIMED}
+LIMITS = {"rotor_speed_limits_rad_s": (0.0, FULL_RAD_S), "torque_coefficient_n_m_s2": C_Q}
 
 
 def commanded_run(name: str, thrust_share: float, power: float, seed: int) -> Run:
@@ -35,9 +32,8 @@ def commanded_run(name: str, thrust_share: float, power: float, seed: int) -> Ru
 
 
 def commanded(thrust_share: float, power: float) -> RecordingSet:
-    made = one_rotor([commanded_run(n, thrust_share, power, k) for k, n in enumerate("abc")], ["c"])
-    limits = {"rotor_speed_limits_rad_s": (0.0, FULL_RAD_S), "torque_coefficient_n_m_s2": 1.9e-8}
-    return RecordingSet(made.name, made.vehicle.model_copy(update=limits), made.runs, made.held_out)
+    runs = [commanded_run(n, thrust_share, power, k) for k, n in enumerate("abc")]
+    return one_rotor(runs, ["c"], **LIMITS)
 
 
 def test_commands_all_a_share_too_low_are_a_thrust_coefficient_and_no_curve_of_the_throttle():
@@ -48,14 +44,13 @@ def test_commands_all_a_share_too_low_are_a_thrust_coefficient_and_no_curve_of_t
 
 def test_a_curve_of_the_throttle_stays_one_beside_it():
     found = find_chain(set_up(commanded(0.0, 0.8)))
-    assert {f.id for f in found.findings if f.status in CLAIMED} == {"throttle_curve"}
+    assert claimed(found) == {"throttle_curve"}
 
 
 def test_a_centre_of_mass_on_a_tilting_mount_is_no_tare_of_single_runs():
     """Runs at other tilts are held out: offsets of the runs fitted say nothing of them, a centre of mass does."""
-    tilts = ((0, 0), (0.26, 0), (-0.26, 0), (0, 0.26), (0, -0.26))
-    runs = [tilted_run(f"r{k}", roll, pitch, (0.004, -0.003, 0.002), k) for k, (roll, pitch) in enumerate(tilts)]
-    analysis = analyse_instrument(RecordingSet("s", four_rotors(), tuple(runs), ("r1", "r3")))
+    runs = tilted((0.004, -0.003, 0.002), TILTS[:5])
+    analysis = analyse_instrument(RecordingSet("s", stand_vehicle(), runs, ("r1", "r3")))
     assert claimed(analysis) == {"com_offset"} and analysis.values == {}
 
 
@@ -96,8 +91,7 @@ def bench_of_slow_noise(seed: int) -> RecordingSet:
         noise = 0.01 * rng.normal(size=len(load)) + 0.025 * slow / slow.std()
         table = {"time_s": np.arange(len(load)) / 10, "force_z_n": load + noise, "reference_force_z_n": load}
         runs.append(Run(name, pd.DataFrame(table)))
-    vehicle = Vehicle.model_validate({"name": "b", "kind": "bench", "tared": True})
-    return RecordingSet("b", vehicle, tuple(runs), ("c",))
+    return RecordingSet("b", BENCH, tuple(runs), ("c",))
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -120,7 +114,7 @@ def test_the_spread_of_scores_that_last_is_that_of_their_sums():
 
 def test_a_rotor_may_be_as_heavy_as_stated_whatever_the_stand_s_inertia():
     def bound(**changes):
-        return rotor_inertia(four_rotors(inertia_kg_m2={"xx": 2e-5, "yy": 2e-5, "zz": 1.2e-5}, **changes)).high
+        return rotor_inertia(stand_vehicle(inertia_kg_m2={"xx": 2e-5, "yy": 2e-5, "zz": 1.2e-5}, **changes)).high
 
     assert bound() == pytest.approx(5e-6)
     assert bound(rotor_inertia_kg_m2=8e-6) == pytest.approx(3.2e-5)
@@ -151,7 +145,5 @@ def sagging_run(name: str, seed: int) -> Run:
 
 
 def test_noise_of_a_voltmeter_next_to_a_sag_is_no_other_effect():
-    made = one_rotor([sagging_run(n, k) for k, n in enumerate("abc")], ["c"])
-    limits = {"rotor_speed_limits_rad_s": (0.0, FULL_RAD_S), "torque_coefficient_n_m_s2": 1.9e-8}
-    recordings = RecordingSet(made.name, made.vehicle.model_copy(update=limits), made.runs, made.held_out)
+    recordings = one_rotor([sagging_run(n, k) for k, n in enumerate("abc")], ["c"], **LIMITS)
     assert claimed(analyse_instrument(recordings)) == {"battery_sag"}

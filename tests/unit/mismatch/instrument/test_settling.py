@@ -1,12 +1,12 @@
 """Loads put on by hand: what happens in the moments after a step is not the instrument's."""
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.instrument.setup import set_up
-from rotorid.recordings import RecordingSet, Run, Vehicle
+from rotorid.recordings import RecordingSet
+from tests.unit.mismatch.instrument.stands import BENCH, bench_run, claimed
 
 RATE_HZ, STEP_S = 50.0, 4.0
 LEVELS_N = np.concatenate([np.arange(6.0), np.arange(4.0, -1.0, -1.0)])
@@ -24,16 +24,10 @@ def bench(seed: int, latest_s: float, lag_s: float = 0.0) -> RecordingSet:
             part = 1.0 - after_s / rng.uniform(0.1, 1.0) / latest_s if latest_s else np.zeros(len(load))
             part = np.exp(-after_s / lag_s) if lag_s else part
             real -= (LEVELS_N[k] - LEVELS_N[k - 1]) * np.where(after_s >= 0, np.clip(part, 0.0, 1.0), 0.0)
-        table = {"time_s": time_s}
-        for k, name in enumerate("xyz"):
-            table[f"reference_force_{name}_n"] = load * (k == axis)
-            table[f"force_{name}_n"] = real * (k == axis) + 0.01 * rng.standard_normal(len(load))
-        runs.append(Run(f"along {axis}", pd.DataFrame(table)))
-    return RecordingSet("b", Vehicle.model_validate({"name": "b", "kind": "bench", "tared": True}), tuple(runs))
-
-
-def claimed(recordings: RecordingSet) -> set[str]:
-    return {f.id for f in analyse_instrument(recordings).findings if f.status in ("established", "ambiguous")}
+        along = np.eye(3)[axis]
+        reading = real[:, None] * along + 0.01 * rng.standard_normal((3, len(load))).T
+        runs.append(bench_run(f"along {axis}", time_s, load[:, None] * along, reading))
+    return RecordingSet("b", BENCH, tuple(runs))
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -41,10 +35,10 @@ def test_a_hand_that_lets_go_slowly_is_no_filter(seed: int) -> None:
     """Every load comes on within a tenth to six tenths of a second, each time anew."""
     recordings = bench(seed, latest_s=0.6)
     assert set_up(recordings).settling_s > 0.5
-    assert claimed(recordings) == set()
+    assert claimed(analyse_instrument(recordings)) == set()
 
 
 def test_a_lag_of_the_instrument_repeats_itself_and_is_found() -> None:
     recordings = bench(0, latest_s=0.0, lag_s=0.1)
     assert set_up(recordings).settling_s == 0.0
-    assert claimed(recordings) == {"amplifier_filter"}
+    assert claimed(analyse_instrument(recordings)) == {"amplifier_filter"}

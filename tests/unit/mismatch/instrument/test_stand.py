@@ -11,23 +11,10 @@ from rotorid.mismatch.instrument.columns import make_terms
 from rotorid.mismatch.instrument.setup import set_up
 from rotorid.mismatch.posterior.status import Estimate
 from rotorid.mismatch.tell.sentences import _wrong, surest
-from rotorid.recordings import RecordingSet, Run, Vehicle
+from rotorid.recordings import RecordingSet, Run
+from tests.unit.mismatch.instrument.stands import C_F, MASS_KG, SENSOR_Z_M, claimed, one_rotor, stand_vehicle
 
-HUBS = ((0.09, 0.09, "ccw"), (0.09, -0.09, "cw"), (-0.09, -0.09, "ccw"), (-0.09, 0.09, "cw"))
-C_F, MASS_KG, SENSOR_Z_M = 1.4e-6, 0.65, 0.05
 FULL_RAD_S = 2000.0
-
-
-def one_rotor(runs, held_out=()) -> RecordingSet:
-    content = {
-        "name": "scale",
-        "kind": "stand",
-        "rotors": [{"x_m": 0.0, "y_m": 0.0, "spin": "ccw"}],
-        "thrust_coefficient_n_s2": C_F,
-        "rotor_radius_m": 0.06,
-        "tared": True,
-    }
-    return RecordingSet("scale", Vehicle.model_validate(content), tuple(runs), tuple(held_out))
 
 
 def steady_run(name: str, volts: float, seed: int) -> Run:
@@ -46,9 +33,13 @@ def steady_run(name: str, volts: float, seed: int) -> Run:
     return Run(name, pd.DataFrame(table))
 
 
+def supplied(*volts: float) -> RecordingSet:
+    """Three runs at these supplies, the last held out."""
+    return one_rotor([steady_run("abc"[k], own, k + 1) for k, own in enumerate(volts)], ["c"])
+
+
 def test_the_curve_of_the_throttle_is_found_from_steady_points() -> None:
-    runs = [steady_run("a", 16.0, 1), steady_run("b", 14.5, 2), steady_run("c", 15.2, 3)]
-    found = find_chain(set_up(one_rotor(runs, ["c"])))
+    found = find_chain(set_up(supplied(16.0, 14.5, 15.2)))
     estimates = {(f.id, p.symbol): p for f in found.findings for p in f.parameters}
     assert estimates["throttle_curve", "n"].value == pytest.approx(0.65, abs=0.01)
     assert estimates["throttle_curve", "u_0"].value == pytest.approx(0.04, abs=0.003)
@@ -59,25 +50,9 @@ def test_the_curve_of_the_throttle_is_found_from_steady_points() -> None:
 
 
 def test_a_curve_found_at_one_supply_is_not_held_to_carry_over_to_another() -> None:
-    runs = [steady_run("a", 16.0, 1), steady_run("b", 16.0, 2), steady_run("c", 11.0, 3)]
-    analysis = analyse_instrument(one_rotor(runs, ["c"]))
+    analysis = analyse_instrument(supplied(16.0, 16.0, 11.0))
     assert "rotor_speed_1" in analysis.unexplained_channels
     assert "battery_voltage_v" in analysis.unexplained_depends_on
-
-
-def four_rotors(**changes) -> Vehicle:
-    content = {
-        "name": "stand",
-        "kind": "stand",
-        "mass_kg": MASS_KG,
-        "rotors": [{"x_m": x, "y_m": y, "spin": s} for x, y, s in HUBS],
-        "thrust_coefficient_n_s2": C_F,
-        "torque_coefficient_n_m_s2": 1.9e-8,
-        "rotor_radius_m": 0.06,
-        "sensor_position_m": [0.0, 0.0, SENSOR_Z_M],
-        "tared": False,
-    }
-    return Vehicle.model_validate(content | changes)
 
 
 def tilted_run(name: str, roll: float, pitch: float, centre_m, seed: int, moments: bool = True) -> Run:
@@ -105,19 +80,21 @@ def tilted_run(name: str, roll: float, pitch: float, centre_m, seed: int, moment
 TILTS = ((0, 0), (0.26, 0), (-0.26, 0), (0, 0.26), (0, -0.26), (0.5, 0), (0, 0.5))
 
 
+def tilted(centre_m, tilts=TILTS) -> tuple[Run, ...]:
+    """A run at each tilt."""
+    return tuple(tilted_run(f"r{k}", roll, pitch, centre_m, k) for k, (roll, pitch) in enumerate(tilts))
+
+
 def test_a_higher_centre_of_mass_is_not_sold_as_a_mass_and_a_tare() -> None:
-    runs = [tilted_run(f"r{k}", roll, pitch, (0.004, -0.003, 0.004), k) for k, (roll, pitch) in enumerate(TILTS)]
-    analysis = analyse_instrument(RecordingSet("s", four_rotors(), tuple(runs), ("r2", "r4")))
+    analysis = analyse_instrument(RecordingSet("s", stand_vehicle(), tilted((0.004, -0.003, 0.004)), ("r2", "r4")))
     assert analysis.values == {}
-    claimed = {f.id for f in analysis.findings if f.status in ("established", "ambiguous")}
-    assert "com_offset" in claimed and "tare_offset" not in claimed
+    assert "com_offset" in claimed(analysis) and "tare_offset" not in claimed(analysis)
 
 
 def test_what_the_weight_loads_is_known_where_the_mount_tilts_with_the_sensor() -> None:
     """On a sensor that tilts the weight pushes along x and y and turns about them; rotors alike push along z."""
-    runs = [tilted_run(f"r{k}", roll, pitch, (0, 0, 0), k) for k, (roll, pitch) in enumerate(TILTS)]
     level, tilting = (
-        set_up(RecordingSet("s", four_rotors(sensor_mount=mount), tuple(runs), ())).instrument
+        set_up(RecordingSet("s", stand_vehicle(sensor_mount=mount), tilted((0, 0, 0)))).instrument
         for mount in ("level", "tilting")
     )
     assert tilting.weighed == (0, 1, 3, 4) and tilting.loaded == (2,)
@@ -126,7 +103,7 @@ def test_what_the_weight_loads_is_known_where_the_mount_tilts_with_the_sensor() 
 
 def test_which_rotor_is_stronger_cannot_be_seen_without_moments() -> None:
     runs = [tilted_run(f"r{k}", 0, 0, (0, 0, 0), k, moments=False) for k in range(3)]
-    terms, reasons = make_terms(set_up(RecordingSet("s", four_rotors(tared=True), tuple(runs), ())))
+    terms, reasons = make_terms(set_up(RecordingSet("s", stand_vehicle(tared=True), tuple(runs), ())))
     assert "unequal_rotors" in reasons and all(t.effect != "unequal_rotors" for t in terms)
 
 

@@ -1,7 +1,5 @@
 """Measured rotor speeds without their noise: plateaus are averaged, steps stay steps."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -10,7 +8,8 @@ from rotorid.effects.contract import Motion
 from rotorid.effects.loading import Loading
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.instrument.tachometer import WIDTHS, noise_of, quieter, without_noise
-from tests.unit.mismatch.instrument.test_approximate import named, stand_set
+from tests.unit.mismatch.instrument.stands import claimed
+from tests.unit.mismatch.instrument.test_approximate import stand_set
 
 RATE_HZ = 200.0
 TIME_S = np.arange(6000) / RATE_HZ
@@ -89,4 +88,4 @@ def test_noise_of_counters_is_no_effect_and_no_wrong_value(share):
         return wrench
 
     analysis = analyse_instrument(stand_set(counted))
-    assert not named(analysis) and not analysis.values
+    assert not claimed(analysis) and not analysis.values

@@ -1,7 +1,5 @@
 """What is analysed of flights whose sensor stood still for so long that a side of the split lacks it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pandas as pd

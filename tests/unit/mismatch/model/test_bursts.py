@@ -1,7 +1,5 @@
 """Windows of a force that comes and goes, and the terms made for them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

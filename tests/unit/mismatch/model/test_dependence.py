@@ -1,7 +1,5 @@
 """The test that a residual does not depend on the inputs: right under coloured noise, and it sees what is there."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Gains by two bands and both sides: a slow moment of the air, and the controller's answer, bias what is slow."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""A gust found as a wind, through the drag it is felt by."""
+"""A gust found as a wind, through the drag it is felt by. A steady wind, through the drag by which it is felt."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -106,3 +106,23 @@ def test_a_wind_that_blows_throughout_is_stated_as_a_velocity():
     for estimate, wind in zip(found["steady_wind"].parameters, (3.0, -1.5), strict=True):
         assert abs(estimate.value - wind) < 0.15
         assert estimate.low < wind < estimate.high
+
+
+STEADY_M_S, SQUARE_DRAG = (-1.0, 3.0), 0.06
+
+
+@pytest.fixture(scope="module")
+def blown():
+    return analyse(recorded(1, 2, 3, flight={"square_drag": SQUARE_DRAG, "excitation": 1.5, "wind": STEADY_M_S}))
+
+
+@pytest.mark.slow
+def test_a_wind_beside_a_drag_of_the_square(blown):
+    """0.06 1/m times 0.652 kg is 0.0391 N s2/m2: through it a wind is no force that is constant in world axes."""
+    found = {f.id: f for f in blown.findings if f.status == "established"}
+    assert set(found) == {"steady_wind", "frame_drag"}
+    for estimate, wind in zip(found["steady_wind"].parameters, STEADY_M_S, strict=True):
+        assert estimate.low < wind < estimate.high
+        assert abs(estimate.value - wind) < 0.3
+    sideways = [p.value for p in found["frame_drag"].parameters][:2]  # it hardly climbs
+    assert np.allclose(sideways, 0.652 * SQUARE_DRAG, rtol=0.1)

@@ -1,7 +1,5 @@
 """A payload that is picked up or dropped in flight."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,6 +1,7 @@
-"""What the analysis works on: the split, the noise measured from the data, the terms a set can test."""
-
-from __future__ import annotations
+"""What the analysis works on: the split, the noise measured from the data, the terms a set can test. What is made of
+a motion is made again only where something changed that it is made of. What is fitted where rotor speeds are
+known from their commands alone.
+"""
 
 from dataclasses import replace
 
@@ -8,9 +9,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import rotorid.mismatch.model.prepare as module
 from rotorid.effects.catalogue import catalogue
+from rotorid.effects.contract import Motion
+from rotorid.mismatch.model.fitted import only_scales, without_same_curves
 from rotorid.mismatch.model.prepare import (
     DEFAULT_TRUST,
+    LastMade,
     form_terms,
     make_terms,
     prepare,
@@ -22,10 +27,12 @@ from rotorid.mismatch.model.prepare import (
     with_predictions,
     with_thrusts,
 )
+from rotorid.mismatch.plant.speedpath import CommandChain, SpeedFit, SpeedResult
 from rotorid.mismatch.plant.split import GAP_S, training_rule
 from rotorid.recordings import RecordingSet, Run, Split
 from rotorid.recordings import columns as c
 from tests.unit.mismatch.flights import COLUMNS, quad, recorded, with_table
+from tests.unit.mismatch.plant.test_speedpath import form
 
 
 def set_of(*names: str, held_out=None) -> RecordingSet:
@@ -207,3 +214,79 @@ def test_thrusts_of_a_comparison_are_what_effects_leave_of_them():
     tilt = next(f for f in forms["thrust_tilt"] if "centre" in f.name)
     sideways = tilt.contribution(weaker, vehicle, np.array([0.01, 0.0])).force[:, 0]
     np.testing.assert_allclose(sideways, 0.01 * share * believed.sum(axis=1))
+
+
+def flown(size: int = 50) -> Motion:
+    """A motion that has what the maker reads."""
+    rng = np.random.default_rng(1)
+    return Motion(
+        time_s=np.arange(size) / 50,
+        rotor_speed=np.full((size, 4), 500.0),
+        velocity=rng.standard_normal((size, 3)),
+        rotation=np.tile(np.eye(3), (size, 1, 1)),
+    )
+
+
+@pytest.fixture
+def counted():
+    """A maker that counts how often it is asked: the force of the air on a plate, and its half."""
+    asked = []
+
+    def make(motion):
+        asked.append(motion)
+        return [{"force": motion.air_velocity**2}]
+
+    return make, asked
+
+
+def test_only_what_was_read_counts(counted):
+    make, asked = counted
+    motion, memory = flown(), LastMade()
+    first = memory.made(("plate",), (1.0,), motion, make)
+    again = memory.made(("plate",), (1.0,), replace(motion, angular_acceleration=np.ones((motion.size, 3))), make)
+    assert again is first and len(asked) == 1
+    blown = memory.made(("plate",), (1.0,), replace(motion, wind=np.array([3.0, 0.0, 0.0])), make)
+    assert len(asked) == 2 and not np.allclose(blown[0]["force"], first[0]["force"])
+
+
+def test_other_values_are_made_anew_and_take_the_place_of_the_first(counted):
+    make, asked = counted
+    motion, memory = flown(), LastMade()
+    for value in (1.0, 2.0, 2.0, 1.0):
+        memory.made(("plate",), (value,), motion, make)
+    assert len(asked) == 3 and len(memory.kept) == 1
+    assert memory.size == asked[0].air_velocity.nbytes
+
+
+def test_what_was_made_first_is_forgotten_first(counted, monkeypatch):
+    make, asked = counted
+    motion, memory = flown(), LastMade()
+    monkeypatch.setattr(module, "MOST_BYTES", 2.5 * motion.velocity.nbytes)
+    for key in ("a", "b", "c", "c", "b", "a"):
+        memory.made((key,), (), motion, make)
+    assert len(asked) == 4 and memory.size <= module.MOST_BYTES
+
+
+def chain_of(effect_id: str, name: str, values, sd: float = 1e-4) -> CommandChain:
+    """A chain of one form, its values known to `sd`."""
+    made = form(effect_id, name)
+    known = sd**2 * np.eye(len(made.parameters))
+    fit = SpeedFit(((effect_id, made),), np.array(values, float), 0.0, 0.0, covariance=known)
+    return CommandChain(SpeedResult(fit, {}, {}, {}), 2500.0, None)
+
+
+@pytest.mark.parametrize(
+    ("values", "sd", "scale"), [((0.0026, 0.04), 1e-4, True), ((0.02, 0.04), 1e-4, False), ((0.02, 0.04), 0.02, True)]
+)
+def test_a_curve_whose_start_is_negligible_or_not_known_is_another_scale(values, sd, scale):
+    """Half a percent of the full speed is negligible."""
+    assert only_scales(chain_of("throttle_curve", "affine", values, sd).result) == scale
+
+
+def test_next_to_a_curve_of_the_throttle_no_curve_of_the_thrust_is_looked_for():
+    prepared = prepare(recorded(1, flight={"duration_s": 10.0}))
+    assert "thrust_curve" in {t.effect for t in prepared.terms}
+    fewer = without_same_curves(prepared, chain_of("throttle_curve", "affine", (0.1, 0.1)))
+    assert {t.effect for t in prepared.terms} - {t.effect for t in fewer.terms} == {"thrust_curve"}
+    assert "throttle" in fewer.not_testable["thrust_curve"]
+    assert without_same_curves(prepared, chain_of("motor_lag", "one constant", (0.05,))) is prepared

@@ -1,7 +1,5 @@
 """The runs held out change no model, and a verdict says what its own numbers say."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from functools import cache
@@ -51,15 +49,20 @@ def disturbed(size_m_s2: float) -> RecordingSet:
 
 
 @cache
+def watched(size_m_s2: float):
+    """The analysis of the disturbed set, and what who watches is told of the fitted runs."""
+    told = []
+    analysis = analyse(disturbed(size_m_s2), watch=told.append)
+    (fitted,) = told
+    return analysis, fitted
+
+
 def analysed(size_m_s2: float):
-    return analyse(disturbed(size_m_s2))
+    return watched(size_m_s2)[0]
 
 
 def test_who_watches_is_told_what_the_fitted_runs_decide_and_nothing_of_the_others():
-    told = []
-    for size in (0.0, 1.5):
-        analyse(disturbed(size), watch=told.append)
-    plain, other = told
+    plain, other = (watched(size)[1] for size in (0.0, 1.5))
     assert "rotor_drag" in {f.id for f in plain.findings if f.status == "established"}
     assert "rotor_drag" not in {f.id for f in plain.outside}
     assert [f.id for f in plain.findings] == [f.id for f in other.findings] and plain.values == other.values

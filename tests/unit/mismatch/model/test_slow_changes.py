@@ -1,7 +1,5 @@
 """Slow changes that no column follows: reported where no sensor can have made them, measured rotor speeds or not."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt

@@ -1,15 +1,17 @@
-"""Wrong believed values: the fewest that explain the residual, only where they are certain and matter."""
-
-from __future__ import annotations
+"""Wrong believed values: the fewest that explain the residual, only where they are certain and matter. What is said
+about a believed value where something beside it would make up for it.
+"""
 
 import numpy as np
 import pytest
 
 from rotorid.mismatch.decision.decide import SMALLEST_CHANGE, main_channels, relative_change, wrong_values
+from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.decision.select import Selection
-from rotorid.mismatch.model.values import with_values_in_question
+from rotorid.mismatch.model.values import with_values_in_question, without_scale_of_curve
 from rotorid.mismatch.plant.regression import build
 from rotorid.mismatch.plant.rows import Rows, Term
+from rotorid.mismatch.posterior.status import Estimate
 from tests.unit.mismatch import synthetic
 from tests.unit.mismatch.plant.test_regression import RATE_HZ
 from tests.unit.mismatch.synthetic import coloured
@@ -48,34 +50,31 @@ def judged(changes: dict[str, float], seed: int = 0, size: int = 4000, refused=(
     return wrong_values(made, Selection([], made.fit(list(TRUST))), size_of, refused=refused)
 
 
-def test_a_wrong_torque_coefficient_is_named_with_its_interval():
-    found = judged({"torque": 0.12})
-    assert list(found) == ["torque"]
-    value, sd = found["torque"]
-    assert value == pytest.approx(0.12, abs=3 * sd) and sd < 0.01
+@pytest.mark.parametrize(
+    ("changes", "allowed"),
+    [
+        ({"torque": 0.12}, 0.01),
+        # An accelerometer sees their ratio only: 5 % less thrust is half of its trust, 5 % more mass one of its own.
+        ({"thrust": -0.05}, 0.005),
+        ({"torque": 0.1, "inertia_zz": -0.08}, 0.01),
+    ],
+    ids=["torque", "of mass and thrust the least trusted", "two values"],
+)
+def test_wrong_values_are_named_with_their_intervals(changes, allowed):
+    found = judged(changes)
+    assert found.keys() == changes.keys()
+    for key, true in changes.items():
+        value, sd = found[key]
+        assert value == pytest.approx(true, abs=min(3 * sd, allowed)) and sd < 0.01
+
+
+def test_a_change_that_no_laboratory_could_tell_is_not_named():
+    assert SMALLEST_CHANGE > 0.01 and judged({"torque": 0.01}) == {}
 
 
 def test_right_values_are_left_alone():
     """100 recordings: a value is called wrong in none of them."""
     assert [seed for seed in range(100) if judged({}, seed, size=1000)] == []
-
-
-def test_of_mass_and_thrust_the_one_least_trusted_is_named():
-    """An accelerometer sees their ratio only: 5 % less thrust is half of its trust, 5 % more mass one of its own."""
-    found = judged({"thrust": -0.05})
-    assert list(found) == ["thrust"]
-    assert found["thrust"][0] == pytest.approx(-0.05, abs=0.005)
-
-
-def test_two_wrong_values_are_both_named():
-    found = judged({"torque": 0.1, "inertia_zz": -0.08})
-    assert sorted(found) == ["inertia_zz", "torque"]
-    assert found["inertia_zz"][0] == pytest.approx(-0.08, abs=0.01)
-
-
-def test_a_change_that_no_laboratory_could_tell_is_not_named():
-    assert SMALLEST_CHANGE > 0.01
-    assert judged({"torque": 0.01}) == {}
 
 
 def test_a_value_that_was_refused_is_not_named_again():
@@ -114,3 +113,20 @@ def test_a_value_that_a_member_of_an_open_class_would_change_is_suggested_with_t
     # A class that is only suggested questions nothing.
     suggested = synthetic.drag_finding(id="com_offset", status="suggested", alternatives=open_class)
     assert with_values_in_question(synthetic.analysis(findings=[suggested], values={"mass_kg": mass})).values
+
+
+def curve(symbol: str, status: str = "established") -> list[Finding]:
+    """A throttle curve with one parameter."""
+    found = Estimate(symbol, 0.3, "1", 0.2, 0.4)
+    return [Finding(id="throttle_curve", status=status, sentence="", parameters=(found,))]
+
+
+@pytest.mark.parametrize(
+    ("findings", "named"),
+    [(curve("a_1"), False), (curve("u_0"), True), (curve("a_1", "not_established"), True), ([], True)],
+)
+def test_a_thrust_beside_a_throttle_curve_with_a_scale_of_its_own_is_not_called_wrong(findings, named):
+    """Nor is a mass: where speeds are known from commands alone a flight knows the ratio of the two."""
+    values = {"thrust": (-0.02, 0.002), "mass": (0.05, 0.001)}
+    assert ("thrust" in without_scale_of_curve(findings, values)) is named
+    assert ("mass" in without_scale_of_curve(findings, values)) is named  # only thrust over mass is known

@@ -1,7 +1,5 @@
 """Believed values move within their trust, without a word, where environments not used for fitting confirm it."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,25 +16,18 @@ TRUST = {"thrust": 0.05, "mass": 0.005}
 def model_of(monkeypatch, thrust: float, helps: bool = True):
     """A model whose only value to move is the thrust, by `thrust`; moving it halves the force's error if it `helps`."""
     terms = [SimpleNamespace(key=k, kind="value", prior_sd=(sd,)) for k, sd in TRUST.items()]
-    where = {"thrust": 0, "mass": 1}
 
-    class Regression:
-        def keys_of(self, *kinds):
-            return list(TRUST) if kinds == ("value",) else []
+    def columns(keys):
+        return np.array([list(TRUST).index(k) for k in keys], int)
 
-        def columns(self, keys):
-            return np.array([where[k] for k in keys])
+    def fit(keys):
+        own = columns(keys)
+        return Fit(own, np.where(own == 0, thrust, 0.0), 0.0, 1e-8 * np.eye(len(own)), np.zeros(1))
 
-        def given(self, cols, beta):
-            return self
-
-        def fit(self, keys):
-            columns = self.columns(keys).astype(int)
-            beta = np.array([thrust if c == 0 else 0.0 for c in columns])
-            return Fit(columns, beta, 0.0, 1e-8 * np.eye(len(columns)), np.zeros(1))
-
-    made = Regression()
-    made.terms = terms
+    made = SimpleNamespace(
+        terms=terms, columns=columns, fit=fit, keys_of=lambda *kinds: list(TRUST) if kinds == ("value",) else []
+    )
+    made.given = lambda cols, beta: made
     model = SimpleNamespace(
         regression=made,
         rows_per_block=40,

@@ -1,7 +1,5 @@
 """The model of force and moment: what counts as noise, and how large a term is."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Means that differ between runs: seen where something was changed, not where a sensor's noise is coloured."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Noise of the rotors and the gyroscope in the band analysed, found by forward and inverse regression."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

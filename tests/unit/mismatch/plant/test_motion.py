@@ -1,6 +1,7 @@
-"""From columns to even stretches: rates, holes, derived quantities and time offsets, by hand."""
-
-from __future__ import annotations
+"""From columns to even stretches: rates, holes, derived quantities and time offsets, by hand. Height without its
+sensor's flutter. A velocity that an autopilot made from its accelerometer is distinguished from one that another
+sensor measured.
+"""
 
 from dataclasses import replace
 
@@ -9,19 +10,23 @@ import pandas as pd
 import pytest
 
 from rotorid.mismatch.plant.motion import (
+    Segment,
     analysis_rate_hz,
     build_segments,
     continuous,
     estimated_full_speed,
     fresh_samples,
     full_speed,
+    made_from_accelerometer,
     own_rate_hz,
+    quiet_height,
     rates_from_attitude,
     rotation_matrices,
     stretches,
 )
 from rotorid.recordings import Run
 from tests.unit.mismatch.flights import COLUMNS, GRAVITY, quad, recorded
+from tests.unit.mismatch.plant.test_rows import still
 
 RATE_HZ, CUTOFF_HZ = 200.0, 20.0
 
@@ -174,3 +179,57 @@ def test_one_full_speed_for_all_runs(run):
     assert full_speed(runs, quad()) == pytest.approx(hover / np.sqrt(0.26))
     assert full_speed(runs, quad(rotor_speed_limits_rad_s=[0, 2500])) == 2500.0
     assert full_speed([run], quad()) is None
+
+
+DT_S = 0.004
+TIME_S = DT_S * np.arange(2500)
+TRUE_M = 0.5 - 0.4 * np.sin(0.6 * TIME_S) ** 2 + 0.005 * np.sin(20 * TIME_S)
+CLIMB_M_S = np.gradient(TRUE_M, DT_S)
+
+
+def noisy(size_m: float) -> np.ndarray:
+    return TRUE_M + size_m * np.random.default_rng(0).standard_normal(len(TRUE_M))
+
+
+def test_the_flutter_goes_and_what_moves_stays():
+    """White noise of 8 mm at 250 Hz through 1 Hz: σ √(1 / (2 √π · 0.1325 s · 250 Hz)) = 0.74 mm."""
+    left = quiet_height(noisy(0.008), CLIMB_M_S, DT_S) - TRUE_M
+    assert left.std() == pytest.approx(0.00074, rel=0.35) and abs(left).max() < 0.004
+
+
+def test_a_bias_of_the_climb_hardly_moves_it():
+    """0.05 m/s too much of climb: the slow part takes it back, at the ends later by 0.11 s times the bias."""
+    found = quiet_height(TRUE_M, CLIMB_M_S + 0.05, DT_S)
+    np.testing.assert_allclose(found[250:-250], TRUE_M[250:-250], atol=2e-5)
+    assert abs(found - TRUE_M).max() < 0.007
+
+
+def test_without_a_climb_only_the_fast_goes():
+    slow = 0.5 - 0.4 * np.sin(0.6 * TIME_S) ** 2
+    np.testing.assert_allclose(quiet_height(slow, None, DT_S)[100:-100], slow[100:-100], atol=6e-4)
+
+
+def test_holes_stay_holes():
+    holed = noisy(0.0)
+    holed[500:600] = np.nan
+    found = quiet_height(holed, CLIMB_M_S, DT_S)
+    assert np.isnan(found[500:600]).all()
+    np.testing.assert_allclose(found[600:], TRUE_M[600:], atol=1e-4)
+    assert np.isnan(quiet_height(np.full(9, np.nan), None, DT_S)).all()
+
+
+READ_HZ, COUNT = 100.0, 6000
+
+
+@pytest.mark.parametrize("integrated", [True, False])
+def test_a_velocity_that_integrates_the_accelerometers_noise_is_no_second_witness(integrated):
+    rng = np.random.default_rng(3)
+    noise = 0.1 * rng.standard_normal((COUNT, 3))
+    velocity = np.cumsum(noise, axis=0) / READ_HZ if integrated else 0.01 * rng.standard_normal((COUNT, 3))
+    motion = replace(
+        still(COUNT, time_s=np.arange(COUNT) / READ_HZ),
+        accelerometer=noise,
+        velocity=velocity,
+        rotation=np.broadcast_to(np.eye(3), (COUNT, 3, 3)),
+    )
+    assert made_from_accelerometer([Segment("a", READ_HZ, motion, "accelerometer")], 20.0) == integrated

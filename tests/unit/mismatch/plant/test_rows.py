@@ -1,27 +1,37 @@
-"""Rows of the regression by hand: rotor-level physics, both sides filtered alike, columns of believed values."""
-
-from __future__ import annotations
+"""Rows of the regression by hand: rotor-level physics, both sides filtered alike, columns of believed values.
+Empirical terms: which flights could tell them from effects with a name. Which errors of sensors the comparison
+with another sensor estimates alone.
+"""
 
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
+from scipy.spatial.transform import Rotation
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Contribution, Motion
+from rotorid.mismatch.decision.decide import coefficients
+from rotorid.mismatch.model.prepare import prepare
+from rotorid.mismatch.model.wrench import wrench_model
 from rotorid.mismatch.plant.motion import Segment
 from rotorid.mismatch.plant.rows import (
     Thinner,
     assemble,
     at_centre,
     baseline_wrench,
+    compared_alone,
     form_columns,
     offset_columns,
     project,
     residual,
     value_columns,
 )
+from rotorid.mismatch.plant.unknowns import can_show
+from rotorid.recordings import columns as c
 from tests.unit.effects.flown import STEP_S, audit_vehicle, commands, motions, segment, start
+from tests.unit.mismatch.flights import recorded, with_table
 from tests.unit.vehicle.thesis import thesis_vehicle
 
 ARM, CF, CQ, MASS = 0.0884, 1.3877e-6, 1.8558e-8, 0.652
@@ -218,3 +228,58 @@ def test_rows_filter_both_sides_alike():
     np.testing.assert_allclose(rows.y[:, :3], 2.0 * rows.x[:, :3, 0], atol=1e-12)
     known = assemble(flown, thesis_vehicle(), thin, [], known={"force": added})
     np.testing.assert_allclose(known.y[:, :3], 0.0, atol=1e-12)
+
+
+def flown(spread_rad: float) -> np.ndarray:
+    headings = spread_rad * np.random.default_rng(0).standard_normal(4000)
+    return Rotation.from_euler("ZYX", np.stack([headings, 0.1 + 0 * headings, 0 * headings], axis=1)).as_matrix()
+
+
+def test_a_moment_fixed_in_the_world_shows_on_a_vehicle_that_turns():
+    assert can_show("unknown_heading", [flown(0.5)])
+    assert not can_show("unknown_heading", [flown(0.1)])
+    # Two flights that each keep their heading, one north and one east, tell it too.
+    east = Rotation.from_euler("z", np.pi / 2).as_matrix() @ flown(0.1)
+    assert can_show("unknown_heading", [flown(0.1), east])
+
+
+def test_other_empirical_terms_and_unknown_attitudes_are_not_concerned():
+    assert can_show("unknown_place", [flown(0.0)])
+    assert can_show("unknown_heading", [None])
+
+
+def test_errors_of_the_sensors_that_are_compared_and_nothing_else():
+    prepared = prepare(recorded(1))
+    channels, keys = compared_alone(prepared.terms, wrench_model(prepared, prepared.terms).rows)
+    assert channels == [6, 7, 8, 9, 10, 11]
+    assert {"gyro_error/scale", "accelerometer_error/bias", "imu_lever_arm/lever arm"} <= set(keys)
+    assert not any(k.startswith(("rotor_drag", "com_offset", "offset:")) for k in keys)
+
+
+def test_without_an_attitude_no_error_of_the_gyroscope_is_compared():
+    def inertial(table: pd.DataFrame) -> pd.DataFrame:
+        return table.drop(columns=[*c.QUATERNION, *c.VELOCITY, *c.POSITION])
+
+    prepared = prepare(with_table(recorded(1), inertial))
+    channels, keys = compared_alone(prepared.terms, wrench_model(prepared, prepared.terms).rows)
+    assert (channels, keys) == ([], [])
+
+
+def test_a_scale_of_the_gyroscope_is_told_rightly_beside_inertias_that_are_far_off():
+    """The moments ask for another number: the believed inertias are a third too small."""
+
+    def scaled(table: pd.DataFrame) -> pd.DataFrame:
+        return table.assign(**{name: 1.08 * table[name] for name in c.ANGULAR_VELOCITY})
+
+    recordings = with_table(recorded(2), scaled)
+    vehicle = recordings.vehicle
+    light = {k: v / 1.5 for k, v in vehicle.inertia_kg_m2.model_dump().items()}
+    vehicle = vehicle.model_copy(update={"inertia_kg_m2": vehicle.inertia_kg_m2.model_copy(update=light)})
+    prepared = prepare(replace(recordings, vehicle=vehicle))
+    model = wrench_model(prepared, prepared.terms)
+    regression = model.search.regression
+    fit = regression.fit([*regression.keys_of("nuisance"), "gyro_error/scale"])
+    beta, covariance = coefficients(regression, fit, "gyro_error/scale")
+    # Ω_m = 1.08 Ω; columns hold the measured rates, so the coefficient is 0.08 / 1.08.
+    assert np.all(np.abs(beta - 0.08 / 1.08) < 3 * np.sqrt(np.diag(covariance)))
+    assert np.all(np.abs(beta - 0.08 / 1.08) < 0.02)

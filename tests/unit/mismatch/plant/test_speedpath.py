@@ -1,7 +1,5 @@
 """Between command and rotor speed: what the search finds on made commands, and what it leaves alone."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -96,27 +94,26 @@ def test_a_lag_of_less_than_half_a_sample_is_none():
     assert effect_id == "motor_lag"
 
 
-def test_up_and_down_have_their_own_time_constants():
-    result = searched(recorded(3, motor_lag=("up and down", (0.03, 0.06))))
-    ((_, found),) = result.fit.chain
-    assert found.name == "up and down"
-    np.testing.assert_allclose(result.fit.values, [0.03, 0.06], atol=0.003)
+SAG = np.linspace(12.4, 10.2, 2000)
 
 
-def test_a_sagging_battery_and_a_lag_are_told_apart():
-    voltage = np.linspace(12.4, 10.2, 2000)
-    at_work = {"battery_sag": ("power of voltage", (0.9,)), "motor_lag": ("one constant", (0.04,))}
-    result = searched(recorded(4, voltage=voltage, **at_work))
-    assert sorted(k for k, _ in result.fit.chain) == ["battery_sag", "motor_lag"]
-    assert result.fit.of("battery_sag")[1][0] == pytest.approx(0.9, abs=0.05)
-    assert result.fit.of("motor_lag")[1][0] == pytest.approx(0.04, abs=0.002)
-
-
-def test_a_delay_is_no_lag():
-    result = searched(recorded(5, delay=("of the command", (0.045,))))
-    assert [k for k, _ in result.fit.chain] == ["delay"]
-    # The nuisance shift of half a sample shares it.
-    assert result.fit.values[0] + result.fit.shift_s == pytest.approx(0.045, abs=0.001)
+@pytest.mark.parametrize(
+    ("seed", "voltage", "at_work"),
+    [
+        (3, None, {"motor_lag": ("up and down", (0.03, 0.06), 0.003)}),
+        (4, SAG, {"battery_sag": ("power of voltage", (0.9,), 0.05), "motor_lag": ("one constant", (0.04,), 0.002)}),
+        (5, None, {"delay": ("of the command", (0.045,), 0.001)}),
+    ],
+    ids=["up and down each by its own constant", "a sagging battery and a lag", "a delay is no lag"],
+)
+def test_the_forms_at_work_are_found_with_their_values_and_no_others(seed, voltage, at_work):
+    made = {key: (name, values) for key, (name, values, _) in at_work.items()}
+    fit = searched(recorded(seed, voltage=voltage, **made)).fit
+    assert {key: found.name for key, found in fit.chain} == {key: name for key, (name, *_) in at_work.items()}
+    for key, (_, values, allowed) in at_work.items():
+        # The nuisance shift of half a sample shares a delay.
+        found = fit.of(key)[1] + (fit.shift_s if key == "delay" else 0.0)
+        np.testing.assert_allclose(found, values, atol=allowed)
 
 
 def test_a_limit_that_is_reached_in_one_second_of_twenty_is_found():

@@ -1,7 +1,5 @@
 """The voltage to be expected of a noisy voltmeter."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

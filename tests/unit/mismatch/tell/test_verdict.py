@@ -191,11 +191,7 @@ def test_a_doubt_that_stops_makes_the_set_not_judged():
 def test_all_believed_values_stand_in_one_table():
     row = ValueRow("mass_kg", 0.652, 0.70, 0.68, 0.72, 0.652)
     made = analysis(findings=[drag_finding()])
-    made = replace(
-        made,
-        believed_values=(row,),
-        value_correlations={("mass_kg", "thrust_coefficient_n_s2"): 0.999},
-    )
+    made = replace(made, believed_values=(row,), value_correlations={("mass_kg", "thrust_coefficient_n_s2"): 0.999})
     found = verdict_of(made)
     value = found.believed_values["mass_kg"]
     assert (value.believed, value.estimate, value.interval_95, value.delivered) == (0.652, 0.70, (0.68, 0.72), 0.652)

@@ -1,7 +1,5 @@
 """A fleet's vehicles over their flights: a change is reported at the set in which it begins, once."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from pathlib import Path

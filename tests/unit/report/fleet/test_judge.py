@@ -1,7 +1,5 @@
 """A fleet's sets are judged each by itself: faults stay with their set, and nothing is judged twice."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,7 +1,5 @@
 """Tables, figure and page of a fleet from verdicts written by hand."""
 
-from __future__ import annotations
-
 import html
 import json
 import re
@@ -51,6 +49,14 @@ def fleet(tmp_path: Path) -> tuple[list[Path], Path]:
     return sorted(out.iterdir()), recordings
 
 
+def page_of(collected, figure: Path, links: dict[str, str] | None = None) -> str:
+    """The page on what was collected, its figure drawn anew."""
+    sets, effects, parameters = collected
+    counts = by_effect(effects, sets)
+    draw_fleet(counts, parameters, sets, figure)
+    return make_page("sets", sets, counts, by_vehicle(effects, sets), links or {}, figure)
+
+
 def test_what_needs_a_person_and_what_stands_by_itself(fleet) -> None:
     sets, _, _ = collect(*fleet)
     why = dict(zip(sets["set"], sets["person"], strict=True))
@@ -96,13 +102,8 @@ def test_days_in_names(name: str, day: str) -> None:
 
 
 def test_the_page_shows_everything_and_the_same_twice(fleet, tmp_path: Path) -> None:
-    sets, effects, parameters = collect(*fleet)
-    pages = []
-    for name in ("one", "two"):
-        figure = tmp_path / f"{name}.svg"
-        draw_fleet(by_effect(effects, sets), parameters, sets, figure)
-        tables = sets, by_effect(effects, sets), by_vehicle(effects, sets)
-        pages.append(make_page("sets", *tables, {"swift_later": "there/report.html"}, figure))
+    links = {"swift_later": "there/report.html"}
+    pages = [page_of(collect(*fleet), tmp_path / f"{name}.svg", links) for name in ("one", "two")]
     assert pages[0] == pages[1]
     assert "6 sets of 3 vehicles" in pages[0] and "<b>4</b> need a person" in pages[0]
     assert "&lt;swift_20261102&gt;" in pages[0] and "<svg" in pages[0]
@@ -110,9 +111,7 @@ def test_the_page_shows_everything_and_the_same_twice(fleet, tmp_path: Path) -> 
 
 
 def test_no_script_runs_on_the_page_and_it_fetches_nothing(fleet, tmp_path: Path) -> None:
-    sets, effects, parameters = collect(*fleet)
-    draw_fleet(by_effect(effects, sets), parameters, sets, tmp_path / "f.svg")
-    page = make_page("sets", sets, by_effect(effects, sets), by_vehicle(effects, sets), {}, tmp_path / "f.svg")
+    page = page_of(collect(*fleet), tmp_path / "f.svg")
     head = page[: page.index("<style>")]
     policy = html.unescape(re.search(r'http-equiv="Content-Security-Policy" content="([^"]+)"', head)[1])
     assert "default-src 'none'; script-src 'none'; " in policy
@@ -121,8 +120,4 @@ def test_no_script_runs_on_the_page_and_it_fetches_nothing(fleet, tmp_path: Path
 def test_a_fleet_without_any_verdict(tmp_path: Path) -> None:
     (tmp_path / "broken").mkdir()
     (tmp_path / "broken" / "failed.json").write_text(json.dumps({"reason": "empty", "fault": True}))
-    sets, effects, parameters = collect([tmp_path / "broken"], tmp_path)
-    draw_fleet(by_effect(effects, sets), parameters, sets, tmp_path / "f.svg")
-    assert "0 sets" not in make_page(
-        "x", sets, by_effect(effects, sets), by_vehicle(effects, sets), {}, tmp_path / "f.svg"
-    )
+    assert "0 sets" not in page_of(collect([tmp_path / "broken"], tmp_path), tmp_path / "f.svg")
