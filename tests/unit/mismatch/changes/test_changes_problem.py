@@ -189,7 +189,7 @@ def test_the_error_of_a_form_is_shared_by_the_forms_that_it_may_look_like():
 
 
 def test_a_closed_loop_feigns_a_delay_by_what_the_second_set_leaves_unexplained_more_than_the_first():
-    calm, shaken = (flight([0.0, 0.0, 0.0], TERMS, seed=3, noise=noise).evidence() for noise in (1.0, 3.0))
+    calm, shaken = (flight([0.0, 0.0, 0.0], ZEROS, seed=3, noise=noise).evidence() for noise in (1.0, 3.0))
     assert feigned(calm, calm, np.ones(1)) == pytest.approx(np.zeros(3), abs=1e-9)
     # Columns of a variance of 1.09; what moves a heavier vehicle as much is three times as large a force.
     assert feigned(calm, shaken, np.ones(1)) == pytest.approx(np.full(3, 0.5 * (8 / 1.09) ** 0.5), rel=0.1)
