@@ -154,13 +154,18 @@ FORMATS = {  # kind: number, format, labels
 LETTERS = {"Q": "Q", "B": "B", "f": "f", "H": "H", "N": "16s"}
 
 
-def dataflash(truth: pd.DataFrame, parameters: dict[str, float]) -> bytes:
-    """A DataFlash log: every kind's format, then messages; motors 1 to 4 on channels 5 to 8, 1100 to 1900 µs."""
+def dataflash(truth: pd.DataFrame, parameters: dict[str, float], before_4_1: bool = False) -> bytes:
+    """A DataFlash log: every kind's format, then messages; motors 1 to 4 on channels 5 to 8, 1100 to 1900 µs.
+
+    `before_4_1`: each speed controller has a message of its own, ESC5 to ESC8.
+    """
     out = bytearray()
-    table = {"FMT": (128, "BBnNZ", "Type,Length,Name,Format,Columns"), **FORMATS}
+    each = {f"ESC{n}": (200 + n, "Qf", "TimeUS,RPM") for n in range(5, 9)} if before_4_1 else {}
+    formats = FORMATS | each
+    table = {"FMT": (128, "BBnNZ", "Type,Length,Name,Format,Columns"), **formats}
 
     def message(kind: str, *values) -> None:
-        number, form, _ = FORMATS[kind]
+        number, form, _ = formats[kind]
         packed = struct.pack("<" + "".join(LETTERS[x] for x in form), *values)
         out.extend(b"\xa3\x95" + bytes([number]) + packed)
 
@@ -185,7 +190,7 @@ def dataflash(truth: pd.DataFrame, parameters: dict[str, float]) -> bytes:
         message("XKF1", at, 0, *(values[n] for n in (*c.VELOCITY, *c.POSITION)))
         message("RCOU", at, 1500, 1500, 1500, 1500, *(round(1100 + 800 * values[n]) for n in THROTTLES))
         for i, name in enumerate(SPEEDS):
-            message("ESC", at, 4 + i, values[name] * 60 / (2 * np.pi))
+            message(*(("ESC", at, 4 + i) if not each else (f"ESC{5 + i}", at)), values[name] * 60 / (2 * np.pi))
         message("BAT", at, 0, values["battery_voltage_v"], 12.0)
     return bytes(out)
 
@@ -194,10 +199,11 @@ PARAMETERS = {"FRAME_CLASS": 1, "FRAME_TYPE": 1, "MOT_PWM_MIN": 1100, "MOT_PWM_M
 PARAMETERS |= {f"SERVO{n}_FUNCTION": 28 + n for n in range(5, 9)}
 
 
-def test_ardupilot(tmp_path: Path) -> None:
+@pytest.mark.parametrize("before_4_1", [False, True])
+def test_ardupilot(before_4_1: bool, tmp_path: Path) -> None:
     pytest.importorskip("pymavlink")
     path, truth = tmp_path / "00000001.BIN", flown()
-    path.write_bytes(dataflash(truth, PARAMETERS))
+    path.write_bytes(dataflash(truth, PARAMETERS, before_4_1))
     found = read_log(path)
     assert (found.format, found.known.autopilot) == ("ardupilot", "ardupilot")
     (run,) = found.runs.values()
