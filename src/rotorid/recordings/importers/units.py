@@ -23,7 +23,9 @@ UNITS: dict[str, dict[str, float]] = {
     "angle": {"rad": 1.0, "deg": np.pi / 180, "mrad": 1e-3, "cdeg": np.pi / 18000},
     "acceleration": {"m/s2": 1.0, "g": G, "mg": G / 1000},
     "rotor": {"rad/s": 1.0, "rpm": RPM, "hz": 2 * np.pi},
-    "turns": {"rad/s": 1.0, "rpm": RPM, "hz": 2 * np.pi, "erpm": RPM, "100erpm": 100 * np.pi / 30},
+    "turns": {
+        "rad/s": 1.0, "rpm": RPM, "krpm": 1000 * RPM, "hz": 2 * np.pi, "erpm": RPM, "100erpm": 100 * np.pi / 30
+    },
     "share": {"1": 1.0, "%": 0.01, "us": 1.0, "raw": 1.0},
     "voltage": {"V": 1.0, "mV": 1e-3, "cV": 1e-2, "dV": 0.1},
     "current": {"A": 1.0, "mA": 1e-3, "cA": 1e-2, "dA": 0.1},
@@ -49,6 +51,7 @@ SPELLINGS: dict[str, dict[str, str]] = {
     "rotor": {"rad/s": "rads radps rads1", "rpm": "r/min rev/min revs/min 1/min u/min min1 revolutions/min rpms",
               "hz": "1/s r/s rev/s revs/s rps s1 revolutions/s"},
     "turns": {"rad/s": "rads radps rads1", "rpm": "r/min rev/min revs/min 1/min u/min min1 rpms",
+              "krpm": "1000rpm rpmx1000 kr/min krev/min",
               "hz": "1/s r/s rev/s revs/s rps s1", "erpm": "", "100erpm": "erpm/100"},
     "share": {"1": "ratio fraction norm normalized normalised 01", "%": "percent pct prc", "us": "usec", "raw": ""},
     "voltage": {"V": "volt volts", "mV": "millivolt millivolts", "cV": "", "dV": ""},

@@ -215,6 +215,8 @@ def throttles_of(names: str, values: np.ndarray, **more):
         ("m{}", 32767 * SPOOLED, {}, "?"),
         ("m{}", np.minimum(60000 * SPOOLED, 32767), {}, [0, 32767]),
         ("m{}", 65535 * SPOOLED * 1.5, {}, [0, 65535]),
+        ("m{}", 600 + 900 * SHARES, {}, "?"),  # DShot's, or speeds in rad/s
+        ("m{}_throttle", 600 + 900 * SHARES, {}, [48, 2047]),
     ],
 )  # fmt: skip
 def test_the_range_of_throttles_is_found_or_asked(names: str, values: np.ndarray, more: dict, ends) -> None:
@@ -248,6 +250,33 @@ def test_electrical_speeds_are_no_speeds_of_rotors(names: str, values: np.ndarra
         table = {"t_s": 0.01 * np.arange(len(values)), **more} | {names.format(k): v for k, v in enumerate(values.T)}
         made, _ = convert(pd.DataFrame(table), mapping, "own.csv")
         np.testing.assert_allclose(made["rotor_speed_1_rad_s"], 900 + 100 * SHARES[:, 0])
+
+
+@pytest.mark.parametrize(
+    ("names", "values", "unit"),
+    [
+        *[(name, 700 + 600 * SHARES, "rad/s") for name in (
+            "omega{}", "w{}", "rotor_{}_speed", "motor{}_vel", "rotor_velocity_{}", "w_m{}"
+        )],
+        *[(name, 9000 + 900 * SHARES, "rpm") for name in ("ESC{} rpm", "prop{}_rpm", "M{} (RPM)", "esc_{}.rpm")],
+        *[(name, 9 + SHARES, "krpm") for name in ("rotor{}_krpm", "krpm{}", "M{} [krpm]")],
+        ("motor_{}_hz", 150 + 100 * SHARES, "hz"),
+    ],
+)  # fmt: skip
+def test_speeds_of_rotors_however_they_are_called(names: str, values: np.ndarray, unit: str) -> None:
+    found = throttles_of(names, values)
+    assert found.mapping.channels["rotor_speed"].unit == unit and "throttle" not in found.mapping.channels
+    assert "rotor_speed" not in found.open
+
+
+def test_columns_that_follow_the_thrust_and_are_called_nothing_are_asked(flown: pd.DataFrame) -> None:
+    """The current of each motor follows it too, but is called so."""
+    pull = -flown[c.SPECIFIC_FORCE[2]].to_numpy()
+    table = plain(flown).assign(**{f"k{i}": 100 * np.sqrt(pull) + i for i in range(4)})
+    question = guess(table).open["throttle"]
+    assert "which readings are no and full throttle" in question and "Or are they speeds?" in question
+    table = plain(flown).assign(**{f"motor_{i}_current": pull + i for i in range(4)})
+    assert "throttle" not in guess(table).mapping.channels
 
 
 def test_slow_turns_are_asked_although_the_names_say_rpm() -> None:

@@ -75,7 +75,8 @@ class Draft:
 
 def triples_of(draft: Draft) -> list[Family]:
     free = draft.free()
-    found = [f for axes in named.AXES for f in named.families(free, axes)]
+    more = {n for f in named.numbered(free) if len(f.columns) > 3 for n in f.columns}  # `w0` to `w3` are no three axes
+    found = [f for axes in named.AXES for f in named.families(free, axes) if axes.isalpha() or not more & {*f.columns}]
     last = {(named.words_of(n) or [""])[-1]: n for n in free}
     for names, unit in _RATES_BY_NAME.items():
         if set(names) <= set(last):

@@ -16,7 +16,8 @@ _UNIT_WORDS: dict[str, str] = {
     "m_s": "m/s", "mps": "m/s", "cm_s": "cm/s", "mm_s": "mm/s",
     "rad_s": "rad/s", "rads": "rad/s", "radps": "rad/s", "deg_s": "deg/s", "dps": "deg/s", "degps": "deg/s",
     "mrad_s": "mrad/s", "mrad": "mrad", "cdeg": "cdeg",
-    "rad": "rad", "deg": "deg", "m": "m", "cm": "cm", "mm": "mm", "ft": "ft", "rpm": "rpm", "hz": "hz", "erpm": "erpm",
+    "rad": "rad", "deg": "deg", "m": "m", "cm": "cm", "mm": "mm", "ft": "ft", "rpm": "rpm", "krpm": "krpm", "hz": "hz",
+    "erpm": "erpm",
 }  # fmt: skip
 """Words of a unit at the end of a name to the mapping's unit."""
 _QUALIFIERS = frozenset(
@@ -52,7 +53,10 @@ TRIPLES: dict[str, tuple[frozenset[str], frozenset[str]]] = {
 }
 """To a quantity the words that a stem may end in, and those that must be the whole of it."""
 _ROTORS: dict[str, frozenset[str]] = {
-    "rotor_speed": frozenset("rpm erpm rotor_speed rotor_speeds motor_speed motor_speeds mot_speed".split()),
+    "rotor_speed": frozenset(
+        "rpm krpm erpm omega w rotor_speed rotor_speeds motor_speed motor_speeds mot_speed prop_speed rotor_vel "
+        "motor_vel rotor_velocity motor_velocity".split()
+    ),
     "rotor_command": frozenset("rotor_command rotor_commands".split()),
     "throttle": frozenset(
         "motor motors throttle throttles pwm m mot output outputs thr control u act actuator actuators servo".split()
@@ -159,16 +163,16 @@ def families(names: Iterable[str], axes: str) -> list[Family]:
 
 
 def numbered(names: Iterable[str]) -> list[Family]:
-    """Families of three to sixteen columns numbered in one go from 0 or 1 (`u0` … `u3`, `motor[1]`, `m1_rpm`)."""
+    """Families of three to sixteen columns numbered in one go from 0 or 1 (`u0`, `motor[1]`, `rotor_1_speed`)."""
     found: dict[str, dict[int, tuple[str, str]]] = {}
     for name in names:
         words, unit = _without_unit(words_of(name.replace("(/100)", "")))
         unit = "100erpm" if "(/100)" in name else unit
         if words and words[-1] in _AFTER_NUMBERS and len(words) > 1 and re.search(r"\d$", words[-2]):
             words = words[:-1]
-        match = re.fullmatch(r"(.*?)(?:_m)?_?(\d{1,2})", "_".join(words))
+        match = re.fullmatch(r"(.*?)(?:_m)?_?(\d{1,2})(_[a-z]+)?", "_".join(words))
         if match:
-            stem = match.group(1) or "m"
+            stem = (match[1] + (match[3] or "")).strip("_") or "m"
             found.setdefault(stem, {}).setdefault(int(match.group(2)), (name, unit))
     result = []
     for stem, members in found.items():
@@ -223,7 +227,9 @@ def is_rotor(family: Family, quantity: str) -> bool:
         )
     if family.words & _WISHED and quantity == "rotor_speed":
         return False
-    if quantity == "rotor_speed" and family.unit in ("rpm", "rad/s", "hz", "erpm", "100erpm"):
+    if quantity == "rotor_speed" and family.unit in ("rpm", "krpm", "erpm", "100erpm"):
+        return True
+    if quantity == "rotor_speed" and family.unit in ("rad/s", "hz"):
         return _ends_in(stem, _ROTORS[quantity] | _ROTORS["throttle"])
     return _ends_in("_".join(rest), _ROTORS[quantity])
 

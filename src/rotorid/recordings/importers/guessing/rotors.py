@@ -36,6 +36,9 @@ _RANGES_BY_NAME = {
     "per cent": frozenset("percent pct".split()),
 }
 _BETAFLIGHTS = ("DShot", "pulses in µs")
+_UNNAMED = "no name says it"
+_OTHER_THINGS = frozenset("current amps temp temperature voltage volt volts power thrust torque force".split())
+"""Words of what a motor has besides a speed and a throttle."""
 _LOWEST_PULSE_US = 880.0
 """Pulses of motors that are disarmed go down to 900 µs."""
 _PULSES_OF_HOVER_US = 1300.0
@@ -56,8 +59,12 @@ def guess_rotors(draft: Draft, quantity: str) -> None:
         and not {"throttle", "rotor_speed", "rotor_command"} & set(draft.channels)
     ):
         offered, how = (
-            [f for f in named.numbered(draft.free()) if _carries(draft, f) > BY_NUMBERS_ALONE - 0.1],
-            "no name says it",
+            [
+                f
+                for f in named.numbered(draft.free())
+                if not f.words & _OTHER_THINGS and _carries(draft, f) > BY_NUMBERS_ALONE - 0.1
+            ],
+            _UNNAMED,
         )
     if not offered:
         return
@@ -106,16 +113,20 @@ def _put(draft: Draft, quantity: str, family: Family, how: str) -> None:
             question = f"{question}; {poles}" if question else poles
         draft.put(quantity, family.columns, f"{evidence}; {why}", question, unit=unit, **more)
         return
-    found = _possible_ranges(values, family, _is_betaflight(draft))
+    betaflight = _is_betaflight(draft)
+    found = _possible_ranges(values, family, betaflight)
+    speeds = how == _UNNAMED or (found == ["DShot"] and not betaflight and _can_be_speeds(values, family))
     if found == ["a share"]:
         draft.put(quantity, family.columns, f"{evidence}, so a share", unit="1")
-    elif len(found) == 1:
+    elif len(found) == 1 and not speeds:
         low, high = _RANGES[found[0]]
         more = f"so {found[0]}: no throttle is taken as {low:g} and full throttle as {high:g}"
         draft.put(quantity, family.columns, f"{evidence}, {more}", unit="raw", range=(low, high))
     else:
         kinds = " or ".join(f"[{_RANGES[k][0]:g}, {_RANGES[k][1]:g}] ({k})" for k in found)
         question = f"which readings are no and full throttle: {kinds or 'no usual range holds them'}?"
+        if speeds:
+            question += " Or are they speeds? Then call the channel rotor_speed and state their unit"
         draft.put(quantity, family.columns, evidence, question, unit="raw", range=OPEN)
 
 
@@ -125,6 +136,15 @@ def _that_move(draft: Draft, family: Family) -> Family:
     spread = pd.DataFrame(values).nunique().to_numpy()
     moving = [n for n, count in zip(family.columns, spread, strict=True) if count > 1]
     return replace(family, columns=tuple(moving)) if 3 <= len(moving) < len(family.columns) else family
+
+
+def _can_be_speeds(values: np.ndarray, family: Family) -> bool:
+    """Whether numbers that fit DShot may be speeds in rad/s: never at an end of it, and no word says throttle."""
+    given = values[values > 0]
+    low, high = _RANGES["DShot"]
+    words = {w for column in family.columns for w in named.words_of(column)}
+    plainly = words & frozenset.union(*_RANGES_BY_NAME.values(), frozenset(("throttle", "throttles", "thr")))
+    return not plainly and low < given.min() < _RANGES["pulses in µs"][0] < given.max() < high
 
 
 def _is_betaflight(draft: Draft) -> bool:
@@ -179,6 +199,8 @@ def _speed_unit(family: Family, middle: float, betaflight: bool) -> tuple[str, s
         return OPEN, f"a median of {middle:.4g} can be electrical turns a minute (erpm) or hundreds of them (100erpm)"
     if family.unit in UNITS["rotor"]:
         return family.unit, "the names state the unit"
+    if "krpm" in {family.unit, *family.words}:
+        return "krpm", "the names state the unit"
     if "rpm" in "_".join(family.words):
         if middle > 1000:
             return "rpm", "the names state the unit"
