@@ -34,6 +34,7 @@ of y and z.
 
 from __future__ import annotations
 
+import re
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Literal
@@ -85,6 +86,7 @@ WORLD = {
 TRAVEL = WORLD | {"neu": np.diag([1.0, 1.0, -1.0])}
 """Axes that position and velocity may have, too: a left-handed system has no attitude."""
 ELECTRICAL = ("erpm", "100erpm")
+_DATE, _TIME_OF_DAY = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d"), re.compile(r"\d{1,2}:\d\d:\d\d(\.\d+)?")
 
 
 class MappedChannel(BaseModel):
@@ -202,6 +204,24 @@ def read_columns(path: Path) -> pd.DataFrame:
             f"{path}: expected a table of numbers with a heading, found {len(table.columns)} columns and "
             f"{len(table)} rows"
         )
+    return _clocks_as_seconds(table)
+
+
+def _clocks_as_seconds(table: pd.DataFrame) -> pd.DataFrame:
+    """The table with columns of dates or times of day, each cell one, as seconds."""
+    for name in table.columns:
+        column = table[name]
+        if pd.api.types.is_numeric_dtype(column.dtype) or not (known := column.notna()).any():
+            continue
+        first = str(column[known].iloc[0]).strip()
+        if _DATE.match(first):
+            since = pd.to_datetime(column, format="ISO8601", utc=True, errors="coerce") - pd.Timestamp(0, tz="UTC")
+        elif _TIME_OF_DAY.fullmatch(first):
+            since = pd.to_timedelta(column, errors="coerce")
+        else:
+            continue
+        if since.notna().equals(known):
+            table[name] = since.dt.total_seconds()
     return table
 
 

@@ -21,7 +21,7 @@ UNITS: dict[str, dict[str, float]] = {
     "velocity": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
     "rate": {"rad/s": 1.0, "deg/s": np.pi / 180, "mrad/s": 1e-3},
     "angle": {"rad": 1.0, "deg": np.pi / 180, "mrad": 1e-3, "cdeg": np.pi / 18000},
-    "acceleration": {"m/s2": 1.0, "g": G, "mg": G / 1000},
+    "acceleration": {"m/s2": 1.0, "g": G, "mg": G / 1000, "cm/s2": 1e-2, "mm/s2": 1e-3, "ft/s2": _FOOT_M},
     "rotor": {"rad/s": 1.0, "rpm": RPM, "hz": 2 * np.pi},
     "turns": {
         "rad/s": 1.0, "rpm": RPM, "krpm": 1000 * RPM, "hz": 2 * np.pi, "erpm": RPM, "100erpm": 100 * np.pi / 30
@@ -47,7 +47,8 @@ SPELLINGS: dict[str, dict[str, str]] = {
     "velocity": {"m/s": "ms mps ms1", "cm/s": "cms cmps", "mm/s": "mms mmps"},
     "rate": {"rad/s": "rads radps rads1", "deg/s": "degs dps degps degrees/s degree/s degs1", "mrad/s": "mrads mradps"},
     "angle": {"rad": "radian radians", "deg": "degree degrees", "mrad": "", "cdeg": "centideg centidegrees"},
-    "acceleration": {"m/s2": "ms2 mps2 m/s/s m/ss", "g": "gs g0 gn", "mg": "milligee"},
+    "acceleration": {"m/s2": "ms2 mps2 m/s/s m/ss", "g": "gs g0 gn", "mg": "milligee",
+                     "cm/s2": "cms2 cm/s/s gal", "mm/s2": "mms2 mm/s/s", "ft/s2": "fts2 ft/s/s"},
     "rotor": {"rad/s": "rads radps rads1", "rpm": "r/min rev/min revs/min 1/min u/min min1 revolutions/min rpms",
               "hz": "1/s r/s rev/s revs/s rps s1 revolutions/s"},
     "turns": {"rad/s": "rads radps rads1", "rpm": "r/min rev/min revs/min 1/min u/min min1 rpms",

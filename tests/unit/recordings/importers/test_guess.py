@@ -20,7 +20,7 @@ from rotorid.recordings import read_set, templates
 from rotorid.recordings.importers.faults import join_rows
 from rotorid.recordings.importers.guessing import names as column_names
 from rotorid.recordings.importers.guessing.guess import as_text, guess
-from rotorid.recordings.importers.mapping import BODY, TRAVEL, UNITS, WORLD, convert, read_mapping
+from rotorid.recordings.importers.mapping import BODY, TRAVEL, UNITS, WORLD, convert, read_columns, read_mapping
 from tests.public_logs import LOGS, needs_logs
 
 NAMES = {
@@ -530,3 +530,89 @@ def test_columns_that_hold_nothing_are_no_channels() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert set(guess(empty).mapping.channels) == {"time"}
+
+
+# Clocks, rates and accelerations under more names -------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "written", "unit"),
+    [
+        ("timestamp", lambda t: [f"2024-05-01 10:00:{x:09.6f}" for x in t], "s"),
+        ("time", lambda t: [f"2024-05-01T10:00:{x:09.6f}Z" for x in t], "s"),
+        ("utc_time", lambda t: pd.Timestamp("2024-05-01") + pd.to_timedelta(t, "s"), "s"),
+        ("time", lambda t: [f"9:59:{x:09.6f}" for x in t], "s"),
+        ("%time", lambda t: 1.7e18 + np.round(t * 1e9), "ns"),
+        ("field.header.stamp", lambda t: 1.7e18 + np.round(t * 1e9), "ns"),
+        ("elapsed (ms)", lambda t: t * 1000, "ms"),
+        ("Seconds", lambda t: t, "s"),
+    ],
+)  # fmt: skip
+def test_clocks_however_they_are_written(flown: pd.DataFrame, name: str, written, unit: str, tmp_path: Path) -> None:
+    table, path = plain(flown), tmp_path / "own.parquet"
+    table = table.assign(t_s=written(table["t_s"].to_numpy())).rename(columns={"t_s": name})
+    table.to_parquet(path)
+    read = read_columns(path)
+    mapping = guess(read).mapping
+    assert mapping.channels["time"].columns == (name,) and mapping.channels["time"].unit == unit
+    made, _ = convert(read, mapping, "own.csv")
+    np.testing.assert_allclose(made[c.TIME], flown[c.TIME] - flown[c.TIME].iloc[0], atol=1e-6)
+
+
+def test_a_clock_that_counts_whole_seconds_is_asked_for_its_fraction(flown: pd.DataFrame) -> None:
+    table = plain(flown)
+    table = table.assign(nsecs=table["t_s"] % 1 * 1e9, t_s=table["t_s"] // 1).rename(columns={"t_s": "stamp.secs"})
+    assert "is its fraction in another column?" in guess(table).open["time"]
+
+
+@pytest.mark.parametrize(
+    ("names", "factor", "unit"),
+    [
+        (("p", "q", "r"), 1.0, "rad/s"), (("P (deg/s)", "Q (deg/s)", "R (deg/s)"), 180 / np.pi, "deg/s"),
+        (("rollRate", "pitchRate", "yawRate"), 180 / np.pi, "deg/s"),
+        (("imu.roll_rate", "imu.pitch_rate", "imu.yaw_rate"), 1.0, "rad/s"),
+        (("gyro_roll_dps", "gyro_pitch_dps", "gyro_yaw_dps"), 180 / np.pi, "deg/s"),
+        (("roll_rate_deg", "pitch_rate_deg", "yaw_rate_deg"), 180 / np.pi, "deg/s"),
+        (("ATTITUDE.rollspeed", "ATTITUDE.pitchspeed", "ATTITUDE.yawspeed"), 1.0, "rad/s"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("attitude", [True, False])
+def test_body_rates_named_by_letters_or_angles(flown: pd.DataFrame, names, factor: float, unit: str, attitude) -> None:
+    """Without an attitude the unit is that of the names, or asked; a rate that is asked for is none."""
+    table = plain(flown)
+    rates = {n: table[f"gyro_{a}"] * factor for n, a in zip(names, "xyz", strict=True)}
+    table = table.drop(columns=[f"gyro_{a}" for a in "xyz"]).assign(**rates, roll_rate_sp=0, pitch_rate_sp=0)
+    if not attitude:
+        table = table.drop(columns=["qw", "qx", "qy", "qz"])
+    channel = guess(table).mapping.channels["angular_velocity"]
+    stated = attitude or any(word in names[0] for word in ("dps", "deg", "speed"))
+    assert channel.columns == tuple(names) and channel.unit == (unit if stated else "?")
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "unit"),
+    [
+        ("acc_{}_mg", 1000 / 9.80665, "mg"), ("acc_{}_cm_s2", 100.0, "cm/s2"), ("acc_{} [mm/s^2]", 1000.0, "mm/s2"),
+        ("acc_{}_ft_s2", 1 / 0.3048, "ft/s2"), ("acc_{}", 1 / 0.3048, "?"), ("acc_{}", 1000.0, "?"),
+        ("acc_{}_g", 100.0, "?"),
+    ],
+)  # fmt: skip
+def test_units_of_an_accelerometer_by_its_names(flown: pd.DataFrame, name: str, factor: float, unit: str) -> None:
+    table = plain(flown)
+    force = {name.format(a): table[f"acc_{a}"] * factor for a in "xyz"}
+    table = table.drop(columns=[f"acc_{a}" for a in "xyz"]).assign(**force)
+    assert guess(table).mapping.channels["specific_force"].unit == unit
+
+
+def test_nine_columns_are_a_matrix_and_no_quaternion(flown: pd.DataFrame) -> None:
+    table = plain(flown).drop(columns=["qw", "qx", "qy", "qz"])
+    turn = Rotation.from_quat(flown[list(c.QUATERNION)].to_numpy()[:, [1, 2, 3, 0]]).as_matrix().reshape(-1, 9)
+    assert "attitude" not in guess(table.assign(**{f"rotation[{k}]": turn[:, k] for k in range(9)})).mapping.channels
+
+
+def test_angles_above_a_full_turn_are_hundredths_of_a_degree(flown: pd.DataFrame) -> None:
+    table = plain(flown).drop(columns=["qw", "qx", "qy", "qz"])
+    turn = Rotation.from_quat(flown[list(c.QUATERNION)].to_numpy()[:, [1, 2, 3, 0]])
+    angles = dict(zip(("yaw", "pitch", "roll"), turn.as_euler("ZYX", degrees=True).T * 100, strict=True))
+    channel = guess(table.assign(**angles)).mapping.channels["attitude"]
+    assert (channel.unit, channel.form) == ("cdeg", "euler")

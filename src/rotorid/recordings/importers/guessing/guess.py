@@ -41,6 +41,11 @@ from rotorid.recordings.tables import numbers
 _USUAL = {"voltage": (60.0, 2.5, 60.0), "current": (60.0, 0.0, 150.0), "temperature": (60.0, -30.0, 130.0)}
 """To a kind the largest median that is plainly in the contract's unit, and between what limits it lies, V, A, °C."""
 
+_USUAL_ACCELERATIONS = ("m/s2", "g", "mg")
+"""Units of accelerometers that names need not state; counts can be as large as others."""
+_MOVES_ON = 0.5
+"""Share of the rows in which a clock moves on at least."""
+
 
 @dataclass(frozen=True)
 class _Guess:
@@ -136,6 +141,7 @@ def _guess_time(draft: Draft) -> None:
     draft.table = join_rows(draft.table, name)
     values = draft.table[name].to_numpy(float)
     steps = np.diff(values[np.isfinite(values)])
+    moves = float((steps > 0).mean()) if len(steps) else 0.0
     steps = steps[steps > 0]
     usual = float(np.median(steps)) if len(steps) else np.nan
     fits = [u for u, f in UNITS["time"].items() if RATES_HZ[0] <= 1 / (usual * f) <= RATES_HZ[1]] if usual > 0 else []
@@ -148,6 +154,8 @@ def _guess_time(draft: Draft) -> None:
     else:
         unit, evidence = OPEN, f"by its name; {seen}"
         question = f"its name says {stated}, its step {' or '.join(fits)}" if stated else "its unit is not clear"
+    if moves < _MOVES_ON:
+        unit, question = OPEN, f"it moves on in {moves:.0%} of the rows: is its fraction in another column?"
     draft.put("time", [name], evidence, question, unit=unit)
     if unit != OPEN and len(steps):
         _set_clock(draft, values * UNITS["time"][unit])
@@ -231,9 +239,8 @@ def _guess_specific_force(draft: Draft) -> None:
 
 def _force_unit(family: Family, norm: float) -> str:
     """The unit in which a median norm is about 1 g, empty where there is none or the names say another."""
-    unit = next((u for u, f in UNITS["acceleration"].items() if 0.7 < norm * f / G < 1.6), "")
-    stated = family.unit if family.unit in UNITS["acceleration"] else ""
-    return unit if stated in ("", unit) else ""
+    among = [family.unit] if family.unit in UNITS["acceleration"] else _USUAL_ACCELERATIONS
+    return next((u for u in among if 0.7 < norm * UNITS["acceleration"][u] / G < 1.6), "")
 
 
 def _power(counts: float) -> int:

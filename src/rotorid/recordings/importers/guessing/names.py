@@ -13,6 +13,7 @@ from dataclasses import dataclass
 _UNIT_WORDS: dict[str, str] = {
     "m_s_s": "m/s2",
     "m_s2": "m/s2", "m_s_2": "m/s2", "m_s^2": "m/s2", "ms2": "m/s2", "mps2": "m/s2", "mg": "mg", "g": "g",
+    "cm_s2": "cm/s2", "cm_s^2": "cm/s2", "mm_s2": "mm/s2", "mm_s^2": "mm/s2", "ft_s2": "ft/s2", "ft_s^2": "ft/s2",
     "m_s": "m/s", "mps": "m/s", "cm_s": "cm/s", "mm_s": "mm/s",
     "rad_s": "rad/s", "rads": "rad/s", "radps": "rad/s", "deg_s": "deg/s", "dps": "deg/s", "degps": "deg/s",
     "mrad_s": "mrad/s", "mrad": "mrad", "cdeg": "cdeg",
@@ -64,8 +65,19 @@ _ROTORS: dict[str, frozenset[str]] = {
 }  # fmt: skip
 _QUATERNION = frozenset("q quat quaternion att_q attitude_q orientation rotation".split())
 _ANGLES = ({"roll", "phi"}, {"pitch", "theta"}, {"yaw", "psi", "heading"})
+_TURNING = frozenset("rate rates speed vel gyro gyr omega".split())
+"""Words that make a name of an angle one of a body rate."""
 _SCALARS: dict[str, tuple[str, ...]] = {
-    "time": (r"t([ _(\[]*([munµ]?s)[)\]]?)?", r"time(stamp)?([ _(\[].*)?", r"time_.*", r".*timestamp.*"),
+    "time": (
+        r"%?t([ _(\[]*([munµ]?s)[)\]]?)?",
+        r"%?time(stamp)?([ _(\[].*)?",
+        r"time_.*",
+        r".*timestamp.*",
+        r"elapsed.*",
+        r"(date|utc)[ _]?time.*",
+        r"(.*[._/])?stamp(\b.*)?",
+        r"sec(ond)?s?",
+    ),
     "battery_voltage": (r"v_?bat(t|tery)?.*", r"battery_?v(olt(age)?)?.*", r"volt(age)?.*", r"u_?bat.*"),
     "battery_current": (r"amperage.*", r"current.*", r"i_?bat.*", r"battery_?current.*"),
     "height": (r"height.*", r"agl.*", r"range.*"),
@@ -200,6 +212,25 @@ def of_mavlink(names: Iterable[str]) -> list[Family]:
     ]
 
 
+def body_rates(names: Iterable[str]) -> list[Family]:
+    """Body rates named by letters or by angles: `p`, `q`, `r`; `rollspeed` of MAVLink's `ATTITUDE`; `roll_rate_dps`."""
+    found: dict[int, tuple[str, str]] = {}
+    for name in names:
+        words, unit = _without_unit(words_of(name))
+        last = "_".join(words[-2:])
+        for axis, (letter, meant) in enumerate(zip("pqr", _ANGLES, strict=True)):
+            called = {letter, *(f"{m}{sign}{w}" for m in meant for w in _TURNING for sign in ("", "_"))}
+            called |= {f"{w}_{m}" for m in meant for w in _TURNING}
+            if {last, *words[-1:]} & called and not {*words} & OTHER_THINGS:
+                unit = "rad/s" if last.endswith("speed") else {"rad": "rad/s", "deg": "deg/s"}.get(unit, unit)
+                found.setdefault(axis, (name, unit))
+    if len(found) < 3:
+        return []
+    units = {unit for _, unit in found.values()}
+    columns = tuple(found[axis][0] for axis in range(3))
+    return [Family("omega", columns, "xyz", units.pop() if len(units) == 1 else "", frozenset(("omega",)))]
+
+
 def _ends_in(stem: str, words: frozenset[str]) -> bool:
     return any(stem == w or stem.endswith(f"_{w}") for w in words)
 
@@ -244,7 +275,8 @@ def angles(names: Sequence[str]) -> tuple[tuple[str, str, str], str] | None:
     for meant in _ANGLES:
         for name in names:
             words, unit = _without_unit(words_of(name))
-            if words and words[-1] in meant and not frozenset(words) & OTHER_THINGS and "rate" not in words:
+            other = frozenset(words) & (OTHER_THINGS | _TURNING) or unit.endswith("/s")
+            if words and words[-1] in meant and not other:
                 found.append(name)
                 units.add(unit)
                 break
