@@ -21,7 +21,7 @@ import pandas as pd
 import yaml
 
 from rotorid.errors import InputError
-from rotorid.recordings.importers.faults import join_rows
+from rotorid.recordings.importers.faults import in_order, join_rows
 from rotorid.recordings.importers.guessing import agreement as by
 from rotorid.recordings.importers.guessing import names as named
 from rotorid.recordings.importers.guessing.attitude import guess_attitude_and_rates
@@ -138,7 +138,7 @@ def _guess_time(draft: Draft) -> None:
             "time", [OPEN], "", "no column is named as a time, and without one nothing can be imported", unit=OPEN
         )
         return
-    draft.table = join_rows(draft.table, name)
+    draft.table = join_rows(in_order(draft.table, name)[0], name)
     values = draft.table[name].to_numpy(float)
     steps = np.diff(values[np.isfinite(values)])
     moves = float((steps > 0).mean()) if len(steps) else 0.0
