@@ -18,7 +18,7 @@ _UNIT_WORDS: dict[str, str] = {
     "rad_s": "rad/s", "rads": "rad/s", "radps": "rad/s", "deg_s": "deg/s", "dps": "deg/s", "degps": "deg/s",
     "mrad_s": "mrad/s", "mrad": "mrad", "cdeg": "cdeg",
     "rad": "rad", "deg": "deg", "m": "m", "cm": "cm", "mm": "mm", "ft": "ft", "rpm": "rpm", "krpm": "krpm", "hz": "hz",
-    "erpm": "erpm",
+    "erpm": "erpm", "kgf": "kgf", "gf": "gf", "lbf": "lbf", "n_m": "N.m", "nm": "N.m", "mnm": "mN.m", "mn_m": "mN.m",
 }  # fmt: skip
 """Words of a unit at the end of a name to the mapping's unit."""
 _QUALIFIERS = frozenset(
@@ -51,6 +51,8 @@ TRIPLES: dict[str, tuple[frozenset[str], frozenset[str]]] = {
     ),
     "position": (frozenset("pos position".split()), frozenset(("p", ""))),
     "velocity": (frozenset("vel velocity".split()), frozenset("v".split())),
+    "force": (frozenset(("force",)), frozenset(("f",))),
+    "moment": (frozenset("moment torque".split()), frozenset("m t tau".split())),
 }
 """To a quantity the words that a stem may end in, and those that must be the whole of it."""
 _ROTORS: dict[str, frozenset[str]] = {
@@ -79,12 +81,16 @@ _SCALARS: dict[str, tuple[str, ...]] = {
         r"sec(ond)?s?",
     ),
     "battery_voltage": (r"v_?bat(t|tery)?.*", r"battery_?v(olt(age)?)?.*", r"volt(age)?.*", r"u_?bat.*"),
-    "battery_current": (r"amperage.*", r"current.*", r"i_?bat.*", r"battery_?current.*"),
+    "battery_current": (r"amperage.*", r"current.*", r"i_?bat.*", r"battery_?current.*", r"amps?\b.*"),
     "height": (r"height.*", r"agl.*", r"range.*"),
     "temperature": (r"temp(erature)?.*",),
     "thrust": (r"thrust([ _(\[,/].*)?", r".*[ _]thrust([ _(\[,/].*)?", r"load( cell)?([ _(\[,/].*)?"),
     "torque": (r"torque([ _(\[,/].*)?", r".*[ _]torque([ _(\[,/].*)?"),
-    "rotor_speed": (r"(rotor|motor|prop\w*)?[ _]?(speed|rpm)([ _(\[,/].*)?", r".*[ _(\[]rpm.*", r".*rotation.*speed.*"),
+    "rotor_speed": (
+        r"(rotor|motor|prop\w*)?[ _]?(speed|e?rpm|omega)([ _(\[,/].*)?",
+        r".*[ _(\[]e?rpm.*",
+        r".*rotation.*speed.*",
+    ),
     "throttle": (r"(throttle|esc|pwm|motor command)([ _(\[,/].*)?",),
 }
 _MAVLINK = "xyz of MAVLink"
@@ -237,9 +243,9 @@ def _ends_in(stem: str, words: frozenset[str]) -> bool:
 
 def is_named(family: Family, quantity: str) -> bool:
     """Whether three columns are named as a quantity of motion; `ang_vel` is no velocity, `acc_bias` no acceleration."""
-    if family.words & OTHER_THINGS:
-        return False
     endings, whole = TRIPLES[quantity]
+    if family.words & OTHER_THINGS - endings:
+        return False
     if family.axes in ("012", "123") and family.stem == "":
         return False
     turning = bool(family.words & {"ang", "angular", "rot", "rotational"})

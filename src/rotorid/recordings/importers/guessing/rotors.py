@@ -12,6 +12,7 @@ from rotorid.recordings.importers.guessing.draft import (
     BY_NUMBERS_ALONE,
     CONTRADICTED,
     Draft,
+    triples_of,
 )
 from rotorid.recordings.importers.guessing.names import Family
 from rotorid.recordings.importers.mapping import CHANNELS, ELECTRICAL, OPEN
@@ -84,7 +85,11 @@ def guess_stand(draft: Draft) -> None:
         unit, top = stated(name, kind), float(np.nanmax(np.abs(draft.values([name]))))
         question = "" if unit else f"in which unit? Its largest value is {top:.4g}"
         draft.put(quantity, [name], f"by its name; up to {top:.4g}", question, unit=unit or OPEN)
-    if "thrust" not in draft.channels:
+    for quantity, family in six_axes(draft).items():
+        kind = CHANNELS[quantity][0]
+        unit = next(iter({stated(n, kind) for n in family.columns})) or OPEN
+        draft.put(quantity, family.columns, "by their names", "in which unit?" if unit == OPEN else "", unit=unit)
+    if not {"thrust", "force"} & set(draft.channels):
         return
     for quantity in ("rotor_speed", "throttle"):
         name = named.scalar(draft.free(), quantity)
@@ -92,6 +97,18 @@ def guess_stand(draft: Draft) -> None:
             unit = stated(name, "turns") if quantity == "rotor_speed" else ""
             words = frozenset(named.words_of(name))
             _put(draft, quantity, Family(name, (name,), "number", unit, words), "by its name")
+
+
+def six_axes(draft: Draft) -> dict[str, Family]:
+    """Force and moment of a stand by their names; next to a gyroscope, or alone without a unit, `f` is specific."""
+    triples = triples_of(draft)
+    if any(named.is_named(f, "angular_velocity") for f in triples):
+        return {}
+    moment = next((f for f in triples if named.is_named(f, "moment")), None)
+    force = next((f for f in triples if named.is_named(f, "force")), None)
+    if force is None or (moment is None and not stated(force.columns[2], "force")):
+        return {}
+    return {"force": force} | ({} if moment is None else {"moment": moment})
 
 
 def _put(draft: Draft, quantity: str, family: Family, how: str) -> None:
@@ -164,8 +181,10 @@ def _possible_ranges(values: np.ndarray, family: Family, betaflight: bool) -> li
         return []
     low, middle, high = np.quantile(given, [0.005, 0.5, 0.995])
     names = {w for column in family.columns for w in named.words_of(column)}
-    stated = next((kind for kind, words in _RANGES_BY_NAME.items() if names & words), None)
-    among = (stated,) if stated else _BETAFLIGHTS if betaflight else tuple(_RANGES)
+    named_so = next((kind for kind, words in _RANGES_BY_NAME.items() if names & words), None)
+    if all(stated(column, "share") == "%" for column in family.columns):
+        named_so = "per cent"
+    among = (named_so,) if named_so else _BETAFLIGHTS if betaflight else tuple(_RANGES)
     held = []
     for kind in among:
         bottom, full = _RANGES[kind]
@@ -174,7 +193,7 @@ def _possible_ranges(values: np.ndarray, family: Family, betaflight: bool) -> li
             continue
         if below <= low and high <= full + 0.02 * (full - bottom):
             held.append(kind)
-    if stated is None and not betaflight:
+    if named_so is None and not betaflight:
         fits = [k for k in held if _HOVERS[0] <= (middle - _RANGES[k][0]) / np.ptp(_RANGES[k]) <= _HOVERS[1]]
         held = fits or [k for k in held if k in ("a share", "-1 to 1")][:1] or held
         if low >= _RANGES["pulses in µs"][0] and middle > _PULSES_OF_HOVER_US:
