@@ -18,7 +18,7 @@ _UNIT_WORDS: dict[str, str] = {
     "rad_s": "rad/s", "rads": "rad/s", "radps": "rad/s", "deg_s": "deg/s", "dps": "deg/s", "degps": "deg/s",
     "mrad_s": "mrad/s", "mrad": "mrad", "cdeg": "cdeg",
     "rad": "rad", "deg": "deg", "m": "m", "cm": "cm", "mm": "mm", "ft": "ft", "rpm": "rpm", "krpm": "krpm", "hz": "hz",
-    "erpm": "erpm", "kgf": "kgf", "gf": "gf", "lbf": "lbf", "n_m": "N.m", "nm": "N.m", "mnm": "mN.m", "mn_m": "mN.m",
+    "erpm": "erpm", "kgf": "kgf", "gf": "gf", "lbf": "lbf", "n_m": "N.m", "nm": "N.m", "m_nm": "mN.m", "mn_m": "mN.m",
 }  # fmt: skip
 """Words of a unit at the end of a name to the mapping's unit."""
 _QUALIFIERS = frozenset(
