@@ -35,7 +35,7 @@ from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import in_the_air
 from rotorid.recordings.importers.bag_records import needs
-from rotorid.recordings.importers.faults import ImportFault, one_sense, report_gaps
+from rotorid.recordings.importers.faults import GOES_ON, ImportFault, one_sense, report_gaps
 from rotorid.recordings.importers.known import Parameters, Values
 from rotorid.recordings.importers.mapping import continuous, quaternion_from_euler_frd
 from rotorid.recordings.importers.units import PULSE_US, RPM
@@ -102,8 +102,6 @@ _HEAD, END = b"\xa3\x95", "END"
 """First bytes of a message, and the key under which stands how many bytes of the last one came."""
 _CLOCKS = {"TimeUS": 1e-6, "TimeMS": 1e-3}
 """Fields of a message's clock, to the seconds that they count in."""
-_GOES_ON = 0.9
-"""Share of another sensor's changes that one has at least as long as it does not stand still or end early."""
 _AROUND_SWITCH_S = 0.2
 
 Log = Mapping[str, pd.DataFrame]
@@ -223,7 +221,7 @@ def _of_sensor(log: Log, kind: str) -> tuple[pd.DataFrame | None, list[ImportFau
         for number, own in table.groupby("I")
     }
     first = min(changes)
-    taken = next(number for number, count in changes.items() if count >= _GOES_ON * max(changes.values()))
+    taken = next(number for number, count in changes.items() if count >= GOES_ON * max(changes.values()))
     faults = []
     if taken != first:
         counts = f"its readings change {changes[first]} times, those of {kind} {taken} {changes[taken]} times"

@@ -15,6 +15,8 @@ import pandas as pd
 
 from rotorid.recordings.columns import TIME
 
+GOES_ON = 0.9
+"""Share of the readings of others of its kind that a sensor has at least, if it neither stands still nor ends early."""
 _REVERSED = 0.02
 """Share of the largest value that a value of the other sign must exceed to be one: less is noise about zero."""
 _SHUFFLED, _LATE_STEPS = 0.05, 100.0
