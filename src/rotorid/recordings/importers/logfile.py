@@ -118,6 +118,8 @@ def format_of(path: Path) -> str:
             f"{path}: not a log that rotorid knows (PX4 ULog, Betaflight, ArduPilot, ROS bag, MCAP, Crazyflie uSD, "
             "NeuroBEM .mat, RCbenchmark CSV, any CSV, Parquet); its first bytes are " + head[:8].hex(" ")
         )
+    if crazyflie.is_table([name.strip(' "') for name in re.split("[,;\t]", text.splitlines()[0])]):
+        return "crazyflie"
     return "rcbenchmark" if _RCBENCHMARK.search(text) and "Thrust" in text else "csv"
 
 
@@ -138,7 +140,7 @@ def read_log(path: Path, mapping: Mapping | None = None) -> _Imported:
 def _read(path: Path, kind: str, mapping: Mapping | None) -> _Imported:
     if kind == "px4":
         return _px4(path)
-    if kind == "crazyflie":
+    if kind == "crazyflie" and mapping is None:
         return _crazyflie(path)
     if kind == "betaflight":
         runs, faults = betaflight.read_betaflight(path)

@@ -410,3 +410,33 @@ def test_a_betaflight_log_becomes_a_set_with_betaflights_order_of_rotors(tmp_pat
     vehicle = read_set(tmp_path / "set").vehicle
     expected = quad_x("betaflight", abs(vehicle.rotors[0].x_m), abs(vehicle.rotors[0].y_m))
     assert vehicle.rotors == expected and ORDERS["betaflight"][0] == ("rear right", "cw")
+
+
+@pytest.mark.parametrize(("clock", "factor"), [("Timestamp", 1e3), ("time_us", 1e6), ("t", 1.0)])
+@pytest.mark.parametrize("sign", [",", ";"])
+def test_a_table_with_the_names_of_the_crazyflies_firmware(
+    clock: str, factor: float, sign: str, tmp_path: Path
+) -> None:
+    """As its client writes it: angles of the old body frame, deg/s, multiples of g, 16 bits; a row late."""
+    path, truth = tmp_path / "flight.csv", flown()
+    turn = Rotation.from_quat(truth[list(c.QUATERNION)].to_numpy()[:, [1, 2, 3, 0]])
+    yaw, pitch, roll = turn.as_euler("ZYX", degrees=True).T
+    table = {clock: truth[c.TIME] * factor, "stateEstimate.roll": roll, "stateEstimate.pitch": pitch}
+    table |= {"stateEstimate.yaw": -yaw, "mode": "hover"}
+    for group, values in (
+        ("gyro.{}", np.degrees(truth[list(c.ANGULAR_VELOCITY)].to_numpy()) @ FLU),
+        ("acc.{}", truth[list(c.SPECIFIC_FORCE)].to_numpy() / 9.81 @ FLU),
+        ("stateEstimate.v{}", truth[list(c.VELOCITY)].to_numpy() @ FLU),
+    ):
+        table |= {group.format(a): column for a, column in zip("xyz", values.T, strict=True)}
+    table |= {f"motor.m{i + 1}": truth[name] * 65536 for i, name in enumerate(THROTTLES)}
+    table = pd.DataFrame(table)
+    table = pd.concat([table[:600], table[601:602], table[600:601], table[602:]])
+    table.to_csv(path, index=False, sep=sign)
+    found = read_log(path)
+    (run,) = found.runs.values()
+    assert (found.format, [f.kind for f in found.faults if f.kind == "order"]) == ("crazyflie", ["order"])
+    check_against(run, truth, (*BODY, *c.QUATERNION, *c.VELOCITY, *THROTTLES), 1e-6)
+    table.drop(columns=clock).to_csv(path, index=False)
+    with pytest.raises(InputError, match="the clock: no column is named as a time"):
+        read_log(path)
