@@ -207,15 +207,6 @@ def _time(data: Mapping[str, np.ndarray], sampled: bool = True) -> np.ndarray:
     return np.where(near, taken, stamp) if sampled else stamp
 
 
-def _on_grid(grid: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Values put into the row of the grid nearest in time; NaN elsewhere (the last one wins a shared row)."""
-    edges = (grid[1:] + grid[:-1]) / 2
-    inside = (time >= grid[0]) & (time <= grid[-1])
-    result = np.full((len(grid), values.shape[1]), np.nan)
-    result[np.searchsorted(edges, time[inside])] = values[inside]
-    return result
-
-
 def _held(grid: np.ndarray, time: np.ndarray, values: np.ndarray, before: float) -> np.ndarray:
     """Values held until the next one; `before` in rows before the first."""
     index = np.searchsorted(time, grid, side="right") - 1
@@ -516,7 +507,7 @@ def convert(log: Px4Log, rotors: int) -> _Converted:
     columns: dict[str, np.ndarray] = {c.TIME: (grid - grid[0]) * 1e-6}
 
     def put(names: Sequence[str], time: np.ndarray, values: np.ndarray) -> None:
-        columns.update(zip(names, _on_grid(grid, time, values).T, strict=True))
+        columns.update(zip(names, in_the_air.on_grid(grid, time, values).T, strict=True))
 
     for names, time, values in inertial.values():
         put(names, time, values)

@@ -80,8 +80,15 @@ _SCALARS: dict[str, tuple[str, ...]] = {
         r"(.*[._/])?stamp(\b.*)?",
         r"sec(ond)?s?",
     ),
-    "battery_voltage": (r"v_?bat(t|tery)?.*", r"battery_?v(olt(age)?)?.*", r"volt(age)?.*", r"u_?bat.*"),
-    "battery_current": (r"amperage.*", r"current.*", r"i_?bat.*", r"battery_?current.*", r"amps?\b.*"),
+    "battery_voltage": (r"v_?bat(t|tery)?.*", r"batt?(ery)?_?v(olt(age)?)?.*", r"volt(age)?.*", r"u_?bat.*"),
+    "battery_current": (
+        r"amperage.*",
+        r"curr(ent)?\b.*",
+        r"current.*",
+        r"i_?bat.*",
+        r"battery_?current.*",
+        r"amps?\b.*",
+    ),
     "height": (r"height.*", r"agl.*", r"range.*"),
     "temperature": (r"temp(erature)?.*",),
     "thrust": (r"thrust([ _(\[,/].*)?", r".*[ _]thrust([ _(\[,/].*)?", r"load( cell)?([ _(\[,/].*)?"),
@@ -292,10 +299,14 @@ def angles(names: Sequence[str]) -> tuple[tuple[str, str, str], str] | None:
 
 
 def scalar(names: Iterable[str], quantity: str) -> str | None:
-    """The first column whose name is that of a scalar quantity, by the pattern that is most its own."""
+    """The first column whose name is that of a scalar quantity, by the pattern that is most its own.
+
+    Of a battery the name of its message may stand before a point (`pm.vbat`, `BAT.Volt`).
+    """
     for pattern in _SCALARS[quantity]:
         for name in names:
-            if re.fullmatch(pattern, str(name).lower()):
+            plain = str(name).lower()
+            if re.fullmatch(pattern, plain.rsplit(".", 1)[-1] if quantity.startswith("battery") else plain):
                 return name
     return None
 
