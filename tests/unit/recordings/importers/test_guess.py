@@ -216,6 +216,7 @@ def throttles_of(names: str, values: np.ndarray, **more):
         ("m{}", np.minimum(60000 * SPOOLED, 32767), {}, [0, 32767]),
         ("m{}", 65535 * SPOOLED * 1.5, {}, [0, 65535]),
         ("m{}", 600 + 900 * SHARES, {}, "?"),  # DShot's, or speeds in rad/s
+        ("RCOU.C{}", 1000 + 600 * SHARES, {}, [1000, 2000]),
         ("m{}_throttle", 600 + 900 * SHARES, {}, [48, 2047]),
     ],
 )  # fmt: skip
@@ -467,7 +468,8 @@ def test_the_names_of_mavlink(flown: pd.DataFrame, message: str, force: str, rat
         ("battery_current_mA", 0.02, "?"), ("battery_voltage", 16.0, "V"), ("battery_voltage_cV", 1600.0, "cV"),
         ("battery_voltage_mV", 16000.0, "mV"), ("vbat", 16000.0, "mV"), ("vbat", 168.0, "dV"), ("vbat", 1680.0, "cV"),
         ("pm.vbat", 3.9, "V"), ("BAT.Volt", 16.0, "V"), ("batt_volt_mV", 16000.0, "mV"),
-        ("BAT.Curr (mA)", 9000.0, "mA"), ("vbat", 380.0, "?"), ("battery_voltage_mV", 16.0, "?"), ("Voltage (V)", 16.0, "V"),
+        ("BAT.Curr (mA)", 9000.0, "mA"), ("vbat", 380.0, "?"), ("battery_voltage_mV", 16.0, "?"),
+        ("Voltage (V)", 16.0, "V"),
         ("temperature_K", 300.0, "K"), ("temperature", 300.0, "K"), ("temperature_c", 35.0, "degC"),
         ("temperature", 35.0, "degC"), ("temperature", 95.0, "?"), ("temp_degF", 95.0, "degF"),
         ("Temperature (°F)", 95.0, "degF"),
@@ -547,6 +549,9 @@ def test_columns_that_hold_nothing_are_no_channels() -> None:
         ("field.header.stamp", lambda t: 1.7e18 + np.round(t * 1e9), "ns"),
         ("elapsed (ms)", lambda t: t * 1000, "ms"),
         ("Seconds", lambda t: t, "s"),
+        ("__time", lambda t: 1.7e9 + t, "s"),
+        ("OSD.flyTime [s]", lambda t: t, "s"),
+        ("IMU.TimeUS", lambda t: np.round(t * 1e6), "us"),
     ],
 )  # fmt: skip
 def test_clocks_however_they_are_written(flown: pd.DataFrame, name: str, written, unit: str, tmp_path: Path) -> None:
@@ -603,6 +608,18 @@ def test_units_of_an_accelerometer_by_its_names(flown: pd.DataFrame, name: str, 
     force = {name.format(a): table[f"acc_{a}"] * factor for a in "xyz"}
     table = table.drop(columns=[f"acc_{a}" for a in "xyz"]).assign(**force)
     assert guess(table).mapping.channels["specific_force"].unit == unit
+
+
+def test_the_names_of_plotjugglers_tables(flown: pd.DataFrame) -> None:
+    """Members of an array have numbers of two digits."""
+    table = plain(flown).rename(columns={"t_s": "__time"})
+    new = {f"gyro_{a}": f"/fmu/sensor_combined/gyro_rad.{i:02d}" for i, a in enumerate("xyz")}
+    new |= {f"acc_{a}": f"/fmu/sensor_combined/accelerometer_m_s2.{i:02d}" for i, a in enumerate("xyz")}
+    new |= {f"q{a}": f"/fmu/vehicle_attitude/q.{i:02d}" for i, a in enumerate("wxyz")}
+    channels = guess(table.rename(columns=new)).mapping.channels
+    for name, form in (("angular_velocity", "gyro_"), ("specific_force", "acc_"), ("attitude", "q")):
+        assert channels[name].columns == tuple(new[f"{form}{a}"] for a in ("wxyz" if name == "attitude" else "xyz"))
+    assert channels["attitude"].form == "wxyz"
 
 
 def test_nine_columns_are_a_matrix_and_no_quaternion(flown: pd.DataFrame) -> None:

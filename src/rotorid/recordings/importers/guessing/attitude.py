@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -85,7 +85,8 @@ def _attitudes(draft: Draft) -> tuple[list[_Turn], str]:
 def guess_attitude_and_rates(draft: Draft) -> None:
     turns, why = _attitudes(draft)
     triples = triples_of(draft)
-    offered = [f for f in triples if named.is_named(f, "angular_velocity")]
+    rates = {"rad": "rad/s", "deg": "deg/s", "mrad": "mrad/s"}  # `gyro_rad` of PX4
+    offered = [replace(f, unit=rates.get(f.unit, f.unit)) for f in triples if named.is_named(f, "angular_velocity")]
     found: dict[tuple[int, Family], Agreement] = {}
     if draft.instants is not None:
         for k, turn in enumerate(turns):

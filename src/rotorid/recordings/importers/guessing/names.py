@@ -62,7 +62,8 @@ _ROTORS: dict[str, frozenset[str]] = {
     ),
     "rotor_command": frozenset("rotor_command rotor_commands".split()),
     "throttle": frozenset(
-        "motor motors throttle throttles pwm m mot output outputs thr control u act actuator actuators servo".split()
+        "motor motors throttle throttles pwm m mot output outputs thr control u act actuator actuators servo "
+        "rcou_c".split()
     ),
 }  # fmt: skip
 _QUATERNION = frozenset("q quat quaternion att_q attitude_q orientation rotation".split())
@@ -72,13 +73,14 @@ _TURNING = frozenset("rate rates speed vel gyro gyr omega".split())
 _SCALARS: dict[str, tuple[str, ...]] = {
     "time": (
         r"%?t([ _(\[]*([munµ]?s)[)\]]?)?",
-        r"%?time(stamp)?([ _(\[].*)?",
+        r"[%_]*time(stamp)?([ _(\[].*)?",
         r"time_.*",
         r".*timestamp.*",
         r"elapsed.*",
         r"(date|utc)[ _]?time.*",
         r"(.*[._/])?stamp(\b.*)?",
         r"sec(ond)?s?",
+        r".*time([um]s)?([ _(\[].*)?",
     ),
     "battery_voltage": (r"v_?bat(t|tery)?.*", r"batt?(ery)?_?v(olt(age)?)?.*", r"volt(age)?.*", r"u_?bat.*"),
     "battery_current": (
@@ -159,6 +161,7 @@ def _member(name: str, axes: str) -> tuple[str, str, str, frozenset[str]] | None
     if not ends or ends[-1][-1] not in axes:
         return None
     last_word, axis = ends[-1][:-1], ends[-1][-1]
+    last_word = "" if axis.isdigit() and last_word == "0" else last_word  # `gyro.02`
     if axis.isdigit() and last_word[-1:].isdigit():
         return None  # of a longer number
     stem = [*ends[:-1], *([last_word] if last_word else [])]

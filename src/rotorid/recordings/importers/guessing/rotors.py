@@ -32,7 +32,7 @@ _RANGES: dict[str, tuple[float, float]] = {
 }
 """Readings of no and of full throttle; a motor that is off may read 0 in each."""
 _RANGES_BY_NAME = {
-    "pulses in µs": frozenset("us usec pwm pulse servo rcout".split()),
+    "pulses in µs": frozenset("us usec pwm pulse servo rcout rcou".split()),
     "DShot": frozenset(("dshot",)),
     "per cent": frozenset("percent pct".split()),
 }
