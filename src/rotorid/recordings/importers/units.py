@@ -24,7 +24,7 @@ UNITS: dict[str, dict[str, float]] = {
     "acceleration": {"m/s2": 1.0, "g": G, "mg": G / 1000, "cm/s2": 1e-2, "mm/s2": 1e-3, "ft/s2": _FOOT_M},
     "rotor": {"rad/s": 1.0, "rpm": RPM, "hz": 2 * np.pi},
     "turns": {
-        "rad/s": 1.0, "rpm": RPM, "krpm": 1000 * RPM, "hz": 2 * np.pi, "erpm": RPM, "100erpm": 100 * np.pi / 30
+        "rad/s": 1.0, "rpm": RPM, "hz": 2 * np.pi, "krpm": 1000 * RPM, "erpm": RPM, "100erpm": 100 * np.pi / 30
     },
     "share": {"1": 1.0, "%": 0.01, "us": 1.0, "raw": 1.0},
     "voltage": {"V": 1.0, "mV": 1e-3, "cV": 1e-2, "dV": 0.1},
