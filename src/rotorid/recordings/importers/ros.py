@@ -323,7 +323,7 @@ def _set_commands_apart(series: dict[str, list[_TopicSeries]]) -> list[ImportFau
     for quantity, offered in list(series.items()):
         asked = [s for s in offered if _COMMANDED.search(s.topic)]
         others = [s for s in offered if s not in asked]
-        if quantity in _UNSET and asked:
+        if quantity in ("attitude", "position", "velocity", "body_velocity") and asked:
             seen = f"{', '.join(s.topic for s in asked)}: a command by the name"
             faults.append(ImportFault("command", quantity, seen, "no measurement, left out", len(asked[0].values)))
         elif quantity == "speeds" and asked and others:

@@ -664,7 +664,8 @@ def test_the_pose_is_that_of_the_body_that_turns_as_measured(tmp_path: Path, top
         "/robot/pose": (lambda k: POSES["PoseStamped"](flight, k, at(k)), at, every),
         topic: (lambda k: POSES["PoseStamped"](other, k, at(k)), at, OTHERS[topic]),
     }
-    topics["/imu"] = (lambda k: flight.imu(k, at(k), covariances=(MINUS, None, None)), at, 1)
+    del topics["/imu"]  # an inertial sensor is none that is asked for, whatever its vehicle is called
+    topics["/target_1/imu"] = (lambda k: flight.imu(k, at(k), covariances=(MINUS, None, None)), at, 1)
     runs, faults, _ = ros.read_ros(written(tmp_path / "a", flight, topics))
     (run,) = runs.values()
     place = run[list(c.POSITION)].dropna().to_numpy() @ FLU
