@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -36,6 +37,7 @@ _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _MOST_ABOVE, _ROWS_BELOW = 200, 3
 """Lines that may stand above a heading, and rows of numbers below by which one is known."""
+_DECIMAL_COMMA = re.compile(r"\s*[-+]?\d+,\d+([eE][-+]?\d+)?\s*")
 _DECIMAL_COMMAS = 1.5
 """A line with so many times the cells of its heading has commas in its numbers."""
 
@@ -74,14 +76,16 @@ class _CsvLayout:
     """Line of the heading in the file, counted from 1; of several the last."""
     cut_off: bool = False
     """Whether the last line ends before its last cell."""
+    decimal: str = "."
+    """The sign before the fraction of a number."""
 
 
 def look_through(path: Path, foreign: bool = False) -> _CsvLayout:
     """How the table of a file is written.
 
     `foreign`: a table of one's own, not of a recording set. Its columns may be separated by semicolons, tabs, bars or
-    blanks as well, one without a name is called by its number (`column_3`), lines may stand above the heading, the
-    heading may have several lines, and the last line may be cut off.
+    blanks as well (its numbers may then have decimal commas), one without a name is called by its number (`column_3`),
+    lines may stand above the heading, the heading may have several lines, and the last line may be cut off.
 
     Raises
     ------
@@ -95,6 +99,10 @@ def look_through(path: Path, foreign: bool = False) -> _CsvLayout:
         if found is None and text.strip():
             found, text = _heading(text, path, foreign)
             line += found.heading_line - 1
+            below = text[:_PACKED_BLOCK].decode("utf-8", "replace").splitlines()[1 : 1 + _MOST_ABOVE]
+            commas = [_DECIMAL_COMMA.fullmatch(cell) for row in below for cell in _names(row, found.separator)]
+            if foreign and found.separator != "," and any(commas):
+                found = replace(found, decimal=",")
         quoted = quoted or b'"' in text
         if found and not quoted:
             cut = _check_cells(text, line, len(found.names), found.separator, path, foreign)
@@ -211,6 +219,8 @@ def _separator(line: str) -> str:
 
 
 def _numbered(names: list[str]) -> list[str]:
+    """The names of a foreign table: without the sign of a comment before the first, a number where there is none."""
+    names = [names[0].lstrip("#% "), *names[1:]]
     return [name or f"column_{number}" for number, name in enumerate(names, 1)]
 
 
@@ -283,9 +293,14 @@ def check_heading(names: list[str], path: Path, line: int = 1) -> None:
         raise InputError(f"{path}, line {line}: expected the names of the columns, found numbers")
 
 
+def with_point(text: str) -> str:
+    """A number with a decimal comma as one with a point; any other text as it is."""
+    return text.replace(",", ".") if _DECIMAL_COMMA.fullmatch(text) else text
+
+
 def _is_number(text: str) -> bool:
     try:
-        float(text)
+        float(with_point(text))
     except ValueError:
         return False
     return True

@@ -21,7 +21,7 @@ from rotorid.io.text.files import (
 )
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
-from rotorid.recordings.csv_text import check_heading, check_size, look_through, opened
+from rotorid.recordings.csv_text import check_heading, check_size, look_through, opened, with_point
 
 _MISSING = frozenset(("", "nan", "na", "n/a", "null", "none", "<na>", "#n/a", "-nan"))
 """What stands for a missing sample, in small letters."""
@@ -53,12 +53,16 @@ def read_cells(path: Path, foreign: bool = False) -> pd.DataFrame:
         with opened(path) as file:
             for _ in range(layout.heading_line - 1):
                 file.readline()
-            table = pd.read_csv(file, sep=layout.separator, skipinitialspace=True, index_col=False, low_memory=False)
+            how = {"skipinitialspace": True, "index_col": False, "low_memory": False}
+            table = pd.read_csv(file, sep=layout.separator, decimal=layout.decimal, **how)
     except (pd.errors.ParserError, pd.errors.EmptyDataError, OverflowError) as error:
         raise InputError(f"{path}: cannot be read as a table ({printable(error)})") from None
     check_size(*table.shape, path)
     table = table.iloc[: len(table) - layout.cut_off]
     table.columns = layout.names
+    if layout.decimal == ",":  # a column with another cell among its numbers is text as a whole
+        for name in table.columns[[not pd.api.types.is_numeric_dtype(kind) for kind in table.dtypes]]:
+            table[name] = table[name].map(with_point, na_action="ignore")
     if foreign:
         table.attrs["layout"] = layout
     return table

@@ -3,9 +3,11 @@
 ArduPilot's frames are the contract's: body forward-right-down, world north-east-down. Read are `IMU` (or `ACC` and
 `GYR`), `XKQ`/`NKQ` or `ATT` for the attitude, `XKF1`/`NKF1` for velocity and position, `RCOU` with the motors' channels
 by `SERVOn_FUNCTION` and their range by `MOT_PWM_MIN` and `MOT_PWM_MAX` (the throttle channel's where these are 0),
-`ESC` for rotor speeds, `BAT` (`CURR` where it is absent), and a range finder that looks down. Attitude, velocity and
-position are the estimator's. Older firmware (3.3-dev) counts time in `TimeMS` and numbers outputs as `Ch1`. Its events
-have no clock and take the time of the message before them. Its estimate `EKF1` is read where `AHRS_EKF_USE` is 1.
+`ESC` (`ESC1` to `ESC8` before 4.1) for rotor speeds, `BAT` (`CURR` where it is absent), and a range finder that looks
+down. Attitude, velocity and position are those of the estimator's core that flew the vehicle (`PI` of `XKF4`); where
+another takes over, a run ends. Of several inertial sensors the first is read that goes on changing. Older firmware
+(3.3-dev) counts time in `TimeMS` and numbers outputs as `Ch1`. Its events have no clock and take the time of the
+message before them. Its estimate `EKF1` is read where `AHRS_EKF_USE` is 1.
 
 The land detector calls idle, spool-up and the wait after landing flight: what is on the ground by the detector of all
 importers (`in_the_air.airborne`) is left out.
@@ -33,14 +35,14 @@ from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import in_the_air
 from rotorid.recordings.importers.bag_records import needs
-from rotorid.recordings.importers.faults import ImportFault, one_sense, report_gaps
+from rotorid.recordings.importers.faults import GOES_ON, ImportFault, one_sense, report_gaps
 from rotorid.recordings.importers.known import Parameters, Values
 from rotorid.recordings.importers.mapping import continuous, quaternion_from_euler_frd
 from rotorid.recordings.importers.units import PULSE_US, RPM
 
 _KINDS = (
-    "IMU", "ACC", "GYR", "XKQ", "NKQ", "ATT", "XKF1", "NKF1", "EKF1", "RCOU", "RCO2", "RCO3", "ESC", "BAT", "CURR",
-    "BARO", "RFND", "EV", "PARM", "MSG", "VER",
+    "IMU", "ACC", "GYR", "XKQ", "NKQ", "ATT", "XKF1", "NKF1", "XKF4", "NKF4", "EKF1", "RCOU", "RCO2", "RCO3", "ESC",
+    *(f"ESC{n}" for n in range(1, 9)), "BAT", "CURR", "BARO", "RFND", "EV", "PARM", "MSG", "VER",
 )  # fmt: skip
 _MOTORS = {33 + i: i for i in range(8)} | {82 + i: 8 + i for i in range(4)} | {160 + i: 12 + i for i in range(20)}
 """`SERVOn_FUNCTION` to the number of the motor, from 0."""
@@ -100,6 +102,7 @@ _HEAD, END = b"\xa3\x95", "END"
 """First bytes of a message, and the key under which stands how many bytes of the last one came."""
 _CLOCKS = {"TimeUS": 1e-6, "TimeMS": 1e-3}
 """Fields of a message's clock, to the seconds that they count in."""
+_AROUND_SWITCH_S = 0.2
 
 Log = Mapping[str, pd.DataFrame]
 
@@ -135,6 +138,8 @@ def read_messages(path: Path) -> dict[str, pd.DataFrame]:
             continue  # damaged: a message without its clock has no place
         if kind == "RCOU":
             table = table.rename(columns={f"Ch{n}": f"C{n}" for n in range(1, 17)})
+        if number := re.fullmatch(r"ESC(\d)", kind):  # before 4.1 each controller has a message of its own
+            kind, table = "ESC", pd.concat([tables.get("ESC"), table.assign(Instance=int(number[1]) - 1)])
         tables[kind] = table
     return tables
 
@@ -206,10 +211,54 @@ def _of_first(table: pd.DataFrame | None, key: str = "I") -> pd.DataFrame | None
     return table
 
 
+def _of_sensor(log: Log, kind: str) -> tuple[pd.DataFrame | None, list[ImportFault]]:
+    """The rows of the first inertial sensor that goes on changing, and a fault where that is not the first of all."""
+    table = log.get(kind)
+    if table is None or "I" not in table or not len(table):
+        return table, []
+    changes = {
+        number: int((np.diff(own.filter(regex="^(Gyr|Acc)").to_numpy(float), axis=0) != 0).any(axis=1).sum())
+        for number, own in table.groupby("I")
+    }
+    first = min(changes)
+    taken = next(number for number, count in changes.items() if count >= GOES_ON * max(changes.values()))
+    faults = []
+    if taken != first:
+        counts = f"its readings change {changes[first]} times, those of {kind} {taken} {changes[taken]} times"
+        found = f"{kind} {first} stands still or ends early ({counts})"
+        faults.append(ImportFault("stuck", "inertial sensor", found, f"{kind} {taken} taken", 0))
+    return table[table["I"] == taken], faults
+
+
+def _of_primary(log: Log, kinds: tuple[str, ...]) -> pd.DataFrame | None:
+    """The rows, of the first kind that is logged, of the estimator's core that flew the vehicle then.
+
+    Of the first core where no message says which.
+    """
+    kind = next((k for k in kinds if k in log), "")
+    table, primary = log.get(kind), log.get(f"{kind[:1]}KF4")
+    if table is None or primary is None or not {"PI", c.TIME} <= set(primary) or "C" not in table:
+        return _of_first(table, "C")
+    held = np.searchsorted(primary[c.TIME], table[c.TIME], side="right") - 1
+    return table[table["C"].to_numpy() == primary["PI"].to_numpy()[np.maximum(held, 0)]]
+
+
+def _switches(log: Log, values: Values) -> np.ndarray:
+    """Times, s, at which another core of the estimator took over."""
+    primary = log.get("NKF4" if _estimators(values)[0] == "NK" and "NKF4" in log else "XKF4")
+    if primary is None or not {"PI", c.TIME} <= set(primary):
+        return np.zeros(0)
+    return primary[c.TIME].to_numpy(float)[1:][np.diff(primary["PI"].to_numpy(float)) != 0]
+
+
+def _estimators(values: Values) -> tuple[str, str]:
+    """How the kinds of the estimators' messages begin, of the one that flew the vehicle first."""
+    return ("NK", "XK") if values.get("AHRS_EKF_TYPE") == 2 else ("XK", "NK")
+
+
 def _clock(log: Log, where: object) -> np.ndarray:
     """Times of the inertial sensor's messages, else of the attitude's, s; InputError where there are none."""
-    imu = _of_first(log.get("IMU"))
-    offered = (imu, _of_first(log.get("GYR")), _of_first(log.get("ACC")), _of_first(log.get("ATT")))
+    offered = (*(_of_sensor(log, kind)[0] for kind in ("IMU", "GYR", "ACC")), _of_first(log.get("ATT")))
     clock = next((t for t in offered if t is not None and len(t) > 1), None)
     if clock is None:
         raise InputError(f"{where}: no message IMU, GYR or ATT to take the clock from")
@@ -245,11 +294,12 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[ImportFault], n
         parts.append((tuple(names), table[c.TIME].to_numpy(float), table[list(fields)].to_numpy(float)))
         return True
 
-    imu = _of_first(log.get("IMU"))
-    accelerometer, gyroscope = (imu, imu) if imu is not None else (_of_first(log.get("ACC")), _of_first(log.get("GYR")))
-    put(c.ANGULAR_VELOCITY, gyroscope, ("GyrX", "GyrY", "GyrZ"))
-    put(c.SPECIFIC_FORCE, accelerometer, ("AccX", "AccY", "AccZ"))
-    quaternion = next((t for k in ("XKQ", "NKQ") if (t := _of_first(log.get(k), "C")) is not None), None)
+    for names, kind, letters in ((c.ANGULAR_VELOCITY, "GYR", "Gyr"), (c.SPECIFIC_FORCE, "ACC", "Acc")):
+        sensor, more = _of_sensor(log, "IMU" if "IMU" in log else kind)
+        put(names, sensor, [f"{letters}{axis}" for axis in "XYZ"])
+        faults += [fault for fault in more if fault not in faults]
+    cores = _estimators(values)
+    quaternion = _of_primary(log, tuple(f"{core}Q" for core in cores))
     attitude = _of_first(log.get("ATT"))
     if quaternion is not None and {"Q1", "Q2", "Q3", "Q4"} <= set(quaternion):
         turns = continuous(quaternion[["Q1", "Q2", "Q3", "Q4"]].to_numpy(float))
@@ -257,7 +307,7 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[ImportFault], n
     elif attitude is not None and {"Roll", "Pitch", "Yaw"} <= set(attitude):
         angles = np.radians(attitude[["Roll", "Pitch", "Yaw"]].to_numpy(float))
         parts.append((c.QUATERNION, attitude[c.TIME].to_numpy(float), quaternion_from_euler_frd(*angles.T)))
-    estimate = next((t for k in ("XKF1", "NKF1") if (t := _of_first(log.get(k), "C")) is not None), None)
+    estimate = _of_primary(log, tuple(f"{core}F1" for core in cores))
     if estimate is None and (estimate := log.get("EKF1")) is not None and values.get("AHRS_EKF_USE") != 1:
         found = "EKF1 did not fly the vehicle (AHRS_EKF_USE is not 1)"
         faults.append(ImportFault("estimate", "velocity, position", found, "columns left out", len(estimate)))
@@ -383,10 +433,18 @@ def _battery(log: Log, faults: list[ImportFault]) -> list[tuple]:
 
 
 def _speeds(esc: pd.DataFrame | None, channels: Mapping[int, int], faults: list[ImportFault]) -> list[tuple]:
-    """Rotor speeds of `ESC` messages, whose instance is the output's number from 0."""
+    """Rotor speeds of `ESC` messages, whose instance is the output's number from 0.
+
+    Some drivers count their controllers instead: where no output has such a number, in the order of the outputs.
+    """
     if esc is None or not {"Instance", "RPM"} <= set(esc):
         return []
-    found = []
+    found, outputs = [], sorted(channels.values())
+    if not {number - 1 for number in outputs} & set(esc["Instance"]) and esc["Instance"].nunique() == len(outputs):
+        order = dict(zip(sorted(set(esc["Instance"])), outputs, strict=True))
+        seen = f"ESC counts {', '.join(f'{i:g}' for i in order)} for outputs {', '.join(map(str, outputs))}"
+        faults.append(ImportFault("order", "rotor_speed", seen, "taken in their order", 0))
+        esc = esc.assign(Instance=esc["Instance"].map(order) - 1)
     for motor, channel in channels.items():
         name = f"rotor_speed_{motor + 1}_rad_s"
         own = esc[esc["Instance"] == channel - 1]
@@ -416,6 +474,13 @@ def read_ardupilot(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFaul
     """Every flight of a DataFlash log by name, what was found, and the key of the rotors' order."""
     log = read_messages(path)
     table, faults, flying = convert(log, path)
-    order, more = order_of(_in_flight(log, path))
-    runs, cuts = in_the_air.flights(table, flying, path.name.split(".")[0], path)
+    values = _in_flight(log, path)
+    order, more = order_of(values)
+    switches, jumps = _switches(log, values) - _clock(log, path)[0], np.zeros(len(table), bool)
+    for switch in switches:
+        jumps |= np.abs(table[c.TIME].to_numpy() - switch) <= _AROUND_SWITCH_S
+    if len(switches):
+        found = f"another core of the estimator took over {len(switches)} times, first at {switches[0]:.2f} s"
+        more.append(ImportFault("estimator_reset", "", found, "a run ends at each change in the air", len(switches)))
+    runs, cuts = in_the_air.flights(table, flying, path.name.split(".")[0], path, jumps)
     return runs, [*faults, *more, *cuts], order

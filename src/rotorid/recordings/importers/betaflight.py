@@ -33,8 +33,10 @@ from rotorid.recordings.importers.units import G
 _DEFAULT_POLES = 14
 _QUATERNION_SCALE = 32767.0
 """`imuQuaternion` holds x, y and z of the unit quaternion times this; w is what is missing to length 1."""
-_OTHER_NAMES = {"gyroADC": ("gyroData",), "accSmooth": ("accADC",), "eRPM": ("eRPM(/100)",)}
-"""To a field its names in other releases."""
+_OTHER_NAMES = {"gyroADC": ("gyroData", "gyroUnfilt"), "accSmooth": ("accADC",), "eRPM": ("eRPM(/100)",)}
+"""To a field its names in other releases, and what holds the same before a filter."""
+_FEWER_MOTORS = {1: "a fixed wing", 2: "a bicopter or a fixed wing", 3: "a tricopter, whose tail rotor a servo tilts"}
+"""What Betaflight's mixers make of fewer motors than four."""
 _FEATURE_3D = 1 << 12
 _DSHOT = (48.0, 2047.0)
 _DSHOT_FORWARD = 1048.0
@@ -175,17 +177,27 @@ def convert(
     motors = [n for i in range(8) if (n := f"motor[{i}]") in raw]
     if not motors:
         raise InputError(f"{where}: no motor[0], motor[1], … is logged, so that nothing shows when the vehicle flies")
+    if len(motors) in _FEWER_MOTORS:
+        what = _FEWER_MOTORS[len(motors)]
+        raise InputError(
+            f"{where}: the log is of {what} ({len(motors)} motors); only multirotors of fixed rotors can be imported"
+        )
     throttle, more = throttles(raw[motors].to_numpy(float), headers)
     faults += more
     table[list(c.rotor_columns("throttle", throttle.shape[1]))] = throttle
-    turns = fields("eRPM", throttle.shape[1])
-    if turns is not None and np.nanmax(turns) > 0:
+    turns = np.column_stack([raw.get(f"eRPM[{i}]", np.zeros(len(raw))) for i in range(throttle.shape[1])])
+    if np.nanmax(turns) > 0:
         poles = _number(headers, "motor_poles", 0)
         if not poles > 0:
             poles, found = _DEFAULT_POLES, "the header does not state motor_poles"
             faults.append(ImportFault("unit", "rotor_speed", found, f"taken as {_DEFAULT_POLES}", 0))
         speeds = np.where(np.isnan(throttle), np.nan, turns * 100 / (poles / 2) * 2 * np.pi / 60)
-        table[list(c.rotor_columns("rotor_speed", turns.shape[1]))] = speeds
+        for column, own in zip(c.rotor_columns("rotor_speed", turns.shape[1]), speeds.T, strict=True):
+            if np.nanmax(own, initial=0.0) > 0:
+                table[column] = own
+            else:
+                found = "its eRPM is not logged, or 0 throughout"
+                faults.append(ImportFault("speed_missing", column, found, "column left out", 0))
     battery, more = _battery(raw, headers)
     faults += more
     table = table.assign(**battery)

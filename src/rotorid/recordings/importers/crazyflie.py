@@ -10,6 +10,8 @@ old body frame, in which pitch is positive nose up and so the contract's; the sa
 Sources: crazyflie-firmware `stabilizer.c` (log groups, `compressState`), `stabilizer_types.h`, `kalman_core.c`,
 `quatcompress.h`.
 
+A CSV whose columns have the firmware's names (the client's, or one of cflib's) is read by the same names.
+
 Crazyflie uSD-deck logs: binary files of timed events (firmware `usddeck`, format versions 1 and 2).
 
 Layout, little-endian throughout::
@@ -26,7 +28,7 @@ Source: bitcraze/crazyflie-firmware, `usddeck.c` and `tools/usdlog/cfusdlog.py` 
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 from zlib import crc32
@@ -42,22 +44,27 @@ from rotorid.recordings.importers.faults import (
     blank_held,
     cut,
     drop_repeated_times,
+    in_order,
+    join_rows,
     report_gaps,
     true_stretches,
 )
+from rotorid.recordings.importers.guessing.guess import guess
 from rotorid.recordings.importers.in_the_air import airborne, stretches_of
 from rotorid.recordings.importers.mapping import (
     continuous,
     half_turn_about_x,
     quaternion_from_euler_frd,
     quaternion_to_frd_ned,
+    read_columns,
 )
-from rotorid.recordings.importers.units import RPM
+from rotorid.recordings.importers.units import RPM, UNITS
+from rotorid.recordings.tables import numbers
 
 _MAGIC = 0xBC
 _CHECKSUM = 4
 """Bytes of it at the end of a log."""
-_TIME = "time_s"
+_TIME, _EVENT = "time_s", "fixedFrequency"
 TYPES = {"e": "<f2", "f": "<f4", "d": "<f8", "b": "i1", "B": "u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4"}
 _STANDARD_GRAVITY_M_S2 = 9.81
 """The firmware's g: accelerometer logs are in multiples of this."""
@@ -116,6 +123,28 @@ FORMS: dict[tuple[str, ...], tuple[tuple[tuple[str, ...], Callable[[np.ndarray],
 }
 """Names of the firmware's variables, in the order in which they are preferred, and how they become the contract's."""
 BODY_VELOCITY = _names("kalman", "statePX statePY statePZ")
+
+
+def is_table(names: Collection[str]) -> bool:
+    """Whether the columns of a table have the firmware's names of its motors and of a state or sensor."""
+    stated = any(set(own) <= set(names) for forms in FORMS.values() for own, _ in forms)
+    return stated and any(
+        {pattern.format(i) for i in _ROTORS} <= set(names) for pattern in ("motor.m{}", "pwm.m{}_pwm")
+    )
+
+
+def _read_table(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
+    """A table with the firmware's names as the one event of a log; InputError where its clock is not clear."""
+    table = read_columns(path)
+    found = guess(table)
+    clock = found.mapping.channels["time"]
+    if "time" in found.open:
+        raise InputError(f"{path}: the clock: {found.open['time']}; call its column time_s, time_ms or time_us")
+    (name,) = clock.columns
+    known = [n for n in table if n == name or "." in n and pd.api.types.is_numeric_dtype(table[n])]
+    raw, late = in_order(numbers(table[known], path), name)
+    raw = join_rows(raw, name).rename(columns={name: _TIME})
+    return {_EVENT: raw.assign(**{_TIME: raw[_TIME] * UNITS["time"][clock.unit]})}, late
 
 
 def _axes(table: pd.DataFrame, prefix: str, axes: str = "xyz") -> np.ndarray | None:
@@ -258,10 +287,12 @@ def flights(
     """
     path = Path(path)
     prefix = prefix or path.name.split(".")[0]
-    tables, faults = read_usd_log(path)
-    if "fixedFrequency" not in tables:
-        raise InputError(f"{path}: no event fixedFrequency in this log, found {', '.join(tables) or 'none'}")
-    table, more = convert(tables["fixedFrequency"])
+    with open(path, "rb") as file:
+        binary = file.read(1) == bytes([_MAGIC])
+    tables, faults = read_usd_log(path) if binary else _read_table(path)
+    if _EVENT not in tables:
+        raise InputError(f"{path}: no event {_EVENT} in this log, found {', '.join(tables) or 'none'}")
+    table, more = convert(tables[_EVENT])
     missing = [name for name in THROTTLES if name not in table]
     if missing and not stretches:
         raise InputError(f"{path}: motor.m1 to motor.m4 are not logged, so that nothing shows when the vehicle flies")

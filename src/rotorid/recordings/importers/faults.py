@@ -15,8 +15,12 @@ import pandas as pd
 
 from rotorid.recordings.columns import TIME
 
+GOES_ON = 0.9
+"""Share of the readings of others of its kind that a sensor has at least, if it neither stands still nor ends early."""
 _REVERSED = 0.02
 """Share of the largest value that a value of the other sign must exceed to be one: less is noise about zero."""
+_SHUFFLED, _LATE_STEPS = 0.05, 100.0
+"""Share of steps back from which rows are in no order, and how many usual steps late a row in order may come."""
 _UNEXPLAINED = 0.2
 """Share of its variance that the motors of a mixer may leave of another motor's signal."""
 
@@ -106,6 +110,26 @@ def drop_repeated_times(table: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportF
         lost,
     )
     return table[keep].reset_index(drop=True), [fault]
+
+
+def in_order(table: pd.DataFrame, time: str) -> tuple[pd.DataFrame, list[ImportFault]]:
+    """Rows that come late sorted by their time, and a fault; a clock that begins anew stays as it is.
+
+    `time` names the clock's column, in any unit.
+    """
+    clock = table[time].to_numpy(float)
+    steps = np.diff(clock)
+    back = steps < 0
+    if not back.any():
+        return table, []
+    known = np.unique(clock[np.isfinite(clock)])
+    latest = min(_LATE_STEPS * float(np.median(np.diff(known))), 0.5 * np.ptp(known))
+    if back.mean() < _SHUFFLED and (steps < -latest).any():
+        return table, []
+    found = f"{int(back.sum())} rows come later than their time"
+    sorted_ = table.sort_values(time, kind="stable", ignore_index=True)
+    sorted_.attrs = table.attrs
+    return sorted_, [ImportFault("order", TIME, found, "sorted by their time", int(back.sum()))]
 
 
 def join_rows(table: pd.DataFrame, time: str) -> pd.DataFrame:

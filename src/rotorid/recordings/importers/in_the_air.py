@@ -38,12 +38,15 @@ _GROUND_M, _CLEAR_M = 0.05, 0.5
 _SMOOTHED_S = 1.0
 
 
-def _on_grid(grid_s: np.ndarray, time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Values (n, k) put into the row of the grid nearest in time; NaN elsewhere (the last one wins a shared row)."""
-    values = np.asarray(values, float).reshape(len(time_s), -1)
-    out = np.full((len(grid_s), values.shape[1]), np.nan)
-    inside = (time_s >= grid_s[0]) & (time_s <= grid_s[-1])
-    out[np.searchsorted((grid_s[1:] + grid_s[:-1]) / 2, time_s[inside])] = values[inside]
+def on_grid(grid: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Values (n, k) put into the row of the grid nearest in time; NaN elsewhere (the last one wins a shared row).
+
+    Both times in one unit, as floats or whole numbers.
+    """
+    values = np.asarray(values, float).reshape(len(time), -1)
+    out = np.full((len(grid), values.shape[1]), np.nan)
+    inside = (time >= grid[0]) & (time <= grid[-1])
+    out[np.searchsorted((grid[1:] + grid[:-1]) / 2, time[inside])] = values[inside]
     return out
 
 
@@ -57,7 +60,7 @@ def table_on(grid_s: np.ndarray, parts: Sequence[tuple[Sequence[str], np.ndarray
     """A table on a grid (n,), s, of parts: names, times (m,), s, and values (m, k); empty columns are left out."""
     columns = {c.TIME: grid_s - grid_s[0]}
     for names, time_s, values in parts:
-        columns.update(zip(names, _on_grid(grid_s, time_s, values).T, strict=True))
+        columns.update(zip(names, on_grid(grid_s, time_s, values).T, strict=True))
     return pd.DataFrame({k: v for k, v in columns.items() if k == c.TIME or np.isfinite(v).any()})
 
 

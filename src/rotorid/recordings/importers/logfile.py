@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
@@ -46,6 +47,8 @@ _BY_FIRST_BYTES = (
     (b"\x89MCAP0", "ros"),
     (b"SQLite format 3", "ros"),
 )
+_RCBENCHMARK = re.compile(r"ESC signal ?[(,](.*[,;])?\s*\"?Motor (Electrical|Optical) Speed ?[(,\r\n]", re.DOTALL)
+"""Headings of RCbenchmark's stands of one rotor; those of other stands are read by a mapping."""
 TEMPLATES = {"px4": "x500", "betaflight": "five-inch", "crazyflie": "crazyflie-2.1", "neurobem": "neurobem"}
 """Template vehicle that supplies what a log of an autopilot or format does not say."""
 
@@ -115,7 +118,9 @@ def format_of(path: Path) -> str:
             f"{path}: not a log that rotorid knows (PX4 ULog, Betaflight, ArduPilot, ROS bag, MCAP, Crazyflie uSD, "
             "NeuroBEM .mat, RCbenchmark CSV, any CSV, Parquet); its first bytes are " + head[:8].hex(" ")
         )
-    return "rcbenchmark" if "ESC signal" in text and "Thrust" in text else "csv"
+    if crazyflie.is_table([name.strip(' "') for name in re.split("[,;\t]", text.splitlines()[0])]):
+        return "crazyflie"
+    return "rcbenchmark" if _RCBENCHMARK.search(text) and "Thrust" in text else "csv"
 
 
 def read_log(path: Path, mapping: Mapping | None = None) -> _Imported:
@@ -135,7 +140,7 @@ def read_log(path: Path, mapping: Mapping | None = None) -> _Imported:
 def _read(path: Path, kind: str, mapping: Mapping | None) -> _Imported:
     if kind == "px4":
         return _px4(path)
-    if kind == "crazyflie":
+    if kind == "crazyflie" and mapping is None:
         return _crazyflie(path)
     if kind == "betaflight":
         runs, faults = betaflight.read_betaflight(path)

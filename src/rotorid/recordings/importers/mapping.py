@@ -34,6 +34,7 @@ of y and z.
 
 from __future__ import annotations
 
+import re
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Literal
@@ -47,7 +48,7 @@ from rotorid.errors import InputError
 from rotorid.io.text.files import read_yaml
 from rotorid.io.text.wording import explain
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.faults import ImportFault, drop_repeated_times, join_rows, report_gaps
+from rotorid.recordings.importers.faults import ImportFault, drop_repeated_times, in_order, join_rows, report_gaps
 from rotorid.recordings.importers.units import UNITS, converted
 from rotorid.recordings.tables import clock_jump, numbers, read_cells, read_parquet_cells
 
@@ -85,6 +86,7 @@ WORLD = {
 TRAVEL = WORLD | {"neu": np.diag([1.0, 1.0, -1.0])}
 """Axes that position and velocity may have, too: a left-handed system has no attitude."""
 ELECTRICAL = ("erpm", "100erpm")
+_DATE, _TIME_OF_DAY = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d"), re.compile(r"\d{1,2}:\d\d:\d\d(\.\d+)?")
 
 
 class MappedChannel(BaseModel):
@@ -202,6 +204,24 @@ def read_columns(path: Path) -> pd.DataFrame:
             f"{path}: expected a table of numbers with a heading, found {len(table.columns)} columns and "
             f"{len(table)} rows"
         )
+    return _clocks_as_seconds(table)
+
+
+def _clocks_as_seconds(table: pd.DataFrame) -> pd.DataFrame:
+    """The table with columns of dates or times of day, each cell one, as seconds."""
+    for name in table.columns:
+        column = table[name]
+        if pd.api.types.is_numeric_dtype(column.dtype) or not (known := column.notna()).any():
+            continue
+        first = str(column[known].iloc[0]).strip()
+        if _DATE.match(first):
+            since = pd.to_datetime(column, format="ISO8601", utc=True, errors="coerce") - pd.Timestamp(0, tz="UTC")
+        elif _TIME_OF_DAY.fullmatch(first):
+            since = pd.to_timedelta(column, errors="coerce")
+        else:
+            continue
+        if since.notna().equals(known):
+            table[name] = since.dt.total_seconds()
     return table
 
 
@@ -214,8 +234,9 @@ def read_by_mapping(path: Path, mapping: Mapping | None) -> tuple[pd.DataFrame, 
     lost = _left_out(raw)
     if mapping is None:
         if c.TIME in raw.columns and sum(c.is_known(n) for n in raw.columns) > 1:
-            table, faults = _clocked(numbers(raw, path), path)
-            return table, lost + faults, "the contract's: the columns have its names"
+            table, late = in_order(numbers(raw, path), c.TIME)
+            table, faults = _clocked(table, path)
+            return table, lost + late + faults, "the contract's: the columns have its names"
         raise InputError(
             f"{path}: the columns ({', '.join(raw.columns[:6])}, …) are not named as the recording contract has them; "
             f"`rotorid import {path.name} --write-mapping mapping.yaml` proposes what each one is"
@@ -243,7 +264,9 @@ def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFra
     body, world = BODY[mapping.body], WORLD[mapping.world]
     wanted = [(name, channel.columns) for name, channel in mapping.channels.items()] + [("keep", mapping.keep)]
     table = pd.concat([_numbers(raw, columns, name, where) for name, columns in wanted if columns], axis=1)
-    table = join_rows(table.loc[:, ~table.columns.duplicated()], mapping.channels["time"].columns[0])
+    clock = mapping.channels["time"].columns[0]
+    table, late = in_order(table.loc[:, ~table.columns.duplicated()], clock)
+    table = join_rows(table, clock)
     out: dict[str, np.ndarray] = {}
     rotation = None
     order = sorted(mapping.channels, key=lambda n: n != "attitude")
@@ -284,7 +307,8 @@ def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFra
     for name in mapping.keep:
         out[name] = table[name].to_numpy(float)
     out[c.TIME] = out[c.TIME] - np.nanmin(out[c.TIME])
-    return _clocked(pd.DataFrame({c.TIME: out.pop(c.TIME), **out}), where)
+    table, faults = _clocked(pd.DataFrame({c.TIME: out.pop(c.TIME), **out}), where)
+    return table, late + faults
 
 
 def _clocked(table: pd.DataFrame, where: object) -> tuple[pd.DataFrame, list[ImportFault]]:

@@ -27,7 +27,14 @@ from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import in_the_air
-from rotorid.recordings.importers.faults import ImportFault, drop_repeated_times, further_motors, one_sense, report_gaps
+from rotorid.recordings.importers.faults import (
+    GOES_ON,
+    ImportFault,
+    drop_repeated_times,
+    further_motors,
+    one_sense,
+    report_gaps,
+)
 from rotorid.recordings.importers.known import Parameters, Values
 from rotorid.recordings.importers.mapping import continuous
 from rotorid.recordings.importers.units import PULSE_US, RPM
@@ -200,15 +207,6 @@ def _time(data: Mapping[str, np.ndarray], sampled: bool = True) -> np.ndarray:
     return np.where(near, taken, stamp) if sampled else stamp
 
 
-def _on_grid(grid: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Values put into the row of the grid nearest in time; NaN elsewhere (the last one wins a shared row)."""
-    edges = (grid[1:] + grid[:-1]) / 2
-    inside = (time >= grid[0]) & (time <= grid[-1])
-    result = np.full((len(grid), values.shape[1]), np.nan)
-    result[np.searchsorted(edges, time[inside])] = values[inside]
-    return result
-
-
 def _held(grid: np.ndarray, time: np.ndarray, values: np.ndarray, before: float) -> np.ndarray:
     """Values held until the next one; `before` in rows before the first."""
     index = np.searchsorted(time, grid, side="right") - 1
@@ -225,7 +223,10 @@ def _stack(data: Mapping[str, np.ndarray], fields: Sequence[str]) -> np.ndarray 
 
 
 def _first(topics: _Topics, name: str) -> Mapping[str, np.ndarray]:
-    return topics.get(name, [{}])[0]
+    """The first instance of a topic that goes on as long as any other; empty where there is none."""
+    counts = [len(data["timestamp"]) for data in topics.get(name, [])]
+    chosen = next((k for k, count in enumerate(counts) if count >= GOES_ON * max(counts)), None)
+    return {} if chosen is None else topics[name][chosen]
 
 
 # Rotors -------------------------------------------------------------------------------------------
@@ -340,9 +341,11 @@ def _pulse_range(parameters: Values, port: str, outputs: Sequence[int]) -> tuple
 
 def _speeds(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray, list[ImportFault]]:
     """Rotor speeds (n, rotors), rad/s, of `esc_status`, NaN where a controller is not heard."""
-    data = _first(log.topics, "esc_status")
-    if not data:
+    instances = log.topics.get("esc_status", [])
+    turning = [d for d in instances if any(np.any(v) for field, v in d.items() if field.endswith(".esc_rpm"))]
+    if not instances:
         return None, np.zeros(0), []
+    data = (turning or instances)[0]
     slots = [i for i in range(8) if f"esc[{i}].esc_rpm" in data]
     function = {i: int(np.median(data.get(f"esc[{i}].actuator_function", [0]))) for i in slots}
     by_function = {f - _FIRST_MOTOR: i for i, f in function.items() if f >= _FIRST_MOTOR}
@@ -353,9 +356,12 @@ def _speeds(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray, li
     online = np.asarray(data.get("esc_online_flags", np.full(len(data["timestamp"]), -1))).astype(np.int64)
     values = np.column_stack([np.asarray(data[f"esc[{place[r]}].esc_rpm"], float) for r in range(rotors)]) * RPM
     values, faults = one_sense(values, c.rotor_columns("rotor_speed", rotors))
+    if len(turning) > 1:
+        found = f"{len(turning)} instances of esc_status hold speeds"
+        faults.append(ImportFault("instances", "rotor_speed", found, "the first of them taken", 0))
     heard = np.column_stack([(online >> place[r]) & 1 for r in range(rotors)]).astype(bool)
-    turning = [i for i in slots if i not in place.values() and np.any(data[f"esc[{i}].esc_rpm"])]
-    faults += _more_rotors("esc_status", rotors + len(turning), rotors)
+    others = [i for i in slots if i not in place.values() and np.any(data[f"esc[{i}].esc_rpm"])]
+    faults += _more_rotors("esc_status", rotors + len(others), rotors)
     if not np.nan_to_num(values).any():
         found = "every speed in esc_status is 0"
         return None, np.zeros(0), [ImportFault("speed_missing", "rotor_speed", found, "no rotor speeds", len(values))]
@@ -501,7 +507,7 @@ def convert(log: Px4Log, rotors: int) -> _Converted:
     columns: dict[str, np.ndarray] = {c.TIME: (grid - grid[0]) * 1e-6}
 
     def put(names: Sequence[str], time: np.ndarray, values: np.ndarray) -> None:
-        columns.update(zip(names, _on_grid(grid, time, values).T, strict=True))
+        columns.update(zip(names, in_the_air.on_grid(grid, time, values).T, strict=True))
 
     for names, time, values in inertial.values():
         put(names, time, values)

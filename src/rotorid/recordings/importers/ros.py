@@ -2,7 +2,7 @@
 
 By ROS's REP 103 the body is forward-left-up and the world has z up; half a turn about x makes them forward-right-down
 and z down; PX4's own messages are forward-right-down and north-east-down. Of each quantity the topic of a known type
-that states most values is read:
+that states most values is read, of several attitudes the one that follows the body rates; a command is no measurement:
 
 | quantity | types |
 | --- | --- |
@@ -40,7 +40,9 @@ from rotorid.recordings import columns as c
 from rotorid.recordings.importers import in_the_air
 from rotorid.recordings.importers.bag_records import Records, needs, typestores
 from rotorid.recordings.importers.faults import ImportFault, further_motors, one_sense, report_gaps
-from rotorid.recordings.importers.mapping import half_turn_about_x, quaternion_to_frd_ned
+from rotorid.recordings.importers.guessing import agreement as by
+from rotorid.recordings.importers.guessing.draft import CONFIRMED, is_clear
+from rotorid.recordings.importers.mapping import continuous, half_turn_about_x, quaternion_to_frd_ned
 from rotorid.recordings.importers.units import PULSE_US, RPM
 
 
@@ -130,6 +132,8 @@ _STEADY_S = 0.2
 _MIXED = 4
 """Motors of a mixer whose signals say those of all others: it has four demands."""
 _LISTED = 8
+_WEIGHT_M_S2 = (5.0, 20.0)
+"""Median size of the readings of an accelerometer that feels what carries the vehicle."""
 
 
 @dataclass(frozen=True)
@@ -293,9 +297,8 @@ def _read_series(path: Path) -> tuple[dict[str, list[_TopicSeries]], list[Import
             faults.append(ImportFault("stuck", quantity, seen, "states nothing, left out", len(values)))
         elif keep.sum() > 1:
             series.setdefault(quantity, []).append(own)
-    for offered in series.values():
-        offered.sort(key=lambda s: -s.changes)
-    _set_commands_apart(series)
+    faults += _set_commands_apart(series)
+    _rank(series, path)
     missing = [name for name, quantities in _WANTED.items() if not set(quantities) & set(series)]
     if missing and others:
         more = f" and {len(others) - _LISTED} more" if len(others) > _LISTED else ""
@@ -313,13 +316,59 @@ def _read_series(path: Path) -> tuple[dict[str, list[_TopicSeries]], list[Import
     return series, faults
 
 
-def _set_commands_apart(series: dict[str, list[_TopicSeries]]) -> None:
-    """Speeds of a topic that is called a command are commands, where another topic has speeds."""
-    speeds = series.get("speeds", [])
-    asked = [s for s in speeds if _COMMANDED.search(s.topic)]
-    if asked and len(asked) < len(speeds):
-        series["speeds"] = [s for s in speeds if s not in asked]
-        series["commands"] = [*series.get("commands", []), *asked]
+def _set_commands_apart(series: dict[str, list[_TopicSeries]]) -> list[ImportFault]:
+    """Leave out the motion of topics that are called commands, each with a fault; speeds of such a topic are commands,
+    where another topic has speeds."""
+    faults = []
+    for quantity, offered in list(series.items()):
+        asked = [s for s in offered if _COMMANDED.search(s.topic)]
+        others = [s for s in offered if s not in asked]
+        if quantity in ("attitude", "position", "velocity", "body_velocity") and asked:
+            seen = f"{', '.join(s.topic for s in asked)}: a command by the name"
+            faults.append(ImportFault("command", quantity, seen, "no measurement, left out", len(asked[0].values)))
+        elif quantity == "speeds" and asked and others:
+            series["commands"] = [*series.get("commands", []), *asked]
+        else:
+            continue
+        series[quantity] = others
+    for quantity in [q for q, offered in series.items() if not offered]:
+        del series[quantity]
+    return faults
+
+
+def _rank(series: dict[str, list[_TopicSeries]], path: Path) -> None:
+    """Sort the topics of each quantity, the one that is read first.
+
+    Inertial sensors that feel the thrust along z before others (those of cameras); attitudes by how far they follow the
+    body rates (other bodies do not); position and velocity of the attitude's topic first; else by what they state.
+    InputError where no inertial sensor feels the thrust along z.
+    """
+    for offered in series.values():
+        offered.sort(key=lambda s: -s.changes)
+    along = {s.topic: np.median(s.values, axis=0) for s in series.get("force", [])}
+    size = {topic: np.linalg.norm(felt) for topic, felt in along.items()}
+    turned = {t for t in along if _WEIGHT_M_S2[0] < size[t] < _WEIGHT_M_S2[1] and along[t][2] < 0.7 * size[t]}
+    if turned and turned == set(along):
+        topic, felt = next(iter(along.items()))
+        axis = int(np.argmax(np.abs(felt)))
+        raise InputError(
+            f"{path}: {topic} reads {felt[axis]:.3g} m/s² along {'xyz'[axis]} in the median, expected 9.8 along z (REP "
+            "103: forward-left-up): its axes or its sign are others; export it as a CSV and state its axes in a mapping"
+        )
+    for quantity in ("force", "rates", "imu_attitude"):
+        series.get(quantity, []).sort(key=lambda s: s.topic in turned)
+    attitudes = series.get("attitude", [])
+    if len(attitudes) > 1 and "rates" in series:
+        rates = series["rates"][0]
+        instants = by.steps_of(rates.time_s)
+        moved = by.integrated(instants, rates.time_s, rates.values)
+        follows = {
+            s.topic: by.compare(by.turned(instants, s.time_s, continuous(s.values)), moved).correlation
+            for s in attitudes
+        }
+        attitudes.sort(key=lambda s: -round(follows[s.topic], 1))
+    for quantity in ("position", "body_velocity"):
+        series.get(quantity, []).sort(key=lambda s: not attitudes or s.topic != attitudes[0].topic)
 
 
 def _times(found: _BagContent) -> tuple[dict[tuple[str, str], np.ndarray], list[ImportFault]]:
@@ -383,14 +432,13 @@ def convert(
     grid = clock.time_s
     parts: list[tuple] = []
     for quantity, names in (
-        ("rates", c.ANGULAR_VELOCITY), ("force", c.SPECIFIC_FORCE), ("position", c.POSITION), ("velocity", c.VELOCITY)
+        ("rates", c.ANGULAR_VELOCITY), ("force", c.SPECIFIC_FORCE), ("position", c.POSITION)
     ):  # fmt: skip
         if quantity in first:
             parts.append((names, first[quantity].time_s, half_turn_about_x(first[quantity].values)))
     if "attitude" in first:
         parts.append((c.QUATERNION, first["attitude"].time_s, quaternion_to_frd_ned(first["attitude"].values)))
-    if "body_velocity" in first and "velocity" not in first:
-        parts += _turned(first["body_velocity"], [*series.get("attitude", []), *series.get("imu_attitude", [])], faults)
+    parts += _velocity(series, faults)
     for quantity, kind, unit in (
         ("speeds", "rotor_speed", 1.0), ("rpm", "rotor_speed", RPM), ("commands", "rotor_command", 1.0)
     ):  # fmt: skip
@@ -409,21 +457,52 @@ def convert(
         parts.append(_of_pulses(first["pulses"], faults))
     for quantity, name in (("voltage", c.BATTERY_VOLTAGE), ("current", c.BATTERY_CURRENT), ("range", c.HEIGHT)):
         if quantity in first:
-            parts.append(((name,), first[quantity].time_s, first[quantity].values))
+            values = first[quantity].values
+            if (
+                quantity == "current" and np.nanmedian(values) < 0
+            ):  # discharging is negative by the message's definition
+                values = -values
+            parts.append(((name,), first[quantity].time_s, values))
     table = in_the_air.table_on(grid, parts)
     return table, in_the_air.airborne(table)[0]
 
 
-def _turned(velocity: _TopicSeries, attitudes: list[_TopicSeries], faults: list[ImportFault]) -> list[tuple]:
-    """A velocity in body axes turned into the world by the attitude of its own topic, else by the nearest in time."""
-    attitude = next((s for s in attitudes if s.topic == velocity.topic), attitudes[0] if attitudes else None)
-    if attitude is None:
+def _velocity(series: dict[str, list[_TopicSeries]], faults: list[ImportFault]) -> list[tuple]:
+    """The velocity in the axes of the world, by the attitude of its own topic, else of the first one.
+
+    It is in the axes that its message states, unless only in the others it integrates to the position.
+    """
+    stated = "velocity" if "velocity" in series else "body_velocity"
+    if stated not in series:
+        return []
+    velocity = series[stated][0]
+    attitudes = [*series.get("attitude", []), *series.get("imu_attitude", [])]
+    own = [next((s for s in offered if s.topic == velocity.topic), offered[0]) if offered else None
+           for offered in (attitudes, series.get("position", []))]  # fmt: skip
+    attitude, position = own
+    readings = {"velocity": velocity.values}
+    if attitude is not None:
+        nearest = np.searchsorted((attitude.time_s[1:] + attitude.time_s[:-1]) / 2, velocity.time_s)
+        turn = Rotation.from_quat(attitude.values[nearest][:, [1, 2, 3, 0]])
+        readings["body_velocity"] = turn.apply(velocity.values)
+    elif stated == "body_velocity":
         seen = f"the velocity of {velocity.topic} is in body axes, and no topic states an attitude"
         faults.append(ImportFault("no_attitude", ", ".join(c.VELOCITY), seen, "columns left out", len(velocity.time_s)))
         return []
-    nearest = np.searchsorted((attitude.time_s[1:] + attitude.time_s[:-1]) / 2, velocity.time_s)
-    turn = Rotation.from_quat(attitude.values[nearest][:, [1, 2, 3, 0]])
-    return [(c.VELOCITY, velocity.time_s, half_turn_about_x(turn.apply(velocity.values)))]
+    if position is not None and attitude is not None:
+        instants = by.steps_of(velocity.time_s)
+        moved = by.changes(instants, position.time_s, position.values)
+        agreed = {k: by.compare(moved, by.integrated(instants, velocity.time_s, v)) for k, v in readings.items()}
+        other = next(k for k in agreed if k != stated)
+        if agreed[other].correlation > CONFIRMED and is_clear(agreed[other], agreed[stated]):
+            axes = {"velocity": "world", "body_velocity": "body"}
+            seen = (
+                f"{velocity.topic} is in {axes[stated]} axes as stated, but only in {axes[other]} axes it integrates "
+                f"to the position (correlation {agreed[other].correlation:.3f}, else {agreed[stated].correlation:.3f})"
+            )
+            faults.append(ImportFault("axes", "velocity", seen, f"taken in {axes[other]} axes", len(velocity.values)))
+            stated = other
+    return [(c.VELOCITY, velocity.time_s, half_turn_about_x(readings[stated]))]
 
 
 def _of_pulses(outputs: _TopicSeries, faults: list[ImportFault]) -> tuple:

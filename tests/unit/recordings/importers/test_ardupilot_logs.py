@@ -377,3 +377,83 @@ def test_a_log_cut_off_anywhere_keeps_every_whole_message(tmp_path: Path) -> Non
 def written(path: Path, data: bytes) -> Path:
     path.write_bytes(data)
     return path
+
+
+# Which sensor, and which core of the estimator ---------------------------------------------------
+
+
+@pytest.mark.parametrize(("kind", "letters"), [("IMU", "GyrAcc"), ("GYR", "Gyr"), ("ACC", "Acc")])
+@pytest.mark.parametrize(("first", "taken"), [("goes on", 0.0), ("stands still", 1.0), ("ends", 1.0)])
+def test_of_several_sensors_the_first_that_goes_on_is_read(kind: str, letters: str, first: str, taken: float) -> None:
+    """The second sensor reads 1 more than the first."""
+    time_s = np.arange(100) / 50
+    names = [f"{letters[k : k + 3]}{axis}" for k in range(0, len(letters), 3) for axis in "XYZ"]
+    reading = np.sin(time_s)
+    own = np.where(time_s < 1, reading, reading[50]) if first == "stands still" else reading
+    sensors = [
+        pd.DataFrame({c.TIME: time_s, "TimeUS": time_s * 1e6, "I": i, **dict.fromkeys(names, values + i)})
+        for i, values in enumerate((own, reading))
+    ]
+    if first == "ends":
+        sensors[0] = sensors[0][:50]
+    log = tables(LIMITS) | {kind: pd.concat(sensors).sort_values([c.TIME, "I"], ignore_index=True)}
+    if kind != "IMU":
+        del log["IMU"]
+    table, faults, _ = ardupilot.convert(log, "log")
+    column = c.SPECIFIC_FORCE[1] if kind == "ACC" else c.ANGULAR_VELOCITY[1]
+    assert table[column].to_numpy() == pytest.approx(reading + taken)
+    assert any(f"{kind} 0 stands still or ends early" in f.found for f in faults) == bool(taken)
+
+
+@pytest.mark.parametrize("estimator", ["XK", "NK"])
+@pytest.mark.parametrize("both", [False, True])
+@pytest.mark.parametrize("switch_s", [None, 0.5, 1.5])
+def test_the_estimate_is_that_of_the_core_that_flew(estimator: str, both: bool, switch_s: float | None) -> None:
+    """Core 1 states a velocity of 1, core 0 of 0, another estimator that did not fly of 9 m/s."""
+    time_s = np.repeat(np.arange(100) / 50, 2)
+    core = np.tile([0, 1], 100)
+    primary = np.zeros(200) if switch_s is None else (time_s >= switch_s).astype(float)
+    names = ("VN", "VE", "VD", "PN", "PE", "PD")
+    estimate = pd.DataFrame({c.TIME: time_s, "C": core, **dict.fromkeys(names, core)})
+    log = tables(LIMITS | {"AHRS_EKF_TYPE": 2.0 if estimator == "NK" else 3.0})
+    if both:
+        log |= {f"{other}F1": estimate.assign(VN=9) for other in ("XK", "NK")}
+    log |= {f"{estimator}F1": estimate, f"{estimator}F4": pd.DataFrame({c.TIME: time_s, "C": core, "PI": primary})}
+    table, _, _ = ardupilot.convert(log, "log")
+    assert table[c.VELOCITY[0]].to_numpy() == pytest.approx(primary[::2])
+
+
+def test_a_run_ends_where_another_core_takes_over(tmp_path: Path, monkeypatch) -> None:
+    time_s = np.arange(1000) / 50
+    table = pd.DataFrame({c.TIME: time_s})
+    log = tables(LIMITS) | {"XKF4": pd.DataFrame({c.TIME: time_s, "C": 0, "PI": (time_s >= 8).astype(int)})}
+    monkeypatch.setattr(ardupilot, "read_messages", lambda path: log)
+    monkeypatch.setattr(ardupilot, "convert", lambda log, path: (table, [], np.ones(1000, bool)))
+    runs, faults, _ = ardupilot.read_ardupilot(tmp_path / "log.bin")
+    assert [run[c.TIME].iloc[-1] for run in runs.values()] == pytest.approx([7.28, 10.76], abs=0.1)
+    assert any("another core of the estimator took over 1 times, first at 8.00 s" in f.found for f in faults)
+
+
+# Speeds -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("outputs", "instances", "taken"),
+    [
+        ((1, 2, 3, 4), (0, 1, 2, 3), (1, 2, 3, 4)),
+        ((4, 3, 2, 1), (0, 1, 2, 3), (4, 3, 2, 1)),
+        ((9, 10, 11, 12), (0, 1, 2, 3), (1, 2, 3, 4)),
+        ((12, 9, 10, 11), (4, 5, 6, 7), (4, 1, 2, 3)),
+        ((9, 10, 11, 12), (0, 1, 2), ()),
+    ],
+)
+def test_speeds_are_those_of_the_motors_outputs(outputs, instances, taken) -> None:
+    """The k-th controller turns at k rounds a second."""
+    log = framed({"FRAME_CLASS": 1}, {n: FUNCTIONS[i] for i, n in enumerate(outputs)})
+    own = [pd.DataFrame({c.TIME: log["IMU"][c.TIME], "Instance": i, "RPM": 60.0 * k})
+           for k, i in enumerate(instances, 1)]  # fmt: skip
+    log["ESC"] = pd.concat(own, ignore_index=True)
+    table, faults, _ = ardupilot.convert(log, "log")
+    speeds = [table[name].iloc[50] / (2 * np.pi) for name in table if name.startswith("rotor_speed")]
+    assert speeds == pytest.approx(list(taken))
+    assert any("taken in their order" in f.action for f in faults) == (bool(taken) and outputs[0] > 8)

@@ -445,12 +445,28 @@ def test_a_battery_whose_unit_is_not_known_is_named(stated: dict) -> None:
 
 
 @pytest.mark.parametrize(
-    ("base", "other"), [("gyroADC", "gyroData"), ("accSmooth", "accADC"), ("eRPM", "eRPM(/100)")]
+    ("base", "other"),
+    [("gyroADC", "gyroData"), ("gyroADC", "gyroUnfilt"), ("accSmooth", "accADC"), ("eRPM", "eRPM(/100)")],
 )  # fmt: skip
 def test_names_of_other_releases(base: str, other: str) -> None:
     raw = frames_of()
     renamed = raw.rename(columns=lambda n: n.replace(base, other))
     pd.testing.assert_frame_equal(run_of(raw)[0], run_of(renamed)[0])
+
+
+@pytest.mark.parametrize("stands_still", [False, True])
+def test_a_motor_without_telemetry_keeps_the_speeds_of_the_others(stands_still: bool) -> None:
+    raw = frames_of()
+    raw = raw.assign(**{"eRPM[2]": 0}) if stands_still else raw.drop(columns="eRPM[2]")
+    run, told = run_of(raw)
+    assert [n for n in run if n.startswith("rotor_speed")] == [f"rotor_speed_{k}_rad_s" for k in (1, 2, 4)]
+    assert "rotor_speed_3_rad_s: its eRPM is not logged, or 0 throughout; column left out" in told
+
+
+@pytest.mark.parametrize(("motors", "what"), [(1, "fixed wing"), (2, "bicopter"), (3, "tricopter")])
+def test_fewer_motors_than_four_are_no_multirotor(motors: int, what: str) -> None:
+    with pytest.raises(InputError, match=f"log.bbl: the log is of a.*{what}.* \\({motors} motors\\); only multirotors"):
+        run_of(frames_of().drop(columns=[f"motor[{k}]" for k in range(motors, 4)]))
 
 
 @pytest.mark.parametrize(

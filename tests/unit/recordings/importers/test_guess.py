@@ -20,7 +20,7 @@ from rotorid.recordings import read_set, templates
 from rotorid.recordings.importers.faults import join_rows
 from rotorid.recordings.importers.guessing import names as column_names
 from rotorid.recordings.importers.guessing.guess import as_text, guess
-from rotorid.recordings.importers.mapping import BODY, TRAVEL, UNITS, WORLD, convert, read_mapping
+from rotorid.recordings.importers.mapping import BODY, TRAVEL, UNITS, WORLD, convert, read_columns, read_mapping
 from tests.public_logs import LOGS, needs_logs
 
 NAMES = {
@@ -215,6 +215,9 @@ def throttles_of(names: str, values: np.ndarray, **more):
         ("m{}", 32767 * SPOOLED, {}, "?"),
         ("m{}", np.minimum(60000 * SPOOLED, 32767), {}, [0, 32767]),
         ("m{}", 65535 * SPOOLED * 1.5, {}, [0, 65535]),
+        ("m{}", 600 + 900 * SHARES, {}, "?"),  # DShot's, or speeds in rad/s
+        ("RCOU.C{}", 1000 + 600 * SHARES, {}, [1000, 2000]),
+        ("m{}_throttle", 600 + 900 * SHARES, {}, [48, 2047]),
     ],
 )  # fmt: skip
 def test_the_range_of_throttles_is_found_or_asked(names: str, values: np.ndarray, more: dict, ends) -> None:
@@ -248,6 +251,33 @@ def test_electrical_speeds_are_no_speeds_of_rotors(names: str, values: np.ndarra
         table = {"t_s": 0.01 * np.arange(len(values)), **more} | {names.format(k): v for k, v in enumerate(values.T)}
         made, _ = convert(pd.DataFrame(table), mapping, "own.csv")
         np.testing.assert_allclose(made["rotor_speed_1_rad_s"], 900 + 100 * SHARES[:, 0])
+
+
+@pytest.mark.parametrize(
+    ("names", "values", "unit"),
+    [
+        *[(name, 700 + 600 * SHARES, "rad/s") for name in (
+            "omega{}", "w{}", "rotor_{}_speed", "motor{}_vel", "rotor_velocity_{}", "w_m{}"
+        )],
+        *[(name, 9000 + 900 * SHARES, "rpm") for name in ("ESC{} rpm", "prop{}_rpm", "M{} (RPM)", "esc_{}.rpm")],
+        *[(name, 9 + SHARES, "krpm") for name in ("rotor{}_krpm", "krpm{}", "M{} [krpm]")],
+        ("motor_{}_hz", 150 + 100 * SHARES, "hz"),
+    ],
+)  # fmt: skip
+def test_speeds_of_rotors_however_they_are_called(names: str, values: np.ndarray, unit: str) -> None:
+    found = throttles_of(names, values)
+    assert found.mapping.channels["rotor_speed"].unit == unit and "throttle" not in found.mapping.channels
+    assert "rotor_speed" not in found.open
+
+
+def test_columns_that_follow_the_thrust_and_are_called_nothing_are_asked(flown: pd.DataFrame) -> None:
+    """The current of each motor follows it too, but is called so."""
+    pull = -flown[c.SPECIFIC_FORCE[2]].to_numpy()
+    table = plain(flown).assign(**{f"k{i}": 100 * np.sqrt(pull) + i for i in range(4)})
+    question = guess(table).open["throttle"]
+    assert "which readings are no and full throttle" in question and "Or are they speeds?" in question
+    table = plain(flown).assign(**{f"motor_{i}_current": pull + i for i in range(4)})
+    assert "throttle" not in guess(table).mapping.channels
 
 
 def test_slow_turns_are_asked_although_the_names_say_rpm() -> None:
@@ -437,7 +467,9 @@ def test_the_names_of_mavlink(flown: pd.DataFrame, message: str, force: str, rat
         ("current", 1500.0, "?"), ("battery_current_cA", 1500.0, "cA"), ("current [mA]", 1500.0, "mA"),
         ("battery_current_mA", 0.02, "?"), ("battery_voltage", 16.0, "V"), ("battery_voltage_cV", 1600.0, "cV"),
         ("battery_voltage_mV", 16000.0, "mV"), ("vbat", 16000.0, "mV"), ("vbat", 168.0, "dV"), ("vbat", 1680.0, "cV"),
-        ("vbat", 380.0, "?"), ("battery_voltage_mV", 16.0, "?"), ("Voltage (V)", 16.0, "V"),
+        ("pm.vbat", 3.9, "V"), ("BAT.Volt", 16.0, "V"), ("batt_volt_mV", 16000.0, "mV"),
+        ("BAT.Curr (mA)", 9000.0, "mA"), ("vbat", 380.0, "?"), ("battery_voltage_mV", 16.0, "?"),
+        ("Voltage (V)", 16.0, "V"),
         ("temperature_K", 300.0, "K"), ("temperature", 300.0, "K"), ("temperature_c", 35.0, "degC"),
         ("temperature", 35.0, "degC"), ("temperature", 95.0, "?"), ("temp_degF", 95.0, "degF"),
         ("Temperature (°F)", 95.0, "degF"),
@@ -501,3 +533,104 @@ def test_columns_that_hold_nothing_are_no_channels() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert set(guess(empty).mapping.channels) == {"time"}
+
+
+# Clocks, rates and accelerations under more names -------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "written", "unit"),
+    [
+        ("timestamp", lambda t: [f"2024-05-01 10:00:{x:09.6f}" for x in t], "s"),
+        ("time", lambda t: [f"2024-05-01T10:00:{x:09.6f}Z" for x in t], "s"),
+        ("utc_time", lambda t: pd.Timestamp("2024-05-01") + pd.to_timedelta(t, "s"), "s"),
+        ("time", lambda t: [f"9:59:{x:09.6f}" for x in t], "s"),
+        ("%time", lambda t: 1.7e18 + np.round(t * 1e9), "ns"),
+        ("field.header.stamp", lambda t: 1.7e18 + np.round(t * 1e9), "ns"),
+        ("elapsed (ms)", lambda t: t * 1000, "ms"),
+        ("Seconds", lambda t: t, "s"),
+        ("__time", lambda t: 1.7e9 + t, "s"),
+        ("OSD.flyTime [s]", lambda t: t, "s"),
+        ("IMU.TimeUS", lambda t: np.round(t * 1e6), "us"),
+    ],
+)  # fmt: skip
+def test_clocks_however_they_are_written(flown: pd.DataFrame, name: str, written, unit: str, tmp_path: Path) -> None:
+    table, path = plain(flown), tmp_path / "own.parquet"
+    table = table.assign(t_s=written(table["t_s"].to_numpy())).rename(columns={"t_s": name})
+    table.to_parquet(path)
+    read = read_columns(path)
+    mapping = guess(read).mapping
+    assert mapping.channels["time"].columns == (name,) and mapping.channels["time"].unit == unit
+    made, _ = convert(read, mapping, "own.csv")
+    np.testing.assert_allclose(made[c.TIME], flown[c.TIME] - flown[c.TIME].iloc[0], atol=1e-6)
+
+
+def test_a_clock_that_counts_whole_seconds_is_asked_for_its_fraction(flown: pd.DataFrame) -> None:
+    table = plain(flown)
+    table = table.assign(nsecs=table["t_s"] % 1 * 1e9, t_s=table["t_s"] // 1).rename(columns={"t_s": "stamp.secs"})
+    assert "is its fraction in another column?" in guess(table).open["time"]
+
+
+@pytest.mark.parametrize(
+    ("names", "factor", "unit"),
+    [
+        (("p", "q", "r"), 1.0, "rad/s"), (("P (deg/s)", "Q (deg/s)", "R (deg/s)"), 180 / np.pi, "deg/s"),
+        (("rollRate", "pitchRate", "yawRate"), 180 / np.pi, "deg/s"),
+        (("imu.roll_rate", "imu.pitch_rate", "imu.yaw_rate"), 1.0, "rad/s"),
+        (("gyro_roll_dps", "gyro_pitch_dps", "gyro_yaw_dps"), 180 / np.pi, "deg/s"),
+        (("roll_rate_deg", "pitch_rate_deg", "yaw_rate_deg"), 180 / np.pi, "deg/s"),
+        (("ATTITUDE.rollspeed", "ATTITUDE.pitchspeed", "ATTITUDE.yawspeed"), 1.0, "rad/s"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("attitude", [True, False])
+def test_body_rates_named_by_letters_or_angles(flown: pd.DataFrame, names, factor: float, unit: str, attitude) -> None:
+    """Without an attitude the unit is that of the names, or asked; a rate that is asked for is none."""
+    table = plain(flown)
+    rates = {n: table[f"gyro_{a}"] * factor for n, a in zip(names, "xyz", strict=True)}
+    table = table.drop(columns=[f"gyro_{a}" for a in "xyz"]).assign(**rates, roll_rate_sp=0, pitch_rate_sp=0)
+    if not attitude:
+        table = table.drop(columns=["qw", "qx", "qy", "qz"])
+    channel = guess(table).mapping.channels["angular_velocity"]
+    stated = attitude or any(word in names[0] for word in ("dps", "deg", "speed"))
+    assert channel.columns == tuple(names) and channel.unit == (unit if stated else "?")
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "unit"),
+    [
+        ("acc_{}_mg", 1000 / 9.80665, "mg"), ("acc_{}_cm_s2", 100.0, "cm/s2"), ("acc_{} [mm/s^2]", 1000.0, "mm/s2"),
+        ("acc_{}_ft_s2", 1 / 0.3048, "ft/s2"), ("acc_{}", 1 / 0.3048, "?"), ("acc_{}", 1000.0, "?"),
+        ("acc_{}_g", 100.0, "?"),
+    ],
+)  # fmt: skip
+def test_units_of_an_accelerometer_by_its_names(flown: pd.DataFrame, name: str, factor: float, unit: str) -> None:
+    table = plain(flown)
+    force = {name.format(a): table[f"acc_{a}"] * factor for a in "xyz"}
+    table = table.drop(columns=[f"acc_{a}" for a in "xyz"]).assign(**force)
+    assert guess(table).mapping.channels["specific_force"].unit == unit
+
+
+def test_the_names_of_plotjugglers_tables(flown: pd.DataFrame) -> None:
+    """Members of an array have numbers of two digits."""
+    table = plain(flown).rename(columns={"t_s": "__time"})
+    new = {f"gyro_{a}": f"/fmu/sensor_combined/gyro_rad.{i:02d}" for i, a in enumerate("xyz")}
+    new |= {f"acc_{a}": f"/fmu/sensor_combined/accelerometer_m_s2.{i:02d}" for i, a in enumerate("xyz")}
+    new |= {f"q{a}": f"/fmu/vehicle_attitude/q.{i:02d}" for i, a in enumerate("wxyz")}
+    channels = guess(table.rename(columns=new)).mapping.channels
+    for name, form in (("angular_velocity", "gyro_"), ("specific_force", "acc_"), ("attitude", "q")):
+        assert channels[name].columns == tuple(new[f"{form}{a}"] for a in ("wxyz" if name == "attitude" else "xyz"))
+    assert channels["attitude"].form == "wxyz"
+
+
+def test_nine_columns_are_a_matrix_and_no_quaternion(flown: pd.DataFrame) -> None:
+    table = plain(flown).drop(columns=["qw", "qx", "qy", "qz"])
+    turn = Rotation.from_quat(flown[list(c.QUATERNION)].to_numpy()[:, [1, 2, 3, 0]]).as_matrix().reshape(-1, 9)
+    assert "attitude" not in guess(table.assign(**{f"rotation[{k}]": turn[:, k] for k in range(9)})).mapping.channels
+
+
+def test_angles_above_a_full_turn_are_hundredths_of_a_degree(flown: pd.DataFrame) -> None:
+    table = plain(flown).drop(columns=["qw", "qx", "qy", "qz"])
+    turn = Rotation.from_quat(flown[list(c.QUATERNION)].to_numpy()[:, [1, 2, 3, 0]])
+    angles = dict(zip(("yaw", "pitch", "roll"), turn.as_euler("ZYX", degrees=True).T * 100, strict=True))
+    channel = guess(table.assign(**angles)).mapping.channels["attitude"]
+    assert (channel.unit, channel.form) == ("cdeg", "euler")

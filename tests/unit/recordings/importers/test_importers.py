@@ -693,6 +693,25 @@ def test_px4_speeds_follow_their_function_and_an_offline_controller_is_missing()
     assert table["rotor_speed_1_rad_s"].isna().tolist() == [False, False, True, False, False]
 
 
+@pytest.mark.parametrize(("rpm", "taken"), [((0, 3000), 3000), ((3000, 0), 3000), ((3000, 6000), 3000)])
+def test_px4_speeds_are_those_of_the_instance_that_turns(rpm, taken: int) -> None:
+    instances = [{"timestamp": np.arange(5) * 1000, "esc[0].esc_rpm": np.full(5, own)} for own in rpm]
+    converted = px4_ulog.convert(px4(sensor_combined=gyro(), esc_status=instances), 1)
+    assert converted.table["rotor_speed_1_rad_s"].tolist() == pytest.approx([taken * np.pi / 30] * 5)
+    assert ("instances" in kinds(converted.faults)) == all(rpm)
+
+
+@pytest.mark.parametrize(("first", "taken"), [(20, 0.0), (19, 0.0), (10, 1.0), (2, 1.0)])
+def test_px4_of_several_instances_the_first_that_goes_on_is_read(first: int, taken: float) -> None:
+    """The second instance has 1 at each place where the first has 0."""
+    instances = [
+        {"timestamp": np.arange(count) * 1000, **{f"q[{k}]": np.full(count, float(k == own)) for k in range(4)}}
+        for own, count in enumerate((first, 20))
+    ]
+    table = px4_ulog.convert(px4(sensor_combined=gyro(20), vehicle_attitude=instances), 1).table
+    assert table["quaternion_x"].iloc[0] == taken
+
+
 def test_px4_invalid_positions_heights_and_currents_are_missing() -> None:
     place = {
         "timestamp": np.arange(5) * 1000,

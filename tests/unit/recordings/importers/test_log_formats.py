@@ -154,13 +154,18 @@ FORMATS = {  # kind: number, format, labels
 LETTERS = {"Q": "Q", "B": "B", "f": "f", "H": "H", "N": "16s"}
 
 
-def dataflash(truth: pd.DataFrame, parameters: dict[str, float]) -> bytes:
-    """A DataFlash log: every kind's format, then messages; motors 1 to 4 on channels 5 to 8, 1100 to 1900 µs."""
+def dataflash(truth: pd.DataFrame, parameters: dict[str, float], before_4_1: bool = False) -> bytes:
+    """A DataFlash log: every kind's format, then messages; motors 1 to 4 on channels 5 to 8, 1100 to 1900 µs.
+
+    `before_4_1`: each speed controller has a message of its own, ESC5 to ESC8.
+    """
     out = bytearray()
-    table = {"FMT": (128, "BBnNZ", "Type,Length,Name,Format,Columns"), **FORMATS}
+    each = {f"ESC{n}": (200 + n, "Qf", "TimeUS,RPM") for n in range(5, 9)} if before_4_1 else {}
+    formats = FORMATS | each
+    table = {"FMT": (128, "BBnNZ", "Type,Length,Name,Format,Columns"), **formats}
 
     def message(kind: str, *values) -> None:
-        number, form, _ = FORMATS[kind]
+        number, form, _ = formats[kind]
         packed = struct.pack("<" + "".join(LETTERS[x] for x in form), *values)
         out.extend(b"\xa3\x95" + bytes([number]) + packed)
 
@@ -185,7 +190,7 @@ def dataflash(truth: pd.DataFrame, parameters: dict[str, float]) -> bytes:
         message("XKF1", at, 0, *(values[n] for n in (*c.VELOCITY, *c.POSITION)))
         message("RCOU", at, 1500, 1500, 1500, 1500, *(round(1100 + 800 * values[n]) for n in THROTTLES))
         for i, name in enumerate(SPEEDS):
-            message("ESC", at, 4 + i, values[name] * 60 / (2 * np.pi))
+            message(*(("ESC", at, 4 + i) if not each else (f"ESC{5 + i}", at)), values[name] * 60 / (2 * np.pi))
         message("BAT", at, 0, values["battery_voltage_v"], 12.0)
     return bytes(out)
 
@@ -194,10 +199,11 @@ PARAMETERS = {"FRAME_CLASS": 1, "FRAME_TYPE": 1, "MOT_PWM_MIN": 1100, "MOT_PWM_M
 PARAMETERS |= {f"SERVO{n}_FUNCTION": 28 + n for n in range(5, 9)}
 
 
-def test_ardupilot(tmp_path: Path) -> None:
+@pytest.mark.parametrize("before_4_1", [False, True])
+def test_ardupilot(before_4_1: bool, tmp_path: Path) -> None:
     pytest.importorskip("pymavlink")
     path, truth = tmp_path / "00000001.BIN", flown()
-    path.write_bytes(dataflash(truth, PARAMETERS))
+    path.write_bytes(dataflash(truth, PARAMETERS, before_4_1))
     found = read_log(path)
     assert (found.format, found.known.autopilot) == ("ardupilot", "ardupilot")
     (run,) = found.runs.values()
@@ -404,3 +410,33 @@ def test_a_betaflight_log_becomes_a_set_with_betaflights_order_of_rotors(tmp_pat
     vehicle = read_set(tmp_path / "set").vehicle
     expected = quad_x("betaflight", abs(vehicle.rotors[0].x_m), abs(vehicle.rotors[0].y_m))
     assert vehicle.rotors == expected and ORDERS["betaflight"][0] == ("rear right", "cw")
+
+
+@pytest.mark.parametrize(("clock", "factor"), [("Timestamp", 1e3), ("time_us", 1e6), ("t", 1.0)])
+@pytest.mark.parametrize("sign", [",", ";"])
+def test_a_table_with_the_names_of_the_crazyflies_firmware(
+    clock: str, factor: float, sign: str, tmp_path: Path
+) -> None:
+    """As its client writes it: angles of the old body frame, deg/s, multiples of g, 16 bits; a row late."""
+    path, truth = tmp_path / "flight.csv", flown()
+    turn = Rotation.from_quat(truth[list(c.QUATERNION)].to_numpy()[:, [1, 2, 3, 0]])
+    yaw, pitch, roll = turn.as_euler("ZYX", degrees=True).T
+    table = {clock: truth[c.TIME] * factor, "stateEstimate.roll": roll, "stateEstimate.pitch": pitch}
+    table |= {"stateEstimate.yaw": -yaw, "mode": "hover"}
+    for group, values in (
+        ("gyro.{}", np.degrees(truth[list(c.ANGULAR_VELOCITY)].to_numpy()) @ FLU),
+        ("acc.{}", truth[list(c.SPECIFIC_FORCE)].to_numpy() / 9.81 @ FLU),
+        ("stateEstimate.v{}", truth[list(c.VELOCITY)].to_numpy() @ FLU),
+    ):
+        table |= {group.format(a): column for a, column in zip("xyz", values.T, strict=True)}
+    table |= {f"motor.m{i + 1}": truth[name] * 65536 for i, name in enumerate(THROTTLES)}
+    table = pd.DataFrame(table)
+    table = pd.concat([table[:600], table[601:602], table[600:601], table[602:]])
+    table.to_csv(path, index=False, sep=sign)
+    found = read_log(path)
+    (run,) = found.runs.values()
+    assert (found.format, [f.kind for f in found.faults if f.kind == "order"]) == ("crazyflie", ["order"])
+    check_against(run, truth, (*BODY, *c.QUATERNION, *c.VELOCITY, *THROTTLES), 1e-6)
+    table.drop(columns=clock).to_csv(path, index=False)
+    with pytest.raises(InputError, match="the clock: no column is named as a time"):
+        read_log(path)

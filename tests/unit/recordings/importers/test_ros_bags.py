@@ -628,3 +628,102 @@ def test_a_file_of_nothing_but_foreign_channels_names_them(tmp_path: Path) -> No
     path.write_bytes(b"\x89MCAP0\r\n" + body + record(2, bytes(20)) + b"\x89MCAP0\r\n")
     with pytest.raises(InputError, match=r"no topic of a type that is known; found /state \(json\)"):
         ros.read_ros(path)
+
+
+# Which topic, and which axes ----------------------------------------------------------------------
+
+
+def moving(two: bool = True) -> Flight:
+    """The known flight with rates that integrate to its attitude, and a velocity that integrates to its position."""
+    flight = Flight(two)
+    flight.place = np.cumsum(flight.moves, axis=0) / 100
+    turn = Rotation.from_matrix(flight.turn)
+    flight.rates = np.vstack([(turn[:-1].inv() * turn[1:]).as_rotvec() * 100, np.zeros(3)])
+    flight.table = flight.table.assign(**dict(zip(c.ANGULAR_VELOCITY, (flight.rates @ FLU).T, strict=True)))
+    return flight
+
+
+OTHERS = {
+    "/mavros/setpoint_position/local": 1,
+    "/vehicle/reference/pose": 1,
+    "/vicon/cart/pose": 1,
+    "/another/pose": 2,
+}
+"""Topics with a pose that is not that of the vehicle, and how often they come."""
+
+
+@pytest.mark.parametrize("topic", OTHERS)
+@pytest.mark.parametrize("every", [1, 2])
+def test_the_pose_is_that_of_the_body_that_turns_as_measured(tmp_path: Path, topic: str, every: int) -> None:
+    """Another body, or one that is asked for, moves too, as often or more often."""
+    flight = moving()
+    at = stamped(flight)
+    other = moving()
+    other.place, other.quaternion = flight.place[::-1] * 1.5, flight.quaternion[::-1]
+    topics = usual(flight, "/imu", "/motors") | {
+        "/robot/pose": (lambda k: POSES["PoseStamped"](flight, k, at(k)), at, every),
+        topic: (lambda k: POSES["PoseStamped"](other, k, at(k)), at, OTHERS[topic]),
+    }
+    del topics["/imu"]  # an inertial sensor is none that is asked for, whatever its vehicle is called
+    topics["/target_1/imu"] = (lambda k: flight.imu(k, at(k), covariances=(MINUS, None, None)), at, 1)
+    runs, faults, _ = ros.read_ros(written(tmp_path / "a", flight, topics))
+    (run,) = runs.values()
+    place = run[list(c.POSITION)].dropna().to_numpy() @ FLU
+    first = np.linalg.norm(flight.place - place[0], axis=1).argmin()
+    np.testing.assert_allclose(place, flight.place[first::every][: len(place)], atol=1e-6)
+    assert any(topic in f.found and f.kind in ("command", "instances") for f in faults)
+
+
+@pytest.mark.parametrize("stated", ["base_link", "map"])
+@pytest.mark.parametrize("true", ["body", "world"])
+@pytest.mark.parametrize("message", ["Odometry", "TwistStamped"])
+def test_the_axes_of_a_velocity_by_what_it_integrates_to(tmp_path: Path, stated: str, true: str, message: str) -> None:
+    """An odometry is in body axes by its definition, whatever its frames are called."""
+    flight = moving()
+    at = stamped(flight)
+    own = [flight.turn[k].T @ flight.moves[k] if true == "body" else flight.moves[k] for k in range(len(flight.moves))]
+
+    def twist(k: int):
+        whole = flight("geometry_msgs/msg/Twist", linear=flight.vector(own[k]), angular=flight.vector((0, 0, 0)))
+        return flight("geometry_msgs/msg/TwistStamped", header=flight.header(at(k), stated), twist=whole)
+
+    topics = usual(flight, "/imu", "/motors")
+    if message == "Odometry":
+        topics["/odom"] = (lambda k: flight.odometry(k, at(k), moves=own[k]), at, 1)
+    else:
+        topics |= {"/pose": (lambda k: POSES["PoseStamped"](flight, k, at(k)), at, 1), "/velocity": (twist, at, 1)}
+    runs, faults, _ = ros.read_ros(written(tmp_path / "a", flight, topics))
+    check_against(next(iter(runs.values())), flight.table, c.VELOCITY, 1e-4)
+    said = "body" if message == "Odometry" or stated == "base_link" else "world"
+    assert any(f.kind == "axes" for f in faults) == (said != true)
+
+
+@pytest.mark.parametrize("turn", [[[0, -1, 0], [0, 0, -1], [1, 0, 0]], [[1, 0, 0], [0, -1, 0], [0, 0, -1]]])
+def test_an_inertial_sensor_whose_axes_are_not_the_vehicles(tmp_path: Path, turn) -> None:
+    """A camera's that comes more often, or one in forward-right-down: passed over, refused where it is the only one."""
+    flight = moving()
+    at, turn = stamped(flight), np.array(turn)
+    camera = (lambda k: flight.imu(k, at(k), rates=turn @ flight.rates[k], force=turn @ flight.force[k]), at, 1)
+    topics = usual(flight, "/odom", "/motors") | {"/camera/imu": camera}
+    topics["/imu"] = (lambda k: flight.imu(k, at(k)), at, 2)
+    runs, _, _ = ros.read_ros(written(tmp_path / "a", flight, topics))
+    (run,) = runs.values()
+    read = run[[*c.ANGULAR_VELOCITY, *c.SPECIFIC_FORCE]].dropna().reset_index(drop=True)
+    check_against(read, flight.table[::2].reset_index(drop=True), c.SPECIFIC_FORCE, 1e-4)
+    del topics["/imu"]
+    with pytest.raises(InputError, match=r"/camera/imu reads .* m/s² along [yz] in the median, expected 9.8 along z"):
+        ros.read_ros(written(tmp_path / "b", flight, topics))
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_a_battery_that_is_discharged_has_a_positive_current(tmp_path: Path, sign: int) -> None:
+    """Negative by the message's definition; many drivers state it as positive."""
+    flight = Flight()
+    at = stamped(flight)
+    kind, zeros = "sensor_msgs/msg/BatteryState", np.zeros(0, np.float32)
+    plain = dict.fromkeys(("temperature", "charge", "capacity", "design_capacity", "percentage"), 0.0)
+    plain |= dict.fromkeys([f"power_supply_{n}" for n in ("status", "health", "technology")], 0)
+    plain |= {"present": True, "cell_voltage": zeros, "cell_temperature": zeros, "location": "", "serial_number": ""}
+    make = lambda k: flight(kind, header=flight.header(at(k)), voltage=15.0, current=sign * 12.0, **plain)  # noqa: E731
+    runs, _, _ = ros.read_ros(written(tmp_path / "a", flight, usual(flight) | {"/battery": (make, at, 10)}))
+    assert set(next(iter(runs.values()))[c.BATTERY_CURRENT].dropna()) == {12.0}

@@ -9,6 +9,7 @@ import pytest
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.guessing.guess import guess
+from rotorid.recordings.importers.logfile import format_of
 from rotorid.recordings.importers.mapping import read_columns
 from rotorid.recordings.importers.rcbenchmark import HEADINGS, read_rcbenchmark
 from rotorid.recordings.importers.set_of_logs import set_of_logs
@@ -246,3 +247,57 @@ def test_a_stand_whose_heading_names_no_unit_is_asked() -> None:
 def test_a_flight_with_a_column_called_thrust_is_no_stand() -> None:
     table = pd.DataFrame({"t_s": 0.01 * np.arange(300), "thrust": 0.5} | {f"acc_{a}": 9.8 * (a == "z") for a in "xyz"})
     assert "thrust" not in guess(table).mapping.channels
+
+
+STEADY = np.repeat(np.linspace(0, 1, 20), 3)
+"""Shares of the largest speed of a stand that is read once in half a second."""
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "unit"), [("Time (s)", 1, "s"), ("t_s", 1, "s"), ("t_ms", 1e3, "ms"), ("t", 1, "?")]
+)
+@pytest.mark.parametrize(
+    ("speed", "turns", "unit_of_speed"),
+    [("Rotation speed (krpm)", 19.1, "krpm"), ("erpm", 133700.0, "erpm"), ("omega (rad/s)", 2000.0, "rad/s")],
+)
+def test_steady_points_of_a_stand(name: str, factor: float, unit: str, speed: str, turns: float, unit_of_speed) -> None:
+    """2 Hz are no 2 kHz; what the program of another stand calls an ESC signal is no export of RCbenchmark's."""
+    table = pd.DataFrame(
+        {
+            name: 0.5 * factor * np.arange(60),
+            "ESC signal (%)": 100 * STEADY,
+            "Thrust (N)": 8 * STEADY**2,
+            speed: turns * STEADY,
+        }
+    )
+    found = guess(table).mapping.channels
+    assert found["time"].unit == unit and found["rotor_speed"].unit == unit_of_speed
+    assert found["throttle"].range == (0.0, 100.0)
+
+
+@pytest.mark.parametrize(
+    "heading", ["ESC signal A (µs),Thrust A (N),Motor Electrical Speed A (RPM)", "ESC signal,Thrust"]
+)
+def test_an_export_of_another_stand_is_a_table(tmp_path: Path, heading: str) -> None:
+    (tmp_path / "a.csv").write_text(f"Time (s),{heading}\n0,1,2,3\n")
+    assert format_of(tmp_path / "a.csv") == "csv"
+    assert format_of(export(tmp_path / "b.csv")) == "rcbenchmark"
+
+
+@pytest.mark.parametrize(("sign", "body"), [(1, "flu"), (-1, "frd")])
+@pytest.mark.parametrize(
+    ("names", "units"),
+    [
+        (("F{}", "M{}"), ("?", "?")),
+        (("F{} [N]", "T{} [N.m]"), ("N", "N.m")),
+        (("f_{}_lbf", "tau_{}_mNm"), ("lbf", "mN.m")),
+    ],
+)
+def test_a_load_cell_of_six_axes(sign: int, body: str, names, units) -> None:
+    """The rotor pulls along -z of forward-right-down."""
+    table = {"t_s": 0.5 * np.arange(60), "rpm": 19100 * STEADY}
+    table |= {names[0].format(a): sign * 8 * STEADY**2 * (a == "z") for a in "xyz"}
+    table |= {names[1].format(a): 0.1 * STEADY**2 * (a == "z") for a in "xyz"}
+    found = guess(pd.DataFrame(table)).mapping
+    assert (found.channels["force"].unit, found.channels["moment"].unit) == units and found.body == body
+    assert "specific_force" not in found.channels and "rotor_speed" in found.channels

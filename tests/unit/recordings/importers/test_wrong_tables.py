@@ -28,7 +28,11 @@ WRONG = (
     ("words in a column", WORDS, "line 2, column angular_velocity_x_rad_s: expected a number, found 'oops'"),
     ("a word in a cell", RUN.replace("0.05,", "soon,", 1), "line 3, column time_s: expected a number, found 'soon'"),
     ("decimal commas", DECIMAL_COMMAS, "the heading has 18 (are decimals written with commas? expected points)"),
-    ("decimal commas between semicolons", RUN.replace(",", ";").replace(".", ","), "line 2, column time_s: expected"),
+    (
+        "decimal commas and thousands' points",
+        RUN.replace(",", ";").replace(".", ",").replace("\n0,05;", "\n1.000,05;"),
+        "line 3, column time_s: expected a number, found '1.000,05'",
+    ),
     ("a cell too many at each start", SHIFTED, f"line 2: has {WIDTH + 1} cells, the heading has {WIDTH}"),
     ("a cell too many in a line", RUN.replace("\n0.05,", "\n0.05,7,"), f"line 3: has {WIDTH + 1} cells"),
     ("a column twice", RUN.replace("velocity_y_m_s", "velocity_x_m_s", 1), "column velocity_x_m_s is there twice"),
@@ -82,6 +86,34 @@ def test_columns_may_be_separated_by_other_signs(sign: str, tmp_path: Path) -> N
     found, faults, _ = read_by_mapping(path, None)
     pd.testing.assert_frame_equal(found, table())
     assert faults == []
+
+
+@pytest.mark.parametrize("sign", [";", "\t", "|"], ids=["semicolons", "tabs", "bars"])
+@pytest.mark.parametrize(
+    "above", ["", "Logger 2;of today\n\n", "# one\n# two\n#"], ids=["plain", "lines above", "comment"]
+)
+def test_decimal_commas_are_read_where_no_comma_parts_columns(sign: str, above: str, tmp_path: Path) -> None:
+    path = tmp_path / "own.csv"
+    path.write_text(above + RUN.replace(",", sign).replace(".", ","))
+    pd.testing.assert_frame_equal(read_by_mapping(path, None)[0], table())
+
+
+@pytest.mark.parametrize("mapping", [None, MAPPING], ids=["by names", "by mapping"])
+@pytest.mark.parametrize(("order", "kept"), [("shuffled", 200), ("one late", 200), ("begins anew", 100)])
+def test_rows_that_come_late_are_sorted_and_a_second_flight_is_not_mixed_in(mapping, order, kept, tmp_path) -> None:
+    own = table()
+    if order == "shuffled":
+        own = own.sample(frac=1, random_state=1)
+    elif order == "one late":
+        own = pd.concat([own[:50], own[60:70], own[50:60], own[70:]])
+    else:
+        own = pd.concat([own[:100], own[:100].assign(velocity_x_m_s=9)])
+    own.to_csv(tmp_path / "own.csv", index=False)
+    found, faults, _ = read_by_mapping(tmp_path / "own.csv", mapping)
+    assert len(found) == kept and np.allclose(np.diff(found["time_s"]), 0.05)
+    names = list(SPEEDS)
+    np.testing.assert_array_equal(found[names], table()[names][:kept])
+    assert [f.kind for f in faults] == ["repeated_time" if order == "begins anew" else "order"]
 
 
 def test_a_column_without_a_name_is_kept_by_its_number(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -27,6 +27,8 @@ from rotorid.recordings.importers.guessing.names import Family
 from rotorid.recordings.importers.mapping import EULER, OPEN, from_angles
 from rotorid.recordings.importers.units import UNITS
 
+_MOST_RAD, _MOST_DEG = 7.0, 400.0
+"""Largest angle in rad, and in degrees."""
 _SAME_ORDER_RAD = np.radians(2.0)
 """Where the two orders of roll, pitch and yaw are no farther apart, the usual one is taken without a question."""
 
@@ -45,7 +47,8 @@ class _Turn:
 def _attitudes(draft: Draft) -> tuple[list[_Turn], str]:
     """Every reading of the columns that can be the attitude, and why they can."""
     free = draft.free()
-    fours = [f for axes in named.FOURS for f in named.families(free, axes)]
+    more = {n for f in named.numbered(free) if len(f.columns) > 4 for n in f.columns}  # nine are a matrix
+    fours = [f for axes in named.FOURS for f in named.families(free, axes) if axes.isalpha() or not more & {*f.columns}]
     lengths = {f: np.linalg.norm(draft.values(f.columns), axis=1) for f in fours}
     unit = [f for f in fours if np.isfinite(lengths[f]).any() and abs(np.nanmedian(lengths[f]) - 1) < 0.02]
     offered = [f for f in unit if named.is_quaternion(f)] or [f for f in unit if not f.words & named.OTHER_THINGS]
@@ -66,7 +69,9 @@ def _attitudes(draft: Draft) -> tuple[list[_Turn], str]:
     if found is None or not np.isfinite(values := draft.values(found[0])).all(axis=1).any():
         return [], ""
     columns, stated = found
-    units = [stated] if stated in UNITS["angle"] else ["deg"] if np.nanmax(np.abs(values)) > 7 else ["rad", "deg"]
+    top = float(np.nanmax(np.abs(values)))
+    by_size = ["rad", "deg"] if top < _MOST_RAD else ["deg"] if top < _MOST_DEG else ["cdeg", "mrad"]
+    units = [stated] if stated in UNITS["angle"] else by_size
     turns = []
     known = np.isfinite(values).all(axis=1)
     for unit_, form in product(units, EULER):
@@ -80,7 +85,8 @@ def _attitudes(draft: Draft) -> tuple[list[_Turn], str]:
 def guess_attitude_and_rates(draft: Draft) -> None:
     turns, why = _attitudes(draft)
     triples = triples_of(draft)
-    offered = [f for f in triples if named.is_named(f, "angular_velocity")]
+    rates = {"rad": "rad/s", "deg": "deg/s", "mrad": "mrad/s"}  # `gyro_rad` of PX4
+    offered = [replace(f, unit=rates.get(f.unit, f.unit)) for f in triples if named.is_named(f, "angular_velocity")]
     found: dict[tuple[int, Family], Agreement] = {}
     if draft.instants is not None:
         for k, turn in enumerate(turns):

@@ -28,8 +28,6 @@ FACTOR_OFF = 0.15
 """How far a factor may be from that of a unit."""
 _FACTOR_OFF_COUNTS = 0.03
 """The same where counts of usual sensors are near: 16.4 to 1 deg/s are 1.064 thousandths of rad/s each."""
-_RATES_BY_NAME = {("p", "q", "r"): "", ("rollspeed", "pitchspeed", "yawspeed"): "rad/s"}
-"""Names of body rates without a word in common, and their unit where it is fixed (MAVLink's `ATTITUDE`)."""
 RATES_HZ = (5.0, 8000.0)
 """Rates at which tables are recorded."""
 _THOUSANDTHS = 100.0
@@ -75,11 +73,9 @@ class Draft:
 
 def triples_of(draft: Draft) -> list[Family]:
     free = draft.free()
-    found = [f for axes in named.AXES for f in named.families(free, axes)]
-    last = {(named.words_of(n) or [""])[-1]: n for n in free}
-    for names, unit in _RATES_BY_NAME.items():
-        if set(names) <= set(last):
-            found.append(Family("omega", tuple(last[n] for n in names), "xyz", unit, frozenset(("omega",))))
+    more = {n for f in named.numbered(free) if len(f.columns) > 3 for n in f.columns}  # `w0` to `w3` are no three axes
+    found = [f for axes in named.AXES for f in named.families(free, axes) if axes.isalpha() or not more & {*f.columns}]
+    found += named.body_rates(free)
     found += _with_units(draft, named.of_mavlink(free))
     return [f for f in found if np.isfinite(draft.values(f.columns)).all(axis=1).sum() > 1]
 

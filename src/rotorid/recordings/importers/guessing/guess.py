@@ -21,7 +21,7 @@ import pandas as pd
 import yaml
 
 from rotorid.errors import InputError
-from rotorid.recordings.importers.faults import join_rows
+from rotorid.recordings.importers.faults import in_order, join_rows
 from rotorid.recordings.importers.guessing import agreement as by
 from rotorid.recordings.importers.guessing import names as named
 from rotorid.recordings.importers.guessing.attitude import guess_attitude_and_rates
@@ -32,7 +32,7 @@ from rotorid.recordings.importers.guessing.draft import (
     triples_of,
 )
 from rotorid.recordings.importers.guessing.names import Family
-from rotorid.recordings.importers.guessing.rotors import guess_rotors, guess_stand
+from rotorid.recordings.importers.guessing.rotors import guess_rotors, guess_stand, six_axes
 from rotorid.recordings.importers.guessing.travel import guess_height, guess_position, guess_velocity
 from rotorid.recordings.importers.mapping import BODY, CHANNELS, OPEN, WORLD, Mapping
 from rotorid.recordings.importers.units import UNITS, G, converted, stated
@@ -40,6 +40,13 @@ from rotorid.recordings.tables import numbers
 
 _USUAL = {"voltage": (60.0, 2.5, 60.0), "current": (60.0, 0.0, 150.0), "temperature": (60.0, -30.0, 130.0)}
 """To a kind the largest median that is plainly in the contract's unit, and between what limits it lies, V, A, °C."""
+
+_USUAL_ACCELERATIONS = ("m/s2", "g", "mg")
+"""Units of accelerometers that names need not state; counts can be as large as others."""
+_SLOWEST_STAND_HZ = 0.05
+"""Steady points of a stand may come so seldom."""
+_MOVES_ON = 0.5
+"""Share of the rows in which a clock moves on at least."""
 
 
 @dataclass(frozen=True)
@@ -70,11 +77,11 @@ def guess(table: pd.DataFrame) -> _Guess:
     body, draft.world = _guess_frames(draft)
     guess_velocity(draft)
     guess_position(draft)
-    body, world = _axes_that_matter(draft, body, draft.world)
     guess_height(draft)
     for name in ("rotor_command", "rotor_speed", "throttle"):
         guess_rotors(draft, name)
     guess_stand(draft)
+    body, world = _axes_that_matter(draft, body, draft.world)
     mapping = Mapping(body=body, world=world, channels=draft.channels, keep=tuple(draft.free()))
     return _Guess(mapping, draft.evidence, draft.open, tuple(left_out))
 
@@ -133,12 +140,15 @@ def _guess_time(draft: Draft) -> None:
             "time", [OPEN], "", "no column is named as a time, and without one nothing can be imported", unit=OPEN
         )
         return
-    draft.table = join_rows(draft.table, name)
+    draft.table = join_rows(in_order(draft.table, name)[0], name)
     values = draft.table[name].to_numpy(float)
     steps = np.diff(values[np.isfinite(values)])
+    moves = float((steps > 0).mean()) if len(steps) else 0.0
     steps = steps[steps > 0]
     usual = float(np.median(steps)) if len(steps) else np.nan
-    fits = [u for u, f in UNITS["time"].items() if RATES_HZ[0] <= 1 / (usual * f) <= RATES_HZ[1]] if usual > 0 else []
+    stand = any(named.scalar(draft.table.columns, quantity) for quantity in ("thrust", "torque")) or six_axes(draft)
+    slowest = _SLOWEST_STAND_HZ if stand else RATES_HZ[0]
+    fits = [u for u, f in UNITS["time"].items() if slowest <= 1 / (usual * f) <= RATES_HZ[1]] if usual > 0 else []
     stated = named.time_unit(name)
     seen = f"its usual step is {usual:.6g}"
     if stated and (stated in fits or not fits):
@@ -148,6 +158,8 @@ def _guess_time(draft: Draft) -> None:
     else:
         unit, evidence = OPEN, f"by its name; {seen}"
         question = f"its name says {stated}, its step {' or '.join(fits)}" if stated else "its unit is not clear"
+    if moves < _MOVES_ON:
+        unit, question = OPEN, f"it moves on in {moves:.0%} of the rows: is its fraction in another column?"
     draft.put("time", [name], evidence, question, unit=unit)
     if unit != OPEN and len(steps):
         _set_clock(draft, values * UNITS["time"][unit])
@@ -200,7 +212,8 @@ def _fitting(kind: str, middle: float) -> list[str]:
 
 def _guess_specific_force(draft: Draft) -> None:
     triples = triples_of(draft)
-    offered = [f for f in triples if named.is_named(f, "specific_force")]
+    of_stand = set(six_axes(draft).values())
+    offered = [f for f in triples if named.is_named(f, "specific_force") and f not in of_stand]
     norms = {f: float(np.nanmedian(np.linalg.norm(draft.values(f.columns), axis=1))) for f in triples}
     fits = [f for f in offered if _force_unit(f, norms[f])]
     if fits:
@@ -231,9 +244,8 @@ def _guess_specific_force(draft: Draft) -> None:
 
 def _force_unit(family: Family, norm: float) -> str:
     """The unit in which a median norm is about 1 g, empty where there is none or the names say another."""
-    unit = next((u for u, f in UNITS["acceleration"].items() if 0.7 < norm * f / G < 1.6), "")
-    stated = family.unit if family.unit in UNITS["acceleration"] else ""
-    return unit if stated in ("", unit) else ""
+    among = [family.unit] if family.unit in UNITS["acceleration"] else _USUAL_ACCELERATIONS
+    return next((u for u in among if 0.7 < norm * UNITS["acceleration"][u] / G < 1.6), "")
 
 
 def _power(counts: float) -> int:
@@ -250,16 +262,20 @@ def _upright(draft: Draft, family: Family) -> bool:
 
 def _guess_frames(draft: Draft) -> tuple[str, str]:
     """Body axes by the sign of the accelerometer's z in flight; the world's z by where the attitude turns it to."""
-    force = draft.channels.get("specific_force")
+    stand = six_axes(draft).get("force")
+    force = stand or draft.channels.get("specific_force")
     if force is None:
         return _frames_without_accelerometer(draft)
     values = draft.values(force.columns)
     size = np.linalg.norm(values, axis=1)
+    strong = size > 0.5 * np.nanmax(size) if stand else np.full(len(size), True)
     with np.errstate(invalid="ignore", divide="ignore"):
-        _, y, z = np.nanmedian(values / size[:, None], axis=0)
+        _, y, z = np.nanmedian((values / size[:, None])[strong], axis=0)
     body = "frd" if z < -0.8 else "flu" if z > 0.8 else "fur" if y > 0.8 else OPEN
     axis, share = ("y", y) if body == "fur" else ("z", z)
-    draft.evidence["body"] = f"the accelerometer's {axis} reads {share:+.2f} of its norm in the median"
+    draft.evidence["body"] = (
+        f"the {'force' if stand else 'accelerometer'}'s {axis} reads {share:+.2f} of its norm in the median"
+    )
     if body == OPEN:
         draft.open["body"] = "frd reads -1 along z, flu +1, fur +1 along y in level flight"
     if draft.wxyz is None or draft.time_s is None:
@@ -319,7 +335,7 @@ def _frames_without_accelerometer(draft: Draft) -> tuple[str, str]:
 def _axes_that_matter(draft: Draft, body: str, world: str) -> tuple[str, str]:
     """The axes of body and world; nothing is asked where no channel stands in them."""
     for key, channels, found, usual in (
-        ("body", {"attitude", "angular_velocity", "specific_force", "velocity"}, body, "frd"),
+        ("body", {"attitude", "angular_velocity", "specific_force", "velocity", "force", "moment"}, body, "frd"),
         ("world", {"attitude", "velocity", "position"}, world, "ned"),
     ):
         if found == OPEN and not channels & set(draft.channels):

@@ -13,10 +13,12 @@ from dataclasses import dataclass
 _UNIT_WORDS: dict[str, str] = {
     "m_s_s": "m/s2",
     "m_s2": "m/s2", "m_s_2": "m/s2", "m_s^2": "m/s2", "ms2": "m/s2", "mps2": "m/s2", "mg": "mg", "g": "g",
+    "cm_s2": "cm/s2", "cm_s^2": "cm/s2", "mm_s2": "mm/s2", "mm_s^2": "mm/s2", "ft_s2": "ft/s2", "ft_s^2": "ft/s2",
     "m_s": "m/s", "mps": "m/s", "cm_s": "cm/s", "mm_s": "mm/s",
     "rad_s": "rad/s", "rads": "rad/s", "radps": "rad/s", "deg_s": "deg/s", "dps": "deg/s", "degps": "deg/s",
     "mrad_s": "mrad/s", "mrad": "mrad", "cdeg": "cdeg",
-    "rad": "rad", "deg": "deg", "m": "m", "cm": "cm", "mm": "mm", "ft": "ft", "rpm": "rpm", "hz": "hz", "erpm": "erpm",
+    "rad": "rad", "deg": "deg", "m": "m", "cm": "cm", "mm": "mm", "ft": "ft", "rpm": "rpm", "krpm": "krpm", "hz": "hz",
+    "erpm": "erpm", "kgf": "kgf", "gf": "gf", "lbf": "lbf", "n_m": "N.m", "nm": "N.m", "m_nm": "mN.m", "mn_m": "mN.m",
 }  # fmt: skip
 """Words of a unit at the end of a name to the mapping's unit."""
 _QUALIFIERS = frozenset(
@@ -49,26 +51,55 @@ TRIPLES: dict[str, tuple[frozenset[str], frozenset[str]]] = {
     ),
     "position": (frozenset("pos position".split()), frozenset(("p", ""))),
     "velocity": (frozenset("vel velocity".split()), frozenset("v".split())),
+    "force": (frozenset(("force",)), frozenset(("f",))),
+    "moment": (frozenset("moment torque".split()), frozenset("m t tau".split())),
 }
 """To a quantity the words that a stem may end in, and those that must be the whole of it."""
 _ROTORS: dict[str, frozenset[str]] = {
-    "rotor_speed": frozenset("rpm erpm rotor_speed rotor_speeds motor_speed motor_speeds mot_speed".split()),
+    "rotor_speed": frozenset(
+        "rpm krpm erpm omega w rotor_speed rotor_speeds motor_speed motor_speeds mot_speed prop_speed rotor_vel "
+        "motor_vel rotor_velocity motor_velocity".split()
+    ),
     "rotor_command": frozenset("rotor_command rotor_commands".split()),
     "throttle": frozenset(
-        "motor motors throttle throttles pwm m mot output outputs thr control u act actuator actuators servo".split()
+        "motor motors throttle throttles pwm m mot output outputs thr control u act actuator actuators servo "
+        "rcou_c".split()
     ),
 }  # fmt: skip
 _QUATERNION = frozenset("q quat quaternion att_q attitude_q orientation rotation".split())
 _ANGLES = ({"roll", "phi"}, {"pitch", "theta"}, {"yaw", "psi", "heading"})
+_TURNING = frozenset("rate rates speed vel gyro gyr omega".split())
+"""Words that make a name of an angle one of a body rate."""
 _SCALARS: dict[str, tuple[str, ...]] = {
-    "time": (r"t([ _(\[]*([munµ]?s)[)\]]?)?", r"time(stamp)?([ _(\[].*)?", r"time_.*", r".*timestamp.*"),
-    "battery_voltage": (r"v_?bat(t|tery)?.*", r"battery_?v(olt(age)?)?.*", r"volt(age)?.*", r"u_?bat.*"),
-    "battery_current": (r"amperage.*", r"current.*", r"i_?bat.*", r"battery_?current.*"),
+    "time": (
+        r"%?t([ _(\[]*([munµ]?s)[)\]]?)?",
+        r"[%_]*time(stamp)?([ _(\[].*)?",
+        r"time_.*",
+        r".*timestamp.*",
+        r"elapsed.*",
+        r"(date|utc)[ _]?time.*",
+        r"(.*[._/])?stamp(\b.*)?",
+        r"sec(ond)?s?",
+        r".*time([um]s)?([ _(\[].*)?",
+    ),
+    "battery_voltage": (r"v_?bat(t|tery)?.*", r"batt?(ery)?_?v(olt(age)?)?.*", r"volt(age)?.*", r"u_?bat.*"),
+    "battery_current": (
+        r"amperage.*",
+        r"curr(ent)?\b.*",
+        r"current.*",
+        r"i_?bat.*",
+        r"battery_?current.*",
+        r"amps?\b.*",
+    ),
     "height": (r"height.*", r"agl.*", r"range.*"),
     "temperature": (r"temp(erature)?.*",),
     "thrust": (r"thrust([ _(\[,/].*)?", r".*[ _]thrust([ _(\[,/].*)?", r"load( cell)?([ _(\[,/].*)?"),
     "torque": (r"torque([ _(\[,/].*)?", r".*[ _]torque([ _(\[,/].*)?"),
-    "rotor_speed": (r"(rotor|motor|prop\w*)?[ _]?(speed|rpm)([ _(\[,/].*)?", r".*[ _(\[]rpm.*", r".*rotation.*speed.*"),
+    "rotor_speed": (
+        r"(rotor|motor|prop\w*)?[ _]?(speed|e?rpm|omega)([ _(\[,/].*)?",
+        r".*[ _(\[]e?rpm.*",
+        r".*rotation.*speed.*",
+    ),
     "throttle": (r"(throttle|esc|pwm|motor command)([ _(\[,/].*)?",),
 }
 _MAVLINK = "xyz of MAVLink"
@@ -130,6 +161,7 @@ def _member(name: str, axes: str) -> tuple[str, str, str, frozenset[str]] | None
     if not ends or ends[-1][-1] not in axes:
         return None
     last_word, axis = ends[-1][:-1], ends[-1][-1]
+    last_word = "" if axis.isdigit() and last_word == "0" else last_word  # `gyro.02`
     if axis.isdigit() and last_word[-1:].isdigit():
         return None  # of a longer number
     stem = [*ends[:-1], *([last_word] if last_word else [])]
@@ -159,16 +191,16 @@ def families(names: Iterable[str], axes: str) -> list[Family]:
 
 
 def numbered(names: Iterable[str]) -> list[Family]:
-    """Families of three to sixteen columns numbered in one go from 0 or 1 (`u0` … `u3`, `motor[1]`, `m1_rpm`)."""
+    """Families of three to sixteen columns numbered in one go from 0 or 1 (`u0`, `motor[1]`, `rotor_1_speed`)."""
     found: dict[str, dict[int, tuple[str, str]]] = {}
     for name in names:
         words, unit = _without_unit(words_of(name.replace("(/100)", "")))
         unit = "100erpm" if "(/100)" in name else unit
         if words and words[-1] in _AFTER_NUMBERS and len(words) > 1 and re.search(r"\d$", words[-2]):
             words = words[:-1]
-        match = re.fullmatch(r"(.*?)(?:_m)?_?(\d{1,2})", "_".join(words))
+        match = re.fullmatch(r"(.*?)(?:_m)?_?(\d{1,2})(_[a-z]+)?", "_".join(words))
         if match:
-            stem = match.group(1) or "m"
+            stem = (match[1] + (match[3] or "")).strip("_") or "m"
             found.setdefault(stem, {}).setdefault(int(match.group(2)), (name, unit))
     result = []
     for stem, members in found.items():
@@ -196,15 +228,34 @@ def of_mavlink(names: Iterable[str]) -> list[Family]:
     ]
 
 
+def body_rates(names: Iterable[str]) -> list[Family]:
+    """Body rates named by letters or by angles: `p`, `q`, `r`; `rollspeed` of MAVLink's `ATTITUDE`; `roll_rate_dps`."""
+    found: dict[int, tuple[str, str]] = {}
+    for name in names:
+        words, unit = _without_unit(words_of(name))
+        last = "_".join(words[-2:])
+        for axis, (letter, meant) in enumerate(zip("pqr", _ANGLES, strict=True)):
+            called = {letter, *(f"{m}{sign}{w}" for m in meant for w in _TURNING for sign in ("", "_"))}
+            called |= {f"{w}_{m}" for m in meant for w in _TURNING}
+            if {last, *words[-1:]} & called and not {*words} & OTHER_THINGS:
+                unit = "rad/s" if last.endswith("speed") else {"rad": "rad/s", "deg": "deg/s"}.get(unit, unit)
+                found.setdefault(axis, (name, unit))
+    if len(found) < 3:
+        return []
+    units = {unit for _, unit in found.values()}
+    columns = tuple(found[axis][0] for axis in range(3))
+    return [Family("omega", columns, "xyz", units.pop() if len(units) == 1 else "", frozenset(("omega",)))]
+
+
 def _ends_in(stem: str, words: frozenset[str]) -> bool:
     return any(stem == w or stem.endswith(f"_{w}") for w in words)
 
 
 def is_named(family: Family, quantity: str) -> bool:
     """Whether three columns are named as a quantity of motion; `ang_vel` is no velocity, `acc_bias` no acceleration."""
-    if family.words & OTHER_THINGS:
-        return False
     endings, whole = TRIPLES[quantity]
+    if family.words & OTHER_THINGS - endings:
+        return False
     if family.axes in ("012", "123") and family.stem == "":
         return False
     turning = bool(family.words & {"ang", "angular", "rot", "rotational"})
@@ -223,7 +274,9 @@ def is_rotor(family: Family, quantity: str) -> bool:
         )
     if family.words & _WISHED and quantity == "rotor_speed":
         return False
-    if quantity == "rotor_speed" and family.unit in ("rpm", "rad/s", "hz", "erpm", "100erpm"):
+    if quantity == "rotor_speed" and family.unit in ("rpm", "krpm", "erpm", "100erpm"):
+        return True
+    if quantity == "rotor_speed" and family.unit in ("rad/s", "hz"):
         return _ends_in(stem, _ROTORS[quantity] | _ROTORS["throttle"])
     return _ends_in("_".join(rest), _ROTORS[quantity])
 
@@ -238,7 +291,8 @@ def angles(names: Sequence[str]) -> tuple[tuple[str, str, str], str] | None:
     for meant in _ANGLES:
         for name in names:
             words, unit = _without_unit(words_of(name))
-            if words and words[-1] in meant and not frozenset(words) & OTHER_THINGS and "rate" not in words:
+            other = frozenset(words) & (OTHER_THINGS | _TURNING) or unit.endswith("/s")
+            if words and words[-1] in meant and not other:
                 found.append(name)
                 units.add(unit)
                 break
@@ -248,10 +302,14 @@ def angles(names: Sequence[str]) -> tuple[tuple[str, str, str], str] | None:
 
 
 def scalar(names: Iterable[str], quantity: str) -> str | None:
-    """The first column whose name is that of a scalar quantity, by the pattern that is most its own."""
+    """The first column whose name is that of a scalar quantity, by the pattern that is most its own.
+
+    Of a battery the name of its message may stand before a point (`pm.vbat`, `BAT.Volt`).
+    """
     for pattern in _SCALARS[quantity]:
         for name in names:
-            if re.fullmatch(pattern, str(name).lower()):
+            plain = str(name).lower()
+            if re.fullmatch(pattern, plain.rsplit(".", 1)[-1] if quantity.startswith("battery") else plain):
                 return name
     return None
 

@@ -12,6 +12,7 @@ from rotorid.recordings.importers.guessing.draft import (
     BY_NUMBERS_ALONE,
     CONTRADICTED,
     Draft,
+    triples_of,
 )
 from rotorid.recordings.importers.guessing.names import Family
 from rotorid.recordings.importers.mapping import CHANNELS, ELECTRICAL, OPEN
@@ -31,11 +32,14 @@ _RANGES: dict[str, tuple[float, float]] = {
 }
 """Readings of no and of full throttle; a motor that is off may read 0 in each."""
 _RANGES_BY_NAME = {
-    "pulses in µs": frozenset("us usec pwm pulse servo rcout".split()),
+    "pulses in µs": frozenset("us usec pwm pulse servo rcout rcou".split()),
     "DShot": frozenset(("dshot",)),
     "per cent": frozenset("percent pct".split()),
 }
 _BETAFLIGHTS = ("DShot", "pulses in µs")
+_UNNAMED = "no name says it"
+_OTHER_THINGS = frozenset("current amps temp temperature voltage volt volts power thrust torque force".split())
+"""Words of what a motor has besides a speed and a throttle."""
 _LOWEST_PULSE_US = 880.0
 """Pulses of motors that are disarmed go down to 900 µs."""
 _PULSES_OF_HOVER_US = 1300.0
@@ -56,8 +60,12 @@ def guess_rotors(draft: Draft, quantity: str) -> None:
         and not {"throttle", "rotor_speed", "rotor_command"} & set(draft.channels)
     ):
         offered, how = (
-            [f for f in named.numbered(draft.free()) if _carries(draft, f) > BY_NUMBERS_ALONE - 0.1],
-            "no name says it",
+            [
+                f
+                for f in named.numbered(draft.free())
+                if not f.words & _OTHER_THINGS and _carries(draft, f) > BY_NUMBERS_ALONE - 0.1
+            ],
+            _UNNAMED,
         )
     if not offered:
         return
@@ -77,7 +85,11 @@ def guess_stand(draft: Draft) -> None:
         unit, top = stated(name, kind), float(np.nanmax(np.abs(draft.values([name]))))
         question = "" if unit else f"in which unit? Its largest value is {top:.4g}"
         draft.put(quantity, [name], f"by its name; up to {top:.4g}", question, unit=unit or OPEN)
-    if "thrust" not in draft.channels:
+    for quantity, family in six_axes(draft).items():
+        kind = CHANNELS[quantity][0]
+        unit = next(iter({stated(n, kind) for n in family.columns})) or OPEN
+        draft.put(quantity, family.columns, "by their names", "in which unit?" if unit == OPEN else "", unit=unit)
+    if not {"thrust", "force"} & set(draft.channels):
         return
     for quantity in ("rotor_speed", "throttle"):
         name = named.scalar(draft.free(), quantity)
@@ -85,6 +97,18 @@ def guess_stand(draft: Draft) -> None:
             unit = stated(name, "turns") if quantity == "rotor_speed" else ""
             words = frozenset(named.words_of(name))
             _put(draft, quantity, Family(name, (name,), "number", unit, words), "by its name")
+
+
+def six_axes(draft: Draft) -> dict[str, Family]:
+    """Force and moment of a stand by their names; next to a gyroscope, or alone without a unit, `f` is specific."""
+    triples = triples_of(draft)
+    if any(named.is_named(f, "angular_velocity") for f in triples):
+        return {}
+    moment = next((f for f in triples if named.is_named(f, "moment")), None)
+    force = next((f for f in triples if named.is_named(f, "force")), None)
+    if force is None or (moment is None and not stated(force.columns[2], "force")):
+        return {}
+    return {"force": force} | ({} if moment is None else {"moment": moment})
 
 
 def _put(draft: Draft, quantity: str, family: Family, how: str) -> None:
@@ -106,16 +130,20 @@ def _put(draft: Draft, quantity: str, family: Family, how: str) -> None:
             question = f"{question}; {poles}" if question else poles
         draft.put(quantity, family.columns, f"{evidence}; {why}", question, unit=unit, **more)
         return
-    found = _possible_ranges(values, family, _is_betaflight(draft))
+    betaflight = _is_betaflight(draft)
+    found = _possible_ranges(values, family, betaflight)
+    speeds = how == _UNNAMED or (found == ["DShot"] and not betaflight and _can_be_speeds(values, family))
     if found == ["a share"]:
         draft.put(quantity, family.columns, f"{evidence}, so a share", unit="1")
-    elif len(found) == 1:
+    elif len(found) == 1 and not speeds:
         low, high = _RANGES[found[0]]
         more = f"so {found[0]}: no throttle is taken as {low:g} and full throttle as {high:g}"
         draft.put(quantity, family.columns, f"{evidence}, {more}", unit="raw", range=(low, high))
     else:
         kinds = " or ".join(f"[{_RANGES[k][0]:g}, {_RANGES[k][1]:g}] ({k})" for k in found)
         question = f"which readings are no and full throttle: {kinds or 'no usual range holds them'}?"
+        if speeds:
+            question += " Or are they speeds? Then call the channel rotor_speed and state their unit"
         draft.put(quantity, family.columns, evidence, question, unit="raw", range=OPEN)
 
 
@@ -125,6 +153,15 @@ def _that_move(draft: Draft, family: Family) -> Family:
     spread = pd.DataFrame(values).nunique().to_numpy()
     moving = [n for n, count in zip(family.columns, spread, strict=True) if count > 1]
     return replace(family, columns=tuple(moving)) if 3 <= len(moving) < len(family.columns) else family
+
+
+def _can_be_speeds(values: np.ndarray, family: Family) -> bool:
+    """Whether numbers that fit DShot may be speeds in rad/s: never at an end of it, and no word says throttle."""
+    given = values[values > 0]
+    low, high = _RANGES["DShot"]
+    words = {w for column in family.columns for w in named.words_of(column)}
+    plainly = words & frozenset.union(*_RANGES_BY_NAME.values(), frozenset(("throttle", "throttles", "thr")))
+    return not plainly and low < given.min() < _RANGES["pulses in µs"][0] < given.max() < high
 
 
 def _is_betaflight(draft: Draft) -> bool:
@@ -144,8 +181,10 @@ def _possible_ranges(values: np.ndarray, family: Family, betaflight: bool) -> li
         return []
     low, middle, high = np.quantile(given, [0.005, 0.5, 0.995])
     names = {w for column in family.columns for w in named.words_of(column)}
-    stated = next((kind for kind, words in _RANGES_BY_NAME.items() if names & words), None)
-    among = (stated,) if stated else _BETAFLIGHTS if betaflight else tuple(_RANGES)
+    named_so = next((kind for kind, words in _RANGES_BY_NAME.items() if names & words), None)
+    if all(stated(column, "share") == "%" for column in family.columns):
+        named_so = "per cent"
+    among = (named_so,) if named_so else _BETAFLIGHTS if betaflight else tuple(_RANGES)
     held = []
     for kind in among:
         bottom, full = _RANGES[kind]
@@ -154,7 +193,7 @@ def _possible_ranges(values: np.ndarray, family: Family, betaflight: bool) -> li
             continue
         if below <= low and high <= full + 0.02 * (full - bottom):
             held.append(kind)
-    if stated is None and not betaflight:
+    if named_so is None and not betaflight:
         fits = [k for k in held if _HOVERS[0] <= (middle - _RANGES[k][0]) / np.ptp(_RANGES[k]) <= _HOVERS[1]]
         held = fits or [k for k in held if k in ("a share", "-1 to 1")][:1] or held
         if low >= _RANGES["pulses in µs"][0] and middle > _PULSES_OF_HOVER_US:
@@ -179,6 +218,8 @@ def _speed_unit(family: Family, middle: float, betaflight: bool) -> tuple[str, s
         return OPEN, f"a median of {middle:.4g} can be electrical turns a minute (erpm) or hundreds of them (100erpm)"
     if family.unit in UNITS["rotor"]:
         return family.unit, "the names state the unit"
+    if "krpm" in {family.unit, *family.words}:
+        return "krpm", "the names state the unit"
     if "rpm" in "_".join(family.words):
         if middle > 1000:
             return "rpm", "the names state the unit"
