@@ -144,10 +144,8 @@ class Parameter:
     """No instrument is better than this: a form whose parameters are all below it is not worth a word."""
 
 
-_Wrench = Callable[[Motion, Vehicle, np.ndarray], Contribution]
-Kernel = Callable[..., None]
-"""`kernel(m, v, p, w)`: adds to `w` (fields of `rotorid.vehicle.kernels.ADDED`) what a form does at the instant `m`
-(`INSTANT`) to the vehicle `v` (`BODY`) with the values `p`. Arithmetic and `math` alone: numba compiles it."""
+_Adding = Callable[[Motion, Vehicle, np.ndarray], Contribution]
+"""What a form adds; a `rotorid.effects.instant.Wrench` where one instant gives its force and moment: then it flies."""
 _Residuals = Sequence[tuple[Motion, dict[str, np.ndarray]]]
 """Motions of a recording, each with the `force` and `moment` that are not explained, (n, 3) in body axes."""
 
@@ -162,7 +160,7 @@ class Form:
     name: str
     equation: str
     parameters: tuple[Parameter, ...]
-    contribution: _Wrench
+    contribution: _Adding
     requires: tuple[str, ...] = ()
     """Fields of `Motion` that must be there."""
     vehicle_requires: tuple[str, ...] = ()
@@ -199,12 +197,6 @@ class Form:
     """Believed values (the contract's names) that it changes as well where it is new in a vehicle."""
     resolution: float = 1.0
     """How many times the size that counts elsewhere its contribution must have."""
-
-    kernel: Kernel | None = None
-    """The same force and moment at one instant, as a plain function that the simulator compiles (`Kernel`); None where
-    the form adds neither, or needs the past. A form without it is simulated by its array code."""
-    kernel_values: Callable[[np.ndarray], Sequence[float]] | None = None
-    """What the kernel takes for its values, from the form's parameter values; None for these themselves."""
 
     def stated(self, fitted: np.ndarray) -> np.ndarray:
         """The linear parameters as their equation has them, from the coefficients fitted to recordings, each (k,)."""
@@ -349,9 +341,6 @@ class Effect:
     shows_in: tuple[str, ...] = ()
     """Kinds of what two sets of flights are compared by without a model (`rotorid.mismatch.changes.quantities`) that
     another amount of it changes."""
-    shows_in: tuple[str, ...] = ()
-    """Kinds of what two sets of flights are compared by without a model (`rotorid.mismatch.changes.quantities`) that
-    another amount of it changes."""
     curves_thrust: bool = False
     """Whether it adds to the square of the rotor speed, which the thrust coefficient has, too."""
     between_flights: Mapping[str, float] = field(default_factory=dict)
@@ -424,32 +413,11 @@ def not_testable_reason(form: Form, motion: Motion, vehicle: Vehicle) -> str | N
     return None
 
 
-def at_hubs(forces: np.ndarray, positions_m: np.ndarray) -> Contribution:
-    """Force and moment of forces (n, k, 3) acting at hubs (k, 3), about the body origin."""
-    # Products of (n, k) by (k,) are many times faster here than sums and cross products over short axes.
-    fx, fy, fz = forces[:, :, 0], forces[:, :, 1], forces[:, :, 2]
-    x, y, z = positions_m.T
-    every = np.ones(len(positions_m))
-    return Contribution(
-        force=np.stack([fx @ every, fy @ every, fz @ every], axis=1),
-        moment=np.stack([fz @ y - fy @ z, fx @ z - fz @ x, fy @ x - fx @ y], axis=1),
-    )
-
-
 def rotor_thrusts(motion: Motion, vehicle: Vehicle) -> np.ndarray:
     """Thrust of each rotor, shape (n, k), N: the believed C_F ω² where the motion does not have another."""
     if motion.rotor_thrust is not None:
         return motion.rotor_thrust
     return vehicle.thrust_coefficients_n_s2() * motion.rotor_speed**2
-
-
-def lift_at_hubs(extra_n: np.ndarray, vehicle: Vehicle) -> Contribution:
-    """Force and moment of further thrust (n, k), N, along each rotor's axis (body -z)."""
-    # Column by column: as `at_hubs`, without its products by zero.
-    x, y, _ = vehicle.rotor_positions_m().T
-    force, moment = np.zeros((len(extra_n), 3)), np.zeros((len(extra_n), 3))
-    force[:, 2], moment[:, 0], moment[:, 1] = -sum(extra_n.T), -sum((extra_n * y).T), sum((extra_n * x).T)
-    return Contribution(force=force, moment=moment)
 
 
 def compiled(**options: Any) -> Callable[[Callable], Callable]:

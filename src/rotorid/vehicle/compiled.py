@@ -1,8 +1,8 @@
 """Compiled equations of motion: flights and restart windows of vehicles with effects, motors and a controller.
 
-The same equations, step by step, as the array code in `rotorid.vehicle.simulator` and `rotorid.vehicle.windows`,
-written as loops over vehicles for numba because a profile of the array code shows its time to go into calls on small
-arrays. Tests hold that both give the same numbers.
+Newton-Euler equations of a rigid body, thesis eqs 4.1-4.4, by quaternion, stepped by the classical Runge-Kutta method.
+Some effects depend on the accelerations that they change (added mass, products of inertia): these are solved for. A
+test compares them with flights that scipy integrates.
 
 Vehicles fly in blocks, as many at a time as there are records of an instant: each kernel is called for all of a block
 before the next kernel, which halves its cost, as the processor then works on several vehicles at once and guesses right
@@ -14,14 +14,44 @@ A state is rates 0:3, quaternion 3:7, velocity (world) 7:10, position 10:13, rot
 from __future__ import annotations
 
 import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
 
 from rotorid.effects.contract import compiled
-from rotorid.vehicle.dynamics import CONVERGED, MOST_ROUNDS
-from rotorid.vehicle.kernels import call_kernel
+from rotorid.effects.instant import MOST_ROTORS
 
+_STATE = 13 + MOST_ROTORS
+SCRATCH = np.dtype(
+    [(name, "f8", 6) for name in ("base", "wrench", "own", "first", "at", "now")]
+    + [("matrix", "f8", (6, 6)), ("known", "i8"), ("open", "i8")]
+    + [("state", "f8", _STATE), ("trial", "f8", _STATE), ("slopes", "f8", (4, _STATE))]
+    + [("angle", "f8", 3), ("wanted", "f8", 3), ("memory", "f8", (3, 3)), ("command", "f8", MOST_ROTORS)],
+    align=True,
+)
+"""Room for a vehicle in flight: forces with moments, accelerations (angular, linear) and how far they are solved for;
+its state, that at which a step is tried, and the slopes of a step's four stages; its controller. In a record because a
+slice of an array costs two atomic counts of references, as long as a kernel."""
+_MOST_ROUNDS = 30
+_CONVERGED = 1e-10
+"""Change of the accelerations, relative to their largest, at which they are taken as solved for."""
 _UNKNOWN, _FOUND, _EXACT = 0, 1, 2
 """What is known of how accelerations answer to themselves: nothing yet, the matrix of the flight, and that its step was
 exact at this step's beginning, so that one is enough at the step's other stages."""
+
+
+@intrinsic
+def _call_kernel(typingctx, address, instant, body, values, offset, added):
+    """Call the kernel at `address` (integer) with records and with `values` (array) from `offset` on."""
+
+    def codegen(context, builder, signature, args):
+        array = context.make_array(signature.args[3])(context, builder, args[3])
+        passed = [args[1], args[2], builder.gep(array.data, [args[4]]), args[5]]
+        function = ir.FunctionType(ir.VoidType(), [value.type for value in passed])
+        builder.call(builder.inttoptr(args[0], function.as_pointer()), passed)
+        return context.get_dummy_value()
+
+    return types.void(types.int64, instant, body, values, types.int64, added), codegen
 
 
 @compiled(error_model="numpy")
@@ -89,7 +119,7 @@ def _implicit(m, v, w, x, addresses, explicit, offsets, values, shift):
     """Accelerations `x.own` that follow where the effects that read accelerations are given `x.at`."""
     _hand_over(m, v, w, x)
     for e in range(explicit, addresses.shape[0]):
-        call_kernel(addresses[e], m, v, values, offsets[e] + shift, w)
+        _call_kernel(addresses[e], m, v, values, offsets[e] + shift, w)
     _follow(m, v, w, x)
 
 
@@ -172,7 +202,7 @@ def _stepped(x):
         for k in range(6):
             change += x.matrix[i, k] * (x.own[k] - x.at[k])
         x.now[i] = x.at[i] + change
-    return turning <= CONVERGED * most_turning and linear <= CONVERGED * most_linear
+    return turning <= _CONVERGED * most_turning and linear <= _CONVERGED * most_linear
 
 
 @compiled(error_model="numpy")
@@ -190,7 +220,7 @@ def _accelerate(count, first, alone, instant, body, added, scratch, addresses, e
         for e in range(explicit):
             for c in range(count):
                 n = first + c
-                call_kernel(addresses[e], instant[c], body[n * alone], values, offsets[e] + n * stride, added[c])
+                _call_kernel(addresses[e], instant[c], body[n * alone], values, offsets[e] + n * stride, added[c])
         for c in range(count):
             _collect(body[(first + c) * alone], added[c], scratch[c].base)
     if explicit == effects:
@@ -204,7 +234,7 @@ def _accelerate(count, first, alone, instant, body, added, scratch, addresses, e
             v = body[(first + c) * alone]
             _relaxation(instant[c], v, added[c], x, addresses, explicit, offsets, values, (first + c) * stride)
             x.known = _FOUND
-    for rounds in range(MOST_ROUNDS):
+    for rounds in range(_MOST_ROUNDS):
         for c in range(count):
             x = scratch[c]
             if x.open:
@@ -215,7 +245,7 @@ def _accelerate(count, first, alone, instant, body, added, scratch, addresses, e
             for c in range(count):
                 n = first + c
                 if scratch[c].open:
-                    call_kernel(addresses[e], instant[c], body[n * alone], values, offsets[e] + n * stride, added[c])
+                    _call_kernel(addresses[e], instant[c], body[n * alone], values, offsets[e] + n * stride, added[c])
         left = 0
         for c in range(count):
             x = scratch[c]

@@ -8,11 +8,10 @@ Y_v, L_p, … A derivative predicts within its range and names no cause.
 
 from __future__ import annotations
 
-from math import sqrt
-
 import numpy as np
 
-from rotorid.effects.contract import Contribution, Form, Motion, Parameter
+from rotorid.effects.contract import Form, Motion, Parameter
+from rotorid.effects.instant import Wrench
 from rotorid.recordings.vehicle import Derivative, Vehicle, unit_of
 
 CHANNELS = ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
@@ -96,20 +95,18 @@ def wrench(x: np.ndarray, matrix: np.ndarray, held: np.ndarray) -> np.ndarray:
     return np.clip(x[:, used], *held[used].T) @ matrix[:, used].T
 
 
-def _contribution(motion: Motion, vehicle: Vehicle, values: np.ndarray) -> Contribution:
-    values = np.asarray(values, float)
-    matrix, held = values[: 6 * _SIZE].reshape(6, _SIZE), values[6 * _SIZE :].reshape(_SIZE, 2)
-    added = wrench(quantities(motion, vehicle), matrix, held)
-    return Contribution(force=added[:, :3], moment=added[:, 3:])
-
-
-def _kernel(m, v, p, w):
-    """Adds to force and moment by a matrix (6, 12) and ranges (12, 2) in a row, as `_contribution`."""
+def _linear(m, v, p, w):
+    """Adds to force and moment by a matrix (6, 12) and ranges (12, 2) in a row, as `wrench`."""
     lift = 0.0
     for i in range(v.rotors):
         lift += v.thrust_coefficient[i]
     hover = v.mass * v.gravity / lift
     for k in range(12):
+        used = False
+        for j in range(6):
+            used = used or p[12 * j + k] != 0.0
+        if not used:
+            continue
         x = 0.0
         if k == 0:
             x = 1.0
@@ -129,12 +126,14 @@ def _kernel(m, v, p, w):
                 elif k == 10:
                     x += square * v.yaw_sign[i]
                 else:
-                    x += m.rotor_speed[i] / sqrt(hover)
+                    x += m.rotor_speed[i] / np.sqrt(hover)
             x /= v.rotors
-        x = min(max(x, p[72 + 2 * k]), p[73 + 2 * k])
+        x = np.minimum(np.maximum(x, p[72 + 2 * k]), p[73 + 2 * k])
         for j in range(3):
-            w.force[j] += p[12 * j + k] * x
-            w.moment[j] += p[12 * (3 + j) + k] * x
+            if p[12 * j + k] != 0.0:
+                w.force[j] += p[12 * j + k] * x
+            if p[12 * (3 + j) + k] != 0.0:
+                w.moment[j] += p[12 * (3 + j) + k] * x
 
 
 def derivative_form(vehicle: Vehicle) -> tuple[Form, np.ndarray] | None:
@@ -146,7 +145,5 @@ def derivative_form(vehicle: Vehicle) -> tuple[Form, np.ndarray] | None:
     needs = dict.fromkeys(_NEEDS.get(q, "rotor_speed") for q in used if q != "constant")
     parameters = [Parameter(symbol_of(c, q), unit_of(c, q)) for c in CHANNELS for q in QUANTITIES]
     parameters += [Parameter(f"{end} of {q}", "") for q in QUANTITIES for end in ("low", "high")]
-    form = Form(
-        "derivatives", "r_c = c_0 + Σ_k c_k x_k", tuple(parameters), _contribution, tuple(needs), kernel=_kernel
-    )
+    form = Form("derivatives", "r_c = c_0 + Σ_k c_k x_k", tuple(parameters), Wrench(_linear), tuple(needs))
     return form, np.concatenate([matrix.ravel(), held.ravel()])

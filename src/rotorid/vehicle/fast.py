@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
+from numba import cfunc, from_dtype, types
 
+from rotorid.effects.contract import LACK, Form, Motion
+from rotorid.effects.instant import ADDED, BODY, INSTANT, MOST_ROTORS, Kernel, Wrench
+from rotorid.errors import InputError
+from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle import compiled
-from rotorid.vehicle.kernels import ADDED, INSTANT, MOST_ROTORS, SCRATCH, Kernels
 
 _LOOP = np.dtype(
     [
@@ -30,6 +36,122 @@ _LEAST_PER_THREAD = 16
 """Vehicles below which a further thread is not worth its start."""
 _BLOCK = 8
 """Vehicles that fly together; their records fill half of a processor's first cache."""
+
+
+_ALWAYS_KNOWN = frozenset(
+    {
+        "rotor_speed",
+        "angular_velocity",
+        "angular_acceleration",
+        "specific_force",
+        # A simulated vehicle carries sensors that read the truth.
+        "accelerometer",
+        "gyroscope",
+    }
+)
+
+
+def check_effects(effects: Sequence[tuple[Form, Sequence[float]]], known: set[str]) -> None:
+    """InputError where a form needs a field of `Motion` that is neither in `known` nor always known."""
+    for form, _ in effects:
+        for name in form.requires:
+            if name not in known and name not in _ALWAYS_KNOWN:
+                reason = LACK.get(name, f"no {name}")
+                raise InputError(f"effect form {form.name!r} cannot be simulated: {reason}")
+
+
+_SIGNATURE = types.void(from_dtype(INSTANT), from_dtype(BODY), types.CPointer(types.float64), from_dtype(ADDED))
+_ACCELERATIONS = frozenset({"specific_force", "angular_acceleration", "accelerometer"})
+
+
+@cache
+def _machine_code(kernel: Kernel):
+    """A kernel as a C function, compiled by itself (0.1 s, then kept on disk next to its file).
+
+    It is called through its `address`, so that a new effect needs no other code to be compiled again; keep it alive as
+    long as that is in use.
+    """
+    try:
+        return cfunc(_SIGNATURE, cache=True)(kernel)
+    except RuntimeError:  # no folder for its cache that may be written
+        return cfunc(_SIGNATURE)(kernel)
+
+
+@dataclass(frozen=True)
+class Kernels:
+    """Effects ready to be called: first those that do not read the accelerations that they change."""
+
+    addresses: np.ndarray
+    """(e,) of the compiled kernels."""
+    explicit: int
+    """How many of them read no acceleration."""
+    offsets: np.ndarray
+    """(e,) place of each one's first value."""
+    values: np.ndarray
+    """(p,) values of all kernels in a row."""
+    forms: tuple[Form, ...]
+    kept: tuple = ()
+    """The compiled functions, so that they live as long as their addresses."""
+
+
+def kernels_of(effects: Sequence[tuple[Form, Sequence[float]]], vehicle: Vehicle) -> Kernels:
+    """The effects' kernels; forms that act on sensors alone are passed over: they do not move the vehicle.
+
+    InputError where a form adds a wrench and has no kernel, or the vehicle has too many rotors.
+    """
+    if vehicle.rotor_count > MOST_ROTORS:
+        raise InputError(f"vehicle {vehicle.name} has {vehicle.rotor_count} rotors, expected {MOST_ROTORS} at most")
+    used = []
+    for form, values in effects:
+        if isinstance(form.contribution, Wrench):
+            used.append((form, values))
+        elif form.memory:
+            raise InputError(
+                f"vehicle {vehicle.name}: effect form {form.name!r} has a memory of its own; "
+                "simulate it one by one (rotorid.vehicle.improved.simulate_as_stated)"
+            )
+        elif _adds_wrench(form, vehicle, np.asarray(values, float)):
+            raise InputError(f"effect form {form.name!r} does not fly: it states no kernel (rotorid.effects.instant)")
+    used.sort(key=lambda pair: _reads_accelerations(pair[0]))
+    functions = [_machine_code(form.contribution.kernel) for form, _ in used]
+    stated = [form.contribution.values_of(values) for form, values in used]
+    sizes = np.array([len(v) for v in stated], dtype=np.int64)
+    return Kernels(
+        addresses=np.array([f.address for f in functions], dtype=np.int64),
+        explicit=sum(not _reads_accelerations(form) for form, _ in used),
+        offsets=np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64) if used else np.zeros(0, np.int64),
+        values=np.concatenate([*stated, [0.0]]),
+        forms=tuple(form for form, _ in used),
+        kept=tuple(functions),
+    )
+
+
+def _reads_accelerations(form: Form) -> bool:
+    """Whether a form depends on the accelerations that it changes."""
+    return bool(_ACCELERATIONS & set(form.requires))
+
+
+def _adds_wrench(form: Form, vehicle: Vehicle, values: np.ndarray) -> bool:
+    """Whether a form adds a force or a moment anywhere."""
+    n, k = 2, vehicle.rotor_count
+    vectors = np.ones((n, 3))
+    motion = Motion(
+        time_s=np.array([0.0, 0.01]),
+        rotor_speed=np.full((n, k), 100.0),
+        rotor_acceleration=np.zeros((n, k)),
+        angular_velocity=vectors,
+        angular_acceleration=vectors,
+        specific_force=vectors,
+        accelerometer=vectors,
+        gyroscope=vectors,
+        rotation=np.broadcast_to(np.eye(3), (n, 3, 3)),
+        velocity=vectors,
+        position=vectors,
+        height=np.ones(n),
+        voltage=np.ones(n),
+    )
+    added = form.contribution(motion, vehicle, values)
+    return added.force is not None or added.moment is not None
 
 
 @dataclass(frozen=True)
@@ -196,7 +318,9 @@ def fly_windows(
 def _room(vehicles: int) -> dict[str, np.ndarray]:
     """Records of a block."""
     count = min(_BLOCK, vehicles)
-    return dict(instant=np.zeros(count, INSTANT), added=np.zeros(count, ADDED), scratch=np.zeros(count, SCRATCH))
+    instant = np.zeros(count, INSTANT)
+    instant["on_board"] = 1.0
+    return dict(instant=instant, added=np.zeros(count, ADDED), scratch=np.zeros(count, compiled.SCRATCH))
 
 
 def _spread(part, n: int, threads: int | None) -> None:

@@ -4,14 +4,15 @@ import numpy as np
 import pytest
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.effects.instant import body_of
 from rotorid.identify.estimate.excitation import ExcitedHold, Multisine
+from rotorid.vehicle import fast
 from rotorid.vehicle.attitude import (
     euler_from_quaternion,
     quaternion_from_euler,
     rotation_from_quaternion,
 )
 from rotorid.vehicle.control.pid import AttitudePid, Gains, Memory, pid_step, training_reference
-from rotorid.vehicle.dynamics import RigidBody, angular_acceleration
 from rotorid.vehicle.mixer import allocation_matrix, wrench_matrix
 from rotorid.vehicle.simulator import (
     Commands,
@@ -129,14 +130,14 @@ def test_torque_free_tumbling_keeps_energy_and_momentum():
     vehicle = thesis_vehicle()
     start = Start(angular_velocity_rad_s=np.array([[0.01, 8.0, 0.02]]))
     trace = simulate(vehicle, still(), 10.0, 0.001, start)
-    body = RigidBody.of_vehicle(vehicle)
+    inertia = vehicle.inertia_kg_m2.matrix()
     rates = trace.angular_velocity[0]
-    energy = 0.5 * np.einsum("ni,ij,nj->n", rates, body.inertia_kg_m2, rates)
+    energy = 0.5 * np.einsum("ni,ij,nj->n", rates, inertia, rates)
     assert np.ptp(energy) / energy[0] < 1e-9
     momentum = np.einsum(
         "nij,nj->ni",
         rotation_from_quaternion(trace.quaternion[0]),
-        trace.angular_velocity[0] @ body.inertia_kg_m2,
+        trace.angular_velocity[0] @ inertia,
     )
     np.testing.assert_allclose(momentum, momentum[:1].repeat(len(momentum), 0), atol=1e-9 * 0.02)
     assert np.abs(trace.angular_velocity[0, :, 1] - 8.0).max() > 5  # it did tumble
@@ -379,9 +380,11 @@ def test_a_runaway_is_one_clear_sentence():
 
 
 def test_angular_acceleration_is_equation_4_19():
-    body = RigidBody.of(0.652, [2.489e-3, 2.5743e-3, 4.6838e-3])
+    vehicle = thesis_vehicle(inertia_kg_m2=dict(xx=2.489e-3, yy=2.5743e-3, zz=4.6838e-3))
     p, q, r = 1.0, 2.0, 3.0
-    found = angular_acceleration(body, np.array([p, q, r]), np.array([0.01, 0.02, 0.03]))
+    start, push = np.array([[p, q, r, 1.0, *[0.0] * 13]]), np.array([[[0.0, 0.0, 0.0, 0.01, 0.02, 0.03]]])
+    flown = fast.fly(body_of(vehicle), fast.kernels_of([], vehicle), start, 0, 1.0, np.zeros((1, 4)), pushes=push)
+    found = flown.accelerations[0, 0, :3]
     by_hand = [
         -0.8475 * q * r + 0.01 / 2.489e-3,
         0.8526 * p * r + 0.02 / 2.5743e-3,
