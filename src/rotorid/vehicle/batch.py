@@ -84,8 +84,8 @@ class Batch:
 
     Keys of `changes` are `mass_kg` (n,), `inertia_kg_m2` (n, 3) or (n, 3, 3), `thrust_coefficient_n_s2` and
     `torque_coefficient_n_m_s2` (n,) or (n, k), `rotor_positions_m` (n, k, 3), and `<effect>.<symbol>` (n,) for a
-    parameter of an effect in the file. InputError names a key that the vehicle does not have, an effect that only
-    array code flies (`rotorid.vehicle.simulator` then), and a shape that does not fit.
+    parameter of an effect in the file. InputError names a key that the vehicle does not have, an effect with a
+    memory (`rotorid.vehicle.simulator` flies it), and a shape that does not fit.
     """
 
     def __init__(self, vehicle: Vehicle, size: int, changes: Mapping[str, np.ndarray] | None = None):
