@@ -86,14 +86,6 @@ class Motion:
         wind = np.broadcast_to(self.wind, self.velocity.shape)
         return self.velocity - np.einsum("nji,nj->ni", self.rotation, wind)
 
-    def hub_velocity(self, positions_m: np.ndarray) -> np.ndarray:
-        """Velocity of each hub through the air, v + Ω × r_i, shape (n, k, 3), m/s, body axes."""
-        rate = self.angular_velocity if self.angular_velocity is not None else np.zeros((self.size, 3))
-        x, y, z = positions_m.T
-        p, q, r = rate[:, :1], rate[:, 1:2], rate[:, 2:]
-        turning = np.stack([q * z - r * y, r * x - p * z, p * y - q * x], axis=2)
-        return self.air_velocity[:, None, :] + turning
-
     def has(self, names: tuple[str, ...]) -> bool:
         """Whether every named field is there."""
         return all(getattr(self, name) is not None for name in names)

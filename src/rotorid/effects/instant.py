@@ -1,9 +1,8 @@
 """One statement of what a form adds at one instant: numba compiles it for flights, numpy runs it on recordings.
 
-A kernel is a plain function `kernel(m, v, p, w)` that adds to `w` (`ADDED`) what a form does at the instant `m`
-(`INSTANT`) to the vehicle `v` (`BODY`) with the values `p`. It is arithmetic, loops over rotors and axes, and functions
-of numpy (`np.maximum`, `np.where`, …) alone, and asks nothing of `m` by an `if`: then each number of `m` may as well be
-that of n instants, (n,).
+A kernel is a plain function `kernel(m, v, p, w)` that adds to `w` what a form does at the instant `m` to the vehicle
+`v` (`records`) with the values `p`. It is arithmetic, loops over rotors and axes, and functions of numpy (`np.maximum`,
+`np.exp`, …) alone, and asks nothing of `m` by an `if`: then each number of `m` may as well be that of n instants, (n,).
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -19,53 +18,46 @@ from rotorid.effects.contract import Contribution, Motion, rotor_thrusts
 from rotorid.effects.scale import hover_inflow_m_s, rotor_radius_m
 from rotorid.recordings.vehicle import Vehicle
 
-MOST_ROTORS = 8
-"""Rotors for which the records have room."""
+_ROOM = 8
+"""Rotors for which the records have room, or a multiple of it: code is compiled once for each."""
 
-INSTANT = np.dtype(
-    [
-        ("time_s", "f8"),
-        ("height", "f8"),
-        ("on_board", "f8"),
-        ("rotor_speed_sum", "f8"),
-        ("angular_velocity", "f8", 3),
-        ("angular_acceleration", "f8", 3),
-        ("specific_force", "f8", 3),
-        ("air_velocity", "f8", 3),
-        ("rotation", "f8", (3, 3)),
-        ("rotor_speed", "f8", MOST_ROTORS),
-        ("rotor_acceleration", "f8", MOST_ROTORS),
-        ("thrust", "f8", MOST_ROTORS),
-        ("hub_velocity", "f8", (MOST_ROTORS, 3)),
-    ],
-    align=True,
-)
-"""`m` of a kernel: the fields of `Motion` at one instant, `thrust` being that of each rotor, N, and `hub_velocity` each
-hub's velocity through the air, m/s, body axes."""
 
-BODY = np.dtype(
-    [
-        ("rotors", "i8"),
-        ("mass", "f8"),
-        ("gravity", "f8"),
-        ("radius", "f8"),
-        ("hover_inflow", "f8"),
-        ("reach", "f8"),
-        ("inertia", "f8", (3, 3)),
-        ("inverse_inertia", "f8", (3, 3)),
-        ("hub", "f8", (MOST_ROTORS, 3)),
-        ("thrust_coefficient", "f8", MOST_ROTORS),
-        ("torque_coefficient", "f8", MOST_ROTORS),
-        ("yaw_sign", "f8", MOST_ROTORS),
-        ("mixer", "f8", (4, MOST_ROTORS)),
-    ],
-    align=True,
-)
-"""`v` of a kernel: a vehicle's constants, SI; `radius` of a rotor, `hover_inflow` of one rotor in hover, m/s, `reach`
-the largest distance of a hub from the body's z axis, m. The last four with `mixer`, inertia and mass are of flights."""
+def room_for(rotors: int) -> int:
+    """Rotors for which a vehicle's records have room."""
+    return _ROOM * -(-rotors // _ROOM)
 
-ADDED = np.dtype([("force", "f8", 3), ("moment", "f8", 3), ("hub_force", "f8", (MOST_ROTORS, 3))], align=True)
-"""`w` of a kernel: force, N, moment about the believed centre of mass, N m, and a force at each hub, N, body axes."""
+
+@cache
+def records(room: int) -> tuple[np.dtype, np.dtype, np.dtype]:
+    """Types of a kernel's `m`, `v` and `w` with room for so many rotors.
+
+    `m`: the fields of `Motion` at one instant, `thrust` being that of each rotor, N, and `hub_velocity` each hub's
+    velocity through the air, m/s, body axes. `v`: a vehicle's constants, SI; `radius` of a rotor, `hover_inflow` of one
+    rotor in hover, m/s, `reach` the largest distance of a hub from the body's z axis, m; inertia and `mixer` are for
+    flights. `w`: force, N, moment about the believed centre of mass, N m, and a force at each hub, N, body axes.
+    """
+    shapes = (
+        {
+            **dict.fromkeys(("time_s", "height", "on_board", "rotor_speed_sum"), ()),
+            **dict.fromkeys(("angular_velocity", "angular_acceleration", "specific_force", "air_velocity"), 3),
+            "rotation": (3, 3),
+            **dict.fromkeys(("rotor_speed", "rotor_acceleration", "thrust"), room),
+            "hub_velocity": (room, 3),
+        },
+        {
+            **dict.fromkeys(("rotors", "mass", "gravity", "radius", "hover_inflow", "reach"), ()),
+            **dict.fromkeys(("inertia", "inverse_inertia"), (3, 3)),
+            "hub": (room, 3),
+            **dict.fromkeys(("thrust_coefficient", "torque_coefficient", "yaw_sign"), room),
+            "mixer": (4, room),
+        },
+        {"force": 3, "moment": 3, "hub_force": (room, 3)},
+    )
+    return tuple(
+        np.dtype([(name, "i8" if name == "rotors" else "f8", shape) for name, shape in fields.items()], align=True)
+        for fields in shapes
+    )
+
 
 Kernel = Callable[..., None]
 
@@ -84,7 +76,7 @@ class Wrench:
         return values if self.values is None else np.asarray(self.values(values), float)
 
     def __call__(self, motion: Motion, vehicle: Vehicle, values: Sequence[float]) -> Contribution:
-        instants, body, added = _Instants(motion, vehicle), _Body(vehicle), _Added()
+        instants, body, added = _Instants(motion, vehicle), Constants(vehicle), _Added()
         self.kernel(instants, body, self.values_of(values), added)
         for (i, j), pull in added.hub_force.items():
             after, last = (j + 1) % 3, (j + 2) % 3
@@ -121,7 +113,7 @@ _UNKNOWN = {
 
 
 class _Instants:
-    """`m` of a kernel that runs on n instants: the fields of INSTANT, the instants last in each."""
+    """`m` of a kernel that runs on n instants: the fields of its record, the instants last in each."""
 
     def __init__(self, motion: Motion, vehicle: Vehicle):
         self._motion, self._vehicle = motion, vehicle
@@ -170,8 +162,8 @@ class _HubVelocity:
         return self.air_velocity[j] + turning
 
 
-class _Body:
-    """The constants of a vehicle by the names of BODY, each computed when it is asked for: a stand lacks some."""
+class Constants:
+    """The constants of a vehicle by the names of its record, each computed when it is asked for: a stand lacks some."""
 
     def __init__(self, vehicle: Vehicle):
         self._vehicle = vehicle
@@ -191,15 +183,16 @@ class _Body:
 
     @cached_property
     def mixer(self) -> np.ndarray:
-        """Total thrust (up) and moments = mixer @ ω²: F_i acts along -z at r_i, r × (0, 0, -F) = (-y F, x F, 0)."""
+        """(4, k): total thrust (N, up) and moments (N m) = mixer @ ω²; C_A of eq. 4.31 for the thesis's geometry."""
+        # F_i acts along -z at r_i: r × (0, 0, -F) = (-y F, x F, 0).
         thrust, hub = self.thrust_coefficient, self.hub
         return np.stack([thrust, -hub[:, 1] * thrust, hub[:, 0] * thrust, self.yaw_sign * self.torque_coefficient])
 
 
 def body_of(vehicle: Vehicle) -> np.ndarray:
-    """The constants of a vehicle, (1,) of BODY."""
-    record, body = np.zeros(1, BODY), _Body(vehicle)
-    for name in BODY.names:
-        value = np.asarray(getattr(body, name))
+    """The constants of a vehicle as a record, (1,)."""
+    constants, record = Constants(vehicle), np.zeros(1, records(room_for(vehicle.rotor_count))[1])
+    for name in record.dtype.names:
+        value = np.asarray(getattr(constants, name))
         record[name][(0, *(slice(length) for length in value.shape))] = value
     return record

@@ -13,25 +13,33 @@ A state is rates 0:3, quaternion 3:7, velocity (world) 7:10, position 10:13, rot
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
 from rotorid.effects.contract import compiled
-from rotorid.effects.instant import MOST_ROTORS
 
-_STATE = 13 + MOST_ROTORS
-SCRATCH = np.dtype(
-    [(name, "f8", 6) for name in ("base", "wrench", "own", "first", "at", "now")]
-    + [("matrix", "f8", (6, 6)), ("known", "i8"), ("open", "i8")]
-    + [("state", "f8", _STATE), ("trial", "f8", _STATE), ("slopes", "f8", (4, _STATE))]
-    + [("angle", "f8", 3), ("wanted", "f8", 3), ("memory", "f8", (3, 3)), ("command", "f8", MOST_ROTORS)],
-    align=True,
-)
-"""Room for a vehicle in flight: forces with moments, accelerations (angular, linear) and how far they are solved for;
-its state, that at which a step is tried, and the slopes of a step's four stages; its controller. In a record because a
-slice of an array costs two atomic counts of references, as long as a kernel."""
+
+@cache
+def scratch_record(room: int) -> np.dtype:
+    """Room for a vehicle in flight with so many rotors.
+
+    Forces with moments, accelerations (angular, linear) and how far they are solved for; its state, that at which a
+    step is tried, and the slopes of a step's four stages; its controller. In a record because a slice of an array costs
+    two atomic counts of references, as long as a kernel.
+    """
+    return np.dtype(
+        [(name, "f8", 6) for name in ("base", "wrench", "own", "first", "at", "now")]
+        + [("matrix", "f8", (6, 6)), ("known", "i8"), ("open", "i8")]
+        + [("state", "f8", 13 + room), ("trial", "f8", 13 + room), ("slopes", "f8", (4, 13 + room))]
+        + [("angle", "f8", 3), ("wanted", "f8", 3), ("memory", "f8", (3, 3)), ("command", "f8", room)],
+        align=True,
+    )
+
+
 _MOST_ROUNDS = 30
 _CONVERGED = 1e-10
 """Change of the accelerations, relative to their largest, at which they are taken as solved for."""
@@ -435,8 +443,8 @@ def fly(
 ):
     """Fly n vehicles from `first_s` over `steps` steps of `step_s`; arrays with a first axis of 1 hold for all of them.
 
-    `body` (n,) BODY; `start` (n, 13 + k); `lags` (n, 2) 1/s up and down, 0 follows at once; `limits` (n, 2) rad/s;
-    `closed` whether `loops` (LOOP) command by `references` (., steps + 1, 4: angles, thrust) and `more` (squares),
+    `body` (n,); `start` (n, 13 + k); `lags` (n, 2) 1/s up and down, 0 follows at once; `limits` (n, 2) rad/s;
+    `closed` whether `loops` command by `references` (., steps + 1, 4: angles, thrust) and `more` (squares),
     else `commands` (., steps + 1, k) with their accelerations `following` (0 for none); `reading_errors`
     (., steps + 1, 3) rad; `pushes` (., steps + 1, 6); `winds` (., 1, 3); `ground_z` (n,); `values` (n p,) those of a
     vehicle beginning `stride` after the last one's (0: all have the same). Each `every`-th instant is kept in `states`,

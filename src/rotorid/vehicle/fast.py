@@ -12,25 +12,10 @@ import numpy as np
 from numba import cfunc, from_dtype, types
 
 from rotorid.effects.contract import LACK, Form, Motion
-from rotorid.effects.instant import ADDED, BODY, INSTANT, MOST_ROTORS, Kernel, Wrench
+from rotorid.effects.instant import Kernel, Wrench, records, room_for
 from rotorid.errors import InputError
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle import compiled
-
-_LOOP = np.dtype(
-    [
-        ("proportional", "f8", 3),
-        ("integral", "f8", 3),
-        ("derivative", "f8", 3),
-        ("limit", "f8", 3),
-        ("derivative_time", "f8"),
-        ("lowest", "f8"),
-        ("highest", "f8"),
-        ("allocation", "f8", (MOST_ROTORS, 4)),
-    ],
-    align=True,
-)
-"""The attitude controller's constants, SI; `allocation` gives squared rotor speeds of thrust and moments."""
 
 _LEAST_PER_THREAD = 16
 """Vehicles below which a further thread is not worth its start."""
@@ -60,21 +45,22 @@ def check_effects(effects: Sequence[tuple[Form, Sequence[float]]], known: set[st
                 raise InputError(f"effect form {form.name!r} cannot be simulated: {reason}")
 
 
-_SIGNATURE = types.void(from_dtype(INSTANT), from_dtype(BODY), types.CPointer(types.float64), from_dtype(ADDED))
 _ACCELERATIONS = frozenset({"specific_force", "angular_acceleration", "accelerometer"})
 
 
 @cache
-def _machine_code(kernel: Kernel):
-    """A kernel as a C function, compiled by itself (0.1 s, then kept on disk next to its file).
+def _machine_code(kernel: Kernel, room: int):
+    """A kernel as a C function of records with room for so many rotors.
 
-    It is called through its `address`, so that a new effect needs no other code to be compiled again; keep it alive as
-    long as that is in use.
+    It is compiled by itself (0.1 s, then kept on disk next to its file) and called through its `address`, so that a new
+    effect needs no other code to be compiled again; keep it alive as long as that is in use.
     """
+    m, v, w = (from_dtype(record) for record in records(room))
+    signature = types.void(m, v, types.CPointer(types.float64), w)
     try:
-        return cfunc(_SIGNATURE, cache=True)(kernel)
+        return cfunc(signature, cache=True)(kernel)
     except RuntimeError:  # no folder for its cache that may be written
-        return cfunc(_SIGNATURE)(kernel)
+        return cfunc(signature)(kernel)
 
 
 @dataclass(frozen=True)
@@ -97,10 +83,8 @@ class Kernels:
 def kernels_of(effects: Sequence[tuple[Form, Sequence[float]]], vehicle: Vehicle) -> Kernels:
     """The effects' kernels; forms that act on sensors alone are passed over: they do not move the vehicle.
 
-    InputError where a form adds a wrench and has no kernel, or the vehicle has too many rotors.
+    InputError where a form adds a wrench and has no kernel.
     """
-    if vehicle.rotor_count > MOST_ROTORS:
-        raise InputError(f"vehicle {vehicle.name} has {vehicle.rotor_count} rotors, expected {MOST_ROTORS} at most")
     used = []
     for form, values in effects:
         if isinstance(form.contribution, Wrench):
@@ -113,7 +97,7 @@ def kernels_of(effects: Sequence[tuple[Form, Sequence[float]]], vehicle: Vehicle
         elif _adds_wrench(form, vehicle, np.asarray(values, float)):
             raise InputError(f"effect form {form.name!r} does not fly: it states no kernel (rotorid.effects.instant)")
     used.sort(key=lambda pair: _reads_accelerations(pair[0]))
-    functions = [_machine_code(form.contribution.kernel) for form, _ in used]
+    functions = [_machine_code(form.contribution.kernel, room_for(vehicle.rotor_count)) for form, _ in used]
     stated = [form.contribution.values_of(values) for form, values in used]
     sizes = np.array([len(v) for v in stated], dtype=np.int64)
     return Kernels(
@@ -154,6 +138,14 @@ def _adds_wrench(form: Form, vehicle: Vehicle, values: np.ndarray) -> bool:
     return added.force is not None or added.moment is not None
 
 
+@cache
+def _loop_record(room: int) -> np.dtype:
+    """The attitude controller's constants, SI; `allocation` gives squared rotor speeds of thrust and moments."""
+    fields = [(name, "f8", 3) for name in ("proportional", "integral", "derivative", "limit")]
+    fields += [(name, "f8") for name in ("derivative_time", "lowest", "highest")]
+    return np.dtype([*fields, ("allocation", "f8", (room, 4))], align=True)
+
+
 @dataclass(frozen=True)
 class AttitudeLoop:
     """An attitude controller laid out for a whole flight, so that it can fly compiled
@@ -175,9 +167,9 @@ class AttitudeLoop:
     limits_rad_s: tuple[float, float] = (0.0, np.inf)
 
     def constants(self) -> np.ndarray:
-        """As records (1 or n,) of LOOP."""
+        """As records (1 or n,)."""
         gains = [np.atleast_2d(np.asarray(g, float)) for g in (self.proportional, self.integral, self.derivative)]
-        loops = np.zeros(max(len(g) for g in gains), _LOOP)
+        loops = np.zeros(max(len(g) for g in gains), _loop_record(room_for(len(self.allocation))))
         loops["proportional"], loops["integral"], loops["derivative"] = gains
         loops["limit"] = np.inf if self.limit_n_m is None else self.limit_n_m
         loops["derivative_time"] = self.derivative_time_s
@@ -233,7 +225,7 @@ def fly(
     lags = np.divide(1.0, lags, out=np.zeros((n, 2)), where=lags > 0)
     limits = np.broadcast_to(np.array([-np.inf, np.inf] if limits_rad_s is None else limits_rad_s), (n, 2))
     closed = isinstance(commands, AttitudeLoop)
-    loops, references, more = np.zeros(1, _LOOP), np.zeros((1, 1, 4)), np.zeros((0, k))
+    loops, references, more = np.zeros(1, _loop_record(room_for(k))), np.zeros((1, 1, 4)), np.zeros((0, k))
     series = np.zeros((1, 1, k))
     if closed:
         loops, references = commands.constants(), np.ascontiguousarray(commands.reference)
@@ -278,7 +270,7 @@ def fly(
     def part(first: int, last: int) -> None:
         mine = {name: a[first:last] if len(a) == n else a for name, a in own.items()}
         stride = mine["values"].shape[1] if len(mine["values"]) > 1 else 0
-        given = fixed | mine | _room(last - first) | dict(values=mine["values"].ravel(), stride=stride)
+        given = fixed | mine | _block(last - first, k) | dict(values=mine["values"].ravel(), stride=stride)
         compiled.fly(*(given[name] for name in _ORDER))
 
     _spread(part, n, threads)
@@ -307,7 +299,7 @@ def fly_windows(
             kernels.explicit,
             kernels.offsets,
             kernels.values,
-            *_room(last - first).values(),
+            *_block(last - first, int(body["rotors"][0])).values(),
             out[first:last],
         )
 
@@ -315,12 +307,13 @@ def fly_windows(
     return out
 
 
-def _room(vehicles: int) -> dict[str, np.ndarray]:
+def _block(vehicles: int, rotors: int) -> dict[str, np.ndarray]:
     """Records of a block."""
-    count = min(_BLOCK, vehicles)
-    instant = np.zeros(count, INSTANT)
+    count, room = min(_BLOCK, vehicles), room_for(rotors)
+    m, _, w = records(room)
+    instant = np.zeros(count, m)
     instant["on_board"] = 1.0
-    return dict(instant=instant, added=np.zeros(count, ADDED), scratch=np.zeros(count, compiled.SCRATCH))
+    return dict(instant=instant, added=np.zeros(count, w), scratch=np.zeros(count, compiled.scratch_record(room)))
 
 
 def _spread(part, n: int, threads: int | None) -> None:

@@ -15,9 +15,9 @@ from rotorid.effects.contract import Motion
 from rotorid.effects.instant import body_of
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle import fast
-from rotorid.vehicle.command_path import CommandPath
 from rotorid.vehicle.improved import active_forms
 from rotorid.vehicle.mixer import allocation_matrix
+from rotorid.vehicle.simulator import CommandPath
 
 _LARGEST_SHARE = 10.0
 """Thrust, over the weight, up to which is asked where the file states no limits of the rotor speed."""

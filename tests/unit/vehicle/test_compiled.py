@@ -10,7 +10,7 @@ import pytest
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Motion
 from rotorid.effects.gust import window_form
-from rotorid.effects.instant import ADDED, INSTANT, Wrench, body_of
+from rotorid.effects.instant import Wrench, body_of, records
 from rotorid.errors import InputError
 from rotorid.identify.estimate.excitation import ExcitedHold, Multisine
 from rotorid.vehicle.attitude import quaternion_from_euler, rotation_from_quaternion
@@ -25,6 +25,7 @@ from tests.unit.effects.flown import audit_vehicle, commands, start, typical_val
 from tests.unit.vehicle.by_numpy import by_numpy
 
 VEHICLE = audit_vehicle()
+INSTANT, _, ADDED = records(8)
 WRENCHES = [
     (effect.id, form)
     for effect in catalogue().values()
@@ -65,7 +66,8 @@ def instants_of(motion: Motion, vehicle) -> np.ndarray:
     m["rotor_speed"][:, :k], m["rotor_acceleration"][:, :k] = motion.rotor_speed, motion.rotor_acceleration
     m["rotor_speed_sum"] = motion.rotor_speed.sum(axis=1)
     m["thrust"][:, :k] = vehicle.thrust_coefficients_n_s2() * motion.rotor_speed**2
-    m["hub_velocity"][:, :k] = motion.hub_velocity(vehicle.rotor_positions_m())
+    turning = np.cross(motion.angular_velocity[:, None], vehicle.rotor_positions_m())
+    m["hub_velocity"][:, :k] = motion.air_velocity[:, None] + turning
     return m
 
 
@@ -251,6 +253,19 @@ def assert_same_windows(vehicle, effects, time_s, inputs, states, step_s=None):
         assert (a is None) == (b is None)
         if a is not None:
             np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * max(1.0, np.abs(b).max()), err_msg=name)
+
+
+def test_a_vehicle_of_ten_rotors_flies_as_by_numpy():
+    """Ten rotors at two heights on five arms of the quadrotor's length; records have room for eight at first."""
+    places = [(0.2 * np.cos(a), 0.2 * np.sin(a), z) for z in (-0.02, 0.02) for a in 2 * np.pi * np.arange(5) / 5]
+    rotors = [dict(x_m=x, y_m=y, z_m=z, spin=("cw", "ccw")[n % 2]) for n, (x, y, z) in enumerate(places)]
+    vehicle = audit_vehicle(rotors=rotors, thrust_coefficient_n_s2=0.4 * 1.3877e-6)
+    drag = catalogue()["rotor_drag"].forms(vehicle)[0]
+    speed = 1073.0 * (1 + 0.02 * np.sin(np.arange(60)[:, None] + np.arange(10)))
+    how = dict(duration_s=0.2, step_s=0.004, start=START_HIGH, effects=[(drag, [3e-5])])
+    fast = simulate(vehicle, Commands(0.004 * np.arange(60), speed), **how)
+    with by_numpy(vehicle):
+        assert_same(fast, simulate(vehicle, Commands(0.004 * np.arange(60), speed), **how))
 
 
 def test_a_load_as_heavy_as_the_vehicle_is_solved_for_where_repetition_would_not_settle():

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from rotorid.cli import app
 from rotorid.effects.contract import Motion
-from rotorid.effects.instant import ADDED, body_of
+from rotorid.effects.instant import body_of
 from rotorid.errors import InputError
 from rotorid.recordings import Vehicle, read_vehicle, templates, write_vehicle
 from rotorid.recordings.vehicle import Derivative, unit_of
@@ -39,6 +39,7 @@ from rotorid.vehicle.simulator import Commands, simulate
 from tests.unit.effects.flown import audit_vehicle, commands, start
 from tests.unit.vehicle.by_numpy import by_numpy
 from tests.unit.vehicle.test_compiled import (
+    ADDED,
     TRACE,
     _record,
     assert_same,
