@@ -209,11 +209,6 @@ class Form:
 CURVE, SUPPLY, LIMIT, DELAY, LAG = range(5)
 """Stages between command and rotor speed, in the order in which they act."""
 
-_FormsFor = Callable[[Vehicle], tuple[Form, ...]]
-_ReadingForms = "Callable[[Instrument], tuple[Form, ...]]"
-"""Forms of an instrument (`rotorid.effects.loading.Instrument`); their contribution takes a `Loading` in place of a
-`Motion` and gives a `reading`."""
-
 
 @dataclass(frozen=True)
 class SpeedPath:
@@ -284,7 +279,7 @@ class Effect:
     """What a pilot would call it, fits into "… was left out"."""
     sentence: str
     """How it is observed, one clause."""
-    forms: _FormsFor
+    forms: Callable[[Vehicle], tuple[Form, ...]]
     """The forms for a vehicle (their parameters may depend on its number of rotors)."""
     source: str
     sign: str = ""
@@ -311,8 +306,8 @@ class Effect:
     """Forms that spoil a recorded set."""
     form_named: Callable[[str], Form | None] = lambda name: None
     """A form that the data give rise to (a gust in its window), from its name in a vehicle file."""
-    reading_forms: _ReadingForms | None = None
-    """Forms of kinds `stand` and `bench`; None where the forms for a flight hold on a stand as well."""
+    reading_forms: Callable[[InstrumentFacts], tuple[Form, ...]] | None = None
+    """Forms of kinds `stand` and `bench`, whose contribution takes a `Loading` and gives a `reading`; None where the forms for a flight hold on a stand as well."""
 
     # What the decision asks of an effect
 

@@ -11,6 +11,7 @@ from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -76,7 +77,9 @@ class Wrench:
         return values if self.values is None else np.asarray(self.values(values), float)
 
     def __call__(self, motion: Motion, vehicle: Vehicle, values: Sequence[float]) -> Contribution:
-        instants, body, added = _Instants(motion, vehicle), Constants(vehicle), _Added()
+        instants, body = _Instants(motion, vehicle), Constants(vehicle)
+        # By axis, or by rotor and axis, (n,) each; what is not added is not there.
+        added = SimpleNamespace(**{name: defaultdict(float) for name in ("force", "moment", "hub_force")})
         self.kernel(instants, body, self.values_of(values), added)
         for (i, j), pull in added.hub_force.items():
             after, last = (j + 1) % 3, (j + 2) % 3
@@ -94,14 +97,6 @@ def _stacked(parts: dict[int, np.ndarray], size: int) -> np.ndarray | None:
     for axis, values in parts.items():
         out[:, axis] = values
     return out
-
-
-class _Added:
-    """`w` of a kernel that runs on n instants: by axis, or by rotor and axis, arrays (n,); what is not added is not
-    there."""
-
-    def __init__(self):
-        self.force, self.moment, self.hub_force = defaultdict(float), defaultdict(float), defaultdict(float)
 
 
 _UNKNOWN = {

@@ -371,21 +371,26 @@ def _advance(x, size, step_s):
 
 
 @compiled(error_model="numpy")
-def _attitude_command(x, j, now_s, last_s, loop, v, references, f, reading_errors, e, more):
-    """Rotor commands `x.command` of the attitude controller at instant `j`.
-
-    `x.memory` (3, 3) is integral, last error, slope; `references[f]` and `reading_errors[e]` hold for all instants
-    where they have one row.
-    """
-    now, read = j if references.shape[1] > 1 else 0, j if reading_errors.shape[1] > 1 else 0
+def _read_attitude(x, j, reading_errors, e):
+    """Roll, pitch and yaw `x.angle` as they are read at instant `j`; `reading_errors[e]` of one row hold for all."""
+    read = j if reading_errors.shape[1] > 1 else 0
     a, b, c, d = x.state[3], x.state[4], x.state[5], x.state[6]
-    x.angle[0] = np.arctan2(2.0 * (a * b + c * d), 1.0 - 2.0 * (b * b + c * c))
-    x.angle[1] = np.arcsin(min(max(2.0 * (a * c - b * d), -1.0), 1.0))
-    x.angle[2] = np.arctan2(2.0 * (a * d + b * c), 1.0 - 2.0 * (c * c + d * d))
-    elapsed = now_s - last_s
+    x.angle[0] = np.arctan2(2.0 * (a * b + c * d), 1.0 - 2.0 * (b * b + c * c)) + reading_errors[e, read, 0]
+    x.angle[1] = np.arcsin(min(max(2.0 * (a * c - b * d), -1.0), 1.0)) + reading_errors[e, read, 1]
+    x.angle[2] = np.arctan2(2.0 * (a * d + b * c), 1.0 - 2.0 * (c * c + d * d)) + reading_errors[e, read, 2]
+
+
+@compiled(error_model="numpy")
+def _attitude_command(x, j, elapsed, loop, rotors, references, f, more):
+    """Rotor commands `x.command` of the attitude controller at instant `j`, `elapsed` s after the last (thesis 4.29).
+
+    It reads `x.angle`; `x.memory` (3, 3) is integral, last error, slope. `references[f]` of one row hold for all
+    instants.
+    """
+    now = j if references.shape[1] > 1 else 0
     keep = np.exp(-elapsed / loop.derivative_time) if loop.derivative_time > 0.0 else 0.0
     for i in range(3):
-        error = references[f, now, i] - (x.angle[i] + reading_errors[e, read, i])
+        error = references[f, now, i] - x.angle[i]
         error = (error + np.pi) % (2.0 * np.pi) - np.pi
         if j == 0:
             x.wanted[i] = loop.proportional[i] * error
@@ -399,7 +404,7 @@ def _attitude_command(x, j, now_s, last_s, loop, v, references, f, reading_error
                 x.memory[0, i] = integral
             x.wanted[i] = held
         x.memory[1, i] = error
-    for n in range(v.rotors):
+    for n in range(rotors):
         square = loop.allocation[n, 0] * references[f, now, 3]
         for i in range(3):
             square += loop.allocation[n, 1 + i] * x.wanted[i]
@@ -407,6 +412,14 @@ def _attitude_command(x, j, now_s, last_s, loop, v, references, f, reading_error
         if more.shape[0] > 0:
             square = max(square + more[j, n], 0.0)
         x.command[n] = min(max(np.sqrt(square), loop.lowest), loop.highest)
+
+
+@compiled(error_model="numpy")
+def command(scratch, j, elapsed, loops, rotors, references, more):
+    """The same for each of n scratch records; `loops` and `references` of one row hold for all of them."""
+    for n in range(scratch.shape[0]):
+        loop, f = loops[n if loops.shape[0] > 1 else 0], n if references.shape[0] > 1 else 0
+        _attitude_command(scratch[n], j, elapsed, loop, rotors, references, f, more)
 
 
 @compiled(error_model="numpy", nogil=True)
@@ -467,8 +480,8 @@ def fly(
                 if closed:
                     loop = loops[n if loops.shape[0] > 1 else 0]
                     f, e = n if references.shape[0] > 1 else 0, n if reading_errors.shape[0] > 1 else 0
-                    last_s = first_s + (j - 1) * step_s
-                    _attitude_command(x, j, now_s, last_s, loop, body[n], references, f, reading_errors, e, more)
+                    _read_attitude(x, j, reading_errors, e)
+                    _attitude_command(x, j, step_s, loop, k, references, f, more)
                 else:
                     own = n if commands.shape[0] > 1 else 0
                     for i in range(k):

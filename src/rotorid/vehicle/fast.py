@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
@@ -166,8 +166,8 @@ class AttitudeLoop:
     """(steps + 1, k), added to the squared speeds, rad²/s²."""
     limits_rad_s: tuple[float, float] = (0.0, np.inf)
 
-    def constants(self) -> np.ndarray:
-        """As records (1 or n,)."""
+    def laid_out(self) -> dict[str, np.ndarray]:
+        """As records `loops` (1 or n,), `references` (1 or n, steps + 1, 4) and `more` (steps + 1 or 0, k)."""
         gains = [np.atleast_2d(np.asarray(g, float)) for g in (self.proportional, self.integral, self.derivative)]
         loops = np.zeros(max(len(g) for g in gains), _loop_record(room_for(len(self.allocation))))
         loops["proportional"], loops["integral"], loops["derivative"] = gains
@@ -175,7 +175,28 @@ class AttitudeLoop:
         loops["derivative_time"] = self.derivative_time_s
         loops["lowest"], loops["highest"] = self.limits_rad_s
         loops["allocation"][:, : len(self.allocation)] = self.allocation
-        return loops
+        references = np.ascontiguousarray(self.reference, float)
+        return dict(
+            loops=loops,
+            references=references[None] if references.ndim == 2 else references,
+            more=np.zeros((0, len(self.allocation))) if self.more is None else np.ascontiguousarray(self.more, float),
+        )
+
+
+def commanding(loop: AttitudeLoop, size: int, step_s: float) -> Callable[[int, np.ndarray], np.ndarray]:
+    """What gives the commands (n, k), rad/s, of n vehicles with a controller, for flights that go a step at a time.
+
+    To be called with the number of each instant, in order, and the attitudes read, Euler angles (n, 3), rad.
+    """
+    k, given = len(loop.allocation), loop.laid_out()
+    scratch = np.zeros(size, compiled.scratch_record(room_for(k)))
+
+    def command(j: int, euler_rad: np.ndarray) -> np.ndarray:
+        scratch["angle"] = euler_rad
+        compiled.command(scratch, j, step_s, given["loops"], k, given["references"], given["more"])
+        return scratch["command"][:, :k].copy()
+
+    return command
 
 
 @dataclass(frozen=True)
@@ -225,13 +246,11 @@ def fly(
     lags = np.divide(1.0, lags, out=np.zeros((n, 2)), where=lags > 0)
     limits = np.broadcast_to(np.array([-np.inf, np.inf] if limits_rad_s is None else limits_rad_s), (n, 2))
     closed = isinstance(commands, AttitudeLoop)
-    loops, references, more = np.zeros(1, _loop_record(room_for(k))), np.zeros((1, 1, 4)), np.zeros((0, k))
     series = np.zeros((1, 1, k))
     if closed:
-        loops, references = commands.constants(), np.ascontiguousarray(commands.reference)
-        references = references[None] if references.ndim == 2 else references
-        more = more if commands.more is None else np.ascontiguousarray(commands.more, float)
+        plan = commands.laid_out()
     else:
+        plan = dict(loops=np.zeros(1, _loop_record(room_for(k))), references=np.zeros((1, 1, 4)), more=np.zeros((0, k)))
         series = np.ascontiguousarray(commands, float)
         series = series[None] if series.ndim == 2 else series
     fixed_times = np.zeros((0, 1, k)) if following is None else np.ascontiguousarray(following, float)
@@ -242,7 +261,7 @@ def fly(
         step_s=step_s,
         every=every,
         closed=closed,
-        more=more,
+        more=plan["more"],
         addresses=kernels.addresses,
         explicit=kernels.explicit,
         offsets=kernels.offsets,
@@ -255,8 +274,8 @@ def fly(
         limits=np.ascontiguousarray(limits),
         commands=series,
         following=fixed_times[None] if fixed_times.ndim == 2 else fixed_times,
-        loops=loops,
-        references=references,
+        loops=plan["loops"],
+        references=plan["references"],
         reading_errors=np.zeros((1, 1, 3)) if reading_errors is None else np.ascontiguousarray(reading_errors),
         pushes=np.zeros((1, 1, 6)) if pushes is None else np.ascontiguousarray(pushes),
         winds=np.atleast_2d(np.ascontiguousarray(wind, float))[:, None],

@@ -41,8 +41,8 @@ _MEMORY_SETTLED = 1e-7
 class Controller(Protocol):
     """Anything that turns time and measured attitude into rotor commands.
 
-    One that is an attitude loop may lay itself out for a whole flight, `attitude_loop(time_s)` (m,), s, giving a
-    `rotorid.vehicle.fast.AttitudeLoop` or None; it then flies compiled.
+    One that is an attitude loop has `attitude_loop(time_s)` in place of `rotor_command`: it lays itself out for the
+    instants (m,), s, of a whole flight as a `rotorid.vehicle.fast.AttitudeLoop`.
     """
 
     def rotor_command(self, time_s: float, euler_rad: np.ndarray) -> np.ndarray:
@@ -305,11 +305,7 @@ def _known_commands(controller: Controller, time_s: np.ndarray) -> np.ndarray | 
     """Commands (m, k) of every instant, or the plan of an attitude loop; None where only a call gives them."""
     if isinstance(controller, Commands):
         return controller.rotor_speed[controller._index(time_s)]
-    # The plan is that of the class that commands; who puts another command in its place is called.
-    commanding = next((c for c in type(controller).__mro__ if "rotor_command" in vars(c)), None)
-    if "rotor_command" in vars(controller) or commanding is None or "attitude_loop" not in vars(commanding):
-        return None
-    return controller.attitude_loop(time_s)
+    return None if hasattr(controller, "rotor_command") else controller.attitude_loop(time_s)
 
 
 def _pushes(disturbance: Disturbance, n: int, steps: int, step_s: float, rng) -> np.ndarray:
@@ -338,10 +334,17 @@ class _Flight:
 
     def fly(self, controller: Controller, pushes: np.ndarray, attitude_errors: np.ndarray) -> Trace:
         """The flight under a controller, a disturbance (steps + 1, n, 6) and errors of attitude (steps + 1, n, 3)."""
-        commands = _known_commands(controller, self.step_s * np.arange(len(pushes))) if self.path is None else None
-        if commands is None:
-            return self._trace(*self._by_steps(controller, pushes, attitude_errors))
-        return self._trace(*self._at_once(controller, commands, pushes, attitude_errors))
+        known = _known_commands(controller, self.step_s * np.arange(len(pushes)))
+        if isinstance(known, fast.AttitudeLoop):
+            command = fast.commanding(known, self.size, self.step_s)
+        else:
+
+            def command(j: int, euler_rad: np.ndarray) -> np.ndarray:
+                return controller.rotor_command(j * self.step_s, euler_rad)
+
+        if known is None or self.path is not None:
+            return self._trace(*self._by_steps(controller, command, pushes, attitude_errors))
+        return self._trace(*self._at_once(controller, known, command, pushes, attitude_errors))
 
     def _start(self) -> np.ndarray:
         """States at the beginning, (n, 13 + k), rotors at rest."""
@@ -352,7 +355,7 @@ class _Flight:
         state[:, 10:13] = self.start.position_m
         return state
 
-    def _at_once(self, controller, commands, pushes, attitude_errors) -> tuple[np.ndarray, ...]:
+    def _at_once(self, controller, commands, command, pushes, attitude_errors) -> tuple[np.ndarray, ...]:
         """States, accelerations and commands, each (n, steps + 1, ...)."""
         steps, limits = len(pushes) - 1, self.motors.limits_rad_s
         state = self._start()
@@ -360,7 +363,7 @@ class _Flight:
             state[:, 13:] = self.start.rotor_speed_rad_s
         else:
             euler = euler_from_quaternion(state[:, 3:7]) + attitude_errors[0]
-            first = np.asarray(_fresh(controller).rotor_command(0.0, euler), float)
+            first = np.asarray(command(0, euler), float)
             state[:, 13:] = first if limits is None else np.clip(first, *limits)
         following = None
         if isinstance(controller, Commands) and controller.rotor_acceleration is not None:
@@ -388,7 +391,7 @@ class _Flight:
         up, down = self.motors.time_up_s, self.motors.time_down_s
         return up, up if down is None else down
 
-    def _by_steps(self, controller, pushes, attitude_errors) -> tuple[np.ndarray, ...]:
+    def _by_steps(self, controller, command_at, pushes, attitude_errors) -> tuple[np.ndarray, ...]:
         """The same a step at a time, the controller called at each."""
         steps, k = len(pushes) - 1, self.vehicle.rotor_count
         state = self._start()
@@ -399,7 +402,7 @@ class _Flight:
         for i in range(steps + 1):
             time_s = i * self.step_s
             euler = euler_from_quaternion(state[:, 3:7]) + attitude_errors[i]
-            command = np.asarray(controller.rotor_command(time_s, euler), float)
+            command = np.asarray(command_at(i, euler), float)
             if command.shape != (self.size, k):
                 raise InputError(f"the controller gave commands {command.shape}, expected {(self.size, k)}")
             if limits is not None:

@@ -14,15 +14,16 @@ from rotorid.effects.contract import Motion
 from rotorid.effects.instant import Wrench
 from rotorid.vehicle import fast, simulator
 from rotorid.vehicle.attitude import quaternion_rate, rotation_from_quaternion
-from rotorid.vehicle.fast import KeptStates, Kernels
+from rotorid.vehicle.fast import AttitudeLoop, KeptStates, Kernels
 from rotorid.vehicle.mixer import wrench_matrix
 
 
 @contextmanager
 def by_numpy(vehicle) -> Iterator[None]:
-    """Within, `vehicle` flies by this module, a step at a time, its controller called at each."""
+    """Within, `vehicle` flies by this module, a step at a time."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(simulator, "_known_commands", lambda controller, time_s: None)
+        patch.setattr(simulator._Flight, "_at_once", lambda self, own, known, *rest: self._by_steps(own, *rest))
+        patch.setattr(fast, "commanding", _commanding)
         patch.setattr(fast, "fly", partial(_fly, vehicle))
         patch.setattr(fast, "fly_windows", partial(_fly_windows, vehicle))
         yield
@@ -46,6 +47,30 @@ def accelerations(vehicle, kernels: Kernels, motion: Motion, push: np.ndarray) -
         if np.abs(np.hstack([turning, felt]) - before).max() <= 1e-13 * max(1.0, np.abs(before).max()):
             break
     return turning, felt
+
+
+def _commanding(loop: AttitudeLoop, size: int, step_s: float):
+    """As `rotorid.vehicle.fast.commanding`."""
+    keep = np.exp(-step_s / loop.derivative_time_s) if loop.derivative_time_s > 0 else 0.0
+    integral, slope, last = np.zeros((size, 3)), np.zeros((size, 3)), None
+
+    def command(j, euler_rad):
+        nonlocal integral, slope, last
+        wanted = np.broadcast_to(loop.reference[..., j, :], (size, 4))
+        error = (wanted[:, :3] - euler_rad + np.pi) % (2 * np.pi) - np.pi
+        moment = loop.proportional * error
+        if last is not None:
+            slope = keep * slope + (1.0 - keep) * (error - last) / step_s
+            grown = integral + error * step_s
+            asked = moment + loop.integral * grown + loop.derivative * slope
+            moment = asked if loop.limit_n_m is None else np.clip(asked, -loop.limit_n_m, loop.limit_n_m)
+            integral = np.where((moment != asked) & (np.sign(error) == np.sign(asked)), integral, grown)
+        last = error
+        square = np.maximum(np.hstack([wanted[:, 3:], moment]) @ loop.allocation.T, 0.0)
+        square = square if loop.more is None else np.maximum(square + loop.more[j], 0.0)
+        return np.clip(np.sqrt(square), *loop.limits_rad_s)
+
+    return command
 
 
 def _motion(state, time_s, rotor_speed, rotor_acceleration, wind, height_offset) -> Motion:

@@ -1,5 +1,8 @@
 """The simulator against closed forms, against itself compiled, and against RotorPy."""
 
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
 import numpy as np
 import pytest
 
@@ -12,7 +15,7 @@ from rotorid.vehicle.attitude import (
     quaternion_from_euler,
     rotation_from_quaternion,
 )
-from rotorid.vehicle.control.pid import AttitudePid, Gains, Memory, pid_step, training_reference
+from rotorid.vehicle.control.pid import AttitudePid, Gains, training_reference
 from rotorid.vehicle.mixer import allocation_matrix, wrench_matrix
 from rotorid.vehicle.simulator import (
     Commands,
@@ -302,14 +305,19 @@ def test_trajectory_of_rotorpy(aero):
 
 
 def test_pid_by_hand():
-    gains = Gains((2.0, 2, 2), (3.0, 3, 3), (0.5, 0.5, 0.5))
-    error = np.array([[0.1, 0.0, -0.2]])
-    moment, memory = pid_step(gains, error, Memory(np.zeros((1, 3)), np.zeros((1, 3))), 0.1)
-    # 2 e + 3 e 0.1 + 0.5 e / 0.1 = 7.3 e
-    np.testing.assert_allclose(moment, 7.3 * error)
-    held, kept = pid_step(gains, error, memory, 0.1, limit_n_m=np.array([0.05, 1, 1]))
-    assert held[0, 0] == 0.05 and kept.integral[0, 0] == memory.integral[0, 0]
-    assert kept.integral[0, 2] == pytest.approx(-0.04)
+    """Rotors whose squares are a thrust of 100 N and a moment each, 0.1 s apart, at angles of 0, then −error."""
+    gains, error = ((2.0, 2, 2), (3.0, 3, 3), (0.0, 0.5, 0.5)), np.array([0.1, 0.0, -0.2])
+    allocation, reference = np.column_stack([np.ones(3), np.eye(3)]), np.array([[0.0, 0.0, 0.0, 100.0]])
+    loop = fast.AttitudeLoop(*gains, allocation, reference)
+    for limit, moments in (
+        # 2 e + 3 e 0.1 + 0.5 e / 0.1 = 7.3 e; then 2 e + 3 e 0.2; at no error the integral alone, and the slope back.
+        (None, ([0, 0, 0], 2.3 * error * [1, 0, 0] + 7.3 * error * [0, 0, 1], 2.6 * error, [0.06, 0, 0.88])),
+        # At the limit the integral about x stands still.
+        (np.array([0.05, 1, 9]), ([0, 0, 0], [0.05, 0, -1.46], [0.05, 0, -0.52], [0.0, 0, 0.88])),
+    ):
+        command = fast.commanding(replace(loop, limit_n_m=limit), 1, 0.1)
+        for j, (angles, moment) in enumerate(zip((0.0 * error, -error, -error, 0.0 * error), moments, strict=True)):
+            np.testing.assert_allclose(command(j, angles[None])[0] ** 2 - 100.0, moment, atol=1e-9)
 
 
 def test_anti_windup_shortens_the_overshoot():
@@ -317,20 +325,24 @@ def test_anti_windup_shortens_the_overshoot():
     from rotorid.vehicle.control.pid import AttitudeReference
 
     vehicle = thesis_vehicle()
+
+    @dataclass
+    class Saturated:
+        """The same saturation, but unknown to the controller."""
+
+        inner: Callable
+
+        def rotor_command(self, time_s, euler_rad):
+            u = wrench_matrix(vehicle) @ (self.inner(round(time_s / 0.002), euler_rad).T ** 2)
+            u[1:] = np.clip(u[1:], -0.02, 0.02)
+            return np.sqrt(np.maximum((allocation_matrix(vehicle) @ u).T, 0))
+
     step = AttitudeReference("step", 6.4, lambda t: np.array([0.8, 0.0, 0.0]))
     peak = {}
     for name, limit in (("wound", None), ("held", (0.02, 0.02, 0.02))):
         pid = AttitudePid(vehicle, step, limit_n_m=limit)
         if limit is None:
-            # The same saturation, but unknown to the controller.
-            pid_inner = pid.rotor_command
-
-            def command(t, e, pid_inner=pid_inner):
-                u = wrench_matrix(vehicle) @ (pid_inner(t, e).T ** 2)
-                u[1:] = np.clip(u[1:], -0.02, 0.02)
-                return np.sqrt(np.maximum((allocation_matrix(vehicle) @ u).T, 0))
-
-            pid.rotor_command = command
+            pid = Saturated(fast.commanding(pid.attitude_loop(0.002 * np.arange(2001)), 1, 0.002))
         peak[name] = simulate(vehicle, pid, 4.0, 0.002).euler_rad[0, :, 0].max()
     assert peak["held"] < peak["wound"] - 0.05
 
