@@ -307,7 +307,8 @@ class Effect:
     form_named: Callable[[str], Form | None] = lambda name: None
     """A form that the data give rise to (a gust in its window), from its name in a vehicle file."""
     reading_forms: Callable[[InstrumentFacts], tuple[Form, ...]] | None = None
-    """Forms of kinds `stand` and `bench`, whose contribution takes a `Loading` and gives a `reading`; None where the forms for a flight hold on a stand as well."""
+    """Forms of kinds `stand` and `bench`, whose contribution takes a `Loading` and gives a `reading`; None where the
+    forms for a flight hold on a stand as well."""
 
     # What the decision asks of an effect
 
