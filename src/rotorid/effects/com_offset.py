@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numba.extending import register_jitable
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.instant import Wrench
@@ -18,6 +19,7 @@ def _moment_only(m, v, p, w):
     w.moment[1] -= p[0] * thrust
 
 
+@register_jitable
 def _of_all_forces(m, v, p, w):
     """M = -r_c × F: what drag and inflow do to the forces acts on that arm, too; F = m a, a the specific force.
 
@@ -34,10 +36,8 @@ def _with_lever_arm(m, v, p, w):
 
     F = −m (dΩ × r_c + Ω × (Ω × r_c)): an accelerometer there and the recorded velocity both hold it.
     """
-    s, a, o = m.specific_force, m.angular_acceleration, m.angular_velocity
-    w.moment[0] -= v.mass * (p[1] * s[2] - p[2] * s[1])
-    w.moment[1] -= v.mass * (p[2] * s[0] - p[0] * s[2])
-    w.moment[2] -= v.mass * (p[0] * s[1] - p[1] * s[0])
+    _of_all_forces(m, v, p, w)
+    a, o = m.angular_acceleration, m.angular_velocity
     # Ω × r, and of that Ω × once more.
     i, j, k = o[1] * p[2] - o[2] * p[1], o[2] * p[0] - o[0] * p[2], o[0] * p[1] - o[1] * p[0]
     w.force[0] -= v.mass * (a[1] * p[2] - a[2] * p[1] + o[1] * k - o[2] * j)

@@ -1,6 +1,7 @@
 """Parasitic drag of the airframe, quadratic in airspeed."""
 
 import numpy as np
+from numba.extending import register_jitable
 
 from rotorid.effects.contract import Effect, Form, Parameter
 from rotorid.effects.instant import Wrench
@@ -10,6 +11,7 @@ _MOST_WEIGHTS_AT_10_M_S = 2.0
 """Drag at 10 m/s beyond this many weights is no airframe's (published: 0.1 to 0.5)."""
 
 
+@register_jitable
 def _drag(m, v, p, w):
     """F_j = -c_j |v| v_j at the centre of mass, c = ρ C_D A / 2; `p` is c_x, c_y, c_z."""
     speed = np.sqrt(m.air_velocity[0] ** 2 + m.air_velocity[1] ** 2 + m.air_velocity[2] ** 2)
@@ -19,9 +21,8 @@ def _drag(m, v, p, w):
 
 def _drag_off_centre(m, v, p, w):
     """The same at a height of h above the centre of mass, M = −h e3 × F: linear in c_x, c_y, c_z, c_x h and c_y h."""
+    _drag(m, v, p, w)
     speed = np.sqrt(m.air_velocity[0] ** 2 + m.air_velocity[1] ** 2 + m.air_velocity[2] ** 2)
-    for j in range(3):
-        w.force[j] -= p[j] * speed * m.air_velocity[j]
     w.moment[0] -= p[4] * speed * m.air_velocity[1]
     w.moment[1] += p[3] * speed * m.air_velocity[0]
 

@@ -1,6 +1,7 @@
 """Ground effect: more thrust close to the ground."""
 
 import numpy as np
+from numba.extending import register_jitable
 
 from rotorid.effects.contract import Effect, Form, Parameter
 from rotorid.effects.instant import Wrench
@@ -10,28 +11,30 @@ _CLOSEST_RADII = 0.3
 """Heights below this many rotor radii are held there: the closed forms diverge and no rotor gets closer."""
 
 
+@register_jitable
+def _height_of_hub(m, v, i):
+    """Height of a hub above ground, m; tilted by the attitude where it is known."""
+    drop = m.rotation[2, 0] * v.hub[i, 0] + m.rotation[2, 1] * v.hub[i, 1] + m.rotation[2, 2] * v.hub[i, 2]
+    return np.maximum(m.height - drop, _CLOSEST_RADII * v.radius)
+
+
 def _image(m, v, p, w):
     """T/T_∞ = 1 / (1 - c (R/4z)²), z the hub's height (Cheeseman and Bennett: c = 1)."""
     for i in range(v.rotors):
-        drop = m.rotation[2, 0] * v.hub[i, 0] + m.rotation[2, 1] * v.hub[i, 1] + m.rotation[2, 2] * v.hub[i, 2]
-        ratio = p[0] * (v.radius / (4.0 * np.maximum(m.height - drop, _CLOSEST_RADII * v.radius))) ** 2
+        ratio = p[0] * (v.radius / (4.0 * _height_of_hub(m, v, i))) ** 2
         w.hub_force[i, 2] -= (1.0 / (1.0 - np.minimum(ratio, 0.8)) - 1.0) * m.thrust[i]
 
 
 def _inverse_square(m, v, p, w):
     """T/T_∞ = 1 + c (R/4z)²."""
     for i in range(v.rotors):
-        drop = m.rotation[2, 0] * v.hub[i, 0] + m.rotation[2, 1] * v.hub[i, 1] + m.rotation[2, 2] * v.hub[i, 2]
-        ratio = (v.radius / (4.0 * np.maximum(m.height - drop, _CLOSEST_RADII * v.radius))) ** 2
-        w.hub_force[i, 2] -= p[0] * ratio * m.thrust[i]
+        w.hub_force[i, 2] -= p[0] * (v.radius / (4.0 * _height_of_hub(m, v, i))) ** 2 * m.thrust[i]
 
 
 def _exponential(m, v, p, w):
     """T/T_∞ = 1 + a exp(-b z)."""
     for i in range(v.rotors):
-        drop = m.rotation[2, 0] * v.hub[i, 0] + m.rotation[2, 1] * v.hub[i, 1] + m.rotation[2, 2] * v.hub[i, 2]
-        height = np.maximum(m.height - drop, _CLOSEST_RADII * v.radius)
-        w.hub_force[i, 2] -= p[0] * np.exp(-p[1] * height) * m.thrust[i]
+        w.hub_force[i, 2] -= p[0] * np.exp(-p[1] * _height_of_hub(m, v, i)) * m.thrust[i]
 
 
 def forms(vehicle):

@@ -3,6 +3,7 @@
 A kernel is a plain function `kernel(m, v, p, w)` that adds to `w` what a form does at the instant `m` to the vehicle
 `v` (`records`) with the values `p`. It is arithmetic, loops over rotors and axes, and functions of numpy (`np.maximum`,
 `np.exp`, …) alone, and asks nothing of `m` by an `if`: then each number of `m` may as well be that of n instants, (n,).
+What several kernels of a file share is a function with numba's `register_jitable`: plain Python, compiled with them.
 """
 
 from __future__ import annotations
@@ -77,7 +78,7 @@ class Wrench:
         return values if self.values is None else np.asarray(self.values(values), float)
 
     def __call__(self, motion: Motion, vehicle: Vehicle, values: Sequence[float]) -> Contribution:
-        instants, body = _Instants(motion, vehicle), Constants(vehicle)
+        instants, body = Instants(motion, vehicle), Constants(vehicle)
         # By axis, or by rotor and axis, (n,) each; what is not added is not there.
         added = SimpleNamespace(**{name: defaultdict(float) for name in ("force", "moment", "hub_force")})
         self.kernel(instants, body, self.values_of(values), added)
@@ -107,7 +108,7 @@ _UNKNOWN = {
 }
 
 
-class _Instants:
+class Instants:
     """`m` of a kernel that runs on n instants: the fields of its record, the instants last in each."""
 
     def __init__(self, motion: Motion, vehicle: Vehicle):

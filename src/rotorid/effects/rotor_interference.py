@@ -1,29 +1,31 @@
 """Rear rotors work in the wake of the front ones in forward flight."""
 
 import numpy as np
+from numba.extending import register_jitable
 
 from rotorid.effects.contract import Effect, Form, Parameter
 from rotorid.effects.instant import Wrench
 
 
-def _growing(m, v, p, w):
-    """T_rear = T (1 - e v_h): the loss grows with in-plane airspeed, and to the rear of the flight direction."""
-    speed = np.sqrt(m.air_velocity[0] ** 2 + m.air_velocity[1] ** 2)
+@register_jitable
+def _lose(m, v, w, speed, share):
+    """A share of its thrust that each rotor loses the farther to the rear of the flight direction it sits, 0 to 1."""
     x, y = m.air_velocity[0] / np.maximum(speed, 1e-6), m.air_velocity[1] / np.maximum(speed, 1e-6)
-    lost, x, y = p[0] * speed, x / v.reach, y / v.reach
     for i in range(v.rotors):
-        rear = np.minimum(np.maximum(-(x * v.hub[i, 0] + y * v.hub[i, 1]), 0.0), 1.0)
-        w.hub_force[i, 2] += lost * rear * m.thrust[i]
+        rear = np.minimum(np.maximum(-(x * v.hub[i, 0] + y * v.hub[i, 1]) / v.reach, 0.0), 1.0)
+        w.hub_force[i, 2] += share * rear * m.thrust[i]
+
+
+def _growing(m, v, p, w):
+    """T_rear = T (1 - e v_h): the loss grows with in-plane airspeed."""
+    speed = np.sqrt(m.air_velocity[0] ** 2 + m.air_velocity[1] ** 2)
+    _lose(m, v, w, speed, p[0] * speed)
 
 
 def _saturating(m, v, p, w):
     """T_rear = T (1 - e v_h / (v_h + v_i)), v_i the hover inflow."""
     speed = np.sqrt(m.air_velocity[0] ** 2 + m.air_velocity[1] ** 2)
-    x, y = m.air_velocity[0] / np.maximum(speed, 1e-6), m.air_velocity[1] / np.maximum(speed, 1e-6)
-    lost, x, y = p[0] * speed / (speed + v.hover_inflow), x / v.reach, y / v.reach
-    for i in range(v.rotors):
-        rear = np.minimum(np.maximum(-(x * v.hub[i, 0] + y * v.hub[i, 1]), 0.0), 1.0)
-        w.hub_force[i, 2] += lost * rear * m.thrust[i]
+    _lose(m, v, w, speed, p[0] * speed / (speed + v.hover_inflow))
 
 
 def forms(vehicle):
