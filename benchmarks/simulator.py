@@ -27,6 +27,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.effects.instant import Wrench
 from rotorid.vehicle.batch import Batch
 from rotorid.vehicle.control.pid import AttitudePid, Gains, training_reference
 from rotorid.vehicle.improved import active_forms
@@ -49,7 +50,7 @@ def everything() -> tuple[dict, ...]:
     """An entry under `effects` for the first form of every id that moves a vehicle at once, of moderate size."""
     vehicle, out = audit_vehicle(), []
     for effect in catalogue().values():
-        forms = [f for f in effect.forms(vehicle) if f.kernel is not None]
+        forms = [f for f in effect.forms(vehicle) if isinstance(f.contribution, Wrench)]
         if forms:
             out.append(entry(effect.id, forms[0], 0.1 * typical_values(effect.id, forms[0])))
     return tuple(out)
@@ -109,7 +110,7 @@ def mujoco_flight(seconds: float) -> float | None:
     return best(flown)[0] / seconds
 
 
-def one_vehicle(entries: tuple[dict, ...], commands: np.ndarray, controller: bool = False, compiled: bool = True):
+def one_vehicle(entries: tuple[dict, ...], commands: np.ndarray, controller: bool = False):
     """Seconds per simulated second of `simulate`, and its trace."""
     vehicle = audit_vehicle(effects=entries, ground_z_m=0.0)
     forms = active_forms(vehicle)
@@ -120,10 +121,10 @@ def one_vehicle(entries: tuple[dict, ...], commands: np.ndarray, controller: boo
         pilot = AttitudePid(vehicle, training_reference(6.4), GAINS, 0.02)
 
     def flown():
-        return simulate(vehicle, pilot, seconds, STEP_S, high, Motors(LAG_S), forms, compiled=compiled)
+        return simulate(vehicle, pilot, seconds, STEP_S, high, Motors(LAG_S), forms)
 
-    flown() if compiled else None  # compiles
-    took, _, trace = best(flown, 3 if compiled else 1)
+    flown()  # compiles
+    took, _, trace = best(flown)
     return took / seconds, trace
 
 
@@ -169,8 +170,6 @@ def main(out: Path | None, sets: int) -> None:
     rows.append((f"one vehicle, {len(all_on)} effects", whole, with_aero))
     closed, _ = one_vehicle(all_on, long, controller=True)
     rows.append((f"one vehicle, {len(all_on)} effects, attitude controller", closed, with_aero))
-    arrays, _ = one_vehicle(all_on, short[:100], compiled=False)
-    rows.append((f"the same by array code, without controller ({len(all_on)} effects)", arrays, with_aero))
     rows.append((f"restart windows of 0.5 s, {len(all_on)} effects, a recorded second", windows(), with_aero))
     for entries, name in ((AERO, "RotorPy's aerodynamics"), (all_on, f"{len(all_on)} effects")):
         processor, _ = many(entries, short, sets, 1)

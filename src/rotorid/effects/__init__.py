@@ -7,6 +7,7 @@ OPEN = (
     "describe",
     "gust",
     "hysteresis",
+    "instant",
     "loading",
     "payload",
     "pendulum",

@@ -1,44 +1,23 @@
 """Axial inflow: a climbing rotor loses thrust, and so damps rolling and pitching at its hub."""
 
-import numpy as np
-
-from rotorid.effects.contract import Contribution, Effect, Form, Parameter, at_hubs
+from rotorid.effects.contract import Effect, Form, Parameter
+from rotorid.effects.instant import Wrench
 from rotorid.effects.scale import scale
 
 
-def _at_the_hubs(motion, vehicle, values):
+def _at_the_hubs(m, v, p, w):
     """T_i += k_z ω_i w_i, w_i the hub's velocity along body z (down) through the air."""
-    positions = vehicle.rotor_positions_m()
-    hub = motion.hub_velocity(positions)
-    forces = np.zeros_like(hub)
-    forces[:, :, 2] = -values[0] * motion.rotor_speed * hub[:, :, 2]
-    return at_hubs(forces, positions)
-
-
-def _at_the_centre(motion, vehicle, values):
-    """T += k_z Σω w at the centre of mass: no damping moment."""
-    force = np.zeros_like(motion.air_velocity)
-    force[:, 2] = -values[0] * motion.rotor_speed.sum(axis=1) * motion.air_velocity[:, 2]
-    return Contribution(force=force)
-
-
-def _independent_of_speed(motion, vehicle, values):
-    """F_z = -d_z w at the centre of mass."""
-    force = np.zeros_like(motion.air_velocity)
-    force[:, 2] = -values[0] * motion.air_velocity[:, 2]
-    return Contribution(force=force)
-
-
-def _kernel_at_the_hubs(m, v, p, w):
     for i in range(v.rotors):
         w.hub_force[i, 2] -= p[0] * m.rotor_speed[i] * m.hub_velocity[i, 2]
 
 
-def _kernel_at_the_centre(m, v, p, w):
+def _at_the_centre(m, v, p, w):
+    """T += k_z Σω w at the centre of mass: no damping moment."""
     w.force[2] -= p[0] * m.rotor_speed_sum * m.air_velocity[2]
 
 
-def _kernel_independent_of_speed(m, v, p, w):
+def _independent_of_speed(m, v, p, w):
+    """F_z = -d_z w at the centre of mass."""
     w.force[2] -= p[0] * m.air_velocity[2]
 
 
@@ -54,23 +33,9 @@ def forms(vehicle):
     d_z = Parameter("d_z", "N s/m", 0.0, size.drag_per_speed, meaning="thrust lost per climb speed")
     needs = ("velocity", "rotor_speed")
     return (
-        Form("at the hubs", "T_i −= k_z ω_i v_z,i (climbing)", (k_z,), _at_the_hubs, needs, kernel=_kernel_at_the_hubs),
-        Form(
-            "at the centre of mass",
-            "T −= k_z Σω v_z (climbing)",
-            (k_z,),
-            _at_the_centre,
-            needs,
-            kernel=_kernel_at_the_centre,
-        ),
-        Form(
-            "independent of rotor speed",
-            "F_z = −d_z v_z",
-            (d_z,),
-            _independent_of_speed,
-            ("velocity",),
-            kernel=_kernel_independent_of_speed,
-        ),
+        Form("at the hubs", "T_i −= k_z ω_i v_z,i (climbing)", (k_z,), Wrench(_at_the_hubs), needs),
+        Form("at the centre of mass", "T −= k_z Σω v_z (climbing)", (k_z,), Wrench(_at_the_centre), needs),
+        Form("independent of rotor speed", "F_z = −d_z v_z", (d_z,), Wrench(_independent_of_speed), ("velocity",)),
     )
 
 

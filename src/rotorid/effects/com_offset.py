@@ -3,62 +3,41 @@
 from __future__ import annotations
 
 import numpy as np
+from numba.extending import register_jitable
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.instant import Wrench
 from rotorid.effects.loading import NO_ROTORS, weight
-from rotorid.effects.rigid_body import force_of_lever
 
 
-def _moment_only(motion, vehicle, values):
+def _moment_only(m, v, p, w):
     """M = -r_c × F_thrust: the rotors' arms are r_i - r_c; moments about the true centre of mass."""
-    thrust = (vehicle.thrust_coefficients_n_s2() * motion.rotor_speed**2).sum(axis=1)
-    return Contribution(moment=np.stack([values[1] * thrust, -values[0] * thrust, 0.0 * thrust], axis=1))
-
-
-def _of_all_forces(motion, vehicle, values):
-    """M = -r_c × F: what drag and inflow do to the forces acts on that arm, too; F = m a, a the specific force."""
-    return Contribution(moment=-np.cross(_first_moment(vehicle, values), motion.specific_force))
-
-
-def _with_lever_arm(motion, vehicle, values):
-    """The same, and what is recorded is the motion of the believed centre of mass, at −r_c from the true one.
-
-    F = −m (dΩ × r_c + Ω × (Ω × r_c)), r_c in the plane or in space: an accelerometer there and the recorded velocity
-    both hold it.
-    """
-    force = force_of_lever(motion, _first_moment(vehicle, values))
-    return Contribution(force=force, moment=_of_all_forces(motion, vehicle, values).moment)
-
-
-def _first_moment(vehicle, values):
-    """m r_c (3,), kg m, of an offset in the plane or in space."""
-    lever = np.zeros(3)
-    lever[: len(values)] = vehicle.mass_kg * np.asarray(values)
-    return lever
-
-
-def kernel(m, v, p, w):
     thrust = 0.0
     for i in range(v.rotors):
-        thrust += m.thrust[i]
+        thrust += v.thrust_coefficient[i] * m.rotor_speed[i] ** 2
     w.moment[0] += p[1] * thrust
     w.moment[1] -= p[0] * thrust
 
 
-def _kernel_of_all_forces(m, v, p, w):
-    """`p` is r_x, r_y, r_z."""
+@register_jitable
+def _of_all_forces(m, v, p, w):
+    """M = -r_c × F: what drag and inflow do to the forces acts on that arm, too; F = m a, a the specific force.
+
+    `p` is r_x, r_y, r_z.
+    """
     s = m.specific_force
     w.moment[0] -= v.mass * (p[1] * s[2] - p[2] * s[1])
     w.moment[1] -= v.mass * (p[2] * s[0] - p[0] * s[2])
     w.moment[2] -= v.mass * (p[0] * s[1] - p[1] * s[0])
 
 
-def _kernel_with_lever_arm(m, v, p, w):
-    """`p` is r_x, r_y, r_z."""
-    s, a, o = m.specific_force, m.angular_acceleration, m.angular_velocity
-    w.moment[0] -= v.mass * (p[1] * s[2] - p[2] * s[1])
-    w.moment[1] -= v.mass * (p[2] * s[0] - p[0] * s[2])
-    w.moment[2] -= v.mass * (p[0] * s[1] - p[1] * s[0])
+def _with_lever_arm(m, v, p, w):
+    """The same, and what is recorded is the motion of the believed centre of mass, at −r_c from the true one.
+
+    F = −m (dΩ × r_c + Ω × (Ω × r_c)): an accelerometer there and the recorded velocity both hold it.
+    """
+    _of_all_forces(m, v, p, w)
+    a, o = m.angular_acceleration, m.angular_velocity
     # Ω × r, and of that Ω × once more.
     i, j, k = o[1] * p[2] - o[2] * p[1], o[2] * p[0] - o[0] * p[2], o[0] * p[1] - o[1] * p[0]
     w.force[0] -= v.mass * (a[1] * p[2] - a[2] * p[1] + o[1] * k - o[2] * j)
@@ -67,7 +46,7 @@ def _kernel_with_lever_arm(m, v, p, w):
 
 
 def _in_the_plane(values):
-    """The kernel's values of an offset in the rotor plane."""
+    """r_x, r_y, r_z of an offset in the rotor plane."""
     return (*values, 0.0)
 
 
@@ -78,35 +57,17 @@ def forms(vehicle):
     known = ("rotor_speed", "angular_velocity")
     needs = (*known, "angular_acceleration", "specific_force")
     return (
-        Form("moment", "M = −r_c × F_thrust", plane, _moment_only, known, excited_by=("rotor_speed",), kernel=kernel),
+        Form("moment", "M = −r_c × F_thrust", plane, Wrench(_moment_only), known, excited_by=("rotor_speed",)),
         Form(
             "moment of all forces",
             text,
             plane,
-            _of_all_forces,
+            Wrench(_of_all_forces, _in_the_plane),
             (*known, "specific_force"),
             excited_by=("specific_force",),
-            kernel=_kernel_of_all_forces,
-            kernel_values=_in_the_plane,
         ),
-        Form(
-            "moment and lever arm",
-            felt,
-            plane,
-            _with_lever_arm,
-            needs,
-            kernel=_kernel_with_lever_arm,
-            kernel_values=_in_the_plane,
-        ),
-        Form(
-            "moment and lever arm, in space",
-            felt,
-            space,
-            _with_lever_arm,
-            needs,
-            must_show=(0, 1),
-            kernel=_kernel_with_lever_arm,
-        ),
+        Form("moment and lever arm", felt, plane, Wrench(_with_lever_arm, _in_the_plane), needs),
+        Form("moment and lever arm, in space", felt, space, Wrench(_with_lever_arm), needs, must_show=(0, 1)),
     )
 
 

@@ -86,14 +86,6 @@ class Motion:
         wind = np.broadcast_to(self.wind, self.velocity.shape)
         return self.velocity - np.einsum("nji,nj->ni", self.rotation, wind)
 
-    def hub_velocity(self, positions_m: np.ndarray) -> np.ndarray:
-        """Velocity of each hub through the air, v + Ω × r_i, shape (n, k, 3), m/s, body axes."""
-        rate = self.angular_velocity if self.angular_velocity is not None else np.zeros((self.size, 3))
-        x, y, z = positions_m.T
-        p, q, r = rate[:, :1], rate[:, 1:2], rate[:, 2:]
-        turning = np.stack([q * z - r * y, r * x - p * z, p * y - q * x], axis=2)
-        return self.air_velocity[:, None, :] + turning
-
     def has(self, names: tuple[str, ...]) -> bool:
         """Whether every named field is there."""
         return all(getattr(self, name) is not None for name in names)
@@ -144,10 +136,8 @@ class Parameter:
     """No instrument is better than this: a form whose parameters are all below it is not worth a word."""
 
 
-_Wrench = Callable[[Motion, Vehicle, np.ndarray], Contribution]
-Kernel = Callable[..., None]
-"""`kernel(m, v, p, w)`: adds to `w` (fields of `rotorid.vehicle.kernels.ADDED`) what a form does at the instant `m`
-(`INSTANT`) to the vehicle `v` (`BODY`) with the values `p`. Arithmetic and `math` alone: numba compiles it."""
+_Adding = Callable[[Motion, Vehicle, np.ndarray], Contribution]
+"""What a form adds; a `rotorid.effects.instant.Wrench` where one instant gives its force and moment: then it flies."""
 _Residuals = Sequence[tuple[Motion, dict[str, np.ndarray]]]
 """Motions of a recording, each with the `force` and `moment` that are not explained, (n, 3) in body axes."""
 
@@ -162,7 +152,7 @@ class Form:
     name: str
     equation: str
     parameters: tuple[Parameter, ...]
-    contribution: _Wrench
+    contribution: _Adding
     requires: tuple[str, ...] = ()
     """Fields of `Motion` that must be there."""
     vehicle_requires: tuple[str, ...] = ()
@@ -200,12 +190,6 @@ class Form:
     resolution: float = 1.0
     """How many times the size that counts elsewhere its contribution must have."""
 
-    kernel: Kernel | None = None
-    """The same force and moment at one instant, as a plain function that the simulator compiles (`Kernel`); None where
-    the form adds neither, or needs the past. A form without it is simulated by its array code."""
-    kernel_values: Callable[[np.ndarray], Sequence[float]] | None = None
-    """What the kernel takes for its values, from the form's parameter values; None for these themselves."""
-
     def stated(self, fitted: np.ndarray) -> np.ndarray:
         """The linear parameters as their equation has them, from the coefficients fitted to recordings, each (k,)."""
         out = np.array(fitted, float)
@@ -224,11 +208,6 @@ class Form:
 
 CURVE, SUPPLY, LIMIT, DELAY, LAG = range(5)
 """Stages between command and rotor speed, in the order in which they act."""
-
-_FormsFor = Callable[[Vehicle], tuple[Form, ...]]
-_ReadingForms = "Callable[[Instrument], tuple[Form, ...]]"
-"""Forms of an instrument (`rotorid.effects.loading.Instrument`); their contribution takes a `Loading` in place of a
-`Motion` and gives a `reading`."""
 
 
 @dataclass(frozen=True)
@@ -300,7 +279,7 @@ class Effect:
     """What a pilot would call it, fits into "… was left out"."""
     sentence: str
     """How it is observed, one clause."""
-    forms: _FormsFor
+    forms: Callable[[Vehicle], tuple[Form, ...]]
     """The forms for a vehicle (their parameters may depend on its number of rotors)."""
     source: str
     sign: str = ""
@@ -327,8 +306,9 @@ class Effect:
     """Forms that spoil a recorded set."""
     form_named: Callable[[str], Form | None] = lambda name: None
     """A form that the data give rise to (a gust in its window), from its name in a vehicle file."""
-    reading_forms: _ReadingForms | None = None
-    """Forms of kinds `stand` and `bench`; None where the forms for a flight hold on a stand as well."""
+    reading_forms: Callable[[InstrumentFacts], tuple[Form, ...]] | None = None
+    """Forms of kinds `stand` and `bench`, whose contribution takes a `Loading` and gives a `reading`; None where the
+    forms for a flight hold on a stand as well."""
 
     # What the decision asks of an effect
 
@@ -346,9 +326,6 @@ class Effect:
     """Id from which it cannot be distinguished where rotor speeds are known from their commands alone."""
     contradiction: bool = False
     """Whether columns that contradict each other show it, whatever force and moment are."""
-    shows_in: tuple[str, ...] = ()
-    """Kinds of what two sets of flights are compared by without a model (`rotorid.mismatch.changes.quantities`) that
-    another amount of it changes."""
     shows_in: tuple[str, ...] = ()
     """Kinds of what two sets of flights are compared by without a model (`rotorid.mismatch.changes.quantities`) that
     another amount of it changes."""
@@ -424,32 +401,11 @@ def not_testable_reason(form: Form, motion: Motion, vehicle: Vehicle) -> str | N
     return None
 
 
-def at_hubs(forces: np.ndarray, positions_m: np.ndarray) -> Contribution:
-    """Force and moment of forces (n, k, 3) acting at hubs (k, 3), about the body origin."""
-    # Products of (n, k) by (k,) are many times faster here than sums and cross products over short axes.
-    fx, fy, fz = forces[:, :, 0], forces[:, :, 1], forces[:, :, 2]
-    x, y, z = positions_m.T
-    every = np.ones(len(positions_m))
-    return Contribution(
-        force=np.stack([fx @ every, fy @ every, fz @ every], axis=1),
-        moment=np.stack([fz @ y - fy @ z, fx @ z - fz @ x, fy @ x - fx @ y], axis=1),
-    )
-
-
 def rotor_thrusts(motion: Motion, vehicle: Vehicle) -> np.ndarray:
     """Thrust of each rotor, shape (n, k), N: the believed C_F ω² where the motion does not have another."""
     if motion.rotor_thrust is not None:
         return motion.rotor_thrust
     return vehicle.thrust_coefficients_n_s2() * motion.rotor_speed**2
-
-
-def lift_at_hubs(extra_n: np.ndarray, vehicle: Vehicle) -> Contribution:
-    """Force and moment of further thrust (n, k), N, along each rotor's axis (body -z)."""
-    # Column by column: as `at_hubs`, without its products by zero.
-    x, y, _ = vehicle.rotor_positions_m().T
-    force, moment = np.zeros((len(extra_n), 3)), np.zeros((len(extra_n), 3))
-    force[:, 2], moment[:, 0], moment[:, 1] = -sum(extra_n.T), -sum((extra_n * y).T), sum((extra_n * x).T)
-    return Contribution(force=force, moment=moment)
 
 
 def compiled(**options: Any) -> Callable[[Callable], Callable]:

@@ -1,36 +1,15 @@
 """Hub moment of blade flapping."""
 
-import numpy as np
-
-from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.contract import Effect, Form, Parameter
+from rotorid.effects.instant import Wrench
 from rotorid.effects.scale import scale
 
-_E3 = np.array([0.0, 0.0, 1.0])
 
+def _hub_moment(m, v, p, w):
+    """M = k_flap Σ ω_i (v_i × e3): the disc tilts back and pulls the nose up in forward flight.
 
-def _weighted_airspeed(motion, vehicle):
-    """Σ ω_i v_i over the hubs, (n, 3), m/s²."""
-    hub = motion.hub_velocity(vehicle.rotor_positions_m())
-    return (motion.rotor_speed[:, :, None] * hub).sum(axis=1)
-
-
-def _hub_moment(motion, vehicle, values):
-    """M = k_flap Σ ω_i (v_i × e3): the disc tilts back and pulls the nose up in forward flight."""
-    # v × e3 with e3 down has y component -v_x; nose up is +y, hence the sign.
-    return Contribution(moment=-values[0] * np.cross(_weighted_airspeed(motion, vehicle), _E3))
-
-
-def _independent_of_speed(motion, vehicle, values):
-    """M = k_m (-v × e3) at the centre of mass."""
-    return Contribution(moment=-values[0] * np.cross(motion.air_velocity, _E3))
-
-
-def _rolling(motion, vehicle, values):
-    """M = −k_roll Σ ω_i (v_i − (v_i · e3) e3): about the airspeed itself, whichever way a rotor spins."""
-    return Contribution(moment=-values[0] * _weighted_airspeed(motion, vehicle) * (1.0 - _E3))
-
-
-def _kernel_hub_moment(m, v, p, w):
+    v × e3 with e3 down has y component −v_x; nose up is +y, hence the sign.
+    """
     along = across = 0.0
     for i in range(v.rotors):
         along += m.rotor_speed[i] * m.hub_velocity[i, 0]
@@ -39,12 +18,14 @@ def _kernel_hub_moment(m, v, p, w):
     w.moment[1] += p[0] * along
 
 
-def _kernel_independent_of_speed(m, v, p, w):
+def _independent_of_speed(m, v, p, w):
+    """M = k_m (-v × e3) at the centre of mass."""
     w.moment[0] -= p[0] * m.air_velocity[1]
     w.moment[1] += p[0] * m.air_velocity[0]
 
 
-def _kernel_rolling(m, v, p, w):
+def _rolling(m, v, p, w):
+    """M = −k_roll Σ ω_i (v_i − (v_i · e3) e3): about the airspeed itself, whichever way a rotor spins."""
     along = across = 0.0
     for i in range(v.rotors):
         along += m.rotor_speed[i] * m.hub_velocity[i, 0]
@@ -62,25 +43,22 @@ def forms(vehicle):
             "at the hubs",
             "M = k_flap Σ ω_i (e3 × v_i)",
             (Parameter("k_flap", "N m s2/(rad m)", 0.0, k_flap, meaning="moment per rotor speed and airspeed"),),
-            _hub_moment,
+            Wrench(_hub_moment),
             ("velocity", "rotor_speed"),
-            kernel=_kernel_hub_moment,
         ),
         Form(
             "independent of rotor speed",
             "M = k_m (e3 × v)",
             (Parameter("k_m", "N s", 0.0, k_m, meaning="moment per airspeed"),),
-            _independent_of_speed,
+            Wrench(_independent_of_speed),
             ("velocity",),
-            kernel=_kernel_independent_of_speed,
         ),
         Form(
             "about the airspeed, at the hubs",
             "M = −k_roll Σ ω_i (v_i − (v_i · e3) e3)",
             (Parameter("k_roll", "N m s2/(rad m)", 0.0, k_flap, meaning="moment about the airspeed per rotor speed"),),
-            _rolling,
+            Wrench(_rolling),
             ("velocity", "rotor_speed"),
-            kernel=_kernel_rolling,
         ),
     )
 

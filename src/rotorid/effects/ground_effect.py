@@ -1,66 +1,40 @@
 """Ground effect: more thrust close to the ground."""
 
-from math import exp
-
 import numpy as np
+from numba.extending import register_jitable
 
-from rotorid.effects.contract import Effect, Form, Parameter, lift_at_hubs, rotor_thrusts
+from rotorid.effects.contract import Effect, Form, Parameter
+from rotorid.effects.instant import Wrench
 from rotorid.effects.scale import rotor_radius_m
 
 _CLOSEST_RADII = 0.3
 """Heights below this many rotor radii are held there: the closed forms diverge and no rotor gets closer."""
 
 
-def _hub_heights_m(motion, vehicle):
-    """Height of each hub above ground, (n, k), m; tilted by the attitude where it is known."""
-    positions = vehicle.rotor_positions_m()
-    if motion.rotation is None:
-        drop = np.broadcast_to(positions[:, 2], (motion.size, len(positions)))
-    else:
-        drop = np.einsum("nj,kj->nk", motion.rotation[:, 2, :], positions)
-    return np.maximum(motion.height[:, None] - drop, _CLOSEST_RADII * rotor_radius_m(vehicle))
+@register_jitable
+def _height_of_hub(m, v, i):
+    """Height of a hub above ground, m; tilted by the attitude where it is known."""
+    drop = m.rotation[2, 0] * v.hub[i, 0] + m.rotation[2, 1] * v.hub[i, 1] + m.rotation[2, 2] * v.hub[i, 2]
+    return np.maximum(m.height - drop, _CLOSEST_RADII * v.radius)
 
 
-def _along_thrust(gain, motion, vehicle):
-    return lift_at_hubs(gain * rotor_thrusts(motion, vehicle), vehicle)
-
-
-def image(motion, vehicle, values):
+def _image(m, v, p, w):
     """T/T_∞ = 1 / (1 - c (R/4z)²), z the hub's height (Cheeseman and Bennett: c = 1)."""
-    ratio = values[0] * (rotor_radius_m(vehicle) / (4 * _hub_heights_m(motion, vehicle))) ** 2
-    return _along_thrust(1.0 / (1.0 - np.minimum(ratio, 0.8)) - 1.0, motion, vehicle)
+    for i in range(v.rotors):
+        ratio = p[0] * (v.radius / (4.0 * _height_of_hub(m, v, i))) ** 2
+        w.hub_force[i, 2] -= (1.0 / (1.0 - np.minimum(ratio, 0.8)) - 1.0) * m.thrust[i]
 
 
-def _inverse_square(motion, vehicle, values):
+def _inverse_square(m, v, p, w):
     """T/T_∞ = 1 + c (R/4z)²."""
-    ratio = (rotor_radius_m(vehicle) / (4 * _hub_heights_m(motion, vehicle))) ** 2
-    return _along_thrust(values[0] * ratio, motion, vehicle)
+    for i in range(v.rotors):
+        w.hub_force[i, 2] -= p[0] * (v.radius / (4.0 * _height_of_hub(m, v, i))) ** 2 * m.thrust[i]
 
 
-def exponential(motion, vehicle, values):
+def _exponential(m, v, p, w):
     """T/T_∞ = 1 + a exp(-b z)."""
-    return _along_thrust(values[0] * np.exp(-values[1] * _hub_heights_m(motion, vehicle)), motion, vehicle)
-
-
-def _kernel_image(m, v, p, w):
     for i in range(v.rotors):
-        drop = m.rotation[2, 0] * v.hub[i, 0] + m.rotation[2, 1] * v.hub[i, 1] + m.rotation[2, 2] * v.hub[i, 2]
-        ratio = p[0] * (v.radius / (4.0 * max(m.height - drop, _CLOSEST_RADII * v.radius))) ** 2
-        w.hub_force[i, 2] -= (1.0 / (1.0 - min(ratio, 0.8)) - 1.0) * m.thrust[i]
-
-
-def _kernel_inverse_square(m, v, p, w):
-    for i in range(v.rotors):
-        drop = m.rotation[2, 0] * v.hub[i, 0] + m.rotation[2, 1] * v.hub[i, 1] + m.rotation[2, 2] * v.hub[i, 2]
-        ratio = (v.radius / (4.0 * max(m.height - drop, _CLOSEST_RADII * v.radius))) ** 2
-        w.hub_force[i, 2] -= p[0] * ratio * m.thrust[i]
-
-
-def _kernel_exponential(m, v, p, w):
-    for i in range(v.rotors):
-        drop = m.rotation[2, 0] * v.hub[i, 0] + m.rotation[2, 1] * v.hub[i, 1] + m.rotation[2, 2] * v.hub[i, 2]
-        height = max(m.height - drop, _CLOSEST_RADII * v.radius)
-        w.hub_force[i, 2] -= p[0] * exp(-p[1] * height) * m.thrust[i]
+        w.hub_force[i, 2] -= p[0] * np.exp(-p[1] * _height_of_hub(m, v, i)) * m.thrust[i]
 
 
 def forms(vehicle):
@@ -71,17 +45,15 @@ def forms(vehicle):
             "image rotor",
             "T/T_∞ = 1/(1 − c (R/4z)²)",
             (Parameter("c", "1", 0.0, 40.0, True, (1.0, 4.0, 10.0), "gain of the image rotor, 1 for a single one"),),
-            image,
+            Wrench(_image),
             needs,
-            kernel=_kernel_image,
         ),
         Form(
             "inverse square",
             "T/T_∞ = 1 + c (R/4z)²",
             (Parameter("c", "1", 0.0, 60.0, meaning="gain of the image rotor, 1 for a single one"),),
-            _inverse_square,
+            Wrench(_inverse_square),
             needs,
-            kernel=_kernel_inverse_square,
         ),
         Form(
             "exponential",
@@ -98,9 +70,8 @@ def forms(vehicle):
                     meaning="one over the height at which it has fallen to 37 %",
                 ),
             ),
-            exponential,
+            Wrench(_exponential),
             needs,
-            kernel=_kernel_exponential,
         ),
     )
 

@@ -63,7 +63,7 @@ def _branches(instrument, share):
     return signal
 
 
-def lens(instrument, share):
+def _lens(instrument, share):
     """The same loop, zero at no load and at the largest: what a spring of metal does, (n, 6)."""
     branch = _branches(instrument, share)
 
@@ -84,13 +84,13 @@ def reading_forms(instrument):
         forms.append(on_channels(f"{name} play", text, "h", "{}", loaded, _branches(instrument, share), meaning=_HALF))
         forms.append(
             on_channels(
-                f"{name} lens", text + " × 4 f (1 − f)", "h", "{}", loaded, lens(instrument, share), meaning=_HALF
+                f"{name} lens", text + " × 4 f (1 − f)", "h", "{}", loaded, _lens(instrument, share), meaning=_HALF
             )
         )
         if 1 < len(loaded) <= 3:
             for c in loaded:
                 own = one_per_channel("h", "{}", (c,), meaning=_HALF)
-                for shape, signal in (("play", _branches(instrument, share)), ("lens", lens(instrument, share))):
+                for shape, signal in (("play", _branches(instrument, share)), ("lens", _lens(instrument, share))):
                     forms.append(Form(f"{name} {shape} of {AXES[c]}", text, own, cross_channels(((c, c),), signal)))
     forms += _exponential_forms(instrument, loaded)
     shares = tuple(Parameter(f"h_{n}", "1", meaning=_HALF + " by the largest load") for n in ("narrow", "wide"))

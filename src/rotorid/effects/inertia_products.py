@@ -1,23 +1,12 @@
 """Off-diagonal entries of the inertia matrix."""
 
-import numpy as np
-
-from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.contract import Effect, Form, Parameter
+from rotorid.effects.instant import Wrench
 from rotorid.effects.scale import scale
 
-_PAIRS = (("J_xy", 0, 1), ("J_xz", 0, 2), ("J_yz", 1, 2))
 
-
-def products(motion, vehicle, values):
+def _products(m, v, p, w):
     """M = -(E dΩ + Ω × E Ω), E the symmetric matrix of J_xy, J_xz, J_yz to be added."""
-    extra = np.zeros((3, 3))
-    for value, (_, i, j) in zip(values, _PAIRS, strict=True):
-        extra[i, j] = extra[j, i] = value
-    rate = motion.angular_velocity
-    return Contribution(moment=-(motion.angular_acceleration @ extra + np.cross(rate, rate @ extra)))
-
-
-def kernel(m, v, p, w):
     a, o = m.angular_acceleration, m.angular_velocity
     x, y, z = p[0] * o[1] + p[1] * o[2], p[0] * o[0] + p[2] * o[2], p[1] * o[0] + p[2] * o[1]
     w.moment[0] -= p[0] * a[1] + p[1] * a[2] + o[1] * z - o[2] * y
@@ -31,10 +20,12 @@ def forms(vehicle):
         Form(
             "products",
             "M = −(E dΩ/dt + Ω × E Ω)",
-            tuple(Parameter(name, "kg m2", -bound, bound, meaning="entry of J to be added") for name, _, _ in _PAIRS),
-            products,
+            tuple(
+                Parameter(name, "kg m2", -bound, bound, meaning="entry of J to be added")
+                for name in ("J_xy", "J_xz", "J_yz")
+            ),
+            Wrench(_products),
             ("angular_velocity", "angular_acceleration"),
-            kernel=kernel,
         ),
     )
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.instant import Wrench
 from rotorid.effects.pendulum import cable_pull, likely_lengths
-from rotorid.effects.rigid_body import force_of_lever
 from rotorid.effects.scale import scale
 
 _LENGTHS_M = (0.15, 6.0)
@@ -29,7 +29,8 @@ def _pull(motion, vehicle, values, slowed):
     swung_by = None if motion.hung_by is None else motion.hung_by - slowed
     world = cable_pull(hanging, time_s, length_m, damping_ratio, vehicle.gravity_m_s2, motion.hung, swung_by)
     pull = np.einsum("nji,nj->ni", motion.rotation, world)
-    pull = _aboard(motion) * pull
+    if motion.on_board is not None:
+        pull *= motion.on_board[:, None]
     return Contribution(force=mass_kg * pull, moment=hook_kg_m * np.cross([0.0, 0.0, 1.0], pull))
 
 
@@ -60,50 +61,31 @@ def _slung_starts(parts, vehicle):
     return likely_lengths(stretches, _LENGTHS_M, _DAMPING_RATIO, vehicle.gravity_m_s2)
 
 
-def _aboard(motion):
-    """Share of the payload that is on board, (n, 1), or 1 throughout."""
-    return 1.0 if motion.on_board is None else motion.on_board[:, None]
-
-
-def rigid(motion, vehicle, values):
+def _rigid(m, v, p, w):
     """A mass m_p at r that moves with the body: F = -m_p (a + dΩ × r + Ω × (Ω × r)), M = -m_p r × a.
 
-    a is the specific force at the believed centre of mass; `values` are m_p (kg) and m_p r (kg m).
+    a is the specific force at the believed centre of mass; `p` is m_p (kg), m_p r (kg m), and the products of inertia
+    that it brings (its moments of inertia count as values), J_xy, J_xz, J_yz (kg m²).
     """
-    lever = np.asarray(values[1:4])
-    on_board, force = _aboard(motion), -values[0] * motion.specific_force
-    if motion.angular_acceleration is not None:
-        force = force + force_of_lever(motion, lever)
-    return Contribution(force=on_board * force, moment=-np.cross(lever, on_board * motion.specific_force))
-
-
-def _rigid_with_inertia(motion, vehicle, values):
-    """The rigid payload and the products of inertia that it brings (its moments of inertia count as values)."""
-    extra = np.zeros((3, 3))
-    extra[0, 1], extra[0, 2], extra[1, 2] = values[4:]
-    extra += extra.T
-    rate = motion.angular_velocity
-    turning = _aboard(motion) * (motion.angular_acceleration @ extra + np.cross(rate, rate @ extra))
-    attached = rigid(motion, vehicle, values[:4])
-    return Contribution(force=attached.force, moment=attached.moment - turning)
-
-
-def _kernel_rigid(m, v, p, w):
-    """A rigid payload; `p` is m_p, m_p x, m_p y, m_p z, J_xy, J_xz, J_yz."""
     s, a, o = m.specific_force, m.angular_acceleration, m.angular_velocity
-    x, y, z = p[4] * o[1] + p[5] * o[2], p[4] * o[0] + p[6] * o[2], p[5] * o[0] + p[6] * o[1]
     # Ω × m_p r, and of that Ω × once more.
     i, j, k = o[1] * p[3] - o[2] * p[2], o[2] * p[1] - o[0] * p[3], o[0] * p[2] - o[1] * p[1]
-    w.force[0] -= p[0] * s[0] + a[1] * p[3] - a[2] * p[2] + o[1] * k - o[2] * j
-    w.force[1] -= p[0] * s[1] + a[2] * p[1] - a[0] * p[3] + o[2] * i - o[0] * k
-    w.force[2] -= p[0] * s[2] + a[0] * p[2] - a[1] * p[1] + o[0] * j - o[1] * i
-    w.moment[0] -= p[2] * s[2] - p[3] * s[1] + p[4] * a[1] + p[5] * a[2] + o[1] * z - o[2] * y
-    w.moment[1] -= p[3] * s[0] - p[1] * s[2] + p[4] * a[0] + p[6] * a[2] + o[2] * x - o[0] * z
-    w.moment[2] -= p[1] * s[1] - p[2] * s[0] + p[5] * a[0] + p[6] * a[1] + o[0] * y - o[1] * x
+    w.force[0] -= m.on_board * (p[0] * s[0] + a[1] * p[3] - a[2] * p[2] + o[1] * k - o[2] * j)
+    w.force[1] -= m.on_board * (p[0] * s[1] + a[2] * p[1] - a[0] * p[3] + o[2] * i - o[0] * k)
+    w.force[2] -= m.on_board * (p[0] * s[2] + a[0] * p[2] - a[1] * p[1] + o[0] * j - o[1] * i)
+    w.moment[0] -= m.on_board * (p[2] * s[2] - p[3] * s[1])
+    w.moment[1] -= m.on_board * (p[3] * s[0] - p[1] * s[2])
+    w.moment[2] -= m.on_board * (p[1] * s[1] - p[2] * s[0])
+    if p[4] == 0.0 and p[5] == 0.0 and p[6] == 0.0:
+        return
+    x, y, z = p[4] * o[1] + p[5] * o[2], p[4] * o[0] + p[6] * o[2], p[5] * o[0] + p[6] * o[1]
+    w.moment[0] -= m.on_board * (p[4] * a[1] + p[5] * a[2] + o[1] * z - o[2] * y)
+    w.moment[1] -= m.on_board * (p[4] * a[0] + p[6] * a[2] + o[2] * x - o[0] * z)
+    w.moment[2] -= m.on_board * (p[5] * a[0] + p[6] * a[1] + o[0] * y - o[1] * x)
 
 
 def _without_products(values):
-    """m_p and m_p r as the kernel's values."""
+    """m_p, m_p r and no products of inertia."""
     return (*values, 0.0, 0.0, 0.0)
 
 
@@ -133,24 +115,21 @@ def forms(vehicle):
             "rigid with its products of inertia",
             "F = −m_p (a + dΩ/dt × r + Ω × (Ω × r)), M = −m_p r × a − (E dΩ/dt + Ω × E Ω)",
             (m_p, *places, *products),
-            _rigid_with_inertia,
+            Wrench(_rigid),
             ("specific_force", "angular_velocity", "angular_acceleration"),
             must_show=(0,),
             comes_and_goes=True,
             brings=moments,
-            kernel=_kernel_rigid,
         ),
         Form(
             "rigid",
             "F = −m_p (a + dΩ/dt × r + Ω × (Ω × r)), M = −m_p r × a",
             (m_p, *places),
-            rigid,
+            Wrench(_rigid, _without_products),
             ("specific_force",),
             must_show=(0,),
             comes_and_goes=True,
             brings=moments,
-            kernel=_kernel_rigid,
-            kernel_values=_without_products,
         ),
         Form(
             "slung",

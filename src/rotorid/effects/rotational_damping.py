@@ -1,39 +1,24 @@
 """Damping of body rates that axial inflow at the rotors does not explain."""
 
-import numpy as np
-
-from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.contract import Effect, Form, Parameter
+from rotorid.effects.instant import Wrench
 from rotorid.effects.scale import scale
 
 
-def linear(motion, vehicle, values):
+def _linear(m, v, p, w):
     """M = -(c_x p, c_y q, c_z r)."""
-    return Contribution(moment=-np.asarray(values) * motion.angular_velocity)
-
-
-def quadratic(motion, vehicle, values):
-    """M_j = -c_j |Ω_j| Ω_j."""
-    rate = motion.angular_velocity
-    return Contribution(moment=-np.asarray(values) * np.abs(rate) * rate)
-
-
-def isotropic(motion, vehicle, values):
-    """M = -c Ω."""
-    return Contribution(moment=-values[0] * motion.angular_velocity)
-
-
-def kernel(m, v, p, w):
     for j in range(3):
         w.moment[j] -= p[j] * m.angular_velocity[j]
 
 
-def _kernel_quadratic(m, v, p, w):
+def _quadratic(m, v, p, w):
+    """M_j = -c_j |Ω_j| Ω_j."""
     for j in range(3):
         w.moment[j] -= p[j] * abs(m.angular_velocity[j]) * m.angular_velocity[j]
 
 
 def _alike(values):
-    """c as the kernel's values."""
+    """c about every axis."""
     return (values[0],) * 3
 
 
@@ -44,9 +29,9 @@ def forms(vehicle):
     square = tuple(Parameter(f"c_{a}", "N m s2/rad2", 0.0, most, meaning=f"damping about {a}") for a in "xyz")
     one = Parameter("c", "N m s/rad", 0.0, most, meaning="damping about every axis")
     return (
-        Form("one constant", "M = −c Ω", (one,), isotropic, needs, kernel=kernel, kernel_values=_alike),
-        Form("linear", "M_j = −c_j Ω_j", each, linear, needs, kernel=kernel),
-        Form("quadratic", "M_j = −c_j |Ω_j| Ω_j", square, quadratic, needs, kernel=_kernel_quadratic),
+        Form("one constant", "M = −c Ω", (one,), Wrench(_linear, _alike), needs),
+        Form("linear", "M_j = −c_j Ω_j", each, Wrench(_linear), needs),
+        Form("quadratic", "M_j = −c_j |Ω_j| Ω_j", square, Wrench(_quadratic), needs),
     )
 
 

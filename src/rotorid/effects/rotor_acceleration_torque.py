@@ -1,19 +1,12 @@
 """Reaction torque of rotors that speed up or slow down."""
 
-import numpy as np
-
-from rotorid.effects.contract import Contribution, Effect, Form
+from rotorid.effects.contract import Effect, Form
+from rotorid.effects.instant import Wrench
 from rotorid.effects.scale import rotor_inertia
 
 
-def reaction(motion, vehicle, values):
+def _reaction(m, v, p, w):
     """M_z = J_r Σ y_i dω_i/dt, y_i = +1 for ccw (reaction opposes the spin, as the drag torque does)."""
-    moment = np.zeros((motion.size, 3))
-    moment[:, 2] = values[0] * (motion.rotor_acceleration * vehicle.yaw_signs()).sum(axis=1)
-    return Contribution(moment=moment)
-
-
-def kernel(m, v, p, w):
     total = 0.0
     for i in range(v.rotors):
         total += m.rotor_acceleration[i] * v.yaw_sign[i]
@@ -26,9 +19,8 @@ def forms(vehicle):
             "reaction",
             "M_z = J_r Σ y_i dω_i/dt",
             (rotor_inertia(vehicle),),
-            reaction,
+            Wrench(_reaction),
             ("rotor_acceleration",),
-            kernel=kernel,
         ),
     )
 

@@ -1,62 +1,31 @@
 """In-plane drag of the rotors (H-force), with the force part of blade flapping: one class, never split."""
 
-import numpy as np
-
-from rotorid.effects.contract import Contribution, Effect, Form, Parameter, at_hubs
+from rotorid.effects.contract import Effect, Form, Parameter
+from rotorid.effects.instant import Wrench
 from rotorid.effects.scale import scale
 
-_IN_PLANE = np.array([1.0, 1.0, 0.0])
 
-
-def _at_the_hubs(motion, vehicle, values):
-    """F_i = -k_d ω_i P v_i, at each hub; v_i = v + Ω × r_i through the air, P drops the thrust axis."""
-    positions = vehicle.rotor_positions_m()
-    hub = motion.hub_velocity(positions) * _IN_PLANE
-    return at_hubs(-values[0] * motion.rotor_speed[:, :, None] * hub, positions)
-
-
-def _at_the_centre(motion, vehicle, values):
-    """F = -k_d Σω P v at the centre of mass: no moment."""
-    total = motion.rotor_speed.sum(axis=1, keepdims=True)
-    return Contribution(force=-values[0] * total * motion.air_velocity * _IN_PLANE)
-
-
-def _per_axis(motion, vehicle, values):
-    """F = -(k_x v_x, k_y v_y, 0) Σω: the airframe shades the rotors differently in x and y."""
-    total = motion.rotor_speed.sum(axis=1, keepdims=True)
-    return Contribution(force=-total * motion.air_velocity * np.array([values[0], values[1], 0.0]))
-
-
-def _per_axis_at_the_hubs(motion, vehicle, values):
-    """F_i = -ω_i (k_x v_x,i, k_y v_y,i, 0) at each hub."""
-    positions = vehicle.rotor_positions_m()
-    hub = motion.hub_velocity(positions) * np.array([values[0], values[1], 0.0])
-    return at_hubs(-motion.rotor_speed[:, :, None] * hub, positions)
-
-
-def _linear_in_speed(motion, vehicle, values):
-    """F = -d P v at the centre of mass, not growing with rotor speed."""
-    return Contribution(force=-values[0] * motion.air_velocity * _IN_PLANE)
-
-
-def _kernel_at_the_hubs(m, v, p, w):
+def _at_the_hubs(m, v, p, w):
+    """F_i = -ω_i (k_x v_x,i, k_y v_y,i, 0), at each hub; v_i = v + Ω × r_i through the air."""
     for i in range(v.rotors):
         w.hub_force[i, 0] -= p[0] * m.rotor_speed[i] * m.hub_velocity[i, 0]
         w.hub_force[i, 1] -= p[1] * m.rotor_speed[i] * m.hub_velocity[i, 1]
 
 
-def _kernel_at_the_centre(m, v, p, w):
+def _at_the_centre(m, v, p, w):
+    """F = -(k_x v_x, k_y v_y, 0) Σω at the centre of mass: no moment; the airframe may shade x and y differently."""
     w.force[0] -= p[0] * m.rotor_speed_sum * m.air_velocity[0]
     w.force[1] -= p[1] * m.rotor_speed_sum * m.air_velocity[1]
 
 
-def _kernel_linear_in_speed(m, v, p, w):
+def _linear_in_speed(m, v, p, w):
+    """F = -d P v at the centre of mass, not growing with rotor speed."""
     w.force[0] -= p[0] * m.air_velocity[0]
     w.force[1] -= p[0] * m.air_velocity[1]
 
 
 def _alike(values):
-    """k_d as the kernels' values."""
+    """k_d along either axis."""
     return (values[0],) * 2
 
 
@@ -72,48 +41,41 @@ def forms(vehicle):
             "at the hubs",
             "F_i = −k_d ω_i v_i,⊥",
             (k_d,),
-            _at_the_hubs,
+            Wrench(_at_the_hubs, _alike),
             needs,
             linear_drag="times rotor speed",
-            kernel=_kernel_at_the_hubs,
-            kernel_values=_alike,
         ),
         Form(
             "at the centre of mass",
             "F = −k_d Σω v_⊥",
             (k_d,),
-            _at_the_centre,
+            Wrench(_at_the_centre, _alike),
             needs,
             linear_drag="times rotor speed",
-            kernel=_kernel_at_the_centre,
-            kernel_values=_alike,
         ),
         Form(
             "per axis",
             "F = −Σω (k_d,x v_x, k_d,y v_y, 0)",
             axes,
-            _per_axis,
+            Wrench(_at_the_centre),
             needs,
             linear_drag="times rotor speed",
-            kernel=_kernel_at_the_centre,
         ),
         Form(
             "per axis, at the hubs",
             "F_i = −ω_i (k_d,x v_x,i, k_d,y v_y,i, 0)",
             axes,
-            _per_axis_at_the_hubs,
+            Wrench(_at_the_hubs),
             needs,
             linear_drag="times rotor speed",
-            kernel=_kernel_at_the_hubs,
         ),
         Form(
             "independent of rotor speed",
             "F = −d v_⊥",
             (d,),
-            _linear_in_speed,
+            Wrench(_linear_in_speed),
             ("velocity",),
             linear_drag="of airspeed alone",
-            kernel=_kernel_linear_in_speed,
         ),
     )
 

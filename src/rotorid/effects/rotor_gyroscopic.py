@@ -1,24 +1,12 @@
 """Gyroscopic moment of the spinning rotors."""
 
-import numpy as np
-
-from rotorid.effects.contract import Contribution, Effect, Form
+from rotorid.effects.contract import Effect, Form
+from rotorid.effects.instant import Wrench
 from rotorid.effects.scale import rotor_inertia
 
 
-def _spin_vector(vehicle):
-    """Sense of each rotor's angular momentum along body z (down): cw seen from above is +z."""
-    return -vehicle.yaw_signs()
-
-
-def gyroscopic(motion, vehicle, values):
+def _gyroscopic(m, v, p, w):
     """M = -Ω × (J_r Σ s_i ω_i e3), s_i = +1 for clockwise seen from above (momentum along body +z)."""
-    momentum = np.zeros((motion.size, 3))
-    momentum[:, 2] = values[0] * (motion.rotor_speed * _spin_vector(vehicle)).sum(axis=1)
-    return Contribution(moment=-np.cross(motion.angular_velocity, momentum))
-
-
-def kernel(m, v, p, w):
     momentum = 0.0
     for i in range(v.rotors):
         momentum -= p[0] * m.rotor_speed[i] * v.yaw_sign[i]
@@ -32,9 +20,8 @@ def forms(vehicle):
             "gyroscopic",
             "M = −Ω × J_r Σ s_i ω_i e3",
             (rotor_inertia(vehicle),),
-            gyroscopic,
+            Wrench(_gyroscopic),
             ("angular_velocity", "rotor_speed"),
-            kernel=kernel,
         ),
     )
 

@@ -5,38 +5,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotorid.effects.contract import Contribution, Effect, Form, Parameter, at_hubs
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.instant import Wrench
 from rotorid.effects.scale import scale
 
-_IN_PLANE = np.array([1.0, 1.0, 0.0])
 _MOST_WIND_M_S = 30.0
 _MOST_WEIGHTS = 2.0
 """No multirotor holds its place against a wind that pushes with more weights than this."""
 
 
-def _world(motion, north, east):
-    vector = np.zeros((motion.size, 3))
-    vector[:, 0], vector[:, 1] = north, east
-    return np.einsum("nji,nj->ni", motion.rotation, vector)
-
-
-def _world_force(motion, vehicle, values):
+def _world_force(m, v, p, w):
     """F = Rᵀ (f_N, f_E, 0): constant in world axes."""
-    return Contribution(force=_world(motion, values[0], values[1]))
-
-
-def _rotor_force(motion, vehicle, values):
-    """F_i = ω_i P Rᵀ (k w_N, k w_E, 0) at each hub: the wind's part of rotor drag on airspeed."""
-    wind = _world(motion, values[0], values[1]) * _IN_PLANE
-    return at_hubs(motion.rotor_speed[:, :, None] * wind[:, None, :], vehicle.rotor_positions_m())
-
-
-def _kernel_world_force(m, v, p, w):
     for j in range(3):
         w.force[j] += m.rotation[0, j] * p[0] + m.rotation[1, j] * p[1]
 
 
-def _kernel_rotor_force(m, v, p, w):
+def _rotor_force(m, v, p, w):
+    """F_i = ω_i P Rᵀ (k w_N, k w_E, 0) at each hub: the wind's part of rotor drag on airspeed."""
     x = m.rotation[0, 0] * p[0] + m.rotation[1, 0] * p[1]
     y = m.rotation[0, 1] * p[0] + m.rotation[1, 1] * p[1]
     for i in range(v.rotors):
@@ -59,20 +44,18 @@ def forms(vehicle):
             "on the rotors",
             "F_i = ω_i P Rᵀ k_d w",
             on_rotors,
-            _rotor_force,
+            Wrench(_rotor_force),
             ("rotation", "rotor_speed"),
             linear_drag="times rotor speed",
-            kernel=_kernel_rotor_force,
         ),
         Form(
             "on the airframe",
             "F = Rᵀ f_w",
             on_frame,
-            _world_force,
+            Wrench(_world_force),
             ("rotation",),
             linear_drag="of airspeed alone",
             excited_by=("always",),
-            kernel=_kernel_world_force,
         ),
     )
 

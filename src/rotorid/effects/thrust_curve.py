@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from rotorid.effects.contract import Effect, Form, Parameter, lift_at_hubs
+from rotorid.effects.contract import Effect, Form, Parameter
+from rotorid.effects.instant import Wrench
 from rotorid.effects.loading import NO_ROTORS, on_stand
 from rotorid.effects.scale import scale
 
@@ -12,37 +13,7 @@ _NO_CURVE = 0.003
 """Share of the hover thrust below which a term is none: no propeller is square to that."""
 
 
-def _linear_term(motion, vehicle, values):
-    """T_i += c_1 ω_i."""
-    return lift_at_hubs(values[0] * motion.rotor_speed, vehicle)
-
-
-def _constant_term(motion, vehicle, values):
-    """T_i += c_0."""
-    return lift_at_hubs(values[0] * np.ones_like(motion.rotor_speed), vehicle)
-
-
-def _linear_and_constant(motion, vehicle, values):
-    """T_i += c_0 + c_1 ω_i."""
-    return lift_at_hubs(values[0] + values[1] * motion.rotor_speed, vehicle)
-
-
-def _cubic_term(motion, vehicle, values):
-    """T_i += c_3 ω_i³."""
-    return lift_at_hubs(values[0] * motion.rotor_speed**3, vehicle)
-
-
-def _linear_and_square(motion, vehicle, values):
-    """T_i += c_1 ω_i + Δc_2 ω_i²."""
-    return lift_at_hubs(values[0] * motion.rotor_speed + values[1] * motion.rotor_speed**2, vehicle)
-
-
-def _constant_and_square(motion, vehicle, values):
-    """T_i += c_0 + Δc_2 ω_i²."""
-    return lift_at_hubs(values[0] + values[1] * motion.rotor_speed**2, vehicle)
-
-
-def kernel(m, v, p, w):
+def _polynomial(m, v, p, w):
     """T_i += c_0 + c_1 ω_i + Δc_2 ω_i² + c_3 ω_i³; `p` holds the four."""
     for i in range(v.rotors):
         speed = m.rotor_speed[i]
@@ -50,15 +21,15 @@ def kernel(m, v, p, w):
 
 
 def _powers(*powers):
-    """Kernel values of a form whose parameters are the coefficients of these powers."""
+    """The four coefficients of a form whose parameters are the coefficients of these powers of the speed."""
 
-    def kernel_values(values):
+    def four(values):
         out = [0.0] * 4
         for power, value in zip(powers, values, strict=True):
             out[power] = value
         return out
 
-    return kernel_values
+    return four
 
 
 def forms(vehicle):
@@ -82,83 +53,61 @@ def forms(vehicle):
             "linear term",
             "T_i = C_F ω_i² + c_1 ω_i",
             (c1,),
-            _linear_term,
+            Wrench(_polynomial, _powers(1)),
             needs,
-            kernel=kernel,
-            kernel_values=_powers(1),
         ),
         Form(
             "constant term",
             "T_i = C_F ω_i² + c_0",
             (c0,),
-            _constant_term,
+            Wrench(_polynomial, _powers(0)),
             needs,
             excited_by=always,
-            kernel=kernel,
-            kernel_values=_powers(0),
         ),
         Form(
             "linear and constant",
             "T_i = C_F ω_i² + c_1 ω_i + c_0",
             (c0, c1),
-            _linear_and_constant,
+            Wrench(_polynomial, _powers(0, 1)),
             needs,
             excited_by=always,
-            kernel=kernel,
-            kernel_values=_powers(0, 1),
         ),
         Form(
             "linear term and its own square",
             "T_i = (C_F + Δc_2) ω_i² + c_1 ω_i",
             (c1, c2),
-            _linear_and_square,
+            Wrench(_polynomial, _powers(1, 2)),
             needs,
             must_show=(0, 1),
-            kernel=kernel,
-            kernel_values=_powers(1, 2),
         ),
         Form(
             "constant term and its own square",
             "T_i = (C_F + Δc_2) ω_i² + c_0",
             (c0, c2),
-            _constant_and_square,
+            Wrench(_polynomial, _powers(0, 2)),
             needs,
             must_show=(0, 1),
             excited_by=always,
-            kernel=kernel,
-            kernel_values=_powers(0, 2),
         ),
         Form(
             "cubic term",
             "T_i = C_F ω_i² + c_3 ω_i³",
             (c3,),
-            _cubic_term,
+            Wrench(_polynomial, _powers(3)),
             needs,
-            kernel=kernel,
-            kernel_values=_powers(3),
         ),
     )
 
 
-def _cubic_and_square(motion, vehicle, values):
-    """T_i += c_3 ω_i³ + Δc_2 ω_i²."""
-    return lift_at_hubs(values[0] * motion.rotor_speed**3 + values[1] * motion.rotor_speed**2, vehicle)
-
-
-def _power_of_speed(vehicle):
-    """Contribution T_i = (1 + d) C_F ω_h² (ω_i/ω_h)^(2 + e), ω_h the hover speed.
+def _power(m, v, p, w):
+    """T_i = (1 + d) C_F ω_h² (ω_i/ω_h)^(2 + e); `p` is e, d and ω_h, the hover speed.
 
     A coefficient of another power has no value to believe: where the two curves cross is as free as the power.
     """
-    hover = scale(vehicle).hover_speed_rad_s
-
-    def contribution(motion, own, values):
-        excess, more = values
-        ratio = np.maximum(motion.rotor_speed, 0.0) / hover
-        square = own.thrust_coefficients_n_s2() * hover**2
-        return lift_at_hubs(square * ((1.0 + more) * ratio ** (2.0 + excess) - ratio**2), own)
-
-    return contribution
+    for i in range(v.rotors):
+        ratio = np.maximum(m.rotor_speed[i], 0.0) / p[2]
+        square = v.thrust_coefficient[i] * p[2] ** 2
+        w.hub_force[i, 2] -= square * ((1.0 + p[1]) * ratio ** (2.0 + p[0]) - ratio**2)
 
 
 def reading_forms(instrument):
@@ -170,11 +119,12 @@ def reading_forms(instrument):
         "e", "1", -1.5, 1.5, nonlinear=True, starts=starts, meaning="exponent of the speed beyond two", negligible=0.01
     )
     more = Parameter("d", "1", -0.6, 0.6, nonlinear=True, starts=(0.0,), meaning="further thrust at hover speed")
+    hover = scale(vehicle).hover_speed_rad_s
     power = Form(
         "power of the speed",
         "T_i = (1 + d) C_F ω_h² (ω_i/ω_h)^(2+e), ω_h the hover speed",
         (excess, more),
-        _power_of_speed(vehicle),
+        Wrench(_power, lambda values: (*values, hover)),
         ("rotor_speed",),
         takes_up=("thrust",),
     )
@@ -185,7 +135,7 @@ def reading_forms(instrument):
         "cubic term and its own square",
         "T_i = (C_F + Δc_2) ω_i² + c_3 ω_i³",
         cube + square,
-        _cubic_and_square,
+        Wrench(_polynomial, _powers(3, 2)),
         ("rotor_speed",),
         must_show=(0, 1),
     )

@@ -2,50 +2,16 @@
 
 import numpy as np
 
-from rotorid.effects.contract import Contribution, Effect, Form, Parameter, at_hubs, rotor_thrusts
+from rotorid.effects.contract import Effect, Form, Parameter
+from rotorid.effects.instant import Wrench
 from rotorid.effects.loading import on_stand
 
 
-def _forces(motion, vehicle, tilt_x, tilt_y):
-    thrust = rotor_thrusts(motion, vehicle)
-    forces = np.zeros((*thrust.shape, 3))
-    forces[:, :, 0] = thrust * tilt_x
-    forces[:, :, 1] = thrust * tilt_y
-    return forces
+def _at_the_hubs(m, v, p, w):
+    """F_i += T_i (ε_x,i, ε_y,i, 0) at each hub, M −= ±Q_i (ε_x,i, ε_y,i, 0): reaction torques lean with their axes.
 
-
-def _tilted(motion, vehicle, tilt_x, tilt_y, weight):
-    """Tilted thrust at the hubs and the reaction torques, which lean with their axes; `weight` (k,) picks rotors."""
-    thrust = at_hubs(_forces(motion, vehicle, tilt_x, tilt_y) * weight[None, :, None], vehicle.rotor_positions_m())
-    torque = motion.rotor_speed**2 @ (vehicle.torque_coefficients_n_m_s2() * vehicle.yaw_signs() * weight)
-    leaning = -torque[:, None] * np.array([[tilt_x, tilt_y, 0.0]])
-    return Contribution(force=thrust.force, moment=thrust.moment + leaning)
-
-
-def _at_the_hubs(motion, vehicle, values):
-    """F_i += T_i (ε_x, ε_y, 0) at each hub, M_i −= ±Q_i (ε_x, ε_y, 0); small angles, all rotors alike."""
-    return _tilted(motion, vehicle, values[0], values[1], np.ones(vehicle.rotor_count))
-
-
-def _thrust_alone(motion, vehicle, values):
-    """F_i += T_i (ε_x, ε_y, 0) at each hub, reaction torques upright: what flows off the rotor leans, not the motor."""
-    return at_hubs(_forces(motion, vehicle, values[0], values[1]), vehicle.rotor_positions_m())
-
-
-def _force_only(motion, vehicle, values):
-    """F = T (ε_x, ε_y, 0) at the centre of mass."""
-    return Contribution(force=_forces(motion, vehicle, values[0], values[1]).sum(axis=1))
-
-
-def _single(k):
-    def one(motion, vehicle, values):
-        return _tilted(motion, vehicle, values[0], values[1], np.eye(vehicle.rotor_count)[k])
-
-    return one
-
-
-def _kernel_at_the_hubs(m, v, p, w):
-    """F_i += T_i (ε_x,i, ε_y,i, 0), M -= ±Q_i (ε_x,i, ε_y,i, 0); `p` is ε_x, ε_y of each rotor."""
+    Small angles; `p` is ε_x, ε_y of each rotor.
+    """
     roll = pitch = 0.0
     for i in range(v.rotors):
         torque = v.torque_coefficient[i] * v.yaw_sign[i] * m.rotor_speed[i] ** 2
@@ -57,20 +23,22 @@ def _kernel_at_the_hubs(m, v, p, w):
     w.moment[1] -= pitch
 
 
-def _kernel_thrust_alone(m, v, p, w):
+def _thrust_alone(m, v, p, w):
+    """F_i += T_i (ε_x, ε_y, 0) at each hub, reaction torques upright: what flows off the rotor leans, not the motor."""
     for i in range(v.rotors):
         for j in range(2):
             w.hub_force[i, j] += m.thrust[i] * p[j]
 
 
-def _kernel_force_only(m, v, p, w):
+def _force_only(m, v, p, w):
+    """F = T (ε_x, ε_y, 0) at the centre of mass."""
     for i in range(v.rotors):
         for j in range(2):
             w.force[j] += m.thrust[i] * p[j]
 
 
 def _of_rotors(leaning):
-    """Kernel values of a tilt that the rotors lean by where `leaning` (k,) is 1."""
+    """ε_x, ε_y of each rotor, of a tilt that those lean by where `leaning` (k,) is 1."""
     return lambda values: [weight * value for weight in leaning for value in values]
 
 
@@ -82,12 +50,10 @@ def forms(vehicle):
             f"rotor {k + 1}",
             f"F_{k + 1} = T_{k + 1} (ε_x, ε_y, −1)",
             tilt,
-            _single(k),
+            Wrench(_at_the_hubs, _of_rotors(np.eye(vehicle.rotor_count)[k])),
             needs,
             (),
             2,
-            kernel=_kernel_at_the_hubs,
-            kernel_values=_of_rotors(np.eye(vehicle.rotor_count)[k]),
         )
         for k in range(vehicle.rotor_count)
     ]
@@ -96,39 +62,24 @@ def forms(vehicle):
             "all rotors, at the hubs",
             "F_i = T_i (ε_x, ε_y, −1)",
             tilt,
-            _at_the_hubs,
+            Wrench(_at_the_hubs, _of_rotors(np.ones(vehicle.rotor_count))),
             needs,
-            kernel=_kernel_at_the_hubs,
-            kernel_values=_of_rotors(np.ones(vehicle.rotor_count)),
         ),
         Form(
             "all rotors, at the hubs, thrust alone",
             "F_i = T_i (ε_x, ε_y, −1), torques upright",
             tilt,
-            _thrust_alone,
+            Wrench(_thrust_alone),
             needs,
-            kernel=_kernel_thrust_alone,
         ),
-        Form(
-            "all rotors, at the centre of mass",
-            "F = T (ε_x, ε_y, −1)",
-            tilt,
-            _force_only,
-            needs,
-            kernel=_kernel_force_only,
-        ),
+        Form("all rotors, at the centre of mass", "F = T (ε_x, ε_y, −1)", tilt, Wrench(_force_only), needs),
         *singles,
     )
 
 
-def _each_its_own(motion, vehicle, values):
-    """F_i += T_i (ε_x,i, ε_y,i, 0) at each hub, torques leaning with their axes; values (2k,): x of each, then y."""
-    tilt_x, tilt_y = np.split(np.asarray(values, float), 2)
-    parts = [
-        _tilted(motion, vehicle, tilt_x[k], tilt_y[k], np.eye(vehicle.rotor_count)[k])
-        for k in range(vehicle.rotor_count)
-    ]
-    return Contribution(force=sum(p.force for p in parts), moment=sum(p.moment for p in parts))
+def _in_pairs(values):
+    """ε_x, ε_y of each rotor, of all ε_x before all ε_y."""
+    return np.reshape(values, (2, -1)).T.ravel()
 
 
 def reading_forms(instrument):
@@ -144,7 +95,7 @@ def reading_forms(instrument):
             for k in range(count)
         )
         text = "F_i = T_i (ε_x,i, ε_y,i, −1)"
-        found.append(Form("each rotor its own way", text, tilts, _each_its_own, ("rotor_speed",)))
+        found.append(Form("each rotor its own way", text, tilts, Wrench(_at_the_hubs, _in_pairs), ("rotor_speed",)))
     return tuple(on_stand(form) for form in found)
 
 

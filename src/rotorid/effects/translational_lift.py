@@ -1,33 +1,21 @@
 """Translational lift: more thrust in forward flight."""
 
-import numpy as np
-
-from rotorid.effects.contract import Effect, Form, Parameter, lift_at_hubs
+from rotorid.effects.contract import Effect, Form, Parameter
+from rotorid.effects.instant import Wrench
 from rotorid.effects.scale import scale
 
 _MOST_SHARE_PER_SQUARE = 0.05
 """Share of hover thrust gained per (m/s)²: published values stay below 0.003."""
 
 
-def _at_the_hubs(motion, vehicle, values):
+def _at_the_hubs(m, v, p, w):
     """T_i += k_h v_h,i², v_h,i the in-plane airspeed of the hub."""
-    hub = motion.hub_velocity(vehicle.rotor_positions_m())
-    return lift_at_hubs(values[0] * (hub[:, :, 0] ** 2 + hub[:, :, 1] ** 2), vehicle)
-
-
-def _at_the_centre(motion, vehicle, values):
-    """T_i += k_h v_h², v_h the in-plane airspeed of the centre of mass."""
-    v = motion.air_velocity
-    extra = values[0] * (v[:, 0] ** 2 + v[:, 1] ** 2)
-    return lift_at_hubs(np.repeat(extra[:, None], vehicle.rotor_count, axis=1), vehicle)
-
-
-def _kernel_at_the_hubs(m, v, p, w):
     for i in range(v.rotors):
         w.hub_force[i, 2] -= p[0] * (m.hub_velocity[i, 0] ** 2 + m.hub_velocity[i, 1] ** 2)
 
 
-def _kernel_at_the_centre(m, v, p, w):
+def _at_the_centre(m, v, p, w):
+    """T_i += k_h v_h², v_h the in-plane airspeed of the centre of mass."""
     for i in range(v.rotors):
         w.hub_force[i, 2] -= p[0] * (m.air_velocity[0] ** 2 + m.air_velocity[1] ** 2)
 
@@ -36,15 +24,8 @@ def forms(vehicle):
     most = _MOST_SHARE_PER_SQUARE * scale(vehicle).thrust_n
     k_h = Parameter("k_h", "N s2/m2", 0.0, most, meaning="lift per rotor and squared in-plane airspeed")
     return (
-        Form("at the hubs", "T_i += k_h v_h,i²", (k_h,), _at_the_hubs, ("velocity",), kernel=_kernel_at_the_hubs),
-        Form(
-            "at the centre of mass",
-            "T_i += k_h v_h²",
-            (k_h,),
-            _at_the_centre,
-            ("velocity",),
-            kernel=_kernel_at_the_centre,
-        ),
+        Form("at the hubs", "T_i += k_h v_h,i²", (k_h,), Wrench(_at_the_hubs), ("velocity",)),
+        Form("at the centre of mass", "T_i += k_h v_h²", (k_h,), Wrench(_at_the_centre), ("velocity",)),
     )
 
 

@@ -5,87 +5,54 @@ from functools import partial
 
 import numpy as np
 
-from rotorid.effects.contract import Contribution, Effect, Form, Parameter, lift_at_hubs, rotor_thrusts
+from rotorid.effects.contract import Effect, Form, Parameter
+from rotorid.effects.instant import Wrench
 from rotorid.effects.loading import NO_ROTORS, on_stand
 
 _MOST_TWIST = 0.5
 """Largest share by which the torque of a rotor differs from that of the others at the same thrust."""
 
 
-def _thrust(motion, vehicle, weights):
-    return lift_at_hubs(weights * rotor_thrusts(motion, vehicle), vehicle)
+def _thrust(m, v, p, w):
+    """C_F,i = C_F (1 + p_i)."""
+    for i in range(v.rotors):
+        w.hub_force[i, 2] -= p[i] * m.thrust[i]
 
 
-def _torque(motion, vehicle, weights):
-    torque = vehicle.torque_coefficients_n_m_s2() * vehicle.yaw_signs() * motion.rotor_speed**2
-    moment = np.zeros((motion.size, 3))
-    moment[:, 2] = sum((weights * torque).T)
-    return moment
+def _torque(m, v, p, w):
+    """C_Q,i = C_Q (1 + p_i)."""
+    yaw = 0.0
+    for i in range(v.rotors):
+        yaw += p[i] * v.torque_coefficient[i] * v.yaw_sign[i] * m.rotor_speed[i] ** 2
+    w.moment[2] += yaw
 
 
-def both(motion, vehicle, values):
-    """C_F,i = C_F (1 + d_i), C_Q,i = C_Q (1 + d_i): one blade shape scales both."""
-    weights = np.asarray(values, float)
-    wrench = _thrust(motion, vehicle, weights)
-    return Contribution(wrench.force, wrench.moment + _torque(motion, vehicle, weights))
+def _both(m, v, p, w):
+    """C_F,i = C_F (1 + d_i), C_Q,i = C_Q (1 + q_i); `p` is d of each rotor, then q of each."""
+    yaw = 0.0
+    for i in range(v.rotors):
+        w.hub_force[i, 2] -= p[i] * m.thrust[i]
+        yaw += p[v.rotors + i] * v.torque_coefficient[i] * v.yaw_sign[i] * m.rotor_speed[i] ** 2
+    w.moment[2] += yaw
 
 
-def _thrust_only(motion, vehicle, values):
-    """C_F,i = C_F (1 + d_i)."""
-    return _thrust(motion, vehicle, np.asarray(values))
-
-
-def _torque_only(motion, vehicle, values):
-    """C_Q,i = C_Q (1 + d_i)."""
-    return Contribution(moment=_torque(motion, vehicle, np.asarray(values)))
-
-
-def _contrast(function):
+def _contrast(values):
     """The differences between rotors alone: what all share is a wrong coefficient, not a difference.
 
     The last rotor's share is minus the sum of the others'; with one more parameter the common part would be free
     although nothing shows it, and the normal equations singular.
     """
-
-    def contrast(motion, vehicle, values):
-        return function(motion, vehicle, np.append(values, -np.sum(values)))
-
-    return contrast
+    return np.append(values, -np.sum(values))
 
 
-def _one(k, count, function):
-    def single(motion, vehicle, values):
-        weights = np.zeros(count)
-        weights[k] = values[0]
-        return function(motion, vehicle, weights)
-
-    return single
+def _contrast_of_both(values):
+    """One blade shape scales thrust and torque alike."""
+    return np.tile(_contrast(values), 2)
 
 
-def kernel(m, v, p, w):
-    """C_F,i = C_F (1 + d_i), C_Q,i = C_Q (1 + q_i); `p` is d_i, q_i of each rotor."""
-    yaw = 0.0
-    for i in range(v.rotors):
-        w.hub_force[i, 2] -= p[2 * i] * m.thrust[i]
-        yaw += p[2 * i + 1] * v.torque_coefficient[i] * v.yaw_sign[i] * m.rotor_speed[i] ** 2
-    w.moment[2] += yaw
-
-
-def _excess(function, weights):
-    """Kernel values of `function` (both, thrust_only or torque_only) for what each rotor has in excess."""
-    thrust = 0.0 if function is _torque_only else 1.0
-    torque = 0.0 if function is _thrust_only else 1.0
-    return [share * weight for weight in weights for share in (thrust, torque)]
-
-
-def _of_one(k, count, function, values):
-    """Kernel values where rotor `k` alone differs."""
-    return _excess(function, [values[0] if i == k else 0.0 for i in range(count)])
-
-
-def _of_contrast(function, values):
-    """Kernel values where the last rotor has what the others lack."""
-    return _excess(function, [*values, -sum(values)])
+def _contrasts_apart(values):
+    """Another twist or a chip changes the two by shares of their own."""
+    return np.concatenate([_contrast(half) for half in np.split(values, 2)])
 
 
 def forms(vehicle):
@@ -99,14 +66,15 @@ def forms(vehicle):
             name.format(i + 1),
             text.format(i + 1),
             (symbols[i],),
-            _one(i, count, function),
+            Wrench(kernel, partial(np.multiply, np.tile(np.eye(count)[i], repeats))),
             needs,
             (),
             2,
-            kernel=kernel,
-            kernel_values=partial(_of_one, i, count, function),
         )
-        for name, text, function in (("rotor {}", both_text, both), ("thrust of rotor {}", thrust_text, _thrust_only))
+        for name, text, kernel, repeats in (
+            ("rotor {}", both_text, _both, 2),
+            ("thrust of rotor {}", thrust_text, _thrust, 1),
+        )
         for i in range(count)
     ]
     free, closed = symbols[:-1], ", Σ d_i = 0"
@@ -115,31 +83,14 @@ def forms(vehicle):
     return (
         *singles,
         *(
-            Form(
-                name,
-                text.format("i") + closed,
-                parameters,
-                _contrast(function),
-                needs,
-                (),
-                2,
-                kernel=kernel,
-                kernel_values=partial(_of_contrast, function),
-            )
-            for name, text, function, parameters in (
-                ("thrust and torque", both_text, both, free),
-                ("thrust", thrust_text, _thrust_only, free),
-                ("torque", torque_text, _torque_only, twisted),
+            Form(name, text.format("i") + closed, parameters, Wrench(*kernel), needs, (), 2)
+            for name, text, kernel, parameters in (
+                ("thrust and torque", both_text, (_both, _contrast_of_both), free),
+                ("thrust", thrust_text, (_thrust, _contrast), free),
+                ("torque", torque_text, (_torque, _contrast), twisted),
             )
         ),
     )
-
-
-def apart(motion, vehicle, values):
-    """C_F,i = C_F (1 + d_i), C_Q,i = C_Q (1 + q_i): another twist or a chip changes the two by shares of their own."""
-    thrust, torque = np.split(np.asarray(values, float), 2)
-    wrench = _thrust(motion, vehicle, np.append(thrust, -thrust.sum()))
-    return Contribution(wrench.force, wrench.moment + _torque(motion, vehicle, np.append(torque, -torque.sum())))
 
 
 def reading_forms(instrument):
@@ -157,7 +108,7 @@ def reading_forms(instrument):
             for i in range(count - 1)
         )
         text = "C_F,i = C_F (1 + d_i), C_Q,i = C_Q (1 + q_i), Σ d_i = Σ q_i = 0"
-        found.append(Form("thrust and torque apart", text, free, apart, ("rotor_speed",)))
+        found.append(Form("thrust and torque apart", text, free, Wrench(_both, _contrasts_apart), ("rotor_speed",)))
     return tuple(on_stand(form) for form in found)
 
 

@@ -8,17 +8,6 @@ from __future__ import annotations
 import numpy as np
 
 
-def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross product over the last axis, (..., 3); on small batches much faster than `numpy.cross`."""
-    a0, a1, a2 = a[..., 0], a[..., 1], a[..., 2]
-    b0, b1, b2 = b[..., 0], b[..., 1], b[..., 2]
-    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
-    out[..., 0] = a1 * b2 - a2 * b1
-    out[..., 1] = a2 * b0 - a0 * b2
-    out[..., 2] = a0 * b1 - a1 * b0
-    return out
-
-
 def rotation_from_quaternion(quaternion: np.ndarray) -> np.ndarray:
     """Rotation of body vectors into the world, (..., 3, 3), of unit quaternions (..., 4)."""
     w, x, y, z = np.moveaxis(quaternion, -1, 0)

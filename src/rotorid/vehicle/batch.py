@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.effects.contract import Form
+from rotorid.effects.instant import body_of
 from rotorid.errors import InputError
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle import fast
@@ -27,7 +28,6 @@ from rotorid.vehicle.improved import (
     all_forms,
     speeds_of_commands,
 )
-from rotorid.vehicle.kernels import MOST_ROTORS, body_of, kernel_values, kernels_of
 
 
 @dataclass(frozen=True)
@@ -84,20 +84,14 @@ class Batch:
 
     Keys of `changes` are `mass_kg` (n,), `inertia_kg_m2` (n, 3) or (n, 3, 3), `thrust_coefficient_n_s2` and
     `torque_coefficient_n_m_s2` (n,) or (n, k), `rotor_positions_m` (n, k, 3), and `<effect>.<symbol>` (n,) for a
-    parameter of an effect in the file. InputError names a key that the vehicle does not have, an effect that only
-    array code flies (`rotorid.vehicle.simulator` then), and a shape that does not fit.
+    parameter of an effect in the file. InputError names a key that the vehicle does not have, an effect with a
+    memory (`rotorid.vehicle.simulator` flies it), and a shape that does not fit.
     """
 
     def __init__(self, vehicle: Vehicle, size: int, changes: Mapping[str, np.ndarray] | None = None):
         self.vehicle, self.size = vehicle, size
         self._effects = active_forms(vehicle)
-        found = kernels_of(self._effects, vehicle)
-        if found is None:
-            raise InputError(
-                f"vehicle {vehicle.name}: more than {MOST_ROTORS} rotors, or an effect with a memory of its own; "
-                "simulate it one by one (rotorid.vehicle.improved.simulate_as_stated)"
-            )
-        self._kernels = found
+        self._kernels = fast.kernels_of(self._effects, vehicle)
         self._body = np.repeat(body_of(vehicle), size)
         self._parameters = [np.tile(values, (size, 1)) for _, values in self._effects]
         for key, values in (changes or {}).items():
@@ -148,7 +142,7 @@ class Batch:
             if form not in self._kernels.forms:
                 continue
             alike = (values == values[0]).all()
-            rows = [kernel_values(form, row) for row in (values[:1] if alike else values)]
+            rows = [form.contribution.values_of(row) for row in (values[:1] if alike else values)]
             columns.append((self._kernels.forms.index(form), np.array(rows)))
         if not columns:
             return self._kernels.values[None]

@@ -1,8 +1,8 @@
 """Compiled equations of motion: flights and restart windows of vehicles with effects, motors and a controller.
 
-The same equations, step by step, as the array code in `rotorid.vehicle.simulator` and `rotorid.vehicle.windows`,
-written as loops over vehicles for numba because a profile of the array code shows its time to go into calls on small
-arrays. Tests hold that both give the same numbers.
+Newton-Euler equations of a rigid body, thesis eqs 4.1-4.4, by quaternion, stepped by the classical Runge-Kutta method.
+Some effects depend on the accelerations that they change (added mass, products of inertia): these are solved for. A
+test compares them with flights that scipy integrates.
 
 Vehicles fly in blocks, as many at a time as there are records of an instant: each kernel is called for all of a block
 before the next kernel, which halves its cost, as the processor then works on several vehicles at once and guesses right
@@ -13,15 +13,53 @@ A state is rates 0:3, quaternion 3:7, velocity (world) 7:10, position 10:13, rot
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
 
 from rotorid.effects.contract import compiled
-from rotorid.vehicle.dynamics import CONVERGED, MOST_ROUNDS
-from rotorid.vehicle.kernels import call_kernel
 
+
+@cache
+def scratch_record(room: int) -> np.dtype:
+    """Room for a vehicle in flight with so many rotors.
+
+    Forces with moments, accelerations (angular, linear) and how far they are solved for; its state, that at which a
+    step is tried, and the slopes of a step's four stages; its controller. In a record because a slice of an array costs
+    two atomic counts of references, as long as a kernel.
+    """
+    return np.dtype(
+        [(name, "f8", 6) for name in ("base", "wrench", "own", "first", "at", "now")]
+        + [("matrix", "f8", (6, 6)), ("known", "i8"), ("open", "i8")]
+        + [("state", "f8", 13 + room), ("trial", "f8", 13 + room), ("slopes", "f8", (4, 13 + room))]
+        + [("angle", "f8", 3), ("wanted", "f8", 3), ("memory", "f8", (3, 3)), ("command", "f8", room)],
+        align=True,
+    )
+
+
+_MOST_ROUNDS = 30
+_CONVERGED = 1e-10
+"""Change of the accelerations, relative to their largest, at which they are taken as solved for."""
 _UNKNOWN, _FOUND, _EXACT = 0, 1, 2
 """What is known of how accelerations answer to themselves: nothing yet, the matrix of the flight, and that its step was
 exact at this step's beginning, so that one is enough at the step's other stages."""
+
+
+@intrinsic
+def _call_kernel(typingctx, address, instant, body, values, offset, added):
+    """Call the kernel at `address` (integer) with records and with `values` (array) from `offset` on."""
+
+    def codegen(context, builder, signature, args):
+        array = context.make_array(signature.args[3])(context, builder, args[3])
+        passed = [args[1], args[2], builder.gep(array.data, [args[4]]), args[5]]
+        function = ir.FunctionType(ir.VoidType(), [value.type for value in passed])
+        builder.call(builder.inttoptr(args[0], function.as_pointer()), passed)
+        return context.get_dummy_value()
+
+    return types.void(types.int64, instant, body, values, types.int64, added), codegen
 
 
 @compiled(error_model="numpy")
@@ -89,7 +127,7 @@ def _implicit(m, v, w, x, addresses, explicit, offsets, values, shift):
     """Accelerations `x.own` that follow where the effects that read accelerations are given `x.at`."""
     _hand_over(m, v, w, x)
     for e in range(explicit, addresses.shape[0]):
-        call_kernel(addresses[e], m, v, values, offsets[e] + shift, w)
+        _call_kernel(addresses[e], m, v, values, offsets[e] + shift, w)
     _follow(m, v, w, x)
 
 
@@ -172,7 +210,7 @@ def _stepped(x):
         for k in range(6):
             change += x.matrix[i, k] * (x.own[k] - x.at[k])
         x.now[i] = x.at[i] + change
-    return turning <= CONVERGED * most_turning and linear <= CONVERGED * most_linear
+    return turning <= _CONVERGED * most_turning and linear <= _CONVERGED * most_linear
 
 
 @compiled(error_model="numpy")
@@ -190,7 +228,7 @@ def _accelerate(count, first, alone, instant, body, added, scratch, addresses, e
         for e in range(explicit):
             for c in range(count):
                 n = first + c
-                call_kernel(addresses[e], instant[c], body[n * alone], values, offsets[e] + n * stride, added[c])
+                _call_kernel(addresses[e], instant[c], body[n * alone], values, offsets[e] + n * stride, added[c])
         for c in range(count):
             _collect(body[(first + c) * alone], added[c], scratch[c].base)
     if explicit == effects:
@@ -204,7 +242,7 @@ def _accelerate(count, first, alone, instant, body, added, scratch, addresses, e
             v = body[(first + c) * alone]
             _relaxation(instant[c], v, added[c], x, addresses, explicit, offsets, values, (first + c) * stride)
             x.known = _FOUND
-    for rounds in range(MOST_ROUNDS):
+    for rounds in range(_MOST_ROUNDS):
         for c in range(count):
             x = scratch[c]
             if x.open:
@@ -215,7 +253,7 @@ def _accelerate(count, first, alone, instant, body, added, scratch, addresses, e
             for c in range(count):
                 n = first + c
                 if scratch[c].open:
-                    call_kernel(addresses[e], instant[c], body[n * alone], values, offsets[e] + n * stride, added[c])
+                    _call_kernel(addresses[e], instant[c], body[n * alone], values, offsets[e] + n * stride, added[c])
         left = 0
         for c in range(count):
             x = scratch[c]
@@ -333,21 +371,26 @@ def _advance(x, size, step_s):
 
 
 @compiled(error_model="numpy")
-def _attitude_command(x, j, now_s, last_s, loop, v, references, f, reading_errors, e, more):
-    """Rotor commands `x.command` of the attitude controller at instant `j`.
-
-    `x.memory` (3, 3) is integral, last error, slope; `references[f]` and `reading_errors[e]` hold for all instants
-    where they have one row.
-    """
-    now, read = j if references.shape[1] > 1 else 0, j if reading_errors.shape[1] > 1 else 0
+def _read_attitude(x, j, reading_errors, e):
+    """Roll, pitch and yaw `x.angle` as they are read at instant `j`; `reading_errors[e]` of one row hold for all."""
+    read = j if reading_errors.shape[1] > 1 else 0
     a, b, c, d = x.state[3], x.state[4], x.state[5], x.state[6]
-    x.angle[0] = np.arctan2(2.0 * (a * b + c * d), 1.0 - 2.0 * (b * b + c * c))
-    x.angle[1] = np.arcsin(min(max(2.0 * (a * c - b * d), -1.0), 1.0))
-    x.angle[2] = np.arctan2(2.0 * (a * d + b * c), 1.0 - 2.0 * (c * c + d * d))
-    elapsed = now_s - last_s
+    x.angle[0] = np.arctan2(2.0 * (a * b + c * d), 1.0 - 2.0 * (b * b + c * c)) + reading_errors[e, read, 0]
+    x.angle[1] = np.arcsin(min(max(2.0 * (a * c - b * d), -1.0), 1.0)) + reading_errors[e, read, 1]
+    x.angle[2] = np.arctan2(2.0 * (a * d + b * c), 1.0 - 2.0 * (c * c + d * d)) + reading_errors[e, read, 2]
+
+
+@compiled(error_model="numpy")
+def _attitude_command(x, j, elapsed, loop, rotors, references, f, more):
+    """Rotor commands `x.command` of the attitude controller at instant `j`, `elapsed` s after the last (thesis 4.29).
+
+    It reads `x.angle`; `x.memory` (3, 3) is integral, last error, slope. `references[f]` of one row hold for all
+    instants.
+    """
+    now = j if references.shape[1] > 1 else 0
     keep = np.exp(-elapsed / loop.derivative_time) if loop.derivative_time > 0.0 else 0.0
     for i in range(3):
-        error = references[f, now, i] - (x.angle[i] + reading_errors[e, read, i])
+        error = references[f, now, i] - x.angle[i]
         error = (error + np.pi) % (2.0 * np.pi) - np.pi
         if j == 0:
             x.wanted[i] = loop.proportional[i] * error
@@ -361,7 +404,7 @@ def _attitude_command(x, j, now_s, last_s, loop, v, references, f, reading_error
                 x.memory[0, i] = integral
             x.wanted[i] = held
         x.memory[1, i] = error
-    for n in range(v.rotors):
+    for n in range(rotors):
         square = loop.allocation[n, 0] * references[f, now, 3]
         for i in range(3):
             square += loop.allocation[n, 1 + i] * x.wanted[i]
@@ -369,6 +412,14 @@ def _attitude_command(x, j, now_s, last_s, loop, v, references, f, reading_error
         if more.shape[0] > 0:
             square = max(square + more[j, n], 0.0)
         x.command[n] = min(max(np.sqrt(square), loop.lowest), loop.highest)
+
+
+@compiled(error_model="numpy")
+def command(scratch, j, elapsed, loops, rotors, references, more):
+    """The same for each of n scratch records; `loops` and `references` of one row hold for all of them."""
+    for n in range(scratch.shape[0]):
+        loop, f = loops[n if loops.shape[0] > 1 else 0], n if references.shape[0] > 1 else 0
+        _attitude_command(scratch[n], j, elapsed, loop, rotors, references, f, more)
 
 
 @compiled(error_model="numpy", nogil=True)
@@ -405,8 +456,8 @@ def fly(
 ):
     """Fly n vehicles from `first_s` over `steps` steps of `step_s`; arrays with a first axis of 1 hold for all of them.
 
-    `body` (n,) BODY; `start` (n, 13 + k); `lags` (n, 2) 1/s up and down, 0 follows at once; `limits` (n, 2) rad/s;
-    `closed` whether `loops` (LOOP) command by `references` (., steps + 1, 4: angles, thrust) and `more` (squares),
+    `body` (n,); `start` (n, 13 + k); `lags` (n, 2) 1/s up and down, 0 follows at once; `limits` (n, 2) rad/s;
+    `closed` whether `loops` command by `references` (., steps + 1, 4: angles, thrust) and `more` (squares),
     else `commands` (., steps + 1, k) with their accelerations `following` (0 for none); `reading_errors`
     (., steps + 1, 3) rad; `pushes` (., steps + 1, 6); `winds` (., 1, 3); `ground_z` (n,); `values` (n p,) those of a
     vehicle beginning `stride` after the last one's (0: all have the same). Each `every`-th instant is kept in `states`,
@@ -429,8 +480,8 @@ def fly(
                 if closed:
                     loop = loops[n if loops.shape[0] > 1 else 0]
                     f, e = n if references.shape[0] > 1 else 0, n if reading_errors.shape[0] > 1 else 0
-                    last_s = first_s + (j - 1) * step_s
-                    _attitude_command(x, j, now_s, last_s, loop, body[n], references, f, reading_errors, e, more)
+                    _read_attitude(x, j, reading_errors, e)
+                    _attitude_command(x, j, step_s, loop, k, references, f, more)
                 else:
                     own = n if commands.shape[0] > 1 else 0
                     for i in range(k):

@@ -8,11 +8,11 @@ Y_v, L_p, … A derivative predicts within its range and names no cause.
 
 from __future__ import annotations
 
-from math import sqrt
-
 import numpy as np
+from numba.extending import register_jitable
 
-from rotorid.effects.contract import Contribution, Form, Motion, Parameter
+from rotorid.effects.contract import Form, Motion, Parameter
+from rotorid.effects.instant import Constants, Instants, Wrench
 from rotorid.recordings.vehicle import Derivative, Vehicle, unit_of
 
 CHANNELS = ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
@@ -32,19 +32,10 @@ def symbol_of(channel: str, quantity: str) -> str:
 
 def quantities(motion: Motion, vehicle: Vehicle) -> np.ndarray:
     """The quantities at every instant, (n, 12) in the order of QUANTITIES; NaN where the motion does not have one."""
-    out = np.full((motion.size, _SIZE), np.nan)
-    out[:, 0] = 1.0
-    if motion.velocity is not None:
-        out[:, 1:4] = motion.air_velocity
-    if motion.angular_velocity is not None:
-        out[:, 4:7] = motion.angular_velocity
-    if motion.rotor_speed is not None:
-        places = vehicle.rotor_positions_m()
-        thrust = motion.rotor_speed**2 / _hover_square(vehicle)
-        out[:, 7] = thrust.mean(axis=1) - 1.0
-        out[:, 8:10] = thrust @ places[:, [1, 0]] / _arm_m(places) / len(places)
-        out[:, 10] = (thrust * vehicle.yaw_signs()).mean(axis=1)
-        out[:, 11] = motion.rotor_speed.mean(axis=1) / np.sqrt(_hover_square(vehicle))
+    m, v, out = Instants(motion, vehicle), Constants(vehicle), np.full((motion.size, _SIZE), np.nan)
+    for k, name in enumerate(QUANTITIES):
+        if name == "constant" or getattr(motion, _NEEDS.get(name, "rotor_speed")) is not None:
+            out[:, k] = _quantity(m, v, k)
     return out
 
 
@@ -96,45 +87,48 @@ def wrench(x: np.ndarray, matrix: np.ndarray, held: np.ndarray) -> np.ndarray:
     return np.clip(x[:, used], *held[used].T) @ matrix[:, used].T
 
 
-def _contribution(motion: Motion, vehicle: Vehicle, values: np.ndarray) -> Contribution:
-    values = np.asarray(values, float)
-    matrix, held = values[: 6 * _SIZE].reshape(6, _SIZE), values[6 * _SIZE :].reshape(_SIZE, 2)
-    added = wrench(quantities(motion, vehicle), matrix, held)
-    return Contribution(force=added[:, :3], moment=added[:, 3:])
-
-
-def _kernel(m, v, p, w):
-    """Adds to force and moment by a matrix (6, 12) and ranges (12, 2) in a row, as `_contribution`."""
+@register_jitable
+def _quantity(m, v, k):
+    """The k-th of QUANTITIES at the instant of a kernel."""
+    if k == 0:
+        return 1.0
+    if k < 4:
+        return m.air_velocity[k - 1]
+    if k < 7:
+        return m.angular_velocity[k - 4]
     lift = 0.0
     for i in range(v.rotors):
         lift += v.thrust_coefficient[i]
-    hover = v.mass * v.gravity / lift
-    for k in range(12):
-        x = 0.0
-        if k == 0:
-            x = 1.0
-        elif k < 4:
-            x = m.air_velocity[k - 1]
-        elif k < 7:
-            x = m.angular_velocity[k - 4]
+    hover, x = v.mass * v.gravity / lift, 0.0
+    for i in range(v.rotors):
+        square = m.rotor_speed[i] * m.rotor_speed[i] / hover
+        if k == 7:
+            x += square - 1.0
+        elif k == 8:
+            x += square * v.hub[i, 1] / v.reach
+        elif k == 9:
+            x += square * v.hub[i, 0] / v.reach
+        elif k == 10:
+            x += square * v.yaw_sign[i]
         else:
-            for i in range(v.rotors):
-                square = m.rotor_speed[i] * m.rotor_speed[i] / hover
-                if k == 7:
-                    x += square - 1.0
-                elif k == 8:
-                    x += square * v.hub[i, 1] / v.reach
-                elif k == 9:
-                    x += square * v.hub[i, 0] / v.reach
-                elif k == 10:
-                    x += square * v.yaw_sign[i]
-                else:
-                    x += m.rotor_speed[i] / sqrt(hover)
-            x /= v.rotors
-        x = min(max(x, p[72 + 2 * k]), p[73 + 2 * k])
+            x += m.rotor_speed[i] / np.sqrt(hover)
+    return x / v.rotors
+
+
+def _linear(m, v, p, w):
+    """Adds to force and moment by a matrix (6, 12) and ranges (12, 2) in a row, as `wrench`."""
+    for k in range(12):
+        used = False
+        for j in range(6):
+            used = used or p[12 * j + k] != 0.0
+        if not used:
+            continue
+        x = np.minimum(np.maximum(_quantity(m, v, k), p[72 + 2 * k]), p[73 + 2 * k])
         for j in range(3):
-            w.force[j] += p[12 * j + k] * x
-            w.moment[j] += p[12 * (3 + j) + k] * x
+            if p[12 * j + k] != 0.0:
+                w.force[j] += p[12 * j + k] * x
+            if p[12 * (3 + j) + k] != 0.0:
+                w.moment[j] += p[12 * (3 + j) + k] * x
 
 
 def derivative_form(vehicle: Vehicle) -> tuple[Form, np.ndarray] | None:
@@ -146,7 +140,5 @@ def derivative_form(vehicle: Vehicle) -> tuple[Form, np.ndarray] | None:
     needs = dict.fromkeys(_NEEDS.get(q, "rotor_speed") for q in used if q != "constant")
     parameters = [Parameter(symbol_of(c, q), unit_of(c, q)) for c in CHANNELS for q in QUANTITIES]
     parameters += [Parameter(f"{end} of {q}", "") for q in QUANTITIES for end in ("low", "high")]
-    form = Form(
-        "derivatives", "r_c = c_0 + Σ_k c_k x_k", tuple(parameters), _contribution, tuple(needs), kernel=_kernel
-    )
+    form = Form("derivatives", "r_c = c_0 + Σ_k c_k x_k", tuple(parameters), Wrench(_linear), tuple(needs))
     return form, np.concatenate([matrix.ravel(), held.ravel()])

@@ -3,33 +3,147 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
+from numba import cfunc, from_dtype, types
 
+from rotorid.effects.contract import LACK, Form, Motion
+from rotorid.effects.instant import Kernel, Wrench, records, room_for
+from rotorid.errors import InputError
+from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle import compiled
-from rotorid.vehicle.kernels import ADDED, INSTANT, MOST_ROTORS, SCRATCH, Kernels
-
-_LOOP = np.dtype(
-    [
-        ("proportional", "f8", 3),
-        ("integral", "f8", 3),
-        ("derivative", "f8", 3),
-        ("limit", "f8", 3),
-        ("derivative_time", "f8"),
-        ("lowest", "f8"),
-        ("highest", "f8"),
-        ("allocation", "f8", (MOST_ROTORS, 4)),
-    ],
-    align=True,
-)
-"""The attitude controller's constants, SI; `allocation` gives squared rotor speeds of thrust and moments."""
 
 _LEAST_PER_THREAD = 16
 """Vehicles below which a further thread is not worth its start."""
 _BLOCK = 8
 """Vehicles that fly together; their records fill half of a processor's first cache."""
+
+
+_ALWAYS_KNOWN = frozenset(
+    {
+        "rotor_speed",
+        "angular_velocity",
+        "angular_acceleration",
+        "specific_force",
+        # A simulated vehicle carries sensors that read the truth.
+        "accelerometer",
+        "gyroscope",
+    }
+)
+
+
+def check_effects(effects: Sequence[tuple[Form, Sequence[float]]], known: set[str]) -> None:
+    """InputError where a form needs a field of `Motion` that is neither in `known` nor always known."""
+    for form, _ in effects:
+        for name in form.requires:
+            if name not in known and name not in _ALWAYS_KNOWN:
+                reason = LACK.get(name, f"no {name}")
+                raise InputError(f"effect form {form.name!r} cannot be simulated: {reason}")
+
+
+_ACCELERATIONS = frozenset({"specific_force", "angular_acceleration", "accelerometer"})
+
+
+@cache
+def _machine_code(kernel: Kernel, room: int):
+    """A kernel as a C function of records with room for so many rotors.
+
+    It is compiled by itself (0.1 s, then kept on disk next to its file) and called through its `address`, so that a new
+    effect needs no other code to be compiled again; keep it alive as long as that is in use.
+    """
+    m, v, w = (from_dtype(record) for record in records(room))
+    signature = types.void(m, v, types.CPointer(types.float64), w)
+    try:
+        return cfunc(signature, cache=True)(kernel)
+    except RuntimeError:  # no folder for its cache that may be written
+        return cfunc(signature)(kernel)
+
+
+@dataclass(frozen=True)
+class Kernels:
+    """Effects ready to be called: first those that do not read the accelerations that they change."""
+
+    addresses: np.ndarray
+    """(e,) of the compiled kernels."""
+    explicit: int
+    """How many of them read no acceleration."""
+    offsets: np.ndarray
+    """(e,) place of each one's first value."""
+    values: np.ndarray
+    """(p,) values of all kernels in a row."""
+    forms: tuple[Form, ...]
+    kept: tuple = ()
+    """The compiled functions, so that they live as long as their addresses."""
+
+
+def kernels_of(effects: Sequence[tuple[Form, Sequence[float]]], vehicle: Vehicle) -> Kernels:
+    """The effects' kernels; forms that act on sensors alone are passed over: they do not move the vehicle.
+
+    InputError where a form adds a wrench and has no kernel.
+    """
+    used = []
+    for form, values in effects:
+        if isinstance(form.contribution, Wrench):
+            used.append((form, values))
+        elif form.memory:
+            raise InputError(
+                f"vehicle {vehicle.name}: effect form {form.name!r} has a memory of its own; "
+                "simulate it one by one (rotorid.vehicle.improved.simulate_as_stated)"
+            )
+        elif _adds_wrench(form, vehicle, np.asarray(values, float)):
+            raise InputError(f"effect form {form.name!r} does not fly: it states no kernel (rotorid.effects.instant)")
+    used.sort(key=lambda pair: _reads_accelerations(pair[0]))
+    functions = [_machine_code(form.contribution.kernel, room_for(vehicle.rotor_count)) for form, _ in used]
+    stated = [form.contribution.values_of(values) for form, values in used]
+    sizes = np.array([len(v) for v in stated], dtype=np.int64)
+    return Kernels(
+        addresses=np.array([f.address for f in functions], dtype=np.int64),
+        explicit=sum(not _reads_accelerations(form) for form, _ in used),
+        offsets=np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64) if used else np.zeros(0, np.int64),
+        values=np.concatenate([*stated, [0.0]]),
+        forms=tuple(form for form, _ in used),
+        kept=tuple(functions),
+    )
+
+
+def _reads_accelerations(form: Form) -> bool:
+    """Whether a form depends on the accelerations that it changes."""
+    return bool(_ACCELERATIONS & set(form.requires))
+
+
+def _adds_wrench(form: Form, vehicle: Vehicle, values: np.ndarray) -> bool:
+    """Whether a form adds a force or a moment anywhere."""
+    n, k = 2, vehicle.rotor_count
+    vectors = np.ones((n, 3))
+    motion = Motion(
+        time_s=np.array([0.0, 0.01]),
+        rotor_speed=np.full((n, k), 100.0),
+        rotor_acceleration=np.zeros((n, k)),
+        angular_velocity=vectors,
+        angular_acceleration=vectors,
+        specific_force=vectors,
+        accelerometer=vectors,
+        gyroscope=vectors,
+        rotation=np.broadcast_to(np.eye(3), (n, 3, 3)),
+        velocity=vectors,
+        position=vectors,
+        height=np.ones(n),
+        voltage=np.ones(n),
+    )
+    added = form.contribution(motion, vehicle, values)
+    return added.force is not None or added.moment is not None
+
+
+@cache
+def _loop_record(room: int) -> np.dtype:
+    """The attitude controller's constants, SI; `allocation` gives squared rotor speeds of thrust and moments."""
+    fields = [(name, "f8", 3) for name in ("proportional", "integral", "derivative", "limit")]
+    fields += [(name, "f8") for name in ("derivative_time", "lowest", "highest")]
+    return np.dtype([*fields, ("allocation", "f8", (room, 4))], align=True)
 
 
 @dataclass(frozen=True)
@@ -52,16 +166,37 @@ class AttitudeLoop:
     """(steps + 1, k), added to the squared speeds, rad²/s²."""
     limits_rad_s: tuple[float, float] = (0.0, np.inf)
 
-    def constants(self) -> np.ndarray:
-        """As records (1 or n,) of LOOP."""
+    def laid_out(self) -> dict[str, np.ndarray]:
+        """As records `loops` (1 or n,), `references` (1 or n, steps + 1, 4) and `more` (steps + 1 or 0, k)."""
         gains = [np.atleast_2d(np.asarray(g, float)) for g in (self.proportional, self.integral, self.derivative)]
-        loops = np.zeros(max(len(g) for g in gains), _LOOP)
+        loops = np.zeros(max(len(g) for g in gains), _loop_record(room_for(len(self.allocation))))
         loops["proportional"], loops["integral"], loops["derivative"] = gains
         loops["limit"] = np.inf if self.limit_n_m is None else self.limit_n_m
         loops["derivative_time"] = self.derivative_time_s
         loops["lowest"], loops["highest"] = self.limits_rad_s
         loops["allocation"][:, : len(self.allocation)] = self.allocation
-        return loops
+        references = np.ascontiguousarray(self.reference, float)
+        return dict(
+            loops=loops,
+            references=references[None] if references.ndim == 2 else references,
+            more=np.zeros((0, len(self.allocation))) if self.more is None else np.ascontiguousarray(self.more, float),
+        )
+
+
+def commanding(loop: AttitudeLoop, size: int, step_s: float) -> Callable[[int, np.ndarray], np.ndarray]:
+    """What gives the commands (n, k), rad/s, of n vehicles with a controller, for flights that go a step at a time.
+
+    To be called with the number of each instant, in order, and the attitudes read, Euler angles (n, 3), rad.
+    """
+    k, given = len(loop.allocation), loop.laid_out()
+    scratch = np.zeros(size, compiled.scratch_record(room_for(k)))
+
+    def command(j: int, euler_rad: np.ndarray) -> np.ndarray:
+        scratch["angle"] = euler_rad
+        compiled.command(scratch, j, step_s, given["loops"], k, given["references"], given["more"])
+        return scratch["command"][:, :k].copy()
+
+    return command
 
 
 @dataclass(frozen=True)
@@ -111,13 +246,11 @@ def fly(
     lags = np.divide(1.0, lags, out=np.zeros((n, 2)), where=lags > 0)
     limits = np.broadcast_to(np.array([-np.inf, np.inf] if limits_rad_s is None else limits_rad_s), (n, 2))
     closed = isinstance(commands, AttitudeLoop)
-    loops, references, more = np.zeros(1, _LOOP), np.zeros((1, 1, 4)), np.zeros((0, k))
     series = np.zeros((1, 1, k))
     if closed:
-        loops, references = commands.constants(), np.ascontiguousarray(commands.reference)
-        references = references[None] if references.ndim == 2 else references
-        more = more if commands.more is None else np.ascontiguousarray(commands.more, float)
+        plan = commands.laid_out()
     else:
+        plan = dict(loops=np.zeros(1, _loop_record(room_for(k))), references=np.zeros((1, 1, 4)), more=np.zeros((0, k)))
         series = np.ascontiguousarray(commands, float)
         series = series[None] if series.ndim == 2 else series
     fixed_times = np.zeros((0, 1, k)) if following is None else np.ascontiguousarray(following, float)
@@ -128,7 +261,7 @@ def fly(
         step_s=step_s,
         every=every,
         closed=closed,
-        more=more,
+        more=plan["more"],
         addresses=kernels.addresses,
         explicit=kernels.explicit,
         offsets=kernels.offsets,
@@ -141,8 +274,8 @@ def fly(
         limits=np.ascontiguousarray(limits),
         commands=series,
         following=fixed_times[None] if fixed_times.ndim == 2 else fixed_times,
-        loops=loops,
-        references=references,
+        loops=plan["loops"],
+        references=plan["references"],
         reading_errors=np.zeros((1, 1, 3)) if reading_errors is None else np.ascontiguousarray(reading_errors),
         pushes=np.zeros((1, 1, 6)) if pushes is None else np.ascontiguousarray(pushes),
         winds=np.atleast_2d(np.ascontiguousarray(wind, float))[:, None],
@@ -156,7 +289,7 @@ def fly(
     def part(first: int, last: int) -> None:
         mine = {name: a[first:last] if len(a) == n else a for name, a in own.items()}
         stride = mine["values"].shape[1] if len(mine["values"]) > 1 else 0
-        given = fixed | mine | _room(last - first) | dict(values=mine["values"].ravel(), stride=stride)
+        given = fixed | mine | _block(last - first, k) | dict(values=mine["values"].ravel(), stride=stride)
         compiled.fly(*(given[name] for name in _ORDER))
 
     _spread(part, n, threads)
@@ -185,7 +318,7 @@ def fly_windows(
             kernels.explicit,
             kernels.offsets,
             kernels.values,
-            *_room(last - first).values(),
+            *_block(last - first, int(body["rotors"][0])).values(),
             out[first:last],
         )
 
@@ -193,10 +326,13 @@ def fly_windows(
     return out
 
 
-def _room(vehicles: int) -> dict[str, np.ndarray]:
+def _block(vehicles: int, rotors: int) -> dict[str, np.ndarray]:
     """Records of a block."""
-    count = min(_BLOCK, vehicles)
-    return dict(instant=np.zeros(count, INSTANT), added=np.zeros(count, ADDED), scratch=np.zeros(count, SCRATCH))
+    count, room = min(_BLOCK, vehicles), room_for(rotors)
+    m, _, w = records(room)
+    instant = np.zeros(count, m)
+    instant["on_board"] = 1.0
+    return dict(instant=instant, added=np.zeros(count, w), scratch=np.zeros(count, compiled.scratch_record(room)))
 
 
 def _spread(part, n: int, threads: int | None) -> None:

@@ -12,11 +12,12 @@ import numpy as np
 from scipy.optimize import brentq, least_squares
 
 from rotorid.effects.contract import Motion
+from rotorid.effects.instant import body_of
 from rotorid.recordings.vehicle import Vehicle
-from rotorid.vehicle.command_path import CommandPath
-from rotorid.vehicle.dynamics import Dynamics, has_memory
+from rotorid.vehicle import fast
 from rotorid.vehicle.improved import active_forms
 from rotorid.vehicle.mixer import allocation_matrix
+from rotorid.vehicle.simulator import CommandPath
 
 _LARGEST_SHARE = 10.0
 """Thrust, over the weight, up to which is asked where the file states no limits of the rotor speed."""
@@ -24,8 +25,6 @@ _SLOPE_SHARE = 0.02
 """Change of the thrust asked for, as a share of it, over which the gain is measured."""
 _HUNG_S, _HUNG_SAMPLES = 2.0, 100
 """Time at rest over which the force of what has a memory (a slung payload) is averaged, and its instants."""
-_ROUNDS = 5
-"""Evaluations until an added mass has settled in the accelerations that it depends on."""
 _CLOSE = 1e-9
 """Share of the weight (and of the weight on a rotor's arm) within which a force or moment counts as none."""
 
@@ -93,34 +92,26 @@ def wrench_of_command(vehicle: Vehicle, path: CommandPath | None, command: np.nd
     command, limits = command[None], vehicle.rotor_speed_limits_rad_s or (0.0, np.inf)
     speed = command if path is None else np.clip(path.steady(command), *limits)
     every = active_forms(vehicle)
-    instant = Dynamics(vehicle, [pair for pair in every if not has_memory(pair[0])], 1)
-    at_rest = _at_rest(vehicle, np.zeros(1), height_m)
-    for _ in range(_ROUNDS if instant.rounds > 1 else 1):
-        turning, specific_force = instant.accelerations(np.zeros((1, 3)), speed, at_rest)
-    up = -vehicle.mass_kg * specific_force[0, 2]
-    moments = turning[0] @ vehicle.inertia_kg_m2.matrix().T
+    instant = fast.kernels_of([pair for pair in every if not pair[0].memory], vehicle)
+    level = np.concatenate([np.zeros(3), [1.0], np.zeros(9), speed[0]])[None]
+    flown = fast.fly(body_of(vehicle), instant, level, 0, 1.0, speed, ground_z_m=height_m)
+    turning, specific_force = np.split(flown.accelerations[0, 0], 2)
+    up = -vehicle.mass_kg * specific_force[2]
+    moments = turning @ vehicle.inertia_kg_m2.matrix().T
     time_s = np.linspace(0.0, _HUNG_S, _HUNG_SAMPLES)
     hanging = Motion(
         rotor_speed=np.repeat(speed, len(time_s), axis=0),
         angular_velocity=np.zeros((len(time_s), 3)),
         angular_acceleration=np.zeros((len(time_s), 3)),
         specific_force=np.repeat([[0.0, 0.0, -vehicle.gravity_m_s2]], len(time_s), axis=0),
-        **_at_rest(vehicle, time_s, height_m),
+        time_s=time_s,
+        rotation=np.repeat(np.eye(3)[None], len(time_s), axis=0),
+        velocity=np.zeros((len(time_s), 3)),
+        position=np.zeros((len(time_s), 3)),
+        rotor_acceleration=np.zeros((len(time_s), vehicle.rotor_count)),
+        height=np.full(len(time_s), height_m),
     )
     for form, values in every:
-        if has_memory(form) and (added := form.contribution(hanging, vehicle, values)).force is not None:
+        if form.memory and (added := form.contribution(hanging, vehicle, values)).force is not None:
             up -= added.force[:, 2].mean()
     return np.array([up, *moments])
-
-
-def _at_rest(vehicle: Vehicle, time_s: np.ndarray, height_m: float) -> dict[str, np.ndarray]:
-    """Fields of `Motion` of a level vehicle that does not move, at instants (n,), s."""
-    count = len(time_s)
-    return dict(
-        time_s=time_s,
-        rotation=np.repeat(np.eye(3)[None], count, axis=0),
-        velocity=np.zeros((count, 3)),
-        position=np.zeros((count, 3)),
-        rotor_acceleration=np.zeros((count, vehicle.rotor_count)),
-        height=np.full(count, height_m),
-    )

@@ -20,10 +20,9 @@ from rotorid.effects.contract import CURVE, DELAY, LIMIT, Effect, Form, SetForm,
 from rotorid.errors import InputError
 from rotorid.recordings.run import RecordingSet
 from rotorid.recordings.vehicle import Vehicle
-from rotorid.vehicle.command_path import CommandPath
 from rotorid.vehicle.derivatives import derivative_form
 from rotorid.vehicle.mixer import hover_speed_rad_s
-from rotorid.vehicle.simulator import Commands, Controller, Motors, Trace, WhiteNoise, recording, simulate
+from rotorid.vehicle.simulator import CommandPath, Commands, Controller, Motors, Trace, WhiteNoise, recording, simulate
 
 _FULL_OVER_HOVER = 2.0
 """Rotor speed of the full command over that of hover where no limits are stated: a thrust of four times the weight."""

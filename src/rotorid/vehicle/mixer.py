@@ -4,20 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from rotorid.effects.instant import Constants
 from rotorid.errors import InputError
 from rotorid.recordings.vehicle import Vehicle
 
 
 def wrench_matrix(vehicle: Vehicle) -> np.ndarray:
-    """Matrix (4, k): total thrust (N, up) and moments about x, y, z (N m) = matrix @ ω².
-
-    For the thesis's geometry this is C_A of eq. 4.31; any number of rotors works.
-    """
-    positions = vehicle.rotor_positions_m()
-    thrust = vehicle.thrust_coefficients_n_s2()
-    torque = vehicle.torque_coefficients_n_m_s2()
-    # F_i acts along -z at r_i: r × (0, 0, -F) = (-y F, x F, 0).
-    return np.stack([thrust, -positions[:, 1] * thrust, positions[:, 0] * thrust, vehicle.yaw_signs() * torque])
+    """Matrix (4, k): total thrust (N, up) and moments about x, y, z (N m) = matrix @ ω² (eq. 4.31)."""
+    return Constants(vehicle).mixer
 
 
 def allocation_matrix(vehicle: Vehicle) -> np.ndarray:

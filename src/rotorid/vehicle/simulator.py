@@ -1,15 +1,15 @@
 """The general simulator: vehicles with motors, effects, disturbances, sensors and a controller, n at a time.
 
 Rigid body by quaternion inside, Euler angles outside. The controller and the disturbance are held over each
-step; the motion between is integrated by the classical Runge-Kutta method. It flies compiled where every effect has a
-kernel (`rotorid.vehicle.fast`), as a whole where commands or the controller's plan are known beforehand, else by array
-code that calls the effects' own functions. Commands that only a call can give, and what lies between command and rotor
-speed (`rotorid.vehicle.command_path`), are flown a step at a time by either. Tests hold that all fly the same.
+step; the motion between is integrated by the classical Runge-Kutta method (`rotorid.vehicle.fast`), as a whole where
+commands or the controller's plan are known beforehand. Commands that only a call can give, and what lies between
+command and rotor speed (`CommandPath`), are flown a step at a time. Tests hold that both fly alike.
 """
 
 from __future__ import annotations
 
 import copy
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -17,7 +17,8 @@ from typing import Protocol
 import numpy as np
 import pandas as pd
 
-from rotorid.effects.contract import Form, Motion
+from rotorid.effects.contract import DELAY, LAG, Form, Motion, SpeedForm, SpeedPath
+from rotorid.effects.instant import body_of
 from rotorid.errors import InputError
 from rotorid.recordings import Run
 from rotorid.recordings import columns as c
@@ -30,10 +31,6 @@ from rotorid.vehicle.attitude import (
     quaternion_rate,
     rotation_from_quaternion,
 )
-from rotorid.vehicle.command_path import CommandPath
-from rotorid.vehicle.dynamics import Dynamics, check_effects, has_memory
-from rotorid.vehicle.kernels import body_of, kernels_of
-from rotorid.vehicle.windows import rk4_step
 
 _MEMORY_ROUNDS = 12
 """Flights simulated in a row, at most, where an effect has a memory of its own; each takes its wrench from the last."""
@@ -44,8 +41,8 @@ _MEMORY_SETTLED = 1e-7
 class Controller(Protocol):
     """Anything that turns time and measured attitude into rotor commands.
 
-    One that is an attitude loop may lay itself out for a whole flight, `attitude_loop(time_s)` (m,), s, giving a
-    `rotorid.vehicle.fast.AttitudeLoop` or None; it then flies compiled.
+    One that is an attitude loop has `attitude_loop(time_s)` in place of `rotor_command`: it lays itself out for the
+    instants (m,), s, of a whole flight as a `rotorid.vehicle.fast.AttitudeLoop`.
     """
 
     def rotor_command(self, time_s: float, euler_rad: np.ndarray) -> np.ndarray:
@@ -146,6 +143,99 @@ class Trace:
         return euler
 
 
+@dataclass(frozen=True)
+class CommandPath:
+    """From command to rotor speed one step at a time, for flights whose commands nobody knows beforehand.
+
+    Under a controller the next command hangs on the flight so far, so that speed forms cannot be given the whole
+    series. Each is applied to the shortest series that has its law in it: a static one to the command of the instant, a
+    lag to a held command over one step; a delay keeps what was asked before. The speeds are those that
+    `rotorid.vehicle.improved.speeds_of_commands` makes of the same commands once they are known.
+    """
+
+    forms: tuple[tuple[SpeedForm, np.ndarray], ...]
+    """In the order in which they act, with their values."""
+    full_speed: float
+    """Rotor speed of the full command, rad/s."""
+    voltage: np.ndarray | None = None
+    """Battery voltage at each step, (m,), V; None for the full one throughout."""
+    full_voltage: float = 1.0
+    """Voltage at which commands are right, V."""
+
+    def start(self, step_s: float, rotor_speed: np.ndarray | None = None) -> _Stepper:
+        """A flight's own path from its first instant; a lag starts at `rotor_speed` (n, k), rad/s, if that is given."""
+        return _Stepper(self, step_s, rotor_speed)
+
+    def steady(self, command: np.ndarray) -> np.ndarray:
+        """Rotor speeds (..., k), rad/s, that commands (..., k) lead to when they are held, at the first voltage."""
+        speed = np.asarray(command, float)
+        for form, values in self.forms:
+            if form.stage < DELAY:
+                speed = self._static(form, values, speed, 0, 0.0)
+        return speed
+
+    def _static(self, form: SpeedForm, values: np.ndarray, speed: np.ndarray, step: int, time_s: float) -> np.ndarray:
+        """What a form without memory makes of speeds (..., k) that hold from the start of the run until a time."""
+        voltage = np.full(2, self.full_voltage if self.voltage is None else self.voltage[step])
+        held = np.stack([speed.ravel(), speed.ravel()])
+        path = SpeedPath(held, np.array([0.0, time_s]), self.full_speed, voltage, self.full_voltage)
+        return form.apply(path, values)[-1].reshape(speed.shape)
+
+
+@dataclass
+class _Stepper:
+    """Where a flight is on its path: call `speed` once for every step, in order."""
+
+    path: CommandPath
+    step_s: float
+    rotor_speed: np.ndarray | None = None
+    """Speed at which a lag starts, (n, k), rad/s."""
+    step: int = 0
+    _past: dict[int, deque] = field(default_factory=dict)
+    """By place in the path, what a delay was asked before, the latest first."""
+    _lagging: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
+    """By place in the path, speed of a lag and what it was asked, at the step before."""
+
+    def speed(self, command: np.ndarray) -> np.ndarray:
+        """Rotor speeds (n, k), rad/s, at this step under commands (n, k) that hold until the next."""
+        speed = np.asarray(command, float)
+        for place, (form, values) in enumerate(self.path.forms):
+            if form.stage == DELAY:
+                speed = self._delayed(place, float(values[0]) / self.step_s, speed)
+            elif form.stage == LAG:
+                speed = self._lagged(place, form, values, speed)
+            else:
+                speed = self.path._static(form, values, speed, self.step, self.step * self.step_s)
+        self.step += 1
+        return speed
+
+    def _delayed(self, place: int, steps: float, asked: np.ndarray) -> np.ndarray:
+        """What was asked `steps` before, between two steps the mean over a step; the first holds for all time before.
+
+        A negative delay would need what is asked later: it is taken as none.
+        """
+        steps = max(steps, 0.0)
+        whole = int(np.floor(steps))
+        part = steps - whole
+        past = self._past.setdefault(place, deque(maxlen=whole + 2))
+        past.appendleft(asked)
+        later, earlier = (past[min(back, len(past) - 1)] for back in (whole, whole + 1))
+        return (1.0 - part) * later + part * earlier
+
+    def _lagged(self, place: int, form: SpeedForm, values: np.ndarray, asked: np.ndarray) -> np.ndarray:
+        """The lag's exact step under what was asked at the step before."""
+        if place in self._lagging:
+            before, held = self._lagging[place]
+            # The last sample shows only where the lag is none.
+            series = np.stack([before.ravel(), held.ravel(), asked.ravel()])
+            path = SpeedPath(series, self.step_s * np.arange(3), self.path.full_speed)
+            speed = form.apply(path, values)[-1].reshape(asked.shape)
+        else:
+            speed = asked if self.rotor_speed is None else np.broadcast_to(self.rotor_speed, asked.shape)
+        self._lagging[place] = speed, asked
+        return speed
+
+
 def simulate(
     vehicle: Vehicle,
     controller: Controller,
@@ -160,7 +250,6 @@ def simulate(
     wind_m_s: np.ndarray | None = None,
     voltage_v: float | None = None,
     path: CommandPath | None = None,
-    compiled: bool = True,
 ) -> Trace:
     """Fly n vehicles (as many as `start` has) for `duration_s` in steps of `step_s`.
 
@@ -168,8 +257,7 @@ def simulate(
     measured attitude; readings with noise are made of the trace by `recording`. `rng` is needed with noise or
     disturbance. `wind_m_s` (3,) is the velocity of the air, world axes. Heights come from the vehicle's
     `ground_z_m`. `path` makes rotor speeds of the commands, which then hold over each step, in place of the motors'
-    lag; the limits of `motors` hold for commands and for speeds. `compiled` False flies by array code whatever could be
-    flown compiled.
+    lag; the limits of `motors` hold for commands and for speeds.
     """
     start, motors = start or Start(), motors or Motors()
     noise, disturbance = noise or WhiteNoise(), disturbance or Disturbance()
@@ -179,23 +267,23 @@ def simulate(
     steps = int(round(duration_s / step_s))
     if steps < 1:
         raise InputError(f"duration_s {duration_s} is shorter than one step of {step_s} s")
-    instant = [(form, values) for form, values in effects if not has_memory(form)]
-    slow = [(form, values) for form, values in effects if has_memory(form)]
+    instant = [(form, values) for form, values in effects if not form.memory]
+    slow = [(form, values) for form, values in effects if form.memory]
     known = {"rotation", "velocity", "position", "rotor_acceleration"}
     known |= {"height"} if vehicle.ground_z_m is not None else set()
     known |= {"voltage"} if voltage_v is not None else set()
-    check_effects(effects, known)
+    fast.check_effects(effects, known)
     pushes = _pushes(disturbance, start.size, steps, step_s, rng)
     readings = np.zeros((steps + 1, start.size, 3))
     if noise.attitude_rad > 0:
         readings = rng.normal(0.0, noise.attitude_rad, readings.shape)
-    flight = _Flight(vehicle, instant, motors, start, step_s, wind_m_s, voltage_v, path, compiled)
+    flight = _Flight(vehicle, instant, motors, start, step_s, wind_m_s, path)
     trace = flight.fly(_fresh(controller), pushes, readings)
     # A load as heavy as the vehicle would make plain repetition diverge: Aitken's relaxation (Küttler and Wall,
     # Computational Mechanics 43, 2008) takes the step from how the last one turned out.
     added, last, share = np.zeros_like(pushes), None, 1.0
     for _ in range(_MEMORY_ROUNDS if slow else 0):
-        wrench = _wrench_of_memory(trace, vehicle, slow, flight)
+        wrench = _wrench_of_memory(trace, vehicle, slow, wind_m_s, voltage_v)
         gap = wrench - added
         if np.abs(gap).max() <= _MEMORY_SETTLED * np.abs(wrench).max():
             break
@@ -203,7 +291,7 @@ def simulate(
             change = gap - last
             share *= -float((last * change).sum() / (change**2).sum())
         added, last = added + share * gap, gap
-        flight = _Flight(vehicle, instant, motors, start, step_s, wind_m_s, voltage_v, path, compiled)
+        flight = _Flight(vehicle, instant, motors, start, step_s, wind_m_s, path)
         trace = flight.fly(_fresh(controller), pushes + added, readings)
     return trace
 
@@ -217,11 +305,7 @@ def _known_commands(controller: Controller, time_s: np.ndarray) -> np.ndarray | 
     """Commands (m, k) of every instant, or the plan of an attitude loop; None where only a call gives them."""
     if isinstance(controller, Commands):
         return controller.rotor_speed[controller._index(time_s)]
-    # The plan is that of the class that commands; who puts another command in its place is called.
-    commanding = next((c for c in type(controller).__mro__ if "rotor_command" in vars(c)), None)
-    if "rotor_command" in vars(controller) or commanding is None or "attitude_loop" not in vars(commanding):
-        return None
-    return controller.attitude_loop(time_s)
+    return None if hasattr(controller, "rotor_command") else controller.attitude_loop(time_s)
 
 
 def _pushes(disturbance: Disturbance, n: int, steps: int, step_s: float, rng) -> np.ndarray:
@@ -241,24 +325,26 @@ def _pushes(disturbance: Disturbance, n: int, steps: int, step_s: float, rng) ->
 class _Flight:
     """One simulation: state columns rates 0:3, quaternion 3:7, velocity 7:10, position 10:13, rotors 13:."""
 
-    def __init__(self, vehicle, effects, motors: Motors, start: Start, step_s, wind_m_s, voltage_v, path, compiled):
+    def __init__(self, vehicle, effects, motors: Motors, start: Start, step_s, wind_m_s, path):
         self.vehicle, self.motors, self.step_s = vehicle, motors, step_s
         self.path = None if path is None else path.start(step_s, start.rotor_speed_rad_s)
         self.start, self.size = start, start.size
-        self.dynamics = Dynamics(vehicle, effects, start.size)
         self.wind = None if wind_m_s is None else np.asarray(wind_m_s, float)
-        self.voltage = None if voltage_v is None else np.full(start.size, float(voltage_v))
-        self.kernels = kernels_of(effects, vehicle) if compiled else None
-        self.body = None if self.kernels is None else body_of(vehicle)
+        self.kernels, self.body = fast.kernels_of(effects, vehicle), body_of(vehicle)
 
     def fly(self, controller: Controller, pushes: np.ndarray, attitude_errors: np.ndarray) -> Trace:
         """The flight under a controller, a disturbance (steps + 1, n, 6) and errors of attitude (steps + 1, n, 3)."""
-        if self.kernels is None:
-            return self._trace(*self._by_steps(self._step_by_arrays, controller, pushes, attitude_errors))
-        commands = _known_commands(controller, self.step_s * np.arange(len(pushes))) if self.path is None else None
-        if commands is None:
-            return self._trace(*self._by_steps(self._step_compiled, controller, pushes, attitude_errors))
-        return self._trace(*self._compiled(controller, commands, pushes, attitude_errors))
+        known = _known_commands(controller, self.step_s * np.arange(len(pushes)))
+        if isinstance(known, fast.AttitudeLoop):
+            command = fast.commanding(known, self.size, self.step_s)
+        else:
+
+            def command(j: int, euler_rad: np.ndarray) -> np.ndarray:
+                return controller.rotor_command(j * self.step_s, euler_rad)
+
+        if known is None or self.path is not None:
+            return self._trace(*self._by_steps(controller, command, pushes, attitude_errors))
+        return self._trace(*self._at_once(controller, known, command, pushes, attitude_errors))
 
     def _start(self) -> np.ndarray:
         """States at the beginning, (n, 13 + k), rotors at rest."""
@@ -269,7 +355,7 @@ class _Flight:
         state[:, 10:13] = self.start.position_m
         return state
 
-    def _compiled(self, controller, commands, pushes, attitude_errors) -> tuple[np.ndarray, ...]:
+    def _at_once(self, controller, commands, command, pushes, attitude_errors) -> tuple[np.ndarray, ...]:
         """States, accelerations and commands, each (n, steps + 1, ...)."""
         steps, limits = len(pushes) - 1, self.motors.limits_rad_s
         state = self._start()
@@ -277,7 +363,7 @@ class _Flight:
             state[:, 13:] = self.start.rotor_speed_rad_s
         else:
             euler = euler_from_quaternion(state[:, 3:7]) + attitude_errors[0]
-            first = np.asarray(_fresh(controller).rotor_command(0.0, euler), float)
+            first = np.asarray(command(0, euler), float)
             state[:, 13:] = first if limits is None else np.clip(first, *limits)
         following = None
         if isinstance(controller, Commands) and controller.rotor_acceleration is not None:
@@ -305,12 +391,8 @@ class _Flight:
         up, down = self.motors.time_up_s, self.motors.time_down_s
         return up, up if down is None else down
 
-    def _by_steps(self, move, controller, pushes, attitude_errors) -> tuple[np.ndarray, ...]:
-        """The same a step at a time, the controller called at each.
-
-        `move(i, state, command, following, push)` gives the accelerations (n, 6) at instant `i` and the state a step
-        later; `following` (n, k), rad/s², is what effects are given of rotors that follow at once.
-        """
+    def _by_steps(self, controller, command_at, pushes, attitude_errors) -> tuple[np.ndarray, ...]:
+        """The same a step at a time, the controller called at each."""
         steps, k = len(pushes) - 1, self.vehicle.rotor_count
         state = self._start()
         states = np.empty((steps + 1, self.size, 13 + k))
@@ -320,7 +402,7 @@ class _Flight:
         for i in range(steps + 1):
             time_s = i * self.step_s
             euler = euler_from_quaternion(state[:, 3:7]) + attitude_errors[i]
-            command = np.asarray(controller.rotor_command(time_s, euler), float)
+            command = np.asarray(command_at(i, euler), float)
             if command.shape != (self.size, k):
                 raise InputError(f"the controller gave commands {command.shape}, expected {(self.size, k)}")
             if limits is not None:
@@ -339,37 +421,22 @@ class _Flight:
             elif self.path is not None and i > 0:
                 following = (state[:, 13:] - states[i - 1][:, 13:]) / self.step_s
             states[i], commands[i] = state, command
-            accelerations[i], state = move(i, state, speed, following, pushes[i])
+            flown = fast.fly(
+                self.body,
+                self.kernels,
+                state,
+                1,
+                self.step_s,
+                np.repeat(speed[:, None], 2, axis=1),
+                lags_s=self._lags_s,
+                following=np.repeat(following[:, None], 2, axis=1),
+                pushes=np.repeat(pushes[i][:, None], 2, axis=1),
+                wind_m_s=self.wind,
+                ground_z_m=self.vehicle.ground_z_m,
+                first_s=time_s,
+            )
+            accelerations[i], state = flown.accelerations[:, 0], flown.states[:, 1]
         return np.moveaxis(states, 0, 1), np.moveaxis(accelerations, 0, 1), np.moveaxis(commands, 0, 1)
-
-    def _step_compiled(self, i: int, state, command, following, push) -> tuple[np.ndarray, np.ndarray]:
-        """One step by compiled code."""
-        flown = fast.fly(
-            self.body,
-            self.kernels,
-            state,
-            1,
-            self.step_s,
-            np.repeat(command[:, None], 2, axis=1),
-            lags_s=self._lags_s,
-            following=np.repeat(following[:, None], 2, axis=1),
-            pushes=np.repeat(push[:, None], 2, axis=1),
-            wind_m_s=self.wind,
-            ground_z_m=self.vehicle.ground_z_m,
-            first_s=i * self.step_s,
-        )
-        return flown.accelerations[:, 0], flown.states[:, 1]
-
-    def _step_by_arrays(self, i: int, state, command, following, push) -> tuple[np.ndarray, np.ndarray]:
-        """One step by array code."""
-        self.command, self.push, self.now_s, self.following = command, push, i * self.step_s, following
-        rounds = 3 if i == 0 and self.dynamics.effects else 1
-        for _ in range(rounds):
-            self.derivative(0.0, state)
-        accelerations = np.hstack([self.dynamics.last_acceleration, self.dynamics.last_specific_force])
-        state = rk4_step(self.derivative, 0.0, state, self.step_s)
-        state[:, 3:7] = normalised(state[:, 3:7])
-        return accelerations, state
 
     def _trace(self, states, accelerations, commands) -> Trace:
         """States (n, m, 13 + k), accelerations (n, m, 6) and commands (n, m, k) by name."""
@@ -388,41 +455,6 @@ class _Flight:
             rotor_speed=states[..., 13:],
             rotor_command=commands,
         )
-
-    def derivative(self, share: float, state: np.ndarray) -> np.ndarray:
-        rates, rotors = state[:, 0:3], state[:, 13:]
-        rotation = rotation_from_quaternion(state[:, 3:7])
-        out = np.empty_like(state)
-        acceleration = self._rotor_acceleration(rotors)
-        # Motors that follow at once hold their speed over a step, whatever the effects are given.
-        out[:, 13:] = acceleration if self.motors.time_up_s > 0.0 else 0.0
-        around = {}
-        if self.dynamics.effects:
-            ground = self.vehicle.ground_z_m
-            around = dict(
-                time_s=np.full(self.size, self.now_s + share * self.step_s),
-                rotor_acceleration=acceleration,
-                rotation=rotation,
-                velocity=np.einsum("nji,nj->ni", rotation, state[:, 7:10]),
-                position=state[:, 10:13],
-                wind=self.wind,
-                height=None if ground is None else ground - state[:, 12],
-                voltage=self.voltage,
-            )
-        out[:, 0:3], specific_force = self.dynamics.accelerations(
-            rates, rotors, around, self.push[:, :3], self.push[:, 3:]
-        )
-        out[:, 3:7] = quaternion_rate(state[:, 3:7], rates)
-        out[:, 7:10] = np.einsum("nij,nj->ni", rotation, specific_force)
-        out[:, 9] += self.dynamics.body.gravity_m_s2
-        out[:, 10:13] = state[:, 7:10]
-        return out
-
-    def _rotor_acceleration(self, rotors: np.ndarray) -> np.ndarray:
-        if self.motors.time_up_s == 0.0:
-            return self.following
-        gap = self.command - rotors
-        return gap / np.where(gap > 0, *self._lags_s)
 
 
 def motion_of(trace: Trace, index: int, vehicle: Vehicle, wind_m_s=None, voltage_v=None) -> Motion:
@@ -447,12 +479,12 @@ def motion_of(trace: Trace, index: int, vehicle: Vehicle, wind_m_s=None, voltage
     )
 
 
-def _wrench_of_memory(trace: Trace, vehicle: Vehicle, slow, flight: _Flight) -> np.ndarray:
+def _wrench_of_memory(trace: Trace, vehicle: Vehicle, slow, wind_m_s, voltage_v) -> np.ndarray:
     """Wrench of the forms with memory along a trace, (m + 1, n, 6)."""
-    out = np.zeros((len(trace.time_s), flight.size, 6))
-    voltage = None if flight.voltage is None else flight.voltage[0]
-    for index in range(flight.size):
-        motion = motion_of(trace, index, vehicle, flight.wind, voltage)
+    size = len(trace.position)
+    out = np.zeros((len(trace.time_s), size, 6))
+    for index in range(size):
+        motion = motion_of(trace, index, vehicle, wind_m_s, voltage_v)
         for form, values in slow:
             added = form.contribution(motion, vehicle, np.asarray(values, float))
             if added.force is not None:

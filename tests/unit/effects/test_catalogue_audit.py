@@ -18,9 +18,10 @@ from scipy.optimize import least_squares
 
 import rotorid.effects
 from rotorid.effects.catalogue import catalogue
-from rotorid.effects.contract import COLUMNS_OF, LACK, Motion, SpeedPath, not_testable_reason
+from rotorid.effects.contract import COLUMNS_OF, LACK, Contribution, Motion, SpeedPath, not_testable_reason
 from rotorid.effects.describe import EXCITATION, instrument_forms
 from rotorid.effects.gust import window_form
+from rotorid.errors import InputError
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.mismatch.model.prepare import make_terms
 from rotorid.mismatch.plant.rows import form_columns, project, residual
@@ -34,7 +35,7 @@ from rotorid.vehicle.improved import (
     simulate_as_stated,
     speeds_of_commands,
 )
-from rotorid.vehicle.simulator import recording
+from rotorid.vehicle.simulator import recording, simulate
 from tests.unit.mismatch.flights import recorded
 
 from .flown import (
@@ -176,17 +177,24 @@ def test_the_columns_named_are_enough_and_needed(effect, form):
 
 
 NEW_EFFECT = """
-from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.contract import Effect, Form, Parameter
+from rotorid.effects.instant import Wrench
 
-def buoyancy(motion, vehicle, values):
-    lift = motion.rotation[:, 2, :] * -values[0]
-    return Contribution(force=lift)
+def buoyancy(m, v, p, w):
+    for j in range(3):
+        w.force[j] -= p[0] * m.rotation[2, j]
 
 def forms(vehicle):
-    return (Form("balloon", "F = -b e_down", (Parameter("b", "N", 0.0, 10.0),), buoyancy, ("rotation",)),)
+    return (Form("balloon", "F = -b e_down", (Parameter("b", "N", 0.0, 10.0),), Wrench(buoyancy), ("rotation",)),)
 
 EFFECT = Effect(id="buoyancy", name="a balloon", sentence="it is lifted", forms=forms, source="Archimedes")
 """
+
+
+def test_an_effect_that_states_no_kernel_does_not_fly():
+    form = replace(window_form(0.0, 1.0, 1), contribution=lambda m, v, values: Contribution(force=m.velocity))
+    with pytest.raises(InputError, match="does not fly: it states no kernel"):
+        simulate(audit_vehicle(), commands(), 0.1, STEP_S, start(), effects=[(form, [1.0, 1.0])])
 
 
 def test_adding_an_effect_is_adding_one_file(tmp_path, monkeypatch):

@@ -12,6 +12,7 @@ from rotorid.vehicle.improved import command_path, flyable, simulate_as_stated, 
 from rotorid.vehicle.simulator import Commands, Start, Trace
 from tests.unit.effects.flown import audit_vehicle, entry
 from tests.unit.effects.test_catalogue_audit import speed_forms, speed_values
+from tests.unit.vehicle.by_numpy import by_numpy
 
 STEP_S, SECONDS = 0.004, 0.6
 VOLTAGE = np.linspace(12.0, 10.5, round(SECONDS / STEP_S) + 1)
@@ -139,7 +140,7 @@ def replace_ground(vehicle: Vehicle) -> Vehicle:
     return vehicle.model_copy(update={"ground_z_m": None, "rotor_speed_limits_rad_s": None})
 
 
-def test_a_path_flies_the_same_compiled_and_by_array_code():
+def test_a_path_flies_the_same_compiled_and_by_numpy():
     """With effects of the rotors' acceleration, of the time (a gust) and of the accelerations themselves."""
     gust = {"f_north_1": 1.0, "f_north_2": -0.6, "f_east_1": 0.4, "f_east_2": 0.8}
     effects = (
@@ -148,7 +149,9 @@ def test_a_path_flies_the_same_compiled_and_by_array_code():
         {"id": "payload", "form": "rigid", "parameters": {"m_p": 0.05, "m_p x": 1e-4, "m_p y": 2e-4, "m_p z": 0.0}},
     )
     vehicle = stated(*CHAIN, *effects)
-    fast, slow = flown(vehicle), flown(vehicle, compiled=False)
+    fast = flown(vehicle)
+    with by_numpy(vehicle):
+        slow = flown(vehicle)
     for name in ("position", "angular_velocity", "specific_force", "rotor_speed", "rotor_command"):
         np.testing.assert_allclose(getattr(fast, name), getattr(slow, name), rtol=1e-6, atol=1e-7, err_msg=name)
     assert np.abs(fast.velocity - flown(stated(*CHAIN)).velocity).max() > 0.1

@@ -1,4 +1,4 @@
-"""Compiled flights and windows against the array code: the same numbers for every effect of the catalogue."""
+"""Compiled flights and windows against numpy: the same numbers for every effect of the catalogue."""
 
 from __future__ import annotations
 
@@ -10,25 +10,27 @@ import pytest
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Motion
 from rotorid.effects.gust import window_form
+from rotorid.effects.instant import Wrench, body_of, records
 from rotorid.errors import InputError
 from rotorid.identify.estimate.excitation import ExcitedHold, Multisine
-from rotorid.vehicle import kernels
 from rotorid.vehicle.attitude import quaternion_from_euler, rotation_from_quaternion
 from rotorid.vehicle.batch import Batch
 from rotorid.vehicle.compiled import _invert
 from rotorid.vehicle.control.pid import AttitudePid, Gains, training_reference
+from rotorid.vehicle.fast import _adds_wrench
 from rotorid.vehicle.improved import simulate_as_stated
-from rotorid.vehicle.kernels import ADDED, INSTANT, body_of, kernel_values, kernels_of
 from rotorid.vehicle.simulator import Commands, Disturbance, Motors, Start, WhiteNoise, simulate
 from rotorid.vehicle.windows import Inputs, States, simulate_windows
 from tests.unit.effects.flown import audit_vehicle, commands, start, typical_values
+from tests.unit.vehicle.by_numpy import by_numpy
 
 VEHICLE = audit_vehicle()
+INSTANT, _, ADDED = records(8)
 WRENCHES = [
     (effect.id, form)
     for effect in catalogue().values()
     for form in effect.forms(VEHICLE)
-    if kernels._adds_wrench(form, VEHICLE, typical_values(effect.id, form)) and not form.memory
+    if _adds_wrench(form, VEHICLE, typical_values(effect.id, form)) and not form.memory
 ]
 WRENCHES.append(("gust", window_form(0.1, 0.5, 3)))
 NAMES = [f"{name}: {form.name}" for name, form in WRENCHES]
@@ -60,30 +62,32 @@ def instants_of(motion: Motion, vehicle) -> np.ndarray:
     k, m = vehicle.rotor_count, np.zeros(motion.size, INSTANT)
     for name in ("time_s", "height", "angular_velocity", "angular_acceleration", "specific_force", "rotation"):
         m[name] = getattr(motion, name)
-    m["air_velocity"] = motion.air_velocity
+    m["air_velocity"], m["on_board"] = motion.air_velocity, 1.0
     m["rotor_speed"][:, :k], m["rotor_acceleration"][:, :k] = motion.rotor_speed, motion.rotor_acceleration
     m["rotor_speed_sum"] = motion.rotor_speed.sum(axis=1)
     m["thrust"][:, :k] = vehicle.thrust_coefficients_n_s2() * motion.rotor_speed**2
-    m["hub_velocity"][:, :k] = motion.hub_velocity(vehicle.rotor_positions_m())
+    turning = np.cross(motion.angular_velocity[:, None], vehicle.rotor_positions_m())
+    m["hub_velocity"][:, :k] = motion.air_velocity[:, None] + turning
     return m
 
 
 def test_every_form_that_moves_the_vehicle_has_a_kernel():
-    assert [name for name, (_, form) in zip(NAMES, WRENCHES, strict=True) if form.kernel is None] == []
+    assert [
+        name for name, (_, form) in zip(NAMES, WRENCHES, strict=True) if not isinstance(form.contribution, Wrench)
+    ] == []
     assert len(WRENCHES) > 45
 
 
 @pytest.mark.parametrize("case", WRENCHES, ids=NAMES)
-def test_a_kernel_adds_what_the_array_code_adds(case):
-    """The kernel as plain Python, so that it is the arithmetic that is compared."""
+def test_a_kernel_adds_at_each_instant_what_it_adds_to_all_at_once(case):
     name, form = case
     motion, values = motion_at_random(), typical_values(name, form)
-    expected = form.contribution(motion, VEHICLE, values)
+    expected, kernel = form.contribution(motion, VEHICLE, values), form.contribution.kernel
     hubs, body, instants = VEHICLE.rotor_positions_m(), body_of(VEHICLE)[0], instants_of(motion, VEHICLE)
     force, moment = np.zeros((motion.size, 3)), np.zeros((motion.size, 3))
     for n in range(motion.size):
         added = np.zeros(1, ADDED).view(np.recarray)
-        form.kernel(_record(instants[n]), _record(body), kernel_values(form, values), added[0])
+        kernel(_record(instants[n]), _record(body), form.contribution.values_of(values), added[0])
         pulls = added[0].hub_force[:4]
         force[n] = added[0].force + pulls.sum(axis=0)
         moment[n] = added[0].moment + np.cross(hubs, pulls).sum(axis=0)
@@ -98,10 +102,16 @@ def _record(row):
 
 
 def flights(effects, **how):
-    """The same flight by compiled and by array code."""
-    settings = dict(duration_s=0.6, step_s=0.004, start=start(), effects=effects) | how
-    controller = settings.pop("controller", commands())
-    return [simulate(VEHICLE, controller, **settings, compiled=c) for c in (True, False)]
+    """The same flight by compiled code and by numpy; a random generator in `how` begins anew for each."""
+    settings = dict(step_s=0.004, start=start(), effects=effects) | how
+    controller, seed = settings.pop("controller", commands()), settings.pop("seed", 0)
+
+    def flown():
+        return simulate(VEHICLE, controller, **settings, rng=np.random.default_rng(seed))
+
+    fast = flown()
+    with by_numpy(VEHICLE):
+        return fast, flown()
 
 
 def assert_same(fast, slow, tolerance=1e-9):
@@ -111,11 +121,10 @@ def assert_same(fast, slow, tolerance=1e-9):
 
 
 @pytest.mark.parametrize("case", WRENCHES, ids=NAMES)
-def test_a_compiled_flight_with_an_effect_is_the_flight_of_the_array_code(case):
+def test_a_compiled_flight_with_an_effect_is_that_of_numpy(case):
     name, form = case
     effects = [(form, typical_values(name, form))]
     fast, slow = flights(effects, duration_s=0.2, motors=Motors(0.03))
-    assert kernels_of(effects, VEHICLE) is not None
     assert_same(fast, slow)
     plain = simulate(VEHICLE, commands(), 0.2, 0.004, start=start(), motors=Motors(0.03))
     assert (
@@ -162,13 +171,7 @@ def several_stated(**changes):
 @pytest.mark.parametrize("motors", [Motors(), Motors(0.03, 0.05, (300.0, 1500.0))], ids=["at once", "lag and limits"])
 def test_all_together_with_wind_and_disturbance(motors):
     how = dict(motors=motors, wind_m_s=np.array([3.0, -1.0, 0.5]), disturbance=Disturbance(0.2, 1e-3, 0.05))
-    fast, slow = (
-        simulate(
-            VEHICLE, commands(), 0.2, 0.004, start(), effects=several(), rng=np.random.default_rng(2), **how, compiled=c
-        )
-        for c in (True, False)
-    )
-    assert_same(fast, slow)
+    assert_same(*flights(several(), duration_s=0.2, seed=2, **how))
 
 
 @pytest.mark.parametrize("kind", ["pid", "limited pid", "trimmed pid", "excited"])
@@ -189,36 +192,23 @@ def test_a_controller_flies_compiled_as_it_is_called(kind):
     )
     # Smaller effects than elsewhere: a vehicle that tumbles makes any two roundings apart.
     held = [(form, 0.2 * np.asarray(values)) for form, values in several()]
-    fast, slow = (
-        simulate(
-            VEHICLE,
-            pilot,
-            0.5,
-            0.004,
-            begin,
-            Motors(0.03),
-            held,
-            noise=WhiteNoise(attitude_rad=0.01),
-            rng=np.random.default_rng(1),
-            compiled=c,
-        )
-        for c in (True, False)
-    )
+    noise, motors = WhiteNoise(attitude_rad=0.01), Motors(0.03)
+    fast, slow = flights(held, controller=pilot, duration_s=0.5, start=begin, motors=motors, noise=noise, seed=1)
     assert np.abs(slow.angular_velocity).max() < 10.0
     assert_same(fast, slow)
 
 
-def test_a_controller_whose_command_was_replaced_is_called():
-    class Still(AttitudePid):
+def test_a_controller_that_gives_commands_alone_is_called():
+    class Still:
         def rotor_command(self, time_s, euler_rad):
             return np.full((len(euler_rad), 4), 900.0)
 
-    trace = simulate(VEHICLE, Still(VEHICLE, training_reference()), 0.02, 0.004)
+    trace = simulate(VEHICLE, Still(), 0.02, 0.004)
     np.testing.assert_array_equal(trace.rotor_command, 900.0)
 
 
 def recorded(n=151, dt=0.004):
-    """A flight of the array code as a recording."""
+    """A flight as a recording."""
     trace = simulate(VEHICLE, Commands(dt * np.arange(n), commands_of(n, dt)), (n - 1) * dt, dt, START_HIGH)
     given = Inputs(trace.rotor_speed[0], wind=np.array([1.0, 2.0, 0.0]))
     return (
@@ -238,7 +228,7 @@ START_HIGH = Start(position_m=np.array([[0.0, 0.0, -0.5]]), velocity_m_s=np.arra
 
 @pytest.mark.parametrize("known", ["all", "pushed", "no velocity", "rates alone"])
 @pytest.mark.parametrize("step_s", [None, 0.004, 0.012])
-def test_windows_are_those_of_the_array_code(known, step_s):
+def test_windows_are_those_of_numpy(known, step_s):
     time_s, inputs, states = recorded()
     effects = several()
     if known == "pushed":
@@ -250,15 +240,32 @@ def test_windows_are_those_of_the_array_code(known, step_s):
         states, effects = replace(states, velocity=None, position=None), several()[2:4]
     if known == "rates alone":
         states, effects = States(states.angular_velocity), several()[2:4]
+    assert_same_windows(VEHICLE, effects, time_s, inputs, states, step_s)
+
+
+def assert_same_windows(vehicle, effects, time_s, inputs, states, step_s=None):
     how = dict(window_s=0.3, step_s=step_s)
-    fast, slow = (
-        simulate_windows(VEHICLE, effects, time_s, inputs, states, **how, compiled=c).predicted for c in (True, False)
-    )
+    fast = simulate_windows(vehicle, effects, time_s, inputs, states, **how).predicted
+    with by_numpy(vehicle):
+        slow = simulate_windows(vehicle, effects, time_s, inputs, states, **how).predicted
     for name in ("angular_velocity", "quaternion", "velocity", "position"):
         a, b = getattr(fast, name), getattr(slow, name)
         assert (a is None) == (b is None)
         if a is not None:
             np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * max(1.0, np.abs(b).max()), err_msg=name)
+
+
+def test_a_vehicle_of_ten_rotors_flies_as_by_numpy():
+    """Ten rotors at two heights on five arms of the quadrotor's length; records have room for eight at first."""
+    places = [(0.2 * np.cos(a), 0.2 * np.sin(a), z) for z in (-0.02, 0.02) for a in 2 * np.pi * np.arange(5) / 5]
+    rotors = [dict(x_m=x, y_m=y, z_m=z, spin=("cw", "ccw")[n % 2]) for n, (x, y, z) in enumerate(places)]
+    vehicle = audit_vehicle(rotors=rotors, thrust_coefficient_n_s2=0.4 * 1.3877e-6)
+    drag = catalogue()["rotor_drag"].forms(vehicle)[0]
+    speed = 1073.0 * (1 + 0.02 * np.sin(np.arange(60)[:, None] + np.arange(10)))
+    how = dict(duration_s=0.2, step_s=0.004, start=START_HIGH, effects=[(drag, [3e-5])])
+    fast = simulate(vehicle, Commands(0.004 * np.arange(60), speed), **how)
+    with by_numpy(vehicle):
+        assert_same(fast, simulate(vehicle, Commands(0.004 * np.arange(60), speed), **how))
 
 
 def test_a_load_as_heavy_as_the_vehicle_is_solved_for_where_repetition_would_not_settle():

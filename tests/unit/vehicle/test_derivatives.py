@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 from rotorid.cli import app
 from rotorid.effects.contract import Motion
+from rotorid.effects.instant import body_of
 from rotorid.errors import InputError
 from rotorid.recordings import Vehicle, read_vehicle, templates, write_vehicle
 from rotorid.recordings.vehicle import Derivative, unit_of
@@ -34,14 +35,15 @@ from rotorid.vehicle.exports.derivatives import MUJOCO_FILE, ROTORPY_FILE
 from rotorid.vehicle.exports.flown import gazebo_damping_of, in_drake, in_mujoco, in_rotorpy
 from rotorid.vehicle.hover import hover, wrench_at_rest
 from rotorid.vehicle.improved import active_forms, flyable, record_as_stated, simulate_as_stated
-from rotorid.vehicle.kernels import ADDED, body_of
 from rotorid.vehicle.simulator import Commands, simulate
-from rotorid.vehicle.windows import simulate_windows
 from tests.unit.effects.flown import audit_vehicle, commands, start
+from tests.unit.vehicle.by_numpy import by_numpy
 from tests.unit.vehicle.test_compiled import (
+    ADDED,
     TRACE,
     _record,
     assert_same,
+    assert_same_windows,
     commands_of,
     instants_of,
     motion_at_random,
@@ -79,14 +81,14 @@ def stated(vehicle: Vehicle, derivatives=None) -> Vehicle:
     return vehicle.model_copy(update={"derivatives": at_random() if derivatives is None else derivatives})
 
 
-def test_the_kernel_adds_what_the_array_code_adds():
+def test_the_kernel_adds_at_each_instant_what_it_adds_to_all_at_once():
     vehicle = stated(audit_vehicle(), at_random(QUANTITIES))
     form, values = derivative_form(vehicle)
     motion, body = motion_at_random(), body_of(vehicle)[0]
     expected, instants = form.contribution(motion, vehicle, values), instants_of(motion, vehicle)
     for n in range(motion.size):
         added = np.zeros(1, ADDED).view(np.recarray)
-        form.kernel(_record(instants[n]), _record(body), values, added[0])
+        form.contribution.kernel(_record(instants[n]), _record(body), values, added[0])
         np.testing.assert_allclose(added[0].force, expected.force[n], rtol=1e-11, atol=1e-12)
         np.testing.assert_allclose(added[0].moment, expected.moment[n], rtol=1e-11, atol=1e-13)
 
@@ -99,26 +101,18 @@ def test_by_hand_a_drag_is_held_at_the_edge_of_its_range():
 
 
 @pytest.mark.parametrize("quantities", [STATE, QUANTITIES], ids=["state", "rotors too"])
-def test_a_compiled_flight_is_that_of_the_array_code(quantities):
+def test_a_compiled_flight_is_that_of_numpy(quantities):
     vehicle = stated(audit_vehicle(), at_random(quantities))
-    fast, slow = (
-        simulate(vehicle, commands(), 0.4, 0.004, start(), effects=active_forms(vehicle), compiled=c)
-        for c in (True, False)
-    )
-    assert_same(fast, slow)
+    how = dict(duration_s=0.4, step_s=0.004, start=start(), effects=active_forms(vehicle))
+    fast = simulate(vehicle, commands(), **how)
+    with by_numpy(vehicle):
+        assert_same(fast, simulate(vehicle, commands(), **how))
     assert np.abs(fast.velocity - simulate(audit_vehicle(), commands(), 0.4, 0.004, start()).velocity).max() > 0.01
 
 
-def test_windows_are_those_of_the_array_code():
-    time_s, inputs, states = recorded()
+def test_windows_are_those_of_numpy():
     vehicle = stated(audit_vehicle())
-    fast, slow = (
-        simulate_windows(vehicle, active_forms(vehicle), time_s, inputs, states, window_s=0.3, compiled=c).predicted
-        for c in (True, False)
-    )
-    for name in ("angular_velocity", "quaternion", "velocity", "position"):
-        a, b = getattr(fast, name), getattr(slow, name)
-        np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * max(1.0, np.abs(b).max()), err_msg=name)
+    assert_same_windows(vehicle, active_forms(vehicle), *recorded())
 
 
 def test_a_batch_flies_them_and_changes_of_an_effect_and_of_the_mass():

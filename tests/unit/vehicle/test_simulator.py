@@ -1,17 +1,21 @@
 """The simulator against closed forms, against itself compiled, and against RotorPy."""
 
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
 import numpy as np
 import pytest
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.effects.instant import body_of
 from rotorid.identify.estimate.excitation import ExcitedHold, Multisine
+from rotorid.vehicle import fast
 from rotorid.vehicle.attitude import (
     euler_from_quaternion,
     quaternion_from_euler,
     rotation_from_quaternion,
 )
-from rotorid.vehicle.control.pid import AttitudePid, Gains, Memory, pid_step, training_reference
-from rotorid.vehicle.dynamics import RigidBody, angular_acceleration
+from rotorid.vehicle.control.pid import AttitudePid, Gains, training_reference
 from rotorid.vehicle.mixer import allocation_matrix, wrench_matrix
 from rotorid.vehicle.simulator import (
     Commands,
@@ -129,14 +133,14 @@ def test_torque_free_tumbling_keeps_energy_and_momentum():
     vehicle = thesis_vehicle()
     start = Start(angular_velocity_rad_s=np.array([[0.01, 8.0, 0.02]]))
     trace = simulate(vehicle, still(), 10.0, 0.001, start)
-    body = RigidBody.of_vehicle(vehicle)
+    inertia = vehicle.inertia_kg_m2.matrix()
     rates = trace.angular_velocity[0]
-    energy = 0.5 * np.einsum("ni,ij,nj->n", rates, body.inertia_kg_m2, rates)
+    energy = 0.5 * np.einsum("ni,ij,nj->n", rates, inertia, rates)
     assert np.ptp(energy) / energy[0] < 1e-9
     momentum = np.einsum(
         "nij,nj->ni",
         rotation_from_quaternion(trace.quaternion[0]),
-        trace.angular_velocity[0] @ body.inertia_kg_m2,
+        trace.angular_velocity[0] @ inertia,
     )
     np.testing.assert_allclose(momentum, momentum[:1].repeat(len(momentum), 0), atol=1e-9 * 0.02)
     assert np.abs(trace.angular_velocity[0, :, 1] - 8.0).max() > 5  # it did tumble
@@ -301,14 +305,19 @@ def test_trajectory_of_rotorpy(aero):
 
 
 def test_pid_by_hand():
-    gains = Gains((2.0, 2, 2), (3.0, 3, 3), (0.5, 0.5, 0.5))
-    error = np.array([[0.1, 0.0, -0.2]])
-    moment, memory = pid_step(gains, error, Memory(np.zeros((1, 3)), np.zeros((1, 3))), 0.1)
-    # 2 e + 3 e 0.1 + 0.5 e / 0.1 = 7.3 e
-    np.testing.assert_allclose(moment, 7.3 * error)
-    held, kept = pid_step(gains, error, memory, 0.1, limit_n_m=np.array([0.05, 1, 1]))
-    assert held[0, 0] == 0.05 and kept.integral[0, 0] == memory.integral[0, 0]
-    assert kept.integral[0, 2] == pytest.approx(-0.04)
+    """Rotors whose squares are a thrust of 100 N and a moment each, 0.1 s apart, at angles of 0, then −error."""
+    gains, error = ((2.0, 2, 2), (3.0, 3, 3), (0.0, 0.5, 0.5)), np.array([0.1, 0.0, -0.2])
+    allocation, reference = np.column_stack([np.ones(3), np.eye(3)]), np.array([[0.0, 0.0, 0.0, 100.0]])
+    loop = fast.AttitudeLoop(*gains, allocation, reference)
+    for limit, moments in (
+        # 2 e + 3 e 0.1 + 0.5 e / 0.1 = 7.3 e; then 2 e + 3 e 0.2; at no error the integral alone, and the slope back.
+        (None, ([0, 0, 0], 2.3 * error * [1, 0, 0] + 7.3 * error * [0, 0, 1], 2.6 * error, [0.06, 0, 0.88])),
+        # At the limit the integral about x stands still.
+        (np.array([0.05, 1, 9]), ([0, 0, 0], [0.05, 0, -1.46], [0.05, 0, -0.52], [0.0, 0, 0.88])),
+    ):
+        command = fast.commanding(replace(loop, limit_n_m=limit), 1, 0.1)
+        for j, (angles, moment) in enumerate(zip((0.0 * error, -error, -error, 0.0 * error), moments, strict=True)):
+            np.testing.assert_allclose(command(j, angles[None])[0] ** 2 - 100.0, moment, atol=1e-9)
 
 
 def test_anti_windup_shortens_the_overshoot():
@@ -316,20 +325,24 @@ def test_anti_windup_shortens_the_overshoot():
     from rotorid.vehicle.control.pid import AttitudeReference
 
     vehicle = thesis_vehicle()
+
+    @dataclass
+    class Saturated:
+        """The same saturation, but unknown to the controller."""
+
+        inner: Callable
+
+        def rotor_command(self, time_s, euler_rad):
+            u = wrench_matrix(vehicle) @ (self.inner(round(time_s / 0.002), euler_rad).T ** 2)
+            u[1:] = np.clip(u[1:], -0.02, 0.02)
+            return np.sqrt(np.maximum((allocation_matrix(vehicle) @ u).T, 0))
+
     step = AttitudeReference("step", 6.4, lambda t: np.array([0.8, 0.0, 0.0]))
     peak = {}
     for name, limit in (("wound", None), ("held", (0.02, 0.02, 0.02))):
         pid = AttitudePid(vehicle, step, limit_n_m=limit)
         if limit is None:
-            # The same saturation, but unknown to the controller.
-            pid_inner = pid.rotor_command
-
-            def command(t, e, pid_inner=pid_inner):
-                u = wrench_matrix(vehicle) @ (pid_inner(t, e).T ** 2)
-                u[1:] = np.clip(u[1:], -0.02, 0.02)
-                return np.sqrt(np.maximum((allocation_matrix(vehicle) @ u).T, 0))
-
-            pid.rotor_command = command
+            pid = Saturated(fast.commanding(pid.attitude_loop(0.002 * np.arange(2001)), 1, 0.002))
         peak[name] = simulate(vehicle, pid, 4.0, 0.002).euler_rad[0, :, 0].max()
     assert peak["held"] < peak["wound"] - 0.05
 
@@ -379,9 +392,11 @@ def test_a_runaway_is_one_clear_sentence():
 
 
 def test_angular_acceleration_is_equation_4_19():
-    body = RigidBody.of(0.652, [2.489e-3, 2.5743e-3, 4.6838e-3])
+    vehicle = thesis_vehicle(inertia_kg_m2=dict(xx=2.489e-3, yy=2.5743e-3, zz=4.6838e-3))
     p, q, r = 1.0, 2.0, 3.0
-    found = angular_acceleration(body, np.array([p, q, r]), np.array([0.01, 0.02, 0.03]))
+    start, push = np.array([[p, q, r, 1.0, *[0.0] * 13]]), np.array([[[0.0, 0.0, 0.0, 0.01, 0.02, 0.03]]])
+    flown = fast.fly(body_of(vehicle), fast.kernels_of([], vehicle), start, 0, 1.0, np.zeros((1, 4)), pushes=push)
+    found = flown.accelerations[0, 0, :3]
     by_hand = [
         -0.8475 * q * r + 0.01 / 2.489e-3,
         0.8526 * p * r + 0.02 / 2.5743e-3,

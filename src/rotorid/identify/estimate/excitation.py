@@ -182,24 +182,18 @@ def design(
     return best, best_errors
 
 
+@dataclass(frozen=True)
 class ExcitedHold:
     """A soft attitude hold with an excitation added to its moments (a `Controller`)."""
 
-    def __init__(self, vehicle: Vehicle, multisine: Multisine, limits_rad_s: tuple[float, float]):
-        hold = AttitudeReference("level", vehicle.mass_kg * vehicle.gravity_m_s2, lambda t: np.zeros(3))
-        self._pid = AttitudePid(vehicle, hold, _HOLD_GAINS, derivative_time_s=0.02)
-        self._multisine = multisine
-        self._allocation = allocation_matrix(vehicle)
-        self._limits = limits_rad_s
+    vehicle: Vehicle
+    multisine: Multisine
+    limits_rad_s: tuple[float, float]
 
-    def rotor_command(self, time_s: float, euler_rad: np.ndarray) -> np.ndarray:
-        """(n, k), rad/s."""
-        square = self._pid.rotor_command(time_s, euler_rad) ** 2
-        square = square + self._multisine.moment(np.array([time_s])) @ self._allocation[:, 1:].T
-        return np.clip(np.sqrt(np.maximum(square, 0.0)), *self._limits)
-
-    def attitude_loop(self, time_s: np.ndarray) -> AttitudeLoop | None:
-        """As of the attitude controller, with the excitation's squared speeds added."""
-        hold = self._pid.attitude_loop(time_s)
-        more = self._multisine.moment(time_s) @ self._allocation[:, 1:].T
-        return None if hold is None else replace(hold, more=more, limits_rad_s=self._limits)
+    def attitude_loop(self, time_s: np.ndarray) -> AttitudeLoop:
+        """That of the hold at instants (m,), s, with the excitation's squared speeds added."""
+        weight = self.vehicle.mass_kg * self.vehicle.gravity_m_s2
+        level = AttitudeReference("level", weight, lambda t: np.zeros(3))
+        hold = AttitudePid(self.vehicle, level, _HOLD_GAINS, derivative_time_s=0.02).attitude_loop(time_s)
+        more = self.multisine.moment(time_s) @ hold.allocation[:, 1:].T
+        return replace(hold, more=more, limits_rad_s=self.limits_rad_s)

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Contribution, Motion
+from rotorid.effects.instant import Instants
 from rotorid.mismatch.decision.decide import coefficients
 from rotorid.mismatch.model.prepare import prepare
 from rotorid.mismatch.model.wrench import wrench_model
@@ -69,9 +70,9 @@ def test_the_baseline_of_unequal_rotors_by_hand():
 def test_the_hub_of_a_turning_vehicle_moves_by_v_plus_omega_cross_r():
     """Yawing at 2 rad/s, flying forward at 3 m/s: the front right hub (d, d) has v = (3 − 2 d, 2 d, 0)."""
     motion = still(velocity=np.array([[3.0, 0, 0]]), angular_velocity=np.array([[0, 0, 2.0]]))
-    hubs = motion.hub_velocity(thesis_vehicle().rotor_positions_m())
-    np.testing.assert_allclose(hubs[0, 0], [3 - 2 * ARM, 2 * ARM, 0], rtol=1e-12)
-    np.testing.assert_allclose(hubs[0, 2], [3 + 2 * ARM, -2 * ARM, 0], rtol=1e-12)
+    hubs = Instants(motion, thesis_vehicle()).hub_velocity
+    np.testing.assert_allclose([hubs[0, j][0] for j in range(3)], [3 - 2 * ARM, 2 * ARM, 0], rtol=1e-12)
+    np.testing.assert_allclose([hubs[2, j][0] for j in range(3)], [3 + 2 * ARM, -2 * ARM, 0], rtol=1e-12)
 
 
 def test_drag_at_the_hubs_damps_yaw_and_drag_at_the_centre_does_not():
