@@ -24,8 +24,8 @@ import skfem
 
 from rotorid.identify.bench.reconstruct import read_geometry
 from rotorid.identify.fem import studies
-from rotorid.identify.fem.answers import judge_statements, ratios
-from rotorid.identify.fem.sizes import read_assumed, read_moduli
+from rotorid.identify.fem.bench import judge_statements, ratios
+from rotorid.identify.fem.placement import read_assumed, read_moduli
 
 ROOT = Path(__file__).resolve().parents[1]
 DRAWS, SEED = 12, 1

@@ -245,7 +245,7 @@ def parameters(data: _Recorded, to: str, vehicle: Believed | None = None, **opti
 
     Returns
     -------
-    tuple of rotorid.identify.autopilot.parameters.Parameter
+    tuple of rotorid.identify.autopilot.parameters.AutopilotParameter
         Each with `value`, `interval_95`, `determined` and `to_set`.
     """
     from rotorid.identify.autopilot.parameters import parameters_of

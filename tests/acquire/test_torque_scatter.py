@@ -7,7 +7,7 @@ import pytest
 
 from rotorid.acquire.campaign import SEED, run_campaign
 from rotorid.acquire.emulators.truth import draw_truth
-from rotorid.identify.rotor.campaign import torque_points
+from rotorid.identify.rotor import torque_points
 from rotorid.io.tables import read_tables
 
 

@@ -13,9 +13,16 @@ import numpy as np
 import pandas as pd
 
 from rotorid.config import READING_S
-from rotorid.identify.estimate.excitation import WINDOW_S, ExcitedHold, Readings, Wanted, design, promised_errors
-from rotorid.identify.estimate.grey_box import WEIGHT_NAMES, check_consistency, weights_of_inertias
-from rotorid.identify.estimate.output_error import cut_windows, fit_output_error, tied, untied
+from rotorid.identify.excitation import WINDOW_S, ExcitedHold, Readings, Wanted, design, promised_errors
+from rotorid.identify.grey_box import (
+    WEIGHT_NAMES,
+    check_consistency,
+    cut_windows,
+    fit_output_error,
+    tied,
+    untied,
+    weights_of_inertias,
+)
 from rotorid.recordings import read_vehicle
 from rotorid.report import log
 from rotorid.vehicle.control.pid import AttitudePid, training_reference, validation_reference

@@ -16,8 +16,15 @@ import numpy as np
 import pandas as pd
 from scipy.special import stdtr
 
-from rotorid.identify.rotor.campaign import COLUMNS, sample_noise, thrust_points, torque_points
-from rotorid.identify.rotor.coefficients import LEAST_FORCE_SD_N, Points, fit_coefficient
+from rotorid.identify.rotor import (
+    COLUMNS,
+    LEAST_FORCE_SD_N,
+    Points,
+    fit_coefficient,
+    sample_noise,
+    thrust_points,
+    torque_points,
+)
 from rotorid.io.tables import read_sessions
 from rotorid.report import log, thesis
 from rotorid.vehicle.mass_properties import compose, read_components

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from rotorid.identify.fem import studies
-from rotorid.identify.fem.sizes import read_assumed, read_moduli
+from rotorid.identify.fem.placement import read_assumed, read_moduli
 from rotorid.identify.fem.studies import from_printed_slope
 from rotorid.io import wire
 from rotorid.report import log

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import chdtri
 
-from rotorid.identify.estimate.grey_box import (
+from rotorid.identify.grey_box import (
     WEIGHT_NAMES,
     NetworkFit,
     check_consistency,

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.identify.estimate.grey_box import fit_coefficient_network
+from rotorid.identify.grey_box import fit_coefficient_network
 from rotorid.identify.networks import Training
-from rotorid.identify.rotor.coefficients import Points, fit_coefficient
+from rotorid.identify.rotor import Points, fit_coefficient
 from rotorid.report import log, thesis
 
 HISTORY = ["coefficient", "epoch", "mse"]

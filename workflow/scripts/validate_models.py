@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.identify.estimate.flights import band_signals, fit_flights
+from rotorid.identify.excitation import band_signals, fit_flights
 from rotorid.recordings import Inertia, Run, Vehicle, read_set, read_vehicle
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.faults import read_report

@@ -12,8 +12,8 @@ import numpy as np
 
 from rotorid.identify.bench.reconstruct import read_geometry
 from rotorid.identify.fem import studies
-from rotorid.identify.fem.answers import EVEN, MIDDLE, NEARLY, judge_statements
-from rotorid.identify.fem.sizes import read_assumed, read_moduli
+from rotorid.identify.fem.bench import EVEN, MIDDLE, NEARLY, judge_statements
+from rotorid.identify.fem.placement import read_assumed, read_moduli
 from rotorid.report import log
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.identify.estimate.excitation import ExcitedHold, Multisine
+from rotorid.identify.excitation import ExcitedHold, Multisine
 from rotorid.vehicle.attitude import (
     euler_from_quaternion,
     quaternion_from_euler,

@@ -19,13 +19,10 @@ from scipy.optimize import brentq
 
 from rotorid.errors import InputError
 from rotorid.identify.bench.reconstruct import GF_N, Geometry
-from rotorid.identify.fem import answers, elasticity
-from rotorid.identify.fem.answers import Answers, by_part, compare, ratios
-from rotorid.identify.fem.bench import Bench, Solved
-from rotorid.identify.fem.cell import strain_per_newton
-from rotorid.identify.fem.elasticity import Hole, LooseParts
-from rotorid.identify.fem.sizes import MATERIALS, Assumed, Material, Sizes, in_file, materials
-from rotorid.identify.fem.tets import block, count, stacked
+from rotorid.identify.fem import elasticity
+from rotorid.identify.fem.bench import Answers, Bench, Solved, ask, by_part, compare, ratios, strain_per_newton
+from rotorid.identify.fem.elasticity import Hole, LooseParts, block, count, stacked
+from rotorid.identify.fem.placement import MATERIALS, Assumed, Material, Sizes, in_file, materials
 from rotorid.io.wire import VOLTS_PER_COUNT
 
 _BEAM = Material(68.9e9, 0.0)
@@ -86,7 +83,7 @@ def mesh_study(
         bench = Bench.of(assumed, assumed.sizes, geometry.distance_m, fineness)
         cell_strain = strain_per_newton(assumed.sizes, of["PLA"]["cells"], fineness)
         solved = {name: bench.solve(of[name]) for name in MATERIALS}
-        found = {name: answers.ask(bench, solved[name], cell_strain, geometry) for name in MATERIALS}
+        found = {name: ask(bench, solved[name], cell_strain, geometry) for name in MATERIALS}
         row = {"fineness": fineness, "elements": bench.body.mesh.nelements, "nodes": bench.body.basis.N}
         rows.append(row | {"cell_strain_per_n": cell_strain} | _row(found))
     return pd.DataFrame(rows), _Finest(bench, solved, found)

@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 import yaml
 
-from rotorid.identify.bench import recalibrate, tensile
-from rotorid.identify.bench.prepare import prepare
+from rotorid.identify.bench import loadcell, reconstruct
+from rotorid.identify.bench.reconstruct import prepare
 from rotorid.io.tables import read_tables
 
 from .test_chain import SETTINGS
@@ -24,12 +24,12 @@ def truth() -> dict:
 
 def test_the_calibration_recovers_the_thesis_within_its_intervals(truth) -> None:
     samples, sessions = read_tables(sorted((CAMPAIGN / "calibration").glob("*.rlog.gz")))
-    readings = recalibrate.readings(prepare(samples, sessions, SETTINGS), sessions)
-    idle = recalibrate.idle_slopes(samples, sessions)
+    readings = reconstruct.readings(prepare(samples, sessions, SETTINGS), sessions)
+    idle = reconstruct.idle_slopes(samples, sessions)
     printed = pd.read_csv(ROOT / "raw/thesis/table_2_8.csv").set_index("coefficient")
     inside = {"a0": 0, "a1": 0, "drift": 0, "creep": 0}
     for cell in range(1, 7):
-        found = recalibrate.calibrate_cell(readings[readings["cell"] == cell], idle[cell])
+        found = reconstruct.calibrate_cell(readings[readings["cell"] == cell], idle[cell])
         for which, name in enumerate(("a0", "a1")):
             low, high = found.line.interval(which)
             inside[name] += low <= printed.loc[name, f"cell_{cell}"] <= high
@@ -46,8 +46,8 @@ def test_the_calibration_recovers_the_thesis_within_its_intervals(truth) -> None
 
 def test_tensile_figures_are_those_of_the_specimens(truth) -> None:
     samples, sessions = read_tables(sorted((CAMPAIGN / "tensile").glob("*.rlog.gz")))
-    found, _ = tensile.specimens(samples, sessions)
-    means = tensile.by_infill(found, pd.read_csv(ROOT / "raw/thesis/table_2_5.csv"))
+    found, _ = loadcell.specimens(samples, sessions)
+    means = loadcell.by_infill(found, pd.read_csv(ROOT / "raw/thesis/table_2_5.csv"))
     for row in means.itertuples():
         told = truth["plastic"][str(row.infill_percent)]
         assert row.modulus_gpa == pytest.approx(told["modulus_pa"] / 1e9, rel=0.005)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rotorid.identify.estimate.grey_box import (
+from rotorid.identify.grey_box import (
     MASK,
     Scaling,
     check_consistency,

@@ -4,9 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.identify.estimate.excitation import Readings, Wanted, design
-from rotorid.identify.estimate.flights import band_signals, fit_flights
-from rotorid.identify.estimate.output_error import (
+from rotorid.identify.excitation import Readings, Wanted, band_signals, design, fit_flights
+from rotorid.identify.grey_box import (
     RateWindows,
     cut_windows,
     fit_output_error,

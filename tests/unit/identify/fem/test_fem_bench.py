@@ -9,12 +9,10 @@ import pytest
 
 from rotorid.errors import InputError
 from rotorid.identify.fem import studies
-from rotorid.identify.fem.answers import compare, judge_statements
-from rotorid.identify.fem.bench import DOWN, Bench
-from rotorid.identify.fem.cell import strain_per_newton
-from rotorid.identify.fem.sizes import Material, materials, read_assumed
+from rotorid.identify.fem.bench import DOWN, Bench, compare, judge_statements, strain_per_newton
+from rotorid.identify.fem.elasticity import on
+from rotorid.identify.fem.placement import Material, materials, read_assumed
 from rotorid.identify.fem.studies import counts_per_newton, from_printed_slope, printed_slope, volts_per_newton
-from rotorid.identify.fem.tets import on
 from rotorid.io.wire import GAIN, REFERENCE_V
 
 ROOT = Path(__file__).parents[4]

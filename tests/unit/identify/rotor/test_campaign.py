@@ -5,8 +5,8 @@ import pandas as pd
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.identify.rotor.campaign import COLUMNS, sample_noise, thrust_points, torque_points
-from rotorid.identify.stand.clocks import device_time
+from rotorid.identify.clocks import device_time
+from rotorid.identify.rotor import COLUMNS, sample_noise, thrust_points, torque_points
 
 STEP_S = 0.02
 SPEED = 1600 * (np.arange(1, 21) / 20) ** 0.669

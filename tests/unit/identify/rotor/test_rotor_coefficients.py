@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.identify.rotor.coefficients import (
+from rotorid.identify.rotor import (
     Points,
     fit_coefficient,
     fit_exponent,

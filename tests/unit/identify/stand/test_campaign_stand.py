@@ -6,11 +6,10 @@ import pandas as pd
 import pytest
 import yaml
 
-from rotorid.identify.blackbox.experiments import thrust_of_throttle
-from rotorid.identify.rotor.campaign import speed_law, thrust_points, torque_points
-from rotorid.identify.rotor.coefficients import Points, fit_coefficient
-from rotorid.identify.stand import clocks
-from rotorid.identify.stand.recordings import read_pairs
+from rotorid.identify import clocks
+from rotorid.identify.black_box import thrust_of_throttle
+from rotorid.identify.rotor import Points, fit_coefficient, speed_law, thrust_points, torque_points
+from rotorid.identify.stand import read_pairs
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.tables import read_tables
 from rotorid.report import thesis
