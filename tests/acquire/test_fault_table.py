@@ -19,15 +19,14 @@ from typer.testing import CliRunner
 from rotorid.acquire import procedures
 from rotorid.acquire.cli import app
 from rotorid.acquire.emulators.wire import Faults
-from rotorid.acquire.errors import AcquireError, DeviceSilent
 from rotorid.acquire.recorder import Recorder, Timings
+from rotorid.acquire.transport import AcquireError, DeviceSilent
 from rotorid.errors import InputError
 from rotorid.io import rawlog, wire
 from rotorid.io.frames import ANSWER, DATA, END, START, Frame, encode
-from rotorid.io.logs import LogError, read_log
+from rotorid.io.logs import LogError, read_log, read_tables
 from rotorid.io.rawlog import read_raw
 from rotorid.io.session import Ended, read_session, session_path, write_session
-from rotorid.io.tables import read_tables
 from rotorid.io.wire import TRAPEZOID, Programme
 from tests.acquire.conftest import QUICK
 from tests.acquire.fault_table import seen
@@ -233,7 +232,7 @@ ODD = {
 @pytest.mark.parametrize("what", ODD)
 @seen("a malformed frame with a right checksum", "recorder and reader crashed (struct.error, ValueError, IndexError)")
 def test_a_malformed_frame_is_counted_and_nothing_else_is_lost(tmp_path, what):
-    from rotorid.acquire.clock import SystemClock
+    from rotorid.acquire.transport import SystemClock
 
     bench = wire.INSTRUMENTS["bench"]
     recorder = Recorder(bench, Script([ODD[what]]), SystemClock(), tmp_path, "run", durable=False)
@@ -253,7 +252,7 @@ def test_a_malformed_frame_is_counted_and_nothing_else_is_lost(tmp_path, what):
 
 @seen("samples that are all of another length", "recorder stopped at the first; the reader raised for the whole log")
 def test_a_firmware_of_another_layout_is_told_and_its_log_is_readable(tmp_path):
-    from rotorid.acquire.clock import SystemClock
+    from rotorid.acquire.transport import SystemClock
 
     script = Script([(DATA, b"\1\2\3\4")] * 25)
     script._number = 9

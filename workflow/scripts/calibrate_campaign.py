@@ -12,7 +12,7 @@ import pandas as pd
 
 from rotorid.identify.bench import loadcell, reconstruct
 from rotorid.identify.bench.loadcell import FLAG_LEVEL
-from rotorid.io.tables import read_sessions
+from rotorid.io.logs import read_sessions
 from rotorid.report import log
 
 LOGGER = logging.getLogger("rotorid.calibration")

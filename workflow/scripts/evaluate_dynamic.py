@@ -13,7 +13,7 @@ import pandas as pd
 
 from rotorid.identify.bench import static
 from rotorid.identify.bench.reconstruct import CELLS, Geometry, cell_forces, forces, read_geometry
-from rotorid.io.tables import by_recording, read_sessions
+from rotorid.io.logs import by_recording, read_sessions
 from rotorid.report import log
 
 KINDS = ("", "_low_pass", "_zero_phase")

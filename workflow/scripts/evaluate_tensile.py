@@ -7,7 +7,7 @@
 import pandas as pd
 
 from rotorid.identify.bench import loadcell
-from rotorid.io.tables import read_sessions
+from rotorid.io.logs import read_sessions
 from rotorid.report import log
 
 

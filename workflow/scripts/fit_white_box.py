@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import stdtr
 
+from rotorid.identify import grey_box
 from rotorid.identify.rotor import (
     COLUMNS,
     LEAST_FORCE_SD_N,
@@ -25,8 +26,8 @@ from rotorid.identify.rotor import (
     thrust_points,
     torque_points,
 )
-from rotorid.io.tables import read_sessions
-from rotorid.report import log, thesis
+from rotorid.io.logs import read_sessions
+from rotorid.report import log
 from rotorid.vehicle.mass_properties import compose, read_components
 
 LEAST_TORQUE_SD_N_M = 1e-6
@@ -82,7 +83,7 @@ def main(
     lift.to_csv(thrust, index=False)
     twist.to_csv(torque, index=False)
     coefficients = {
-        key: coefficient(points, thesis.WHITE_BOX[believed], least)
+        key: coefficient(points, grey_box.WHITE_BOX[believed], least)
         for key, points, believed, least in (
             ("c_f", lift, "thrust_coefficient_n_s2", LEAST_FORCE_SD_N),
             ("c_q", twist, "torque_coefficient_n_m_s2", LEAST_TORQUE_SD_N_M),
@@ -96,7 +97,7 @@ def main(
         "centre_m": composed.centre_m.tolist(),
         "inertia_kg_m2": dict(zip(("xx", "yy", "zz"), np.diag(composed.inertia_kg_m2).tolist(), strict=True)),
         "inertia_difference": {
-            axis: float(composed.inertia_kg_m2[k, k] / thesis.WHITE_BOX[f"inertia_{axis}_kg_m2"] - 1)
+            axis: float(composed.inertia_kg_m2[k, k] / grey_box.WHITE_BOX[f"inertia_{axis}_kg_m2"] - 1)
             for k, axis in enumerate(("xx", "yy", "zz"))
         },
     }
@@ -116,7 +117,7 @@ def main(
         if fit
     ]
     for axis in ("xx", "yy", "zz"):
-        believed = thesis.WHITE_BOX[f"inertia_{axis}_kg_m2"]
+        believed = grey_box.WHITE_BOX[f"inertia_{axis}_kg_m2"]
         value = found["inertia_kg_m2"][axis]
         rows.append(
             {

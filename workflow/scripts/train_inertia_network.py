@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import chdtri
 
+from rotorid.identify import grey_box
 from rotorid.identify.grey_box import (
     WEIGHT_NAMES,
     NetworkFit,
@@ -27,7 +28,7 @@ from rotorid.identify.grey_box import (
 )
 from rotorid.identify.networks import Training
 from rotorid.recordings import read_vehicle
-from rotorid.report import log, thesis
+from rotorid.report import log
 
 THESIS_EPOCHS = 20_000
 """Where the thesis reads off its figure 4.22 that the error of the yaw acceleration has converged."""
@@ -94,7 +95,7 @@ def main(
     rms = np.sqrt(np.mean(thinned[2] ** 2, axis=0))
     # The torque weight's share of the squared error falls by exp(-2 rate <τ²> epoch): to 1 % in the epochs read off.
     asked = np.sqrt(np.log(100) / (2 * rate * THESIS_EPOCHS))
-    printed = np.array(thesis.INERTIAL_WEIGHTS)
+    printed = np.array(grey_box.INERTIAL_WEIGHTS)
     found = {
         "names": list(WEIGHT_NAMES),
         "truth": weights_of_inertias(truth).tolist(),

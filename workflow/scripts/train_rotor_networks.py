@@ -11,10 +11,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from rotorid.identify import grey_box
 from rotorid.identify.grey_box import fit_coefficient_network
 from rotorid.identify.networks import Training
 from rotorid.identify.rotor import Points, fit_coefficient
-from rotorid.report import log, thesis
+from rotorid.report import log
 
 HISTORY = ["coefficient", "epoch", "mse"]
 SIZES = ["coefficient", "hidden", "epoch", "mse"]
@@ -32,7 +33,7 @@ def main(
         points = pd.read_csv(path)
         if points.empty:
             continue
-        printed = thesis.ROTOR_NETWORKS[key]
+        printed = grey_box.ROTOR_NETWORKS[key]
         speed, value = points["speed_rad_s"].to_numpy(), points["value"].to_numpy()
         fit = fit_coefficient_network(speed, value, hidden, Training(rate, epochs, seed=seed))
         squares = fit_coefficient([Points("tests", speed, value)], offset=False)
@@ -41,8 +42,8 @@ def main(
             "network": fit.coefficient,
             "least_squares": squares.value,
             "interval_95": squares.interval_95,
-            "thesis_network": thesis.GREY_BOX[key],
-            "thesis_least_squares": thesis.WHITE_BOX[key],
+            "thesis_network": grey_box.GREY_BOX[key],
+            "thesis_least_squares": grey_box.WHITE_BOX[key],
             "thesis_weights": printed.coefficient,
             "thesis_weights_rounding": printed.rounding,
             "network_inside": squares.interval_95[0] <= fit.coefficient <= squares.interval_95[1],

@@ -20,7 +20,6 @@ from zlib import crc32
 import numpy as np
 
 from rotorid.acquire import procedures
-from rotorid.acquire.clock import VirtualClock
 from rotorid.acquire.emulators.devices import (
     BenchDevice,
     Device,
@@ -44,13 +43,13 @@ from rotorid.acquire.emulators.physics import (
     TesterPhysics,
     TorqueRig,
     TurningRotors,
+    write_stated,
 )
-from rotorid.acquire.emulators.stated import write_stated
 from rotorid.acquire.emulators.truth import Truth, draw_truth, write_truth
 from rotorid.acquire.emulators.wire import Faults, WireHalf, World
 from rotorid.acquire.procedures import STEADY_JR3, SteadyRule, programme_of
 from rotorid.acquire.recorder import Recorder, Timings
-from rotorid.acquire.transport import LoopbackTransport
+from rotorid.acquire.transport import LoopbackTransport, VirtualClock
 from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.index import write_index
 from rotorid.io.session import RoomAir, Session, Setup, session_path, write_session

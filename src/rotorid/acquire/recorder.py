@@ -21,11 +21,11 @@ from hashlib import file_digest
 from pathlib import Path
 from typing import NamedTuple
 
-from rotorid.acquire.clock import Clock
-from rotorid.acquire.errors import (
+from rotorid.acquire.transport import (
     AcquireError,
     BadName,
     CannotWrite,
+    Clock,
     DeviceFault,
     DeviceReset,
     DeviceSilent,
@@ -36,11 +36,10 @@ from rotorid.acquire.errors import (
     PortLost,
     PortMissing,
     Refused,
+    Transport,
 )
-from rotorid.acquire.transport import Transport
 from rotorid.io import rawlog, wire
-from rotorid.io.frames import ANSWER, COMMAND, DATA, END, START, Frame, encode
-from rotorid.io.sequence import Intake, Taken
+from rotorid.io.frames import ANSWER, COMMAND, DATA, END, START, Frame, Intake, Taken, encode
 from rotorid.io.session import Counts, Ended, GapEntry, Session, Setup, write_session
 from rotorid.io.session import Event as SessionEvent
 from rotorid.io.wire import COMPLETE, GO, IDENTIFY, KEEP, OK, STOP, STOPPED, UNHEARD, pack_keep

@@ -86,12 +86,11 @@ def _flight_plan(source, content: dict, allowed, wishes: dict[str, float], folde
 
 def _session_plan(source, content: dict, allowed, folder: Path):
     """Plan a session of a stand or bench and write it: sentences, files, and the picture where there is one."""
-    from rotorid.plan.session import known_instrument_from, plan_session
-    from rotorid.plan.write_session import text, write
+    from rotorid.plan.session import known_instrument_from, plan_session, text, write
 
     made = plan_session(known_instrument_from(source, content), allowed)
     files = write(made, folder)
-    return text(made), files, folder / "plan.png" if made.steps else None
+    return text(made), files, folder / "plan.png" if made.pieces else None
 
 
 def _onto_page(page: Path, name: str, said: list[str], picture: Path | None) -> None:
@@ -154,7 +153,7 @@ def sets_of(folder: Path, content: dict) -> list[Path]:
 
 def _read_sets(paths: list[Path]):
     """A set, or several of one vehicle as one."""
-    from rotorid.plan.together import joined_sets
+    from rotorid.plan.questions import joined_sets
     from rotorid.recordings import read_set
 
     sets = [read_set(p) for p in paths]
@@ -180,7 +179,7 @@ def together(
         with progress("together", quiet), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             from rotorid.io.text.writing import all_or_none
-            from rotorid.plan.together import answers, joined_sets, open_classes
+            from rotorid.plan.questions import answers, joined_sets, open_classes
             from rotorid.recordings import read_set
             from rotorid.report.deliver import analysis_of, write_files
 

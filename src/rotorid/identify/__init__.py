@@ -2,6 +2,7 @@
 
 OPEN = (
     "autopilot.parameters",
+    "autopilot.thrust",
     "bench.loadcell",
     "bench.reconstruct",
     "bench.static",

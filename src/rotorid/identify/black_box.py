@@ -32,7 +32,7 @@ from scipy.optimize import least_squares
 from rotorid.errors import InputError
 from rotorid.identify.networks import Trained, Training, build, train
 from rotorid.io.experiments import EXPERIMENTS
-from rotorid.io.tables import by_recording
+from rotorid.io.logs import by_recording
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.attitude import quaternion_from_euler, rotation_from_quaternion
 from rotorid.vehicle.mixer import wrench_matrix
@@ -128,7 +128,7 @@ def read_experiments(
 ) -> pd.DataFrame:
     """Samples of all experiments, columns `COLUMNS`, by number and then by time.
 
-    `quadrotor` and `wrench` are (samples, recordings) of `rotorid.io.tables`; recordings of one group are one
+    `quadrotor` and `wrench` are (samples, recordings) of `rotorid.io.logs`; recordings of one group are one
     experiment. A number of table A.1 that was recorded more than once has the samples of every recording. Raises
     InputError for a recording without a number of table A.1 or without the sensor's.
     """

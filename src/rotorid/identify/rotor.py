@@ -20,7 +20,7 @@ The reading at rest is taken off each test (the tare): before the motor starts, 
 Thrust comes from the tester alone. Torque comes from two instruments with their own clocks: the tester counts
 revolutions, the wrench sensor feels the moment. The host's time shows which of its samples are of the motor's run; all
 margins are in each device's own time, which also holds for an emulator that runs faster than life. Tables are those of
-`rotorid.io.tables`: all samples of one instrument, and one row a recording.
+`rotorid.io.logs`: all samples of one instrument, and one row a recording.
 
 Of the points two more things are asked:
 
@@ -45,7 +45,7 @@ from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
 from rotorid.identify.clocks import device_time
-from rotorid.io.tables import by_recording
+from rotorid.io.logs import by_recording
 from rotorid.recordings import RecordingSet
 from rotorid.recordings.spikes import lost_speed
 

@@ -23,8 +23,8 @@ from scipy.special import stdtrit as student_quantile
 from rotorid.errors import InputError
 from rotorid.identify.clocks import Aligned, Pair, both_on_host, pair_of, torque_offset
 from rotorid.io.experiments import EXPERIMENTS
-from rotorid.io.sequence import Quality
-from rotorid.io.tables import by_recording
+from rotorid.io.frames import Quality
+from rotorid.io.logs import by_recording
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.signal.filters import block_count, mean_and_error
@@ -133,7 +133,7 @@ def pairs(first: pd.DataFrame, second: pd.DataFrame) -> list[tuple]:
 
 
 def read_pairs(quadrotor: tuple, wrench: tuple, largest_error: float) -> list[Pair]:
-    """The experiments' two recordings each; both arguments are (samples, recordings) of `rotorid.io.tables`."""
+    """The experiments' two recordings each; both arguments are (samples, recordings) of `rotorid.io.logs`."""
     commands, felt = by_recording(quadrotor[0]), by_recording(wrench[0])
     return [
         pair_of(

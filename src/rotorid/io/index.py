@@ -14,8 +14,9 @@ from hashlib import sha256
 from pathlib import Path, PurePosixPath
 
 from rotorid.errors import InputError
-from rotorid.io.session import Session, SessionError, read_session, replace_bytes
-from rotorid.io.text.files import LARGEST_INDEX, check_text, read_bytes
+from rotorid.io import metadata_checksum
+from rotorid.io.session import Session, SessionError, read_session, replace_bytes, session_path
+from rotorid.io.text.files import LARGEST_INDEX, LARGEST_METADATA, check_text, read_bytes
 from rotorid.io.text.wording import hint, listed
 
 COLUMNS = (
@@ -65,25 +66,51 @@ def with_checksum(data: bytes) -> bytes:
     return rest + "\t".join(cells + [""] * (len(COLUMNS) - len(cells))).encode() + b"\n"
 
 
+def files_with_checksum(place: Path) -> list[Path]:
+    """Files with a checksum meant by a folder, a log, metadata or an index. Raises SessionError where there are none.
+
+    Of a folder its index comes first, where it has one.
+    """
+    if place.is_dir():
+        found = metadata_files(place)
+        if not found:
+            raise SessionError(f"{place}: holds no metadata of recordings (`<log>.yaml`)")
+        return [place / NAME] * (place / NAME).is_file() + found
+    return [place if place.suffix == ".yaml" or place.name == NAME else session_path(place)]
+
+
 def add_checksum(path: Path) -> bool:
-    """Give an index the checksum that it lacks; True if it had none. Raises SessionError for an index that is none."""
-    read_index(path.parent)
-    data = read_bytes(path, LARGEST_INDEX)
-    if _ROW.search(data) is None:
-        replace_bytes(path, with_checksum(data))
-        return True
-    return False
+    """Add the checksum to metadata or an index without one; True if there was none. Raises SessionError for files that
+    are neither, or whose checksum does not fit."""
+    if path.name == NAME:
+        read_index(path.parent)
+        data = read_bytes(path, LARGEST_INDEX)
+        lacking, added = _ROW.search(data) is None, with_checksum
+    else:
+        lacking, added = read_session(path).metadata_sha256 is None, metadata_checksum.with_checksum
+        data = read_bytes(path, LARGEST_METADATA)
+    if lacking:
+        replace_bytes(path, added(data))
+    return lacking
 
 
 def renew_checksum(path: Path) -> bool:
-    """Make the checksum fit what stands in the index now; True if it did not. Raises SessionError where it is none."""
+    """Make the checksum fit what stands in the file now; True if it did not. Raises SessionError for metadata or an
+    index that are none with it, and then leaves the file as it was."""
+    of_index = path.name == NAME
     if not path.exists():
-        raise SessionError(f"{path}: no such file; `rotorid-acquire index` makes it")
-    data = read_bytes(path, LARGEST_INDEX)
-    if (after := with_checksum(data)) == data:
+        why = "`rotorid-acquire index` makes it" if of_index else "every log has its metadata next to it"
+        raise SessionError(f"{path}: no such file; {why}")
+    before = read_bytes(path, LARGEST_INDEX if of_index else LARGEST_METADATA)
+    after = (with_checksum if of_index else metadata_checksum.with_checksum)(before)
+    if after == before:
         return False
-    _rows(after, path)
     replace_bytes(path, after)
+    try:
+        read_index(path.parent) if of_index else read_session(path)
+    except SessionError:
+        replace_bytes(path, before)
+        raise
     return True
 
 

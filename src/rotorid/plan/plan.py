@@ -17,8 +17,7 @@ import numpy as np
 from rotorid.errors import InputError
 from rotorid.mismatch.plant.comparison import ENVIRONMENT_S, LEAST_ENVIRONMENTS
 from rotorid.plan.candidates import STANDARD, ManoeuvrePiece, Reference, candidates, joined, smaller, standard
-from rotorid.plan.handled import Handled, handled
-from rotorid.plan.intervals import Width, check_wishes, widths
+from rotorid.plan.handled import Handled, Width, check_wishes, handled, widths
 from rotorid.plan.limits import Limits
 from rotorid.plan.questions import FittedSet
 from rotorid.plan.separation import (
@@ -68,13 +67,14 @@ class Tried:
 
 @dataclass(frozen=True)
 class Forecast:
-    """A flight, and what is expected of it next to the set at hand."""
+    """A flight, or a session of a stand or bench, and what is expected of it next to the set at hand."""
 
     name: str
     """`chosen`, `second` (the best without the chosen one's first manoeuvre), or `standard`."""
     pieces: tuple[ManoeuvrePiece, ...]
-    reference: Reference
-    """From the middle of the volume."""
+    """Of a session its steps."""
+    reference: Reference | None
+    """From the middle of the volume; none of a session."""
     flight: SimulatedFlight | None
     """As the vehicle would fly it."""
     questions: Questions
@@ -83,8 +83,8 @@ class Forecast:
 
     @property
     def duration_s(self) -> float:
-        """In the air, without take-off and landing."""
-        return self.reference.duration_s if self.pieces else 0.0
+        """In the air, without take-off and landing; of all steps of a session, without the time that mounting takes."""
+        return sum(p.duration_s for p in self.pieces) if self.reference is None else self.reference.duration_s
 
     @property
     def sigma(self) -> float | None:
@@ -98,7 +98,7 @@ class Forecast:
 
 @dataclass(frozen=True)
 class Plan(Forecast):
-    """A flight to fly next, and what else was considered."""
+    """What to fly or record next, and what else was considered."""
 
     set: str
     limits: Limits

@@ -3,18 +3,15 @@
 OPEN = (
     "codehash",
     "deliver",
-    "fleet.history",
-    "fleet.judge",
-    "fleet.summary",
+    "fleet",
+    "fleet_history",
     "log",
     "next_to_log",
     "page.changes",
     "plots.*",
     "prose",
     "provenance",
-    "result",
     "series_files",
-    "thesis",
     "typeset",
 )
 """Modules that other rooms may import; all else is this room's own."""

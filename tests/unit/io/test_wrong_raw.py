@@ -19,15 +19,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotorid.acquire.plan import read_plan, steps_of
+from rotorid.acquire.run_plan import read_plan, steps_of
 from rotorid.errors import InputError
 from rotorid.identify.networks import Training, build, train
 from rotorid.io import rawlog
 from rotorid.io.index import COLUMNS, read_index, with_checksum, write_index
 from rotorid.io.lines import read_description
-from rotorid.io.logs import read_log
+from rotorid.io.logs import read_log, read_tables
 from rotorid.io.session import read_session
-from rotorid.io.tables import read_tables
 
 MOST_S = 10.0
 SESSION = """\

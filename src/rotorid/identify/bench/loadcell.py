@@ -30,7 +30,7 @@ import pandas as pd
 from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
-from rotorid.io.tables import by_recording
+from rotorid.io.logs import by_recording
 
 FLAG_LEVEL = 0.01
 """Of good calibrations at most this share has a flag, or several, among all its points."""

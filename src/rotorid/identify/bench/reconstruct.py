@@ -36,7 +36,7 @@ from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
 from rotorid.identify.bench.loadcell import LineFit, fit_line
-from rotorid.io.tables import by_recording
+from rotorid.io.logs import by_recording
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.signal import filters
@@ -470,7 +470,7 @@ def bench_set(
     Parameters
     ----------
     prepared, sessions
-        Of that platform, from `rotorid.identify.bench.reconstruct` and `rotorid.io.tables`.
+        Of that platform, from `rotorid.identify.bench.reconstruct` and `rotorid.io.logs`.
     force_of
         Force (n, 3), N, of a prepared recording, see `bench_force`.
     noise_n

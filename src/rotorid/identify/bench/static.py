@@ -36,7 +36,7 @@ from rotorid.identify.bench.reconstruct import (
     force_covariance,
     forces,
 )
-from rotorid.io.tables import by_recording
+from rotorid.io.logs import by_recording
 from rotorid.recordings.signal.filters import mean_and_error
 
 _AXES = "xyz"

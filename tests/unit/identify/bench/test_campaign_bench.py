@@ -9,7 +9,7 @@ import yaml
 
 from rotorid.identify.bench import loadcell, reconstruct
 from rotorid.identify.bench.reconstruct import prepare
-from rotorid.io.tables import read_tables
+from rotorid.io.logs import read_tables
 
 from .test_chain import SETTINGS
 

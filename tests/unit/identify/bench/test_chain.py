@@ -7,8 +7,8 @@ import pytest
 from rotorid.errors import InputError
 from rotorid.identify.bench import reconstruct, static
 from rotorid.identify.bench.reconstruct import CELLS, GF_N, SPIKE, Filter, bench_force, bench_set, prepare
+from rotorid.io.logs import read_sessions, read_tables
 from rotorid.io.session import Ended, Setup
-from rotorid.io.tables import read_sessions, read_tables
 
 from .logs import cells, write_log
 from .test_reconstruct import GEOMETRY, forces_by_matrix

@@ -10,7 +10,7 @@ import pandas as pd
 
 from rotorid.recordings import RecordingSet, write_set
 from rotorid.recordings.templates import read
-from rotorid.report.fleet.history import by_vehicle, change_points, history, shown_by
+from rotorid.report.fleet_history import by_vehicle, change_points, history, shown_by
 from rotorid.report.plots.fleet import draw_history
 from rotorid.vehicle.control.swings import swings
 from workflow.scripts import fleet_history

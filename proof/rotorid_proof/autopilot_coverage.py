@@ -1,6 +1,6 @@
 """How often a true value lies in its stated 95 % interval: simulated flights by each autopilot's own map.
 
-    python -m rotorid.identify.autopilot.coverage docs/proof/autopilot_parameters.csv [flights a map]
+    python -m rotorid_proof.autopilot_coverage docs/proof/autopilot_parameters.csv [flights a map]
 
 writes a row a flight and parameter. A flight is made by each autopilot's own law from thrust to signal of a motor:
 attitude and thrust are prescribed; velocity follows by Newton's law with drag and wind, the moments by Euler's, the

@@ -22,7 +22,7 @@ from rotorid.mismatch.changes.level_one import (
 from rotorid.mismatch.changes.level_one_words import difference_words, in_unit_of_words, quantity_words, unit_of
 from rotorid.mismatch.changes.quantities import Flown, flown, grid_of
 from rotorid.recordings import RecordingSet, read_set
-from rotorid.report.fleet.summary import day_of
+from rotorid.report.fleet import day_of
 
 _NUMBERS = ("vehicle", "set", "day", "good", "name", "quantity", "unit", "change", "low_95", "high_95", "limit")
 EVENTS = ("vehicle", "set", "day", "id", "lasts", "sentence")
