@@ -24,7 +24,7 @@ def main(prepared: str, samples: str, recordings: str, readings: str, coefficien
     table = loadcell.flag_readings(reconstruct.readings(pd.read_parquet(prepared), sessions))
     idle = reconstruct.idle_slopes(pd.read_parquet(samples), sessions)
     cells = [
-        reconstruct.as_dict(int(cell), reconstruct.calibrate_cell(part, idle[int(cell)])) | loadcell.flags_as_dict(part)
+        {"cell": int(cell)} | reconstruct.calibrate_cell(part, idle[int(cell)]) | loadcell.flags_as_dict(part)
         for cell, part in table.groupby("cell")
     ]
     warnings = loadcell.flag_warnings(cells, table)

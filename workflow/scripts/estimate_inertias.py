@@ -117,7 +117,7 @@ def main(
         weights, covariance = untied_weights(free)
         agreement = check_consistency(weights, covariance)
         fitted.append((fit, weights, covariance, agreement))
-        row = {"draw": draw, "consistency_p": agreement.p_value}
+        row = {"draw": draw, "consistency_p": agreement["p_value"]}
         for k, axis in enumerate(AXES):
             low, high = fit.inertia_intervals_95[k]
             row |= {
@@ -144,7 +144,7 @@ def main(
         "gyroscopic": weights[:3].tolist(),
         "gyroscopic_sigma": np.sqrt(np.diag(covariance)[:3]).tolist(),
         "gyroscopic_truth": weights_of_inertias(truth)[:3].tolist(),
-        "consistency_p": agreement.p_value,
+        "consistency_p": agreement["p_value"],
         "consistency_p_smallest": float(table["consistency_p"].min()),
         "consistency_share": float(np.mean(table["consistency_p"] > 0.05)),
         "draws": draws,

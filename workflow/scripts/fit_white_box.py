@@ -8,7 +8,6 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +58,7 @@ def coefficient(points: pd.DataFrame, believed: float, least_sd: float) -> dict:
         "p_value": float(2 * stdtr(plain.freedom, -(abs(plain.value - believed) / plain.standard_error))),
         "thesis_inside": plain.interval_95[0] <= believed <= plain.interval_95[1],
         "interval_95_own_noise": own_noise.interval_95,
-        "noise": asdict(sample_noise(points)),
+        "noise": sample_noise(points),
     }
 
 

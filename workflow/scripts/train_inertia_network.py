@@ -43,14 +43,14 @@ def columns(table: pd.DataFrame, name: str) -> np.ndarray:
 def consistency(weights, covariance) -> dict:
     found = check_consistency(weights, covariance)
     return {
-        "trained": found.trained.tolist(),
-        "implied": found.implied.tolist(),
-        "sigma": found.sigma.tolist(),
-        "z": (found.gap / found.sigma).tolist(),
-        "statistic": found.statistic,
+        "trained": found["trained"].tolist(),
+        "implied": found["implied"].tolist(),
+        "sigma": found["sigma"].tolist(),
+        "z": (found["gap"] / found["sigma"]).tolist(),
+        "statistic": found["statistic"],
         # Only noise so many times larger than assumed would leave the relations in doubt at 5 %.
-        "noise_factor": float(np.sqrt(found.statistic / chdtri(3, 1 - 0.95))),
-        "p_value": found.p_value,
+        "noise_factor": float(np.sqrt(found["statistic"] / chdtri(3, 1 - 0.95))),
+        "p_value": found["p_value"],
     }
 
 

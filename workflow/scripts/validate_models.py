@@ -66,7 +66,7 @@ def real_flights(folder: Path, band_hz, rate_hz: float, block_s: float, delay_s:
         fits = fit_flights(others, block_s, np.random.default_rng(seed), draws=2)
         estimated = np.diag(vehicle.inertia_kg_m2.matrix()).copy()
         # Yaw is kept as published: its band holds no moment that the rotors' speeds explain.
-        estimated[:2] = [fits[0].estimate, fits[1].estimate]
+        estimated[:2] = [fits[0]["estimate"], fits[1]["estimate"]]
         before, count = forward_error(vehicle, run, delay_s)
         after, _ = forward_error(with_inertias(vehicle, estimated), run, delay_s)
         rows += [

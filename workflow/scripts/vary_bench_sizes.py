@@ -5,7 +5,6 @@
 """
 
 import json
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -35,7 +34,7 @@ def main(sizes: str, moduli: str, geometry: str, mesh: str, draws: int, seed: in
         "even": EVEN,
         "middle": MIDDLE,
         "nearly": NEARLY,
-        "statements": [asdict(row) | {"word": row.word} for row in judge_statements(table)],
+        "statements": judge_statements(table),
         "ranges": studies.ranges(table),
         "strongest": studies.strongest(table),
     }

@@ -227,17 +227,6 @@ class _BandSignals:
     rate_hz: float
 
 
-@dataclass(frozen=True)
-class _FlightInertia:
-    """Of one axis: bounds, estimate and its 95 % interval over blocks (kg m2), squared correlation."""
-
-    lower: float
-    upper: float
-    estimate: float
-    interval_95: tuple[float, float]
-    r2: float
-
-
 def band_signals(
     run: Run, vehicle: Vehicle, band_hz: tuple[float, float], delay_s: float, rate_hz: float
 ) -> _BandSignals | None:
@@ -276,8 +265,11 @@ def _on_grid(grid: np.ndarray, time_s: np.ndarray, values: np.ndarray) -> np.nda
 
 def fit_flights(
     parts: Sequence[_BandSignals], block_s: float, rng: np.random.Generator, draws: int = 500
-) -> list[_FlightInertia]:
-    """Inertia about x, y, z from several flights; intervals by drawing blocks of `block_s`."""
+) -> list[dict]:
+    """Inertia about x, y, z from several flights: bounds `lower` and `upper`, `estimate`, `interval_95` (kg m2), `r2`.
+
+    Intervals by drawing blocks of `block_s`; `r2` is the squared correlation.
+    """
     sums = []
     for part in parts:
         size = int(block_s * part.rate_hz)
@@ -292,12 +284,12 @@ def fit_flights(
         positive = ma[k] > 0
         spread = np.sqrt(drawn[:, 2, k] / drawn[:, 1, k])
         found.append(
-            _FlightInertia(
-                float(ma[k] / aa[k]) if positive else float("nan"),
-                float(mm[k] / ma[k]) if positive else float("nan"),
-                float(np.sqrt(mm[k] / aa[k])),
-                tuple(float(v) for v in np.quantile(spread, [0.025, 0.975])),
-                float(ma[k] * abs(ma[k]) / (aa[k] * mm[k])),
-            )
+            {
+                "lower": float(ma[k] / aa[k]) if positive else float("nan"),
+                "upper": float(mm[k] / ma[k]) if positive else float("nan"),
+                "estimate": float(np.sqrt(mm[k] / aa[k])),
+                "interval_95": tuple(float(v) for v in np.quantile(spread, [0.025, 0.975])),
+                "r2": float(ma[k] * abs(ma[k]) / (aa[k] * mm[k])),
+            }
         )
     return found

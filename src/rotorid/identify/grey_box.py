@@ -189,18 +189,6 @@ def fit_least_squares(rates: np.ndarray, accelerations: np.ndarray, moments: np.
     return _WeightFit(weights, covariance, residual)
 
 
-@dataclass(frozen=True)
-class _Consistency:
-    """`gap` (3,): trained minus implied gyroscopic weight; `sigma` its standard error (0 where unknown)."""
-
-    trained: np.ndarray
-    implied: np.ndarray
-    gap: np.ndarray
-    sigma: np.ndarray
-    statistic: float
-    p_value: float
-
-
 def implied_gyroscopic(weights: np.ndarray) -> np.ndarray:
     """w11, w22, w33 as the torque weights imply them, (3,)."""
     a, b, c = np.asarray(weights)[3:]
@@ -220,15 +208,25 @@ def _least_squares_slope(weights: np.ndarray) -> np.ndarray:
     return np.hstack([np.eye(3), -implied])
 
 
-def check_consistency(weights: np.ndarray, covariance: np.ndarray) -> _Consistency:
-    """Wald test of the three relations for weights (6,) with covariance (6, 6)."""
+def check_consistency(weights: np.ndarray, covariance: np.ndarray) -> dict:
+    """Wald test of the three relations for weights (6,) with covariance (6, 6).
+
+    `gap` (3,): trained minus implied gyroscopic weight; `sigma` its standard error (0 where unknown).
+    """
     weights = np.asarray(weights, float)
     implied = implied_gyroscopic(weights)
     gap = weights[:3] - implied
     slope = _least_squares_slope(weights)
     spread = slope @ covariance @ slope.T
     statistic = float(gap @ np.linalg.solve(spread, gap))
-    return _Consistency(weights[:3], implied, gap, np.sqrt(np.diag(spread)), statistic, float(chdtrc(3, statistic)))
+    return {
+        "trained": weights[:3],
+        "implied": implied,
+        "gap": gap,
+        "sigma": np.sqrt(np.diag(spread)),
+        "statistic": statistic,
+        "p_value": float(chdtrc(3, statistic)),
+    }
 
 
 @dataclass(frozen=True)
@@ -249,23 +247,16 @@ def coefficient(network: Network, scaling: Scaling) -> float:
     return float(product[0, 0] * scaling.k_x**2 / scaling.k_d)
 
 
-@dataclass(frozen=True)
-class _AerodynamicFit:
-    coefficient: float
-    scaling: Scaling
-    trained: Trained
-
-
 def fit_coefficient_network(
     speed_rad_s: np.ndarray, value: np.ndarray, hidden: int, training: Training
-) -> _AerodynamicFit:
-    """Train on steady points: speeds (n,), rad/s, and thrusts (N) or torques (N m) (n,)."""
+) -> tuple[float, Scaling, Trained]:
+    """Coefficient, scaling and training on steady points: speeds (n,), rad/s, and thrusts (N) or torques (N m) (n,)."""
     scaling = Scaling.of(speed_rad_s, value)
     network = build((1, hidden, 1), ("linear", "linear"), np.random.default_rng(training.seed), bias=False)
     inputs = (scaling.k_x * np.asarray(speed_rad_s, float)[:, None]) ** 2
     targets = scaling.k_d * np.asarray(value, float)[:, None]
     trained = train(network, inputs, targets, training)
-    return _AerodynamicFit(coefficient(trained.network, scaling), scaling, trained)
+    return coefficient(trained.network, scaling), scaling, trained
 
 
 @dataclass(frozen=True)

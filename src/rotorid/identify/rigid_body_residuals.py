@@ -177,20 +177,14 @@ def by_airspeed(
     )
 
 
-@dataclass(frozen=True)
-class _NeurobemTables:
-    """Summary and tables; forces in N, moments in N m."""
-
-    summary: dict
-    flights: pd.DataFrame
-    bins: pd.DataFrame
-    points: pd.DataFrame
+_Tables = tuple[dict, pd.DataFrame, pd.DataFrame, pd.DataFrame]
+"""Summary, flights, bins and points; forces in N, moments in N m."""
 
 
-def no_neurobem() -> _NeurobemTables:
+def no_neurobem() -> _Tables:
     """Tables without a row, for recordings that are not there."""
     tables = (pd.DataFrame(columns=names) for names in (_FLIGHT_COLUMNS, _BIN_COLUMNS, _POINT_COLUMNS))
-    return _NeurobemTables({}, *tables)
+    return {}, *tables
 
 
 def _residuals_of(run: Run, vehicle: Vehicle, cutoff_hz: float) -> dict[str, np.ndarray]:
@@ -238,7 +232,7 @@ def _bin_rows(model: str, found: _Binned) -> list[tuple]:
 
 def compare_with_neurobem(
     recordings: RecordingSet, cutoff_hz: float, airspeed_bin_m_s: float, block_s: float, seed: int
-) -> _NeurobemTables:
+) -> _Tables:
     """RMS of every flight and model, and against airspeed with block-bootstrap intervals."""
     vehicle = recordings.vehicle
     left = {run.name: _residuals_of(run, vehicle, cutoff_hz) for run in recordings.runs}
@@ -265,6 +259,4 @@ def compare_with_neurobem(
     cloud = [np.column_stack([speeds[flight], models["rigid_body"]])[::_POINT_STEP] for flight, models in left.items()]
     points = pd.DataFrame(np.concatenate(cloud), columns=_POINT_COLUMNS[1:])
     points.insert(0, "flight", np.repeat(list(left), [len(part) for part in cloud]))
-    return _NeurobemTables(
-        summary, pd.DataFrame(rows)[_FLIGHT_COLUMNS], pd.DataFrame(bins, columns=_BIN_COLUMNS), points
-    )
+    return summary, pd.DataFrame(rows)[_FLIGHT_COLUMNS], pd.DataFrame(bins, columns=_BIN_COLUMNS), points

@@ -515,23 +515,12 @@ def speed_law(points: pd.DataFrame) -> dict:
     return out | {"points": len(kept)}
 
 
-@dataclass(frozen=True)
-class _SampleNoise:
-    """Noise of the samples, and the chi-square of a parabola through the origin with it."""
+def sample_noise(points: pd.DataFrame) -> dict:
+    """Noise of four tests or more (columns `COLUMNS`), and the chi-square of a parabola through the origin.
 
-    sd: float
-    """Of one sample, all tests together, N or N m."""
-    growth: float
-    """Of the fastest quarter of the tests over the slowest (1)."""
-    growth_interval_95: tuple[float, float]
-    chi_square: float
-    freedom: int
-    p_value: float
-    """Of a chi-square as large or larger, if the parabola holds and all samples are equally noisy."""
-
-
-def sample_noise(points: pd.DataFrame) -> _SampleNoise:
-    """Noise of tests with the columns `COLUMNS`; at least four tests."""
+    `sd` is of one sample, all tests together, N or N m; `growth` of the fastest quarter of the tests over the slowest;
+    `p_value` of a chi-square as large or larger, if the parabola holds and all samples are equally noisy.
+    """
     tests = points.sort_values("speed_rad_s")
     square, value = tests["speed_rad_s"].to_numpy() ** 2, tests["value"].to_numpy()
     counts = tests["samples"].to_numpy(float)
@@ -544,14 +533,14 @@ def sample_noise(points: pd.DataFrame) -> _SampleNoise:
     left = value - square * np.sum(square * value / each) / np.sum(square**2 / each)
     total, freedom = float(np.sum(left**2 / each)), len(tests) - 1
     low, high = fdtri(freedoms[1], freedoms[0], [0.975, 0.025])
-    return _SampleNoise(
-        sd=variance**0.5,
-        growth=(fast / slow) ** 0.5,
-        growth_interval_95=(float((fast / slow / low) ** 0.5), float((fast / slow / high) ** 0.5)),
-        chi_square=total,
-        freedom=freedom,
-        p_value=float(chdtrc(freedom, total)),
-    )
+    return {
+        "sd": variance**0.5,
+        "growth": (fast / slow) ** 0.5,
+        "growth_interval_95": (float((fast / slow / low) ** 0.5), float((fast / slow / high) ** 0.5)),
+        "chi_square": total,
+        "freedom": freedom,
+        "p_value": float(chdtrc(freedom, total)),
+    }
 
 
 def _ends(quarter: int) -> tuple[slice, slice]:

@@ -151,22 +151,12 @@ def balance_disagreement(weights_path: str | Path) -> float:
     return float(((table["ohaus_gf"] - table["mettler_gf"]) / table["average_gf"]).median())
 
 
-@dataclass(frozen=True)
-class _SharedWeightError:
-    """What all cells agree on about the error of one weight."""
-
-    mean_gf: float
-    """True weight minus printed weight [gf], mean over the cells."""
-    interval_95_gf: tuple[float, float]
-    """Student's t over the cells, which are independent instruments."""
-    by_cell_gf: tuple[float, ...]
-
-
 def shared_weight_error(
     weights_gf: np.ndarray, readings: dict[int, np.ndarray], contains: np.ndarray
-) -> _SharedWeightError:
-    """Error of one weight, from the residuals that it would leave in every cell alike.
+) -> tuple[float, tuple[float, float], tuple[float, ...]]:
+    """Error of one weight, true minus printed [gf], from the residuals that it would leave in every cell alike.
 
+    Mean over the cells, its 95 % interval (Student's t over the cells, which are independent instruments), and by cell.
     Each cell's line is fitted with one unknown more, d: weight + d * contains = a0 + a1 * reading.
 
     Parameters
@@ -189,7 +179,7 @@ def shared_weight_error(
         found.append(float(solution[2]))
     mean = float(np.mean(found))
     half = student_quantile(len(found) - 1, 0.975) * np.std(found, ddof=1) / np.sqrt(len(found))
-    return _SharedWeightError(mean, (mean - float(half), mean + float(half)), tuple(found))
+    return mean, (mean - float(half), mean + float(half)), tuple(found)
 
 
 def flag_readings(readings: pd.DataFrame) -> pd.DataFrame:

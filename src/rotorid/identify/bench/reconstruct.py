@@ -251,25 +251,12 @@ def _slope(time_s: np.ndarray, values: np.ndarray) -> float:
     return float(centred @ values / (centred @ centred))
 
 
-@dataclass(frozen=True)
-class _Metrology:
-    """Figures of one cell; gf unless the name says otherwise."""
+def calibrate_cell(table: pd.DataFrame, idle_slopes_v_s: np.ndarray) -> dict:
+    """Line and figures of one cell from its rows of `readings` and its slopes where it was not loaded (V/s).
 
-    line: LineFit
-    linearity_gf: float
-    repeatability_gf: float
-    full_scale_gf: float
-    noise_gf: float
-    """Standard deviation of one sample."""
-    drift_gf_min: float
-    drift_interval_95: tuple[float, float]
-    creep_share_min: float
-    """Growth of the reading under load as a share of the load, per minute, over the seconds of a recording."""
-    creep_interval_95: tuple[float, float]
-
-
-def calibrate_cell(table: pd.DataFrame, idle_slopes_v_s: np.ndarray) -> _Metrology:
-    """Line and figures of one cell from its rows of `readings` and its slopes where it was not loaded (V/s)."""
+    Creep is the growth of the reading under load as a share of the load, per minute, over the seconds of a recording;
+    noise the standard deviation of one sample. Units stand in the names, for a JSON file.
+    """
     weight, reading = table["weight_gf"].to_numpy(float), table["reading_10uv"].to_numpy(float)
     line = fit_line(reading, weight)
     force = line.a0 + line.a1 * reading
@@ -284,17 +271,27 @@ def calibrate_cell(table: pd.DataFrame, idle_slopes_v_s: np.ndarray) -> _Metrolo
     share = float(growth @ volts / (volts @ volts))
     left = growth - share * volts
     half = student_quantile(len(volts) - 1, 0.975) * np.sqrt(left @ left / (len(volts) - 1) / (volts @ volts))
-    return _Metrology(
-        line=line,
-        linearity_gf=float(np.abs(off).max()),
-        repeatability_gf=spread,
-        full_scale_gf=float(weight.max()),
-        noise_gf=float(np.sqrt((table["noise_10uv"] ** 2).mean()) * line.a1),
-        drift_gf_min=drift * 60 * gf_per_volt,
-        drift_interval_95=tuple(60 * gf_per_volt * v for v in drift_interval),
-        creep_share_min=60 * share,
-        creep_interval_95=(60 * (share - half), 60 * (share + half)),
-    )
+    linearity, most = float(np.abs(off).max()), float(weight.max())
+    return {
+        "a0_gf": line.a0,
+        "a0_interval_95": line.interval(0),
+        "a1_gf_per_10uv": line.a1,
+        "a1_interval_95": line.interval(1),
+        "covariance": line.covariance,
+        "r": line.r,
+        "residual_sd_gf": line.residual_sd,
+        "degrees_of_freedom": line.degrees_of_freedom,
+        "linearity_gf": linearity,
+        "linearity_share": linearity / most,
+        "repeatability_gf": spread,
+        "repeatability_share": spread / most,
+        "full_scale_gf": most,
+        "noise_gf": float(np.sqrt((table["noise_10uv"] ** 2).mean()) * line.a1),
+        "drift_gf_min": drift * 60 * gf_per_volt,
+        "drift_interval_95": tuple(60 * gf_per_volt * v for v in drift_interval),
+        "creep_share_min": 60 * share,
+        "creep_interval_95": (60 * (share - half), 60 * (share + half)),
+    }
 
 
 def _mean_interval(values: np.ndarray) -> tuple[float, tuple[float, float]]:
@@ -322,34 +319,8 @@ def idle_slopes(samples: pd.DataFrame, sessions: pd.DataFrame) -> dict[int, np.n
     return {i: np.array(v) for i, v in out.items()}
 
 
-def as_dict(cell: int, metrology: _Metrology) -> dict:
-    """One cell's figures for a JSON file, units in the names."""
-    line = metrology.line
-    return {
-        "cell": cell,
-        "a0_gf": line.a0,
-        "a0_interval_95": line.interval(0),
-        "a1_gf_per_10uv": line.a1,
-        "a1_interval_95": line.interval(1),
-        "covariance": line.covariance,
-        "r": line.r,
-        "residual_sd_gf": line.residual_sd,
-        "degrees_of_freedom": line.degrees_of_freedom,
-        "linearity_gf": metrology.linearity_gf,
-        "linearity_share": metrology.linearity_gf / metrology.full_scale_gf,
-        "repeatability_gf": metrology.repeatability_gf,
-        "repeatability_share": metrology.repeatability_gf / metrology.full_scale_gf,
-        "full_scale_gf": metrology.full_scale_gf,
-        "noise_gf": metrology.noise_gf,
-        "drift_gf_min": metrology.drift_gf_min,
-        "drift_interval_95": metrology.drift_interval_95,
-        "creep_share_min": metrology.creep_share_min,
-        "creep_interval_95": metrology.creep_interval_95,
-    }
-
-
 def line_of(entry: dict) -> LineFit:
-    """The line in an entry of `as_dict`, without its residuals."""
+    """The line in an entry of `calibrate_cell`, without its residuals."""
     return LineFit(
         a0=entry["a0_gf"],
         a1=entry["a1_gf_per_10uv"],

@@ -174,31 +174,8 @@ def strain_per_newton(sizes: Sizes, material: Material, fineness: float) -> floa
     return bridge_strain(gauge_strains(body, _NAME, sizes, frame, moved.reshape(3, -1).T))
 
 
-@dataclass(frozen=True)
-class _Bond:
-    """A piece's end that follows the surface of another part."""
-
-    piece: str
-    on: str
-    pad: Pad
-
-
-@dataclass(frozen=True)
-class _Leg:
-    """The model's geometry, in frame {T} (z down, origin on top of plate D)."""
-
-    parts: Mapping[str, Tets]
-    frames: Mapping[str, PartFrame]
-    """Own frames of the cells and of plate D."""
-    bonds: tuple[_Bond, ...]
-    base: Pad
-    """Fixed to the table."""
-    seat_m: float
-    """Height of the surface that bears the load above the plate's top."""
-
-
-def _build(assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fineness: float) -> _Leg:
-    """Meshes of one leg.
+def build(assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fineness: float) -> Bench:
+    """One leg in frame {T} (z down, origin on top of plate D), with all that binds it.
 
     Parameters
     ----------
@@ -250,13 +227,14 @@ def _build(assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fin
         "D": _mesh(sizes, assumed.pressed_area_m2, fineness).put(frames["D"]),
     }
     bonds = (
-        _Bond("A", "lower cell", held),
-        _Bond("B", "upper cell", leaves),
-        _Bond("B", "lower cell", arrives),
-        _Bond("C", "upper cell", hung),
-        _Bond("C", "D", top),
+        ("A", "lower cell", held),
+        ("B", "upper cell", leaves),
+        ("B", "lower cell", arrives),
+        ("C", "upper cell", hung),
+        ("C", "D", top),
     )
-    return _Leg(parts, frames, bonds, base, sizes.boss_height_m)
+    walls = [hole for name in CELLS for hole in holes(name, sizes, frames[name])]
+    return Bench(frames, bonds, base, sizes, LooseParts.of(parts, walls, _GROUPS))
 
 
 def _other_end(place: placement.Place, sizes: Sizes) -> np.ndarray:
@@ -327,29 +305,27 @@ class Solved:
 class Bench:
     """A leg's mesh with all that binds it, for one set of sizes."""
 
-    leg: _Leg
+    frames: Mapping[str, PartFrame]
+    """Own frames of the cells and of plate D."""
+    bonds: tuple[tuple[str, str, Pad], ...]
+    """A piece, the part whose surface its end follows, and that end."""
+    base: Pad
+    """Fixed to the table."""
     sizes: Sizes
     body: LooseParts
-
-    @classmethod
-    def of(cls, assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fineness: float) -> Bench:
-        """The bench of these sizes; InputError where they do not go together."""
-        leg = _build(assumed, sizes, distances_m, fineness)
-        walls = [hole for name in CELLS for hole in holes(name, sizes, leg.frames[name])]
-        return cls(leg, sizes, LooseParts.of(leg.parts, walls, _GROUPS))
 
     @cached_property
     def binding(self) -> sparse.csr_matrix:
         """Bonds, the cut through the plate and the table, as the matrix of `elasticity.constraints`."""
         nodes = self.body.nodes_m
         bonds = []
-        for bond in self.leg.bonds:
-            own = self.body.nodes_of(bond.piece)
-            own = own[on(bond.pad, nodes[own])]
-            bonds.append(Bound(own, self.body.weights(nodes[own], bond.on), np.eye(3)))
+        for piece, part, pad in self.bonds:
+            own = self.body.nodes_of(piece)
+            own = own[on(pad, nodes[own])]
+            bonds.append(Bound(own, self.body.weights(nodes[own], part), np.eye(3)))
         fixed = np.zeros((3, len(nodes)), bool)
         foot = self.body.nodes_of("A")
-        fixed[:, foot[on(self.leg.base, nodes[foot])]] = True
+        fixed[:, foot[on(self.base, nodes[foot])]] = True
         axis, cut = self._cut()
         fixed[:2, axis] = True
         return elasticity.constraints(len(nodes), [bonds, [cut]], fixed)
@@ -358,7 +334,7 @@ class Bench:
         """Nodes on the axis, and those on one face of the cut, which follow those on the other, turned."""
         nodes = self.body.nodes_m
         plate = self.body.nodes_of("D")
-        frame = self.leg.frames["D"]
+        frame = self.frames["D"]
         own = (nodes[plate] - frame.origin_m) @ frame.axes.T
         radius, angle = np.hypot(own[:, 0], own[:, 1]), np.arctan2(own[:, 1], own[:, 0])
         axis = plate[radius < 1e-9]
@@ -376,7 +352,7 @@ class Bench:
     @cached_property
     def seat(self) -> np.ndarray:
         """Facets that bear the load."""
-        height = -self.leg.seat_m
+        height = -self.sizes.boss_height_m
         return self.body.mesh.facets_satisfying(lambda x: np.abs(x[2] - height) < 1e-9, boundaries_only=True)
 
     @cached_property
@@ -392,11 +368,11 @@ class Bench:
 
     def gauge_strains(self, solved: Solved, name: str) -> np.ndarray:
         """Strain [1/N] of the four gauges of a cell, shape (4,)."""
-        return gauge_strains(self.body, name, self.sizes, self.leg.frames[name], solved.displacement_m)
+        return gauge_strains(self.body, name, self.sizes, self.frames[name], solved.displacement_m)
 
     def narrow(self, name: str) -> np.ndarray:
         """Nodes of a cell's narrow sections: within the middle third of the walls above and below the holes."""
-        frame = self.leg.frames[name]
+        frame = self.frames[name]
         nodes = self.body.nodes_of(name)
         own = np.abs((self.body.nodes_m[nodes] - frame.origin_m) @ frame.axes.T)
         off_hole = np.abs(own[:, 0] - self.sizes.cell_between_holes_m / 2)
@@ -478,7 +454,7 @@ def compare(
     assumed: Assumed, sizes: Sizes, moduli_pa: Mapping[str, float], geometry: Geometry, fineness: float
 ) -> dict[str, Answers]:
     """Answers of a bench with pieces of each material, on a mesh of this fineness."""
-    bench = Bench.of(assumed, sizes, geometry.distance_m, fineness)
+    bench = build(assumed, sizes, geometry.distance_m, fineness)
     of = {name: materials(sizes, moduli_pa, name) for name in MATERIALS}
     cell_strain = strain_per_newton(sizes, of["PLA"]["cells"], fineness)
     return {name: ask(bench, bench.solve(of[name]), cell_strain, geometry) for name in MATERIALS}
@@ -493,26 +469,8 @@ def ratios(found: Mapping[str, Answers]) -> dict[str, float]:
     }
 
 
-@dataclass(frozen=True)
-class _Judged:
-    """A sentence and on how many benches it holds."""
-
-    statement: str
-    on_assumed: bool
-    """Whether it holds with all sizes as assumed."""
-    holds: int
-    benches: int
-
-    @property
-    def word(self) -> str:
-        """What follows from that."""
-        if self.holds == self.benches:
-            return "follows"
-        return "does not follow" if self.holds == 0 else "depends on the assumed sizes"
-
-
-def judge_statements(table: pd.DataFrame) -> list[_Judged]:
-    """Each sentence on each bench.
+def judge_statements(table: pd.DataFrame) -> list[dict]:
+    """Each sentence: whether it holds with all sizes as assumed, on how many benches it `holds`, and what follows.
 
     Parameters
     ----------
@@ -530,7 +488,16 @@ def judge_statements(table: pd.DataFrame) -> list[_Judged]:
         "the stress in an upper cell's narrow section is nearly the same": _nearly(table["ratio_narrow_upper"]),
         "the stress in a lower cell's narrow section is nearly the same": _nearly(table["ratio_narrow_lower"]),
     }
-    return [_Judged(name, bool(holds.iloc[0]), int(holds.sum()), len(holds)) for name, holds in held.items()]
+    return [
+        {
+            "statement": name,
+            "on_assumed": bool(holds.iloc[0]),
+            "holds": int(holds.sum()),
+            "benches": len(holds),
+            "word": "follows" if holds.all() else "depends on the assumed sizes" if holds.any() else "does not follow",
+        }
+        for name, holds in held.items()
+    ]
 
 
 def _nearly(ratio: pd.Series) -> pd.Series:

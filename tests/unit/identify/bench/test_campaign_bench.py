@@ -30,15 +30,15 @@ def test_the_calibration_recovers_the_thesis_within_its_intervals(truth) -> None
     inside = {"a0": 0, "a1": 0, "drift": 0, "creep": 0}
     for cell in range(1, 7):
         found = reconstruct.calibrate_cell(readings[readings["cell"] == cell], idle[cell])
-        for which, name in enumerate(("a0", "a1")):
-            low, high = found.line.interval(which)
+        for name in ("a0", "a1"):
+            low, high = found[f"{name}_interval_95"]
             inside[name] += low <= printed.loc[name, f"cell_{cell}"] <= high
-        drift = truth["cells"]["drift_v_s"][cell - 1] * 60 * found.line.a1 * 1e5
-        inside["drift"] += found.drift_interval_95[0] <= drift <= found.drift_interval_95[1]
+        drift = truth["cells"]["drift_v_s"][cell - 1] * 60 * found["a1_gf_per_10uv"] * 1e5
+        inside["drift"] += found["drift_interval_95"][0] <= drift <= found["drift_interval_95"][1]
         # Creep over the seconds of a recording: the mean slope of share (1 − e^(−t/τ)) from 1.5 to 7 s.
         share, tau = (truth["cells"][name][cell - 1] for name in ("creep_share", "creep_s"))
         rate = share * (np.exp(-1.5 / tau) - np.exp(-7 / tau)) / 5.5 * 60
-        inside["creep"] += found.creep_interval_95[0] <= rate <= found.creep_interval_95[1]
+        inside["creep"] += found["creep_interval_95"][0] <= rate <= found["creep_interval_95"][1]
     # 24 intervals of 95 %: fewer than 21 inside would happen once in 300 times.
     assert inside["a0"] == inside["a1"] == 6
     assert sum(inside.values()) >= 21

@@ -78,11 +78,11 @@ def test_the_line_that_made_the_readings_comes_back(tmp_path) -> None:
     # Of 140 samples under load the first 25 fill the window, and the filter takes as long to settle.
     assert 75 < readings["samples"].min() < 115
     found = reconstruct.calibrate_cell(readings[readings["cell"] == 1], np.array([1e-9, 3e-9, 2e-9]))
-    assert found.line.a1 == pytest.approx(40, abs=0.02)
-    assert found.line.interval(0)[0] < 0.5 < found.line.interval(0)[1]
-    assert found.noise_gf == pytest.approx(6e-8 * 1e5 * 40, rel=0.1)
+    assert found["a1_gf_per_10uv"] == pytest.approx(40, abs=0.02)
+    assert found["a0_interval_95"][0] < 0.5 < found["a0_interval_95"][1]
+    assert found["noise_gf"] == pytest.approx(6e-8 * 1e5 * 40, rel=0.1)
     # Mean slope of 2e-9 V/s is 2e-9 × 60 × 40e5 gf/min.
-    assert found.drift_gf_min == pytest.approx(2e-9 * 60 * 40e5, rel=1e-3)
+    assert found["drift_gf_min"] == pytest.approx(2e-9 * 60 * 40e5, rel=1e-3)
 
 
 def test_repeatability_and_linearity_by_hand() -> None:
@@ -96,11 +96,11 @@ def test_repeatability_and_linearity_by_hand() -> None:
         }
     )
     found = reconstruct.calibrate_cell(table, np.zeros(3))
-    by_weight = found.line.a0 + found.line.a1 * np.array([0.0, 10.0, 6.0])
-    assert found.linearity_gf == pytest.approx(np.abs(by_weight - [0, 10, 5]).max())
+    by_weight = found["a0_gf"] + found["a1_gf_per_10uv"] * np.array([0.0, 10.0, 6.0])
+    assert found["linearity_gf"] == pytest.approx(np.abs(by_weight - [0, 10, 5]).max())
     # Two readings 1 apart have a standard deviation of 1/√2, times the slope.
-    assert found.repeatability_gf == pytest.approx(found.line.a1 / np.sqrt(2))
-    assert found.full_scale_gf == 10
+    assert found["repeatability_gf"] == pytest.approx(found["a1_gf_per_10uv"] / np.sqrt(2))
+    assert found["full_scale_gf"] == 10
 
 
 def test_a_weight_put_on_long_after_its_mark_is_waited_for(tmp_path) -> None:

@@ -128,6 +128,6 @@ def test_flight_bounds_hold_the_truth():
     part = band_signals(Run("flight", pd.DataFrame(table)), vehicle, (1.0, 6.0), 0.0, 250.0)
     fits = fit_flights([part], 1.0, rng)
     for fit, true in zip(fits[:2], TRUE[:2], strict=True):
-        assert fit.lower < fit.estimate < fit.upper
-        assert fit.interval_95[0] < true < fit.interval_95[1]
-        assert fit.r2 > 0.9
+        assert fit["lower"] < fit["estimate"] < fit["upper"]
+        assert fit["interval_95"][0] < true < fit["interval_95"][1]
+        assert fit["r2"] > 0.9

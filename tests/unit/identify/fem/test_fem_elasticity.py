@@ -112,7 +112,7 @@ def test_closed_forms_are_met_ever_better(case, finest) -> None:
     errors = {name: [] for name in finest}
     for fineness in FINENESSES:
         for row in case(fineness):
-            errors[row.quantity].append(abs(row.error))
+            errors[row["quantity"]].append(abs(row["error"]))
     for name, found in errors.items():
         assert found == sorted(found, reverse=True)
         assert found[-1] < finest[name], name
