@@ -40,7 +40,7 @@ from rotorid.acquire.transport import (
 )
 from rotorid.io import rawlog, wire
 from rotorid.io.frames import ANSWER, COMMAND, DATA, END, START, Frame, Intake, Taken, encode
-from rotorid.io.session import Counts, Ended, GapEntry, Session, Setup, write_session
+from rotorid.io.session import Counts, Ended, Session, Setup, write_session
 from rotorid.io.session import Event as SessionEvent
 from rotorid.io.wire import COMPLETE, GO, IDENTIFY, KEEP, OK, STOP, STOPPED, UNHEARD, pack_keep
 
@@ -712,7 +712,7 @@ class Recorder:
             malformed_samples=self._intake.malformed_samples or None,
             unknown_kinds=self._intake.unknown_kinds or None,
         )
-        session.gaps = [GapEntry(**vars(gap)) for gap in tracker.gaps[:_MAX_GAPS_LISTED]]
+        session.gaps = tracker.gaps[:_MAX_GAPS_LISTED]
         session.gaps_left_out = max(0, len(tracker.gaps) - _MAX_GAPS_LISTED)
         rate = self._measured_rate()
         if self.identity is not None and self.identity.interval_us:

@@ -15,7 +15,7 @@ import random
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any, Literal
@@ -33,7 +33,7 @@ from rotorid.io.index import write_index
 from rotorid.io.logs import Log, LogError, read_log
 from rotorid.io.models import KnownKeys, read_model
 from rotorid.io.rawlog import RECEIVED, NotALog, read_raw
-from rotorid.io.session import Counts, Ended, GapEntry, SessionError, Setup, read_session, session_path, write_session
+from rotorid.io.session import Counts, Ended, SessionError, Setup, read_session, session_path, write_session
 from rotorid.io.text.wording import explain, hint
 from rotorid.io.wire import INSTRUMENTS
 
@@ -474,7 +474,7 @@ def repair(log: Path, parsed: Log) -> bool:
     )
     if not parsed.faults:  # from now on a change of the log is noticed
         session.log_sha256 = raw.sha256
-    session.gaps = [GapEntry(**asdict(gap)) for gap in parsed.gaps[:1000]]
+    session.gaps = parsed.gaps[:1000]
     session.gaps_left_out = max(0, len(parsed.gaps) - 1000)
     session.duration_s = round(float(table.time_s.iloc[-1]), 6) if len(table) else 0.0
     write_session(session, session_path(log))

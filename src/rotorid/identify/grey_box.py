@@ -65,11 +65,6 @@ def weights_of_inertias(inertias: np.ndarray) -> np.ndarray:
     return np.array([(y - z) / x, (z - x) / y, (x - y) / z, 1 / x, 1 / y, 1 / z])
 
 
-def _six_weights(matrix: np.ndarray) -> np.ndarray:
-    """(w11, w22, w33, w14, w25, w36) of the weight matrix (3, 6)."""
-    return np.array([matrix[i, i] for i in range(3)] + [matrix[i, 3 + i] for i in range(3)])
-
-
 def inertias_of_weights(weights: np.ndarray) -> np.ndarray:
     """J_xx, J_yy, J_zz = 1 / (w14, w25, w36) (eq. 4.80), kg m2."""
     return 1.0 / np.asarray(weights)[3:]
@@ -164,7 +159,8 @@ def fit_masked_network(
     matrix = matrix * k_x / k_d[:, None]
     with np.errstate(divide="ignore"):  # an input that is always zero never settles
         settle = 1 / (training.rate * np.mean((inputs * k_x) ** 2, axis=0))
-    return NetworkFit(_six_weights(matrix), np.arange(len(mse)) * training.every, mse, settle)
+    weights = np.array([matrix[i, i] for i in range(3)] + [matrix[i, 3 + i] for i in range(3)])
+    return NetworkFit(weights, np.arange(len(mse)) * training.every, mse, settle)
 
 
 def fit_least_squares(rates: np.ndarray, accelerations: np.ndarray, moments: np.ndarray, block: int = 50) -> _WeightFit:

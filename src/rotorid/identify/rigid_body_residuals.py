@@ -79,11 +79,6 @@ def rotor_wrench(rotor_speeds: np.ndarray, vehicle: Vehicle) -> np.ndarray:
     return np.column_stack([zero, zero, -thrust.sum(axis=1), -thrust @ y, thrust @ x, torque.sum(axis=1)])
 
 
-def _airspeed(run: Run) -> np.ndarray:
-    """Speed in still air, m/s, shape (n,)."""
-    return np.linalg.norm(run.array(c.VELOCITY), axis=1)
-
-
 def rmse(residual: np.ndarray) -> dict[str, float]:
     """Root mean square of each channel and of the totals, residual of shape (n, 6)."""
     squares = np.mean(_squares(residual), axis=0)
@@ -236,7 +231,7 @@ def compare_with_neurobem(
     """RMS of every flight and model, and against airspeed with block-bootstrap intervals."""
     vehicle = recordings.vehicle
     left = {run.name: _residuals_of(run, vehicle, cutoff_hz) for run in recordings.runs}
-    speeds = {run.name: _airspeed(run) for run in recordings.runs}
+    speeds = {run.name: np.linalg.norm(run.array(c.VELOCITY), axis=1) for run in recordings.runs}
     times = {run.name: run.time_s for run in recordings.runs}
     rows, summary = [], {"mass_kg": vehicle.mass_kg, "paper_mass_kg": _PAPER_MASS_KG, "flights": {}}
     for flight, models in left.items():

@@ -20,11 +20,11 @@ from __future__ import annotations
 import struct
 from binascii import crc_hqx
 from collections.abc import Iterator
-from dataclasses import dataclass
 from enum import IntFlag
 from typing import NamedTuple
 
 from rotorid.io import wire
+from rotorid.io.session import Gap
 from rotorid.io.wire import BOOTED
 
 START = ord("S")  # identity: at boot, when asked, and when a stream starts
@@ -159,20 +159,6 @@ class Quality(IntFlag):
     SATURATED = 8  # a channel stands at the end of its range
 
 
-@dataclass(frozen=True)
-class Gap:
-    """Missing frames, `count` of them from `first_index` on, within one segment (between two resets).
-
-    `start_s` and `stop_s` are the device times of the last frame before and the first one after the gap.
-    """
-
-    segment: int
-    first_index: int
-    count: int
-    start_s: float
-    stop_s: float
-
-
 class Placed(NamedTuple):
     """Where a frame belongs: segment (number of resets before it), index within the segment's unwrapped
     sequence, unwrapped device clock in µs, flags."""
@@ -237,7 +223,8 @@ class Tracker:
         if step <= 0:
             return self._old(index, clock)
         if step > 1:
-            self.gaps.append(Gap(self.segment, self._index + 1, step - 1, self._clock / 1e6, clock / 1e6))
+            since = {"segment": self.segment, "first_index": self._index + 1, "start_s": self._clock / 1e6}
+            self.gaps.append(Gap(**since, count=step - 1, stop_s=clock / 1e6))
             self.missing += step - 1
             self._flags |= Quality.AFTER_GAP
         self._index, self._clock, self._kind = index, clock, frame.kind
@@ -312,8 +299,8 @@ def _split(gap: Gap, index: int, clock_s: float) -> list[Gap]:
     """What is left of a gap once the frame `index` in it has come after all."""
     before, after = index - gap.first_index, gap.first_index + gap.count - 1 - index
     parts = [
-        Gap(gap.segment, gap.first_index, before, gap.start_s, clock_s),
-        Gap(gap.segment, index + 1, after, clock_s, gap.stop_s),
+        gap.model_copy(update={"count": before, "stop_s": clock_s}),
+        gap.model_copy(update={"first_index": index + 1, "count": after, "start_s": clock_s}),
     ]
     return [part for part in parts if part.count]
 

@@ -23,8 +23,8 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.io import rawlog, wire
-from rotorid.io.frames import DATA, END, START, Gap, Intake, Quality
-from rotorid.io.session import Ended, Session, SessionError, read_session, session_path
+from rotorid.io.frames import DATA, END, START, Intake, Quality
+from rotorid.io.session import Ended, Gap, Session, SessionError, read_session, session_path
 from rotorid.io.wire import STREAMING
 
 _SETUP = (
@@ -320,7 +320,7 @@ def _row(log: Log) -> dict:
         "sensor_z_m": _part(setup["sensor_position_m"], 2),
         "air_density_kg_m3": session.setup.air.density_kg_m3 if session.setup.air else np.nan,
         "samples": len(log.table),
-        "rate_hz": _rate(log.table["time_s"].to_numpy()),
+        "rate_hz": float(1 / log.table["time_s"].diff().median()),
         "flagged": flagged,
         "missing": log.missing,
         "damaged": log.checksum_errors + log.broken_frames + log.malformed,
@@ -338,11 +338,6 @@ def _row(log: Log) -> dict:
 
 def _part(values: list[float] | None, place: int) -> float:
     return np.nan if values is None else values[place]
-
-
-def _rate(time_s: np.ndarray) -> float:
-    """Samples per second of device time by the median step; NaN of fewer than two samples."""
-    return float(1 / np.median(np.diff(time_s))) if len(time_s) > 1 else float("nan")
 
 
 def read_sessions(path: str | Path) -> pd.DataFrame:

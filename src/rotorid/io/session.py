@@ -80,8 +80,11 @@ class Setup(KnownKeys):
     remarks: str | None = None
 
 
-class GapEntry(KnownKeys):
-    """Frames that never came, in device time of their segment."""
+class Gap(KnownKeys):
+    """Missing frames, `count` of them from `first_index` on, within one segment (between two resets).
+
+    `start_s` and `stop_s` are the device times of the last frame before and the first one after the gap.
+    """
 
     segment: int
     first_index: int
@@ -143,7 +146,7 @@ class Session(KnownKeys):
     device_clock_ratio: float | None = None  # device seconds per host second
     duration_s: float | None = None
     counts: Counts = Counts()
-    gaps: list[GapEntry] = []
+    gaps: list[Gap] = []
     gaps_left_out: int = 0  # beyond the first thousand
     events: list[Event] = []
     warnings: list[str] = []

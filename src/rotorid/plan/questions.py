@@ -44,7 +44,7 @@ from rotorid.mismatch.plant.rows import Term, residual
 from rotorid.mismatch.plant.speedpath import commanded_path, starts_of
 from rotorid.mismatch.plant.split import parts_of, split_runs
 from rotorid.mismatch.posterior.status import CLAIMED
-from rotorid.recordings import RecordingSet, Run
+from rotorid.recordings import RecordingSet
 from rotorid.recordings.signal.kernels import causal
 from rotorid.recordings.sufficient import sufficient
 from rotorid.vehicle.derivatives import derivative_form, own_controls, quantities
@@ -418,7 +418,7 @@ def joined_sets(first: RecordingSet, *others: RecordingSet) -> tuple[RecordingSe
     for number, other in enumerate(others, 2):
         if len(other.runs) >= 3:
             held += [f"{number}-{n}" for n in split_runs(other).held_out]
-    columns = [set.intersection(*(_present(r) for r in s.runs)) for s in sets]
+    columns = [set.intersection(*({n for n in r.table.columns if r.has(n)} for r in s.runs)) for s in sets]
     shared = set.intersection(*columns)
     name = "+".join(s.name for s in sets)
     if shared <= {"time_s"}:
@@ -448,11 +448,6 @@ def _brief(value) -> str:
     """A value of vehicle.yaml, short."""
     text = str(value)
     return text if len(text) < 40 else text[:37] + "…"
-
-
-def _present(run: Run) -> set[str]:
-    """Columns with anything in them."""
-    return {n for n in run.table.columns if run.has(n)}
 
 
 @dataclass(frozen=True)

@@ -168,7 +168,10 @@ def _imported_names(tree: ast.Module, package: str) -> Iterator[str]:
             names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             names = _from_names(node, package)
-        elif isinstance(node, ast.Call) and _called(node) == "import_module":
+        elif isinstance(node, ast.Call) and "import_module" in (
+            getattr(node.func, "attr", ""),
+            getattr(node.func, "id", ""),
+        ):
             names = [arg.value for arg in node.args if isinstance(arg, ast.Constant)]
         else:
             continue
@@ -184,10 +187,6 @@ def _from_names(node: ast.ImportFrom, package: str) -> list[str]:
         parts = package.split(".")
         base = ".".join(parts[: len(parts) - node.level + 1] + ([base] if base else []))
     return [base, *(f"{base}.{alias.name}" for alias in node.names)]
-
-
-def _called(node: ast.Call) -> str:
-    return node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
 
 
 def _package_of(path: Path, homes: Mapping[str, Path]) -> str:

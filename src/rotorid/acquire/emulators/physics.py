@@ -461,7 +461,12 @@ def stated(truth: Truth) -> dict[str, Any]:
         "battery_sag": {"p": rotor.voltage_exponent},
     }
     sensor = {
-        "crosstalk": _off_diagonal(wrench.crosstalk),
+        "crosstalk": {
+            f"C_{to},{by}": wrench.crosstalk[t][s]
+            for t, to in enumerate(_CHANNELS)
+            for s, by in enumerate(_CHANNELS)
+            if t != s
+        },
         "sensor_origin": {f"d_{a}": -e for a, e in zip("xyz", wrench.position_error_m, strict=True)},
         "rotor_acceleration_torque": {"J_r": rotor.inertia_kg_m2},
         "com_offset": {f"r_{a}": c for a, c in zip("xyz", vehicle.com_offset_m, strict=True)},
@@ -499,11 +504,6 @@ def _rounded(value: Any) -> Any:
     if isinstance(value, list):
         return [_rounded(part) for part in value]
     return float(f"{value:.6g}") if isinstance(value, float) else value
-
-
-def _off_diagonal(matrix: list[list[float]]) -> dict[str, float]:
-    """`C_to,from` of each pair of channels."""
-    return {f"C_{_CHANNELS[t]},{_CHANNELS[s]}": matrix[t][s] for t in range(6) for s in range(6) if t != s}
 
 
 def _excess(letter: str, factors: list[float]) -> dict[str, float]:
