@@ -39,8 +39,7 @@ from rotorid.acquire.emulators.truth import (
     write_truth,
 )
 from rotorid.acquire.procedures import LowPass, Steadiness, programme_of
-from rotorid.io.experiments import EXPERIMENTS
-from rotorid.io.wire import GREEN, RED, SINE, TRAPEZOID, YELLOW, Programme
+from rotorid.io.wire import EXPERIMENTS, GREEN, RED, SINE, TRAPEZOID, YELLOW, Programme
 
 RNG = np.random.default_rng
 

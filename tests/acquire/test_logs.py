@@ -13,11 +13,11 @@ from rotorid.acquire import procedures
 from rotorid.acquire.emulators.wire import Faults
 from rotorid.acquire.recorder import LogWriter
 from rotorid.io import rawlog
-from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.index import COLUMNS, read_index, write_index
 from rotorid.io.logs import LogError, read_log
 from rotorid.io.rawlog import NotALog, read_raw
 from rotorid.io.session import RoomAir, Session, SessionError, read_session, session_path, write_session
+from rotorid.io.wire import EXPERIMENTS
 
 
 def short_log(loopback, samples):

@@ -36,10 +36,9 @@ from rotorid.acquire.transport import (
 )
 from rotorid.errors import InputError
 from rotorid.io import wire
-from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.frames import COMMAND, START, Frame, Intake, encode
 from rotorid.io.session import RoomAir, SessionError, Setup
-from rotorid.io.wire import IDENTIFY, INSTRUMENTS
+from rotorid.io.wire import EXPERIMENTS, IDENTIFY, INSTRUMENTS
 
 _DEFAULT_OUT = Path("raw/local")
 _BY_ID = Path("/dev/serial/by-id")

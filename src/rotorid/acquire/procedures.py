@@ -25,9 +25,8 @@ from pathlib import Path
 from rotorid.acquire.recorder import Recorder, Row, Timings
 from rotorid.acquire.transport import GaveUp, SerialTransport, SystemClock
 from rotorid.io import wire
-from rotorid.io.experiments import Experiment
 from rotorid.io.session import Session, Setup
-from rotorid.io.wire import INSTRUMENTS
+from rotorid.io.wire import INSTRUMENTS, Experiment
 
 RAMP_S = 3.0
 HOLD_S = 8.0

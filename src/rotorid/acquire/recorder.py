@@ -75,7 +75,7 @@ class Row(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Status:
+class _Status:
     """What a live view shows, a snapshot."""
 
     phase: str
@@ -373,14 +373,14 @@ class Recorder:
         """Whether there is a log of this recording."""
         return self._writer is not None
 
-    def status(self) -> Status:
+    def status(self) -> _Status:
         """A snapshot for a live view; may be called from another thread."""
         elapsed = (self._clock.now_ns() - self.session.host_start_ns) / 1e9
         rate = self._measured_rate()
         remaining = None
         if self.wanted is not None and rate:
             remaining = max(0, self.wanted - self.progress) / rate
-        return Status(
+        return _Status(
             phase=self.phase,
             values=self._last_values,
             samples=self._samples,

@@ -28,14 +28,13 @@ from rotorid.acquire.procedures import programme_of, recorders_for, run_with
 from rotorid.acquire.recorder import NAME, Recorder
 from rotorid.acquire.transport import AcquireError
 from rotorid.errors import InputError
-from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.index import write_index
 from rotorid.io.logs import Log, LogError, read_log
 from rotorid.io.models import KnownKeys, read_model
 from rotorid.io.rawlog import RECEIVED, NotALog, read_raw
 from rotorid.io.session import Counts, Ended, SessionError, Setup, read_session, session_path, write_session
 from rotorid.io.text.wording import explain, hint
-from rotorid.io.wire import INSTRUMENTS
+from rotorid.io.wire import EXPERIMENTS, INSTRUMENTS
 
 _Kind = Literal["stream", "calibrate", "static", "dynamic", "thrust", "torque", "wrench", "experiment", "tensile"]
 _NEEDS: dict[str, tuple[str, ...]] = {
@@ -67,7 +66,7 @@ class PlanError(InputError):
     """The plan is not what it should be; the sentence names file and place."""
 
 
-class Checks(KnownKeys):
+class _Checks(KnownKeys):
     """What is looked at before the first step. Keys of the dictionaries are columns."""
 
     disk_mb: float = 100
@@ -77,7 +76,7 @@ class Checks(KnownKeys):
     clock_s: float = 5  # the newest recording in the folder may not be further in the future
 
 
-class Group(KnownKeys):
+class _Group(KnownKeys):
     """Steps of one kind: all combinations of `over`, each `repeats` times."""
 
     name: str  # of the recordings; {key} stands for a value of `over`, {repeat} for the repeat
@@ -99,9 +98,9 @@ class CampaignPlan(KnownKeys):
     ports: dict[str, str]  # instrument: serial port, best by its stable name in /dev/serial/by-id
     operator: str | None = None
     seed: int = 1  # of the random order
-    checks: Checks = Checks()
+    checks: _Checks = _Checks()
     limits: dict[str, tuple[float, float]] = {}  # column: lowest and highest; beyond, everything stops
-    steps: list[Group]
+    steps: list[_Group]
 
     @model_validator(mode="after")
     def _fits(self) -> CampaignPlan:
@@ -116,12 +115,12 @@ class CampaignPlan(KnownKeys):
 
 
 @dataclass(frozen=True)
-class Step:
+class _Step:
     """One recording of the plan."""
 
     number: int
     name: str
-    group: Group
+    group: _Group
     values: dict[str, Any]  # of `over`, and `repeat`
     instruments: tuple[str, ...]
 
@@ -147,12 +146,12 @@ def read_plan(path: Path) -> CampaignPlan:
     return read_model(path, CampaignPlan, PlanError)
 
 
-def steps_of(plan: CampaignPlan) -> list[Step]:
+def steps_of(plan: CampaignPlan) -> list[_Step]:
     """All steps in the order in which they are recorded; the same plan gives the same order each time.
 
     Raises PlanError for names that are none or not each step's own, and for instruments without a port.
     """
-    steps: list[Step] = []
+    steps: list[_Step] = []
     for place, group in enumerate(plan.steps):
         combinations = [
             dict(zip(group.over, values, strict=True)) | {"repeat": repeat}
@@ -169,7 +168,7 @@ def steps_of(plan: CampaignPlan) -> list[Step]:
                 raise PlanError(
                     f"steps.{place}: {group.name!r} or its `ask` uses {error}, which is not in `over`"
                 ) from error
-            step = Step(len(steps) + 1, name, group, values, _instruments(plan, place, group))
+            step = _Step(len(steps) + 1, name, group, values, _instruments(plan, place, group))
             _check_step(step, place, plan.operator)
             steps.append(step)
     names = [step.name for step in steps]
@@ -181,7 +180,7 @@ def steps_of(plan: CampaignPlan) -> list[Step]:
     return steps
 
 
-def _check_step(step: Step, place: int, operator: str | None) -> None:
+def _check_step(step: _Step, place: int, operator: str | None) -> None:
     """PlanError where a setup does not fit, or where a setting or a value of `over` is one that nothing reads."""
     group, known = step.group, (*_SETTINGS[step.group.do], "tolerance", "wait_s")
     try:
@@ -196,7 +195,7 @@ def _check_step(step: Step, place: int, operator: str | None) -> None:
             raise PlanError(f"steps.{place}: over.{name}: nothing reads it{hint(name, [*known, *Setup.model_fields])}")
 
 
-def _instruments(plan: CampaignPlan, place: int, group: Group) -> tuple[str, ...]:
+def _instruments(plan: CampaignPlan, place: int, group: _Group) -> tuple[str, ...]:
     needed = _NEEDS.get(group.do, ())
     if group.instrument is not None and len(needed) < 2:
         needed = (group.instrument,)
@@ -208,29 +207,29 @@ def _instruments(plan: CampaignPlan, place: int, group: Group) -> tuple[str, ...
     return needed
 
 
-def attempts(plan: CampaignPlan, step: Step) -> list[str]:
+def attempts(plan: CampaignPlan, step: _Step) -> list[str]:
     """Names of the step's attempts that have left anything in the folder, oldest first."""
     found = []
     for number in itertools.count(1):
         name = step.name if number == 1 else f"{step.name}.{number}"
-        files = [plan.out / f"{stem}{end}" for stem in stems(step, name) for end in (".yaml", ".rlog", ".rlog.gz")]
+        files = [plan.out / f"{stem}{end}" for stem in _stems(step, name) for end in (".yaml", ".rlog", ".rlog.gz")]
         if not any(path.exists() for path in files):
             return found
         found.append(name)
 
 
-def next_attempt(plan: CampaignPlan, step: Step) -> str:
+def _next_attempt(plan: CampaignPlan, step: _Step) -> str:
     """The name of the recording that would be made now."""
     number = len(attempts(plan, step)) + 1
     return step.name if number == 1 else f"{step.name}.{number}"
 
 
-def is_done(plan: CampaignPlan, step: Step) -> bool:
+def is_done(plan: CampaignPlan, step: _Step) -> bool:
     """Whether one attempt has finished and its logs are as they were recorded."""
-    return any(all(_whole(plan.out, stem) for stem in stems(step, name)) for name in attempts(plan, step))
+    return any(all(_whole(plan.out, stem) for stem in _stems(step, name)) for name in attempts(plan, step))
 
 
-def stems(step: Step, name: str) -> list[str]:
+def _stems(step: _Step, name: str) -> list[str]:
     """File names, without their ends, of an attempt: one for each instrument."""
     return [name] if len(step.instruments) == 1 else [f"{name}-{instrument}" for instrument in step.instruments]
 
@@ -248,7 +247,7 @@ def _whole(folder: Path, stem: str) -> bool:
 
 _Say = Callable[[str], None]
 _Ask = Callable[[str], str]
-_Prompts = Callable[[Step], Callable[[Recorder], procedures.Prompt]]
+_Prompts = Callable[[_Step], Callable[[Recorder], procedures.Prompt]]
 _Watch = Callable[[list[Recorder], Callable[[], None]], None]
 
 
@@ -322,13 +321,13 @@ def _rest_faults(plan: CampaignPlan, recorder: Recorder) -> Iterator[str]:
             yield f"{column}: reads {mean:.3g} at rest, allowed {plan.checks.zero[column]:g} (checks.zero); tare it"
 
 
-def _record_step(plan: CampaignPlan, step: Step, ports: dict[str, str], desk: Desk) -> None:
+def _record_step(plan: CampaignPlan, step: _Step, ports: dict[str, str], desk: Desk) -> None:
     """Record one step under the next free name. Raises AcquireError."""
     setup: Setup = step.setup(plan.operator)
     recorders = recorders_for(
         {instrument: ports[instrument] for instrument in step.instruments},
         plan.out,
-        next_attempt(plan, step),
+        _next_attempt(plan, step),
         dict.fromkeys(step.instruments, setup),
         procedure={
             "name": step.group.do,
@@ -343,7 +342,7 @@ def _record_step(plan: CampaignPlan, step: Step, ports: dict[str, str], desk: De
     desk.watch(recorders, lambda: run_with(recorders, lambda *opened: _carry_out(step, desk, *opened)))
 
 
-def _carry_out(step: Step, desk: Desk, *recorders: Recorder) -> None:
+def _carry_out(step: _Step, desk: Desk, *recorders: Recorder) -> None:
     do, get, first = step.group.do, step.setting, recorders[0]
     rule = procedures.STEADY_JR3 if first.instrument.name == "jr3" else procedures.SteadyRule()
     if get("tolerance") is not None:
@@ -373,11 +372,11 @@ def _carry_out(step: Step, desk: Desk, *recorders: Recorder) -> None:
         procedures.stream(first, None, moves=True)
 
 
-def _complete_killed(plan: CampaignPlan, steps: list[Step], say: _Say) -> None:
+def _complete_killed(plan: CampaignPlan, steps: list[_Step], say: _Say) -> None:
     """Counts and gaps for the metadata of attempts whose recorder was killed; the attempts stay what they are."""
     for step in steps:
         for name in attempts(plan, step):
-            for stem in stems(step, name):
+            for stem in _stems(step, name):
                 with suppress(SessionError, LogError, NotALog, OSError):  # such a one is no recording to complete
                     session = read_session(plan.out / f"{stem}.yaml")
                     log = plan.out / session.log
@@ -418,14 +417,14 @@ def run(plan: CampaignPlan, ports_of: Callable, desk: Desk, repeat: str | None =
 
 
 @contextmanager
-def real_ports(plan: CampaignPlan, step: Step | None) -> Iterator[dict[str, str]]:
+def real_ports(plan: CampaignPlan, step: _Step | None) -> Iterator[dict[str, str]]:
     """The plan's own."""
     yield plan.ports
 
 
 @contextmanager
 def emulated_ports(
-    plan: CampaignPlan, step: Step | None, folder: Path, speed: float, place_s: float
+    plan: CampaignPlan, step: _Step | None, folder: Path, speed: float, place_s: float
 ) -> Iterator[dict[str, str]]:
     """Emulators under the plan's instruments; a weight that the step asks for is put on by itself."""
     from contextlib import ExitStack

@@ -101,12 +101,12 @@ def _write_model(folder: Path, target: Path, to: str, quiet: bool = True) -> tup
                 found = next_to_log(analysis, to, exported)
         except InputError as error:
             return written, [*said, f"not flown next to the log: {error}"]
-        written += comparison(found, target)
+        written += _comparison(found, target)
         first, *rest = found.sentences()
         return written, [*said, first, *(f"  - {sentence}" for sentence in rest)]
 
 
-def comparison(found, target: Path) -> list[Path]:
+def _comparison(found, target: Path) -> list[Path]:
     """Write `next_to_log.csv` (a row a model and channel) and `next_to_log.png`."""
     import pandas as pd
 
@@ -254,13 +254,13 @@ def parameters(
             typer.echo(json.dumps([_as_dict(p) for p in found], indent=1, ensure_ascii=False, allow_nan=False))
             return
         for p in found:
-            typer.echo(line(p))
+            typer.echo(_line(p))
         if out is not None:
             number = sum(p.to_set is not None for p in found)
             typer.echo(f"{out}: {number} parameter{'' if number == 1 else 's'} to load")
 
 
-def line(p: AutopilotParameter) -> str:
+def _line(p: AutopilotParameter) -> str:
     """`NAME = value [low, high] unit: sentence`; the sentence alone where nothing was estimated."""
     if math.isnan(p.value):
         return f"{p.name}: {p.sentence}"

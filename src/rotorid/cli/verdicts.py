@@ -251,11 +251,11 @@ def compare(
             found = changes_between(good, second, seen=seen)
         text = json.dumps(words.as_json(found), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
         if out is not None:
-            write(out, text)
+            _write(out, text)
         if page is not None:
             from rotorid.report.page.changes import make_changes_page
 
-            write(page, make_changes_page(found))
+            _write(page, make_changes_page(found))
         if as_json:
             typer.echo(text, nl=False)
         else:
@@ -295,7 +295,7 @@ def read(
         return out
 
 
-def write(path: Path, text: str) -> None:
+def _write(path: Path, text: str) -> None:
     """Write a file whole or not at all."""
     from rotorid.io.text.writing import all_or_none
 

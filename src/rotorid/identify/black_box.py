@@ -31,8 +31,8 @@ from scipy.optimize import least_squares
 
 from rotorid.errors import InputError
 from rotorid.identify.networks import Trained, Training, build, train
-from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.logs import by_recording
+from rotorid.io.wire import EXPERIMENTS
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.attitude import quaternion_from_euler, rotation_from_quaternion
 from rotorid.vehicle.mixer import wrench_matrix

@@ -22,9 +22,9 @@ from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
 from rotorid.identify.clocks import Aligned, Pair, both_on_host, pair_of, torque_offset
-from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.frames import Quality
 from rotorid.io.logs import by_recording
+from rotorid.io.wire import EXPERIMENTS
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.signal.filters import block_count, mean_and_error
@@ -126,7 +126,7 @@ def _tester_vehicle(name: str, believed: Vehicle, noise: dict[str, float]) -> Ve
     return Vehicle.model_validate(content)
 
 
-def pairs(first: pd.DataFrame, second: pd.DataFrame) -> list[tuple]:
+def _pairs(first: pd.DataFrame, second: pd.DataFrame) -> list[tuple]:
     """Rows of two tables of recordings that belong to one group, in the order of the first."""
     others = {row.group: row for row in second.itertuples()}
     return [(row, others[row.group]) for row in first.itertuples() if row.group in others]
@@ -144,7 +144,7 @@ def read_pairs(quadrotor: tuple, wrench: tuple, largest_error: float) -> list[Pa
             felt[read.id],
             largest_error,
         )
-        for sent, read in pairs(quadrotor[1], wrench[1])
+        for sent, read in _pairs(quadrotor[1], wrench[1])
     ]
 
 
@@ -167,7 +167,7 @@ def torque_set(
     """The 20 torque tests; where a test's lift is too weak to show its clocks' offset, the others' median is taken."""
     counted, felt = by_recording(rotor[0]), by_recording(wrench[0])
     tests = []
-    for drive, read in pairs(rotor[1], wrench[1]):
+    for drive, read in _pairs(rotor[1], wrench[1]):
         (speed, _), (reading, _) = both_on_host(counted[drive.id], felt[read.id], largest_error)
         tests.append((drive.group, speed, reading))
     lags = [torque_offset(speed, reading) for _, speed, reading in tests]

@@ -1,7 +1,6 @@
 """Files: raw logs of instruments and their tables; texts that people write, and sentences to them."""
 
 OPEN = (
-    "experiments",
     "frames",
     "index",
     "lines",

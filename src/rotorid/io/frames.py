@@ -35,8 +35,8 @@ COMMAND = ord("C")  # from the host to the device
 
 _HEAD = struct.Struct("<BHI")
 _TAIL = struct.Struct("<H")
-SEQUENCE_PERIOD = 1 << 16
-CLOCK_PERIOD_US = 1 << 32
+_SEQUENCE_PERIOD = 1 << 16
+_CLOCK_PERIOD_US = 1 << 32
 _MAX_BODY = 253  # so that a COBS block never needs the special code 0xFF
 _MAX_WIRE = _MAX_BODY + 2
 _UNKNOWN_BOOT = -1  # a reset was noticed whose start record never came
@@ -91,7 +91,7 @@ def cobs_decode(block: bytes) -> bytes:
 
 def encode(frame: Frame) -> bytes:
     """The bytes of a frame on the wire, ending in the zero that delimits it."""
-    body = _HEAD.pack(frame.kind, frame.sequence % SEQUENCE_PERIOD, frame.clock_us % CLOCK_PERIOD_US)
+    body = _HEAD.pack(frame.kind, frame.sequence % _SEQUENCE_PERIOD, frame.clock_us % _CLOCK_PERIOD_US)
     body += frame.payload
     return cobs_encode(body + _TAIL.pack(crc_hqx(body, 0xFFFF))) + b"\0"
 
@@ -159,7 +159,7 @@ class Quality(IntFlag):
     SATURATED = 8  # a channel stands at the end of its range
 
 
-class Placed(NamedTuple):
+class _Placed(NamedTuple):
     """Where a frame belongs: segment (number of resets before it), index within the segment's unwrapped
     sequence, unwrapped device clock in µs, flags."""
 
@@ -196,9 +196,9 @@ class Tracker:
     @property
     def rollovers(self) -> int:
         """How often the device clock ran over 2^32 µs (71.6 minutes)."""
-        return self._rollovers + max(0, self._clock // CLOCK_PERIOD_US)
+        return self._rollovers + max(0, self._clock // _CLOCK_PERIOD_US)
 
-    def place(self, frame: Frame) -> Placed | None:
+    def place(self, frame: Frame) -> _Placed | None:
         """The frame's place, or None for a frame that was here before."""
         record = _start_record(frame)
         if record is not None:
@@ -209,8 +209,8 @@ class Tracker:
                 self._begin_segment(record.boot_id)
         if self._index is None:
             return self._first(frame)
-        step = _signed(frame.sequence - self._index, SEQUENCE_PERIOD)
-        ticks = _signed(frame.clock_us - self._clock, CLOCK_PERIOD_US)
+        step = _signed(frame.sequence - self._index, _SEQUENCE_PERIOD)
+        ticks = _signed(frame.clock_us - self._clock, _CLOCK_PERIOD_US)
         if frame.kind == DATA == self._kind:  # between other frames the device may have idled for hours
             step += self._whole_periods(step, ticks)
             if self._contradicts(step, ticks):
@@ -228,14 +228,14 @@ class Tracker:
             self.missing += step - 1
             self._flags |= Quality.AFTER_GAP
         self._index, self._clock, self._kind = index, clock, frame.kind
-        return Placed(self.segment, index, clock, self._take_flags(frame))
+        return _Placed(self.segment, index, clock, self._take_flags(frame))
 
-    def _first(self, frame: Frame) -> Placed:
+    def _first(self, frame: Frame) -> _Placed:
         if self.segment < 0:
             self.segment = 0
         self._index, self._clock, self._kind = frame.sequence, frame.clock_us, frame.kind
         self._origin = (self._index, self._clock)
-        return Placed(self.segment, self._index, self._clock, self._take_flags(frame))
+        return _Placed(self.segment, self._index, self._clock, self._take_flags(frame))
 
     def _begin_segment(self, boot_id: int) -> None:
         # frames may come before the first start record: they belong to the boot it names
@@ -257,13 +257,13 @@ class Tracker:
 
     def _whole_periods(self, step: int, ticks: int) -> int:
         """Multiples of 65,536 frames that the clock says have passed unseen."""
-        if not self.interval_us or ticks <= SEQUENCE_PERIOD * self.interval_us // 4:
+        if not self.interval_us or ticks <= _SEQUENCE_PERIOD * self.interval_us // 4:
             return 0
-        return round((ticks / self.interval_us - step) / SEQUENCE_PERIOD) * SEQUENCE_PERIOD
+        return round((ticks / self.interval_us - step) / _SEQUENCE_PERIOD) * _SEQUENCE_PERIOD
 
     def _contradicts(self, step: int, ticks: int) -> bool:
         """Whether a step back, or over periods unseen, goes with a clock that does not fit it: a reset."""
-        if not self.interval_us or 0 < step < SEQUENCE_PERIOD // 2:
+        if not self.interval_us or 0 < step < _SEQUENCE_PERIOD // 2:
             return False
         return abs(ticks - step * self.interval_us) > max(1_000_000, ticks // 100) + 50 * self.interval_us
 
@@ -283,14 +283,14 @@ class Tracker:
         """The frame just placed holds no sample: the next sample says that one is missing before it."""
         self._flags |= Quality.AFTER_GAP
 
-    def _old(self, index: int, clock: int) -> Placed | None:
+    def _old(self, index: int, clock: int) -> _Placed | None:
         for i in range(len(self.gaps) - 1, max(len(self.gaps) - _LATEST_GAPS, 0) - 1, -1):
             gap = self.gaps[i]
             if gap.segment == self.segment and gap.first_index <= index < gap.first_index + gap.count:
                 self.gaps[i : i + 1] = _split(gap, index, clock / 1e6)
                 self.late += 1
                 self.missing -= 1
-                return Placed(self.segment, index, clock, Quality.LATE)
+                return _Placed(self.segment, index, clock, Quality.LATE)
         self.repeated += 1
         return None
 
@@ -327,7 +327,7 @@ class Taken(NamedTuple):
     """
 
     kind: int
-    place: Placed | None
+    place: _Placed | None
     content: wire.StartRecord | wire.EndRecord | wire.Answer | bytes
 
 

@@ -93,7 +93,7 @@ class Forecast:
 
     def reached(self, target_sigma: float) -> float:
         """Share of the way to all goals."""
-        return share_reached([s.sigma for _, found in self.questions for s in found], self.widths, target_sigma)
+        return _share_reached([s.sigma for _, found in self.questions for s in found], self.widths, target_sigma)
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ def _tried(
     return out
 
 
-def share_reached(sigmas: Iterable[float], wished: Iterable[Width], target_sigma: float) -> float:
+def _share_reached(sigmas: Iterable[float], wished: Iterable[Width], target_sigma: float) -> float:
     """Share of the way to the goals: the mean over all models and wishes of what is reached of each."""
     found = [min(s / target_sigma, 1.0) for s in sigmas]
     found += [min(w.wished / w.after, 1.0) for w in wished if w.wished]
@@ -192,7 +192,7 @@ def _reached(known: FittedSet, base: Information, information: Information, targ
     """Share of the way to the goals with the set (`base`) and more, as `share_reached`."""
     sigmas = [s.sigma for q in known.questions for s in separations(known, q, base, information)]
     sigmas += [s.sigma for _, own in chain_separations(known, information) for s in own]
-    return share_reached(sigmas, widths(known, base, information, wishes) if wishes else (), target)
+    return _share_reached(sigmas, widths(known, base, information, wishes) if wishes else (), target)
 
 
 @step("choosing")

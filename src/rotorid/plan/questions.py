@@ -70,7 +70,7 @@ class _ChainModel:
 
 
 @dataclass(frozen=True)
-class ChainQuestion:
+class _ChainQuestion:
     """Ids of which one lies between command and rotor speed."""
 
     ids: tuple[str, ...]
@@ -163,7 +163,7 @@ def _fitted_values(left, chain, starts: Sequence[np.ndarray]) -> tuple[np.ndarra
     return done.x, float(2 * done.cost)
 
 
-def chain_question(found: Fitted, finding: Finding, ids: Sequence[str]) -> ChainQuestion | None:
+def _chain_question(found: Fitted, finding: Finding, ids: Sequence[str]) -> _ChainQuestion | None:
     """The competing chains of a class; None where fewer than two can be fitted to the set."""
     result = found.chain[0]
     own, rest = finding.id, [(k, f) for k, f in result.fit.chain if k != finding.id]
@@ -184,7 +184,7 @@ def chain_question(found: Fitted, finding: Finding, ids: Sequence[str]) -> Chain
             tries.append((square, _ChainModel(other, chain, values, models[0].doubt)))
         if tries:
             models.append(min(tries, key=lambda t: t[0])[1])
-    return ChainQuestion(tuple(m.id for m in models), tuple(models)) if len(models) > 1 else None
+    return _ChainQuestion(tuple(m.id for m in models), tuple(models)) if len(models) > 1 else None
 
 
 def chain_squares(found: Fitted, segments: Sequence[Segment], true: _ChainModel, rival: _ChainModel) -> float:
@@ -238,7 +238,7 @@ class FittedSet:
     fitted: Fitted
     findings: tuple[Finding, ...]
     questions: tuple[Question, ...]
-    chains: tuple[ChainQuestion, ...]
+    chains: tuple[_ChainQuestion, ...]
     """The same of what lies between command and rotor speed."""
     unanswerable: tuple[tuple[tuple[str, ...], str], ...]
     """Classes that no flight with these columns can settle, with what it takes."""
@@ -296,7 +296,7 @@ def known(
         if needed := beyond_flying(found, ids):
             unanswerable.append((ids, needed))
         elif finding.id in chain:
-            if (between := chain_question(found, finding, ids)) is not None:
+            if (between := _chain_question(found, finding, ids)) is not None:
                 chains.append(between)
             else:
                 needed = "these columns give no chain of the others to compare with"

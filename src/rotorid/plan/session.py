@@ -406,7 +406,7 @@ def _summary(plan: SessionPlan) -> dict:
     )
 
 
-def draw(plan: SessionPlan, path: Path) -> None:
+def _draw(plan: SessionPlan, path: Path) -> None:
     """Write the picture as PNG: the loads or speeds of the session one after the other, and the separations."""
     use()
     bench = plan.kind == "bench"
@@ -440,6 +440,6 @@ def write(plan: SessionPlan, folder: Path) -> list[Path]:
             first = ["run", c.TIME]
             table = plan.table[[*first, *(n for n in plan.table.columns if n not in first)]]
             table.to_csv(parts[1], index=False, float_format="%.6g", lineterminator="\n")
-            draw(plan, parts[2])
+            _draw(plan, parts[2])
         parts[0].write_text(json.dumps(_summary(plan), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     return paths

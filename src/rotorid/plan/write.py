@@ -388,7 +388,7 @@ def write(plan: Plan, folder: Path) -> list[Path]:
             content["crazyflie"] = rounded(
                 {"pieces": len(table), "uploads": -(-len(table) // _PIECES_AT_ONCE), "worst_fit_m": worst}
             )
-            draw(plan, parts[4])
+            _draw(plan, parts[4])
             content["px4_mission"] = why or "px4_mission.plan"
             if not why:
                 parts[5].write_text(json.dumps(mission(plan), indent=1) + "\n", encoding="utf-8")
@@ -396,7 +396,7 @@ def write(plan: Plan, folder: Path) -> list[Path]:
     return paths
 
 
-def draw(plan: Plan, path: Path) -> None:
+def _draw(plan: Plan, path: Path) -> None:
     """Write the picture as PNG."""
     use()
     flight = plan.flight

@@ -69,7 +69,7 @@ class _Content(io.RawIOBase):
         return count
 
 
-def opened(path: Path) -> io.BufferedReader:
+def _opened(path: Path) -> io.BufferedReader:
     """The file's unpacked content, to be read once `look_through` has found it sound."""
     return io.BufferedReader(_Content(_blocks(path)), _BLOCK)
 
@@ -88,7 +88,7 @@ class _CsvLayout:
     """Whether the last line ends before its last cell."""
 
 
-def look_through(path: Path, foreign: bool = False) -> _CsvLayout:
+def _look_through(path: Path, foreign: bool = False) -> _CsvLayout:
     """How the table of a file is written.
 
     `foreign`: a table of one's own, not of a recording set. Its columns may be separated by semicolons, tabs, bars or
@@ -103,7 +103,7 @@ def look_through(path: Path, foreign: bool = False) -> _CsvLayout:
     found, quoted, cut = None, False, False
     for line, text in _whole_lines(path):
         check_text(text, path, line)
-        check_size(line - 2, len(found.names) if found else 0, path)
+        _check_size(line - 2, len(found.names) if found else 0, path)
         if found is None and text.strip():
             found, text = _heading(text, path, foreign)
             line += found.heading_line - 1
@@ -117,7 +117,7 @@ def look_through(path: Path, foreign: bool = False) -> _CsvLayout:
     return replace(found, cut_off=cut)
 
 
-def check_size(rows: int, columns: int, where: object) -> None:
+def _check_size(rows: int, columns: int, where: object) -> None:
     """InputError where a table is larger than any recording."""
     for found, most, what in ((rows, MOST_ROWS, "samples"), (rows * columns, MOST_CELLS, "cells")):
         if found > most:
@@ -198,7 +198,7 @@ def _heading(text: bytes, path: Path, foreign: bool) -> tuple[_CsvLayout, bytes]
     """How the table is written by the beginning of its text, and the text from the last line of the heading on."""
     if foreign and (below := _below_other_lines(text, path)) is not None:
         layout, rest = below
-        check_heading(layout.names, path, layout.heading_line)
+        _check_heading(layout.names, path, layout.heading_line)
         return layout, rest
     first = text.lstrip(b"\r\n").splitlines()[0].decode("utf-8")
     separator = _separator(first)
@@ -213,7 +213,7 @@ def _heading(text: bytes, path: Path, foreign: bool) -> tuple[_CsvLayout, bytes]
     elif widths[separator] == 1:
         separator = " "
     names = _names(first, separator)
-    check_heading(_numbered(names) if foreign else names, path)
+    _check_heading(_numbered(names) if foreign else names, path)
     return _CsvLayout(_numbered(names) if foreign else names, separator), text
 
 
@@ -278,7 +278,7 @@ def _names(line: str, separator: str) -> list[str]:
     return [name.strip() for name in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
 
 
-def check_heading(names: list[str], path: Path, line: int = 1) -> None:
+def _check_heading(names: list[str], path: Path, line: int = 1) -> None:
     """InputError where a column has no name or one that is there twice, or where the names are numbers."""
     seen: set[str] = set()
     for number, name in enumerate(names, 1):
@@ -323,7 +323,7 @@ def _check_cells(text: bytes, first_line: int, count: int, separator: str, path:
 def _check_quoted(path: Path, layout: _CsvLayout, foreign: bool) -> bool:
     """The same where some cells stand in quotes."""
     count, short = len(layout.names), None
-    with io.TextIOWrapper(opened(path), "utf-8-sig", newline="") as text:
+    with io.TextIOWrapper(_opened(path), "utf-8-sig", newline="") as text:
         for _ in range(layout.heading_line - 1):
             text.readline()
         reader = csv.reader(text, delimiter=layout.separator, skipinitialspace=True)
@@ -368,15 +368,15 @@ def read_cells(path: Path, foreign: bool = False) -> pd.DataFrame:
 
     `foreign` as in `csv_text.look_through`; the table's `attrs` then hold the `layout` that was found.
     """
-    layout = look_through(path, foreign)
+    layout = _look_through(path, foreign)
     try:
-        with opened(path) as file:
+        with _opened(path) as file:
             for _ in range(layout.heading_line - 1):
                 file.readline()
             table = pd.read_csv(file, sep=layout.separator, skipinitialspace=True, index_col=False, low_memory=False)
     except (pd.errors.ParserError, pd.errors.EmptyDataError, OverflowError) as error:
         raise InputError(f"{path}: cannot be read as a table ({printable(error)})") from None
-    check_size(*table.shape, path)
+    _check_size(*table.shape, path)
     table = table.iloc[: len(table) - layout.cut_off]
     table.columns = layout.names
     if foreign:
@@ -428,8 +428,8 @@ def _check_parquet(file, size: int, path: Path) -> None:
     """InputError where what a Parquet file says of itself is no table of numbers, or one too large."""
     import pyarrow as pa
 
-    check_heading([str(name) for name in file.schema_arrow.names], path)
-    check_size(file.metadata.num_rows, max(file.metadata.num_columns, 1), path)
+    _check_heading([str(name) for name in file.schema_arrow.names], path)
+    _check_size(file.metadata.num_rows, max(file.metadata.num_columns, 1), path)
     for field in file.schema_arrow:
         if pa.types.is_nested(field.type):
             raise InputError(f"{path}, row 1, column {field.name}: expected a number, found {field.type}")
@@ -446,7 +446,7 @@ def check_table(table: pd.DataFrame, where: str) -> pd.DataFrame:
     if c.TIME not in table.columns:
         near = next((f"; is {printable(n)} meant?" for n in table.columns if _like_time(str(n))), "")
         raise InputError(f"{where}: column {c.TIME} is missing{near}")
-    check_size(*table.shape, where)
+    _check_size(*table.shape, where)
     table = table.astype(float)
     time = table[c.TIME].to_numpy()
     if len(time) < 2:

@@ -22,7 +22,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-PACKAGES = {"rotorid": "src", "rotorid_proof": "proof"}
+_PACKAGES = {"rotorid": "src", "rotorid_proof": "proof"}
 """Each package of the project and the folder, from the top, that holds it."""
 _RESOURCES = "importlib.resources"
 _READ_BY_TESTS = (["OPEN"], ["ROOMS"])
@@ -42,7 +42,7 @@ class Code:
 
     def __init__(self, root: str | Path, memory: str | Path | None = None) -> None:
         self.root = Path(root).resolve()
-        self._homes = {package: self.root / folder for package, folder in PACKAGES.items()}
+        self._homes = {package: self.root / folder for package, folder in _PACKAGES.items()}
         self._facts: dict[Path, _Facts] = {}
         self._files: dict[str, list[Path]] = {}
         self._imports: dict[Path, set[Path]] = {}
@@ -177,7 +177,7 @@ def _imported_names(tree: ast.Module, package: str) -> Iterator[str]:
             continue
         if "pkgutil" in names and package:
             yield f"{package}.*"
-        yield from (name for name in names if name.split(".")[0] in PACKAGES or name == _RESOURCES)
+        yield from (name for name in names if name.split(".")[0] in _PACKAGES or name == _RESOURCES)
 
 
 def _from_names(node: ast.ImportFrom, package: str) -> list[str]:

@@ -448,7 +448,7 @@ class TensilePhysics:
         return max(self.displacement_mm - self._slack_mm, 0) / GAUGE_MM > 1.2 * self._strain[-1]
 
 
-def stated(truth: Truth) -> dict[str, Any]:
+def _stated(truth: Truth) -> dict[str, Any]:
     """Ids at work in each set (`ids`, also what is smaller than the noise) and their `numbers` by id and symbol.
 
     Next to the `sets`: `displaced`, the sensor's place error (m), and its crosstalk of a force into the moment
@@ -494,7 +494,7 @@ def stated(truth: Truth) -> dict[str, Any]:
 def write_stated(truth: Truth, path: Path) -> None:
     """The sealed file that the scoring of the campaign's verdicts reads."""
     head = "# SEALED: the emulated campaign's truth as a verdict could state it. Only scoring may read this file.\n"
-    path.write_text(head + yaml.safe_dump(_rounded(stated(truth)), sort_keys=False, width=110), encoding="utf-8")
+    path.write_text(head + yaml.safe_dump(_rounded(_stated(truth)), sort_keys=False, width=110), encoding="utf-8")
 
 
 def _rounded(value: Any) -> Any:

@@ -39,7 +39,7 @@ from rotorid.acquire.emulators.physics import (
 )
 from rotorid.acquire.emulators.truth import Truth
 from rotorid.acquire.emulators.wire import Faults, WireHalf, World
-from rotorid.io.experiments import EXPERIMENTS
+from rotorid.io.wire import EXPERIMENTS
 
 _MAX_PENDING = 1 << 16  # bytes a device keeps when nobody reads; older ones are overrun, as in a real UART
 _IDLE_S = 0.02

@@ -56,7 +56,7 @@ M = np.array(
 
 # table 2.8, as printed: gf per 1e-5 V and gf
 SLOPE = np.array([39.7571, 37.2649, 40.9000, 39.9259, 42.4717, 39.4705])
-INTERCEPT = np.array([-0.0829, -0.3379, 0.1014, 0.0289, 0.1096, 0.0771])
+_INTERCEPT = np.array([-0.0829, -0.3379, 0.1014, 0.0289, 0.1096, 0.0771])
 
 
 def body_forces(cells_n: np.ndarray) -> np.ndarray:
@@ -68,7 +68,7 @@ def body_forces(cells_n: np.ndarray) -> np.ndarray:
 
 def cell_forces(volts: np.ndarray) -> np.ndarray:
     """Cells' forces in N, shape (6,), from tared voltages in V, with table 2.8's calibration (eq. 2.10)."""
-    return (INTERCEPT + SLOPE * volts * 1e5) * GF_N
+    return (_INTERCEPT + SLOPE * volts * 1e5) * GF_N
 
 
 def cell_response() -> np.ndarray:
@@ -115,7 +115,7 @@ class CellsTruth(_Truth):
     """Six load cells; every list has six entries."""
 
     volts_per_gf: list[float] = [float(1e-5 / slope) for slope in SLOPE]
-    seat_v: list[float] = [float(-a0 / a1 * 1e-5) for a0, a1 in zip(INTERCEPT, SLOPE, strict=True)]
+    seat_v: list[float] = [float(-a0 / a1 * 1e-5) for a0, a1 in zip(_INTERCEPT, SLOPE, strict=True)]
     seat_gf: float = 5.0  # load at which the bearing plate sits and `seat_v` is fully there
     zero_v: list[float] = [0.0] * 6
     drift_v_s: list[float] = [0.0] * 6
@@ -205,7 +205,7 @@ class PlasticTruth(_Truth):
     yield_pa: float
 
 
-class ClockTruth(_Truth):
+class _ClockTruth(_Truth):
     """Relative error of each device's clock."""
 
     bench: float = 0.0
@@ -234,7 +234,7 @@ class Truth(_Truth):
         100: PlasticTruth(modulus_pa=1.9482e9, ultimate_pa=41.388e6, yield_pa=16.02e6),
     }
     specimen_scatter: float = 0.0
-    clocks: ClockTruth = ClockTruth()
+    clocks: _ClockTruth = _ClockTruth()
 
 
 def draw_truth(seed: int) -> Truth:
@@ -307,7 +307,7 @@ def draw_truth(seed: int) -> Truth:
             resonance_hz=60.0,
         ),
         specimen_scatter=0.012,
-        clocks=ClockTruth(**dict(zip(ClockTruth.model_fields, (v * 1e-6 for v in signed(30, 120, 6)), strict=True))),
+        clocks=_ClockTruth(**dict(zip(_ClockTruth.model_fields, (v * 1e-6 for v in signed(30, 120, 6)), strict=True))),
     )
 
 

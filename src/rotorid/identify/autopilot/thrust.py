@@ -98,25 +98,25 @@ class ThrustMap:
     """Signal of full thrust."""
 
 
-def px4(signal: np.ndarray, voltage: np.ndarray | None, shape: np.ndarray) -> np.ndarray:
+def _px4(signal: np.ndarray, voltage: np.ndarray | None, shape: np.ndarray) -> np.ndarray:
     """T/T_max = f u² + (1 − f) u, f = THR_MDL_FAC."""
     return shape[0] * signal**2 + (1 - shape[0]) * signal
 
 
-def ardupilot(signal: np.ndarray, voltage: np.ndarray | None, shape: np.ndarray) -> np.ndarray:
+def _ardupilot(signal: np.ndarray, voltage: np.ndarray | None, shape: np.ndarray) -> np.ndarray:
     """T/T_max = e r² + (1 − e) r with r = (u − spin_min)/(spin_max − spin_min); none below spin_min."""
     expo, spin_min = shape
     r = np.maximum(signal - spin_min, 0.0) / (_SPIN_MAX - spin_min)
     return expo * r**2 + (1 - expo) * r
 
 
-def betaflight(signal: np.ndarray, voltage: np.ndarray | None, shape: np.ndarray) -> np.ndarray:
+def _betaflight(signal: np.ndarray, voltage: np.ndarray | None, shape: np.ndarray) -> np.ndarray:
     """T/T_max = x where u = x (1 + k (1 − x)²), k = thrust_linear/100; below k = 3 one x for each u."""
     x = np.linspace(0.0, _MOST_SHARE, _CURVE_POINTS)
     return np.interp(signal, x * (1 + shape[0] * (1 - x) ** 2), x)
 
 
-def crazyflie(signal: np.ndarray, voltage: np.ndarray | None, shape: np.ndarray) -> np.ndarray:
+def _crazyflie(signal: np.ndarray, voltage: np.ndarray | None, shape: np.ndarray) -> np.ndarray:
     """Grams t of a rotor where u V = c_1 t + c_2 t²."""
     volts = signal * (1.0 if voltage is None else voltage)
     root = np.sqrt(np.maximum(shape[0] ** 2 + 4 * shape[1] * volts, 1e-6 * shape[0] ** 2))
@@ -127,7 +127,7 @@ MAPS = {
     "px4": ThrustMap(
         "PX4",
         (_Shape("THR_MDL_FAC", 0.5, -0.5, 1.6, (0.0, 1.0), 0.25),),
-        px4,
+        _px4,
         "T/T_max = f u² + (1 − f) u, f = THR_MDL_FAC",
         "PX4-Autopilot, src/lib/mixer_module/motor_params.c (THR_MDL_FAC) and functions/FunctionMotors.hpp",
     ),
@@ -137,7 +137,7 @@ MAPS = {
             _Shape("MOT_THST_EXPO", 0.5, -0.9, 1.8, (-1.0, 1.0), 0.25),
             _Shape("MOT_SPIN_MIN", 0.15, -0.2, 0.4, (0.0, 0.3), 0.08, believed=_SPIN_MIN_BELIEVED),
         ),
-        ardupilot,
+        _ardupilot,
         f"T/T_max = e r² + (1 − e) r, r = (u − MOT_SPIN_MIN)/({_SPIN_MAX:g} − MOT_SPIN_MIN), e = MOT_THST_EXPO",
         "ardupilot, libraries/AP_Motors/AP_Motors_Thrust_Linearization.cpp, with MOT_SPIN_MAX at its default",
         full_signal=_SPIN_MAX,
@@ -145,7 +145,7 @@ MAPS = {
     "betaflight": ThrustMap(
         "Betaflight",
         (_Shape("thrust_linear", 0.3, -0.6, 2.5, (0.0, 1.5), 0.25, 0, 100.0),),
-        betaflight,
+        _betaflight,
         "u = x (1 + k (1 − x)²), x = T/T_max, k = thrust_linear/100",
         "Betaflight 4.5, src/main/flight/pid.c, pidApplyThrustLinearization, and pid_init.c",
     ),
@@ -155,7 +155,7 @@ MAPS = {
             _Shape("volts_per_gram", 0.088, 0.01, 0.5, (0.0, np.inf), 0.02, 5),
             _Shape("volts_per_gram_squared", -0.0006239, -0.004, 0.01, (-np.inf, np.inf), 0.0008, 7),
         ),
-        crazyflie,
+        _crazyflie,
         "u V = c_1 t + c_2 t², t in grams a rotor, V the battery's voltage",
         "crazyflie-firmware, src/drivers/src/motors.c, motorsCompensateBatteryVoltage (c_1 = 0.088, c_2 = −0.0006239)",
         in_grams=True,
@@ -311,7 +311,7 @@ def _residuals(used: Sequence[Stretch], chosen: ThrustMap, layout: _Layout, mass
             up = up + values[layout.zero]
             if through is not None:
                 up = up + through @ values[layout.motion : layout.motion + 2]
-            out.append(averaged(-s.specific_force[:, 2] - up, every))
+            out.append(_averaged(-s.specific_force[:, 2] - up, every))
         return out
 
     return residuals
@@ -325,7 +325,7 @@ def lagging(series: np.ndarray, dt_s: float, time_constant_s: float) -> np.ndarr
     return series[:1] + lfilter([ahead, behind], [1.0, -keep], series - series[:1], axis=0)
 
 
-def averaged(series: np.ndarray, every: int) -> np.ndarray:
+def _averaged(series: np.ndarray, every: int) -> np.ndarray:
     """Means of `every` neighbours, (n // every,)."""
     count = len(series) // every
     return series[: count * every].reshape(count, every).mean(axis=1)
@@ -379,7 +379,7 @@ def fit_drag(stretches: Sequence[Stretch], density_kg_m3: float = _AIR_DENSITY_K
             through = np.einsum("nji,nj->ni", s.attitude, moving)
             force = specific_drag(through, *values[:3], density_kg_m3) + values[3:5]
             every = max(int(round(1 / (_DRAG_RATE_HZ * s.dt_s))), 1)
-            out += [averaged(s.specific_force[:, j] - force[:, j], every) for j in range(2)]
+            out += [_averaged(s.specific_force[:, j] - force[:, j], every) for j in range(2)]
         return out
 
     found = fit(residuals, start, (low, high), scale, prior)

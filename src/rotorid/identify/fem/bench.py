@@ -55,13 +55,13 @@ _WALL = 1.5
 """Distance from the hole's axis to the end of that block, over half the bar's side."""
 _NAME = "cell"
 _UP = np.array([0.0, 0.0, -1.0])
-CELLS = ("upper cell", "lower cell")
-PIECES = ("A", "B", "C", "D")
+_CELLS = ("upper cell", "lower cell")
+_PIECES = ("A", "B", "C", "D")
 DOWN = -_UP
 _LEGS = len(placement.LEGS)
-_GROUPS = dict.fromkeys(CELLS, "cells") | dict.fromkeys(PIECES, "pieces")
+_GROUPS = dict.fromkeys(_CELLS, "cells") | dict.fromkeys(_PIECES, "pieces")
 """Material of each part."""
-_PARTS = (*CELLS, *PIECES)
+_PARTS = (*_CELLS, *_PIECES)
 EVEN = 0.9
 """A plate moves evenly where its least displacement is at least this share of its largest."""
 MIDDLE = 0.99
@@ -125,7 +125,7 @@ def _gauge_ends_m(sizes: Sizes) -> tuple[np.ndarray, np.ndarray]:
     return middles - along, middles + along
 
 
-def holes(name: str, sizes: Sizes, frame: PartFrame) -> list[Hole]:
+def _holes(name: str, sizes: Sizes, frame: PartFrame) -> list[Hole]:
     """The two holes of the cell `name` with this own frame."""
     reach = sizes.cell_between_holes_m / 2
     return [
@@ -134,7 +134,7 @@ def holes(name: str, sizes: Sizes, frame: PartFrame) -> list[Hole]:
     ]
 
 
-def gauge_strains(body: LooseParts, name: str, sizes: Sizes, frame: PartFrame, moved_m: np.ndarray) -> np.ndarray:
+def _gauge_strains(body: LooseParts, name: str, sizes: Sizes, frame: PartFrame, moved_m: np.ndarray) -> np.ndarray:
     """Strain of the four gauges of the cell `name`, shape (4,): change of length of each grid over its length.
 
     Parameters
@@ -151,7 +151,7 @@ def gauge_strains(body: LooseParts, name: str, sizes: Sizes, frame: PartFrame, m
     return (last - first) / sizes.gauge_length_m
 
 
-def bridge_strain(strains: np.ndarray) -> float:
+def _bridge_strain(strains: np.ndarray) -> float:
     """What a full bridge makes of its four gauges: the mean of their strains, each with its sign."""
     return float(_GAUGE_SIGNS @ strains / len(_GAUGE_SIGNS))
 
@@ -159,7 +159,7 @@ def bridge_strain(strains: np.ndarray) -> float:
 def strain_per_newton(sizes: Sizes, material: Material, fineness: float) -> float:
     """Strain of the bridge per newton across the free end [1/N]."""
     frame = PartFrame(np.zeros(3), np.eye(3))
-    body = LooseParts.of({_NAME: mesh(sizes, fineness)}, holes(_NAME, sizes, frame))
+    body = LooseParts.of({_NAME: mesh(sizes, fineness)}, _holes(_NAME, sizes, frame))
     half, reach = sizes.cell_side_m / 2, sizes.cell_between_pads_m / 2
     pad = Pad(np.array([reach, -half, 0.0]), frame.axes[1], frame.axes[0], (sizes.cell_pad_m, sizes.cell_side_m))
     end = np.array([-reach, half, 0.0])
@@ -171,7 +171,7 @@ def strain_per_newton(sizes: Sizes, material: Material, fineness: float) -> floa
     across[weights.indices] = weights.data
     forces = np.concatenate([np.zeros(len(nodes)), across, np.zeros(len(nodes))])
     moved = elasticity.solve(body.stiffness({_NAME: material}), binding, forces[:, None])[:, 0]
-    return bridge_strain(gauge_strains(body, _NAME, sizes, frame, moved.reshape(3, -1).T))
+    return _bridge_strain(_gauge_strains(body, _NAME, sizes, frame, moved.reshape(3, -1).T))
 
 
 def build(assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fineness: float) -> Bench:
@@ -217,10 +217,10 @@ def build(assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fine
     ground = held.centre_m + sizes.foot_out_m * outwards / np.linalg.norm(outwards)
     base = Pad(np.append(ground[:2], sizes.foot_depth_m), _UP, lower.axis, (sizes.foot_side_m, sizes.cell_side_m))
     counts = (count(1, fineness) + 1, count(1, fineness) + 1, count(3, fineness))
-    frames = {name: _frame(place, sizes) for name, place in zip(CELLS, (upper, lower), strict=True)}
+    frames = {name: _frame(place, sizes) for name, place in zip(_CELLS, (upper, lower), strict=True)}
     frames["D"] = PartFrame(np.zeros(3), placement.turn(np.arctan2(under[1], under[0])).T)
     parts = {
-        **{name: mesh(sizes, fineness).put(frames[name]) for name in CELLS},
+        **{name: mesh(sizes, fineness).put(frames[name]) for name in _CELLS},
         "A": column("A", base, held, counts),
         "B": column("B", leaves, arrives, counts),
         "C": column("C", hung, top, counts),
@@ -233,7 +233,7 @@ def build(assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fine
         ("C", "upper cell", hung),
         ("C", "D", top),
     )
-    walls = [hole for name in CELLS for hole in holes(name, sizes, frames[name])]
+    walls = [hole for name in _CELLS for hole in _holes(name, sizes, frames[name])]
     return Bench(frames, bonds, base, sizes, LooseParts.of(parts, walls, _GROUPS))
 
 
@@ -368,7 +368,7 @@ class Bench:
 
     def gauge_strains(self, solved: Solved, name: str) -> np.ndarray:
         """Strain [1/N] of the four gauges of a cell, shape (4,)."""
-        return gauge_strains(self.body, name, self.sizes, self.frames[name], solved.displacement_m)
+        return _gauge_strains(self.body, name, self.sizes, self.frames[name], solved.displacement_m)
 
     def narrow(self, name: str) -> np.ndarray:
         """Nodes of a cell's narrow sections: within the middle third of the walls above and below the holes."""
@@ -420,8 +420,8 @@ def ask(bench: Bench, solved: Solved, cell_strain: float, geometry: Geometry) ->
     part = np.array(body.names)[body.part_of_node]
     plate = body.nodes_of("D")
     middle = plate[np.hypot(*body.nodes_m[plate, :2].T) < 1e-9]
-    narrow = [float(solved.von_mises_pa[bench.narrow(name)].max()) for name in CELLS]
-    read = [bridge_strain(bench.gauge_strains(solved, name)) / cell_strain for name in CELLS]
+    narrow = [float(solved.von_mises_pa[bench.narrow(name)].max()) for name in _CELLS]
+    read = [_bridge_strain(bench.gauge_strains(solved, name)) / cell_strain for name in _CELLS]
     six = np.empty(6)
     for numbers in LEGS:
         six[np.array(numbers) - 1] = read

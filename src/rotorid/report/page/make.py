@@ -543,7 +543,7 @@ def _error_table(channels: Mapping[str, Channel], fits: Mapping[str, tuple[float
                 "name": channel_words(c).removesuffix(" after half a second"),
                 "unit": _unit_text(channels[c].unit),
                 "noise": _cell(channels[c].noise_floor),
-                "bars": bars(channels[c]),
+                "bars": _bars(channels[c]),
                 "fit": pretty(" → ".join(f"{v:.0f}" for v in fits[c])) if c in fits else "–",
                 "held_out": [_cell(getattr(channels[c].rmse.held_out, s)) for s in _STAGES],
                 "training": [_cell(getattr(channels[c].rmse.training, s)) for s in _STAGES],
@@ -639,7 +639,7 @@ _FARTHEST = 100.0
 """Error over noise at which the bar of the table of errors ends."""
 
 
-def bars(channel: Channel) -> Markup:
+def _bars(channel: Channel) -> Markup:
     """Errors as believed (open) and improved (full) next to the noise (line), on a logarithmic scale."""
     errors, _ = errors_of(channel)
     if not channel.noise_floor or errors.before is None or errors.after is None:

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.identify.black_box import COLUMNS, INPUTS, OUTPUTS, PLATEAU_BLOCKS, SINE_BLOCKS, stand_wrench
-from rotorid.io.experiments import EXPERIMENTS
+from rotorid.io.wire import EXPERIMENTS
 from rotorid.recordings.vehicle import Vehicle
 
 

@@ -10,8 +10,8 @@ from rotorid.identify import clocks, grey_box
 from rotorid.identify.black_box import thrust_of_throttle
 from rotorid.identify.rotor import Points, fit_coefficient, speed_law, thrust_points, torque_points
 from rotorid.identify.stand import read_pairs
-from rotorid.io.experiments import EXPERIMENTS
 from rotorid.io.logs import read_tables
+from rotorid.io.wire import EXPERIMENTS
 
 ROOT = Path(__file__).parents[4]
 CAMPAIGN = ROOT / "raw" / "campaign"
