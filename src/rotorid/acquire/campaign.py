@@ -212,7 +212,7 @@ def _operator(place: Callable[[float], None], load_gf: float, reaction_samples: 
 # ---- the tests -------------------------------------------------------------------------------------------
 
 
-def _calibration(campaign: _Campaign) -> None:
+def calibration(campaign: _Campaign) -> None:
     """Six cells, eight combinations of weights, three repeats, 400 samples each (fig. 2.34)."""
     for cell in range(1, 7):
         for number, items in enumerate(COMBINATIONS, start=1):
@@ -239,7 +239,7 @@ def _calibration(campaign: _Campaign) -> None:
                 )
 
 
-def _static(campaign: _Campaign) -> None:
+def static(campaign: _Campaign) -> None:
     """Weights along x and y on the aluminium bench, along z on all three platforms, ten repeats."""
     series = [("al", "x"), ("al", "y"), *((platform, "z") for platform in _PLATFORMS_Z)]
     for platform, axis in series:
@@ -265,7 +265,7 @@ def _static(campaign: _Campaign) -> None:
                 )
 
 
-def _dynamic(campaign: _Campaign) -> None:
+def dynamic(campaign: _Campaign) -> None:
     """A small quadrotor flown on the bench in aluminium, in PLA and on the reference sensor, three sets."""
     for repeat in range(1, 4):
         for platform in _PLATFORMS_Z:
@@ -318,7 +318,7 @@ def _manoeuvre(set_rng: np.random.Generator, own_rng: np.random.Generator) -> Ca
     return force
 
 
-def _thrust(campaign: _Campaign) -> None:
+def thrust(campaign: _Campaign) -> None:
     """Motor 1 on the thrust tester at 1 to 50 % (50 tests)."""
     truth = campaign.truth
     for percent in range(1, 51):
@@ -345,7 +345,7 @@ def _thrust(campaign: _Campaign) -> None:
         )
 
 
-def _torque(campaign: _Campaign) -> None:
+def torque(campaign: _Campaign) -> None:
     """Motor 1 on the vehicle on the wrench sensor at 2 to 40 % (20 tests)."""
     truth = campaign.truth
     for percent in range(2, 41, 2):
@@ -384,7 +384,7 @@ def _torque(campaign: _Campaign) -> None:
         )
 
 
-def _dynamics(campaign: _Campaign) -> None:
+def dynamics(campaign: _Campaign) -> None:
     """The 48 experiments of table A.1 on the stand, two loggers with their own clocks."""
     truth = campaign.truth
     for number, experiment in EXPERIMENTS.items():
@@ -427,7 +427,7 @@ def _plain(programme: Programme) -> dict:
     return programme._asdict() | {"shape": shape, "maxima": list(programme.maxima)}
 
 
-def _tensile(campaign: _Campaign) -> None:
+def tensile(campaign: _Campaign) -> None:
     """Printed specimens of four infill densities, three each."""
     for infill, plastic in campaign.truth.plastic.items():
         scatter = campaign.rng(f"specimens {infill}").permutation([-1.0, 0.0, 1.0])
@@ -455,7 +455,7 @@ def _tensile(campaign: _Campaign) -> None:
             )
 
 
-def _combined(campaign: _Campaign) -> None:
+def combined(campaign: _Campaign) -> None:
     """Weights that pull along two or three axes of the aluminium bench at once, five repeats.
 
     The thesis has none; they show how good a reconstruction is when loads are not along one axis at a time.
@@ -483,7 +483,7 @@ def _combined(campaign: _Campaign) -> None:
 
 
 PARTS: dict[str, Callable[[_Campaign], None]] = {
-    part.__name__: part for part in (_calibration, _static, _dynamic, _thrust, _torque, _dynamics, _tensile, _combined)
+    part.__name__: part for part in (calibration, static, dynamic, thrust, torque, dynamics, tensile, combined)
 }
 
 
