@@ -11,6 +11,7 @@ import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 from jinja2 import Environment
@@ -161,6 +162,18 @@ def policy_for(*scripts: str) -> str:
         f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; "
         "form-action 'none'"
     )
+
+
+def filled(name: str, **values: object) -> str:
+    """A page without scripts: a template of the page's files with its values."""
+    environment = Environment(autoescape=True, trim_blocks=True)
+    return environment.from_string(page_file(name)).render(policy=policy_for(), **values)
+
+
+def drawing(figure: Path) -> Markup:
+    """An SVG file as it stands within a page."""
+    text = figure.read_text(encoding="utf-8")
+    return Markup(text[text.index("<svg") :])
 
 
 def _embedded(data: Mapping) -> Markup:
