@@ -62,7 +62,11 @@ def plan(
         sources = recordings or sets_of(folder, content)
         with progress("plan", quiet), step("planning"), warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            source = _read_sets(sources)
+            from rotorid.plan.questions import joined_sets
+            from rotorid.recordings import read_set
+
+            sets = [read_set(p) for p in sources]
+            source = sets[0] if len(sets) == 1 else joined_sets(*sets)[0]
             if flight:
                 said, files, picture = _flight_plan(source, content, allowed, wishes, out or folder / "plan")
             else:
@@ -149,15 +153,6 @@ def sets_of(folder: Path, content: dict) -> list[Path]:
             return list(found.values())
     lacking = next(name for name, place in found.items() if place is None)
     raise InputError(f"{folder}: the recording set {lacking} of this verdict is not next to it; name it with --set")
-
-
-def _read_sets(paths: list[Path]):
-    """A set, or several of one vehicle as one."""
-    from rotorid.plan.questions import joined_sets
-    from rotorid.recordings import read_set
-
-    sets = [read_set(p) for p in paths]
-    return sets[0] if len(sets) == 1 else joined_sets(*sets)[0]
 
 
 def together(

@@ -162,14 +162,10 @@ def stand_wrench(vehicle: Vehicle, forces_n: np.ndarray, roll_rad: np.ndarray, p
     force = np.zeros((len(forces_n), 3))
     force[:, 2] = -body[:, 0]
     moment = body[:, 1:] - np.cross(np.asarray(vehicle.sensor_position_m)[None], force)
-    rotation = _tilt(roll_rad, pitch_rad)
-    return np.concatenate([np.einsum("nij,nj->ni", rotation, force), np.einsum("nij,nj->ni", rotation, moment)], axis=1)
-
-
-def _tilt(roll: np.ndarray, pitch: np.ndarray) -> np.ndarray:
     from rotorid.vehicle.attitude import quaternion_from_euler, rotation_from_quaternion
 
-    return rotation_from_quaternion(quaternion_from_euler(np.stack([roll, pitch, 0 * roll], axis=-1)))
+    rotation = rotation_from_quaternion(quaternion_from_euler(np.stack([roll_rad, pitch_rad, 0 * roll_rad], axis=-1)))
+    return np.concatenate([np.einsum("nij,nj->ni", rotation, force), np.einsum("nij,nj->ni", rotation, moment)], axis=1)
 
 
 @dataclass(frozen=True)

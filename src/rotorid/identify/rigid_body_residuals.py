@@ -201,21 +201,6 @@ def _residuals_of(run: Run, vehicle: Vehicle, cutoff_hz: float) -> dict[str, np.
     }
 
 
-def _growth(found: _Binned) -> dict[str, dict]:
-    """RMS in the slowest and the fastest bin, and their ratio, of each channel and total."""
-    return {
-        channel: {
-            "slowest_m_s": [float(found.low_m_s[0]), float(found.high_m_s[0])],
-            "fastest_m_s": [float(found.low_m_s[-1]), float(found.high_m_s[-1])],
-            "rms_slowest": float(found.rms[0, place]),
-            "rms_fastest": float(found.rms[-1, place]),
-            "growth": float(found.growth[place]),
-            "growth_95": [float(v) for v in found.growth_95[place]],
-        }
-        for place, channel in enumerate(_CHANNELS + _TOTALS)
-    }
-
-
 def _bin_rows(model: str, found: _Binned) -> list[tuple]:
     rows = []
     for place, channel in enumerate(_CHANNELS + _TOTALS):
@@ -249,7 +234,17 @@ def compare_with_neurobem(
     for model in _MODELS:
         mine = {flight: models[model] for flight, models in left.items()}
         found = by_airspeed(mine, speeds, times, edges, block_s, np.random.default_rng(seed))
-        summary[model] = _growth(found)
+        summary[model] = {
+            channel: {
+                "slowest_m_s": [float(found.low_m_s[0]), float(found.high_m_s[0])],
+                "fastest_m_s": [float(found.low_m_s[-1]), float(found.high_m_s[-1])],
+                "rms_slowest": float(found.rms[0, place]),
+                "rms_fastest": float(found.rms[-1, place]),
+                "growth": float(found.growth[place]),
+                "growth_95": [float(v) for v in found.growth_95[place]],
+            }
+            for place, channel in enumerate(_CHANNELS + _TOTALS)
+        }
         bins += _bin_rows(model, found)
     cloud = [np.column_stack([speeds[flight], models["rigid_body"]])[::_POINT_STEP] for flight, models in left.items()]
     points = pd.DataFrame(np.concatenate(cloud), columns=_POINT_COLUMNS[1:])

@@ -202,7 +202,11 @@ def fly(
             voltage=None if world.voltage_v is None else np.full(len(t), world.voltage_v),
         )
         motion = replace(motion, accelerometer=motion.specific_force, gyroscope=rates)
-        force, moment = _wrench(world, motion)
+        force, moment = np.zeros((motion.size, 3)), np.zeros((motion.size, 3))
+        for form, values in (*world.effects, *world.derivatives):
+            part = form.contribution(motion, world.vehicle, values)
+            force = force if part.force is None else force + part.force
+            moment = moment if part.moment is None else moment + part.moment
         # The tilt answers a force, and turning into it asks for moments that grow with the square of the frequency:
         # beyond what the rotors follow the rounds would not converge.
         force = sosfiltfilt(butter(2, _FASTER * bandwidth_rad_s * step / np.pi, output="sos"), force, axis=0)
@@ -217,15 +221,6 @@ def _held_longer(reference: Reference, step_s: float) -> Reference:
     t = np.arange(-_EDGE, len(reference.time_s) + _EDGE) * step_s + reference.time_s[0]
     ends = ((_EDGE, _EDGE), (0, 0))
     return Reference(t, np.pad(reference.position_m, ends, "edge"), np.pad(reference.yaw_rad, _EDGE, "edge"))
-
-
-def _wrench(world: CompetingModel, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
-    force, moment = np.zeros((motion.size, 3)), np.zeros((motion.size, 3))
-    for form, values in (*world.effects, *world.derivatives):
-        part = form.contribution(motion, world.vehicle, values)
-        force = force if part.force is None else force + part.force
-        moment = moment if part.moment is None else moment + part.moment
-    return force, moment
 
 
 def commands(world: CompetingModel, motion: Motion) -> np.ndarray:

@@ -440,7 +440,8 @@ def _rotors(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
     if not wrong:
         return
     sure = [i for i in range(vehicle.rotor_count) if found[:, i].all()]
-    seats = ", ".join(f"{i + 1} {_seat(np.array([found[1, i], -found[0, i]]))}" for i in sure)
+    ends = [("front" if found[1, i] > 0 else "rear", "right" if -found[0, i] > 0 else "left") for i in sure]
+    seats = ", ".join(f"{i + 1} {end} {side}" for i, (end, side) in zip(sure, ends, strict=True))
     rotors = f"rotor {wrong[0]} does" if len(wrong) == 1 else f"rotors {', '.join(map(str, wrong))} do"
     yield Doubt(
         "rotors",
@@ -448,10 +449,6 @@ def _rotors(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
         "order of the rotors, or at the signs of the body axes",
         stops=True,
     )
-
-
-def _seat(place: np.ndarray) -> str:
-    return f"{'front' if place[0] > 0 else 'rear'} {'right' if place[1] > 0 else 'left'}"
 
 
 def _throttle(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
