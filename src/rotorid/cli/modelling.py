@@ -60,10 +60,10 @@ def model(
         target = out or Path(f"{name}-{to}")
         folder = paths[0]
         if not is_set:
-            made = make_set(paths, target / name, mass_kg, like, vehicle, mapping)
-            folder = made.folder
+            folder = target / name
+            made = make_set(paths, folder, mass_kg, like, vehicle, mapping)
             if not quiet:
-                print_notes(made)
+                print_notes(made, folder)
         written, said = _write_model(folder, target, to, quiet)
         for sentence in said:
             typer.echo(sentence)

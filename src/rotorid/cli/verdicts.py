@@ -84,10 +84,10 @@ def verdict(
             if not (folder / "vehicle.yaml").is_file():
                 raise InputError(_no_vehicle(folder))
         else:
-            made = make_set(paths, target / name, mass_kg, like, vehicle, mapping)
-            folder = made.folder
+            folder = target / name
+            made = make_set(paths, folder, mass_kg, like, vehicle, mapping)
             if not quiet and not as_json:
-                print_notes(made)
+                print_notes(made, folder)
         found = deliver_set(folder, target, quiet, series)
         if as_json:
             typer.echo((target / "verdict.json").read_text(encoding="utf-8"), nl=False)
@@ -290,7 +290,8 @@ def read(
                 out.append(read_set(path))
                 continue
             folder = Path(made) / str(len(out)) / path.stem
-            out.append(read_set(make_set([path], folder, mass_kg, like, vehicle, mapping).folder))
+            make_set([path], folder, mass_kg, like, vehicle, mapping)
+            out.append(read_set(folder))
             vehicle, mass_kg, like = folder / "vehicle.yaml", None, None
         return out
 

@@ -1,7 +1,6 @@
 """What is written for a reader: a verdict's files and page, figures of the report (its chapters are in notebooks/)."""
 
 OPEN = (
-    "codehash",
     "deliver",
     "fleet",
     "fleet_history",

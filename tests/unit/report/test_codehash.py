@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rotorid.report.codehash import Code
+from rotorid.report.provenance import Code
 
 FILES = {
     "src/rotorid/__init__.py": "",
@@ -75,7 +75,7 @@ def test_the_list_of_modules_that_others_may_import_does_not(project: Path) -> N
 
 
 def test_a_second_package_of_the_project_is_followed(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rotorid.report.codehash.PACKAGES", {"rotorid": "src", "second": "beside"})
+    monkeypatch.setattr("rotorid.report.provenance._PACKAGES", {"rotorid": "src", "second": "beside"})
     for name, text in {
         "__init__": "",
         "one": "from .two import X",
