@@ -43,10 +43,10 @@ def measure(mesh: str) -> dict[str, str]:
     geometry = read_geometry(ROOT / "raw/thesis/table_2_3.csv")
     level = studies.LEVELS[mesh]
     began = time.process_time()
-    table, _, _, answers = studies.mesh_study(assumed, moduli, geometry, level.study)
+    table, _, _, answers = studies.mesh_study(assumed, moduli, geometry, level["study"])
     bench_s = time.process_time() - began
     began = time.process_time()
-    benches = studies.size_study(assumed, moduli, geometry, level.sizes, DRAWS, np.random.default_rng(SEED))
+    benches = studies.size_study(assumed, moduli, geometry, level["sizes"], DRAWS, np.random.default_rng(SEED))
     sizes_s = time.process_time() - began
     own, ranges = ratios(answers), studies.ranges(benches)
     rows = {

@@ -23,7 +23,7 @@ def main(
     """Write what the finest mesh says (JSON), its loads (CSV), a mesh a row (CSV) and the surface (Parquet)."""
     assumed, modulus = read_assumed(sizes), read_moduli(moduli)
     table, built, solved, found = studies.mesh_study(
-        assumed, modulus, read_geometry(geometry), studies.LEVELS[mesh].study
+        assumed, modulus, read_geometry(geometry), studies.LEVELS[mesh]["study"]
     )
     weights_gf = pd.read_csv(readings)["weight_gf"].to_numpy(float)
     series = studies.loads(found, weights_gf, assumed.pressed_area_m2)

@@ -22,13 +22,13 @@ def main(sizes: str, moduli: str, geometry: str, mesh: str, draws: int, seed: in
         read_assumed(sizes),
         read_moduli(moduli),
         read_geometry(geometry),
-        studies.LEVELS[mesh].sizes,
+        studies.LEVELS[mesh]["sizes"],
         draws,
         np.random.default_rng(seed),
     )
     table.to_csv(benches, index=False, float_format="%.6g")
     result = {
-        "fineness": studies.LEVELS[mesh].sizes,
+        "fineness": studies.LEVELS[mesh]["sizes"],
         "benches": len(table),
         "drawn": int((table["end"] == "drawn").sum()),
         "even": EVEN,

@@ -11,7 +11,7 @@ Problems with a known answer, solved by the same code as the bench: a cantilever
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pandas as pd
@@ -45,23 +45,12 @@ _LARGEST_LIGAMENT = 0.8
 """Share of half the bar's side up to which a ligament is looked for that gives the printed sensitivity."""
 
 
-@dataclass(frozen=True)
-class _Levels:
-    """How fine the meshes are, as multiples of the coarsest."""
-
-    study: tuple[float, ...]
-    """Of the bench as assumed; the last one's answers are the results."""
-    sizes: float
-    """Of benches of other sizes."""
-    chain: float
-    """Of a single cell."""
-
-
 LEVELS = {
-    "coarse": _Levels(study=(1.0, 1.5, 2.0), sizes=1.0, chain=2.0),
-    "full": _Levels(study=(1.0, 1.5, 2.0, 3.0), sizes=1.5, chain=3.0),
+    "coarse": {"study": (1.0, 1.5, 2.0), "sizes": 1.0, "chain": 2.0},
+    "full": {"study": (1.0, 1.5, 2.0, 3.0), "sizes": 1.5, "chain": 3.0},
 }
-"""By the setting `fem`."""
+"""How fine the meshes are, as multiples of the coarsest, by the setting `fem`: of the bench as assumed (the last one's
+answers are the results), of benches of other `sizes`, and of a single cell (`chain`)."""
 
 
 def mesh_study(

@@ -89,9 +89,16 @@ def make_page(
         "exp": math.exp,
         "place": _place,
     }
-    environment.filters |= {"pretty": pretty, "subscripts": _subscripts, "unit": _unit_text, "number": number}
+    environment.filters |= {
+        "pretty": pretty,
+        "subscripts": _subscripts,
+        "listed": listed,
+        "unit": _unit_text,
+        "number": number,
+    }
     environment.filters |= {"cell": _cell, "plus_minus": plus_minus, "channel": channel_words, "value": parameter_words}
     environment.filters |= {"effect": lambda id_: capital(effect_words(id_)), "regime": regime_words}
+    environment.globals["symbol_of"] = symbol_of
     shown, more = _shown_locations(verdict.locations)
     known = {row.id for row in (*verdict.effects, *verdict.not_testable, *verdict.absent)}
     known |= {i for e in verdict.effects for i in e.alternatives}
@@ -133,7 +140,10 @@ def make_page(
         values=[_value_range(name, *v) for name, v in analysis.values.items()],
         all_values=verdict.believed_values,
         correlated=_correlated_text(verdict),
-        derivatives=_derivative_rows(verdict),
+        # Those first whose interval leaves out nothing.
+        derivatives=sorted(verdict.derivatives, key=lambda d: not (d.interval_95[0] > 0 or d.interval_95[1] < 0)),
+        quantities=_QUANTITY_WORDS,
+        causes=lambda d: [effect_words(i) for i in would_explain(d.channel, d.quantity, verdict)],
         delivered=verdict.delivered,
         models=_MODELS,
         better_text=_better_text(verdict),
@@ -525,34 +535,6 @@ def _step_rows(verdict: Verdict) -> list[dict]:
 
 _STEP_KINDS = ("values", "named", "derivatives", "left", "noise")
 _STEP_WORDS = ("values take off", "named physics", "predictable, without a name", "left above the noise", "noise")
-
-
-def _derivative_rows(verdict: Verdict) -> list[dict]:
-    """The table of derivatives, those first whose interval leaves out nothing."""
-    rows = []
-    for d in verdict.derivatives:
-        low, high = d.interval_95
-        clear = low > 0 or high < 0
-        names = [effect_words(i) for i in would_explain(d.channel, d.quantity, verdict)] if clear else []
-        rows.append(
-            {
-                "symbol": _subscripts(symbol_of(d.channel, d.quantity)),
-                "words": _derivative_words(d.channel, d.quantity),
-                "value": pretty(f"{number(d.value, 3)} ({number(low, 3)} to {number(high, 3)})"),
-                "unit": _unit_text(d.unit),
-                "range": "" if d.quantity == "constant" else pretty(f"{number(d.low, 2)} to {number(d.high, 2)}"),
-                "clear": clear,
-                "names": listed(names, "or") if names else "",
-            }
-        )
-    return sorted(rows, key=lambda row: not row["clear"])
-
-
-def _derivative_words(channel: str, quantity: str) -> str:
-    """A derivative in words: `sideways force by sideways velocity`."""
-    if quantity == "constant":
-        return f"{channel_words(channel)}, constant"
-    return f"{channel_words(channel)} by {_QUANTITY_WORDS[quantity]}"
 
 
 _QUANTITY_WORDS = {
