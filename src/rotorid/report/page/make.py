@@ -174,10 +174,10 @@ def policy_for(*scripts: str) -> str:
     )
 
 
-def filled(name: str, **values: object) -> str:
+def filled(template: str, /, **values: object) -> str:
     """A page without scripts: a template of the page's files with its values."""
     environment = Environment(autoescape=True, trim_blocks=True)
-    return environment.from_string(page_file(name)).render(policy=policy_for(), **values)
+    return environment.from_string(page_file(template)).render(policy=policy_for(), **values)
 
 
 def drawing(figure: Path) -> Markup:
