@@ -18,8 +18,8 @@ from rotorid.acquire.emulators.truth import GF_N, body_forces, cell_forces
 from rotorid.acquire.view import Plot, bench_forces, braille, panel, watch
 from rotorid.identify import clocks
 from rotorid.identify.stand import read_pairs
-from rotorid.io.index import read_index
 from rotorid.io.logs import read_log, read_tables
+from rotorid.io.session import read_index
 from tests.acquire.fault_table import seen
 
 ACQUIRE = [sys.executable, "-m", "rotorid.acquire"]

@@ -33,9 +33,8 @@ from rotorid.acquire.run_plan import (
     steps_of,
 )
 from rotorid.acquire.transport import AcquireError, LimitExceeded
-from rotorid.io.index import read_index
 from rotorid.io.logs import read_log
-from rotorid.io.session import Ended
+from rotorid.io.session import Ended, read_index
 from tests.acquire.fault_table import seen
 
 GROUP = {

@@ -50,8 +50,7 @@ from rotorid.acquire.emulators.wire import Faults, WireHalf, World
 from rotorid.acquire.procedures import STEADY_JR3, SteadyRule, programme_of
 from rotorid.acquire.recorder import Recorder, Timings
 from rotorid.acquire.transport import LoopbackTransport, VirtualClock
-from rotorid.io.index import write_index
-from rotorid.io.session import RoomAir, Session, Setup, session_path, write_session
+from rotorid.io.session import RoomAir, Session, Setup, session_path, write_index, write_session
 from rotorid.io.wire import EXPERIMENTS, TRAPEZOID, Programme
 
 _WEIGHTS_GF = {

@@ -452,7 +452,7 @@ def checksum(
     renew: Annotated[bool, typer.Option("--renew", help="also where one is there and no longer fits")] = False,
 ) -> None:
     """Add the checksum to metadata and indexes that have none. After a meant edit of such a file, --renew it."""
-    from rotorid.io.index import add_checksum, files_with_checksum, renew_checksum
+    from rotorid.io.session import add_checksum, files_with_checksum, renew_checksum
 
     paths, written = [], 0
     try:
@@ -469,9 +469,8 @@ def checksum(
 @app.command()
 def index(raw: Annotated[Path, typer.Argument(help="the folder of raw logs")] = Path("raw")) -> None:
     """Write `sessions.tsv` from the metadata of all recordings below a folder."""
-    from rotorid.io.index import metadata_files, write_index
     from rotorid.io.metadata_checksum import without_checksum
-    from rotorid.io.session import read_session
+    from rotorid.io.session import metadata_files, read_session, write_index
 
     try:
         rows = write_index(raw)

@@ -28,11 +28,19 @@ from rotorid.acquire.procedures import programme_of, recorders_for, run_with
 from rotorid.acquire.recorder import NAME, Recorder
 from rotorid.acquire.transport import AcquireError
 from rotorid.errors import InputError
-from rotorid.io.index import write_index
 from rotorid.io.logs import Log, LogError, read_log
 from rotorid.io.models import KnownKeys, read_model
 from rotorid.io.rawlog import RECEIVED, NotALog, read_raw
-from rotorid.io.session import Counts, Ended, SessionError, Setup, read_session, session_path, write_session
+from rotorid.io.session import (
+    Counts,
+    Ended,
+    SessionError,
+    Setup,
+    read_session,
+    session_path,
+    write_index,
+    write_session,
+)
 from rotorid.io.text.wording import explain, hint
 from rotorid.io.wire import EXPERIMENTS, INSTRUMENTS
 

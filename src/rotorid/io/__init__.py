@@ -2,7 +2,6 @@
 
 OPEN = (
     "frames",
-    "index",
     "lines",
     "logs",
     "metadata_checksum",
