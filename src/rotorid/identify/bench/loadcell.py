@@ -362,26 +362,10 @@ def _agreeing(x: np.ndarray, y: np.ndarray, count: int) -> np.ndarray:
     return mask
 
 
-@dataclass(frozen=True)
-class _Specimen:
-    """Curve and figures of one specimen; strain is compensated for the slack."""
-
-    strain: np.ndarray
-    stress_pa: np.ndarray
-    modulus_pa: float
-    modulus_interval_95_pa: tuple[float, float]
-    strength_pa: float
-    yield_pa: float
-    yield_strain: float
-    proportional_pa: float
-    """Stress at which the straight part ends."""
-    break_strain: float
-    slack_mm: float
-    straight_samples: int
-
-
-def evaluate(displacement_mm: np.ndarray, force_n: np.ndarray, gauge_mm: float, section_mm2: float) -> _Specimen:
-    """Figures of one specimen.
+def evaluate(
+    displacement_mm: np.ndarray, force_n: np.ndarray, gauge_mm: float, section_mm2: float
+) -> tuple[dict, pd.DataFrame]:
+    """Figures of one specimen, with their units, and its curve (`strain`, compensated for the slack, and `stress_pa`).
 
     Parameters
     ----------
@@ -415,19 +399,20 @@ def evaluate(displacement_mm: np.ndarray, force_n: np.ndarray, gauge_mm: float, 
     strain = strain - zero
     broken = int(peak + np.argmax(np.append(stress[peak:], 0.0) < 0.5 * strength))
     yield_strain, yield_pa = _offset_yield(strain[: peak + 1], stress[: peak + 1], line.a1)
-    return _Specimen(
-        strain=strain[:broken],
-        stress_pa=stress[:broken],
-        modulus_pa=line.a1,
-        modulus_interval_95_pa=line.interval(1),
-        strength_pa=strength,
-        yield_pa=yield_pa,
-        yield_strain=yield_strain,
-        proportional_pa=float(stress[last]),
-        break_strain=float(strain[broken - 1]),
-        slack_mm=float(zero * gauge_mm),
-        straight_samples=last - first + 1,
-    )
+    low, high = line.interval(1)
+    figures = {
+        "modulus_gpa": line.a1 / 1e9,
+        "modulus_low_95_gpa": low / 1e9,
+        "modulus_high_95_gpa": high / 1e9,
+        "strength_mpa": strength / 1e6,
+        "yield_mpa": yield_pa / 1e6,
+        "yield_strain": yield_strain,
+        "proportional_mpa": float(stress[last]) / 1e6,  # where the straight part ends
+        "break_strain": float(strain[broken - 1]),
+        "slack_mm": float(zero * gauge_mm),
+        "straight_samples": last - first + 1,
+    }
+    return figures, pd.DataFrame({"strain": strain[:broken], "stress_pa": stress[:broken]})
 
 
 def _noise(stress: np.ndarray) -> float:
@@ -459,7 +444,7 @@ def specimens(samples: pd.DataFrame, sessions: pd.DataFrame) -> tuple[pd.DataFra
         table = parts[session.id]
         table = table[table["quality"] == 0]
         try:
-            found = evaluate(
+            found, curve = evaluate(
                 table["displacement_mm"].to_numpy(),
                 table["force_n"].to_numpy(),
                 session.gauge_length_mm,
@@ -468,23 +453,7 @@ def specimens(samples: pd.DataFrame, sessions: pd.DataFrame) -> tuple[pd.DataFra
         except InputError as error:
             raise InputError(f"{session.id}: {error}") from None
         infill = int(session.infill_percent)
-        rows.append(
-            {
-                "infill_percent": infill,
-                "specimen": session.specimen,
-                "modulus_gpa": found.modulus_pa / 1e9,
-                "modulus_low_95_gpa": found.modulus_interval_95_pa[0] / 1e9,
-                "modulus_high_95_gpa": found.modulus_interval_95_pa[1] / 1e9,
-                "strength_mpa": found.strength_pa / 1e6,
-                "yield_mpa": found.yield_pa / 1e6,
-                "yield_strain": found.yield_strain,
-                "proportional_mpa": found.proportional_pa / 1e6,
-                "break_strain": found.break_strain,
-                "slack_mm": found.slack_mm,
-                "straight_samples": found.straight_samples,
-            }
-        )
-        curve = pd.DataFrame({"strain": found.strain, "stress_pa": found.stress_pa})
+        rows.append({"infill_percent": infill, "specimen": session.specimen} | found)
         curves.append(curve.assign(infill_percent=infill, specimen=session.specimen))
     return pd.DataFrame(rows), pd.concat(curves, ignore_index=True)
 
