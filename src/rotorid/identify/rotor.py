@@ -35,7 +35,7 @@ Of the points two more things are asked:
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -103,18 +103,6 @@ class _CoefficientFit:
     points: int
     freedom: float
     """Degrees of freedom of Student's t that the interval is made with."""
-
-
-@dataclass(frozen=True)
-class _Pooled:
-    """Random-effects mean over motors."""
-
-    value: float
-    interval_95: tuple[float, float]
-    between_sd: float
-    """Standard deviation of the true values between motors, the unit of the values."""
-    prediction_95: tuple[float, float]
-    """Where the value of one further motor is expected."""
 
 
 def usable(speed_rad_s: np.ndarray, thrust_n: np.ndarray) -> np.ndarray:
@@ -283,8 +271,11 @@ def fit_exponent(runs: Sequence[Points]) -> tuple[float, tuple[float, float]]:
     return float(exponent), (float(exponent - half), float(exponent + half))
 
 
-def pool(values: Sequence[float], standard_errors: Sequence[float]) -> _Pooled:
-    """Random-effects mean of the motors' values.
+def pool(values: Sequence[float], standard_errors: Sequence[float]) -> dict:
+    """Random-effects mean of the motors' values: `value`, `interval_95`, `between_sd`, `prediction_95`.
+
+    `between_sd` is the standard deviation of the true values between motors, in the unit of the values; in
+    `prediction_95` the value of one further motor is expected.
 
     τ² solves Σ (C_i - C̄)² / (s_i² + τ²) = k - 1 (Paule and Mandel); the interval is Hartung's and Knapp's,
     with Student's t for k - 1 degrees of freedom.
@@ -308,12 +299,12 @@ def pool(values: Sequence[float], standard_errors: Sequence[float]) -> _Pooled:
     spread = np.sum(weight * (values - mean) ** 2) / ((k - 1) * np.sum(weight))
     half = student_quantile(k - 1, 0.975) * np.sqrt(spread)
     ahead = student_quantile(k - 1, 0.975) * np.sqrt(tau2 + spread)
-    return _Pooled(
-        value=float(mean),
-        interval_95=(float(mean - half), float(mean + half)),
-        between_sd=float(np.sqrt(tau2)),
-        prediction_95=(float(mean - ahead), float(mean + ahead)),
-    )
+    return {
+        "value": float(mean),
+        "interval_95": (float(mean - half), float(mean + half)),
+        "between_sd": float(np.sqrt(tau2)),
+        "prediction_95": (float(mean - ahead), float(mean + ahead)),
+    }
 
 
 def modified_z_scores(values: Sequence[float]) -> np.ndarray:
@@ -366,9 +357,9 @@ def summarise_propeller(
         without_noise = pool([f.value for f in exact.values()], [f.standard_error for f in exact.values()])
         furthest = int(np.argmax(np.abs(scores)))
         summary[form] = {
-            **asdict(pooled),
-            "between_relative": pooled.between_sd / pooled.value,
-            "value_if_speed_exact": without_noise.value,
+            **pooled,
+            "between_relative": pooled["between_sd"] / pooled["value"],
+            "value_if_speed_exact": without_noise["value"],
             "median_standard_error": float(np.median([f.standard_error for f in fits.values()])),
             "median_residual_rms_n": float(np.median([f.residual_rms_n for f in fits.values()])),
             "outlying": [m for m, z in zip(fits, scores, strict=True) if abs(z) > outlying_above],
