@@ -130,27 +130,6 @@ def _true_speeds(speed, thrust, offsets, c_f, force_sd, speed_sd):
     return found
 
 
-def _both_noisy(speed, thrust, offset_columns, start, force_sd, speed_noise_relative):
-    """Maximum-likelihood fit with noise in thrust and speed: estimate, covariance, chi-square."""
-    theta, true = start.copy(), speed
-    for _ in range(60):
-        offsets = offset_columns @ theta[1:]
-        # A share of the true speed: a share of the reading would trust low readings more and raise C_F.
-        speed_sd = speed_noise_relative * true
-        true = _true_speeds(speed, thrust, offsets, theta[0], force_sd, speed_sd)
-        slope = 2 * theta[0] * true
-        residual = thrust - offsets - theta[0] * true**2 - slope * (speed - true)
-        weight = 1 / (force_sd**2 + (slope * speed_sd) ** 2)
-        columns = np.column_stack([true**2, offset_columns])
-        scale = np.linalg.norm(columns, axis=0)
-        inverse = np.linalg.inv((columns / scale).T @ (weight[:, None] * columns / scale))
-        step = inverse @ ((columns / scale).T @ (weight * residual)) / scale
-        theta = theta + step
-        if abs(step[0]) < 1e-12 * abs(theta[0]):
-            break
-    return theta, inverse / np.outer(scale, scale), float(np.sum(weight * residual**2))
-
-
 def _each_its_own_noise(
     columns: np.ndarray, inverse: np.ndarray, residual: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -227,7 +206,24 @@ def fit_coefficient(
     if speed_noise_relative > 0:
 
         def fit_at(force_sd):
-            return _both_noisy(speed, thrust, offset_columns, values, force_sd, speed_noise_relative)
+            """Maximum-likelihood fit with noise in thrust and speed: estimate, covariance, chi-square."""
+            theta, true = values.copy(), speed
+            for _ in range(60):
+                offsets = offset_columns @ theta[1:]
+                # A share of the true speed: a share of the reading would trust low readings more and raise C_F.
+                speed_sd = speed_noise_relative * true
+                true = _true_speeds(speed, thrust, offsets, theta[0], force_sd, speed_sd)
+                slope = 2 * theta[0] * true
+                residual = thrust - offsets - theta[0] * true**2 - slope * (speed - true)
+                weight = 1 / (force_sd**2 + (slope * speed_sd) ** 2)
+                columns = np.column_stack([true**2, offset_columns])
+                scale = np.linalg.norm(columns, axis=0)
+                inverse = np.linalg.inv((columns / scale).T @ (weight[:, None] * columns / scale))
+                step = inverse @ ((columns / scale).T @ (weight * residual)) / scale
+                theta = theta + step
+                if abs(step[0]) < 1e-12 * abs(theta[0]):
+                    break
+            return theta, inverse / np.outer(scale, scale), float(np.sum(weight * residual**2))
 
         ceiling = 3 * np.sqrt(variance) + 2 * least_sd
         force_sd = least_sd
