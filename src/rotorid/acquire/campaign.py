@@ -51,7 +51,7 @@ from rotorid.acquire.procedures import STEADY_JR3, SteadyRule, programme_of
 from rotorid.acquire.recorder import Recorder, Timings
 from rotorid.acquire.transport import LoopbackTransport, VirtualClock
 from rotorid.io.session import RoomAir, Session, Setup, session_path, write_index, write_session
-from rotorid.io.wire import EXPERIMENTS, TRAPEZOID, Programme
+from rotorid.io.wire import EXPERIMENTS, TRAPEZOID
 
 _WEIGHTS_GF = {
     "Carbon Fiber 1": 35.715,
@@ -417,13 +417,10 @@ def dynamics(campaign: _Campaign) -> None:
             world,
             {f"{name}-quadrotor": setup, f"{name}-wrench": setup},
             lambda vehicle, sensor, c=letter, p=programme: procedures.experiment(vehicle, sensor, c, p),
-            {"name": "experiment", "number": number, "letter": letter, **_plain(programme)},
+            {"name": "experiment", "number": number, "letter": letter}
+            | programme._asdict()
+            | {"shape": "trapezoid" if programme.shape == TRAPEZOID else "sine", "maxima": list(programme.maxima)},
         )
-
-
-def _plain(programme: Programme) -> dict:
-    shape = "trapezoid" if programme.shape == TRAPEZOID else "sine"
-    return programme._asdict() | {"shape": shape, "maxima": list(programme.maxima)}
 
 
 def tensile(campaign: _Campaign) -> None:

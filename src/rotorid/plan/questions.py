@@ -35,7 +35,7 @@ from rotorid.mismatch.model.absent import chosen_already
 from rotorid.mismatch.model.fitted import Fitted, fitted
 from rotorid.mismatch.model.next_flight import CURVES, beyond_flying
 from rotorid.mismatch.model.prepare import Prepared, assemble_rows, prepare
-from rotorid.mismatch.model.within_trust import Way, ways
+from rotorid.mismatch.model.within_trust import ways
 from rotorid.mismatch.model.wrench import chosen, path_segments
 from rotorid.mismatch.plant.comparison import ENVIRONMENT_S
 from rotorid.mismatch.plant.motion import HIGHEST_CUTOFF_HZ, Segment
@@ -306,19 +306,14 @@ def known(
             questions.append(question)
         else:
             unanswerable.append((ids, "these columns give no model of the others to compare with"))
-    own = _derivatives_of(found, way)
-    asked = tuple(questions), tuple(chains), tuple(unanswerable)
-    return FittedSet(recordings, prepared, found, findings, *asked, derivatives=own)
-
-
-def _derivatives_of(found: Fitted, way: Way) -> tuple[tuple[Form, np.ndarray], ...]:
-    """Derivatives of what a fit leaves where it was not fitted, as a form with its values."""
     model, vehicle, thinner = found.model, found.prepared.vehicle, found.prepared.thinner
     x = np.concatenate([thinner(quantities(s.motion, vehicle)) for s in model.segments])
     folds = np.concatenate(model.regression.of_rows(model.regression.folds()))
     learnt = learn(x, np.concatenate(way.left)[:, :6], folds, own_controls(vehicle))
     form = derivative_form(vehicle.model_copy(update={"derivatives": learnt.derivatives}))
-    return () if form is None else (form,)
+    own = () if form is None else (form,)
+    asked = tuple(questions), tuple(chains), tuple(unanswerable)
+    return FittedSet(recordings, prepared, found, findings, *asked, derivatives=own)
 
 
 def known_from(recordings: RecordingSet, verdict: dict) -> FittedSet:

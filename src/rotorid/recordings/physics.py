@@ -269,18 +269,6 @@ def _accelerometer(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Do
         )
 
 
-def _rates_of_attitude(attitude: np.ndarray) -> np.ndarray:
-    """Body rates (n, 3), rad/s, of quaternions (n, 4), scalar first, on the common clock; NaN at gaps and ends."""
-    out = np.full((len(attitude), 3), np.nan)
-    norm = np.linalg.norm(attitude, axis=1)
-    known = np.isfinite(norm) & (norm > 0.1)
-    both = known[:-2] & known[2:]
-    first, last = attitude[:-2][both], attitude[2:][both]
-    turn = Rotation.from_quat(first[:, [1, 2, 3, 0]]).inv() * Rotation.from_quat(last[:, [1, 2, 3, 0]])
-    out[1:-1][both] = turn.as_rotvec() / (2 * _STEP_S)
-    return out
-
-
 def _gyroscope(run: Run, clock: np.ndarray) -> Iterator[Doubt]:
     gyro, attitude = _on(run, clock, c.ANGULAR_VELOCITY), _on(run, clock, c.QUATERNION)
     if gyro is None:
@@ -295,7 +283,14 @@ def _gyroscope(run: Run, clock: np.ndarray) -> Iterator[Doubt]:
                 stops=True,
             )
         return
-    derived = _rates_of_attitude(attitude)
+    # Body rates, rad/s, of the attitude on the common clock; NaN at gaps and ends.
+    derived = np.full((len(attitude), 3), np.nan)
+    norm = np.linalg.norm(attitude, axis=1)
+    known = np.isfinite(norm) & (norm > 0.1)
+    both = known[:-2] & known[2:]
+    first, last = attitude[:-2][both], attitude[2:][both]
+    turn = Rotation.from_quat(first[:, [1, 2, 3, 0]]).inv() * Rotation.from_quat(last[:, [1, 2, 3, 0]])
+    derived[1:-1][both] = turn.as_rotvec() / (2 * _STEP_S)
     for axis, k in (("x", 0), ("y", 1), ("z", 2)):
         if not np.nanstd(derived[:, k]) > _LEAST_TURNING_RAD_S:
             continue

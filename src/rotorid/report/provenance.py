@@ -321,10 +321,8 @@ def _parse(path: Path) -> ast.Module:
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             if ast.get_docstring(node, clean=False) is not None:
                 node.body = node.body[1:] or [ast.Pass()]
-    tree.body = [node for node in tree.body if not _of_rooms(node)]
+    # What lists a package's modules that others may import, or their order, only a test reads.
+    for node in [n for n in tree.body if isinstance(n, ast.Assign)]:
+        if [ast.unparse(target) for target in node.targets] in _READ_BY_TESTS:
+            tree.body.remove(node)
     return tree
-
-
-def _of_rooms(node: ast.stmt) -> bool:
-    """Whether a statement lists a package's modules that others may import, or its order, which only a test reads."""
-    return isinstance(node, ast.Assign) and [ast.unparse(target) for target in node.targets] in _READ_BY_TESTS

@@ -217,7 +217,10 @@ def build(assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fine
     ground = held.centre_m + sizes.foot_out_m * outwards / np.linalg.norm(outwards)
     base = Pad(np.append(ground[:2], sizes.foot_depth_m), _UP, lower.axis, (sizes.foot_side_m, sizes.cell_side_m))
     counts = (count(1, fineness) + 1, count(1, fineness) + 1, count(3, fineness))
-    frames = {name: _frame(place, sizes) for name, place in zip(_CELLS, (upper, lower), strict=True)}
+    frames = {}
+    for name, place in zip(_CELLS, (upper, lower), strict=True):
+        axes = np.stack([place.axis, place.sense, np.cross(place.axis, place.sense)])
+        frames[name] = PartFrame(place.force_m + sizes.cell_between_pads_m / 2 * place.axis, axes)
     frames["D"] = PartFrame(np.zeros(3), placement.turn(np.arctan2(under[1], under[0])).T)
     parts = {
         **{name: mesh(sizes, fineness).put(frames[name]) for name in _CELLS},
@@ -239,11 +242,6 @@ def build(assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fine
 
 def _other_end(place: placement.Place, sizes: Sizes) -> np.ndarray:
     return place.force_m + sizes.cell_between_pads_m * place.axis
-
-
-def _frame(place: placement.Place, sizes: Sizes) -> PartFrame:
-    middle = place.force_m + sizes.cell_between_pads_m / 2 * place.axis
-    return PartFrame(middle, np.stack([place.axis, place.sense, np.cross(place.axis, place.sense)]))
 
 
 def _seat_radius_m(area_m2: float, fineness: float) -> float:
