@@ -24,8 +24,8 @@ import skfem
 
 from rotorid.identify.bench.reconstruct import read_geometry
 from rotorid.identify.fem import studies
-from rotorid.identify.fem.answers import judge_statements, ratios
-from rotorid.identify.fem.sizes import read_assumed, read_moduli
+from rotorid.identify.fem.bench import judge_statements, ratios
+from rotorid.identify.fem.placement import read_assumed, read_moduli
 
 ROOT = Path(__file__).resolve().parents[1]
 DRAWS, SEED = 12, 1
@@ -43,12 +43,12 @@ def measure(mesh: str) -> dict[str, str]:
     geometry = read_geometry(ROOT / "raw/thesis/table_2_3.csv")
     level = studies.LEVELS[mesh]
     began = time.process_time()
-    table, finest = studies.mesh_study(assumed, moduli, geometry, level.study)
+    table, _, _, answers = studies.mesh_study(assumed, moduli, geometry, level["study"])
     bench_s = time.process_time() - began
     began = time.process_time()
-    benches = studies.size_study(assumed, moduli, geometry, level.sizes, DRAWS, np.random.default_rng(SEED))
+    benches = studies.size_study(assumed, moduli, geometry, level["sizes"], DRAWS, np.random.default_rng(SEED))
     sizes_s = time.process_time() - began
-    own, ranges = ratios(finest.answers), studies.ranges(benches)
+    own, ranges = ratios(answers), studies.ranges(benches)
     rows = {
         "elements of the finest mesh": f"{int(table['elements'].iloc[-1])}",
         "processor time of the mesh study, s": f"{bench_s:.0f}",
@@ -58,10 +58,10 @@ def measure(mesh: str) -> dict[str, str]:
     for name, (short, what) in RATIOS.items():
         rows[what] = f"{own[short]:.3f}"
         rows[f"{what}: range over the sizes"] = " to ".join(f"{end:.2f}" for end in ranges[name])
-    for name, found in finest.answers.items():
+    for name, found in answers.items():
         rows[f"eq. 2.8 for one newton, {studies.SHORT[name]}, N"] = f"{found.equation_n:.3f}"
     for row in judge_statements(benches):
-        rows[f"{row.statement}: holds on"] = f"{row.holds} of {row.benches}"
+        rows[f"{row['statement']}: holds on"] = f"{row['holds']} of {row['benches']}"
     return rows
 
 

@@ -16,12 +16,11 @@ import pandas as pd
 from rotorid.mismatch.decision.findings import Finding
 from rotorid.mismatch.plant.regression import Regression
 from rotorid.mismatch.plant.rows import Term
-from rotorid.plan.changed import ChangedVehicle
 from rotorid.plan.plan import Plan
-from rotorid.plan.questions import FittedSet, Question, best_of
+from rotorid.plan.questions import FittedSet, Question, answers, best_of, joined_sets
 from rotorid.plan.separation import Separation, recorded_after
 from rotorid.plan.session import KnownInstrument, SessionPlan
-from rotorid.plan.together import answers, joined_sets
+from rotorid.plan.simulate import ChangedVehicle
 from rotorid.recordings import RecordingSet
 from rotorid.report.deliver import analysis_of
 from rotorid_proof.intervals import wilson

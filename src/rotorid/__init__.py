@@ -30,7 +30,7 @@ __all__ = [
 
 _HOME = {name: "api" for name in __all__} | {
     "InputError": "errors",
-    "Result": "report.result",
+    "Result": "report.deliver",
     "read_set": "recordings",
 }
 

@@ -21,7 +21,7 @@ from rotorid.recordings import RecordingSet, Run, Vehicle, read_set, read_vehicl
 from rotorid.recordings.check import SetCheck, check_recordings
 from rotorid.recordings.files import check_belief, check_rotors, proposed_in, usable_runs
 from rotorid.recordings.tables import check_table, numbers
-from rotorid.report.result import FILES, OTHERS, Result
+from rotorid.report.deliver import FILES, OTHERS, Result
 from rotorid.steps import heard_by
 from rotorid.vehicle.exports import Exported, export_vehicle
 
@@ -245,7 +245,7 @@ def parameters(data: _Recorded, to: str, vehicle: Believed | None = None, **opti
 
     Returns
     -------
-    tuple of rotorid.identify.autopilot.parameters.Parameter
+    tuple of rotorid.identify.autopilot.parameters.AutopilotParameter
         Each with `value`, `interval_95`, `determined` and `to_set`.
     """
     from rotorid.identify.autopilot.parameters import parameters_of

@@ -8,13 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from rotorid.acquire.clock import SystemClock, VirtualClock
-from rotorid.acquire.emulators.build import build
-from rotorid.acquire.emulators.ports import EmulatedPorts
+from rotorid.acquire.emulators.ports import EmulatedPorts, build
 from rotorid.acquire.emulators.truth import Truth
 from rotorid.acquire.emulators.wire import Faults
 from rotorid.acquire.recorder import Recorder, Timings
-from rotorid.acquire.transport import LoopbackTransport, SerialTransport
+from rotorid.acquire.transport import LoopbackTransport, SerialTransport, SystemClock, VirtualClock
 from rotorid.io.wire import INSTRUMENTS
 
 ACQUIRE = (sys.executable, "-m", "rotorid.acquire")

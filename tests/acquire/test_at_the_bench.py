@@ -9,7 +9,7 @@ from zipfile import ZipFile
 
 import pytest
 
-from rotorid.acquire.plan import read_plan, steps_of
+from rotorid.acquire.run_plan import read_plan, steps_of
 from rotorid.io.lines import read_description
 
 ROOT = Path(__file__).parents[2]

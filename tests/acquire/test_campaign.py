@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from rotorid.acquire.campaign import COMBINATIONS, PARTS, run_campaign, weight_gf
-from rotorid.acquire.geometry import SLOPE, body_forces, cell_forces
-from rotorid.io.index import read_index
+from rotorid.acquire.emulators.truth import SLOPE, body_forces, cell_forces
 from rotorid.io.logs import read_log
-from rotorid.io.session import read_session
+from rotorid.io.session import read_index, read_session
 
 RAW = Path(__file__).parents[2] / "raw"
 SEALED = Path(__file__).parents[1] / "sealed" / "campaign_truth.yaml"

@@ -13,13 +13,12 @@ from typer.testing import CliRunner
 
 from rotorid.acquire import procedures
 from rotorid.acquire.cli import app, stable_name, udev_rule, who_is_there
-from rotorid.acquire.geometry import GF_N, body_forces, cell_forces
+from rotorid.acquire.emulators.truth import GF_N, body_forces, cell_forces
 from rotorid.acquire.view import Plot, bench_forces, braille, panel, watch
-from rotorid.identify.stand import clocks
-from rotorid.identify.stand.recordings import read_pairs
-from rotorid.io.index import read_index
-from rotorid.io.logs import read_log
-from rotorid.io.tables import read_tables
+from rotorid.identify import clocks
+from rotorid.identify.stand import read_pairs
+from rotorid.io.logs import read_log, read_tables
+from rotorid.io.session import read_index
 from tests.acquire.conftest import ACQUIRE
 from tests.acquire.fault_table import seen
 

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from rotorid.acquire import procedures
-from rotorid.acquire.clock import SystemClock
-from rotorid.acquire.errors import PortLost
 from rotorid.acquire.recorder import Recorder, Timings
+from rotorid.acquire.transport import PortLost, SystemClock
 from rotorid.io.frames import COMMAND, decode
 from rotorid.io.logs import read_log
 from rotorid.io.rawlog import RECEIVED, SENT, read_raw

@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from rotorid.acquire.emulators.build import build
 from rotorid.acquire.emulators.devices import programme_share
 from rotorid.acquire.emulators.physics import (
     GAUGE_MM,
@@ -19,22 +18,26 @@ from rotorid.acquire.emulators.physics import (
     TurningRotors,
     tilt_matrix,
 )
+from rotorid.acquire.emulators.ports import build
 from rotorid.acquire.emulators.truth import (
+    GF_N,
     BatteryTruth,
     BenchTruth,
     CellsTruth,
+    M,
     RotorTruth,
     SensorTruth,
     Truth,
     VehicleTruth,
+    body_forces,
+    cell_forces,
+    cell_response,
     draw_truth,
     read_truth,
     write_truth,
 )
-from rotorid.acquire.geometry import GF_N, M, body_forces, cell_forces, cell_response
 from rotorid.acquire.procedures import LowPass, Steadiness, programme_of
-from rotorid.io.experiments import EXPERIMENTS
-from rotorid.io.wire import GREEN, RED, SINE, TRAPEZOID, YELLOW, Programme
+from rotorid.io.wire import EXPERIMENTS, GREEN, RED, SINE, TRAPEZOID, YELLOW, Programme
 
 RNG = np.random.default_rng
 

@@ -17,17 +17,15 @@ from typer.testing import CliRunner
 
 from rotorid.acquire import procedures
 from rotorid.acquire.cli import app
-from rotorid.acquire.clock import SystemClock
 from rotorid.acquire.emulators.wire import Faults
-from rotorid.acquire.errors import AcquireError
 from rotorid.acquire.recorder import Recorder, Timings, _source
+from rotorid.acquire.transport import AcquireError, SystemClock
 from rotorid.errors import InputError
 from rotorid.io import rawlog, wire
 from rotorid.io.frames import ANSWER, DATA, END, START, Frame, StreamDecoder, encode
-from rotorid.io.logs import LogError, read_log
+from rotorid.io.logs import LogError, read_log, read_tables
 from rotorid.io.rawlog import read_raw
 from rotorid.io.session import Ended, Session, read_session, session_path, write_session
-from rotorid.io.tables import read_tables
 from rotorid.io.wire import TRAPEZOID, Programme
 from tests.acquire.conftest import ACQUIRE, QUICK
 from tests.acquire.fault_table import TABLE, seen

@@ -13,7 +13,7 @@ import pytest
 
 from rotorid.acquire import procedures
 from rotorid.acquire.emulators.wire import Faults
-from rotorid.acquire.errors import (
+from rotorid.acquire.transport import (
     BadName,
     DeviceReset,
     DeviceSilent,
@@ -23,11 +23,11 @@ from rotorid.acquire.errors import (
     PortLost,
     PortMissing,
     Refused,
+    SerialTransport,
 )
-from rotorid.acquire.transport import SerialTransport
 from rotorid.io import wire
+from rotorid.io.frames import Quality
 from rotorid.io.logs import Log, read_log
-from rotorid.io.sequence import Quality
 from rotorid.io.session import Ended, read_session
 from rotorid.io.wire import TRAPEZOID, Programme
 from tests.acquire.conftest import ACQUIRE, QUICK

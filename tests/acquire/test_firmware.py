@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from rotorid.acquire import procedures
-from rotorid.acquire.errors import DeviceFault, Refused
 from rotorid.acquire.recorder import Timings
+from rotorid.acquire.transport import DeviceFault, Refused
 from rotorid.io.logs import Log, read_log
 from rotorid.io.session import Ended
 from rotorid.io.wire import SINE, TRAPEZOID, VOLTS_PER_COUNT, Programme

@@ -13,13 +13,14 @@ from rotorid.io.frames import (
     BrokenFrame,
     ChecksumError,
     Frame,
+    Quality,
     StreamDecoder,
+    Tracker,
     cobs_decode,
     cobs_encode,
     decode,
     encode,
 )
-from rotorid.io.sequence import Quality, Tracker
 
 frames = st.builds(
     Frame, st.integers(0, 255), st.integers(0, 65535), st.integers(0, 2**32 - 1), st.binary(max_size=240)

@@ -13,10 +13,8 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from rotorid.acquire.cli import app
-from rotorid.acquire.clock import SystemClock
-from rotorid.acquire.errors import BadName, DeviceSilent, Interrupted
 from rotorid.acquire.lines import record_lines
-from rotorid.acquire.transport import SerialTransport
+from rotorid.acquire.transport import BadName, DeviceSilent, Interrupted, SerialTransport, SystemClock
 from rotorid.acquire.view import LinesPanel, Plot
 from rotorid.io import rawlog
 from rotorid.io.lines import Description, DescriptionError, LineDecoder, read_description, read_line_log

@@ -11,11 +11,20 @@ from rotorid.acquire import procedures
 from rotorid.acquire.emulators.wire import Faults
 from rotorid.acquire.recorder import LogWriter
 from rotorid.io import rawlog
-from rotorid.io.experiments import EXPERIMENTS
-from rotorid.io.index import COLUMNS, read_index, write_index
 from rotorid.io.logs import LogError, read_log
 from rotorid.io.rawlog import NotALog, read_raw
-from rotorid.io.session import RoomAir, Session, SessionError, read_session, session_path, write_session
+from rotorid.io.session import (
+    INDEX_COLUMNS,
+    RoomAir,
+    Session,
+    SessionError,
+    read_index,
+    read_session,
+    session_path,
+    write_index,
+    write_session,
+)
+from rotorid.io.wire import EXPERIMENTS
 
 
 def short_log(loopback, samples):
@@ -159,7 +168,7 @@ def test_index(log_path):
     raw = log_path.parent
     (raw / "vehicle.yaml").write_text("name: not a session\n")
     rows = write_index(raw)
-    assert len(rows) == 1 and list(rows[0]) == COLUMNS
+    assert len(rows) == 1 and list(rows[0]) == INDEX_COLUMNS
     assert rows == read_index(raw)
     assert rows[0]["file"] == "run-bench.rlog" and rows[0]["missing"] == "1" and rows[0]["ended"] == "finished"
 

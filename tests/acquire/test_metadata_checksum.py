@@ -10,9 +10,8 @@ import pytest
 from typer.testing import CliRunner
 
 from rotorid.acquire.cli import app
-from rotorid.io.index import KEY, read_index, write_index
 from rotorid.io.logs import read_log
-from rotorid.io.session import SessionError, read_session
+from rotorid.io.session import INDEX_KEY, SessionError, read_index, read_session, write_index
 from tests.acquire.fault_table import seen
 from workflow.scripts import ingest
 
@@ -126,7 +125,7 @@ def test_every_flipped_bit_of_the_index_is_noticed(log):
     write_index(log.parent)
     path, rng = log.parent / "sessions.tsv", random.Random(42)
     good, rows = path.read_bytes(), read_index(log.parent)
-    last_row = 8 * good.rindex(KEY.encode())
+    last_row = 8 * good.rindex(INDEX_KEY.encode())
     anywhere = [rng.randrange(last_row) for _ in range(200)]
     for bit in anywhere + rng.sample(range(last_row, 8 * len(good)), 100):
         changed = bytearray(good)
@@ -165,7 +164,7 @@ def test_rows_behind_the_checksum_and_a_row_that_is_none_are_told(log):
         read_index(log.parent)
     assert command("checksum", "--renew", str(path))[0] == 0
     assert [row["id"] for row in read_index(log.parent)] == [NAME, "mine"]
-    assert path.read_text().splitlines()[-1].startswith(KEY)
+    assert path.read_text().splitlines()[-1].startswith(INDEX_KEY)
     path.write_text(path.read_text() + "short\tline\n")
     before = path.read_bytes()
     code, text = command("checksum", "--renew", str(path))
@@ -176,7 +175,7 @@ def test_an_index_without_a_checksum_is_read_and_given_one(log):
     write_index(log.parent)
     path = log.parent / "sessions.tsv"
     good, rows = path.read_bytes(), read_index(log.parent)
-    path.write_bytes(good[: good.rindex(KEY.encode())])
+    path.write_bytes(good[: good.rindex(INDEX_KEY.encode())])
     assert read_index(log.parent) == rows
     assert command("checksum", str(log.parent)) == (0, f"{log.parent}: 1 checksums written, 1 fitted already\n")
     assert path.read_bytes() == good

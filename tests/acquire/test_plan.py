@@ -17,13 +17,22 @@ from typer.testing import CliRunner
 
 from rotorid.acquire import procedures
 from rotorid.acquire.cli import app
-from rotorid.acquire.errors import AcquireError, LimitExceeded
-from rotorid.acquire.plan import CampaignPlan, PlanError, attempts, is_done, read_plan, steps_of
-from rotorid.acquire.record import record
-from rotorid.acquire.run_plan import Desk, check, emulated_ports, run
-from rotorid.io.index import read_index
+from rotorid.acquire.procedures import record
+from rotorid.acquire.run_plan import (
+    CampaignPlan,
+    Desk,
+    PlanError,
+    attempts,
+    check,
+    emulated_ports,
+    is_done,
+    read_plan,
+    run,
+    steps_of,
+)
+from rotorid.acquire.transport import AcquireError, LimitExceeded
 from rotorid.io.logs import read_log
-from rotorid.io.session import Ended
+from rotorid.io.session import Ended, read_index
 from tests.acquire.fault_table import seen
 
 GROUP = {

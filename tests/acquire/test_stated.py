@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotorid.acquire.campaign import STATED
-from rotorid.acquire.emulators import stated
+from rotorid.acquire.emulators import physics
 from rotorid.acquire.emulators.physics import CORNERS
 from rotorid.acquire.emulators.truth import BenchTruth, SensorTruth, Truth, VehicleTruth, read_truth
 
@@ -14,13 +14,13 @@ SEALED = Path(__file__).parents[1] / "sealed"
 
 
 def test_the_sealed_file_is_what_the_truth_gives(tmp_path: Path) -> None:
-    stated.write_stated(read_truth(SEALED / "campaign_truth.yaml"), tmp_path / STATED)
+    physics.write_stated(read_truth(SEALED / "campaign_truth.yaml"), tmp_path / STATED)
     assert (tmp_path / STATED).read_text() == (SEALED / STATED).read_text()
 
 
 def test_an_ideal_bench_reads_a_lateral_load_as_a_vertical_one_too() -> None:
     """The equations' absolute values do that; nothing gives way, so that nothing grows with the square."""
-    found = stated.readings(Truth(), "al")
+    found = physics.readings(Truth(), "al")
     assert found["crosstalk"]["C_Fz,Fx"] < -1.5
     assert found["crosstalk"]["C_Fx,Fz"] == pytest.approx(0, abs=1e-9)
     assert max(abs(v) for v in found["compliance"].values()) < 1e-3
@@ -28,7 +28,7 @@ def test_an_ideal_bench_reads_a_lateral_load_as_a_vertical_one_too() -> None:
 
 def test_a_bench_that_gives_way_under_thrust_grows_by_its_compliance() -> None:
     truth = Truth(bench={"pla": BenchTruth(compliance_1_n=[0, 0, 0.003])})
-    assert stated.readings(truth, "pla")["compliance"]["k_Fz,Fz"] == pytest.approx(0.003, rel=0.01)
+    assert physics.readings(truth, "pla")["compliance"]["k_Fz,Fz"] == pytest.approx(0.003, rel=0.01)
 
 
 def test_a_displaced_sensor_moves_the_moments_as_these_rotors_and_this_centre_do() -> None:
@@ -36,7 +36,7 @@ def test_a_displaced_sensor_moves_the_moments_as_these_rotors_and_this_centre_do
     truth = Truth(
         vehicle=VehicleTruth(com_offset_m=[0.004, 0.0, 0.0]), wrench=SensorTruth(position_error_m=[0.001, -0.003, 0.0])
     )
-    found = stated.displaced(truth)
+    found = physics.displaced(truth)
     x, y = CORNERS[:, 0] * truth.vehicle.arm_m, CORNERS[:, 1] * truth.vehicle.arm_m
     excess = np.array(list(found["unequal_rotors"].values()))
     thrust, weight = 1.5, 6.4

@@ -7,8 +7,8 @@ import pytest
 
 from rotorid.acquire.campaign import SEED, run_campaign
 from rotorid.acquire.emulators.truth import draw_truth
-from rotorid.identify.rotor.campaign import torque_points
-from rotorid.io.tables import read_tables
+from rotorid.identify.rotor import torque_points
+from rotorid.io.logs import read_tables
 
 
 def deviation(folder: Path, seed: int) -> float:

@@ -11,7 +11,7 @@ import yaml
 
 from rotorid.config import ConfigError, check, from_command_line
 from rotorid.errors import InputError
-from rotorid.identify.blackbox.models import conformal_coverage, folds
+from rotorid.identify.black_box import conformal_coverage, folds
 from rotorid_proof import plan
 
 ROOT = Path(__file__).parents[2]

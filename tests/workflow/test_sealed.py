@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from test_rules import RULES, WORKING
 
-from rotorid.report.codehash import Code
+from rotorid.report.provenance import Code
 
 ROOT = Path(__file__).parents[2]
 OPENS = {"score_proof", "score_ablation", "score_campaign"}

@@ -10,7 +10,7 @@ from pathlib import Path
 from snakemake.persistence import PersistenceBase
 
 from rotorid.report import log as logs
-from rotorid.report.codehash import Code
+from rotorid.report.provenance import Code
 from rotorid.config import check, from_command_line
 from rotorid.errors import InputError
 from rotorid.io.text.files import read_yaml

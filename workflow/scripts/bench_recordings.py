@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.identify.bench.prepare import bench_force, bench_set
-from rotorid.identify.bench.reconstruct import read_geometry
-from rotorid.io.tables import read_sessions
+from rotorid.identify.bench.reconstruct import bench_force, bench_set, read_geometry
+from rotorid.io.logs import read_sessions
 from rotorid.recordings import write_set
 from rotorid.report import log
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid.identify.bench import loadcell, recalibrate
+from rotorid.identify.bench import loadcell, reconstruct
 from rotorid.identify.bench.loadcell import FLAG_LEVEL
-from rotorid.io.tables import read_sessions
+from rotorid.io.logs import read_sessions
 from rotorid.report import log
 
 LOGGER = logging.getLogger("rotorid.calibration")
@@ -21,10 +21,10 @@ LOGGER = logging.getLogger("rotorid.calibration")
 def main(prepared: str, samples: str, recordings: str, readings: str, coefficients: str) -> None:
     """Write the readings (CSV) and each cell's calibration (JSON)."""
     sessions = read_sessions(recordings)
-    table = loadcell.flag_readings(recalibrate.readings(pd.read_parquet(prepared), sessions))
-    idle = recalibrate.idle_slopes(pd.read_parquet(samples), sessions)
+    table = loadcell.flag_readings(reconstruct.readings(pd.read_parquet(prepared), sessions))
+    idle = reconstruct.idle_slopes(pd.read_parquet(samples), sessions)
     cells = [
-        recalibrate.as_dict(int(cell), recalibrate.calibrate_cell(part, idle[int(cell)])) | loadcell.flags_as_dict(part)
+        {"cell": int(cell)} | reconstruct.calibrate_cell(part, idle[int(cell)]) | loadcell.flags_as_dict(part)
         for cell, part in table.groupby("cell")
     ]
     warnings = loadcell.flag_warnings(cells, table)

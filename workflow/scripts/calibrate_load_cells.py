@@ -25,7 +25,7 @@ def main(weights: str, readings: str, printed: str, out: str) -> None:
     """Fit every cell in `readings` and write the JSON file `out`."""
     known_gf, cells = loadcell.read_calibration_table(readings)
     with_tube = pd.read_csv(readings)["elements"].str.contains(TUBE, regex=False).to_numpy(float)
-    tube = loadcell.shared_weight_error(known_gf, cells, with_tube)
+    tube_error, tube_interval, _ = loadcell.shared_weight_error(known_gf, cells, with_tube)
     table = pd.read_csv(printed).set_index("coefficient")
     flagged = loadcell.flag_readings(loadcell.as_readings(known_gf, cells))
     fitted = []
@@ -65,8 +65,8 @@ def main(weights: str, readings: str, printed: str, out: str) -> None:
             max(cell["residual_rms_gf"] for cell in fitted),
         ],
         "balance_disagreement_share": loadcell.balance_disagreement(weights),
-        "tube_error_gf": tube.mean_gf,
-        "tube_error_interval_95": tube.interval_95_gf,
+        "tube_error_gf": tube_error,
+        "tube_error_interval_95": tube_interval,
         "tube_error_expected_gf": expected_tube_error(weights),
         "intercepts_off_zero": [
             cell["cell"] for cell in fitted if not cell["a0_interval_95"][0] <= 0 <= cell["a0_interval_95"][1]

@@ -12,9 +12,16 @@ import numpy as np
 import pandas as pd
 from scipy.special import stdtrit as student_quantile
 
-from rotorid.identify.blackbox import models
-from rotorid.identify.blackbox.experiments import INPUTS, OUTPUTS
-from rotorid.identify.blackbox.models import TrainingRange, conformal_coverage, folds, out_of_fold, scores
+from rotorid.identify import black_box
+from rotorid.identify.black_box import (
+    INPUTS,
+    OUTPUTS,
+    TrainingRange,
+    conformal_coverage,
+    folds,
+    out_of_fold,
+    scores,
+)
 from rotorid.recordings import read_vehicle
 from rotorid.report import log
 
@@ -46,12 +53,12 @@ def main(
     numbers = table["experiment"].to_numpy()
     measured = table[list(OUTPUTS)].to_numpy()
     fits = {
-        "thesis_network": lambda t: models.fit_thesis_network(t, epochs, rate, tuple(hidden), seed)[0],
-        "linear": models.fit_linear,
-        "ridge_physics": lambda t: models.fit_ridge_physics(t, t["experiment"].to_numpy()),
-        "boosting": lambda t: models.fit_boosting(t, seed),
-        "white_box": lambda t: models.white_box(vehicle),
-        "white_box_effects": lambda t: models.fit_white_box_effects(vehicle, t)[0],
+        "thesis_network": lambda t: black_box.fit_thesis_network(t, epochs, rate, tuple(hidden), seed)[0],
+        "linear": black_box.fit_linear,
+        "ridge_physics": lambda t: black_box.fit_ridge_physics(t, t["experiment"].to_numpy()),
+        "boosting": lambda t: black_box.fit_boosting(t, seed),
+        "white_box": lambda t: black_box.white_box(vehicle),
+        "white_box_effects": lambda t: black_box.fit_white_box_effects(vehicle, t)[0],
     }
     masks = folds(numbers, fold_count, np.random.default_rng(seed))
     predicted = out_of_fold(table, fits, masks)
@@ -62,7 +69,7 @@ def main(
         for k, output in enumerate(OUTPUTS):
             rows.append(
                 {
-                    "model": models.NAMES[name],
+                    "model": black_box.NAMES[name],
                     "output": output,
                     "rmse": score["rmse"][k],
                     "rmse_low": score["rmse_interval"][k, 0],
@@ -75,17 +82,17 @@ def main(
                 }
             )
         found["models"][name] = {
-            "name": models.NAMES[name],
+            "name": black_box.NAMES[name],
             "rmse": score["rmse"].tolist(),
             "r2": score["r2"].tolist(),
             "worst_r2": float(score["r2"].min()),
             "mean_coverage": float(coverage.mean()),
         }
-    _, effects, errors = models.fit_white_box_effects(vehicle, table)
+    _, effects, errors = black_box.fit_white_box_effects(vehicle, table)
     half = student_quantile(found["experiments"] - 1, 0.975) * errors
     found["effects"] = {
         name: {"value": value, "interval_95": [value - width, value + width]}
-        for name, value, width in zip(models.EFFECT_PARAMETERS, effects.tolist(), half.tolist(), strict=True)
+        for name, value, width in zip(black_box.EFFECT_PARAMETERS, effects.tolist(), half.tolist(), strict=True)
     }
     span = TrainingRange.of(table)
     found["statements"] = [{"asked": name, "says": span.statement(values)} for name, values in ASKED.items()]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.identify.estimate.flights import band_signals, fit_flights
+from rotorid.identify.excitation import band_signals, fit_flights
 from rotorid.recordings import read_set
 from rotorid.recordings.importers.faults import read_report
 from rotorid.report import log
@@ -28,7 +28,7 @@ def one_set(folder: Path, band_hz, rate_hz: float, block_s: float, seed: int) ->
     for delay in DELAYS_S:
         parts = [band_signals(run, vehicle, band_hz, delay, rate_hz) for run in recordings.runs]
         fits = fit_flights([p for p in parts if p is not None], block_s, np.random.default_rng(seed))
-        score = fits[0].r2 + fits[1].r2
+        score = fits[0]["r2"] + fits[1]["r2"]
         if score > best:
             best, found, chosen = score, fits, delay
     return [
@@ -36,13 +36,13 @@ def one_set(folder: Path, band_hz, rate_hz: float, block_s: float, seed: int) ->
             "set": recordings.name,
             "axis": axis,
             "published": believed,
-            "lower": fit.lower,
-            "estimate": fit.estimate,
-            "upper": fit.upper,
-            "low_95": fit.interval_95[0],
-            "high_95": fit.interval_95[1],
-            "ratio": fit.estimate / believed,
-            "r2": fit.r2,
+            "lower": fit["lower"],
+            "estimate": fit["estimate"],
+            "upper": fit["upper"],
+            "low_95": fit["interval_95"][0],
+            "high_95": fit["interval_95"][1],
+            "ratio": fit["estimate"] / believed,
+            "r2": fit["r2"],
             "delay_ms": 1000 * chosen,
         }
         for axis, believed, fit in zip(("xx", "yy", "zz"), published, found, strict=True)

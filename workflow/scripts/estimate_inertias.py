@@ -13,9 +13,16 @@ import numpy as np
 import pandas as pd
 
 from rotorid.config import READING_S
-from rotorid.identify.estimate.excitation import WINDOW_S, ExcitedHold, Readings, Wanted, design, promised_errors
-from rotorid.identify.estimate.grey_box import WEIGHT_NAMES, check_consistency, weights_of_inertias
-from rotorid.identify.estimate.output_error import cut_windows, fit_output_error, tied, untied
+from rotorid.identify.excitation import WINDOW_S, ExcitedHold, Readings, Wanted, design, promised_errors
+from rotorid.identify.grey_box import (
+    WEIGHT_NAMES,
+    check_consistency,
+    cut_windows,
+    fit_output_error,
+    tied,
+    untied,
+    weights_of_inertias,
+)
 from rotorid.recordings import read_vehicle
 from rotorid.report import log
 from rotorid.vehicle.control.pid import AttitudePid, training_reference, validation_reference
@@ -110,7 +117,7 @@ def main(
         weights, covariance = untied_weights(free)
         agreement = check_consistency(weights, covariance)
         fitted.append((fit, weights, covariance, agreement))
-        row = {"draw": draw, "consistency_p": agreement.p_value}
+        row = {"draw": draw, "consistency_p": agreement["p_value"]}
         for k, axis in enumerate(AXES):
             low, high = fit.inertia_intervals_95[k]
             row |= {
@@ -137,7 +144,7 @@ def main(
         "gyroscopic": weights[:3].tolist(),
         "gyroscopic_sigma": np.sqrt(np.diag(covariance)[:3]).tolist(),
         "gyroscopic_truth": weights_of_inertias(truth)[:3].tolist(),
-        "consistency_p": agreement.p_value,
+        "consistency_p": agreement["p_value"],
         "consistency_p_smallest": float(table["consistency_p"].min()),
         "consistency_share": float(np.mean(table["consistency_p"] > 0.05)),
         "draws": draws,

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.identify.bench import dynamic
+from rotorid.identify.bench import static
 from rotorid.identify.bench.reconstruct import CELLS, Geometry, cell_forces, forces, read_geometry
-from rotorid.io.tables import by_recording, read_sessions
+from rotorid.io.logs import by_recording, read_sessions
 from rotorid.report import log
 
 KINDS = ("", "_low_pass", "_zero_phase")
@@ -34,7 +34,7 @@ def main(
     coefficients = np.array([[cell["a0_gf"], cell["a1_gf_per_10uv"]] for cell in cells])
     distances = read_geometry(geometry)
     parts = []
-    sets = dynamic.sets_of(pd.concat([read_sessions(tables[1]) for tables in (bench, jr3)], ignore_index=True))
+    sets = static.sets_of(pd.concat([read_sessions(tables[1]) for tables in (bench, jr3)], ignore_index=True))
     for tables in (bench, jr3):
         prepared, sessions = pd.read_parquet(tables[0]), read_sessions(tables[1])
         force_z = {
@@ -42,13 +42,13 @@ def main(
             for name, table in by_recording(prepared).items()
             for kind in KINDS
         }
-        parts.append(dynamic.flights(force_z, prepared, sessions, sets))
+        parts.append(static.flights(force_z, prepared, sessions, sets))
     flown = pd.concat(parts, ignore_index=True)
     flown.to_parquet(flights, index=False)
-    dynamic.figures(flown).to_csv(figures, index=False, float_format="%.9g")
-    held = dynamic.agreement(flown)
+    static.figures(flown).to_csv(figures, index=False, float_format="%.9g")
+    held = static.agreement(flown)
     held.to_csv(levels, index=False, float_format="%.9g")
-    found = {entry["platform"]: entry for entry in dynamic.ratios(held)}
+    found = {entry["platform"]: entry for entry in static.ratios(held)}
     Path(summary).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 
 

@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.identify.blackbox.experiments import stand_wrench, thrust_of_throttle
-from rotorid.identify.rotor.campaign import SPEED_LAW_PARAMETERS, speed_by_law, speed_law
-from rotorid.identify.stand import wrench
-from rotorid.io.experiments import EXPERIMENTS
-from rotorid.io.tables import read_sessions
+from rotorid.identify import stand as wrench
+from rotorid.identify.black_box import stand_wrench, thrust_of_throttle
+from rotorid.identify.rotor import SPEED_LAW_PARAMETERS, speed_by_law, speed_law
+from rotorid.io.logs import read_sessions
+from rotorid.io.wire import EXPERIMENTS
 from rotorid.recordings import read_set
 from rotorid.report import log
 

@@ -6,16 +6,16 @@
 
 import pandas as pd
 
-from rotorid.identify.bench import tensile
-from rotorid.io.tables import read_sessions
+from rotorid.identify.bench import loadcell
+from rotorid.io.logs import read_sessions
 from rotorid.report import log
 
 
 def main(samples: str, recordings: str, printed: str, specimens: str, infill: str, curves: str) -> None:
     """Write one row a specimen (CSV), one an infill density (CSV) and the curves (Parquet)."""
-    table, stress = tensile.specimens(pd.read_parquet(samples), read_sessions(recordings))
+    table, stress = loadcell.specimens(pd.read_parquet(samples), read_sessions(recordings))
     table.to_csv(specimens, index=False, float_format="%.9g")
-    tensile.by_infill(table, pd.read_csv(printed)).to_csv(infill, index=False, float_format="%.9g")
+    loadcell.by_infill(table, pd.read_csv(printed)).to_csv(infill, index=False, float_format="%.9g")
     stress.to_parquet(curves, index=False)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid.identify.rotor.coefficients import PROPELLER_COLUMNS, summarise_propeller
+from rotorid.identify.rotor import PROPELLER_COLUMNS, summarise_propeller
 from rotorid.recordings import read_set
 from rotorid.recordings.importers.faults import read_report
 from rotorid.report import log

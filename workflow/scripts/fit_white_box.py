@@ -8,7 +8,6 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +15,18 @@ import numpy as np
 import pandas as pd
 from scipy.special import stdtr
 
-from rotorid.identify.rotor.campaign import COLUMNS, sample_noise, thrust_points, torque_points
-from rotorid.identify.rotor.coefficients import LEAST_FORCE_SD_N, Points, fit_coefficient
-from rotorid.io.tables import read_sessions
-from rotorid.report import log, thesis
+from rotorid.identify import grey_box
+from rotorid.identify.rotor import (
+    COLUMNS,
+    LEAST_FORCE_SD_N,
+    Points,
+    fit_coefficient,
+    sample_noise,
+    thrust_points,
+    torque_points,
+)
+from rotorid.io.logs import read_sessions
+from rotorid.report import log
 from rotorid.vehicle.mass_properties import compose, read_components
 
 LEAST_TORQUE_SD_N_M = 1e-6
@@ -51,7 +58,7 @@ def coefficient(points: pd.DataFrame, believed: float, least_sd: float) -> dict:
         "p_value": float(2 * stdtr(plain.freedom, -(abs(plain.value - believed) / plain.standard_error))),
         "thesis_inside": plain.interval_95[0] <= believed <= plain.interval_95[1],
         "interval_95_own_noise": own_noise.interval_95,
-        "noise": asdict(sample_noise(points)),
+        "noise": sample_noise(points),
     }
 
 
@@ -75,7 +82,7 @@ def main(
     lift.to_csv(thrust, index=False)
     twist.to_csv(torque, index=False)
     coefficients = {
-        key: coefficient(points, thesis.WHITE_BOX[believed], least)
+        key: coefficient(points, grey_box.WHITE_BOX[believed], least)
         for key, points, believed, least in (
             ("c_f", lift, "thrust_coefficient_n_s2", LEAST_FORCE_SD_N),
             ("c_q", twist, "torque_coefficient_n_m_s2", LEAST_TORQUE_SD_N_M),
@@ -89,7 +96,7 @@ def main(
         "centre_m": composed.centre_m.tolist(),
         "inertia_kg_m2": dict(zip(("xx", "yy", "zz"), np.diag(composed.inertia_kg_m2).tolist(), strict=True)),
         "inertia_difference": {
-            axis: float(composed.inertia_kg_m2[k, k] / thesis.WHITE_BOX[f"inertia_{axis}_kg_m2"] - 1)
+            axis: float(composed.inertia_kg_m2[k, k] / grey_box.WHITE_BOX[f"inertia_{axis}_kg_m2"] - 1)
             for k, axis in enumerate(("xx", "yy", "zz"))
         },
     }
@@ -109,7 +116,7 @@ def main(
         if fit
     ]
     for axis in ("xx", "yy", "zz"):
-        believed = thesis.WHITE_BOX[f"inertia_{axis}_kg_m2"]
+        believed = grey_box.WHITE_BOX[f"inertia_{axis}_kg_m2"]
         value = found["inertia_kg_m2"][axis]
         rows.append(
             {

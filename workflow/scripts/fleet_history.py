@@ -11,8 +11,8 @@ from pathlib import Path
 import pandas as pd
 
 from rotorid.report import log
-from rotorid.report.fleet.history import by_vehicle, history
-from rotorid.report.fleet.summary import make_vehicle_page
+from rotorid.report.fleet import make_vehicle_page
+from rotorid.report.fleet_history import by_vehicle, history
 from rotorid.report.plots.fleet import draw_history, draw_vehicle
 
 

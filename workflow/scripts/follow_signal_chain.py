@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from rotorid.identify.fem import studies
-from rotorid.identify.fem.sizes import read_assumed, read_moduli
+from rotorid.identify.fem.placement import read_assumed, read_moduli
 from rotorid.identify.fem.studies import from_printed_slope
 from rotorid.io import wire
 from rotorid.report import log
@@ -21,13 +21,13 @@ def main(sizes: str, moduli: str, calibration: str, mesh: str, chain: str, varia
     """Write the chain and the calibration (JSON), and a size's end a row (CSV)."""
     assumed, modulus = read_assumed(sizes), read_moduli(moduli)
     level = studies.LEVELS[mesh]
-    table = studies.chain_study(assumed, modulus, level.chain, level.sizes)
+    table = studies.chain_study(assumed, modulus, level["chain"], level["sizes"])
     table.to_csv(variants, index=False, float_format="%.6g")
     cells = json.loads(Path(calibration).read_text(encoding="utf-8"))["cells"]
     measured = np.array([from_printed_slope(cell["a1_gf_per_10uv"]) for cell in cells])
     slopes = [cell["a1_gf_per_10uv"] for cell in cells]
     volts, mean = table["volts_per_n"], float(measured.mean())
-    needed = studies.ligament_for(assumed.sizes, modulus, mean, level.sizes)
+    needed = studies.ligament_for(assumed.sizes, modulus, mean, level["sizes"])
     result = {
         "computed": table.drop(columns=["size", "end", "value"]).iloc[0].to_dict(),
         "steps": studies.steps(table.iloc[0], mean, assumed.sizes),

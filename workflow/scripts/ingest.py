@@ -7,8 +7,8 @@
 import logging
 from collections.abc import Sequence
 
+from rotorid.io.logs import read_tables
 from rotorid.io.metadata_checksum import without_checksum
-from rotorid.io.tables import read_tables
 from rotorid.report import log
 
 LOGGER = logging.getLogger("rotorid.ingest")

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 from rotorid.report import log
-from rotorid.report.fleet.judge import judge_sets
+from rotorid.report.fleet import judge_sets
 
 
 def main(folders: list[str], code: str, verdicts: str, memory: str) -> None:

@@ -17,12 +17,11 @@ from rotorid.report import log
 def main(folder: str, settings: dict, summary: str, flights: str, bins: str, points: str) -> None:
     """Compare the flights in `folder`; `settings` holds cutoff_hz, airspeed_bin_m_s, block_s and seed."""
     report = read_report(Path(folder))
-    found = compare_with_neurobem(read_set(folder), **settings) if report["available"] else no_neurobem()
-    result = {"available": report["available"], "reason": report["reason"], **settings, **found.summary}
+    found, *tables = compare_with_neurobem(read_set(folder), **settings) if report["available"] else no_neurobem()
+    result = {"available": report["available"], "reason": report["reason"], **settings, **found}
     Path(summary).write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-    found.flights.to_csv(flights, index=False)
-    found.bins.to_csv(bins, index=False)
-    found.points.to_csv(points, index=False, float_format="%.6g")
+    for own, path, form in zip(tables, (flights, bins, points), (None, None, "%.6g"), strict=True):
+        own.to_csv(path, index=False, float_format=form)
 
 
 if __name__ == "__main__":

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 
 import pandas as pd
 
-from rotorid.identify.bench.prepare import Filter, prepare
-from rotorid.io.tables import read_sessions
+from rotorid.identify.bench.reconstruct import Filter, prepare
+from rotorid.io.logs import read_sessions
 from rotorid.report import log
 
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from rotorid.identify.blackbox.experiments import read_experiments, thrust_of_throttle
-from rotorid.io.tables import read_sessions
+from rotorid.identify.black_box import read_experiments, thrust_of_throttle
+from rotorid.io.logs import read_sessions
 from rotorid.report import log
 
 

@@ -33,7 +33,7 @@ from rotorid_proof.row_by_row import as_read, rows_of
 def standard_as_long(made: SessionPlan) -> list[SessionStep]:
     """The standard steps in turn, each place as often as the others, about as long as the planned session."""
     usual = next((s for s in (made, *made.others) if s.name == "standard"), None)
-    once = list({s.name: s for s in usual.steps}.values()) if usual else []
+    once = list({s.name: s for s in usual.pieces}.values()) if usual else []
     out: list[SessionStep] = []
     for step in cycle(once):
         longer = sum(s.duration_s for s in out) + step.duration_s
@@ -59,13 +59,13 @@ def row_of(case, answer: dict, first: RecordingSet, simulator, limits: SessionLi
         return proof.Row(case=case.name, truth=named, open="", said="nothing was left open", kind=kind)
     ids = classes[0]
     made = plan_session(found, limits)
-    if not made.steps:
+    if not made.pieces:
         said = made.unanswerable[0][1] if made.unanswerable else "no load separates them"
         return proof.Row(case=case.name, truth=named, open=" ".join(ids), outcome="no plan", said=said, kind=kind)
     expected = proof.predicted(made, ids, truth)
     question = next((q for q in found.questions if set(q.ids) == set(ids)), None)
     outcome, measured, said = {}, {}, {}
-    for name, steps in {"planned": list(made.steps), "standard": standard_as_long(made)}.items():
+    for name, steps in {"planned": list(made.pieces), "standard": standard_as_long(made)}.items():
         if not steps:
             continue
         second = as_read(simulator.record(case, answer, as_table(found, steps)), simulator.write_set, "second")

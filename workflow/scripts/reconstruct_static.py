@@ -13,10 +13,9 @@ import numpy as np
 import pandas as pd
 
 from rotorid.identify.bench import static
-from rotorid.identify.bench.recalibrate import line_of
-from rotorid.identify.bench.reconstruct import CELLS, FORCES, read_geometry
+from rotorid.identify.bench.reconstruct import CELLS, FORCES, line_of, read_geometry
 from rotorid.identify.bench.static import as_dict
-from rotorid.io.tables import read_sessions
+from rotorid.io.logs import read_sessions
 from rotorid.report import log
 
 

@@ -12,8 +12,8 @@ import pandas as pd
 
 from rotorid.identify.bench.reconstruct import read_geometry
 from rotorid.identify.fem import studies
-from rotorid.identify.fem.answers import ratios
-from rotorid.identify.fem.sizes import read_assumed, read_moduli
+from rotorid.identify.fem.bench import ratios
+from rotorid.identify.fem.placement import read_assumed, read_moduli
 from rotorid.report import log
 
 
@@ -22,9 +22,11 @@ def main(
 ) -> None:
     """Write what the finest mesh says (JSON), its loads (CSV), a mesh a row (CSV) and the surface (Parquet)."""
     assumed, modulus = read_assumed(sizes), read_moduli(moduli)
-    table, finest = studies.mesh_study(assumed, modulus, read_geometry(geometry), studies.LEVELS[mesh].study)
+    table, built, solved, found = studies.mesh_study(
+        assumed, modulus, read_geometry(geometry), studies.LEVELS[mesh]["study"]
+    )
     weights_gf = pd.read_csv(readings)["weight_gf"].to_numpy(float)
-    series = studies.loads(finest.answers, weights_gf, assumed.pressed_area_m2)
+    series = studies.loads(found, weights_gf, assumed.pressed_area_m2)
     result = {
         "mesh": mesh,
         "elements": int(table["elements"].iloc[-1]),
@@ -37,15 +39,15 @@ def main(
         "pressed_area_mm2": assumed.pressed_area_m2 * 1e6,
         "modulus_gpa": {studies.SHORT[name]: value / 1e9 for name, value in modulus.items()},
         "at_largest": series.iloc[-1].to_dict(),
-        "ratio": ratios(finest.answers),
-        "per_newton": {studies.SHORT[name]: asdict(found) for name, found in finest.answers.items()},
-        "parts": studies.parts(finest),
+        "ratio": ratios(found),
+        "per_newton": {studies.SHORT[name]: asdict(answers) for name, answers in found.items()},
+        "parts": studies.parts(built, solved),
         "change_of_last_mesh": studies.change_of_last_mesh(table),
     }
     Path(bench).write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     series.to_csv(loads, index=False, float_format="%.6g")
     table.to_csv(meshes, index=False, float_format="%.6g")
-    studies.surface(finest).to_parquet(surface, index=False)
+    studies.surface(built, solved).to_parquet(surface, index=False)
 
 
 if __name__ == "__main__":

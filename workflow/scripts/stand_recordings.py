@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid.identify.blackbox.experiments import thrust_of_throttle
-from rotorid.identify.stand import recordings as sets
-from rotorid.identify.stand.clocks import align, clock_summary, clock_table, skew
-from rotorid.io.tables import read_sessions
+from rotorid.identify import stand as sets
+from rotorid.identify.black_box import thrust_of_throttle
+from rotorid.identify.clocks import align, clock_summary, clock_table, skew
+from rotorid.io.logs import read_sessions
 from rotorid.recordings import read_vehicle, write_set
 from rotorid.report import log
 

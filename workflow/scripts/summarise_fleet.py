@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 
 from rotorid.report import log
-from rotorid.report.fleet.summary import by_effect, by_vehicle, collect, make_page
+from rotorid.report.fleet import by_effect, by_vehicle, collect, make_page
 from rotorid.report.plots.fleet import draw_fleet
 
 

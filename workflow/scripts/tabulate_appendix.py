@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from rotorid.io.experiments import EXPERIMENTS
+from rotorid.io.wire import EXPERIMENTS
 from rotorid.report import log, provenance
 from rotorid.report.plots import style
 from rotorid.report.plots.rule_graph import rule_graph

@@ -10,8 +10,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.errors import InputError
-from rotorid.identify.blackbox.experiments import OUTPUTS
-from rotorid.identify.blackbox.models import fit_thesis_network
+from rotorid.identify.black_box import OUTPUTS, fit_thesis_network
 from rotorid.report import log
 
 

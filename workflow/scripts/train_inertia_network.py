@@ -16,7 +16,8 @@ import numpy as np
 import pandas as pd
 from scipy.special import chdtri
 
-from rotorid.identify.estimate.grey_box import (
+from rotorid.identify import grey_box
+from rotorid.identify.grey_box import (
     WEIGHT_NAMES,
     NetworkFit,
     check_consistency,
@@ -27,7 +28,7 @@ from rotorid.identify.estimate.grey_box import (
 )
 from rotorid.identify.networks import Training
 from rotorid.recordings import read_vehicle
-from rotorid.report import log, thesis
+from rotorid.report import log
 
 THESIS_EPOCHS = 20_000
 """Where the thesis reads off its figure 4.22 that the error of the yaw acceleration has converged."""
@@ -42,14 +43,14 @@ def columns(table: pd.DataFrame, name: str) -> np.ndarray:
 def consistency(weights, covariance) -> dict:
     found = check_consistency(weights, covariance)
     return {
-        "trained": found.trained.tolist(),
-        "implied": found.implied.tolist(),
-        "sigma": found.sigma.tolist(),
-        "z": (found.gap / found.sigma).tolist(),
-        "statistic": found.statistic,
+        "trained": found["trained"].tolist(),
+        "implied": found["implied"].tolist(),
+        "sigma": found["sigma"].tolist(),
+        "z": (found["gap"] / found["sigma"]).tolist(),
+        "statistic": found["statistic"],
         # Only noise so many times larger than assumed would leave the relations in doubt at 5 %.
-        "noise_factor": float(np.sqrt(found.statistic / chdtri(3, 1 - 0.95))),
-        "p_value": found.p_value,
+        "noise_factor": float(np.sqrt(found["statistic"] / chdtri(3, 1 - 0.95))),
+        "p_value": found["p_value"],
     }
 
 
@@ -94,7 +95,7 @@ def main(
     rms = np.sqrt(np.mean(thinned[2] ** 2, axis=0))
     # The torque weight's share of the squared error falls by exp(-2 rate <τ²> epoch): to 1 % in the epochs read off.
     asked = np.sqrt(np.log(100) / (2 * rate * THESIS_EPOCHS))
-    printed = np.array(thesis.INERTIAL_WEIGHTS)
+    printed = np.array(grey_box.INERTIAL_WEIGHTS)
     found = {
         "names": list(WEIGHT_NAMES),
         "truth": weights_of_inertias(truth).tolist(),

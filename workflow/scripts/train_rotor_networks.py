@@ -11,10 +11,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.identify.estimate.grey_box import fit_coefficient_network
+from rotorid.identify import grey_box
+from rotorid.identify.grey_box import fit_coefficient_network
 from rotorid.identify.networks import Training
-from rotorid.identify.rotor.coefficients import Points, fit_coefficient
-from rotorid.report import log, thesis
+from rotorid.identify.rotor import Points, fit_coefficient
+from rotorid.report import log
 
 HISTORY = ["coefficient", "epoch", "mse"]
 SIZES = ["coefficient", "hidden", "epoch", "mse"]
@@ -32,31 +33,31 @@ def main(
         points = pd.read_csv(path)
         if points.empty:
             continue
-        printed = thesis.ROTOR_NETWORKS[key]
+        printed = grey_box.ROTOR_NETWORKS[key]
         speed, value = points["speed_rad_s"].to_numpy(), points["value"].to_numpy()
-        fit = fit_coefficient_network(speed, value, hidden, Training(rate, epochs, seed=seed))
+        coefficient, scaling, trained = fit_coefficient_network(speed, value, hidden, Training(rate, epochs, seed=seed))
         squares = fit_coefficient([Points("tests", speed, value)], offset=False)
-        mse = fit.trained.mse[:, 0]
+        mse = trained.mse[:, 0]
         found[name] = {
-            "network": fit.coefficient,
+            "network": coefficient,
             "least_squares": squares.value,
             "interval_95": squares.interval_95,
-            "thesis_network": thesis.GREY_BOX[key],
-            "thesis_least_squares": thesis.WHITE_BOX[key],
+            "thesis_network": grey_box.GREY_BOX[key],
+            "thesis_least_squares": grey_box.WHITE_BOX[key],
             "thesis_weights": printed.coefficient,
             "thesis_weights_rounding": printed.rounding,
-            "network_inside": squares.interval_95[0] <= fit.coefficient <= squares.interval_95[1],
-            "k_x": fit.scaling.k_x,
-            "k_d": fit.scaling.k_d,
-            "w1": fit.trained.network.weights[0][:, 0].tolist(),
-            "w2": fit.trained.network.weights[1][0].tolist(),
+            "network_inside": squares.interval_95[0] <= coefficient <= squares.interval_95[1],
+            "k_x": scaling.k_x,
+            "k_d": scaling.k_d,
+            "w1": trained.network.weights[0][:, 0].tolist(),
+            "w2": trained.network.weights[1][0].tolist(),
             "final_mse": float(mse[-1]),
             "settled_epoch": int(np.argmax(mse < 2 * mse[-1])),
         }
-        curves.append(pd.DataFrame({"coefficient": name, "epoch": fit.trained.epochs, "mse": mse}))
+        curves.append(pd.DataFrame({"coefficient": name, "epoch": trained.epochs, "mse": mse}))
         for size in (1, 2, 4, 8, 16):
             runs = [
-                fit_coefficient_network(speed, value, size, Training(rate, epochs, seed=s, every=5)).trained
+                fit_coefficient_network(speed, value, size, Training(rate, epochs, seed=s, every=5))[2]
                 for s in range(seed, seed + 8)
             ]
             middle = np.median([r.mse[:, 0] for r in runs], axis=0)

@@ -11,11 +11,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.identify.estimate.flights import band_signals, fit_flights
+from rotorid.identify import grey_box
+from rotorid.identify.excitation import band_signals, fit_flights
 from rotorid.recordings import Inertia, Run, Vehicle, read_set, read_vehicle
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.faults import read_report
-from rotorid.report import log, thesis
+from rotorid.report import log
 from rotorid.vehicle.control.pid import AttitudePid, validation_reference
 from rotorid.vehicle.simulator import simulate
 from rotorid.vehicle.windows import Inputs, States, simulate_windows
@@ -65,7 +66,7 @@ def real_flights(folder: Path, band_hz, rate_hz: float, block_s: float, delay_s:
         fits = fit_flights(others, block_s, np.random.default_rng(seed), draws=2)
         estimated = np.diag(vehicle.inertia_kg_m2.matrix()).copy()
         # Yaw is kept as published: its band holds no moment that the rotors' speeds explain.
-        estimated[:2] = [fits[0].estimate, fits[1].estimate]
+        estimated[:2] = [fits[0]["estimate"], fits[1]["estimate"]]
         before, count = forward_error(vehicle, run, delay_s)
         after, _ = forward_error(with_inertias(vehicle, estimated), run, delay_s)
         rows += [
@@ -101,9 +102,9 @@ def main(
     white = read_vehicle(Path(vehicle_file))
     grey = with_inertias(
         white,
-        [thesis.GREY_BOX[f"inertia_{a}_kg_m2"] for a in ("xx", "yy", "zz")],
-        thrust_coefficient_n_s2=thesis.GREY_BOX["thrust_coefficient_n_s2"],
-        torque_coefficient_n_m_s2=thesis.GREY_BOX["torque_coefficient_n_m_s2"],
+        [grey_box.GREY_BOX[f"inertia_{a}_kg_m2"] for a in ("xx", "yy", "zz")],
+        thrust_coefficient_n_s2=grey_box.GREY_BOX["thrust_coefficient_n_s2"],
+        torque_coefficient_n_m_s2=grey_box.GREY_BOX["torque_coefficient_n_m_s2"],
     )
     better = with_inertias(white, json.loads(Path(improved).read_text(encoding="utf-8"))["inertias"])
     table, found = {}, {"window_s": WINDOW_S}

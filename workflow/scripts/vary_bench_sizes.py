@@ -5,15 +5,14 @@
 """
 
 import json
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
 from rotorid.identify.bench.reconstruct import read_geometry
 from rotorid.identify.fem import studies
-from rotorid.identify.fem.answers import EVEN, MIDDLE, NEARLY, judge_statements
-from rotorid.identify.fem.sizes import read_assumed, read_moduli
+from rotorid.identify.fem.bench import EVEN, MIDDLE, NEARLY, judge_statements
+from rotorid.identify.fem.placement import read_assumed, read_moduli
 from rotorid.report import log
 
 
@@ -23,19 +22,19 @@ def main(sizes: str, moduli: str, geometry: str, mesh: str, draws: int, seed: in
         read_assumed(sizes),
         read_moduli(moduli),
         read_geometry(geometry),
-        studies.LEVELS[mesh].sizes,
+        studies.LEVELS[mesh]["sizes"],
         draws,
         np.random.default_rng(seed),
     )
     table.to_csv(benches, index=False, float_format="%.6g")
     result = {
-        "fineness": studies.LEVELS[mesh].sizes,
+        "fineness": studies.LEVELS[mesh]["sizes"],
         "benches": len(table),
         "drawn": int((table["end"] == "drawn").sum()),
         "even": EVEN,
         "middle": MIDDLE,
         "nearly": NEARLY,
-        "statements": [asdict(row) | {"word": row.word} for row in judge_statements(table)],
+        "statements": judge_statements(table),
         "ranges": studies.ranges(table),
         "strongest": studies.strongest(table),
     }

@@ -20,7 +20,6 @@ from zlib import crc32
 import numpy as np
 
 from rotorid.acquire import procedures
-from rotorid.acquire.clock import VirtualClock
 from rotorid.acquire.emulators.devices import (
     BenchDevice,
     Device,
@@ -44,17 +43,15 @@ from rotorid.acquire.emulators.physics import (
     TesterPhysics,
     TorqueRig,
     TurningRotors,
+    write_stated,
 )
-from rotorid.acquire.emulators.stated import write_stated
 from rotorid.acquire.emulators.truth import Truth, draw_truth, write_truth
 from rotorid.acquire.emulators.wire import Faults, WireHalf, World
 from rotorid.acquire.procedures import STEADY_JR3, SteadyRule, programme_of
 from rotorid.acquire.recorder import Recorder, Timings
-from rotorid.acquire.transport import LoopbackTransport
-from rotorid.io.experiments import EXPERIMENTS
-from rotorid.io.index import write_index
-from rotorid.io.session import RoomAir, Session, Setup, session_path, write_session
-from rotorid.io.wire import TRAPEZOID, Programme
+from rotorid.acquire.transport import LoopbackTransport, VirtualClock
+from rotorid.io.session import RoomAir, Session, Setup, session_path, write_index, write_session
+from rotorid.io.wire import EXPERIMENTS, TRAPEZOID
 
 _WEIGHTS_GF = {
     "Carbon Fiber 1": 35.715,
@@ -420,13 +417,10 @@ def dynamics(campaign: _Campaign) -> None:
             world,
             {f"{name}-quadrotor": setup, f"{name}-wrench": setup},
             lambda vehicle, sensor, c=letter, p=programme: procedures.experiment(vehicle, sensor, c, p),
-            {"name": "experiment", "number": number, "letter": letter, **_plain(programme)},
+            {"name": "experiment", "number": number, "letter": letter}
+            | programme._asdict()
+            | {"shape": "trapezoid" if programme.shape == TRAPEZOID else "sine", "maxima": list(programme.maxima)},
         )
-
-
-def _plain(programme: Programme) -> dict:
-    shape = "trapezoid" if programme.shape == TRAPEZOID else "sine"
-    return programme._asdict() | {"shape": shape, "maxima": list(programme.maxima)}
 
 
 def tensile(campaign: _Campaign) -> None:

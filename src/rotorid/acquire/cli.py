@@ -23,18 +23,22 @@ from typing import Annotated, get_type_hints
 import typer
 
 from rotorid.acquire import procedures, view
-from rotorid.acquire.errors import AcquireError, Interrupted, LimitExceeded, PortBusy, PortLost, PortMissing
-from rotorid.acquire.procedures import HOLD_S, RAMP_S, programme_of
-from rotorid.acquire.record import recorders_for, run_with
+from rotorid.acquire.procedures import HOLD_S, RAMP_S, programme_of, recorders_for, run_with
 from rotorid.acquire.recorder import Recorder
-from rotorid.acquire.transport import SerialTransport
+from rotorid.acquire.transport import (
+    AcquireError,
+    Interrupted,
+    LimitExceeded,
+    PortBusy,
+    PortLost,
+    PortMissing,
+    SerialTransport,
+)
 from rotorid.errors import InputError
 from rotorid.io import wire
-from rotorid.io.experiments import EXPERIMENTS
-from rotorid.io.frames import COMMAND, START, Frame, encode
-from rotorid.io.sequence import Intake
+from rotorid.io.frames import COMMAND, START, Frame, Intake, encode
 from rotorid.io.session import RoomAir, SessionError, Setup
-from rotorid.io.wire import IDENTIFY, INSTRUMENTS
+from rotorid.io.wire import EXPERIMENTS, IDENTIFY, INSTRUMENTS
 
 _DEFAULT_OUT = Path("raw/local")
 _BY_ID = Path("/dev/serial/by-id")
@@ -448,15 +452,15 @@ def checksum(
     renew: Annotated[bool, typer.Option("--renew", help="also where one is there and no longer fits")] = False,
 ) -> None:
     """Add the checksum to metadata and indexes that have none. After a meant edit of such a file, --renew it."""
-    from rotorid.acquire import checksum
+    from rotorid.io.session import add_checksum, files_with_checksum, renew_checksum
 
     paths, written = [], 0
     try:
-        paths = checksum.metadata_of(place)
+        paths = files_with_checksum(place)
         if renew and len(paths) > 1:
             _fail(f"{place}: --renew is for one file at a time, found {len(paths)}")
         for path in paths:
-            written += checksum.renew(path) if renew else checksum.add(path)
+            written += renew_checksum(path) if renew else add_checksum(path)
     except (InputError, OSError) as error:
         _fail(f"{error}" + (f" ({written} of {len(paths)} written before that)" if written else ""))
     typer.echo(f"{place}: {written} checksums written, {len(paths) - written} fitted already")
@@ -465,9 +469,8 @@ def checksum(
 @app.command()
 def index(raw: Annotated[Path, typer.Argument(help="the folder of raw logs")] = Path("raw")) -> None:
     """Write `sessions.tsv` from the metadata of all recordings below a folder."""
-    from rotorid.io.index import metadata_files, write_index
     from rotorid.io.metadata_checksum import without_checksum
-    from rotorid.io.session import read_session
+    from rotorid.io.session import metadata_files, read_session, write_index
 
     try:
         rows = write_index(raw)
@@ -499,8 +502,7 @@ def emulate(
     truth: Annotated[Path | None, typer.Option(help="a truth file of one's own instead")] = None,
 ) -> None:
     """Be an instrument: a pseudo-terminal that speaks like the real one. Ctrl-C ends it."""
-    from rotorid.acquire.emulators.build import build, parse_load
-    from rotorid.acquire.emulators.ports import EmulatedPorts
+    from rotorid.acquire.emulators.ports import EmulatedPorts, build, parse_load
     from rotorid.acquire.emulators.truth import draw_truth, read_truth
 
     try:
@@ -532,9 +534,8 @@ def lines(
     shared: _Shared,
 ) -> None:
     """Record an instrument that sends plain lines of text (CSV, key=value, fixed places) and knows no frames."""
-    from rotorid.acquire.clock import SystemClock
     from rotorid.acquire.lines import record_lines
-    from rotorid.acquire.transport import SerialTransport
+    from rotorid.acquire.transport import SerialTransport, SystemClock
     from rotorid.io.lines import DescriptionError, read_description
 
     console = view.stderr_console()
@@ -592,7 +593,7 @@ def campaign(
     from tempfile import TemporaryDirectory
 
     from rotorid.acquire import run_plan
-    from rotorid.acquire.plan import PlanError, is_done, read_plan, steps_of
+    from rotorid.acquire.run_plan import PlanError, is_done, read_plan, steps_of
 
     console = view.stderr_console()
     stop = threading.Event()

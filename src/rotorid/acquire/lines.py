@@ -9,10 +9,8 @@ from contextlib import suppress
 from hashlib import file_digest
 from pathlib import Path
 
-from rotorid.acquire.clock import Clock
-from rotorid.acquire.errors import AcquireError, DeviceSilent, Interrupted
 from rotorid.acquire.recorder import Recorder
-from rotorid.acquire.transport import Transport
+from rotorid.acquire.transport import AcquireError, Clock, DeviceSilent, Interrupted, Transport
 from rotorid.io import rawlog, wire
 from rotorid.io.lines import Description, LineDecoder
 from rotorid.io.session import Counts, Ended, Session, Setup, write_session

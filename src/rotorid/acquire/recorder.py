@@ -21,11 +21,11 @@ from hashlib import file_digest
 from pathlib import Path
 from typing import NamedTuple
 
-from rotorid.acquire.clock import Clock
-from rotorid.acquire.errors import (
+from rotorid.acquire.transport import (
     AcquireError,
     BadName,
     CannotWrite,
+    Clock,
     DeviceFault,
     DeviceReset,
     DeviceSilent,
@@ -36,12 +36,11 @@ from rotorid.acquire.errors import (
     PortLost,
     PortMissing,
     Refused,
+    Transport,
 )
-from rotorid.acquire.transport import Transport
 from rotorid.io import rawlog, wire
-from rotorid.io.frames import ANSWER, COMMAND, DATA, END, START, Frame, encode
-from rotorid.io.sequence import Intake, Taken
-from rotorid.io.session import Counts, Ended, GapEntry, Session, Setup, write_session
+from rotorid.io.frames import ANSWER, COMMAND, DATA, END, START, Frame, Intake, Taken, encode
+from rotorid.io.session import Counts, Ended, Session, Setup, write_session
 from rotorid.io.session import Event as SessionEvent
 from rotorid.io.wire import COMPLETE, GO, IDENTIFY, KEEP, OK, STOP, STOPPED, UNHEARD, pack_keep
 
@@ -76,7 +75,7 @@ class Row(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Status:
+class _Status:
     """What a live view shows, a snapshot."""
 
     phase: str
@@ -374,14 +373,14 @@ class Recorder:
         """Whether there is a log of this recording."""
         return self._writer is not None
 
-    def status(self) -> Status:
+    def status(self) -> _Status:
         """A snapshot for a live view; may be called from another thread."""
         elapsed = (self._clock.now_ns() - self.session.host_start_ns) / 1e9
         rate = self._measured_rate()
         remaining = None
         if self.wanted is not None and rate:
             remaining = max(0, self.wanted - self.progress) / rate
-        return Status(
+        return _Status(
             phase=self.phase,
             values=self._last_values,
             samples=self._samples,
@@ -713,7 +712,7 @@ class Recorder:
             malformed_samples=self._intake.malformed_samples or None,
             unknown_kinds=self._intake.unknown_kinds or None,
         )
-        session.gaps = [GapEntry(**vars(gap)) for gap in tracker.gaps[:_MAX_GAPS_LISTED]]
+        session.gaps = tracker.gaps[:_MAX_GAPS_LISTED]
         session.gaps_left_out = max(0, len(tracker.gaps) - _MAX_GAPS_LISTED)
         rate = self._measured_rate()
         if self.identity is not None and self.identity.interval_us:

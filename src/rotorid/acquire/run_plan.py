@@ -1,34 +1,261 @@
 """Carries out a campaign's plan: checks first, then step after step; the same with instruments and with emulators.
 
 Completes the metadata of a recording whose recorder was killed, from the log alone.
+
+A campaign's plan: what is recorded, in which order, how often; and what of it is done.
+
+What is done is read from the recordings themselves, so a campaign goes on after anything: a step is done when one of
+its attempts (`name`, `name.2`, `name.3`, …) has ended `finished` and its log is as it was recorded.
 """
 
 from __future__ import annotations
 
+import itertools
+import random
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
+from pydantic import Field, ValidationError, model_validator
 
 from rotorid.acquire import procedures
-from rotorid.acquire.errors import AcquireError
-from rotorid.acquire.plan import CampaignPlan, Step, attempts, is_done, next_attempt, stems, steps_of
-from rotorid.acquire.procedures import programme_of
-from rotorid.acquire.record import recorders_for, run_with
-from rotorid.acquire.recorder import Recorder
-from rotorid.io.experiments import EXPERIMENTS
-from rotorid.io.index import write_index
+from rotorid.acquire.procedures import programme_of, recorders_for, run_with
+from rotorid.acquire.recorder import NAME, Recorder
+from rotorid.acquire.transport import AcquireError
+from rotorid.errors import InputError
 from rotorid.io.logs import Log, LogError, read_log
+from rotorid.io.models import KnownKeys, read_model
 from rotorid.io.rawlog import RECEIVED, NotALog, read_raw
-from rotorid.io.session import Counts, Ended, GapEntry, SessionError, Setup, read_session, session_path, write_session
+from rotorid.io.session import (
+    Counts,
+    Ended,
+    SessionError,
+    Setup,
+    read_session,
+    session_path,
+    write_index,
+    write_session,
+)
+from rotorid.io.text.wording import explain, hint
+from rotorid.io.wire import EXPERIMENTS, INSTRUMENTS
+
+_Kind = Literal["stream", "calibrate", "static", "dynamic", "thrust", "torque", "wrench", "experiment", "tensile"]
+_NEEDS: dict[str, tuple[str, ...]] = {
+    "calibrate": ("bench",),
+    "static": ("bench",),
+    "dynamic": ("bench",),
+    "thrust": ("rotor",),
+    "torque": ("rotor", "wrench"),
+    "wrench": ("wrench",),
+    "experiment": ("quadrotor", "wrench"),
+    "tensile": ("tensile",),
+}
+
+_SETTINGS: dict[str, tuple[str, ...]] = {
+    "stream": ("samples", "interval_s"),
+    "calibrate": ("samples",),
+    "static": ("samples", "axis", "load_gf"),
+    "dynamic": ("samples", "axis", "load_gf"),
+    "thrust": ("throttle", "rest_s", "hold_s"),
+    "torque": ("throttle", "rest_s", "hold_s"),
+    "wrench": ("interval_s", "offset", "samples"),
+    "experiment": ("experiment",),
+    "tensile": (),
+}
+"""What the procedures read, except `tolerance` and `wait_s`."""
+
+
+class PlanError(InputError):
+    """The plan is not what it should be; the sentence names file and place."""
+
+
+class _Checks(KnownKeys):
+    """What is looked at before the first step. Keys of the dictionaries are columns."""
+
+    disk_mb: float = 100
+    samples: int = 50
+    noise: dict[str, float] = {}  # largest standard deviation at rest, in the column's unit
+    zero: dict[str, float] = {}  # largest mean at rest, either sign: the tare
+    clock_s: float = 5  # the newest recording in the folder may not be further in the future
+
+
+class _Group(KnownKeys):
+    """Steps of one kind: all combinations of `over`, each `repeats` times."""
+
+    name: str  # of the recordings; {key} stands for a value of `over`, {repeat} for the repeat
+    do: _Kind
+    instrument: str | None = None  # of `stream`; of bench tests: bench or jr3
+    over: dict[str, list[Any]] = {}
+    repeats: int = Field(default=1, ge=1)
+    order: Literal["as written", "random"] = "as written"
+    ask: str = ""  # what the person has to do first
+    setup: dict[str, Any] = {}
+    settings: dict[str, Any] = {}  # of the procedure: samples, throttle, hold_s, number, …
+
+
+class CampaignPlan(KnownKeys):
+    """A campaign."""
+
+    name: str
+    out: Path
+    ports: dict[str, str]  # instrument: serial port, best by its stable name in /dev/serial/by-id
+    operator: str | None = None
+    seed: int = 1  # of the random order
+    checks: _Checks = _Checks()
+    limits: dict[str, tuple[float, float]] = {}  # column: lowest and highest; beyond, everything stops
+    steps: list[_Group]
+
+    @model_validator(mode="after")
+    def _fits(self) -> CampaignPlan:
+        known = [column for instrument in INSTRUMENTS.values() for column in instrument.columns]
+        for instrument in self.ports:
+            if instrument not in INSTRUMENTS:
+                raise ValueError(f"ports: there is no instrument {instrument!r}; there are {', '.join(INSTRUMENTS)}")
+        for column in [*self.limits, *self.checks.noise, *self.checks.zero]:
+            if column not in known:
+                raise ValueError(f"limits and checks are by column of an instrument, and {column!r} is none")
+        return self
+
+
+@dataclass(frozen=True)
+class _Step:
+    """One recording of the plan."""
+
+    number: int
+    name: str
+    group: _Group
+    values: dict[str, Any]  # of `over`, and `repeat`
+    instruments: tuple[str, ...]
+
+    @property
+    def ask(self) -> str:
+        return self.group.ask.format(**self.values)
+
+    def setup(self, operator: str | None) -> Setup:
+        """What the metadata say: the group's setup, the step's values where they are keys of it."""
+        kind = {"calibrate": "calibration", "stream": "free", "wrench": "free", "experiment": "dynamics"}
+        own = {key: value for key, value in self.values.items() if key in Setup.model_fields}
+        return Setup.model_validate(
+            {"kind": kind.get(self.group.do, self.group.do), "operator": operator, **self.group.setup, **own}
+        )
+
+    def setting(self, name: str, default: Any = None) -> Any:
+        """A setting of the procedure: the step's own value, else the group's."""
+        return self.values.get(name, self.group.settings.get(name, default))
+
+
+def read_plan(path: Path) -> CampaignPlan:
+    """Read and validate. Raises PlanError naming the file and the first thing that is wrong."""
+    return read_model(path, CampaignPlan, PlanError)
+
+
+def steps_of(plan: CampaignPlan) -> list[_Step]:
+    """All steps in the order in which they are recorded; the same plan gives the same order each time.
+
+    Raises PlanError for names that are none or not each step's own, and for instruments without a port.
+    """
+    steps: list[_Step] = []
+    for place, group in enumerate(plan.steps):
+        combinations = [
+            dict(zip(group.over, values, strict=True)) | {"repeat": repeat}
+            for repeat in range(1, group.repeats + 1)
+            for values in itertools.product(*group.over.values())
+        ]
+        if group.order == "random":
+            random.Random(f"{plan.seed} {place}").shuffle(combinations)
+        for values in combinations:
+            try:
+                name = group.name.format(**values)
+                group.ask.format(**values)
+            except (KeyError, IndexError, ValueError, AttributeError) as error:
+                raise PlanError(
+                    f"steps.{place}: {group.name!r} or its `ask` uses {error}, which is not in `over`"
+                ) from error
+            step = _Step(len(steps) + 1, name, group, values, _instruments(plan, place, group))
+            _check_step(step, place, plan.operator)
+            steps.append(step)
+    names = [step.name for step in steps]
+    for name in names:
+        if not NAME.fullmatch(name):
+            raise PlanError(f"a recording cannot be called {name!r}: letters, digits, '.', '_', '+' and '-' only")
+        if names.count(name) > 1:
+            raise PlanError(f"two steps are called {name!r}; put {{repeat}} or a value of `over` into the name")
+    return steps
+
+
+def _check_step(step: _Step, place: int, operator: str | None) -> None:
+    """PlanError where a setup does not fit, or where a setting or a value of `over` is one that nothing reads."""
+    group, known = step.group, (*_SETTINGS[step.group.do], "tolerance", "wait_s")
+    try:
+        step.setup(operator)
+    except ValidationError as error:
+        raise PlanError(f"steps.{place}: setup.{explain(error, Setup)}") from None
+    for name in group.settings:
+        if name not in known:
+            raise PlanError(f"steps.{place}: settings.{name}: {group.do} has no such setting{hint(name, known)}")
+    for name in group.over:
+        if name not in known and name not in Setup.model_fields and f"{{{name}}}" not in group.name + group.ask:
+            raise PlanError(f"steps.{place}: over.{name}: nothing reads it{hint(name, [*known, *Setup.model_fields])}")
+
+
+def _instruments(plan: CampaignPlan, place: int, group: _Group) -> tuple[str, ...]:
+    needed = _NEEDS.get(group.do, ())
+    if group.instrument is not None and len(needed) < 2:
+        needed = (group.instrument,)
+    if not needed:
+        raise PlanError(f"steps.{place}: `do: stream` needs an `instrument`")
+    for instrument in needed:
+        if instrument not in plan.ports:
+            raise PlanError(f"steps.{place}: {group.do} needs a {instrument}, and `ports` has none")
+    return needed
+
+
+def attempts(plan: CampaignPlan, step: _Step) -> list[str]:
+    """Names of the step's attempts that have left anything in the folder, oldest first."""
+    found = []
+    for number in itertools.count(1):
+        name = step.name if number == 1 else f"{step.name}.{number}"
+        files = [plan.out / f"{stem}{end}" for stem in _stems(step, name) for end in (".yaml", ".rlog", ".rlog.gz")]
+        if not any(path.exists() for path in files):
+            return found
+        found.append(name)
+
+
+def _next_attempt(plan: CampaignPlan, step: _Step) -> str:
+    """The name of the recording that would be made now."""
+    number = len(attempts(plan, step)) + 1
+    return step.name if number == 1 else f"{step.name}.{number}"
+
+
+def is_done(plan: CampaignPlan, step: _Step) -> bool:
+    """Whether one attempt has finished and its logs are as they were recorded."""
+    return any(all(_whole(plan.out, stem) for stem in _stems(step, name)) for name in attempts(plan, step))
+
+
+def _stems(step: _Step, name: str) -> list[str]:
+    """File names, without their ends, of an attempt: one for each instrument."""
+    return [name] if len(step.instruments) == 1 else [f"{name}-{instrument}" for instrument in step.instruments]
+
+
+def _whole(folder: Path, stem: str) -> bool:
+    try:
+        session = read_session(folder / f"{stem}.yaml")
+        if session.ended != Ended.FINISHED:
+            return False
+        log = read_log(folder / session.log)
+    except (SessionError, LogError, NotALog, OSError):
+        return False
+    return not log.faults and log.cut_at is None
+
 
 _Say = Callable[[str], None]
 _Ask = Callable[[str], str]
-_Prompts = Callable[[Step], Callable[[Recorder], procedures.Prompt]]
+_Prompts = Callable[[_Step], Callable[[Recorder], procedures.Prompt]]
 _Watch = Callable[[list[Recorder], Callable[[], None]], None]
 
 
@@ -102,13 +329,13 @@ def _rest_faults(plan: CampaignPlan, recorder: Recorder) -> Iterator[str]:
             yield f"{column}: reads {mean:.3g} at rest, allowed {plan.checks.zero[column]:g} (checks.zero); tare it"
 
 
-def _record_step(plan: CampaignPlan, step: Step, ports: dict[str, str], desk: Desk) -> None:
+def _record_step(plan: CampaignPlan, step: _Step, ports: dict[str, str], desk: Desk) -> None:
     """Record one step under the next free name. Raises AcquireError."""
     setup: Setup = step.setup(plan.operator)
     recorders = recorders_for(
         {instrument: ports[instrument] for instrument in step.instruments},
         plan.out,
-        next_attempt(plan, step),
+        _next_attempt(plan, step),
         dict.fromkeys(step.instruments, setup),
         procedure={
             "name": step.group.do,
@@ -123,7 +350,7 @@ def _record_step(plan: CampaignPlan, step: Step, ports: dict[str, str], desk: De
     desk.watch(recorders, lambda: run_with(recorders, lambda *opened: _carry_out(step, desk, *opened)))
 
 
-def _carry_out(step: Step, desk: Desk, *recorders: Recorder) -> None:
+def _carry_out(step: _Step, desk: Desk, *recorders: Recorder) -> None:
     do, get, first = step.group.do, step.setting, recorders[0]
     rule = procedures.STEADY_JR3 if first.instrument.name == "jr3" else procedures.SteadyRule()
     if get("tolerance") is not None:
@@ -153,11 +380,11 @@ def _carry_out(step: Step, desk: Desk, *recorders: Recorder) -> None:
         procedures.stream(first, None, moves=True)
 
 
-def _complete_killed(plan: CampaignPlan, steps: list[Step], say: _Say) -> None:
+def _complete_killed(plan: CampaignPlan, steps: list[_Step], say: _Say) -> None:
     """Counts and gaps for the metadata of attempts whose recorder was killed; the attempts stay what they are."""
     for step in steps:
         for name in attempts(plan, step):
-            for stem in stems(step, name):
+            for stem in _stems(step, name):
                 with suppress(SessionError, LogError, NotALog, OSError):  # such a one is no recording to complete
                     session = read_session(plan.out / f"{stem}.yaml")
                     log = plan.out / session.log
@@ -198,20 +425,19 @@ def run(plan: CampaignPlan, ports_of: Callable, desk: Desk, repeat: str | None =
 
 
 @contextmanager
-def real_ports(plan: CampaignPlan, step: Step | None) -> Iterator[dict[str, str]]:
+def real_ports(plan: CampaignPlan, step: _Step | None) -> Iterator[dict[str, str]]:
     """The plan's own."""
     yield plan.ports
 
 
 @contextmanager
 def emulated_ports(
-    plan: CampaignPlan, step: Step | None, folder: Path, speed: float, place_s: float
+    plan: CampaignPlan, step: _Step | None, folder: Path, speed: float, place_s: float
 ) -> Iterator[dict[str, str]]:
     """Emulators under the plan's instruments; a weight that the step asks for is put on by itself."""
     from contextlib import ExitStack
 
-    from rotorid.acquire.emulators.build import build
-    from rotorid.acquire.emulators.ports import EmulatedPorts
+    from rotorid.acquire.emulators.ports import EmulatedPorts, build
     from rotorid.acquire.emulators.truth import draw_truth
 
     together = {("quadrotor", "wrench"): "stand", ("rotor", "wrench"): "torque"}
@@ -255,7 +481,7 @@ def repair(log: Path, parsed: Log) -> bool:
     )
     if not parsed.faults:  # from now on a change of the log is noticed
         session.log_sha256 = raw.sha256
-    session.gaps = [GapEntry(**asdict(gap)) for gap in parsed.gaps[:1000]]
+    session.gaps = parsed.gaps[:1000]
     session.gaps_left_out = max(0, len(parsed.gaps) - 1000)
     session.duration_s = round(float(table.time_s.iloc[-1]), 6) if len(table) else 0.0
     write_session(session, session_path(log))

@@ -1,18 +1,151 @@
 """Where bytes come from: a serial port, or an emulator in the same process.
 
 The seam below the recorder: a transport knows bytes and ports, nothing of frames.
+
+The host's clock, real or virtual. Recorders take one, so that a test or a campaign never waits.
+
+What can go wrong with an instrument. Every message says what happened and what to do.
 """
 
 from __future__ import annotations
 
 import errno
 import select
+import time
+from datetime import datetime, timedelta
 from typing import Protocol
 
 import serial
 
-from rotorid.acquire.clock import VirtualClock
-from rotorid.acquire.errors import PortBusy, PortLost, PortMissing
+from rotorid.io.session import Ended
+
+
+class AcquireError(Exception):
+    """Base; `ended` is what the session's metadata say."""
+
+    ended = Ended.FAILED
+
+
+class PortMissing(AcquireError):
+    """No such port."""
+
+    ended = Ended.DEVICE_LOST
+
+
+class PortBusy(AcquireError):
+    """Another program holds the port, or we may not open it."""
+
+    ended = Ended.DEVICE_LOST
+
+
+class PortLost(AcquireError):
+    """The port went away while it was open."""
+
+    ended = Ended.DEVICE_LOST
+
+
+class DeviceSilent(AcquireError):
+    """Nothing comes, or no answer."""
+
+    ended = Ended.DEVICE_SILENT
+
+
+class DeviceReset(AcquireError):
+    """The device restarted in a run that cannot be resumed."""
+
+    ended = Ended.DEVICE_RESET
+
+
+class Refused(AcquireError):
+    """The device refused a command, or is not the instrument that was asked for."""
+
+    ended = Ended.REFUSED
+
+
+class DeviceFault(AcquireError):
+    """The device ended the stream by itself, and not because it was done."""
+
+    ended = Ended.DEVICE_FAULT
+
+
+class GaveUp(AcquireError):
+    """A weight, a steady reading: what was waited for did not come in the time that was given."""
+
+    ended = Ended.GAVE_UP
+
+
+class LimitExceeded(AcquireError):
+    """A reading went beyond what was allowed."""
+
+    ended = Ended.LIMIT_EXCEEDED
+
+
+class BadName(AcquireError):
+    """A recording cannot be called that, or one is called that already."""
+
+
+class CannotWrite(AcquireError):
+    """The folder does not take the log."""
+
+
+class DiskFull(AcquireError):
+    """The log cannot be written any more. `stored`: the chunk in hand is whole on disk all the same."""
+
+    ended = Ended.DISK_FULL
+    stored = False
+
+
+class Interrupted(AcquireError):
+    """The person at the keyboard has had enough."""
+
+    ended = Ended.INTERRUPTED
+
+
+class Clock(Protocol):
+    """Monotonic time, date, and waiting."""
+
+    def now_ns(self) -> int: ...
+
+    def date(self) -> datetime: ...
+
+    def wait(self, seconds: float) -> None: ...
+
+
+class SystemClock:
+    """The computer's own clock."""
+
+    def now_ns(self) -> int:
+        return time.monotonic_ns()
+
+    def date(self) -> datetime:
+        return datetime.now().astimezone()
+
+    def wait(self, seconds: float) -> None:
+        time.sleep(seconds)
+
+
+class VirtualClock:
+    """A clock that stands still unless it is advanced; the world's emulators follow it."""
+
+    def __init__(self, start: datetime) -> None:
+        self._start = start
+        self._now_ns = 0
+        self._followers = []
+
+    def follow(self, run_until) -> None:
+        """Call `run_until(seconds)` whenever the time has advanced."""
+        self._followers.append(run_until)
+
+    def now_ns(self) -> int:
+        return self._now_ns
+
+    def date(self) -> datetime:
+        return self._start + timedelta(microseconds=self._now_ns // 1000)
+
+    def wait(self, seconds: float) -> None:
+        self._now_ns += round(seconds * 1e9)
+        for run_until in self._followers:
+            run_until(self._now_ns / 1e9)
 
 
 class Transport(Protocol):

@@ -136,7 +136,7 @@ def bench_forces(recorder: Recorder) -> Text | None:
     # Here alone is numpy needed: it is a quarter of the time that every command takes to start.
     import numpy as np
 
-    from rotorid.acquire.geometry import body_forces, cell_forces
+    from rotorid.acquire.emulators.truth import body_forces, cell_forces
 
     volts = np.array(values) - np.array([tare[column] for column in recorder.instrument.columns])
     forces = body_forces(cell_forces(volts))

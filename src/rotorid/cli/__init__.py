@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli import comparing, effects, importing, modelling, parameters, planning, starting, verdicts
-from rotorid.cli.starting import check
+from rotorid.cli import importing, modelling, planning, starting, verdicts
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -50,17 +49,17 @@ def main(
 
 
 app.command("verdict")(verdicts.verdict)
-app.command("compare")(comparing.compare)
+app.command("compare")(verdicts.compare)
 app.command("plan")(planning.plan)
 app.command("together")(planning.together)
 app.command("import")(importing.import_logs)
 app.command("init")(starting.init)
-app.command("check")(check)
+app.command("check")(starting.check)
 app.command("simulate")(modelling.simulate)
 app.command("export")(modelling.export)
 app.command("model")(modelling.model)
-app.command("parameters")(parameters.parameters)
-app.command("effects")(effects.effects)
+app.command("parameters")(modelling.parameters)
+app.command("effects")(starting.effects)
 
 OPEN = ("console",)
 """Modules that other rooms may import; all else is this room's own."""

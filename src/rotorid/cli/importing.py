@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rotorid.cli.console import one_sentence
 from rotorid.errors import InputError
+
+if TYPE_CHECKING:
+    from rotorid.recordings.importers.set_of_logs import SetOfLogs
 
 Like = Annotated[
     str | None,
@@ -21,16 +23,6 @@ VehicleFile = Annotated[
     Path | None, typer.Option("--vehicle", help="A vehicle.yaml to take as it is, in place of a proposal.")
 ]
 MappingFile = Annotated[Path | None, typer.Option("--mapping", help="What the columns of a CSV or Parquet file are.")]
-
-
-@dataclass(frozen=True)
-class _MadeSet:
-    """A recording set that was made of logs, and what a person should know of it."""
-
-    folder: Path
-    remarks: tuple[str, ...]
-    faults: tuple[str, ...]
-    kept_vehicle: bool = False
 
 
 def import_logs(
@@ -66,34 +58,31 @@ def import_logs(
         if write_mapping is not None:
             _write_mapping(logs, write_mapping, as_json)
             return
-        made = make_set(logs, out or Path(_set_name(logs[0])), mass_kg, like, vehicle, mapping, as_csv)
+        folder = out or Path(_set_name(logs[0]))
+        made = make_set(logs, folder, mass_kg, like, vehicle, mapping, as_csv)
         from rotorid.recordings.sufficient import LEAST_SINGLE_S
 
-        durations, refused = _contents(made.folder)
+        durations, refused = _contents(folder)
         if as_json:
-            typer.echo(json.dumps(_as_dict(made, durations, refused), indent=1, ensure_ascii=False))
+            said = {
+                "set": str(folder),
+                "runs": [{"name": name, "duration_s": round(seconds, 6)} for name, seconds in durations.items()],
+                "found": list(made.sentences),
+                "proposed": list(made.remarks),
+                "kept_vehicle": made.kept_vehicle,
+                "verdict_refuses": refused or None,
+            }
+            typer.echo(json.dumps(said, indent=1, ensure_ascii=False))
             return
         word = "run" if len(durations) == 1 else "runs"
-        typer.echo(f"{made.folder}: {len(durations)} {word}, {sum(durations.values()):.0f} s, {', '.join(durations)}")
-        print_notes(made)
+        typer.echo(f"{folder}: {len(durations)} {word}, {sum(durations.values()):.0f} s, {', '.join(durations)}")
+        print_notes(made, folder)
         if refused:
-            typer.echo(f"`rotorid verdict {made.folder}` will refuse the set: {refused}")
+            typer.echo(f"`rotorid verdict {folder}` will refuse the set: {refused}")
             if len(durations) == 1 and max(durations.values()) < LEAST_SINGLE_S:
-                typer.echo(f"Next: add another flight of this vehicle: `rotorid import LOG -o {made.folder}`")
+                typer.echo(f"Next: add another flight of this vehicle: `rotorid import LOG -o {folder}`")
         else:
-            typer.echo(f"Next: look through {made.folder / 'vehicle.yaml'}, then `rotorid verdict {made.folder}`")
-
-
-def _as_dict(made: _MadeSet, durations: dict[str, float], refused: str) -> dict:
-    """What `--json` prints: the set, its runs with their lengths, s, and the sentences that the text has."""
-    return {
-        "set": str(made.folder),
-        "runs": [{"name": name, "duration_s": round(seconds, 6)} for name, seconds in durations.items()],
-        "found": list(made.faults),
-        "proposed": list(made.remarks),
-        "kept_vehicle": made.kept_vehicle,
-        "verdict_refuses": refused or None,
-    }
+            typer.echo(f"Next: look through {folder / 'vehicle.yaml'}, then `rotorid verdict {folder}`")
 
 
 def _write_mapping(logs: list[Path], target: Path, as_json: bool) -> None:
@@ -137,7 +126,7 @@ def make_set(
     vehicle_file: Path | None = None,
     mapping_file: Path | None = None,
     as_csv: bool = False,
-) -> _MadeSet:
+) -> SetOfLogs:
     """Write the set `folder` of logs of one vehicle; a `vehicle.yaml` that is there already stays."""
     from rotorid.recordings.importers.mapping import read_mapping
     from rotorid.recordings.importers.set_of_logs import set_of_logs
@@ -145,17 +134,17 @@ def make_set(
     mapping = read_mapping(mapping_file) if mapping_file else None
     found = set_of_logs(logs, folder.name, mass_kg, like, vehicle_file, mapping, folder / "vehicle.yaml")
     found.write(folder, as_csv)
-    return _MadeSet(folder, found.remarks, found.sentences, found.kept_vehicle)
+    return found
 
 
-def print_notes(made: _MadeSet) -> None:
+def print_notes(made: SetOfLogs, folder: Path) -> None:
     """Print what was found in the logs and what is only proposed."""
-    if made.faults:
+    if made.sentences:
         typer.echo("Found in the logs:")
-        for sentence in made.faults:
+        for sentence in made.sentences:
             typer.echo(f"  - {sentence}")
     if made.kept_vehicle:
-        typer.echo(f"{made.folder / 'vehicle.yaml'} was there and stays as it is.")
+        typer.echo(f"{folder / 'vehicle.yaml'} was there and stays as it is.")
     if made.remarks:
         typer.echo("Proposed, not measured (marked PROPOSED in vehicle.yaml):")
         for remark in made.remarks:

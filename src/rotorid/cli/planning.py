@@ -62,7 +62,11 @@ def plan(
         sources = recordings or sets_of(folder, content)
         with progress("plan", quiet), step("planning"), warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            source = _read_sets(sources)
+            from rotorid.plan.questions import joined_sets
+            from rotorid.recordings import read_set
+
+            sets = [read_set(p) for p in sources]
+            source = sets[0] if len(sets) == 1 else joined_sets(*sets)[0]
             if flight:
                 said, files, picture = _flight_plan(source, content, allowed, wishes, out or folder / "plan")
             else:
@@ -86,12 +90,11 @@ def _flight_plan(source, content: dict, allowed, wishes: dict[str, float], folde
 
 def _session_plan(source, content: dict, allowed, folder: Path):
     """Plan a session of a stand or bench and write it: sentences, files, and the picture where there is one."""
-    from rotorid.plan.session import known_instrument_from, plan_session
-    from rotorid.plan.write_session import text, write
+    from rotorid.plan.session import known_instrument_from, plan_session, text, write
 
     made = plan_session(known_instrument_from(source, content), allowed)
     files = write(made, folder)
-    return text(made), files, folder / "plan.png" if made.steps else None
+    return text(made), files, folder / "plan.png" if made.pieces else None
 
 
 def _onto_page(page: Path, name: str, said: list[str], picture: Path | None) -> None:
@@ -152,15 +155,6 @@ def sets_of(folder: Path, content: dict) -> list[Path]:
     raise InputError(f"{folder}: the recording set {lacking} of this verdict is not next to it; name it with --set")
 
 
-def _read_sets(paths: list[Path]):
-    """A set, or several of one vehicle as one."""
-    from rotorid.plan.together import joined_sets
-    from rotorid.recordings import read_set
-
-    sets = [read_set(p) for p in paths]
-    return sets[0] if len(sets) == 1 else joined_sets(*sets)[0]
-
-
 def together(
     first: Annotated[Path, typer.Argument(help="The recording set that left something open.")],
     later: Annotated[list[Path], typer.Argument(help="The sets flown to settle it, one after the other.")],
@@ -180,7 +174,7 @@ def together(
         with progress("together", quiet), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             from rotorid.io.text.writing import all_or_none
-            from rotorid.plan.together import answers, joined_sets, open_classes
+            from rotorid.plan.questions import answers, joined_sets, open_classes
             from rotorid.recordings import read_set
             from rotorid.report.deliver import analysis_of, write_files
 

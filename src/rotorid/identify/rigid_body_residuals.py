@@ -79,11 +79,6 @@ def rotor_wrench(rotor_speeds: np.ndarray, vehicle: Vehicle) -> np.ndarray:
     return np.column_stack([zero, zero, -thrust.sum(axis=1), -thrust @ y, thrust @ x, torque.sum(axis=1)])
 
 
-def _airspeed(run: Run) -> np.ndarray:
-    """Speed in still air, m/s, shape (n,)."""
-    return np.linalg.norm(run.array(c.VELOCITY), axis=1)
-
-
 def rmse(residual: np.ndarray) -> dict[str, float]:
     """Root mean square of each channel and of the totals, residual of shape (n, 6)."""
     squares = np.mean(_squares(residual), axis=0)
@@ -177,20 +172,14 @@ def by_airspeed(
     )
 
 
-@dataclass(frozen=True)
-class _NeurobemTables:
-    """Summary and tables; forces in N, moments in N m."""
-
-    summary: dict
-    flights: pd.DataFrame
-    bins: pd.DataFrame
-    points: pd.DataFrame
+_Tables = tuple[dict, pd.DataFrame, pd.DataFrame, pd.DataFrame]
+"""Summary, flights, bins and points; forces in N, moments in N m."""
 
 
-def no_neurobem() -> _NeurobemTables:
+def no_neurobem() -> _Tables:
     """Tables without a row, for recordings that are not there."""
     tables = (pd.DataFrame(columns=names) for names in (_FLIGHT_COLUMNS, _BIN_COLUMNS, _POINT_COLUMNS))
-    return _NeurobemTables({}, *tables)
+    return {}, *tables
 
 
 def _residuals_of(run: Run, vehicle: Vehicle, cutoff_hz: float) -> dict[str, np.ndarray]:
@@ -212,21 +201,6 @@ def _residuals_of(run: Run, vehicle: Vehicle, cutoff_hz: float) -> dict[str, np.
     }
 
 
-def _growth(found: _Binned) -> dict[str, dict]:
-    """RMS in the slowest and the fastest bin, and their ratio, of each channel and total."""
-    return {
-        channel: {
-            "slowest_m_s": [float(found.low_m_s[0]), float(found.high_m_s[0])],
-            "fastest_m_s": [float(found.low_m_s[-1]), float(found.high_m_s[-1])],
-            "rms_slowest": float(found.rms[0, place]),
-            "rms_fastest": float(found.rms[-1, place]),
-            "growth": float(found.growth[place]),
-            "growth_95": [float(v) for v in found.growth_95[place]],
-        }
-        for place, channel in enumerate(_CHANNELS + _TOTALS)
-    }
-
-
 def _bin_rows(model: str, found: _Binned) -> list[tuple]:
     rows = []
     for place, channel in enumerate(_CHANNELS + _TOTALS):
@@ -238,11 +212,11 @@ def _bin_rows(model: str, found: _Binned) -> list[tuple]:
 
 def compare_with_neurobem(
     recordings: RecordingSet, cutoff_hz: float, airspeed_bin_m_s: float, block_s: float, seed: int
-) -> _NeurobemTables:
+) -> _Tables:
     """RMS of every flight and model, and against airspeed with block-bootstrap intervals."""
     vehicle = recordings.vehicle
     left = {run.name: _residuals_of(run, vehicle, cutoff_hz) for run in recordings.runs}
-    speeds = {run.name: _airspeed(run) for run in recordings.runs}
+    speeds = {run.name: np.linalg.norm(run.array(c.VELOCITY), axis=1) for run in recordings.runs}
     times = {run.name: run.time_s for run in recordings.runs}
     rows, summary = [], {"mass_kg": vehicle.mass_kg, "paper_mass_kg": _PAPER_MASS_KG, "flights": {}}
     for flight, models in left.items():
@@ -260,11 +234,19 @@ def compare_with_neurobem(
     for model in _MODELS:
         mine = {flight: models[model] for flight, models in left.items()}
         found = by_airspeed(mine, speeds, times, edges, block_s, np.random.default_rng(seed))
-        summary[model] = _growth(found)
+        summary[model] = {
+            channel: {
+                "slowest_m_s": [float(found.low_m_s[0]), float(found.high_m_s[0])],
+                "fastest_m_s": [float(found.low_m_s[-1]), float(found.high_m_s[-1])],
+                "rms_slowest": float(found.rms[0, place]),
+                "rms_fastest": float(found.rms[-1, place]),
+                "growth": float(found.growth[place]),
+                "growth_95": [float(v) for v in found.growth_95[place]],
+            }
+            for place, channel in enumerate(_CHANNELS + _TOTALS)
+        }
         bins += _bin_rows(model, found)
     cloud = [np.column_stack([speeds[flight], models["rigid_body"]])[::_POINT_STEP] for flight, models in left.items()]
     points = pd.DataFrame(np.concatenate(cloud), columns=_POINT_COLUMNS[1:])
     points.insert(0, "flight", np.repeat(list(left), [len(part) for part in cloud]))
-    return _NeurobemTables(
-        summary, pd.DataFrame(rows)[_FLIGHT_COLUMNS], pd.DataFrame(bins, columns=_BIN_COLUMNS), points
-    )
+    return summary, pd.DataFrame(rows)[_FLIGHT_COLUMNS], pd.DataFrame(bins, columns=_BIN_COLUMNS), points

@@ -1,18 +1,14 @@
 """Files: raw logs of instruments and their tables; texts that people write, and sentences to them."""
 
 OPEN = (
-    "experiments",
     "frames",
-    "index",
     "lines",
     "logs",
     "metadata_checksum",
     "models",
     "public_list",
     "rawlog",
-    "sequence",
     "session",
-    "tables",
     "text.files",
     "text.wording",
     "text.writing",

@@ -36,7 +36,7 @@ class DescriptionError(InputError):
     """The description is not what it should be; the sentence names file and place."""
 
 
-class Column(KnownKeys):
+class _Column(KnownKeys):
     """Where a column's number stands in a line."""
 
     field: int | str | None = None
@@ -55,7 +55,7 @@ class Description(KnownKeys):
     decimal: Literal[".", ","] = "."
     begin: str = ""  # sent to start it, escapes as in YAML: "R\r\n"
     end: str = ""  # sent to stop it
-    columns: dict[str, Column]
+    columns: dict[str, _Column]
 
     @model_validator(mode="after")
     def _fits(self) -> Description:

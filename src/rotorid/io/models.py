@@ -15,7 +15,7 @@ Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 """A finite number: no text, no `true`."""
 Whole = Annotated[int, Field(strict=True)]
 
-Model = TypeVar("Model", bound=BaseModel)
+_Model = TypeVar("_Model", bound=BaseModel)
 
 
 class KnownKeys(BaseModel):
@@ -26,12 +26,12 @@ class KnownKeys(BaseModel):
 
 def read_model(
     path: Path,
-    model: type[Model],
+    model: type[_Model],
     error: type[InputError],
     most_bytes: int = LARGEST_YAML,
     most_values: int = MOST_YAML_VALUES,
     compiled: bool = False,
-) -> Model:
+) -> _Model:
     """The model that a file fills. Raises `error` with one sentence that names file and key.
 
     `compiled` reads by libyaml, ten times faster, where a program wrote the file and will read thousands of them.

@@ -37,7 +37,7 @@ class NotALog(InputError):
     """The file is not a raw log at all."""
 
 
-class Chunk(NamedTuple):
+class _Chunk(NamedTuple):
     """Bytes and the host's monotonic time (ns) at which they were read, sent or noted."""
 
     tag: int
@@ -55,7 +55,7 @@ class Damage(NamedTuple):
     start: int
     stop: int
     after: int
-    rescued: Chunk | None
+    rescued: _Chunk | None
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class RawLog:
     log that goes to its end; `damages` are the places before that where bytes were changed; `sha256` is that of
     the unpacked file as it is."""
 
-    chunks: tuple[Chunk, ...]
+    chunks: tuple[_Chunk, ...]
     cut_at: int | None
     damages: tuple[Damage, ...] = ()
     sha256: str = ""
@@ -74,7 +74,7 @@ class RawLog:
         """Bytes of the file in damaged places, not counting the end that a cut took."""
         return sum(damage.stop - damage.start for damage in self.damages)
 
-    def pieces(self) -> Iterator[Chunk | Damage]:
+    def pieces(self) -> Iterator[_Chunk | Damage]:
         """Chunks and damages in the order of the file."""
         damages = list(self.damages)
         for number, chunk in enumerate(self.chunks):
@@ -135,7 +135,7 @@ def _unpacked(data: bytes) -> tuple[bytes, bool]:
     return bytes(out), not unpacker.eof
 
 
-def _walk(data: bytes, position: int) -> Iterator[tuple[Chunk, int, int]]:
+def _walk(data: bytes, position: int) -> Iterator[tuple[_Chunk, int, int]]:
     """Intact chunks, each with where it begins and ends; what lies between two of them is damaged."""
     earliest, latest, tried, following = 0, 2**64, 0, position
     while (place := _TAG.search(data, position)) is not None and tried < MOST_TRIED_BYTES:
@@ -150,14 +150,14 @@ def _walk(data: bytes, position: int) -> Iterator[tuple[Chunk, int, int]]:
         if timely and end + _CHUNK_TAIL.size <= len(data):
             if crc_hqx(data[position:end], 0xFFFF) == _CHUNK_TAIL.unpack_from(data, end)[0]:
                 earliest, latest = host_ns, host_ns + _LONGEST_PAUSE_NS
-                yield Chunk(tag, host_ns, data[begin:end]), position, end + _CHUNK_TAIL.size
+                yield _Chunk(tag, host_ns, data[begin:end]), position, end + _CHUNK_TAIL.size
                 position = following = end + _CHUNK_TAIL.size
                 continue
             tried += length
         position += 1
 
 
-def _rescued(data: bytes, start: int, stop: int, before: list[Chunk], following: Chunk) -> Chunk | None:
+def _rescued(data: bytes, start: int, stop: int, before: list[_Chunk], following: _Chunk) -> _Chunk | None:
     """The content of one damaged chunk of received bytes whose length still leads to the next chunk."""
     if stop - start < _CHUNK_HEAD.size + _CHUNK_TAIL.size:
         return None
@@ -166,4 +166,4 @@ def _rescued(data: bytes, start: int, stop: int, before: list[Chunk], following:
         return None
     earliest = before[-1].host_ns if before else 0
     content = data[start + _CHUNK_HEAD.size : stop - _CHUNK_TAIL.size]
-    return Chunk(tag, min(max(host_ns, earliest), following.host_ns), content)
+    return _Chunk(tag, min(max(host_ns, earliest), following.host_ns), content)

@@ -2,14 +2,12 @@
 would."""
 
 OPEN = (
-    "changed",
     "limits",
     "plan",
     "questions",
     "separation",
     "session",
-    "together",
+    "simulate",
     "write",
-    "write_session",
 )
 """Modules that other rooms may import; all else is this room's own."""

@@ -15,7 +15,7 @@ _Range = tuple[float, float]
 T = TypeVar("T", bound=BaseModel)
 
 
-def number(value: object) -> object:
+def _number(value: object) -> object:
     """The value as it is; YAML's yes and no are no numbers, and text is none."""
     for part in value if isinstance(value, list) else [value]:
         if isinstance(part, bool):
@@ -54,7 +54,7 @@ class Limits(BaseModel):
     home_deg: _Range | None = None
     """Latitude and longitude of the start, for a mission; without them none is written."""
 
-    _numbers = field_validator("*", mode="before")(number)
+    _numbers = field_validator("*", mode="before")(_number)
 
     @field_validator("x_m", "y_m", "height_m")
     @classmethod
@@ -116,7 +116,7 @@ class SessionLimits(BaseModel):
     target_sigma: float = Field(6.0, gt=0, le=100)
     """Separation, in standard errors, at which a question counts as settled."""
 
-    _numbers = field_validator("*", mode="before")(number)
+    _numbers = field_validator("*", mode="before")(_number)
 
 
 def read_limits(path: Path | None, kind: type[T] = Limits) -> T:

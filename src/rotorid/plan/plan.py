@@ -17,8 +17,7 @@ import numpy as np
 from rotorid.errors import InputError
 from rotorid.mismatch.plant.comparison import ENVIRONMENT_S, LEAST_ENVIRONMENTS
 from rotorid.plan.candidates import STANDARD, ManoeuvrePiece, Reference, candidates, joined, smaller, standard
-from rotorid.plan.handled import Handled, handled
-from rotorid.plan.intervals import Width, check_wishes, widths
+from rotorid.plan.handled import Handled, Width, check_wishes, handled, widths
 from rotorid.plan.limits import Limits
 from rotorid.plan.questions import FittedSet
 from rotorid.plan.separation import (
@@ -68,13 +67,14 @@ class Tried:
 
 @dataclass(frozen=True)
 class Forecast:
-    """A flight, and what is expected of it next to the set at hand."""
+    """A flight, or a session of a stand or bench, and what is expected of it next to the set at hand."""
 
     name: str
     """`chosen`, `second` (the best without the chosen one's first manoeuvre), or `standard`."""
     pieces: tuple[ManoeuvrePiece, ...]
-    reference: Reference
-    """From the middle of the volume."""
+    """Of a session its steps."""
+    reference: Reference | None
+    """From the middle of the volume; none of a session."""
     flight: SimulatedFlight | None
     """As the vehicle would fly it."""
     questions: Questions
@@ -83,8 +83,8 @@ class Forecast:
 
     @property
     def duration_s(self) -> float:
-        """In the air, without take-off and landing."""
-        return self.reference.duration_s if self.pieces else 0.0
+        """In the air, without take-off and landing; of all steps of a session, without the time that mounting takes."""
+        return sum(p.duration_s for p in self.pieces) if self.reference is None else self.reference.duration_s
 
     @property
     def sigma(self) -> float | None:
@@ -93,12 +93,12 @@ class Forecast:
 
     def reached(self, target_sigma: float) -> float:
         """Share of the way to all goals."""
-        return share_reached([s.sigma for _, found in self.questions for s in found], self.widths, target_sigma)
+        return _share_reached([s.sigma for _, found in self.questions for s in found], self.widths, target_sigma)
 
 
 @dataclass(frozen=True)
 class Plan(Forecast):
-    """A flight to fly next, and what else was considered."""
+    """What to fly or record next, and what else was considered."""
 
     set: str
     limits: Limits
@@ -181,7 +181,7 @@ def _tried(
     return out
 
 
-def share_reached(sigmas: Iterable[float], wished: Iterable[Width], target_sigma: float) -> float:
+def _share_reached(sigmas: Iterable[float], wished: Iterable[Width], target_sigma: float) -> float:
     """Share of the way to the goals: the mean over all models and wishes of what is reached of each."""
     found = [min(s / target_sigma, 1.0) for s in sigmas]
     found += [min(w.wished / w.after, 1.0) for w in wished if w.wished]
@@ -192,7 +192,7 @@ def _reached(known: FittedSet, base: Information, information: Information, targ
     """Share of the way to the goals with the set (`base`) and more, as `share_reached`."""
     sigmas = [s.sigma for q in known.questions for s in separations(known, q, base, information)]
     sigmas += [s.sigma for _, own in chain_separations(known, information) for s in own]
-    return share_reached(sigmas, widths(known, base, information, wishes) if wishes else (), target)
+    return _share_reached(sigmas, widths(known, base, information, wishes) if wishes else (), target)
 
 
 @step("choosing")

@@ -5,6 +5,13 @@ fitted: to what the set's columns would hold if the other were true, by least sq
 the shared linear terms free, in whitened squares as the engine has them. What the best rival leaves more than the true
 chain is λ of `rotorid.plan.separation`. Fitted to each manoeuvre apart the rival is freer than over all of them: the
 sum is a lower bound.
+
+Sets of one vehicle judged together, and what of the first's open questions the later ones settled.
+
+Values of the vehicle and effects are held equal in all sets; each run keeps what belongs to a run (a scale of its
+thrust where runs differ beyond doubt, gusts, offsets in time). Runs are named by their set, so that `2-hover` is of the
+second. What the first holds out stays held out; of each other a third is held out. One of fewer than three runs is cut
+for that: runs held out of calm flights say nothing of what a planned flight excites.
 """
 
 from __future__ import annotations
@@ -20,7 +27,7 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form, SpeedForm
 from rotorid.errors import InputError
 from rotorid.mismatch.analyse import findings_inside, findings_outside
-from rotorid.mismatch.decision.findings import Finding, with_probabilities
+from rotorid.mismatch.decision.findings import Analysis, Finding, with_probabilities
 from rotorid.mismatch.decision.select import COST_PER_PARAMETER
 from rotorid.mismatch.delivery.derivatives import learn
 from rotorid.mismatch.mistakes import find_mistakes
@@ -28,8 +35,9 @@ from rotorid.mismatch.model.absent import chosen_already
 from rotorid.mismatch.model.fitted import Fitted, fitted
 from rotorid.mismatch.model.next_flight import CURVES, beyond_flying
 from rotorid.mismatch.model.prepare import Prepared, assemble_rows, prepare
-from rotorid.mismatch.model.within_trust import Way, ways
+from rotorid.mismatch.model.within_trust import ways
 from rotorid.mismatch.model.wrench import chosen, path_segments
+from rotorid.mismatch.plant.comparison import ENVIRONMENT_S
 from rotorid.mismatch.plant.motion import HIGHEST_CUTOFF_HZ, Segment
 from rotorid.mismatch.plant.regression import Regression, autoregression
 from rotorid.mismatch.plant.rows import Term, residual
@@ -46,6 +54,8 @@ _EDGE_S = 0.5
 """Left out at both ends of a flight: a command that leads has nothing to lead from there."""
 _LEAST_WEIGHT = 0.05
 """Relative probability from which a form may as well be the true one."""
+_MAY_DIFFER = ("name", "noise", "effects", "ground_z_m")
+"""Keys of vehicle.yaml that say nothing of the vehicle itself."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +70,7 @@ class _ChainModel:
 
 
 @dataclass(frozen=True)
-class ChainQuestion:
+class _ChainQuestion:
     """Ids of which one lies between command and rotor speed."""
 
     ids: tuple[str, ...]
@@ -153,7 +163,7 @@ def _fitted_values(left, chain, starts: Sequence[np.ndarray]) -> tuple[np.ndarra
     return done.x, float(2 * done.cost)
 
 
-def chain_question(found: Fitted, finding: Finding, ids: Sequence[str]) -> ChainQuestion | None:
+def _chain_question(found: Fitted, finding: Finding, ids: Sequence[str]) -> _ChainQuestion | None:
     """The competing chains of a class; None where fewer than two can be fitted to the set."""
     result = found.chain[0]
     own, rest = finding.id, [(k, f) for k, f in result.fit.chain if k != finding.id]
@@ -174,7 +184,7 @@ def chain_question(found: Fitted, finding: Finding, ids: Sequence[str]) -> Chain
             tries.append((square, _ChainModel(other, chain, values, models[0].doubt)))
         if tries:
             models.append(min(tries, key=lambda t: t[0])[1])
-    return ChainQuestion(tuple(m.id for m in models), tuple(models)) if len(models) > 1 else None
+    return _ChainQuestion(tuple(m.id for m in models), tuple(models)) if len(models) > 1 else None
 
 
 def chain_squares(found: Fitted, segments: Sequence[Segment], true: _ChainModel, rival: _ChainModel) -> float:
@@ -228,7 +238,7 @@ class FittedSet:
     fitted: Fitted
     findings: tuple[Finding, ...]
     questions: tuple[Question, ...]
-    chains: tuple[ChainQuestion, ...]
+    chains: tuple[_ChainQuestion, ...]
     """The same of what lies between command and rotor speed."""
     unanswerable: tuple[tuple[tuple[str, ...], str], ...]
     """Classes that no flight with these columns can settle, with what it takes."""
@@ -286,7 +296,7 @@ def known(
         if needed := beyond_flying(found, ids):
             unanswerable.append((ids, needed))
         elif finding.id in chain:
-            if (between := chain_question(found, finding, ids)) is not None:
+            if (between := _chain_question(found, finding, ids)) is not None:
                 chains.append(between)
             else:
                 needed = "these columns give no chain of the others to compare with"
@@ -296,19 +306,14 @@ def known(
             questions.append(question)
         else:
             unanswerable.append((ids, "these columns give no model of the others to compare with"))
-    own = _derivatives_of(found, way)
-    asked = tuple(questions), tuple(chains), tuple(unanswerable)
-    return FittedSet(recordings, prepared, found, findings, *asked, derivatives=own)
-
-
-def _derivatives_of(found: Fitted, way: Way) -> tuple[tuple[Form, np.ndarray], ...]:
-    """Derivatives of what a fit leaves where it was not fitted, as a form with its values."""
     model, vehicle, thinner = found.model, found.prepared.vehicle, found.prepared.thinner
     x = np.concatenate([thinner(quantities(s.motion, vehicle)) for s in model.segments])
     folds = np.concatenate(model.regression.of_rows(model.regression.folds()))
     learnt = learn(x, np.concatenate(way.left)[:, :6], folds, own_controls(vehicle))
     form = derivative_form(vehicle.model_copy(update={"derivatives": learnt.derivatives}))
-    return () if form is None else (form,)
+    own = () if form is None else (form,)
+    asked = tuple(questions), tuple(chains), tuple(unanswerable)
+    return FittedSet(recordings, prepared, found, findings, *asked, derivatives=own)
 
 
 def known_from(recordings: RecordingSet, verdict: dict) -> FittedSet:
@@ -382,3 +387,96 @@ def _hypothesis(regression: Regression, shared: Sequence[str], name: str, keys: 
     fit = regression.fit([*shared, *keys])
     where = fit.places(regression.columns(keys))
     return Hypothesis(name, keys, fit.beta[where], fit.covariance[np.ix_(where, where)])
+
+
+def joined_sets(first: RecordingSet, *others: RecordingSet) -> tuple[RecordingSet, tuple[str, ...]]:
+    """All sets as one, and what a reader must know about it.
+
+    Raises
+    ------
+    InputError
+        The sets are not of one vehicle as believed, or share no columns but the time.
+    """
+    others = tuple(in_thirds(s) for s in others)
+    sets = (first, *others)
+    beliefs = [s.vehicle.model_dump(exclude=set(_MAY_DIFFER)) for s in sets]
+    for other, belief in zip(others, beliefs[1:], strict=True):
+        for key, value in beliefs[0].items():
+            if value != belief[key]:
+                raise InputError(
+                    f"sets {first.name} and {other.name} differ in {key} of vehicle.yaml ({_brief(value)} and "
+                    f"{_brief(belief[key])}); judged together they must be of one vehicle as believed"
+                )
+    split = split_runs(first)
+    held = [] if split.held_out == split.training else [f"1-{n}" for n in split.held_out]
+    notes = ["Values and effects are held equal in all sets; thrust may differ from run to run."]
+    for number, other in enumerate(others, 2):
+        if len(other.runs) >= 3:
+            held += [f"{number}-{n}" for n in split_runs(other).held_out]
+    columns = [set.intersection(*({n for n in r.table.columns if r.has(n)} for r in s.runs)) for s in sets]
+    shared = set.intersection(*columns)
+    name = "+".join(s.name for s in sets)
+    if shared <= {"time_s"}:
+        raise InputError(f"sets {' and '.join(s.name for s in sets)} have no column in common but the time")
+    for number, own in enumerate(columns, 1):
+        if extra := sorted(own - shared):
+            notes.append(f"Not all sets have {', '.join(extra[:4])}{' …' if len(extra) > 4 else ''} of set {number}.")
+    runs = [replace(r, name=f"{number}-{r.name}") for number, s in enumerate(sets, 1) for r in s.runs]
+    runs = [replace(r, table=r.table[[n for n in r.table.columns if n in shared]]) for r in runs]
+    return RecordingSet(name, first.vehicle, tuple(runs), tuple(held) or None), tuple(notes)
+
+
+def in_thirds(recordings: RecordingSet) -> RecordingSet:
+    """A set of one or two runs with each in three parts, as far as these are as long as an environment."""
+    if len(recordings.runs) >= 3 or recordings.held_out is not None:
+        return recordings
+    runs = []
+    for run in recordings.runs:
+        edges = np.linspace(0, len(run.table), 4).astype(int)
+        parts = [run.table.iloc[a:b].reset_index(drop=True) for a, b in zip(edges, edges[1:], strict=False)]
+        long = run.time_s[-1] - run.time_s[0] >= 3 * ENVIRONMENT_S
+        runs += [replace(run, name=f"{run.name}-{i}", table=t) for i, t in enumerate(parts, 1)] if long else [run]
+    return replace(recordings, runs=tuple(runs))
+
+
+def _brief(value) -> str:
+    """A value of vehicle.yaml, short."""
+    text = str(value)
+    return text if len(text) < 40 else text[:37] + "…"
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """What became of a question that the first set left open."""
+
+    ids: tuple[str, ...]
+    answer: str
+    """The id that is established now; empty where the question is still open."""
+    sentence: str
+
+
+def answers(open_before: Sequence[tuple[str, ...]], findings: Sequence[Finding]) -> list[_Outcome]:
+    """What the findings of all sets together say of each class that was left open."""
+    out = []
+    for ids in open_before:
+        named = " or ".join(ids)
+        sure = [f.id for f in findings if f.status == "established" and f.id in ids]
+        still = [f for f in findings if f.status == "ambiguous" and set(f.alternatives) & set(ids)]
+        if sure and not still:
+            what = " and ".join(sure)
+            out.append(_Outcome(ids, sure[0], f"{named}: all sets together say {what}"))
+        elif still:
+            left = still[0].alternatives
+            fewer = set(left) < set(ids)
+            out.append(_Outcome(ids, "", f"{named}: {'narrowed to' if fewer else 'still'} {' or '.join(left)}"))
+        else:
+            weaker = [f.id for f in findings if f.status == "suggested" and f.id in ids]
+            said = f"suggested is {weaker[0]}" if weaker else "neither is established"
+            out.append(_Outcome(ids, "", f"{named}: {said}"))
+    return out
+
+
+def open_classes(analysis: Analysis) -> list[tuple[str, ...]]:
+    """Classes that an analysis left open, each once."""
+    found = [tuple(f.alternatives) for f in analysis.findings if f.status in CLAIMED and f.alternatives]
+    return list(dict.fromkeys(found))

@@ -32,10 +32,9 @@ from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.mismatch.plant.split import HELD_OUT_SHARE, training_rule
 from rotorid.mismatch.posterior.problem import Prior
 from rotorid.plan.candidates import Reference
-from rotorid.plan.changed import ChangedVehicle
 from rotorid.plan.limits import Limits
 from rotorid.plan.questions import FittedSet, Hypothesis, Question, chain_interval, chain_squares
-from rotorid.plan.simulate import CompetingModel, SimulatedFlight, commands, fly, recorded
+from rotorid.plan.simulate import ChangedVehicle, CompetingModel, SimulatedFlight, commands, fly, recorded
 from rotorid.recordings import RecordingSet, Vehicle
 from rotorid.steps import step
 
@@ -46,7 +45,7 @@ _SLOWER_LOOPS = (1.0, 0.7)
 """Shares of the stated bandwidths that flights are simulated with: what is asked of quick motions only a loop as fast
 as stated flies."""
 FITTED_SHARE = 1.0 - HELD_OUT_SHARE
-"""Share of a later recording that the joint judgement fits: the rest is held out (`rotorid.plan.together`)."""
+"""Share of a later recording that the joint judgement fits: the rest is held out (`rotorid.plan.questions`)."""
 _SIZES = np.geomspace(1e-2, 1e2, 41)
 """Sizes, of the coefficients found, among which that of a model's coefficients is looked for."""
 

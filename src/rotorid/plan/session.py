@@ -3,19 +3,22 @@
 A step is a schedule that starts and ends unloaded: loads of a bench (hung on by hand or pulled by a machine), throttle
 of a stand's rotors, in one mounting. Its load is known as soon as it is asked for, so that nothing is simulated but the
 columns that every competing effect would have in it; separations are predicted and steps chosen as for flights.
+
+A session of a stand or bench as files: the schedule, a picture, and what each outcome would mean.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from rotorid.effects.loading import CHANNELS
 from rotorid.errors import InputError
+from rotorid.io.text.writing import all_or_none, rounded
 from rotorid.mismatch.decision.findings import with_probabilities
 from rotorid.mismatch.instrument.analyse import reading_findings, with_plainer_forms
 from rotorid.mismatch.instrument.chain import ChainResult, find_chain, moved
@@ -33,20 +36,19 @@ from rotorid.mismatch.plant.regression import Regression, build
 from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.mismatch.plant.split import parts_of, split_runs
 from rotorid.plan.limits import SessionLimits
-from rotorid.plan.plan import Tried, chosen_pieces, share_reached
-from rotorid.plan.questions import Question, claimed_in, question_of
+from rotorid.plan.plan import Forecast, Plan, Tried, chosen_pieces
+from rotorid.plan.questions import Question, claimed_in, in_thirds, question_of
 from rotorid.plan.separation import (
     FITTED_SHARE,
     Information,
-    Separation,
     of_set,
     separations,
-    smallest_separation,
 )
-from rotorid.plan.together import in_thirds
+from rotorid.plan.write import by_hand_as_data, draw_separations, questions_as_data, sentences
 from rotorid.recordings import RecordingSet, Run
 from rotorid.recordings import columns as c
 from rotorid.recordings.sufficient import sufficient
+from rotorid.report.plots.style import GREY, figure, use
 from rotorid.steps import step
 
 REST_S = 2.0
@@ -91,46 +93,12 @@ class KnownInstrument:
         return self
 
 
-@dataclass(frozen=True)
-class SessionForecast:
-    """A session, and what is expected of it next to the set at hand."""
-
-    name: str
-    """`chosen`, `second` (the best without the chosen one's first step), or `standard`."""
-    steps: tuple[SessionStep, ...]
-    questions: tuple[tuple[tuple[str, ...], tuple[Separation, ...]], ...]
-
-    @property
-    def duration_s(self) -> float:
-        """Of all steps, without the time that mounting takes."""
-        return sum(s.duration_s for s in self.steps)
-
-    @property
-    def sigma(self) -> float | None:
-        """Smallest separation expected over all questions; None where nothing is compared."""
-        return smallest_separation(self.questions)
-
-    def reached(self, target_sigma: float) -> float:
-        """Share of the way to all goals."""
-        return share_reached([s.sigma for _, found in self.questions for s in found], (), target_sigma)
-
-
-@dataclass(frozen=True)
-class SessionPlan(SessionForecast):
+@dataclass(frozen=True, kw_only=True)
+class SessionPlan(Plan):
     """What to do next on a stand or bench, and what else was considered."""
 
-    set: str
     kind: str
-    limits: SessionLimits
     table: pd.DataFrame
-    others: tuple[SessionForecast, ...] = ()
-    """What else was considered as a whole, the better one first."""
-    unanswerable: tuple[tuple[tuple[str, ...], str], ...] = ()
-
-    @property
-    def settles(self) -> bool:
-        """Whether every question is expected to be settled."""
-        return self.sigma is not None and self.sigma >= self.limits.target_sigma
 
 
 def known_instrument(recordings: RecordingSet, claimed: Collection[str] | None = None) -> KnownInstrument:
@@ -341,7 +309,7 @@ def _fitted_runs(known: KnownInstrument, steps: Sequence[SessionStep]) -> list[R
     return [r for r in whole.runs if r.name in fitted]
 
 
-def _forecast(known: KnownInstrument, name: str, taken: Sequence[Tried]) -> SessionForecast:
+def _forecast(known: KnownInstrument, name: str, taken: Sequence[Tried]) -> Forecast:
     """What is expected of steps taken."""
     # What is mounted alike, and what is done alike, follows each other.
     taken = sorted(taken, key=lambda t: (t.piece.tilt_rad != (0.0, 0.0), t.piece.tilt_rad, t.piece.name))
@@ -350,7 +318,7 @@ def _forecast(known: KnownInstrument, name: str, taken: Sequence[Tried]) -> Sess
     for run in _fitted_runs(known, steps) if steps else ():
         after = after + _of_run(known, run, terms)
     questions = tuple((q.ids, tuple(separations(known, q, before, after))) for q in known.questions)
-    return SessionForecast(name, steps, questions)
+    return Forecast(name, steps, None, None, questions, ())
 
 
 def _standard_steps(tried: Sequence[Tried], limits: SessionLimits) -> list[Tried]:
@@ -366,7 +334,7 @@ def plan_session(known: KnownInstrument, limits: SessionLimits) -> SessionPlan:
     about = {"set": known.recordings.name, "kind": known.recordings.vehicle.kind, "limits": limits}
     about |= {"unanswerable": known.unanswerable}
     if not known.questions:
-        return SessionPlan("chosen", (), (), **about, table=pd.DataFrame())
+        return SessionPlan("chosen", (), None, None, (), (), **about, table=pd.DataFrame())
     terms, tried = asked(known), []
     for tested in options(known, limits):
         try:
@@ -382,31 +350,96 @@ def plan_session(known: KnownInstrument, limits: SessionLimits) -> SessionPlan:
         found.append(_forecast(known, "standard", usual))
     found.sort(key=lambda f: (-round(f.reached(limits.target_sigma), 2), f.duration_s))
     best, *others = found
-    parts = [table_of(known, s).assign(run=f"step{i + 1:02d}") for i, s in enumerate(best.steps)]
+    parts = [table_of(known, s).assign(run=f"step{i + 1:02d}") for i, s in enumerate(best.pieces)]
     table = pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
     readings = [n for n in table.columns if n in c.FORCE + c.MOMENT]
     return SessionPlan(**vars(best), **about, table=table.drop(columns=readings), others=tuple(others))
 
 
-def words_of_steps(steps: Sequence[SessionStep]) -> list[str]:
-    """The steps in their order, one that is done several times in a row once."""
-    out, at = [], 0
-    for words, same in groupby(steps, key=lambda s: s.words):
-        group = list(same)
-        number = f"{at + 1}" if len(group) == 1 else f"{at + 1} to {at + len(group)}"
-        times = f"{len(group)} × " if len(group) > 1 else ""
-        out.append(f"{number}. {words} ({times}{group[0].duration_s:.0f} s)")
-        at += len(group)
-    return out
+def text(plan: SessionPlan) -> list[str]:
+    """The session in sentences, for the screen and for a page."""
+    return sentences(
+        plan,
+        begin=f"Record {len(plan.pieces)} runs of {plan.duration_s:.0f} s in all (without the time to mount):",
+        none="No load within the limits separates what is open any further.",
+        more="time, load or tilt",
+        kind="session",
+        schedule="schedule",
+        needed="further measurement",
+        standard=True,
+    )
 
 
-__all__ = [
-    "CHANNELS",
-    "KnownInstrument",
-    "SessionPlan",
-    "SessionStep",
-    "known_instrument",
-    "known_instrument_from",
-    "plan_session",
-    "words_of_steps",
-]
+def _forecast_as_data(session: Forecast, target: float) -> dict:
+    """A session and what is expected of it, for JSON; its steps in the order in which they are recorded."""
+    steps = [
+        {
+            "run": f"step{i + 1:02d}",
+            "name": s.name,
+            "words": s.words,
+            "duration_s": s.duration_s,
+            "roll_deg": float(np.degrees(s.tilt_rad[0])),
+            "pitch_deg": float(np.degrees(s.tilt_rad[1])),
+        }
+        for i, s in enumerate(session.pieces)
+    ]
+    return {
+        "duration_s": session.duration_s,
+        "predicted_separation_sigma": session.sigma,
+        "steps": steps,
+        "questions": questions_as_data(session.questions, target),
+    }
+
+
+def _summary(plan: SessionPlan) -> dict:
+    """The session as data, for `plan.json`."""
+    target = plan.limits.target_sigma
+    return rounded(
+        {"set": plan.set, "kind": plan.kind, "settles": plan.settles}
+        | _forecast_as_data(plan, target)
+        | {
+            "others": [{"name": other.name} | _forecast_as_data(other, target) for other in plan.others],
+            "not_by_loading": [{"ids": list(ids), "what_it_takes": what} for ids, what in plan.unanswerable],
+            "by_hand": by_hand_as_data(plan),
+            "limits": plan.limits.model_dump(mode="json"),
+        }
+    )
+
+
+def _draw(plan: SessionPlan, path: Path) -> None:
+    """Write the picture as PNG: the loads or speeds of the session one after the other, and the separations."""
+    use()
+    bench = plan.kind == "bench"
+    stem = [n for n in c.REFERENCE_FORCE] if bench else [n for n in plan.table.columns if n.startswith("rotor_speed")]
+    stem = stem or [n for n in plan.table.columns if n.startswith(("rotor_command", "throttle"))]
+    fig, axes = figure(4.2, 2, 1)
+    step = float(plan.table[c.TIME].iloc[1] - plan.table[c.TIME].iloc[0])
+    t = step * np.arange(len(plan.table))
+    every = max(1, len(t) // 3000)
+    for k, name in enumerate(stem):
+        if np.abs(plan.table[name]).max() > 0:
+            label = name.split("_force_")[-1][0] if bench else f"rotor {k + 1}"
+            axes[0].plot(t[::every], plan.table[name].to_numpy()[::every], label=label, lw=0.9)
+    unit = "load [N]" if bench else ("throttle [-]" if stem[0].startswith("throttle") else "rotor speed [rad/s]")
+    axes[0].set(xlabel="time [s]", ylabel=unit, xlim=(0, t[-1]))
+    axes[0].legend(loc="upper right", ncols=4)
+    start = 0.0
+    for i, s in enumerate(plan.pieces):
+        axes[0].axvline(start, color=GREY, lw=0.5, ls=":")
+        axes[0].annotate(str(i + 1), (start, 1.0), xycoords=("data", "axes fraction"), va="bottom", fontsize=8)
+        start += s.duration_s
+    draw_separations(axes[1], plan, "session")
+    fig.savefig(path, format="png")
+
+
+def write(plan: SessionPlan, folder: Path) -> list[Path]:
+    """Write everything; returns the files, the picture last. Nothing is left half written."""
+    paths = [folder / n for n in ("plan.json", *(("session.csv", "plan.png") if plan.pieces else ()))]
+    with all_or_none(*paths) as parts:
+        if plan.pieces:
+            first = ["run", c.TIME]
+            table = plan.table[[*first, *(n for n in plan.table.columns if n not in first)]]
+            table.to_csv(parts[1], index=False, float_format="%.6g", lineterminator="\n")
+            _draw(plan, parts[2])
+        parts[0].write_text(json.dumps(_summary(plan), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    return paths

@@ -16,8 +16,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -26,8 +26,7 @@ import pandas as pd
 from rotorid.effects.catalogue import catalogue
 from rotorid.io.text.writing import all_or_none, rounded
 from rotorid.plan.candidates import Reference
-from rotorid.plan.handled import Handled
-from rotorid.plan.intervals import SHARE
+from rotorid.plan.handled import SHARE, Handled
 from rotorid.plan.plan import BETWEEN_S, Forecast, Plan
 from rotorid.plan.separation import Questions, Separation
 from rotorid.report.plots.style import BLUE, GREY, ORANGE, RED, figure, use
@@ -159,17 +158,17 @@ def crazyflie(plan: Plan) -> tuple[pd.DataFrame, float]:
     return pd.DataFrame(rows, columns=names), worst
 
 
-def words_of(effect: str) -> str:
+def _words_of(effect: str) -> str:
     """An id in words."""
     return catalogue()[effect].name if effect in catalogue() else {"nothing": "no further effect"}.get(effect, effect)
 
 
-def outcome(separation: Separation, target: float) -> str:
+def _outcome(separation: Separation, target: float) -> str:
     """What it would mean if one of the models came out."""
     low, high = separation.interval_95
     sure = "would be distinguished from" if separation.sigma >= target else "would probably not be distinguished from"
     return (
-        f"If {words_of(separation.true)} is at work it {sure} its nearest rival, {words_of(separation.rival)}: "
+        f"If {_words_of(separation.true)} is at work it {sure} its nearest rival, {_words_of(separation.rival)}: "
         f"{separation.sigma:.1f} standard errors ({low:.1f} to {high:.1f}); the recordings so far give "
         f"{separation.so_far:.1f}."
     )
@@ -188,7 +187,7 @@ def questions_as_data(questions: Questions, target: float) -> list[dict]:
                     "interval_95": list(s.interval_95),
                     "log_odds_nats": s.log_odds,
                     "so_far_sigma": s.so_far,
-                    "meaning": outcome(s, target),
+                    "meaning": _outcome(s, target),
                 }
                 for s in found
             ],
@@ -224,7 +223,7 @@ def _summary(plan: Plan) -> dict:
             **_forecast_as_data(plan, plan.limits.target_sigma),
             "others": [_forecast_as_data(f, plan.limits.target_sigma) for f in plan.others],
             "not_by_flying": [{"ids": list(ids), "what_it_takes": what} for ids, what in plan.unanswerable],
-            "by_hand": _by_hand_as_data(plan),
+            "by_hand": by_hand_as_data(plan),
             "not_testable": [{"id": i, "reason": reason} for i, reason in plan.not_testable],
             "not_flown": [{"name": t.piece.name, "reason": t.reason} for t in plan.tried if t.reason],
             "limits": plan.limits.model_dump(mode="json"),
@@ -233,24 +232,53 @@ def _summary(plan: Plan) -> dict:
 
 
 def text(plan: Plan) -> list[str]:
-    """The plan in sentences, for the screen and for a page."""
+    """The flight in sentences, for the screen and for a page."""
+    return sentences(
+        plan,
+        begin=f"Fly for {plan.duration_s:.0f} s (without take-off and landing):",
+        none=f"No manoeuvre within the limits separates what is open any further: {why_none(plan)}."
+        if plan.questions and not plan.pieces
+        else "",
+        more="time, speed, tilt or room",
+        kind="flight",
+        schedule="flight",
+        needed="flight",
+    )
+
+
+def sentences(
+    plan: Plan, begin: str, none: str, more: str, kind: str, schedule: str, needed: str, standard: bool = False
+) -> list[str]:
+    """A plan in sentences.
+
+    Parameters
+    ----------
+    begin, none
+        What stands above the pieces, and what is said where questions are open and there are no pieces.
+    more
+        What in the limits may settle more.
+    kind, schedule, needed
+        The words for what is planned, for what no question is settled by, and for what is not needed.
+    standard
+        Whether the standard one's pieces are named as well.
+    """
     out = []
     if plan.pieces:
-        out.append(f"Fly for {plan.duration_s:.0f} s (without take-off and landing):")
-        out += [f"  {line}" for line in _steps(plan)]
+        out += [begin, *(f"  {line}" for line in _numbered(plan))]
     elif plan.questions:
-        out.append(f"No manoeuvre within the limits separates what is open any further: {why_none(plan)}.")
+        out.append(none)
     for _, found in plan.questions:
-        out += [outcome(s, plan.limits.target_sigma) for s in found]
+        out += [_outcome(s, plan.limits.target_sigma) for s in found]
     if plan.sigma is not None and not plan.settles:
         out.append(
             f"Not all would be settled: the smallest separation is {plan.sigma:.1f} standard errors of "
-            f"{plan.limits.target_sigma:g}. More time, speed, tilt or room in the limits may do it."
+            f"{plan.limits.target_sigma:g}. More {more} in the limits may do it."
         )
     for other in plan.others:
         if other.sigma is not None:
-            name = "The standard flight" if other.name == "standard" else "The next best flight"
-            words = "" if other.name == "standard" else f" ({', '.join(dict.fromkeys(p.name for p in other.pieces))})"
+            name = f"The {'standard' if other.name == 'standard' else 'next best'} {kind}"
+            named = standard or other.name != "standard"
+            words = f" ({', '.join(dict.fromkeys(p.name for p in other.pieces))})" if named else ""
             out.append(f"{name}{words}, {other.duration_s:.0f} s: {other.sigma:.1f} standard errors at the least.")
     out += [
         f"{w.name}: {_size(w.before, w.unit)} now, {_size(w.after, w.unit)} with this flight"
@@ -259,10 +287,11 @@ def text(plan: Plan) -> list[str]:
         if plan.pieces or w.wished
     ]
     for ids, what in plan.unanswerable:
-        out.append(f"No flight with these columns settles {' or '.join(words_of(i) for i in ids)}: {what}.")
+        out.append(f"No {schedule} with these columns settles {' or '.join(_words_of(i) for i in ids)}: {what}.")
     if not out:
-        out.append("Nothing is open: no flight is needed to distinguish effects.")
-    return out + _in_words(plan)
+        out.append(f"Nothing is open: no {needed} is needed to distinguish effects.")
+    expected = {h.of: f" {_expected_by_hand(h, plan.limits.target_sigma)}" for h in plan.by_hand if h.sigma is not None}
+    return out + [f"By hand: {step}.{expected.get(i, '')}" for i, step in _manual_steps(plan).items()]
 
 
 def why_none(plan: Plan) -> str:
@@ -277,16 +306,10 @@ def why_none(plan: Plan) -> str:
     )
 
 
-def _in_words(plan: Plan) -> list[str]:
-    """Manual steps, as sentences; with the separation where one is predicted."""
-    found = {h.of: f" {_expected_by_hand(h, plan.limits.target_sigma)}" for h in plan.by_hand if h.sigma is not None}
-    return [f"By hand: {step}.{found.get(i, '')}" for i, step in _manual_steps(plan).items()]
-
-
 def _manual_steps(plan: Plan) -> dict[str, str]:
-    """Manual steps, to the id that each is there for."""
-    every = [*(ids for ids, _ in plan.questions), *(ids for ids, _ in plan.unanswerable)]
-    return steps_of([i for ids in every for i in ids])
+    """Manual steps that set one id of an open class apart from the others, by the id that each is there for."""
+    ids = [i for ids, _ in (*plan.questions, *plan.unanswerable) for i in ids]
+    return {i: STEPS[i] for i in dict.fromkeys(ids) if i in STEPS}
 
 
 def _expected_by_hand(step: Handled, target: float) -> str:
@@ -299,7 +322,7 @@ def _expected_by_hand(step: Handled, target: float) -> str:
     )
 
 
-def _by_hand_as_data(plan: Plan) -> list[dict]:
+def by_hand_as_data(plan: Plan) -> list[dict]:
     """Manual steps, for JSON; `predicted` is null where no separation is."""
     target, found = plan.limits.target_sigma, {h.of: h for h in plan.by_hand}
     return [
@@ -320,14 +343,12 @@ def _by_hand_as_data(plan: Plan) -> list[dict]:
     ]
 
 
-def _steps(plan: Plan) -> list[str]:
-    """The manoeuvres in their order, one that is flown several times in a row once."""
+def _numbered(plan: Plan) -> list[str]:
+    """The pieces in their order, one that is done several times in a row once."""
     out, at = [], 0
-    while at < len(plan.pieces):
-        piece = plan.pieces[at]
-        times = 1
-        while at + times < len(plan.pieces) and plan.pieces[at + times] is piece:
-            times += 1
+    for _, same in groupby(plan.pieces, key=lambda p: p.name):
+        piece, *more = same
+        times = 1 + len(more)
         number = str(at + 1) if times == 1 else f"{at + 1} to {at + times}"
         out.append(f"{number}. {piece.words} ({f'{times} × ' if times > 1 else ''}{piece.duration_s:.0f} s)")
         at += times
@@ -367,7 +388,7 @@ def write(plan: Plan, folder: Path) -> list[Path]:
             content["crazyflie"] = rounded(
                 {"pieces": len(table), "uploads": -(-len(table) // _PIECES_AT_ONCE), "worst_fit_m": worst}
             )
-            draw(plan, parts[4])
+            _draw(plan, parts[4])
             content["px4_mission"] = why or "px4_mission.plan"
             if not why:
                 parts[5].write_text(json.dumps(mission(plan), indent=1) + "\n", encoding="utf-8")
@@ -375,7 +396,7 @@ def write(plan: Plan, folder: Path) -> list[Path]:
     return paths
 
 
-def draw(plan: Plan, path: Path) -> None:
+def _draw(plan: Plan, path: Path) -> None:
     """Write the picture as PNG."""
     use()
     flight = plan.flight
@@ -405,28 +426,28 @@ def draw(plan: Plan, path: Path) -> None:
             if ax is axes[0, 1]:
                 ax.annotate(str(i + 1), (start, 1.0), xycoords=("data", "axes fraction"), va="bottom", fontsize=8)
     ax = axes[2, 1]
-    found = [s for _, own in plan.questions for s in own]
-    if found:
-        rows = np.arange(len(found))[::-1]
-        for row, s in zip(rows, found, strict=True):
-            ax.plot(s.interval_95, [row, row], color=BLUE, lw=1.5)
-            ax.plot(s.sigma, row, "o", color=BLUE)
-            ax.plot(s.so_far, row, "o", color=ORANGE, mfc="none")
-        ax.axvline(plan.limits.target_sigma, color=RED, lw=0.8)
-        ax.set_yticks(rows, [f"{s.true} against {s.rival}".replace("_", " ") for s in found], fontsize=7)
-        ax.set_xscale("symlog", linthresh=3)
+    if any(own for _, own in plan.questions):
+        draw_separations(ax, plan, "flight")
         ax.tick_params(axis="x", which="minor", bottom=False)
-        most = max(s.interval_95[1] for s in found)
-        ax.set(xlabel="separation [standard errors]", ylim=(-0.6, len(found) - 0.4), xlim=(-0.3, 1.3 * most))
-        ax.set_title("Ring: so far. Dot: with this flight. Line: wanted", loc="right")
     else:
         ax.set_axis_off()
     fig.savefig(path, format="png")
 
 
-def steps_of(ids: Sequence[str]) -> dict[str, str]:
-    """Manual steps that set one id of a class apart from the others, by the id that each is there for, in order."""
-    return {i: STEPS[i] for i in dict.fromkeys(ids) if i in STEPS}
+def draw_separations(ax, plan: Plan, kind: str) -> None:
+    """Draw how far apart the competing models are so far, and with the flight or session."""
+    found = [s for _, own in plan.questions for s in own]
+    rows = np.arange(len(found))[::-1]
+    for row, s in zip(rows, found, strict=True):
+        ax.plot(s.interval_95, [row, row], color=BLUE, lw=1.5)
+        ax.plot(s.sigma, row, "o", color=BLUE)
+        ax.plot(s.so_far, row, "o", color=ORANGE, mfc="none")
+    ax.axvline(plan.limits.target_sigma, color=RED, lw=0.8)
+    ax.set_yticks(rows, [f"{s.true} against {s.rival}".replace("_", " ") for s in found], fontsize=7)
+    ax.set_xscale("symlog", linthresh=3)
+    most = max(s.interval_95[1] for s in found)
+    ax.set(xlabel="separation [standard errors]", ylim=(-0.6, len(found) - 0.4), xlim=(-0.3, 1.3 * most))
+    ax.set_title(f"Ring: so far. Dot: with this {kind}. Line: wanted", loc="right")
 
 
 EARTH_M = 6378137.0

@@ -15,7 +15,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import partial
 from pathlib import Path
 
@@ -273,14 +273,9 @@ def list_sets(parent: Path) -> list[str]:
 
 def proposed_in(text: str) -> tuple[Doubt, ...]:
     """A doubt for each value that the text of a `vehicle.yaml` marks as proposed, in the order of the file."""
-    return tuple(_doubts(text))
-
-
-def _doubts(text: str) -> Iterator[Doubt]:
-    for line in text.splitlines():
-        if found := _LINE.match(line):
-            why = found["why"].strip().rstrip(".")
-            yield Doubt(found["key"], f"{found['key']} is only proposed{f' ({why})' if why else ''}.", stops=False)
+    found = (_LINE.match(line) for line in text.splitlines())
+    whys = ((m["key"], m["why"].strip().rstrip(".")) for m in found if m)
+    return tuple(Doubt(k, f"{k} is only proposed{f' ({why})' if why else ''}.", stops=False) for k, why in whys)
 
 
 def check_belief(vehicle: Vehicle, where: str) -> None:

@@ -269,18 +269,6 @@ def _accelerometer(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Do
         )
 
 
-def _rates_of_attitude(attitude: np.ndarray) -> np.ndarray:
-    """Body rates (n, 3), rad/s, of quaternions (n, 4), scalar first, on the common clock; NaN at gaps and ends."""
-    out = np.full((len(attitude), 3), np.nan)
-    norm = np.linalg.norm(attitude, axis=1)
-    known = np.isfinite(norm) & (norm > 0.1)
-    both = known[:-2] & known[2:]
-    first, last = attitude[:-2][both], attitude[2:][both]
-    turn = Rotation.from_quat(first[:, [1, 2, 3, 0]]).inv() * Rotation.from_quat(last[:, [1, 2, 3, 0]])
-    out[1:-1][both] = turn.as_rotvec() / (2 * _STEP_S)
-    return out
-
-
 def _gyroscope(run: Run, clock: np.ndarray) -> Iterator[Doubt]:
     gyro, attitude = _on(run, clock, c.ANGULAR_VELOCITY), _on(run, clock, c.QUATERNION)
     if gyro is None:
@@ -295,7 +283,14 @@ def _gyroscope(run: Run, clock: np.ndarray) -> Iterator[Doubt]:
                 stops=True,
             )
         return
-    derived = _rates_of_attitude(attitude)
+    # Body rates, rad/s, of the attitude on the common clock; NaN at gaps and ends.
+    derived = np.full((len(attitude), 3), np.nan)
+    norm = np.linalg.norm(attitude, axis=1)
+    known = np.isfinite(norm) & (norm > 0.1)
+    both = known[:-2] & known[2:]
+    first, last = attitude[:-2][both], attitude[2:][both]
+    turn = Rotation.from_quat(first[:, [1, 2, 3, 0]]).inv() * Rotation.from_quat(last[:, [1, 2, 3, 0]])
+    derived[1:-1][both] = turn.as_rotvec() / (2 * _STEP_S)
     for axis, k in (("x", 0), ("y", 1), ("z", 2)):
         if not np.nanstd(derived[:, k]) > _LEAST_TURNING_RAD_S:
             continue
@@ -440,7 +435,8 @@ def _rotors(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
     if not wrong:
         return
     sure = [i for i in range(vehicle.rotor_count) if found[:, i].all()]
-    seats = ", ".join(f"{i + 1} {_seat(np.array([found[1, i], -found[0, i]]))}" for i in sure)
+    ends = [("front" if found[1, i] > 0 else "rear", "right" if -found[0, i] > 0 else "left") for i in sure]
+    seats = ", ".join(f"{i + 1} {end} {side}" for i, (end, side) in zip(sure, ends, strict=True))
     rotors = f"rotor {wrong[0]} does" if len(wrong) == 1 else f"rotors {', '.join(map(str, wrong))} do"
     yield Doubt(
         "rotors",
@@ -448,10 +444,6 @@ def _rotors(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
         "order of the rotors, or at the signs of the body axes",
         stops=True,
     )
-
-
-def _seat(place: np.ndarray) -> str:
-    return f"{'front' if place[0] > 0 else 'rear'} {'right' if place[1] > 0 else 'left'}"
 
 
 def _throttle(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:

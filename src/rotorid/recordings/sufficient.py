@@ -199,15 +199,11 @@ def _groups_of(vehicle: Vehicle) -> tuple[tuple[str, ...], ...]:
     return ()
 
 
-def _known_names(vehicle: Vehicle) -> list[str]:
-    """Every column that the contract knows for this vehicle."""
-    return sorted(c.FIXED) + [name for names in rotor_groups(vehicle).values() for name in names]
-
-
 def _check_spelling(run: Run, vehicle: Vehicle) -> None:
     """InputError where an unknown column can only be a known one that is missing."""
     there = set(run.table.columns)
-    missing = [name for name in _known_names(vehicle) if name not in there]
+    known = sorted(c.FIXED) + [name for names in rotor_groups(vehicle).values() for name in names]
+    missing = [name for name in known if name not in there]
     halved = {
         name for names in _groups_of(vehicle) if any(n in there for n in names) for name in names if name not in there
     }

@@ -1,20 +1,16 @@
 """What is written for a reader: a verdict's files and page, figures of the report (its chapters are in notebooks/)."""
 
 OPEN = (
-    "codehash",
     "deliver",
-    "fleet.history",
-    "fleet.judge",
-    "fleet.summary",
+    "fleet",
+    "fleet_history",
     "log",
     "next_to_log",
     "page.changes",
     "plots.*",
     "prose",
     "provenance",
-    "result",
     "series_files",
-    "thesis",
     "typeset",
 )
 """Modules that other rooms may import; all else is this room's own."""

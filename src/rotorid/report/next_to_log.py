@@ -89,21 +89,11 @@ def next_to_log(analysis: Analysis, to: str, exported: Exported) -> NextToLog:
     how, package, fly = FLYERS[to]
     if package and find_spec(package) is None:
         raise InputError(f"{package} is not installed: the exported vehicle was not flown next to the log")
-    windows = _windows_of(analysis, improved)
-    flown = tuple(fly(improved.vehicle, exported, windows))
-    errors = {"exported": _errors(flown, windows)}
-    for name, model in (("improved", improved), ("believed", Model(analysis.believed))):
-        errors[name] = _errors(_ours(model, windows), windows)
-    return NextToLog(how, windows, flown, errors)
-
-
-def _windows_of(analysis: Analysis, model: Model) -> tuple[LogWindow, ...]:
-    """At most `_MOST_WINDOWS` windows of the flights; InputError where there is none."""
     found = []
     usable = [
         s for s in segments_of(analysis) if s.motion.rotor_speed is not None and s.motion.angular_velocity is not None
     ]
-    for segment, inputs, states in zip(usable, *driven_by(usable, model), strict=True):
+    for segment, inputs, states in zip(usable, *driven_by(usable, improved), strict=True):
         if states.quaternion is None:
             continue
         time_s = segment.motion.time_s
@@ -120,7 +110,12 @@ def _windows_of(analysis: Analysis, model: Model) -> tuple[LogWindow, ...]:
         )
     chosen = np.unique(np.linspace(0, len(found) - 1, min(_MOST_WINDOWS, len(found))).astype(int))
     first = found[0]
-    return tuple(found[k] for k in chosen if len(found[k].time_s) == len(first.time_s))
+    windows = tuple(found[k] for k in chosen if len(found[k].time_s) == len(first.time_s))
+    flown = tuple(fly(improved.vehicle, exported, windows))
+    errors = {"exported": _errors(flown, windows)}
+    for name, model in (("improved", improved), ("believed", Model(analysis.believed))):
+        errors[name] = _errors(_ours(model, windows), windows)
+    return NextToLog(how, windows, flown, errors)
 
 
 def _ours(model: Model, windows: Sequence[LogWindow]) -> list[States]:
@@ -281,35 +276,30 @@ def in_mujoco(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow]
     with read_by("MuJoCo"):
         model = mujoco.MjModel.from_xml_string(exported.text)
     with passive_forces(exported):
-        return _in_mujoco(vehicle, model, windows)
+        import mujoco
 
-
-def _in_mujoco(vehicle: Vehicle, model, windows: Sequence[LogWindow]) -> list[States]:
-    """Windows of a MuJoCo model."""
-    import mujoco
-
-    coefficients = vehicle.thrust_coefficients_n_s2()
-    out = []
-    for window in windows:
-        data, start = mujoco.MjData(model), window.recorded
-        model.opt.wind[:] = window.wind * FLU
-        data.qpos[:] = [0, 0, 0, *(start.quaternion[0] * [1, *FLU])]
-        data.qvel[:] = [*(_first(start.velocity) * FLU), *(start.angular_velocity[0] * FLU)]
-        kept = [(data.qpos.copy(), data.qvel.copy())]
-        for k in range(len(window.time_s) - 1):
-            gap = window.time_s[k + 1] - window.time_s[k]
-            steps = max(int(np.ceil(gap / _STEP_S)), 1)
-            model.opt.timestep = gap / steps
-            for step in range(steps):
-                share = (step + 0.5) / steps
-                thrust = coefficients * (window.speed[k] + share * (window.speed[k + 1] - window.speed[k])) ** 2
-                data.ctrl[:] = thrust
-                data.act[:] = thrust[: model.na]
-                mujoco.mj_step(model, data)
-            kept.append((data.qpos.copy(), data.qvel.copy()))
-        at, moving = (np.array(part) for part in zip(*kept, strict=True))
-        out.append(_from_flu(at[:, :3], moving[:, :3], at[:, 3:], moving[:, 3:], start))
-    return out
+        coefficients = vehicle.thrust_coefficients_n_s2()
+        out = []
+        for window in windows:
+            data, start = mujoco.MjData(model), window.recorded
+            model.opt.wind[:] = window.wind * FLU
+            data.qpos[:] = [0, 0, 0, *(start.quaternion[0] * [1, *FLU])]
+            data.qvel[:] = [*(_first(start.velocity) * FLU), *(start.angular_velocity[0] * FLU)]
+            kept = [(data.qpos.copy(), data.qvel.copy())]
+            for k in range(len(window.time_s) - 1):
+                gap = window.time_s[k + 1] - window.time_s[k]
+                steps = max(int(np.ceil(gap / _STEP_S)), 1)
+                model.opt.timestep = gap / steps
+                for step in range(steps):
+                    share = (step + 0.5) / steps
+                    thrust = coefficients * (window.speed[k] + share * (window.speed[k + 1] - window.speed[k])) ** 2
+                    data.ctrl[:] = thrust
+                    data.act[:] = thrust[: model.na]
+                    mujoco.mj_step(model, data)
+                kept.append((data.qpos.copy(), data.qvel.copy()))
+            at, moving = (np.array(part) for part in zip(*kept, strict=True))
+            out.append(_from_flu(at[:, :3], moving[:, :3], at[:, 3:], moving[:, 3:], start))
+        return out
 
 
 def _first(values: np.ndarray | None) -> np.ndarray:

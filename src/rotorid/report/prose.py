@@ -198,7 +198,9 @@ def table_of(rows: Sequence[Mapping[str, Any]], caption: str, columns: Sequence[
     widths = [
         max(3, word, *(min(len(line[place]), _WIDEST) for line in cells)) for place, word in enumerate(longest_words)
     ]
-    attributes = f" widths={_shares_of(headings, cells)}" if _too_wide(headings, cells) else ""
+    # A row that would not fit on a line: the columns need shares of it.
+    too_wide = sum(whole for _, whole in _columns_pt(headings, cells)) > LINE_PT
+    attributes = f" widths={_shares_of(headings, cells)}" if too_wide else ""
     rules = [
         ":" + "-" * width if form in _WORDS else "-" * width + ":" for width, form in zip(widths, forms, strict=True)
     ]
@@ -234,11 +236,6 @@ def _columns_pt(
 def _seen(markdown: str) -> str:
     """About what is seen of a cell's markdown: without the signs for mathematics, raised and escaped letters."""
     return re.sub(r"[$^{}\\_]", "", markdown)
-
-
-def _too_wide(headings: Sequence[str], cells: Sequence[Sequence[str]]) -> bool:
-    """Whether a row would not fit on a line, so that the columns need shares of it."""
-    return sum(whole for _, whole in _columns_pt(headings, cells)) > LINE_PT
 
 
 def _shares_of(headings: Sequence[str], cells: Sequence[Sequence[str]]) -> str:

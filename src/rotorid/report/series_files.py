@@ -72,13 +72,11 @@ def write_mcap(series: Sequence[_Series], path: Path) -> None:
         channels, messages = {}, []
         for one in series:
             if one.topic not in channels:
-                channels[one.topic] = writer.register_channel(
-                    topic=one.topic,
-                    message_encoding="json",
-                    schema_id=writer.register_schema(
-                        name=f"rotorid.residual ({one.unit})", encoding="jsonschema", data=_schema_of(one)
-                    ),
-                )
+                fields = {name: {"type": "number", "description": f"{name}, {one.unit}"} for name in one.fields}
+                schema = json.dumps({"type": "object", "title": one.topic, "properties": fields}).encode()
+                name = f"rotorid.residual ({one.unit})"
+                kind = writer.register_schema(name=name, encoding="jsonschema", data=schema)
+                channels[one.topic] = writer.register_channel(topic=one.topic, message_encoding="json", schema_id=kind)
             for k, now in enumerate(one.time_s):
                 values = {name: float(v[k]) for name, v in one.fields.items() if np.isfinite(v[k])}
                 messages.append((round(now * 1e9), channels[one.topic], json.dumps(values)))
@@ -87,12 +85,6 @@ def write_mcap(series: Sequence[_Series], path: Path) -> None:
             when = stamp - min(first, 0)  # MCAP counts from 0 up
             writer.add_message(channel_id=channel, log_time=when, publish_time=when, data=text.encode())
         writer.finish()
-
-
-def _schema_of(one: _Series) -> bytes:
-    """The JSON schema of a topic's messages."""
-    properties = {name: {"type": "number", "description": f"{name}, {one.unit}"} for name in one.fields}
-    return json.dumps({"type": "object", "title": one.topic, "properties": properties}).encode()
 
 
 def topics_of(series: Sequence[_Series]) -> dict[str, list[str]]:

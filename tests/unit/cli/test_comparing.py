@@ -7,8 +7,8 @@ import pytest
 from typer.testing import CliRunner
 
 from rotorid.cli import app
-from rotorid.cli.comparing import read
 from rotorid.cli.modelling import fly
+from rotorid.cli.verdicts import read
 from rotorid.errors import InputError
 from rotorid.recordings import read_set, templates
 

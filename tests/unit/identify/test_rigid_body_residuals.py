@@ -108,13 +108,13 @@ def test_the_comparison_finds_a_drag_that_neurobem_knows_and_the_rigid_body_does
         table |= dict(zip(PREDICTED_FORCE, (-0.5 * speed, zero, zero - 19.62), strict=True))
         table |= {n: zero + np.sqrt(19.62 / 4e-6) for n in c.rotor_columns("rotor_speed", 4)}
         runs.append(Run(name, pd.DataFrame(table)))
-    found = compare_with_neurobem(RecordingSet("s", VEHICLE, tuple(runs)), 20.0, 1.0, 1.0, seed=1)
-    assert found.summary["one_flight_above_m_s"] == pytest.approx(6.0)
-    assert found.summary["flights"]["b"]["rigid_body"]["force_x"] == pytest.approx(0.5 * 10 * np.sqrt(3 / 8), rel=1e-3)
-    assert found.summary["flights"]["b"]["neurobem"]["force"] == pytest.approx(0, abs=1e-9)
-    lighter = found.summary["flights"]["a"]["neurobem_paper_mass"]["force_z"]
+    summary, flights, bins, _ = compare_with_neurobem(RecordingSet("s", VEHICLE, tuple(runs)), 20.0, 1.0, 1.0, seed=1)
+    assert summary["one_flight_above_m_s"] == pytest.approx(6.0)
+    assert summary["flights"]["b"]["rigid_body"]["force_x"] == pytest.approx(0.5 * 10 * np.sqrt(3 / 8), rel=1e-3)
+    assert summary["flights"]["b"]["neurobem"]["force"] == pytest.approx(0, abs=1e-9)
+    lighter = summary["flights"]["a"]["neurobem_paper_mass"]["force_z"]
     assert lighter == pytest.approx((2.0 - 0.752) * 9.81)
-    assert found.summary["rigid_body"]["force_x"]["growth"] > 10
-    bins = found.bins[(found.bins["model"] == "rigid_body") & (found.bins["channel"] == "force_x")]
+    assert summary["rigid_body"]["force_x"]["growth"] > 10
+    bins = bins[(bins["model"] == "rigid_body") & (bins["channel"] == "force_x")]
     assert bins["rms"].is_monotonic_increasing
-    assert set(found.flights["flight"]) == {"a", "b"}
+    assert set(flights["flight"]) == {"a", "b"}

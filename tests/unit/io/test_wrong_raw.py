@@ -19,15 +19,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotorid.acquire.plan import read_plan, steps_of
+from rotorid.acquire.run_plan import read_plan, steps_of
 from rotorid.errors import InputError
 from rotorid.identify.networks import Training, build, train
 from rotorid.io import rawlog
-from rotorid.io.index import COLUMNS, read_index, with_checksum, write_index
 from rotorid.io.lines import read_description
-from rotorid.io.logs import read_log
-from rotorid.io.session import read_session
-from rotorid.io.tables import read_tables
+from rotorid.io.logs import read_log, read_tables
+from rotorid.io.session import INDEX_COLUMNS, index_with_checksum, read_index, read_session, write_index
 
 MOST_S = 10.0
 SESSION = """\
@@ -44,7 +42,7 @@ log: run.rlog
 ended: finished
 message: done
 """
-ROW = dict.fromkeys(COLUMNS, "") | {"id": "run", "file": "a/run.rlog", "metadata": "a/run.yaml"}
+ROW = dict.fromkeys(INDEX_COLUMNS, "") | {"id": "run", "file": "a/run.rlog", "metadata": "a/run.yaml"}
 DESCRIPTION = "name: x\nseparator: ','\ncolumns: {force_z_n: {field: 1}}\n"
 PLAN = "name: p\nout: out\nports: {bench: /dev/b}\nsteps:\n  - {name: a, do: stream, instrument: bench}\n"
 
@@ -122,7 +120,7 @@ def index(what: str, text: str, *said: str) -> Wrong:
 
 
 def tsv(*rows: dict) -> str:
-    return "\n".join(["\t".join(COLUMNS), *("\t".join(row.values()) for row in rows)]) + "\n"
+    return "\n".join(["\t".join(INDEX_COLUMNS), *("\t".join(row.values()) for row in rows)]) + "\n"
 
 
 def network(path: Path):
@@ -201,7 +199,7 @@ def described(what: str, text: str, *said: str) -> Wrong:
     return Wrong(f"d.yaml: {what}", "d.yaml", written(text), read_description, said)
 
 
-SUMMED = with_checksum(tsv(ROW).encode()).decode()
+SUMMED = index_with_checksum(tsv(ROW).encode()).decode()
 TABLE = [
     *yaml_faults("run.yaml", read_session, SESSION),  # before: UnicodeDecodeError, IsADirectoryError, a crash, no end
     session("no id", "id: run\n", "", "id: is missing"),

@@ -5,7 +5,7 @@ import pytest
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Motion
-from rotorid.plan.changed import MASS_SHARE, masses, swaps
+from rotorid.plan.simulate import MASS_SHARE, masses, swaps
 from rotorid.recordings import Vehicle
 
 VEHICLE = Vehicle.model_validate(

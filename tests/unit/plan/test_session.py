@@ -8,8 +8,9 @@ import pandas as pd
 import pytest
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.plan import write_session
+from rotorid.plan import session
 from rotorid.plan.limits import SessionLimits
+from rotorid.plan.plan import Plan
 from rotorid.plan.questions import Hypothesis, Question
 from rotorid.plan.session import (
     REST_S,
@@ -22,7 +23,7 @@ from rotorid.plan.session import (
     table_of,
     through,
 )
-from rotorid.plan.write import STEPS, steps_of
+from rotorid.plan.write import STEPS
 from rotorid.recordings import RecordingSet, Run, Vehicle
 
 RATE_HZ = 20.0
@@ -50,8 +51,9 @@ def test_levels_are_held_for_equal_times() -> None:
 
 def test_steps_by_hand_are_of_ids_that_exist_and_said_once() -> None:
     assert set(STEPS) <= set(catalogue())
-    assert len(steps_of(("unequal_rotors", "com_offset", "unequal_rotors"))) == 2
-    assert steps_of(("vortex_ring",)) == {}
+    left = ((("unequal_rotors", "com_offset", "unequal_rotors"), "why"), (("vortex_ring",), "why"))
+    plan = Plan("chosen", (), None, None, (), (), "set", LIMITS, unanswerable=left)
+    assert sum(line.startswith("By hand: ") for line in session.text(plan)) == 2
 
 
 def crept(load: np.ndarray) -> np.ndarray:
@@ -119,17 +121,17 @@ def test_a_session_settles_an_open_question_and_is_written(known, tmp_path: Path
     ((_, (found,)),) = plan.questions
     assert found.sigma > found.so_far > 0
     assert plan.duration_s <= LIMITS.duration_s
-    files = write_session.write(plan, tmp_path / "plan")
+    files = session.write(plan, tmp_path / "plan")
     assert [f.name for f in files] == ["plan.json", "session.csv", "plan.png"]
     table = pd.read_csv(tmp_path / "plan" / "session.csv")
-    assert table["run"].nunique() == len(plan.steps)
+    assert table["run"].nunique() == len(plan.pieces)
     assert not [n for n in table.columns if n.startswith(("force", "moment"))]
     assert {other.name for other in (plan, *plan.others)} == {"chosen", "second", "standard"}
     assert all(plan.reached(6.0) >= other.reached(6.0) - 0.01 for other in plan.others)
-    said = write_session.text(plan)
+    said = session.text(plan)
     # Of sessions that reach as much the shortest is the plan: here the standard one reaches more.
     stated = any(line.startswith("The standard session (slow steps along z") for line in said)
     assert stated == (plan.name != "standard")
     written = json.loads((tmp_path / "plan" / "plan.json").read_text())["others"]
     assert [o["name"] for o in written] == [o.name for o in plan.others] and all(o["steps"] for o in written)
-    assert said[0].startswith(f"Record {len(plan.steps)} runs") and any(line.startswith("By hand") for line in said)
+    assert said[0].startswith(f"Record {len(plan.pieces)} runs") and any(line.startswith("By hand") for line in said)

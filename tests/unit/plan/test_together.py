@@ -12,7 +12,7 @@ from rotorid.cli import app
 from rotorid.cli.planning import sets_of
 from rotorid.errors import InputError
 from rotorid.mismatch.decision.findings import Finding
-from rotorid.plan.together import answers, joined_sets
+from rotorid.plan.questions import answers, joined_sets
 from rotorid.recordings import RecordingSet, Run, templates
 
 VEHICLE = templates.read("thesis")

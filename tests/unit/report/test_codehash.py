@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rotorid.report.codehash import Code
+from rotorid.report.provenance import Code
 
 FILES = {
     "src/rotorid/__init__.py": "",
@@ -77,7 +77,7 @@ def test_what_runs_counts_and_nothing_else_does(project: Path, what: str) -> Non
 
 
 def test_a_second_package_of_the_project_is_followed(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rotorid.report.codehash.PACKAGES", {"rotorid": "src", "second": "beside"})
+    monkeypatch.setattr("rotorid.report.provenance._PACKAGES", {"rotorid": "src", "second": "beside"})
     texts = {"__init__": "", "one": "from .two import X", "two": "from rotorid.constants import G as X"}
     (project / "beside/second").mkdir(parents=True)
     for name, text in texts.items():

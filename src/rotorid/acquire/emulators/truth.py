@@ -2,18 +2,109 @@
 
 Rotors, mass and geometry are the thesis's (tables 2.3, 2.5, 4.1), load cells have table 2.8's calibration;
 everything else is drawn here and concealed from the pipeline, for its mismatch stage to find.
+
+The bench's geometry: cell forces to body forces (thesis eqs 2.3–2.9, table 2.3), and the inverse.
+
+The recorder shows forces with it; the emulated bench uses the inverse. The pipeline has its own
+implementation, so that one can be checked against the other.
+
+Weights as an operator puts them down: never twice in quite the same place.
 """
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
 import yaml
 from pydantic import BaseModel, ConfigDict
 
-from rotorid.acquire.geometry import INTERCEPT, SLOPE
 from rotorid.io.text.files import read_yaml
+
+# a load "along z" pulls upwards, as thrust does
+AXES = {"x": np.array([1.0, 0, 0]), "y": np.array([0, 1.0, 0]), "z": np.array([0, 0, -1.0])}
+GF_N = 9.80665e-3
+_L_M = 0.225
+_D_135Z, _D_246Z = 0.02120, 0.050457916
+_D_2X, _D_4X, _D_6X = 0.068585472, 0.053814095, 0.014771377
+_D_2Y, _D_4Y, _D_6Y = 0.022541324, 0.048126099, 0.070667423
+_C30, _C45, _C60 = (math.cos(math.radians(angle)) for angle in (30, 45, 60))
+
+# eq. 2.9, first two rows (forces along x and y) and the linear part of the third, shape (3, 6)
+M = np.array(
+    [
+        [
+            -_D_135Z / (_C60 * _L_M),
+            (_D_246Z / _C30 - _D_2X) / (_C45 * _L_M),
+            _D_135Z / _L_M,
+            _D_4X / (_C45 * _L_M),
+            -_D_135Z / (_C60 * _L_M),
+            -(_D_246Z / _C30 - _D_6X) / (_C45 * _L_M),
+        ],
+        [
+            _D_135Z / (_C30 * _L_M),
+            (_D_246Z / _C60 + _D_2Y) / (_C45 * _L_M),
+            0.0,
+            (_D_4Y - _D_246Z) / (_C45 * _L_M),
+            -_D_135Z / (_C30 * _L_M),
+            (_D_246Z / _C60 - _D_6Y) / (_C45 * _L_M),
+        ],
+        [0.0, -1 / _C45, 0.0, -1 / _C45, 0.0, -1 / _C45],
+    ]
+)
+
+# table 2.8, as printed: gf per 1e-5 V and gf
+SLOPE = np.array([39.7571, 37.2649, 40.9000, 39.9259, 42.4717, 39.4705])
+_INTERCEPT = np.array([-0.0829, -0.3379, 0.1014, 0.0289, 0.1096, 0.0771])
+
+
+def body_forces(cells_n: np.ndarray) -> np.ndarray:
+    """Force on the vehicle, body axes, shape (3,), N, from the six cells' forces, shape (6,), N (eq. 2.9)."""
+    force = M @ cells_n
+    force[2] -= np.abs(cells_n[[0, 2, 4]]).sum()
+    return force
+
+
+def cell_forces(volts: np.ndarray) -> np.ndarray:
+    """Cells' forces in N, shape (6,), from tared voltages in V, with table 2.8's calibration (eq. 2.10)."""
+    return (_INTERCEPT + SLOPE * volts * 1e5) * GF_N
+
+
+def cell_response() -> np.ndarray:
+    """Forces on the six cells for a unit force on the body along x, y and −z, shape (6, 3).
+
+    The inverse of the equations above where they hold, along one axis at a time; six unknowns and three
+    equations leave a choice, and it is: least squares of the cells' forces for x and y (with no share in
+    the linear part of z), and for −z all cells alike ("the load cells deform equally", thesis 2.4) as
+    nearly as no reading in x and y allows.
+    """
+    lateral = np.linalg.pinv(M)[:, :2]
+    rows = M.copy()
+    rows[2, [0, 2, 4]] = -1.0  # cells 1, 3, 5 pulled: their absolute value is their value
+    wanted = np.array([0.0, 0.0, -1.0])
+    alike = np.full(6, 1 / (3 + 3 / _C45))
+    vertical = alike + np.linalg.pinv(rows) @ (wanted - rows @ alike)
+    if (vertical[[0, 2, 4]] <= 0).any():
+        raise AssertionError("cells 1, 3 and 5 must be pulled by a force along -z")
+    return np.column_stack([lateral, vertical])
+
+
+def direction_of(axis: str) -> np.ndarray:
+    """Unit vector of a load along one axis, or along several alike (`xz`: halfway between x and z)."""
+    together = sum(AXES[letter] for letter in axis)
+    return together / np.linalg.norm(together)
+
+
+_SPREAD = 1e-4
+_SPREAD_GF = 0.08
+
+
+def put_down(load_gf: float, rng: np.random.Generator) -> float:
+    """Force in N that a weight in gf exerts this time; no weight exerts none."""
+    if load_gf == 0:
+        return 0.0
+    return (load_gf * (1 + _SPREAD * rng.standard_normal()) + _SPREAD_GF * rng.standard_normal()) * GF_N
 
 
 class _Truth(BaseModel):
@@ -24,7 +115,7 @@ class CellsTruth(_Truth):
     """Six load cells; every list has six entries."""
 
     volts_per_gf: list[float] = [float(1e-5 / slope) for slope in SLOPE]
-    seat_v: list[float] = [float(-a0 / a1 * 1e-5) for a0, a1 in zip(INTERCEPT, SLOPE, strict=True)]
+    seat_v: list[float] = [float(-a0 / a1 * 1e-5) for a0, a1 in zip(_INTERCEPT, SLOPE, strict=True)]
     seat_gf: float = 5.0  # load at which the bearing plate sits and `seat_v` is fully there
     zero_v: list[float] = [0.0] * 6
     drift_v_s: list[float] = [0.0] * 6
@@ -114,7 +205,7 @@ class PlasticTruth(_Truth):
     yield_pa: float
 
 
-class ClockTruth(_Truth):
+class _ClockTruth(_Truth):
     """Relative error of each device's clock."""
 
     bench: float = 0.0
@@ -143,7 +234,7 @@ class Truth(_Truth):
         100: PlasticTruth(modulus_pa=1.9482e9, ultimate_pa=41.388e6, yield_pa=16.02e6),
     }
     specimen_scatter: float = 0.0
-    clocks: ClockTruth = ClockTruth()
+    clocks: _ClockTruth = _ClockTruth()
 
 
 def draw_truth(seed: int) -> Truth:
@@ -216,7 +307,7 @@ def draw_truth(seed: int) -> Truth:
             resonance_hz=60.0,
         ),
         specimen_scatter=0.012,
-        clocks=ClockTruth(**dict(zip(ClockTruth.model_fields, (v * 1e-6 for v in signed(30, 120, 6)), strict=True))),
+        clocks=_ClockTruth(**dict(zip(_ClockTruth.model_fields, (v * 1e-6 for v in signed(30, 120, 6)), strict=True))),
     )
 
 

@@ -16,14 +16,14 @@ CONCEALED = ({"id": "rotor_drag", "form": "at the hubs", "parameters": {"k_d": 1
 """What the vehicle does and its file does not say."""
 
 
-def names() -> tuple[str, ...]:
+def _names() -> tuple[str, ...]:
     """Files of the set, sorted."""
     return tuple(sorted(p.name for p in files(__name__).iterdir() if p.name.endswith((".yaml", ".csv.gz"))))
 
 
 def write(folder: Path) -> tuple[Path, ...]:
     """Copy the set into `folder`; InputError, and nothing written, where one of its files is there already."""
-    paths = tuple(folder / name for name in names())
+    paths = tuple(folder / name for name in _names())
     for path in paths:
         if path.exists():
             raise InputError(f"{path} is there already; nothing was written")

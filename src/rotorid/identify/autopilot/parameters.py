@@ -9,11 +9,16 @@ from difflib import get_close_matches
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.identify.autopilot.correlated import EstimatedNumber
-from rotorid.identify.autopilot.drag import DragFit, fit_drag
-from rotorid.identify.autopilot.signals import stretches_of
-from rotorid.identify.autopilot.thrust import TIME_CONSTANTS_S, ThrustFit, fit_thrust
-from rotorid.identify.autopilot.thrust_maps import MAPS, ThrustMap
+from rotorid.identify.autopilot.correlated import EstimatedNumber, stretches_of
+from rotorid.identify.autopilot.thrust import (
+    MAPS,
+    TIME_CONSTANTS_S,
+    DragFit,
+    ThrustFit,
+    ThrustMap,
+    fit_drag,
+    fit_thrust,
+)
 from rotorid.recordings import RecordingSet
 
 _WIDEST_SHARE = 0.5

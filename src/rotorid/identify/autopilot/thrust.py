@@ -4,6 +4,21 @@ The accelerometer reads, upward, the thrust over the mass, whatever the attitude
 a steady thrust by the autopilot's own curve; the rotor's speed, its square root, follows with a lag of first order.
 What else moves the thrust is estimated jointly: the voltage of the battery (or, where it is not recorded, a drift over
 the run), the axial speed, the lift of forward flight, and the zero of the accelerometer, believed to 0.1 m/s².
+
+How each autopilot says what thrust a motor's signal makes: its thrust curve, as published.
+
+A motor's signal u is what the motor is sent, as a share of its range, 0 to 1 (the contract's `throttle_i`). A map gives
+the thrust that u makes in the steady state, as a share of the thrust at u = 1; the Crazyflie's gives grams.
+
+Drag by PX4's own law, jointly with a constant wind: EKF2_BCOEF_X, EKF2_BCOEF_Y, EKF2_MCOEF.
+
+PX4's estimator of wind takes the specific force across the rotors' axis as
+
+    a = −½ ρ b |v| v − M √(ρ/1.225) v,   b = |(v_x/B_x, v_y/B_y)| / |(v_x, v_y)|
+
+with v the velocity through the air in body axes. Source: PX4-Autopilot,
+src/modules/ekf2/EKF/aid_sources/drag/drag_fusion.cpp. Its own script for the numbers (mc_wind_estimator_tuning.py)
+takes the air for still; here each run has a wind of its own.
 """
 
 from __future__ import annotations
@@ -14,10 +29,16 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from rotorid.identify.autopilot.correlated import CorrelatedFit, EstimatedNumber, fit
-from rotorid.identify.autopilot.signals import Stretch
-from rotorid.identify.autopilot.thrust_maps import ThrustMap
+from rotorid.identify.autopilot.correlated import CorrelatedFit, EstimatedNumber, Stretch, fit
 
+_MOST_SHARE = 1.5
+"""Shares of thrust up to which Betaflight's curve is inverted: a signal above its range is no use."""
+_CURVE_POINTS = 3001
+_SPIN_MAX = 0.95
+"""Default of ArduPilot's MOT_SPIN_MAX, at which its curve ends."""
+_SPIN_MIN_BELIEVED = 0.3 / np.sqrt(12)
+"""MOT_SPIN_MIN is believed to lie in what ArduPilot takes, 0 to 0.3: the deviation of an even spread. Without it a
+curve that is nearly a square (MOT_THST_EXPO near 1) leaves a line of pairs that fit alike."""
 _STANDARD_GRAVITY = 9.80665
 """m/s²: grams of thrust are by it."""
 _ACCELEROMETER_ZERO_M_S2 = 0.1
@@ -29,6 +50,118 @@ _VOLTAGE_MOVES = 0.01
 """Share of the voltage that it must vary by for its part to be estimated."""
 _DRIFT, _AXIAL, _LIFT = 0.1, 1.0, 0.05
 """Usual sizes: share of thrust that drifts over a run, m/s² per m/s of axial speed, m/s² per (m/s)² across."""
+_AIR_DENSITY_KG_M3 = 1.225
+_DRAG_RATE_HZ = 20.0
+"""Residuals are averaged down to about so many a second: drag follows the velocity, which is slow."""
+_LEAST_AIRSPEED_M_S = 1e-3
+_ZERO_M_S2 = 0.3
+"""Believed deviation of the specific force at rest: the accelerometer's zero, and rotors whose axis is not quite z."""
+_WIND_M_S = 5.0
+"""Believed deviation of each component of the wind about none."""
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """A number of a map: its name in the autopilot, where its estimate starts, and between what it lies."""
+
+    name: str
+    start: float
+    low: float
+    high: float
+    """Bounds of the estimate; wider than what the autopilot takes, so that an interval is not cut."""
+    allowed: tuple[float, float]
+    """What the autopilot takes."""
+    widest: float
+    """Half width of the 95 % interval beyond which the flight does not determine it."""
+    decimals: int = 3
+    factor: float = 1.0
+    """From the estimate to the number that the autopilot takes."""
+    believed: float = np.inf
+    """Standard deviation about the start that is believed before the flight."""
+
+
+@dataclass(frozen=True)
+class ThrustMap:
+    """A thrust curve with its free numbers.
+
+    `thrust` takes signals (n, k), battery voltage (n, 1) or None, and the numbers of `shapes`; it returns shares of the
+    thrust at full signal (n, k), or grams where `in_grams`.
+    """
+
+    autopilot: str
+    shapes: tuple[_Shape, ...]
+    thrust: Callable[[np.ndarray, np.ndarray | None, np.ndarray], np.ndarray]
+    equation: str
+    source: str
+    in_grams: bool = False
+    full_signal: float = 1.0
+    """Signal of full thrust."""
+
+
+def _px4(signal: np.ndarray, voltage: np.ndarray | None, shape: np.ndarray) -> np.ndarray:
+    """T/T_max = f u² + (1 − f) u, f = THR_MDL_FAC."""
+    return shape[0] * signal**2 + (1 - shape[0]) * signal
+
+
+def _ardupilot(signal: np.ndarray, voltage: np.ndarray | None, shape: np.ndarray) -> np.ndarray:
+    """T/T_max = e r² + (1 − e) r with r = (u − spin_min)/(spin_max − spin_min); none below spin_min."""
+    expo, spin_min = shape
+    r = np.maximum(signal - spin_min, 0.0) / (_SPIN_MAX - spin_min)
+    return expo * r**2 + (1 - expo) * r
+
+
+def _betaflight(signal: np.ndarray, voltage: np.ndarray | None, shape: np.ndarray) -> np.ndarray:
+    """T/T_max = x where u = x (1 + k (1 − x)²), k = thrust_linear/100; below k = 3 one x for each u."""
+    x = np.linspace(0.0, _MOST_SHARE, _CURVE_POINTS)
+    return np.interp(signal, x * (1 + shape[0] * (1 - x) ** 2), x)
+
+
+def _crazyflie(signal: np.ndarray, voltage: np.ndarray | None, shape: np.ndarray) -> np.ndarray:
+    """Grams t of a rotor where u V = c_1 t + c_2 t²."""
+    volts = signal * (1.0 if voltage is None else voltage)
+    root = np.sqrt(np.maximum(shape[0] ** 2 + 4 * shape[1] * volts, 1e-6 * shape[0] ** 2))
+    return 2 * volts / (shape[0] + root)
+
+
+MAPS = {
+    "px4": ThrustMap(
+        "PX4",
+        (_Shape("THR_MDL_FAC", 0.5, -0.5, 1.6, (0.0, 1.0), 0.25),),
+        _px4,
+        "T/T_max = f u² + (1 − f) u, f = THR_MDL_FAC",
+        "PX4-Autopilot, src/lib/mixer_module/motor_params.c (THR_MDL_FAC) and functions/FunctionMotors.hpp",
+    ),
+    "ardupilot": ThrustMap(
+        "ArduPilot",
+        (
+            _Shape("MOT_THST_EXPO", 0.5, -0.9, 1.8, (-1.0, 1.0), 0.25),
+            _Shape("MOT_SPIN_MIN", 0.15, -0.2, 0.4, (0.0, 0.3), 0.08, believed=_SPIN_MIN_BELIEVED),
+        ),
+        _ardupilot,
+        f"T/T_max = e r² + (1 − e) r, r = (u − MOT_SPIN_MIN)/({_SPIN_MAX:g} − MOT_SPIN_MIN), e = MOT_THST_EXPO",
+        "ardupilot, libraries/AP_Motors/AP_Motors_Thrust_Linearization.cpp, with MOT_SPIN_MAX at its default",
+        full_signal=_SPIN_MAX,
+    ),
+    "betaflight": ThrustMap(
+        "Betaflight",
+        (_Shape("thrust_linear", 0.3, -0.6, 2.5, (0.0, 1.5), 0.25, 0, 100.0),),
+        _betaflight,
+        "u = x (1 + k (1 − x)²), x = T/T_max, k = thrust_linear/100",
+        "Betaflight 4.5, src/main/flight/pid.c, pidApplyThrustLinearization, and pid_init.c",
+    ),
+    "crazyflie": ThrustMap(
+        "Crazyflie",
+        (
+            _Shape("volts_per_gram", 0.088, 0.01, 0.5, (0.0, np.inf), 0.02, 5),
+            _Shape("volts_per_gram_squared", -0.0006239, -0.004, 0.01, (-np.inf, np.inf), 0.0008, 7),
+        ),
+        _crazyflie,
+        "u V = c_1 t + c_2 t², t in grams a rotor, V the battery's voltage",
+        "crazyflie-firmware, src/drivers/src/motors.c, motorsCompensateBatteryVoltage (c_1 = 0.088, c_2 = −0.0006239)",
+        in_grams=True,
+    ),
+}
+"""By the name that `--to` takes."""
 
 
 @dataclass(frozen=True)
@@ -178,7 +311,7 @@ def _residuals(used: Sequence[Stretch], chosen: ThrustMap, layout: _Layout, mass
             up = up + values[layout.zero]
             if through is not None:
                 up = up + through @ values[layout.motion : layout.motion + 2]
-            out.append(averaged(-s.specific_force[:, 2] - up, every))
+            out.append(_averaged(-s.specific_force[:, 2] - up, every))
         return out
 
     return residuals
@@ -192,7 +325,65 @@ def lagging(series: np.ndarray, dt_s: float, time_constant_s: float) -> np.ndarr
     return series[:1] + lfilter([ahead, behind], [1.0, -keep], series - series[:1], axis=0)
 
 
-def averaged(series: np.ndarray, every: int) -> np.ndarray:
+def _averaged(series: np.ndarray, every: int) -> np.ndarray:
     """Means of `every` neighbours, (n // every,)."""
     count = len(series) // every
     return series[: count * every].reshape(count, every).mean(axis=1)
+
+
+@dataclass(frozen=True)
+class DragFit:
+    """Drag by PX4's law."""
+
+    bluff_x: EstimatedNumber
+    """1/EKF2_BCOEF_X, m²/kg."""
+    bluff_y: EstimatedNumber
+    momentum: EstimatedNumber
+    """EKF2_MCOEF, 1/s."""
+    wind: dict[str, tuple[EstimatedNumber, EstimatedNumber]]
+    """By run the wind towards north and east, m/s."""
+    fastest_m_s: float
+    """99 % quantile of the horizontal speed."""
+
+
+def specific_drag(
+    through_air: np.ndarray, bluff_x: float, bluff_y: float, momentum: float, density_kg_m3: float = _AIR_DENSITY_KG_M3
+) -> np.ndarray:
+    """Specific force (n, 2), m/s², along body x and y, of velocities through the air (n, 3), body axes."""
+    across = through_air[:, :2]
+    speed = np.maximum(np.linalg.norm(across, axis=1), _LEAST_AIRSPEED_M_S)
+    bluff = np.linalg.norm(across * [bluff_x, bluff_y], axis=1) / speed
+    quadratic = 0.5 * density_kg_m3 * bluff * np.linalg.norm(through_air, axis=1)
+    return -(quadratic + momentum * np.sqrt(density_kg_m3 / _AIR_DENSITY_KG_M3))[:, None] * across
+
+
+def fit_drag(stretches: Sequence[Stretch], density_kg_m3: float = _AIR_DENSITY_KG_M3) -> DragFit | None:
+    """Drag and wind; None where no stretch has attitude and velocity."""
+    used = [s for s in stretches if s.attitude is not None and s.velocity is not None]
+    if not used:
+        return None
+    runs = list(dict.fromkeys(s.run for s in used))
+    count = 5 + 2 * len(runs)
+    start = np.zeros(count)
+    start[:3] = 0.02, 0.02, 0.1
+    low = np.array([-0.2, -0.2, -1.0, -3, -3, *[-30.0] * (2 * len(runs))])
+    high = np.array([1.0, 1.0, 3.0, 3, 3, *[30.0] * (2 * len(runs))])
+    scale = np.array([0.02, 0.02, 0.1, _ZERO_M_S2, _ZERO_M_S2, *[2.0] * (2 * len(runs))])
+    prior = np.array([np.inf, np.inf, np.inf, _ZERO_M_S2, _ZERO_M_S2, *[_WIND_M_S] * (2 * len(runs))])
+
+    def residuals(values: np.ndarray) -> list[np.ndarray]:
+        out = []
+        for s in used:
+            at = 5 + 2 * runs.index(s.run)
+            moving = s.velocity - np.array([*values[at : at + 2], 0.0])
+            through = np.einsum("nji,nj->ni", s.attitude, moving)
+            force = specific_drag(through, *values[:3], density_kg_m3) + values[3:5]
+            every = max(int(round(1 / (_DRAG_RATE_HZ * s.dt_s))), 1)
+            out += [_averaged(s.specific_force[:, j] - force[:, j], every) for j in range(2)]
+        return out
+
+    found = fit(residuals, start, (low, high), scale, prior)
+    of = [found.of(lambda v, k=k: float(v[k])) for k in range(count)]
+    across = np.concatenate([np.linalg.norm(s.velocity[:, :2], axis=1) for s in used])
+    wind = {run: (of[5 + 2 * k], of[6 + 2 * k]) for k, run in enumerate(runs)}
+    return DragFit(of[0], of[1], of[2], wind, float(np.quantile(across, 0.99)))

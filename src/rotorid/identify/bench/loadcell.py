@@ -8,6 +8,14 @@ scatter by which it is judged, and several wrong ones hide each other. So the li
 best (least trimmed squares) and takes the others in, the nearest first. Once the nearest is beyond the limit of the
 studentised residuals, it and those further off are outliers (Hadi and Simonoff 1993). The limit is that of Student's t,
 Bonferroni's over all points and over the numbers of outliers that are tried.
+
+Tensile tests of printed PLA (thesis 2.6.4, table 2.5, fig. 2.29): modulus, strength and 0.2 % yield.
+
+- Stress is force over the section, strain displacement over the distance between grips.
+- Modulus: slope of the straight part. It begins where the specimen is taut and is extended for as long as the
+  line's largest residual stays within the noise; the foot, where the slack is removed, is left out.
+- Strain is then counted from where that line meets zero stress (toe compensation).
+- Yield: where the curve meets the line of the modulus moved by 0.2 % of strain. Strength: the largest stress.
 """
 
 from __future__ import annotations
@@ -22,12 +30,20 @@ import pandas as pd
 from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
+from rotorid.io.logs import by_recording
 
 FLAG_LEVEL = 0.01
 """Of good calibrations at most this share has a flag, or several, among all its points."""
 _FEWEST_KEPT = 4
 _ROUNDING = 1e-9
 """Scatter below this share of the range of y is that of the numbers' last digits."""
+_OFFSET_STRAIN = 0.002
+_FOOT_SHARE = 0.04
+"""The straight part is looked for from this share of the strength on: below it the slack is still being removed."""
+_FIRST_SHARE = 0.12
+"""… and reaches at least up to this share."""
+_NOISE_FACTOR = 4.0
+"""Residuals beyond so many standard deviations of the noise end the straight part."""
 
 
 @dataclass(frozen=True)
@@ -135,22 +151,12 @@ def balance_disagreement(weights_path: str | Path) -> float:
     return float(((table["ohaus_gf"] - table["mettler_gf"]) / table["average_gf"]).median())
 
 
-@dataclass(frozen=True)
-class _SharedWeightError:
-    """What all cells agree on about the error of one weight."""
-
-    mean_gf: float
-    """True weight minus printed weight [gf], mean over the cells."""
-    interval_95_gf: tuple[float, float]
-    """Student's t over the cells, which are independent instruments."""
-    by_cell_gf: tuple[float, ...]
-
-
 def shared_weight_error(
     weights_gf: np.ndarray, readings: dict[int, np.ndarray], contains: np.ndarray
-) -> _SharedWeightError:
-    """Error of one weight, from the residuals that it would leave in every cell alike.
+) -> tuple[float, tuple[float, float], tuple[float, ...]]:
+    """Error of one weight, true minus printed [gf], from the residuals that it would leave in every cell alike.
 
+    Mean over the cells, its 95 % interval (Student's t over the cells, which are independent instruments), and by cell.
     Each cell's line is fitted with one unknown more, d: weight + d * contains = a0 + a1 * reading.
 
     Parameters
@@ -173,7 +179,7 @@ def shared_weight_error(
         found.append(float(solution[2]))
     mean = float(np.mean(found))
     half = student_quantile(len(found) - 1, 0.975) * np.std(found, ddof=1) / np.sqrt(len(found))
-    return _SharedWeightError(mean, (mean - float(half), mean + float(half)), tuple(found))
+    return mean, (mean - float(half), mean + float(half)), tuple(found)
 
 
 def flag_readings(readings: pd.DataFrame) -> pd.DataFrame:
@@ -354,3 +360,121 @@ def _agreeing(x: np.ndarray, y: np.ndarray, count: int) -> np.ndarray:
     mask = np.zeros(len(x), bool)
     mask[np.argsort(best, kind="stable")[:count]] = True
     return mask
+
+
+def evaluate(
+    displacement_mm: np.ndarray, force_n: np.ndarray, gauge_mm: float, section_mm2: float
+) -> tuple[dict, pd.DataFrame]:
+    """Figures of one specimen, with their units, and its curve (`strain`, compensated for the slack, and `stress_pa`).
+
+    Parameters
+    ----------
+    displacement_mm, force_n
+        Samples, shape (n,), from before the specimen is taut to after it broke.
+    gauge_mm, section_mm2
+        Distance between grips and cross-section.
+
+    Raises
+    ------
+    InputError
+        No straight part of at least five samples, or a curve that never meets the 0.2 % line.
+    """
+    displacement, force = np.asarray(displacement_mm, float), np.asarray(force_n, float)
+    stress, strain = force / section_mm2 * 1e6, displacement / gauge_mm
+    peak = int(np.argmax(stress))
+    strength = float(stress[peak])
+    first = int(np.argmax(stress > _FOOT_SHARE * strength))
+    last = int(np.argmax(stress > _FIRST_SHARE * strength))
+    noise = _noise(stress[: peak + 1])
+    last = max(last, first + 4)
+    if last >= peak:
+        raise InputError("no straight part of at least five samples before the largest force")
+    while last < peak:
+        longer = fit_line(strain[first : last + 2], stress[first : last + 2])
+        if np.max(np.abs(longer.residuals)) > _NOISE_FACTOR * noise:
+            break
+        last += 1
+    line = fit_line(strain[first : last + 1], stress[first : last + 1])
+    zero = -line.a0 / line.a1
+    strain = strain - zero
+    broken = int(peak + np.argmax(np.append(stress[peak:], 0.0) < 0.5 * strength))
+    yield_strain, yield_pa = _offset_yield(strain[: peak + 1], stress[: peak + 1], line.a1)
+    low, high = line.interval(1)
+    figures = {
+        "modulus_gpa": line.a1 / 1e9,
+        "modulus_low_95_gpa": low / 1e9,
+        "modulus_high_95_gpa": high / 1e9,
+        "strength_mpa": strength / 1e6,
+        "yield_mpa": yield_pa / 1e6,
+        "yield_strain": yield_strain,
+        "proportional_mpa": float(stress[last]) / 1e6,  # where the straight part ends
+        "break_strain": float(strain[broken - 1]),
+        "slack_mm": float(zero * gauge_mm),
+        "straight_samples": last - first + 1,
+    }
+    return figures, pd.DataFrame({"strain": strain[:broken], "stress_pa": stress[:broken]})
+
+
+def _noise(stress: np.ndarray) -> float:
+    """Standard deviation of the readings from their third differences, which a smooth curve does not show."""
+    third = np.diff(stress, 3)
+    return float(1.4826 * np.median(np.abs(third)) / np.sqrt(20))
+
+
+def _offset_yield(strain: np.ndarray, stress: np.ndarray, modulus: float) -> tuple[float, float]:
+    """Strain and stress where the curve falls below the line moved by 0.2 % of strain."""
+    above = stress - modulus * (strain - _OFFSET_STRAIN)
+    loaded = np.flatnonzero(strain > _OFFSET_STRAIN)
+    below = loaded[above[loaded] <= 0]
+    if len(below) == 0:
+        raise InputError("the curve never meets the line of 0.2 % plastic strain: the specimen broke before it yielded")
+    i = below[0]
+    share = above[i - 1] / (above[i - 1] - above[i])
+    return (
+        float(strain[i - 1] + share * (strain[i] - strain[i - 1])),
+        float(stress[i - 1] + share * (stress[i] - stress[i - 1])),
+    )
+
+
+def specimens(samples: pd.DataFrame, sessions: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """One row a specimen with its figures, and all curves (`infill_percent specimen strain stress_pa`)."""
+    parts = by_recording(samples)
+    rows, curves = [], []
+    for session in sessions.itertuples():
+        table = parts[session.id]
+        table = table[table["quality"] == 0]
+        try:
+            found, curve = evaluate(
+                table["displacement_mm"].to_numpy(),
+                table["force_n"].to_numpy(),
+                session.gauge_length_mm,
+                session.cross_section_mm2,
+            )
+        except InputError as error:
+            raise InputError(f"{session.id}: {error}") from None
+        infill = int(session.infill_percent)
+        rows.append({"infill_percent": infill, "specimen": session.specimen} | found)
+        curves.append(curve.assign(infill_percent=infill, specimen=session.specimen))
+    return pd.DataFrame(rows), pd.concat(curves, ignore_index=True)
+
+
+def by_infill(table: pd.DataFrame, printed: pd.DataFrame) -> pd.DataFrame:
+    """Mean of each infill's specimens with its 95 % interval, next to the thesis's table 2.5.
+
+    `printed` has the columns `infill_percent modulus_gpa strength_mpa yield_mpa`.
+    """
+    known = printed.set_index("infill_percent")
+    rows = []
+    for infill, part in table.groupby("infill_percent"):
+        row = {"infill_percent": infill, "specimens": len(part)}
+        for name in ("modulus_gpa", "strength_mpa", "yield_mpa"):
+            values = part[name]
+            half = student_quantile(len(values) - 1, 0.975) * values.std(ddof=1) / np.sqrt(len(values))
+            row |= {
+                name: values.mean(),
+                f"{name}_low_95": values.mean() - half,
+                f"{name}_high_95": values.mean() + half,
+                f"{name}_thesis": known.loc[infill, name] if infill in known.index else np.nan,
+            }
+        rows.append(row)
+    return pd.DataFrame(rows)

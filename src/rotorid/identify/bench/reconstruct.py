@@ -3,19 +3,44 @@
 The bench is a cantilever: a force along one axis at a time follows from a sum of moments (x, y) or of the cells'
 forces (z). With loads along several axes at once the six readings do not determine six unknowns (thesis 2.4),
 and the equations are then no more than an attempt. Axes are the vehicle's, z down; forces in newtons.
+
+Calibration of the cells from raw logs: readings of known weights, lines, and what a metrologist asks for.
+
+- A reading is the mean of the tared voltage from where it stays steady under the weight to the end (fig. 2.34).
+- Linearity: largest distance of a weight's mean reading from the line. Repeatability: standard deviation of
+  readings of the same weight. Both in gf and as a share of the largest weight.
+- Drift: slope in time of cells that carry nothing. Creep: slope under load, beyond the drift, per gf.
+- Hysteresis needs loads taken off again. The thesis's calibration only puts weights on, so it is not to be
+  had from it; the return to zero after a flight (dynamic tests) bounds hysteresis, creep and drift together.
+
+Bench readings made ready: rest reading taken off, spikes out, filtered as the thesis does and without lag.
+
+The quality of a sample is that of `rotorid.io.logs` plus `SPIKE` where a channel jumped and came back.
+
+Static tests that are ready make recording sets of kind `bench`: reconstructed force next to the load that was put on.
+One run holds the loads of one axis and repeat in the order in which they were put on. Its time counts from the first
+recording of the set, so that runs lie where they were in the day; each load has its own recording, tared at its start,
+with a gap in time before the next.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
-from rotorid.identify.bench.loadcell import LineFit
+from rotorid.identify.bench.loadcell import LineFit, fit_line
+from rotorid.io.logs import by_recording
+from rotorid.recordings import columns as c
+from rotorid.recordings.run import RecordingSet, Run
+from rotorid.recordings.signal import filters
+from rotorid.recordings.vehicle import Vehicle
 
 GF_N = 9.80665e-3
 """Newtons in a gram-force."""
@@ -28,6 +53,10 @@ CELLS = tuple(f"cell_{i}_v" for i in range(1, 7))
 FORCES = ("force_x_n", "force_y_n", "force_z_n")
 DIRECTION = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, -1.0)}
 """Unit vector of a load, body axes: along z it pulls upwards, as thrust does."""
+_FEWEST_STEADY = 50
+SPIKE = 16
+_SETTLING_SAMPLES = 10
+"""Fig. 2.35: so many samples let the spikes of switching on dissipate."""
 
 
 @dataclass(frozen=True)
@@ -179,3 +208,260 @@ def force_covariance(cells_n: np.ndarray, variance_n2: np.ndarray, geometry: Geo
     slope = np.repeat(geometry.matrix[None], len(cells_n), axis=0)
     slope[:, 2, PULLED] -= np.sign(cells_n[:, PULLED])
     return np.einsum("nij,nj,nkj->nik", slope, np.atleast_2d(variance_n2), slope)
+
+
+def readings(prepared: pd.DataFrame, sessions: pd.DataFrame) -> pd.DataFrame:
+    """One row per calibration recording: cell, weight, repeat, mean reading and how it was had.
+
+    Columns `id cell weight_gf repeat reading_10uv mean_from_s noise_10uv samples slope_v_s`; the reading is in
+    1e-5 V, as in the thesis's table 2.7. Raises InputError where a recording never became steady under its weight.
+    """
+    parts = by_recording(prepared)
+    rows = []
+    for session in sessions.itertuples():
+        table = parts[session.id]
+        loaded = table[table["index"] > session.mark_load]
+        # Steady until the end: before the weight is really on, the reading at rest is steady too.
+        unsteady = np.flatnonzero(~loaded["steady"].to_numpy())
+        first = int(unsteady[-1]) + 1 if len(unsteady) else 0
+        if len(loaded) - first < _FEWEST_STEADY:
+            raise InputError(f"{session.id}: the reading was not steady for the last {_FEWEST_STEADY} samples")
+        kept = loaded.iloc[first:]
+        kept = kept[kept["quality"] == 0]
+        volts, time_s = kept["cell_v"].to_numpy(), kept["time_s"].to_numpy()
+        rows.append(
+            {
+                "id": session.id,
+                "cell": int(session.cell),
+                "weight_gf": session.load_gf,
+                "repeat": session.repeat,
+                "reading_10uv": volts.mean() * 1e5,
+                "mean_from_s": time_s[0],
+                "noise_10uv": volts.std(ddof=1) * 1e5,
+                "samples": len(kept),
+                "slope_v_s": _slope(time_s, volts),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _slope(time_s: np.ndarray, values: np.ndarray) -> float:
+    """Least-squares slope of values in time."""
+    centred = time_s - time_s.mean()
+    return float(centred @ values / (centred @ centred))
+
+
+def calibrate_cell(table: pd.DataFrame, idle_slopes_v_s: np.ndarray) -> dict:
+    """Line and figures of one cell from its rows of `readings` and its slopes where it was not loaded (V/s).
+
+    Creep is the growth of the reading under load as a share of the load, per minute, over the seconds of a recording;
+    noise the standard deviation of one sample. Units stand in the names, for a JSON file.
+    """
+    weight, reading = table["weight_gf"].to_numpy(float), table["reading_10uv"].to_numpy(float)
+    line = fit_line(reading, weight)
+    force = line.a0 + line.a1 * reading
+    by_weight = pd.DataFrame({"weight": weight, "force": force}).groupby("weight")["force"]
+    off = by_weight.mean() - by_weight.mean().index
+    repeats = by_weight.count() - 1
+    spread = float(np.sqrt((by_weight.var(ddof=1).fillna(0) * repeats).sum() / max(repeats.sum(), 1)))
+    gf_per_volt = line.a1 * 1e5
+    drift, drift_interval = _mean_interval(idle_slopes_v_s)
+    growth = table["slope_v_s"].to_numpy() - drift
+    volts = reading * 1e-5
+    share = float(growth @ volts / (volts @ volts))
+    left = growth - share * volts
+    half = student_quantile(len(volts) - 1, 0.975) * np.sqrt(left @ left / (len(volts) - 1) / (volts @ volts))
+    linearity, most = float(np.abs(off).max()), float(weight.max())
+    return {
+        "a0_gf": line.a0,
+        "a0_interval_95": line.interval(0),
+        "a1_gf_per_10uv": line.a1,
+        "a1_interval_95": line.interval(1),
+        "covariance": line.covariance,
+        "r": line.r,
+        "residual_sd_gf": line.residual_sd,
+        "degrees_of_freedom": line.degrees_of_freedom,
+        "linearity_gf": linearity,
+        "linearity_share": linearity / most,
+        "repeatability_gf": spread,
+        "repeatability_share": spread / most,
+        "full_scale_gf": most,
+        "noise_gf": float(np.sqrt((table["noise_10uv"] ** 2).mean()) * line.a1),
+        "drift_gf_min": drift * 60 * gf_per_volt,
+        "drift_interval_95": tuple(60 * gf_per_volt * v for v in drift_interval),
+        "creep_share_min": 60 * share,
+        "creep_interval_95": (60 * (share - half), 60 * (share + half)),
+    }
+
+
+def _mean_interval(values: np.ndarray) -> tuple[float, tuple[float, float]]:
+    """Mean and its 95 % interval by Student's t."""
+    values = np.asarray(values, float)
+    if len(values) < 2:
+        return float("nan"), (float("nan"), float("nan"))
+    half = student_quantile(len(values) - 1, 0.975) * values.std(ddof=1) / np.sqrt(len(values))
+    return float(values.mean()), (float(values.mean() - half), float(values.mean() + half))
+
+
+def idle_slopes(samples: pd.DataFrame, sessions: pd.DataFrame) -> dict[int, np.ndarray]:
+    """Slopes in time (V/s) of each cell in the recordings in which another cell was under load."""
+    out: dict[int, list[float]] = {i: [] for i in range(1, 7)}
+    parts = by_recording(samples)
+    for session in sessions.itertuples():
+        table = parts[session.id]
+        table = table[table["quality"] == 0]
+        time_s, volts = table["time_s"].to_numpy(), table[list(CELLS)].to_numpy()
+        centred = time_s - time_s.mean()
+        slopes = centred @ volts / (centred @ centred)
+        for i in out:
+            if i != int(session.cell):
+                out[i].append(float(slopes[i - 1]))
+    return {i: np.array(v) for i, v in out.items()}
+
+
+def line_of(entry: dict) -> LineFit:
+    """The line in an entry of `calibrate_cell`, without its residuals."""
+    return LineFit(
+        a0=entry["a0_gf"],
+        a1=entry["a1_gf_per_10uv"],
+        r=entry["r"],
+        residual_sd=entry["residual_sd_gf"],
+        residual_rms=float("nan"),
+        covariance=tuple(tuple(row) for row in entry["covariance"]),
+        degrees_of_freedom=entry["degrees_of_freedom"],
+        residuals=(),
+    )
+
+
+@dataclass(frozen=True)
+class Filter:
+    """Settings of the filters for one instrument."""
+
+    low_pass_hz: float
+    zero_phase_hz: float
+    spike_window: int
+    """Samples."""
+    spike_threshold: float
+    """Robust standard deviations."""
+    steady_window: int
+    """Samples."""
+    steady_tolerance: float
+    """Span of the low-passed signal, unit of the channel."""
+
+
+def _rest_range(session: pd.Series, table: pd.DataFrame) -> tuple[int, int]:
+    """First and last row of the rest reading: the recorder's tare, else what lies between settling and load.
+
+    Marks are values of the table's column `index`.
+    """
+    index = table["index"].to_numpy()
+    start, stop = session.get("mark_tare_start"), session.get("mark_tare_stop")
+    if pd.notna(start) and pd.notna(stop):
+        first, last = np.searchsorted(index, start), np.searchsorted(index, stop, side="right") - 1
+    else:
+        load = session.get("mark_load")
+        if pd.isna(load):
+            raise InputError(f"{session['id']}: has neither a tare nor a mark where the load was put on")
+        first, last = _SETTLING_SAMPLES, np.searchsorted(index, load) - 2
+    if last < first:
+        raise InputError(f"{session['id']}: no samples at rest before the load")
+    return int(first), int(last)
+
+
+def _prepare_recording(session: pd.Series, table: pd.DataFrame, channels: Sequence[str], settings: Filter):
+    """One recording made ready: columns `id time_s index quality steady`, and for each channel its tared values,
+    `<channel>_low_pass` and `<channel>_zero_phase`."""
+    rate_hz = float(session["rate_hz"])
+    raw = table[list(channels)].to_numpy()
+    jumped = filters.spikes(raw, settings.spike_window, settings.spike_threshold)
+    clean = filters.without_spikes(raw, jumped)
+    clean = clean - filters.tare(clean, *_rest_range(session, table))
+    low = filters.first_order(clean, settings.low_pass_hz, rate_hz)
+    out = table[["id", "time_s", "index"]].copy()
+    out["quality"] = table["quality"].to_numpy() | np.where(jumped.any(axis=1), SPIKE, 0).astype(np.uint8)
+    out["steady"] = filters.steady(low, settings.steady_window, settings.steady_tolerance)
+    smooth = filters.zero_phase(clean, settings.zero_phase_hz, rate_hz)
+    for kind, values in (("", clean), ("_low_pass", low), ("_zero_phase", smooth)):
+        out[[name + kind for name in channels]] = values
+    return out
+
+
+def prepare(samples: pd.DataFrame, sessions: pd.DataFrame, settings: Filter) -> pd.DataFrame:
+    """All recordings of one kind and instrument made ready; of a calibration only the cell under load, as `cell_v`."""
+    parts = by_recording(samples)
+    out = []
+    for _, session in sessions.iterrows():
+        table = parts[session["id"]]
+        if session["kind"] == "calibration":
+            name = f"cell_{int(session['cell'])}_v"
+            table = table.rename(columns={name: "cell_v"})
+            out.append(_prepare_recording(session, table, ["cell_v"], settings))
+        else:
+            channels = [name for name in (*CELLS, *FORCES) if name in table]
+            out.append(_prepare_recording(session, table, channels, settings))
+    return pd.concat(out, ignore_index=True)
+
+
+def bench_force(coefficients_gf: np.ndarray, geometry: Geometry) -> Callable[[pd.DataFrame], np.ndarray]:
+    """Force, N, shape (n, 3), of a prepared table: of six cells by eqs 2.3 to 2.9, else as the sensor gives it."""
+
+    def force(table: pd.DataFrame) -> np.ndarray:
+        if CELLS[0] in table and table[CELLS[0]].notna().any():
+            return forces(cell_forces(table[list(CELLS)].to_numpy(), coefficients_gf), geometry)
+        return table[list(FORCES)].to_numpy()
+
+    return force
+
+
+def _reference(session, table: pd.DataFrame, force_n: np.ndarray) -> np.ndarray:
+    """The known load at each sample, N, shape (n, 3).
+
+    Nobody wrote down the very moment at which the weight came on: it is where the reading first exceeds half of
+    its final value.
+    """
+    direction = np.array(DIRECTION[session.axis])
+    along = force_n @ direction
+    index = table["index"].to_numpy()
+    final = along[(index >= session.mark_read_start) & (index <= session.mark_read_stop)].mean()
+    after_tare = index > session.mark_tare_stop
+    on = after_tare & (np.abs(along) > 0.5 * abs(final))
+    loaded = np.arange(len(index)) >= (np.argmax(on) if on.any() else len(index))
+    return np.outer(loaded * session.load_gf * GF_N, direction)
+
+
+def bench_set(
+    name: str,
+    prepared: pd.DataFrame,
+    sessions: pd.DataFrame,
+    force_of: Callable[[pd.DataFrame], np.ndarray],
+    noise_n: float,
+) -> RecordingSet:
+    """Static tests of one platform as a contract set.
+
+    Parameters
+    ----------
+    prepared, sessions
+        Of that platform, from `rotorid.identify.bench.reconstruct` and `rotorid.io.logs`.
+    force_of
+        Force (n, 3), N, of a prepared recording, see `bench_force`.
+    noise_n
+        One-sigma noise of a sample as it is believed, N.
+    """
+    parts = by_recording(prepared)
+    started = pd.to_datetime(sessions["started"])
+    day_s = (started - started.min()).dt.total_seconds()
+    runs: dict[str, list[pd.DataFrame]] = {}
+    for session, offset_s in zip(sessions.itertuples(), day_s, strict=True):
+        whole = parts[session.id]
+        force = force_of(whole)
+        table = pd.DataFrame({c.TIME: whole["time_s"].to_numpy() + offset_s})
+        table[list(c.FORCE)] = force
+        table[list(c.REFERENCE_FORCE)] = _reference(session, whole, force)
+        kept = whole["index"].between(session.mark_tare_start, session.mark_read_stop).to_numpy()
+        runs.setdefault(f"{session.axis}-r{int(session.repeat):02d}", []).append(table[kept])
+    vehicle = Vehicle.model_validate({"name": name, "kind": "bench", "tared": True, "noise": {"force_n": noise_n}})
+    made = tuple(
+        Run(run, pd.concat(tables, ignore_index=True).sort_values(c.TIME, ignore_index=True))
+        for run, tables in sorted(runs.items())
+    )
+    return RecordingSet(name, vehicle, made)

@@ -4,60 +4,178 @@ Under such a load all legs do the same, turned by 120°, so one is enough: on th
 those of the other cut, turned. Pieces A, B and C end on rectangles of the cells and of the plate and follow them there
 (bonded contact). The order of the pieces: plate D, post C, upper cell, bracket B, lower cell, foot A. Plate D is round
 with a round seat in its middle, on which the tube stands; a third of it belongs to a leg.
+
+The load cell: a bar with two holes across, joined by a slot (binocular bending beam), and its bridge of four gauges.
+
+Own frame: x along the bar, from its middle to the end away from the vehicle, y the way of a positive force, z across.
+Alone it is solved as it is calibrated (thesis fig. 2.32): one end clamped, the weight on the other.
+
+What a solved bench says: deformation, equivalent stress, stress in the narrow sections, and what its cells read.
+
+The thesis's four sentences on its simulations (2.5.2) are held to a table of such answers, for benches of different
+sizes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 
 import numpy as np
+import pandas as pd
 from scipy import sparse
 from scipy.spatial import cKDTree
 
 from rotorid.errors import InputError
-from rotorid.identify.fem import cell, elasticity, placement
-from rotorid.identify.fem.cell import gauge_strains, holes
-from rotorid.identify.fem.elasticity import Bound, LooseParts
-from rotorid.identify.fem.placement import THIRD, PartFrame
-from rotorid.identify.fem.sizes import Assumed, Material, Sizes
-from rotorid.identify.fem.tets import Flat, Pad, Tets, block, column, count, joined, on, stacked
+from rotorid.identify.bench.reconstruct import Geometry, forces
+from rotorid.identify.fem import elasticity, placement
+from rotorid.identify.fem.elasticity import (
+    Bound,
+    Flat,
+    Hole,
+    LooseParts,
+    Pad,
+    Tets,
+    between,
+    block,
+    column,
+    count,
+    joined,
+    mirrored,
+    on,
+    stacked,
+)
+from rotorid.identify.fem.placement import LEGS, MATERIALS, THIRD, Assumed, Material, PartFrame, Sizes, materials
 
+_CORNER = np.pi / 4
+"""Angle about the hole's axis of the line from the hole to the corner of the block around it."""
+
+_WALL = 1.5
+"""Distance from the hole's axis to the end of that block, over half the bar's side."""
+_NAME = "cell"
 _UP = np.array([0.0, 0.0, -1.0])
-CELLS = ("upper cell", "lower cell")
-PIECES = ("A", "B", "C", "D")
+_CELLS = ("upper cell", "lower cell")
+_PIECES = ("A", "B", "C", "D")
 DOWN = -_UP
 _LEGS = len(placement.LEGS)
-_GROUPS = dict.fromkeys(CELLS, "cells") | dict.fromkeys(PIECES, "pieces")
+_GROUPS = dict.fromkeys(_CELLS, "cells") | dict.fromkeys(_PIECES, "pieces")
 """Material of each part."""
+_PARTS = (*_CELLS, *_PIECES)
+EVEN = 0.9
+"""A plate moves evenly where its least displacement is at least this share of its largest."""
+MIDDLE = 0.99
+"""Its largest displacement is in its middle where the middle has at least this share of it."""
+NEARLY = 0.1
+"""Two stresses are nearly the same where they differ by at most this share."""
 
 
-@dataclass(frozen=True)
-class _Bond:
-    """A piece's end that follows the surface of another part."""
+def _profile(sizes: Sizes, fineness: float) -> Flat:
+    """The bar from the side, with `fineness` times as many elements along each line as the coarsest has."""
+    half, reach = sizes.cell_side_m / 2, sizes.cell_between_holes_m / 2
+    beyond = reach + _WALL * half
+    radius, slot, end = sizes.hole_radius_m, sizes.cell_slot_m / 2, sizes.cell_length_m / 2
+    first = np.pi - np.arcsin(min(slot / radius, 1.0))
+    inner = reach + radius * np.cos(first)
+    if not (0 < slot < radius and inner > 0.05 * reach and beyond < end):
+        raise InputError("the load cell's holes do not fit into its bar with these sizes")
+    angles = np.r_[
+        np.linspace(first, np.pi / 2, count(4, fineness) + 1),
+        np.linspace(np.pi / 2, _CORNER, count(3, fineness) + 1)[1:],
+    ]
+    arc = np.c_[reach + radius * np.cos(angles), radius * np.sin(angles)]
+    # Straight above the hole's axis the lines between hole and surface stand upright: that is the narrow section.
+    above = np.interp(-angles, [-first, -np.pi / 2, -_CORNER], [inner, reach, beyond])
+    straight = np.linspace(0, inner, count(1, fineness) + 1)[:-1]
+    below = np.concatenate([np.c_[straight, np.full(len(straight), slot)], arc])
+    top = np.c_[np.r_[straight, above], np.full(len(straight) + len(above), half)]
+    layers = count(1, fineness)
+    angles = np.linspace(_CORNER, 0, count(2, fineness) + 1)
+    side_in = np.c_[reach + radius * np.cos(angles), radius * np.sin(angles)]
+    height = half * angles / _CORNER
+    side_out = np.c_[np.full(len(height), beyond), height]
+    columns = np.linspace(beyond, end, count(2, fineness) + 1)
+    rest = block(np.stack(np.meshgrid(columns, height, indexing="ij"), axis=-1))
+    quarter = joined([between(below, top, layers), between(side_in, side_out, layers), rest])
+    upper = joined([quarter, mirrored(quarter, 0)])
+    return joined([upper, mirrored(upper, 1)])
 
-    piece: str
-    on: str
-    pad: Pad
+
+def mesh(sizes: Sizes, fineness: float) -> Tets:
+    """The bar in its own frame."""
+    flat = _profile(sizes, fineness)
+    across = np.linspace(-0.5, 0.5, count(1, fineness) + 2) * sizes.cell_side_m
+    layers = np.stack([np.c_[flat.points_m, np.full(len(flat.points_m), z)] for z in across])
+    return stacked(layers, flat.triangles)
 
 
-@dataclass(frozen=True)
-class _Leg:
-    """The model's geometry, in frame {T} (z down, origin on top of plate D)."""
-
-    parts: Mapping[str, Tets]
-    frames: Mapping[str, PartFrame]
-    """Own frames of the cells and of plate D."""
-    bonds: tuple[_Bond, ...]
-    base: Pad
-    """Fixed to the table."""
-    seat_m: float
-    """Height of the surface that bears the load above the plate's top."""
+_GAUGE_SIGNS = np.array([1.0, -1.0, 1.0, -1.0])
+"""Sign of each gauge's strain under a positive force: it is also its sign in the bridge."""
 
 
-def _build(assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fineness: float) -> _Leg:
-    """Meshes of one leg.
+def _gauge_ends_m(sizes: Sizes) -> tuple[np.ndarray, np.ndarray]:
+    """Ends of the four gauges' grids [m] in the cell's own frame, shape (4, 3) each.
+
+    Each lies along the bar on the surface over a narrow section, at mid-width. A force in +y on the end towards the
+    vehicle (at -x) stretches the first and the third.
+    """
+    reach, half, grid = sizes.cell_between_holes_m / 2, sizes.cell_side_m / 2, sizes.gauge_length_m / 2
+    middles = np.array([[-reach, half, 0.0], [-reach, -half, 0.0], [reach, -half, 0.0], [reach, half, 0.0]])
+    along = np.array([grid, 0.0, 0.0])
+    return middles - along, middles + along
+
+
+def _holes(name: str, sizes: Sizes, frame: PartFrame) -> list[Hole]:
+    """The two holes of the cell `name` with this own frame."""
+    reach = sizes.cell_between_holes_m / 2
+    return [
+        Hole(name, frame.origin_m + side * frame.axes[0], frame.axes[2], sizes.hole_radius_m)
+        for side in (-reach, reach)
+    ]
+
+
+def _gauge_strains(body: LooseParts, name: str, sizes: Sizes, frame: PartFrame, moved_m: np.ndarray) -> np.ndarray:
+    """Strain of the four gauges of the cell `name`, shape (4,): change of length of each grid over its length.
+
+    Parameters
+    ----------
+    frame
+        The cell's own.
+    moved_m
+        Displacements of all nodes [m], shape (n, 3).
+    """
+    first, last = (
+        body.weights(frame.origin_m + ends @ frame.axes, name) @ moved_m @ frame.axes[0]
+        for ends in _gauge_ends_m(sizes)
+    )
+    return (last - first) / sizes.gauge_length_m
+
+
+def _bridge_strain(strains: np.ndarray) -> float:
+    """What a full bridge makes of its four gauges: the mean of their strains, each with its sign."""
+    return float(_GAUGE_SIGNS @ strains / len(_GAUGE_SIGNS))
+
+
+def strain_per_newton(sizes: Sizes, material: Material, fineness: float) -> float:
+    """Strain of the bridge per newton across the free end [1/N]."""
+    frame = PartFrame(np.zeros(3), np.eye(3))
+    body = LooseParts.of({_NAME: mesh(sizes, fineness)}, _holes(_NAME, sizes, frame))
+    half, reach = sizes.cell_side_m / 2, sizes.cell_between_pads_m / 2
+    pad = Pad(np.array([reach, -half, 0.0]), frame.axes[1], frame.axes[0], (sizes.cell_pad_m, sizes.cell_side_m))
+    end = np.array([-reach, half, 0.0])
+    nodes = body.nodes_m
+    binding = elasticity.constraints(len(nodes), [], np.tile(on(pad, nodes), (3, 1)))
+    across = np.zeros(len(nodes))
+    # The weight's resultant acts in the middle of the pad; how it spreads there does not reach the gauges.
+    weights = body.weights(end[None], _NAME)
+    across[weights.indices] = weights.data
+    forces = np.concatenate([np.zeros(len(nodes)), across, np.zeros(len(nodes))])
+    moved = elasticity.solve(body.stiffness({_NAME: material}), binding, forces[:, None])[:, 0]
+    return _bridge_strain(_gauge_strains(body, _NAME, sizes, frame, moved.reshape(3, -1).T))
+
+
+def build(assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fineness: float) -> Bench:
+    """One leg in frame {T} (z down, origin on top of plate D), with all that binds it.
 
     Parameters
     ----------
@@ -99,32 +217,31 @@ def _build(assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fin
     ground = held.centre_m + sizes.foot_out_m * outwards / np.linalg.norm(outwards)
     base = Pad(np.append(ground[:2], sizes.foot_depth_m), _UP, lower.axis, (sizes.foot_side_m, sizes.cell_side_m))
     counts = (count(1, fineness) + 1, count(1, fineness) + 1, count(3, fineness))
-    frames = {name: _frame(place, sizes) for name, place in zip(CELLS, (upper, lower), strict=True)}
+    frames = {}
+    for name, place in zip(_CELLS, (upper, lower), strict=True):
+        axes = np.stack([place.axis, place.sense, np.cross(place.axis, place.sense)])
+        frames[name] = PartFrame(place.force_m + sizes.cell_between_pads_m / 2 * place.axis, axes)
     frames["D"] = PartFrame(np.zeros(3), placement.turn(np.arctan2(under[1], under[0])).T)
     parts = {
-        **{name: cell.mesh(sizes, fineness).put(frames[name]) for name in CELLS},
+        **{name: mesh(sizes, fineness).put(frames[name]) for name in _CELLS},
         "A": column("A", base, held, counts),
         "B": column("B", leaves, arrives, counts),
         "C": column("C", hung, top, counts),
         "D": _mesh(sizes, assumed.pressed_area_m2, fineness).put(frames["D"]),
     }
     bonds = (
-        _Bond("A", "lower cell", held),
-        _Bond("B", "upper cell", leaves),
-        _Bond("B", "lower cell", arrives),
-        _Bond("C", "upper cell", hung),
-        _Bond("C", "D", top),
+        ("A", "lower cell", held),
+        ("B", "upper cell", leaves),
+        ("B", "lower cell", arrives),
+        ("C", "upper cell", hung),
+        ("C", "D", top),
     )
-    return _Leg(parts, frames, bonds, base, sizes.boss_height_m)
+    walls = [hole for name in _CELLS for hole in _holes(name, sizes, frames[name])]
+    return Bench(frames, bonds, base, sizes, LooseParts.of(parts, walls, _GROUPS))
 
 
 def _other_end(place: placement.Place, sizes: Sizes) -> np.ndarray:
     return place.force_m + sizes.cell_between_pads_m * place.axis
-
-
-def _frame(place: placement.Place, sizes: Sizes) -> PartFrame:
-    middle = place.force_m + sizes.cell_between_pads_m / 2 * place.axis
-    return PartFrame(middle, np.stack([place.axis, place.sense, np.cross(place.axis, place.sense)]))
 
 
 def _seat_radius_m(area_m2: float, fineness: float) -> float:
@@ -186,29 +303,27 @@ class Solved:
 class Bench:
     """A leg's mesh with all that binds it, for one set of sizes."""
 
-    leg: _Leg
+    frames: Mapping[str, PartFrame]
+    """Own frames of the cells and of plate D."""
+    bonds: tuple[tuple[str, str, Pad], ...]
+    """A piece, the part whose surface its end follows, and that end."""
+    base: Pad
+    """Fixed to the table."""
     sizes: Sizes
     body: LooseParts
-
-    @classmethod
-    def of(cls, assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fineness: float) -> Bench:
-        """The bench of these sizes; InputError where they do not go together."""
-        leg = _build(assumed, sizes, distances_m, fineness)
-        walls = [hole for name in CELLS for hole in holes(name, sizes, leg.frames[name])]
-        return cls(leg, sizes, LooseParts.of(leg.parts, walls, _GROUPS))
 
     @cached_property
     def binding(self) -> sparse.csr_matrix:
         """Bonds, the cut through the plate and the table, as the matrix of `elasticity.constraints`."""
         nodes = self.body.nodes_m
         bonds = []
-        for bond in self.leg.bonds:
-            own = self.body.nodes_of(bond.piece)
-            own = own[on(bond.pad, nodes[own])]
-            bonds.append(Bound(own, self.body.weights(nodes[own], bond.on), np.eye(3)))
+        for piece, part, pad in self.bonds:
+            own = self.body.nodes_of(piece)
+            own = own[on(pad, nodes[own])]
+            bonds.append(Bound(own, self.body.weights(nodes[own], part), np.eye(3)))
         fixed = np.zeros((3, len(nodes)), bool)
         foot = self.body.nodes_of("A")
-        fixed[:, foot[on(self.leg.base, nodes[foot])]] = True
+        fixed[:, foot[on(self.base, nodes[foot])]] = True
         axis, cut = self._cut()
         fixed[:2, axis] = True
         return elasticity.constraints(len(nodes), [bonds, [cut]], fixed)
@@ -217,7 +332,7 @@ class Bench:
         """Nodes on the axis, and those on one face of the cut, which follow those on the other, turned."""
         nodes = self.body.nodes_m
         plate = self.body.nodes_of("D")
-        frame = self.leg.frames["D"]
+        frame = self.frames["D"]
         own = (nodes[plate] - frame.origin_m) @ frame.axes.T
         radius, angle = np.hypot(own[:, 0], own[:, 1]), np.arctan2(own[:, 1], own[:, 0])
         axis = plate[radius < 1e-9]
@@ -235,7 +350,7 @@ class Bench:
     @cached_property
     def seat(self) -> np.ndarray:
         """Facets that bear the load."""
-        height = -self.leg.seat_m
+        height = -self.sizes.boss_height_m
         return self.body.mesh.facets_satisfying(lambda x: np.abs(x[2] - height) < 1e-9, boundaries_only=True)
 
     @cached_property
@@ -251,12 +366,137 @@ class Bench:
 
     def gauge_strains(self, solved: Solved, name: str) -> np.ndarray:
         """Strain [1/N] of the four gauges of a cell, shape (4,)."""
-        return gauge_strains(self.body, name, self.sizes, self.leg.frames[name], solved.displacement_m)
+        return _gauge_strains(self.body, name, self.sizes, self.frames[name], solved.displacement_m)
 
     def narrow(self, name: str) -> np.ndarray:
         """Nodes of a cell's narrow sections: within the middle third of the walls above and below the holes."""
-        frame = self.leg.frames[name]
+        frame = self.frames[name]
         nodes = self.body.nodes_of(name)
         own = np.abs((self.body.nodes_m[nodes] - frame.origin_m) @ frame.axes.T)
         off_hole = np.abs(own[:, 0] - self.sizes.cell_between_holes_m / 2)
         return nodes[(off_hole < self.sizes.hole_radius_m / 2) & (own[:, 1] > self.sizes.hole_radius_m / 2)]
+
+
+@dataclass(frozen=True)
+class Answers:
+    """Per newton of load, downwards in the middle of plate D."""
+
+    deformation_m: float
+    """Largest displacement [m/N]."""
+    deformed_most: str
+    """The part where it is."""
+    stress_pa: float
+    """Largest equivalent stress [Pa/N]."""
+    stressed_most: str
+    """The part where it is."""
+    narrow_upper_pa: float
+    """Largest equivalent stress in the narrow sections of an upper cell [Pa/N], and of a lower one."""
+    narrow_lower_pa: float
+    plate_evenness: float
+    """Least displacement of plate D over its largest [1]."""
+    plate_middle: float
+    """Displacement in the plate's middle over the plate's largest [1]."""
+    force_upper_n: float
+    """What an upper cell reads by its calibration [N/N], and a lower one; positive as in eqs 2.3 to 2.8."""
+    force_lower_n: float
+    equation_n: float
+    """Vertical force by eq. 2.8 from all six readings [N/N]; the load itself is +1."""
+
+
+def ask(bench: Bench, solved: Solved, cell_strain: float, geometry: Geometry) -> Answers:
+    """The answers of a solved bench.
+
+    Parameters
+    ----------
+    cell_strain
+        Strain of a single cell's bridge per newton [1/N], its calibration.
+    geometry
+        Table 2.3.
+    """
+    body = bench.body
+    moved = np.linalg.norm(solved.displacement_m, axis=1)
+    part = np.array(body.names)[body.part_of_node]
+    plate = body.nodes_of("D")
+    middle = plate[np.hypot(*body.nodes_m[plate, :2].T) < 1e-9]
+    narrow = [float(solved.von_mises_pa[bench.narrow(name)].max()) for name in _CELLS]
+    read = [_bridge_strain(bench.gauge_strains(solved, name)) / cell_strain for name in _CELLS]
+    six = np.empty(6)
+    for numbers in LEGS:
+        six[np.array(numbers) - 1] = read
+    return Answers(
+        deformation_m=float(moved.max()),
+        deformed_most=str(part[moved.argmax()]),
+        stress_pa=float(solved.von_mises_pa.max()),
+        stressed_most=str(part[solved.von_mises_pa.argmax()]),
+        narrow_upper_pa=narrow[0],
+        narrow_lower_pa=narrow[1],
+        plate_evenness=float(moved[plate].min() / moved[plate].max()),
+        plate_middle=float(moved[middle].max() / moved[plate].max()),
+        force_upper_n=read[0],
+        force_lower_n=read[1],
+        equation_n=float(forces(six, geometry)[2]),
+    )
+
+
+def by_part(bench: Bench, solved: Solved) -> dict[str, dict[str, float]]:
+    """Largest displacement [m/N] and equivalent stress [Pa/N] of each part."""
+    moved = np.linalg.norm(solved.displacement_m, axis=1)
+    return {
+        name: {"deformation_m": float(moved[own].max()), "stress_pa": float(solved.von_mises_pa[own].max())}
+        for name in _PARTS
+        for own in [bench.body.nodes_of(name)]
+    }
+
+
+def compare(
+    assumed: Assumed, sizes: Sizes, moduli_pa: Mapping[str, float], geometry: Geometry, fineness: float
+) -> dict[str, Answers]:
+    """Answers of a bench with pieces of each material, on a mesh of this fineness."""
+    bench = build(assumed, sizes, geometry.distance_m, fineness)
+    of = {name: materials(sizes, moduli_pa, name) for name in MATERIALS}
+    cell_strain = strain_per_newton(sizes, of["PLA"]["cells"], fineness)
+    return {name: ask(bench, bench.solve(of[name]), cell_strain, geometry) for name in MATERIALS}
+
+
+def ratios(found: Mapping[str, Answers]) -> dict[str, float]:
+    """PLA over aluminium: of the largest deformation, the largest stress, and the stress in the narrow sections [1]."""
+    metal, plastic = (asdict(found[name]) for name in MATERIALS)
+    return {
+        name.removesuffix("_m").removesuffix("_pa"): plastic[name] / metal[name]
+        for name in ("deformation_m", "stress_pa", "narrow_upper_pa", "narrow_lower_pa")
+    }
+
+
+def judge_statements(table: pd.DataFrame) -> list[dict]:
+    """Each sentence: whether it holds with all sizes as assumed, on how many benches it `holds`, and what follows.
+
+    Parameters
+    ----------
+    table
+        A bench a row, the first with all sizes as assumed; columns `ratio_deformation`, `ratio_narrow_upper`,
+        `ratio_narrow_lower`; `plate_evenness`, `plate_middle` and `stressed_most` with `_aluminium` and with `_pla`.
+    """
+    even = table["plate_evenness_aluminium"] >= EVEN
+    middle = (table["plate_middle_pla"] >= MIDDLE) & (table["plate_evenness_pla"] < table["plate_evenness_aluminium"])
+    held = {
+        "PLA deforms more than aluminium": table["ratio_deformation"] > 1,
+        "aluminium's piece D deforms evenly": even,
+        "PLA's piece D deforms most in its middle, and less evenly": middle,
+        "the largest stresses lie in different pieces": table["stressed_most_aluminium"] != table["stressed_most_pla"],
+        "the stress in an upper cell's narrow section is nearly the same": _nearly(table["ratio_narrow_upper"]),
+        "the stress in a lower cell's narrow section is nearly the same": _nearly(table["ratio_narrow_lower"]),
+    }
+    return [
+        {
+            "statement": name,
+            "on_assumed": bool(holds.iloc[0]),
+            "holds": int(holds.sum()),
+            "benches": len(holds),
+            "word": "follows" if holds.all() else "depends on the assumed sizes" if holds.any() else "does not follow",
+        }
+        for name, holds in held.items()
+    ]
+
+
+def _nearly(ratio: pd.Series) -> pd.Series:
+    return (ratio - 1).abs() <= NEARLY

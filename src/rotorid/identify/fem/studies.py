@@ -11,7 +11,7 @@ Problems with a known answer, solved by the same code as the bench: a cantilever
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pandas as pd
@@ -19,13 +19,10 @@ from scipy.optimize import brentq
 
 from rotorid.errors import InputError
 from rotorid.identify.bench.reconstruct import GF_N, Geometry
-from rotorid.identify.fem import answers, elasticity
-from rotorid.identify.fem.answers import Answers, by_part, compare, ratios
-from rotorid.identify.fem.bench import Bench, Solved
-from rotorid.identify.fem.cell import strain_per_newton
-from rotorid.identify.fem.elasticity import Hole, LooseParts
-from rotorid.identify.fem.sizes import MATERIALS, Assumed, Material, Sizes, in_file, materials
-from rotorid.identify.fem.tets import block, count, stacked
+from rotorid.identify.fem import elasticity
+from rotorid.identify.fem.bench import Answers, Bench, Solved, ask, build, by_part, compare, ratios, strain_per_newton
+from rotorid.identify.fem.elasticity import Hole, LooseParts, block, count, stacked
+from rotorid.identify.fem.placement import MATERIALS, Assumed, Material, Sizes, in_file, materials
 from rotorid.io.wire import VOLTS_PER_COUNT
 
 _BEAM = Material(68.9e9, 0.0)
@@ -48,48 +45,28 @@ _LARGEST_LIGAMENT = 0.8
 """Share of half the bar's side up to which a ligament is looked for that gives the printed sensitivity."""
 
 
-@dataclass(frozen=True)
-class _Levels:
-    """How fine the meshes are, as multiples of the coarsest."""
-
-    study: tuple[float, ...]
-    """Of the bench as assumed; the last one's answers are the results."""
-    sizes: float
-    """Of benches of other sizes."""
-    chain: float
-    """Of a single cell."""
-
-
 LEVELS = {
-    "coarse": _Levels(study=(1.0, 1.5, 2.0), sizes=1.0, chain=2.0),
-    "full": _Levels(study=(1.0, 1.5, 2.0, 3.0), sizes=1.5, chain=3.0),
+    "coarse": {"study": (1.0, 1.5, 2.0), "sizes": 1.0, "chain": 2.0},
+    "full": {"study": (1.0, 1.5, 2.0, 3.0), "sizes": 1.5, "chain": 3.0},
 }
-"""By the setting `fem`."""
-
-
-@dataclass(frozen=True)
-class _Finest:
-    """The bench on the finest mesh of the study, with pieces of each material."""
-
-    bench: Bench
-    solved: Mapping[str, Solved]
-    answers: Mapping[str, Answers]
+"""How fine the meshes are, as multiples of the coarsest, by the setting `fem`: of the bench as assumed (the last one's
+answers are the results), of benches of other `sizes`, and of a single cell (`chain`)."""
 
 
 def mesh_study(
     assumed: Assumed, moduli_pa: Mapping[str, float], geometry: Geometry, finenesses: Sequence[float]
-) -> tuple[pd.DataFrame, _Finest]:
-    """A mesh a row with what it says per newton, and all of the last one."""
+) -> tuple[pd.DataFrame, Bench, dict[str, Solved], dict[str, Answers]]:
+    """A mesh a row with what it says per newton, and the last one's bench, how it is solved and what it says."""
     rows = []
     for fineness in finenesses:
         of = {name: materials(assumed.sizes, moduli_pa, name) for name in MATERIALS}
-        bench = Bench.of(assumed, assumed.sizes, geometry.distance_m, fineness)
+        bench = build(assumed, assumed.sizes, geometry.distance_m, fineness)
         cell_strain = strain_per_newton(assumed.sizes, of["PLA"]["cells"], fineness)
         solved = {name: bench.solve(of[name]) for name in MATERIALS}
-        found = {name: answers.ask(bench, solved[name], cell_strain, geometry) for name in MATERIALS}
+        found = {name: ask(bench, solved[name], cell_strain, geometry) for name in MATERIALS}
         row = {"fineness": fineness, "elements": bench.body.mesh.nelements, "nodes": bench.body.basis.N}
         rows.append(row | {"cell_strain_per_n": cell_strain} | _row(found))
-    return pd.DataFrame(rows), _Finest(bench, solved, found)
+    return pd.DataFrame(rows), bench, solved, found
 
 
 def _row(found: Mapping[str, Answers]) -> dict[str, float | str]:
@@ -109,17 +86,17 @@ def loads(found: Mapping[str, Answers], loads_gf: Sequence[float], area_m2: floa
     return pd.DataFrame(table)
 
 
-def parts(finest: _Finest) -> dict[str, dict[str, dict[str, float]]]:
+def parts(bench: Bench, solved: Mapping[str, Solved]) -> dict[str, dict[str, dict[str, float]]]:
     """Largest displacement [m/N] and equivalent stress [Pa/N] by material and part."""
-    return {SHORT[name]: by_part(finest.bench, finest.solved[name]) for name in MATERIALS}
+    return {SHORT[name]: by_part(bench, solved[name]) for name in MATERIALS}
 
 
-def surface(finest: _Finest) -> pd.DataFrame:
+def surface(bench: Bench, solved: Mapping[str, Solved]) -> pd.DataFrame:
     """Triangles of the leg's surface: places of their corners [m], and per newton their mean displacement and stress.
 
     Columns: `part`, `x_1_m` to `z_3_m`, and `deformation_m` and `stress_pa` with the ending of each material.
     """
-    body = finest.bench.body
+    body = bench.body
     facets = body.mesh.boundary_facets()
     corners = body.mesh.facets[:, facets]
     table: dict[str, np.ndarray] = {"part": np.array(body.names)[body.part[body.mesh.f2t[0, facets]]]}
@@ -128,16 +105,16 @@ def surface(finest: _Finest) -> pd.DataFrame:
             table[f"{name}_{number + 1}_m"] = body.mesh.p[axis, corners[number]]
     nodes = body.basis.nodal_dofs[0][corners]
     for name, end in SHORT.items():
-        solved = finest.solved[name]
-        table[f"deformation_m_{end}"] = np.linalg.norm(solved.displacement_m[nodes], axis=-1).mean(axis=0)
-        table[f"stress_pa_{end}"] = solved.von_mises_pa[nodes].mean(axis=0)
+        moved = solved[name].displacement_m[nodes]
+        table[f"deformation_m_{end}"] = np.linalg.norm(moved, axis=-1).mean(axis=0)
+        table[f"stress_pa_{end}"] = solved[name].von_mises_pa[nodes].mean(axis=0)
     return pd.DataFrame(table)
 
 
 def verification() -> pd.DataFrame:
     """Closed forms and what the solver says, a quantity and mesh a row."""
     rows = [row for case in (cantilever, plate_with_hole) for fineness in FINENESSES for row in case(fineness)]
-    return pd.DataFrame([asdict(row) | {"error": row.error} for row in rows])
+    return pd.DataFrame(rows)
 
 
 def size_study(
@@ -302,25 +279,12 @@ def from_printed_slope(slope_gf: float) -> float:
     return _PRINTED_STEP_V / (slope_gf * GF_N)
 
 
-@dataclass(frozen=True)
-class _Checked:
-    """A computed number and the closed form's."""
-
-    case: str
-    quantity: str
-    """With its unit."""
-    fineness: float
-    nodes: int
-    computed: float
-    closed_form: float
-
-    @property
-    def error(self) -> float:
-        """Difference as a share of the closed form."""
-        return self.computed / self.closed_form - 1
+def _checked(case: str, quantity: str, fineness: float, nodes: int, computed: float, closed_form: float) -> dict:
+    """A number (`quantity` with its unit) as computed and by the closed form; `error` is a share of the latter."""
+    return dict(vars()) | {"error": computed / closed_form - 1}
 
 
-def cantilever(fineness: float, length_m: float = 0.08, side_m: float = 0.01, force_n: float = 1.0) -> list[_Checked]:
+def cantilever(fineness: float, length_m: float = 0.08, side_m: float = 0.01, force_n: float = 1.0) -> list[dict]:
     """A clamped square bar with a force across its free end: deflection there and stress halfway.
 
     Deflection of a beam with shear, F l³ / (3 E I) + 6 F l / (5 G A); stress F (l/2) (h/2) / I.
@@ -343,8 +307,8 @@ def cantilever(fineness: float, length_m: float = 0.08, side_m: float = 0.01, fo
     shear = 1.2 * force_n * length_m / (_BEAM.lame_pa[1] * side_m**2)
     deflection = force_n * length_m**3 / (3 * _BEAM.modulus_pa * inertia) + shear
     return [
-        _Checked("cantilever", "deflection (m)", fineness, len(nodes), float(moved.reshape(3, -1)[2, tip]), deflection),
-        _Checked(
+        _checked("cantilever", "deflection (m)", fineness, len(nodes), float(moved.reshape(3, -1)[2, tip]), deflection),
+        _checked(
             "cantilever",
             "stress (Pa)",
             fineness,
@@ -355,7 +319,7 @@ def cantilever(fineness: float, length_m: float = 0.08, side_m: float = 0.01, fo
     ]
 
 
-def plate_with_hole(fineness: float, radius_m: float = 0.005, pull_pa: float = 1e6) -> list[_Checked]:
+def plate_with_hole(fineness: float, radius_m: float = 0.005, pull_pa: float = 1e6) -> list[dict]:
     """A quarter of a plate under tension along x, with Kirsch's displacements on a circle of four radii.
 
     Plane strain, so that the contraction counts; stress at the hole across the tension is 3 times the tension, along it
@@ -382,7 +346,7 @@ def plate_with_hole(fineness: float, radius_m: float = 0.005, pull_pa: float = 1
     above = np.flatnonzero(np.hypot(nodes[:, 0], nodes[:, 1] - radius_m) < 1e-9)
     edge = np.flatnonzero(np.hypot(nodes[:, 0] - radius_m, nodes[:, 1]) < 1e-9)
     return [
-        _Checked("plate with a hole", name, fineness, len(nodes), float(component[at].mean()), factor * pull_pa)
+        _checked("plate with a hole", name, fineness, len(nodes), float(component[at].mean()), factor * pull_pa)
         for name, component, at, factor in (
             ("stress across (Pa)", stress[0, 0], above, 3.0),
             ("stress along (Pa)", stress[1, 1], edge, -1.0),

@@ -76,7 +76,7 @@ def page_data(analysis: Analysis, verdict: Verdict, main: str) -> dict:
     every = max(1, int(np.ceil(total / _BUDGET)))
     runs = list(dict.fromkeys(run for run, _ in by_pair))
     largest = _largest_run(analysis, verdict, main)
-    flown = replay(analysis, verdict, largest, segments)
+    flown = _replay(analysis, verdict, largest, segments)
     return {
         "main": {"channel": main, "run": largest, "shown_s": _first_shown(by_pair.get((largest, main), []))},
         "every": every,
@@ -238,7 +238,9 @@ def _correlation(series: Sequence[np.ndarray], lags: np.ndarray) -> list[float]:
     return [sum(float(p[: len(p) - k] @ p[k:]) for p in parts if len(p) > k) / max(power, 1e-300) for k in lags]
 
 
-def replay(analysis: Analysis, verdict: Verdict, run: str, segments: Sequence[Segment]) -> dict[str, np.ndarray] | None:
+def _replay(
+    analysis: Analysis, verdict: Verdict, run: str, segments: Sequence[Segment]
+) -> dict[str, np.ndarray] | None:
     """Frames of up to LONGEST_S of a run, about where most was located; None where attitudes cannot be simulated.
 
     Returns

@@ -11,6 +11,7 @@ import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 from jinja2 import Environment
@@ -38,7 +39,6 @@ from rotorid.mismatch.tell.steps import steps_of, together, would_explain
 from rotorid.mismatch.tell.tiles import errors_of, tiles
 from rotorid.mismatch.tell.verdict import (
     Absent,
-    BelievedValue,
     Channel,
     EffectVerdict,
     Location,
@@ -84,7 +84,21 @@ def make_page(
     """The page's HTML. `ledger` holds the rules that decided something, each with a `sentence`."""
     main = main_channel(analysis, verdict.locations, verdict.channels)
     environment = Environment(autoescape=True, trim_blocks=False)
-    environment.globals.update(figure=_figure_html, ranges=_ranges_html)
+    environment.filters |= {
+        "base64": lambda text: base64.b64encode(text.encode()).decode(),
+        "exp": math.exp,
+        "place": _place,
+    }
+    environment.filters |= {
+        "pretty": pretty,
+        "subscripts": _subscripts,
+        "listed": listed,
+        "unit": _unit_text,
+        "number": number,
+    }
+    environment.filters |= {"cell": _cell, "plus_minus": plus_minus, "channel": channel_words, "value": parameter_words}
+    environment.filters |= {"effect": lambda id_: capital(effect_words(id_)), "regime": regime_words}
+    environment.globals["symbol_of"] = symbol_of
     shown, more = _shown_locations(verdict.locations)
     known = {row.id for row in (*verdict.effects, *verdict.not_testable, *verdict.absent)}
     known |= {i for e in verdict.effects for i in e.alternatives}
@@ -118,16 +132,20 @@ def make_page(
         details=[pretty(text) for text in verdict.details],
         where_text=_where_text(verdict),
         strip=strip(analysis, verdict),
-        locations=[_location_row(loc) for loc in shown],
+        locations=shown,
         more_locations=more,
         what_text=_what_text(verdict),
         effects=[_effect_block(e, _finding_of(e, analysis)) for e in claimed],
         suggested=[_effect_block(e, _finding_of(e, analysis)) for e in verdict.effects if e.status == "suggested"],
         values=[_value_range(name, *v) for name, v in analysis.values.items()],
-        all_values=[_value_row(name, row) for name, row in verdict.believed_values.items()],
+        all_values=verdict.believed_values,
         correlated=_correlated_text(verdict),
-        derivatives=_derivative_rows(verdict),
-        scores=_score_rows(verdict),
+        # Those first whose interval leaves out nothing.
+        derivatives=sorted(verdict.derivatives, key=lambda d: not (d.interval_95[0] > 0 or d.interval_95[1] < 0)),
+        quantities=_QUANTITY_WORDS,
+        causes=lambda d: [effect_words(i) for i in would_explain(d.channel, d.quantity, verdict)],
+        delivered=verdict.delivered,
+        models=_MODELS,
         better_text=_better_text(verdict),
         forward_text=_forward_text(verdict),
         table=_error_table(verdict.channels, data["fit_percent"]),
@@ -135,7 +153,7 @@ def make_page(
         ruled_out=[_ruled_out(e) for e in verdict.effects if e.status in ("absorbed", "not_established")],
         silent=listed(silent),
         limits=[_limit_row(a) for a in verdict.absent],
-        not_testable=[{"name": capital(effect_words(n.id)), "reason": n.reason} for n in verdict.not_testable],
+        not_testable=verdict.not_testable,
         next=next_text(verdict, analysis.recordings),
         ledger=[_ledger_row(row) for row in ledger],
         notes=_notes(analysis, forward_notes),
@@ -154,6 +172,18 @@ def policy_for(*scripts: str) -> str:
         f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; "
         "form-action 'none'"
     )
+
+
+def filled(template: str, /, **values: object) -> str:
+    """A page without scripts: a template of the page's files with its values."""
+    environment = Environment(autoescape=True, trim_blocks=True)
+    return environment.from_string(page_file(template)).render(policy=policy_for(), **values)
+
+
+def drawing(figure: Path) -> Markup:
+    """An SVG file as it stands within a page."""
+    text = figure.read_text(encoding="utf-8")
+    return Markup(text[text.index("<svg") :])
 
 
 def _embedded(data: Mapping) -> Markup:
@@ -228,47 +258,9 @@ def _unit_text(text: str) -> str:
     return re.sub(r"\b(rad|kg|m|s|A|V|K)(-?\d)\b", lambda m: m[1] + m[2].translate(_SUPERSCRIPTS), text)
 
 
-def _figure_html(shown: tuple[str, str, str] | None) -> Markup:
-    """A figure from (svg, alternative text, caption); nothing for None."""
-    if shown is None:
-        return Markup("")
-    picture, alternative, caption = shown
-    data = base64.b64encode(picture.encode()).decode()
-    return Markup(
-        '<figure><img alt="{}" src="data:image/svg+xml;base64,{}"><figcaption>{}</figcaption></figure>'
-    ).format(alternative, Markup(data), caption)
-
-
-def _ranges_html(rows: Sequence[Mapping]) -> Markup:
-    """Table of parameters, each with its interval drawn on the range that is physically plausible."""
-    if not rows:
-        return Markup("")
-    out = [Markup('<table class="ranges">')]
-    for row in rows:
-        marks = Markup("")
-        if row["scale"] is not None:
-            low, high = row["scale"]
-
-            def at(x, low=low, high=high):
-                return f"{100 * min(max((x - low) / (high - low), 0.0), 1.0):.2f}%"
-
-            first, last = row["interval"]
-            wide = f"{100 * (min(max(last, low), high) - min(max(first, low), high)) / (high - low):.2f}%"
-            belief = (
-                Markup('<i class="belief" style="left:{}" title="believed"></i>').format(at(row["believed"]))
-                if row["believed"] is not None
-                else ""
-            )
-            marks = Markup(
-                '<div class="range"><i class="track"></i><i class="band" style="left:{};width:{}"></i>{}'
-                '<i class="dot" style="left:{}"></i></div><div class="ends"><span>{}</span><span>{}</span></div>'
-            ).format(at(first), wide, belief, at(row["value"]), pretty(number(low)), pretty(number(high)))
-        out.append(
-            Markup('<tr><td><em>{}</em></td><td class="text">{}</td><td class="text">{}</td><td>{}</td></tr>').format(
-                _subscripts(row["symbol"]), pretty(row["meaning"]), pretty(row["text"]), marks
-            )
-        )
-    return Markup("").join([*out, Markup("</table>")])
+def _place(x: float, low: float, high: float) -> str:
+    """Where a value lies on a range, in percent of its length."""
+    return f"{100 * min(max((x - low) / (high - low), 0.0), 1.0):.2f}"
 
 
 def _runs_text(verdict: Verdict) -> str:
@@ -346,28 +338,6 @@ def _shown_locations(locations: Sequence[Location]) -> tuple[list[Location], str
     kept = sorted(locations, key=lambda loc: -loc.energy_share)[:_MOST_LOCATIONS]
     rest = len(locations) - _MOST_LOCATIONS
     return [loc for loc in locations if loc in kept], f"{rest} more are in verdict.json."
-
-
-def _location_row(loc: Location) -> dict:
-    regime = ""
-    if loc.regime is not None:
-        name, unit = regime_words(loc.regime.variable)
-        regime = pretty(f"{name} {number(loc.regime.low)}–{number(loc.regime.high)} {unit}".strip())
-    return {
-        "channel": channel_words(loc.channel),
-        "run": loc.run,
-        "start": f"{loc.start_s:.1f}",
-        "stop": f"{loc.stop_s:.1f}",
-        "share": f"{100 * loc.energy_share:.0f} %",
-        "regime": regime,
-        "p": _chance(loc.p_value),
-    }
-
-
-def _chance(p_value: float | None) -> str:
-    if p_value is None:
-        return "–"
-    return "< 0.001" if p_value < 1e-3 else f"{p_value:.3f}"
 
 
 def _what_text(verdict: Verdict) -> list[str]:
@@ -486,24 +456,6 @@ def _value_range(name: str, believed: float, refitted: float, low: float, high: 
     return row | {"meaning": pretty(f"believed {number(believed, 4)} {unit}".strip())}
 
 
-def _value_row(name: str, row: BelievedValue) -> dict:
-    """A line of the table of all believed values: before, estimate with interval, delivered."""
-    words, unit = parameter_words(name)
-    low, high = row.interval_95
-    change = ""
-    if row.believed and row.delivered is not None and row.delivered != row.believed:
-        change = f"{100 * (row.delivered / row.believed - 1):+.2g} %"
-    return {
-        "name": words,
-        "unit": _unit_text(unit),
-        "believed": _cell(row.believed),
-        "estimate": pretty(plus_minus(row.estimate, low, high)) if row.estimate is not None else "–",
-        "delivered": _cell(row.delivered),
-        "change": pretty(change),
-        "note": pretty("wrong" if row.wrong else ""),
-    }
-
-
 def _correlated_text(verdict: Verdict) -> list[str]:
     """Sentences on the values of which little more than a ratio is known."""
     pairs: list[tuple[str, str, float]] = []
@@ -543,7 +495,7 @@ def _error_table(channels: Mapping[str, Channel], fits: Mapping[str, tuple[float
                 "name": channel_words(c).removesuffix(" after half a second"),
                 "unit": _unit_text(channels[c].unit),
                 "noise": _cell(channels[c].noise_floor),
-                "bars": bars(channels[c]),
+                "bars": _bars(channels[c]),
                 "fit": pretty(" → ".join(f"{v:.0f}" for v in fits[c])) if c in fits else "–",
                 "held_out": [_cell(getattr(channels[c].rmse.held_out, s)) for s in _STAGES],
                 "training": [_cell(getattr(channels[c].rmse.training, s)) for s in _STAGES],
@@ -585,34 +537,6 @@ _STEP_KINDS = ("values", "named", "derivatives", "left", "noise")
 _STEP_WORDS = ("values take off", "named physics", "predictable, without a name", "left above the noise", "noise")
 
 
-def _derivative_rows(verdict: Verdict) -> list[dict]:
-    """The table of derivatives, those first whose interval leaves out nothing."""
-    rows = []
-    for d in verdict.derivatives:
-        low, high = d.interval_95
-        clear = low > 0 or high < 0
-        names = [effect_words(i) for i in would_explain(d.channel, d.quantity, verdict)] if clear else []
-        rows.append(
-            {
-                "symbol": _subscripts(symbol_of(d.channel, d.quantity)),
-                "words": _derivative_words(d.channel, d.quantity),
-                "value": pretty(f"{number(d.value, 3)} ({number(low, 3)} to {number(high, 3)})"),
-                "unit": _unit_text(d.unit),
-                "range": "" if d.quantity == "constant" else pretty(f"{number(d.low, 2)} to {number(d.high, 2)}"),
-                "clear": clear,
-                "names": listed(names, "or") if names else "",
-            }
-        )
-    return sorted(rows, key=lambda row: not row["clear"])
-
-
-def _derivative_words(channel: str, quantity: str) -> str:
-    """A derivative in words: `sideways force by sideways velocity`."""
-    if quantity == "constant":
-        return f"{channel_words(channel)}, constant"
-    return f"{channel_words(channel)} by {_QUANTITY_WORDS[quantity]}"
-
-
 _QUANTITY_WORDS = {
     **{"u": "forward velocity", "v": "sideways velocity", "w": "downward velocity"},
     **{"p": "roll rate", "q": "pitch rate", "r": "yaw rate", "thrust": "thrust", "thrust_roll": "rolling thrust"},
@@ -620,26 +544,11 @@ _QUANTITY_WORDS = {
 }
 
 
-def _score_rows(verdict: Verdict) -> list[dict]:
-    """Every candidate with its error over the believed vehicle's where nothing was fitted; the delivered one marked."""
-    taken = verdict.delivered.model, verdict.delivered.derivatives
-    return [
-        {
-            "name": _MODELS[s.model] + (", with derivatives" if s.derivatives else ""),
-            "error": f"{100 * math.exp(s.score):.0f} %",
-            "doubt": f"± {100 * math.exp(s.score) * (s.standard_error or 0.0):.0f} %",
-            "taken": (s.model, s.derivatives) == taken,
-            "unfit": s.unfit,
-        }
-        for s in verdict.delivered.scores
-    ]
-
-
 _FARTHEST = 100.0
 """Error over noise at which the bar of the table of errors ends."""
 
 
-def bars(channel: Channel) -> Markup:
+def _bars(channel: Channel) -> Markup:
     """Errors as believed (open) and improved (full) next to the noise (line), on a logarithmic scale."""
     errors, _ = errors_of(channel)
     if not channel.noise_floor or errors.before is None or errors.after is None:

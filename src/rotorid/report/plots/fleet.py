@@ -17,7 +17,7 @@ _WORDS = {"established": style.BLUE, "ambiguous": style.ORANGE, "suggested": sty
 
 
 def draw_fleet(counts: pd.DataFrame, parameters: pd.DataFrame, sets: pd.DataFrame, path: Path) -> None:
-    """Bars of `counts` (`rotorid.report.fleet.summary.by_effect`), and below them the numbers most often established.
+    """Bars of `counts` (`rotorid.report.fleet.by_effect`), and below them the numbers most often established.
 
     Each number stands at its set's day, or its place in the order of day and name, with its interval (95 %).
     """
@@ -92,7 +92,7 @@ _MOST_HISTORIES = 8
 def draw_history(numbers: pd.DataFrame, events: pd.DataFrame, path: Path) -> None:
     """Each vehicle's trims, shares and thrust over its sets, as changes since its first ones with intervals (95 %).
 
-    `numbers` and `events` are the tables of `rotorid.report.fleet.history.history`. A quantity that differs from
+    `numbers` and `events` are the tables of `rotorid.report.fleet_history.history`. A quantity that differs from
     some set on has a colour, the others are grey; a line stands where an event begins.
     """
     counts = events["vehicle"].value_counts()
@@ -140,7 +140,7 @@ _ABREAST = 4
 def draw_vehicle(numbers: pd.DataFrame, events: pd.DataFrame, path: Path) -> None:
     """Every quantity of one vehicle over its sets: good ones shaded, limits dotted, a line where it has an event.
 
-    `numbers` and `events` are the vehicle's rows of the tables of `rotorid.report.fleet.history.history`.
+    `numbers` and `events` are the vehicle's rows of the tables of `rotorid.report.fleet_history.history`.
     """
     names = list(dict.fromkeys(numbers["name"]))
     rows = -(-len(names) // _ABREAST) or 1

@@ -12,13 +12,11 @@ import rotorid
 from rotorid.cli import app
 from rotorid.errors import InputError
 from rotorid.identify.autopilot.correlated import autoregression, fit
-from rotorid.identify.autopilot.coverage import counted, drawn, flight, signal_of
-from rotorid.identify.autopilot.drag import specific_drag
 from rotorid.identify.autopilot.parameters import as_text, parameters_of
-from rotorid.identify.autopilot.thrust import lagging
-from rotorid.identify.autopilot.thrust_maps import MAPS
+from rotorid.identify.autopilot.thrust import MAPS, lagging, specific_drag
 from rotorid.recordings import RecordingSet, Run, write_set
 from rotorid.recordings import columns as c
+from rotorid_proof.autopilot_coverage import counted, drawn, flight, signal_of
 
 THROTTLES = c.rotor_columns("throttle", 4)
 

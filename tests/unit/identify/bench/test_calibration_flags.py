@@ -12,7 +12,7 @@ import pytest
 
 from rotorid.identify.bench import loadcell
 from rotorid.identify.bench.loadcell import FLAG_LEVEL, find_outliers
-from rotorid.identify.bench.prepare import prepare
+from rotorid.identify.bench.reconstruct import prepare
 from rotorid.report.plots import bench as plots
 from workflow.scripts import calibrate_campaign, calibrate_load_cells
 

@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 import yaml
 
-from rotorid.identify.bench import recalibrate, tensile
-from rotorid.identify.bench.prepare import prepare
-from rotorid.io.tables import read_tables
+from rotorid.identify.bench import loadcell, reconstruct
+from rotorid.identify.bench.reconstruct import prepare
+from rotorid.io.logs import read_tables
 
 from .test_chain import SETTINGS
 
@@ -24,21 +24,21 @@ def truth() -> dict:
 
 def test_the_calibration_recovers_the_thesis_within_its_intervals(truth) -> None:
     samples, sessions = read_tables(sorted((CAMPAIGN / "calibration").glob("*.rlog.gz")))
-    readings = recalibrate.readings(prepare(samples, sessions, SETTINGS), sessions)
-    idle = recalibrate.idle_slopes(samples, sessions)
+    readings = reconstruct.readings(prepare(samples, sessions, SETTINGS), sessions)
+    idle = reconstruct.idle_slopes(samples, sessions)
     printed = pd.read_csv(ROOT / "raw/thesis/table_2_8.csv").set_index("coefficient")
     inside = {"a0": 0, "a1": 0, "drift": 0, "creep": 0}
     for cell in range(1, 7):
-        found = recalibrate.calibrate_cell(readings[readings["cell"] == cell], idle[cell])
-        for which, name in enumerate(("a0", "a1")):
-            low, high = found.line.interval(which)
+        found = reconstruct.calibrate_cell(readings[readings["cell"] == cell], idle[cell])
+        for name in ("a0", "a1"):
+            low, high = found[f"{name}_interval_95"]
             inside[name] += low <= printed.loc[name, f"cell_{cell}"] <= high
-        drift = truth["cells"]["drift_v_s"][cell - 1] * 60 * found.line.a1 * 1e5
-        inside["drift"] += found.drift_interval_95[0] <= drift <= found.drift_interval_95[1]
+        drift = truth["cells"]["drift_v_s"][cell - 1] * 60 * found["a1_gf_per_10uv"] * 1e5
+        inside["drift"] += found["drift_interval_95"][0] <= drift <= found["drift_interval_95"][1]
         # Creep over the seconds of a recording: the mean slope of share (1 − e^(−t/τ)) from 1.5 to 7 s.
         share, tau = (truth["cells"][name][cell - 1] for name in ("creep_share", "creep_s"))
         rate = share * (np.exp(-1.5 / tau) - np.exp(-7 / tau)) / 5.5 * 60
-        inside["creep"] += found.creep_interval_95[0] <= rate <= found.creep_interval_95[1]
+        inside["creep"] += found["creep_interval_95"][0] <= rate <= found["creep_interval_95"][1]
     # 24 intervals of 95 %: fewer than 21 inside would happen once in 300 times.
     assert inside["a0"] == inside["a1"] == 6
     assert sum(inside.values()) >= 21
@@ -46,8 +46,8 @@ def test_the_calibration_recovers_the_thesis_within_its_intervals(truth) -> None
 
 def test_tensile_figures_are_those_of_the_specimens(truth) -> None:
     samples, sessions = read_tables(sorted((CAMPAIGN / "tensile").glob("*.rlog.gz")))
-    found, _ = tensile.specimens(samples, sessions)
-    means = tensile.by_infill(found, pd.read_csv(ROOT / "raw/thesis/table_2_5.csv"))
+    found, _ = loadcell.specimens(samples, sessions)
+    means = loadcell.by_infill(found, pd.read_csv(ROOT / "raw/thesis/table_2_5.csv"))
     for row in means.itertuples():
         told = truth["plastic"][str(row.infill_percent)]
         assert row.modulus_gpa == pytest.approx(told["modulus_pa"] / 1e9, rel=0.005)

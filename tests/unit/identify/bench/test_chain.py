@@ -5,11 +5,10 @@ import pandas as pd
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.identify.bench import recalibrate, static
-from rotorid.identify.bench.prepare import SPIKE, Filter, bench_force, bench_set, prepare
-from rotorid.identify.bench.reconstruct import CELLS, GF_N
+from rotorid.identify.bench import reconstruct, static
+from rotorid.identify.bench.reconstruct import CELLS, GF_N, SPIKE, Filter, bench_force, bench_set, prepare
+from rotorid.io.logs import read_sessions, read_tables
 from rotorid.io.session import Ended, Setup
-from rotorid.io.tables import read_sessions, read_tables
 
 from .logs import cells, write_log
 from .test_reconstruct import GEOMETRY, forces_by_matrix
@@ -73,17 +72,17 @@ def test_logs_that_cannot_be_one_table_are_named(tmp_path) -> None:
 
 def test_the_line_that_made_the_readings_comes_back(tmp_path) -> None:
     samples, sessions = tables(calibration_logs(tmp_path), tmp_path)
-    readings = recalibrate.readings(prepare(samples, sessions, SETTINGS), sessions)
+    readings = reconstruct.readings(prepare(samples, sessions, SETTINGS), sessions)
     # The zero of 1e-4 V is tared away; 100 gf read (100 − 0.5)/40 = 2.4875.
     assert readings.loc[readings["weight_gf"] == 100, "reading_10uv"].to_numpy() == pytest.approx(2.4875, abs=4e-3)
     # Of 140 samples under load the first 25 fill the window, and the filter takes as long to settle.
     assert 75 < readings["samples"].min() < 115
-    found = recalibrate.calibrate_cell(readings[readings["cell"] == 1], np.array([1e-9, 3e-9, 2e-9]))
-    assert found.line.a1 == pytest.approx(40, abs=0.02)
-    assert found.line.interval(0)[0] < 0.5 < found.line.interval(0)[1]
-    assert found.noise_gf == pytest.approx(6e-8 * 1e5 * 40, rel=0.1)
+    found = reconstruct.calibrate_cell(readings[readings["cell"] == 1], np.array([1e-9, 3e-9, 2e-9]))
+    assert found["a1_gf_per_10uv"] == pytest.approx(40, abs=0.02)
+    assert found["a0_interval_95"][0] < 0.5 < found["a0_interval_95"][1]
+    assert found["noise_gf"] == pytest.approx(6e-8 * 1e5 * 40, rel=0.1)
     # Mean slope of 2e-9 V/s is 2e-9 × 60 × 40e5 gf/min.
-    assert found.drift_gf_min == pytest.approx(2e-9 * 60 * 40e5, rel=1e-3)
+    assert found["drift_gf_min"] == pytest.approx(2e-9 * 60 * 40e5, rel=1e-3)
 
 
 def test_repeatability_and_linearity_by_hand() -> None:
@@ -96,12 +95,12 @@ def test_repeatability_and_linearity_by_hand() -> None:
             "slope_v_s": 0.0,
         }
     )
-    found = recalibrate.calibrate_cell(table, np.zeros(3))
-    by_weight = found.line.a0 + found.line.a1 * np.array([0.0, 10.0, 6.0])
-    assert found.linearity_gf == pytest.approx(np.abs(by_weight - [0, 10, 5]).max())
+    found = reconstruct.calibrate_cell(table, np.zeros(3))
+    by_weight = found["a0_gf"] + found["a1_gf_per_10uv"] * np.array([0.0, 10.0, 6.0])
+    assert found["linearity_gf"] == pytest.approx(np.abs(by_weight - [0, 10, 5]).max())
     # Two readings 1 apart have a standard deviation of 1/√2, times the slope.
-    assert found.repeatability_gf == pytest.approx(found.line.a1 / np.sqrt(2))
-    assert found.full_scale_gf == 10
+    assert found["repeatability_gf"] == pytest.approx(found["a1_gf_per_10uv"] / np.sqrt(2))
+    assert found["full_scale_gf"] == 10
 
 
 def test_a_weight_put_on_long_after_its_mark_is_waited_for(tmp_path) -> None:
@@ -109,7 +108,7 @@ def test_a_weight_put_on_long_after_its_mark_is_waited_for(tmp_path) -> None:
     setup = Setup(kind="calibration", cell=1, load_gf=80.0, repeat=1)
     path = write_log(tmp_path, "late", "bench", cells(loaded, rest=120, load=140), setup, {"load": 50})
     samples, sessions = tables([path], tmp_path)
-    readings = recalibrate.readings(prepare(samples, sessions, SETTINGS), sessions)
+    readings = reconstruct.readings(prepare(samples, sessions, SETTINGS), sessions)
     assert readings["reading_10uv"].item() == pytest.approx(2.0, abs=1e-3)
 
 
@@ -120,7 +119,7 @@ def test_a_reading_that_never_settles_is_refused(tmp_path) -> None:
     path = write_log(tmp_path, "drifting", "bench", values, setup, {"load": 61})
     samples, sessions = tables([path], tmp_path)
     with pytest.raises(InputError, match="drifting: the reading was not steady for the last 50 samples"):
-        recalibrate.readings(prepare(samples, sessions, SETTINGS), sessions)
+        reconstruct.readings(prepare(samples, sessions, SETTINGS), sessions)
 
 
 MARKS = {"tare_start": 20, "tare_stop": 44, "load": 70, "read_start": 120, "read_stop": 169}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.identify.bench.tensile import evaluate
+from rotorid.identify.bench.loadcell import evaluate
 
 GAUGE_MM, SECTION_MM2 = 40.0, 20.0
 
@@ -25,21 +25,21 @@ def curve(noise_n: float = 0.0, slack_mm: float = 0.08, yields: bool = True) -> 
 
 
 def test_modulus_yield_and_strength_by_hand() -> None:
-    found = evaluate(*curve(noise_n=0.05), GAUGE_MM, SECTION_MM2)
-    assert found.modulus_pa == pytest.approx(2e9, rel=2e-3)
-    assert found.modulus_interval_95_pa[0] < 2e9 < found.modulus_interval_95_pa[1]
-    assert found.yield_pa == pytest.approx(10.4444e6, rel=2e-3)
-    assert found.strength_pa == pytest.approx(20e6, rel=5e-3)
-    assert found.slack_mm == pytest.approx(0.08, abs=2e-3)
-    assert found.proportional_pa == pytest.approx(10e6, rel=0.1)
-    assert found.break_strain == pytest.approx(0.055, rel=0.02)
+    found, _ = evaluate(*curve(noise_n=0.05), GAUGE_MM, SECTION_MM2)
+    assert found["modulus_gpa"] == pytest.approx(2, rel=2e-3)
+    assert found["modulus_low_95_gpa"] < 2 < found["modulus_high_95_gpa"]
+    assert found["yield_mpa"] == pytest.approx(10.4444, rel=2e-3)
+    assert found["strength_mpa"] == pytest.approx(20, rel=5e-3)
+    assert found["slack_mm"] == pytest.approx(0.08, abs=2e-3)
+    assert found["proportional_mpa"] == pytest.approx(10, rel=0.1)
+    assert found["break_strain"] == pytest.approx(0.055, rel=0.02)
 
 
 def test_more_slack_changes_nothing_but_the_slack() -> None:
-    little, much = (evaluate(*curve(0.05, slack), GAUGE_MM, SECTION_MM2) for slack in (0.02, 0.3))
-    assert much.modulus_pa == pytest.approx(little.modulus_pa, rel=5e-3)
-    assert much.yield_pa == pytest.approx(little.yield_pa, rel=5e-3)
-    assert much.slack_mm - little.slack_mm == pytest.approx(0.28, abs=5e-3)
+    little, much = (evaluate(*curve(0.05, slack), GAUGE_MM, SECTION_MM2)[0] for slack in (0.02, 0.3))
+    assert much["modulus_gpa"] == pytest.approx(little["modulus_gpa"], rel=5e-3)
+    assert much["yield_mpa"] == pytest.approx(little["yield_mpa"], rel=5e-3)
+    assert much["slack_mm"] - little["slack_mm"] == pytest.approx(0.28, abs=5e-3)
 
 
 def test_a_brittle_specimen_is_named_as_such() -> None:

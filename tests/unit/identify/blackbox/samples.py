@@ -3,8 +3,8 @@
 import numpy as np
 import pandas as pd
 
-from rotorid.identify.blackbox.experiments import COLUMNS, INPUTS, OUTPUTS, PLATEAU_BLOCKS, SINE_BLOCKS, stand_wrench
-from rotorid.io.experiments import EXPERIMENTS
+from rotorid.identify.black_box import COLUMNS, INPUTS, OUTPUTS, PLATEAU_BLOCKS, SINE_BLOCKS, stand_wrench
+from rotorid.io.wire import EXPERIMENTS
 from rotorid.recordings.vehicle import Vehicle
 
 

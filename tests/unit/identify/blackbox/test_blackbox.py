@@ -2,15 +2,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.identify.blackbox.experiments import (
+from rotorid.identify.black_box import (
     INPUTS,
     OUTPUTS,
-    read_experiments,
-    samples_of,
-    stand_wrench,
-    thrust_of_throttle,
-)
-from rotorid.identify.blackbox.models import (
     TrainingRange,
     conformal_coverage,
     conformal_half_width,
@@ -20,7 +14,11 @@ from rotorid.identify.blackbox.models import (
     fit_thesis_network,
     fit_white_box_effects,
     folds,
+    read_experiments,
+    samples_of,
     scores,
+    stand_wrench,
+    thrust_of_throttle,
     white_box,
 )
 from tests.unit.identify.blackbox.samples import generated_experiments

@@ -4,9 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.identify.estimate.excitation import Readings, Wanted, design
-from rotorid.identify.estimate.flights import band_signals, fit_flights
-from rotorid.identify.estimate.output_error import (
+from rotorid.identify.excitation import Readings, Wanted, band_signals, design, fit_flights
+from rotorid.identify.grey_box import (
     RateWindows,
     cut_windows,
     fit_output_error,
@@ -129,6 +128,6 @@ def test_flight_bounds_hold_the_truth():
     part = band_signals(Run("flight", pd.DataFrame(table)), vehicle, (1.0, 6.0), 0.0, 250.0)
     fits = fit_flights([part], 1.0, rng)
     for fit, true in zip(fits[:2], TRUE[:2], strict=True):
-        assert fit.lower < fit.estimate < fit.upper
-        assert fit.interval_95[0] < true < fit.interval_95[1]
-        assert fit.r2 > 0.9
+        assert fit["lower"] < fit["estimate"] < fit["upper"]
+        assert fit["interval_95"][0] < true < fit["interval_95"][1]
+        assert fit["r2"] > 0.9

@@ -9,12 +9,10 @@ import pytest
 
 from rotorid.errors import InputError
 from rotorid.identify.fem import studies
-from rotorid.identify.fem.answers import compare, judge_statements
-from rotorid.identify.fem.bench import DOWN, Bench
-from rotorid.identify.fem.cell import strain_per_newton
-from rotorid.identify.fem.sizes import Material, materials, read_assumed
+from rotorid.identify.fem.bench import DOWN, build, compare, judge_statements, strain_per_newton
+from rotorid.identify.fem.elasticity import on
+from rotorid.identify.fem.placement import Material, materials, read_assumed
 from rotorid.identify.fem.studies import counts_per_newton, from_printed_slope, printed_slope, volts_per_newton
-from rotorid.identify.fem.tets import on
 from rotorid.io.wire import GAIN, REFERENCE_V
 
 ROOT = Path(__file__).parents[4]
@@ -22,7 +20,7 @@ ROOT = Path(__file__).parents[4]
 
 @pytest.fixture(scope="module")
 def bench(assumed, geometry):
-    return Bench.of(assumed, assumed.sizes, geometry.distance_m, 1.0)
+    return build(assumed, assumed.sizes, geometry.distance_m, 1.0)
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +39,7 @@ def test_the_table_bears_the_leg_share_of_the_load(bench, assumed, moduli) -> No
     moved = bench.solve(of).displacement_m.T.ravel()
     forces = (bench.body.stiffness(of) @ moved).reshape(3, -1)
     foot = bench.body.nodes_of("A")
-    base = foot[on(bench.leg.base, bench.body.nodes_m[foot])]
+    base = foot[on(bench.base, bench.body.nodes_m[foot])]
     assert len(base) > 4
     assert forces[2, base].sum() == pytest.approx(-DOWN[2] / 3, rel=1e-8)
 
@@ -71,7 +69,7 @@ def test_deformation_is_inverse_to_all_moduli_and_stress_is_not(bench) -> None:
 
 
 def test_finer_meshes_agree_better(assumed, moduli, geometry) -> None:
-    table, _ = studies.mesh_study(assumed, moduli, geometry, (1.0, 1.5))
+    table, *_ = studies.mesh_study(assumed, moduli, geometry, (1.0, 1.5))
     for name in ("ratio_deformation", "ratio_narrow_lower", "equation_n_pla"):
         assert table[name].iloc[1] == pytest.approx(table[name].iloc[0], rel=0.03)
 
@@ -113,17 +111,17 @@ def test_the_ligament_that_gives_a_sensitivity_does(assumed, moduli) -> None:
 
 def test_every_assumed_size_makes_a_bench_at_its_ends(assumed, geometry) -> None:
     for name, end, sizes in assumed.variants():
-        made = Bench.of(assumed, sizes, geometry.distance_m, 1.0)
+        made = build(assumed, sizes, geometry.distance_m, 1.0)
         assert made.binding.shape[1] > 1000, (name, end)
 
 
 def test_a_plate_that_meets_the_cells_is_refused(assumed, geometry) -> None:
     with pytest.raises(InputError, match="plate_thickness_mm"):
-        Bench.of(assumed, replace(assumed.sizes, plate_thickness_m=0.02), geometry.distance_m, 1.0)
+        build(assumed, replace(assumed.sizes, plate_thickness_m=0.02), geometry.distance_m, 1.0)
     with pytest.raises(InputError, match="plate_radius_mm"):
-        Bench.of(assumed, replace(assumed.sizes, plate_radius_m=0.03), geometry.distance_m, 1.0)
+        build(assumed, replace(assumed.sizes, plate_radius_m=0.03), geometry.distance_m, 1.0)
     with pytest.raises(InputError, match="do not fit"):
-        Bench.of(assumed, replace(assumed.sizes, cell_between_holes_m=0.08), geometry.distance_m, 1.0)
+        build(assumed, replace(assumed.sizes, cell_between_holes_m=0.08), geometry.distance_m, 1.0)
 
 
 @pytest.mark.parametrize(
@@ -178,5 +176,5 @@ def test_a_statement_follows_depends_or_does_not(number, changed) -> None:
         ([not_held, not_held], "does not follow"),
     ):
         judged = judge_statements(pd.DataFrame(rows))[number]
-        assert judged.word == word
-        assert judged.on_assumed == (rows[0] is held)
+        assert judged["word"] == word
+        assert judged["on_assumed"] == (rows[0] is held)

@@ -5,10 +5,9 @@ import pytest
 
 from rotorid.errors import InputError
 from rotorid.identify.fem import elasticity
-from rotorid.identify.fem.elasticity import Bound, LooseParts
-from rotorid.identify.fem.sizes import Material
+from rotorid.identify.fem.elasticity import Bound, LooseParts, Pad, block, column, stacked
+from rotorid.identify.fem.placement import Material
 from rotorid.identify.fem.studies import FINENESSES, cantilever, kirsch_displacement_m, plate_with_hole
-from rotorid.identify.fem.tets import Pad, block, column, stacked
 
 STEEL = Material(200e9, 0.3)
 
@@ -113,7 +112,7 @@ def test_closed_forms_are_met_ever_better(case, finest) -> None:
     errors = {name: [] for name in finest}
     for fineness in FINENESSES:
         for row in case(fineness):
-            errors[row.quantity].append(abs(row.error))
+            errors[row["quantity"]].append(abs(row["error"]))
     for name, found in errors.items():
         assert found == sorted(found, reverse=True)
         assert found[-1] < finest[name], name

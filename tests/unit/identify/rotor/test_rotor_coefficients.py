@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.identify.rotor.coefficients import (
+from rotorid.identify.rotor import (
     Points,
     fit_coefficient,
     fit_exponent,
@@ -108,15 +108,15 @@ def test_pooling_by_hand() -> None:
     # Equal errors s² = 1: Paule-Mandel gives s² + tau² = sample variance = 4, so tau² = 3; mean 0; the
     # Hartung-Knapp error is sqrt(4/3), Student's t for 2 degrees of freedom 4.30265.
     found = pool([-2.0, 0.0, 2.0], [1.0, 1.0, 1.0])
-    assert found.value == pytest.approx(0, abs=1e-9)
-    assert found.between_sd == pytest.approx(np.sqrt(3))
-    assert found.interval_95[1] == pytest.approx(4.30265 * np.sqrt(4 / 3), rel=1e-5)
-    assert found.prediction_95[1] == pytest.approx(4.30265 * np.sqrt(3 + 4 / 3), rel=1e-5)
+    assert found["value"] == pytest.approx(0, abs=1e-9)
+    assert found["between_sd"] == pytest.approx(np.sqrt(3))
+    assert found["interval_95"][1] == pytest.approx(4.30265 * np.sqrt(4 / 3), rel=1e-5)
+    assert found["prediction_95"][1] == pytest.approx(4.30265 * np.sqrt(3 + 4 / 3), rel=1e-5)
 
 
 def test_motors_that_agree_have_nothing_between_them() -> None:
     found = pool([1.0, 1.001, 0.999], [0.1, 0.1, 0.1])
-    assert found.between_sd == 0.0
+    assert found["between_sd"] == 0.0
     with pytest.raises(InputError, match="at least two motors, found 1"):
         pool([1.0], [0.1])
 
@@ -127,7 +127,7 @@ def test_the_pooled_interval_covers_the_mean_of_all_motors() -> None:
     for _ in range(1000):
         errors = rng.uniform(0.05, 0.3, 13)
         values = 10 + rng.normal(0, 0.5, 13) + rng.normal(0, errors)
-        low, high = pool(values, errors).interval_95
+        low, high = pool(values, errors)["interval_95"]
         hits += low < 10 < high
     assert 0.93 < hits / 1000 < 0.97
 

@@ -6,14 +6,12 @@ import pandas as pd
 import pytest
 import yaml
 
-from rotorid.identify.blackbox.experiments import thrust_of_throttle
-from rotorid.identify.rotor.campaign import speed_law, thrust_points, torque_points
-from rotorid.identify.rotor.coefficients import Points, fit_coefficient
-from rotorid.identify.stand import clocks
-from rotorid.identify.stand.recordings import read_pairs
-from rotorid.io.experiments import EXPERIMENTS
-from rotorid.io.tables import read_tables
-from rotorid.report import thesis
+from rotorid.identify import clocks, grey_box
+from rotorid.identify.black_box import thrust_of_throttle
+from rotorid.identify.rotor import Points, fit_coefficient, speed_law, thrust_points, torque_points
+from rotorid.identify.stand import read_pairs
+from rotorid.io.logs import read_tables
+from rotorid.io.wire import EXPERIMENTS
 
 ROOT = Path(__file__).parents[4]
 CAMPAIGN = ROOT / "raw" / "campaign"
@@ -45,8 +43,8 @@ def test_thrust_and_torque_coefficients_are_the_thesis_s(thrust, torque) -> None
     """The noise of the torque does not grow with speed: its interval is narrow, and the thesis's value just outside."""
     c_f, c_q = coefficient(thrust), coefficient(torque)
     low, high = c_f.interval_95
-    assert low < thesis.WHITE_BOX["thrust_coefficient_n_s2"] < high
-    believed = thesis.WHITE_BOX["torque_coefficient_n_m_s2"]
+    assert low < grey_box.WHITE_BOX["thrust_coefficient_n_s2"] < high
+    believed = grey_box.WHITE_BOX["torque_coefficient_n_m_s2"]
     assert believed < c_q.interval_95[0] < 1.001 * believed
     assert c_q.standard_error < 0.001 * c_q.value
 

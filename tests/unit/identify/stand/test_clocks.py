@@ -5,8 +5,8 @@ import pandas as pd
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.identify.stand import clocks
-from rotorid.identify.stand.clocks import Lag, follow, lower_edge, pooled
+from rotorid.identify import clocks
+from rotorid.identify.clocks import Lag, follow, lower_edge, pooled
 
 OFFSET_S, LAG_S = -0.083, 0.055
 

@@ -7,11 +7,11 @@ import pandas as pd
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.identify.rotor.campaign import speed_law
-from rotorid.identify.stand import wrench
+from rotorid.identify import stand
+from rotorid.identify.rotor import speed_law
 from rotorid.recordings.run import Run
 
-WRENCH = wrench.WRENCH
+WRENCH = stand.WRENCH
 
 
 def programme(time_s: np.ndarray) -> np.ndarray:
@@ -22,32 +22,32 @@ def programme(time_s: np.ndarray) -> np.ndarray:
 
 def test_segments_of_a_trapezoid() -> None:
     time_s = np.arange(0, 18, 0.01)
-    found = wrench.segments(time_s, programme(time_s))
+    found = stand.segments(time_s, programme(time_s))
     assert [s.kind for s in found] == ["rest", "ramp", "plateau", "ramp", "rest"]
-    flat = wrench.longest(found, wrench.PLATEAU)
+    flat = stand.longest(found, stand.PLATEAU)
     assert flat.start_s == pytest.approx(5.0, abs=0.06)
     assert flat.stop_s == pytest.approx(13.0, abs=0.06)
-    whole = wrench.programme(found)
+    whole = stand.programme(found)
     assert (whole.start_s, whole.stop_s) == pytest.approx((2.0, 16.0), abs=0.02)
 
 
 def test_a_sine_has_no_plateau_and_rest_alone_is_refused() -> None:
     time_s = np.arange(0, 12, 0.02)
     sine = 0.1 * (1 - np.cos(2 * np.pi * 0.25 * time_s))
-    found = wrench.segments(time_s, np.column_stack([sine] * 4))
-    assert wrench.longest(found, wrench.PLATEAU) is None
+    found = stand.segments(time_s, np.column_stack([sine] * 4))
+    assert stand.longest(found, stand.PLATEAU) is None
     with pytest.raises(InputError, match="never ran"):
-        wrench.segments(time_s, np.zeros((len(time_s), 4)))
+        stand.segments(time_s, np.zeros((len(time_s), 4)))
 
 
 def test_tilt_and_weight_by_hand() -> None:
     # Pitch 30°: x forward goes up (−z), so R e_x = (cos 30°, 0, −sin 30°).
-    rotation = wrench.tilt(0.0, np.radians(30))
+    rotation = stand.tilt(0.0, np.radians(30))
     assert rotation @ [1, 0, 0] == pytest.approx([np.sqrt(3) / 2, 0, -0.5])
     # Roll 30°: y right goes down, R e_y = (0, cos 30°, sin 30°).
-    assert wrench.tilt(np.radians(30), 0.0) @ [0, 1, 0] == pytest.approx([0, np.sqrt(3) / 2, 0.5])
+    assert stand.tilt(np.radians(30), 0.0) @ [0, 1, 0] == pytest.approx([0, np.sqrt(3) / 2, 0.5])
     # 2 kg at (0.1, 0, 0) on a level sensor with g = 10: F = (0, 0, 20), M = c × F = (0, −2, 0).
-    assert wrench.weight_wrench(2.0, 10.0, np.array([0.1, 0, 0]), np.eye(3)) == pytest.approx([0, 0, 20, 0, -2, 0])
+    assert stand.weight_wrench(2.0, 10.0, np.array([0.1, 0, 0]), np.eye(3)) == pytest.approx([0, 0, 20, 0, -2, 0])
 
 
 def experiment(roll: float, pitch: float, seed: int = 0, drift_n_s: float = 0.0) -> Run:
@@ -55,7 +55,7 @@ def experiment(roll: float, pitch: float, seed: int = 0, drift_n_s: float = 0.0)
     rng = np.random.default_rng(seed)
     time_s = np.arange(0, 18.5, 0.01)
     throttle = programme(time_s)
-    at_rest = wrench.weight_wrench(0.652, 9.81, np.array([0.003, -0.002, -0.045]), wrench.tilt(roll, pitch))
+    at_rest = stand.weight_wrench(0.652, 9.81, np.array([0.003, -0.002, -0.045]), stand.tilt(roll, pitch))
     values = np.tile(at_rest, (len(time_s), 1))
     values[:, 2] += -4.0 * throttle[:, 0] / 0.2 + drift_n_s * time_s
     values += rng.normal(0, 1, values.shape) * np.array([0.1] * 3 + [0.001] * 3)
@@ -68,7 +68,7 @@ def experiment(roll: float, pitch: float, seed: int = 0, drift_n_s: float = 0.0)
 
 
 def test_steady_wrench_with_rest_and_drift_taken_off() -> None:
-    found = wrench.evaluate(experiment(0.0, 0.2, drift_n_s=0.05), None)
+    found = stand.evaluate(experiment(0.0, 0.2, drift_n_s=0.05), None)
     assert found.kind == "plateau"
     assert found.throttle == pytest.approx([0.2, 0.1, 0.2, 0.2])
     # The zero drifts linearly, and the rest reading is interpolated: nothing of it stays.
@@ -83,7 +83,7 @@ def test_steady_wrench_with_rest_and_drift_taken_off() -> None:
 def test_intervals_of_the_steady_wrench_cover() -> None:
     inside = []
     for seed in range(60):
-        found = wrench.evaluate(experiment(0.1, 0.0, seed), None)
+        found = stand.evaluate(experiment(0.1, 0.0, seed), None)
         inside.append(np.abs(found.steady.mean - [0, 0, -4, 0, 0, 0]) <= found.steady.half_width_95)
     assert np.mean(inside) == pytest.approx(0.95, abs=0.03)
 
@@ -93,8 +93,8 @@ CENTRE = np.array([0.003, -0.002, -0.045])
 
 
 def test_the_weight_under_tilt_gives_mass_and_centre() -> None:
-    evaluated = [wrench.evaluate(experiment(*tilt, seed), None) for seed, tilt in enumerate(TILTS)]
-    found = wrench.fit_weight(evaluated, 0.652, np.array([0, 0, -0.045]), 9.81)
+    evaluated = [stand.evaluate(experiment(*tilt, seed), None) for seed, tilt in enumerate(TILTS)]
+    found = stand.fit_weight(evaluated, 0.652, np.array([0, 0, -0.045]), 9.81)
     assert found.mass_kg == pytest.approx(0.652, abs=1e-3)
     assert found.centre_m == pytest.approx(CENTRE, abs=1e-4)
     assert found.rms_before[4] == pytest.approx(0.652 * 9.81 * 0.003, rel=0.05)
@@ -103,15 +103,15 @@ def test_the_weight_under_tilt_gives_mass_and_centre() -> None:
 
 def test_intervals_of_mass_and_centre_cover() -> None:
     rng = np.random.default_rng(0)
-    like = wrench.evaluate(experiment(0.0, 0.0), None)
+    like = stand.evaluate(experiment(0.0, 0.0), None)
     inside = []
     for _ in range(500):
         evaluated = []
         for roll, pitch in TILTS:
-            exact = wrench.weight_wrench(0.652, 9.81, CENTRE, wrench.tilt(roll, pitch))
+            exact = stand.weight_wrench(0.652, 9.81, CENTRE, stand.tilt(roll, pitch))
             rest = replace(like.rest, mean=exact + rng.normal(0, 1, 6) * np.array([0.007] * 3 + [7e-5] * 3))
             evaluated.append(replace(like, roll_rad=roll, pitch_rad=pitch, rest=rest))
-        found = wrench.fit_weight(evaluated, 0.652, CENTRE, 9.81)
+        found = stand.fit_weight(evaluated, 0.652, CENTRE, 9.81)
         low, high = found.centre_interval_95.T
         inside.append(
             [*((low < CENTRE) & (CENTRE < high)), found.mass_interval_95[0] < 0.652 < found.mass_interval_95[1]]

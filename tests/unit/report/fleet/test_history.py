@@ -8,7 +8,7 @@ import pandas as pd
 
 from rotorid.recordings import RecordingSet, write_set
 from rotorid.recordings.templates import read
-from rotorid.report.fleet.history import by_vehicle, change_points, history, shown_by
+from rotorid.report.fleet_history import by_vehicle, change_points, history, shown_by
 from rotorid.report.plots.fleet import draw_history
 from rotorid.vehicle.control.swings import swings
 from workflow.scripts import fleet_history
@@ -48,15 +48,15 @@ def test_a_second_change_is_an_event_of_its_own_and_the_first_ends_there():
 
     sets = [flown(1), flown(2), flown(3), weak(4, 1.1), replace(weak(3, 1.1), name="heron-2026-10-07")]
     points = change_points(shown_by(sets, 2, print), 2)
-    assert [(p.set, p.lasts) for p in points] == [("heron-2026-10-04", 2)]
-    assert points[0].differences[0].quantity.key in ("share/2", "trim/roll", "trim/pitch")
+    assert [point[:2] for point in points] == [("heron-2026-10-04", 2)]
+    assert points[0][2][0].quantity.key in ("share/2", "trim/roll", "trim/pitch")
     mended = [*sets, *(replace(flown(day), name=f"heron-2026-11-0{day}") for day in (5, 6))]
     points = change_points(shown_by(mended, 2, print), 2)
-    assert [(p.set, p.lasts) for p in points] == [("heron-2026-10-04", 2), ("heron-2026-11-05", 2)]
-    before, after = points
+    assert [point[:2] for point in points] == [("heron-2026-10-04", 2), ("heron-2026-11-05", 2)]
+    (*_, before), (*_, after) = points
     # The rotor is as it was: its trims go back.
-    back = {d.quantity.key: d.value for d in after.differences}
-    there = {d.quantity.key: d.value for d in before.differences}
+    back = {d.quantity.key: d.value for d in after}
+    there = {d.quantity.key: d.value for d in before}
     assert back["trim/roll"] * there["trim/roll"] < 0
 
 

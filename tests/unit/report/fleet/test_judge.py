@@ -11,8 +11,8 @@ from rotorid.cli.modelling import fly
 from rotorid.errors import InputError
 from rotorid.recordings import read_set
 from rotorid.recordings.templates import read
+from rotorid.report import fleet
 from rotorid.report.deliver import deliver
-from rotorid.report.fleet import judge
 
 
 @pytest.fixture
@@ -50,16 +50,16 @@ def told(monkeypatch, tmp_path: Path) -> Path:
             raise OSError(5, "Input/output error", str(folder / "run.csv"))
         return folder
 
-    monkeypatch.setattr(judge, "deliver", analysed)
-    monkeypatch.setattr(judge, "read_set", read)
-    monkeypatch.setattr(judge, "_load", lambda: None)
+    monkeypatch.setattr(fleet, "deliver", analysed)
+    monkeypatch.setattr(fleet, "read_set", read)
+    monkeypatch.setattr(fleet, "_load", lambda: None)
     return calls
 
 
 def judged(sets: Path, out: Path, code: str = "c0de") -> dict[str, dict]:
     """What stands in each set's folder after judging."""
     folders = sorted(sets.iterdir())
-    judge.judge_sets(folders, code, out, sets.parent / "memory")
+    fleet.judge_sets(folders, code, out, sets.parent / "memory")
     return {f.name: {p.name: p.read_text() for p in f.iterdir()} for f in sorted(out.iterdir())}
 
 
@@ -82,7 +82,7 @@ def test_a_set_that_cannot_be_read_fails_alone_and_is_read_again(sets: Path, tol
     for _ in range(2):
         found = judged(sets, tmp_path / "out")["g-torn"]
         assert set(found) == {"failed.json"} and "run.csv" in found["failed.json"]
-    assert not (tmp_path / "memory" / "c0de" / judge.content_of(sets / "g-torn")).exists()
+    assert not (tmp_path / "memory" / "c0de" / fleet.content_of(sets / "g-torn")).exists()
 
 
 def test_nothing_is_judged_twice_but_what_changed(sets: Path, told: Path, tmp_path: Path) -> None:
@@ -92,7 +92,7 @@ def test_nothing_is_judged_twice_but_what_changed(sets: Path, told: Path, tmp_pa
     assert told.read_text() == "d-killed\n"  # what killed it may be gone
     told.write_text("")
     (sets / "e-sound" / "run.csv").write_text("time_s\n0\n")
-    left = tmp_path / "memory" / "c0de" / f".{judge.content_of(sets / 'e-sound')}.1.part"
+    left = tmp_path / "memory" / "c0de" / f".{fleet.content_of(sets / 'e-sound')}.1.part"
     left.mkdir()  # by a process that was killed
     judged(sets, tmp_path / "third")
     assert not left.exists()
@@ -118,9 +118,9 @@ def test_a_full_disk_is_no_verdict_and_loses_nothing(sets: Path, told: Path, tmp
 @pytest.mark.slow
 def test_a_fleet_says_byte_for_byte_what_each_set_says_by_itself(tmp_path: Path) -> None:
     folders = [fly(read("thesis"), tmp_path / "sets" / f"s{k}", 6.0, 2, k) for k in (1, 2)]
-    judge.judge_sets(folders, "c0de", tmp_path / "out", tmp_path / "memory")
+    fleet.judge_sets(folders, "c0de", tmp_path / "out", tmp_path / "memory")
     for folder in folders:
         alone = tmp_path / "alone" / folder.name
-        deliver(read_set(folder), *(alone / name for name in judge.FILES[:3]))
-        for name in judge.FILES:
+        deliver(read_set(folder), *(alone / name for name in fleet.FILES[:3]))
+        for name in fleet.FILES:
             assert (tmp_path / "out" / folder.name / name).read_bytes() == (alone / name).read_bytes(), name

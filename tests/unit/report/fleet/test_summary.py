@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rotorid.report.fleet.summary import by_effect, by_vehicle, collect, day_of, make_page
+from rotorid.report.fleet import by_effect, by_vehicle, collect, day_of, make_page
 from rotorid.report.plots.fleet import draw_fleet
 
 

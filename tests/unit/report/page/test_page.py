@@ -13,7 +13,7 @@ from rotorid.mismatch.decision.findings import Delivery, ValueRow
 from rotorid.mismatch.decision.shares import segments_of
 from rotorid.mismatch.tell.sentences import MOST_WORDS
 from rotorid.mismatch.tell.tiles import tiles
-from rotorid.mismatch.tell.verdict import main_channel
+from rotorid.mismatch.tell.verdict import DerivativeOf, main_channel
 from rotorid.recordings import Run
 from rotorid.recordings.run import Doubt
 from rotorid.report.deliver import verdict_of, write_files
@@ -245,6 +245,16 @@ def test_a_vehicle_with_derivatives_is_shown_with_and_without_them_where_most_wa
     with_them = data_of(page_of(replace(made, delivery=Delivery("named", True, made.delivery.scores))))
     forces = [t for t in with_them["traces"] if t["channel"].startswith(("force", "moment"))]
     assert forces and all("without" in t for t in forces)
+
+
+def test_derivatives_whose_interval_holds_zero_are_grey_and_stand_last():
+    made = analysis(findings=[drag_finding()], dash=True)
+    numbers = {"unit": "N s/m", "value": -0.1, "low": -3.0, "high": 4.0}
+    doubtful = DerivativeOf(channel="force_x", quantity="u", interval_95=(-0.2, 0.05), **numbers)
+    clear = DerivativeOf(channel="force_y", quantity="v", interval_95=(-0.2, -0.05), **numbers)
+    page = make_page(made, verdict_of(made).model_copy(update={"derivatives": (doubtful, clear)}))
+    first, last = re.findall(r"<tr[^>]*><td class=\"text\"><em>[XY]<sub>", page)
+    assert "soft" not in first and 'class="soft"' in last and "Y" in first
 
 
 def test_a_run_of_less_than_ten_seconds_is_shown_whole():

@@ -1,30 +1,164 @@
 """Tables of a fleet: which sets show which effect, each parameter over time, which verdicts need a person; its page.
 
 The page is one HTML file that needs no other but the verdicts that it links to.
+
+Verdicts on many recording sets in one process: Python starts once, a set that fails costs only itself.
+
+Each set is judged in a process of its own, branched off after everything is imported (which takes milliseconds), so
+that neither a fault nor the memory of one reaches the next. A verdict is remembered by the content of its set and the
+code that judged it: a batch that was broken off, or is cut anew because sets were added, judges nothing twice. A set
+that could not be read, or whose process was killed, is not remembered: another day it may end otherwise.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
+import multiprocessing
+import os
 import re
-from collections.abc import Sequence
+import shutil
+import sys
+import tempfile
+import time
+import traceback
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from jinja2 import Environment
-from markupsafe import Markup
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
 from rotorid.io.text.files import read_yaml
-from rotorid.report.fleet.judge import FAILED
-from rotorid.report.page.make import policy_for
+from rotorid.recordings import read_set
+from rotorid.recordings.templates import read
+from rotorid.report.deliver import deliver
+from rotorid.report.page.make import drawing, filled
+from rotorid.vehicle.control.swings import swings
 
+FILES = ("verdict.json", "report.html", "improved_vehicle.yaml", "ledger.json")
+"""What a verdict consists of."""
+FAILED = "failed.json"
+"""What stands in its place where there is none: `reason`, and `fault` where it is none of the set's."""
+_WORTH_A_START = 4
+"""Sets to judge from which on it pays to load beforehand what every one of them would load by itself."""
 _SHOWN = ("established", "ambiguous", "suggested")
 """Words of effects that a summary counts; what is absorbed or not established shows nothing."""
 _DATE = re.compile(r"(?<!\d)(20\d\d)[-_]?(0[1-9]|1[0-2])[-_]?(0[1-9]|[12]\d|3[01])(?!\d)")
 """A day in the name of a set: 2026-11-22, 2026_11_22 or 20261122."""
+
+
+def judge_sets(
+    folders: Sequence[Path], code: str, out: Path, memory: Path, progress: Callable[[str], None] = lambda text: None
+) -> None:
+    """Judge sets: `out/<set>/` each, with the files of its verdict or `failed.json`.
+
+    Parameters
+    ----------
+    folders
+        Folders of the sets; their names must differ.
+    code
+        Hash of the code that judges.
+    out
+        Folder of the results.
+    memory
+        Folder that remembers verdicts by content and code.
+    progress
+        Called with one line a set.
+
+    Raises
+    ------
+    OSError
+        The disk is full, or the like: no fault of a set. What was judged before stays remembered.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    places = {folder: memory / code / content_of(folder) for folder in folders}
+    if sum(not known.is_dir() for known in places.values()) >= _WORTH_A_START:
+        _load()
+    for folder, known in places.items():
+        start = time.monotonic()
+        if known.is_dir():
+            shutil.copytree(known, out / folder.name, dirs_exist_ok=True)
+        else:
+            _judge_apart(folder, known, out / folder.name)
+        failed = " (failed)" if (out / folder.name / FAILED).is_file() else ""
+        progress(f"{folder.name}: {time.monotonic() - start:.1f} s{failed}")
+
+
+def content_of(folder: Path) -> str:
+    """Sixteen hexadecimal digits that stand for a set: its name and every file in it."""
+    whole = hashlib.sha256(folder.name.encode())
+    for path in sorted(p for p in folder.iterdir() if p.is_file()):
+        with open(path, "rb") as file:
+            whole.update(f"\n{path.name} {hashlib.file_digest(file, 'sha256').hexdigest()}".encode())
+    return whole.hexdigest()[:16]
+
+
+def _load() -> None:
+    """Judge a short flight made up for it, so that modules, compiled code and fonts are there in every branch.
+
+    They are two fifths of what a short set costs.
+    """
+    made_up = swings(read("thesis"), "first", 3.0, 2, 1)
+    with tempfile.TemporaryDirectory() as folder:
+        deliver(made_up, *(Path(folder) / name for name in FILES[:3]))
+
+
+def _judge_apart(folder: Path, known: Path, out: Path) -> None:
+    """Judge a set in a process of its own; results appear as the folder `known`, whole or not at all, and in `out`."""
+    part = known.with_name(f".{known.name}.{os.getpid()}.part")
+    # Nobody else judges this set: what lies here was left by a process that was killed.
+    for left in known.parent.glob(f".{known.name}.*.part"):
+        shutil.rmtree(left, ignore_errors=True)
+    part.mkdir(parents=True)
+    try:
+        context = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
+        process = context.Process(target=_judge_one, args=(folder, part))
+        process.start()
+        process.join()
+        if process.exitcode == _DISK:
+            raise OSError(f"{folder.name}: {(part / FAILED).read_text(encoding='utf-8')}")
+        if process.exitcode not in (0, _UNREADABLE):
+            _write_failure(part, f"its process ended by signal or exit code {process.exitcode}", fault=True)
+        shutil.copytree(part, out, dirs_exist_ok=True)
+        if process.exitcode == 0 and not known.is_dir():
+            os.replace(part, known)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+_DISK, _UNREADABLE = 74, 66
+"""Exit codes of a process that could not write, and of one that could not read its set (sysexits.h)."""
+
+
+def _judge_one(folder: Path, target: Path) -> None:
+    """The files of a set's verdict, or why there are none, into `target`."""
+    try:
+        recordings = read_set(folder)
+    except OSError as error:
+        _write_failure(target, str(error), fault=False)
+        sys.exit(_UNREADABLE)
+    except InputError as error:
+        _write_failure(target, str(error), fault=False)
+        return
+    try:
+        deliver(recordings, *(target / name for name in FILES[:3]))
+    except InputError as error:
+        _write_failure(target, str(error), fault=False)
+    except OSError as error:
+        (target / FAILED).write_text(str(error), encoding="utf-8")
+        sys.exit(_DISK)
+    except Exception as error:  # any fault of the stage costs this set alone
+        traceback.print_exc()
+        _write_failure(target, f"{type(error).__name__}: {error}", fault=True)
+
+
+def _write_failure(target: Path, reason: str, fault: bool) -> None:
+    for name in FILES:
+        (target / name).unlink(missing_ok=True)
+    text = json.dumps({"reason": reason, "fault": fault}, indent=1, ensure_ascii=False) + "\n"
+    (target / FAILED).write_text(text, encoding="utf-8")
 
 
 def collect(folders: Sequence[Path], recordings: Path) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
@@ -175,96 +309,17 @@ def _vehicle(folder: Path) -> str:
         return folder.name
 
 
-_TEMPLATE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><title>Fleet: {{ name }}</title>
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta http-equiv="Content-Security-Policy" content="{{ policy }}">
-<style>
-body { font: 15px/1.45 system-ui, sans-serif; max-width: 70rem; margin: 2rem auto; padding: 0 1rem; color: #222; }
-table { border-collapse: collapse; width: 100%; margin: .5rem 0 2rem; }
-th, td { text-align: left; padding: .25rem .6rem; border-bottom: 1px solid #ddd; vertical-align: top; }
-td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; }
-svg { max-width: 100%; height: auto; background: #fff; }
-.wide { overflow-x: auto; }
-summary { cursor: pointer; margin: .5rem 0; }
-td { overflow-wrap: break-word; }
-td:last-child:not(.number) { min-width: 9rem; }
-.failed, .unexplained { color: #a40000; }
-</style></head><body>
-<h1>Fleet: {{ name }}</h1>
-<p>{{ total }} sets of {{ vehicles }} vehicles: {{ words }}. <b>{{ people }}</b> need a person.</p>
-<h2>What shows</h2>
-{{ figure }}
-<div class="wide"><table><tr><th>effect</th><th class="number">established</th><th class="number">ambiguous</th>
-<th class="number">suggested</th><th class="number">vehicles</th></tr>
-{% for row in counts %}<tr><td>{{ row.effect }}</td><td class="number">{{ row.established }}</td>
-<td class="number">{{ row.ambiguous }}</td><td class="number">{{ row.suggested }}</td>
-<td class="number">{{ row.vehicles }}</td></tr>
-{% endfor %}</table></div>
-<h2>Vehicles</h2>
-<div class="wide"><table><tr><th>vehicle</th><th class="number">sets</th><th class="number">failed</th>
-<th class="number">need a person</th><th>established, in how many sets</th><th>last verdict</th></tr>
-{% for row in fleet %}<tr><td>{{ row.vehicle }}</td><td class="number">{{ row.sets }}</td>
-<td class="number">{{ row.failed or "" }}</td><td class="number">{{ row.person or "" }}</td><td>{{ row.effects }}</td>
-<td class="{{ row.last }}">{{ row.last.replace("_", " ") }}</td></tr>
-{% endfor %}</table></div>
-{% if history %}<h2>What changed since the first sets</h2>
-{% if events %}<ul>{% for row in events %}<li>{{ row.sentence }} {% if row.lasts > 1 %}Seen in {{ row.lasts }} sets.
-{% else %}Seen in this set alone.{% endif %}</li>{% endfor %}</ul>{% else %}<p>Nothing.</p>{% endif %}
-{{ history }}{% endif %}
-<h2>Need a person</h2>
-{% if looked %}<div class="wide"><table>
-<tr><th>set</th><th>vehicle</th><th>verdict</th><th>why</th><th>what it says</th></tr>
-{% for row in looked %}<tr><td>{% if row.verdict == "failed" %}{{ row.set }}{% else %}
-<a href="{{ row.link }}">{{ row.set }}</a>{% endif %}</td>
-<td>{{ row.vehicle }}</td><td class="{{ row.verdict }}">{{ row.verdict.replace("_", " ") }}</td>
-<td>{{ row.person }}</td>
-<td>{{ row.sentence }}</td></tr>
-{% endfor %}</table></div>{% else %}<p>None.</p>{% endif %}
-<h2>Stand by themselves</h2>
-{% if alone %}<details{% if alone|length <= 50 %} open{% endif %}><summary>{{ alone|length }} sets</summary>
-<div class="wide"><table><tr><th>set</th><th>vehicle</th><th>verdict</th><th>effects</th></tr>
-{% for row in alone %}<tr><td><a href="{{ row.link }}">{{ row.set }}</a></td><td>{{ row.vehicle }}</td>
-<td>{{ row.verdict.replace("_", " ") }}</td><td>{{ row.effects }}</td></tr>
-{% endfor %}</table></div></details>{% else %}<p>None.</p>{% endif %}
-</body></html>
-"""
-
-
-_VEHICLE_TEMPLATE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><title>{{ vehicle }}</title>
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta http-equiv="Content-Security-Policy" content="{{ policy }}">
-<style>
-body { font: 15px/1.45 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; color: #222; }
-svg { max-width: 100%; height: auto; background: #fff; }
-</style></head><body>
-<h1>{{ vehicle }}</h1>
-<p>{{ sets }} sets, from {{ first }} to {{ last }}.</p>
-{% if events %}<ul>{% for row in events %}<li>{{ row.sentence }}</li>{% endfor %}</ul>
-{% else %}<p>No quantity differs from some set on by more than flights of one vehicle do.</p>{% endif %}
-<p>Each quantity against the mean of the first sets (shaded), with 95 % intervals. Dotted: what would be stated of all
-later sets in 19 of 20 histories. Red, with a line: differs from that set on.</p>
-{{ figure }}
-</body></html>
-"""
-
-
 def make_vehicle_page(vehicle: str, numbers: pd.DataFrame, events: pd.DataFrame, figure: Path) -> str:
-    """The page of one vehicle from its rows of the tables of `rotorid.report.fleet.history`, and their figure."""
+    """The page of one vehicle from its rows of the tables of `rotorid.report.fleet_history`, and their figure."""
     sets = list(dict.fromkeys(numbers["set"]))
-    return (
-        Environment(autoescape=True, trim_blocks=True)
-        .from_string(_VEHICLE_TEMPLATE)
-        .render(
-            policy=policy_for(),
-            vehicle=vehicle,
-            sets=len(sets),
-            first=sets[0],
-            last=sets[-1],
-            events=events.to_dict("records"),
-            figure=_drawing(figure),
-        )
+    return filled(
+        "vehicle.html",
+        vehicle=vehicle,
+        sets=len(sets),
+        first=sets[0],
+        last=sets[-1],
+        events=events.to_dict("records"),
+        figure=drawing(figure),
     )
 
 
@@ -277,34 +332,24 @@ def make_page(
     figure: Path,
     history: tuple[pd.DataFrame, Path] | None = None,
 ) -> str:
-    """The page of a fleet from its tables (`rotorid.report.fleet.summary`); `links` lead to each set's own page.
+    """The page of a fleet from its tables (`rotorid.report.fleet`); `links` lead to each set's own page.
 
-    `history` are the events of `rotorid.report.fleet.history` and their figure, where they were asked for.
+    `history` are the events of `rotorid.report.fleet_history` and their figure, where they were asked for.
     """
     rows = [{**row, "link": links.get(row["set"], "")} for row in sets.to_dict("records")]
     words = sets["verdict"].value_counts()
-    return (
-        Environment(autoescape=True, trim_blocks=True)
-        .from_string(_TEMPLATE)
-        .render(
-            policy=policy_for(),
-            name=name,
-            total=len(sets),
-            vehicles=sets["vehicle"].nunique(),
-            words=", ".join(f"{count} {word.replace('_', ' ')}" for word, count in sorted(words.items())),
-            people=int((sets["person"] != "").sum()),
-            figure=_drawing(figure),
-            history=_drawing(history[1]) if history else "",
-            events=history[0].to_dict("records") if history else [],
-            counts=counts.to_dict("records"),
-            fleet=fleet.to_dict("records"),
-            looked=[row for row in rows if row["person"]],
-            alone=[row for row in rows if not row["person"]],
-        )
+    return filled(
+        "fleet.html",
+        name=name,
+        total=len(sets),
+        vehicles=sets["vehicle"].nunique(),
+        words=", ".join(f"{count} {word.replace('_', ' ')}" for word, count in sorted(words.items())),
+        people=int((sets["person"] != "").sum()),
+        figure=drawing(figure),
+        history=drawing(history[1]) if history else "",
+        events=history[0].to_dict("records") if history else [],
+        counts=counts.to_dict("records"),
+        fleet=fleet.to_dict("records"),
+        looked=[row for row in rows if row["person"]],
+        alone=[row for row in rows if not row["person"]],
     )
-
-
-def _drawing(figure: Path) -> Markup:
-    """An SVG file as it stands within a page."""
-    text = figure.read_text(encoding="utf-8")
-    return Markup(text[text.index("<svg") :])

@@ -1,6 +1,6 @@
 """How often a true value lies in its stated 95 % interval: simulated flights by each autopilot's own map.
 
-    python -m rotorid.identify.autopilot.coverage docs/proof/autopilot_parameters.csv [flights a map]
+    python -m rotorid_proof.autopilot_coverage docs/proof/autopilot_parameters.csv [flights a map]
 
 writes a row a flight and parameter. A flight is made by each autopilot's own law from thrust to signal of a motor:
 attitude and thrust are prescribed; velocity follows by Newton's law with drag and wind, the moments by Euler's, the
@@ -18,9 +18,8 @@ import numpy as np
 import pandas as pd
 from scipy.signal import lfilter
 
-from rotorid.identify.autopilot.drag import specific_drag
 from rotorid.identify.autopilot.parameters import AutopilotParameter, parameters_of
-from rotorid.identify.autopilot.thrust_maps import MAPS
+from rotorid.identify.autopilot.thrust import MAPS, specific_drag
 from rotorid.recordings import RecordingSet, Run, Vehicle, templates
 from rotorid.recordings import columns as c
 from rotorid.vehicle.attitude import quaternion_from_euler, rotation_from_quaternion

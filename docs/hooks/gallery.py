@@ -1,6 +1,6 @@
 """The gallery: a page for each kind of log, made by the commands that it shows.
 
-    ROTORID_PUBLIC_DATA=DIR python -m rotorid.report.gallery docs/gallery
+    ROTORID_PUBLIC_DATA=DIR python docs/hooks/gallery.py docs/gallery
 
 Each page is a public or shipped log, three commands with what they print, a picture, and what to do next. A log that is
 not in the folder of public recordings leaves its page as it is, and is named.
@@ -15,9 +15,9 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -29,8 +29,7 @@ _MOST_LINES = 3
 """Of what a command prints so many lines are shown from either end."""
 
 
-@dataclass(frozen=True)
-class _GalleryPage:
+class _GalleryPage(NamedTuple):
     """One page."""
 
     name: str
@@ -232,7 +231,7 @@ def index() -> str:
     head = (
         "# Gallery\n\nFor each kind of log: the log, the commands with what they print, a picture, and what to do next."
     )
-    return f"{head} Made by\n`python -m rotorid.report.gallery docs/gallery`.\n\n" + "\n".join(rows) + "\n"
+    return f"{head} Made by\n`python docs/hooks/gallery.py docs/gallery`.\n\n" + "\n".join(rows) + "\n"
 
 
 def main(target: Path, names: Sequence[str]) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
@@ -22,7 +21,7 @@ from rotorid.mismatch.changes.level_one import (
 from rotorid.mismatch.changes.level_one_words import difference_words, in_unit_of_words, quantity_words, unit_of
 from rotorid.mismatch.changes.quantities import Flown, flown, grid_of
 from rotorid.recordings import RecordingSet, read_set
-from rotorid.report.fleet.summary import day_of
+from rotorid.report.fleet import day_of
 
 _NUMBERS = ("vehicle", "set", "day", "good", "name", "quantity", "unit", "change", "low_95", "high_95", "limit")
 EVENTS = ("vehicle", "set", "day", "id", "lasts", "sentence")
@@ -84,7 +83,7 @@ def history(
             progress(f"{vehicle} is left out: {error}")
             continue
         numbers += _numbers_of(vehicle, shown, good)
-        events += [row for point in change_points(shown, good) for row in _rows_of(vehicle, point)]
+        events += [row for point in change_points(shown, good) for row in _rows_of(vehicle, *point)]
         progress(f"{vehicle}: {len(shown)} sets")
     return pd.DataFrame(numbers, columns=_NUMBERS), pd.DataFrame(events, columns=EVENTS)
 
@@ -117,20 +116,11 @@ def shown_by(sets: Sequence[RecordingSet], good: int, progress: Callable[[str], 
     return out
 
 
-@dataclass(frozen=True)
-class _ChangePoint:
-    """A set from which on something differs."""
+def change_points(shown: _Shown, good: int) -> list[tuple[str, int, tuple[Difference, ...]]]:
+    """The sets from which on something differs, in their order, in how many sets it lasts, and what differs.
 
-    set: str
-    lasts: int
-    differences: tuple[Difference, ...]
-
-
-def change_points(shown: _Shown, good: int) -> list[_ChangePoint]:
-    """The sets from which on something differs, in their order; each splits the history in two parts, looked at again.
-
-    The false alarms of a vehicle are those of all sets at which it may have changed. A further change needs as many
-    good sets before it as the first one.
+    Each splits the history in two parts, looked at again. The false alarms of a vehicle are those of all sets at which
+    it may have changed. A further change needs as many good sets before it as the first one.
     """
     names = list(shown)
     places = range(good, len(names))
@@ -148,8 +138,8 @@ def change_points(shown: _Shown, good: int) -> list[_ChangePoint]:
     *_, k, stated = best
     before, after = ({n: shown[n] for n in part} for part in (names[:k], names[k:]))
     earlier, later = change_points(before, good), change_points(after, good)
-    first = list(after).index(later[0].set) if later else len(after)
-    return [*earlier, _ChangePoint(names[k], first, stated), *later]
+    first = list(after).index(later[0][0]) if later else len(after)
+    return [*earlier, (names[k], first, stated), *later]
 
 
 def _rarity(d: Difference) -> tuple[float, float]:
@@ -175,8 +165,8 @@ def _numbers_of(vehicle: str, shown: _Shown, good: int) -> list[dict]:
     return out
 
 
-def _rows_of(vehicle: str, point: _ChangePoint) -> list[dict]:
+def _rows_of(vehicle: str, name: str, lasts: int, differing: Sequence[Difference]) -> list[dict]:
     """Rows of what differs from a set on, the rarest first."""
-    head = {"vehicle": vehicle, "set": point.set, "day": day_of(point.set), "lasts": point.lasts}
-    on = f"{vehicle}, from {point.set} on: "
-    return [head | {"id": d.quantity.key, "sentence": on + difference_words(d)} for d in point.differences]
+    head = {"vehicle": vehicle, "set": name, "day": day_of(name), "lasts": lasts}
+    on = f"{vehicle}, from {name} on: "
+    return [head | {"id": d.quantity.key, "sentence": on + difference_words(d)} for d in differing]

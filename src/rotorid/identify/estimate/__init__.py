@@ -1,1 +1,0 @@
-"""Grey-box estimators: parameters of the equations of motion from data."""

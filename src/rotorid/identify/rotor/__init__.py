@@ -1,1 +1,0 @@
-"""Rotors on a thrust stand."""

@@ -1,1 +1,0 @@
-"""The vehicle on the six-axis sensor: clocks, plateaus, mean wrenches, rotor characteristics."""
