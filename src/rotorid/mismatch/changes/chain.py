@@ -269,6 +269,19 @@ def _decided_at(
     return ChainOption(found, chain, log_posterior)
 
 
+def remembering(products_at: _Products) -> _Products:
+    """The same, asked once for each chain: its columns cost many times what a decision does."""
+    kept: dict[tuple[float, ...], tuple[Evidence, Evidence]] = {}
+
+    def remembered(chain: ChainTerms | None) -> tuple[Evidence, Evidence]:
+        key = () if chain is None else tuple(chain.values)
+        if key not in kept:
+            kept[key] = products_at(chain)
+        return kept[key]
+
+    return remembered
+
+
 def options_of(
     first: ChainTerms | None, products_at: _Products, spread: np.ndarray, prior: Prior, base_at: _BaseAt | None = None
 ) -> list[ChainOption]:
@@ -280,23 +293,16 @@ def options_of(
     """
     if first is None:
         return [_decided_at(None, products_at, spread, prior)]
-    kept: dict[tuple[float, ...], tuple[Evidence, Evidence]] = {}
-
-    def remembered(chain: ChainTerms) -> tuple[Evidence, Evidence]:
-        key = tuple(chain.values)
-        if key not in kept:
-            kept[key] = products_at(chain)
-        return kept[key]
 
     def best(same: frozenset[str] = frozenset()) -> ChainOption:
         starts = [chain for key, chain in first.starts() if key not in same]
-        tried = (_option_of(first, start, remembered, spread, prior, same) for start in starts)
+        tried = (_option_of(first, start, products_at, spread, prior, same) for start in starts)
         return max(tried, key=lambda o: o.log_posterior)
 
     plain = best()
     others = [best(frozenset({t.key})) for t in first.terms if t.key in plain.found.model]
     if base_at is not None and not np.array_equal(plain.chain.values, first.values):
-        base, moved, new = remembered(first)[0], base_at(plain.chain), remembered(plain.chain)[1]
+        base, moved, new = products_at(first)[0], base_at(plain.chain), products_at(plain.chain)[1]
         found, log_posterior = weighed_changes(moved, new, spread, prior)
         gained = 0.5 * float(base.square.sum() - moved.square.sum())
         others.append(ChainOption(found, plain.chain, log_posterior + gained))

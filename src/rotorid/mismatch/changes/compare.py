@@ -23,6 +23,7 @@ from rotorid.mismatch.changes.chain import (
     ChainTerms,
     options_of,
     others_in_place,
+    remembering,
     speed_evidence,
     speed_filters,
     speed_rows,
@@ -260,6 +261,7 @@ def _flight_options(reference: FittedReference, joint: Joint, prior: Prior) -> l
     """The most probable changes of force, moment and sensors, and where the chain changed those without; best first."""
     first = reference.chain if reference.found.commanded else None
 
+    @remembering
     def products_at(chain: ChainTerms | None) -> tuple[Evidence, Evidence]:
         if chain is first:
             return joint.base, joint.new
@@ -324,13 +326,14 @@ def decided_of_speeds(
     """
     if first is None or found.commanded or any(s.command is None for own in both for s in own):
         return None
-    base, rows, now = speed_rows(both[0], found, first, first), [], first
-    for _ in range(3):
+    base, now = speed_rows(both[0], found, first, first), first
+    for at_first in (True, False, False):
         # Whitened by what the chains leave in both sets: what no lag of first order explains is large in the second. At
         # first by the first set alone: a change that is still to be found is no noise.
-        filters = speed_filters([*base, *rows])
+        filters = speed_filters([*base, *([] if at_first else speed_rows(both[1], found, now, now))])
         own = speed_evidence(base, filters, first, first)
 
+        @remembering
         def products_at(chain: ChainTerms, filters=filters, own=own) -> tuple[Evidence, Evidence]:
             return own, speed_evidence(speed_rows(both[1], found, chain, first), filters, chain, first)
 
@@ -339,7 +342,6 @@ def decided_of_speeds(
 
         options = options_of(first, products_at, first.spread, prior, base_at)
         now = options[0].chain
-        rows = speed_rows(both[1], found, now, now)
     return options, squares_of_speeds(speed_rows(both[1], found, now, first), both[1], now)
 
 
