@@ -3,7 +3,7 @@
 Run: python benchmarks/selection.py [--out benchmarks/selection.md]
 
 The columns of the catalogue's forms, as the regression has them, go to both: to PySINDy's STLSQ as
-`rotorid_proof.peers.sindy` uses it, and to our search (`rotorid.mismatch.decision.select.Search`), timed inside the
+`rotorid_proof.peers.sindy` uses it, and to our search (`rotorid.mismatch.decide.select.Search`), timed inside the
 whole analysis, which makes columns, searches and judges. Simulated vehicles, two flights each.
 """
 
@@ -19,8 +19,8 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from rotorid.mismatch.analyse import analyse
-from rotorid.mismatch.decision.select import Search
-from rotorid.mismatch.posterior.status import CLAIMED
+from rotorid.mismatch.decide.select import Search
+from rotorid.mismatch.decide.status import CLAIMED
 from rotorid.recordings.templates import read
 from rotorid.vehicle.control.swings import swings
 from rotorid_proof.peers import sindy

@@ -180,7 +180,7 @@ A rule decides where the comparison of two models by their fit cannot. It can be
 def decision_page() -> str:
     """The page of the decision: its rules with their limits, its modules and its constants."""
     from rotorid.mismatch import ROOMS
-    from rotorid.mismatch.decision.rules import markdown
+    from rotorid.mismatch.decide.rules import markdown
 
     lines = [DECISION, markdown(), "## Modules and constants", ""]
     lines += ["Rooms in their order: each uses those above it.", ""]

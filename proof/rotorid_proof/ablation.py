@@ -13,7 +13,7 @@ from pathlib import Path
 import pandas as pd
 from scipy.stats import beta
 
-from rotorid.mismatch.decision.rules import RULES
+from rotorid.mismatch.decide.rules import RULES
 from rotorid_proof.score import score_case
 from rotorid_proof.without_rules import Judged
 

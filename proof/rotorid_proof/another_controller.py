@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.mismatch.decision.findings import Analysis
-from rotorid.mismatch.delivery.files import improved_vehicle
-from rotorid.mismatch.delivery.flown import UNITS, model_of, squares_of_windows
-from rotorid.mismatch.plant.motion import HIGHEST_CUTOFF_HZ, analysis_rate_hz, build_segments, full_speed
+from rotorid.mismatch.decide.findings import Analysis
+from rotorid.mismatch.deliver.files import improved_vehicle
+from rotorid.mismatch.deliver.flown import UNITS, model_of, squares_of_windows
+from rotorid.mismatch.evidence.motion import HIGHEST_CUTOFF_HZ, analysis_rate_hz, build_segments, full_speed
 from rotorid.recordings import Run, Vehicle, read_set
 from rotorid.report.deliver import analysis_of, verdict_of
 from rotorid_proof.concealed import cases, drawn

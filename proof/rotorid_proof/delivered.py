@@ -12,11 +12,11 @@ import numpy as np
 import pandas as pd
 
 from rotorid.errors import InputError
-from rotorid.mismatch.decision.findings import Analysis
-from rotorid.mismatch.decision.shares import fitted_part
-from rotorid.mismatch.delivery.files import delivered, improved_vehicle
-from rotorid.mismatch.delivery.usable import question_of
-from rotorid.mismatch.plant.rows import CHANNELS
+from rotorid.mismatch.decide.findings import Analysis
+from rotorid.mismatch.decide.sizes import fitted_part
+from rotorid.mismatch.deliver.files import delivered, improved_vehicle
+from rotorid.mismatch.deliver.usable import question_of
+from rotorid.mismatch.evidence.rows import CHANNELS
 from rotorid.mismatch.tell.verdict import Verdict
 from rotorid.recordings import RecordingSet, Vehicle, read_set
 from rotorid.report.deliver import analysis_of, verdict_of

@@ -13,9 +13,9 @@ from dataclasses import asdict, dataclass, fields
 import numpy as np
 import pandas as pd
 
-from rotorid.mismatch.decision.findings import Finding
-from rotorid.mismatch.plant.regression import Regression
-from rotorid.mismatch.plant.rows import Term
+from rotorid.mismatch.decide.findings import Finding
+from rotorid.mismatch.evidence.regression import Regression
+from rotorid.mismatch.evidence.rows import Term
 from rotorid.plan.plan import Plan
 from rotorid.plan.questions import FittedSet, Question, answers, best_of, joined_sets
 from rotorid.plan.separation import Separation, recorded_after

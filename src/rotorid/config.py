@@ -23,7 +23,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 
 from rotorid.errors import InputError
 from rotorid.io.text.wording import LONGEST, explained
-from rotorid.mismatch.decision.rules import RULES
+from rotorid.mismatch.decide.rules import RULES
 
 READING_S = 0.004
 """Time between readings, s."""
@@ -405,7 +405,7 @@ class Decisions(Section):
 
 
 class Rules(Section):
-    """Rules of the mismatch stage (`rotorid.mismatch.decision.rules`)."""
+    """Rules of the mismatch stage (`rotorid.mismatch.decide.rules`)."""
 
     off: list[_Text] = Field(description="Rules that are left out of every verdict [names].")
 

@@ -6,7 +6,7 @@ Concealed sets are judged with all rules, then without each rule those in which 
 
 from fnmatch import fnmatchcase
 
-from rotorid.mismatch.decision.rules import RULES
+from rotorid.mismatch.decide.rules import RULES
 
 ABLATION_CASES = [
     entry.case

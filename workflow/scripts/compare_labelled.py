@@ -11,7 +11,7 @@ from pathlib import Path
 from rotorid.mismatch.changes import words
 from rotorid.mismatch.changes.compare import changes_from
 from rotorid.mismatch.changes.joint import reference_of
-from rotorid.mismatch.changes.level_one_words import quantity_words
+from rotorid.mismatch.changes.words import quantity_words
 from rotorid.recordings import read_set
 from rotorid.recordings.importers.faults import read_report
 from rotorid.report import log

@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.mismatch.changes.compare import Changes
-from rotorid.mismatch.posterior.status import CLAIMED
+from rotorid.mismatch.decide.status import CLAIMED
 from rotorid.recordings import RecordingSet
 from rotorid_proof.intervals import wilson
 

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rotorid.mismatch.decision.findings import Finding
-from rotorid.mismatch.model.absent import evidence_of
-from rotorid.mismatch.model.decided import Decided
-from rotorid.mismatch.posterior.evidence import Evidence
+from rotorid.mismatch.decide.findings import Finding
+from rotorid.mismatch.evidence.gram import Evidence
+from rotorid.mismatch.flight.absent import evidence_of
+from rotorid.mismatch.flight.fitted import Decided
 from rotorid.mismatch.tell.verdict import WrongValue, effect_verdict
 from rotorid.recordings import RecordingSet
 from rotorid.report.deliver import analysis_of, verdict_of

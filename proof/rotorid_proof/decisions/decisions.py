@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.mismatch.posterior.problem import Prior
-from rotorid.mismatch.posterior.search import Found, decide, ranked
-from rotorid.mismatch.posterior.statements import Statement, statements_of
-from rotorid.mismatch.posterior.status import CLAIMED
+from rotorid.mismatch.decide.problem import Prior
+from rotorid.mismatch.decide.search import Found, decide, ranked
+from rotorid.mismatch.decide.statements import Statement, statements_of
+from rotorid.mismatch.decide.status import CLAIMED
 from rotorid_proof.decisions.store import Kept
 
 MOST_RANKED, MOST_STARTS = 200, 4

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from rotorid.io.text.writing import all_or_none
-from rotorid.mismatch.posterior.evidence import Evidence, EvidenceTerm, LinearParameter
+from rotorid.mismatch.evidence.gram import Evidence, EvidenceTerm, LinearParameter
 from rotorid_proof.decisions.label import Label
 
 SEALED = "sealed"

@@ -20,11 +20,11 @@ from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
-from rotorid.mismatch.decision.findings import Analysis
-from rotorid.mismatch.decision.shares import fitted_part, segments_of
-from rotorid.mismatch.delivery.flown import model_of, squares_of_windows
-from rotorid.mismatch.plant.motion import HIGHEST_CUTOFF_HZ, Segment, analysis_rate_hz
-from rotorid.mismatch.plant.rows import GROUPS, Thinner, residual
+from rotorid.mismatch.decide.findings import Analysis
+from rotorid.mismatch.decide.sizes import fitted_part, segments_of
+from rotorid.mismatch.deliver.flown import model_of, squares_of_windows
+from rotorid.mismatch.evidence.motion import HIGHEST_CUTOFF_HZ, Segment, analysis_rate_hz
+from rotorid.mismatch.evidence.rows import GROUPS, Thinner, residual
 from rotorid.recordings import Vehicle
 from rotorid.vehicle.derivatives import quantities
 

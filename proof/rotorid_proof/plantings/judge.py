@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from rotorid.mismatch.decision.findings import Finding
+from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.recordings import RecordingSet, read_set
 from rotorid.report.deliver import judge

@@ -110,7 +110,7 @@ def _comparison(found, target: Path) -> list[Path]:
     """Write `next_to_log.csv` (a row a model and channel) and `next_to_log.png`."""
     import pandas as pd
 
-    from rotorid.mismatch.delivery.flown import UNITS
+    from rotorid.mismatch.deliver.flown import UNITS
     from rotorid.report.plots.next_to_log import draw
 
     rows = [

@@ -235,7 +235,7 @@ def compare(
             )
         with progress("compare: what differs", quiet):
             from rotorid.mismatch.changes.level_one import as_one, of_one_vehicle, seen_by
-            from rotorid.mismatch.changes.level_one_words import level_one_sentences
+            from rotorid.mismatch.changes.words import level_one_sentences
 
             *known, second = of_one_vehicle(read(sets, mass_kg, like, vehicle, mapping))
             good = as_one(known)

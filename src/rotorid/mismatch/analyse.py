@@ -14,10 +14,9 @@ import numpy as np
 from rotorid.effects.catalogue import before_the_rotors, catalogue, ids_of, ids_of_stage, moving_air
 from rotorid.effects.contract import LIMIT, SUPPLY, SpeedForm, SpeedPath
 from rotorid.errors import InputError
-from rotorid.mismatch.decision import rules
-from rotorid.mismatch.decision.decide import coefficients, throttle_or_thrust, wrench_findings
-from rotorid.mismatch.decision.evidence import weighed
-from rotorid.mismatch.decision.findings import (
+from rotorid.mismatch.decide import rules
+from rotorid.mismatch.decide.enough import weighed
+from rotorid.mismatch.decide.findings import (
     Analysis,
     ChannelTrace,
     Finding,
@@ -28,28 +27,30 @@ from rotorid.mismatch.decision.findings import (
     rms,
     with_probabilities,
 )
-from rotorid.mismatch.decision.shares import fitted_part
-from rotorid.mismatch.delivery.candidates import Candidate, Ground
-from rotorid.mismatch.delivery.files import claimed, conditions_of, instruments_of, place_of, with_effects
-from rotorid.mismatch.delivery.final import Offered, Stretches, as_delivered
-from rotorid.mismatch.delivery.flown import model_of, squares_of_windows
-from rotorid.mismatch.delivery.usable import chain_ids, question_of, with_only
-from rotorid.mismatch.mistakes import find_mistakes
-from rotorid.mismatch.model import within_trust
-from rotorid.mismatch.model.absent import absent, absorbed_findings, chosen_already
-from rotorid.mismatch.model.decided import Decided, Watch, unwatched
-from rotorid.mismatch.model.delivered import Values, believed_residuals, residuals_of
-from rotorid.mismatch.model.dependence import dependence
-from rotorid.mismatch.model.fitted import Fitted, fitted
-from rotorid.mismatch.model.gains import values_alone
-from rotorid.mismatch.model.gusts import gust_finding
-from rotorid.mismatch.model.leave_one_out import without_each
-from rotorid.mismatch.model.leftover import leftover
-from rotorid.mismatch.model.next_flight import next_flight
-from rotorid.mismatch.model.payload_windows import loads, on_board
-from rotorid.mismatch.model.prepare import Prepared, prepare, prepare_like
-from rotorid.mismatch.model.report_runs import comparable, on_every_run, scaled_by_run
-from rotorid.mismatch.model.values import (
+from rotorid.mismatch.decide.selected import coefficients, throttle_or_thrust, wrench_findings
+from rotorid.mismatch.decide.sizes import fitted_part
+from rotorid.mismatch.decide.statements import UpperLimit
+from rotorid.mismatch.decide.status import CLAIMED
+from rotorid.mismatch.deliver.candidates import Candidate, Ground
+from rotorid.mismatch.deliver.files import claimed, conditions_of, instruments_of, place_of, with_effects
+from rotorid.mismatch.deliver.final import Offered, Stretches, as_delivered
+from rotorid.mismatch.deliver.flown import model_of, squares_of_windows
+from rotorid.mismatch.deliver.usable import chain_ids, question_of, with_only
+from rotorid.mismatch.evidence.motion import Segment, full_speed, regime_variables, stretches
+from rotorid.mismatch.evidence.regression import Fit
+from rotorid.mismatch.evidence.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE
+from rotorid.mismatch.evidence.speedpath import CommandChain, SpeedResult, commanded_path
+from rotorid.mismatch.evidence.split import parts_of, split_runs
+from rotorid.mismatch.flight.absent import absent, absorbed_findings, chosen_already
+from rotorid.mismatch.flight.delivered import Values, believed_residuals, beyond_trust, in_words, residuals_of, settled
+from rotorid.mismatch.flight.fitted import Decided, Fitted, Watch, fitted, next_flight, unwatched
+from rotorid.mismatch.flight.gains import values_alone
+from rotorid.mismatch.flight.gusts import gust_finding
+from rotorid.mismatch.flight.leftover import dependence, leftover
+from rotorid.mismatch.flight.prepare import Prepared, prepare, prepare_like
+from rotorid.mismatch.flight.report_runs import comparable, on_every_run, scaled_by_run, without_each
+from rotorid.mismatch.flight.swinging import loads, on_board
+from rotorid.mismatch.flight.values import (
     changed_vehicle,
     contract_values,
     only_throttle,
@@ -59,15 +60,8 @@ from rotorid.mismatch.model.values import (
     with_square_term,
     with_values_in_question,
 )
-from rotorid.mismatch.model.within_trust import beyond_trust, settled
-from rotorid.mismatch.model.wrench import WrenchModel, linear_drag, nonlinear_intervals
-from rotorid.mismatch.plant.motion import Segment, full_speed, regime_variables, stretches
-from rotorid.mismatch.plant.regression import Fit
-from rotorid.mismatch.plant.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE
-from rotorid.mismatch.plant.speedpath import CommandChain, SpeedResult, commanded_path
-from rotorid.mismatch.plant.split import parts_of, split_runs
-from rotorid.mismatch.posterior.limits import UpperLimit
-from rotorid.mismatch.posterior.status import CLAIMED
+from rotorid.mismatch.flight.wrench import WrenchModel, linear_drag, nonlinear_intervals
+from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.recordings import RecordingSet, Split, Vehicle
 from rotorid.vehicle.derivatives import quantities
 from rotorid.vehicle.improved import active_forms
@@ -235,7 +229,7 @@ def _account(
         force_source=model.segments[0].force_source,
         notes=(*choice.remarks, *run_scale_notes(model), *_lag_alone_notes(found.chain)),
         instead=_instead_in_words(found.instead),
-        corrected=within_trust.in_words(moved),
+        corrected=in_words(moved),
     )
 
 
@@ -384,7 +378,7 @@ def not_testable(prepared: Prepared, chain: CommandChain | None, findings: list[
 def _instead_in_words(instead: Mapping[str, Sequence[Values]]) -> dict[str, tuple[str, ...]]:
     """Contract name of a wrong value to others, in words, that would explain as much in its place."""
     return {
-        PARAMETER_NAMES[key]: tuple(filter(None, (" with ".join(within_trust.in_words(x)) for x in as_well)))
+        PARAMETER_NAMES[key]: tuple(filter(None, (" with ".join(in_words(x)) for x in as_well)))
         for key, as_well in instead.items()
     }
 

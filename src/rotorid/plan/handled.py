@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.mismatch.decision.select import VALUE_FLOOR
-from rotorid.mismatch.plant.regression import NEVER_EXCITED, ridge_inverse
-from rotorid.mismatch.plant.rows import PARAMETER_NAMES
-from rotorid.mismatch.plant.unknowns import UNKNOWNS
-from rotorid.mismatch.posterior.limits import PROBABILITY, drawn
+from rotorid.mismatch.decide.select import VALUE_FLOOR
+from rotorid.mismatch.decide.statements import PROBABILITY, drawn
+from rotorid.mismatch.evidence.regression import NEVER_EXCITED, ridge_inverse
+from rotorid.mismatch.evidence.rows import PARAMETER_NAMES
+from rotorid.mismatch.evidence.unknowns import UNKNOWNS
 from rotorid.plan.candidates import ManoeuvrePiece, joined
 from rotorid.plan.limits import Limits
 from rotorid.plan.questions import FittedSet, Question

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.mismatch.plant.comparison import ENVIRONMENT_S, LEAST_ENVIRONMENTS
+from rotorid.mismatch.evidence.comparison import ENVIRONMENT_S, LEAST_ENVIRONMENTS
 from rotorid.plan.candidates import STANDARD, ManoeuvrePiece, Reference, candidates, joined, smaller, standard
 from rotorid.plan.handled import Handled, Width, check_wishes, handled, widths
 from rotorid.plan.limits import Limits

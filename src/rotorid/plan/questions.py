@@ -27,23 +27,22 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form, SpeedForm
 from rotorid.errors import InputError
 from rotorid.mismatch.analyse import findings_inside, findings_outside
-from rotorid.mismatch.decision.findings import Analysis, Finding, with_probabilities
-from rotorid.mismatch.decision.select import COST_PER_PARAMETER
-from rotorid.mismatch.delivery.derivatives import learn
+from rotorid.mismatch.decide.findings import Analysis, Finding, with_probabilities
+from rotorid.mismatch.decide.select import COST_PER_PARAMETER
+from rotorid.mismatch.decide.status import CLAIMED
+from rotorid.mismatch.deliver.candidates import learn
+from rotorid.mismatch.evidence.comparison import ENVIRONMENT_S
+from rotorid.mismatch.evidence.motion import HIGHEST_CUTOFF_HZ, Segment
+from rotorid.mismatch.evidence.regression import Regression, autoregression
+from rotorid.mismatch.evidence.rows import Term, residual
+from rotorid.mismatch.evidence.speedpath import commanded_path, starts_of
+from rotorid.mismatch.evidence.split import parts_of, split_runs
+from rotorid.mismatch.flight.absent import chosen_already
+from rotorid.mismatch.flight.delivered import ways
+from rotorid.mismatch.flight.fitted import CURVES, Fitted, beyond_flying, fitted
+from rotorid.mismatch.flight.prepare import Prepared, assemble_rows, prepare
+from rotorid.mismatch.flight.wrench import chosen, path_segments
 from rotorid.mismatch.mistakes import find_mistakes
-from rotorid.mismatch.model.absent import chosen_already
-from rotorid.mismatch.model.fitted import Fitted, fitted
-from rotorid.mismatch.model.next_flight import CURVES, beyond_flying
-from rotorid.mismatch.model.prepare import Prepared, assemble_rows, prepare
-from rotorid.mismatch.model.within_trust import ways
-from rotorid.mismatch.model.wrench import chosen, path_segments
-from rotorid.mismatch.plant.comparison import ENVIRONMENT_S
-from rotorid.mismatch.plant.motion import HIGHEST_CUTOFF_HZ, Segment
-from rotorid.mismatch.plant.regression import Regression, autoregression
-from rotorid.mismatch.plant.rows import Term, residual
-from rotorid.mismatch.plant.speedpath import commanded_path, starts_of
-from rotorid.mismatch.plant.split import parts_of, split_runs
-from rotorid.mismatch.posterior.status import CLAIMED
 from rotorid.recordings import RecordingSet
 from rotorid.recordings.signal.kernels import causal
 from rotorid.recordings.sufficient import sufficient

@@ -1,6 +1,6 @@
 """How far apart two competing models are on recordings not made yet, by the comparison that the engine decides with.
 
-The engine compares models by what they leave in whitened squares (`rotorid.mismatch.plant.comparison`). If model h is
+The engine compares models by what they leave in whitened squares (`mismatch.evidence.comparison`). If model h is
 true with coefficients θ, the best that its rival can do leaves λ more of them: what is left of h's contribution once
 the rival's terms and all that both share are fitted to it, with the priors and within the limits of the engine's own
 fit. A believed value moves at a cost and no further than its limit: without one the rotors' distance would take over
@@ -22,15 +22,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rotorid.mismatch.model.absent import scales
-from rotorid.mismatch.model.prepare import assemble_rows, prepare_like
-from rotorid.mismatch.model.wrench import after_residual, block_seconds, channel_floor, chosen, path_segments
-from rotorid.mismatch.plant.comparison import ENVIRONMENT_S
-from rotorid.mismatch.plant.motion import Segment
-from rotorid.mismatch.plant.regression import Regression, autoregression, build, ridge_inverse
-from rotorid.mismatch.plant.rows import Rows, Term
-from rotorid.mismatch.plant.split import HELD_OUT_SHARE, training_rule
-from rotorid.mismatch.posterior.problem import Prior
+from rotorid.mismatch.decide.problem import Prior
+from rotorid.mismatch.evidence.comparison import ENVIRONMENT_S
+from rotorid.mismatch.evidence.motion import Segment
+from rotorid.mismatch.evidence.regression import Regression, autoregression, build, ridge_inverse
+from rotorid.mismatch.evidence.rows import Rows, Term
+from rotorid.mismatch.evidence.split import HELD_OUT_SHARE, training_rule
+from rotorid.mismatch.flight.absent import scales
+from rotorid.mismatch.flight.prepare import assemble_rows, prepare_like
+from rotorid.mismatch.flight.wrench import after_residual, block_seconds, channel_floor, chosen, path_segments
 from rotorid.plan.candidates import Reference
 from rotorid.plan.limits import Limits
 from rotorid.plan.questions import FittedSet, Hypothesis, Question, chain_interval, chain_squares
@@ -144,7 +144,7 @@ def world_of(known: FittedSet, question: Question | None, hypothesis: Hypothesis
             if term.form.linear:
                 values[list(term.form.linear)] = fit.beta[fit.places(regression.columns([key]))]
             effects.append((term.form, values))
-    from rotorid.mismatch.plant.unknowns import UNKNOWNS
+    from rotorid.mismatch.evidence.unknowns import UNKNOWNS
 
     unnamed = {t.form.name for t in regression.terms if t.kind == "effect" and t.effect in UNKNOWNS}
     effects = tuple(e for e in effects if e[0].name not in unnamed)
@@ -342,7 +342,7 @@ def squares_left(
 def within(normal: np.ndarray, right: np.ndarray, limit: np.ndarray) -> np.ndarray:
     """Solutions (D, n) of normal equations (n, n) for many right sides (D, n), each coefficient within `limit` (n,).
 
-    As the engine's own fit (`rotorid.mismatch.plant.regression.bounded`): what is furthest out is held at its limit,
+    As the engine's own fit (`rotorid.mismatch.evidence.regression.bounded`): what is furthest out is held at its limit,
     until nothing is out.
     """
     free = ridge_inverse(normal)

@@ -19,22 +19,23 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.io.text.writing import all_or_none, rounded
-from rotorid.mismatch.decision.findings import with_probabilities
+from rotorid.mismatch.decide.findings import with_probabilities
+from rotorid.mismatch.evidence.regression import Regression, build
+from rotorid.mismatch.evidence.rows import Rows, Term
+from rotorid.mismatch.evidence.split import parts_of, split_runs
 from rotorid.mismatch.instrument.analyse import reading_findings, with_plainer_forms
 from rotorid.mismatch.instrument.chain import ChainResult, find_chain, moved
-from rotorid.mismatch.instrument.columns import make_terms, rows_of
 from rotorid.mismatch.instrument.mistakes import find_mistakes
 from rotorid.mismatch.instrument.model import (
     ReadingModel,
     chosen_already,
     everything,
     fitted_model,
+    make_terms,
+    rows_of,
     whole_reading,
 )
 from rotorid.mismatch.instrument.setup import set_up, with_unseen
-from rotorid.mismatch.plant.regression import Regression, build
-from rotorid.mismatch.plant.rows import Rows, Term
-from rotorid.mismatch.plant.split import parts_of, split_runs
 from rotorid.plan.limits import SessionLimits
 from rotorid.plan.plan import Forecast, Plan, Tried, chosen_pieces
 from rotorid.plan.questions import Question, claimed_in, in_thirds, question_of

@@ -30,7 +30,7 @@ from scipy.spatial.transform import Rotation
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form, Motion, SpeedPath
 from rotorid.errors import InputError
-from rotorid.mismatch.plant.rows import Term
+from rotorid.mismatch.evidence.rows import Term
 from rotorid.plan.candidates import Reference
 from rotorid.recordings import Run, Vehicle
 from rotorid.recordings import columns as c

@@ -24,10 +24,10 @@ from threadpoolctl import threadpool_limits
 from rotorid.io.text.files import parse_yaml
 from rotorid.io.text.writing import all_or_none, rounded
 from rotorid.mismatch.analyse import analyse
-from rotorid.mismatch.decision import rules
-from rotorid.mismatch.decision.findings import Analysis, Finding
-from rotorid.mismatch.decision.rules import RULES
-from rotorid.mismatch.delivery.files import (
+from rotorid.mismatch.decide import rules
+from rotorid.mismatch.decide.findings import Analysis, Finding
+from rotorid.mismatch.decide.rules import RULES
+from rotorid.mismatch.deliver.files import (
     CONDITIONS,
     INSTRUMENTS,
     conditions_of,
@@ -37,15 +37,14 @@ from rotorid.mismatch.delivery.files import (
     read_conditions,
     read_instruments,
 )
-from rotorid.mismatch.delivery.files import text_of as file_text
-from rotorid.mismatch.delivery.flown import model_of
+from rotorid.mismatch.deliver.files import text_of as file_text
+from rotorid.mismatch.deliver.flown import model_of
+from rotorid.mismatch.flight.fitted import Watch, unwatched
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.instrument.remainder import prove as prove_reading
-from rotorid.mismatch.model.decided import Watch, unwatched
 from rotorid.mismatch.tell.forward import Forward, forward_channels, prove
 from rotorid.mismatch.tell.locate import locate
-from rotorid.mismatch.tell.steps import steps_sentence
-from rotorid.mismatch.tell.tiles import tiles
+from rotorid.mismatch.tell.steps import steps_sentence, tiles
 from rotorid.mismatch.tell.verdict import Verdict, main_channel, make_verdict, with_doubts
 from rotorid.recordings import RecordingSet, Vehicle, read_vehicle, vehicle_of, write_vehicle
 from rotorid.recordings.sufficient import sufficient

@@ -18,8 +18,8 @@ from rotorid.mismatch.changes.level_one import (
     of_one_vehicle,
     usual_scatter,
 )
-from rotorid.mismatch.changes.level_one_words import difference_words, in_unit_of_words, quantity_words, unit_of
 from rotorid.mismatch.changes.quantities import Flown, flown, grid_of
+from rotorid.mismatch.changes.words import difference_words, in_unit_of_words, quantity_words, unit_of
 from rotorid.recordings import RecordingSet, read_set
 from rotorid.report.fleet import day_of
 

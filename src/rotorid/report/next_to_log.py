@@ -16,10 +16,9 @@ from importlib.util import find_spec
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.mismatch.decision.drift import WINDOW_S
-from rotorid.mismatch.decision.findings import Analysis
-from rotorid.mismatch.decision.shares import segments_of
-from rotorid.mismatch.delivery.flown import UNITS, Model, driven_by, model_of
+from rotorid.mismatch.decide.findings import Analysis
+from rotorid.mismatch.decide.sizes import WINDOW_S, segments_of
+from rotorid.mismatch.deliver.flown import UNITS, Model, driven_by, model_of
 from rotorid.mismatch.tell.forward import delivered_model
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.attitude import normalised, quaternion_rate, rotation_from_quaternion

@@ -17,8 +17,8 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.mismatch.decision.findings import Analysis
-from rotorid.mismatch.decision.shares import segments_of, shares
+from rotorid.mismatch.decide.findings import Analysis
+from rotorid.mismatch.decide.sizes import segments_of, shares
 
 _COLOURS = ("#d55e00", "#e69f00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#000000", "#f0e442")
 _PLOTS_A_TAB = 3

@@ -8,7 +8,7 @@ import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form, Motion, SpeedForm
-from rotorid.mismatch.plant.motion import Segment
+from rotorid.mismatch.evidence.motion import Segment
 from rotorid.recordings import Vehicle
 from rotorid.vehicle.improved import simulate_as_stated
 from rotorid.vehicle.simulator import Commands, Start, Trace, motion_of

@@ -11,7 +11,7 @@ import pytest
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.pendulum import likely_lengths
 from rotorid.effects.scale import hover_inflow_m_s, scale
-from tests.unit.mismatch.plant.test_rows import still
+from tests.unit.mismatch.evidence.test_rows import still
 from tests.unit.vehicle.thesis import thesis_vehicle
 
 T, Q, D, G = 1.3877, 0.018558, 0.0884, 9.81

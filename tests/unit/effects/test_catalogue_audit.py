@@ -22,10 +22,10 @@ from rotorid.effects.contract import COLUMNS_OF, LACK, Contribution, Motion, Spe
 from rotorid.effects.describe import EXCITATION, instrument_forms
 from rotorid.effects.gust import window_form
 from rotorid.errors import InputError
+from rotorid.mismatch.evidence.rows import form_columns, project, residual
+from rotorid.mismatch.evidence.speedpath import commanded_path
+from rotorid.mismatch.flight.prepare import make_terms
 from rotorid.mismatch.mistakes import find_mistakes
-from rotorid.mismatch.model.prepare import make_terms
-from rotorid.mismatch.plant.rows import form_columns, project, residual
-from rotorid.mismatch.plant.speedpath import commanded_path
 from rotorid.recordings import RecordingSet
 from rotorid.vehicle.improved import (
     active_forms,

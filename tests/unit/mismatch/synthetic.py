@@ -5,8 +5,8 @@ import pandas as pd
 from scipy.signal import lfilter
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.mismatch.decision.findings import Analysis, ChannelTrace, Finding
-from rotorid.mismatch.posterior.status import Estimate
+from rotorid.mismatch.decide.findings import Analysis, ChannelTrace, Finding
+from rotorid.mismatch.decide.status import Estimate
 from rotorid.recordings import RecordingSet, Run, Split
 from tests.unit.vehicle.thesis import thesis_vehicle
 

@@ -1,7 +1,7 @@
 """A centre of mass off its place may be a payload where the vehicle is heavier than believed."""
 
 from rotorid.mismatch.analyse import payload_or_offset
-from rotorid.mismatch.decision.findings import Finding
+from rotorid.mismatch.decide.findings import Finding
 
 OFFSET = Finding(id="com_offset", status="established")
 PRODUCTS = Finding(id="inertia_products", status="established")

@@ -8,8 +8,8 @@ import pytest
 from rotorid.cli.planning import SECTION, with_plan
 from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
-from rotorid.mismatch.plant.motion import build_segments
-from rotorid.mismatch.plant.rows import residual
+from rotorid.mismatch.evidence.motion import build_segments
+from rotorid.mismatch.evidence.rows import residual
 from rotorid.plan import write
 from rotorid.plan.candidates import Reference, candidates, joined, smaller, standard
 from rotorid.plan.limits import Limits

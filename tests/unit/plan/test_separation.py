@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rotorid.mismatch.plant.regression import bounded, build
-from rotorid.mismatch.plant.rows import Rows, Term
+from rotorid.mismatch.evidence.regression import bounded, build
+from rotorid.mismatch.evidence.rows import Rows, Term
 from rotorid.plan.questions import Hypothesis, Question
 from rotorid.plan.separation import Information, drawn, log_odds, separations, squares_left, within
 

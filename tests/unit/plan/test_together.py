@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from rotorid.cli import app
 from rotorid.cli.planning import sets_of
 from rotorid.errors import InputError
-from rotorid.mismatch.decision.findings import Finding
+from rotorid.mismatch.decide.findings import Finding
 from rotorid.plan.questions import answers, joined_sets
 from rotorid.recordings import RecordingSet, Run, templates
 

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from rotorid.mismatch.changes.compare import Change, Changes
-from rotorid.mismatch.posterior.status import Estimate
+from rotorid.mismatch.decide.status import Estimate
 from rotorid.recordings import RecordingSet, Run
 from rotorid_proof.changes import pairs
 from rotorid_proof.changes.score import Sought, halves, row_of, some_runs, summary, table

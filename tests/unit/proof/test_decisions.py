@@ -17,8 +17,8 @@ from rotorid_proof.decisions.store import Kept, read_all, write
 from rotorid_proof.decisions.table import markdown, sets, table
 from rotorid_proof.plan import Entry
 from rotorid_proof.plantings.kinds import Ratio, Size, named
-from tests.unit.mismatch.posterior.test_posterior import effect as term
-from tests.unit.mismatch.posterior.test_posterior import flight
+from tests.unit.mismatch.decide.test_posterior import effect as term
+from tests.unit.mismatch.decide.test_posterior import flight
 
 DRAG = {"id": "rotor_drag", "form": "", "equivalent": [], "size_over_noise": 1.0}
 ANSWER = {

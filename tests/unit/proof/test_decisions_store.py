@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotorid.mismatch.posterior.evidence import Evidence, EvidenceTerm, LinearParameter
+from rotorid.mismatch.evidence.gram import Evidence, EvidenceTerm, LinearParameter
 from rotorid_proof.decisions import truths
 from rotorid_proof.decisions.label import Label
 from rotorid_proof.decisions.store import SEALED, Kept, key_of, newest, read_all, read_evidence, read_truth, write

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rotorid.mismatch.plant.regression import build
-from rotorid.mismatch.plant.rows import Rows, Term
+from rotorid.mismatch.evidence.regression import build
+from rotorid.mismatch.evidence.rows import Rows, Term
 from rotorid_proof.next_flight import as_asked
 
 RATE = 40.0

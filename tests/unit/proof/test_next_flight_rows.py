@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from rotorid.mismatch.decision.findings import Finding
+from rotorid.mismatch.decide.findings import Finding
 from rotorid_proof.next_flight import Row, outcome_of, summary, table
 
 IDS = ("frame_drag", "rotor_drag")

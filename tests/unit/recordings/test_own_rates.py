@@ -10,7 +10,7 @@ import pytest
 
 from rotorid.cli.modelling import fly
 from rotorid.errors import InputError
-from rotorid.mismatch.plant.motion import between_readings
+from rotorid.mismatch.evidence.motion import between_readings
 from rotorid.recordings import RecordingSet, Run, read_set, templates
 from rotorid.recordings import columns as c
 from rotorid.recordings.own_rates import evenly, is_scattered, noise_gain, on_one_side, on_own_rates, own_period_s

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from rotorid.mismatch.delivery.files import improved_vehicle
-from rotorid.mismatch.delivery.flown import model_of
+from rotorid.mismatch.deliver.files import improved_vehicle
+from rotorid.mismatch.deliver.flown import model_of
 from rotorid.mismatch.tell.forward import delivered_model, forward_channels, prove
 from rotorid.recordings import read_vehicle, write_vehicle
 from rotorid.report.deliver import write_files

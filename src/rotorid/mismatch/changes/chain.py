@@ -14,16 +14,16 @@ import numpy as np
 
 from rotorid.effects.contract import DELAY, LIMIT, Parameter
 from rotorid.mismatch.changes.problem import change_of, held, weighed_changes
-from rotorid.mismatch.model.fitted import Fitted
-from rotorid.mismatch.model.prepare import assemble_rows
-from rotorid.mismatch.model.report_runs import as_flown
-from rotorid.mismatch.plant.motion import Segment
-from rotorid.mismatch.plant.regression import autoregression, build
-from rotorid.mismatch.plant.rows import Rows, Term
-from rotorid.mismatch.plant.speedpath import Chain, candidate_forms, commanded_path
-from rotorid.mismatch.posterior.evidence import Evidence, LinearParameter, evidence_from
-from rotorid.mismatch.posterior.problem import Prior
-from rotorid.mismatch.posterior.search import Found
+from rotorid.mismatch.decide.problem import Prior
+from rotorid.mismatch.decide.search import Found
+from rotorid.mismatch.evidence.gram import Evidence, LinearParameter, evidence_from
+from rotorid.mismatch.evidence.motion import Segment
+from rotorid.mismatch.evidence.regression import autoregression, build
+from rotorid.mismatch.evidence.rows import Rows, Term
+from rotorid.mismatch.evidence.speedpath import Chain, candidate_forms, commanded_path
+from rotorid.mismatch.flight.fitted import Fitted
+from rotorid.mismatch.flight.prepare import assemble_rows
+from rotorid.mismatch.flight.report_runs import as_flown
 
 _SAME_TIME_SD, _SAME_SHARE_SD = 0.03, 0.01
 """One-sigma between two flights in which nothing changed: of a time constant relative to itself, and of a number

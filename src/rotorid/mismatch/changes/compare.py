@@ -47,11 +47,31 @@ from rotorid.mismatch.changes.of_instruments import (
     instrument_reference_of,
     joint_of_instruments,
 )
-from rotorid.mismatch.changes.problem import MOST_CHANGE, NAMES, change_of
-from rotorid.mismatch.changes.usual import feigned, form_spread, left_by_all, spread_of_flights, usual_spread
-from rotorid.mismatch.decision.decide import relative_change
-from rotorid.mismatch.decision.findings import Finding
-from rotorid.mismatch.decision.words import (
+from rotorid.mismatch.changes.problem import (
+    MOST_CHANGE,
+    NAMES,
+    change_of,
+    feigned,
+    form_spread,
+    left_by_all,
+    spread_of_flights,
+    usual_spread,
+)
+from rotorid.mismatch.decide.findings import Finding
+from rotorid.mismatch.decide.problem import Prior
+from rotorid.mismatch.decide.search import Found, scored
+from rotorid.mismatch.decide.selected import relative_change
+from rotorid.mismatch.decide.statements import (
+    FORM_SD,
+    Statement,
+    UpperLimit,
+    limits_of,
+    parameters,
+    statements_of,
+    widened,
+)
+from rotorid.mismatch.decide.status import CLAIMED, Estimate, Status
+from rotorid.mismatch.decide.words import (
     capital,
     channel_words,
     effect_words,
@@ -60,9 +80,13 @@ from rotorid.mismatch.decision.words import (
     parameter_words,
     regime_words,
 )
-from rotorid.mismatch.model.fitted import Fitted
-from rotorid.mismatch.model.prepare import guesses
-from rotorid.mismatch.model.swinging import (
+from rotorid.mismatch.evidence.comparison import CHANNELS_OF_WRENCH
+from rotorid.mismatch.evidence.gram import TINY, Evidence
+from rotorid.mismatch.evidence.motion import Segment
+from rotorid.mismatch.evidence.rows import CHANNELS, Rows
+from rotorid.mismatch.flight.fitted import Fitted
+from rotorid.mismatch.flight.prepare import guesses
+from rotorid.mismatch.flight.swinging import (
     Cable,
     as_effect,
     hanging,
@@ -73,18 +97,7 @@ from rotorid.mismatch.model.swinging import (
     price,
     share_left,
 )
-from rotorid.mismatch.model.values import believed_value
-from rotorid.mismatch.plant.comparison import CHANNELS_OF_WRENCH
-from rotorid.mismatch.plant.motion import Segment
-from rotorid.mismatch.plant.rows import CHANNELS, Rows
-from rotorid.mismatch.posterior.evidence import Evidence
-from rotorid.mismatch.posterior.leftover import TINY
-from rotorid.mismatch.posterior.limits import UpperLimit, limits_of
-from rotorid.mismatch.posterior.problem import Prior
-from rotorid.mismatch.posterior.score import scored
-from rotorid.mismatch.posterior.search import Found
-from rotorid.mismatch.posterior.statements import FORM_SD, Statement, parameters, statements_of, widened
-from rotorid.mismatch.posterior.status import CLAIMED, Estimate, Status
+from rotorid.mismatch.flight.values import believed_value
 from rotorid.recordings import RecordingSet, Vehicle
 from rotorid.steps import step
 

@@ -20,22 +20,21 @@ from rotorid.mismatch.changes.chain import (
     chain_terms,
     turning,
 )
-from rotorid.mismatch.changes.problem import decide_changes
-from rotorid.mismatch.changes.usual import of_environments
-from rotorid.mismatch.decision.findings import Finding
+from rotorid.mismatch.changes.problem import decide_changes, of_environments
+from rotorid.mismatch.decide.findings import Finding
+from rotorid.mismatch.decide.problem import Prior
+from rotorid.mismatch.decide.search import Found
+from rotorid.mismatch.decide.statements import FORM_SD
+from rotorid.mismatch.evidence.gram import Evidence, EvidenceTerm, evidence_from
+from rotorid.mismatch.evidence.motion import Segment, regime_variables
+from rotorid.mismatch.evidence.regression import NEVER_EXCITED, Regression, build
+from rotorid.mismatch.evidence.rows import Rows, Term
+from rotorid.mismatch.flight.absent import squares_of
+from rotorid.mismatch.flight.fitted import Fitted, fitted
+from rotorid.mismatch.flight.prepare import assemble_rows, prepare, prepare_like
+from rotorid.mismatch.flight.report_runs import as_flown, comparable
+from rotorid.mismatch.flight.wrench import WrenchModel, block_seconds, chosen, model_filters
 from rotorid.mismatch.mistakes import find_mistakes
-from rotorid.mismatch.model.absent import squares_of
-from rotorid.mismatch.model.fitted import Fitted, fitted
-from rotorid.mismatch.model.prepare import assemble_rows, prepare, prepare_like
-from rotorid.mismatch.model.report_runs import as_flown, comparable
-from rotorid.mismatch.model.wrench import WrenchModel, block_seconds, chosen, model_filters
-from rotorid.mismatch.plant.motion import Segment, regime_variables
-from rotorid.mismatch.plant.regression import NEVER_EXCITED, Regression, build
-from rotorid.mismatch.plant.rows import Rows, Term
-from rotorid.mismatch.posterior.evidence import Evidence, EvidenceTerm, evidence_from
-from rotorid.mismatch.posterior.problem import Prior
-from rotorid.mismatch.posterior.search import Found
-from rotorid.mismatch.posterior.statements import FORM_SD
 from rotorid.recordings import RecordingSet, Vehicle
 from rotorid.steps import step
 
@@ -85,7 +84,7 @@ class Joint:
     own_effects: Effects = ()
     """Forms at work in the second set alone, for the accelerations in its columns."""
     more_usual: np.ndarray | float = 0.0
-    """(K,) one-sigma of each coefficient between sets in which nothing changed, beyond `usual.usual_spread`."""
+    """(K,) one-sigma of each coefficient between sets in which nothing changed, beyond `usual_spread`."""
     form_sd: float = FORM_SD
     """Share of what effects contribute that their forms are wrong by."""
     decide: Callable[[Evidence, Evidence, np.ndarray, Prior], Found] = decide_changes

@@ -18,14 +18,34 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import AXES, CHANNELS, Loading
 from rotorid.errors import InputError
 from rotorid.mismatch.changes.joint import Joint, by_run
-from rotorid.mismatch.changes.problem import change_of, difference_of, joint, leftover_of, problem_of_changes, settled
-from rotorid.mismatch.changes.usual import joined
-from rotorid.mismatch.decision.findings import Finding
+from rotorid.mismatch.changes.problem import (
+    change_of,
+    difference_of,
+    joined,
+    joint,
+    leftover_of,
+    problem_of_changes,
+    settled,
+)
+from rotorid.mismatch.decide.findings import Finding
+from rotorid.mismatch.decide.problem import Prior, Problem
+from rotorid.mismatch.decide.search import Found, Model, Posterior
+from rotorid.mismatch.evidence.gram import TINY, Evidence, evidence_from, spectrum_of, unit_of
+from rotorid.mismatch.evidence.regression import Regression, build, ridge_inverse
+from rotorid.mismatch.evidence.rows import Rows, Term
+from rotorid.mismatch.flight.absent import mean_squares
 from rotorid.mismatch.instrument.analyse import first_model
 from rotorid.mismatch.instrument.chain import ChainResult, moved
-from rotorid.mismatch.instrument.columns import make_terms, rows_of
 from rotorid.mismatch.instrument.mistakes import find_mistakes
-from rotorid.mismatch.instrument.model import ReadingModel, ReadingSearch, everything, refined, whole_reading
+from rotorid.mismatch.instrument.model import (
+    ReadingModel,
+    ReadingSearch,
+    everything,
+    make_terms,
+    refined,
+    rows_of,
+    whole_reading,
+)
 from rotorid.mismatch.instrument.sampling import quantisation
 from rotorid.mismatch.instrument.setup import (
     PreparedInstrument,
@@ -36,14 +56,6 @@ from rotorid.mismatch.instrument.setup import (
     set_up,
     with_unseen,
 )
-from rotorid.mismatch.model.absent import mean_squares
-from rotorid.mismatch.plant.regression import Regression, build, ridge_inverse
-from rotorid.mismatch.plant.rows import Rows, Term
-from rotorid.mismatch.posterior.evidence import Evidence, evidence_from
-from rotorid.mismatch.posterior.leftover import TINY, spectrum_of, unit_of
-from rotorid.mismatch.posterior.problem import Prior, Problem
-from rotorid.mismatch.posterior.score import Model, Posterior
-from rotorid.mismatch.posterior.search import Found
 from rotorid.recordings import RecordingSet
 
 _OTHER_RATE = 0.3

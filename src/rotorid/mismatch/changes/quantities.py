@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotorid.effects.scale import hover_inflow_m_s
-from rotorid.mismatch.plant.motion import (
+from rotorid.mismatch.evidence.motion import (
     HIGHEST_CUTOFF_HZ,
     Segment,
     analysis_rate_hz,
@@ -21,7 +21,7 @@ from rotorid.mismatch.plant.motion import (
     fresh_samples,
     full_speed,
 )
-from rotorid.mismatch.plant.rows import Thinner, residual
+from rotorid.mismatch.evidence.rows import Thinner, residual
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
 

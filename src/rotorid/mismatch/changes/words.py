@@ -1,12 +1,19 @@
-"""What changed between two sets, in sentences and as JSON."""
+"""What changed between two sets, and what differs between flights, in a pilot's words and as JSON."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+import numpy as np
+
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.changes.compare import Change, Changes
-from rotorid.mismatch.changes.level_one_words import level_one_json, level_one_sentences
+from rotorid.mismatch.changes.level_one import CAUSES, Difference, LevelOne
 from rotorid.mismatch.changes.problem import NAMES
-from rotorid.mismatch.decision.words import (
+from rotorid.mismatch.changes.quantities import KINDS, SENSORS
+from rotorid.mismatch.decide.statements import UpperLimit
+from rotorid.mismatch.decide.status import CLAIMED, Estimate
+from rotorid.mismatch.decide.words import (
     capital,
     effect_words,
     listed,
@@ -15,10 +22,77 @@ from rotorid.mismatch.decision.words import (
     percent,
     percent_words,
 )
-from rotorid.mismatch.instrument.columns import VALUE_NAMES
-from rotorid.mismatch.posterior.limits import UpperLimit
-from rotorid.mismatch.posterior.status import CLAIMED, Estimate
+from rotorid.mismatch.instrument.model import VALUE_NAMES
 
+_THRUST = "it gives {} thrust, or there is {} weight near it"
+_MEANS = {
+    "share": (
+        "rotor {m} is asked for {size} {more} than in {good}",
+        _THRUST.format("less", "more"),
+        _THRUST.format("more", "less"),
+    ),
+    "roll": (
+        "the roll trim differs from that of {good} by {size} of thrust times arm",
+        "there is more weight on the right, or the rotors there give less thrust",
+        "there is more weight on the left, or the rotors there give less thrust",
+    ),
+    "pitch": (
+        "the pitch trim differs from that of {good} by {size} of thrust times arm",
+        "there is more weight at the rear, or the rotors there give less thrust",
+        "there is more weight at the front, or the rotors there give less thrust",
+    ),
+    "yaw_trim": (
+        "the yaw trim differs from that of {good} by {size} of the torque of all rotors",
+        "a rotor gives another torque (a damaged propeller), or a motor is tilted",
+    ),
+    "lift": (
+        "{size} {more} thrust is asked for than in {good} at the same load{voltage}",
+        "the vehicle is heavier, the rotors give less thrust, or the accelerometer reads less",
+        "the vehicle is lighter, the rotors give more thrust, or the accelerometer reads more",
+    ),
+    "sideways": (
+        "along {m} there is a force of {size} of the weight that {good} had not at the same speed",
+        "the thrust or the accelerometer is tilted, or there is wind",
+    ),
+    "follows": (
+        "rotor {m} turns {size} {faster} than in {good} at the same command",
+        "motor, bearing, controller, battery or tachometer",
+    ),
+    "accelerometer": (
+        "against the motion, the accelerometer reads {size} {more} along {m} than in {good}",
+        "its zero, its scale or its mounting changed",
+    ),
+    "gyroscope": (
+        "against the attitude, the gyroscope reads {size} {more} about {m} than in {good}",
+        "its zero changed",
+    ),
+    "gyroscope_scale": (
+        "of each rate, the gyroscope reads {size} {more} than in {good}",
+        "its scale changed",
+    ),
+    "gyroscope_turn": (
+        "the gyroscope is turned by {size} about {m} against its place in {good}",
+        "its mounting changed",
+    ),
+    "drag": (
+        "the drag along {m} is {size} of the weight per hover inflow {more} than in {good}",
+        "something is added to the frame or gone from it, or another propeller is on",
+    ),
+    "noise": (
+        "the noise of {m} is {size} {more} than in {good}",
+        "vibration (propeller, bearing, mount), or the sensor",
+    ),
+}
+"""Of a kind, or of a trim, what is seen and what may be behind it: where it is more, and where it is less."""
+_SHOWN = ("share", "trim", "lift", "lift_of_throttle", "lift_without_voltage", "yaw_trim", "sideways")
+"""Kinds whose smallest change is stated."""
+_SMALLEST = {
+    "share": "a rotor's share of the thrust by {}",
+    "trim": "the roll or pitch trim by {} of thrust times arm",
+    "yaw_trim": "the yaw trim by {}",
+    "lift": "the weight over the thrust by {}",
+    "sideways": "a sideways force of {} of the weight",
+}
 VALUES = frozenset(NAMES.values())
 WHOLE = {"flight": "the weight", "stand": "the largest load", "bench": "the largest load"}
 """Kind of the sets to what shares are of."""
@@ -131,5 +205,129 @@ def as_json(found: Changes) -> dict:
                 _SHARE[found.kind]: x.share or None,
             }
             for x in found.limits
+        ],
+    }
+
+
+def level_one_sentences(found: LevelOne) -> list[str]:
+    """What differs, the rarest first; where nothing does, the smallest change that would have been stated."""
+    if found.stated:
+        return [difference_words(d) for d in found.stated]
+    return [
+        f"From {found.base} to {found.new} no trim, share of a rotor or sensor differs by more than flights of one "
+        f"vehicle do. {_smallest_words(found)}".strip()
+    ]
+
+
+def difference_words(d: Difference) -> str:
+    """`Rotor 3 is asked for 7.3 ± 1.8 % more than in the 5 good flights (…): it gives less thrust, or …`"""
+    seen, *causes = _MEANS[d.quantity.member if d.quantity.kind == "trim" else _family(d.quantity.kind)]
+    signed = "{more}" not in seen and "{faster}" not in seen
+    text = seen.format(
+        m=f"the {d.quantity.member}" if d.quantity.member in SENSORS else d.quantity.member,
+        good=f"the {len(d.good)} good flights" if len(d.good) > 1 else "the good flight",
+        size=_size_of(d, signed),
+        # The slope of a drag is negative.
+        more="more" if (d.value > 0) != (d.quantity.kind == "drag") else "less",
+        faster="faster" if d.value > 0 else "slower",
+        voltage=" and battery voltage" if d.quantity.kind == "lift_of_throttle" else "",
+    )
+    return (
+        f"{capital(text)} (scatter from flight to flight {_amount(d, d.scatter)}, false-alarm rate "
+        f"{_percent_of(d.false_alarms)}): {causes[-1] if d.value < 0 else causes[0]}."
+    )
+
+
+def _percent_of(rate: float) -> str:
+    """`0.03 %`; rates that no table of scatter can vouch for are all below a thousandth."""
+    return f"{number(100.0 * rate)} %" if rate >= 1e-3 else "below 0.1 %"
+
+
+def _smallest_words(found: LevelOne) -> str:
+    """The smallest changes that would have been stated in 19 of 20 comparisons, of the kinds that a pilot looks at."""
+    most: dict[str, Difference] = {}
+    for d in found.differences:
+        if d.quantity.kind in _SHOWN and d.smallest > getattr(most.get(d.quantity.kind), "smallest", 0.0):
+            most[d.quantity.kind] = d
+    named = [_SMALLEST[_family(k)].format(_amount(most[k], most[k].smallest)) for k in _SHOWN if k in most]
+    return f"Stated in 19 of 20 such comparisons would be: {listed(named)}." if named else ""
+
+
+def quantity_words(d: Difference) -> str:
+    """`share of rotor 3 (%)`: a quantity's name with its unit, for an axis."""
+    kind, member = d.quantity.kind, d.quantity.member
+    names = {
+        "share": f"thrust asked of rotor {member}",
+        "trim": f"{member} trim",
+        "yaw_trim": "yaw trim",
+        "sideways": f"force along {member}",
+        "follows": f"speed of rotor {member} over its command",
+        "accelerometer": f"accelerometer {member}",
+        "gyroscope": f"gyroscope {member}",
+        "gyroscope_scale": "scale of the gyroscope",
+        "gyroscope_turn": f"turn of the gyroscope about {member}",
+        "drag": f"drag along {member}",
+        "noise": f"noise of {member}",
+    }
+    return f"{names.get(kind, 'thrust at the same load')} ({unit_of(d)})"
+
+
+def in_unit_of_words(d: Difference, value: float) -> float:
+    """A quantity in the unit of `quantity_words`."""
+    if KINDS[d.quantity.kind].logarithm:
+        return 100.0 * float(np.expm1(np.clip(value, -20.0, 20.0)))
+    if d.quantity.kind == "gyroscope_turn":
+        return float(np.rad2deg(value))
+    return value if d.quantity.kind in ("accelerometer", "gyroscope") else 100.0 * value
+
+
+def _family(kind: str) -> str:
+    return "lift" if kind.startswith("lift") else kind
+
+
+def unit_of(d: Difference) -> str:
+    """Unit of `in_unit_of_words`."""
+    return {"accelerometer": "g", "gyroscope": "rad/s", "gyroscope_turn": "°"}.get(d.quantity.kind, "%")
+
+
+def _amount(d: Difference, value: float) -> str:
+    return f"{number(abs(in_unit_of_words(d, value)))} {unit_of(d)}"
+
+
+def _size_of(d: Difference, signed: bool) -> str:
+    """`7.3 ± 1.8 %`, with its sign where the words have none; of a noise, which is no small share, the interval."""
+    low, high = (in_unit_of_words(d, end) for end in d.interval())
+    value, half = in_unit_of_words(d, d.value), 0.5 * (high - low)
+    if d.quantity.kind == "noise":
+        low, high = sorted((abs(low), abs(high)))
+        return f"{abs(value):.0f} ({low:.0f} to {high:.0f}) %"
+    digits = max(0, min(4, 1 - int(np.floor(np.log10(max(half, 1e-6))))))
+    shown = f"{value:+.{digits}f}" if signed else f"{abs(value):.{digits}f}"
+    return f"{shown} ± {half:.{digits}f} {unit_of(d)}"
+
+
+def level_one_json(found: LevelOne, explained: Mapping[str, tuple[str, ...]]) -> dict:
+    """What differs, with every quantity of every flight, as `changes.json` holds it; `explained` as in `Changes`."""
+    return {
+        "nothing_changed": not found.stated,
+        "sentences": level_one_sentences(found),
+        "left_out": list(found.left_out),
+        "quantities": [
+            {
+                "id": d.quantity.key,
+                "unit": KINDS[d.quantity.kind].unit,
+                "logarithm": KINDS[d.quantity.kind].logarithm,
+                "stated": d.stated,
+                "difference": d.value,
+                "interval_95": list(d.interval()),
+                "scatter": d.scatter,
+                "false_alarm_rate": d.false_alarms,
+                "smallest_stated": d.smallest,
+                "may_be": list(CAUSES[d.quantity.kind]),
+                "explained_by": list(explained.get(d.quantity.key, ())),
+                "good": [{"flight": f.name, "value": f.value, "sd": f.sd} for f in d.good],
+                "new": [{"flight": f.name, "value": f.value, "sd": f.sd} for f in d.new],
+            }
+            for d in found.differences
         ],
     }

@@ -18,8 +18,12 @@ from scipy.stats import f as f_distribution
 from rotorid.effects.catalogue import catalogue, ids_of
 from rotorid.effects.contract import CURVE, DELAY, SUPPLY, Form, SpeedForm, SpeedPath
 from rotorid.effects.loading import Loading, between_samples, forms_of, weights_of_four
-from rotorid.mismatch.decision import rules
-from rotorid.mismatch.decision.findings import ChannelTrace, Finding
+from rotorid.mismatch.decide import rules
+from rotorid.mismatch.decide.findings import ChannelTrace, Finding
+from rotorid.mismatch.decide.status import Estimate
+from rotorid.mismatch.evidence.regression import at_least, autoregression, quadratic_form
+from rotorid.mismatch.evidence.rows import form_reading, forms_reading
+from rotorid.mismatch.evidence.speedpath import COST_PER_PARAMETER, ENTER_P, SMALLEST_SIZE, Chain
 from rotorid.mismatch.instrument.setup import (
     SHORT,
     PreparedInstrument,
@@ -29,10 +33,6 @@ from rotorid.mismatch.instrument.setup import (
     rotor_wrench,
     with_speed,
 )
-from rotorid.mismatch.plant.readings import form_reading, forms_reading
-from rotorid.mismatch.plant.regression import at_least, autoregression, quadratic_form
-from rotorid.mismatch.plant.speedpath import COST_PER_PARAMETER, ENTER_P, SMALLEST_SIZE, Chain
-from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings.signal.kernels import causal
 
 _MOST_SAMPLES = 12_000

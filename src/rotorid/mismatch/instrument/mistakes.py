@@ -12,10 +12,10 @@ from itertools import permutations
 import numpy as np
 
 from rotorid.effects.loading import CHANNELS
-from rotorid.mismatch.decision.findings import Finding
+from rotorid.mismatch.decide.findings import Finding
+from rotorid.mismatch.decide.status import Estimate
 from rotorid.mismatch.instrument.setup import PreparedInstrument, loaded_by, set_up, with_speed
 from rotorid.mismatch.mistakes import dropout
-from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import RecordingSet, Run
 from rotorid.recordings import columns as c
 

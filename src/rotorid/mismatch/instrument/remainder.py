@@ -13,12 +13,12 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form
 from rotorid.effects.loading import CHANNELS, InstrumentFacts, Loading, forms_of
 from rotorid.errors import InputError
-from rotorid.mismatch.decision.findings import Analysis
-from rotorid.mismatch.delivery.files import Instruments, instruments_of
+from rotorid.mismatch.decide.findings import Analysis
+from rotorid.mismatch.deliver.files import Instruments, instruments_of
+from rotorid.mismatch.evidence.rows import form_reading
+from rotorid.mismatch.flight.leftover import ALARM_P, SMALLEST_SHARE_OF_NOISE, _wald
 from rotorid.mismatch.instrument.model import MEMORY, ReadingModel
 from rotorid.mismatch.instrument.setup import averaged, full_voltage_of, loaded_by, pieces_of, with_speed
-from rotorid.mismatch.model.dependence import ALARM_P, SMALLEST_SHARE_OF_NOISE, _wald
-from rotorid.mismatch.plant.readings import form_reading
 from rotorid.recordings import Vehicle
 from rotorid.vehicle.improved import speeds_of_commands
 

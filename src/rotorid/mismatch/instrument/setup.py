@@ -16,11 +16,10 @@ from rotorid.effects.contract import Motion
 from rotorid.effects.hysteresis import NARROW, play
 from rotorid.effects.loading import CHANNELS, REST_S, InstrumentFacts, Loading, at_sensor, rotation_of, weight
 from rotorid.errors import InputError
-from rotorid.mismatch.instrument.sampling import settling_s, without_settling
-from rotorid.mismatch.instrument.tachometer import noise_of, quieter, without_noise
-from rotorid.mismatch.plant.rows import baseline_wrench
-from rotorid.mismatch.plant.split import split_runs
-from rotorid.mismatch.plant.voltmeter import SLOW_S, expected_voltages, is_noise
+from rotorid.mismatch.evidence.motion import SLOW_S, expected_voltages, is_noise
+from rotorid.mismatch.evidence.rows import baseline_wrench
+from rotorid.mismatch.evidence.split import split_runs
+from rotorid.mismatch.instrument.sampling import noise_of, quieter, settling_s, without_noise, without_settling
 from rotorid.recordings import RecordingSet, Run, Split, Vehicle
 from rotorid.recordings import columns as c
 

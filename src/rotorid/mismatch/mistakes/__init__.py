@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rotorid.mismatch.decision.findings import Finding
+from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.mistakes import axes, dropout, rotor_layout, timing, units, vibration
 from rotorid.mismatch.mistakes.signals import Corrected, ReadSet, connected
 from rotorid.recordings import RecordingSet

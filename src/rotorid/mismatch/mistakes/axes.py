@@ -10,10 +10,9 @@ import numpy as np
 from scipy.stats import t as student
 from scipy.stats import ttest_1samp
 
-from rotorid.mismatch.decision.findings import Finding
-from rotorid.mismatch.mistakes import comparisons as compare
+from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.mistakes import lagged
-from rotorid.mismatch.mistakes.lagged import LaggedFit
+from rotorid.mismatch.mistakes.lagged import LaggedFit, accelerating, moving, rolling, sideways, speeds_of, turning
 from rotorid.mismatch.mistakes.signals import (
     SENSOR_WORDS,
     Corrected,
@@ -181,7 +180,7 @@ def _in_contract_units(recordings: ReadSet, sensor: str, reading: _Reading, amon
 def _turning(recordings: ReadSet) -> Corrected:
     """The gyroscope against the attitude, and who of the two is wrong."""
     vehicle = recordings.vehicle
-    reading = read(lagged.fit(compare.turning(recordings.signals)))
+    reading = read(lagged.fit(turning(recordings.signals)))
     if reading is None:
         return _gyroscope_units(recordings)
     result = _in_contract_units(recordings, "gyroscope", reading)
@@ -191,7 +190,7 @@ def _turning(recordings: ReadSet) -> Corrected:
         for name, (signs, order) in _ATTITUDES.items():
             undo = partial(_quaternions, signs=signs, order=order)
             trial = replace_sensor(result.recordings, "attitude", undo)
-            again = read(lagged.fit(compare.turning(trial.signals)))
+            again = read(lagged.fit(turning(trial.signals)))
             if again and again.turn.identity and _attitude_fits(trial.signals, vehicle, strict=True):
                 finding = Finding(
                     id="axis_sign",
@@ -213,7 +212,7 @@ def _force_source(all_signals: list[Signals]) -> str | None:
     """What the velocity's changes are compared with: the accelerometer, else rotor speeds read or commanded."""
     if any("accelerometer" in s.values for s in all_signals):
         return "accelerometer"
-    return next((n for n in map(compare.speeds_of, all_signals) if n in ("rotors", "commands")), None)
+    return next((n for n in map(speeds_of, all_signals) if n in ("rotors", "commands")), None)
 
 
 def _attitude_fits(all_signals: list[Signals], vehicle: Vehicle, strict: bool = False) -> bool:
@@ -229,7 +228,7 @@ def _attitude_fits(all_signals: list[Signals], vehicle: Vehicle, strict: bool = 
     if agree and not all(agree):
         return False
     source = _force_source(all_signals)
-    fit = lagged.fit(compare.accelerating(all_signals, vehicle, source)) if source else None
+    fit = lagged.fit(accelerating(all_signals, vehicle, source)) if source else None
     if fit is None:
         return not strict or bool(agree)
     gains = [(fit.gain[k, k], fit.gain_sd[k, k]) for k in (0, 1) if fit.explained[k] > _LEAST_EXPLAINED]
@@ -241,10 +240,10 @@ def _attitude_fits(all_signals: list[Signals], vehicle: Vehicle, strict: bool = 
 def _gyroscope_units(recordings: ReadSet) -> Corrected:
     """Without an attitude that shows it: the gyroscope's unit from the size of the believed moments."""
     signals = recordings.signals
-    sensor = next((n for n in map(compare.speeds_of, signals) if n), None)
+    sensor = next((n for n in map(speeds_of, signals) if n), None)
     if sensor is None or sensor == "throttle" and not recordings.vehicle.rotor_speed_limits_rad_s:
         return Corrected(recordings)
-    blocks = compare.rolling(signals, recordings.vehicle, sensor)
+    blocks = rolling(signals, recordings.vehicle, sensor)
     if blocks is not None and sensor != "rotors":
         # The motors' lag takes most of a quick moment away.
         _, blocks = lagged.through_motor(blocks)
@@ -265,7 +264,7 @@ def _accelerating(recordings: ReadSet) -> Corrected:
     source = _force_source(recordings.signals)
     if source is None:
         return Corrected(recordings)
-    fit = lagged.fit(compare.accelerating(recordings.signals, recordings.vehicle, source))
+    fit = lagged.fit(accelerating(recordings.signals, recordings.vehicle, source))
     return _in_the_world(recordings, "velocity", fit)
 
 
@@ -293,7 +292,7 @@ def _inverse(fit: LaggedFit | None) -> LaggedFit | None:
 
 def _sideways(recordings: ReadSet) -> Corrected:
     """The accelerometer's x and y, where there is enough sideways force to decide."""
-    fit = lagged.fit(compare.sideways(recordings.signals, recordings.vehicle.gravity_m_s2), np.zeros(1))
+    fit = lagged.fit(sideways(recordings.signals, recordings.vehicle.gravity_m_s2), np.zeros(1))
     if fit is None:
         return Corrected(recordings)
     sign, p_values = [1, 1, 1], []
@@ -310,4 +309,4 @@ def _sideways(recordings: ReadSet) -> Corrected:
 
 def _moving(recordings: ReadSet) -> Corrected:
     """The position against the velocity (already checked against the forces where there were any)."""
-    return _in_the_world(recordings, "position", lagged.fit(compare.moving(recordings.signals)))
+    return _in_the_world(recordings, "position", lagged.fit(moving(recordings.signals)))

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.mismatch.decision.findings import Finding
+from rotorid.mismatch.decide.findings import Finding
+from rotorid.mismatch.evidence.split import parts_of, split_runs
 from rotorid.mismatch.mistakes.signals import COMMANDED, replace_columns, sensor_columns
-from rotorid.mismatch.plant.split import parts_of, split_runs
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
 from rotorid.recordings.held import (

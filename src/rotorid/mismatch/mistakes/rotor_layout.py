@@ -16,11 +16,19 @@ from scipy.optimize import nnls
 from scipy.sparse.csgraph import connected_components
 from scipy.stats import t as student
 
-from rotorid.mismatch.decision.findings import Finding
-from rotorid.mismatch.mistakes import comparisons as compare
+from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.mistakes import lagged
 from rotorid.mismatch.mistakes.axes import Turn, turned
-from rotorid.mismatch.mistakes.lagged import OVERLAP, Blocks, LaggedFit, Signal
+from rotorid.mismatch.mistakes.lagged import (
+    BANDS_HZ,
+    OVERLAP,
+    Blocks,
+    LaggedFit,
+    Signal,
+    gather,
+    speeds_of,
+    squared_speeds,
+)
 from rotorid.mismatch.mistakes.signals import Corrected, ReadSet, Signals, replace_columns, sensor_columns
 from rotorid.recordings import Run, Vehicle
 
@@ -150,7 +158,7 @@ def find(recordings: ReadSet) -> Corrected:
     if not 3 <= vehicle.rotor_count <= 8:
         return Corrected(recordings)
     signals = recordings.signals
-    sensor = next((n for n in map(compare.speeds_of, signals) if n), None)
+    sensor = next((n for n in map(speeds_of, signals) if n), None)
     blocks = _thrust_blocks(signals, vehicle, sensor) if sensor else None
     free = lagged.fit(blocks)
     if free is None:
@@ -263,10 +271,10 @@ def _turned_gyroscope(
 def _thrust_blocks(signals: list[Signals], vehicle: Vehicle, sensor: str) -> Blocks | None:
     def make(s: Signals):
         rate = s.values["gyroscope"]
-        thrust = compare.squared_speeds(s, vehicle, sensor)
+        thrust = squared_speeds(s, vehicle, sensor)
         return Signal(rate[:, :2], True), Signal(thrust), Signal(rate)
 
-    return compare.gather(signals, ("gyroscope", sensor), compare.BANDS_HZ["rolling"], make)
+    return gather(signals, ("gyroscope", sensor), BANDS_HZ["rolling"], make)
 
 
 def _reordered(recordings: ReadSet, order: np.ndarray, p: float, ambiguous: bool) -> Corrected:
@@ -304,12 +312,12 @@ def _yaw_moments(signals: list[Signals], vehicle: Vehicle, sensor: str, roll: La
 
     def make(s: Signals):
         rate = s.values["gyroscope"]
-        torque = compare.squared_speeds(s, vehicle, sensor) / vehicle.thrust_coefficients_n_s2()
+        torque = squared_speeds(s, vehicle, sensor) / vehicle.thrust_coefficients_n_s2()
         torque = torque * vehicle.torque_coefficients_n_m_s2() / vehicle.inertia_kg_m2.zz
         change = np.gradient(s.values[sensor], 1.0 / s.rate_hz, axis=0)
         return Signal(rate[:, 2:], True), Signal(np.concatenate([torque, change], axis=1)), Signal(rate)
 
-    blocks = compare.gather(signals, ("gyroscope", sensor), compare.BANDS_HZ["yawing"], make)
+    blocks = gather(signals, ("gyroscope", sensor), BANDS_HZ["yawing"], make)
     sharp = roll.lag_sd < 0.005
     late = roll.lag_s if sharp else 0.0
     free = lagged.fit(blocks, np.array([late]))

@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from rotorid.mismatch.decision.findings import Finding
-from rotorid.mismatch.plant.motion import (
+from rotorid.mismatch.decide.findings import Finding
+from rotorid.mismatch.evidence.motion import (
     LONGEST_BRIDGED_SAMPLES,
     continuous,
     fresh_samples,

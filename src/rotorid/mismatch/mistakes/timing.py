@@ -14,11 +14,20 @@ from itertools import combinations, permutations
 import numpy as np
 from scipy.stats import t as student
 
-from rotorid.mismatch.decision.findings import Finding, in_interval
-from rotorid.mismatch.decision.words import capital, listed
-from rotorid.mismatch.mistakes import comparisons as compare
+from rotorid.mismatch.decide.findings import Finding, in_interval
+from rotorid.mismatch.decide.words import capital, listed
 from rotorid.mismatch.mistakes import lagged
-from rotorid.mismatch.mistakes.lagged import Blocks, LaggedFit
+from rotorid.mismatch.mistakes.lagged import (
+    Blocks,
+    LaggedFit,
+    accelerating,
+    following,
+    lifting,
+    moving,
+    rolling,
+    speeds_of,
+    turning,
+)
 from rotorid.mismatch.mistakes.signals import (
     COMMANDED,
     SENSOR_WORDS,
@@ -143,36 +152,36 @@ class _LatenessFound:
 
 def find(recordings: ReadSet) -> Corrected:
     """Clocks that drift first, then constant delays."""
-    known = comparisons(recordings)
+    known = _sensor_pairs(recordings)
     result = _skew(recordings, known)
-    return result.then(partial(_delay, known=comparisons(result.recordings) if result.findings else known))
+    return result.then(partial(_delay, known=_sensor_pairs(result.recordings) if result.findings else known))
 
 
-def comparisons(recordings: ReadSet) -> list[_SensorPair]:
+def _sensor_pairs(recordings: ReadSet) -> list[_SensorPair]:
     """Every comparison of two sensors that may show time."""
     all_signals, vehicle = recordings.signals, recordings.vehicle
     have = set().union(*(s.values for s in all_signals))
-    speeds = next((n for n in map(compare.speeds_of, all_signals) if n), None)
+    speeds = next((n for n in map(speeds_of, all_signals) if n), None)
     force = "accelerometer" if "accelerometer" in have else None
     source = force or speeds
     pairs: list[tuple[str, str, Blocks | None]] = []
     if {"attitude", "gyroscope"} <= have:
-        pairs.append(("attitude", "gyroscope", compare.turning(all_signals)))
+        pairs.append(("attitude", "gyroscope", turning(all_signals)))
     if {"velocity", "attitude"} <= have and (force or speeds in ("rotors", "commands")):
-        world = compare.accelerating(all_signals, vehicle, source)
+        world = accelerating(all_signals, vehicle, source)
         if world is not None:
             # Level motion follows the tilt, so it compares with the attitude; vertical motion with the force.
             pairs.append(("velocity", "attitude", world.outputs([0, 1])))
             pairs.append(("velocity", source, world.outputs([2])))
     if {"position", "velocity"} <= have:
-        pairs.append(("position", "velocity", compare.moving(all_signals)))
+        pairs.append(("position", "velocity", moving(all_signals)))
     if "gyroscope" in have and speeds:
-        pairs.append(("gyroscope", speeds, compare.rolling(all_signals, vehicle, speeds)))
+        pairs.append(("gyroscope", speeds, rolling(all_signals, vehicle, speeds)))
     if force and speeds:
-        pairs.append(("accelerometer", speeds, compare.lifting(all_signals, vehicle, speeds)))
+        pairs.append(("accelerometer", speeds, lifting(all_signals, vehicle, speeds)))
     if "rotors" in have and ("commands" in have or "throttle" in have):
         command = "commands" if "commands" in have else "throttle"
-        pairs.append(("rotors", command, compare.following(all_signals, command)))
+        pairs.append(("rotors", command, following(all_signals, command)))
     out = []
     for late, over, blocks in pairs:
         if blocks is None:
@@ -224,7 +233,7 @@ def _shares_of(
     """
     steps = max(1, round(_SHARE_STEP_S * all_signals[0].rate_hz))
     moved = [_late(s, "attitude", steps) for s in all_signals]
-    blocks = compare.accelerating(moved, vehicle, source)
+    blocks = accelerating(moved, vehicle, source)
     again = lagged.fit(blocks.outputs(outputs)) if blocks is not None else None
     if again is None:
         return (("attitude", 1.0),) if outputs == [0, 1] else ((source, 1.0),)
@@ -366,7 +375,7 @@ def _remeasured(
     From close by, where the blocks of two sensors hold the same motion. Comparisons with sensors `aside` do not count;
     None where none is left.
     """
-    again = [d for d in differences(comparisons(recordings), drifting=bool(key)) if not {*aside} & {*d.of.sensors}]
+    again = [d for d in differences(_sensor_pairs(recordings), drifting=bool(key)) if not {*aside} & {*d.of.sensors}]
     if not any(abs(d.of.part(wrong)) > _LEAST_SHARE for d in again):
         return None
     rest, sd = _across(again, wrong, key)

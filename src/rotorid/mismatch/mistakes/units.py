@@ -10,9 +10,9 @@ import numpy as np
 from scipy.constants import g
 from scipy.stats import norm
 
-from rotorid.mismatch.decision.findings import Finding
+from rotorid.mismatch.decide.findings import Finding
+from rotorid.mismatch.decide.status import Estimate
 from rotorid.mismatch.mistakes.signals import Corrected, ReadSet, replace_columns, sensor_columns
-from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import Run
 from rotorid.recordings import columns as c
 

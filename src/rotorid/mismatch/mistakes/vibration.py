@@ -14,10 +14,10 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.stats import gamma
 
-from rotorid.mismatch.decision.findings import Finding
+from rotorid.mismatch.decide.findings import Finding
+from rotorid.mismatch.decide.status import Estimate
+from rotorid.mismatch.evidence.motion import full_speed
 from rotorid.mismatch.mistakes.signals import P_LIMIT, Corrected, ReadSet, Signals
-from rotorid.mismatch.plant.motion import full_speed
-from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import columns as c
 
 _WINDOW_S = 0.35

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotorid.mismatch.decision.findings import Analysis, Finding, with_status
-from rotorid.mismatch.posterior.status import CLAIMED
+from rotorid.mismatch.decide.findings import Analysis, Finding, with_status
+from rotorid.mismatch.decide.status import CLAIMED
 
 if TYPE_CHECKING:
     from rotorid.mismatch.tell.verdict import Channel, Errors, Location

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.mismatch.decision.findings import Analysis
-from rotorid.mismatch.decision.shares import fitted_part, segments_of
-from rotorid.mismatch.delivery.files import (
+from rotorid.mismatch.decide.findings import Analysis
+from rotorid.mismatch.decide.sizes import fitted_part, segments_of
+from rotorid.mismatch.deliver.files import (
     claimed,
     conditions_of,
     improved_vehicle,
@@ -24,9 +24,9 @@ from rotorid.mismatch.delivery.files import (
     place_of,
     with_effects,
 )
-from rotorid.mismatch.delivery.flown import UNITS, Model, WindowErrors, between, driven_by, errors_of, model_of, predict
-from rotorid.mismatch.model.prepare import sensor_noise
-from rotorid.mismatch.plant.motion import Segment, SensorNoise
+from rotorid.mismatch.deliver.flown import UNITS, Model, WindowErrors, between, driven_by, errors_of, model_of, predict
+from rotorid.mismatch.evidence.motion import Segment, SensorNoise
+from rotorid.mismatch.flight.prepare import sensor_noise
 from rotorid.mismatch.tell.verdict import Channel, Errors, PValues, SplitErrors, reached
 from rotorid.steps import step
 from rotorid.vehicle.windows import States

@@ -27,13 +27,13 @@ import numpy as np
 from scipy.optimize import nnls
 from scipy.stats import chi2, f
 
-from rotorid.mismatch.decision.findings import Analysis, ChannelTrace, by_channel, rms, with_status
-from rotorid.mismatch.decision.shares import effort, segments_of, shares
+from rotorid.mismatch.decide.findings import Analysis, ChannelTrace, by_channel, rms, with_status
+from rotorid.mismatch.decide.sizes import effort, segments_of, shares
+from rotorid.mismatch.decide.status import CLAIMED
+from rotorid.mismatch.evidence.comparison import apart
+from rotorid.mismatch.evidence.motion import Segment, stretches
+from rotorid.mismatch.evidence.regression import autoregression
 from rotorid.mismatch.mistakes.signals import channel_of
-from rotorid.mismatch.plant.between_runs import apart
-from rotorid.mismatch.plant.motion import Segment, stretches
-from rotorid.mismatch.plant.regression import autoregression
-from rotorid.mismatch.posterior.status import CLAIMED
 from rotorid.mismatch.tell.verdict import Location, Regime
 from rotorid.recordings.signal.kernels import causal
 

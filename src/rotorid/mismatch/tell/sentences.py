@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from rotorid.mismatch.decision.findings import Analysis, Finding, one_per_class, with_status
-from rotorid.mismatch.decision.sizes import Size, channel_size, metres_words, scales, share_words
-from rotorid.mismatch.decision.words import (
+from rotorid.mismatch.decide.findings import Analysis, Finding, one_per_class, with_status
+from rotorid.mismatch.decide.sizes import Size, channel_size, metres_words, scales, share_words
+from rotorid.mismatch.decide.status import CLAIMED, Estimate
+from rotorid.mismatch.decide.words import (
     capital,
     channel_words,
     effect_words,
@@ -25,11 +26,10 @@ from rotorid.mismatch.decision.words import (
     regime_words,
     sure,
 )
-from rotorid.mismatch.posterior.status import CLAIMED, Estimate
 from rotorid.mismatch.tell.consistency import by_share, carrying, quoted
 
 if TYPE_CHECKING:
-    from rotorid.mismatch.posterior.limits import UpperLimit
+    from rotorid.mismatch.decide.statements import UpperLimit
     from rotorid.mismatch.tell.verdict import Channel, Location
 
 MOST_WORDS = 40

@@ -20,7 +20,7 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from rotorid.io.text.writing import rounded
-from rotorid.mismatch.decision.findings import (
+from rotorid.mismatch.decide.findings import (
     Analysis,
     ChannelTrace,
     Finding,
@@ -30,8 +30,7 @@ from rotorid.mismatch.decision.findings import (
     rms,
     with_status,
 )
-from rotorid.mismatch.decision.shares import fitted_part
-from rotorid.mismatch.decision.sizes import Size, scales
+from rotorid.mismatch.decide.sizes import Size, fitted_part, scales
 from rotorid.mismatch.tell.consistency import by_share, located_channels, missing_places, share_left, verdict_word
 from rotorid.mismatch.tell.sentences import (
     Contents,

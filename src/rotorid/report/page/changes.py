@@ -9,8 +9,8 @@ from markupsafe import Markup
 
 from rotorid.mismatch.changes import words
 from rotorid.mismatch.changes.compare import Changes
-from rotorid.mismatch.changes.level_one_words import level_one_sentences, quantity_words
-from rotorid.mismatch.decision.words import capital, channel_words
+from rotorid.mismatch.changes.words import level_one_sentences, quantity_words
+from rotorid.mismatch.decide.words import capital, channel_words
 from rotorid.report.page.make import drawing, filled
 from rotorid.report.plots.mismatch import draw_differences, draw_residuals, draw_values
 

@@ -18,13 +18,13 @@ import numpy as np
 
 from rotorid.effects.loading import Loading
 from rotorid.errors import InputError
-from rotorid.mismatch.decision.findings import Analysis, ChannelTrace, Delivery
-from rotorid.mismatch.decision.shares import fitted_part, segments_of
-from rotorid.mismatch.decision.words import FORWARD_WORDS, channel_words, regime_words
-from rotorid.mismatch.delivery.flown import Model
+from rotorid.mismatch.decide.findings import Analysis, ChannelTrace, Delivery
+from rotorid.mismatch.decide.sizes import fitted_part, segments_of
+from rotorid.mismatch.decide.words import FORWARD_WORDS, channel_words, regime_words
+from rotorid.mismatch.deliver.flown import Model
+from rotorid.mismatch.evidence.motion import HIGHEST_CUTOFF_HZ, Segment, analysis_rate_hz
+from rotorid.mismatch.evidence.rows import CHANNELS, Thinner, at_centre
 from rotorid.mismatch.instrument.setup import averaged
-from rotorid.mismatch.plant.motion import HIGHEST_CUTOFF_HZ, Segment, analysis_rate_hz
-from rotorid.mismatch.plant.rows import CHANNELS, Thinner, at_centre
 from rotorid.mismatch.tell import forward
 from rotorid.mismatch.tell.locate import REGIME_BLOCK_S
 from rotorid.mismatch.tell.verdict import Verdict

@@ -19,8 +19,8 @@ from markupsafe import Markup
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.describe import advice
-from rotorid.mismatch.decision.findings import Analysis, Finding
-from rotorid.mismatch.decision.words import (
+from rotorid.mismatch.decide.findings import Analysis, Finding
+from rotorid.mismatch.decide.words import (
     FORWARD_WORDS,
     capital,
     channel_words,
@@ -34,9 +34,8 @@ from rotorid.mismatch.decision.words import (
     regime_words,
     sure,
 )
-from rotorid.mismatch.delivery.files import form_of
-from rotorid.mismatch.tell.steps import steps_of, together, would_explain
-from rotorid.mismatch.tell.tiles import errors_of, tiles
+from rotorid.mismatch.deliver.files import form_of
+from rotorid.mismatch.tell.steps import errors_of, steps_of, tiles, together, would_explain
 from rotorid.mismatch.tell.verdict import (
     Absent,
     Channel,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rotorid.mismatch.delivery.flown import UNITS
+from rotorid.mismatch.deliver.flown import UNITS
 from rotorid.report.next_to_log import NextToLog
 from rotorid.report.plots import style
 

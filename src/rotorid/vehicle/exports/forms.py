@@ -5,7 +5,7 @@ from above pushes the airframe about minus z.
 
 What other tools ask of a vehicle beyond that it is one: asked before a file for them is made.
 
-Whether a vehicle may be delivered is asked elsewhere (`rotorid.mismatch.delivery.usable`, with room for the error of an
+Whether a vehicle may be delivered is asked elsewhere (`rotorid.mismatch.deliver.usable`, with room for the error of an
 estimate). A tool that wants more takes nothing from the vehicle: its file is not written, and a sentence says why.
 """
 

@@ -16,8 +16,8 @@ from rotorid.mismatch.changes.compare import Change, Changes, changes_between, i
 from rotorid.mismatch.changes.joint import FARTHER, joints_of, lasting_effects, moved_by, reference_of, slower
 from rotorid.mismatch.changes.level_one import as_one
 from rotorid.mismatch.changes.words import as_json, sentences
-from rotorid.mismatch.posterior.problem import Prior
-from rotorid.mismatch.posterior.status import Estimate
+from rotorid.mismatch.decide.problem import Prior
+from rotorid.mismatch.decide.status import Estimate
 from rotorid.recordings import RecordingSet, Vehicle, write_set
 from rotorid.report.page.changes import make_changes_page
 from tests.unit.mismatch.flights import Flight, recorded

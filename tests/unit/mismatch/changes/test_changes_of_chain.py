@@ -14,11 +14,11 @@ from rotorid.mismatch.changes.compare import (
     mistakes_that_differ,
     most_like,
 )
-from rotorid.mismatch.decision.findings import Finding
-from rotorid.mismatch.plant.speedpath import CommandChain
-from rotorid.mismatch.posterior.problem import Prior
-from rotorid.mismatch.posterior.status import Estimate
-from tests.unit.mismatch.plant.test_speedpath import FULL, recorded, searched
+from rotorid.mismatch.decide.findings import Finding
+from rotorid.mismatch.decide.problem import Prior
+from rotorid.mismatch.decide.status import Estimate
+from rotorid.mismatch.evidence.speedpath import CommandChain
+from tests.unit.mismatch.evidence.test_speedpath import FULL, recorded, searched
 
 VOLTAGE = np.linspace(12.4, 10.2, 2000)
 GOOD = {"motor_lag": ("one constant", (0.05,))}

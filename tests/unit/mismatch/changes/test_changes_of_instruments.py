@@ -13,7 +13,7 @@ from rotorid.errors import InputError
 from rotorid.mismatch.changes.compare import Changes, changes_between
 from rotorid.mismatch.changes.of_instruments import Wander, between, wandering
 from rotorid.mismatch.changes.words import as_json, sentences
-from rotorid.mismatch.posterior.evidence import Evidence
+from rotorid.mismatch.evidence.gram import Evidence
 from rotorid.recordings import RecordingSet, write_set
 from rotorid.report.page.changes import make_changes_page
 from tests.unit.mismatch.instrument.stands import C_F, one_rotor

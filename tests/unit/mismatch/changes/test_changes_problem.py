@@ -10,15 +10,23 @@ import pytest
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.changes.joint import within_bounds
-from rotorid.mismatch.changes.problem import against_leftover, at_own_noise, decide_changes, joint, problem_of_changes
-from rotorid.mismatch.changes.usual import feigned, form_spread, hidden_in, share_of_form, usual_spread
-from rotorid.mismatch.posterior.evidence import EvidenceTerm, LinearParameter
-from rotorid.mismatch.posterior.leftover import spectrum_of, unit_of
-from rotorid.mismatch.posterior.problem import Prior
-from rotorid.mismatch.posterior.score import Posterior
-from rotorid.mismatch.posterior.search import Found
-from rotorid.mismatch.posterior.statements import statements_of, visited_instead
-from tests.unit.mismatch.posterior.test_posterior import OFFSET, effect, flight
+from rotorid.mismatch.changes.problem import (
+    against_leftover,
+    at_own_noise,
+    decide_changes,
+    feigned,
+    form_spread,
+    hidden_in,
+    joint,
+    problem_of_changes,
+    share_of_form,
+    usual_spread,
+)
+from rotorid.mismatch.decide.problem import Prior
+from rotorid.mismatch.decide.search import Found, Posterior
+from rotorid.mismatch.decide.statements import statements_of, visited_instead
+from rotorid.mismatch.evidence.gram import EvidenceTerm, LinearParameter, spectrum_of, unit_of
+from tests.unit.mismatch.decide.test_posterior import OFFSET, effect, flight
 
 DRAG, LIFT = "drag/plain", "lift/plain"
 TERMS = (OFFSET, effect(DRAG), effect(LIFT), effect("both/plain"))

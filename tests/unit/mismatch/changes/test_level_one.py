@@ -19,10 +19,10 @@ from rotorid.mismatch.changes.level_one import (
     of_one_vehicle,
     usual_scatter,
 )
-from rotorid.mismatch.changes.level_one_words import level_one_sentences
 from rotorid.mismatch.changes.problem import NAMES
 from rotorid.mismatch.changes.quantities import KINDS
-from rotorid.mismatch.posterior.status import Estimate
+from rotorid.mismatch.changes.words import level_one_sentences
+from rotorid.mismatch.decide.status import Estimate
 from rotorid.recordings import RecordingSet, Run
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import Doubt

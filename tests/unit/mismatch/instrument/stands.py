@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from rotorid.mismatch.decision.findings import Finding
+from rotorid.mismatch.decide.findings import Finding
 from rotorid.recordings import RecordingSet, Run, Vehicle
 
 C_F, C_Q, MASS_KG, SENSOR_Z_M = 1.4e-6, 1.9e-8, 0.65, 0.05

@@ -10,13 +10,11 @@ from rotorid.effects.cable_stiffness import friction
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Motion
 from rotorid.effects.loading import forms_of, rotation_of
-from rotorid.mismatch.instrument.analyse import analyse_instrument
-from rotorid.mismatch.instrument.approximate import hats
-from rotorid.mismatch.instrument.columns import OFFSET, make_terms
-from rotorid.mismatch.instrument.model import MOST_OFFSET, fitted_model
+from rotorid.mismatch.evidence.motion import is_noise
+from rotorid.mismatch.evidence.rows import form_reading
+from rotorid.mismatch.instrument.analyse import analyse_instrument, hats
+from rotorid.mismatch.instrument.model import MOST_OFFSET, OFFSET, fitted_model, make_terms
 from rotorid.mismatch.instrument.setup import set_up, without_voltmeter_noise
-from rotorid.mismatch.plant.readings import form_reading
-from rotorid.mismatch.plant.voltmeter import is_noise
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
 from tests.unit.mismatch.instrument.stands import C_F, C_Q, HUBS, claimed, claims, stand_vehicle

@@ -11,12 +11,11 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Motion
 from rotorid.effects.hysteresis import settling
 from rotorid.effects.loading import InstrumentFacts, Loading, forms_of
+from rotorid.mismatch.evidence.rows import form_reading
+from rotorid.mismatch.evidence.unknowns import UNKNOWNS
 from rotorid.mismatch.instrument.analyse import analyse_instrument
-from rotorid.mismatch.instrument.columns import make_terms
-from rotorid.mismatch.instrument.model import kept_values, reading_model
+from rotorid.mismatch.instrument.model import kept_values, make_terms, reading_model
 from rotorid.mismatch.instrument.setup import session_of, set_up, zero_temperature
-from rotorid.mismatch.plant.readings import form_reading
-from rotorid.mismatch.plant.unknowns import UNKNOWNS
 from rotorid.recordings import RecordingSet, Run
 from tests.unit.mismatch.instrument.stands import BENCH, bench_run, claimed
 

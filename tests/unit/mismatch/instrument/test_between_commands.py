@@ -13,10 +13,10 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Motion, SpeedPath
 from rotorid.effects.loading import forms_of
 from rotorid.effects.motor_lag import lagged
+from rotorid.mismatch.evidence.rows import form_reading
+from rotorid.mismatch.evidence.split import parts_of, split_runs
 from rotorid.mismatch.instrument.chain import find_chain, moved_between_samples, unknown_courses
 from rotorid.mismatch.instrument.setup import pieces_of, set_up, with_speed
-from rotorid.mismatch.plant.readings import form_reading
-from rotorid.mismatch.plant.split import parts_of, split_runs
 from rotorid.recordings import RecordingSet, Run
 from tests.unit.mismatch.instrument.stands import C_F, one_rotor
 from tests.unit.mismatch.instrument.test_instrument import RATE_HZ, bench_set

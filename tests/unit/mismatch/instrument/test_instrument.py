@@ -10,15 +10,13 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Motion
 from rotorid.effects.loading import InstrumentFacts, Loading, at_sensor, forms_of, rotation_of, weight
 from rotorid.errors import InputError
-from rotorid.mismatch.delivery.files import read_instruments
+from rotorid.mismatch.deliver.files import read_instruments
+from rotorid.mismatch.evidence.rows import Rows, form_reading
 from rotorid.mismatch.instrument.analyse import analyse_instrument
-from rotorid.mismatch.instrument.columns import value_column
 from rotorid.mismatch.instrument.mistakes import find_mistakes
-from rotorid.mismatch.instrument.model import size_of_columns
+from rotorid.mismatch.instrument.model import size_of_columns, value_column
 from rotorid.mismatch.instrument.sampling import step_of
 from rotorid.mismatch.instrument.setup import set_up
-from rotorid.mismatch.plant.readings import form_reading
-from rotorid.mismatch.plant.rows import Rows
 from rotorid.recordings import RecordingSet, Run, Vehicle, read_vehicle
 from rotorid.report.deliver import deliver
 from tests.unit.mismatch.instrument.stands import BENCH, bench_run, claimed, stand_vehicle

@@ -7,14 +7,13 @@ import pandas as pd
 import pytest
 
 from rotorid.effects.scale import rotor_inertia
+from rotorid.mismatch.evidence.regression import Fit, build, spread_of
+from rotorid.mismatch.evidence.rows import Rows, Term
+from rotorid.mismatch.flight.wrench import WrenchModel
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.instrument.chain import find_chain
-from rotorid.mismatch.instrument.columns import OFFSET
-from rotorid.mismatch.instrument.model import MEMORY, MOST_OFFSET, UNMOVED, restrain
+from rotorid.mismatch.instrument.model import MEMORY, MOST_OFFSET, OFFSET, UNMOVED, restrain
 from rotorid.mismatch.instrument.setup import set_up
-from rotorid.mismatch.model.wrench import WrenchModel
-from rotorid.mismatch.plant.regression import Fit, build, spread_of
-from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.recordings import RecordingSet, Run
 from tests.unit.mismatch.instrument.stands import BENCH, C_F, C_Q, claimed, one_rotor, stand_vehicle
 from tests.unit.mismatch.instrument.test_stand import FULL_RAD_S, TILTS, tilted

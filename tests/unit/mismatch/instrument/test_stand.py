@@ -5,11 +5,11 @@ import pandas as pd
 import pytest
 
 from rotorid.effects.loading import bracketed
+from rotorid.mismatch.decide.status import Estimate
 from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.instrument.chain import find_chain
-from rotorid.mismatch.instrument.columns import make_terms
+from rotorid.mismatch.instrument.model import make_terms
 from rotorid.mismatch.instrument.setup import set_up
-from rotorid.mismatch.posterior.status import Estimate
 from rotorid.mismatch.tell.sentences import _wrong, surest
 from rotorid.recordings import RecordingSet, Run
 from tests.unit.mismatch.instrument.stands import C_F, MASS_KG, SENSOR_Z_M, claimed, one_rotor, stand_vehicle

@@ -7,7 +7,7 @@ from scipy.signal import lfilter
 from rotorid.effects.contract import Motion
 from rotorid.effects.loading import Loading
 from rotorid.mismatch.instrument.analyse import analyse_instrument
-from rotorid.mismatch.instrument.tachometer import WIDTHS, noise_of, quieter, without_noise
+from rotorid.mismatch.instrument.sampling import WIDTHS, noise_of, quieter, without_noise
 from tests.unit.mismatch.instrument.stands import claimed
 from tests.unit.mismatch.instrument.test_approximate import stand_set
 

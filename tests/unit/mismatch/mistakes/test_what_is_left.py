@@ -6,8 +6,8 @@ import pandas as pd
 import pytest
 
 from rotorid.errors import InputError
+from rotorid.mismatch.evidence.split import parts_of, split_runs
 from rotorid.mismatch.mistakes import dropout
-from rotorid.mismatch.plant.split import parts_of, split_runs
 from rotorid.recordings import RecordingSet
 from rotorid.recordings import columns as c
 from tests.unit.recordings.test_still import COUNT, FIRST, SECOND, SENSORS, SPEEDS, THROTTLES, flown, frozen, set_of

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from rotorid.mismatch.decision.findings import Delivery
+from rotorid.mismatch.decide.findings import Delivery
 from rotorid.mismatch.tell.steps import _moved_by, steps_of, steps_sentence, together
 from rotorid.report.deliver import verdict_of
 

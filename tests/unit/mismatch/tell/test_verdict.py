@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotorid.mismatch.decision.findings import ValueRow
+from rotorid.mismatch.decide.findings import ValueRow
 from rotorid.mismatch.tell.locate import locate
 from rotorid.mismatch.tell.verdict import (
     SCHEMA_PATH,

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotorid.mismatch.decision.findings import Delivery, ValueRow
-from rotorid.mismatch.decision.shares import segments_of
+from rotorid.mismatch.decide.findings import Delivery, ValueRow
+from rotorid.mismatch.decide.sizes import segments_of
 from rotorid.mismatch.tell.sentences import MOST_WORDS
-from rotorid.mismatch.tell.tiles import tiles
+from rotorid.mismatch.tell.steps import tiles
 from rotorid.mismatch.tell.verdict import DerivativeOf, main_channel
 from rotorid.recordings import Run
 from rotorid.recordings.run import Doubt

@@ -1,0 +1,229 @@
+"""Whether what an effect explains is enough to state it, and what the held-out runs say of it.
+
+A selected effect stays established if what it contributes to the fitted runs is more than what the model leaves over,
+if it takes a share of the error or gains much in some channel, and if its main parameter is away from nothing. Else it
+is too small to matter: not established, or suggested where it is not known to be at work. The held-out runs change no
+status: from them come the gain that is reported and the shares.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rotorid.effects.catalogue import catalogue
+from rotorid.mismatch.decide import rules
+from rotorid.mismatch.decide.findings import Analysis, ChannelTrace, Finding
+from rotorid.mismatch.decide.sizes import effect_sizes, fitted_part, scales
+from rotorid.mismatch.decide.statements import SURE
+from rotorid.mismatch.decide.status import CLAIMED
+from rotorid.mismatch.evidence.comparison import VOTES_FROM
+
+_ACTS = 1 / 3
+"""Contribution to a channel, in units of its noise and relative to the strongest, from which an effect acts there."""
+_BLOCKS_S = (2.0, 1.0, 0.5, 0.25)
+"""Lengths of the blocks that the bootstrap draws, the first that gives LEAST_BLOCKS: residuals are alike for less."""
+_LEAST_BLOCKS = 6
+_BOOTSTRAPS = 400
+_LEAST_SHARE = 0.01
+"""Part of the explained error below which an effect is only suggested: names that fit unmodelled residual hold less
+than 0.7 % of what a model explains."""
+_LARGE_GAIN = 0.9
+"""Error with an effect over that without up to which its gain in a channel is large, however small its share of all."""
+_LEAST_EXCITED = 0.1
+"""Size of a contribution on the held-out runs, relative to that on the fitted ones, below which they do not excite
+it."""
+
+
+@dataclass(frozen=True)
+class _Ratio:
+    """Error of a channel with an effect over that without it, with its 95 % interval."""
+
+    channel: str
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class _RowsEvidence:
+    """What some rows say of one effect."""
+
+    ratios: tuple[_Ratio, ...] = ()
+    """Of every channel that the effect acts on, the most significant gain first; empty where the rows do not excite
+    it."""
+    beyond_leftover: bool = True
+    """Whether it contributes more than the model leaves over in some channel that it acts on."""
+
+
+def weighed(analysis: Analysis) -> Analysis:
+    """The analysis with the statuses of its effects that the fitted runs allow, and with the gains on the held-out
+    ones."""
+    part = fitted_part(analysis)
+    fitted, held = ([sign * part(t.run, t.time_s) > 0 for t in analysis.compared] for sign in (1, -1))
+    shares = _effect_shares(analysis, fitted)
+    return replace(
+        analysis, findings=tuple(judged(f, analysis, fitted, held, shares.get(f.id, 0.0)) for f in analysis.findings)
+    )
+
+
+def with_shares(analysis: Analysis) -> Analysis:
+    """The analysis with the size of each effect and what it carries of the error that goes; no word changes.
+
+    Channels are weighed by what a pilot knows: the weight, and the moment that the rotors can make.
+    """
+    part = fitted_part(analysis)
+    held = [part(t.run, t.time_s) < 0 for t in analysis.compared]
+    units = {channel: scale.value for channel, scale in scales(analysis).items()}
+    return replace(analysis, shares=_effect_shares(analysis, held, units), effect_sizes=effect_sizes(analysis, held))
+
+
+def _effect_shares(
+    analysis: Analysis, rows: list[np.ndarray], units: Mapping[str, float] | None = None
+) -> dict[str, float]:
+    """To every stated effect the part of what goes from before to after on some rows that goes without it.
+
+    Energies over all channels, each in its unit (default its floor): what is left without the effect less what is left
+    with all, over what all take away. Effects that only act together add up to more than one.
+    """
+    units = analysis.noise_floor if units is None else units
+
+    def energy(parts: Sequence[np.ndarray]) -> float:
+        sums: dict[str, np.ndarray] = {}
+        for trace, own, mask in zip(analysis.compared, parts, rows, strict=True):
+            new = np.array([np.nansum(own[mask] ** 2), np.isfinite(own[mask]).sum()])
+            sums[trace.channel] = sums.get(trace.channel, np.zeros(2)) + new
+        return sum(s[0] / max(s[1], 1) / units[c] ** 2 for c, s in sums.items() if units.get(c))
+
+    before, after = (energy([getattr(t, stage) for t in analysis.compared]) for stage in ("before", "named"))
+    if before <= after:
+        return dict.fromkeys(analysis.without, 0.0)
+    return {i: float(np.clip((energy(x) - after) / (before - after), 0.0, 1.0)) for i, x in analysis.without.items()}
+
+
+def judged(
+    finding: Finding, analysis: Analysis, fitted: list[np.ndarray], held: list[np.ndarray], share: float
+) -> Finding:
+    """A finding with its gain on the held-out runs and the status that the fitted ones allow, a mistake as it is.
+
+    `share` is its part of the explained error.
+    """
+    if finding.status not in CLAIMED or finding.id not in analysis.without or finding.late_s is not None:
+        return finding
+    without = analysis.without[finding.id]
+    # What lies between command and speed moves every channel that the rotors act on.
+    acts_on = finding.channels if finding.form else ()
+    found, reported = (contribution(analysis, without, rows, acts_on) for rows in (fitted, held))
+    if finding.windows and not reported.ratios:
+        # What acts in a window of one run alone (a gust) belongs to that run and is reported there.
+        windows = [_in_windows(t, finding.windows) for t in analysis.compared]
+        reported = contribution(analysis, without, windows, acts_on)
+    slight = found.ratios and found.ratios[0].value > _LARGE_GAIN
+    reason = ""
+    if rules.BELOW_LEFTOVER(not found.beyond_leftover):
+        reason = "it is smaller than what the model leaves over"
+    elif rules.MAY_BE_NOTHING(not _away_from_nothing(finding)):
+        reason = "every number of it may be nothing"
+    elif rules.SLIGHT(bool(share < _LEAST_SHARE and slight and not finding.windows)):
+        reason = f"it takes {100 * share:.1f} % of the error that goes"
+    best = reported.ratios[0] if reported.ratios else None
+    finding = replace(finding, gain=None if best is None else (best.value, best.low, best.high))
+    return _lowered(finding, reason) if reason else finding
+
+
+def _lowered(finding: Finding, reason: str) -> Finding:
+    """A claim that does not stand: suggested, or not established where it is at work and too small to matter."""
+    if finding.probability is None or finding.probability < SURE:
+        return replace(finding, status="suggested", objection=reason)
+    sentence = f"{catalogue()[finding.id].name} is not established: {reason}"
+    return replace(finding, status="not_established", sentence=sentence, rule="too_small", alternatives=())
+
+
+def _in_windows(trace: ChannelTrace, windows: tuple[tuple[str, float, float], ...]) -> np.ndarray:
+    """Mask of a trace's instants that lie in one of the windows: what belongs to a run is judged there."""
+    inside = np.zeros(len(trace.time_s), bool)
+    for run, start_s, stop_s in windows:
+        if run == trace.run:
+            inside |= (trace.time_s >= start_s) & (trace.time_s <= stop_s)
+    return inside
+
+
+def contribution(
+    analysis: Analysis, without: tuple[np.ndarray, ...], rows: list[np.ndarray], acts_on: Collection[str] = ()
+) -> _RowsEvidence:
+    """What some rows (masks of the traces) say of an effect, given what is left of the traces without it.
+
+    Judged are the channels that the effect `acts_on`, others change by what the rest of the model is fitted to
+    without it, and what two sensors say of each other: a wrong mass makes up for an accelerometer's scale in the force,
+    never there. Where none of its channels is compared, those that differ most.
+    """
+    size: dict[str, list[float]] = {}
+    for trace, left, mask in zip(analysis.compared, without, rows, strict=True):
+        added = (left - trace.named) ** 2
+        own = size.setdefault(trace.channel, [0.0, 0.0, 0.0, 0.0])
+        own[0], own[1] = own[0] + float(np.nansum(added[mask])), own[1] + int(mask.sum())
+        own[2], own[3] = own[2] + float(np.nansum(added[~mask])), own[3] + int((~mask).sum())
+    noise = {c: max(analysis.noise_floor.get(c) or 0.0, 1e-12) for c in size}
+    here = {c: np.sqrt(s[0] / max(s[1], 1)) / noise[c] for c, s in size.items()}
+    there = {c: np.sqrt(s[2] / max(s[3], 1)) / noise[c] for c, s in size.items()}
+    strongest = max(here.values(), default=0.0)
+    if strongest <= _LEAST_EXCITED * max(there.values(), default=0.0):
+        return _RowsEvidence()
+    sensors = {t.channel for t in analysis.between_sensors}
+    differing = [c for c in here if here[c] > _ACTS * strongest]
+    acting = [c for c in here if c in acts_on or (c in sensors and c in differing)] or differing
+    ratios = [r for r in (ratio_of(analysis, without, rows, c) for c in acting) if r is not None]
+    beyond = any(here[c] * noise[c] > _leftover_rms(analysis, rows, c) for c in acting)
+    return _RowsEvidence(tuple(sorted(ratios, key=lambda r: r.high)), beyond)
+
+
+def _leftover_rms(analysis: Analysis, rows: list[np.ndarray], channel: str) -> float:
+    """What the model leaves of a channel beyond its noise on masked rows, root mean square in the channel's unit."""
+    pairs = [(t, m) for t, m in zip(analysis.compared, rows, strict=True) if t.channel == channel and m.any()]
+    if not pairs:
+        return 0.0
+    left = np.concatenate([t.named[m] for t, m in pairs])
+    return float(np.sqrt(max(0.0, np.nanmean(left**2) - (analysis.noise_floor.get(channel) or 0.0) ** 2)))
+
+
+def ratio_of(
+    analysis: Analysis, without: tuple[np.ndarray, ...], rows: list[np.ndarray], channel: str
+) -> _Ratio | None:
+    """Error of a channel with an effect over that without it, in the blocks in which it acts; None where these are few.
+
+    Blocks are drawn anew for the interval. What acts for a short time is judged in shorter blocks.
+    """
+    parts = zip(analysis.compared, without, rows, strict=True)
+    own = [(t, left - t.named, m) for t, left, m in parts if t.channel == channel]
+    for block_s in _BLOCKS_S:
+        energies = np.array([e for t, added, m in own for e in _block_energies(t, added, m, block_s)]).reshape(-1, 3)
+        acting = energies[energies[:, 2] > VOTES_FROM * energies[:, 2].max(initial=0.0)]
+        if len(acting) >= _LEAST_BLOCKS:
+            break
+    else:
+        return None
+    draws = acting[np.random.default_rng(1).integers(0, len(acting), (_BOOTSTRAPS, len(acting)))].sum(axis=1)
+    low, high = np.quantile(np.sqrt(draws[:, 0] / np.maximum(draws[:, 1], 1e-300)), [0.025, 0.975])
+    value = np.sqrt(acting[:, 0].sum() / max(acting[:, 1].sum(), 1e-300))
+    return _Ratio(channel, float(value), float(low), float(high))
+
+
+def _block_energies(trace: ChannelTrace, added: np.ndarray, mask: np.ndarray, block_s: float):
+    """Energies of blocks of masked rows: with the effect, without it (its contribution `added` (n,) put back), and of
+    the contribution alone."""
+    index = np.flatnonzero(mask & np.isfinite(trace.named) & np.isfinite(added))
+    if not len(index):
+        return
+    period_s = float(np.median(np.diff(trace.time_s))) if len(trace.time_s) > 1 else block_s
+    for rows in np.array_split(index, max(1, len(index) // max(1, int(round(block_s / period_s))))):
+        after, own = trace.named[rows], added[rows]
+        yield float(after @ after), float((after + own) @ (after + own)), float(own @ own)
+
+
+def _away_from_nothing(finding: Finding) -> bool:
+    """Whether the interval of some number of a finding does not hold the value at which it does nothing."""
+    if not finding.parameters:
+        return True
+    return any(not p.low <= 0.0 <= p.high for p in finding.parameters)

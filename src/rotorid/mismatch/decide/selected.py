@@ -1,0 +1,258 @@
+"""From the selected terms to a word on each id: intervals, held-out gain, sameness between runs, alternatives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import t as student
+
+from rotorid.effects.catalogue import catalogue
+from rotorid.mismatch.decide import rules
+from rotorid.mismatch.decide.findings import Finding, not_held
+from rotorid.mismatch.decide.select import NEAR_LIMIT, SMALLEST_SIZE, VALUE_FLOOR, Search, Selection
+from rotorid.mismatch.decide.status import CLAIMED, Estimate
+from rotorid.mismatch.evidence.regression import MOST_ATTENUATION, Fit, Regression
+from rotorid.mismatch.evidence.rows import CHANNELS, Contributions, Rows
+from rotorid.mismatch.evidence.unknowns import UNKNOWNS
+
+_COST_PER_VALUE = 12.0
+"""Whitened squares that a further wrong value must explain."""
+_MOST_VALUES = 3
+_LEAST_ROOM = 0.6
+"""A value that is asked whether it is wrong may be so by this share at least; in the search it has less room, or it
+would take physics up."""
+_MOST_DISTRUST = 9.0
+WIDEST_TRUST = 0.1
+_VALUE_P = 5e-4
+VALUE_Z = 3.5
+"""A believed value is called wrong beyond this many standard errors: about 1 in 300 over seven values."""
+SMALLEST_CHANGE = 0.015
+"""A relative change below this is no wrong value: no laboratory knows its numbers better."""
+_BEST_KNOWN = 0.004
+"""Relative one-sigma that no believed value is taken to be better known than, while others are called wrong."""
+
+
+def coefficients(regression: Regression, fit: Fit, key: str) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients of a term and their covariance."""
+    cols = regression.columns([key])
+    where = fit.places(cols)
+    return fit.beta[where], fit.covariance[np.ix_(where, where)]
+
+
+def estimates(
+    regression: Regression,
+    fit: Fit,
+    search: Search,
+    key: str,
+    suggested: Fit | None = None,
+    delivered: Fit | None = None,
+) -> tuple[Estimate, ...]:
+    """Linear parameters of a term with 95 % intervals: within runs, between them, and with what is `suggested`.
+
+    Stated is the number that is `delivered`; its interval holds the one found with the believed values free, too.
+    """
+    term = search.terms[key]
+    covariance = coefficients(regression, fit, key)[1]
+    spread, p = regression.between_runs(fit, key)
+    variance = np.diag(covariance) + (spread if p < 0.05 else 0.0)
+    reach = student.ppf(0.975, max(5, int(regression.training.sum()) - len(fit.columns)))
+    beta, *others = (coefficients(regression, f, key)[0] for f in (delivered or fit, fit, suggested or fit))
+    out = []
+    for k, (index, sd) in enumerate(zip(term.form.linear, np.sqrt(variance), strict=False)):
+        parameter = term.form.parameters[index]
+        found = [beta[k], *(other[k] for other in others)]
+        ends = (beta[k], min(found) - reach * sd, max(found) + reach * sd)
+        middle, low, high = (float(term.form.stated(np.where(np.arange(len(beta)) == k, x, beta))[k]) for x in ends)
+        out.append(Estimate(parameter.symbol, middle, parameter.unit, low, high))
+    return tuple(out)
+
+
+def predicted(rows: Rows, cols: np.ndarray, beta: np.ndarray) -> np.ndarray:
+    """What columns add to the residual, (n, 12)."""
+    return rows.x[:, :, cols] @ beta
+
+
+def main_channels(rows: list[Rows], cols: np.ndarray, beta: np.ndarray, noise: np.ndarray) -> list[int]:
+    """Channels in which a contribution is at least a third of its strongest, the strongest first."""
+    energy = np.zeros(12)
+    for r in rows:
+        energy += (predicted(r, cols, beta) ** 2).sum(axis=0)
+    size = np.sqrt(energy / sum(len(r.y) for r in rows)) / np.where(np.isfinite(noise), noise, np.inf)
+    order = np.argsort(-size)
+    return [int(c) for c in order if size[c] > 0.33 * size[order[0]]]
+
+
+class TermReport(NamedTuple):
+    """What is reported of a term at work."""
+
+    values: np.ndarray
+    parameters: tuple[Estimate, ...]
+    channels: tuple[str, ...]
+    alternatives: Collection[str]
+
+
+def findings_of(search: Search, selection: Selection, report_of: Callable[[str], TermReport]) -> list[Finding]:
+    """A finding for every term that entered, and for those that looked like something and did not survive.
+
+    Terms without a name are reported as unexplained instead.
+    """
+    effects, findings = catalogue(), []
+    for key in selection.active:
+        term = search.terms[key]
+        if term.effect in UNKNOWNS:
+            continue
+        own = report_of(key)
+        found = Finding(
+            id=term.effect,
+            status="established",
+            form=term.form,
+            values=tuple(float(v) for v in own.values),
+            equation=term.form.equation,
+            sentence=effects[term.effect].sentence,
+            parameters=own.parameters,
+            p_value=selection.p_values[key],
+            channels=own.channels,
+            windows=(term.window,) if term.window else (),
+        )
+        findings.append(found.or_else(own.alternatives) if own.alternatives else found)
+    named = {i for f in findings for i in f.alternatives}
+    for effect_id, reason in selection.not_established.items():
+        if effect_id not in named and effect_id not in UNKNOWNS:
+            findings.append(not_held(effect_id, reason, rule=getattr(reason, "rule", "")))
+    return findings
+
+
+def wrench_findings(
+    contributions: Contributions,
+    regression: Regression,
+    search: Search,
+    selection: Selection,
+    noise: np.ndarray,
+    nonlinear: dict[str, tuple[np.ndarray, np.ndarray]],
+    delivered: Fit,
+) -> list[Finding]:
+    """Findings of the terms of a flight; `nonlinear` holds values and one-sigma of those with nonlinear parameters,
+    `delivered` the fit whose numbers are stated."""
+    beside = search.beside(selection.active)
+
+    def report_of(key: str) -> TermReport:
+        term = search.terms[key]
+        beta, _ = coefficients(regression, delivered, key)
+        channels = main_channels(contributions.rows, regression.columns([key]), beta, noise)
+        values, parameters = np.array(term.values, float), ()
+        if term.form.linear:
+            values[list(term.form.linear)] = term.form.stated(beta)
+            stated = estimates(regression, selection.fit, search, key, beside, delivered)
+            # What nothing in the recordings shows (columns that are noise alone) is not stated.
+            parameters = tuple(p for p, shown in zip(stated, regression.shown(key), strict=True) if shown)
+        if key in nonlinear:
+            centre, sd = nonlinear[key]
+            values[list(term.form.nonlinear)] = centre[list(term.form.nonlinear)]
+            low, high = np.minimum(values, centre) - 1.96 * sd, np.maximum(values, centre) + 1.96 * sd
+            parameters = tuple(
+                Estimate(p.symbol, float(v), p.unit, float(a), float(b))
+                for p, v, a, b in zip(term.form.parameters, values, low, high, strict=True)
+            )
+        names = tuple(CHANNELS[c] for c in channels if c < 6) or tuple(CHANNELS[c] for c in channels)
+        return TermReport(values, parameters, names, search.alternatives(key, selection.active))
+
+    return findings_of(search, selection, report_of)
+
+
+def wrong_values(
+    regression: Regression,
+    selection: Selection,
+    size_of: Callable[[str, float], float],
+    moving: bool = True,
+    refused: Collection[str] = (),
+) -> dict[str, tuple[float, float]]:
+    """The fewest believed values that must change: relative change and one-sigma.
+
+    Of all small subsets (the others at their belief) the one that explains most for its size. The user's trust
+    counts, but only up to MOST_DISTRUST per value: a number may be far off, and a wrong mass must not be
+    sold as a wrong thrust and three wrong inertias. A value is named only where it matters: SMALLEST_CHANGE, and a size
+    in units of the noise (`size_of(key, relative change)`). `moving` is False on a stand, where a mass only weighs;
+    `refused` values are not called wrong.
+    """
+    regression = regression.with_room(_LEAST_ROOM)
+    nuisance = regression.keys_of("nuisance", "wind")
+    trust = {t.key: t.prior_sd[0] for t in regression.terms if t.kind == "value"}
+    always = nuisance + selection.active
+    loose = {key: max(sd, WIDEST_TRUST) for key, sd in trust.items()}
+    count = int(regression.training.sum())
+
+    def penalised(keys: list[str]) -> float:
+        # The others give by a fraction of a percent, or a third value would be called wrong to make up for it.
+        room = {k: loose[k] if k in keys else min(_BEST_KNOWN, sd) for k, sd in trust.items()}
+        fit = regression.fit([*always, *trust], loose=room)
+        cost = 0.0
+        for key in trust:
+            change = coefficients(regression, fit, key)[0][0]
+            if key in keys:
+                cost += _COST_PER_VALUE + min((change / trust[key]) ** 2, _MOST_DISTRUST)
+            else:
+                cost += (change / room[key]) ** 2
+        return fit.gain - cost
+
+    subsets = [list(c) for size in range(_MOST_VALUES + 1) for c in combinations(trust, size)]
+    best_first = sorted(subsets, key=penalised, reverse=True)
+    doubtful = set(refused)
+    at_limits: list[list[str]] = []
+    while named := next(s for s in best_first if s not in at_limits and not doubtful.intersection(s)):
+        fit = regression.fit(always + named, loose=loose)
+        certainty, pinned = {}, False
+        for key in named:
+            beta, covariance = coefficients(regression, fit, key)
+            change, sd = float(beta[0]), float(np.sqrt(covariance[0, 0]))
+            noisy = regression.own_part([*always, *named], key, np.ones(1))[1] > MOST_ATTENUATION
+            matters = abs(change) > SMALLEST_CHANGE and size_of(key, change) > SMALLEST_SIZE
+            p = regression.wald(fit, regression.columns([key]), count)
+            pinned |= abs(change) > NEAR_LIMIT * regression.limit[regression.start[key]]
+            if abs(change) < VALUE_Z * sd or p > _VALUE_P or noisy or not matters:
+                certainty[key] = abs(change) / sd
+        if pinned:
+            # Two values that run away together say nothing against either of them alone.
+            at_limits.append(named)
+        elif certainty:
+            # Without it the others are chosen anew: one in doubt must not hide one that is far off.
+            doubtful.add(min(certainty, key=certainty.get))
+        else:
+            break
+    if not named:
+        return {}
+    fit = regression.fit(always + named, jackknife=True, loose=loose)
+    out = {}
+    for key in named:
+        beta, covariance = coefficients(regression, fit, key)
+        change, sd = float(beta[0]), float(np.hypot(np.sqrt(covariance[0, 0]), VALUE_FLOOR))
+        if moving:
+            change, sd = relative_change(key, change, sd)
+        out[key] = change, sd
+    return out
+
+
+def throttle_or_thrust(finding: Finding) -> Finding:
+    """Where no rotor speed is measured, a thrust curve and a throttle curve are one and the same column."""
+    same = catalogue()[finding.id].same_on_commands if finding.id in catalogue() else ""
+    if not rules.THROTTLE_OR_THRUST(bool(same) and finding.status in CLAIMED):
+        return finding
+    return finding.or_else([same])
+
+
+def relative_change(key: str, coefficient: float, sd: float) -> tuple[float, float]:
+    """Relative change of a believed value, and its one-sigma, from its coefficient.
+
+    The columns of a mass and an inertia m hold the acceleration F / m of the believed one: their coefficient is
+    1 − m_believed / m.
+    """
+    if key == "mass" or key.startswith("inertia"):
+        return coefficient / (1.0 - coefficient), sd / (1.0 - coefficient) ** 2
+    return coefficient, sd
+
+
+def coefficient_of(key: str, change: float) -> float:
+    """Coefficient of a relative change of a believed value in rows without measured moments (`relative_change`)."""
+    return change / (1.0 + change) if key == "mass" or key.startswith("inertia") else change

@@ -1,0 +1,268 @@
+"""Whether a vehicle is a body that hovers and flies: what the fit of its values alone does not ask.
+
+A value can leave every channel better and still be that of no vehicle: a thrust coefficient that absorbs a drag may
+leave a maximum thrust below the weight.
+
+The model of a flight with fewer of its parts: what is only suggested takes no part in what is delivered.
+
+Believed values, nuisances and the effects that stay are fitted anew without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rotorid.effects.catalogue import moving_air
+from rotorid.errors import InputError
+from rotorid.mismatch.decide.select import Selection
+from rotorid.mismatch.evidence.motion import Segment
+from rotorid.mismatch.evidence.regression import build
+from rotorid.mismatch.evidence.rows import Contributions, compared_alone
+from rotorid.mismatch.evidence.split import training_rule
+from rotorid.mismatch.evidence.unknowns import UNKNOWNS
+from rotorid.mismatch.flight.delivered import Values
+from rotorid.mismatch.flight.fitted import Fitted
+from rotorid.mismatch.flight.prepare import assemble_rows
+from rotorid.mismatch.flight.report_runs import chain_without, without_wind
+from rotorid.mismatch.flight.wrench import WrenchModel, block_seconds, path_segments
+from rotorid.recordings import Run, Vehicle
+from rotorid.recordings import columns as c
+from rotorid.recordings.body import body_of, unfit
+from rotorid.recordings.files import NO_BODY
+from rotorid.steps import step
+from rotorid.vehicle.control.swings import FLIGHTS, SECONDS, SEED, swings, turned_over
+from rotorid.vehicle.exports.forms import FORMS, export_vehicle
+from rotorid.vehicle.hover import wrench_at_rest, wrench_of_command
+from rotorid.vehicle.improved import command_path, flyable
+
+_MOST_HOVER_SHARE = 0.9
+"""Share of the full thrust at which a vehicle may hover: what steers it needs the rest."""
+_HIGH_ABOVE_GROUND_M = 1e3
+_BEYOND_ALL = 1e6
+"""Weights that no rotors lift: asked for, each turns at its limit."""
+_CARRIES = (0.7, 1.4)
+"""Upward force at the recorded rotor speeds, over what was felt with them, that a vehicle which flies like the recorded
+one may make: airspeed and climb change the thrust at the same speed by some ten percent."""
+_LIGHT = 0.5
+"""Share of the largest recorded thrust below which a vehicle is not taken to be in the air."""
+
+
+_Question = Callable[[Vehicle], str]
+"""Takes a vehicle of kind `flight`; gives why it is not fit for use, without a full stop, or nothing."""
+
+
+def question_of(believed: Vehicle, runs: Sequence[Run]) -> tuple[_Question, tuple[str, ...]]:
+    """What is asked of a vehicle derived from a believed one (a body, that hovers, that flies), and what the believed
+    vehicle fails itself, a sentence each.
+
+    That is not asked: what is derived from it may fail it, too, and no part of the model is to blame for it.
+    """
+    answers = {question: question(believed) for question in questions(believed, runs)}
+    asked = [question for question, why in answers.items() if not why]
+    faults = (f"The believed vehicle itself is not fit to be flown: {why}." for why in answers.values() if why)
+    return lambda vehicle: next((why for question in asked if (why := question(vehicle))), ""), tuple(faults)
+
+
+def questions(believed: Vehicle, runs: Sequence[Run]) -> tuple[_Question, ...]:
+    """Everything that is asked, the cheapest first."""
+    share, recorded = recorded_share(runs, believed), _recorded_hover(runs, believed)
+    return (
+        no_body,
+        lambda vehicle: cannot_hover(vehicle, share),
+        lambda vehicle: _off_as_recorded(vehicle, recorded),
+        cannot_fly,
+    )
+
+
+def no_body(vehicle: Vehicle) -> str:
+    """Which values are not those of one body with rotors; empty where they may be."""
+    least, middle, largest = np.linalg.eigvalsh(vehicle.inertia_kg_m2.matrix())
+    if largest > NO_BODY * (least + middle):
+        return f"its principal moments of inertia {least:.3g}, {middle:.3g} and {largest:.3g} kg m2 are of no body"
+    wrong = unfit(body_of(vehicle, None))
+    return f"it would have {wrong[0].words}" if wrong else ""
+
+
+def cannot_hover(vehicle: Vehicle, recorded_share: float) -> str:
+    """Why it cannot hover; empty where it can, or where no largest rotor speed is stated."""
+    most = full_thrust_n(vehicle)
+    if most is None:
+        return ""
+    weight = vehicle.mass_kg * vehicle.gravity_m_s2
+    allowed = max(_MOST_HOVER_SHARE, recorded_share)
+    if weight <= allowed * most:
+        return ""
+    return (
+        f"its full thrust is {most:.3g} N for a weight of {weight:.3g} N; hovering may take {100 * allowed:.0f} % of it"
+    )
+
+
+@dataclass(frozen=True)
+class _RecordedHover:
+    """What was recorded in the air, medians over time."""
+
+    speed_rad_s: np.ndarray
+    """Of each rotor, (k,): measured, else commanded."""
+    measured: bool
+    specific_force_m_s2: float
+    """Upward."""
+
+
+def _recorded_hover(runs: Sequence[Run], vehicle: Vehicle) -> _RecordedHover | None:
+    """Rotor speeds in the air and the specific force that went with them; None where the runs do not have both."""
+    limits, force = vehicle.rotor_speed_limits_rad_s, c.SPECIFIC_FORCE[2]
+    for group in ("rotor_speed", "rotor_command", "throttle"):
+        names = list(c.rotor_columns(group, vehicle.rotor_count))
+        own = [r.table[[*names, force]].to_numpy() for r in runs if r.has(*names, force)]
+        if own and (limits is not None or group != "throttle"):
+            table = np.concatenate(own)
+            table[:, :-1] *= limits[1] if group == "throttle" else 1.0
+            square = (table[:, :-1] ** 2).mean(axis=1)
+            flying = table[square > _LIGHT * np.nanquantile(square, 0.99)]
+            if len(flying):
+                middle = np.nanmedian(flying, axis=0)
+                return _RecordedHover(middle[:-1], group == "rotor_speed", -float(middle[-1]))
+    return None
+
+
+def _off_as_recorded(vehicle: Vehicle, recorded: _RecordedHover | None) -> str:
+    """Why its force at the recorded rotor speeds is not the one that was felt; empty where it is."""
+    if recorded is None or recorded.specific_force_m_s2 <= 0:
+        return ""
+    flown = flyable(vehicle)[0]
+    path = None if recorded.measured else command_path(flown)
+    up = wrench_of_command(flown, path, recorded.speed_rad_s, _HIGH_ABOVE_GROUND_M)[0]
+    share = float(up) / (vehicle.mass_kg * recorded.specific_force_m_s2)
+    if _CARRIES[0] <= share <= _CARRIES[1]:
+        return ""
+    return f"at the rotor speeds that were recorded it makes {share:.2g} times the upward force that was felt"
+
+
+def full_thrust_n(vehicle: Vehicle) -> float | None:
+    """Upward force at rest in still air with full command, effects included, N.
+
+    None without a limit of the speed, and for rotors that cannot set thrust and moments independently (one central
+    rotor, whose vanes or flaps are not recorded): `cannot_fly` says so of them.
+    """
+    if vehicle.rotor_speed_limits_rad_s is None:
+        return None
+    flown = flyable(vehicle)[0]
+    asked = np.array([_BEYOND_ALL * vehicle.mass_kg * vehicle.gravity_m_s2, 0.0, 0.0, 0.0])
+    try:
+        return float(wrench_at_rest(flown, command_path(flown), asked, _HIGH_ABOVE_GROUND_M)[0])
+    except InputError:
+        return None
+
+
+@step("flying the vehicle in simulation")
+def cannot_fly(vehicle: Vehicle) -> str:
+    """Why it does not fly the swings about hover of `rotorid simulate`; empty where it does.
+
+    The very flights that are made of the file later: shorter ones end before a slow swing has grown.
+    """
+    try:
+        flown = swings(vehicle, "trial", SECONDS, FLIGHTS, SEED)
+    except InputError as error:
+        return f"it cannot be simulated: {error}"
+    return "simulated under an attitude controller it turns over" if turned_over(flown) else ""
+
+
+def recorded_share(runs: Sequence[Run], vehicle: Vehicle) -> float:
+    """Share of the full thrust that the rotors made while flying, by the squares of their speeds; 0 if not known.
+
+    A log says it without any coefficient: a racer that hovers at a fifth of its thrust, a lifter at nine tenths.
+    """
+    limits = vehicle.rotor_speed_limits_rad_s
+    if limits is None:
+        return 0.0
+    for group, scale in (("rotor_speed", 1.0), ("rotor_command", 1.0), ("throttle", limits[1])):
+        names = list(c.rotor_columns(group, vehicle.rotor_count))
+        tables = [r.table[names].to_numpy() for r in runs if r.has(*names)]
+        if tables:
+            table = np.concatenate(tables)
+            share = np.mean((scale * table[np.isfinite(table).all(axis=1)] / limits[1]) ** 2, axis=1)
+            flying = share[share > _LIGHT * share.max(initial=0.0)]
+            return float(np.median(flying)) if len(flying) else 0.0
+    return 0.0
+
+
+def exports_lost(vehicle: Vehicle, believed: Vehicle) -> tuple[str, ...]:
+    """Forms of other tools that take the believed vehicle and not this one, a sentence each."""
+    out = []
+    for form in FORMS:
+        try:
+            export_vehicle(believed, form)
+        except InputError:
+            continue
+        try:
+            export_vehicle(vehicle, form)
+        except InputError as error:
+            out.append(f"The improved vehicle cannot be exported as {form}: {error}.")
+    return tuple(out)
+
+
+def with_only(found: Fitted, ids: Collection[str], values: Values) -> Fitted:
+    """What was fitted with the effects `ids` and the wrong `values` alone; terms without a name stay.
+
+    Rows are built anew where what goes lies between command and speed, or is air that moves.
+    """
+    model, chain = found.model, found.chain
+    active = [k for k in model.selection.active if model.search.terms[k].effect in {*ids, *UNKNOWNS}]
+    gone = sorted(chain_ids(found) - set(ids))
+    for key in gone:
+        chain = chain_without(replace(found, chain=chain), key)
+    still = model.wind is not None and moving_air("all the time").id not in ids
+    calm = bool(model.gusts) and moving_air("in windows").id not in ids
+    if (gone and found.commanded) or still or calm:
+        segments, noisy = model.segments, model.noisy_segments
+        if gone and found.commanded:
+            cutoff = model.prepared.thinner.cutoff_hz
+            segments, noisy = (path_segments(s, *chain, cutoff) for s in (segments, noisy))
+        steady = None if model.wind is None else np.array([*model.wind, 0.0])
+        if calm:
+            segments, noisy = ([_in_air(s, steady) for s in own] for own in (segments, noisy))
+        if still:
+            segments, noisy = ([_in_air(s, without_wind(s, model.wind)) for s in own] for own in (segments, noisy))
+        own = {"wind": None if still else model.wind, "gusts": () if calm else model.gusts}
+        model = _rebuilt(replace(model, **own), segments, noisy, active)
+    fit = model.regression.fit([t.key for t in model.regression.terms if t.kind != "effect"] + active, jackknife=True)
+    model = replace(model, selection=replace(model.selection, active=active, fit=fit))
+    return replace(found, model=model, chain=chain, values=values)
+
+
+def _in_air(segment: Segment, wind: np.ndarray | None) -> Segment:
+    """A stretch in air that moves by `wind` (3,) or (n, 3), m/s, world axes; still for None."""
+    return replace(segment, motion=replace(segment.motion, wind=wind))
+
+
+def _rebuilt(
+    model: WrenchModel, segments: Sequence[Segment], noisy: Sequence[Segment], active: Sequence[str]
+) -> WrenchModel:
+    """A model's rows and regression on changed stretches, with its own noise and terms; nothing is searched."""
+    prepared, old = model.prepared, model.regression
+    kinds = {"effect"} if model.gusts else {"effect", "wind"}
+    terms = [t for t in old.terms if t.kind not in kinds or t.key in active]
+    rows = assemble_rows(prepared, terms, list(segments), model.effects)
+    again = assemble_rows(prepared, terms, list(noisy), model.effects) if noisy else None
+    rate = prepared.thinner.rate_hz
+    rule = training_rule(prepared.split, list(segments))
+    block_s, alone = block_seconds(rows, rate), compared_alone(terms, rows)
+    regression = build(rows, terms, old.filters, rule, block_s, rate, again, *alone)
+    return replace(
+        model,
+        terms=terms,
+        rows=rows,
+        regression=regression,
+        segments=list(segments),
+        noisy_segments=list(noisy),
+        contributions=Contributions(rows, again, rate),
+        selection=Selection(list(active), model.selection.fit),
+    )
+
+
+def chain_ids(found: Fitted) -> set[str]:
+    """Ids of the effects between command and rotor speed."""
+    return set() if found.chain is None else {key for key, _ in found.chain.result.fit.chain}

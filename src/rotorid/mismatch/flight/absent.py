@@ -1,0 +1,112 @@
+"""What was tested and not found in a flight, and how large it may be all the same.
+
+A size is a share of the weight: root mean square force over the weight, and moment over the weight at the rotors' mean
+distance from the centre of mass.
+
+Effects that look significant while wrong values are held at their belief, and vanish with the right ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rotorid.effects.catalogue import catalogue
+from rotorid.mismatch.decide.findings import Finding
+from rotorid.mismatch.decide.search import Found
+from rotorid.mismatch.decide.statements import UpperLimit, limits_of, posterior_at
+from rotorid.mismatch.evidence.gram import Evidence, evidence_from
+from rotorid.mismatch.evidence.regression import Regression, build
+from rotorid.mismatch.evidence.rows import Rows, Term, compared_alone
+from rotorid.mismatch.evidence.split import training_rule
+from rotorid.mismatch.evidence.unknowns import UNKNOWNS
+from rotorid.mismatch.flight.delivered import FittedModel, Values
+from rotorid.mismatch.flight.wrench import WrenchModel, block_seconds
+from rotorid.recordings import Vehicle
+
+_ABSORBED_P = 1e-6
+"""About fifty terms are looked at."""
+_ABSORBED_GAIN = 50.0
+"""Whitened squares: what a reader would have taken for an effect."""
+
+
+def absent(model: WrenchModel, found: Found) -> tuple[UpperLimit, ...]:
+    """Upper limits of the ids that the fitted runs were tested for and that are not at work, the largest first.
+
+    `found` is the posterior at the chosen model (`chosen_already`).
+    """
+    effects = [t for t in model.regression.terms if t.kind == "effect"]
+    return limits_of(found, squares_of(model, effects))
+
+
+def chosen_already(model: WrenchModel) -> Found:
+    """The posterior at the model of a flight that was chosen."""
+    return posterior_at(by_channel(model), model.selection.active)
+
+
+def evidence_of(model: WrenchModel) -> Evidence:
+    """What a decision on a flight needs, and what was chosen."""
+    return replace(evidence_from(by_channel(model)), active=tuple(model.selection.active))
+
+
+def by_channel(model: WrenchModel) -> Regression:
+    """The regression of a flight with its products channel by channel."""
+    rate_hz = model.prepared.thinner.rate_hz
+    return build(
+        model.rows,
+        model.terms,
+        model.regression.filters,
+        training_rule(model.prepared.split, model.segments),
+        block_seconds(model.rows, rate_hz),
+        rate_hz,
+        model.contributions.noisy,
+        *compared_alone(model.terms, model.rows),
+        by_channel=True,
+    ).without_winds()
+
+
+def squares_of(model: WrenchModel, terms: Sequence[Term]) -> dict[str, np.ndarray]:
+    """To the key of each term what its columns amount to (k, k), as mean squares of shares of the weight."""
+    return mean_squares(model.rows, model.regression, terms, scales(model.prepared.vehicle))
+
+
+def mean_squares(
+    rows: Sequence[Rows], regression: Regression, terms: Sequence[Term], scale: np.ndarray
+) -> dict[str, np.ndarray]:
+    """To the key of each term the mean squares of its columns (k, k), in units of `scale` (6,) of force and moment."""
+    out = {t.key: np.zeros((t.size, t.size)) for t in terms}
+    count = sum(len(r.y) for r in rows)
+    for part in rows:
+        for term in terms:
+            x = np.nan_to_num(part.x[:, :6, regression.columns([term.key])]) / scale[:, None]
+            out[term.key] += np.einsum("nci,ncj->ij", x, x) / count
+    return out
+
+
+def scales(vehicle: Vehicle) -> np.ndarray:
+    """The weight, N, and the weight at the rotors' mean distance, N m, of each channel of force and moment, (6,)."""
+    weight_n = vehicle.mass_kg * vehicle.gravity_m_s2
+    arm_m = float(np.linalg.norm(vehicle.rotor_positions_m()[:, :2], axis=1).mean())
+    return np.repeat([weight_n, weight_n * arm_m if arm_m > 0 else np.inf], 3)
+
+
+def absorbed_findings(model: FittedModel, values: Values, findings: list[Finding]) -> list[Finding]:
+    """A finding for every such effect that `findings` do not hold; none where no value is wrong."""
+    if not values:
+        return []
+    search, regression, active = model.search, model.search.regression, model.selection.active
+    held = [k for k in search.always if k not in values]
+    base = regression.fit(held + active)
+    taken, out = {f.id for f in findings}, {}
+    for term in regression.terms:
+        if term.kind != "effect" or term.effect in taken or term.effect in out or term.effect in UNKNOWNS:
+            continue
+        fit = regression.fit([*held, *active, term.key])
+        p = regression.wald(fit, regression.columns([term.key]), search.blocks)
+        if p < _ABSORBED_P and fit.gain - base.gain > _ABSORBED_GAIN:
+            name = catalogue()[term.effect].name
+            text = f"{name} looked significant with the believed values; the refitted values explain it"
+            out[term.effect] = Finding(id=term.effect, status="absorbed", sentence=text, p_value=p)
+    return list(out.values())

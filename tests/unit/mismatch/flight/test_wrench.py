@@ -1,0 +1,181 @@
+"""The model of force and moment: what counts as noise, and how large a term is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rotorid.effects.catalogue import catalogue
+from rotorid.mismatch.evidence.motion import Segment
+from rotorid.mismatch.evidence.regression import full_fit_residuals
+from rotorid.mismatch.evidence.rows import Rows
+from rotorid.mismatch.flight import wrench
+from rotorid.mismatch.flight.prepare import prepare
+from rotorid.mismatch.flight.wrench import (
+    SAME_WRENCH,
+    Seconds,
+    channel_floor,
+    inflated_channels,
+    steady_moments,
+    without_unseen,
+)
+from rotorid.recordings import Vehicle
+from rotorid.vehicle.mixer import wrench_matrix
+from tests.unit.mismatch.evidence.test_rows import still
+from tests.unit.mismatch.flights import recorded
+
+
+def two_channels(force: float, moment: float, size: int = 1600) -> Rows:
+    """A column in force_x and moment_x, and responses that hold it with these coefficients; noise of one sigma."""
+    rng = np.random.default_rng(0)
+    y, x = np.full((size, 12), np.nan), np.zeros((size, 12, 1))
+    for channel, coefficient in ((0, force), (3, moment)):
+        x[:, channel, 0] = 2 * rng.normal(size=size)
+        y[:, channel] = coefficient * x[:, channel, 0] + rng.normal(size=size)
+    return Rows("b", np.arange(size) / 40.0, y, x)
+
+
+def test_a_residual_far_above_its_noise_is_itself_the_noise():
+    rng = np.random.default_rng(1)
+    noise = np.full(12, np.nan)
+    noise[[0, 3]] = 0.1, 0.001
+    remains = np.full((500, 12), np.nan)
+    remains[:, 0], remains[:, 3] = 0.1 * rng.normal(size=500), 0.08 * rng.normal(size=500)
+    assert list(np.flatnonzero(inflated_channels([remains], noise))) == [3]
+
+
+def test_sizes_second_by_second_are_those_of_the_rows():
+    """A column of 1 in the first second and 3 in the second, times 2, noise 0.5: 4 and 12, nine tenths up 11.2."""
+    rows = two_channels(1.0, 1.0, 85)
+    rows.x[:, 0, 0] = np.where(np.arange(85) < 40, 1.0, 3.0)
+    rows.x[:, 3, 0] = 0.0
+    noise = np.where(np.isfinite(rows.y[0]), 0.5, np.nan)
+    found = Seconds([rows], noise, 40).sizes(np.array([0]), np.array([2.0]))
+    np.testing.assert_allclose(found, [11.2, *[0.0] * 11])
+
+
+def sizes_of_parts(parts: list[np.ndarray], noise: np.ndarray, per: int, quantile: float = 0.9) -> np.ndarray:
+    """Quantile over seconds of the rms of contributions (n, 12), in units of the noise; the largest of all parts."""
+    best = np.zeros(12)
+    for part in parts:
+        count = len(part) // per
+        if count:
+            local = np.sqrt((part[: count * per].reshape(count, per, 12) ** 2).mean(axis=1))
+            best = np.fmax(best, np.quantile(local, quantile, axis=0) / noise)
+    return np.nan_to_num(best)
+
+
+def test_sizes_of_several_columns_and_stretches():
+    rng = np.random.default_rng(2)
+    acts = (np.arange(12) < 4)[None, :, None]
+    stretches = [Rows("a", np.arange(n) / 40, np.zeros((n, 12)), rng.normal(size=(n, 12, 5)) * acts) for n in (410, 30)]
+    cols, beta, noise = np.array([4, 0, 3]), rng.normal(size=3), np.full(12, 2.0)
+    expected = sizes_of_parts([r.x[:, :, cols] @ beta for r in stretches], noise, 40)
+    np.testing.assert_allclose(Seconds(stretches, noise, 40).sizes(cols, beta), expected, rtol=1e-12)
+
+
+def with_blue_noise(slow: float) -> tuple[Rows, Rows]:
+    """A column `slow` times a sine of 0.5 Hz, read with noise that grows with frequency, in a channel with the same.
+
+    The response holds the true column (2 of it) and noise of its own, as the copy with noise added once more does.
+    """
+    rng = np.random.default_rng(2)
+    size, rate_hz = 8000, 40.0
+    time_s = np.arange(size) / rate_hz
+    blue = [np.diff(rng.normal(size=size + 2), n=2) for _ in range(4)]
+    signal = slow * np.sin(np.pi * time_s)
+    y, x = np.full((size, 12), np.nan), np.zeros((size, 12, 1))
+    y[:, 5], x[:, 5, 0] = 2 * signal + blue[0], signal + blue[1]
+    rows = Rows("b", time_s, y, x)
+    y, x = y.copy(), x.copy()
+    y[:, 5] += blue[2]
+    x[:, 5, 0] += blue[3]
+    return rows, Rows("b", time_s, y, x)
+
+
+def test_a_slow_column_is_seen_through_noise_of_higher_frequency():
+    """Noise has six times the sine's energy, but hardly any at its frequency: the fit holds all of it."""
+    rows, noisy = with_blue_noise(1.4)
+    colours = without_unseen([rows], [noisy], 40.0, 20.0)
+    assert rows.x[:, 5].any() and list(colours) == [5]
+    _, coefficient = full_fit_residuals([rows], np.zeros(1), colours)
+    assert abs(coefficient[0] - 2) < 0.1
+    _, attenuated = full_fit_residuals([rows], np.zeros(1))
+    assert attenuated[0] < 0.5
+
+
+def test_a_column_that_is_all_noise_says_nothing():
+    rows, noisy = with_blue_noise(0.0)
+    assert without_unseen([rows], [noisy], 40.0, 20.0) == {}
+    assert not rows.x.any() and not noisy.x.any()
+
+
+def test_no_channel_is_known_better_than_a_share_of_the_rotors_own_changes():
+    """C_F = 1e-6, rotors at x = ±0.1 m; one turns at 1000 and 2000 rad/s in turn: 1.5 N of spread, and a tenth."""
+    vehicle = Vehicle(
+        name="two", kind="flight", mass_kg=1.0, inertia_kg_m2={"xx": 0.01, "yy": 0.01, "zz": 0.02},
+        rotors=[{"x_m": 0.1, "y_m": 0.0, "spin": "ccw"}, {"x_m": -0.1, "y_m": 0.0, "spin": "cw"}],
+        thrust_coefficient_n_s2=1e-6, torque_coefficient_n_m_s2=1e-8,
+    )  # fmt: skip
+    speed = np.tile([[1000.0, 1000.0], [2000.0, 1000.0]], (200, 1))
+    segment = Segment("run", 100.0, still(400, rotor_speed=speed), "accelerometer")
+    floor = channel_floor([segment], vehicle)
+    np.testing.assert_allclose(floor[:6], SAME_WRENCH * np.array([0.375, 0.375, 1.5, 0.0, 0.15, 0.015]), atol=1e-12)
+
+
+def test_steady_moments_go_with_the_thrust_about_each_axis():
+    """What a centre of mass off its place makes is free while the chain is searched."""
+    prepared = prepare(recorded(1, 2))
+    segment = prepared.segments[0]
+    columns = steady_moments(segment, prepared, ("force", "moment"))
+    thrust = prepared.thinner((1.3877e-6 * (segment.motion.rotor_speed**2)).sum(axis=1, keepdims=True))[:, 0]
+    assert columns.shape == (len(thrust), 6, 3) and not columns[:, :3].any()
+    for axis in range(3):
+        np.testing.assert_allclose(columns[:, 3 + axis], np.outer(thrust, np.eye(3)[axis]), rtol=1e-9)
+    assert steady_moments(segment, prepared, ("force",)).shape == (len(thrust), 3, 0)
+
+
+@pytest.mark.parametrize(
+    ("effect", "name", "values", "others"),
+    [
+        ("thrust_tilt", "rotor 3", (0.02, -0.05), 0),
+        ("inertia_products", "products", (1e-4, 2e-4, -1e-4), 0),
+        ("rotor_drag", "at the centre of mass", (1e-4,), 1),
+    ],
+)
+def test_what_is_known_beside_commands_costs_a_path_nothing_where_it_follows_squared_speeds(
+    effect, name, values, others
+):
+    """What is left of the rows at any speeds is the same as where each effect is asked anew; a drag follows the
+    speeds themselves and stays apart."""
+    prepared = prepare(recorded(1))
+    segment = prepared.segments[0]
+    segment = replace(segment, command=segment.motion.rotor_speed)
+    form = next(f for f in catalogue()[effect].forms(prepared.vehicle) if f.name == name)
+    known, groups = [(form, np.array(values))], ("force", "moment")
+    thrust, *moments = wrench_matrix(prepared.vehicle)
+    of_squares = np.stack([0 * thrust, 0 * thrust, -thrust, *moments]).T
+    still, per_square, apart = wrench._in_squares(segment, prepared, known, of_squares, groups)
+    assert len(apart) == others
+    speed = segment.command * (1.0 + 0.1 * np.cos(segment.motion.time_s)[:, None])
+    moved = wrench._at_speed(segment, speed)
+    left = still - prepared.thinner(speed**2) @ per_square
+    for one in apart:
+        left = left - prepared.thinner(wrench._wrench_of(moved, one, prepared.vehicle, groups))
+    asked_anew = wrench._thinned_residual(moved, prepared, groups)
+    asked_anew = asked_anew - prepared.thinner(wrench._wrench_of(moved, known[0], prepared.vehicle, groups))
+    np.testing.assert_allclose(left, asked_anew, atol=1e-8)
+
+
+def test_a_channel_known_to_be_above_what_the_catalogue_leaves_is_searched_once(monkeypatch):
+    """One search says in which channels the model's own residual is the noise; the next begins with it."""
+    prepared = prepare(recorded(1))
+    before = wrench.wrench_model(prepared, prepared.terms)
+    searches = []
+    monkeypatch.setattr(wrench, "searched", lambda *given: searches.append(given[4]) or before)
+    known = replace(before, inflated=np.arange(12) == 0)
+    again = wrench.wrench_model(prepared, prepared.terms, before=known)
+    assert len(searches) == 1 and again.inflated[0]
+    own = wrench.after_residual(before)
+    assert all(np.array_equal(left[:, 0], part[:, 0]) for left, part in zip(searches[0], own, strict=True))
+    assert not np.array_equal(searches[0][0][:, 1], own[0][:, 1])
