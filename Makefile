@@ -73,7 +73,8 @@ test-slow: $(READY) ## the tests on whole recordings and whole builds that `make
 environment: $(READY) ## make the environment alone
 
 # uv, itself from the lock, installs the rest in seconds; where it cannot, or is not to be had, pip does it in a minute
-# without it. Both take packages from where the user set either of them.
+# without it. Both take packages from where the user set either of them. Both compile them: where
+# Python is told to write no bytecode, as in many containers, every start would compile the libraries anew.
 $(READY): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
 		echo "rotorid needs Python 3.11 or newer, and $(PYTHON) is not; say which to use: make PYTHON=python3.12 ..."; \
@@ -87,10 +88,11 @@ $(READY): requirements.lock pyproject.toml
 	@sed '/^uv==/,/# via/d' requirements.lock > .venv/without-uv.lock
 	@indexes=$$($(BIN)/python .ci/package_index.py) && eval "$$indexes" || exit 1; \
 		$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r .venv/uv.lock \
-		&& $(BIN)/uv pip install --quiet --python $(BIN)/python --require-hashes -r requirements.lock \
+		&& $(BIN)/uv pip install --quiet --compile-bytecode --python $(BIN)/python --require-hashes -r requirements.lock \
 		|| { echo "Environment: uv did not work here; installing with pip, about a minute"; \
 		$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r .venv/without-uv.lock; }
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable . $(if $(wildcard proof/pyproject.toml),--editable ./proof)
+	@$(BIN)/python -m compileall -q src $(wildcard proof)
 	@touch $@
 
 lock: $(READY) ## resolve the dependencies of pyproject.toml anew

@@ -113,7 +113,7 @@ def asked_terms(known: FittedSet, ids: Iterable[str] = ()) -> list[Term]:
 def of_set(known: FittedSet) -> Information:
     """What the fitted runs of the set hold."""
     regression = known.regression
-    gram, _, bias, _ = regression._normal(np.arange(len(regression.precision)), regression.training)
+    gram, _, bias, _ = regression.normal(np.arange(len(regression.precision)))
     seconds = float(regression.training.sum() * regression.block_s)
     shares = (
         seconds * _shares_of(known.fitted.model.rows, known.prepared.vehicle) if isinstance(known, FittedSet) else 0.0

@@ -303,7 +303,7 @@ class Search:
                     if worth > least
                 ]
         for _, new, trial in sorted(trials, key=lambda t: -t[0])[:_MOST_TRIALS]:
-            if all(self.judge(key, trial).physical for key in trial) and self.failing(new, trial)[0] is None:
+            if self.failing(new, trial)[0] is None and all(self.judge(key, trial).physical for key in trial):
                 return trial
         return None
 

@@ -198,6 +198,35 @@ class _ByChannel:
         return replace(self, gram=gram, cross=cross, square=square, bias_gram=bias_gram, bias_cross=bias_cross)
 
 
+@dataclass(frozen=True)
+class _Products:
+    """Products of all columns over parts of the fitted blocks: `environments`, folds, all of them."""
+
+    blocks: np.ndarray
+    """(P,) in each part."""
+    gram: np.ndarray
+    """(P, K, K)."""
+    cross: np.ndarray
+    """(P, K)."""
+    apart: np.ndarray
+    """(P, m, K), as in `_Apart`; m is 0 where nothing is estimated apart."""
+    apart_cross: np.ndarray
+    """(P, m)."""
+
+    def over(self, part: np.ndarray, count: int) -> _Products:
+        """Summed over parts again; `part` (P,) says which of `count` each belongs to."""
+        one = (part == np.arange(count)[:, None]).astype(float)
+        return _Products(*(np.tensordot(one, x, 1) for x in self._all))
+
+    def without(self, part: int) -> _Products:
+        """All of them but one, as a single part."""
+        return _Products(*(x.sum(axis=0, keepdims=True) - x[part : part + 1] for x in self._all))
+
+    @property
+    def _all(self) -> tuple[np.ndarray, ...]:
+        return self.blocks, self.gram, self.cross, self.apart, self.apart_cross
+
+
 @dataclass
 class Regression:
     """Gram matrices of all terms over blocks of time."""
@@ -251,7 +280,6 @@ class Regression:
         self._place_apart = np.full(len(self._total_cross), -1)
         if self.apart is not None:
             self._place_apart[self.apart.columns] = np.arange(len(self.apart.columns))
-            self._total_apart = self.apart.gram[self.training].sum(axis=0), self.apart.cross[self.training].sum(axis=0)
         self.limit = np.full(len(self._total_cross), np.inf)
         for term in self.terms:
             if term.kind == "value":
@@ -312,7 +340,7 @@ class Regression:
         if cols.max() + 1 != len(self.precision) or len(cols) != len(self.precision) - kept:
             raise ValueError("the winds of single runs must be the last columns")
         every = np.arange(len(self.precision))
-        gram, cross, bias, bias_cross = self._normal(every, self.training)
+        gram, cross, bias, bias_cross = self.normal(every)
         normal = gram - bias + np.diag(self.precision)
         inverse = ridge_inverse(normal[kept:, kept:])
         # A wind follows the other coefficients b as `alone + follows @ b`.
@@ -342,18 +370,17 @@ class Regression:
         place = self._place_apart[cols]
         return np.flatnonzero(place >= 0), place[place >= 0]
 
-    def _equations(self, whole: tuple[np.ndarray, ...], cols: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, ...]:
-        """What `_normal` gives, in the rows of terms estimated apart with the products of their channels alone."""
+    def _equations(
+        self, whole: tuple[np.ndarray, ...], cols: np.ndarray, of: _Products | None = None
+    ) -> tuple[np.ndarray, ...]:
+        """What `normal` gives, in the rows of terms estimated apart with the products of their channels alone."""
         where, own = self._apart(cols)
         if not len(where):
             return whole
         gram, cross, bias, bias_cross = (part.copy() for part in whole)
-        share, grid = mask.sum() / len(mask), (own[:, None], cols)
-        if mask is self.training:
-            gram[where], cross[where] = self._total_apart[0][grid], self._total_apart[1][own]
-        else:
-            gram[where] = self.apart.gram[mask][:, *grid].sum(axis=0)
-            cross[where] = self.apart.cross[mask][:, own].sum(axis=0)
+        of = self._fitted if of is None else of
+        share, grid = of.blocks[0] / len(self.training), (own[:, None], cols)
+        gram[where], cross[where] = of.apart[0][grid], of.apart_cross[0, own]
         noise = self.apart.bias_gram[grid] * share
         # As `limited_bias`, column by column: these channels' products alone are no symmetric matrix.
         most = MOST_ATTENUATION * gram[where, where] / np.maximum(noise[np.arange(len(where)), where], 1e-300)
@@ -361,39 +388,32 @@ class Regression:
         bias_cross[where] = self.apart.bias_cross[own] * share * np.minimum(1.0, most)
         return gram, cross, bias, bias_cross
 
-    def _normal(self, cols: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Products of columns with each other (k, k) and with the response (k,) in a mask, and the noise's of both."""
-        share, grid = mask.sum() / len(mask), (cols[:, None], cols)
-        if mask is self.training:
-            gram, cross = self._total_gram[grid], self._total_cross[cols]
+    def normal(self, cols: np.ndarray, of: _Products | None = None) -> tuple[np.ndarray, ...]:
+        """Products of columns with each other (k, k) and with the response (k,), and the noise's of both, over all
+        fitted blocks or a part of them."""
+        grid = (cols[:, None], cols)
+        if of is None:
+            share, gram, cross = self.training.mean(), self._total_gram[grid], self._total_cross[cols]
         else:
-            gram, cross = self.gram.transpose(1, 2, 0)[grid] @ mask, mask @ self.cross[:, cols]
+            share, gram, cross = of.blocks[0] / len(self.training), of.gram[0][grid], of.cross[0, cols]
         bias = limited_bias(gram, self.bias_gram[grid] * share)
         return gram, cross, bias, self.bias_cross[cols] * share
 
-    def fit(
-        self,
-        keys: Iterable[str],
-        mask: np.ndarray | None = None,
-        jackknife: bool = False,
-        loose: dict[str, float] | None = None,
-    ) -> Fit:
-        """Fit terms on the masked blocks (training by default); `loose` widens priors (term to one-sigma).
+    def fit(self, keys: Iterable[str], *, jackknife: bool = False, loose: dict[str, float] | None = None) -> Fit:
+        """Fit terms on the training blocks; `loose` widens priors (term to one-sigma).
 
-        Fits of the training blocks are remembered: a search asks for the same ones over and over.
+        Remembered: a search asks for the same ones over and over.
         """
         keys = tuple(keys)
-        if mask is not None:
-            return self._fit(keys, mask, jackknife, loose)
         asked = keys, jackknife, tuple(sorted((loose or {}).items()))
         if asked not in self._fits:
-            making_room(self._fits, _MOST_REMEMBERED)[asked] = self._fit(keys, self.training, jackknife, loose)
+            making_room(self._fits, _MOST_REMEMBERED)[asked] = self._fit(keys, jackknife, loose)
         return self._fits[asked]
 
-    def _fit(self, keys: tuple[str, ...], mask: np.ndarray, jackknife: bool, loose: dict[str, float] | None) -> Fit:
-        cols = self.columns(keys)
-        whole = self._normal(cols, mask)
-        gram, cross, bias, bias_cross = self._equations(whole, cols, mask)
+    def _fit(self, keys: tuple[str, ...], jackknife: bool, loose: dict[str, float] | None) -> Fit:
+        cols, mask = self.columns(keys), self.training
+        whole = self.normal(cols)
+        gram, cross, bias, bias_cross = self._equations(whole, cols)
         where, own = self._apart(cols)
         precision = self.precision
         if loose:
@@ -403,7 +423,7 @@ class Regression:
         prior = precision[cols]
         normal = _raised(gram - bias, prior)
         beta, inverse, held, at = bounded(normal, cross - bias_cross, self.limit[cols])
-        self._fit_held_out_scales(cols, beta, mask)
+        self._fit_held_out_scales(cols, beta)
         count = int(mask.sum())
         every, explained = self.gram.transpose(1, 2, 0)[cols[:, None], cols], self.cross[:, cols]
         pull = (beta @ every).T
@@ -436,8 +456,12 @@ class Regression:
         gain = float((self.square - rss)[mask].sum())
         return Fit(cols, beta, gain, covariance, rss)
 
-    def _fit_held_out_scales(self, cols: np.ndarray, beta: np.ndarray, mask: np.ndarray) -> None:
-        """Coefficients of a run's own scale where that run is not fitted: found in the run itself, in place."""
+    def _fit_held_out_scales(self, cols: np.ndarray, beta: np.ndarray, left_out: np.ndarray | None = None) -> None:
+        """Coefficients of a run's own scale where that run is not fitted: found in the run itself, in place.
+
+        `left_out` (blocks,) are not fitted either.
+        """
+        mask = self.training if left_out is None else self.training & ~left_out
         for term in self.terms:
             if term.kind != "nuisance" or not term.run:
                 continue
@@ -485,7 +509,7 @@ class Regression:
         every, size = np.arange(count), count + max(t.size for t in self.terms)
         noise, noise_cross = self.bias_gram * self.training.mean(), self.bias_cross * self.training.mean()
         whole = self._total_gram, self._total_cross, noise, noise_cross
-        gram, cross, bias, bias_cross = self._equations(whole, every, self.training)
+        gram, cross, bias, bias_cross = self._equations(whole, every)
         normal = _raised(gram - bias, self.precision)
         scale, unit = inverse_root(normal.diagonal()), inverse_root(self._total_gram.diagonal())
 
@@ -517,8 +541,8 @@ class Regression:
 
     def _solved(self, asked: int) -> Solution:
         cols = self._columns_in(asked)
-        whole = self._normal(cols, self.training)
-        gram, cross, bias, bias_cross = self._equations(whole, cols, self.training)
+        whole = self.normal(cols)
+        gram, cross, bias, bias_cross = self._equations(whole, cols)
         beta = bounded(_raised(gram - bias, self.precision[cols]), cross - bias_cross, self.limit[cols])[0]
         gram, cross, bias, bias_cross = whole
         return Solution(cols, beta, float(2 * (cross - bias_cross) @ beta - beta @ (gram - bias) @ beta))
@@ -548,6 +572,41 @@ class Regression:
         out = np.full(len(self.training), -1)
         out[self.training] = folds(environments(run, self.block_s), run, whole)
         return out
+
+    @cached_property
+    def _environment(self) -> np.ndarray:
+        """Number of the environment of every fitted block."""
+        return environments(self.run[self.training], self.block_s)
+
+    @cached_property
+    def _environments(self) -> _Products:
+        """Products of the fitted blocks summed over environments."""
+        one = (self._environment == np.arange(int(self._environment.max(initial=-1)) + 1)[:, None]).astype(float)
+        gram, cross = self.gram.transpose(1, 2, 0)[:, :, self.training], self.cross[self.training]
+        own = (np.zeros((len(cross), 0, gram.shape[0])), np.zeros((len(cross), 0)))
+        if self.apart is not None:
+            own = self.apart.gram[self.training], self.apart.cross[self.training]
+        apart = (np.tensordot(one, x, 1) for x in own)
+        return _Products(one.sum(axis=1), (gram @ one.T).transpose(2, 0, 1), one @ cross, *apart)
+
+    @cached_property
+    def _fitted(self) -> _Products:
+        """Products of all fitted blocks."""
+        return self._environments.over(np.zeros(len(self._environments.blocks)), 1)
+
+    @cached_property
+    def _folds(self) -> dict[bool, list[_Products]]:
+        """Products of the fitted blocks without each fold in turn, whole runs or environments left out."""
+        out = {}
+        for whole in (True, False):
+            fold = self._fold_of_environments(whole)
+            parts = self._environments.over(fold, count := int(fold.max(initial=-1)) + 1)
+            out[whole] = [parts.without(part) for part in range(count)]
+        return out
+
+    def _fold_of_environments(self, whole_runs: bool) -> np.ndarray:
+        """Fold of every environment: no environment is in two."""
+        return self.folds(whole_runs)[self.training][np.unique(self._environment, return_index=True)[1]]
 
     def left_out_together(self) -> np.ndarray:
         """Number of the run (or, of fewer than LEAST_RUNS, of the piece) of every block (blocks,); -1 if not fitted."""
@@ -581,7 +640,7 @@ class Regression:
         winds = [k for k in keys if kinds[k].kind == "wind" and kinds[k].run]
         if winds:
             return self._leave_out_in_wind([k for k in keys if k not in winds], winds, whole_runs, loose)
-        cols, fold = self.columns(keys), self.folds(whole_runs)
+        cols, fold, parts = self.columns(keys), self.folds(whole_runs), self._folds[whole_runs]
         precision = self.precision
         if loose:
             precision = precision.copy()
@@ -589,15 +648,14 @@ class Regression:
                 precision[self.columns([key])] = 1.0 / sd**2
         found, inverses = [], []
         for out in range(fold.max() + 1):
-            mask = self.training & (fold != out)
-            gram, cross, bias, bias_cross = self._equations(self._normal(cols, mask), cols, mask)
+            gram, cross, bias, bias_cross = self._equations(self.normal(cols, parts[out]), cols, parts[out])
             normal = _raised(gram - bias, precision[cols])
             beta, inverse = bounded(normal, cross - bias_cross, self.limit[cols])[:2]
             found.append(beta)
             # Of a column that only this fold excites nothing is known without it.
             dead = np.diag(normal) <= NEVER_EXCITED
             inverses.append(np.where(np.diag(dead), _UNKNOWN, inverse))
-            self._fit_held_out_scales(cols, found[-1], mask)
+            self._fit_held_out_scales(cols, found[-1], fold == out)
         return cols, np.array(found), np.array(inverses)
 
     def _leave_out_in_wind(self, keys, winds, whole_runs, loose) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -605,7 +663,7 @@ class Regression:
         cols, betas, known = self.without_winds()._without_folds(keys, whole_runs, dict(loose))
         own = self.columns(winds)
         both = np.concatenate([cols, own])
-        gram, cross, bias, bias_cross = self._normal(both, self.training)
+        gram, cross, bias, bias_cross = self.normal(both)
         normal, right, count = gram - bias + np.diag(self.precision[both]), cross - bias_cross, len(cols)
         inverse = ridge_inverse(normal[count:, count:])
         blowing = (right[count:, None] - normal[count:, :count] @ betas.T).T @ inverse
@@ -627,55 +685,47 @@ class Regression:
                 return self.compare(more, fewer, loose, False)
             apart = self.compare(more, fewer, loose, True)
             return apart if apart.answers else self.compare(more, fewer, loose, False)
-        fold = self.folds(whole_runs)
-        environment = environments(self.run[self.training], self.block_s)
         more_of, fewer_of = (self._without_folds(keys, whole_runs, loose) for keys in (more, fewer))
         (cols, a, _), (others, b, _) = more_of, fewer_of
-        index = np.flatnonzero(self.training)
-        a, b = a[fold[index]], b[fold[index]]
+        fold = self._fold_of_environments(whole_runs)
+        a, b = a[fold], b[fold]
         left, grams = [], []
         for c, beta in ((cols, a), (others, b)):
-            gram, cross = self._noise_free(index, c)
-            quadratic = np.einsum("bk,bkl,bl->b", beta, gram, beta)
-            left.append(quadratic - 2 * np.einsum("bk,bk->b", cross, beta))
+            gram, cross = self._noise_free(c)
+            quadratic = np.einsum("ek,ekl,el->e", beta, gram, beta, optimize=True)
+            left.append(quadratic - 2 * np.einsum("ek,ek->e", cross, beta))
             grams.append(gram)
         shift, gram = a.copy(), grams[0]
         shared = np.isin(cols, others)
         at = [list(others).index(c) for c in cols[shared]]
         shift[:, shared] -= b[:, at]
-        promised = np.einsum("bk,bkl,bl->b", shift, gram, shift)
-        # What the fitted blocks of each fold hold of the same change of coefficients.
+        promised = np.einsum("ek,ekl,el->e", shift, gram, shift, optimize=True)
+        # What the fitted environments of each fold hold of the same change of coefficients.
         every = gram.sum(axis=0)
-        seen = np.empty(len(index))
-        for out in np.unique(fold[index]):
-            own = fold[index] == out
+        seen = np.empty(len(fold))
+        for out in np.unique(fold):
+            own = fold == out
             one = shift[own][0]
             seen[own] = one @ (every - gram[own].sum(axis=0)) @ one
-        doubt = self._doubt(index, cols, fold, more_of[2]) - self._doubt(index, others, fold, fewer_of[2])
-        count = int(environment.max()) + 1
-        size = np.bincount(environment, minlength=count)
-        return Comparison(
-            np.bincount(environment, left[1] - left[0], count),
-            np.bincount(environment, promised, count),
-            np.bincount(environment, seen, count) / size,
-            np.bincount(environment, doubt, count),
-            np.bincount(environment, fold[index], count) / size,
-        )
+        doubt = self._doubt(cols, more_of[2][fold]) - self._doubt(others, fewer_of[2][fold])
+        return Comparison(left[1] - left[0], promised, seen, doubt, fold)
 
-    def _noise_free(self, index: np.ndarray, cols: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Gram matrices (blocks, k, k) and cross products (blocks, k) less each block's part of the regressors' noise.
+    def _noise_free(self, cols: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Gram matrices (environments, k, k) and cross products (environments, k) less the regressors' noise in each.
 
         Coefficients that the noise does not shrink promise, and leave, no more than the signal in the columns: scored
         on noisy columns a true one would keep 1 − 2 λ of its promise where a share λ of the energy is noise.
         """
-        _, _, bias, bias_cross = self._normal(cols, self.training)
-        gram, cross = self.gram[:, cols[:, None], cols][index], self.cross[np.ix_(index, cols)]
-        return gram - bias / len(index), cross - bias_cross / len(index)
+        _, _, bias, bias_cross = self.normal(cols)
+        parts = self._environments
+        share = parts.blocks / parts.blocks.sum()
+        gram, cross = parts.gram[:, cols[:, None], cols], parts.cross[:, cols]
+        return gram - share[:, None, None] * bias, cross - share[:, None] * bias_cross
 
-    def _doubt(self, index: np.ndarray, cols: np.ndarray, fold: np.ndarray, inverses: np.ndarray) -> np.ndarray:
-        """Squares that errors of coefficients fitted without a block's fold are expected to make in it, (blocks,)."""
-        gram = self.gram[np.ix_(index, cols, cols)]
-        return np.einsum("bkl,bkl->b", gram, inverses[fold[index]])
+    def _doubt(self, cols: np.ndarray, inverses: np.ndarray) -> np.ndarray:
+        """Squares that errors of coefficients (environments, k, k) fitted without an environment's fold are expected to
+        make in it, (environments,)."""
+        return np.einsum("ekl,ekl->e", self._environments.gram[:, cols[:, None], cols], inverses)
 
     def products(self, cols: np.ndarray) -> np.ndarray:
         """Products of columns on the training blocks, (k, k)."""

@@ -428,10 +428,11 @@ def speed_path(
                 r = assemble_rows(prepared, terms, [moved], known)[0]
                 return r.y[:, keep], np.concatenate([r.x[:, keep], steady_moments(moved, prepared, groups)], axis=2)
             still, per_square, others = laws[id(segment)]
-            left = still - prepared.thinner(speed**2) @ per_square
-            for effect in others:
-                left -= prepared.thinner(_wrench_of(_at_speed(segment, speed), effect, vehicle, groups))
-            return left, None
+            if not others:
+                return still - prepared.thinner(speed**2) @ per_square, None
+            moved = _at_speed(segment, speed)
+            wrench = speed**2 @ per_square + sum(_wrench_of(moved, effect, vehicle, groups) for effect in others)
+            return still - prepared.thinner(wrench), None
 
         force_z = 2 if "force" in groups else None
         rate_hz = prepared.thinner.rate_hz
