@@ -34,7 +34,7 @@ from rotorid.mismatch.flight.fitted import Fitted, fitted
 from rotorid.mismatch.flight.prepare import assemble_rows, prepare, prepare_like
 from rotorid.mismatch.flight.report_runs import as_flown, comparable
 from rotorid.mismatch.flight.wrench import WrenchModel, block_seconds, chosen, model_filters
-from rotorid.mismatch.mistakes import find_mistakes
+from rotorid.mismatch.mistakes import find_mistakes, in_its_units
 from rotorid.recordings import RecordingSet, Vehicle
 from rotorid.steps import step
 
@@ -219,19 +219,19 @@ def joints_of(reference: FittedReference, new: RecordingSet) -> list[Joint]:
     """Two sets of flights on the same columns: corrected for the second set's mistakes, and as recorded.
 
     Each is compared with its own vehicle.yaml: what was changed on purpose and is written there is no change. Mistakes
-    that the first set has as well are corrected in both.
+    that the first set has as well are corrected in both, and so is a unit that is wrong.
 
     Raises
     ------
     InputError
         No stretch of the second set has all that the first was fitted by.
     """
-    new = replace(new, held_out=())
-    corrected, mistakes, _ = find_mistakes(new)
+    new, of_units = in_its_units(replace(new, held_out=()))
+    corrected, found, _ = find_mistakes(new)
     known = {m.which for m in reference.mistakes}
-    variants = (
-        [(corrected, mistakes)] if all(m.which in known for m in mistakes) else [(corrected, mistakes), (new, ())]
-    )
+    variants = [(corrected, (*of_units, *found))]
+    if not all(m.which in known for m in found):
+        variants.append((new, of_units))
     stretches = [(own, _recorded_stretches(reference.found, own)[0], found) for own, found in variants]
     joints = [
         joined_at(reference, own, recorded, reference.chain, found) for own, recorded, found in stretches if recorded

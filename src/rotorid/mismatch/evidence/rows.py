@@ -361,7 +361,8 @@ class Thinner:
         # upfirdn's sample j·step is the kernel's last tap at input j·step; the uncovered start is skipped.
         skip = -(-(len(self.kernel) - 1) // self.step)
         count = (len(signal) - 1) // self.step + 1 - skip
-        if self.step < _BY_BLOCKS or count < 1:
+        # A reading that is missing must not reach its neighbours, which share a product with it.
+        if self.step < _BY_BLOCKS or count < 1 or not np.isfinite(signal).all():
             return upfirdn(self.kernel, signal, up=1, down=self.step, axis=0)[skip : skip + max(count, 0)]
         start, columns = skip * self.step - len(self.kernel) + 1, signal.reshape(len(signal), -1)
         parts = [self._by_blocks(columns[start:, i : i + 3], count) for i in range(0, columns.shape[1], 3)]

@@ -12,7 +12,7 @@ from rotorid.steps import step
 @step("looking for mistakes in the recordings")
 def find_mistakes(recordings: RecordingSet) -> tuple[RecordingSet, tuple[Finding, ...], tuple[str, ...]]:
     """The set of a vehicle in flight as corrected, what was wrong with it, and notes for the reader."""
-    before = ReadSet(recordings.name, recordings.vehicle, recordings.runs, recordings.held_out)
+    before = _read(recordings)
     recordings, lost = dropout.find(before)
     notes: tuple[str, ...] = ()
     if lost:
@@ -20,5 +20,18 @@ def find_mistakes(recordings: RecordingSet) -> tuple[RecordingSet, tuple[Finding
     result = Corrected(recordings, (lost,) if lost else (), notes)
     for find in (units.find, connected, axes.find, rotor_layout.find, timing.find, vibration.find):
         result = result.then(find)
-    last = result.recordings
-    return RecordingSet(last.name, last.vehicle, last.runs, last.held_out), result.findings, result.notes
+    return _written(result.recordings), result.findings, result.notes
+
+
+def in_its_units(recordings: RecordingSet) -> tuple[RecordingSet, tuple[Finding, ...]]:
+    """The set in the contract's units, and what was not: sizes of columns alone leave no doubt of a unit."""
+    result = units.find(_read(recordings))
+    return _written(result.recordings), result.findings
+
+
+def _read(recordings: RecordingSet) -> ReadSet:
+    return ReadSet(recordings.name, recordings.vehicle, recordings.runs, recordings.held_out)
+
+
+def _written(recordings: ReadSet) -> RecordingSet:
+    return RecordingSet(recordings.name, recordings.vehicle, recordings.runs, recordings.held_out)

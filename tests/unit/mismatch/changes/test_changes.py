@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.constants import g
 from typer.testing import CliRunner
 
 from rotorid.cli import app
@@ -19,6 +20,7 @@ from rotorid.mismatch.changes.words import as_json, sentences
 from rotorid.mismatch.decide.problem import Prior
 from rotorid.mismatch.decide.status import Estimate
 from rotorid.recordings import RecordingSet, Vehicle, write_set
+from rotorid.recordings import columns as c
 from rotorid.report.page.changes import make_changes_page
 from tests.unit.mismatch.flights import Flight, recorded
 
@@ -177,6 +179,14 @@ def test_columns_that_contradict_each_other_speak_for_a_mistake_by_themselves():
     flipped, exchanged = (SimpleNamespace(id=i) for i in ("axis_sign", "rotor_order"))
     assert price_of([exchanged], Prior()) == Prior().effect_nats > 0.0 > price_of([flipped], Prior())
     assert price_of([flipped, exchanged], Prior()) == price_of([flipped], Prior()) + price_of([exchanged], Prior())
+
+
+def test_a_unit_that_is_wrong_is_no_question():
+    """Compared as recorded, an accelerometer in g would be a payload, a lag and three errors of sensors."""
+    friday = flights("friday", (3, 4))
+    in_g = tuple(replace(r, table=r.table.assign(**{n: r.table[n] / g for n in c.SPECIFIC_FORCE})) for r in friday.runs)
+    (joint,) = joints_of(reference_of(monday()), replace(friday, runs=in_g))
+    assert [m.id for m in joint.mistakes_of_new] == ["unit_error"]
 
 
 def test_a_set_that_is_faster_throughout_is_refused():

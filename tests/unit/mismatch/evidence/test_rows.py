@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.signal import upfirdn
 from scipy.spatial.transform import Rotation
 
 from rotorid.effects.catalogue import catalogue
@@ -212,6 +213,18 @@ def test_thinning_keeps_every_signal_at_its_own_instant(rate_hz, step):
     np.testing.assert_allclose(thin(t), thin.times(t), atol=1e-9)
     both = thin(np.stack([t, np.full(1003, 5.0)], axis=1))
     np.testing.assert_allclose(both[:, 1], 5.0, atol=1e-12)
+
+
+def test_thinning_is_a_weighted_sum_at_every_step_and_a_missing_column_stays_alone():
+    """However it is computed: block by block where the steps are long."""
+    rng, thin = np.random.default_rng(0), Thinner(500.0, 20.0)
+    signal = rng.standard_normal((1003, 2, 2))
+    assert thin.step == 12
+    expected = upfirdn(thin.kernel, signal, axis=0)[len(thin.kernel) - 1 : len(signal)]
+    first = -(len(thin.kernel) - 1) % thin.step
+    np.testing.assert_allclose(thin(signal), expected[first :: thin.step], atol=1e-12)
+    signal[:, 0, 1] = np.nan
+    assert (np.isnan(thin(signal)) == np.isnan(signal[0])).all()
 
 
 def test_rows_filter_both_sides_alike():
