@@ -248,8 +248,7 @@ def build_segments(
     `shift_s` moves a sensor's columns in time: a positive value says that the sensor's stamps are late by it.
     Keys: `accelerometer`, `gyroscope`, `attitude`, `velocity`, `position`, `rotors`. `noise` adds white noise of
     that one-sigma per sample to each of a sensor's columns (same keys), to learn what noise does to the analysis. A
-    throttle
-    is one of `full_speed_rad_s` (`full_speed` of the run alone where None).
+    throttle is one of `full_speed_rad_s` (`full_speed` of the run alone where None).
     """
     shift_s, noise = shift_s or {}, noise or {}
     t = run.time_s

@@ -9,7 +9,7 @@ or a term's own values change. What was read of the motion while a column was ma
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 from itertools import chain
@@ -65,8 +65,8 @@ MOST_BYTES = 256e6
 DEFAULT_TRUST = {"thrust": 0.1, "torque": 0.2, "mass": 0.05, "arm": 0.03, "inertia": 0.15}
 """Relative one-sigma belief where `trust` states none."""
 _LOWEST_TO_MEAN = 1.08
-MOST_S, _PIECE_S = 600.0, 20.0
-"""Longer recordings are represented by pieces: memory must not grow with an hour's flight."""
+MOST_S, MOST_SAMPLES, _PIECE_S = 600.0, 100_000, 20.0
+"""Longer recordings are represented by pieces: neither memory nor time must grow with an hour's flight."""
 _NOISE_REACH = 5.0
 """Highest frequency, over the cutoff of the analysis, that a sensor's noise is read from."""
 _OF_THE_BODY = frozenset({"specific_force", "angular_acceleration"})
@@ -198,17 +198,25 @@ def sensor_noise(runs: tuple[Run, ...], vehicle: Vehicle, cutoff_hz: float = np.
     return levels
 
 
-def representative(segments: list[Segment]) -> list[Segment]:
-    """The segments, or of a recording longer than MOST_S as many pieces of PIECE_S, spread evenly over all of it."""
-    if sum(s.motion.size * s.dt_s for s in segments) <= MOST_S:
-        return segments
+def representative(runs: Sequence[Run], rate_hz: float) -> list[Run]:
+    """The runs, or of such as last too long as many pieces of PIECE_S as may be analysed, spread evenly over them all.
+
+    `rate_hz` is the rate of the analysis.
+    """
+    seconds = [float(run.time_s[-1] - run.time_s[0]) for run in runs]
+    most_s = min(MOST_S, MOST_SAMPLES / rate_hz)
+    if sum(seconds) <= most_s:
+        return list(runs)
     pieces = [
-        (s, part[0], part[-1] + 1)
-        for s in segments
-        for part in np.array_split(np.arange(s.motion.size), max(1, int(s.motion.size * s.dt_s / _PIECE_S)))
+        (run, part[0], part[-1] + 1)
+        for run, length in zip(runs, seconds, strict=True)
+        for part in np.array_split(np.arange(len(run.time_s)), max(1, int(length / _PIECE_S)))
     ]
-    kept = np.unique(np.linspace(0, len(pieces) - 1, int(MOST_S / _PIECE_S)).round().astype(int))
-    return [pieces[k][0].part(*pieces[k][1:]) for k in kept]
+    kept = np.unique(np.linspace(0, len(pieces) - 1, int(most_s / _PIECE_S)).round().astype(int))
+    return [
+        Run(run.name, run.table.iloc[first:stop].reset_index(drop=True))
+        for run, first, stop in map(pieces.__getitem__, kept)
+    ]
 
 
 @dataclass
@@ -327,7 +335,8 @@ def prepare(
     rate_hz, cutoff = analysis_rate_hz(recordings.runs, vehicle, cutoff_hz)
     noise = sensor_noise(recordings.runs, vehicle, cutoff)
     segments, noisy, full = [], [], full_speed(recordings.runs, vehicle)
-    for run in recordings.runs:
+    runs = representative(recordings.runs, rate_hz)
+    for run in runs:
         segments += build_segments(run, vehicle, rate_hz, cutoff, shift_s, full_speed_rad_s=full)
         noisy += build_segments(run, vehicle, rate_hz, cutoff, shift_s, noise, _draws_of(run, 0), full)
     if not segments:
@@ -341,10 +350,10 @@ def prepare(
     ):
         noise = {k: v * factors.get(k, 1.0) for k, v in noise.items()}
         noisy = []
-        for run in recordings.runs:
+        for run in runs:
             noisy += build_segments(run, vehicle, rate_hz, cutoff, shift_s, noise, _draws_of(run, 1), full)
-    noisy = representative(without_noise(noisy)) if len(noisy) == len(segments) else []
-    segments = representative(without_noise(segments))
+    noisy = without_noise(noisy) if len(noisy) == len(segments) else []
+    segments = without_noise(segments)
     if made_from_accelerometer(segments, cutoff):
         segments, noisy = ([replace(s, independent_velocity=False) for s in own] for own in (segments, noisy))
     prepared = Prepared(recordings, vehicle, split, segments, noisy, thinner, noise, [], unseen=unseen)
@@ -363,16 +372,14 @@ def prepare_like(prepared: Prepared, recordings: RecordingSet) -> tuple[list[Seg
     """Segments of other runs of the same vehicle, and the same with the noise that `prepared` found added once more."""
     vehicle = prepared.vehicle
     full = full_speed(prepared.recordings.runs, vehicle)
-    segments, noisy = [], []
-    for run in recordings.runs:
-        own = run, vehicle, prepared.segments[0].rate_hz, prepared.thinner.cutoff_hz, None
+    segments, noisy, rate_hz = [], [], prepared.segments[0].rate_hz
+    for run in representative(recordings.runs, rate_hz):
+        own = run, vehicle, rate_hz, prepared.thinner.cutoff_hz, None
         segments += build_segments(*own, full_speed_rad_s=full)
         noisy += build_segments(*own, prepared.noise, _draws_of(run, 1), full)
-    noisy = representative(without_noise(noisy)) if len(noisy) == len(segments) else []
+    noisy = without_noise(noisy) if len(noisy) == len(segments) else []
     same = prepared.segments[0].independent_velocity
-    segments, noisy = (
-        [replace(s, independent_velocity=same) for s in own] for own in (representative(without_noise(segments)), noisy)
-    )
+    segments, noisy = ([replace(s, independent_velocity=same) for s in own] for own in (without_noise(segments), noisy))
     return segments, noisy
 
 

@@ -701,6 +701,7 @@ def _blown_by(prepared: Prepared, model: WrenchModel, segments, noisy, terms: li
     drags, always = ids_of("drag"), [t for t in terms if t.kind != "effect"]
     had = any(model.search.terms[k].effect in drags for k in active)
     for _ in range(_WIND_ROUNDS):
+        again = None  # of a long flight the columns of one model are half a gigabyte: the last round's go first
         own = [*always, *[model.search.terms[k] for k in active], _wind_term()]
         found = _fitted_wind(prepared, own, effects, wind, segments, model_filters(model))
         if found is None:

@@ -34,8 +34,25 @@ _COMMAND_LAG_S = 0.03
 """How late rotors follow their commands, roughly."""
 _MOST_WINDOWS = 30
 """Windows of a run that the factor is found from."""
+_MOST_MEASURED = 1000
+"""Windows of a run, spread over it, that a line is measured from."""
 _LOWEST_HZ = 8.0
 """Aliases below this fall among the flight's own motion and are left out."""
+
+
+@dataclass(frozen=True)
+class _Turns:
+    """How the rotors turn in windows of a run, at an order."""
+
+    windows: np.ndarray
+    """(w,) numbers of the windows, of `length` samples each."""
+    length: int
+    follow: np.ndarray
+    """(w, length, k) e^(-iψ) of each rotor."""
+    clear: np.ndarray
+    """(w, k) whether the line lies above flight motion: where its alias comes near zero that would be taken for it."""
+    crowd: np.ndarray
+    """(w, k) number of rotors that share the line."""
 
 
 @dataclass(frozen=True)
@@ -55,15 +72,17 @@ class Line:
 def find(recordings: ReadSet) -> Corrected:
     """A vibration that follows the rotors, if there is a clear one; the set stays as it is."""
     signals = turning(recordings)
+    turns = {order: [_turns(s, order, _MOST_MEASURED) for s in signals] for order in _ORDERS}
     lines = []
     for sensor, columns, unit in (
         ("accelerometer", c.SPECIFIC_FORCE, "m/s2"),
         ("gyroscope", c.ANGULAR_VELOCITY, "rad/s"),
     ):
-        have = [s for s in signals if sensor in s.values and s.own_rate_hz[sensor] > 0.9 * s.rate_hz]
+        have = [k for k, s in enumerate(signals) if sensor in s.values and s.own_rate_hz[sensor] > 0.9 * s.rate_hz]
         for axis, column in enumerate(columns):
             for order in _ORDERS:
-                line = _measure(have, sensor, axis, column, unit, order)
+                seen = [(signals[k].values[sensor][:, axis], turns[order][k]) for k in have]
+                line = _measure(seen, column, unit, order)
                 if line and line.p_value < P_LIMIT and line.over_noise > _LEAST_AMPLITUDE:
                     lines.append(line)
     if not lines:
@@ -119,38 +138,33 @@ def _as_commanded(s: Signals, full_rad_s: float | None) -> np.ndarray | None:
 def _strongest_line(signals: list[Signals]) -> float:
     """Power at the order over that next to it, in half of the windows, of the accelerometer's clearest line."""
     best = 0.0
-    for axis in range(3):
-        for order in _ORDERS:
-            ratios = []
-            for s in signals:
-                length = int(_WINDOW_S * s.rate_hz)
-                if "accelerometer" in s.values and length >= 24:
-                    line, beside, _, _ = _demodulated(s, "accelerometer", axis, order, length, _MOST_WINDOWS)
-                    ratios.append((line / beside).ravel())
-            found = np.concatenate(ratios) if ratios else np.zeros(0)
+    for order in _ORDERS:
+        seen = [(s, _turns(s, order, _MOST_WINDOWS)) for s in signals if "accelerometer" in s.values]
+        for axis in range(3):
+            powers = [_powers(s.values["accelerometer"][:, axis], own) for s, own in seen if own is not None]
+            found = np.concatenate([(line / beside).ravel() for line, beside, _ in powers] or [np.zeros(0)])
             found = found[np.isfinite(found)]
             best = max(best, float(np.median(found)) if len(found) else 0.0)
     return best
 
 
-def _measure(all_signals: list[Signals], sensor: str, axis: int, column: str, unit: str, order: int) -> Line | None:
-    """Power at the rotors' order over that next to it, summed over windows and rotors."""
+def _measure(all_seen: list[tuple[np.ndarray, _Turns | None]], column: str, unit: str, order: int) -> Line | None:
+    """Power of readings (n,) at the rotors' order over that next to it, summed over windows and rotors."""
     ratios, powers, levels, lengths = [], [], [], []
-    for s in all_signals:
-        length = int(_WINDOW_S * s.rate_hz)
-        if length < 24:
+    for reading, turns in all_seen:
+        if turns is None:
             continue
-        line, beside, crowd, floor = _demodulated(s, sensor, axis, order, length)
+        line, beside, floor = _powers(reading, turns)
         seen = np.isfinite(line) & np.isfinite(beside) & (beside > 0)
         good = seen.any(axis=1)
         if not good.any():
             continue
-        line, beside, crowd, floor = (np.where(seen, values, np.nan) for values in (line, beside, crowd, floor))
+        line, beside, crowd, floor = (np.where(seen, values, np.nan) for values in (line, beside, turns.crowd, floor))
         # Rotors at nearly one speed see the same line: count each window once, by their mean.
         ratios.append(np.nanmean(line[good] / beside[good], axis=1))
         powers.append(np.nanmean((line - beside)[good] / crowd[good], axis=1))
         levels.append(np.nanmean(floor[good], axis=1))
-        lengths.append(np.full(good.sum(), length))
+        lengths.append(np.full(good.sum(), turns.length))
     if not ratios or sum(map(len, ratios)) < 20:
         return None
     ratio, power, level, length = (np.concatenate(x) for x in (ratios, powers, levels, lengths))
@@ -167,44 +181,49 @@ def _measure(all_signals: list[Signals], sensor: str, axis: int, column: str, un
     return Line(column, unit, order, float(amplitude), float(low), float(high), float(amplitude) / max(noise, 1e-12), p)
 
 
-def _demodulated(
-    s: Signals, sensor: str, axis: int, order: int, length: int, most: int | None = None
-) -> tuple[np.ndarray, ...]:
-    """Squared amplitude at the order, next to it, number of rotors that share the line, and noise: (windows, rotors).
+def _tapered(length: int) -> np.ndarray:
+    """Weights (length,) of a window, their mean one."""
+    taper = np.hanning(length + 2)[1:-1]
+    return taper / taper.mean()
 
-    NaN where it is not identifiable. Of no more than `most` windows spread over the run, if stated.
-    """
+
+def _turns(s: Signals, order: int, most: int) -> _Turns | None:
+    """The rotors of a run at an order, in no more than `most` windows spread over it; None of too few samples."""
+    length, speed, dt = int(_WINDOW_S * s.rate_hz), s.values["rotors"], 1.0 / s.rate_hz
+    if length < 24:
+        return None
     count = len(s.time_s) // length
-    rows = np.unique(np.linspace(0, count - 1, min(count, most or count)).astype(int))
-    speed = s.values["rotors"]
-    dt = 1.0 / s.rate_hz
+    windows = np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
     middle = np.zeros_like(speed)
     middle[1:] = (speed[1:] + speed[:-1]) * dt / 2
-    speed, middle = (x[: count * length].reshape(count, length, -1)[rows] for x in (speed, middle))
-    x = s.values[sensor][: count * length, axis].reshape(count, length)[rows]
+    speed, middle = (x[: count * length].reshape(count, length, -1)[windows] for x in (speed, middle))
+    steps = order * middle
+    steps[:, 0] = 0.0
+    follow = np.exp(-1j * np.cumsum(steps, axis=1))
+    turned = np.abs((order * speed.mean(axis=1) * dt + np.pi) % (2 * np.pi) - np.pi)
+    clear = turned / (2 * np.pi * dt) > _LOWEST_HZ + 6 / _WINDOW_S
+    # Rotors of nearly one speed add to each other's line, with phases that wander: their powers add.
+    together = np.matmul((_tapered(length)[:, None] * follow.conj()).transpose(0, 2, 1), follow) / length
+    return _Turns(windows, length, follow, clear, np.sum(np.abs(together) ** 2, axis=2))
+
+
+def _powers(reading: np.ndarray, turns: _Turns) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Squared amplitude of a reading (n,) at the order, next to it, and noise: (windows, rotors) each.
+
+    NaN where it is not identifiable.
+    """
+    length = turns.length
+    x = reading[: len(reading) // length * length].reshape(-1, length)[turns.windows]
     k = np.arange(length)
     # The flight's own slow motion is taken out with a straight line and a taper.
     ramp = (k - k.mean()) / max(np.abs(k - k.mean()).max(), 1)
     x = x - x.mean(axis=1, keepdims=True)
-    x = x - ramp * (x @ ramp / (ramp @ ramp))[:, None]
-    taper = np.hanning(length + 2)[1:-1]
-    taper = taper / taper.mean()
-    line = np.full((len(rows), speed.shape[2]), np.nan)
-    beside, crowd, floor = (np.full_like(line, np.nan) for _ in range(3))
-    steps = order * middle
-    steps[:, 0] = 0.0
-    follow = np.exp(-1j * np.cumsum(steps, axis=1))
-    for i in range(speed.shape[2]):
-        base = x * taper * follow[:, :, i]
-        spectrum = np.abs(np.fft.fft(base, axis=1) / length) ** 2 * 4
-        # Where the alias comes near zero frequency, flight motion would be taken for a line.
-        turn = order * speed[:, :, i].mean(axis=1) * dt
-        turned = np.abs((turn + np.pi) % (2 * np.pi) - np.pi)
-        clear = turned / (2 * np.pi * dt) > _LOWEST_HZ + 6 / _WINDOW_S
-        line[clear, i] = spectrum[clear, 0]
-        # Rotors of nearly one speed add to each other's line, with phases that wander: their powers add.
-        together = np.mean(taper[:, None] * follow[:, :, i, None].conj() * follow, axis=1)
-        crowd[clear, i] = np.sum(np.abs(together[clear]) ** 2, axis=1)
-        floor[clear, i] = np.median(spectrum[clear], axis=1) / np.log(2)
-        beside[clear, i] = np.mean(spectrum[clear][:, list(_SIDE_BINS)], axis=1)
-    return line, beside, crowd, floor
+    x = (x - ramp * (x @ ramp / (ramp @ ramp))[:, None]) * _tapered(length)
+    line = np.full(turns.clear.shape, np.nan)
+    beside, floor = np.full_like(line, np.nan), np.full_like(line, np.nan)
+    for i, clear in enumerate(turns.clear.T):
+        spectrum = np.abs(np.fft.fft(x[clear] * turns.follow[clear, :, i], axis=1) / length) ** 2 * 4
+        line[clear, i] = spectrum[:, 0]
+        floor[clear, i] = np.median(spectrum, axis=1) / np.log(2)
+        beside[clear, i] = np.mean(spectrum[:, list(_SIDE_BINS)], axis=1)
+    return line, beside, floor

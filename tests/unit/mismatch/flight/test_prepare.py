@@ -169,17 +169,15 @@ def test_a_form_needs_its_rotors():
 
 
 def test_a_long_recording_is_represented_by_pieces_of_all_its_runs(monkeypatch):
-    """Three runs of about 25 s are one piece each; two pieces are the first and the last, cut in every field alike."""
-    segments = prepare(recorded(1, 2, 3)).segments
-    assert representative(segments) is segments
-    monkeypatch.setattr("rotorid.mismatch.flight.prepare.MOST_S", 40.0)
-    assert [s.run for s in representative(segments)] == ["run00", "run02"]
-    piece = segments[0].part(100, 300)
-    assert piece.motion.size == 200 and piece.motion.time_s[0] == segments[0].motion.time_s[100]
-    for whole, cut in ((segments[0].motion, piece.motion), (segments[0], piece)):
-        for name, values in vars(cut).items():
-            if isinstance(values, np.ndarray) and name != "wind":
-                np.testing.assert_array_equal(values, getattr(whole, name)[100:300])
+    """Three runs of 25 s at 200 Hz in pieces of 8 s: five of nine are 41 s, whether seconds or samples are too many."""
+    runs = recorded(1, 2, 3).runs
+    assert representative(runs, 100.0) == list(runs)
+    monkeypatch.setattr("rotorid.mismatch.flight.prepare._PIECE_S", 8.0)
+    cut = representative(runs, 2400.0)
+    assert [r.name for r in cut] == ["run00", "run00", "run01", "run02", "run02"]
+    monkeypatch.setattr("rotorid.mismatch.flight.prepare.MOST_S", 41.0)
+    assert [r.time_s[0] for r in representative(runs, 1.0)] == [r.time_s[0] for r in cut]
+    assert cut[0].table.equals(runs[0].table[:1667]) and cut[-1].time_s[-1] == runs[2].time_s[-1]
 
 
 def test_predicted_accelerations_hold_no_measured_ones():
