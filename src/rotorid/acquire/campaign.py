@@ -24,7 +24,6 @@ from rotorid.acquire.emulators.devices import (
     BenchDevice,
     Device,
     Jr3Device,
-    Physics,
     QuadrotorDevice,
     RotorDevice,
     TensileDevice,
@@ -41,13 +40,13 @@ from rotorid.acquire.emulators.physics import (
     StandPhysics,
     TensilePhysics,
     TesterPhysics,
-    TorqueRig,
     TurningRotors,
+    torque_rig,
     write_stated,
 )
 from rotorid.acquire.emulators.truth import Truth, draw_truth, write_truth
 from rotorid.acquire.emulators.wire import Faults, WireHalf, World
-from rotorid.acquire.procedures import STEADY_JR3, SteadyRule, programme_of
+from rotorid.acquire.procedures import STEADY_JR3, SteadyRule, programme_of, run_with
 from rotorid.acquire.recorder import Recorder, Timings
 from rotorid.acquire.transport import LoopbackTransport, VirtualClock
 from rotorid.io.session import RoomAir, Session, Setup, session_path, write_index, write_session
@@ -160,24 +159,19 @@ class _Campaign:
             )
             for line, (name, setup) in zip(world.lines, setups.items(), strict=True)
         ]
-        _within(recorders, run)
+        run_with(recorders, run)
         for recorder in recorders:
             _pack(recorder.log_path, recorder.session)
             self.recordings.append(recorder.session)
         self.date += timedelta(seconds=round(clock.now_ns() / 1e9 + pause_s))
 
 
-def _within(recorders: list[Recorder], run: Callable[..., None]) -> None:
-    """Run a procedure with all recorders open."""
-    if len(recorders) == 1:
-        with recorders[0] as only:
-            run(only)
-    else:
-        with recorders[0] as first, recorders[1] as second:
-            run(first, second)
+def weight_gf(items: tuple[str, ...] | list[str]) -> float:
+    """Weight of a combination in gf."""
+    return round(sum(_WEIGHTS_GF[item] for item in items), 4)
 
 
-def _pack(log: Path, session: Session) -> Path:
+def _pack(log: Path, session: Session) -> None:
     """Replace a finished log by its gzipped form (same bytes inside, no name and no date in the header)."""
     packed = log.with_name(log.name + ".gz")
     with open(packed, "wb") as raw, gzip.GzipFile("", "wb", 9, raw, mtime=0) as out:
@@ -185,7 +179,6 @@ def _pack(log: Path, session: Session) -> Path:
     log.unlink()
     session.log = packed.name
     write_session(session, session_path(packed))
-    return packed
 
 
 def _operator(place: Callable[[float], None], load_gf: float, reaction_samples: int) -> procedures.Prompt:
@@ -244,24 +237,31 @@ def static(campaign: _Campaign) -> None:
     for platform, axis in series:
         for number, items in enumerate(COMBINATIONS, start=1):
             for repeat in range(1, _REPEATS + 1):
-                name = f"static-{platform}-{axis}-w{number}-r{repeat:02d}"
-                rng = campaign.rng(name)
-                physics, device = _platform(campaign, platform, rng)
-                world = World(physics, campaign.line(device, name))
-                physics.process(1.0)
-                load = weight_gf(items)
-                rule = STEADY_JR3 if platform == "jr3" else SteadyRule()
-                reaction = int(rng.integers(60, 120))
-                prompt = _operator(lambda gf, p=physics, a=axis: p.place_load(a, gf), load, reaction)
-                setup = Setup(platform=platform, axis=axis, load_gf=load, load_items=list(items), repeat=repeat)
-                campaign.record(
-                    "static",
-                    f"static-{platform}-{axis}",
-                    world,
-                    {name: setup},
-                    lambda recorder, prompt=prompt, rule=rule: procedures.static_test(recorder, prompt, 50, rule),
-                    {"name": "static_test", "samples": 50, **vars(rule)},
-                )
+                _weigh(campaign, "static", platform, axis, items, f"w{number}-r{repeat:02d}", repeat)
+
+
+def _weigh(
+    campaign: _Campaign, kind: str, platform: str, axis: str, items: tuple[str, ...], name: str, repeat: int
+) -> None:
+    """Put weights on a platform along one axis, or along several at once, and read."""
+    group = f"{kind}-{platform}-{axis}"
+    name = f"{group}-{name}"
+    rng = campaign.rng(name)
+    physics, device = _platform(campaign, platform, rng)
+    world = World(physics, campaign.line(device, name))
+    physics.process(1.0)
+    load = weight_gf(items)
+    rule = STEADY_JR3 if platform == "jr3" else SteadyRule()
+    prompt = _operator(lambda gf: physics.place_load(axis, gf), load, int(rng.integers(60, 120)))
+    setup = Setup(platform=platform, axis=axis, load_gf=load, load_items=list(items), repeat=repeat)
+    campaign.record(
+        kind,
+        group,
+        world,
+        {name: setup},
+        lambda recorder: procedures.static_test(recorder, prompt, 50, rule),
+        {"name": "static_test", "samples": 50, **vars(rule)},
+    )
 
 
 def dynamic(campaign: _Campaign) -> None:
@@ -291,7 +291,9 @@ def dynamic(campaign: _Campaign) -> None:
             )
 
 
-def _platform(campaign: _Campaign, platform: str, rng: np.random.Generator) -> tuple[Physics, Device]:
+def _platform(
+    campaign: _Campaign, platform: str, rng: np.random.Generator
+) -> tuple[BenchPhysics | LoadedSensor, Device]:
     if platform == "jr3":
         sensor = LoadedSensor(campaign.truth.jr3, rng)
         return sensor, Jr3Device(sensor)
@@ -351,7 +353,7 @@ def torque(campaign: _Campaign) -> None:
         if percent % 10 == 2:
             battery = Battery(truth.battery)
         name = f"torque-{percent:02d}"
-        rig = TorqueRig(truth, battery, campaign.rng(name))
+        stand, tester = torque_rig(truth, battery, campaign.rng(name))
         common = Setup(
             axis="z",
             motor=1,
@@ -363,11 +365,7 @@ def torque(campaign: _Campaign) -> None:
             sensor_position_m=list(SENSOR_POSITION_M),
             tared=False,
         )
-        world = World(
-            rig,
-            campaign.line(RotorDevice(rig.tester), name),
-            campaign.line(WrenchDevice(rig.stand), name),
-        )
+        lines = (campaign.line(device, name) for device in (RotorDevice(tester), WrenchDevice(stand)))
         remark = "drives and counts only: its thrust cell carries nothing"
         setups = {
             f"{name}-rotor": common.model_copy(update={"platform": "tester", "remarks": remark}),
@@ -376,7 +374,7 @@ def torque(campaign: _Campaign) -> None:
         campaign.record(
             "torque",
             name,
-            world,
+            World(stand, *lines),
             setups,
             lambda tester, sensor, u=percent / 100: procedures.torque_test(tester, sensor, u, 2.0, 6.0),
             {"name": "torque_test", "throttle": percent / 100, "rest_s": 2.0, "hold_s": 6.0},
@@ -458,24 +456,9 @@ def combined(campaign: _Campaign) -> None:
     """
     for axis in _COMBINED_AXES:
         for number in _COMBINED_LOADS:
-            items = COMBINATIONS[number - 1]
             for repeat in range(1, 6):
-                name = f"combined-al-{axis}-w{number}-r{repeat}"
-                rng = campaign.rng(name)
-                physics, device = _platform(campaign, "al", rng)
-                world = World(physics, campaign.line(device, name))
-                physics.process(1.0)
-                load = weight_gf(items)
-                prompt = _operator(lambda gf, p=physics, a=axis: p.place_load(a, gf), load, int(rng.integers(60, 120)))
-                setup = Setup(platform="al", axis=axis, load_gf=load, load_items=list(items), repeat=repeat)
-                campaign.record(
-                    "combined",
-                    f"combined-al-{axis}",
-                    world,
-                    {name: setup},
-                    lambda recorder, prompt=prompt: procedures.static_test(recorder, prompt, 50, SteadyRule()),
-                    {"name": "static_test", "samples": 50, **vars(SteadyRule())},
-                )
+                name = f"w{number}-r{repeat}"
+                _weigh(campaign, "combined", "al", axis, COMBINATIONS[number - 1], name, repeat)
 
 
 PARTS: dict[str, Callable[[_Campaign], None]] = {
@@ -524,8 +507,3 @@ def main() -> None:
 
 if __name__ == "__main__":
     main()
-
-
-def weight_gf(items: tuple[str, ...] | list[str]) -> float:
-    """Weight of a combination in gf."""
-    return round(sum(_WEIGHTS_GF[item] for item in items), 4)

@@ -28,8 +28,6 @@ from rotorid.acquire.recorder import Recorder
 from rotorid.acquire.transport import (
     AcquireError,
     Interrupted,
-    LimitExceeded,
-    PortBusy,
     PortLost,
     PortMissing,
     SerialTransport,
@@ -37,7 +35,7 @@ from rotorid.acquire.transport import (
 from rotorid.errors import InputError
 from rotorid.io import wire
 from rotorid.io.frames import COMMAND, START, Frame, Intake, encode
-from rotorid.io.session import RoomAir, SessionError, Setup
+from rotorid.io.session import Ended, RoomAir, Setup
 from rotorid.io.wire import EXPERIMENTS, IDENTIFY, INSTRUMENTS
 
 _DEFAULT_OUT = Path("raw/local")
@@ -175,22 +173,15 @@ def bench(
     shared: _Shared,
 ) -> None:
     """Record the load-cell bench: settle, wait until steady, tare, load, read (thesis fig. 2.35)."""
-    instrument, rule = ("jr3", procedures.STEADY_JR3) if platform == "jr3" else ("bench", procedures.SteadyRule())
-    if tolerance is not None:
-        rule = replace(rule, tolerance=tolerance)
+    instrument = "jr3" if platform == "jr3" else "bench"
     kind = {"calibrate": "calibration", "stream": "free"}.get(test, test)
     setup = Setup(
         kind=kind, platform=platform, axis=axis, load_gf=load_gf, cell=cell, repeat=repeat, operator=shared.operator
     )
 
     def run(recorder: Recorder) -> None:
-        prompt = _prompt(recorder, place_s)
-        if test == "calibrate":
-            procedures.calibrate_cell(recorder, prompt, samples or 400)
-        elif test == "static":
-            procedures.static_test(recorder, prompt, samples or 50, rule, wait_s)
-        elif test == "dynamic":
-            procedures.dynamic_test(recorder, prompt, samples or 1500, rule, wait_s)
+        if test in procedures.BENCH_TESTS:
+            procedures.bench_test(recorder, test, _prompt(recorder, place_s), samples or None, tolerance, wait_s)
         elif test == "stream":
             procedures.stream(recorder, samples, 1 / rate if rate else 0.0)
         else:
@@ -410,9 +401,8 @@ def check(
     """Read a log as the pipeline does and say what is in it. A recording that was cut off is completed: its
     metadata then say how far it goes."""
     from rotorid.acquire.run_plan import repair
-    from rotorid.io.logs import LogError, read_log
+    from rotorid.io.logs import read_log
     from rotorid.io.metadata_checksum import without_checksum
-    from rotorid.io.rawlog import NotALog
     from rotorid.io.session import session_path
 
     try:
@@ -420,7 +410,7 @@ def check(
             return
         parsed = read_log(log)
         repaired = repair(log, parsed)
-    except (LogError, NotALog, SessionError, OSError) as error:
+    except (InputError, OSError) as error:
         _fail(str(error))
     table = parsed.table
     typer.echo(f"{log}: {parsed.instrument.title} ({parsed.start.firmware}), {len(table)} samples", nl=False)
@@ -475,7 +465,7 @@ def index(raw: Annotated[Path, typer.Argument(help="the folder of raw logs")] = 
     try:
         rows = write_index(raw)
         bare = [path for path in metadata_files(raw) if read_session(path).metadata_sha256 is None]
-    except (SessionError, OSError) as error:
+    except (InputError, OSError) as error:
         _fail(str(error))
     typer.echo(f"{raw / 'sessions.tsv'}: {len(rows)} recordings")
     if bare:
@@ -536,7 +526,7 @@ def lines(
     """Record an instrument that sends plain lines of text (CSV, key=value, fixed places) and knows no frames."""
     from rotorid.acquire.lines import record_lines
     from rotorid.acquire.transport import SerialTransport, SystemClock
-    from rotorid.io.lines import DescriptionError, read_description
+    from rotorid.io.lines import read_description
 
     console = view.stderr_console()
     stop = threading.Event()
@@ -556,7 +546,8 @@ def lines(
             for column, (low, high) in limits.items():
                 value = values[columns.index(column)]
                 if not low <= value <= high:
-                    raise LimitExceeded(f"{column} is {value:.6g}, allowed are {low:g} to {high:g}: stopped")
+                    text = f"{column} is {value:.6g}, allowed are {low:g} to {high:g}: stopped"
+                    raise AcquireError(text, Ended.LIMIT_EXCEEDED)
 
         def work() -> None:
             record_lines(
@@ -571,7 +562,7 @@ def lines(
     except Interrupted as error:
         console.print(str(error))
         raise typer.Exit(130) from error
-    except (DescriptionError, AcquireError) as error:
+    except (InputError, AcquireError) as error:
         _fail(str(error))
     typer.echo(f"{shared.out / name}.rlog: recorded; `rotorid-acquire check` reads it")
 
@@ -589,18 +580,18 @@ def campaign(
     ] = None,
 ) -> None:
     """Record a campaign by its plan: checks first, then step after step; goes on where it was left."""
-    from functools import partial
+    from contextlib import nullcontext
     from tempfile import TemporaryDirectory
 
     from rotorid.acquire import run_plan
-    from rotorid.acquire.run_plan import PlanError, is_done, read_plan, steps_of
+    from rotorid.acquire.run_plan import is_done, read_plan, steps_of
 
     console = view.stderr_console()
     stop = threading.Event()
     try:
         planned = read_plan(plan)
         steps = steps_of(planned)
-    except PlanError as error:
+    except InputError as error:
         _fail(str(error))
     if show:
         for step in steps:
@@ -632,16 +623,17 @@ def campaign(
     )
     try:
         with TemporaryDirectory(prefix="rotorid-") as folder:
-            ports_of = partial(run_plan.real_ports, planned)
-            if emulate_it:
-                ports_of = partial(
-                    run_plan.emulated_ports, planned, folder=Path(folder), speed=speed, place_s=wait_s * 0.6
-                )
+
+            def ports_of(step):
+                if emulate_it:
+                    return run_plan.emulated_ports(planned, step, Path(folder), speed, wait_s * 0.6)
+                return nullcontext(planned.ports)
+
             left = run_plan.run(planned, ports_of, desk, repeat)
     except Interrupted as error:
         console.print(str(error))
         raise typer.Exit(130) from error
-    except (AcquireError, PlanError, SessionError, OSError) as error:
+    except (AcquireError, InputError, OSError) as error:
         _fail(f"{error}\nNothing that is recorded is lost; the same command goes on from here.")
     typer.echo(f"{planned.out}: {len(steps) - left} of {len(steps)} recordings are there; {planned.out}/sessions.tsv")
 
@@ -796,7 +788,7 @@ def who_is_there(port: str, wait_s: float = _WAIT_S) -> str:
                         return (
                             f"{content.instrument}{known}, firmware {content.firmware}, serial {content.serial_number}"
                         )
-        except (PortMissing, PortBusy, PortLost) as error:
+        except (PortMissing, PortLost) as error:
             return str(error)
         finally:
             transport.close()

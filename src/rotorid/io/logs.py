@@ -24,17 +24,13 @@ import pandas as pd
 from rotorid.errors import InputError
 from rotorid.io import rawlog, wire
 from rotorid.io.frames import DATA, END, START, Intake, Quality
-from rotorid.io.session import Ended, Gap, Session, SessionError, read_session, session_path
+from rotorid.io.session import Ended, Gap, Session, read_session, session_path
 from rotorid.io.wire import STREAMING
 
 _SETUP = (
     "platform axis load_gf cell repeat experiment throttle motor infill_percent specimen gauge_length_mm "
     "cross_section_mm2 mount_roll_deg mount_pitch_deg tared"
 ).split()
-
-
-class LogError(InputError):
-    """A log that no table can be made of; the sentence names the file and what was expected."""
 
 
 @dataclass(frozen=True)
@@ -83,12 +79,12 @@ class Log:
 def read_log(path: str | Path) -> Log:
     """Parse a raw log (`.rlog` or `.rlog.gz`), whole, cut or damaged.
 
-    Raises LogError where no start record names the instrument (and no metadata does either) or where the log and
-    the metadata next to it are of two recordings, NotALog where the file is none or is not there.
+    Raises InputError where no start record names the instrument (and no metadata does either), where the log and the
+    metadata next to it are of two recordings, and where the file is no log or is not there.
     """
     path = Path(path)
     raw = rawlog.read_raw(path)
-    session = _session_of(path)
+    session = read_session(session_path(path)) if session_path(path).exists() else None
     same_recording(path, raw, session)
     intake = Intake(wire.INSTRUMENTS.get(session.instrument) if session is not None else None)
     starts: list[wire.StartRecord] = []
@@ -175,14 +171,14 @@ def _note(data: bytes) -> dict:
 
 
 def same_recording(path: Path, raw: rawlog.RawLog, session: Session | None) -> None:
-    """Raises LogError where the log's own name is not that of the metadata next to it."""
+    """Raises InputError where the log's own name is not that of the metadata next to it."""
     if session is None:
         return
     for chunk in raw.chunks:
         if chunk.tag == rawlog.NOTE and _note(chunk.data).get("note") == "begin":
             name = _note(chunk.data).get("id")
             if name is not None and name != session.id:
-                raise LogError(
+                raise InputError(
                     f"{path}: holds the recording {name!r}, and the metadata next to it are those of {session.id!r}; "
                     "put the right file back"
                 )
@@ -202,15 +198,6 @@ def faults_of(raw: rawlog.RawLog, session: Session | None) -> list[str]:
     return faults
 
 
-def _session_of(path: Path) -> Session | None:
-    try:
-        return read_session(session_path(path))
-    except SessionError:
-        if session_path(path).exists():
-            raise
-        return None
-
-
 def _instrument(path: Path, starts: list[wire.StartRecord], session: Session | None) -> tuple[wire.Instrument, str]:
     """Who wrote the log, and a sentence where that is an instrument we do not know: its samples cannot be read."""
     named = [start.instrument for start in starts]
@@ -219,7 +206,7 @@ def _instrument(path: Path, starts: list[wire.StartRecord], session: Session | N
             return wire.INSTRUMENTS[name], ""
     name = named[-1] if named else session.instrument if session else None
     if name is None:
-        raise LogError(
+        raise InputError(
             f"{path}: no start record in it and no {session_path(path).name} next to it, "
             "so nothing says which instrument wrote it"
         )
@@ -227,7 +214,7 @@ def _instrument(path: Path, starts: list[wire.StartRecord], session: Session | N
     if name in wire.INSTRUMENTS:
         return wire.INSTRUMENTS[name], ""
     if session is None or session.instrument not in wire.INSTRUMENTS:
-        raise LogError(f"{path}: {known}")
+        raise InputError(f"{path}: {known}")
     return wire.INSTRUMENTS[session.instrument], known
 
 

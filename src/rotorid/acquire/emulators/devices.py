@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import struct
-from typing import Protocol
 
 import numpy as np
 
@@ -25,12 +24,6 @@ _FIRMWARE = "1.2 (emulated)"  # the committed campaign's
 
 class CommandRefused(Exception):
     """The device says no; the text says why."""
-
-
-class Physics(Protocol):
-    """Advanced by a time step."""
-
-    def process(self, dt_s: float) -> None: ...
 
 
 class Device:

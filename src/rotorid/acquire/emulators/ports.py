@@ -34,8 +34,8 @@ from rotorid.acquire.emulators.physics import (
     StandPhysics,
     TensilePhysics,
     TesterPhysics,
-    TorqueRig,
     TurningRotors,
+    torque_rig,
 )
 from rotorid.acquire.emulators.truth import Truth
 from rotorid.acquire.emulators.wire import Faults, WireHalf, World
@@ -270,8 +270,8 @@ def build(
         physics = TesterPhysics(rotors, truth.rotor, truth.tester, rng)
         return World(physics, line(RotorDevice(physics)))
     if what == "torque":
-        rig = TorqueRig(truth, Battery(truth.battery), rng)
-        return World(rig, line(RotorDevice(rig.tester)), line(WrenchDevice(rig.stand)))
+        stand, tester = torque_rig(truth, Battery(truth.battery), rng)
+        return World(stand, line(RotorDevice(tester)), line(WrenchDevice(stand)))
     if what not in _NAMES:
         raise ValueError(f"there is no emulator {what!r}; there are {', '.join(_NAMES)}")
     if experiment not in EXPERIMENTS:

@@ -8,12 +8,12 @@ from __future__ import annotations
 import struct
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from zlib import crc32
 
 import numpy as np
 
-from rotorid.acquire.emulators.devices import CommandRefused, Device, Physics
+from rotorid.acquire.emulators.devices import CommandRefused, Device
 from rotorid.io import wire
 from rotorid.io.frames import ANSWER, COMMAND, DATA, END, START, Frame, StreamDecoder, encode
 from rotorid.io.wire import (
@@ -55,43 +55,6 @@ class Faults:
 _KINDS = ("drop", "repeat", "swap", "corrupt", "half", "garbage")
 
 
-@dataclass
-class _FaultyLine:
-    """Applies the faults of the line to encoded frames."""
-
-    faults: Faults
-    rng: np.random.Generator
-    count: int = 0  # data frames so far
-    done: dict[str, int] = field(default_factory=lambda: dict.fromkeys(_KINDS, 0))
-    _held: bytes = b""
-
-    def send(self, encoded: bytes) -> bytes:
-        """What reaches the other end when this data frame is sent."""
-        number, self.count = self.count, self.count + 1
-        befalls = {kind for kind in _KINDS if number in getattr(self.faults, kind)}
-        if self.faults.share:
-            befalls |= {kind for kind in _KINDS if self.rng.random() < self.faults.share}
-        for kind in befalls:
-            self.done[kind] += 1
-        out = b""
-        if "garbage" in befalls:
-            out += self.rng.bytes(16)
-        if "corrupt" in befalls:
-            place = 2 + int(self.rng.integers(len(encoded) - 3))
-            encoded = encoded[:place] + bytes([encoded[place] ^ 0x10]) + encoded[place + 1 :]
-        if "half" in befalls:
-            encoded = encoded[: len(encoded) // 2]
-        if "drop" in befalls:
-            encoded = b""
-        if "repeat" in befalls:
-            encoded *= 2
-        if "swap" in befalls and not self._held:
-            self._held = encoded
-            return out
-        out, self._held = out + encoded + self._held, b""
-        return out
-
-
 class WireHalf:
     """One instrument on a line.
 
@@ -111,9 +74,11 @@ class WireHalf:
         self.due_s: float | None = None  # true time of the next sample
         self.unplugged = False
         self.at_rest = False  # the cable carries nothing, either way, and no port notices
-        self.line = _FaultyLine(faults, rng)
+        self.count = 0  # data frames so far
+        self.done = dict.fromkeys(_KINDS, 0)  # faults of the line so far
         self._faults = faults
         self._rng = rng
+        self._held = b""
         self._clock_rate = 1 + clock_error
         self._burst_s = burst_s
         self._out: deque[tuple[float, bytes]] = deque()
@@ -174,7 +139,7 @@ class WireHalf:
 
     def sample(self) -> None:
         """The moment `due_s` is there: take a sample and send it."""
-        number = self.line.count
+        number = self.count
         if number in self._faults.reset_at and number not in self._fired:
             self._fired.add(number)
             self.power_up()
@@ -182,7 +147,7 @@ class WireHalf:
         frame = self._frame(DATA, self.device.instrument.encode(self.device.counts()))
         self._sent += 1
         self.due_s += self.device.interval_us * 1e-6 / self._clock_rate / self._faults.pace
-        self._emit(self.line.send(frame))
+        self._emit(self._spoilt(frame))
         if not self.device.streaming:
             self._end(COMPLETE)
 
@@ -203,6 +168,32 @@ class WireHalf:
         self._decoder = StreamDecoder()
 
     # ---- inside --------------------------------------------------------------------------------------
+
+    def _spoilt(self, encoded: bytes) -> bytes:
+        """What of a data frame reaches the other end by the faults of the line."""
+        number, self.count = self.count, self.count + 1
+        befalls = {kind for kind in _KINDS if number in getattr(self._faults, kind)}
+        if self._faults.share:
+            befalls |= {kind for kind in _KINDS if self._rng.random() < self._faults.share}
+        for kind in befalls:
+            self.done[kind] += 1
+        out = b""
+        if "garbage" in befalls:
+            out += self._rng.bytes(16)
+        if "corrupt" in befalls:
+            place = 2 + int(self._rng.integers(len(encoded) - 3))
+            encoded = encoded[:place] + bytes([encoded[place] ^ 0x10]) + encoded[place + 1 :]
+        if "half" in befalls:
+            encoded = encoded[: len(encoded) // 2]
+        if "drop" in befalls:
+            encoded = b""
+        if "repeat" in befalls:
+            encoded *= 2
+        if "swap" in befalls and not self._held:
+            self._held = encoded
+            return out
+        out, self._held = out + encoded + self._held, b""
+        return out
 
     def _obey(self, letter: str, arguments: bytes) -> None:
         if letter == IDENTIFY:
@@ -254,7 +245,7 @@ class WireHalf:
         return frame
 
     def _emit(self, data: bytes) -> None:
-        if self._faults.silent_from is not None and self.line.count > self._faults.silent_from:
+        if self._faults.silent_from is not None and self.count > self._faults.silent_from:
             return
         arrival_s = self._now_s
         if self._burst_s:
@@ -265,9 +256,12 @@ class WireHalf:
 
 
 class World:
-    """Physics shared by one or more instruments, advanced from sample to sample in the order of time."""
+    """Physics shared by one or more instruments, advanced from sample to sample in the order of time.
 
-    def __init__(self, physics: Physics, *lines: WireHalf) -> None:
+    `physics.process(dt_s)` advances it.
+    """
+
+    def __init__(self, physics, *lines: WireHalf) -> None:
         self.physics = physics
         self.lines = lines
         self.now_s = 0.0
