@@ -103,7 +103,7 @@ def _write_mapping(logs: list[Path], target: Path, as_json: bool) -> None:
             "channels": list(channels),
             "evidence": found.evidence,
             "open": found.open,
-            "left_out": list(found.left_out),
+            "left_out": found.left_out,
         }
         typer.echo(json.dumps(said, indent=1, ensure_ascii=False))
         return

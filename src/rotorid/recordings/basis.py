@@ -9,7 +9,7 @@ import numpy as np
 
 from rotorid.io.text.wording import listed
 from rotorid.recordings import columns as c
-from rotorid.recordings.run import RecordingSet, Run
+from rotorid.recordings.run import RecordingSet, Run, stretches
 from rotorid.recordings.vehicle import Vehicle
 
 _IDLE_SHARE, _LARGEST_QUANTILE = 0.2, 0.98
@@ -80,9 +80,8 @@ def on_the_ground_s(run: Run, vehicle: Vehicle) -> float | None:
     rows, thrust = squares
     time_s, force = run.time_s[rows], run.array(c.SPECIFIC_FORCE)[rows]
     idle = thrust < _IDLE_SHARE * np.quantile(thrust, _LARGEST_QUANTILE)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], idle.astype(int), [0]])))
     total = 0.0
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+    for start, stop in stretches(idle):
         lasted = float(time_s[min(stop, len(time_s) - 1)] - time_s[start])
         felt = np.linalg.norm(force[start:stop], axis=1)
         felt = felt[np.isfinite(felt)]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from rotorid.recordings import columns as c
-from rotorid.recordings.run import Run
+from rotorid.recordings.run import Run, stretches
 from rotorid.recordings.sufficient import driven_by
 from rotorid.recordings.vehicle import Vehicle
 
@@ -42,12 +42,6 @@ _FOLLOWED = {
     c.POSITION: c.VELOCITY,
 }
 """To the columns of a sensor those without whose changes it cannot change, nor stand where they do."""
-
-
-def stretches(good: np.ndarray) -> list[tuple[int, int]]:
-    """Start and stop (exclusive) of every run of True."""
-    edges = np.diff(np.concatenate([[0], good.astype(np.int8), [0]]))
-    return list(zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True))
 
 
 def held(

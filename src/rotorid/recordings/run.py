@@ -12,6 +12,12 @@ from rotorid.recordings import columns as c
 from rotorid.recordings.vehicle import Vehicle
 
 
+def stretches(mask: np.ndarray) -> list[tuple[int, int]]:
+    """Start and stop (exclusive) of every run of True in a mask (n,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(mask, np.int8), [0]])))
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
 @dataclass(frozen=True)
 class Doubt:
     """One thing in a set that is probably not as stated."""

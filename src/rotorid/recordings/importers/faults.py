@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.recordings.columns import TIME
+from rotorid.recordings.run import stretches
 
 GOES_ON = 0.9
 """Share of the readings of others of its kind that a sensor has at least, if it neither stands still nor ends early."""
@@ -33,7 +34,7 @@ class ImportFault:
     column: str
     found: str
     action: str
-    samples: int
+    samples: int = 0
     run: str = ""
 
     def in_run(self, run: str) -> ImportFault:
@@ -98,18 +99,10 @@ def drop_repeated_times(table: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportF
     time = table[TIME].to_numpy(float)
     latest = np.maximum.accumulate(np.where(np.isnan(time), -np.inf, time))
     keep = ~np.isnan(time) & (np.concatenate([[-np.inf], latest[:-1]]) < time)
-    lost = int((~keep).sum())
-    if not lost:
+    if keep.all():
         return table, []
-    first = float(time[np.flatnonzero(~keep)[0]])
-    fault = ImportFault(
-        "repeated_time",
-        TIME,
-        f"{lost} rows do not move the clock on (first at {first:.6g} s)",
-        "left out",
-        lost,
-    )
-    return table[keep].reset_index(drop=True), [fault]
+    found = f"{(~keep).sum()} rows do not move the clock on (first at {time[~keep][0]:.6g} s)"
+    return table[keep].reset_index(drop=True), fault_where(~keep, "repeated_time", TIME, found, "left out")
 
 
 def in_order(table: pd.DataFrame, time: str) -> tuple[pd.DataFrame, list[ImportFault]]:
@@ -162,17 +155,10 @@ def one_sense(
     own = values * np.where(signs == 0, 1.0, signs)
     largest = np.nanmax(np.abs(own), axis=0, initial=0.0, where=np.isfinite(own))
     against = own < -_REVERSED * largest
-    faults = [
-        ImportFault(
-            "reversed",
-            name,
-            f"against its usual sign in {lost.mean():.1%} of the samples",
-            "made empty cells",
-            int(lost.sum()),
-        )
-        for name, lost in zip(names, against.T, strict=True)
-        if lost.any()
-    ]
+    faults = []
+    for name, lost in zip(names, against.T, strict=True):
+        found = f"against its usual sign in {lost.mean():.1%} of the samples"
+        faults += fault_where(lost, "reversed", name, found, "made empty cells")
     return np.where(against, np.nan, np.abs(own) if sense is None else np.clip(own, 0, None)), faults
 
 
@@ -195,10 +181,8 @@ def report_gaps(table: pd.DataFrame, factor: float = 3.0) -> list[ImportFault]:
     """A fault where the clock steps by more than `factor` times its median step; nothing is filled in."""
     steps = np.diff(table[TIME].to_numpy(float))
     long = steps > factor * np.median(steps)
-    if not long.any():
-        return []
-    found = f"{int(long.sum())} gaps longer than {factor:g} samples, the longest {steps.max():.3g} s"
-    return [ImportFault("gap", TIME, found, "left as a gap", int(long.sum()))]
+    found = f"{int(long.sum())} gaps longer than {factor:g} samples, the longest {steps.max(initial=0.0):.3g} s"
+    return fault_where(long, "gap", TIME, found, "left as a gap")
 
 
 def blank_held(
@@ -230,9 +214,14 @@ def blank_held(
 
 def true_stretches(mask: np.ndarray, time_s: np.ndarray, shortest_s: float) -> list[tuple[float, float]]:
     """Start and stop times of every stretch of True that lasts at least `shortest_s`."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(mask, int), [0]])))
-    pairs = zip(edges[::2], edges[1::2] - 1, strict=True)
-    return [(float(time_s[a]), float(time_s[b])) for a, b in pairs if time_s[b] - time_s[a] >= shortest_s]
+    ends = ((float(time_s[start]), float(time_s[stop - 1])) for start, stop in stretches(mask))
+    return [(start_s, stop_s) for start_s, stop_s in ends if stop_s - start_s >= shortest_s]
+
+
+def fault_where(mask: np.ndarray, kind: str, column: str, found: str, action: str) -> list[ImportFault]:
+    """A fault of the samples that a mask (n,) or (n, k) holds, for a row once; none where it holds none."""
+    rows = np.asarray(mask).reshape(len(mask), -1).any(axis=1)
+    return [ImportFault(kind, column, found, action, int(rows.sum()))] if rows.any() else []
 
 
 def cut(table: pd.DataFrame, start_s: float, stop_s: float) -> pd.DataFrame:

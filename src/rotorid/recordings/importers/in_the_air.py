@@ -7,6 +7,7 @@ row nearest in time, so that nothing is interpolated.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
@@ -14,6 +15,7 @@ import pandas as pd
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.faults import ImportFault, true_stretches
+from rotorid.recordings.run import stretches
 
 _SHORTEST_FLIGHT_S = 4.0
 _AFTER_TAKE_OFF_S = 1.0
@@ -157,8 +159,7 @@ def off_the_ground(
     flown |= (turning | up) & (throttle >= 0.5 * of_flight)
     flown = flying & without_pauses(flown, time_s)
     lifts, out = (throttle >= _LIFTS * of_flight) | turning | up, np.zeros(len(flying), bool)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flown.astype(int), [0]])))
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+    for start, stop in stretches(flown):
         lifting = np.flatnonzero(lifts[start:stop])
         if len(lifting):
             first = start if start == 0 else start + lifting[0]
@@ -178,8 +179,7 @@ def _turning(rates: np.ndarray, step_s: float) -> np.ndarray:
 def without_pauses(up: np.ndarray, time_s: np.ndarray) -> np.ndarray:
     """The mask with pauses inside it that are shorter than `_LONGEST_PAUSE_S` filled."""
     up = up.copy()
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], up.astype(int), [0]])))
-    for stop, start in zip(edges[1:-1:2], edges[2::2], strict=True):
+    for (_, stop), (start, _) in pairwise(stretches(up)):
         if time_s[start] - time_s[stop - 1] < _LONGEST_PAUSE_S:
             up[stop:start] = True
     return up
@@ -200,12 +200,15 @@ def flights(
     found = _long_enough(flying, time_s)
     if not found:
         longest = max((b - a for a, b in true_stretches(flying, time_s, 0.0)), default=0.0)
-        why = (
-            f"the longest stretch in the air is {longest:.1f} s, at least {_SHORTEST_FLIGHT_S:g} s beyond take-off and "
-            "landing are needed"
-            if longest > 0
-            else f"the vehicle never flies in this log of {time_s[-1]:.0f} s" + _undriven(table)
-        )
+        throttles = [n for n in table if n.startswith("throttle_") and c.rotor_number(n)]
+        why = f"the vehicle never flies in this log of {time_s[-1]:.0f} s"
+        if longest > 0:
+            why = (
+                f"the longest stretch in the air is {longest:.1f} s, at least {_SHORTEST_FLIGHT_S:g} s beyond take-off "
+                "and landing are needed"
+            )
+        elif throttles and not (table[throttles] > _DRIVEN).any().any():
+            why += ": no motor is ever driven"
         raise InputError(f"{where}: {why}")
     runs, cuts = {}, []
     for number, (start, stop) in enumerate(found, 1):
@@ -238,8 +241,3 @@ def _inside(start_s: float, stop_s: float, time_s: np.ndarray) -> tuple[float, f
     """A stretch in the air without take-off and landing, as far as these are in the table."""
     first = start_s if start_s <= time_s[0] else start_s + _AFTER_TAKE_OFF_S
     return first, stop_s if stop_s >= time_s[-1] else stop_s - _BEFORE_LANDING_S
-
-
-def _undriven(table: pd.DataFrame) -> str:
-    throttles = [n for n in table if n.startswith("throttle_") and c.rotor_number(n)]
-    return ": no motor is ever driven" if throttles and not (table[throttles] > _DRIVEN).any().any() else ""

@@ -186,13 +186,13 @@ def _px4(path: Path) -> _Imported:
     log = px4_ulog.open_log(path)
     try:
         rotors = px4_ulog.rotor_count(log)
-        converted = px4_ulog.convert(log, rotors)
+        table, found, flying, jumps = px4_ulog.convert(log, rotors)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     known, faults = px4_vehicle(px4_ulog.in_flight(log), rotors)
-    runs, cuts = in_the_air.flights(converted.table, converted.flying, path.stem, path, converted.jumps)
+    runs, cuts = in_the_air.flights(table, flying, path.stem, path, jumps)
     axes = "PX4's: body forward-right-down, world north-east-down, as the contract's"
-    return _Imported("px4", runs, (*converted.faults, *faults, *cuts), axes, known, speed_unit="rpm")
+    return _Imported("px4", runs, (*found, *faults, *cuts), axes, known, speed_unit="rpm")
 
 
 def _crazyflie(path: Path) -> _Imported:

@@ -9,15 +9,13 @@ to thrust. `trust` is wide where a value is a guess, so that the verdict re-esti
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
 from rotorid.errors import InputError
-from rotorid.io.text.files import as_yaml, parse_yaml
+from rotorid.io.text.files import as_yaml
 from rotorid.recordings import columns as c
-from rotorid.recordings.files import vehicle_of
 from rotorid.recordings.importers.known import ORDERS, PLACES, Known, quad_x
 from rotorid.recordings.templates import names
 from rotorid.recordings.templates import read as read_template
@@ -30,18 +28,6 @@ _CALM_RAD_S = 1.0
 """Body rate below which thrust and speeds of nearby instants are compared."""
 
 
-@dataclass(frozen=True)
-class _Proposal:
-    """The text of a `vehicle.yaml`, and a sentence for each value that is proposed, not known."""
-
-    text: str
-    remarks: tuple[str, ...]
-
-    @property
-    def vehicle(self) -> Vehicle:
-        return vehicle_of(parse_yaml(self.text, "the vehicle proposed"), "the vehicle proposed")
-
-
 def propose(
     name: str,
     tables: Sequence[pd.DataFrame],
@@ -49,8 +35,11 @@ def propose(
     template: Vehicle,
     template_name: str,
     mass_kg: float | None = None,
-) -> _Proposal:
-    """A vehicle for flights in contract columns; InputError where the rotors of log and template do not agree."""
+) -> tuple[str, tuple[str, ...]]:
+    """The `vehicle.yaml` for flights in contract columns, and a sentence for each value that is proposed, not known.
+
+    InputError where the rotors of log and template do not agree.
+    """
     remarks: list[str] = []
     mass, mass_trust, mass_note = _mass(mass_kg, template, template_name, remarks)
     rotors, rotor_note = _rotors(known, template, template_name, remarks)
@@ -70,11 +59,16 @@ def propose(
             f"the rotors turn in flight as those of template {closer} do, rather than of {template_name}: if that is "
             f"the vehicle, import again with --like {closer}"
         )
-    ratio, ratio_note = _ratio(known, template, template_name)
+    ratio, ratio_note = known.torque_over_thrust_m, known.where
+    if not ratio:
+        ratio = float(template.torque_coefficients_n_m_s2()[0] / template.thrust_coefficients_n_s2()[0])
+        ratio_note = f"template {template_name}"
     remarks.append(f"the torque coefficient is C_F times {ratio:.4g} m ({ratio_note})")
     inertia, scale = _inertia(rotors, mass, template)
     remarks.append(f"the inertia is that of template {template_name} times {scale:.3g} (mass and arm squared)")
-    places = _place_words(rotors)
+    words = {signs: place for place, signs in PLACES.items()}
+    signs = [(int(np.sign(r.x_m)), int(np.sign(r.y_m))) for r in rotors]
+    places = [words.get(own, f"at x {r.x_m:g}, y {r.y_m:g}") for own, r in zip(signs, rotors, strict=True)]
     lines = [
         f"# Proposed from {name}. Lines marked PROPOSED are guesses: replace them by what you know, and then",
         "# lower their `trust` (the relative one-sigma belief) at the bottom.",
@@ -102,7 +96,7 @@ def propose(
         f"torque_coefficient_n_m_s2: {_GUESSED_TORQUE:g}, inertia_xx_kg_m2: {_GUESSED_INERTIA:g}, "
         f"inertia_yy_kg_m2: {_GUESSED_INERTIA:g}, inertia_zz_kg_m2: {_GUESSED_INERTIA:g}}}",
     ]
-    return _Proposal("\n".join(lines) + "\n", tuple(remarks))
+    return "\n".join(lines) + "\n", tuple(remarks)
 
 
 def closer_template(lift_n_s2_kg: float, template: Vehicle, template_name: str) -> str | None:
@@ -166,19 +160,6 @@ def _arm(rotors) -> float:
     return float(np.mean([np.hypot(r.x_m, r.y_m) for r in rotors]))
 
 
-def _place_words(rotors) -> list[str]:
-    """`front right`, `rear left`, … by the signs of each rotor's place."""
-    words = {signs: place for place, signs in PLACES.items()}
-    return [words.get((int(np.sign(r.x_m)), int(np.sign(r.y_m))), f"at x {r.x_m:g}, y {r.y_m:g}") for r in rotors]
-
-
-def _ratio(known: Known, template: Vehicle, template_name: str) -> tuple[float, str]:
-    if known.torque_over_thrust_m:
-        return known.torque_over_thrust_m, known.where
-    ratio = float(template.torque_coefficients_n_m_s2()[0] / template.thrust_coefficients_n_s2()[0])
-    return ratio, f"template {template_name}"
-
-
 def _inertia(rotors, mass: float, template: Vehicle) -> tuple[np.ndarray, float]:
     """Principal inertias of the template scaled by mass and mean squared arm, and the factor."""
     arm = np.mean([r.x_m**2 + r.y_m**2 for r in rotors])
@@ -220,8 +201,8 @@ def thrust_coefficient(
         drive = table[[c.TIME, *names]].dropna()
         squared = ((drive[names].to_numpy(float) * (full_speed_rad_s or 1.0)) ** 2).sum(axis=1)
         lift = _specific_lift(table, drive[c.TIME].to_numpy(float))
-        good = (squared > 0.25 * np.median(squared)) & np.isfinite(lift) if len(squared) else []
         if len(squared):
+            good = (squared > 0.25 * np.median(squared)) & np.isfinite(lift)
             ratios.append(mass_kg * lift[good] / squared[good])
     values = np.concatenate(ratios) if ratios else np.zeros(0)
     value = float(np.median(values)) if len(values) else 0.0

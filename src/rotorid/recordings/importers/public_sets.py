@@ -33,7 +33,7 @@ from rotorid.recordings import RecordingSet, Run, read_vehicle, write_set
 from rotorid.recordings import columns as c
 from rotorid.recordings.files import sha256
 from rotorid.recordings.importers import crazyflie
-from rotorid.recordings.importers.faults import ImportFault, ImportReport
+from rotorid.recordings.importers.faults import ImportFault, ImportReport, fault_where
 from rotorid.recordings.importers.neurobem import read_neurobem
 from rotorid.recordings.importers.rcbenchmark import read_rcbenchmark
 from rotorid.recordings.importers.units import RPM
@@ -67,27 +67,15 @@ class _PublicSet:
     notes: tuple[str, ...] = ()
 
 
-def _whole(reader: Callable[[Path], tuple[pd.DataFrame, list[ImportFault]]]) -> Callable[[Path, str], _Runs]:
-    """A file is one run, named after the file."""
-    return lambda path, name: {name.rsplit("/")[-1].split(".")[0].lower(): reader(path)}
-
-
-def _neurobem(path: Path, name: str) -> _Runs:
-    return {Path(name).stem.removeprefix("bemnn"): read_neurobem(path)}
-
-
-def _crazyflie(path: Path, prefix: str, stretches: list[tuple[float, float]] | None = None) -> _Runs:
+def _flights(path: Path, name: str, stretches: list[tuple[float, float]] | None = None) -> _Runs:
     """Flights of a uSD log, each with the faults of the whole log and its own."""
-    tables, faults = crazyflie.flights(path, prefix, stretches, crazyflie.in_the_air)
+    tables, faults = crazyflie.flights(path, Path(name).name, stretches, crazyflie.in_the_air)
     return {run: (table, [f for f in faults if f.run in ("", run)]) for run, table in tables.items()}
 
 
 def _imrc_brushless(path: Path, name: str) -> _Runs:
     """The controller's map of thrust to PWM is published: it gives the commanded speed of each rotor."""
-    return {
-        run: (_with_commanded_speed(table), faults)
-        for run, (table, faults) in _crazyflie(path, Path(name).name).items()
-    }
+    return {run: (_with_commanded_speed(table), faults) for run, (table, faults) in _flights(path, name).items()}
 
 
 _PWM_OF_GRAMS = (0.16609668469985447, 0.02297914810965436, 0.0001878280261246769)
@@ -112,14 +100,6 @@ def _with_commanded_speed(table: pd.DataFrame) -> pd.DataFrame:
     return table
 
 
-def _crazypad(path: Path, name: str) -> _Runs:
-    return _crazyflie(path, Path(name).name)
-
-
-def _scale(path: Path, name: str) -> _Runs:
-    return {Path(name).name.removesuffix(".csv").replace(".", "_"): read_imrc_bench(path)}
-
-
 def _bench(path: Path, name: str) -> _Runs:
     motor, voltage = re.fullmatch(r"([a-m])\d_(7|11)\.csv", Path(name).name).groups()
     return {f"{motor}_{_CELLS[voltage]}": read_rcbenchmark(path)}
@@ -137,7 +117,7 @@ def _public_sets() -> dict[str, _PublicSet]:
         "neurobem": _PublicSet(
             "neurobem",
             tuple(f"bemnn{f}.mat" for f in flights),
-            _neurobem,
+            lambda path, name: {Path(name).stem.removeprefix("bemnn"): read_neurobem(path)},
             "neurobem",
             _FLU,
             notes=(
@@ -148,7 +128,7 @@ def _public_sets() -> dict[str, _PublicSet]:
         "appius-ground-effect": _PublicSet(
             "appius-ground-effect",
             ("HOVERING.csv", "VERTICAL_SPEEDS.csv"),
-            _whole(read_vicon_csv),
+            lambda path, name: {Path(name).stem.lower(): read_vicon_csv(path)},
             "appius-ground-effect",
             "attitude and rates forward-right-down over x north, y east (lateral accelerations are -g pitch "
             "and +g roll); only z is turned over",
@@ -168,14 +148,14 @@ def _public_sets() -> dict[str, _PublicSet]:
         "imrc-brushed": _PublicSet(
             "imrc-crazyflie-rpm",
             ("brushed_flights/jana01", "brushed_flights/jana24"),
-            lambda path, name: _crazyflie(path, Path(name).name),
+            _flights,
             "imrc-brushed",
             _FLU,
         ),
         "crazyflie-arpl-log10": _PublicSet(
             "crazyflie-arpl",
             ("log10",),
-            lambda path, name: _crazyflie(path, "log10", [(35.0, 65.0)]),
+            lambda path, name: _flights(path, name, [(35.0, 65.0)]),
             "crazyflie-arpl",
             _FLU,
             notes=(
@@ -186,7 +166,7 @@ def _public_sets() -> dict[str, _PublicSet]:
         "crazyflie-arpl-log15": _PublicSet(
             "crazyflie-arpl",
             ("log15",),
-            lambda path, name: _crazyflie(path, "log15", [(55.0, 90.0)]),
+            lambda path, name: _flights(path, name, [(55.0, 90.0)]),
             "crazyflie-arpl",
             _FLU,
             notes=("roll and pitch window 55-90 s as upstream",),
@@ -208,7 +188,7 @@ def _public_sets() -> dict[str, _PublicSet]:
         sets[f"imrc-bench-{name}"] = _PublicSet(
             "imrc-crazyflie-rpm",
             tuple(f"{bench}/{file}.csv" for file in files),
-            _scale,
+            lambda path, name: {Path(name).name.removesuffix(".csv").replace(".", "_"): read_imrc_bench(path)},
             f"imrc-bench-{vehicle}",
             "thrust of the whole vehicle along -z of the body",
         )
@@ -216,7 +196,7 @@ def _public_sets() -> dict[str, _PublicSet]:
         sets[f"crazypad-{label}"] = _PublicSet(
             "crazypad",
             tuple(f"{folder}/E9_log{n:02d}" for n in numbers),
-            _crazypad,
+            _flights,
             "crazypad",
             _FLU,
             notes=("specific force is the state estimate's world acceleration turned into the body",),
@@ -240,7 +220,7 @@ def _public_sets() -> dict[str, _PublicSet]:
 PUBLIC_SETS = _public_sets()
 
 
-def build(name: str, obtained: Obtained, source: dict, vehicles: Path, parent: Path) -> Path:
+def build(name: str, obtained: tuple[Path, dict[str, str]], source: dict, vehicles: Path, parent: Path) -> Path:
     """Write the set `name` below `parent`; returns its folder.
 
     Where a file could not be had, the folder holds `import_report.json` alone, which says so. Until all files are read
@@ -249,7 +229,7 @@ def build(name: str, obtained: Obtained, source: dict, vehicles: Path, parent: P
     Parameters
     ----------
     obtained
-        The files of the set's source, already checked.
+        What `obtain` gives of the set's source.
     source
         The source's entry in the manifest (licence, repository, commit, citation).
     vehicles
@@ -262,31 +242,24 @@ def build(name: str, obtained: Obtained, source: dict, vehicles: Path, parent: P
         "licence": source["licence"],
         "citation": source["citation"],
     }
-    lost = [file for file in recipe.files if file not in obtained.files]
+    (files, missing), sums = obtained, {file["path"]: file["sha256"] for file in source["files"]}
+    lost = [file for file in recipe.files if file in missing or file not in sums]
     if lost:
-        reason = obtained.missing.get(lost[0], f"{lost[0]} is not in the manifest")
+        reason = missing.get(lost[0], f"{lost[0]} is not in the manifest")
         folder.mkdir(parents=True, exist_ok=True)
         ImportReport(name, False, **origin, reason=f"{len(lost)} files could not be had: {reason}").write(folder)
         return folder
     runs, faults = [], []
     for file in recipe.files:
-        for run, (table, found) in recipe.read(obtained.folder / file, file).items():
+        for run, (table, found) in recipe.read(files / file, file).items():
             runs.append(Run(run, table))
             faults += [fault.in_run(run) for fault in found]
     believed = Path(vehicles) / f"{recipe.vehicle}.yaml"
     ordered = tuple(sorted(runs, key=lambda run: run.name))
     write_set(RecordingSet(name, read_vehicle(believed), ordered, recipe.held_out), Path(parent))
     shutil.copyfile(believed, folder / "vehicle.yaml")
-    sums = {file["path"]: file["sha256"] for file in source["files"]}
-    ImportReport(
-        name,
-        True,
-        **origin,
-        files={file: sums[file] for file in recipe.files},
-        axes=recipe.axes,
-        faults=tuple(faults),
-        notes=recipe.notes,
-    ).write(folder)
+    more = {"axes": recipe.axes, "faults": tuple(faults), "notes": recipe.notes}
+    ImportReport(name, True, **origin, files={file: sums[file] for file in recipe.files}, **more).write(folder)
     return folder
 
 
@@ -319,24 +292,9 @@ def read_imrc_bench(path: Path) -> tuple[pd.DataFrame, list[ImportFault]]:
     faults = [ImportFault("no_clock", c.TIME, "rows have no time", "rows counted as seconds", len(table))]
     for column in c.rotor_columns("rotor_speed", 4):
         lost = (table[column] == 0) & (throttle > 0.3)
-        if lost.any():
-            found = f"speed reads 0 in {int(lost.sum())} rows while the motor is driven"
-            faults.append(ImportFault("speed_dropout", column, found, "kept as recorded", int(lost.sum())))
+        found = f"speed reads 0 in {int(lost.sum())} rows while the motor is driven"
+        faults += fault_where(lost, "speed_dropout", column, found, "kept as recorded")
     return table, faults
-
-
-@dataclass(frozen=True)
-class Obtained:
-    """What was had of one source: its folder, the files that are right, and why others are not."""
-
-    source: str
-    folder: Path
-    files: tuple[str, ...]
-    missing: dict[str, str]
-
-    @property
-    def complete(self) -> bool:
-        return not self.missing
 
 
 def address(source: dict, file: dict, base: str = _RAW_FILES) -> str:
@@ -357,25 +315,19 @@ def _download(url: str, wanted: str, path: Path) -> None:
     partial.rename(path)
 
 
-def _from_folder(name: str, source: dict, folder: Path) -> Obtained:
-    files, missing = [], {}
-    for file in source["files"]:
-        path = folder / name / file["path"]
-        if not path.is_file():
-            missing[file["path"]] = f"{path} is not there"
-        elif sha256(path) != file["sha256"]:
-            missing[file["path"]] = f"{path} is not the file of the manifest (SHA-256 differs)"
-        else:
-            files.append(file["path"])
-    return Obtained(name, folder / name, tuple(files), missing)
+def _in_folder(path: Path, file: dict) -> str:
+    """Why a file of the manifest is not there; empty where it is."""
+    if not path.is_file():
+        return f"{path} is not there"
+    return "" if sha256(path) == file["sha256"] else f"{path} is not the file of the manifest (SHA-256 differs)"
 
 
-def _from_network(name: str, source: dict, cache: Path, base: str) -> Obtained:
-    files, missing, offline = [], {}, ""
+def _downloaded(source: dict, folder: Path, base: str) -> dict[str, str]:
+    """To the files that could not be had the reason; after one without an answer none is asked for."""
+    missing, offline = {}, ""
     for file in source["files"]:
-        path = cache / name / file["path"]
-        if path.is_file() and sha256(path) == file["sha256"]:
-            files.append(file["path"])
+        path = folder / file["path"]
+        if not _in_folder(path, file):
             continue
         if offline:
             missing[file["path"]] = offline
@@ -383,20 +335,20 @@ def _from_network(name: str, source: dict, cache: Path, base: str) -> Obtained:
         url = address(source, file, base)
         try:
             _download(url, file["sha256"], path)
-            files.append(file["path"])
         except InputError as error:
             missing[file["path"]] = str(error)
         except urllib.error.HTTPError as error:
             missing[file["path"]] = f"{url}: the server answers {error.code}"
         except OSError as error:
             host = urllib.parse.urlsplit(base).netloc
-            offline = f"no answer from {host} ({getattr(error, 'reason', error)})"
-            missing[file["path"]] = offline
-    return Obtained(name, cache / name, tuple(files), missing)
+            offline = missing[file["path"]] = f"no answer from {host} ({getattr(error, 'reason', error)})"
+    return missing
 
 
-def obtain(name: str, source: dict, folder: Path | None, cache: Path, base: str = _RAW_FILES) -> Obtained:
-    """Files of one source of the manifest.
+def obtain(
+    name: str, source: dict, folder: Path | None, cache: Path, base: str = _RAW_FILES
+) -> tuple[Path, dict[str, str]]:
+    """The folder of one source of the manifest, its files checked, and to those that could not be had the reason.
 
     Parameters
     ----------
@@ -409,6 +361,8 @@ def obtain(name: str, source: dict, folder: Path | None, cache: Path, base: str 
     base
         Server of raw files.
     """
-    if folder is not None:
-        return _from_folder(name, source, Path(folder))
-    return _from_network(name, source, Path(cache), base)
+    if folder is None:
+        return Path(cache) / name, _downloaded(source, Path(cache) / name, base)
+    own = Path(folder) / name
+    reasons = {file["path"]: _in_folder(own / file["path"], file) for file in source["files"]}
+    return own, {path: reason for path, reason in reasons.items() if reason}

@@ -20,7 +20,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.errors import InputError
-from rotorid.io.text.files import LARGEST_METADATA, MOST_RUNS, read_text
+from rotorid.io.text.files import LARGEST_METADATA, MOST_RUNS, parse_yaml, read_text
 from rotorid.io.text.writing import staging, take_name, take_place
 from rotorid.recordings import Run, read_vehicle, templates
 from rotorid.recordings import columns as c
@@ -32,6 +32,7 @@ from rotorid.recordings.files import (
     run_name,
     sha256,
     usable_runs,
+    vehicle_of,
     write_manifest,
 )
 from rotorid.recordings.importers.faults import FILE_NAME as REPORT
@@ -168,7 +169,10 @@ class SetOfLogs:
         OSError
             The disk is full or cannot be written.
         """
-        report = self._report(folder.name)
+        files = dict(self.files)
+        report = ImportReport(
+            folder.name, True, ", ".join(files), "", "", "", files, self.axes, self.faults, self.remarks
+        )
         if folder.is_dir():
             with staging(folder / "import") as part:
                 _add_to_set(self._write_files(part, as_csv), report, folder)
@@ -190,19 +194,6 @@ class SetOfLogs:
             paths.append(folder / f"{name}{suffix}")
             write_table(table, paths[-1])
         return paths
-
-    def _report(self, name: str) -> ImportReport:
-        return ImportReport(
-            name,
-            True,
-            source=", ".join(self.files),
-            licence="",
-            citation="",
-            files=dict(self.files),
-            axes=self.axes,
-            faults=self.faults,
-            notes=self.remarks,
-        )
 
 
 def set_of_logs(
@@ -250,7 +241,8 @@ def set_of_logs(
             if run in runs:
                 raise InputError(f"{path}: another log has a run called {run}, too; rename one of the files")
             runs[run] = table
-    usable, left_out = usable_runs((partial(_checked, run, table) for run, table in runs.items()), logs[0].name)
+    readers = (partial(lambda n, t: Run(n, check_table(t, f"run {n}")), run, table) for run, table in runs.items())
+    usable, left_out = usable_runs(readers, logs[0].name)
     runs = {run.name: run.table for run in usable}
     faults = [fault for imported in found for fault in imported.faults]
     units = {run: imported.speed_unit for imported in found for run in imported.runs}
@@ -276,12 +268,13 @@ def set_of_logs(
         rotors = len(found[0].known.rotors or found[0].known.directions or vehicle.rotors)
         runs, changed = in_unit_of_weight(runs, units, mass, rotors)
         faults += changed
-        proposal = propose(name, list(runs.values()), found[0].known, vehicle, template, mass_kg)
-        text, remarks = proposal.text, proposal.remarks
+        text, remarks = propose(name, list(runs.values()), found[0].known, vehicle, template, mass_kg)
         if there is not None and there.is_file() and there.read_text(encoding="utf-8") != text:
             raise InputError(f"{there} is there already and would change; move it away, or leave --mass-kg and --like")
-    _check_rotors(runs, vehicle if vehicle_file is not None or kept else proposal.vehicle, logs[0])
-    if kinds == {"flight"} and (vehicle_file is not None or kept):
+    stated = vehicle_file is not None or kept
+    proposed = "the vehicle proposed"
+    _check_rotors(runs, vehicle if stated else vehicle_of(parse_yaml(text, proposed), proposed), logs[0])
+    if kinds == {"flight"} and stated:
         known = float(np.mean(vehicle.thrust_coefficients_n_s2()))
         runs, changed = in_unit_of_weight(runs, units, vehicle.mass_kg, vehicle.rotor_count, known)
         faults += changed
@@ -311,10 +304,6 @@ def _check_rotors(runs: Names[str, pd.DataFrame], vehicle: Vehicle, log: Path) -
         )
 
 
-def _checked(name: str, table: pd.DataFrame) -> Run:
-    return Run(name, check_table(table, f"run {name}"))
-
-
 def _add_to_set(staged: Sequence[Path], report: ImportReport, folder: Path) -> None:
     """Move staged files (a vehicle, runs) into the set `folder`.
 
@@ -329,7 +318,12 @@ def _add_to_set(staged: Sequence[Path], report: ImportReport, folder: Path) -> N
     names = {path.name for path in staged}
     there = run_files(folder)
     for path in staged:
-        _check_place(path, folder, there)
+        place, name = folder / path.name, run_name(path)
+        if place.exists() and sha256(place) != sha256(path):
+            raise InputError(f"{place} is there already and would change; move it away, or choose another folder")
+        same = next((p for p in there if name and run_name(p) == name and p.name != path.name), None)
+        if same:
+            raise InputError(f"{same} is there already, and {path.name} would be the same run again; move it away")
     check_manifest(folder, there, ignored=names)
     runs = {path.name for path in there} | {name for name in names if run_name(Path(name))}
     if len(runs) > MOST_RUNS:
@@ -345,17 +339,6 @@ def _add_to_set(staged: Sequence[Path], report: ImportReport, folder: Path) -> N
     report.write(staged[0].parent)
     take_place(staged[0].parent / REPORT, folder / REPORT)
     write_manifest(folder, [folder / name for name in runs])
-
-
-def _check_place(path: Path, folder: Path, there: Sequence[Path]) -> None:
-    """InputError where a staged file would change one that is there, or give a run a second file."""
-    place = folder / path.name
-    if place.exists() and sha256(place) != sha256(path):
-        raise InputError(f"{place} is there already and would change; move it away, or choose another folder")
-    name = run_name(path)
-    same = next((p for p in there if name and run_name(p) == name and p.name != path.name), None)
-    if same:
-        raise InputError(f"{same} is there already, and {path.name} would be the same run again; move it away")
 
 
 def _after(report: ImportReport, folder: Path) -> ImportReport:

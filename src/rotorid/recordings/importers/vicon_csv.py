@@ -20,6 +20,7 @@ from rotorid.recordings.importers.faults import (
     blank_held,
     cut,
     drop_repeated_times,
+    fault_where,
     report_gaps,
     true_stretches,
 )
@@ -43,15 +44,16 @@ def _read_matrix(path: Path) -> tuple[np.ndarray, list[ImportFault]]:
             continue
         cells = line.rstrip(",").split(",")
         last = number == len(lines)
-        try:
-            values = [float(cell) for cell in cells]
-        except ValueError:
-            if not last:
-                bad = next(i for i, cell in enumerate(cells) if not _is_number(cell))
-                raise InputError(
-                    f"{path}, line {number}, column {bad + 1}: expected a number, found {cells[bad]!r}"
-                ) from None
-            values = []
+        values = []
+        for column, cell in enumerate(cells, start=1):
+            try:
+                values.append(float(cell))
+            except ValueError:
+                if not last:
+                    where = f"{path}, line {number}, column {column}"
+                    raise InputError(f"{where}: expected a number, found {cell!r}") from None
+                values = []
+                break
         if len(values) != _COUNT:
             if not last:
                 raise InputError(f"{path}, line {number}: expected {_COUNT} columns, found {len(values)}")
@@ -61,14 +63,6 @@ def _read_matrix(path: Path) -> tuple[np.ndarray, list[ImportFault]]:
     if len(rows) < 2:
         raise InputError(f"{path}: expected at least two rows of {_COUNT} numbers")
     return np.array(rows), faults
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
 
 
 def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[ImportFault]]:
@@ -86,32 +80,13 @@ def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[ImportFault]]:
     columns[c.BATTERY_VOLTAGE] = matrix[:, 17:21].mean(axis=1)
     columns[c.BATTERY_CURRENT] = matrix[:, 21:25].sum(axis=1)
     table = pd.DataFrame(columns)
-    faults = []
     unlocked = table[list(c.POSITION)].isna().any(axis=1)
-    if unlocked.any():
-        table.loc[unlocked, [*c.POSITION, *c.VELOCITY, c.HEIGHT]] = np.nan
-        faults.append(
-            ImportFault(
-                "no_lock",
-                ", ".join(c.POSITION),
-                "motion capture not locked (nan)",
-                "made empty",
-                int(unlocked.sum()),
-            )
-        )
+    table.loc[unlocked, [*c.POSITION, *c.VELOCITY, c.HEIGHT]] = np.nan
+    faults = fault_where(unlocked, "no_lock", ", ".join(c.POSITION), "motion capture not locked (nan)", "made empty")
     rotors = list(c.rotor_columns("rotor_speed", 4))
     unpowered = (table[c.BATTERY_VOLTAGE] == 0) & (table[rotors].abs().sum(axis=1) == 0)
-    if unpowered.any():
-        faults.append(
-            ImportFault(
-                "no_telemetry",
-                c.BATTERY_VOLTAGE,
-                "speed controllers report 0 V",
-                "made empty",
-                int(unpowered.sum()),
-            )
-        )
-        table.loc[unpowered, [c.BATTERY_VOLTAGE, c.BATTERY_CURRENT]] = np.nan
+    faults += fault_where(unpowered, "no_telemetry", c.BATTERY_VOLTAGE, "speed controllers report 0 V", "made empty")
+    table.loc[unpowered, [c.BATTERY_VOLTAGE, c.BATTERY_CURRENT]] = np.nan
     table, repeated = drop_repeated_times(table)
     height = table[c.HEIGHT].to_numpy()
     resting = np.nanmedian(height[: max(10, int(np.argmax(table[rotors[0]].to_numpy() > 3000 * RPM)))])
@@ -122,17 +97,9 @@ def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[ImportFault]]:
     start, stop = max(stretches, key=lambda s: s[1] - s[0])
     before = len(table)
     table = cut(table, start + 1.0, stop)
-    faults += repeated
-    faults.append(
-        ImportFault(
-            "on_ground",
-            "",
-            f"in the air from {start:.1f} to {stop:.1f} s",
-            "rest, take-off and landing left out",
-            before - len(table),
-        )
-    )
-    faults += report_gaps(table)
+    found = f"in the air from {start:.1f} to {stop:.1f} s"
+    ground = ImportFault("on_ground", "", found, "rest, take-off and landing left out", before - len(table))
+    faults += [*repeated, ground, *report_gaps(table)]
     groups = {
         "pose": [*c.POSITION, *c.VELOCITY, c.HEIGHT],
         "attitude": [*c.QUATERNION, *c.ANGULAR_VELOCITY],

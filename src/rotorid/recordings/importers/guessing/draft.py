@@ -12,7 +12,7 @@ from rotorid.recordings.importers.guessing import agreement as by
 from rotorid.recordings.importers.guessing import names as named
 from rotorid.recordings.importers.guessing.agreement import Agreement
 from rotorid.recordings.importers.guessing.names import Family
-from rotorid.recordings.importers.mapping import OPEN, MappedChannel, continuous
+from rotorid.recordings.importers.mapping import OPEN, MappedChannel, Mapping, continuous
 from rotorid.recordings.importers.units import UNITS
 
 CONFIRMED = 0.8
@@ -37,7 +37,7 @@ FASTEST_GYRO_RAD_S = 40.0
 
 @dataclass
 class Draft:
-    """What is known so far while looking through a table."""
+    """A mapping that is proposed, why (by channel, `body` and `world`), and what only a person can answer."""
 
     table: pd.DataFrame
     time_s: np.ndarray | None = None
@@ -45,6 +45,11 @@ class Draft:
     channels: dict[str, MappedChannel] = field(default_factory=dict)
     evidence: dict[str, str] = field(default_factory=dict)
     open: dict[str, str] = field(default_factory=dict)
+    """To a channel, `body` or `world` the question."""
+    left_out: list[str] = field(default_factory=list)
+    """Columns that hold something else than numbers, a sentence each."""
+    mapping: Mapping | None = None
+    """What is proposed, once all has been looked at."""
     wxyz: np.ndarray | None = None
     """Attitude as recorded (n, 4), where its order is known."""
     instants: np.ndarray | None = None

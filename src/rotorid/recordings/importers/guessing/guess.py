@@ -4,16 +4,11 @@ Each guess has its evidence. Names propose. Numbers decide what names leave open
 gyroscope integrates to the attitude, an accelerometer turned by the attitude to the velocity, a velocity to the
 position; an accelerometer reads 9.8 m/s² in hover, a quaternion has length 1. What neither settles is left open as `?`.
 
-A mapping file in which each line has its evidence.
-
-The clock of a table, battery and temperature.
-
-The accelerometer, and by it the axes of body and world.
+Here: the clock of a table, battery and temperature, and the accelerometer with the axes of body and world.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -49,26 +44,19 @@ _MOVES_ON = 0.5
 """Share of the rows in which a clock moves on at least."""
 
 
-@dataclass(frozen=True)
-class _Guess:
-    """A mapping that is proposed, why (by channel, `body` and `world`), and what only a person can answer."""
-
-    mapping: Mapping
-    evidence: dict[str, str]
-    open: dict[str, str]
-    """To a channel, `body` or `world` the question."""
-    left_out: tuple[str, ...] = ()
-    """Columns that hold something else than numbers, a sentence each."""
-
-
-def guess(table: pd.DataFrame) -> _Guess:
+def guess(table: pd.DataFrame) -> Draft:
     """A mapping proposed for a table of any columns; those with a cell that is no number take no part."""
     layout = table.attrs.get("layout")
-    table, left_out = _of_numbers(table)
+    kept, left_out = {}, []
     if layout and layout.above:
         first = layout.above[0][:150]
-        left_out.insert(0, f"left out: {len(layout.above)} lines above the heading, the first of them: {first}")
-    draft = Draft(table)
+        left_out.append(f"left out: {len(layout.above)} lines above the heading, the first of them: {first}")
+    for name in table.columns:
+        try:
+            kept[name] = numbers(table[[name]], "left out")[name]
+        except InputError as error:
+            left_out.append(str(error))
+    draft = Draft(pd.DataFrame(kept), left_out=left_out)
     _guess_time(draft)
     for name in ("battery_voltage", "battery_current", "temperature"):
         _guess_scalar(draft, name)
@@ -82,30 +70,18 @@ def guess(table: pd.DataFrame) -> _Guess:
         guess_rotors(draft, name)
     guess_stand(draft)
     body, world = _axes_that_matter(draft, body, draft.world)
-    mapping = Mapping(body=body, world=world, channels=draft.channels, keep=tuple(draft.free()))
-    return _Guess(mapping, draft.evidence, draft.open, tuple(left_out))
+    draft.mapping = Mapping(body=body, world=world, channels=draft.channels, keep=tuple(draft.free()))
+    return draft
 
 
-def _of_numbers(table: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
-    """The columns that hold numbers alone, and a sentence for each other one."""
-    kept, left_out = {}, []
-    for name in table.columns:
-        try:
-            kept[name] = numbers(table[[name]], "left out")[name]
-        except InputError as error:
-            left_out.append(str(error))
-    return pd.DataFrame(kept), left_out
-
-
-def as_text(found: _Guess, source: str) -> str:
+def as_text(found: Draft, source: str) -> str:
     """A mapping file in which each line has its evidence, and what is open is marked."""
     mapping = found.mapping
     lines = [f"# What the columns of {source} are, proposed by rotorid from names and numbers. Look through it, then:"]
     lines += [f"#   rotorid import {source} --mapping THIS_FILE --mass-kg … --like …"]
     if found.open:
-        lines += [
-            f"# Nothing is imported while a {OPEN!r} is left: write the answer in its place, or remove the channel."
-        ]
+        said = f"# Nothing is imported while a {OPEN!r} is left: write the answer in its place, or remove the channel."
+        lines.append(said)
     lines += [f"# {sentence}" for sentence in found.left_out]
     for key, words in (("body", " | ".join(BODY)), ("world", " | ".join(WORLD))):
         lines += _comment(found, key, "")
@@ -128,7 +104,7 @@ def as_text(found: _Guess, source: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _comment(found: _Guess, key: str, indent: str) -> list[str]:
+def _comment(found: Draft, key: str, indent: str) -> list[str]:
     lines = [f"{indent}# {found.evidence[key]}"] if found.evidence.get(key) else []
     return lines + ([f"{indent}# OPEN: {found.open[key]}"] if key in found.open else [])
 
@@ -136,9 +112,8 @@ def _comment(found: _Guess, key: str, indent: str) -> list[str]:
 def _guess_time(draft: Draft) -> None:
     name = named.scalar(draft.table.columns, "time")
     if name is None:
-        draft.put(
-            "time", [OPEN], "", "no column is named as a time, and without one nothing can be imported", unit=OPEN
-        )
+        question = "no column is named as a time, and without one nothing can be imported"
+        draft.put("time", [OPEN], "", question, unit=OPEN)
         return
     draft.table = join_rows(in_order(draft.table, name)[0], name)
     values = draft.table[name].to_numpy(float)
@@ -225,18 +200,16 @@ def _guess_specific_force(draft: Draft) -> None:
     elif offered:
         family, read = offered[0], norms[offered[0]]
         evidence = f"by their names; the median of its norm is {read:.4g}"
+        power = 2 ** round(float(np.log2(read))) if read >= 3 else 0  # as sensors have counts to 1 g
         question = f"a median of {read:.4g} is 1 g in no unit" + (
             ": is gravity removed? Then it is no accelerometer's reading; remove the channel"
             if read < 3
-            else f"; if these are counts: unit: g, scale: what one count is (about {1 / read:.4g}, or 1/{_power(read)})"
+            else f"; if these are counts: unit: g, scale: what one count is (about {1 / read:.4g}, or 1/{power})"
         )
         draft.put("specific_force", family.columns, evidence, question, unit=OPEN)
     else:
-        near = [
-            f
-            for f in triples
-            if not f.words & named.OTHER_THINGS and abs(norms[f] / G - 1) < 0.1 and _upright(draft, f)
-        ]
+        offered = (f for f in triples if not f.words & named.OTHER_THINGS and abs(norms[f] / G - 1) < 0.1)
+        near = [f for f in offered if _upright(draft, f)]
         if len(near) == 1:
             evidence = f"no name says it; the median of its norm is {norms[near[0]]:.4g}, along z"
             draft.put("specific_force", near[0].columns, evidence, unit="m/s2")
@@ -246,11 +219,6 @@ def _force_unit(family: Family, norm: float) -> str:
     """The unit in which a median norm is about 1 g, empty where there is none or the names say another."""
     among = [family.unit] if family.unit in UNITS["acceleration"] else _USUAL_ACCELERATIONS
     return next((u for u in among if 0.7 < norm * UNITS["acceleration"][u] / G < 1.6), "")
-
-
-def _power(counts: float) -> int:
-    """The power of two next to a number, as sensors have counts to 1 g."""
-    return 2 ** round(float(np.log2(counts)))
 
 
 def _upright(draft: Draft, family: Family) -> bool:

@@ -52,25 +52,13 @@ _FASTEST_HUNDREDS = 12_000.0
 
 
 def guess_rotors(draft: Draft, quantity: str) -> None:
-    offered = [f for f in named.numbered(draft.free()) if named.is_rotor(f, quantity)]
-    how = "by their names"
-    if (
-        not offered
-        and quantity == "throttle"
-        and not {"throttle", "rotor_speed", "rotor_command"} & set(draft.channels)
-    ):
-        offered, how = (
-            [
-                f
-                for f in named.numbered(draft.free())
-                if not f.words & _OTHER_THINGS and _carries(draft, f) > BY_NUMBERS_ALONE - 0.1
-            ],
-            _UNNAMED,
-        )
-    if not offered:
-        return
-    family = _that_move(draft, offered[0])
-    _put(draft, quantity, family, how)
+    families, how = named.numbered(draft.free()), "by their names"
+    offered = [f for f in families if named.is_rotor(f, quantity)]
+    if not offered and quantity == "throttle" and not {"rotor_speed", "rotor_command"} & set(draft.channels):
+        unnamed = (f for f in families if not f.words & _OTHER_THINGS)
+        offered, how = [f for f in unnamed if _carries(draft, f) > BY_NUMBERS_ALONE - 0.1], _UNNAMED
+    if offered:
+        _put(draft, quantity, _that_move(draft, offered[0]), how)
 
 
 def guess_stand(draft: Draft) -> None:
