@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 
 from rotorid.acquire import procedures
 from rotorid.acquire.cli import app
-from rotorid.acquire.emulators.wire import Faults
+from rotorid.acquire.emulators.devices import Faults
 from rotorid.acquire.recorder import Recorder, Timings, _source
 from rotorid.acquire.transport import AcquireError, SystemClock
 from rotorid.errors import InputError

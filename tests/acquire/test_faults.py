@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from rotorid.acquire import procedures
-from rotorid.acquire.emulators.wire import Faults
+from rotorid.acquire.emulators.devices import Faults
 from rotorid.acquire.transport import (
     AcquireError,
     DeviceSilent,

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from rotorid.acquire import procedures
-from rotorid.acquire.emulators.wire import Faults
+from rotorid.acquire.emulators.devices import Faults
 from rotorid.acquire.recorder import LogWriter
 from rotorid.errors import InputError
 from rotorid.io import rawlog

@@ -23,10 +23,13 @@ from rotorid.acquire import procedures
 from rotorid.acquire.emulators.devices import (
     BenchDevice,
     Device,
+    Faults,
     Jr3Device,
     QuadrotorDevice,
     RotorDevice,
     TensileDevice,
+    WireHalf,
+    World,
     WrenchDevice,
 )
 from rotorid.acquire.emulators.physics import (
@@ -45,7 +48,6 @@ from rotorid.acquire.emulators.physics import (
     write_stated,
 )
 from rotorid.acquire.emulators.truth import Truth, draw_truth, write_truth
-from rotorid.acquire.emulators.wire import Faults, WireHalf, World
 from rotorid.acquire.procedures import STEADY_JR3, SteadyRule, programme_of, run_with
 from rotorid.acquire.recorder import Recorder, Timings
 from rotorid.acquire.transport import LoopbackTransport, VirtualClock

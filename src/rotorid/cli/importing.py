@@ -12,7 +12,7 @@ from rotorid.cli.console import one_sentence
 from rotorid.errors import InputError
 
 if TYPE_CHECKING:
-    from rotorid.recordings.importers.set_of_logs import SetOfLogs
+    from rotorid.recordings.importers.logfile import SetOfLogs
 
 Like = Annotated[
     str | None,
@@ -128,8 +128,8 @@ def make_set(
     as_csv: bool = False,
 ) -> SetOfLogs:
     """Write the set `folder` of logs of one vehicle; a `vehicle.yaml` that is there already stays."""
+    from rotorid.recordings.importers.logfile import set_of_logs
     from rotorid.recordings.importers.mapping import read_mapping
-    from rotorid.recordings.importers.set_of_logs import set_of_logs
 
     mapping = read_mapping(mapping_file) if mapping_file else None
     found = set_of_logs(logs, folder.name, mass_kg, like, vehicle_file, mapping, folder / "vehicle.yaml")

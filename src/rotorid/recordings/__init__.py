@@ -29,7 +29,6 @@ __all__ = [
 ]
 
 OPEN = (
-    "basis",
     "body",
     "check",
     "columns",
@@ -40,13 +39,11 @@ OPEN = (
     "importers.logfile",
     "importers.mapping",
     "importers.neurobem",
-    "importers.overview",
     "importers.public_sets",
-    "importers.set_of_logs",
-    "own_rates",
+    "mended",
     "run",
+    "signal",
     "signal.*",
-    "spikes",
     "sufficient",
     "tables",
     "templates",

@@ -292,9 +292,14 @@ def _remedies(body: Body) -> Iterator[tuple[tuple[str, ...], tuple[int, np.ndarr
         yield keys, (int(least), factors, tuple(nearest))
 
 
+def unfit(body: Body) -> list[_CoupledNumber]:
+    """The quantities that lie outside their limits."""
+    return [q for q in quantities(body) if not q.fits]
+
+
 def impossible(body: Body) -> Iterator[Doubt]:
     """Believed values that no multirotor has together: one doubt for each value that has to change."""
-    while wrong := [q for q in quantities(body) if not q.fits]:
+    while wrong := unfit(body):
         order = {key: place for place, key in enumerate(dict.fromkeys(key for q in wrong for key in q.keys))}
         found = {keys: r for keys, r in _remedies(body) if r[0] < len(wrong) and keys[0] in order}
         if not found:

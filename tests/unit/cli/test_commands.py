@@ -268,7 +268,7 @@ def test_the_bundled_example_is_what_its_module_makes_and_the_verdict_finds_what
 
 
 def test_a_template_that_hovers_as_the_flight_did_is_named() -> None:
-    from rotorid.recordings.importers.propose import closer_template
+    from rotorid.recordings.importers.known import closer_template
 
     brushed, brushless = templates.read("crazyflie-2.1"), templates.read("crazyflie-2.1-brushless")
     lift = brushless.thrust_coefficient_n_s2 / brushless.mass_kg

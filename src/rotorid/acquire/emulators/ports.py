@@ -20,10 +20,13 @@ import numpy as np
 
 from rotorid.acquire.emulators.devices import (
     BenchDevice,
+    Faults,
     Jr3Device,
     QuadrotorDevice,
     RotorDevice,
     TensileDevice,
+    WireHalf,
+    World,
     WrenchDevice,
 )
 from rotorid.acquire.emulators.physics import (
@@ -38,7 +41,6 @@ from rotorid.acquire.emulators.physics import (
     torque_rig,
 )
 from rotorid.acquire.emulators.truth import Truth
-from rotorid.acquire.emulators.wire import Faults, WireHalf, World
 from rotorid.io.wire import EXPERIMENTS
 
 _MAX_PENDING = 1 << 16  # bytes a device keeps when nobody reads; older ones are overrun, as in a real UART

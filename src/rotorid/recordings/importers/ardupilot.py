@@ -37,8 +37,7 @@ from rotorid.recordings.importers import in_the_air
 from rotorid.recordings.importers.bag_records import needs
 from rotorid.recordings.importers.faults import GOES_ON, ImportFault, one_sense, report_gaps
 from rotorid.recordings.importers.known import Parameters, Values
-from rotorid.recordings.importers.mapping import continuous, quaternion_from_euler_frd
-from rotorid.recordings.importers.units import PULSE_US, RPM
+from rotorid.recordings.importers.mapping import PULSE_US, RPM, continuous, quaternion_from_euler_frd
 
 _KINDS = (
     "IMU", "ACC", "GYR", "XKQ", "NKQ", "ATT", "XKF1", "NKF1", "XKF4", "NKF4", "EKF1", "RCOU", "RCO2", "RCO3", "ESC",

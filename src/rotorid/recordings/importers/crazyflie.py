@@ -51,13 +51,14 @@ from rotorid.recordings.importers.faults import (
 from rotorid.recordings.importers.guessing.guess import guess
 from rotorid.recordings.importers.in_the_air import airborne, stretches_of
 from rotorid.recordings.importers.mapping import (
+    RPM,
+    UNITS,
     continuous,
     half_turn_about_x,
     quaternion_from_euler_frd,
     quaternion_to_frd_ned,
     read_columns,
 )
-from rotorid.recordings.importers.units import RPM, UNITS
 from rotorid.recordings.tables import numbers
 
 _MAGIC = 0xBC

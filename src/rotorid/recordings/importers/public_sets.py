@@ -1,27 +1,23 @@
-"""The public recordings as contract sets: which files make which set, and through which importer.
+"""The public recordings: how they are had, which files make which contract set, and tables of them for the report.
 
-`build` writes one set: `vehicle.yaml` (copied with its comments on where each value comes from), one Parquet
-file a run, and `import_report.json` with every fault met on the way.
+Files come from a folder that is there or by download; SHA-256 is always checked. One that cannot be had is named with
+the reason, and the pipeline goes on without. `build` writes one set: `vehicle.yaml` (copied with its comments on where
+each value comes from), one Parquet file a run, and `import_report.json` with every fault met on the way.
 
-Crazyflie on a scale (IMRCLab): CSV of PWM, battery, four rotor speeds and the thrust of the whole vehicle.
-
-Two layouts: `pwm,vbat[V],rpm1..4,thrust[g]` with steady points in random order, and
-`weight[g],pwm,vbat[V],rpm1..4,v[V],i[A],p[W]` as a sweep. Neither has a clock: rows are counted as seconds.
-
-Getting the public recordings: from a folder that is there or by download; SHA-256 is always checked.
-
-Nothing here is fatal: a file that cannot be had is named with the reason, and the pipeline goes on without.
+Two formats are of single laboratories, and read here: a Crazyflie on a scale (IMRCLab), `read_imrc_bench`, and a Vicon
+room with a PX4 vehicle (A. Appius, ground-effect flights), `read_vicon_csv`.
 """
 
 from __future__ import annotations
 
 import hashlib
+import json
 import re
 import shutil
 import urllib.error
 import urllib.parse
 import urllib.request
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,17 +25,69 @@ import numpy as np
 import pandas as pd
 
 from rotorid.errors import InputError
-from rotorid.recordings import RecordingSet, Run, read_vehicle, write_set
+from rotorid.recordings import RecordingSet, Run, read_set, read_vehicle, write_set
 from rotorid.recordings import columns as c
+from rotorid.recordings.check import check_set
 from rotorid.recordings.files import sha256
 from rotorid.recordings.importers import crazyflie
-from rotorid.recordings.importers.faults import ImportFault, ImportReport, fault_where
+from rotorid.recordings.importers.faults import (
+    ImportFault,
+    ImportReport,
+    blank_held,
+    cut,
+    drop_repeated_times,
+    fault_where,
+    read_report,
+    report_gaps,
+    true_stretches,
+)
+from rotorid.recordings.importers.mapping import RPM, quaternion_from_euler_frd
 from rotorid.recordings.importers.neurobem import read_neurobem
 from rotorid.recordings.importers.rcbenchmark import read_rcbenchmark
-from rotorid.recordings.importers.units import RPM
-from rotorid.recordings.importers.vicon_csv import read_vicon_csv
 from rotorid.recordings.tables import place, read_csv
 
+_FAULT_NAMES = {
+    "byte_order_mark": "byte-order mark",
+    "encoding": "encoding",
+    "line_ends": "line ends",
+    "cut_off": "last line or event cut off",
+    "no_lock": "motion capture not locked",
+    "no_telemetry": "no telemetry yet",
+    "held": "last value repeated",
+    "gap": "gaps in the clock",
+    "repeated_time": "clock stands still",
+    "speed_missing": "rotor speed 0 under thrust",
+    "speed_lost": "rotor speed too low for its thrust",
+    "speed_dropout": "rotor speed drops to 0",
+    "tare": "thrust at rest",
+    "flipped_sign": "sign of the thrust flipped",
+    "stuck": "reading never moves",
+    "unit": "unit",
+    "superseded": "superseded columns",
+    "derived": "derived, not measured",
+    "no_pitch": "pitch not recorded",
+    "on_ground": "rest, take-off and landing",
+    "cut": "only the flight kept",
+    "checksum": "checksum",
+    "unknown_event": "unknown event",
+    "dropout": "logger dropout",
+    "no_command": "no command logged",
+    "no_clock": "no clock",
+    "second_sensor": "second sensor",
+    "estimate": "estimate that did not fly the vehicle",
+}
+_HOW_TO_HAVE = {
+    "folder": "ROTORID_PUBLIC_DATA names a folder and files are taken from there alone, so put the missing ones where "
+    "the list says and run again, or unset it and run again where the network reaches their repositories",
+    "network": "ROTORID_PUBLIC_DATA is not set and files are downloaded, so run again where the network reaches their "
+    "repositories, after deleting results/public/<source>.json, or set it to a folder that holds the files",
+}
+"""What to do about files that are missing, by where they were looked for."""
+_CHOICES = {"cut", "on_ground"}
+"""Kinds that note what part of a log was kept, which is no fault of the log."""
+_VICON_COLUMNS = 25
+_GROUND_MARGIN_M = 0.015
+"""Height above the resting height from which the vehicle counts as in the air."""
 _RAW_FILES = "https://raw.githubusercontent.com"
 _TIMEOUT_S = 20.0
 _GRAM_FORCE_N = 9.80665e-3
@@ -269,7 +317,11 @@ def sets_of(source: str) -> list[str]:
 
 
 def read_imrc_bench(path: Path) -> tuple[pd.DataFrame, list[ImportFault]]:
-    """One bench run in contract columns (kind stand, thrust along -z), and its faults."""
+    """One bench run in contract columns (kind stand, thrust along -z), and its faults.
+
+    `pwm,vbat[V],rpm1..4,thrust[g]` with steady points in random order, or
+    `weight[g],pwm,vbat[V],rpm1..4,v[V],i[A],p[W]` as a sweep. Neither has a clock: rows are counted as seconds.
+    """
     raw = read_csv(Path(path))
     thrust = next((name for name in ("thrust[g]", "weight[g]") if name in raw), None)
     missing = [name for name in ("pwm", "vbat[V]", *_SPEEDS) if name not in raw]
@@ -366,3 +418,181 @@ def obtain(
     own = Path(folder) / name
     reasons = {file["path"]: _in_folder(own / file["path"], file) for file in source["files"]}
     return own, {path: reason for path, reason in reasons.items() if reason}
+
+
+def _vicon_matrix(path: Path) -> tuple[np.ndarray, list[ImportFault]]:
+    """The numbers of a header-less CSV, shape (n, 25); the last row may be cut off."""
+    try:
+        lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
+    except FileNotFoundError:
+        raise InputError(f"{path}: file is missing") from None
+    rows, faults = [], []
+    for number, line in enumerate(lines, start=1):
+        if not line.strip():
+            continue
+        cells = line.rstrip(",").split(",")
+        last = number == len(lines)
+        values = []
+        for column, cell in enumerate(cells, start=1):
+            try:
+                values.append(float(cell))
+            except ValueError:
+                if not last:
+                    where = f"{path}, line {number}, column {column}"
+                    raise InputError(f"{where}: expected a number, found {cell!r}") from None
+                values = []
+                break
+        if len(values) != _VICON_COLUMNS:
+            if not last:
+                raise InputError(f"{path}, line {number}: expected {_VICON_COLUMNS} columns, found {len(values)}")
+            faults.append(
+                ImportFault("cut_off", "", f"last line has {len(cells)} of {_VICON_COLUMNS} columns", "left out", 1)
+            )
+            continue
+        rows.append(values)
+    if len(rows) < 2:
+        raise InputError(f"{path}: expected at least two rows of {_VICON_COLUMNS} numbers")
+    return np.array(rows), faults
+
+
+def _of_vicon(matrix: np.ndarray) -> tuple[pd.DataFrame, list[ImportFault]]:
+    """Contract columns of the flown part of a log, clock from zero at its start."""
+    time, position, velocity = matrix[:, 0], matrix[:, 1:4], matrix[:, 4:7]
+    roll, pitch, yaw = np.radians(matrix[:, 7:10]).T
+    columns = {c.TIME: time}
+    columns |= dict(zip(c.POSITION, (position * [1, 1, -1]).T, strict=True))
+    columns |= dict(zip(c.VELOCITY, (velocity * [1, 1, -1]).T, strict=True))
+    columns[c.HEIGHT] = position[:, 2]
+    quaternion = quaternion_from_euler_frd(roll, pitch, yaw)
+    columns |= dict(zip(c.QUATERNION, quaternion.T, strict=True))
+    columns |= dict(zip(c.ANGULAR_VELOCITY, matrix[:, 10:13].T, strict=True))
+    columns |= dict(zip(c.rotor_columns("rotor_speed", 4), (matrix[:, 13:17] * RPM).T, strict=True))
+    columns[c.BATTERY_VOLTAGE] = matrix[:, 17:21].mean(axis=1)
+    columns[c.BATTERY_CURRENT] = matrix[:, 21:25].sum(axis=1)
+    table = pd.DataFrame(columns)
+    unlocked = table[list(c.POSITION)].isna().any(axis=1)
+    table.loc[unlocked, [*c.POSITION, *c.VELOCITY, c.HEIGHT]] = np.nan
+    faults = fault_where(unlocked, "no_lock", ", ".join(c.POSITION), "motion capture not locked (nan)", "made empty")
+    rotors = list(c.rotor_columns("rotor_speed", 4))
+    unpowered = (table[c.BATTERY_VOLTAGE] == 0) & (table[rotors].abs().sum(axis=1) == 0)
+    faults += fault_where(unpowered, "no_telemetry", c.BATTERY_VOLTAGE, "speed controllers report 0 V", "made empty")
+    table.loc[unpowered, [c.BATTERY_VOLTAGE, c.BATTERY_CURRENT]] = np.nan
+    table, repeated = drop_repeated_times(table)
+    height = table[c.HEIGHT].to_numpy()
+    resting = np.nanmedian(height[: max(10, int(np.argmax(table[rotors[0]].to_numpy() > 3000 * RPM)))])
+    flying = (table[rotors].mean(axis=1) > 4000 * RPM).to_numpy() & (height > resting + _GROUND_MARGIN_M)
+    stretches = true_stretches(flying, table[c.TIME].to_numpy(), 5.0)
+    if not stretches:
+        raise InputError("no stretch of 5 s in the air found (rotors above 4000 rpm and off the ground)")
+    start, stop = max(stretches, key=lambda s: s[1] - s[0])
+    before = len(table)
+    table = cut(table, start + 1.0, stop)
+    found = f"in the air from {start:.1f} to {stop:.1f} s"
+    ground = ImportFault("on_ground", "", found, "rest, take-off and landing left out", before - len(table))
+    faults += [*repeated, ground, *report_gaps(table)]
+    groups = {
+        "pose": [*c.POSITION, *c.VELOCITY, c.HEIGHT],
+        "attitude": [*c.QUATERNION, *c.ANGULAR_VELOCITY],
+        "rotor speed": rotors,
+        "battery": [c.BATTERY_VOLTAGE, c.BATTERY_CURRENT],
+    }
+    table, held = blank_held(table, groups)
+    return table, faults + held
+
+
+def read_vicon_csv(path: Path) -> tuple[pd.DataFrame, list[ImportFault]]:
+    """One flight in contract columns, and its faults.
+
+    25 columns without a heading: time, position (m, Vicon, z up), velocity, roll, pitch, yaw (deg), body rates (rad/s),
+    four rotor speeds (rpm), four voltages, four currents. The lateral accelerations are −g·pitch along x and +g·roll
+    along y, so attitude and rates are forward-right-down over x north, y east, and only the height is turned over.
+    Rotors in PX4's order. Each group of columns is held at its own slower rate.
+    """
+    matrix, faults = _vicon_matrix(path)
+    try:
+        table, more = _of_vicon(matrix)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return table, faults + more
+
+
+def sources(status_files: Sequence[Path]) -> pd.DataFrame:
+    """One row a source: repository, commit, licence, citation, contents, whether it was had, and from where."""
+    rows = []
+    for path in status_files:
+        status = json.loads(Path(path).read_text(encoding="utf-8"))
+        rows.append(
+            {
+                "source": status["source"],
+                "repository": status["repository"],
+                "place": f"{status['repository']} at {status['commit'][:10]}",
+                "licence": status["licence"],
+                "contents": status["contents"],
+                "citation": status["citation"],
+                "files": status["files"] - status["files_missing"],
+                "obtained": "yes" if status["available"] else "no",
+                "reason": status["reason"],
+                "taken_from": status["taken_from"],
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def recordings(folders: Sequence[Path]) -> pd.DataFrame:
+    """One row a set that is there: kind, runs, duration (s), rate (Hz), faults met."""
+    rows = []
+    for folder in folders:
+        report = read_report(Path(folder))
+        if not report["available"]:
+            continue
+        check = check_set(read_set(Path(folder)))
+        rows.append(
+            {
+                "set": check.name,
+                "kind": check.kind,
+                "rotors": check.rotors,
+                "runs": len(check.runs),
+                "duration_s": sum(run.duration_s for run in check.runs),
+                "rate_hz": sorted(run.rate_hz for run in check.runs)[len(check.runs) // 2],
+                "faults": len(report["faults"]),
+            }
+        )
+    columns = ["set", "kind", "rotors", "runs", "duration_s", "rate_hz", "faults"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def faults(folders: Sequence[Path]) -> pd.DataFrame:
+    """One row a source and kind of fault: in how many runs, an example of what was seen and what was done."""
+    rows: dict[tuple[str, str], dict] = {}
+    for folder in folders:
+        report = read_report(Path(folder))
+        for fault in report["faults"]:
+            if fault["kind"] in _CHOICES:
+                continue
+            recipe = PUBLIC_SETS[report["set"]]
+            row = rows.setdefault(
+                (recipe.source, fault["kind"]),
+                {
+                    "source": recipe.source,
+                    "fault": _FAULT_NAMES.get(fault["kind"], fault["kind"]),
+                    "runs": set(),
+                    "found": fault["found"],
+                    "action": fault["action"],
+                },
+            )
+            row["runs"].add((report["set"], fault["run"]))
+    table = [{**row, "runs": len(row["runs"])} for row in rows.values()]
+    return pd.DataFrame(table, columns=["source", "fault", "runs", "found", "action"])
+
+
+def state(table: pd.DataFrame) -> dict:
+    """What the report's text needs to know of the table of sources."""
+    missing = table[table["obtained"] == "no"]
+    places = set(missing["taken_from"])
+    return {
+        "available": bool((table["obtained"] == "yes").all()),
+        "sources": len(table),
+        "obtained": int((table["obtained"] == "yes").sum()),
+        "missing": missing[["source", "reason"]].to_dict("records"),
+        "how": "; ".join(how for place, how in _HOW_TO_HAVE.items() if place in places),
+    }

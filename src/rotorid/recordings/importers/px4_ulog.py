@@ -37,8 +37,7 @@ from rotorid.recordings.importers.faults import (
     report_gaps,
 )
 from rotorid.recordings.importers.known import Parameters, Values
-from rotorid.recordings.importers.mapping import continuous
-from rotorid.recordings.importers.units import PULSE_US, RPM
+from rotorid.recordings.importers.mapping import PULSE_US, RPM, continuous
 
 _FIRST_MOTOR = 101
 """Number of motor 1 among PX4's output functions."""

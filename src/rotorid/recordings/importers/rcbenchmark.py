@@ -17,8 +17,8 @@ import pandas as pd
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.faults import ImportFault, drop_repeated_times, fault_where
-from rotorid.recordings.importers.units import UNITS, bracketed, converted, unit_of
-from rotorid.recordings.spikes import lost_speed
+from rotorid.recordings.importers.mapping import UNITS, bracketed, converted, unit_of
+from rotorid.recordings.mended import lost_speed
 from rotorid.recordings.vehicle import Vehicle
 
 _ESC_LOW_US, _ESC_HIGH_US = 1000.0, 2000.0

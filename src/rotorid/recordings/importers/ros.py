@@ -41,9 +41,8 @@ from rotorid.recordings.importers import in_the_air
 from rotorid.recordings.importers.bag_records import Records, needs, typestores
 from rotorid.recordings.importers.faults import ImportFault, further_motors, one_sense, report_gaps
 from rotorid.recordings.importers.guessing import agreement as by
-from rotorid.recordings.importers.guessing.draft import CONFIRMED, is_clear
-from rotorid.recordings.importers.mapping import continuous, half_turn_about_x, quaternion_to_frd_ned
-from rotorid.recordings.importers.units import PULSE_US, RPM
+from rotorid.recordings.importers.guessing.agreement import CONFIRMED, is_clear
+from rotorid.recordings.importers.mapping import PULSE_US, RPM, continuous, half_turn_about_x, quaternion_to_frd_ned
 
 
 def _xyz(v) -> list[float]:

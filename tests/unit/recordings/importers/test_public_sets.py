@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from rotorid.io.public_list import of_one_motor, read_manifest
 from rotorid.recordings import columns as c
 from rotorid.recordings import read_set, read_vehicle
-from rotorid.recordings.importers import overview
+from rotorid.recordings.importers import public_sets
 from rotorid.recordings.importers.faults import read_report
 from rotorid.recordings.importers.public_sets import PUBLIC_SETS, address, build, obtain, sets_of, sha256
 from rotorid_proof.plantings import sow
@@ -291,10 +291,10 @@ def test_the_tables_of_the_report_count_runs_not_sets_twice(real, tmp_path: Path
         source = PUBLIC_SETS[name].source
         found = obtain(source, MANIFEST[source], REAL, tmp_path)
         folders.append(build(name, found, MANIFEST[source], VEHICLES, tmp_path))
-    table = overview.faults(folders)
+    table = public_sets.faults(folders)
     pitch = table[table["fault"] == "pitch not recorded"]
     assert pitch[["source", "runs"]].to_numpy().tolist() == [["crazypad", 16]]
-    assert overview.recordings(folders)["runs"].tolist() == [2, 10, 6]
+    assert public_sets.recordings(folders)["runs"].tolist() == [2, 10, 6]
 
 
 @needs_data

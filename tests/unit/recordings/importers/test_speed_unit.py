@@ -14,10 +14,15 @@ from rotorid.recordings import columns as c
 from rotorid.recordings import templates
 from rotorid.recordings.files import vehicle_of
 from rotorid.recordings.importers import known
-from rotorid.recordings.importers.logfile import read_log
+from rotorid.recordings.importers.known import propose
+from rotorid.recordings.importers.logfile import (
+    carrying_unit,
+    in_unit_of_weight,
+    read_log,
+    set_of_logs,
+    usual_coefficient,
+)
 from rotorid.recordings.importers.mapping import UNITS, Mapping
-from rotorid.recordings.importers.propose import propose
-from rotorid.recordings.importers.set_of_logs import carrying_unit, in_unit_of_weight, set_of_logs, usual_coefficient
 from tests.public_logs import PUBLIC
 
 SPEEDS = list(c.rotor_columns("rotor_speed", 4))

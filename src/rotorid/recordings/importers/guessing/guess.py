@@ -19,18 +19,21 @@ from rotorid.errors import InputError
 from rotorid.recordings.importers.faults import in_order, join_rows
 from rotorid.recordings.importers.guessing import agreement as by
 from rotorid.recordings.importers.guessing import names as named
-from rotorid.recordings.importers.guessing.attitude import guess_attitude_and_rates
-from rotorid.recordings.importers.guessing.draft import (
+from rotorid.recordings.importers.guessing.agreement import (
     CONFIRMED,
     RATES_HZ,
     Draft,
     triples_of,
 )
+from rotorid.recordings.importers.guessing.motion import (
+    guess_attitude_and_rates,
+    guess_height,
+    guess_position,
+    guess_velocity,
+)
 from rotorid.recordings.importers.guessing.names import Family
 from rotorid.recordings.importers.guessing.rotors import guess_rotors, guess_stand, six_axes
-from rotorid.recordings.importers.guessing.travel import guess_height, guess_position, guess_velocity
-from rotorid.recordings.importers.mapping import BODY, CHANNELS, OPEN, WORLD, Mapping
-from rotorid.recordings.importers.units import UNITS, G, converted, stated
+from rotorid.recordings.importers.mapping import BODY, CHANNELS, OPEN, UNITS, WORLD, G, Mapping, converted, stated
 from rotorid.recordings.tables import numbers
 
 _USUAL = {"voltage": (60.0, 2.5, 60.0), "current": (60.0, 0.0, 150.0), "temperature": (60.0, -30.0, 130.0)}

@@ -8,15 +8,14 @@ import numpy as np
 import pandas as pd
 
 from rotorid.recordings.importers.guessing import names as named
-from rotorid.recordings.importers.guessing.draft import (
+from rotorid.recordings.importers.guessing.agreement import (
     BY_NUMBERS_ALONE,
     CONTRADICTED,
     Draft,
     triples_of,
 )
 from rotorid.recordings.importers.guessing.names import Family
-from rotorid.recordings.importers.mapping import CHANNELS, ELECTRICAL, OPEN
-from rotorid.recordings.importers.units import UNITS, bracketed, stated
+from rotorid.recordings.importers.mapping import CHANNELS, ELECTRICAL, OPEN, UNITS, bracketed, stated
 
 _RANGES: dict[str, tuple[float, float]] = {
     "a share": (0.0, 1.0),
