@@ -58,7 +58,9 @@ def import_logs(
         if write_mapping is not None:
             _write_mapping(logs, write_mapping, as_json)
             return
-        folder = out or Path(_set_name(logs[0]))
+        # `flight` of flight.ulg, `flight-set` of the bag in the folder flight
+        name, is_folder = (logs[0].resolve().name, True) if logs[0].is_dir() else (logs[0].name, False)
+        folder = out or Path((name.split(".")[0] or "flights") + "-set" * is_folder)
         made = make_set(logs, folder, mass_kg, like, vehicle, mapping, as_csv)
         from rotorid.recordings.sufficient import LEAST_SINGLE_S
 
@@ -149,13 +151,6 @@ def print_notes(made: SetOfLogs, folder: Path) -> None:
         typer.echo("Proposed, not measured (marked PROPOSED in vehicle.yaml):")
         for remark in made.remarks:
             typer.echo(f"  - {remark}")
-
-
-def _set_name(log: Path) -> str:
-    """The name of a set after its first log: `flight` of flight.ulg, `flight-set` of the bag in the folder flight."""
-    if log.is_dir():
-        return f"{log.resolve().name.split('.')[0] or 'flights'}-set"
-    return log.name.split(".")[0] or "flights"
 
 
 def _contents(folder: Path) -> tuple[dict[str, float], str]:

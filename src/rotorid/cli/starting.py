@@ -73,7 +73,12 @@ def init(
                 raise InputError(f"--mass-kg is {mass_kg:g}, expected a finite number of more than 0")
             text = re.sub(r"(?m)^mass_kg:.*$", lambda _: f"mass_kg: {as_yaml(mass_kg)}   # as you stated it", text)
         if name is not None:
-            _check_name(name)
+            if not name.strip():
+                raise InputError(f"--name is {name!r}, expected text")
+            try:
+                name.encode("utf-8")
+            except UnicodeEncodeError:
+                raise InputError(f"--name is '{printable(name)}', expected UTF-8 text") from None
             text = re.sub(r"(?m)^name:.*$", lambda _: f"name: {as_yaml(name)}", text)
         # What is written must be read again: a mass beyond the contract's bounds is refused here, not by `check`.
         vehicle_of(parse_yaml(text, str(path)), str(path))
@@ -83,26 +88,6 @@ def init(
             f"{path}: written from template {like}. Put runs (CSV or Parquet, columns as in the recording contract) "
             f"next to it, then `rotorid check {folder}`"
         )
-
-
-def _check_name(name: str) -> None:
-    """InputError where a vehicle cannot be called so: a blank name, or one that is no Unicode text."""
-    if not name.strip():
-        raise InputError(f"--name is {name!r}, expected text")
-    try:
-        name.encode("utf-8")
-    except UnicodeEncodeError:
-        raise InputError(f"--name is '{printable(name)}', expected UTF-8 text") from None
-
-
-def _check_no_log(path: Path) -> None:
-    """InputError for a log, whether a file or the folder of a bag: a recording set is made of it first."""
-    from rotorid.recordings.importers.logfile import format_of, is_bag
-
-    if path.is_file() and (path.parent / "vehicle.yaml").is_file():
-        raise InputError(f"{path}: is a file of a recording set; check the set: `rotorid check {path.parent}`")
-    if is_bag(path) or path.is_file() and format_of(path):
-        raise InputError(f"{path}: is a log, not a recording set; make a set of it first: `rotorid import {path}`")
 
 
 def check(
@@ -119,9 +104,15 @@ def check(
     from rotorid.recordings import list_sets
     from rotorid.recordings.check import as_text, check_folder
     from rotorid.recordings.files import run_paths, write_manifest
+    from rotorid.recordings.importers.logfile import format_of, is_bag
 
     with one_sentence():
-        _check_no_log(folder)
+        if folder.is_file() and (folder.parent / "vehicle.yaml").is_file():
+            said = f"is a file of a recording set; check the set: `rotorid check {folder.parent}`"
+            raise InputError(f"{folder}: {said}")
+        if is_bag(folder) or folder.is_file() and format_of(folder):
+            said = f"is a log, not a recording set; make a set of it first: `rotorid import {folder}`"
+            raise InputError(f"{folder}: {said}")
     is_set = (folder / "vehicle.yaml").is_file()
     folders = [folder] if is_set else [folder / name for name in list_sets(folder)] or [folder]
     failed = False

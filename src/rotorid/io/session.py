@@ -233,22 +233,20 @@ def read_session(path: str | Path) -> Session:
     return read_model(path, Session, LARGEST_METADATA, MOST_METADATA_VALUES, compiled=True)
 
 
-def _index_row(session: Session, metadata: Path, raw: Path) -> dict[str, str]:
-    """A row of the index; paths are relative to `raw`, what is not known is empty."""
-    values = session.setup.model_dump() | session.model_dump(exclude={"setup"}) | session.counts.model_dump()
-    values["file"] = metadata.with_name(session.log).relative_to(raw).as_posix()
-    values["metadata"] = metadata.relative_to(raw).as_posix()
-    return {name: "" if values.get(name) is None else str(values[name]) for name in INDEX_COLUMNS}
-
-
 def write_index(raw: Path) -> list[dict[str, str]]:
-    """Find all recordings below `raw`, in the order of their time, and write the index.
+    """Find all recordings below `raw`, in the order of their time, and write the index. What is not known is empty.
 
     What lies in `raw/local`, where the recorders write by default, is left out: first tries are no part of a campaign.
     Such a folder has an index of its own, by `write_index(raw / "local")`. Files that are no session metadata (vehicle
     files) are passed over. Raises InputError for a session file that is damaged.
     """
-    rows = [_index_row(read_session(path), path, raw) for path in metadata_files(raw)]
+    rows = []
+    for path in metadata_files(raw):
+        session = read_session(path)
+        values = session.setup.model_dump() | session.model_dump(exclude={"setup"}) | session.counts.model_dump()
+        values["file"] = path.with_name(session.log).relative_to(raw).as_posix()
+        values["metadata"] = path.relative_to(raw).as_posix()
+        rows.append({name: "" if values.get(name) is None else str(values[name]) for name in INDEX_COLUMNS})
     rows.sort(key=lambda row: (row["started"], row["id"]))
     text = io.StringIO(newline="")
     writer = csv.DictWriter(text, INDEX_COLUMNS, delimiter="\t", lineterminator="\n")
