@@ -35,7 +35,7 @@ from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import in_the_air
 from rotorid.recordings.importers.bag_records import needs
-from rotorid.recordings.importers.faults import GOES_ON, ImportFault, one_sense, report_gaps
+from rotorid.recordings.importers.faults import GOES_ON, ImportFault, fault_where, one_sense, report_gaps
 from rotorid.recordings.importers.known import Parameters, Values
 from rotorid.recordings.importers.mapping import PULSE_US, RPM, continuous, quaternion_from_euler_frd
 
@@ -242,14 +242,6 @@ def _of_primary(log: Log, kinds: tuple[str, ...]) -> pd.DataFrame | None:
     return table[table["C"].to_numpy() == primary["PI"].to_numpy()[np.maximum(held, 0)]]
 
 
-def _switches(log: Log, values: Values) -> np.ndarray:
-    """Times, s, at which another core of the estimator took over."""
-    primary = log.get("NKF4" if _estimators(values)[0] == "NK" and "NKF4" in log else "XKF4")
-    if primary is None or not {"PI", c.TIME} <= set(primary):
-        return np.zeros(0)
-    return primary[c.TIME].to_numpy(float)[1:][np.diff(primary["PI"].to_numpy(float)) != 0]
-
-
 def _estimators(values: Values) -> tuple[str, str]:
     """How the kinds of the estimators' messages begin, of the one that flew the vehicle first."""
     return ("NK", "XK") if values.get("AHRS_EKF_TYPE") == 2 else ("XK", "NK")
@@ -280,11 +272,9 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[ImportFault], n
     if END in log:
         found = f"the file ends inside a message, after {int(log[END]['bytes'].iloc[0])} bytes of it"
         faults.append(ImportFault("cut_off", "", found, "what came before is kept; the log stopped before its end", 0))
-    keep = in_the_air.increasing(grid)
-    if not keep.all():
-        found = f"{int((~keep).sum())} messages do not move the clock on"
-        faults.append(ImportFault("repeated_time", c.TIME, found, "left out", int((~keep).sum())))
-    grid = grid[keep]
+    late = ~in_the_air.increasing(grid)
+    faults += fault_where(late, "repeated_time", c.TIME, f"{late.sum()} messages do not move the clock on", "left out")
+    grid = grid[~late]
     parts: list[tuple] = []
 
     def put(names, table: pd.DataFrame | None, fields) -> bool:
@@ -423,9 +413,8 @@ def _battery(log: Log, faults: list[ImportFault]) -> list[tuple]:
             continue  # damaged: no numbers
         values = values.astype(float) * (0.01 if kind == "CURR" and values.dtype.kind in "iu" else 1.0)
         if (values == 0).all():
-            faults.append(
-                ImportFault("stuck", column, f"{kind}.{name} is 0 throughout", "column left out", len(values))
-            )
+            seen = f"{kind}.{name} is 0 throughout"
+            faults.append(ImportFault("stuck", column, seen, "column left out", len(values)))
             continue
         parts.append(((column,), table[c.TIME].to_numpy(float), values))
     return parts
@@ -475,7 +464,11 @@ def read_ardupilot(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFaul
     table, faults, flying = convert(log, path)
     values = _in_flight(log, path)
     order, more = order_of(values)
-    switches, jumps = _switches(log, values) - _clock(log, path)[0], np.zeros(len(table), bool)
+    primary = log.get("NKF4" if _estimators(values)[0] == "NK" and "NKF4" in log else "XKF4")
+    switches = np.zeros(0)  # times at which another core of the estimator took over
+    if primary is not None and {"PI", c.TIME} <= set(primary):
+        switches = primary[c.TIME].to_numpy(float)[1:][np.diff(primary["PI"].to_numpy(float)) != 0]
+    switches, jumps = switches - _clock(log, path)[0], np.zeros(len(table), bool)
     for switch in switches:
         jumps |= np.abs(table[c.TIME].to_numpy() - switch) <= _AROUND_SWITCH_S
     if len(switches):

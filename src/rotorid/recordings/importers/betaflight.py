@@ -31,7 +31,7 @@ import pandas as pd
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import in_the_air
-from rotorid.recordings.importers.faults import ImportFault, report_gaps
+from rotorid.recordings.importers.faults import ImportFault, fault_where, report_gaps
 from rotorid.recordings.importers.mapping import G, half_turn_about_x, quaternion_to_frd_ned
 
 _FIRST_LINE = b"H Product:Blackbox"
@@ -155,9 +155,8 @@ def convert(
     raw, faults = _known_names(raw)
     time = raw["time"].to_numpy(float) * 1e-6
     keep = np.isfinite(time) & in_the_air.increasing(np.nan_to_num(time, nan=-np.inf))
-    if not keep.all():
-        found = f"{int((~keep).sum())} frames do not move the clock on"
-        faults.append(ImportFault("repeated_time", c.TIME, found, "left out", int((~keep).sum())))
+    found = f"{(~keep).sum()} frames do not move the clock on"
+    faults += fault_where(~keep, "repeated_time", c.TIME, found, "left out")
     raw, time = raw[keep].reset_index(drop=True), time[keep]
     table = pd.DataFrame({c.TIME: time - time[0]})
 
@@ -171,9 +170,8 @@ def convert(
         scale /= 10 if _number(headers, "blackbox_high_resolution", 0) > 0 else 1
         table[list(c.ANGULAR_VELOCITY)] = half_turn_about_x(np.radians(gyro * scale))
     else:
-        faults.append(
-            ImportFault("missing", ", ".join(c.ANGULAR_VELOCITY), "gyroADC is not logged", "no body rates", 0)
-        )
+        missing = ", ".join(c.ANGULAR_VELOCITY)
+        faults.append(ImportFault("missing", missing, "gyroADC is not logged", "no body rates"))
     acceleration = fields("accSmooth", 3)
     one_g = _number(headers, "acc_1G", 0)
     if acceleration is not None and one_g > 0:
@@ -254,9 +252,7 @@ def throttles(motors: np.ndarray, headers: Mapping[str, str]) -> tuple[np.ndarra
         else:
             backwards, low = motors < _DEADBAND_3D[0], _DEADBAND_3D[1]
             found = "pulses in µs with 3D, whose dead band the header does not state"
-            faults.append(
-                ImportFault("unit", "throttle", found, f"no throttle taken as {low:g} µs, Betaflight's own", 0)
-            )
+            faults.append(ImportFault("unit", "throttle", found, f"no throttle taken as {low:g} µs, Betaflight's own"))
     share = np.clip((motors - low) / (high - low), 0, 1)
     if backwards.any():
         found = f"{int(backwards.any(axis=1).sum())} samples have a motor that turns backwards (3D)"
@@ -397,14 +393,14 @@ def _one_signed(data: bytes, at: int, count: int) -> tuple[list[int], int]:
     return [value], at
 
 
-def _one_unsigned(data: bytes, at: int, count: int) -> tuple[list[int], int]:
-    value, at = _unsigned(data, at)
-    return [value], at
+def _one(turned: Callable[[int], int]) -> Callable[[bytes, int, int], tuple[list[int], int]]:
+    """One number, turned into what it stands for."""
 
+    def read(data: bytes, at: int, count: int) -> tuple[list[int], int]:
+        value, at = _unsigned(data, at)
+        return [turned(value)], at
 
-def _one_negative(data: bytes, at: int, count: int) -> tuple[list[int], int]:
-    value, at = _unsigned(data, at)
-    return [-_extended(value, 14)], at
+    return read
 
 
 def _up_to_eight(data: bytes, at: int, count: int) -> tuple[list[int], int]:
@@ -456,8 +452,8 @@ def _three(layouts: tuple) -> Callable[[bytes, int, int], tuple[list[int], int]]
 
 _ENCODINGS: dict[int, tuple[Callable, int]] = {
     0: (_one_signed, 1),
-    1: (_one_unsigned, 1),
-    3: (_one_negative, 1),
+    1: (_one(lambda value: value), 1),
+    3: (_one(lambda value: -_extended(value, 14)), 1),
     6: (_up_to_eight, 8),
     7: (_three(((1, ((4, 2), (2, 2), (0, 2))), (2, ((8, 4), (4, 4), (0, 4))), (3, ((16, 6), (8, 6), (0, 6))))), 3),
     8: (_four, 4),

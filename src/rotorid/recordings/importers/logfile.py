@@ -182,7 +182,9 @@ def _read(path: Path, kind: str, mapping: Mapping | None) -> _Imported:
     if kind == "px4":
         return _px4(path)
     if kind == "crazyflie" and mapping is None:
-        return _crazyflie(path)
+        runs, faults = crazyflie.flights(path)
+        axes = "body forward-left-up and world z up, turned by half a turn about x into FRD and NED"
+        return _Imported(kind, runs, tuple(faults), axes, Known("crazyflie"), speed_unit="rpm")
     if kind == "betaflight":
         runs, faults = betaflight.read_betaflight(path)
         axes = "body forward-left-up, turned by half a turn about x into FRD"
@@ -203,20 +205,13 @@ def _read(path: Path, kind: str, mapping: Mapping | None) -> _Imported:
         axes = "thrust along -z of the body"
         return _Imported(kind, {_stem(path): table}, tuple(faults), axes, kind="stand")
     table, faults, axes = read_by_mapping(path, mapping)
-    runs, cuts = _in_the_air(table, _stem(path), path)
+    stand, runs, cuts = bool(set(table) & {*c.FORCE, *c.MOMENT}), {_stem(path): table}, []
+    if not stand and not (flying := in_the_air.airborne(table)[0]).all():
+        runs, cuts = in_the_air.flights(table, flying, _stem(path), path)
     speeds = None if mapping is None else mapping.channels.get("rotor_speed") or mapping.channels.get("rotor_command")
     unit = (speeds.unit if speeds else "") or "rad/s"
     unit = "rpm" if unit in ELECTRICAL else unit  # they are turns of the rotor by now
-    stand = any({*c.FORCE, *c.MOMENT} & set(run) for run in runs.values())
     return _Imported(kind, runs, (*faults, *cuts), axes, kind="stand" if stand else "flight", speed_unit=unit)
-
-
-def _in_the_air(table: pd.DataFrame, name: str, path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
-    """The flights of a table in contract columns; the table as it is where all of it is in the air, or of a stand."""
-    if set(table) & {*c.FORCE, *c.MOMENT}:
-        return {name: table}, []
-    flying, _ = in_the_air.airborne(table)
-    return ({name: table}, []) if flying.all() else in_the_air.flights(table, flying, name, path)
 
 
 def _stem(path: Path) -> str:
@@ -234,12 +229,6 @@ def _px4(path: Path) -> _Imported:
     runs, cuts = in_the_air.flights(table, flying, path.stem, path, jumps)
     axes = "PX4's: body forward-right-down, world north-east-down, as the contract's"
     return _Imported("px4", runs, (*found, *faults, *cuts), axes, known, speed_unit="rpm")
-
-
-def _crazyflie(path: Path) -> _Imported:
-    runs, faults = crazyflie.flights(path)
-    axes = "body forward-left-up and world z up, turned by half a turn about x into FRD and NED"
-    return _Imported("crazyflie", runs, tuple(faults), axes, Known("crazyflie"), speed_unit="rpm")
 
 
 @contextmanager

@@ -190,23 +190,20 @@ def _open_questions(mapping: Mapping) -> list[str]:
     found = [f"{key} ({' or '.join(known)})" for key, known in (("body", BODY), ("world", WORLD))
              if getattr(mapping, key) == OPEN]  # fmt: skip
     for name, channel in mapping.channels.items():
-        if OPEN in channel.columns:
-            found.append(f"channels.{name}.columns (a column's name)")
-        if channel.unit == OPEN:
-            known = UNITS[CHANNELS[name][0]] if name in CHANNELS else ()
-            found.append(f"channels.{name}.unit ({' or '.join(known)})")
-        if channel.form == OPEN:
-            found.append(f"channels.{name}.form (wxyz, xyzw, euler or euler_xyz)")
-        if channel.axes == OPEN:
-            found.append(f"channels.{name}.axes (world or body)")
-        if channel.world == OPEN:
-            found.append(f"channels.{name}.world ({' or '.join(TRAVEL)})")
-        if channel.scale == OPEN:
-            found.append(f"channels.{name}.scale (what one count is in the unit)")
-        if channel.range == OPEN:
-            found.append(f"channels.{name}.range ([reading of no throttle, of full throttle])")
-        if channel.poles == OPEN:
-            found.append(f"channels.{name}.poles (magnetic poles of a motor)")
+        units = UNITS[CHANNELS[name][0]] if name in CHANNELS else ()
+        expected = {
+            "columns": "a column's name",
+            "unit": " or ".join(units),
+            "form": "wxyz, xyzw, euler or euler_xyz",
+            "axes": "world or body",
+            "world": " or ".join(TRAVEL),
+            "scale": "what one count is in the unit",
+            "range": "[reading of no throttle, of full throttle]",
+            "poles": "magnetic poles of a motor",
+        }
+        for key, words in expected.items():
+            if getattr(channel, key) == OPEN or key == "columns" and OPEN in channel.columns:
+                found.append(f"channels.{name}.{key} ({words})")
     return found
 
 
@@ -289,7 +286,12 @@ def read_by_mapping(path: Path, mapping: Mapping | None) -> tuple[pd.DataFrame, 
     Without a mapping the columns must have the contract's names; InputError says how to get a mapping.
     """
     raw = read_columns(path)
-    lost = _left_out(raw)
+    layout, lost = raw.attrs.get("layout"), []
+    if layout and layout.above:
+        found = f"{len(layout.above)} lines above the heading in line {layout.heading_line}"
+        lost.append(ImportFault("above", "", found, "left out"))
+    if layout and layout.cut_off:
+        lost.append(ImportFault("cut_off", c.TIME, "the last line is cut off", "left out", 1))
     if mapping is None:
         if c.TIME in raw.columns and sum(c.is_known(n) for n in raw.columns) > 1:
             table, late = in_order(numbers(raw, path), c.TIME)
@@ -301,19 +303,6 @@ def read_by_mapping(path: Path, mapping: Mapping | None) -> tuple[pd.DataFrame, 
         )
     table, faults = convert(raw, mapping, str(path))
     return table, lost + faults, f"body {mapping.body.upper()}, world {mapping.world.upper()}, turned into FRD and NED"
-
-
-def _left_out(raw: pd.DataFrame) -> list[ImportFault]:
-    """What of the file of a table is none of its rows."""
-    layout = raw.attrs.get("layout")
-    faults = []
-    if layout and layout.above:
-        found = f"{len(layout.above)} lines above the heading in line {layout.heading_line}"
-        faults.append(ImportFault("above", "", found, "left out", 0))
-    if layout and layout.cut_off:
-        found = "the last line is cut off"
-        faults.append(ImportFault("cut_off", c.TIME, found, "left out", 1))
-    return faults
 
 
 def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFrame, list[ImportFault]]:
@@ -342,7 +331,7 @@ def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFra
         if channel.unit in ELECTRICAL:
             values = values / (channel.poles / 2)
         if name == "attitude":
-            rotation, values = _attitude(values, channel.form, body, world)
+            rotation = values = _attitude(values, channel.form, body, world)
         elif name in ("angular_velocity", "specific_force", "force", "moment"):
             values = values @ body.T
         elif name == "thrust":
@@ -392,8 +381,8 @@ def from_angles(angles: np.ndarray, form: str) -> Rotation:
     return Rotation.from_euler(EULER[form], angles if form == "euler_xyz" else angles[:, ::-1])
 
 
-def _attitude(values: np.ndarray, form: str, body: np.ndarray, world: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Quaternions (n, 4), scalar first, FRD to NED; NaN where a value is missing. Twice, as `convert` takes it."""
+def _attitude(values: np.ndarray, form: str, body: np.ndarray, world: np.ndarray) -> np.ndarray:
+    """Quaternions (n, 4), scalar first, FRD to NED; NaN where a value is missing."""
     out = np.full((len(values), 4), np.nan)
     known = np.isfinite(values).all(axis=1)
     if form in EULER:
@@ -403,7 +392,7 @@ def _attitude(values: np.ndarray, form: str, body: np.ndarray, world: np.ndarray
         turn = Rotation.from_quat(values[known] if form == "xyzw" else values[known][:, [1, 2, 3, 0]])
     turn = Rotation.from_matrix(world) * turn * Rotation.from_matrix(body).inv()
     out[known] = continuous(turn.as_quat()[:, [3, 0, 1, 2]])
-    return out, out
+    return out
 
 
 def half_turn_about_x(vectors: np.ndarray) -> np.ndarray:
@@ -426,8 +415,7 @@ def continuous(wxyz: np.ndarray) -> np.ndarray:
 
 def quaternion_from_euler_frd(roll: np.ndarray, pitch: np.ndarray, yaw: np.ndarray) -> np.ndarray:
     """Quaternions (n, 4), scalar first, from FRD roll, pitch, yaw in rad (aerospace order z-y'-x'')."""
-    xyzw = Rotation.from_euler("ZYX", np.column_stack([yaw, pitch, roll])).as_quat()
-    return continuous(xyzw[:, [3, 0, 1, 2]])
+    return continuous(from_angles(np.column_stack([roll, pitch, yaw]), "euler").as_quat()[:, [3, 0, 1, 2]])
 
 
 def _plainly(text: str) -> str:

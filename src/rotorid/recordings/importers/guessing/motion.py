@@ -33,25 +33,19 @@ _SAME_ORDER_RAD = np.radians(2.0)
 """Where the two orders of roll, pitch and yaw are no farther apart, the usual one is taken without a question."""
 
 
-def _gained(draft: Draft) -> np.ndarray | None:
-    """Changes of velocity by accelerometer and attitude in the axes of the recorded world, m/s; None without both."""
-    force = draft.channels.get("specific_force")
-    if force is None or force.unit == OPEN or draft.wxyz is None or draft.instants is None:
-        return None
-    values = draft.values(force.columns) * UNITS["acceleration"][force.unit]
-    return draft.integrated(by.into_world(draft.time_s, draft.wxyz, values))
-
-
 def guess_velocity(draft: Draft) -> None:
     triples = triples_of(draft)
     offered = [f for f in triples if named.is_named(f, "velocity")]
-    gained = _gained(draft)
+    force = draft.channels.get("specific_force")
     candidates = offered or [
         f for f in triples if not f.words & named.OTHER_THINGS and not named.is_named(f, "position")
     ]
     found: dict[tuple[str, Family], Agreement] = {}
     others: dict[Family, tuple[str, str]] = {}
-    if gained is not None:
+    if force is not None and force.unit != OPEN and draft.wxyz is not None and draft.instants is not None:
+        # Changes of velocity by accelerometer and attitude in the axes of the recorded world, m/s.
+        felt = draft.values(force.columns) * UNITS["acceleration"][force.unit]
+        gained = draft.integrated(by.into_world(draft.time_s, draft.wxyz, felt))
         for family in candidates:
             values = draft.values(family.columns)
             found["world", family], others[family] = _in_any_axes(draft.changes(values), gained, draft.world)
@@ -83,15 +77,6 @@ def _in_any_axes(changes: np.ndarray, gained: np.ndarray, world: str) -> tuple[A
     return best, axes
 
 
-def _own_axes(draft: Draft, axes: tuple[str, str]) -> tuple[dict[str, str], str]:
-    """What a mapping states where a channel has other axes than the attitude, and the same in words."""
-    attitude, own = axes
-    if own == attitude:
-        return {}, ""
-    draft.world = attitude
-    return {"world": own}, f", its axes are {own} where those of the attitude are {attitude}"
-
-
 def _velocity_confirmed(
     draft: Draft, best: tuple[str, Family], found: dict, own_axes: tuple[str, str], by_name: bool
 ) -> None:
@@ -103,11 +88,11 @@ def _velocity_confirmed(
         f"{'by their names' if by_name else 'no name says it'}; follows accelerometer and attitude ({agreed.in_words}"
     )
     said += f"; in {'body' if axes == 'world' else 'world'} axes {other.correlation:.2f})"
-    question = ""
-    more = {"unit": unit or OPEN, "axes": axes}
-    if axes == "world":
-        other_axes, words = _own_axes(draft, own_axes)
-        more, said = more | other_axes, said + words
+    question, more = "", {"unit": unit or OPEN, "axes": axes}
+    attitude, own = own_axes
+    if axes == "world" and own != attitude:
+        draft.world, more["world"] = attitude, own
+        said += f", its axes are {own} where those of the attitude are {attitude}"
     if unit is None or (family.unit in UNITS["velocity"] and family.unit != unit):
         question = f"the accelerometer asks for {1 / agreed.slope:.3g} m/s a unit"
         more["unit"] = OPEN
@@ -198,18 +183,16 @@ def guess_position(draft: Draft) -> None:
         unit = family.unit if family.unit in UNITS["length"] and not off else OPEN
         question = "is it a position? The velocity does not integrate to it" if off else "in which unit?"
         questions, more = [question] if unit == OPEN else [], {}
-        if draft.world == "ned" and _is_up(draft.values(family.columns)[:, 2]):
+        z = draft.values(family.columns)[:, 2]
+        z = z[np.isfinite(z)]
+        # It begins at its lowest and rises by many times what it ever falls below.
+        upward = len(z) > 1 and z.max() > 0 and z.max() - z[0] > 10 * max(z[0] - z.min(), 0.0)
+        if draft.world == "ned" and upward:
             more = {"world": OPEN}
             questions.append(
                 "z is never below its start: does it point up (neu) although that of the attitude is down?"
             )
         draft.put("position", family.columns, f"by their names; {seen}", " ".join(questions), unit=unit, **more)
-
-
-def _is_up(z: np.ndarray) -> bool:
-    """Whether a vertical place (n,) begins at its lowest and rises by many times what it ever falls below."""
-    known = z[np.isfinite(z)]
-    return len(known) > 1 and known.max() > 0 and known.max() - known[0] > 10 * max(known[0] - known.min(), 0.0)
 
 
 def guess_height(draft: Draft) -> None:

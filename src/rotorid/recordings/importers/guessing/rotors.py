@@ -57,7 +57,12 @@ def guess_rotors(draft: Draft, quantity: str) -> None:
         unnamed = (f for f in families if not f.words & _OTHER_THINGS)
         offered, how = [f for f in unnamed if _carries(draft, f) > BY_NUMBERS_ALONE - 0.1], _UNNAMED
     if offered:
-        _put(draft, quantity, _that_move(draft, offered[0]), how)
+        # Without outputs that keep one value and drive nothing, unless fewer than three would be left.
+        family = offered[0]
+        spread = pd.DataFrame(draft.values(family.columns)).nunique()
+        moving = tuple(n for n, count in zip(family.columns, spread, strict=True) if count > 1)
+        several = 3 <= len(moving) < len(family.columns)
+        _put(draft, quantity, replace(family, columns=moving) if several else family, how)
 
 
 def guess_stand(draft: Draft) -> None:
@@ -132,14 +137,6 @@ def _put(draft: Draft, quantity: str, family: Family, how: str) -> None:
         if speeds:
             question += " Or are they speeds? Then call the channel rotor_speed and state their unit"
         draft.put(quantity, family.columns, evidence, question, unit="raw", range=OPEN)
-
-
-def _that_move(draft: Draft, family: Family) -> Family:
-    """A family without outputs that keep one value and drive nothing; itself where fewer than three would be left."""
-    values = draft.values(family.columns)
-    spread = pd.DataFrame(values).nunique().to_numpy()
-    moving = [n for n, count in zip(family.columns, spread, strict=True) if count > 1]
-    return replace(family, columns=tuple(moving)) if 3 <= len(moving) < len(family.columns) else family
 
 
 def _can_be_speeds(values: np.ndarray, family: Family) -> bool:
