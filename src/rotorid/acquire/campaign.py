@@ -14,6 +14,7 @@ import shutil
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta, timezone
+from functools import partial
 from pathlib import Path
 from zlib import crc32
 
@@ -223,14 +224,9 @@ def calibration(campaign: _Campaign) -> None:
                     return lambda: True
 
                 setup = Setup(platform="clamp", cell=cell, load_gf=load, load_items=list(items), repeat=repeat)
-                campaign.record(
-                    "calibration",
-                    f"cal-cell{cell}",
-                    world,
-                    {name: setup},
-                    lambda recorder, prompt=prompt: procedures.calibrate_cell(recorder, prompt),
-                    {"name": "calibrate_cell", "samples": 400, "weight_at": 50},
-                )
+                procedure = {"name": "calibrate_cell", "samples": 400, "weight_at": 50}
+                run = partial(procedures.calibrate_cell, prompt=prompt)
+                campaign.record("calibration", f"cal-cell{cell}", world, {name: setup}, run, procedure)
 
 
 def static(campaign: _Campaign) -> None:
@@ -256,14 +252,8 @@ def _weigh(
     rule = STEADY_JR3 if platform == "jr3" else SteadyRule()
     prompt = _operator(lambda gf: physics.place_load(axis, gf), load, int(rng.integers(60, 120)))
     setup = Setup(platform=platform, axis=axis, load_gf=load, load_items=list(items), repeat=repeat)
-    campaign.record(
-        kind,
-        group,
-        world,
-        {name: setup},
-        lambda recorder: procedures.static_test(recorder, prompt, 50, rule),
-        {"name": "static_test", "samples": 50, **vars(rule)},
-    )
+    run = partial(procedures.static_test, prompt=prompt, samples=50, rule=rule)
+    campaign.record(kind, group, world, {name: setup}, run, {"name": "static_test", "samples": 50, **vars(rule)})
 
 
 def dynamic(campaign: _Campaign) -> None:
@@ -282,15 +272,10 @@ def dynamic(campaign: _Campaign) -> None:
                 physics.drive(force)
                 return lambda: True
 
-            campaign.record(
-                "dynamic",
-                f"dynamic-set{repeat}",
-                world,
-                {name: Setup(platform=platform, axis="z", repeat=repeat, remarks="87 g quadrotor, flown by hand")},
-                lambda recorder, prompt=prompt, rule=rule: procedures.dynamic_test(recorder, prompt, 1500, rule),
-                {"name": "dynamic_test", "samples": 1500, **vars(rule)},
-                pause_s=300,
-            )
+            setup = Setup(platform=platform, axis="z", repeat=repeat, remarks="87 g quadrotor, flown by hand")
+            procedure = {"name": "dynamic_test", "samples": 1500, **vars(rule)}
+            run = partial(procedures.dynamic_test, prompt=prompt, samples=1500, rule=rule)
+            campaign.record("dynamic", f"dynamic-set{repeat}", world, {name: setup}, run, procedure, pause_s=300)
 
 
 def _platform(
@@ -338,14 +323,10 @@ def thrust(campaign: _Campaign) -> None:
             propeller=_PROPELLER,
             battery=f"4S 1500 mAh no. {(percent - 1) // 10 % 3 + 1}",
         )
-        campaign.record(
-            "thrust",
-            "thrust",
-            World(physics, campaign.line(RotorDevice(physics), name)),
-            {name: setup},
-            lambda recorder, u=percent / 100: procedures.thrust_test(recorder, u, 1.0, 4.0),
-            {"name": "thrust_test", "throttle": percent / 100, "rest_s": 1.0, "hold_s": 4.0},
-        )
+        world = World(physics, campaign.line(RotorDevice(physics), name))
+        settings = {"throttle": percent / 100, "rest_s": 1.0, "hold_s": 4.0}
+        run = partial(procedures.thrust_test, **settings)
+        campaign.record("thrust", "thrust", world, {name: setup}, run, {"name": "thrust_test", **settings})
 
 
 def torque(campaign: _Campaign) -> None:
@@ -373,14 +354,9 @@ def torque(campaign: _Campaign) -> None:
             f"{name}-rotor": common.model_copy(update={"platform": "tester", "remarks": remark}),
             f"{name}-wrench": common.model_copy(update={"platform": "stand"}),
         }
-        campaign.record(
-            "torque",
-            name,
-            World(stand, *lines),
-            setups,
-            lambda tester, sensor, u=percent / 100: procedures.torque_test(tester, sensor, u, 2.0, 6.0),
-            {"name": "torque_test", "throttle": percent / 100, "rest_s": 2.0, "hold_s": 6.0},
-        )
+        settings = {"throttle": percent / 100, "rest_s": 2.0, "hold_s": 6.0}
+        run = partial(procedures.torque_test, **settings)
+        campaign.record("torque", name, World(stand, *lines), setups, run, {"name": "torque_test", **settings})
 
 
 def dynamics(campaign: _Campaign) -> None:
@@ -411,16 +387,12 @@ def dynamics(campaign: _Campaign) -> None:
             sensor_position_m=list(SENSOR_POSITION_M),
             tared=False,
         )
-        campaign.record(
-            "dynamics",
-            name,
-            world,
-            {f"{name}-quadrotor": setup, f"{name}-wrench": setup},
-            lambda vehicle, sensor, c=letter, p=programme: procedures.experiment(vehicle, sensor, c, p),
-            {"name": "experiment", "number": number, "letter": letter}
-            | programme._asdict()
-            | {"shape": "trapezoid" if programme.shape == TRAPEZOID else "sine", "maxima": list(programme.maxima)},
-        )
+        shape = "trapezoid" if programme.shape == TRAPEZOID else "sine"
+        procedure = {"name": "experiment", "number": number, "letter": letter, **programme._asdict()}
+        procedure |= {"shape": shape, "maxima": list(programme.maxima)}
+        setups = {f"{name}-quadrotor": setup, f"{name}-wrench": setup}
+        run = partial(procedures.experiment, letter=letter, programme=programme)
+        campaign.record("dynamics", name, world, setups, run, procedure)
 
 
 def tensile(campaign: _Campaign) -> None:
@@ -440,15 +412,10 @@ def tensile(campaign: _Campaign) -> None:
                 gauge_length_mm=GAUGE_MM,
                 cross_section_mm2=SECTION_MM2,
             )
-            campaign.record(
-                "tensile",
-                f"tensile-{infill:03d}",
-                World(physics, campaign.line(TensileDevice(physics), name)),
-                {name: setup},
-                lambda recorder: procedures.stream(recorder, None),
-                {"name": "stream", "until": "the specimen is broken", "speed_mm_min": 10},
-                pause_s=120,
-            )
+            world = World(physics, campaign.line(TensileDevice(physics), name))
+            procedure = {"name": "stream", "until": "the specimen is broken", "speed_mm_min": 10}
+            run = partial(procedures.stream, samples=None)
+            campaign.record("tensile", f"tensile-{infill:03d}", world, {name: setup}, run, procedure, pause_s=120)
 
 
 def combined(campaign: _Campaign) -> None:

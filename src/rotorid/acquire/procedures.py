@@ -2,8 +2,6 @@
 
 Time in here is the device's: a procedure counts samples, so it is the same at any speed of the host.
 
-The recorder's own filter and its idea of steady (thesis 2.7.3, fig. 2.35).
-
 Recording from Python, by the same way that the command line goes:
 
     from rotorid.acquire.procedures import record, stream
@@ -278,12 +276,10 @@ def _tare(recorder: Recorder, rule: SteadyRule, wait_s: float) -> None:
     _wait_until_steady(recorder, rule, "steady", wait_s)
     recorder.phase = "taring"
     sums = [0.0] * len(recorder.instrument.channels)
-    count = 0
-    for row in recorder.rows(_TARE_SAMPLES):
-        if count == 0:
+    for count, row in enumerate(recorder.rows(_TARE_SAMPLES), start=1):
+        if count == 1:
             recorder.mark("tare_start", row)
         sums = [total + value for total, value in zip(sums, row.values, strict=True)]
-        count += 1
     recorder.mark("tare_stop", row)
     means = (total / count for total in sums)
     recorder.session.tare = dict(zip(recorder.instrument.columns, means, strict=True))
@@ -307,12 +303,10 @@ def _wait_until_steady(recorder: Recorder, rule: SteadyRule, mark: str, wait_s: 
 
 
 def _mark_ends(recorder: Recorder, samples: int, first: str, last: str) -> None:
-    begun = False
     row: Row | None = None
-    for row in recorder.rows(samples):
-        if not begun:
+    for number, row in enumerate(recorder.rows(samples)):
+        if not number:
             recorder.mark(first, row)
-            begun = True
     if row is not None:
         recorder.mark(last, row)
 

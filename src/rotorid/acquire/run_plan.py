@@ -1,11 +1,9 @@
-"""Carries out a campaign's plan: checks first, then step after step; the same with instruments and with emulators.
+"""A campaign's plan: what is recorded, in which order, how often, and what of it is done; carried out step after step.
 
-Completes the metadata of a recording whose recorder was killed, from the log alone.
-
-A campaign's plan: what is recorded, in which order, how often; and what of it is done.
-
-What is done is read from the recordings themselves, so a campaign goes on after anything: a step is done when one of
-its attempts (`name`, `name.2`, `name.3`, …) has ended `finished` and its log is as it was recorded.
+Checks come first; it is the same with instruments and with emulators. What is done is read from the recordings
+themselves, so a campaign goes on after anything: a step is done when one of its attempts (`name`, `name.2`, `name.3`,
+…) has ended `finished` and its log is as it was recorded. The metadata of one whose recorder was killed are completed
+from its log.
 """
 
 from __future__ import annotations

@@ -15,11 +15,8 @@ from zlib import crc32
 import numpy as np
 
 from rotorid.acquire.emulators.physics import (
-    BenchPhysics,
-    CellClamp,
     LoadedSensor,
     StandPhysics,
-    TensilePhysics,
     TesterPhysics,
     TurningRotors,
 )
@@ -52,10 +49,12 @@ class Device:
     """What all instruments do: start, stop, one interval. `streaming` makes the wire half sample."""
 
     instrument: wire.Instrument
+    serial_number: str
     needs_watchdog = False  # refuses to move anything before its watchdog is on, as firmware from 1.3 on does
 
-    def __init__(self, serial_number: str) -> None:
-        self.serial_number = serial_number
+    def __init__(self, physics, serial_number: str = "") -> None:
+        self._physics = physics
+        self.serial_number = serial_number or self.serial_number
         self.firmware = f"{self.instrument.name} {_FIRMWARE}"
         self.interval_us = self.instrument.interval_us
         self.streaming = False
@@ -96,11 +95,7 @@ class Device:
 class BenchDevice(Device):
     """Arduino UNO with two ADS1256."""
 
-    instrument = wire.BENCH
-
-    def __init__(self, physics: BenchPhysics | CellClamp, serial_number: str = "EMU-BENCH-1") -> None:
-        super().__init__(serial_number)
-        self._physics = physics
+    instrument, serial_number = wire.BENCH, "EMU-BENCH-1"
 
     def counts(self) -> list[int]:
         return [round(volt / wire.VOLTS_PER_COUNT) for volt in self._physics.volts().tolist()]
@@ -109,11 +104,10 @@ class BenchDevice(Device):
 class RotorDevice(Device):
     """Thrust tester."""
 
-    instrument = wire.ROTOR
+    instrument, serial_number = wire.ROTOR, "EMU-ROTOR-1"
 
-    def __init__(self, physics: TesterPhysics, serial_number: str = "EMU-ROTOR-1") -> None:
-        super().__init__(serial_number)
-        self._physics = physics
+    def __init__(self, physics: TesterPhysics) -> None:
+        super().__init__(physics)
         self._left_s = 0.0
 
     def moves(self, letter: str, arguments: bytes) -> bool:
@@ -150,11 +144,10 @@ class RotorDevice(Device):
 class WrenchDevice(Device):
     """Miniature six-axis sensor: needs power and initialisation before it measures."""
 
-    instrument = wire.WRENCH
+    instrument, serial_number = wire.WRENCH, "EMU-WRENCH-1"
 
-    def __init__(self, physics: StandPhysics | LoadedSensor, serial_number: str = "EMU-WRENCH-1") -> None:
-        super().__init__(serial_number)
-        self._physics = physics
+    def __init__(self, physics: StandPhysics | LoadedSensor) -> None:
+        super().__init__(physics)
         self._powered = self._initialised = False
         self._runs_left = self._samples_left = self._measuring_times = 0
 
@@ -205,11 +198,7 @@ class WrenchDevice(Device):
 class Jr3Device(Device):
     """Large six-axis sensor."""
 
-    instrument = wire.JR3
-
-    def __init__(self, physics: LoadedSensor, serial_number: str = "EMU-JR3-1") -> None:
-        super().__init__(serial_number)
-        self._physics = physics
+    instrument, serial_number = wire.JR3, "EMU-JR3-1"
 
     def operate(self, letter: str, arguments: bytes) -> None:
         if letter != wire.OFFSET:
@@ -224,10 +213,10 @@ class Jr3Device(Device):
 class QuadrotorDevice(Device):
     """ESP32: a command character starts a programme, which ends by itself."""
 
-    instrument = wire.QUADROTOR
+    instrument, serial_number = wire.QUADROTOR, "EMU-ESP32-1"
 
-    def __init__(self, rotors: TurningRotors, rng: np.random.Generator, serial_number: str = "EMU-ESP32-1") -> None:
-        super().__init__(serial_number)
+    def __init__(self, rotors: TurningRotors, rng: np.random.Generator) -> None:
+        super().__init__(rotors)
         self._rotors = rotors
         self._rng = rng
         self._programme: wire.Programme | None = None
@@ -296,11 +285,7 @@ def programme_share(programme: wire.Programme, time_s: float) -> tuple[float, in
 class TensileDevice(Device):
     """Tensile tester: starting it starts the crosshead; it stops when the specimen is broken."""
 
-    instrument = wire.TENSILE
-
-    def __init__(self, physics: TensilePhysics, serial_number: str = "EMU-AGSX-1") -> None:
-        super().__init__(serial_number)
-        self._physics = physics
+    instrument, serial_number = wire.TENSILE, "EMU-AGSX-1"
 
     def moves(self, letter: str, arguments: bytes) -> bool:
         return letter == GO
