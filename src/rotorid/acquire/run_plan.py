@@ -1,4 +1,4 @@
-"""A campaign's plan: what is recorded, in which order, how often, and what of it is done; carried out step after step.
+"""A campaign's plan: what is recorded, in which order, how often, and what of it is done; recorded step after step.
 
 Checks come first; it is the same with instruments and with emulators. What is done is read from the recordings
 themselves, so a campaign goes on after anything: a step is done when one of its attempts (`name`, `name.2`, `name.3`,

@@ -264,7 +264,7 @@ def proposed_in(text: str) -> tuple[Doubt, ...]:
     """A doubt for each value that the text of a `vehicle.yaml` marks as proposed, in the order of the file."""
     found = (_LINE.match(line) for line in text.splitlines())
     whys = ((m["key"], m["why"].strip().rstrip(".")) for m in found if m)
-    return tuple(Doubt(k, f"{k} is only proposed{f' ({why})' if why else ''}.", stops=False) for k, why in whys)
+    return tuple(Doubt(k, f"{k} is only proposed{f' ({why})' if why else ''}.") for k, why in whys)
 
 
 def check_belief(vehicle: Vehicle, where: str) -> None:

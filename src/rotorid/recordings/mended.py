@@ -193,12 +193,10 @@ def _cuts(steps_s: np.ndarray) -> int:
 
 def _cut_by_chance(run: Run, names: tuple[str, ...]) -> bool:
     """Whether a rule in usual steps cuts a sensor where no column of it has a hole of several of its own periods."""
-    steps = _steps_s(run, names)
-    whole = _whole_steps_s(run, names)
-    cuts = _cuts(whole) if len(whole) else len(run.time_s)
-    every = [np.diff(run.time_s[np.isfinite(run.column(name))]) for name in names]
-    mean = max(float(s.mean()) for s in steps)
-    return cuts > sum(int((s > _HOLE_PERIODS * mean).sum()) for s in every)
+    whole, mean = _whole_steps_s(run, names), max(float(s.mean()) for s in _steps_s(run, names))
+    every = (np.diff(run.time_s[np.isfinite(run.column(name))]) for name in names)
+    holes = sum(int((s > _HOLE_PERIODS * mean).sum()) for s in every)
+    return (_cuts(whole) if len(whole) else len(run.time_s)) > holes
 
 
 def is_scattered(run: Run, names: tuple[str, ...]) -> bool:

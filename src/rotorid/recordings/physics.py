@@ -437,7 +437,6 @@ def _held(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
             held[0],
             f"{listed(held)} {'keeps' if len(held) == 1 else 'keep'} one value ({value:.4g}) throughout, expected the "
             "changes that keep a vehicle in the air: not measured, or a sensor that stands still",
-            stops=False,
         )
 
 
@@ -452,7 +451,6 @@ def _rest(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
         yield Doubt(
             c.rotor_columns(kinds[0], 1)[0],
             f"all rotors are at rest in {at_rest:.0%} of the samples: keep only the part in the air",
-            stops=False,
         )
 
 
@@ -461,7 +459,7 @@ def _amount(recordings: RecordingSet) -> Iterator[Doubt]:
     total = sum(float(r.time_s[-1] - r.time_s[0]) for r in recordings.runs)
     if total < _LEAST_TIME_S:
         sentence = f"Only {total:.0f} s are recorded: intervals will be wide; {_LEAST_TIME_S:g} s and more are better."
-        yield Doubt(c.TIME, sentence, stops=False)
+        yield Doubt(c.TIME, sentence)
     speeds = c.rotor_columns("rotor_speed", recordings.vehicle.rotor_count)
     lag = "a lag of the motors, of some 50 ms, cannot be distinguished from a delay"
     for name, columns, least, cost in (
@@ -478,7 +476,7 @@ def _amount(recordings: RecordingSet) -> Iterator[Doubt]:
         if rates and min(rates) < least:
             come = "come" if name.endswith("s") else "comes"
             said = f"The {name} {come} at {min(rates):.3g} Hz, {least:g} Hz and more are better: {cost}."
-            yield Doubt(columns[0], said, stops=False)
+            yield Doubt(columns[0], said)
 
 
 def near_names(recordings: RecordingSet) -> tuple[Doubt, ...]:
@@ -490,5 +488,5 @@ def near_names(recordings: RecordingSet) -> tuple[Doubt, ...]:
     for name in sorted(there - set(known)):
         near = [n for n in get_close_matches(name, known, 1, 0.85) if n not in there]
         if near and not c.is_known(name):
-            out.append(Doubt(name, f"Column {name} is not known; did you mean {near[0]}?", stops=False))
+            out.append(Doubt(name, f"Column {name} is not known; did you mean {near[0]}?"))
     return tuple(out)

@@ -26,7 +26,7 @@ class Doubt:
     """Key of vehicle.yaml (`mass_kg`), column (`angular_velocity_x_rad_s`), file or run that is in doubt."""
     sentence: str
     """What was found, what was expected and, where one is known, what would explain it."""
-    stops: bool
+    stops: bool = False
     """Whether a verdict would be about this mistake: a unit, an axis, an order, or mass or inertia by more than a
     factor of two."""
 

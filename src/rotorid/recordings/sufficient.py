@@ -77,7 +77,12 @@ def sufficient(recordings: RecordingSet) -> RecordingSet:
     InputError
         One sentence with file and column, where a column is misspelled or what is left does not suffice.
     """
-    recordings = on_own_rates(without_spikes(_without_dead_sensors(_without_rotors_on_a_bench(recordings))))
+    vehicle = recordings.vehicle
+    if vehicle.kind == "bench" and vehicle.rotors and not any(driven_by(r, vehicle) for r in recordings.runs):
+        # A bench compares readings with known loads: rotors that are listed but not recorded play no part.
+        without = {"rotors": (), "thrust_coefficient_n_s2": None, "torque_coefficient_n_m_s2": None}
+        recordings = replace(recordings, vehicle=vehicle.model_copy(update=without))
+    recordings = on_own_rates(without_spikes(_without_dead_sensors(recordings)))
     for run in recordings.runs:
         _check_spelling(run, recordings.vehicle)
     usable, reasons = [], []
@@ -97,15 +102,6 @@ def sufficient(recordings: RecordingSet) -> RecordingSet:
         _check_single(kept)
     _check_common(kept)
     return _with_split_of_the_rest(kept)
-
-
-def _without_rotors_on_a_bench(recordings: RecordingSet) -> RecordingSet:
-    """A bench compares readings with known loads: rotors that are listed but not recorded play no part."""
-    vehicle = recordings.vehicle
-    if vehicle.kind != "bench" or not vehicle.rotors or any(driven_by(r, vehicle) for r in recordings.runs):
-        return recordings
-    without = {"rotors": (), "thrust_coefficient_n_s2": None, "torque_coefficient_n_m_s2": None}
-    return replace(recordings, vehicle=vehicle.model_copy(update=without))
 
 
 def _without_dead_sensors(recordings: RecordingSet) -> RecordingSet:
@@ -200,23 +196,18 @@ def driven_by(run: Run, vehicle: Vehicle) -> tuple[str, ...]:
     return next((names for names in rotor_groups(vehicle).values() if names and run.has(*names)), ())
 
 
-def _groups_of(vehicle: Vehicle) -> tuple[tuple[str, ...], ...]:
-    """Sensors whose columns only make sense together."""
-    if vehicle.kind == "flight":
-        return (*rotor_groups(vehicle).values(), *SENSORS)
-    if vehicle.kind == "stand":
-        return (*rotor_groups(vehicle).values(), c.MOUNT)
-    return ()
-
-
 def _check_spelling(run: Run, vehicle: Vehicle) -> None:
     """InputError where an unknown column can only be a known one that is missing."""
     there = set(run.table.columns)
     known = sorted(c.FIXED) + [name for names in rotor_groups(vehicle).values() for name in names]
     missing = [name for name in known if name not in there]
-    halved = {
-        name for names in _groups_of(vehicle) if any(n in there for n in names) for name in names if name not in there
+    # Columns of a sensor whose columns only make sense together, where others of it are there.
+    groups = {
+        "flight": (*rotor_groups(vehicle).values(), *SENSORS),
+        "stand": (*rotor_groups(vehicle).values(), c.MOUNT),
     }
+    begun = (names for names in groups.get(vehicle.kind, ()) if any(n in there for n in names))
+    halved = {name for names in begun for name in names if name not in there}
     for column in run.unknown_columns:
         meant = next((name for name in missing if plain(name) == plain(column)), None)
         meant = meant or nearest(column, halved, _SURELY_MEANT)
@@ -447,23 +438,19 @@ def _check_not_constant(recordings: RecordingSet) -> None:
     )
 
 
-def _check_single_of_instrument(run: Run, names: list[str]) -> None:
-    """InputError where the last third of a single run, less half the gap before it, is next to nothing."""
-    known = run.time_s[np.isfinite(run.array(tuple(names))).all(axis=1)]
-    needed = (_SINGLE_GAP_S / 2 + LEAST_VALUES * float(np.median(np.diff(known)))) / _HELD_OUT_SHARE
-    lasts = float(known[-1] - known[0])
-    if lasts < needed:
-        raise InputError(
-            f"{_whereof(run)}: too little data: a single run must last at least {needed:.3g} s, because its last third "
-            f"is held out, after a gap; found {lasts:.3g} s"
-        )
-
-
 def _check_single(recordings: RecordingSet) -> None:
     """InputError where a single run is too short to hold out a part of it."""
     run, vehicle = recordings.runs[0], recordings.vehicle
     if vehicle.kind != "flight":
-        _check_single_of_instrument(run, compared_readings(run, vehicle))
+        # The last third, less half the gap before it, must be more than next to nothing.
+        known = run.time_s[np.isfinite(run.array(tuple(compared_readings(run, vehicle)))).all(axis=1)]
+        needed = (_SINGLE_GAP_S / 2 + LEAST_VALUES * float(np.median(np.diff(known)))) / _HELD_OUT_SHARE
+        lasts = float(known[-1] - known[0])
+        if lasts < needed:
+            raise InputError(
+                f"{_whereof(run)}: too little data: a single run must last at least {needed:.3g} s, because its last "
+                f"third is held out, after a gap; found {lasts:.3g} s"
+            )
         return
     longest, _ = longest_stretch_s(run, [driven_by(run, vehicle), *moving_sensors(run)])
     if longest < LEAST_SINGLE_S:
@@ -536,10 +523,13 @@ class _Basis:
 
 def basis_of(recordings: RecordingSet) -> _Basis:
     """What a set offers to a verdict."""
-    with_pauses = recordings.vehicle.kind == "flight"
-    recorded = sum(float(np.ptp(run.time_s)) if with_pauses else _recorded_s(run.time_s) for run in recordings.runs)
+    flies, recorded = recordings.vehicle.kind == "flight", 0.0
+    for run in recordings.runs:
+        steps = np.diff(run.time_s)
+        pause_s = max(_PAUSE_S, _PAUSE_STEPS * np.median(steps)) if len(steps) else 0.0
+        recorded += float(np.ptp(run.time_s)) if flies else float(steps[steps <= pause_s].sum())
     grounded = [on_the_ground_s(run, recordings.vehicle) for run in recordings.runs]
-    known = recordings.vehicle.kind == "flight" and any(g is not None for g in grounded)
+    known = flies and any(g is not None for g in grounded)
     ground = sum(g for g in grounded if g is not None)
     return _Basis(
         recorded,
@@ -549,20 +539,13 @@ def basis_of(recordings: RecordingSet) -> _Basis:
     )
 
 
-def _recorded_s(time_s: np.ndarray) -> float:
-    """Length of a run, s, without its pauses; `time_s` has shape (n,)."""
-    steps = np.diff(time_s)
-    if not len(steps):
-        return 0.0
-    return float(steps[steps <= max(_PAUSE_S, _PAUSE_STEPS * np.median(steps))].sum())
-
-
 def on_the_ground_s(run: Run, vehicle: Vehicle) -> float | None:
     """How long a run is on the ground, s; None where no rotors are recorded."""
-    squares = _squares(run, vehicle)
-    if squares is None:
+    values = run.array(driven_by(run, vehicle))
+    rows = np.flatnonzero(np.isfinite(values).all(axis=1))
+    if not values.shape[1] or not len(rows):
         return None
-    rows, thrust = squares
+    thrust = (values[rows] ** 2).sum(axis=1)
     time_s, force = run.time_s[rows], run.array(c.SPECIFIC_FORCE)[rows]
     idle = thrust < _IDLE_SHARE * np.quantile(thrust, _LARGEST_QUANTILE)
     total = 0.0
@@ -573,17 +556,6 @@ def on_the_ground_s(run: Run, vehicle: Vehicle) -> float | None:
         rests = not len(felt) or float(np.median(felt)) > _RESTING_G * vehicle.gravity_m_s2
         total += lasted if lasted >= _GROUND_S and rests else 0.0
     return total
-
-
-def _squares(run: Run, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray] | None:
-    """Rows in which all rotors are known, and the sum of the squares of their speeds or throttles there."""
-    for kind in ("rotor_speed", "rotor_command", "throttle"):
-        names = c.rotor_columns(kind, vehicle.rotor_count)
-        if names and run.has(*names):
-            values = run.array(names)
-            rows = np.flatnonzero(np.isfinite(values).all(axis=1))
-            return (rows, (values[rows] ** 2).sum(axis=1)) if len(rows) else None
-    return None
 
 
 def missing(recordings: RecordingSet) -> Iterator[str]:

@@ -38,6 +38,7 @@ rocks on the ground at 0.3 to 0.8 with rotors at two thirds of what flight takes
 _GROUND_M, _CLEAR_M = 0.05, 0.5
 """Heights below which a vehicle is on the ground, and above which it is in the air."""
 _SMOOTHED_S = 1.0
+_SPEEDS = ("rotor_speed", "rotor_command")
 
 
 def on_grid(grid: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -78,7 +79,10 @@ def airborne(table: pd.DataFrame, stated: np.ndarray | None = None) -> tuple[np.
     def of(names) -> np.ndarray | None:
         return table[list(names)].to_numpy(float) if set(names) <= set(table) else None
 
-    drive, force = _drive_of(table), of(c.SPECIFIC_FORCE)
+    # What drives the rotors (n, k): throttles, else measured, else commanded speeds.
+    kinds = ([n for n in table if c.rotor_number(n) and n.startswith(k)] for k in ("throttle", *_SPEEDS))
+    drive = next((table[n].to_numpy(float) for n in kinds if n and table[n].notna().any().all()), None)
+    force = of(c.SPECIFIC_FORCE)
     if drive is None or len(table) < 2 or not flying.any() or (force is None and stated is not None):
         return flying, []
     height = of([c.HEIGHT])
@@ -96,15 +100,6 @@ def airborne(table: pd.DataFrame, stated: np.ndarray | None = None) -> tuple[np.
     return found, [ImportFault("on_ground", c.TIME, seen, "left out", lost)]
 
 
-def _drive_of(table: pd.DataFrame) -> np.ndarray | None:
-    """What drives the rotors (n, k): throttles, else measured, else commanded speeds; None where none is recorded."""
-    for kind in ("throttle", "rotor_speed", "rotor_command"):
-        names = [n for n in table if c.rotor_number(n) and n.startswith(kind)]
-        if names and table[names].notna().any().all():
-            return table[names].to_numpy(float)
-    return None
-
-
 def off_the_ground(
     flying: np.ndarray,
     drive: np.ndarray,
@@ -119,18 +114,9 @@ def off_the_ground(
     flight takes is the median of the rows above half of what is mostly given. A log of the ground alone shows no flight
     and is not recognised. A stretch begins and ends with rotors that lift, unless the log begins or ends in it.
 
-    Parameters
-    ----------
-    flying
-        What may be flight: what the log calls so, or every row, (n,).
-    drive
-        Throttles or speeds of the rotors (n, k); NaN where there is no value.
-    force, rates
-        Specific force, m/s², and body rates, rad/s, (n, 3); None where they are not recorded.
-    time_s
-        Clock of the rows (n,), s.
-    height
-        Height above ground (n,), m, where a range finder or a motion capture says it; None elsewhere.
+    `drive` holds throttles or speeds of the rotors (n, k), NaN where there is no value; `force`, m/s², and `rates`,
+    rad/s, specific force and body rates (n, 3), None where they are not recorded; `time_s` the clock (n,); `height`
+    what a range finder or a motion capture says of the height above ground (n,), m.
     """
     step_s = max(float(np.median(np.diff(time_s))), 1e-4)
     rows = max(int(_SMOOTHED_S / step_s), 1)

@@ -299,16 +299,8 @@ def in_unit_of_weight(
 ) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
     """Flights whose rotor speeds are in the unit that carries the weight, and what was changed.
 
-    Parameters
-    ----------
-    runs
-        Flights in contract columns, rotor speeds by the unit that the log states.
-    stated
-        To each run that unit: `rad/s`, `rpm` or `hz`.
-    mass_kg, rotors
-        Mass as flown and number of rotors.
-    coefficient_n_s2
-        C_F where it is known; else that of usual propellers.
+    `runs` are in contract columns, rotor speeds by the unit that the log states: `stated` has it for each run (`rad/s`,
+    `rpm` or `hz`). The mass is as flown; C_F is that of usual propellers where it is not known.
     """
     out, faults = dict(runs), []
     for written in dict.fromkeys(stated[run] for run in runs):
