@@ -241,9 +241,9 @@ def wrench(
     _record({"wrench": port}, Setup(tared=offset), run, procedure, shared)
 
 
-@app.command("quadrotor")
+@app.command()
 @_with_shared
-def quadrotor_command(
+def quadrotor(
     port: _Port,
     dynamics: Annotated[str, typer.Option(help=f"command character: {wire.DYNAMICS}")] = "h",
     shape: Annotated[str, typer.Option(help="trapezoid or sine")] = "trapezoid",

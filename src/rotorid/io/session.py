@@ -206,10 +206,10 @@ def write_session(session: Session, path: str | Path) -> None:
     """Write atomically, with a checksum: a reader sees the old file or the new one, never half of either."""
     content = session.model_dump(mode="json", exclude_none=True, exclude={"metadata_sha256"})
     text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=110)
-    replace_bytes(Path(path), metadata_checksum.with_checksum(text.encode()))
+    _replace_bytes(Path(path), metadata_checksum.with_checksum(text.encode()))
 
 
-def replace_bytes(path: Path, data: bytes) -> None:
+def _replace_bytes(path: Path, data: bytes) -> None:
     """Put a whole new content in the place of a file, or leave it as it is. Raises OSError."""
     temporary = path.with_name(path.name + ".tmp")
     try:
@@ -252,7 +252,7 @@ def write_index(raw: Path) -> list[dict[str, str]]:
     writer = csv.DictWriter(text, INDEX_COLUMNS, delimiter="\t", lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
-    replace_bytes(raw / INDEX, index_with_checksum(text.getvalue().encode()))
+    _replace_bytes(raw / INDEX, index_with_checksum(text.getvalue().encode()))
     return rows
 
 
@@ -290,7 +290,7 @@ def add_checksum(path: Path) -> bool:
         lacking, added = read_session(path).metadata_sha256 is None, metadata_checksum.with_checksum
         data = read_bytes(path, LARGEST_METADATA)
     if lacking:
-        replace_bytes(path, added(data))
+        _replace_bytes(path, added(data))
     return lacking
 
 
@@ -305,11 +305,11 @@ def renew_checksum(path: Path) -> bool:
     after = (index_with_checksum if of_index else metadata_checksum.with_checksum)(before)
     if after == before:
         return False
-    replace_bytes(path, after)
+    _replace_bytes(path, after)
     try:
         read_index(path.parent) if of_index else read_session(path)
     except InputError:
-        replace_bytes(path, before)
+        _replace_bytes(path, before)
         raise
     return True
 

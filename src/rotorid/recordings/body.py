@@ -185,57 +185,36 @@ def quantities(body: Body) -> Iterator[_CoupledNumber]:
     if body.mass_kg and body.inertia_kg_m2 and body.rotors:
         for moment in (min(body.inertia_kg_m2), max(body.inertia_kg_m2)):
             gyration = sqrt(moment / body.mass_kg)
-            yield _CoupledNumber(
-                ("inertia_kg_m2", "mass_kg", "rotors"),
-                gyration / body.rotors,
-                _GYRATION_ARMS,
-                f"a radius of gyration of {gyration:.3g} m with arms of {body.rotors:.3g} m",
-            )
+            words = f"a radius of gyration of {gyration:.3g} m with arms of {body.rotors:.3g} m"
+            keys = ("inertia_kg_m2", "mass_kg", "rotors")
+            yield _CoupledNumber(keys, gyration / body.rotors, _GYRATION_ARMS, words)
     if body.rotors:
-        yield _CoupledNumber(
-            ("rotors", length),
-            body.rotors / radius,
-            _SPAN_RADII,
-            f"arms of {body.rotors:.3g} m with {disc}",
-        )
+        words = f"arms of {body.rotors:.3g} m with {disc}"
+        yield _CoupledNumber(("rotors", length), body.rotors / radius, _SPAN_RADII, words)
     if stated:
-        yield _CoupledNumber(
-            ("rotor_radius_m", "thrust_coefficient_n_s2"),
-            c_f / (_AIR_KG_M3 * pi * radius**4),
-            _C_T,
-            f"a dimensionless C_T of {c_f / (_AIR_KG_M3 * pi * radius**4):.3g} (C_F over ρ π R⁴, R {radius:.3g} m)",
-        )
+        c_t = c_f / (_AIR_KG_M3 * pi * radius**4)
+        words = f"a dimensionless C_T of {c_t:.3g} (C_F over ρ π R⁴, R {radius:.3g} m)"
+        yield _CoupledNumber(("rotor_radius_m", "thrust_coefficient_n_s2"), c_t, _C_T, words)
     if body.torque_coefficient_n_m_s2:
         merit = c_f**1.5 / (body.torque_coefficient_n_m_s2 * sqrt(2 * _AIR_KG_M3 * pi) * radius)
-        yield _CoupledNumber(
-            ("torque_coefficient_n_m_s2", "thrust_coefficient_n_s2", length),
-            merit,
-            _FIGURE_OF_MERIT if stated else _ROUGH_FIGURE_OF_MERIT,
-            f"a figure of merit of {merit:.3g} (C_F^1.5 over C_Q √(2 ρ π) R)",
-            sure=_SURE_FIGURE_OF_MERIT if stated else None,
-        )
+        words = f"a figure of merit of {merit:.3g} (C_F^1.5 over C_Q √(2 ρ π) R)"
+        keys = ("torque_coefficient_n_m_s2", "thrust_coefficient_n_s2", length)
+        limits, sure = (_FIGURE_OF_MERIT, _SURE_FIGURE_OF_MERIT) if stated else (_ROUGH_FIGURE_OF_MERIT, None)
+        yield _CoupledNumber(keys, merit, limits, words, sure)
     if body.mass_kg:
         loading = body.mass_kg * 9.81 / (body.count * pi * radius**2)
-        yield _CoupledNumber(
-            ("mass_kg", length), loading, _DISC_LOADING_N_M2, f"a disc loading of {loading:.3g} N/m² with {disc}"
-        )
+        words = f"a disc loading of {loading:.3g} N/m² with {disc}"
+        yield _CoupledNumber(("mass_kg", length), loading, _DISC_LOADING_N_M2, words)
     if body.rotor_speeds:
         yield from _turning(body, disc)
     if body.accelerometer_position_m and body.rotors:
-        yield _CoupledNumber(
-            ("accelerometer_position_m", "rotors"),
-            body.accelerometer_position_m / body.rotors,
-            _PLACE_ARMS,
-            f"an accelerometer {body.accelerometer_position_m:.3g} m from the origin with arms of {body.rotors:.3g} m",
-        )
+        place = body.accelerometer_position_m
+        words = f"an accelerometer {place:.3g} m from the origin with arms of {body.rotors:.3g} m"
+        yield _CoupledNumber(("accelerometer_position_m", "rotors"), place / body.rotors, _PLACE_ARMS, words)
     if body.rotor_inertia_kg_m2 and body.mass_kg:
         share = body.rotor_inertia_kg_m2 / (body.mass_kg * radius**2)
-        yield _CoupledNumber(
-            ("rotor_inertia_kg_m2", "mass_kg", length),
-            share,
-            _ROTOR_INERTIA,
-            f"the inertia of a rotor is {share:.3g} times that of the whole mass at its tip, with {disc}",
-        )
+        words = f"the inertia of a rotor is {share:.3g} times that of the whole mass at its tip, with {disc}"
+        yield _CoupledNumber(("rotor_inertia_kg_m2", "mass_kg", length), share, _ROTOR_INERTIA, words)
 
 
 def _turning(body: Body, disc: str) -> Iterator[_CoupledNumber]:
@@ -243,25 +222,17 @@ def _turning(body: Body, disc: str) -> Iterator[_CoupledNumber]:
     hover, top = body.rotor_speeds
     source = "rotor_speed_limits_rad_s" if body.by_throttle else "rotor_speeds"
     tip = top * body.radius_m
-    yield _CoupledNumber(
-        (source, "rotor_radius_m"), tip, (0.0, _HIGHEST_TIP_M_S), f"a tip speed of {tip:.3g} m/s with {disc}"
-    )
+    words = f"a tip speed of {tip:.3g} m/s with {disc}"
+    yield _CoupledNumber((source, "rotor_radius_m"), tip, (0.0, _HIGHEST_TIP_M_S), words)
     if body.mass_kg and body.lift_m_s2:
         ratio = body.count * body.thrust_coefficient_n_s2 * hover**2 / (body.mass_kg * body.lift_m_s2)
-        yield _CoupledNumber(
-            ("mass_kg", "thrust_coefficient_n_s2", source),
-            ratio,
-            _WEIGHT_BY_THROTTLE if body.by_throttle else _WEIGHT,
-            f"the thrust is {ratio:.3g} times what carries the vehicle (C_F Σω² over mass times specific force)",
-        )
+        words = f"the thrust is {ratio:.3g} times what carries the vehicle (C_F Σω² over mass times specific force)"
+        limits = _WEIGHT_BY_THROTTLE if body.by_throttle else _WEIGHT
+        yield _CoupledNumber(("mass_kg", "thrust_coefficient_n_s2", source), ratio, limits, words)
         if body.rotor_speed_limits_rad_s and not body.by_throttle:
             share = body.rotor_speed_limits_rad_s / hover
-            yield _CoupledNumber(
-                ("rotor_speed_limits_rad_s", "rotor_speeds"),
-                share,
-                _LIMIT_OVER_HOVER,
-                f"an upper limit of {share:.3g} times the hovering speed of {hover:.4g} rad/s",
-            )
+            words = f"an upper limit of {share:.3g} times the hovering speed of {hover:.4g} rad/s"
+            yield _CoupledNumber(("rotor_speed_limits_rad_s", "rotor_speeds"), share, _LIMIT_OVER_HOVER, words)
 
 
 def _remedies(body: Body) -> Iterator[tuple[tuple[str, ...], tuple[int, np.ndarray, tuple[str, ...]]]]:

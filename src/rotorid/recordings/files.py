@@ -27,9 +27,10 @@ from rotorid.recordings.run import Doubt, RecordingSet, Run
 from rotorid.recordings.tables import (
     UnusableRun,
     check_table,
+    numbers,
     parquet_is_here,
-    read_csv,
-    read_parquet,
+    read_cells,
+    read_parquet_cells,
     write_table,
 )
 from rotorid.recordings.vehicle import Vehicle
@@ -110,8 +111,8 @@ def read_run(path: Path) -> Run:
     if name is None:
         raise InputError(f"{path}: expected one of {', '.join(RUN_SUFFIXES)}")
     check_file(path)
-    table = read_parquet(path) if path.name.endswith(".parquet") else read_csv(path)
-    return Run(name, check_table(table, str(path)), str(path))
+    cells = read_parquet_cells(path) if path.name.endswith(".parquet") else read_cells(path)
+    return Run(name, check_table(numbers(cells, path), str(path)), str(path))
 
 
 def run_paths(folder: Path) -> list[Path]:

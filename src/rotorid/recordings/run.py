@@ -104,7 +104,4 @@ class RecordingSet:
 
     def run(self, name: str) -> Run:
         """The run of that name; KeyError if there is none."""
-        for run in self.runs:
-            if run.name == name:
-                return run
-        raise KeyError(name)
+        return {run.name: run for run in self.runs}[name]

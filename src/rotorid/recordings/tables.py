@@ -368,16 +368,6 @@ class UnusableRun(InputError):
     """A run that is a table and cannot be used: a set can do without it."""
 
 
-def read_csv(path: Path) -> pd.DataFrame:
-    """The table of a CSV file, plain or gzipped, as numbers, not yet checked for its clock."""
-    return numbers(read_cells(path), path)
-
-
-def read_parquet(path: Path) -> pd.DataFrame:
-    """The table of a Parquet file as numbers, not yet checked for its clock."""
-    return numbers(read_parquet_cells(path), path)
-
-
 def read_cells(path: Path, foreign: bool = False) -> pd.DataFrame:
     """The cells of a CSV file, plain or gzipped: numbers where a column holds nothing else.
 

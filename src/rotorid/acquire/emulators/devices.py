@@ -41,7 +41,7 @@ from rotorid.io.wire import (
 _FIRMWARE = "1.2 (emulated)"  # the committed campaign's
 
 
-class CommandRefused(Exception):
+class _CommandRefused(Exception):
     """The device says no; the text says why."""
 
 
@@ -60,11 +60,11 @@ class Device:
         self.streaming = False
 
     def command(self, letter: str, arguments: bytes) -> None:
-        """Raises CommandRefused, or struct.error for arguments of the wrong length."""
+        """Raises _CommandRefused, or struct.error for arguments of the wrong length."""
         if letter == GO:
             (interval_us,) = struct.unpack("<I", arguments)
             if self.streaming and interval_us not in (0, self.interval_us):
-                raise CommandRefused("a stream of another interval is running; stop it first")
+                raise _CommandRefused("a stream of another interval is running; stop it first")
             self.interval_us = interval_us or self.interval_us
             self.streaming = True
         elif letter == STOP:
@@ -78,7 +78,7 @@ class Device:
 
     def operate(self, letter: str, arguments: bytes) -> None:
         """The instrument's own commands."""
-        raise CommandRefused(f"there is no command {letter!r}")
+        raise _CommandRefused(f"there is no command {letter!r}")
 
     def boot(self) -> None:
         """Power-up: what was started or set is forgotten."""
@@ -118,7 +118,7 @@ class RotorDevice(Device):
             super().operate(letter, arguments)
         throttle, self._left_s = wire.unpack_throttle(arguments)
         if throttle > 1:
-            raise CommandRefused("throttle above 1")
+            raise _CommandRefused("throttle above 1")
         self._physics.rotors.throttle[0] = throttle
 
     def boot(self) -> None:
@@ -153,7 +153,7 @@ class WrenchDevice(Device):
 
     def command(self, letter: str, arguments: bytes) -> None:
         if letter == GO and not self._initialised:
-            raise CommandRefused("power on and initialise first")
+            raise _CommandRefused("power on and initialise first")
         super().command(letter, arguments)
         if letter == GO:
             self._samples_left = self._measuring_times
@@ -163,7 +163,7 @@ class WrenchDevice(Device):
             self._powered = arguments == b"\1"
             self._initialised = self._initialised and self._powered
         elif not self._powered:
-            raise CommandRefused("the sensor is not powered")
+            raise _CommandRefused("the sensor is not powered")
         elif letter == wire.INITIALISE:
             self.interval_us, self._runs_left, self._measuring_times = wire.unpack_initialise(arguments)
             self._initialised = True
@@ -228,7 +228,7 @@ class QuadrotorDevice(Device):
 
     def command(self, letter: str, arguments: bytes) -> None:
         if letter == GO:
-            raise CommandRefused("this device starts with a programme, not with G")
+            raise _CommandRefused("this device starts with a programme, not with G")
         super().command(letter, arguments)
         if letter == STOP:
             self._cut()
@@ -237,7 +237,7 @@ class QuadrotorDevice(Device):
         if letter not in wire.DYNAMICS:
             super().operate(letter, arguments)
         if self._programme is not None:
-            raise CommandRefused("a programme is running; stop it first")
+            raise _CommandRefused("a programme is running; stop it first")
         self._programme = wire.Programme.unpack(arguments)
         self._time_s = 0.0
         self.streaming = True
@@ -471,14 +471,14 @@ class WireHalf:
         status, text = OK, ""
         try:
             if letter in self._faults.refuse:
-                raise CommandRefused("this device is set to refuse it")
+                raise _CommandRefused("this device is set to refuse it")
             if letter == KEEP and letter in self.device.instrument.commands:
                 self._watchdog_s = unpack_keep(arguments)
             elif self.device.needs_watchdog and self._watchdog_s is None and self.device.moves(letter, arguments):
-                raise CommandRefused("switch the watchdog on first (K)")
+                raise _CommandRefused("switch the watchdog on first (K)")
             else:
                 self.device.command(letter, arguments)
-        except CommandRefused as refusal:
+        except _CommandRefused as refusal:
             status, text = REFUSED, str(refusal)
         except struct.error:
             status, text = REFUSED, f"{len(arguments)} bytes of arguments are not what {letter!r} takes"

@@ -10,7 +10,7 @@ another takes over, a run ends. Of several inertial sensors the first is read th
 message before them. Its estimate `EKF1` is read where `AHRS_EKF_USE` is 1.
 
 The land detector calls idle, spool-up and the wait after landing flight: what is on the ground by the detector of all
-importers (`in_the_air.airborne`) is left out.
+importers (`faults.airborne`) is left out.
 
 Outputs are motors only where the frame class says so: helicopters use motor functions for their servos, tricopters one
 for the servo of the tail. Those, and whatever is no multirotor of fixed rotors, are refused by name. Parameters may
@@ -33,9 +33,18 @@ import pandas as pd
 from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers import in_the_air
 from rotorid.recordings.importers.bag_records import needs
-from rotorid.recordings.importers.faults import GOES_ON, ImportFault, fault_where, one_sense, report_gaps
+from rotorid.recordings.importers.faults import (
+    GOES_ON,
+    ImportFault,
+    airborne,
+    fault_where,
+    flights,
+    increasing,
+    one_sense,
+    report_gaps,
+    table_on,
+)
 from rotorid.recordings.importers.known import Parameters, Values
 from rotorid.recordings.importers.mapping import PULSE_US, RPM, continuous, quaternion_from_euler_frd
 
@@ -272,7 +281,7 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[ImportFault], n
     if END in log:
         found = f"the file ends inside a message, after {int(log[END]['bytes'].iloc[0])} bytes of it"
         faults.append(ImportFault("cut_off", "", found, "what came before is kept; the log stopped before its end", 0))
-    late = ~in_the_air.increasing(grid)
+    late = ~increasing(grid)
     faults += fault_where(late, "repeated_time", c.TIME, f"{late.sum()} messages do not move the clock on", "left out")
     grid = grid[~late]
     parts: list[tuple] = []
@@ -315,8 +324,8 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[ImportFault], n
         faults += more
         parts += _throttles(outputs, stated, values.get("FRAME_CLASS", 0.0), faults)
         parts += _speeds(log.get("ESC"), channels, faults)
-    table = in_the_air.table_on(grid, parts)
-    flying, ground = in_the_air.airborne(table, _flying(log, grid))
+    table = table_on(grid, parts)
+    flying, ground = airborne(table, _flying(log, grid))
     return table, [*faults, *ground, *report_gaps(table)], flying
 
 
@@ -474,5 +483,5 @@ def read_ardupilot(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFaul
     if len(switches):
         found = f"another core of the estimator took over {len(switches)} times, first at {switches[0]:.2f} s"
         more.append(ImportFault("estimator_reset", "", found, "a run ends at each change in the air", len(switches)))
-    runs, cuts = in_the_air.flights(table, flying, path.name.split(".")[0], path, jumps)
+    runs, cuts = flights(table, flying, path.name.split(".")[0], path, jumps)
     return runs, [*faults, *more, *cuts], order

@@ -30,8 +30,7 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers import in_the_air
-from rotorid.recordings.importers.faults import ImportFault, fault_where, report_gaps
+from rotorid.recordings.importers.faults import ImportFault, airborne, fault_where, flights, increasing, report_gaps
 from rotorid.recordings.importers.mapping import G, half_turn_about_x, quaternion_to_frd_ned
 
 _FIRST_LINE = b"H Product:Blackbox"
@@ -154,7 +153,7 @@ def convert(
         raise InputError(f"{where}: the log has no field time")
     raw, faults = _known_names(raw)
     time = raw["time"].to_numpy(float) * 1e-6
-    keep = np.isfinite(time) & in_the_air.increasing(np.nan_to_num(time, nan=-np.inf))
+    keep = np.isfinite(time) & increasing(np.nan_to_num(time, nan=-np.inf))
     found = f"{(~keep).sum()} frames do not move the clock on"
     faults += fault_where(~keep, "repeated_time", c.TIME, found, "left out")
     raw, time = raw[keep].reset_index(drop=True), time[keep]
@@ -212,7 +211,7 @@ def convert(
     faults += more
     table = table.assign(**battery)
     faults += report_gaps(table)
-    runs, cuts = in_the_air.flights(table, in_the_air.airborne(table)[0], name, where)
+    runs, cuts = flights(table, airborne(table)[0], name, where)
     return runs, [*faults, *cuts]
 
 

@@ -40,16 +40,17 @@ from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.faults import (
     ImportFault,
+    airborne,
     blank_held,
     cut,
     drop_repeated_times,
     in_order,
     join_rows,
     report_gaps,
+    stretches_of,
     true_stretches,
 )
 from rotorid.recordings.importers.guessing.guess import guess
-from rotorid.recordings.importers.in_the_air import airborne, stretches_of
 from rotorid.recordings.importers.mapping import (
     RPM,
     UNITS,

@@ -54,18 +54,9 @@ from rotorid.recordings.files import (
     vehicle_of,
     write_manifest,
 )
-from rotorid.recordings.importers import (
-    ardupilot,
-    betaflight,
-    crazyflie,
-    in_the_air,
-    neurobem,
-    px4_ulog,
-    rcbenchmark,
-    ros,
-)
+from rotorid.recordings.importers import ardupilot, betaflight, crazyflie, neurobem, px4_ulog, rcbenchmark, ros
 from rotorid.recordings.importers.faults import FILE_NAME as REPORT
-from rotorid.recordings.importers.faults import ImportFault, ImportReport
+from rotorid.recordings.importers.faults import ImportFault, ImportReport, airborne, flights
 from rotorid.recordings.importers.known import Known, propose, px4_vehicle, thrust_coefficient
 from rotorid.recordings.importers.mapping import ELECTRICAL, UNITS, Mapping, read_by_mapping
 from rotorid.recordings.importers.rcbenchmark import signed_by_spin
@@ -90,7 +81,7 @@ _BY_FIRST_BYTES = (
 )
 _RCBENCHMARK = re.compile(r"ESC signal ?[(,](.*[,;])?\s*\"?Motor (Electrical|Optical) Speed ?[(,\r\n]", re.DOTALL)
 """Headings of RCbenchmark's stands of one rotor; those of other stands are read by a mapping."""
-TEMPLATES = {"px4": "x500", "betaflight": "five-inch", "crazyflie": "crazyflie-2.1", "neurobem": "neurobem"}
+_TEMPLATES = {"px4": "x500", "betaflight": "five-inch", "crazyflie": "crazyflie-2.1", "neurobem": "neurobem"}
 """Template vehicle that supplies what a log of an autopilot or format does not say."""
 
 
@@ -113,7 +104,7 @@ def is_bag(path: Path) -> bool:
     return (path / "metadata.yaml").is_file() and not (path / "vehicle.yaml").is_file()
 
 
-def files_of(path: Path) -> dict[str, Path]:
+def _files_of(path: Path) -> dict[str, Path]:
     """The files of a log by name: itself, or all that lie in the folder of a bag."""
     if not path.is_dir():
         return {path.name: path}
@@ -206,8 +197,8 @@ def _read(path: Path, kind: str, mapping: Mapping | None) -> _Imported:
         return _Imported(kind, {_stem(path): table}, tuple(faults), axes, kind="stand")
     table, faults, axes = read_by_mapping(path, mapping)
     stand, runs, cuts = bool(set(table) & {*c.FORCE, *c.MOMENT}), {_stem(path): table}, []
-    if not stand and not (flying := in_the_air.airborne(table)[0]).all():
-        runs, cuts = in_the_air.flights(table, flying, _stem(path), path)
+    if not stand and not (flying := airborne(table)[0]).all():
+        runs, cuts = flights(table, flying, _stem(path), path)
     speeds = None if mapping is None else mapping.channels.get("rotor_speed") or mapping.channels.get("rotor_command")
     unit = (speeds.unit if speeds else "") or "rad/s"
     unit = "rpm" if unit in ELECTRICAL else unit  # they are turns of the rotor by now
@@ -226,7 +217,7 @@ def _px4(path: Path) -> _Imported:
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     known, faults = px4_vehicle(px4_ulog.in_flight(log), rotors)
-    runs, cuts = in_the_air.flights(table, flying, path.stem, path, jumps)
+    runs, cuts = flights(table, flying, path.stem, path, jumps)
     axes = "PX4's: body forward-right-down, world north-east-down, as the contract's"
     return _Imported("px4", runs, (*found, *faults, *cuts), axes, known, speed_unit="rpm")
 
@@ -480,7 +471,7 @@ def set_of_logs(
     else:
         if kinds != {"flight"}:
             raise InputError(f"{logs[0]}: a log of a {kinds.pop()} needs --vehicle vehicle.yaml")
-        template = like or TEMPLATES.get(found[0].known.autopilot) or TEMPLATES.get(found[0].format)
+        template = like or _TEMPLATES.get(found[0].known.autopilot) or _TEMPLATES.get(found[0].format)
         if template is None:
             raise InputError(
                 f"{logs[0]}: nothing says what vehicle this is; give --vehicle vehicle.yaml, or --like with one of "
@@ -512,7 +503,7 @@ def set_of_logs(
         (*remarks, *left_out),
         tuple(dict.fromkeys(faults)),
         found[0].axes,
-        {name: sha256(file) for path in logs for name, file in files_of(path).items()},
+        {name: sha256(file) for path in logs for name, file in _files_of(path).items()},
         kept,
     )
 

@@ -44,7 +44,7 @@ from rotorid.recordings.importers.faults import (
 from rotorid.recordings.importers.mapping import RPM, quaternion_from_euler_frd
 from rotorid.recordings.importers.neurobem import read_neurobem
 from rotorid.recordings.importers.rcbenchmark import read_rcbenchmark
-from rotorid.recordings.tables import place, read_csv
+from rotorid.recordings.tables import numbers, place, read_cells
 
 _FAULT_NAMES = {
     "byte_order_mark": "byte-order mark",
@@ -83,6 +83,7 @@ _HOW_TO_HAVE = {
     "repositories, after deleting results/public/<source>.json, or set it to a folder that holds the files",
 }
 """What to do about files that are missing, by where they were looked for."""
+_OF_A_SOURCE = "source repository place licence contents citation files obtained reason taken_from".split()
 _CHOICES = {"cut", "on_ground"}
 """Kinds that note what part of a log was kept, which is no fault of the log."""
 _VICON_COLUMNS = 25
@@ -240,10 +241,10 @@ def _public_sets() -> dict[str, _PublicSet]:
             f"imrc-bench-{vehicle}",
             "thrust of the whole vehicle along -z of the body",
         )
-    for label, (folder, numbers) in pad.items():
+    for label, (folder, logs) in pad.items():
         sets[f"crazypad-{label}"] = _PublicSet(
             "crazypad",
-            tuple(f"{folder}/E9_log{n:02d}" for n in numbers),
+            tuple(f"{folder}/E9_log{n:02d}" for n in logs),
             _flights,
             "crazypad",
             _FLU,
@@ -322,7 +323,7 @@ def read_imrc_bench(path: Path) -> tuple[pd.DataFrame, list[ImportFault]]:
     `pwm,vbat[V],rpm1..4,thrust[g]` with steady points in random order, or
     `weight[g],pwm,vbat[V],rpm1..4,v[V],i[A],p[W]` as a sweep. Neither has a clock: rows are counted as seconds.
     """
-    raw = read_csv(Path(path))
+    raw = numbers(read_cells(Path(path)), path)
     thrust = next((name for name in ("thrust[g]", "weight[g]") if name in raw), None)
     missing = [name for name in ("pwm", "vbat[V]", *_SPEEDS) if name not in raw]
     if thrust is None or missing:
@@ -521,20 +522,10 @@ def sources(status_files: Sequence[Path]) -> pd.DataFrame:
     rows = []
     for path in status_files:
         status = json.loads(Path(path).read_text(encoding="utf-8"))
-        rows.append(
-            {
-                "source": status["source"],
-                "repository": status["repository"],
-                "place": f"{status['repository']} at {status['commit'][:10]}",
-                "licence": status["licence"],
-                "contents": status["contents"],
-                "citation": status["citation"],
-                "files": status["files"] - status["files_missing"],
-                "obtained": "yes" if status["available"] else "no",
-                "reason": status["reason"],
-                "taken_from": status["taken_from"],
-            }
-        )
+        status["place"] = f"{status['repository']} at {status['commit'][:10]}"
+        status["files"] -= status["files_missing"]
+        status["obtained"] = "yes" if status["available"] else "no"
+        rows.append({key: status[key] for key in _OF_A_SOURCE})
     return pd.DataFrame(rows)
 
 
@@ -546,19 +537,10 @@ def recordings(folders: Sequence[Path]) -> pd.DataFrame:
         if not report["available"]:
             continue
         check = check_set(read_set(Path(folder)))
-        rows.append(
-            {
-                "set": check.name,
-                "kind": check.kind,
-                "rotors": check.rotors,
-                "runs": len(check.runs),
-                "duration_s": sum(run.duration_s for run in check.runs),
-                "rate_hz": sorted(run.rate_hz for run in check.runs)[len(check.runs) // 2],
-                "faults": len(report["faults"]),
-            }
-        )
-    columns = ["set", "kind", "rotors", "runs", "duration_s", "rate_hz", "faults"]
-    return pd.DataFrame(rows, columns=columns)
+        length_s, rates = sum(run.duration_s for run in check.runs), sorted(run.rate_hz for run in check.runs)
+        found = (check.name, check.kind, check.rotors, len(check.runs), length_s, rates[len(rates) // 2])
+        rows.append((*found, len(report["faults"])))
+    return pd.DataFrame(rows, columns=["set", "kind", "rotors", "runs", "duration_s", "rate_hz", "faults"])
 
 
 def faults(folders: Sequence[Path]) -> pd.DataFrame:
@@ -569,17 +551,9 @@ def faults(folders: Sequence[Path]) -> pd.DataFrame:
         for fault in report["faults"]:
             if fault["kind"] in _CHOICES:
                 continue
-            recipe = PUBLIC_SETS[report["set"]]
-            row = rows.setdefault(
-                (recipe.source, fault["kind"]),
-                {
-                    "source": recipe.source,
-                    "fault": _FAULT_NAMES.get(fault["kind"], fault["kind"]),
-                    "runs": set(),
-                    "found": fault["found"],
-                    "action": fault["action"],
-                },
-            )
+            source, kind = PUBLIC_SETS[report["set"]].source, fault["kind"]
+            row = {"source": source, "fault": _FAULT_NAMES.get(kind, kind), "runs": set()}
+            row = rows.setdefault((source, kind), row | {k: fault[k] for k in ("found", "action")})
             row["runs"].add((report["set"], fault["run"]))
     table = [{**row, "runs": len(row["runs"])} for row in rows.values()]
     return pd.DataFrame(table, columns=["source", "fault", "runs", "found", "action"])

@@ -26,15 +26,17 @@ from pyulog import ULog
 from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers import in_the_air
 from rotorid.recordings.importers.faults import (
     GOES_ON,
     ImportFault,
+    airborne,
     drop_repeated_times,
     fault_where,
     further_motors,
+    on_grid,
     one_sense,
     report_gaps,
+    without_pauses,
 )
 from rotorid.recordings.importers.known import Parameters, Values
 from rotorid.recordings.importers.mapping import PULSE_US, RPM, continuous
@@ -457,7 +459,7 @@ def _flying(log: Px4Log, grid: np.ndarray) -> np.ndarray | None:
                 up &= _held(grid, time, land[name], 1.0) < 0.5
     if "arming_state" in status:
         up &= _held(grid, _time(status), status["arming_state"], 0.0) == _ARMED
-    return in_the_air.without_pauses(up, (grid - grid[0]) * 1e-6)
+    return without_pauses(up, (grid - grid[0]) * 1e-6)
 
 
 def _clock(topics: _Topics) -> np.ndarray:
@@ -482,7 +484,7 @@ def convert(log: Px4Log, rotors: int) -> tuple[pd.DataFrame, list[ImportFault], 
     columns: dict[str, np.ndarray] = {c.TIME: (grid - grid[0]) * 1e-6}
 
     def put(names: Sequence[str], time: np.ndarray, values: np.ndarray) -> None:
-        columns.update(zip(names, in_the_air.on_grid(grid, time, values).T, strict=True))
+        columns.update(zip(names, on_grid(grid, time, values).T, strict=True))
 
     for names, time, values in inertial.values():
         put(names, time, values)
@@ -505,7 +507,7 @@ def convert(log: Px4Log, rotors: int) -> tuple[pd.DataFrame, list[ImportFault], 
         if values is not None:
             put(c.rotor_columns(kind, rotors), time, values)
     table = pd.DataFrame({k: v for k, v in columns.items() if k == c.TIME or np.isfinite(v).any()})
-    flying, ground = in_the_air.airborne(table, _flying(log, grid))
+    flying, ground = airborne(table, _flying(log, grid))
     faults += ground
     jumps = np.zeros(len(grid), bool)
     for reset in _resets(log.topics):

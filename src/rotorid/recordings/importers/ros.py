@@ -37,9 +37,17 @@ from scipy.spatial.transform import Rotation
 from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers import in_the_air
 from rotorid.recordings.importers.bag_records import Records, needs, typestores
-from rotorid.recordings.importers.faults import ImportFault, further_motors, one_sense, report_gaps
+from rotorid.recordings.importers.faults import (
+    ImportFault,
+    airborne,
+    flights,
+    further_motors,
+    increasing,
+    one_sense,
+    report_gaps,
+    table_on,
+)
 from rotorid.recordings.importers.guessing import agreement as by
 from rotorid.recordings.importers.guessing.agreement import CONFIRMED, is_clear
 from rotorid.recordings.importers.mapping import PULSE_US, RPM, continuous, half_turn_about_x, quaternion_to_frd_ned
@@ -288,7 +296,7 @@ def _read_series(path: Path) -> tuple[dict[str, list[_TopicSeries]], list[Import
             continue
         order = np.argsort(time_s, kind="stable")
         time_s, values = time_s[order], values[order]
-        keep = in_the_air.increasing(time_s)
+        keep = increasing(time_s)
         own = _TopicSeries(topic, time_s[keep], values[keep])
         if quantity in _UNSET and (own.values == _UNSET[quantity]).all():
             seen = f"{quantity.replace('_', ' ')} of {topic} was never set ({_UNSET[quantity][0]:g}, 0, … throughout)"
@@ -457,8 +465,8 @@ def convert(
             if quantity == "current" and np.nanmedian(values) < 0:  # discharging is negative by definition
                 values = -values
             parts.append(((name,), first[quantity].time_s, values))
-    table = in_the_air.table_on(grid, parts)
-    return table, in_the_air.airborne(table)[0]
+    table = table_on(grid, parts)
+    return table, airborne(table)[0]
 
 
 def _velocity(series: dict[str, list[_TopicSeries]], faults: list[ImportFault]) -> list[tuple]:
@@ -523,6 +531,6 @@ def read_ros(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault], st
     in which rotor speeds are stated."""
     series, faults = _read_series(path)
     table, flying = convert(series, faults, path)
-    runs, cuts = in_the_air.flights(table, flying, (path.resolve() if path.is_dir() else path).name.split(".")[0], path)
+    runs, cuts = flights(table, flying, (path.resolve() if path.is_dir() else path).name.split(".")[0], path)
     unit = "rpm" if "rpm" in series and "speeds" not in series else "rad/s"
     return runs, [*faults, *report_gaps(table), *cuts], unit

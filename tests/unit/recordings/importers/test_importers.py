@@ -12,9 +12,16 @@ from scipy.spatial.transform import Rotation
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers import crazyflie, in_the_air, known, px4_ulog
+from rotorid.recordings.importers import crazyflie, known, px4_ulog
 from rotorid.recordings.importers.crazyflie import TYPES, decode_usd_log, read_usd_log
-from rotorid.recordings.importers.faults import blank_held, cut, drop_repeated_times, report_gaps, true_stretches
+from rotorid.recordings.importers.faults import (
+    blank_held,
+    cut,
+    drop_repeated_times,
+    flights,
+    report_gaps,
+    true_stretches,
+)
 from rotorid.recordings.importers.known import Parameters
 from rotorid.recordings.importers.mapping import (
     continuous,
@@ -761,7 +768,7 @@ def test_px4_each_jump_of_the_estimator_ends_a_run(topic: str, counter: str, fie
         stated = {} if by is None else {f: after * (by if f == fields[0] else 0.0) for f in fields}
         log = px4(sensor_combined=gyro(count, 10_000), **{topic: data | stated})
         made, found, flying, jumps = px4_ulog.convert(log, 1)
-        assert len(in_the_air.flights(made, flying, "run", "log", jumps)[0]) == runs, by
+        assert len(flights(made, flying, "run", "log", jumps)[0]) == runs, by
         assert ("estimator_reset" in kinds(found)) == (runs > 1)
 
 

@@ -29,7 +29,7 @@ _QUALIFIERS = frozenset(
 _AFTER_NUMBERS = frozenset("us usec pwm dshot pct percent raw".split())
 """Words that may stand behind the number of a rotor (`m1_us`, `servo1_raw`)."""
 _IN_BODY = frozenset(("b", "body", "bodyframe", "frd", "flu"))
-SOURCES = frozenset("state estimate est ekf odom odometry vicon mocap imu drone quad uav vehicle px4 mavros".split())
+_SOURCES = frozenset("state estimate est ekf odom odometry vicon mocap imu drone quad uav vehicle px4 mavros".split())
 """Words at the beginning of a stem that say where a value comes from."""
 OTHER_THINGS = frozenset(
     "bias offset std sigma var variance cov covariance err error innov innovation sp setpoint ref reference des "
@@ -149,7 +149,7 @@ def _member(name: str, axes: str) -> tuple[str, str, str, frozenset[str]] | None
     kept = stem
     while len(kept) > 1 and kept[-1] in _QUALIFIERS:
         kept = kept[:-1]
-    while kept and kept[0] in SOURCES:
+    while kept and kept[0] in _SOURCES:
         kept = kept[1:]
     return "_".join(kept), axis, unit or more, frozenset(words) | frozenset(stem)
 
