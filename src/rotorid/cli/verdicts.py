@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rotorid.cli.console import one_sentence, progress
-from rotorid.cli.importing import Like, MappingFile, MassKg, VehicleFile, make_set, print_notes
+from rotorid.cli.sets import Like, MappingFile, MassKg, VehicleFile, make_set, print_notes
 from rotorid.errors import InputError
 from rotorid.io.text.writing import write_texts
 from rotorid.steps import step
