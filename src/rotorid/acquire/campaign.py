@@ -74,14 +74,7 @@ COMBINATIONS: tuple[tuple[str, ...], ...] = (
     ("Carbon Fiber Tube",),
     ("Aluminum 1", "Aluminum 2"),
     ("Aluminum 1", "Aluminum 2", "Aluminum 3"),
-    (
-        "Aluminum 3",
-        "Aluminum 4",
-        "Carbon Fiber 1",
-        "Carbon Fiber 2",
-        "Carbon Fiber 3",
-        "Carbon Fiber Tube",
-    ),
+    ("Aluminum 3", "Aluminum 4", "Carbon Fiber 1", "Carbon Fiber 2", "Carbon Fiber 3", "Carbon Fiber Tube"),
 )
 SEED = 2024
 STATED = "campaign_stated.yaml"

@@ -25,13 +25,7 @@ import typer
 from rotorid.acquire import procedures, view
 from rotorid.acquire.procedures import HOLD_S, RAMP_S, programme_of, recorders_for, run_with
 from rotorid.acquire.recorder import Recorder
-from rotorid.acquire.transport import (
-    AcquireError,
-    Interrupted,
-    PortLost,
-    PortMissing,
-    SerialTransport,
-)
+from rotorid.acquire.transport import AcquireError, Interrupted, PortLost, PortMissing, SerialTransport
 from rotorid.errors import InputError
 from rotorid.io import wire
 from rotorid.io.frames import COMMAND, START, Frame, Intake, encode

@@ -243,12 +243,7 @@ def experiment(
 
 
 def torque_test(
-    tester: Recorder,
-    sensor: Recorder,
-    throttle: float,
-    rest_s: float,
-    hold_s: float,
-    interval_s: float = 0.01,
+    tester: Recorder, sensor: Recorder, throttle: float, rest_s: float, hold_s: float, interval_s: float = 0.01
 ) -> None:
     """Motor 1 of the vehicle on the wrench sensor, driven and counted by the thrust tester."""
     tester.guard()

@@ -29,15 +29,7 @@ from rotorid.errors import InputError
 from rotorid.io.logs import Log, read_log
 from rotorid.io.models import KnownKeys, read_model
 from rotorid.io.rawlog import RECEIVED, read_raw
-from rotorid.io.session import (
-    Counts,
-    Ended,
-    Setup,
-    read_session,
-    session_path,
-    write_index,
-    write_session,
-)
+from rotorid.io.session import Counts, Ended, Setup, read_session, session_path, write_index, write_session
 from rotorid.io.text.wording import explain, hint
 from rotorid.io.wire import EXPERIMENTS, INSTRUMENTS
 

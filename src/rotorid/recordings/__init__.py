@@ -1,14 +1,6 @@
 """Recording sets: what goes into the mismatch stage (the recording contract)."""
 
-from rotorid.recordings.files import (
-    list_sets,
-    read_run,
-    read_set,
-    read_vehicle,
-    vehicle_of,
-    write_set,
-    write_vehicle,
-)
+from rotorid.recordings.files import list_sets, read_run, read_set, read_vehicle, vehicle_of, write_set, write_vehicle
 from rotorid.recordings.run import RecordingSet, Run, Split
 from rotorid.recordings.vehicle import Inertia, Rotor, Vehicle
 

@@ -14,12 +14,7 @@ from zlib import crc32
 
 import numpy as np
 
-from rotorid.acquire.emulators.physics import (
-    LoadedSensor,
-    StandPhysics,
-    TesterPhysics,
-    TurningRotors,
-)
+from rotorid.acquire.emulators.physics import LoadedSensor, StandPhysics, TesterPhysics, TurningRotors
 from rotorid.io import wire
 from rotorid.io.frames import ANSWER, COMMAND, DATA, END, START, Frame, StreamDecoder, encode
 from rotorid.io.wire import (

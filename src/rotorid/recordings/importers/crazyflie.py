@@ -250,10 +250,7 @@ def flight_run(table: pd.DataFrame, start_s: float, stop_s: float) -> tuple[pd.D
     if any(f.kind == "stuck" for f in faults):
         run = run.drop(columns=c.BATTERY_VOLTAGE)
     gaps = report_gaps(run)
-    groups = {
-        "state estimate": [*c.POSITION, *c.VELOCITY, *c.QUATERNION],
-        "battery voltage": [c.BATTERY_VOLTAGE],
-    }
+    groups = {"state estimate": [*c.POSITION, *c.VELOCITY, *c.QUATERNION], "battery voltage": [c.BATTERY_VOLTAGE]}
     if c.ANGULAR_VELOCITY[0] not in run:  # roll and yaw then come with every sample
         groups["state estimate"] = [*c.POSITION, *c.VELOCITY]
     run, held = blank_held(run, groups)

@@ -195,11 +195,7 @@ def _public_sets() -> dict[str, _PublicSet]:
             ),
         ),
         "imrc-brushed": _PublicSet(
-            "imrc-crazyflie-rpm",
-            ("brushed_flights/jana01", "brushed_flights/jana24"),
-            _flights,
-            "imrc-brushed",
-            _FLU,
+            "imrc-crazyflie-rpm", ("brushed_flights/jana01", "brushed_flights/jana24"), _flights, "imrc-brushed", _FLU
         ),
         "crazyflie-arpl-log10": _PublicSet(
             "crazyflie-arpl",

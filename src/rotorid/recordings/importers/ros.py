@@ -267,10 +267,7 @@ def _read_series(path: Path) -> tuple[dict[str, list[_TopicSeries]], list[Import
     broken = f"{found.broken} messages cannot be decoded"
     met = (
         (found.cut, ImportFault("cut_off", "", "the file ends early, without its index", cut)),
-        (
-            found.broken,
-            ImportFault("damaged", "", broken, "left out", found.broken),
-        ),
+        (found.broken, ImportFault("damaged", "", broken, "left out", found.broken)),
         (found.lost_chunks, ImportFault("damaged", "", f"{lost} cannot be unpacked", gap, found.lost_chunks)),
         (foreign, ImportFault("unread", "", f"{strange} hold no messages of ROS", "left out")),
     )

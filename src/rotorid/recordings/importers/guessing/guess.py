@@ -19,12 +19,7 @@ from rotorid.errors import InputError
 from rotorid.recordings.importers.faults import in_order, join_rows
 from rotorid.recordings.importers.guessing import agreement as by
 from rotorid.recordings.importers.guessing import names as named
-from rotorid.recordings.importers.guessing.agreement import (
-    CONFIRMED,
-    RATES_HZ,
-    Draft,
-    triples_of,
-)
+from rotorid.recordings.importers.guessing.agreement import CONFIRMED, RATES_HZ, Draft, triples_of
 from rotorid.recordings.importers.guessing.motion import (
     guess_attitude_and_rates,
     guess_height,

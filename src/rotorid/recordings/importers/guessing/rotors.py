@@ -8,12 +8,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.recordings.importers.guessing import names as named
-from rotorid.recordings.importers.guessing.agreement import (
-    BY_NUMBERS_ALONE,
-    CONTRADICTED,
-    Draft,
-    triples_of,
-)
+from rotorid.recordings.importers.guessing.agreement import BY_NUMBERS_ALONE, CONTRADICTED, Draft, triples_of
 from rotorid.recordings.importers.guessing.names import Family
 from rotorid.recordings.importers.mapping import CHANNELS, ELECTRICAL, OPEN, UNITS, bracketed, stated
 
