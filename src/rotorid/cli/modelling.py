@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rotorid.cli.console import one_sentence, progress
-from rotorid.cli.sets import Like, MappingFile, MassKg, VehicleFile, make_set, print_notes
+from rotorid.cli.sets import Like, MappingFile, MassKg, VehicleFile, name_of, set_of
 from rotorid.errors import InputError
 from rotorid.io.text.writing import write_texts
 from rotorid.steps import step
@@ -60,14 +60,8 @@ def model(
         from rotorid.recordings.importers.logfile import is_bag
 
         is_set = len(paths) == 1 and (paths[0] / "vehicle.yaml").is_file() and not is_bag(paths[0])
-        name = paths[0].resolve().name if paths[0].is_dir() else paths[0].name.split(".")[0]
-        target = out or Path(f"{name}-{to}")
-        folder = paths[0]
-        if not is_set:
-            folder = target / name
-            made = make_set(paths, folder, mass_kg, like, vehicle, mapping)
-            if not quiet:
-                print_notes(made, folder)
+        target = out or Path(f"{name_of(paths[0])}-{to}")
+        folder = set_of(paths, is_set, target, quiet, mass_kg, like, vehicle, mapping)
         written, said = _write_model(folder, target, to, quiet)
         for sentence in said:
             typer.echo(sentence)

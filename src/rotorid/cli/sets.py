@@ -147,6 +147,22 @@ def make_set(
     return found
 
 
+def set_of(paths: list[Path], is_set: bool, target: Path, quiet: bool, *vehicle) -> Path:
+    """The folder of a set: the one that is given, or below `target` one made of logs, as `make_set` takes them."""
+    if is_set:
+        return paths[0]
+    folder = target / name_of(paths[0])
+    made = make_set(paths, folder, *vehicle)
+    if not quiet:
+        print_notes(made, folder)
+    return folder
+
+
+def name_of(path: Path) -> str:
+    """What is made of a set or log is called after it."""
+    return path.resolve().name if path.is_dir() else path.name.split(".")[0]
+
+
 def print_notes(made: SetOfLogs, folder: Path) -> None:
     """Print what was found in the logs and what is only proposed."""
     if made.sentences:

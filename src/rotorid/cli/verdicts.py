@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rotorid.cli.console import one_sentence, progress
-from rotorid.cli.sets import Like, MappingFile, MassKg, VehicleFile, make_set, print_notes
+from rotorid.cli.sets import Like, MappingFile, MassKg, VehicleFile, make_set, name_of, set_of
 from rotorid.errors import InputError
 from rotorid.io.text.writing import write_texts
 from rotorid.steps import step
@@ -76,8 +76,7 @@ def verdict(
 
         start, limit = time.monotonic(), share_of(max_unexplained)
         is_set = len(paths) == 1 and paths[0].is_dir() and not is_bag(paths[0])
-        name = paths[0].resolve().name if paths[0].is_dir() else paths[0].name.split(".")[0]
-        target = out or Path(f"{name}-verdict")
+        target = out or Path(f"{name_of(paths[0])}-verdict")
         if is_set:
             folder = paths[0]
             ignored = {"--mass-kg": mass_kg, "--like": like, "--vehicle": vehicle, "--mapping": mapping}
@@ -87,11 +86,7 @@ def verdict(
                 typer.echo(f"rotorid: {' and '.join(given)} {play} no part: {said}", err=True)
             if not (folder / "vehicle.yaml").is_file():
                 raise InputError(_no_vehicle(folder))
-        else:
-            folder = target / name
-            made = make_set(paths, folder, mass_kg, like, vehicle, mapping)
-            if not quiet and not as_json:
-                print_notes(made, folder)
+        folder = set_of(paths, is_set, target, quiet or as_json, mass_kg, like, vehicle, mapping)
         found = deliver_set(folder, target, quiet, series)
         if as_json:
             typer.echo((target / "verdict.json").read_text(encoding="utf-8"), nl=False)

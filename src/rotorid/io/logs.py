@@ -1,14 +1,10 @@
 """Raw logs to tidy tables: `read_log(path)` gives a table with units, quality flags and the metadata.
 
-A log cut off anywhere is read up to the cut, a damaged one behind the damage as well; `Log.faults` says in
-sentences what is not as it was recorded. The table's time is the device's own clock, unwrapped; the host's time
-stands next to it, so that two instruments can be aligned.
-
-Raw logs of one kind and instrument as two tidy tables: all samples, and one row per recording.
-
-The table of samples keeps the instrument's columns with the unit in their names, the quality flags of
-`rotorid.io.logs`, and the recording's `id` before them. The table of recordings holds what the operator set,
-the marks (values of the column `index`) and what went wrong on the line.
+A log cut off anywhere is read up to the cut, a damaged one behind the damage as well; `Log.faults` says in sentences
+what is not as it was recorded. The table's time is the device's own clock, unwrapped; the host's time stands next to
+it, so that two instruments can be aligned. `read_tables` makes two tables of logs of one instrument: all samples, with
+the recording's `id` before them, and one row a recording, with what the operator set, the marks (values of the column
+`index`) and what went wrong on the line.
 """
 
 from __future__ import annotations
@@ -264,11 +260,8 @@ def _device_time(where: np.ndarray, host_ns: np.ndarray) -> np.ndarray:
 def read_tables(paths: Iterable[str | Path]) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Samples and recordings of logs of one instrument, in the order of the recordings' time.
 
-    Raises
-    ------
-    InputError
-        No logs, logs of different instruments, a log without its metadata or with bytes that are not those of the
-        recording, or two of the same id.
+    InputError for no logs, logs of different instruments, one without its metadata or with bytes that are not those of
+    the recording, and two of the same id.
     """
     logs = [read_log(path) for path in paths]
     if not logs:

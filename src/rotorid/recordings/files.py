@@ -183,12 +183,9 @@ def check_rotors(run: Run, vehicle: Vehicle) -> None:
 
 
 def usable_runs(readers: Iterable[Callable[[], Run]], where: object) -> tuple[tuple[Run, ...], tuple[str, ...]]:
-    """The runs that can be used, and one sentence for each that cannot.
+    """The runs that can be used, and one sentence for each that cannot; `where` names the set.
 
-    Raises
-    ------
-    InputError
-        A run is no table, none can be used, or together they are larger than any recording; `where` names the set.
+    InputError where a run is no table, none can be used, or together they are larger than any recording.
     """
     runs: list[Run] = []
     left_out: list[UnusableRun] = []

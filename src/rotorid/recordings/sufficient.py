@@ -72,10 +72,7 @@ _LEAST_LIFT_N = 1.0
 def sufficient(recordings: RecordingSet) -> RecordingSet:
     """The set as the analysis can use it: runs that cannot be used left out, each with a sentence in `left_out`.
 
-    Raises
-    ------
-    InputError
-        One sentence with file and column, where a column is misspelled or what is left does not suffice.
+    InputError with file and column, where a column is misspelled or what is left does not suffice.
     """
     vehicle = recordings.vehicle
     if vehicle.kind == "bench" and vehicle.rotors and not any(driven_by(r, vehicle) for r in recordings.runs):

@@ -98,11 +98,7 @@ def _look_through(path: Path, foreign: bool = False) -> _CsvLayout:
     `foreign`: a table of one's own, not of a recording set. Its columns may be separated by semicolons, tabs, bars or
     blanks as well (its numbers may then have decimal commas), one without a name is called by its number (`column_3`),
     lines may stand above the heading, the heading may have several lines, and the last line may be cut off.
-
-    Raises
-    ------
-    InputError
-        The file is no table, has a line with more or fewer cells than its heading, or is too large.
+    InputError where the file is no table, has a line with more or fewer cells than its heading, or is too large.
     """
     found, quoted, cut = None, False, False
     for line, text in _whole_lines(path):

@@ -7,9 +7,8 @@
   stands on it, drift and noise.
 - A printed specimen in the tensile tester: linear up to a limit, then yielding, then it breaks.
 
-The truth of the emulated campaign in the words of the catalogue: what a verdict on each of its sets could state.
-
-The emulators are given causes in their own terms; a verdict states what a recording shows of them.
+`write_stated` writes the truth of the emulated campaign in the words of the catalogue: what a verdict on each of its
+sets could state. The emulators are given causes in their own terms; a verdict states what a recording shows of them.
 
 - On the bench a reading is what the thesis's equations make of the cells. A lateral load, or one that turns as the
   bench gives way, becomes a vertical force there (the absolute values of eq. 2.9). So the coefficients of a reading

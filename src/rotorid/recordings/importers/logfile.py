@@ -376,12 +376,7 @@ class SetOfLogs:
         new runs next to its own; until all are there its list says that it is not whole. Runs are Parquet files; plain
         CSV where wished, and .csv.gz where pyarrow is not installed.
 
-        Raises
-        ------
-        InputError
-            Something that is there already would change.
-        OSError
-            The disk is full or cannot be written.
+        InputError where something that is there already would change, OSError where the disk is full.
         """
         files = dict(self.files)
         report = ImportReport(
@@ -419,29 +414,14 @@ def set_of_logs(
     mapping: Mapping | None = None,
     there: Path | None = None,
 ) -> SetOfLogs:
-    """The flights in `logs`, all of one vehicle, and what is known or proposed of it.
+    """The flights in `logs` (or runs of a stand), all of one vehicle, and what is known or proposed of it.
 
-    Parameters
-    ----------
-    logs
-        Files, and folders of ROS 2 bags, that `rotorid.recordings.importers.logfile` knows, all of one kind (flights,
-        or runs of a stand).
-    name
-        What the set is called.
-    mass_kg, like
-        Mass as flown and the template vehicle for what the logs do not say.
-    vehicle_file
-        A `vehicle.yaml` to take as it is, in place of a proposal.
-    mapping
-        What the columns of a CSV or Parquet file are.
-    there
-        A `vehicle.yaml` that may be there already: it is taken where neither `mass_kg` nor `like` is given.
+    `vehicle_file` is taken as it is, in place of a proposal. So is `there`, a `vehicle.yaml` that may be there already,
+    where neither the mass as flown nor the template vehicle for what the logs do not say (`like`) is given. `mapping`
+    says what the columns of a CSV or Parquet file are.
 
-    Raises
-    ------
-    InputError
-        A log cannot be read or holds no flight; the logs do not belong together; nothing says what vehicle it is;
-        `there` exists and would change.
+    InputError where a log cannot be read or holds no flight, the logs do not belong together, nothing says what vehicle
+    it is, or `there` exists and would change.
     """
     if len(logs) > MOST_RUNS:
         raise InputError(f"{len(logs)} logs were given, expected at most {MOST_RUNS}; make several sets of them")
@@ -524,10 +504,7 @@ def _add_to_set(staged: Sequence[Path], report: ImportReport, folder: Path) -> N
     The set's list of runs is there before the first new run and names them after the last. Whoever is killed between
     the two leaves a set that readers refuse, and that the same import completes.
 
-    Raises
-    ------
-    InputError
-        A file that is there would change, a run would be there twice, or the set is not whole as it is.
+    InputError where a file that is there would change, a run would be there twice, or the set is not whole as it is.
     """
     names = {path.name for path in staged}
     there = run_files(folder)

@@ -37,10 +37,11 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
 from rotorid.errors import InputError
+from rotorid.io.models import KnownKeys
 from rotorid.io.text.files import read_yaml
 from rotorid.io.text.wording import explain
 from rotorid.recordings import columns as c
@@ -147,10 +148,8 @@ ELECTRICAL = ("erpm", "100erpm")
 _DATE, _TIME_OF_DAY = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d"), re.compile(r"\d{1,2}:\d\d:\d\d(\.\d+)?")
 
 
-class MappedChannel(BaseModel):
+class MappedChannel(KnownKeys, frozen=True):
     """Columns that make one channel."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     columns: tuple[str, ...]
     unit: str = ""
@@ -168,10 +167,8 @@ class MappedChannel(BaseModel):
     """Speeds in electrical turns only: magnetic poles of a motor."""
 
 
-class Mapping(BaseModel):
+class Mapping(KnownKeys, frozen=True):
     """What the columns of a table are."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     body: Literal["frd", "flu", "fur", "?"] = "frd"
     world: Literal["ned", "enu", "nwu", "nue", "?"] = "ned"

@@ -271,14 +271,8 @@ def build(name: str, obtained: tuple[Path, dict[str, str]], source: dict, vehicl
     Where a file could not be had, the folder holds `import_report.json` alone, which says so. Until all files are read
     there is no folder.
 
-    Parameters
-    ----------
-    obtained
-        What `obtain` gives of the set's source.
-    source
-        The source's entry in the manifest (licence, repository, commit, citation).
-    vehicles
-        Folder with the believed vehicle files.
+    `obtained` is what `obtain` gives of the set's source, `source` the source's entry in the manifest, `vehicles` the
+    folder with the believed vehicle files.
     """
     recipe = PUBLIC_SETS[name]
     folder = Path(parent) / name
@@ -399,16 +393,7 @@ def obtain(
 ) -> tuple[Path, dict[str, str]]:
     """The folder of one source of the manifest, its files checked, and to those that could not be had the reason.
 
-    Parameters
-    ----------
-    name, source
-        Name and entry of the source in the manifest.
-    folder
-        A folder with the public recordings (what ROTORID_PUBLIC_DATA names), or None to download.
-    cache
-        Where downloads are kept.
-    base
-        Server of raw files.
+    `folder` has the public recordings (what ROTORID_PUBLIC_DATA names); None downloads them into `cache`.
     """
     if folder is None:
         return Path(cache) / name, _downloaded(source, Path(cache) / name, base)
