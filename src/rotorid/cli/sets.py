@@ -96,7 +96,7 @@ def import_logs(
 
 
 def _write_mapping(logs: list[Path], target: Path, as_json: bool) -> None:
-    from rotorid.recordings.importers.guessing.guess import as_text, guess
+    from rotorid.recordings.importers.guessing import as_text, guess
     from rotorid.recordings.importers.logfile import format_of
     from rotorid.recordings.importers.mapping import read_columns
 

@@ -27,7 +27,7 @@ OPEN = (
     "files",
     "held",
     "importers.faults",
-    "importers.guessing.guess",
+    "importers.guessing",
     "importers.logfile",
     "importers.mapping",
     "importers.neurobem",

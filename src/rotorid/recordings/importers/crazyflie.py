@@ -50,7 +50,7 @@ from rotorid.recordings.importers.faults import (
     stretches_of,
     true_stretches,
 )
-from rotorid.recordings.importers.guessing.guess import guess
+from rotorid.recordings.importers.guessing import guess
 from rotorid.recordings.importers.mapping import (
     RPM,
     UNITS,

@@ -243,8 +243,10 @@ def _throttles(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray,
     return _from_pulses(log, instances, rotors, names)
 
 
-def _no_throttle(kind: str, names: str, found: str, samples: int = 0) -> tuple[None, np.ndarray, list[ImportFault]]:
-    return None, np.zeros(0), [ImportFault(kind, names, found, "no throttle columns", samples)]
+def _no_throttle(
+    kind: str, names: str, found: str, samples: int = 0, before: Sequence[ImportFault] = ()
+) -> tuple[None, np.ndarray, list[ImportFault]]:
+    return None, np.zeros(0), [*before, ImportFault(kind, names, found, "no throttle columns", samples)]
 
 
 def _more_rotors(topic: str, driven: int, rotors: int) -> list[ImportFault]:
@@ -278,8 +280,7 @@ def _from_pulses(log: Px4Log, instances, rotors: int, names: str):
     turning = pulses[pulses > 0]
     if len(turning) and not (turning.min() >= _PLAUSIBLE_PULSE_US[0] and turning.max() <= _PLAUSIBLE_PULSE_US[1]):
         found = f"outputs from {turning.min():g} to {turning.max():g} are no pulse widths in µs"
-        *nothing, more = _no_throttle("unit", names, found, len(pulses))
-        return *nothing, faults + more
+        return _no_throttle("unit", names, found, len(pulses), faults)
     throttle = np.full(pulses.shape, np.nan)
     for start, stop, values in log.parameters.spans(_CHANGED[0][0]):
         inside = (times >= start) & (times < stop)

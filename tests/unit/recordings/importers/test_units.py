@@ -8,7 +8,7 @@ import pytest
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.guessing.guess import guess
+from rotorid.recordings.importers.guessing import guess
 from rotorid.recordings.importers.logfile import format_of, set_of_logs
 from rotorid.recordings.importers.mapping import SPELLINGS, UNITS, bracketed, converted, read_columns, stated, unit_of
 from rotorid.recordings.importers.rcbenchmark import HEADINGS, read_rcbenchmark
