@@ -303,9 +303,7 @@ class Recorder:
         """Stop the stream and take in what is still on its way, up to the end record."""
         self._closing = True
         self.command(STOP)
-        deadline = self._clock.now_ns() + round(self._timings.reply_s * 1e9)
-        while self.ended is None and self._clock.now_ns() < deadline:
-            self._pump()
+        self._pump_until(lambda: self.ended is not None)
         self._streaming = self._watched = False
 
     def rows(self, count: int | None = None) -> Iterator[Row]:
@@ -374,6 +372,13 @@ class Recorder:
                 self._after_silence()
 
     # ---- inside --------------------------------------------------------------------------------------
+
+    def _pump_until(self, done: Callable[[], bool]) -> bool:
+        """Read until something is there, for as long as an answer may take; whether it is."""
+        deadline = self._clock.now_ns() + round(self._timings.reply_s * 1e9)
+        while not done() and self._clock.now_ns() < deadline:
+            self._pump()
+        return done()
 
     def _pump(self) -> None:
         if self._watched and self._clock.now_ns() - self._last_sent_ns > self._timings.watchdog_s / 4 * 1e9:
@@ -452,7 +457,10 @@ class Recorder:
             self._last_values = values
             self._rows.append(row)
             self._time(row, now_ns)
-            self._check_limits(values)
+            for number, low, high in self._limits:
+                if not low <= values[number] <= high and not self._exceeded:
+                    column = self.instrument.columns[number]
+                    self._exceeded = f"{column} is {values[number]:.5g}, allowed are {low:g} to {high:g}: stopped"
             if self.on_row is not None:
                 self.on_row(row)
         elif kind == ANSWER:
@@ -465,12 +473,6 @@ class Recorder:
             self._skipped += content.skipped
             self._streaming = self._watched = False
             self.over = True
-
-    def _check_limits(self, values: tuple[float, ...]) -> None:
-        for number, low, high in self._limits:
-            if not low <= values[number] <= high and not self._exceeded:
-                column = self.instrument.columns[number]
-                self._exceeded = f"{column} is {values[number]:.5g}, allowed are {low:g} to {high:g}: stopped"
 
     def _time(self, row: Row, now_ns: int) -> None:
         """Keep the first and the latest sample of the present segment, for rate and clock ratio."""
@@ -507,12 +509,7 @@ class Recorder:
                 raise Interrupted("stopped at your wish while nothing was heard of the device; the log is safe")
             self._send(IDENTIFY, b"")
             asked += 1
-            deadline = self._clock.now_ns() + round(self._timings.reply_s * 1e9)
-            while not self._answered and self._clock.now_ns() < deadline:
-                self._pump()
-                if patience_s is not None and self._data_frames() > samples:
-                    return True
-            if self._answered:
+            if self._pump_until(lambda: self._answered or patience_s is not None and self._data_frames() > samples):
                 return True
         return False
 
@@ -587,9 +584,7 @@ class Recorder:
             self._after_restart()
             return
         # it answers; if it still streams, a sample is not far
-        deadline = self._clock.now_ns() + round(self._timings.reply_s * 1e9)
-        while self._data_frames() == samples and not self.over and self._clock.now_ns() < deadline:
-            self._pump()
+        self._pump_until(lambda: self._data_frames() != samples or self.over)
         if self._data_frames() > samples:
             self._event("silence_over", "samples come again")
         elif self.over:

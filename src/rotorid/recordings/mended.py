@@ -26,7 +26,7 @@ from scipy.sparse import diags, eye_array
 from scipy.sparse.linalg import spsolve
 
 from rotorid.recordings import columns as c
-from rotorid.recordings.run import RecordingSet, Run
+from rotorid.recordings.run import RecordingSet, Run, means_of
 
 _FAR = 10.0
 """Standard deviations of the readings about their neighbours from which one is a spike."""
@@ -244,10 +244,7 @@ def _on_lines(time_s: np.ndarray, values: np.ndarray, at_s: np.ndarray, step_s: 
     """Readings (n,) at instants (m,): the mean of those within half a step, on straight lines where there is no more
     than one. What changes faster than the grid would else be taken for something slow."""
     first, last = (np.searchsorted(time_s, at_s + side * step_s / 2) for side in (-1, 1))
-    total = np.concatenate([[0.0], np.cumsum(values)])
-    count = last - first
-    mean = (total[last] - total[first]) / np.maximum(count, 1)
-    return np.where(count > 1, mean, np.interp(at_s, time_s, values))
+    return np.where(last - first > 1, means_of(values, first, last), np.interp(at_s, time_s, values))
 
 
 def _spline(time_s: np.ndarray, values: np.ndarray, period_s: float) -> BSpline:

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from rotorid.io.text.wording import listed
 from rotorid.recordings import columns as c
 from rotorid.recordings.body import Body, body_of, impossible, quantities
-from rotorid.recordings.run import Doubt, RecordingSet, Run
+from rotorid.recordings.run import Doubt, RecordingSet, Run, means_of
 from rotorid.recordings.vehicle import Vehicle
 
 _STEP_S = 0.02
@@ -105,11 +105,8 @@ def _on(run: Run, clock: np.ndarray, names: tuple[str, ...], smooth_s: float = _
     if known.sum() < 10:
         return None
     time, values = run.time_s[known], values[known]
-    total = np.vstack([np.zeros(values.shape[1]), np.cumsum(values, axis=0)])
-    first = np.searchsorted(time, clock - smooth_s / 2)
-    last = np.searchsorted(time, clock + smooth_s / 2)
-    count = last - first
-    mean = (total[last] - total[first]) / np.maximum(count, 1)[:, None]
+    first, last = (np.searchsorted(time, clock + side * smooth_s / 2) for side in (-1, 1))
+    mean, count = means_of(values, first, last), last - first
     line = np.column_stack([np.interp(clock, time, column) for column in values.T])
     near = np.clip(np.searchsorted(time, clock), 1, len(time) - 1)
     gap = time[near] - time[near - 1]
@@ -348,10 +345,9 @@ def _world(run: Run, clock: np.ndarray) -> Iterator[Doubt]:
 def _band(values: np.ndarray) -> np.ndarray:
     """What is faster than `_SLOW_S`: the values less their mean over it, (n, k)."""
     width = int(_SLOW_S / _STEP_S)
-    total = np.vstack([np.zeros(values.shape[1]), np.cumsum(values, axis=0)])
     index = np.arange(len(values))
     first, last = np.maximum(index - width // 2, 0), np.minimum(index + width // 2 + 1, len(values))
-    return values - (total[last] - total[first]) / (last - first)[:, None]
+    return values - means_of(values, first, last)
 
 
 def _pushes(speeds: np.ndarray, gyro: np.ndarray) -> np.ndarray | None:

@@ -18,6 +18,13 @@ def stretches(mask: np.ndarray) -> list[tuple[int, int]]:
     return list(zip(edges[::2], edges[1::2], strict=True))
 
 
+def means_of(values: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Means (m, …) of the rows `first` to `last` (exclusive, (m,)) of values (n, …); 0 where there is none."""
+    total = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
+    count = np.maximum(last - first, 1).reshape(-1, *[1] * (values.ndim - 1))
+    return (total[last] - total[first]) / count
+
+
 @dataclass(frozen=True)
 class Doubt:
     """One thing in a set that is probably not as stated."""
