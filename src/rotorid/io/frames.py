@@ -309,15 +309,12 @@ def _signed(difference: int, period: int) -> int:
     return (difference + period // 2) % period - period // 2
 
 
-class Taken(NamedTuple):
-    """A frame of a known kind with what it says: a record, an answer, or the payload of a sample.
+_Content = wire.StartRecord | wire.EndRecord | wire.Answer | bytes
+Taken = tuple[int, _Placed | None, _Content]
+"""Kind and place of a frame of a known kind, and what it says: a record, an answer, or the payload of a sample.
 
-    `place` is None for a frame that was here before; only a start record is handed on then.
-    """
-
-    kind: int
-    place: _Placed | None
-    content: wire.StartRecord | wire.EndRecord | wire.Answer | bytes
+The place is None for a frame that was here before; only a start record is handed on then.
+"""
 
 
 class Intake:
@@ -356,9 +353,9 @@ class Intake:
             return None
         if place is None and frame.kind != START:
             return None
-        return Taken(frame.kind, place, content)
+        return frame.kind, place, content
 
-    def _content(self, frame: Frame):
+    def _content(self, frame: Frame) -> _Content | None:
         """What a frame says, or None, counted, where it says nothing that could be understood."""
         try:
             if frame.kind == DATA:
