@@ -168,8 +168,8 @@ def _of_table(name: str, table: pd.DataFrame) -> Run:
 
 
 def _of_logs(logs, name, vehicle, mass_kg, like, mapping) -> RecordingSet:
+    from rotorid.recordings.importers.logfile import set_of_logs
     from rotorid.recordings.importers.mapping import read_mapping
-    from rotorid.recordings.importers.set_of_logs import set_of_logs
 
     found = set_of_logs(
         logs,

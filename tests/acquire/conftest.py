@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from rotorid.acquire.emulators.devices import Faults
 from rotorid.acquire.emulators.ports import EmulatedPorts, build
 from rotorid.acquire.emulators.truth import Truth
-from rotorid.acquire.emulators.wire import Faults
 from rotorid.acquire.recorder import Recorder, Timings
 from rotorid.acquire.transport import LoopbackTransport, SerialTransport, SystemClock, VirtualClock
 from rotorid.io.wire import INSTRUMENTS

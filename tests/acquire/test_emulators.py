@@ -36,7 +36,7 @@ from rotorid.acquire.emulators.truth import (
     read_truth,
     write_truth,
 )
-from rotorid.acquire.procedures import LowPass, Steadiness, programme_of
+from rotorid.acquire.procedures import Steadiness, SteadyRule, programme_of
 from rotorid.io.wire import EXPERIMENTS, GREEN, RED, SINE, TRAPEZOID, YELLOW, Programme
 
 RNG = np.random.default_rng
@@ -225,11 +225,11 @@ def test_truth_keeps_the_thesis_and_round_trips(tmp_path):
 
 
 def test_low_pass_and_steadiness():
-    low_pass = LowPass(1.0, 1 / (2 * math.pi))  # α = 1 − 1/e
-    assert low_pass.update((0.0,)) == [0.0]
-    assert low_pass.update((1.0,)) == pytest.approx([1 - math.exp(-1)])
-    steady = Steadiness(3, (0.5,))
-    assert [steady.update([x]) for x in (0.0, 1.0, 1.2, 1.4, 1.9)] == [False, False, False, True, False]
+    slow = Steadiness(SteadyRule(1.0, 3, 0.5), 1 / (2 * math.pi))  # α = 1 − 1/e
+    assert [slow.update((x,)) for x in (0.0, 1.0)] == [False, False]
+    assert slow.spans() == pytest.approx([1 - math.exp(-1)])
+    steady = Steadiness(SteadyRule(1e9, 3, 0.5), 1.0)  # lets everything pass
+    assert [steady.update((x,)) for x in (0.0, 1.0, 1.2, 1.4, 1.9)] == [False, False, False, True, False]
 
 
 def test_one_cell_alone_takes_a_load_from_the_command_line():

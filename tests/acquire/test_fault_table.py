@@ -17,13 +17,13 @@ from typer.testing import CliRunner
 
 from rotorid.acquire import procedures
 from rotorid.acquire.cli import app
-from rotorid.acquire.emulators.wire import Faults
+from rotorid.acquire.emulators.devices import Faults
 from rotorid.acquire.recorder import Recorder, Timings, _source
 from rotorid.acquire.transport import AcquireError, SystemClock
 from rotorid.errors import InputError
 from rotorid.io import rawlog, wire
 from rotorid.io.frames import ANSWER, DATA, END, START, Frame, StreamDecoder, encode
-from rotorid.io.logs import LogError, read_log, read_tables
+from rotorid.io.logs import read_log, read_tables
 from rotorid.io.rawlog import read_raw
 from rotorid.io.session import Ended, Session, read_session, session_path, write_session
 from rotorid.io.wire import TRAPEZOID, Programme
@@ -107,7 +107,7 @@ def test_another_recordings_bytes_are_refused(loopback, tmp_path):
     other = read_session(session_path(path)).model_copy(update={"id": "other", "log": "other.rlog"})
     write_session(other, tmp_path / "other.yaml")
     (tmp_path / "other.rlog").write_bytes(path.read_bytes())
-    with pytest.raises(LogError, match="holds the recording 'run-bench'.*those of 'other'"):
+    with pytest.raises(InputError, match="holds the recording 'run-bench'.*those of 'other'"):
         read_log(tmp_path / "other.rlog")
     assert command_line("check", str(tmp_path / "other.rlog"))[0] == 1
 
@@ -272,7 +272,7 @@ def test_a_note_that_is_none_hurts_nothing(loopback):
 def test_a_log_of_an_unknown_instrument_is_readable(tmp_path):
     path = tmp_path / "run.rlog"
     session_free(path, [(START, start_record(name="toaster")), (DATA, b"\1\2"), (END, end_record(1))])
-    with pytest.raises(LogError, match="unknown instrument 'toaster'; known are bench"):
+    with pytest.raises(InputError, match="unknown instrument 'toaster'; known are bench"):
         read_log(path)  # nothing says what was expected
     write_session(
         Session(id="run", instrument="bench", started="2024-03-04T09:00:00-06:00", host_start_ns=0, log=path.name),

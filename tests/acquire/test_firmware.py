@@ -15,7 +15,7 @@ import pytest
 
 from rotorid.acquire import procedures
 from rotorid.acquire.recorder import Timings
-from rotorid.acquire.transport import DeviceFault, Refused
+from rotorid.acquire.transport import AcquireError, Refused
 from rotorid.io.logs import Log, read_log
 from rotorid.io.session import Ended
 from rotorid.io.wire import SINE, TRAPEZOID, VOLTS_PER_COUNT, Programme
@@ -146,7 +146,7 @@ def test_esp32_board_file_sends_each_frame_and_gives_the_pulses_of_its_programme
 def test_esp32_board_file_takes_the_pulses_back_when_nobody_is_heard(on_host, recorder_on, tmp_path):
     port = on_host("esp32", tmp_path / "pulses")
     recorder = recorder_on("quadrotor", port, Timings(poll_s=0.02, reply_s=0.5, watchdog_s=0.3))
-    with pytest.raises(DeviceFault, match="heard nothing"):
+    with pytest.raises(AcquireError, match="heard nothing"):
         with recorder:
             procedures.start_programme(recorder, "b", Programme(SINE, (0.4, 0.4, 0.4, 0.4), 0.0, 30.0, 1.0))
             for _ in recorder.rows(10):
@@ -202,7 +202,7 @@ def test_what_g_does(on_host, recorder_on):
 def test_host_rotor_stops_when_nobody_is_heard(on_host, recorder_on):
     timings = Timings(poll_s=0.02, reply_s=0.5, watchdog_s=0.3)
     recorder = recorder_on("rotor", on_host("rotor"), timings)
-    with pytest.raises(DeviceFault, match="heard nothing"):
+    with pytest.raises(AcquireError, match="heard nothing"):
         with recorder:
             with pytest.raises(Refused, match="watchdog"):
                 recorder.command("T", bytes.fromhex("c4096009"))

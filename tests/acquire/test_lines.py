@@ -14,10 +14,11 @@ from typer.testing import CliRunner
 
 from rotorid.acquire.cli import app
 from rotorid.acquire.lines import record_lines
-from rotorid.acquire.transport import BadName, DeviceSilent, Interrupted, SerialTransport, SystemClock
+from rotorid.acquire.transport import AcquireError, DeviceSilent, Interrupted, SerialTransport, SystemClock
 from rotorid.acquire.view import LinesPanel, Plot
+from rotorid.errors import InputError
 from rotorid.io import rawlog
-from rotorid.io.lines import Description, DescriptionError, LineDecoder, read_description, read_line_log
+from rotorid.io.lines import Description, LineDecoder, read_description, read_line_log
 from rotorid.io.rawlog import RECEIVED, read_raw
 from rotorid.io.session import Ended, Session, read_session, write_session
 from tests.acquire.fault_table import seen
@@ -111,7 +112,7 @@ def test_every_byte_is_kept_and_the_log_is_read_by_its_own_description(line, tmp
     table = read_line_log(log).table
     assert [tuple(row) for row in table[list(description.columns)].to_numpy()] == [pytest.approx(v) for v in values]
     assert session.counts.samples == len(values) and session.counts.broken_frames == unreadable
-    with pytest.raises(BadName):
+    with pytest.raises(AcquireError):
         record_lines(description, transport, SystemClock(), tmp_path, "run", samples=1)
 
 
@@ -219,6 +220,6 @@ def test_the_look_at_lines_while_recording():
 def test_mistakes_in_a_description_get_one_sentence(tmp_path: Path, text, sentence):
     path = tmp_path / "d.yaml"
     path.write_text(text)
-    with pytest.raises(DescriptionError) as error:
+    with pytest.raises(InputError) as error:
         read_description(path)
     assert sentence in str(error.value)

@@ -10,8 +10,9 @@ import pytest
 from typer.testing import CliRunner
 
 from rotorid.acquire.cli import app
+from rotorid.errors import InputError
 from rotorid.io.logs import read_log
-from rotorid.io.session import INDEX_KEY, SessionError, read_index, read_session, write_index
+from rotorid.io.session import INDEX_KEY, read_index, read_session, write_index
 from tests.acquire.fault_table import seen
 from workflow.scripts import ingest
 
@@ -52,7 +53,7 @@ def test_every_flipped_bit_is_noticed(log):
         changed = bytearray(good)
         changed[bit // 8] ^= 1 << bit % 8
         path.write_bytes(changed)
-        with pytest.raises(SessionError, match=rf"{NAME}\.yaml"):
+        with pytest.raises(InputError, match=rf"{NAME}\.yaml"):
             read_session(path)
     path.write_bytes(good)
     assert read_session(path).setup.load_gf == 35.715
@@ -63,7 +64,7 @@ def test_a_changed_load_is_one_sentence_and_an_edit_can_be_meant(log):
     path, bytes_of_log = metadata(log), log.read_bytes()
     edited = path.read_bytes().replace(b"load_gf: 35.715", b"load_gf: 135.715")
     path.write_bytes(edited)
-    with pytest.raises(SessionError, match="were changed after recording") as refused:
+    with pytest.raises(InputError, match="were changed after recording") as refused:
         read_log(log)
     assert f"rotorid-acquire checksum --renew {path}" in str(refused.value) and "\n" not in str(refused.value)
     assert command("check", str(log))[0] == 1
@@ -78,7 +79,7 @@ def test_a_changed_load_is_one_sentence_and_an_edit_can_be_meant(log):
 def test_lines_behind_the_checksum_are_noticed_and_kept(log):
     path = metadata(log)
     path.write_bytes(path.read_bytes() + b"group: mine")
-    with pytest.raises(SessionError, match="were changed after recording"):
+    with pytest.raises(InputError, match="were changed after recording"):
         read_session(path)
     code, text = command("checksum", "--renew", str(path))
     assert code == 1 and "group" in text and "twice" in text  # no metadata: left as it was
@@ -116,7 +117,7 @@ def test_no_recording_falls_out_of_the_index(log):
     path = metadata(log)
     for spoilt in (b"formau: ", b"Format: "):
         path.write_bytes(path.read_bytes().replace(path.read_bytes()[:8], spoilt, 1))
-        with pytest.raises(SessionError, match="were changed after recording"):
+        with pytest.raises(InputError, match="were changed after recording"):
             write_index(log.parent)
 
 
@@ -131,7 +132,7 @@ def test_every_flipped_bit_of_the_index_is_noticed(log):
         changed = bytearray(good)
         changed[bit // 8] ^= 1 << bit % 8
         path.write_bytes(changed)
-        with pytest.raises(SessionError, match=r"sessions\.tsv"):
+        with pytest.raises(InputError, match=r"sessions\.tsv"):
             read_index(log.parent)
     path.write_bytes(good)
     assert [row["id"] for row in rows] == [NAME] and read_index(log.parent) == rows
@@ -144,7 +145,7 @@ def test_an_edit_of_the_index_can_be_meant(log):
     good = path.read_bytes()
     edited = good.replace(b"35.715", b"135.715")
     path.write_bytes(edited)
-    with pytest.raises(SessionError, match="the index was changed after it was written") as refused:
+    with pytest.raises(InputError, match="the index was changed after it was written") as refused:
         read_index(log.parent)
     assert f"rotorid-acquire checksum --renew {path}" in str(refused.value) and "\n" not in str(refused.value)
     code, text = command("checksum", str(path))
@@ -160,7 +161,7 @@ def test_rows_behind_the_checksum_and_a_row_that_is_none_are_told(log):
     path = log.parent / "sessions.tsv"
     row = path.read_text().splitlines()[1]
     path.write_text(path.read_text() + row.replace(NAME, "mine", 1) + "\n")
-    with pytest.raises(SessionError, match="the index was changed after it was written"):
+    with pytest.raises(InputError, match="the index was changed after it was written"):
         read_index(log.parent)
     assert command("checksum", "--renew", str(path))[0] == 0
     assert [row["id"] for row in read_index(log.parent)] == [NAME, "mine"]

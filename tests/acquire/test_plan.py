@@ -21,7 +21,6 @@ from rotorid.acquire.procedures import record
 from rotorid.acquire.run_plan import (
     CampaignPlan,
     Desk,
-    PlanError,
     attempts,
     check,
     emulated_ports,
@@ -30,7 +29,8 @@ from rotorid.acquire.run_plan import (
     run,
     steps_of,
 )
-from rotorid.acquire.transport import AcquireError, LimitExceeded
+from rotorid.acquire.transport import AcquireError
+from rotorid.errors import InputError
 from rotorid.io.logs import read_log
 from rotorid.io.session import Ended, read_index
 from tests.acquire.fault_table import seen
@@ -187,7 +187,7 @@ def test_a_limit_stops_motor_and_campaign(tmp_path, emulated):
         [thrust | {"settings": {"rest_s": 0.2, "hold_s": 2.0}}],
         limits={"speed_rpm": [0, 9000], "battery_current_a": [-1, 50]},
     )
-    with pytest.raises(LimitExceeded, match="speed_rpm is .*, allowed are 0 to 9000: stopped"):
+    with pytest.raises(AcquireError, match="speed_rpm is .*, allowed are 0 to 9000: stopped"):
         run(plan, emulated(plan, speed=20), desk([]), checked=True)
     log = read_log(plan.out / "t-0.5.rlog")
     assert log.session.ended == Ended.LIMIT_EXCEEDED and log.end is not None
@@ -238,7 +238,7 @@ def test_checks_find_a_port_that_is_not_there_and_a_clock_that_is_behind(tmp_pat
     ],
 )
 def test_mistakes_in_a_plan_get_one_sentence(tmp_path, change, sentence):
-    with pytest.raises(PlanError) as error:
+    with pytest.raises(InputError) as error:
         steps_of(plan_with(tmp_path, **change))
     assert sentence in str(error.value)
 

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rotorid.recordings.importers.guessing.guess import guess
+from rotorid.recordings.importers.guessing import guess
 from rotorid.recordings.importers.logfile import read_log
 from rotorid.recordings.importers.mapping import read_columns
 from tests.forked import Commands, commands

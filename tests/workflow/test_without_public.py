@@ -8,7 +8,7 @@ import pytest
 from copied_project import ROOT, Project
 
 from rotorid.io.public_list import read_manifest
-from rotorid.recordings.importers import overview
+from rotorid.recordings.importers import public_sets
 from rotorid.report import prose
 from workflow.scripts import import_public
 
@@ -66,7 +66,7 @@ def test_what_to_do_about_missing_files_is_what_helps(
         status.append(tmp_path / f"{source}.json")
         places = (str(tmp_path / folder) if folder else "", str(tmp_path / "cache"), str(tmp_path / "sets"))
         import_public.main(source, str(manifest), vehicles, *places, str(status[-1]))
-    state = overview.state(overview.sources(status))
+    state = public_sets.state(public_sets.sources(status))
     assert state["obtained"] == 0 and said in state["how"] and unsaid not in state["how"]
     files = {"state": tmp_path / "state.json"}
     files["state"].write_text(json.dumps(state))

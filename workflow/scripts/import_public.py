@@ -24,7 +24,8 @@ def main(
     """Import every set of `source` below `parent` and write what was had to the JSON file `status`."""
     entry = read_manifest(manifest)[source]
     obtained = obtain(source, entry, Path(folder) if folder else None, Path(cache))
-    for file, reason in obtained.missing.items():
+    missing = obtained[1]
+    for file, reason in missing.items():
         LOGGER.warning("%s: %s", file, reason)
     sets = {}
     for name in public_sets.sets_of(source):
@@ -37,10 +38,10 @@ def main(
     status_of = {
         "source": source,
         "taken_from": "folder" if folder else "network",
-        "available": obtained.complete,
+        "available": not missing,
         "files": len(entry["files"]),
-        "files_missing": len(obtained.missing),
-        "reason": next(iter(obtained.missing.values()), ""),
+        "files_missing": len(missing),
+        "reason": next(iter(missing.values()), ""),
         **words,
         "sets": sets,
     }

@@ -14,6 +14,7 @@ import shutil
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta, timezone
+from functools import partial
 from pathlib import Path
 from zlib import crc32
 
@@ -23,11 +24,13 @@ from rotorid.acquire import procedures
 from rotorid.acquire.emulators.devices import (
     BenchDevice,
     Device,
+    Faults,
     Jr3Device,
-    Physics,
     QuadrotorDevice,
     RotorDevice,
     TensileDevice,
+    WireHalf,
+    World,
     WrenchDevice,
 )
 from rotorid.acquire.emulators.physics import (
@@ -41,13 +44,12 @@ from rotorid.acquire.emulators.physics import (
     StandPhysics,
     TensilePhysics,
     TesterPhysics,
-    TorqueRig,
     TurningRotors,
+    torque_rig,
     write_stated,
 )
 from rotorid.acquire.emulators.truth import Truth, draw_truth, write_truth
-from rotorid.acquire.emulators.wire import Faults, WireHalf, World
-from rotorid.acquire.procedures import STEADY_JR3, SteadyRule, programme_of
+from rotorid.acquire.procedures import STEADY_JR3, SteadyRule, programme_of, run_with
 from rotorid.acquire.recorder import Recorder, Timings
 from rotorid.acquire.transport import LoopbackTransport, VirtualClock
 from rotorid.io.session import RoomAir, Session, Setup, session_path, write_index, write_session
@@ -72,14 +74,7 @@ COMBINATIONS: tuple[tuple[str, ...], ...] = (
     ("Carbon Fiber Tube",),
     ("Aluminum 1", "Aluminum 2"),
     ("Aluminum 1", "Aluminum 2", "Aluminum 3"),
-    (
-        "Aluminum 3",
-        "Aluminum 4",
-        "Carbon Fiber 1",
-        "Carbon Fiber 2",
-        "Carbon Fiber 3",
-        "Carbon Fiber Tube",
-    ),
+    ("Aluminum 3", "Aluminum 4", "Carbon Fiber 1", "Carbon Fiber 2", "Carbon Fiber 3", "Carbon Fiber Tube"),
 )
 SEED = 2024
 STATED = "campaign_stated.yaml"
@@ -160,24 +155,19 @@ class _Campaign:
             )
             for line, (name, setup) in zip(world.lines, setups.items(), strict=True)
         ]
-        _within(recorders, run)
+        run_with(recorders, run)
         for recorder in recorders:
             _pack(recorder.log_path, recorder.session)
             self.recordings.append(recorder.session)
         self.date += timedelta(seconds=round(clock.now_ns() / 1e9 + pause_s))
 
 
-def _within(recorders: list[Recorder], run: Callable[..., None]) -> None:
-    """Run a procedure with all recorders open."""
-    if len(recorders) == 1:
-        with recorders[0] as only:
-            run(only)
-    else:
-        with recorders[0] as first, recorders[1] as second:
-            run(first, second)
+def weight_gf(items: tuple[str, ...] | list[str]) -> float:
+    """Weight of a combination in gf."""
+    return round(sum(_WEIGHTS_GF[item] for item in items), 4)
 
 
-def _pack(log: Path, session: Session) -> Path:
+def _pack(log: Path, session: Session) -> None:
     """Replace a finished log by its gzipped form (same bytes inside, no name and no date in the header)."""
     packed = log.with_name(log.name + ".gz")
     with open(packed, "wb") as raw, gzip.GzipFile("", "wb", 9, raw, mtime=0) as out:
@@ -185,7 +175,6 @@ def _pack(log: Path, session: Session) -> Path:
     log.unlink()
     session.log = packed.name
     write_session(session, session_path(packed))
-    return packed
 
 
 def _operator(place: Callable[[float], None], load_gf: float, reaction_samples: int) -> procedures.Prompt:
@@ -228,14 +217,9 @@ def calibration(campaign: _Campaign) -> None:
                     return lambda: True
 
                 setup = Setup(platform="clamp", cell=cell, load_gf=load, load_items=list(items), repeat=repeat)
-                campaign.record(
-                    "calibration",
-                    f"cal-cell{cell}",
-                    world,
-                    {name: setup},
-                    lambda recorder, prompt=prompt: procedures.calibrate_cell(recorder, prompt),
-                    {"name": "calibrate_cell", "samples": 400, "weight_at": 50},
-                )
+                procedure = {"name": "calibrate_cell", "samples": 400, "weight_at": 50}
+                run = partial(procedures.calibrate_cell, prompt=prompt)
+                campaign.record("calibration", f"cal-cell{cell}", world, {name: setup}, run, procedure)
 
 
 def static(campaign: _Campaign) -> None:
@@ -244,24 +228,25 @@ def static(campaign: _Campaign) -> None:
     for platform, axis in series:
         for number, items in enumerate(COMBINATIONS, start=1):
             for repeat in range(1, _REPEATS + 1):
-                name = f"static-{platform}-{axis}-w{number}-r{repeat:02d}"
-                rng = campaign.rng(name)
-                physics, device = _platform(campaign, platform, rng)
-                world = World(physics, campaign.line(device, name))
-                physics.process(1.0)
-                load = weight_gf(items)
-                rule = STEADY_JR3 if platform == "jr3" else SteadyRule()
-                reaction = int(rng.integers(60, 120))
-                prompt = _operator(lambda gf, p=physics, a=axis: p.place_load(a, gf), load, reaction)
-                setup = Setup(platform=platform, axis=axis, load_gf=load, load_items=list(items), repeat=repeat)
-                campaign.record(
-                    "static",
-                    f"static-{platform}-{axis}",
-                    world,
-                    {name: setup},
-                    lambda recorder, prompt=prompt, rule=rule: procedures.static_test(recorder, prompt, 50, rule),
-                    {"name": "static_test", "samples": 50, **vars(rule)},
-                )
+                _weigh(campaign, "static", platform, axis, items, f"w{number}-r{repeat:02d}", repeat)
+
+
+def _weigh(
+    campaign: _Campaign, kind: str, platform: str, axis: str, items: tuple[str, ...], name: str, repeat: int
+) -> None:
+    """Put weights on a platform along one axis, or along several at once, and read."""
+    group = f"{kind}-{platform}-{axis}"
+    name = f"{group}-{name}"
+    rng = campaign.rng(name)
+    physics, device = _platform(campaign, platform, rng)
+    world = World(physics, campaign.line(device, name))
+    physics.process(1.0)
+    load = weight_gf(items)
+    rule = STEADY_JR3 if platform == "jr3" else SteadyRule()
+    prompt = _operator(lambda gf: physics.place_load(axis, gf), load, int(rng.integers(60, 120)))
+    setup = Setup(platform=platform, axis=axis, load_gf=load, load_items=list(items), repeat=repeat)
+    run = partial(procedures.static_test, prompt=prompt, samples=50, rule=rule)
+    campaign.record(kind, group, world, {name: setup}, run, {"name": "static_test", "samples": 50, **vars(rule)})
 
 
 def dynamic(campaign: _Campaign) -> None:
@@ -280,18 +265,15 @@ def dynamic(campaign: _Campaign) -> None:
                 physics.drive(force)
                 return lambda: True
 
-            campaign.record(
-                "dynamic",
-                f"dynamic-set{repeat}",
-                world,
-                {name: Setup(platform=platform, axis="z", repeat=repeat, remarks="87 g quadrotor, flown by hand")},
-                lambda recorder, prompt=prompt, rule=rule: procedures.dynamic_test(recorder, prompt, 1500, rule),
-                {"name": "dynamic_test", "samples": 1500, **vars(rule)},
-                pause_s=300,
-            )
+            setup = Setup(platform=platform, axis="z", repeat=repeat, remarks="87 g quadrotor, flown by hand")
+            procedure = {"name": "dynamic_test", "samples": 1500, **vars(rule)}
+            run = partial(procedures.dynamic_test, prompt=prompt, samples=1500, rule=rule)
+            campaign.record("dynamic", f"dynamic-set{repeat}", world, {name: setup}, run, procedure, pause_s=300)
 
 
-def _platform(campaign: _Campaign, platform: str, rng: np.random.Generator) -> tuple[Physics, Device]:
+def _platform(
+    campaign: _Campaign, platform: str, rng: np.random.Generator
+) -> tuple[BenchPhysics | LoadedSensor, Device]:
     if platform == "jr3":
         sensor = LoadedSensor(campaign.truth.jr3, rng)
         return sensor, Jr3Device(sensor)
@@ -334,14 +316,10 @@ def thrust(campaign: _Campaign) -> None:
             propeller=_PROPELLER,
             battery=f"4S 1500 mAh no. {(percent - 1) // 10 % 3 + 1}",
         )
-        campaign.record(
-            "thrust",
-            "thrust",
-            World(physics, campaign.line(RotorDevice(physics), name)),
-            {name: setup},
-            lambda recorder, u=percent / 100: procedures.thrust_test(recorder, u, 1.0, 4.0),
-            {"name": "thrust_test", "throttle": percent / 100, "rest_s": 1.0, "hold_s": 4.0},
-        )
+        world = World(physics, campaign.line(RotorDevice(physics), name))
+        settings = {"throttle": percent / 100, "rest_s": 1.0, "hold_s": 4.0}
+        run = partial(procedures.thrust_test, **settings)
+        campaign.record("thrust", "thrust", world, {name: setup}, run, {"name": "thrust_test", **settings})
 
 
 def torque(campaign: _Campaign) -> None:
@@ -351,7 +329,7 @@ def torque(campaign: _Campaign) -> None:
         if percent % 10 == 2:
             battery = Battery(truth.battery)
         name = f"torque-{percent:02d}"
-        rig = TorqueRig(truth, battery, campaign.rng(name))
+        stand, tester = torque_rig(truth, battery, campaign.rng(name))
         common = Setup(
             axis="z",
             motor=1,
@@ -363,24 +341,15 @@ def torque(campaign: _Campaign) -> None:
             sensor_position_m=list(SENSOR_POSITION_M),
             tared=False,
         )
-        world = World(
-            rig,
-            campaign.line(RotorDevice(rig.tester), name),
-            campaign.line(WrenchDevice(rig.stand), name),
-        )
+        lines = (campaign.line(device, name) for device in (RotorDevice(tester), WrenchDevice(stand)))
         remark = "drives and counts only: its thrust cell carries nothing"
         setups = {
             f"{name}-rotor": common.model_copy(update={"platform": "tester", "remarks": remark}),
             f"{name}-wrench": common.model_copy(update={"platform": "stand"}),
         }
-        campaign.record(
-            "torque",
-            name,
-            world,
-            setups,
-            lambda tester, sensor, u=percent / 100: procedures.torque_test(tester, sensor, u, 2.0, 6.0),
-            {"name": "torque_test", "throttle": percent / 100, "rest_s": 2.0, "hold_s": 6.0},
-        )
+        settings = {"throttle": percent / 100, "rest_s": 2.0, "hold_s": 6.0}
+        run = partial(procedures.torque_test, **settings)
+        campaign.record("torque", name, World(stand, *lines), setups, run, {"name": "torque_test", **settings})
 
 
 def dynamics(campaign: _Campaign) -> None:
@@ -411,16 +380,12 @@ def dynamics(campaign: _Campaign) -> None:
             sensor_position_m=list(SENSOR_POSITION_M),
             tared=False,
         )
-        campaign.record(
-            "dynamics",
-            name,
-            world,
-            {f"{name}-quadrotor": setup, f"{name}-wrench": setup},
-            lambda vehicle, sensor, c=letter, p=programme: procedures.experiment(vehicle, sensor, c, p),
-            {"name": "experiment", "number": number, "letter": letter}
-            | programme._asdict()
-            | {"shape": "trapezoid" if programme.shape == TRAPEZOID else "sine", "maxima": list(programme.maxima)},
-        )
+        shape = "trapezoid" if programme.shape == TRAPEZOID else "sine"
+        procedure = {"name": "experiment", "number": number, "letter": letter, **programme._asdict()}
+        procedure |= {"shape": shape, "maxima": list(programme.maxima)}
+        setups = {f"{name}-quadrotor": setup, f"{name}-wrench": setup}
+        run = partial(procedures.experiment, letter=letter, programme=programme)
+        campaign.record("dynamics", name, world, setups, run, procedure)
 
 
 def tensile(campaign: _Campaign) -> None:
@@ -440,15 +405,10 @@ def tensile(campaign: _Campaign) -> None:
                 gauge_length_mm=GAUGE_MM,
                 cross_section_mm2=SECTION_MM2,
             )
-            campaign.record(
-                "tensile",
-                f"tensile-{infill:03d}",
-                World(physics, campaign.line(TensileDevice(physics), name)),
-                {name: setup},
-                lambda recorder: procedures.stream(recorder, None),
-                {"name": "stream", "until": "the specimen is broken", "speed_mm_min": 10},
-                pause_s=120,
-            )
+            world = World(physics, campaign.line(TensileDevice(physics), name))
+            procedure = {"name": "stream", "until": "the specimen is broken", "speed_mm_min": 10}
+            run = partial(procedures.stream, samples=None)
+            campaign.record("tensile", f"tensile-{infill:03d}", world, {name: setup}, run, procedure, pause_s=120)
 
 
 def combined(campaign: _Campaign) -> None:
@@ -458,24 +418,9 @@ def combined(campaign: _Campaign) -> None:
     """
     for axis in _COMBINED_AXES:
         for number in _COMBINED_LOADS:
-            items = COMBINATIONS[number - 1]
             for repeat in range(1, 6):
-                name = f"combined-al-{axis}-w{number}-r{repeat}"
-                rng = campaign.rng(name)
-                physics, device = _platform(campaign, "al", rng)
-                world = World(physics, campaign.line(device, name))
-                physics.process(1.0)
-                load = weight_gf(items)
-                prompt = _operator(lambda gf, p=physics, a=axis: p.place_load(a, gf), load, int(rng.integers(60, 120)))
-                setup = Setup(platform="al", axis=axis, load_gf=load, load_items=list(items), repeat=repeat)
-                campaign.record(
-                    "combined",
-                    f"combined-al-{axis}",
-                    world,
-                    {name: setup},
-                    lambda recorder, prompt=prompt: procedures.static_test(recorder, prompt, 50, SteadyRule()),
-                    {"name": "static_test", "samples": 50, **vars(SteadyRule())},
-                )
+                name = f"w{number}-r{repeat}"
+                _weigh(campaign, "combined", "al", axis, COMBINATIONS[number - 1], name, repeat)
 
 
 PARTS: dict[str, Callable[[_Campaign], None]] = {
@@ -524,8 +469,3 @@ def main() -> None:
 
 if __name__ == "__main__":
     main()
-
-
-def weight_gf(items: tuple[str, ...] | list[str]) -> float:
-    """Weight of a combination in gf."""
-    return round(sum(_WEIGHTS_GF[item] for item in items), 4)

@@ -25,19 +25,11 @@ import typer
 from rotorid.acquire import procedures, view
 from rotorid.acquire.procedures import HOLD_S, RAMP_S, programme_of, recorders_for, run_with
 from rotorid.acquire.recorder import Recorder
-from rotorid.acquire.transport import (
-    AcquireError,
-    Interrupted,
-    LimitExceeded,
-    PortBusy,
-    PortLost,
-    PortMissing,
-    SerialTransport,
-)
+from rotorid.acquire.transport import AcquireError, Interrupted, PortLost, PortMissing, SerialTransport
 from rotorid.errors import InputError
 from rotorid.io import wire
 from rotorid.io.frames import COMMAND, START, Frame, Intake, encode
-from rotorid.io.session import RoomAir, SessionError, Setup
+from rotorid.io.session import Ended, RoomAir, Setup
 from rotorid.io.wire import EXPERIMENTS, IDENTIFY, INSTRUMENTS
 
 _DEFAULT_OUT = Path("raw/local")
@@ -175,28 +167,19 @@ def bench(
     shared: _Shared,
 ) -> None:
     """Record the load-cell bench: settle, wait until steady, tare, load, read (thesis fig. 2.35)."""
-    instrument, rule = ("jr3", procedures.STEADY_JR3) if platform == "jr3" else ("bench", procedures.SteadyRule())
-    if tolerance is not None:
-        rule = replace(rule, tolerance=tolerance)
+    instrument = "jr3" if platform == "jr3" else "bench"
     kind = {"calibrate": "calibration", "stream": "free"}.get(test, test)
-    setup = Setup(
-        kind=kind, platform=platform, axis=axis, load_gf=load_gf, cell=cell, repeat=repeat, operator=shared.operator
-    )
+    setup = Setup(kind=kind, platform=platform, axis=axis, load_gf=load_gf, cell=cell, repeat=repeat)
 
     def run(recorder: Recorder) -> None:
-        prompt = _prompt(recorder, place_s)
-        if test == "calibrate":
-            procedures.calibrate_cell(recorder, prompt, samples or 400)
-        elif test == "static":
-            procedures.static_test(recorder, prompt, samples or 50, rule, wait_s)
-        elif test == "dynamic":
-            procedures.dynamic_test(recorder, prompt, samples or 1500, rule, wait_s)
+        if test in procedures.BENCH_TESTS:
+            procedures.bench_test(recorder, test, _prompt(recorder, place_s), samples or None, tolerance, wait_s)
         elif test == "stream":
             procedures.stream(recorder, samples, 1 / rate if rate else 0.0)
         else:
             raise typer.BadParameter(f"--test is stream, calibrate, static or dynamic, not {test!r}")
 
-    _record({instrument: port}, {instrument: setup}, run, {"name": test}, shared)
+    _record({instrument: port}, setup, run, {"name": test}, shared)
 
 
 @app.command()
@@ -212,17 +195,10 @@ def rotor(
     shared: _Shared,
 ) -> None:
     """Record the thrust tester: rest, throttle, rest. Keep clear of the propeller."""
-    setup = Setup(
-        kind="thrust", throttle=throttle, propeller=propeller, battery=battery, operator=shared.operator, motor=1
-    )
-    procedure = {"name": "thrust_test", "throttle": throttle, "rest_s": rest_s, "hold_s": hold_s}
-    _record(
-        {"rotor": port},
-        {"rotor": setup},
-        lambda recorder: procedures.thrust_test(recorder, throttle, rest_s, hold_s),
-        procedure,
-        shared,
-    )
+    setup = Setup(kind="thrust", throttle=throttle, propeller=propeller, battery=battery, motor=1)
+    settings = {"throttle": throttle, "rest_s": rest_s, "hold_s": hold_s}
+    run = functools.partial(procedures.thrust_test, **settings)
+    _record({"rotor": port}, setup, run, {"name": "thrust_test", **settings}, shared)
 
 
 @app.command()
@@ -256,13 +232,12 @@ def wrench(
         "measuring_times": measuring_times,
         "offset": offset,
     }
-    setup = Setup(operator=shared.operator, tared=offset)
-    _record({"wrench": port}, {"wrench": setup}, run, procedure, shared)
+    _record({"wrench": port}, Setup(tared=offset), run, procedure, shared)
 
 
-@app.command("quadrotor")
+@app.command()
 @_with_shared
-def quadrotor_command(
+def quadrotor(
     port: _Port,
     dynamics: Annotated[str, typer.Option(help=f"command character: {wire.DYNAMICS}")] = "h",
     shape: Annotated[str, typer.Option(help="trapezoid or sine")] = "trapezoid",
@@ -287,15 +262,10 @@ def quadrotor_command(
         programme.pack()
     except ValueError as error:
         raise typer.BadParameter(f"--maxima are four fractions such as 0.1,0.1,0.1,0.1 ({error})") from error
-    setup = Setup(kind="free", propeller=propeller, battery=battery, operator=shared.operator)
+    setup = Setup(kind="free", propeller=propeller, battery=battery)
     procedure = {"name": "fly_programme", "letter": dynamics, **programme._asdict(), "maxima": list(four)}
-    _record(
-        {"quadrotor": port},
-        {"quadrotor": setup},
-        lambda recorder: procedures.fly_programme(recorder, dynamics, programme),
-        procedure,
-        shared,
-    )
+    run = functools.partial(procedures.fly_programme, letter=dynamics, programme=programme)
+    _record({"quadrotor": port}, setup, run, procedure, shared)
 
 
 @app.command()
@@ -326,15 +296,12 @@ def experiment(
         tared=False,
         propeller=propeller,
         battery=battery,
-        operator=shared.operator,
     )
-    _record(
-        {"quadrotor": quadrotor_port, "wrench": wrench_port},
-        {"quadrotor": setup, "wrench": setup},
-        lambda vehicle, sensor: procedures.experiment(vehicle, sensor, letter, programme),
-        {"name": "experiment", "number": number, "letter": letter, "duration_s": programme.duration_s},
-        replace(shared, name=shared.name or f"exp-{number:02d}-{datetime.now():%Y%m%d-%H%M%S}"),
-    )
+    ports = {"quadrotor": quadrotor_port, "wrench": wrench_port}
+    run = functools.partial(procedures.experiment, letter=letter, programme=programme)
+    procedure = {"name": "experiment", "number": number, "letter": letter, "duration_s": programme.duration_s}
+    name = shared.name or f"exp-{number:02d}-{datetime.now():%Y%m%d-%H%M%S}"
+    _record(ports, setup, run, procedure, replace(shared, name=name))
 
 
 @app.command()
@@ -361,15 +328,10 @@ def torque(
         tared=False,
         propeller=propeller,
         battery=battery,
-        operator=shared.operator,
     )
-    _record(
-        {"rotor": rotor_port, "wrench": wrench_port},
-        {"rotor": setup, "wrench": setup},
-        lambda tester, sensor: procedures.torque_test(tester, sensor, throttle, rest_s, hold_s),
-        {"name": "torque_test", "throttle": throttle, "rest_s": rest_s, "hold_s": hold_s},
-        shared,
-    )
+    settings = {"throttle": throttle, "rest_s": rest_s, "hold_s": hold_s}
+    ports, run = {"rotor": rotor_port, "wrench": wrench_port}, functools.partial(procedures.torque_test, **settings)
+    _record(ports, setup, run, {"name": "torque_test", **settings}, shared)
 
 
 @app.command()
@@ -391,15 +353,9 @@ def tensile(
         specimen=f"{infill_percent}-{repeat}",
         gauge_length_mm=gauge_length_mm,
         cross_section_mm2=cross_section_mm2,
-        operator=shared.operator,
     )
-    _record(
-        {"tensile": port},
-        {"tensile": setup},
-        lambda recorder: procedures.stream(recorder, None, moves=True),
-        {"name": "stream"},
-        shared,
-    )
+    run = functools.partial(procedures.stream, samples=None, moves=True)
+    _record({"tensile": port}, setup, run, {"name": "stream"}, shared)
 
 
 @app.command()
@@ -410,35 +366,40 @@ def check(
     """Read a log as the pipeline does and say what is in it. A recording that was cut off is completed: its
     metadata then say how far it goes."""
     from rotorid.acquire.run_plan import repair
-    from rotorid.io.logs import LogError, read_log
+    from rotorid.io.lines import read_line_log
+    from rotorid.io.logs import read_log
     from rotorid.io.metadata_checksum import without_checksum
-    from rotorid.io.rawlog import NotALog
-    from rotorid.io.session import session_path
+    from rotorid.io.session import read_session, session_path
 
     try:
-        if _check_lines(log, csv):
-            return
-        parsed = read_log(log)
-        repaired = repair(log, parsed)
-    except (LogError, NotALog, SessionError, OSError) as error:
+        session = read_session(session_path(log)) if session_path(log).exists() else None
+        of_lines = session is not None and "description" in session.procedure
+        parsed = (read_line_log if of_lines else read_log)(log)
+        repaired = not of_lines and repair(log, parsed)
+    except (InputError, OSError) as error:
         _fail(str(error))
     table = parsed.table
-    typer.echo(f"{log}: {parsed.instrument.title} ({parsed.start.firmware}), {len(table)} samples", nl=False)
-    typer.echo(f", {table.time_s.iloc[-1]:.2f} s of device time" if len(table) else "")
-    typer.echo(f"missing {parsed.missing} in {len(parsed.gaps)} gaps, repeated {parsed.repeated}, damaged ", nl=False)
-    typer.echo(f"{parsed.checksum_errors + parsed.broken_frames}, resets {parsed.resets}")
-    if parsed.malformed or parsed.unknown_kinds:
-        typer.echo(f"frames that make no sense {parsed.malformed}, of an unknown kind {parsed.unknown_kinds}")
+    if of_lines:
+        typer.echo(f"{log}: {len(table)} lines read, {parsed.unreadable} could not be", nl=False)
+        typer.echo(f", {parsed.damaged_bytes} bytes damaged" if parsed.damaged_bytes else "")
+    else:
+        session = parsed.session
+        typer.echo(f"{log}: {parsed.instrument.title} ({parsed.start.firmware}), {len(table)} samples", nl=False)
+        typer.echo(f", {table.time_s.iloc[-1]:.2f} s of device time" if len(table) else "")
+        damaged = f"damaged {parsed.checksum_errors + parsed.broken_frames}, resets {parsed.resets}"
+        typer.echo(f"missing {parsed.missing} in {len(parsed.gaps)} gaps, repeated {parsed.repeated}, {damaged}")
+        if parsed.malformed or parsed.unknown_kinds:
+            typer.echo(f"frames that make no sense {parsed.malformed}, of an unknown kind {parsed.unknown_kinds}")
     if parsed.cut_at is not None:
         typer.echo(f"cut off at byte {parsed.cut_at}; everything before that is there")
     for fault in parsed.faults:
         typer.echo(f"NOT AS RECORDED: {fault}")
     if repaired:
         typer.echo("its metadata were never finished; completed now from the log")
-    if parsed.session is not None:
-        typer.echo(f"ended: {parsed.session.ended} – {parsed.session.message}")
-        if parsed.session.metadata_sha256 is None and not repaired:
-            typer.echo(without_checksum(1, session_path(log)))
+    if session is not None and not of_lines:
+        typer.echo(f"ended: {session.ended} – {session.message}")
+    if session is not None and session.metadata_sha256 is None and not repaired:
+        typer.echo(without_checksum(1, session_path(log)))
     if csv is not None:
         table.to_csv(csv, index=False)
         typer.echo(f"table: {csv}")
@@ -475,7 +436,7 @@ def index(raw: Annotated[Path, typer.Argument(help="the folder of raw logs")] = 
     try:
         rows = write_index(raw)
         bare = [path for path in metadata_files(raw) if read_session(path).metadata_sha256 is None]
-    except (SessionError, OSError) as error:
+    except (InputError, OSError) as error:
         _fail(str(error))
     typer.echo(f"{raw / 'sessions.tsv'}: {len(rows)} recordings")
     if bare:
@@ -536,10 +497,9 @@ def lines(
     """Record an instrument that sends plain lines of text (CSV, key=value, fixed places) and knows no frames."""
     from rotorid.acquire.lines import record_lines
     from rotorid.acquire.transport import SerialTransport, SystemClock
-    from rotorid.io.lines import DescriptionError, read_description
+    from rotorid.io.lines import read_description
 
-    console = view.stderr_console()
-    stop = threading.Event()
+    console, stop = view.stderr_console(), threading.Event()
     try:
         read = read_description(description)
         name = shared.name or f"{read.name}-{datetime.now():%Y%m%d-%H%M%S}"
@@ -556,7 +516,8 @@ def lines(
             for column, (low, high) in limits.items():
                 value = values[columns.index(column)]
                 if not low <= value <= high:
-                    raise LimitExceeded(f"{column} is {value:.6g}, allowed are {low:g} to {high:g}: stopped")
+                    text = f"{column} is {value:.6g}, allowed are {low:g} to {high:g}: stopped"
+                    raise AcquireError(text, Ended.LIMIT_EXCEEDED)
 
         def work() -> None:
             record_lines(
@@ -571,7 +532,7 @@ def lines(
     except Interrupted as error:
         console.print(str(error))
         raise typer.Exit(130) from error
-    except (DescriptionError, AcquireError) as error:
+    except (InputError, AcquireError) as error:
         _fail(str(error))
     typer.echo(f"{shared.out / name}.rlog: recorded; `rotorid-acquire check` reads it")
 
@@ -589,18 +550,17 @@ def campaign(
     ] = None,
 ) -> None:
     """Record a campaign by its plan: checks first, then step after step; goes on where it was left."""
-    from functools import partial
+    from contextlib import nullcontext
     from tempfile import TemporaryDirectory
 
     from rotorid.acquire import run_plan
-    from rotorid.acquire.run_plan import PlanError, is_done, read_plan, steps_of
+    from rotorid.acquire.run_plan import is_done, read_plan, steps_of
 
-    console = view.stderr_console()
-    stop = threading.Event()
+    console, stop = view.stderr_console(), threading.Event()
     try:
         planned = read_plan(plan)
         steps = steps_of(planned)
-    except PlanError as error:
+    except InputError as error:
         _fail(str(error))
     if show:
         for step in steps:
@@ -632,16 +592,17 @@ def campaign(
     )
     try:
         with TemporaryDirectory(prefix="rotorid-") as folder:
-            ports_of = partial(run_plan.real_ports, planned)
-            if emulate_it:
-                ports_of = partial(
-                    run_plan.emulated_ports, planned, folder=Path(folder), speed=speed, place_s=wait_s * 0.6
-                )
+
+            def ports_of(step):
+                if emulate_it:
+                    return run_plan.emulated_ports(planned, step, Path(folder), speed, wait_s * 0.6)
+                return nullcontext(planned.ports)
+
             left = run_plan.run(planned, ports_of, desk, repeat)
     except Interrupted as error:
         console.print(str(error))
         raise typer.Exit(130) from error
-    except (AcquireError, PlanError, SessionError, OSError) as error:
+    except (AcquireError, InputError, OSError) as error:
         _fail(f"{error}\nNothing that is recorded is lost; the same command goes on from here.")
     typer.echo(f"{planned.out}: {len(steps) - left} of {len(steps)} recordings are there; {planned.out}/sessions.tsv")
 
@@ -649,16 +610,9 @@ def campaign(
 # ---- shared ----------------------------------------------------------------------------------------------
 
 
-def _record(
-    ports: dict[str, str],
-    setups: dict[str, Setup],
-    run: Callable[..., None],
-    procedure: dict,
-    shared: _Shared,
-) -> None:
+def _record(ports: dict[str, str], setup: Setup, run: Callable[..., None], procedure: dict, shared: _Shared) -> None:
     """Open one recorder per instrument, run, show, and leave with a code: 0, 1 or (interrupted) 130."""
-    console = view.stderr_console()
-    stop = threading.Event()
+    console, stop = view.stderr_console(), threading.Event()
     columns = [column for instrument in ports for column in INSTRUMENTS[instrument].columns]
     _of(columns, shared.plot)
     try:
@@ -666,7 +620,7 @@ def _record(
             ports,
             shared.out,
             shared.name,
-            {name: setup.model_copy(update={"air": shared.weather}) for name, setup in setups.items()},
+            dict.fromkeys(ports, setup.model_copy(update={"air": shared.weather, "operator": shared.operator})),
             procedure=procedure,
             limits=shared.limits(columns),
             say=lambda text: console.print(text, style="bold"),
@@ -733,34 +687,6 @@ def _of(columns: list[str], wanted: list[str] | None) -> list[str]:
     return wanted or []
 
 
-def _check_lines(log: Path, csv: Path | None) -> bool:
-    """Say what is in a log of plain lines; False where it is one of frames."""
-    from rotorid.io.lines import read_line_log
-    from rotorid.io.metadata_checksum import without_checksum
-    from rotorid.io.session import read_session, session_path
-
-    if not session_path(log).exists():
-        return False
-    session = read_session(session_path(log))
-    if "description" not in session.procedure:
-        return False
-    found = read_line_log(log)
-    typer.echo(f"{log}: {len(found.table)} lines read, {found.unreadable} could not be", nl=False)
-    typer.echo(f", {found.damaged_bytes} bytes damaged" if found.damaged_bytes else "")
-    if found.cut_at is not None:
-        typer.echo(f"cut off at byte {found.cut_at}; everything before that is there")
-    for fault in found.faults:
-        typer.echo(f"NOT AS RECORDED: {fault}")
-    if session.metadata_sha256 is None:
-        typer.echo(without_checksum(1, session_path(log)))
-    if csv is not None:
-        found.table.to_csv(csv, index=False)
-        typer.echo(f"table: {csv}")
-    if found.faults:
-        raise typer.Exit(1)
-    return True
-
-
 def _fail(text: str) -> None:
     typer.echo(text, err=True)
     raise typer.Exit(1)
@@ -796,7 +722,7 @@ def who_is_there(port: str, wait_s: float = _WAIT_S) -> str:
                         return (
                             f"{content.instrument}{known}, firmware {content.firmware}, serial {content.serial_number}"
                         )
-        except (PortMissing, PortBusy, PortLost) as error:
+        except (PortMissing, PortLost) as error:
             return str(error)
         finally:
             transport.close()

@@ -2,8 +2,6 @@
 
 Time in here is the device's: a procedure counts samples, so it is the same at any speed of the host.
 
-The recorder's own filter and its idea of steady (thesis 2.7.3, fig. 2.35).
-
 Recording from Python, by the same way that the command line goes:
 
     from rotorid.acquire.procedures import record, stream
@@ -18,14 +16,14 @@ import threading
 from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 
 from rotorid.acquire.recorder import Recorder, Row, Timings
-from rotorid.acquire.transport import GaveUp, SerialTransport, SystemClock
+from rotorid.acquire.transport import AcquireError, SerialTransport, SystemClock
 from rotorid.io import wire
-from rotorid.io.session import Session, Setup
+from rotorid.io.session import Ended, Session, Setup
 from rotorid.io.wire import INSTRUMENTS, Experiment
 
 RAMP_S = 3.0
@@ -51,6 +49,7 @@ class SteadyRule:
 
 
 WAIT_S = 600.0  # device time that a weight, or a steady reading, is waited for
+BENCH_TESTS = ("calibrate", "static", "dynamic")
 STEADY_JR3 = SteadyRule(cutoff_hz=0.5, tolerance=0.5)  # in N: the reference sensor is noisy
 
 
@@ -99,8 +98,8 @@ def static_test(
     rule: SteadyRule = SteadyRule(),  # noqa: B008
     wait_s: float = WAIT_S,
 ) -> None:
-    """Thesis fig. 2.35: settle, wait until steady, tare, load, wait until steady, read. Raises GaveUp where the load
-    or a steady reading takes longer than `wait_s` of device time."""
+    """Thesis fig. 2.35: settle, wait until steady, tare, load, wait until steady, read. Raises AcquireError where the
+    load or a steady reading takes longer than `wait_s` of device time."""
     recorder.start()
     _tare(recorder, rule, wait_s)
     recorder.phase = "put the load on"
@@ -109,28 +108,43 @@ def static_test(
         if done():
             break
         if count * recorder.instrument.interval_us > wait_s * 1e6:
-            raise GaveUp(f"no load within {wait_s:g} s (--wait-s); the device is stopped, the log has what came before")
+            text = f"no load within {wait_s:g} s (--wait-s); the device is stopped, the log has what came before"
+            raise AcquireError(text, Ended.GAVE_UP)
     recorder.mark("load", row)
     _wait_until_steady(recorder, rule, "load_steady", wait_s)
     recorder.phase = "reading"
-    _read(recorder, samples)
+    _mark_ends(recorder, samples, "read_start", "read_stop")
     recorder.stop()
 
 
 def dynamic_test(
     recorder: Recorder,
     prompt: Prompt,
-    samples: int,
+    samples: int = 1500,
     rule: SteadyRule = SteadyRule(),  # noqa: B008
     wait_s: float = WAIT_S,
 ) -> None:
-    """Settle, wait until steady, tare, then record the vehicle's manoeuvre. Raises GaveUp as `static_test` does."""
+    """Settle, wait until steady, tare, then record the vehicle's manoeuvre. Raises as `static_test`."""
     recorder.start()
     _tare(recorder, rule, wait_s)
     recorder.phase = "reading"
     prompt("fly the manoeuvre now")
-    _read(recorder, samples)
+    _mark_ends(recorder, samples, "read_start", "read_stop")
     recorder.stop()
+
+
+def bench_test(
+    recorder: Recorder, test: str, prompt: Prompt, samples: int | None, tolerance: float | None, wait_s: float
+) -> None:
+    """Carry out one of `BENCH_TESTS`; what is None is the test's, or the instrument's, own."""
+    more = {} if samples is None else {"samples": samples}
+    if test == "calibrate":
+        calibrate_cell(recorder, prompt, **more)
+        return
+    rule = STEADY_JR3 if recorder.instrument.name == "jr3" else SteadyRule()
+    if tolerance is not None:
+        rule = replace(rule, tolerance=tolerance)
+    (static_test if test == "static" else dynamic_test)(recorder, prompt, rule=rule, wait_s=wait_s, **more)
 
 
 def thrust_test(recorder: Recorder, throttle: float, rest_s: float, hold_s: float) -> None:
@@ -229,12 +243,7 @@ def experiment(
 
 
 def torque_test(
-    tester: Recorder,
-    sensor: Recorder,
-    throttle: float,
-    rest_s: float,
-    hold_s: float,
-    interval_s: float = 0.01,
+    tester: Recorder, sensor: Recorder, throttle: float, rest_s: float, hold_s: float, interval_s: float = 0.01
 ) -> None:
     """Motor 1 of the vehicle on the wrench sensor, driven and counted by the thrust tester."""
     tester.guard()
@@ -262,12 +271,10 @@ def _tare(recorder: Recorder, rule: SteadyRule, wait_s: float) -> None:
     _wait_until_steady(recorder, rule, "steady", wait_s)
     recorder.phase = "taring"
     sums = [0.0] * len(recorder.instrument.channels)
-    count = 0
-    for row in recorder.rows(_TARE_SAMPLES):
-        if count == 0:
+    for count, row in enumerate(recorder.rows(_TARE_SAMPLES), start=1):
+        if count == 1:
             recorder.mark("tare_start", row)
         sums = [total + value for total, value in zip(sums, row.values, strict=True)]
-        count += 1
     recorder.mark("tare_stop", row)
     means = (total / count for total in sums)
     recorder.session.tare = dict(zip(recorder.instrument.columns, means, strict=True))
@@ -275,32 +282,26 @@ def _tare(recorder: Recorder, rule: SteadyRule, wait_s: float) -> None:
 
 def _wait_until_steady(recorder: Recorder, rule: SteadyRule, mark: str, wait_s: float) -> None:
     recorder.phase = "waiting until steady"
-    low_pass = LowPass(rule.cutoff_hz, recorder.instrument.interval_us * 1e-6)
-    steadiness = Steadiness(rule.window, (rule.tolerance,) * len(recorder.instrument.channels))
+    steadiness = Steadiness(rule, recorder.instrument.interval_us * 1e-6)
     for count, row in enumerate(recorder.rows()):
-        if steadiness.update(low_pass.update(row.values)):
+        if steadiness.update(row.values):
             recorder.mark(mark, row)
             return
         if count * recorder.instrument.interval_us > wait_s * 1e6:
             spans = steadiness.spans()
             worst = max(range(len(spans)), key=spans.__getitem__)
-            raise GaveUp(
+            raise AcquireError(
                 f"not steady within {wait_s:g} s (--wait-s): {recorder.instrument.columns[worst]} still moves by "
-                f"{spans[worst]:.3g} over {rule.window} samples, {rule.tolerance:.3g} is allowed (--tolerance)"
+                f"{spans[worst]:.3g} over {rule.window} samples, {rule.tolerance:.3g} is allowed (--tolerance)",
+                Ended.GAVE_UP,
             )
 
 
-def _read(recorder: Recorder, samples: int) -> None:
-    _mark_ends(recorder, samples, "read_start", "read_stop")
-
-
 def _mark_ends(recorder: Recorder, samples: int, first: str, last: str) -> None:
-    begun = False
     row: Row | None = None
-    for row in recorder.rows(samples):
-        if not begun:
+    for number, row in enumerate(recorder.rows(samples)):
+        if not number:
             recorder.mark(first, row)
-            begun = True
     if row is not None:
         recorder.mark(last, row)
 
@@ -327,35 +328,22 @@ def _together(leader: Recorder, samples: float, *others: Recorder) -> None:
         leader.drop_rows()
 
 
-class LowPass:
-    """First-order low-pass y += α (x − y) with α = 1 − exp(−2π f_c Δt), for tuples of channels."""
-
-    def __init__(self, cutoff_hz: float, interval_s: float) -> None:
-        self._alpha = 1 - math.exp(-2 * math.pi * cutoff_hz * interval_s)
-        self._state: list[float] | None = None
-
-    def update(self, values: tuple[float, ...]) -> list[float]:
-        """The filtered values; the first sample passes unchanged."""
-        if self._state is None:
-            self._state = list(values)
-        else:
-            self._state = [y + self._alpha * (x - y) for y, x in zip(self._state, values, strict=True)]
-        return self._state
-
-
 class Steadiness:
-    """Steady: over the last `window` samples no channel's filtered value spans more than `tolerance`."""
+    """Steady: over the last samples of a window no channel's low-passed value spans more than is tolerated.
 
-    def __init__(self, window: int, tolerance: tuple[float, ...]) -> None:
-        self._last: deque[list[float]] = deque(maxlen=window)
-        self._tolerance = tolerance
+    The low-pass is of first order, y += α (x − y) with α = 1 − exp(−2π f_c Δt); the first sample passes unchanged.
+    """
 
-    def update(self, filtered: list[float]) -> bool:
-        """Take one more filtered sample; True once the window is full and steady."""
-        self._last.append(filtered)
-        if len(self._last) < self._last.maxlen:
-            return False
-        return all(span <= t for span, t in zip(self.spans(), self._tolerance, strict=True))
+    def __init__(self, rule: SteadyRule, interval_s: float) -> None:
+        self._alpha = 1 - math.exp(-2 * math.pi * rule.cutoff_hz * interval_s)
+        self._tolerance = rule.tolerance
+        self._last: deque[list[float]] = deque(maxlen=rule.window)
+
+    def update(self, values: tuple[float, ...]) -> bool:
+        """Take one more sample; True once the window is full and steady."""
+        before = self._last[-1] if self._last else values
+        self._last.append([y + self._alpha * (x - y) for y, x in zip(before, values, strict=True)])
+        return len(self._last) == self._last.maxlen and all(span <= self._tolerance for span in self.spans())
 
     def spans(self) -> list[float]:
         """What each channel spans over the window so far."""

@@ -23,16 +23,10 @@ from typing import NamedTuple
 
 from rotorid.acquire.transport import (
     AcquireError,
-    BadName,
-    CannotWrite,
     Clock,
-    DeviceFault,
-    DeviceReset,
     DeviceSilent,
     DiskFull,
     Interrupted,
-    LimitExceeded,
-    PortBusy,
     PortLost,
     PortMissing,
     Refused,
@@ -74,26 +68,12 @@ class Row(NamedTuple):
     values: tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class _Status:
-    """What a live view shows, a snapshot."""
-
-    phase: str
-    values: tuple[float, ...]
-    samples: int
-    wanted: int | None
-    rate_hz: float | None
-    missing: int
-    bad_frames: int
-    elapsed_s: float
-    remaining_s: float | None
-
-
 class Recorder:
     """One recording of one instrument.
 
     `resume` (set by a procedure) brings a device that restarted back to streaming; None means that the run
-    is void after a reset. `stop_asked` may be set from another thread or a signal handler.
+    is void after a reset. `say` prints to the person at the keyboard. `stop_asked` may be set from another thread or a
+    signal handler.
     """
 
     def __init__(
@@ -115,7 +95,7 @@ class Recorder:
         limits: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
         if not NAME.fullmatch(recording_id):
-            raise BadName(
+            raise AcquireError(
                 f"a recording is called by letters, digits, '.', '_', '+' and '-', such as static-z-3; "
                 f"{recording_id!r} cannot be its name"
             )
@@ -134,7 +114,7 @@ class Recorder:
         self._transport = transport
         self._clock = clock
         self._timings = timings or Timings()
-        self._say = say
+        self.say = say
         self._durable = durable
         self._source = source
         self._limits = [
@@ -202,10 +182,10 @@ class Recorder:
         self._finish(error)
 
     def check_name(self) -> None:
-        """Raises BadName where a recording of this name is there, packed or not: none is ever overwritten."""
+        """Raises AcquireError where a recording of this name is there, packed or not: none is ever overwritten."""
         for path in (self.log_path, self.log_path.with_name(self.log_path.name + ".gz"), self.session_path):
             if os.path.lexists(path):
-                raise BadName(f"{path}: exists already; a recording is never overwritten. Choose another --id.")
+                raise AcquireError(f"{path}: exists already; a recording is never overwritten. Choose another --id.")
 
     def _create(self) -> None:
         """Log and metadata, or, where the folder does not take both, neither."""
@@ -217,14 +197,14 @@ class Recorder:
             write_session(self.session, self.session_path)
         except FileExistsError as error:
             if error.filename is not None and Path(error.filename) == self.log_path:  # made since we looked
-                raise BadName(f"{error.filename}: exists already; choose another --id.") from error
-            raise CannotWrite(f"{folder}: is a file, not a folder; choose another --out.") from error
+                raise AcquireError(f"{error.filename}: exists already; choose another --id.") from error
+            raise AcquireError(f"{folder}: is a file, not a folder; choose another --out.") from error
         except OSError as error:
             if writer is not None:
                 writer.discard()
             if error.errno in _FULL:
                 raise DiskFull(f"{folder}: the disk is full; free some space or choose another --out.") from error
-            raise CannotWrite(
+            raise AcquireError(
                 f"{error.filename or folder}: cannot be written ({os.strerror(error.errno or errno.EIO)}); "
                 "choose another --out."
             ) from error
@@ -252,14 +232,14 @@ class Recorder:
             try:
                 write_session(self.session, self.session_path)
             except OSError as late:
-                self._say(f"{self.session_path}: cannot be written ({late}); the log itself is whole")
+                self.say(f"{self.session_path}: cannot be written ({late}); the log itself is whole")
 
     # ---- what procedures use -------------------------------------------------------------------------
 
     def command(self, letter: str, arguments: bytes = b"") -> wire.Answer:
         """Send a command and wait for its answer, repeating it if none comes.
 
-        Raises Refused where the device says no, DeviceReset where it says so because it restarted in a run that
+        Raises Refused where the device says no, AcquireError where it says so because it restarted in a run that
         this makes void, DeviceSilent where it says nothing.
         """
         for _ in range(self._timings.tries):
@@ -323,9 +303,7 @@ class Recorder:
         """Stop the stream and take in what is still on its way, up to the end record."""
         self._closing = True
         self.command(STOP)
-        deadline = self._clock.now_ns() + round(self._timings.reply_s * 1e9)
-        while self.ended is None and self._clock.now_ns() < deadline:
-            self._pump()
+        self._pump_until(lambda: self.ended is not None)
         self._streaming = self._watched = False
 
     def rows(self, count: int | None = None) -> Iterator[Row]:
@@ -359,41 +337,31 @@ class Recorder:
         self.session.marks[name] = row.index
         self._note("mark", name=name, index=row.index, segment=row.segment)
 
-    def say(self, text: str) -> None:
-        """Print to the person at the keyboard."""
-        self._say(text)
-
     def note(self, what: str, text: str) -> None:
         """Something happened that belongs into log and metadata; the person is informed as well."""
         self._event(what, text)
-        self._say(text)
+        self.say(text)
 
     @property
     def begun(self) -> bool:
         """Whether there is a log of this recording."""
         return self._writer is not None
 
-    def status(self) -> _Status:
-        """A snapshot for a live view; may be called from another thread."""
-        elapsed = (self._clock.now_ns() - self.session.host_start_ns) / 1e9
-        rate = self._measured_rate()
-        remaining = None
-        if self.wanted is not None and rate:
-            remaining = max(0, self.wanted - self.progress) / rate
-        return _Status(
-            phase=self.phase,
-            values=self._last_values,
-            samples=self._samples,
-            wanted=self.wanted,
-            rate_hz=rate,
-            missing=self._tracker.missing,
-            bad_frames=self._decoder.checksum_errors + self._decoder.broken_frames,
-            elapsed_s=elapsed,
-            remaining_s=remaining,
-        )
+    def status(self) -> tuple[tuple[float, ...], dict[str, str]]:
+        """What a live view shows, which may ask from another thread: the last values, and by heading how it goes."""
+        samples, missing, wanted, rate = self._samples, self._tracker.missing, self.wanted, self._measured_rate()
+        known = wanted is not None and rate
+        return self._last_values, {
+            "samples": f"{samples}" + (f"/{wanted}" if wanted else ""),
+            "rate [1/s]": f"{rate:.1f}" if rate else "–",
+            "missing": str(missing) + (f" ({missing / (samples + missing):.2%})" if missing else ""),
+            "damaged": str(self._decoder.checksum_errors + self._decoder.broken_frames),
+            "elapsed [s]": f"{(self._clock.now_ns() - self.session.host_start_ns) / 1e9:.1f}",
+            "remaining [s]": f"{max(0, wanted - samples - missing) / rate:.0f}" if known else "–",
+        }
 
     def pump(self) -> None:
-        """One read: write, decode, keep watch. Raises Interrupted, DeviceSilent, DeviceReset and others."""
+        """One read: write, decode, keep watch. Raises Interrupted, DeviceSilent and others."""
         if self.stop_asked.is_set() and not self._closing:
             raise Interrupted("stopped at your wish; everything received until then is in the log")
         self._pump()
@@ -404,6 +372,13 @@ class Recorder:
                 self._after_silence()
 
     # ---- inside --------------------------------------------------------------------------------------
+
+    def _pump_until(self, done: Callable[[], bool]) -> bool:
+        """Read until something is there, for as long as an answer may take; whether it is."""
+        deadline = self._clock.now_ns() + round(self._timings.reply_s * 1e9)
+        while not done() and self._clock.now_ns() < deadline:
+            self._pump()
+        return done()
 
     def _pump(self) -> None:
         if self._watched and self._clock.now_ns() - self._last_sent_ns > self._timings.watchdog_s / 4 * 1e9:
@@ -443,7 +418,7 @@ class Recorder:
         if self._closing:
             return
         if self._exceeded:
-            raise LimitExceeded(self._exceeded)
+            raise AcquireError(self._exceeded, Ended.LIMIT_EXCEEDED)
         if not self._samples and self._intake.malformed_samples >= _UNREADABLE_AT_MOST:
             raise Refused(
                 f"the {self.instrument.title} sends what this version cannot read ({self._intake.fault}): "
@@ -451,10 +426,11 @@ class Recorder:
             )
         if self.ended is not None and self.ended.reason not in (STOPPED, COMPLETE):
             unheard = self.ended.reason == UNHEARD
-            raise DeviceFault(
+            raise AcquireError(
                 f"the {self.instrument.title} ended the stream by itself: "
                 + ("its watchdog heard nothing from this computer" if unheard else "it reports a fault")
-                + ". What it moved stands still; what came before is in the log."
+                + ". What it moved stands still; what came before is in the log.",
+                Ended.DEVICE_FAULT,
             )
 
     def _data_frames(self) -> int:
@@ -481,7 +457,10 @@ class Recorder:
             self._last_values = values
             self._rows.append(row)
             self._time(row, now_ns)
-            self._check_limits(values)
+            for number, low, high in self._limits:
+                if not low <= values[number] <= high and not self._exceeded:
+                    column = self.instrument.columns[number]
+                    self._exceeded = f"{column} is {values[number]:.5g}, allowed are {low:g} to {high:g}: stopped"
             if self.on_row is not None:
                 self.on_row(row)
         elif kind == ANSWER:
@@ -494,12 +473,6 @@ class Recorder:
             self._skipped += content.skipped
             self._streaming = self._watched = False
             self.over = True
-
-    def _check_limits(self, values: tuple[float, ...]) -> None:
-        for number, low, high in self._limits:
-            if not low <= values[number] <= high and not self._exceeded:
-                column = self.instrument.columns[number]
-                self._exceeded = f"{column} is {values[number]:.5g}, allowed are {low:g} to {high:g}: stopped"
 
     def _time(self, row: Row, now_ns: int) -> None:
         """Keep the first and the latest sample of the present segment, for rate and clock ratio."""
@@ -536,12 +509,7 @@ class Recorder:
                 raise Interrupted("stopped at your wish while nothing was heard of the device; the log is safe")
             self._send(IDENTIFY, b"")
             asked += 1
-            deadline = self._clock.now_ns() + round(self._timings.reply_s * 1e9)
-            while not self._answered and self._clock.now_ns() < deadline:
-                self._pump()
-                if patience_s is not None and self._data_frames() > samples:
-                    return True
-            if self._answered:
+            if self._pump_until(lambda: self._answered or patience_s is not None and self._data_frames() > samples):
                 return True
         return False
 
@@ -584,9 +552,10 @@ class Recorder:
     def _after_restart(self) -> None:
         """Bring a device that restarted, or whose port was gone, back to streaming."""
         if self.resume is None:
-            raise DeviceReset(
+            raise AcquireError(
                 f"the {self.instrument.title} restarted in the middle of the run, which is void. "
-                "Check its supply and plug, then record again; what came before is in the log."
+                "Check its supply and plug, then record again; what came before is in the log.",
+                Ended.DEVICE_RESET,
             )
         # its start record has to come before its samples, or these look like old ones
         if not self._ask_identity():
@@ -595,7 +564,7 @@ class Recorder:
         self._go_on()
 
     def _go_on(self) -> None:
-        self._say(f"making the {self.instrument.title} go on")
+        self.say(f"making the {self.instrument.title} go on")
         self.resume()
 
     def _give_up(self) -> None:
@@ -607,7 +576,7 @@ class Recorder:
     def _after_silence(self) -> None:
         """A line at rest has as long as a port that is gone; what then comes decides how the recording goes on."""
         self._event("silence", f"no sample for {self._silence_s():g} s")
-        self._say(f"nothing from the {self.instrument.title}; waiting up to {self._timings.reconnect_s:g} s for it")
+        self.say(f"nothing from the {self.instrument.title}; waiting up to {self._timings.reconnect_s:g} s for it")
         samples = self._data_frames()
         if not self._ask_identity(self._timings.reconnect_s):
             self._give_up()
@@ -615,9 +584,7 @@ class Recorder:
             self._after_restart()
             return
         # it answers; if it still streams, a sample is not far
-        deadline = self._clock.now_ns() + round(self._timings.reply_s * 1e9)
-        while self._data_frames() == samples and not self.over and self._clock.now_ns() < deadline:
-            self._pump()
+        self._pump_until(lambda: self._data_frames() != samples or self.over)
         if self._data_frames() > samples:
             self._event("silence_over", "samples come again")
         elif self.over:
@@ -629,9 +596,10 @@ class Recorder:
         elif self.resume is not None:
             self._go_on()
         else:
-            raise DeviceFault(
+            raise AcquireError(
                 f"the {self.instrument.title} answers, but no longer streams: the run is void. "
-                "Record again; what came before is in the log."
+                "Record again; what came before is in the log.",
+                Ended.DEVICE_FAULT,
             )
 
     def _reconnect(self, error: PortLost) -> None:
@@ -641,7 +609,7 @@ class Recorder:
         self._decoder.break_off()
         if self._closing:
             raise error
-        self._say(f"{self._transport.name} went away; waiting up to {self._timings.reconnect_s:g} s for it")
+        self.say(f"{self._transport.name} went away; waiting up to {self._timings.reconnect_s:g} s for it")
         self._transport.close()
         deadline = self._clock.now_ns() + round(self._timings.reconnect_s * 1e9)
         while self._clock.now_ns() < deadline:
@@ -649,11 +617,11 @@ class Recorder:
                 raise Interrupted("stopped at your wish while the port was gone; the log is safe")
             try:
                 self._transport.open()
-            except (PortMissing, PortBusy):
+            except PortMissing:
                 self._clock.wait(self._timings.retry_open_s)
                 continue
             self._event("port_back", f"{self._transport.name} is back")
-            self._say(f"{self._transport.name} is back; going on")
+            self.say(f"{self._transport.name} is back; going on")
             self._last_sample_ns = self._clock.now_ns()
             if self._streaming:
                 self._restarted = True  # whatever it was: it needs the command to go on
@@ -798,25 +766,7 @@ class LogWriter:
 
     def write(self, tag: int, host_ns: int, data: bytes) -> None:
         """Append a chunk. Raises DiskFull; the chunk is whole on disk if the ballast gave room for it."""
-        self._write(rawlog.pack_chunk(tag, host_ns, data), host_ns)
-
-    def close(self) -> None:
-        if self._file < 0:
-            return
-        if self.durable:
-            os.fsync(self._file)
-        os.close(self._file)
-        self._file = -1
-        self._drop_ballast()
-
-    def discard(self) -> None:
-        """Leave nothing behind: for a recording that never began."""
-        self.durable = False
-        self.close()
-        self.path.unlink(missing_ok=True)
-
-    def _write(self, packed: bytes, host_ns: int) -> None:
-        start = self.bytes_written
+        packed, start = rawlog.pack_chunk(tag, host_ns, data), self.bytes_written
         try:
             self._append(packed)
             if self.durable and host_ns - self._synced_ns > 1_000_000_000:
@@ -833,6 +783,21 @@ class LogWriter:
             except OSError:  # not even the ballast's room was enough: the log ends in a cut chunk
                 pass
             raise full from error
+
+    def close(self) -> None:
+        if self._file < 0:
+            return
+        if self.durable:
+            os.fsync(self._file)
+        os.close(self._file)
+        self._file = -1
+        self._drop_ballast()
+
+    def discard(self) -> None:
+        """Leave nothing behind: for a recording that never began."""
+        self.durable = False
+        self.close()
+        self.path.unlink(missing_ok=True)
 
     def _take_ballast(self) -> None:
         try:

@@ -1,11 +1,9 @@
-"""Carries out a campaign's plan: checks first, then step after step; the same with instruments and with emulators.
+"""A campaign's plan: what is recorded, in which order, how often, and what of it is done; recorded step after step.
 
-Completes the metadata of a recording whose recorder was killed, from the log alone.
-
-A campaign's plan: what is recorded, in which order, how often; and what of it is done.
-
-What is done is read from the recordings themselves, so a campaign goes on after anything: a step is done when one of
-its attempts (`name`, `name.2`, `name.3`, …) has ended `finished` and its log is as it was recorded.
+Checks come first; it is the same with instruments and with emulators. What is done is read from the recordings
+themselves, so a campaign goes on after anything: a step is done when one of its attempts (`name`, `name.2`, `name.3`,
+…) has ended `finished` and its log is as it was recorded. The metadata of one whose recorder was killed are completed
+from its log.
 """
 
 from __future__ import annotations
@@ -15,7 +13,7 @@ import random
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any, Literal
@@ -28,19 +26,10 @@ from rotorid.acquire.procedures import programme_of, recorders_for, run_with
 from rotorid.acquire.recorder import NAME, Recorder
 from rotorid.acquire.transport import AcquireError
 from rotorid.errors import InputError
-from rotorid.io.logs import Log, LogError, read_log
+from rotorid.io.logs import Log, read_log
 from rotorid.io.models import KnownKeys, read_model
-from rotorid.io.rawlog import RECEIVED, NotALog, read_raw
-from rotorid.io.session import (
-    Counts,
-    Ended,
-    SessionError,
-    Setup,
-    read_session,
-    session_path,
-    write_index,
-    write_session,
-)
+from rotorid.io.rawlog import RECEIVED, read_raw
+from rotorid.io.session import Counts, Ended, Setup, read_session, session_path, write_index, write_session
 from rotorid.io.text.wording import explain, hint
 from rotorid.io.wire import EXPERIMENTS, INSTRUMENTS
 
@@ -68,10 +57,6 @@ _SETTINGS: dict[str, tuple[str, ...]] = {
     "tensile": (),
 }
 """What the procedures read, except `tolerance` and `wait_s`."""
-
-
-class PlanError(InputError):
-    """The plan is not what it should be; the sentence names file and place."""
 
 
 class _Checks(KnownKeys):
@@ -150,14 +135,14 @@ class _Step:
 
 
 def read_plan(path: Path) -> CampaignPlan:
-    """Read and validate. Raises PlanError naming the file and the first thing that is wrong."""
-    return read_model(path, CampaignPlan, PlanError)
+    """Read and validate. Raises InputError naming the file and the first thing that is wrong."""
+    return read_model(path, CampaignPlan)
 
 
 def steps_of(plan: CampaignPlan) -> list[_Step]:
     """All steps in the order in which they are recorded; the same plan gives the same order each time.
 
-    Raises PlanError for names that are none or not each step's own, and for instruments without a port.
+    Raises InputError for names that are none or not each step's own, and for instruments without a port.
     """
     steps: list[_Step] = []
     for place, group in enumerate(plan.steps):
@@ -173,7 +158,7 @@ def steps_of(plan: CampaignPlan) -> list[_Step]:
                 name = group.name.format(**values)
                 group.ask.format(**values)
             except (KeyError, IndexError, ValueError, AttributeError) as error:
-                raise PlanError(
+                raise InputError(
                     f"steps.{place}: {group.name!r} or its `ask` uses {error}, which is not in `over`"
                 ) from error
             step = _Step(len(steps) + 1, name, group, values, _instruments(plan, place, group))
@@ -182,25 +167,25 @@ def steps_of(plan: CampaignPlan) -> list[_Step]:
     names = [step.name for step in steps]
     for name in names:
         if not NAME.fullmatch(name):
-            raise PlanError(f"a recording cannot be called {name!r}: letters, digits, '.', '_', '+' and '-' only")
+            raise InputError(f"a recording cannot be called {name!r}: letters, digits, '.', '_', '+' and '-' only")
         if names.count(name) > 1:
-            raise PlanError(f"two steps are called {name!r}; put {{repeat}} or a value of `over` into the name")
+            raise InputError(f"two steps are called {name!r}; put {{repeat}} or a value of `over` into the name")
     return steps
 
 
 def _check_step(step: _Step, place: int, operator: str | None) -> None:
-    """PlanError where a setup does not fit, or where a setting or a value of `over` is one that nothing reads."""
+    """InputError where a setup does not fit, or where a setting or a value of `over` is one that nothing reads."""
     group, known = step.group, (*_SETTINGS[step.group.do], "tolerance", "wait_s")
     try:
         step.setup(operator)
     except ValidationError as error:
-        raise PlanError(f"steps.{place}: setup.{explain(error, Setup)}") from None
+        raise InputError(f"steps.{place}: setup.{explain(error, Setup)}") from None
     for name in group.settings:
         if name not in known:
-            raise PlanError(f"steps.{place}: settings.{name}: {group.do} has no such setting{hint(name, known)}")
+            raise InputError(f"steps.{place}: settings.{name}: {group.do} has no such setting{hint(name, known)}")
     for name in group.over:
         if name not in known and name not in Setup.model_fields and f"{{{name}}}" not in group.name + group.ask:
-            raise PlanError(f"steps.{place}: over.{name}: nothing reads it{hint(name, [*known, *Setup.model_fields])}")
+            raise InputError(f"steps.{place}: over.{name}: nothing reads it{hint(name, [*known, *Setup.model_fields])}")
 
 
 def _instruments(plan: CampaignPlan, place: int, group: _Group) -> tuple[str, ...]:
@@ -208,10 +193,10 @@ def _instruments(plan: CampaignPlan, place: int, group: _Group) -> tuple[str, ..
     if group.instrument is not None and len(needed) < 2:
         needed = (group.instrument,)
     if not needed:
-        raise PlanError(f"steps.{place}: `do: stream` needs an `instrument`")
+        raise InputError(f"steps.{place}: `do: stream` needs an `instrument`")
     for instrument in needed:
         if instrument not in plan.ports:
-            raise PlanError(f"steps.{place}: {group.do} needs a {instrument}, and `ports` has none")
+            raise InputError(f"steps.{place}: {group.do} needs a {instrument}, and `ports` has none")
     return needed
 
 
@@ -219,16 +204,14 @@ def attempts(plan: CampaignPlan, step: _Step) -> list[str]:
     """Names of the step's attempts that have left anything in the folder, oldest first."""
     found = []
     for number in itertools.count(1):
-        name = step.name if number == 1 else f"{step.name}.{number}"
+        name = _attempt(step, number)
         files = [plan.out / f"{stem}{end}" for stem in _stems(step, name) for end in (".yaml", ".rlog", ".rlog.gz")]
         if not any(path.exists() for path in files):
             return found
         found.append(name)
 
 
-def _next_attempt(plan: CampaignPlan, step: _Step) -> str:
-    """The name of the recording that would be made now."""
-    number = len(attempts(plan, step)) + 1
+def _attempt(step: _Step, number: int) -> str:
     return step.name if number == 1 else f"{step.name}.{number}"
 
 
@@ -248,25 +231,19 @@ def _whole(folder: Path, stem: str) -> bool:
         if session.ended != Ended.FINISHED:
             return False
         log = read_log(folder / session.log)
-    except (SessionError, LogError, NotALog, OSError):
+    except (InputError, OSError):
         return False
     return not log.faults and log.cut_at is None
-
-
-_Say = Callable[[str], None]
-_Ask = Callable[[str], str]
-_Prompts = Callable[[_Step], Callable[[Recorder], procedures.Prompt]]
-_Watch = Callable[[list[Recorder], Callable[[], None]], None]
 
 
 @dataclass(frozen=True)
 class Desk:
     """Who sits there: how they are informed, asked and waited for."""
 
-    say: _Say
-    ask: _Ask  # a question; the answer is "", or a word
-    prompts: _Prompts  # how a procedure asks for a load
-    watch: _Watch  # run with these recorders, showing them
+    say: Callable[[str], None]
+    ask: Callable[[str], str]  # a question; the answer is "", or a word
+    prompts: Callable[[_Step], Callable[[Recorder], procedures.Prompt]]  # how a procedure asks for a load
+    watch: Callable[[list[Recorder], Callable[[], None]], None]  # run with these recorders, showing them
 
 
 def check(plan: CampaignPlan, ports: dict[str, str], desk: Desk) -> list[str]:
@@ -335,7 +312,7 @@ def _record_step(plan: CampaignPlan, step: _Step, ports: dict[str, str], desk: D
     recorders = recorders_for(
         {instrument: ports[instrument] for instrument in step.instruments},
         plan.out,
-        _next_attempt(plan, step),
+        _attempt(step, len(attempts(plan, step)) + 1),
         dict.fromkeys(step.instruments, setup),
         procedure={
             "name": step.group.do,
@@ -352,19 +329,11 @@ def _record_step(plan: CampaignPlan, step: _Step, ports: dict[str, str], desk: D
 
 def _carry_out(step: _Step, desk: Desk, *recorders: Recorder) -> None:
     do, get, first = step.group.do, step.setting, recorders[0]
-    rule = procedures.STEADY_JR3 if first.instrument.name == "jr3" else procedures.SteadyRule()
-    if get("tolerance") is not None:
-        rule = replace(rule, tolerance=get("tolerance"))
-    wait_s = get("wait_s", procedures.WAIT_S)
-    prompt = desk.prompts(step)(first)
     if do == "stream":
         procedures.stream(first, get("samples", 500), get("interval_s", 0.0))
-    elif do == "calibrate":
-        procedures.calibrate_cell(first, prompt, get("samples", 400))
-    elif do == "static":
-        procedures.static_test(first, prompt, get("samples", 50), rule, wait_s)
-    elif do == "dynamic":
-        procedures.dynamic_test(first, prompt, get("samples", 1500), rule, wait_s)
+    elif do in procedures.BENCH_TESTS:
+        wait_s = get("wait_s", procedures.WAIT_S)
+        procedures.bench_test(first, do, desk.prompts(step)(first), get("samples"), get("tolerance"), wait_s)
     elif do == "thrust":
         procedures.thrust_test(first, get("throttle", 0.1), get("rest_s", 1.0), get("hold_s", 4.0))
     elif do == "torque":
@@ -380,12 +349,12 @@ def _carry_out(step: _Step, desk: Desk, *recorders: Recorder) -> None:
         procedures.stream(first, None, moves=True)
 
 
-def _complete_killed(plan: CampaignPlan, steps: list[_Step], say: _Say) -> None:
+def _complete_killed(plan: CampaignPlan, steps: list[_Step], say: Callable[[str], None]) -> None:
     """Counts and gaps for the metadata of attempts whose recorder was killed; the attempts stay what they are."""
     for step in steps:
         for name in attempts(plan, step):
             for stem in _stems(step, name):
-                with suppress(SessionError, LogError, NotALog, OSError):  # such a one is no recording to complete
+                with suppress(InputError, OSError):  # such a one is no recording to complete
                     session = read_session(plan.out / f"{stem}.yaml")
                     log = plan.out / session.log
                     if session.ended == Ended.RECORDING and repair(log, read_log(log)):
@@ -422,12 +391,6 @@ def run(plan: CampaignPlan, ports_of: Callable, desk: Desk, repeat: str | None =
         if is_done(plan, step):
             done.add(step.name)
     return len(steps) - len(done)
-
-
-@contextmanager
-def real_ports(plan: CampaignPlan, step: _Step | None) -> Iterator[dict[str, str]]:
-    """The plan's own."""
-    yield plan.ports
 
 
 @contextmanager

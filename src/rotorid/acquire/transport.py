@@ -13,7 +13,6 @@ import errno
 import select
 import time
 from datetime import datetime, timedelta
-from typing import Protocol
 
 import serial
 
@@ -21,19 +20,17 @@ from rotorid.io.session import Ended
 
 
 class AcquireError(Exception):
-    """Base; `ended` is what the session's metadata say."""
+    """What ends a recording before its time; `ended` is what the session's metadata say."""
 
     ended = Ended.FAILED
 
+    def __init__(self, text: str, ended: Ended | None = None) -> None:
+        super().__init__(text)
+        self.ended = ended or self.ended
+
 
 class PortMissing(AcquireError):
-    """No such port."""
-
-    ended = Ended.DEVICE_LOST
-
-
-class PortBusy(AcquireError):
-    """Another program holds the port, or we may not open it."""
+    """No such port, another program holds it, or we may not open it."""
 
     ended = Ended.DEVICE_LOST
 
@@ -50,42 +47,10 @@ class DeviceSilent(AcquireError):
     ended = Ended.DEVICE_SILENT
 
 
-class DeviceReset(AcquireError):
-    """The device restarted in a run that cannot be resumed."""
-
-    ended = Ended.DEVICE_RESET
-
-
 class Refused(AcquireError):
     """The device refused a command, or is not the instrument that was asked for."""
 
     ended = Ended.REFUSED
-
-
-class DeviceFault(AcquireError):
-    """The device ended the stream by itself, and not because it was done."""
-
-    ended = Ended.DEVICE_FAULT
-
-
-class GaveUp(AcquireError):
-    """A weight, a steady reading: what was waited for did not come in the time that was given."""
-
-    ended = Ended.GAVE_UP
-
-
-class LimitExceeded(AcquireError):
-    """A reading went beyond what was allowed."""
-
-    ended = Ended.LIMIT_EXCEEDED
-
-
-class BadName(AcquireError):
-    """A recording cannot be called that, or one is called that already."""
-
-
-class CannotWrite(AcquireError):
-    """The folder does not take the log."""
 
 
 class DiskFull(AcquireError):
@@ -101,18 +66,8 @@ class Interrupted(AcquireError):
     ended = Ended.INTERRUPTED
 
 
-class Clock(Protocol):
-    """Monotonic time, date, and waiting."""
-
-    def now_ns(self) -> int: ...
-
-    def date(self) -> datetime: ...
-
-    def wait(self, seconds: float) -> None: ...
-
-
 class SystemClock:
-    """The computer's own clock."""
+    """The computer's own clock: monotonic time, date, and waiting."""
 
     def now_ns(self) -> int:
         return time.monotonic_ns()
@@ -148,23 +103,8 @@ class VirtualClock:
             run_until(self._now_ns / 1e9)
 
 
-class Transport(Protocol):
-    """Bytes both ways. `read` waits at most `timeout_s` and returns what there is, perhaps nothing."""
-
-    name: str
-    baud_rate: int | None
-
-    def open(self) -> None: ...
-
-    def read(self, timeout_s: float) -> bytes: ...
-
-    def write(self, data: bytes) -> None: ...
-
-    def close(self) -> None: ...
-
-
 class SerialTransport:
-    """A serial port, held exclusively.
+    """A serial port, held exclusively. `read` waits at most `timeout_s` and returns what there is, perhaps nothing.
 
     `gather_s`: once bytes come, wait so long for more before reading them all, so that a fast stream
     costs fifty wake-ups a second and not one per frame. The port's own buffer (4096 bytes) must hold
@@ -178,7 +118,7 @@ class SerialTransport:
         self._serial: serial.Serial | None = None
 
     def open(self) -> None:
-        """Raises PortMissing or PortBusy."""
+        """Raises PortMissing."""
         try:
             self._serial = serial.Serial(self.name, self.baud_rate, timeout=0, write_timeout=1, exclusive=True)
         except (serial.SerialException, OSError) as error:
@@ -223,7 +163,7 @@ class SerialTransport:
         return self._serial
 
 
-def _port_error(name: str, error: Exception) -> PortMissing | PortBusy:
+def _port_error(name: str, error: Exception) -> PortMissing:
     number = getattr(error, "errno", None)
     text = str(error)
     if number == errno.ENOENT or "No such file" in text or "FileNotFoundError" in text:
@@ -231,11 +171,11 @@ def _port_error(name: str, error: Exception) -> PortMissing | PortBusy:
             f"{name}: there is no such port. Plug the instrument in, and look at `rotorid-acquire ports`."
         )
     if number in (errno.EACCES, errno.EPERM):
-        return PortBusy(
+        return PortMissing(
             f"{name}: you may not open this port. On Linux: `sudo usermod -aG dialout $USER`, log in again."
         )
     if number in (errno.EBUSY, errno.EAGAIN) or "lock" in text:
-        return PortBusy(f"{name}: another program holds this port. Close it there (a serial monitor?), try again.")
+        return PortMissing(f"{name}: another program holds this port. Close it there (a serial monitor?), try again.")
     return PortMissing(f"{name}: cannot be opened ({text}). Unplug the instrument, plug it in, try again.")
 
 
@@ -261,3 +201,8 @@ class LoopbackTransport:
 
     def close(self) -> None:
         pass
+
+
+Clock = SystemClock | VirtualClock
+Transport = SerialTransport | LoopbackTransport
+"""Bytes both ways. Tests have others of their own."""

@@ -80,7 +80,7 @@ class LinesPanel:
 
     def __init__(self, title: str, columns: Sequence[str], wanted: int | None, clock_s: Callable[[], float]) -> None:
         self._title, self._columns, self._wanted, self._clock_s = title, columns, wanted, clock_s
-        self._values: Sequence[float] = [float("nan")] * len(columns)
+        self._values: Sequence[float] = ()
         self._lines, self._begun_s = 0, clock_s()
 
     def see(self, values: Sequence[float]) -> None:
@@ -91,46 +91,35 @@ class LinesPanel:
     def render(self) -> Table:
         elapsed_s = self._clock_s() - self._begun_s
         rate_hz = self._lines / elapsed_s if elapsed_s > 0 and self._lines else 0.0
-        left = f"{(self._wanted - self._lines) / rate_hz:.0f}" if self._wanted and rate_hz else "–"
-        table = Table(title=f"{self._title} · lines", title_justify="left", box=None)
-        for heading in ("lines", "rate [1/s]", "elapsed [s]", "remaining [s]"):
-            table.add_column(heading, justify="right")
-        for column in self._columns:
-            table.add_column(column, justify="right", style="cyan")
-        table.add_row(
-            f"{self._lines}" + (f"/{self._wanted}" if self._wanted else ""),
-            f"{rate_hz:.1f}" if rate_hz else "–",
-            f"{elapsed_s:.1f}",
-            left,
-            *(f"{value:.5g}" for value in self._values),
-        )
-        return table
+        cells = {
+            "lines": f"{self._lines}" + (f"/{self._wanted}" if self._wanted else ""),
+            "rate [1/s]": f"{rate_hz:.1f}" if rate_hz else "–",
+            "elapsed [s]": f"{elapsed_s:.1f}",
+            "remaining [s]": f"{(self._wanted - self._lines) / rate_hz:.0f}" if self._wanted and rate_hz else "–",
+        }
+        return _table(f"{self._title} · lines", cells, self._columns, self._values)
 
 
 def panel(recorder: Recorder) -> Table:
     """One instrument's table."""
-    status = recorder.status()
-    table = Table(title=f"{recorder.instrument.title} · {status.phase}", title_justify="left", box=None)
-    for heading in ("samples", "rate [1/s]", "missing", "damaged", "elapsed [s]", "remaining [s]"):
+    values, cells = recorder.status()
+    return _table(f"{recorder.instrument.title} · {recorder.phase}", cells, recorder.instrument.columns, values)
+
+
+def _table(title: str, cells: dict[str, str], columns: Sequence[str], values: Sequence[float]) -> Table:
+    """One row: how it goes by heading, then the values of the columns."""
+    table = Table(title=title, title_justify="left", box=None)
+    for heading in cells:
         table.add_column(heading, justify="right")
-    for column in recorder.instrument.columns:
+    for column in columns:
         table.add_column(column, justify="right", style="cyan")
-    table.add_row(
-        f"{status.samples}" + (f"/{status.wanted}" if status.wanted else ""),
-        f"{status.rate_hz:.1f}" if status.rate_hz else "–",
-        str(status.missing)
-        + (f" ({status.missing / (status.samples + status.missing):.2%})" if status.missing else ""),
-        str(status.bad_frames),
-        f"{status.elapsed_s:.1f}",
-        f"{status.remaining_s:.0f}" if status.remaining_s is not None else "–",
-        *(f"{value:.5g}" for value in status.values or [float("nan")] * len(recorder.instrument.columns)),
-    )
+    table.add_row(*cells.values(), *(f"{value:.5g}" for value in values or [float("nan")] * len(columns)))
     return table
 
 
 def bench_forces(recorder: Recorder) -> Text | None:
     """Forces on the vehicle in N by table 2.8's calibration, once the bench is tared (thesis fig. 2.38)."""
-    tare, values = recorder.session.tare, recorder.status().values
+    tare, values = recorder.session.tare, recorder.status()[0]
     if recorder.instrument.name != "bench" or not tare or not values:
         return None
     # Here alone is numpy needed: it is a quarter of the time that every command takes to start.

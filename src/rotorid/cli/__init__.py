@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli import importing, modelling, planning, starting, verdicts
+from rotorid.cli import modelling, planning, sets, verdicts
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -52,14 +52,14 @@ app.command("verdict")(verdicts.verdict)
 app.command("compare")(verdicts.compare)
 app.command("plan")(planning.plan)
 app.command("together")(planning.together)
-app.command("import")(importing.import_logs)
-app.command("init")(starting.init)
-app.command("check")(starting.check)
+app.command("import")(sets.import_logs)
+app.command("init")(sets.init)
+app.command("check")(sets.check)
 app.command("simulate")(modelling.simulate)
 app.command("export")(modelling.export)
 app.command("model")(modelling.model)
 app.command("parameters")(modelling.parameters)
-app.command("effects")(starting.effects)
+app.command("effects")(sets.effects)
 
 OPEN = ("console",)
 """Modules that other rooms may import; all else is this room's own."""

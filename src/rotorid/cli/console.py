@@ -23,7 +23,7 @@ from statistics import mean
 import typer
 
 from rotorid.errors import InputError
-from rotorid.io.text.writing import all_or_none
+from rotorid.io.text.writing import write_texts
 from rotorid.steps import heard_by
 
 _Run = list[tuple[str, float]]
@@ -152,8 +152,8 @@ def keep(command: str, done: _Run) -> None:
     """Add a run to the record, where it can be written."""
     runs = read_record()
     runs[command] = [*runs.get(command, []), [(step, round(seconds, 2)) for step, seconds in done]][-KEPT:]
-    with suppress(Exception), all_or_none(record_file()) as (part,):
-        part.write_text(json.dumps({"version": version("rotorid"), "runs": runs}), encoding="utf-8")
+    with suppress(Exception):
+        write_texts({record_file(): json.dumps({"version": version("rotorid"), "runs": runs})})
 
 
 @contextmanager

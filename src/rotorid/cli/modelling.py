@@ -3,8 +3,7 @@
 - `rotorid model`: from logs to a vehicle in a simulator, in one go.
 - `rotorid export`: the identified vehicle in the forms that other tools know.
 - `rotorid simulate`: a flight of a vehicle with every effect its file states.
-
-`rotorid parameters`: what a flight says of an autopilot's parameters.
+- `rotorid parameters`: what a flight says of an autopilot's parameters.
 """
 
 from __future__ import annotations
@@ -19,9 +18,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rotorid.cli.console import one_sentence, progress
-from rotorid.cli.importing import Like, MappingFile, MassKg, VehicleFile, make_set, print_notes
+from rotorid.cli.sets import Like, MappingFile, MassKg, VehicleFile, name_of, set_of
 from rotorid.errors import InputError
+from rotorid.io.text.writing import write_texts
 from rotorid.steps import step
+
+if TYPE_CHECKING:
+    from rotorid.identify.autopilot.parameters import AutopilotParameter
+    from rotorid.recordings import Vehicle
 
 
 def model(
@@ -56,14 +60,8 @@ def model(
         from rotorid.recordings.importers.logfile import is_bag
 
         is_set = len(paths) == 1 and (paths[0] / "vehicle.yaml").is_file() and not is_bag(paths[0])
-        name = paths[0].resolve().name if paths[0].is_dir() else paths[0].name.split(".")[0]
-        target = out or Path(f"{name}-{to}")
-        folder = paths[0]
-        if not is_set:
-            folder = target / name
-            made = make_set(paths, folder, mass_kg, like, vehicle, mapping)
-            if not quiet:
-                print_notes(made, folder)
+        target = out or Path(f"{name_of(paths[0])}-{to}")
+        folder = set_of(paths, is_set, target, quiet, mass_kg, like, vehicle, mapping)
         written, said = _write_model(folder, target, to, quiet)
         for sentence in said:
             typer.echo(sentence)
@@ -77,7 +75,6 @@ def _write_model(folder: Path, target: Path, to: str, quiet: bool = True) -> tup
         from rotorid.recordings import read_set
 
         recordings = read_set(folder)
-        from rotorid.io.text.writing import all_or_none
         from rotorid.recordings import read_vehicle
         from rotorid.report.deliver import analysis_of, write_files
         from rotorid.report.next_to_log import next_to_log
@@ -91,9 +88,7 @@ def _write_model(folder: Path, target: Path, to: str, quiet: bool = True) -> tup
         exported = gazebo_airframe(improved) if to == "sdf" else export_vehicle(improved, to)
         texts = {exported.file_name: exported.text, **exported.companions}
         written = [target / name for name in texts]
-        with all_or_none(*written) as parts:
-            for part, text in zip(parts, texts.values(), strict=True):
-                part.write_text(text, encoding="utf-8")
+        write_texts(dict(zip(written, texts.values(), strict=True)))
         said = [verdict.sentence, *(f"! {doubt.sentence}" for doubt in verdict.doubts)]
         said += [f"  - not expressed: {sentence}" for sentence in exported.left_out]
         try:
@@ -122,10 +117,6 @@ def _comparison(found, target: Path) -> list[Path]:
     pd.DataFrame(rows, columns=["model", "channel", "rms_error", "unit", "windows"]).to_csv(table, index=False)
     draw(found, figure)
     return [table, figure]
-
-
-if TYPE_CHECKING:
-    from rotorid.recordings import Vehicle
 
 
 def simulate(
@@ -190,7 +181,6 @@ def export(
     Example: `rotorid export flights-verdict/improved_vehicle.yaml --to rotorpy`
     """
     with one_sentence():
-        from rotorid.io.text.writing import all_or_none
         from rotorid.recordings import read_vehicle
         from rotorid.vehicle.exports import export_vehicle
         from rotorid.vehicle.exports.flown import try_out
@@ -200,19 +190,13 @@ def export(
         flown = try_out(vehicle, to, exported)
         path = out or Path(exported.file_name)
         texts = {path: exported.text} | {path.parent / name: text for name, text in exported.companions.items()}
-        with all_or_none(*texts) as parts:
-            for part, text in zip(parts, texts.values(), strict=True):
-                part.write_text(text, encoding="utf-8")
+        write_texts(texts)
         for written in texts:
             typer.echo(f"{written}: written for {to}")
         for sentence in exported.left_out:
             typer.echo(f"  - not expressed: {sentence}")
         if flown:
             typer.echo(f"  {flown}")
-
-
-if TYPE_CHECKING:
-    from rotorid.identify.autopilot.parameters import AutopilotParameter
 
 
 def parameters(
@@ -246,10 +230,7 @@ def parameters(
         data = paths[0] if len(paths) == 1 else paths
         found = of(data, to, vehicle=vehicle, mass_kg=mass_kg, like=like, mapping=mapping)
         if out is not None:
-            from rotorid.io.text.writing import all_or_none
-
-            with all_or_none(out) as (part,):
-                part.write_text(as_text(found, to), encoding="utf-8")
+            write_texts({out: as_text(found, to)})
         if as_json:
             typer.echo(json.dumps([_as_dict(p) for p in found], indent=1, ensure_ascii=False, allow_nan=False))
             return

@@ -19,6 +19,7 @@ from markupsafe import Markup, escape
 from rotorid.cli.console import one_sentence, progress
 from rotorid.errors import InputError
 from rotorid.io.text.wording import neighbour
+from rotorid.io.text.writing import write_texts
 from rotorid.steps import step
 
 OPEN, _CLOSE = "<!-- plan -->", "<!-- end of the plan -->"
@@ -67,45 +68,31 @@ def plan(
 
             sets = [read_set(p) for p in sources]
             source = sets[0] if len(sets) == 1 else joined_sets(*sets)[0]
+            target = out or folder / "plan"
             if flight:
-                said, files, picture = _flight_plan(source, content, allowed, wishes, out or folder / "plan")
+                from rotorid.plan.plan import plan as make_plan
+                from rotorid.plan.questions import known_from
+                from rotorid.plan.write import text, write
+
+                made = make_plan(known_from(source, content), allowed, wishes)
             else:
-                said, files, picture = _session_plan(source, content, allowed, out or folder / "plan")
+                from rotorid.plan.session import known_instrument_from, plan_session, text, write
+
+                made = plan_session(known_instrument_from(source, content), allowed)
+            files, said = write(made, target), text(made)
+            picture = target / "plan.png" if made.pieces else None
             _onto_page(folder / "report.html", source.name, said, picture)
         for line in said:
             typer.echo(line)
         typer.echo(f"{files[0].parent}: {', '.join(f.name for f in files)}")
 
 
-def _flight_plan(source, content: dict, allowed, wishes: dict[str, float], folder: Path):
-    """Plan a flight and write it: sentences, files, and the picture where there is one."""
-    from rotorid.plan.plan import plan as make_plan
-    from rotorid.plan.questions import known_from
-    from rotorid.plan.write import text, write
-
-    made = make_plan(known_from(source, content), allowed, wishes)
-    files = write(made, folder)
-    return text(made), files, folder / "plan.png" if made.pieces else None
-
-
-def _session_plan(source, content: dict, allowed, folder: Path):
-    """Plan a session of a stand or bench and write it: sentences, files, and the picture where there is one."""
-    from rotorid.plan.session import known_instrument_from, plan_session, text, write
-
-    made = plan_session(known_instrument_from(source, content), allowed)
-    files = write(made, folder)
-    return text(made), files, folder / "plan.png" if made.pieces else None
-
-
 def _onto_page(page: Path, name: str, said: list[str], picture: Path | None) -> None:
     """Put the plan on the verdict's page, where there is one."""
-    from rotorid.io.text.writing import all_or_none
-
     if not page.is_file():
         return
     content = with_plan(page.read_text(encoding="utf-8"), name, said, picture.read_bytes() if picture else None)
-    with all_or_none(page) as (part,):
-        part.write_text(content, encoding="utf-8")
+    write_texts({page: content})
 
 
 def _wished(texts: list[str]) -> dict[str, float]:
@@ -173,7 +160,6 @@ def together(
     with one_sentence():
         with progress("together", quiet), warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            from rotorid.io.text.writing import all_or_none
             from rotorid.plan.questions import answers, joined_sets, open_classes
             from rotorid.recordings import read_set
             from rotorid.report.deliver import analysis_of, write_files
@@ -188,9 +174,8 @@ def together(
             files = [target / n for n in ("verdict.json", "report.html", "improved_vehicle.yaml")]
             said = write_files(analysis, *files)
             found = answers(before, analysis.findings)
-            with all_or_none(target / "answers.json") as (part,):
-                rows = [{"ids": list(a.ids), "answer": a.answer, "sentence": a.sentence} for a in found]
-                part.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+            rows = [{"ids": list(a.ids), "answer": a.answer, "sentence": a.sentence} for a in found]
+            write_texts({target / "answers.json": json.dumps(rows, indent=1) + "\n"})
         typer.echo(said.sentence)
         for line in (*notes, *(a.sentence for a in found)):
             typer.echo(f"  - {line}")

@@ -16,12 +16,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rotorid.cli.console import one_sentence, progress
-from rotorid.cli.importing import Like, MappingFile, MassKg, VehicleFile, make_set, print_notes
+from rotorid.cli.sets import Like, MappingFile, MassKg, VehicleFile, make_set, name_of, set_of
 from rotorid.errors import InputError
+from rotorid.io.text.writing import write_texts
 from rotorid.steps import step
 
 if TYPE_CHECKING:
     from rotorid.mismatch.tell.verdict import Verdict
+    from rotorid.recordings import RecordingSet
 
 
 def verdict(
@@ -74,20 +76,17 @@ def verdict(
 
         start, limit = time.monotonic(), share_of(max_unexplained)
         is_set = len(paths) == 1 and paths[0].is_dir() and not is_bag(paths[0])
-        name = paths[0].resolve().name if paths[0].is_dir() else paths[0].name.split(".")[0]
-        target = out or Path(f"{name}-verdict")
+        target = out or Path(f"{name_of(paths[0])}-verdict")
         if is_set:
             folder = paths[0]
             ignored = {"--mass-kg": mass_kg, "--like": like, "--vehicle": vehicle, "--mapping": mapping}
             if given := [name for name, value in ignored.items() if value is not None]:
-                typer.echo(_unused(given, folder), err=True)
+                play = "plays" if len(given) == 1 else "play"
+                said = f"{folder} is a recording set, whose vehicle is that of {folder / 'vehicle.yaml'}"
+                typer.echo(f"rotorid: {' and '.join(given)} {play} no part: {said}", err=True)
             if not (folder / "vehicle.yaml").is_file():
                 raise InputError(_no_vehicle(folder))
-        else:
-            folder = target / name
-            made = make_set(paths, folder, mass_kg, like, vehicle, mapping)
-            if not quiet and not as_json:
-                print_notes(made, folder)
+        folder = set_of(paths, is_set, target, quiet or as_json, mass_kg, like, vehicle, mapping)
         found = deliver_set(folder, target, quiet, series)
         if as_json:
             typer.echo((target / "verdict.json").read_text(encoding="utf-8"), nl=False)
@@ -161,15 +160,6 @@ def deliver_set(folder: Path, target: Path, quiet: bool, series: bool = False) -
         return verdict
 
 
-def _unused(given: list[str], folder: Path) -> str:
-    """That options which describe the vehicle of a log play no part where a recording set is judged."""
-    play = "plays" if len(given) == 1 else "play"
-    return (
-        f"rotorid: {' and '.join(given)} {play} no part: {folder} is a recording set, whose vehicle is that of "
-        f"{folder / 'vehicle.yaml'}"
-    )
-
-
 def _no_vehicle(folder: Path) -> str:
     """What to do about a folder without vehicle.yaml, by what is in it."""
     files = [p for p in folder.iterdir() if p.is_file()]
@@ -183,10 +173,6 @@ def _no_vehicle(folder: Path) -> str:
             f"one by `rotorid init {folder}`"
         )
     return f"{folder}: no vehicle.yaml and no log in it; expected a recording set (a folder with vehicle.yaml and runs)"
-
-
-if TYPE_CHECKING:
-    from rotorid.recordings import RecordingSet
 
 
 def compare(
@@ -251,11 +237,11 @@ def compare(
             found = changes_between(good, second, seen=seen)
         text = json.dumps(words.as_json(found), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
         if out is not None:
-            _write(out, text)
+            write_texts({out: text})
         if page is not None:
             from rotorid.report.page.changes import make_changes_page
 
-            _write(page, make_changes_page(found))
+            write_texts({page: make_changes_page(found)})
         if as_json:
             typer.echo(text, nl=False)
         else:
@@ -294,11 +280,3 @@ def read(
             out.append(read_set(folder))
             vehicle, mass_kg, like = folder / "vehicle.yaml", None, None
         return out
-
-
-def _write(path: Path, text: str) -> None:
-    """Write a file whole or not at all."""
-    from rotorid.io.text.writing import all_or_none
-
-    with all_or_none(path) as (part,):
-        part.write_text(text, encoding="utf-8")

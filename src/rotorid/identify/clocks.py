@@ -26,7 +26,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.errors import InputError
-from rotorid.recordings.signal.filters import zero_phase
+from rotorid.recordings.signal import zero_phase
 
 _STEP_S = 0.01
 _SMOOTH_HZ = 5.0

@@ -47,7 +47,7 @@ from rotorid.errors import InputError
 from rotorid.identify.clocks import device_time
 from rotorid.io.logs import by_recording
 from rotorid.recordings import RecordingSet
-from rotorid.recordings.spikes import lost_speed
+from rotorid.recordings.mended import lost_speed
 
 _FORMS = {"origin": False, "offset": True}
 _PROPELLERS = {

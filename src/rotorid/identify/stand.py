@@ -27,7 +27,7 @@ from rotorid.io.logs import by_recording
 from rotorid.io.wire import EXPERIMENTS
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import RecordingSet, Run
-from rotorid.recordings.signal.filters import block_count, mean_and_error
+from rotorid.recordings.signal import block_count, mean_and_error
 from rotorid.recordings.vehicle import Vehicle
 
 _RPM = 2 * np.pi / 60

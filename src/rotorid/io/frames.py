@@ -20,6 +20,7 @@ from __future__ import annotations
 import struct
 from binascii import crc_hqx
 from collections.abc import Iterator
+from contextlib import suppress
 from enum import IntFlag
 from typing import NamedTuple
 
@@ -200,7 +201,10 @@ class Tracker:
 
     def place(self, frame: Frame) -> _Placed | None:
         """The frame's place, or None for a frame that was here before."""
-        record = _start_record(frame)
+        record = None
+        if frame.kind == START:
+            with suppress(wire.Malformed):
+                record = wire.StartRecord.unpack(frame.payload)
         if record is not None:
             self.interval_us = record.interval_us or self.interval_us
             if self.boot_id == _UNKNOWN_BOOT:
@@ -287,31 +291,16 @@ class Tracker:
         for i in range(len(self.gaps) - 1, max(len(self.gaps) - _LATEST_GAPS, 0) - 1, -1):
             gap = self.gaps[i]
             if gap.segment == self.segment and gap.first_index <= index < gap.first_index + gap.count:
-                self.gaps[i : i + 1] = _split(gap, index, clock / 1e6)
+                # what is left of the gap on both sides, now that this frame has come after all
+                before, after, clock_s = index - gap.first_index, gap.first_index + gap.count - 1 - index, clock / 1e6
+                first = gap.model_copy(update={"count": before, "stop_s": clock_s})
+                second = {"first_index": index + 1, "count": after, "start_s": clock_s}
+                parts = (first, gap.model_copy(update=second))
+                self.gaps[i : i + 1] = [part for part in parts if part.count]
                 self.late += 1
                 self.missing -= 1
                 return _Placed(self.segment, index, clock, Quality.LATE)
         self.repeated += 1
-        return None
-
-
-def _split(gap: Gap, index: int, clock_s: float) -> list[Gap]:
-    """What is left of a gap once the frame `index` in it has come after all."""
-    before, after = index - gap.first_index, gap.first_index + gap.count - 1 - index
-    parts = [
-        gap.model_copy(update={"count": before, "stop_s": clock_s}),
-        gap.model_copy(update={"first_index": index + 1, "count": after, "start_s": clock_s}),
-    ]
-    return [part for part in parts if part.count]
-
-
-def _start_record(frame: Frame) -> wire.StartRecord | None:
-    """What a start record says; None for other frames, and for a record that makes no sense."""
-    if frame.kind != START:
-        return None
-    try:
-        return wire.StartRecord.unpack(frame.payload)
-    except wire.Malformed:
         return None
 
 
@@ -320,15 +309,12 @@ def _signed(difference: int, period: int) -> int:
     return (difference + period // 2) % period - period // 2
 
 
-class Taken(NamedTuple):
-    """A frame of a known kind with what it says: a record, an answer, or the payload of a sample.
+_Content = wire.StartRecord | wire.EndRecord | wire.Answer | bytes
+Taken = tuple[int, _Placed | None, _Content]
+"""Kind and place of a frame of a known kind, and what it says: a record, an answer, or the payload of a sample.
 
-    `place` is None for a frame that was here before; only a start record is handed on then.
-    """
-
-    kind: int
-    place: _Placed | None
-    content: wire.StartRecord | wire.EndRecord | wire.Answer | bytes
+The place is None for a frame that was here before; only a start record is handed on then.
+"""
 
 
 class Intake:
@@ -367,9 +353,9 @@ class Intake:
             return None
         if place is None and frame.kind != START:
             return None
-        return Taken(frame.kind, place, content)
+        return frame.kind, place, content
 
-    def _content(self, frame: Frame):
+    def _content(self, frame: Frame) -> _Content | None:
         """What a frame says, or None, counted, where it says nothing that could be understood."""
         try:
             if frame.kind == DATA:

@@ -26,14 +26,10 @@ from rotorid.errors import InputError
 from rotorid.io.logs import faults_of, same_recording
 from rotorid.io.models import KnownKeys, Number, read_model
 from rotorid.io.rawlog import RECEIVED, Damage, read_raw
-from rotorid.io.session import SessionError, read_session, session_path
+from rotorid.io.session import read_session, session_path
 from rotorid.io.text.wording import explain
 
 _MAX_LINE = 4096
-
-
-class DescriptionError(InputError):
-    """The description is not what it should be; the sentence names file and place."""
 
 
 class _Column(KnownKeys):
@@ -101,8 +97,8 @@ class Description(KnownKeys):
 
 
 def read_description(path: Path) -> Description:
-    """Read and validate. Raises DescriptionError."""
-    return read_model(path, Description, DescriptionError)
+    """Read and validate. Raises InputError."""
+    return read_model(path, Description)
 
 
 class LineDecoder:
@@ -157,18 +153,18 @@ class _LineLog:
 def read_line_log(path: Path, description: Description | None = None) -> _LineLog:
     """Read a log of plain lines by its own description or by another, around damage.
 
-    Raises SessionError, NotALog, and LogError where log and metadata are of two recordings.
+    Raises InputError, also where log and metadata are of two recordings.
     """
     beside = session_path(path)
     session = read_session(beside) if description is None or beside.exists() else None
     if description is None:
         stored = session.procedure.get("description")
         if stored is None:
-            raise SessionError(f"{beside}: holds no description of lines; is this a log of frames?")
+            raise InputError(f"{beside}: holds no description of lines; is this a log of frames?")
         try:
             description = Description.model_validate(stored)
         except ValidationError as error:
-            raise SessionError(f"{beside}: procedure.description." + explain(error, Description)) from None
+            raise InputError(f"{beside}: procedure.description." + explain(error, Description)) from None
     raw, decoder, rows = read_raw(path), LineDecoder(description), []
     same_recording(path, raw, session)
     for piece in raw.pieces():

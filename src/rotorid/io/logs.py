@@ -1,14 +1,10 @@
 """Raw logs to tidy tables: `read_log(path)` gives a table with units, quality flags and the metadata.
 
-A log cut off anywhere is read up to the cut, a damaged one behind the damage as well; `Log.faults` says in
-sentences what is not as it was recorded. The table's time is the device's own clock, unwrapped; the host's time
-stands next to it, so that two instruments can be aligned.
-
-Raw logs of one kind and instrument as two tidy tables: all samples, and one row per recording.
-
-The table of samples keeps the instrument's columns with the unit in their names, the quality flags of
-`rotorid.io.logs`, and the recording's `id` before them. The table of recordings holds what the operator set,
-the marks (values of the column `index`) and what went wrong on the line.
+A log cut off anywhere is read up to the cut, a damaged one behind the damage as well; `Log.faults` says in sentences
+what is not as it was recorded. The table's time is the device's own clock, unwrapped; the host's time stands next to
+it, so that two instruments can be aligned. `read_tables` makes two tables of logs of one instrument: all samples, with
+the recording's `id` before them, and one row a recording, with what the operator set, the marks (values of the column
+`index`) and what went wrong on the line.
 """
 
 from __future__ import annotations
@@ -24,17 +20,13 @@ import pandas as pd
 from rotorid.errors import InputError
 from rotorid.io import rawlog, wire
 from rotorid.io.frames import DATA, END, START, Intake, Quality
-from rotorid.io.session import Ended, Gap, Session, SessionError, read_session, session_path
+from rotorid.io.session import Ended, Gap, Session, read_session, session_path
 from rotorid.io.wire import STREAMING
 
 _SETUP = (
     "platform axis load_gf cell repeat experiment throttle motor infill_percent specimen gauge_length_mm "
     "cross_section_mm2 mount_roll_deg mount_pitch_deg tared"
 ).split()
-
-
-class LogError(InputError):
-    """A log that no table can be made of; the sentence names the file and what was expected."""
 
 
 @dataclass(frozen=True)
@@ -83,12 +75,12 @@ class Log:
 def read_log(path: str | Path) -> Log:
     """Parse a raw log (`.rlog` or `.rlog.gz`), whole, cut or damaged.
 
-    Raises LogError where no start record names the instrument (and no metadata does either) or where the log and
-    the metadata next to it are of two recordings, NotALog where the file is none or is not there.
+    Raises InputError where no start record names the instrument (and no metadata does either), where the log and the
+    metadata next to it are of two recordings, and where the file is no log or is not there.
     """
     path = Path(path)
     raw = rawlog.read_raw(path)
-    session = _session_of(path)
+    session = read_session(session_path(path)) if session_path(path).exists() else None
     same_recording(path, raw, session)
     intake = Intake(wire.INSTRUMENTS.get(session.instrument) if session is not None else None)
     starts: list[wire.StartRecord] = []
@@ -175,14 +167,14 @@ def _note(data: bytes) -> dict:
 
 
 def same_recording(path: Path, raw: rawlog.RawLog, session: Session | None) -> None:
-    """Raises LogError where the log's own name is not that of the metadata next to it."""
+    """Raises InputError where the log's own name is not that of the metadata next to it."""
     if session is None:
         return
     for chunk in raw.chunks:
         if chunk.tag == rawlog.NOTE and _note(chunk.data).get("note") == "begin":
             name = _note(chunk.data).get("id")
             if name is not None and name != session.id:
-                raise LogError(
+                raise InputError(
                     f"{path}: holds the recording {name!r}, and the metadata next to it are those of {session.id!r}; "
                     "put the right file back"
                 )
@@ -202,15 +194,6 @@ def faults_of(raw: rawlog.RawLog, session: Session | None) -> list[str]:
     return faults
 
 
-def _session_of(path: Path) -> Session | None:
-    try:
-        return read_session(session_path(path))
-    except SessionError:
-        if session_path(path).exists():
-            raise
-        return None
-
-
 def _instrument(path: Path, starts: list[wire.StartRecord], session: Session | None) -> tuple[wire.Instrument, str]:
     """Who wrote the log, and a sentence where that is an instrument we do not know: its samples cannot be read."""
     named = [start.instrument for start in starts]
@@ -219,7 +202,7 @@ def _instrument(path: Path, starts: list[wire.StartRecord], session: Session | N
             return wire.INSTRUMENTS[name], ""
     name = named[-1] if named else session.instrument if session else None
     if name is None:
-        raise LogError(
+        raise InputError(
             f"{path}: no start record in it and no {session_path(path).name} next to it, "
             "so nothing says which instrument wrote it"
         )
@@ -227,7 +210,7 @@ def _instrument(path: Path, starts: list[wire.StartRecord], session: Session | N
     if name in wire.INSTRUMENTS:
         return wire.INSTRUMENTS[name], ""
     if session is None or session.instrument not in wire.INSTRUMENTS:
-        raise LogError(f"{path}: {known}")
+        raise InputError(f"{path}: {known}")
     return wire.INSTRUMENTS[session.instrument], known
 
 
@@ -277,11 +260,8 @@ def _device_time(where: np.ndarray, host_ns: np.ndarray) -> np.ndarray:
 def read_tables(paths: Iterable[str | Path]) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Samples and recordings of logs of one instrument, in the order of the recordings' time.
 
-    Raises
-    ------
-    InputError
-        No logs, logs of different instruments, a log without its metadata or with bytes that are not those of the
-        recording, or two of the same id.
+    InputError for no logs, logs of different instruments, one without its metadata or with bytes that are not those of
+    the recording, and two of the same id.
     """
     logs = [read_log(path) for path in paths]
     if not logs:

@@ -27,18 +27,15 @@ class KnownKeys(BaseModel):
 def read_model(
     path: Path,
     model: type[_Model],
-    error: type[InputError],
     most_bytes: int = LARGEST_YAML,
     most_values: int = MOST_YAML_VALUES,
     compiled: bool = False,
 ) -> _Model:
-    """The model that a file fills. Raises `error` with one sentence that names file and key.
+    """The model that a file fills. Raises InputError with one sentence that names file and key.
 
     `compiled` reads by libyaml, ten times faster, where a program wrote the file and will read thousands of them.
     """
     try:
         return model.model_validate(read_yaml(path, False, most_bytes, most_values, compiled))
     except ValidationError as fault:
-        raise error(f"{path}: {explain(fault, model)}") from None
-    except InputError as fault:
-        raise error(str(fault)) from None
+        raise InputError(f"{path}: {explain(fault, model)}") from None

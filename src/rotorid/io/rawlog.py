@@ -33,10 +33,6 @@ _LONGEST_PAUSE_NS = 30 * 86_400 * 10**9
 """Between two chunks of one log."""
 
 
-class NotALog(InputError):
-    """The file is not a raw log at all."""
-
-
 class _Chunk(NamedTuple):
     """Bytes and the host's monotonic time (ns) at which they were read, sent or noted."""
 
@@ -94,18 +90,15 @@ def pack_chunk(tag: int, host_ns: int, data: bytes) -> bytes:
 
 
 def read_raw(path: str | Path) -> RawLog:
-    """Read a log, whole, cut or damaged, plain or gzipped. Raises NotALog where there is none."""
-    try:
-        data = read_bytes(Path(path), LARGEST_RAW_LOG)
-    except InputError as error:
-        raise NotALog(str(error)) from None
+    """Read a log, whole, cut or damaged, plain or gzipped. Raises InputError where there is none."""
+    data = read_bytes(Path(path), LARGEST_RAW_LOG)
     truncated = False
     if data[:2] == b"\x1f\x8b":
         data, truncated = _unpacked(data)
         if len(data) > LARGEST_RAW_LOG:
-            raise NotALog(f"{path}: unpacks to more than {LARGEST_RAW_LOG / 1e6:g} MB, expected at most that")
+            raise InputError(f"{path}: unpacks to more than {LARGEST_RAW_LOG / 1e6:g} MB, expected at most that")
     if not MAGIC.startswith(data[: len(MAGIC)]):
-        raise NotALog(f"{path}: does not begin with {MAGIC!r}, so it is no raw log of rotorid-acquire")
+        raise InputError(f"{path}: does not begin with {MAGIC!r}, so it is no raw log of rotorid-acquire")
     digest = sha256(data).hexdigest()
     if len(data) < len(MAGIC):  # cut inside the first ten bytes: a log with nothing in it
         return RawLog((), len(data), sha256=digest)

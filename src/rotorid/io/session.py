@@ -196,10 +196,6 @@ class Session(KnownKeys):
         return name
 
 
-class SessionError(InputError):
-    """The metadata file is missing, unreadable or not what it should be."""
-
-
 def session_path(log: str | Path) -> Path:
     """Where the metadata of a log stands: `x.rlog` or `x.rlog.gz` → `x.yaml`."""
     log = Path(log)
@@ -210,10 +206,10 @@ def write_session(session: Session, path: str | Path) -> None:
     """Write atomically, with a checksum: a reader sees the old file or the new one, never half of either."""
     content = session.model_dump(mode="json", exclude_none=True, exclude={"metadata_sha256"})
     text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=110)
-    replace_bytes(Path(path), metadata_checksum.with_checksum(text.encode()))
+    _replace_bytes(Path(path), metadata_checksum.with_checksum(text.encode()))
 
 
-def replace_bytes(path: Path, data: bytes) -> None:
+def _replace_bytes(path: Path, data: bytes) -> None:
     """Put a whole new content in the place of a file, or leave it as it is. Raises OSError."""
     temporary = path.with_name(path.name + ".tmp")
     try:
@@ -228,40 +224,35 @@ def replace_bytes(path: Path, data: bytes) -> None:
 
 
 def read_session(path: str | Path) -> Session:
-    """Read and validate. Raises SessionError naming the file and the first key that is wrong, or that the file was
+    """Read and validate. Raises InputError naming the file and the first key that is wrong, or that the file was
     changed after recording; `metadata_sha256` of the session is None where nothing can say that it was not."""
     path = Path(path)
     if not path.exists() and not path.is_symlink():
-        raise SessionError(f"{path}: no such file; every log has its metadata next to it")
-    try:
-        metadata_checksum.check(read_bytes(path, LARGEST_METADATA), path)
-    except InputError as error:
-        raise SessionError(str(error)) from None
-    return read_model(path, Session, SessionError, LARGEST_METADATA, MOST_METADATA_VALUES, compiled=True)
-
-
-def _index_row(session: Session, metadata: Path, raw: Path) -> dict[str, str]:
-    """A row of the index; paths are relative to `raw`, what is not known is empty."""
-    values = session.setup.model_dump() | session.model_dump(exclude={"setup"}) | session.counts.model_dump()
-    values["file"] = metadata.with_name(session.log).relative_to(raw).as_posix()
-    values["metadata"] = metadata.relative_to(raw).as_posix()
-    return {name: "" if values.get(name) is None else str(values[name]) for name in INDEX_COLUMNS}
+        raise InputError(f"{path}: no such file; every log has its metadata next to it")
+    metadata_checksum.check(read_bytes(path, LARGEST_METADATA), path)
+    return read_model(path, Session, LARGEST_METADATA, MOST_METADATA_VALUES, compiled=True)
 
 
 def write_index(raw: Path) -> list[dict[str, str]]:
-    """Find all recordings below `raw`, in the order of their time, and write the index.
+    """Find all recordings below `raw`, in the order of their time, and write the index. What is not known is empty.
 
     What lies in `raw/local`, where the recorders write by default, is left out: first tries are no part of a campaign.
     Such a folder has an index of its own, by `write_index(raw / "local")`. Files that are no session metadata (vehicle
-    files) are passed over. Raises SessionError for a session file that is damaged.
+    files) are passed over. Raises InputError for a session file that is damaged.
     """
-    rows = [_index_row(read_session(path), path, raw) for path in metadata_files(raw)]
+    rows = []
+    for path in metadata_files(raw):
+        session = read_session(path)
+        values = session.setup.model_dump() | session.model_dump(exclude={"setup"}) | session.counts.model_dump()
+        values["file"] = path.with_name(session.log).relative_to(raw).as_posix()
+        values["metadata"] = path.relative_to(raw).as_posix()
+        rows.append({name: "" if values.get(name) is None else str(values[name]) for name in INDEX_COLUMNS})
     rows.sort(key=lambda row: (row["started"], row["id"]))
     text = io.StringIO(newline="")
     writer = csv.DictWriter(text, INDEX_COLUMNS, delimiter="\t", lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
-    replace_bytes(raw / INDEX, index_with_checksum(text.getvalue().encode()))
+    _replace_bytes(raw / INDEX, index_with_checksum(text.getvalue().encode()))
     return rows
 
 
@@ -276,20 +267,20 @@ def index_with_checksum(data: bytes) -> bytes:
 
 
 def files_with_checksum(place: Path) -> list[Path]:
-    """Files with a checksum meant by a folder, a log, metadata or an index. Raises SessionError where there are none.
+    """Files with a checksum meant by a folder, a log, metadata or an index. Raises InputError where there are none.
 
     Of a folder its index comes first, where it has one.
     """
     if place.is_dir():
         found = metadata_files(place)
         if not found:
-            raise SessionError(f"{place}: holds no metadata of recordings (`<log>.yaml`)")
+            raise InputError(f"{place}: holds no metadata of recordings (`<log>.yaml`)")
         return [place / INDEX] * (place / INDEX).is_file() + found
     return [place if place.suffix == ".yaml" or place.name == INDEX else session_path(place)]
 
 
 def add_checksum(path: Path) -> bool:
-    """Add the checksum to metadata or an index without one; True if there was none. Raises SessionError for files that
+    """Add the checksum to metadata or an index without one; True if there was none. Raises InputError for files that
     are neither, or whose checksum does not fit."""
     if path.name == INDEX:
         read_index(path.parent)
@@ -299,26 +290,26 @@ def add_checksum(path: Path) -> bool:
         lacking, added = read_session(path).metadata_sha256 is None, metadata_checksum.with_checksum
         data = read_bytes(path, LARGEST_METADATA)
     if lacking:
-        replace_bytes(path, added(data))
+        _replace_bytes(path, added(data))
     return lacking
 
 
 def renew_checksum(path: Path) -> bool:
-    """Make the checksum fit what stands in the file now; True if it did not. Raises SessionError for metadata or an
+    """Make the checksum fit what stands in the file now; True if it did not. Raises InputError for metadata or an
     index that are none with it, and then leaves the file as it was."""
     of_index = path.name == INDEX
     if not path.exists():
         why = "`rotorid-acquire index` makes it" if of_index else "every log has its metadata next to it"
-        raise SessionError(f"{path}: no such file; {why}")
+        raise InputError(f"{path}: no such file; {why}")
     before = read_bytes(path, LARGEST_INDEX if of_index else LARGEST_METADATA)
     after = (index_with_checksum if of_index else metadata_checksum.with_checksum)(before)
     if after == before:
         return False
-    replace_bytes(path, after)
+    _replace_bytes(path, after)
     try:
         read_index(path.parent) if of_index else read_session(path)
-    except SessionError:
-        replace_bytes(path, before)
+    except InputError:
+        _replace_bytes(path, before)
         raise
     return True
 
@@ -333,18 +324,15 @@ def metadata_files(raw: Path) -> list[Path]:
 def read_index(raw: Path) -> list[dict[str, str]]:
     """Rows of the index.
 
-    Raises SessionError where there is none, its columns are others, a row is none or its checksum does not fit.
+    Raises InputError where there is none, its columns are others, a row is none or its checksum does not fit.
     """
     path = raw / INDEX
     if not path.exists() and not path.is_symlink():
-        raise SessionError(f"{path}: no such file; `rotorid-acquire index` makes it")
-    try:
-        data = read_bytes(path, LARGEST_INDEX)
-        rows = _rows(data, path)
-    except InputError as error:
-        raise SessionError(str(error)) from None
+        raise InputError(f"{path}: no such file; `rotorid-acquire index` makes it")
+    data = read_bytes(path, LARGEST_INDEX)
+    rows = _rows(data, path)
     if _ROW.search(data) is not None and index_with_checksum(data) != data:
-        raise SessionError(
+        raise InputError(
             f"{path}: the index was changed after it was written, its checksum ({INDEX_KEY}, the last row) does not fit"
             f"; make it anew from the metadata: rotorid-acquire index {raw}, or, if the change is meant, renew the "
             f"checksum: rotorid-acquire checksum --renew {path}"
@@ -365,25 +353,25 @@ def _rows(data: bytes, path: Path) -> list[dict[str, str]]:
             if wrong
             else f"{listed(lacking) or 'their order'} is wrong"
         )
-        raise SessionError(f"{path}, line 1: the columns should be {', '.join(INDEX_COLUMNS)}: {what}")
+        raise InputError(f"{path}, line 1: the columns should be {', '.join(INDEX_COLUMNS)}: {what}")
     try:
         rows = list(csv.reader(lines[1:], delimiter="\t", strict=True))
     except csv.Error as error:
-        raise SessionError(f"{path}: not a table ({error}); `rotorid-acquire index` makes it anew") from None
+        raise InputError(f"{path}: not a table ({error}); `rotorid-acquire index` makes it anew") from None
     seen: dict[str, int] = {}
     recordings = []
     for number, row in enumerate(rows, 2):
         if row[:1] == [INDEX_KEY]:
             continue
         if len(row) != len(INDEX_COLUMNS):
-            raise SessionError(f"{path}, line {number}: has {len(row)} cells, expected {len(INDEX_COLUMNS)}")
+            raise InputError(f"{path}, line {number}: has {len(row)} cells, expected {len(INDEX_COLUMNS)}")
         if row[0] in seen:
-            raise SessionError(f"{path}, line {number}: {row[0]} is there twice (first in line {seen[row[0]]})")
+            raise InputError(f"{path}, line {number}: {row[0]} is there twice (first in line {seen[row[0]]})")
         seen[row[0]] = number
         for name in ("file", "metadata"):
             place = PurePosixPath(row[INDEX_COLUMNS.index(name)])
             if place.is_absolute() or ".." in place.parts or not place.name:
-                raise SessionError(
+                raise InputError(
                     f"{path}, line {number}: {name}: found {str(place)!r}, expected a file below {path.parent}"
                 )
         recordings.append(dict(zip(INDEX_COLUMNS, row, strict=True)))

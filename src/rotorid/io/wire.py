@@ -322,15 +322,7 @@ def unpack_throttle(arguments: bytes) -> tuple[float, float]:
 
 RED, YELLOW, GREEN = 0, 1, 2  # no motor turns, speeds change, speeds constant
 TRAPEZOID, SINE = 0, 1
-DYNAMICS = {
-    "h": "hover",
-    "b": "bounce",
-    "r": "roll",
-    "p": "pitch",
-    "y": "yaw",
-    "t": "tilted",
-    "m": "one motor",
-}
+DYNAMICS = {"h": "hover", "b": "bounce", "r": "roll", "p": "pitch", "y": "yaw", "t": "tilted", "m": "one motor"}
 
 QUADROTOR = Instrument(
     name="quadrotor",

@@ -1,14 +1,6 @@
 """Recording sets: what goes into the mismatch stage (the recording contract)."""
 
-from rotorid.recordings.files import (
-    list_sets,
-    read_run,
-    read_set,
-    read_vehicle,
-    vehicle_of,
-    write_set,
-    write_vehicle,
-)
+from rotorid.recordings.files import list_sets, read_run, read_set, read_vehicle, vehicle_of, write_set, write_vehicle
 from rotorid.recordings.run import RecordingSet, Run, Split
 from rotorid.recordings.vehicle import Inertia, Rotor, Vehicle
 
@@ -29,24 +21,21 @@ __all__ = [
 ]
 
 OPEN = (
-    "basis",
     "body",
     "check",
     "columns",
     "files",
     "held",
     "importers.faults",
-    "importers.guessing.guess",
+    "importers.guessing",
     "importers.logfile",
     "importers.mapping",
     "importers.neurobem",
-    "importers.overview",
     "importers.public_sets",
-    "importers.set_of_logs",
-    "own_rates",
+    "mended",
     "run",
+    "signal",
     "signal.*",
-    "spikes",
     "sufficient",
     "tables",
     "templates",

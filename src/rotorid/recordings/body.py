@@ -80,19 +80,6 @@ _UNITS: dict[tuple[str, ...], dict[str, float]] = {
 
 
 @dataclass(frozen=True)
-class RotorsInAir:
-    """What a run says about the rotors in the air."""
-
-    hover_rad_s: float
-    """Speed at which equal rotors give the run's median thrust."""
-    top_rad_s: float
-    lift_m_s2: float | None
-    """Specific force against the thrust; None where nothing was lifted (a stand)."""
-    column: str
-    """First column of the rotors; `throttle_1` where speed is throttle times the upper limit."""
-
-
-@dataclass(frozen=True)
 class Body:
     """Believed values in SI units; None where the vehicle does not state one."""
 
@@ -106,13 +93,19 @@ class Body:
     torque_coefficient_n_m_s2: float | None
     rotor_speed_limits_rad_s: float | None
     rotor_speeds: tuple[float, float] | None
-    """At hover and at the most."""
+    """At which equal rotors give a run's median thrust, and at the most."""
     lift_m_s2: float | None
+    """Specific force against the thrust; None where nothing was lifted (a stand)."""
     accelerometer_position_m: float | None
     """Distance from the origin; None where it is there."""
     rotor_inertia_kg_m2: float | None
     count: int
-    by_throttle: bool
+    column: str
+    """First column of the rotors; `throttle_1` where speed is throttle times the upper limit."""
+
+    @property
+    def by_throttle(self) -> bool:
+        return self.column.startswith("throttle")
 
     def scaled(self, keys: tuple[str, ...], factor: float) -> Body:
         """The body with these values multiplied by one factor."""
@@ -156,8 +149,10 @@ def _within(value: float, limits: tuple[float, float]) -> bool:
     return isfinite(value) and limits[0] <= value <= limits[1]
 
 
-def body_of(vehicle: Vehicle, flown: RotorsInAir | None) -> Body | None:
-    """The vehicle's values that are coupled, with the rotor speeds of a run where there is one; None without rotors."""
+def body_of(
+    vehicle: Vehicle, speeds: tuple[float, float] | None = None, lift_m_s2: float | None = None, column: str = ""
+) -> Body | None:
+    """The vehicle's values that are coupled, with those of a run where there is one; None without rotors."""
     if not vehicle.rotors or vehicle.thrust_coefficient_n_s2 is None:
         return None
     hubs = vehicle.rotor_positions_m()
@@ -172,12 +167,12 @@ def body_of(vehicle: Vehicle, flown: RotorsInAir | None) -> Body | None:
         thrust_coefficient_n_s2=float(vehicle.thrust_coefficients_n_s2().mean()),
         torque_coefficient_n_m_s2=None if torque is None else float(vehicle.torque_coefficients_n_m_s2().mean()),
         rotor_speed_limits_rad_s=None if limits is None else limits[1],
-        rotor_speeds=None if flown is None else (flown.hover_rad_s, flown.top_rad_s),
-        lift_m_s2=None if flown is None else flown.lift_m_s2,
+        rotor_speeds=speeds,
+        lift_m_s2=lift_m_s2,
         accelerometer_position_m=float(np.linalg.norm(vehicle.accelerometer_position_m)) or None,
         rotor_inertia_kg_m2=vehicle.rotor_inertia_kg_m2,
         count=vehicle.rotor_count,
-        by_throttle=flown is not None and flown.column.startswith("throttle"),
+        column=column,
     )
 
 
@@ -190,57 +185,36 @@ def quantities(body: Body) -> Iterator[_CoupledNumber]:
     if body.mass_kg and body.inertia_kg_m2 and body.rotors:
         for moment in (min(body.inertia_kg_m2), max(body.inertia_kg_m2)):
             gyration = sqrt(moment / body.mass_kg)
-            yield _CoupledNumber(
-                ("inertia_kg_m2", "mass_kg", "rotors"),
-                gyration / body.rotors,
-                _GYRATION_ARMS,
-                f"a radius of gyration of {gyration:.3g} m with arms of {body.rotors:.3g} m",
-            )
+            words = f"a radius of gyration of {gyration:.3g} m with arms of {body.rotors:.3g} m"
+            keys = ("inertia_kg_m2", "mass_kg", "rotors")
+            yield _CoupledNumber(keys, gyration / body.rotors, _GYRATION_ARMS, words)
     if body.rotors:
-        yield _CoupledNumber(
-            ("rotors", length),
-            body.rotors / radius,
-            _SPAN_RADII,
-            f"arms of {body.rotors:.3g} m with {disc}",
-        )
+        words = f"arms of {body.rotors:.3g} m with {disc}"
+        yield _CoupledNumber(("rotors", length), body.rotors / radius, _SPAN_RADII, words)
     if stated:
-        yield _CoupledNumber(
-            ("rotor_radius_m", "thrust_coefficient_n_s2"),
-            c_f / (_AIR_KG_M3 * pi * radius**4),
-            _C_T,
-            f"a dimensionless C_T of {c_f / (_AIR_KG_M3 * pi * radius**4):.3g} (C_F over ρ π R⁴, R {radius:.3g} m)",
-        )
+        c_t = c_f / (_AIR_KG_M3 * pi * radius**4)
+        words = f"a dimensionless C_T of {c_t:.3g} (C_F over ρ π R⁴, R {radius:.3g} m)"
+        yield _CoupledNumber(("rotor_radius_m", "thrust_coefficient_n_s2"), c_t, _C_T, words)
     if body.torque_coefficient_n_m_s2:
         merit = c_f**1.5 / (body.torque_coefficient_n_m_s2 * sqrt(2 * _AIR_KG_M3 * pi) * radius)
-        yield _CoupledNumber(
-            ("torque_coefficient_n_m_s2", "thrust_coefficient_n_s2", length),
-            merit,
-            _FIGURE_OF_MERIT if stated else _ROUGH_FIGURE_OF_MERIT,
-            f"a figure of merit of {merit:.3g} (C_F^1.5 over C_Q √(2 ρ π) R)",
-            sure=_SURE_FIGURE_OF_MERIT if stated else None,
-        )
+        words = f"a figure of merit of {merit:.3g} (C_F^1.5 over C_Q √(2 ρ π) R)"
+        keys = ("torque_coefficient_n_m_s2", "thrust_coefficient_n_s2", length)
+        limits, sure = (_FIGURE_OF_MERIT, _SURE_FIGURE_OF_MERIT) if stated else (_ROUGH_FIGURE_OF_MERIT, None)
+        yield _CoupledNumber(keys, merit, limits, words, sure)
     if body.mass_kg:
         loading = body.mass_kg * 9.81 / (body.count * pi * radius**2)
-        yield _CoupledNumber(
-            ("mass_kg", length), loading, _DISC_LOADING_N_M2, f"a disc loading of {loading:.3g} N/m² with {disc}"
-        )
+        words = f"a disc loading of {loading:.3g} N/m² with {disc}"
+        yield _CoupledNumber(("mass_kg", length), loading, _DISC_LOADING_N_M2, words)
     if body.rotor_speeds:
         yield from _turning(body, disc)
     if body.accelerometer_position_m and body.rotors:
-        yield _CoupledNumber(
-            ("accelerometer_position_m", "rotors"),
-            body.accelerometer_position_m / body.rotors,
-            _PLACE_ARMS,
-            f"an accelerometer {body.accelerometer_position_m:.3g} m from the origin with arms of {body.rotors:.3g} m",
-        )
+        place = body.accelerometer_position_m
+        words = f"an accelerometer {place:.3g} m from the origin with arms of {body.rotors:.3g} m"
+        yield _CoupledNumber(("accelerometer_position_m", "rotors"), place / body.rotors, _PLACE_ARMS, words)
     if body.rotor_inertia_kg_m2 and body.mass_kg:
         share = body.rotor_inertia_kg_m2 / (body.mass_kg * radius**2)
-        yield _CoupledNumber(
-            ("rotor_inertia_kg_m2", "mass_kg", length),
-            share,
-            _ROTOR_INERTIA,
-            f"the inertia of a rotor is {share:.3g} times that of the whole mass at its tip, with {disc}",
-        )
+        words = f"the inertia of a rotor is {share:.3g} times that of the whole mass at its tip, with {disc}"
+        yield _CoupledNumber(("rotor_inertia_kg_m2", "mass_kg", length), share, _ROTOR_INERTIA, words)
 
 
 def _turning(body: Body, disc: str) -> Iterator[_CoupledNumber]:
@@ -248,42 +222,25 @@ def _turning(body: Body, disc: str) -> Iterator[_CoupledNumber]:
     hover, top = body.rotor_speeds
     source = "rotor_speed_limits_rad_s" if body.by_throttle else "rotor_speeds"
     tip = top * body.radius_m
-    yield _CoupledNumber(
-        (source, "rotor_radius_m"), tip, (0.0, _HIGHEST_TIP_M_S), f"a tip speed of {tip:.3g} m/s with {disc}"
-    )
+    words = f"a tip speed of {tip:.3g} m/s with {disc}"
+    yield _CoupledNumber((source, "rotor_radius_m"), tip, (0.0, _HIGHEST_TIP_M_S), words)
     if body.mass_kg and body.lift_m_s2:
         ratio = body.count * body.thrust_coefficient_n_s2 * hover**2 / (body.mass_kg * body.lift_m_s2)
-        yield _CoupledNumber(
-            ("mass_kg", "thrust_coefficient_n_s2", source),
-            ratio,
-            _WEIGHT_BY_THROTTLE if body.by_throttle else _WEIGHT,
-            f"the thrust is {ratio:.3g} times what carries the vehicle (C_F Σω² over mass times specific force)",
-        )
+        words = f"the thrust is {ratio:.3g} times what carries the vehicle (C_F Σω² over mass times specific force)"
+        limits = _WEIGHT_BY_THROTTLE if body.by_throttle else _WEIGHT
+        yield _CoupledNumber(("mass_kg", "thrust_coefficient_n_s2", source), ratio, limits, words)
         if body.rotor_speed_limits_rad_s and not body.by_throttle:
             share = body.rotor_speed_limits_rad_s / hover
-            yield _CoupledNumber(
-                ("rotor_speed_limits_rad_s", "rotor_speeds"),
-                share,
-                _LIMIT_OVER_HOVER,
-                f"an upper limit of {share:.3g} times the hovering speed of {hover:.4g} rad/s",
-            )
+            words = f"an upper limit of {share:.3g} times the hovering speed of {hover:.4g} rad/s"
+            yield _CoupledNumber(("rotor_speed_limits_rad_s", "rotor_speeds"), share, _LIMIT_OVER_HOVER, words)
 
 
-@dataclass(frozen=True)
-class _Remedy:
-    """Values that, multiplied by one factor, bring most of what does not fit inside its limits."""
+def _remedies(body: Body) -> Iterator[tuple[tuple[str, ...], tuple[int, np.ndarray, tuple[str, ...]]]]:
+    """For each value that may be wrong alone, and for values wrong by one unit together, what one factor mends.
 
-    keys: tuple[str, ...]
-    factors: np.ndarray
-    """All factors that do, ascending; empty where none does."""
-    left: int
-    """How many quantities lie outside their limits even then."""
-    units: tuple[str, ...]
-    """Units whose factor is one of them, the likeliest first."""
-
-
-def _remedies(body: Body) -> Iterator[_Remedy]:
-    """For each value that may be wrong alone, and for values wrong by one unit together, what a factor mends."""
+    To the values how many quantities lie outside their limits even then, all factors that do so, ascending, and the
+    units whose factor is one of them, the likeliest first.
+    """
     before = [q.fits for q in quantities(body)]
 
     def left(keys: tuple[str, ...], factor: float) -> int:
@@ -303,7 +260,7 @@ def _remedies(body: Body) -> Iterator[_Remedy]:
         factors = np.sort([*grid[rest == least], *(units[u] for u in fitting)])
         middle = float(np.log(factors[-1:] if factors[0] <= _FACTORS[0] else factors).mean())
         nearest = sorted(fitting, key=lambda unit: abs(np.log(units[unit]) - middle))[:_MOST_UNITS]
-        yield _Remedy(keys, factors, int(least), tuple(nearest))
+        yield keys, (int(least), factors, tuple(nearest))
 
 
 def unfit(body: Body) -> list[_CoupledNumber]:
@@ -311,33 +268,38 @@ def unfit(body: Body) -> list[_CoupledNumber]:
     return [q for q in quantities(body) if not q.fits]
 
 
-def impossible(body: Body, column: str) -> Iterator[Doubt]:
-    """Believed values that no multirotor has together: one doubt for each value that has to change.
-
-    `column` is the first column of the rotor speeds, as the doubt calls them.
-    """
+def impossible(body: Body) -> Iterator[Doubt]:
+    """Believed values that no multirotor has together: one doubt for each value that has to change."""
     while wrong := unfit(body):
         order = {key: place for place, key in enumerate(dict.fromkeys(key for q in wrong for key in q.keys))}
-        found = [r for r in _remedies(body) if r.left < len(wrong) and r.keys[0] in order]
+        found = {keys: r for keys, r in _remedies(body) if r[0] < len(wrong) and keys[0] in order}
         if not found:
             # Several values are wrong at once, and no single one of them improves anything.
-            yield _doubt(body, _Remedy(wrong[0].keys[:1], np.array([]), 0, ()), wrong, (), column)
+            yield _doubt(body, wrong[0].keys[:1], np.array([]), (), wrong, ())
             return
-        best = min(found, key=lambda r: (r.left, not r.units, len(r.keys), order[r.keys[0]]))
-        mended = body.scaled(best.keys, float(np.exp(np.log(best.factors).mean())))
+        best = min(found, key=lambda keys: (found[keys][0], not found[keys][2], len(keys), order[keys[0]]))
+        left, factors, units = found[best]
+        mended = body.scaled(best, float(np.exp(np.log(factors).mean())))
         fixed = [q for q, after in zip(quantities(body), quantities(mended), strict=True) if after.fits > q.fits]
-        others = [r.keys[0] for r in found if r.left == best.left and len(r.keys) == 1 and r.keys != best.keys]
-        yield _doubt(body, best, fixed, others, column)
+        others = [keys[0] for keys, r in found.items() if r[0] == left and len(keys) == 1 and keys != best]
+        yield _doubt(body, best, factors, units, fixed, others)
         body = mended
 
 
-def _doubt(body: Body, best: _Remedy, raised_by: Sequence[_CoupledNumber], others: Sequence[str], column: str) -> Doubt:
+def _doubt(
+    body: Body,
+    keys: tuple[str, ...],
+    factors: np.ndarray,
+    units: Sequence[str],
+    raised_by: Sequence[_CoupledNumber],
+    others: Sequence[str],
+) -> Doubt:
     """The doubt of a value, with what raised it, what was expected and which unit would fit."""
 
     def name(key: str) -> str:
-        return column if key == "rotor_speeds" else key
+        return body.column if key == "rotor_speeds" else key
 
-    key, about = best.keys[0], raised_by[0]
+    key, about = keys[0], raised_by[0]
     value = getattr(body, key)
     label = f"{name(key)} = "
     if key == "inertia_kg_m2":
@@ -347,18 +309,18 @@ def _doubt(body: Body, best: _Remedy, raised_by: Sequence[_CoupledNumber], other
     elif key == "rotors":
         label = "rotors, longest arm in m = "
     elif key == "rotor_speeds":
-        label, value = f"{column} and its like, at hover = ", value[0]
+        label, value = f"{body.column} and its like, at hover = ", value[0]
     sentence = f"{label}{value:.4g}: {about.words}"
-    ends = (best.factors[0], best.factors[-1]) if len(best.factors) else None
+    ends = (factors[0], factors[-1]) if len(factors) else None
     if ends:
         low, high = value * ends[0], value * ends[1]
         least = "at most " if ends[0] <= _FACTORS[0] else f"{low:.3g} to " if high > low else "about "
         sentence += f"; expected {least}{high:.3g}"
     if key == "torque_coefficient_n_m_s2" and ends and _within(body.thrust_coefficient_n_s2, ends):
         sentence += "; the ratio of torque to thrust in m would fit"
-    elif best.units:
-        both = " (" + " and ".join(map(name, best.keys)) + " alike)" if len(best.keys) > 1 else ""
-        sentence += f"; {' or '.join(best.units)} would fit{both}"
+    elif units:
+        both = " (" + " and ".join(map(name, keys)) + " alike)" if len(keys) > 1 else ""
+        sentence += f"; {' or '.join(units)} would fit{both}"
     if others:
         sentence += f"; {' or '.join(map(name, others))} may be wrong in its place"
     if key == "rotors" and isclose(value, _PX4_UNSET_ARM_M):

@@ -1,20 +1,15 @@
 """What a recording set contains and what it lacks, in words for a person.
 
-For each run: samples, duration, rate, gaps and the share of empty cells; for the set: which columns are
-there, which are not and what that means for testing.
+For each run: samples, duration, rate, gaps and the share of empty cells; for the set: which columns are there, which
+are not and what that means for testing; and what cannot be right:
 
-Runs that hold the same samples: a run held out proves nothing if a fitted one repeats it.
-
-Two recordings of the same manoeuvre agree in what was done and differ in the noise of every sensor. Samples whose
-readings are equal to the last digit, whatever their time stamps, are a copy. A copy that was rounded or scaled anew is
-found by the noise itself: second differences of short blocks, correlated with every place of the other run.
-
-Files in a set's folder that look like recordings and are not read.
-
-Readings that stand still while others go on: nothing was read there.
-
-On a stand or bench a reading that keeps one value in every run; in flight a sensor that repeats one reading for a
-second or more.
+- Runs that hold the same samples: a run held out proves nothing if a fitted one repeats it. Two recordings of the same
+  manoeuvre agree in what was done and differ in the noise of every sensor. Samples whose readings are equal to the last
+  digit, whatever their time stamps, are a copy. A copy that was rounded or scaled anew is found by the noise itself:
+  second differences of short blocks, correlated with every place of the other run.
+- Files in a set's folder that look like recordings and are not read.
+- Readings that stand still while others go on: on a stand or bench one that keeps one value in every run, in flight a
+  sensor that repeats one reading for a second or more.
 """
 
 from __future__ import annotations
@@ -22,6 +17,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -309,7 +305,6 @@ def copies(recordings: RecordingSet) -> tuple[Doubt, ...]:
             second,
             f"Run {second} repeats run {first}: {how}; such a run confirms nothing that was fitted to the other, leave "
             "one of them out.",
-            stops=False,
         )
         for second, (first, how) in found.items()
     )
@@ -341,10 +336,9 @@ def _equal_samples(runs: tuple[Run, ...], names: list[str]) -> Iterator[tuple[st
 def _same_noise(runs: list[Run], names: list[str]) -> Iterator[tuple[str, str]]:
     """Names of pairs of runs of which a block of the first lies somewhere in the second."""
     noises = [_noise(run, names) for run in runs]
-    for i, first in enumerate(noises):
-        for j in range(i + 1, len(noises)):
-            if any(_lies_in(block, noises[j]) for block in _blocks(first)):
-                yield runs[i].name, runs[j].name
+    for (a, first), (b, second) in combinations(zip(runs, noises, strict=True), 2):
+        if any(_lies_in(block, second) for block in _blocks(first)):
+            yield a.name, b.name
 
 
 def _noise(run: Run, names: list[str]) -> np.ndarray:
@@ -392,7 +386,6 @@ def _unread_files(recordings: RecordingSet) -> tuple[Doubt, ...]:
             name,
             f"{name} looks like a recording and is not read: runs end in {', '.join(RUN_SUFFIXES)}; unpack, import or "
             "rename it, or move it out of the set.",
-            stops=False,
         )
         for name in names
         if _RECORDING.search(name) and run_name(Path(name)) is None
@@ -429,7 +422,6 @@ def still_sensors(recordings: RecordingSet) -> Iterator[Doubt]:
             f"{f'{names[0]} to {names[-1]} stand' if len(names) > 1 else f'{names[0]} stands'} still in {run} from "
             f"{start:.2f} to {stop:.2f} s{more} while the vehicle flies on, expected at least the noise of a sensor: "
             "its driver or its link stopped, and nothing was read there",
-            stops=False,
         )
 
 

@@ -1,13 +1,8 @@
-"""Reading and writing recording sets: `vehicle.yaml`, runs (CSV, CSV.gz, Parquet) and `split.yaml`.
+"""Reading and writing recording sets: `vehicle.yaml`, runs (CSV, CSV.gz, Parquet), `split.yaml` and `manifest.json`.
 
-Values of a `vehicle.yaml` that nobody measured: lines that the importer marked as PROPOSED and nobody replaced.
-
-Whether what is believed of a vehicle can be true of any: bodies, rotors and names.
-
-The list of a set's runs with their SHA-256, which `rotorid import` leaves in the set.
-
-A set without such a list is what its files are. Where there is one, a run that is missing, changed or not listed is
-said, so that half an import is not taken for a whole one.
+The last is the list of a set's runs with their SHA-256, which `rotorid import` leaves in the set. A set without it is
+what its files are. Where there is one, a run that is missing, changed or not listed is said, so that half an import is
+not taken for a whole one.
 """
 
 from __future__ import annotations
@@ -26,15 +21,16 @@ from pydantic import ValidationError
 from rotorid.errors import InputError
 from rotorid.io.text.files import MOST_CELLS, MOST_RUNS, check_file, read_text, read_yaml, with_exponents
 from rotorid.io.text.wording import explain, hint, listed, neighbour, printable
-from rotorid.io.text.writing import all_or_none, staging, take_name
+from rotorid.io.text.writing import staging, take_name, write_texts
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import Doubt, RecordingSet, Run
 from rotorid.recordings.tables import (
     UnusableRun,
     check_table,
+    numbers,
     parquet_is_here,
-    read_csv,
-    read_parquet,
+    read_cells,
+    read_parquet_cells,
     write_table,
 )
 from rotorid.recordings.vehicle import Vehicle
@@ -84,9 +80,8 @@ def vehicle_of(content: dict, where: str) -> Vehicle:
 def _misnamed(path: Path) -> str | None:
     """A file next to this one whose name differs in its case or in `.yml`."""
     wanted = (path.name.lower(), path.with_suffix(".yml").name.lower())
-    return next(
-        (p.name for p in sorted(path.parent.iterdir()) if p.name.lower() in wanted and p.name != path.name), None
-    )
+    there = sorted(p.name for p in path.parent.iterdir() if p.name != path.name)
+    return next((name for name in there if name.lower() in wanted), None)
 
 
 def _plain(value):
@@ -99,19 +94,14 @@ def _plain(value):
 
 def write_vehicle(vehicle: Vehicle, path: Path) -> None:
     """Write `vehicle.yaml`, leaving out what the vehicle does not state."""
-    content = vehicle.model_dump(exclude_defaults=True)
-    path.write_text(
-        yaml.safe_dump(_plain(content), sort_keys=False, allow_unicode=True, default_flow_style=None),
-        encoding="utf-8",
-    )
+    content = _plain(vehicle.model_dump(exclude_defaults=True))
+    text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, default_flow_style=None)
+    path.write_text(text, encoding="utf-8")
 
 
 def run_name(path: Path) -> str | None:
     """Name of the run that a file holds, None if the file is no run."""
-    for suffix in RUN_SUFFIXES:
-        if path.name.endswith(suffix):
-            return path.name.removesuffix(suffix)
-    return None
+    return next((path.name.removesuffix(end) for end in RUN_SUFFIXES if path.name.endswith(end)), None)
 
 
 def read_run(path: Path) -> Run:
@@ -121,8 +111,8 @@ def read_run(path: Path) -> Run:
     if name is None:
         raise InputError(f"{path}: expected one of {', '.join(RUN_SUFFIXES)}")
     check_file(path)
-    table = read_parquet(path) if path.name.endswith(".parquet") else read_csv(path)
-    return Run(name, check_table(table, str(path)), str(path))
+    cells = read_parquet_cells(path) if path.name.endswith(".parquet") else read_cells(path)
+    return Run(name, check_table(numbers(cells, path), str(path)), str(path))
 
 
 def run_paths(folder: Path) -> list[Path]:
@@ -193,12 +183,9 @@ def check_rotors(run: Run, vehicle: Vehicle) -> None:
 
 
 def usable_runs(readers: Iterable[Callable[[], Run]], where: object) -> tuple[tuple[Run, ...], tuple[str, ...]]:
-    """The runs that can be used, and one sentence for each that cannot.
+    """The runs that can be used, and one sentence for each that cannot; `where` names the set.
 
-    Raises
-    ------
-    InputError
-        A run is no table, none can be used, or together they are larger than any recording; `where` names the set.
+    InputError where a run is no table, none can be used, or together they are larger than any recording.
     """
     runs: list[Run] = []
     left_out: list[UnusableRun] = []
@@ -275,7 +262,7 @@ def proposed_in(text: str) -> tuple[Doubt, ...]:
     """A doubt for each value that the text of a `vehicle.yaml` marks as proposed, in the order of the file."""
     found = (_LINE.match(line) for line in text.splitlines())
     whys = ((m["key"], m["why"].strip().rstrip(".")) for m in found if m)
-    return tuple(Doubt(k, f"{k} is only proposed{f' ({why})' if why else ''}.", stops=False) for k, why in whys)
+    return tuple(Doubt(k, f"{k} is only proposed{f' ({why})' if why else ''}.") for k, why in whys)
 
 
 def check_belief(vehicle: Vehicle, where: str) -> None:
@@ -289,7 +276,12 @@ def check_belief(vehicle: Vehicle, where: str) -> None:
     for key in vehicle.trust:
         if key not in _TRUSTED:
             raise InputError(f"{where}: trust.{key}: no such value is known{hint(key, _TRUSTED)}")
-    _check_rotors(vehicle, where)
+    hubs = vehicle.rotor_positions_m()
+    for first in range(len(hubs)):
+        near = np.flatnonzero(np.linalg.norm(hubs[first + 1 :] - hubs[first], axis=1) < _ONE_SPOT_M)
+        if len(near):
+            spot = listed([f"{name} {value:g} m" for name, value in zip("xyz", hubs[first], strict=True)])
+            raise InputError(f"{where}: rotors {first + 1} and {first + 2 + near[0]} are on one spot ({spot})")
     if vehicle.inertia_kg_m2 is not None:
         least, middle, largest = np.linalg.eigvalsh(vehicle.inertia_kg_m2.matrix())
         if largest > NO_BODY * (least + middle):
@@ -297,16 +289,6 @@ def check_belief(vehicle: Vehicle, where: str) -> None:
                 f"{where}: inertia_kg_m2: found principal moments {least:.3g}, {middle:.3g} and {largest:.3g}; no body "
                 "has one that is larger than the sum of the others"
             )
-
-
-def _check_rotors(vehicle: Vehicle, where: str) -> None:
-    hubs = vehicle.rotor_positions_m()
-    for first in range(len(hubs)):
-        near = np.flatnonzero(np.linalg.norm(hubs[first + 1 :] - hubs[first], axis=1) < _ONE_SPOT_M)
-        if len(near):
-            second = first + 1 + int(near[0])
-            spot = listed([f"{name} {value:g} m" for name, value in zip("xyz", hubs[first], strict=True)])
-            raise InputError(f"{where}: rotors {first + 1} and {second + 1} are on one spot ({spot})")
 
 
 def sha256(path: Path) -> str:
@@ -318,8 +300,7 @@ def sha256(path: Path) -> str:
 def write_manifest(folder: Path, paths: Iterable[Path]) -> None:
     """Write the list of a set's runs, whole or not at all; `paths` are their files."""
     runs = {path.name: sha256(path) for path in sorted(paths)}
-    with all_or_none(folder / FILE_NAME) as (part,):
-        part.write_text(json.dumps({"runs": runs}, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    write_texts({folder / FILE_NAME: json.dumps({"runs": runs}, indent=1, ensure_ascii=False) + "\n"})
 
 
 def listed_runs(folder: Path) -> Mapping[str, str] | None:

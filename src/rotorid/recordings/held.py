@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from rotorid.recordings import columns as c
-from rotorid.recordings.run import Run
+from rotorid.recordings.run import Run, stretches
 from rotorid.recordings.sufficient import driven_by
 from rotorid.recordings.vehicle import Vehicle
 
@@ -42,12 +42,6 @@ _FOLLOWED = {
     c.POSITION: c.VELOCITY,
 }
 """To the columns of a sensor those without whose changes it cannot change, nor stand where they do."""
-
-
-def stretches(good: np.ndarray) -> list[tuple[int, int]]:
-    """Start and stop (exclusive) of every run of True."""
-    edges = np.diff(np.concatenate([[0], good.astype(np.int8), [0]]))
-    return list(zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True))
 
 
 def held(
@@ -89,7 +83,9 @@ def held(
             continue
         mask = np.zeros(len(values), bool)
         # The first of the repeated readings is a true one, but where it is a jump (to zero) by itself.
-        mask[index[a] + int(not _jumps_to(v, a)) : index[b - 1] + 1] = True
+        usual, _ = _steps_and_bends([v[: a + 1]])
+        jumps = a > 0 and np.abs(v[a] - v[a - 1]).max() > _LEAST_JUMP * usual > 0
+        mask[index[a] + int(not jumps) : index[b - 1] + 1] = True
         if _may_stand(v, a, b, noisy) and not (duration >= _LONG_S and contradicted is not None and contradicted(mask)):
             continue
         out.append((mask, p))
@@ -110,12 +106,6 @@ def _may_stand(values: np.ndarray, start: int, stop: int, noisy: bool) -> bool:
         return False
     jump = float(np.abs(values[stop] - values[stop - 1]).max()) if stop < len(values) else 0.0
     return jump < _LEAST_JUMP * usual
-
-
-def _jumps_to(values: np.ndarray, start: int) -> bool:
-    """Whether columns (n, k) come to the reading at `start` by a step far beyond their usual ones."""
-    usual, _ = _steps_and_bends([values[: start + 1]])
-    return start > 0 and bool(np.abs(values[start] - values[start - 1]).max() > _LEAST_JUMP * usual > 0)
 
 
 def _steps_and_bends(parts: list[np.ndarray]) -> tuple[float, float]:
@@ -182,23 +172,18 @@ def moves(time_s: np.ndarray, values: np.ndarray) -> bool:
     return full.sum() > 4 and bool(np.std(means) > least)
 
 
-def _driven(run: Run, names: tuple[str, ...], mask: np.ndarray) -> bool:
-    """Whether rotors are given in a mask (n,) at least half of what they usually are elsewhere, and something."""
-    given = run.array(names).mean(axis=1)
-    inside, outside = given[mask & np.isfinite(given)], given[~mask & np.isfinite(given)]
-    usual = float(np.median(outside)) if len(outside) else 0.0
-    return bool(len(inside)) and float(inside.mean()) > _DRIVEN * usual
-
-
 def standing_together(run: Run, vehicle: Vehicle, names: tuple[str, ...]) -> list[tuple[np.ndarray, float]]:
     """Stretches of at least `_LONG_S` in which all commands of one kind stand still in flight: the log of them stopped.
 
     On the ground they stand still, too; as masks (n,) with their p-values.
     """
-    contradicted = contradiction(run, vehicle, names)
+    contradicted, given = contradiction(run, vehicle, names), run.array(names).mean(axis=1)
     found = held(run.time_s, run.array(names), SHORTEST_FREEZE_S, SHORTEST_FREEZE_PERIODS, True, contradicted)
-    return [
-        (mask, p)
-        for mask, p in found
-        if np.ptp(run.time_s[mask]) >= _LONG_S and _driven(run, names, mask) and contradicted(mask)
-    ]
+
+    def driven(mask: np.ndarray) -> bool:
+        """Whether rotors are given in a mask (n,) at least half of what they usually are elsewhere, and something."""
+        inside, outside = given[mask & np.isfinite(given)], given[~mask & np.isfinite(given)]
+        usual = float(np.median(outside)) if len(outside) else 0.0
+        return bool(len(inside)) and float(inside.mean()) > _DRIVEN * usual
+
+    return [(m, p) for m, p in found if np.ptp(run.time_s[m]) >= _LONG_S and driven(m) and contradicted(m)]

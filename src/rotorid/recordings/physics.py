@@ -11,14 +11,15 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from difflib import get_close_matches
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rotorid.io.text.wording import listed
 from rotorid.recordings import columns as c
-from rotorid.recordings.body import Body, RotorsInAir, body_of, impossible, quantities
-from rotorid.recordings.run import Doubt, RecordingSet, Run
+from rotorid.recordings.body import Body, body_of, impossible, quantities
+from rotorid.recordings.run import Doubt, RecordingSet, Run, means_of
 from rotorid.recordings.vehicle import Vehicle
 
 _STEP_S = 0.02
@@ -43,7 +44,6 @@ _SLOW_S, _LATEST_STEPS, _LEAST_EXPLAINED = 0.5, 4, 0.4
 _SURE_Z, _ALIKE, _RIDGE = 6.0, 5.0, 0.02
 """Standard errors by which a rotor's sign must be sure; samples that count as one; ridge, a share of the regressors."""
 _DEGREE = np.pi / 180
-_LEAST_RATE_HZ = {"rotor speeds": 25.0, "body rates": 50.0, "accelerometer": 50.0, "attitude": 20.0}
 _LEAST_TIME_S = 20.0
 _MOST_S = 7200.0
 """How much of a run is looked at: a clock that was set on the way would need more memory than there is."""
@@ -60,9 +60,9 @@ def physical_doubts(recordings: RecordingSet) -> tuple[Doubt, ...]:
         if clock is None:
             continue
         for doubt in (
-            *_accelerometer(run, clock, vehicle),
+            *_accelerometer(run, clock),
             *_gyroscope(run, clock),
-            *_world(run, clock, vehicle),
+            *_world(run, clock),
             *_rotors(run, clock, vehicle),
             *_throttle(run, vehicle),
             *_held(run, vehicle),
@@ -105,11 +105,8 @@ def _on(run: Run, clock: np.ndarray, names: tuple[str, ...], smooth_s: float = _
     if known.sum() < 10:
         return None
     time, values = run.time_s[known], values[known]
-    total = np.vstack([np.zeros(values.shape[1]), np.cumsum(values, axis=0)])
-    first = np.searchsorted(time, clock - smooth_s / 2)
-    last = np.searchsorted(time, clock + smooth_s / 2)
-    count = last - first
-    mean = (total[last] - total[first]) / np.maximum(count, 1)[:, None]
+    first, last = (np.searchsorted(time, clock + side * smooth_s / 2) for side in (-1, 1))
+    mean, count = means_of(values, first, last), last - first
     line = np.column_stack([np.interp(clock, time, column) for column in values.T])
     near = np.clip(np.searchsorted(time, clock), 1, len(time) - 1)
     gap = time[near] - time[near - 1]
@@ -138,8 +135,11 @@ def _correlation(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.corrcoef(a, b)[0, 1])
 
 
-def _flown(run: Run, vehicle: Vehicle) -> RotorsInAir | None:
-    """What a run says about the rotors in the air (on a stand: turning); None where it is short or says nothing."""
+def _flown(run: Run, vehicle: Vehicle) -> tuple[tuple[float, float], float | None, str] | None:
+    """What a run says about the rotors in the air (on a stand: turning), as `body_of` takes it.
+
+    Speeds at hover and at the most, lift, first column; None where the run is short or says nothing.
+    """
     clock = _clock(run)
     speeds = None if clock is None else _speeds(run, clock, vehicle)
     if clock is None or speeds is None or not np.isfinite(speeds).any():
@@ -154,32 +154,26 @@ def _flown(run: Run, vehicle: Vehicle) -> RotorsInAir | None:
         lift = 9.81  # On average thrust balances weight in a flight; a wrong accelerometer is a doubt of its own.
     kinds = ("rotor_speed", "rotor_command", "throttle")
     column = next(n[0] for k in kinds if run.has(*(n := c.rotor_columns(k, vehicle.rotor_count))))
-    return RotorsInAir(
-        hover_rad_s=float(np.sqrt(thrust / coefficients.sum())),
-        top_rad_s=float(np.nanquantile(speeds, _TOP)),
-        lift_m_s2=lift if vehicle.kind == "flight" else None,
-        column=column,
-    )
+    hover, top = float(np.sqrt(thrust / coefficients.sum())), float(np.nanquantile(speeds, _TOP))
+    return (hover, top), lift if vehicle.kind == "flight" else None, column
 
 
 def impossible_values(recordings: RecordingSet) -> tuple[Doubt, ...]:
     """Believed values that no multirotor has together, by the rotor speeds of each run; each value once."""
     vehicle = recordings.vehicle
-    speeds = {run.name: x for run in recordings.runs if (x := _flown(run, vehicle))} or {"": None}
-    alike: dict[tuple[int, ...], list[str]] = {}
-    bodies: dict[tuple[int, ...], tuple[Body, str]] = {}
+    speeds = {run.name: x for run in recordings.runs if (x := _flown(run, vehicle))} or {"": ()}
+    bodies: dict[tuple[int, ...], tuple[Body, list[str]]] = {}
     for run, turning in speeds.items():
-        body = body_of(vehicle, turning)
+        body = body_of(vehicle, *turning)
         if body is None:
             return ()
         # Runs in which the same quantities are wrong have the same cause.
         wrong = tuple(number for number, q in enumerate(quantities(body)) if not q.fits)
-        alike.setdefault(wrong, []).append(run)
-        bodies.setdefault(wrong, (body, turning.column if turning else ""))
+        bodies.setdefault(wrong, (body, []))[1].append(run)
     found: dict[str, tuple[Doubt, list[str]]] = {}
-    for wrong, (body, column) in bodies.items():
-        for doubt in impossible(body, column):
-            found.setdefault(doubt.what, (doubt, []))[1].extend(alike[wrong])
+    for body, alike in bodies.values():
+        for doubt in impossible(body):
+            found.setdefault(doubt.what, (doubt, []))[1].extend(alike)
     return tuple(
         doubt if len(runs) == len(speeds) else replace(doubt, sentence=f"{listed(runs)}: {doubt.sentence}")
         for doubt, runs in found.values()
@@ -218,55 +212,33 @@ def voltages(recordings: RecordingSet) -> tuple[Doubt, ...]:
 # Doubts -------------------------------------------------------------------------------------------
 
 
-def _accelerometer(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
+def _accelerometer(run: Run, clock: np.ndarray) -> Iterator[Doubt]:
     force = _on(run, clock, c.SPECIFIC_FORCE)
     if force is None:
         return
     middle = np.nanmedian(force, axis=0)
     size = float(np.linalg.norm(middle))
+    axis, seen = "z", f"the accelerometer's median is {size:.3g}"
     if middle[2] > 0.5 * size and size > 0.5:
-        yield Doubt(
-            c.SPECIFIC_FORCE[2],
+        said = (
             f"specific_force_z_m_s2 is positive in flight (median {middle[2]:.3g}), expected about -9.8: the body axes "
-            "are forward-left-up, or the sign is turned",
-            stops=True,
+            "are forward-left-up, or the sign is turned"
         )
-    elif size < 2.0 and size > 0.5:
-        yield Doubt(
-            c.SPECIFIC_FORCE[2],
-            f"the accelerometer's median is {size:.3g}, expected about 9.8 m/s²: it is in multiples of g",
-            stops=True,
-        )
+    elif 0.5 < size < 2.0:
+        said = f"{seen}, expected about 9.8 m/s²: it is in multiples of g"
     elif size <= 0.5:
-        yield Doubt(
-            c.SPECIFIC_FORCE[2],
-            f"the accelerometer's median is {size:.3g} m/s², expected about 9.8: gravity was added back, but a "
-            "specific force holds none",
-            stops=True,
-        )
+        said = f"{seen} m/s², expected about 9.8: gravity was added back, but a specific force holds none"
     elif size > _LIFT_M_S2[1]:
-        unit = (
-            "ft/s²"
-            if 28 < size < 37
-            else "milli-g"
-            if 700 < size < 1400
-            else "cm/s²"
-            if 700 < size / 9.81 < 1400
-            else ""
-        )
-        yield Doubt(
-            c.SPECIFIC_FORCE[2],
-            f"the accelerometer's median is {size:.4g}, expected about 9.8 m/s²"
-            + (f": {unit} would fit" if unit else ""),
-            stops=True,
-        )
+        scales = {"ft/s²": 28 < size < 37, "milli-g": 700 < size < 1400, "cm/s²": 700 < size / 9.81 < 1400}
+        unit = next((unit for unit, fits in scales.items() if fits), "")
+        said = f"the accelerometer's median is {size:.4g}, expected about 9.8 m/s²"
+        said += f": {unit} would fit" if unit else ""
     elif -middle[2] < 0.7 * size:
         axis = "xyz"[int(np.argmax(np.abs(middle)))]
-        yield Doubt(
-            f"specific_force_{axis}_m_s2",
-            f"the accelerometer feels the thrust along {axis}, not along -z: its axes are not the body's",
-            stops=True,
-        )
+        said = f"the accelerometer feels the thrust along {axis}, not along -z: its axes are not the body's"
+    else:
+        return
+    yield Doubt(f"specific_force_{axis}_m_s2", said, stops=True)
 
 
 def _gyroscope(run: Run, clock: np.ndarray) -> Iterator[Doubt]:
@@ -291,68 +263,56 @@ def _gyroscope(run: Run, clock: np.ndarray) -> Iterator[Doubt]:
     first, last = attitude[:-2][both], attitude[2:][both]
     turn = Rotation.from_quat(first[:, [1, 2, 3, 0]]).inv() * Rotation.from_quat(last[:, [1, 2, 3, 0]])
     derived[1:-1][both] = turn.as_rotvec() / (2 * _STEP_S)
-    for axis, k in (("x", 0), ("y", 1), ("z", 2)):
+    for k, axis in enumerate("xyz"):
         if not np.nanstd(derived[:, k]) > _LEAST_TURNING_RAD_S:
             continue
         r = _correlation(gyro[:, k], derived[:, k])
         scale = float(np.nanstd(gyro[:, k]) / np.nanstd(derived[:, k]))
         name = f"angular_velocity_{axis}_rad_s"
+        said = ""
         if r < _CONTRADICTS:
-            yield Doubt(
-                name,
+            said = (
                 f"{name} turns against the attitude (correlation {r:.2f}): body axes of gyroscope and attitude differ, "
-                "or the quaternion is the inverse one",
-                stops=True,
+                "or the quaternion is the inverse one"
             )
         elif r > _AGREES and 0.5 < scale * _DEGREE < 2:
-            yield Doubt(
-                name,
-                f"{name} is {scale:.3g} times the derivative of the attitude: it is in degrees per second",
-                stops=True,
-            )
+            said = f"{name} is {scale:.3g} times the derivative of the attitude: it is in degrees per second"
         elif r > _AGREES and not 0.5 < scale < 2:
-            yield Doubt(name, f"{name} is {scale:.3g} times the derivative of the attitude", stops=True)
+            said = f"{name} is {scale:.3g} times the derivative of the attitude"
         elif np.isfinite(r) and r < 0.2:
             others = [abs(_correlation(gyro[:, k], derived[:, j])) for j in range(3)]
             best = int(np.nanargmax(others))
             if others[best] > 0.6 and best != k:
-                yield Doubt(
-                    name,
-                    f"{name} follows the attitude about {'xyz'[best]}, not about {axis}: the axes are exchanged",
-                    stops=True,
-                )
+                said = f"{name} follows the attitude about {'xyz'[best]}, not about {axis}: the axes are exchanged"
+        if said:
+            yield Doubt(name, said, stops=True)
 
 
-def _world(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
+def _world(run: Run, clock: np.ndarray) -> Iterator[Doubt]:
     attitude, force = _on(run, clock, c.QUATERNION), _on(run, clock, c.SPECIFIC_FORCE)
     velocity, position = _on(run, clock, c.VELOCITY), _on(run, clock, c.POSITION)
     if velocity is not None and position is not None:
         derived = np.gradient(position, _STEP_S, axis=0)
         for k, axis in enumerate("xyz"):
-            if np.nanstd(velocity[:, k]) > 0.2:
-                r = _correlation(velocity[:, k], derived[:, k])
-                if r < _CONTRADICTS:
-                    yield Doubt(
-                        f"velocity_{axis}_m_s",
-                        f"velocity_{axis}_m_s goes against the derivative of position_{axis}_m (correlation {r:.2f})",
-                        stops=True,
-                    )
-                elif r < 0.2:
-                    yield Doubt(
-                        f"velocity_{axis}_m_s",
-                        f"velocity_{axis}_m_s does not follow position_{axis}_m (correlation {r:.2f}): one of them is "
-                        "in body axes, or axes are exchanged",
-                        stops=True,
-                    )
-                scale = float(np.nanstd(velocity[:, k]) / np.nanstd(derived[:, k]))
-                if r > _AGREES and not _SAME_UNIT[0] < scale < _SAME_UNIT[1]:
-                    # Units that are used as well as metres are smaller: the column with the larger numbers is the one.
-                    yield Doubt(
-                        f"velocity_{axis}_m_s" if scale > 1 else f"position_{axis}_m",
-                        f"velocity_{axis}_m_s is {scale:.3g} times the derivative of position_{axis}_m, expected 1: "
-                        f"{'the velocity' if scale > 1 else 'the position'} is in another unit",
-                        stops=True,
-                    )
+            if not np.nanstd(velocity[:, k]) > 0.2:
+                continue
+            own, place = f"velocity_{axis}_m_s", f"position_{axis}_m"
+            r = _correlation(velocity[:, k], derived[:, k])
+            scale = float(np.nanstd(velocity[:, k]) / np.nanstd(derived[:, k]))
+            if r < _CONTRADICTS:
+                said = f"{own} goes against the derivative of {place} (correlation {r:.2f})"
+                yield Doubt(own, said, stops=True)
+            elif r < 0.2:
+                said = (
+                    f"{own} does not follow {place} (correlation {r:.2f}): one of them is in body axes, or axes are "
+                    "exchanged"
+                )
+                yield Doubt(own, said, stops=True)
+            elif r > _AGREES and not _SAME_UNIT[0] < scale < _SAME_UNIT[1]:
+                # Units that are used as well as metres are smaller: the column with the larger numbers is the one.
+                what, which = (own, "the velocity") if scale > 1 else (place, "the position")
+                said = f"{own} is {scale:.3g} times the derivative of {place}, expected 1: {which} is in another unit"
+                yield Doubt(what, said, stops=True)
     if attitude is None or force is None:
         return
     known = np.isfinite(attitude).all(axis=1) & np.isfinite(force).all(axis=1)
@@ -385,10 +345,9 @@ def _world(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
 def _band(values: np.ndarray) -> np.ndarray:
     """What is faster than `_SLOW_S`: the values less their mean over it, (n, k)."""
     width = int(_SLOW_S / _STEP_S)
-    total = np.vstack([np.zeros(values.shape[1]), np.cumsum(values, axis=0)])
     index = np.arange(len(values))
     first, last = np.maximum(index - width // 2, 0), np.minimum(index + width // 2 + 1, len(values))
-    return values - (total[last] - total[first]) / (last - first)[:, None]
+    return values - means_of(values, first, last)
 
 
 def _pushes(speeds: np.ndarray, gyro: np.ndarray) -> np.ndarray | None:
@@ -474,7 +433,6 @@ def _held(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
             held[0],
             f"{listed(held)} {'keeps' if len(held) == 1 else 'keep'} one value ({value:.4g}) throughout, expected the "
             "changes that keep a vehicle in the air: not measured, or a sensor that stands still",
-            stops=False,
         )
 
 
@@ -489,7 +447,6 @@ def _rest(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
         yield Doubt(
             c.rotor_columns(kinds[0], 1)[0],
             f"all rotors are at rest in {at_rest:.0%} of the samples: keep only the part in the air",
-            stops=False,
         )
 
 
@@ -498,39 +455,28 @@ def _amount(recordings: RecordingSet) -> Iterator[Doubt]:
     total = sum(float(r.time_s[-1] - r.time_s[0]) for r in recordings.runs)
     if total < _LEAST_TIME_S:
         sentence = f"Only {total:.0f} s are recorded: intervals will be wide; {_LEAST_TIME_S:g} s and more are better."
-        yield Doubt(c.TIME, sentence, stops=False)
-    groups = {
-        "rotor speeds": c.rotor_columns("rotor_speed", recordings.vehicle.rotor_count),
-        "body rates": c.ANGULAR_VELOCITY,
-        "accelerometer": c.SPECIFIC_FORCE,
-        "attitude": c.QUATERNION,
-    }
-    costs = {
-        "rotor speeds": "a lag of the motors, of some 50 ms, cannot be distinguished from a delay",
-        "body rates": "moments are known only below a few hertz",
-        "accelerometer": "forces are known only below a few hertz",
-        "attitude": "wind and drag are known only below a few hertz",
-    }
-    for name, columns in groups.items():
+        yield Doubt(c.TIME, sentence)
+    speeds = c.rotor_columns("rotor_speed", recordings.vehicle.rotor_count)
+    lag = "a lag of the motors, of some 50 ms, cannot be distinguished from a delay"
+    for name, columns, least, cost in (
+        ("rotor speeds", speeds, 25.0, lag),
+        ("body rates", c.ANGULAR_VELOCITY, 50.0, "moments are known only below a few hertz"),
+        ("accelerometer", c.SPECIFIC_FORCE, 50.0, "forces are known only below a few hertz"),
+        ("attitude", c.QUATERNION, 20.0, "wind and drag are known only below a few hertz"),
+    ):
         rates = []
         for run in recordings.runs:
             if run.has(*columns):
                 known = np.isfinite(run.array(columns)).all(axis=1)
                 rates.append(known.sum() / max(float(run.time_s[-1] - run.time_s[0]), 1e-9))
-        if rates and min(rates) < _LEAST_RATE_HZ[name]:
+        if rates and min(rates) < least:
             come = "come" if name.endswith("s") else "comes"
-            yield Doubt(
-                columns[0],
-                f"The {name} {come} at {min(rates):.3g} Hz, {_LEAST_RATE_HZ[name]:g} Hz and more are better: "
-                f"{costs[name]}.",
-                stops=False,
-            )
+            said = f"The {name} {come} at {min(rates):.3g} Hz, {least:g} Hz and more are better: {cost}."
+            yield Doubt(columns[0], said)
 
 
 def near_names(recordings: RecordingSet) -> tuple[Doubt, ...]:
     """Columns that are kept without a meaning but are nearly one that has a meaning."""
-    from difflib import get_close_matches
-
     count = max(recordings.vehicle.rotor_count, 1)
     known = [*c.FIXED, *(n for k in ("rotor_speed", "rotor_command", "throttle") for n in c.rotor_columns(k, count))]
     there = {n for run in recordings.runs for n in run.table.columns}
@@ -538,5 +484,5 @@ def near_names(recordings: RecordingSet) -> tuple[Doubt, ...]:
     for name in sorted(there - set(known)):
         near = [n for n in get_close_matches(name, known, 1, 0.85) if n not in there]
         if near and not c.is_known(name):
-            out.append(Doubt(name, f"Column {name} is not known; did you mean {near[0]}?", stops=False))
+            out.append(Doubt(name, f"Column {name} is not known; did you mean {near[0]}?"))
     return tuple(out)

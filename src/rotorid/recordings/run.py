@@ -12,6 +12,19 @@ from rotorid.recordings import columns as c
 from rotorid.recordings.vehicle import Vehicle
 
 
+def stretches(mask: np.ndarray) -> list[tuple[int, int]]:
+    """Start and stop (exclusive) of every run of True in a mask (n,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(mask, np.int8), [0]])))
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
+def means_of(values: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Means (m, …) of the rows `first` to `last` (exclusive, (m,)) of values (n, …); 0 where there is none."""
+    total = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
+    count = np.maximum(last - first, 1).reshape(-1, *[1] * (values.ndim - 1))
+    return (total[last] - total[first]) / count
+
+
 @dataclass(frozen=True)
 class Doubt:
     """One thing in a set that is probably not as stated."""
@@ -20,7 +33,7 @@ class Doubt:
     """Key of vehicle.yaml (`mass_kg`), column (`angular_velocity_x_rad_s`), file or run that is in doubt."""
     sentence: str
     """What was found, what was expected and, where one is known, what would explain it."""
-    stops: bool
+    stops: bool = False
     """Whether a verdict would be about this mistake: a unit, an axis, an order, or mass or inertia by more than a
     factor of two."""
 
@@ -98,7 +111,4 @@ class RecordingSet:
 
     def run(self, name: str) -> Run:
         """The run of that name; KeyError if there is none."""
-        for run in self.runs:
-            if run.name == name:
-                return run
-        raise KeyError(name)
+        return {run.name: run for run in self.runs}[name]

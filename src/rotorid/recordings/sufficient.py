@@ -1,31 +1,41 @@
-"""Whether a recording set holds enough to be compared with its vehicle, looked at before any analysis.
+"""Whether a recording set holds enough to be compared with its vehicle, before any analysis, and what it offers.
 
 A fault that a person mends in a minute (a misspelled column, a rotor without its column) ends with one sentence. A run
 that cannot be used (too short, empty, numbers that nothing measures) is left out and named where the others suffice.
+What a verdict then rests on: time in the air, share of the recordings on the ground, what was not recorded.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rotorid.errors import InputError
 from rotorid.io.text.wording import listed, nearest, plain
 from rotorid.recordings import columns as c
-from rotorid.recordings.own_rates import (
+from rotorid.recordings.mended import (
     LEAST_SINGLE_S,
     LEAST_STRETCH_S,
     LEAST_VALUES,
     on_own_rates,
     whole_stretches,
+    without_spikes,
 )
-from rotorid.recordings.run import RecordingSet, Run
-from rotorid.recordings.spikes import without_spikes
+from rotorid.recordings.run import RecordingSet, Run, stretches
 from rotorid.recordings.tables import clock_jump, place
 from rotorid.recordings.vehicle import Vehicle
 
+_IDLE_SHARE, _LARGEST_QUANTILE = 0.2, 0.98
+"""Rotors idle below this share of nearly the largest thrust of their run, by the squares of their speeds."""
+_GROUND_S = 1.0
+"""Rotors that idle so long leave a vehicle on the ground: in the air it would have fallen five metres."""
+_RESTING_G = 0.5
+"""Specific force, over gravity, that the ground exerts on it at least; a vehicle that falls has next to none."""
+_PAUSE_S, _PAUSE_STEPS = 5.0, 20
+"""A stand's or bench's samples that are further apart than both are of two recordings, and nothing between them."""
+_MOST_NAMES = 12
 _LEAST_FLIGHT_HZ = 2.0
 """Slower flights show no motion of their own: between two samples a quadrotor has turned and come back."""
 _LEAST_STRETCH_SAMPLES = 30
@@ -62,12 +72,14 @@ _LEAST_LIFT_N = 1.0
 def sufficient(recordings: RecordingSet) -> RecordingSet:
     """The set as the analysis can use it: runs that cannot be used left out, each with a sentence in `left_out`.
 
-    Raises
-    ------
-    InputError
-        One sentence with file and column, where a column is misspelled or what is left does not suffice.
+    InputError with file and column, where a column is misspelled or what is left does not suffice.
     """
-    recordings = on_own_rates(without_spikes(_without_dead_sensors(_without_rotors_on_a_bench(recordings))))
+    vehicle = recordings.vehicle
+    if vehicle.kind == "bench" and vehicle.rotors and not any(driven_by(r, vehicle) for r in recordings.runs):
+        # A bench compares readings with known loads: rotors that are listed but not recorded play no part.
+        without = {"rotors": (), "thrust_coefficient_n_s2": None, "torque_coefficient_n_m_s2": None}
+        recordings = replace(recordings, vehicle=vehicle.model_copy(update=without))
+    recordings = on_own_rates(without_spikes(_without_dead_sensors(recordings)))
     for run in recordings.runs:
         _check_spelling(run, recordings.vehicle)
     usable, reasons = [], []
@@ -87,15 +99,6 @@ def sufficient(recordings: RecordingSet) -> RecordingSet:
         _check_single(kept)
     _check_common(kept)
     return _with_split_of_the_rest(kept)
-
-
-def _without_rotors_on_a_bench(recordings: RecordingSet) -> RecordingSet:
-    """A bench compares readings with known loads: rotors that are listed but not recorded play no part."""
-    vehicle = recordings.vehicle
-    if vehicle.kind != "bench" or not vehicle.rotors or any(driven_by(r, vehicle) for r in recordings.runs):
-        return recordings
-    without = {"rotors": (), "thrust_coefficient_n_s2": None, "torque_coefficient_n_m_s2": None}
-    return replace(recordings, vehicle=vehicle.model_copy(update=without))
 
 
 def _without_dead_sensors(recordings: RecordingSet) -> RecordingSet:
@@ -190,23 +193,18 @@ def driven_by(run: Run, vehicle: Vehicle) -> tuple[str, ...]:
     return next((names for names in rotor_groups(vehicle).values() if names and run.has(*names)), ())
 
 
-def _groups_of(vehicle: Vehicle) -> tuple[tuple[str, ...], ...]:
-    """Sensors whose columns only make sense together."""
-    if vehicle.kind == "flight":
-        return (*rotor_groups(vehicle).values(), *SENSORS)
-    if vehicle.kind == "stand":
-        return (*rotor_groups(vehicle).values(), c.MOUNT)
-    return ()
-
-
 def _check_spelling(run: Run, vehicle: Vehicle) -> None:
     """InputError where an unknown column can only be a known one that is missing."""
     there = set(run.table.columns)
     known = sorted(c.FIXED) + [name for names in rotor_groups(vehicle).values() for name in names]
     missing = [name for name in known if name not in there]
-    halved = {
-        name for names in _groups_of(vehicle) if any(n in there for n in names) for name in names if name not in there
+    # Columns of a sensor whose columns only make sense together, where others of it are there.
+    groups = {
+        "flight": (*rotor_groups(vehicle).values(), *SENSORS),
+        "stand": (*rotor_groups(vehicle).values(), c.MOUNT),
     }
+    begun = (names for names in groups.get(vehicle.kind, ()) if any(n in there for n in names))
+    halved = {name for names in begun for name in names if name not in there}
     for column in run.unknown_columns:
         meant = next((name for name in missing if plain(name) == plain(column)), None)
         meant = meant or nearest(column, halved, _SURELY_MEANT)
@@ -437,23 +435,19 @@ def _check_not_constant(recordings: RecordingSet) -> None:
     )
 
 
-def _check_single_of_instrument(run: Run, names: list[str]) -> None:
-    """InputError where the last third of a single run, less half the gap before it, is next to nothing."""
-    known = run.time_s[np.isfinite(run.array(tuple(names))).all(axis=1)]
-    needed = (_SINGLE_GAP_S / 2 + LEAST_VALUES * float(np.median(np.diff(known)))) / _HELD_OUT_SHARE
-    lasts = float(known[-1] - known[0])
-    if lasts < needed:
-        raise InputError(
-            f"{_whereof(run)}: too little data: a single run must last at least {needed:.3g} s, because its last third "
-            f"is held out, after a gap; found {lasts:.3g} s"
-        )
-
-
 def _check_single(recordings: RecordingSet) -> None:
     """InputError where a single run is too short to hold out a part of it."""
     run, vehicle = recordings.runs[0], recordings.vehicle
     if vehicle.kind != "flight":
-        _check_single_of_instrument(run, compared_readings(run, vehicle))
+        # The last third, less half the gap before it, must be more than next to nothing.
+        known = run.time_s[np.isfinite(run.array(tuple(compared_readings(run, vehicle)))).all(axis=1)]
+        needed = (_SINGLE_GAP_S / 2 + LEAST_VALUES * float(np.median(np.diff(known)))) / _HELD_OUT_SHARE
+        lasts = float(known[-1] - known[0])
+        if lasts < needed:
+            raise InputError(
+                f"{_whereof(run)}: too little data: a single run must last at least {needed:.3g} s, because its last "
+                f"third is held out, after a gap; found {lasts:.3g} s"
+            )
         return
     longest, _ = longest_stretch_s(run, [driven_by(run, vehicle), *moving_sensors(run)])
     if longest < LEAST_SINGLE_S:
@@ -496,3 +490,109 @@ def _with_split_of_the_rest(recordings: RecordingSet) -> RecordingSet:
         return replace(recordings, held_out=held_out)
     side = "left to fit" if held_out else "held out"
     raise InputError(f"{_first_reason(recordings)}; without it no run is {side}")
+
+
+@dataclass(frozen=True)
+class _Basis:
+    """Time and columns of a set, as they are used."""
+
+    recorded_s: float
+    """Length of all runs, of a stand or bench without the pauses in them."""
+    in_the_air_s: float | None
+    """None for a stand or bench, and where no rotors are recorded."""
+    ground_share: float | None
+    """Of `recorded_s`, on the ground with rotors that idle or stand still."""
+    missing: tuple[str, ...]
+    """What the contract knows and no run, or not every run, has."""
+
+    @property
+    def sentence(self) -> str:
+        """`The verdict rests on 62 s in the air; 8 % of the recordings are on the ground; not recorded: height.`"""
+        if self.in_the_air_s is None:
+            said = f"{self.recorded_s:.0f} s of recordings"
+        else:
+            share = 100 * (self.ground_share or 0.0)
+            ground = f"{share:.0f} % of the recordings {'is' if share < 1.5 else 'are'} on the ground"
+            said = f"{self.in_the_air_s:.0f} s in the air; {ground if share >= 0.5 else 'none of it is on the ground'}"
+        lacks = f"not recorded: {listed(self.missing, _MOST_NAMES)}" if self.missing else "no column is missing"
+        return f"The verdict rests on {said}; {lacks}."
+
+
+def basis_of(recordings: RecordingSet) -> _Basis:
+    """What a set offers to a verdict."""
+    flies, recorded = recordings.vehicle.kind == "flight", 0.0
+    for run in recordings.runs:
+        steps = np.diff(run.time_s)
+        pause_s = max(_PAUSE_S, _PAUSE_STEPS * np.median(steps)) if len(steps) else 0.0
+        recorded += float(np.ptp(run.time_s)) if flies else float(steps[steps <= pause_s].sum())
+    grounded = [on_the_ground_s(run, recordings.vehicle) for run in recordings.runs]
+    known = flies and any(g is not None for g in grounded)
+    ground = sum(g for g in grounded if g is not None)
+    return _Basis(
+        recorded,
+        recorded - ground if known else None,
+        ground / recorded if known and recorded > 0 else None,
+        tuple(missing(recordings)),
+    )
+
+
+def on_the_ground_s(run: Run, vehicle: Vehicle) -> float | None:
+    """How long a run is on the ground, s; None where no rotors are recorded."""
+    values = run.array(driven_by(run, vehicle))
+    rows = np.flatnonzero(np.isfinite(values).all(axis=1))
+    if not values.shape[1] or not len(rows):
+        return None
+    thrust = (values[rows] ** 2).sum(axis=1)
+    time_s, force = run.time_s[rows], run.array(c.SPECIFIC_FORCE)[rows]
+    idle = thrust < _IDLE_SHARE * np.quantile(thrust, _LARGEST_QUANTILE)
+    total = 0.0
+    for start, stop in stretches(idle):
+        lasted = float(time_s[min(stop, len(time_s) - 1)] - time_s[start])
+        felt = np.linalg.norm(force[start:stop], axis=1)
+        felt = felt[np.isfinite(felt)]
+        rests = not len(felt) or float(np.median(felt)) > _RESTING_G * vehicle.gravity_m_s2
+        total += lasted if lasted >= _GROUND_S and rests else 0.0
+    return total
+
+
+def missing(recordings: RecordingSet) -> Iterator[str]:
+    """Names of what the contract knows for this kind of set and no run has; with a count where some runs have it."""
+    runs = recordings.runs
+    for name, ways in _wanted(recordings).items():
+        having = sum(any(run.has(*way) for way in ways) for run in runs)
+        if having == 0:
+            yield name
+        elif having < len(runs):
+            yield f"{name} in {len(runs) - having} of {len(runs)} runs"
+
+
+def _wanted(recordings: RecordingSet) -> dict[str, list[tuple[str, ...]]]:
+    """Name of each thing that may be recorded to the columns, any of which in full are it."""
+    vehicle, runs = recordings.vehicle, recordings.runs
+
+    def rotors(kind: str) -> tuple[str, ...]:
+        return c.rotor_columns(kind, vehicle.rotor_count)
+
+    def there(name: str) -> bool:
+        return any(run.has(name) for run in runs)
+
+    turning = {"rotor speeds": [rotors("rotor_speed")], "commands": [rotors("rotor_command"), rotors("throttle")]}
+    voltage = {"battery voltage": [(c.BATTERY_VOLTAGE,)]}
+    if vehicle.kind == "flight":
+        heights = [(c.HEIGHT,)] if vehicle.ground_z_m is None else [(c.HEIGHT,), (c.POSITION[2],)]
+        return turning | {
+            "accelerometer": [c.SPECIFIC_FORCE],
+            "body rates": [c.ANGULAR_VELOCITY],
+            "attitude": [c.QUATERNION],
+            "position and velocity": [c.POSITION, c.VELOCITY],
+            "height above ground": heights,
+        } | voltage  # fmt: skip
+    if vehicle.kind == "stand":
+        wrench = {}
+        for group, names in (("force", c.FORCE), ("moment", c.MOMENT)):
+            axes = [axis for axis, name in zip("xyz", names, strict=True) if not there(name)]
+            along = f"{group} along {listed(axes)}" if 0 < len(axes) < 3 else f"{group}s"
+            wrench[along] = [tuple(name for name in names if not axes or not there(name))]
+        return wrench | turning | {"attitude of the mount": [c.MOUNT]} | voltage
+    pairs = zip(c.FORCE, c.REFERENCE_FORCE, strict=True)
+    return {name: [(name,)] for pair in pairs if any(map(there, pair)) for name in pair}

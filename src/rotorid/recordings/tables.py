@@ -98,11 +98,7 @@ def _look_through(path: Path, foreign: bool = False) -> _CsvLayout:
     `foreign`: a table of one's own, not of a recording set. Its columns may be separated by semicolons, tabs, bars or
     blanks as well (its numbers may then have decimal commas), one without a name is called by its number (`column_3`),
     lines may stand above the heading, the heading may have several lines, and the last line may be cut off.
-
-    Raises
-    ------
-    InputError
-        The file is no table, has a line with more or fewer cells than its heading, or is too large.
+    InputError where the file is no table, has a line with more or fewer cells than its heading, or is too large.
     """
     found, quoted, cut = None, False, False
     for line, text in _whole_lines(path):
@@ -366,16 +362,6 @@ def _wrong_cells(path: Path, line: int, found: int, count: int, last: bool) -> s
 
 class UnusableRun(InputError):
     """A run that is a table and cannot be used: a set can do without it."""
-
-
-def read_csv(path: Path) -> pd.DataFrame:
-    """The table of a CSV file, plain or gzipped, as numbers, not yet checked for its clock."""
-    return numbers(read_cells(path), path)
-
-
-def read_parquet(path: Path) -> pd.DataFrame:
-    """The table of a Parquet file as numbers, not yet checked for its clock."""
-    return numbers(read_parquet_cells(path), path)
 
 
 def read_cells(path: Path, foreign: bool = False) -> pd.DataFrame:

@@ -10,17 +10,15 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
+
+from rotorid.io.models import KnownKeys
 
 _Number = Annotated[float, Field(strict=True)]
 """A number: no text, no `true`."""
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Inertia(_Strict):
+class Inertia(KnownKeys, frozen=True, allow_inf_nan=False):
     """Entries of the inertia matrix J about the centre of mass, kg m2 (J_xz = -∫ x z dm)."""
 
     xx: _Number = Field(ge=1e-12, le=1e6)
@@ -35,7 +33,7 @@ class Inertia(_Strict):
         return np.array([[self.xx, self.xy, self.xz], [self.xy, self.yy, self.yz], [self.xz, self.yz, self.zz]])
 
 
-class Rotor(_Strict):
+class Rotor(KnownKeys, frozen=True, allow_inf_nan=False):
     """Where a rotor sits (body axes, m) and how it spins seen from above."""
 
     x_m: _Number = Field(ge=-100, le=100)
@@ -49,7 +47,7 @@ class Rotor(_Strict):
         return 1.0 if self.spin == "ccw" else -1.0
 
 
-class Noise(_Strict):
+class Noise(KnownKeys, frozen=True, allow_inf_nan=False):
     """One-sigma sensor noise as the user believes it; a hint that the tool checks."""
 
     specific_force_m_s2: _Number | None = Field(None, ge=0)
@@ -71,7 +69,7 @@ def unit_of(channel: str, quantity: str) -> str:
     return "N" if force else "N m"
 
 
-class Derivative(_Strict):
+class Derivative(KnownKeys, frozen=True, allow_inf_nan=False):
     """What a channel of force or moment gains per unit of a quantity (`rotorid.vehicle.derivatives`)."""
 
     channel: Literal["force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z"]
@@ -106,7 +104,7 @@ _LARGEST_TRUST = 100.0
 _FLIGHT_NEEDS = ("mass_kg", "inertia_kg_m2", "rotors", "thrust_coefficient_n_s2", "torque_coefficient_n_m_s2")
 
 
-class Vehicle(_Strict):
+class Vehicle(KnownKeys, frozen=True, allow_inf_nan=False):
     """A vehicle (kinds `flight`, `stand`) or a bench, as believed by its user."""
 
     name: str

@@ -268,7 +268,7 @@ def test_the_bundled_example_is_what_its_module_makes_and_the_verdict_finds_what
 
 
 def test_a_template_that_hovers_as_the_flight_did_is_named() -> None:
-    from rotorid.recordings.importers.propose import closer_template
+    from rotorid.recordings.importers.known import closer_template
 
     brushed, brushless = templates.read("crazyflie-2.1"), templates.read("crazyflie-2.1-brushless")
     lift = brushless.thrust_coefficient_n_s2 / brushless.mass_kg
@@ -278,7 +278,7 @@ def test_a_template_that_hovers_as_the_flight_did_is_named() -> None:
 
 
 def test_names_of_times_and_commands_are_recognised_and_a_lacking_time_is_told() -> None:
-    from rotorid.recordings.importers.guessing.guess import guess
+    from rotorid.recordings.importers.guessing import guess
 
     rpm = np.linspace(8000, 9000, 50)
     names = {f"cmd_rpm{i}": rpm for i in range(1, 5)} | {f"motor_speed_{i}": rpm / 10 for i in range(1, 5)}

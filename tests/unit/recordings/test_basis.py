@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from rotorid.recordings import RecordingSet, Run
-from rotorid.recordings.basis import basis_of, missing, on_the_ground_s
+from rotorid.recordings.sufficient import basis_of, missing, on_the_ground_s
 from tests.unit.vehicle.thesis import thesis_vehicle
 
 HOVER = 1073.0

@@ -158,9 +158,9 @@ def test_an_optional_value_in_another_unit_is_named(flown, changed, what, said) 
 
 
 def doubts_without_flight(vehicle: Vehicle) -> list[Doubt]:
-    body = body_of(vehicle, None)
+    body = body_of(vehicle)
     assert body is not None
-    return list(impossible(body, SPEED))
+    return list(impossible(body))
 
 
 VEHICLES = [

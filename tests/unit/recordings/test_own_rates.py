@@ -13,7 +13,7 @@ from rotorid.errors import InputError
 from rotorid.mismatch.evidence.motion import between_readings
 from rotorid.recordings import RecordingSet, Run, read_set, templates
 from rotorid.recordings import columns as c
-from rotorid.recordings.own_rates import evenly, is_scattered, noise_gain, on_one_side, on_own_rates, own_period_s
+from rotorid.recordings.mended import evenly, is_scattered, noise_gain, on_one_side, on_own_rates, own_period_s
 from rotorid.recordings.sufficient import longest_stretch_s, moving_sensors, sufficient
 
 SPEEDS = c.rotor_columns("rotor_speed", 4)

@@ -6,7 +6,7 @@ import pytest
 
 from rotorid.recordings import RecordingSet, Run, templates
 from rotorid.recordings import columns as c
-from rotorid.recordings.spikes import spikes, without_spikes
+from rotorid.recordings.mended import spikes, without_spikes
 from rotorid.recordings.sufficient import sufficient
 
 RATE_HZ, SECONDS = 80.0, 60.0

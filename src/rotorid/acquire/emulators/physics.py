@@ -7,9 +7,8 @@
   stands on it, drift and noise.
 - A printed specimen in the tensile tester: linear up to a limit, then yielding, then it breaks.
 
-The truth of the emulated campaign in the words of the catalogue: what a verdict on each of its sets could state.
-
-The emulators are given causes in their own terms; a verdict states what a recording shows of them.
+`write_stated` writes the truth of the emulated campaign in the words of the catalogue: what a verdict on each of its
+sets could state. The emulators are given causes in their own terms; a verdict states what a recording shows of them.
 
 - On the bench a reading is what the thesis's equations make of the cells. A lateral load, or one that turns as the
   bench gives way, becomes a vertical force there (the absolute values of eq. 2.9). So the coefficients of a reading
@@ -339,18 +338,15 @@ class StandPhysics:
         self.sensor.process(dt_s, self.wrench())
 
 
-class TorqueRig:
-    """Vehicle on the wrench sensor, motor 1 driven and counted by the thrust tester (fig. 3.20b)."""
+def torque_rig(truth: Truth, battery: Battery, rng: np.random.Generator) -> tuple[StandPhysics, TesterPhysics]:
+    """Vehicle on the wrench sensor, motor 1 driven and counted by the thrust tester (fig. 3.20b).
 
-    def __init__(self, truth: Truth, battery: Battery, rng: np.random.Generator) -> None:
-        rotors = TurningRotors(truth.rotor, battery, 4)
-        level = truth.wrench.model_copy(update={"tilt_rad": [0.0, 0.0]})  # a fixture of its own, levelled
-        self.stand = StandPhysics(truth.vehicle, truth.rotor, level, rotors, 0.0, 0.0, rng)
-        self.tester = TesterPhysics(rotors, truth.rotor, truth.tester, rng, loaded=False)
-
-    def process(self, dt_s: float) -> None:
-        """Advance by `dt_s`; the stand advances the rotors that both look at."""
-        self.stand.process(dt_s)
+    The stand advances the rotors that both look at.
+    """
+    rotors = TurningRotors(truth.rotor, battery, 4)
+    level = truth.wrench.model_copy(update={"tilt_rad": [0.0, 0.0]})  # a fixture of its own, levelled
+    stand = StandPhysics(truth.vehicle, truth.rotor, level, rotors, 0.0, 0.0, rng)
+    return stand, TesterPhysics(rotors, truth.rotor, truth.tester, rng, loaded=False)
 
 
 class LoadedSensor:

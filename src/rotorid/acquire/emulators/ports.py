@@ -20,10 +20,13 @@ import numpy as np
 
 from rotorid.acquire.emulators.devices import (
     BenchDevice,
+    Faults,
     Jr3Device,
     QuadrotorDevice,
     RotorDevice,
     TensileDevice,
+    WireHalf,
+    World,
     WrenchDevice,
 )
 from rotorid.acquire.emulators.physics import (
@@ -34,11 +37,10 @@ from rotorid.acquire.emulators.physics import (
     StandPhysics,
     TensilePhysics,
     TesterPhysics,
-    TorqueRig,
     TurningRotors,
+    torque_rig,
 )
 from rotorid.acquire.emulators.truth import Truth
-from rotorid.acquire.emulators.wire import Faults, WireHalf, World
 from rotorid.io.wire import EXPERIMENTS
 
 _MAX_PENDING = 1 << 16  # bytes a device keeps when nobody reads; older ones are overrun, as in a real UART
@@ -270,8 +272,8 @@ def build(
         physics = TesterPhysics(rotors, truth.rotor, truth.tester, rng)
         return World(physics, line(RotorDevice(physics)))
     if what == "torque":
-        rig = TorqueRig(truth, Battery(truth.battery), rng)
-        return World(rig, line(RotorDevice(rig.tester)), line(WrenchDevice(rig.stand)))
+        stand, tester = torque_rig(truth, Battery(truth.battery), rng)
+        return World(stand, line(RotorDevice(tester)), line(WrenchDevice(stand)))
     if what not in _NAMES:
         raise ValueError(f"there is no emulator {what!r}; there are {', '.join(_NAMES)}")
     if experiment not in EXPERIMENTS:

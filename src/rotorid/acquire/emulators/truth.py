@@ -18,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from pydantic import BaseModel, ConfigDict
 
+from rotorid.io.models import KnownKeys
 from rotorid.io.text.files import read_yaml
 
 # a load "along z" pulls upwards, as thrust does
@@ -32,27 +32,13 @@ _D_2Y, _D_4Y, _D_6Y = 0.022541324, 0.048126099, 0.070667423
 _C30, _C45, _C60 = (math.cos(math.radians(angle)) for angle in (30, 45, 60))
 
 # eq. 2.9, first two rows (forces along x and y) and the linear part of the third, shape (3, 6)
-M = np.array(
-    [
-        [
-            -_D_135Z / (_C60 * _L_M),
-            (_D_246Z / _C30 - _D_2X) / (_C45 * _L_M),
-            _D_135Z / _L_M,
-            _D_4X / (_C45 * _L_M),
-            -_D_135Z / (_C60 * _L_M),
-            -(_D_246Z / _C30 - _D_6X) / (_C45 * _L_M),
-        ],
-        [
-            _D_135Z / (_C30 * _L_M),
-            (_D_246Z / _C60 + _D_2Y) / (_C45 * _L_M),
-            0.0,
-            (_D_4Y - _D_246Z) / (_C45 * _L_M),
-            -_D_135Z / (_C30 * _L_M),
-            (_D_246Z / _C60 - _D_6Y) / (_C45 * _L_M),
-        ],
-        [0.0, -1 / _C45, 0.0, -1 / _C45, 0.0, -1 / _C45],
-    ]
-)
+M = np.array([
+    [-_D_135Z / (_C60 * _L_M), (_D_246Z / _C30 - _D_2X) / (_C45 * _L_M), _D_135Z / _L_M,
+     _D_4X / (_C45 * _L_M), -_D_135Z / (_C60 * _L_M), -(_D_246Z / _C30 - _D_6X) / (_C45 * _L_M)],
+    [_D_135Z / (_C30 * _L_M), (_D_246Z / _C60 + _D_2Y) / (_C45 * _L_M), 0.0,
+     (_D_4Y - _D_246Z) / (_C45 * _L_M), -_D_135Z / (_C30 * _L_M), (_D_246Z / _C60 - _D_6Y) / (_C45 * _L_M)],
+    [0.0, -1 / _C45, 0.0, -1 / _C45, 0.0, -1 / _C45],
+])  # fmt: skip
 
 # table 2.8, as printed: gf per 1e-5 V and gf
 SLOPE = np.array([39.7571, 37.2649, 40.9000, 39.9259, 42.4717, 39.4705])
@@ -107,11 +93,7 @@ def put_down(load_gf: float, rng: np.random.Generator) -> float:
     return (load_gf * (1 + _SPREAD * rng.standard_normal()) + _SPREAD_GF * rng.standard_normal()) * GF_N
 
 
-class _Truth(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class CellsTruth(_Truth):
+class CellsTruth(KnownKeys, frozen=True):
     """Six load cells; every list has six entries."""
 
     volts_per_gf: list[float] = [float(1e-5 / slope) for slope in SLOPE]
@@ -128,7 +110,7 @@ class CellsTruth(_Truth):
     noise_v: float = 0.0
 
 
-class BenchTruth(_Truth):
+class BenchTruth(KnownKeys, frozen=True):
     """The structure around the cells, for one material."""
 
     compliance_1_n: list[float] = [0.0] * 3  # relative growth of the reading per newton, loads along x, y, z
@@ -139,7 +121,7 @@ class BenchTruth(_Truth):
     pulley_loss: float = 0.0  # loads along x and y hang over a pulley that removes at most this share of them
 
 
-class BatteryTruth(_Truth):
+class BatteryTruth(KnownKeys, frozen=True):
     """A 4S lithium-polymer battery."""
 
     cells: int = 4
@@ -149,7 +131,7 @@ class BatteryTruth(_Truth):
     resistance_ohm: float = 0.030
 
 
-class RotorTruth(_Truth):
+class RotorTruth(KnownKeys, frozen=True):
     """Motor, ESC and propeller."""
 
     thrust_coefficient_n_s2: float = 1.3877e-6
@@ -166,7 +148,7 @@ class RotorTruth(_Truth):
     idle_a: float = 0.3
 
 
-class TesterTruth(_Truth):
+class TesterTruth(KnownKeys, frozen=True):
     """The thrust tester's own errors."""
 
     tare_n: float = 0.0  # spread of the zero from run to run
@@ -174,7 +156,7 @@ class TesterTruth(_Truth):
     speed_noise_rpm: float = 6.0
 
 
-class VehicleTruth(_Truth):
+class VehicleTruth(KnownKeys, frozen=True):
     """The quadrotor. Lists over rotors in the thesis's numbering."""
 
     mass_kg: float = 0.652
@@ -184,7 +166,7 @@ class VehicleTruth(_Truth):
     torque_factors: list[float] = [1.0] * 4
 
 
-class SensorTruth(_Truth):
+class SensorTruth(KnownKeys, frozen=True):
     """A six-axis sensor; wrench order: force x y z, moment x y z."""
 
     crosstalk: list[list[float]] = np.eye(6).tolist()
@@ -197,7 +179,7 @@ class SensorTruth(_Truth):
     damping: float = 0.05
 
 
-class PlasticTruth(_Truth):
+class PlasticTruth(KnownKeys, frozen=True):
     """Printed PLA of one infill density (table 2.5)."""
 
     modulus_pa: float
@@ -205,7 +187,7 @@ class PlasticTruth(_Truth):
     yield_pa: float
 
 
-class _ClockTruth(_Truth):
+class _ClockTruth(KnownKeys, frozen=True):
     """Relative error of each device's clock."""
 
     bench: float = 0.0
@@ -216,7 +198,7 @@ class _ClockTruth(_Truth):
     tensile: float = 0.0
 
 
-class Truth(_Truth):
+class Truth(KnownKeys, frozen=True):
     """Everything."""
 
     cells: CellsTruth = CellsTruth()

@@ -22,7 +22,7 @@ from scipy.stats import t as student
 from rotorid.errors import InputError
 from rotorid.recordings import RecordingSet, Run
 from rotorid.recordings import columns as c
-from rotorid.recordings.own_rates import on_own_rates
+from rotorid.recordings.mended import on_own_rates
 from rotorid.vehicle.attitude import normalised, rotation_from_quaternion
 
 _LARGEST_ORDER = 20

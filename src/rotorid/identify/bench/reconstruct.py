@@ -39,7 +39,7 @@ from rotorid.identify.bench.loadcell import LineFit, fit_line
 from rotorid.io.logs import by_recording
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import RecordingSet, Run
-from rotorid.recordings.signal import filters
+from rotorid.recordings.signal import first_order, spikes, steady, tare, without_spikes, zero_phase
 from rotorid.recordings.vehicle import Vehicle
 
 GF_N = 9.80665e-3
@@ -373,14 +373,14 @@ def _prepare_recording(session: pd.Series, table: pd.DataFrame, channels: Sequen
     `<channel>_low_pass` and `<channel>_zero_phase`."""
     rate_hz = float(session["rate_hz"])
     raw = table[list(channels)].to_numpy()
-    jumped = filters.spikes(raw, settings.spike_window, settings.spike_threshold)
-    clean = filters.without_spikes(raw, jumped)
-    clean = clean - filters.tare(clean, *_rest_range(session, table))
-    low = filters.first_order(clean, settings.low_pass_hz, rate_hz)
+    jumped = spikes(raw, settings.spike_window, settings.spike_threshold)
+    clean = without_spikes(raw, jumped)
+    clean = clean - tare(clean, *_rest_range(session, table))
+    low = first_order(clean, settings.low_pass_hz, rate_hz)
     out = table[["id", "time_s", "index"]].copy()
     out["quality"] = table["quality"].to_numpy() | np.where(jumped.any(axis=1), SPIKE, 0).astype(np.uint8)
-    out["steady"] = filters.steady(low, settings.steady_window, settings.steady_tolerance)
-    smooth = filters.zero_phase(clean, settings.zero_phase_hz, rate_hz)
+    out["steady"] = steady(low, settings.steady_window, settings.steady_tolerance)
+    smooth = zero_phase(clean, settings.zero_phase_hz, rate_hz)
     for kind, values in (("", clean), ("_low_pass", low), ("_zero_phase", smooth)):
         out[[name + kind for name in channels]] = values
     return out

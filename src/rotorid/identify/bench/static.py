@@ -37,7 +37,7 @@ from rotorid.identify.bench.reconstruct import (
     forces,
 )
 from rotorid.io.logs import by_recording
-from rotorid.recordings.signal.filters import mean_and_error
+from rotorid.recordings.signal import mean_and_error
 
 _AXES = "xyz"
 _REST_S = 1.0

@@ -169,11 +169,7 @@ def read_yaml(
 
 
 def parse_yaml(
-    text: str,
-    where: str,
-    as_written: bool = False,
-    most_values: int = MOST_YAML_VALUES,
-    compiled: bool = False,
+    text: str, where: str, as_written: bool = False, most_values: int = MOST_YAML_VALUES, compiled: bool = False
 ) -> dict[str, Any]:
     """The mapping that a YAML text holds; InputError names `where` and the line of a fault.
 

@@ -8,8 +8,12 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel, ValidationError
 
 _ALIKE = 0.7
 """Share of letters in common (difflib's ratio) from which one name is proposed for another."""
@@ -53,9 +57,6 @@ def hint(name: str, known: Iterable[str]) -> str:
     found = nearest(name, known)
     return f"; did you mean {found}?" if found else ""
 
-
-if TYPE_CHECKING:
-    from pydantic import BaseModel, ValidationError
 
 _EXACT = {
     "greater_than": "a number greater than {gt:g}",
@@ -124,19 +125,11 @@ def _clause(entry: Mapping[str, Any], model: type[BaseModel]) -> str:
         return ": ".join(x for x in (key, printable(entry["ctx"]["error"])) if x)
     wanted = _expected(entry)
     clause = f"{key}: found {_found(entry)}, expected {wanted}"
-    if "number" in wanted and _reads_as_number(entry.get("input")):
-        clause += " (without quotes, and where it has an exponent with a point and a sign: 1.0e-3)"
+    if "number" in wanted and isinstance(entry.get("input"), str):
+        with suppress(ValueError):
+            float(entry["input"])
+            clause += " (without quotes, and where it has an exponent with a point and a sign: 1.0e-3)"
     return clause
-
-
-def _reads_as_number(given: Any) -> bool:
-    if not isinstance(given, str):
-        return False
-    try:
-        float(given)
-    except ValueError:
-        return False
-    return True
 
 
 def _keys_at(model: type[BaseModel], location: tuple[str | int, ...]) -> list[str]:

@@ -8,7 +8,7 @@ import os
 import platform
 import shutil
 import time
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -56,6 +56,13 @@ def all_or_none(*paths: Path, optional: Collection[Path] = ()) -> Iterator[tuple
     finally:
         for part in parts:
             part.unlink(missing_ok=True)
+
+
+def write_texts(texts: Mapping[Path, str]) -> None:
+    """Write text files, all of them or none."""
+    with all_or_none(*texts) as parts:
+        for part, text in zip(parts, texts.values(), strict=True):
+            part.write_text(text, encoding="utf-8")
 
 
 @contextmanager

@@ -35,7 +35,7 @@ from rotorid.effects.contract import Motion
 from rotorid.effects.scale import hover_inflow_m_s
 from rotorid.recordings import Run, Vehicle
 from rotorid.recordings import columns as c
-from rotorid.recordings.held import stretches
+from rotorid.recordings.run import stretches
 from rotorid.recordings.signal import kernels
 
 SLOW_S = 5.0

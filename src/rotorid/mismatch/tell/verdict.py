@@ -43,9 +43,9 @@ from rotorid.mismatch.tell.sentences import (
     warnings_of,
 )
 from rotorid.recordings import RecordingSet
-from rotorid.recordings.basis import basis_of
 from rotorid.recordings.check import doubts_of
 from rotorid.recordings.run import Doubt
+from rotorid.recordings.sufficient import basis_of
 
 _DESCRIBED = 0.1
 """Share of the weight, or of the moment that the rotors can make, that may stay off in a channel where a mistake in the

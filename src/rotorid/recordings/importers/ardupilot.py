@@ -10,7 +10,7 @@ another takes over, a run ends. Of several inertial sensors the first is read th
 message before them. Its estimate `EKF1` is read where `AHRS_EKF_USE` is 1.
 
 The land detector calls idle, spool-up and the wait after landing flight: what is on the ground by the detector of all
-importers (`in_the_air.airborne`) is left out.
+importers (`faults.airborne`) is left out.
 
 Outputs are motors only where the frame class says so: helicopters use motor functions for their servos, tricopters one
 for the servo of the tail. Those, and whatever is no multirotor of fixed rotors, are refused by name. Parameters may
@@ -33,12 +33,20 @@ import pandas as pd
 from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers import in_the_air
 from rotorid.recordings.importers.bag_records import needs
-from rotorid.recordings.importers.faults import GOES_ON, ImportFault, one_sense, report_gaps
+from rotorid.recordings.importers.faults import (
+    GOES_ON,
+    ImportFault,
+    airborne,
+    fault_where,
+    flights,
+    increasing,
+    one_sense,
+    report_gaps,
+    table_on,
+)
 from rotorid.recordings.importers.known import Parameters, Values
-from rotorid.recordings.importers.mapping import continuous, quaternion_from_euler_frd
-from rotorid.recordings.importers.units import PULSE_US, RPM
+from rotorid.recordings.importers.mapping import PULSE_US, RPM, continuous, quaternion_from_euler_frd
 
 _KINDS = (
     "IMU", "ACC", "GYR", "XKQ", "NKQ", "ATT", "XKF1", "NKF1", "XKF4", "NKF4", "EKF1", "RCOU", "RCO2", "RCO3", "ESC",
@@ -243,14 +251,6 @@ def _of_primary(log: Log, kinds: tuple[str, ...]) -> pd.DataFrame | None:
     return table[table["C"].to_numpy() == primary["PI"].to_numpy()[np.maximum(held, 0)]]
 
 
-def _switches(log: Log, values: Values) -> np.ndarray:
-    """Times, s, at which another core of the estimator took over."""
-    primary = log.get("NKF4" if _estimators(values)[0] == "NK" and "NKF4" in log else "XKF4")
-    if primary is None or not {"PI", c.TIME} <= set(primary):
-        return np.zeros(0)
-    return primary[c.TIME].to_numpy(float)[1:][np.diff(primary["PI"].to_numpy(float)) != 0]
-
-
 def _estimators(values: Values) -> tuple[str, str]:
     """How the kinds of the estimators' messages begin, of the one that flew the vehicle first."""
     return ("NK", "XK") if values.get("AHRS_EKF_TYPE") == 2 else ("XK", "NK")
@@ -281,11 +281,9 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[ImportFault], n
     if END in log:
         found = f"the file ends inside a message, after {int(log[END]['bytes'].iloc[0])} bytes of it"
         faults.append(ImportFault("cut_off", "", found, "what came before is kept; the log stopped before its end", 0))
-    keep = in_the_air.increasing(grid)
-    if not keep.all():
-        found = f"{int((~keep).sum())} messages do not move the clock on"
-        faults.append(ImportFault("repeated_time", c.TIME, found, "left out", int((~keep).sum())))
-    grid = grid[keep]
+    late = ~increasing(grid)
+    faults += fault_where(late, "repeated_time", c.TIME, f"{late.sum()} messages do not move the clock on", "left out")
+    grid = grid[~late]
     parts: list[tuple] = []
 
     def put(names, table: pd.DataFrame | None, fields) -> bool:
@@ -326,8 +324,8 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[ImportFault], n
         faults += more
         parts += _throttles(outputs, stated, values.get("FRAME_CLASS", 0.0), faults)
         parts += _speeds(log.get("ESC"), channels, faults)
-    table = in_the_air.table_on(grid, parts)
-    flying, ground = in_the_air.airborne(table, _flying(log, grid))
+    table = table_on(grid, parts)
+    flying, ground = airborne(table, _flying(log, grid))
     return table, [*faults, *ground, *report_gaps(table)], flying
 
 
@@ -424,9 +422,8 @@ def _battery(log: Log, faults: list[ImportFault]) -> list[tuple]:
             continue  # damaged: no numbers
         values = values.astype(float) * (0.01 if kind == "CURR" and values.dtype.kind in "iu" else 1.0)
         if (values == 0).all():
-            faults.append(
-                ImportFault("stuck", column, f"{kind}.{name} is 0 throughout", "column left out", len(values))
-            )
+            seen = f"{kind}.{name} is 0 throughout"
+            faults.append(ImportFault("stuck", column, seen, "column left out", len(values)))
             continue
         parts.append(((column,), table[c.TIME].to_numpy(float), values))
     return parts
@@ -476,11 +473,15 @@ def read_ardupilot(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFaul
     table, faults, flying = convert(log, path)
     values = _in_flight(log, path)
     order, more = order_of(values)
-    switches, jumps = _switches(log, values) - _clock(log, path)[0], np.zeros(len(table), bool)
+    primary = log.get("NKF4" if _estimators(values)[0] == "NK" and "NKF4" in log else "XKF4")
+    switches = np.zeros(0)  # times at which another core of the estimator took over
+    if primary is not None and {"PI", c.TIME} <= set(primary):
+        switches = primary[c.TIME].to_numpy(float)[1:][np.diff(primary["PI"].to_numpy(float)) != 0]
+    switches, jumps = switches - _clock(log, path)[0], np.zeros(len(table), bool)
     for switch in switches:
         jumps |= np.abs(table[c.TIME].to_numpy() - switch) <= _AROUND_SWITCH_S
     if len(switches):
         found = f"another core of the estimator took over {len(switches)} times, first at {switches[0]:.2f} s"
         more.append(ImportFault("estimator_reset", "", found, "a run ends at each change in the air", len(switches)))
-    runs, cuts = in_the_air.flights(table, flying, path.name.split(".")[0], path, jumps)
+    runs, cuts = flights(table, flying, path.name.split(".")[0], path, jumps)
     return runs, [*faults, *more, *cuts], order

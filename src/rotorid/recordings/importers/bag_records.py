@@ -81,8 +81,9 @@ class Records:
             at += 9 + size
             if code == _FOOTER:
                 return
-            if code == _CHUNK:
-                yield from self._of_mcap(self._unpacked_mcap(body), True)
+            if code == _CHUNK and len(body) >= 40:
+                compression, place = _string(body, 28)
+                yield from self._of_mcap(self._unpacked(body[place + 8 :], compression), True)
             if len(body) < size:
                 self.cut = True
                 return
@@ -97,13 +98,6 @@ class Records:
             elif code == _MESSAGE and (channel := self.channels.get(_u16(body, 0))) and channel.of_ros:
                 yield channel, struct.unpack_from("<Q", body, 6)[0], body[22:]
         self.cut |= not in_chunk or at < len(data)
-
-    def _unpacked_mcap(self, body: bytes) -> bytes:
-        """The records of a chunk, as many as came."""
-        if len(body) < 40:
-            return b""
-        compression, place = _string(body, 28)
-        return self._unpacked(body[place + 8 :], compression)
 
     def _of_bag(self, data: bytes, in_chunk: bool) -> Iterator[tuple[_Topic, int, bytes]]:
         at, indexed = 0, in_chunk

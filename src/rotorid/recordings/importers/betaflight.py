@@ -1,4 +1,8 @@
-"""Betaflight's blackbox logs: what the fields of a session mean, by its own header.
+"""Betaflight's blackbox logs: read byte by byte, and what the fields of a session mean by its own header.
+
+Each session has lines of text (`H name:value`) that say how its frames are packed. Key frames (I) stand alone; a frame
+between them (P) holds differences from a prediction. A frame is whole where the next one begins with a known letter.
+After damage nothing is taken until the next key frame, because the frames between count from the damaged one.
 
 Betaflight's body axes are forward-left-up (a positive pitch rate lowers the nose, a positive yaw rate turns left, and
 the accelerometer reads +1 g along z at rest): half a turn about x makes them forward-right-down. Units by the log's own
@@ -6,8 +10,8 @@ header: `gyro_scale` (deg/s) and `blackbox_high_resolution` (tenths of it), `acc
 motors' commands) and `features` (3D), `motor_poles`; `eRPM` in hundreds of electrical turns a minute; voltage and
 current by the version. Blackbox logs hold no velocity; an attitude only since `imuQuaternion` is logged.
 
-Sources: Betaflight `src/main/blackbox/blackbox.c`, `src/main/drivers/dshot.c`, `src/main/flight/mixer_init.c`, Blackbox
-Explorer `flightlog_fields_presenter.js`.
+Sources: Betaflight `src/main/blackbox/` (`blackbox.c`, `blackbox_encoding.c`, `blackbox_fielddefs.h`),
+`src/main/drivers/dshot.c`, `src/main/flight/mixer_init.c`, Blackbox Explorer `flightlog_fields_presenter.js`.
 """
 
 from __future__ import annotations
@@ -17,7 +21,8 @@ import io
 import re
 import struct
 from array import array
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -25,11 +30,19 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers import blackbox, in_the_air
-from rotorid.recordings.importers.faults import ImportFault, report_gaps
-from rotorid.recordings.importers.mapping import half_turn_about_x, quaternion_to_frd_ned
-from rotorid.recordings.importers.units import G
+from rotorid.recordings.importers.faults import ImportFault, airborne, fault_where, flights, increasing, report_gaps
+from rotorid.recordings.importers.mapping import G, half_turn_about_x, quaternion_to_frd_ned
 
+_FIRST_LINE = b"H Product:Blackbox"
+_HEADER_LINE = re.compile(rb"H ([^:\n]{1,80}):([^\n]*)\n")
+_FRAMES = b"IPGHSE"
+_END_OF_LOG = b"End of log"
+_LONGEST_FRAME = _MOST_FIELDS = 256
+_LARGEST_STEP = 5000
+_LARGEST_STEP_US = 10_000_000
+"""A main frame that leaps farther ahead in iterations or time than this, or back, is damaged."""
+_TURN = 1 << 32
+"""Numbers have 32 bits: a clock in microseconds begins anew after 71.6 minutes."""
 _DEFAULT_POLES = 14
 _QUATERNION_SCALE = 32767.0
 """`imuQuaternion` holds x, y and z of the unit quaternion times this; w is what is missing to length 1."""
@@ -57,7 +70,7 @@ def read_betaflight(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFau
     InputError where the file is of another firmware, cannot be read, or holds no flight.
     """
     data = Path(path).read_bytes()
-    found = [_exported(data, path)] if data.startswith(b'"Product"') else blackbox.sessions(data)
+    found = [_exported(data, path)] if data.startswith(b'"Product"') else sessions(data)
     runs: dict[str, pd.DataFrame] = {}
     faults: list[ImportFault] = []
     reasons: list[str] = []
@@ -78,7 +91,7 @@ def read_betaflight(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFau
     return runs, faults
 
 
-def _exported(data: bytes, path: Path) -> blackbox.BlackboxSession:
+def _exported(data: bytes, path: Path) -> BlackboxSession:
     """The session in a table that Blackbox Explorer exports: its header, a line each, then frames as logged."""
     rows = csv.reader(io.StringIO(data.decode("utf-8", "replace")))
     headers: dict[str, str] = {}
@@ -99,7 +112,7 @@ def _exported(data: bytes, path: Path) -> blackbox.BlackboxSession:
         raise InputError(f"{path}: Blackbox Explorer's header is there, but no heading with a column time below it")
     if scale := _number(headers, "gyroScale", 0.0):  # the Explorer turns deg/s into rad/µs
         headers.setdefault("gyro_scale", f"{np.degrees(scale) * 1e6:.9f}")
-    return blackbox.BlackboxSession(headers, names, np.array(values).reshape(-1, len(names)), whole, 0)
+    return BlackboxSession(headers, names, np.array(values).reshape(-1, len(names)), whole, 0)
 
 
 def _cell(text: str) -> float:
@@ -109,9 +122,7 @@ def _cell(text: str) -> float:
         return np.nan
 
 
-def _flights(
-    session: blackbox.BlackboxSession, name: str, path: Path
-) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
+def _flights(session: BlackboxSession, name: str, path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
     headers = session.headers
     firmware = headers.get("Firmware revision", headers.get("Firmware type", ""))
     if "betaflight" not in firmware.lower():
@@ -142,10 +153,9 @@ def convert(
         raise InputError(f"{where}: the log has no field time")
     raw, faults = _known_names(raw)
     time = raw["time"].to_numpy(float) * 1e-6
-    keep = np.isfinite(time) & in_the_air.increasing(np.nan_to_num(time, nan=-np.inf))
-    if not keep.all():
-        found = f"{int((~keep).sum())} frames do not move the clock on"
-        faults.append(ImportFault("repeated_time", c.TIME, found, "left out", int((~keep).sum())))
+    keep = np.isfinite(time) & increasing(np.nan_to_num(time, nan=-np.inf))
+    found = f"{(~keep).sum()} frames do not move the clock on"
+    faults += fault_where(~keep, "repeated_time", c.TIME, found, "left out")
     raw, time = raw[keep].reset_index(drop=True), time[keep]
     table = pd.DataFrame({c.TIME: time - time[0]})
 
@@ -159,9 +169,8 @@ def convert(
         scale /= 10 if _number(headers, "blackbox_high_resolution", 0) > 0 else 1
         table[list(c.ANGULAR_VELOCITY)] = half_turn_about_x(np.radians(gyro * scale))
     else:
-        faults.append(
-            ImportFault("missing", ", ".join(c.ANGULAR_VELOCITY), "gyroADC is not logged", "no body rates", 0)
-        )
+        missing = ", ".join(c.ANGULAR_VELOCITY)
+        faults.append(ImportFault("missing", missing, "gyroADC is not logged", "no body rates"))
     acceleration = fields("accSmooth", 3)
     one_g = _number(headers, "acc_1G", 0)
     if acceleration is not None and one_g > 0:
@@ -202,7 +211,7 @@ def convert(
     faults += more
     table = table.assign(**battery)
     faults += report_gaps(table)
-    runs, cuts = in_the_air.flights(table, in_the_air.airborne(table)[0], name, where)
+    runs, cuts = flights(table, airborne(table)[0], name, where)
     return runs, [*faults, *cuts]
 
 
@@ -242,9 +251,7 @@ def throttles(motors: np.ndarray, headers: Mapping[str, str]) -> tuple[np.ndarra
         else:
             backwards, low = motors < _DEADBAND_3D[0], _DEADBAND_3D[1]
             found = "pulses in µs with 3D, whose dead band the header does not state"
-            faults.append(
-                ImportFault("unit", "throttle", found, f"no throttle taken as {low:g} µs, Betaflight's own", 0)
-            )
+            faults.append(ImportFault("unit", "throttle", found, f"no throttle taken as {low:g} µs, Betaflight's own"))
     share = np.clip((motors - low) / (high - low), 0, 1)
     if backwards.any():
         found = f"{int(backwards.any(axis=1).sum())} samples have a motor that turns backwards (3D)"
@@ -296,3 +303,325 @@ def _version(headers: Mapping[str, str]) -> tuple[int, ...]:
     """Betaflight's version, `(4, 4)`; empty where the header does not state it."""
     found = re.search(r"(\d{1,4})\.(\d{1,3})", headers.get("Firmware revision", ""))
     return (int(found[1]), int(found[2])) if found else ()
+
+
+@dataclass(frozen=True)
+class BlackboxSession:
+    """One session of a blackbox file.
+
+    `names` and `values` (n, k), whole numbers: the main frames in the order of the file, `time` in µs without the
+    clock's new beginnings. `whole`: the event of the end is there. `damaged`: frames that could not be read, or count
+    from such a one.
+    """
+
+    headers: Mapping[str, str]
+    names: tuple[str, ...]
+    values: np.ndarray
+    whole: bool
+    damaged: int
+
+
+def sessions(data: bytes) -> list[BlackboxSession | InputError]:
+    """Every session of a blackbox file in its order; for one whose header cannot be read the reason."""
+    starts = [match.start() for match in re.finditer(re.escape(_FIRST_LINE), data)]
+    found: list[BlackboxSession | InputError] = []
+    for start, stop in zip(starts, [*starts[1:], len(data)], strict=True):
+        try:
+            found.append(_session(data[start:stop]))
+        except InputError as error:
+            found.append(error)
+    return found
+
+
+def _session(data: bytes) -> BlackboxSession:
+    headers, at = _headers(data)
+    frames = _Frames(headers, data)
+    whole = frames.read(at)
+    values = np.array(frames.values, dtype=np.int64).reshape(-1, len(frames.names))
+    time = values[:, frames.time]
+    values[:, frames.time] = time + _TURN * np.cumsum(np.diff(time, prepend=time[:1]) < -_TURN // 2)
+    return BlackboxSession(headers, frames.names, values, whole, frames.damaged)
+
+
+def _headers(data: bytes) -> tuple[dict[str, str], int]:
+    """The lines of a header by name, and where the frames begin; what is no line is passed over."""
+    headers: dict[str, str] = {}
+    at = 0
+    while at < len(data):
+        if line := _HEADER_LINE.match(data, at):
+            name, value = (part.decode("utf-8", "replace").strip() for part in line.groups())
+            headers[name] = value
+            at = line.end()
+        elif data[at] in _FRAMES.replace(b"H", b""):
+            break
+        else:
+            at += 1
+    return headers, at
+
+
+# Numbers ------------------------------------------------------------------------------------------
+
+
+def _unsigned(data: bytes, at: int) -> tuple[int, int]:
+    """A number of seven bits a byte, the lowest first, and where the next begins."""
+    value = shift = 0
+    while True:
+        byte = data[at]
+        at += 1
+        value |= (byte & 127) << shift
+        if byte < 128:
+            return value & _TURN - 1, at
+        shift += 7
+        if shift > 28:
+            return 0, at
+
+
+def _signed(data: bytes, at: int) -> tuple[int, int]:
+    value, at = _unsigned(data, at)
+    return value >> 1 ^ -(value & 1), at
+
+
+def _extended(value: int, bits: int) -> int:
+    """The lowest bits of a number, of which the highest is the sign."""
+    sign = 1 << bits - 1
+    return (value & (sign << 1) - 1 ^ sign) - sign
+
+
+def _one_signed(data: bytes, at: int, count: int) -> tuple[list[int], int]:
+    value, at = _signed(data, at)
+    return [value], at
+
+
+def _one(turned: Callable[[int], int]) -> Callable[[bytes, int, int], tuple[list[int], int]]:
+    """One number, turned into what it stands for."""
+
+    def read(data: bytes, at: int, count: int) -> tuple[list[int], int]:
+        value, at = _unsigned(data, at)
+        return [turned(value)], at
+
+    return read
+
+
+def _up_to_eight(data: bytes, at: int, count: int) -> tuple[list[int], int]:
+    """A bit for each number that is not zero, then those."""
+    if count == 1:
+        return _one_signed(data, at, 1)
+    given, values = data[at], []
+    at += 1
+    for k in range(count):
+        value = 0
+        if given >> k & 1:
+            value, at = _signed(data, at)
+        values.append(value)
+    return values, at
+
+
+def _four(data: bytes, at: int, count: int) -> tuple[list[int], int]:
+    """Two bits for the width of each number (0, 4, 8, 16 bits), then these one behind the other."""
+    widths = [(0, 4, 8, 16)[data[at] >> shift & 3] for shift in (0, 2, 4, 6)]
+    size = -(-sum(widths) // 8)
+    packed, left, values = int.from_bytes(data[at + 1 : at + 1 + size], "big"), 8 * size, []
+    for width in widths:
+        left -= width
+        values.append(_extended(packed >> left, width) if width else 0)
+    return values, at + 1 + size
+
+
+def _three(layouts: tuple) -> Callable[[bytes, int, int], tuple[list[int], int]]:
+    """Three numbers by the layout that the highest two bits choose: bytes, and shift and width of each number.
+
+    The last choice gives each number whole bytes, from one to four, the lowest first.
+    """
+
+    def read(data: bytes, at: int, count: int) -> tuple[list[int], int]:
+        lead = data[at]
+        if lead >> 6 < 3:
+            size, fields = layouts[lead >> 6]
+            packed = int.from_bytes(data[at : at + size], "big")
+            return [_extended(packed >> shift, width) for shift, width in fields], at + size
+        values, at = [], at + 1
+        for shift in (0, 2, 4):
+            size = (lead >> shift & 3) + 1
+            values.append(int.from_bytes(data[at : at + size], "little", signed=True))
+            at += size
+        return values, at
+
+    return read
+
+
+_ENCODINGS: dict[int, tuple[Callable, int]] = {
+    0: (_one_signed, 1),
+    1: (_one(lambda value: value), 1),
+    3: (_one(lambda value: -_extended(value, 14)), 1),
+    6: (_up_to_eight, 8),
+    7: (_three(((1, ((4, 2), (2, 2), (0, 2))), (2, ((8, 4), (4, 4), (0, 4))), (3, ((16, 6), (8, 6), (0, 6))))), 3),
+    8: (_four, 4),
+    9: (lambda data, at, count: ([0], at), 1),
+    10: (_three(((1, ((4, 2), (2, 2), (0, 2))), (2, ((9, 5), (4, 5), (0, 4))), (3, ((14, 8), (7, 7), (0, 7))))), 3),
+}
+"""To the number of an encoding its reader and how many fields it packs together (`_up_to_eight`: at most)."""
+_EVENTS: dict[int, int] = {0: 1, 14: 2, 15: 1, 30: 2}
+"""To an event how many unsigned numbers follow: beep, log resumed, disarmed, flight mode."""
+_RESUMED, _ADJUSTED, _ENDED = 14, 13, 255
+
+
+# Frames -------------------------------------------------------------------------------------------
+
+
+class _Frames:
+    """Reads the frames of one session into `values`, a row of fields behind the other."""
+
+    def __init__(self, headers: Mapping[str, str], data: bytes) -> None:
+        self._data, self.values, self.damaged = data, array("q"), 0
+        self.names = tuple(headers.get("Field I name", "").split(","))
+        if not {"time", "loopIteration"} <= set(self.names):
+            raise InputError("the header of the log is damaged: it does not name the fields loopIteration and time")
+        if len(self.names) > _MOST_FIELDS:
+            raise InputError(f"the header of the log is damaged: it names {len(self.names)} fields")
+        self.time, self._iteration = self.names.index("time"), self.names.index("loopIteration")
+        self._motor = self.names.index("motor[0]") if "motor[0]" in self.names else 0
+        self._plans = {}
+        for letter in _FRAMES.decode().replace("E", ""):
+            encodings = _numbers_of(headers, f"Field {letter} encoding")
+            if encodings or letter == "I":
+                count = len(self.names) if letter in "IP" else len(encodings)
+                self._plans[ord(letter)] = _plan(encodings, count, letter)
+        self._predictors = {ord(k): _numbers_of(headers, f"Field {k} predictor") for k in "IP"}
+        if any(len(self._predictors[k]) != len(self.names) for k in self._predictors if k in self._plans):
+            raise InputError("the header of the log is damaged: its lists of fields have different lengths")
+        first = {name: (_numbers_of(headers, name) or [default])[0]
+                 for name, default in (("minthrottle", 1150), ("vbatref", 4095), ("motorOutput", 0))}  # fmt: skip
+        self._fixed = {4: first["minthrottle"], 8: 1500, 9: first["vbatref"], 11: first["motorOutput"]}
+        self._key_every = max((_numbers_of(headers, "I interval") or [1])[0], 1)
+        share = [int(n) for n in re.findall(r"\d+", headers.get("P interval", "1"))] or [1]
+        self._of, self._every = (share[0], max(share[1], 1)) if len(share) > 1 else (1, max(share[0], 1))
+        self._history: list[list[int]] = []
+        self._last: tuple[int, int] | None = None
+        """Iteration and time of the last main frame, or of the event that the log resumes."""
+
+    def read(self, at: int) -> bool:
+        """Read from a place on to the event of the end, or of the data; whether that event was there."""
+        data, size, sound = self._data, len(self._data), False
+        while at < size:
+            letter, start = data[at], at
+            if letter == ord("E"):
+                if data.startswith(_END_OF_LOG, at + 2) and data[at + 1] == _ENDED:
+                    return True
+                after = self._event(at + 1)
+            else:
+                after = self._frame(letter, at + 1) if letter in self._plans else None
+            if after is None or not self._begins(after) or after - start > _LONGEST_FRAME:
+                # What is no frame is looked through byte by byte for the next one.
+                self.damaged += sound or letter == ord("I")
+                at, sound = start + 1, False
+                continue
+            if letter in b"IP":
+                sound = self._take(letter, sound)
+                self.damaged += not sound
+            at = after
+        return False
+
+    def _begins(self, at: int) -> bool:
+        return at == len(self._data) or (at < len(self._data) and self._data[at] in _FRAMES)
+
+    def _frame(self, letter: int, at: int) -> int | None:
+        """Where the frame that begins here ends, its numbers in `_now`; None where the data end in it."""
+        self._now: list[int] = []
+        try:
+            for read, count in self._plans[letter]:
+                values, at = read(self._data, at, count)
+                self._now += values
+        except IndexError:
+            return None
+        return at if at <= len(self._data) else None
+
+    def _event(self, at: int) -> int | None:
+        """Where an event ends; None where it is not known, or the data end in it."""
+        data = self._data
+        try:
+            kind, at = data[at], at + 1
+            if kind == _ADJUSTED:
+                return at + 5 if data[at] & 128 else _signed(data, at + 1)[1]
+            if kind not in _EVENTS:
+                return None
+            values = []
+            for _ in range(_EVENTS[kind]):
+                value, at = _unsigned(data, at)
+                values.append(value)
+        except IndexError:
+            return None
+        if kind == _RESUMED and self._begins(at):
+            self._last = values[0], values[1]
+        return at
+
+    def _take(self, letter: int, sound: bool) -> bool:
+        """Add the main frame just read; whether it, and what counts from it, can be relied on."""
+        if letter == ord("P") and not sound:
+            return False
+        now = self._predicted(letter)
+        at = now[self._iteration], now[self.time]
+        follows = self._last is None or (
+            0 <= at[0] - self._last[0] < _LARGEST_STEP and (at[1] - self._last[1]) % _TURN < _LARGEST_STEP_US
+        )
+        self._last = at  # a key frame after a true leap is not taken, the next one is
+        if not follows:
+            return False
+        self._history = [now, now] if letter == ord("I") else [now, self._history[0]]
+        self.values.extend(now)
+        return True
+
+    def _predicted(self, letter: int) -> list[int]:
+        """The fields of a main frame: what was read and its predictions."""
+        now, zero = self._now, [0] * len(self.names)
+        before, earlier = self._history if letter == ord("P") else (zero, zero)
+        for k, predictor in enumerate(self._predictors[letter]):
+            if predictor == 0:
+                continue
+            if predictor == 1:
+                now[k] += before[k]
+            elif predictor == 2:
+                now[k] += 2 * before[k] - earlier[k]
+            elif predictor == 3:
+                now[k] += int((before[k] + earlier[k]) / 2)  # towards zero, as the firmware divides
+            elif predictor == 5:
+                now[k] += now[self._motor]
+            elif predictor == 6:
+                now[k] = before[k] + 1 + self._left_out()
+            elif predictor in self._fixed:
+                now[k] += self._fixed[predictor]
+            else:
+                raise InputError(f"the header of the log is damaged: there is no predictor {predictor}")
+            if not -_TURN // 2 <= now[k] < _TURN // 2:
+                now[k] = now[k] % _TURN if k == self.time else _extended(now[k], 32)
+        now[self.time] %= _TURN
+        return now
+
+    def _left_out(self) -> int:
+        """Iterations behind the last frame that the log leaves out by its rate."""
+        following = self._history[0][self._iteration] + 1
+        for count in range(self._key_every):
+            if ((following + count) % self._key_every + self._of - 1) % self._every < self._of:
+                return count
+        return 0
+
+
+def _plan(encodings: list[int], count: int, letter: str) -> list[tuple[Callable, int]]:
+    """Readers of the fields of a kind of frame, each with the number of fields that it takes."""
+    plan, k = [], 0
+    while k < len(encodings):
+        if encodings[k] not in _ENCODINGS:
+            raise InputError(f"the header of the log is damaged: there is no encoding {encodings[k]}")
+        read, takes = _ENCODINGS[encodings[k]]
+        if encodings[k] == 6:
+            takes = next((n for n in range(1, 8) if encodings[k + n : k + n + 1] != [6]), 8)
+        plan.append((read, takes))
+        k += takes
+    if k != count:
+        raise InputError(f"the header of the log is damaged: the fields of frames {letter} are packed for {k} numbers")
+    return plan
+
+
+def _numbers_of(headers: Mapping[str, str], name: str) -> list[int]:
+    """Whole numbers of a header's list; empty where it is not there or holds something else."""
+    parts = headers.get(name, "").split(",")
+    return [int(p) for p in parts] if all(re.fullmatch(r"-?\d{1,10}", p.strip()) for p in parts) else []

@@ -29,7 +29,6 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
 from pathlib import Path
 from zlib import crc32
 
@@ -41,24 +40,26 @@ from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.faults import (
     ImportFault,
+    airborne,
     blank_held,
     cut,
     drop_repeated_times,
     in_order,
     join_rows,
     report_gaps,
+    stretches_of,
     true_stretches,
 )
-from rotorid.recordings.importers.guessing.guess import guess
-from rotorid.recordings.importers.in_the_air import airborne, stretches_of
+from rotorid.recordings.importers.guessing import guess
 from rotorid.recordings.importers.mapping import (
+    RPM,
+    UNITS,
     continuous,
     half_turn_about_x,
     quaternion_from_euler_frd,
     quaternion_to_frd_ned,
     read_columns,
 )
-from rotorid.recordings.importers.units import RPM, UNITS
 from rotorid.recordings.tables import numbers
 
 _MAGIC = 0xBC
@@ -66,6 +67,7 @@ _CHECKSUM = 4
 """Bytes of it at the end of a log."""
 _TIME, _EVENT = "time_s", "fixedFrequency"
 TYPES = {"e": "<f2", "f": "<f4", "d": "<f8", "b": "i1", "B": "u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4"}
+TYPES |= {"q": "<i8", "Q": "<u8"}
 _STANDARD_GRAVITY_M_S2 = 9.81
 """The firmware's g: accelerometer logs are in multiples of this."""
 _FULL_SCALE = 65536.0
@@ -147,11 +149,6 @@ def _read_table(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]
     return {_EVENT: raw.assign(**{_TIME: raw[_TIME] * UNITS["time"][clock.unit]})}, late
 
 
-def _axes(table: pd.DataFrame, prefix: str, axes: str = "xyz") -> np.ndarray | None:
-    names = [prefix + a for a in axes]
-    return table[names].to_numpy(float) if set(names) <= set(table.columns) else None
-
-
 def attitude_without_pitch(
     specific_force_world_g: np.ndarray, roll_rad: np.ndarray, yaw_rad: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -183,26 +180,15 @@ def convert(log: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
     if not set(c.VELOCITY) & set(columns) and set(BODY_VELOCITY) <= set(log.columns) and c.QUATERNION[0] in columns:
         xyzw = np.column_stack([columns[n] for n in c.QUATERNION])[:, [1, 2, 3, 0]]
         put(c.VELOCITY, Rotation.from_quat(xyzw).apply(half_turn_about_x(log[list(BODY_VELOCITY)].to_numpy(float))))
-    estimate = _axes(log, "stateEstimate.a")
-    if (
-        c.QUATERNION[0] not in columns
-        and estimate is not None
-        and {"stateEstimate.roll", "stateEstimate.yaw"} <= set(log.columns)
-    ):
-        roll, yaw = np.radians(log[["stateEstimate.roll", "stateEstimate.yaw"]].to_numpy(float)).T
+    names = _names("stateEstimate", "ax ay az roll yaw")
+    if c.QUATERNION[0] not in columns and set(names) <= set(log.columns):
+        estimate, (roll, yaw) = log[list(names[:3])].to_numpy(float), np.radians(log[list(names[3:])].to_numpy(float)).T
         quaternion, force_g = attitude_without_pitch(estimate + [0, 0, 1], roll, yaw)
         put(c.QUATERNION, continuous(quaternion_to_frd_ned(quaternion)))
         if c.SPECIFIC_FORCE[0] not in columns:
             put(c.SPECIFIC_FORCE[1:], (half_turn_about_x(force_g) * _STANDARD_GRAVITY_M_S2)[:, 1:])
-        faults.append(
-            ImportFault(
-                "no_pitch",
-                ", ".join(c.QUATERNION),
-                "pitch is not recorded",
-                "taken from the direction of the estimated acceleration; specific force along x left out",
-                len(log),
-            )
-        )
+        done = "taken from the direction of the estimated acceleration; specific force along x left out"
+        faults.append(ImportFault("no_pitch", ", ".join(c.QUATERNION), "pitch is not recorded", done, len(log)))
     output = [f"pwm.m{i}_pwm" for i in _ROTORS]
     request = [f"motor.m{i}" for i in _ROTORS]
     drive = output if set(output) <= set(log.columns) else request
@@ -234,7 +220,7 @@ def in_the_air(table: pd.DataFrame, shortest_s: float = 4.0, margin_s: float = 1
 
 def _flown_stretches(table: pd.DataFrame) -> list[tuple[float, float]]:
     """Start and stop of every flight of a log by the detector of all importers, take-off and landing left out."""
-    height = {} if "position_z_m" not in table else {c.HEIGHT: -table["position_z_m"]}
+    height = {c.HEIGHT: -table["position_z_m"]} if "position_z_m" in table else {}
     flying, _ = airborne(table.assign(**height))
     return stretches_of(table[c.TIME].to_numpy(float), flying)
 
@@ -264,10 +250,7 @@ def flight_run(table: pd.DataFrame, start_s: float, stop_s: float) -> tuple[pd.D
     if any(f.kind == "stuck" for f in faults):
         run = run.drop(columns=c.BATTERY_VOLTAGE)
     gaps = report_gaps(run)
-    groups = {
-        "state estimate": [*c.POSITION, *c.VELOCITY, *c.QUATERNION],
-        "battery voltage": [c.BATTERY_VOLTAGE],
-    }
+    groups = {"state estimate": [*c.POSITION, *c.VELOCITY, *c.QUATERNION], "battery voltage": [c.BATTERY_VOLTAGE]}
     if c.ANGULAR_VELOCITY[0] not in run:  # roll and yaw then come with every sample
         groups["state estimate"] = [*c.POSITION, *c.VELOCITY]
     run, held = blank_held(run, groups)
@@ -304,24 +287,11 @@ def flights(
     for number, (start, stop) in enumerate(stretches):
         run, found = flight_run(table, start, stop)
         label = prefix if len(stretches) == 1 else f"{prefix}_{number + 1}"
-        flown = ImportFault(
-            "cut", c.TIME, f"flight from {start:.2f} to {stop:.2f} s of the log", "the rest left out", 0
-        )
+        kept = f"flight from {start:.2f} to {stop:.2f} s of the log"
+        flown = ImportFault("cut", c.TIME, kept, "the rest left out")
         runs[label] = run
         faults += [f.in_run(label) for f in (flown, *found)]
     return runs, faults
-
-
-TYPES |= {"q": "<i8", "Q": "<u8"}
-
-
-@dataclass(frozen=True)
-class _EventType:
-    """One kind of record in a log: its name and the names and numpy types of its variables."""
-
-    name: str
-    variables: tuple[str, ...]
-    dtype: np.dtype
 
 
 def _text(data: bytes, start: int, where: str) -> tuple[str, int]:
@@ -331,8 +301,8 @@ def _text(data: bytes, start: int, where: str) -> tuple[str, int]:
     return data[start:end].decode("latin-1"), end + 1
 
 
-def _event_types(data: bytes, where: str) -> tuple[dict[int, _EventType], int, int]:
-    """Event types by id, format version and the offset of the first event."""
+def _event_types(data: bytes, where: str) -> tuple[dict[int, tuple[str, np.dtype]], int, int]:
+    """Kinds of events by id (name, and layout with `__id` and `__clock` first), format version, offset of the first."""
     if len(data) < 9 or data[0] != _MAGIC:
         found = f"0x{data[0]:02X}" if data else "an empty file"
         raise InputError(f"{where}: expected a Crazyflie uSD log starting with 0xBC, found {found}")
@@ -354,7 +324,7 @@ def _event_types(data: bytes, where: str) -> tuple[dict[int, _EventType], int, i
                 if letter not in TYPES or not variable:
                     raise InputError(f"{where}: variable {label!r} has a type that is not known")
                 fields.append((variable, TYPES[letter]))
-            types[identifier] = _EventType(name, tuple(f for f, _ in fields[2:]), np.dtype(fields))
+            types[identifier] = name, np.dtype(fields)
     except struct.error:
         raise InputError(f"{where}: header is cut off after {offset} bytes") from None
     return types, version, offset
@@ -370,34 +340,30 @@ def decode_usd_log(data: bytes, where: str = "log") -> tuple[dict[str, pd.DataFr
     whole = crc32(data[:-_CHECKSUM]) == struct.unpack("<I", data[-_CHECKSUM:])[0]
     end = len(data) - _CHECKSUM * whole  # of a log that is cut off the last bytes are no checksum
     offsets: dict[int, list[int]] = {identifier: [] for identifier in types}
-    unknown, inside = None, None
+    unknown, inside = None, ""
     while offset + 2 <= end:
         identifier = data[offset] | data[offset + 1] << 8
-        kind = types.get(identifier)
-        if kind is None:
+        if identifier not in types:
             unknown = identifier
             break
-        if offset + kind.dtype.itemsize > end:
-            inside = kind
+        name, layout = types[identifier]
+        if offset + layout.itemsize > end:
+            inside = name
             break
         offsets[identifier].append(offset)
-        offset += kind.dtype.itemsize
-    faults = _faults_of_end(data, offset, whole, unknown, inside)
+        offset += layout.itemsize
     raw = np.frombuffer(data, np.uint8)
     scale = 1e-6 if version == 2 else 1e-3
     tables = {}
-    for identifier, kind in types.items():
+    for identifier, (name, layout) in types.items():
         starts = np.asarray(offsets[identifier], int)
-        rows = raw[starts[:, None] + np.arange(kind.dtype.itemsize)].copy().view(kind.dtype)[:, 0]
+        rows = raw[starts[:, None] + np.arange(layout.itemsize)].copy().view(layout)[:, 0]
         columns = {_TIME: rows["__clock"].astype(float) * scale}
-        columns |= {name: rows[name].astype(float) for name in kind.variables}
-        tables[kind.name] = pd.DataFrame(columns)
-    return tables, faults
+        tables[name] = pd.DataFrame(columns | {n: rows[n].astype(float) for n in layout.names[2:]})
+    return tables, _faults_of_end(data, offset, whole, unknown, inside)
 
 
-def _faults_of_end(
-    data: bytes, offset: int, whole: bool, unknown: int | None, inside: _EventType | None
-) -> list[ImportFault]:
+def _faults_of_end(data: bytes, offset: int, whole: bool, unknown: int | None, inside: str) -> list[ImportFault]:
     """What is wrong with a log whose events end at an offset: with an event that is not known, or inside one."""
     rest, faults = len(data) - offset, []
     checked = rest == _CHECKSUM  # exactly a checksum follows, right or wrong
@@ -410,8 +376,8 @@ def _faults_of_end(
         stored = struct.unpack("<I", data[-_CHECKSUM:])[0]
         found = f"CRC-32 is {crc32(data[:-_CHECKSUM]):08x}, file says {stored:08x}"
         faults.insert(0, ImportFault("checksum", "", found, "kept; bytes may be damaged", 1))
-    elif inside is not None or not (whole or unknown is not None):
-        found = f"the file ends inside an event ({inside.name})" if inside else "the file ends without its checksum"
+    elif inside or not (whole or unknown is not None):
+        found = f"the file ends inside an event ({inside})" if inside else "the file ends without its checksum"
         faults.append(ImportFault("cut_off", "", found, "what came before is kept; the log stopped before its end", 1))
     return faults
 

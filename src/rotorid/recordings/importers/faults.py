@@ -1,6 +1,7 @@
-"""Faults of a recording: what an importer finds wrong in a file, what it does about it, and the report of both.
+"""What the importers share: faults of a recording and the report of them, repairs, and the part of a log in the air.
 
-Repairs that every importer needs stand here: repeated clock values, held samples, the part of a log in the air.
+Each message has its own clock; a run is laid out on the times of the inertial sensor and each other value stands in the
+row nearest in time, so that nothing is interpolated.
 """
 
 from __future__ import annotations
@@ -8,13 +9,38 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from rotorid.recordings.columns import TIME
+from rotorid.errors import InputError
+from rotorid.recordings import columns as c
+from rotorid.recordings.run import stretches
 
+_SHORTEST_FLIGHT_S = 4.0
+_AFTER_TAKE_OFF_S = 1.0
+_BEFORE_LANDING_S = 0.5
+_LONGEST_PAUSE_S = 1.0
+"""A dip of the throttle shorter than this does not end a flight."""
+_DRIVEN = 0.05
+"""Mean throttle below which nothing flies."""
+_NEAR_WEIGHT = 0.85
+"""Share of the throttle of flight below which the rotors do not carry the weight."""
+_LIFTS = 0.95
+"""Share of the throttle of flight that a stretch begins and ends with: less is spool-up or a vehicle that settles."""
+_FALLING = 0.9
+"""Share of the usual specific force below which a vehicle falls: on the ground it stays at 1 g."""
+_NEAR_WEIGHT_ALONE = 0.7
+"""The same where no accelerometer distinguishes a fall from the ground."""
+_TURNS_RAD_S = 1.0
+"""Root mean square of slow body rates above which a vehicle whose rotors turn is in the air. A public log has one that
+rocks on the ground at 0.3 to 0.8 with rotors at two thirds of what flight takes."""
+_GROUND_M, _CLEAR_M = 0.05, 0.5
+"""Heights below which a vehicle is on the ground, and above which it is in the air."""
+_SMOOTHED_S = 1.0
+_SPEEDS = ("rotor_speed", "rotor_command")
 GOES_ON = 0.9
 """Share of the readings of others of its kind that a sensor has at least, if it neither stands still nor ends early."""
 _REVERSED = 0.02
@@ -33,7 +59,7 @@ class ImportFault:
     column: str
     found: str
     action: str
-    samples: int
+    samples: int = 0
     run: str = ""
 
     def in_run(self, run: str) -> ImportFault:
@@ -95,21 +121,13 @@ def read_report(folder: Path) -> dict:
 
 def drop_repeated_times(table: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
     """Rows whose time is not later than every row before are left out and reported."""
-    time = table[TIME].to_numpy(float)
+    time = table[c.TIME].to_numpy(float)
     latest = np.maximum.accumulate(np.where(np.isnan(time), -np.inf, time))
     keep = ~np.isnan(time) & (np.concatenate([[-np.inf], latest[:-1]]) < time)
-    lost = int((~keep).sum())
-    if not lost:
+    if keep.all():
         return table, []
-    first = float(time[np.flatnonzero(~keep)[0]])
-    fault = ImportFault(
-        "repeated_time",
-        TIME,
-        f"{lost} rows do not move the clock on (first at {first:.6g} s)",
-        "left out",
-        lost,
-    )
-    return table[keep].reset_index(drop=True), [fault]
+    found = f"{(~keep).sum()} rows do not move the clock on (first at {time[~keep][0]:.6g} s)"
+    return table[keep].reset_index(drop=True), fault_where(~keep, "repeated_time", c.TIME, found, "left out")
 
 
 def in_order(table: pd.DataFrame, time: str) -> tuple[pd.DataFrame, list[ImportFault]]:
@@ -129,7 +147,7 @@ def in_order(table: pd.DataFrame, time: str) -> tuple[pd.DataFrame, list[ImportF
     found = f"{int(back.sum())} rows come later than their time"
     sorted_ = table.sort_values(time, kind="stable", ignore_index=True)
     sorted_.attrs = table.attrs
-    return sorted_, [ImportFault("order", TIME, found, "sorted by their time", int(back.sum()))]
+    return sorted_, [ImportFault("order", c.TIME, found, "sorted by their time", int(back.sum()))]
 
 
 def join_rows(table: pd.DataFrame, time: str) -> pd.DataFrame:
@@ -162,17 +180,10 @@ def one_sense(
     own = values * np.where(signs == 0, 1.0, signs)
     largest = np.nanmax(np.abs(own), axis=0, initial=0.0, where=np.isfinite(own))
     against = own < -_REVERSED * largest
-    faults = [
-        ImportFault(
-            "reversed",
-            name,
-            f"against its usual sign in {lost.mean():.1%} of the samples",
-            "made empty cells",
-            int(lost.sum()),
-        )
-        for name, lost in zip(names, against.T, strict=True)
-        if lost.any()
-    ]
+    faults = []
+    for name, lost in zip(names, against.T, strict=True):
+        found = f"against its usual sign in {lost.mean():.1%} of the samples"
+        faults += fault_where(lost, "reversed", name, found, "made empty cells")
     return np.where(against, np.nan, np.abs(own) if sense is None else np.clip(own, 0, None)), faults
 
 
@@ -193,12 +204,10 @@ def further_motors(outputs: np.ndarray, motors: int) -> list[int]:
 
 def report_gaps(table: pd.DataFrame, factor: float = 3.0) -> list[ImportFault]:
     """A fault where the clock steps by more than `factor` times its median step; nothing is filled in."""
-    steps = np.diff(table[TIME].to_numpy(float))
+    steps = np.diff(table[c.TIME].to_numpy(float))
     long = steps > factor * np.median(steps)
-    if not long.any():
-        return []
-    found = f"{int(long.sum())} gaps longer than {factor:g} samples, the longest {steps.max():.3g} s"
-    return [ImportFault("gap", TIME, found, "left as a gap", int(long.sum()))]
+    found = f"{int(long.sum())} gaps longer than {factor:g} samples, the longest {steps.max(initial=0.0):.3g} s"
+    return fault_where(long, "gap", c.TIME, found, "left as a gap")
 
 
 def blank_held(
@@ -212,7 +221,7 @@ def blank_held(
     """
     table, faults = table.copy(), []
     for name, columns in groups.items():
-        columns = [c for c in columns if c in table.columns]
+        columns = [n for n in columns if n in table.columns]
         if not columns:
             continue
         values = table[columns].to_numpy(float)
@@ -221,22 +230,213 @@ def blank_held(
         if same.mean() <= share:
             continue
         table.loc[same, columns] = np.nan
-        rate = (~same).sum() / (table[TIME].iloc[-1] - table[TIME].iloc[0])
+        rate = (~same).sum() / (table[c.TIME].iloc[-1] - table[c.TIME].iloc[0])
         found = f"{name} repeats its last value in {same.mean():.0%} of the rows (new values at {rate:.3g} Hz)"
         faults.append(ImportFault("held", ", ".join(columns), found, "repeats made empty cells", int(same.sum())))
-    empty = table.drop(columns=TIME).isna().all(axis=1)
+    empty = table.drop(columns=c.TIME).isna().all(axis=1)
     return table[~empty].reset_index(drop=True), faults
 
 
 def true_stretches(mask: np.ndarray, time_s: np.ndarray, shortest_s: float) -> list[tuple[float, float]]:
     """Start and stop times of every stretch of True that lasts at least `shortest_s`."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(mask, int), [0]])))
-    pairs = zip(edges[::2], edges[1::2] - 1, strict=True)
-    return [(float(time_s[a]), float(time_s[b])) for a, b in pairs if time_s[b] - time_s[a] >= shortest_s]
+    ends = ((float(time_s[start]), float(time_s[stop - 1])) for start, stop in stretches(mask))
+    return [(start_s, stop_s) for start_s, stop_s in ends if stop_s - start_s >= shortest_s]
+
+
+def fault_where(mask: np.ndarray, kind: str, column: str, found: str, action: str) -> list[ImportFault]:
+    """A fault of the samples that a mask (n,) or (n, k) holds, for a row once; none where it holds none."""
+    rows = np.asarray(mask).reshape(len(mask), -1).any(axis=1)
+    return [ImportFault(kind, column, found, action, int(rows.sum()))] if rows.any() else []
 
 
 def cut(table: pd.DataFrame, start_s: float, stop_s: float) -> pd.DataFrame:
     """Rows from start to stop, the clock set to zero at the first of them."""
-    time = table[TIME]
+    time = table[c.TIME]
     part = table[(time >= start_s) & (time <= stop_s)].reset_index(drop=True)
-    return part.assign(**{TIME: part[TIME] - part[TIME].min()})
+    return part.assign(**{c.TIME: part[c.TIME] - part[c.TIME].min()})
+
+
+def on_grid(grid: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Values (n, k) put into the row of the grid nearest in time; NaN elsewhere (the last one wins a shared row).
+
+    Both times in one unit, as floats or whole numbers.
+    """
+    values = np.asarray(values, float).reshape(len(time), -1)
+    out = np.full((len(grid), values.shape[1]), np.nan)
+    inside = (time >= grid[0]) & (time <= grid[-1])
+    out[np.searchsorted((grid[1:] + grid[:-1]) / 2, time[inside])] = values[inside]
+    return out
+
+
+def increasing(time_s: np.ndarray) -> np.ndarray:
+    """Mask of the instants later than every one before, (n,)."""
+    latest = np.maximum.accumulate(time_s)
+    return np.concatenate([[True], time_s[1:] > latest[:-1]])
+
+
+def table_on(grid_s: np.ndarray, parts: Sequence[tuple[Sequence[str], np.ndarray, np.ndarray]]) -> pd.DataFrame:
+    """A table on a grid (n,), s, of parts: names, times (m,), s, and values (m, k); empty columns are left out."""
+    columns = {c.TIME: grid_s - grid_s[0]}
+    for names, time_s, values in parts:
+        columns.update(zip(names, on_grid(grid_s, time_s, values).T, strict=True))
+    return pd.DataFrame({k: v for k, v in columns.items() if k == c.TIME or np.isfinite(v).any()})
+
+
+def airborne(table: pd.DataFrame, stated: np.ndarray | None = None) -> tuple[np.ndarray, list[ImportFault]]:
+    """Rows of a table in contract columns in which the vehicle flies, (n,), and what of a stated flight is ground.
+
+    `stated` is what the log itself calls flight, (n,); None where it says nothing. It holds where no rotors are
+    recorded, or no accelerometer.
+    """
+    time_s = table[c.TIME].to_numpy(float)
+    flying = np.ones(len(table), bool) if stated is None else stated
+
+    def of(names) -> np.ndarray | None:
+        return table[list(names)].to_numpy(float) if set(names) <= set(table) else None
+
+    # What drives the rotors (n, k): throttles, else measured, else commanded speeds.
+    kinds = ([n for n in table if c.rotor_number(n) and n.startswith(k)] for k in ("throttle", *_SPEEDS))
+    drive = next((table[n].to_numpy(float) for n in kinds if n and table[n].notna().any().all()), None)
+    force = of(c.SPECIFIC_FORCE)
+    if drive is None or len(table) < 2 or not flying.any() or (force is None and stated is not None):
+        return flying, []
+    height = of([c.HEIGHT])
+    found = off_the_ground(
+        flying, drive, force, time_s, of(c.ANGULAR_VELOCITY), None if height is None else height[:, 0]
+    )
+    lost = int((flying & ~found).sum())
+    if stated is None or not lost:
+        return found, []
+    lasts = np.minimum(np.diff(time_s, append=time_s[-1]), _LONGEST_PAUSE_S)  # the clock stops between flights
+    seen = (
+        f"{lasts[flying & ~found].sum():.0f} s of {lasts[flying].sum():.0f} s that the log calls flight are on the "
+        f"ground (rotors below {_NEAR_WEIGHT:g} of those of flight, specific force of 1 g, no turning)"
+    )
+    return found, [ImportFault("on_ground", c.TIME, seen, "left out", lost)]
+
+
+def off_the_ground(
+    flying: np.ndarray,
+    drive: np.ndarray,
+    force: np.ndarray | None,
+    time_s: np.ndarray,
+    rates: np.ndarray | None = None,
+    height: np.ndarray | None = None,
+) -> np.ndarray:
+    """Rows of a mask (n,) of possible flight in which thrust carries the vehicle, or it falls, turns, or is up.
+
+    On the ground the rotors turn below what flight takes while the specific force stays at 1 g and nothing turns. What
+    flight takes is the median of the rows above half of what is mostly given. A log of the ground alone shows no flight
+    and is not recognised. A stretch begins and ends with rotors that lift, unless the log begins or ends in it.
+
+    `drive` holds throttles or speeds of the rotors (n, k), NaN where there is no value; `force`, m/s², and `rates`,
+    rad/s, specific force and body rates (n, 3), None where they are not recorded; `time_s` the clock (n,); `height`
+    what a range finder or a motion capture says of the height above ground (n,), m.
+    """
+    step_s = max(float(np.median(np.diff(time_s))), 1e-4)
+    rows = max(int(_SMOOTHED_S / step_s), 1)
+
+    def smooth(values: np.ndarray) -> np.ndarray:
+        known = pd.Series(values).interpolate(limit_direction="both")
+        return known.rolling(rows, center=True, min_periods=1).median().to_numpy()
+
+    throttle = smooth(pd.DataFrame(drive).mean(axis=1).to_numpy())
+    given = throttle[flying & np.isfinite(throttle)]
+    full = float(np.quantile(given, 0.9)) if len(given) else 0.0
+    if full <= _DRIVEN:
+        return flying
+    of_flight = np.median(given[given > 0.5 * full])
+    turning = np.zeros(len(throttle), bool) if rates is None else _turning(rates, step_s) > _TURNS_RAD_S
+    up = np.zeros(len(throttle), bool)
+    if force is not None and np.isfinite(force).any():
+        pull = smooth(np.linalg.norm(force, axis=1))
+        flown = (throttle >= _NEAR_WEIGHT * of_flight) | (pull < _FALLING * np.nanmedian(pull[flying]))
+    else:
+        flown = throttle >= _NEAR_WEIGHT_ALONE * of_flight
+    if height is not None and np.isfinite(height).any():
+        above = smooth(height)
+        up = above > _CLEAR_M
+        flown &= ~(above < _GROUND_M)
+    flown |= (turning | up) & (throttle >= 0.5 * of_flight)
+    flown = flying & without_pauses(flown, time_s)
+    lifts, out = (throttle >= _LIFTS * of_flight) | turning | up, np.zeros(len(flying), bool)
+    for start, stop in stretches(flown):
+        lifting = np.flatnonzero(lifts[start:stop])
+        if len(lifting):
+            first = start if start == 0 else start + lifting[0]
+            last = stop if stop == len(flown) else start + lifting[-1] + 1
+            out[first:last] = True
+    return out
+
+
+def _turning(rates: np.ndarray, step_s: float) -> np.ndarray:
+    """Root mean square over `_SMOOTHED_S` of body rates (n, 3) that are averaged over a tenth of it, rad/s, (n,)."""
+    known = pd.DataFrame(rates).interpolate(limit_direction="both")
+    few, many = max(int(0.1 * _SMOOTHED_S / step_s), 1), max(int(_SMOOTHED_S / step_s), 1)
+    slow = known.rolling(few, center=True, min_periods=1).mean()
+    return np.sqrt((slow**2).sum(axis=1).rolling(many, center=True, min_periods=1).mean()).to_numpy()
+
+
+def without_pauses(up: np.ndarray, time_s: np.ndarray) -> np.ndarray:
+    """The mask with pauses inside it that are shorter than `_LONGEST_PAUSE_S` filled."""
+    up = up.copy()
+    for (_, stop), (start, _) in pairwise(stretches(up)):
+        if time_s[start] - time_s[stop - 1] < _LONGEST_PAUSE_S:
+            up[stop:start] = True
+    return up
+
+
+def flights(
+    table: pd.DataFrame, flying: np.ndarray, name: str, where: object, jumps: np.ndarray | None = None
+) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
+    """Every flight of a table by name, take-off and landing left out, its clock at zero; InputError where none is.
+
+    Where the table begins or ends in the air nothing is left out there. No run holds a row of `jumps` (n,), however
+    few these are.
+    """
+    time_s = table[c.TIME].to_numpy(float)
+    flying = without_pauses(flying, time_s)
+    if jumps is not None:
+        flying &= ~jumps
+    found = _long_enough(flying, time_s)
+    if not found:
+        longest = max((b - a for a, b in true_stretches(flying, time_s, 0.0)), default=0.0)
+        throttles = [n for n in table if n.startswith("throttle_") and c.rotor_number(n)]
+        why = f"the vehicle never flies in this log of {time_s[-1]:.0f} s"
+        if longest > 0:
+            why = (
+                f"the longest stretch in the air is {longest:.1f} s, at least {_SHORTEST_FLIGHT_S:g} s beyond take-off "
+                "and landing are needed"
+            )
+        elif throttles and not (table[throttles] > _DRIVEN).any().any():
+            why += ": no motor is ever driven"
+        raise InputError(f"{where}: {why}")
+    runs, cuts = {}, []
+    for number, (start, stop) in enumerate(found, 1):
+        run = name if len(found) == 1 else f"{name}_{number}"
+        first, last = _inside(start, stop, time_s)
+        part = cut(table, first, last)
+        if len(part) < 2:
+            continue
+        runs[run] = part.dropna(axis=1, how="all")
+        seen = f"in the air from {start:.2f} to {stop:.2f} s of {time_s[-1]:.0f} s"
+        cuts.append(ImportFault("cut", c.TIME, seen, f"{first:.2f} to {last:.2f} s kept", len(table) - len(part), run))
+    if not runs:
+        raise InputError(f"{where}: next to no samples of its {len(found)} flights are there")
+    return runs, cuts
+
+
+def stretches_of(time_s: np.ndarray, flying: np.ndarray) -> list[tuple[float, float]]:
+    """Start and stop, s, of every flight of a mask (n,) that is long enough, without take-off and landing."""
+    return [_inside(start, stop, time_s) for start, stop in _long_enough(without_pauses(flying, time_s), time_s)]
+
+
+def _long_enough(flying: np.ndarray, time_s: np.ndarray) -> list[tuple[float, float]]:
+    every = true_stretches(flying, time_s, _SHORTEST_FLIGHT_S)
+    return [s for s in every if np.diff(_inside(*s, time_s))[0] >= _SHORTEST_FLIGHT_S]
+
+
+def _inside(start_s: float, stop_s: float, time_s: np.ndarray) -> tuple[float, float]:
+    """A stretch in the air without take-off and landing, as far as these are in the table."""
+    first = start_s if start_s <= time_s[0] else start_s + _AFTER_TAKE_OFF_S
+    return first, stop_s if stop_s >= time_s[-1] else stop_s - _BEFORE_LANDING_S

@@ -1,43 +1,75 @@
-"""Any log that rotorid knows, recognised by its first bytes, as flights in contract columns.
+"""Logs that rotorid knows, recognised by their first bytes, as flights in contract columns and as a recording set.
 
-Other people's readers at work: with a limit on their memory, and without what they print.
+Other people's readers are at work: with a limit on their memory where the system can (Linux), so that a packed log made
+to unpack to anything ends as one sentence and not with the machine, and without what they print, a line for each byte
+that they stumble over. What is wrong with a log is said once, by the importer.
 
-Packed logs can be made to unpack to anything. Where the system can (Linux), the process gets a limit while a log is
-read, so that a bomb ends as one sentence and not with the machine. What is wrong with a log is said once, by the
-importer; the readers print a line for each byte that they stumble over.
+New runs into a set that is there change nothing of it, and half of them is not taken for all.
+
+The unit of recorded rotor speeds is checked by physics: in hover the rotors carry the weight. Logs name a unit and
+write another (Gazebo puts rad/s into PX4's `esc_rpm`). The speeds at which rotors hover follow from the mass within a
+third for vehicles from 27 g to 2 kg, or from a known thrust coefficient, while units are 6 to 60 apart.
 """
 
 from __future__ import annotations
 
 import io
+import json
 import os
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from collections.abc import Mapping as Names
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from rotorid.errors import InputError
-from rotorid.io.text.files import LARGEST_FILE, LEAST_MEMORY, MEMORY_TIMES_FILE, check_file
-from rotorid.io.text.wording import printable
-from rotorid.recordings import columns as c
-from rotorid.recordings.importers import (
-    ardupilot,
-    betaflight,
-    crazyflie,
-    in_the_air,
-    neurobem,
-    px4_ulog,
-    rcbenchmark,
-    ros,
+from rotorid.io.text.files import (
+    LARGEST_FILE,
+    LARGEST_METADATA,
+    LEAST_MEMORY,
+    MEMORY_TIMES_FILE,
+    MOST_RUNS,
+    check_file,
+    parse_yaml,
+    read_text,
 )
-from rotorid.recordings.importers.faults import ImportFault
-from rotorid.recordings.importers.known import Known, px4_vehicle
-from rotorid.recordings.importers.mapping import ELECTRICAL, Mapping, read_by_mapping
+from rotorid.io.text.wording import printable
+from rotorid.io.text.writing import staging, take_name, take_place
+from rotorid.recordings import Run, read_vehicle, templates
+from rotorid.recordings import columns as c
+from rotorid.recordings.files import (
+    VEHICLE,
+    check_manifest,
+    listed_runs,
+    run_files,
+    run_name,
+    sha256,
+    usable_runs,
+    vehicle_of,
+    write_manifest,
+)
+from rotorid.recordings.importers import ardupilot, betaflight, crazyflie, neurobem, px4_ulog, rcbenchmark, ros
+from rotorid.recordings.importers.faults import FILE_NAME as REPORT
+from rotorid.recordings.importers.faults import ImportFault, ImportReport, airborne, flights
+from rotorid.recordings.importers.known import Known, propose, px4_vehicle, thrust_coefficient
+from rotorid.recordings.importers.mapping import ELECTRICAL, UNITS, Mapping, read_by_mapping
+from rotorid.recordings.importers.rcbenchmark import signed_by_spin
+from rotorid.recordings.tables import check_table, parquet_is_here, write_table
+from rotorid.recordings.vehicle import Vehicle
 
+_USUAL_COEFFICIENT = 1.7e-5
+"""C_F / (mass of the vehicle a rotor)^(4/3), N s² kg^(-4/3): thrust grows with the fourth power of the size, mass with
+its third. The templates (Crazyflie to x500) have 1.4e-5 to 2.1e-5."""
+_IMPOSSIBLE = 3.5
+"""Speeds of hover so many times off, or more, are not in the unit that is stated."""
+_POSSIBLE = 2.2
+"""Speeds of hover within this factor are."""
 _GZIP = b"\x1f\x8b"
 _BY_FIRST_BYTES = (
     (b"H Product:Blackbox", "betaflight"),
@@ -49,7 +81,7 @@ _BY_FIRST_BYTES = (
 )
 _RCBENCHMARK = re.compile(r"ESC signal ?[(,](.*[,;])?\s*\"?Motor (Electrical|Optical) Speed ?[(,\r\n]", re.DOTALL)
 """Headings of RCbenchmark's stands of one rotor; those of other stands are read by a mapping."""
-TEMPLATES = {"px4": "x500", "betaflight": "five-inch", "crazyflie": "crazyflie-2.1", "neurobem": "neurobem"}
+_TEMPLATES = {"px4": "x500", "betaflight": "five-inch", "crazyflie": "crazyflie-2.1", "neurobem": "neurobem"}
 """Template vehicle that supplies what a log of an autopilot or format does not say."""
 
 
@@ -72,7 +104,7 @@ def is_bag(path: Path) -> bool:
     return (path / "metadata.yaml").is_file() and not (path / "vehicle.yaml").is_file()
 
 
-def files_of(path: Path) -> dict[str, Path]:
+def _files_of(path: Path) -> dict[str, Path]:
     """The files of a log by name: itself, or all that lie in the folder of a bag."""
     if not path.is_dir():
         return {path.name: path}
@@ -141,7 +173,9 @@ def _read(path: Path, kind: str, mapping: Mapping | None) -> _Imported:
     if kind == "px4":
         return _px4(path)
     if kind == "crazyflie" and mapping is None:
-        return _crazyflie(path)
+        runs, faults = crazyflie.flights(path)
+        axes = "body forward-left-up and world z up, turned by half a turn about x into FRD and NED"
+        return _Imported(kind, runs, tuple(faults), axes, Known("crazyflie"), speed_unit="rpm")
     if kind == "betaflight":
         runs, faults = betaflight.read_betaflight(path)
         axes = "body forward-left-up, turned by half a turn about x into FRD"
@@ -162,20 +196,13 @@ def _read(path: Path, kind: str, mapping: Mapping | None) -> _Imported:
         axes = "thrust along -z of the body"
         return _Imported(kind, {_stem(path): table}, tuple(faults), axes, kind="stand")
     table, faults, axes = read_by_mapping(path, mapping)
-    runs, cuts = _in_the_air(table, _stem(path), path)
+    stand, runs, cuts = bool(set(table) & {*c.FORCE, *c.MOMENT}), {_stem(path): table}, []
+    if not stand and not (flying := airborne(table)[0]).all():
+        runs, cuts = flights(table, flying, _stem(path), path)
     speeds = None if mapping is None else mapping.channels.get("rotor_speed") or mapping.channels.get("rotor_command")
     unit = (speeds.unit if speeds else "") or "rad/s"
     unit = "rpm" if unit in ELECTRICAL else unit  # they are turns of the rotor by now
-    stand = any({*c.FORCE, *c.MOMENT} & set(run) for run in runs.values())
     return _Imported(kind, runs, (*faults, *cuts), axes, kind="stand" if stand else "flight", speed_unit=unit)
-
-
-def _in_the_air(table: pd.DataFrame, name: str, path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
-    """The flights of a table in contract columns; the table as it is where all of it is in the air, or of a stand."""
-    if set(table) & {*c.FORCE, *c.MOMENT}:
-        return {name: table}, []
-    flying, _ = in_the_air.airborne(table)
-    return ({name: table}, []) if flying.all() else in_the_air.flights(table, flying, name, path)
 
 
 def _stem(path: Path) -> str:
@@ -186,19 +213,13 @@ def _px4(path: Path) -> _Imported:
     log = px4_ulog.open_log(path)
     try:
         rotors = px4_ulog.rotor_count(log)
-        converted = px4_ulog.convert(log, rotors)
+        table, found, flying, jumps = px4_ulog.convert(log, rotors)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     known, faults = px4_vehicle(px4_ulog.in_flight(log), rotors)
-    runs, cuts = in_the_air.flights(converted.table, converted.flying, path.stem, path, converted.jumps)
+    runs, cuts = flights(table, flying, path.stem, path, jumps)
     axes = "PX4's: body forward-right-down, world north-east-down, as the contract's"
-    return _Imported("px4", runs, (*converted.faults, *faults, *cuts), axes, known, speed_unit="rpm")
-
-
-def _crazyflie(path: Path) -> _Imported:
-    runs, faults = crazyflie.flights(path)
-    axes = "body forward-left-up and world z up, turned by half a turn about x into FRD and NED"
-    return _Imported("crazyflie", runs, tuple(faults), axes, Known("crazyflie"), speed_unit="rpm")
+    return _Imported("px4", runs, (*found, *faults, *cuts), axes, known, speed_unit="rpm")
 
 
 @contextmanager
@@ -253,3 +274,272 @@ def _taken_bytes() -> int | None:
     except OSError:
         return None
     return next((int(line.split()[1]) * 1024 for line in lines if line.startswith("VmData:")), None)
+
+
+def usual_coefficient(mass_kg: float, rotors: int) -> float:
+    """C_F of a multirotor of usual propellers, N s²."""
+    return _USUAL_COEFFICIENT * (mass_kg / rotors) ** (4 / 3)
+
+
+def in_unit_of_weight(
+    runs: Names[str, pd.DataFrame],
+    stated: Names[str, str],
+    mass_kg: float,
+    rotors: int,
+    coefficient_n_s2: float | None = None,
+) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
+    """Flights whose rotor speeds are in the unit that carries the weight, and what was changed.
+
+    `runs` are in contract columns, rotor speeds by the unit that the log states: `stated` has it for each run (`rad/s`,
+    `rpm` or `hz`). The mass is as flown; C_F is that of usual propellers where it is not known.
+    """
+    out, faults = dict(runs), []
+    for written in dict.fromkeys(stated[run] for run in runs):
+        mine = [run for run in runs if stated[run] == written]
+        for kind in ("rotor_speed", "rotor_command"):
+            names = list(c.rotor_columns(kind, rotors))
+            tables = [out[run] for run in mine]
+            unit, off = carrying_unit(tables, kind, written, mass_kg, rotors, coefficient_n_s2)
+            if unit == written:
+                if not 1 / _IMPOSSIBLE < off < _IMPOSSIBLE and np.isfinite(off):
+                    found = (
+                        f"in {written}, as stated, the rotors hover at {off:.2g} times the speed that carries "
+                        f"{mass_kg:.3g} kg, which no unit explains: electrical turns (divide by half of the motor's "
+                        "poles), or another vehicle"
+                    )
+                    faults.append(ImportFault("unit", kind, found, "kept as recorded", sum(len(t) for t in tables)))
+                continue
+            factor = UNITS["rotor"][unit] / UNITS["rotor"][written]
+            for run in mine:
+                if set(names) <= set(out[run].columns):
+                    out[run] = out[run].assign(**{name: out[run][name] * factor for name in names})
+            found = (
+                f"in {written}, as the log states, the rotors hover at {off:.2g} times the speed that carries "
+                f"{mass_kg:.3g} kg, in {unit} at {off * factor:.2g} times"
+            )
+            faults.append(ImportFault("unit", kind, found, f"taken as {unit}", sum(len(t) for t in tables)))
+    return out, faults
+
+
+def carrying_unit(
+    tables: Sequence[pd.DataFrame],
+    kind: str,
+    stated: str,
+    mass_kg: float,
+    rotors: int,
+    coefficient_n_s2: float | None = None,
+) -> tuple[str, float]:
+    """The unit of speeds that carries the weight, and the speed of hover in the stated one over the one expected.
+
+    The stated one where its speeds are possible, or no other's are.
+    """
+    flown = thrust_coefficient(tables, mass_kg, rotors, kind=kind)
+    if flown is None:
+        return stated, np.nan
+    expected = coefficient_n_s2 or usual_coefficient(mass_kg, rotors)
+    off = float(np.sqrt(expected / flown))
+    if 1 / _IMPOSSIBLE < off < _IMPOSSIBLE:
+        return stated, off
+    others = {u: abs(np.log(off * f / UNITS["rotor"][stated])) for u, f in UNITS["rotor"].items() if u != stated}
+    best = min(others, key=others.get)
+    return (best, off) if others[best] < np.log(_POSSIBLE) else (stated, off)
+
+
+@dataclass(frozen=True)
+class SetOfLogs:
+    """What logs of one vehicle hold, before it is written anywhere."""
+
+    name: str
+    runs: Names[str, pd.DataFrame]
+    """To the name of a run its table in contract columns."""
+    vehicle_text: str
+    """The `vehicle.yaml`, comments and all."""
+    remarks: tuple[str, ...] = ()
+    """One sentence for each value that is proposed, not known."""
+    faults: tuple[ImportFault, ...] = ()
+    """What was found in the logs."""
+    axes: str = ""
+    files: Names[str, str] = field(default_factory=dict)
+    """To the name of a log its SHA-256."""
+    kept_vehicle: bool = False
+    """Whether the vehicle's text is that of a file which stays as it is."""
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """The faults in words, each once."""
+        return tuple(fault.sentence for fault in self.faults)
+
+    def write(self, folder: Path, as_csv: bool = False) -> None:
+        """Write `vehicle.yaml` (unless it was there and is kept), a file a run, a report and the list of the runs.
+
+        All of it or nothing: it is written aside and takes its name in one step. A set that is there already gets the
+        new runs next to its own; until all are there its list says that it is not whole. Runs are Parquet files; plain
+        CSV where wished, and .csv.gz where pyarrow is not installed.
+
+        InputError where something that is there already would change, OSError where the disk is full.
+        """
+        files = dict(self.files)
+        report = ImportReport(
+            folder.name, True, ", ".join(files), "", "", "", files, self.axes, self.faults, self.remarks
+        )
+        if folder.is_dir():
+            with staging(folder / "import") as part:
+                _add_to_set(self._write_files(part, as_csv), report, folder)
+        else:
+            with staging(folder) as part:
+                files = self._write_files(part, as_csv)
+                write_manifest(part, [path for path in files if path.name != VEHICLE])
+                report.write(part)
+                take_name(part, folder)
+
+    def _write_files(self, folder: Path, as_csv: bool) -> list[Path]:
+        """Write the vehicle, unless it is kept, and the runs; returns their files."""
+        suffix = ".csv" if as_csv else ".parquet" if parquet_is_here() else ".csv.gz"
+        paths = []
+        if not self.kept_vehicle:
+            paths.append(folder / VEHICLE)
+            paths[-1].write_text(self.vehicle_text, encoding="utf-8")
+        for name, table in self.runs.items():
+            paths.append(folder / f"{name}{suffix}")
+            write_table(table, paths[-1])
+        return paths
+
+
+def set_of_logs(
+    logs: Sequence[Path],
+    name: str,
+    mass_kg: float | None = None,
+    like: str | None = None,
+    vehicle_file: Path | None = None,
+    mapping: Mapping | None = None,
+    there: Path | None = None,
+) -> SetOfLogs:
+    """The flights in `logs` (or runs of a stand), all of one vehicle, and what is known or proposed of it.
+
+    `vehicle_file` is taken as it is, in place of a proposal. So is `there`, a `vehicle.yaml` that may be there already,
+    where neither the mass as flown nor the template vehicle for what the logs do not say (`like`) is given. `mapping`
+    says what the columns of a CSV or Parquet file are.
+
+    InputError where a log cannot be read or holds no flight, the logs do not belong together, nothing says what vehicle
+    it is, or `there` exists and would change.
+    """
+    if len(logs) > MOST_RUNS:
+        raise InputError(f"{len(logs)} logs were given, expected at most {MOST_RUNS}; make several sets of them")
+    found = [read_log(path, mapping) for path in logs]
+    kinds = {f.kind for f in found}
+    if len(kinds) > 1:
+        raise InputError(f"the logs are of different kinds ({', '.join(sorted(kinds))}); import each kind by itself")
+    runs: dict[str, pd.DataFrame] = {}
+    for path, imported in zip(logs, found, strict=True):
+        for run, table in imported.runs.items():
+            if run in runs:
+                raise InputError(f"{path}: another log has a run called {run}, too; rename one of the files")
+            runs[run] = table
+    readers = (partial(lambda n, t: Run(n, check_table(t, f"run {n}")), run, table) for run, table in runs.items())
+    usable, left_out = usable_runs(readers, logs[0].name)
+    runs = {run.name: run.table for run in usable}
+    faults = [fault for imported in found for fault in imported.faults]
+    units = {run: imported.speed_unit for imported in found for run in imported.runs}
+    remarks: tuple[str, ...] = ()
+    kept = False
+    if vehicle_file is not None:
+        vehicle = read_vehicle(vehicle_file)
+        text = vehicle_file.read_text(encoding="utf-8")
+    elif there is not None and there.is_file() and mass_kg is None and like is None:
+        vehicle = read_vehicle(there)
+        text, kept = there.read_text(encoding="utf-8"), True
+    else:
+        if kinds != {"flight"}:
+            raise InputError(f"{logs[0]}: a log of a {kinds.pop()} needs --vehicle vehicle.yaml")
+        template = like or _TEMPLATES.get(found[0].known.autopilot) or _TEMPLATES.get(found[0].format)
+        if template is None:
+            raise InputError(
+                f"{logs[0]}: nothing says what vehicle this is; give --vehicle vehicle.yaml, or --like with one of "
+                f"{', '.join(templates.names())} and --mass-kg"
+            )
+        vehicle = templates.read(template)
+        mass = mass_kg or vehicle.mass_kg
+        rotors = len(found[0].known.rotors or found[0].known.directions or vehicle.rotors)
+        runs, changed = in_unit_of_weight(runs, units, mass, rotors)
+        faults += changed
+        text, remarks = propose(name, list(runs.values()), found[0].known, vehicle, template, mass_kg)
+        if there is not None and there.is_file() and there.read_text(encoding="utf-8") != text:
+            raise InputError(f"{there} is there already and would change; move it away, or leave --mass-kg and --like")
+    stated = vehicle_file is not None or kept
+    proposed = "the vehicle proposed"
+    _check_rotors(runs, vehicle if stated else vehicle_of(parse_yaml(text, proposed), proposed), logs[0])
+    if kinds == {"flight"} and stated:
+        known = float(np.mean(vehicle.thrust_coefficients_n_s2()))
+        runs, changed = in_unit_of_weight(runs, units, vehicle.mass_kg, vehicle.rotor_count, known)
+        faults += changed
+    unsigned = all(f.format == "rcbenchmark" for f in found) or (mapping is not None and "torque" in mapping.channels)
+    if kinds == {"stand"} and unsigned:
+        runs, changed = signed_by_spin(runs, vehicle)
+        faults += changed
+    return SetOfLogs(
+        name,
+        runs,
+        text,
+        (*remarks, *left_out),
+        tuple(dict.fromkeys(faults)),
+        found[0].axes,
+        {name: sha256(file) for path in logs for name, file in _files_of(path).items()},
+        kept,
+    )
+
+
+def _check_rotors(runs: Names[str, pd.DataFrame], vehicle: Vehicle, log: Path) -> None:
+    """InputError where a log drives more rotors than the vehicle has: without them its thrust would be short."""
+    numbers = [found[1] for table in runs.values() for name in table if (found := c.rotor_number(name))]
+    if vehicle.kind != "bench" and max(numbers, default=0) > vehicle.rotor_count:
+        raise InputError(
+            f"{log}: the log drives {max(numbers)} rotors, the vehicle has {vehicle.rotor_count}; "
+            f"give --vehicle with a vehicle.yaml of {max(numbers)} rotors"
+        )
+
+
+def _add_to_set(staged: Sequence[Path], report: ImportReport, folder: Path) -> None:
+    """Move staged files (a vehicle, runs) into the set `folder`.
+
+    The set's list of runs is there before the first new run and names them after the last. Whoever is killed between
+    the two leaves a set that readers refuse, and that the same import completes.
+
+    InputError where a file that is there would change, a run would be there twice, or the set is not whole as it is.
+    """
+    names = {path.name for path in staged}
+    there = run_files(folder)
+    for path in staged:
+        place, name = folder / path.name, run_name(path)
+        if place.exists() and sha256(place) != sha256(path):
+            raise InputError(f"{place} is there already and would change; move it away, or choose another folder")
+        same = next((p for p in there if name and run_name(p) == name and p.name != path.name), None)
+        if same:
+            raise InputError(f"{same} is there already, and {path.name} would be the same run again; move it away")
+    check_manifest(folder, there, ignored=names)
+    runs = {path.name for path in there} | {name for name in names if run_name(Path(name))}
+    if len(runs) > MOST_RUNS:
+        raise InputError(
+            f"{folder}: would have {len(runs)} runs, expected at most {MOST_RUNS}; make several sets of them"
+        )
+    report = _after(report, folder)
+    if listed_runs(folder) is None:
+        write_manifest(folder, there)
+    for path in staged:
+        if not (folder / path.name).exists():
+            take_place(path, folder / path.name)
+    report.write(staged[0].parent)
+    take_place(staged[0].parent / REPORT, folder / REPORT)
+    write_manifest(folder, [folder / name for name in runs])
+
+
+def _after(report: ImportReport, folder: Path) -> ImportReport:
+    """The report together with the set's own, where it has one."""
+    path = folder / REPORT
+    if not path.exists():
+        return report
+    try:
+        return report.after(json.loads(read_text(path, LARGEST_METADATA)))
+    except (ValueError, KeyError, TypeError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{path}: is no report of an import; move it away") from None

@@ -24,12 +24,8 @@ A value that is `?` is a question left open: nothing is imported until it is ans
 `rotorid.recordings.importers.guessing` proposes such a mapping from the names of the columns and from what stands in
 them.
 
-Turning z-up laboratory frames into the contract's north-east-down and forward-right-down.
-
-Most laboratories log body axes forward-left-up (FLU) and a world with z up (north-west-up or
-east-north-up). Turning both by half a turn about the x axis gives forward-right-down (FRD) and a world with
-z down; x stays x, y and z change sign. A quaternion between the two then keeps w and x and changes the sign
-of y and z.
+Most laboratories log body axes forward-left-up (FLU) and a world with z up. Half a turn about the x axis gives
+forward-right-down (FRD) and a world with z down: y and z change sign, of a quaternion as well.
 """
 
 from __future__ import annotations
@@ -41,17 +37,80 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
 from rotorid.errors import InputError
+from rotorid.io.models import KnownKeys
 from rotorid.io.text.files import read_yaml
 from rotorid.io.text.wording import explain
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.faults import ImportFault, drop_repeated_times, in_order, join_rows, report_gaps
-from rotorid.recordings.importers.units import UNITS, converted
 from rotorid.recordings.tables import clock_jump, numbers, read_cells, read_parquet_cells
 
+G = 9.80665
+"""Standard gravity, m/s²."""
+RPM = np.pi / 30
+"""One turn a minute, rad/s."""
+PULSE_US = (1000.0, 2000.0)
+"""Pulse widths of no and full throttle where nothing states them."""
+_POUND_N, _OUNCE_N = 4.4482216152605, 0.27801385095378
+_INCH_M, _FOOT_M = 0.0254, 0.3048
+
+UNITS: dict[str, dict[str, float]] = {
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
+    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "ft": _FOOT_M},
+    "velocity": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
+    "rate": {"rad/s": 1.0, "deg/s": np.pi / 180, "mrad/s": 1e-3},
+    "angle": {"rad": 1.0, "deg": np.pi / 180, "mrad": 1e-3, "cdeg": np.pi / 18000},
+    "acceleration": {"m/s2": 1.0, "g": G, "mg": G / 1000, "cm/s2": 1e-2, "mm/s2": 1e-3, "ft/s2": _FOOT_M},
+    "rotor": {"rad/s": 1.0, "rpm": RPM, "hz": 2 * np.pi},
+    "turns": {
+        "rad/s": 1.0, "rpm": RPM, "hz": 2 * np.pi, "krpm": 1000 * RPM, "erpm": RPM, "100erpm": 100 * np.pi / 30
+    },
+    "share": {"1": 1.0, "%": 0.01, "us": 1.0, "raw": 1.0},
+    "voltage": {"V": 1.0, "mV": 1e-3, "cV": 1e-2, "dV": 0.1},
+    "current": {"A": 1.0, "mA": 1e-3, "cA": 1e-2, "dA": 0.1},
+    "temperature": {"degC": 1.0, "degF": 5 / 9, "K": 1.0},
+    "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3, "kgf": G, "gf": 9.80665e-3, "lbf": _POUND_N, "ozf": _OUNCE_N},
+    "torque": {
+        "N.m": 1.0, "N.cm": 1e-2, "N.mm": 1e-3, "mN.m": 1e-3, "kgf.m": G, "kgf.cm": G / 100, "gf.cm": G / 1e5,
+        "lbf.ft": _POUND_N * _FOOT_M, "lbf.in": _POUND_N * _INCH_M, "ozf.in": _OUNCE_N * _INCH_M,
+    },
+}  # fmt: skip
+"""To each kind of quantity its units, and the factor to the contract's (`turns`: electrical ones per pair of poles)."""
+_ZEROS = {"degF": -32 * 5 / 9, "K": -273.15}
+"""What a reading of 0 is in the contract's unit, where that is not 0."""
+SPELLINGS: dict[str, dict[str, str]] = {
+    "time": {"s": "sec secs second seconds", "ms": "msec millis millisecond milliseconds",
+             "us": "usec micros microsecond microseconds", "ns": "nsec nanos nanosecond nanoseconds"},
+    "length": {"m": "meter meters metre metres", "cm": "centimeter centimeters", "mm": "millimeter millimeters",
+               "ft": "foot feet"},
+    "velocity": {"m/s": "ms mps ms1", "cm/s": "cms cmps", "mm/s": "mms mmps"},
+    "rate": {"rad/s": "rads radps rads1", "deg/s": "degs dps degps degrees/s degree/s degs1", "mrad/s": "mrads mradps"},
+    "angle": {"rad": "radian radians", "deg": "degree degrees", "mrad": "", "cdeg": "centideg centidegrees"},
+    "acceleration": {"m/s2": "ms2 mps2 m/s/s m/ss", "g": "gs g0 gn", "mg": "milligee",
+                     "cm/s2": "cms2 cm/s/s gal", "mm/s2": "mms2 mm/s/s", "ft/s2": "fts2 ft/s/s"},
+    "rotor": {"rad/s": "rads radps rads1", "rpm": "r/min rev/min revs/min 1/min u/min min1 revolutions/min rpms",
+              "hz": "1/s r/s rev/s revs/s rps s1 revolutions/s"},
+    "turns": {"rad/s": "rads radps rads1", "rpm": "r/min rev/min revs/min 1/min u/min min1 rpms",
+              "krpm": "1000rpm rpmx1000 kr/min krev/min",
+              "hz": "1/s r/s rev/s revs/s rps s1", "erpm": "", "100erpm": "erpm/100"},
+    "share": {"1": "ratio fraction norm normalized normalised 01", "%": "percent pct prc", "us": "usec", "raw": ""},
+    "voltage": {"V": "volt volts", "mV": "millivolt millivolts", "cV": "", "dV": ""},
+    "current": {"A": "amp amps ampere amperes", "mA": "milliamp milliamps", "cA": "", "dA": ""},
+    "temperature": {"degC": "c celsius", "degF": "f fahrenheit", "K": "kelvin degk"},
+    "force": {"N": "newton newtons", "mN": "millinewton", "kN": "kilonewton", "kgf": "kg kp kgs kilogram kilograms",
+              "gf": "g gr gram grams gramforce p pond", "lbf": "lb lbs pound pounds", "ozf": "oz ounce ounces"},
+    "torque": {"N.m": "newtonmeter newtonmeters newtonmetre", "N.cm": "", "N.mm": "", "mN.m": "", "kgf.m": "kgm kpm",
+               "kgf.cm": "kgcm", "gf.cm": "gcm", "lbf.ft": "lbft ftlb ftlbf ftlbs lbsft", "lbf.in": "lbin inlb inlbf",
+               "ozf.in": "ozin inoz inozf"},
+}  # fmt: skip
+"""Other ways to write a unit, in small letters without blanks and signs of multiplication."""
+_SIGNS = str.maketrans(
+    {"µ": "u", "μ": "u", "²": "2", "⁻": "", "¹": "1", "°": "deg", "º": "deg", "Â": "", "\ufffd": "u"}
+)
+"""Signs of units as letters; the last two are what a wrong encoding makes of `µ`."""
 _HALF_TURN_ABOUT_X = np.array([1.0, -1.0, -1.0])
 CHANNELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "time": ("time", (c.TIME,)),
@@ -89,10 +148,8 @@ ELECTRICAL = ("erpm", "100erpm")
 _DATE, _TIME_OF_DAY = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d"), re.compile(r"\d{1,2}:\d\d:\d\d(\.\d+)?")
 
 
-class MappedChannel(BaseModel):
+class MappedChannel(KnownKeys, frozen=True):
     """Columns that make one channel."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     columns: tuple[str, ...]
     unit: str = ""
@@ -110,10 +167,8 @@ class MappedChannel(BaseModel):
     """Speeds in electrical turns only: magnetic poles of a motor."""
 
 
-class Mapping(BaseModel):
+class Mapping(KnownKeys, frozen=True):
     """What the columns of a table are."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     body: Literal["frd", "flu", "fur", "?"] = "frd"
     world: Literal["ned", "enu", "nwu", "nue", "?"] = "ned"
@@ -132,23 +187,20 @@ def _open_questions(mapping: Mapping) -> list[str]:
     found = [f"{key} ({' or '.join(known)})" for key, known in (("body", BODY), ("world", WORLD))
              if getattr(mapping, key) == OPEN]  # fmt: skip
     for name, channel in mapping.channels.items():
-        if OPEN in channel.columns:
-            found.append(f"channels.{name}.columns (a column's name)")
-        if channel.unit == OPEN:
-            known = UNITS[CHANNELS[name][0]] if name in CHANNELS else ()
-            found.append(f"channels.{name}.unit ({' or '.join(known)})")
-        if channel.form == OPEN:
-            found.append(f"channels.{name}.form (wxyz, xyzw, euler or euler_xyz)")
-        if channel.axes == OPEN:
-            found.append(f"channels.{name}.axes (world or body)")
-        if channel.world == OPEN:
-            found.append(f"channels.{name}.world ({' or '.join(TRAVEL)})")
-        if channel.scale == OPEN:
-            found.append(f"channels.{name}.scale (what one count is in the unit)")
-        if channel.range == OPEN:
-            found.append(f"channels.{name}.range ([reading of no throttle, of full throttle])")
-        if channel.poles == OPEN:
-            found.append(f"channels.{name}.poles (magnetic poles of a motor)")
+        units = UNITS[CHANNELS[name][0]] if name in CHANNELS else ()
+        expected = {
+            "columns": "a column's name",
+            "unit": " or ".join(units),
+            "form": "wxyz, xyzw, euler or euler_xyz",
+            "axes": "world or body",
+            "world": " or ".join(TRAVEL),
+            "scale": "what one count is in the unit",
+            "range": "[reading of no throttle, of full throttle]",
+            "poles": "magnetic poles of a motor",
+        }
+        for key, words in expected.items():
+            if getattr(channel, key) == OPEN or key == "columns" and OPEN in channel.columns:
+                found.append(f"channels.{name}.{key} ({words})")
     return found
 
 
@@ -231,7 +283,12 @@ def read_by_mapping(path: Path, mapping: Mapping | None) -> tuple[pd.DataFrame, 
     Without a mapping the columns must have the contract's names; InputError says how to get a mapping.
     """
     raw = read_columns(path)
-    lost = _left_out(raw)
+    layout, lost = raw.attrs.get("layout"), []
+    if layout and layout.above:
+        found = f"{len(layout.above)} lines above the heading in line {layout.heading_line}"
+        lost.append(ImportFault("above", "", found, "left out"))
+    if layout and layout.cut_off:
+        lost.append(ImportFault("cut_off", c.TIME, "the last line is cut off", "left out", 1))
     if mapping is None:
         if c.TIME in raw.columns and sum(c.is_known(n) for n in raw.columns) > 1:
             table, late = in_order(numbers(raw, path), c.TIME)
@@ -243,19 +300,6 @@ def read_by_mapping(path: Path, mapping: Mapping | None) -> tuple[pd.DataFrame, 
         )
     table, faults = convert(raw, mapping, str(path))
     return table, lost + faults, f"body {mapping.body.upper()}, world {mapping.world.upper()}, turned into FRD and NED"
-
-
-def _left_out(raw: pd.DataFrame) -> list[ImportFault]:
-    """What of the file of a table is none of its rows."""
-    layout = raw.attrs.get("layout")
-    faults = []
-    if layout and layout.above:
-        found = f"{len(layout.above)} lines above the heading in line {layout.heading_line}"
-        faults.append(ImportFault("above", "", found, "left out", 0))
-    if layout and layout.cut_off:
-        found = "the last line is cut off"
-        faults.append(ImportFault("cut_off", c.TIME, found, "left out", 1))
-    return faults
 
 
 def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFrame, list[ImportFault]]:
@@ -284,7 +328,7 @@ def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFra
         if channel.unit in ELECTRICAL:
             values = values / (channel.poles / 2)
         if name == "attitude":
-            rotation, values = _attitude(values, channel.form, body, world)
+            rotation = values = _attitude(values, channel.form, body, world)
         elif name in ("angular_velocity", "specific_force", "force", "moment"):
             values = values @ body.T
         elif name == "thrust":
@@ -334,8 +378,8 @@ def from_angles(angles: np.ndarray, form: str) -> Rotation:
     return Rotation.from_euler(EULER[form], angles if form == "euler_xyz" else angles[:, ::-1])
 
 
-def _attitude(values: np.ndarray, form: str, body: np.ndarray, world: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Quaternions (n, 4), scalar first, FRD to NED; NaN where a value is missing. Twice, as `convert` takes it."""
+def _attitude(values: np.ndarray, form: str, body: np.ndarray, world: np.ndarray) -> np.ndarray:
+    """Quaternions (n, 4), scalar first, FRD to NED; NaN where a value is missing."""
     out = np.full((len(values), 4), np.nan)
     known = np.isfinite(values).all(axis=1)
     if form in EULER:
@@ -345,7 +389,7 @@ def _attitude(values: np.ndarray, form: str, body: np.ndarray, world: np.ndarray
         turn = Rotation.from_quat(values[known] if form == "xyzw" else values[known][:, [1, 2, 3, 0]])
     turn = Rotation.from_matrix(world) * turn * Rotation.from_matrix(body).inv()
     out[known] = continuous(turn.as_quat()[:, [3, 0, 1, 2]])
-    return out, out
+    return out
 
 
 def half_turn_about_x(vectors: np.ndarray) -> np.ndarray:
@@ -368,5 +412,53 @@ def continuous(wxyz: np.ndarray) -> np.ndarray:
 
 def quaternion_from_euler_frd(roll: np.ndarray, pitch: np.ndarray, yaw: np.ndarray) -> np.ndarray:
     """Quaternions (n, 4), scalar first, from FRD roll, pitch, yaw in rad (aerospace order z-y'-x'')."""
-    xyzw = Rotation.from_euler("ZYX", np.column_stack([yaw, pitch, roll])).as_quat()
-    return continuous(xyzw[:, [3, 0, 1, 2]])
+    return continuous(from_angles(np.column_stack([roll, pitch, yaw]), "euler").as_quat()[:, [3, 0, 1, 2]])
+
+
+def _plainly(text: str) -> str:
+    """A unit in small letters, without blanks, powers' signs and signs of multiplication, seconds as `s`."""
+    plain = re.sub(r"[\s.·⋅∙•*×^_-]", "", str(text).translate(_SIGNS).lower())
+    return re.sub(r"(?<=/)(sec|second)s?$", "s", re.sub(r"(?<=/)minute$", "min", plain))
+
+
+_WRITTEN: dict[str, dict[str, str]] = {
+    kind: {word: unit for unit, others in units.items() for word in (_plainly(unit), *others.split())}
+    for kind, units in SPELLINGS.items()
+}
+
+
+def unit_of(text: str, kind: str) -> str:
+    """The unit of a kind that a text writes (`N·m`, `kg`, `°C`); empty where it writes none."""
+    return _WRITTEN[kind].get(_plainly(text), "")
+
+
+def bracketed(heading: str) -> tuple[str, str]:
+    """A heading without the brackets at its end, and what stands in them: `Thrust` and `kgf` of `Thrust (kgf)`.
+
+    A number in brackets belongs to the name (`motor[0]`).
+    """
+    found = re.fullmatch(r"(.*\S)\s*[(\[{<]\s*([^()\[\]{}<>]*?)\s*[)\]}>]\s*", heading)
+    if found is None or found[2].isdigit():
+        return heading.strip(), ""
+    return found[1].strip(), found[2]
+
+
+def stated(name: str, kind: str) -> str:
+    """The unit of a kind that the name of a column states in brackets, or in its last words; empty where none.
+
+    `Voltage [mV]`, `battery_current_mA`, `temperature K`, `rpm`.
+    """
+    plain, unit = bracketed(name)
+    if unit:
+        return unit_of(unit, kind)
+    words = [w for w in re.split(r"[^A-Za-z0-9%µμ°²/]+", plain) if w]
+    for count in (3, 2, 1):
+        if len(words) > count and (found := unit_of("".join(words[-count:]), kind)):
+            return found
+    last = re.fullmatch(r".*[a-z0-9]([munckd]?[A-Z])", words[-1]) if words else None
+    return unit_of(last[1], kind) if last else ""
+
+
+def converted(values: np.ndarray, kind: str, unit: str) -> np.ndarray:
+    """Values of a kind in the contract's unit; without a unit as they are."""
+    return values * UNITS[kind].get(unit, 1.0) + _ZEROS.get(unit, 0.0)

@@ -52,10 +52,8 @@ def _read_matrix(path: Path) -> np.ndarray:
 
 def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[ImportFault]]:
     """Contract columns of a NeuroBEM matrix; NeuroBEM's prediction and accelerations ride as own columns."""
-    parts, start = {}, 0
-    for name, width in _LAYOUT:
-        parts[name] = matrix[:, start : start + width]
-        start += width
+    ends = np.cumsum([width for _, width in _LAYOUT])
+    parts = {name: part for (name, _), part in zip(_LAYOUT, np.split(matrix, ends, axis=1), strict=False)}
     attitude = Rotation.from_quat(parts["quaternion_xyzw"])
     vectors = {
         c.POSITION: parts["position"],
@@ -75,38 +73,17 @@ def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[ImportFault]]:
     battery = parts["battery"][:, 0]
     faults = []
     if np.nanmedian(battery) > 60:  # no quadrotor of this size flies on more than 14 cells
-        faults.append(
-            ImportFault(
-                "unit",
-                c.BATTERY_VOLTAGE,
-                f"battery reads {np.nanmedian(battery):.0f}, a tenth of a volt",
-                "divided by 10",
-                len(battery),
-            )
-        )
+        found = f"battery reads {np.nanmedian(battery):.0f}, a tenth of a volt"
+        faults.append(ImportFault("unit", c.BATTERY_VOLTAGE, found, "divided by 10", len(battery)))
         battery = battery / 10
     columns[c.BATTERY_VOLTAGE] = battery
     if matrix.shape[1] > USED:
-        faults.append(
-            ImportFault(
-                "superseded",
-                "",
-                f"{matrix.shape[1] - USED} columns of residuals made with a mass of 0.752 kg",
-                "left out",
-                0,
-            )
-        )
+        found = f"{matrix.shape[1] - USED} columns of residuals made with a mass of 0.752 kg"
+        faults.append(ImportFault("superseded", "", found, "left out"))
     table, repeated = drop_repeated_times(pd.DataFrame(columns))
     table[c.TIME] -= table[c.TIME].iloc[0]
-    faults.append(
-        ImportFault(
-            "derived",
-            ", ".join(c.SPECIFIC_FORCE),
-            "acceleration agrees with the derivative of the velocity: not an independent accelerometer",
-            "kept",
-            0,
-        )
-    )
+    found = "acceleration agrees with the derivative of the velocity: not an independent accelerometer"
+    faults.append(ImportFault("derived", ", ".join(c.SPECIFIC_FORCE), found, "kept"))
     return table, faults + repeated + report_gaps(table)
 
 

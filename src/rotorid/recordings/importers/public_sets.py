@@ -1,27 +1,23 @@
-"""The public recordings as contract sets: which files make which set, and through which importer.
+"""The public recordings: how they are had, which files make which contract set, and tables of them for the report.
 
-`build` writes one set: `vehicle.yaml` (copied with its comments on where each value comes from), one Parquet
-file a run, and `import_report.json` with every fault met on the way.
+Files come from a folder that is there or by download; SHA-256 is always checked. One that cannot be had is named with
+the reason, and the pipeline goes on without. `build` writes one set: `vehicle.yaml` (copied with its comments on where
+each value comes from), one Parquet file a run, and `import_report.json` with every fault met on the way.
 
-Crazyflie on a scale (IMRCLab): CSV of PWM, battery, four rotor speeds and the thrust of the whole vehicle.
-
-Two layouts: `pwm,vbat[V],rpm1..4,thrust[g]` with steady points in random order, and
-`weight[g],pwm,vbat[V],rpm1..4,v[V],i[A],p[W]` as a sweep. Neither has a clock: rows are counted as seconds.
-
-Getting the public recordings: from a folder that is there or by download; SHA-256 is always checked.
-
-Nothing here is fatal: a file that cannot be had is named with the reason, and the pipeline goes on without.
+Two formats are of single laboratories, and read here: a Crazyflie on a scale (IMRCLab), `read_imrc_bench`, and a Vicon
+room with a PX4 vehicle (A. Appius, ground-effect flights), `read_vicon_csv`.
 """
 
 from __future__ import annotations
 
 import hashlib
+import json
 import re
 import shutil
 import urllib.error
 import urllib.parse
 import urllib.request
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,17 +25,70 @@ import numpy as np
 import pandas as pd
 
 from rotorid.errors import InputError
-from rotorid.recordings import RecordingSet, Run, read_vehicle, write_set
+from rotorid.recordings import RecordingSet, Run, read_set, read_vehicle, write_set
 from rotorid.recordings import columns as c
+from rotorid.recordings.check import check_set
 from rotorid.recordings.files import sha256
 from rotorid.recordings.importers import crazyflie
-from rotorid.recordings.importers.faults import ImportFault, ImportReport
+from rotorid.recordings.importers.faults import (
+    ImportFault,
+    ImportReport,
+    blank_held,
+    cut,
+    drop_repeated_times,
+    fault_where,
+    read_report,
+    report_gaps,
+    true_stretches,
+)
+from rotorid.recordings.importers.mapping import RPM, quaternion_from_euler_frd
 from rotorid.recordings.importers.neurobem import read_neurobem
 from rotorid.recordings.importers.rcbenchmark import read_rcbenchmark
-from rotorid.recordings.importers.units import RPM
-from rotorid.recordings.importers.vicon_csv import read_vicon_csv
-from rotorid.recordings.tables import place, read_csv
+from rotorid.recordings.tables import numbers, place, read_cells
 
+_FAULT_NAMES = {
+    "byte_order_mark": "byte-order mark",
+    "encoding": "encoding",
+    "line_ends": "line ends",
+    "cut_off": "last line or event cut off",
+    "no_lock": "motion capture not locked",
+    "no_telemetry": "no telemetry yet",
+    "held": "last value repeated",
+    "gap": "gaps in the clock",
+    "repeated_time": "clock stands still",
+    "speed_missing": "rotor speed 0 under thrust",
+    "speed_lost": "rotor speed too low for its thrust",
+    "speed_dropout": "rotor speed drops to 0",
+    "tare": "thrust at rest",
+    "flipped_sign": "sign of the thrust flipped",
+    "stuck": "reading never moves",
+    "unit": "unit",
+    "superseded": "superseded columns",
+    "derived": "derived, not measured",
+    "no_pitch": "pitch not recorded",
+    "on_ground": "rest, take-off and landing",
+    "cut": "only the flight kept",
+    "checksum": "checksum",
+    "unknown_event": "unknown event",
+    "dropout": "logger dropout",
+    "no_command": "no command logged",
+    "no_clock": "no clock",
+    "second_sensor": "second sensor",
+    "estimate": "estimate that did not fly the vehicle",
+}
+_HOW_TO_HAVE = {
+    "folder": "ROTORID_PUBLIC_DATA names a folder and files are taken from there alone, so put the missing ones where "
+    "the list says and run again, or unset it and run again where the network reaches their repositories",
+    "network": "ROTORID_PUBLIC_DATA is not set and files are downloaded, so run again where the network reaches their "
+    "repositories, after deleting results/public/<source>.json, or set it to a folder that holds the files",
+}
+"""What to do about files that are missing, by where they were looked for."""
+_OF_A_SOURCE = "source repository place licence contents citation files obtained reason taken_from".split()
+_CHOICES = {"cut", "on_ground"}
+"""Kinds that note what part of a log was kept, which is no fault of the log."""
+_VICON_COLUMNS = 25
+_GROUND_MARGIN_M = 0.015
+"""Height above the resting height from which the vehicle counts as in the air."""
 _RAW_FILES = "https://raw.githubusercontent.com"
 _TIMEOUT_S = 20.0
 _GRAM_FORCE_N = 9.80665e-3
@@ -67,27 +116,15 @@ class _PublicSet:
     notes: tuple[str, ...] = ()
 
 
-def _whole(reader: Callable[[Path], tuple[pd.DataFrame, list[ImportFault]]]) -> Callable[[Path, str], _Runs]:
-    """A file is one run, named after the file."""
-    return lambda path, name: {name.rsplit("/")[-1].split(".")[0].lower(): reader(path)}
-
-
-def _neurobem(path: Path, name: str) -> _Runs:
-    return {Path(name).stem.removeprefix("bemnn"): read_neurobem(path)}
-
-
-def _crazyflie(path: Path, prefix: str, stretches: list[tuple[float, float]] | None = None) -> _Runs:
+def _flights(path: Path, name: str, stretches: list[tuple[float, float]] | None = None) -> _Runs:
     """Flights of a uSD log, each with the faults of the whole log and its own."""
-    tables, faults = crazyflie.flights(path, prefix, stretches, crazyflie.in_the_air)
+    tables, faults = crazyflie.flights(path, Path(name).name, stretches, crazyflie.in_the_air)
     return {run: (table, [f for f in faults if f.run in ("", run)]) for run, table in tables.items()}
 
 
 def _imrc_brushless(path: Path, name: str) -> _Runs:
     """The controller's map of thrust to PWM is published: it gives the commanded speed of each rotor."""
-    return {
-        run: (_with_commanded_speed(table), faults)
-        for run, (table, faults) in _crazyflie(path, Path(name).name).items()
-    }
+    return {run: (_with_commanded_speed(table), faults) for run, (table, faults) in _flights(path, name).items()}
 
 
 _PWM_OF_GRAMS = (0.16609668469985447, 0.02297914810965436, 0.0001878280261246769)
@@ -112,14 +149,6 @@ def _with_commanded_speed(table: pd.DataFrame) -> pd.DataFrame:
     return table
 
 
-def _crazypad(path: Path, name: str) -> _Runs:
-    return _crazyflie(path, Path(name).name)
-
-
-def _scale(path: Path, name: str) -> _Runs:
-    return {Path(name).name.removesuffix(".csv").replace(".", "_"): read_imrc_bench(path)}
-
-
 def _bench(path: Path, name: str) -> _Runs:
     motor, voltage = re.fullmatch(r"([a-m])\d_(7|11)\.csv", Path(name).name).groups()
     return {f"{motor}_{_CELLS[voltage]}": read_rcbenchmark(path)}
@@ -137,7 +166,7 @@ def _public_sets() -> dict[str, _PublicSet]:
         "neurobem": _PublicSet(
             "neurobem",
             tuple(f"bemnn{f}.mat" for f in flights),
-            _neurobem,
+            lambda path, name: {Path(name).stem.removeprefix("bemnn"): read_neurobem(path)},
             "neurobem",
             _FLU,
             notes=(
@@ -148,7 +177,7 @@ def _public_sets() -> dict[str, _PublicSet]:
         "appius-ground-effect": _PublicSet(
             "appius-ground-effect",
             ("HOVERING.csv", "VERTICAL_SPEEDS.csv"),
-            _whole(read_vicon_csv),
+            lambda path, name: {Path(name).stem.lower(): read_vicon_csv(path)},
             "appius-ground-effect",
             "attitude and rates forward-right-down over x north, y east (lateral accelerations are -g pitch "
             "and +g roll); only z is turned over",
@@ -166,16 +195,12 @@ def _public_sets() -> dict[str, _PublicSet]:
             ),
         ),
         "imrc-brushed": _PublicSet(
-            "imrc-crazyflie-rpm",
-            ("brushed_flights/jana01", "brushed_flights/jana24"),
-            lambda path, name: _crazyflie(path, Path(name).name),
-            "imrc-brushed",
-            _FLU,
+            "imrc-crazyflie-rpm", ("brushed_flights/jana01", "brushed_flights/jana24"), _flights, "imrc-brushed", _FLU
         ),
         "crazyflie-arpl-log10": _PublicSet(
             "crazyflie-arpl",
             ("log10",),
-            lambda path, name: _crazyflie(path, "log10", [(35.0, 65.0)]),
+            lambda path, name: _flights(path, name, [(35.0, 65.0)]),
             "crazyflie-arpl",
             _FLU,
             notes=(
@@ -186,7 +211,7 @@ def _public_sets() -> dict[str, _PublicSet]:
         "crazyflie-arpl-log15": _PublicSet(
             "crazyflie-arpl",
             ("log15",),
-            lambda path, name: _crazyflie(path, "log15", [(55.0, 90.0)]),
+            lambda path, name: _flights(path, name, [(55.0, 90.0)]),
             "crazyflie-arpl",
             _FLU,
             notes=("roll and pitch window 55-90 s as upstream",),
@@ -208,15 +233,15 @@ def _public_sets() -> dict[str, _PublicSet]:
         sets[f"imrc-bench-{name}"] = _PublicSet(
             "imrc-crazyflie-rpm",
             tuple(f"{bench}/{file}.csv" for file in files),
-            _scale,
+            lambda path, name: {Path(name).name.removesuffix(".csv").replace(".", "_"): read_imrc_bench(path)},
             f"imrc-bench-{vehicle}",
             "thrust of the whole vehicle along -z of the body",
         )
-    for label, (folder, numbers) in pad.items():
+    for label, (folder, logs) in pad.items():
         sets[f"crazypad-{label}"] = _PublicSet(
             "crazypad",
-            tuple(f"{folder}/E9_log{n:02d}" for n in numbers),
-            _crazypad,
+            tuple(f"{folder}/E9_log{n:02d}" for n in logs),
+            _flights,
             "crazypad",
             _FLU,
             notes=("specific force is the state estimate's world acceleration turned into the body",),
@@ -240,20 +265,14 @@ def _public_sets() -> dict[str, _PublicSet]:
 PUBLIC_SETS = _public_sets()
 
 
-def build(name: str, obtained: Obtained, source: dict, vehicles: Path, parent: Path) -> Path:
+def build(name: str, obtained: tuple[Path, dict[str, str]], source: dict, vehicles: Path, parent: Path) -> Path:
     """Write the set `name` below `parent`; returns its folder.
 
     Where a file could not be had, the folder holds `import_report.json` alone, which says so. Until all files are read
     there is no folder.
 
-    Parameters
-    ----------
-    obtained
-        The files of the set's source, already checked.
-    source
-        The source's entry in the manifest (licence, repository, commit, citation).
-    vehicles
-        Folder with the believed vehicle files.
+    `obtained` is what `obtain` gives of the set's source, `source` the source's entry in the manifest, `vehicles` the
+    folder with the believed vehicle files.
     """
     recipe = PUBLIC_SETS[name]
     folder = Path(parent) / name
@@ -262,31 +281,24 @@ def build(name: str, obtained: Obtained, source: dict, vehicles: Path, parent: P
         "licence": source["licence"],
         "citation": source["citation"],
     }
-    lost = [file for file in recipe.files if file not in obtained.files]
+    (files, missing), sums = obtained, {file["path"]: file["sha256"] for file in source["files"]}
+    lost = [file for file in recipe.files if file in missing or file not in sums]
     if lost:
-        reason = obtained.missing.get(lost[0], f"{lost[0]} is not in the manifest")
+        reason = missing.get(lost[0], f"{lost[0]} is not in the manifest")
         folder.mkdir(parents=True, exist_ok=True)
         ImportReport(name, False, **origin, reason=f"{len(lost)} files could not be had: {reason}").write(folder)
         return folder
     runs, faults = [], []
     for file in recipe.files:
-        for run, (table, found) in recipe.read(obtained.folder / file, file).items():
+        for run, (table, found) in recipe.read(files / file, file).items():
             runs.append(Run(run, table))
             faults += [fault.in_run(run) for fault in found]
     believed = Path(vehicles) / f"{recipe.vehicle}.yaml"
     ordered = tuple(sorted(runs, key=lambda run: run.name))
     write_set(RecordingSet(name, read_vehicle(believed), ordered, recipe.held_out), Path(parent))
     shutil.copyfile(believed, folder / "vehicle.yaml")
-    sums = {file["path"]: file["sha256"] for file in source["files"]}
-    ImportReport(
-        name,
-        True,
-        **origin,
-        files={file: sums[file] for file in recipe.files},
-        axes=recipe.axes,
-        faults=tuple(faults),
-        notes=recipe.notes,
-    ).write(folder)
+    more = {"axes": recipe.axes, "faults": tuple(faults), "notes": recipe.notes}
+    ImportReport(name, True, **origin, files={file: sums[file] for file in recipe.files}, **more).write(folder)
     return folder
 
 
@@ -296,8 +308,12 @@ def sets_of(source: str) -> list[str]:
 
 
 def read_imrc_bench(path: Path) -> tuple[pd.DataFrame, list[ImportFault]]:
-    """One bench run in contract columns (kind stand, thrust along -z), and its faults."""
-    raw = read_csv(Path(path))
+    """One bench run in contract columns (kind stand, thrust along -z), and its faults.
+
+    `pwm,vbat[V],rpm1..4,thrust[g]` with steady points in random order, or
+    `weight[g],pwm,vbat[V],rpm1..4,v[V],i[A],p[W]` as a sweep. Neither has a clock: rows are counted as seconds.
+    """
+    raw = numbers(read_cells(Path(path)), path)
     thrust = next((name for name in ("thrust[g]", "weight[g]") if name in raw), None)
     missing = [name for name in ("pwm", "vbat[V]", *_SPEEDS) if name not in raw]
     if thrust is None or missing:
@@ -319,24 +335,9 @@ def read_imrc_bench(path: Path) -> tuple[pd.DataFrame, list[ImportFault]]:
     faults = [ImportFault("no_clock", c.TIME, "rows have no time", "rows counted as seconds", len(table))]
     for column in c.rotor_columns("rotor_speed", 4):
         lost = (table[column] == 0) & (throttle > 0.3)
-        if lost.any():
-            found = f"speed reads 0 in {int(lost.sum())} rows while the motor is driven"
-            faults.append(ImportFault("speed_dropout", column, found, "kept as recorded", int(lost.sum())))
+        found = f"speed reads 0 in {int(lost.sum())} rows while the motor is driven"
+        faults += fault_where(lost, "speed_dropout", column, found, "kept as recorded")
     return table, faults
-
-
-@dataclass(frozen=True)
-class Obtained:
-    """What was had of one source: its folder, the files that are right, and why others are not."""
-
-    source: str
-    folder: Path
-    files: tuple[str, ...]
-    missing: dict[str, str]
-
-    @property
-    def complete(self) -> bool:
-        return not self.missing
 
 
 def address(source: dict, file: dict, base: str = _RAW_FILES) -> str:
@@ -357,25 +358,19 @@ def _download(url: str, wanted: str, path: Path) -> None:
     partial.rename(path)
 
 
-def _from_folder(name: str, source: dict, folder: Path) -> Obtained:
-    files, missing = [], {}
-    for file in source["files"]:
-        path = folder / name / file["path"]
-        if not path.is_file():
-            missing[file["path"]] = f"{path} is not there"
-        elif sha256(path) != file["sha256"]:
-            missing[file["path"]] = f"{path} is not the file of the manifest (SHA-256 differs)"
-        else:
-            files.append(file["path"])
-    return Obtained(name, folder / name, tuple(files), missing)
+def _in_folder(path: Path, file: dict) -> str:
+    """Why a file of the manifest is not there; empty where it is."""
+    if not path.is_file():
+        return f"{path} is not there"
+    return "" if sha256(path) == file["sha256"] else f"{path} is not the file of the manifest (SHA-256 differs)"
 
 
-def _from_network(name: str, source: dict, cache: Path, base: str) -> Obtained:
-    files, missing, offline = [], {}, ""
+def _downloaded(source: dict, folder: Path, base: str) -> dict[str, str]:
+    """To the files that could not be had the reason; after one without an answer none is asked for."""
+    missing, offline = {}, ""
     for file in source["files"]:
-        path = cache / name / file["path"]
-        if path.is_file() and sha256(path) == file["sha256"]:
-            files.append(file["path"])
+        path = folder / file["path"]
+        if not _in_folder(path, file):
             continue
         if offline:
             missing[file["path"]] = offline
@@ -383,32 +378,176 @@ def _from_network(name: str, source: dict, cache: Path, base: str) -> Obtained:
         url = address(source, file, base)
         try:
             _download(url, file["sha256"], path)
-            files.append(file["path"])
         except InputError as error:
             missing[file["path"]] = str(error)
         except urllib.error.HTTPError as error:
             missing[file["path"]] = f"{url}: the server answers {error.code}"
         except OSError as error:
             host = urllib.parse.urlsplit(base).netloc
-            offline = f"no answer from {host} ({getattr(error, 'reason', error)})"
-            missing[file["path"]] = offline
-    return Obtained(name, cache / name, tuple(files), missing)
+            offline = missing[file["path"]] = f"no answer from {host} ({getattr(error, 'reason', error)})"
+    return missing
 
 
-def obtain(name: str, source: dict, folder: Path | None, cache: Path, base: str = _RAW_FILES) -> Obtained:
-    """Files of one source of the manifest.
+def obtain(
+    name: str, source: dict, folder: Path | None, cache: Path, base: str = _RAW_FILES
+) -> tuple[Path, dict[str, str]]:
+    """The folder of one source of the manifest, its files checked, and to those that could not be had the reason.
 
-    Parameters
-    ----------
-    name, source
-        Name and entry of the source in the manifest.
-    folder
-        A folder with the public recordings (what ROTORID_PUBLIC_DATA names), or None to download.
-    cache
-        Where downloads are kept.
-    base
-        Server of raw files.
+    `folder` has the public recordings (what ROTORID_PUBLIC_DATA names); None downloads them into `cache`.
     """
-    if folder is not None:
-        return _from_folder(name, source, Path(folder))
-    return _from_network(name, source, Path(cache), base)
+    if folder is None:
+        return Path(cache) / name, _downloaded(source, Path(cache) / name, base)
+    own = Path(folder) / name
+    reasons = {file["path"]: _in_folder(own / file["path"], file) for file in source["files"]}
+    return own, {path: reason for path, reason in reasons.items() if reason}
+
+
+def _vicon_matrix(path: Path) -> tuple[np.ndarray, list[ImportFault]]:
+    """The numbers of a header-less CSV, shape (n, 25); the last row may be cut off."""
+    try:
+        lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
+    except FileNotFoundError:
+        raise InputError(f"{path}: file is missing") from None
+    rows, faults = [], []
+    for number, line in enumerate(lines, start=1):
+        if not line.strip():
+            continue
+        cells = line.rstrip(",").split(",")
+        last = number == len(lines)
+        values = []
+        for column, cell in enumerate(cells, start=1):
+            try:
+                values.append(float(cell))
+            except ValueError:
+                if not last:
+                    where = f"{path}, line {number}, column {column}"
+                    raise InputError(f"{where}: expected a number, found {cell!r}") from None
+                values = []
+                break
+        if len(values) != _VICON_COLUMNS:
+            if not last:
+                raise InputError(f"{path}, line {number}: expected {_VICON_COLUMNS} columns, found {len(values)}")
+            faults.append(
+                ImportFault("cut_off", "", f"last line has {len(cells)} of {_VICON_COLUMNS} columns", "left out", 1)
+            )
+            continue
+        rows.append(values)
+    if len(rows) < 2:
+        raise InputError(f"{path}: expected at least two rows of {_VICON_COLUMNS} numbers")
+    return np.array(rows), faults
+
+
+def _of_vicon(matrix: np.ndarray) -> tuple[pd.DataFrame, list[ImportFault]]:
+    """Contract columns of the flown part of a log, clock from zero at its start."""
+    time, position, velocity = matrix[:, 0], matrix[:, 1:4], matrix[:, 4:7]
+    roll, pitch, yaw = np.radians(matrix[:, 7:10]).T
+    columns = {c.TIME: time}
+    columns |= dict(zip(c.POSITION, (position * [1, 1, -1]).T, strict=True))
+    columns |= dict(zip(c.VELOCITY, (velocity * [1, 1, -1]).T, strict=True))
+    columns[c.HEIGHT] = position[:, 2]
+    quaternion = quaternion_from_euler_frd(roll, pitch, yaw)
+    columns |= dict(zip(c.QUATERNION, quaternion.T, strict=True))
+    columns |= dict(zip(c.ANGULAR_VELOCITY, matrix[:, 10:13].T, strict=True))
+    columns |= dict(zip(c.rotor_columns("rotor_speed", 4), (matrix[:, 13:17] * RPM).T, strict=True))
+    columns[c.BATTERY_VOLTAGE] = matrix[:, 17:21].mean(axis=1)
+    columns[c.BATTERY_CURRENT] = matrix[:, 21:25].sum(axis=1)
+    table = pd.DataFrame(columns)
+    unlocked = table[list(c.POSITION)].isna().any(axis=1)
+    table.loc[unlocked, [*c.POSITION, *c.VELOCITY, c.HEIGHT]] = np.nan
+    faults = fault_where(unlocked, "no_lock", ", ".join(c.POSITION), "motion capture not locked (nan)", "made empty")
+    rotors = list(c.rotor_columns("rotor_speed", 4))
+    unpowered = (table[c.BATTERY_VOLTAGE] == 0) & (table[rotors].abs().sum(axis=1) == 0)
+    faults += fault_where(unpowered, "no_telemetry", c.BATTERY_VOLTAGE, "speed controllers report 0 V", "made empty")
+    table.loc[unpowered, [c.BATTERY_VOLTAGE, c.BATTERY_CURRENT]] = np.nan
+    table, repeated = drop_repeated_times(table)
+    height = table[c.HEIGHT].to_numpy()
+    resting = np.nanmedian(height[: max(10, int(np.argmax(table[rotors[0]].to_numpy() > 3000 * RPM)))])
+    flying = (table[rotors].mean(axis=1) > 4000 * RPM).to_numpy() & (height > resting + _GROUND_MARGIN_M)
+    stretches = true_stretches(flying, table[c.TIME].to_numpy(), 5.0)
+    if not stretches:
+        raise InputError("no stretch of 5 s in the air found (rotors above 4000 rpm and off the ground)")
+    start, stop = max(stretches, key=lambda s: s[1] - s[0])
+    before = len(table)
+    table = cut(table, start + 1.0, stop)
+    found = f"in the air from {start:.1f} to {stop:.1f} s"
+    ground = ImportFault("on_ground", "", found, "rest, take-off and landing left out", before - len(table))
+    faults += [*repeated, ground, *report_gaps(table)]
+    groups = {
+        "pose": [*c.POSITION, *c.VELOCITY, c.HEIGHT],
+        "attitude": [*c.QUATERNION, *c.ANGULAR_VELOCITY],
+        "rotor speed": rotors,
+        "battery": [c.BATTERY_VOLTAGE, c.BATTERY_CURRENT],
+    }
+    table, held = blank_held(table, groups)
+    return table, faults + held
+
+
+def read_vicon_csv(path: Path) -> tuple[pd.DataFrame, list[ImportFault]]:
+    """One flight in contract columns, and its faults.
+
+    25 columns without a heading: time, position (m, Vicon, z up), velocity, roll, pitch, yaw (deg), body rates (rad/s),
+    four rotor speeds (rpm), four voltages, four currents. The lateral accelerations are −g·pitch along x and +g·roll
+    along y, so attitude and rates are forward-right-down over x north, y east, and only the height is turned over.
+    Rotors in PX4's order. Each group of columns is held at its own slower rate.
+    """
+    matrix, faults = _vicon_matrix(path)
+    try:
+        table, more = _of_vicon(matrix)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    return table, faults + more
+
+
+def sources(status_files: Sequence[Path]) -> pd.DataFrame:
+    """One row a source: repository, commit, licence, citation, contents, whether it was had, and from where."""
+    rows = []
+    for path in status_files:
+        status = json.loads(Path(path).read_text(encoding="utf-8"))
+        status["place"] = f"{status['repository']} at {status['commit'][:10]}"
+        status["files"] -= status["files_missing"]
+        status["obtained"] = "yes" if status["available"] else "no"
+        rows.append({key: status[key] for key in _OF_A_SOURCE})
+    return pd.DataFrame(rows)
+
+
+def recordings(folders: Sequence[Path]) -> pd.DataFrame:
+    """One row a set that is there: kind, runs, duration (s), rate (Hz), faults met."""
+    rows = []
+    for folder in folders:
+        report = read_report(Path(folder))
+        if not report["available"]:
+            continue
+        check = check_set(read_set(Path(folder)))
+        length_s, rates = sum(run.duration_s for run in check.runs), sorted(run.rate_hz for run in check.runs)
+        found = (check.name, check.kind, check.rotors, len(check.runs), length_s, rates[len(rates) // 2])
+        rows.append((*found, len(report["faults"])))
+    return pd.DataFrame(rows, columns=["set", "kind", "rotors", "runs", "duration_s", "rate_hz", "faults"])
+
+
+def faults(folders: Sequence[Path]) -> pd.DataFrame:
+    """One row a source and kind of fault: in how many runs, an example of what was seen and what was done."""
+    rows: dict[tuple[str, str], dict] = {}
+    for folder in folders:
+        report = read_report(Path(folder))
+        for fault in report["faults"]:
+            if fault["kind"] in _CHOICES:
+                continue
+            source, kind = PUBLIC_SETS[report["set"]].source, fault["kind"]
+            row = {"source": source, "fault": _FAULT_NAMES.get(kind, kind), "runs": set()}
+            row = rows.setdefault((source, kind), row | {k: fault[k] for k in ("found", "action")})
+            row["runs"].add((report["set"], fault["run"]))
+    table = [{**row, "runs": len(row["runs"])} for row in rows.values()]
+    return pd.DataFrame(table, columns=["source", "fault", "runs", "found", "action"])
+
+
+def state(table: pd.DataFrame) -> dict:
+    """What the report's text needs to know of the table of sources."""
+    missing = table[table["obtained"] == "no"]
+    places = set(missing["taken_from"])
+    return {
+        "available": bool((table["obtained"] == "yes").all()),
+        "sources": len(table),
+        "obtained": int((table["obtained"] == "yes").sum()),
+        "missing": missing[["source", "reason"]].to_dict("records"),
+        "how": "; ".join(how for place, how in _HOW_TO_HAVE.items() if place in places),
+    }

@@ -26,18 +26,20 @@ from pyulog import ULog
 from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers import in_the_air
 from rotorid.recordings.importers.faults import (
     GOES_ON,
     ImportFault,
+    airborne,
     drop_repeated_times,
+    fault_where,
     further_motors,
+    on_grid,
     one_sense,
     report_gaps,
+    without_pauses,
 )
 from rotorid.recordings.importers.known import Parameters, Values
-from rotorid.recordings.importers.mapping import continuous
-from rotorid.recordings.importers.units import PULSE_US, RPM
+from rotorid.recordings.importers.mapping import PULSE_US, RPM, continuous
 
 _FIRST_MOTOR = 101
 """Number of motor 1 among PX4's output functions."""
@@ -84,20 +86,6 @@ class Px4Log:
     lost_s: tuple[float, ...] = ()
     damaged: bool = False
     rest: int = 0
-
-
-@dataclass(frozen=True)
-class _Converted:
-    """A whole log in contract columns.
-
-    `flying` (n,) says in which rows the vehicle is in the air, as far as the log shows; `jumps` (n,) in which the
-    estimator is reset, so that no run may hold them.
-    """
-
-    table: pd.DataFrame
-    faults: list[ImportFault]
-    flying: np.ndarray
-    jumps: np.ndarray
 
 
 class _Subscriptions(dict):
@@ -247,15 +235,18 @@ def _throttles(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray,
                 half = (1 - curve) / (2 * curve)
                 values[inside] = np.sqrt(half**2 + values[inside] / curve) - half
                 seen = f"THR_MDL_FAC is {curve:g}: actuator_motors holds thrusts"
-                faults.append(
-                    ImportFault("unit", names, seen, "turned into signals by PX4's own curve", int(inside.sum()))
-                )
+                faults += fault_where(inside, "unit", names, seen, "turned into signals by PX4's own curve")
         return values, times, faults + reversed_
     instances = log.topics.get("actuator_outputs", [])
     if not instances:
-        found = "neither actuator_motors nor actuator_outputs is logged"
-        return None, np.zeros(0), [ImportFault("no_command", "", found, "no throttle columns", 0)]
+        return _no_throttle("no_command", "", "neither actuator_motors nor actuator_outputs is logged")
     return _from_pulses(log, instances, rotors, names)
+
+
+def _no_throttle(
+    kind: str, names: str, found: str, samples: int = 0, before: Sequence[ImportFault] = ()
+) -> tuple[None, np.ndarray, list[ImportFault]]:
+    return None, np.zeros(0), [*before, ImportFault(kind, names, found, "no throttle columns", samples)]
 
 
 def _more_rotors(topic: str, driven: int, rotors: int) -> list[ImportFault]:
@@ -272,13 +263,12 @@ def _from_pulses(log: Px4Log, instances, rotors: int, names: str):
     port, outputs = _outputs_of_motors(flown, rotors)
     if outputs is None:
         found = f"no output of PWM_MAIN_FUNC* or PWM_AUX_FUNC* is motor {port}, and actuator_motors is not logged"
-        return None, np.zeros(0), [ImportFault("no_command", "", found, "no throttle columns", 0)]
+        return _no_throttle("no_command", "", found)
     faults = []
     stacks = [_stack(data, [f"output[{k}]" for k in outputs]) for data in instances]
     usable = [i for i, s in enumerate(stacks) if s is not None]
     if not usable:
-        found = f"actuator_outputs holds fewer than {rotors} outputs"
-        return None, np.zeros(0), [ImportFault("no_command", "", found, "no throttle columns", 0)]
+        return _no_throttle("no_command", "", f"actuator_outputs holds fewer than {rotors} outputs")
     chosen = max(usable, key=lambda i: float(np.nanstd(stacks[i], axis=0).min()))
     if len(instances) > 1:
         found = f"{len(instances)} instances of actuator_outputs"
@@ -290,7 +280,7 @@ def _from_pulses(log: Px4Log, instances, rotors: int, names: str):
     turning = pulses[pulses > 0]
     if len(turning) and not (turning.min() >= _PLAUSIBLE_PULSE_US[0] and turning.max() <= _PLAUSIBLE_PULSE_US[1]):
         found = f"outputs from {turning.min():g} to {turning.max():g} are no pulse widths in µs"
-        return None, np.zeros(0), [*faults, ImportFault("unit", names, found, "no throttle columns", len(pulses))]
+        return _no_throttle("unit", names, found, len(pulses), faults)
     throttle = np.full(pulses.shape, np.nan)
     for start, stop, values in log.parameters.spans(_CHANGED[0][0]):
         inside = (times >= start) & (times < stop)
@@ -298,16 +288,14 @@ def _from_pulses(log: Px4Log, instances, rotors: int, names: str):
         throttle[inside] = (pulses[inside] - low) / (high - low)
         if not stated and inside.any():
             found = "no parameter states the pulse widths of no and full throttle"
-            action = f"taken as {low[0]:g} and {high[0]:g} µs"
-            faults.append(ImportFault("unit", names, found, action, int(inside.sum())))
+            faults += fault_where(inside, "unit", names, found, f"taken as {low[0]:g} and {high[0]:g} µs")
     both = [i for i in range(rotors) if int(flown.get("CA_R_REV", 0)) >> i & 1]  # 0 in the middle of their range
     throttle[:, both], backwards = one_sense(
         2 * throttle[:, both] - 1, [c.rotor_columns("throttle", rotors)[i] for i in both], 1.0
     )
     outside = (throttle < -0.01) | (throttle > 1.01)
-    if outside.any():
-        found = f"{outside.any(axis=1).mean():.0%} of the rows lie outside the range (disarmed motors get less)"
-        faults.append(ImportFault("range", names, found, "cut off at 0 and 1", int(outside.any(axis=1).sum())))
+    found = f"{outside.any(axis=1).mean():.0%} of the rows lie outside the range (disarmed motors get less)"
+    faults += fault_where(outside, "range", names, found, "cut off at 0 and 1")
     return np.clip(throttle, 0, 1), times, faults + backwards
 
 
@@ -365,10 +353,8 @@ def _speeds(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray, li
     if not np.nan_to_num(values).any():
         found = "every speed in esc_status is 0"
         return None, np.zeros(0), [ImportFault("speed_missing", "rotor_speed", found, "no rotor speeds", len(values))]
-    if not heard.all():
-        lost = int((~heard).any(axis=1).sum())
-        found = f"a speed controller is offline in {lost} messages"
-        faults.append(ImportFault("speed_missing", "rotor_speed", found, "made empty cells", lost))
+    found = f"a speed controller is offline in {(~heard).any(axis=1).sum()} messages"
+    faults += fault_where(~heard, "speed_missing", "rotor_speed", found, "made empty cells")
     return np.where(heard, values, np.nan), _time(data, sampled=False), faults
 
 
@@ -378,27 +364,22 @@ def _speeds(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray, li
 def _inertial(topics: _Topics) -> dict[str, tuple[tuple[str, ...], np.ndarray, np.ndarray]]:
     """Accelerometer and gyroscope: topic to (columns, time in µs, values), each from the topic with most samples."""
     combined = _first(topics, "sensor_combined")
-    choices = {
-        c.SPECIFIC_FORCE: [
-            ("sensor_combined", _stack(combined, _indexed("accelerometer_m_s2", 3)), combined),
-            ("vehicle_acceleration", _stack(_first(topics, "vehicle_acceleration"), _indexed("xyz", 3)), None),
-        ],
-        c.ANGULAR_VELOCITY: [
-            ("sensor_combined", _stack(combined, _indexed("gyro_rad", 3)), combined),
-            ("vehicle_angular_velocity", _stack(_first(topics, "vehicle_angular_velocity"), _indexed("xyz", 3)), None),
-        ],
-    }
     found = {}
-    for columns, offered in choices.items():
-        offered = [(name, values) for name, values, _ in offered if values is not None]
+    for columns, field, other in (
+        (c.SPECIFIC_FORCE, "accelerometer_m_s2", "vehicle_acceleration"),
+        (c.ANGULAR_VELOCITY, "gyro_rad", "vehicle_angular_velocity"),
+    ):
+        offered = {"sensor_combined": _stack(combined, _indexed(field, 3))}
+        offered[other] = _stack(_first(topics, other), _indexed("xyz", 3))
+        offered = {name: values for name, values in offered.items() if values is not None}
         if not offered:
             continue
-        name, values = max(offered, key=lambda o: len(o[1]))
-        time = _time(_first(topics, name))
+        name = max(offered, key=lambda name: len(offered[name]))
+        time, values = _time(_first(topics, name)), offered[name]
         if name == "sensor_combined" and columns == c.SPECIFIC_FORCE:
             late = np.asarray(combined.get("accelerometer_timestamp_relative", np.zeros(len(time)))).astype(np.int64)
-            time = time + np.where(np.abs(late) < 1_000_000, late, 0)
-            values = np.where((np.abs(late) < 1_000_000)[:, None], values, np.nan)
+            near = np.abs(late) < 1_000_000
+            time, values = time + np.where(near, late, 0), np.where(near[:, None], values, np.nan)
         found[name, columns] = (columns, time, values)
     return found
 
@@ -420,13 +401,9 @@ def _local_position(data: Mapping[str, np.ndarray]) -> tuple[dict[tuple[str, ...
         if names == (c.HEIGHT,) and "dist_bottom_sensor_bitfield" in data:
             # Without a range finder or optical flow PX4 states a height over a ground that it only assumes.
             known &= np.asarray(data["dist_bottom_sensor_bitfield"]).astype(bool)[:, None]
-        lost = ~known
-        if lost.any():
-            bad = [n for n, column in zip(names, lost.T, strict=True) if column.any()]
-            found = f"PX4 calls it invalid in {lost.any(axis=1).mean():.0%} of the messages"
-            faults.append(
-                ImportFault("invalid", ", ".join(bad), found, "made empty cells", int(lost.any(axis=1).sum()))
-            )
+        bad = ", ".join(n for n, column in zip(names, known.T, strict=True) if not column.all())
+        found = f"PX4 calls it invalid in {(~known).any(axis=1).mean():.0%} of the messages"
+        faults += fault_where(~known, "invalid", bad, found, "made empty cells")
         values[names] = np.where(known, raw, np.nan)
     return values, faults
 
@@ -483,7 +460,7 @@ def _flying(log: Px4Log, grid: np.ndarray) -> np.ndarray | None:
                 up &= _held(grid, time, land[name], 1.0) < 0.5
     if "arming_state" in status:
         up &= _held(grid, _time(status), status["arming_state"], 0.0) == _ARMED
-    return in_the_air.without_pauses(up, (grid - grid[0]) * 1e-6)
+    return without_pauses(up, (grid - grid[0]) * 1e-6)
 
 
 def _clock(topics: _Topics) -> np.ndarray:
@@ -493,8 +470,9 @@ def _clock(topics: _Topics) -> np.ndarray:
     return max(clocks, key=len, default=np.zeros(0, np.int64))
 
 
-def convert(log: Px4Log, rotors: int) -> _Converted:
-    """Contract columns of a whole log, its faults, and where it flies; InputError where there is no clock."""
+def convert(log: Px4Log, rotors: int) -> tuple[pd.DataFrame, list[ImportFault], np.ndarray, np.ndarray]:
+    """Contract columns of a whole log, its faults, the rows (n,) in which it flies, and those (n,) in which the
+    estimator is reset, so that no run may hold them; InputError where there is no clock."""
     inertial = _inertial(log.topics)
     attitude = _first(log.topics, "vehicle_attitude")
     base = _clock(log.topics)
@@ -507,7 +485,7 @@ def convert(log: Px4Log, rotors: int) -> _Converted:
     columns: dict[str, np.ndarray] = {c.TIME: (grid - grid[0]) * 1e-6}
 
     def put(names: Sequence[str], time: np.ndarray, values: np.ndarray) -> None:
-        columns.update(zip(names, in_the_air.on_grid(grid, time, values).T, strict=True))
+        columns.update(zip(names, on_grid(grid, time, values).T, strict=True))
 
     for names, time, values in inertial.values():
         put(names, time, values)
@@ -530,7 +508,7 @@ def convert(log: Px4Log, rotors: int) -> _Converted:
         if values is not None:
             put(c.rotor_columns(kind, rotors), time, values)
     table = pd.DataFrame({k: v for k, v in columns.items() if k == c.TIME or np.isfinite(v).any()})
-    flying, ground = in_the_air.airborne(table, _flying(log, grid))
+    flying, ground = airborne(table, _flying(log, grid))
     faults += ground
     jumps = np.zeros(len(grid), bool)
     for reset in _resets(log.topics):
@@ -548,4 +526,4 @@ def convert(log: Px4Log, rotors: int) -> _Converted:
     if log.lost_s:
         found = f"the logger lost {len(log.lost_s)} stretches, {sum(log.lost_s):.3g} s in all"
         faults.append(ImportFault("dropout", c.TIME, found, "left as gaps", len(log.lost_s)))
-    return _Converted(table, faults + report_gaps(table), flying & ~jumps, jumps)
+    return table, faults + report_gaps(table), flying & ~jumps, jumps

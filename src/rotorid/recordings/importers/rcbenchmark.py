@@ -16,9 +16,9 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.faults import ImportFault, drop_repeated_times
-from rotorid.recordings.importers.units import UNITS, bracketed, converted, unit_of
-from rotorid.recordings.spikes import lost_speed
+from rotorid.recordings.importers.faults import ImportFault, drop_repeated_times, fault_where
+from rotorid.recordings.importers.mapping import UNITS, bracketed, converted, unit_of
+from rotorid.recordings.mended import lost_speed
 from rotorid.recordings.vehicle import Vehicle
 
 _ESC_LOW_US, _ESC_HIGH_US = 1000.0, 2000.0
@@ -42,7 +42,7 @@ def decode_text(data: bytes) -> tuple[str, list[ImportFault]]:
     faults = []
     if data.startswith(b"\xef\xbb\xbf"):
         text = data.decode("utf-8-sig")
-        faults.append(ImportFault("byte_order_mark", "", "file starts with a byte-order mark", "read as UTF-8", 0))
+        faults.append(ImportFault("byte_order_mark", "", "file starts with a byte-order mark", "read as UTF-8"))
     else:
         try:
             text = data.decode("utf-8")
@@ -119,52 +119,26 @@ def convert(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
     The thrust is a force along -z of the body, which the rotor passes on to the sensor. The torque is positive while
     the rotor turns; `signed_by_spin` gives it the sign of its rotor.
     """
-    faults = []
+    faults, kept = [], "kept as recorded"
     thrust_n = raw["thrust"].to_numpy()
     optical = raw["optical"].to_numpy() if "optical" in raw else np.zeros(len(raw))
     electrical = raw["speed"].to_numpy() if "speed" in raw else np.zeros(len(raw))
-    both = (optical > 0).any() and (electrical > 0).any()
     speed = electrical if (electrical > 0).any() or not (optical > 0).any() else optical
     turning = speed > 0
     if turning.sum() >= 2 and np.corrcoef(speed[turning] ** 2, thrust_n[turning])[0, 1] < -0.5:
-        faults.append(
-            ImportFault(
-                "flipped_sign",
-                "force_z_n",
-                "thrust falls as the rotor speed rises: the load cell's sign is flipped",
-                "kept as recorded",
-                int(len(raw)),
-            )
-        )
+        found = "thrust falls as the rotor speed rises: the load cell's sign is flipped"
+        faults.append(ImportFault("flipped_sign", "force_z_n", found, kept, len(raw)))
     silent = (speed == 0) & (np.abs(thrust_n) > 0) & (raw["esc"].to_numpy() > 0)
-    if silent.any():
-        faults.append(
-            ImportFault(
-                "speed_missing",
-                "rotor_speed_1_rad_s",
-                f"speed 0 while the rotor gives thrust ({int(silent.sum())} rows)",
-                "kept as recorded",
-                int(silent.sum()),
-            )
-        )
+    found = f"speed 0 while the rotor gives thrust ({int(silent.sum())} rows)"
+    faults += fault_where(silent, "speed_missing", "rotor_speed_1_rad_s", found, kept)
     slow = lost_speed(speed, np.abs(thrust_n))
-    if slow.any():
-        found = f"speed far too low for its thrust ({int(slow.sum())} rows): pulses lost"
-        faults.append(ImportFault("speed_lost", "rotor_speed_1_rad_s", found, "kept as recorded", int(slow.sum())))
+    found = f"speed far too low for its thrust ({int(slow.sum())} rows): pulses lost"
+    faults += fault_where(slow, "speed_lost", "rotor_speed_1_rad_s", found, kept)
     negative = (thrust_n < 0) & ~turning
-    if negative.any():
-        faults.append(
-            ImportFault(
-                "tare",
-                "force_z_n",
-                f"thrust {thrust_n[negative].min():.4f} N with the rotor at rest",
-                "kept as recorded",
-                int(negative.sum()),
-            )
-        )
-    if both:
-        found, count = "an optical speed is recorded too", int((optical > 0).sum())
-        faults.append(ImportFault("second_sensor", "", found, "left out", count))
+    found = f"thrust {thrust_n[negative].min(initial=0.0):.4f} N with the rotor at rest"
+    faults += fault_where(negative, "tare", "force_z_n", found, kept)
+    if (electrical > 0).any():
+        faults += fault_where(optical > 0, "second_sensor", "", "an optical speed is recorded too", "left out")
     table = pd.DataFrame(
         {
             c.TIME: raw["time"],

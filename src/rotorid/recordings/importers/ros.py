@@ -37,13 +37,20 @@ from scipy.spatial.transform import Rotation
 from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers import in_the_air
 from rotorid.recordings.importers.bag_records import Records, needs, typestores
-from rotorid.recordings.importers.faults import ImportFault, further_motors, one_sense, report_gaps
+from rotorid.recordings.importers.faults import (
+    ImportFault,
+    airborne,
+    flights,
+    further_motors,
+    increasing,
+    one_sense,
+    report_gaps,
+    table_on,
+)
 from rotorid.recordings.importers.guessing import agreement as by
-from rotorid.recordings.importers.guessing.draft import CONFIRMED, is_clear
-from rotorid.recordings.importers.mapping import continuous, half_turn_about_x, quaternion_to_frd_ned
-from rotorid.recordings.importers.units import PULSE_US, RPM
+from rotorid.recordings.importers.guessing.agreement import CONFIRMED, is_clear
+from rotorid.recordings.importers.mapping import PULSE_US, RPM, continuous, half_turn_about_x, quaternion_to_frd_ned
 
 
 def _xyz(v) -> list[float]:
@@ -255,21 +262,17 @@ def _read_series(path: Path) -> tuple[dict[str, list[_TopicSeries]], list[Import
     if not found.rows:
         listed = ", ".join([*others, *foreign][:_LISTED]) or "none"
         raise InputError(f"{path}: no topic of a type that is known; found {listed}")
-    faults = []
-    if found.cut:
-        seen = "the file ends early, without its index"
-        faults.append(ImportFault("cut_off", "", seen, "what came before is kept; the log stopped before its end", 0))
-    if found.broken:
-        seen = f"{found.broken} messages cannot be decoded"
-        faults.append(ImportFault("damaged", "", seen, "left out", found.broken))
-    if found.lost_chunks:
-        seen = f"{found.lost_chunks} chunks of messages cannot be unpacked"
-        faults.append(ImportFault("damaged", "", seen, "left out; their time is a gap", found.lost_chunks))
-    if foreign:
-        seen = f"{', '.join(foreign[:_LISTED])} hold no messages of ROS"
-        faults.append(ImportFault("unread", "", seen, "left out", 0))
+    cut, gap = "what came before is kept; the log stopped before its end", "left out; their time is a gap"
+    lost, strange = f"{found.lost_chunks} chunks of messages", ", ".join(foreign[:_LISTED])
+    broken = f"{found.broken} messages cannot be decoded"
+    met = (
+        (found.cut, ImportFault("cut_off", "", "the file ends early, without its index", cut)),
+        (found.broken, ImportFault("damaged", "", broken, "left out", found.broken)),
+        (found.lost_chunks, ImportFault("damaged", "", f"{lost} cannot be unpacked", gap, found.lost_chunks)),
+        (foreign, ImportFault("unread", "", f"{strange} hold no messages of ROS", "left out")),
+    )
     times, more = _times(found)
-    faults += more
+    faults = [*(fault for there, fault in met if there), *more]
     series: dict[str, list[_TopicSeries]] = {}
     for (quantity, topic), rows in found.rows.items():
         widths = [len(values) for *_, values in rows]
@@ -290,7 +293,7 @@ def _read_series(path: Path) -> tuple[dict[str, list[_TopicSeries]], list[Import
             continue
         order = np.argsort(time_s, kind="stable")
         time_s, values = time_s[order], values[order]
-        keep = in_the_air.increasing(time_s)
+        keep = increasing(time_s)
         own = _TopicSeries(topic, time_s[keep], values[keep])
         if quantity in _UNSET and (own.values == _UNSET[quantity]).all():
             seen = f"{quantity.replace('_', ' ')} of {topic} was never set ({_UNSET[quantity][0]:g}, 0, … throughout)"
@@ -306,13 +309,10 @@ def _read_series(path: Path) -> tuple[dict[str, list[_TopicSeries]], list[Import
             f"no topic of a type that is read states {', '.join(missing)}; not read are {', '.join(others[:_LISTED])}"
         )
         faults.append(ImportFault("unread", "", seen + more, "export what is missing as a CSV", 0))
-    faults += [
-        ImportFault(
-            "instances", quantity, f"{', '.join(s.topic for s in offered)} hold it", f"{offered[0].topic} taken", 0
-        )
-        for quantity, offered in series.items()
-        if len(offered) > 1
-    ]
+    for quantity, offered in series.items():
+        if len(offered) > 1:
+            seen = f"{', '.join(s.topic for s in offered)} hold it"
+            faults.append(ImportFault("instances", quantity, seen, f"{offered[0].topic} taken"))
     return series, faults
 
 
@@ -378,7 +378,14 @@ def _times(found: _BagContent) -> tuple[dict[tuple[str, str], np.ndarray], list[
     """
     stamps = {key: np.array([row[0] for row in rows]) for key, rows in found.rows.items()}
     recorded = {key: np.array([row[1] for row in rows]) for key, rows in found.rows.items()}
-    sound = {key for key in stamps if stamps[key].any() and not _jumps(stamps[key], recorded[key])}
+    sound = set()
+    for key, own in stamps.items():
+        order = np.argsort(recorded[key], kind="stable")
+        steps, waited = np.diff(own[order]), np.diff(recorded[key][order])
+        # Stamps that jump go back, or run on by far more than the time between two recordings.
+        jump = np.any(steps < -_SAME_CLOCK_S) or np.any(steps > _SAME_CLOCK_S + 10 * waited)
+        if own.any() and not jump:
+            sound.add(key)
     first = next((q for q in ("rates", "imu_attitude", "attitude") if any(k[0] == q for k in stamps)), None)
     base = max((k for k in stamps if k[0] == first), key=lambda k: len(stamps[k]), default=None)
 
@@ -410,13 +417,6 @@ def _times(found: _BagContent) -> tuple[dict[tuple[str, str], np.ndarray], list[
     return times, list(faults.values())
 
 
-def _jumps(stamps: np.ndarray, recorded: np.ndarray) -> bool:
-    """Whether the stamps of a topic go back, or run on by far more than the time between two recordings, s."""
-    order = np.argsort(recorded, kind="stable")
-    steps, waited = np.diff(stamps[order]), np.diff(recorded[order])
-    return bool(np.any(steps < -_SAME_CLOCK_S) or np.any(steps > _SAME_CLOCK_S + 10 * waited))
-
-
 def convert(
     series: dict[str, list[_TopicSeries]], faults: list[ImportFault], where: object
 ) -> tuple[pd.DataFrame, np.ndarray]:
@@ -431,13 +431,14 @@ def convert(
         raise InputError(f"{where}: neither sensor_msgs/Imu nor a pose to take the clock from")
     grid = clock.time_s
     parts: list[tuple] = []
-    for quantity, names in (
-        ("rates", c.ANGULAR_VELOCITY), ("force", c.SPECIFIC_FORCE), ("position", c.POSITION)
-    ):  # fmt: skip
+    for quantity, names, turned in (
+        ("rates", c.ANGULAR_VELOCITY, half_turn_about_x),
+        ("force", c.SPECIFIC_FORCE, half_turn_about_x),
+        ("position", c.POSITION, half_turn_about_x),
+        ("attitude", c.QUATERNION, quaternion_to_frd_ned),
+    ):
         if quantity in first:
-            parts.append((names, first[quantity].time_s, half_turn_about_x(first[quantity].values)))
-    if "attitude" in first:
-        parts.append((c.QUATERNION, first["attitude"].time_s, quaternion_to_frd_ned(first["attitude"].values)))
+            parts.append((names, first[quantity].time_s, turned(first[quantity].values)))
     parts += _velocity(series, faults)
     for quantity, kind, unit in (
         ("speeds", "rotor_speed", 1.0), ("rpm", "rotor_speed", RPM), ("commands", "rotor_command", 1.0)
@@ -458,13 +459,11 @@ def convert(
     for quantity, name in (("voltage", c.BATTERY_VOLTAGE), ("current", c.BATTERY_CURRENT), ("range", c.HEIGHT)):
         if quantity in first:
             values = first[quantity].values
-            if (
-                quantity == "current" and np.nanmedian(values) < 0
-            ):  # discharging is negative by the message's definition
+            if quantity == "current" and np.nanmedian(values) < 0:  # discharging is negative by definition
                 values = -values
             parts.append(((name,), first[quantity].time_s, values))
-    table = in_the_air.table_on(grid, parts)
-    return table, in_the_air.airborne(table)[0]
+    table = table_on(grid, parts)
+    return table, airborne(table)[0]
 
 
 def _velocity(series: dict[str, list[_TopicSeries]], faults: list[ImportFault]) -> list[tuple]:
@@ -477,9 +476,10 @@ def _velocity(series: dict[str, list[_TopicSeries]], faults: list[ImportFault]) 
         return []
     velocity = series[stated][0]
     attitudes = [*series.get("attitude", []), *series.get("imu_attitude", [])]
-    own = [next((s for s in offered if s.topic == velocity.topic), offered[0]) if offered else None
-           for offered in (attitudes, series.get("position", []))]  # fmt: skip
-    attitude, position = own
+    attitude, position = (
+        next((s for s in offered if s.topic == velocity.topic), offered[0] if offered else None)
+        for offered in (attitudes, series.get("position", []))
+    )
     readings = {"velocity": velocity.values}
     if attitude is not None:
         nearest = np.searchsorted((attitude.time_s[1:] + attitude.time_s[:-1]) / 2, velocity.time_s)
@@ -528,6 +528,6 @@ def read_ros(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault], st
     in which rotor speeds are stated."""
     series, faults = _read_series(path)
     table, flying = convert(series, faults, path)
-    runs, cuts = in_the_air.flights(table, flying, (path.resolve() if path.is_dir() else path).name.split(".")[0], path)
+    runs, cuts = flights(table, flying, (path.resolve() if path.is_dir() else path).name.split(".")[0], path)
     unit = "rpm" if "rpm" in series and "speeds" not in series else "rad/s"
     return runs, [*faults, *report_gaps(table), *cuts], unit

@@ -13,7 +13,7 @@ from rotorid.identify.rotor import (
     rest_reading,
     usable,
 )
-from rotorid.recordings.spikes import lost_speed
+from rotorid.recordings.mended import lost_speed
 
 SPEED = np.array([400.0, 800.0, 1200.0, 1600.0, 2000.0])
 

@@ -11,7 +11,7 @@ import pytest
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import ardupilot
-from rotorid.recordings.importers.in_the_air import off_the_ground
+from rotorid.recordings.importers.faults import off_the_ground
 from tests.unit.recordings.importers.test_log_formats import PARAMETERS, dataflash, flown
 
 ROOT = Path(__file__).parents[4]

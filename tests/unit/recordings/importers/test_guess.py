@@ -18,8 +18,8 @@ from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings import read_set, templates
 from rotorid.recordings.importers.faults import join_rows
+from rotorid.recordings.importers.guessing import as_text, guess
 from rotorid.recordings.importers.guessing import names as column_names
-from rotorid.recordings.importers.guessing.guess import as_text, guess
 from rotorid.recordings.importers.mapping import BODY, TRAVEL, UNITS, WORLD, convert, read_columns, read_mapping
 from tests.public_logs import LOGS, needs_logs
 

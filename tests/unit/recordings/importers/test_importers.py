@@ -12,9 +12,16 @@ from scipy.spatial.transform import Rotation
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers import crazyflie, in_the_air, known, px4_ulog
+from rotorid.recordings.importers import crazyflie, known, px4_ulog
 from rotorid.recordings.importers.crazyflie import TYPES, decode_usd_log, read_usd_log
-from rotorid.recordings.importers.faults import blank_held, cut, drop_repeated_times, report_gaps, true_stretches
+from rotorid.recordings.importers.faults import (
+    blank_held,
+    cut,
+    drop_repeated_times,
+    flights,
+    report_gaps,
+    true_stretches,
+)
 from rotorid.recordings.importers.known import Parameters
 from rotorid.recordings.importers.mapping import (
     continuous,
@@ -23,9 +30,8 @@ from rotorid.recordings.importers.mapping import (
     quaternion_to_frd_ned,
 )
 from rotorid.recordings.importers.neurobem import USED, read_neurobem
-from rotorid.recordings.importers.public_sets import read_imrc_bench
+from rotorid.recordings.importers.public_sets import read_imrc_bench, read_vicon_csv
 from rotorid.recordings.importers.rcbenchmark import decode_text, read_rcbenchmark
-from rotorid.recordings.importers.vicon_csv import read_vicon_csv
 
 
 def kinds(faults) -> list[str]:
@@ -603,8 +609,8 @@ def test_a_px4_log_is_laid_out_on_the_fastest_inertial_clock(tmp_path: Path) -> 
             }
         )
     )
-    converted = px4_ulog.convert(px4_ulog.open_log(path), 4)
-    table, faults = converted.table, converted.faults
+    made, found, *_ = px4_ulog.convert(px4_ulog.open_log(path), 4)
+    table, faults = made, found
     assert table["time_s"].tolist() == pytest.approx(np.arange(50) * 0.004)
     assert table[list(c.ANGULAR_VELOCITY)].iloc[0].tolist() == pytest.approx([0.1, 0.2, 0.3])
     assert table["throttle_3"].tolist() == [0.75] * 50
@@ -632,11 +638,11 @@ def test_px4_rotor_speeds_and_messages(tmp_path: Path) -> None:
     time = np.arange(5) * 1000
     speeds = {"timestamp": time, "esc[0].esc_rpm": np.full(5, 6000.0)}
     log = px4(sensor_combined=gyro(), esc_status=speeds, actuator_outputs=outputs(1500.0))
-    converted = px4_ulog.convert(log, rotors=1)
-    assert converted.table["rotor_speed_1_rad_s"].tolist() == pytest.approx([200 * np.pi] * 5)
-    assert converted.table["throttle_1"].tolist() == [0.5] * 5
-    assert kinds(converted.faults) == ["unit"]
-    assert kinds(px4_ulog.convert(px4(sensor_combined=gyro(), esc_status=speeds), 1).faults) == ["no_command"]
+    made, found, *_ = px4_ulog.convert(log, rotors=1)
+    assert made["rotor_speed_1_rad_s"].tolist() == pytest.approx([200 * np.pi] * 5)
+    assert made["throttle_1"].tolist() == [0.5] * 5
+    assert kinds(found) == ["unit"]
+    assert kinds(px4_ulog.convert(px4(sensor_combined=gyro(), esc_status=speeds), 1)[1]) == ["no_command"]
     with pytest.raises(InputError, match="to take the clock from"):
         px4_ulog.convert(px4(battery_status={"timestamp": time}), rotors=1)
     (tmp_path / "x.ulg").write_bytes(b"nothing")
@@ -649,33 +655,33 @@ def test_px4_rotor_speeds_and_messages(tmp_path: Path) -> None:
 def test_px4_pulses_take_the_range_of_their_own_output() -> None:
     parameters = {"PWM_MAIN_MIN": 1075, "PWM_MAIN_MAX": 1950, "PWM_MAIN_MIN2": 1000, "PWM_MAIN_MAX1": -1}
     log = px4(parameters, sensor_combined=gyro(), actuator_outputs=outputs(1512.5, 1475.0, 900.0))
-    converted = px4_ulog.convert(log, rotors=3)
-    table = converted.table
+    made, found, *_ = px4_ulog.convert(log, rotors=3)
+    table = made
     assert table[["throttle_1", "throttle_2", "throttle_3"]].iloc[0].tolist() == pytest.approx([0.5, 0.5, 0.0])
-    assert kinds(converted.faults) == ["range"]
+    assert kinds(found) == ["range"]
 
 
 def test_px4_motors_are_found_by_the_function_of_an_output() -> None:
     parameters = {"PWM_MAIN_FUNC1": 102, "PWM_MAIN_FUNC2": 101, "PWM_MAIN_MIN": 1000, "PWM_MAIN_MAX": 2000}
     log = px4(parameters, sensor_combined=gyro(), actuator_outputs=outputs(1250.0, 1750.0))
-    table = px4_ulog.convert(log, rotors=2).table
+    table = px4_ulog.convert(log, rotors=2)[0]
     assert table[["throttle_1", "throttle_2"]].iloc[0].tolist() == [0.75, 0.25]
     silent = px4({"PWM_MAIN_FUNC1": 201}, sensor_combined=gyro(), actuator_outputs=outputs(1250.0, 1750.0))
-    assert kinds(px4_ulog.convert(silent, rotors=2).faults) == ["no_command"]
+    assert kinds(px4_ulog.convert(silent, rotors=2)[1]) == ["no_command"]
 
 
 def test_px4_takes_the_instance_whose_outputs_move() -> None:
     moving = outputs(1500.0, 1500.0)
     moving["output[0]"], moving["output[1]"] = np.linspace(1000, 2000, 5), np.linspace(2000, 1000, 5)
     log = px4(sensor_combined=gyro(), actuator_outputs=[outputs(1000.0, 1500.0), moving])
-    converted = px4_ulog.convert(log, rotors=2)
-    assert converted.table["throttle_1"].tolist() == pytest.approx([0, 0.25, 0.5, 0.75, 1])
-    assert "instances" in kinds(converted.faults)
+    made, found, *_ = px4_ulog.convert(log, rotors=2)
+    assert made["throttle_1"].tolist() == pytest.approx([0, 0.25, 0.5, 0.75, 1])
+    assert "instances" in kinds(found)
 
 
 def test_px4_thrusts_become_signals_by_the_thrust_model() -> None:
     motors = {"timestamp": np.arange(5) * 1000, "control[0]": np.full(5, 0.3 * 0.5**2 + 0.7 * 0.5)}
-    table = px4_ulog.convert(px4({"THR_MDL_FAC": 0.3}, sensor_combined=gyro(), actuator_motors=motors), 1).table
+    table = px4_ulog.convert(px4({"THR_MDL_FAC": 0.3}, sensor_combined=gyro(), actuator_motors=motors), 1)[0]
     assert table["throttle_1"].tolist() == pytest.approx([0.5] * 5)
 
 
@@ -688,7 +694,7 @@ def test_px4_speeds_follow_their_function_and_an_offline_controller_is_missing()
         "esc[1].esc_rpm": np.full(5, 3000),
         "esc[1].actuator_function": np.full(5, 101),
     }
-    table = px4_ulog.convert(px4(sensor_combined=gyro(), esc_status=esc), 2).table
+    table = px4_ulog.convert(px4(sensor_combined=gyro(), esc_status=esc), 2)[0]
     assert table["rotor_speed_2_rad_s"].iloc[0] == pytest.approx(200 * np.pi)
     assert table["rotor_speed_1_rad_s"].isna().tolist() == [False, False, True, False, False]
 
@@ -696,9 +702,9 @@ def test_px4_speeds_follow_their_function_and_an_offline_controller_is_missing()
 @pytest.mark.parametrize(("rpm", "taken"), [((0, 3000), 3000), ((3000, 0), 3000), ((3000, 6000), 3000)])
 def test_px4_speeds_are_those_of_the_instance_that_turns(rpm, taken: int) -> None:
     instances = [{"timestamp": np.arange(5) * 1000, "esc[0].esc_rpm": np.full(5, own)} for own in rpm]
-    converted = px4_ulog.convert(px4(sensor_combined=gyro(), esc_status=instances), 1)
-    assert converted.table["rotor_speed_1_rad_s"].tolist() == pytest.approx([taken * np.pi / 30] * 5)
-    assert ("instances" in kinds(converted.faults)) == all(rpm)
+    made, found, *_ = px4_ulog.convert(px4(sensor_combined=gyro(), esc_status=instances), 1)
+    assert made["rotor_speed_1_rad_s"].tolist() == pytest.approx([taken * np.pi / 30] * 5)
+    assert ("instances" in kinds(found)) == all(rpm)
 
 
 @pytest.mark.parametrize(("first", "taken"), [(20, 0.0), (19, 0.0), (10, 1.0), (2, 1.0)])
@@ -708,7 +714,7 @@ def test_px4_of_several_instances_the_first_that_goes_on_is_read(first: int, tak
         {"timestamp": np.arange(count) * 1000, **{f"q[{k}]": np.full(count, float(k == own)) for k in range(4)}}
         for own, count in enumerate((first, 20))
     ]
-    table = px4_ulog.convert(px4(sensor_combined=gyro(20), vehicle_attitude=instances), 1).table
+    table = px4_ulog.convert(px4(sensor_combined=gyro(20), vehicle_attitude=instances), 1)[0]
     assert table["quaternion_x"].iloc[0] == taken
 
 
@@ -726,13 +732,13 @@ def test_px4_invalid_positions_heights_and_currents_are_missing() -> None:
     battery = {"timestamp": np.arange(5) * 1000, "voltage_v": np.full(5, 16.0), "current_a": np.full(5, -1.0)}
     second = {**battery, "voltage_v": np.full(5, 24.0), "current_a": np.full(5, 3.0)}
     log = px4(sensor_combined=gyro(), vehicle_local_position=place, battery_status=[battery, second])
-    converted = px4_ulog.convert(log, 1)
-    table = converted.table
+    made, found, *_ = px4_ulog.convert(log, 1)
+    table = made
     assert table["position_x_m"].isna().tolist() == [True, True, False, False, False]
     assert table["position_z_m"].tolist() == [0, 1, 2, 3, 4]
     assert not {"velocity_x_m_s", "velocity_y_m_s", "height_m", "battery_current_a"} & set(table.columns)
     assert table["battery_2_voltage_v"].tolist() == [24.0] * 5
-    assert {"invalid", "not_measured", "instances"} <= set(kinds(converted.faults))
+    assert {"invalid", "not_measured", "instances"} <= set(kinds(found))
 
 
 def px4_flight(**more) -> px4_ulog.Px4Log:
@@ -744,7 +750,7 @@ def px4_flight(**more) -> px4_ulog.Px4Log:
 
 
 def test_px4_only_the_part_in_the_air_is_flown_and_a_jump_of_the_estimator_ends_it() -> None:
-    flying = px4_ulog.convert(px4_flight(), 1).flying
+    _, _, flying, _ = px4_ulog.convert(px4_flight(), 1)
     time_s = np.arange(2001) * 0.01
     assert (time_s[flying].min(), time_s[flying].max()) == (5.0, pytest.approx(14.99))
 
@@ -760,10 +766,10 @@ def test_px4_each_jump_of_the_estimator_ends_a_run(topic: str, counter: str, fie
     data |= {f"q[{i}]": np.full(count, float(i == 0)) for i in range(4)}
     for by, runs in ((None, 2), (2 * small, 2), (0.5 * small, 1)):
         stated = {} if by is None else {f: after * (by if f == fields[0] else 0.0) for f in fields}
-        converted = px4_ulog.convert(px4(sensor_combined=gyro(count, 10_000), **{topic: data | stated}), 1)
-        found, _ = in_the_air.flights(converted.table, converted.flying, "run", "log", converted.jumps)
-        assert len(found) == runs, by
-        assert ("estimator_reset" in kinds(converted.faults)) == (runs > 1)
+        log = px4(sensor_combined=gyro(count, 10_000), **{topic: data | stated})
+        made, found, flying, jumps = px4_ulog.convert(log, 1)
+        assert len(flights(made, flying, "run", "log", jumps)[0]) == runs, by
+        assert ("estimator_reset" in kinds(found)) == (runs > 1)
 
 
 def test_px4_rotors_and_torque_come_from_control_allocation() -> None:
@@ -798,7 +804,7 @@ def test_px4_the_type_says_how_many_rotors_and_else_the_motors_that_are_driven(k
     log = px4({} if kind is None else {"MAV_TYPE": kind}, sensor_combined=gyro(), actuator_motors=motors)
     assert px4_ulog.rotor_count(log) == rotors
     assert px4_ulog.rotor_count(px4({"CA_ROTOR_COUNT": 3}, actuator_motors=motors)) == 3
-    faults = px4_ulog.convert(log, rotors).faults
+    faults = px4_ulog.convert(log, rotors)[1]
     assert any("drives 6 motors" in f.found for f in faults) == (rotors < 6)
 
 
@@ -814,7 +820,7 @@ def test_px4_speeds_and_outputs_of_more_motors_than_stated_are_named() -> None:
     outputs_ = {"timestamp": time, **{f"output[{i}]": p for i, p in enumerate(pulses.T)}}
     log = px4(sensor_combined=gyro(400), actuator_outputs=outputs_, esc_status=esc)
     for rotors, named in ((4, True), (6, False)):
-        found = [f.found for f in px4_ulog.convert(log, rotors).faults if f.kind == "order"]
+        found = [f.found for f in px4_ulog.convert(log, rotors)[1] if f.kind == "order"]
         assert [f.split()[:3] for f in found] == [
             [t, "drives", "6"] for t in ("actuator_outputs", "esc_status")
         ] * named
@@ -863,12 +869,12 @@ def test_px4_a_motor_that_is_reversed_for_a_time_has_empty_cells_there(sign: flo
     flips = np.where(np.arange(10) < 3, -1.0, 1.0)
     motors = {"timestamp": time, "control[0]": 0.5 * flips, "control[1]": np.full(10, 0.5)}
     esc = {"timestamp": time, "esc[0].esc_rpm": sign * 6000 * flips, "esc[1].esc_rpm": np.full(10, sign * 6000.0)}
-    converted = px4_ulog.convert(px4(sensor_combined=gyro(10), actuator_motors=motors, esc_status=esc), 2)
+    made, found, *_ = px4_ulog.convert(px4(sensor_combined=gyro(10), actuator_motors=motors, esc_status=esc), 2)
     for name, size in (("throttle_{}", 0.5), ("rotor_speed_{}_rad_s", 200 * np.pi)):
-        assert converted.table[name.format(1)].isna().tolist() == [True] * 3 + [False] * 7
-        assert converted.table[name.format(1)].dropna().to_numpy() == pytest.approx(size)
-        assert converted.table[name.format(2)].to_numpy() == pytest.approx(size)
-    assert [f.column for f in converted.faults if f.kind == "reversed"] == ["throttle_1", "rotor_speed_1_rad_s"]
+        assert made[name.format(1)].isna().tolist() == [True] * 3 + [False] * 7
+        assert made[name.format(1)].dropna().to_numpy() == pytest.approx(size)
+        assert made[name.format(2)].to_numpy() == pytest.approx(size)
+    assert [f.column for f in found if f.kind == "reversed"] == ["throttle_1", "rotor_speed_1_rad_s"]
 
 
 @pytest.mark.parametrize("port", ["MAIN", "AUX"])
@@ -880,9 +886,9 @@ def test_px4_rotors_are_found_by_function_on_either_port(port: str) -> None:
     if port == "AUX":
         values["PWM_MAIN_FUNC1"] = 201
     log = px4(values, sensor_combined=gyro(), actuator_outputs=outputs(1900.0, 1700.0, 1111.0, 1250.0, 1800.0, 1900.0))
-    table = px4_ulog.convert(log, 3).table
+    table = px4_ulog.convert(log, 3)[0]
     assert table[["throttle_1", "throttle_2", "throttle_3"]].iloc[0].tolist() == pytest.approx([0.25, 0.3, 0.6])
-    (said,) = [f.found for f in px4_ulog.convert(log, 4).faults if f.kind == "no_command"]
+    (said,) = [f.found for f in px4_ulog.convert(log, 4)[1] if f.kind == "no_command"]
     assert "motor 4" in said
 
 
@@ -899,9 +905,9 @@ def test_px4_a_pulse_is_read_by_the_parameters_that_held_then(change, before: fl
     stated = {"PWM_MAIN_FUNC1": 101, "PWM_MAIN_MIN1": 1000, "PWM_MAIN_MAX1": 2000, "PWM_MAIN_REV": 0, "THR_MDL_FAC": 0}
     topics = {"sensor_combined": [gyro(10)], "actuator_outputs": [outputs(1500.0, count=10)]}
     log = px4_ulog.Px4Log(topics, Parameters.of([(3000.0, "PWM_MAIN_MIN1", 1000), (5000.0, *change)], stated))
-    converted = px4_ulog.convert(log, 1)
-    assert converted.table["throttle_1"].tolist() == pytest.approx([before] * 5 + [after] * 5)
-    (said,) = [f.sentence for f in converted.faults if f.kind == "parameter_changed"]
+    made, found, *_ = px4_ulog.convert(log, 1)
+    assert made["throttle_1"].tolist() == pytest.approx([before] * 5 + [after] * 5)
+    (said,) = [f.sentence for f in found if f.kind == "parameter_changed"]
     assert f"{change[0]} was set from" in said and f"to {change[1]:g} at 0.01 s" in said
 
 
@@ -909,9 +915,9 @@ def test_px4_a_thrust_curve_set_in_the_air_holds_from_then_on() -> None:
     motors = {"timestamp": np.arange(10) * 1000, "control[0]": np.full(10, 0.3 * 0.5**2 + 0.7 * 0.5)}
     changes = [(5000.0, "THR_MDL_FAC", 0.3), (8000.0, "THR_MDL_FAC", 0.0)]
     topics = {"sensor_combined": [gyro(10)], "actuator_motors": [motors]}
-    converted = px4_ulog.convert(px4_ulog.Px4Log(topics, Parameters.of(changes, {"THR_MDL_FAC": 0.0})), 1)
-    assert converted.table["throttle_1"].tolist() == pytest.approx([0.425] * 5 + [0.5] * 3 + [0.425] * 2)
-    (said,) = [f.found for f in converted.faults if f.kind == "parameter_changed"]
+    made, found, *_ = px4_ulog.convert(px4_ulog.Px4Log(topics, Parameters.of(changes, {"THR_MDL_FAC": 0.0})), 1)
+    assert made["throttle_1"].tolist() == pytest.approx([0.425] * 5 + [0.5] * 3 + [0.425] * 2)
+    (said,) = [f.found for f in found if f.kind == "parameter_changed"]
     assert said == "THR_MDL_FAC was set from 0 to 0.3 at 0.01 s, to 0 at 0.01 s of the log"
 
 
@@ -922,7 +928,7 @@ def test_px4_a_change_of_what_else_is_compared_is_stated_and_the_value_of_most_o
             {"sensor_combined": [gyro(20)]}, Parameters.of([(at, name, 3.0), (at, "MC_ROLL_P", 5)], {name: 2.0})
         )
         assert px4_ulog.in_flight(log)[name] == value
-        changed = [f.found.split()[0] for f in px4_ulog.convert(log, 1).faults if f.kind == "parameter_changed"]
+        changed = [f.found.split()[0] for f in px4_ulog.convert(log, 1)[1] if f.kind == "parameter_changed"]
         assert changed == [name]
 
 
@@ -939,7 +945,7 @@ def test_px4_a_topic_subscribed_twice_keeps_its_first_half(tmp_path: Path, numbe
         for k in range(50 * half, 50 * half + 50):
             data += ulog_message("D", struct.pack("<HQfff", own, 1_000_000 + 4000 * k, k, 0, 0))
     (tmp_path / "log.ulg").write_bytes(data)
-    table = px4_ulog.convert(px4_ulog.open_log(tmp_path / "log.ulg"), 4).table
+    table = px4_ulog.convert(px4_ulog.open_log(tmp_path / "log.ulg"), 4)[0]
     assert table["angular_velocity_x_rad_s"].tolist() == list(range(100))
 
 
@@ -951,8 +957,8 @@ def test_px4_a_log_cut_off_anywhere_keeps_every_whole_message(tmp_path: Path) ->
     size = 3 + 2 + kind.itemsize
     for lost in range(2 * size + 1):
         (tmp_path / "log.ulg").write_bytes(data[: len(data) - lost])
-        converted = px4_ulog.convert(px4_ulog.open_log(tmp_path / "log.ulg"), 4)
-        assert len(converted.table) == 40 - -(-lost // size)
-        assert ("cut_off" in kinds(converted.faults)) == (lost % size > 0)
+        made, found, *_ = px4_ulog.convert(px4_ulog.open_log(tmp_path / "log.ulg"), 4)
+        assert len(made) == 40 - -(-lost // size)
+        assert ("cut_off" in kinds(found)) == (lost % size > 0)
     with pytest.raises(InputError, match="VTOL"):
         px4_ulog.rotor_count(px4({"MAV_TYPE": 22}))

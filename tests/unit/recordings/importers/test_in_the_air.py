@@ -13,7 +13,7 @@ from rotorid.cli import app
 from rotorid.cli.modelling import fly
 from rotorid.recordings import columns as c
 from rotorid.recordings import read_set, templates
-from rotorid.recordings.importers.in_the_air import airborne
+from rotorid.recordings.importers.faults import airborne
 from rotorid.recordings.importers.logfile import read_log
 from tests.public_logs import PUBLIC, needs_logs
 

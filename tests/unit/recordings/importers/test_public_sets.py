@@ -16,9 +16,9 @@ from scipy.spatial.transform import Rotation
 from rotorid.io.public_list import of_one_motor, read_manifest
 from rotorid.recordings import columns as c
 from rotorid.recordings import read_set, read_vehicle
-from rotorid.recordings.importers import overview
+from rotorid.recordings.importers import public_sets
 from rotorid.recordings.importers.faults import read_report
-from rotorid.recordings.importers.public_sets import PUBLIC_SETS, Obtained, address, build, obtain, sets_of, sha256
+from rotorid.recordings.importers.public_sets import PUBLIC_SETS, address, build, obtain, sets_of, sha256
 from rotorid_proof.plantings import sow
 from rotorid_proof.plantings.flights import FLIGHTS as PLANTED
 
@@ -55,16 +55,13 @@ def test_an_address_is_built_of_repository_commit_and_path() -> None:
 def test_files_of_a_folder_are_checked(tmp_path: Path) -> None:
     source = source_of(b"right")
     path = tmp_path / "s" / "a b (c)" / "x.bin"
-    found = obtain("s", source, tmp_path, tmp_path / "cache")
-    assert not found.complete
-    assert "is not there" in found.missing["a b (c)/x.bin"]
+    _, missing = obtain("s", source, tmp_path, tmp_path / "cache")
+    assert "is not there" in missing["a b (c)/x.bin"]
     path.parent.mkdir(parents=True)
     path.write_bytes(b"wrong")
-    assert "SHA-256 differs" in obtain("s", source, tmp_path, tmp_path).missing["a b (c)/x.bin"]
+    assert "SHA-256 differs" in obtain("s", source, tmp_path, tmp_path)[1]["a b (c)/x.bin"]
     path.write_bytes(b"right")
-    found = obtain("s", source, tmp_path, tmp_path)
-    assert found.complete
-    assert found.files == ("a b (c)/x.bin",)
+    assert obtain("s", source, tmp_path, tmp_path) == (tmp_path / "s", {})
     assert sha256(path) == source["files"][0]["sha256"]
 
 
@@ -89,25 +86,25 @@ def test_a_download_is_checked_kept_and_not_repeated(tmp_path: Path, server) -> 
     upstream = root / "someone" / "something" / "c0ffee" / "a b (c)" / "x.bin"
     source = source_of(b"right")
     cache = tmp_path / "cache"
-    found = obtain("s", source, None, cache, base)
-    assert "the server answers 404" in found.missing["a b (c)/x.bin"]
+    _, missing = obtain("s", source, None, cache, base)
+    assert "the server answers 404" in missing["a b (c)/x.bin"]
     upstream.write_bytes(b"tampered")
-    found = obtain("s", source, None, cache, base)
-    assert "SHA-256 is" in found.missing["a b (c)/x.bin"]
+    _, missing = obtain("s", source, None, cache, base)
+    assert "SHA-256 is" in missing["a b (c)/x.bin"]
     assert not list(cache.rglob("*.bin"))
     upstream.write_bytes(b"right")
-    assert obtain("s", source, None, cache, base).complete
+    assert not obtain("s", source, None, cache, base)[1]
     upstream.unlink()
-    assert obtain("s", source, None, cache, base).complete
+    assert not obtain("s", source, None, cache, base)[1]
 
 
 def test_without_a_network_the_reason_is_told_once_for_all_files(tmp_path: Path) -> None:
     source = source_of(b"")
     source["files"] = [{"path": f"{n}", "sha256": "0"} for n in range(3)]
-    found = obtain("s", source, None, tmp_path, "http://127.0.0.1:1")
-    assert len(found.missing) == 3
-    assert len(set(found.missing.values())) == 1
-    assert found.missing["0"].startswith("no answer from 127.0.0.1:1")
+    _, missing = obtain("s", source, None, tmp_path, "http://127.0.0.1:1")
+    assert len(missing) == 3
+    assert len(set(missing.values())) == 1
+    assert missing["0"].startswith("no answer from 127.0.0.1:1")
 
 
 def test_a_set_that_cannot_be_had_says_so(tmp_path: Path) -> None:
@@ -129,7 +126,7 @@ def test_an_import_that_stops_while_it_reads_leaves_no_folder(tmp_path: Path, mo
         raise KeyboardInterrupt
 
     monkeypatch.setitem(PUBLIC_SETS, "neurobem", replace(PUBLIC_SETS["neurobem"], read=stopped))
-    found = Obtained("neurobem", tmp_path, PUBLIC_SETS["neurobem"].files, {})
+    found = tmp_path, {}
     with pytest.raises(KeyboardInterrupt):
         build("neurobem", found, MANIFEST["neurobem"], VEHICLES, tmp_path / "sets")
     assert not (tmp_path / "sets").exists()
@@ -294,10 +291,10 @@ def test_the_tables_of_the_report_count_runs_not_sets_twice(real, tmp_path: Path
         source = PUBLIC_SETS[name].source
         found = obtain(source, MANIFEST[source], REAL, tmp_path)
         folders.append(build(name, found, MANIFEST[source], VEHICLES, tmp_path))
-    table = overview.faults(folders)
+    table = public_sets.faults(folders)
     pitch = table[table["fault"] == "pitch not recorded"]
     assert pitch[["source", "runs"]].to_numpy().tolist() == [["crazypad", 16]]
-    assert overview.recordings(folders)["runs"].tolist() == [2, 10, 6]
+    assert public_sets.recordings(folders)["runs"].tolist() == [2, 10, 6]
 
 
 @needs_data

@@ -8,7 +8,7 @@ import pytest
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.guessing.guess import guess
+from rotorid.recordings.importers.guessing import guess
 from rotorid.recordings.importers.logfile import format_of, read_log
 from rotorid.recordings.importers.mapping import Mapping, read_by_mapping, read_columns
 

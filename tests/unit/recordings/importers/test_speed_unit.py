@@ -9,13 +9,20 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from rotorid.io.text.files import parse_yaml
 from rotorid.recordings import columns as c
 from rotorid.recordings import templates
+from rotorid.recordings.files import vehicle_of
 from rotorid.recordings.importers import known
-from rotorid.recordings.importers.logfile import read_log
+from rotorid.recordings.importers.known import propose
+from rotorid.recordings.importers.logfile import (
+    carrying_unit,
+    in_unit_of_weight,
+    read_log,
+    set_of_logs,
+    usual_coefficient,
+)
 from rotorid.recordings.importers.mapping import UNITS, Mapping
-from rotorid.recordings.importers.propose import propose
-from rotorid.recordings.importers.set_of_logs import carrying_unit, in_unit_of_weight, set_of_logs, usual_coefficient
 from tests.public_logs import PUBLIC
 
 SPEEDS = list(c.rotor_columns("rotor_speed", 4))
@@ -99,15 +106,15 @@ def test_a_geometry_of_one_metre_is_directions_alone() -> None:
     found, _ = known.px4_vehicle(parameters, 4)
     assert found.rotors is None and len(found.directions) == 4
     template = templates.read("x500")
-    proposal = propose("own", [], found, template, "x500", 2.0)
-    rotors = proposal.vehicle.rotors
+    text, remarks = propose("own", [], found, template, "x500", 2.0)
+    rotors = vehicle_of(parse_yaml(text, ""), "").rotors
     assert [np.hypot(r.x_m, r.y_m) for r in rotors] == pytest.approx(
         [np.hypot(template.rotors[0].x_m, template.rotors[0].y_m)] * 4, rel=1e-4
     )
     assert [(np.sign(r.x_m), np.sign(r.y_m), r.spin) for r in rotors] == [
         (1, 1, "ccw"), (-1, -1, "ccw"), (1, -1, "cw"), (-1, 1, "cw"),
     ]  # fmt: skip
-    assert any("±1 m is unset" in remark for remark in proposal.remarks)
+    assert any("±1 m is unset" in remark for remark in remarks)
     real, _ = known.px4_vehicle(parameters | {"CA_ROTOR0_PX": 0.9}, 4)
     assert real.rotors is not None and real.directions is None
 

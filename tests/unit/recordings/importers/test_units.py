@@ -8,12 +8,10 @@ import pytest
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.guessing.guess import guess
-from rotorid.recordings.importers.logfile import format_of
-from rotorid.recordings.importers.mapping import read_columns
+from rotorid.recordings.importers.guessing import guess
+from rotorid.recordings.importers.logfile import format_of, set_of_logs
+from rotorid.recordings.importers.mapping import SPELLINGS, UNITS, bracketed, converted, read_columns, stated, unit_of
 from rotorid.recordings.importers.rcbenchmark import HEADINGS, read_rcbenchmark
-from rotorid.recordings.importers.set_of_logs import set_of_logs
-from rotorid.recordings.importers.units import SPELLINGS, UNITS, bracketed, converted, stated, unit_of
 
 POUND, OUNCE, FOOT, INCH = 4.44822161526, 0.278013850954, 0.3048, 0.0254
 WRITTEN = {  # kind: a text and what 1 of it is in the contract's unit

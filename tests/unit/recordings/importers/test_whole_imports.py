@@ -19,9 +19,9 @@ from rotorid.errors import InputError
 from rotorid.io.text import writing
 from rotorid.recordings import list_sets, read_set, write_set
 from rotorid.recordings.files import FILE_NAME
-from rotorid.recordings.importers import set_of_logs as writer
+from rotorid.recordings.importers import logfile as writer
 from rotorid.recordings.importers.faults import read_report
-from rotorid.recordings.importers.set_of_logs import SetOfLogs
+from rotorid.recordings.importers.logfile import SetOfLogs
 from tests.unit.recordings.wrong_inputs import RUN, VEHICLE, sound, table
 
 MOST_STEPS = 80
@@ -156,14 +156,14 @@ def test_a_full_disk_is_one_sentence_and_loses_nothing(when: str, there: bool, t
 KILLED = """
 import os, signal, sys
 from rotorid.cli import app
-from rotorid.recordings.importers import set_of_logs
+from rotorid.recordings.importers import logfile
 
-write = set_of_logs.write_table
+write = logfile.write_table
 def second_kills(table, path):
     if path.name.startswith("run2"):
         os.kill(os.getpid(), signal.SIGKILL)
     write(table, path)
-set_of_logs.write_table = second_kills
+logfile.write_table = second_kills
 app(sys.argv[1:])
 """
 

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from rotorid.cli import app
 from rotorid.errors import InputError
 from rotorid.recordings import read_set
-from rotorid.recordings.importers.guessing.guess import guess
+from rotorid.recordings.importers.guessing import guess
 from rotorid.recordings.importers.mapping import Mapping, read_by_mapping, read_columns
 from tests.unit.recordings.wrong_inputs import LINES, RUN, SPEEDS, WIDTH, table
 

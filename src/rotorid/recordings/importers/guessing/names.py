@@ -29,7 +29,7 @@ _QUALIFIERS = frozenset(
 _AFTER_NUMBERS = frozenset("us usec pwm dshot pct percent raw".split())
 """Words that may stand behind the number of a rotor (`m1_us`, `servo1_raw`)."""
 _IN_BODY = frozenset(("b", "body", "bodyframe", "frd", "flu"))
-SOURCES = frozenset("state estimate est ekf odom odometry vicon mocap imu drone quad uav vehicle px4 mavros".split())
+_SOURCES = frozenset("state estimate est ekf odom odometry vicon mocap imu drone quad uav vehicle px4 mavros".split())
 """Words at the beginning of a stem that say where a value comes from."""
 OTHER_THINGS = frozenset(
     "bias offset std sigma var variance cov covariance err error innov innovation sp setpoint ref reference des "
@@ -72,24 +72,12 @@ _TURNING = frozenset("rate rates speed vel gyro gyr omega".split())
 """Words that make a name of an angle one of a body rate."""
 _SCALARS: dict[str, tuple[str, ...]] = {
     "time": (
-        r"%?t([ _(\[]*([munµ]?s)[)\]]?)?",
-        r"[%_]*time(stamp)?([ _(\[].*)?",
-        r"time_.*",
-        r".*timestamp.*",
-        r"elapsed.*",
-        r"(date|utc)[ _]?time.*",
-        r"(.*[._/])?stamp(\b.*)?",
-        r"sec(ond)?s?",
-        r".*time([um]s)?([ _(\[].*)?",
+        r"%?t([ _(\[]*([munµ]?s)[)\]]?)?", r"[%_]*time(stamp)?([ _(\[].*)?", r"time_.*", r".*timestamp.*", r"elapsed.*",
+        r"(date|utc)[ _]?time.*", r"(.*[._/])?stamp(\b.*)?", r"sec(ond)?s?", r".*time([um]s)?([ _(\[].*)?",
     ),
     "battery_voltage": (r"v_?bat(t|tery)?.*", r"batt?(ery)?_?v(olt(age)?)?.*", r"volt(age)?.*", r"u_?bat.*"),
     "battery_current": (
-        r"amperage.*",
-        r"curr(ent)?\b.*",
-        r"current.*",
-        r"i_?bat.*",
-        r"battery_?current.*",
-        r"amps?\b.*",
+        r"amperage.*", r"curr(ent)?\b.*", r"current.*", r"i_?bat.*", r"battery_?current.*", r"amps?\b.*",
     ),
     "height": (r"height.*", r"agl.*", r"range.*"),
     "temperature": (r"temp(erature)?.*",),
@@ -101,7 +89,7 @@ _SCALARS: dict[str, tuple[str, ...]] = {
         r".*rotation.*speed.*",
     ),
     "throttle": (r"(throttle|esc|pwm|motor command)([ _(\[,/].*)?",),
-}
+}  # fmt: skip
 _MAVLINK = "xyz of MAVLink"
 AXES = ("xyz", "012", "123", "ned", "enu")
 FOURS = ("wxyz", "0123", "1234")
@@ -144,14 +132,6 @@ def unit_of(name: str) -> str:
     return _without_unit(words_of(name))[1]
 
 
-def _without_qualifiers(words: list[str]) -> list[str]:
-    while len(words) > 1 and words[-1] in _QUALIFIERS:
-        words = words[:-1]
-    while words and words[0] in SOURCES:
-        words = words[1:]
-    return words
-
-
 def _member(name: str, axes: str) -> tuple[str, str, str, frozenset[str]] | None:
     """Stem, axis, stated unit and words of a name as a member of a family with `axes`; None where it is none."""
     words, unit = _without_unit(words_of(name))
@@ -166,7 +146,11 @@ def _member(name: str, axes: str) -> tuple[str, str, str, frozenset[str]] | None
         return None  # of a longer number
     stem = [*ends[:-1], *([last_word] if last_word else [])]
     stem, more = _without_unit(stem) if len(stem) > 1 else (stem, "")
-    kept = _without_qualifiers(stem)
+    kept = stem
+    while len(kept) > 1 and kept[-1] in _QUALIFIERS:
+        kept = kept[:-1]
+    while kept and kept[0] in _SOURCES:
+        kept = kept[1:]
     return "_".join(kept), axis, unit or more, frozenset(words) | frozenset(stem)
 
 
@@ -183,10 +167,9 @@ def families(names: Iterable[str], axes: str) -> list[Family]:
     result = []
     for (stem, qualifiers), members in found.items():
         if set(members) == set(axes):
-            units = {unit for _, unit in members.values()}
-            columns = tuple(members[a][0] for a in axes)
+            columns, units = zip(*(members[a] for a in axes), strict=True)
             words = frozenset(stem.split("_")) | qualifiers
-            result.append(Family(stem, columns, axes, units.pop() if len(units) == 1 else "", words))
+            result.append(Family(stem, columns, axes, _the_one(units), words))
     return sorted(result, key=lambda f: names.index(f.columns[0]))
 
 
@@ -204,14 +187,16 @@ def numbered(names: Iterable[str]) -> list[Family]:
             found.setdefault(stem, {}).setdefault(int(match.group(2)), (name, unit))
     result = []
     for stem, members in found.items():
-        count = len(members)
-        if 3 <= count <= 16 and sorted(members) in (list(range(count)), list(range(1, count + 1))):
-            order = sorted(members)
-            units = {members[k][1] for k in order}
-            columns = tuple(members[k][0] for k in order)
-            unit = units.pop() if len(units) == 1 else ""
-            result.append(Family(stem, columns, "number", unit, frozenset(stem.split("_"))))
+        count, order = len(members), sorted(members)
+        if 3 <= count <= 16 and order in (list(range(count)), list(range(1, count + 1))):
+            columns, units = zip(*(members[k] for k in order), strict=True)
+            result.append(Family(stem, columns, "number", _the_one(units), frozenset(stem.split("_"))))
     return result
+
+
+def _the_one(units: Iterable[str]) -> str:
+    """The unit that all members of a family state; empty where they state several."""
+    return next(iter(set(units))) if len(set(units)) == 1 else ""
 
 
 def of_mavlink(names: Iterable[str]) -> list[Family]:
@@ -242,9 +227,8 @@ def body_rates(names: Iterable[str]) -> list[Family]:
                 found.setdefault(axis, (name, unit))
     if len(found) < 3:
         return []
-    units = {unit for _, unit in found.values()}
-    columns = tuple(found[axis][0] for axis in range(3))
-    return [Family("omega", columns, "xyz", units.pop() if len(units) == 1 else "", frozenset(("omega",)))]
+    columns, units = zip(*(found[axis] for axis in range(3)), strict=True)
+    return [Family("omega", columns, "xyz", _the_one(units), frozenset(("omega",)))]
 
 
 def _ends_in(stem: str, words: frozenset[str]) -> bool:
@@ -254,31 +238,25 @@ def _ends_in(stem: str, words: frozenset[str]) -> bool:
 def is_named(family: Family, quantity: str) -> bool:
     """Whether three columns are named as a quantity of motion; `ang_vel` is no velocity, `acc_bias` no acceleration."""
     endings, whole = TRIPLES[quantity]
-    if family.words & OTHER_THINGS - endings:
+    if family.words & OTHER_THINGS - endings or family.axes in ("012", "123") and family.stem == "":
         return False
-    if family.axes in ("012", "123") and family.stem == "":
-        return False
-    turning = bool(family.words & {"ang", "angular", "rot", "rotational"})
-    if quantity != "angular_velocity" and turning:
+    if quantity != "angular_velocity" and family.words & {"ang", "angular", "rot", "rotational"}:
         return False
     return _ends_in(family.stem, endings) or family.stem in whole
 
 
 def is_rotor(family: Family, quantity: str) -> bool:
     """Whether numbered columns are named as speeds, commanded speeds or throttles of rotors."""
-    stem = family.stem
-    rest = [w for w in stem.split("_") if w not in _WISHED]
+    stem, wished = family.stem, bool(family.words & _WISHED)
+    rest = "_".join(w for w in stem.split("_") if w not in _WISHED)
     if quantity == "rotor_command":
-        return _ends_in(stem, _ROTORS[quantity]) or (
-            bool(family.words & _WISHED) and _ends_in("_".join(rest), _ROTORS["rotor_speed"])
-        )
-    if family.words & _WISHED and quantity == "rotor_speed":
-        return False
-    if quantity == "rotor_speed" and family.unit in ("rpm", "krpm", "erpm", "100erpm"):
-        return True
-    if quantity == "rotor_speed" and family.unit in ("rad/s", "hz"):
-        return _ends_in(stem, _ROTORS[quantity] | _ROTORS["throttle"])
-    return _ends_in("_".join(rest), _ROTORS[quantity])
+        return _ends_in(stem, _ROTORS[quantity]) or wished and _ends_in(rest, _ROTORS["rotor_speed"])
+    if quantity == "rotor_speed":
+        if wished or family.unit in ("rpm", "krpm", "erpm", "100erpm"):
+            return not wished
+        if family.unit in ("rad/s", "hz"):
+            return _ends_in(stem, _ROTORS[quantity] | _ROTORS["throttle"])
+    return _ends_in(rest, _ROTORS[quantity])
 
 
 def is_quaternion(family: Family) -> bool:
@@ -287,18 +265,18 @@ def is_quaternion(family: Family) -> bool:
 
 def angles(names: Sequence[str]) -> tuple[tuple[str, str, str], str] | None:
     """Roll, pitch and yaw by their names, and the unit that these state."""
-    found, units = [], set()
+    found, units = [], []
     for meant in _ANGLES:
         for name in names:
             words, unit = _without_unit(words_of(name))
             other = frozenset(words) & (OTHER_THINGS | _TURNING) or unit.endswith("/s")
             if words and words[-1] in meant and not other:
                 found.append(name)
-                units.add(unit)
+                units.append(unit)
                 break
         else:
             return None
-    return (found[0], found[1], found[2]), units.pop() if len(units) == 1 else ""
+    return (found[0], found[1], found[2]), _the_one(units)
 
 
 def scalar(names: Iterable[str], quantity: str) -> str | None:

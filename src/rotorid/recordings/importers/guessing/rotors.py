@@ -8,15 +8,9 @@ import numpy as np
 import pandas as pd
 
 from rotorid.recordings.importers.guessing import names as named
-from rotorid.recordings.importers.guessing.draft import (
-    BY_NUMBERS_ALONE,
-    CONTRADICTED,
-    Draft,
-    triples_of,
-)
+from rotorid.recordings.importers.guessing.agreement import BY_NUMBERS_ALONE, CONTRADICTED, Draft, triples_of
 from rotorid.recordings.importers.guessing.names import Family
-from rotorid.recordings.importers.mapping import CHANNELS, ELECTRICAL, OPEN
-from rotorid.recordings.importers.units import UNITS, bracketed, stated
+from rotorid.recordings.importers.mapping import CHANNELS, ELECTRICAL, OPEN, UNITS, bracketed, stated
 
 _RANGES: dict[str, tuple[float, float]] = {
     "a share": (0.0, 1.0),
@@ -52,25 +46,18 @@ _FASTEST_HUNDREDS = 12_000.0
 
 
 def guess_rotors(draft: Draft, quantity: str) -> None:
-    offered = [f for f in named.numbered(draft.free()) if named.is_rotor(f, quantity)]
-    how = "by their names"
-    if (
-        not offered
-        and quantity == "throttle"
-        and not {"throttle", "rotor_speed", "rotor_command"} & set(draft.channels)
-    ):
-        offered, how = (
-            [
-                f
-                for f in named.numbered(draft.free())
-                if not f.words & _OTHER_THINGS and _carries(draft, f) > BY_NUMBERS_ALONE - 0.1
-            ],
-            _UNNAMED,
-        )
-    if not offered:
-        return
-    family = _that_move(draft, offered[0])
-    _put(draft, quantity, family, how)
+    families, how = named.numbered(draft.free()), "by their names"
+    offered = [f for f in families if named.is_rotor(f, quantity)]
+    if not offered and quantity == "throttle" and not {"rotor_speed", "rotor_command"} & set(draft.channels):
+        unnamed = (f for f in families if not f.words & _OTHER_THINGS)
+        offered, how = [f for f in unnamed if _carries(draft, f) > BY_NUMBERS_ALONE - 0.1], _UNNAMED
+    if offered:
+        # Without outputs that keep one value and drive nothing, unless fewer than three would be left.
+        family = offered[0]
+        spread = pd.DataFrame(draft.values(family.columns)).nunique()
+        moving = tuple(n for n, count in zip(family.columns, spread, strict=True) if count > 1)
+        several = 3 <= len(moving) < len(family.columns)
+        _put(draft, quantity, replace(family, columns=moving) if several else family, how)
 
 
 def guess_stand(draft: Draft) -> None:
@@ -145,14 +132,6 @@ def _put(draft: Draft, quantity: str, family: Family, how: str) -> None:
         if speeds:
             question += " Or are they speeds? Then call the channel rotor_speed and state their unit"
         draft.put(quantity, family.columns, evidence, question, unit="raw", range=OPEN)
-
-
-def _that_move(draft: Draft, family: Family) -> Family:
-    """A family without outputs that keep one value and drive nothing; itself where fewer than three would be left."""
-    values = draft.values(family.columns)
-    spread = pd.DataFrame(values).nunique().to_numpy()
-    moving = [n for n, count in zip(family.columns, spread, strict=True) if count > 1]
-    return replace(family, columns=tuple(moving)) if 3 <= len(moving) < len(family.columns) else family
 
 
 def _can_be_speeds(values: np.ndarray, family: Family) -> bool:

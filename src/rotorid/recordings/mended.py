@@ -1,15 +1,17 @@
-"""Sensors whose readings come at random (a radio link, loggers merged by time) on an even grid of their own.
+"""Readings mended before any analysis: spikes emptied, sensors that are read at random on an even grid of their own.
 
-Where cells are empty by chance, steps of three or five rows are as usual as those of one, and a rule in usual steps
-cuts the flight at each longer one. Such a sensor is taken at its own rate: a cubic spline with even knots is fitted to
-all its readings by least squares, which keeps the band below half the rate of the knots and averages the noise above
-it. Its values at the knots are the new readings. Speeds and commands of rotors, which jump, are joined by straight
-lines. What this costs is stated: the rate, its band, and the noise there.
+Spikes (bits lost on a serial line, a telemetry frame that reads 0 or double, lost pulses) are few, alone or in pairs,
+and far from the readings before and after. What a fast motion or a vibration gives changes with its neighbours: there
+is no gap between usual and far. The points of a rotor test whose speed sensor lost pulses are found by their thrust.
 
-Where packets are lost several at a time, hardly a stretch is left in which every sensor has readings. There a sensor
-that is faster than the analysis needs has the rate that the analysis needs, whose periods bridge such gaps.
-
-A sensor that comes evenly, however slow, stays as it is, and so does a hole of several of its own periods.
+Where cells are empty by chance (a radio link, loggers merged by time), steps of three or five rows are as usual as
+those of one, and a rule in usual steps cuts the flight at each longer one. Such a sensor is taken at its own rate: a
+cubic spline with even knots is fitted to all its readings by least squares, which keeps the band below half the rate of
+the knots and averages the noise above it. Its values at the knots are the new readings. Speeds and commands of rotors,
+which jump, are joined by straight lines. What this costs is stated: the rate, its band, and the noise there. Where
+packets are lost several at a time, hardly a stretch is left in which every sensor has readings; there a sensor that is
+faster than the analysis needs has the rate that the analysis needs, whose periods bridge such gaps. A sensor that comes
+evenly, however slow, stays as it is, and so does a hole of several of its own periods.
 """
 
 from __future__ import annotations
@@ -24,8 +26,31 @@ from scipy.sparse import diags, eye_array
 from scipy.sparse.linalg import spsolve
 
 from rotorid.recordings import columns as c
-from rotorid.recordings.run import RecordingSet, Run
+from rotorid.recordings.run import RecordingSet, Run, means_of
 
+_FAR = 10.0
+"""Standard deviations of the readings about their neighbours from which one is a spike."""
+_NEAR = 4.0
+"""Fewer readings than spikes lie between this and `_FAR`, or the sensor's noise is what makes them."""
+_MOST = 0.1
+"""A sensor with a larger share of far readings is no sensor with spikes."""
+_NEIGHBOURS = 3
+"""Readings on each side whose medians a spike is far from: two of three may be spikes themselves."""
+_AROUND = 31
+"""Readings over which the scatter is local: a burst of vibration is none of spikes."""
+_FINEST = 1e-3
+"""Share of a sensor's usual span below which its scatter is not believed."""
+_LEAST_OF_SPIKES = 60
+_LEAST_SPIKES = 3
+"""Fewer in all runs may be what a vehicle does once: a bump, a touch of the ground."""
+_REPEATED = 0.1
+"""Share of the spikes that one value must have to be named."""
+_TOO_SLOW = 1.35
+"""A point whose F/ω² exceeds the run's median by this factor has lost part of its speed pulses.
+
+An offset of the balance or a curve that bends makes the low points' F/ω² smaller, not larger, in these data,
+so the rule is one-sided: it must not remove what the offset explains.
+"""
 _HOLE_PERIODS = 6.0
 """Where a sensor gives nothing for longer than so many of its own periods, the flight is cut in two."""
 _LONGEST_USUAL = 10.0
@@ -168,12 +193,10 @@ def _cuts(steps_s: np.ndarray) -> int:
 
 def _cut_by_chance(run: Run, names: tuple[str, ...]) -> bool:
     """Whether a rule in usual steps cuts a sensor where no column of it has a hole of several of its own periods."""
-    steps = _steps_s(run, names)
-    whole = _whole_steps_s(run, names)
-    cuts = _cuts(whole) if len(whole) else len(run.time_s)
-    every = [np.diff(run.time_s[np.isfinite(run.column(name))]) for name in names]
-    mean = max(float(s.mean()) for s in steps)
-    return cuts > sum(int((s > _HOLE_PERIODS * mean).sum()) for s in every)
+    whole, mean = _whole_steps_s(run, names), max(float(s.mean()) for s in _steps_s(run, names))
+    every = (np.diff(run.time_s[np.isfinite(run.column(name))]) for name in names)
+    holes = sum(int((s > _HOLE_PERIODS * mean).sum()) for s in every)
+    return (_cuts(whole) if len(whole) else len(run.time_s)) > holes
 
 
 def is_scattered(run: Run, names: tuple[str, ...]) -> bool:
@@ -221,10 +244,7 @@ def _on_lines(time_s: np.ndarray, values: np.ndarray, at_s: np.ndarray, step_s: 
     """Readings (n,) at instants (m,): the mean of those within half a step, on straight lines where there is no more
     than one. What changes faster than the grid would else be taken for something slow."""
     first, last = (np.searchsorted(time_s, at_s + side * step_s / 2) for side in (-1, 1))
-    total = np.concatenate([[0.0], np.cumsum(values)])
-    count = last - first
-    mean = (total[last] - total[first]) / np.maximum(count, 1)
-    return np.where(count > 1, mean, np.interp(at_s, time_s, values))
+    return np.where(last - first > 1, means_of(values, first, last), np.interp(at_s, time_s, values))
 
 
 def _spline(time_s: np.ndarray, values: np.ndarray, period_s: float) -> BSpline:
@@ -253,3 +273,81 @@ def on_one_side(quaternion: np.ndarray) -> np.ndarray:
                 row[known] *= -1.0
             last[known] = row[known]
     return out
+
+
+def without_spikes(recordings: RecordingSet) -> RecordingSet:
+    """The set with spikes of its sensors made empty cells; a sentence in `left_out` for each column that had some."""
+    speeds = c.rotor_columns("rotor_speed", recordings.vehicle.rotor_count)
+    names = (*c.FORCE, *c.MOMENT, *c.SPECIFIC_FORCE, *c.ANGULAR_VELOCITY, *c.POSITION, *c.VELOCITY, *speeds, c.HEIGHT)
+    masks = {(run.name, n): spikes(run.column(n)) for run in recordings.runs for n in names if run.has(n)}
+    counts = {n: sum(int(mask.sum()) for (_, column), mask in masks.items() if column == n) for n in names}
+    masks = {(run, n): mask for (run, n), mask in masks.items() if mask.any() and counts[n] >= _LEAST_SPIKES}
+    if not masks:
+        return recordings
+    runs = []
+    for run in recordings.runs:
+        clean = {n: np.where(masks[run.name, n], np.nan, run.column(n)) for n in names if (run.name, n) in masks}
+        runs.append(replace(run, table=run.table.assign(**clean)) if clean else run)
+    said = [_of_spikes(recordings.runs, n, masks) for n in names if any(column == n for _, column in masks)]
+    return replace(recordings, runs=tuple(runs), left_out=(*recordings.left_out, *said))
+
+
+def spikes(values: np.ndarray) -> np.ndarray:
+    """Mask of the spikes among the readings of one sensor (n,); NaN where there is no reading."""
+    found = np.zeros(len(values), bool)
+    known = np.flatnonzero(np.isfinite(values))
+    if len(known) < _LEAST_OF_SPIKES:
+        return found
+    x = values[known]
+    windows = np.lib.stride_tricks.sliding_window_view(x, _NEIGHBOURS)
+    medians = np.median(windows, axis=1)
+    inner = slice(_NEIGHBOURS, len(x) - _NEIGHBOURS)
+    rise, fall = x[inner] - medians[: len(x) - 2 * _NEIGHBOURS], x[inner] - medians[_NEIGHBOURS + 1 :]
+    size = np.where(np.sign(rise) == np.sign(fall), np.minimum(np.abs(rise), np.abs(fall)), 0.0)
+    scatter = _around(np.abs(rise + fall) / 2) * 1.4826
+    scatter = np.maximum(scatter, _FINEST * float(np.subtract(*np.quantile(x, [0.95, 0.05]))))
+    size -= 2 * _around(np.maximum(np.abs(rise), np.abs(fall)))  # what moves fast turns round fast
+    far = _alone(size > _FAR * scatter, size, x[inner])
+    between = (size > _NEAR * scatter) & (size <= _FAR * scatter)
+    if scatter.min() > 0 and between.sum() < far.sum() <= _MOST * len(x):
+        found[known[inner][far]] = True
+    return found
+
+
+def _around(sizes: np.ndarray) -> np.ndarray:
+    """The median of sizes (n,) around each of them, or of all where that is more."""
+    local = pd.Series(sizes).rolling(_AROUND, center=True, min_periods=_AROUND // 2).median()
+    return np.fmax(local.to_numpy(), np.median(sizes))
+
+
+def _alone(far: np.ndarray, size: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Far readings (n,) that are far from the nearest others on both sides, too: no tops of pulses."""
+    near = np.flatnonzero(~far)
+    place = np.searchsorted(near, np.flatnonzero(far))
+    nearest = x[near[np.maximum(place - 1, 0)]], x[near[np.minimum(place, len(near) - 1)]]
+    out = far.copy()
+    out[far] = np.minimum(*(np.abs(x[far] - b) for b in nearest)) > size[far] / 2
+    return out
+
+
+def _of_spikes(runs: tuple[Run, ...], name: str, masks: dict[tuple[str, str], np.ndarray]) -> str:
+    """How many readings of a column are spikes, and which values they repeat."""
+    there = [run for run in runs if run.has(name)]
+    read = sum(int(np.isfinite(run.column(name)).sum()) for run in there)
+    values = np.concatenate([run.column(name)[masks[run.name, name]] for run in there if (run.name, name) in masks])
+    often = pd.Series([f"{v:.3g}" for v in values]).value_counts()
+    often = [value for value, count in often.items() if count >= max(_REPEATED * len(values), 3)]
+    repeated = f", most of them at {', '.join(sorted(often, key=float))}" if often else ""
+    return (
+        f"{name}: {len(values)} readings ({100 * len(values) / read:.2g} %) are spikes, single readings far from "
+        f"those before and after them{repeated}: left out."
+    )
+
+
+def lost_speed(speed_rad_s: np.ndarray, thrust_n: np.ndarray) -> np.ndarray:
+    """Points that turn but whose speed is too low for their thrust, shape (n,), bool."""
+    turning = speed_rad_s > 0
+    if not turning.any():
+        return turning
+    ratio = np.where(turning, thrust_n, 0.0) / np.where(turning, speed_rad_s, 1.0) ** 2
+    return turning & (ratio > _TOO_SLOW * np.median(ratio[turning]))
