@@ -29,7 +29,7 @@ import numpy as np
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.instant import Wrench
 from rotorid.vehicle.batch import Batch
-from rotorid.vehicle.control.pid import AttitudePid, Gains, training_reference
+from rotorid.vehicle.control import AttitudePid, Gains, training_reference
 from rotorid.vehicle.improved import active_forms
 from rotorid.vehicle.simulator import Commands, Motors, Start, simulate
 from rotorid.vehicle.windows import Inputs, States, simulate_windows

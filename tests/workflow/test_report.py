@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from rotorid.report import prose, typeset
+from rotorid.report import typeset
+from rotorid.report.typeset import render
 from tests.browser import CHROMIUM, Browser
 
 ROOT = Path(__file__).parents[2]
@@ -218,7 +219,7 @@ def named(chapters: list[str]) -> list[str]:
         "# Third {#sec:third}\n\nRun {{ names[0].name|text }} and {{ names[4].name|text }}.\n\n"
         '{{ table("names", "Names.", [["name", "name", "text"], ["x", "x", "fix0"]], kind="public") }}\n'
     )
-    Path("named.md").write_text(prose.render("three.md", {"names": "names.csv"}))
+    Path("named.md").write_text(render("three.md", {"names": "names.csv"}))
     return ["named.md"]
 
 

@@ -18,7 +18,7 @@ from rotorid.report import log, provenance
 from rotorid.report.plots import style
 from rotorid.report.plots.rule_graph import rule_graph
 from rotorid.report.provenance import sha256
-from rotorid.vehicle.control.pid import THESIS_GAINS, AttitudeReference, training_reference, validation_reference
+from rotorid.vehicle.control import THESIS_GAINS, AttitudeReference, training_reference, validation_reference
 
 AXES = ("roll", "pitch", "yaw")
 

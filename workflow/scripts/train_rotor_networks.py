@@ -35,7 +35,9 @@ def main(
             continue
         printed = grey_box.ROTOR_NETWORKS[key]
         speed, value = points["speed_rad_s"].to_numpy(), points["value"].to_numpy()
-        coefficient, scaling, trained = fit_coefficient_network(speed, value, hidden, Training(rate, epochs, seed=seed))
+        coefficient, (k_x, k_d), trained = fit_coefficient_network(
+            speed, value, hidden, Training(rate, epochs, seed=seed)
+        )
         squares = fit_coefficient([Points("tests", speed, value)], offset=False)
         mse = trained.mse[:, 0]
         found[name] = {
@@ -47,8 +49,8 @@ def main(
             "thesis_weights": printed.coefficient,
             "thesis_weights_rounding": printed.rounding,
             "network_inside": squares.interval_95[0] <= coefficient <= squares.interval_95[1],
-            "k_x": scaling.k_x,
-            "k_d": scaling.k_d,
+            "k_x": k_x,
+            "k_d": k_d,
             "w1": trained.network.weights[0][:, 0].tolist(),
             "w2": trained.network.weights[1][0].tolist(),
             "final_mse": float(mse[-1]),

@@ -51,7 +51,7 @@ def plan(
     Example: `rotorid plan flights-verdict --limits room.yaml`
     """
     with one_sentence():
-        from rotorid.plan.limits import Limits, SessionLimits, read_limits
+        from rotorid.plan.candidates import Limits, SessionLimits, read_limits
 
         wishes = _wished(want or [])
         folder, content = _read_verdict(verdict)

@@ -253,7 +253,7 @@ def compare(
         if out is not None:
             _write(out, text)
         if page is not None:
-            from rotorid.report.page.changes import make_changes_page
+            from rotorid.report.page import make_changes_page
 
             _write(page, make_changes_page(found))
         if as_json:

@@ -1,11 +1,9 @@
 """Parameters from measurements of known things: bench, stand, rotor, estimates, networks, finite elements."""
 
 OPEN = (
-    "autopilot.parameters",
-    "autopilot.thrust",
-    "bench.loadcell",
-    "bench.reconstruct",
-    "bench.static",
+    "autopilot",
+    "bench",
+    "bench_tests",
     "black_box",
     "clocks",
     "excitation",
@@ -13,6 +11,7 @@ OPEN = (
     "fem.placement",
     "fem.studies",
     "grey_box",
+    "loadcell",
     "networks",
     "rigid_body_residuals",
     "rotor",

@@ -28,14 +28,14 @@ from scipy.signal import butter, sosfiltfilt
 from rotorid.identify.grey_box import regressors, weights_of_inertias
 from rotorid.recordings import Run, Vehicle
 from rotorid.recordings import columns as c
-from rotorid.vehicle.control.pid import AttitudePid, AttitudeReference, Gains
+from rotorid.vehicle.control import AttitudePid, AttitudeReference, Gains
 from rotorid.vehicle.fast import AttitudeLoop
 from rotorid.vehicle.mixer import allocation_matrix, wrench_matrix
 
+_INERTIA_ERROR, _GYROSCOPIC_ERROR = 0.001, 0.04
+"""Standard errors that are wanted of a period: of inertias (relative), of gyroscopic weights (absolute)."""
 _HOLD_GAINS = Gains((0.04, 0.04, 0.04), (0.02, 0.02, 0.01), (0.015, 0.015, 0.02))
 """A soft attitude hold, slower than the excitation: it keeps the attitude but does not undo the motion."""
-
-
 _FIRST_SHARES_N_M = np.array([0.1, 0.1, 0.03])
 """Where the search for the axes' shares begins: roll and pitch can be pushed far harder than yaw."""
 WINDOW_S = 0.25
@@ -53,13 +53,10 @@ class Multisine:
 
     def moment(self, time_s: np.ndarray) -> np.ndarray:
         """(n, 3), N m, at times (n,), s."""
-        return self._sum(time_s, 0)
+        return self.integral(time_s, 0)
 
     def integral(self, time_s: np.ndarray, order: int) -> np.ndarray:
         """The `order`-th integral over time without its constants, (n, 3)."""
-        return self._sum(time_s, order)
-
-    def _sum(self, time_s, order):
         rate = 2 * np.pi * self.harmonics[:, None] / self.period_s
         angle = rate * np.asarray(time_s, float) - order * np.pi / 2
         waves = np.cos(angle[:, :, None] + self.phase_rad[:, None, :]) / rate[:, :, None] ** order
@@ -67,18 +64,6 @@ class Multisine:
 
     def scaled(self, factor) -> Multisine:
         return Multisine(self.period_s, self.harmonics, self.amplitude_n_m * factor, self.phase_rad)
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """Limits of the search and what its result is measured against."""
-
-    speed_limits_rad_s: tuple[float, float]
-    tilt_rad: float
-    harmonics: tuple[int, int]
-    period_s: float
-    inertia_error: float = 0.001
-    gyroscopic_error: float = 0.04
 
 
 @dataclass(frozen=True)
@@ -99,12 +84,7 @@ class Readings:
 
 
 def promised_errors(
-    rates: np.ndarray,
-    moments: np.ndarray,
-    inertias: np.ndarray,
-    noise: Readings,
-    dt_s: float,
-    window_s: float,
+    rates: np.ndarray, moments: np.ndarray, inertias: np.ndarray, noise: Readings, dt_s: float, window_s: float
 ) -> np.ndarray:
     """Standard errors (6,) of w11, w22, w33 (absolute) and of the torque weights (relative).
 
@@ -131,10 +111,10 @@ def promised_errors(
     return out
 
 
-def _largest(multisine: Multisine, time_s, allocation, thrust_n, inertias, wanted: Wanted) -> Multisine:
+def _largest(multisine: Multisine, time_s, allocation, thrust_n, inertias, speeds_rad_s, tilt_rad) -> Multisine:
     """Scaled to the largest that keeps rotor speeds (together) and tilt (per axis) within their limits."""
     mean = allocation @ np.array([thrust_n, 0.0, 0.0, 0.0])
-    low, high = wanted.speed_limits_rad_s[0] ** 2, wanted.speed_limits_rad_s[1] ** 2
+    low, high = speeds_rad_s[0] ** 2, speeds_rad_s[1] ** 2
 
     def room(candidate: Multisine) -> float:
         swing = candidate.moment(time_s) @ allocation[:, 1:].T
@@ -142,42 +122,43 @@ def _largest(multisine: Multisine, time_s, allocation, thrust_n, inertias, wante
 
     multisine = multisine.scaled(room(multisine))
     tilt = np.abs(multisine.integral(time_s, 2) / inertias)[:, :2].max(axis=0)
-    multisine = multisine.scaled(np.append(np.minimum(1.0, wanted.tilt_rad / np.maximum(tilt, 1e-12)), 1.0))
+    multisine = multisine.scaled(np.append(np.minimum(1.0, tilt_rad / np.maximum(tilt, 1e-12)), 1.0))
     # Where two axes cancelled each other in a rotor, less of one may be more for the rotor.
     return multisine.scaled(min(1.0, room(multisine)))
 
 
 def design(
     vehicle: Vehicle,
-    wanted: Wanted,
+    speed_limits_rad_s: tuple[float, float],
+    tilt_rad: float,
+    harmonics: tuple[int, int],
+    period_s: float,
     noise: Readings,
     candidates: int,
     rng: np.random.Generator,
 ) -> tuple[Multisine, np.ndarray]:
-    """The best of `candidates` multisines and the standard errors (6,) that one period of it promises."""
+    """The best of `candidates` multisines and the standard errors (6,) that one period of it promises.
+
+    It keeps rotor speeds and tilt within their limits, and has the `harmonics` from the first to the last.
+    """
     allocation = allocation_matrix(vehicle)
     thrust = vehicle.mass_kg * vehicle.gravity_m_s2
     inertias = np.diag(vehicle.inertia_kg_m2.matrix())
-    harmonics = np.arange(wanted.harmonics[0], wanted.harmonics[1] + 1)
-    dt_s = wanted.period_s / (harmonics[-1] * 12)
-    time_s = np.arange(0.0, wanted.period_s, dt_s)
-    target = np.repeat([wanted.gyroscopic_error, wanted.inertia_error], 3)
-    owner = np.arange(len(harmonics)) % 3
-    mine = owner[:, None] == np.arange(3)
+    orders = np.arange(harmonics[0], harmonics[1] + 1)
+    dt_s = period_s / (orders[-1] * 12)
+    time_s = np.arange(0.0, period_s, dt_s)
+    target = np.repeat([_GYROSCOPIC_ERROR, _INERTIA_ERROR], 3)
+    mine = (np.arange(len(orders)) % 3)[:, None] == np.arange(3)
 
     def trial(levels, phases, share):
         amplitude = np.where(mine, np.exp(levels), 0.0) * np.exp(share) * _FIRST_SHARES_N_M
-        made = Multisine(wanted.period_s, harmonics.astype(float), amplitude, phases)
-        return _largest(made, time_s, allocation, thrust, inertias, wanted)
+        made = Multisine(period_s, orders.astype(float), amplitude, phases)
+        return _largest(made, time_s, allocation, thrust, inertias, speed_limits_rad_s, tilt_rad)
 
     best, best_cost, best_errors, best_point = None, np.inf, None, None
     for number in range(candidates):
         if number < candidates // 4:
-            point = (
-                rng.normal(0, 1, mine.shape),
-                rng.uniform(0, 2 * np.pi, mine.shape),
-                rng.uniform(-2, 0, 3),
-            )
+            point = rng.normal(0, 1, mine.shape), rng.uniform(0, 2 * np.pi, mine.shape), rng.uniform(-2, 0, 3)
         else:
             # Smaller and smaller moves around the best so far.
             move = 1.0 - number / candidates
@@ -211,21 +192,12 @@ class ExcitedHold:
         return replace(hold, more=more, limits_rad_s=self.limits_rad_s)
 
 
-@dataclass(frozen=True)
-class _BandSignals:
-    """Band-passed moment and angular acceleration of one stretch, (n, 3), N m and rad/s2, with the sample rate."""
-
-    run: str
-    moment: np.ndarray
-    acceleration: np.ndarray
-    rate_hz: float
-
-
 def band_signals(
     run: Run, vehicle: Vehicle, band_hz: tuple[float, float], delay_s: float, rate_hz: float
-) -> _BandSignals | None:
-    """Signals of a run on an even grid, rotor speeds taken `delay_s` earlier; None where columns are missing.
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Band-passed moment and angular acceleration of a run on an even grid, (n, 3), N m and rad/s2.
 
+    Rotor speeds are taken `delay_s` earlier; None where columns are missing.
     The gyroscopic term Ω × JΩ, small here, is added to the moment's side with the believed inertia.
     """
     speeds = c.rotor_columns("rotor_speed", vehicle.rotor_count)
@@ -244,12 +216,7 @@ def band_signals(
     moment = (np.roll(moment, 1, 0) + 4 * moment + np.roll(moment, -1, 0)) / 6
     edge = int(rate_hz / band_hz[0])
     keep = slice(edge, -edge)
-    return _BandSignals(
-        run.name,
-        sosfiltfilt(filtered, moment, axis=0)[keep],
-        sosfiltfilt(filtered, acceleration, axis=0)[keep],
-        rate_hz,
-    )
+    return sosfiltfilt(filtered, moment, axis=0)[keep], sosfiltfilt(filtered, acceleration, axis=0)[keep]
 
 
 def _on_grid(grid: np.ndarray, time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -258,17 +225,21 @@ def _on_grid(grid: np.ndarray, time_s: np.ndarray, values: np.ndarray) -> np.nda
 
 
 def fit_flights(
-    parts: Sequence[_BandSignals], block_s: float, rng: np.random.Generator, draws: int = 500
+    parts: Sequence[tuple[np.ndarray, np.ndarray]],
+    rate_hz: float,
+    block_s: float,
+    rng: np.random.Generator,
+    draws: int = 500,
 ) -> list[dict]:
     """Inertia about x, y, z from several flights: bounds `lower` and `upper`, `estimate`, `interval_95` (kg m2), `r2`.
 
-    Intervals by drawing blocks of `block_s`; `r2` is the squared correlation.
+    `parts` are of `band_signals` at `rate_hz`. Intervals by drawing blocks of `block_s`; `r2` is the squared
+    correlation.
     """
-    sums = []
-    for part in parts:
-        size = int(block_s * part.rate_hz)
-        for start in range(0, len(part.moment) - size + 1, size):
-            m, a = part.moment[start : start + size], part.acceleration[start : start + size]
+    sums, size = [], int(block_s * rate_hz)
+    for moment, acceleration in parts:
+        for start in range(0, len(moment) - size + 1, size):
+            m, a = moment[start : start + size], acceleration[start : start + size]
             sums.append([(m * a).sum(0), (a * a).sum(0), (m * m).sum(0)])
     sums = np.array(sums)
     drawn = sums[rng.integers(0, len(sums), (draws, len(sums)))].sum(axis=1)

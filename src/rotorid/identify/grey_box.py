@@ -151,9 +151,8 @@ def fit_masked_network(
     matrix = rng.uniform(-1, 1, (3, 6)) * MASK
     group = {"batch": len(inputs), "stochastic": 1, "mini-batch": training.group}[training.method]
     order = rng.permutation(len(inputs))
-    mse = _delta_rule(
-        matrix, inputs * k_x, accelerations * k_d, order, training.rate, training.epochs, group, training.every
-    )
+    how = training.rate, training.epochs, group, training.every
+    mse = _delta_rule(matrix, inputs * k_x, accelerations * k_d, order, *how)
     if not np.isfinite(matrix).all():
         raise ValueError(f"training ran away: lower the rate {training.rate}")
     matrix = matrix * k_x / k_d[:, None]
@@ -225,52 +224,38 @@ def check_consistency(weights: np.ndarray, covariance: np.ndarray) -> dict:
     }
 
 
-@dataclass(frozen=True)
-class Scaling:
-    """k_x = 1 / max|ω|, k_d = 1 / max|d| (eq. 4.68)."""
-
-    k_x: float
-    k_d: float
-
-    @classmethod
-    def of(cls, speed_rad_s: np.ndarray, value: np.ndarray) -> Scaling:
-        return cls(float(1 / np.max(np.abs(speed_rad_s))), float(1 / np.max(np.abs(value))))
-
-
-def coefficient(network: Network, scaling: Scaling) -> float:
+def coefficient(network: Network, k_x: float, k_d: float) -> float:
     """C = w⁽²⁾ w⁽¹⁾ k_x² / k_d (eq. 4.73), N s2 or N m s2."""
     product = network.weights[1] @ network.weights[0]
-    return float(product[0, 0] * scaling.k_x**2 / scaling.k_d)
+    return float(product[0, 0] * k_x**2 / k_d)
 
 
 def fit_coefficient_network(
     speed_rad_s: np.ndarray, value: np.ndarray, hidden: int, training: Training
-) -> tuple[float, Scaling, Trained]:
-    """Coefficient, scaling and training on steady points: speeds (n,), rad/s, and thrusts (N) or torques (N m) (n,)."""
-    scaling = Scaling.of(speed_rad_s, value)
+) -> tuple[float, tuple[float, float], Trained]:
+    """Coefficient, scales k_x = 1 / max|ω| and k_d = 1 / max|d| (eq. 4.68), and training on steady points.
+
+    Speeds (n,) in rad/s, thrusts in N or torques in N m (n,).
+    """
+    k_x, k_d = float(1 / np.max(np.abs(speed_rad_s))), float(1 / np.max(np.abs(value)))
     network = build((1, hidden, 1), ("linear", "linear"), np.random.default_rng(training.seed), bias=False)
-    inputs = (scaling.k_x * np.asarray(speed_rad_s, float)[:, None]) ** 2
-    targets = scaling.k_d * np.asarray(value, float)[:, None]
-    trained = train(network, inputs, targets, training)
-    return coefficient(trained.network, scaling), scaling, trained
+    inputs = (k_x * np.asarray(speed_rad_s, float)[:, None]) ** 2
+    trained = train(network, inputs, k_d * np.asarray(value, float)[:, None], training)
+    return coefficient(trained.network, k_x, k_d), (k_x, k_d), trained
 
 
-@dataclass(frozen=True)
-class RateWindows:
-    """Measured rates (w, m, 3), rad/s, and moments (w, m, 3), N m, of w windows sampled evenly at `dt_s`."""
+def cut_windows(
+    rates: np.ndarray, moments: np.ndarray, dt_s: float, window_s: float, start: int = 0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rates and moments (w, m, 3) in consecutive windows of an evenly sampled flight (n, 3).
 
-    rates: np.ndarray
-    moments: np.ndarray
-    dt_s: float
-
-
-def cut_windows(rates: np.ndarray, moments: np.ndarray, dt_s: float, window_s: float, start: int = 0) -> RateWindows:
-    """Consecutive windows of an evenly sampled flight (n, 3); windows with missing samples are left out."""
+    Windows with missing samples are left out.
+    """
     length = int(round(window_s / dt_s)) + 1
     first = np.arange(start, len(rates) - length + 1, length - 1)
     index = first[:, None] + np.arange(length)
     good = np.isfinite(rates[index]).all((1, 2)) & np.isfinite(moments[index]).all((1, 2))
-    return RateWindows(rates[index[good]], moments[index[good]], dt_s)
+    return rates[index[good]], moments[index[good]]
 
 
 @compiled(error_model="numpy")
@@ -300,16 +285,8 @@ def _simulate(weights, start, moments, extra, dt, out):
             _slope(weights, p, q, r, m0[0] + e[0], m0[1] + e[1], m0[2] + e[2], k1)
             _slope(weights, p + h * k1[0], q + h * k1[1], r + h * k1[2], ha, hb, hc, k2)
             _slope(weights, p + h * k2[0], q + h * k2[1], r + h * k2[2], ha, hb, hc, k3)
-            _slope(
-                weights,
-                p + dt * k3[0],
-                q + dt * k3[1],
-                r + dt * k3[2],
-                m1[0] + e[0],
-                m1[1] + e[1],
-                m1[2] + e[2],
-                k4,
-            )
+            p3, q3, r3 = p + dt * k3[0], q + dt * k3[1], r + dt * k3[2]
+            _slope(weights, p3, q3, r3, m1[0] + e[0], m1[1] + e[1], m1[2] + e[2], k4)
             p += dt / 6.0 * (k1[0] + 2.0 * (k2[0] + k3[0]) + k4[0])
             q += dt / 6.0 * (k1[1] + 2.0 * (k2[1] + k3[1]) + k4[1])
             r += dt / 6.0 * (k1[2] + 2.0 * (k2[2] + k3[2]) + k4[2])
@@ -374,7 +351,9 @@ def _walk_power(samples: int) -> float:
 
 
 def fit_output_error(
-    windows: RateWindows,
+    rates: np.ndarray,
+    moments: np.ndarray,
+    dt_s: float,
     model: _Model,
     start: np.ndarray,
     window_moment: bool = False,
@@ -385,26 +364,28 @@ def fit_output_error(
 ) -> _OutputErrorFit:
     """Gauss-Newton with the windows' own unknowns projected out.
 
+    Measured `rates`, rad/s, and `moments`, N m, are (w, m, 3) of w windows sampled evenly at `dt_s`.
+
     Noise of the moments (3,), one sigma a sample, blurs the regressors and would make the inertias too large by
     noise power over signal power; where `moment_noise_n_m` states it, that is taken off again. The covariance is
     robust over clusters of `cluster` neighbouring windows. ValueError where there are too few
     windows or the estimate does not converge.
     """
     parameters = np.asarray(start, float).copy()
-    w, m, _ = windows.rates.shape
+    w, m, _ = rates.shape
     if w <= len(parameters):
         raise ValueError(f"{w} windows cannot distinguish {len(parameters)} parameters: record longer")
-    moments = np.ascontiguousarray(windows.moments)
-    begin, extra = windows.rates[:, 0].copy(), np.zeros((w, 3))
+    moments = np.ascontiguousarray(moments)
+    begin, extra = rates[:, 0].copy(), np.zeros((w, 3))
     scale = np.ones(3)
     moment_step = 1e-3 * max(float(np.std(moments)), 1e-9)
 
     def simulate(values, begin, extra):
-        return simulate_rates(model(values), begin, moments, windows.dt_s, extra)
+        return simulate_rates(model(values), begin, moments, dt_s, extra)
 
     for iteration in range(iterations):
         predicted = simulate(parameters, begin, extra)
-        residual = windows.rates - predicted
+        residual = rates - predicted
         own = []
         for axis in range(3):
             moved = begin.copy()
@@ -445,23 +426,15 @@ def fit_output_error(
     inverse = np.linalg.inv(information)
     if moment_noise_n_m is not None:
         torque = model(parameters)[3:6]
-        power = w * (np.asarray(moment_noise_n_m) * torque * windows.dt_s / scale_used) ** 2 * _walk_power(m)
-        parameters = parameters.copy()
+        power = w * (np.asarray(moment_noise_n_m) * torque * dt_s / scale_used) ** 2 * _walk_power(m)
         parameters[:3] += np.log1p(-power / np.diag(information)[:3])
     # Neighbouring windows share slow disturbances: their scores are summed before they are squared.
     clustered = np.add.reduceat(scores, np.arange(0, w, cluster), axis=0)
-    spread_of_scores = clustered.T @ clustered
     count = len(clustered)
-    covariance = count / max(count - len(parameters), 1) * inverse @ spread_of_scores @ inverse
-    spread = windows.rates - windows.rates.mean(axis=1, keepdims=True)
-    return _OutputErrorFit(
-        parameters,
-        covariance,
-        scale,
-        1.0 - scale**2 / np.mean(spread**2, axis=(0, 1)),
-        w,
-        iteration + 1,
-    )
+    covariance = count / max(count - len(parameters), 1) * inverse @ (clustered.T @ clustered) @ inverse
+    spread = rates - rates.mean(axis=1, keepdims=True)
+    explained = 1.0 - scale**2 / np.mean(spread**2, axis=(0, 1))
+    return _OutputErrorFit(parameters, covariance, scale, explained, w, iteration + 1)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ its motors stand.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -154,8 +154,8 @@ def dynamics_set(
     """The 48 experiments; `recordings` are the wrench sensor's."""
     session_of = {session.group: session for session in recordings.itertuples()}
     runs = [_experiment_run(session_of[entry.pair.name], entry) for entry in aligned]
-    first = session_of[aligned[0].pair.name]
-    return RecordingSet(name, _stand_vehicle(name, believed, first, noise), tuple(sorted(runs, key=_name)))
+    vehicle = _stand_vehicle(name, believed, session_of[aligned[0].pair.name], noise)
+    return RecordingSet(name, vehicle, tuple(sorted(runs, key=lambda run: run.name)))
 
 
 _LARGEST_OFFSET_ERROR_S = 0.01
@@ -177,18 +177,14 @@ def torque_set(
         _torque_run(test, speed, reading, lag.delay_s if lag.delay_error_s < _LARGEST_OFFSET_ERROR_S else usual)
         for (test, speed, reading), lag in zip(tests, lags, strict=True)
     ]
-    first = next(wrench[1].itertuples())
-    return RecordingSet(name, _stand_vehicle(name, believed, first, noise), tuple(sorted(runs, key=_name)))
+    vehicle = _stand_vehicle(name, believed, next(wrench[1].itertuples()), noise)
+    return RecordingSet(name, vehicle, tuple(sorted(runs, key=lambda run: run.name)))
 
 
 def thrust_set(name: str, rotor: tuple, believed: Vehicle, noise: dict[str, float]) -> RecordingSet:
     """The 50 thrust tests."""
     runs = [_thrust_run(str(key), table) for key, table in by_recording(rotor[0]).items()]
-    return RecordingSet(name, _tester_vehicle(name, believed, noise), tuple(sorted(runs, key=_name)))
-
-
-def _name(run: Run) -> str:
-    return run.name
+    return RecordingSet(name, _tester_vehicle(name, believed, noise), tuple(sorted(runs, key=lambda run: run.name)))
 
 
 @dataclass(frozen=True)
@@ -229,10 +225,9 @@ def segments(time_s: np.ndarray, throttle: np.ndarray) -> list[_StandStretch]:
     span_s = np.maximum(time_s[ahead] - time_s[behind], 1e-9)
     slope = np.abs(throttle[ahead] - throttle[behind]).max(axis=1) / span_s
     kinds = np.where(~running, _REST, np.where(slope < _SLOPE_1_S, PLATEAU, _RAMP)).astype(object)
-    found = _stretches(time_s, kinds)
-    short = [s for s in found if s.kind == PLATEAU and s.length_s < _SHORTEST_S]
-    for segment in short:
-        kinds[(time_s >= segment.start_s) & (time_s <= segment.stop_s)] = _RAMP
+    for segment in _stretches(time_s, kinds):
+        if segment.kind == PLATEAU and segment.length_s < _SHORTEST_S:
+            kinds[(time_s >= segment.start_s) & (time_s <= segment.stop_s)] = _RAMP
     return _stretches(time_s, kinds)
 
 
@@ -374,28 +369,16 @@ def mean_thrust(run: Run, entry: _Evaluated, thrust_of: Callable) -> np.ndarray:
     return np.clip(thrust_of(run.array(c.rotor_columns("throttle", 4))[inside]), 0.0, None).mean(axis=0)
 
 
-@dataclass(frozen=True)
-class _Weight:
-    """What the readings at rest say of the vehicle: mass, centre of mass from the sensor, body axes."""
-
-    mass_kg: float
-    mass_interval_95: tuple[float, float]
-    centre_m: np.ndarray
-    centre_interval_95: np.ndarray
-    """Shape (3, 2)."""
-    rms_before: np.ndarray
-    """RMS over the experiments of what the believed weight leaves at rest, shape (6,)."""
-    rms_after: np.ndarray
-    """… and of what the fitted one leaves."""
-
-
 def weights(evaluated: list[_Evaluated], mass_kg: float, centre_m: np.ndarray, gravity_m_s2: float) -> np.ndarray:
     """The weight's wrench in the attitude of each experiment, shape (n, 6)."""
     return np.array([weight_wrench(mass_kg, gravity_m_s2, centre_m, tilt(e.roll_rad, e.pitch_rad)) for e in evaluated])
 
 
-def fit_weight(evaluated: list[_Evaluated], mass_kg: float, centre_m: np.ndarray, gravity_m_s2: float) -> _Weight:
+def fit_weight(evaluated: list[_Evaluated], mass_kg: float, centre_m: np.ndarray, gravity_m_s2: float) -> dict:
     """Mass and centre of mass from the readings at rest under all tilts, next to the believed ones.
+
+    `mass_kg` and `centre_m` (3,), from the sensor in body axes, with `_interval_95`; RMS over the experiments of what
+    the believed and the fitted weight leave at rest, `rms_before` and `rms_after` (6,).
 
     Fz gives the mass, the moments M = (R c) × W give c: under tilt also its height. The sensor's own zero is
     taken as zero (it was zeroed without the vehicle), and its frame as level.
@@ -422,14 +405,14 @@ def fit_weight(evaluated: list[_Evaluated], mass_kg: float, centre_m: np.ndarray
     def rms(m: float, place: np.ndarray) -> np.ndarray:
         return np.sqrt(((rest - weights(evaluated, m, place, gravity_m_s2)) ** 2).mean(axis=0))
 
-    return _Weight(
-        mass_kg=float(mass),
-        mass_interval_95=(float(mass - mass_half), float(mass + mass_half)),
-        centre_m=centre,
-        centre_interval_95=np.column_stack([centre - half, centre + half]),
-        rms_before=rms(mass_kg, np.asarray(centre_m, float)),
-        rms_after=rms(mass, centre),
-    )
+    return {
+        "mass_kg": float(mass),
+        "mass_interval_95": (float(mass - mass_half), float(mass + mass_half)),
+        "centre_m": centre,
+        "centre_interval_95": np.column_stack([centre - half, centre + half]),
+        "rms_before": rms(mass_kg, np.asarray(centre_m, float)),
+        "rms_after": rms(mass, centre),
+    }
 
 
 def table(
@@ -446,8 +429,9 @@ def table(
     mass, shape (n, 6) each.
     """
     rows = []
-    entries = zip(evaluated, numbers, expected, believed_rest, fitted_rest, strict=True)
-    for entry, number, model, believed, fitted in entries:
+    for entry, number, model, believed, fitted in zip(
+        evaluated, numbers, expected, believed_rest, fitted_rest, strict=True
+    ):
         row = {
             "name": entry.name,
             "experiment": number,
@@ -474,22 +458,26 @@ def table(
     return pd.DataFrame(rows)
 
 
-def weight_as_dict(found: _Weight, mass_kg: float, centre_m: np.ndarray, experiments: pd.DataFrame) -> dict:
+def weight_as_dict(found: dict, mass_kg: float, centre_m: np.ndarray, experiments: pd.DataFrame) -> dict:
     """The weight for a JSON file, next to the believed one, and how far the believed vehicle's steady wrench is off."""
     off = np.array([experiments[name] - experiments[f"{name}_model"] for name in WRENCH])
     half = np.array([experiments[f"{name}_half_95"] for name in WRENCH])
-    axes = ("x", "y", "z")
+
+    def named(names: Sequence[str], values: np.ndarray) -> dict:
+        return dict(zip(names, values.tolist(), strict=True))
+
+    low, high = found["mass_interval_95"]
     return {
         "experiments": len(experiments),
-        "mass_kg": found.mass_kg,
-        "mass_interval_95": found.mass_interval_95,
+        "mass_kg": found["mass_kg"],
+        "mass_interval_95": found["mass_interval_95"],
         "mass_believed_kg": mass_kg,
-        "mass_believed_inside": found.mass_interval_95[0] <= mass_kg <= found.mass_interval_95[1],
-        "centre_m": dict(zip(axes, found.centre_m.tolist(), strict=True)),
-        "centre_interval_95_m": dict(zip(axes, found.centre_interval_95.tolist(), strict=True)),
-        "centre_believed_m": dict(zip(axes, np.asarray(centre_m).tolist(), strict=True)),
-        "rest_rms_before": dict(zip(WRENCH, found.rms_before.tolist(), strict=True)),
-        "rest_rms_after": dict(zip(WRENCH, found.rms_after.tolist(), strict=True)),
-        "steady_rms_off_model": dict(zip(WRENCH, np.sqrt((off**2).mean(axis=1)).tolist(), strict=True)),
-        "steady_half_width_95": dict(zip(WRENCH, half.mean(axis=1).tolist(), strict=True)),
+        "mass_believed_inside": low <= mass_kg <= high,
+        "centre_m": named("xyz", found["centre_m"]),
+        "centre_interval_95_m": named("xyz", found["centre_interval_95"]),
+        "centre_believed_m": named("xyz", np.asarray(centre_m)),
+        "rest_rms_before": named(WRENCH, found["rms_before"]),
+        "rest_rms_after": named(WRENCH, found["rms_after"]),
+        "steady_rms_off_model": named(WRENCH, np.sqrt((off**2).mean(axis=1))),
+        "steady_half_width_95": named(WRENCH, half.mean(axis=1)),
     }

@@ -2,7 +2,7 @@
 would."""
 
 OPEN = (
-    "limits",
+    "candidates",
     "plan",
     "questions",
     "separation",

@@ -31,8 +31,7 @@ from rotorid.mismatch.plant.regression import Regression, autoregression, build,
 from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.mismatch.plant.split import HELD_OUT_SHARE, training_rule
 from rotorid.mismatch.posterior.problem import Prior
-from rotorid.plan.candidates import Reference
-from rotorid.plan.limits import Limits
+from rotorid.plan.candidates import Limits, Reference
 from rotorid.plan.questions import FittedSet, Hypothesis, Question, chain_interval, chain_squares
 from rotorid.plan.simulate import ChangedVehicle, CompetingModel, SimulatedFlight, commands, fly, recorded
 from rotorid.recordings import RecordingSet, Vehicle

@@ -35,7 +35,7 @@ from rotorid.mismatch.instrument.setup import set_up, with_unseen
 from rotorid.mismatch.plant.regression import Regression, build
 from rotorid.mismatch.plant.rows import Rows, Term
 from rotorid.mismatch.plant.split import parts_of, split_runs
-from rotorid.plan.limits import SessionLimits
+from rotorid.plan.candidates import SessionLimits
 from rotorid.plan.plan import Forecast, Plan, Tried, chosen_pieces
 from rotorid.plan.questions import Question, claimed_in, in_thirds, question_of
 from rotorid.plan.separation import (

@@ -26,8 +26,7 @@ import pandas as pd
 from rotorid.effects.catalogue import catalogue
 from rotorid.io.text.writing import all_or_none, rounded
 from rotorid.plan.candidates import Reference
-from rotorid.plan.handled import SHARE, Handled
-from rotorid.plan.plan import BETWEEN_S, Forecast, Plan
+from rotorid.plan.plan import BETWEEN_S, SHARE, Forecast, Handled, Plan
 from rotorid.plan.separation import Questions, Separation
 from rotorid.report.plots.style import BLUE, GREY, ORANGE, RED, figure, use
 

@@ -3,12 +3,10 @@
 OPEN = (
     "deliver",
     "fleet",
-    "fleet_history",
     "log",
     "next_to_log",
-    "page.changes",
+    "page",
     "plots.*",
-    "prose",
     "provenance",
     "series_files",
     "typeset",

@@ -49,7 +49,7 @@ from rotorid.mismatch.tell.tiles import tiles
 from rotorid.mismatch.tell.verdict import Verdict, main_channel, make_verdict, with_doubts
 from rotorid.recordings import RecordingSet, Vehicle, read_vehicle, vehicle_of, write_vehicle
 from rotorid.recordings.sufficient import sufficient
-from rotorid.report.page.make import make_page, pretty
+from rotorid.report.page import make_page, pretty
 from rotorid.steps import step
 
 _ONE_THREAD = threadpool_limits.wrap(limits=1)

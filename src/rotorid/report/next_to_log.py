@@ -23,7 +23,8 @@ from rotorid.mismatch.delivery.flown import UNITS, Model, driven_by, model_of
 from rotorid.mismatch.tell.forward import delivered_model
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.attitude import normalised, quaternion_rate, rotation_from_quaternion
-from rotorid.vehicle.exports import ardupilot_frame, sih
+from rotorid.vehicle.exports import ardupilot_frame
+from rotorid.vehicle.exports import px4 as sih
 from rotorid.vehicle.exports.flown import multirotor_of, passive_forces, read_by
 from rotorid.vehicle.exports.forms import FLU, KNOWS, Exported, expressed, parts_of
 from rotorid.vehicle.windows import States, plan_windows

@@ -149,7 +149,7 @@ def _loop_record(room: int) -> np.dtype:
 @dataclass(frozen=True)
 class AttitudeLoop:
     """An attitude controller laid out for a whole flight, so that it can fly compiled
-    (`rotorid.vehicle.control.pid`)."""
+    (`rotorid.vehicle.control`)."""
 
     proportional: np.ndarray
     """(3,) or (n, 3), N m/rad, likewise the integral and derivative gains."""

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from rotorid.identify.networks import LINEAR, SIGMOID, Network, Training, build, gradients, sigmoid, train
+from rotorid.identify.networks import Network, Training, build, gradients, sigmoid, train
 
 
 def test_delta_rule_by_hand():
     """One linear node, w = (0.5, -1), x = (1, 2), d = 3, rate 0.1: e = 4.5, w += 0.1 e x = (0.95, -0.1)."""
-    network = Network((np.array([[0.5, -1.0]]),), (None,), (LINEAR,), (None,))
+    network = Network((np.array([[0.5, -1.0]]),), (None,), ("linear",), (None,))
     found = train(network, np.array([[1.0, 2.0]]), np.array([[3.0]]), Training(0.1, 1))
     np.testing.assert_allclose(found.network.weights[0], [[0.95, -0.1]])
     np.testing.assert_allclose(found.mse, [[4.5**2]])
@@ -14,7 +14,7 @@ def test_delta_rule_by_hand():
 
 def test_generalised_delta_rule_of_a_sigmoid_by_hand():
     """v = 0: y = 0.5, φ' = 0.25, e = 0.5: Δw = 0.25 · 0.5 · x."""
-    network = Network((np.zeros((1, 2)),), (np.zeros(1),), (SIGMOID,), (None,))
+    network = Network((np.zeros((1, 2)),), (np.zeros(1),), ("sigmoid",), (None,))
     steps, bias_steps, _ = gradients(network, np.array([[1.0, 2.0]]), np.array([[1.0]]))
     np.testing.assert_allclose(steps[0], [[0.125, 0.25]])
     np.testing.assert_allclose(bias_steps[0], [0.125])

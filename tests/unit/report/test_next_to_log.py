@@ -15,8 +15,9 @@ from rotorid.errors import InputError
 from rotorid.recordings import Vehicle, write_set
 from rotorid.report import next_to_log
 from rotorid.report.next_to_log import LogWindow, by_equations
-from rotorid.vehicle.exports import ardupilot_frame, export_vehicle, sih
-from rotorid.vehicle.exports.gazebo_airframe import gazebo_airframe
+from rotorid.vehicle.exports import ardupilot_frame, export_vehicle
+from rotorid.vehicle.exports import px4 as sih
+from rotorid.vehicle.exports.px4 import gazebo_airframe
 from rotorid.vehicle.mixer import hover_speed_rad_s
 from rotorid.vehicle.windows import States
 

@@ -7,7 +7,7 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import SpeedForm
 from rotorid.errors import InputError
 from rotorid.recordings import Vehicle
-from rotorid.vehicle.control.pid import AttitudePid, AttitudeReference, Gains
+from rotorid.vehicle.control import AttitudePid, AttitudeReference, Gains
 from rotorid.vehicle.improved import command_path, flyable, simulate_as_stated, speeds_of_commands
 from rotorid.vehicle.simulator import Commands, Start, Trace
 from tests.unit.effects.flown import audit_vehicle, entry

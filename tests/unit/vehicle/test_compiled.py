@@ -16,7 +16,7 @@ from rotorid.identify.excitation import ExcitedHold, Multisine
 from rotorid.vehicle.attitude import quaternion_from_euler, rotation_from_quaternion
 from rotorid.vehicle.batch import Batch
 from rotorid.vehicle.compiled import _invert
-from rotorid.vehicle.control.pid import AttitudePid, Gains, training_reference
+from rotorid.vehicle.control import AttitudePid, Gains, training_reference
 from rotorid.vehicle.fast import _adds_wrench
 from rotorid.vehicle.improved import simulate_as_stated
 from rotorid.vehicle.simulator import Commands, Disturbance, Motors, Start, WhiteNoise, simulate

@@ -19,7 +19,7 @@ from rotorid.recordings import Vehicle, read_vehicle, templates, write_vehicle
 from rotorid.recordings.vehicle import Derivative, unit_of
 from rotorid.report import next_to_log
 from rotorid.vehicle.batch import Batch
-from rotorid.vehicle.control.swings import swings, turned_over
+from rotorid.vehicle.control import swings, turned_over
 from rotorid.vehicle.derivatives import (
     CHANNELS,
     QUANTITIES,
@@ -30,11 +30,11 @@ from rotorid.vehicle.derivatives import (
     table_of,
     wrench,
 )
-from rotorid.vehicle.exports import NAMES, ardupilot_frame, export_vehicle, sih
+from rotorid.vehicle.exports import NAMES, ardupilot_frame, export_vehicle
+from rotorid.vehicle.exports import px4 as sih
 from rotorid.vehicle.exports.derivatives import MUJOCO_FILE, ROTORPY_FILE
 from rotorid.vehicle.exports.flown import gazebo_damping_of, in_drake, in_mujoco, in_rotorpy
-from rotorid.vehicle.hover import hover, wrench_at_rest
-from rotorid.vehicle.improved import active_forms, flyable, record_as_stated, simulate_as_stated
+from rotorid.vehicle.improved import active_forms, flyable, hover, record_as_stated, simulate_as_stated, wrench_at_rest
 from rotorid.vehicle.simulator import Commands, simulate
 from tests.unit.effects.flown import audit_vehicle, commands, start
 from tests.unit.vehicle.by_numpy import by_numpy

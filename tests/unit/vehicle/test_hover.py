@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from rotorid.recordings import Vehicle
-from rotorid.vehicle.control.pid import AttitudePid, AttitudeReference, Gains
-from rotorid.vehicle.hover import hover
-from rotorid.vehicle.improved import command_path, simulate_as_stated
+from rotorid.vehicle.control import AttitudePid, AttitudeReference, Gains
+from rotorid.vehicle.improved import command_path, hover, simulate_as_stated
 from rotorid.vehicle.simulator import Start
 from tests.unit.effects.flown import audit_vehicle
 

@@ -15,7 +15,7 @@ from rotorid.vehicle.attitude import (
     quaternion_from_euler,
     rotation_from_quaternion,
 )
-from rotorid.vehicle.control.pid import AttitudePid, Gains, training_reference
+from rotorid.vehicle.control import AttitudePid, Gains, training_reference
 from rotorid.vehicle.mixer import allocation_matrix, wrench_matrix
 from rotorid.vehicle.simulator import (
     Commands,
@@ -322,7 +322,7 @@ def test_pid_by_hand():
 
 def test_anti_windup_shortens_the_overshoot():
     """A roll step that saturates the moment: with the integral held the overshoot is smaller."""
-    from rotorid.vehicle.control.pid import AttitudeReference
+    from rotorid.vehicle.control import AttitudeReference
 
     vehicle = thesis_vehicle()
 

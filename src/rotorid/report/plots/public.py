@@ -12,16 +12,6 @@ from rotorid.report.plots import style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_CHANNELS = ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
-_LABEL = {
-    "force_x": "$F_x$ (N)",
-    "force_y": "$F_y$ (N)",
-    "force_z": "$F_z$ (N)",
-    "moment_x": "$M_x$ (N m)",
-    "moment_y": "$M_y$ (N m)",
-    "moment_z": "$M_z$ (N m)",
-}
-
 
 def residual_against_airspeed(bins: pd.DataFrame, points: pd.DataFrame) -> Figure:
     """Residual of each channel against airspeed: samples of the rigid body, its RMS and NeuroBEM's.
@@ -34,25 +24,23 @@ def residual_against_airspeed(bins: pd.DataFrame, points: pd.DataFrame) -> Figur
         Columns `airspeed_m_s` and the six channels: residual of the rigid body (N, N m).
     """
     fig, axes = style.figure(4.6, rows=2, columns=3, sharex=True)
-    for axis, channel in zip(axes.flat, _CHANNELS, strict=True):
+    for axis, (channel, (label, unit)) in zip(axes.flat, style.CHANNELS.items(), strict=True):
         size = points[channel].abs()
         axis.plot(points["airspeed_m_s"], size, ".", markersize=1.6, color="#bbbbbb", rasterized=True, zorder=0)
-        for model, colour, label in (
+        for model, colour, name in (
             ("rigid_body", style.COLOUR["before"], "rigid body, RMS"),
             ("neurobem", style.COLOUR["after"], "NeuroBEM, RMS"),
         ):
             part = bins[(bins["model"] == model) & (bins["channel"] == channel)]
             middle = (part["airspeed_low_m_s"] + part["airspeed_high_m_s"]) / 2
             axis.fill_between(middle, part["low_95"], part["high_95"], color=colour, alpha=0.25, linewidth=0)
-            axis.plot(middle, part["rms"], "o-", color=colour, label=label)
+            axis.plot(middle, part["rms"], "o-", color=colour, label=name)
         mine = bins[bins["channel"] == channel]
         axis.set_ylim(0, 1.15 * max(mine["high_95"].max(), size.quantile(0.99)))
         axis.set_xlim(0, None)
-        axis.set_ylabel(f"residual of {_LABEL[channel]}")
-    for axis in axes[-1]:
-        axis.set_xlabel("airspeed (m/s)")
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    fig.legend(handles, labels, loc="outside upper center", ncols=2)
+        axis.set_ylabel(f"residual of {label} ({unit})")
+    style.label_outer(axes, "airspeed (m/s)")
+    fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
     return fig
 
 
@@ -80,13 +68,8 @@ def rmse_of_flights(flights: pd.DataFrame) -> Figure:
         axis.set_xlabel("flight")
         axis.set_ylabel(f"RMSE of the {total} ({unit})")
         axis.grid(axis="x", visible=False)
-    handles, labels = axes[0].get_legend_handles_labels()
-    fig.legend(handles, labels, loc="outside lower center", ncols=3)
+    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return fig
-
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def apparent_coefficient(points: pd.DataFrame, pooled: dict[str, dict], names: dict[str, str]) -> Figure:
@@ -121,10 +104,7 @@ def apparent_coefficient(points: pd.DataFrame, pooled: dict[str, dict], names: d
         axis.plot(speed, bent, color=style.RED, linestyle="--", label="with offset")
         axis.set_title(names[propeller])
         axis.set_ylim(0.45 * 1e6 * fits["origin"], 1.3 * 1e6 * fits["origin"])
-    for axis in axes[-1]:
-        axis.set_xlabel("rotor speed (rad/s)")
-    for axis in axes[:, 0]:
-        axis.set_ylabel(r"$F/\omega^2$ ($10^{-6}$ N s²)")
+    style.label_outer(axes, "rotor speed (rad/s)", r"$F/\omega^2$ ($10^{-6}$ N s²)")
     axes[1, 0].legend(loc="lower right", ncols=2, markerscale=2)
     return fig
 
@@ -162,6 +142,5 @@ def motors(table: pd.DataFrame, pooled: dict[str, dict], names: dict[str, str]) 
     axes = np.atleast_1d(axes)
     axes[0].set_ylabel("motor")
     axes[0].set_ylim(len(letters) - 0.5, -0.5)
-    handles, labels = axes[0].get_legend_handles_labels()
-    fig.legend(handles, labels, loc="outside lower center", ncols=2)
+    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return fig

@@ -41,6 +41,14 @@ COLOUR = {
 """Colour of a quantity, the same in every figure."""
 AXIS_COLOURS = tuple(COLOUR[axis] for axis in "xyz")
 
+CHANNELS = {
+    **{f"force_{axis}": (f"$F_{axis}$", "N") for axis in "xyz"},
+    **{f"moment_{axis}": (f"$M_{axis}$", "N m") for axis in "xyz"},
+}
+"""Symbol and unit of each force and moment."""
+WRENCH = {f"{name}_{unit.replace(' ', '_').lower()}": (symbol, unit) for name, (symbol, unit) in CHANNELS.items()}
+"""The same by the columns that hold them: `force_x_n` to `moment_z_n_m`."""
+
 CYCLE = (BLUE, RED, GREEN, ORANGE, _PURPLE, SKY, BLACK, _YELLOW)
 """Colours in order for things without a fixed one (cells, motors, flights)."""
 
@@ -99,6 +107,14 @@ def figure(height_in: float, rows: int = 1, columns: int = 1, **subplots: Any) -
 
     use()
     return plt.subplots(rows, columns, figsize=(TEXT_WIDTH_IN, height_in), **subplots)
+
+
+def label_outer(axes: np.ndarray, across: str, up: str = "") -> None:
+    """Name what a grid of axes, shape (rows, columns), shares: on its lowest row and its first column."""
+    for axis in axes[-1]:
+        axis.set_xlabel(across)
+    for axis in axes[:, 0] if up else ():
+        axis.set_ylabel(up)
 
 
 def save(fig: Figure, path: str | Path) -> None:

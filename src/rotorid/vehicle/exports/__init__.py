@@ -13,7 +13,7 @@ from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.exports import forms
 from rotorid.vehicle.exports.ardupilot_frame import ardupilot_json
 from rotorid.vehicle.exports.forms import Exported, check_exportable
-from rotorid.vehicle.exports.sih import px4_sih
+from rotorid.vehicle.exports.px4 import px4_sih
 
 _SIMULATORS: dict[str, Callable[[Vehicle], Exported]] = {"px4-sih": px4_sih, "ardupilot-json": ardupilot_json}
 NAMES = (*forms.FORMS, *_SIMULATORS)

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.exports.derivatives import left_of_one_damping, own_damping
 from rotorid.vehicle.exports.forms import KNOWS, Exported, parts_of
-from rotorid.vehicle.exports.sih import RICHEST, SENSES, full_speed_rad_s, order_in_x, with_drag_of_hover
+from rotorid.vehicle.exports.px4 import RICHEST, SENSES, full_speed_rad_s, order_in_x, with_drag_of_hover
 from rotorid.vehicle.mixer import hover_speed_rad_s
 
 GRAVITY = 9.80665

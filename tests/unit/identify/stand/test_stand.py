@@ -95,10 +95,10 @@ CENTRE = np.array([0.003, -0.002, -0.045])
 def test_the_weight_under_tilt_gives_mass_and_centre() -> None:
     evaluated = [stand.evaluate(experiment(*tilt, seed), None) for seed, tilt in enumerate(TILTS)]
     found = stand.fit_weight(evaluated, 0.652, np.array([0, 0, -0.045]), 9.81)
-    assert found.mass_kg == pytest.approx(0.652, abs=1e-3)
-    assert found.centre_m == pytest.approx(CENTRE, abs=1e-4)
-    assert found.rms_before[4] == pytest.approx(0.652 * 9.81 * 0.003, rel=0.05)
-    assert found.rms_after[4] < 3e-4
+    assert found["mass_kg"] == pytest.approx(0.652, abs=1e-3)
+    assert found["centre_m"] == pytest.approx(CENTRE, abs=1e-4)
+    assert found["rms_before"][4] == pytest.approx(0.652 * 9.81 * 0.003, rel=0.05)
+    assert found["rms_after"][4] < 3e-4
 
 
 def test_intervals_of_mass_and_centre_cover() -> None:
@@ -112,9 +112,9 @@ def test_intervals_of_mass_and_centre_cover() -> None:
             rest = replace(like.rest, mean=exact + rng.normal(0, 1, 6) * np.array([0.007] * 3 + [7e-5] * 3))
             evaluated.append(replace(like, roll_rad=roll, pitch_rad=pitch, rest=rest))
         found = stand.fit_weight(evaluated, 0.652, CENTRE, 9.81)
-        low, high = found.centre_interval_95.T
+        low, high = found["centre_interval_95"].T
         inside.append(
-            [*((low < CENTRE) & (CENTRE < high)), found.mass_interval_95[0] < 0.652 < found.mass_interval_95[1]]
+            [*((low < CENTRE) & (CENTRE < high)), found["mass_interval_95"][0] < 0.652 < found["mass_interval_95"][1]]
         )
     assert np.mean(inside, axis=0) == pytest.approx(np.full(4, 0.95), abs=0.03)
 

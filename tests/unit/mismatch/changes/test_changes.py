@@ -19,7 +19,7 @@ from rotorid.mismatch.changes.words import as_json, sentences
 from rotorid.mismatch.posterior.problem import Prior
 from rotorid.mismatch.posterior.status import Estimate
 from rotorid.recordings import RecordingSet, Vehicle, write_set
-from rotorid.report.page.changes import make_changes_page
+from rotorid.report.page import make_changes_page
 from tests.unit.mismatch.flights import Flight, recorded
 
 

@@ -25,8 +25,7 @@ import pandas as pd
 from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
-from rotorid.identify.bench.loadcell import LineFit, fit_line
-from rotorid.identify.bench.reconstruct import (
+from rotorid.identify.bench import (
     DIRECTION,
     GF_N,
     PULLED,
@@ -36,6 +35,7 @@ from rotorid.identify.bench.reconstruct import (
     force_covariance,
     forces,
 )
+from rotorid.identify.loadcell import LineFit, fit_line
 from rotorid.io.logs import by_recording
 from rotorid.recordings.signal.filters import mean_and_error
 
