@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from rotorid.errors import InputError
 from rotorid.report import typeset
 from rotorid.report.typeset import render
 from tests.browser import CHROMIUM, Browser
@@ -114,7 +115,7 @@ def test_both_forms_say_on_their_first_page_from_which_commit_they_are(chapters:
 )
 def test_what_leads_nowhere_stops_the_report(chapters: list[str], text: str, message: str) -> None:
     Path("bad.md").write_text(text)
-    with pytest.raises(typeset.TypesetError, match=message):
+    with pytest.raises(InputError, match=message):
         html_of(["bad.md"])
 
 

@@ -89,14 +89,14 @@ def main(
         )
         if len(points)
     }
-    composed = compose(read_components(components))
+    mass_kg, centre_m, inertia = compose(read_components(components))
     found: dict[str, Any] = {
         **coefficients,
-        "mass_kg": composed.mass_kg,
-        "centre_m": composed.centre_m.tolist(),
-        "inertia_kg_m2": dict(zip(("xx", "yy", "zz"), np.diag(composed.inertia_kg_m2).tolist(), strict=True)),
+        "mass_kg": mass_kg,
+        "centre_m": centre_m.tolist(),
+        "inertia_kg_m2": dict(zip(("xx", "yy", "zz"), np.diag(inertia).tolist(), strict=True)),
         "inertia_difference": {
-            axis: float(composed.inertia_kg_m2[k, k] / grey_box.WHITE_BOX[f"inertia_{axis}_kg_m2"] - 1)
+            axis: float(inertia[k, k] / grey_box.WHITE_BOX[f"inertia_{axis}_kg_m2"] - 1)
             for k, axis in enumerate(("xx", "yy", "zz"))
         },
     }

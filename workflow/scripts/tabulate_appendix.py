@@ -25,8 +25,7 @@ AXES = ("roll", "pitch", "yaw")
 
 def gains() -> pd.DataFrame:
     """Gains about each axis."""
-    columns = (THESIS_GAINS.proportional, THESIS_GAINS.integral, THESIS_GAINS.derivative)
-    return pd.DataFrame(list(zip(AXES, *columns, strict=True)), columns=["axis", "k_p", "k_i", "k_d"])
+    return pd.DataFrame(list(zip(AXES, *THESIS_GAINS, strict=True)), columns=["axis", "k_p", "k_i", "k_d"])
 
 
 def reference_rows(reference: AttitudeReference) -> list[dict]:

@@ -28,13 +28,13 @@ from scipy.signal import butter, sosfiltfilt
 from rotorid.identify.grey_box import regressors, weights_of_inertias
 from rotorid.recordings import Run, Vehicle
 from rotorid.recordings import columns as c
-from rotorid.vehicle.control import AttitudePid, AttitudeReference, Gains
+from rotorid.vehicle.control import AttitudePid, AttitudeReference
 from rotorid.vehicle.fast import AttitudeLoop
 from rotorid.vehicle.mixer import allocation_matrix, wrench_matrix
 
 _INERTIA_ERROR, _GYROSCOPIC_ERROR = 0.001, 0.04
 """Standard errors that are wanted of a period: of inertias (relative), of gyroscopic weights (absolute)."""
-_HOLD_GAINS = Gains((0.04, 0.04, 0.04), (0.02, 0.02, 0.01), (0.015, 0.015, 0.02))
+_HOLD_GAINS = ((0.04, 0.04, 0.04), (0.02, 0.02, 0.01), (0.015, 0.015, 0.02))
 """A soft attitude hold, slower than the excitation: it keeps the attitude but does not undo the motion."""
 _FIRST_SHARES_N_M = np.array([0.1, 0.1, 0.03])
 """Where the search for the axes' shares begins: roll and pitch can be pushed far harder than yaw."""

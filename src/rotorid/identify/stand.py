@@ -20,6 +20,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import stdtrit as student_quantile
 
+from rotorid.effects.loading import rotation_of
 from rotorid.errors import InputError
 from rotorid.identify.clocks import Aligned, Pair, both_on_host, pair_of, torque_offset
 from rotorid.io.frames import Quality
@@ -252,12 +253,6 @@ def programme(found: list[_StandStretch]) -> _StandStretch:
     return _StandStretch(_RAMP, moving[0].start_s, moving[-1].stop_s)
 
 
-def tilt(roll_rad: float, pitch_rad: float) -> np.ndarray:
-    """Body axes to level axes, shape (3, 3), R_y(pitch) R_x(roll), yaw zero (thesis eq. 4.10)."""
-    cr, sr, cp, sp = np.cos(roll_rad), np.sin(roll_rad), np.cos(pitch_rad), np.sin(pitch_rad)
-    return np.array([[cp, sr * sp, cr * sp], [0.0, cr, -sr], [-sp, sr * cp, cr * cp]])
-
-
 def weight_wrench(mass_kg: float, gravity_m_s2: float, centre_m: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     """What the weight exerts on the level sensor, shape (6,), N and N m.
 
@@ -371,7 +366,9 @@ def mean_thrust(run: Run, entry: _Evaluated, thrust_of: Callable) -> np.ndarray:
 
 def weights(evaluated: list[_Evaluated], mass_kg: float, centre_m: np.ndarray, gravity_m_s2: float) -> np.ndarray:
     """The weight's wrench in the attitude of each experiment, shape (n, 6)."""
-    return np.array([weight_wrench(mass_kg, gravity_m_s2, centre_m, tilt(e.roll_rad, e.pitch_rad)) for e in evaluated])
+    return np.array(
+        [weight_wrench(mass_kg, gravity_m_s2, centre_m, rotation_of(e.roll_rad, e.pitch_rad)) for e in evaluated]
+    )
 
 
 def fit_weight(evaluated: list[_Evaluated], mass_kg: float, centre_m: np.ndarray, gravity_m_s2: float) -> dict:
@@ -384,7 +381,7 @@ def fit_weight(evaluated: list[_Evaluated], mass_kg: float, centre_m: np.ndarray
     taken as zero (it was zeroed without the vehicle), and its frame as level.
     """
     rest = np.array([e.rest.mean for e in evaluated])
-    rotations = [tilt(e.roll_rad, e.pitch_rad) for e in evaluated]
+    rotations = [rotation_of(e.roll_rad, e.pitch_rad) for e in evaluated]
     freedom = len(rest) - 1
     if freedom < 3:
         raise InputError(f"a weight under tilt needs at least four experiments, found {len(rest)}")

@@ -56,16 +56,12 @@ _ONE_THREAD = threadpool_limits.wrap(limits=1)
 """The matrices are small: a second thread of the linear algebra costs half as much again and saves no time."""
 FILES = ("verdict.json", "report.html", "improved_vehicle.yaml", "ledger.json")
 """Files that every verdict has."""
-OTHERS = ("conditions.yaml", "instruments.yaml")
+OTHERS = (CONDITIONS, INSTRUMENTS)
 """Files that it has where there is something to write."""
 
 
 def deliver(
-    recordings: RecordingSet,
-    verdict_path: Path,
-    page_path: Path,
-    improved_path: Path,
-    off: Collection[str] = (),
+    recordings: RecordingSet, verdict_path: Path, page_path: Path, improved_path: Path, off: Collection[str] = ()
 ) -> Verdict:
     """Analyse a set and write its verdict, its page and the improved vehicle; rules named in `off` are left out."""
     return write_files(analysis_of(recordings, off), verdict_path, page_path, improved_path)
@@ -119,19 +115,14 @@ def _with_first_details(verdict: Verdict, analysis: Analysis) -> Verdict:
 
 
 @_ONE_THREAD
-def write_files(
-    analysis: Analysis,
-    verdict_path: Path,
-    page_path: Path,
-    improved_path: Path,
-) -> Verdict:
+def write_files(analysis: Analysis, verdict_path: Path, page_path: Path, improved_path: Path) -> Verdict:
     """Write what an analysis amounts to; what is taken home is read back and simulated as proof.
 
     `conditions.yaml` and `instruments.yaml` are written next to the improved vehicle where there is something to write.
     """
     locations = locate(analysis)
     improved = improved_vehicle(analysis)
-    others = [improved_path.with_name(name) for name in (CONDITIONS, INSTRUMENTS)]
+    others = [improved_path.with_name(name) for name in OTHERS]
     paths = (verdict_path, page_path, improved_path, verdict_path.with_name("ledger.json"), *others)
     with all_or_none(*paths, optional=others) as parts:
         verdict_part, page_part, improved_part, ledger_part, *other_parts = parts

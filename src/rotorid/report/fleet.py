@@ -47,15 +47,13 @@ from rotorid.mismatch.changes.level_one_words import difference_words, in_unit_o
 from rotorid.mismatch.changes.quantities import Flown, flown, grid_of
 from rotorid.recordings import RecordingSet, read_set
 from rotorid.recordings.templates import read
-from rotorid.report.deliver import deliver
+from rotorid.report.deliver import FILES, deliver
 from rotorid.report.page import drawing, filled
 from rotorid.vehicle.control import swings
 
 _NUMBERS = ("vehicle", "set", "day", "good", "name", "quantity", "unit", "change", "low_95", "high_95", "limit")
 EVENTS = ("vehicle", "set", "day", "id", "lasts", "sentence")
 _Z95 = 1.96
-FILES = ("verdict.json", "report.html", "improved_vehicle.yaml", "ledger.json")
-"""What a verdict consists of."""
 FAILED = "failed.json"
 """What stands in its place where there is none: `reason`, and `fault` where it is none of the set's."""
 _WORTH_A_START = 4
@@ -208,26 +206,20 @@ def collect(folders: Sequence[Path], recordings: Path) -> tuple[pd.DataFrame, pd
             continue
         verdict = json.loads((folder / "verdict.json").read_text(encoding="utf-8"))
         found = [e for e in verdict["effects"] if e["status"] in _SHOWN]
-        rows.append(
-            own
-            | {
-                "verdict": verdict["verdict"],
-                "unexplained": verdict["unexplained"]["share"],
-                "effects": " ".join(e["id"] for e in found if e["status"] != "suggested"),
-                "person": "; ".join(_reasons(verdict)),
-                "sentence": verdict["sentence"],
-            }
-        )
+        shown = " ".join(e["id"] for e in found if e["status"] != "suggested")
+        own_row = {"verdict": verdict["verdict"], "unexplained": verdict["unexplained"]["share"], "effects": shown}
+        rows.append(own | own_row | {"person": "; ".join(_reasons(verdict)), "sentence": verdict["sentence"]})
         effects += [own | {"effect": e["id"], "status": e["status"], "share": e["share"]} for e in found]
         parameters += [own | row for row in _numbers(verdict, found)]
     return (
         pd.DataFrame(rows, columns=[*_OWN, "verdict", "unexplained", "effects", "person", "sentence"]),
         pd.DataFrame(effects, columns=[*_OWN, "effect", "status", "share"]),
-        pd.DataFrame(parameters, columns=[*_OWN, "parameter", "unit", "value", "low_95", "high_95", "status"]),
+        pd.DataFrame(parameters, columns=[*_OWN, *_STATED]),
     )
 
 
 _OWN = ("set", "vehicle", "day")
+_STATED = ("parameter", "unit", "value", "low_95", "high_95", "status")
 
 
 def _reasons(verdict: dict[str, Any]) -> list[str]:
@@ -255,11 +247,9 @@ def by_effect(effects: pd.DataFrame, sets: pd.DataFrame) -> pd.DataFrame:
     `share` of the error that goes; the most frequent first."""
     rows = []
     for name, own in effects.groupby("effect"):
-        counts = {status: int((own["status"] == status).sum()) for status in _SHOWN}
+        counts = [int((own["status"] == status).sum()) for status in _SHOWN]
         surely = own[own["status"] == "established"]
-        rows.append(
-            {"effect": name, **counts, "vehicles": surely["vehicle"].nunique(), "share": surely["share"].median()}
-        )
+        rows.append((name, *counts, surely["vehicle"].nunique(), surely["share"].median()))
     table = pd.DataFrame(rows, columns=["effect", *_SHOWN, "vehicles", "share"])
     judged = int((sets["verdict"] != "failed").sum())
     table.insert(1, "of_sets", judged)
@@ -274,16 +264,9 @@ def by_vehicle(effects: pd.DataFrame, sets: pd.DataFrame) -> pd.DataFrame:
     for name, own in sets.sort_values(["day", "set"]).groupby("vehicle"):
         counts = sure.loc[sure["vehicle"] == name, "effect"].value_counts()
         ordered = sorted(counts.items(), key=lambda pair: (-pair[1], pair[0]))
-        rows.append(
-            {
-                "vehicle": name,
-                "sets": len(own),
-                "failed": int((own["verdict"] == "failed").sum()),
-                "person": int((own["person"] != "").sum()),
-                "effects": ", ".join(f"{effect} {count}" for effect, count in ordered),
-                "last": own["verdict"].iloc[-1],
-            }
-        )
+        failed, person = int((own["verdict"] == "failed").sum()), int((own["person"] != "").sum())
+        found = ", ".join(f"{effect} {count}" for effect, count in ordered)
+        rows.append((name, len(own), failed, person, found, own["verdict"].iloc[-1]))
     return pd.DataFrame(rows, columns=["vehicle", "sets", "failed", "person", "effects", "last"])
 
 
@@ -297,25 +280,10 @@ def _numbers(verdict: dict[str, Any], found: Sequence[dict[str, Any]]):
     """Every number that a verdict states with an interval."""
     for effect in found:
         for p in effect["parameters"]:
-            low, high = p["interval_95"]
-            yield {
-                "parameter": f"{effect['id']}.{p['symbol']}",
-                "unit": p["unit"],
-                "value": p["value"],
-                "low_95": low,
-                "high_95": high,
-                "status": effect["status"],
-            }
+            name = f"{effect['id']}.{p['symbol']}"
+            yield dict(zip(_STATED, (name, p["unit"], p["value"], *p["interval_95"], effect["status"]), strict=True))
     for name, value in verdict["parameters"].items():
-        low, high = value["interval_95"]
-        yield {
-            "parameter": name,
-            "unit": "",
-            "value": value["refitted"],
-            "low_95": low,
-            "high_95": high,
-            "status": "wrong value",
-        }
+        yield dict(zip(_STATED, (name, "", value["refitted"], *value["interval_95"], "wrong value"), strict=True))
 
 
 def _vehicle(folder: Path) -> str:

@@ -27,7 +27,7 @@ from rotorid.vehicle.exports import ardupilot_frame
 from rotorid.vehicle.exports import px4 as sih
 from rotorid.vehicle.exports.flown import multirotor_of, passive_forces, read_by
 from rotorid.vehicle.exports.forms import FLU, KNOWS, Exported, expressed, parts_of
-from rotorid.vehicle.windows import States, plan_windows
+from rotorid.vehicle.windows import Inputs, States, plan_windows, simulate_windows
 
 _MOST_WINDOWS = 40
 """Windows that are flown, spread evenly over the log: RotorPy takes a second for five."""
@@ -122,8 +122,6 @@ def next_to_log(analysis: Analysis, to: str, exported: Exported) -> NextToLog:
 def _ours(model: Model, windows: Sequence[LogWindow]) -> list[States]:
     """The windows flown by our own simulator: the wrench of the model's forms at each instant."""
     vehicle = model.vehicle
-    from rotorid.vehicle.windows import Inputs, simulate_windows
-
     out = []
     for window in windows:
         inputs = Inputs(window.speed, np.gradient(window.speed, window.time_s, axis=0), wind=window.wind)
@@ -227,9 +225,7 @@ def in_sih(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow]) -
 def in_ardupilot(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow]) -> list[States]:
     """By the equations of ArduPilot's simulated frame, from the file's text."""
     frame = ardupilot_frame.values_of(exported.text)
-    share, expo = _shares(vehicle, exported, windows, KNOWS["ardupilot-json"]), frame["propExpo"]
-    if expo != 0:
-        share = (expo - 1 + np.sqrt((1 - expo) ** 2 + 4 * expo * share)) / (2 * expo)
+    share = ardupilot_frame.signal(_shares(vehicle, exported, windows, KNOWS["ardupilot-json"]), frame["propExpo"])
 
     def wrench(signal, velocity, rates):
         return ardupilot_frame.wrench(frame, signal, velocity, rates)
@@ -277,8 +273,6 @@ def in_mujoco(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow]
     with read_by("MuJoCo"):
         model = mujoco.MjModel.from_xml_string(exported.text)
     with passive_forces(exported):
-        import mujoco
-
         coefficients = vehicle.thrust_coefficients_n_s2()
         out = []
         for window in windows:

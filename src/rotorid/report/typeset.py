@@ -48,10 +48,6 @@ _WIDEST = 40
 _MARKDOWN = "markdown-raw_tex-raw_html+table_attributes"
 
 
-class TypesetError(InputError):
-    """The report could not be typeset; carries what pandoc or typst said."""
-
-
 @dataclass(frozen=True)
 class Document:
     """What a report is made from."""
@@ -66,9 +62,9 @@ class Document:
     left_out: Sequence[str] = ()
     """Names of chapters that are not in this report: a reference into one of them says so."""
     notice: str = ""
+    """What the title page says of the data."""
     origin: str = ""
     """Commit, date and code, for the title page."""
-    """What the title page says of the data."""
 
 
 def typst_source(document: Document, out: str | Path, later: Mapping[str, int] | None = None) -> None:
@@ -77,19 +73,6 @@ def typst_source(document: Document, out: str | Path, later: Mapping[str, int] |
     options = ["--to=typst", f"--template={Path(document.parts) / 'report.typ'}", f"--output={out}"]
     options.append("--metadata=later:" + ",".join(f"{name}={steps}" for name, steps in (later or {}).items()))
     _pandoc(document, options)
-
-
-@dataclass(frozen=True)
-class _EmptySpace:
-    """Empty space at the foot of a page since a figure or table did not fit there."""
-
-    identifier: str
-    chapter: int
-    """From 1, those without a number included."""
-    height_pt: float
-    """0 where it follows its text on the same page."""
-    movable: bool
-    """Whether whole sentences follow that could stand before it."""
 
 
 MOST_EMPTY_PT = 70.0
@@ -106,7 +89,7 @@ def without_gaps(document: Document, out: str | Path) -> None:
     """
     later: dict[str, int] = {}
     written: dict[str, int] | None = None
-    found: list[_EmptySpace] = []
+    found: list[tuple[str, int, float, bool]] = []
     seen: dict[str, dict[int, float]] = {}
     settled: set[str] = set()
     for _ in range(_ROUNDS):
@@ -115,16 +98,16 @@ def without_gaps(document: Document, out: str | Path) -> None:
             typst_source(document, out, moved)
             written, found = moved, gaps(out)
         tried: set[int] = set()
-        for gap in found:
-            name, steps = gap.identifier, later.get(gap.identifier, 0)
-            if name in settled or gap.chapter in tried:
+        for name, chapter, height_pt, movable in found:
+            steps = later.get(name, 0)
+            if name in settled or chapter in tried:
                 continue
-            seen.setdefault(name, {})[steps] = gap.height_pt
-            if gap.height_pt <= MOST_EMPTY_PT:
+            seen.setdefault(name, {})[steps] = height_pt
+            if height_pt <= MOST_EMPTY_PT:
                 settled |= {name} if steps else set()
                 continue
-            tried.add(gap.chapter)
-            if gap.movable and steps < _MOST_STEPS:
+            tried.add(chapter)
+            if movable and steps < _MOST_STEPS:
                 later[name] = steps + 1
             else:
                 later[name] = min(seen[name], key=lambda k: (seen[name][k], k))
@@ -134,18 +117,23 @@ def without_gaps(document: Document, out: str | Path) -> None:
     typst_source(document, out, later)
 
 
-def gaps(source: str | Path) -> list[_EmptySpace]:
-    """The gap before each figure and table that follows text, in reading order, from a typst source's own marks."""
+def gaps(source: str | Path) -> list[tuple[str, int, float, bool]]:
+    """The gap before each figure and table that follows text, in reading order, from a typst source's own marks.
+
+    Its identifier, its chapter (from 1, those without a number included), the height in pt of the empty space at the
+    foot of the page since it did not fit there (0 where it follows its text on the same page), and whether whole
+    sentences follow that could stand before it.
+    """
     import typst
 
     try:
         found = typst.query(str(source), "<places>", field="value", one=True, root=".", ignore_system_fonts=True)
     except typst.TypstError as error:
-        raise TypesetError(f"{source}: typst says: {error}") from None
+        raise InputError(f"{source}: typst says: {error}") from None
     places = json.loads(found)
     page_of = dict(places["shown"])
     return [
-        _EmptySpace(name, chapter, places["bottom"] - below_pt if page_of[name] > page else 0.0, movable)
+        (name, chapter, places["bottom"] - below_pt if page_of[name] > page else 0.0, movable)
         for (name, movable, chapter), page, below_pt in places["text"]
     ]
 
@@ -157,7 +145,7 @@ def pdf(source: str | Path, out: str | Path) -> None:
     try:
         typst.compile(str(source), output=str(out), root=".", ignore_system_fonts=True, timestamp=0, pdf_standards=[])
     except typst.TypstError as error:
-        raise TypesetError(f"{source}: typst says: {error}") from None
+        raise InputError(f"{source}: typst says: {error}") from None
 
 
 def html(document: Document, out: str | Path) -> None:
@@ -193,11 +181,7 @@ def _pandoc(document: Document, options: Sequence[str]) -> None:
     ]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
-        raise TypesetError(f"report: pandoc says: {done.stderr.strip()}")
-
-
-class ProseError(InputError):
-    """A chapter's text that cannot be rendered; says which file, which line and why."""
+        raise InputError(f"report: pandoc says: {done.stderr.strip()}")
 
 
 def render(path: str | Path, files: Mapping[str, str], emulated: bool = False) -> str:
@@ -215,7 +199,7 @@ def render(path: str | Path, files: Mapping[str, str], emulated: bool = False) -
 
     Raises
     ------
-    ProseError
+    InputError
         The text names what no file gives, or is not valid Jinja2.
     """
     path = Path(path)
@@ -233,14 +217,14 @@ def render(path: str | Path, files: Mapping[str, str], emulated: bool = False) -
 
     def captioned(caption: str, kind: str) -> str:
         if kind not in _MADE_OF:
-            raise ProseError(f"{path}: a figure or table is made of {', '.join(_MADE_OF)}, not {kind!r}.")
+            raise InputError(f"{path}: a figure or table is made of {', '.join(_MADE_OF)}, not {kind!r}.")
         made_of = _MADE_OF[kind.replace("campaign", "emulated") if emulated else kind]
         return f"*{made_of}* {caption}" if made_of else caption
 
     def figure(name: str, caption: str, kind: str, width: str = "100%", moving: str = "") -> str:
         for shown in filter(None, (name, moving)):
             if shown not in files or Path(files[shown]).suffix not in _FIGURES:
-                raise ProseError(f"{path}: there is no figure called {shown}.")
+                raise InputError(f"{path}: there is no figure called {shown}.")
         label = f"fig:{path.stem}-{name}".replace("_", "-")
         on_page = f' moving="{files[moving]}"' if moving else ""
         return f"![{captioned(caption, kind)}]({files[name]}){{#{label} width={width}{on_page}}}"
@@ -250,22 +234,22 @@ def render(path: str | Path, files: Mapping[str, str], emulated: bool = False) -
     ) -> str:
         whole = known.get(name)
         if not isinstance(whole, list):
-            raise ProseError(f"{path}: there is no table called {name}.")
+            raise InputError(f"{path}: there is no table called {name}.")
         label = f"tbl:{path.stem}-{name}".replace("_", "-")
         try:
             return table_of(whole if rows is None else rows, captioned(caption, kind), columns, label)
         except KeyError as missing:
-            raise ProseError(f"{path}: the table {name} has no column {missing}.") from None
+            raise InputError(f"{path}: the table {name} has no column {missing}.") from None
 
     try:
         template = environment.from_string(path.read_text(encoding="utf-8"))
         return _standing_alone(template.render(**known, figure=figure, table=table, emulated=emulated), path)
     except jinja2.TemplateSyntaxError as error:
-        raise ProseError(f"{path}, line {error.lineno}: {error.message}.") from None
+        raise InputError(f"{path}, line {error.lineno}: {error.message}.") from None
+    except InputError:
+        raise
     except (jinja2.UndefinedError, TypeError, ValueError) as error:
-        if isinstance(error, ProseError):
-            raise
-        raise ProseError(f"{path}, line {_line_of(error)}: {error}.") from None
+        raise InputError(f"{path}, line {_line_of(error)}: {error}.") from None
 
 
 def _standing_alone(markdown: str, path: Path) -> str:
@@ -274,7 +258,7 @@ def _standing_alone(markdown: str, path: Path) -> str:
     for before, line, after in zip(lines, lines[1:], lines[2:], strict=False):
         if line.startswith("![") and (before.strip() or after.strip()):
             name = line[line.rfind("{#") + 2 :].split()[0].rstrip("}")
-            raise ProseError(
+            raise InputError(
                 f"{path}: the figure {name} stands inside a paragraph; it needs an empty line on both sides."
             )
     return markdown

@@ -10,7 +10,7 @@ What an attitude controller is asked to follow: total thrust and Euler angles ov
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,7 +80,7 @@ def swings(vehicle: Vehicle, name: str, seconds: float, flights: int, seed: int,
     tilted = (1 / _MEAN_TILT_COSINE - 1) * vehicle.mass_kg * vehicle.gravity_m_s2
     thrust_n = steady.thrust_n + tilted / steady.gain
     j = np.diag(vehicle.inertia_kg_m2.matrix()) / steady.gain
-    gains = Gains(tuple(j * stiffness**2), (0.0,) * 3, tuple(2 * _DAMPING * stiffness * j))
+    gains = (j * stiffness**2, np.zeros(3), 2 * _DAMPING * stiffness * j)
     most = (np.inf, np.inf, _most_yaw_n_m(vehicle, np.array([thrust_n, *steady.moments_n_m])))
     noise = WhiteNoise(
         angular_velocity_rad_s=0.01,
@@ -131,9 +131,9 @@ def turned_over(recordings: RecordingSet) -> tuple[str, ...]:
         _, x, y, _ = run.array(c.QUATERNION).T
         if (2 * (x**2 + y**2) > 1.0).any():  # 1 − 2 (x² + y²) is the cosine of the tilt
             names.append(run.name)
-    return (
-        (f"The vehicle turned over in {', '.join(names)}: its attitude controller does not hold it.",) if names else ()
-    )
+    if not names:
+        return ()
+    return (f"The vehicle turned over in {', '.join(names)}: its attitude controller does not hold it.",)
 
 
 def _lateness_s(vehicle: Vehicle) -> float:
@@ -141,16 +141,9 @@ def _lateness_s(vehicle: Vehicle) -> float:
     return sum(float(max(values)) for form, values in active_speed_forms(vehicle) if form.stage in (DELAY, LAG))
 
 
-@dataclass(frozen=True)
-class Gains:
-    """Gains about roll, pitch and yaw, each (3,): N m/rad, N m/(rad s), N m s/rad."""
-
-    proportional: tuple[float, float, float]
-    integral: tuple[float, float, float]
-    derivative: tuple[float, float, float]
-
-
-THESIS_GAINS = Gains((0.2, 0.2, 4.0), (3.0, 3.0, 0.1), (0.1, 0.1, 0.1))
+Gains = Sequence[Sequence[float]]
+"""Proportional, integral and derivative gains about roll, pitch and yaw, (3, 3): N m/rad, N m/(rad s), N m s/rad."""
+THESIS_GAINS: Gains = ((0.2, 0.2, 4.0), (3.0, 3.0, 0.1), (0.1, 0.1, 0.1))
 """Table 4.2."""
 
 
@@ -175,7 +168,7 @@ class AttitudePid:
         """The controller laid out for instants (m,), s."""
         angles, allocation = self.reference.at(time_s), allocation_matrix(self.vehicle)
         return AttitudeLoop(
-            *(np.asarray(g) for g in (self.gains.proportional, self.gains.integral, self.gains.derivative)),
+            *(np.asarray(g) for g in self.gains),
             allocation=allocation,
             reference=np.concatenate([angles, np.full((*angles.shape[:-1], 1), self.reference.thrust_n)], axis=-1),
             derivative_time_s=self.derivative_time_s,
@@ -215,12 +208,7 @@ def validation_reference(thrust_n: float = 5.0) -> AttitudeReference:
     """Thesis eq. 4.81: 5 N; roll and pitch swing by 4 degrees at 10 rad/s, yaw by 8 degrees at 2 rad/s."""
 
     def euler(t: float) -> np.ndarray:
-        return np.array(
-            [
-                np.pi / 45 * np.sin(10 * t),
-                np.pi / 45 * np.sin(10 * t + np.pi / 2),
-                2 * np.pi / 45 * np.sin(2 * t),
-            ]
-        )
+        four = np.pi / 45
+        return np.array([four * np.sin(10 * t), four * np.sin(10 * t + np.pi / 2), 2 * four * np.sin(2 * t)])
 
     return AttitudeReference("eq. 4.81", thrust_n, euler)

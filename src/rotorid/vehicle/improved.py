@@ -192,8 +192,7 @@ def simulate_as_stated(
     motors, path, command = _motors_of(vehicle, step_s), None, None
     if isinstance(controller, Commands):
         time_s = step_s * np.arange(steps + 1)
-        held = np.searchsorted(controller.time_s, time_s + 1e-9, side="right") - 1
-        command = controller.rotor_speed[np.maximum(held, 0)]
+        command = controller.rotor_speed[controller.index(time_s)]
         speed = speeds_of_commands(vehicle, command, time_s, voltage, full_voltage_v)
         controller = Commands(time_s, speed, np.gradient(speed, step_s, axis=0))
         motors = None

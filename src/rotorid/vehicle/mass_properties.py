@@ -7,7 +7,6 @@ centre of mass by the theorem of parallel axes. A component with count 4 stands 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,15 +16,6 @@ from rotorid.errors import InputError
 
 COLUMNS = ("component count mass_kg shape size_x_m size_y_m size_z_m x_m y_m z_m").split()
 _SHAPES = ("point", "box", "cylinder")
-
-
-@dataclass(frozen=True)
-class _MassProperties:
-    """Mass, kg; centre of mass (3,), m, in the table's axes; inertia (3, 3), kg m2, about the centre of mass."""
-
-    mass_kg: float
-    centre_m: np.ndarray
-    inertia_kg_m2: np.ndarray
 
 
 def read_components(path: str | Path) -> pd.DataFrame:
@@ -56,8 +46,9 @@ def own_inertia(shape: str, mass_kg: float, size_m: np.ndarray) -> np.ndarray:
     return mass_kg / 12 * np.diag([y**2 + z**2, x**2 + z**2, x**2 + y**2])
 
 
-def compose(table: pd.DataFrame) -> _MassProperties:
-    """Mass properties of all components together."""
+def compose(table: pd.DataFrame) -> tuple[float, np.ndarray, np.ndarray]:
+    """Mass, kg, of all components together, their centre of mass (3,), m, in the table's axes, and the inertia (3, 3),
+    kg m2, about it."""
     masses, places, inertias = [], [], []
     for row in table.itertuples():
         size = np.array([row.size_x_m, row.size_y_m, row.size_z_m])
@@ -74,7 +65,7 @@ def compose(table: pd.DataFrame) -> _MassProperties:
     total = np.zeros((3, 3))
     for mass, arm, own in zip(masses, places - centre, inertias, strict=True):
         total += own + mass * ((arm @ arm) * np.eye(3) - np.outer(arm, arm))
-    return _MassProperties(float(masses.sum()), centre, total)
+    return float(masses.sum()), centre, total
 
 
 def _about_z(angle: float) -> np.ndarray:

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from rotorid.errors import InputError
 from rotorid.report.typeset import (
     LETTER_PT,
     LINE_PT,
-    ProseError,
     fix,
     not_recorded,
     one_line,
@@ -72,14 +72,14 @@ def test_a_figure_has_caption_path_and_label(tmp_path: Path, files: dict[str, st
 
 def test_a_figure_inside_a_paragraph_stops_the_report(tmp_path: Path, files: dict[str, str]) -> None:
     text = 'Said before.\n{{ figure("lines", "Lines.", kind="public") }}\n'
-    with pytest.raises(ProseError, match="fig:hover-lines stands inside a paragraph"):
+    with pytest.raises(InputError, match="fig:hover-lines stands inside a paragraph"):
         rendered(tmp_path, text, files)
 
 
 def test_a_figure_may_move_on_the_page(tmp_path: Path, files: dict[str, str]) -> None:
     text = '{{ figure("lines", "Lines.", kind="public", moving="lines") }}'
     assert 'moving="results/report/x/lines.svg"' in rendered(tmp_path, text, files)
-    with pytest.raises(ProseError, match="no figure called film"):
+    with pytest.raises(InputError, match="no figure called film"):
         rendered(tmp_path, '{{ figure("lines", "Lines.", kind="public", moving="film") }}', files)
 
 
@@ -88,7 +88,7 @@ def test_a_caption_says_first_that_instruments_were_emulated(tmp_path: Path, fil
     path.write_text('{{ figure("lines", "All lines.", kind="campaign") }}{% if emulated %} Emulated.{% endif %}')
     text = render(path, files, emulated=True)
     assert text.startswith("![*Emulated instruments.* All lines.]") and text.endswith(" Emulated.")
-    with pytest.raises(ProseError, match="not 'guessed'"):
+    with pytest.raises(InputError, match="not 'guessed'"):
         rendered(tmp_path, '{{ figure("lines", "All lines.", kind="guessed") }}', files)
 
 
@@ -118,7 +118,7 @@ def test_pandocs_identifiers_are_not_comments(tmp_path: Path, files: dict[str, s
     ],
 )
 def test_what_is_missing_stops_the_report(tmp_path: Path, files: dict[str, str], text: str, message: str) -> None:
-    with pytest.raises(ProseError, match=message):
+    with pytest.raises(InputError, match=message):
         rendered(tmp_path, text, files)
 
 

@@ -15,7 +15,7 @@ from rotorid.vehicle.attitude import (
     quaternion_from_euler,
     rotation_from_quaternion,
 )
-from rotorid.vehicle.control import AttitudePid, Gains, training_reference
+from rotorid.vehicle.control import AttitudePid, training_reference
 from rotorid.vehicle.mixer import allocation_matrix, wrench_matrix
 from rotorid.vehicle.simulator import (
     Commands,
@@ -386,7 +386,7 @@ def test_sensor_effects_reach_the_readings_only():
 
 def test_a_runaway_is_one_clear_sentence():
     # A derivative of the wrong sign with gains a million times too large.
-    pid = AttitudePid(thesis_vehicle(), training_reference(), Gains((-1e9,) * 3, (0.0,) * 3, (0.0,) * 3))
+    pid = AttitudePid(thesis_vehicle(), training_reference(), ((-1e9,) * 3, (0.0,) * 3, (0.0,) * 3))
     with pytest.raises(ValueError, match="ran away"), np.errstate(all="ignore"):
         simulate(thesis_vehicle(), pid, 5.0, 0.01)
 

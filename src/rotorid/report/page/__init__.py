@@ -54,8 +54,15 @@ from rotorid.mismatch.tell.verdict import (
     spoken,
 )
 from rotorid.recordings import RecordingSet
-from rotorid.report.page.data import page_data
-from rotorid.report.plots.mismatch import draw_differences, draw_residuals, draw_values
+from rotorid.report.page.data import blocks, page_data
+from rotorid.report.plots.mismatch import (
+    STRIP_CELL_S,
+    draw_differences,
+    draw_residuals,
+    draw_values,
+    heat_strip,
+    svg,
+)
 from rotorid.steps import step
 from rotorid.vehicle.derivatives import symbol_of
 
@@ -84,28 +91,16 @@ def page_file(name: str) -> str:
 
 @step("drawing")
 def make_page(
-    analysis: Analysis,
-    verdict: Verdict,
-    forward_notes: Sequence[str] = (),
-    ledger: Sequence[Mapping] = (),
+    analysis: Analysis, verdict: Verdict, forward_notes: Sequence[str] = (), ledger: Sequence[Mapping] = ()
 ) -> str:
     """The page's HTML. `ledger` holds the rules that decided something, each with a `sentence`."""
     main = main_channel(analysis, verdict.locations, verdict.channels)
     environment = Environment(autoescape=True, trim_blocks=False)
-    environment.filters |= {
-        "base64": lambda text: base64.b64encode(text.encode()).decode(),
-        "exp": math.exp,
-        "place": _place,
-    }
-    environment.filters |= {
-        "pretty": pretty,
-        "subscripts": _subscripts,
-        "listed": listed,
-        "unit": _unit_text,
-        "number": number,
-    }
-    environment.filters |= {"cell": _cell, "plus_minus": plus_minus, "channel": channel_words, "value": parameter_words}
-    environment.filters |= {"effect": lambda id_: capital(effect_words(id_)), "regime": regime_words}
+    environment.filters |= {"base64": lambda text: base64.b64encode(text.encode()).decode(), "exp": math.exp}
+    environment.filters |= {"place": _place, "pretty": pretty, "subscripts": _subscripts, "listed": listed}
+    environment.filters |= {"unit": _unit_text, "number": number, "cell": _cell, "plus_minus": plus_minus}
+    environment.filters |= {"channel": channel_words, "value": parameter_words, "regime": regime_words}
+    environment.filters["effect"] = lambda id_: capital(effect_words(id_))
     environment.globals["symbol_of"] = symbol_of
     shown, more = _shown_locations(verdict.locations)
     known = {row.id for row in (*verdict.effects, *verdict.not_testable, *verdict.absent)}
@@ -298,8 +293,6 @@ def _where_text(verdict: Verdict) -> list[str]:
 
 def strip(analysis: Analysis, verdict: Verdict) -> tuple[str, str, str] | None:
     """Heat strip of every channel over every run."""
-    from rotorid.report.plots import mismatch as plots
-
     channels = [c for c in verdict.channels if c not in FORWARD_WORDS and verdict.channels[c].noise_floor]
     runs = list(dict.fromkeys(t.run for t in analysis.traces))
     located_runs = dict.fromkeys(loc.run for loc in verdict.locations)
@@ -312,13 +305,13 @@ def strip(analysis: Analysis, verdict: Verdict) -> tuple[str, str, str] | None:
         if trace.run in shown and trace.channel in channels:
             noise = verdict.channels[trace.channel].noise_floor
             period = float(np.median(np.diff(trace.time_s)))
-            per = max(int(plots.STRIP_CELL_S / period), len(trace.time_s) // _STRIP_CELLS, 1)
+            per = max(int(STRIP_CELL_S / period), len(trace.time_s) // _STRIP_CELLS, 1)
             per = min(per, len(trace.time_s))  # A stretch that is shorter than a cell is one cell.
             count = len(trace.time_s) // per
             for stage in ("before", "after"):
-                size = np.sqrt(_blocks(getattr(trace, stage) ** 2, per, count)) / noise
+                size = np.sqrt(blocks(getattr(trace, stage) ** 2, per, count)) / noise
                 key = (stage, trace.run, trace.channel)
-                time_s = _blocks(trace.time_s, per, count)
+                time_s = blocks(trace.time_s, per, count)
                 if key in sizes:
                     time_s, size = np.append(sizes[key][0], time_s), np.append(sizes[key][1], size)
                 sizes[key] = (time_s, size)
@@ -327,16 +320,11 @@ def strip(analysis: Analysis, verdict: Verdict) -> tuple[str, str, str] | None:
         located.setdefault((loc.run, loc.channel), []).append((loc.start_s, loc.stop_s))
     labels = [channel_words(c) for c in channels]
     held = verdict.runs.held_out if verdict.runs.held_out != verdict.runs.training else ()
-    picture = plots.svg(plots.heat_strip(channels, labels, shown, held, sizes, located))
+    picture = svg(heat_strip(channels, labels, shown, held, sizes, located))
     caption = "Error of each channel over the runs' time, in units of its noise. Black lines: where it was located."
     if len(shown) < len(runs):
         caption += f" {len(shown)} of {len(runs)} runs are shown."
     return picture, "error over noise by channel and time, before and after", caption
-
-
-def _blocks(values: np.ndarray, per: int, count: int) -> np.ndarray:
-    """Means of `count` blocks of `per` samples."""
-    return values[: count * per].reshape(count, per).mean(axis=1)
 
 
 def _shown_locations(locations: Sequence[Location]) -> tuple[list[Location], str]:
@@ -466,14 +454,12 @@ def _value_range(name: str, believed: float, refitted: float, low: float, high: 
 
 def _correlated_text(verdict: Verdict) -> list[str]:
     """Sentences on the values of which little more than a ratio is known."""
-    pairs: list[tuple[str, str, float]] = []
+    texts = []
     for pair in verdict.correlations:
         first, second = (parameter_words(n)[0] for n in pair.values)
-        pairs.append((first, second, pair.correlation))
-    return [
-        pretty(f"Of {first} and {second} these recordings know little more than a ratio (correlation {r:.3f}).")
-        for first, second, r in pairs
-    ]
+        known = f"know little more than a ratio (correlation {pair.correlation:.3f})"
+        texts.append(pretty(f"Of {first} and {second} these recordings {known}."))
+    return texts
 
 
 def _better_text(verdict: Verdict) -> str:

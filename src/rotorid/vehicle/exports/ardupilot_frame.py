@@ -44,7 +44,7 @@ def ardupilot_json(vehicle: Vehicle) -> Exported:
     weight = parts.mass_kg * GRAVITY
     share = weight / (len(order) * float(thrust.mean()) * full_speed_rad_s(vehicle, parts) ** 2)
     expo = 1.0 - parts.curve
-    signal = _signal(share, expo)
+    at_hover = float(signal(share, expo))
     diagonal = 2 * float(np.linalg.norm(places[:, :2], axis=1).mean())
     area = len(order) * np.pi * (vehicle.rotor_radius_m or diagonal / 8) ** 2
     if vehicle.rotor_radius_m is None:
@@ -75,7 +75,7 @@ def ardupilot_json(vehicle: Vehicle) -> Exported:
         "gyroscopic moment Ω × J Ω: it has none",
     ]
     wake = np.sqrt(2 * weight / (DENSITY_KG_M3 * area))
-    yaw = torque / thrust / (_YAW_PER_THRUST * diagonal * signal)
+    yaw = torque / thrust / (_YAW_PER_THRUST * diagonal * at_hover)
     content = {
         "mass": parts.mass_kg,
         "diagonal_size": diagonal,
@@ -111,11 +111,9 @@ def ardupilot_json(vehicle: Vehicle) -> Exported:
     return Exported(text, "frame.json", tuple(left), parameters=content, rotor_order=tuple(order))
 
 
-def _signal(share: float, expo: float) -> float:
-    """The signal whose thrust is a share of the full one: share = (1 − e) u + e u²."""
-    if expo == 0:
-        return share
-    return float((expo - 1 + np.sqrt((1 - expo) ** 2 + 4 * expo * share)) / (2 * expo))
+def signal(share: float | np.ndarray, expo: float) -> float | np.ndarray:
+    """The signals whose thrusts are shares of the full one: share = (1 − e) u + e u²."""
+    return share if expo == 0 else (expo - 1 + np.sqrt((1 - expo) ** 2 + 4 * expo * share)) / (2 * expo)
 
 
 def _momentum_n(weight: float, coefficient: float, area: float, tilt: float) -> float:
