@@ -84,10 +84,10 @@ def classes_in(found: FittedSet | KnownInstrument) -> list[tuple[str, ...]]:
 def outcome_of(ids: tuple[str, ...], findings: tuple[Finding, ...], truth: set[str]) -> tuple[str, str]:
     """`right`, `wrong` (also where something untrue of the class is established too) or `open`, and the sentence."""
     (answer,) = answers([ids], findings)
-    if not answer.answer:
-        return "open", answer.sentence
+    if not answer["answer"]:
+        return "open", answer["sentence"]
     named = {f.id for f in findings if f.status == "established" and f.id in ids}
-    return ("right" if named <= truth else "wrong"), answer.sentence
+    return ("right" if named <= truth else "wrong"), answer["sentence"]
 
 
 def predicted(plan: Plan | SessionPlan, ids: tuple[str, ...], truth: set[str]) -> Separation | None:

@@ -19,7 +19,6 @@ from rotorid.identify import grey_box
 from rotorid.identify.rotor import (
     COLUMNS,
     LEAST_FORCE_SD_N,
-    Points,
     fit_coefficient,
     sample_noise,
     thrust_points,
@@ -34,7 +33,7 @@ LEAST_TORQUE_SD_N_M = 1e-6
 
 def coefficient(points: pd.DataFrame, believed: float, least_sd: float) -> dict:
     """C with its intervals: speed exact, and speed as noisy as its own readings at each point scattered."""
-    run = [Points("tests", points["speed_rad_s"].to_numpy(), points["value"].to_numpy())]
+    run = [("tests", points["speed_rad_s"].to_numpy(), points["value"].to_numpy())]
     plain = fit_coefficient(run, offset=False, equal_noise=True)
     own_noise = fit_coefficient(run, offset=False)
     # The mean of n readings: its speed is uncertain by sd / sqrt(n) as a share of the speed.

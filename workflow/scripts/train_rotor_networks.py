@@ -14,7 +14,7 @@ import pandas as pd
 from rotorid.identify import grey_box
 from rotorid.identify.grey_box import fit_coefficient_network
 from rotorid.identify.networks import Training
-from rotorid.identify.rotor import Points, fit_coefficient
+from rotorid.identify.rotor import fit_coefficient
 from rotorid.report import log
 
 HISTORY = ["coefficient", "epoch", "mse"]
@@ -38,7 +38,7 @@ def main(
         coefficient, (k_x, k_d), trained = fit_coefficient_network(
             speed, value, hidden, Training(rate, epochs, seed=seed)
         )
-        squares = fit_coefficient([Points("tests", speed, value)], offset=False)
+        squares = fit_coefficient([("tests", speed, value)], offset=False)
         mse = trained.mse[:, 0]
         found[name] = {
             "network": coefficient,

@@ -189,10 +189,9 @@ def together(
             said = write_files(analysis, *files)
             found = answers(before, analysis.findings)
             with all_or_none(target / "answers.json") as (part,):
-                rows = [{"ids": list(a.ids), "answer": a.answer, "sentence": a.sentence} for a in found]
-                part.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+                part.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
         typer.echo(said.sentence)
-        for line in (*notes, *(a.sentence for a in found)):
+        for line in (*notes, *(answer["sentence"] for answer in found)):
             typer.echo(f"  - {line}")
         if not before:
             typer.echo("  - The first set left nothing open.")

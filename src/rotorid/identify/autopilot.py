@@ -33,7 +33,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from rotorid.errors import InputError
-from rotorid.identify.correlated import CorrelatedFit, EstimatedNumber, Stretch, fit, stretches_of
+from rotorid.identify.correlated import EstimatedNumber, Stretch, fit, stretches_of
 from rotorid.recordings import RecordingSet
 
 _WIDEST_SHARE = 0.5
@@ -179,28 +179,13 @@ MAPS = {
 """By the name that `--to` takes."""
 
 
-@dataclass(frozen=True)
-class ThrustFit:
-    """The estimates of a thrust curve."""
+def _fit_thrust(stretches: Sequence[Stretch], chosen: ThrustMap, mass_kg: float, gravity_m_s2: float) -> tuple | None:
+    """The thrust curve; None where no stretch has signals of the motors (or, for grams, the battery's voltage).
 
-    shapes: tuple[EstimatedNumber, ...]
-    """Of the map's numbers, in its order."""
-    time_constant_s: EstimatedNumber
-    hover_signal: EstimatedNumber
-    """Signal of the motors at which they make the weight, 0 to 1."""
-    hover_share: EstimatedNumber
-    """Weight over the thrust at full signal."""
-    throttle_range: tuple[float, float]
-    """1 % and 99 % quantile of the signals flown."""
-
-
-def fit_thrust(
-    stretches: Sequence[Stretch], chosen: ThrustMap, mass_kg: float, gravity_m_s2: float = 9.81
-) -> ThrustFit | None:
-    """The thrust curve; None where no stretch has signals of the motors (or, for grams, the battery's voltage)."""
-    used = [s for s in stretches if s.throttle is not None]
-    if chosen.in_grams:
-        used = [s for s in used if s.voltage is not None]
+    Estimates of the map's numbers in its order, of the time constant, s, of the motors' signal that makes the weight, 0
+    to 1, and of the weight over the thrust at full signal; 1 % and 99 % quantile of the signals flown.
+    """
+    used = [s for s in stretches if s.throttle is not None and not (chosen.in_grams and s.voltage is None)]
     if not used:
         return None
     layout = _layout(used, chosen)
@@ -221,20 +206,16 @@ def fit_thrust(
         return float(share[0, 0]) * _per_share(values, chosen, mass_kg, used[0].throttle.shape[1])
 
     signals = np.concatenate([s.throttle.ravel() for s in used])
-    return ThrustFit(
-        tuple(found.of(lambda v, k=k: float(v[k])) for k in range(*layout.shapes.indices(len(start)))),
-        _exponential(found, layout.lag),
+    # The exponential of the lag's logarithm: its interval stays positive.
+    log = found.of(lambda v: float(v[layout.lag]))
+    low, high = np.exp(np.clip(log.interval_95, -50, 50))
+    return (
+        [found.of(lambda v, k=k: float(v[k])) for k in range(*layout.shapes.indices(len(start)))],
+        EstimatedNumber(float(np.exp(log.value)), (float(low), float(high))),
         found.of(lambda v: _solve(lambda u: lifted(v, u), gravity_m_s2)),
         found.of(lambda v: gravity_m_s2 / lifted(v, chosen.full_signal)),
         (float(np.quantile(signals, 0.01)), float(np.quantile(signals, 0.99))),
     )
-
-
-def _exponential(found: CorrelatedFit, index: int) -> EstimatedNumber:
-    """exp of a value, with an interval that stays positive."""
-    log = found.of(lambda v: float(v[index]))
-    low, high = np.exp(np.clip(log.interval_95, -50, 50))
-    return EstimatedNumber(float(np.exp(log.value)), (float(low), float(high)))
 
 
 def _per_share(values: np.ndarray, chosen: ThrustMap, mass_kg: float, rotors: int) -> float:
@@ -346,21 +327,6 @@ def _averaged(series: np.ndarray, every: int) -> np.ndarray:
     return series[: count * every].reshape(count, every).mean(axis=1)
 
 
-@dataclass(frozen=True)
-class DragFit:
-    """Drag by PX4's law."""
-
-    bluff_x: EstimatedNumber
-    """1/EKF2_BCOEF_X, m²/kg."""
-    bluff_y: EstimatedNumber
-    momentum: EstimatedNumber
-    """EKF2_MCOEF, 1/s."""
-    wind: dict[str, tuple[EstimatedNumber, EstimatedNumber]]
-    """By run the wind towards north and east, m/s."""
-    fastest_m_s: float
-    """99 % quantile of the horizontal speed."""
-
-
 def specific_drag(
     through_air: np.ndarray, bluff_x: float, bluff_y: float, momentum: float, density_kg_m3: float = _AIR_DENSITY_KG_M3
 ) -> np.ndarray:
@@ -372,8 +338,12 @@ def specific_drag(
     return -(quadratic + momentum * np.sqrt(density_kg_m3 / _AIR_DENSITY_KG_M3))[:, None] * across
 
 
-def fit_drag(stretches: Sequence[Stretch], density_kg_m3: float = _AIR_DENSITY_KG_M3) -> DragFit | None:
-    """Drag and wind; None where no stretch has attitude and velocity."""
+def _fit_drag(stretches: Sequence[Stretch]) -> tuple | None:
+    """Drag by PX4's law, and wind; None where no stretch has attitude and velocity.
+
+    Estimates of 1/EKF2_BCOEF_X and 1/EKF2_BCOEF_Y, m²/kg, and EKF2_MCOEF, 1/s; by run those of the wind towards north
+    and east, m/s; 99 % quantile of the horizontal speed, m/s.
+    """
     used = [s for s in stretches if s.attitude is not None and s.velocity is not None]
     if not used:
         return None
@@ -392,7 +362,7 @@ def fit_drag(stretches: Sequence[Stretch], density_kg_m3: float = _AIR_DENSITY_K
             at = 5 + 2 * runs.index(s.run)
             moving = s.velocity - np.array([*values[at : at + 2], 0.0])
             through = np.einsum("nji,nj->ni", s.attitude, moving)
-            force = specific_drag(through, *values[:3], density_kg_m3) + values[3:5]
+            force = specific_drag(through, *values[:3]) + values[3:5]
             every = max(int(round(1 / (_DRAG_RATE_HZ * s.dt_s))), 1)
             out += [_averaged(s.specific_force[:, j] - force[:, j], every) for j in range(2)]
         return out
@@ -401,7 +371,7 @@ def fit_drag(stretches: Sequence[Stretch], density_kg_m3: float = _AIR_DENSITY_K
     of = [found.of(lambda v, k=k: float(v[k])) for k in range(count)]
     across = np.concatenate([np.linalg.norm(s.velocity[:, :2], axis=1) for s in used])
     wind = {run: (of[5 + 2 * k], of[6 + 2 * k]) for k, run in enumerate(runs)}
-    return DragFit(of[0], of[1], of[2], wind, float(np.quantile(across, 0.99)))
+    return of[:3], wind, float(np.quantile(across, 0.99))
 
 
 @dataclass(frozen=True)
@@ -434,16 +404,25 @@ def parameters_of(recordings: RecordingSet, to: str) -> tuple[AutopilotParameter
         )
     stretches = stretches_of(recordings)
     chosen, vehicle = MAPS[to], recordings.vehicle
-    thrust = fit_thrust(stretches, chosen, vehicle.mass_kg, vehicle.gravity_m_s2)
-    out = _missing(chosen, to) if thrust is None else _of_thrust(thrust, chosen, to)
+    thrust = _fit_thrust(stretches, chosen, vehicle.mass_kg, vehicle.gravity_m_s2)
+    out = _missing(chosen, to) if thrust is None else _of_thrust(*thrust, chosen, to)
     if to == "px4":
-        drag = fit_drag(stretches)
-        out += _no_drag() if drag is None else _of_drag(drag)
+        drag = _fit_drag(stretches)
+        out += _no_drag() if drag is None else _of_drag(*drag)
     return tuple(out)
 
 
+_NOT = "not determined by this flight"
+
+
 def _nothing(name: str, unit: str, why: str) -> AutopilotParameter:
-    return AutopilotParameter(name, np.nan, (-np.inf, np.inf), unit, False, f"not determined by this flight: {why}")
+    return AutopilotParameter(name, np.nan, (-np.inf, np.inf), unit, False, f"{_NOT}: {why}")
+
+
+def _stated(name, number: EstimatedNumber, unit, fine: bool, sentence, to_set=None, decimals=3) -> AutopilotParameter:
+    return AutopilotParameter(
+        name, number.value, number.interval_95, unit, fine, sentence, to_set if fine else None, decimals
+    )
 
 
 def _missing(chosen: ThrustMap, to: str) -> list[AutopilotParameter]:
@@ -455,69 +434,53 @@ def _missing(chosen: ThrustMap, to: str) -> list[AutopilotParameter]:
 
 
 def _no_drag() -> list[AutopilotParameter]:
-    why = "drag needs attitude and velocity"
     units = {"EKF2_BCOEF_X": "kg/m²", "EKF2_BCOEF_Y": "kg/m²", "EKF2_MCOEF": "1/s"}
-    return [_nothing(name, unit, why) for name, unit in units.items()]
+    return [_nothing(name, unit, "drag needs attitude and velocity") for name, unit in units.items()]
 
 
-def _of_thrust(found: ThrustFit, chosen: ThrustMap, to: str) -> list[AutopilotParameter]:
-    flown = "signals from {:.2f} to {:.2f} were flown".format(*found.throttle_range)
+def _of_thrust(shapes, lag, hover, share, throttle_range, chosen: ThrustMap, to: str) -> list[AutopilotParameter]:
+    flown = "signals from {:.2f} to {:.2f} were flown".format(*throttle_range)
     out = []
-    for shape, estimate in zip(chosen.shapes, found.shapes, strict=True):
+    for shape, estimate in zip(chosen.shapes, shapes, strict=True):
         unit = {"volts_per_gram": "V/g", "volts_per_gram_squared": "V/g²"}.get(shape.name, "")
-        low, high = (shape.factor * end for end in estimate.interval_95)
         outside = estimate.interval_95[1] < shape.allowed[0] or estimate.interval_95[0] > shape.allowed[1]
         margin = _AT_A_BOUND * (shape.high - shape.low)
         at_bound = not shape.low + margin < estimate.value < shape.high - margin
         wide = at_bound or not estimate.half_width <= shape.widest
         sentence = f"{chosen.equation}; {flown}"
         if at_bound:
-            sentence = f"not determined by this flight: {flown}, and no curve of this form fits them"
+            sentence = f"{_NOT}: {flown}, and no curve of this form fits them"
         elif wide:
-            sentence = f"not determined by this flight: {flown}, which is too little; fly climbs and descents"
+            sentence = f"{_NOT}: {flown}, which is too little; fly climbs and descents"
         elif outside:
             ends = f"{shape.factor * shape.allowed[0]:g} to {shape.factor * shape.allowed[1]:g}"
             sentence += f"; {chosen.autopilot} takes {ends}: the nearest is to be set"
-        value = shape.factor * estimate.value
+        low, high = (shape.factor * end for end in estimate.interval_95)
+        number = EstimatedNumber(shape.factor * estimate.value, (low, high))
         settable = shape.factor * float(np.clip(estimate.value, *shape.allowed))
-        out.append(
-            AutopilotParameter(
-                shape.name, value, (low, high), unit, not wide, sentence, None if wide else settable, shape.decimals
-            )
-        )
+        out.append(_stated(shape.name, number, unit, not wide, sentence, settable, shape.decimals))
     curve = all(p.determined for p in out)
     if to in _HOVERS:
         name, allowed = _HOVERS[to]
-        share = found.hover_share
         fine = share.half_width <= _WIDEST_HOVER * share.value and curve
         sentence = "weight over full thrust; it belongs to the thrust curve above"
         if not fine:
-            sentence = "not determined by this flight: full thrust follows from the curve, which it does not determine"
-        out.append(
-            AutopilotParameter(
-                name, share.value, share.interval_95, "", fine, sentence,
-                float(np.clip(share.value, *allowed)) if fine else None,
-            )
-        )  # fmt: skip
-    hover, lag = found.hover_signal, found.time_constant_s
+            sentence = f"{_NOT}: full thrust follows from the curve, which it does not determine"
+        out.append(_stated(name, share, "", fine, sentence, float(np.clip(share.value, *allowed))))
     fine = hover.half_width <= _WIDEST_HOVER * hover.value
-    sentence = "signal of the motors that makes the weight" if fine else "not determined by this flight"
-    out.append(AutopilotParameter("hover_signal", hover.value, hover.interval_95, "", fine, sentence))
-    fine = (
-        lag.half_width <= _WIDEST_SHARE * lag.value
-        and 1.1 * TIME_CONSTANTS_S[0] < lag.value < TIME_CONSTANTS_S[1] / 1.1
-    )
+    out.append(_stated("hover_signal", hover, "", fine, "signal of the motors that makes the weight" if fine else _NOT))
+    inside = 1.1 * TIME_CONSTANTS_S[0] < lag.value < TIME_CONSTANTS_S[1] / 1.1
+    fine = lag.half_width <= _WIDEST_SHARE * lag.value and inside
     sentence = "lag of the rotors' speed behind the signal, with that of the accelerometer's filter"
     if not fine:
-        sentence = "not determined by this flight: the thrust changed too slowly, or the log is too coarse, to see it"
-    out.append(AutopilotParameter("motor_time_constant_s", lag.value, lag.interval_95, "s", fine, sentence, decimals=4))
-    return out
+        sentence = f"{_NOT}: the thrust changed too slowly, or the log is too coarse, to see it"
+    return [*out, _stated("motor_time_constant_s", lag, "s", fine, sentence, decimals=4)]
 
 
-def _of_drag(found: DragFit) -> list[AutopilotParameter]:
-    flown = f"speeds up to {found.fastest_m_s:.1f} m/s were flown"
+def _of_drag(drag, wind, fastest_m_s: float) -> list[AutopilotParameter]:
+    flown = f"speeds up to {fastest_m_s:.1f} m/s were flown"
     out = []
-    for name, estimate in (("EKF2_BCOEF_X", found.bluff_x), ("EKF2_BCOEF_Y", found.bluff_y)):
+    for name, estimate in zip(("EKF2_BCOEF_X", "EKF2_BCOEF_Y"), drag, strict=False):
         low, high = estimate.interval_95
         ends = (1 / high if high > 0 else np.inf, 1 / low if low > 0 else np.inf)
         value = 1 / estimate.value if estimate.value > 0 else np.inf
@@ -525,31 +488,19 @@ def _of_drag(found: DragFit) -> list[AutopilotParameter]:
         sentence = f"mass over drag area, jointly with the wind; {flown}"
         if not fine:
             at_least = f"; at least {ends[0]:.3g} kg/m²" if np.isfinite(ends[0]) and ends[0] > 0 else ""
-            sentence = f"not determined by this flight: {flown}; fly faster, there and back{at_least}"
-        out.append(
-            AutopilotParameter(
-                name, value, ends, "kg/m²", fine, sentence, min(value, _LARGEST_BCOEF) if fine else None, 1
-            )
-        )
-    m = found.momentum
-    fine = m.half_width <= _WIDEST_SHARE * abs(m.value)
-    sentence = "drag of the rotors, jointly with the wind" if fine else "not determined by this flight"
-    sentence = f"{sentence}; {flown}"
-    out.append(
-        AutopilotParameter(
-            "EKF2_MCOEF", m.value, m.interval_95, "1/s", fine, sentence, max(m.value, 0.0) if fine else None
-        )
-    )
-    for run, wind in found.wind.items():
-        for word, part in zip(("north", "east"), wind, strict=True):
-            out.append(_wind(f"wind_{word}_m_s ({run})", part))
+            sentence = f"{_NOT}: {flown}; fly faster, there and back{at_least}"
+        number = EstimatedNumber(value, ends)
+        out.append(_stated(name, number, "kg/m²", fine, sentence, min(value, _LARGEST_BCOEF), 1))
+    momentum = drag[2]
+    fine = momentum.half_width <= _WIDEST_SHARE * abs(momentum.value)
+    sentence = f"{'drag of the rotors, jointly with the wind' if fine else _NOT}; {flown}"
+    out.append(_stated("EKF2_MCOEF", momentum, "1/s", fine, sentence, max(momentum.value, 0.0)))
+    for run, parts in wind.items():
+        for word, part in zip(("north", "east"), parts, strict=True):
+            fine = part.half_width <= _WIDEST_WIND_M_S
+            sentence = "towards which the air moved, on the mean of the run" if fine else _NOT
+            out.append(_stated(f"wind_{word}_m_s ({run})", part, "m/s", fine, sentence, decimals=2))
     return out
-
-
-def _wind(name: str, part: EstimatedNumber) -> AutopilotParameter:
-    fine = part.half_width <= _WIDEST_WIND_M_S
-    sentence = "towards which the air moved, on the mean of the run" if fine else "not determined by this flight"
-    return AutopilotParameter(name, part.value, part.interval_95, "m/s", fine, sentence, decimals=2)
 
 
 def as_text(found: Sequence[AutopilotParameter], to: str) -> str:

@@ -176,14 +176,8 @@ def cell_forces(volts: np.ndarray, coefficients_gf: np.ndarray) -> np.ndarray:
 def cell_variance(volts: np.ndarray, lines: list[LineFit], reading_variance_v2: np.ndarray) -> np.ndarray:
     """Variance of the cells' forces, N², shape (n, 6): the lines' covariances and the readings' noise.
 
-    Parameters
-    ----------
-    volts
-        Tared voltages, V, shape (n, 6).
-    lines
-        Calibration of each cell, gf against 1e-5 V.
-    reading_variance_v2
-        Variance of each voltage, V², shape (n, 6) or (6,).
+    `volts`: tared voltages, V, shape (n, 6). `lines`: calibration of each cell, gf against 1e-5 V.
+    `reading_variance_v2`: variance of each voltage, V², shape (n, 6) or (6,).
     """
     x = np.atleast_2d(np.asarray(volts, float)) * 1e5
     noise = np.broadcast_to(np.asarray(reading_variance_v2, float), x.shape) * 1e10
@@ -425,14 +419,8 @@ def bench_set(
 ) -> RecordingSet:
     """Static tests of one platform as a contract set.
 
-    Parameters
-    ----------
-    prepared, sessions
-        Of that platform, from `rotorid.identify.bench` and `rotorid.io.logs`.
-    force_of
-        Force (n, 3), N, of a prepared recording, see `bench_force`.
-    noise_n
-        One-sigma noise of a sample as it is believed, N.
+    `prepared`, `sessions`: of that platform, from `rotorid.identify.bench` and `rotorid.io.logs`. `force_of`: force
+    (n, 3), N, of a prepared recording, see `bench_force`. `noise_n`: one-sigma noise of a sample as it is believed, N.
     """
     parts = by_recording(prepared)
     started = pd.to_datetime(sessions["started"])

@@ -274,17 +274,8 @@ class Calibration:
 def calibrate(volts: np.ndarray, force_n: np.ndarray) -> Calibration:
     """The bench's answer to loads of known direction.
 
-    Parameters
-    ----------
-    volts
-        Mean tared voltages of the cells, V, shape (n, 6).
-    force_n
-        Known loads, N, shape (n, 3), body axes; between them they must cover all three.
-
-    Raises
-    ------
-    InputError
-        Fewer than five loads, or none along some direction.
+    `volts`: mean tared voltages of the cells, V, shape (n, 6). `force_n`: known loads, N, shape (n, 3), body axes;
+    between them they must cover all three. Raises InputError: fewer than five loads, or none along some direction.
     """
     volts, force_n = np.asarray(volts, float), np.asarray(force_n, float)
     if len(volts) < 5 or np.linalg.matrix_rank(force_n) < 3:

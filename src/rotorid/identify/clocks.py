@@ -68,12 +68,8 @@ def device_time(time_s: np.ndarray, seen_s: np.ndarray, host_s: np.ndarray) -> n
 
     Of a batch that the host sees at once, the last sample counts.
 
-    Parameters
-    ----------
-    time_s, seen_s
-        Shape (n,): the device's time of each sample, and the host's time when it was read.
-    host_s
-        Times of the host, any shape; beyond the samples the first or last device time is given.
+    `time_s`, `seen_s`: shape (n,): the device's time of each sample, and the host's time when it was read. `host_s`:
+    times of the host, any shape; beyond the samples the first or last device time is given.
     """
     latest = pd.Series(np.asarray(time_s, float)).groupby(np.asarray(seen_s, float)).max()
     return np.interp(host_s, latest.index, latest)

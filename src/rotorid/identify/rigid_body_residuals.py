@@ -53,14 +53,8 @@ def low_pass(values: np.ndarray, rate_hz: float, cutoff_hz: float) -> np.ndarray
 def measured_wrench(run: Run, vehicle: Vehicle, angular_acceleration: np.ndarray) -> np.ndarray:
     """Force (N) and moment (N m) that act on the vehicle except gravity, body axes, shape (n, 6).
 
-    Parameters
-    ----------
-    run
-        With `specific_force_*` and `angular_velocity_*`.
-    vehicle
-        Believed mass and inertia.
-    angular_acceleration
-        Ω̇, rad/s², body axes, shape (n, 3).
+    `run`: with `specific_force_*` and `angular_velocity_*`. `vehicle`: believed mass and inertia.
+    `angular_acceleration`: Ω̇, rad/s², body axes, shape (n, 3).
     """
     rates = run.array(c.ANGULAR_VELOCITY)
     inertia = vehicle.inertia_kg_m2.matrix()
@@ -106,18 +100,8 @@ def by_airspeed(
     and `high` (m/s), `samples`, and of its eight channels and totals `rms` with `rms_95` (2, bins, 8); `growth`, RMS in
     the fastest bin over RMS in the slowest, with `growth_95` (2, 8).
 
-    Parameters
-    ----------
-    residuals
-        Per run, shape (n, 6).
-    airspeeds, times_s
-        Per run, shape (n,).
-    edges_m_s
-        Edges of the bins.
-    block_s
-        Length of a block.
-    fewest_blocks
-        A bin seen in fewer blocks is left out.
+    `residuals`: per run, shape (n, 6). `airspeeds`, `times_s`: per run, shape (n,). `edges_m_s`: edges of the bins.
+    `block_s`: length of a block. `fewest_blocks`: a bin seen in fewer blocks is left out.
     """
     edges = np.asarray(edges_m_s, float)
     bins = len(edges) - 1

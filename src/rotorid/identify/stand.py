@@ -204,17 +204,7 @@ class _StandStretch:
 def segments(time_s: np.ndarray, throttle: np.ndarray) -> list[_StandStretch]:
     """Stretches of a programme in the order of time.
 
-    Parameters
-    ----------
-    time_s
-        Shape (n,), increasing.
-    throttle
-        Fractions 0 to 1, shape (n, motors).
-
-    Raises
-    ------
-    InputError
-        The motors never run.
+    `time_s`: shape (n,), increasing. `throttle`: fractions 0 to 1, shape (n, motors). InputError: the motors never run.
     """
     time_s, throttle = np.asarray(time_s, float), np.atleast_2d(np.asarray(throttle, float))
     running = (throttle > 0).any(axis=1)

@@ -73,10 +73,20 @@ class ManoeuvrePiece:
         return Reference(t, position, yaw)
 
 
+def _smooth(s: np.ndarray) -> np.ndarray:
+    """From 0 to 1, twice differentiable, while s goes from 0 to 1."""
+    s = np.clip(s, 0, 1)
+    return s**3 * (10 - 15 * s + 6 * s**2)
+
+
 def _envelope(t: np.ndarray, ramp_s: float = _RAMP_S) -> np.ndarray:
     """From 0 smoothly to 1 and back to 0, twice differentiable; `ramp_s` each way."""
-    s = np.clip(np.minimum(t, t[-1] - t) / ramp_s, 0, 1)
-    return s**3 * (10 - 15 * s + 6 * s**2)
+    return _smooth(np.minimum(t, t[-1] - t) / ramp_s)
+
+
+def _most_level_m_s2(limits: Limits) -> float:
+    """Level acceleration that a reference asks for at most."""
+    return _ROOM * _GRAVITY_M_S2 * np.tan(np.radians(limits.tilt_deg))
 
 
 def _phase(t: np.ndarray, rate_rad_s: float, unit_rad: float = np.pi, ramp_s: float = _RAMP_S) -> np.ndarray:
@@ -112,8 +122,7 @@ def _multisine(t: np.ndarray, harmonics: np.ndarray, seed: int) -> np.ndarray:
 
 def _largest(limits: Limits, room_m: float, share: float) -> tuple[float, float]:
     """Amplitude (m) and rate (rad/s) of a swing along a line at a share of the speed, within room and tilt."""
-    speed = share * limits.speed_m_s
-    most = _ROOM * _GRAVITY_M_S2 * np.tan(np.radians(limits.tilt_deg))
+    speed, most = share * limits.speed_m_s, _most_level_m_s2(limits)
     amplitude = min(room_m, max(0.5, speed**2 / most * 1.2))
     return amplitude, min(speed / amplitude, np.sqrt(most / amplitude))
 
@@ -169,8 +178,7 @@ def _still(limits: Limits) -> list[ManoeuvrePiece]:
         at = np.linspace(0, t[-1], len(steps) + 1)
         out = np.zeros((len(t), 3))
         for before, after, when in zip(steps, steps[1:], at[1:], strict=False):
-            s = np.clip((t - when) / change_s + 0.5, 0, 1)
-            out[:, 2] -= (after - before) * s**3 * (10 - 15 * s + 6 * s**2)
+            out[:, 2] -= (after - before) * _smooth((t - when) / change_s + 0.5)
         return out, np.zeros(len(t))
 
     low, high = limits.height_m[0], limits.height_m[1] - limits.wall_margin_m
@@ -195,9 +203,8 @@ def _passes(limits: Limits) -> list[ManoeuvrePiece]:
 
             way = {0: "along the nose", 45: "across the diagonal", 90: "sideways"}[degrees]
             words = f"to and fro {way}, {amplitude:.1f} m each way at up to {amplitude * rate:.1f} m/s, nose held"
-            out.append(
-                ManoeuvrePiece(f"pass {degrees} at {share:g}", words, make, _whole(rate, 15.0, ramp_s=_SLOW_RAMP_S))
-            )
+            duration_s = _whole(rate, 15.0, ramp_s=_SLOW_RAMP_S)
+            out.append(ManoeuvrePiece(f"pass {degrees} at {share:g}", words, make, duration_s))
     for degrees, axis in ((0, 0), (90, 1)):
         amplitude, rate = _largest(limits, limits.room_m[axis], 0.8)
         heave = min(limits.room_m[2], 0.6 * limits.climb_m_s / _HEAVE_RAD_S, 0.3 * _GRAVITY_M_S2 / _HEAVE_RAD_S**2)
@@ -242,21 +249,13 @@ def _turns(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
         out[:, 0] = amplitude * np.sin(_phase(t, rate, ramp_s=_SLOW_RAMP_S))
         return out, _phase(t, 0.6 * yaw_rate, 2 * np.pi)
 
-    pieces = [
-        ManoeuvrePiece(
-            "eight",
-            f"a figure of eight, {amplitude:.1f} m each way, nose held",
-            eight,
-            _whole(rate / np.sqrt(2), 15.0, ramp_s=_SLOW_RAMP_S),
-        )
-    ]
+    words = f"a figure of eight, {amplitude:.1f} m each way, nose held"
+    pieces = [ManoeuvrePiece("eight", words, eight, _whole(rate / np.sqrt(2), 15.0, ramp_s=_SLOW_RAMP_S))]
     # Half a turn by a quintic: its largest rate is 1.875 π / T, its largest acceleration 5.77 π / T².
     half_s = max(1.875 * np.pi / (0.8 * np.radians(limits.yaw_rate_deg_s)), np.sqrt(5.77 * np.pi / most_rad_s2), 1.0)
 
     def face(t):
-        there, back = np.clip((t - 1.0) / half_s, 0, 1), np.clip((t[-1] - 1.0 - t) / half_s, 0, 1)
-        s = np.minimum(there, back)
-        return np.zeros((len(t), 3)), np.pi * s**3 * (10 - 15 * s + 6 * s**2)
+        return np.zeros((len(t), 3)), np.pi * _smooth(np.minimum(t - 1.0, t[-1] - 1.0 - t) / half_s)
 
     pieces.append(ManoeuvrePiece("face", "turn the nose half round, hover, turn it back", face, 2 * half_s + 4.0))
     degrees = np.degrees(yaw_rate)
@@ -291,21 +290,15 @@ def _climbs(limits: Limits) -> list[ManoeuvrePiece]:
 
 def _oscillations(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
     """Multisines of the acceleration along some axes (and of yaw) with harmonics of their own each."""
-    most = _ROOM * _GRAVITY_M_S2 * np.tan(np.radians(limits.tilt_deg))
-    families = {
-        "shake all": ("x", "y", "z", "yaw"),
-        "shake sideways": ("x", "y"),
-        "shake height": ("z",),
-        "shake yaw": ("yaw",),
-    }
-    words = {
-        "shake all": "small quick motions along and about all axes at once",
-        "shake sideways": "small quick motions forwards and sideways",
-        "shake height": "small quick climbs and descents",
-        "shake yaw": "small quick turns of the nose",
-    }
+    most = _most_level_m_s2(limits)
+    families = (
+        ("shake all", ("x", "y", "z", "yaw"), "small quick motions along and about all axes at once"),
+        ("shake sideways", ("x", "y"), "small quick motions forwards and sideways"),
+        ("shake height", ("z",), "small quick climbs and descents"),
+        ("shake yaw", ("yaw",), "small quick turns of the nose"),
+    )
     out = []
-    for name, axes in families.items():
+    for name, axes, words in families:
         for low_hz, high_hz in _BANDS_HZ:
 
             def make(t, axes=axes, low_hz=low_hz, high_hz=high_hz):
@@ -315,9 +308,9 @@ def _oscillations(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
                 for i, axis in enumerate(axes):
                     own = count[i :: len(axes)].astype(float)
                     wave = _multisine(t, own, i) * _envelope(t)
+                    slope = np.gradient(wave, t)
+                    bend = np.abs(np.gradient(slope, t)).max()
                     if axis == "yaw":
-                        slope = np.gradient(wave, t)
-                        bend = np.abs(np.gradient(slope, t)).max()
                         most_rate = 0.8 * np.radians(limits.yaw_rate_deg_s)
                         most_bend = most_rad_s2 / len(axes) ** 0.5
                         yaw = wave * min(np.radians(40.0), most_rate / np.abs(slope).max(), most_bend / bend)
@@ -326,27 +319,21 @@ def _oscillations(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
                     # What several axes ask of a rotor at once adds up.
                     top = (most / np.sqrt(2) if len(axes) > 1 else most) if k < 2 else 4.0 / len(axes) ** 0.5
                     speed = limits.speed_m_s / np.sqrt(2) if k < 2 else limits.climb_m_s
-                    slope = np.gradient(wave, t)
-                    bend = np.abs(np.gradient(slope, t)).max()
                     size = min(top / bend, speed / np.abs(slope).max(), limits.room_m[k] / np.abs(wave).max())
                     position[:, k] = size * wave
                 return position, yaw
 
-            out.append(
-                ManoeuvrePiece(
-                    f"{name} to {high_hz:g} Hz", f"{words[name]}, {low_hz:g} to {high_hz:g} times a second", make
-                )
-            )
+            said = f"{words}, {low_hz:g} to {high_hz:g} times a second"
+            out.append(ManoeuvrePiece(f"{name} to {high_hz:g} Hz", said, make))
     return out
 
 
 def _doublets(limits: Limits, most_rad_s2: float) -> ManoeuvrePiece:
     """Pushes of the tilt forwards, sideways and of the nose, each followed by its opposite, which leads back."""
-    most = _ROOM * _GRAVITY_M_S2 * np.tan(np.radians(limits.tilt_deg))
+    most = _most_level_m_s2(limits)
     push = min(most, limits.speed_m_s / _DOUBLET_S, min(limits.room_m[:2]) / _DOUBLET_S**2)
-    turn = min(
-        np.radians(20.0), 0.5 * np.radians(limits.yaw_rate_deg_s) * _DOUBLET_S, most_rad_s2 * _DOUBLET_S**2 / 5.77
-    )
+    fastest = 0.5 * np.radians(limits.yaw_rate_deg_s) * _DOUBLET_S
+    turn = min(np.radians(20.0), fastest, most_rad_s2 * _DOUBLET_S**2 / 5.77)
 
     def make(t):
         position, yaw = np.zeros((len(t), 3)), np.zeros(len(t))
@@ -367,9 +354,8 @@ def _doublets(limits: Limits, most_rad_s2: float) -> ManoeuvrePiece:
                 yaw += turn * wave
         return position, yaw
 
-    return ManoeuvrePiece(
-        "doublets", "quick pushes to and fro: forwards, sideways, of the nose", make, 8.0 * _DOUBLET_S * 6 + 1.0
-    )
+    words = "quick pushes to and fro: forwards, sideways, of the nose"
+    return ManoeuvrePiece("doublets", words, make, 8.0 * _DOUBLET_S * 6 + 1.0)
 
 
 def joined(pieces: tuple[ManoeuvrePiece, ...] | list[ManoeuvrePiece], step_s: float, still_s: float = 1.0) -> Reference:
@@ -494,10 +480,7 @@ class SessionLimits(BaseModel):
 def read_limits(path: Path | None, kind: type[T] = Limits) -> T:
     """Limits of a flight, or of another `kind`, from a file; the usual ones without any.
 
-    Raises
-    ------
-    InputError
-        The file is not there, is no YAML, or states something that cannot be; one sentence.
+    Raises InputError: the file is not there, is no YAML, or states something that cannot be; one sentence.
     """
     if path is None:
         return kind()

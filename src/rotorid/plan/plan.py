@@ -358,11 +358,7 @@ def broken(flight: SimulatedFlight, limits: Limits, vehicle: Vehicle) -> str:
     return ""
 
 
-def _tried(
-    known: FittedSet,
-    limits: Limits,
-    wishes: Iterable[str] = (),
-) -> list[Tried]:
+def _tried(known: FittedSet, limits: Limits, wishes: Iterable[str] = ()) -> list[Tried]:
     """Every candidate flown in simulation by the model as fitted, as large as the limits allow it to be flown.
 
     The controller makes some motions larger than they are asked for: where a limit would be broken a smaller size of
@@ -442,9 +438,7 @@ def chosen_pieces(
         now, share = now + best.information, then
     for t in sorted(list(taken), key=lambda t: -t.flown_s):
         rest = [o for o in taken if o is not t]
-        total = base
-        for o in rest:
-            total = total + o.information
+        total = sum((o.information for o in rest), base)
         if rest and share_of(total) >= share - _LEAST_PROGRESS / 2:
             taken = rest
     return taken, judged
@@ -533,11 +527,7 @@ def _expected(known: FittedSet, limits: Limits, name: str, taken: list[Tried], w
     return made
 
 
-def plan(
-    known: FittedSet,
-    limits: Limits,
-    wishes: dict[str, float] | None = None,
-) -> Plan:
+def plan(known: FittedSet, limits: Limits, wishes: dict[str, float] | None = None) -> Plan:
     """The flight to fly next; without anything to settle, or any manoeuvre that helps, one without pieces."""
     wishes = wishes or {}
     check_wishes(known, wishes)

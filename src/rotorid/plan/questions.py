@@ -264,10 +264,7 @@ def known(
     Of ids that the verdict on the set does not claim (`claimed`, all members of its classes) nothing is asked: they are
     too small to matter.
 
-    Raises
-    ------
-    InputError
-        The set is no flight.
+    Raises InputError: the set is no flight.
     """
     if recordings.vehicle.kind != "flight":
         raise InputError(f"set {recordings.name}: a plan is made for flights; this is a {recordings.vehicle.kind}")
@@ -319,10 +316,7 @@ def known(
 def known_from(recordings: RecordingSet, verdict: dict) -> FittedSet:
     """A set fitted, with the questions that its verdict leaves open; `verdict` is the content of its verdict.json.
 
-    Raises
-    ------
-    InputError
-        The set is no flight, or does not suffice.
+    Raises InputError: the set is no flight, or does not suffice.
     """
     suggested = [e["id"] for e in verdict["effects"] if e["status"] == "suggested"]
     return known(sufficient(recordings), suggested, claimed_in(verdict))
@@ -392,10 +386,7 @@ def _hypothesis(regression: Regression, shared: Sequence[str], name: str, keys: 
 def joined_sets(first: RecordingSet, *others: RecordingSet) -> tuple[RecordingSet, tuple[str, ...]]:
     """All sets as one, and what a reader must know about it.
 
-    Raises
-    ------
-    InputError
-        The sets are not of one vehicle as believed, or share no columns but the time.
+    Raises InputError: the sets are not of one vehicle as believed, or share no columns but the time.
     """
     others = tuple(in_thirds(s) for s in others)
     sets = (first, *others)
@@ -445,34 +436,22 @@ def _brief(value) -> str:
     return text if len(text) < 40 else text[:37] + "…"
 
 
-@dataclass(frozen=True)
-class _Outcome:
-    """What became of a question that the first set left open."""
-
-    ids: tuple[str, ...]
-    answer: str
-    """The id that is established now; empty where the question is still open."""
-    sentence: str
-
-
-def answers(open_before: Sequence[tuple[str, ...]], findings: Sequence[Finding]) -> list[_Outcome]:
-    """What the findings of all sets together say of each class that was left open."""
+def answers(open_before: Sequence[tuple[str, ...]], findings: Sequence[Finding]) -> list[dict]:
+    """What the findings of all sets together say of each class that was left open: its `ids`, a `sentence`, and as
+    `answer` the id that is established now (empty where the question is still open)."""
     out = []
     for ids in open_before:
-        named = " or ".join(ids)
-        sure = [f.id for f in findings if f.status == "established" and f.id in ids]
+        answer, sure = "", [f.id for f in findings if f.status == "established" and f.id in ids]
         still = [f for f in findings if f.status == "ambiguous" and set(f.alternatives) & set(ids)]
         if sure and not still:
-            what = " and ".join(sure)
-            out.append(_Outcome(ids, sure[0], f"{named}: all sets together say {what}"))
+            answer, said = sure[0], f"all sets together say {' and '.join(sure)}"
         elif still:
             left = still[0].alternatives
-            fewer = set(left) < set(ids)
-            out.append(_Outcome(ids, "", f"{named}: {'narrowed to' if fewer else 'still'} {' or '.join(left)}"))
+            said = f"{'narrowed to' if set(left) < set(ids) else 'still'} {' or '.join(left)}"
         else:
             weaker = [f.id for f in findings if f.status == "suggested" and f.id in ids]
             said = f"suggested is {weaker[0]}" if weaker else "neither is established"
-            out.append(_Outcome(ids, "", f"{named}: {said}"))
+        out.append({"ids": list(ids), "answer": answer, "sentence": f"{' or '.join(ids)}: {said}"})
     return out
 
 

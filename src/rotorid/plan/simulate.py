@@ -151,10 +151,7 @@ def fly(
 
     `bandwidth_rad_s` is of the attitude loop, `position_rad_s` of the position loop (a share of it where not stated).
 
-    Raises
-    ------
-    InputError
-        The rotors cannot do it: one would have to turn backwards.
+    Raises InputError: the rotors cannot do it: one would have to turn backwards.
     """
     vehicle, step = world.vehicle, float(reference.time_s[1] - reference.time_s[0])
     gravity, reference = np.array([0.0, 0.0, vehicle.gravity_m_s2]), _held_longer(reference, step)

@@ -407,10 +407,7 @@ _Shown = Mapping[str, Sequence[Flown]]
 def shown_by(sets: Sequence[RecordingSet], good: int, progress: Callable[[str], None]) -> _Shown:
     """What each set shows; one that lacks something that the good ones have is left out, with a line.
 
-    Raises
-    ------
-    InputError
-        A good set has no stretch of flight that is long enough.
+    Raises InputError: a good set has no stretch of flight that is long enough.
     """
     first = tuple(sets[:good])
     grid, out, needed = grid_of(first), {}, set()

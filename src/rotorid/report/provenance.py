@@ -40,14 +40,8 @@ _READ_BY_TESTS = (["OPEN"], ["ROOMS"])
 def gather(raw: Sequence[str | Path], lock: str | Path, config: Mapping[str, Any]) -> dict[str, Any]:
     """Everything needed to make the same report again.
 
-    Parameters
-    ----------
-    raw
-        Files that instruments wrote.
-    lock
-        The lock file; the installed version of each package in it is recorded.
-    config
-        The configuration that the run used.
+    `raw`: files that instruments wrote. `lock`: the lock file; the installed version of each package in it is recorded.
+    `config`: the configuration that the run used.
     """
     lock = Path(lock)
     return {
@@ -128,13 +122,8 @@ def sha256(path: str | Path) -> str:
 class Code:
     """The code of a project as it is now; each file is read once, so that many rules can be asked for.
 
-    Parameters
-    ----------
-    root
-        Top of the project: holds the folders of `PACKAGES`.
-    memory
-        File that keeps what was found, so that the next start need not parse what has not changed since (by
-        size and time of change). None keeps nothing.
+    `root`: top of the project: holds the folders of `PACKAGES`. `memory`: file that keeps what was found, so that the
+    next start need not parse what has not changed since (by size and time of change). None keeps nothing.
     """
 
     def __init__(self, root: str | Path, memory: str | Path | None = None) -> None:
@@ -151,17 +140,8 @@ class Code:
     def of(self, script: str | Path) -> str:
         """Sixteen hexadecimal digits that stand for the code that `script` runs.
 
-        Parameters
-        ----------
-        script
-            Path of a Python file or a notebook, relative to the top of the project.
-
-        Raises
-        ------
-        FileNotFoundError
-            The script does not exist.
-        SyntaxError
-            The script or a module that it reaches is not valid Python.
+        `script`: path of a Python file or a notebook, relative to the top of the project. FileNotFoundError: the script
+        does not exist. SyntaxError: the script or a module that it reaches is not valid Python.
         """
         path = self.root / script
         if path not in self._codes:

@@ -187,20 +187,9 @@ def _pandoc(document: Document, options: Sequence[str]) -> None:
 def render(path: str | Path, files: Mapping[str, str], emulated: bool = False) -> str:
     """The chapter's markdown with numbers, figures and tables in place.
 
-    Parameters
-    ----------
-    path
-        The chapter's text, `notebooks/<chapter>.md`.
-    files
-        Paths by the names under which the text knows them.
-    emulated
-        Whether emulators wrote the instruments' recordings; the text knows it by this name, and captions of kind
-        `campaign` say it.
-
-    Raises
-    ------
-    InputError
-        The text names what no file gives, or is not valid Jinja2.
+    `path`: the chapter's text, `notebooks/<chapter>.md`. `files`: paths by the names under which the text knows them.
+    `emulated`: whether emulators wrote the instruments' recordings; the text knows it by this name, and captions of
+    kind `campaign` say it. Raises InputError: the text names what no file gives, or is not valid Jinja2.
     """
     path = Path(path)
     environment = jinja2.Environment(

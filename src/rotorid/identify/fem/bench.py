@@ -134,12 +134,7 @@ def _holes(name: str, sizes: Sizes, frame: PartFrame) -> list[Hole]:
 def _gauge_strains(body: LooseParts, name: str, sizes: Sizes, frame: PartFrame, moved_m: np.ndarray) -> np.ndarray:
     """Strain of the four gauges of the cell `name`, shape (4,): change of length of each grid over its length.
 
-    Parameters
-    ----------
-    frame
-        The cell's own.
-    moved_m
-        Displacements of all nodes [m], shape (n, 3).
+    `frame`: the cell's own. `moved_m`: displacements of all nodes [m], shape (n, 3).
     """
     first, last = (
         body.weights(frame.origin_m + ends @ frame.axes, name) @ moved_m @ frame.axes[0]
@@ -174,21 +169,8 @@ def strain_per_newton(sizes: Sizes, material: Material, fineness: float) -> floa
 def build(assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fineness: float) -> Bench:
     """One leg in frame {T} (z down, origin on top of plate D), with all that binds it.
 
-    Parameters
-    ----------
-    assumed
-        For the area that bears the load.
-    sizes
-        All other sizes.
-    distances_m
-        Table 2.3, by name [m].
-    fineness
-        Elements along each line, as a multiple of the coarsest mesh.
-
-    Raises
-    ------
-    InputError
-        Sizes that do not go together.
+    `assumed`: for the area that bears the load. `sizes`: all other sizes. `distances_m`: table 2.3, by name [m].
+    `fineness`: elements along each line, as a multiple of the coarsest mesh. InputError: sizes that do not go together.
     """
     placed = placement.cells(distances_m)
     upper, lower = placed[1], placed[2]
@@ -430,11 +412,8 @@ def ratios(found: Answers) -> dict[str, float]:
 def judge_statements(table: pd.DataFrame) -> list[dict]:
     """Each sentence: whether it holds with all sizes as assumed, on how many benches it `holds`, and what follows.
 
-    Parameters
-    ----------
-    table
-        A bench a row, the first with all sizes as assumed; columns `ratio_deformation`, `ratio_narrow_upper`,
-        `ratio_narrow_lower`; `plate_evenness`, `plate_middle` and `stressed_most` with `_aluminium` and with `_pla`.
+    `table`: a bench a row, the first with all sizes as assumed; columns `ratio_deformation`, `ratio_narrow_upper`,
+    `ratio_narrow_lower`; `plate_evenness`, `plate_middle` and `stressed_most` with `_aluminium` and with `_pla`.
     """
     even = table["plate_evenness_aluminium"] >= EVEN
     middle = (table["plate_middle_pla"] >= MIDDLE) & (table["plate_evenness_pla"] < table["plate_evenness_aluminium"])

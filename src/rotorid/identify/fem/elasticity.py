@@ -92,12 +92,8 @@ def mirrored(part: Mesh, axis: int) -> Mesh:
 def stacked(layers_m: np.ndarray, triangles: np.ndarray) -> Mesh:
     """Tetrahedra between copies of a profile.
 
-    Parameters
-    ----------
-    layers_m
-        Its points in each layer [m], shape (layers + 1, n, 3).
-    triangles
-        Indices into one layer, shape (t, 3).
+    `layers_m`: its points in each layer [m], shape (layers + 1, n, 3). `triangles`: indices into one layer, shape
+    (t, 3).
 
     Each prism is cut into three by the order of its corners' indices, so that neighbours agree on the diagonal of the
     face between them (Dompierre et al. 1999).
@@ -146,17 +142,8 @@ class Pad:
 def column(name: str, start: Pad, stop: Pad, counts: tuple[int, int, int]) -> Mesh:
     """A bent column from one rectangle to another: each of its fibres is a cubic that leaves and arrives along `way`.
 
-    Parameters
-    ----------
-    name
-        Of the piece, for the message.
-    counts
-        Elements along the first side, the second side and the column.
-
-    Raises
-    ------
-    InputError
-        The column folds over itself.
+    `name`: of the piece, for the message. `counts`: elements along the first side, the second side and the column.
+    Raises InputError: the column folds over itself.
     """
     profile = block(np.stack(np.meshgrid(*(np.arange(k + 1.0) for k in counts[:2]), indexing="ij"), axis=-1))
     first, last = start.grid_m(*counts[:2]), stop.grid_m(*counts[:2])
@@ -302,10 +289,7 @@ class LooseParts:
     def weights(self, points_m: np.ndarray, name: str) -> sparse.csr_matrix:
         """What the nodes' values count at points, shape (k, 3), of a part: shape (k, n).
 
-        Raises
-        ------
-        InputError
-            A point that is not in or on the part.
+        Raises InputError: a point that is not in or on the part.
         """
         own = np.flatnonzero(self.part == self.names.index(name))
         corners = self.mesh.p[:, self.mesh.t[:, own]].transpose(2, 1, 0)
@@ -394,14 +378,8 @@ class Bound:
 def constraints(nodes: int, bound: Sequence[Sequence[Bound]], fixed: np.ndarray) -> sparse.csr_matrix:
     """The matrix C of u = C q, shape (3 n, free unknowns).
 
-    Parameters
-    ----------
-    nodes
-        Their number n.
-    bound
-        In stages: nodes that others follow in one stage may follow others in a later one, not the other way round.
-    fixed
-        Which displacements are 0, shape (3, n).
+    `nodes`: their number n. `bound`: in stages: nodes that others follow in one stage may follow others in a later one,
+    not the other way round. `fixed`: which displacements are 0, shape (3, n).
     """
     whole = sparse.identity(3 * nodes, format="csr")
     for stage in bound:
@@ -423,10 +401,7 @@ def solve(stiffness: sparse.csr_matrix, binding: sparse.csr_matrix, forces: np.n
 
     Factors of a symmetric matrix in the order of least degree; for these long, thin bodies they stay small.
 
-    Raises
-    ------
-    InputError
-        Parts that can move freely.
+    Raises InputError: parts that can move freely.
     """
     reduced = (binding.T @ stiffness @ binding).tocsc()
     given = binding.T @ forces

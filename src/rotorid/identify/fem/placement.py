@@ -172,10 +172,7 @@ def in_file(name: str) -> tuple[str, float]:
 def read_assumed(path: str | Path) -> Assumed:
     """The assumed sizes.
 
-    Raises
-    ------
-    InputError
-        A size that is missing or unknown, or not [assumed, low, high] with 0 < low <= assumed <= high.
+    Raises InputError: a size that is missing or unknown, or not [assumed, low, high] with 0 < low <= assumed <= high.
     """
     path = Path(path)
     held = read_yaml(path)

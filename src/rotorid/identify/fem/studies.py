@@ -126,10 +126,7 @@ def size_study(
     First all as assumed (`end` empty), then each size in turn at its least and its largest (`low`, `high`), then as
     many as `draws` with all sizes drawn at once (`drawn`). Drawn sizes that do not go together are drawn anew.
 
-    Raises
-    ------
-    InputError
-        One size at one of its ends makes no bench.
+    Raises InputError: one size at one of its ends makes no bench.
     """
     rows = []
     for name, end, sizes in [("", "", assumed.sizes), *assumed.variants()]:
@@ -211,10 +208,7 @@ def steps(computed: Mapping[str, float], volts_per_n: float, sizes: Sizes) -> li
 def ligament_for(sizes: Sizes, moduli_pa: Mapping[str, float], volts_per_n: float, fineness: float) -> float:
     """Thickness of the ligament [m] with which a cell has this sensitivity.
 
-    Raises
-    ------
-    InputError
-        None between the assumed one and most of the bar's half side has.
+    Raises InputError: none between the assumed one and most of the bar's half side has.
     """
     thickest = _LARGEST_LIGAMENT * sizes.cell_side_m / 2
 

@@ -210,16 +210,9 @@ def lines_and_residuals(
 ) -> Figure:
     """Calibration lines of all cells, and below them what the lines leave over.
 
-    Parameters
-    ----------
-    weights_gf
-        Known weights [gf], shape (n,).
-    readings
-        Reading of each cell [1e-5 V], shape (n,) each.
-    lines
-        Intercept [gf] and slope [gf per 1e-5 V] of each cell.
-    flagged_gf
-        Weights [gf] of each cell whose readings do not match them; drawn as crosses.
+    `weights_gf`: known weights [gf], shape (n,). `readings`: reading of each cell [1e-5 V], shape (n,) each. `lines`:
+    intercept [gf] and slope [gf per 1e-5 V] of each cell. `flagged_gf`: weights [gf] of each cell whose readings do not
+    match them; drawn as crosses.
     """
     weights = np.asarray(weights_gf, float)
     fig, (above, below) = style.figure(4.6, rows=2, gridspec_kw={"height_ratios": [1.6, 1]})
@@ -248,14 +241,8 @@ def against_printed(
 ) -> Figure:
     """Coefficients with 95 % intervals as differences from printed ones.
 
-    Parameters
-    ----------
-    cells
-        Names of the cells, k of them.
-    estimates, printed
-        Values of `a0` [gf] and `a1` [gf per 1e-5 V], shape (k,) each.
-    intervals
-        95 % intervals of the same, shape (k, 2) each.
+    `cells`: names of the cells, k of them. `estimates`, `printed`: values of `a0` [gf] and `a1` [gf per 1e-5 V], shape
+    (k,) each. `intervals`: 95 % intervals of the same, shape (k, 2) each.
     """
     fig, axes = style.figure(2.5, columns=2, sharey=True)
     places = np.arange(len(cells))

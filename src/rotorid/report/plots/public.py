@@ -16,12 +16,8 @@ if TYPE_CHECKING:
 def residual_against_airspeed(bins: pd.DataFrame, points: pd.DataFrame) -> Figure:
     """Residual of each channel against airspeed: samples of the rigid body, its RMS and NeuroBEM's.
 
-    Parameters
-    ----------
-    bins
-        Columns `model`, `channel`, `airspeed_low_m_s`, `airspeed_high_m_s`, `rms`, `low_95`, `high_95`.
-    points
-        Columns `airspeed_m_s` and the six channels: residual of the rigid body (N, N m).
+    `bins`: columns `model`, `channel`, `airspeed_low_m_s`, `airspeed_high_m_s`, `rms`, `low_95`, `high_95`. `points`:
+    columns `airspeed_m_s` and the six channels: residual of the rigid body (N, N m).
     """
     fig, axes = style.figure(4.6, rows=2, columns=3, sharex=True)
     for axis, (channel, (label, unit)) in zip(axes.flat, style.CHANNELS.items(), strict=True):
@@ -47,10 +43,7 @@ def residual_against_airspeed(bins: pd.DataFrame, points: pd.DataFrame) -> Figur
 def rmse_of_flights(flights: pd.DataFrame) -> Figure:
     """RMSE of force and moment of each flight: rigid body, NeuroBEM, NeuroBEM with its paper's mass.
 
-    Parameters
-    ----------
-    flights
-        Columns `flight`, `model`, `force`, `moment`.
+    `flights`: columns `flight`, `model`, `force`, `moment`.
     """
     fig, axes = style.figure(2.4, columns=2)
     names = list(dict.fromkeys(flights["flight"]))
@@ -75,15 +68,9 @@ def rmse_of_flights(flights: pd.DataFrame) -> Figure:
 def apparent_coefficient(points: pd.DataFrame, pooled: dict[str, dict], names: dict[str, str]) -> Figure:
     """F/ω² of every steady point against rotor speed, one panel a propeller, with the two pooled forms.
 
-    Parameters
-    ----------
-    points
-        Columns `propeller`, `run`, `speed_rad_s`, `thrust_n`, `used`.
-    pooled
-        Per propeller the C_F through the origin, the C_F with offset and the mean offset (N), keys `origin`,
-        `offset`, `mean_offset_n`.
-    names
-        Heading of each panel.
+    `points`: columns `propeller`, `run`, `speed_rad_s`, `thrust_n`, `used`. `pooled`: per propeller the C_F through the
+    origin, the C_F with offset and the mean offset (N), keys `origin`, `offset`, `mean_offset_n`. `names`: heading of
+    each panel.
     """
     fig, axes = style.figure(4.2, rows=2, columns=2, sharex=True)
     for axis, (propeller, fits) in zip(axes.flat, pooled.items(), strict=False):
@@ -112,14 +99,8 @@ def apparent_coefficient(points: pd.DataFrame, pooled: dict[str, dict], names: d
 def motors(table: pd.DataFrame, pooled: dict[str, dict], names: dict[str, str]) -> Figure:
     """C_F of each motor with its interval, and the pooled value with its own; one column a propeller.
 
-    Parameters
-    ----------
-    table
-        Columns `propeller`, `motor`, `form`, `c_f_n_s2`, `low_95_n_s2`, `high_95_n_s2`, `outlying`.
-    pooled
-        Per propeller and form: `value`, `interval_95`, `prediction_95` (N s²).
-    names
-        Heading of each panel.
+    `table`: columns `propeller`, `motor`, `form`, `c_f_n_s2`, `low_95_n_s2`, `high_95_n_s2`, `outlying`. `pooled`: per
+    propeller and form: `value`, `interval_95`, `prediction_95` (N s²). `names`: heading of each panel.
     """
     fig, axes = style.figure(2.5, columns=len(names), sharey=True)
     letters = sorted(table["motor"].unique())

@@ -94,14 +94,8 @@ def use() -> None:
 def figure(height_in: float, rows: int = 1, columns: int = 1, **subplots: Any) -> tuple[Figure, Any]:
     """A figure as wide as the text with its axes, in the project's look.
 
-    Parameters
-    ----------
-    height_in
-        Height [in].
-    rows, columns
-        Number of axes down and across.
-    subplots
-        Passed on to `matplotlib.pyplot.subplots` (`sharex`, `squeeze`, ...).
+    `height_in`: height [in]. `rows`, `columns`: number of axes down and across. `subplots`: passed on to
+    `matplotlib.pyplot.subplots` (`sharex`, `squeeze`, ...).
     """
     import matplotlib.pyplot as plt
 
@@ -137,18 +131,10 @@ def placeholder(path: str | Path, reason: str) -> None:
 
 
 def thin(values: np.ndarray, samples: int) -> np.ndarray:
-    """Indices of about `samples` points that keep the envelope of a trace.
+    """Indices (k,), sorted, of about `samples` points that keep the envelope of a trace (n,), any unit.
 
-    Parameters
-    ----------
-    values
-        Trace, any unit, shape (n,).
-    samples
-        About how many points to keep; a trace no longer than this is kept whole.
-
-    Returns
-    -------
-    Sorted indices, shape (k,): the smallest and the largest value of each of `samples / 2` equal stretches.
+    They are the smallest and the largest value of each of `samples / 2` equal stretches; a trace that is no longer than
+    `samples` is kept whole.
     """
     values = np.asarray(values)
     if len(values) <= samples:

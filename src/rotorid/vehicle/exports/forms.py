@@ -184,35 +184,35 @@ def _left_of_its_own(values: dict, knows: frozenset[str]) -> list[str]:
     return left
 
 
+_BY_AXIS = {
+    **{("frame_drag", form): "frame" for form in ("isotropic", "per axis")},
+    **{("rotational_damping", form): "damping" for form in ("one constant", "linear")},
+}
+"""Effects and forms with a constant for each axis, or one for all, and their part."""
+
+
 def _take(values: dict, name: str, form: str, p: dict[str, float]) -> bool | str:
     """Put an effect into the parts; False where its form has no place there, a remark where it fits only nearly."""
+    at_hubs = True if form == "at the hubs" else "taken at the hubs in place of the centre of mass"
     if name == "rotor_drag" and "k_d" in p:
         values["drag"] = (p["k_d"], p["k_d"])
-        return True if form == "at the hubs" else "taken at the hubs in place of the centre of mass"
+        return at_hubs
     if name == "axial_inflow" and "k_z" in p:
         values["inflow"] = p["k_z"]
-        return True if form == "at the hubs" else "taken at the hubs in place of the centre of mass"
+        return at_hubs
     if name == "translational_lift":
         values["lift"] = p["k_h"]
-        return True if form == "at the hubs" else "taken at the hubs in place of the centre of mass"
+        return at_hubs
     if name == "flapping_moment" and form == "at the hubs":
         values["flap"] = p["k_flap"]
         return True
-    if name == "frame_drag" and form in ("isotropic", "per axis"):
-        values["frame"] = (p["c"],) * 3 if "c" in p else (p["c_x"], p["c_y"], p["c_z"])
+    if (name, form) in _BY_AXIS:
+        values[_BY_AXIS[name, form]] = (p["c"],) * 3 if "c" in p else (p["c_x"], p["c_y"], p["c_z"])
         return True
-    if name == "rotational_damping" and form in ("one constant", "linear"):
-        values["damping"] = (p["c"],) * 3 if "c" in p else (p["c_x"], p["c_y"], p["c_z"])
-        return True
-    if name == "motor_lag" and form == "one constant":
-        values["tau_s"] = (p["tau"], p["tau"])
-        return True
-    if name == "motor_lag" and form == "up and down":
-        values["tau_s"] = (p["tau_up"], p["tau_down"])
-        return True
-    if name == "motor_lag" and form == "on thrust":
-        values["tau_s"] = (p["tau"], p["tau"])
-        return "taken as a lag of the rotor speed, which near hover has the same time constant"
+    if name == "motor_lag" and form in ("one constant", "up and down", "on thrust"):
+        values["tau_s"] = (p["tau"], p["tau"]) if "tau" in p else (p["tau_up"], p["tau_down"])
+        same = "taken as a lag of the rotor speed, which near hover has the same time constant"
+        return same if form == "on thrust" else True
     if name == "command_saturation" and values["limits_rad_s"] is not None:
         low, high = values["limits_rad_s"]
         if form == "upper limit":
@@ -364,17 +364,22 @@ def mjcf(vehicle: Vehicle) -> Exported:
     return Exported(text, "vehicle.xml", tuple(left), companions=companions)
 
 
+def allocated(parts: Parts, yaw_signs: np.ndarray) -> list[tuple[str, float]]:
+    """Places, torques and thrusts of the rotors as parameters of PX4's control allocation."""
+    rows, strongest = [], parts.thrust.max()
+    for i, (place, signed) in enumerate(zip(parts.places, yaw_signs, strict=True)):
+        values = (*place, signed * (parts.torque[i] / parts.thrust[i]), 6.5 * parts.thrust[i] / strongest)
+        names = (f"CA_ROTOR{i}_{key}" for key in ("PX", "PY", "PZ", "KM", "CT"))
+        rows += zip(names, map(float, values), strict=True)
+    return rows
+
+
 def px4(vehicle: Vehicle) -> Exported:
     """Parameters of PX4's control allocation and thrust model, as QGroundControl loads them."""
     parts = parts_of(vehicle, KNOWS["px4"])
     left = [*parts.left_out, "mass and inertia: they are parameters of PX4's own simulator alone (--to px4-sih)"]
     rows: list[tuple[str, float, int]] = [("CA_AIRFRAME", 0, 6), ("CA_ROTOR_COUNT", vehicle.rotor_count, 6)]
-    strongest = parts.thrust.max()
-    for i, (place, signed) in enumerate(zip(parts.places, vehicle.yaw_signs(), strict=True)):
-        ratio = parts.torque[i] / parts.thrust[i]
-        values = {"PX": place[0], "PY": place[1], "PZ": place[2], "KM": signed * ratio}
-        values["CT"] = 6.5 * parts.thrust[i] / strongest
-        rows += [(f"CA_ROTOR{i}_{k}", float(v), 9) for k, v in values.items()]
+    rows += [(name, value, 9) for name, value in allocated(parts, vehicle.yaw_signs())]
     limit = parts.limits_rad_s
     if limit or parts.curve:
         rows.append(("THR_MDL_FAC", 1.0 - parts.curve, 9))

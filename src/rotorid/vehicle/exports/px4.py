@@ -22,7 +22,7 @@ import numpy as np
 from rotorid.errors import InputError
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.exports.derivatives import left_of_one_damping, own_damping
-from rotorid.vehicle.exports.forms import KNOWS, Exported, Parts, parts_of, sdf
+from rotorid.vehicle.exports.forms import KNOWS, Exported, Parts, allocated, parts_of, sdf
 from rotorid.vehicle.mixer import hover_speed_rad_s
 
 _NUMBER = 22000
@@ -239,13 +239,7 @@ def airframe(vehicle: Vehicle, name: str) -> str:
         f"PX4_SIM_MODEL=${{PX4_SIM_MODEL:={name}}}", "", "param set-default SIM_GZ_EN 1", "",
         "param set-default CA_AIRFRAME 0", f"param set-default CA_ROTOR_COUNT {vehicle.rotor_count}",
     ]  # fmt: skip
-    strongest = parts.thrust.max()
-    for i, (place, sign) in enumerate(zip(parts.places, vehicle.yaw_signs(), strict=True)):
-        own = {
-            "PX": place[0], "PY": place[1], "PZ": place[2], "KM": sign * parts.torque[i] / parts.thrust[i],
-            "CT": 6.5 * parts.thrust[i] / strongest,
-        }  # fmt: skip
-        lines += [f"param set-default CA_ROTOR{i}_{key} {value:.6g}" for key, value in own.items()]
+    lines += [f"param set-default {name} {value:.6g}" for name, value in allocated(parts, vehicle.yaw_signs())]
     for i in range(1, vehicle.rotor_count + 1):
         lines += [
             f"param set-default SIM_GZ_EC_FUNC{i} {100 + i}",
@@ -254,7 +248,8 @@ def airframe(vehicle: Vehicle, name: str) -> str:
         ]
     share = vehicle.mass_kg * vehicle.gravity_m_s2 / float((parts.thrust * high**2).sum())
     squared = low < _LOW_START * high
-    hover = share if squared else _signal(share, low / high)
+    # The signal at which speeds from the lowest to the highest make that share of the thrust.
+    hover = share if squared else (float(np.sqrt(share)) - low / high) / (1 - low / high)
     lines += [
         "",
         "# Gazebo's rotor speed is proportional to the signal between its ends: thrust goes with the square.",
@@ -262,8 +257,3 @@ def airframe(vehicle: Vehicle, name: str) -> str:
         f"param set-default MPC_THR_HOVER {min(max(hover, 0.1), 0.8):.4g}",
     ]
     return "\n".join(lines) + "\n"
-
-
-def _signal(share: float, lowest: float) -> float:
-    """The signal at which speeds from `lowest` to 1 make a share of the thrust."""
-    return (float(np.sqrt(share)) - lowest) / (1 - lowest)
