@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.identify.excitation import band_signals, fit_flights
+from rotorid.identify.inertias import band_signals, fit_flights
 from rotorid.recordings import read_set
 from rotorid.recordings.importers.faults import read_report
 from rotorid.report import log

@@ -16,6 +16,7 @@ import pandas as pd
 from scipy.special import stdtr
 
 from rotorid.identify import grey_box
+from rotorid.identify.inertias import compose, read_components
 from rotorid.identify.rotor import (
     COLUMNS,
     LEAST_FORCE_SD_N,
@@ -26,7 +27,6 @@ from rotorid.identify.rotor import (
 )
 from rotorid.io.logs import read_sessions
 from rotorid.report import log
-from rotorid.vehicle.mass_properties import compose, read_components
 
 LEAST_TORQUE_SD_N_M = 1e-6
 

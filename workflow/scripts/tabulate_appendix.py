@@ -16,7 +16,7 @@ import pandas as pd
 from rotorid.io.wire import EXPERIMENTS
 from rotorid.report import log, provenance
 from rotorid.report.plots import style
-from rotorid.report.plots.rule_graph import rule_graph
+from rotorid.report.plots.instruments import rule_graph
 from rotorid.report.provenance import sha256
 from rotorid.vehicle.control import THESIS_GAINS, AttitudeReference, training_reference, validation_reference
 

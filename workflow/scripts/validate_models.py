@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.identify import grey_box
-from rotorid.identify.excitation import band_signals, fit_flights
+from rotorid.identify.inertias import band_signals, fit_flights
 from rotorid.recordings import Inertia, Run, Vehicle, read_set, read_vehicle
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.faults import read_report

@@ -26,6 +26,9 @@ from rotorid.recordings import columns as c
 from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.vehicle import Vehicle
 
+if TYPE_CHECKING:
+    from rotorid.effects.loading import InstrumentFacts
+
 VECTORS = {
     "accelerometer": c.SPECIFIC_FORCE,
     "gyroscope": c.ANGULAR_VELOCITY,
@@ -33,10 +36,6 @@ VECTORS = {
     "position": c.POSITION,
 }
 """Sensors that read a vector, with their columns."""
-
-
-if TYPE_CHECKING:
-    from rotorid.effects.loading import InstrumentFacts
 
 
 @dataclass(frozen=True)

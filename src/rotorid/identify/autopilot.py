@@ -1,4 +1,6 @@
-"""The thrust curve of the motors, their lag and the hover, from signals of the motors and the accelerometer.
+"""What a flight says of an autopilot's parameters: each with its 95 % interval, or "not determined by this flight".
+
+The thrust curve of the motors, their lag and the hover, from signals of the motors and the accelerometer.
 
 The accelerometer reads, upward, the thrust over the mass, whatever the attitude and the wind. Each motor's signal makes
 a steady thrust by the autopilot's own curve; the rotor's speed, its square root, follows with a lag of first order.
@@ -19,8 +21,6 @@ PX4's estimator of wind takes the specific force across the rotors' axis as
 with v the velocity through the air in body axes. Source: PX4-Autopilot,
 src/modules/ekf2/EKF/aid_sources/drag/drag_fusion.cpp. Its own script for the numbers (mc_wind_estimator_tuning.py)
 takes the air for still; here each run has a wind of its own.
-
-What a flight says of an autopilot's parameters: each with its 95 % interval, or "not determined by this flight".
 """
 
 from __future__ import annotations

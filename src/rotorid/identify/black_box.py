@@ -30,7 +30,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import least_squares
 
 from rotorid.errors import InputError
-from rotorid.identify.networks import Trained, Training, build, train
+from rotorid.identify.networks import Training, build, train
 from rotorid.io.logs import by_recording
 from rotorid.io.wire import EXPERIMENTS
 from rotorid.recordings.vehicle import Vehicle
@@ -183,20 +183,20 @@ def fit_thesis_network(
     seed: int = 0,
     every: int = 10,
     checkpoint: Path | None = None,
-) -> tuple[_Predict, Trained]:
-    """Train the network of thesis 4.4 on a table with `INPUTS` and `OUTPUTS`."""
+) -> tuple[_Predict, np.ndarray, np.ndarray]:
+    """The network of thesis 4.4 on a table of `INPUTS` and `OUTPUTS`: its model, and epochs and errors of `train`."""
     x, y = table[list(INPUTS)].to_numpy(), table[list(OUTPUTS)].to_numpy()
     scale_x, scale_y = _ColumnScale.of(x), _ColumnScale.of(y)
     sizes = (len(INPUTS), *hidden, len(OUTPUTS))
     activations = ("sigmoid",) * len(hidden) + ("linear",)
     network = build(sizes, activations, np.random.default_rng(seed))
     how = Training(rate, epochs, every=every, seed=seed, checkpoint_every=10_000)
-    trained = train(network, scale_x.apply(x), scale_y.apply(y), how, checkpoint)
+    network, kept, errors = train(network, scale_x.apply(x), scale_y.apply(y), how, checkpoint)
 
     def predict(other: pd.DataFrame) -> np.ndarray:
-        return scale_y.back(trained.network(scale_x.apply(other[list(INPUTS)].to_numpy())))
+        return scale_y.back(network(scale_x.apply(other[list(INPUTS)].to_numpy())))
 
-    return predict, trained
+    return predict, kept, errors
 
 
 def fit_linear(table: pd.DataFrame) -> _Predict:

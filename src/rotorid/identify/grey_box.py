@@ -27,7 +27,7 @@ from scipy.special import chdtrc
 from scipy.special import stdtrit as student_quantile
 
 from rotorid.effects.contract import compiled
-from rotorid.identify.networks import Network, Trained, Training, build, train
+from rotorid.identify.networks import Network, Training, build, train
 
 MASK = np.array([[1, 0, 0, 1, 0, 0], [0, 1, 0, 0, 1, 0], [0, 0, 1, 0, 0, 1]], float)
 """Which weights of eq. 4.74 are there."""
@@ -232,16 +232,16 @@ def coefficient(network: Network, k_x: float, k_d: float) -> float:
 
 def fit_coefficient_network(
     speed_rad_s: np.ndarray, value: np.ndarray, hidden: int, training: Training
-) -> tuple[float, tuple[float, float], Trained]:
-    """Coefficient, scales k_x = 1 / max|ω| and k_d = 1 / max|d| (eq. 4.68), and training on steady points.
+) -> tuple[float, tuple[float, float], Network, np.ndarray, np.ndarray]:
+    """Coefficient, scales k_x = 1 / max|ω| and k_d = 1 / max|d| (eq. 4.68), and what `train` gives on steady points.
 
     Speeds (n,) in rad/s, thrusts in N or torques in N m (n,).
     """
     k_x, k_d = float(1 / np.max(np.abs(speed_rad_s))), float(1 / np.max(np.abs(value)))
     network = build((1, hidden, 1), ("linear", "linear"), np.random.default_rng(training.seed), bias=False)
     inputs = (k_x * np.asarray(speed_rad_s, float)[:, None]) ** 2
-    trained = train(network, inputs, k_d * np.asarray(value, float)[:, None], training)
-    return coefficient(trained.network, k_x, k_d), (k_x, k_d), trained
+    network, epochs, mse = train(network, inputs, k_d * np.asarray(value, float)[:, None], training)
+    return coefficient(network, k_x, k_d), (k_x, k_d), network, epochs, mse
 
 
 def cut_windows(
@@ -437,51 +437,27 @@ def fit_output_error(
     return _OutputErrorFit(parameters, covariance, scale, explained, w, iteration + 1)
 
 
-@dataclass(frozen=True)
-class PrintedNetwork:
-    """A rotor network of appendix A.1: scaling factors and weights as printed, and the last digit of each."""
+def printed_coefficient(
+    k_x: float, k_d: float, w1, w2, k_x_digit: float = 1e-8, k_d_digit: float = 1e-4, weight_digit: float = 1e-4
+) -> tuple[float, float]:
+    """Coefficient of a rotor network of appendix A.1 by eq. 4.73, thrust (N s²) or torque (N m s²) over squared speed.
 
-    k_x: float
-    """s/rad."""
-    k_d: float
-    """1/N or 1/(N m)."""
-    w1: tuple[float, ...]
-    w2: tuple[float, ...]
-    k_x_digit: float
-    k_d_digit: float = 1e-4
-    weight_digit: float = 1e-4
+    The second number is by how much the digits that are not printed may change it.
 
-    @property
-    def coefficient(self) -> float:
-        """Eq. 4.73: thrust in N s² or torque in N m s² over squared speed."""
-        return self._product * self.k_x**2 / self.k_d
-
-    @property
-    def rounding(self) -> float:
-        """By how much the digits that are not printed may change the coefficient, in its unit."""
-        weights = self.weight_digit / 2 * sum(abs(weight) for weight in (*self.w1, *self.w2))
-        relative = weights / abs(self._product) + self.k_x_digit / self.k_x + self.k_d_digit / 2 / self.k_d
-        return abs(self.coefficient) * relative
-
-    @property
-    def _product(self) -> float:
-        return sum(first * second for first, second in zip(self.w1, self.w2, strict=True))
+    Scales, s/rad and 1/N or 1/(N m), and weights as printed, and the last digit of each.
+    """
+    product = sum(first * second for first, second in zip(w1, w2, strict=True))
+    coefficient = product * k_x**2 / k_d
+    weights = weight_digit / 2 * sum(abs(weight) for weight in (*w1, *w2))
+    return coefficient, abs(coefficient) * (weights / abs(product) + k_x_digit / k_x + k_d_digit / 2 / k_d)
 
 
 ROTOR_NETWORKS = {
-    "thrust_coefficient_n_s2": PrintedNetwork(
-        k_x=5.4669e-4,
-        k_d=0.2133,
-        w1=(-0.5311, 0.1014, -1.0462, -0.1708),
-        w2=(-0.4342, -0.6602, -0.7606, -0.1731),
-        k_x_digit=1e-8,
+    "thrust_coefficient_n_s2": printed_coefficient(
+        5.4669e-4, 0.2133, (-0.5311, 0.1014, -1.0462, -0.1708), (-0.4342, -0.6602, -0.7606, -0.1731)
     ),
-    "torque_coefficient_n_m_s2": PrintedNetwork(
-        k_x=6.3486e-4,
-        k_d=20.8333,
-        w1=(-0.4279, 1.0063, -0.8083, -0.4139),
-        w2=(-0.3693, 0.5336, -0.0600, -0.5183),
-        k_x_digit=1e-8,
+    "torque_coefficient_n_m_s2": printed_coefficient(
+        6.3486e-4, 20.8333, (-0.4279, 1.0063, -0.8083, -0.4139), (-0.3693, 0.5336, -0.0600, -0.5183)
     ),
 }
 """Appendix A.1.1 and A.1.2."""

@@ -130,19 +130,10 @@ class Training:
     checkpoint_every: int = 5000
 
 
-@dataclass(frozen=True)
-class Trained:
-    """A trained network and its mean squared error (before each kept epoch) per output, (kept, n_out)."""
-
-    network: Network
-    epochs: np.ndarray
-    mse: np.ndarray
-
-
 def train(
     network: Network, inputs: np.ndarray, targets: np.ndarray, training: Training, checkpoint: Path | None = None
-) -> Trained:
-    """Train and return the network with its history.
+) -> tuple[Network, np.ndarray, np.ndarray]:
+    """The trained network, epochs (kept,), and before each of them the mean squared error per output, (kept, n_out).
 
     `inputs` (n, n_in), `targets` (n, n_out). With `checkpoint` (.npz) the state is written every
     `checkpoint_every` epochs (atomically) and an existing file is continued. ValueError where the weights run
@@ -169,7 +160,7 @@ def train(
         _LOGGER.info("epoch %d of %d, mse %s", stop, training.epochs, mse.round(9))
         if checkpoint is not None:
             _store(Path(checkpoint), stop, weights, biases, history)
-    return Trained(current, np.arange(kept) * training.every, history)
+    return current, np.arange(kept) * training.every, history
 
 
 def _batch(network, inputs, targets, training: Training, epochs: range, history: np.ndarray) -> np.ndarray:

@@ -1,4 +1,6 @@
-"""Tables of a fleet: which sets show which effect, each parameter over time, which verdicts need a person; its page.
+"""A fleet: verdicts on many sets, their tables and page, and each vehicle over its flights.
+
+Tables of a fleet: which sets show which effect, each parameter over time, which verdicts need a person; its page.
 
 The page is one HTML file that needs no other but the verdicts that it links to.
 

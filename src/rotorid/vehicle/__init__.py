@@ -12,7 +12,6 @@ OPEN = (
     "exports.px4",
     "fast",
     "improved",
-    "mass_properties",
     "mixer",
     "simulator",
     "windows",

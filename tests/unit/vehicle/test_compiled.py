@@ -12,7 +12,7 @@ from rotorid.effects.contract import Motion
 from rotorid.effects.gust import window_form
 from rotorid.effects.instant import Wrench, body_of, records
 from rotorid.errors import InputError
-from rotorid.identify.excitation import ExcitedHold, Multisine
+from rotorid.identify.inertias import ExcitedHold, Multisine
 from rotorid.vehicle.attitude import quaternion_from_euler, rotation_from_quaternion
 from rotorid.vehicle.batch import Batch
 from rotorid.vehicle.compiled import _invert

@@ -8,7 +8,7 @@ import pytest
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.instant import body_of
-from rotorid.identify.excitation import ExcitedHold, Multisine
+from rotorid.identify.inertias import ExcitedHold, Multisine
 from rotorid.vehicle import fast
 from rotorid.vehicle.attitude import (
     euler_from_quaternion,

@@ -1,7 +1,4 @@
-"""The verdict as a page for a person: one HTML file that needs no other.
-
-The page of a comparison: one HTML file that needs no other.
-"""
+"""The pages for a person, of a verdict and of a comparison: one HTML file each that needs no other."""
 
 from __future__ import annotations
 

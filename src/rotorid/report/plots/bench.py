@@ -1,7 +1,5 @@
-"""Figures of the load-cell bench: calibrations, static, dynamic and tensile tests.
-
-Figures of the stand: clocks, one experiment, steady wrenches, weight under tilt, rotor characteristics.
-"""
+"""Figures of the bench (calibrations, static, dynamic and tensile tests) and of the stand (clocks, one experiment,
+steady wrenches, weight under tilt, rotor characteristics)."""
 
 from __future__ import annotations
 

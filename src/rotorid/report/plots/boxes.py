@@ -1,9 +1,5 @@
-"""Figures of the white box: rotor curves and the attitude-control simulation.
-
-Figures of the grey box: networks by epoch, identifiability, excitation, errors, validation.
-
-Figures of the black box: training, held-out samples, comparison of models, calibrated intervals.
-"""
+"""Figures of the white box (rotor curves, attitude control), the grey box (networks by epoch, identifiability,
+excitation, errors, validation) and the black box (training, held-out samples, models compared, intervals)."""
 
 from __future__ import annotations
 
@@ -14,15 +10,13 @@ import pandas as pd
 
 from rotorid.report.plots import style
 
-_NAMES = {"c_f": ("thrust", "N", 1.0), "c_q": ("torque", "mN m", 1000.0)}
-
-
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+_NAMES = {"c_f": ("thrust", "N", 1.0), "c_q": ("torque", "mN m", 1000.0)}
 _ANGLES = ("roll", "pitch", "yaw")
 
 

@@ -1,7 +1,5 @@
-"""Figures of a verdict (before and after, where, in which regime, how much better) and of a comparison of two sets.
-
-Figures of a fleet: in how many sets each effect shows, how numbers change from set to set and since the first.
-"""
+"""Figures of a verdict (before and after, where, in which regime, how much better), of a comparison of two sets and of
+a fleet (in how many sets each effect shows, numbers from set to set and since the first)."""
 
 from __future__ import annotations
 
@@ -15,18 +13,16 @@ import pandas as pd
 
 from rotorid.report.plots import style
 
-_MOST_EFFECTS = 15
-_MOST_PARAMETERS = 4
-_MOST_NAMED = 6
-"""Vehicles that still have a colour each."""
-_WORDS = {"established": style.BLUE, "ambiguous": style.ORANGE, "suggested": style.GREY}
-
-
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rotorid.mismatch.changes.compare import Changes
 
+_MOST_EFFECTS = 15
+_MOST_PARAMETERS = 4
+_MOST_NAMED = 6
+"""Vehicles that still have a colour each."""
+_WORDS = {"established": style.BLUE, "ambiguous": style.ORANGE, "suggested": style.GREY}
 STRIP_CELL_S = 0.5
 _LARGEST = 10.0
 """Size relative to the noise at which the heat strip's colour ends."""

@@ -1,4 +1,4 @@
-"""PX4's own simulator, SIH ("simulation in hardware"): its parameters, and its equations to fly them.
+"""PX4's simulators: SIH ("simulation in hardware"), its parameters and equations, and Gazebo with sensors and airframe.
 
 Source: PX4-Autopilot, src/modules/simulation/simulator_sih: sih_params.c, and sih.cpp (read_motors,
 generate_force_and_torques, equations_of_motion) as of version 1.16. Written from them; no code of theirs is here.

@@ -4,7 +4,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.identify.excitation import Readings, band_signals, design, fit_flights
 from rotorid.identify.grey_box import (
     cut_windows,
     fit_output_error,
@@ -12,6 +11,7 @@ from rotorid.identify.grey_box import (
     tied,
     untied,
 )
+from rotorid.identify.inertias import band_signals, design, fit_flights, readings_at_hover
 from rotorid.recordings import Run
 from rotorid.vehicle.mixer import wrench_matrix
 from tests.unit.vehicle.thesis import thesis_vehicle
@@ -88,7 +88,7 @@ def test_windows_with_gaps_are_left_out_and_too_few_are_said():
 def test_designed_excitation_keeps_its_limits_and_beats_a_first_guess():
     vehicle = thesis_vehicle()
     wanted = (550.0, 1550.0), np.radians(12), (10, 40), 10.0
-    readings = Readings.at_hover(vehicle, 0.02, 0.005, 250.0)
+    readings = readings_at_hover(vehicle, 0.02, 0.005, 250.0)
     first, first_errors = design(vehicle, *wanted, readings, 4, np.random.default_rng(0))
     best, errors = design(vehicle, *wanted, readings, 80, np.random.default_rng(0))
     target = np.repeat([0.04, 0.001], 3)
@@ -106,7 +106,7 @@ def test_designed_excitation_keeps_its_limits_and_beats_a_first_guess():
 def test_multisine_integrals_are_integrals():
     vehicle = thesis_vehicle()
     wanted = (550.0, 1550.0), np.radians(12), (10, 20), 10.0
-    best, _ = design(vehicle, *wanted, Readings.at_hover(vehicle, 0.02, 0.005, 250.0), 4, np.random.default_rng(0))
+    best, _ = design(vehicle, *wanted, readings_at_hover(vehicle, 0.02, 0.005, 250.0), 4, np.random.default_rng(0))
     t = np.array([0.5, 0.5 + 1e-5])
     slope = np.diff(best.integral(t, 1), axis=0)[0] / 1e-5
     np.testing.assert_allclose(slope, best.moment(t).mean(axis=0), rtol=1e-6, atol=1e-9)

@@ -1,5 +1,6 @@
-"""An excitation that makes all inertias and gyroscopic terms identifiable: multisines within what motors can
-do.
+"""Inertias: from an excitation under which all of them show, from real flights, and from a table of components.
+
+An excitation that makes all inertias and gyroscopic terms identifiable: multisines within what motors can do.
 
 Each axis gets its own harmonics of one period (so the axes are orthogonal). Amplitudes, phases and the axes'
 shares are searched from a seed; each candidate is scaled to the largest that keeps every rotor
@@ -15,16 +16,25 @@ where the moment drives the motion. There both sides are still noisy, and no reg
 acceleration as given bounds the inertia from below, <M a> / <a a>, taking the moment as given bounds it from above,
 <M M> / <M a> (Frisch). The truth lies between if the noises are independent; the geometric mean is the estimate, and
 the ratio of the bounds is one over the squared correlation.
+
+Mass, centre of mass and inertia of a vehicle from a table of its components, in place of CAD (thesis eq. 4.27).
+
+Each component is a point, a box or a cylinder (axis along z) of even density; its inertia is moved to the
+centre of mass by the theorem of parallel axes. A component with count 4 stands at the four corners (±x, ±y).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from scipy.signal import butter, sosfiltfilt
 
+from rotorid.errors import InputError
+from rotorid.identify.fem.placement import turn
 from rotorid.identify.grey_box import regressors, weights_of_inertias
 from rotorid.recordings import Run, Vehicle
 from rotorid.recordings import columns as c
@@ -32,6 +42,8 @@ from rotorid.vehicle.control import AttitudePid, AttitudeReference
 from rotorid.vehicle.fast import AttitudeLoop
 from rotorid.vehicle.mixer import allocation_matrix, wrench_matrix
 
+COLUMNS = ("component count mass_kg shape size_x_m size_y_m size_z_m x_m y_m z_m").split()
+_SHAPES = ("point", "box", "cylinder")
 _INERTIA_ERROR, _GYROSCOPIC_ERROR = 0.001, 0.04
 """Standard errors that are wanted of a period: of inertias (relative), of gyroscopic weights (absolute)."""
 _HOLD_GAINS = ((0.04, 0.04, 0.04), (0.02, 0.02, 0.01), (0.015, 0.015, 0.02))
@@ -66,21 +78,16 @@ class Multisine:
         return Multisine(self.period_s, self.harmonics, self.amplitude_n_m * factor, self.phase_rad)
 
 
-@dataclass(frozen=True)
-class Readings:
-    """Noise of the readings: of the rates (rad/s) and, through the rotor speeds, of the moments (3,), N m,
-    one sigma per sample at `rate_hz` samples a second."""
+Readings = tuple[float, np.ndarray, float]
+"""Noise of the readings of the rates, rad/s, and, through the rotor speeds, of the moments (3,), N m: one sigma,
+and samples a second."""
 
-    rates_rad_s: float
-    moments_n_m: np.ndarray
-    rate_hz: float
 
-    @classmethod
-    def at_hover(cls, vehicle: Vehicle, rates_rad_s: float, speed_relative: float, rate_hz: float) -> Readings:
-        """Noise of the moments from relative noise of each rotor's speed, all rotors at hover."""
-        matrix = wrench_matrix(vehicle)
-        square = allocation_matrix(vehicle) @ [vehicle.mass_kg * vehicle.gravity_m_s2, 0.0, 0.0, 0.0]
-        return cls(rates_rad_s, np.sqrt(np.sum((2 * speed_relative * square * matrix[1:]) ** 2, 1)), rate_hz)
+def readings_at_hover(vehicle: Vehicle, rates_rad_s: float, speed_relative: float, rate_hz: float) -> Readings:
+    """Noise of the moments from relative noise of each rotor's speed, all rotors at hover."""
+    matrix = wrench_matrix(vehicle)
+    square = allocation_matrix(vehicle) @ [vehicle.mass_kg * vehicle.gravity_m_s2, 0.0, 0.0, 0.0]
+    return rates_rad_s, np.sqrt(np.sum((2 * speed_relative * square * matrix[1:]) ** 2, 1)), rate_hz
 
 
 def promised_errors(
@@ -99,12 +106,13 @@ def promised_errors(
     within = np.cumsum(inputs.reshape(count, length, 6), axis=1) * dt_s
     within = (within - within.mean(axis=1, keepdims=True)).reshape(-1, 6)
     # The candidate is sampled more coarsely than the sensors: more readings for each of its samples.
-    more = noise.rate_hz * dt_s
+    rates_rad_s, moments_n_m, rate_hz = noise
+    more = rate_hz * dt_s
     out = np.empty(6)
     for axis in range(3):
         pick = [axis, 3 + axis]
-        by_rates = noise.rates_rad_s**2 * np.linalg.inv(within[:, pick].T @ within[:, pick])
-        sigma = noise.moments_n_m[axis] * true[3 + axis]
+        by_rates = rates_rad_s**2 * np.linalg.inv(within[:, pick].T @ within[:, pick])
+        sigma = moments_n_m[axis] * true[3 + axis]
         by_moments = sigma**2 * np.linalg.inv(inputs[:, pick].T @ inputs[:, pick])
         out[pick] = np.sqrt(np.diag(by_rates + by_moments) / more)
     out[3:] /= np.abs(true[3:])
@@ -258,3 +266,53 @@ def fit_flights(
             }
         )
     return found
+
+
+def read_components(path: str | Path) -> pd.DataFrame:
+    """The component table; InputError names the line and what was expected."""
+    table = pd.read_csv(path)
+    missing = [c for c in COLUMNS if c not in table.columns]
+    if missing:
+        raise InputError(f"{path}: column {missing[0]} is missing, expected {', '.join(COLUMNS)}")
+    for number, row in enumerate(table.itertuples(), 2):
+        if row.shape not in _SHAPES:
+            raise InputError(f"{path}, line {number}: shape {row.shape!r}, expected {', '.join(_SHAPES)}")
+        if row.count not in (1, 4):
+            raise InputError(f"{path}, line {number}: count {row.count}, expected 1 or 4 (the four corners)")
+        sizes = (row.mass_kg, row.size_x_m, row.size_y_m, row.size_z_m)
+        if not row.mass_kg > 0 or not min(sizes) >= 0:
+            raise InputError(f"{path}, line {number}: mass must be positive and sizes 0 or more, got {sizes}")
+    return table
+
+
+def own_inertia(shape: str, mass_kg: float, size_m: np.ndarray) -> np.ndarray:
+    """Inertia (3, 3), kg m2, of a component about its own centre; `size_m` (3,), a cylinder's x size its diameter."""
+    x, y, z = size_m
+    if shape == "point":
+        return np.zeros((3, 3))
+    if shape == "cylinder":
+        across = mass_kg * (3 * (x / 2) ** 2 + z**2) / 12
+        return np.diag([across, across, mass_kg * (x / 2) ** 2 / 2])
+    return mass_kg / 12 * np.diag([y**2 + z**2, x**2 + z**2, x**2 + y**2])
+
+
+def compose(table: pd.DataFrame) -> tuple[float, np.ndarray, np.ndarray]:
+    """Mass, kg, of all components together, their centre of mass (3,), m, in the table's axes, and the inertia (3, 3),
+    kg m2, about it."""
+    masses, places, inertias = [], [], []
+    for row in table.itertuples():
+        size = np.array([row.size_x_m, row.size_y_m, row.size_z_m])
+        # A box at a corner points along its diagonal; the four together are symmetric all the same.
+        own = own_inertia(row.shape, row.mass_kg, size)
+        corners = [(1, 1)] if row.count == 1 else [(1, 1), (1, -1), (-1, -1), (-1, 1)]
+        for sx, sy in corners:
+            masses.append(row.mass_kg)
+            places.append([sx * row.x_m, sy * row.y_m, row.z_m])
+            about_z = turn(np.arctan2(sy * row.y_m, sx * row.x_m)) if row.count == 4 else np.eye(3)
+            inertias.append(about_z @ own @ about_z.T)
+    masses, places = np.array(masses), np.array(places)
+    centre = masses @ places / masses.sum()
+    total = np.zeros((3, 3))
+    for mass, arm, own in zip(masses, places - centre, inertias, strict=True):
+        total += own + mass * ((arm @ arm) * np.eye(3) - np.outer(arm, arm))
+    return float(masses.sum()), centre, total
