@@ -437,11 +437,7 @@ def compiled(**options: Any) -> Callable[[Callable], Callable]:
 
 def sensors(vehicle: Vehicle) -> dict[str, tuple[str, ...]]:
     """Every sensor with its columns."""
-    return {
-        **VECTORS,
-        "attitude": c.QUATERNION,
-        "rotor speeds": c.rotor_columns("rotor_speed", vehicle.rotor_count),
-    }
+    return {**VECTORS, "attitude": c.QUATERNION, "rotor speeds": c.rotor_columns("rotor_speed", vehicle.rotor_count)}
 
 
 def with_columns(recordings: RecordingSet, names: tuple[str, ...], change: Callable[[Run, np.ndarray], np.ndarray]):

@@ -58,7 +58,7 @@ _STANDARD_GRAVITY = 9.80665
 """m/s²: grams of thrust are by it."""
 _ACCELEROMETER_ZERO_M_S2 = 0.1
 """Standard deviation of the error of an accelerometer's zero that is believed."""
-TIME_CONSTANTS_S = (0.002, 0.4)
+_TIME_CONSTANTS_S = (0.002, 0.4)
 _RATE_HZ = 100.0
 """Residuals are averaged down to about so many a second: there is nothing above that the motors could do."""
 _VOLTAGE_MOVES = 0.01
@@ -96,7 +96,7 @@ class _Shape:
 
 
 @dataclass(frozen=True)
-class ThrustMap:
+class _ThrustMap:
     """A thrust curve with its free numbers.
 
     `thrust` takes signals (n, k), battery voltage (n, 1) or None, and the numbers of `shapes`; it returns shares of the
@@ -139,14 +139,14 @@ def _crazyflie(signal: np.ndarray, voltage: np.ndarray | None, shape: np.ndarray
 
 
 MAPS = {
-    "px4": ThrustMap(
+    "px4": _ThrustMap(
         "PX4",
         (_Shape("THR_MDL_FAC", 0.5, -0.5, 1.6, (0.0, 1.0), 0.25),),
         _px4,
         "T/T_max = f u² + (1 − f) u, f = THR_MDL_FAC",
         "PX4-Autopilot, src/lib/mixer_module/motor_params.c (THR_MDL_FAC) and functions/FunctionMotors.hpp",
     ),
-    "ardupilot": ThrustMap(
+    "ardupilot": _ThrustMap(
         "ArduPilot",
         (
             _Shape("MOT_THST_EXPO", 0.5, -0.9, 1.8, (-1.0, 1.0), 0.25),
@@ -157,14 +157,14 @@ MAPS = {
         "ardupilot, libraries/AP_Motors/AP_Motors_Thrust_Linearization.cpp, with MOT_SPIN_MAX at its default",
         full_signal=_SPIN_MAX,
     ),
-    "betaflight": ThrustMap(
+    "betaflight": _ThrustMap(
         "Betaflight",
         (_Shape("thrust_linear", 0.3, -0.6, 2.5, (0.0, 1.5), 0.25, 0, 100.0),),
         _betaflight,
         "u = x (1 + k (1 − x)²), x = T/T_max, k = thrust_linear/100",
         "Betaflight 4.5, src/main/flight/pid.c, pidApplyThrustLinearization, and pid_init.c",
     ),
-    "crazyflie": ThrustMap(
+    "crazyflie": _ThrustMap(
         "Crazyflie",
         (
             _Shape("volts_per_gram", 0.088, 0.01, 0.5, (0.0, np.inf), 0.02, 5),
@@ -179,7 +179,7 @@ MAPS = {
 """By the name that `--to` takes."""
 
 
-def _fit_thrust(stretches: Sequence[Stretch], chosen: ThrustMap, mass_kg: float, gravity_m_s2: float) -> tuple | None:
+def _fit_thrust(stretches: Sequence[Stretch], chosen: _ThrustMap, mass_kg: float, gravity_m_s2: float) -> tuple | None:
     """The thrust curve; None where no stretch has signals of the motors (or, for grams, the battery's voltage).
 
     Estimates of the map's numbers in its order, of the time constant, s, of the motors' signal that makes the weight, 0
@@ -218,7 +218,7 @@ def _fit_thrust(stretches: Sequence[Stretch], chosen: ThrustMap, mass_kg: float,
     )
 
 
-def _per_share(values: np.ndarray, chosen: ThrustMap, mass_kg: float, rotors: int) -> float:
+def _per_share(values: np.ndarray, chosen: _ThrustMap, mass_kg: float, rotors: int) -> float:
     """m/s² that all rotors make by a share (or a gram a rotor)."""
     return rotors * 1e-3 * _STANDARD_GRAVITY / mass_kg if chosen.in_grams else float(np.exp(values[0]))
 
@@ -250,7 +250,7 @@ class _Layout:
     full_voltage: float
 
 
-def _layout(used: Sequence[Stretch], chosen: ThrustMap) -> _Layout:
+def _layout(used: Sequence[Stretch], chosen: _ThrustMap) -> _Layout:
     rows: list[tuple[float, float, float, float, float]] = []
 
     def add(start: float, low: float, high: float, scale: float, prior: float = np.inf) -> int:
@@ -263,7 +263,7 @@ def _layout(used: Sequence[Stretch], chosen: ThrustMap) -> _Layout:
     for shape in chosen.shapes:
         add(shape.start, shape.low, shape.high, (shape.high - shape.low) / 10, shape.believed)
     shapes = slice(first, len(rows))
-    lag = add(np.log(0.04), *np.log(TIME_CONSTANTS_S), 0.3)
+    lag = add(np.log(0.04), *np.log(_TIME_CONSTANTS_S), 0.3)
     zero = add(0.0, -2.0, 2.0, _ACCELEROMETER_ZERO_M_S2, _ACCELEROMETER_ZERO_M_S2)
     voltage, drift, mean = None, {}, 1.0
     if not chosen.in_grams:
@@ -282,7 +282,7 @@ def _layout(used: Sequence[Stretch], chosen: ThrustMap) -> _Layout:
     return _Layout(shapes, lag, zero, voltage, drift, motion, *columns, mean)
 
 
-def _residuals(used: Sequence[Stretch], chosen: ThrustMap, layout: _Layout, mass_kg: float):
+def _residuals(used: Sequence[Stretch], chosen: _ThrustMap, layout: _Layout, mass_kg: float):
     """The function from values to the residuals of each stretch, m/s², averaged down to `_RATE_HZ`."""
     prepared = []
     for s in used:
@@ -425,7 +425,7 @@ def _stated(name, number: EstimatedNumber, unit, fine: bool, sentence, to_set=No
     )
 
 
-def _missing(chosen: ThrustMap, to: str) -> list[AutopilotParameter]:
+def _missing(chosen: _ThrustMap, to: str) -> list[AutopilotParameter]:
     why = "it holds no signals of the motors (throttle_1 …)"
     if chosen.in_grams:
         why += " together with the battery's voltage"
@@ -438,7 +438,7 @@ def _no_drag() -> list[AutopilotParameter]:
     return [_nothing(name, unit, "drag needs attitude and velocity") for name, unit in units.items()]
 
 
-def _of_thrust(shapes, lag, hover, share, throttle_range, chosen: ThrustMap, to: str) -> list[AutopilotParameter]:
+def _of_thrust(shapes, lag, hover, share, throttle_range, chosen: _ThrustMap, to: str) -> list[AutopilotParameter]:
     flown = "signals from {:.2f} to {:.2f} were flown".format(*throttle_range)
     out = []
     for shape, estimate in zip(chosen.shapes, shapes, strict=True):
@@ -469,7 +469,7 @@ def _of_thrust(shapes, lag, hover, share, throttle_range, chosen: ThrustMap, to:
         out.append(_stated(name, share, "", fine, sentence, float(np.clip(share.value, *allowed))))
     fine = hover.half_width <= _WIDEST_HOVER * hover.value
     out.append(_stated("hover_signal", hover, "", fine, "signal of the motors that makes the weight" if fine else _NOT))
-    inside = 1.1 * TIME_CONSTANTS_S[0] < lag.value < TIME_CONSTANTS_S[1] / 1.1
+    inside = 1.1 * _TIME_CONSTANTS_S[0] < lag.value < _TIME_CONSTANTS_S[1] / 1.1
     fine = lag.half_width <= _WIDEST_SHARE * lag.value and inside
     sentence = "lag of the rotors' speed behind the signal, with that of the accelerometer's filter"
     if not fine:

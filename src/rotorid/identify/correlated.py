@@ -51,7 +51,7 @@ class EstimatedNumber:
 
 
 @dataclass(frozen=True)
-class CorrelatedFit:
+class _CorrelatedFit:
     """Values with what their errors are known by."""
 
     values: np.ndarray
@@ -87,7 +87,7 @@ def fit(
     bounds: tuple[np.ndarray, np.ndarray],
     scale: np.ndarray,
     prior: np.ndarray,
-) -> CorrelatedFit:
+) -> _CorrelatedFit:
     """Values (p,) that make the residuals small.
 
     `bounds`, `scale` and `prior` are by value: where it may lie, its usual size, and the standard deviation of what is
@@ -113,7 +113,7 @@ def fit(
         values = solved.x
     count = len(solved.fun) - int(believed.sum())
     white, jacobian = solved.fun[:count], solved.jac[:count]
-    return CorrelatedFit(values, *_covariances(jacobian, white, prior))
+    return _CorrelatedFit(values, *_covariances(jacobian, white, prior))
 
 
 def _covariances(

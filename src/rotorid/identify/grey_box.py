@@ -277,7 +277,7 @@ def _simulate(weights, start, moments, extra, dt, out):
             before, after = moments[w, max(j - 1, 0)], moments[w, min(j + 2, last)]
             inner = 1.0 if 0 < j < last - 1 else 0.0
             e = extra[w]
-            # Half way the cubic through four samples (see rotorid.vehicle.windows.halfway).
+            # Half way the cubic through four samples (see rotorid.vehicle.windows._halfway).
             ha = 0.5 * (m0[0] + m1[0]) + inner * (m0[0] + m1[0] - before[0] - after[0]) / 16.0 + e[0]
             hb = 0.5 * (m0[1] + m1[1]) + inner * (m0[1] + m1[1] - before[1] - after[1]) / 16.0 + e[1]
             hc = 0.5 * (m0[2] + m1[2]) + inner * (m0[2] + m1[2] - before[2] - after[2]) / 16.0 + e[2]

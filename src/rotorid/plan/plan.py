@@ -123,7 +123,7 @@ def _steps_for(known: FittedSet) -> list[tuple[list[ChangedVehicle], list[Questi
     return [(choices, questions) for choices, questions in out if choices]
 
 
-def handled(
+def _handled(
     known: FittedSet, limits: Limits, hover: ManoeuvrePiece, least_s: float, still_s: float
 ) -> tuple[Handled, ...]:
     """The best choice of each kind of step, the one with the largest smallest separation first.
@@ -166,7 +166,7 @@ def _of_change(
 
 
 @dataclass(frozen=True)
-class Width:
+class _Width:
     """Half the 95 % interval of a believed value (relative) or of an effect's parameter (its own unit); of an effect
     that is not at work its upper limit (share of the weight, as the verdict's `absent`)."""
 
@@ -189,7 +189,7 @@ def _able(known: FittedSet) -> dict[str, tuple[str, ...]]:
     return out
 
 
-def check_wishes(known: FittedSet, wishes: dict[str, float]) -> None:
+def _check_wishes(known: FittedSet, wishes: dict[str, float]) -> None:
     """InputError where something is wished for that these recordings do not show."""
     names = _able(known)
     for name in wishes:
@@ -202,7 +202,7 @@ def check_wishes(known: FittedSet, wishes: dict[str, float]) -> None:
             )
 
 
-def widths(known: FittedSet, before: Information, after: Information, wishes: dict[str, float]) -> list[Width]:
+def widths(known: FittedSet, before: Information, after: Information, wishes: dict[str, float]) -> list[_Width]:
     """Half widths and limits that are wished for, and half widths of the parameters of the effects in the model.
 
     A doubt that the engine found beyond the usual one (blocks that differ more than their noise) is taken to stay. Of
@@ -214,10 +214,10 @@ def widths(known: FittedSet, before: Information, after: Information, wishes: di
         if name in PARAMETER_NAMES.values():
             (column,) = regression.columns(names[name])
             sizes = [_half(known, before, i, int(column), VALUE_FLOOR) for i in (before, after)]
-            out.append(Width(name, "relative", *sizes, wished))
+            out.append(_Width(name, "relative", *sizes, wished))
         else:
             sizes = [max(_limit(known, i, after, key) for key in names[name]) for i in (before, after)]
-            out.append(Width(name, SHARE, *sizes, wished))
+            out.append(_Width(name, SHARE, *sizes, wished))
     for key in model.selection.active:
         term = model.search.terms[key]
         if not term.form.linear or term.run or term.effect in UNKNOWNS:
@@ -225,7 +225,7 @@ def widths(known: FittedSet, before: Information, after: Information, wishes: di
         for index, column in zip(term.form.linear, regression.columns([key]), strict=True):
             parameter = term.form.parameters[index]
             sizes = [_half(known, before, i, int(column)) for i in (before, after)]
-            out.append(Width(f"{term.effect} {parameter.symbol}", parameter.unit, *sizes))
+            out.append(_Width(f"{term.effect} {parameter.symbol}", parameter.unit, *sizes))
     return out
 
 
@@ -289,7 +289,7 @@ class Forecast:
     """As the vehicle would fly it."""
     questions: Questions
     """Ids of each open question, and how far apart their models will be."""
-    widths: tuple[Width, ...]
+    widths: tuple[_Width, ...]
 
     @property
     def duration_s(self) -> float:
@@ -387,7 +387,7 @@ def _tried(known: FittedSet, limits: Limits, wishes: Iterable[str] = ()) -> list
     return out
 
 
-def _share_reached(sigmas: Iterable[float], wished: Iterable[Width], target_sigma: float) -> float:
+def _share_reached(sigmas: Iterable[float], wished: Iterable[_Width], target_sigma: float) -> float:
     """Share of the way to the goals: the mean over all models and wishes of what is reached of each."""
     found = [min(s / target_sigma, 1.0) for s in sigmas]
     found += [min(w.wished / w.after, 1.0) for w in wished if w.wished]
@@ -530,7 +530,7 @@ def _expected(known: FittedSet, limits: Limits, name: str, taken: list[Tried], w
 def plan(known: FittedSet, limits: Limits, wishes: dict[str, float] | None = None) -> Plan:
     """The flight to fly next; without anything to settle, or any manoeuvre that helps, one without pieces."""
     wishes = wishes or {}
-    check_wishes(known, wishes)
+    _check_wishes(known, wishes)
     reasons = tuple(sorted(known.prepared.not_testable.items()))
     about = {"set": known.recordings.name, "limits": limits, "unanswerable": known.unanswerable}
     if not known.questions and not known.chains and not wishes:
@@ -547,6 +547,6 @@ def plan(known: FittedSet, limits: Limits, wishes: dict[str, float] | None = Non
         found.append(_forecast(known, limits, "standard", (piece,), wishes))
     found.sort(key=lambda f: (-round(f.reached(limits.target_sigma), 2), f.duration_s))
     hover = next((t.piece for t in options if t.piece.name == "hover" and t.information is not None), None)
-    hands = () if hover is None else handled(known, limits, hover, _LEAST_S, BETWEEN_S)
+    hands = () if hover is None else _handled(known, limits, hover, _LEAST_S, BETWEEN_S)
     about |= {"others": tuple(found[1:]), "by_hand": hands, "tried": tuple(judged), "not_testable": reasons}
     return Plan(**vars(found[0]), **about)

@@ -24,13 +24,7 @@ from rotorid.mismatch.instrument.analyse import reading_findings, with_plainer_f
 from rotorid.mismatch.instrument.chain import ChainResult, find_chain, moved
 from rotorid.mismatch.instrument.columns import make_terms, rows_of
 from rotorid.mismatch.instrument.mistakes import find_mistakes
-from rotorid.mismatch.instrument.model import (
-    ReadingModel,
-    chosen_already,
-    everything,
-    fitted_model,
-    whole_reading,
-)
+from rotorid.mismatch.instrument.model import ReadingModel, chosen_already, everything, fitted_model, whole_reading
 from rotorid.mismatch.instrument.setup import set_up, with_unseen
 from rotorid.mismatch.plant.regression import Regression, build
 from rotorid.mismatch.plant.rows import Rows, Term
@@ -38,12 +32,7 @@ from rotorid.mismatch.plant.split import parts_of, split_runs
 from rotorid.plan.candidates import SessionLimits
 from rotorid.plan.plan import Forecast, Plan, Tried, chosen_pieces
 from rotorid.plan.questions import Question, claimed_in, in_thirds, question_of
-from rotorid.plan.separation import (
-    FITTED_SHARE,
-    Information,
-    of_set,
-    separations,
-)
+from rotorid.plan.separation import FITTED_SHARE, Information, of_set, separations
 from rotorid.plan.write import by_hand_as_data, draw_separations, questions_as_data, sentences
 from rotorid.recordings import RecordingSet, Run
 from rotorid.recordings import columns as c

@@ -41,25 +41,10 @@ from rotorid.mismatch.decision.words import (
 from rotorid.mismatch.delivery.files import form_of
 from rotorid.mismatch.tell.steps import steps_of, together, would_explain
 from rotorid.mismatch.tell.tiles import errors_of, tiles
-from rotorid.mismatch.tell.verdict import (
-    Absent,
-    Channel,
-    EffectVerdict,
-    Location,
-    Verdict,
-    main_channel,
-    spoken,
-)
+from rotorid.mismatch.tell.verdict import Absent, Channel, EffectVerdict, Location, Verdict, main_channel, spoken
 from rotorid.recordings import RecordingSet
 from rotorid.report.page.data import blocks, page_data
-from rotorid.report.plots.mismatch import (
-    STRIP_CELL_S,
-    draw_differences,
-    draw_residuals,
-    draw_values,
-    heat_strip,
-    svg,
-)
+from rotorid.report.plots.mismatch import STRIP_CELL_S, draw_differences, draw_residuals, draw_values, heat_strip, svg
 from rotorid.steps import step
 from rotorid.vehicle.derivatives import symbol_of
 
@@ -110,7 +95,7 @@ def make_page(
     scripts = page_file("uPlot.iife.min.js"), page_file("page.js")
     page = environment.from_string(page_file("page.html")).render(
         css=Markup(page_file("uPlot.min.css") + page_file("page.css")),
-        policy=policy_for(*scripts),
+        policy=_policy_for(*scripts),
         library=Markup(scripts[0]),
         script=Markup(scripts[1]),
         data=_embedded(data),
@@ -161,7 +146,7 @@ def make_page(
     return spoken(page, analysis)
 
 
-def policy_for(*scripts: str) -> str:
+def _policy_for(*scripts: str) -> str:
     """Content security policy under which these scripts alone run, nothing is fetched and nothing sent.
 
     Without scripts none runs.
@@ -177,7 +162,7 @@ def policy_for(*scripts: str) -> str:
 def filled(template: str, /, **values: object) -> str:
     """A page without scripts: a template of the page's files with its values."""
     environment = Environment(autoescape=True, trim_blocks=True)
-    return environment.from_string(page_file(template)).render(policy=policy_for(), **values)
+    return environment.from_string(page_file(template)).render(policy=_policy_for(), **values)
 
 
 def drawing(figure: Path) -> Markup:
@@ -239,9 +224,7 @@ def _ledger_row(row: Mapping) -> Markup:
 def pretty(text: str) -> Markup:
     """Text as HTML with powers of ten and units set as they are printed: 5.1e-5 ± 0.2e-5 → (5.1 ± 0.2) × 10⁻⁵."""
     text = re.sub(
-        r"(-?[\d.]+)e(-?\d+) ± ([\d.]+)e\2\b",
-        lambda m: f"({m[1]} ± {m[3]}) × 10{m[2].translate(_SUPERSCRIPTS)}",
-        text,
+        r"(-?[\d.]+)e(-?\d+) ± ([\d.]+)e\2\b", lambda m: f"({m[1]} ± {m[3]}) × 10{m[2].translate(_SUPERSCRIPTS)}", text
     )
     text = re.sub(r"(\d)e([+-]?\d+)\b", lambda m: f"{m[1]} × 10{str(int(m[2])).translate(_SUPERSCRIPTS)}", text)
     text = re.sub(r"(?<![\w])-(?=\d)", "−", text)
