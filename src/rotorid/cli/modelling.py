@@ -82,7 +82,7 @@ def _write_model(folder: Path, target: Path, to: str, quiet: bool = True) -> tup
         from rotorid.report.deliver import analysis_of, write_files
         from rotorid.report.next_to_log import next_to_log
         from rotorid.vehicle.exports import export_vehicle
-        from rotorid.vehicle.exports.px4 import gazebo_airframe
+        from rotorid.vehicle.exports.autopilots import gazebo_airframe
 
         analysis = analysis_of(recordings)
         files = [target / n for n in ("verdict.json", "report.html", "improved_vehicle.yaml")]

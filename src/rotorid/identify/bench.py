@@ -34,7 +34,7 @@ import pandas as pd
 from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
-from rotorid.identify.loadcell import LineFit, fit_line
+from rotorid.identify.loadcell import LineFit, fit_line, mean_interval
 from rotorid.io.logs import by_recording
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import RecordingSet, Run
@@ -251,7 +251,9 @@ def calibrate_cell(table: pd.DataFrame, idle_slopes_v_s: np.ndarray) -> dict:
     repeats = by_weight.count() - 1
     spread = float(np.sqrt((by_weight.var(ddof=1).fillna(0) * repeats).sum() / max(repeats.sum(), 1)))
     gf_per_volt = line.a1 * 1e5
-    drift, drift_interval = _mean_interval(idle_slopes_v_s)
+    drift, drift_interval = float("nan"), (float("nan"), float("nan"))
+    if len(idle_slopes_v_s) > 1:
+        drift, drift_interval = mean_interval(np.asarray(idle_slopes_v_s, float))
     growth = table["slope_v_s"].to_numpy() - drift
     volts = reading * 1e-5
     share = float(growth @ volts / (volts @ volts))
@@ -278,15 +280,6 @@ def calibrate_cell(table: pd.DataFrame, idle_slopes_v_s: np.ndarray) -> dict:
         "creep_share_min": 60 * share,
         "creep_interval_95": (60 * (share - half), 60 * (share + half)),
     }
-
-
-def _mean_interval(values: np.ndarray) -> tuple[float, tuple[float, float]]:
-    """Mean and its 95 % interval by Student's t."""
-    values = np.asarray(values, float)
-    if len(values) < 2:
-        return float("nan"), (float("nan"), float("nan"))
-    half = student_quantile(len(values) - 1, 0.975) * values.std(ddof=1) / np.sqrt(len(values))
-    return float(values.mean()), (float(values.mean() - half), float(values.mean() + half))
 
 
 def idle_slopes(samples: pd.DataFrame, sessions: pd.DataFrame) -> dict[int, np.ndarray]:

@@ -35,7 +35,7 @@ from rotorid.identify.bench import (
     force_covariance,
     forces,
 )
-from rotorid.identify.loadcell import LineFit, fit_line
+from rotorid.identify.loadcell import LineFit, fit_line, mean_interval
 from rotorid.io.logs import by_recording
 from rotorid.recordings.signal.filters import mean_and_error
 
@@ -148,21 +148,19 @@ def by_load(table: pd.DataFrame) -> pd.DataFrame:
     """Mean error of each platform, axis and load with its interval, spread of the repeats, propagated uncertainty."""
     rows = []
     for (platform, axis, method, load), part in table.groupby(["platform", "axis", "method", "load_n"]):
-        n, spread = len(part), part["error_n"].std(ddof=1)
-        half = student_quantile(n - 1, 0.975) * spread / np.sqrt(n)
-        mean = part["error_n"].mean()
+        mean, (low, high) = mean_interval(part["error_n"])
         rows.append(
             {
                 "platform": platform,
                 "axis": axis,
                 "method": method,
                 "load_n": load,
-                "repeats": n,
+                "repeats": len(part),
                 "error_n": mean,
-                "low_95_n": mean - half,
-                "high_95_n": mean + half,
+                "low_95_n": low,
+                "high_95_n": high,
                 "error_percent": 100 * mean / load,
-                "repeatability_n": spread,
+                "repeatability_n": part["error_n"].std(ddof=1),
                 "across_n": part["across_n"].mean(),
                 "uncertainty_n": part["uncertainty_n"].mean(),
             }
@@ -384,18 +382,8 @@ def agreement(flown: pd.DataFrame, base: str = "al") -> pd.DataFrame:
                 continue
             for platform, flight in flights_of_set.groupby("platform"):
                 inside = flight["time_s"].between(start + _MARGIN_S, stop - _MARGIN_S)
-                mean, error = mean_and_error(flight.loc[inside, "thrust_n"].to_numpy())
-                rows.append(
-                    {
-                        "set": number,
-                        "stretch": place,
-                        "start_s": start,
-                        "stop_s": stop,
-                        "platform": platform,
-                        "thrust_n": mean,
-                        "error_n": error,
-                    }
-                )
+                found = mean_and_error(flight.loc[inside, "thrust_n"].to_numpy())
+                rows.append((number, place, start, stop, platform, *found))
     return pd.DataFrame(rows, columns=["set", "stretch", "start_s", "stop_s", "platform", "thrust_n", "error_n"])
 
 

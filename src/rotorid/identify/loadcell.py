@@ -72,6 +72,13 @@ class LineFit:
         return float(centre - half), float(centre + half)
 
 
+def mean_interval(values: np.ndarray | pd.Series) -> tuple[float, tuple[float, float]]:
+    """Mean of two values or more and its 95 % interval by Student's t."""
+    mean = values.mean()
+    half = student_quantile(len(values) - 1, 0.975) * values.std(ddof=1) / np.sqrt(len(values))
+    return float(mean), (float(mean - half), float(mean + half))
+
+
 def fit_line(x: Sequence[float], y: Sequence[float]) -> LineFit:
     """Least-squares line through (x, y), eqs 2.10 to 2.13.
 
@@ -164,9 +171,7 @@ def shared_weight_error(
         if rank < 3:
             raise InputError("the weight in question must be part of some loads and not of others")
         found.append(float(solution[2]))
-    mean = float(np.mean(found))
-    half = student_quantile(len(found) - 1, 0.975) * np.std(found, ddof=1) / np.sqrt(len(found))
-    return mean, (mean - float(half), mean + float(half)), tuple(found)
+    return *mean_interval(np.array(found)), tuple(found)
 
 
 def flag_readings(readings: pd.DataFrame) -> pd.DataFrame:
@@ -440,13 +445,8 @@ def by_infill(table: pd.DataFrame, printed: pd.DataFrame) -> pd.DataFrame:
     for infill, part in table.groupby("infill_percent"):
         row = {"infill_percent": infill, "specimens": len(part)}
         for name in ("modulus_gpa", "strength_mpa", "yield_mpa"):
-            values = part[name]
-            half = student_quantile(len(values) - 1, 0.975) * values.std(ddof=1) / np.sqrt(len(values))
-            row |= {
-                name: values.mean(),
-                f"{name}_low_95": values.mean() - half,
-                f"{name}_high_95": values.mean() + half,
-                f"{name}_thesis": known.loc[infill, name] if infill in known.index else np.nan,
-            }
+            mean, (low, high) = mean_interval(part[name])
+            row |= {name: mean, f"{name}_low_95": low, f"{name}_high_95": high}
+            row[f"{name}_thesis"] = known.loc[infill, name] if infill in known.index else np.nan
         rows.append(row)
     return pd.DataFrame(rows)

@@ -22,7 +22,7 @@ from scipy.special import stdtrit as student_quantile
 
 from rotorid.effects.loading import rotation_of
 from rotorid.errors import InputError
-from rotorid.identify.clocks import Aligned, Pair, both_on_host, pair_of, torque_offset
+from rotorid.identify.clocks import THROTTLES, Aligned, Pair, both_on_host, pair_of, torque_offset
 from rotorid.io.frames import Quality
 from rotorid.io.logs import by_recording
 from rotorid.io.wire import EXPERIMENTS
@@ -32,7 +32,6 @@ from rotorid.recordings.signal.filters import block_count, mean_and_error
 from rotorid.recordings.vehicle import Vehicle
 
 _RPM = 2 * np.pi / 60
-_THROTTLES = c.rotor_columns("throttle", 4)
 _REST, _RAMP, PLATEAU = "rest", "ramp", "plateau"
 _SLOPE_1_S = 0.004
 """A throttle that changes by less than this per second is constant (the slowest ramp of table A.1: 0.0167)."""
@@ -63,7 +62,7 @@ def _experiment_run(session, aligned: Aligned) -> Run:
     when, felt = _felt(aligned.pair.wrench, aligned.offset_s)
     sent = quadrotor["host_s"].to_numpy()
     table = pd.DataFrame({c.TIME: when - when[0]})
-    for column in _THROTTLES:
+    for column in THROTTLES:
         table[column] = _within(when, sent, quadrotor[column].to_numpy(), 0.0)
     table[c.BATTERY_VOLTAGE] = _within(when, sent, quadrotor["battery_voltage_v"].to_numpy(), np.nan)
     table["roll_rad"] = np.radians(session.mount_roll_deg)
@@ -307,7 +306,7 @@ def evaluate(run: Run, frequency_hz: float | None) -> _Evaluated:
     Of a trapezoid the plateau, of a sine (`frequency_hz` given) as many whole cycles as the programme holds, so
     that the mean is one over the cycle.
     """
-    throttle = run.array(c.rotor_columns("throttle", 4))
+    throttle = run.array(THROTTLES)
     found = segments(run.time_s, throttle)
     active = programme(found)
     flat = longest(found, PLATEAU)
@@ -351,7 +350,7 @@ def mean_thrust(run: Run, entry: _Evaluated, thrust_of: Callable) -> np.ndarray:
     The mean of the thrust, not the thrust of the mean throttle: over a sine they differ.
     """
     inside = (run.time_s >= entry.start_s) & (run.time_s <= entry.stop_s)
-    return np.clip(thrust_of(run.array(c.rotor_columns("throttle", 4))[inside]), 0.0, None).mean(axis=0)
+    return np.clip(thrust_of(run.array(THROTTLES)[inside]), 0.0, None).mean(axis=0)
 
 
 def weights(evaluated: list[_Evaluated], mass_kg: float, centre_m: np.ndarray, gravity_m_s2: float) -> np.ndarray:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib.util import find_spec
 
 import numpy as np
@@ -23,8 +24,7 @@ from rotorid.mismatch.delivery.flown import UNITS, Model, driven_by, model_of
 from rotorid.mismatch.tell.forward import delivered_model
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.attitude import normalised, quaternion_rate, rotation_from_quaternion
-from rotorid.vehicle.exports import ardupilot_frame
-from rotorid.vehicle.exports import px4 as sih
+from rotorid.vehicle.exports import autopilots
 from rotorid.vehicle.exports.flown import multirotor_of, passive_forces, read_by
 from rotorid.vehicle.exports.forms import FLU, KNOWS, Exported, expressed, parts_of
 from rotorid.vehicle.windows import Inputs, States, plan_windows, simulate_windows
@@ -211,32 +211,25 @@ def by_equations(
 
 def in_sih(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow]) -> list[States]:
     """By the equations of PX4's SIH, from the file's text."""
-    values = sih.values_of(exported.text)
+    values = autopilots.sih_values(exported.text)
     signals = _shares(vehicle, exported, windows, KNOWS["px4-sih"])
-
-    def wrench(signal, velocity, rates):
-        return sih.wrench(values, signal, velocity, rates)
-
-    inertia = sih.inertia_of(values)
+    wrench, inertia = partial(autopilots.sih_wrench, values), autopilots.sih_inertia(values)
     mass, gravity = values["SIH_MASS"], vehicle.gravity_m_s2
-    return by_equations(windows, signals, wrench, mass, inertia, gravity, True, sih.FASTEST_RAD_S)
+    return by_equations(windows, signals, wrench, mass, inertia, gravity, True, autopilots.FASTEST_RAD_S)
 
 
 def in_ardupilot(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow]) -> list[States]:
     """By the equations of ArduPilot's simulated frame, from the file's text."""
-    frame = ardupilot_frame.values_of(exported.text)
-    share = ardupilot_frame.signal(_shares(vehicle, exported, windows, KNOWS["ardupilot-json"]), frame["propExpo"])
-
-    def wrench(signal, velocity, rates):
-        return ardupilot_frame.wrench(frame, signal, velocity, rates)
-
+    frame = autopilots.ardupilot_values(exported.text)
+    share = autopilots.ardupilot_signal(_shares(vehicle, exported, windows, KNOWS["ardupilot-json"]), frame["propExpo"])
+    wrench = partial(autopilots.ardupilot_wrench, frame)
     inertia = np.diag(frame["moment_inertia"])
-    return by_equations(windows, share, wrench, frame["mass"], inertia, ardupilot_frame.GRAVITY, False)
+    return by_equations(windows, share, wrench, frame["mass"], inertia, autopilots.ARDUPILOT_GRAVITY, False)
 
 
 def _shares(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow], knows: frozenset[str]) -> np.ndarray:
     """Shares of full thrust, (w, m, 4), in the tool's order."""
-    full = sih.full_speed_rad_s(vehicle, parts_of(sih.with_drag_of_hover(vehicle), knows))
+    full = autopilots.full_speed_rad_s(vehicle, parts_of(autopilots.with_drag_of_hover(vehicle), knows))
     speed = np.array([w.speed for w in windows])[:, :, list(exported.rotor_order)]
     return (speed / full) ** 2
 

@@ -75,7 +75,8 @@ def swings(vehicle: Vehicle, name: str, seconds: float, flights: int, seed: int,
         raise InputError("seconds must be more than 0 and flights at least 1")
     vehicle, _ = flyable(vehicle)
     steady = hover(vehicle, command_path(vehicle), START_HEIGHT_M)
-    stiffness = min(_STIFFNESS_RAD_S, _LATE_RAD / (_DERIVATIVE_S + _lateness_s(vehicle)))
+    late_s = sum(float(max(values)) for form, values in active_speed_forms(vehicle) if form.stage in (DELAY, LAG))
+    stiffness = min(_STIFFNESS_RAD_S, _LATE_RAD / (_DERIVATIVE_S + late_s))
     # Tilted by the swings a vehicle needs a little more than level.
     tilted = (1 / _MEAN_TILT_COSINE - 1) * vehicle.mass_kg * vehicle.gravity_m_s2
     thrust_n = steady.thrust_n + tilted / steady.gain
@@ -134,11 +135,6 @@ def turned_over(recordings: RecordingSet) -> tuple[str, ...]:
     if not names:
         return ()
     return (f"The vehicle turned over in {', '.join(names)}: its attitude controller does not hold it.",)
-
-
-def _lateness_s(vehicle: Vehicle) -> float:
-    """Delays and time constants between command and rotor speed together, s."""
-    return sum(float(max(values)) for form, values in active_speed_forms(vehicle) if form.stage in (DELAY, LAG))
 
 
 Gains = Sequence[Sequence[float]]

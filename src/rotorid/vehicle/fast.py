@@ -389,14 +389,11 @@ def _block(vehicles: int, rotors: int) -> dict[str, np.ndarray]:
 
 def _spread(part, n: int, threads: int | None) -> None:
     """Call `part(first, last)` on shares of n vehicles, in as many threads as pay."""
-    count = min(_cores() if threads is None else threads, max(n // _LEAST_PER_THREAD, 1))
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    count = min(cores if threads is None else threads, max(n // _LEAST_PER_THREAD, 1))
     if count == 1:
         part(0, n)
         return
     edges = np.linspace(0, n, count + 1).astype(int)
     with ThreadPoolExecutor(count) as pool:
         list(pool.map(part, edges[:-1], edges[1:]))
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

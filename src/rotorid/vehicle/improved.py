@@ -22,7 +22,7 @@ import numpy as np
 from scipy.optimize import brentq, least_squares
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.effects.contract import CURVE, DELAY, LIMIT, Effect, Form, Motion, SetForm, SpeedForm, SpeedPath
+from rotorid.effects.contract import CURVE, DELAY, LIMIT, Form, Motion, SetForm, SpeedForm, SpeedPath
 from rotorid.effects.instant import body_of
 from rotorid.errors import InputError
 from rotorid.recordings.run import RecordingSet
@@ -105,19 +105,16 @@ def all_forms(vehicle: Vehicle) -> list[ActiveForm | _ActiveSpeedForm | _ActiveS
     return [_active(entry, number, vehicle) for number, entry in enumerate(vehicle.effects, 1)]
 
 
-def _forms(effect: Effect, vehicle: Vehicle, wanted: str | None) -> dict[str, Form | SpeedForm | SetForm]:
-    given = effect.form_named(wanted) if wanted else None
-    forms = (*effect.forms(vehicle), *effect.speed_forms, *effect.set_forms(vehicle), *([given] if given else []))
-    return {form.name: form for form in forms}
-
-
 def _active(entry: dict, number: int, vehicle: Vehicle) -> ActiveForm | _ActiveSpeedForm | _ActiveSetForm:
     where = f"vehicle {vehicle.name}: effects entry {number}"
     name = entry.get("id")
     effects = catalogue()
     if name not in effects:
         raise InputError(f"{where} has id {name!r}, expected one of {', '.join(effects)}")
-    forms = _forms(effects[name], vehicle, entry.get("form"))
+    effect = effects[name]
+    named = effect.form_named(entry["form"]) if entry.get("form") else None
+    every = (*effect.forms(vehicle), *effect.speed_forms, *effect.set_forms(vehicle), *([named] if named else []))
+    forms = {form.name: form for form in every}
     wanted = entry.get("form", next(iter(forms)) if len(forms) == 1 else None)
     if wanted not in forms:
         raise InputError(f"{where} ({name}) has form {wanted!r}, expected one of {', '.join(forms)}")
@@ -243,7 +240,8 @@ def flyable(vehicle: Vehicle) -> tuple[Vehicle, tuple[str, ...]]:
     between = [(form, values) for form, values in forms if isinstance(form, SpeedForm)]
     changes: dict = {}
     said: list[str] = []
-    early = [i for i, (form, values) in enumerate(forms) if _is_early(form, values)]
+    delays = [i for i, (form, _) in enumerate(forms) if isinstance(form, SpeedForm) and form.stage == DELAY]
+    early = [i for i in delays if forms[i][1][0] < 0]
     if early:
         changes["effects"] = tuple(e for i, e in enumerate(vehicle.effects) if i not in early)
         said.append(
@@ -263,11 +261,6 @@ def flyable(vehicle: Vehicle) -> tuple[Vehicle, tuple[str, ...]]:
         changes["ground_z_m"] = 0.0
         said.append("The file states no ground_z_m: the ground is taken at z = 0.")
     return vehicle.model_copy(update=changes), tuple(said)
-
-
-def _is_early(form, values) -> bool:
-    """Whether a form is a negative delay of the command."""
-    return isinstance(form, SpeedForm) and form.stage == DELAY and values[0] < 0
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,5 @@
-"""Figures of the bench (calibrations, static, dynamic and tensile tests) and of the stand (clocks, one experiment,
-steady wrenches, weight under tilt, rotor characteristics)."""
+"""Figures of the bench (calibrations, static, dynamic and tensile tests), of the stand (clocks, one experiment,
+steady wrenches, weight under tilt, rotor characteristics) and of public thrust stands (coefficients of rotors)."""
 
 from __future__ import annotations
 
@@ -375,4 +375,66 @@ def characteristic(thrust: pd.DataFrame, torque: pd.DataFrame, laws: Mapping, cu
         axes[2].plot(100 * points["throttle"], points["speed_rad_s"], marker, markersize=2.5, label=label, mfc="none")
     axes[2].set(xlabel="throttle (%)", ylabel="rotor speed (rad/s)")
     axes[2].legend(loc="lower right")
+    return fig
+
+
+def apparent_coefficient(points: pd.DataFrame, pooled: dict[str, dict], names: dict[str, str]) -> Figure:
+    """F/ω² of every steady point against rotor speed, one panel a propeller, with the two pooled forms.
+
+    `points`: columns `propeller`, `run`, `speed_rad_s`, `thrust_n`, `used`. `pooled`: per propeller the C_F through the
+    origin, the C_F with offset and the mean offset (N), keys `origin`, `offset`, `mean_offset_n`. `names`: heading of
+    each panel.
+    """
+    fig, axes = style.figure(4.2, rows=2, columns=2, sharex=True)
+    for axis, (propeller, fits) in zip(axes.flat, pooled.items(), strict=False):
+        mine = points[(points["propeller"] == propeller) & points["used"]]
+        for cells, colour in (("2s", style.BLUE), ("3s", style.ORANGE)):
+            part = mine[mine["run"].str.endswith(cells)]
+            axis.plot(
+                part["speed_rad_s"],
+                1e6 * part["thrust_n"] / part["speed_rad_s"] ** 2,
+                "o",
+                markersize=2.2,
+                color=colour,
+                label={"2s": "7.4 V", "3s": "11.1 V"}[cells],
+            )
+        speed = np.linspace(300, mine["speed_rad_s"].max(), 200)
+        axis.axhline(1e6 * fits["origin"], color=style.BLACK, label="through the origin")
+        bent = 1e6 * (fits["offset"] + fits["mean_offset_n"] / speed**2)
+        axis.plot(speed, bent, color=style.RED, linestyle="--", label="with offset")
+        axis.set_title(names[propeller])
+        axis.set_ylim(0.45 * 1e6 * fits["origin"], 1.3 * 1e6 * fits["origin"])
+    style.label_outer(axes, "rotor speed (rad/s)", r"$F/\omega^2$ ($10^{-6}$ N s²)")
+    axes[1, 0].legend(loc="lower right", ncols=2, markerscale=2)
+    return fig
+
+
+def motors(table: pd.DataFrame, pooled: dict[str, dict], names: dict[str, str]) -> Figure:
+    """C_F of each motor with its interval, and the pooled value with its own; one column a propeller.
+
+    `table`: columns `propeller`, `motor`, `form`, `c_f_n_s2`, `low_95_n_s2`, `high_95_n_s2`, `outlying`. `pooled`: per
+    propeller and form: `value`, `interval_95`, `prediction_95` (N s²). `names`: heading of each panel.
+    """
+    fig, axes = style.figure(2.5, columns=len(names), sharey=True)
+    letters = sorted(table["motor"].unique())
+    for axis, propeller in zip(np.atleast_1d(axes), names, strict=True):
+        for form, colour, shift in (("origin", style.BLACK, -0.15), ("offset", style.RED, 0.15)):
+            part = table[(table["propeller"] == propeller) & (table["form"] == form)]
+            place = np.array([letters.index(m) for m in part["motor"]]) + shift
+            centre = 1e6 * part["c_f_n_s2"].to_numpy()
+            ends = 1e6 * part[["low_95_n_s2", "high_95_n_s2"]].to_numpy()
+            axis.hlines(place, ends[:, 0], ends[:, 1], color=colour, linewidth=0.9)
+            label = {"origin": "through the origin", "offset": "with offset"}[form]
+            axis.plot(centre, place, "o", markersize=3, color=colour, label=label)
+            outlying = (part["outlying"] == "yes").to_numpy()
+            axis.plot(centre[outlying], place[outlying], "o", markersize=8, mfc="none", color=colour)
+            low, high = (1e6 * v for v in pooled[propeller][form]["interval_95"])
+            axis.axvspan(low, high, color=colour, alpha=0.15, linewidth=0)
+        axis.set_title(names[propeller], fontsize=8.5)
+        axis.set_xlabel(r"$C_F$ ($10^{-6}$ N s²)")
+        axis.set_yticks(range(len(letters)), letters)
+    axes = np.atleast_1d(axes)
+    axes[0].set_ylabel("motor")
+    axes[0].set_ylim(len(letters) - 0.5, -0.5)
+    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return fig

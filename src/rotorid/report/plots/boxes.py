@@ -1,5 +1,6 @@
 """Figures of the white box (rotor curves, attitude control), the grey box (networks by epoch, identifiability,
-excitation, errors, validation) and the black box (training, held-out samples, models compared, intervals)."""
+excitation, errors, validation), the black box (training, held-out samples, models compared, intervals) and of
+residuals of the rigid body and NeuroBEM."""
 
 from __future__ import annotations
 
@@ -443,3 +444,55 @@ def effect_rows(effects: dict) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows)
+
+
+def residual_against_airspeed(bins: pd.DataFrame, points: pd.DataFrame) -> Figure:
+    """Residual of each channel against airspeed: samples of the rigid body, its RMS and NeuroBEM's.
+
+    `bins`: columns `model`, `channel`, `airspeed_low_m_s`, `airspeed_high_m_s`, `rms`, `low_95`, `high_95`. `points`:
+    columns `airspeed_m_s` and the six channels: residual of the rigid body (N, N m).
+    """
+    fig, axes = style.figure(4.6, rows=2, columns=3, sharex=True)
+    for axis, (channel, (label, unit)) in zip(axes.flat, style.CHANNELS.items(), strict=True):
+        size = points[channel].abs()
+        axis.plot(points["airspeed_m_s"], size, ".", markersize=1.6, color="#bbbbbb", rasterized=True, zorder=0)
+        for model, colour, name in (
+            ("rigid_body", style.COLOUR["before"], "rigid body, RMS"),
+            ("neurobem", style.COLOUR["after"], "NeuroBEM, RMS"),
+        ):
+            part = bins[(bins["model"] == model) & (bins["channel"] == channel)]
+            middle = (part["airspeed_low_m_s"] + part["airspeed_high_m_s"]) / 2
+            axis.fill_between(middle, part["low_95"], part["high_95"], color=colour, alpha=0.25, linewidth=0)
+            axis.plot(middle, part["rms"], "o-", color=colour, label=name)
+        mine = bins[bins["channel"] == channel]
+        axis.set_ylim(0, 1.15 * max(mine["high_95"].max(), size.quantile(0.99)))
+        axis.set_xlim(0, None)
+        axis.set_ylabel(f"residual of {label} ({unit})")
+    style.label_outer(axes, "airspeed (m/s)")
+    fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
+    return fig
+
+
+def rmse_of_flights(flights: pd.DataFrame) -> Figure:
+    """RMSE of force and moment of each flight: rigid body, NeuroBEM, NeuroBEM with its paper's mass.
+
+    `flights`: columns `flight`, `model`, `force`, `moment`.
+    """
+    fig, axes = style.figure(2.4, columns=2)
+    names = list(dict.fromkeys(flights["flight"]))
+    models = (
+        ("rigid_body", "rigid body", style.COLOUR["before"]),
+        ("neurobem", "NeuroBEM", style.COLOUR["after"]),
+        ("neurobem_paper_mass", "NeuroBEM, its paper's mass", style.SKY),
+    )
+    for axis, (total, unit) in zip(axes, (("force", "N"), ("moment", "N m")), strict=True):
+        for shift, (model, label, colour) in enumerate(models):
+            part = flights[flights["model"] == model].set_index("flight").loc[names, total]
+            places = [n + 0.27 * (shift - 1) for n in range(len(names))]
+            axis.bar(places, part, width=0.25, color=colour, label=label)
+        axis.set_xticks(range(len(names)), [str(n + 1) for n in range(len(names))])
+        axis.set_xlabel("flight")
+        axis.set_ylabel(f"RMSE of the {total} ({unit})")
+        axis.grid(axis="x", visible=False)
+    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return fig

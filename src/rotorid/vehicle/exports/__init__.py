@@ -11,9 +11,8 @@ from difflib import get_close_matches
 from rotorid.errors import InputError
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.exports import forms
-from rotorid.vehicle.exports.ardupilot_frame import ardupilot_json
+from rotorid.vehicle.exports.autopilots import ardupilot_json, px4_sih
 from rotorid.vehicle.exports.forms import Exported, check_exportable
-from rotorid.vehicle.exports.px4 import px4_sih
 
 _SIMULATORS: dict[str, Callable[[Vehicle], Exported]] = {"px4-sih": px4_sih, "ardupilot-json": ardupilot_json}
 NAMES = (*forms.FORMS, *_SIMULATORS)

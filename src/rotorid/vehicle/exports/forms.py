@@ -11,7 +11,7 @@ estimate). A tool that wants more takes nothing from the vehicle: its file is no
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from xml.sax.saxutils import quoteattr
 
@@ -237,6 +237,15 @@ def _take(values: dict, name: str, form: str, p: dict[str, float]) -> bool | str
     return False
 
 
+def _numbers(values: Iterable[float]) -> str:
+    return " ".join(f"{v:.9g}" for v in values)
+
+
+def _comments(left: Iterable[str]) -> str:
+    """What a file does not express, as comments of XML."""
+    return "".join(f"  <!-- Not expressed: {s.replace('--', '- -')} -->\n" for s in left)
+
+
 def _in_flu(inertia: np.ndarray) -> np.ndarray:
     return inertia * np.outer(FLU, FLU)
 
@@ -328,18 +337,18 @@ def mjcf(vehicle: Vehicle) -> Exported:
     added, companions = _companion(vehicle, MUJOCO_FILE, mujoco_companion)
     left += added
     j = _in_flu(parts.inertia)
-    full = " ".join(f"{v:.9g}" for v in (j[0, 0], j[1, 1], j[2, 2], j[0, 1], j[0, 2], j[1, 2]))
+    full = _numbers((j[0, 0], j[1, 1], j[2, 2], j[0, 1], j[0, 2], j[1, 2]))
     limit = parts.limits_rad_s
     dynamics = f' dyntype="filterexact" dynprm="{tau_s:.9g}"' if tau_s > 0 else ""
     sites, motors = [], []
     for i, (place, signed) in enumerate(zip(parts.places, vehicle.yaw_signs(), strict=True), 1):
-        at = " ".join(f"{v:.9g}" for v in place * FLU)
+        at = _numbers(place * FLU)
         ratio = -signed * parts.torque[i - 1] / parts.thrust[i - 1]
-        ends = " ".join(f"{parts.thrust[i - 1] * speed**2:.9g}" for speed in limit) if limit else ""
+        ends = _numbers(parts.thrust[i - 1] * speed**2 for speed in limit) if limit else ""
         most = f' ctrlrange="{ends}"' if limit else ""
         sites.append(f'      <site name="rotor_{i}" pos="{at}"/>')
         motors.append(f'    <general name="rotor_{i}" site="rotor_{i}" gear="0 0 1 0 0 {ratio:.9g}"{most}{dynamics}/>')
-    comments = "".join(f"  <!-- Not expressed: {s.replace('--', '- -')} -->\n" for s in left)
+    comments = _comments(left)
     c_f = ", ".join(f"{v:.6g}" for v in parts.thrust)
     late = "\n  <!-- Thrust follows its control late: set data.act to the first thrust. -->" if tau_s > 0 else ""
     name = quoteattr(vehicle.name)
@@ -420,7 +429,7 @@ def sdf(vehicle: Vehicle) -> Exported:
     radius = vehicle.rotor_radius_m or 0.05
     links, motors = [], []
     for i, (place, signed) in enumerate(zip(parts.places, vehicle.yaw_signs(), strict=True)):
-        at = " ".join(f"{v:.9g}" for v in place * FLU)
+        at = _numbers(place * FLU)
         # A light rotor of its own: its mass is taken off the body's; its inertia is small enough to do nothing.
         spin = 1e-7
         links.append(f"""    <link name="rotor_{i}">
@@ -462,7 +471,7 @@ def sdf(vehicle: Vehicle) -> Exported:
     own = j - spread - 1e-7 * len(parts.places) * np.eye(3)
     inertia = "".join(f"<i{a}{b}>{own['xyz'.index(a), 'xyz'.index(b)]:.9g}</i{a}{b}>"
                       for a, b in ("xx", "yy", "zz", "xy", "xz", "yz"))  # fmt: skip
-    comments = "".join(f"  <!-- Not expressed: {s.replace('--', '- -')} -->\n" for s in left)
+    comments = _comments(left)
     nl = "\n"
     text = f"""<?xml version="1.0"?>
 <sdf version="1.9">
@@ -528,13 +537,13 @@ def _gym_pybullet_drones(vehicle: Vehicle) -> Exported:
     shown = " ".join(f'{k}="{v:.9g}"' for k, v in properties.items())
     links = []
     for k, i in enumerate(order):
-        at = " ".join(f"{v:.9g}" for v in parts.places[i] * FLU)
+        at = _numbers(parts.places[i] * FLU)
         links.append(f"""  <link name="prop{k}_link">
     <inertial><origin rpy="0 0 0" xyz="{at}"/><mass value="0.0"/>
       <inertia ixx="0.0" ixy="0.0" ixz="0.0" iyy="0.0" iyz="0.0" izz="0.0"/></inertial>
   </link>
   <joint name="prop{k}_joint" type="fixed"><parent link="base_link"/><child link="prop{k}_link"/></joint>""")
-    comments = "".join(f"  <!-- Not expressed: {s.replace('--', '- -')} -->\n" for s in left)
+    comments = _comments(left)
     nl = "\n"
     text = f"""<?xml version="1.0" ?>
 <robot name={quoteattr(vehicle.name)}>
