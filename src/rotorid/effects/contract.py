@@ -3,13 +3,10 @@
 An effect is one physical, sensor or logging cause that the rigid-body baseline leaves out. It may have
 several forms that compete inside its id (drag at the hubs or at the centre of mass). A form is a function from
 the flight (`Motion`), the vehicle and parameter values to what it adds (`Contribution`); the contribution is
-linear in every parameter not marked `nonlinear`, which the selection relies on and a test holds.
+linear in every parameter not marked `nonlinear`, which the selection relies on and a test holds. A fault of sensors or
+logging changes the columns of a recorded set (`SetForm`).
 
 Frames: world north-east-down, body forward-right-down. All functions take n instants at once.
-
-Functions compiled to machine code that is kept between runs where there is a place for it.
-
-What faults of sensors and logging do to the columns of a recorded set.
 """
 
 from __future__ import annotations

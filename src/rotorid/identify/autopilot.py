@@ -1,26 +1,19 @@
 """What a flight says of an autopilot's parameters: each with its 95 % interval, or "not determined by this flight".
 
-The thrust curve of the motors, their lag and the hover, from signals of the motors and the accelerometer.
+A motor's signal u is what it is sent as a share of its range, 0 to 1 (the contract's `throttle_i`). By the autopilot's
+own thrust curve, as published, it makes a steady share of the thrust at u = 1 (grams on the Crazyflie); the rotor's
+speed, the root of the thrust, follows with a lag of first order. The accelerometer reads, upward, the thrust over the
+mass, whatever the attitude and the wind. What else moves the thrust is estimated jointly: the voltage of the battery
+(or, where it is not recorded, a drift over the run), the axial speed, the lift of forward flight, and the zero of the
+accelerometer, believed to 0.1 m/s².
 
-The accelerometer reads, upward, the thrust over the mass, whatever the attitude and the wind. Each motor's signal makes
-a steady thrust by the autopilot's own curve; the rotor's speed, its square root, follows with a lag of first order.
-What else moves the thrust is estimated jointly: the voltage of the battery (or, where it is not recorded, a drift over
-the run), the axial speed, the lift of forward flight, and the zero of the accelerometer, believed to 0.1 m/s².
-
-How each autopilot says what thrust a motor's signal makes: its thrust curve, as published.
-
-A motor's signal u is what the motor is sent, as a share of its range, 0 to 1 (the contract's `throttle_i`). A map gives
-the thrust that u makes in the steady state, as a share of the thrust at u = 1; the Crazyflie's gives grams.
-
-Drag by PX4's own law, jointly with a constant wind: EKF2_BCOEF_X, EKF2_BCOEF_Y, EKF2_MCOEF.
-
-PX4's estimator of wind takes the specific force across the rotors' axis as
+Drag is by PX4's own law (EKF2_BCOEF_X, EKF2_BCOEF_Y, EKF2_MCOEF), the specific force across the rotors' axis
 
     a = −½ ρ b |v| v − M √(ρ/1.225) v,   b = |(v_x/B_x, v_y/B_y)| / |(v_x, v_y)|
 
 with v the velocity through the air in body axes. Source: PX4-Autopilot,
 src/modules/ekf2/EKF/aid_sources/drag/drag_fusion.cpp. Its own script for the numbers (mc_wind_estimator_tuning.py)
-takes the air for still; here each run has a wind of its own.
+takes the air for still; here each run has a constant wind of its own.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""From the six cells' forces to the force on the vehicle (thesis 2.4, tables 2.2 and 2.3, eqs 2.3 to 2.9).
+"""The load-cell bench from raw logs to force: readings made ready, calibration, reconstruction, recording sets.
 
-The bench is a cantilever: a force along one axis at a time follows from a sum of moments (x, y) or of the cells'
-forces (z). With loads along several axes at once the six readings do not determine six unknowns (thesis 2.4),
-and the equations are then no more than an attempt. Axes are the vehicle's, z down; forces in newtons.
+The bench is a cantilever (thesis 2.4, tables 2.2 and 2.3, eqs 2.3 to 2.9): a force along one axis at a time follows
+from a sum of moments (x, y) or of the cells' forces (z). With loads along several axes at once the six readings do not
+determine six unknowns, and the equations are then no more than an attempt. Axes are the vehicle's, z down; newtons.
 
-Calibration of the cells from raw logs: readings of known weights, lines, and what a metrologist asks for.
+Of the calibration:
 
 - A reading is the mean of the tared voltage from where it stays steady under the weight to the end (fig. 2.34).
 - Linearity: largest distance of a weight's mean reading from the line. Repeatability: standard deviation of
@@ -13,14 +13,9 @@ Calibration of the cells from raw logs: readings of known weights, lines, and wh
 - Hysteresis needs loads taken off again. The thesis's calibration only puts weights on, so it is not to be
   had from it; the return to zero after a flight (dynamic tests) bounds hysteresis, creep and drift together.
 
-Bench readings made ready: rest reading taken off, spikes out, filtered as the thesis does and without lag.
-
-The quality of a sample is that of `rotorid.io.logs` plus `SPIKE` where a channel jumped and came back.
-
-Static tests that are ready make recording sets of kind `bench`: reconstructed force next to the load that was put on.
-One run holds the loads of one axis and repeat in the order in which they were put on. Its time counts from the first
-recording of the set, so that runs lie where they were in the day; each load has its own recording, tared at its start,
-with a gap in time before the next.
+Static tests that are ready make sets of kind `bench`, the reconstructed force next to the load. A run holds the loads
+of one axis and repeat in their order. Its time counts from the set's first recording, so that runs lie where they were
+in the day; each load has its own recording, tared at its start, with a gap in time before the next.
 """
 
 from __future__ import annotations

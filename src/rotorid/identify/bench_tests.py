@@ -1,19 +1,15 @@
-"""Static tests: what the bench gives for a known load, per platform and axis (thesis 2.8.1, figs 2.42 and 2.45).
+"""Tests of the bench: static ones of known load (thesis 2.8.1, figs 2.42 and 2.45), flights on it (2.8.2, fig. 2.47).
 
-Each recording becomes one point: the mean force while the load was read, by the thesis's equations and, on the
+Each static recording becomes one point: the mean force while the load was read, by the thesis's equations and, on the
 aluminium bench, by the calibration matrix, each with the uncertainty that the calibration and the noise leave.
-
-A full calibration matrix from loads of known direction, next to the thesis's equations.
 
 The thesis reconstructs one axis at a time (eqs 2.6 to 2.8) and says itself that six readings do not determine six
 unknowns. Three of these, the forces, they do determine once it is known how the cells answer to each: voltages of
 loads of known direction give the answer R (6 × 3, V/N), and its weighted pseudo-inverse A = (Rᵀ W R)⁻¹ Rᵀ W gives
 the force of any reading, combined loads included, for as long as the bench answers linearly.
 
-Dynamic tests: a small quadrotor flown on three platforms, three sets (thesis 2.8.2, fig. 2.47).
-
-The pilot flies the same plan on each platform with timing of his own, so the platforms are compared by what
-they agree in whatever the timing: levels held, the largest force, noise at rest, the return to zero.
+In flight the pilot follows the same plan on each of three platforms with timing of his own, so they are compared by
+what they agree in whatever the timing: levels held, the largest force, noise at rest, the return to zero.
 """
 
 from __future__ import annotations

@@ -8,20 +8,16 @@
 - `white_box_effects`: the same with the effects that the stand's recordings show (unequal rotors and torques, shifted
   sensor origin, tilted mount) fitted by least squares.
 
-They are compared on whole experiments held out, with intervals; calibrated prediction intervals and the range of
-validity are here, too.
-
-The 48 dynamics experiments (table A.1) as samples: motor forces, roll, pitch, and the wrench they exert.
-
-A motor's force is read from its throttle through the thrust tests of the same propeller, as the thesis does.
-The two loggers have their own clocks; the wrench is shifted to the throttles by the largest correlation of
-its vertical force with their total thrust. The reading at rest is taken off, which removes the weight.
+They are compared on whole experiments held out, with intervals; there are calibrated prediction intervals and the range
+of validity. Samples are those of the 48 dynamics experiments (table A.1). A motor's force is read from its throttle
+through the thrust tests of the same propeller, as the thesis does. The two loggers have their own clocks; the wrench is
+shifted to the throttles by the largest correlation of its vertical force with their total thrust. The reading at rest
+is taken off, which removes the weight.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -156,23 +152,11 @@ def stand_wrench(vehicle: Vehicle, forces_n: np.ndarray, roll_rad: np.ndarray, p
     return np.concatenate([np.einsum("nij,nj->ni", rotation, force), np.einsum("nij,nj->ni", rotation, moment)], axis=1)
 
 
-@dataclass(frozen=True)
-class _ColumnScale:
-    """Even scaling of columns to 0-1 over the training data, as networks want it."""
-
-    low: np.ndarray
-    high: np.ndarray
-
-    @classmethod
-    def of(cls, values: np.ndarray) -> _ColumnScale:
-        low, high = values.min(axis=0), values.max(axis=0)
-        return cls(low, np.where(high > low, high, low + 1.0))
-
-    def apply(self, values: np.ndarray) -> np.ndarray:
-        return (values - self.low) / (self.high - self.low)
-
-    def back(self, values: np.ndarray) -> np.ndarray:
-        return self.low + values * (self.high - self.low)
+def _range_of(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest value and span of each column, which are scaled to 0-1 by them, as networks want it."""
+    low = values.min(axis=0)
+    span = values.max(axis=0) - low
+    return low, np.where(span > 0, span, 1.0)
 
 
 def fit_thesis_network(
@@ -186,15 +170,15 @@ def fit_thesis_network(
 ) -> tuple[_Predict, np.ndarray, np.ndarray]:
     """The network of thesis 4.4 on a table of `INPUTS` and `OUTPUTS`: its model, and epochs and errors of `train`."""
     x, y = table[list(INPUTS)].to_numpy(), table[list(OUTPUTS)].to_numpy()
-    scale_x, scale_y = _ColumnScale.of(x), _ColumnScale.of(y)
+    (low_x, span_x), (low_y, span_y) = _range_of(x), _range_of(y)
     sizes = (len(INPUTS), *hidden, len(OUTPUTS))
     activations = ("sigmoid",) * len(hidden) + ("linear",)
     network = build(sizes, activations, np.random.default_rng(seed))
     how = Training(rate, epochs, every=every, seed=seed, checkpoint_every=10_000)
-    network, kept, errors = train(network, scale_x.apply(x), scale_y.apply(y), how, checkpoint)
+    network, kept, errors = train(network, (x - low_x) / span_x, (y - low_y) / span_y, how, checkpoint)
 
     def predict(other: pd.DataFrame) -> np.ndarray:
-        return scale_y.back(network(scale_x.apply(other[list(INPUTS)].to_numpy())))
+        return low_y + network((other[list(INPUTS)].to_numpy() - low_x) / span_x) * span_y
 
     return predict, kept, errors
 
@@ -394,8 +378,8 @@ def conformal_coverage(
 def within_training(table: pd.DataFrame) -> Callable[[Sequence[float]], str]:
     """What gives a sentence on one input (6,): inside the training samples, or what lies outside and by how much."""
     values = table[list(INPUTS)].to_numpy()
-    scale = _ColumnScale.of(values)
-    points = scale.apply(values)
+    lowest, span = _range_of(values)
+    points = (values - lowest) / span
     experiments = table["experiment"].to_numpy()
     gap = np.linalg.norm(points[:, None] - points[None], axis=2)
     gap[experiments[:, None] == experiments[None]] = np.inf
@@ -403,10 +387,10 @@ def within_training(table: pd.DataFrame) -> Callable[[Sequence[float]], str]:
     reach = float(np.quantile(gap.min(axis=1), 0.99))
 
     def statement(inputs: Sequence[float]) -> str:
-        scaled = scale.apply(np.asarray(inputs, float))
+        scaled = (np.asarray(inputs, float) - lowest) / span
         outside = [
             f"{_INPUT_NAMES[name]} is {value:.3g}, trained from {low:.3g} to {high:.3g}"
-            for name, value, low, high, s in zip(INPUTS, inputs, scale.low, scale.high, scaled, strict=True)
+            for name, value, low, high, s in zip(INPUTS, inputs, lowest, lowest + span, scaled, strict=True)
             if s < -1e-9 or s > 1 + 1e-9
         ]
         if outside:

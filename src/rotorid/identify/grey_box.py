@@ -1,11 +1,4 @@
-"""Inertias by output error: body rates simulated in windows are brought to the measured ones.
-
-No measured signal is differentiated, so noise of the gyroscope does not bias the estimate. The rates at each
-window's start, and on request a constant moment in each window (slow aerodynamics), are unknowns of that
-window and are projected out; what stays are a few parameters shared by all windows. Their covariance is
-cluster-robust over windows.
-
-Weights of networks that are numbers of physics (thesis 4.3): rotor coefficients and principal inertias.
+"""Rotor coefficients and inertias from flights, as weights of networks (thesis 4.3) or by output error.
 
 - C_F and C_Q by a linear 1-n-1 network without bias (eqs 4.58-4.73).
 - Principal inertias by the masked single-layer network (eqs 4.74-4.80), and by least squares. Both fit
@@ -13,8 +6,12 @@ Weights of networks that are numbers of physics (thesis 4.3): rotor coefficients
 - Six weights describe three inertias, so three relations must hold: w11 = w14 (1/w25 - 1/w36), w22 = w25 (1/w36
   - 1/w14), w33 = w36 (1/w14 - 1/w25). A Wald test asks whether their violation is more than the weights' own
   uncertainty.
+- By output error: body rates simulated in windows are brought to the measured ones. No measured signal is
+  differentiated, so noise of the gyroscope does not bias the estimate. The rates at each window's start, and on request
+  a constant moment in each window (slow aerodynamics), are unknowns of that window and are projected out; what stays
+  are a few parameters shared by all windows. Their covariance is cluster-robust over windows.
 
-Numbers that the thesis prints in chapter 4 and appendix A.1, for comparison: no result of ours rests on them.
+Numbers that the thesis prints are for comparison: no result of ours rests on them.
 """
 
 from __future__ import annotations

@@ -1,26 +1,21 @@
 """Inertias: from an excitation under which all of them show, from real flights, and from a table of components.
 
-An excitation that makes all inertias and gyroscopic terms identifiable: multisines within what motors can do.
-
-Each axis gets its own harmonics of one period (so the axes are orthogonal). Amplitudes, phases and the axes'
-shares are searched from a seed; each candidate is scaled to the largest that keeps every rotor
-within its limits and roll and pitch within a tilt, and judged by the standard errors it promises (worst of
-inertias and gyroscopic weights, each against what is wanted). The search uses the motion without controller:
+The excitation is multisines within what motors can do. Each axis gets its own harmonics of one period (so the axes are
+orthogonal). Amplitudes, phases and the axes' shares are searched from a seed; each candidate is scaled to the largest
+that keeps every rotor within its limits and roll and pitch within a tilt, and judged by the standard errors it promises
+(worst of inertias and gyroscopic weights, each against what is wanted). The search uses the motion without controller:
 rates are integrals of moment over inertia.
 
-Inertias from real flights: the moment of the rotors against the angular acceleration, within a frequency band.
-
-In flight the controller answers every disturbance with a moment of its own, so at low frequency moment and motion are
-tied by the controller as much as by the inertia; at high frequency both readings are noise. Between them lies a band
-where the moment drives the motion. There both sides are still noisy, and no regression knows by how much: taking the
-acceleration as given bounds the inertia from below, <M a> / <a a>, taking the moment as given bounds it from above,
+In real flight the controller answers every disturbance with a moment of its own, so at low frequency moment and motion
+are tied by the controller as much as by the inertia; at high frequency both readings are noise. Between them lies a
+band where the moment drives the motion. There both sides are still noisy, and no regression knows by how much: taking
+the acceleration as given bounds the inertia from below, <M a> / <a a>, taking the moment as given bounds it from above,
 <M M> / <M a> (Frisch). The truth lies between if the noises are independent; the geometric mean is the estimate, and
 the ratio of the bounds is one over the squared correlation.
 
-Mass, centre of mass and inertia of a vehicle from a table of its components, in place of CAD (thesis eq. 4.27).
-
-Each component is a point, a box or a cylinder (axis along z) of even density; its inertia is moved to the
-centre of mass by the theorem of parallel axes. A component with count 4 stands at the four corners (±x, ±y).
+A component of the table (in place of CAD, thesis eq. 4.27) is a point, a box or a cylinder (axis along z) of even
+density; its inertia is moved to the centre of mass by the theorem of parallel axes. One with count 4 stands at the four
+corners (±x, ±y).
 """
 
 from __future__ import annotations

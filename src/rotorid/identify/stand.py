@@ -1,14 +1,12 @@
-"""Steady wrenches of the experiments on the stand: means with intervals, rest reading, weight under tilt.
-
-The throttles alone say where a programme rests, ramps and holds. The sensor stays level and the vehicle is tilted on
-it, so the weight pulls along the sensor's z whatever the tilt; what turns with the vehicle is the arm from the sensor
-to the centre of mass, and with it the weight's moment.
-
-The stand's tests as recording sets of kind `stand`.
+"""The stand's experiments: recording sets of kind `stand`, and steady wrenches with intervals, rest reading, weight.
 
 Two instruments with their own clocks are put on one (`rotorid.identify.clocks`); a run's samples are the wrench
 sensor's, with throttle, speed and voltage interpolated to them. Before and after a programme the vehicle sends nothing:
 its motors stand.
+
+The throttles alone say where a programme rests, ramps and holds. The sensor stays level and the vehicle is tilted on
+it, so the weight pulls along the sensor's z whatever the tilt; what turns with the vehicle is the arm from the sensor
+to the centre of mass, and with it the weight's moment.
 """
 
 from __future__ import annotations

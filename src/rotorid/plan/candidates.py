@@ -1,10 +1,8 @@
-"""Manoeuvres to choose from: pieces that start and end at rest in one place, so that they join in any order.
+"""What a flight or session may ask, as its user states it, and manoeuvres to choose from.
 
-A piece is a reference for position (north-east-down, from the middle of the volume) and yaw, as large as the limits
-allow or a stated share of it. Oscillations of several axes at once have harmonics of their own each, so that they are
-orthogonal over the piece.
-
-What a flight may ask of a vehicle and its room, a session of a stand or bench, as its user states it.
+A manoeuvre's pieces start and end at rest in one place, so that they join in any order. A piece is a reference for
+position (north-east-down, from the middle of the volume) and yaw, as large as the limits allow or a stated share of it.
+Oscillations of several axes at once have harmonics of their own each, so that they are orthogonal over the piece.
 """
 
 from __future__ import annotations

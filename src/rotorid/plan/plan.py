@@ -4,14 +4,11 @@ Every candidate is flown in simulation; one that leaves the limits is out. Then 
 questions and wishes furthest towards their goals for its time is taken, and again, until all are reached or no time is
 left. What the others make needless is dropped. Next to that flight stand the best one without its first manoeuvre and
 the standard flight of the same length. Each is flown once more by every competing model; these predictions are the ones
-stated, and by them the best of the three is the plan.
+stated, and by them the best of the three is the plan, with the widths of the intervals that it will leave.
 
-What a step by hand and a hover after it would separate, predicted as flights are.
-
-Where two propellers are swapped the flight after it is of the same believed vehicle, with the propellers' coefficients
-in other places; with a known mass attached it is of another one (`rotorid.plan.simulate`). A step takes HANDLING_S.
-
-Widths of the intervals that a planned flight will leave, and how large an effect may then be that is not found.
+What a step by hand (HANDLING_S) and a hover after it would separate is predicted as flights are. Where two propellers
+are swapped the flight after it is of the same believed vehicle, with the propellers' coefficients in other places; with
+a known mass attached it is of another one (`rotorid.plan.simulate`).
 """
 
 from __future__ import annotations
@@ -394,13 +391,6 @@ def _share_reached(sigmas: Iterable[float], wished: Iterable[_Width], target_sig
     return float(np.mean(found)) if found else 1.0
 
 
-def _reached(known: FittedSet, base: Information, information: Information, target: float, wishes: dict) -> float:
-    """Share of the way to the goals with the set (`base`) and more, as `share_reached`."""
-    sigmas = [s.sigma for q in known.questions for s in separations(known, q, base, information)]
-    sigmas += [s.sigma for _, own in chain_separations(known, information) for s in own]
-    return _share_reached(sigmas, widths(known, base, information, wishes) if wishes else (), target)
-
-
 @step("choosing")
 def chosen_pieces(
     known: FittedSet,
@@ -413,7 +403,11 @@ def chosen_pieces(
     base = of_set(known)
 
     def share_of(information: Information) -> float:
-        return _reached(known, base, information, limits.target_sigma, wishes or {})
+        """Share of the way to the goals with the set (`base`) and more."""
+        sigmas = [s.sigma for q in known.questions for s in separations(known, q, base, information)]
+        sigmas += [s.sigma for _, own in chain_separations(known, information) for s in own]
+        wished = widths(known, base, information, wishes) if wishes else ()
+        return _share_reached(sigmas, wished, limits.target_sigma)
 
     start = share_of(base)
     judged = [

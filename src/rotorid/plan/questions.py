@@ -6,12 +6,11 @@ the shared linear terms free, in whitened squares as the engine has them. What t
 chain is λ of `rotorid.plan.separation`. Fitted to each manoeuvre apart the rival is freer than over all of them: the
 sum is a lower bound.
 
-Sets of one vehicle judged together, and what of the first's open questions the later ones settled.
-
-Values of the vehicle and effects are held equal in all sets; each run keeps what belongs to a run (a scale of its
-thrust where runs differ beyond doubt, gusts, offsets in time). Runs are named by their set, so that `2-hover` is of the
-second. What the first holds out stays held out; of each other a third is held out. One of fewer than three runs is cut
-for that: runs held out of calm flights say nothing of what a planned flight excites.
+Later sets of the vehicle are judged together with it: values of the vehicle and effects are held equal in all sets;
+each run keeps what belongs to a run (a scale of its thrust where runs differ beyond doubt, gusts, offsets in time).
+Runs are named by their set, so that `2-hover` is of the second. What the first holds out stays held out; of each other
+a third is held out. One of fewer than three runs is cut for that: runs held out of calm flights say nothing of what a
+planned flight excites.
 """
 
 from __future__ import annotations

@@ -1,11 +1,7 @@
-"""From a recording set to the files of its verdict: verdict, page, vehicle, conditions, instruments and ledger.
+"""From a recording set to the files of its verdict, and the verdict as an object of a notebook.
 
-The ledger of a verdict: every rule that decided something, on what, with its numbers and its sentence.
-
-It lies next to the verdict (`ledger.json`), for whoever wants to know why an effect is not in the model, or why its
-status is no higher.
-
-A verdict as an object: its sentence, tables, the improved vehicle, its files, and how a notebook shows it.
+Of the files `ledger.json` has every rule that decided something, on what, with its numbers and its sentence: for
+whoever wants to know why an effect is not in the model, or why its status is no higher.
 """
 
 from __future__ import annotations

@@ -1,17 +1,10 @@
-"""A fleet: verdicts on many sets, their tables and page, and each vehicle over its flights.
+"""A fleet: verdicts on many sets, their tables and page (one HTML file), and each vehicle over its flights.
 
-Tables of a fleet: which sets show which effect, each parameter over time, which verdicts need a person; its page.
-
-The page is one HTML file that needs no other but the verdicts that it links to.
-
-Verdicts on many recording sets in one process: Python starts once, a set that fails costs only itself.
-
-Each set is judged in a process of its own, branched off after everything is imported (which takes milliseconds), so
-that neither a fault nor the memory of one reaches the next. A verdict is remembered by the content of its set and the
-code that judged it: a batch that was broken off, or is cut anew because sets were added, judges nothing twice. A set
-that could not be read, or whose process was killed, is not remembered: another day it may end otherwise.
-
-Each vehicle of a fleet over its flights: what differs since the first ones, and from which flight on.
+Many sets are judged by one process: Python starts once, a set that fails costs only itself. Each is judged in a process
+of its own, branched off after everything is imported (which takes milliseconds), so that neither a fault nor the memory
+of one reaches the next. A verdict is remembered by the content of its set and the code that judged it: a batch that was
+broken off, or is cut anew because sets were added, judges nothing twice. A set that could not be read, or whose process
+was killed, is not remembered: another day it may end otherwise.
 """
 
 from __future__ import annotations

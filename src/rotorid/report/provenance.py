@@ -1,6 +1,4 @@
-"""Where a report came from: versions, commit, configuration, hashes of raw files, date.
-
-The code of the library as part of a rule's identity.
+"""Where a report came from: versions, commit, configuration, hashes of raw files and of code, date.
 
 Snakemake watches a script, not what the script imports. `Code.of` hashes the syntax tree of a script and of
 every module of the library that it reaches, so that a changed formula reruns exactly what uses it, while comments,

@@ -1,11 +1,9 @@
-"""The report: its chapters' text, and from that its two files, by pandoc and typst, both from wheels.
+"""The report: its chapters' text by Jinja2 over pandoc markdown, and its two files by pandoc and typst, from wheels.
 
-A chapter's text: Jinja2 over pandoc markdown, with every number read from a result file.
-
-A chapter's files are known in its text by the names that its rule gives them. A `.json` file is the object in
-it, a `.csv` file the list of its rows, a figure is placed with `figure("name", "caption", kind="...")` and a table with
-`table("name", "caption", columns, kind="...")`; the kind says what it is made of, one of `_MADE_OF`. A name that no
-file gives is an error, so no number goes missing quietly.
+Every number is read from a result file. A chapter's files are known in its text by the names that its rule gives them.
+A `.json` file is the object in it, a `.csv` file the list of its rows, a figure is placed with
+`figure("name", "caption", kind="...")` and a table with `table("name", "caption", columns, kind="...")`; the kind says
+what it is made of, one of `_MADE_OF`. A name that no file gives is an error, so no number goes missing quietly.
 """
 
 from __future__ import annotations

@@ -1,11 +1,7 @@
-"""Flights for a first look at a vehicle: swings in roll, pitch and yaw about hover under an attitude controller.
+"""PID attitude control (thesis eqs 4.29, 4.30, table 4.2), what it follows, and swings for a first look at a vehicle.
 
-The pilot knows the believed vehicle alone. As a pilot does, he finds the throttle that carries what he flies, and turns
-his gains down where the rotors answer more strongly or later than believed.
-
-PID attitude control (thesis eqs 4.29, 4.30, table 4.2); anti-windup and filtered derivative as options.
-
-What an attitude controller is asked to follow: total thrust and Euler angles over time.
+The pilot of these flights knows the believed vehicle alone. As a pilot does, he finds the throttle that carries what he
+flies, and turns his gains down where the rotors answer more strongly or later than believed.
 """
 
 from __future__ import annotations

@@ -1,17 +1,13 @@
-"""Effects switched on in a vehicle file: `effects` of `vehicle.yaml` as catalogue forms with their values.
+"""Effects switched on in a vehicle file: `effects` of `vehicle.yaml` as catalogue forms with values, and its hover.
 
 What adds a wrench or an error of a sensor flies in `simulate_as_stated`, and so does what lies between command and
 rotor speed; `record_as_stated` writes what the sensors of such a flight read, with the faults of sensors and logging.
 
-A vehicle file as a controller can fly it: what the file leaves open is set, what nobody can fly is left out.
-
 A vehicle of a recording may lack what its effects refer to (where the ground is, the rotor speed of the full command),
 and a delay fitted to stamps may be negative. Such a vehicle is flown all the same, and a sentence says each difference.
 
-What a vehicle with its effects must be asked for to hover, found at rest in still air.
-
 A controller that knows the believed vehicle asks for a thrust and moments; a curve between command and speed, a payload
-or unequal rotors make others of them. A pilot trims his vehicle until it hovers level, and so does this.
+or unequal rotors make others of them. A pilot trims his vehicle until it hovers level, and so does `hover`.
 """
 
 from __future__ import annotations

@@ -1,19 +1,14 @@
-"""The bench under a vertical load in the middle of plate D: meshes of one leg, and the leg solved for any material.
+"""One leg of the bench and its load cell, meshed and solved, and what they say of the thesis's sentences (2.5.2).
 
-Under such a load all legs do the same, turned by 120°, so one is enough: on the cut through the plate displacements are
-those of the other cut, turned. Pieces A, B and C end on rectangles of the cells and of the plate and follow them there
-(bonded contact). The order of the pieces: plate D, post C, upper cell, bracket B, lower cell, foot A. Plate D is round
-with a round seat in its middle, on which the tube stands; a third of it belongs to a leg.
+Under a vertical load in the middle of plate D all legs do the same, turned by 120°, so one is enough: on the cut
+through the plate displacements are those of the other cut, turned. Pieces A, B and C end on rectangles of the cells and
+of the plate and follow them there (bonded contact). The order of the pieces: plate D, post C, upper cell, bracket B,
+lower cell, foot A. Plate D is round with a round seat in its middle, on which the tube stands; a third of it belongs to
+a leg.
 
-The load cell: a bar with two holes across, joined by a slot (binocular bending beam), and its bridge of four gauges.
-
+The load cell is a bar with two holes across, joined by a slot (binocular bending beam), and its bridge of four gauges.
 Own frame: x along the bar, from its middle to the end away from the vehicle, y the way of a positive force, z across.
 Alone it is solved as it is calibrated (thesis fig. 2.32): one end clamped, the weight on the other.
-
-What a solved bench says: deformation, equivalent stress, stress in the narrow sections, and what its cells read.
-
-The thesis's four sentences on its simulations (2.5.2) are held to a table of such answers, for benches of different
-sizes.
 """
 
 from __future__ import annotations

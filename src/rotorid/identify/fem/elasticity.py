@@ -1,13 +1,10 @@
-"""Linear elasticity of isotropic bodies on quadratic tetrahedra, with parts bonded to each other.
+"""Linear elasticity of isotropic bodies on quadratic tetrahedra, with parts bonded to each other, and their meshes.
 
-A mesh's unknowns are the displacements of its nodes (corners and middles of edges), first all of x, then all of y, then
-all of z: shape (3 n,). The stiffness is a sum of matrices that hold no material, weighted by Lamé's constants, so that
-another material needs no new integration. What binds nodes is a matrix C with u = C q; solved is CᵀKC q = Cᵀf.
-
-Meshes of tetrahedra made of layers: a triangulated profile that is moved along a path.
-
-Plates, columns and bars with holes across need no mesh generator; the usual ones need libraries of a desktop
-(docs/decisions/0008-finite-elements.md).
+A mesh is layers of tetrahedra: a triangulated profile moved along a path. Plates, columns and bars with holes across
+need no mesh generator; the usual ones need libraries of a desktop (docs/decisions/0008-finite-elements.md). Its
+unknowns are the displacements of its nodes (corners and middles of edges), first all of x, then all of y, then all of
+z: shape (3 n,). The stiffness is a sum of matrices that hold no material, weighted by Lamé's constants, so that another
+material needs no new integration. What binds nodes is a matrix C with u = C q; solved is CᵀKC q = Cᵀf.
 """
 
 from __future__ import annotations

@@ -1,11 +1,8 @@
-"""The tables of the report's chapter: loads, meshes, sizes, the signal chain.
-
-From a cell's strain to the converter's counts (thesis 2.1, 2.2 and 2.7.2).
+"""The tables of the report's chapter: loads, meshes, sizes, the signal chain (thesis 2.1, 2.2, 2.7.2), known answers.
 
 Four active gauges in a full bridge give V = V_e k ε: excitation V_e, gauge factor k, and ε the mean of their strains,
-each with its sign. The ADS1256 resolves V in steps of 2 V_ref / gain / (2²³ - 1).
-
-Problems with a known answer, solved by the same code as the bench: a cantilever, and a plate with a round hole.
+each with its sign. The ADS1256 resolves V in steps of 2 V_ref / gain / (2²³ - 1). Solved by the same code as the bench
+are two problems with a known answer: a cantilever, and a plate with a round hole.
 """
 
 from __future__ import annotations

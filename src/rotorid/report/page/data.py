@@ -1,11 +1,7 @@
-"""The numbers behind the page's figures, small enough to stand in the page.
+"""The numbers behind the page's figures and its replay, small enough to stand in the page.
 
 Series are stored as 16-bit integers times a scale, base64: the page reads them without a library. A long run is thinned
 to every k-th row, and the page says so.
-
-What the page's replay shows: attitude as recorded and as simulated, and the force and moment that a model leaves.
-
-What was measured in each channel, on the instants of the traces: a trace holds only what a model leaves of it.
 """
 
 from __future__ import annotations

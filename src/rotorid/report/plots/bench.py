@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from rotorid.identify.bench_tests import direction
 from rotorid.report.plots import style
 
 if TYPE_CHECKING:
@@ -135,7 +136,7 @@ def methods(points: pd.DataFrame) -> Figure:
     """Loads along several axes at once: reconstructed against applied component, by equations and by matrix."""
     fig, axes = style.figure(2.9, columns=3)
     several = points[points["axis"].str.len() > 1]
-    unit = {axis: _units(axis) for axis in several["axis"].unique()}
+    unit = {axis: direction(axis) for axis in several["axis"].unique()}
     for k, (axis, name) in enumerate(zip(axes, _AXES, strict=True)):
         applied = several["load_n"] * several["axis"].map({label: part[k] for label, part in unit.items()})
         for method, colour, marker, label in (
@@ -150,12 +151,6 @@ def methods(points: pd.DataFrame) -> Figure:
         axis.set(xlabel=f"applied $F_{name}$ (N)", ylabel=f"reconstructed $F_{name}$ (N)")
     fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return fig
-
-
-def _units(axis: str) -> np.ndarray:
-    """Direction of a load of that name, loads along z pull up."""
-    together = np.array([1.0 if "x" in axis else 0.0, 1.0 if "y" in axis else 0.0, -1.0 if "z" in axis else 0.0])
-    return together / np.linalg.norm(together)
 
 
 def dynamic(flights: pd.DataFrame) -> Figure:

@@ -3,8 +3,6 @@
 Those tools have the body forward-left-up: y and z of places change sign, and a rotor that turns counter-clockwise seen
 from above pushes the airframe about minus z.
 
-What other tools ask of a vehicle beyond that it is one: asked before a file for them is made.
-
 Whether a vehicle may be delivered is asked elsewhere (`rotorid.mismatch.delivery.usable`, with room for the error of an
 estimate). A tool that wants more takes nothing from the vehicle: its file is not written, and a sentence says why.
 """
