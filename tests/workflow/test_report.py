@@ -144,11 +144,11 @@ def test_a_figure_that_does_not_fit_lets_the_text_go_on(chapters: list[str]) -> 
     """Before: a page ended half empty."""
     texts = a_chapter([SAID] * 5)
     typst_of(texts)
-    (gap,) = typeset.gaps("report.typ")
-    assert gap.identifier == "fig:tall" and gap.movable and gap.height_pt > 3 * typeset.MOST_EMPTY_PT
+    ((identifier, _, height_pt, movable),) = typeset.gaps("report.typ")
+    assert identifier == "fig:tall" and movable and height_pt > 3 * typeset.MOST_EMPTY_PT
     typeset.without_gaps(typeset.Document(texts, "Title", "Subtitle", PARTS), "report.typ")
-    (gap,) = typeset.gaps("report.typ")
-    assert gap.height_pt < typeset.MOST_EMPTY_PT
+    ((_, _, height_pt, _),) = typeset.gaps("report.typ")
+    assert height_pt < typeset.MOST_EMPTY_PT
     source = Path("report.typ").read_text()
     assert source.count("Some words") == 8 * 9 and source.index("#figure(") > source.index("Some words")
 
@@ -156,9 +156,9 @@ def test_a_figure_that_does_not_fit_lets_the_text_go_on(chapters: list[str]) -> 
 def test_a_figure_right_after_another_is_looked_at_too(chapters: list[str]) -> None:
     texts = a_chapter(["![Second.](tall.svg){#fig:tall-second width=100%}", SAID, SAID], before=1)
     typst_of(texts)
-    first, second = typeset.gaps("report.typ")
-    assert first.height_pt == 0 and not first.movable
-    assert second.height_pt > 2 * typeset.MOST_EMPTY_PT and second.movable
+    (_, _, first_pt, first_movable), (_, _, second_pt, second_movable) = typeset.gaps("report.typ")
+    assert first_pt == 0 and not first_movable
+    assert second_pt > 2 * typeset.MOST_EMPTY_PT and second_movable
 
 
 def test_a_figure_passes_no_heading_and_cuts_no_sentence(chapters: list[str]) -> None:
@@ -167,8 +167,8 @@ def test_a_figure_passes_no_heading_and_cuts_no_sentence(chapters: list[str]) ->
     assert source.index("holds at all speeds.") < source.index("#figure(") < source.rindex("Some words")
     texts = a_chapter(["## Next {#sec:next}", SAID])
     typeset.without_gaps(typeset.Document(texts, "Title", "Subtitle", PARTS), "report.typ")
-    (gap,) = typeset.gaps("report.typ")
-    assert not gap.movable and gap.height_pt > typeset.MOST_EMPTY_PT
+    ((_, _, height_pt, movable),) = typeset.gaps("report.typ")
+    assert not movable and height_pt > typeset.MOST_EMPTY_PT
     source = Path("report.typ").read_text()
     assert source.index("#figure(") < source.index("<sec:next>")
 
