@@ -77,7 +77,8 @@ def judged(first: RecordingSet, second: RecordingSet, ids: tuple[str, ...], trut
 
 def classes_in(found: FittedSet | KnownInstrument) -> list[tuple[str, ...]]:
     """Ids of every class that is open; what is only suggested is compared with nothing and is no class."""
-    classes = [q.ids for q in (*found.questions, *found.chains)] + [ids for ids, _ in found.unanswerable]
+    classes = [q.ids for q in found.questions] + [tuple(m.id for m in chains) for chains in found.chains]
+    classes += [ids for ids, _ in found.unanswerable]
     return [ids for ids in classes if len(ids) > 1 and NOTHING not in ids]
 
 
