@@ -117,25 +117,9 @@ def follow(
 ) -> Lag:
     """Delay with which a signal follows its cause, from their shapes alone.
 
-    signal(t) = a + k cause(t − d − s (t − t̄)) + others(t) b, by Gauss and Newton from the best of a coarse search.
-
-    Parameters
-    ----------
-    time_s
-        Shape (n,), evenly spaced, s.
-    signal, cause
-        Shape (n,), smoothed alike if at all; any unit.
-    largest_s
-        Largest delay looked for, either way, s.
-    others
-        What else the signal depends on at once, shape (n, m).
-    with_skew
-        Whether the delay may grow over time.
-
-    Raises
-    ------
-    InputError
-        A constant cause.
+    signal(t) = a + k cause(t − d − s (t − t̄)) + others(t) b, by Gauss and Newton from the best of a coarse search of
+    delays up to `largest_s` either way. Signal and cause (n,), evenly spaced, are smoothed alike if at all; `others`
+    (n, m) is what else the signal depends on at once. InputError: a constant cause.
     """
     time_s, signal, cause = (np.asarray(v, float) for v in (time_s, signal, cause))
     if np.ptp(cause) == 0:

@@ -143,23 +143,9 @@ def fit_coefficient(
 ) -> _CoefficientFit:
     """C_F of one motor and propeller from its runs, with one offset a run where `offset`.
 
-    Parameters
-    ----------
-    runs
-        Steady points of each run.
-    offset
-        Whether each run has a force offset of its own.
-    speed_noise_relative
-        One-sigma noise of the speed reading, as a share of the speed; 0 for ordinary least squares.
-    least_sd
-        The force (or torque) is never taken as more exact than this, N (N m); where the speed's noise is considered.
-    equal_noise
-        Whether all points are equally noisy; otherwise each has a variance of its own.
-
-    Raises
-    ------
-    InputError
-        Not more points than unknowns.
+    `speed_noise_relative` is the one-sigma noise of the speed reading as a share of the speed, 0 for ordinary least
+    squares; where it is considered the force (or torque) is never taken as more exact than `least_sd`, N (N m). Unless
+    `equal_noise`, each point has a variance of its own. InputError: not more points than unknowns.
     """
     kept = [usable(speed, thrust) for _, speed, thrust in runs]
     speed = np.concatenate([speed[k] for (_, speed, _), k in zip(runs, kept, strict=True)])

@@ -62,25 +62,11 @@ _DATE = re.compile(r"(?<!\d)(20\d\d)[-_]?(0[1-9]|1[0-2])[-_]?(0[1-9]|[12]\d|3[01
 def judge_sets(
     folders: Sequence[Path], code: str, out: Path, memory: Path, progress: Callable[[str], None] = lambda text: None
 ) -> None:
-    """Judge sets: `out/<set>/` each, with the files of its verdict or `failed.json`.
+    """Judge sets of different names: `out/<set>/` each, with the files of its verdict or `failed.json`.
 
-    Parameters
-    ----------
-    folders
-        Folders of the sets; their names must differ.
-    code
-        Hash of the code that judges.
-    out
-        Folder of the results.
-    memory
-        Folder that remembers verdicts by content and code.
-    progress
-        Called with one line a set.
-
-    Raises
-    ------
-    OSError
-        The disk is full, or the like: no fault of a set. What was judged before stays remembered.
+    `memory` is the folder that remembers verdicts by content and `code`, the hash of the code that judges. `progress`
+    gets one line a set. OSError: the disk is full, or the like, no fault of a set; what was judged before stays
+    remembered.
     """
     out.mkdir(parents=True, exist_ok=True)
     places = {folder: memory / code / content_of(folder) for folder in folders}
@@ -174,12 +160,7 @@ def _write_failure(target: Path, reason: str, fault: bool) -> None:
 def collect(folders: Sequence[Path], recordings: Path) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
     """Tables of sets, of effects in sets and of parameters in sets.
 
-    Parameters
-    ----------
-    folders
-        One folder a set, with its verdict or `failed.json`.
-    recordings
-        Folder of the sets themselves, for the names of their vehicles.
+    `folders`: one a set, with its verdict or `failed.json`; `recordings`: that of the sets, for their vehicles' names.
 
     Returns
     -------
@@ -357,16 +338,9 @@ def sets_of_vehicles(
 def history(
     sets: Mapping[str, Sequence[RecordingSet]], good: int, progress: Callable[[str], None] = lambda text: None
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Numbers and events of every vehicle.
+    """Numbers and events of every vehicle, by sets in the order they were flown, of which the first `good` surely are.
 
-    Parameters
-    ----------
-    sets
-        By vehicle, in the order they were flown.
-    good
-        How many of the first sets are surely good.
-    progress
-        Gets one line a vehicle, and one for each set that is left out.
+    `progress` gets one line a vehicle, and one for each set that is left out.
 
     Returns
     -------

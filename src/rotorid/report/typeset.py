@@ -299,20 +299,11 @@ def _value(cell: str) -> float | str | None:
 
 
 def table_of(rows: Sequence[Mapping[str, Any]], caption: str, columns: Sequence[Sequence[str]], label: str) -> str:
-    """A pandoc pipe table.
+    """A pandoc pipe table, with its caption (markdown) and its `label` for references.
 
-    Parameters
-    ----------
-    rows
-        One mapping a row.
-    caption
-        Text above the table, markdown.
-    columns
-        `(key, heading)` or `(key, heading, form)`; `form` is `text`, `name` and `unit` (text that stays on one line; of
-        a unit with its powers raised), `symbol` (`J_xx` set as mathematics), `fixN`, `sciN` or `percentN` with N
-        decimals, or `sigN` with N significant digits.
-    label
-        Identifier for references.
+    `columns`: `(key, heading)` or `(key, heading, form)`; `form` is `text`, `name` and `unit` (text that stays on one
+    line; of a unit with its powers raised), `symbol` (`J_xx` set as mathematics), `fixN`, `sciN` or `percentN` with N
+    decimals, or `sigN` with N significant digits.
     """
     headings = [column[1] for column in columns]
     forms = [column[2] if len(column) > 2 else "text" for column in columns]

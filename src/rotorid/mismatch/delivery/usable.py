@@ -35,7 +35,8 @@ from rotorid.recordings.body import body_of, unfit
 from rotorid.recordings.files import NO_BODY
 from rotorid.steps import step
 from rotorid.vehicle.control import FLIGHTS, SECONDS, SEED, swings, turned_over
-from rotorid.vehicle.exports.forms import FORMS, export_vehicle
+from rotorid.vehicle.exports import export_vehicle
+from rotorid.vehicle.exports.forms import FORMS
 from rotorid.vehicle.improved import command_path, flyable, wrench_at_rest, wrench_of_command
 
 _MOST_HOVER_SHARE = 0.9

@@ -589,20 +589,6 @@ FORMS: dict[str, Callable[[Vehicle], Exported]] = {
 }
 
 
-def check_exportable(vehicle: Vehicle) -> None:
-    """InputError where a vehicle lacks what every form needs."""
-    if vehicle.kind == "bench" or vehicle.mass_kg is None or vehicle.inertia_kg_m2 is None:
-        raise InputError(f"vehicle {vehicle.name}: only a vehicle with mass, inertia and rotors can be exported")
-
-
-def export_vehicle(vehicle: Vehicle, to: str) -> Exported:
-    """The vehicle for another tool, a form of `FORMS`; InputError says why the tool does not take it."""
-    check_exportable(vehicle)
-    if why := refusal(to, vehicle.rotor_count, parts_of(vehicle, KNOWS[to]).inertia):
-        raise InputError(f"{vehicle.name}: {why}")
-    return FORMS[to](vehicle)
-
-
 def refusal(to: str, rotor_count: int, inertia_kg_m2: np.ndarray) -> str:
     """Why the tool of a form does not take a vehicle with this inertia (3, 3); no full stop, empty where it does."""
     if to in _FOUR_ROTORS and rotor_count != 4:
