@@ -22,7 +22,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 import skfem
 
-from rotorid.identify.bench.reconstruct import read_geometry
+from rotorid.identify.bench import read_geometry
 from rotorid.identify.fem import studies
 from rotorid.identify.fem.bench import judge_statements, ratios
 from rotorid.identify.fem.placement import read_assumed, read_moduli
@@ -59,7 +59,7 @@ def measure(mesh: str) -> dict[str, str]:
         rows[what] = f"{own[short]:.3f}"
         rows[f"{what}: range over the sizes"] = " to ".join(f"{end:.2f}" for end in ranges[name])
     for name, found in answers.items():
-        rows[f"eq. 2.8 for one newton, {studies.SHORT[name]}, N"] = f"{found.equation_n:.3f}"
+        rows[f"eq. 2.8 for one newton, {studies.SHORT[name]}, N"] = f"{found['equation_n']:.3f}"
     for row in judge_statements(benches):
         rows[f"{row['statement']}: holds on"] = f"{row['holds']} of {row['benches']}"
     return rows

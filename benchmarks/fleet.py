@@ -27,7 +27,7 @@ from rotorid.recordings import read_set, write_set
 from rotorid.recordings.templates import read
 from rotorid.report.deliver import deliver
 from rotorid.report.fleet import FAILED, FILES
-from rotorid.vehicle.control.swings import swings
+from rotorid.vehicle.control import swings
 from rotorid_proof.concealed import cases
 from rotorid_proof.concealed.build import build
 

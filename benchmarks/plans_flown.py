@@ -20,7 +20,7 @@ import pandas as pd
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "proof"))
 
-from rotorid.plan.limits import Limits, read_limits
+from rotorid.plan.candidates import Limits, read_limits
 from rotorid.plan.plan import Plan, plan
 from rotorid.plan.questions import known_from
 from rotorid.plan.write import write

@@ -22,7 +22,7 @@ from rotorid.mismatch.analyse import analyse
 from rotorid.mismatch.decide.select import Search
 from rotorid.mismatch.decide.status import CLAIMED
 from rotorid.recordings.templates import read
-from rotorid.vehicle.control.swings import swings
+from rotorid.vehicle.control import swings
 from rotorid_proof.peers import sindy
 from rotorid_proof.peers.problem import problem_of
 

@@ -29,7 +29,7 @@ import numpy as np
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.instant import Wrench
 from rotorid.vehicle.batch import Batch
-from rotorid.vehicle.control.pid import AttitudePid, Gains, training_reference
+from rotorid.vehicle.control import AttitudePid, training_reference
 from rotorid.vehicle.improved import active_forms
 from rotorid.vehicle.simulator import Commands, Motors, Start, simulate
 from rotorid.vehicle.windows import Inputs, States, simulate_windows
@@ -43,7 +43,7 @@ AERO = (
     {"id": "axial_inflow", "form": "at the hubs", "parameters": {"k_z": 2.3e-5}},
     {"id": "translational_lift", "form": "at the hubs", "parameters": {"k_h": 3.4e-3}},
 )
-GAINS = Gains((0.25, 0.25, 0.5), (0.0, 0.0, 0.0), (0.04, 0.04, 0.07))
+GAINS = ((0.25, 0.25, 0.5), (0.0, 0.0, 0.0), (0.04, 0.04, 0.07))
 
 
 def everything() -> tuple[dict, ...]:

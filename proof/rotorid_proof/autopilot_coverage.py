@@ -18,8 +18,7 @@ import numpy as np
 import pandas as pd
 from scipy.signal import lfilter
 
-from rotorid.identify.autopilot.parameters import AutopilotParameter, parameters_of
-from rotorid.identify.autopilot.thrust import MAPS, specific_drag
+from rotorid.identify.autopilot import MAPS, AutopilotParameter, parameters_of, specific_drag
 from rotorid.recordings import RecordingSet, Run, Vehicle, templates
 from rotorid.recordings import columns as c
 from rotorid.vehicle.attitude import quaternion_from_euler, rotation_from_quaternion

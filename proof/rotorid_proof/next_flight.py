@@ -77,17 +77,18 @@ def judged(first: RecordingSet, second: RecordingSet, ids: tuple[str, ...], trut
 
 def classes_in(found: FittedSet | KnownInstrument) -> list[tuple[str, ...]]:
     """Ids of every class that is open; what is only suggested is compared with nothing and is no class."""
-    classes = [q.ids for q in (*found.questions, *found.chains)] + [ids for ids, _ in found.unanswerable]
+    classes = [q.ids for q in found.questions] + [tuple(m.id for m in chains) for chains in found.chains]
+    classes += [ids for ids, _ in found.unanswerable]
     return [ids for ids in classes if len(ids) > 1 and NOTHING not in ids]
 
 
 def outcome_of(ids: tuple[str, ...], findings: tuple[Finding, ...], truth: set[str]) -> tuple[str, str]:
     """`right`, `wrong` (also where something untrue of the class is established too) or `open`, and the sentence."""
     (answer,) = answers([ids], findings)
-    if not answer.answer:
-        return "open", answer.sentence
+    if not answer["answer"]:
+        return "open", answer["sentence"]
     named = {f.id for f in findings if f.status == "established" and f.id in ids}
-    return ("right" if named <= truth else "wrong"), answer.sentence
+    return ("right" if named <= truth else "wrong"), answer["sentence"]
 
 
 def predicted(plan: Plan | SessionPlan, ids: tuple[str, ...], truth: set[str]) -> Separation | None:

@@ -221,7 +221,7 @@ def simulate(vehicle: Believed, seconds: float = 20.0, flights: int = 2, seed: i
     The vehicle swings in roll and pitch about hover under an attitude controller; sensors are noisy. The set's own
     vehicle is the one without the effects.
     """
-    from rotorid.vehicle.control.swings import swings
+    from rotorid.vehicle.control import swings
 
     return swings(_vehicle_from(vehicle), "simulated", seconds, flights, seed)
 
@@ -245,9 +245,9 @@ def parameters(data: _Recorded, to: str, vehicle: Believed | None = None, **opti
 
     Returns
     -------
-    tuple of rotorid.identify.autopilot.parameters.AutopilotParameter
+    tuple of rotorid.identify.autopilot.AutopilotParameter
         Each with `value`, `interval_95`, `determined` and `to_set`.
     """
-    from rotorid.identify.autopilot.parameters import parameters_of
+    from rotorid.identify.autopilot import parameters_of
 
     return parameters_of(recording_set(data, vehicle, **options), to)

@@ -10,7 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from rotorid.report import prose, typeset
+from rotorid.errors import InputError
+from rotorid.report import typeset
+from rotorid.report.typeset import render
 from tests.browser import CHROMIUM, Browser
 
 ROOT = Path(__file__).parents[2]
@@ -113,7 +115,7 @@ def test_both_forms_say_on_their_first_page_from_which_commit_they_are(chapters:
 )
 def test_what_leads_nowhere_stops_the_report(chapters: list[str], text: str, message: str) -> None:
     Path("bad.md").write_text(text)
-    with pytest.raises(typeset.TypesetError, match=message):
+    with pytest.raises(InputError, match=message):
         html_of(["bad.md"])
 
 
@@ -142,11 +144,11 @@ def test_a_figure_that_does_not_fit_lets_the_text_go_on(chapters: list[str]) -> 
     """Before: a page ended half empty."""
     texts = a_chapter([SAID] * 5)
     typst_of(texts)
-    (gap,) = typeset.gaps("report.typ")
-    assert gap.identifier == "fig:tall" and gap.movable and gap.height_pt > 3 * typeset.MOST_EMPTY_PT
+    ((identifier, _, height_pt, movable),) = typeset.gaps("report.typ")
+    assert identifier == "fig:tall" and movable and height_pt > 3 * typeset.MOST_EMPTY_PT
     typeset.without_gaps(typeset.Document(texts, "Title", "Subtitle", PARTS), "report.typ")
-    (gap,) = typeset.gaps("report.typ")
-    assert gap.height_pt < typeset.MOST_EMPTY_PT
+    ((_, _, height_pt, _),) = typeset.gaps("report.typ")
+    assert height_pt < typeset.MOST_EMPTY_PT
     source = Path("report.typ").read_text()
     assert source.count("Some words") == 8 * 9 and source.index("#figure(") > source.index("Some words")
 
@@ -154,9 +156,9 @@ def test_a_figure_that_does_not_fit_lets_the_text_go_on(chapters: list[str]) -> 
 def test_a_figure_right_after_another_is_looked_at_too(chapters: list[str]) -> None:
     texts = a_chapter(["![Second.](tall.svg){#fig:tall-second width=100%}", SAID, SAID], before=1)
     typst_of(texts)
-    first, second = typeset.gaps("report.typ")
-    assert first.height_pt == 0 and not first.movable
-    assert second.height_pt > 2 * typeset.MOST_EMPTY_PT and second.movable
+    (_, _, first_pt, first_movable), (_, _, second_pt, second_movable) = typeset.gaps("report.typ")
+    assert first_pt == 0 and not first_movable
+    assert second_pt > 2 * typeset.MOST_EMPTY_PT and second_movable
 
 
 def test_a_figure_passes_no_heading_and_cuts_no_sentence(chapters: list[str]) -> None:
@@ -165,8 +167,8 @@ def test_a_figure_passes_no_heading_and_cuts_no_sentence(chapters: list[str]) ->
     assert source.index("holds at all speeds.") < source.index("#figure(") < source.rindex("Some words")
     texts = a_chapter(["## Next {#sec:next}", SAID])
     typeset.without_gaps(typeset.Document(texts, "Title", "Subtitle", PARTS), "report.typ")
-    (gap,) = typeset.gaps("report.typ")
-    assert not gap.movable and gap.height_pt > typeset.MOST_EMPTY_PT
+    ((_, _, height_pt, movable),) = typeset.gaps("report.typ")
+    assert not movable and height_pt > typeset.MOST_EMPTY_PT
     source = Path("report.typ").read_text()
     assert source.index("#figure(") < source.index("<sec:next>")
 
@@ -218,7 +220,7 @@ def named(chapters: list[str]) -> list[str]:
         "# Third {#sec:third}\n\nRun {{ names[0].name|text }} and {{ names[4].name|text }}.\n\n"
         '{{ table("names", "Names.", [["name", "name", "text"], ["x", "x", "fix0"]], kind="public") }}\n'
     )
-    Path("named.md").write_text(prose.render("three.md", {"names": "names.csv"}))
+    Path("named.md").write_text(render("three.md", {"names": "names.csv"}))
     return ["named.md"]
 
 

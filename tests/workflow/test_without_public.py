@@ -9,7 +9,7 @@ from copied_project import ROOT, Project
 
 from rotorid.io.public_list import read_manifest
 from rotorid.recordings.importers import public_sets
-from rotorid.report import prose
+from rotorid.report.typeset import render
 from workflow.scripts import import_public
 
 NOWHERE = "http://127.0.0.1:9"
@@ -73,7 +73,7 @@ def test_what_to_do_about_missing_files_is_what_helps(
     whole = (ROOT / "notebooks" / "public_recordings.md").read_text()
     part = tmp_path / "public_recordings.md"
     part.write_text(whole[: whole.index("{{ table(")])
-    assert f"To have them: ROTORID\\_PUBLIC\\_DATA {said}" in prose.render(part, {k: str(v) for k, v in files.items()})
+    assert f"To have them: ROTORID\\_PUBLIC\\_DATA {said}" in render(part, {k: str(v) for k, v in files.items()})
 
 
 @pytest.mark.parametrize("available", [True, False])
@@ -83,7 +83,7 @@ def test_the_conclusions_say_of_real_propellers_what_this_report_has(tmp_path: P
     section = tmp_path / "conclusions.md"
     section.write_text(whole[whole.index("{% if propellers") : whole.index("## Can neural")] + "## Next\n")
     (tmp_path / "propellers.json").write_text(json.dumps({"available": available}))
-    text = prose.render(section, {"propellers": str(tmp_path / "propellers.json")})
+    text = render(section, {"propellers": str(tmp_path / "propellers.json")})
     assert ("their thrust is no exact parabola" in text) == available
     assert ("could not be\nobtained (@sec:rotor-coefficients).\n\n## Next" in text) != available
 
@@ -93,7 +93,7 @@ def test_the_chapter_on_changes_says_which_pairs_are_left_out_and_what_is_stored
     found = tmp_path / "found.json"
     found.write_text(json.dumps({"available": False, "reason": reason, "pairs": {}}))
     files = {"found": str(found), "measured": str(ROOT / "docs" / "proof" / "changes_summary.csv")}
-    text = prose.render(ROOT / "notebooks" / "changes.md", files)
+    text = render(ROOT / "notebooks" / "changes.md", files)
     assert "a small weight taped near\nrotor 3" in text and "cut off the propeller" in text
     assert f"**Both pairs are left out here**, because the flights could not be obtained: {reason}." in text
     assert "Nothing changed" not in text and "![" not in text and "drawn pairs in simulators it named all" in text
@@ -110,6 +110,6 @@ def test_the_grey_box_names_real_flights_that_are_left_out(tmp_path: Path, avail
     files["flight_summary"].write_text(json.dumps(summary))
     columns = "set,axis,published,lower,estimate,upper,low_95,high_95,ratio,r2"
     files["flights"].write_text(f"{columns}\nneurobem,xx,1,1,1,1,1,1,1,1\n")
-    text = prose.render(section, {name: str(path) for name, path in files.items()})
+    text = render(section, {name: str(path) for name, path in files.items()})
     assert f"could not be obtained: {missing}." in text
     assert ("| neurobem" in text) == available

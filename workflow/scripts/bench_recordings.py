@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.identify.bench.reconstruct import bench_force, bench_set, read_geometry
+from rotorid.identify.bench import bench_force, bench_set, read_geometry
 from rotorid.io.logs import read_sessions
 from rotorid.recordings import write_set
 from rotorid.report import log

@@ -10,8 +10,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid.identify.bench import loadcell, reconstruct
-from rotorid.identify.bench.loadcell import FLAG_LEVEL
+from rotorid.identify import bench as reconstruct
+from rotorid.identify import loadcell
+from rotorid.identify.loadcell import FLAG_LEVEL
 from rotorid.io.logs import read_sessions
 from rotorid.report import log
 

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid.identify.bench import loadcell
-from rotorid.identify.bench.loadcell import FLAG_LEVEL
+from rotorid.identify import loadcell
+from rotorid.identify.loadcell import FLAG_LEVEL
 from rotorid.report import log
 
 TUBE = "Carbon Fiber Tube"

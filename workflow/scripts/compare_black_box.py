@@ -16,11 +16,11 @@ from rotorid.identify import black_box
 from rotorid.identify.black_box import (
     INPUTS,
     OUTPUTS,
-    TrainingRange,
     conformal_coverage,
     folds,
     out_of_fold,
     scores,
+    within_training,
 )
 from rotorid.recordings import read_vehicle
 from rotorid.report import log
@@ -94,8 +94,8 @@ def main(
         name: {"value": value, "interval_95": [value - width, value + width]}
         for name, value, width in zip(black_box.EFFECT_PARAMETERS, effects.tolist(), half.tolist(), strict=True)
     }
-    span = TrainingRange.of(table)
-    found["statements"] = [{"asked": name, "says": span.statement(values)} for name, values in ASKED.items()]
+    said_of = within_training(table)
+    found["statements"] = [{"asked": name, "says": said_of(values)} for name, values in ASKED.items()]
     found["inputs"] = list(INPUTS)
     pd.DataFrame(rows).to_csv(metrics, index=False, float_format="%.6g")
     frame = table.copy()

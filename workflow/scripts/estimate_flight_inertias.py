@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.identify.excitation import band_signals, fit_flights
+from rotorid.identify.inertias import band_signals, fit_flights
 from rotorid.recordings import read_set
 from rotorid.recordings.importers.faults import read_report
 from rotorid.report import log
@@ -27,7 +27,7 @@ def one_set(folder: Path, band_hz, rate_hz: float, block_s: float, seed: int) ->
     best, found = -np.inf, None
     for delay in DELAYS_S:
         parts = [band_signals(run, vehicle, band_hz, delay, rate_hz) for run in recordings.runs]
-        fits = fit_flights([p for p in parts if p is not None], block_s, np.random.default_rng(seed))
+        fits = fit_flights([p for p in parts if p is not None], rate_hz, block_s, np.random.default_rng(seed))
         score = fits[0]["r2"] + fits[1]["r2"]
         if score > best:
             best, found, chosen = score, fits, delay

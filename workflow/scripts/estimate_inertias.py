@@ -13,7 +13,6 @@ import numpy as np
 import pandas as pd
 
 from rotorid.config import READING_S
-from rotorid.identify.excitation import WINDOW_S, ExcitedHold, Readings, Wanted, design, promised_errors
 from rotorid.identify.grey_box import (
     WEIGHT_NAMES,
     check_consistency,
@@ -23,9 +22,10 @@ from rotorid.identify.grey_box import (
     untied,
     weights_of_inertias,
 )
+from rotorid.identify.inertias import WINDOW_S, ExcitedHold, Readings, design, promised_errors, readings_at_hover
 from rotorid.recordings import read_vehicle
 from rotorid.report import log
-from rotorid.vehicle.control.pid import AttitudePid, training_reference, validation_reference
+from rotorid.vehicle.control import AttitudePid, training_reference, validation_reference
 from rotorid.vehicle.mixer import wrench_matrix
 from rotorid.vehicle.simulator import Disturbance, Motors, Start, simulate
 
@@ -85,9 +85,9 @@ def main(
     """Design, fly, estimate; write results (JSON), one row a draw, the promises and a stretch of the flight (CSV)."""
     vehicle, rng = read_vehicle(Path(vehicle_file)), np.random.default_rng(seed)
     truth = np.diag(vehicle.inertia_kg_m2.matrix())
-    wanted = Wanted(tuple(design_limits_rad_s), np.radians(tilt_deg), tuple(harmonics), period_s)
-    readings = Readings.at_hover(vehicle, rate_noise, speed_noise_relative, 1 / READING_S)
-    multisine, _ = design(vehicle, wanted, readings, candidates, rng)
+    wanted = tuple(design_limits_rad_s), np.radians(tilt_deg), tuple(harmonics), period_s
+    readings = readings_at_hover(vehicle, rate_noise, speed_noise_relative, 1 / READING_S)
+    multisine, _ = design(vehicle, *wanted, readings, candidates, rng)
     push = Disturbance(force_n, moment_n_m, correlation_s)
     lag, hold = Motors(motor_time_s), ExcitedHold(vehicle, multisine, tuple(limits_rad_s))
     start = Start(*(np.zeros((draws, 3)) for _ in range(4)))
@@ -110,10 +110,9 @@ def main(
         read_rates = trace.angular_velocity[draw, ::every] + rate_noise * noise.normal(size=rates.shape)
         windows = cut_windows(read_rates, moments_of(vehicle, read_speeds), READING_S, WINDOW_S)
         guess = np.log(truth * np.array([1.2, 0.85, 1.1]))
-        fit = fit_output_error(windows, tied, guess, moment_noise_n_m=readings.moments_n_m)
-        free = fit_output_error(
-            windows, untied, np.concatenate([guess, np.zeros(3)]), moment_noise_n_m=readings.moments_n_m
-        )
+        fit = fit_output_error(*windows, READING_S, tied, guess, moment_noise_n_m=readings[1])
+        apart = np.concatenate([guess, np.zeros(3)])
+        free = fit_output_error(*windows, READING_S, untied, apart, moment_noise_n_m=readings[1])
         weights, covariance = untied_weights(free)
         agreement = check_consistency(weights, covariance)
         fitted.append((fit, weights, covariance, agreement))

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.identify.bench import static
-from rotorid.identify.bench.reconstruct import CELLS, Geometry, cell_forces, forces, read_geometry
+from rotorid.identify import bench_tests as static
+from rotorid.identify.bench import CELLS, Geometry, cell_forces, forces, read_geometry
 from rotorid.io.logs import by_recording, read_sessions
 from rotorid.report import log
 

@@ -52,7 +52,7 @@ def main(
     found = wrench.fit_weight(evaluated, vehicle.mass_kg, believed, vehicle.gravity_m_s2)
     at_rest = [
         wrench.weights(evaluated, mass, centre, vehicle.gravity_m_s2)
-        for mass, centre in ((vehicle.mass_kg, believed), (found.mass_kg, found.centre_m))
+        for mass, centre in ((vehicle.mass_kg, believed), (found["mass_kg"], found["centre_m"]))
     ]
     table = wrench.table(evaluated, numbers, expected, *at_rest)
     table.to_csv(experiments, index=False, float_format="%.9g")

@@ -6,7 +6,7 @@
 
 import pandas as pd
 
-from rotorid.identify.bench import loadcell
+from rotorid.identify import loadcell
 from rotorid.io.logs import read_sessions
 from rotorid.report import log
 

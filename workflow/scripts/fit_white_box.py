@@ -16,10 +16,10 @@ import pandas as pd
 from scipy.special import stdtr
 
 from rotorid.identify import grey_box
+from rotorid.identify.inertias import compose, read_components
 from rotorid.identify.rotor import (
     COLUMNS,
     LEAST_FORCE_SD_N,
-    Points,
     fit_coefficient,
     sample_noise,
     thrust_points,
@@ -27,14 +27,13 @@ from rotorid.identify.rotor import (
 )
 from rotorid.io.logs import read_sessions
 from rotorid.report import log
-from rotorid.vehicle.mass_properties import compose, read_components
 
 LEAST_TORQUE_SD_N_M = 1e-6
 
 
 def coefficient(points: pd.DataFrame, believed: float, least_sd: float) -> dict:
     """C with its intervals: speed exact, and speed as noisy as its own readings at each point scattered."""
-    run = [Points("tests", points["speed_rad_s"].to_numpy(), points["value"].to_numpy())]
+    run = [("tests", points["speed_rad_s"].to_numpy(), points["value"].to_numpy())]
     plain = fit_coefficient(run, offset=False, equal_noise=True)
     own_noise = fit_coefficient(run, offset=False)
     # The mean of n readings: its speed is uncertain by sd / sqrt(n) as a share of the speed.
@@ -89,14 +88,14 @@ def main(
         )
         if len(points)
     }
-    composed = compose(read_components(components))
+    mass_kg, centre_m, inertia = compose(read_components(components))
     found: dict[str, Any] = {
         **coefficients,
-        "mass_kg": composed.mass_kg,
-        "centre_m": composed.centre_m.tolist(),
-        "inertia_kg_m2": dict(zip(("xx", "yy", "zz"), np.diag(composed.inertia_kg_m2).tolist(), strict=True)),
+        "mass_kg": mass_kg,
+        "centre_m": centre_m.tolist(),
+        "inertia_kg_m2": dict(zip(("xx", "yy", "zz"), np.diag(inertia).tolist(), strict=True)),
         "inertia_difference": {
-            axis: float(composed.inertia_kg_m2[k, k] / grey_box.WHITE_BOX[f"inertia_{axis}_kg_m2"] - 1)
+            axis: float(inertia[k, k] / grey_box.WHITE_BOX[f"inertia_{axis}_kg_m2"] - 1)
             for k, axis in enumerate(("xx", "yy", "zz"))
         },
     }

@@ -11,14 +11,13 @@ from pathlib import Path
 import pandas as pd
 
 from rotorid.report import log
-from rotorid.report.fleet import make_vehicle_page
-from rotorid.report.fleet_history import by_vehicle, history
-from rotorid.report.plots.fleet import draw_history, draw_vehicle
+from rotorid.report.fleet import history, make_vehicle_page, sets_of_vehicles
+from rotorid.report.plots.mismatch import draw_history, draw_vehicle
 
 
 def main(folders: list[str], good: int, numbers: str, events: str, figure: str, pages: str) -> None:
     """Write the history of the vehicles whose sets are in `folders`; the first `good` ones are the reference."""
-    sets = by_vehicle([Path(f) for f in folders], log.progress)
+    sets = sets_of_vehicles([Path(f) for f in folders], log.progress)
     rows, found = history(sets, good, log.progress)
     rows.to_csv(numbers, index=False, float_format="%.6g")
     found.to_csv(events, index=False)

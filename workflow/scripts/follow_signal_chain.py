@@ -12,7 +12,7 @@ import numpy as np
 
 from rotorid.identify.fem import studies
 from rotorid.identify.fem.placement import read_assumed, read_moduli
-from rotorid.identify.fem.studies import from_printed_slope
+from rotorid.identify.fem.studies import printed_slope
 from rotorid.io import wire
 from rotorid.report import log
 
@@ -24,7 +24,7 @@ def main(sizes: str, moduli: str, calibration: str, mesh: str, chain: str, varia
     table = studies.chain_study(assumed, modulus, level["chain"], level["sizes"])
     table.to_csv(variants, index=False, float_format="%.6g")
     cells = json.loads(Path(calibration).read_text(encoding="utf-8"))["cells"]
-    measured = np.array([from_printed_slope(cell["a1_gf_per_10uv"]) for cell in cells])
+    measured = np.array([printed_slope(cell["a1_gf_per_10uv"]) for cell in cells])
     slopes = [cell["a1_gf_per_10uv"] for cell in cells]
     volts, mean = table["volts_per_n"], float(measured.mean())
     needed = studies.ligament_for(assumed.sizes, modulus, mean, level["sizes"])

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 import pandas as pd
 
-from rotorid.identify.bench.reconstruct import Filter, prepare
+from rotorid.identify.bench import Filter, prepare
 from rotorid.io.logs import read_sessions
 from rotorid.report import log
 

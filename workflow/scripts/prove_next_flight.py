@@ -11,7 +11,7 @@ import warnings
 from dataclasses import replace
 from pathlib import Path
 
-from rotorid.plan.limits import Limits, read_limits
+from rotorid.plan.candidates import Limits, read_limits
 from rotorid.plan.plan import plan
 from rotorid.plan.questions import FittedSet, known, known_from
 from rotorid.plan.write import sampled

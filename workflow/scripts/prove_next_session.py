@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.plan.limits import SessionLimits
+from rotorid.plan.candidates import SessionLimits
 from rotorid.plan.session import (
     SessionPlan,
     SessionStep,

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.identify.bench import static
-from rotorid.identify.bench.reconstruct import CELLS, FORCES, line_of, read_geometry
-from rotorid.identify.bench.static import as_dict
+from rotorid.identify import bench_tests as static
+from rotorid.identify.bench import CELLS, FORCES, force_matrix, line_of, read_geometry
+from rotorid.identify.bench_tests import as_dict
 from rotorid.io.logs import read_sessions
 from rotorid.report import log
 
@@ -54,7 +54,7 @@ def main(
     found = {
         "matrix_largest_n": matrix_largest_n,
         "matrix": as_dict(fitted),
-        "equations_matrix": distances.matrix.tolist(),
+        "equations_matrix": force_matrix(distances).tolist(),
         "lateral_as_vertical": static.lateral_as_vertical(fitted, lines, distances),
         "methods": static.methods_compared(table),
     }

@@ -6,12 +6,13 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from rotorid.report import log, prose
+from rotorid.report import log
+from rotorid.report.typeset import not_recorded, render
 
 
 def main(text: str, files: Mapping[str, str], lacking: Sequence[str], index: str, emulated: bool, out: str) -> None:
     """Render `text` with the named `files` to the markdown file `out`; `lacking` kinds are not in the `index`."""
-    rendered = prose.not_recorded(text, lacking, index) if lacking else prose.render(text, files, emulated)
+    rendered = not_recorded(text, lacking, index) if lacking else render(text, files, emulated)
     Path(out).write_text(rendered, encoding="utf-8")
 
 

@@ -12,7 +12,7 @@ import pandas as pd
 
 from rotorid.recordings import read_vehicle
 from rotorid.report import log
-from rotorid.vehicle.control.pid import AttitudePid, training_reference
+from rotorid.vehicle.control import AttitudePid, training_reference
 from rotorid.vehicle.mixer import wrench_matrix
 from rotorid.vehicle.simulator import Disturbance, simulate
 

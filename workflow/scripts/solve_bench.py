@@ -5,12 +5,11 @@
 """
 
 import json
-from dataclasses import asdict
 from pathlib import Path
 
 import pandas as pd
 
-from rotorid.identify.bench.reconstruct import read_geometry
+from rotorid.identify.bench import read_geometry
 from rotorid.identify.fem import studies
 from rotorid.identify.fem.bench import ratios
 from rotorid.identify.fem.placement import read_assumed, read_moduli
@@ -40,7 +39,7 @@ def main(
         "modulus_gpa": {studies.SHORT[name]: value / 1e9 for name, value in modulus.items()},
         "at_largest": series.iloc[-1].to_dict(),
         "ratio": ratios(found),
-        "per_newton": {studies.SHORT[name]: asdict(answers) for name, answers in found.items()},
+        "per_newton": {studies.SHORT[name]: answers for name, answers in found.items()},
         "parts": studies.parts(built, solved),
         "change_of_last_mesh": studies.change_of_last_mesh(table),
     }

@@ -11,7 +11,7 @@ import pandas as pd
 
 from rotorid.report import log
 from rotorid.report.fleet import by_effect, by_vehicle, collect, make_page
-from rotorid.report.plots.fleet import draw_fleet
+from rotorid.report.plots.mismatch import draw_fleet
 
 
 def main(

@@ -16,17 +16,16 @@ import pandas as pd
 from rotorid.io.wire import EXPERIMENTS
 from rotorid.report import log, provenance
 from rotorid.report.plots import style
-from rotorid.report.plots.rule_graph import rule_graph
+from rotorid.report.plots.instruments import rule_graph
 from rotorid.report.provenance import sha256
-from rotorid.vehicle.control.pid import THESIS_GAINS, AttitudeReference, training_reference, validation_reference
+from rotorid.vehicle.control import THESIS_GAINS, AttitudeReference, training_reference, validation_reference
 
 AXES = ("roll", "pitch", "yaw")
 
 
 def gains() -> pd.DataFrame:
     """Gains about each axis."""
-    columns = (THESIS_GAINS.proportional, THESIS_GAINS.integral, THESIS_GAINS.derivative)
-    return pd.DataFrame(list(zip(AXES, *columns, strict=True)), columns=["axis", "k_p", "k_i", "k_d"])
+    return pd.DataFrame(list(zip(AXES, *THESIS_GAINS, strict=True)), columns=["axis", "k_p", "k_i", "k_d"])
 
 
 def reference_rows(reference: AttitudeReference) -> list[dict]:

@@ -33,9 +33,10 @@ def main(
     chosen = np.random.default_rng(seed).choice(len(table), held_out, replace=False)
     mask = np.zeros(len(table), bool)
     mask[chosen] = True
-    predict, trained = fit_thesis_network(table[~mask], epochs, rate, tuple(hidden), seed, checkpoint=Path(checkpoint))
-    errors = pd.DataFrame(trained.mse, columns=list(OUTPUTS))
-    errors.insert(0, "epoch", trained.epochs)
+    how = (epochs, rate, tuple(hidden), seed)
+    predict, kept, mse = fit_thesis_network(table[~mask], *how, checkpoint=Path(checkpoint))
+    errors = pd.DataFrame(mse, columns=list(OUTPUTS))
+    errors.insert(0, "epoch", kept)
     errors.to_csv(history, index=False, float_format="%.6g")
     rows = table[mask].reset_index(drop=True)
     predicted = pd.DataFrame(predict(rows), columns=[f"predicted_{name}" for name in OUTPUTS])

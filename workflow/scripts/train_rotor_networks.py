@@ -14,7 +14,7 @@ import pandas as pd
 from rotorid.identify import grey_box
 from rotorid.identify.grey_box import fit_coefficient_network
 from rotorid.identify.networks import Training
-from rotorid.identify.rotor import Points, fit_coefficient
+from rotorid.identify.rotor import fit_coefficient
 from rotorid.report import log
 
 HISTORY = ["coefficient", "epoch", "mse"]
@@ -33,35 +33,37 @@ def main(
         points = pd.read_csv(path)
         if points.empty:
             continue
-        printed = grey_box.ROTOR_NETWORKS[key]
+        printed, rounding = grey_box.ROTOR_NETWORKS[key]
         speed, value = points["speed_rad_s"].to_numpy(), points["value"].to_numpy()
-        coefficient, scaling, trained = fit_coefficient_network(speed, value, hidden, Training(rate, epochs, seed=seed))
-        squares = fit_coefficient([Points("tests", speed, value)], offset=False)
-        mse = trained.mse[:, 0]
+        coefficient, (k_x, k_d), network, kept, mse = fit_coefficient_network(
+            speed, value, hidden, Training(rate, epochs, seed=seed)
+        )
+        squares = fit_coefficient([("tests", speed, value)], offset=False)
+        mse = mse[:, 0]
         found[name] = {
             "network": coefficient,
             "least_squares": squares.value,
             "interval_95": squares.interval_95,
             "thesis_network": grey_box.GREY_BOX[key],
             "thesis_least_squares": grey_box.WHITE_BOX[key],
-            "thesis_weights": printed.coefficient,
-            "thesis_weights_rounding": printed.rounding,
+            "thesis_weights": printed,
+            "thesis_weights_rounding": rounding,
             "network_inside": squares.interval_95[0] <= coefficient <= squares.interval_95[1],
-            "k_x": scaling.k_x,
-            "k_d": scaling.k_d,
-            "w1": trained.network.weights[0][:, 0].tolist(),
-            "w2": trained.network.weights[1][0].tolist(),
+            "k_x": k_x,
+            "k_d": k_d,
+            "w1": network.weights[0][:, 0].tolist(),
+            "w2": network.weights[1][0].tolist(),
             "final_mse": float(mse[-1]),
             "settled_epoch": int(np.argmax(mse < 2 * mse[-1])),
         }
-        curves.append(pd.DataFrame({"coefficient": name, "epoch": trained.epochs, "mse": mse}))
+        curves.append(pd.DataFrame({"coefficient": name, "epoch": kept, "mse": mse}))
         for size in (1, 2, 4, 8, 16):
             runs = [
-                fit_coefficient_network(speed, value, size, Training(rate, epochs, seed=s, every=5))[2]
+                fit_coefficient_network(speed, value, size, Training(rate, epochs, seed=s, every=5))[3:]
                 for s in range(seed, seed + 8)
             ]
-            middle = np.median([r.mse[:, 0] for r in runs], axis=0)
-            by_size.append(pd.DataFrame({"coefficient": name, "hidden": size, "epoch": runs[0].epochs, "mse": middle}))
+            middle = np.median([mse[:, 0] for _, mse in runs], axis=0)
+            by_size.append(pd.DataFrame({"coefficient": name, "hidden": size, "epoch": runs[0][0], "mse": middle}))
     Path(fits).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     pd.concat(curves[1:] or curves).to_csv(history, index=False, float_format="%.6g")
     pd.concat(by_size[1:] or by_size).to_csv(sizes, index=False, float_format="%.6g")

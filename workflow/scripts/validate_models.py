@@ -12,12 +12,12 @@ import numpy as np
 import pandas as pd
 
 from rotorid.identify import grey_box
-from rotorid.identify.excitation import band_signals, fit_flights
+from rotorid.identify.inertias import band_signals, fit_flights
 from rotorid.recordings import Inertia, Run, Vehicle, read_set, read_vehicle
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.faults import read_report
 from rotorid.report import log
-from rotorid.vehicle.control.pid import AttitudePid, validation_reference
+from rotorid.vehicle.control import AttitudePid, validation_reference
 from rotorid.vehicle.simulator import simulate
 from rotorid.vehicle.windows import Inputs, States, simulate_windows
 
@@ -63,7 +63,7 @@ def real_flights(folder: Path, band_hz, rate_hz: float, block_s: float, delay_s:
         others = [part for name, part in parts.items() if part is not None and name != run.name]
         if parts[run.name] is None or not others:
             continue
-        fits = fit_flights(others, block_s, np.random.default_rng(seed), draws=2)
+        fits = fit_flights(others, rate_hz, block_s, np.random.default_rng(seed), draws=2)
         estimated = np.diag(vehicle.inertia_kg_m2.matrix()).copy()
         # Yaw is kept as published: its band holds no moment that the rotors' speeds explain.
         estimated[:2] = [fits[0]["estimate"], fits[1]["estimate"]]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rotorid.identify.bench.reconstruct import read_geometry
+from rotorid.identify.bench import read_geometry
 from rotorid.identify.fem import studies
 from rotorid.identify.fem.bench import EVEN, MIDDLE, NEARLY, judge_statements
 from rotorid.identify.fem.placement import read_assumed, read_moduli

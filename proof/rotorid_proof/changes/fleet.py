@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, fields
 
 import pandas as pd
 
-from rotorid.report.fleet_history import history
+from rotorid.report.fleet import history
 from rotorid_proof.changes.score import sought_in
 from rotorid_proof.row_by_row import as_read
 

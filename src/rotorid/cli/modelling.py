@@ -24,7 +24,7 @@ from rotorid.io.text.writing import write_texts
 from rotorid.steps import step
 
 if TYPE_CHECKING:
-    from rotorid.identify.autopilot.parameters import AutopilotParameter
+    from rotorid.identify.autopilot import AutopilotParameter
     from rotorid.recordings import Vehicle
 
 
@@ -79,7 +79,7 @@ def _write_model(folder: Path, target: Path, to: str, quiet: bool = True) -> tup
         from rotorid.report.deliver import analysis_of, write_files
         from rotorid.report.next_to_log import next_to_log
         from rotorid.vehicle.exports import export_vehicle
-        from rotorid.vehicle.exports.gazebo_airframe import gazebo_airframe
+        from rotorid.vehicle.exports.autopilots import gazebo_airframe
 
         analysis = analysis_of(recordings)
         files = [target / n for n in ("verdict.json", "report.html", "improved_vehicle.yaml")]
@@ -155,7 +155,7 @@ def fly(
 ) -> Path:
     """Write `flights` simulated flights of a vehicle as the set `folder`; `say` takes what a reader must know."""
     from rotorid.recordings import write_set
-    from rotorid.vehicle.control.swings import remarks, swings, turned_over
+    from rotorid.vehicle.control import remarks, swings, turned_over
 
     for sentence in remarks(vehicle):
         say(sentence)
@@ -225,7 +225,7 @@ def parameters(
     """
     with one_sentence():
         from rotorid.api import parameters as of
-        from rotorid.identify.autopilot.parameters import as_text
+        from rotorid.identify.autopilot import as_text
 
         data = paths[0] if len(paths) == 1 else paths
         found = of(data, to, vehicle=vehicle, mass_kg=mass_kg, like=like, mapping=mapping)

@@ -52,7 +52,7 @@ def plan(
     Example: `rotorid plan flights-verdict --limits room.yaml`
     """
     with one_sentence():
-        from rotorid.plan.limits import Limits, SessionLimits, read_limits
+        from rotorid.plan.candidates import Limits, SessionLimits, read_limits
 
         wishes = _wished(want or [])
         folder, content = _read_verdict(verdict)
@@ -174,10 +174,9 @@ def together(
             files = [target / n for n in ("verdict.json", "report.html", "improved_vehicle.yaml")]
             said = write_files(analysis, *files)
             found = answers(before, analysis.findings)
-            rows = [{"ids": list(a.ids), "answer": a.answer, "sentence": a.sentence} for a in found]
-            write_texts({target / "answers.json": json.dumps(rows, indent=1) + "\n"})
+            write_texts({target / "answers.json": json.dumps(found, indent=1) + "\n"})
         typer.echo(said.sentence)
-        for line in (*notes, *(a.sentence for a in found)):
+        for line in (*notes, *(answer["sentence"] for answer in found)):
             typer.echo(f"  - {line}")
         if not before:
             typer.echo("  - The first set left nothing open.")

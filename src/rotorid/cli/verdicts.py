@@ -239,7 +239,7 @@ def compare(
         if out is not None:
             write_texts({out: text})
         if page is not None:
-            from rotorid.report.page.changes import make_changes_page
+            from rotorid.report.page import make_changes_page
 
             write_texts({page: make_changes_page(found)})
         if as_json:

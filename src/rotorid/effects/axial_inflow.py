@@ -24,11 +24,7 @@ def _independent_of_speed(m, v, p, w):
 def forms(vehicle):
     size = scale(vehicle)
     k_z = Parameter(
-        "k_z",
-        "N s2/(rad m)",
-        0.0,
-        size.drag_per_rotor_speed,
-        meaning="thrust lost per rotor speed and climb speed",
+        "k_z", "N s2/(rad m)", 0.0, size.drag_per_rotor_speed, meaning="thrust lost per rotor speed and climb speed"
     )
     d_z = Parameter("d_z", "N s/m", 0.0, size.drag_per_speed, meaning="thrust lost per climb speed")
     needs = ("velocity", "rotor_speed")

@@ -29,16 +29,7 @@ EFFECT = Effect(
     sentence="all rotors turn slower than commanded as the battery's voltage falls",
     forms=lambda vehicle: (),
     speed_forms=(
-        SpeedForm(
-            "power of voltage",
-            "ω = ω_c (V/V_0)^p",
-            (P,),
-            SUPPLY,
-            power,
-            (0.0,),
-            ("voltage",),
-            "voltage",
-        ),
+        SpeedForm("power of voltage", "ω = ω_c (V/V_0)^p", (P,), SUPPLY, power, (0.0,), ("voltage",), "voltage"),
         SpeedForm(
             "power of voltage, own reference",
             "ω = (1 + g) ω_c (V/V_0)^p",

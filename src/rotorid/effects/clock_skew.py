@@ -6,9 +6,8 @@ reading lies on another clock than what loads it.
 
 import numpy as np
 
-from rotorid.effects.contract import Contribution, Effect, Form, Parameter
+from rotorid.effects.contract import Contribution, Effect, Form, Parameter, late_sensors
 from rotorid.effects.loading import between_samples
-from rotorid.effects.recorded import late_sensors
 
 
 def set_forms(vehicle):

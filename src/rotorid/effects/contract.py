@@ -3,11 +3,10 @@
 An effect is one physical, sensor or logging cause that the rigid-body baseline leaves out. It may have
 several forms that compete inside its id (drag at the hubs or at the centre of mass). A form is a function from
 the flight (`Motion`), the vehicle and parameter values to what it adds (`Contribution`); the contribution is
-linear in every parameter not marked `nonlinear`, which the selection relies on and a test holds.
+linear in every parameter not marked `nonlinear`, which the selection relies on and a test holds. A fault of sensors or
+logging changes the columns of a recorded set (`SetForm`).
 
 Frames: world north-east-down, body forward-right-down. All functions take n instants at once.
-
-Functions compiled to machine code that is kept between runs where there is a place for it.
 """
 
 from __future__ import annotations
@@ -20,11 +19,20 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numba import njit
 
-from rotorid.recordings.run import RecordingSet
+from rotorid.recordings import columns as c
+from rotorid.recordings.run import RecordingSet, Run
 from rotorid.recordings.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from rotorid.effects.loading import InstrumentFacts
+
+VECTORS = {
+    "accelerometer": c.SPECIFIC_FORCE,
+    "gyroscope": c.ANGULAR_VELOCITY,
+    "velocity": c.VELOCITY,
+    "position": c.POSITION,
+}
+"""Sensors that read a vector, with their columns."""
 
 
 @dataclass(frozen=True)
@@ -422,3 +430,47 @@ def compiled(**options: Any) -> Callable[[Callable], Callable]:
             return njit(**options)(function)
 
     return decorated
+
+
+def sensors(vehicle: Vehicle) -> dict[str, tuple[str, ...]]:
+    """Every sensor with its columns."""
+    return {**VECTORS, "attitude": c.QUATERNION, "rotor speeds": c.rotor_columns("rotor_speed", vehicle.rotor_count)}
+
+
+def with_columns(recordings: RecordingSet, names: tuple[str, ...], change: Callable[[Run, np.ndarray], np.ndarray]):
+    """The set with `change(run, values)` (values (n, m) to (n, m)) in place of the named columns where it has them."""
+    runs = []
+    for run in recordings.runs:
+        if run.has(*names):
+            table = run.table.copy()
+            table[list(names)] = change(run, run.array(names).copy())
+            run = Run(run.name, table)
+        runs.append(run)
+    return replace(recordings, runs=tuple(runs))
+
+
+def late(run: Run, values: np.ndarray, late_s: np.ndarray | float) -> np.ndarray:
+    """Columns (n, m) as a sensor writes them whose stamps are late by `late_s`: value at t is that of t - late."""
+    when = run.time_s - late_s
+    return np.stack([np.interp(when, run.time_s, column) for column in values.T], axis=1)
+
+
+def late_sensors(
+    vehicle: Vehicle,
+    equation: str,
+    parameters: tuple[Parameter, ...],
+    example: tuple[float, ...],
+    late_s: Callable[[np.ndarray, np.ndarray], np.ndarray | float],
+) -> tuple[SetForm, ...]:
+    """A form for each sensor whose lateness is `late_s(seconds since the run's start, values)`."""
+
+    def one(sensor: str, names: tuple[str, ...]) -> SetForm:
+        def apply(recordings, values):
+            def change(run, columns):
+                return late(run, columns, late_s(run.time_s - run.time_s[0], values))
+
+            return with_columns(recordings, names, change)
+
+        return SetForm(f"of the {sensor}", equation, parameters, apply, (0.0,) * len(parameters), example, names)
+
+    return tuple(one(sensor, names) for sensor, names in sensors(vehicle).items())

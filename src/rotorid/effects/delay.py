@@ -3,9 +3,8 @@
 import numpy as np
 
 from rotorid.effects.clock_skew import at_other_times
-from rotorid.effects.contract import DELAY, Effect, Form, Parameter, SpeedForm
+from rotorid.effects.contract import DELAY, Effect, Form, Parameter, SpeedForm, late_sensors
 from rotorid.effects.loading import between_samples
-from rotorid.effects.recorded import late_sensors
 
 
 def _later(speed, steps):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import COLUMNS_OF, Effect, Form, Parameter, SetForm, SpeedForm
@@ -27,13 +27,8 @@ EXAMPLE = Vehicle(
     mass_kg=0.652,
     inertia_kg_m2={"xx": 2.489e-3, "yy": 2.5743e-3, "zz": 4.6838e-3},
     rotors=[
-        {"x_m": x, "y_m": y, "spin": spin}
-        for x, y, spin in (
-            (0.0884, 0.0884, "ccw"),
-            (0.0884, -0.0884, "cw"),
-            (-0.0884, -0.0884, "ccw"),
-            (-0.0884, 0.0884, "cw"),
-        )
+        {"x_m": 0.0884 * x, "y_m": 0.0884 * y, "spin": "ccw" if x == y else "cw"}
+        for x, y in ((1, 1), (1, -1), (-1, -1), (-1, 1))
     ],
     thrust_coefficient_n_s2=1.3877e-6,
     torque_coefficient_n_m_s2=1.8558e-8,
@@ -116,15 +111,8 @@ How they are distinguished: [the mismatch stage](mismatch.md).
 """
 
 
-@dataclass(frozen=True)
-class _FormRow:
-    """Forms of one equation: names, equation, parameters and the columns they need."""
-
-    names: tuple[str, ...]
-    equation: str
-    parameters: tuple[Parameter, ...]
-    columns: tuple[str, ...]
-    excited_by: tuple[str, ...]
+_FormRow = tuple[tuple[str, ...], str, tuple[Parameter, ...], tuple[str, ...], tuple[str, ...]]
+"""Forms of one equation: names, equation, parameters, the columns that they need, and what they show with."""
 
 
 def columns_of(form: Form | SpeedForm | SetForm) -> tuple[str, ...]:
@@ -150,7 +138,7 @@ def _reading_rows(effect: Effect) -> list[_FormRow]:
     for form in instrument_forms(effect):
         found.setdefault(form.equation, []).append(form)
     return [
-        _FormRow(
+        (
             tuple(form.name for form in forms),
             equation,
             tuple(dict.fromkeys(p for form in forms for p in form.parameters)),
@@ -168,13 +156,12 @@ def rows(effect: Effect, vehicle: Vehicle = EXAMPLE) -> list[_FormRow]:
         excited = effect.excitation(form) if isinstance(form, Form) else (getattr(form, "excited_by", ""),)
         alike = (re.sub(r"(?<=[_,])\d+", "i", form.equation), len(form.parameters), type(form), form.parameters[0].unit)
         if alike in found and isinstance(form, SetForm | Form):
-            row = found[alike]
-            columns = tuple(dict.fromkeys((*row.columns, *columns_of(form))))
-            found[alike] = _FormRow((*row.names, form.name), alike[0], row.parameters, columns, row.excited_by)
+            names, _, parameters, columns, shows = found[alike]
+            columns = tuple(dict.fromkeys((*columns, *columns_of(form))))
+            found[alike] = (*names, form.name), alike[0], parameters, columns, shows
         else:
-            found[(*alike, form.name) if isinstance(form, SpeedForm) else alike] = _FormRow(
-                (form.name,), form.equation, form.parameters, columns_of(form), tuple(filter(None, excited))
-            )
+            row = (form.name,), form.equation, form.parameters, columns_of(form), tuple(filter(None, excited))
+            found[(*alike, form.name) if isinstance(form, SpeedForm) else alike] = row
     return list(found.values())
 
 
@@ -235,13 +222,12 @@ def in_full(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
     out = [f"{effect.id}: {effect.name} ({_KINDS[effect.kind]})", f"  {effect.sentence}", ""]
     every = [("form", row) for row in rows(effect, vehicle)]
     every += [("on an instrument", row) for row in _reading_rows(effect)]
-    for kind, row in every:
-        out.append(f"  {kind} {_names_text(row.names)}")
-        out.append(f"    {row.equation}")
-        out += [f"    {text}" for text in _parameter_texts(row.parameters)]
-        out.append(f"    columns: {'; '.join(row.columns)}")
-        if row.excited_by:
-            out.append(f"    shows with: {_excitation_text(row.excited_by)}")
+    for kind, (names, equation, parameters, columns, excited) in every:
+        out += [f"  {kind} {_names_text(names)}", f"    {equation}"]
+        out += [f"    {text}" for text in _parameter_texts(parameters)]
+        out.append(f"    columns: {'; '.join(columns)}")
+        if excited:
+            out.append(f"    shows with: {_excitation_text(excited)}")
         out.append("")
     if not every:
         out += [f"  {_formless(effect)}", ""]
@@ -258,18 +244,14 @@ def in_full(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
 def section(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
     """One effect as a section of the page."""
     out = [f"### `{effect.id}`: {effect.name}\n", f"{_KINDS[effect.kind].capitalize()}: {effect.sentence}.\n"]
-    table = [(_names_text(row.names), row) for row in rows(effect, vehicle)]
-    table += [(f"on an instrument: {_names_text(row.names)}", row) for row in _reading_rows(effect)]
+    table = [("", *row) for row in rows(effect, vehicle)]
+    table += [("on an instrument: ", *row) for row in _reading_rows(effect)]
     if table:
         out.append("| form | equation | parameters | columns | shows with |\n| --- | --- | --- | --- | --- |")
-        for names, row in table:
-            cells = (
-                names,
-                row.equation,
-                "<br>".join(_parameter_texts(row.parameters)),
-                "<br>".join(f"`{c}`" if " " not in c else c for c in row.columns),
-                _excitation_text(row.excited_by),
-            )
+        for where, names, equation, parameters, columns, excited in table:
+            needed = "<br>".join(f"`{c}`" if " " not in c else c for c in columns)
+            texts = "<br>".join(_parameter_texts(parameters))
+            cells = (where + _names_text(names), equation, texts, needed, _excitation_text(excited))
             out.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
         out.append("")
     else:

@@ -64,13 +64,7 @@ EFFECT = Effect(
     forms=lambda vehicle: (),
     speed_forms=(
         SpeedForm(
-            "one constant",
-            "dω/dt = (ω_c − ω)/τ",
-            (_tau("tau"),),
-            LAG,
-            _one_constant,
-            (0.0,),
-            excited_by="change",
+            "one constant", "dω/dt = (ω_c − ω)/τ", (_tau("tau"),), LAG, _one_constant, (0.0,), excited_by="change"
         ),
         SpeedForm(
             "up and down",

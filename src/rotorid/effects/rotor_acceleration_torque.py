@@ -16,11 +16,7 @@ def _reaction(m, v, p, w):
 def forms(vehicle):
     return (
         Form(
-            "reaction",
-            "M_z = J_r Σ y_i dω_i/dt",
-            (rotor_inertia(vehicle),),
-            Wrench(_reaction),
-            ("rotor_acceleration",),
+            "reaction", "M_z = J_r Σ y_i dω_i/dt", (rotor_inertia(vehicle),), Wrench(_reaction), ("rotor_acceleration",)
         ),
     )
 

@@ -3,8 +3,7 @@
 Recognised before the physics (rotorid.mismatch.mistakes); it is no wrench.
 """
 
-from rotorid.effects.contract import Effect, Parameter, SetForm
-from rotorid.effects.recorded import with_columns
+from rotorid.effects.contract import Effect, Parameter, SetForm, with_columns
 from rotorid.recordings import columns as c
 
 

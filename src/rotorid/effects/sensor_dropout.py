@@ -5,8 +5,7 @@ Recognised before the physics (rotorid.mismatch.mistakes); it is no wrench.
 
 import numpy as np
 
-from rotorid.effects.contract import Effect, Parameter, SetForm
-from rotorid.effects.recorded import sensors, with_columns
+from rotorid.effects.contract import Effect, Parameter, SetForm, sensors, with_columns
 from rotorid.recordings import columns as c
 
 _WINDOW = (

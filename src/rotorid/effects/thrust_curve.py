@@ -49,21 +49,8 @@ def forms(vehicle):
     c2 = Parameter(SQUARE, "N s2/rad2", -0.8 * thrust / speed**2, thrust / speed**2, meaning="squared term beyond C_F")
     always = ("always",)
     return (
-        Form(
-            "linear term",
-            "T_i = C_F ω_i² + c_1 ω_i",
-            (c1,),
-            Wrench(_polynomial, _powers(1)),
-            needs,
-        ),
-        Form(
-            "constant term",
-            "T_i = C_F ω_i² + c_0",
-            (c0,),
-            Wrench(_polynomial, _powers(0)),
-            needs,
-            excited_by=always,
-        ),
+        Form("linear term", "T_i = C_F ω_i² + c_1 ω_i", (c1,), Wrench(_polynomial, _powers(1)), needs),
+        Form("constant term", "T_i = C_F ω_i² + c_0", (c0,), Wrench(_polynomial, _powers(0)), needs, excited_by=always),
         Form(
             "linear and constant",
             "T_i = C_F ω_i² + c_1 ω_i + c_0",
@@ -89,13 +76,7 @@ def forms(vehicle):
             must_show=(0, 1),
             excited_by=always,
         ),
-        Form(
-            "cubic term",
-            "T_i = C_F ω_i² + c_3 ω_i³",
-            (c3,),
-            Wrench(_polynomial, _powers(3)),
-            needs,
-        ),
+        Form("cubic term", "T_i = C_F ω_i² + c_3 ω_i³", (c3,), Wrench(_polynomial, _powers(3)), needs),
     )
 
 

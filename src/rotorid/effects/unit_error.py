@@ -5,8 +5,7 @@ Recognised before the physics (rotorid.mismatch.mistakes); it is no wrench.
 
 import numpy as np
 
-from rotorid.effects.contract import Effect, Parameter, SetForm
-from rotorid.effects.recorded import with_columns
+from rotorid.effects.contract import Effect, Parameter, SetForm, with_columns
 from rotorid.recordings import columns as c
 
 

@@ -1,18 +1,17 @@
 """Parameters from measurements of known things: bench, stand, rotor, estimates, networks, finite elements."""
 
 OPEN = (
-    "autopilot.parameters",
-    "autopilot.thrust",
-    "bench.loadcell",
-    "bench.reconstruct",
-    "bench.static",
+    "autopilot",
+    "bench",
+    "bench_tests",
     "black_box",
     "clocks",
-    "excitation",
     "fem.bench",
     "fem.placement",
     "fem.studies",
     "grey_box",
+    "inertias",
+    "loadcell",
     "networks",
     "rigid_body_residuals",
     "rotor",

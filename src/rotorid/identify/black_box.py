@@ -8,20 +8,16 @@
 - `white_box_effects`: the same with the effects that the stand's recordings show (unequal rotors and torques, shifted
   sensor origin, tilted mount) fitted by least squares.
 
-They are compared on whole experiments held out, with intervals; calibrated prediction intervals and the range of
-validity are here, too.
-
-The 48 dynamics experiments (table A.1) as samples: motor forces, roll, pitch, and the wrench they exert.
-
-A motor's force is read from its throttle through the thrust tests of the same propeller, as the thesis does.
-The two loggers have their own clocks; the wrench is shifted to the throttles by the largest correlation of
-its vertical force with their total thrust. The reading at rest is taken off, which removes the weight.
+They are compared on whole experiments held out, with intervals; there are calibrated prediction intervals and the range
+of validity. Samples are those of the 48 dynamics experiments (table A.1). A motor's force is read from its throttle
+through the thrust tests of the same propeller, as the thesis does. The two loggers have their own clocks; the wrench is
+shifted to the throttles by the largest correlation of its vertical force with their total thrust. The reading at rest
+is taken off, which removes the weight.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +26,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import least_squares
 
 from rotorid.errors import InputError
-from rotorid.identify.networks import Trained, Training, build, train
+from rotorid.identify.networks import Training, build, train
 from rotorid.io.logs import by_recording
 from rotorid.io.wire import EXPERIMENTS
 from rotorid.recordings.vehicle import Vehicle
@@ -93,26 +89,16 @@ def samples_of(number: int, quadrotor: pd.DataFrame, wrench: pd.DataFrame, curve
     shift = _shift(grid, total, when, -values[:, 2])
     felt = np.column_stack([np.interp(grid + shift, when, v) for v in values.T])
     if experiment.signal == "trapezoidal":
-        flat = np.flatnonzero(total > 0.99 * total.max())
-        flat = flat[60:-60]
-        blocks = np.array_split(flat, PLATEAU_BLOCKS)
+        blocks = np.array_split(np.flatnonzero(total > 0.99 * total.max())[60:-60], PLATEAU_BLOCKS)
     else:
         active = np.flatnonzero(total > 0.02 * total.max())
         blocks = np.array_split(active, max(SINE_BLOCKS * 3, 1))[::3]
-    rows = []
-    for sample, block in enumerate(blocks, 1):
-        if len(block) == 0:
-            continue
-        rows.append(
-            [
-                number,
-                sample,
-                *forces[block].mean(axis=0),
-                np.radians(experiment.roll_deg),
-                np.radians(experiment.pitch_deg),
-                *felt[block].mean(axis=0),
-            ]
-        )
+    tilt = np.radians([experiment.roll_deg, experiment.pitch_deg])
+    rows = [
+        [number, sample, *forces[block].mean(axis=0), *tilt, *felt[block].mean(axis=0)]
+        for sample, block in enumerate(blocks, 1)
+        if len(block)
+    ]
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
@@ -162,29 +148,15 @@ def stand_wrench(vehicle: Vehicle, forces_n: np.ndarray, roll_rad: np.ndarray, p
     force = np.zeros((len(forces_n), 3))
     force[:, 2] = -body[:, 0]
     moment = body[:, 1:] - np.cross(np.asarray(vehicle.sensor_position_m)[None], force)
-    from rotorid.vehicle.attitude import quaternion_from_euler, rotation_from_quaternion
-
     rotation = rotation_from_quaternion(quaternion_from_euler(np.stack([roll_rad, pitch_rad, 0 * roll_rad], axis=-1)))
     return np.concatenate([np.einsum("nij,nj->ni", rotation, force), np.einsum("nij,nj->ni", rotation, moment)], axis=1)
 
 
-@dataclass(frozen=True)
-class _ColumnScale:
-    """Even scaling of columns to 0-1 over the training data, as networks want it."""
-
-    low: np.ndarray
-    high: np.ndarray
-
-    @classmethod
-    def of(cls, values: np.ndarray) -> _ColumnScale:
-        low, high = values.min(axis=0), values.max(axis=0)
-        return cls(low, np.where(high > low, high, low + 1.0))
-
-    def apply(self, values: np.ndarray) -> np.ndarray:
-        return (values - self.low) / (self.high - self.low)
-
-    def back(self, values: np.ndarray) -> np.ndarray:
-        return self.low + values * (self.high - self.low)
+def _range_of(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest value and span of each column, which are scaled to 0-1 by them, as networks want it."""
+    low = values.min(axis=0)
+    span = values.max(axis=0) - low
+    return low, np.where(span > 0, span, 1.0)
 
 
 def fit_thesis_network(
@@ -195,20 +167,20 @@ def fit_thesis_network(
     seed: int = 0,
     every: int = 10,
     checkpoint: Path | None = None,
-) -> tuple[_Predict, Trained]:
-    """Train the network of thesis 4.4 on a table with `INPUTS` and `OUTPUTS`."""
+) -> tuple[_Predict, np.ndarray, np.ndarray]:
+    """The network of thesis 4.4 on a table of `INPUTS` and `OUTPUTS`: its model, and epochs and errors of `train`."""
     x, y = table[list(INPUTS)].to_numpy(), table[list(OUTPUTS)].to_numpy()
-    scale_x, scale_y = _ColumnScale.of(x), _ColumnScale.of(y)
+    (low_x, span_x), (low_y, span_y) = _range_of(x), _range_of(y)
     sizes = (len(INPUTS), *hidden, len(OUTPUTS))
     activations = ("sigmoid",) * len(hidden) + ("linear",)
     network = build(sizes, activations, np.random.default_rng(seed))
     how = Training(rate, epochs, every=every, seed=seed, checkpoint_every=10_000)
-    trained = train(network, scale_x.apply(x), scale_y.apply(y), how, checkpoint)
+    network, kept, errors = train(network, (x - low_x) / span_x, (y - low_y) / span_y, how, checkpoint)
 
     def predict(other: pd.DataFrame) -> np.ndarray:
-        return scale_y.back(trained.network(scale_x.apply(other[list(INPUTS)].to_numpy())))
+        return low_y + network((other[list(INPUTS)].to_numpy() - low_x) / span_x) * span_y
 
-    return predict, trained
+    return predict, kept, errors
 
 
 def fit_linear(table: pd.DataFrame) -> _Predict:
@@ -223,14 +195,8 @@ def _physical_features(table: pd.DataFrame) -> np.ndarray:
     """Each motor's force times 1, sin and cos of roll and pitch and their product, (n, 24)."""
     forces = table[list(INPUTS[:4])].to_numpy()
     roll, pitch = table["roll_rad"].to_numpy(), table["pitch_rad"].to_numpy()
-    ways = [
-        np.ones(len(table)),
-        np.sin(roll),
-        np.cos(roll) - 1,
-        np.sin(pitch),
-        np.cos(pitch) - 1,
-        np.sin(roll) * np.sin(pitch),
-    ]
+    ways = [np.ones(len(table)), np.sin(roll), np.cos(roll) - 1, np.sin(pitch), np.cos(pitch) - 1]
+    ways.append(np.sin(roll) * np.sin(pitch))
     return np.concatenate([forces * way[:, None] for way in ways], axis=1)
 
 
@@ -270,10 +236,7 @@ def fit_boosting(table: pd.DataFrame, seed: int = 0) -> _Predict:
 
 def white_box(vehicle: Vehicle) -> _Predict:
     return lambda other: stand_wrench(
-        vehicle,
-        other[list(INPUTS[:4])].to_numpy(),
-        other["roll_rad"].to_numpy(),
-        other["pitch_rad"].to_numpy(),
+        vehicle, other[list(INPUTS[:4])].to_numpy(), other["roll_rad"].to_numpy(), other["pitch_rad"].to_numpy()
     )
 
 
@@ -412,39 +375,32 @@ def conformal_coverage(
     return conformal_half_width(error, experiments, share), inside.mean(axis=0)
 
 
-@dataclass(frozen=True)
-class TrainingRange:
-    """Where the training samples lie; says when an input is outside."""
+def within_training(table: pd.DataFrame) -> Callable[[Sequence[float]], str]:
+    """What gives a sentence on one input (6,): inside the training samples, or what lies outside and by how much."""
+    values = table[list(INPUTS)].to_numpy()
+    lowest, span = _range_of(values)
+    points = (values - lowest) / span
+    experiments = table["experiment"].to_numpy()
+    gap = np.linalg.norm(points[:, None] - points[None], axis=2)
+    gap[experiments[:, None] == experiments[None]] = np.inf
+    # Distance to the nearest sample of another experiment within which 99 % of the training samples lie.
+    reach = float(np.quantile(gap.min(axis=1), 0.99))
 
-    scale: _ColumnScale
-    points: np.ndarray
-    reach: float
-    """Distance to the nearest other experiment's sample within which 99 % of the training samples lie, scaled."""
-
-    @classmethod
-    def of(cls, table: pd.DataFrame) -> TrainingRange:
-        values = table[list(INPUTS)].to_numpy()
-        scale = _ColumnScale.of(values)
-        points = scale.apply(values)
-        experiments = table["experiment"].to_numpy()
-        gap = np.linalg.norm(points[:, None] - points[None], axis=2)
-        gap[experiments[:, None] == experiments[None]] = np.inf
-        return cls(scale, points, float(np.quantile(gap.min(axis=1), 0.99)))
-
-    def statement(self, inputs: np.ndarray) -> str:
-        """A sentence for one input (6,): inside, or what lies outside and by how much."""
-        scaled = self.scale.apply(np.asarray(inputs, float))
+    def statement(inputs: Sequence[float]) -> str:
+        scaled = (np.asarray(inputs, float) - lowest) / span
         outside = [
             f"{_INPUT_NAMES[name]} is {value:.3g}, trained from {low:.3g} to {high:.3g}"
-            for name, value, low, high, s in zip(INPUTS, inputs, self.scale.low, self.scale.high, scaled, strict=True)
+            for name, value, low, high, s in zip(INPUTS, inputs, lowest, lowest + span, scaled, strict=True)
             if s < -1e-9 or s > 1 + 1e-9
         ]
         if outside:
             return "outside the training range: " + "; ".join(outside)
-        distance = float(np.min(np.linalg.norm(self.points - scaled, axis=1)))
-        if distance > self.reach:
+        distance = float(np.min(np.linalg.norm(points - scaled, axis=1)))
+        if distance > reach:
             return (
                 f"outside the training data: no such combination was trained (nearest sample {distance:.2f} of the "
-                f"range away, {self.reach:.2f} is usual)"
+                f"range away, {reach:.2f} is usual)"
             )
         return "inside the training range"
+
+    return statement

@@ -41,21 +41,8 @@ _CURRENT_POWER = 1.5
 THROTTLES = tuple(f"throttle_{i}" for i in (1, 2, 3, 4))
 
 
-@dataclass(frozen=True)
-class _ClockLine:
-    """host = offset_s + rate * device."""
-
-    offset_s: float
-    rate: float
-    """Host seconds per device second."""
-
-    def host(self, device_s: np.ndarray) -> np.ndarray:
-        """Host time, s, at which the device took its samples."""
-        return self.offset_s + self.rate * np.asarray(device_s, float)
-
-
-def lower_edge(device_s: np.ndarray, host_s: np.ndarray, largest_error: float) -> _ClockLine:
-    """The line below all samples that lies closest to them.
+def lower_edge(device_s: np.ndarray, host_s: np.ndarray, largest_error: float) -> tuple[float, float]:
+    """Offset, s, and rate of the line host = offset + rate · device below all samples that lies closest to them.
 
     Of all lines that no sample lies below, and whose rate is within 1 ± `largest_error`, the one with the
     smallest mean distance; it touches the lower convex hull where the samples' mean time lies.
@@ -73,7 +60,7 @@ def lower_edge(device_s: np.ndarray, host_s: np.ndarray, largest_error: float) -
     slope = ((y - x)[right] - (y - x)[left]) / (x[right] - x[left])
     slope = float(np.clip(slope, -largest_error, largest_error))
     offset = float(np.min(y - x - slope * x))
-    return _ClockLine(offset, 1 + slope)
+    return offset, 1 + slope
 
 
 def device_time(time_s: np.ndarray, seen_s: np.ndarray, host_s: np.ndarray) -> np.ndarray:
@@ -81,12 +68,8 @@ def device_time(time_s: np.ndarray, seen_s: np.ndarray, host_s: np.ndarray) -> n
 
     Of a batch that the host sees at once, the last sample counts.
 
-    Parameters
-    ----------
-    time_s, seen_s
-        Shape (n,): the device's time of each sample, and the host's time when it was read.
-    host_s
-        Times of the host, any shape; beyond the samples the first or last device time is given.
+    `time_s`, `seen_s`: shape (n,): the device's time of each sample, and the host's time when it was read. `host_s`:
+    times of the host, any shape; beyond the samples the first or last device time is given.
     """
     latest = pd.Series(np.asarray(time_s, float)).groupby(np.asarray(seen_s, float)).max()
     return np.interp(host_s, latest.index, latest)
@@ -134,25 +117,9 @@ def follow(
 ) -> Lag:
     """Delay with which a signal follows its cause, from their shapes alone.
 
-    signal(t) = a + k cause(t − d − s (t − t̄)) + others(t) b, by Gauss and Newton from the best of a coarse search.
-
-    Parameters
-    ----------
-    time_s
-        Shape (n,), evenly spaced, s.
-    signal, cause
-        Shape (n,), smoothed alike if at all; any unit.
-    largest_s
-        Largest delay looked for, either way, s.
-    others
-        What else the signal depends on at once, shape (n, m).
-    with_skew
-        Whether the delay may grow over time.
-
-    Raises
-    ------
-    InputError
-        A constant cause.
+    signal(t) = a + k cause(t − d − s (t − t̄)) + others(t) b, by Gauss and Newton from the best of a coarse search of
+    delays up to `largest_s` either way. Signal and cause (n,), evenly spaced, are smoothed alike if at all; `others`
+    (n, m) is what else the signal depends on at once. InputError: a constant cause.
     """
     time_s, signal, cause = (np.asarray(v, float) for v in (time_s, signal, cause))
     if np.ptp(cause) == 0:
@@ -234,8 +201,9 @@ class Pair:
 
 def _on_host(table: pd.DataFrame, largest_error: float) -> tuple[pd.DataFrame, float]:
     """The table with `host_s`, when its samples were taken by the host's clock, and the device clock's rate."""
-    line = lower_edge(table["time_s"].to_numpy(), table["host_time_s"].to_numpy(), largest_error)
-    return table.assign(host_s=line.host(table["time_s"].to_numpy())), line.rate
+    taken = table["time_s"].to_numpy(float)
+    offset_s, rate = lower_edge(taken, table["host_time_s"].to_numpy(), largest_error)
+    return table.assign(host_s=offset_s + rate * taken), rate
 
 
 def both_on_host(

@@ -1,11 +1,4 @@
-"""Inertias by output error: body rates simulated in windows are brought to the measured ones.
-
-No measured signal is differentiated, so noise of the gyroscope does not bias the estimate. The rates at each
-window's start, and on request a constant moment in each window (slow aerodynamics), are unknowns of that
-window and are projected out; what stays are a few parameters shared by all windows. Their covariance is
-cluster-robust over windows.
-
-Weights of networks that are numbers of physics (thesis 4.3): rotor coefficients and principal inertias.
+"""Rotor coefficients and inertias from flights, as weights of networks (thesis 4.3) or by output error.
 
 - C_F and C_Q by a linear 1-n-1 network without bias (eqs 4.58-4.73).
 - Principal inertias by the masked single-layer network (eqs 4.74-4.80), and by least squares. Both fit
@@ -13,8 +6,12 @@ Weights of networks that are numbers of physics (thesis 4.3): rotor coefficients
 - Six weights describe three inertias, so three relations must hold: w11 = w14 (1/w25 - 1/w36), w22 = w25 (1/w36
   - 1/w14), w33 = w36 (1/w14 - 1/w25). A Wald test asks whether their violation is more than the weights' own
   uncertainty.
+- By output error: body rates simulated in windows are brought to the measured ones. No measured signal is
+  differentiated, so noise of the gyroscope does not bias the estimate. The rates at each window's start, and on request
+  a constant moment in each window (slow aerodynamics), are unknowns of that window and are projected out; what stays
+  are a few parameters shared by all windows. Their covariance is cluster-robust over windows.
 
-Numbers that the thesis prints in chapter 4 and appendix A.1, for comparison: no result of ours rests on them.
+Numbers that the thesis prints are for comparison: no result of ours rests on them.
 """
 
 from __future__ import annotations
@@ -27,7 +24,7 @@ from scipy.special import chdtrc
 from scipy.special import stdtrit as student_quantile
 
 from rotorid.effects.contract import compiled
-from rotorid.identify.networks import Network, Trained, Training, build, train
+from rotorid.identify.networks import Network, Training, build, train
 
 MASK = np.array([[1, 0, 0, 1, 0, 0], [0, 1, 0, 0, 1, 0], [0, 0, 1, 0, 0, 1]], float)
 """Which weights of eq. 4.74 are there."""
@@ -151,9 +148,8 @@ def fit_masked_network(
     matrix = rng.uniform(-1, 1, (3, 6)) * MASK
     group = {"batch": len(inputs), "stochastic": 1, "mini-batch": training.group}[training.method]
     order = rng.permutation(len(inputs))
-    mse = _delta_rule(
-        matrix, inputs * k_x, accelerations * k_d, order, training.rate, training.epochs, group, training.every
-    )
+    how = training.rate, training.epochs, group, training.every
+    mse = _delta_rule(matrix, inputs * k_x, accelerations * k_d, order, *how)
     if not np.isfinite(matrix).all():
         raise ValueError(f"training ran away: lower the rate {training.rate}")
     matrix = matrix * k_x / k_d[:, None]
@@ -225,52 +221,38 @@ def check_consistency(weights: np.ndarray, covariance: np.ndarray) -> dict:
     }
 
 
-@dataclass(frozen=True)
-class Scaling:
-    """k_x = 1 / max|ω|, k_d = 1 / max|d| (eq. 4.68)."""
-
-    k_x: float
-    k_d: float
-
-    @classmethod
-    def of(cls, speed_rad_s: np.ndarray, value: np.ndarray) -> Scaling:
-        return cls(float(1 / np.max(np.abs(speed_rad_s))), float(1 / np.max(np.abs(value))))
-
-
-def coefficient(network: Network, scaling: Scaling) -> float:
+def coefficient(network: Network, k_x: float, k_d: float) -> float:
     """C = w⁽²⁾ w⁽¹⁾ k_x² / k_d (eq. 4.73), N s2 or N m s2."""
     product = network.weights[1] @ network.weights[0]
-    return float(product[0, 0] * scaling.k_x**2 / scaling.k_d)
+    return float(product[0, 0] * k_x**2 / k_d)
 
 
 def fit_coefficient_network(
     speed_rad_s: np.ndarray, value: np.ndarray, hidden: int, training: Training
-) -> tuple[float, Scaling, Trained]:
-    """Coefficient, scaling and training on steady points: speeds (n,), rad/s, and thrusts (N) or torques (N m) (n,)."""
-    scaling = Scaling.of(speed_rad_s, value)
+) -> tuple[float, tuple[float, float], Network, np.ndarray, np.ndarray]:
+    """Coefficient, scales k_x = 1 / max|ω| and k_d = 1 / max|d| (eq. 4.68), and what `train` gives on steady points.
+
+    Speeds (n,) in rad/s, thrusts in N or torques in N m (n,).
+    """
+    k_x, k_d = float(1 / np.max(np.abs(speed_rad_s))), float(1 / np.max(np.abs(value)))
     network = build((1, hidden, 1), ("linear", "linear"), np.random.default_rng(training.seed), bias=False)
-    inputs = (scaling.k_x * np.asarray(speed_rad_s, float)[:, None]) ** 2
-    targets = scaling.k_d * np.asarray(value, float)[:, None]
-    trained = train(network, inputs, targets, training)
-    return coefficient(trained.network, scaling), scaling, trained
+    inputs = (k_x * np.asarray(speed_rad_s, float)[:, None]) ** 2
+    network, epochs, mse = train(network, inputs, k_d * np.asarray(value, float)[:, None], training)
+    return coefficient(network, k_x, k_d), (k_x, k_d), network, epochs, mse
 
 
-@dataclass(frozen=True)
-class RateWindows:
-    """Measured rates (w, m, 3), rad/s, and moments (w, m, 3), N m, of w windows sampled evenly at `dt_s`."""
+def cut_windows(
+    rates: np.ndarray, moments: np.ndarray, dt_s: float, window_s: float, start: int = 0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rates and moments (w, m, 3) in consecutive windows of an evenly sampled flight (n, 3).
 
-    rates: np.ndarray
-    moments: np.ndarray
-    dt_s: float
-
-
-def cut_windows(rates: np.ndarray, moments: np.ndarray, dt_s: float, window_s: float, start: int = 0) -> RateWindows:
-    """Consecutive windows of an evenly sampled flight (n, 3); windows with missing samples are left out."""
+    Windows with missing samples are left out.
+    """
     length = int(round(window_s / dt_s)) + 1
     first = np.arange(start, len(rates) - length + 1, length - 1)
     index = first[:, None] + np.arange(length)
     good = np.isfinite(rates[index]).all((1, 2)) & np.isfinite(moments[index]).all((1, 2))
-    return RateWindows(rates[index[good]], moments[index[good]], dt_s)
+    return rates[index[good]], moments[index[good]]
 
 
 @compiled(error_model="numpy")
@@ -292,7 +274,7 @@ def _simulate(weights, start, moments, extra, dt, out):
             before, after = moments[w, max(j - 1, 0)], moments[w, min(j + 2, last)]
             inner = 1.0 if 0 < j < last - 1 else 0.0
             e = extra[w]
-            # Half way the cubic through four samples (see rotorid.vehicle.windows.halfway).
+            # Half way the cubic through four samples (see rotorid.vehicle.windows._halfway).
             ha = 0.5 * (m0[0] + m1[0]) + inner * (m0[0] + m1[0] - before[0] - after[0]) / 16.0 + e[0]
             hb = 0.5 * (m0[1] + m1[1]) + inner * (m0[1] + m1[1] - before[1] - after[1]) / 16.0 + e[1]
             hc = 0.5 * (m0[2] + m1[2]) + inner * (m0[2] + m1[2] - before[2] - after[2]) / 16.0 + e[2]
@@ -300,16 +282,8 @@ def _simulate(weights, start, moments, extra, dt, out):
             _slope(weights, p, q, r, m0[0] + e[0], m0[1] + e[1], m0[2] + e[2], k1)
             _slope(weights, p + h * k1[0], q + h * k1[1], r + h * k1[2], ha, hb, hc, k2)
             _slope(weights, p + h * k2[0], q + h * k2[1], r + h * k2[2], ha, hb, hc, k3)
-            _slope(
-                weights,
-                p + dt * k3[0],
-                q + dt * k3[1],
-                r + dt * k3[2],
-                m1[0] + e[0],
-                m1[1] + e[1],
-                m1[2] + e[2],
-                k4,
-            )
+            p3, q3, r3 = p + dt * k3[0], q + dt * k3[1], r + dt * k3[2]
+            _slope(weights, p3, q3, r3, m1[0] + e[0], m1[1] + e[1], m1[2] + e[2], k4)
             p += dt / 6.0 * (k1[0] + 2.0 * (k2[0] + k3[0]) + k4[0])
             q += dt / 6.0 * (k1[1] + 2.0 * (k2[1] + k3[1]) + k4[1])
             r += dt / 6.0 * (k1[2] + 2.0 * (k2[2] + k3[2]) + k4[2])
@@ -374,7 +348,9 @@ def _walk_power(samples: int) -> float:
 
 
 def fit_output_error(
-    windows: RateWindows,
+    rates: np.ndarray,
+    moments: np.ndarray,
+    dt_s: float,
     model: _Model,
     start: np.ndarray,
     window_moment: bool = False,
@@ -385,26 +361,28 @@ def fit_output_error(
 ) -> _OutputErrorFit:
     """Gauss-Newton with the windows' own unknowns projected out.
 
+    Measured `rates`, rad/s, and `moments`, N m, are (w, m, 3) of w windows sampled evenly at `dt_s`.
+
     Noise of the moments (3,), one sigma a sample, blurs the regressors and would make the inertias too large by
     noise power over signal power; where `moment_noise_n_m` states it, that is taken off again. The covariance is
     robust over clusters of `cluster` neighbouring windows. ValueError where there are too few
     windows or the estimate does not converge.
     """
     parameters = np.asarray(start, float).copy()
-    w, m, _ = windows.rates.shape
+    w, m, _ = rates.shape
     if w <= len(parameters):
         raise ValueError(f"{w} windows cannot distinguish {len(parameters)} parameters: record longer")
-    moments = np.ascontiguousarray(windows.moments)
-    begin, extra = windows.rates[:, 0].copy(), np.zeros((w, 3))
+    moments = np.ascontiguousarray(moments)
+    begin, extra = rates[:, 0].copy(), np.zeros((w, 3))
     scale = np.ones(3)
     moment_step = 1e-3 * max(float(np.std(moments)), 1e-9)
 
     def simulate(values, begin, extra):
-        return simulate_rates(model(values), begin, moments, windows.dt_s, extra)
+        return simulate_rates(model(values), begin, moments, dt_s, extra)
 
     for iteration in range(iterations):
         predicted = simulate(parameters, begin, extra)
-        residual = windows.rates - predicted
+        residual = rates - predicted
         own = []
         for axis in range(3):
             moved = begin.copy()
@@ -445,70 +423,38 @@ def fit_output_error(
     inverse = np.linalg.inv(information)
     if moment_noise_n_m is not None:
         torque = model(parameters)[3:6]
-        power = w * (np.asarray(moment_noise_n_m) * torque * windows.dt_s / scale_used) ** 2 * _walk_power(m)
-        parameters = parameters.copy()
+        power = w * (np.asarray(moment_noise_n_m) * torque * dt_s / scale_used) ** 2 * _walk_power(m)
         parameters[:3] += np.log1p(-power / np.diag(information)[:3])
     # Neighbouring windows share slow disturbances: their scores are summed before they are squared.
     clustered = np.add.reduceat(scores, np.arange(0, w, cluster), axis=0)
-    spread_of_scores = clustered.T @ clustered
     count = len(clustered)
-    covariance = count / max(count - len(parameters), 1) * inverse @ spread_of_scores @ inverse
-    spread = windows.rates - windows.rates.mean(axis=1, keepdims=True)
-    return _OutputErrorFit(
-        parameters,
-        covariance,
-        scale,
-        1.0 - scale**2 / np.mean(spread**2, axis=(0, 1)),
-        w,
-        iteration + 1,
-    )
+    covariance = count / max(count - len(parameters), 1) * inverse @ (clustered.T @ clustered) @ inverse
+    spread = rates - rates.mean(axis=1, keepdims=True)
+    explained = 1.0 - scale**2 / np.mean(spread**2, axis=(0, 1))
+    return _OutputErrorFit(parameters, covariance, scale, explained, w, iteration + 1)
 
 
-@dataclass(frozen=True)
-class PrintedNetwork:
-    """A rotor network of appendix A.1: scaling factors and weights as printed, and the last digit of each."""
+def printed_coefficient(
+    k_x: float, k_d: float, w1, w2, k_x_digit: float = 1e-8, k_d_digit: float = 1e-4, weight_digit: float = 1e-4
+) -> tuple[float, float]:
+    """Coefficient of a rotor network of appendix A.1 by eq. 4.73, thrust (N s²) or torque (N m s²) over squared speed.
 
-    k_x: float
-    """s/rad."""
-    k_d: float
-    """1/N or 1/(N m)."""
-    w1: tuple[float, ...]
-    w2: tuple[float, ...]
-    k_x_digit: float
-    k_d_digit: float = 1e-4
-    weight_digit: float = 1e-4
+    The second number is by how much the digits that are not printed may change it.
 
-    @property
-    def coefficient(self) -> float:
-        """Eq. 4.73: thrust in N s² or torque in N m s² over squared speed."""
-        return self._product * self.k_x**2 / self.k_d
-
-    @property
-    def rounding(self) -> float:
-        """By how much the digits that are not printed may change the coefficient, in its unit."""
-        weights = self.weight_digit / 2 * sum(abs(weight) for weight in (*self.w1, *self.w2))
-        relative = weights / abs(self._product) + self.k_x_digit / self.k_x + self.k_d_digit / 2 / self.k_d
-        return abs(self.coefficient) * relative
-
-    @property
-    def _product(self) -> float:
-        return sum(first * second for first, second in zip(self.w1, self.w2, strict=True))
+    Scales, s/rad and 1/N or 1/(N m), and weights as printed, and the last digit of each.
+    """
+    product = sum(first * second for first, second in zip(w1, w2, strict=True))
+    coefficient = product * k_x**2 / k_d
+    weights = weight_digit / 2 * sum(abs(weight) for weight in (*w1, *w2))
+    return coefficient, abs(coefficient) * (weights / abs(product) + k_x_digit / k_x + k_d_digit / 2 / k_d)
 
 
 ROTOR_NETWORKS = {
-    "thrust_coefficient_n_s2": PrintedNetwork(
-        k_x=5.4669e-4,
-        k_d=0.2133,
-        w1=(-0.5311, 0.1014, -1.0462, -0.1708),
-        w2=(-0.4342, -0.6602, -0.7606, -0.1731),
-        k_x_digit=1e-8,
+    "thrust_coefficient_n_s2": printed_coefficient(
+        5.4669e-4, 0.2133, (-0.5311, 0.1014, -1.0462, -0.1708), (-0.4342, -0.6602, -0.7606, -0.1731)
     ),
-    "torque_coefficient_n_m_s2": PrintedNetwork(
-        k_x=6.3486e-4,
-        k_d=20.8333,
-        w1=(-0.4279, 1.0063, -0.8083, -0.4139),
-        w2=(-0.3693, 0.5336, -0.0600, -0.5183),
-        k_x_digit=1e-8,
+    "torque_coefficient_n_m_s2": printed_coefficient(
+        6.3486e-4, 20.8333, (-0.4279, 1.0063, -0.8083, -0.4139), (-0.3693, 0.5336, -0.0600, -0.5183)
     ),
 }
 """Appendix A.1.1 and A.1.2."""

@@ -36,27 +36,22 @@ def sigmoid(v: np.ndarray) -> np.ndarray:
     return 0.5 * (1.0 + np.tanh(0.5 * v))
 
 
-@dataclass(frozen=True)
-class _Activation:
-    """φ and its derivative written in terms of φ's value."""
-
-    name: str
-    value: Callable[[np.ndarray], np.ndarray]
-    slope_of_value: Callable[[np.ndarray], np.ndarray | float]
-
-
-LINEAR = _Activation("linear", lambda v: v, lambda y: 1.0)
-SIGMOID = _Activation("sigmoid", sigmoid, lambda y: y * (1.0 - y))
-_ACTIVATIONS = {a.name: a for a in (LINEAR, SIGMOID)}
+_VALUE: dict[str, Callable[[np.ndarray], np.ndarray]] = {"linear": lambda v: v, "sigmoid": sigmoid}
+"""φ of each activation."""
+_SLOPE: dict[str, Callable[[np.ndarray], np.ndarray | float]] = {
+    "linear": lambda y: 1.0,
+    "sigmoid": lambda y: y * (1.0 - y),
+}
+"""Its derivative, of φ's value."""
 
 
 @dataclass(frozen=True)
 class Network:
-    """Layers: weights (n_out, n_in), biases (n_out,), masks like the weights (None: without), activations."""
+    """Layers: weights (n_out, n_in), biases (n_out,), masks like the weights (None: without), activations by name."""
 
     weights: tuple[np.ndarray, ...]
     biases: tuple[np.ndarray | None, ...]
-    activations: tuple[_Activation, ...]
+    activations: tuple[str, ...]
     masks: tuple[np.ndarray | None, ...]
 
     def __call__(self, inputs: np.ndarray) -> np.ndarray:
@@ -81,7 +76,7 @@ def build(
         w = rng.uniform(-spread, spread, (n_out, n_in))
         weights.append(w if mask is None else w * mask)
         biases.append(rng.uniform(-spread, spread, n_out) if bias else None)
-    return Network(tuple(weights), tuple(biases), tuple(_ACTIVATIONS[a] for a in activations), masks)
+    return Network(tuple(weights), tuple(biases), tuple(activations), masks)
 
 
 def _outputs(network: Network, inputs: np.ndarray) -> list[np.ndarray]:
@@ -91,7 +86,7 @@ def _outputs(network: Network, inputs: np.ndarray) -> list[np.ndarray]:
         v = values[-1] @ w.T
         if b is not None:
             v = v + b
-        values.append(activation.value(v))
+        values.append(_VALUE[activation](v))
     return values
 
 
@@ -107,7 +102,7 @@ def gradients(
     values = _outputs(network, inputs)
     errors = targets - values[-1]
     count = len(inputs)
-    delta = errors * network.activations[-1].slope_of_value(values[-1])
+    delta = errors * _SLOPE[network.activations[-1]](values[-1])
     weight_steps: list[np.ndarray] = []
     bias_steps: list[np.ndarray | None] = []
     for layer in range(len(network.weights) - 1, -1, -1):
@@ -116,8 +111,7 @@ def gradients(
         weight_steps.append(step if mask is None else step * mask)
         bias_steps.append(None if network.biases[layer] is None else delta.mean(axis=0))
         if layer > 0:
-            slope = network.activations[layer - 1].slope_of_value(values[layer])
-            delta = (delta @ network.weights[layer]) * slope
+            delta = (delta @ network.weights[layer]) * _SLOPE[network.activations[layer - 1]](values[layer])
     return weight_steps[::-1], bias_steps[::-1], errors
 
 
@@ -136,23 +130,10 @@ class Training:
     checkpoint_every: int = 5000
 
 
-@dataclass(frozen=True)
-class Trained:
-    """A trained network and its mean squared error (before each kept epoch) per output, (kept, n_out)."""
-
-    network: Network
-    epochs: np.ndarray
-    mse: np.ndarray
-
-
 def train(
-    network: Network,
-    inputs: np.ndarray,
-    targets: np.ndarray,
-    training: Training,
-    checkpoint: Path | None = None,
-) -> Trained:
-    """Train and return the network with its history.
+    network: Network, inputs: np.ndarray, targets: np.ndarray, training: Training, checkpoint: Path | None = None
+) -> tuple[Network, np.ndarray, np.ndarray]:
+    """The trained network, epochs (kept,), and before each of them the mean squared error per output, (kept, n_out).
 
     `inputs` (n, n_in), `targets` (n, n_out). With `checkpoint` (.npz) the state is written every
     `checkpoint_every` epochs (atomically) and an existing file is continued. ValueError where the weights run
@@ -179,8 +160,7 @@ def train(
         _LOGGER.info("epoch %d of %d, mse %s", stop, training.epochs, mse.round(9))
         if checkpoint is not None:
             _store(Path(checkpoint), stop, weights, biases, history)
-    epochs = np.arange(kept) * training.every
-    return Trained(current, epochs, history)
+    return current, np.arange(kept) * training.every, history
 
 
 def _batch(network, inputs, targets, training: Training, epochs: range, history: np.ndarray) -> np.ndarray:
@@ -274,7 +254,7 @@ def _batch_epochs(
     weights = tuple(np.ascontiguousarray(w.T) for w in network.weights)
     biases = tuple(np.zeros(0) if b is None else b.copy() for b in network.biases)
     masks = tuple(np.zeros((0, 0)) if m is None else np.ascontiguousarray(m.T, dtype=float) for m in network.masks)
-    codes = tuple(_CODES[a.name] for a in network.activations)
+    codes = tuple(_CODES[a] for a in network.activations)
     # A layer's values lie sample next to sample, so that one instruction works on several samples.
     inputs, targets = np.ascontiguousarray(inputs.T), np.ascontiguousarray(targets.T)
     values = tuple(np.empty((w.shape[1], inputs.shape[1])) for w in weights)

@@ -14,7 +14,6 @@ the two published masses differ.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -54,14 +53,8 @@ def low_pass(values: np.ndarray, rate_hz: float, cutoff_hz: float) -> np.ndarray
 def measured_wrench(run: Run, vehicle: Vehicle, angular_acceleration: np.ndarray) -> np.ndarray:
     """Force (N) and moment (N m) that act on the vehicle except gravity, body axes, shape (n, 6).
 
-    Parameters
-    ----------
-    run
-        With `specific_force_*` and `angular_velocity_*`.
-    vehicle
-        Believed mass and inertia.
-    angular_acceleration
-        Ω̇, rad/s², body axes, shape (n, 3).
+    `run`: with `specific_force_*` and `angular_velocity_*`. `vehicle`: believed mass and inertia.
+    `angular_acceleration`: Ω̇, rad/s², body axes, shape (n, 3).
     """
     rates = run.array(c.ANGULAR_VELOCITY)
     inertia = vehicle.inertia_kg_m2.matrix()
@@ -91,23 +84,6 @@ def _squares(residual: np.ndarray) -> np.ndarray:
     return np.column_stack([squares, squares[:, :3].mean(axis=1), squares[:, 3:].mean(axis=1)])
 
 
-@dataclass(frozen=True)
-class _Binned:
-    """RMS residual in bins of airspeed with 95 % intervals; rows are bins, columns
-    the six channels and the two totals."""
-
-    low_m_s: np.ndarray
-    high_m_s: np.ndarray
-    samples: np.ndarray
-    rms: np.ndarray
-    rms_low: np.ndarray
-    rms_high: np.ndarray
-    growth: np.ndarray
-    """RMS in the fastest bin over RMS in the slowest, per channel."""
-    growth_95: np.ndarray
-    """Its 95 % interval, shape (8, 2)."""
-
-
 def by_airspeed(
     residuals: Mapping[str, np.ndarray],
     airspeeds: Mapping[str, np.ndarray],
@@ -117,23 +93,15 @@ def by_airspeed(
     rng: np.random.Generator,
     repeats: int = 400,
     fewest_blocks: int = 5,
-) -> _Binned:
+) -> dict[str, np.ndarray]:
     """RMS residual against airspeed over all runs, intervals by resampling blocks of time.
 
-    Residuals are correlated in time, so whole blocks of `block_s` are drawn, not samples.
+    Residuals are correlated in time, so whole blocks of `block_s` are drawn, not samples. By name: of each bin `low`
+    and `high` (m/s), `samples`, and of its eight channels and totals `rms` with `rms_95` (2, bins, 8); `growth`, RMS in
+    the fastest bin over RMS in the slowest, with `growth_95` (2, 8).
 
-    Parameters
-    ----------
-    residuals
-        Per run, shape (n, 6).
-    airspeeds, times_s
-        Per run, shape (n,).
-    edges_m_s
-        Edges of the bins.
-    block_s
-        Length of a block.
-    fewest_blocks
-        A bin seen in fewer blocks is left out.
+    `residuals`: per run, shape (n, 6). `airspeeds`, `times_s`: per run, shape (n,). `edges_m_s`: edges of the bins.
+    `block_s`: length of a block. `fewest_blocks`: a bin seen in fewer blocks is left out.
     """
     edges = np.asarray(edges_m_s, float)
     bins = len(edges) - 1
@@ -157,19 +125,17 @@ def by_airspeed(
     total = np.einsum("rb,bkc->rkc", draws, squares)
     spread = np.sqrt(total / np.where(number > 0, number, np.nan)[:, :, None])
     centre = np.sqrt(squares.sum(axis=0) / counts.sum(axis=0)[:, None])
-    low, high = np.nanpercentile(spread, [2.5, 97.5], axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):  # a channel may have nothing left over
         ratio, growth = spread[:, -1] / spread[:, 0], centre[-1] / centre[0]
-    return _Binned(
-        low_m_s=edges[:-1][kept],
-        high_m_s=edges[1:][kept],
-        samples=counts.sum(axis=0).astype(int),
-        rms=centre,
-        rms_low=low,
-        rms_high=high,
-        growth=growth,
-        growth_95=np.nanpercentile(ratio, [2.5, 97.5], axis=0).T,
-    )
+    return {
+        "low": edges[:-1][kept],
+        "high": edges[1:][kept],
+        "samples": counts.sum(axis=0).astype(int),
+        "rms": centre,
+        "rms_95": np.nanpercentile(spread, [2.5, 97.5], axis=0),
+        "growth": growth,
+        "growth_95": np.nanpercentile(ratio, [2.5, 97.5], axis=0),
+    }
 
 
 _Tables = tuple[dict, pd.DataFrame, pd.DataFrame, pd.DataFrame]
@@ -201,15 +167,6 @@ def _residuals_of(run: Run, vehicle: Vehicle, cutoff_hz: float) -> dict[str, np.
     }
 
 
-def _bin_rows(model: str, found: _Binned) -> list[tuple]:
-    rows = []
-    for place, channel in enumerate(_CHANNELS + _TOTALS):
-        for b in range(len(found.low_m_s)):
-            where = (model, channel, found.low_m_s[b], found.high_m_s[b], found.samples[b])
-            rows.append((*where, found.rms[b, place], found.rms_low[b, place], found.rms_high[b, place]))
-    return rows
-
-
 def compare_with_neurobem(
     recordings: RecordingSet, cutoff_hz: float, airspeed_bin_m_s: float, block_s: float, seed: int
 ) -> _Tables:
@@ -220,10 +177,7 @@ def compare_with_neurobem(
     times = {run.name: run.time_s for run in recordings.runs}
     rows, summary = [], {"mass_kg": vehicle.mass_kg, "paper_mass_kg": _PAPER_MASS_KG, "flights": {}}
     for flight, models in left.items():
-        pace = {
-            "airspeed_mean_m_s": float(speeds[flight].mean()),
-            "airspeed_max_m_s": float(speeds[flight].max()),
-        }
+        pace = {f"airspeed_{name}_m_s": float(getattr(speeds[flight], name)()) for name in ("mean", "max")}
         summary["flights"][flight] = {**pace, **{model: rmse(r) for model, r in models.items()}}
         rows += [{"flight": flight, "model": model, **pace, **rmse(r)} for model, r in models.items()]
     tops = sorted(float(speed.max()) for speed in speeds.values())
@@ -234,18 +188,23 @@ def compare_with_neurobem(
     for model in _MODELS:
         mine = {flight: models[model] for flight, models in left.items()}
         found = by_airspeed(mine, speeds, times, edges, block_s, np.random.default_rng(seed))
+        low, high, rms = (found[name].tolist() for name in ("low", "high", "rms"))
         summary[model] = {
             channel: {
-                "slowest_m_s": [float(found.low_m_s[0]), float(found.high_m_s[0])],
-                "fastest_m_s": [float(found.low_m_s[-1]), float(found.high_m_s[-1])],
-                "rms_slowest": float(found.rms[0, place]),
-                "rms_fastest": float(found.rms[-1, place]),
-                "growth": float(found.growth[place]),
-                "growth_95": [float(v) for v in found.growth_95[place]],
+                "slowest_m_s": [low[0], high[0]],
+                "fastest_m_s": [low[-1], high[-1]],
+                "rms_slowest": rms[0][place],
+                "rms_fastest": rms[-1][place],
+                "growth": float(found["growth"][place]),
+                "growth_95": found["growth_95"][:, place].tolist(),
             }
             for place, channel in enumerate(_CHANNELS + _TOTALS)
         }
-        bins += _bin_rows(model, found)
+        bins += [
+            (model, channel, low[b], high[b], found["samples"][b], rms[b][place], *found["rms_95"][:, b, place])
+            for place, channel in enumerate(_CHANNELS + _TOTALS)
+            for b in range(len(low))
+        ]
     cloud = [np.column_stack([speeds[flight], models["rigid_body"]])[::_POINT_STEP] for flight, models in left.items()]
     points = pd.DataFrame(np.concatenate(cloud), columns=_POINT_COLUMNS[1:])
     points.insert(0, "flight", np.repeat(list(left), [len(part) for part in cloud]))

@@ -56,20 +56,10 @@ _PROPELLERS = {
     "hq5x4": "HQ 5x4, 4 blades",
     "lumenier5x45": "Lumenier 5x4.5, 2 blades",
 }
-PROPELLER_COLUMNS = [
-    "propeller",
-    "motor",
-    "form",
-    "c_f_n_s2",
-    "low_95_n_s2",
-    "high_95_n_s2",
-    "offset_2s_n",
-    "offset_3s_n",
-    "residual_rms_n",
-    "points",
-    "modified_z",
-    "outlying",
-]
+PROPELLER_COLUMNS = (
+    "propeller motor form c_f_n_s2 low_95_n_s2 high_95_n_s2 offset_2s_n offset_3s_n residual_rms_n points "
+    "modified_z outlying"
+).split()
 _RPM = 2 * np.pi / 60
 _MARGIN_S = 0.6
 COLUMNS = (
@@ -80,13 +70,8 @@ COLUMNS = (
 SPEED_LAW_PARAMETERS = ("speed_at_half_rad_s", "throttle_exponent", "dead_throttle", "voltage_exponent")
 
 
-@dataclass(frozen=True)
-class Points:
-    """Steady points of one run: rotor speed (rad/s) and thrust (N), shape (n,) each."""
-
-    run: str
-    speed_rad_s: np.ndarray
-    thrust_n: np.ndarray
+Points = tuple[str, np.ndarray, np.ndarray]
+"""Steady points of one run: its name, rotor speed (rad/s) and thrust (N), shape (n,) each."""
 
 
 @dataclass(frozen=True)
@@ -109,14 +94,6 @@ def usable(speed_rad_s: np.ndarray, thrust_n: np.ndarray) -> np.ndarray:
     """Points with a speed: a reading of 0 while there is thrust is a missing speed, not a rotor at rest."""
     known = np.isfinite(speed_rad_s) & np.isfinite(thrust_n) & (speed_rad_s > 0)
     return known & ~lost_speed(speed_rad_s, thrust_n)
-
-
-def _design(runs: Sequence[Points], kept: Sequence[np.ndarray], offset: bool) -> np.ndarray:
-    """Columns of the offsets, shape (n, runs) or (n, 0)."""
-    counts = [int(k.sum()) for k in kept]
-    if not offset:
-        return np.zeros((sum(counts), 0))
-    return np.repeat(np.eye(len(runs)), counts, axis=0)
 
 
 def _true_speeds(speed, thrust, offsets, c_f, force_sd, speed_sd):
@@ -166,32 +143,19 @@ def fit_coefficient(
 ) -> _CoefficientFit:
     """C_F of one motor and propeller from its runs, with one offset a run where `offset`.
 
-    Parameters
-    ----------
-    runs
-        Steady points of each run.
-    offset
-        Whether each run has a force offset of its own.
-    speed_noise_relative
-        One-sigma noise of the speed reading, as a share of the speed; 0 for ordinary least squares.
-    least_sd
-        The force (or torque) is never taken as more exact than this, N (N m); where the speed's noise is considered.
-    equal_noise
-        Whether all points are equally noisy; otherwise each has a variance of its own.
-
-    Raises
-    ------
-    InputError
-        Not more points than unknowns.
+    `speed_noise_relative` is the one-sigma noise of the speed reading as a share of the speed, 0 for ordinary least
+    squares; where it is considered the force (or torque) is never taken as more exact than `least_sd`, N (N m). Unless
+    `equal_noise`, each point has a variance of its own. InputError: not more points than unknowns.
     """
-    kept = [usable(p.speed_rad_s, p.thrust_n) for p in runs]
-    speed = np.concatenate([p.speed_rad_s[k] for p, k in zip(runs, kept, strict=True)])
-    thrust = np.concatenate([p.thrust_n[k] for p, k in zip(runs, kept, strict=True)])
-    offset_columns = _design(runs, kept, offset)
+    kept = [usable(speed, thrust) for _, speed, thrust in runs]
+    speed = np.concatenate([speed[k] for (_, speed, _), k in zip(runs, kept, strict=True)])
+    thrust = np.concatenate([thrust[k] for (_, _, thrust), k in zip(runs, kept, strict=True)])
+    # Columns of the offsets, shape (n, runs) or (n, 0).
+    offset_columns = np.repeat(np.eye(len(runs)), [int(k.sum()) for k in kept], axis=0)[:, : len(runs) * offset]
     unknowns = 1 + offset_columns.shape[1]
     freedom = len(speed) - unknowns
     if freedom < 1:
-        names = ", ".join(p.run for p in runs)
+        names = ", ".join(name for name, *_ in runs)
         raise InputError(f"runs {names}: {len(speed)} points for {unknowns} unknowns")
     columns = np.column_stack([speed**2, offset_columns])
     scale = np.linalg.norm(columns, axis=0)
@@ -251,16 +215,14 @@ def fit_exponent(runs: Sequence[Points]) -> tuple[float, tuple[float, float]]:
     Least squares of log F on log ω; points below 2 % of the largest thrust are left out, since there the
     balance's own offset rules the logarithm.
     """
-    x, y, group = [], [], []
-    for number, points in enumerate(runs):
-        keep = usable(points.speed_rad_s, points.thrust_n)
-        keep &= points.thrust_n > 0.02 * np.nanmax(points.thrust_n)
-        log_speed, log_thrust = np.log(points.speed_rad_s[keep]), np.log(points.thrust_n[keep])
+    x, y = [], []
+    for _, speed, thrust in runs:
+        keep = usable(speed, thrust) & (thrust > 0.02 * np.nanmax(thrust))
+        log_speed, log_thrust = np.log(speed[keep]), np.log(thrust[keep])
         x.append(log_speed - log_speed.mean())
         y.append(log_thrust - log_thrust.mean())
-        group.append(number)
     x, y = np.concatenate(x), np.concatenate(y)
-    freedom = len(x) - len(group) - 1
+    freedom = len(x) - len(runs) - 1
     exponent = np.sum(x * y) / np.sum(x**2)
     error = np.sqrt(np.sum((y - exponent * x) ** 2) / freedom / np.sum(x**2))
     half = student_quantile(freedom, 0.975) * error
@@ -321,11 +283,7 @@ def rest_reading(thrust_n: Sequence[float]) -> dict:
         return {"mean_n": None, "interval_95_n": None, "points": len(thrust_n)}
     half = student_quantile(len(thrust_n) - 1, 0.975) * thrust_n.std(ddof=1) / np.sqrt(len(thrust_n))
     mean = float(thrust_n.mean())
-    return {
-        "mean_n": mean,
-        "interval_95_n": [float(mean - half), float(mean + half)],
-        "points": len(thrust_n),
-    }
+    return {"mean_n": mean, "interval_95_n": [float(mean - half), float(mean + half)], "points": len(thrust_n)}
 
 
 def summarise_propeller(
@@ -339,7 +297,7 @@ def summarise_propeller(
     points, at_rest, lost = {}, [], 0
     for run in recordings.runs:
         speed, thrust = run.column("rotor_speed_1_rad_s"), -run.column("force_z_n")
-        points.setdefault(run.name[0], []).append(Points(run.name, speed, thrust))
+        points.setdefault(run.name[0], []).append((run.name, speed, thrust))
         at_rest += list(thrust[(run.column("throttle_1") == 0) & (speed == 0)])
         lost += int((~usable(speed, thrust) & (run.column("throttle_1") > 0)).sum())
     summary = {"name": _PROPELLERS[name], "runs": len(recordings.runs), "points_without_speed": lost}
@@ -375,10 +333,10 @@ def summarise_propeller(
     offsets = [v for row in rows if row["form"] == "offset" for v in (row["offset_2s_n"], row["offset_3s_n"])]
     summary["mean_offset_n"] = float(np.mean(offsets))
     scattered = [
-        {"propeller": name, "run": p.run, "speed_rad_s": s, "thrust_n": t, "used": bool(u)}
+        {"propeller": name, "run": run, "speed_rad_s": s, "thrust_n": t, "used": bool(u)}
         for group in points.values()
-        for p in group
-        for s, t, u in zip(p.speed_rad_s, p.thrust_n, usable(p.speed_rad_s, p.thrust_n), strict=True)
+        for run, speed, thrust in group
+        for s, t, u in zip(speed, thrust, usable(speed, thrust), strict=True)
     ]
     return summary, rows, scattered
 
@@ -512,8 +470,9 @@ def sample_noise(points: pd.DataFrame) -> dict:
     square, value = tests["speed_rad_s"].to_numpy() ** 2, tests["value"].to_numpy()
     counts = tests["samples"].to_numpy(float)
     squares, quarter = tests["value_sd"].to_numpy() ** 2 * (counts - 1), len(tests) // 4
-    slow, fast = (float(np.sum(squares[part]) / np.sum(counts[part] - 1)) for part in _ends(quarter))
-    freedoms = [float(np.sum(counts[part] - 1)) for part in _ends(quarter)]
+    ends = slice(0, quarter), slice(-quarter, None)
+    slow, fast = (float(np.sum(squares[part]) / np.sum(counts[part] - 1)) for part in ends)
+    freedoms = [float(np.sum(counts[part] - 1)) for part in ends]
     rest = tests["rest_samples"].to_numpy(float)
     variance = float(np.sum(squares) / np.sum(counts - 1))
     each = variance * (1 / counts + 1 / rest)
@@ -528,7 +487,3 @@ def sample_noise(points: pd.DataFrame) -> dict:
         "freedom": freedom,
         "p_value": float(chdtrc(freedom, total)),
     }
-
-
-def _ends(quarter: int) -> tuple[slice, slice]:
-    return slice(0, quarter), slice(-quarter, None)

@@ -1,27 +1,26 @@
-"""Steady wrenches of the experiments on the stand: means with intervals, rest reading, weight under tilt.
-
-The throttles alone say where a programme rests, ramps and holds. The sensor stays level and the vehicle is tilted on
-it, so the weight pulls along the sensor's z whatever the tilt; what turns with the vehicle is the arm from the sensor
-to the centre of mass, and with it the weight's moment.
-
-The stand's tests as recording sets of kind `stand`.
+"""The stand's experiments: recording sets of kind `stand`, and steady wrenches with intervals, rest reading, weight.
 
 Two instruments with their own clocks are put on one (`rotorid.identify.clocks`); a run's samples are the wrench
 sensor's, with throttle, speed and voltage interpolated to them. Before and after a programme the vehicle sends nothing:
 its motors stand.
+
+The throttles alone say where a programme rests, ramps and holds. The sensor stays level and the vehicle is tilted on
+it, so the weight pulls along the sensor's z whatever the tilt; what turns with the vehicle is the arm from the sensor
+to the centre of mass, and with it the weight's moment.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 from scipy.special import stdtrit as student_quantile
 
+from rotorid.effects.loading import rotation_of
 from rotorid.errors import InputError
-from rotorid.identify.clocks import Aligned, Pair, both_on_host, pair_of, torque_offset
+from rotorid.identify.clocks import THROTTLES, Aligned, Pair, both_on_host, pair_of, torque_offset
 from rotorid.io.frames import Quality
 from rotorid.io.logs import by_recording
 from rotorid.io.wire import EXPERIMENTS
@@ -31,7 +30,6 @@ from rotorid.recordings.signal import block_count, mean_and_error
 from rotorid.recordings.vehicle import Vehicle
 
 _RPM = 2 * np.pi / 60
-_THROTTLES = c.rotor_columns("throttle", 4)
 _REST, _RAMP, PLATEAU = "rest", "ramp", "plateau"
 _SLOPE_1_S = 0.004
 """A throttle that changes by less than this per second is constant (the slowest ramp of table A.1: 0.0167)."""
@@ -62,7 +60,7 @@ def _experiment_run(session, aligned: Aligned) -> Run:
     when, felt = _felt(aligned.pair.wrench, aligned.offset_s)
     sent = quadrotor["host_s"].to_numpy()
     table = pd.DataFrame({c.TIME: when - when[0]})
-    for column in _THROTTLES:
+    for column in THROTTLES:
         table[column] = _within(when, sent, quadrotor[column].to_numpy(), 0.0)
     table[c.BATTERY_VOLTAGE] = _within(when, sent, quadrotor["battery_voltage_v"].to_numpy(), np.nan)
     table["roll_rad"] = np.radians(session.mount_roll_deg)
@@ -154,8 +152,8 @@ def dynamics_set(
     """The 48 experiments; `recordings` are the wrench sensor's."""
     session_of = {session.group: session for session in recordings.itertuples()}
     runs = [_experiment_run(session_of[entry.pair.name], entry) for entry in aligned]
-    first = session_of[aligned[0].pair.name]
-    return RecordingSet(name, _stand_vehicle(name, believed, first, noise), tuple(sorted(runs, key=_name)))
+    vehicle = _stand_vehicle(name, believed, session_of[aligned[0].pair.name], noise)
+    return RecordingSet(name, vehicle, tuple(sorted(runs, key=lambda run: run.name)))
 
 
 _LARGEST_OFFSET_ERROR_S = 0.01
@@ -177,18 +175,14 @@ def torque_set(
         _torque_run(test, speed, reading, lag.delay_s if lag.delay_error_s < _LARGEST_OFFSET_ERROR_S else usual)
         for (test, speed, reading), lag in zip(tests, lags, strict=True)
     ]
-    first = next(wrench[1].itertuples())
-    return RecordingSet(name, _stand_vehicle(name, believed, first, noise), tuple(sorted(runs, key=_name)))
+    vehicle = _stand_vehicle(name, believed, next(wrench[1].itertuples()), noise)
+    return RecordingSet(name, vehicle, tuple(sorted(runs, key=lambda run: run.name)))
 
 
 def thrust_set(name: str, rotor: tuple, believed: Vehicle, noise: dict[str, float]) -> RecordingSet:
     """The 50 thrust tests."""
     runs = [_thrust_run(str(key), table) for key, table in by_recording(rotor[0]).items()]
-    return RecordingSet(name, _tester_vehicle(name, believed, noise), tuple(sorted(runs, key=_name)))
-
-
-def _name(run: Run) -> str:
-    return run.name
+    return RecordingSet(name, _tester_vehicle(name, believed, noise), tuple(sorted(runs, key=lambda run: run.name)))
 
 
 @dataclass(frozen=True)
@@ -207,17 +201,7 @@ class _StandStretch:
 def segments(time_s: np.ndarray, throttle: np.ndarray) -> list[_StandStretch]:
     """Stretches of a programme in the order of time.
 
-    Parameters
-    ----------
-    time_s
-        Shape (n,), increasing.
-    throttle
-        Fractions 0 to 1, shape (n, motors).
-
-    Raises
-    ------
-    InputError
-        The motors never run.
+    `time_s`: shape (n,), increasing. `throttle`: fractions 0 to 1, shape (n, motors). InputError: the motors never run.
     """
     time_s, throttle = np.asarray(time_s, float), np.atleast_2d(np.asarray(throttle, float))
     running = (throttle > 0).any(axis=1)
@@ -229,10 +213,9 @@ def segments(time_s: np.ndarray, throttle: np.ndarray) -> list[_StandStretch]:
     span_s = np.maximum(time_s[ahead] - time_s[behind], 1e-9)
     slope = np.abs(throttle[ahead] - throttle[behind]).max(axis=1) / span_s
     kinds = np.where(~running, _REST, np.where(slope < _SLOPE_1_S, PLATEAU, _RAMP)).astype(object)
-    found = _stretches(time_s, kinds)
-    short = [s for s in found if s.kind == PLATEAU and s.length_s < _SHORTEST_S]
-    for segment in short:
-        kinds[(time_s >= segment.start_s) & (time_s <= segment.stop_s)] = _RAMP
+    for segment in _stretches(time_s, kinds):
+        if segment.kind == PLATEAU and segment.length_s < _SHORTEST_S:
+            kinds[(time_s >= segment.start_s) & (time_s <= segment.stop_s)] = _RAMP
     return _stretches(time_s, kinds)
 
 
@@ -255,12 +238,6 @@ def programme(found: list[_StandStretch]) -> _StandStretch:
     """From the first moment at which a motor runs to the last."""
     moving = [segment for segment in found if segment.kind != _REST]
     return _StandStretch(_RAMP, moving[0].start_s, moving[-1].stop_s)
-
-
-def tilt(roll_rad: float, pitch_rad: float) -> np.ndarray:
-    """Body axes to level axes, shape (3, 3), R_y(pitch) R_x(roll), yaw zero (thesis eq. 4.10)."""
-    cr, sr, cp, sp = np.cos(roll_rad), np.sin(roll_rad), np.cos(pitch_rad), np.sin(pitch_rad)
-    return np.array([[cp, sr * sp, cr * sp], [0.0, cr, -sr], [-sp, sr * cp, cr * cp]])
 
 
 def weight_wrench(mass_kg: float, gravity_m_s2: float, centre_m: np.ndarray, rotation: np.ndarray) -> np.ndarray:
@@ -327,7 +304,7 @@ def evaluate(run: Run, frequency_hz: float | None) -> _Evaluated:
     Of a trapezoid the plateau, of a sine (`frequency_hz` given) as many whole cycles as the programme holds, so
     that the mean is one over the cycle.
     """
-    throttle = run.array(c.rotor_columns("throttle", 4))
+    throttle = run.array(THROTTLES)
     found = segments(run.time_s, throttle)
     active = programme(found)
     flat = longest(found, PLATEAU)
@@ -371,37 +348,27 @@ def mean_thrust(run: Run, entry: _Evaluated, thrust_of: Callable) -> np.ndarray:
     The mean of the thrust, not the thrust of the mean throttle: over a sine they differ.
     """
     inside = (run.time_s >= entry.start_s) & (run.time_s <= entry.stop_s)
-    return np.clip(thrust_of(run.array(c.rotor_columns("throttle", 4))[inside]), 0.0, None).mean(axis=0)
-
-
-@dataclass(frozen=True)
-class _Weight:
-    """What the readings at rest say of the vehicle: mass, centre of mass from the sensor, body axes."""
-
-    mass_kg: float
-    mass_interval_95: tuple[float, float]
-    centre_m: np.ndarray
-    centre_interval_95: np.ndarray
-    """Shape (3, 2)."""
-    rms_before: np.ndarray
-    """RMS over the experiments of what the believed weight leaves at rest, shape (6,)."""
-    rms_after: np.ndarray
-    """… and of what the fitted one leaves."""
+    return np.clip(thrust_of(run.array(THROTTLES)[inside]), 0.0, None).mean(axis=0)
 
 
 def weights(evaluated: list[_Evaluated], mass_kg: float, centre_m: np.ndarray, gravity_m_s2: float) -> np.ndarray:
     """The weight's wrench in the attitude of each experiment, shape (n, 6)."""
-    return np.array([weight_wrench(mass_kg, gravity_m_s2, centre_m, tilt(e.roll_rad, e.pitch_rad)) for e in evaluated])
+    return np.array(
+        [weight_wrench(mass_kg, gravity_m_s2, centre_m, rotation_of(e.roll_rad, e.pitch_rad)) for e in evaluated]
+    )
 
 
-def fit_weight(evaluated: list[_Evaluated], mass_kg: float, centre_m: np.ndarray, gravity_m_s2: float) -> _Weight:
+def fit_weight(evaluated: list[_Evaluated], mass_kg: float, centre_m: np.ndarray, gravity_m_s2: float) -> dict:
     """Mass and centre of mass from the readings at rest under all tilts, next to the believed ones.
+
+    `mass_kg` and `centre_m` (3,), from the sensor in body axes, with `_interval_95`; RMS over the experiments of what
+    the believed and the fitted weight leave at rest, `rms_before` and `rms_after` (6,).
 
     Fz gives the mass, the moments M = (R c) × W give c: under tilt also its height. The sensor's own zero is
     taken as zero (it was zeroed without the vehicle), and its frame as level.
     """
     rest = np.array([e.rest.mean for e in evaluated])
-    rotations = [tilt(e.roll_rad, e.pitch_rad) for e in evaluated]
+    rotations = [rotation_of(e.roll_rad, e.pitch_rad) for e in evaluated]
     freedom = len(rest) - 1
     if freedom < 3:
         raise InputError(f"a weight under tilt needs at least four experiments, found {len(rest)}")
@@ -422,14 +389,14 @@ def fit_weight(evaluated: list[_Evaluated], mass_kg: float, centre_m: np.ndarray
     def rms(m: float, place: np.ndarray) -> np.ndarray:
         return np.sqrt(((rest - weights(evaluated, m, place, gravity_m_s2)) ** 2).mean(axis=0))
 
-    return _Weight(
-        mass_kg=float(mass),
-        mass_interval_95=(float(mass - mass_half), float(mass + mass_half)),
-        centre_m=centre,
-        centre_interval_95=np.column_stack([centre - half, centre + half]),
-        rms_before=rms(mass_kg, np.asarray(centre_m, float)),
-        rms_after=rms(mass, centre),
-    )
+    return {
+        "mass_kg": float(mass),
+        "mass_interval_95": (float(mass - mass_half), float(mass + mass_half)),
+        "centre_m": centre,
+        "centre_interval_95": np.column_stack([centre - half, centre + half]),
+        "rms_before": rms(mass_kg, np.asarray(centre_m, float)),
+        "rms_after": rms(mass, centre),
+    }
 
 
 def table(
@@ -446,8 +413,9 @@ def table(
     mass, shape (n, 6) each.
     """
     rows = []
-    entries = zip(evaluated, numbers, expected, believed_rest, fitted_rest, strict=True)
-    for entry, number, model, believed, fitted in entries:
+    for entry, number, model, believed, fitted in zip(
+        evaluated, numbers, expected, believed_rest, fitted_rest, strict=True
+    ):
         row = {
             "name": entry.name,
             "experiment": number,
@@ -474,22 +442,26 @@ def table(
     return pd.DataFrame(rows)
 
 
-def weight_as_dict(found: _Weight, mass_kg: float, centre_m: np.ndarray, experiments: pd.DataFrame) -> dict:
+def weight_as_dict(found: dict, mass_kg: float, centre_m: np.ndarray, experiments: pd.DataFrame) -> dict:
     """The weight for a JSON file, next to the believed one, and how far the believed vehicle's steady wrench is off."""
     off = np.array([experiments[name] - experiments[f"{name}_model"] for name in WRENCH])
     half = np.array([experiments[f"{name}_half_95"] for name in WRENCH])
-    axes = ("x", "y", "z")
+
+    def named(names: Sequence[str], values: np.ndarray) -> dict:
+        return dict(zip(names, values.tolist(), strict=True))
+
+    low, high = found["mass_interval_95"]
     return {
         "experiments": len(experiments),
-        "mass_kg": found.mass_kg,
-        "mass_interval_95": found.mass_interval_95,
+        "mass_kg": found["mass_kg"],
+        "mass_interval_95": found["mass_interval_95"],
         "mass_believed_kg": mass_kg,
-        "mass_believed_inside": found.mass_interval_95[0] <= mass_kg <= found.mass_interval_95[1],
-        "centre_m": dict(zip(axes, found.centre_m.tolist(), strict=True)),
-        "centre_interval_95_m": dict(zip(axes, found.centre_interval_95.tolist(), strict=True)),
-        "centre_believed_m": dict(zip(axes, np.asarray(centre_m).tolist(), strict=True)),
-        "rest_rms_before": dict(zip(WRENCH, found.rms_before.tolist(), strict=True)),
-        "rest_rms_after": dict(zip(WRENCH, found.rms_after.tolist(), strict=True)),
-        "steady_rms_off_model": dict(zip(WRENCH, np.sqrt((off**2).mean(axis=1)).tolist(), strict=True)),
-        "steady_half_width_95": dict(zip(WRENCH, half.mean(axis=1).tolist(), strict=True)),
+        "mass_believed_inside": low <= mass_kg <= high,
+        "centre_m": named("xyz", found["centre_m"]),
+        "centre_interval_95_m": named("xyz", found["centre_interval_95"]),
+        "centre_believed_m": named("xyz", np.asarray(centre_m)),
+        "rest_rms_before": named(WRENCH, found["rms_before"]),
+        "rest_rms_after": named(WRENCH, found["rms_after"]),
+        "steady_rms_off_model": named(WRENCH, np.sqrt((off**2).mean(axis=1))),
+        "steady_half_width_95": named(WRENCH, half.mean(axis=1)),
     }

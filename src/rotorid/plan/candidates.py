@@ -1,19 +1,26 @@
-"""Manoeuvres to choose from: pieces that start and end at rest in one place, so that they join in any order.
+"""What a flight or session may ask, as its user states it, and manoeuvres to choose from.
 
-A piece is a reference for position (north-east-down, from the middle of the volume) and yaw, as large as the limits
-allow or a stated share of it. Oscillations of several axes at once have harmonics of their own each, so that they are
-orthogonal over the piece.
+A manoeuvre's pieces start and end at rest in one place, so that they join in any order. A piece is a reference for
+position (north-east-down, from the middle of the volume) and yaw, as large as the limits allow or a stated share of it.
+Oscillations of several axes at once have harmonics of their own each, so that they are orthogonal over the piece.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from rotorid.plan.limits import Limits
+from rotorid.errors import InputError
+from rotorid.io.text.files import read_yaml, with_exponents
+from rotorid.io.text.wording import hint
 
+_Range = tuple[float, float]
+T = TypeVar("T", bound=BaseModel)
 _GRAVITY_M_S2 = 9.81
 _RAMP_S = 2.0
 _SLOW_RAMP_S = 4.0
@@ -64,10 +71,20 @@ class ManoeuvrePiece:
         return Reference(t, position, yaw)
 
 
+def _smooth(s: np.ndarray) -> np.ndarray:
+    """From 0 to 1, twice differentiable, while s goes from 0 to 1."""
+    s = np.clip(s, 0, 1)
+    return s**3 * (10 - 15 * s + 6 * s**2)
+
+
 def _envelope(t: np.ndarray, ramp_s: float = _RAMP_S) -> np.ndarray:
     """From 0 smoothly to 1 and back to 0, twice differentiable; `ramp_s` each way."""
-    s = np.clip(np.minimum(t, t[-1] - t) / ramp_s, 0, 1)
-    return s**3 * (10 - 15 * s + 6 * s**2)
+    return _smooth(np.minimum(t, t[-1] - t) / ramp_s)
+
+
+def _most_level_m_s2(limits: Limits) -> float:
+    """Level acceleration that a reference asks for at most."""
+    return _ROOM * _GRAVITY_M_S2 * np.tan(np.radians(limits.tilt_deg))
 
 
 def _phase(t: np.ndarray, rate_rad_s: float, unit_rad: float = np.pi, ramp_s: float = _RAMP_S) -> np.ndarray:
@@ -103,8 +120,7 @@ def _multisine(t: np.ndarray, harmonics: np.ndarray, seed: int) -> np.ndarray:
 
 def _largest(limits: Limits, room_m: float, share: float) -> tuple[float, float]:
     """Amplitude (m) and rate (rad/s) of a swing along a line at a share of the speed, within room and tilt."""
-    speed = share * limits.speed_m_s
-    most = _ROOM * _GRAVITY_M_S2 * np.tan(np.radians(limits.tilt_deg))
+    speed, most = share * limits.speed_m_s, _most_level_m_s2(limits)
     amplitude = min(room_m, max(0.5, speed**2 / most * 1.2))
     return amplitude, min(speed / amplitude, np.sqrt(most / amplitude))
 
@@ -160,8 +176,7 @@ def _still(limits: Limits) -> list[ManoeuvrePiece]:
         at = np.linspace(0, t[-1], len(steps) + 1)
         out = np.zeros((len(t), 3))
         for before, after, when in zip(steps, steps[1:], at[1:], strict=False):
-            s = np.clip((t - when) / change_s + 0.5, 0, 1)
-            out[:, 2] -= (after - before) * s**3 * (10 - 15 * s + 6 * s**2)
+            out[:, 2] -= (after - before) * _smooth((t - when) / change_s + 0.5)
         return out, np.zeros(len(t))
 
     low, high = limits.height_m[0], limits.height_m[1] - limits.wall_margin_m
@@ -186,9 +201,8 @@ def _passes(limits: Limits) -> list[ManoeuvrePiece]:
 
             way = {0: "along the nose", 45: "across the diagonal", 90: "sideways"}[degrees]
             words = f"to and fro {way}, {amplitude:.1f} m each way at up to {amplitude * rate:.1f} m/s, nose held"
-            out.append(
-                ManoeuvrePiece(f"pass {degrees} at {share:g}", words, make, _whole(rate, 15.0, ramp_s=_SLOW_RAMP_S))
-            )
+            duration_s = _whole(rate, 15.0, ramp_s=_SLOW_RAMP_S)
+            out.append(ManoeuvrePiece(f"pass {degrees} at {share:g}", words, make, duration_s))
     for degrees, axis in ((0, 0), (90, 1)):
         amplitude, rate = _largest(limits, limits.room_m[axis], 0.8)
         heave = min(limits.room_m[2], 0.6 * limits.climb_m_s / _HEAVE_RAD_S, 0.3 * _GRAVITY_M_S2 / _HEAVE_RAD_S**2)
@@ -233,21 +247,13 @@ def _turns(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
         out[:, 0] = amplitude * np.sin(_phase(t, rate, ramp_s=_SLOW_RAMP_S))
         return out, _phase(t, 0.6 * yaw_rate, 2 * np.pi)
 
-    pieces = [
-        ManoeuvrePiece(
-            "eight",
-            f"a figure of eight, {amplitude:.1f} m each way, nose held",
-            eight,
-            _whole(rate / np.sqrt(2), 15.0, ramp_s=_SLOW_RAMP_S),
-        )
-    ]
+    words = f"a figure of eight, {amplitude:.1f} m each way, nose held"
+    pieces = [ManoeuvrePiece("eight", words, eight, _whole(rate / np.sqrt(2), 15.0, ramp_s=_SLOW_RAMP_S))]
     # Half a turn by a quintic: its largest rate is 1.875 π / T, its largest acceleration 5.77 π / T².
     half_s = max(1.875 * np.pi / (0.8 * np.radians(limits.yaw_rate_deg_s)), np.sqrt(5.77 * np.pi / most_rad_s2), 1.0)
 
     def face(t):
-        there, back = np.clip((t - 1.0) / half_s, 0, 1), np.clip((t[-1] - 1.0 - t) / half_s, 0, 1)
-        s = np.minimum(there, back)
-        return np.zeros((len(t), 3)), np.pi * s**3 * (10 - 15 * s + 6 * s**2)
+        return np.zeros((len(t), 3)), np.pi * _smooth(np.minimum(t - 1.0, t[-1] - 1.0 - t) / half_s)
 
     pieces.append(ManoeuvrePiece("face", "turn the nose half round, hover, turn it back", face, 2 * half_s + 4.0))
     degrees = np.degrees(yaw_rate)
@@ -282,21 +288,15 @@ def _climbs(limits: Limits) -> list[ManoeuvrePiece]:
 
 def _oscillations(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
     """Multisines of the acceleration along some axes (and of yaw) with harmonics of their own each."""
-    most = _ROOM * _GRAVITY_M_S2 * np.tan(np.radians(limits.tilt_deg))
-    families = {
-        "shake all": ("x", "y", "z", "yaw"),
-        "shake sideways": ("x", "y"),
-        "shake height": ("z",),
-        "shake yaw": ("yaw",),
-    }
-    words = {
-        "shake all": "small quick motions along and about all axes at once",
-        "shake sideways": "small quick motions forwards and sideways",
-        "shake height": "small quick climbs and descents",
-        "shake yaw": "small quick turns of the nose",
-    }
+    most = _most_level_m_s2(limits)
+    families = (
+        ("shake all", ("x", "y", "z", "yaw"), "small quick motions along and about all axes at once"),
+        ("shake sideways", ("x", "y"), "small quick motions forwards and sideways"),
+        ("shake height", ("z",), "small quick climbs and descents"),
+        ("shake yaw", ("yaw",), "small quick turns of the nose"),
+    )
     out = []
-    for name, axes in families.items():
+    for name, axes, words in families:
         for low_hz, high_hz in _BANDS_HZ:
 
             def make(t, axes=axes, low_hz=low_hz, high_hz=high_hz):
@@ -306,9 +306,9 @@ def _oscillations(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
                 for i, axis in enumerate(axes):
                     own = count[i :: len(axes)].astype(float)
                     wave = _multisine(t, own, i) * _envelope(t)
+                    slope = np.gradient(wave, t)
+                    bend = np.abs(np.gradient(slope, t)).max()
                     if axis == "yaw":
-                        slope = np.gradient(wave, t)
-                        bend = np.abs(np.gradient(slope, t)).max()
                         most_rate = 0.8 * np.radians(limits.yaw_rate_deg_s)
                         most_bend = most_rad_s2 / len(axes) ** 0.5
                         yaw = wave * min(np.radians(40.0), most_rate / np.abs(slope).max(), most_bend / bend)
@@ -317,27 +317,21 @@ def _oscillations(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
                     # What several axes ask of a rotor at once adds up.
                     top = (most / np.sqrt(2) if len(axes) > 1 else most) if k < 2 else 4.0 / len(axes) ** 0.5
                     speed = limits.speed_m_s / np.sqrt(2) if k < 2 else limits.climb_m_s
-                    slope = np.gradient(wave, t)
-                    bend = np.abs(np.gradient(slope, t)).max()
                     size = min(top / bend, speed / np.abs(slope).max(), limits.room_m[k] / np.abs(wave).max())
                     position[:, k] = size * wave
                 return position, yaw
 
-            out.append(
-                ManoeuvrePiece(
-                    f"{name} to {high_hz:g} Hz", f"{words[name]}, {low_hz:g} to {high_hz:g} times a second", make
-                )
-            )
+            said = f"{words}, {low_hz:g} to {high_hz:g} times a second"
+            out.append(ManoeuvrePiece(f"{name} to {high_hz:g} Hz", said, make))
     return out
 
 
 def _doublets(limits: Limits, most_rad_s2: float) -> ManoeuvrePiece:
     """Pushes of the tilt forwards, sideways and of the nose, each followed by its opposite, which leads back."""
-    most = _ROOM * _GRAVITY_M_S2 * np.tan(np.radians(limits.tilt_deg))
+    most = _most_level_m_s2(limits)
     push = min(most, limits.speed_m_s / _DOUBLET_S, min(limits.room_m[:2]) / _DOUBLET_S**2)
-    turn = min(
-        np.radians(20.0), 0.5 * np.radians(limits.yaw_rate_deg_s) * _DOUBLET_S, most_rad_s2 * _DOUBLET_S**2 / 5.77
-    )
+    fastest = 0.5 * np.radians(limits.yaw_rate_deg_s) * _DOUBLET_S
+    turn = min(np.radians(20.0), fastest, most_rad_s2 * _DOUBLET_S**2 / 5.77)
 
     def make(t):
         position, yaw = np.zeros((len(t), 3)), np.zeros(len(t))
@@ -358,9 +352,8 @@ def _doublets(limits: Limits, most_rad_s2: float) -> ManoeuvrePiece:
                 yaw += turn * wave
         return position, yaw
 
-    return ManoeuvrePiece(
-        "doublets", "quick pushes to and fro: forwards, sideways, of the nose", make, 8.0 * _DOUBLET_S * 6 + 1.0
-    )
+    words = "quick pushes to and fro: forwards, sideways, of the nose"
+    return ManoeuvrePiece("doublets", words, make, 8.0 * _DOUBLET_S * 6 + 1.0)
 
 
 def joined(pieces: tuple[ManoeuvrePiece, ...] | list[ManoeuvrePiece], step_s: float, still_s: float = 1.0) -> Reference:
@@ -376,3 +369,132 @@ def joined(pieces: tuple[ManoeuvrePiece, ...] | list[ManoeuvrePiece], step_s: fl
     yaw.append(np.full(rest, turned))
     every = np.concatenate(position)
     return Reference(step_s * np.arange(len(every)), every, np.concatenate(yaw))
+
+
+def _number(value: object) -> object:
+    """The value as it is; YAML's yes and no are no numbers, and text is none."""
+    for part in value if isinstance(value, list) else [value]:
+        if isinstance(part, bool):
+            raise ValueError("found yes or no, expected a number")
+        if isinstance(part, str):
+            raise ValueError(f"found {part!r}, expected a number")
+    return value
+
+
+class Limits(BaseModel):
+    """Limits of a flight; x and y are from the place of the start, heights above the ground, all in SI but degrees."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    x_m: _Range = (-3.0, 3.0)
+    """North of the start, lowest and highest."""
+    y_m: _Range = (-3.0, 3.0)
+    """East of the start, lowest and highest."""
+    height_m: _Range = (0.8, 3.0)
+    """Above the ground, lowest and highest."""
+    wall_margin_m: float = Field(0.5, ge=0)
+    """Kept from every side of that volume but the lowest height."""
+    speed_m_s: float = Field(3.0, gt=0, le=60)
+    climb_m_s: float = Field(1.5, gt=0, le=30)
+    tilt_deg: float = Field(25.0, gt=0, le=70)
+    yaw_rate_deg_s: float = Field(120.0, gt=0, le=2000)
+    duration_s: float = Field(60.0, ge=10, le=1200)
+    """In the air, in total; what the battery allows."""
+    attitude_bandwidth_rad_s: float = Field(9.0, gt=0.5, le=100)
+    """Natural frequency of the vehicle's attitude loop: faster changes are not followed."""
+    position_bandwidth_rad_s: float | None = Field(None, gt=0.1, le=50)
+    """Natural frequency of its position loop; a fifth of the attitude loop's where not stated."""
+    target_sigma: float = Field(6.0, gt=0, le=100)
+    """Separation, in standard errors, at which a question counts as settled."""
+
+    home_deg: _Range | None = None
+    """Latitude and longitude of the start, for a mission; without them none is written."""
+
+    _numbers = field_validator("*", mode="before")(_number)
+
+    @field_validator("x_m", "y_m", "height_m")
+    @classmethod
+    def _in_order(cls, value: _Range) -> _Range:
+        if not value[0] < value[1]:
+            raise ValueError(f"found [{value[0]:g}, {value[1]:g}], expected the lower number first")
+        return value
+
+    @field_validator("home_deg")
+    @classmethod
+    def _on_earth(cls, value: _Range | None) -> _Range | None:
+        if value is not None and not (abs(value[0]) < 85 and abs(value[1]) <= 180):
+            raise ValueError(f"found [{value[0]:g}, {value[1]:g}], expected latitude and longitude in degrees")
+        return value
+
+    @model_validator(mode="after")
+    def _has_room(self) -> Limits:
+        if not self.x_m[0] <= 0 <= self.x_m[1] or not self.y_m[0] <= 0 <= self.y_m[1]:
+            raise ValueError("x_m and y_m are from the place of the start and must hold 0")
+        if self.height_m[0] < 0:
+            raise ValueError(f"height_m starts at {self.height_m[0]:g} m, below the ground")
+        slow = self.position_bandwidth_rad_s
+        if slow is not None and slow > self.attitude_bandwidth_rad_s / 2:
+            raise ValueError(
+                f"position_bandwidth_rad_s {slow:g} is more than half of attitude_bandwidth_rad_s "
+                f"{self.attitude_bandwidth_rad_s:g}: such a loop does not hold"
+            )
+        if min(self.room_m) <= 0:
+            raise ValueError(f"wall_margin_m {self.wall_margin_m:g} leaves no room to fly in")
+        return self
+
+    @property
+    def room_m(self) -> tuple[float, float, float]:
+        """Largest excursion from the middle of the volume along x, y and height."""
+        m = self.wall_margin_m
+        sizes = [(self.x_m[1] - self.x_m[0]) / 2 - m, (self.y_m[1] - self.y_m[0]) / 2 - m]
+        return (*sizes, (self.height_m[1] - m - self.height_m[0]) / 2)
+
+    @property
+    def middle_m(self) -> tuple[float, float, float]:
+        """Middle of the volume: north, east of the start, and height."""
+        top = self.height_m[1] - self.wall_margin_m
+        return (sum(self.x_m) / 2, sum(self.y_m) / 2, (self.height_m[0] + top) / 2)
+
+
+class SessionLimits(BaseModel):
+    """Limits of a session on a stand or bench."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    duration_s: float = Field(600.0, ge=30, le=14400)
+    """Of all steps together."""
+    load_share: float = Field(1.0, gt=0, le=1.5)
+    """Largest load of a bench, or speed of a stand's rotors, over the largest of the set."""
+    wait_s: float = Field(60.0, ge=5, le=3600)
+    """How long a load is held, or its absence."""
+    tilt_deg: float = Field(15.0, ge=0, le=60)
+    """To which a stand's mount can be tilted; 0 where it cannot."""
+    target_sigma: float = Field(6.0, gt=0, le=100)
+    """Separation, in standard errors, at which a question counts as settled."""
+
+    _numbers = field_validator("*", mode="before")(_number)
+
+
+def read_limits(path: Path | None, kind: type[T] = Limits) -> T:
+    """Limits of a flight, or of another `kind`, from a file; the usual ones without any.
+
+    Raises InputError: the file is not there, is no YAML, or states something that cannot be; one sentence.
+    """
+    if path is None:
+        return kind()
+    such = "speed_m_s: 3" if kind is Limits else "duration_s: 600"
+    try:
+        content = with_exponents(read_yaml(path))
+    except InputError as error:
+        raise InputError(f"{error}; expected lines such as {such}") from None
+    try:
+        return kind.model_validate(content)
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = ".".join(str(part) for part in first["loc"])
+        if first["type"] == "extra_forbidden":
+            known = ", ".join(kind.model_fields)
+            raise InputError(f"{path}: {name} is no limit; known are {known}{hint(name, kind.model_fields)}") from None
+        said = first["msg"].removeprefix("Value error, ")
+        said = said[0].lower() + said[1:]
+        raise InputError(f"{path}: {name + ': ' if name else ''}{said}") from None

@@ -6,17 +6,16 @@ the shared linear terms free, in whitened squares as the engine has them. What t
 chain is λ of `rotorid.plan.separation`. Fitted to each manoeuvre apart the rival is freer than over all of them: the
 sum is a lower bound.
 
-Sets of one vehicle judged together, and what of the first's open questions the later ones settled.
-
-Values of the vehicle and effects are held equal in all sets; each run keeps what belongs to a run (a scale of its
-thrust where runs differ beyond doubt, gusts, offsets in time). Runs are named by their set, so that `2-hover` is of the
-second. What the first holds out stays held out; of each other a third is held out. One of fewer than three runs is cut
-for that: runs held out of calm flights say nothing of what a planned flight excites.
+Later sets of the vehicle are judged together with it: values of the vehicle and effects are held equal in all sets;
+each run keeps what belongs to a run (a scale of its thrust where runs differ beyond doubt, gusts, offsets in time).
+Runs are named by their set, so that `2-hover` is of the second. What the first holds out stays held out; of each other
+a third is held out. One of fewer than three runs is cut for that: runs held out of calm flights say nothing of what a
+planned flight excites.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -68,85 +67,60 @@ class _ChainModel:
     """Relative one-sigma of the id's own parameters."""
 
 
-@dataclass(frozen=True)
-class _ChainQuestion:
-    """Ids of which one lies between command and rotor speed."""
+def _leftover(found: Fitted, segments: Sequence[Segment]) -> Callable[[tuple, np.ndarray], np.ndarray]:
+    """A function of chain and values: what these leave of segments, whitened (m,), the shared linear terms free."""
+    prepared, search, (result, full, volt) = found.prepared, found.model.search, found.chain
 
-    ids: tuple[str, ...]
-    models: tuple[_ChainModel, ...]
-
-    @property
-    def pairs(self) -> tuple[tuple[_ChainModel, _ChainModel], ...]:
-        """Every model with every rival."""
-        return tuple((a, b) for a in self.models for b in self.models if a.id != b.id)
-
-
-class _ChainLeftover:
-    """What a chain leaves of a set's recordings in whitened squares, the shared linear terms free."""
-
-    def __init__(self, found: Fitted):
-        self.found, self.prepared = found, found.prepared
-        self.result, self.full, self.volt = found.chain
-        self.keys = [*found.model.search.always, *found.model.selection.active]
-        self.filters = found.model.search.regression.filters
-        if found.measured:
-            raws = [self._speeds(s, self.result.fit.chain, self.result.fit.values) for s in self.prepared.segments]
-            self.speed_filters = [autoregression([r[:, j] for r in raws]) for j in range(raws[0].shape[1])]
-
-    def path(self, segment: Segment, chain, values) -> np.ndarray:
+    def path(segment: Segment, chain, values) -> np.ndarray:
         """Rotor speeds (n, k), rad/s, that a chain makes of the segment's commands."""
-        return commanded_path(
-            segment, chain, values, self.result.fit.shift_s, self.full, self.volt, self.result.fit.holds
-        )
+        return commanded_path(segment, chain, values, result.fit.shift_s, full, volt, result.fit.holds)
 
-    def _speeds(self, segment, chain, values) -> np.ndarray:
-        return segment.motion.rotor_speed - self.path(segment, chain, values)
+    if found.measured:
+        raws = [s.motion.rotor_speed - path(s, result.fit.chain, result.fit.values) for s in prepared.segments]
+        by_rotor = [autoregression([r[:, j] for r in raws]) for j in range(raws[0].shape[1])]
 
-    def of(self, segments: Sequence[Segment]):
-        """A function of chain and values that gives the whitened residual (m,) of segments."""
-        if self.found.measured:
-            return lambda chain, values: np.concatenate([self._white_speeds(s, chain, values) for s in segments])
-        turned = path_segments(list(segments), self.result, self.full, self.volt, self.prepared.thinner.cutoff_hz)
-        terms = [self.found.model.search.terms[k] for k in self.keys]
-        rows = assemble_rows(self.prepared, terms, turned, chosen(self.found.model))
-        channels = [c for c in self.filters if c < 6 and np.isfinite(rows[0].y[:, c]).all()]
-        columns = np.concatenate([self._white(r.x, channels) for r in rows])
-        precision = self.found.model.search.regression.precision[self.found.model.search.regression.columns(self.keys)]
-        stacked = np.concatenate([columns, np.diag(np.sqrt(precision))])
-        unit = np.sqrt((stacked**2).sum(axis=0)) + 1e-30
-        basis = np.linalg.qr(stacked / unit)[0]
-        effects = chosen(self.found.model)
+        def white_speeds(segment: Segment, chain, values) -> np.ndarray:
+            raw = segment.motion.rotor_speed - path(segment, chain, values)
+            edge = max(max(len(f) for f in by_rotor), int(_EDGE_S * segment.rate_hz))
+            return np.concatenate([causal(f, raw[:, j])[edge : len(raw) - edge] for j, f in enumerate(by_rotor)])
 
-        def left(chain, values):
-            parts = []
-            for segment in segments:
-                moved = replace(segment, motion=replace(segment.motion, rotor_speed=self.path(segment, chain, values)))
-                own = residual(moved, self.prepared.vehicle)
-                for form, at in effects:
-                    extra = form.contribution(moved.motion, self.prepared.vehicle, at)
-                    for name in ("force", "moment"):
-                        if name in own and getattr(extra, name) is not None:
-                            own[name] = own[name] - getattr(extra, name)
-                groups = [self.prepared.thinner(own[g]) if g in own else None for g in ("force", "moment")]
-                size = next(len(g) for g in groups if g is not None)
-                y = np.concatenate([np.zeros((size, 3)) if g is None else g for g in groups], axis=1)
-                parts.append(self._white(y[:, :, None], channels)[:, 0])
-            y = np.concatenate([*parts, np.zeros(len(unit))])
-            return y - basis @ (basis.T @ y)
+        return lambda chain, values: np.concatenate([white_speeds(s, chain, values) for s in segments])
 
-        return left
+    keys, filters = [*search.always, *found.model.selection.active], search.regression.filters
+    effects = chosen(found.model)
+    turned = path_segments(list(segments), result, full, volt, prepared.thinner.cutoff_hz)
+    rows = assemble_rows(prepared, [search.terms[k] for k in keys], turned, effects)
+    channels = [c for c in filters if c < 6 and np.isfinite(rows[0].y[:, c]).all()]
+    edge = max(*(len(filters[c]) for c in channels), int(_EDGE_S * prepared.thinner.rate_hz))
 
-    def _white(self, values: np.ndarray, channels: Sequence[int]) -> np.ndarray:
+    def white(values: np.ndarray) -> np.ndarray:
         """Channels (n, c, k) whitened and stacked, (m, k)."""
-        longest = max(len(self.filters[c]) for c in channels)
-        edge = max(longest, int(_EDGE_S * self.prepared.thinner.rate_hz))
-        return np.concatenate([causal(self.filters[c], values[:, c])[edge : len(values) - edge] for c in channels])
+        return np.concatenate([causal(filters[c], values[:, c])[edge : len(values) - edge] for c in channels])
 
-    def _white_speeds(self, segment, chain, values) -> np.ndarray:
-        raw = self._speeds(segment, chain, values)
-        edge = max(max(len(f) for f in self.speed_filters), int(_EDGE_S * segment.rate_hz))
-        parts = [causal(f, raw[:, j])[edge : len(raw) - edge] for j, f in enumerate(self.speed_filters)]
-        return np.concatenate(parts)
+    columns = np.concatenate([white(r.x) for r in rows])
+    precision = search.regression.precision[search.regression.columns(keys)]
+    stacked = np.concatenate([columns, np.diag(np.sqrt(precision))])
+    unit = np.sqrt((stacked**2).sum(axis=0)) + 1e-30
+    basis = np.linalg.qr(stacked / unit)[0]
+
+    def left(chain, values):
+        parts = []
+        for segment in segments:
+            moved = replace(segment, motion=replace(segment.motion, rotor_speed=path(segment, chain, values)))
+            own = residual(moved, prepared.vehicle)
+            for form, at in effects:
+                extra = form.contribution(moved.motion, prepared.vehicle, at)
+                for name in ("force", "moment"):
+                    if name in own and getattr(extra, name) is not None:
+                        own[name] = own[name] - getattr(extra, name)
+            groups = [prepared.thinner(own[g]) if g in own else None for g in ("force", "moment")]
+            size = next(len(g) for g in groups if g is not None)
+            y = np.concatenate([np.zeros((size, 3)) if g is None else g for g in groups], axis=1)
+            parts.append(white(y[:, :, None])[:, 0])
+        y = np.concatenate([*parts, np.zeros(len(unit))])
+        return y - basis @ (basis.T @ y)
+
+    return left
 
 
 def _fitted_values(left, chain, starts: Sequence[np.ndarray]) -> tuple[np.ndarray, float]:
@@ -162,15 +136,15 @@ def _fitted_values(left, chain, starts: Sequence[np.ndarray]) -> tuple[np.ndarra
     return done.x, float(2 * done.cost)
 
 
-def _chain_question(found: Fitted, finding: Finding, ids: Sequence[str]) -> _ChainQuestion | None:
-    """The competing chains of a class; None where fewer than two can be fitted to the set."""
+def _chain_question(found: Fitted, finding: Finding, ids: Sequence[str]) -> tuple[_ChainModel, ...]:
+    """The competing chains of a class; none where fewer than two can be fitted to the set."""
     result = found.chain[0]
     own, rest = finding.id, [(k, f) for k, f in result.fit.chain if k != finding.id]
     where = result.fit.slice_of(own)
     kept = np.delete(result.fit.values, np.arange(where.start, where.stop))
     spread = np.sqrt(np.diag(result.fit.covariance)[where]) / np.maximum(np.abs(result.fit.values[where]), 1e-12)
     models = [_ChainModel(own, result.fit.chain, result.fit.values, float(spread.min()))]
-    left = _ChainLeftover(found).of([s for s in found.prepared.segments if s.run in found.prepared.split.training])
+    left = _leftover(found, [s for s in found.prepared.segments if s.run in found.prepared.split.training])
     for other in ids:
         forms = catalogue()[other].speed_forms if other in catalogue() else ()
         volts = all(s.motion.voltage is not None for s in found.prepared.segments)
@@ -183,12 +157,12 @@ def _chain_question(found: Fitted, finding: Finding, ids: Sequence[str]) -> _Cha
             tries.append((square, _ChainModel(other, chain, values, models[0].doubt)))
         if tries:
             models.append(min(tries, key=lambda t: t[0])[1])
-    return _ChainQuestion(tuple(m.id for m in models), tuple(models)) if len(models) > 1 else None
+    return tuple(models) if len(models) > 1 else ()
 
 
 def chain_squares(found: Fitted, segments: Sequence[Segment], true: _ChainModel, rival: _ChainModel) -> float:
     """λ of a true chain against its rival on segments that the true one made."""
-    left = _ChainLeftover(found).of(segments)
+    left = _leftover(found, segments)
     own = float((left(true.chain, true.values) ** 2).sum())
     _, other = _fitted_values(left, rival.chain, [rival.values])
     return max(other - own, 0.0)
@@ -237,7 +211,7 @@ class FittedSet:
     fitted: Fitted
     findings: tuple[Finding, ...]
     questions: tuple[Question, ...]
-    chains: tuple[_ChainQuestion, ...]
+    chains: tuple[tuple[_ChainModel, ...], ...]
     """The same of what lies between command and rotor speed."""
     unanswerable: tuple[tuple[tuple[str, ...], str], ...]
     """Classes that no flight with these columns can settle, with what it takes."""
@@ -263,10 +237,7 @@ def known(
     Of ids that the verdict on the set does not claim (`claimed`, all members of its classes) nothing is asked: they are
     too small to matter.
 
-    Raises
-    ------
-    InputError
-        The set is no flight.
+    Raises InputError: the set is no flight.
     """
     if recordings.vehicle.kind != "flight":
         raise InputError(f"set {recordings.name}: a plan is made for flights; this is a {recordings.vehicle.kind}")
@@ -295,7 +266,7 @@ def known(
         if needed := beyond_flying(found, ids):
             unanswerable.append((ids, needed))
         elif finding.id in chain:
-            if (between := _chain_question(found, finding, ids)) is not None:
+            if between := _chain_question(found, finding, ids):
                 chains.append(between)
             else:
                 needed = "these columns give no chain of the others to compare with"
@@ -318,10 +289,7 @@ def known(
 def known_from(recordings: RecordingSet, verdict: dict) -> FittedSet:
     """A set fitted, with the questions that its verdict leaves open; `verdict` is the content of its verdict.json.
 
-    Raises
-    ------
-    InputError
-        The set is no flight, or does not suffice.
+    Raises InputError: the set is no flight, or does not suffice.
     """
     suggested = [e["id"] for e in verdict["effects"] if e["status"] == "suggested"]
     return known(sufficient(recordings), suggested, claimed_in(verdict))
@@ -391,10 +359,7 @@ def _hypothesis(regression: Regression, shared: Sequence[str], name: str, keys: 
 def joined_sets(first: RecordingSet, *others: RecordingSet) -> tuple[RecordingSet, tuple[str, ...]]:
     """All sets as one, and what a reader must know about it.
 
-    Raises
-    ------
-    InputError
-        The sets are not of one vehicle as believed, or share no columns but the time.
+    Raises InputError: the sets are not of one vehicle as believed, or share no columns but the time.
     """
     others = tuple(in_thirds(s) for s in others)
     sets = (first, *others)
@@ -444,34 +409,22 @@ def _brief(value) -> str:
     return text if len(text) < 40 else text[:37] + "…"
 
 
-@dataclass(frozen=True)
-class _Outcome:
-    """What became of a question that the first set left open."""
-
-    ids: tuple[str, ...]
-    answer: str
-    """The id that is established now; empty where the question is still open."""
-    sentence: str
-
-
-def answers(open_before: Sequence[tuple[str, ...]], findings: Sequence[Finding]) -> list[_Outcome]:
-    """What the findings of all sets together say of each class that was left open."""
+def answers(open_before: Sequence[tuple[str, ...]], findings: Sequence[Finding]) -> list[dict]:
+    """What the findings of all sets together say of each class that was left open: its `ids`, a `sentence`, and as
+    `answer` the id that is established now (empty where the question is still open)."""
     out = []
     for ids in open_before:
-        named = " or ".join(ids)
-        sure = [f.id for f in findings if f.status == "established" and f.id in ids]
+        answer, sure = "", [f.id for f in findings if f.status == "established" and f.id in ids]
         still = [f for f in findings if f.status == "ambiguous" and set(f.alternatives) & set(ids)]
         if sure and not still:
-            what = " and ".join(sure)
-            out.append(_Outcome(ids, sure[0], f"{named}: all sets together say {what}"))
+            answer, said = sure[0], f"all sets together say {' and '.join(sure)}"
         elif still:
             left = still[0].alternatives
-            fewer = set(left) < set(ids)
-            out.append(_Outcome(ids, "", f"{named}: {'narrowed to' if fewer else 'still'} {' or '.join(left)}"))
+            said = f"{'narrowed to' if set(left) < set(ids) else 'still'} {' or '.join(left)}"
         else:
             weaker = [f.id for f in findings if f.status == "suggested" and f.id in ids]
             said = f"suggested is {weaker[0]}" if weaker else "neither is established"
-            out.append(_Outcome(ids, "", f"{named}: {said}"))
+        out.append({"ids": list(ids), "answer": answer, "sentence": f"{' or '.join(ids)}: {said}"})
     return out
 
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import permutations
 
 import numpy as np
 
@@ -31,8 +32,7 @@ from rotorid.mismatch.evidence.split import HELD_OUT_SHARE, training_rule
 from rotorid.mismatch.flight.absent import scales
 from rotorid.mismatch.flight.prepare import assemble_rows, prepare_like
 from rotorid.mismatch.flight.wrench import after_residual, block_seconds, channel_floor, chosen, path_segments
-from rotorid.plan.candidates import Reference
-from rotorid.plan.limits import Limits
+from rotorid.plan.candidates import Limits, Reference
 from rotorid.plan.questions import FittedSet, Hypothesis, Question, chain_interval, chain_squares
 from rotorid.plan.simulate import ChangedVehicle, CompetingModel, SimulatedFlight, commands, fly, recorded
 from rotorid.recordings import RecordingSet, Vehicle
@@ -234,8 +234,8 @@ def _of_flight(
 
     segments = segments_of(flight)
     apart = []
-    for question in known.chains:
-        for true, rival in question.pairs:
+    for models in known.chains:
+        for true, rival in permutations(models, 2):
             at, chain = 0, []
             for _, form in true.chain:
                 chain.append((form, true.values[at : at + len(form.parameters)]))
@@ -460,9 +460,9 @@ def chain_separations(
 ) -> list[tuple[tuple[str, ...], tuple[Separation, ...]]]:
     """Every chain of every question between command and speed against its nearest rival."""
     out, at = [], 0
-    for question in known.chains:
+    for models in known.chains:
         found: dict[str, Separation] = {}
-        for true, rival in question.pairs:
+        for true, rival in permutations(models, 2):
             every = np.zeros(1) if information.squares is None else np.sqrt(information.squares[..., at].ravel())
             at += 1
             sigma, most = float(every.min()), float(every.max())
@@ -471,7 +471,7 @@ def chain_separations(
                 found[true.id] = Separation(
                     true.id, rival.id, sigma, ends, 0.0, log_odds(np.array([sigma]), information.seconds)
                 )
-        out.append((question.ids, tuple(found.values())))
+        out.append((tuple(m.id for m in models), tuple(found.values())))
     return out
 
 

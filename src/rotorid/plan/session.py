@@ -1,10 +1,8 @@
-"""What to load, throttle, tilt and wait next on a stand or a bench, so that what a set left open is settled.
+"""What to load, throttle, tilt and wait next on a stand or a bench, so that what a set left open is settled, as files.
 
 A step is a schedule that starts and ends unloaded: loads of a bench (hung on by hand or pulled by a machine), throttle
 of a stand's rotors, in one mounting. Its load is known as soon as it is asked for, so that nothing is simulated but the
 columns that every competing effect would have in it; separations are predicted and steps chosen as for flights.
-
-A session of a stand or bench as files: the schedule, a picture, and what each outcome would mean.
 """
 
 from __future__ import annotations
@@ -36,15 +34,10 @@ from rotorid.mismatch.instrument.model import (
     whole_reading,
 )
 from rotorid.mismatch.instrument.setup import set_up, with_unseen
-from rotorid.plan.limits import SessionLimits
+from rotorid.plan.candidates import SessionLimits
 from rotorid.plan.plan import Forecast, Plan, Tried, chosen_pieces
 from rotorid.plan.questions import Question, claimed_in, in_thirds, question_of
-from rotorid.plan.separation import (
-    FITTED_SHARE,
-    Information,
-    of_set,
-    separations,
-)
+from rotorid.plan.separation import FITTED_SHARE, Information, of_set, separations
 from rotorid.plan.write import by_hand_as_data, draw_separations, questions_as_data, sentences
 from rotorid.recordings import RecordingSet, Run
 from rotorid.recordings import columns as c

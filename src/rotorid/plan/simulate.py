@@ -8,12 +8,10 @@ speeds that make them, with the effects of the competing model at work, follow b
 controller finds them by feedback in the same way. Commands are what the chain between command and speed needs for these
 speeds. Sensors read the truth here: their noise enters where the comparison is predicted.
 
-A vehicle after a step by hand: two propellers swapped, or a known mass attached at a known place.
-
-What a set left open stays in the vehicle, so the columns of its terms are those of the same parameters as before: the
-coefficients of a propeller act where it now sits, and an offset of the centre of mass moves the common centre of both
-masses by the vehicle's share of them. What is believed of the vehicle changes by what was done. How well the mass and
-its place are known is a nuisance of that flight alone.
+After a step by hand (two propellers swapped, or a known mass attached at a known place) what a set left open stays in
+the vehicle, so the columns of its terms are those of the same parameters as before: the coefficients of a propeller act
+where it now sits, and an offset of the centre of mass moves the common centre of both masses by the vehicle's share of
+them. How well the mass and its place are known is a nuisance of that flight alone.
 """
 
 from __future__ import annotations
@@ -151,10 +149,7 @@ def fly(
 
     `bandwidth_rad_s` is of the attitude loop, `position_rad_s` of the position loop (a share of it where not stated).
 
-    Raises
-    ------
-    InputError
-        The rotors cannot do it: one would have to turn backwards.
+    Raises InputError: the rotors cannot do it: one would have to turn backwards.
     """
     vehicle, step = world.vehicle, float(reference.time_s[1] - reference.time_s[0])
     gravity, reference = np.array([0.0, 0.0, vehicle.gravity_m_s2]), _held_longer(reference, step)

@@ -16,7 +16,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 
@@ -26,8 +25,7 @@ import pandas as pd
 from rotorid.effects.catalogue import catalogue
 from rotorid.io.text.writing import all_or_none, rounded
 from rotorid.plan.candidates import Reference
-from rotorid.plan.handled import SHARE, Handled
-from rotorid.plan.plan import BETWEEN_S, Forecast, Plan
+from rotorid.plan.plan import BETWEEN_S, SHARE, Forecast, Handled, Plan
 from rotorid.plan.separation import Questions, Separation
 from rotorid.report.plots.style import BLUE, GREY, ORANGE, RED, figure, use
 
@@ -102,8 +100,7 @@ def px4_offboard(plan: Plan) -> pd.DataFrame:
     """Setpoints in the fields of PX4's TrajectorySetpoint (local north-east-down frame, yaw from −π to π)."""
     table = sampled(plan)
     names = {"time_s": "timestamp_s", "yaw_rate_rad_s": "yawspeed"}
-    for stem in ("position", "velocity", "acceleration"):
-        unit = {"position": "m", "velocity": "m_s", "acceleration": "m_s2"}[stem]
+    for stem, unit in (("position", "m"), ("velocity", "m_s"), ("acceleration", "m_s2")):
         names |= {f"{stem}_{axis}_{unit}": f"{stem}[{i}]" for i, axis in enumerate("xyz")}
     out = table.rename(columns=names | {"yaw_rad": "yaw"})
     out["yaw"] = (out["yaw"] + np.pi) % (2 * np.pi) - np.pi
@@ -251,16 +248,9 @@ def sentences(
 ) -> list[str]:
     """A plan in sentences.
 
-    Parameters
-    ----------
-    begin, none
-        What stands above the pieces, and what is said where questions are open and there are no pieces.
-    more
-        What in the limits may settle more.
-    kind, schedule, needed
-        The words for what is planned, for what no question is settled by, and for what is not needed.
-    standard
-        Whether the standard one's pieces are named as well.
+    `begin`, `none`: what stands above the pieces, and what is said where questions are open and there are no pieces.
+    `more`: what in the limits may settle more. `kind`, `schedule`, `needed`: the words for what is planned, for what no
+    question is settled by, and for what is not needed. `standard`: whether the standard one's pieces are named as well.
     """
     out = []
     if plan.pieces:
@@ -325,20 +315,14 @@ def _expected_by_hand(step: Handled, target: float) -> str:
 def by_hand_as_data(plan: Plan) -> list[dict]:
     """Manual steps, for JSON; `predicted` is null where no separation is."""
     target, found = plan.limits.target_sigma, {h.of: h for h in plan.by_hand}
+
+    def predicted(step: Handled) -> dict:
+        said = {"words": step.words, "hover_s": step.hover_s, "minutes": step.minutes}
+        questions = questions_as_data(step.questions, target)
+        return said | {"predicted_separation_sigma": step.sigma, "questions": questions}
+
     return [
-        {
-            "id": i,
-            "step": step,
-            "predicted": None
-            if i not in found
-            else {
-                "words": found[i].words,
-                "hover_s": found[i].hover_s,
-                "minutes": found[i].minutes,
-                "predicted_separation_sigma": found[i].sigma,
-                "questions": questions_as_data(found[i].questions, target),
-            },
-        }
+        {"id": i, "step": step, "predicted": predicted(found[i]) if i in found else None}
         for i, step in _manual_steps(plan).items()
     ]
 
@@ -462,16 +446,6 @@ _RELATIVE = 3
 """MAVLink frame: latitude, longitude, height above home."""
 
 
-@dataclass(frozen=True)
-class _Stop:
-    """A place to go to (north, east, down from the volume's middle), how long to stay, how fast to get there."""
-
-    place_m: np.ndarray
-    yaw_rad: float
-    wait_s: float
-    speed_m_s: float
-
-
 def not_a_mission(plan: Plan) -> str:
     """Why a plan is no mission; empty where it is one."""
     others = [p.name for p in plan.pieces if p.name.split()[0] not in _STRAIGHT]
@@ -482,8 +456,12 @@ def not_a_mission(plan: Plan) -> str:
     return ""
 
 
-def _stops(reference: Reference) -> list[_Stop]:
-    """Where a reference turns round or rests, in order."""
+def _stops(reference: Reference) -> list[tuple[np.ndarray, float, float, float]]:
+    """Where a reference turns round or rests, in order.
+
+    The place (north, east, down from the volume's middle), m, the yaw, rad, how long to stay, s, and how fast to get
+    there, m/s.
+    """
     t = reference.time_s
     speed = np.linalg.norm(np.gradient(reference.position_m, t, axis=0), axis=1)
     turning = np.abs(np.gradient(reference.yaw_rad, t))
@@ -492,10 +470,8 @@ def _stops(reference: Reference) -> list[_Stop]:
     out, last = [], 0
     for start, stop in edges:
         middle, wait = (start + stop - 1) // 2, float(t[stop - 1] - t[start])
-        way = float(speed[last : start + 1].max())
-        out.append(
-            _Stop(reference.position_m[middle], float(reference.yaw_rad[middle]), wait if wait > _HELD_S else 0.0, way)
-        )
+        way, held = float(speed[last : start + 1].max()), wait if wait > _HELD_S else 0.0
+        out.append((reference.position_m[middle], float(reference.yaw_rad[middle]), held, way))
         last = stop
     return out
 
@@ -506,18 +482,9 @@ def mission(plan: Plan) -> dict:
     items: list[dict] = []
 
     def add(command: int, params: list, frame: int = _RELATIVE) -> None:
+        item = {"type": "SimpleItem", "autoContinue": True, "command": command, "doJumpId": len(items) + 1}
         height = {"Altitude": params[6], "AltitudeMode": 1, "AMSLAltAboveTerrain": None} if command == WAYPOINT else {}
-        items.append(
-            {
-                "type": "SimpleItem",
-                "autoContinue": True,
-                "command": command,
-                "doJumpId": len(items) + 1,
-                "frame": frame,
-                "params": params,
-            }
-            | height
-        )
+        items.append(item | {"frame": frame, "params": params} | height)
 
     def place(at: np.ndarray) -> list[float]:
         north, east, height = at[0] + middle[0], at[1] + middle[1], middle[2] - at[2]
@@ -527,14 +494,11 @@ def mission(plan: Plan) -> dict:
 
     add(TAKE_OFF, [0, 0, 0, 0, *place(np.zeros(3))])
     fastest = 0.0
-    for stop in _stops(plan.reference):
-        if stop.speed_m_s > 0.1 and abs(stop.speed_m_s - fastest) > 0.05:
-            fastest = stop.speed_m_s
+    for at, yaw_rad, wait_s, speed_m_s in _stops(plan.reference):
+        if speed_m_s > 0.1 and abs(speed_m_s - fastest) > 0.05:
+            fastest = speed_m_s
             add(SPEED, [1, round(fastest, 2), -1, 0, 0, 0, 0], frame=2)
-        add(
-            WAYPOINT,
-            [round(stop.wait_s, 1), 0, 0, round(float(np.degrees(stop.yaw_rad)) % 360, 1), *place(stop.place_m)],
-        )
+        add(WAYPOINT, [round(wait_s, 1), 0, 0, round(float(np.degrees(yaw_rad)) % 360, 1), *place(at)])
     add(RETURN, [0, 0, 0, 0, 0, 0, 0], frame=2)
     return {
         "fileType": "Plan",

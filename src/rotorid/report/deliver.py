@@ -1,11 +1,7 @@
-"""From a recording set to the files of its verdict: verdict, page, vehicle, conditions, instruments and ledger.
+"""From a recording set to the files of its verdict, and the verdict as an object of a notebook.
 
-The ledger of a verdict: every rule that decided something, on what, with its numbers and its sentence.
-
-It lies next to the verdict (`ledger.json`), for whoever wants to know why an effect is not in the model, or why its
-status is no higher.
-
-A verdict as an object: its sentence, tables, the improved vehicle, its files, and how a notebook shows it.
+Of the files `ledger.json` has every rule that decided something, on what, with its numbers and its sentence: for
+whoever wants to know why an effect is not in the model, or why its status is no higher.
 """
 
 from __future__ import annotations
@@ -48,23 +44,19 @@ from rotorid.mismatch.tell.steps import steps_sentence, tiles
 from rotorid.mismatch.tell.verdict import Verdict, main_channel, make_verdict, with_doubts
 from rotorid.recordings import RecordingSet, Vehicle, read_vehicle, vehicle_of, write_vehicle
 from rotorid.recordings.sufficient import sufficient
-from rotorid.report.page.make import make_page, pretty
+from rotorid.report.page import make_page, pretty
 from rotorid.steps import step
 
 _ONE_THREAD = threadpool_limits.wrap(limits=1)
 """The matrices are small: a second thread of the linear algebra costs half as much again and saves no time."""
 FILES = ("verdict.json", "report.html", "improved_vehicle.yaml", "ledger.json")
 """Files that every verdict has."""
-OTHERS = ("conditions.yaml", "instruments.yaml")
+OTHERS = (CONDITIONS, INSTRUMENTS)
 """Files that it has where there is something to write."""
 
 
 def deliver(
-    recordings: RecordingSet,
-    verdict_path: Path,
-    page_path: Path,
-    improved_path: Path,
-    off: Collection[str] = (),
+    recordings: RecordingSet, verdict_path: Path, page_path: Path, improved_path: Path, off: Collection[str] = ()
 ) -> Verdict:
     """Analyse a set and write its verdict, its page and the improved vehicle; rules named in `off` are left out."""
     return write_files(analysis_of(recordings, off), verdict_path, page_path, improved_path)
@@ -118,19 +110,14 @@ def _with_first_details(verdict: Verdict, analysis: Analysis) -> Verdict:
 
 
 @_ONE_THREAD
-def write_files(
-    analysis: Analysis,
-    verdict_path: Path,
-    page_path: Path,
-    improved_path: Path,
-) -> Verdict:
+def write_files(analysis: Analysis, verdict_path: Path, page_path: Path, improved_path: Path) -> Verdict:
     """Write what an analysis amounts to; what is taken home is read back and simulated as proof.
 
     `conditions.yaml` and `instruments.yaml` are written next to the improved vehicle where there is something to write.
     """
     locations = locate(analysis)
     improved = improved_vehicle(analysis)
-    others = [improved_path.with_name(name) for name in (CONDITIONS, INSTRUMENTS)]
+    others = [improved_path.with_name(name) for name in OTHERS]
     paths = (verdict_path, page_path, improved_path, verdict_path.with_name("ledger.json"), *others)
     with all_or_none(*paths, optional=others) as parts:
         verdict_part, page_part, improved_part, ledger_part, *other_parts = parts

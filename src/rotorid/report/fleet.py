@@ -1,13 +1,10 @@
-"""Tables of a fleet: which sets show which effect, each parameter over time, which verdicts need a person; its page.
+"""A fleet: verdicts on many sets, their tables and page (one HTML file), and each vehicle over its flights.
 
-The page is one HTML file that needs no other but the verdicts that it links to.
-
-Verdicts on many recording sets in one process: Python starts once, a set that fails costs only itself.
-
-Each set is judged in a process of its own, branched off after everything is imported (which takes milliseconds), so
-that neither a fault nor the memory of one reaches the next. A verdict is remembered by the content of its set and the
-code that judged it: a batch that was broken off, or is cut anew because sets were added, judges nothing twice. A set
-that could not be read, or whose process was killed, is not remembered: another day it may end otherwise.
+Many sets are judged by one process: Python starts once, a set that fails costs only itself. Each is judged in a process
+of its own, branched off after everything is imported (which takes milliseconds), so that neither a fault nor the memory
+of one reaches the next. A verdict is remembered by the content of its set and the code that judged it: a batch that was
+broken off, or is cut anew because sets were added, judges nothing twice. A set that could not be read, or whose process
+was killed, is not remembered: another day it may end otherwise.
 """
 
 from __future__ import annotations
@@ -22,7 +19,7 @@ import sys
 import tempfile
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,14 +28,27 @@ import pandas as pd
 from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
 from rotorid.io.text.files import read_yaml
-from rotorid.recordings import read_set
+from rotorid.mismatch.changes.level_one import (
+    FALSE_ALARMS,
+    Difference,
+    as_one,
+    differences,
+    differences_at,
+    measured,
+    of_one_vehicle,
+    usual_scatter,
+)
+from rotorid.mismatch.changes.quantities import Flown, flown, grid_of
+from rotorid.mismatch.changes.words import difference_words, in_unit_of_words, quantity_words, unit_of
+from rotorid.recordings import RecordingSet, read_set
 from rotorid.recordings.templates import read
-from rotorid.report.deliver import deliver
-from rotorid.report.page.make import drawing, filled
-from rotorid.vehicle.control.swings import swings
+from rotorid.report.deliver import FILES, deliver
+from rotorid.report.page import drawing, filled
+from rotorid.vehicle.control import swings
 
-FILES = ("verdict.json", "report.html", "improved_vehicle.yaml", "ledger.json")
-"""What a verdict consists of."""
+_NUMBERS = ("vehicle", "set", "day", "good", "name", "quantity", "unit", "change", "low_95", "high_95", "limit")
+EVENTS = ("vehicle", "set", "day", "id", "lasts", "sentence")
+_Z95 = 1.96
 FAILED = "failed.json"
 """What stands in its place where there is none: `reason`, and `fault` where it is none of the set's."""
 _WORTH_A_START = 4
@@ -52,25 +62,11 @@ _DATE = re.compile(r"(?<!\d)(20\d\d)[-_]?(0[1-9]|1[0-2])[-_]?(0[1-9]|[12]\d|3[01
 def judge_sets(
     folders: Sequence[Path], code: str, out: Path, memory: Path, progress: Callable[[str], None] = lambda text: None
 ) -> None:
-    """Judge sets: `out/<set>/` each, with the files of its verdict or `failed.json`.
+    """Judge sets of different names: `out/<set>/` each, with the files of its verdict or `failed.json`.
 
-    Parameters
-    ----------
-    folders
-        Folders of the sets; their names must differ.
-    code
-        Hash of the code that judges.
-    out
-        Folder of the results.
-    memory
-        Folder that remembers verdicts by content and code.
-    progress
-        Called with one line a set.
-
-    Raises
-    ------
-    OSError
-        The disk is full, or the like: no fault of a set. What was judged before stays remembered.
+    `memory` is the folder that remembers verdicts by content and `code`, the hash of the code that judges. `progress`
+    gets one line a set. OSError: the disk is full, or the like, no fault of a set; what was judged before stays
+    remembered.
     """
     out.mkdir(parents=True, exist_ok=True)
     places = {folder: memory / code / content_of(folder) for folder in folders}
@@ -164,12 +160,7 @@ def _write_failure(target: Path, reason: str, fault: bool) -> None:
 def collect(folders: Sequence[Path], recordings: Path) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
     """Tables of sets, of effects in sets and of parameters in sets.
 
-    Parameters
-    ----------
-    folders
-        One folder a set, with its verdict or `failed.json`.
-    recordings
-        Folder of the sets themselves, for the names of their vehicles.
+    `folders`: one a set, with its verdict or `failed.json`; `recordings`: that of the sets, for their vehicles' names.
 
     Returns
     -------
@@ -191,26 +182,20 @@ def collect(folders: Sequence[Path], recordings: Path) -> tuple[pd.DataFrame, pd
             continue
         verdict = json.loads((folder / "verdict.json").read_text(encoding="utf-8"))
         found = [e for e in verdict["effects"] if e["status"] in _SHOWN]
-        rows.append(
-            own
-            | {
-                "verdict": verdict["verdict"],
-                "unexplained": verdict["unexplained"]["share"],
-                "effects": " ".join(e["id"] for e in found if e["status"] != "suggested"),
-                "person": "; ".join(_reasons(verdict)),
-                "sentence": verdict["sentence"],
-            }
-        )
+        shown = " ".join(e["id"] for e in found if e["status"] != "suggested")
+        own_row = {"verdict": verdict["verdict"], "unexplained": verdict["unexplained"]["share"], "effects": shown}
+        rows.append(own | own_row | {"person": "; ".join(_reasons(verdict)), "sentence": verdict["sentence"]})
         effects += [own | {"effect": e["id"], "status": e["status"], "share": e["share"]} for e in found]
         parameters += [own | row for row in _numbers(verdict, found)]
     return (
         pd.DataFrame(rows, columns=[*_OWN, "verdict", "unexplained", "effects", "person", "sentence"]),
         pd.DataFrame(effects, columns=[*_OWN, "effect", "status", "share"]),
-        pd.DataFrame(parameters, columns=[*_OWN, "parameter", "unit", "value", "low_95", "high_95", "status"]),
+        pd.DataFrame(parameters, columns=[*_OWN, *_STATED]),
     )
 
 
 _OWN = ("set", "vehicle", "day")
+_STATED = ("parameter", "unit", "value", "low_95", "high_95", "status")
 
 
 def _reasons(verdict: dict[str, Any]) -> list[str]:
@@ -238,11 +223,9 @@ def by_effect(effects: pd.DataFrame, sets: pd.DataFrame) -> pd.DataFrame:
     `share` of the error that goes; the most frequent first."""
     rows = []
     for name, own in effects.groupby("effect"):
-        counts = {status: int((own["status"] == status).sum()) for status in _SHOWN}
+        counts = [int((own["status"] == status).sum()) for status in _SHOWN]
         surely = own[own["status"] == "established"]
-        rows.append(
-            {"effect": name, **counts, "vehicles": surely["vehicle"].nunique(), "share": surely["share"].median()}
-        )
+        rows.append((name, *counts, surely["vehicle"].nunique(), surely["share"].median()))
     table = pd.DataFrame(rows, columns=["effect", *_SHOWN, "vehicles", "share"])
     judged = int((sets["verdict"] != "failed").sum())
     table.insert(1, "of_sets", judged)
@@ -257,16 +240,9 @@ def by_vehicle(effects: pd.DataFrame, sets: pd.DataFrame) -> pd.DataFrame:
     for name, own in sets.sort_values(["day", "set"]).groupby("vehicle"):
         counts = sure.loc[sure["vehicle"] == name, "effect"].value_counts()
         ordered = sorted(counts.items(), key=lambda pair: (-pair[1], pair[0]))
-        rows.append(
-            {
-                "vehicle": name,
-                "sets": len(own),
-                "failed": int((own["verdict"] == "failed").sum()),
-                "person": int((own["person"] != "").sum()),
-                "effects": ", ".join(f"{effect} {count}" for effect, count in ordered),
-                "last": own["verdict"].iloc[-1],
-            }
-        )
+        failed, person = int((own["verdict"] == "failed").sum()), int((own["person"] != "").sum())
+        found = ", ".join(f"{effect} {count}" for effect, count in ordered)
+        rows.append((name, len(own), failed, person, found, own["verdict"].iloc[-1]))
     return pd.DataFrame(rows, columns=["vehicle", "sets", "failed", "person", "effects", "last"])
 
 
@@ -280,25 +256,10 @@ def _numbers(verdict: dict[str, Any], found: Sequence[dict[str, Any]]):
     """Every number that a verdict states with an interval."""
     for effect in found:
         for p in effect["parameters"]:
-            low, high = p["interval_95"]
-            yield {
-                "parameter": f"{effect['id']}.{p['symbol']}",
-                "unit": p["unit"],
-                "value": p["value"],
-                "low_95": low,
-                "high_95": high,
-                "status": effect["status"],
-            }
+            name = f"{effect['id']}.{p['symbol']}"
+            yield dict(zip(_STATED, (name, p["unit"], p["value"], *p["interval_95"], effect["status"]), strict=True))
     for name, value in verdict["parameters"].items():
-        low, high = value["interval_95"]
-        yield {
-            "parameter": name,
-            "unit": "",
-            "value": value["refitted"],
-            "low_95": low,
-            "high_95": high,
-            "status": "wrong value",
-        }
+        yield dict(zip(_STATED, (name, "", value["refitted"], *value["interval_95"], "wrong value"), strict=True))
 
 
 def _vehicle(folder: Path) -> str:
@@ -310,7 +271,7 @@ def _vehicle(folder: Path) -> str:
 
 
 def make_vehicle_page(vehicle: str, numbers: pd.DataFrame, events: pd.DataFrame, figure: Path) -> str:
-    """The page of one vehicle from its rows of the tables of `rotorid.report.fleet_history`, and their figure."""
+    """The page of one vehicle from its rows of the tables of `rotorid.report.fleet`, and their figure."""
     sets = list(dict.fromkeys(numbers["set"]))
     return filled(
         "vehicle.html",
@@ -334,7 +295,7 @@ def make_page(
 ) -> str:
     """The page of a fleet from its tables (`rotorid.report.fleet`); `links` lead to each set's own page.
 
-    `history` are the events of `rotorid.report.fleet_history` and their figure, where they were asked for.
+    `history` are the events of `rotorid.report.fleet` and their figure, where they were asked for.
     """
     rows = [{**row, "link": links.get(row["set"], "")} for row in sets.to_dict("records")]
     words = sets["verdict"].value_counts()
@@ -353,3 +314,137 @@ def make_page(
         looked=[row for row in rows if row["person"]],
         alone=[row for row in rows if not row["person"]],
     )
+
+
+def sets_of_vehicles(
+    folders: Sequence[Path], progress: Callable[[str], None] = lambda text: None
+) -> dict[str, list[RecordingSet]]:
+    """Sets of flights by the name of their vehicle, each in the order of its days, then of its names.
+
+    A set that cannot be read, or is none of flights, is left out; `progress` gets a line that says so.
+    """
+    out: dict[str, list[RecordingSet]] = {}
+    for folder in sorted(folders, key=lambda f: (day_of(f.name), f.name)):
+        try:
+            own = read_set(folder)
+        except InputError as error:
+            progress(f"{folder.name} is left out: {error}")
+            continue
+        if own.vehicle.kind == "flight":
+            out.setdefault(own.vehicle.name, []).append(own)
+    return out
+
+
+def history(
+    sets: Mapping[str, Sequence[RecordingSet]], good: int, progress: Callable[[str], None] = lambda text: None
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Numbers and events of every vehicle, by sets in the order they were flown, of which the first `good` surely are.
+
+    `progress` gets one line a vehicle, and one for each set that is left out.
+
+    Returns
+    -------
+    numbers
+        One row a set and quantity: `vehicle`, `set`, `day`, `good` (1 of the first ones), `name`, `quantity` in words,
+        `unit`, `change` against the mean of the good ones, `low_95`, `high_95` by the set's own pieces and the scatter
+        from flight to flight, `limit` that the mean of the later sets must pass to be stated in 19 of 20 histories.
+    events
+        One row a quantity that differs from a set on: `vehicle`, `set`, `day`, `id` of the quantity, `lasts` (how many
+        sets there are from this one to the next event), `sentence`.
+    """
+    numbers, events = [], []
+    for vehicle, own in sets.items():
+        if len(own) <= good:
+            continue
+        try:
+            own = of_one_vehicle(own)
+            as_one(own[:good])
+            shown = shown_by(own, good, lambda text, v=vehicle: progress(f"{v}: {text}"))
+        except InputError as error:
+            progress(f"{vehicle} is left out: {error}")
+            continue
+        numbers += _numbers_of(vehicle, shown, good)
+        events += [row for point in change_points(shown, good) for row in _rows_of(vehicle, *point)]
+        progress(f"{vehicle}: {len(shown)} sets")
+    return pd.DataFrame(numbers, columns=_NUMBERS), pd.DataFrame(events, columns=EVENTS)
+
+
+_Shown = Mapping[str, Sequence[Flown]]
+"""What the runs of each set show, in the order they were flown; each set counts as one flight."""
+
+
+def shown_by(sets: Sequence[RecordingSet], good: int, progress: Callable[[str], None]) -> _Shown:
+    """What each set shows; one that lacks something that the good ones have is left out, with a line.
+
+    Raises InputError: a good set has no stretch of flight that is long enough.
+    """
+    first = tuple(sets[:good])
+    grid, out, needed = grid_of(first), {}, set()
+    for k, own in enumerate(sets):
+        runs = [flown(run, own.vehicle, grid) for run in own.runs] if grid_of((*first, own)).like(grid) else []
+        runs = [run for run in runs if run is not None]
+        if k < good:
+            if not runs:
+                raise InputError(f"set {own.name}: no stretch of flight is long enough; expected some seconds")
+            needed |= set(runs[0].y)
+        elif not runs or any(needed - set(run.y) for run in runs):
+            progress(f"{own.name} is left out: it lacks flight or columns that the first sets have")
+            continue
+        out[own.name] = runs
+    return out
+
+
+def change_points(shown: _Shown, good: int) -> list[tuple[str, int, tuple[Difference, ...]]]:
+    """The sets from which on something differs, in their order, in how many sets it lasts, and what differs.
+
+    Each splits the history in two parts, looked at again. The false alarms of a vehicle are those of all sets at which
+    it may have changed. A further change needs as many good sets before it as the first one.
+    """
+    names = list(shown)
+    places = range(good, len(names))
+    if not places:
+        return []
+    numbers = measured(list(shown.values()))
+    best: tuple[float, float, int, tuple[Difference, ...]] | None = None
+    for k in places:
+        found = differences_at(k, numbers, names, usual_scatter())
+        stated = tuple(d for d in found if d.false_alarms * len(places) <= FALSE_ALARMS)
+        if stated and (best is None or _rarity(stated[0]) < best[:2]):
+            best = (*_rarity(stated[0]), k, stated)
+    if best is None:
+        return []
+    *_, k, stated = best
+    before, after = ({n: shown[n] for n in part} for part in (names[:k], names[k:]))
+    earlier, later = change_points(before, good), change_points(after, good)
+    first = list(after).index(later[0][0]) if later else len(after)
+    return [*earlier, (names[k], first, stated), *later]
+
+
+def _rarity(d: Difference) -> tuple[float, float]:
+    """How rare a difference is, the rarest first; of those that are equally rare, by their size."""
+    return d.false_alarms, -abs(d.value) / d.sd
+
+
+def _numbers_of(vehicle: str, shown: _Shown, good: int) -> list[dict]:
+    """Rows of every quantity of all sets."""
+    first, later = dict(list(shown.items())[:good]), dict(list(shown.items())[good:])
+    if not later:
+        return []
+    out = []
+    for d in differences(first, later, usual_scatter()):
+        middle = sum(f.value for f in d.good) / len(d.good)
+        for place, f in enumerate((*d.good, *d.new)):
+            reach = _Z95 * (d.scatter**2 * (1.0 + 1.0 / len(d.good)) + f.sd**2) ** 0.5
+            ends = (f.value - middle, f.value - middle - reach, f.value - middle + reach)
+            change, low, high, limit = (in_unit_of_words(d, end) for end in (*ends, d.smallest))
+            row = {"vehicle": vehicle, "set": f.name, "day": day_of(f.name), "good": int(place < len(d.good))}
+            row |= {"name": d.quantity.key, "quantity": quantity_words(d), "unit": unit_of(d)}
+            out.append(row | {"change": change, "low_95": low, "high_95": high, "limit": limit})
+    return out
+
+
+def _rows_of(vehicle: str, name: str, lasts: int, differing: Sequence[Difference]) -> list[dict]:
+    """Rows of what differs from a set on, the rarest first."""
+    head = {"vehicle": vehicle, "set": name, "day": day_of(name), "lasts": lasts}
+    on = f"{vehicle}, from {name} on: "
+    return [head | {"id": d.quantity.key, "sentence": on + difference_words(d)} for d in differing]

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib.util import find_spec
 
 import numpy as np
@@ -22,10 +23,10 @@ from rotorid.mismatch.deliver.flown import UNITS, Model, driven_by, model_of
 from rotorid.mismatch.tell.forward import delivered_model
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.attitude import normalised, quaternion_rate, rotation_from_quaternion
-from rotorid.vehicle.exports import ardupilot_frame, sih
+from rotorid.vehicle.exports import autopilots
 from rotorid.vehicle.exports.flown import multirotor_of, passive_forces, read_by
 from rotorid.vehicle.exports.forms import FLU, KNOWS, Exported, expressed, parts_of
-from rotorid.vehicle.windows import States, plan_windows
+from rotorid.vehicle.windows import Inputs, States, plan_windows, simulate_windows
 
 _MOST_WINDOWS = 40
 """Windows that are flown, spread evenly over the log: RotorPy takes a second for five."""
@@ -120,8 +121,6 @@ def next_to_log(analysis: Analysis, to: str, exported: Exported) -> NextToLog:
 def _ours(model: Model, windows: Sequence[LogWindow]) -> list[States]:
     """The windows flown by our own simulator: the wrench of the model's forms at each instant."""
     vehicle = model.vehicle
-    from rotorid.vehicle.windows import Inputs, simulate_windows
-
     out = []
     for window in windows:
         inputs = Inputs(window.speed, np.gradient(window.speed, window.time_s, axis=0), wind=window.wind)
@@ -211,34 +210,25 @@ def by_equations(
 
 def in_sih(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow]) -> list[States]:
     """By the equations of PX4's SIH, from the file's text."""
-    values = sih.values_of(exported.text)
+    values = autopilots.sih_values(exported.text)
     signals = _shares(vehicle, exported, windows, KNOWS["px4-sih"])
-
-    def wrench(signal, velocity, rates):
-        return sih.wrench(values, signal, velocity, rates)
-
-    inertia = sih.inertia_of(values)
+    wrench, inertia = partial(autopilots.sih_wrench, values), autopilots.sih_inertia(values)
     mass, gravity = values["SIH_MASS"], vehicle.gravity_m_s2
-    return by_equations(windows, signals, wrench, mass, inertia, gravity, True, sih.FASTEST_RAD_S)
+    return by_equations(windows, signals, wrench, mass, inertia, gravity, True, autopilots.FASTEST_RAD_S)
 
 
 def in_ardupilot(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow]) -> list[States]:
     """By the equations of ArduPilot's simulated frame, from the file's text."""
-    frame = ardupilot_frame.values_of(exported.text)
-    share, expo = _shares(vehicle, exported, windows, KNOWS["ardupilot-json"]), frame["propExpo"]
-    if expo != 0:
-        share = (expo - 1 + np.sqrt((1 - expo) ** 2 + 4 * expo * share)) / (2 * expo)
-
-    def wrench(signal, velocity, rates):
-        return ardupilot_frame.wrench(frame, signal, velocity, rates)
-
+    frame = autopilots.ardupilot_values(exported.text)
+    share = autopilots.ardupilot_signal(_shares(vehicle, exported, windows, KNOWS["ardupilot-json"]), frame["propExpo"])
+    wrench = partial(autopilots.ardupilot_wrench, frame)
     inertia = np.diag(frame["moment_inertia"])
-    return by_equations(windows, share, wrench, frame["mass"], inertia, ardupilot_frame.GRAVITY, False)
+    return by_equations(windows, share, wrench, frame["mass"], inertia, autopilots.ARDUPILOT_GRAVITY, False)
 
 
 def _shares(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow], knows: frozenset[str]) -> np.ndarray:
     """Shares of full thrust, (w, m, 4), in the tool's order."""
-    full = sih.full_speed_rad_s(vehicle, parts_of(sih.with_drag_of_hover(vehicle), knows))
+    full = autopilots.full_speed_rad_s(vehicle, parts_of(autopilots.with_drag_of_hover(vehicle), knows))
     speed = np.array([w.speed for w in windows])[:, :, list(exported.rotor_order)]
     return (speed / full) ** 2
 
@@ -275,8 +265,6 @@ def in_mujoco(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow]
     with read_by("MuJoCo"):
         model = mujoco.MjModel.from_xml_string(exported.text)
     with passive_forces(exported):
-        import mujoco
-
         coefficients = vehicle.thrust_coefficients_n_s2()
         out = []
         for window in windows:

@@ -1,6 +1,4 @@
-"""Where a report came from: versions, commit, configuration, hashes of raw files, date.
-
-The code of the library as part of a rule's identity.
+"""Where a report came from: versions, commit, configuration, hashes of raw files and of code, date.
 
 Snakemake watches a script, not what the script imports. `Code.of` hashes the syntax tree of a script and of
 every module of the library that it reaches, so that a changed formula reruns exactly what uses it, while comments,
@@ -24,7 +22,6 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -41,14 +38,8 @@ _READ_BY_TESTS = (["OPEN"], ["ROOMS"])
 def gather(raw: Sequence[str | Path], lock: str | Path, config: Mapping[str, Any]) -> dict[str, Any]:
     """Everything needed to make the same report again.
 
-    Parameters
-    ----------
-    raw
-        Files that instruments wrote.
-    lock
-        The lock file; the installed version of each package in it is recorded.
-    config
-        The configuration that the run used.
+    `raw`: files that instruments wrote. `lock`: the lock file; the installed version of each package in it is recorded.
+    `config`: the configuration that the run used.
     """
     lock = Path(lock)
     return {
@@ -63,14 +54,19 @@ def gather(raw: Sequence[str | Path], lock: str | Path, config: Mapping[str, Any
     }
 
 
+def _git(folder: str | Path, *asked: str) -> str | None:
+    """What git says of a folder; None where there is no git or it refuses."""
+    try:
+        done = subprocess.run(["git", "-C", str(folder), *asked], capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return done.stdout.strip()
+
+
 def commit(folder: str | Path) -> str:
     """The commit of the working tree, with `-dirty` where files differ; says so where there is none."""
-    command = ["git", "-C", str(folder), "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, check=True)
-    except (OSError, subprocess.CalledProcessError):
-        return "unknown: not a git checkout"
-    return done.stdout.strip()
+    found = _git(folder, "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*")
+    return "unknown: not a git checkout" if found is None else found
 
 
 def own_commit() -> str:
@@ -79,37 +75,17 @@ def own_commit() -> str:
     A library installed into another project's folder lies in that project's repository, which does not track it.
     """
     folder = Path(rotorid.__file__).parent
-    tracked = ["git", "-C", str(folder), "ls-files", "--error-unmatch", "__init__.py"]
-    try:
-        subprocess.run(tracked, capture_output=True, check=True)
-    except (OSError, subprocess.CalledProcessError):
-        return ""
-    return commit(folder)
-
-
-def _commit_date(folder: str | Path) -> str:
-    """The day of the commit of the working tree (ISO); empty where there is none."""
-    command = ["git", "-C", str(folder), "log", "-1", "--format=%cs"]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, check=True)
-    except (OSError, subprocess.CalledProcessError):
-        return ""
-    return done.stdout.strip()
+    return "" if _git(folder, "ls-files", "--error-unmatch", "__init__.py") is None else commit(folder)
 
 
 def stored_with(folder: str | Path, path: str) -> str:
     """The commit that last changed a file of a checkout, and its day: `09827fa, 2026-11-23`; or `not known`."""
-    command = ["git", "-C", str(folder), "log", "-1", "--format=%h, %cs", "--abbrev=7", "--", path]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, check=True)
-    except (OSError, subprocess.CalledProcessError):
-        return "not known"
-    return done.stdout.strip() or "not known"
+    return _git(folder, "log", "-1", "--format=%h, %cs", "--abbrev=7", "--", path) or "not known"
 
 
 def in_words(folder: str | Path, judging: str) -> str:
     """Commit, its date and the hash of the code that judges recordings, in one sentence for a title page."""
-    made, day = commit(folder), _commit_date(folder)
+    made, day = commit(folder), _git(folder, "log", "-1", "--format=%cs")
     known = f"Made from commit {made[:10]}" + (" of " + day if day else "")
     known += ", with changes that are not committed" if made.endswith("-dirty") else ""
     source = known if day else "Made outside of a git checkout, so that no commit is known"
@@ -144,19 +120,15 @@ def sha256(path: str | Path) -> str:
 class Code:
     """The code of a project as it is now; each file is read once, so that many rules can be asked for.
 
-    Parameters
-    ----------
-    root
-        Top of the project: holds the folders of `PACKAGES`.
-    memory
-        File that keeps what was found, so that the next start need not parse what has not changed since (by
-        size and time of change). None keeps nothing.
+    `root`: top of the project: holds the folders of `PACKAGES`. `memory`: file that keeps what was found, so that the
+    next start need not parse what has not changed since (by size and time of change). None keeps nothing.
     """
 
     def __init__(self, root: str | Path, memory: str | Path | None = None) -> None:
         self.root = Path(root).resolve()
         self._homes = {package: self.root / folder for package, folder in _PACKAGES.items()}
-        self._facts: dict[Path, _Facts] = {}
+        # Of each file its size and time of change, the hash of its syntax tree, and the modules that it names.
+        self._facts: dict[Path, dict[str, Any]] = {}
         self._files: dict[str, list[Path]] = {}
         self._imports: dict[Path, set[Path]] = {}
         self._codes: dict[Path, str] = {}
@@ -166,17 +138,8 @@ class Code:
     def of(self, script: str | Path) -> str:
         """Sixteen hexadecimal digits that stand for the code that `script` runs.
 
-        Parameters
-        ----------
-        script
-            Path of a Python file or a notebook, relative to the top of the project.
-
-        Raises
-        ------
-        FileNotFoundError
-            The script does not exist.
-        SyntaxError
-            The script or a module that it reaches is not valid Python.
+        `script`: path of a Python file or a notebook, relative to the top of the project. FileNotFoundError: the script
+        does not exist. SyntaxError: the script or a module that it reaches is not valid Python.
         """
         path = self.root / script
         if path not in self._codes:
@@ -184,7 +147,7 @@ class Code:
                 raise FileNotFoundError(f"code_of: there is no file {path}.")
             modules = self.reached_modules(path)
             files = (path, *modules, *self._read_by(modules))
-            digests = [f"{file.name} {self._facts_of(file).digest}" for file in files]
+            digests = [f"{file.name} {self._facts_of(file)['digest']}" for file in files]
             self._codes[path] = hashlib.sha256("\n".join(digests).encode()).hexdigest()[:16]
         return self._codes[path]
 
@@ -201,18 +164,18 @@ class Code:
     def _imported_by(self, path: Path) -> set[Path]:
         """Files that a file imports itself; most are asked for by many scripts."""
         if path not in self._imports:
-            self._imports[path] = {file for name in self._facts_of(path).names for file in self._files_of(name)}
+            self._imports[path] = {file for name in self._facts_of(path)["names"] for file in self._files_of(name)}
         return self._imports[path]
 
     def _read_by(self, modules: list[Path]) -> list[Path]:
         """Files that are no code but shipped next to a module that reads such files (`importlib.resources`), sorted."""
-        folders = {m.parent for m in modules if _RESOURCES in self._facts_of(m).names}
+        folders = {m.parent for m in modules if _RESOURCES in self._facts_of(m)["names"]}
         beside = (p for folder in folders for p in folder.rglob("*") if p.is_file() and "__pycache__" not in p.parts)
         return sorted(p for p in beside if p.suffix not in (".py", ".pyc"))
 
     def remember(self) -> None:
         """Write the memory, whole or not at all, where it is wanted and something is new."""
-        entries = {str(path.relative_to(self.root)): asdict(facts) for path, facts in self._facts.items()}
+        entries = {str(path.relative_to(self.root)): facts for path, facts in self._facts.items()}
         if self._memory is None or entries.items() <= self._remembered.items():
             return
         self._memory.parent.mkdir(parents=True, exist_ok=True)
@@ -227,21 +190,19 @@ class Code:
         except (OSError, ValueError):
             return {}
 
-    def _facts_of(self, path: Path) -> _Facts:
+    def _facts_of(self, path: Path) -> dict[str, Any]:
         if path not in self._facts:
             stat = path.stat()
-            stamp = [stat.st_size, stat.st_mtime_ns]
+            stamp, names = [stat.st_size, stat.st_mtime_ns], []
             known = self._remembered.get(str(path.relative_to(self.root)))
-            if known and known["stamp"] == stamp:
-                self._facts[path] = _Facts(**known)
-            else:
-                if path.suffix not in (".py", ".ipynb"):
-                    self._facts[path] = _Facts(stamp, hashlib.sha256(path.read_bytes()).hexdigest(), [])
-                    return self._facts[path]
-                tree = _parse(path)
-                names = sorted(set(_imported_names(tree, _package_of(path, self._homes))))
-                digest = hashlib.sha256(ast.dump(tree).encode()).hexdigest()
-                self._facts[path] = _Facts(stamp, digest, names)
+            if not known or known["stamp"] != stamp:
+                content = path.read_bytes()
+                if path.suffix in (".py", ".ipynb"):
+                    tree = _parse(path)
+                    names = sorted(set(_imported_names(tree, _package_of(path, self._homes))))
+                    content = ast.dump(tree).encode()
+                known = {"stamp": stamp, "digest": hashlib.sha256(content).hexdigest(), "names": names}
+            self._facts[path] = known
         return self._facts[path]
 
     def _files_of(self, name: str) -> list[Path]:
@@ -258,15 +219,6 @@ class Code:
                 own = [file for file in (place / "__init__.py", place.with_suffix(".py")) if file.is_file()]
             self._files[name] = (self._files_of(above) if above else []) + own
         return self._files[name]
-
-
-@dataclass(frozen=True)
-class _Facts:
-    """What one file says: its size and time of change, the hash of its syntax tree, the modules it names."""
-
-    stamp: list[int]
-    digest: str
-    names: list[str]
 
 
 def _made_by() -> list[str]:

@@ -11,7 +11,7 @@ some parameters, with every effect that the file states, flown by compiled code 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -20,63 +20,8 @@ from rotorid.effects.instant import body_of
 from rotorid.errors import InputError
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle import fast
-from rotorid.vehicle.fast import AttitudeLoop, KeptStates
-from rotorid.vehicle.improved import (
-    LAGS_OF_SPEED,
-    active_forms,
-    active_speed_forms,
-    all_forms,
-    speeds_of_commands,
-)
-
-
-@dataclass(frozen=True)
-class _Trajectories:
-    """What n vehicles did at the m instants kept, SI; attitudes scalar first, body to world."""
-
-    time_s: np.ndarray
-    """(m,)."""
-    flown: KeptStates
-
-    @property
-    def angular_velocity(self) -> np.ndarray:
-        """(n, m, 3), rad/s, body axes."""
-        return self.flown.states[..., 0:3]
-
-    @property
-    def quaternion(self) -> np.ndarray:
-        """(n, m, 4)."""
-        return self.flown.states[..., 3:7]
-
-    @property
-    def velocity(self) -> np.ndarray:
-        """(n, m, 3), m/s, world axes."""
-        return self.flown.states[..., 7:10]
-
-    @property
-    def position(self) -> np.ndarray:
-        """(n, m, 3), m, world axes."""
-        return self.flown.states[..., 10:13]
-
-    @property
-    def rotor_speed(self) -> np.ndarray:
-        """(n, m, k), rad/s."""
-        return self.flown.states[..., 13:]
-
-    @property
-    def angular_acceleration(self) -> np.ndarray:
-        """(n, m, 3), rad/s², body axes."""
-        return self.flown.accelerations[..., :3]
-
-    @property
-    def specific_force(self) -> np.ndarray:
-        """(n, m, 3), m/s², body axes."""
-        return self.flown.accelerations[..., 3:]
-
-    @property
-    def end(self) -> np.ndarray:
-        """States at the last instant kept, (n, 13 + k): the start of what follows."""
-        return self.flown.states[:, -1].copy()
+from rotorid.vehicle.fast import AttitudeLoop, Trace
+from rotorid.vehicle.improved import LAGS_OF_SPEED, active_forms, active_speed_forms, all_forms, speeds_of_commands
 
 
 class Batch:
@@ -98,6 +43,8 @@ class Batch:
             self._change(key, np.asarray(values, float))
         _derive(self._body)
         self._values = self._kernel_values()
+        own = {"limits_rad_s": vehicle.rotor_speed_limits_rad_s, "ground_z_m": vehicle.ground_z_m}
+        self._fly = partial(fast.fly, self._body, self._kernels, values=self._values, **own)
 
     def _change(self, key: str, values: np.ndarray) -> None:
         n, k, body = self.size, self.vehicle.rotor_count, self._body
@@ -170,7 +117,7 @@ class Batch:
         wind_m_s: np.ndarray | None = None,
         pushes: np.ndarray | None = None,
         threads: int | None = None,
-    ) -> _Trajectories:
+    ) -> Trace:
         """Fly from `start` (n, 13 + k): rates, quaternion, velocity and position (world), rotor speeds, SI.
 
         `commands` are rotor speeds, rad/s, each held over its step, (m, k) for all or (n, m, k), or a controller with
@@ -197,24 +144,8 @@ class Batch:
             commands = series
         if pushes is not None:
             pushes = np.concatenate([pushes, pushes[:, -1:]], axis=1)
-        flown = fast.fly(
-            self._body,
-            self._kernels,
-            start,
-            steps,
-            step_s,
-            commands,
-            values=self._values,
-            lags_s=lags,
-            limits_rad_s=self.vehicle.rotor_speed_limits_rad_s,
-            following=following,
-            pushes=pushes,
-            wind_m_s=wind_m_s,
-            ground_z_m=self.vehicle.ground_z_m,
-            every=every,
-            threads=threads,
-        )
-        return _Trajectories(step_s * every * np.arange(flown.states.shape[1]), flown)
+        also = {"wind_m_s": wind_m_s, "every": every, "threads": threads}
+        return self._fly(start, steps, step_s, commands, lags_s=lags, following=following, pushes=pushes, **also)
 
     def step(
         self,
@@ -233,21 +164,9 @@ class Batch:
         commands = np.asarray(commands, float)
         if lags[0] == 0.0:
             states[:, 13:] = commands
-        flown = fast.fly(
-            self._body,
-            self._kernels,
-            states,
-            1,
-            step_s,
-            np.repeat(commands[:, None, :], 2, axis=1),
-            values=self._values,
-            lags_s=lags,
-            limits_rad_s=self.vehicle.rotor_speed_limits_rad_s,
-            pushes=None if pushes is None else np.repeat(np.asarray(pushes, float)[:, None, :], 2, axis=1),
-            wind_m_s=wind_m_s,
-            ground_z_m=self.vehicle.ground_z_m,
-        )
-        return flown.states[:, 1].copy()
+        held = np.repeat(commands[:, None, :], 2, axis=1)
+        pushes = None if pushes is None else np.repeat(np.asarray(pushes, float)[:, None, :], 2, axis=1)
+        return self._fly(states, 1, step_s, held, lags_s=lags, pushes=pushes, wind_m_s=wind_m_s).end
 
     def _through_motors(self, series: np.ndarray, step_s: float) -> np.ndarray:
         """Rotor speeds that commands (m, k) or (n, m, k) become, all series in one pass."""

@@ -51,7 +51,8 @@ def about_hover_of(x: np.ndarray, vehicle: Vehicle, other: Vehicle) -> np.ndarra
 
 def own_controls(vehicle: Vehicle) -> dict[str, tuple[str, float]]:
     """Of each channel that rotors make the control quantity that asks for it, and what a unit of it makes, N or N m."""
-    weight, arm = vehicle.mass_kg * vehicle.gravity_m_s2, _arm_m(vehicle.rotor_positions_m())
+    weight = vehicle.mass_kg * vehicle.gravity_m_s2
+    arm = float(np.linalg.norm(vehicle.rotor_positions_m()[:, :2], axis=1).max()) or 1.0  # of a single central rotor
     torque = float(vehicle.torque_coefficients_n_m_s2().mean() / vehicle.thrust_coefficients_n_s2().mean())
     return {
         "force_z": ("thrust", -weight),
@@ -64,11 +65,6 @@ def own_controls(vehicle: Vehicle) -> dict[str, tuple[str, float]]:
 def _hover_square(vehicle: Vehicle) -> float:
     """Mean square of the rotor speeds in hover, rad2/s2."""
     return vehicle.mass_kg * vehicle.gravity_m_s2 / float(vehicle.thrust_coefficients_n_s2().sum())
-
-
-def _arm_m(places: np.ndarray) -> float:
-    """Largest distance of a hub from the z axis, m; 1 of a single central rotor."""
-    return float(np.linalg.norm(places[:, :2], axis=1).max()) or 1.0
 
 
 def table_of(derivatives: tuple[Derivative, ...]) -> tuple[np.ndarray, np.ndarray]:

@@ -16,13 +16,12 @@ from rotorid.effects.instant import Kernel, Wrench, records, room_for
 from rotorid.errors import InputError
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle import compiled
+from rotorid.vehicle.attitude import euler_from_quaternion
 
 _LEAST_PER_THREAD = 16
 """Vehicles below which a further thread is not worth its start."""
 _BLOCK = 8
 """Vehicles that fly together; their records fill half of a processor's first cache."""
-
-
 _ALWAYS_KNOWN = frozenset(
     {
         "rotor_speed",
@@ -149,7 +148,7 @@ def _loop_record(room: int) -> np.dtype:
 @dataclass(frozen=True)
 class AttitudeLoop:
     """An attitude controller laid out for a whole flight, so that it can fly compiled
-    (`rotorid.vehicle.control.pid`)."""
+    (`rotorid.vehicle.control`)."""
 
     proportional: np.ndarray
     """(3,) or (n, 3), N m/rad, likewise the integral and derivative gains."""
@@ -200,15 +199,67 @@ def commanding(loop: AttitudeLoop, size: int, step_s: float) -> Callable[[int, n
 
 
 @dataclass(frozen=True)
-class KeptStates:
-    """What n vehicles did at the instants kept, each (n, kept, ...), SI."""
+class Trace:
+    """What n vehicles did at the m instants kept, (n, m, ...), SI units, the truth without noise.
 
+    Accelerations and moments are those at each instant under the rotor speeds of that instant.
+    """
+
+    time_s: np.ndarray
+    """(m,)."""
     states: np.ndarray
-    """(n, kept, 13 + k): rates, quaternion, velocity (world), position, rotor speeds."""
+    """(n, m, 13 + k): rates, quaternion, velocity (world), position, rotor speeds."""
     accelerations: np.ndarray
-    """(n, kept, 6): angular acceleration, rad/s², and specific force, m/s², body axes."""
-    commands: np.ndarray
-    """(n, kept, k), rad/s."""
+    """(n, m, 6): angular acceleration, rad/s², and specific force, m/s², body axes."""
+    rotor_command: np.ndarray
+    """(n, m, k), rad/s."""
+
+    @property
+    def angular_velocity(self) -> np.ndarray:
+        """(n, m, 3), rad/s, body axes."""
+        return self.states[..., 0:3]
+
+    @property
+    def quaternion(self) -> np.ndarray:
+        """(n, m, 4), scalar first, body to world."""
+        return self.states[..., 3:7]
+
+    @property
+    def euler_rad(self) -> np.ndarray:
+        """Roll, pitch, yaw, (n, m, 3), rad; yaw unwound."""
+        euler = euler_from_quaternion(self.quaternion)
+        euler[..., 2] = np.unwrap(euler[..., 2], axis=1)
+        return euler
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """(n, m, 3), m/s, world axes."""
+        return self.states[..., 7:10]
+
+    @property
+    def position(self) -> np.ndarray:
+        """(n, m, 3), m, world axes."""
+        return self.states[..., 10:13]
+
+    @property
+    def rotor_speed(self) -> np.ndarray:
+        """(n, m, k), rad/s."""
+        return self.states[..., 13:]
+
+    @property
+    def angular_acceleration(self) -> np.ndarray:
+        """(n, m, 3), rad/s², body axes."""
+        return self.accelerations[..., :3]
+
+    @property
+    def specific_force(self) -> np.ndarray:
+        """(n, m, 3), m/s², body axes."""
+        return self.accelerations[..., 3:]
+
+    @property
+    def end(self) -> np.ndarray:
+        """States at the last instant kept, (n, 13 + k): the start of what follows."""
+        return self.states[:, -1].copy()
 
 
 def fly(
@@ -230,7 +281,7 @@ def fly(
     first_s: float = 0.0,
     every: int = 1,
     threads: int | None = None,
-) -> KeptStates:
+) -> Trace:
     """Fly n vehicles with constants `body` (1 or n,) from `start` (n, 13 + k) over `steps` steps.
 
     `commands` are rotor speeds (steps + 1, k) for all or (n, steps + 1, k), or a controller; `values` (n, p) are the
@@ -293,7 +344,8 @@ def fly(
         compiled.fly(*(given[name] for name in _ORDER))
 
     _spread(part, n, threads)
-    return KeptStates(own["states"], own["accelerations_out"], own["commands_out"])
+    time_s = first_s + step_s * every * np.arange(kept)
+    return Trace(time_s, own["states"], own["accelerations_out"], own["commands_out"])
 
 
 _ORDER = compiled.fly.py_func.__code__.co_varnames[: compiled.fly.py_func.__code__.co_argcount]
@@ -337,14 +389,11 @@ def _block(vehicles: int, rotors: int) -> dict[str, np.ndarray]:
 
 def _spread(part, n: int, threads: int | None) -> None:
     """Call `part(first, last)` on shares of n vehicles, in as many threads as pay."""
-    count = min(_cores() if threads is None else threads, max(n // _LEAST_PER_THREAD, 1))
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    count = min(cores if threads is None else threads, max(n // _LEAST_PER_THREAD, 1))
     if count == 1:
         part(0, n)
         return
     edges = np.linspace(0, n, count + 1).astype(int)
     with ThreadPoolExecutor(count) as pool:
         list(pool.map(part, edges[:-1], edges[1:]))
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,29 +1,41 @@
-"""Effects switched on in a vehicle file: `effects` of `vehicle.yaml` as catalogue forms with their values.
+"""Effects switched on in a vehicle file: `effects` of `vehicle.yaml` as catalogue forms with values, and its hover.
 
 What adds a wrench or an error of a sensor flies in `simulate_as_stated`, and so does what lies between command and
 rotor speed; `record_as_stated` writes what the sensors of such a flight read, with the faults of sensors and logging.
 
-A vehicle file as a controller can fly it: what the file leaves open is set, what nobody can fly is left out.
-
 A vehicle of a recording may lack what its effects refer to (where the ground is, the rotor speed of the full command),
 and a delay fitted to stamps may be negative. Such a vehicle is flown all the same, and a sentence says each difference.
+
+A controller that knows the believed vehicle asks for a thrust and moments; a curve between command and speed, a payload
+or unequal rotors make others of them. A pilot trims his vehicle until it hovers level, and so does `hover`.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import brentq, least_squares
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.effects.contract import CURVE, DELAY, LIMIT, Effect, Form, SetForm, SpeedForm, SpeedPath
+from rotorid.effects.contract import CURVE, DELAY, LIMIT, Form, Motion, SetForm, SpeedForm, SpeedPath
+from rotorid.effects.instant import body_of
 from rotorid.errors import InputError
 from rotorid.recordings.run import RecordingSet
 from rotorid.recordings.vehicle import Vehicle
+from rotorid.vehicle import fast
 from rotorid.vehicle.derivatives import derivative_form
-from rotorid.vehicle.mixer import hover_speed_rad_s
+from rotorid.vehicle.mixer import allocation_matrix, hover_speed_rad_s
 from rotorid.vehicle.simulator import CommandPath, Commands, Controller, Motors, Trace, WhiteNoise, recording, simulate
 
+_LARGEST_SHARE = 10.0
+"""Thrust, over the weight, up to which is asked where the file states no limits of the rotor speed."""
+_SLOPE_SHARE = 0.02
+"""Change of the thrust asked for, as a share of it, over which the gain is measured."""
+_HUNG_S, _HUNG_SAMPLES = 2.0, 100
+"""Time at rest over which the force of what has a memory (a slung payload) is averaged, and its instants."""
+_CLOSE = 1e-9
+"""Share of the weight (and of the weight on a rotor's arm) within which a force or moment counts as none."""
 _FULL_OVER_HOVER = 2.0
 """Rotor speed of the full command over that of hover where no limits are stated: a thrust of four times the weight."""
 LAGS_OF_SPEED = frozenset({"one constant", "up and down"})
@@ -89,19 +101,16 @@ def all_forms(vehicle: Vehicle) -> list[ActiveForm | _ActiveSpeedForm | _ActiveS
     return [_active(entry, number, vehicle) for number, entry in enumerate(vehicle.effects, 1)]
 
 
-def _forms(effect: Effect, vehicle: Vehicle, wanted: str | None) -> dict[str, Form | SpeedForm | SetForm]:
-    given = effect.form_named(wanted) if wanted else None
-    forms = (*effect.forms(vehicle), *effect.speed_forms, *effect.set_forms(vehicle), *([given] if given else []))
-    return {form.name: form for form in forms}
-
-
 def _active(entry: dict, number: int, vehicle: Vehicle) -> ActiveForm | _ActiveSpeedForm | _ActiveSetForm:
     where = f"vehicle {vehicle.name}: effects entry {number}"
     name = entry.get("id")
     effects = catalogue()
     if name not in effects:
         raise InputError(f"{where} has id {name!r}, expected one of {', '.join(effects)}")
-    forms = _forms(effects[name], vehicle, entry.get("form"))
+    effect = effects[name]
+    named = effect.form_named(entry["form"]) if entry.get("form") else None
+    every = (*effect.forms(vehicle), *effect.speed_forms, *effect.set_forms(vehicle), *([named] if named else []))
+    forms = {form.name: form for form in every}
     wanted = entry.get("form", next(iter(forms)) if len(forms) == 1 else None)
     if wanted not in forms:
         raise InputError(f"{where} ({name}) has form {wanted!r}, expected one of {', '.join(forms)}")
@@ -176,8 +185,7 @@ def simulate_as_stated(
     motors, path, command = _motors_of(vehicle, step_s), None, None
     if isinstance(controller, Commands):
         time_s = step_s * np.arange(steps + 1)
-        held = np.searchsorted(controller.time_s, time_s + 1e-9, side="right") - 1
-        command = controller.rotor_speed[np.maximum(held, 0)]
+        command = controller.rotor_speed[controller.index(time_s)]
         speed = speeds_of_commands(vehicle, command, time_s, voltage, full_voltage_v)
         controller = Commands(time_s, speed, np.gradient(speed, step_s, axis=0))
         motors = None
@@ -228,7 +236,8 @@ def flyable(vehicle: Vehicle) -> tuple[Vehicle, tuple[str, ...]]:
     between = [(form, values) for form, values in forms if isinstance(form, SpeedForm)]
     changes: dict = {}
     said: list[str] = []
-    early = [i for i, (form, values) in enumerate(forms) if _is_early(form, values)]
+    delays = [i for i, (form, _) in enumerate(forms) if isinstance(form, SpeedForm) and form.stage == DELAY]
+    early = [i for i in delays if forms[i][1][0] < 0]
     if early:
         changes["effects"] = tuple(e for i, e in enumerate(vehicle.effects) if i not in early)
         said.append(
@@ -250,6 +259,89 @@ def flyable(vehicle: Vehicle) -> tuple[Vehicle, tuple[str, ...]]:
     return vehicle.model_copy(update=changes), tuple(said)
 
 
-def _is_early(form, values) -> bool:
-    """Whether a form is a negative delay of the command."""
-    return isinstance(form, SpeedForm) and form.stage == DELAY and values[0] < 0
+@dataclass(frozen=True)
+class _Hover:
+    """What to ask for."""
+
+    thrust_n: float
+    moments_n_m: tuple[float, float, float]
+    """About roll, pitch and yaw."""
+    gain: float
+    """Force, N, that a further newton of thrust makes."""
+    supported: float = 1.0
+    """Upward force over what hover needs; below 1 where all that the rotors can do does not support the vehicle."""
+
+
+def hover(vehicle: Vehicle, path: CommandPath | None, height_m: float) -> _Hover:
+    """The hover of a vehicle with the effects that its file states, at a height above its ground, m.
+
+    `path` is what lies between its command and rotor speed. Where the rotors cannot balance every moment, what is
+    asked for leaves the least of them.
+    """
+    weight = vehicle.mass_kg * vehicle.gravity_m_s2
+    units = weight * np.array([1.0, *np.repeat(np.linalg.norm(vehicle.rotor_positions_m(), axis=1).mean(), 3)])
+    limits = vehicle.rotor_speed_limits_rad_s
+    most = _LARGEST_SHARE * weight
+    if limits is not None:
+        most = float((vehicle.thrust_coefficients_n_s2() * limits[1] ** 2).sum())
+
+    def missing(asked: np.ndarray) -> np.ndarray:
+        """Force and moments beyond those of a level hover, over `units`, for thrust and moments over them."""
+        return wrench_at_rest(vehicle, path, asked * units, height_m) / units - [1.0, 0.0, 0.0, 0.0]
+
+    def rising(share: float) -> float:
+        return float(missing(np.array([share, 0.0, 0.0, 0.0]))[0])
+
+    share = 1.0
+    if abs(rising(share)) > _CLOSE:
+        if (highest := rising(most / weight)) <= 0:
+            return _Hover(most, (0.0, 0.0, 0.0), 1.0, 1.0 + highest)
+        if rising(0.0) < 0:
+            share = brentq(rising, 0.0, most / weight, xtol=_CLOSE)
+    asked = np.array([share, 0.0, 0.0, 0.0])
+    if np.abs(missing(asked)).max() > _CLOSE:
+        asked = least_squares(missing, asked).x
+    less = asked - [_SLOPE_SHARE * asked[0], 0.0, 0.0, 0.0]
+    gain = float((missing(asked) - missing(less))[0] / (_SLOPE_SHARE * asked[0]))
+    thrust, *moments = (float(v) for v in asked * units)
+    return _Hover(thrust, tuple(moments), gain if gain > 0 else 1.0)
+
+
+def wrench_at_rest(vehicle: Vehicle, path: CommandPath | None, asked: np.ndarray, height_m: float) -> np.ndarray:
+    """Upward force, N, and moments, N m, (4,), on the level vehicle at rest where a believed wrench (4,) is asked for.
+
+    They are the accelerations times the believed mass and inertia.
+    """
+    command = np.sqrt(np.maximum(allocation_matrix(vehicle) @ asked, 0.0))
+    limits = vehicle.rotor_speed_limits_rad_s or (0.0, np.inf)
+    return wrench_of_command(vehicle, path, np.clip(command, *limits), height_m)
+
+
+def wrench_of_command(vehicle: Vehicle, path: CommandPath | None, command: np.ndarray, height_m: float) -> np.ndarray:
+    """The same where rotor speeds (k,), rad/s, are commanded."""
+    command, limits = command[None], vehicle.rotor_speed_limits_rad_s or (0.0, np.inf)
+    speed = command if path is None else np.clip(path.steady(command), *limits)
+    every = active_forms(vehicle)
+    instant = fast.kernels_of([pair for pair in every if not pair[0].memory], vehicle)
+    level = np.concatenate([np.zeros(3), [1.0], np.zeros(9), speed[0]])[None]
+    flown = fast.fly(body_of(vehicle), instant, level, 0, 1.0, speed, ground_z_m=height_m)
+    turning, specific_force = np.split(flown.accelerations[0, 0], 2)
+    up = -vehicle.mass_kg * specific_force[2]
+    moments = turning @ vehicle.inertia_kg_m2.matrix().T
+    time_s = np.linspace(0.0, _HUNG_S, _HUNG_SAMPLES)
+    hanging = Motion(
+        rotor_speed=np.repeat(speed, len(time_s), axis=0),
+        angular_velocity=np.zeros((len(time_s), 3)),
+        angular_acceleration=np.zeros((len(time_s), 3)),
+        specific_force=np.repeat([[0.0, 0.0, -vehicle.gravity_m_s2]], len(time_s), axis=0),
+        time_s=time_s,
+        rotation=np.repeat(np.eye(3)[None], len(time_s), axis=0),
+        velocity=np.zeros((len(time_s), 3)),
+        position=np.zeros((len(time_s), 3)),
+        rotor_acceleration=np.zeros((len(time_s), vehicle.rotor_count)),
+        height=np.full(len(time_s), height_m),
+    )
+    for form, values in every:
+        if form.memory and (added := form.contribution(hanging, vehicle, values)).force is not None:
+            up -= added.force[:, 2].mean()
+    return np.array([up, *moments])

@@ -12,6 +12,7 @@ import copy
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -31,6 +32,7 @@ from rotorid.vehicle.attitude import (
     quaternion_rate,
     rotation_from_quaternion,
 )
+from rotorid.vehicle.fast import Trace
 
 _MEMORY_ROUNDS = 12
 """Flights simulated in a row, at most, where an effect has a memory of its own; each takes its wrench from the last."""
@@ -61,14 +63,14 @@ class Commands:
     rotor_acceleration: np.ndarray | None = None
 
     def rotor_command(self, time_s: float, euler_rad: np.ndarray) -> np.ndarray:
-        return np.broadcast_to(self.rotor_speed[self._index(time_s)], (len(euler_rad), self.rotor_speed.shape[1]))
+        return np.broadcast_to(self.rotor_speed[self.index(time_s)], (len(euler_rad), self.rotor_speed.shape[1]))
 
     def acceleration(self, time_s: float) -> np.ndarray | float:
         """Rotor accelerations (k,), rad/s2, that go with the commands."""
-        return 0.0 if self.rotor_acceleration is None else self.rotor_acceleration[self._index(time_s)]
+        return 0.0 if self.rotor_acceleration is None else self.rotor_acceleration[self.index(time_s)]
 
-    def _index(self, time_s):
-        """Which command holds at a time, or at each of several."""
+    def index(self, time_s: float | np.ndarray) -> np.ndarray:
+        """Which command holds at a time, or at each of several, s."""
         return np.maximum(np.searchsorted(self.time_s, np.asarray(time_s) + 1e-9, side="right") - 1, 0)
 
 
@@ -116,31 +118,6 @@ class Start:
     @property
     def size(self) -> int:
         return len(self.position_m)
-
-
-@dataclass(frozen=True)
-class Trace:
-    """What n vehicles did at m + 1 instants: arrays (n, m + 1, ...), SI units, the truth without noise.
-
-    Accelerations and moments are those at each instant under the rotor speeds of that instant.
-    """
-
-    time_s: np.ndarray
-    position: np.ndarray
-    velocity: np.ndarray
-    quaternion: np.ndarray
-    angular_velocity: np.ndarray
-    angular_acceleration: np.ndarray
-    specific_force: np.ndarray
-    rotor_speed: np.ndarray
-    rotor_command: np.ndarray
-
-    @property
-    def euler_rad(self) -> np.ndarray:
-        """Roll, pitch, yaw, (n, m + 1, 3), rad; yaw unwound."""
-        euler = euler_from_quaternion(self.quaternion)
-        euler[..., 2] = np.unwrap(euler[..., 2], axis=1)
-        return euler
 
 
 @dataclass(frozen=True)
@@ -277,8 +254,13 @@ def simulate(
     readings = np.zeros((steps + 1, start.size, 3))
     if noise.attitude_rad > 0:
         readings = rng.normal(0.0, noise.attitude_rad, readings.shape)
-    flight = _Flight(vehicle, instant, motors, start, step_s, wind_m_s, path)
-    trace = flight.fly(_fresh(controller), pushes, readings)
+
+    def flown(pushes: np.ndarray) -> Trace:
+        # A controller may remember: each flight has a copy of its own.
+        flight = _Flight(vehicle, instant, motors, start, step_s, wind_m_s, path)
+        return flight.fly(copy.deepcopy(controller), pushes, readings)
+
+    trace = flown(pushes)
     # A load as heavy as the vehicle would make plain repetition diverge: Aitken's relaxation (Küttler and Wall,
     # Computational Mechanics 43, 2008) takes the step from how the last one turned out.
     added, last, share = np.zeros_like(pushes), None, 1.0
@@ -291,20 +273,14 @@ def simulate(
             change = gap - last
             share *= -float((last * change).sum() / (change**2).sum())
         added, last = added + share * gap, gap
-        flight = _Flight(vehicle, instant, motors, start, step_s, wind_m_s, path)
-        trace = flight.fly(_fresh(controller), pushes + added, readings)
+        trace = flown(pushes + added)
     return trace
-
-
-def _fresh(controller: Controller) -> Controller:
-    """A copy of the controller as it is before the flight, so that a flight can be repeated."""
-    return copy.deepcopy(controller)
 
 
 def _known_commands(controller: Controller, time_s: np.ndarray) -> np.ndarray | fast.AttitudeLoop | None:
     """Commands (m, k) of every instant, or the plan of an attitude loop; None where only a call gives them."""
     if isinstance(controller, Commands):
-        return controller.rotor_speed[controller._index(time_s)]
+        return controller.rotor_speed[controller.index(time_s)]
     return None if hasattr(controller, "rotor_command") else controller.attitude_loop(time_s)
 
 
@@ -329,8 +305,15 @@ class _Flight:
         self.vehicle, self.motors, self.step_s = vehicle, motors, step_s
         self.path = None if path is None else path.start(step_s, start.rotor_speed_rad_s)
         self.start, self.size = start, start.size
-        self.wind = None if wind_m_s is None else np.asarray(wind_m_s, float)
-        self.kernels, self.body = fast.kernels_of(effects, vehicle), body_of(vehicle)
+        up, down = motors.time_up_s, motors.time_down_s
+        self._fly = partial(
+            fast.fly,
+            body_of(vehicle),
+            fast.kernels_of(effects, vehicle),
+            lags_s=(up, up if down is None else down),
+            wind_m_s=None if wind_m_s is None else np.asarray(wind_m_s, float),
+            ground_z_m=vehicle.ground_z_m,
+        )
 
     def fly(self, controller: Controller, pushes: np.ndarray, attitude_errors: np.ndarray) -> Trace:
         """The flight under a controller, a disturbance (steps + 1, n, 6) and errors of attitude (steps + 1, n, 3)."""
@@ -343,8 +326,14 @@ class _Flight:
                 return controller.rotor_command(j * self.step_s, euler_rad)
 
         if known is None or self.path is not None:
-            return self._trace(*self._by_steps(controller, command, pushes, attitude_errors))
-        return self._trace(*self._at_once(controller, known, command, pushes, attitude_errors))
+            trace = self._by_steps(controller, command, pushes, attitude_errors)
+        else:
+            trace = self._at_once(controller, known, command, pushes, attitude_errors)
+        if not np.isfinite(trace.states).all():
+            raise InputError(
+                "the simulation ran away (values not finite): check gains, inertia and the size of the step"
+            )
+        return trace
 
     def _start(self) -> np.ndarray:
         """States at the beginning, (n, 13 + k), rotors at rest."""
@@ -355,8 +344,7 @@ class _Flight:
         state[:, 10:13] = self.start.position_m
         return state
 
-    def _at_once(self, controller, commands, command, pushes, attitude_errors) -> tuple[np.ndarray, ...]:
-        """States, accelerations and commands, each (n, steps + 1, ...)."""
+    def _at_once(self, controller, commands, command, pushes, attitude_errors) -> Trace:
         steps, limits = len(pushes) - 1, self.motors.limits_rad_s
         state = self._start()
         if self.start.rotor_speed_rad_s is not None:
@@ -368,30 +356,18 @@ class _Flight:
         following = None
         if isinstance(controller, Commands) and controller.rotor_acceleration is not None:
             following = controller.acceleration(self.step_s * np.arange(steps + 1))
-        flown = fast.fly(
-            self.body,
-            self.kernels,
+        return self._fly(
             state,
             steps,
             self.step_s,
             commands,
-            lags_s=self._lags_s,
             limits_rad_s=limits,
             following=following,
             reading_errors=np.moveaxis(attitude_errors, 0, 1) if attitude_errors.any() else None,
             pushes=np.moveaxis(pushes, 0, 1) if pushes.any() else None,
-            wind_m_s=self.wind,
-            ground_z_m=self.vehicle.ground_z_m,
         )
-        return flown.states, flown.accelerations, flown.commands
 
-    @property
-    def _lags_s(self) -> tuple[float, float]:
-        """Time constants of the motors, up and down."""
-        up, down = self.motors.time_up_s, self.motors.time_down_s
-        return up, up if down is None else down
-
-    def _by_steps(self, controller, command_at, pushes, attitude_errors) -> tuple[np.ndarray, ...]:
+    def _by_steps(self, controller, command_at, pushes, attitude_errors) -> Trace:
         """The same a step at a time, the controller called at each."""
         steps, k = len(pushes) - 1, self.vehicle.rotor_count
         state = self._start()
@@ -421,40 +397,11 @@ class _Flight:
             elif self.path is not None and i > 0:
                 following = (state[:, 13:] - states[i - 1][:, 13:]) / self.step_s
             states[i], commands[i] = state, command
-            flown = fast.fly(
-                self.body,
-                self.kernels,
-                state,
-                1,
-                self.step_s,
-                np.repeat(speed[:, None], 2, axis=1),
-                lags_s=self._lags_s,
-                following=np.repeat(following[:, None], 2, axis=1),
-                pushes=np.repeat(pushes[i][:, None], 2, axis=1),
-                wind_m_s=self.wind,
-                ground_z_m=self.vehicle.ground_z_m,
-                first_s=time_s,
-            )
+            over_step, following, push = (np.repeat(v[:, None], 2, axis=1) for v in (speed, following, pushes[i]))
+            flown = self._fly(state, 1, self.step_s, over_step, following=following, pushes=push, first_s=time_s)
             accelerations[i], state = flown.accelerations[:, 0], flown.states[:, 1]
-        return np.moveaxis(states, 0, 1), np.moveaxis(accelerations, 0, 1), np.moveaxis(commands, 0, 1)
-
-    def _trace(self, states, accelerations, commands) -> Trace:
-        """States (n, m, 13 + k), accelerations (n, m, 6) and commands (n, m, k) by name."""
-        if not np.isfinite(states).all():
-            raise InputError(
-                "the simulation ran away (values not finite): check gains, inertia and the size of the step"
-            )
-        return Trace(
-            time_s=self.step_s * np.arange(states.shape[1]),
-            position=states[..., 10:13],
-            velocity=states[..., 7:10],
-            quaternion=states[..., 3:7],
-            angular_velocity=states[..., 0:3],
-            angular_acceleration=accelerations[..., :3],
-            specific_force=accelerations[..., 3:],
-            rotor_speed=states[..., 13:],
-            rotor_command=commands,
-        )
+        series = (np.moveaxis(values, 0, 1) for values in (states, accelerations, commands))
+        return Trace(self.step_s * np.arange(steps + 1), *series)
 
 
 def motion_of(trace: Trace, index: int, vehicle: Vehicle, wind_m_s=None, voltage_v=None) -> Motion:

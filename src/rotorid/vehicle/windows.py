@@ -136,7 +136,7 @@ def simulate_windows(
     driven = []
     for name, axes in (("rotor_speed", k), ("rotor_acceleration", k), ("wind", 3), ("push", 6)):
         if name in given:
-            driven += [given[name][sample], halfway(given[name], time_s, sample)]
+            driven += [given[name][sample], _halfway(given[name], time_s, sample)]
         else:
             driven += [np.zeros((0, m, axes))] * 2
     out = fast.fly_windows(
@@ -190,21 +190,14 @@ def _height_offset(vehicle: Vehicle, height, recorded: States, first: np.ndarray
 def usable(inputs: Inputs, recorded: States) -> np.ndarray:
     """Samples at which every input and state that is there has a value, (n,)."""
     good = np.isfinite(inputs.rotor_speed).all(axis=1)
-    fields = (
-        inputs.rotor_acceleration,
-        inputs.height,
-        inputs.voltage,
-        inputs.force,
-        inputs.moment,
-        inputs.wind,
-    )
+    fields = (inputs.rotor_acceleration, inputs.height, inputs.voltage, inputs.force, inputs.moment, inputs.wind)
     for values in (*fields, *vars(recorded).values()):
         if values is not None and len(values) == len(good):
             good &= np.isfinite(values.reshape(len(good), -1)).all(axis=1)
     return good
 
 
-def halfway(values: np.ndarray, time_s: np.ndarray, sample: np.ndarray) -> np.ndarray:
+def _halfway(values: np.ndarray, time_s: np.ndarray, sample: np.ndarray) -> np.ndarray:
     """Values half way between successive window samples, (w, m - 1, ...), of values (n, ...).
 
     The recorded sample where one lies there, else the cubic through the four nearest samples (a straight line

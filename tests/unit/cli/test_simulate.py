@@ -6,7 +6,7 @@ from typer.testing import CliRunner
 
 from rotorid.cli import app
 from rotorid.recordings import Vehicle, read_set, templates, write_vehicle
-from rotorid.vehicle.control.swings import START_HEIGHT_M
+from rotorid.vehicle.control import START_HEIGHT_M
 from tests.unit.effects.flown import entry, typical_values
 from tests.unit.effects.test_catalogue_audit import set_forms, speed_forms, speed_values, wrench_forms
 

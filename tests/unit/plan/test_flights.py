@@ -11,8 +11,7 @@ from rotorid.errors import InputError
 from rotorid.mismatch.evidence.motion import build_segments
 from rotorid.mismatch.evidence.rows import residual
 from rotorid.plan import write
-from rotorid.plan.candidates import Reference, candidates, joined, smaller, standard
-from rotorid.plan.limits import Limits
+from rotorid.plan.candidates import Limits, Reference, candidates, joined, smaller, standard
 from rotorid.plan.plan import NOTHING, SIZES, Plan, Tried, broken, yaw_acceleration
 from rotorid.plan.simulate import CompetingModel, commands, fly, followed, low_pass, recorded
 from rotorid.recordings import templates
@@ -255,6 +254,6 @@ def test_what_is_no_mission_says_why() -> None:
 
 
 def test_the_page_that_is_written_has_the_section() -> None:
-    from rotorid.report.page.make import page_file
+    from rotorid.report.page import page_file
 
     assert SECTION.search(page_file("page.html"))

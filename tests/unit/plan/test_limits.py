@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.plan.limits import Limits, SessionLimits, read_limits
+from rotorid.plan.candidates import Limits, SessionLimits, read_limits
 
 
 def refused_in_one_sentence(file: Path, text: str, said: str, kind: type = Limits) -> None:

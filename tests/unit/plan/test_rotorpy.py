@@ -5,8 +5,7 @@ import pandas as pd
 import pytest
 
 from rotorid.plan import write
-from rotorid.plan.candidates import candidates, joined, smaller
-from rotorid.plan.limits import Limits
+from rotorid.plan.candidates import Limits, candidates, joined, smaller
 from rotorid.plan.plan import Plan, yaw_acceleration
 from rotorid.plan.simulate import CompetingModel, fly
 from rotorid.recordings import Vehicle

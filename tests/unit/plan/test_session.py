@@ -9,7 +9,7 @@ import pytest
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.plan import session
-from rotorid.plan.limits import SessionLimits
+from rotorid.plan.candidates import SessionLimits
 from rotorid.plan.plan import Plan
 from rotorid.plan.questions import Hypothesis, Question
 from rotorid.plan.session import (

@@ -83,11 +83,11 @@ def test_answers_say_what_was_settled_narrowed_or_left() -> None:
     ids = ("frame_drag", "rotor_drag", "steady_wind")
     sure = Finding("rotor_drag", "established")
     fewer = Finding("rotor_drag", "ambiguous", alternatives=("frame_drag", "rotor_drag"))
-    assert answers([ids], [sure])[0].answer == "rotor_drag"
-    assert "narrowed" in answers([ids], [fewer])[0].sentence and not answers([ids], [fewer])[0].answer
-    assert answers([ids], [sure, fewer])[0].answer == ""
-    assert "neither" in answers([ids], [])[0].sentence
-    assert "suggested" in answers([ids], [Finding("rotor_drag", "suggested")])[0].sentence
+    assert answers([ids], [sure])[0]["answer"] == "rotor_drag"
+    assert "narrowed" in answers([ids], [fewer])[0]["sentence"] and not answers([ids], [fewer])[0]["answer"]
+    assert answers([ids], [sure, fewer])[0]["answer"] == ""
+    assert "neither" in answers([ids], [])[0]["sentence"]
+    assert "suggested" in answers([ids], [Finding("rotor_drag", "suggested")])[0]["sentence"]
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from rotorid.report.fleet_history import EVENTS
+from rotorid.report.fleet import EVENTS
 from rotorid_proof.changes import fleet
 from rotorid_proof.concealed import pairs
 

@@ -15,8 +15,8 @@ from rotorid.errors import InputError
 from rotorid.recordings import Vehicle, write_set
 from rotorid.report import next_to_log
 from rotorid.report.next_to_log import LogWindow, by_equations
-from rotorid.vehicle.exports import ardupilot_frame, export_vehicle, sih
-from rotorid.vehicle.exports.gazebo_airframe import gazebo_airframe
+from rotorid.vehicle.exports import autopilots, export_vehicle
+from rotorid.vehicle.exports.autopilots import gazebo_airframe
 from rotorid.vehicle.mixer import hover_speed_rad_s
 from rotorid.vehicle.windows import States
 
@@ -98,18 +98,18 @@ def test_sih_turns_no_faster_than_its_limit_and_the_file_says_so() -> None:
 
 def test_damping_and_inertia_go_along() -> None:
     made = x500(DAMPING)
-    values = sih.values_of(export_vehicle(made, "px4-sih").text)
+    values = autopilots.sih_values(export_vehicle(made, "px4-sih").text)
     assert values["SIH_KDW"] == pytest.approx(0.01) and values["SIH_IZZ"] == pytest.approx(0.04)
-    frame = ardupilot_frame.values_of(export_vehicle(made, "ardupilot-json").text)
+    frame = autopilots.ardupilot_values(export_vehicle(made, "ardupilot-json").text)
     j = made.inertia_kg_m2.matrix().diagonal()
     assert np.radians(400) / frame["refRotRate"] == pytest.approx(np.mean(0.01 / j))
 
 
 def test_the_frames_drag_of_ardupilot_is_the_vehicles() -> None:
     vehicle = x500(DRAG, {"id": "frame_drag", "form": "isotropic", "parameters": {"c": 0.02}})
-    frame = ardupilot_frame.values_of(export_vehicle(vehicle, "ardupilot-json").text)
+    frame = autopilots.ardupilot_values(export_vehicle(vehicle, "ardupilot-json").text)
     hover = np.full((1, 4), np.sqrt(frame["hoverThrOut"]))
-    at_10, _ = ardupilot_frame.wrench(frame, hover, np.array([[10.0, 0.0, 0.0]]), np.zeros((1, 3)))
+    at_10, _ = autopilots.ardupilot_wrench(frame, hover, np.array([[10.0, 0.0, 0.0]]), np.zeros((1, 3)))
     rotors = 4 * 8e-5 * hover_speed_rad_s(vehicle)
     assert at_10[0, 0] == pytest.approx(-(rotors * 10 + 0.02 * 100), rel=5e-3)
 

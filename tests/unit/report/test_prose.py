@@ -6,7 +6,20 @@ from pathlib import Path
 
 import pytest
 
-from rotorid.report import prose
+from rotorid.errors import InputError
+from rotorid.report.typeset import (
+    LETTER_PT,
+    LINE_PT,
+    fix,
+    not_recorded,
+    one_line,
+    render,
+    sci,
+    sig,
+    symbol,
+    table_of,
+    unit,
+)
 
 
 @pytest.fixture
@@ -21,7 +34,7 @@ def files(tmp_path: Path) -> dict[str, str]:
 def rendered(tmp_path: Path, text: str, files: dict[str, str]) -> str:
     path = tmp_path / "hover.md"
     path.write_text(text)
-    return prose.render(path, files)
+    return render(path, files)
 
 
 def test_numbers_come_from_the_file_with_the_asked_digits(tmp_path: Path, files: dict[str, str]) -> None:
@@ -31,9 +44,9 @@ def test_numbers_come_from_the_file_with_the_asked_digits(tmp_path: Path, files:
 
 
 def test_a_zero_after_rounding_has_no_sign_and_nothing_is_a_dash() -> None:
-    assert prose.fix(-0.0004, 2) == "0.00"
-    assert prose.fix(None, 2) == "–"
-    assert prose.sci(float("nan"), 2) == "–"
+    assert fix(-0.0004, 2) == "0.00"
+    assert fix(None, 2) == "–"
+    assert sci(float("nan"), 2) == "–"
 
 
 def test_a_table_has_heading_numbers_caption_and_label(tmp_path: Path, files: dict[str, str]) -> None:
@@ -59,30 +72,30 @@ def test_a_figure_has_caption_path_and_label(tmp_path: Path, files: dict[str, st
 
 def test_a_figure_inside_a_paragraph_stops_the_report(tmp_path: Path, files: dict[str, str]) -> None:
     text = 'Said before.\n{{ figure("lines", "Lines.", kind="public") }}\n'
-    with pytest.raises(prose.ProseError, match="fig:hover-lines stands inside a paragraph"):
+    with pytest.raises(InputError, match="fig:hover-lines stands inside a paragraph"):
         rendered(tmp_path, text, files)
 
 
 def test_a_figure_may_move_on_the_page(tmp_path: Path, files: dict[str, str]) -> None:
     text = '{{ figure("lines", "Lines.", kind="public", moving="lines") }}'
     assert 'moving="results/report/x/lines.svg"' in rendered(tmp_path, text, files)
-    with pytest.raises(prose.ProseError, match="no figure called film"):
+    with pytest.raises(InputError, match="no figure called film"):
         rendered(tmp_path, '{{ figure("lines", "Lines.", kind="public", moving="film") }}', files)
 
 
 def test_a_caption_says_first_that_instruments_were_emulated(tmp_path: Path, files: dict[str, str]) -> None:
     path = tmp_path / "hover.md"
     path.write_text('{{ figure("lines", "All lines.", kind="campaign") }}{% if emulated %} Emulated.{% endif %}')
-    text = prose.render(path, files, emulated=True)
+    text = render(path, files, emulated=True)
     assert text.startswith("![*Emulated instruments.* All lines.]") and text.endswith(" Emulated.")
-    with pytest.raises(prose.ProseError, match="not 'guessed'"):
+    with pytest.raises(InputError, match="not 'guessed'"):
         rendered(tmp_path, '{{ figure("lines", "All lines.", kind="guessed") }}', files)
 
 
 def test_a_chapter_without_its_recordings_says_which(tmp_path: Path) -> None:
     path = tmp_path / "hover.md"
     path.write_text("# Hover {#sec:hover}\n\n{{ nothing.here }}\n")
-    assert prose.not_recorded(path, ["thrust", "torque"], "mine/sessions.tsv") == (
+    assert not_recorded(path, ["thrust", "torque"], "mine/sessions.tsv") == (
         "# Hover {#sec:hover}\n\nThis chapter needs thrust and torque recordings, "
         "and `mine/sessions.tsv` lists none or too few.\n"
     )
@@ -105,13 +118,13 @@ def test_pandocs_identifiers_are_not_comments(tmp_path: Path, files: dict[str, s
     ],
 )
 def test_what_is_missing_stops_the_report(tmp_path: Path, files: dict[str, str], text: str, message: str) -> None:
-    with pytest.raises(prose.ProseError, match=message):
+    with pytest.raises(InputError, match=message):
         rendered(tmp_path, text, files)
 
 
 def test_columns_of_long_text_get_more_room(tmp_path: Path) -> None:
     rows = [{"what": "a" * 60, "n": 1.0}, {"what": "b", "n": 22.0}]
-    lines = prose.table_of(rows, "All.", [("what", "What"), ("n", "Number of them", "fix0")], "tbl:x")
+    lines = table_of(rows, "All.", [("what", "What"), ("n", "Number of them", "fix0")], "tbl:x")
     assert lines.splitlines()[1] == f"| :{'-' * 40} | {'-' * 6}: |"
 
 
@@ -124,20 +137,20 @@ def test_no_column_of_a_wide_table_is_narrower_than_its_longest_word() -> None:
     ]
     rows = [{"study": "appius-ground-effect", "found": "rotor drag; unequal rotors; " * 4, "error": "0.686 / 0.653 N",
              "rest": "14 %"}]  # fmt: skip
-    table = prose.table_of(rows, "All.", columns, "tbl:x")
+    table = table_of(rows, "All.", columns, "tbl:x")
     shares = [float(share) for share in re.search(r"widths=([\d.,]+)", table)[1].split(",")]
     assert sum(shares) == pytest.approx(1, abs=0.01)
     for share, word in zip(shares, ("appius", "unequal", "Measured", "Unexplained"), strict=True):
-        assert share * prose.LINE_PT > prose.LETTER_PT * len(word)
-    assert "widths" not in prose.table_of([{"a": "1"}], "All.", [("a", "A")], "tbl:x")
+        assert share * LINE_PT > LETTER_PT * len(word)
+    assert "widths" not in table_of([{"a": "1"}], "All.", [("a", "A")], "tbl:x")
 
 
 def three_digits(value: float | None) -> str:
-    return prose.sig(value, 3)
+    return sig(value, 3)
 
 
 def test_a_symbol_in_a_table_is_set_as_mathematics() -> None:
-    row = prose.table_of([{"name": "C_F"}], "Values.", [("name", "Parameter", "symbol")], "tbl:x").splitlines()[2]
+    row = table_of([{"name": "C_F"}], "Values.", [("name", "Parameter", "symbol")], "tbl:x").splitlines()[2]
     assert row == "| $C_{F}$ |"
 
 
@@ -145,16 +158,16 @@ def test_a_symbol_in_a_table_is_set_as_mathematics() -> None:
     ("form", "given", "shown"),
     [
         (
-            prose.unit,
+            unit,
             ("kg m2", "N s2/(rad m)", "1e-6 kg/rad"),
             ("kg\u00a0m²", "N\u00a0s²/(rad\u00a0m)", "10⁻⁶\u00a0kg/rad"),
         ),
-        (prose.unit, (1.0, "1e-6 1", "N/(N)2"), ("1", "10⁻⁶", "1/N")),
-        (prose.one_line, ("imrc-brushless a",), ("imrc\u2011brushless\u00a0a",)),
+        (unit, (1.0, "1e-6 1", "N/(N)2"), ("1", "10⁻⁶", "1/N")),
+        (one_line, ("imrc-brushless a",), ("imrc\u2011brushless\u00a0a",)),
         (three_digits, (0.20613, -0.00421, 12.0, None), ("0.206", "−0.00421", "12.0", "–")),
         (three_digits, (1.44e-6,), ("1.44\u00a0×\u00a010^−6^",)),
-        (prose.symbol, ("tau", "eps_x", "gain_x"), ("$\\tau$", "$\\varepsilon_{x}$", "$\\mathrm{gain}_{x}$")),
-        (prose.symbol, ("m", "J_xx", "w_11"), ("$m$", "$J_{xx}$", "$w_{11}$")),
+        (symbol, ("tau", "eps_x", "gain_x"), ("$\\tau$", "$\\varepsilon_{x}$", "$\\mathrm{gain}_{x}$")),
+        (symbol, ("m", "J_xx", "w_11"), ("$m$", "$J_{xx}$", "$w_{11}$")),
     ],
     ids=["units", "units of a power of ten and of nothing", "names", "numbers", "small numbers", "words", "letters"],
 )
@@ -166,5 +179,5 @@ def test_a_caption_of_two_kinds_says_that_instruments_were_emulated(tmp_path: Pa
     text = '{{ figure("lines", "All lines.", kind="campaign_simulated") }}\n'
     path = tmp_path / "chapter.md"
     path.write_text(text)
-    assert "*Emulated instruments, and simulated.* All lines." in prose.render(path, files, emulated=True)
-    assert "*Recorded on the instruments, and simulated.*" in prose.render(path, files)
+    assert "*Emulated instruments, and simulated.* All lines." in render(path, files, emulated=True)
+    assert "*Recorded on the instruments, and simulated.*" in render(path, files)

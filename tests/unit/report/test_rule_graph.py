@@ -1,6 +1,6 @@
 """The drawing of the workflow's rules."""
 
-from rotorid.report.plots.rule_graph import columns, heights, merged, reduced, rule_graph, wrapped
+from rotorid.report.plots.instruments import columns, heights, merged, reduced, rule_graph, wrapped
 
 STEPS = [
     ("import_public_a", "fit"),

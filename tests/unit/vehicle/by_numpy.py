@@ -14,7 +14,7 @@ from rotorid.effects.contract import Motion
 from rotorid.effects.instant import Wrench
 from rotorid.vehicle import fast, simulator
 from rotorid.vehicle.attitude import quaternion_rate, rotation_from_quaternion
-from rotorid.vehicle.fast import AttitudeLoop, KeptStates, Kernels
+from rotorid.vehicle.fast import AttitudeLoop, Kernels, Trace
 from rotorid.vehicle.mixer import wrench_matrix
 
 
@@ -111,7 +111,7 @@ def rk4_step(derivative, state, step_s):
     return out
 
 
-def _fly(vehicle, body, kernels, start, steps, step_s, commands, **given) -> KeptStates:
+def _fly(vehicle, body, kernels, start, steps, step_s, commands, **given) -> Trace:
     """One step, as `rotorid.vehicle.fast.fly`."""
     assert steps == 1
     command, following, push = commands[:, 0], given["following"][:, 0], given["pushes"][:, 0]
@@ -131,7 +131,8 @@ def _fly(vehicle, body, kernels, start, steps, step_s, commands, **given) -> Kep
 
     first = np.hstack(accelerations(vehicle, kernels, motion_of(0.0, start), push))
     after = rk4_step(derivative, start, step_s)
-    return KeptStates(np.stack([start, after], axis=1), first[:, None], commands)
+    time_s = given["first_s"] + step_s * np.arange(2)
+    return Trace(time_s, np.stack([start, after], axis=1), first[:, None], commands)
 
 
 def _fly_windows(vehicle, body, kernels, start, time_s, *driven) -> np.ndarray:

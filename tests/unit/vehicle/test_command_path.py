@@ -7,7 +7,7 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import SpeedForm
 from rotorid.errors import InputError
 from rotorid.recordings import Vehicle
-from rotorid.vehicle.control.pid import AttitudePid, AttitudeReference, Gains
+from rotorid.vehicle.control import AttitudePid, AttitudeReference
 from rotorid.vehicle.improved import command_path, flyable, simulate_as_stated, speeds_of_commands
 from rotorid.vehicle.simulator import Commands, Start, Trace
 from tests.unit.effects.flown import audit_vehicle, entry
@@ -38,7 +38,7 @@ def pilot(vehicle: Vehicle) -> AttitudePid:
         return 0.3 * np.sin(np.array([7.0, 9.0, 4.0]) * t + [0.0, 1.0, 2.0])
 
     j = np.diag(vehicle.inertia_kg_m2.matrix())
-    gains = Gains(tuple(60.0 * j), (0.0,) * 3, tuple(12.0 * j))
+    gains = (tuple(60.0 * j), (0.0,) * 3, tuple(12.0 * j))
     return AttitudePid(vehicle, AttitudeReference("lively", 6.5, wanted), gains, 0.02)
 
 

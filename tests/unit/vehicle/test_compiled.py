@@ -12,11 +12,11 @@ from rotorid.effects.contract import Motion
 from rotorid.effects.gust import window_form
 from rotorid.effects.instant import Wrench, body_of, records
 from rotorid.errors import InputError
-from rotorid.identify.excitation import ExcitedHold, Multisine
+from rotorid.identify.inertias import ExcitedHold, Multisine
 from rotorid.vehicle.attitude import quaternion_from_euler, rotation_from_quaternion
 from rotorid.vehicle.batch import Batch
 from rotorid.vehicle.compiled import _invert
-from rotorid.vehicle.control.pid import AttitudePid, Gains, training_reference
+from rotorid.vehicle.control import AttitudePid, training_reference
 from rotorid.vehicle.fast import _adds_wrench
 from rotorid.vehicle.improved import simulate_as_stated
 from rotorid.vehicle.simulator import Commands, Disturbance, Motors, Start, WhiteNoise, simulate
@@ -180,7 +180,7 @@ def test_a_controller_flies_compiled_as_it_is_called(kind):
         waves = Multisine(2.0, np.array([1.0, 2.0, 3.0]), np.eye(3) * [0.01, 0.01, 0.002], np.zeros((3, 3)))
         pilot = ExcitedHold(VEHICLE, waves, (400.0, 2000.0))
     else:
-        gains = Gains((0.25, 0.25, 0.5), (0.3, 0.3, 0.1), (0.04, 0.04, 0.07))
+        gains = ((0.25, 0.25, 0.5), (0.3, 0.3, 0.1), (0.04, 0.04, 0.07))
         limit = (0.1, 0.1, 0.02) if kind == "limited pid" else None
         trim = (0.02, -0.03, 0.005) if kind == "trimmed pid" else (0.0, 0.0, 0.0)
         pilot = AttitudePid(VEHICLE, training_reference(6.4), gains, 0.02, limit, trim)
@@ -312,7 +312,7 @@ def test_steps_of_a_batch_make_up_its_flight_and_threads_change_nothing():
     series = commands_of(20, 0.004)
     whole = batch.fly(batch.hover(), series, 0.004, threads=2)
     single = batch.fly(batch.hover(), series, 0.004, threads=1)
-    np.testing.assert_array_equal(whole.flown.states, single.flown.states)
+    np.testing.assert_array_equal(whole.states, single.states)
     states = batch.hover()
     for command in series:
         states = batch.step(states, np.tile(command, (40, 1)), 0.004)

@@ -19,7 +19,7 @@ from rotorid.recordings import Vehicle, read_vehicle, templates, write_vehicle
 from rotorid.recordings.vehicle import Derivative, unit_of
 from rotorid.report import next_to_log
 from rotorid.vehicle.batch import Batch
-from rotorid.vehicle.control.swings import swings, turned_over
+from rotorid.vehicle.control import swings, turned_over
 from rotorid.vehicle.derivatives import (
     CHANNELS,
     QUANTITIES,
@@ -30,11 +30,10 @@ from rotorid.vehicle.derivatives import (
     table_of,
     wrench,
 )
-from rotorid.vehicle.exports import NAMES, ardupilot_frame, export_vehicle, sih
+from rotorid.vehicle.exports import NAMES, autopilots, export_vehicle
 from rotorid.vehicle.exports.derivatives import MUJOCO_FILE, ROTORPY_FILE
 from rotorid.vehicle.exports.flown import gazebo_damping_of, in_drake, in_mujoco, in_rotorpy
-from rotorid.vehicle.hover import hover, wrench_at_rest
-from rotorid.vehicle.improved import active_forms, flyable, record_as_stated, simulate_as_stated
+from rotorid.vehicle.improved import active_forms, flyable, hover, record_as_stated, simulate_as_stated, wrench_at_rest
 from rotorid.vehicle.simulator import Commands, simulate
 from tests.unit.effects.flown import audit_vehicle, commands, start
 from tests.unit.vehicle.by_numpy import by_numpy
@@ -287,7 +286,7 @@ def test_linear_drag_of_sih_and_ardupilot_slows_as_it_should(form):
 def test_one_drag_and_one_damping_are_means_by_what_was_flown():
     vehicle = x500_with(("force_x", "u", -0.3), ("force_y", "v", -0.1), *TURNS)
     exported = export_vehicle(vehicle, "px4-sih")
-    values = sih.values_of(exported.text)
+    values = autopilots.sih_values(exported.text)
     # Ranges to 1.5, 3 m/s and none along z; to 3, 3 and 1 rad/s.
     assert values["SIH_KDV"] == pytest.approx((0.3 * 1.5**2 + 0.1 * 3**2) / (1.5**2 + 3**2))
     j = vehicle.inertia_kg_m2.matrix().diagonal()
@@ -295,19 +294,19 @@ def test_one_drag_and_one_damping_are_means_by_what_was_flown():
     assert values["SIH_KDW"] == pytest.approx(weights @ [0.01, 0.01, 0.02] / weights.sum())
     assert sum(s.startswith("derivatives") for s in exported.left_out) == 1
     both = vehicle.model_copy(update={"effects": (DRAG,)})
-    plain = sih.values_of(export_vehicle(both.model_copy(update={"derivatives": ()}), "px4-sih").text)
-    added = sih.values_of(export_vehicle(both, "px4-sih").text)
+    plain = autopilots.sih_values(export_vehicle(both.model_copy(update={"derivatives": ()}), "px4-sih").text)
+    added = autopilots.sih_values(export_vehicle(both, "px4-sih").text)
     assert added["SIH_KDV"] == pytest.approx(plain["SIH_KDV"] + values["SIH_KDV"])
-    frame = ardupilot_frame.values_of(export_vehicle(vehicle, "ardupilot-json").text)
+    frame = autopilots.ardupilot_values(export_vehicle(vehicle, "ardupilot-json").text)
     rate = np.average([0.01, 0.01, 0.02] / j, weights=[9, 9, 1])
     assert np.radians(400) / frame["refRotRate"] == pytest.approx(rate)
 
 
 def test_what_drives_a_vehicle_on_makes_no_negative_drag():
     vehicle = x500_with(*[(c, q, -v) for c, q, v in (*ALIKE, *TURNS)])
-    values = sih.values_of(export_vehicle(vehicle, "px4-sih").text)
+    values = autopilots.sih_values(export_vehicle(vehicle, "px4-sih").text)
     assert values["SIH_KDV"] == 0 and values["SIH_KDW"] == 0
-    frame = ardupilot_frame.values_of(export_vehicle(vehicle, "ardupilot-json").text)
+    frame = autopilots.ardupilot_values(export_vehicle(vehicle, "ardupilot-json").text)
     assert frame["mdrag_coef"] == 0 and frame["refRotRate"] == 0
 
 

@@ -417,7 +417,7 @@ def test_what_a_tool_does_not_take_is_one_sentence_before_anything_is_written(tm
 
 def test_a_tool_refuses_what_is_refused_for_it(monkeypatch) -> None:
     """The limits are the tools' own: without them the tools say the same."""
-    monkeypatch.setattr(forms, "refusal", lambda *asked: "")
+    monkeypatch.setattr("rotorid.vehicle.exports.refusal", lambda *asked: "")
     for vehicle, form, module in ((FLAT, "mjcf", "mujoco"), (six_rotors(), "rotorpy", "rotorpy")):
         pytest.importorskip(module)
         with pytest.raises(InputError, match="does not read the exported vehicle"):
@@ -433,7 +433,7 @@ def test_other_tools_take_what_one_refuses() -> None:
 
 def test_a_file_that_the_tool_does_not_read_is_not_written(tmp_path, monkeypatch) -> None:
     pytest.importorskip("mujoco")
-    monkeypatch.setattr(forms, "refusal", lambda *asked: "")
+    monkeypatch.setattr("rotorid.vehicle.exports.refusal", lambda *asked: "")
     done = exported_by_command(tmp_path, FLAT, "mjcf", "v.xml")
     assert done.exit_code == 1 and "MuJoCo does not read the exported vehicle" in done.output
     assert len(done.output.strip().splitlines()) == 1 and not (tmp_path / "out").exists()

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from rotorid.recordings import Vehicle
-from rotorid.vehicle.control.pid import AttitudePid, AttitudeReference, Gains
-from rotorid.vehicle.hover import hover
-from rotorid.vehicle.improved import command_path, simulate_as_stated
+from rotorid.vehicle.control import AttitudePid, AttitudeReference
+from rotorid.vehicle.improved import command_path, hover, simulate_as_stated
 from rotorid.vehicle.simulator import Start
 from tests.unit.effects.flown import audit_vehicle
 
@@ -61,7 +60,7 @@ def test_what_is_asked_for_holds_a_vehicle_level_at_its_height():
 
     def flight(thrust_n: float, trim: tuple[float, float, float]):
         level = AttitudeReference("level", thrust_n, lambda t: np.zeros(3))
-        pid = AttitudePid(vehicle, level, Gains(tuple(50.0 * j), (0.0,) * 3, tuple(11.0 * j)), 0.02, None, trim)
+        pid = AttitudePid(vehicle, level, (tuple(50.0 * j), (0.0,) * 3, tuple(11.0 * j)), 0.02, None, trim)
         return simulate_as_stated(vehicle, pid, 2.0, 0.002, start=start)
 
     held = flight(asked.thrust_n, asked.moments_n_m)

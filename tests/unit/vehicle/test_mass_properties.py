@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from rotorid.vehicle.mass_properties import COLUMNS, compose, own_inertia, read_components
+from rotorid.identify.inertias import COLUMNS, compose, own_inertia, read_components
 
 
 def write(path, *rows):
@@ -12,10 +12,10 @@ def write(path, *rows):
 def test_two_points_by_hand(tmp_path):
     """1 kg at x = 0 and 1 kg at x = 2: centre at 1, J_yy = J_zz = 2 kg m2."""
     table = read_components(write(tmp_path / "c.csv", "a,1,1,point,0,0,0,0,0,0", "b,1,1,point,0,0,0,2,0,0"))
-    found = compose(table)
-    assert found.mass_kg == 2
-    np.testing.assert_allclose(found.centre_m, [1, 0, 0])
-    np.testing.assert_allclose(found.inertia_kg_m2, np.diag([0, 2, 2]))
+    mass_kg, centre_m, inertia = compose(table)
+    assert mass_kg == 2
+    np.testing.assert_allclose(centre_m, [1, 0, 0])
+    np.testing.assert_allclose(inertia, np.diag([0, 2, 2]))
 
 
 def test_box_and_cylinder_by_hand():
@@ -26,8 +26,7 @@ def test_box_and_cylinder_by_hand():
 
 def test_four_corners_are_symmetric(tmp_path):
     table = read_components(write(tmp_path / "c.csv", "arm,4,0.1,box,0.2,0.01,0.01,0.1,0.1,0"))
-    found = compose(table)
-    inertia = found.inertia_kg_m2
+    _, _, inertia = compose(table)
     np.testing.assert_allclose(inertia - np.diag(np.diag(inertia)), 0, atol=1e-18)
     assert inertia[0, 0] == pytest.approx(inertia[1, 1])
     # About z: own 0.1 (0.04 + 0.0001) / 12 and 0.1 * 0.02, four times.

@@ -8,14 +8,14 @@ import pytest
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.instant import body_of
-from rotorid.identify.excitation import ExcitedHold, Multisine
+from rotorid.identify.inertias import ExcitedHold, Multisine
 from rotorid.vehicle import fast
 from rotorid.vehicle.attitude import (
     euler_from_quaternion,
     quaternion_from_euler,
     rotation_from_quaternion,
 )
-from rotorid.vehicle.control.pid import AttitudePid, Gains, training_reference
+from rotorid.vehicle.control import AttitudePid, training_reference
 from rotorid.vehicle.mixer import allocation_matrix, wrench_matrix
 from rotorid.vehicle.simulator import (
     Commands,
@@ -322,7 +322,7 @@ def test_pid_by_hand():
 
 def test_anti_windup_shortens_the_overshoot():
     """A roll step that saturates the moment: with the integral held the overshoot is smaller."""
-    from rotorid.vehicle.control.pid import AttitudeReference
+    from rotorid.vehicle.control import AttitudeReference
 
     vehicle = thesis_vehicle()
 
@@ -386,7 +386,7 @@ def test_sensor_effects_reach_the_readings_only():
 
 def test_a_runaway_is_one_clear_sentence():
     # A derivative of the wrong sign with gains a million times too large.
-    pid = AttitudePid(thesis_vehicle(), training_reference(), Gains((-1e9,) * 3, (0.0,) * 3, (0.0,) * 3))
+    pid = AttitudePid(thesis_vehicle(), training_reference(), ((-1e9,) * 3, (0.0,) * 3, (0.0,) * 3))
     with pytest.raises(ValueError, match="ran away"), np.errstate(all="ignore"):
         simulate(thesis_vehicle(), pid, 5.0, 0.01)
 

@@ -7,7 +7,7 @@ import numpy as np
 from rotorid.cli.examples import CONCEALED, EVERY, FLIGHTS, SECONDS, SEED
 from rotorid.recordings import templates, write_vehicle
 from rotorid.recordings.tables import write_table
-from rotorid.vehicle.control.swings import swings
+from rotorid.vehicle.control import swings
 
 _HEADING = """\
 # Two flights of {seconds:g} s of the thesis's quadrotor, simulated by rotorid with seed {seed}. What the vehicle

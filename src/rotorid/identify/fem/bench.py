@@ -1,25 +1,20 @@
-"""The bench under a vertical load in the middle of plate D: meshes of one leg, and the leg solved for any material.
+"""One leg of the bench and its load cell, meshed and solved, and what they say of the thesis's sentences (2.5.2).
 
-Under such a load all legs do the same, turned by 120°, so one is enough: on the cut through the plate displacements are
-those of the other cut, turned. Pieces A, B and C end on rectangles of the cells and of the plate and follow them there
-(bonded contact). The order of the pieces: plate D, post C, upper cell, bracket B, lower cell, foot A. Plate D is round
-with a round seat in its middle, on which the tube stands; a third of it belongs to a leg.
+Under a vertical load in the middle of plate D all legs do the same, turned by 120°, so one is enough: on the cut
+through the plate displacements are those of the other cut, turned. Pieces A, B and C end on rectangles of the cells and
+of the plate and follow them there (bonded contact). The order of the pieces: plate D, post C, upper cell, bracket B,
+lower cell, foot A. Plate D is round with a round seat in its middle, on which the tube stands; a third of it belongs to
+a leg.
 
-The load cell: a bar with two holes across, joined by a slot (binocular bending beam), and its bridge of four gauges.
-
+The load cell is a bar with two holes across, joined by a slot (binocular bending beam), and its bridge of four gauges.
 Own frame: x along the bar, from its middle to the end away from the vehicle, y the way of a positive force, z across.
 Alone it is solved as it is calibrated (thesis fig. 2.32): one end clamped, the weight on the other.
-
-What a solved bench says: deformation, equivalent stress, stress in the narrow sections, and what its cells read.
-
-The thesis's four sentences on its simulations (2.5.2) are held to a table of such answers, for benches of different
-sizes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -28,15 +23,14 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from rotorid.errors import InputError
-from rotorid.identify.bench.reconstruct import Geometry, forces
+from rotorid.identify.bench import Geometry, forces
 from rotorid.identify.fem import elasticity, placement
 from rotorid.identify.fem.elasticity import (
     Bound,
-    Flat,
     Hole,
     LooseParts,
+    Mesh,
     Pad,
-    Tets,
     between,
     block,
     column,
@@ -44,7 +38,7 @@ from rotorid.identify.fem.elasticity import (
     joined,
     mirrored,
     on,
-    stacked,
+    raised,
 )
 from rotorid.identify.fem.placement import LEGS, MATERIALS, THIRD, Assumed, Material, PartFrame, Sizes, materials
 
@@ -70,7 +64,7 @@ NEARLY = 0.1
 """Two stresses are nearly the same where they differ by at most this share."""
 
 
-def _profile(sizes: Sizes, fineness: float) -> Flat:
+def _profile(sizes: Sizes, fineness: float) -> Mesh:
     """The bar from the side, with `fineness` times as many elements along each line as the coarsest has."""
     half, reach = sizes.cell_side_m / 2, sizes.cell_between_holes_m / 2
     beyond = reach + _WALL * half
@@ -101,12 +95,10 @@ def _profile(sizes: Sizes, fineness: float) -> Flat:
     return joined([upper, mirrored(upper, 1)])
 
 
-def mesh(sizes: Sizes, fineness: float) -> Tets:
+def mesh(sizes: Sizes, fineness: float) -> Mesh:
     """The bar in its own frame."""
-    flat = _profile(sizes, fineness)
     across = np.linspace(-0.5, 0.5, count(1, fineness) + 2) * sizes.cell_side_m
-    layers = np.stack([np.c_[flat.points_m, np.full(len(flat.points_m), z)] for z in across])
-    return stacked(layers, flat.triangles)
+    return raised(_profile(sizes, fineness), across)
 
 
 _GAUGE_SIGNS = np.array([1.0, -1.0, 1.0, -1.0])
@@ -137,12 +129,7 @@ def _holes(name: str, sizes: Sizes, frame: PartFrame) -> list[Hole]:
 def _gauge_strains(body: LooseParts, name: str, sizes: Sizes, frame: PartFrame, moved_m: np.ndarray) -> np.ndarray:
     """Strain of the four gauges of the cell `name`, shape (4,): change of length of each grid over its length.
 
-    Parameters
-    ----------
-    frame
-        The cell's own.
-    moved_m
-        Displacements of all nodes [m], shape (n, 3).
+    `frame`: the cell's own. `moved_m`: displacements of all nodes [m], shape (n, 3).
     """
     first, last = (
         body.weights(frame.origin_m + ends @ frame.axes, name) @ moved_m @ frame.axes[0]
@@ -177,21 +164,8 @@ def strain_per_newton(sizes: Sizes, material: Material, fineness: float) -> floa
 def build(assumed: Assumed, sizes: Sizes, distances_m: Mapping[str, float], fineness: float) -> Bench:
     """One leg in frame {T} (z down, origin on top of plate D), with all that binds it.
 
-    Parameters
-    ----------
-    assumed
-        For the area that bears the load.
-    sizes
-        All other sizes.
-    distances_m
-        Table 2.3, by name [m].
-    fineness
-        Elements along each line, as a multiple of the coarsest mesh.
-
-    Raises
-    ------
-    InputError
-        Sizes that do not go together.
+    `assumed`: for the area that bears the load. `sizes`: all other sizes. `distances_m`: table 2.3, by name [m].
+    `fineness`: elements along each line, as a multiple of the coarsest mesh. InputError: sizes that do not go together.
     """
     placed = placement.cells(distances_m)
     upper, lower = placed[1], placed[2]
@@ -244,31 +218,19 @@ def _other_end(place: placement.Place, sizes: Sizes) -> np.ndarray:
     return place.force_m + sizes.cell_between_pads_m * place.axis
 
 
-def _seat_radius_m(area_m2: float, fineness: float) -> float:
-    """Radius of the polygon's corners that has just the area which bears the load."""
-    corners = 6 * _core(fineness)
-    return float(np.sqrt(2 * area_m2 / (corners * np.sin(2 * np.pi / corners))))
+def _mesh(sizes: Sizes, area_m2: float, fineness: float) -> Mesh:
+    """Plate D between -60° and +60° about the x axis; z points down, the plate's top is at 0."""
+    n = count(2, fineness)  # elements along each side of the rhombus in the middle
+    # Radius of the corners of the polygon that has just the area which bears the load.
+    seat_m = float(np.sqrt(2 * area_m2 / (6 * n * np.sin(2 * np.pi / (6 * n)))))
+    core, whole = _flat(seat_m, sizes.plate_radius_m, n, count(4, fineness))
+    plate = raised(whole, np.linspace(sizes.plate_thickness_m, 0, count(1, fineness) + 1))
+    seat = raised(core, np.linspace(0, -sizes.boss_height_m, count(1, fineness) + 1))
+    return joined([plate, seat])
 
 
-def _mesh(sizes: Sizes, area_m2: float, fineness: float) -> Tets:
-    """The part between -60° and +60° about the x axis; z points down, the plate's top is at 0."""
-    core, whole = _flat(_seat_radius_m(area_m2, fineness), sizes.plate_radius_m, fineness)
-    plate = _raised(whole, np.linspace(sizes.plate_thickness_m, 0, count(1, fineness) + 1))
-    seat = _raised(core, np.linspace(0, -sizes.boss_height_m, count(1, fineness) + 1))
-    points = np.concatenate([plate.points_m, seat.points_m])
-    cells = np.concatenate([plate.cells, seat.cells + len(plate.points_m)])
-    kept, back = np.unique([min(same) for same in cKDTree(points).query_ball_point(points, 1e-9)], return_inverse=True)
-    return Tets(points[kept], back[cells])
-
-
-def _core(fineness: float) -> int:
-    """Elements along each side of the rhombus in the middle."""
-    return count(2, fineness)
-
-
-def _flat(seat_m: float, rim_m: float, fineness: float) -> tuple[Flat, Flat]:
-    """The seat alone and the whole, from above."""
-    n = _core(fineness)
+def _flat(seat_m: float, rim_m: float, n: int, rings: int) -> tuple[Mesh, Mesh]:
+    """The seat alone and the whole, from above, with n elements along each side of the rhombus in the middle."""
     i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij")
     larger = np.maximum(np.maximum(i, j), 1)
     share = np.maximum(i, j) / n
@@ -278,15 +240,10 @@ def _flat(seat_m: float, rim_m: float, fineness: float) -> tuple[Flat, Flat]:
     straight = (i[..., None] * ends[0] + j[..., None] * ends[1]) / n
     weight = share[..., None] ** 2
     core = block(weight * round_ + (1 - weight) * straight)
-    radii = np.geomspace(seat_m, rim_m, count(4, fineness) + 1)
+    radii = np.geomspace(seat_m, rim_m, rings + 1)
     angles = np.linspace(-THIRD / 2, THIRD / 2, 2 * n + 1)
     ring = block(np.stack([np.outer(radii, np.cos(angles)), np.outer(radii, np.sin(angles))], axis=-1))
     return core, joined([core, ring])
-
-
-def _raised(flat: Flat, heights_m: np.ndarray) -> Tets:
-    layers = np.stack([np.c_[flat.points_m, np.full(len(flat.points_m), z)] for z in heights_m])
-    return stacked(layers, flat.triangles)
 
 
 @dataclass(frozen=True)
@@ -377,41 +334,15 @@ class Bench:
         return nodes[(off_hole < self.sizes.hole_radius_m / 2) & (own[:, 1] > self.sizes.hole_radius_m / 2)]
 
 
-@dataclass(frozen=True)
-class Answers:
-    """Per newton of load, downwards in the middle of plate D."""
+def ask(bench: Bench, solved: Solved, cell_strain: float, geometry: Geometry) -> dict[str, float | str]:
+    """The answers of a solved bench per newton of load, downwards in the middle of plate D.
 
-    deformation_m: float
-    """Largest displacement [m/N]."""
-    deformed_most: str
-    """The part where it is."""
-    stress_pa: float
-    """Largest equivalent stress [Pa/N]."""
-    stressed_most: str
-    """The part where it is."""
-    narrow_upper_pa: float
-    """Largest equivalent stress in the narrow sections of an upper cell [Pa/N], and of a lower one."""
-    narrow_lower_pa: float
-    plate_evenness: float
-    """Least displacement of plate D over its largest [1]."""
-    plate_middle: float
-    """Displacement in the plate's middle over the plate's largest [1]."""
-    force_upper_n: float
-    """What an upper cell reads by its calibration [N/N], and a lower one; positive as in eqs 2.3 to 2.8."""
-    force_lower_n: float
-    equation_n: float
-    """Vertical force by eq. 2.8 from all six readings [N/N]; the load itself is +1."""
-
-
-def ask(bench: Bench, solved: Solved, cell_strain: float, geometry: Geometry) -> Answers:
-    """The answers of a solved bench.
-
-    Parameters
-    ----------
-    cell_strain
-        Strain of a single cell's bridge per newton [1/N], its calibration.
-    geometry
-        Table 2.3.
+    `deformation_m` and `stress_pa`: largest displacement [m/N] and equivalent stress [Pa/N], `deformed_most` and
+    `stressed_most` the parts where they are; `narrow_upper_pa` and `narrow_lower_pa`: largest stress in the narrow
+    sections of a cell [Pa/N]; `plate_evenness` and `plate_middle`: least displacement of plate D, and that of its
+    middle, over its largest; `force_upper_n` and `force_lower_n`: what a cell reads by its calibration `cell_strain`
+    (strain of a single cell's bridge [1/N]), positive as in eqs 2.3 to 2.8; `equation_n`: vertical force by eq. 2.8
+    from all six readings [N/N], where the load itself is +1. `geometry` is table 2.3.
     """
     body = bench.body
     moved = np.linalg.norm(solved.displacement_m, axis=1)
@@ -423,19 +354,19 @@ def ask(bench: Bench, solved: Solved, cell_strain: float, geometry: Geometry) ->
     six = np.empty(6)
     for numbers in LEGS:
         six[np.array(numbers) - 1] = read
-    return Answers(
-        deformation_m=float(moved.max()),
-        deformed_most=str(part[moved.argmax()]),
-        stress_pa=float(solved.von_mises_pa.max()),
-        stressed_most=str(part[solved.von_mises_pa.argmax()]),
-        narrow_upper_pa=narrow[0],
-        narrow_lower_pa=narrow[1],
-        plate_evenness=float(moved[plate].min() / moved[plate].max()),
-        plate_middle=float(moved[middle].max() / moved[plate].max()),
-        force_upper_n=read[0],
-        force_lower_n=read[1],
-        equation_n=float(forces(six, geometry)[2]),
-    )
+    return {
+        "deformation_m": float(moved.max()),
+        "deformed_most": str(part[moved.argmax()]),
+        "stress_pa": float(solved.von_mises_pa.max()),
+        "stressed_most": str(part[solved.von_mises_pa.argmax()]),
+        "narrow_upper_pa": narrow[0],
+        "narrow_lower_pa": narrow[1],
+        "plate_evenness": float(moved[plate].min() / moved[plate].max()),
+        "plate_middle": float(moved[middle].max() / moved[plate].max()),
+        "force_upper_n": read[0],
+        "force_lower_n": read[1],
+        "equation_n": float(forces(six, geometry)[2]),
+    }
 
 
 def by_part(bench: Bench, solved: Solved) -> dict[str, dict[str, float]]:
@@ -448,19 +379,25 @@ def by_part(bench: Bench, solved: Solved) -> dict[str, dict[str, float]]:
     }
 
 
-def compare(
+Answers = Mapping[str, Mapping[str, float | str]]
+"""What `ask` gives, by the material of the pieces."""
+
+
+def solve(
     assumed: Assumed, sizes: Sizes, moduli_pa: Mapping[str, float], geometry: Geometry, fineness: float
-) -> dict[str, Answers]:
-    """Answers of a bench with pieces of each material, on a mesh of this fineness."""
-    bench = build(assumed, sizes, geometry.distance_m, fineness)
+) -> tuple[Bench, float, dict[str, Solved], Answers]:
+    """A bench on a mesh of this fineness, its cells' calibration [1/N], and by material how it is solved and what it
+    answers."""
+    bench = build(assumed, sizes, geometry, fineness)
     of = {name: materials(sizes, moduli_pa, name) for name in MATERIALS}
     cell_strain = strain_per_newton(sizes, of["PLA"]["cells"], fineness)
-    return {name: ask(bench, bench.solve(of[name]), cell_strain, geometry) for name in MATERIALS}
+    solved = {name: bench.solve(of[name]) for name in MATERIALS}
+    return bench, cell_strain, solved, {name: ask(bench, solved[name], cell_strain, geometry) for name in MATERIALS}
 
 
-def ratios(found: Mapping[str, Answers]) -> dict[str, float]:
+def ratios(found: Answers) -> dict[str, float]:
     """PLA over aluminium: of the largest deformation, the largest stress, and the stress in the narrow sections [1]."""
-    metal, plastic = (asdict(found[name]) for name in MATERIALS)
+    metal, plastic = (found[name] for name in MATERIALS)
     return {
         name.removesuffix("_m").removesuffix("_pa"): plastic[name] / metal[name]
         for name in ("deformation_m", "stress_pa", "narrow_upper_pa", "narrow_lower_pa")
@@ -470,11 +407,8 @@ def ratios(found: Mapping[str, Answers]) -> dict[str, float]:
 def judge_statements(table: pd.DataFrame) -> list[dict]:
     """Each sentence: whether it holds with all sizes as assumed, on how many benches it `holds`, and what follows.
 
-    Parameters
-    ----------
-    table
-        A bench a row, the first with all sizes as assumed; columns `ratio_deformation`, `ratio_narrow_upper`,
-        `ratio_narrow_lower`; `plate_evenness`, `plate_middle` and `stressed_most` with `_aluminium` and with `_pla`.
+    `table`: a bench a row, the first with all sizes as assumed; columns `ratio_deformation`, `ratio_narrow_upper`,
+    `ratio_narrow_lower`; `plate_evenness`, `plate_middle` and `stressed_most` with `_aluminium` and with `_pla`.
     """
     even = table["plate_evenness_aluminium"] >= EVEN
     middle = (table["plate_middle_pla"] >= MIDDLE) & (table["plate_evenness_pla"] < table["plate_evenness_aluminium"])

@@ -1,13 +1,10 @@
-"""Linear elasticity of isotropic bodies on quadratic tetrahedra, with parts bonded to each other.
+"""Linear elasticity of isotropic bodies on quadratic tetrahedra, with parts bonded to each other, and their meshes.
 
-A mesh's unknowns are the displacements of its nodes (corners and middles of edges), first all of x, then all of y, then
-all of z: shape (3 n,). The stiffness is a sum of matrices that hold no material, weighted by Lamé's constants, so that
-another material needs no new integration. What binds nodes is a matrix C with u = C q; solved is CᵀKC q = Cᵀf.
-
-Meshes of tetrahedra made of layers: a triangulated profile that is moved along a path.
-
-Plates, columns and bars with holes across need no mesh generator; the usual ones need libraries of a desktop
-(docs/decisions/0008-finite-elements.md).
+A mesh is layers of tetrahedra: a triangulated profile moved along a path. Plates, columns and bars with holes across
+need no mesh generator; the usual ones need libraries of a desktop (docs/decisions/0008-finite-elements.md). Its
+unknowns are the displacements of its nodes (corners and middles of edges), first all of x, then all of y, then all of
+z: shape (3 n,). The stiffness is a sum of matrices that hold no material, weighted by Lamé's constants, so that another
+material needs no new integration. What binds nodes is a matrix C with u = C q; solved is CᵀKC q = Cᵀf.
 """
 
 from __future__ import annotations
@@ -36,27 +33,17 @@ _OUTSIDE = 0.02
 
 
 @dataclass(frozen=True)
-class Tets:
-    """A mesh of tetrahedra."""
+class Mesh:
+    """Triangles of a flat profile, or tetrahedra."""
 
     points_m: np.ndarray
-    """Corners [m], shape (n, 3)."""
+    """Corners [m], shape (n, 2) or (n, 3)."""
     cells: np.ndarray
-    """Indices of the corners of each tetrahedron, shape (m, 4)."""
+    """Indices of the corners of each triangle, shape (m, 3), or tetrahedron, shape (m, 4)."""
 
-    def put(self, frame: PartFrame) -> Tets:
-        """The same mesh in the frame in which its own is `frame`."""
-        return Tets(frame.origin_m + self.points_m @ frame.axes, self.cells)
-
-
-@dataclass(frozen=True)
-class Flat:
-    """A triangulated profile."""
-
-    points_m: np.ndarray
-    """Corners [m], shape (n, 2)."""
-    triangles: np.ndarray
-    """Indices, shape (t, 3)."""
+    def put(self, frame: PartFrame) -> Mesh:
+        """Tetrahedra in the frame in which their own is `frame`."""
+        return Mesh(frame.origin_m + self.points_m @ frame.axes, self.cells)
 
 
 def count(coarsest: int, fineness: float) -> int:
@@ -64,7 +51,7 @@ def count(coarsest: int, fineness: float) -> int:
     return int(np.ceil(coarsest * fineness - 1e-9))
 
 
-def block(points_m: np.ndarray) -> Flat:
+def block(points_m: np.ndarray) -> Mesh:
     """A grid of points, shape (rows, columns, 2), each of its quadrilaterals cut in two along the shorter diagonal."""
     rows, columns = points_m.shape[:2]
     index = np.arange(rows * columns).reshape(rows, columns)
@@ -73,41 +60,37 @@ def block(points_m: np.ndarray) -> Flat:
     through_ac = np.sum((flat[a] - flat[c]) ** 2, 1) <= np.sum((flat[b] - flat[d]) ** 2, 1) * (1 + 1e-9)
     first = np.where(through_ac[:, None], np.c_[a, b, c], np.c_[a, b, d])
     second = np.where(through_ac[:, None], np.c_[a, c, d], np.c_[b, c, d])
-    return Flat(flat, np.r_[first, second])
+    return Mesh(flat, np.r_[first, second])
 
 
-def between(inner_m: np.ndarray, outer_m: np.ndarray, layers: int) -> Flat:
+def between(inner_m: np.ndarray, outer_m: np.ndarray, layers: int) -> Mesh:
     """Layers between two polylines of equally many points, shape (n, 2) each."""
     share = np.linspace(0, 1, layers + 1)[:, None, None]
     return block((1 - share) * inner_m + share * outer_m)
 
 
-def joined(parts: Sequence[Flat], tolerance_m: float = 1e-9) -> Flat:
-    """Profiles as one, points within the tolerance of each other made one."""
+def joined(parts: Sequence[Mesh], tolerance_m: float = 1e-9) -> Mesh:
+    """Meshes as one, points within the tolerance of each other made one."""
     points = np.concatenate([part.points_m for part in parts])
     starts = np.cumsum([0] + [len(part.points_m) for part in parts[:-1]])
-    triangles = np.concatenate([part.triangles + start for part, start in zip(parts, starts, strict=True)])
+    cells = np.concatenate([part.cells + start for part, start in zip(parts, starts, strict=True)])
     near = cKDTree(points).query_ball_point(points, tolerance_m)
     kept, back = np.unique([min(same) for same in near], return_inverse=True)
-    return Flat(points[kept], back[triangles])
+    return Mesh(points[kept], back[cells])
 
 
-def mirrored(part: Flat, axis: int) -> Flat:
+def mirrored(part: Mesh, axis: int) -> Mesh:
     """The profile with the sign of one coordinate turned."""
     sign = np.ones(2)
     sign[axis] = -1
-    return Flat(part.points_m * sign, part.triangles)
+    return Mesh(part.points_m * sign, part.cells)
 
 
-def stacked(layers_m: np.ndarray, triangles: np.ndarray) -> Tets:
+def stacked(layers_m: np.ndarray, triangles: np.ndarray) -> Mesh:
     """Tetrahedra between copies of a profile.
 
-    Parameters
-    ----------
-    layers_m
-        Its points in each layer [m], shape (layers + 1, n, 3).
-    triangles
-        Indices into one layer, shape (t, 3).
+    `layers_m`: its points in each layer [m], shape (layers + 1, n, 3). `triangles`: indices into one layer, shape
+    (t, 3).
 
     Each prism is cut into three by the order of its corners' indices, so that neighbours agree on the diagonal of the
     face between them (Dompierre et al. 1999).
@@ -116,7 +99,13 @@ def stacked(layers_m: np.ndarray, triangles: np.ndarray) -> Tets:
     a, b, c = np.sort(triangles, axis=1).T
     prism = np.concatenate([np.c_[a, b, c, c + n], np.c_[a, b, b + n, c + n], np.c_[a, a + n, b + n, c + n]])
     steps = np.arange(len(layers_m) - 1) * n
-    return Tets(layers_m.reshape(-1, 3), (prism + steps[:, None, None]).reshape(-1, 4))
+    return Mesh(layers_m.reshape(-1, 3), (prism + steps[:, None, None]).reshape(-1, 4))
+
+
+def raised(profile: Mesh, heights_m: np.ndarray) -> Mesh:
+    """Tetrahedra between copies of a profile at heights [m], shape (layers + 1,)."""
+    layers = np.stack([np.c_[profile.points_m, np.full(len(profile.points_m), z)] for z in heights_m])
+    return stacked(layers, profile.cells)
 
 
 @dataclass(frozen=True)
@@ -147,20 +136,11 @@ class Pad:
         return self.centre_m + u.reshape(-1, 1) * self.along + v.reshape(-1, 1) * self.across
 
 
-def column(name: str, start: Pad, stop: Pad, counts: tuple[int, int, int]) -> Tets:
+def column(name: str, start: Pad, stop: Pad, counts: tuple[int, int, int]) -> Mesh:
     """A bent column from one rectangle to another: each of its fibres is a cubic that leaves and arrives along `way`.
 
-    Parameters
-    ----------
-    name
-        Of the piece, for the message.
-    counts
-        Elements along the first side, the second side and the column.
-
-    Raises
-    ------
-    InputError
-        The column folds over itself.
+    `name`: of the piece, for the message. `counts`: elements along the first side, the second side and the column.
+    Raises InputError: the column folds over itself.
     """
     profile = block(np.stack(np.meshgrid(*(np.arange(k + 1.0) for k in counts[:2]), indexing="ij"), axis=-1))
     first, last = start.grid_m(*counts[:2]), stop.grid_m(*counts[:2])
@@ -172,9 +152,9 @@ def column(name: str, start: Pad, stop: Pad, counts: tuple[int, int, int]) -> Te
         + (3 * s**2 - 2 * s**3) * last
         + (s**3 - s**2) * reach * stop.way
     )
-    if not _upright(layers, profile.triangles):
+    if not _upright(layers, profile.cells):
         raise InputError(f"piece {name} folds over itself with these sizes; expected pads further apart or smaller")
-    return stacked(layers, profile.triangles)
+    return stacked(layers, profile.cells)
 
 
 def _upright(layers_m: np.ndarray, triangles: np.ndarray) -> bool:
@@ -228,7 +208,7 @@ class LooseParts:
 
     @classmethod
     def of(
-        cls, parts: Mapping[str, Tets], holes: Sequence[Hole] = (), groups: Mapping[str, str] | None = None
+        cls, parts: Mapping[str, Mesh], holes: Sequence[Hole] = (), groups: Mapping[str, str] | None = None
     ) -> LooseParts:
         """All parts in one mesh; edges between corners on the wall of a hole are bent onto it.
 
@@ -306,10 +286,7 @@ class LooseParts:
     def weights(self, points_m: np.ndarray, name: str) -> sparse.csr_matrix:
         """What the nodes' values count at points, shape (k, 3), of a part: shape (k, n).
 
-        Raises
-        ------
-        InputError
-            A point that is not in or on the part.
+        Raises InputError: a point that is not in or on the part.
         """
         own = np.flatnonzero(self.part == self.names.index(name))
         corners = self.mesh.p[:, self.mesh.t[:, own]].transpose(2, 1, 0)
@@ -398,14 +375,8 @@ class Bound:
 def constraints(nodes: int, bound: Sequence[Sequence[Bound]], fixed: np.ndarray) -> sparse.csr_matrix:
     """The matrix C of u = C q, shape (3 n, free unknowns).
 
-    Parameters
-    ----------
-    nodes
-        Their number n.
-    bound
-        In stages: nodes that others follow in one stage may follow others in a later one, not the other way round.
-    fixed
-        Which displacements are 0, shape (3, n).
+    `nodes`: their number n. `bound`: in stages: nodes that others follow in one stage may follow others in a later one,
+    not the other way round. `fixed`: which displacements are 0, shape (3, n).
     """
     whole = sparse.identity(3 * nodes, format="csr")
     for stage in bound:
@@ -427,10 +398,7 @@ def solve(stiffness: sparse.csr_matrix, binding: sparse.csr_matrix, forces: np.n
 
     Factors of a symmetric matrix in the order of least degree; for these long, thin bodies they stay small.
 
-    Raises
-    ------
-    InputError
-        Parts that can move freely.
+    Raises InputError: parts that can move freely.
     """
     reduced = (binding.T @ stiffness @ binding).tocsc()
     given = binding.T @ forces

@@ -1,10 +1,8 @@
-"""Where the cells sit and which way they give way, from the thesis's tables 2.2 and 2.3.
+"""Where the cells sit and which way they give way (thesis tables 2.2, 2.3), and what the bench is made of, with ranges.
 
 Frame {T}: x and y of the vehicle, z down, origin on top of plate D. The tube begins there and ends L above, at {B}.
 The signs of eqs 2.3 to 2.5 and 2.8 fix the rest: the cells sit on two rings of three, 120° apart, and cells 2, 4 and 6
 lie below cells 1, 3 and 5. One leg of the bench is a cell of each ring; the others are that leg turned by ±120°.
-
-What the finite-element model of the bench is made of: printed moduli, and assumed sizes with their ranges.
 """
 
 from __future__ import annotations
@@ -172,10 +170,7 @@ def in_file(name: str) -> tuple[str, float]:
 def read_assumed(path: str | Path) -> Assumed:
     """The assumed sizes.
 
-    Raises
-    ------
-    InputError
-        A size that is missing or unknown, or not [assumed, low, high] with 0 < low <= assumed <= high.
+    Raises InputError: a size that is missing or unknown, or not [assumed, low, high] with 0 < low <= assumed <= high.
     """
     path = Path(path)
     held = read_yaml(path)

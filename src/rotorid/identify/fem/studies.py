@@ -1,27 +1,24 @@
-"""The tables of the report's chapter: loads, meshes, sizes, the signal chain.
-
-From a cell's strain to the converter's counts (thesis 2.1, 2.2 and 2.7.2).
+"""The tables of the report's chapter: loads, meshes, sizes, the signal chain (thesis 2.1, 2.2, 2.7.2), known answers.
 
 Four active gauges in a full bridge give V = V_e k ε: excitation V_e, gauge factor k, and ε the mean of their strains,
-each with its sign. The ADS1256 resolves V in steps of 2 V_ref / gain / (2²³ - 1).
-
-Problems with a known answer, solved by the same code as the bench: a cantilever, and a plate with a round hole.
+each with its sign. The ADS1256 resolves V in steps of 2 V_ref / gain / (2²³ - 1). Solved by the same code as the bench
+are two problems with a known answer: a cantilever, and a plate with a round hole.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 from scipy.optimize import brentq
 
 from rotorid.errors import InputError
-from rotorid.identify.bench.reconstruct import GF_N, Geometry
+from rotorid.identify.bench import GF_N, Geometry
 from rotorid.identify.fem import elasticity
-from rotorid.identify.fem.bench import Answers, Bench, Solved, ask, build, by_part, compare, ratios, strain_per_newton
-from rotorid.identify.fem.elasticity import Hole, LooseParts, block, count, stacked
+from rotorid.identify.fem.bench import Answers, Bench, Solved, by_part, ratios, solve, strain_per_newton
+from rotorid.identify.fem.elasticity import Hole, LooseParts, block, count, raised, stacked
 from rotorid.identify.fem.placement import MATERIALS, Assumed, Material, Sizes, in_file, materials
 from rotorid.io.wire import VOLTS_PER_COUNT
 
@@ -55,34 +52,30 @@ answers are the results), of benches of other `sizes`, and of a single cell (`ch
 
 def mesh_study(
     assumed: Assumed, moduli_pa: Mapping[str, float], geometry: Geometry, finenesses: Sequence[float]
-) -> tuple[pd.DataFrame, Bench, dict[str, Solved], dict[str, Answers]]:
+) -> tuple[pd.DataFrame, Bench, dict[str, Solved], Answers]:
     """A mesh a row with what it says per newton, and the last one's bench, how it is solved and what it says."""
     rows = []
     for fineness in finenesses:
-        of = {name: materials(assumed.sizes, moduli_pa, name) for name in MATERIALS}
-        bench = build(assumed, assumed.sizes, geometry.distance_m, fineness)
-        cell_strain = strain_per_newton(assumed.sizes, of["PLA"]["cells"], fineness)
-        solved = {name: bench.solve(of[name]) for name in MATERIALS}
-        found = {name: ask(bench, solved[name], cell_strain, geometry) for name in MATERIALS}
+        bench, cell_strain, solved, found = solve(assumed, assumed.sizes, moduli_pa, geometry, fineness)
         row = {"fineness": fineness, "elements": bench.body.mesh.nelements, "nodes": bench.body.basis.N}
         rows.append(row | {"cell_strain_per_n": cell_strain} | _row(found))
     return pd.DataFrame(rows), bench, solved, found
 
 
-def _row(found: Mapping[str, Answers]) -> dict[str, float | str]:
+def _row(found: Answers) -> dict[str, float | str]:
     row = {f"ratio_{name}": value for name, value in ratios(found).items()}
     for name, end in SHORT.items():
-        row |= {f"{key}_{end}": value for key, value in asdict(found[name]).items()}
+        row |= {f"{key}_{end}": value for key, value in found[name].items()}
     return row
 
 
-def loads(found: Mapping[str, Answers], loads_gf: Sequence[float], area_m2: float) -> pd.DataFrame:
+def loads(found: Answers, loads_gf: Sequence[float], area_m2: float) -> pd.DataFrame:
     """Deformation and stresses against the load: linear, a load a row."""
     force = np.asarray(loads_gf, float) * GF_N
     table = {"load_gf": np.asarray(loads_gf, float), "load_n": force, "pressure_pa": force / area_m2}
     for name, end in SHORT.items():
         for key in ("deformation_m", "stress_pa", "narrow_upper_pa", "narrow_lower_pa"):
-            table[f"{key}_{end}"] = force * getattr(found[name], key)
+            table[f"{key}_{end}"] = force * found[name][key]
     return pd.DataFrame(table)
 
 
@@ -130,17 +123,14 @@ def size_study(
     First all as assumed (`end` empty), then each size in turn at its least and its largest (`low`, `high`), then as
     many as `draws` with all sizes drawn at once (`drawn`). Drawn sizes that do not go together are drawn anew.
 
-    Raises
-    ------
-    InputError
-        One size at one of its ends makes no bench.
+    Raises InputError: one size at one of its ends makes no bench.
     """
     rows = []
     for name, end, sizes in [("", "", assumed.sizes), *assumed.variants()]:
         if name in _ELECTRIC:
             continue
         try:
-            found = compare(assumed, sizes, moduli_pa, geometry, fineness)
+            *_, found = solve(assumed, sizes, moduli_pa, geometry, fineness)
         except InputError as error:
             raise InputError(f"{in_file(name)[0]} at its {end} end: {error}") from None
         rows.append(_named(name, end, sizes) | _row(found))
@@ -149,7 +139,7 @@ def size_study(
         if len(rows) == wanted:
             break
         try:
-            found = compare(assumed, assumed.draw(rng), moduli_pa, geometry, fineness)
+            *_, found = solve(assumed, assumed.draw(rng), moduli_pa, geometry, fineness)
         except InputError:
             continue
         rows.append({"size": "all", "end": "drawn", "value": np.nan} | _row(found))
@@ -215,10 +205,7 @@ def steps(computed: Mapping[str, float], volts_per_n: float, sizes: Sizes) -> li
 def ligament_for(sizes: Sizes, moduli_pa: Mapping[str, float], volts_per_n: float, fineness: float) -> float:
     """Thickness of the ligament [m] with which a cell has this sensitivity.
 
-    Raises
-    ------
-    InputError
-        None between the assumed one and most of the bar's half side has.
+    Raises InputError: none between the assumed one and most of the bar's half side has.
     """
     thickest = _LARGEST_LIGAMENT * sizes.cell_side_m / 2
 
@@ -270,13 +257,8 @@ def counts_per_newton(volts_per_n: float) -> float:
 
 
 def printed_slope(volts_per_n: float) -> float:
-    """The same sensitivity as table 2.8 prints it [gf per 1e-5 V]."""
+    """A sensitivity [V/N] as table 2.8 prints it [gf per 1e-5 V]; of such a slope the sensitivity."""
     return _PRINTED_STEP_V / (volts_per_n * GF_N)
-
-
-def from_printed_slope(slope_gf: float) -> float:
-    """Sensitivity [V/N] of a slope as table 2.8 prints it [gf per 1e-5 V]."""
-    return _PRINTED_STEP_V / (slope_gf * GF_N)
 
 
 def _checked(case: str, quantity: str, fineness: float, nodes: int, computed: float, closed_form: float) -> dict:
@@ -293,7 +275,7 @@ def cantilever(fineness: float, length_m: float = 0.08, side_m: float = 0.01, fo
     profile = block(np.stack(np.meshgrid(across, across, indexing="ij"), axis=-1))
     along = np.linspace(0, length_m, 2 * count(4, fineness) + 1)
     layers = np.stack([np.c_[np.full(len(profile.points_m), x), profile.points_m] for x in along])
-    body = LooseParts.of({"beam": stacked(layers, profile.triangles)})
+    body = LooseParts.of({"beam": stacked(layers, profile.cells)})
     materials = {"beam": _BEAM}
     nodes = body.nodes_m
     end = body.mesh.facets_satisfying(lambda x: x[0] > length_m - 1e-9, boundaries_only=True)
@@ -306,16 +288,10 @@ def cantilever(fineness: float, length_m: float = 0.08, side_m: float = 0.01, fo
     tip = np.argmin(np.abs(nodes - [length_m, side_m / 2, side_m / 2]).sum(axis=1))
     shear = 1.2 * force_n * length_m / (_BEAM.lame_pa[1] * side_m**2)
     deflection = force_n * length_m**3 / (3 * _BEAM.modulus_pa * inertia) + shear
+    bending = force_n * (length_m - nodes[middle, 0]) * side_m / 2 / inertia
     return [
         _checked("cantilever", "deflection (m)", fineness, len(nodes), float(moved.reshape(3, -1)[2, tip]), deflection),
-        _checked(
-            "cantilever",
-            "stress (Pa)",
-            fineness,
-            len(nodes),
-            float(stress[middle]),
-            force_n * (length_m - nodes[middle, 0]) * side_m / 2 / inertia,
-        ),
+        _checked("cantilever", "stress (Pa)", fineness, len(nodes), float(stress[middle]), bending),
     ]
 
 
@@ -328,11 +304,9 @@ def plate_with_hole(fineness: float, radius_m: float = 0.005, pull_pa: float = 1
     angles = np.linspace(0, np.pi / 2, count(4, fineness) + 1)
     radii = np.geomspace(radius_m, 4 * radius_m, count(3, fineness) + 1)
     profile = block(np.stack([np.outer(radii, np.cos(angles)), np.outer(radii, np.sin(angles))], axis=-1))
-    flat = profile.points_m
-    layers = np.stack([np.c_[flat, np.full(len(flat), z)] for z in (0, radius_m / 2)])
     up = np.array([0.0, 0.0, 1.0])
     holes = [Hole("plate", np.zeros(3), up, scale * radius_m) for scale in (1, 4)]
-    body = LooseParts.of({"plate": stacked(layers, profile.triangles)}, holes)
+    body = LooseParts.of({"plate": raised(profile, np.array([0, radius_m / 2]))}, holes)
     materials = {"plate": _PLATE}
     nodes = body.nodes_m
     known = np.hypot(nodes[:, 0], nodes[:, 1]) > 4 * radius_m - 1e-9

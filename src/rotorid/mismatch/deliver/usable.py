@@ -33,10 +33,10 @@ from rotorid.recordings import columns as c
 from rotorid.recordings.body import body_of, unfit
 from rotorid.recordings.files import NO_BODY
 from rotorid.steps import step
-from rotorid.vehicle.control.swings import FLIGHTS, SECONDS, SEED, swings, turned_over
-from rotorid.vehicle.exports.forms import FORMS, export_vehicle
-from rotorid.vehicle.hover import wrench_at_rest, wrench_of_command
-from rotorid.vehicle.improved import command_path, flyable
+from rotorid.vehicle.control import FLIGHTS, SECONDS, SEED, swings, turned_over
+from rotorid.vehicle.exports import export_vehicle
+from rotorid.vehicle.exports.forms import FORMS
+from rotorid.vehicle.improved import command_path, flyable, wrench_at_rest, wrench_of_command
 
 _MOST_HOVER_SHARE = 0.9
 """Share of the full thrust at which a vehicle may hover: what steers it needs the rest."""

@@ -1,11 +1,7 @@
-"""The numbers behind the page's figures, small enough to stand in the page.
+"""The numbers behind the page's figures and its replay, small enough to stand in the page.
 
 Series are stored as 16-bit integers times a scale, base64: the page reads them without a library. A long run is thinned
 to every k-th row, and the page says so.
-
-What the page's replay shows: attitude as recorded and as simulated, and the force and moment that a model leaves.
-
-What was measured in each channel, on the instants of the traces: a trace holds only what a model leaves of it.
 """
 
 from __future__ import annotations
@@ -124,14 +120,7 @@ def _first_shown(traces: Sequence[ChannelTrace]) -> list[float] | None:
     return None if best is None else best[1]
 
 
-def _series(
-    run: str,
-    channel: str,
-    traces: Sequence[ChannelTrace],
-    readings: Sequence[np.ndarray],
-    every: int,
-    delivery: Delivery,
-) -> dict:
+def _series(run: str, channel: str, traces, readings: Sequence[np.ndarray], every: int, delivery: Delivery) -> dict:
     """One channel of one run: what was measured, and what the believed and the improved model leave of it.
 
     Where derivatives are delivered, also what the same vehicle leaves without them.
@@ -179,13 +168,13 @@ def _regimes(analysis: Analysis, by_pair: dict[tuple[str, str], list[ChannelTrac
                 per = max(2, int(round(REGIME_BLOCK_S / float(np.median(np.diff(trace.time_s))))))
                 count = len(trace.time_s) // per
                 for stage in ("before", "after"):
-                    columns[stage].append(np.sqrt(_blocks(getattr(trace, stage) ** 2, per, count)))
+                    columns[stage].append(np.sqrt(blocks(getattr(trace, stage) ** 2, per, count)))
                 for v in variables:
                     flown = known.get(v)
                     line = np.full(len(trace.time_s), np.nan)
                     if flown is not None:
                         line = np.interp(trace.time_s, known["time_s"], flown)
-                    columns[v].append(_blocks(line, per, count))
+                    columns[v].append(blocks(line, per, count))
         if columns["before"]:
             rows[channel] = columns
     if not rows or not variables:
@@ -200,7 +189,8 @@ def _regimes(analysis: Analysis, by_pair: dict[tuple[str, str], list[ChannelTrac
     return {"variables": names, "channels": out}
 
 
-def _blocks(values: np.ndarray, per: int, count: int) -> np.ndarray:
+def blocks(values: np.ndarray, per: int, count: int) -> np.ndarray:
+    """Means of `count` blocks of `per` samples."""
     return values[: count * per].reshape(count, per).mean(axis=1)
 
 

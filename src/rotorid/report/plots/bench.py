@@ -1,4 +1,5 @@
-"""Figures of the load-cell bench: calibrations, static, dynamic and tensile tests."""
+"""Figures of the bench (calibrations, static, dynamic and tensile tests), of the stand (clocks, one experiment,
+steady wrenches, weight under tilt, rotor characteristics) and of public thrust stands (coefficients of rotors)."""
 
 from __future__ import annotations
 
@@ -8,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from rotorid.identify.bench_tests import direction
 from rotorid.report.plots import style
 
 if TYPE_CHECKING:
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
 PLATFORM = {"al": "aluminium", "pla": "PLA", "jr3": "reference sensor"}
 _PLATFORM_COLOUR = {"al": style.BLUE, "pla": style.ORANGE, "jr3": style.GREY}
 _AXES = "xyz"
+_WRENCH = tuple(style.WRENCH)
 
 
 def reading(recording: pd.DataFrame, load_time_s: float, mean_from_s: float, mean_10uv: float) -> Figure:
@@ -63,8 +66,7 @@ def calibration(campaign: Sequence[Mapping], thesis: Sequence[Mapping]) -> Figur
         axis.locator_params(axis="x", nbins=5)
     axes[0].set_yticks(range(1, 7), [f"cell {i}" for i in range(1, 7)])
     axes[0].invert_yaxis()
-    handles, labels = axes[0].get_legend_handles_labels()
-    fig.legend(handles, labels, loc="outside lower center", ncols=2)
+    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return fig
 
 
@@ -79,10 +81,7 @@ def calibration_residuals(readings: pd.DataFrame, cells: Sequence[Mapping]) -> F
         axis.plot(part["weight_gf"][wrong], left[wrong], "x", color=style.RED, markersize=8)
         axis.axhline(0, color=style.BLACK, linewidth=0.7)
         axis.set_title(f"cell {cell['cell']}")
-    for axis in axes[-1]:
-        axis.set_xlabel("weight (gf)")
-    for axis in axes[:, 0]:
-        axis.set_ylabel("residual (gf)")
+    style.label_outer(axes, "weight (gf)", "residual (gf)")
     return fig
 
 
@@ -137,7 +136,7 @@ def methods(points: pd.DataFrame) -> Figure:
     """Loads along several axes at once: reconstructed against applied component, by equations and by matrix."""
     fig, axes = style.figure(2.9, columns=3)
     several = points[points["axis"].str.len() > 1]
-    unit = {axis: _units(axis) for axis in several["axis"].unique()}
+    unit = {axis: direction(axis) for axis in several["axis"].unique()}
     for k, (axis, name) in enumerate(zip(axes, _AXES, strict=True)):
         applied = several["load_n"] * several["axis"].map({label: part[k] for label, part in unit.items()})
         for method, colour, marker, label in (
@@ -150,15 +149,8 @@ def methods(points: pd.DataFrame) -> Figure:
         ends = np.array([applied.min(), applied.max()])
         axis.plot(ends, ends, color=style.BLACK, linewidth=0.7, zorder=0)
         axis.set(xlabel=f"applied $F_{name}$ (N)", ylabel=f"reconstructed $F_{name}$ (N)")
-    handles, labels = axes[0].get_legend_handles_labels()
-    fig.legend(handles, labels, loc="outside lower center", ncols=2)
+    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return fig
-
-
-def _units(axis: str) -> np.ndarray:
-    """Direction of a load of that name, loads along z pull up."""
-    together = np.array([1.0 if "x" in axis else 0.0, 1.0 if "y" in axis else 0.0, -1.0 if "z" in axis else 0.0])
-    return together / np.linalg.norm(together)
 
 
 def dynamic(flights: pd.DataFrame) -> Figure:
@@ -203,10 +195,6 @@ def tensile(curves: pd.DataFrame, specimens: pd.DataFrame) -> Figure:
     return fig
 
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-
 def lines_and_residuals(
     weights_gf: Sequence[float],
     readings: Mapping[str, Sequence[float]],
@@ -215,16 +203,9 @@ def lines_and_residuals(
 ) -> Figure:
     """Calibration lines of all cells, and below them what the lines leave over.
 
-    Parameters
-    ----------
-    weights_gf
-        Known weights [gf], shape (n,).
-    readings
-        Reading of each cell [1e-5 V], shape (n,) each.
-    lines
-        Intercept [gf] and slope [gf per 1e-5 V] of each cell.
-    flagged_gf
-        Weights [gf] of each cell whose readings do not match them; drawn as crosses.
+    `weights_gf`: known weights [gf], shape (n,). `readings`: reading of each cell [1e-5 V], shape (n,) each. `lines`:
+    intercept [gf] and slope [gf per 1e-5 V] of each cell. `flagged_gf`: weights [gf] of each cell whose readings do not
+    match them; drawn as crosses.
     """
     weights = np.asarray(weights_gf, float)
     fig, (above, below) = style.figure(4.6, rows=2, gridspec_kw={"height_ratios": [1.6, 1]})
@@ -253,14 +234,8 @@ def against_printed(
 ) -> Figure:
     """Coefficients with 95 % intervals as differences from printed ones.
 
-    Parameters
-    ----------
-    cells
-        Names of the cells, k of them.
-    estimates, printed
-        Values of `a0` [gf] and `a1` [gf per 1e-5 V], shape (k,) each.
-    intervals
-        95 % intervals of the same, shape (k, 2) each.
+    `cells`: names of the cells, k of them. `estimates`, `printed`: values of `a0` [gf] and `a1` [gf per 1e-5 V], shape
+    (k,) each. `intervals`: 95 % intervals of the same, shape (k, 2) each.
     """
     fig, axes = style.figure(2.5, columns=2, sharey=True)
     places = np.arange(len(cells))
@@ -276,4 +251,185 @@ def against_printed(
         panel.locator_params(axis="x", nbins=5)
     axes[0].set_yticks(places, [f"cell {cell}" for cell in cells])
     axes[0].invert_yaxis()
+    return fig
+
+
+def clocks(arrivals: Mapping[str, pd.DataFrame], table: pd.DataFrame) -> Figure:
+    """When samples arrived against when they were taken, and the clocks' offset of every experiment.
+
+    `arrivals` holds for each device of one experiment `time_s` and `host_time_s`; `table` is that of the clocks.
+    """
+    fig, (left, right) = style.figure(2.7, columns=2)
+    for (device, samples), colour in zip(arrivals.items(), (style.BLUE, style.ORANGE), strict=False):
+        late = samples["host_time_s"] - samples["time_s"]
+        late = 1e3 * (late - late.min())
+        left.plot(samples["time_s"], late, ".", color=colour, markersize=2, label=device, rasterized=True)
+    left.set(xlabel="device time (s)", ylabel="arrival after the earliest (ms)")
+    left.legend(loc="upper right", markerscale=4)
+    for sine, colour, label in ((False, style.BLACK, "trapezoids"), (True, style.RED, "sines")):
+        part = table[table["sine"] == sine]
+        right.errorbar(
+            part["experiment"],
+            1e3 * part["offset_s"],
+            1.96e3 * part["offset_error_s"],
+            fmt="o",
+            color=colour,
+            markersize=2.5,
+            linewidth=0.8,
+            label=label,
+        )
+    right.set(xlabel="experiment", ylabel="offset left by arrivals (ms)")
+    right.legend(loc="lower right")
+    return fig
+
+
+def experiment(run: pd.DataFrame, start_s: float, stop_s: float) -> Figure:
+    """One experiment (fig. 3.21): throttles, forces and moments; shaded: what the mean is taken of."""
+    fig, axes = style.figure(3.7, 3, 1, sharex=True)
+    time_s = run["time_s"].to_numpy()
+    for colour, number in zip(style.CYCLE, (1, 2, 3, 4), strict=False):
+        axes[0].plot(time_s, 100 * run[f"throttle_{number}"], color=colour, label=f"motor {number}", linewidth=0.9)
+    for axis, names, scale in ((axes[1], _WRENCH[:3], 1.0), (axes[2], _WRENCH[3:], 1e3)):
+        for letter, name in zip("xyz", names, strict=True):
+            values = scale * run[name].to_numpy()
+            kept = style.thin(values, 700)
+            axis.plot(time_s[kept], values[kept], color=style.COLOUR[letter], linewidth=0.6, label=letter)
+    for axis, label in zip(axes, ("throttle (%)", "force (N)", "moment (mN m)"), strict=True):
+        axis.axvspan(start_s, stop_s, color=style.GREY, alpha=0.15, linewidth=0)
+        axis.set_ylabel(label)
+        axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=4, borderaxespad=0.0)
+    axes[-1].set_xlabel("time (s)")
+    return fig
+
+
+def steady(table: pd.DataFrame) -> Figure:
+    """Steady wrench of the 48 experiments: measured with 95 % intervals, and what the believed vehicle gives."""
+    fig, axes = style.figure(3.7, 3, 2, sharex=True)
+    for k, (name, (label, _)) in enumerate(style.WRENCH.items()):
+        axis = axes[k % 3, k // 3]
+        scale = 1.0 if k < 3 else 1e3
+        axis.plot(
+            table["experiment"],
+            scale * table[f"{name}_model"],
+            "_",
+            color=style.COLOUR["model"],
+            markersize=6,
+            label="believed vehicle",
+        )
+        axis.errorbar(
+            table["experiment"],
+            scale * table[name],
+            scale * table[f"{name}_half_95"],
+            fmt="o",
+            color=style.COLOUR["measured"],
+            markersize=2,
+            linewidth=0.8,
+            label="measured",
+        )
+        axis.set_ylabel(f"{label} ({'N' if k < 3 else 'mN m'})")
+    style.label_outer(axes, "experiment")
+    fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    return fig
+
+
+def weight(table: pd.DataFrame) -> Figure:
+    """Moments of the weight at rest: measured, of the believed centre of mass, of the fitted one."""
+    fig, axes = style.figure(2.8, columns=2)
+    for axis, name in zip(axes, _WRENCH[3:5], strict=True):
+        label = style.WRENCH[name][0]
+        measured = 1e3 * table[f"{name}_rest"]
+        for kind, colour, marker, what in (
+            ("believed", style.RED, "x", "believed centre of mass"),
+            ("fitted", style.BLUE, "o", "fitted centre of mass"),
+        ):
+            values = 1e3 * table[f"{name}_rest_{kind}"]
+            axis.plot(measured, values, marker, color=colour, markersize=4, mfc="none", label=what)
+        ends = np.array([measured.min(), measured.max()])
+        axis.plot(ends, ends, color=style.BLACK, linewidth=0.7)
+        axis.set(xlabel=f"{label} measured at rest (mN m)", ylabel=f"{label} of the weight (mN m)")
+    axes[0].legend(loc="upper left")
+    return fig
+
+
+def characteristic(thrust: pd.DataFrame, torque: pd.DataFrame, laws: Mapping, curve: pd.DataFrame) -> Figure:
+    """Thrust and torque against speed (fig. 3.22) and speed against throttle.
+
+    `curve` has `throttle` and `speed_rad_s`, the law of throttle at the mean voltage.
+    """
+    fig, axes = style.figure(2.7, columns=3)
+    for axis, points, fit, scale, label in (
+        (axes[0], thrust, laws["c_f"], 1.0, "thrust (N)"),
+        (axes[1], torque, laws["c_q"], 1e3, "torque (mN m)"),
+    ):
+        fine = np.linspace(0, points["speed_rad_s"].max(), 200)
+        axis.plot(fine, scale * fit["value"] * fine**2, color=style.COLOUR["model"])
+        axis.plot(points["speed_rad_s"], scale * points["value"], "o", color=style.COLOUR["measured"], markersize=2.5)
+        axis.set(xlabel="rotor speed (rad/s)", ylabel=label)
+    axes[2].plot(100 * curve["throttle"], curve["speed_rad_s"], color=style.COLOUR["model"], label="law, mean voltage")
+    for points, marker, label in ((thrust, "o", "thrust tests"), (torque, "^", "torque tests")):
+        axes[2].plot(100 * points["throttle"], points["speed_rad_s"], marker, markersize=2.5, label=label, mfc="none")
+    axes[2].set(xlabel="throttle (%)", ylabel="rotor speed (rad/s)")
+    axes[2].legend(loc="lower right")
+    return fig
+
+
+def apparent_coefficient(points: pd.DataFrame, pooled: dict[str, dict], names: dict[str, str]) -> Figure:
+    """F/ω² of every steady point against rotor speed, one panel a propeller, with the two pooled forms.
+
+    `points`: columns `propeller`, `run`, `speed_rad_s`, `thrust_n`, `used`. `pooled`: per propeller the C_F through the
+    origin, the C_F with offset and the mean offset (N), keys `origin`, `offset`, `mean_offset_n`. `names`: heading of
+    each panel.
+    """
+    fig, axes = style.figure(4.2, rows=2, columns=2, sharex=True)
+    for axis, (propeller, fits) in zip(axes.flat, pooled.items(), strict=False):
+        mine = points[(points["propeller"] == propeller) & points["used"]]
+        for cells, colour in (("2s", style.BLUE), ("3s", style.ORANGE)):
+            part = mine[mine["run"].str.endswith(cells)]
+            axis.plot(
+                part["speed_rad_s"],
+                1e6 * part["thrust_n"] / part["speed_rad_s"] ** 2,
+                "o",
+                markersize=2.2,
+                color=colour,
+                label={"2s": "7.4 V", "3s": "11.1 V"}[cells],
+            )
+        speed = np.linspace(300, mine["speed_rad_s"].max(), 200)
+        axis.axhline(1e6 * fits["origin"], color=style.BLACK, label="through the origin")
+        bent = 1e6 * (fits["offset"] + fits["mean_offset_n"] / speed**2)
+        axis.plot(speed, bent, color=style.RED, linestyle="--", label="with offset")
+        axis.set_title(names[propeller])
+        axis.set_ylim(0.45 * 1e6 * fits["origin"], 1.3 * 1e6 * fits["origin"])
+    style.label_outer(axes, "rotor speed (rad/s)", r"$F/\omega^2$ ($10^{-6}$ N s²)")
+    axes[1, 0].legend(loc="lower right", ncols=2, markerscale=2)
+    return fig
+
+
+def motors(table: pd.DataFrame, pooled: dict[str, dict], names: dict[str, str]) -> Figure:
+    """C_F of each motor with its interval, and the pooled value with its own; one column a propeller.
+
+    `table`: columns `propeller`, `motor`, `form`, `c_f_n_s2`, `low_95_n_s2`, `high_95_n_s2`, `outlying`. `pooled`: per
+    propeller and form: `value`, `interval_95`, `prediction_95` (N s²). `names`: heading of each panel.
+    """
+    fig, axes = style.figure(2.5, columns=len(names), sharey=True)
+    letters = sorted(table["motor"].unique())
+    for axis, propeller in zip(np.atleast_1d(axes), names, strict=True):
+        for form, colour, shift in (("origin", style.BLACK, -0.15), ("offset", style.RED, 0.15)):
+            part = table[(table["propeller"] == propeller) & (table["form"] == form)]
+            place = np.array([letters.index(m) for m in part["motor"]]) + shift
+            centre = 1e6 * part["c_f_n_s2"].to_numpy()
+            ends = 1e6 * part[["low_95_n_s2", "high_95_n_s2"]].to_numpy()
+            axis.hlines(place, ends[:, 0], ends[:, 1], color=colour, linewidth=0.9)
+            label = {"origin": "through the origin", "offset": "with offset"}[form]
+            axis.plot(centre, place, "o", markersize=3, color=colour, label=label)
+            outlying = (part["outlying"] == "yes").to_numpy()
+            axis.plot(centre[outlying], place[outlying], "o", markersize=8, mfc="none", color=colour)
+            low, high = (1e6 * v for v in pooled[propeller][form]["interval_95"])
+            axis.axvspan(low, high, color=colour, alpha=0.15, linewidth=0)
+        axis.set_title(names[propeller], fontsize=8.5)
+        axis.set_xlabel(r"$C_F$ ($10^{-6}$ N s²)")
+        axis.set_yticks(range(len(letters)), letters)
+    axes = np.atleast_1d(axes)
+    axes[0].set_ylabel("motor")
+    axes[0].set_ylim(len(letters) - 0.5, -0.5)
+    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return fig

@@ -32,18 +32,9 @@ _RATIOS = {
 def whole_bench(surface: pd.DataFrame, column: str, factor: float, label: str, gamma: float = 1.0) -> Figure:
     """The whole bench, once a material, coloured by what a load does to it; each material has a scale of its own.
 
-    Parameters
-    ----------
-    surface
-        Triangles of one leg's surface (results/fem/surface.parquet).
-    column
-        Of the surface, without the ending of the material.
-    factor
-        From the column's value to what is shown.
-    label
-        Quantity and unit.
-    gamma
-        Power of the scale of colours; below 1 small values can be distinguished.
+    `surface`: triangles of one leg's surface (results/fem/surface.parquet). `column`: of the surface, without the
+    ending of the material. `factor`: from the column's value to what is shown. `label`: quantity and unit. `gamma`:
+    power of the scale of colours; below 1 small values can be distinguished.
     """
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable

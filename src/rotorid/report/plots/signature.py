@@ -96,21 +96,13 @@ def _flight() -> Motion:
     thrust = (EXAMPLE.thrust_coefficients_n_s2() * speed**2).sum(1) / EXAMPLE.mass_kg
     force = np.stack([-0.4 * velocity[:, 0] / 6, -0.4 * velocity[:, 1] / 6, -thrust], 1)
     rotation = Rotation.from_euler("ZYX", angles[:, ::-1]).as_matrix()
+    turning = (rates, np.gradient(rates, time_s, axis=0))
     return Motion(
-        time_s,
-        speed,
-        np.gradient(speed, time_s, axis=0),
-        rates,
-        np.gradient(rates, time_s, axis=0),
-        force,
-        force,
-        rates,
-        rotation,
-        velocity,
+        time_s, speed, np.gradient(speed, time_s, axis=0), *turning, force, force, rates, rotation, velocity,
         position=np.stack([3 * _swing(19.0, 1.6), 3 * _swing(13.0, 2.6), -height], 1),
         height=height,
         voltage=np.linspace(12.4, 10.8, len(time_s)),
-    )
+    )  # fmt: skip
 
 
 def _typical(form: Form | SpeedForm) -> np.ndarray:
@@ -126,9 +118,10 @@ def _typical(form: Form | SpeedForm) -> np.ndarray:
     return np.array(values)
 
 
-def _named(form: Form | SpeedForm | SetForm, values) -> tuple[tuple[str, float, str], ...]:
-    """Symbols, values and units of a form's parameters."""
-    return tuple((p.symbol, float(v), p.unit) for p, v in zip(form.parameters, values, strict=True))
+def _of(form: Form | SpeedForm | SetForm, values, *shown, **more) -> _Signature:
+    """The picture of a form with these values of its parameters."""
+    named = tuple((p.symbol, float(v), p.unit) for p, v in zip(form.parameters, values, strict=True))
+    return _Signature(form.name, form.equation, named, *shown, **more)
 
 
 def _quantities(motion: Motion) -> dict[str, np.ndarray]:
@@ -182,11 +175,8 @@ def _strongest(added: Contribution) -> tuple[str, np.ndarray] | None:
         for axis, column in zip("xyz", values.T if values is not None else (), strict=False):
             size = float(np.sqrt(np.mean(column**2))) / scale
             if best is None or size > best[0]:
-                best = (
-                    size,
-                    f"{name} along {axis} ({unit})" if name != "moment" else f"moment about {axis} ({unit})",
-                    column,
-                )
+                where = f"{name} {'about' if name == 'moment' else 'along'} {axis} ({unit})"
+                best = (size, where, column)
     return None if best is None or best[0] < 1e-9 else best[1:]
 
 
@@ -201,7 +191,7 @@ def _of_wrench(effect: Effect, form: Form) -> _Signature | None:
     # What is always the same, and what no single quantity explains, is shown as it goes on.
     if np.ptp(shown[1]) < 1e-9 * np.abs(shown[1]).max() or explained(shown[1], known[over]) < _LEAST_EXPLAINED:
         over, known = "time (s)", {"time (s)": motion.time_s}
-    return _Signature(form.name, form.equation, _named(form, values), over, shown[0], known[over], shown[1])
+    return _of(form, values, over, shown[0], known[over], shown[1])
 
 
 def _of_speed(form: SpeedForm) -> _Signature:
@@ -217,9 +207,7 @@ def _of_speed(form: SpeedForm) -> _Signature:
     path = SpeedPath(np.repeat(command[:, None], 4, 1), time_s, 2500.0, np.linspace(12.4, 10.4, 200), 12.4)
     speed = form.apply(path, values)[:, 0]
     over = ("commanded speed (rad/s)", command) if static else ("time (s)", time_s)
-    return _Signature(
-        form.name, form.equation, _named(form, values), over[0], "rotor speed (rad/s)", over[1], speed, command
-    )
+    return _of(form, values, over[0], "rotor speed (rad/s)", over[1], speed, command)
 
 
 def _recorded() -> RecordingSet:
@@ -262,18 +250,17 @@ def _of_fault(form: SetForm) -> _Signature | None:
             change = np.nanmean(np.abs(np.nan_to_num(wrong, nan=0.0) - sure)) / max(np.nanstd(sure), 1e-9)
             if best is None or change > best[0]:
                 best = (float(change), name, shared[c.TIME].to_numpy(), sure, wrong)
-    values = _named(form, form.example)
     if best is None or best[0] == 0.0:
         if sound.vehicle.rotors == spoilt.vehicle.rotors:
             return None
         nothing = np.zeros(0)
         both = (sound.vehicle.rotors, spoilt.vehicle.rotors)
-        return _Signature(form.name, form.equation, values, "", "", nothing, nothing, layouts=both)
+        return _of(form, form.example, "", "", nothing, nothing, layouts=both)
     _, name, time_s, sure, wrong = best
     first = int(np.argmax(np.abs(np.nan_to_num(wrong, nan=np.inf) - sure) > 0))
     start = max(min(time_s[first] - 1.0, time_s[-1] - _SHOWN_S), 0.0)
     inside = (time_s >= start) & (time_s <= start + _SHOWN_S)
-    return _Signature(form.name, form.equation, values, "time (s)", name, time_s[inside], wrong[inside], sure[inside])
+    return _of(form, form.example, "time (s)", name, time_s[inside], wrong[inside], sure[inside])
 
 
 def _loading(instrument: InstrumentFacts) -> Loading:
@@ -285,30 +272,14 @@ def _loading(instrument: InstrumentFacts) -> Loading:
     rotation = Rotation.from_euler("ZYX", np.stack([0 * roll, pitch, roll], 1)).as_matrix()
     gravity = np.broadcast_to([0.0, 0.0, 9.81], (len(time_s), 3))
     moving = _flight()
-    on = Motion(
-        time_s,
-        moving.rotor_speed,
-        moving.rotor_acceleration,
-        rotation=rotation,
-        tilt_gravity=gravity,
-        voltage=moving.voltage,
-    )
-    warm = 5.0 * time_s / _DURATION_S
-    return Loading(
-        "first",
-        time_s,
-        time_s,
-        load,
-        load,
-        np.zeros(6),
-        Motion(time_s, np.zeros((len(time_s), 0))) if instrument.bench else on,
-        None if instrument.bench else (roll, pitch),
-        warm,
-        22.0 + warm,
-        time_s,
-        0.2 + 0.15 * _swing(19.0),
-        moving.rotor_speed,
-    )
+    if instrument.bench:
+        on, attitude = Motion(time_s, np.zeros((len(time_s), 0))), None
+    else:
+        turning, attitude = {"rotation": rotation, "tilt_gravity": gravity, "voltage": moving.voltage}, (roll, pitch)
+        on = Motion(time_s, moving.rotor_speed, moving.rotor_acceleration, **turning)
+    warm, distance = 5.0 * time_s / _DURATION_S, 0.2 + 0.15 * _swing(19.0)
+    of_run = (on, attitude, warm, 22.0 + warm, time_s, distance, moving.rotor_speed)
+    return Loading("first", time_s, time_s, load, load, np.zeros(6), *of_run)
 
 
 def _of_reading(effect: Effect, form: Form, instrument: InstrumentFacts) -> _Signature | None:
@@ -332,15 +303,7 @@ def _of_reading(effect: Effect, form: Form, instrument: InstrumentFacts) -> _Sig
     elif excited and set(excited) <= {"load", "load_change"}:
         known = loads
     over = max(known, key=lambda name: explained(y, known[name]))
-    return _Signature(
-        form.name,
-        form.equation,
-        _named(form, values),
-        over,
-        f"error of {CHANNELS[channel]} ({UNITS[channel]})",
-        known[over],
-        y,
-    )
+    return _of(form, values, over, f"error of {CHANNELS[channel]} ({UNITS[channel]})", known[over], y)
 
 
 if TYPE_CHECKING:

@@ -41,6 +41,14 @@ COLOUR = {
 """Colour of a quantity, the same in every figure."""
 AXIS_COLOURS = tuple(COLOUR[axis] for axis in "xyz")
 
+CHANNELS = {
+    **{f"force_{axis}": (f"$F_{axis}$", "N") for axis in "xyz"},
+    **{f"moment_{axis}": (f"$M_{axis}$", "N m") for axis in "xyz"},
+}
+"""Symbol and unit of each force and moment."""
+WRENCH = {f"{name}_{unit.replace(' ', '_').lower()}": (symbol, unit) for name, (symbol, unit) in CHANNELS.items()}
+"""The same by the columns that hold them: `force_x_n` to `moment_z_n_m`."""
+
 CYCLE = (BLUE, RED, GREEN, ORANGE, _PURPLE, SKY, BLACK, _YELLOW)
 """Colours in order for things without a fixed one (cells, motors, flights)."""
 
@@ -86,19 +94,21 @@ def use() -> None:
 def figure(height_in: float, rows: int = 1, columns: int = 1, **subplots: Any) -> tuple[Figure, Any]:
     """A figure as wide as the text with its axes, in the project's look.
 
-    Parameters
-    ----------
-    height_in
-        Height [in].
-    rows, columns
-        Number of axes down and across.
-    subplots
-        Passed on to `matplotlib.pyplot.subplots` (`sharex`, `squeeze`, ...).
+    `height_in`: height [in]. `rows`, `columns`: number of axes down and across. `subplots`: passed on to
+    `matplotlib.pyplot.subplots` (`sharex`, `squeeze`, ...).
     """
     import matplotlib.pyplot as plt
 
     use()
     return plt.subplots(rows, columns, figsize=(TEXT_WIDTH_IN, height_in), **subplots)
+
+
+def label_outer(axes: np.ndarray, across: str, up: str = "") -> None:
+    """Name what a grid of axes, shape (rows, columns), shares: on its lowest row and its first column."""
+    for axis in axes[-1]:
+        axis.set_xlabel(across)
+    for axis in axes[:, 0] if up else ():
+        axis.set_ylabel(up)
 
 
 def save(fig: Figure, path: str | Path) -> None:
@@ -121,18 +131,10 @@ def placeholder(path: str | Path, reason: str) -> None:
 
 
 def thin(values: np.ndarray, samples: int) -> np.ndarray:
-    """Indices of about `samples` points that keep the envelope of a trace.
+    """Indices (k,), sorted, of about `samples` points that keep the envelope of a trace (n,), any unit.
 
-    Parameters
-    ----------
-    values
-        Trace, any unit, shape (n,).
-    samples
-        About how many points to keep; a trace no longer than this is kept whole.
-
-    Returns
-    -------
-    Sorted indices, shape (k,): the smallest and the largest value of each of `samples / 2` equal stretches.
+    They are the smallest and the largest value of each of `samples / 2` equal stretches; a trace that is no longer than
+    `samples` is kept whole.
     """
     values = np.asarray(values)
     if len(values) <= samples:

@@ -10,13 +10,11 @@ from difflib import get_close_matches
 
 from rotorid.errors import InputError
 from rotorid.recordings.vehicle import Vehicle
-from rotorid.vehicle.exports import forms
-from rotorid.vehicle.exports.ardupilot_frame import ardupilot_json
-from rotorid.vehicle.exports.forms import Exported, check_exportable
-from rotorid.vehicle.exports.sih import px4_sih
+from rotorid.vehicle.exports.autopilots import ardupilot_json, px4_sih
+from rotorid.vehicle.exports.forms import FORMS, KNOWS, Exported, parts_of, refusal
 
-_SIMULATORS: dict[str, Callable[[Vehicle], Exported]] = {"px4-sih": px4_sih, "ardupilot-json": ardupilot_json}
-NAMES = (*forms.FORMS, *_SIMULATORS)
+_WRITERS: dict[str, Callable[[Vehicle], Exported]] = {**FORMS, "px4-sih": px4_sih, "ardupilot-json": ardupilot_json}
+NAMES = tuple(_WRITERS)
 __all__ = ["Exported", "export_vehicle"]
 
 
@@ -26,7 +24,8 @@ def export_vehicle(vehicle: Vehicle, to: str) -> Exported:
         near = get_close_matches(to, NAMES, 1)
         meant = f"; did you mean {near[0]}?" if near else f", expected one of {', '.join(NAMES)}"
         raise InputError(f"no form is called {to!r}{meant}")
-    if to in forms.FORMS:
-        return forms.export_vehicle(vehicle, to)
-    check_exportable(vehicle)
-    return _SIMULATORS[to](vehicle)
+    if vehicle.kind == "bench" or vehicle.mass_kg is None or vehicle.inertia_kg_m2 is None:
+        raise InputError(f"vehicle {vehicle.name}: only a vehicle with mass, inertia and rotors can be exported")
+    if why := refusal(to, vehicle.rotor_count, parts_of(vehicle, KNOWS[to]).inertia):
+        raise InputError(f"{vehicle.name}: {why}")
+    return _WRITERS[to](vehicle)

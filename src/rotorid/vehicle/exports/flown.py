@@ -191,32 +191,19 @@ def read_by(tool: str) -> Iterator[None]:
         raise InputError(f"{tool} does not read the exported vehicle: {' '.join(str(error).split())}") from error
 
 
-@dataclass(frozen=True)
-class _GazeboMotor:
-    """What one `MulticopterMotorModel` of an SDF file says; SI units."""
+def _gazebo_motors(text: str) -> list[dict[str, Any]]:
+    """What each `MulticopterMotorModel` of an SDF file says by its tags, in the order of their numbers; SI units.
 
-    link: str
-    sense: float
-    """1 for counter-clockwise seen from above, else −1."""
-    up_s: float
-    down_s: float
-    thrust: float
-    moment: float
-    """Torque over thrust, m."""
-    drag: float
-
-    @staticmethod
-    def all_of(text: str) -> list[_GazeboMotor]:
-        """The motors of a model, in the order of their numbers."""
-
-        def read(p: ElementTree.Element) -> _GazeboMotor:
-            value = {e.tag: e.text or "" for e in p}
-            names = ("timeConstantUp", "timeConstantDown", "motorConstant", "momentConstant", "rotorDragCoefficient")
-            sense = 1.0 if value["turningDirection"] == "ccw" else -1.0
-            return _GazeboMotor(value["linkName"], sense, *(float(value[name]) for name in names))
-
-        plugins = [p for p in ElementTree.fromstring(text).iter("plugin") if p.find("motorNumber") is not None]
-        return [read(p) for p in sorted(plugins, key=lambda p: int(p.findtext("motorNumber", "0")))]
+    `sense` is 1 for counter-clockwise seen from above, else −1.
+    """
+    names = ("timeConstantUp", "timeConstantDown", "motorConstant", "momentConstant", "rotorDragCoefficient")
+    plugins = [p for p in ElementTree.fromstring(text).iter("plugin") if p.find("motorNumber") is not None]
+    out = []
+    for plugin in sorted(plugins, key=lambda p: int(p.findtext("motorNumber", "0"))):
+        value = {e.tag: e.text or "" for e in plugin}
+        sense = 1.0 if value["turningDirection"] == "ccw" else -1.0
+        out.append({"link": value["linkName"], "sense": sense, **{name: float(value[name]) for name in names}})
+    return out
 
 
 def gazebo_damping_of(text: str) -> np.ndarray:
@@ -243,16 +230,13 @@ def in_drake(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> _
     from pydrake.systems.analysis import Simulator
     from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
-    motors, damping = _GazeboMotor.all_of(exported.text), gazebo_damping_of(exported.text)
+    motors, damping = _gazebo_motors(exported.text), gazebo_damping_of(exported.text)
     same = expressed(vehicle, "sdf")
     time, speeds = commands_of(same, duration_s)
-    turning = np.stack(
-        [
-            speeds[:, i] if m.up_s == AT_ONCE_S else lagging(speeds[:, [i]], m.up_s, m.down_s)[:, 0]
-            for i, m in enumerate(motors)
-        ],
-        axis=1,
-    )
+    turning = speeds.copy()
+    for i, m in enumerate(motors):
+        if m["timeConstantUp"] != AT_ONCE_S:
+            turning[:, [i]] = lagging(speeds[:, [i]], m["timeConstantUp"], m["timeConstantDown"])
     builder = DiagramBuilder()
     plant = builder.AddSystem(MultibodyPlant(0.0))
     with read_by("Drake"):
@@ -260,7 +244,7 @@ def in_drake(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> _
     plant.mutable_gravity_field().set_gravity_vector([0, 0, -vehicle.gravity_m_s2])
     plant.Finalize()
     base = plant.GetBodyByName("base_link")
-    links = [plant.GetBodyByName(m.link) for m in motors]
+    links = [plant.GetBodyByName(m["link"]) for m in motors]
     inside = plant.CreateDefaultContext()
 
     class Rotors(LeafSystem):
@@ -280,10 +264,11 @@ def in_drake(vehicle: Vehicle, exported: Exported, duration_s: float = 0.3) -> _
             for m, link, speed in zip(motors, links, turning[step], strict=True):
                 moving = plant.EvalBodySpatialVelocityInWorld(inside, link).translational()
                 across = moving - (moving @ turned[:, 2]) * turned[:, 2]
-                thrust = m.thrust * speed**2
-                pull = thrust * turned[:, 2] - abs(speed) * m.drag * across
+                thrust = m["motorConstant"] * speed**2
+                pull = thrust * turned[:, 2] - abs(speed) * m["rotorDragCoefficient"] * across
                 wrenches.append((link, np.zeros(3), pull))
-                wrenches.append((base, -m.sense * m.moment * thrust * turned[:, 2], np.zeros(3)))
+                torque = -m["sense"] * m["momentConstant"] * thrust * turned[:, 2]
+                wrenches.append((base, torque, np.zeros(3)))
             forces = []
             for body, torque, force in wrenches:
                 applied = ExternallyAppliedSpatialForce()

@@ -3,15 +3,13 @@
 Those tools have the body forward-left-up: y and z of places change sign, and a rotor that turns counter-clockwise seen
 from above pushes the airframe about minus z.
 
-What other tools ask of a vehicle beyond that it is one: asked before a file for them is made.
-
 Whether a vehicle may be delivered is asked elsewhere (`rotorid.mismatch.deliver.usable`, with room for the error of an
 estimate). A tool that wants more takes nothing from the vehicle: its file is not written, and a sentence says why.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from xml.sax.saxutils import quoteattr
 
@@ -184,35 +182,35 @@ def _left_of_its_own(values: dict, knows: frozenset[str]) -> list[str]:
     return left
 
 
+_BY_AXIS = {
+    **{("frame_drag", form): "frame" for form in ("isotropic", "per axis")},
+    **{("rotational_damping", form): "damping" for form in ("one constant", "linear")},
+}
+"""Effects and forms with a constant for each axis, or one for all, and their part."""
+
+
 def _take(values: dict, name: str, form: str, p: dict[str, float]) -> bool | str:
     """Put an effect into the parts; False where its form has no place there, a remark where it fits only nearly."""
+    at_hubs = True if form == "at the hubs" else "taken at the hubs in place of the centre of mass"
     if name == "rotor_drag" and "k_d" in p:
         values["drag"] = (p["k_d"], p["k_d"])
-        return True if form == "at the hubs" else "taken at the hubs in place of the centre of mass"
+        return at_hubs
     if name == "axial_inflow" and "k_z" in p:
         values["inflow"] = p["k_z"]
-        return True if form == "at the hubs" else "taken at the hubs in place of the centre of mass"
+        return at_hubs
     if name == "translational_lift":
         values["lift"] = p["k_h"]
-        return True if form == "at the hubs" else "taken at the hubs in place of the centre of mass"
+        return at_hubs
     if name == "flapping_moment" and form == "at the hubs":
         values["flap"] = p["k_flap"]
         return True
-    if name == "frame_drag" and form in ("isotropic", "per axis"):
-        values["frame"] = (p["c"],) * 3 if "c" in p else (p["c_x"], p["c_y"], p["c_z"])
+    if (name, form) in _BY_AXIS:
+        values[_BY_AXIS[name, form]] = (p["c"],) * 3 if "c" in p else (p["c_x"], p["c_y"], p["c_z"])
         return True
-    if name == "rotational_damping" and form in ("one constant", "linear"):
-        values["damping"] = (p["c"],) * 3 if "c" in p else (p["c_x"], p["c_y"], p["c_z"])
-        return True
-    if name == "motor_lag" and form == "one constant":
-        values["tau_s"] = (p["tau"], p["tau"])
-        return True
-    if name == "motor_lag" and form == "up and down":
-        values["tau_s"] = (p["tau_up"], p["tau_down"])
-        return True
-    if name == "motor_lag" and form == "on thrust":
-        values["tau_s"] = (p["tau"], p["tau"])
-        return "taken as a lag of the rotor speed, which near hover has the same time constant"
+    if name == "motor_lag" and form in ("one constant", "up and down", "on thrust"):
+        values["tau_s"] = (p["tau"], p["tau"]) if "tau" in p else (p["tau_up"], p["tau_down"])
+        same = "taken as a lag of the rotor speed, which near hover has the same time constant"
+        return same if form == "on thrust" else True
     if name == "command_saturation" and values["limits_rad_s"] is not None:
         low, high = values["limits_rad_s"]
         if form == "upper limit":
@@ -235,6 +233,15 @@ def _take(values: dict, name: str, form: str, p: dict[str, float]) -> bool | str
         values["inertia"] = j
         return True
     return False
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return " ".join(f"{v:.9g}" for v in values)
+
+
+def _comments(left: Iterable[str]) -> str:
+    """What a file does not express, as comments of XML."""
+    return "".join(f"  <!-- Not expressed: {s.replace('--', '- -')} -->\n" for s in left)
 
 
 def _in_flu(inertia: np.ndarray) -> np.ndarray:
@@ -328,18 +335,18 @@ def mjcf(vehicle: Vehicle) -> Exported:
     added, companions = _companion(vehicle, MUJOCO_FILE, mujoco_companion)
     left += added
     j = _in_flu(parts.inertia)
-    full = " ".join(f"{v:.9g}" for v in (j[0, 0], j[1, 1], j[2, 2], j[0, 1], j[0, 2], j[1, 2]))
+    full = _numbers((j[0, 0], j[1, 1], j[2, 2], j[0, 1], j[0, 2], j[1, 2]))
     limit = parts.limits_rad_s
     dynamics = f' dyntype="filterexact" dynprm="{tau_s:.9g}"' if tau_s > 0 else ""
     sites, motors = [], []
     for i, (place, signed) in enumerate(zip(parts.places, vehicle.yaw_signs(), strict=True), 1):
-        at = " ".join(f"{v:.9g}" for v in place * FLU)
+        at = _numbers(place * FLU)
         ratio = -signed * parts.torque[i - 1] / parts.thrust[i - 1]
-        ends = " ".join(f"{parts.thrust[i - 1] * speed**2:.9g}" for speed in limit) if limit else ""
+        ends = _numbers(parts.thrust[i - 1] * speed**2 for speed in limit) if limit else ""
         most = f' ctrlrange="{ends}"' if limit else ""
         sites.append(f'      <site name="rotor_{i}" pos="{at}"/>')
         motors.append(f'    <general name="rotor_{i}" site="rotor_{i}" gear="0 0 1 0 0 {ratio:.9g}"{most}{dynamics}/>')
-    comments = "".join(f"  <!-- Not expressed: {s.replace('--', '- -')} -->\n" for s in left)
+    comments = _comments(left)
     c_f = ", ".join(f"{v:.6g}" for v in parts.thrust)
     late = "\n  <!-- Thrust follows its control late: set data.act to the first thrust. -->" if tau_s > 0 else ""
     name = quoteattr(vehicle.name)
@@ -364,17 +371,22 @@ def mjcf(vehicle: Vehicle) -> Exported:
     return Exported(text, "vehicle.xml", tuple(left), companions=companions)
 
 
+def allocated(parts: Parts, yaw_signs: np.ndarray) -> list[tuple[str, float]]:
+    """Places, torques and thrusts of the rotors as parameters of PX4's control allocation."""
+    rows, strongest = [], parts.thrust.max()
+    for i, (place, signed) in enumerate(zip(parts.places, yaw_signs, strict=True)):
+        values = (*place, signed * (parts.torque[i] / parts.thrust[i]), 6.5 * parts.thrust[i] / strongest)
+        names = (f"CA_ROTOR{i}_{key}" for key in ("PX", "PY", "PZ", "KM", "CT"))
+        rows += zip(names, map(float, values), strict=True)
+    return rows
+
+
 def px4(vehicle: Vehicle) -> Exported:
     """Parameters of PX4's control allocation and thrust model, as QGroundControl loads them."""
     parts = parts_of(vehicle, KNOWS["px4"])
     left = [*parts.left_out, "mass and inertia: they are parameters of PX4's own simulator alone (--to px4-sih)"]
     rows: list[tuple[str, float, int]] = [("CA_AIRFRAME", 0, 6), ("CA_ROTOR_COUNT", vehicle.rotor_count, 6)]
-    strongest = parts.thrust.max()
-    for i, (place, signed) in enumerate(zip(parts.places, vehicle.yaw_signs(), strict=True)):
-        ratio = parts.torque[i] / parts.thrust[i]
-        values = {"PX": place[0], "PY": place[1], "PZ": place[2], "KM": signed * ratio}
-        values["CT"] = 6.5 * parts.thrust[i] / strongest
-        rows += [(f"CA_ROTOR{i}_{k}", float(v), 9) for k, v in values.items()]
+    rows += [(name, value, 9) for name, value in allocated(parts, vehicle.yaw_signs())]
     limit = parts.limits_rad_s
     if limit or parts.curve:
         rows.append(("THR_MDL_FAC", 1.0 - parts.curve, 9))
@@ -415,7 +427,7 @@ def sdf(vehicle: Vehicle) -> Exported:
     radius = vehicle.rotor_radius_m or 0.05
     links, motors = [], []
     for i, (place, signed) in enumerate(zip(parts.places, vehicle.yaw_signs(), strict=True)):
-        at = " ".join(f"{v:.9g}" for v in place * FLU)
+        at = _numbers(place * FLU)
         # A light rotor of its own: its mass is taken off the body's; its inertia is small enough to do nothing.
         spin = 1e-7
         links.append(f"""    <link name="rotor_{i}">
@@ -457,7 +469,7 @@ def sdf(vehicle: Vehicle) -> Exported:
     own = j - spread - 1e-7 * len(parts.places) * np.eye(3)
     inertia = "".join(f"<i{a}{b}>{own['xyz'.index(a), 'xyz'.index(b)]:.9g}</i{a}{b}>"
                       for a, b in ("xx", "yy", "zz", "xy", "xz", "yz"))  # fmt: skip
-    comments = "".join(f"  <!-- Not expressed: {s.replace('--', '- -')} -->\n" for s in left)
+    comments = _comments(left)
     nl = "\n"
     text = f"""<?xml version="1.0"?>
 <sdf version="1.9">
@@ -523,13 +535,13 @@ def _gym_pybullet_drones(vehicle: Vehicle) -> Exported:
     shown = " ".join(f'{k}="{v:.9g}"' for k, v in properties.items())
     links = []
     for k, i in enumerate(order):
-        at = " ".join(f"{v:.9g}" for v in parts.places[i] * FLU)
+        at = _numbers(parts.places[i] * FLU)
         links.append(f"""  <link name="prop{k}_link">
     <inertial><origin rpy="0 0 0" xyz="{at}"/><mass value="0.0"/>
       <inertia ixx="0.0" ixy="0.0" ixz="0.0" iyy="0.0" iyz="0.0" izz="0.0"/></inertial>
   </link>
   <joint name="prop{k}_joint" type="fixed"><parent link="base_link"/><child link="prop{k}_link"/></joint>""")
-    comments = "".join(f"  <!-- Not expressed: {s.replace('--', '- -')} -->\n" for s in left)
+    comments = _comments(left)
     nl = "\n"
     text = f"""<?xml version="1.0" ?>
 <robot name={quoteattr(vehicle.name)}>
@@ -575,20 +587,6 @@ FORMS: dict[str, Callable[[Vehicle], Exported]] = {
     "gym-pybullet-drones": _gym_pybullet_drones,
     "px4": px4,
 }
-
-
-def check_exportable(vehicle: Vehicle) -> None:
-    """InputError where a vehicle lacks what every form needs."""
-    if vehicle.kind == "bench" or vehicle.mass_kg is None or vehicle.inertia_kg_m2 is None:
-        raise InputError(f"vehicle {vehicle.name}: only a vehicle with mass, inertia and rotors can be exported")
-
-
-def export_vehicle(vehicle: Vehicle, to: str) -> Exported:
-    """The vehicle for another tool, a form of `FORMS`; InputError says why the tool does not take it."""
-    check_exportable(vehicle)
-    if why := refusal(to, vehicle.rotor_count, parts_of(vehicle, KNOWS[to]).inertia):
-        raise InputError(f"{vehicle.name}: {why}")
-    return FORMS[to](vehicle)
 
 
 def refusal(to: str, rotor_count: int, inertia_kg_m2: np.ndarray) -> str:

@@ -11,9 +11,8 @@ from typer.testing import CliRunner
 import rotorid
 from rotorid.cli import app
 from rotorid.errors import InputError
-from rotorid.identify.autopilot.correlated import autoregression, fit
-from rotorid.identify.autopilot.parameters import as_text, parameters_of
-from rotorid.identify.autopilot.thrust import MAPS, lagging, specific_drag
+from rotorid.identify.autopilot import MAPS, as_text, lagging, parameters_of, specific_drag
+from rotorid.identify.correlated import autoregression, fit
 from rotorid.recordings import RecordingSet, Run, write_set
 from rotorid.recordings import columns as c
 from rotorid_proof.autopilot_coverage import counted, drawn, flight, signal_of

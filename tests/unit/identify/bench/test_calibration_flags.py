@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.identify.bench import loadcell
-from rotorid.identify.bench.loadcell import FLAG_LEVEL, find_outliers
-from rotorid.identify.bench.reconstruct import prepare
+from rotorid.identify import loadcell
+from rotorid.identify.bench import prepare
+from rotorid.identify.loadcell import FLAG_LEVEL, find_outliers
 from rotorid.report.plots import bench as plots
 from workflow.scripts import calibrate_campaign, calibrate_load_cells
 

@@ -7,8 +7,9 @@ import pandas as pd
 import pytest
 import yaml
 
-from rotorid.identify.bench import loadcell, reconstruct
-from rotorid.identify.bench.reconstruct import prepare
+from rotorid.identify import bench as reconstruct
+from rotorid.identify import loadcell
+from rotorid.identify.bench import prepare
 from rotorid.io.logs import read_tables
 
 from .test_chain import SETTINGS

@@ -5,8 +5,9 @@ import pandas as pd
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.identify.bench import reconstruct, static
-from rotorid.identify.bench.reconstruct import CELLS, GF_N, SPIKE, Filter, bench_force, bench_set, prepare
+from rotorid.identify import bench as reconstruct
+from rotorid.identify import bench_tests as static
+from rotorid.identify.bench import CELLS, GF_N, SPIKE, Filter, bench_force, bench_set, prepare
 from rotorid.io.logs import read_sessions, read_tables
 from rotorid.io.session import Ended, Setup
 

@@ -7,20 +7,21 @@ import numpy as np
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.identify.bench.loadcell import fit_line
-from rotorid.identify.bench.reconstruct import (
+from rotorid.identify.bench import (
     GF_N,
     PULLED,
     Geometry,
     cell_forces,
     cell_variance,
     force_covariance,
+    force_matrix,
     forces,
     input_components,
     moments,
     read_geometry,
 )
-from rotorid.identify.bench.static import lateral_as_vertical
+from rotorid.identify.bench_tests import lateral_as_vertical
+from rotorid.identify.loadcell import fit_line
 
 TABLE = Path(__file__).parents[4] / "raw" / "thesis" / "table_2_3.csv"
 GEOMETRY = read_geometry(TABLE)
@@ -80,7 +81,7 @@ def test_a_lateral_load_becomes_vertical_by_absolute_values() -> None:
 
 def forces_by_matrix(cells_n: np.ndarray, geometry: Geometry) -> np.ndarray:
     """Eq. 2.9: the same as `forces`, by the matrix; N, shape (n, 3)."""
-    force = cells_n @ geometry.matrix.T
+    force = cells_n @ force_matrix(geometry).T
     force[..., 2] -= np.abs(cells_n[..., PULLED]).sum(axis=-1)
     return force
 

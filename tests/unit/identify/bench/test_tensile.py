@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.identify.bench.loadcell import evaluate
+from rotorid.identify.loadcell import evaluate
 
 GAUGE_MM, SECTION_MM2 = 40.0, 20.0
 

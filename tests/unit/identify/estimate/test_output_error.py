@@ -4,15 +4,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.identify.excitation import Readings, Wanted, band_signals, design, fit_flights
 from rotorid.identify.grey_box import (
-    RateWindows,
     cut_windows,
     fit_output_error,
     simulate_rates,
     tied,
     untied,
 )
+from rotorid.identify.inertias import band_signals, design, fit_flights, readings_at_hover
 from rotorid.recordings import Run
 from rotorid.vehicle.mixer import wrench_matrix
 from tests.unit.vehicle.thesis import thesis_vehicle
@@ -45,10 +44,10 @@ def test_constant_moment_turns_at_a_constant_rate():
 def test_noise_free_flight_gives_the_inertias_back(window_moment):
     rates, moments = flight()
     windows = cut_windows(rates, moments, DT, 0.5)
-    fit = fit_output_error(windows, tied, np.log(TRUE * [1.3, 0.8, 1.2]), window_moment)
+    fit = fit_output_error(*windows, DT, tied, np.log(TRUE * [1.3, 0.8, 1.2]), window_moment)
     # What is left is the interpolation of the moments at the windows' ends.
     np.testing.assert_allclose(fit.inertias, TRUE, rtol=2e-5)
-    free = fit_output_error(windows, untied, np.concatenate([np.log(TRUE), np.zeros(3)]))
+    free = fit_output_error(*windows, DT, untied, np.concatenate([np.log(TRUE), np.zeros(3)]))
     np.testing.assert_allclose(free.parameters[3:], [-0.8475, 0.8526, -0.0182], atol=1e-3)
 
 
@@ -57,7 +56,7 @@ def test_intervals_cover_under_noise():
     inside = []
     for seed in range(60):
         noisy = rates + 0.02 * np.random.default_rng(seed).normal(size=rates.shape)
-        fit = fit_output_error(cut_windows(noisy, moments, DT, 0.5), tied, np.log(TRUE))
+        fit = fit_output_error(*cut_windows(noisy, moments, DT, 0.5), DT, tied, np.log(TRUE))
         low, high = fit.inertia_intervals_95.T
         inside.append((low < TRUE) & (high > TRUE))
     assert np.mean(inside) == pytest.approx(0.95, abs=0.05)
@@ -69,8 +68,8 @@ def test_noise_of_the_moments_is_taken_off():
     sigma = 0.06
     noisy = moments + sigma * np.random.default_rng(1).normal(size=moments.shape)
     windows = cut_windows(rates, noisy, DT, 0.25)
-    plain = fit_output_error(windows, tied, np.log(TRUE)).inertias / TRUE - 1
-    mended = fit_output_error(windows, tied, np.log(TRUE), moment_noise_n_m=np.full(3, sigma)).inertias / TRUE - 1
+    plain = fit_output_error(*windows, DT, tied, np.log(TRUE)).inertias / TRUE - 1
+    mended = fit_output_error(*windows, DT, tied, np.log(TRUE), moment_noise_n_m=np.full(3, sigma)).inertias / TRUE - 1
     assert plain.min() > 0.03
     assert np.abs(mended).max() < 0.4 * plain.min()
 
@@ -80,19 +79,19 @@ def test_windows_with_gaps_are_left_out_and_too_few_are_said():
     rates = rates.copy()
     rates[100] = np.nan
     windows = cut_windows(rates, moments, DT, 0.5)
-    assert np.isfinite(windows.rates).all() and len(windows.rates) == 6
-    few = RateWindows(windows.rates[:2], windows.moments[:2], DT)
+    assert np.isfinite(windows[0]).all() and len(windows[0]) == 6
+    few = tuple(part[:2] for part in windows)
     with pytest.raises(ValueError, match="2 windows cannot distinguish 3 parameters"):
-        fit_output_error(few, tied, np.log(TRUE))
+        fit_output_error(*few, DT, tied, np.log(TRUE))
 
 
 def test_designed_excitation_keeps_its_limits_and_beats_a_first_guess():
     vehicle = thesis_vehicle()
-    wanted = Wanted((550.0, 1550.0), np.radians(12), (10, 40), 10.0)
-    readings = Readings.at_hover(vehicle, 0.02, 0.005, 250.0)
-    first, first_errors = design(vehicle, wanted, readings, 4, np.random.default_rng(0))
-    best, errors = design(vehicle, wanted, readings, 80, np.random.default_rng(0))
-    target = np.repeat([wanted.gyroscopic_error, wanted.inertia_error], 3)
+    wanted = (550.0, 1550.0), np.radians(12), (10, 40), 10.0
+    readings = readings_at_hover(vehicle, 0.02, 0.005, 250.0)
+    first, first_errors = design(vehicle, *wanted, readings, 4, np.random.default_rng(0))
+    best, errors = design(vehicle, *wanted, readings, 80, np.random.default_rng(0))
+    target = np.repeat([0.04, 0.001], 3)
     assert np.max(errors / target) < np.max(first_errors / target)
     t = np.arange(0, 10, 0.01)
     wrench = np.column_stack([np.full(len(t), 0.652 * 9.81), best.moment(t)])
@@ -106,8 +105,8 @@ def test_designed_excitation_keeps_its_limits_and_beats_a_first_guess():
 
 def test_multisine_integrals_are_integrals():
     vehicle = thesis_vehicle()
-    wanted = Wanted((550.0, 1550.0), np.radians(12), (10, 20), 10.0)
-    best, _ = design(vehicle, wanted, Readings.at_hover(vehicle, 0.02, 0.005, 250.0), 4, np.random.default_rng(0))
+    wanted = (550.0, 1550.0), np.radians(12), (10, 20), 10.0
+    best, _ = design(vehicle, *wanted, readings_at_hover(vehicle, 0.02, 0.005, 250.0), 4, np.random.default_rng(0))
     t = np.array([0.5, 0.5 + 1e-5])
     slope = np.diff(best.integral(t, 1), axis=0)[0] / 1e-5
     np.testing.assert_allclose(slope, best.moment(t).mean(axis=0), rtol=1e-6, atol=1e-9)
@@ -126,7 +125,7 @@ def test_flight_bounds_hold_the_truth():
     for k, a in enumerate("xyz"):
         table[f"angular_velocity_{a}_rad_s"] = rates[:, k] + 0.05 * rng.normal(size=len(rates))
     part = band_signals(Run("flight", pd.DataFrame(table)), vehicle, (1.0, 6.0), 0.0, 250.0)
-    fits = fit_flights([part], 1.0, rng)
+    fits = fit_flights([part], 250.0, 1.0, rng)
     for fit, true in zip(fits[:2], TRUE[:2], strict=True):
         assert fit["lower"] < fit["estimate"] < fit["upper"]
         assert fit["interval_95"][0] < true < fit["interval_95"][1]

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from rotorid.identify.bench.reconstruct import read_geometry
+from rotorid.identify.bench import read_geometry
 from rotorid.identify.fem.placement import read_assumed, read_moduli
 
 ROOT = Path(__file__).parents[4]

@@ -17,7 +17,7 @@ def box(size, counts, at=(0.0, 0.0, 0.0)):
     x, y, z = (np.linspace(0, length, number + 1) for length, number in zip(size, counts, strict=True))
     profile = block(np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1))
     layers = np.stack([np.c_[profile.points_m, np.full(len(profile.points_m), height)] for height in z])
-    return stacked(layers + np.array(at), profile.triangles)
+    return stacked(layers + np.array(at), profile.cells)
 
 
 def held(body, fixed, given):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rotorid.identify.bench.reconstruct import forces, input_components, moments
+from rotorid.identify.bench import forces, input_components, moments
 from rotorid.identify.fem import placement
 
 
@@ -15,20 +15,20 @@ def acting(cell: int, sense: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("cell", range(1, 7))
 def test_moments_about_the_frame_are_those_of_the_thesis(cell, geometry) -> None:
-    place = placement.cells(geometry.distance_m)[cell]
+    place = placement.cells(geometry)[cell]
     moment = np.cross(place.force_m, acting(cell, place.sense))
     np.testing.assert_allclose(moment, moments(np.eye(6)[cell - 1], geometry), atol=1e-8)
 
 
 @pytest.mark.parametrize("cell", [2, 4, 6])
 def test_a_lower_cell_gives_the_vertical_force_of_eq_2_8(cell, geometry) -> None:
-    place = placement.cells(geometry.distance_m)[cell]
+    place = placement.cells(geometry)[cell]
     assert acting(cell, place.sense)[2] == pytest.approx(forces(np.eye(6)[cell - 1], geometry)[2])
 
 
 @pytest.mark.parametrize("cell", range(1, 7))
 def test_directions_have_the_factors_of_table_2_2(cell, geometry) -> None:
-    sense = placement.cells(geometry.distance_m)[cell].sense
+    sense = placement.cells(geometry)[cell].sense
     parts = input_components(np.eye(6)[cell - 1])
     for axis, component in zip("xyz", np.abs(sense), strict=True):
         factor = 1 / parts[f"f_{cell}{axis}"] if f"f_{cell}{axis}" in parts else 0.0
@@ -36,7 +36,7 @@ def test_directions_have_the_factors_of_table_2_2(cell, geometry) -> None:
 
 
 def test_a_bar_lies_level_and_across_its_direction(geometry) -> None:
-    for place in placement.cells(geometry.distance_m).values():
+    for place in placement.cells(geometry).values():
         assert abs(place.axis @ place.sense) < 1e-12
         assert abs(place.axis[2]) < 1e-12
         assert place.inwards[:2] @ place.force_m[:2] < 0

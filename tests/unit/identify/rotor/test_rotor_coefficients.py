@@ -19,7 +19,7 @@ SPEED = np.array([400.0, 800.0, 1200.0, 1600.0, 2000.0])
 
 
 def points(thrust, speed=SPEED, run="a") -> Points:
-    return Points(run, np.asarray(speed, float), np.asarray(thrust, float))
+    return (run, np.asarray(speed, float), np.asarray(thrust, float))
 
 
 def test_through_the_origin_by_hand() -> None:

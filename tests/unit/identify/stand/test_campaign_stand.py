@@ -8,7 +8,7 @@ import yaml
 
 from rotorid.identify import clocks, grey_box
 from rotorid.identify.black_box import thrust_of_throttle
-from rotorid.identify.rotor import Points, fit_coefficient, speed_law, thrust_points, torque_points
+from rotorid.identify.rotor import fit_coefficient, speed_law, thrust_points, torque_points
 from rotorid.identify.stand import read_pairs
 from rotorid.io.logs import read_tables
 from rotorid.io.wire import EXPERIMENTS
@@ -35,7 +35,7 @@ def torque() -> pd.DataFrame:
 
 
 def coefficient(points: pd.DataFrame):
-    run = [Points("tests", points["speed_rad_s"].to_numpy(), points["value"].to_numpy())]
+    run = [("tests", points["speed_rad_s"].to_numpy(), points["value"].to_numpy())]
     return fit_coefficient(run, offset=False)
 
 

@@ -14,22 +14,20 @@ OFFSET_S, LAG_S = -0.083, 0.055
 def test_the_lower_edge_by_hand() -> None:
     # Host = 2 + device, each read 0 to 0.3 s late; the samples read at once lie at 0, 2 and 4 s.
     line = lower_edge(np.array([0.0, 1, 2, 3, 4]), np.array([2.0, 3.3, 4.0, 5.1, 6.0]), 0.01)
-    assert line.offset_s == pytest.approx(2.0)
-    assert line.rate == pytest.approx(1.0)
-    assert line.host(np.array([1.5])) == pytest.approx([3.5])
+    assert line == pytest.approx((2.0, 1.0))
 
 
 def test_a_slow_clock_is_measured_through_delays() -> None:
     rng = np.random.default_rng(0)
     device = np.arange(0, 100, 0.01)
-    line = lower_edge(device, 5 + 1.0001 * device + rng.exponential(0.02, len(device)), 0.001)
-    assert line.rate == pytest.approx(1.0001, abs=3e-6)
-    assert line.offset_s == pytest.approx(5, abs=3e-4)
+    offset_s, rate = lower_edge(device, 5 + 1.0001 * device + rng.exponential(0.02, len(device)), 0.001)
+    assert rate == pytest.approx(1.0001, abs=3e-6)
+    assert offset_s == pytest.approx(5, abs=3e-4)
 
 
 def test_no_line_leaves_the_rates_that_a_clock_can_have() -> None:
-    line = lower_edge(np.array([0.0, 1, 2]), np.array([0.0, 1.5, 3.0]), 0.001)
-    assert line.rate == pytest.approx(1.001)
+    _, rate = lower_edge(np.array([0.0, 1, 2]), np.array([0.0, 1.5, 3.0]), 0.001)
+    assert rate == pytest.approx(1.001)
     with pytest.raises(InputError, match="at least two samples"):
         lower_edge(np.array([1.0]), np.array([1.0]), 0.01)
 

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from rotorid.effects.loading import rotation_of
 from rotorid.errors import InputError
 from rotorid.identify import stand
 from rotorid.identify.rotor import speed_law
@@ -42,10 +43,10 @@ def test_a_sine_has_no_plateau_and_rest_alone_is_refused() -> None:
 
 def test_tilt_and_weight_by_hand() -> None:
     # Pitch 30°: x forward goes up (−z), so R e_x = (cos 30°, 0, −sin 30°).
-    rotation = stand.tilt(0.0, np.radians(30))
+    rotation = rotation_of(0.0, np.radians(30))
     assert rotation @ [1, 0, 0] == pytest.approx([np.sqrt(3) / 2, 0, -0.5])
     # Roll 30°: y right goes down, R e_y = (0, cos 30°, sin 30°).
-    assert stand.tilt(np.radians(30), 0.0) @ [0, 1, 0] == pytest.approx([0, np.sqrt(3) / 2, 0.5])
+    assert rotation_of(np.radians(30), 0.0) @ [0, 1, 0] == pytest.approx([0, np.sqrt(3) / 2, 0.5])
     # 2 kg at (0.1, 0, 0) on a level sensor with g = 10: F = (0, 0, 20), M = c × F = (0, −2, 0).
     assert stand.weight_wrench(2.0, 10.0, np.array([0.1, 0, 0]), np.eye(3)) == pytest.approx([0, 0, 20, 0, -2, 0])
 
@@ -55,7 +56,7 @@ def experiment(roll: float, pitch: float, seed: int = 0, drift_n_s: float = 0.0)
     rng = np.random.default_rng(seed)
     time_s = np.arange(0, 18.5, 0.01)
     throttle = programme(time_s)
-    at_rest = stand.weight_wrench(0.652, 9.81, np.array([0.003, -0.002, -0.045]), stand.tilt(roll, pitch))
+    at_rest = stand.weight_wrench(0.652, 9.81, np.array([0.003, -0.002, -0.045]), rotation_of(roll, pitch))
     values = np.tile(at_rest, (len(time_s), 1))
     values[:, 2] += -4.0 * throttle[:, 0] / 0.2 + drift_n_s * time_s
     values += rng.normal(0, 1, values.shape) * np.array([0.1] * 3 + [0.001] * 3)
@@ -95,10 +96,10 @@ CENTRE = np.array([0.003, -0.002, -0.045])
 def test_the_weight_under_tilt_gives_mass_and_centre() -> None:
     evaluated = [stand.evaluate(experiment(*tilt, seed), None) for seed, tilt in enumerate(TILTS)]
     found = stand.fit_weight(evaluated, 0.652, np.array([0, 0, -0.045]), 9.81)
-    assert found.mass_kg == pytest.approx(0.652, abs=1e-3)
-    assert found.centre_m == pytest.approx(CENTRE, abs=1e-4)
-    assert found.rms_before[4] == pytest.approx(0.652 * 9.81 * 0.003, rel=0.05)
-    assert found.rms_after[4] < 3e-4
+    assert found["mass_kg"] == pytest.approx(0.652, abs=1e-3)
+    assert found["centre_m"] == pytest.approx(CENTRE, abs=1e-4)
+    assert found["rms_before"][4] == pytest.approx(0.652 * 9.81 * 0.003, rel=0.05)
+    assert found["rms_after"][4] < 3e-4
 
 
 def test_intervals_of_mass_and_centre_cover() -> None:
@@ -108,13 +109,13 @@ def test_intervals_of_mass_and_centre_cover() -> None:
     for _ in range(500):
         evaluated = []
         for roll, pitch in TILTS:
-            exact = stand.weight_wrench(0.652, 9.81, CENTRE, stand.tilt(roll, pitch))
+            exact = stand.weight_wrench(0.652, 9.81, CENTRE, rotation_of(roll, pitch))
             rest = replace(like.rest, mean=exact + rng.normal(0, 1, 6) * np.array([0.007] * 3 + [7e-5] * 3))
             evaluated.append(replace(like, roll_rad=roll, pitch_rad=pitch, rest=rest))
         found = stand.fit_weight(evaluated, 0.652, CENTRE, 9.81)
-        low, high = found.centre_interval_95.T
+        low, high = found["centre_interval_95"].T
         inside.append(
-            [*((low < CENTRE) & (CENTRE < high)), found.mass_interval_95[0] < 0.652 < found.mass_interval_95[1]]
+            [*((low < CENTRE) & (CENTRE < high)), found["mass_interval_95"][0] < 0.652 < found["mass_interval_95"][1]]
         )
     assert np.mean(inside, axis=0) == pytest.approx(np.full(4, 0.95), abs=0.03)
 

@@ -21,7 +21,7 @@ from rotorid.mismatch.decide.problem import Prior
 from rotorid.mismatch.decide.status import Estimate
 from rotorid.recordings import RecordingSet, Vehicle, write_set
 from rotorid.recordings import columns as c
-from rotorid.report.page.changes import make_changes_page
+from rotorid.report.page import make_changes_page
 from tests.unit.mismatch.flights import Flight, recorded
 
 

@@ -15,7 +15,7 @@ from rotorid.mismatch.changes.of_instruments import Wander, between, wandering
 from rotorid.mismatch.changes.words import as_json, sentences
 from rotorid.mismatch.evidence.gram import Evidence
 from rotorid.recordings import RecordingSet, write_set
-from rotorid.report.page.changes import make_changes_page
+from rotorid.report.page import make_changes_page
 from tests.unit.mismatch.instrument.stands import C_F, one_rotor
 from tests.unit.mismatch.instrument.test_instrument import RATE_HZ, bench_set, crosstalk
 from tests.unit.mismatch.instrument.test_stand import steady_run

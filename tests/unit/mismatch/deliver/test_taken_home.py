@@ -18,7 +18,7 @@ from rotorid.mismatch.tell.verdict import Verdict
 from rotorid.recordings import RecordingSet, Vehicle, templates, write_set, write_vehicle
 from rotorid.recordings import columns as c
 from rotorid.report.deliver import analysis_of, verdict_of, write_files
-from rotorid.vehicle.control.swings import swings
+from rotorid.vehicle.control import swings
 from rotorid_proof.delivered import row_of
 from tests.unit.mismatch.flights import QUAD, quad, recorded, with_table
 

@@ -30,7 +30,7 @@ from rotorid.mismatch.flight.prepare import prepare
 from rotorid.recordings import RecordingSet, Run, read_set, templates
 from rotorid.recordings import columns as c
 from rotorid.report.deliver import analysis_of
-from rotorid.vehicle.control.swings import FLIGHTS, SECONDS, SEED
+from rotorid.vehicle.control import FLIGHTS, SECONDS, SEED
 from rotorid.vehicle.mixer import allocation_matrix
 from tests.unit.mismatch.flights import recorded
 from tests.unit.vehicle.thesis import thesis_vehicle

@@ -8,9 +8,9 @@ import pandas as pd
 
 from rotorid.recordings import RecordingSet, write_set
 from rotorid.recordings.templates import read
-from rotorid.report.fleet_history import by_vehicle, change_points, history, shown_by
-from rotorid.report.plots.fleet import draw_history
-from rotorid.vehicle.control.swings import swings
+from rotorid.report.fleet import change_points, history, sets_of_vehicles, shown_by
+from rotorid.report.plots.mismatch import draw_history
+from rotorid.vehicle.control import swings
 from workflow.scripts import fleet_history
 
 DAYS = 6
@@ -100,7 +100,7 @@ def test_sets_are_ordered_by_vehicle_and_day_and_a_broken_one_is_named(tmp_path:
     (tmp_path / "broken-2026-10-03").mkdir()
     (tmp_path / "broken-2026-10-03" / "vehicle.yaml").write_text("name: x\n", encoding="utf-8")
     said: list[str] = []
-    found = by_vehicle(list(tmp_path.iterdir()), said.append)
+    found = sets_of_vehicles(list(tmp_path.iterdir()), said.append)
     assert {v: [s.name for s in own] for v, own in found.items()} == {
         flown(1).vehicle.name: ["heron-2026-10-01", "heron-2026-10-02"]
     }

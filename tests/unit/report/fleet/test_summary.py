@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rotorid.report.fleet import by_effect, by_vehicle, collect, day_of, make_page
-from rotorid.report.plots.fleet import draw_fleet
+from rotorid.report.plots.mismatch import draw_fleet
 
 
 def effect(name: str, status: str, value: float = 1.0, share: float | None = 0.5) -> dict:

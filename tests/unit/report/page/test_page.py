@@ -17,8 +17,8 @@ from rotorid.mismatch.tell.verdict import DerivativeOf, main_channel
 from rotorid.recordings import Run
 from rotorid.recordings.run import Doubt
 from rotorid.report.deliver import verdict_of, write_files
+from rotorid.report.page import by_share, make_page, next_text, pretty, strip
 from rotorid.report.page.data import _first_shown, fit_percent, measured, packed
-from rotorid.report.page.make import by_share, make_page, next_text, pretty, strip
 from tests.browser import CHROMIUM, Browser
 from tests.unit.mismatch.synthetic import analysis, drag_finding
 

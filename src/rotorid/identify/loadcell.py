@@ -72,18 +72,18 @@ class LineFit:
         return float(centre - half), float(centre + half)
 
 
+def mean_interval(values: np.ndarray | pd.Series) -> tuple[float, tuple[float, float]]:
+    """Mean of two values or more and its 95 % interval by Student's t."""
+    mean = values.mean()
+    half = student_quantile(len(values) - 1, 0.975) * values.std(ddof=1) / np.sqrt(len(values))
+    return float(mean), (float(mean - half), float(mean + half))
+
+
 def fit_line(x: Sequence[float], y: Sequence[float]) -> LineFit:
     """Least-squares line through (x, y), eqs 2.10 to 2.13.
 
-    Parameters
-    ----------
-    x, y
-        Readings and known values, shape (n,), n at least 3.
-
-    Raises
-    ------
-    InputError
-        Fewer than three points, unequal lengths, or all readings equal.
+    `x`, `y`: readings and known values, shape (n,), n at least 3. InputError: fewer than three points, unequal lengths,
+    or all readings equal.
     """
     x, y = np.asarray(x, float), np.asarray(y, float)
     n = len(x)
@@ -159,14 +159,8 @@ def shared_weight_error(
     Mean over the cells, its 95 % interval (Student's t over the cells, which are independent instruments), and by cell.
     Each cell's line is fitted with one unknown more, d: weight + d * contains = a0 + a1 * reading.
 
-    Parameters
-    ----------
-    weights_gf
-        Known weights [gf], shape (n,), n at least 4.
-    readings
-        Readings of each of at least two cells, any unit, shape (n,) each.
-    contains
-        1 where the weight in question is part of the load, otherwise 0, shape (n,).
+    `weights_gf`: known weights [gf], shape (n,), n at least 4. `readings`: readings of each of at least two cells, any
+    unit, shape (n,) each. `contains`: 1 where the weight in question is part of the load, otherwise 0, shape (n,).
     """
     if len(readings) < 2 or len(weights_gf) < 4:
         raise InputError("an error shared by cells needs at least 2 cells and 4 loads")
@@ -177,25 +171,16 @@ def shared_weight_error(
         if rank < 3:
             raise InputError("the weight in question must be part of some loads and not of others")
         found.append(float(solution[2]))
-    mean = float(np.mean(found))
-    half = student_quantile(len(found) - 1, 0.975) * np.std(found, ddof=1) / np.sqrt(len(found))
-    return mean, (mean - float(half), mean + float(half)), tuple(found)
+    return *mean_interval(np.array(found)), tuple(found)
 
 
 def flag_readings(readings: pd.DataFrame) -> pd.DataFrame:
     """The readings with what their cell's other readings say of them, in three more columns.
 
-    Parameters
-    ----------
-    readings
-        One row a reading of any number of cells: `id`, `cell`, `weight_gf`, `reading_10uv` (1e-5 V).
-
-    Returns
-    -------
-    pd.DataFrame
-        The same rows with `reading_says_gf` (load by the line through the unflagged readings), `studentised` (residual
-        over its standard uncertainty; NaN where a cell has too few readings to test) and `flag` (what is wrong, empty
-        where nothing is).
+    `readings`: one row a reading of any number of cells: `id`, `cell`, `weight_gf`, `reading_10uv` (1e-5 V). Returns
+    the same rows with `reading_says_gf` (load by the line through the unflagged readings), `studentised` (residual over
+    its standard uncertainty; NaN where a cell has too few readings to test) and `flag` (what is wrong, empty where
+    nothing is).
     """
     parts = []
     for _, part in readings.groupby("cell", sort=False):
@@ -367,17 +352,9 @@ def evaluate(
 ) -> tuple[dict, pd.DataFrame]:
     """Figures of one specimen, with their units, and its curve (`strain`, compensated for the slack, and `stress_pa`).
 
-    Parameters
-    ----------
-    displacement_mm, force_n
-        Samples, shape (n,), from before the specimen is taut to after it broke.
-    gauge_mm, section_mm2
-        Distance between grips and cross-section.
-
-    Raises
-    ------
-    InputError
-        No straight part of at least five samples, or a curve that never meets the 0.2 % line.
+    `displacement_mm`, `force_n`: samples, shape (n,), from before the specimen is taut to after it broke. `gauge_mm`,
+    `section_mm2`: distance between grips and cross-section. InputError: no straight part of at least five samples, or a
+    curve that never meets the 0.2 % line.
     """
     displacement, force = np.asarray(displacement_mm, float), np.asarray(force_n, float)
     stress, strain = force / section_mm2 * 1e6, displacement / gauge_mm
@@ -468,13 +445,8 @@ def by_infill(table: pd.DataFrame, printed: pd.DataFrame) -> pd.DataFrame:
     for infill, part in table.groupby("infill_percent"):
         row = {"infill_percent": infill, "specimens": len(part)}
         for name in ("modulus_gpa", "strength_mpa", "yield_mpa"):
-            values = part[name]
-            half = student_quantile(len(values) - 1, 0.975) * values.std(ddof=1) / np.sqrt(len(values))
-            row |= {
-                name: values.mean(),
-                f"{name}_low_95": values.mean() - half,
-                f"{name}_high_95": values.mean() + half,
-                f"{name}_thesis": known.loc[infill, name] if infill in known.index else np.nan,
-            }
+            mean, (low, high) = mean_interval(part[name])
+            row |= {name: mean, f"{name}_low_95": low, f"{name}_high_95": high}
+            row[f"{name}_thesis"] = known.loc[infill, name] if infill in known.index else np.nan
         rows.append(row)
     return pd.DataFrame(rows)

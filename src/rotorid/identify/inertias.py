@@ -1,41 +1,48 @@
-"""An excitation that makes all inertias and gyroscopic terms identifiable: multisines within what motors can
-do.
+"""Inertias: from an excitation under which all of them show, from real flights, and from a table of components.
 
-Each axis gets its own harmonics of one period (so the axes are orthogonal). Amplitudes, phases and the axes'
-shares are searched from a seed; each candidate is scaled to the largest that keeps every rotor
-within its limits and roll and pitch within a tilt, and judged by the standard errors it promises (worst of
-inertias and gyroscopic weights, each against what is wanted). The search uses the motion without controller:
+The excitation is multisines within what motors can do. Each axis gets its own harmonics of one period (so the axes are
+orthogonal). Amplitudes, phases and the axes' shares are searched from a seed; each candidate is scaled to the largest
+that keeps every rotor within its limits and roll and pitch within a tilt, and judged by the standard errors it promises
+(worst of inertias and gyroscopic weights, each against what is wanted). The search uses the motion without controller:
 rates are integrals of moment over inertia.
 
-Inertias from real flights: the moment of the rotors against the angular acceleration, within a frequency band.
-
-In flight the controller answers every disturbance with a moment of its own, so at low frequency moment and motion are
-tied by the controller as much as by the inertia; at high frequency both readings are noise. Between them lies a band
-where the moment drives the motion. There both sides are still noisy, and no regression knows by how much: taking the
-acceleration as given bounds the inertia from below, <M a> / <a a>, taking the moment as given bounds it from above,
+In real flight the controller answers every disturbance with a moment of its own, so at low frequency moment and motion
+are tied by the controller as much as by the inertia; at high frequency both readings are noise. Between them lies a
+band where the moment drives the motion. There both sides are still noisy, and no regression knows by how much: taking
+the acceleration as given bounds the inertia from below, <M a> / <a a>, taking the moment as given bounds it from above,
 <M M> / <M a> (Frisch). The truth lies between if the noises are independent; the geometric mean is the estimate, and
 the ratio of the bounds is one over the squared correlation.
+
+A component of the table (in place of CAD, thesis eq. 4.27) is a point, a box or a cylinder (axis along z) of even
+density; its inertia is moved to the centre of mass by the theorem of parallel axes. One with count 4 stands at the four
+corners (±x, ±y).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from scipy.signal import butter, sosfiltfilt
 
+from rotorid.errors import InputError
+from rotorid.identify.fem.placement import turn
 from rotorid.identify.grey_box import regressors, weights_of_inertias
 from rotorid.recordings import Run, Vehicle
 from rotorid.recordings import columns as c
-from rotorid.vehicle.control.pid import AttitudePid, AttitudeReference, Gains
+from rotorid.vehicle.control import AttitudePid, AttitudeReference
 from rotorid.vehicle.fast import AttitudeLoop
 from rotorid.vehicle.mixer import allocation_matrix, wrench_matrix
 
-_HOLD_GAINS = Gains((0.04, 0.04, 0.04), (0.02, 0.02, 0.01), (0.015, 0.015, 0.02))
+COLUMNS = ("component count mass_kg shape size_x_m size_y_m size_z_m x_m y_m z_m").split()
+_SHAPES = ("point", "box", "cylinder")
+_INERTIA_ERROR, _GYROSCOPIC_ERROR = 0.001, 0.04
+"""Standard errors that are wanted of a period: of inertias (relative), of gyroscopic weights (absolute)."""
+_HOLD_GAINS = ((0.04, 0.04, 0.04), (0.02, 0.02, 0.01), (0.015, 0.015, 0.02))
 """A soft attitude hold, slower than the excitation: it keeps the attitude but does not undo the motion."""
-
-
 _FIRST_SHARES_N_M = np.array([0.1, 0.1, 0.03])
 """Where the search for the axes' shares begins: roll and pitch can be pushed far harder than yaw."""
 WINDOW_S = 0.25
@@ -53,13 +60,10 @@ class Multisine:
 
     def moment(self, time_s: np.ndarray) -> np.ndarray:
         """(n, 3), N m, at times (n,), s."""
-        return self._sum(time_s, 0)
+        return self.integral(time_s, 0)
 
     def integral(self, time_s: np.ndarray, order: int) -> np.ndarray:
         """The `order`-th integral over time without its constants, (n, 3)."""
-        return self._sum(time_s, order)
-
-    def _sum(self, time_s, order):
         rate = 2 * np.pi * self.harmonics[:, None] / self.period_s
         angle = rate * np.asarray(time_s, float) - order * np.pi / 2
         waves = np.cos(angle[:, :, None] + self.phase_rad[:, None, :]) / rate[:, :, None] ** order
@@ -69,42 +73,20 @@ class Multisine:
         return Multisine(self.period_s, self.harmonics, self.amplitude_n_m * factor, self.phase_rad)
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """Limits of the search and what its result is measured against."""
-
-    speed_limits_rad_s: tuple[float, float]
-    tilt_rad: float
-    harmonics: tuple[int, int]
-    period_s: float
-    inertia_error: float = 0.001
-    gyroscopic_error: float = 0.04
+Readings = tuple[float, np.ndarray, float]
+"""Noise of the readings of the rates, rad/s, and, through the rotor speeds, of the moments (3,), N m: one sigma,
+and samples a second."""
 
 
-@dataclass(frozen=True)
-class Readings:
-    """Noise of the readings: of the rates (rad/s) and, through the rotor speeds, of the moments (3,), N m,
-    one sigma per sample at `rate_hz` samples a second."""
-
-    rates_rad_s: float
-    moments_n_m: np.ndarray
-    rate_hz: float
-
-    @classmethod
-    def at_hover(cls, vehicle: Vehicle, rates_rad_s: float, speed_relative: float, rate_hz: float) -> Readings:
-        """Noise of the moments from relative noise of each rotor's speed, all rotors at hover."""
-        matrix = wrench_matrix(vehicle)
-        square = allocation_matrix(vehicle) @ [vehicle.mass_kg * vehicle.gravity_m_s2, 0.0, 0.0, 0.0]
-        return cls(rates_rad_s, np.sqrt(np.sum((2 * speed_relative * square * matrix[1:]) ** 2, 1)), rate_hz)
+def readings_at_hover(vehicle: Vehicle, rates_rad_s: float, speed_relative: float, rate_hz: float) -> Readings:
+    """Noise of the moments from relative noise of each rotor's speed, all rotors at hover."""
+    matrix = wrench_matrix(vehicle)
+    square = allocation_matrix(vehicle) @ [vehicle.mass_kg * vehicle.gravity_m_s2, 0.0, 0.0, 0.0]
+    return rates_rad_s, np.sqrt(np.sum((2 * speed_relative * square * matrix[1:]) ** 2, 1)), rate_hz
 
 
 def promised_errors(
-    rates: np.ndarray,
-    moments: np.ndarray,
-    inertias: np.ndarray,
-    noise: Readings,
-    dt_s: float,
-    window_s: float,
+    rates: np.ndarray, moments: np.ndarray, inertias: np.ndarray, noise: Readings, dt_s: float, window_s: float
 ) -> np.ndarray:
     """Standard errors (6,) of w11, w22, w33 (absolute) and of the torque weights (relative).
 
@@ -119,22 +101,23 @@ def promised_errors(
     within = np.cumsum(inputs.reshape(count, length, 6), axis=1) * dt_s
     within = (within - within.mean(axis=1, keepdims=True)).reshape(-1, 6)
     # The candidate is sampled more coarsely than the sensors: more readings for each of its samples.
-    more = noise.rate_hz * dt_s
+    rates_rad_s, moments_n_m, rate_hz = noise
+    more = rate_hz * dt_s
     out = np.empty(6)
     for axis in range(3):
         pick = [axis, 3 + axis]
-        by_rates = noise.rates_rad_s**2 * np.linalg.inv(within[:, pick].T @ within[:, pick])
-        sigma = noise.moments_n_m[axis] * true[3 + axis]
+        by_rates = rates_rad_s**2 * np.linalg.inv(within[:, pick].T @ within[:, pick])
+        sigma = moments_n_m[axis] * true[3 + axis]
         by_moments = sigma**2 * np.linalg.inv(inputs[:, pick].T @ inputs[:, pick])
         out[pick] = np.sqrt(np.diag(by_rates + by_moments) / more)
     out[3:] /= np.abs(true[3:])
     return out
 
 
-def _largest(multisine: Multisine, time_s, allocation, thrust_n, inertias, wanted: Wanted) -> Multisine:
+def _largest(multisine: Multisine, time_s, allocation, thrust_n, inertias, speeds_rad_s, tilt_rad) -> Multisine:
     """Scaled to the largest that keeps rotor speeds (together) and tilt (per axis) within their limits."""
     mean = allocation @ np.array([thrust_n, 0.0, 0.0, 0.0])
-    low, high = wanted.speed_limits_rad_s[0] ** 2, wanted.speed_limits_rad_s[1] ** 2
+    low, high = speeds_rad_s[0] ** 2, speeds_rad_s[1] ** 2
 
     def room(candidate: Multisine) -> float:
         swing = candidate.moment(time_s) @ allocation[:, 1:].T
@@ -142,42 +125,43 @@ def _largest(multisine: Multisine, time_s, allocation, thrust_n, inertias, wante
 
     multisine = multisine.scaled(room(multisine))
     tilt = np.abs(multisine.integral(time_s, 2) / inertias)[:, :2].max(axis=0)
-    multisine = multisine.scaled(np.append(np.minimum(1.0, wanted.tilt_rad / np.maximum(tilt, 1e-12)), 1.0))
+    multisine = multisine.scaled(np.append(np.minimum(1.0, tilt_rad / np.maximum(tilt, 1e-12)), 1.0))
     # Where two axes cancelled each other in a rotor, less of one may be more for the rotor.
     return multisine.scaled(min(1.0, room(multisine)))
 
 
 def design(
     vehicle: Vehicle,
-    wanted: Wanted,
+    speed_limits_rad_s: tuple[float, float],
+    tilt_rad: float,
+    harmonics: tuple[int, int],
+    period_s: float,
     noise: Readings,
     candidates: int,
     rng: np.random.Generator,
 ) -> tuple[Multisine, np.ndarray]:
-    """The best of `candidates` multisines and the standard errors (6,) that one period of it promises."""
+    """The best of `candidates` multisines and the standard errors (6,) that one period of it promises.
+
+    It keeps rotor speeds and tilt within their limits, and has the `harmonics` from the first to the last.
+    """
     allocation = allocation_matrix(vehicle)
     thrust = vehicle.mass_kg * vehicle.gravity_m_s2
     inertias = np.diag(vehicle.inertia_kg_m2.matrix())
-    harmonics = np.arange(wanted.harmonics[0], wanted.harmonics[1] + 1)
-    dt_s = wanted.period_s / (harmonics[-1] * 12)
-    time_s = np.arange(0.0, wanted.period_s, dt_s)
-    target = np.repeat([wanted.gyroscopic_error, wanted.inertia_error], 3)
-    owner = np.arange(len(harmonics)) % 3
-    mine = owner[:, None] == np.arange(3)
+    orders = np.arange(harmonics[0], harmonics[1] + 1)
+    dt_s = period_s / (orders[-1] * 12)
+    time_s = np.arange(0.0, period_s, dt_s)
+    target = np.repeat([_GYROSCOPIC_ERROR, _INERTIA_ERROR], 3)
+    mine = (np.arange(len(orders)) % 3)[:, None] == np.arange(3)
 
     def trial(levels, phases, share):
         amplitude = np.where(mine, np.exp(levels), 0.0) * np.exp(share) * _FIRST_SHARES_N_M
-        made = Multisine(wanted.period_s, harmonics.astype(float), amplitude, phases)
-        return _largest(made, time_s, allocation, thrust, inertias, wanted)
+        made = Multisine(period_s, orders.astype(float), amplitude, phases)
+        return _largest(made, time_s, allocation, thrust, inertias, speed_limits_rad_s, tilt_rad)
 
     best, best_cost, best_errors, best_point = None, np.inf, None, None
     for number in range(candidates):
         if number < candidates // 4:
-            point = (
-                rng.normal(0, 1, mine.shape),
-                rng.uniform(0, 2 * np.pi, mine.shape),
-                rng.uniform(-2, 0, 3),
-            )
+            point = rng.normal(0, 1, mine.shape), rng.uniform(0, 2 * np.pi, mine.shape), rng.uniform(-2, 0, 3)
         else:
             # Smaller and smaller moves around the best so far.
             move = 1.0 - number / candidates
@@ -211,21 +195,12 @@ class ExcitedHold:
         return replace(hold, more=more, limits_rad_s=self.limits_rad_s)
 
 
-@dataclass(frozen=True)
-class _BandSignals:
-    """Band-passed moment and angular acceleration of one stretch, (n, 3), N m and rad/s2, with the sample rate."""
-
-    run: str
-    moment: np.ndarray
-    acceleration: np.ndarray
-    rate_hz: float
-
-
 def band_signals(
     run: Run, vehicle: Vehicle, band_hz: tuple[float, float], delay_s: float, rate_hz: float
-) -> _BandSignals | None:
-    """Signals of a run on an even grid, rotor speeds taken `delay_s` earlier; None where columns are missing.
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Band-passed moment and angular acceleration of a run on an even grid, (n, 3), N m and rad/s2.
 
+    Rotor speeds are taken `delay_s` earlier; None where columns are missing.
     The gyroscopic term Ω × JΩ, small here, is added to the moment's side with the believed inertia.
     """
     speeds = c.rotor_columns("rotor_speed", vehicle.rotor_count)
@@ -244,12 +219,7 @@ def band_signals(
     moment = (np.roll(moment, 1, 0) + 4 * moment + np.roll(moment, -1, 0)) / 6
     edge = int(rate_hz / band_hz[0])
     keep = slice(edge, -edge)
-    return _BandSignals(
-        run.name,
-        sosfiltfilt(filtered, moment, axis=0)[keep],
-        sosfiltfilt(filtered, acceleration, axis=0)[keep],
-        rate_hz,
-    )
+    return sosfiltfilt(filtered, moment, axis=0)[keep], sosfiltfilt(filtered, acceleration, axis=0)[keep]
 
 
 def _on_grid(grid: np.ndarray, time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -258,17 +228,21 @@ def _on_grid(grid: np.ndarray, time_s: np.ndarray, values: np.ndarray) -> np.nda
 
 
 def fit_flights(
-    parts: Sequence[_BandSignals], block_s: float, rng: np.random.Generator, draws: int = 500
+    parts: Sequence[tuple[np.ndarray, np.ndarray]],
+    rate_hz: float,
+    block_s: float,
+    rng: np.random.Generator,
+    draws: int = 500,
 ) -> list[dict]:
     """Inertia about x, y, z from several flights: bounds `lower` and `upper`, `estimate`, `interval_95` (kg m2), `r2`.
 
-    Intervals by drawing blocks of `block_s`; `r2` is the squared correlation.
+    `parts` are of `band_signals` at `rate_hz`. Intervals by drawing blocks of `block_s`; `r2` is the squared
+    correlation.
     """
-    sums = []
-    for part in parts:
-        size = int(block_s * part.rate_hz)
-        for start in range(0, len(part.moment) - size + 1, size):
-            m, a = part.moment[start : start + size], part.acceleration[start : start + size]
+    sums, size = [], int(block_s * rate_hz)
+    for moment, acceleration in parts:
+        for start in range(0, len(moment) - size + 1, size):
+            m, a = moment[start : start + size], acceleration[start : start + size]
             sums.append([(m * a).sum(0), (a * a).sum(0), (m * m).sum(0)])
     sums = np.array(sums)
     drawn = sums[rng.integers(0, len(sums), (draws, len(sums)))].sum(axis=1)
@@ -287,3 +261,53 @@ def fit_flights(
             }
         )
     return found
+
+
+def read_components(path: str | Path) -> pd.DataFrame:
+    """The component table; InputError names the line and what was expected."""
+    table = pd.read_csv(path)
+    missing = [c for c in COLUMNS if c not in table.columns]
+    if missing:
+        raise InputError(f"{path}: column {missing[0]} is missing, expected {', '.join(COLUMNS)}")
+    for number, row in enumerate(table.itertuples(), 2):
+        if row.shape not in _SHAPES:
+            raise InputError(f"{path}, line {number}: shape {row.shape!r}, expected {', '.join(_SHAPES)}")
+        if row.count not in (1, 4):
+            raise InputError(f"{path}, line {number}: count {row.count}, expected 1 or 4 (the four corners)")
+        sizes = (row.mass_kg, row.size_x_m, row.size_y_m, row.size_z_m)
+        if not row.mass_kg > 0 or not min(sizes) >= 0:
+            raise InputError(f"{path}, line {number}: mass must be positive and sizes 0 or more, got {sizes}")
+    return table
+
+
+def own_inertia(shape: str, mass_kg: float, size_m: np.ndarray) -> np.ndarray:
+    """Inertia (3, 3), kg m2, of a component about its own centre; `size_m` (3,), a cylinder's x size its diameter."""
+    x, y, z = size_m
+    if shape == "point":
+        return np.zeros((3, 3))
+    if shape == "cylinder":
+        across = mass_kg * (3 * (x / 2) ** 2 + z**2) / 12
+        return np.diag([across, across, mass_kg * (x / 2) ** 2 / 2])
+    return mass_kg / 12 * np.diag([y**2 + z**2, x**2 + z**2, x**2 + y**2])
+
+
+def compose(table: pd.DataFrame) -> tuple[float, np.ndarray, np.ndarray]:
+    """Mass, kg, of all components together, their centre of mass (3,), m, in the table's axes, and the inertia (3, 3),
+    kg m2, about it."""
+    masses, places, inertias = [], [], []
+    for row in table.itertuples():
+        size = np.array([row.size_x_m, row.size_y_m, row.size_z_m])
+        # A box at a corner points along its diagonal; the four together are symmetric all the same.
+        own = own_inertia(row.shape, row.mass_kg, size)
+        corners = [(1, 1)] if row.count == 1 else [(1, 1), (1, -1), (-1, -1), (-1, 1)]
+        for sx, sy in corners:
+            masses.append(row.mass_kg)
+            places.append([sx * row.x_m, sy * row.y_m, row.z_m])
+            about_z = turn(np.arctan2(sy * row.y_m, sx * row.x_m)) if row.count == 4 else np.eye(3)
+            inertias.append(about_z @ own @ about_z.T)
+    masses, places = np.array(masses), np.array(places)
+    centre = masses @ places / masses.sum()
+    total = np.zeros((3, 3))
+    for mass, arm, own in zip(masses, places - centre, inertias, strict=True):
+        total += own + mass * ((arm @ arm) * np.eye(3) - np.outer(arm, arm))
+    return float(masses.sum()), centre, total

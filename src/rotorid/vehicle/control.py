@@ -1,20 +1,30 @@
-"""Flights for a first look at a vehicle: swings in roll, pitch and yaw about hover under an attitude controller.
+"""PID attitude control (thesis eqs 4.29, 4.30, table 4.2), what it follows, and swings for a first look at a vehicle.
 
-The pilot knows the believed vehicle alone. As a pilot does, he finds the throttle that carries what he flies, and turns
-his gains down where the rotors answer more strongly or later than believed.
+The pilot of these flights knows the believed vehicle alone. As a pilot does, he finds the throttle that carries what he
+flies, and turns his gains down where the rotors answer more strongly or later than believed.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from rotorid.effects.contract import DELAY, LAG
 from rotorid.errors import InputError
-from rotorid.recordings import RecordingSet, Run, Vehicle
+from rotorid.recordings import RecordingSet, Run
 from rotorid.recordings import columns as c
-from rotorid.vehicle.control.pid import AttitudePid, AttitudeReference, Gains
-from rotorid.vehicle.hover import hover
-from rotorid.vehicle.improved import active_speed_forms, command_path, flyable, record_as_stated, simulate_as_stated
+from rotorid.recordings.vehicle import Vehicle
+from rotorid.vehicle.fast import AttitudeLoop
+from rotorid.vehicle.improved import (
+    active_speed_forms,
+    command_path,
+    flyable,
+    hover,
+    record_as_stated,
+    simulate_as_stated,
+)
 from rotorid.vehicle.mixer import allocation_matrix
 from rotorid.vehicle.simulator import Start, WhiteNoise
 
@@ -61,12 +71,13 @@ def swings(vehicle: Vehicle, name: str, seconds: float, flights: int, seed: int,
         raise InputError("seconds must be more than 0 and flights at least 1")
     vehicle, _ = flyable(vehicle)
     steady = hover(vehicle, command_path(vehicle), START_HEIGHT_M)
-    stiffness = min(_STIFFNESS_RAD_S, _LATE_RAD / (_DERIVATIVE_S + _lateness_s(vehicle)))
+    late_s = sum(float(max(values)) for form, values in active_speed_forms(vehicle) if form.stage in (DELAY, LAG))
+    stiffness = min(_STIFFNESS_RAD_S, _LATE_RAD / (_DERIVATIVE_S + late_s))
     # Tilted by the swings a vehicle needs a little more than level.
     tilted = (1 / _MEAN_TILT_COSINE - 1) * vehicle.mass_kg * vehicle.gravity_m_s2
     thrust_n = steady.thrust_n + tilted / steady.gain
     j = np.diag(vehicle.inertia_kg_m2.matrix()) / steady.gain
-    gains = Gains(tuple(j * stiffness**2), (0.0,) * 3, tuple(2 * _DAMPING * stiffness * j))
+    gains = (j * stiffness**2, np.zeros(3), 2 * _DAMPING * stiffness * j)
     most = (np.inf, np.inf, _most_yaw_n_m(vehicle, np.array([thrust_n, *steady.moments_n_m])))
     noise = WhiteNoise(
         angular_velocity_rad_s=0.01,
@@ -117,11 +128,79 @@ def turned_over(recordings: RecordingSet) -> tuple[str, ...]:
         _, x, y, _ = run.array(c.QUATERNION).T
         if (2 * (x**2 + y**2) > 1.0).any():  # 1 − 2 (x² + y²) is the cosine of the tilt
             names.append(run.name)
-    return (
-        (f"The vehicle turned over in {', '.join(names)}: its attitude controller does not hold it.",) if names else ()
-    )
+    if not names:
+        return ()
+    return (f"The vehicle turned over in {', '.join(names)}: its attitude controller does not hold it.",)
 
 
-def _lateness_s(vehicle: Vehicle) -> float:
-    """Delays and time constants between command and rotor speed together, s."""
-    return sum(float(max(values)) for form, values in active_speed_forms(vehicle) if form.stage in (DELAY, LAG))
+Gains = Sequence[Sequence[float]]
+"""Proportional, integral and derivative gains about roll, pitch and yaw, (3, 3): N m/rad, N m/(rad s), N m s/rad."""
+THESIS_GAINS: Gains = ((0.2, 0.2, 4.0), (3.0, 3.0, 0.1), (0.1, 0.1, 0.1))
+"""Table 4.2."""
+
+
+@dataclass(frozen=True)
+class AttitudePid:
+    """The thesis's attitude controller (fig. 4.8): PID moments and a set thrust, allocated to rotor speeds.
+
+    A `Controller` of `rotorid.vehicle.simulator` for the `vehicle` as believed. Options that the thesis does not have:
+    the derivative, a difference over a step, is smoothed by a first-order lag of `derivative_time_s`; moments are held
+    within `limit_n_m` (3,), N m, and the integral stands still about an axis that is at its limit and would be driven
+    further (anti-windup by conditional integration). `trim_n_m` (3,), N m, is added to the moments, beyond their limit.
+    """
+
+    vehicle: Vehicle
+    reference: AttitudeReference
+    gains: Gains = THESIS_GAINS
+    derivative_time_s: float = 0.0
+    limit_n_m: tuple[float, float, float] | None = None
+    trim_n_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def attitude_loop(self, time_s: np.ndarray) -> AttitudeLoop:
+        """The controller laid out for instants (m,), s."""
+        angles, allocation = self.reference.at(time_s), allocation_matrix(self.vehicle)
+        return AttitudeLoop(
+            *(np.asarray(g) for g in self.gains),
+            allocation=allocation,
+            reference=np.concatenate([angles, np.full((*angles.shape[:-1], 1), self.reference.thrust_n)], axis=-1),
+            derivative_time_s=self.derivative_time_s,
+            limit_n_m=None if self.limit_n_m is None else np.asarray(self.limit_n_m, float),
+            more=np.tile(allocation[:, 1:] @ self.trim_n_m, (len(time_s), 1)) if any(self.trim_n_m) else None,
+        )
+
+
+@dataclass(frozen=True)
+class AttitudeReference:
+    """Total thrust, N, and a function of time (s) that gives roll, pitch, yaw (3,), or (n, 3) of n vehicles, rad."""
+
+    name: str
+    thrust_n: float
+    euler_rad: Callable[[float], np.ndarray]
+    at_once: bool = False
+    """Whether the function takes many times (m,), too, and gives (m, 3), or (n, m, 3)."""
+
+    def at(self, time_s: np.ndarray) -> np.ndarray:
+        """Roll, pitch and yaw at many times, (m, 3) or (n, m, 3), rad."""
+        return self.euler_rad(time_s) if self.at_once else np.array([self.euler_rad(t) for t in time_s], float)
+
+
+def training_reference(thrust_n: float = 5.0) -> AttitudeReference:
+    """Thesis eq. 4.28: 5 N; roll and pitch swing by 5 degrees at 4 rad/s, yaw turns at 20 degrees a second.
+
+    5 N is below the vehicle's weight (6.396 N): the thesis simulates attitude, not hover.
+    """
+
+    def euler(t: float) -> np.ndarray:
+        return np.array([np.pi / 36 * np.sin(4 * t), np.pi / 36 * np.sin(4 * t + np.pi / 2), np.pi / 9 * t])
+
+    return AttitudeReference("eq. 4.28", thrust_n, euler)
+
+
+def validation_reference(thrust_n: float = 5.0) -> AttitudeReference:
+    """Thesis eq. 4.81: 5 N; roll and pitch swing by 4 degrees at 10 rad/s, yaw by 8 degrees at 2 rad/s."""
+
+    def euler(t: float) -> np.ndarray:
+        four = np.pi / 45
+        return np.array([four * np.sin(10 * t), four * np.sin(10 * t + np.pi / 2), 2 * four * np.sin(2 * t)])
+
+    return AttitudeReference("eq. 4.81", thrust_n, euler)

@@ -1,10 +1,10 @@
-"""From the six cells' forces to the force on the vehicle (thesis 2.4, tables 2.2 and 2.3, eqs 2.3 to 2.9).
+"""The load-cell bench from raw logs to force: readings made ready, calibration, reconstruction, recording sets.
 
-The bench is a cantilever: a force along one axis at a time follows from a sum of moments (x, y) or of the cells'
-forces (z). With loads along several axes at once the six readings do not determine six unknowns (thesis 2.4),
-and the equations are then no more than an attempt. Axes are the vehicle's, z down; forces in newtons.
+The bench is a cantilever (thesis 2.4, tables 2.2 and 2.3, eqs 2.3 to 2.9): a force along one axis at a time follows
+from a sum of moments (x, y) or of the cells' forces (z). With loads along several axes at once the six readings do not
+determine six unknowns, and the equations are then no more than an attempt. Axes are the vehicle's, z down; newtons.
 
-Calibration of the cells from raw logs: readings of known weights, lines, and what a metrologist asks for.
+Of the calibration:
 
 - A reading is the mean of the tared voltage from where it stays steady under the weight to the end (fig. 2.34).
 - Linearity: largest distance of a weight's mean reading from the line. Repeatability: standard deviation of
@@ -13,21 +13,15 @@ Calibration of the cells from raw logs: readings of known weights, lines, and wh
 - Hysteresis needs loads taken off again. The thesis's calibration only puts weights on, so it is not to be
   had from it; the return to zero after a flight (dynamic tests) bounds hysteresis, creep and drift together.
 
-Bench readings made ready: rest reading taken off, spikes out, filtered as the thesis does and without lag.
-
-The quality of a sample is that of `rotorid.io.logs` plus `SPIKE` where a channel jumped and came back.
-
-Static tests that are ready make recording sets of kind `bench`: reconstructed force next to the load that was put on.
-One run holds the loads of one axis and repeat in the order in which they were put on. Its time counts from the first
-recording of the set, so that runs lie where they were in the day; each load has its own recording, tared at its start,
-with a gap in time before the next.
+Static tests that are ready make sets of kind `bench`, the reconstructed force next to the load. A run holds the loads
+of one axis and repeat in their order. Its time counts from the set's first recording, so that runs lie where they were
+in the day; each load has its own recording, tared at its start, with a gap in time before the next.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -35,7 +29,7 @@ import pandas as pd
 from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
-from rotorid.identify.bench.loadcell import LineFit, fit_line
+from rotorid.identify.loadcell import LineFit, fit_line, mean_interval
 from rotorid.io.logs import by_recording
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import RecordingSet, Run
@@ -59,44 +53,37 @@ _SETTLING_SAMPLES = 10
 """Fig. 2.35: so many samples let the spikes of switching on dissipate."""
 
 
-@dataclass(frozen=True)
-class Geometry:
-    """Table 2.3: distances from {T} to where each cell takes its force, m."""
+Geometry = Mapping[str, float]
+"""Table 2.3: distances from {T} to where each cell takes its force, m, by their names there."""
 
-    distance_m: dict[str, float]
 
-    def __getitem__(self, name: str) -> float:
-        return self.distance_m[name]
-
-    @cached_property
-    def matrix(self) -> np.ndarray:
-        """M of eq. 2.9, shape (3, 6): cells' forces to the force on the vehicle, but for the |F| of cells 1, 3, 5."""
-        d = self.distance_m
-        length = d["L"]
-        return np.array(
+def force_matrix(d: Geometry) -> np.ndarray:
+    """M of eq. 2.9, shape (3, 6): cells' forces to the force on the vehicle, but for the |F| of cells 1, 3, 5."""
+    length = d["L"]
+    return np.array(
+        [
             [
-                [
-                    -d["D_135z"] / (_C60 * length),
-                    (d["D_246z"] / _C30 - d["D_2x"]) / (_C45 * length),
-                    d["D_135z"] / length,
-                    d["D_4x"] / (_C45 * length),
-                    -d["D_135z"] / (_C60 * length),
-                    -(d["D_246z"] / _C30 - d["D_6x"]) / (_C45 * length),
-                ],
-                [
-                    d["D_135z"] / (_C30 * length),
-                    (d["D_246z"] / _C60 + d["D_2y"]) / (_C45 * length),
-                    0.0,
-                    (d["D_4y"] - d["D_246z"]) / (_C45 * length),
-                    -d["D_135z"] / (_C30 * length),
-                    (d["D_246z"] / _C60 - d["D_6y"]) / (_C45 * length),
-                ],
-                [0.0, -1 / _C45, 0.0, -1 / _C45, 0.0, -1 / _C45],
-            ]
-        )
+                -d["D_135z"] / (_C60 * length),
+                (d["D_246z"] / _C30 - d["D_2x"]) / (_C45 * length),
+                d["D_135z"] / length,
+                d["D_4x"] / (_C45 * length),
+                -d["D_135z"] / (_C60 * length),
+                -(d["D_246z"] / _C30 - d["D_6x"]) / (_C45 * length),
+            ],
+            [
+                d["D_135z"] / (_C30 * length),
+                (d["D_246z"] / _C60 + d["D_2y"]) / (_C45 * length),
+                0.0,
+                (d["D_4y"] - d["D_246z"]) / (_C45 * length),
+                -d["D_135z"] / (_C30 * length),
+                (d["D_246z"] / _C60 - d["D_6y"]) / (_C45 * length),
+            ],
+            [0.0, -1 / _C45, 0.0, -1 / _C45, 0.0, -1 / _C45],
+        ]
+    )
 
 
-def read_geometry(path: str | Path) -> Geometry:
+def read_geometry(path: str | Path) -> dict[str, float]:
     """Table 2.3 from a CSV with the columns `distance` and `value_mm`. Raises InputError where one is missing."""
     table = pd.read_csv(path)
     if not {"distance", "value_mm"} <= set(table.columns):
@@ -105,7 +92,7 @@ def read_geometry(path: str | Path) -> Geometry:
     missing = [name for name in _DISTANCES if name not in values]
     if missing:
         raise InputError(f"{path}: the distance {missing[0]} is missing")
-    return Geometry({name: float(values[name]) for name in _DISTANCES})
+    return {name: float(values[name]) for name in _DISTANCES}
 
 
 def input_components(cells_n: np.ndarray) -> dict[str, np.ndarray]:
@@ -131,9 +118,9 @@ def input_components(cells_n: np.ndarray) -> dict[str, np.ndarray]:
     }
 
 
-def moments(cells_n: np.ndarray, geometry: Geometry) -> np.ndarray:
+def moments(cells_n: np.ndarray, d: Geometry) -> np.ndarray:
     """Eqs 2.3 to 2.5: sums of moments about the axes of {T}, N m, shape (n, 3), of cells' forces (n, 6), N."""
-    f, d = input_components(cells_n), geometry.distance_m
+    f = input_components(cells_n)
     about_x = (
         (f["f_1y"] - f["f_5y"]) * d["D_135z"]
         + (f["f_2y"] - f["f_4y"] + f["f_6y"]) * d["D_246z"]
@@ -184,14 +171,8 @@ def cell_forces(volts: np.ndarray, coefficients_gf: np.ndarray) -> np.ndarray:
 def cell_variance(volts: np.ndarray, lines: list[LineFit], reading_variance_v2: np.ndarray) -> np.ndarray:
     """Variance of the cells' forces, N², shape (n, 6): the lines' covariances and the readings' noise.
 
-    Parameters
-    ----------
-    volts
-        Tared voltages, V, shape (n, 6).
-    lines
-        Calibration of each cell, gf against 1e-5 V.
-    reading_variance_v2
-        Variance of each voltage, V², shape (n, 6) or (6,).
+    `volts`: tared voltages, V, shape (n, 6). `lines`: calibration of each cell, gf against 1e-5 V.
+    `reading_variance_v2`: variance of each voltage, V², shape (n, 6) or (6,).
     """
     x = np.atleast_2d(np.asarray(volts, float)) * 1e5
     noise = np.broadcast_to(np.asarray(reading_variance_v2, float), x.shape) * 1e10
@@ -205,7 +186,7 @@ def cell_variance(volts: np.ndarray, lines: list[LineFit], reading_variance_v2: 
 def force_covariance(cells_n: np.ndarray, variance_n2: np.ndarray, geometry: Geometry) -> np.ndarray:
     """Covariance of the reconstructed force, N², shape (n, 3, 3), to first order (cells are independent)."""
     cells_n = np.atleast_2d(np.asarray(cells_n, float))
-    slope = np.repeat(geometry.matrix[None], len(cells_n), axis=0)
+    slope = np.repeat(force_matrix(geometry)[None], len(cells_n), axis=0)
     slope[:, 2, PULLED] -= np.sign(cells_n[:, PULLED])
     return np.einsum("nij,nj,nkj->nik", slope, np.atleast_2d(variance_n2), slope)
 
@@ -239,16 +220,16 @@ def readings(prepared: pd.DataFrame, sessions: pd.DataFrame) -> pd.DataFrame:
                 "mean_from_s": time_s[0],
                 "noise_10uv": volts.std(ddof=1) * 1e5,
                 "samples": len(kept),
-                "slope_v_s": _slope(time_s, volts),
+                "slope_v_s": float(_slope(time_s, volts)),
             }
         )
     return pd.DataFrame(rows)
 
 
-def _slope(time_s: np.ndarray, values: np.ndarray) -> float:
-    """Least-squares slope of values in time."""
+def _slope(time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Least-squares slope in time (n,) of values (n,) or of each column of values (n, m)."""
     centred = time_s - time_s.mean()
-    return float(centred @ values / (centred @ centred))
+    return centred @ values / (centred @ centred)
 
 
 def calibrate_cell(table: pd.DataFrame, idle_slopes_v_s: np.ndarray) -> dict:
@@ -265,7 +246,9 @@ def calibrate_cell(table: pd.DataFrame, idle_slopes_v_s: np.ndarray) -> dict:
     repeats = by_weight.count() - 1
     spread = float(np.sqrt((by_weight.var(ddof=1).fillna(0) * repeats).sum() / max(repeats.sum(), 1)))
     gf_per_volt = line.a1 * 1e5
-    drift, drift_interval = _mean_interval(idle_slopes_v_s)
+    drift, drift_interval = float("nan"), (float("nan"), float("nan"))
+    if len(idle_slopes_v_s) > 1:
+        drift, drift_interval = mean_interval(np.asarray(idle_slopes_v_s, float))
     growth = table["slope_v_s"].to_numpy() - drift
     volts = reading * 1e-5
     share = float(growth @ volts / (volts @ volts))
@@ -294,15 +277,6 @@ def calibrate_cell(table: pd.DataFrame, idle_slopes_v_s: np.ndarray) -> dict:
     }
 
 
-def _mean_interval(values: np.ndarray) -> tuple[float, tuple[float, float]]:
-    """Mean and its 95 % interval by Student's t."""
-    values = np.asarray(values, float)
-    if len(values) < 2:
-        return float("nan"), (float("nan"), float("nan"))
-    half = student_quantile(len(values) - 1, 0.975) * values.std(ddof=1) / np.sqrt(len(values))
-    return float(values.mean()), (float(values.mean() - half), float(values.mean() + half))
-
-
 def idle_slopes(samples: pd.DataFrame, sessions: pd.DataFrame) -> dict[int, np.ndarray]:
     """Slopes in time (V/s) of each cell in the recordings in which another cell was under load."""
     out: dict[int, list[float]] = {i: [] for i in range(1, 7)}
@@ -310,9 +284,7 @@ def idle_slopes(samples: pd.DataFrame, sessions: pd.DataFrame) -> dict[int, np.n
     for session in sessions.itertuples():
         table = parts[session.id]
         table = table[table["quality"] == 0]
-        time_s, volts = table["time_s"].to_numpy(), table[list(CELLS)].to_numpy()
-        centred = time_s - time_s.mean()
-        slopes = centred @ volts / (centred @ centred)
+        slopes = _slope(table["time_s"].to_numpy(), table[list(CELLS)].to_numpy())
         for i in out:
             if i != int(session.cell):
                 out[i].append(float(slopes[i - 1]))
@@ -392,13 +364,10 @@ def prepare(samples: pd.DataFrame, sessions: pd.DataFrame, settings: Filter) -> 
     out = []
     for _, session in sessions.iterrows():
         table = parts[session["id"]]
+        channels = [name for name in (*CELLS, *FORCES) if name in table]
         if session["kind"] == "calibration":
-            name = f"cell_{int(session['cell'])}_v"
-            table = table.rename(columns={name: "cell_v"})
-            out.append(_prepare_recording(session, table, ["cell_v"], settings))
-        else:
-            channels = [name for name in (*CELLS, *FORCES) if name in table]
-            out.append(_prepare_recording(session, table, channels, settings))
+            table, channels = table.rename(columns={f"cell_{int(session['cell'])}_v": "cell_v"}), ["cell_v"]
+        out.append(_prepare_recording(session, table, channels, settings))
     return pd.concat(out, ignore_index=True)
 
 
@@ -438,14 +407,8 @@ def bench_set(
 ) -> RecordingSet:
     """Static tests of one platform as a contract set.
 
-    Parameters
-    ----------
-    prepared, sessions
-        Of that platform, from `rotorid.identify.bench.reconstruct` and `rotorid.io.logs`.
-    force_of
-        Force (n, 3), N, of a prepared recording, see `bench_force`.
-    noise_n
-        One-sigma noise of a sample as it is believed, N.
+    `prepared`, `sessions`: of that platform, from `rotorid.identify.bench` and `rotorid.io.logs`. `force_of`: force
+    (n, 3), N, of a prepared recording, see `bench_force`. `noise_n`: one-sigma noise of a sample as it is believed, N.
     """
     parts = by_recording(prepared)
     started = pd.to_datetime(sessions["started"])

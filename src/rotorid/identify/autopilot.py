@@ -1,36 +1,44 @@
-"""The thrust curve of the motors, their lag and the hover, from signals of the motors and the accelerometer.
+"""What a flight says of an autopilot's parameters: each with its 95 % interval, or "not determined by this flight".
 
-The accelerometer reads, upward, the thrust over the mass, whatever the attitude and the wind. Each motor's signal makes
-a steady thrust by the autopilot's own curve; the rotor's speed, its square root, follows with a lag of first order.
-What else moves the thrust is estimated jointly: the voltage of the battery (or, where it is not recorded, a drift over
-the run), the axial speed, the lift of forward flight, and the zero of the accelerometer, believed to 0.1 m/s².
+A motor's signal u is what it is sent as a share of its range, 0 to 1 (the contract's `throttle_i`). By the autopilot's
+own thrust curve, as published, it makes a steady share of the thrust at u = 1 (grams on the Crazyflie); the rotor's
+speed, the root of the thrust, follows with a lag of first order. The accelerometer reads, upward, the thrust over the
+mass, whatever the attitude and the wind. What else moves the thrust is estimated jointly: the voltage of the battery
+(or, where it is not recorded, a drift over the run), the axial speed, the lift of forward flight, and the zero of the
+accelerometer, believed to 0.1 m/s².
 
-How each autopilot says what thrust a motor's signal makes: its thrust curve, as published.
-
-A motor's signal u is what the motor is sent, as a share of its range, 0 to 1 (the contract's `throttle_i`). A map gives
-the thrust that u makes in the steady state, as a share of the thrust at u = 1; the Crazyflie's gives grams.
-
-Drag by PX4's own law, jointly with a constant wind: EKF2_BCOEF_X, EKF2_BCOEF_Y, EKF2_MCOEF.
-
-PX4's estimator of wind takes the specific force across the rotors' axis as
+Drag is by PX4's own law (EKF2_BCOEF_X, EKF2_BCOEF_Y, EKF2_MCOEF), the specific force across the rotors' axis
 
     a = −½ ρ b |v| v − M √(ρ/1.225) v,   b = |(v_x/B_x, v_y/B_y)| / |(v_x, v_y)|
 
 with v the velocity through the air in body axes. Source: PX4-Autopilot,
 src/modules/ekf2/EKF/aid_sources/drag/drag_fusion.cpp. Its own script for the numbers (mc_wind_estimator_tuning.py)
-takes the air for still; here each run has a wind of its own.
+takes the air for still; here each run has a constant wind of its own.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 
 import numpy as np
 from scipy.signal import lfilter
 
-from rotorid.identify.autopilot.correlated import CorrelatedFit, EstimatedNumber, Stretch, fit
+from rotorid.errors import InputError
+from rotorid.identify.correlated import EstimatedNumber, Stretch, fit, stretches_of
+from rotorid.recordings import RecordingSet
 
+_WIDEST_SHARE = 0.5
+"""Half width over the value beyond which a time constant or a drag is not determined."""
+_WIDEST_HOVER = 0.1
+_WIDEST_WIND_M_S = 1.0
+_AT_A_BOUND = 0.01
+"""Share of the range searched within which a value is at its end."""
+_LARGEST_BCOEF = 200.0
+"""kg/m²: PX4 takes no more (EKF2_BCOEF_X, its range)."""
+_HOVERS = {"px4": ("MPC_THR_HOVER", (0.1, 0.8)), "ardupilot": ("MOT_THST_HOVER", (0.125, 0.6875))}
+"""By autopilot the parameter for the share of thrust that hovers, and what it may be."""
 _MOST_SHARE = 1.5
 """Shares of thrust up to which Betaflight's curve is inverted: a signal above its range is no use."""
 _CURVE_POINTS = 3001
@@ -43,7 +51,7 @@ _STANDARD_GRAVITY = 9.80665
 """m/s²: grams of thrust are by it."""
 _ACCELEROMETER_ZERO_M_S2 = 0.1
 """Standard deviation of the error of an accelerometer's zero that is believed."""
-TIME_CONSTANTS_S = (0.002, 0.4)
+_TIME_CONSTANTS_S = (0.002, 0.4)
 _RATE_HZ = 100.0
 """Residuals are averaged down to about so many a second: there is nothing above that the motors could do."""
 _VOLTAGE_MOVES = 0.01
@@ -81,7 +89,7 @@ class _Shape:
 
 
 @dataclass(frozen=True)
-class ThrustMap:
+class _ThrustMap:
     """A thrust curve with its free numbers.
 
     `thrust` takes signals (n, k), battery voltage (n, 1) or None, and the numbers of `shapes`; it returns shares of the
@@ -124,14 +132,14 @@ def _crazyflie(signal: np.ndarray, voltage: np.ndarray | None, shape: np.ndarray
 
 
 MAPS = {
-    "px4": ThrustMap(
+    "px4": _ThrustMap(
         "PX4",
         (_Shape("THR_MDL_FAC", 0.5, -0.5, 1.6, (0.0, 1.0), 0.25),),
         _px4,
         "T/T_max = f u² + (1 − f) u, f = THR_MDL_FAC",
         "PX4-Autopilot, src/lib/mixer_module/motor_params.c (THR_MDL_FAC) and functions/FunctionMotors.hpp",
     ),
-    "ardupilot": ThrustMap(
+    "ardupilot": _ThrustMap(
         "ArduPilot",
         (
             _Shape("MOT_THST_EXPO", 0.5, -0.9, 1.8, (-1.0, 1.0), 0.25),
@@ -142,14 +150,14 @@ MAPS = {
         "ardupilot, libraries/AP_Motors/AP_Motors_Thrust_Linearization.cpp, with MOT_SPIN_MAX at its default",
         full_signal=_SPIN_MAX,
     ),
-    "betaflight": ThrustMap(
+    "betaflight": _ThrustMap(
         "Betaflight",
         (_Shape("thrust_linear", 0.3, -0.6, 2.5, (0.0, 1.5), 0.25, 0, 100.0),),
         _betaflight,
         "u = x (1 + k (1 − x)²), x = T/T_max, k = thrust_linear/100",
         "Betaflight 4.5, src/main/flight/pid.c, pidApplyThrustLinearization, and pid_init.c",
     ),
-    "crazyflie": ThrustMap(
+    "crazyflie": _ThrustMap(
         "Crazyflie",
         (
             _Shape("volts_per_gram", 0.088, 0.01, 0.5, (0.0, np.inf), 0.02, 5),
@@ -164,28 +172,13 @@ MAPS = {
 """By the name that `--to` takes."""
 
 
-@dataclass(frozen=True)
-class ThrustFit:
-    """The estimates of a thrust curve."""
+def _fit_thrust(stretches: Sequence[Stretch], chosen: _ThrustMap, mass_kg: float, gravity_m_s2: float) -> tuple | None:
+    """The thrust curve; None where no stretch has signals of the motors (or, for grams, the battery's voltage).
 
-    shapes: tuple[EstimatedNumber, ...]
-    """Of the map's numbers, in its order."""
-    time_constant_s: EstimatedNumber
-    hover_signal: EstimatedNumber
-    """Signal of the motors at which they make the weight, 0 to 1."""
-    hover_share: EstimatedNumber
-    """Weight over the thrust at full signal."""
-    throttle_range: tuple[float, float]
-    """1 % and 99 % quantile of the signals flown."""
-
-
-def fit_thrust(
-    stretches: Sequence[Stretch], chosen: ThrustMap, mass_kg: float, gravity_m_s2: float = 9.81
-) -> ThrustFit | None:
-    """The thrust curve; None where no stretch has signals of the motors (or, for grams, the battery's voltage)."""
-    used = [s for s in stretches if s.throttle is not None]
-    if chosen.in_grams:
-        used = [s for s in used if s.voltage is not None]
+    Estimates of the map's numbers in its order, of the time constant, s, of the motors' signal that makes the weight, 0
+    to 1, and of the weight over the thrust at full signal; 1 % and 99 % quantile of the signals flown.
+    """
+    used = [s for s in stretches if s.throttle is not None and not (chosen.in_grams and s.voltage is None)]
     if not used:
         return None
     layout = _layout(used, chosen)
@@ -206,23 +199,19 @@ def fit_thrust(
         return float(share[0, 0]) * _per_share(values, chosen, mass_kg, used[0].throttle.shape[1])
 
     signals = np.concatenate([s.throttle.ravel() for s in used])
-    return ThrustFit(
-        tuple(found.of(lambda v, k=k: float(v[k])) for k in range(*layout.shapes.indices(len(start)))),
-        _exponential(found, layout.lag),
+    # The exponential of the lag's logarithm: its interval stays positive.
+    log = found.of(lambda v: float(v[layout.lag]))
+    low, high = np.exp(np.clip(log.interval_95, -50, 50))
+    return (
+        [found.of(lambda v, k=k: float(v[k])) for k in range(*layout.shapes.indices(len(start)))],
+        EstimatedNumber(float(np.exp(log.value)), (float(low), float(high))),
         found.of(lambda v: _solve(lambda u: lifted(v, u), gravity_m_s2)),
         found.of(lambda v: gravity_m_s2 / lifted(v, chosen.full_signal)),
         (float(np.quantile(signals, 0.01)), float(np.quantile(signals, 0.99))),
     )
 
 
-def _exponential(found: CorrelatedFit, index: int) -> EstimatedNumber:
-    """exp of a value, with an interval that stays positive."""
-    log = found.of(lambda v: float(v[index]))
-    low, high = np.exp(np.clip(log.interval_95, -50, 50))
-    return EstimatedNumber(float(np.exp(log.value)), (float(low), float(high)))
-
-
-def _per_share(values: np.ndarray, chosen: ThrustMap, mass_kg: float, rotors: int) -> float:
+def _per_share(values: np.ndarray, chosen: _ThrustMap, mass_kg: float, rotors: int) -> float:
     """m/s² that all rotors make by a share (or a gram a rotor)."""
     return rotors * 1e-3 * _STANDARD_GRAVITY / mass_kg if chosen.in_grams else float(np.exp(values[0]))
 
@@ -254,7 +243,7 @@ class _Layout:
     full_voltage: float
 
 
-def _layout(used: Sequence[Stretch], chosen: ThrustMap) -> _Layout:
+def _layout(used: Sequence[Stretch], chosen: _ThrustMap) -> _Layout:
     rows: list[tuple[float, float, float, float, float]] = []
 
     def add(start: float, low: float, high: float, scale: float, prior: float = np.inf) -> int:
@@ -267,7 +256,7 @@ def _layout(used: Sequence[Stretch], chosen: ThrustMap) -> _Layout:
     for shape in chosen.shapes:
         add(shape.start, shape.low, shape.high, (shape.high - shape.low) / 10, shape.believed)
     shapes = slice(first, len(rows))
-    lag = add(np.log(0.04), *np.log(TIME_CONSTANTS_S), 0.3)
+    lag = add(np.log(0.04), *np.log(_TIME_CONSTANTS_S), 0.3)
     zero = add(0.0, -2.0, 2.0, _ACCELEROMETER_ZERO_M_S2, _ACCELEROMETER_ZERO_M_S2)
     voltage, drift, mean = None, {}, 1.0
     if not chosen.in_grams:
@@ -286,7 +275,7 @@ def _layout(used: Sequence[Stretch], chosen: ThrustMap) -> _Layout:
     return _Layout(shapes, lag, zero, voltage, drift, motion, *columns, mean)
 
 
-def _residuals(used: Sequence[Stretch], chosen: ThrustMap, layout: _Layout, mass_kg: float):
+def _residuals(used: Sequence[Stretch], chosen: _ThrustMap, layout: _Layout, mass_kg: float):
     """The function from values to the residuals of each stretch, m/s², averaged down to `_RATE_HZ`."""
     prepared = []
     for s in used:
@@ -331,21 +320,6 @@ def _averaged(series: np.ndarray, every: int) -> np.ndarray:
     return series[: count * every].reshape(count, every).mean(axis=1)
 
 
-@dataclass(frozen=True)
-class DragFit:
-    """Drag by PX4's law."""
-
-    bluff_x: EstimatedNumber
-    """1/EKF2_BCOEF_X, m²/kg."""
-    bluff_y: EstimatedNumber
-    momentum: EstimatedNumber
-    """EKF2_MCOEF, 1/s."""
-    wind: dict[str, tuple[EstimatedNumber, EstimatedNumber]]
-    """By run the wind towards north and east, m/s."""
-    fastest_m_s: float
-    """99 % quantile of the horizontal speed."""
-
-
 def specific_drag(
     through_air: np.ndarray, bluff_x: float, bluff_y: float, momentum: float, density_kg_m3: float = _AIR_DENSITY_KG_M3
 ) -> np.ndarray:
@@ -357,8 +331,12 @@ def specific_drag(
     return -(quadratic + momentum * np.sqrt(density_kg_m3 / _AIR_DENSITY_KG_M3))[:, None] * across
 
 
-def fit_drag(stretches: Sequence[Stretch], density_kg_m3: float = _AIR_DENSITY_KG_M3) -> DragFit | None:
-    """Drag and wind; None where no stretch has attitude and velocity."""
+def _fit_drag(stretches: Sequence[Stretch]) -> tuple | None:
+    """Drag by PX4's law, and wind; None where no stretch has attitude and velocity.
+
+    Estimates of 1/EKF2_BCOEF_X and 1/EKF2_BCOEF_Y, m²/kg, and EKF2_MCOEF, 1/s; by run those of the wind towards north
+    and east, m/s; 99 % quantile of the horizontal speed, m/s.
+    """
     used = [s for s in stretches if s.attitude is not None and s.velocity is not None]
     if not used:
         return None
@@ -377,7 +355,7 @@ def fit_drag(stretches: Sequence[Stretch], density_kg_m3: float = _AIR_DENSITY_K
             at = 5 + 2 * runs.index(s.run)
             moving = s.velocity - np.array([*values[at : at + 2], 0.0])
             through = np.einsum("nji,nj->ni", s.attitude, moving)
-            force = specific_drag(through, *values[:3], density_kg_m3) + values[3:5]
+            force = specific_drag(through, *values[:3]) + values[3:5]
             every = max(int(round(1 / (_DRAG_RATE_HZ * s.dt_s))), 1)
             out += [_averaged(s.specific_force[:, j] - force[:, j], every) for j in range(2)]
         return out
@@ -386,4 +364,156 @@ def fit_drag(stretches: Sequence[Stretch], density_kg_m3: float = _AIR_DENSITY_K
     of = [found.of(lambda v, k=k: float(v[k])) for k in range(count)]
     across = np.concatenate([np.linalg.norm(s.velocity[:, :2], axis=1) for s in used])
     wind = {run: (of[5 + 2 * k], of[6 + 2 * k]) for k, run in enumerate(runs)}
-    return DragFit(of[0], of[1], of[2], wind, float(np.quantile(across, 0.99)))
+    return of[:3], wind, float(np.quantile(across, 0.99))
+
+
+@dataclass(frozen=True)
+class AutopilotParameter:
+    """One number for an autopilot."""
+
+    name: str
+    value: float
+    interval_95: tuple[float, float]
+    """Infinite where nothing bounds it."""
+    unit: str
+    determined: bool
+    sentence: str
+    """What it is, and why it is not determined where it is not."""
+    to_set: float | None = None
+    """The number to set; None for what the autopilot has no parameter for, or the flight does not determine."""
+    decimals: int = 3
+
+
+def parameters_of(recordings: RecordingSet, to: str) -> tuple[AutopilotParameter, ...]:
+    """The parameters of an autopilot (`px4`, `ardupilot`, `betaflight`, `crazyflie`) by a set of flights.
+
+    InputError names the autopilots there are, or what the recordings lack for all of it.
+    """
+    if to not in MAPS:
+        near = get_close_matches(to, list(MAPS), 1)
+        raise InputError(
+            f"no autopilot is called {to!r}"
+            + (f"; did you mean {near[0]}?" if near else f", expected {', '.join(MAPS)}")
+        )
+    stretches = stretches_of(recordings)
+    chosen, vehicle = MAPS[to], recordings.vehicle
+    thrust = _fit_thrust(stretches, chosen, vehicle.mass_kg, vehicle.gravity_m_s2)
+    out = _missing(chosen, to) if thrust is None else _of_thrust(*thrust, chosen, to)
+    if to == "px4":
+        drag = _fit_drag(stretches)
+        out += _no_drag() if drag is None else _of_drag(*drag)
+    return tuple(out)
+
+
+_NOT = "not determined by this flight"
+
+
+def _nothing(name: str, unit: str, why: str) -> AutopilotParameter:
+    return AutopilotParameter(name, np.nan, (-np.inf, np.inf), unit, False, f"{_NOT}: {why}")
+
+
+def _stated(name, number: EstimatedNumber, unit, fine: bool, sentence, to_set=None, decimals=3) -> AutopilotParameter:
+    return AutopilotParameter(
+        name, number.value, number.interval_95, unit, fine, sentence, to_set if fine else None, decimals
+    )
+
+
+def _missing(chosen: _ThrustMap, to: str) -> list[AutopilotParameter]:
+    why = "it holds no signals of the motors (throttle_1 …)"
+    if chosen.in_grams:
+        why += " together with the battery's voltage"
+    names = [s.name for s in chosen.shapes] + ([_HOVERS[to][0]] if to in _HOVERS else [])
+    return [_nothing(name, "", why) for name in (*names, "hover_signal", "motor_time_constant_s")]
+
+
+def _no_drag() -> list[AutopilotParameter]:
+    units = {"EKF2_BCOEF_X": "kg/m²", "EKF2_BCOEF_Y": "kg/m²", "EKF2_MCOEF": "1/s"}
+    return [_nothing(name, unit, "drag needs attitude and velocity") for name, unit in units.items()]
+
+
+def _of_thrust(shapes, lag, hover, share, throttle_range, chosen: _ThrustMap, to: str) -> list[AutopilotParameter]:
+    flown = "signals from {:.2f} to {:.2f} were flown".format(*throttle_range)
+    out = []
+    for shape, estimate in zip(chosen.shapes, shapes, strict=True):
+        unit = {"volts_per_gram": "V/g", "volts_per_gram_squared": "V/g²"}.get(shape.name, "")
+        outside = estimate.interval_95[1] < shape.allowed[0] or estimate.interval_95[0] > shape.allowed[1]
+        margin = _AT_A_BOUND * (shape.high - shape.low)
+        at_bound = not shape.low + margin < estimate.value < shape.high - margin
+        wide = at_bound or not estimate.half_width <= shape.widest
+        sentence = f"{chosen.equation}; {flown}"
+        if at_bound:
+            sentence = f"{_NOT}: {flown}, and no curve of this form fits them"
+        elif wide:
+            sentence = f"{_NOT}: {flown}, which is too little; fly climbs and descents"
+        elif outside:
+            ends = f"{shape.factor * shape.allowed[0]:g} to {shape.factor * shape.allowed[1]:g}"
+            sentence += f"; {chosen.autopilot} takes {ends}: the nearest is to be set"
+        low, high = (shape.factor * end for end in estimate.interval_95)
+        number = EstimatedNumber(shape.factor * estimate.value, (low, high))
+        settable = shape.factor * float(np.clip(estimate.value, *shape.allowed))
+        out.append(_stated(shape.name, number, unit, not wide, sentence, settable, shape.decimals))
+    curve = all(p.determined for p in out)
+    if to in _HOVERS:
+        name, allowed = _HOVERS[to]
+        fine = share.half_width <= _WIDEST_HOVER * share.value and curve
+        sentence = "weight over full thrust; it belongs to the thrust curve above"
+        if not fine:
+            sentence = f"{_NOT}: full thrust follows from the curve, which it does not determine"
+        out.append(_stated(name, share, "", fine, sentence, float(np.clip(share.value, *allowed))))
+    fine = hover.half_width <= _WIDEST_HOVER * hover.value
+    out.append(_stated("hover_signal", hover, "", fine, "signal of the motors that makes the weight" if fine else _NOT))
+    inside = 1.1 * _TIME_CONSTANTS_S[0] < lag.value < _TIME_CONSTANTS_S[1] / 1.1
+    fine = lag.half_width <= _WIDEST_SHARE * lag.value and inside
+    sentence = "lag of the rotors' speed behind the signal, with that of the accelerometer's filter"
+    if not fine:
+        sentence = f"{_NOT}: the thrust changed too slowly, or the log is too coarse, to see it"
+    return [*out, _stated("motor_time_constant_s", lag, "s", fine, sentence, decimals=4)]
+
+
+def _of_drag(drag, wind, fastest_m_s: float) -> list[AutopilotParameter]:
+    flown = f"speeds up to {fastest_m_s:.1f} m/s were flown"
+    out = []
+    for name, estimate in zip(("EKF2_BCOEF_X", "EKF2_BCOEF_Y"), drag, strict=False):
+        low, high = estimate.interval_95
+        ends = (1 / high if high > 0 else np.inf, 1 / low if low > 0 else np.inf)
+        value = 1 / estimate.value if estimate.value > 0 else np.inf
+        fine = low > 0 and estimate.half_width <= _WIDEST_SHARE * estimate.value
+        sentence = f"mass over drag area, jointly with the wind; {flown}"
+        if not fine:
+            at_least = f"; at least {ends[0]:.3g} kg/m²" if np.isfinite(ends[0]) and ends[0] > 0 else ""
+            sentence = f"{_NOT}: {flown}; fly faster, there and back{at_least}"
+        number = EstimatedNumber(value, ends)
+        out.append(_stated(name, number, "kg/m²", fine, sentence, min(value, _LARGEST_BCOEF), 1))
+    momentum = drag[2]
+    fine = momentum.half_width <= _WIDEST_SHARE * abs(momentum.value)
+    sentence = f"{'drag of the rotors, jointly with the wind' if fine else _NOT}; {flown}"
+    out.append(_stated("EKF2_MCOEF", momentum, "1/s", fine, sentence, max(momentum.value, 0.0)))
+    for run, parts in wind.items():
+        for word, part in zip(("north", "east"), parts, strict=True):
+            fine = part.half_width <= _WIDEST_WIND_M_S
+            sentence = "towards which the air moved, on the mean of the run" if fine else _NOT
+            out.append(_stated(f"wind_{word}_m_s ({run})", part, "m/s", fine, sentence, decimals=2))
+    return out
+
+
+def as_text(found: Sequence[AutopilotParameter], to: str) -> str:
+    """A file that the autopilot's tools load: what is determined as settings, the rest as comments.
+
+    PX4: QGroundControl's parameter file; ArduPilot: `NAME,VALUE`; Betaflight: CLI; Crazyflie: the constants of
+    `motors.c` as comments, because its firmware has no parameter for them.
+    """
+    lines = [f"# {MAPS[to].autopilot}: {MAPS[to].equation}", f"# Source: {MAPS[to].source}"]
+    for p in found:
+        low, high = p.interval_95
+        shown = f"{p.value:.{p.decimals}f} [{low:.{p.decimals}f}, {high:.{p.decimals}f}] {p.unit}".rstrip()
+        lines.append(f"# {p.name} = {shown}: {p.sentence}")
+        if p.to_set is None:
+            continue
+        value = f"{p.to_set:.{p.decimals}f}"
+        lines += {
+            "px4": [f"1\t1\t{p.name}\t{value}\t9"],
+            "ardupilot": [f"{p.name},{value}"],
+            "betaflight": [f"set {p.name} = {value}"],
+            "crazyflie": [],
+        }[to]
+    return "\n".join([*lines, *(["save"] if to == "betaflight" else [])]) + "\n"

@@ -1,11 +1,9 @@
-"""Least squares with intervals that hold where residuals are correlated in time.
+"""Least squares on stretches of a flight (an even grid), with intervals that hold where residuals are correlated.
 
 The residuals of a model of flight are coloured: turbulence, what the model leaves out. They are whitened by an
 autoregressive model of their own (Cochrane and Orcutt's iteration), and the covariance is the larger of the two that
 then stand: the classical one, and the sandwich with scores summed over blocks of time, which holds for what colour is
 left. Source: Hamilton, Time Series Analysis, ch. 8 and 10; Newey and West (1987) for the sandwich.
-
-Stretches of a flight on an even grid: signals of the motors, specific force, motion, voltage.
 """
 
 from __future__ import annotations
@@ -51,7 +49,7 @@ class EstimatedNumber:
 
 
 @dataclass(frozen=True)
-class CorrelatedFit:
+class _CorrelatedFit:
     """Values with what their errors are known by."""
 
     values: np.ndarray
@@ -87,7 +85,7 @@ def fit(
     bounds: tuple[np.ndarray, np.ndarray],
     scale: np.ndarray,
     prior: np.ndarray,
-) -> CorrelatedFit:
+) -> _CorrelatedFit:
     """Values (p,) that make the residuals small.
 
     `bounds`, `scale` and `prior` are by value: where it may lie, its usual size, and the standard deviation of what is
@@ -113,7 +111,7 @@ def fit(
         values = solved.x
     count = len(solved.fun) - int(believed.sum())
     white, jacobian = solved.fun[:count], solved.jac[:count]
-    return CorrelatedFit(values, *_covariances(jacobian, white, prior))
+    return _CorrelatedFit(values, *_covariances(jacobian, white, prior))
 
 
 def _covariances(

@@ -1,19 +1,15 @@
-"""Static tests: what the bench gives for a known load, per platform and axis (thesis 2.8.1, figs 2.42 and 2.45).
+"""Tests of the bench: static ones of known load (thesis 2.8.1, figs 2.42 and 2.45), flights on it (2.8.2, fig. 2.47).
 
-Each recording becomes one point: the mean force while the load was read, by the thesis's equations and, on the
+Each static recording becomes one point: the mean force while the load was read, by the thesis's equations and, on the
 aluminium bench, by the calibration matrix, each with the uncertainty that the calibration and the noise leave.
-
-A full calibration matrix from loads of known direction, next to the thesis's equations.
 
 The thesis reconstructs one axis at a time (eqs 2.6 to 2.8) and says itself that six readings do not determine six
 unknowns. Three of these, the forces, they do determine once it is known how the cells answer to each: voltages of
 loads of known direction give the answer R (6 × 3, V/N), and its weighted pseudo-inverse A = (Rᵀ W R)⁻¹ Rᵀ W gives
 the force of any reading, combined loads included, for as long as the bench answers linearly.
 
-Dynamic tests: a small quadrotor flown on three platforms, three sets (thesis 2.8.2, fig. 2.47).
-
-The pilot flies the same plan on each platform with timing of his own, so the platforms are compared by what
-they agree in whatever the timing: levels held, the largest force, noise at rest, the return to zero.
+In flight the pilot follows the same plan on each of three platforms with timing of his own, so they are compared by
+what they agree in whatever the timing: levels held, the largest force, noise at rest, the return to zero.
 """
 
 from __future__ import annotations
@@ -25,8 +21,7 @@ import pandas as pd
 from scipy.special import stdtrit as student_quantile
 
 from rotorid.errors import InputError
-from rotorid.identify.bench.loadcell import LineFit, fit_line
-from rotorid.identify.bench.reconstruct import (
+from rotorid.identify.bench import (
     DIRECTION,
     GF_N,
     PULLED,
@@ -36,6 +31,7 @@ from rotorid.identify.bench.reconstruct import (
     force_covariance,
     forces,
 )
+from rotorid.identify.loadcell import LineFit, fit_line, mean_interval
 from rotorid.io.logs import by_recording
 from rotorid.recordings.signal import mean_and_error
 
@@ -148,21 +144,19 @@ def by_load(table: pd.DataFrame) -> pd.DataFrame:
     """Mean error of each platform, axis and load with its interval, spread of the repeats, propagated uncertainty."""
     rows = []
     for (platform, axis, method, load), part in table.groupby(["platform", "axis", "method", "load_n"]):
-        n, spread = len(part), part["error_n"].std(ddof=1)
-        half = student_quantile(n - 1, 0.975) * spread / np.sqrt(n)
-        mean = part["error_n"].mean()
+        mean, (low, high) = mean_interval(part["error_n"])
         rows.append(
             {
                 "platform": platform,
                 "axis": axis,
                 "method": method,
                 "load_n": load,
-                "repeats": n,
+                "repeats": len(part),
                 "error_n": mean,
-                "low_95_n": mean - half,
-                "high_95_n": mean + half,
+                "low_95_n": low,
+                "high_95_n": high,
                 "error_percent": 100 * mean / load,
-                "repeatability_n": spread,
+                "repeatability_n": part["error_n"].std(ddof=1),
                 "across_n": part["across_n"].mean(),
                 "uncertainty_n": part["uncertainty_n"].mean(),
             }
@@ -274,17 +268,8 @@ class Calibration:
 def calibrate(volts: np.ndarray, force_n: np.ndarray) -> Calibration:
     """The bench's answer to loads of known direction.
 
-    Parameters
-    ----------
-    volts
-        Mean tared voltages of the cells, V, shape (n, 6).
-    force_n
-        Known loads, N, shape (n, 3), body axes; between them they must cover all three.
-
-    Raises
-    ------
-    InputError
-        Fewer than five loads, or none along some direction.
+    `volts`: mean tared voltages of the cells, V, shape (n, 6). `force_n`: known loads, N, shape (n, 3), body axes;
+    between them they must cover all three. Raises InputError: fewer than five loads, or none along some direction.
     """
     volts, force_n = np.asarray(volts, float), np.asarray(force_n, float)
     if len(volts) < 5 or np.linalg.matrix_rank(force_n) < 3:
@@ -393,18 +378,8 @@ def agreement(flown: pd.DataFrame, base: str = "al") -> pd.DataFrame:
                 continue
             for platform, flight in flights_of_set.groupby("platform"):
                 inside = flight["time_s"].between(start + _MARGIN_S, stop - _MARGIN_S)
-                mean, error = mean_and_error(flight.loc[inside, "thrust_n"].to_numpy())
-                rows.append(
-                    {
-                        "set": number,
-                        "stretch": place,
-                        "start_s": start,
-                        "stop_s": stop,
-                        "platform": platform,
-                        "thrust_n": mean,
-                        "error_n": error,
-                    }
-                )
+                found = mean_and_error(flight.loc[inside, "thrust_n"].to_numpy())
+                rows.append((number, place, start, stop, platform, *found))
     return pd.DataFrame(rows, columns=["set", "stretch", "start_s", "stop_s", "platform", "thrust_n", "error_n"])
 
 

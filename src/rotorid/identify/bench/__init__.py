@@ -1,1 +1,0 @@
-"""The load-cell bench: calibration, reconstruction of forces, tests."""

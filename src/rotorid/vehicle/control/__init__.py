@@ -1,1 +1,0 @@
-"""Controllers and their references, one file each."""
