@@ -74,7 +74,7 @@ environment: $(READY) ## make the environment alone
 
 # uv, itself from the lock, installs the rest in seconds; where it cannot, or is not to be had, pip does it in a minute
 # without it. Both take packages from where the user set either of them. Both compile them: where
-# Python is told to write no bytecode, as in many containers, every start would compile the libraries anew.
+# Python is set to write no bytecode, as in many containers, every start would compile the libraries anew.
 $(READY): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
 		echo "rotorid needs Python 3.11 or newer, and $(PYTHON) is not; say which to use: make PYTHON=python3.12 ..."; \

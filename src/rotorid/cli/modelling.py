@@ -57,7 +57,7 @@ def model(
 
         if to not in FLYERS:
             raise InputError(f"no simulator is called {to!r}, expected one of {', '.join(FLYERS)}")
-        from rotorid.recordings.importers.logfile import is_bag
+        from rotorid.recordings.files import is_bag
 
         is_set = len(paths) == 1 and (paths[0] / "vehicle.yaml").is_file() and not is_bag(paths[0])
         target = out or Path(f"{name_of(paths[0])}-{to}")

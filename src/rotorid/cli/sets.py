@@ -275,8 +275,8 @@ def check(
     """
     from rotorid.recordings import list_sets
     from rotorid.recordings.check import as_text, check_folder
-    from rotorid.recordings.files import run_paths, write_manifest
-    from rotorid.recordings.importers.logfile import format_of, is_bag
+    from rotorid.recordings.files import is_bag, run_paths, write_manifest
+    from rotorid.recordings.importers.logfile import format_of
 
     with one_sentence():
         if folder.is_file() and (folder.parent / "vehicle.yaml").is_file():

@@ -72,7 +72,7 @@ def verdict(
     """
     with one_sentence():
         from rotorid.mismatch.tell.steps import steps_sentence
-        from rotorid.recordings.importers.logfile import is_bag
+        from rotorid.recordings.files import is_bag
 
         start, limit = time.monotonic(), share_of(max_unexplained)
         is_set = len(paths) == 1 and paths[0].is_dir() and not is_bag(paths[0])
@@ -267,7 +267,7 @@ def read(
         A path is neither.
     """
     from rotorid.recordings import read_set
-    from rotorid.recordings.importers.logfile import is_bag
+    from rotorid.recordings.files import is_bag
 
     out = []
     with TemporaryDirectory() as made:

@@ -340,3 +340,8 @@ def _renewed(folder: Path) -> str:
     return (
         f"; import again, or where the runs are as they should be, list them anew by `rotorid check {folder} --renew`"
     )
+
+
+def is_bag(path: Path) -> bool:
+    """Whether a path is the folder of a ROS 2 bag (`metadata.yaml` next to its .db3 or .mcap), and no recording set."""
+    return (path / "metadata.yaml").is_file() and not (path / "vehicle.yaml").is_file()

@@ -36,8 +36,6 @@ from rotorid.mismatch.deliver.files import (
 from rotorid.mismatch.deliver.files import text_of as file_text
 from rotorid.mismatch.deliver.flown import model_of
 from rotorid.mismatch.flight.fitted import Watch, unwatched
-from rotorid.mismatch.instrument.analyse import analyse_instrument
-from rotorid.mismatch.instrument.remainder import prove as prove_reading
 from rotorid.mismatch.tell.forward import Forward, forward_channels, prove
 from rotorid.mismatch.tell.locate import locate
 from rotorid.mismatch.tell.steps import steps_sentence, tiles
@@ -72,8 +70,12 @@ def analysis_of(recordings: RecordingSet, off: Collection[str] = (), watch: Watc
     """
     usable = sufficient(recordings)
     with rules.asking(off) as asked, step(f"analysing the {usable.vehicle.kind}"):
-        flight = usable.vehicle.kind == "flight"
-        analysis = analyse(usable, watch=watch) if flight else analyse_instrument(usable)
+        if usable.vehicle.kind == "flight":
+            analysis = analyse(usable, watch=watch)
+        else:
+            from rotorid.mismatch.instrument.analyse import analyse_instrument
+
+            analysis = analyse_instrument(usable)
     without = tuple(f"Judged without the rule {name}: {rules.RULES[name].decides}" for name in sorted(asked.off))
     analysis = replace(analysis, fired=dict(asked.fired), notes=(*without, *analysis.notes))
     recordings = replace(analysis.recordings, left_out=usable.left_out)  # sets with corrected mistakes are made anew
@@ -135,6 +137,8 @@ def write_files(analysis: Analysis, verdict_path: Path, page_path: Path, improve
             forward = forward_channels(analysis)
             prove(analysis, model_of(reloaded, conditions, instruments), forward)
         else:
+            from rotorid.mismatch.instrument.remainder import prove as prove_reading
+
             forward = Forward({})
             prove_reading(analysis, improved, reloaded, instruments)
         verdict = _with_first_details(make_verdict(analysis, locations, forward.channels), analysis)

@@ -46,6 +46,7 @@ from rotorid.recordings import columns as c
 from rotorid.recordings.files import (
     VEHICLE,
     check_manifest,
+    is_bag,
     listed_runs,
     run_files,
     run_name,
@@ -97,11 +98,6 @@ class _Imported:
     kind: str = "flight"
     speed_unit: str = "rad/s"
     """Unit in which the log states rotor speeds."""
-
-
-def is_bag(path: Path) -> bool:
-    """Whether a path is the folder of a ROS 2 bag (`metadata.yaml` next to its .db3 or .mcap), and no recording set."""
-    return (path / "metadata.yaml").is_file() and not (path / "vehicle.yaml").is_file()
 
 
 def _files_of(path: Path) -> dict[str, Path]:

@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jinja2 import Environment
@@ -20,9 +21,6 @@ from markupsafe import Markup
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.describe import advice
-from rotorid.mismatch.changes import words
-from rotorid.mismatch.changes.compare import Changes
-from rotorid.mismatch.changes.words import level_one_sentences, quantity_words
 from rotorid.mismatch.decide.findings import Analysis, Finding
 from rotorid.mismatch.decide.words import (
     FORWARD_WORDS,
@@ -46,6 +44,9 @@ from rotorid.report.page.data import blocks, page_data
 from rotorid.report.plots.mismatch import STRIP_CELL_S, draw_differences, draw_residuals, draw_values, heat_strip, svg
 from rotorid.steps import step
 from rotorid.vehicle.derivatives import symbol_of
+
+if TYPE_CHECKING:
+    from rotorid.mismatch.changes.compare import Changes
 
 _WORDS = {
     "no_mismatch": "no mismatch",
@@ -626,6 +627,9 @@ def _notes(analysis: Analysis, forward_notes: Sequence[str]) -> list[str]:
 
 def make_changes_page(found: Changes) -> str:
     """The page of a comparison."""
+    from rotorid.mismatch.changes import words
+    from rotorid.mismatch.changes.words import level_one_sentences, quantity_words
+
     sentences, flown = words.level_two_sentences(found), found.kind == "flight"
     seen = found.level_1
     names = {} if seen is None else {d.quantity.key: quantity_words(d) for d in seen.differences}
@@ -648,6 +652,8 @@ def make_changes_page(found: Changes) -> str:
 
 def _changed_limit_row(limit) -> dict[str, str]:
     """A limit's name, size and share of the weight, in words."""
+    from rotorid.mismatch.changes import words
+
     share = words.percent_words(limit.share) if limit.share else ""
     if limit.id in words.VALUES:
         return {"name": capital(words.name_words(limit.id)), "at_most": words.percent_words(limit.at_most), "share": ""}

@@ -20,7 +20,6 @@ from rotorid.mismatch.decide.words import FORWARD_WORDS, channel_words, regime_w
 from rotorid.mismatch.deliver.flown import Model
 from rotorid.mismatch.evidence.motion import HIGHEST_CUTOFF_HZ, Segment, analysis_rate_hz
 from rotorid.mismatch.evidence.rows import CHANNELS, Thinner, at_centre
-from rotorid.mismatch.instrument.setup import averaged
 from rotorid.mismatch.tell import forward
 from rotorid.mismatch.tell.locate import REGIME_BLOCK_S
 from rotorid.mismatch.tell.verdict import Verdict
@@ -359,6 +358,8 @@ def _of_flight(segment: Segment, analysis: Analysis, thinner: Thinner) -> tuple[
 
 
 def _of_loading(loading: Loading, count: int) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    from rotorid.mismatch.instrument.setup import averaged
+
     names = [f"{group}_{axis}" for group in ("force", "moment") for axis in "xyz"]
     out = dict(zip(names, averaged(loading.reading, count).T, strict=True))
     speed = loading.speed_read if loading.speed_read is not None else loading.motion.rotor_speed
