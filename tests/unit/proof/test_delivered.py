@@ -18,7 +18,7 @@ def test_what_a_tool_does_not_take_is_told_from_what_it_does_not_fly():
 def test_an_engine_that_refuses_a_file_is_named(monkeypatch):
     pytest.importorskip("mujoco")
     monkeypatch.setattr(delivered, "refused_by", lambda vehicle: {"rotorpy": "", "gym-pybullet-drones": ""})
-    monkeypatch.setattr("rotorid.vehicle.exports.forms.refusal", lambda *asked: "")
+    monkeypatch.setattr("rotorid.vehicle.exports.refusal", lambda *asked: "")
     (said,) = not_flown_by(FLAT)
     assert said.startswith("mjcf (MuJoCo does not read the exported vehicle")
 
