@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.mismatch.decide.posterior import Found, decide, ranked
 from rotorid.mismatch.decide.problem import Prior
-from rotorid.mismatch.decide.search import Found, decide, ranked
 from rotorid.mismatch.decide.statements import Statement, statements_of
 from rotorid.mismatch.decide.status import CLAIMED
 from rotorid_proof.decisions.store import Kept

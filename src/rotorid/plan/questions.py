@@ -29,7 +29,7 @@ from rotorid.mismatch.analyse import findings_inside, findings_outside
 from rotorid.mismatch.decide.findings import Analysis, Finding, with_probabilities
 from rotorid.mismatch.decide.select import COST_PER_PARAMETER
 from rotorid.mismatch.decide.status import CLAIMED
-from rotorid.mismatch.deliver.candidates import learn
+from rotorid.mismatch.deliver.derivatives import learn
 from rotorid.mismatch.evidence.comparison import ENVIRONMENT_S
 from rotorid.mismatch.evidence.motion import HIGHEST_CUTOFF_HZ, Segment
 from rotorid.mismatch.evidence.regression import Regression, autoregression

@@ -14,8 +14,8 @@ import numpy as np
 
 from rotorid.effects.contract import DELAY, LIMIT, Parameter
 from rotorid.mismatch.changes.problem import change_of, held, weighed_changes
+from rotorid.mismatch.decide.posterior import Found
 from rotorid.mismatch.decide.problem import Prior
-from rotorid.mismatch.decide.search import Found
 from rotorid.mismatch.evidence.gram import Evidence, LinearParameter, evidence_from
 from rotorid.mismatch.evidence.motion import Segment
 from rotorid.mismatch.evidence.regression import autoregression, build

@@ -58,8 +58,8 @@ from rotorid.mismatch.changes.problem import (
     usual_spread,
 )
 from rotorid.mismatch.decide.findings import Finding
+from rotorid.mismatch.decide.posterior import Found, scored
 from rotorid.mismatch.decide.problem import Prior
-from rotorid.mismatch.decide.search import Found, scored
 from rotorid.mismatch.decide.selected import relative_change
 from rotorid.mismatch.decide.statements import (
     FORM_SD,

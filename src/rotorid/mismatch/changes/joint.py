@@ -22,8 +22,8 @@ from rotorid.mismatch.changes.chain import (
 )
 from rotorid.mismatch.changes.problem import decide_changes, of_environments
 from rotorid.mismatch.decide.findings import Finding
+from rotorid.mismatch.decide.posterior import Found
 from rotorid.mismatch.decide.problem import Prior
-from rotorid.mismatch.decide.search import Found
 from rotorid.mismatch.decide.statements import FORM_SD
 from rotorid.mismatch.evidence.gram import Evidence, EvidenceTerm, evidence_from
 from rotorid.mismatch.evidence.motion import Segment, regime_variables

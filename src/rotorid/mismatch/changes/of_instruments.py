@@ -28,8 +28,8 @@ from rotorid.mismatch.changes.problem import (
     settled,
 )
 from rotorid.mismatch.decide.findings import Finding
+from rotorid.mismatch.decide.posterior import Found, Model, Posterior
 from rotorid.mismatch.decide.problem import Prior, Problem
-from rotorid.mismatch.decide.search import Found, Model, Posterior
 from rotorid.mismatch.evidence.gram import TINY, Evidence, evidence_from, spectrum_of, unit_of
 from rotorid.mismatch.evidence.regression import Regression, build, ridge_inverse
 from rotorid.mismatch.evidence.rows import Rows, Term

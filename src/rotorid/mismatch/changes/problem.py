@@ -31,8 +31,8 @@ from dataclasses import replace
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.mismatch.decide.posterior import Found, Model, Posterior, most_probable, places, scored, without
 from rotorid.mismatch.decide.problem import Prior, Problem, believed, limiting, log_priors
-from rotorid.mismatch.decide.search import Found, Model, Posterior, most_probable, places, scored, without
 from rotorid.mismatch.decide.statements import FORM_SD, statements_of
 from rotorid.mismatch.evidence.gram import (
     FULL_RIDGE,

@@ -18,7 +18,7 @@ import numpy as np
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form
 from rotorid.effects.loading import InstrumentFacts, Loading
-from rotorid.mismatch.decide.search import Found
+from rotorid.mismatch.decide.posterior import Found
 from rotorid.mismatch.decide.statements import LIKELY, SURE, Statement, share_of, statements_of, weights_of
 from rotorid.mismatch.decide.status import CLAIMED, Estimate, Status
 from rotorid.recordings import RecordingSet, Split, Vehicle

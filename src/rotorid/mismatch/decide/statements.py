@@ -17,8 +17,8 @@ from itertools import chain
 
 import numpy as np
 
+from rotorid.mismatch.decide.posterior import Found, Model, Posterior, Scored, joint, places, ranked, scored, without
 from rotorid.mismatch.decide.problem import Prior, Problem, problem_of
-from rotorid.mismatch.decide.search import Found, Model, Posterior, Scored, joint, places, ranked, scored, without
 from rotorid.mismatch.decide.status import CLAIMED, Estimate, Status
 from rotorid.mismatch.evidence.gram import TINY, evidence_from, spectrum_of
 from rotorid.mismatch.evidence.regression import Regression

@@ -15,7 +15,8 @@ import numpy as np
 from rotorid.mismatch.decide.enough import with_shares
 from rotorid.mismatch.decide.findings import Analysis, ChannelTrace, Delivery, Finding, ValueRow
 from rotorid.mismatch.decide.selected import coefficients
-from rotorid.mismatch.deliver.candidates import Candidate, CandidateScore, Ground, Learnt, choose, learn
+from rotorid.mismatch.deliver.candidates import Candidate, CandidateScore, Ground, choose
+from rotorid.mismatch.deliver.derivatives import Learnt, learn
 from rotorid.mismatch.deliver.files import claimed, improved_vehicle, place_of
 from rotorid.mismatch.deliver.usable import exports_lost
 from rotorid.mismatch.evidence.rows import CHANNELS

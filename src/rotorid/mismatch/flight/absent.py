@@ -15,7 +15,7 @@ import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.decide.findings import Finding
-from rotorid.mismatch.decide.search import Found
+from rotorid.mismatch.decide.posterior import Found
 from rotorid.mismatch.decide.statements import UpperLimit, limits_of, posterior_at
 from rotorid.mismatch.evidence.gram import Evidence, evidence_from
 from rotorid.mismatch.evidence.regression import Regression, build

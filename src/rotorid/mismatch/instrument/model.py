@@ -14,7 +14,7 @@ from rotorid.effects.catalogue import before_the_rotors, catalogue
 from rotorid.effects.contract import Form, not_testable_reason
 from rotorid.effects.loading import NO_ROTORS, Loading, forms_of, weight
 from rotorid.mismatch.decide import rules
-from rotorid.mismatch.decide.search import Found
+from rotorid.mismatch.decide.posterior import Found
 from rotorid.mismatch.decide.select import Questions, Search, Selection
 from rotorid.mismatch.decide.statements import posterior_at
 from rotorid.mismatch.evidence.comparison import LEAST_RUNS

@@ -22,8 +22,8 @@ from rotorid.mismatch.changes.problem import (
     share_of_form,
     usual_spread,
 )
+from rotorid.mismatch.decide.posterior import Found, Posterior
 from rotorid.mismatch.decide.problem import Prior
-from rotorid.mismatch.decide.search import Found, Posterior
 from rotorid.mismatch.decide.statements import statements_of, visited_instead
 from rotorid.mismatch.evidence.gram import EvidenceTerm, LinearParameter, spectrum_of, unit_of
 from tests.unit.mismatch.decide.test_posterior import OFFSET, effect, flight

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
+from rotorid.mismatch.decide.posterior import Posterior, decide, log_prior, most_probable, ranked, scored
 from rotorid.mismatch.decide.problem import Prior, Problem, problem_of
-from rotorid.mismatch.decide.search import Posterior, decide, log_prior, most_probable, ranked, scored
 from rotorid.mismatch.decide.statements import drawn, limits_of, statements_of
 from rotorid.mismatch.evidence.comparison import environments
 from rotorid.mismatch.evidence.gram import Evidence, EvidenceTerm, LinearParameter, spectrum_of

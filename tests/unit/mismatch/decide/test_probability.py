@@ -7,7 +7,7 @@ import pytest
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.decide.findings import Finding, with_probabilities
-from rotorid.mismatch.decide.search import Found, Posterior
+from rotorid.mismatch.decide.posterior import Found, Posterior
 from rotorid.mismatch.decide.select import Questions, Search, Selection
 from rotorid.mismatch.decide.selected import wrench_findings
 from rotorid.mismatch.evidence.regression import build

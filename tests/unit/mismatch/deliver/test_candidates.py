@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from rotorid.mismatch.deliver.candidates import Candidate, Ground, Learnt, choose, compared
+from rotorid.mismatch.deliver.candidates import Candidate, Ground, choose, compared
+from rotorid.mismatch.deliver.derivatives import Learnt
 
 RUNS, PER_RUN = 6, 200
 UNIT = np.repeat(np.arange(RUNS), PER_RUN)

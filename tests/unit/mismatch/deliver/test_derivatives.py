@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rotorid.mismatch.deliver.candidates import learn
+from rotorid.mismatch.deliver.derivatives import learn
 from rotorid.vehicle.derivatives import CHANNELS, QUANTITIES
 
 N, FOLDS = 3000, 6
