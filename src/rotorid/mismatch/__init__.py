@@ -19,7 +19,6 @@ OPEN = (
     "decide.statements",
     "decide.status",
     "decide.words",
-    "deliver.candidates",
     "deliver.derivatives",
     "deliver.files",
     "deliver.flown",
