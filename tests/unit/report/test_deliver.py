@@ -79,12 +79,3 @@ def test_the_page_is_whole_and_the_same_twice(tmp_path, findings, shown):
         assert f"<h2>{heading}</h2>" in page
     assert "no height above ground" in page
     assert verdict.set == "made"
-
-
-def test_names_in_figures_are_no_mathematics():
-    from rotorid.report.plots import style
-    from rotorid.report.plots.mismatch import svg
-
-    figure, axis = style.figure(1.0)
-    axis.set_title("$\\frac{1}{$")
-    assert "<svg" in svg(figure)

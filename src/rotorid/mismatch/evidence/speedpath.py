@@ -47,7 +47,12 @@ _AT_BOUND = 1e-3
 _LEAST_INFORMATION = 1e-30
 """Inverse variance of a parameter that changes nothing."""
 
+_STEPS_KEPT = 3
+"""What a step of a chain made last that is kept: slopes move one parameter at a time, and a step has up to two."""
+
 Chain = tuple[tuple[str, SpeedForm], ...]
+LastSteps = dict[int, list[tuple[np.ndarray, tuple, np.ndarray]]]
+"""By place in a chain: speeds that a step was given, the step with its values, and what it made."""
 
 
 @dataclass(frozen=True)
@@ -123,8 +128,12 @@ def commanded_path(
     full_speed: float,
     full_voltage: float | None,
     holds: bool = True,
+    last: LastSteps | None = None,
 ) -> np.ndarray:
-    """Rotor speeds (n, k), rad/s, that a chain makes of the segment's commands; `holds` as in SpeedFit."""
+    """Rotor speeds (n, k), rad/s, that a chain makes of the segment's commands; `holds` as in SpeedFit.
+
+    `last` holds what the steps of the chain made of this segment last, and is kept up to date.
+    """
     motion = segment.motion
     path = SpeedPath(segment.command, motion.time_s, full_speed, motion.voltage, full_voltage)
     steps, at = [], 0
@@ -132,8 +141,14 @@ def commanded_path(
         steps.append((form.stage, form.apply, values[at : at + len(form.parameters)]))
         at += len(form.parameters)
     steps.append((DELAY, shifted if holds else moved, np.array([shift_s])))
-    for _, apply, own in sorted(steps, key=lambda s: s[0]):
-        path = replace(path, speed=apply(path, own))
+    for place, (_, apply, own) in enumerate(sorted(steps, key=lambda s: s[0])):
+        known = [] if last is None else last.setdefault(place, [])
+        asked = apply, tuple(own)
+        speed = next((made for of, how, made in known if of is path.speed and how == asked), None)
+        if speed is None:
+            speed = apply(path, own)
+            known[:] = [(path.speed, asked, speed), *known[: _STEPS_KEPT - 1]]
+        path = replace(path, speed=speed)
     return path.speed
 
 
@@ -162,9 +177,11 @@ class _SpeedProblem:
         self.filters: list[np.ndarray] | None = None
         self.shift_prior_s = 0.5 / segments[0].rate_hz
         self.holds = True
+        self._last: dict[int, LastSteps] = {id(s): {} for s in segments}
 
     def path(self, segment: Segment, chain: Chain, values, shift_s: float) -> np.ndarray:
-        return commanded_path(segment, chain, values, shift_s, self.full_speed, self.full_voltage, self.holds)
+        full, last = (self.full_speed, self.full_voltage), self._last[id(segment)]
+        return commanded_path(segment, chain, values, shift_s, *full, self.holds, last)
 
     def raw(self, chain: Chain, values, shift_s: float) -> list[np.ndarray]:
         """Residual of every segment, (n, channels), unwhitened."""

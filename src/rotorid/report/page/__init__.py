@@ -40,8 +40,9 @@ from rotorid.mismatch.deliver.files import form_of
 from rotorid.mismatch.tell.steps import errors_of, steps_of, tiles, together, would_explain
 from rotorid.mismatch.tell.verdict import Absent, Channel, EffectVerdict, Location, Verdict, main_channel, spoken
 from rotorid.recordings import RecordingSet
-from rotorid.report.page.data import blocks, page_data
-from rotorid.report.plots.mismatch import STRIP_CELL_S, draw_differences, draw_residuals, draw_values, heat_strip, svg
+from rotorid.report.page.data import page_data
+from rotorid.report.page.strip import strip
+from rotorid.report.plots.mismatch import draw_differences, draw_residuals, draw_values
 from rotorid.steps import step
 from rotorid.vehicle.derivatives import symbol_of
 
@@ -56,8 +57,6 @@ _WORDS = {
     "not_judged": "not judged",
 }
 _MOST_LOCATIONS = 12
-_MOST_RUNS_IN_STRIP = 8
-_STRIP_CELLS = 400
 _NARROWEST = 0.03
 """Interval over plausible range below which the range is zoomed in."""
 _LIMIT_DECADES = 5.0
@@ -78,7 +77,7 @@ def make_page(
     """The page's HTML. `ledger` holds the rules that decided something, each with a `sentence`."""
     main = main_channel(analysis, verdict.locations, verdict.channels)
     environment = Environment(autoescape=True, trim_blocks=False)
-    environment.filters |= {"base64": lambda text: base64.b64encode(text.encode()).decode(), "exp": math.exp}
+    environment.filters["exp"] = math.exp
     environment.filters |= {"place": _place, "pretty": pretty, "subscripts": _subscripts, "listed": listed}
     environment.filters |= {"unit": _unit_text, "number": number, "cell": _cell, "plus_minus": plus_minus}
     environment.filters |= {"channel": channel_words, "value": parameter_words, "regime": regime_words}
@@ -232,8 +231,9 @@ def pretty(text: str) -> Markup:
 
 
 def _subscripts(text: str) -> Markup:
-    """`k_d,x` with what follows the underscore set low."""
-    return Markup(re.sub(r"_([A-Za-z0-9⊥∥,]+)(?<!,)", r"<sub>\1</sub>", html.escape(text, quote=False)))
+    """`k_d,x` with what follows the underscore set low, `u^n` with the exponent set high."""
+    low = re.sub(r"_([A-Za-z0-9⊥∥,]+)(?<!,)", r"<sub>\1</sub>", html.escape(text, quote=False))
+    return Markup(re.sub(r"\^(\([^()]*\)|\w+)", r"<sup>\1</sup>", low))
 
 
 def _unit_text(text: str) -> str:
@@ -269,42 +269,6 @@ def _where_text(verdict: Verdict) -> list[str]:
     channels = dict.fromkeys(loc.channel for loc in verdict.locations)
     first = f"The mismatch shows in {listed([channel_words(channel) for channel in channels])}."
     return [first] + ([pretty(f"What separates it best: {'; '.join(texts)}.")] if texts else [])
-
-
-def strip(analysis: Analysis, verdict: Verdict) -> tuple[str, str, str] | None:
-    """Heat strip of every channel over every run."""
-    channels = [c for c in verdict.channels if c not in FORWARD_WORDS and verdict.channels[c].noise_floor]
-    runs = list(dict.fromkeys(t.run for t in analysis.traces))
-    located_runs = dict.fromkeys(loc.run for loc in verdict.locations)
-    shown = list(dict.fromkeys([*[r for r in runs if r in verdict.runs.held_out], *located_runs, *runs]))
-    shown = [r for r in runs if r in shown[:_MOST_RUNS_IN_STRIP]]
-    if not channels or not shown:
-        return None
-    sizes = {}
-    for trace in analysis.traces:
-        if trace.run in shown and trace.channel in channels:
-            noise = verdict.channels[trace.channel].noise_floor
-            period = float(np.median(np.diff(trace.time_s)))
-            per = max(int(STRIP_CELL_S / period), len(trace.time_s) // _STRIP_CELLS, 1)
-            per = min(per, len(trace.time_s))  # A stretch that is shorter than a cell is one cell.
-            count = len(trace.time_s) // per
-            for stage in ("before", "after"):
-                size = np.sqrt(blocks(getattr(trace, stage) ** 2, per, count)) / noise
-                key = (stage, trace.run, trace.channel)
-                time_s = blocks(trace.time_s, per, count)
-                if key in sizes:
-                    time_s, size = np.append(sizes[key][0], time_s), np.append(sizes[key][1], size)
-                sizes[key] = (time_s, size)
-    located: dict[tuple[str, str], list] = {}
-    for loc in verdict.locations:
-        located.setdefault((loc.run, loc.channel), []).append((loc.start_s, loc.stop_s))
-    labels = [channel_words(c) for c in channels]
-    held = verdict.runs.held_out if verdict.runs.held_out != verdict.runs.training else ()
-    picture = svg(heat_strip(channels, labels, shown, held, sizes, located))
-    caption = "Error of each channel over the runs' time, in units of its noise. Black lines: where it was located."
-    if len(shown) < len(runs):
-        caption += f" {len(shown)} of {len(runs)} runs are shown."
-    return picture, "error over noise by channel and time, before and after", caption
 
 
 def _shown_locations(locations: Sequence[Location]) -> tuple[list[Location], str]:

@@ -3,7 +3,6 @@ a fleet (in how many sets each effect shows, numbers from set to set and since t
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,118 +22,8 @@ _MOST_PARAMETERS = 4
 _MOST_NAMED = 6
 """Vehicles that still have a colour each."""
 _WORDS = {"established": style.BLUE, "ambiguous": style.ORANGE, "suggested": style.GREY}
-STRIP_CELL_S = 0.5
-_LARGEST = 10.0
-"""Size relative to the noise at which the heat strip's colour ends."""
 _SHADE = "#f3e6d8"
 _STAGES = {"before": "as believed", "refitted": "values refitted", "after": "improved"}
-
-
-def svg(fig: Figure) -> str:
-    """The figure as SVG text, the same for the same data; closes it."""
-    import matplotlib.pyplot as plt
-
-    _names_are_names(fig)
-    text = io.StringIO()
-    fig.savefig(text, format="svg", metadata={"Date": None})
-    plt.close(fig)
-    return text.getvalue()
-
-
-def _names_are_names(fig: Figure) -> None:
-    """Let no text of the figure be read as mathematics: a run or a column may be called `$x$`.
-
-    The numbers at a logarithmic axis, which matplotlib writes as powers of ten, stay what they are.
-    """
-    from matplotlib.text import Text
-
-    powers = {
-        label
-        for ax in fig.axes
-        for axis in (ax.xaxis, ax.yaxis)
-        if axis.get_scale() == "log"
-        for label in axis.get_ticklabels(which="both")
-    }
-    for text in fig.findobj(Text):
-        if text not in powers:
-            text.set_parse_math(False)
-
-
-def heat_strip(
-    channels: Sequence[str],
-    labels: Sequence[str],
-    runs: Sequence[str],
-    held_out: Sequence[str],
-    sizes: Mapping[tuple[str, str, str], tuple[np.ndarray, np.ndarray]],
-    located: Mapping[tuple[str, str], Sequence[tuple[float, float]]],
-) -> Figure:
-    """Size of the error relative to the noise, channels down, the runs' time across, before above after.
-
-    `sizes` maps (stage, run, channel) to instants and sizes in units of the noise; `located` maps (run, channel)
-    to intervals, which are underlined.
-    """
-    import matplotlib.pyplot as plt
-    from matplotlib.colors import LogNorm
-
-    height = 0.9 + 2 * 0.19 * len(channels)
-    span = {r: _span(sizes, r) for r in runs}
-    widths = [max(span[r][1] - span[r][0], 1e-3) for r in runs]
-    style.use()
-    fig, axes = plt.subplots(
-        2,
-        len(runs),
-        figsize=(style.TEXT_WIDTH_IN, height),
-        squeeze=False,
-        sharey=True,
-        gridspec_kw={"width_ratios": widths},
-    )
-    norm = LogNorm(0.7, _LARGEST)
-    for row, stage in enumerate(("before", "after")):
-        for column, run in enumerate(runs):
-            ax = axes[row, column]
-            for line, channel in enumerate(channels):
-                if (stage, run, channel) not in sizes:
-                    continue
-                time_s, size = sizes[stage, run, channel]
-                step = float(np.median(np.diff(time_s))) if len(time_s) > 1 else STRIP_CELL_S
-                edges = np.append(time_s - step / 2, time_s[-1] + step / 2)
-                image = np.clip(size, 0.7, _LARGEST)[None, :]
-                ax.pcolormesh(edges, [line - 0.44, line + 0.36], image, norm=norm, cmap="YlOrRd", rasterized=True, lw=0)
-                if row == 0:
-                    for start, stop in located.get((run, channel), ()):
-                        ax.plot([start, stop], [line + 0.43] * 2, color="black", lw=1.2, solid_capstyle="butt")
-            ax.set_xlim(*span[run])
-            ax.grid(False)
-            ax.tick_params(length=2)
-            for side in ("left", "bottom"):
-                ax.spines[side].set_visible(False)
-            if row == 0:
-                ax.set_xticklabels([])
-                name = run if len(run) <= 14 else f"{run[:12]}…"
-                ax.set_title(f"{name}\nheld out" if run in held_out else f"{name}\n", fontsize=7.5, pad=3)
-            else:
-                ax.locator_params(axis="x", nbins=3)
-        axes[row, 0].set_yticks(range(len(channels)), labels)
-        axes[row, 0].set_ylabel("as believed" if row == 0 else "improved")
-    axes[0, 0].set_ylim(len(channels) - 0.4, -0.6)
-    fig.supxlabel("time (s)", fontsize=9.5)
-    fig.get_layout_engine().set(w_pad=0.01, wspace=0.01)
-    scale = fig.colorbar(
-        plt.cm.ScalarMappable(norm=norm, cmap="YlOrRd"), ax=axes, fraction=0.02, pad=0.01, ticks=[1, 2, 5, 10]
-    )
-    scale.ax.set_yticklabels(["1", "2", "5", "10"])
-    scale.ax.minorticks_off()
-    scale.set_label("error / noise")
-    return fig
-
-
-def _span(sizes, run: str) -> tuple[float, float]:
-    times = [t for (_, r, _), (t, _) in sizes.items() if r == run and len(t)]
-    if not times:
-        return 0.0, 1.0
-    start, stop = min(t[0] for t in times), max(t[-1] for t in times)
-    # A run of a single cell is as wide as that.
-    return (start, stop) if stop > start else (start - STRIP_CELL_S / 2, stop + STRIP_CELL_S / 2)
 
 
 def errors_over_time(traces: pd.DataFrame, channels: Sequence[str], located: pd.DataFrame) -> Figure:

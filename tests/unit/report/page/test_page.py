@@ -5,6 +5,7 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -210,6 +211,17 @@ def test_runs_that_are_shorter_than_a_cell_of_the_strip_are_shown():
     ]
     picture, _, _ = strip(replace(made, traces=short), verdict_of(made))
     assert "svg" in picture
+
+
+def test_the_strip_is_well_formed_whatever_a_run_is_called() -> None:
+    made = analysis(findings=(drag_finding(),))
+    name = 'a<b & "c" $\\frac{1}{$'
+    runs = {run: f"{name} {k}" for k, run in enumerate(dict.fromkeys(t.run for t in made.traces))}
+    picture, _, _ = strip(replace(made, traces=[replace(t, run=runs[t.run]) for t in made.traces]), verdict_of(made))
+    drawn = ElementTree.fromstring(picture)
+    assert len(drawn.findall("image")) == 2 * len(runs)
+    shown = [text.text for text in drawn.findall("text")]
+    assert [text for text in shown if text.startswith("a<b & ")], shown
 
 
 @pytest.mark.parametrize(("kind", "what"), [("flight", "flight"), ("bench", "session")])
