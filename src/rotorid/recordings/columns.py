@@ -58,21 +58,29 @@ def is_known(column: str) -> bool:
     return column in FIXED or rotor_number(column) is not None
 
 
+_UNIT_SUFFIXES = {
+    "_rad_s2": "rad/s²",
+    "_rad_s": "rad/s",
+    "_m_s2": "m/s²",
+    "_m_s": "m/s",
+    "_n_m": "N m",
+    "_rad": "rad",
+    "_hz": "Hz",
+    "_n": "N",
+    "_m": "m",
+    "_s": "s",
+    "_v": "V",
+    "_a": "A",
+    "_c": "°C",
+}
+"""How a column's name ends, and its unit for people; of two that fit the first is meant."""
+
+
+def unit_suffix(column: str) -> str:
+    """The unit as a column's name writes it, `_m_s2`; empty for pure numbers."""
+    return next((suffix for suffix in _UNIT_SUFFIXES if column.endswith(suffix)), "")
+
+
 def unit_of(column: str) -> str:
     """Unit written in the column's name, for people; empty for pure numbers."""
-    for suffix, unit in (
-        ("_rad_s", "rad/s"),
-        ("_m_s2", "m/s²"),
-        ("_m_s", "m/s"),
-        ("_n_m", "N m"),
-        ("_rad", "rad"),
-        ("_n", "N"),
-        ("_m", "m"),
-        ("_s", "s"),
-        ("_v", "V"),
-        ("_a", "A"),
-        ("_c", "°C"),
-    ):
-        if column.endswith(suffix):
-            return unit
-    return ""
+    return _UNIT_SUFFIXES.get(unit_suffix(column), "")

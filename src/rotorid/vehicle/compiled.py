@@ -415,11 +415,17 @@ def _attitude_command(x, j, elapsed, loop, rotors, references, f, more):
 
 
 @compiled(error_model="numpy")
-def command(scratch, j, elapsed, loops, rotors, references, more):
-    """The same for each of n scratch records; `loops` and `references` of one row hold for all of them."""
+def command(scratch, states, reading_errors, j, elapsed, loops, rotors, references, more):
+    """The same for each of n scratch records at states (n, 13 + k), read with errors (n, 1, 3), rad.
+
+    `loops` and `references` of one row hold for all of them.
+    """
     for n in range(scratch.shape[0]):
-        loop, f = loops[n if loops.shape[0] > 1 else 0], n if references.shape[0] > 1 else 0
-        _attitude_command(scratch[n], j, elapsed, loop, rotors, references, f, more)
+        loop, f, x = loops[n if loops.shape[0] > 1 else 0], n if references.shape[0] > 1 else 0, scratch[n]
+        for i in range(3, 7):
+            x.state[i] = states[n, i]
+        _read_attitude(x, j, reading_errors, n)
+        _attitude_command(x, j, elapsed, loop, rotors, references, f, more)
 
 
 @compiled(error_model="numpy", nogil=True)

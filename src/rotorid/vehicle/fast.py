@@ -182,17 +182,28 @@ class AttitudeLoop:
         )
 
 
-def commanding(loop: AttitudeLoop, size: int, step_s: float) -> Callable[[int, np.ndarray], np.ndarray]:
+def commanding(loop: AttitudeLoop, size: int, step_s: float) -> Callable[[int, np.ndarray, np.ndarray], np.ndarray]:
     """What gives the commands (n, k), rad/s, of n vehicles with a controller, for flights that go a step at a time.
 
-    To be called with the number of each instant, in order, and the attitudes read, Euler angles (n, 3), rad.
+    To be called with the number of each instant, in order, the states (n, 13 + k), and the errors of the attitude that
+    is read, (n, 3), rad.
     """
     k, given = len(loop.allocation), loop.laid_out()
     scratch = np.zeros(size, compiled.scratch_record(room_for(k)))
 
-    def command(j: int, euler_rad: np.ndarray) -> np.ndarray:
-        scratch["angle"] = euler_rad
-        compiled.command(scratch, j, step_s, given["loops"], k, given["references"], given["more"])
+    def command(j: int, states: np.ndarray, attitude_errors: np.ndarray) -> np.ndarray:
+        errors = np.ascontiguousarray(attitude_errors)[:, None]
+        compiled.command(
+            scratch,
+            np.ascontiguousarray(states),
+            errors,
+            j,
+            step_s,
+            given["loops"],
+            k,
+            given["references"],
+            given["more"],
+        )
         return scratch["command"][:, :k].copy()
 
     return command
@@ -338,7 +349,7 @@ def fly(
     )
 
     def part(first: int, last: int) -> None:
-        mine = {name: a[first:last] if len(a) == n else a for name, a in own.items()}
+        mine = own if last - first == n else {key: a[first:last] if len(a) == n else a for key, a in own.items()}
         stride = mine["values"].shape[1] if len(mine["values"]) > 1 else 0
         given = fixed | mine | _block(last - first, k) | dict(values=mine["values"].ravel(), stride=stride)
         compiled.fly(*(given[name] for name in _ORDER))

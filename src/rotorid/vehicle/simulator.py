@@ -322,8 +322,10 @@ class _Flight:
             command = fast.commanding(known, self.size, self.step_s)
         else:
 
-            def command(j: int, euler_rad: np.ndarray) -> np.ndarray:
-                return controller.rotor_command(j * self.step_s, euler_rad)
+            def command(j: int, states: np.ndarray, attitude_errors: np.ndarray) -> np.ndarray:
+                return controller.rotor_command(
+                    j * self.step_s, euler_from_quaternion(states[:, 3:7]) + attitude_errors
+                )
 
         if known is None or self.path is not None:
             trace = self._by_steps(controller, command, pushes, attitude_errors)
@@ -350,8 +352,7 @@ class _Flight:
         if self.start.rotor_speed_rad_s is not None:
             state[:, 13:] = self.start.rotor_speed_rad_s
         else:
-            euler = euler_from_quaternion(state[:, 3:7]) + attitude_errors[0]
-            first = np.asarray(command(0, euler), float)
+            first = np.asarray(command(0, state, attitude_errors[0]), float)
             state[:, 13:] = first if limits is None else np.clip(first, *limits)
         following = None
         if isinstance(controller, Commands) and controller.rotor_acceleration is not None:
@@ -377,8 +378,7 @@ class _Flight:
         limits = self.motors.limits_rad_s
         for i in range(steps + 1):
             time_s = i * self.step_s
-            euler = euler_from_quaternion(state[:, 3:7]) + attitude_errors[i]
-            command = np.asarray(command_at(i, euler), float)
+            command = np.asarray(command_at(i, state, attitude_errors[i]), float)
             if command.shape != (self.size, k):
                 raise InputError(f"the controller gave commands {command.shape}, expected {(self.size, k)}")
             if limits is not None:

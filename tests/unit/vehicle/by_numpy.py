@@ -13,7 +13,7 @@ import pytest
 from rotorid.effects.contract import Motion
 from rotorid.effects.instant import Wrench
 from rotorid.vehicle import fast, simulator
-from rotorid.vehicle.attitude import quaternion_rate, rotation_from_quaternion
+from rotorid.vehicle.attitude import euler_from_quaternion, quaternion_rate, rotation_from_quaternion
 from rotorid.vehicle.fast import AttitudeLoop, Kernels, Trace
 from rotorid.vehicle.mixer import wrench_matrix
 
@@ -54,8 +54,9 @@ def _commanding(loop: AttitudeLoop, size: int, step_s: float):
     keep = np.exp(-step_s / loop.derivative_time_s) if loop.derivative_time_s > 0 else 0.0
     integral, slope, last = np.zeros((size, 3)), np.zeros((size, 3)), None
 
-    def command(j, euler_rad):
+    def command(j, states, attitude_errors):
         nonlocal integral, slope, last
+        euler_rad = euler_from_quaternion(states[:, 3:7]) + attitude_errors
         wanted = np.broadcast_to(loop.reference[..., j, :], (size, 4))
         error = (wanted[:, :3] - euler_rad + np.pi) % (2 * np.pi) - np.pi
         moment = loop.proportional * error

@@ -304,6 +304,13 @@ def test_trajectory_of_rotorpy(aero):
     np.testing.assert_allclose(trace.quaternion[0], sign * quaternion, atol=1e-6)
 
 
+def read_as(euler_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """States of four rotors' vehicles at rest with these attitudes (n, 3), and no errors of reading them."""
+    states = np.zeros((len(euler_rad), 17))
+    states[:, 3:7] = quaternion_from_euler(euler_rad)
+    return states, np.zeros_like(euler_rad)
+
+
 def test_pid_by_hand():
     """Rotors whose squares are a thrust of 100 N and a moment each, 0.1 s apart, at angles of 0, then −error."""
     gains, error = ((2.0, 2, 2), (3.0, 3, 3), (0.0, 0.5, 0.5)), np.array([0.1, 0.0, -0.2])
@@ -317,7 +324,7 @@ def test_pid_by_hand():
     ):
         command = fast.commanding(replace(loop, limit_n_m=limit), 1, 0.1)
         for j, (angles, moment) in enumerate(zip((0.0 * error, -error, -error, 0.0 * error), moments, strict=True)):
-            np.testing.assert_allclose(command(j, angles[None])[0] ** 2 - 100.0, moment, atol=1e-9)
+            np.testing.assert_allclose(command(j, *read_as(angles[None]))[0] ** 2 - 100.0, moment, atol=1e-9)
 
 
 def test_anti_windup_shortens_the_overshoot():
@@ -333,7 +340,7 @@ def test_anti_windup_shortens_the_overshoot():
         inner: Callable
 
         def rotor_command(self, time_s, euler_rad):
-            u = wrench_matrix(vehicle) @ (self.inner(round(time_s / 0.002), euler_rad).T ** 2)
+            u = wrench_matrix(vehicle) @ (self.inner(round(time_s / 0.002), *read_as(euler_rad)).T ** 2)
             u[1:] = np.clip(u[1:], -0.02, 0.02)
             return np.sqrt(np.maximum((allocation_matrix(vehicle) @ u).T, 0))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.recordings.columns import unit_of, unit_suffix
 
 WRENCH_WORDS = {
     "force_x": ("forward force", "force along x"),
@@ -37,21 +38,6 @@ _REGIME_WORDS = {
     "pitch_rad": ("pitch of the mount", "rad"),
 }
 """Regime variables in words, with their unit; any other is named from its column."""
-_UNIT_SUFFIXES = (
-    ("_rad_s2", "rad/s²"),
-    ("_rad_s", "rad/s"),
-    ("_m_s2", "m/s²"),
-    ("_m_s", "m/s"),
-    ("_n_m", "N m"),
-    ("_rad", "rad"),
-    ("_hz", "Hz"),
-    ("_n", "N"),
-    ("_m", "m"),
-    ("_s", "s"),
-    ("_v", "V"),
-    ("_a", "A"),
-    ("_c", "°C"),
-)
 _PARAMETER_WORDS = {
     "mass_kg": ("mass", "kg"),
     "thrust_coefficient_n_s2": ("thrust coefficient", "N s²"),
@@ -103,10 +89,7 @@ def regime_words(variable: str) -> tuple[str, str]:
     """Name and unit of a regime variable."""
     if variable in _REGIME_WORDS:
         return _REGIME_WORDS[variable]
-    for suffix, unit in _UNIT_SUFFIXES:
-        if variable.endswith(suffix):
-            return variable.removesuffix(suffix).replace("_", " "), unit
-    return variable.replace("_", " "), ""
+    return variable.removesuffix(unit_suffix(variable)).replace("_", " "), unit_of(variable)
 
 
 def parameter_words(name: str) -> tuple[str, str]:
