@@ -355,6 +355,9 @@ class Thinner:
         self.kernel = kernels.low_pass(rate_hz, cutoff_hz)
         self.step = max(1, int(np.floor(rate_hz / (2 * cutoff_hz) + 1e-9)))
         self.rate_hz = rate_hz / self.step
+        blocks = -(-len(self.kernel) // self.step)
+        taps = np.pad(self.kernel[::-1], (0, blocks * self.step - len(self.kernel)))
+        self._taps = np.ascontiguousarray(taps.reshape(blocks, self.step).T)
 
     def __call__(self, signal: np.ndarray) -> np.ndarray:
         """(n, …) at the native rate to (m, …) at the thinned rate; only fully covered samples."""
@@ -365,22 +368,19 @@ class Thinner:
         if self.step < _BY_BLOCKS or count < 1 or not np.isfinite(signal).all():
             return upfirdn(self.kernel, signal, up=1, down=self.step, axis=0)[skip : skip + max(count, 0)]
         start, columns = skip * self.step - len(self.kernel) + 1, signal.reshape(len(signal), -1)
-        parts = [self._by_blocks(columns[start:, i : i + 3], count) for i in range(0, columns.shape[1], 3)]
-        return np.concatenate(parts, axis=1).reshape(count, *signal.shape[1:])
+        return self._by_blocks(columns[start:], count).T.reshape(count, *signal.shape[1:])
 
     def _by_blocks(self, signal: np.ndarray, count: int) -> np.ndarray:
-        """Weighted sums (count, c) of a signal (n, c) from every `step`-th sample on, the kernel's taps the weights.
+        """Weighted sums (c, count) of a signal (n, c) from every `step`-th sample on, the kernel's taps the weights.
 
         Blocks of `step` samples by the kernel's own blocks are one product of matrices, many times as quick as taps.
         """
-        blocks, wide = -(-len(self.kernel) // self.step), signal.shape[1]
-        taps = np.zeros(blocks * self.step)
-        taps[: len(self.kernel)] = self.kernel[::-1]
-        weights = np.kron(taps.reshape(blocks, self.step).T, np.eye(wide))
-        whole = np.zeros(((count - 1 + blocks) * self.step, wide))
-        whole[: min(len(signal), len(whole))] = signal[: len(whole)]
-        products = (whole.reshape(-1, self.step * wide) @ weights).reshape(-1, blocks, wide)
-        return sum(products[b : b + count, b] for b in range(blocks))
+        blocks = self._taps.shape[1]
+        whole = np.zeros((signal.shape[1], (count - 1 + blocks) * self.step))
+        reach = min(len(signal), whole.shape[1])
+        whole[:, :reach] = signal[:reach].T
+        products = whole.reshape(len(whole), -1, self.step) @ self._taps
+        return sum(products[:, b : b + count, b] for b in range(blocks))
 
     def times(self, time_s: np.ndarray) -> np.ndarray:
         """Time stamps of the thinned samples (centre of the kernel)."""
