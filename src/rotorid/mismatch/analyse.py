@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -31,6 +32,7 @@ from rotorid.mismatch.decide.selected import coefficients, throttle_or_thrust, w
 from rotorid.mismatch.decide.sizes import fitted_part
 from rotorid.mismatch.decide.statements import UpperLimit
 from rotorid.mismatch.decide.status import CLAIMED
+from rotorid.mismatch.deliver.by_vehicle import acting_over_rows, on_vehicle
 from rotorid.mismatch.deliver.candidates import Candidate, Ground
 from rotorid.mismatch.deliver.files import claimed, conditions_of, instruments_of, place_of, with_effects
 from rotorid.mismatch.deliver.final import Offered, Stretches, as_delivered
@@ -117,7 +119,7 @@ def _analysed(recordings: RecordingSet, mistakes, remarks, watch: Watch) -> Anal
     fit, moved = settled(model, values, model.selection.active)
 
     outside = [*mistakes, *findings_outside(found, prepared)]
-    findings = [*outside, *findings_inside(found, prepared, fit)]
+    findings = [*outside, *findings_inside(found, prepared, fit, {**moved, **to_state})]
     findings = payload_or_offset(findings, {**moved, **values})
     findings += absorbed_findings(model, values, findings)
     findings, to_state = with_square_term(findings, to_state, model)
@@ -329,6 +331,8 @@ def _offered(
         unfit=question,
         remarks=faults,
         chain_is_named=found.commanded,
+        larger=lambda c, term: on_vehicle(term, model.segments, vehicle, {**c.moved, **stated_of(c)}, model.noise)[0],
+        in_rows=lambda other: acting_over_rows(vehicle, other),
     )
 
 
@@ -343,8 +347,13 @@ def findings_outside(found: Fitted, prepared: Prepared) -> list[Finding]:
     return [throttle_or_thrust(f) for f in findings] if found.commanded else findings
 
 
-def findings_inside(found: Fitted, prepared: Prepared, delivered: Fit) -> list[Finding]:
-    """A finding for every term that the regression of force, moment and sensors selected or dropped."""
+def findings_inside(
+    found: Fitted, prepared: Prepared, delivered: Fit, changed: Values = MappingProxyType({})
+) -> list[Finding]:
+    """A finding for every term that the regression of force, moment and sensors selected or dropped.
+
+    Numbers are those for the believed vehicle with its values `changed`.
+    """
     model = found.model
     findings = wrench_findings(
         model.contributions,
@@ -354,6 +363,7 @@ def findings_inside(found: Fitted, prepared: Prepared, delivered: Fit) -> list[F
         model.noise,
         nonlinear_intervals(prepared, model, model.segments),
         delivered,
+        lambda term: on_vehicle(term, model.segments, prepared.vehicle, changed, model.noise),
     )
     return [throttle_or_thrust(f) for f in findings] if found.commanded else findings
 

@@ -15,7 +15,7 @@ from rotorid.mismatch.decide.findings import Finding, not_held
 from rotorid.mismatch.decide.select import NEAR_LIMIT, SMALLEST_SIZE, VALUE_FLOOR, Search, Selection
 from rotorid.mismatch.decide.status import CLAIMED, Estimate
 from rotorid.mismatch.evidence.regression import MOST_ATTENUATION, Fit, Regression
-from rotorid.mismatch.evidence.rows import CHANNELS, Contributions, Rows
+from rotorid.mismatch.evidence.rows import CHANNELS, Contributions, Rows, Term
 from rotorid.mismatch.evidence.unknowns import UNKNOWNS
 
 _COST_PER_VALUE = 12.0
@@ -35,6 +35,15 @@ _BEST_KNOWN = 0.004
 """Relative one-sigma that no believed value is taken to be better known than, while others are called wrong."""
 
 
+Factors = tuple[np.ndarray, np.ndarray]
+"""Factors of a term's linear coefficients and their one-sigma, (k,) each."""
+
+
+def as_fitted(term: Term) -> Factors:
+    """No other coefficients than the fitted ones, and no doubt of that."""
+    return np.ones(len(term.form.linear)), np.zeros(len(term.form.linear))
+
+
 def coefficients(regression: Regression, fit: Fit, key: str) -> tuple[np.ndarray, np.ndarray]:
     """Coefficients of a term and their covariance."""
     cols = regression.columns([key])
@@ -49,19 +58,23 @@ def estimates(
     key: str,
     suggested: Fit | None = None,
     delivered: Fit | None = None,
+    larger: Factors | None = None,
 ) -> tuple[Estimate, ...]:
     """Linear parameters of a term with 95 % intervals: within runs, between them, and with what is `suggested`.
 
     Stated is the number that is `delivered`; its interval holds the one found with the believed values free, too.
+    `larger` are the factors of its coefficients on the vehicle that is delivered, and their one-sigma.
     """
     term = search.terms[key]
+    times, doubt = larger or as_fitted(term)
     covariance = coefficients(regression, fit, key)[1]
     spread, p = regression.between_runs(fit, key)
     variance = np.diag(covariance) + (spread if p < 0.05 else 0.0)
     reach = student.ppf(0.975, max(5, int(regression.training.sum()) - len(fit.columns)))
-    beta, *others = (coefficients(regression, f, key)[0] for f in (delivered or fit, fit, suggested or fit))
+    beta, *others = (times * coefficients(regression, f, key)[0] for f in (delivered or fit, fit, suggested or fit))
+    deviations = np.hypot(times * np.sqrt(variance), doubt * beta / np.where(times, times, 1.0))
     out = []
-    for k, (index, sd) in enumerate(zip(term.form.linear, np.sqrt(variance), strict=False)):
+    for k, (index, sd) in enumerate(zip(term.form.linear, deviations, strict=False)):
         parameter = term.form.parameters[index]
         found = [beta[k], *(other[k] for other in others)]
         ends = (beta[k], min(found) - reach * sd, max(found) + reach * sd)
@@ -133,23 +146,28 @@ def wrench_findings(
     noise: np.ndarray,
     nonlinear: dict[str, tuple[np.ndarray, np.ndarray]],
     delivered: Fit,
+    larger_of: Callable[[Term], Factors] = as_fitted,
 ) -> list[Finding]:
     """Findings of the terms of a flight; `nonlinear` holds values and one-sigma of those with nonlinear parameters,
-    `delivered` the fit whose numbers are stated."""
+    `delivered` is the fit whose numbers are stated, `larger_of` the factors of a term's coefficients on the vehicle
+    that is delivered, and their one-sigma."""
     beside = search.beside(selection.active)
 
     def report_of(key: str) -> TermReport:
         term = search.terms[key]
         beta, _ = coefficients(regression, delivered, key)
         channels = main_channels(contributions.rows, regression.columns([key]), beta, noise)
-        values, parameters = np.array(term.values, float), ()
-        if term.form.linear:
-            values[list(term.form.linear)] = term.form.stated(beta)
-            stated = estimates(regression, selection.fit, search, key, beside, delivered)
+        values, parameters, linear = np.array(term.values, float), (), list(term.form.linear)
+        larger = larger_of(term)
+        if linear:
+            values[linear] = term.form.stated(larger[0] * beta)
+            stated = estimates(regression, selection.fit, search, key, beside, delivered, larger)
             # What nothing in the recordings shows (columns that are noise alone) is not stated.
             parameters = tuple(p for p, shown in zip(stated, regression.shown(key), strict=True) if shown)
         if key in nonlinear:
-            centre, sd = nonlinear[key]
+            centre, sd = (own.copy() for own in nonlinear[key])
+            sd[linear] = np.hypot(larger[0] * sd[linear], larger[1] * centre[linear])
+            centre[linear] *= larger[0]
             values[list(term.form.nonlinear)] = centre[list(term.form.nonlinear)]
             low, high = np.minimum(values, centre) - 1.96 * sd, np.maximum(values, centre) + 1.96 * sd
             parameters = tuple(

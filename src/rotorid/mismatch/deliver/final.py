@@ -19,7 +19,7 @@ from rotorid.mismatch.deliver.candidates import Candidate, CandidateScore, Groun
 from rotorid.mismatch.deliver.derivatives import Learnt, learn
 from rotorid.mismatch.deliver.files import claimed, improved_vehicle, place_of
 from rotorid.mismatch.deliver.usable import exports_lost
-from rotorid.mismatch.evidence.rows import CHANNELS
+from rotorid.mismatch.evidence.rows import CHANNELS, Term
 from rotorid.mismatch.flight.delivered import FittedModel, Values, all_free, ways
 from rotorid.mismatch.flight.values import believed_value
 from rotorid.recordings import Vehicle
@@ -68,6 +68,10 @@ class Offered:
     remarks: tuple[str, ...] = ()
     chain_is_named: bool = False
     """Whether what lies between command and speed is known by force and moment alone: the believed vehicle lacks it."""
+    larger: Callable[[Candidate, Term], np.ndarray] = lambda candidate, term: np.ones(len(term.form.linear))
+    """Factors of a term's coefficients on a candidate's vehicle (`rotorid.mismatch.deliver.by_vehicle`)."""
+    in_rows: Callable[[Vehicle], np.ndarray] = lambda vehicle: np.ones(len(CHANNELS) // 2)
+    """Force and moment on a vehicle over those that its rows hold, (6,)."""
     restates: bool = True
     """Whether numbers are stated by the fit that is delivered even where nothing else than that was found."""
 
@@ -85,7 +89,7 @@ def as_delivered(offered: Offered) -> Analysis:
         candidates.append(named)
     if offered.stretches:
         candidates += [c.with_derivatives(learnt) for c in candidates if (learnt := _learnt_of(offered, c)).derivatives]
-    findings = _restated(words.findings, model, named) if offered.restates or not offered.whole else words.findings
+    findings = _restated(words.findings, offered, named) if offered.restates or not offered.whole else words.findings
     candidates = [replace(c, flown=offered.flown(c, findings, ground)) for c in candidates]
     chosen, scored = choose(
         candidates,
@@ -104,7 +108,7 @@ def as_delivered(offered: Offered) -> Analysis:
         not_testable=words.not_testable,
         improved=offered.improved(taken),
     )
-    last = _with_taken(last, taken, scored, stretches, offered.believed)
+    last = _with_taken(last, taken, scored, stretches, offered)
     return replace(
         with_shares(last),
         notes=(*last.notes, *offered.remarks, *exports_lost(improved_vehicle(last), offered.believed)),
@@ -137,7 +141,9 @@ def _learnt_of(offered: Offered, candidate: Candidate) -> Learnt:
     x = about_hover_of(np.concatenate([x for _, _, x in offered.stretches]), offered.believed, vehicle)
     regression = offered.model.regression
     folds = np.concatenate(regression.of_rows(regression.folds()))
-    return learn(x, candidate.left, folds, own_controls(vehicle))
+    acting = offered.in_rows(vehicle)
+    learnt = learn(x, acting * candidate.left, folds, own_controls(vehicle))
+    return replace(learnt, left_out=learnt.left_out / acting)
 
 
 def _why_not(finding: Finding, taken: Candidate, scored: Sequence[CandidateScore], offered: Offered) -> str:
@@ -161,12 +167,13 @@ def _why_not(finding: Finding, taken: Candidate, scored: Sequence[CandidateScore
 
 
 def _with_taken(
-    analysis: Analysis, taken: Candidate, scored: Sequence[CandidateScore], stretches: Stretches, believed: Vehicle
+    analysis: Analysis, taken: Candidate, scored: Sequence[CandidateScore], stretches: Stretches, offered: Offered
 ) -> Analysis:
     """The analysis with the traces that the vehicle taken home leaves, and that vehicle's derivatives."""
     derivatives = taken.learnt.derivatives if taken.learnt else ()
+    acting = offered.in_rows(analysis.improved)
     added = {
-        (run, float(time_s[0])): taken.learnt.of(about_hover_of(x, believed, analysis.improved))
+        (run, float(time_s[0])): taken.learnt.of(about_hover_of(x, offered.believed, analysis.improved)) / acting
         for run, time_s, x in stretches
         if len(time_s) and derivatives
     }
@@ -187,8 +194,9 @@ def _with_taken(
     )
 
 
-def _restated(findings: Sequence[Finding], model: FittedModel, named: Candidate) -> tuple[Finding, ...]:
+def _restated(findings: Sequence[Finding], offered: Offered, named: Candidate) -> tuple[Finding, ...]:
     """Findings with their linear parameters by a settled fit; intervals reach to where the findings had them."""
+    model = offered.model
     key_of = {model.search.terms[k].form: k for k in named.active}
     out = []
     for finding in findings:
@@ -198,7 +206,8 @@ def _restated(findings: Sequence[Finding], model: FittedModel, named: Candidate)
             continue
         form = finding.form
         values = np.array(finding.values, float)
-        values[list(form.linear)] = form.stated(coefficients(model.regression, named.fit, key)[0])
+        beta = coefficients(model.regression, named.fit, key)[0]
+        values[list(form.linear)] = form.stated(offered.larger(named, model.search.terms[key]) * beta)
         now = dict(zip((p.symbol for p in form.parameters), values, strict=True))
         parameters = tuple(
             replace(e, value=v, low=min(e.low, e.low + v - e.value), high=max(e.high, e.high + v - e.value))

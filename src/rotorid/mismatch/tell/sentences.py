@@ -340,7 +340,9 @@ def _when(best: Location, here: Sequence[Location], analysis: Analysis) -> str:
         if from_the_start and to_the_end:
             return ""
         if from_the_start:
-            return f"up to {number(regime.high)}{space} of {name}, "
+            # "Up to −1.3 m/s of forward speed" nobody reads as flying backwards.
+            below = f"where the {name} is below {number(regime.high)}{space}, "
+            return below if regime.high < 0 else f"up to {number(regime.high)}{space} of {name}, "
         if to_the_end:
             return f"from {number(regime.low)}{space} of {name} on, "
         return f"between {number(regime.low)} and {number(regime.high)}{space} of {name}, "

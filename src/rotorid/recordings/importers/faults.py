@@ -31,7 +31,9 @@ _NEAR_WEIGHT = 0.85
 _LIFTS = 0.95
 """Share of the throttle of flight that a stretch begins and ends with: less is spool-up or a vehicle that settles."""
 _FALLING = 0.9
-"""Share of the usual specific force below which a vehicle falls: on the ground it stays at 1 g."""
+"""Share of the usual specific force, or of 1 g where that is more, below which a vehicle falls: on the ground it stays
+at 1 g, and lively flights take more."""
+_ONE_G_M_S2 = 9.81
 _NEAR_WEIGHT_ALONE = 0.7
 """The same where no accelerometer distinguishes a fall from the ground."""
 _TURNS_RAD_S = 1.0
@@ -45,10 +47,13 @@ GOES_ON = 0.9
 """Share of the readings of others of its kind that a sensor has at least, if it neither stands still nor ends early."""
 _REVERSED = 0.02
 """Share of the largest value that a value of the other sign must exceed to be one: less is noise about zero."""
-_SHUFFLED, _LATE_STEPS = 0.05, 100.0
+_SHUFFLED, LATE_STEPS = 0.05, 100.0
 """Share of steps back from which rows are in no order, and how many usual steps late a row in order may come."""
 _UNEXPLAINED = 0.2
 """Share of its variance that the motors of a mixer may leave of another motor's signal."""
+
+
+SET_BACK = "clock_set_back"
 
 
 @dataclass(frozen=True)
@@ -131,7 +136,7 @@ def drop_repeated_times(table: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportF
 
 
 def in_order(table: pd.DataFrame, time: str) -> tuple[pd.DataFrame, list[ImportFault]]:
-    """Rows that come late sorted by their time, and a fault; a clock that begins anew stays as it is.
+    """Rows that come late sorted by their time, those after a clock that was set back moved on, and the faults.
 
     `time` names the clock's column, in any unit.
     """
@@ -140,14 +145,42 @@ def in_order(table: pd.DataFrame, time: str) -> tuple[pd.DataFrame, list[ImportF
     back = steps < 0
     if not back.any():
         return table, []
-    known = np.unique(clock[np.isfinite(clock)])
-    latest = min(_LATE_STEPS * float(np.median(np.diff(known))), 0.5 * np.ptp(known))
-    if back.mean() < _SHUFFLED and (steps < -latest).any():
-        return table, []
-    found = f"{int(back.sum())} rows come later than their time"
-    sorted_ = table.sort_values(time, kind="stable", ignore_index=True)
-    sorted_.attrs = table.attrs
-    return sorted_, [ImportFault("order", c.TIME, found, "sorted by their time", int(back.sum()))]
+    usual = float(np.median(np.diff(np.unique(clock[np.isfinite(clock)]))))
+    anew = (
+        [] if back.mean() >= _SHUFFLED else [int(k) for k in np.flatnonzero(back) if _set_back(table, clock, k, usual)]
+    )
+    faults = []
+    for row in anew:
+        by = clock[row] - clock[row + 1]
+        clock = np.append(clock[: row + 1], clock[row + 1 :] + by + LATE_STEPS * usual)
+        found = f"the clock is set back by {by:.4g} of its units after row {row + 1}"
+        faults.append(
+            ImportFault(SET_BACK, c.TIME, found, "the rows after it follow after a gap", len(clock) - row - 1)
+        )
+    late = np.diff(clock) < 0
+    ordered = table.assign(**{time: clock})
+    if late.any():
+        ordered = ordered.sort_values(time, kind="stable", ignore_index=True)
+        found = f"{int(late.sum())} rows come later than their time"
+        faults.append(ImportFault("order", c.TIME, found, "sorted by their time", int(late.sum())))
+    ordered.attrs = table.attrs
+    return ordered, faults
+
+
+def _set_back(table: pd.DataFrame, clock: np.ndarray, row: int, usual: float) -> bool:
+    """Whether a clock that steps back after a row was set: from there it goes on step by step, past where it had been.
+
+    Rows that only come late end with a jump ahead; rows that are sent twice are the same.
+    """
+    by = clock[row] - clock[row + 1]
+    past = np.flatnonzero(clock[row + 1 :] > clock[row])
+    stop = row + 1 + past[0] if len(past) else len(clock)
+    ahead = clock[stop] - clock[stop - 1] if len(past) else 0.0
+    if ahead > 0.5 * by + usual or (stop - row - 1) * usual < 0.5 * min(by, clock[stop - 1] - clock[row + 1]):
+        return False
+    again = table.iloc[row + 1 : stop].reset_index(drop=True)
+    earlier = table.iloc[: row + 1].drop_duplicates()
+    return len(again.merge(earlier.drop_duplicates(), how="inner")) < 0.5 * len(again)
 
 
 def join_rows(table: pd.DataFrame, time: str) -> pd.DataFrame:
@@ -350,7 +383,9 @@ def off_the_ground(
     up = np.zeros(len(throttle), bool)
     if force is not None and np.isfinite(force).any():
         pull = smooth(np.linalg.norm(force, axis=1))
-        flown = (throttle >= _NEAR_WEIGHT * of_flight) | (pull < _FALLING * np.nanmedian(pull[flying]))
+        flown = (throttle >= _NEAR_WEIGHT * of_flight) | (
+            pull < _FALLING * min(np.nanmedian(pull[flying]), _ONE_G_M_S2)
+        )
     else:
         flown = throttle >= _NEAR_WEIGHT_ALONE * of_flight
     if height is not None and np.isfinite(height).any():

@@ -57,7 +57,7 @@ from rotorid.recordings.files import (
 )
 from rotorid.recordings.importers import ardupilot, betaflight, crazyflie, neurobem, px4_ulog, rcbenchmark, ros
 from rotorid.recordings.importers.faults import FILE_NAME as REPORT
-from rotorid.recordings.importers.faults import ImportFault, ImportReport, airborne, flights
+from rotorid.recordings.importers.faults import LATE_STEPS, SET_BACK, ImportFault, ImportReport, airborne, flights
 from rotorid.recordings.importers.known import Known, propose, px4_vehicle, thrust_coefficient
 from rotorid.recordings.importers.mapping import ELECTRICAL, UNITS, Mapping, read_by_mapping
 from rotorid.recordings.importers.rcbenchmark import signed_by_spin
@@ -193,12 +193,20 @@ def _read(path: Path, kind: str, mapping: Mapping | None) -> _Imported:
         return _Imported(kind, {_stem(path): table}, tuple(faults), axes, kind="stand")
     table, faults, axes = read_by_mapping(path, mapping)
     stand, runs, cuts = bool(set(table) & {*c.FORCE, *c.MOMENT}), {_stem(path): table}, []
-    if not stand and not (flying := airborne(table)[0]).all():
-        runs, cuts = flights(table, flying, _stem(path), path)
+    apart = _apart(table, faults)
+    if not stand and (apart.any() or not airborne(table)[0].all()):
+        runs, cuts = flights(table, airborne(table)[0], _stem(path), path, apart)
     speeds = None if mapping is None else mapping.channels.get("rotor_speed") or mapping.channels.get("rotor_command")
     unit = (speeds.unit if speeds else "") or "rad/s"
     unit = "rpm" if unit in ELECTRICAL else unit  # they are turns of the rotor by now
     return _Imported(kind, runs, (*faults, *cuts), axes, kind="stand" if stand else "flight", speed_unit=unit)
+
+
+def _apart(table: pd.DataFrame, faults: Sequence[ImportFault]) -> np.ndarray:
+    """Rows, (n,), that begin anew after a clock that was set back: no run goes on over them."""
+    steps_s = np.diff(table[c.TIME].to_numpy(float), prepend=table[c.TIME].iloc[0])
+    set_back = any(fault.kind == SET_BACK for fault in faults)
+    return set_back & (steps_s > 0.5 * LATE_STEPS * np.median(steps_s[1:]))
 
 
 def _stem(path: Path) -> str:

@@ -15,6 +15,7 @@ from rotorid.cli import app
 from rotorid.errors import InputError
 from rotorid.recordings import read_set
 from rotorid.recordings.importers.guessing import guess
+from rotorid.recordings.importers.logfile import read_log
 from rotorid.recordings.importers.mapping import Mapping, read_by_mapping, read_columns
 from tests.unit.recordings.wrong_inputs import LINES, RUN, SPEEDS, WIDTH, table
 
@@ -22,7 +23,6 @@ WORDS = table().assign(angular_velocity_x_rad_s="oops").to_csv(index=False)
 DECIMAL_COMMAS = "\n".join([LINES[0], *(line.replace(".", ",") for line in LINES[1:])]) + "\n"
 SHIFTED = "\n".join([LINES[0], *("7," + line for line in LINES[1:])]) + "\n"
 CUT = RUN[:-40]
-SET_BACK = table().assign(time_s=lambda t: t["time_s"] - 3600 * (t["time_s"] > 5)).to_csv(index=False)
 SUMMER_TIME = table().assign(time_s=lambda t: t["time_s"] + 3600 * (t["time_s"] > 5)).to_csv(index=False)
 WRONG = (
     ("words in a column", WORDS, "line 2, column angular_velocity_x_rad_s: expected a number, found 'oops'"),
@@ -39,7 +39,6 @@ WRONG = (
     ("no heading", "\n".join(LINES[1:]) + "\n", "line 1: expected the names of the columns, found numbers"),
     ("an underscore in a number", RUN.replace("\n0.05,", "\n0_0.05,"), "line 3, column time_s: expected a number"),
     ("a clock set to summer time", SUMMER_TIME, "line 103: time_s jumps by 3600.05 s"),
-    ("a clock set back", SET_BACK, "line 103: time_s jumps by -3599.95 s"),
     ("a clock that stands still", table().assign(time_s=3.0).to_csv(index=False), "time_s moves on in 1 of 200 rows"),
 )
 MAPPING = Mapping.model_validate(
@@ -99,21 +98,45 @@ def test_decimal_commas_are_read_where_no_comma_parts_columns(sign: str, above: 
 
 
 @pytest.mark.parametrize("mapping", [None, MAPPING], ids=["by names", "by mapping"])
-@pytest.mark.parametrize(("order", "kept"), [("shuffled", 200), ("one late", 200), ("begins anew", 100)])
-def test_rows_that_come_late_are_sorted_and_a_second_flight_is_not_mixed_in(mapping, order, kept, tmp_path) -> None:
+@pytest.mark.parametrize("order", ["shuffled", "one late"])
+def test_rows_that_come_late_are_sorted(mapping, order, tmp_path) -> None:
     own = table()
-    if order == "shuffled":
-        own = own.sample(frac=1, random_state=1)
-    elif order == "one late":
-        own = pd.concat([own[:50], own[60:70], own[50:60], own[70:]])
-    else:
-        own = pd.concat([own[:100], own[:100].assign(velocity_x_m_s=9)])
+    late = pd.concat([own[:50], own[60:70], own[50:60], own[70:]])
+    (own.sample(frac=1, random_state=1) if order == "shuffled" else late).to_csv(tmp_path / "own.csv", index=False)
+    found, faults, _ = read_by_mapping(tmp_path / "own.csv", mapping)
+    assert np.allclose(np.diff(found["time_s"]), 0.05)
+    names = list(SPEEDS)
+    np.testing.assert_array_equal(found[names], own[names])
+    assert [f.kind for f in faults] == ["order"]
+
+
+@pytest.mark.parametrize("mapping", [None, MAPPING], ids=["by names", "by mapping"])
+@pytest.mark.parametrize("back", [3600.0, 5.0, 2.0, 0.5], ids=["an hour", "begins anew", "seconds", "half a second"])
+def test_what_follows_a_clock_that_was_set_back_is_kept_behind_a_gap(mapping, back, tmp_path) -> None:
+    """Before: rows were left out until the clock had caught up, and the flight jumped there within a step."""
+    own = table()
+    own.loc[100:, "time_s"] -= back
     own.to_csv(tmp_path / "own.csv", index=False)
     found, faults, _ = read_by_mapping(tmp_path / "own.csv", mapping)
-    assert len(found) == kept and np.allclose(np.diff(found["time_s"]), 0.05)
-    names = list(SPEEDS)
-    np.testing.assert_array_equal(found[names], table()[names][:kept])
-    assert [f.kind for f in faults] == ["repeated_time" if order == "begins anew" else "order"]
+    names, steps = list(SPEEDS), np.diff(found["time_s"])
+    np.testing.assert_array_equal(found[names], own[names])
+    assert np.allclose(np.delete(steps, 99), 0.05) and steps[99] > 1.0
+    assert faults[0].kind == "clock_set_back" and f"{back - 0.05:.4g}" in faults[0].found
+
+
+def test_rows_that_are_sent_twice_are_no_clock_set_back(tmp_path) -> None:
+    own = table()
+    pd.concat([own[:100], own[60:100], own[100:]]).to_csv(tmp_path / "own.csv", index=False)
+    found, faults, _ = read_by_mapping(tmp_path / "own.csv", None)
+    assert len(found) == len(own) and "clock_set_back" not in [f.kind for f in faults]
+
+
+def test_each_side_of_a_clock_that_was_set_back_is_a_run(tmp_path) -> None:
+    own = table()
+    own["time_s"] *= 2
+    own.loc[100:, "time_s"] -= 2.0
+    own.to_csv(tmp_path / "own.csv", index=False)
+    assert list(read_log(tmp_path / "own.csv").runs) == ["own_1", "own_2"]
 
 
 def test_a_column_without_a_name_is_kept_by_its_number(tmp_path: Path) -> None:
