@@ -325,7 +325,6 @@ class _OutputErrorFit:
     residual_rms: np.ndarray
     explained: np.ndarray
     windows: int
-    iterations: int
 
     @property
     def inertias(self) -> np.ndarray:
@@ -431,7 +430,7 @@ def fit_output_error(
     covariance = count / max(count - len(parameters), 1) * inverse @ (clustered.T @ clustered) @ inverse
     spread = rates - rates.mean(axis=1, keepdims=True)
     explained = 1.0 - scale**2 / np.mean(spread**2, axis=(0, 1))
-    return _OutputErrorFit(parameters, covariance, scale, explained, w, iteration + 1)
+    return _OutputErrorFit(parameters, covariance, scale, explained, w)
 
 
 def printed_coefficient(

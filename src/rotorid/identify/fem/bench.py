@@ -277,7 +277,7 @@ class Bench:
         for piece, part, pad in self.bonds:
             own = self.body.nodes_of(piece)
             own = own[on(pad, nodes[own])]
-            bonds.append(Bound(own, self.body.weights(nodes[own], part), np.eye(3)))
+            bonds.append((own, self.body.weights(nodes[own], part), np.eye(3)))
         fixed = np.zeros((3, len(nodes)), bool)
         foot = self.body.nodes_of("A")
         fixed[:, foot[on(self.base, nodes[foot])]] = True
@@ -302,7 +302,7 @@ class Bench:
         if len(first) != len(last) or distance.max() > 1e-8:
             raise InputError("the two faces of the cut through plate D have different meshes")
         weights = sparse.csr_matrix((np.ones(len(last)), (np.arange(len(last)), first[match])), (len(last), len(nodes)))
-        return axis, Bound(last, weights, matrix)
+        return axis, (last, weights, matrix)
 
     @cached_property
     def seat(self) -> np.ndarray:

@@ -118,7 +118,7 @@ def _mode_of(
     return _modes(problem, columns[None], bias[None], believed)[0]
 
 
-def log_evidences(
+def _log_evidences(
     problem: Problem, columns: np.ndarray, believed: tuple[np.ndarray, np.ndarray, np.ndarray]
 ) -> np.ndarray:
     """About the log evidence of each of many sets of columns (m, k); −∞ where there is no mode.
@@ -314,7 +314,7 @@ def ranked(problem: Problem, models: Sequence[Model]) -> np.ndarray:
     for (_, freed), own in alike.items():
         for first in range(0, len(own), _AT_ONCE):
             at, columns = zip(*own[first : first + _AT_ONCE], strict=True)
-            out[list(at)] = log_evidences(problem, np.array(columns), problem.believed(freed))
+            out[list(at)] = _log_evidences(problem, np.array(columns), problem.believed(freed))
     return out + np.array([log_prior(problem, model) for model in models])
 
 

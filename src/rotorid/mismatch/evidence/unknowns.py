@@ -45,7 +45,7 @@ def _fixed_moment(motion, vehicle, values):
     return Contribution(moment=_to_body(motion, world))
 
 
-def dipole(motion, vehicle, values):
+def _dipole(motion, vehicle, values):
     """M = m × Rᵀ e_N + m' × Rᵀ e_D: a body that aligns with a direction of the world, as a magnet does."""
     north, down = motion.rotation[:, 0, :], motion.rotation[:, 2, :]
     return Contribution(moment=np.cross(np.asarray(values[:3]), north) + np.cross(np.asarray(values[3:]), down))
@@ -76,7 +76,7 @@ def _heading_forms(vehicle):
     body = tuple(Parameter(f"m_{a}", "N m") for a in "xyz") + tuple(Parameter(f"m'_{a}", "N m") for a in "xyz")
     return (
         Form("fixed", "M = Rᵀ (m_N, m_E, 0)", fixed, _fixed_moment, ("rotation",)),
-        Form("dipole", "M = m × Rᵀ e_N + m' × Rᵀ e_D", body, dipole, ("rotation",)),
+        Form("dipole", "M = m × Rᵀ e_N + m' × Rᵀ e_D", body, _dipole, ("rotation",)),
     )
 
 

@@ -35,7 +35,6 @@ from rotorid.mismatch.decide.select import KEEP_P, SHARE_OF_LARGEST, Selection
 from rotorid.mismatch.decide.selected import (
     SMALLEST_CHANGE,
     WIDEST_TRUST,
-    TermReport,
     coefficients,
     estimates,
     findings_of,
@@ -181,7 +180,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         if why is not None:
             reasons |= dict.fromkeys(ids_of_stage(SUPPLY), why)
     values, refused = values_of(model.selection), set()
-    while needless := (needless_values(model, values) | curved_gains(model, values)) - refused:
+    while needless := (_needless_values(model, values) | _curved_gains(model, values)) - refused:
         refused |= needless
         values = values_of(model.selection, refused)
     found = [_one_load(f, setup) for f in reading_findings(model)]
@@ -443,12 +442,12 @@ def reading_findings(model: ReadingModel) -> list[Finding]:
     """Findings of the terms of a reading, each with the channels that it shows in, the strongest first."""
     fit, search = model.selection.fit, model.search
 
-    def report_of(key: str) -> TermReport:
+    def report_of(key: str):
         size = search.ask.sizes_of(key, fit.beta[fit.places(model.regression.columns([key]))])
         order = np.argsort(-size)
         channels = tuple(CHANNELS[c] for c in order if size[c] > _SHOWS * size[order[0]])
         others = search.alternatives(key, model.selection.active)
-        return TermReport(active_values(model, key), _parameters_of(model, key), channels, others)
+        return active_values(model, key), _parameters_of(model, key), channels, others
 
     return findings_of(search, model.selection, report_of)
 
@@ -587,7 +586,7 @@ def _stronger_ones(model: ReadingModel, value: str, active: list[str]) -> list[t
     return out
 
 
-def needless_values(model: ReadingModel, values: Iterable[str]) -> set[str]:
+def _needless_values(model: ReadingModel, values: Iterable[str]) -> set[str]:
     """Of believed values that seem wrong those that only make up for the form of an effect at work.
 
     Also those that a form's own parameters say again: another power of the speed has no C_F to believe.
@@ -602,14 +601,14 @@ def needless_values(model: ReadingModel, values: Iterable[str]) -> set[str]:
     return out if rules.NEEDLESS_VALUE(bool(out)) else set()
 
 
-def curved_gains(model: ReadingModel, values: Values) -> set[str]:
+def _curved_gains(model: ReadingModel, values: Values) -> set[str]:
     """Gains called wrong given a curved characteristic that is right at small loads, or right over all of them.
 
     The gain of a curve is a convention: a reading that saturates is right at small loads, one with a dead band nearly
     so over all, and the slope that a polynomial has at no load is neither. A wrong calibration is off in both.
     """
     instrument = model.setup.instrument
-    if not any(model.search.terms[k].effect in characteristics() for k in model.selection.active):
+    if not any(model.search.terms[k].effect in _characteristics() for k in model.selection.active):
         return set()
     out = set()
     for key, (change, _) in values.items():
@@ -622,7 +621,7 @@ def curved_gains(model: ReadingModel, values: Values) -> set[str]:
     return out if rules.CURVED_GAIN(bool(out)) else set()
 
 
-def characteristics() -> frozenset[str]:
+def _characteristics() -> frozenset[str]:
     """Ids of a sensor's curves."""
     return ids_of("curve_of_load") & ids_of("kind", "sensor")
 
@@ -630,7 +629,7 @@ def characteristics() -> frozenset[str]:
 def _slope_of(model: ReadingModel, channel: int, most: float) -> float:
     """Slope, less one, of a reading over loads up to `most` in size, less all effects but a curved characteristic."""
     fit, search = model.selection.fit, model.search
-    others = [k for k in model.selection.active if search.terms[k].effect not in characteristics()]
+    others = [k for k in model.selection.active if search.terms[k].effect not in _characteristics()]
     known = np.isin(fit.columns, model.regression.columns(others))
     load, left = [], []
     for rows, loads in zip(model.rows, _loads_of_rows(model), strict=True):

@@ -474,7 +474,7 @@ def nonlinear_deviation(model: ReadingModel, key: str) -> np.ndarray:
     return out
 
 
-def value_keys(setup: PreparedInstrument) -> list[str]:
+def _value_keys(setup: PreparedInstrument) -> list[str]:
     """Believed values that this set can contradict."""
     vehicle, channels = setup.vehicle, setup.instrument.channels
     if vehicle.kind == "bench":
@@ -496,7 +496,7 @@ def value_keys(setup: PreparedInstrument) -> list[str]:
 def make_terms(setup: PreparedInstrument) -> tuple[list[Term], dict[str, str]]:
     """Every term that this set can test, and the ids that it cannot, with the reason."""
     trust = setup.vehicle.trust
-    sd = {k: max(trust.get(VALUE_NAMES[k], _DEFAULT_TRUST[k.split("_")[0]]), 1e-6) for k in value_keys(setup)}
+    sd = {k: max(trust.get(VALUE_NAMES[k], _DEFAULT_TRUST[k.split("_")[0]]), 1e-6) for k in _value_keys(setup)}
     terms = [Term(key, "value", prior_sd=(relative,)) for key, relative in sd.items()]
     reasons: dict[str, str] = {}
     if not setup.steady_points and not setup.instrument.by_hand:
@@ -608,4 +608,4 @@ def rows_of(setup: PreparedInstrument, terms: list[Term], loadings=None, at_work
     return out
 
 
-__all__ = ["OFFSET", "VALUE_NAMES", "make_terms", "rows_of", "value_keys"]
+__all__ = ["OFFSET", "VALUE_NAMES", "make_terms", "rows_of"]

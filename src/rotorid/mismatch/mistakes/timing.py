@@ -264,7 +264,7 @@ def difference(of: _SensorPair, drifting: bool, free: bool = True) -> _LatenessF
         found = _unblurred(blocks, found)
     start, growth = found.lag_s, 0.0
     for _ in range(3 if drifting else 1):
-        curves = likelihood(blocks, found, lags)
+        curves = _likelihood(blocks, found, lags)
         middle = start + growth * float(blocks.time_s.mean())
         start, growth = _peak(lags, curves, blocks.time_s, middle, drifting)
         aligned = blocks.delayed(start + growth * blocks.time_s)
@@ -296,8 +296,8 @@ def difference(of: _SensorPair, drifting: bool, free: bool = True) -> _LatenessF
     gained = 0.0
     if drifting:
         # The aligned fit's likelihood at no further lag is that of the drift itself.
-        drift = likelihood(aligned, found, np.zeros(1)).sum()
-        gained = float(drift - likelihood(blocks, found, lags).sum(axis=0).max())
+        drift = _likelihood(aligned, found, np.zeros(1)).sum()
+        gained = float(drift - _likelihood(blocks, found, lags).sum(axis=0).max())
     explained = float(np.min(found.explained))
     answered = of.over == "rotors" or (of.over in COMMANDED and of.late != "rotors")
     bias_s = _disturbed_s(blocks, found) if answered else 0.0
@@ -329,7 +329,7 @@ def _unblurred(blocks: Blocks, found: LaggedFit) -> LaggedFit:
     return best
 
 
-def likelihood(blocks: Blocks, found: LaggedFit, lags: np.ndarray) -> np.ndarray:
+def _likelihood(blocks: Blocks, found: LaggedFit, lags: np.ndarray) -> np.ndarray:
     """Log-likelihood of every lag in every block, (b, lags), up to what no lag changes."""
     model = blocks.x @ found.gain.T
     rest = blocks.y - blocks.z @ found.nuisance.T
