@@ -241,7 +241,7 @@ def in_full(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
     return "\n".join(out) + "\n"
 
 
-def section(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
+def _section(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
     """One effect as a section of the page."""
     out = [f"### `{effect.id}`: {effect.name}\n", f"{_KINDS[effect.kind].capitalize()}: {effect.sentence}.\n"]
     table = [("", *row) for row in rows(effect, vehicle)]
@@ -272,7 +272,7 @@ def markdown() -> str:
     parts = [_INTRODUCTION]
     for kind, title in (("physics", "Physics"), ("sensor", "Sensors and logging"), ("mistake", "Mistakes in the set")):
         parts.append(f"## {title}\n")
-        parts += [section(e) for e in catalogue().values() if e.kind == kind]
+        parts += [_section(e) for e in catalogue().values() if e.kind == kind]
     return "\n".join(parts).rstrip() + "\n"
 
 

@@ -241,15 +241,13 @@ def fit_coefficient_network(
     return coefficient(network, k_x, k_d), (k_x, k_d), network, epochs, mse
 
 
-def cut_windows(
-    rates: np.ndarray, moments: np.ndarray, dt_s: float, window_s: float, start: int = 0
-) -> tuple[np.ndarray, np.ndarray]:
+def cut_windows(rates: np.ndarray, moments: np.ndarray, dt_s: float, window_s: float) -> tuple[np.ndarray, np.ndarray]:
     """Rates and moments (w, m, 3) in consecutive windows of an evenly sampled flight (n, 3).
 
     Windows with missing samples are left out.
     """
     length = int(round(window_s / dt_s)) + 1
-    first = np.arange(start, len(rates) - length + 1, length - 1)
+    first = np.arange(0, len(rates) - length + 1, length - 1)
     index = first[:, None] + np.arange(length)
     good = np.isfinite(rates[index]).all((1, 2)) & np.isfinite(moments[index]).all((1, 2))
     return rates[index[good]], moments[index[good]]

@@ -189,8 +189,8 @@ class LevelOne:
 
 
 @step("what differs")
-def level_one(base: RecordingSet, new: RecordingSet, usual: Mapping[str, _Usual] | None = None) -> LevelOne:
-    """What differs between two sets of flights; `usual` is the scatter by kind, by default of all laboratories.
+def level_one(base: RecordingSet, new: RecordingSet) -> LevelOne:
+    """What differs between two sets of flights, by the scatter of all laboratories.
 
     Raises
     ------
@@ -216,7 +216,7 @@ def level_one(base: RecordingSet, new: RecordingSet, usual: Mapping[str, _Usual]
                 f"set {own.name}: no stretch of flight with rotors and motion is long enough; expected some seconds"
             )
         sides.append(flights)
-    return LevelOne(base.name, new.name, differences(*sides, usual or usual_scatter()), tuple(left_out))
+    return LevelOne(base.name, new.name, differences(*sides, usual_scatter()), tuple(left_out))
 
 
 def as_one(sets: Sequence[RecordingSet]) -> RecordingSet:

@@ -284,7 +284,7 @@ def _with_one_of_time(found: Found) -> Found:
 
     A filter of the fourth order is one of the second and a delay to the catalogue, at thousands of nats.
     """
-    problem, posterior = found.problem, OneOfTime(found.problem)
+    problem, posterior = found.problem, _OneOfTime(found.problem)
     of_time = [k for k in found.model if _takes_time(problem.terms[k].effect)]
     if len(of_time) < 2:
         return found
@@ -296,7 +296,7 @@ def _with_one_of_time(found: Found) -> Found:
     return Found(posterior, best, posterior(best))
 
 
-class OneOfTime(Posterior):
+class _OneOfTime(Posterior):
     """The log posterior of models with one effect that takes time at most."""
 
     def __call__(self, model: Model) -> float:

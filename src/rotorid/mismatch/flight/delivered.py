@@ -68,18 +68,13 @@ class FittedModel(Protocol):
         """Coefficient of a relative change of a believed value."""
 
 
-def _widely(values: Values) -> dict[str, float]:
-    """Priors of the values called wrong."""
-    return dict.fromkeys(values, WIDEST_TRUST)
-
-
 def _delivered_fit(model: FittedModel, keys: Sequence[str], values: Values) -> tuple[list[str], Fit]:
     """Keys of all that is delivered with the terms `keys`, and their fit with the wrong values at their stated numbers.
 
     What the whole balance would make of those values is another number where slow moments of the air bias it, and
     effects fitted given that number would be those of a vehicle that nobody states.
     """
-    delivered = model.delivered_with(keys, _widely(values))
+    delivered = model.delivered_with(keys, dict.fromkeys(values, WIDEST_TRUST))
     known, cols, beta = _at_stated_numbers(model, delivered, values)
     fit = known.fit([k for k in delivered if k not in values])
     size = len(fit.beta)

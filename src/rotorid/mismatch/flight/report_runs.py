@@ -201,7 +201,8 @@ def without_each(
         elif in_chain and found.measured:
             out[finding.id] = _speeds_without(found, seen, finding.id, traces)
         elif in_chain:
-            segments = path_segments(seen.prepared.segments, *chain_without(found, finding.id), _cutoff_of(seen))
+            cutoff_hz = seen.prepared.thinner.cutoff_hz
+            segments = path_segments(seen.prepared.segments, *chain_without(found, finding.id), cutoff_hz)
             out[finding.id] = on_traces(traces, seen.rows, made_by(seen, segments, fit))
         elif finding.id in ids_of("air_moves", "all the time") and seen.wind is not None:
             still = [replace(s, motion=replace(s.motion, wind=without_wind(s, seen.wind))) for s in seen.segments]
@@ -211,10 +212,6 @@ def without_each(
             calm = [replace(s, motion=replace(s.motion, wind=steady)) for s in seen.segments]
             out[finding.id] = on_traces(traces, seen.rows, made_by(seen, calm, fit))
     return out
-
-
-def _cutoff_of(model: WrenchModel) -> float:
-    return model.prepared.thinner.cutoff_hz
 
 
 def without_wind(segment, wind: np.ndarray) -> np.ndarray:

@@ -474,23 +474,11 @@ def with_plainer_forms(model: ReadingModel, again: Callable[[ReadingModel, list[
         term = model.search.terms[key]
         if term.effect in UNKNOWNS or key not in model.selection.active:
             continue
-        if not any(len(t.form.parameters) < len(term.form.parameters) for t in _forms_beside(model, key)):
-            continue
-        if rules.PLAINER_FORM(all(p.low <= 0.0 <= p.high for p in _parameters_of(model, key))):
-            others = [t for t in model.terms if t.kind != "effect" or t.effect != term.effect or _plainer(t, term)]
-            model = again(model, others)
+        alike = [t for t in model.terms if t.kind == "effect" and t.effect == term.effect]
+        plainer = [t for t in alike if len(t.form.parameters) < len(term.form.parameters)]
+        if plainer and rules.PLAINER_FORM(all(p.low <= 0.0 <= p.high for p in _parameters_of(model, key))):
+            model = again(model, [t for t in model.terms if t not in alike or t in plainer])
     return model
-
-
-def _forms_beside(model: ReadingModel, key: str) -> list[Term]:
-    """Terms of the same id."""
-    effect = model.search.terms[key].effect
-    return [t for t in model.terms if t.kind == "effect" and t.effect == effect and t.key != key]
-
-
-def _plainer(one: Term, than: Term) -> bool:
-    """Whether a term's form has fewer parameters than another's."""
-    return len(one.form.parameters) < len(than.form.parameters)
 
 
 def hats(values: np.ndarray) -> np.ndarray:
