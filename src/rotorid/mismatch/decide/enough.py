@@ -108,7 +108,7 @@ def judged(
     reason = ""
     if rules.BELOW_LEFTOVER(not beyond):
         reason = "it is smaller than what the model leaves over"
-    elif rules.MAY_BE_NOTHING(not _away_from_nothing(finding)):
+    elif rules.MAY_BE_NOTHING(bool(finding.parameters) and all(p.low <= 0.0 <= p.high for p in finding.parameters)):
         reason = "every number of it may be nothing"
     elif rules.SLIGHT(bool(share < _LEAST_SHARE and slight and not finding.windows)):
         reason = f"it takes {100 * share:.1f} % of the error that goes"
@@ -206,10 +206,3 @@ def _block_energies(trace: ChannelTrace, added: np.ndarray, mask: np.ndarray, bl
     for rows in np.array_split(index, max(1, len(index) // max(1, int(round(block_s / period_s))))):
         after, own = trace.named[rows], added[rows]
         yield float(after @ after), float((after + own) @ (after + own)), float(own @ own)
-
-
-def _away_from_nothing(finding: Finding) -> bool:
-    """Whether the interval of some number of a finding does not hold the value at which it does nothing."""
-    if not finding.parameters:
-        return True
-    return any(not p.low <= 0.0 <= p.high for p in finding.parameters)

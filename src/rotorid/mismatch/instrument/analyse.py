@@ -20,7 +20,7 @@ Gains of a reading that only look wrong because its characteristic is curved.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -164,12 +164,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
 
         return wrong_values(model.regression, selection, size, moving=False, refused=refused)
 
-    def among(model: ReadingModel, terms: list[Term]) -> ReadingModel:
-        kept = {t.key for t in terms}
-        active = [k for k in model.selection.active if k in kept]
-        return fitted_model(setup, terms, active, loadings, model.search.refused)
-
-    model = with_plainer_forms(model, among)
+    model = with_plainer_forms(model, loadings)
     if chain is None:
         reasons.update(
             {k: NO_ROTORS if setup.instrument.bench else "no commands are recorded" for k in before_the_rotors()}
@@ -464,20 +459,24 @@ def _parameters_of(model: ReadingModel, key: str) -> tuple[Estimate, ...]:
     )
 
 
-def with_plainer_forms(model: ReadingModel, again: Callable[[ReadingModel, list[Term]], ReadingModel]) -> ReadingModel:
+def with_plainer_forms(model: ReadingModel, loadings: tuple[Loading, ...] | None) -> ReadingModel:
     """The model with a plainer form of the same id wherever all numbers of a form may be nothing.
 
-    A form of two time constants explains more than one of one and says nothing of either. `again(model, terms)`
-    searches once more from a model's terms at work with others to choose from.
+    A form of two time constants explains more than one of one and says nothing of either. The search is run once more
+    without it; `loadings` are those of `first_model`.
     """
     for key in list(model.selection.active):
         term = model.search.terms[key]
         if term.effect in UNKNOWNS or key not in model.selection.active:
             continue
         alike = [t for t in model.terms if t.kind == "effect" and t.effect == term.effect]
-        plainer = [t for t in alike if len(t.form.parameters) < len(term.form.parameters)]
-        if plainer and rules.PLAINER_FORM(all(p.low <= 0.0 <= p.high for p in _parameters_of(model, key))):
-            model = again(model, [t for t in model.terms if t not in alike or t in plainer])
+        others = {t.key for t in alike if len(t.form.parameters) >= len(term.form.parameters)}
+        if len(others) == len(alike):
+            continue
+        if rules.PLAINER_FORM(all(p.low <= 0.0 <= p.high for p in _parameters_of(model, key))):
+            terms = [t for t in model.terms if t.key not in others]
+            active = [k for k in model.selection.active if k not in others]
+            model = fitted_model(model.setup, terms, active, loadings, model.search.refused)
     return model
 
 
