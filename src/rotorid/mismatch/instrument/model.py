@@ -606,6 +606,3 @@ def rows_of(setup: PreparedInstrument, terms: list[Term], loadings=None, at_work
                 at += 1
         out += [Rows(loading.run, times[p], small[p], x[p]) for p in pieces]
     return out
-
-
-__all__ = ["OFFSET", "VALUE_NAMES", "make_terms", "rows_of"]

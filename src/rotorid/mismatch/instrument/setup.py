@@ -14,7 +14,7 @@ import numpy as np
 
 from rotorid.effects.contract import Motion
 from rotorid.effects.hysteresis import NARROW, play
-from rotorid.effects.loading import CHANNELS, REST_S, InstrumentFacts, Loading, at_sensor, rotation_of, weight
+from rotorid.effects.loading import REST_S, InstrumentFacts, Loading, at_sensor, rotation_of, weight
 from rotorid.errors import InputError
 from rotorid.mismatch.evidence.motion import SLOW_S, expected_voltages, is_noise
 from rotorid.mismatch.evidence.rows import baseline_wrench
@@ -583,6 +583,3 @@ def averaged(values: np.ndarray, count: int) -> np.ndarray:
         return values
     whole = len(values) // count * count
     return values[:whole].reshape(len(values) // count, count, *values.shape[1:]).mean(axis=1)
-
-
-__all__ = ["CHANNELS", "PreparedInstrument", "averaged", "set_up"]
