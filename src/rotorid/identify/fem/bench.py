@@ -334,7 +334,7 @@ class Bench:
         return nodes[(off_hole < self.sizes.hole_radius_m / 2) & (own[:, 1] > self.sizes.hole_radius_m / 2)]
 
 
-def ask(bench: Bench, solved: Solved, cell_strain: float, geometry: Geometry) -> dict[str, float | str]:
+def _ask(bench: Bench, solved: Solved, cell_strain: float, geometry: Geometry) -> dict[str, float | str]:
     """The answers of a solved bench per newton of load, downwards in the middle of plate D.
 
     `deformation_m` and `stress_pa`: largest displacement [m/N] and equivalent stress [Pa/N], `deformed_most` and
@@ -380,7 +380,7 @@ def by_part(bench: Bench, solved: Solved) -> dict[str, dict[str, float]]:
 
 
 Answers = Mapping[str, Mapping[str, float | str]]
-"""What `ask` gives, by the material of the pieces."""
+"""What `_ask` gives, by the material of the pieces."""
 
 
 def solve(
@@ -392,7 +392,7 @@ def solve(
     of = {name: materials(sizes, moduli_pa, name) for name in MATERIALS}
     cell_strain = strain_per_newton(sizes, of["PLA"]["cells"], fineness)
     solved = {name: bench.solve(of[name]) for name in MATERIALS}
-    return bench, cell_strain, solved, {name: ask(bench, solved[name], cell_strain, geometry) for name in MATERIALS}
+    return bench, cell_strain, solved, {name: _ask(bench, solved[name], cell_strain, geometry) for name in MATERIALS}
 
 
 def ratios(found: Answers) -> dict[str, float]:

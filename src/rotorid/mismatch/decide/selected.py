@@ -69,7 +69,7 @@ def estimates(
     return tuple(out)
 
 
-def predicted(rows: Rows, cols: np.ndarray, beta: np.ndarray) -> np.ndarray:
+def _predicted(rows: Rows, cols: np.ndarray, beta: np.ndarray) -> np.ndarray:
     """What columns add to the residual, (n, 12)."""
     return rows.x[:, :, cols] @ beta
 
@@ -78,7 +78,7 @@ def main_channels(rows: list[Rows], cols: np.ndarray, beta: np.ndarray, noise: n
     """Channels in which a contribution is at least a third of its strongest, the strongest first."""
     energy = np.zeros(12)
     for r in rows:
-        energy += (predicted(r, cols, beta) ** 2).sum(axis=0)
+        energy += (_predicted(r, cols, beta) ** 2).sum(axis=0)
     size = np.sqrt(energy / sum(len(r.y) for r in rows)) / np.where(np.isfinite(noise), noise, np.inf)
     order = np.argsort(-size)
     return [int(c) for c in order if size[c] > 0.33 * size[order[0]]]

@@ -60,13 +60,13 @@ def question_of(believed: Vehicle, runs: Sequence[Run]) -> tuple[_Question, tupl
 
     That is not asked: what is derived from it may fail it, too, and no part of the model is to blame for it.
     """
-    answers = {question: question(believed) for question in questions(believed, runs)}
+    answers = {question: question(believed) for question in _questions(believed, runs)}
     asked = [question for question, why in answers.items() if not why]
     faults = (f"The believed vehicle itself is not fit to be flown: {why}." for why in answers.values() if why)
     return lambda vehicle: next((why for question in asked if (why := question(vehicle))), ""), tuple(faults)
 
 
-def questions(believed: Vehicle, runs: Sequence[Run]) -> tuple[_Question, ...]:
+def _questions(believed: Vehicle, runs: Sequence[Run]) -> tuple[_Question, ...]:
     """Everything that is asked, the cheapest first."""
     share, recorded = recorded_share(runs, believed), _recorded_hover(runs, believed)
     return (

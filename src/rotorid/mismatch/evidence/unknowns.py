@@ -25,7 +25,7 @@ def _to_body(motion, world):
     return np.einsum("nji,nj->ni", motion.rotation, world)
 
 
-def place(motion, vehicle, values, middle=0.0):
+def _place(motion, vehicle, values, middle=0.0):
     """F = Rᵀ (k_h (x, y), k_z z), position in the world from `middle` (3,), m: a spring or a cable to a fixed point."""
     k_h, k_z, north, east = values
     world = (motion.position - middle) * [k_h, k_h, k_z] + [north, east, 0.0]
@@ -67,7 +67,7 @@ def _place_forms(vehicle):
     spring = (Parameter("k_h", "N/m"), Parameter("k_z", "N/m"), Parameter("f_N", "N"), Parameter("f_E", "N"))
     return (
         Form("height", "F = Rᵀ (0, 0, k_z z)", (Parameter("k_z", "N/m"),), _height_only, ("position", "rotation")),
-        Form("place", "F = Rᵀ (f + K p)", spring, place, ("position", "rotation")),
+        Form("place", "F = Rᵀ (f + K p)", spring, _place, ("position", "rotation")),
     )
 
 

@@ -109,7 +109,7 @@ def leftover(
     on = [v for e in unknown for v in DEPENDS_ON[e.id]] + ([] if unknown else list(depends))
     on += ["time_s"] if slow else []
     on += ["run"] if any(c.between for c in left) else []
-    text = description(left, [e.sentence for e in unknown], slow, list(depends))
+    text = _description(left, [e.sentence for e in unknown], slow, list(depends))
     return tuple(c.name for c in left), tuple(dict.fromkeys(on)), text
 
 
@@ -169,7 +169,7 @@ def _channels_of(prepared, model, segments, full, added, slow, p_after, delivere
     return out
 
 
-def description(
+def _description(
     channels: Sequence[_ChannelLeftover],
     sentences: Sequence[str],
     slow: Mapping[str, tuple[float, float]],

@@ -485,7 +485,7 @@ def hats(values: np.ndarray) -> np.ndarray:
     return np.stack([np.interp(values, _KNOTS, row) for row in np.eye(len(_KNOTS))], axis=1)
 
 
-def freed(model: ReadingModel, key: str, beta: np.ndarray, channels: list[int]) -> list[np.ndarray]:
+def _freed(model: ReadingModel, key: str, beta: np.ndarray, channels: list[int]) -> list[np.ndarray]:
     """Columns of a term's free form on the rows of every part, (n, 6, m), apart in each of the channels."""
     cols = model.regression.columns([key])
     parts = [r.x[:, :, cols] @ beta for r in model.rows]
@@ -532,7 +532,7 @@ def _left_of(model: ReadingModel, value: str, strong: str, active: list[str], ch
     The value is as free as one that is called wrong.
     """
     fit, loose = model.regression.fit([*model.search.always, *active]), {value: WIDEST_TRUST}
-    small = _with_free(model, active, freed(model, strong, coefficients(model.regression, fit, strong)[0], channels))
+    small = _with_free(model, active, _freed(model, strong, coefficients(model.regression, fit, strong)[0], channels))
     every = [*model.search.always, *active]
     rest = [k for k in every if k != value]
     with_it = small.fit([_FREE, *every], loose=loose)

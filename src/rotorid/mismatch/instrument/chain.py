@@ -417,7 +417,7 @@ def _thinned(loadings: list[Loading]) -> list[Loading]:
     return loadings[::step] if len(loadings) >= 4 * step else loadings
 
 
-def candidates(setup: PreparedInstrument) -> list[tuple[str, SpeedForm]]:
+def _candidates(setup: PreparedInstrument) -> list[tuple[str, SpeedForm]]:
     """Forms that these recordings can test."""
     out = []
     for key, effect in catalogue().items():
@@ -467,7 +467,7 @@ def find_chain(setup: PreparedInstrument, others: list | None = None) -> ChainRe
     if not any(np.any(x.command > 0) for x in setup.loadings):
         return None
     problem = _ChainProblem(setup, others)
-    forms = candidates(setup)
+    forms = _candidates(setup)
     # What no form explains yet is no noise: whitened by it, slow steps of the command would leave their jumps alone.
     problem.learn((), problem.neutral(), coloured=False)
     best = problem.fit((), problem.neutral())

@@ -517,7 +517,7 @@ def make_terms(setup: PreparedInstrument) -> tuple[list[Term], dict[str, str]]:
         found, why = [], None
         for form in forms_of(effect, setup.instrument):
             if not effect.reading_forms:
-                lacking = lacks(form, setup)
+                lacking = _lacks(form, setup)
                 if lacking:
                     why = why or lacking
                     continue
@@ -529,7 +529,7 @@ def make_terms(setup: PreparedInstrument) -> tuple[list[Term], dict[str, str]]:
     return terms, reasons
 
 
-def lacks(form: Form, setup: PreparedInstrument) -> str | None:
+def _lacks(form: Form, setup: PreparedInstrument) -> str | None:
     """Why a form for a flight cannot be tested on this stand."""
     if any(name in _DISPLACED for name in form.requires):
         return _STILL

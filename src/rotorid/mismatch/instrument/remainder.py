@@ -219,7 +219,7 @@ def _entries(vehicle: Vehicle, instrument: InstrumentFacts) -> tuple[list[tuple[
     return found, chain
 
 
-def predicted(
+def _predicted(
     vehicle: Vehicle,
     instrument: InstrumentFacts,
     loading: Loading,
@@ -257,8 +257,8 @@ def prove(analysis: Analysis, written: Vehicle, reloaded: Vehicle, errors: Instr
     ours_of = instruments_of(analysis)
     volts = full_voltage_of(analysis.loadings)
     for loading in analysis.loadings:
-        ours = predicted(written, analysis.instrument, loading, volts, ours_of)
-        theirs = predicted(reloaded, analysis.instrument, loading, volts, errors)
+        ours = _predicted(written, analysis.instrument, loading, volts, ours_of)
+        theirs = _predicted(reloaded, analysis.instrument, loading, volts, errors)
         scale = max(float(np.abs(ours).max()), 1e-12)
         if not np.allclose(ours, theirs, rtol=0, atol=_SAME * scale):
             raise RuntimeError(f"improved_vehicle.yaml read back predicts another reading in {loading.run}")

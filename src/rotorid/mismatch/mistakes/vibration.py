@@ -71,7 +71,7 @@ class _Line:
 
 def find(recordings: ReadSet) -> Corrected:
     """A vibration that follows the rotors, if there is a clear one; the set stays as it is."""
-    signals = turning(recordings)
+    signals = _turning(recordings)
     turns = {order: [_turns(s, order, _MOST_MEASURED) for s in signals] for order in _ORDERS}
     lines = []
     for sensor, columns, unit in (
@@ -105,7 +105,7 @@ def find(recordings: ReadSet) -> Corrected:
     return Corrected(recordings, (finding,))
 
 
-def turning(recordings: ReadSet) -> list[Signals]:
+def _turning(recordings: ReadSet) -> list[Signals]:
     """Signals of the runs with their rotors' speed: as read, or as commanded, at the scale at which a line stands out.
 
     A command is followed late, and its full speed is only believed: half a window's turn too much hides a line.
