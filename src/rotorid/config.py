@@ -52,10 +52,6 @@ _WHOLE, _NUMBER = (
 )
 
 
-class ConfigError(InputError):
-    """A configuration that cannot be used; its text is one sentence for each wrong key."""
-
-
 class Section(BaseModel):
     """A group of keys: frozen, no key unknown, no value converted from another type."""
 
@@ -478,13 +474,13 @@ def check(values: Mapping[str, Any], source: str = "config.yaml") -> Config:
 
     Raises
     ------
-    ConfigError
+    InputError
         One sentence for each unknown key, missing key, wrong type or impossible value.
     """
     try:
         return Config.model_validate(dict(values))
     except ValidationError as error:
-        raise ConfigError("\n".join(f"{source}: {clause}" for clause in explained(error, Config))) from None
+        raise InputError("\n".join(f"{source}: {clause}" for clause in explained(error, Config))) from None
 
 
 def from_command_line(values: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:

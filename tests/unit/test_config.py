@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 import yaml
 
-from rotorid.config import SCHEMA_PATH, Config, ConfigError, check, schema_text
+from rotorid.config import SCHEMA_PATH, Config, check, schema_text
+from rotorid.errors import InputError
 
 ROOT = Path(__file__).parents[2]
 
@@ -33,7 +34,7 @@ def test_the_projects_own_files_are_valid(values: dict[str, Any]) -> None:
 
 def test_an_unknown_key_is_named_with_what_was_meant(values: dict[str, Any]) -> None:
     values["report"]["titel"] = "x"
-    with pytest.raises(ConfigError) as error:
+    with pytest.raises(InputError) as error:
         check(values)
     assert str(error.value) == "config.yaml: report.titel: no such key is known; did you mean title?"
 
@@ -41,33 +42,33 @@ def test_an_unknown_key_is_named_with_what_was_meant(values: dict[str, Any]) -> 
 def test_an_unknown_key_like_no_other_gets_the_known_ones(values: dict[str, Any]) -> None:
     values["report"]["zzz"] = 1
     with pytest.raises(
-        ConfigError, match=r"report\.zzz: no such key is known; known here are chapters, subtitle and title"
+        InputError, match=r"report\.zzz: no such key is known; known here are chapters, subtitle and title"
     ):
         check(values)
 
 
 def test_a_missing_key_is_named(values: dict[str, Any]) -> None:
     del values["report"]["title"]
-    with pytest.raises(ConfigError, match=r"^config\.yaml: report\.title: is missing$"):
+    with pytest.raises(InputError, match=r"^config\.yaml: report\.title: is missing$"):
         check(values)
 
 
 def test_a_wrong_type_is_named_with_value_and_what_is_expected(values: dict[str, Any]) -> None:
     values["recordings"] = 7
-    with pytest.raises(ConfigError, match=r"^config\.yaml: recordings: found 7, expected text$"):
+    with pytest.raises(InputError, match=r"^config\.yaml: recordings: found 7, expected text$"):
         check(values)
 
 
 def test_an_impossible_value_is_named(values: dict[str, Any]) -> None:
     values["report"]["chapters"] = ["introduction", "introduction"]
-    with pytest.raises(ConfigError, match=r"chapters must not name a chapter twice, but introduction is$"):
+    with pytest.raises(InputError, match=r"chapters must not name a chapter twice, but introduction is$"):
         check(values)
 
 
 def test_every_wrong_key_gets_its_own_line(values: dict[str, Any]) -> None:
     values["recordings"] = 7
     values["more"] = 1
-    with pytest.raises(ConfigError) as error:
+    with pytest.raises(InputError) as error:
         check(values)
     assert len(str(error.value).splitlines()) == 2
 

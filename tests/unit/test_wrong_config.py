@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from rotorid.config import ConfigError, check, from_command_line
+from rotorid.config import check, from_command_line
 from rotorid.errors import InputError
 from rotorid.identify.black_box import conformal_coverage, folds
 from rotorid_proof import plan
@@ -173,7 +173,7 @@ def with_value(key: str, value: Any) -> dict[str, Any]:
 
 @pytest.mark.parametrize(("key", "value", "said"), WRONG, ids=lambda x: repr(x)[:40])
 def test_a_wrong_value_is_named(key: str, value: Any, said: str) -> None:
-    with pytest.raises(ConfigError) as error:
+    with pytest.raises(InputError) as error:
         check(with_value(key, value))
     text = str(error.value)
     assert text.startswith(f"config.yaml: {key}")
@@ -185,7 +185,7 @@ def test_a_wrong_value_is_named(key: str, value: Any, said: str) -> None:
 
 @pytest.mark.parametrize(("key", "value", "said"), TOGETHER)
 def test_values_that_do_not_go_together_are_named(key: str, value: Any, said: str) -> None:
-    with pytest.raises(ConfigError) as error:
+    with pytest.raises(InputError) as error:
         check(with_value(f"grey_box.{key}", value))
     text = str(error.value)
     assert text.startswith("config.yaml: grey_box: ") and key in text and said in text
@@ -197,7 +197,7 @@ def test_a_misspelled_key_of_each_section_gets_the_right_one(section: str) -> No
     changed = copy.deepcopy(SOUND)
     key = next(iter(changed[section]))
     changed[section][key + "x"] = changed[section].pop(key)
-    with pytest.raises(ConfigError) as error:
+    with pytest.raises(InputError) as error:
         check(changed)
     assert f"{section}.{key}x: no such key is known; did you mean {key}?" in str(error.value)
 
@@ -279,7 +279,7 @@ def test_numbers_in_braces_on_the_command_line_are_read() -> None:
     ],
 )
 def test_a_wrong_value_in_braces_is_named(text: str, said: str) -> None:
-    with pytest.raises(ConfigError) as error:
+    with pytest.raises(InputError) as error:
         check(over(text))
     assert str(error.value).startswith(f"config.yaml: {said}") and len(str(error.value).splitlines()) == 1
 

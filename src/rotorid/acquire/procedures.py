@@ -36,7 +36,6 @@ _TARE_SAMPLES = 25
 
 Prompt = Callable[[str], Callable[[], bool]]
 """Asks a person for something and returns a function that says whether it is done, asked once per sample."""
-_Limits = Mapping[str, tuple[float, float]]
 
 
 @dataclass(frozen=True)
@@ -366,7 +365,7 @@ def recorders_for(
     setups: Mapping[str, Setup] | None = None,
     *,
     procedure: dict | None = None,
-    limits: _Limits | None = None,
+    limits: Mapping[str, tuple[float, float]] | None = None,
     say: Callable[[str], None] = lambda text: None,
     stop_asked: threading.Event | None = None,
     source: str | None = None,

@@ -86,7 +86,7 @@ def import_logs(
             return
         word = "run" if len(durations) == 1 else "runs"
         typer.echo(f"{folder}: {len(durations)} {word}, {sum(durations.values()):.0f} s, {', '.join(durations)}")
-        print_notes(made, folder)
+        _print_notes(made, folder)
         if refused:
             typer.echo(f"`rotorid verdict {folder}` will refuse the set: {refused}")
             if len(durations) == 1 and max(durations.values()) < LEAST_SINGLE_S:
@@ -154,7 +154,7 @@ def set_of(paths: list[Path], is_set: bool, target: Path, quiet: bool, *vehicle)
     folder = target / name_of(paths[0])
     made = make_set(paths, folder, *vehicle)
     if not quiet:
-        print_notes(made, folder)
+        _print_notes(made, folder)
     return folder
 
 
@@ -163,7 +163,7 @@ def name_of(path: Path) -> str:
     return path.resolve().name if path.is_dir() else path.name.split(".")[0]
 
 
-def print_notes(made: SetOfLogs, folder: Path) -> None:
+def _print_notes(made: SetOfLogs, folder: Path) -> None:
     """Print what was found in the logs and what is only proposed."""
     if made.sentences:
         typer.echo("Found in the logs:")

@@ -15,7 +15,7 @@ def scale(motion, vehicle, values):
     return Contribution(specific_force=np.asarray(values) * motion.accelerometer)
 
 
-def misalignment(motion, vehicle, values):
+def _misalignment(motion, vehicle, values):
     """a_m = a + θ × a: the sensor is turned by small angles θ."""
     return Contribution(specific_force=np.cross(np.asarray(values, float)[None, :], motion.accelerometer))
 
@@ -25,7 +25,7 @@ def _all_errors(motion, vehicle, values):
     total = (
         bias(motion, vehicle, values[:3]).specific_force
         + scale(motion, vehicle, values[3:6]).specific_force
-        + misalignment(motion, vehicle, values[6:9]).specific_force
+        + _misalignment(motion, vehicle, values[6:9]).specific_force
     )
     return Contribution(specific_force=total)
 
@@ -46,7 +46,7 @@ def forms(vehicle):
     return (
         Form("bias", "a_m = a + b", b, bias, needs, excited_by=bias_too),
         Form("scale", "a_m = (1 + s) a", s, scale, needs),
-        Form("misalignment", "a_m = a + θ × a", t, misalignment, needs),
+        Form("misalignment", "a_m = a + θ × a", t, _misalignment, needs),
         Form(
             "bias, scale and misalignment",
             "a_m = (1 + s) a + θ × a + b",

@@ -4,6 +4,8 @@ On a flight it is recognised before the physics (rotorid.mismatch.mistakes): it 
 reading lies on another clock than what loads it.
 """
 
+from operator import attrgetter
+
 import numpy as np
 
 from rotorid.effects.contract import Contribution, Effect, Form, Parameter, late_sensors
@@ -26,14 +28,6 @@ def at_other_times(loading, late_s):
     """The load `late_s` (n,) earlier less the load now, (n, 6)."""
     steps = np.arange(loading.size) - late_s / loading.dt_s
     return Contribution(reading=between_samples(loading.load, steps) - loading.load)
-
-
-def _since_run(loading):
-    return loading.run_time_s
-
-
-def _since_session(loading):
-    return loading.session_time_s
 
 
 def _other_rate(since_s):
@@ -73,9 +67,10 @@ def _forms(instrument, name, span_s, since_s, t):
 
 def reading_forms(instrument):
     """A clock that each run starts anew, and one that runs on through the session, as `time_s` then does."""
-    forms = _forms(instrument, "", instrument.duration_s, _since_run, "t")
+    forms = _forms(instrument, "", instrument.duration_s, attrgetter("run_time_s"), "t")
     if instrument.session_clock:
-        forms += _forms(instrument, " over the session", instrument.session_s, _since_session, "t_s")
+        since_s = attrgetter("session_time_s")
+        forms += _forms(instrument, " over the session", instrument.session_s, since_s, "t_s")
     return forms
 
 

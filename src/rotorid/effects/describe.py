@@ -115,7 +115,7 @@ _FormRow = tuple[tuple[str, ...], str, tuple[Parameter, ...], tuple[str, ...], t
 """Forms of one equation: names, equation, parameters, the columns that they need, and what they show with."""
 
 
-def columns_of(form: Form | SpeedForm | SetForm) -> tuple[str, ...]:
+def _columns_of(form: Form | SpeedForm | SetForm) -> tuple[str, ...]:
     """Columns of a run that a form needs (or, for a fault, spoils)."""
     if isinstance(form, SetForm):
         return tuple(dict.fromkeys(re.sub(r"\d+", "*", name) for name in form.columns))
@@ -157,10 +157,10 @@ def rows(effect: Effect, vehicle: Vehicle = EXAMPLE) -> list[_FormRow]:
         alike = (re.sub(r"(?<=[_,])\d+", "i", form.equation), len(form.parameters), type(form), form.parameters[0].unit)
         if alike in found and isinstance(form, SetForm | Form):
             names, _, parameters, columns, shows = found[alike]
-            columns = tuple(dict.fromkeys((*columns, *columns_of(form))))
+            columns = tuple(dict.fromkeys((*columns, *_columns_of(form))))
             found[alike] = (*names, form.name), alike[0], parameters, columns, shows
         else:
-            row = (form.name,), form.equation, form.parameters, columns_of(form), tuple(filter(None, excited))
+            row = (form.name,), form.equation, form.parameters, _columns_of(form), tuple(filter(None, excited))
             found[(*alike, form.name) if isinstance(form, SpeedForm) else alike] = row
     return list(found.values())
 
@@ -241,7 +241,7 @@ def in_full(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
     return "\n".join(out) + "\n"
 
 
-def section(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
+def _section(effect: Effect, vehicle: Vehicle = EXAMPLE) -> str:
     """One effect as a section of the page."""
     out = [f"### `{effect.id}`: {effect.name}\n", f"{_KINDS[effect.kind].capitalize()}: {effect.sentence}.\n"]
     table = [("", *row) for row in rows(effect, vehicle)]
@@ -272,7 +272,7 @@ def markdown() -> str:
     parts = [_INTRODUCTION]
     for kind, title in (("physics", "Physics"), ("sensor", "Sensors and logging"), ("mistake", "Mistakes in the set")):
         parts.append(f"## {title}\n")
-        parts += [section(e) for e in catalogue().values() if e.kind == kind]
+        parts += [_section(e) for e in catalogue().values() if e.kind == kind]
     return "\n".join(parts).rstrip() + "\n"
 
 

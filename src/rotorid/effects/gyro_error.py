@@ -18,7 +18,7 @@ def scale(motion, vehicle, values):
     )
 
 
-def misalignment(motion, vehicle, values):
+def _misalignment(motion, vehicle, values):
     """Ω_m = Ω + θ × Ω."""
     turn = np.asarray(values, float)[None, :]
     return Contribution(
@@ -51,7 +51,7 @@ def forms(vehicle):
     return (
         Form("bias", "Ω_m = Ω + b", b, bias, needs[:2], excited_by=("always",)),
         Form("scale", "Ω_m = (1 + s) Ω", s, scale, needs, of_reading=((0, 0), (1, 1), (2, 2))),
-        Form("misalignment", "Ω_m = Ω + θ × Ω", t, misalignment, needs),
+        Form("misalignment", "Ω_m = Ω + θ × Ω", t, _misalignment, needs),
         Form(
             "bias and scale",
             "Ω_m = (1 + s) Ω + b",

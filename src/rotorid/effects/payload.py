@@ -11,7 +11,7 @@ _LENGTHS_M = (0.15, 6.0)
 _DAMPING_RATIO = 0.03
 
 
-def slung(motion, vehicle, values):
+def _slung(motion, vehicle, values):
     """F = m_p (e·n + L |n'|²) n, n the cable's direction downward, e = g − a what hangs it; M = z ẑ × F.
 
     The hook is z below the centre of mass, moved by it alone; `values` are m_p (kg), m_p z (kg m), L (m) and ζ. Needs
@@ -40,7 +40,7 @@ def hanging_acceleration(motion):
 
 
 def _slung_in_air(motion, vehicle, values):
-    """As `slung`, but slowed by the air that it moves through and not by its swing: e = g − a − 2 ζ ω v."""
+    """As `_slung`, but slowed by the air that it moves through and not by its swing: e = g − a − 2 ζ ω v."""
     _, _, length_m, damping_ratio = values
     slowed = 2 * damping_ratio * np.sqrt(vehicle.gravity_m_s2 / length_m)
     through_air = np.einsum("nij,nj->ni", motion.rotation, motion.air_velocity)
@@ -135,7 +135,7 @@ def forms(vehicle):
             "slung",
             "F = m_p (e·n + L |n'|²) n, M = z ẑ × F, n'' = (e − (e·n) n)/L − |n'|² n − 2ζω n', e = g − a",
             cable,
-            slung,
+            _slung,
             ("specific_force", "rotation"),
             memory=True,
             swings=True,

@@ -6,7 +6,7 @@ from rotorid.effects.contract import Contribution, Effect, Form, Parameter
 from rotorid.effects.loading import turned
 
 
-def displaced(loading, vehicle, values):
+def _displaced(loading, vehicle, values):
     """M = M_0 + d × F, sensor axes."""
     moment = np.cross(np.asarray(values, float)[None, :], loading.load[:, :3])
     return Contribution(reading=np.concatenate([np.zeros((loading.size, 3)), moment], axis=1))
@@ -14,7 +14,7 @@ def displaced(loading, vehicle, values):
 
 def _in_plane(loading, vehicle, values):
     """The same without an offset in height."""
-    return displaced(loading, vehicle, (*values, 0.0))
+    return _displaced(loading, vehicle, (*values, 0.0))
 
 
 def _with_the_body(loading, vehicle, values):
@@ -33,7 +33,7 @@ def reading_forms(instrument):
     text = "M = M_0 + d × F"
     forms = [Form("in the plane", text, d[:2], _in_plane)]
     if any(c in instrument.loaded for c in (0, 1)):
-        forms.append(Form("in space", text, d, displaced))
+        forms.append(Form("in space", text, d, _displaced))
     if instrument.tilts and instrument.vehicle.sensor_mount == "level":
         forms.append(Form("in the plane, with the body", "M = M_0 + R d × F", d[:2], _with_the_body))
         forms.append(Form("in space, with the body", "M = M_0 + R d × F", d, _with_the_body))

@@ -21,7 +21,7 @@ def _thrust_part(gain, loading, vehicle):
     return at_sensor(force, moment, loading.motion, vehicle)
 
 
-def recirculation(loading, vehicle, values):
+def _recirculation(loading, vehicle, values):
     """T_i = C_F ω_i (ω_i − c LP_τ ω_i): air thrown out goes as the speed, and comes round as inflow after τ.
 
     Inflow w takes k ω w from the thrust of a turning rotor, and nothing from one at rest.
@@ -80,7 +80,7 @@ def reading_forms(instrument):
         tau = Parameter("tau", "s", shortest, 3 * span, nonlinear=True, starts=starts, meaning="time to come round")
         share = Parameter("c", "1", 0.0, 0.5, meaning="share of the thrust")
         text = "T = C_F ω² − c C_F ω (ω after a lag of τ)"
-        forms.append(Form("recirculation", text, (share, tau), recirculation, ("rotor_speed",)))
+        forms.append(Form("recirculation", text, (share, tau), _recirculation, ("rotor_speed",)))
         largest = Parameter("c_T", "1", 0.0, 0.5, meaning="share of the thrust when all have turned at their most")
         text = "T = C_F ω² (1 − c_T (ΣT after a lag of τ)/T_max)"
         together = _of_all_rotors(max(instrument.largest[2], 1e-6))

@@ -91,14 +91,14 @@ def by_equations(means: Means, lines: list[LineFit], geometry: Geometry) -> tupl
     return forces(cells, geometry), np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
 
 
-def by_matrix(means: Means, calibration: Calibration) -> tuple[np.ndarray, np.ndarray]:
+def by_matrix(means: Means, calibration: _Calibration) -> tuple[np.ndarray, np.ndarray]:
     """Force and its standard uncertainty, N, shape (n, 3) each, by the calibration matrix."""
     force = calibration.force(means.values)
     noise_v = np.sqrt(means.variance.mean(axis=0))
     return force, np.sqrt(np.diagonal(calibration.force_covariance(force, noise_v), axis1=1, axis2=2))
 
 
-def lateral_as_vertical(calibration: Calibration, lines: list[LineFit], geometry: Geometry) -> dict[str, dict]:
+def lateral_as_vertical(calibration: _Calibration, lines: list[LineFit], geometry: Geometry) -> dict[str, dict]:
     """What eq. 2.8 makes of one newton along x or y alone, N: `force_z_n`, and of it the absolute values' part.
 
     The cells answer as the matrix has measured it, so it is the equation that turns a lateral load into a vertical one.
@@ -114,7 +114,7 @@ def lateral_as_vertical(calibration: Calibration, lines: list[LineFit], geometry
     }
 
 
-def matrix_of(means: Means, largest_n: float, repeats: set[int] | None = None) -> Calibration:
+def matrix_of(means: Means, largest_n: float, repeats: set[int] | None = None) -> _Calibration:
     """Calibration matrix from loads along one axis at a time, up to `largest_n`; of some `repeats` only if given."""
     use = (np.linalg.norm(means.applied_n, axis=1) <= largest_n) & (means.sessions["axis"].str.len() == 1).to_numpy()
     if repeats is not None:
@@ -232,7 +232,7 @@ def methods_compared(table: pd.DataFrame) -> dict:
 
 
 @dataclass(frozen=True)
-class Calibration:
+class _Calibration:
     """The bench's answer to forces and its inverse."""
 
     response_v_n: np.ndarray
@@ -265,7 +265,7 @@ class Calibration:
         return np.einsum("ij,nj,kj->nik", self.matrix_n_v, variance, self.matrix_n_v)
 
 
-def calibrate(volts: np.ndarray, force_n: np.ndarray) -> Calibration:
+def calibrate(volts: np.ndarray, force_n: np.ndarray) -> _Calibration:
     """The bench's answer to loads of known direction.
 
     `volts`: mean tared voltages of the cells, V, shape (n, 6). `force_n`: known loads, N, shape (n, 3), body axes;
@@ -280,10 +280,10 @@ def calibrate(volts: np.ndarray, force_n: np.ndarray) -> Calibration:
     residual = np.sqrt((left**2).sum(axis=0) / freedom)
     weight = np.diag(1 / residual**2)
     inverse = np.linalg.solve(response @ weight @ response.T, response @ weight)
-    return Calibration(response.T, inverse, np.linalg.inv(force_n.T @ force_n), residual, freedom)
+    return _Calibration(response.T, inverse, np.linalg.inv(force_n.T @ force_n), residual, freedom)
 
 
-def as_dict(calibration: Calibration) -> dict:
+def as_dict(calibration: _Calibration) -> dict:
     """The calibration for a JSON file."""
     return {
         "response_v_n": calibration.response_v_n.tolist(),

@@ -58,8 +58,6 @@ class _CorrelatedFit:
     sandwich: np.ndarray
     """Covariance (p, p) by scores summed over blocks."""
     blocks: int
-    innovation: float
-    """Standard deviation of the whitened residuals."""
 
     def of(self, quantity: Callable[[np.ndarray], float]) -> EstimatedNumber:
         """A quantity of the values with its 95 % interval, by its derivative (numerical)."""
@@ -114,10 +112,8 @@ def fit(
     return _CorrelatedFit(values, *_covariances(jacobian, white, prior))
 
 
-def _covariances(
-    jacobian: np.ndarray, white: np.ndarray, prior: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, int, float]:
-    """The two covariances (p, p), the number of blocks and the residuals' deviation, of whitened rows."""
+def _covariances(jacobian: np.ndarray, white: np.ndarray, prior: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+    """The two covariances (p, p) and the number of blocks, of whitened rows."""
     freedom = max(len(white) - jacobian.shape[1], 1)
     variance = float(white @ white) / freedom
     belief = np.diag(np.where(np.isfinite(prior), 1.0 / prior**2, 0.0))
@@ -126,7 +122,7 @@ def _covariances(
     scores = np.add.reduceat(jacobian * white[:, None], edges, axis=0) / variance
     blocks = len(edges)
     meat = blocks / max(blocks - jacobian.shape[1], 1) * scores.T @ scores + belief
-    return bread, bread @ meat @ bread, blocks, float(np.sqrt(variance))
+    return bread, bread @ meat @ bread, blocks
 
 
 def autoregression(stretches: Sequence[np.ndarray]) -> np.ndarray:

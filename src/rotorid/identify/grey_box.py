@@ -241,15 +241,13 @@ def fit_coefficient_network(
     return coefficient(network, k_x, k_d), (k_x, k_d), network, epochs, mse
 
 
-def cut_windows(
-    rates: np.ndarray, moments: np.ndarray, dt_s: float, window_s: float, start: int = 0
-) -> tuple[np.ndarray, np.ndarray]:
+def cut_windows(rates: np.ndarray, moments: np.ndarray, dt_s: float, window_s: float) -> tuple[np.ndarray, np.ndarray]:
     """Rates and moments (w, m, 3) in consecutive windows of an evenly sampled flight (n, 3).
 
     Windows with missing samples are left out.
     """
     length = int(round(window_s / dt_s)) + 1
-    first = np.arange(start, len(rates) - length + 1, length - 1)
+    first = np.arange(0, len(rates) - length + 1, length - 1)
     index = first[:, None] + np.arange(length)
     good = np.isfinite(rates[index]).all((1, 2)) & np.isfinite(moments[index]).all((1, 2))
     return rates[index[good]], moments[index[good]]
@@ -325,7 +323,6 @@ class _OutputErrorFit:
     residual_rms: np.ndarray
     explained: np.ndarray
     windows: int
-    iterations: int
 
     @property
     def inertias(self) -> np.ndarray:
@@ -431,7 +428,7 @@ def fit_output_error(
     covariance = count / max(count - len(parameters), 1) * inverse @ (clustered.T @ clustered) @ inverse
     spread = rates - rates.mean(axis=1, keepdims=True)
     explained = 1.0 - scale**2 / np.mean(spread**2, axis=(0, 1))
-    return _OutputErrorFit(parameters, covariance, scale, explained, w, iteration + 1)
+    return _OutputErrorFit(parameters, covariance, scale, explained, w)
 
 
 def printed_coefficient(

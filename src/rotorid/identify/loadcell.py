@@ -290,7 +290,7 @@ class _Outliers:
     """False for too few points, or too many at one reading: then nothing is flagged."""
 
 
-def find_outliers(x: Sequence[float], y: Sequence[float], tests: int, level: float = FLAG_LEVEL) -> _Outliers:
+def find_outliers(x: Sequence[float], y: Sequence[float], tests: int) -> _Outliers:
     """Points of y over x, shape (n,) each, that lie off their line; at most a third of them.
 
     `tests` is the number of points among which none should be flagged by chance, those of other lines included.
@@ -308,7 +308,7 @@ def find_outliers(x: Sequence[float], y: Sequence[float], tests: int, level: flo
         distance = np.abs(_studentised(x, y, kept, floor))
         distance[kept] = np.inf
         nearest = int(np.argmin(distance))
-        if distance[nearest] > _limit(kept.sum() - 2, tests * most, level):
+        if distance[nearest] > _limit(kept.sum() - 2, tests * most):
             break
         kept[nearest] = True
     studentised = _studentised(x, y, kept, floor)
@@ -318,12 +318,12 @@ def find_outliers(x: Sequence[float], y: Sequence[float], tests: int, level: flo
         if np.ptp(x[others]) > 0:
             studentised[i] = _studentised(x, y, others, floor)[i]
     line = whole if kept.all() else fit_line(x[kept], y[kept])
-    return _Outliers(~kept, studentised, _limit(kept.sum() - 2, tests * most, level), line, True)
+    return _Outliers(~kept, studentised, _limit(kept.sum() - 2, tests * most), line, True)
 
 
-def _limit(freedom: int, tests: int, level: float) -> float:
-    """Student's t that none of `tests` residuals exceeds but in a share `level` of cases."""
-    return float(-student_quantile(freedom, level / (2 * tests)))
+def _limit(freedom: int, tests: int) -> float:
+    """Student's t that none of `tests` residuals exceeds but in a share FLAG_LEVEL of cases."""
+    return float(-student_quantile(freedom, FLAG_LEVEL / (2 * tests)))
 
 
 def _studentised(x: np.ndarray, y: np.ndarray, kept: np.ndarray, floor: float) -> np.ndarray:

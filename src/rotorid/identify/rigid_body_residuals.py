@@ -31,6 +31,9 @@ _ORDER = 2
 _PAPER_MASS_KG = 0.752
 _POINT_STEP = 40
 """Every so many samples become a point of the figure."""
+_REPEATS = 400
+"""Of the bootstrap."""
+_FEWEST_BLOCKS = 5
 _MODELS = ("rigid_body", "neurobem")
 _FLIGHT_COLUMNS = ["flight", "model", "airspeed_mean_m_s", "airspeed_max_m_s", *_CHANNELS, *_TOTALS]
 _BIN_COLUMNS = ["model", "channel", "airspeed_low_m_s", "airspeed_high_m_s", "samples"]
@@ -91,8 +94,6 @@ def by_airspeed(
     edges_m_s: Sequence[float],
     block_s: float,
     rng: np.random.Generator,
-    repeats: int = 400,
-    fewest_blocks: int = 5,
 ) -> dict[str, np.ndarray]:
     """RMS residual against airspeed over all runs, intervals by resampling blocks of time.
 
@@ -101,7 +102,7 @@ def by_airspeed(
     the fastest bin over RMS in the slowest, with `growth_95` (2, 8).
 
     `residuals`: per run, shape (n, 6). `airspeeds`, `times_s`: per run, shape (n,). `edges_m_s`: edges of the bins.
-    `block_s`: length of a block. `fewest_blocks`: a bin seen in fewer blocks is left out.
+    `block_s`: length of a block. A bin seen in fewer than five blocks is left out.
     """
     edges = np.asarray(edges_m_s, float)
     bins = len(edges) - 1
@@ -117,10 +118,10 @@ def by_airspeed(
         squares.append(total)
         counts.append(number)
     squares, counts = np.concatenate(squares), np.concatenate(counts)
-    kept = (counts > 0).sum(axis=0) >= fewest_blocks
+    kept = (counts > 0).sum(axis=0) >= _FEWEST_BLOCKS
     squares, counts = squares[:, kept], counts[:, kept]
     blocks = len(counts)
-    draws = rng.multinomial(blocks, np.full(blocks, 1 / blocks), size=repeats).astype(float)
+    draws = rng.multinomial(blocks, np.full(blocks, 1 / blocks), size=_REPEATS).astype(float)
     number = draws @ counts
     total = np.einsum("rb,bkc->rkc", draws, squares)
     spread = np.sqrt(total / np.where(number > 0, number, np.nan)[:, :, None])

@@ -250,7 +250,7 @@ def weight_wrench(mass_kg: float, gravity_m_s2: float, centre_m: np.ndarray, rot
 
 
 @dataclass(frozen=True)
-class Steady:
+class _Steady:
     """Mean wrench of one stretch, N and N m, shape (6,), and its standard error from the means of some blocks."""
 
     mean: np.ndarray
@@ -264,7 +264,7 @@ class Steady:
         return student_quantile(self.blocks - 1, 0.975) * self.error
 
 
-def _steady_mean(run: Run, start_s: float, stop_s: float, periods: int | None = None) -> Steady:
+def _steady_mean(run: Run, start_s: float, stop_s: float, periods: int | None = None) -> _Steady:
     """Mean wrench between two times, which hold `periods` of a periodic signal if given.
 
     Raises InputError for fewer than two samples.
@@ -274,7 +274,7 @@ def _steady_mean(run: Run, start_s: float, stop_s: float, periods: int | None = 
         raise InputError(f"{run.name}: no samples between {start_s:.2f} and {stop_s:.2f} s")
     blocks = periods or block_count(int(inside.sum()))
     pairs = [mean_and_error(column, blocks) for column in run.array(WRENCH)[inside].T]
-    return Steady(np.array([m for m, _ in pairs]), np.array([e for _, e in pairs]), int(inside.sum()), blocks)
+    return _Steady(np.array([m for m, _ in pairs]), np.array([e for _, e in pairs]), int(inside.sum()), blocks)
 
 
 @dataclass(frozen=True)
@@ -287,10 +287,10 @@ class _Evaluated:
     throttle: np.ndarray
     """Mean throttles of the steady stretch, shape (4,)."""
     voltage_v: float
-    rest: Steady
+    rest: _Steady
     drift: np.ndarray
     """Rest after minus rest before, shape (6,)."""
-    steady: Steady
+    steady: _Steady
     """With the rest reading (interpolated between before and after) taken off; the rest's error is in it."""
     start_s: float
     stop_s: float
@@ -325,7 +325,7 @@ def evaluate(run: Run, frequency_hz: float | None) -> _Evaluated:
     share = ((start + stop) / 2 - first) / (last - first)
     rest = before.mean + share * (after.mean - before.mean)
     rest_error = np.hypot((1 - share) * before.error, share * after.error)
-    steady = Steady(loaded.mean - rest, np.hypot(loaded.error, rest_error), loaded.samples, loaded.blocks)
+    steady = _Steady(loaded.mean - rest, np.hypot(loaded.error, rest_error), loaded.samples, loaded.blocks)
     inside = (run.time_s >= start) & (run.time_s <= stop)
     return _Evaluated(
         name=run.name,

@@ -179,9 +179,9 @@ class Instrument:
             raise Malformed(f"a {self.name} sample has {self.layout.size} bytes, this one has {len(payload)}")
 
 
-def _counts(columns: list[str], code: str, scale: float, high: int, low: int | None = None) -> tuple:
-    """Channels of one kind; the range is symmetric unless `low` is given."""
-    return tuple(_WireChannel(name, code, scale, -high if low is None else low, high) for name in columns)
+def _counts(columns: list[str], code: str, scale: float, high: int) -> tuple:
+    """Channels of one kind and of symmetric range."""
+    return tuple(_WireChannel(name, code, scale, -high, high) for name in columns)
 
 
 _COMMON_COMMANDS = {

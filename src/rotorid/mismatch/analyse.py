@@ -191,7 +191,7 @@ def _account(
     fit, plain_fit = scaled_by_run(seen, fit), scaled_by_run(seen, plain_fit)
     delivered = residuals_of(seen, fit)
     before, after, depends = dependence(seen.prepared, seen, seen.segments, seen.noisy_segments)
-    left = leftover(
+    unexplained_channels, depends_on, description = leftover(
         seen.prepared,
         seen,
         seen.segments,
@@ -223,9 +223,9 @@ def _account(
         p_values={c: (before[c], after[c]) for c in before},
         regimes=_regimes_by_run(seen.segments, seen.prepared),
         winds=_winds_of(seen),
-        unexplained_channels=left.channels,
-        unexplained_depends_on=left.depends_on,
-        unexplained_description=left.description,
+        unexplained_channels=unexplained_channels,
+        unexplained_depends_on=depends_on,
+        unexplained_description=description,
         next_manoeuvre=fly.manoeuvre,
         next_separates=fly.separates,
         force_source=model.segments[0].force_source,

@@ -13,14 +13,15 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 from rotorid.errors import InputError
+from rotorid.io.models import KnownKeys
 from rotorid.io.text.files import read_yaml, with_exponents
 from rotorid.io.text.wording import hint
 
 _Range = tuple[float, float]
-T = TypeVar("T", bound=BaseModel)
+_Kind = TypeVar("_Kind", bound=KnownKeys)
 _GRAVITY_M_S2 = 9.81
 _RAMP_S = 2.0
 _SLOW_RAMP_S = 4.0
@@ -381,10 +382,8 @@ def _number(value: object) -> object:
     return value
 
 
-class Limits(BaseModel):
+class Limits(KnownKeys, frozen=True, allow_inf_nan=False):
     """Limits of a flight; x and y are from the place of the start, heights above the ground, all in SI but degrees."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     x_m: _Range = (-3.0, 3.0)
     """North of the start, lowest and highest."""
@@ -456,10 +455,8 @@ class Limits(BaseModel):
         return (sum(self.x_m) / 2, sum(self.y_m) / 2, (self.height_m[0] + top) / 2)
 
 
-class SessionLimits(BaseModel):
+class SessionLimits(KnownKeys, frozen=True, allow_inf_nan=False):
     """Limits of a session on a stand or bench."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     duration_s: float = Field(600.0, ge=30, le=14400)
     """Of all steps together."""
@@ -475,7 +472,7 @@ class SessionLimits(BaseModel):
     _numbers = field_validator("*", mode="before")(_number)
 
 
-def read_limits(path: Path | None, kind: type[T] = Limits) -> T:
+def read_limits(path: Path | None, kind: type[_Kind] = Limits) -> _Kind:
     """Limits of a flight, or of another `kind`, from a file; the usual ones without any.
 
     Raises InputError: the file is not there, is no YAML, or states something that cannot be; one sentence.

@@ -37,7 +37,6 @@ from rotorid.plan.separation import (
     of_flights,
     of_set,
     separations,
-    smallest_separation,
     step_of,
     world_of,
 )
@@ -72,6 +71,11 @@ _LEAST_PROGRESS = 0.01
 """Share of the way to the goal that a further manoeuvre must bring."""
 
 
+def _smallest_separation(questions: Questions) -> float | None:
+    """Smallest separation expected over all questions; None where nothing is compared."""
+    return min((s.sigma for _, found in questions for s in found), default=None)
+
+
 @dataclass(frozen=True)
 class Handled:
     """A step by hand with the hover after it, and what is expected of both next to the set at hand."""
@@ -99,7 +103,7 @@ class Handled:
     @property
     def sigma(self) -> float | None:
         """Smallest separation expected; None where nothing is compared."""
-        return smallest_separation(self.questions)
+        return _smallest_separation(self.questions)
 
 
 def _steps_for(known: FittedSet) -> list[tuple[list[ChangedVehicle], list[Question]]]:
@@ -296,7 +300,7 @@ class Forecast:
     @property
     def sigma(self) -> float | None:
         """Smallest separation expected over all questions; None where nothing is compared."""
-        return smallest_separation(self.questions)
+        return _smallest_separation(self.questions)
 
     def reached(self, target_sigma: float) -> float:
         """Share of the way to all goals."""

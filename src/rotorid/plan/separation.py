@@ -477,8 +477,3 @@ def chain_separations(
 
 Questions = tuple[tuple[tuple[str, ...], tuple[Separation, ...]], ...]
 """Ids of each open question, and how far apart their models will be."""
-
-
-def smallest_separation(questions: Questions) -> float | None:
-    """Smallest separation expected over all questions; None where nothing is compared."""
-    return min((s.sigma for _, found in questions for s in found), default=None)

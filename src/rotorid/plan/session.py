@@ -108,13 +108,7 @@ def known_instrument(recordings: RecordingSet, claimed: Collection[str] | None =
     measured = all(x.measured for x in setup.loadings)
     loadings = None if chain is None or measured else moved(setup, chain)
     model = fitted_model(setup, terms, loadings=loadings)
-
-    def among(model: ReadingModel, terms: list[Term]) -> ReadingModel:
-        kept = {t.key for t in terms}
-        active = [k for k in model.selection.active if k in kept]
-        return fitted_model(setup, terms, active, loadings, model.search.refused)
-
-    model = with_plainer_forms(model, among)
+    model = with_plainer_forms(model, loadings)
     holder = KnownInstrument(recordings, model, chain, (), ())
     questions, unanswerable = [], [(f.alternatives, f.sentence) for f in mistakes if f.status == "ambiguous"]
     inside = with_probabilities(reading_findings(model), chosen_already(model))

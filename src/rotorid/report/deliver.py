@@ -36,7 +36,7 @@ from rotorid.mismatch.deliver.files import (
 from rotorid.mismatch.deliver.files import text_of as file_text
 from rotorid.mismatch.deliver.flown import model_of
 from rotorid.mismatch.flight.fitted import Watch, unwatched
-from rotorid.mismatch.tell.forward import Forward, forward_channels, prove
+from rotorid.mismatch.tell.forward import forward_channels, prove
 from rotorid.mismatch.tell.locate import locate
 from rotorid.mismatch.tell.steps import steps_sentence, tiles
 from rotorid.mismatch.tell.verdict import Verdict, main_channel, make_verdict, with_doubts
@@ -101,7 +101,7 @@ def judge(recordings: RecordingSet) -> Verdict:
 @_ONE_THREAD
 def verdict_of(analysis: Analysis) -> Verdict:
     """The verdict that an analysis amounts to."""
-    forward = forward_channels(analysis).channels if analysis.instrument is None else {}
+    forward = forward_channels(analysis)[0] if analysis.instrument is None else {}
     return _with_first_details(make_verdict(analysis, locate(analysis), forward), analysis)
 
 
@@ -134,18 +134,18 @@ def write_files(analysis: Analysis, verdict_path: Path, page_path: Path, improve
         )
         reloaded = read_vehicle(improved_part)
         if analysis.instrument is None:
-            forward = forward_channels(analysis)
-            prove(analysis, model_of(reloaded, conditions, instruments), forward)
+            forward, notes = forward_channels(analysis)
+            prove(analysis, model_of(reloaded, conditions, instruments), forward, notes)
         else:
             from rotorid.mismatch.instrument.remainder import prove as prove_reading
 
-            forward = Forward({})
+            forward, notes = {}, ()
             prove_reading(analysis, improved, reloaded, instruments)
-        verdict = _with_first_details(make_verdict(analysis, locations, forward.channels), analysis)
+        verdict = _with_first_details(make_verdict(analysis, locations, forward), analysis)
         verdict_part.write_text(verdict.text(), encoding="utf-8")
         decided = ledger(analysis, verdict)
         ledger_part.write_text(text_of(decided), encoding="utf-8")
-        page_part.write_text(make_page(analysis, verdict, forward.notes, decided), encoding="utf-8")
+        page_part.write_text(make_page(analysis, verdict, notes, decided), encoding="utf-8")
     return verdict
 
 

@@ -258,7 +258,7 @@ def _in_rotorpy(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindo
     return out
 
 
-def in_mujoco(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow]) -> list[States]:
+def _in_mujoco(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow]) -> list[States]:
     """MuJoCo with the exported model and its companion; the thrusts are set at every step."""
     import mujoco
 
@@ -316,7 +316,7 @@ FLYERS: dict[str, tuple[str, str, Callable[[Vehicle, Exported, Sequence[LogWindo
     "px4-sih": ("PX4's SIH by its published equations", "", in_sih),
     "ardupilot-json": ("ArduPilot's simulated frame by its published equations", "", in_ardupilot),
     "rotorpy": ("RotorPy", "rotorpy", _in_rotorpy),
-    "mjcf": ("MuJoCo", "mujoco", in_mujoco),
+    "mjcf": ("MuJoCo", "mujoco", _in_mujoco),
     "sdf": ("our simulator with what the SDF file expresses", "", as_expressed("sdf")),
     "gym-pybullet-drones": ("our simulator with what the URDF expresses", "", as_expressed("gym-pybullet-drones")),
 }

@@ -39,22 +39,22 @@ def test_forward_errors_are_those_computed_by_hand():
     runs = tuple(
         replace(r, table=r.table.assign(velocity_x_m_s=5.0, position_x_m=5.0 * r.time_s)) for r in made.recordings.runs
     )
-    forward = forward_channels(replace(made, recordings=replace(made.recordings, runs=runs)))
-    velocity = forward.channels["velocity"].rmse.held_out
+    channels, _ = forward_channels(replace(made, recordings=replace(made.recordings, runs=runs)))
+    velocity = channels["velocity"].rmse.held_out
     assert velocity.before == pytest.approx(0, abs=1e-6)
     # dv = a t with a = K_D · 4 ω · v / m; steps of 10 ms to 0.5 s: the mean of t² is 0.5² · 51 · 101 / (6 · 50²).
     slowing = K_D * 4 * HOVER * SPEED_M_S / 0.652
     assert velocity.after == pytest.approx(slowing * 0.5 * math.sqrt(51 * 101 / (6 * 50**2)), rel=0.1)
-    assert forward.channels["attitude"].rmse.held_out.after == pytest.approx(0, abs=1e-6)
+    assert channels["attitude"].rmse.held_out.after == pytest.approx(0, abs=1e-6)
 
 
 def test_a_vehicle_that_is_not_the_model_is_refused():
     made = analysis(findings=[drag_finding()])
     forward = forward_channels(made)
-    prove(made, delivered_model(made), forward)
+    prove(made, delivered_model(made), *forward)
     wrong = replace(made, findings=(drag_finding(values=(2 * K_D,)),))
     with pytest.raises(RuntimeError, match="improved_vehicle.yaml"):
-        prove(made, delivered_model(wrong), forward)
+        prove(made, delivered_model(wrong), *forward)
 
 
 @pytest.mark.parametrize(

@@ -44,8 +44,6 @@ from rotorid.acquire.emulators.truth import (
     VehicleTruth,
     body_forces,
     cell_response,
-    direction_of,
-    put_down,
 )
 
 _RPM = 60 / (2 * math.pi)
@@ -64,6 +62,22 @@ _LOADS_N = np.linspace(0.35, 9.39, 8)
 """Of the static tests."""
 _SENSES = {"x": 1.0, "y": 1.0, "z": -1.0}
 """In which sense weights pull along each axis; thrust is along −z."""
+_SPREAD = 1e-4
+_SPREAD_GF = 0.08
+"""Of a weight from one time that it is put down to the next, one sigma."""
+
+
+def _direction_of(axis: str) -> np.ndarray:
+    """Unit vector of a load along one axis, or along several alike (`xz`: halfway between x and z)."""
+    together = sum(AXES[letter] for letter in axis)
+    return together / np.linalg.norm(together)
+
+
+def _put_down(load_gf: float, rng: np.random.Generator) -> float:
+    """Force in N that a weight in gf exerts this time: none is put down twice in quite the same place."""
+    if load_gf == 0:
+        return 0.0
+    return (load_gf * (1 + _SPREAD * rng.standard_normal()) + _SPREAD_GF * rng.standard_normal()) * GF_N
 
 
 @lru_cache(maxsize=64)
@@ -111,10 +125,10 @@ class BenchPhysics:
     def place_load(self, axis: str, load_gf: float) -> None:
         """Put a weight on (or, with 0, take all off); the direction is never quite the same twice. `axis` names
         one axis, or several along which the weight pulls alike."""
-        load_n = put_down(load_gf, self._rng)
+        load_n = _put_down(load_gf, self._rng)
         if axis != "z":
             load_n *= 1 - self._bench.pulley_loss * self._rng.random()
-        direction = direction_of(axis)
+        direction = _direction_of(axis)
         spread = max(self._bench.misalignment_rad["xyz".index(letter)] for letter in axis)
         slant = spread * self._rng.standard_normal(3)
         direction = direction + np.cross(slant, direction)
@@ -156,7 +170,7 @@ class CellClamp:
 
     def place_load(self, axis: str, load_gf: float) -> None:
         """Put a weight on the cell's plate; the axis is the cell's own."""
-        load_n = put_down(load_gf, self._rng)
+        load_n = _put_down(load_gf, self._rng)
         self._load_n = np.array([load_n])
 
     def process(self, dt_s: float) -> None:
@@ -362,7 +376,7 @@ class LoadedSensor:
 
     def place_load(self, axis: str, load_gf: float) -> None:
         """A weight along +x, +y or, like thrust, −z."""
-        self._load = np.concatenate([AXES[axis] * put_down(load_gf, self._rng), np.zeros(3)])
+        self._load = np.concatenate([AXES[axis] * _put_down(load_gf, self._rng), np.zeros(3)])
 
     def drive(self, force) -> None:
         """A force on the body, N, shape (3,), as a function of the time from now on in s."""

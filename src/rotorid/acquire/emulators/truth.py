@@ -7,8 +7,6 @@ The bench's geometry: cell forces to body forces (thesis eqs 2.3–2.9, table 2.
 
 The recorder shows forces with it; the emulated bench uses the inverse. The pipeline has its own
 implementation, so that one can be checked against the other.
-
-Weights as an operator puts them down: never twice in quite the same place.
 """
 
 from __future__ import annotations
@@ -74,23 +72,6 @@ def cell_response() -> np.ndarray:
     if (vertical[[0, 2, 4]] <= 0).any():
         raise AssertionError("cells 1, 3 and 5 must be pulled by a force along -z")
     return np.column_stack([lateral, vertical])
-
-
-def direction_of(axis: str) -> np.ndarray:
-    """Unit vector of a load along one axis, or along several alike (`xz`: halfway between x and z)."""
-    together = sum(AXES[letter] for letter in axis)
-    return together / np.linalg.norm(together)
-
-
-_SPREAD = 1e-4
-_SPREAD_GF = 0.08
-
-
-def put_down(load_gf: float, rng: np.random.Generator) -> float:
-    """Force in N that a weight in gf exerts this time; no weight exerts none."""
-    if load_gf == 0:
-        return 0.0
-    return (load_gf * (1 + _SPREAD * rng.standard_normal()) + _SPREAD_GF * rng.standard_normal()) * GF_N
 
 
 class CellsTruth(KnownKeys, frozen=True):

@@ -277,7 +277,7 @@ class Bench:
         for piece, part, pad in self.bonds:
             own = self.body.nodes_of(piece)
             own = own[on(pad, nodes[own])]
-            bonds.append(Bound(own, self.body.weights(nodes[own], part), np.eye(3)))
+            bonds.append((own, self.body.weights(nodes[own], part), np.eye(3)))
         fixed = np.zeros((3, len(nodes)), bool)
         foot = self.body.nodes_of("A")
         fixed[:, foot[on(self.base, nodes[foot])]] = True
@@ -302,7 +302,7 @@ class Bench:
         if len(first) != len(last) or distance.max() > 1e-8:
             raise InputError("the two faces of the cut through plate D have different meshes")
         weights = sparse.csr_matrix((np.ones(len(last)), (np.arange(len(last)), first[match])), (len(last), len(nodes)))
-        return axis, Bound(last, weights, matrix)
+        return axis, (last, weights, matrix)
 
     @cached_property
     def seat(self) -> np.ndarray:
@@ -334,7 +334,7 @@ class Bench:
         return nodes[(off_hole < self.sizes.hole_radius_m / 2) & (own[:, 1] > self.sizes.hole_radius_m / 2)]
 
 
-def ask(bench: Bench, solved: Solved, cell_strain: float, geometry: Geometry) -> dict[str, float | str]:
+def _ask(bench: Bench, solved: Solved, cell_strain: float, geometry: Geometry) -> dict[str, float | str]:
     """The answers of a solved bench per newton of load, downwards in the middle of plate D.
 
     `deformation_m` and `stress_pa`: largest displacement [m/N] and equivalent stress [Pa/N], `deformed_most` and
@@ -380,7 +380,7 @@ def by_part(bench: Bench, solved: Solved) -> dict[str, dict[str, float]]:
 
 
 Answers = Mapping[str, Mapping[str, float | str]]
-"""What `ask` gives, by the material of the pieces."""
+"""What `_ask` gives, by the material of the pieces."""
 
 
 def solve(
@@ -392,7 +392,7 @@ def solve(
     of = {name: materials(sizes, moduli_pa, name) for name in MATERIALS}
     cell_strain = strain_per_newton(sizes, of["PLA"]["cells"], fineness)
     solved = {name: bench.solve(of[name]) for name in MATERIALS}
-    return bench, cell_strain, solved, {name: ask(bench, solved[name], cell_strain, geometry) for name in MATERIALS}
+    return bench, cell_strain, solved, {name: _ask(bench, solved[name], cell_strain, geometry) for name in MATERIALS}
 
 
 def ratios(found: Answers) -> dict[str, float]:

@@ -360,16 +360,9 @@ def von_mises(stress: np.ndarray) -> np.ndarray:
     return np.sqrt(1.5 * np.einsum("ab...,ab...->...", deviator, deviator))
 
 
-@dataclass(frozen=True)
-class Bound:
-    """Nodes that follow others: each row of a node's displacement as weights of others' displacements."""
-
-    nodes: np.ndarray
-    """Shape (k,)."""
-    weights: sparse.csr_matrix
-    """Shape (k, n)."""
-    turn: np.ndarray
-    """Matrix that turns what they follow, shape (3, 3)."""
+Bound = tuple[np.ndarray, sparse.csr_matrix, np.ndarray]
+"""Nodes that follow others, shape (k,), each row of their displacements as weights of others', shape (k, n), and the
+matrix that turns what they follow, shape (3, 3)."""
 
 
 def constraints(nodes: int, bound: Sequence[Sequence[Bound]], fixed: np.ndarray) -> sparse.csr_matrix:
@@ -382,12 +375,11 @@ def constraints(nodes: int, bound: Sequence[Sequence[Bound]], fixed: np.ndarray)
     for stage in bound:
         keep = np.ones(nodes)
         moved = [[sparse.csr_matrix((nodes, nodes)) for _ in range(3)] for _ in range(3)]
-        for one in stage:
-            keep[one.nodes] = 0
-            k = len(one.nodes)
-            put = sparse.csr_matrix((np.ones(k), (one.nodes, np.arange(k))), (nodes, k))
-            for a, b in np.argwhere(one.turn != 0):
-                moved[a][b] = moved[a][b] + one.turn[a, b] * (put @ one.weights)
+        for own, weights, turn in stage:
+            keep[own] = 0
+            put = sparse.csr_matrix((np.ones(len(own)), (own, np.arange(len(own)))), (nodes, len(own)))
+            for a, b in np.argwhere(turn != 0):
+                moved[a][b] = moved[a][b] + turn[a, b] * (put @ weights)
         whole = whole @ (sparse.bmat(moved, format="csr") + sparse.diags(np.tile(keep, 3)))
     used = np.asarray(abs(whole).sum(axis=0)).ravel() > 0
     return whole[:, np.flatnonzero(used & ~fixed.ravel())]

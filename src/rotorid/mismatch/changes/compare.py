@@ -124,7 +124,7 @@ class Change:
 
 
 @dataclass(frozen=True)
-class Residual:
+class _Residual:
     """What a believed vehicle leaves of one force (N) or moment (N m) in a stretch."""
 
     time_s: np.ndarray
@@ -145,7 +145,7 @@ class Changes:
     """By how much everything else may have changed at most, with 95 % probability; of a value relative."""
     values: tuple[Estimate, ...]
     """Of every believed value its relative change with 95 % interval, changed or not."""
-    residuals: tuple[Mapping[str, Residual], Mapping[str, Residual]]
+    residuals: tuple[Mapping[str, _Residual], Mapping[str, _Residual]]
     """Of the longest stretch of each set, by channel."""
     notes: tuple[str, ...] = ()
     """What keeps the two sets from being compared fully, in sentences."""
@@ -370,11 +370,11 @@ def changes_in(options: Sequence[ChainOption], prior: Prior) -> tuple[Statement,
     return tuple(out)
 
 
-def _residuals_of(rows: Sequence[Rows]) -> dict[str, Residual]:
+def _residuals_of(rows: Sequence[Rows]) -> dict[str, _Residual]:
     """What is left in the longest stretch, by channel that the set has."""
     longest = max(rows, key=lambda own: len(own.time_s))
     known = [c for c in range(CHANNELS_OF_WRENCH) if np.isfinite(longest.y[:, c]).all()]
-    return {CHANNELS[c]: Residual(longest.time_s, longest.y[:, c]) for c in known}
+    return {CHANNELS[c]: _Residual(longest.time_s, longest.y[:, c]) for c in known}
 
 
 def _values_of(found: Found, base: Vehicle, new: Vehicle) -> tuple[Estimate, ...]:

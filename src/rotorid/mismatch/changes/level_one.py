@@ -1,6 +1,6 @@
 """What differs between flights before any cause is sought, next to how much flights differ in which nothing changed.
 
-Every flight has a number v of each quantity (`quantities`) at the conditions that all flights share. The difference of
+Every flight has a number v of each quantity (`_quantities`) at the conditions that all flights share. The difference of
 two sets' means follows Student's t by two yardsticks, of which the rarer counts, twice:
 
 - s² of the flights about the mean of their own set, joined with what is usual in other laboratories and weighed by
@@ -189,8 +189,8 @@ class LevelOne:
 
 
 @step("what differs")
-def level_one(base: RecordingSet, new: RecordingSet, usual: Mapping[str, _Usual] | None = None) -> LevelOne:
-    """What differs between two sets of flights; `usual` is the scatter by kind, by default of all laboratories.
+def level_one(base: RecordingSet, new: RecordingSet) -> LevelOne:
+    """What differs between two sets of flights, by the scatter of all laboratories.
 
     Raises
     ------
@@ -216,7 +216,7 @@ def level_one(base: RecordingSet, new: RecordingSet, usual: Mapping[str, _Usual]
                 f"set {own.name}: no stretch of flight with rotors and motion is long enough; expected some seconds"
             )
         sides.append(flights)
-    return LevelOne(base.name, new.name, differences(*sides, usual or usual_scatter()), tuple(left_out))
+    return LevelOne(base.name, new.name, differences(*sides, usual_scatter()), tuple(left_out))
 
 
 def as_one(sets: Sequence[RecordingSet]) -> RecordingSet:
@@ -331,7 +331,7 @@ def found_in(flights: Mapping[str, Sequence[Flown]]) -> dict[Quantity, tuple[flo
     return out
 
 
-def quantities(every: Sequence[Flown]) -> list[Quantity]:
+def _quantities(every: Sequence[Flown]) -> list[Quantity]:
     """All that every run has."""
     keys = [k for k, v in every[0].y.items() if all(k in run.y and np.isfinite(run.y[k]).all() for run in every)]
     keys += [k for k in every[0].noise if all(k in run.noise for run in every)]
@@ -371,7 +371,7 @@ class _Numbers:
 def measured(flights: Sequence[Sequence[Flown]]) -> dict[Quantity, _Numbers]:
     """All quantities of some flights, each known by its runs."""
     every = [run for runs in flights for run in runs]
-    return {q: _numbers(q, flights, every) for q in quantities(every)}
+    return {q: _numbers(q, flights, every) for q in _quantities(every)}
 
 
 def _numbers(q: Quantity, flights: Sequence[Sequence[Flown]], every: Sequence[Flown]) -> _Numbers:

@@ -193,7 +193,7 @@ def joint_of_instruments(reference: InstrumentReference, new: RecordingSet) -> J
         recorded=(),
         rows_of_new=second.rows,
         mistakes_of_new=(*mistakes, *_steps_of(setup, model)),
-        squares=mean_squares(second.rows, second.regression, compared, scales(setup.instrument.largest)),
+        squares=mean_squares(second.rows, second.regression, compared, _scales(setup.instrument.largest)),
         more_usual=more,
         form_sd=_FORM_SD_OF_READING,
         decide=partial(_decide_instrument_changes, sizes=second.evidence.gram.sum(axis=1)),
@@ -284,7 +284,7 @@ def _with_one_of_time(found: Found) -> Found:
 
     A filter of the fourth order is one of the second and a delay to the catalogue, at thousands of nats.
     """
-    problem, posterior = found.problem, OneOfTime(found.problem)
+    problem, posterior = found.problem, _OneOfTime(found.problem)
     of_time = [k for k in found.model if _takes_time(problem.terms[k].effect)]
     if len(of_time) < 2:
         return found
@@ -296,7 +296,7 @@ def _with_one_of_time(found: Found) -> Found:
     return Found(posterior, best, posterior(best))
 
 
-class OneOfTime(Posterior):
+class _OneOfTime(Posterior):
     """The log posterior of models with one effect that takes time at most."""
 
     def __call__(self, model: Model) -> float:
@@ -328,7 +328,7 @@ def _must_compare(base: RecordingSet, new: RecordingSet) -> None:
     for name, (own, other) in alike.items():
         if own != other:
             raise InputError(f"{new.name}/vehicle.yaml: {name} is {other}, expected {own} as in {base.name}")
-    lost = sorted(columns_of(base) - columns_of(new))
+    lost = sorted(_columns_of(base) - _columns_of(new))
     if lost:
         raise InputError(f"set {new.name}: {', '.join(lost)} is not in every run, expected as in {base.name}")
     if compared_channels(base) != compared_channels(new):
@@ -340,7 +340,7 @@ def _must_compare(base: RecordingSet, new: RecordingSet) -> None:
         )
 
 
-def columns_of(recordings: RecordingSet) -> set[str]:
+def _columns_of(recordings: RecordingSet) -> set[str]:
     """Columns that every run of a set has values in."""
     return set.intersection(*({n for n in r.table.columns if r.has(n)} for r in recordings.runs))
 
@@ -494,7 +494,7 @@ def _mounted_anew(terms: Sequence[Term], setup: PreparedInstrument) -> np.ndarra
 
     The forms in which a coefficient stands have it in equal shares, so that their sum has it once.
     """
-    scale = dict(zip(AXES, scales(setup.instrument.largest), strict=True))
+    scale = dict(zip(AXES, _scales(setup.instrument.largest), strict=True))
     role, _ = _OF_OTHER_AXES
     symbols = [
         [t.form.parameters[i].symbol for i in t.form.linear] if _role_of(t.effect) == role else [""] * t.size
@@ -521,7 +521,7 @@ def _how_large(loadings: Sequence[Loading], channels: Sequence[int]) -> dict[str
     return {f"load_{CHANNELS[c]}": float(np.quantile(load[:, c], 0.95)) for c in channels}
 
 
-def scales(largest: Sequence[float]) -> np.ndarray:
+def _scales(largest: Sequence[float]) -> np.ndarray:
     """The largest force, N, and the largest moment, N m, of each channel's kind, (6,)."""
     force, moment = max(largest[:3]), max(largest[3:])
     return np.repeat([force, moment if moment > _LEAST_MOMENT_N_M else np.inf], 3)

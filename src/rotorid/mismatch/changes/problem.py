@@ -479,11 +479,11 @@ def spread_of_flights(flights: Sequence[Evidence], decide: Callable[[Evidence, E
     squares = np.zeros(flights[0].gram.shape[-1])
     for k, flight in enumerate(flights):
         others = joined([f for j, f in enumerate(flights) if j != k])
-        squares += differences(decide(others, flight), len(squares))
+        squares += _differences(decide(others, flight), len(squares))
     return np.sqrt(squares / (number - 1) * (number + 1) / (number - 1))
 
 
-def differences(found: Found, count: int) -> np.ndarray:
+def _differences(found: Found, count: int) -> np.ndarray:
     """Squares (count,) of the changes in a model, each member of a class as large as what it would contribute."""
     problem, at, out = found.problem, scored(found.problem, found.model), np.zeros(count)
     for said in statements_of(found):

@@ -181,7 +181,7 @@ def as_json(found: Changes) -> dict:
         "kind": found.kind,
         "sentences": sentences(found),
         "notes": list(found.notes),
-        "level_1": None if found.level_1 is None else level_one_json(found.level_1, found.explained),
+        "level_1": None if found.level_1 is None else _level_one_json(found.level_1, found.explained),
         "changes": [
             {
                 "id": c.id,
@@ -306,7 +306,7 @@ def _size_of(d: Difference, signed: bool) -> str:
     return f"{shown} ± {half:.{digits}f} {unit_of(d)}"
 
 
-def level_one_json(found: LevelOne, explained: Mapping[str, tuple[str, ...]]) -> dict:
+def _level_one_json(found: LevelOne, explained: Mapping[str, tuple[str, ...]]) -> dict:
     """What differs, with every quantity of every flight, as `changes.json` holds it; `explained` as in `Changes`."""
     return {
         "nothing_changed": not found.stated,

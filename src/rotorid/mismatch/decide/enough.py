@@ -9,7 +9,7 @@ status: from them come the gain that is reported and the shares.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -37,25 +37,8 @@ _LEAST_EXCITED = 0.1
 it."""
 
 
-@dataclass(frozen=True)
-class _Ratio:
-    """Error of a channel with an effect over that without it, with its 95 % interval."""
-
-    channel: str
-    value: float
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
-class _RowsEvidence:
-    """What some rows say of one effect."""
-
-    ratios: tuple[_Ratio, ...] = ()
-    """Of every channel that the effect acts on, the most significant gain first; empty where the rows do not excite
-    it."""
-    beyond_leftover: bool = True
-    """Whether it contributes more than the model leaves over in some channel that it acts on."""
+_Ratio = tuple[float, float, float]
+"""Error of a channel with an effect over that without it, and its 95 % interval: value, low, high."""
 
 
 def weighed(analysis: Analysis) -> Analysis:
@@ -115,21 +98,21 @@ def judged(
     without = analysis.without[finding.id]
     # What lies between command and speed moves every channel that the rotors act on.
     acts_on = finding.channels if finding.form else ()
-    found, reported = (contribution(analysis, without, rows, acts_on) for rows in (fitted, held))
-    if finding.windows and not reported.ratios:
+    found, beyond = contribution(analysis, without, fitted, acts_on)
+    reported, _ = contribution(analysis, without, held, acts_on)
+    if finding.windows and not reported:
         # What acts in a window of one run alone (a gust) belongs to that run and is reported there.
         windows = [_in_windows(t, finding.windows) for t in analysis.compared]
-        reported = contribution(analysis, without, windows, acts_on)
-    slight = found.ratios and found.ratios[0].value > _LARGE_GAIN
+        reported, _ = contribution(analysis, without, windows, acts_on)
+    slight = found and next(iter(found.values()))[0] > _LARGE_GAIN
     reason = ""
-    if rules.BELOW_LEFTOVER(not found.beyond_leftover):
+    if rules.BELOW_LEFTOVER(not beyond):
         reason = "it is smaller than what the model leaves over"
-    elif rules.MAY_BE_NOTHING(not _away_from_nothing(finding)):
+    elif rules.MAY_BE_NOTHING(bool(finding.parameters) and all(p.low <= 0.0 <= p.high for p in finding.parameters)):
         reason = "every number of it may be nothing"
     elif rules.SLIGHT(bool(share < _LEAST_SHARE and slight and not finding.windows)):
         reason = f"it takes {100 * share:.1f} % of the error that goes"
-    best = reported.ratios[0] if reported.ratios else None
-    finding = replace(finding, gain=None if best is None else (best.value, best.low, best.high))
+    finding = replace(finding, gain=next(iter(reported.values()), None))
     return _lowered(finding, reason) if reason else finding
 
 
@@ -152,8 +135,11 @@ def _in_windows(trace: ChannelTrace, windows: tuple[tuple[str, float, float], ..
 
 def contribution(
     analysis: Analysis, without: tuple[np.ndarray, ...], rows: list[np.ndarray], acts_on: Collection[str] = ()
-) -> _RowsEvidence:
+) -> tuple[dict[str, _Ratio], bool]:
     """What some rows (masks of the traces) say of an effect, given what is left of the traces without it.
+
+    First the gain in every channel that the effect acts on by the channel's name, the most significant first, none
+    where the rows do not excite it; then whether it contributes more than the model leaves over in some such channel.
 
     Judged are the channels that the effect `acts_on`, others change by what the rest of the model is fitted to
     without it, and what two sensors say of each other: a wrong mass makes up for an accelerometer's scale in the force,
@@ -170,13 +156,13 @@ def contribution(
     there = {c: np.sqrt(s[2] / max(s[3], 1)) / noise[c] for c, s in size.items()}
     strongest = max(here.values(), default=0.0)
     if strongest <= _LEAST_EXCITED * max(there.values(), default=0.0):
-        return _RowsEvidence()
+        return {}, True
     sensors = {t.channel for t in analysis.between_sensors}
     differing = [c for c in here if here[c] > _ACTS * strongest]
     acting = [c for c in here if c in acts_on or (c in sensors and c in differing)] or differing
-    ratios = [r for r in (ratio_of(analysis, without, rows, c) for c in acting) if r is not None]
+    ratios = {c: r for c in acting if (r := ratio_of(analysis, without, rows, c)) is not None}
     beyond = any(here[c] * noise[c] > _leftover_rms(analysis, rows, c) for c in acting)
-    return _RowsEvidence(tuple(sorted(ratios, key=lambda r: r.high)), beyond)
+    return dict(sorted(ratios.items(), key=lambda pair: pair[1][2])), beyond
 
 
 def _leftover_rms(analysis: Analysis, rows: list[np.ndarray], channel: str) -> float:
@@ -207,7 +193,7 @@ def ratio_of(
     draws = acting[np.random.default_rng(1).integers(0, len(acting), (_BOOTSTRAPS, len(acting)))].sum(axis=1)
     low, high = np.quantile(np.sqrt(draws[:, 0] / np.maximum(draws[:, 1], 1e-300)), [0.025, 0.975])
     value = np.sqrt(acting[:, 0].sum() / max(acting[:, 1].sum(), 1e-300))
-    return _Ratio(channel, float(value), float(low), float(high))
+    return float(value), float(low), float(high)
 
 
 def _block_energies(trace: ChannelTrace, added: np.ndarray, mask: np.ndarray, block_s: float):
@@ -220,10 +206,3 @@ def _block_energies(trace: ChannelTrace, added: np.ndarray, mask: np.ndarray, bl
     for rows in np.array_split(index, max(1, len(index) // max(1, int(round(block_s / period_s))))):
         after, own = trace.named[rows], added[rows]
         yield float(after @ after), float((after + own) @ (after + own)), float(own @ own)
-
-
-def _away_from_nothing(finding: Finding) -> bool:
-    """Whether the interval of some number of a finding does not hold the value at which it does nothing."""
-    if not finding.parameters:
-        return True
-    return any(not p.low <= 0.0 <= p.high for p in finding.parameters)

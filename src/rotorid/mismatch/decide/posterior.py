@@ -118,7 +118,7 @@ def _mode_of(
     return _modes(problem, columns[None], bias[None], believed)[0]
 
 
-def log_evidences(
+def _log_evidences(
     problem: Problem, columns: np.ndarray, believed: tuple[np.ndarray, np.ndarray, np.ndarray]
 ) -> np.ndarray:
     """About the log evidence of each of many sets of columns (m, k); −∞ where there is no mode.
@@ -259,7 +259,7 @@ def decide(evidence: Evidence, prior: Prior, *starts: Iterable[str]) -> Found:
     there = {term.key for term in evidence.terms if term.kind == "effect"}
     spectrum, known = spectrum_of(evidence), [tuple(sorted(there & set(start))) for start in starts]
     all_of_it = spectrum.variance_of_leftover(np.zeros(len(spectrum.unit)))
-    small, large = (settled(evidence, spectrum, prior, v, known) for v in (np.zeros(len(all_of_it)), all_of_it))
+    small, large = (_settled(evidence, spectrum, prior, v, known) for v in (np.zeros(len(all_of_it)), all_of_it))
     gain = joint(spectrum, small) - joint(spectrum, large)
     return small if gain > prior.leftover_nats else large
 
@@ -269,7 +269,7 @@ def joint(spectrum: Spectrum, found: Found) -> float:
     return found.log_posterior + spectrum.evidence_of(found.problem.variance)
 
 
-def settled(
+def _settled(
     evidence: Evidence, spectrum: Spectrum, prior: Prior, variance: np.ndarray, known: Iterable[Model]
 ) -> Found:
     """The most probable model and its leftover, from a leftover of `variance` (C,) and each of the models `known`."""
@@ -314,7 +314,7 @@ def ranked(problem: Problem, models: Sequence[Model]) -> np.ndarray:
     for (_, freed), own in alike.items():
         for first in range(0, len(own), _AT_ONCE):
             at, columns = zip(*own[first : first + _AT_ONCE], strict=True)
-            out[list(at)] = log_evidences(problem, np.array(columns), problem.believed(freed))
+            out[list(at)] = _log_evidences(problem, np.array(columns), problem.believed(freed))
     return out + np.array([log_prior(problem, model) for model in models])
 
 

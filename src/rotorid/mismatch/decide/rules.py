@@ -12,16 +12,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 from rotorid.errors import InputError
-
-
-class Limit(NamedTuple):
-    """A number that a rule compares with, and why it has this value."""
-
-    value: float
-    why: str
 
 
 @dataclass
@@ -42,7 +34,8 @@ class _Rule:
     name: str
     decides: str
     """What it decides, one sentence."""
-    limits: Mapping[str, Limit] = field(default_factory=dict)
+    limits: Mapping[str, tuple[float, str]]
+    """Numbers that it compares with, each with why it has this value."""
 
     @property
     def on(self) -> bool:
@@ -51,7 +44,7 @@ class _Rule:
         return asked is None or self.name not in asked.off
 
     def __getitem__(self, limit: str) -> float:
-        return self.limits[limit].value
+        return self.limits[limit][0]
 
     def __call__(self, holds: bool) -> bool:
         """Whether the rule decides here: its condition holds and it is not switched off."""
@@ -68,7 +61,7 @@ RULES: dict[str, _Rule] = {}
 
 def rule(name: str, decides: str, **limits: tuple[float, str]) -> _Rule:
     """A new rule, known under its name."""
-    made = _Rule(name, decides, {key: Limit(*pair) for key, pair in limits.items()})
+    made = _Rule(name, decides, limits)
     RULES[name] = made
     return made
 
@@ -206,6 +199,6 @@ def markdown() -> str:
     """The rules as a table, for the site's reference of the decision."""
     lines = ["| rule | decides | limits |", "| --- | --- | --- |"]
     for one in RULES.values():
-        limits = "; ".join(f"`{name}` {limit.value:g}: {limit.why}" for name, limit in one.limits.items())
+        limits = "; ".join(f"`{name}` {value:g}: {why}" for name, (value, why) in one.limits.items())
         lines.append(f"| `{one.name}` | {one.decides} | {limits} |")
     return "\n".join(lines) + "\n"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from itertools import combinations
-from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import t as student
@@ -83,7 +82,7 @@ def estimates(
     return tuple(out)
 
 
-def predicted(rows: Rows, cols: np.ndarray, beta: np.ndarray) -> np.ndarray:
+def _predicted(rows: Rows, cols: np.ndarray, beta: np.ndarray) -> np.ndarray:
     """What columns add to the residual, (n, 12)."""
     return rows.x[:, :, cols] @ beta
 
@@ -92,22 +91,17 @@ def main_channels(rows: list[Rows], cols: np.ndarray, beta: np.ndarray, noise: n
     """Channels in which a contribution is at least a third of its strongest, the strongest first."""
     energy = np.zeros(12)
     for r in rows:
-        energy += (predicted(r, cols, beta) ** 2).sum(axis=0)
+        energy += (_predicted(r, cols, beta) ** 2).sum(axis=0)
     size = np.sqrt(energy / sum(len(r.y) for r in rows)) / np.where(np.isfinite(noise), noise, np.inf)
     order = np.argsort(-size)
     return [int(c) for c in order if size[c] > 0.33 * size[order[0]]]
 
 
-class TermReport(NamedTuple):
-    """What is reported of a term at work."""
-
-    values: np.ndarray
-    parameters: tuple[Estimate, ...]
-    channels: tuple[str, ...]
-    alternatives: Collection[str]
+_TermReport = tuple[np.ndarray, tuple[Estimate, ...], tuple[str, ...], Collection[str]]
+"""Of a term at work its values, parameters, channels and alternatives."""
 
 
-def findings_of(search: Search, selection: Selection, report_of: Callable[[str], TermReport]) -> list[Finding]:
+def findings_of(search: Search, selection: Selection, report_of: Callable[[str], _TermReport]) -> list[Finding]:
     """A finding for every term that entered, and for those that looked like something and did not survive.
 
     Terms without a name are reported as unexplained instead.
@@ -117,20 +111,20 @@ def findings_of(search: Search, selection: Selection, report_of: Callable[[str],
         term = search.terms[key]
         if term.effect in UNKNOWNS:
             continue
-        own = report_of(key)
+        values, parameters, channels, alternatives = report_of(key)
         found = Finding(
             id=term.effect,
             status="established",
             form=term.form,
-            values=tuple(float(v) for v in own.values),
+            values=tuple(float(v) for v in values),
             equation=term.form.equation,
             sentence=effects[term.effect].sentence,
-            parameters=own.parameters,
+            parameters=parameters,
             p_value=selection.p_values[key],
-            channels=own.channels,
+            channels=channels,
             windows=(term.window,) if term.window else (),
         )
-        findings.append(found.or_else(own.alternatives) if own.alternatives else found)
+        findings.append(found.or_else(alternatives) if alternatives else found)
     named = {i for f in findings for i in f.alternatives}
     for effect_id, reason in selection.not_established.items():
         if effect_id not in named and effect_id not in UNKNOWNS:
@@ -153,7 +147,7 @@ def wrench_findings(
     that is delivered, and their one-sigma."""
     beside = search.beside(selection.active)
 
-    def report_of(key: str) -> TermReport:
+    def report_of(key: str) -> _TermReport:
         term = search.terms[key]
         beta, _ = coefficients(regression, delivered, key)
         channels = main_channels(contributions.rows, regression.columns([key]), beta, noise)
@@ -175,7 +169,7 @@ def wrench_findings(
                 for p, v, a, b in zip(term.form.parameters, values, low, high, strict=True)
             )
         names = tuple(CHANNELS[c] for c in channels if c < 6) or tuple(CHANNELS[c] for c in channels)
-        return TermReport(values, parameters, names, search.alternatives(key, selection.active))
+        return values, parameters, names, search.alternatives(key, selection.active)
 
     return findings_of(search, selection, report_of)
 

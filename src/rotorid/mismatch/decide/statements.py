@@ -39,7 +39,7 @@ _MOST_SUBSTITUTES = 6
 """Ids that are tried exactly in another's place, the most promising first."""
 _WORST_SUBSTITUTE = -8.0
 """Nats, as ranked, from which one is not tried."""
-SURE, LIKELY, POSSIBLE = 0.99, 0.5, 0.05
+SURE, LIKELY, _POSSIBLE = 0.99, 0.5, 0.05
 """Probabilities from which an id (a class) is established (ambiguous), suggested, or looked at and not established."""
 _STATED_REACH = 10.0
 """Times as wide a prior as models are compared by, for the numbers of a change: they shrink by a percent at most where
@@ -123,7 +123,7 @@ def _statement(
     effect = found.problem.terms[key].effect
     members = _smallest_class(found, weights, effect, others)
     alone, joint = (share_of(found, weights, own) for own in ({effect}, members))
-    if not matters(found, at, key):
+    if not _matters(found, at, key):
         status: Status = "not_established"  # sure or not, it is too small to matter
     elif joint >= SURE:
         status = "established" if len(members) == 1 else "ambiguous"
@@ -166,7 +166,7 @@ def weights_of(found: Found) -> dict[Model, float]:
     return {m: w / total for m, w in weight.items()}
 
 
-def by_id(found: Found) -> dict[str, float]:
+def _by_id(found: Found) -> dict[str, float]:
     """Probability of every id in some visited model."""
     out: dict[str, float] = {}
     for model, weight in weights_of(found).items():
@@ -246,7 +246,7 @@ def holds(found: Found, model: Model, members: set[str]) -> bool:
     return any(found.problem.terms[key].effect in members for key in model)
 
 
-def matters(found: Found, at: Scored, key: str) -> bool:
+def _matters(found: Found, at: Scored, key: str) -> bool:
     """Whether an effect does something of its own in some channel.
 
     That is more than a share of the noise, and more than what the form of a larger effect there is wrong by.
@@ -333,12 +333,12 @@ def limits_of(found: Found, squares: Mapping[str, np.ndarray]) -> tuple[UpperLim
     `squares` holds to a term's key what its columns amount to, (k, k): βᵀ S β is the square of the share that
     coefficients β, in their units, contribute.
     """
-    problem, probability = found.problem, by_id(found)
+    problem, probability = found.problem, _by_id(found)
     named = {t.effect for t in problem.terms.values() if t.kind == "effect" and not t.run} - UNKNOWNS.keys()
     at_work = {problem.terms[key].effect for key in found.model}
     out = []
     for effect in sorted(named - at_work):
-        if probability.get(effect, 0.0) >= POSSIBLE:
+        if probability.get(effect, 0.0) >= _POSSIBLE:
             continue
         forms = [k for k, t in problem.terms.items() if t.effect == effect and not t.run and k in squares]
         limits = [limit for key in forms if (limit := _limit_of(found, key, squares[key])) is not None]

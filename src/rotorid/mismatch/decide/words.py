@@ -52,25 +52,6 @@ _PARAMETER_WORDS = {
 }
 
 
-_GROUND_WORDS = (
-    ("on flights not used", "on runs not used"),
-    ("on the flight it was fitted to", "on the run it was fitted to"),
-    ("on held-out flight", "on held-out runs"),
-    ("What to fly next", "What to measure next"),
-    ("Faster, higher or rougher flight would show", "Larger, faster and returning loads would show"),
-    ("the believed vehicle describes", "the believed values describe"),
-    *WRENCH_WORDS.values(),
-)
-"""What is said of flights, as it is said of a stand or bench."""
-
-
-def on_the_ground(text: str) -> str:
-    """A text about flights for a stand or bench."""
-    for flown, still in _GROUND_WORDS:
-        text = text.replace(flown, still).replace(capital(flown), capital(still))
-    return text
-
-
 def channel_words(channel: str) -> str:
     """A channel's name for a person: `force_y` is the sideways force."""
     if channel in WRENCH_WORDS:

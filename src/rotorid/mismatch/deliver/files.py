@@ -18,11 +18,12 @@ from typing import Literal
 
 import numpy as np
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form, SpeedForm
 from rotorid.errors import InputError
+from rotorid.io.models import KnownKeys
 from rotorid.io.text.files import read_yaml
 from rotorid.io.text.writing import rounded
 from rotorid.mismatch.decide.findings import Analysis, Finding, RunWind, one_per_class
@@ -37,13 +38,7 @@ _ABOUT = {
 }
 
 
-class _KeysOfFile(BaseModel):
-    """A group of keys of a file: none unknown."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Entry(_KeysOfFile):
+class Entry(KnownKeys, frozen=True):
     """One finding as a file has it."""
 
     id: str
@@ -58,7 +53,7 @@ class Entry(_KeysOfFile):
     interval_95: dict[str, tuple[float, float]] = Field(default_factory=dict)
 
 
-class Air(_KeysOfFile):
+class Air(KnownKeys, frozen=True):
     """Wind of a run, straight lines between instants; outside of the condition's own the air is still."""
 
     time_s: tuple[float, ...]
@@ -76,7 +71,7 @@ class Condition(Entry):
     air: Air | None = None
 
 
-class Conditions(_KeysOfFile):
+class Conditions(KnownKeys, frozen=True):
     """The whole of `conditions.yaml`."""
 
     set: str
@@ -103,7 +98,7 @@ class Conditions(_KeysOfFile):
         return ((condition.run == run) & (time_s >= start) & (time_s <= stop)).astype(float)
 
 
-class Window(_KeysOfFile):
+class Window(KnownKeys, frozen=True):
     """A part of a run, s on its clock."""
 
     run: str
@@ -118,7 +113,7 @@ class Fault(Entry):
     """When it was so; empty for always."""
 
 
-class Instruments(_KeysOfFile):
+class Instruments(KnownKeys, frozen=True):
     """The whole of `instruments.yaml`."""
 
     set: str

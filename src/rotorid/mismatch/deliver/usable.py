@@ -11,7 +11,7 @@ Believed values, nuisances and the effects that stay are fitted anew without it.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -60,13 +60,13 @@ def question_of(believed: Vehicle, runs: Sequence[Run]) -> tuple[_Question, tupl
 
     That is not asked: what is derived from it may fail it, too, and no part of the model is to blame for it.
     """
-    answers = {question: question(believed) for question in questions(believed, runs)}
+    answers = {question: question(believed) for question in _questions(believed, runs)}
     asked = [question for question, why in answers.items() if not why]
     faults = (f"The believed vehicle itself is not fit to be flown: {why}." for why in answers.values() if why)
     return lambda vehicle: next((why for question in asked if (why := question(vehicle))), ""), tuple(faults)
 
 
-def questions(believed: Vehicle, runs: Sequence[Run]) -> tuple[_Question, ...]:
+def _questions(believed: Vehicle, runs: Sequence[Run]) -> tuple[_Question, ...]:
     """Everything that is asked, the cheapest first."""
     share, recorded = recorded_share(runs, believed), _recorded_hover(runs, believed)
     return (
@@ -100,19 +100,11 @@ def cannot_hover(vehicle: Vehicle, recorded_share: float) -> str:
     )
 
 
-@dataclass(frozen=True)
-class _RecordedHover:
-    """What was recorded in the air, medians over time."""
+def _recorded_hover(runs: Sequence[Run], vehicle: Vehicle) -> tuple[np.ndarray, bool, float] | None:
+    """What was recorded in the air, medians over time; None where the runs do not have all of it.
 
-    speed_rad_s: np.ndarray
-    """Of each rotor, (k,): measured, else commanded."""
-    measured: bool
-    specific_force_m_s2: float
-    """Upward."""
-
-
-def _recorded_hover(runs: Sequence[Run], vehicle: Vehicle) -> _RecordedHover | None:
-    """Rotor speeds in the air and the specific force that went with them; None where the runs do not have both."""
+    Rotor speeds, (k,), rad/s, whether they are measured or commanded, and the upward specific force, m/s².
+    """
     limits, force = vehicle.rotor_speed_limits_rad_s, c.SPECIFIC_FORCE[2]
     for group in ("rotor_speed", "rotor_command", "throttle"):
         names = list(c.rotor_columns(group, vehicle.rotor_count))
@@ -124,18 +116,19 @@ def _recorded_hover(runs: Sequence[Run], vehicle: Vehicle) -> _RecordedHover | N
             flying = table[square > _LIGHT * np.nanquantile(square, 0.99)]
             if len(flying):
                 middle = np.nanmedian(flying, axis=0)
-                return _RecordedHover(middle[:-1], group == "rotor_speed", -float(middle[-1]))
+                return middle[:-1], group == "rotor_speed", -float(middle[-1])
     return None
 
 
-def _off_as_recorded(vehicle: Vehicle, recorded: _RecordedHover | None) -> str:
-    """Why its force at the recorded rotor speeds is not the one that was felt; empty where it is."""
-    if recorded is None or recorded.specific_force_m_s2 <= 0:
+def _off_as_recorded(vehicle: Vehicle, recorded: tuple[np.ndarray, bool, float] | None) -> str:
+    """Why its force at the rotor speeds of `_recorded_hover` is not the one that was felt; empty where it is."""
+    if recorded is None or recorded[2] <= 0:
         return ""
+    speed_rad_s, measured, specific_force_m_s2 = recorded
     flown = flyable(vehicle)[0]
-    path = None if recorded.measured else command_path(flown)
-    up = wrench_of_command(flown, path, recorded.speed_rad_s, _HIGH_ABOVE_GROUND_M)[0]
-    share = float(up) / (vehicle.mass_kg * recorded.specific_force_m_s2)
+    path = None if measured else command_path(flown)
+    up = wrench_of_command(flown, path, speed_rad_s, _HIGH_ABOVE_GROUND_M)[0]
+    share = float(up) / (vehicle.mass_kg * specific_force_m_s2)
     if _CARRIES[0] <= share <= _CARRIES[1]:
         return ""
     return f"at the rotor speeds that were recorded it makes {share:.2g} times the upward force that was felt"

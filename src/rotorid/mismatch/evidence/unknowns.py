@@ -25,7 +25,7 @@ def _to_body(motion, world):
     return np.einsum("nji,nj->ni", motion.rotation, world)
 
 
-def place(motion, vehicle, values, middle=0.0):
+def _place(motion, vehicle, values, middle=0.0):
     """F = Rᵀ (k_h (x, y), k_z z), position in the world from `middle` (3,), m: a spring or a cable to a fixed point."""
     k_h, k_z, north, east = values
     world = (motion.position - middle) * [k_h, k_h, k_z] + [north, east, 0.0]
@@ -45,7 +45,7 @@ def _fixed_moment(motion, vehicle, values):
     return Contribution(moment=_to_body(motion, world))
 
 
-def dipole(motion, vehicle, values):
+def _dipole(motion, vehicle, values):
     """M = m × Rᵀ e_N + m' × Rᵀ e_D: a body that aligns with a direction of the world, as a magnet does."""
     north, down = motion.rotation[:, 0, :], motion.rotation[:, 2, :]
     return Contribution(moment=np.cross(np.asarray(values[:3]), north) + np.cross(np.asarray(values[3:]), down))
@@ -67,7 +67,7 @@ def _place_forms(vehicle):
     spring = (Parameter("k_h", "N/m"), Parameter("k_z", "N/m"), Parameter("f_N", "N"), Parameter("f_E", "N"))
     return (
         Form("height", "F = Rᵀ (0, 0, k_z z)", (Parameter("k_z", "N/m"),), _height_only, ("position", "rotation")),
-        Form("place", "F = Rᵀ (f + K p)", spring, place, ("position", "rotation")),
+        Form("place", "F = Rᵀ (f + K p)", spring, _place, ("position", "rotation")),
     )
 
 
@@ -76,7 +76,7 @@ def _heading_forms(vehicle):
     body = tuple(Parameter(f"m_{a}", "N m") for a in "xyz") + tuple(Parameter(f"m'_{a}", "N m") for a in "xyz")
     return (
         Form("fixed", "M = Rᵀ (m_N, m_E, 0)", fixed, _fixed_moment, ("rotation",)),
-        Form("dipole", "M = m × Rᵀ e_N + m' × Rᵀ e_D", body, dipole, ("rotation",)),
+        Form("dipole", "M = m × Rᵀ e_N + m' × Rᵀ e_D", body, _dipole, ("rotation",)),
     )
 
 

@@ -43,15 +43,15 @@ def absent(model: WrenchModel, found: Found) -> tuple[UpperLimit, ...]:
 
 def chosen_already(model: WrenchModel) -> Found:
     """The posterior at the model of a flight that was chosen."""
-    return posterior_at(by_channel(model), model.selection.active)
+    return posterior_at(_by_channel(model), model.selection.active)
 
 
 def evidence_of(model: WrenchModel) -> Evidence:
     """What a decision on a flight needs, and what was chosen."""
-    return replace(evidence_from(by_channel(model)), active=tuple(model.selection.active))
+    return replace(evidence_from(_by_channel(model)), active=tuple(model.selection.active))
 
 
-def by_channel(model: WrenchModel) -> Regression:
+def _by_channel(model: WrenchModel) -> Regression:
     """The regression of a flight with its products channel by channel."""
     rate_hz = model.prepared.thinner.rate_hz
     return build(

@@ -68,18 +68,13 @@ class FittedModel(Protocol):
         """Coefficient of a relative change of a believed value."""
 
 
-def _widely(values: Values) -> dict[str, float]:
-    """Priors of the values called wrong."""
-    return dict.fromkeys(values, WIDEST_TRUST)
-
-
-def delivered_fit(model: FittedModel, keys: Sequence[str], values: Values) -> tuple[list[str], Fit]:
+def _delivered_fit(model: FittedModel, keys: Sequence[str], values: Values) -> tuple[list[str], Fit]:
     """Keys of all that is delivered with the terms `keys`, and their fit with the wrong values at their stated numbers.
 
     What the whole balance would make of those values is another number where slow moments of the air bias it, and
     effects fitted given that number would be those of a vehicle that nobody states.
     """
-    delivered = model.delivered_with(keys, _widely(values))
+    delivered = model.delivered_with(keys, dict.fromkeys(values, WIDEST_TRUST))
     known, cols, beta = _at_stated_numbers(model, delivered, values)
     fit = known.fit([k for k in delivered if k not in values])
     size = len(fit.beta)
@@ -148,7 +143,7 @@ def beyond_trust(model: FittedModel, values: Values, active: Sequence[str]) -> b
 
 def all_free(model: FittedModel, values: Values, active: Sequence[str]) -> tuple[list[str], Fit]:
     """What is delivered with every value free: those called wrong widely, the others within their trust."""
-    return delivered_fit(model, [*model.values_beside(active), *active], values)
+    return _delivered_fit(model, [*model.values_beside(active), *active], values)
 
 
 def _pushed_beyond_trust(model: FittedModel, moved: Values) -> bool:
@@ -168,7 +163,7 @@ def changes(model: FittedModel, values: Values, active: Sequence[str], fit: Fit)
 
 
 @dataclass(frozen=True)
-class Way:
+class _Way:
     """A fit of what may be delivered: values not called wrong as believed, or moved within their trust."""
 
     model: FittedModel
@@ -184,19 +179,19 @@ class Way:
         return left_out_residuals(self.model, self.keys, self.values)
 
 
-def ways(model: FittedModel, values: Values, active: Sequence[str]) -> list[Way]:
+def ways(model: FittedModel, values: Values, active: Sequence[str]) -> list[_Way]:
     """The fits that may be delivered with the terms of `active`, the one to deliver first.
 
     Values not called wrong move together, and only if where it was not fitted the error falls by it in some channel,
     grows in none, and none of them would move beyond its trust.
     """
-    plain, as_believed = delivered_fit(model, [*values, *active], values)
-    held = Way(model, plain, values, as_believed, {})
+    plain, as_believed = _delivered_fit(model, [*values, *active], values)
+    held = _Way(model, plain, values, as_believed, {})
     free, fit = all_free(model, values, active)
     moved = changes(model, values, active, fit)
     if _pushed_beyond_trust(model, moved):
         return [held]
-    loose = Way(model, free, values, fit, moved)
+    loose = _Way(model, free, values, fit, moved)
     better = _pays(held.left, loose.left, judged_rows(model), model.rows_per_block)
     return [loose, held] if better else [held, loose]
 

@@ -84,17 +84,10 @@ class _ChannelLeftover:
         return self.unexplained > 0 or self.by_values > 0
 
 
-@dataclass(frozen=True)
-class _Leftover:
-    """What stays unexplained: channels, inputs and a description."""
-
-    channels: tuple[str, ...] = ()
-    depends_on: tuple[str, ...] = ()
-    description: str = ""
-
-
-def leftover(prepared, model, segments, noisy, p_after, depends, delivered=None, claimed=True) -> _Leftover:
-    """What no named effect explains of the force and moment channels.
+def leftover(
+    prepared, model, segments, noisy, p_after, depends, delivered=None, claimed=True
+) -> tuple[tuple[str, ...], tuple[str, ...], str]:
+    """What no named effect explains of the force and moment channels: channels, inputs and a description.
 
     Five things count: empirical terms that won against the catalogue, what a ridge regression on all inputs and
     their products ("whatever could be explained") still finds, fitted on the training runs and judged held out,
@@ -111,16 +104,13 @@ def leftover(prepared, model, segments, noisy, p_after, depends, delivered=None,
     )
     left = [c for c in channels if c.counts]
     if not left:
-        return _Leftover()
+        return (), (), ""
     unknown = [UNKNOWNS[e] for e in (model.search.terms[k].effect for k in model.selection.active) if e in UNKNOWNS]
     on = [v for e in unknown for v in DEPENDS_ON[e.id]] + ([] if unknown else list(depends))
     on += ["time_s"] if slow else []
     on += ["run"] if any(c.between for c in left) else []
-    return _Leftover(
-        tuple(c.name for c in left),
-        tuple(dict.fromkeys(on)),
-        description(left, [e.sentence for e in unknown], slow, list(depends)),
-    )
+    text = _description(left, [e.sentence for e in unknown], slow, list(depends))
+    return tuple(c.name for c in left), tuple(dict.fromkeys(on)), text
 
 
 def _channels_of(prepared, model, segments, full, added, slow, p_after, delivered, least) -> list[_ChannelLeftover]:
@@ -129,7 +119,7 @@ def _channels_of(prepared, model, segments, full, added, slow, p_after, delivere
     `full` is the fit of the whole model, `added` (n, 12) of each stretch what it makes of the channels; `least` is how
     much of the noise's energy must be kept by values to count.
     """
-    _, inputs = standardised(prepared, segments)
+    _, inputs = _standardised(prepared, segments)
     unnamed = model.unnamed(full.columns)
     training = [r.run in prepared.split.training for r in model.rows]
     if prepared.split.training == prepared.split.held_out:
@@ -179,7 +169,7 @@ def _channels_of(prepared, model, segments, full, added, slow, p_after, delivere
     return out
 
 
-def description(
+def _description(
     channels: Sequence[_ChannelLeftover],
     sentences: Sequence[str],
     slow: Mapping[str, tuple[float, float]],
@@ -249,7 +239,7 @@ def slow_excess(prepared, model, segments, noisy, contributions) -> dict[str, tu
         return {}
     rate = prepared.thinner.rate_hz
     fast = tuple(share * prepared.thinner.cutoff_hz for share in _FAST_BAND)
-    noise = added_noise(prepared, segments, noisy)
+    noise = _added_noise(prepared, segments, noisy)
     out = {}
     for c in range(6) if all(s.measured_speed for s in segments) else _ACROSS:
         if not np.isfinite(model.noise[c]):
@@ -331,7 +321,7 @@ def probes(segment: Segment, prepared) -> dict[str, np.ndarray]:
     return out
 
 
-def standardised(prepared, segments, also=()):
+def _standardised(prepared, segments, also=()):
     """Names of the inputs that vary, and per stretch their values (n, p), of mean 0 and deviation 1 over `segments`.
 
     Stretches of `also` follow on the same scale.
@@ -347,7 +337,7 @@ def standardised(prepared, segments, also=()):
     ]
 
 
-def added_noise(prepared, segments, noisy) -> list[np.ndarray]:
+def _added_noise(prepared, segments, noisy) -> list[np.ndarray]:
     """What the sensors' noise, added once more (`noisy`), changes in the channels of each stretch, (n, 12)."""
     clean_rows, noisy_rows = assemble_rows(prepared, [], segments), assemble_rows(prepared, [], noisy)
     return [b.y - a.y for a, b in zip(clean_rows, noisy_rows, strict=True)]
@@ -375,9 +365,9 @@ def dependence(prepared, model, segments, noisy):
 
     `noisy` are the segments with the sensors' noise added once more; empty where that is not known.
     """
-    names, inputs = standardised(prepared, segments, noisy)
+    names, inputs = _standardised(prepared, segments, noisy)
     inputs, again = inputs[: len(segments)], inputs[len(segments) :]
-    noise = added_noise(prepared, segments, noisy) if noisy else []
+    noise = _added_noise(prepared, segments, noisy) if noisy else []
     moved = [b - a for a, b in zip(inputs, again, strict=True)] if noisy else []
     most = most_noise(prepared, segments, noisy)
     full = model.full_fit()

@@ -64,16 +64,16 @@ def on_every_run(
     if model.segments and model.segments[0].motion.on_board is not None:
         own, noisy = _carrying(model, own, noisy)
     if model.segments and model.segments[0].motion.hung is not None:
-        own = hung(model, own, rows_of(model, own), swinging_term(model)) or own
+        own = hung(model, own, _rows_of(model, own), swinging_term(model)) or own
         noisy = like(own, noisy)
     gusts = ()
     if model.gusts:
-        own, noisy, gusts = with_gusts_of_new_runs(model, own, noisy, rows_of(model, own))
+        own, noisy, gusts = with_gusts_of_new_runs(model, own, noisy, _rows_of(model, own))
     known_noise = bool(model.noisy_segments) and bool(noisy or not own)
-    both = [*model.rows, *rows_of(model, own)]
+    both = [*model.rows, *_rows_of(model, own)]
     again = None
     if known_noise and model.contributions.noisy is not None:
-        again = [*model.contributions.noisy, *rows_of(model, noisy)]
+        again = [*model.contributions.noisy, *_rows_of(model, noisy)]
     whole = replace(
         prepared,
         recordings=recordings,
@@ -110,13 +110,13 @@ def as_flown(segments: list[Segment], found: Fitted) -> list[Segment]:
 def _carrying(model: WrenchModel, segments: list[Segment], noisy: list[Segment]):
     """Stretches that say when a payload is on board, found in their own loads."""
     every = [*model.segments, *segments]
-    rows = rows_of(model, with_payload_on_board(every, [((-np.inf, np.inf),)] * len(every)))
+    rows = _rows_of(model, with_payload_on_board(every, [((-np.inf, np.inf),)] * len(every)))
     windows = payload_windows_of(replace(model, rows=rows))[len(model.segments) :]
     windows = windows or [()] * len(segments)
     return with_payload_on_board(segments, windows), with_payload_on_board(noisy, windows) if noisy else noisy
 
 
-def rows_of(model: WrenchModel, segments: list[Segment]) -> list[Rows]:
+def _rows_of(model: WrenchModel, segments: list[Segment]) -> list[Rows]:
     """Rows of other stretches: the columns of what is in the model, at the places they have in the fitted rows.
 
     Columns that say nothing in a channel of the fitted rows (they are noise alone there) say nothing here either.
@@ -201,7 +201,8 @@ def without_each(
         elif in_chain and found.measured:
             out[finding.id] = _speeds_without(found, seen, finding.id, traces)
         elif in_chain:
-            segments = path_segments(seen.prepared.segments, *chain_without(found, finding.id), _cutoff_of(seen))
+            cutoff_hz = seen.prepared.thinner.cutoff_hz
+            segments = path_segments(seen.prepared.segments, *chain_without(found, finding.id), cutoff_hz)
             out[finding.id] = on_traces(traces, seen.rows, made_by(seen, segments, fit))
         elif finding.id in ids_of("air_moves", "all the time") and seen.wind is not None:
             still = [replace(s, motion=replace(s.motion, wind=without_wind(s, seen.wind))) for s in seen.segments]
@@ -211,10 +212,6 @@ def without_each(
             calm = [replace(s, motion=replace(s.motion, wind=steady)) for s in seen.segments]
             out[finding.id] = on_traces(traces, seen.rows, made_by(seen, calm, fit))
     return out
-
-
-def _cutoff_of(model: WrenchModel) -> float:
-    return model.prepared.thinner.cutoff_hz
 
 
 def without_wind(segment, wind: np.ndarray) -> np.ndarray:
@@ -239,7 +236,7 @@ def chain_without(found: Fitted, key: str) -> CommandChain:
 
 def made_by(model: WrenchModel, segments, fit: Fit) -> list[np.ndarray]:
     """What a fit leaves of stretches that were changed, (n, 12) each."""
-    rows = rows_of(model, segments)
+    rows = _rows_of(model, segments)
     named = np.where(model.unnamed(fit.columns), 0.0, fit.beta)
     return [r.y - r.x[:, :, fit.columns] @ named for r in rows]
 

@@ -20,7 +20,7 @@ Gains of a reading that only look wrong because its characteristic is curved.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,7 +35,6 @@ from rotorid.mismatch.decide.select import KEEP_P, SHARE_OF_LARGEST, Selection
 from rotorid.mismatch.decide.selected import (
     SMALLEST_CHANGE,
     WIDEST_TRUST,
-    TermReport,
     coefficients,
     estimates,
     findings_of,
@@ -165,12 +164,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
 
         return wrong_values(model.regression, selection, size, moving=False, refused=refused)
 
-    def among(model: ReadingModel, terms: list[Term]) -> ReadingModel:
-        kept = {t.key for t in terms}
-        active = [k for k in model.selection.active if k in kept]
-        return fitted_model(setup, terms, active, loadings, model.search.refused)
-
-    model = with_plainer_forms(model, among)
+    model = with_plainer_forms(model, loadings)
     if chain is None:
         reasons.update(
             {k: NO_ROTORS if setup.instrument.bench else "no commands are recorded" for k in before_the_rotors()}
@@ -181,7 +175,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
         if why is not None:
             reasons |= dict.fromkeys(ids_of_stage(SUPPLY), why)
     values, refused = values_of(model.selection), set()
-    while needless := (needless_values(model, values) | curved_gains(model, values)) - refused:
+    while needless := (_needless_values(model, values) | _curved_gains(model, values)) - refused:
         refused |= needless
         values = values_of(model.selection, refused)
     found = [_one_load(f, setup) for f in reading_findings(model)]
@@ -443,12 +437,12 @@ def reading_findings(model: ReadingModel) -> list[Finding]:
     """Findings of the terms of a reading, each with the channels that it shows in, the strongest first."""
     fit, search = model.selection.fit, model.search
 
-    def report_of(key: str) -> TermReport:
+    def report_of(key: str):
         size = search.ask.sizes_of(key, fit.beta[fit.places(model.regression.columns([key]))])
         order = np.argsort(-size)
         channels = tuple(CHANNELS[c] for c in order if size[c] > _SHOWS * size[order[0]])
         others = search.alternatives(key, model.selection.active)
-        return TermReport(active_values(model, key), _parameters_of(model, key), channels, others)
+        return active_values(model, key), _parameters_of(model, key), channels, others
 
     return findings_of(search, model.selection, report_of)
 
@@ -465,33 +459,25 @@ def _parameters_of(model: ReadingModel, key: str) -> tuple[Estimate, ...]:
     )
 
 
-def with_plainer_forms(model: ReadingModel, again: Callable[[ReadingModel, list[Term]], ReadingModel]) -> ReadingModel:
+def with_plainer_forms(model: ReadingModel, loadings: tuple[Loading, ...] | None) -> ReadingModel:
     """The model with a plainer form of the same id wherever all numbers of a form may be nothing.
 
-    A form of two time constants explains more than one of one and says nothing of either. `again(model, terms)`
-    searches once more from a model's terms at work with others to choose from.
+    A form of two time constants explains more than one of one and says nothing of either. The search is run once more
+    without it; `loadings` are those of `first_model`.
     """
     for key in list(model.selection.active):
         term = model.search.terms[key]
         if term.effect in UNKNOWNS or key not in model.selection.active:
             continue
-        if not any(len(t.form.parameters) < len(term.form.parameters) for t in _forms_beside(model, key)):
+        alike = [t for t in model.terms if t.kind == "effect" and t.effect == term.effect]
+        others = {t.key for t in alike if len(t.form.parameters) >= len(term.form.parameters)}
+        if len(others) == len(alike):
             continue
         if rules.PLAINER_FORM(all(p.low <= 0.0 <= p.high for p in _parameters_of(model, key))):
-            others = [t for t in model.terms if t.kind != "effect" or t.effect != term.effect or _plainer(t, term)]
-            model = again(model, others)
+            terms = [t for t in model.terms if t.key not in others]
+            active = [k for k in model.selection.active if k not in others]
+            model = fitted_model(model.setup, terms, active, loadings, model.search.refused)
     return model
-
-
-def _forms_beside(model: ReadingModel, key: str) -> list[Term]:
-    """Terms of the same id."""
-    effect = model.search.terms[key].effect
-    return [t for t in model.terms if t.kind == "effect" and t.effect == effect and t.key != key]
-
-
-def _plainer(one: Term, than: Term) -> bool:
-    """Whether a term's form has fewer parameters than another's."""
-    return len(one.form.parameters) < len(than.form.parameters)
 
 
 def hats(values: np.ndarray) -> np.ndarray:
@@ -499,7 +485,7 @@ def hats(values: np.ndarray) -> np.ndarray:
     return np.stack([np.interp(values, _KNOTS, row) for row in np.eye(len(_KNOTS))], axis=1)
 
 
-def freed(model: ReadingModel, key: str, beta: np.ndarray, channels: list[int]) -> list[np.ndarray]:
+def _freed(model: ReadingModel, key: str, beta: np.ndarray, channels: list[int]) -> list[np.ndarray]:
     """Columns of a term's free form on the rows of every part, (n, 6, m), apart in each of the channels."""
     cols = model.regression.columns([key])
     parts = [r.x[:, :, cols] @ beta for r in model.rows]
@@ -546,7 +532,7 @@ def _left_of(model: ReadingModel, value: str, strong: str, active: list[str], ch
     The value is as free as one that is called wrong.
     """
     fit, loose = model.regression.fit([*model.search.always, *active]), {value: WIDEST_TRUST}
-    small = _with_free(model, active, freed(model, strong, coefficients(model.regression, fit, strong)[0], channels))
+    small = _with_free(model, active, _freed(model, strong, coefficients(model.regression, fit, strong)[0], channels))
     every = [*model.search.always, *active]
     rest = [k for k in every if k != value]
     with_it = small.fit([_FREE, *every], loose=loose)
@@ -587,7 +573,7 @@ def _stronger_ones(model: ReadingModel, value: str, active: list[str]) -> list[t
     return out
 
 
-def needless_values(model: ReadingModel, values: Iterable[str]) -> set[str]:
+def _needless_values(model: ReadingModel, values: Iterable[str]) -> set[str]:
     """Of believed values that seem wrong those that only make up for the form of an effect at work.
 
     Also those that a form's own parameters say again: another power of the speed has no C_F to believe.
@@ -602,14 +588,14 @@ def needless_values(model: ReadingModel, values: Iterable[str]) -> set[str]:
     return out if rules.NEEDLESS_VALUE(bool(out)) else set()
 
 
-def curved_gains(model: ReadingModel, values: Values) -> set[str]:
+def _curved_gains(model: ReadingModel, values: Values) -> set[str]:
     """Gains called wrong given a curved characteristic that is right at small loads, or right over all of them.
 
     The gain of a curve is a convention: a reading that saturates is right at small loads, one with a dead band nearly
     so over all, and the slope that a polynomial has at no load is neither. A wrong calibration is off in both.
     """
     instrument = model.setup.instrument
-    if not any(model.search.terms[k].effect in characteristics() for k in model.selection.active):
+    if not any(model.search.terms[k].effect in _characteristics() for k in model.selection.active):
         return set()
     out = set()
     for key, (change, _) in values.items():
@@ -622,7 +608,7 @@ def curved_gains(model: ReadingModel, values: Values) -> set[str]:
     return out if rules.CURVED_GAIN(bool(out)) else set()
 
 
-def characteristics() -> frozenset[str]:
+def _characteristics() -> frozenset[str]:
     """Ids of a sensor's curves."""
     return ids_of("curve_of_load") & ids_of("kind", "sensor")
 
@@ -630,7 +616,7 @@ def characteristics() -> frozenset[str]:
 def _slope_of(model: ReadingModel, channel: int, most: float) -> float:
     """Slope, less one, of a reading over loads up to `most` in size, less all effects but a curved characteristic."""
     fit, search = model.selection.fit, model.search
-    others = [k for k in model.selection.active if search.terms[k].effect not in characteristics()]
+    others = [k for k in model.selection.active if search.terms[k].effect not in _characteristics()]
     known = np.isin(fit.columns, model.regression.columns(others))
     load, left = [], []
     for rows, loads in zip(model.rows, _loads_of_rows(model), strict=True):

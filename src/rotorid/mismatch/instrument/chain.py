@@ -417,7 +417,7 @@ def _thinned(loadings: list[Loading]) -> list[Loading]:
     return loadings[::step] if len(loadings) >= 4 * step else loadings
 
 
-def candidates(setup: PreparedInstrument) -> list[tuple[str, SpeedForm]]:
+def _candidates(setup: PreparedInstrument) -> list[tuple[str, SpeedForm]]:
     """Forms that these recordings can test."""
     out = []
     for key, effect in catalogue().items():
@@ -447,7 +447,7 @@ def _ordered(chain: Chain) -> Chain:
     return tuple(sorted(chain, key=lambda pair: pair[1].stage))
 
 
-def start_of(problem: _ChainProblem, chain: Chain, fit: _ChainFit, new: str = "", values=()) -> np.ndarray:
+def _start_of(problem: _ChainProblem, chain: Chain, fit: _ChainFit, new: str = "", values=()) -> np.ndarray:
     """Start of a chain from the fit of another that may lack one form, nothing having happened between its samples."""
     known = {key: fit.theta[fit.place(key)] for key, _ in fit.chain}
     theta = [values if key == new else known.get(key, form.neutral) for key, form in chain]
@@ -456,7 +456,7 @@ def start_of(problem: _ChainProblem, chain: Chain, fit: _ChainFit, new: str = ""
 
 def _start_with(problem: _ChainProblem, chain: Chain, fit: _ChainFit, new: tuple[str, SpeedForm]) -> np.ndarray:
     """Start of a chain with a new form from what is known of the others: of the form's starts that explains most."""
-    options = [start_of(problem, chain, fit, new[0], v) for v in starts(new[1])]
+    options = [_start_of(problem, chain, fit, new[0], v) for v in starts(new[1])]
     return min(options, key=lambda theta: float(np.sum(problem.white(chain, theta) ** 2)))
 
 
@@ -467,7 +467,7 @@ def find_chain(setup: PreparedInstrument, others: list | None = None) -> ChainRe
     if not any(np.any(x.command > 0) for x in setup.loadings):
         return None
     problem = _ChainProblem(setup, others)
-    forms = candidates(setup)
+    forms = _candidates(setup)
     # What no form explains yet is no noise: whitened by it, slow steps of the command would leave their jumps alone.
     problem.learn((), problem.neutral(), coloured=False)
     best = problem.fit((), problem.neutral())
@@ -491,7 +491,7 @@ def _without_mere_scale(problem: _ChainProblem, best: _ChainFit, dropped: dict[s
             if form.stage not in (CURVE, SUPPLY):
                 continue
             rest = best.chain_without(key)
-            fit = scaled.fit(rest, np.concatenate([[problem.first_full], start_of(problem, rest, best)]))
+            fit = scaled.fit(rest, np.concatenate([[problem.first_full], _start_of(problem, rest, best)]))
             if fit.cost < best.cost + COST_PER_PARAMETER * (len(form.parameters) - 1):
                 found = key, _ChainFit(rest, fit.values, fit.cost, False)
         if found is None:
@@ -579,7 +579,7 @@ def _pruned(problem: _ChainProblem, best: _ChainFit, dropped: dict[str, str]) ->
         worst = max(doubtful, key=doubtful.get)
         dropped.setdefault(worst, f"p = {doubtful[worst]:.2g} given the others")
         kept = best.chain_without(worst)
-        best = _richer(problem, replace(best, chain=kept, theta=start_of(problem, kept, best)))
+        best = _richer(problem, replace(best, chain=kept, theta=_start_of(problem, kept, best)))
     return best
 
 
@@ -661,7 +661,7 @@ def alternatives(problem: _ChainProblem, best: _ChainFit, key: str, forms) -> li
 def _reading_alternatives(problem: _ChainProblem, best: _ChainFit, rest: Chain, key: str) -> list[str]:
     """Effects of the reading that explain as well in a form's place, where no speed is measured."""
     out = sorted(ids_of("same_on_commands", key))
-    known, low, high = start_of(problem, rest, best), *problem.bounds(rest)
+    known, low, high = _start_of(problem, rest, best), *problem.bounds(rest)
 
     def explains(form: Form, value: float) -> bool:
         first, with_it = form.parameters[0], copy(problem)

@@ -43,7 +43,7 @@ class _Slope:
     correlation: float
 
 
-def slopes(setup: PreparedInstrument) -> list[_Slope]:
+def _slopes(setup: PreparedInstrument) -> list[_Slope]:
     """Slopes of every channel that is loaded, by run.
 
     Of a moment what goes with the forces across it is taken off first: a lever arm that nobody stated makes any sign.
@@ -71,7 +71,7 @@ def _rest_beside(columns: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 def find_mistakes(recordings: RecordingSet) -> tuple[RecordingSet, list[Finding], list[str]]:
     """The set with overwhelming mistakes corrected, their findings, and notes."""
-    recordings, findings, notes = degrees(recordings)
+    recordings, findings, notes = _degrees(recordings)
     recordings, lost = dropout.find(recordings)
     findings += [lost] if lost else []
     setup = set_up(recordings)
@@ -85,7 +85,7 @@ def find_mistakes(recordings: RecordingSet) -> tuple[RecordingSet, list[Finding]
     return recordings, findings, notes
 
 
-def scaled(run: Run, factors: dict[str, float]) -> Run:
+def _scaled(run: Run, factors: dict[str, float]) -> Run:
     """A run with columns multiplied."""
     table = run.table.copy()
     for name, factor in factors.items():
@@ -98,7 +98,7 @@ def _with_runs(recordings: RecordingSet, runs) -> RecordingSet:
     return RecordingSet(recordings.name, recordings.vehicle, tuple(runs), recordings.held_out)
 
 
-def degrees(recordings: RecordingSet) -> tuple[RecordingSet, list[Finding], list[str]]:
+def _degrees(recordings: RecordingSet) -> tuple[RecordingSet, list[Finding], list[str]]:
     """Attitude of the mount in degrees: no mount is tilted by more than a right angle."""
     off = [
         n
@@ -108,7 +108,7 @@ def degrees(recordings: RecordingSet) -> tuple[RecordingSet, list[Finding], list
     if not off:
         return recordings, [], []
     names = [n for n in c.MOUNT if any(r.has(n) for r in recordings.runs)]
-    runs = [scaled(r, dict.fromkeys(names, np.pi / 180)) for r in recordings.runs]
+    runs = [_scaled(r, dict.fromkeys(names, np.pi / 180)) for r in recordings.runs]
     text = f"{' and '.join(names)} are in degrees, not in rad; they were converted"
     return (
         _with_runs(recordings, runs),
@@ -134,13 +134,13 @@ def _finding(key: str, sentence: str, channels, factor: float | None = None, oth
 
 def _flipped(recordings: RecordingSet, setup: PreparedInstrument):
     """Channels whose reading falls as the load rises, in all runs or in some."""
-    bad = [s for s in slopes(setup) if s.correlation < -_CERTAIN and s.slope < _FLIPPED]
+    bad = [s for s in _slopes(setup) if s.correlation < -_CERTAIN and s.slope < _FLIPPED]
     if not bad:
         return None
     runs = []
     for run in recordings.runs:
         own = {NAMES[s.channel]: -1.0 for s in bad if s.run == run.name}
-        runs.append(scaled(run, own))
+        runs.append(_scaled(run, own))
     channels = list(dict.fromkeys(CHANNELS[s.channel] for s in bad))
     named = list(dict.fromkeys(s.run for s in bad))
     everywhere = len(named) == len(recordings.runs)
@@ -163,7 +163,7 @@ def _nearest(slope: float, units: dict[str, float]) -> str | None:
 
 def _other_unit(recordings: RecordingSet, setup: PreparedInstrument):
     """Forces, moments or rotor speeds in another unit, in every run."""
-    found = [s for s in slopes(setup) if s.correlation > _CERTAIN]
+    found = [s for s in _slopes(setup) if s.correlation > _CERTAIN]
     forces = [s.slope for s in found if s.channel < 3]
     moments = [s.slope for s in found if s.channel >= 3]
     speed_known = bool(setup.loadings) and setup.loadings[0].measured and recordings.vehicle.kind == "stand"
@@ -183,7 +183,7 @@ def _other_unit(recordings: RecordingSet, setup: PreparedInstrument):
 
 
 def _converted(recordings, names, unit, factor, wanted, channels):
-    runs = [scaled(r, dict.fromkeys(names, factor)) for r in recordings.runs]
+    runs = [_scaled(r, dict.fromkeys(names, factor)) for r in recordings.runs]
     present = [n for n in names if any(r.has(n) for r in recordings.runs)]
     text = f"{', '.join(present)} are in {unit}, not in {wanted}; they were converted"
     return _with_runs(recordings, runs), _finding("unit_error", text, channels, factor), text + "."

@@ -474,7 +474,7 @@ def nonlinear_deviation(model: ReadingModel, key: str) -> np.ndarray:
     return out
 
 
-def value_keys(setup: PreparedInstrument) -> list[str]:
+def _value_keys(setup: PreparedInstrument) -> list[str]:
     """Believed values that this set can contradict."""
     vehicle, channels = setup.vehicle, setup.instrument.channels
     if vehicle.kind == "bench":
@@ -496,7 +496,7 @@ def value_keys(setup: PreparedInstrument) -> list[str]:
 def make_terms(setup: PreparedInstrument) -> tuple[list[Term], dict[str, str]]:
     """Every term that this set can test, and the ids that it cannot, with the reason."""
     trust = setup.vehicle.trust
-    sd = {k: max(trust.get(VALUE_NAMES[k], _DEFAULT_TRUST[k.split("_")[0]]), 1e-6) for k in value_keys(setup)}
+    sd = {k: max(trust.get(VALUE_NAMES[k], _DEFAULT_TRUST[k.split("_")[0]]), 1e-6) for k in _value_keys(setup)}
     terms = [Term(key, "value", prior_sd=(relative,)) for key, relative in sd.items()]
     reasons: dict[str, str] = {}
     if not setup.steady_points and not setup.instrument.by_hand:
@@ -517,7 +517,7 @@ def make_terms(setup: PreparedInstrument) -> tuple[list[Term], dict[str, str]]:
         found, why = [], None
         for form in forms_of(effect, setup.instrument):
             if not effect.reading_forms:
-                lacking = lacks(form, setup)
+                lacking = _lacks(form, setup)
                 if lacking:
                     why = why or lacking
                     continue
@@ -529,7 +529,7 @@ def make_terms(setup: PreparedInstrument) -> tuple[list[Term], dict[str, str]]:
     return terms, reasons
 
 
-def lacks(form: Form, setup: PreparedInstrument) -> str | None:
+def _lacks(form: Form, setup: PreparedInstrument) -> str | None:
     """Why a form for a flight cannot be tested on this stand."""
     if any(name in _DISPLACED for name in form.requires):
         return _STILL
@@ -606,6 +606,3 @@ def rows_of(setup: PreparedInstrument, terms: list[Term], loadings=None, at_work
                 at += 1
         out += [Rows(loading.run, times[p], small[p], x[p]) for p in pieces]
     return out
-
-
-__all__ = ["OFFSET", "VALUE_NAMES", "make_terms", "rows_of", "value_keys"]

@@ -193,7 +193,7 @@ def _features(z: np.ndarray) -> np.ndarray:
     return np.concatenate([np.ones((len(z), 1)), z, z[:, i] * z[:, j]], axis=1)
 
 
-def entries(vehicle: Vehicle, instrument: InstrumentFacts) -> tuple[list[tuple[Form, np.ndarray]], bool]:
+def _entries(vehicle: Vehicle, instrument: InstrumentFacts) -> tuple[list[tuple[Form, np.ndarray]], bool]:
     """Forms that act on load or reading with their values, and whether any acts between command and speed."""
     found, chain = [], False
     for number, entry in enumerate(vehicle.effects, 1):
@@ -219,7 +219,7 @@ def entries(vehicle: Vehicle, instrument: InstrumentFacts) -> tuple[list[tuple[F
     return found, chain
 
 
-def predicted(
+def _predicted(
     vehicle: Vehicle,
     instrument: InstrumentFacts,
     loading: Loading,
@@ -229,7 +229,7 @@ def predicted(
     """Reading that the vehicle with its effects predicts for a stretch by an instrument with its errors, (n, 6)."""
     of_reading = [e.model_dump(include={"id", "form", "parameters"}) for e in (errors.instruments if errors else ())]
     both = vehicle.model_copy(update={"effects": (*vehicle.effects, *(e for e in of_reading if e["form"]))})
-    forms, chain = entries(both, replace(instrument, vehicle=vehicle))
+    forms, chain = _entries(both, replace(instrument, vehicle=vehicle))
     if not loading.measured and loading.command is not None:
         speed = loading.command
         if chain:
@@ -257,8 +257,8 @@ def prove(analysis: Analysis, written: Vehicle, reloaded: Vehicle, errors: Instr
     ours_of = instruments_of(analysis)
     volts = full_voltage_of(analysis.loadings)
     for loading in analysis.loadings:
-        ours = predicted(written, analysis.instrument, loading, volts, ours_of)
-        theirs = predicted(reloaded, analysis.instrument, loading, volts, errors)
+        ours = _predicted(written, analysis.instrument, loading, volts, ours_of)
+        theirs = _predicted(reloaded, analysis.instrument, loading, volts, errors)
         scale = max(float(np.abs(ours).max()), 1e-12)
         if not np.allclose(ours, theirs, rtol=0, atol=_SAME * scale):
             raise RuntimeError(f"improved_vehicle.yaml read back predicts another reading in {loading.run}")

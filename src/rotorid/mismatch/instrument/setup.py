@@ -14,7 +14,7 @@ import numpy as np
 
 from rotorid.effects.contract import Motion
 from rotorid.effects.hysteresis import NARROW, play
-from rotorid.effects.loading import CHANNELS, REST_S, InstrumentFacts, Loading, at_sensor, rotation_of, weight
+from rotorid.effects.loading import REST_S, InstrumentFacts, Loading, at_sensor, rotation_of, weight
 from rotorid.errors import InputError
 from rotorid.mismatch.evidence.motion import SLOW_S, expected_voltages, is_noise
 from rotorid.mismatch.evidence.rows import baseline_wrench
@@ -258,7 +258,7 @@ def _stretches_of(run: Run, how: _Preparation) -> list[Loading]:
     return out
 
 
-def turned(loading: Loading, change: Callable[[np.ndarray, float], np.ndarray]) -> Loading:
+def _turned(loading: Loading, change: Callable[[np.ndarray, float], np.ndarray]) -> Loading:
     """The loading with what `change` makes of measured rotor speeds and their rate; the speeds read are kept too."""
     read = loading.motion.rotor_speed
     if not loading.measured or read is None:
@@ -394,9 +394,9 @@ def set_up(recordings: RecordingSet, whole: RecordingSet | None = None) -> Prepa
     loadings = how.stretches(recordings)
     if vehicle.kind == "stand" and loadings:
         loadings = without_voltmeter_noise(loadings)
-        calm = [loaded_by(turned(x, without_noise), vehicle) for x in loadings]
+        calm = [loaded_by(_turned(x, without_noise), vehicle) for x in loadings]
         if quieter(loadings, calm) is calm:
-            noisier = tuple(loaded_by(turned(x, _noised), vehicle) for x in loadings)
+            noisier = tuple(loaded_by(_turned(x, _noised), vehicle) for x in loadings)
             loadings = calm
     if not loadings:
         raise InputError(f"{recordings.name}: no run has {_SHORTEST} samples in a row with every channel")
@@ -443,7 +443,7 @@ def with_unseen(setup: PreparedInstrument, unseen: RecordingSet) -> PreparedInst
     if own and any(x.voltage_read is not None for x in setup.loadings):
         own = _with_expected_voltages(own)
     if setup.noisier is not None:
-        own = [loaded_by(turned(x, without_noise), vehicle) for x in own]
+        own = [loaded_by(_turned(x, without_noise), vehicle) for x in own]
     if setup.settling_s:
         own = list(without_settling(own, instrument.loaded, instrument.largest, setup.settling_s))
     every = replace(unseen, runs=(*setup.recordings.runs, *runs))
@@ -583,6 +583,3 @@ def averaged(values: np.ndarray, count: int) -> np.ndarray:
         return values
     whole = len(values) // count * count
     return values[:whole].reshape(len(values) // count, count, *values.shape[1:]).mean(axis=1)
-
-
-__all__ = ["CHANNELS", "PreparedInstrument", "averaged", "set_up"]

@@ -21,7 +21,7 @@ from rotorid.mismatch.mistakes.signals import (
     replace_sensor,
     sensor_columns,
 )
-from rotorid.mismatch.mistakes.units import RATES, UnitError, corrected, nearest
+from rotorid.mismatch.mistakes.units import RATES, corrected, nearest
 from rotorid.recordings import Vehicle
 
 _LEAST_EXPLAINED = 0.4
@@ -174,7 +174,7 @@ def _in_contract_units(recordings: ReadSet, sensor: str, reading: _Reading, amon
         return Corrected(recordings)
     measured, spread = 1.0 / reading.scale, 1.96 * reading.scale_sd / reading.scale
     columns = sensor_columns(recordings.vehicle)[sensor]
-    return corrected(recordings, UnitError(columns, what, *unit, expected, measured, spread, reading.p_value))
+    return corrected(recordings, columns, what, unit, expected, measured, spread, reading.p_value)
 
 
 def _turning(recordings: ReadSet) -> Corrected:

@@ -121,7 +121,7 @@ def what_is_left(recordings: RecordingSet, before: RecordingSet, lost: Finding) 
     """
     vehicle = recordings.vehicle
     sensors = {run.name: _sensors(run, vehicle, len(before.runs) == 1) for run in before.runs}
-    short = [run for run in recordings.runs if _lasts_s(run, sensors[run.name]) < LEAST_STRETCH_S]
+    short = [run for run in recordings.runs if longest_stretch_s(run, sensors[run.name])[0] < LEAST_STRETCH_S]
     if len(recordings.runs) == 1:
         (run,) = recordings.runs
         found, _ = whole_stretches(run, sensors[run.name])
@@ -163,10 +163,6 @@ def _sensors(run: Run, vehicle: Vehicle, alone: bool) -> list[tuple[str, ...]]:
     """Sensors that a run is compared by: of several runs one without rotor speeds is compared by its commands."""
     rotors = [names for names in rotor_groups(vehicle).values() if names and run.has(*names)]
     return [*(rotors if alone else rotors[-1:]), *moving_sensors(run)]
-
-
-def _lasts_s(run: Run, sensors: list[tuple[str, ...]]) -> float:
-    return longest_stretch_s(run, sensors)[0]
 
 
 def _share(run: Run, stretches_s: list[tuple[float, float]]) -> float:

@@ -62,7 +62,7 @@ class _Moments:
         return float(self.square.sum()), self.cross.sum(axis=0), self.gram.sum(axis=0)
 
 
-def moments(blocks: Blocks, output: int, lag_s: float, weight: np.ndarray) -> _Moments:
+def _moments(blocks: Blocks, output: int, lag_s: float, weight: np.ndarray) -> _Moments:
     """Moments of one output with the rotors delayed and Z projected out."""
     x = blocks.x * lagged.delay(blocks.frequency_hz, lag_s)[:, :, None]
     y, z = blocks.y[:, :, output], blocks.z
@@ -163,7 +163,7 @@ def find(recordings: ReadSet) -> Corrected:
     free = lagged.fit(blocks)
     if free is None:
         return Corrected(recordings)
-    parts = [moments(blocks, axis, free.lag_s, free.weight[axis]) for axis in (0, 1)]
+    parts = [_moments(blocks, axis, free.lag_s, free.weight[axis]) for axis in (0, 1)]
     rows = _rows_of(vehicle)
     orders = _orders_to_try(vehicle.rotor_count)
     yaw = _yaw_moments(signals, vehicle, sensor, free)
@@ -322,7 +322,7 @@ def _yaw_moments(signals: list[Signals], vehicle: Vehicle, sensor: str, roll: La
     late = roll.lag_s if sharp else 0.0
     free = lagged.fit(blocks, np.array([late]))
     lags = [late] if sensor == "rotors" else [late, *(late + _LATER_S)]
-    return [moments(blocks, 0, lag, free.weight[0]) for lag in lags] if free else []
+    return [_moments(blocks, 0, lag, free.weight[0]) for lag in lags] if free else []
 
 
 def _spun(recordings: ReadSet, rotors: list[int], p_value: float, ambiguous: bool) -> Corrected:

@@ -250,7 +250,7 @@ def _late(signals: Signals, sensor: str, steps: int) -> Signals:
     return replace(signals, values={**signals.values, sensor: _moved(signals.values[sensor], -steps)})
 
 
-def difference(of: _SensorPair, drifting: bool, free: bool = True) -> _LatenessFound:
+def _difference(of: _SensorPair, drifting: bool, free: bool = True) -> _LatenessFound:
     """Lateness, and its growth if asked for, at the likelihood's peak.
 
     Where `free`, gains and weights are fitted again with the blocks put on one time, because a drifting clock blurs the
@@ -264,7 +264,7 @@ def difference(of: _SensorPair, drifting: bool, free: bool = True) -> _LatenessF
         found = _unblurred(blocks, found)
     start, growth = found.lag_s, 0.0
     for _ in range(3 if drifting else 1):
-        curves = likelihood(blocks, found, lags)
+        curves = _likelihood(blocks, found, lags)
         middle = start + growth * float(blocks.time_s.mean())
         start, growth = _peak(lags, curves, blocks.time_s, middle, drifting)
         aligned = blocks.delayed(start + growth * blocks.time_s)
@@ -296,8 +296,8 @@ def difference(of: _SensorPair, drifting: bool, free: bool = True) -> _LatenessF
     gained = 0.0
     if drifting:
         # The aligned fit's likelihood at no further lag is that of the drift itself.
-        drift = likelihood(aligned, found, np.zeros(1)).sum()
-        gained = float(drift - likelihood(blocks, found, lags).sum(axis=0).max())
+        drift = _likelihood(aligned, found, np.zeros(1)).sum()
+        gained = float(drift - _likelihood(blocks, found, lags).sum(axis=0).max())
     explained = float(np.min(found.explained))
     answered = of.over == "rotors" or (of.over in COMMANDED and of.late != "rotors")
     bias_s = _disturbed_s(blocks, found) if answered else 0.0
@@ -329,7 +329,7 @@ def _unblurred(blocks: Blocks, found: LaggedFit) -> LaggedFit:
     return best
 
 
-def likelihood(blocks: Blocks, found: LaggedFit, lags: np.ndarray) -> np.ndarray:
+def _likelihood(blocks: Blocks, found: LaggedFit, lags: np.ndarray) -> np.ndarray:
     """Log-likelihood of every lag in every block, (b, lags), up to what no lag changes."""
     model = blocks.x @ found.gain.T
     rest = blocks.y - blocks.z @ found.nuisance.T
@@ -348,7 +348,7 @@ def _waves(frequency_hz: tuple[float, ...], first_s: float, count: int) -> tuple
 def differences(known: list[_SensorPair], drifting: bool) -> list[_LatenessFound]:
     """Every difference of lateness that a comparison is good enough to show."""
     least = dict.fromkeys(COMMANDED, _LEAST_EXPLAINED if drifting else _LEAST_ALONE)
-    found = [difference(c, drifting) for c in known]
+    found = [_difference(c, drifting) for c in known]
     return [d for d in found if d.explained > least.get(d.of.over, _LEAST_EXPLAINED)]
 
 
@@ -391,7 +391,7 @@ def _in_every_run(whole: _LatenessFound) -> bool:
         if own.count < 2:
             continue
         # A run of a few blocks cannot determine gains of its own.
-        d = difference(replace(whole.of, blocks=own), drifting=True, free=own.count >= lagged.FEWEST_BLOCKS)
+        d = _difference(replace(whole.of, blocks=own), drifting=True, free=own.count >= lagged.FEWEST_BLOCKS)
         sd = d.sd(1)
         agree.append(abs(d.growth - whole.growth) < _RUN_SIGMAS * sd + _RUN_AGREEMENT * abs(whole.growth))
         due = min(_LEAST_LIKELIHOOD, whole.gained * own.count / blocks.count) / 4

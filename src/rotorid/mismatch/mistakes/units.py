@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
@@ -32,22 +31,6 @@ _THROTTLES = {
 """A throttle's unit with its factor, and what its largest value is above and up to."""
 
 
-@dataclass(frozen=True)
-class UnitError:
-    """Columns that hold `factor` times the contract's unit."""
-
-    columns: tuple[str, ...]
-    what: str
-    unit: str
-    factor: float
-    expected: str
-    measured: float
-    """The factor as the recording itself gives it."""
-    spread: float
-    """Half width of the 95 % interval of the logarithm of `measured`."""
-    p_value: float
-
-
 def nearest(ratio: float, factors: Mapping[str, float]) -> tuple[str, float] | None:
     """The unit whose factor a measured ratio is, None if it is none of them or the contract's own."""
     if not np.isfinite(ratio) or ratio <= 0 or abs(np.log(ratio)) < _FAR:
@@ -59,8 +42,8 @@ def nearest(ratio: float, factors: Mapping[str, float]) -> tuple[str, float] | N
 def find(recordings: ReadSet) -> Corrected:
     """The set in the contract's units, with every unit error that the mean sizes of columns give away."""
     result = Corrected(recordings)
-    for error in _by_size(recordings):
-        result = result.then(partial(corrected, error=error))
+    for correct in _by_size(recordings):
+        result = result.then(correct)
     return result
 
 
@@ -77,8 +60,8 @@ def _spread(values: np.ndarray) -> float:
     return float(2.4 * np.std(np.log(np.maximum(parts, 1e-12))) / np.sqrt(len(parts)) + 1e-6)
 
 
-def _by_size(recordings: ReadSet) -> list[UnitError]:
-    """Every unit error that the mean sizes of columns give away."""
+def _by_size(recordings: ReadSet) -> list[Callable[[ReadSet], Corrected]]:
+    """For every unit error that the mean sizes of columns give away what corrects it."""
     vehicle, found = recordings.vehicle, []
     names = sensor_columns(vehicle)
 
@@ -87,7 +70,8 @@ def _by_size(recordings: ReadSet) -> list[UnitError]:
             measured = unit[1] if measured is None else measured
             # How sure the recording is that the ratio is nearer to the unit's factor than to one.
             surely = abs(np.log(measured)) / 2 / max(spread / 1.96, 1e-6)
-            found.append(UnitError(columns, what, *unit, expected, measured, spread, float(norm.sf(surely))))
+            error = dict(columns=columns, what=what, unit=unit, expected=expected, measured=measured, spread=spread)
+            found.append(partial(corrected, **error, p_value=float(norm.sf(surely))))
 
     force = _pooled(recordings, names["accelerometer"])
     if len(force):
@@ -119,29 +103,40 @@ def _by_size(recordings: ReadSet) -> list[UnitError]:
     return found
 
 
-def corrected(recordings: ReadSet, error: UnitError) -> Corrected:
-    """The set with the columns in the contract's unit, and the finding of a unit error.
+def corrected(
+    recordings: ReadSet,
+    columns: tuple[str, ...],
+    what: str,
+    unit: tuple[str, float],
+    expected: str,
+    measured: float,
+    spread: float,
+    p_value: float,
+) -> Corrected:
+    """The set with columns in the contract's unit (`expected`), and the finding that they hold another, times a factor.
 
-    It states the unit's own factor, and in its interval what the recording itself gives.
+    It states the unit's own factor, and in its interval what the recording itself gives: `measured`, with `spread`,
+    half the width of the 95 % interval of its logarithm.
     """
+    name, factor = unit
 
     def change(run: Run) -> dict:
-        own = {n: run.table[n] for n in error.columns if n in run.table.columns}
-        if error.unit == _PULSES:
+        own = {n: run.table[n] for n in columns if n in run.table.columns}
+        if name == _PULSES:
             return {n: (pulse - 1000.0) / 1000.0 for n, pulse in own.items()}
-        return {n: values * (1.0 / error.factor) for n, values in own.items()}
+        return {n: values * (1.0 / factor) for n, values in own.items()}
 
-    half = max(error.spread, abs(float(np.log(error.measured / error.factor))))
-    low, high = error.factor * np.exp(-half), error.factor * np.exp(half)
+    half = max(spread, abs(float(np.log(measured / factor))))
+    low, high = factor * np.exp(-half), factor * np.exp(half)
     finding = Finding(
         id="unit_error",
         status="established",
         sentence=(
-            f"{error.what[0].upper()}{error.what[1:]} ({error.columns[0]} …) hold {error.unit}, not {error.expected}: "
-            f"corrected by dividing by {error.factor:.6g}."
+            f"{what[0].upper()}{what[1:]} ({columns[0]} …) hold {name}, not {expected}: corrected by dividing by "
+            f"{factor:.6g}."
         ),
-        parameters=(Estimate("factor", error.factor, "1", float(low), float(high)),),
-        p_value=error.p_value,
-        channels=error.columns,
+        parameters=(Estimate("factor", factor, "1", float(low), float(high)),),
+        p_value=p_value,
+        channels=columns,
     )
     return Corrected(replace_columns(recordings, change), (finding,))

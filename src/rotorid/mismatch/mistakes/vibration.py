@@ -56,7 +56,7 @@ class _Turns:
 
 
 @dataclass(frozen=True)
-class Line:
+class _Line:
     """One axis of a sensor against the rotors' order."""
 
     column: str
@@ -71,7 +71,7 @@ class Line:
 
 def find(recordings: ReadSet) -> Corrected:
     """A vibration that follows the rotors, if there is a clear one; the set stays as it is."""
-    signals = turning(recordings)
+    signals = _turning(recordings)
     turns = {order: [_turns(s, order, _MOST_MEASURED) for s in signals] for order in _ORDERS}
     lines = []
     for sensor, columns, unit in (
@@ -105,7 +105,7 @@ def find(recordings: ReadSet) -> Corrected:
     return Corrected(recordings, (finding,))
 
 
-def turning(recordings: ReadSet) -> list[Signals]:
+def _turning(recordings: ReadSet) -> list[Signals]:
     """Signals of the runs with their rotors' speed: as read, or as commanded, at the scale at which a line stands out.
 
     A command is followed late, and its full speed is only believed: half a window's turn too much hides a line.
@@ -148,7 +148,7 @@ def _strongest_line(signals: list[Signals]) -> float:
     return best
 
 
-def _measure(all_seen: list[tuple[np.ndarray, _Turns | None]], column: str, unit: str, order: int) -> Line | None:
+def _measure(all_seen: list[tuple[np.ndarray, _Turns | None]], column: str, unit: str, order: int) -> _Line | None:
     """Power of readings (n,) at the rotors' order over that next to it, summed over windows and rotors."""
     ratios, powers, levels, lengths = [], [], [], []
     for reading, turns in all_seen:
@@ -178,7 +178,9 @@ def _measure(all_seen: list[tuple[np.ndarray, _Turns | None]], column: str, unit
     amplitude, low, high = (np.sqrt(max(v, 0.0)) for v in (mean, mean - 1.96 * sd, mean + 1.96 * sd))
     # White noise of one sigma s a sample shows as 4 s² · 1.5 / length behind a Hann taper.
     noise = float(np.sqrt(level.mean() * np.median(length) / 6))
-    return Line(column, unit, order, float(amplitude), float(low), float(high), float(amplitude) / max(noise, 1e-12), p)
+    return _Line(
+        column, unit, order, float(amplitude), float(low), float(high), float(amplitude) / max(noise, 1e-12), p
+    )
 
 
 def _tapered(length: int) -> np.ndarray:

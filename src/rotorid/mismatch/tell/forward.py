@@ -8,8 +8,8 @@ white noise again, and the recorded side's noise is added. It is never put above
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -35,23 +35,15 @@ _SAME = 1e-5
 """Relative difference above which a vehicle read back is not the model written (errors are stated to six digits)."""
 
 
-@dataclass(frozen=True)
-class Forward:
-    """Errors of simulation run forward, and what a reader must know about them."""
-
-    channels: dict[str, Channel]
-    notes: tuple[str, ...] = ()
-
-
 @step("running the simulation forward")
-def forward_channels(analysis: Analysis) -> Forward:
-    """Errors of every channel that the recording allows, for the four models."""
+def forward_channels(analysis: Analysis) -> tuple[dict[str, Channel], tuple[str, ...]]:
+    """Errors of every channel that the recording allows, for the four models, and what a reader must know of them."""
     vehicle = analysis.recordings.vehicle
     if vehicle.kind != "flight":
-        return Forward({})
+        return {}, ()
     segments, notes = _segments(analysis), []
     if not segments:
-        return Forward({}, ("No simulation run forward: rotor speeds and body rates are not recorded together.",))
+        return {}, ("No simulation run forward: rotor speeds and body rates are not recorded together.",)
     models = {
         "before": Model(analysis.believed),
         "refitted": Model(analysis.refitted),
@@ -81,7 +73,7 @@ def forward_channels(analysis: Analysis) -> Forward:
             rmse=rmse,
             p_value=PValues(before=None, after=None),
         )
-    return Forward(channels, tuple(notes))
+    return channels, tuple(notes)
 
 
 def delivered_model(analysis: Analysis) -> Model:
@@ -95,13 +87,16 @@ def _named_model(analysis: Analysis) -> Model:
     return model_of(named, conditions_of(analysis), instruments_of(analysis))
 
 
-def prove(analysis: Analysis, reloaded: Model, forward: Forward) -> None:
-    """Simulate a model read back from its files; RuntimeError unless it makes the errors stated as `after`."""
+def prove(analysis: Analysis, reloaded: Model, channels: Mapping[str, Channel], notes: Sequence[str]) -> None:
+    """Simulate a model read back from its files; RuntimeError unless it makes the errors stated as `after`.
+
+    `channels` and `notes` are those of `forward_channels`.
+    """
     segments = _segments(analysis)
-    if not forward.channels or not segments or any("leaves out" in note for note in forward.notes):
+    if not channels or not segments or any("leaves out" in note for note in notes):
         return
     errors, part = errors_of(segments, reloaded), fitted_part(analysis)
-    for name, channel in forward.channels.items():
+    for name, channel in channels.items():
         for sign, stated in ((1, channel.rmse.training.after), (-1, channel.rmse.held_out.after)):
             found = _rms(errors, name, part, sign)
             unknown = found is None or stated is None

@@ -13,12 +13,12 @@ from rotorid.mismatch.decide.findings import Analysis, Finding, one_per_class, w
 from rotorid.mismatch.decide.sizes import Size, channel_size, metres_words, scales, share_words
 from rotorid.mismatch.decide.status import CLAIMED, Estimate
 from rotorid.mismatch.decide.words import (
+    WRENCH_WORDS,
     capital,
     channel_words,
     effect_words,
     listed,
     number,
-    on_the_ground,
     parameter_words,
     percent,
     percent_words,
@@ -49,6 +49,16 @@ _NO_BETTER = 0.02
 
 _SizeWords = Literal["both", "share", "metres", ""]
 """Which sizes stand in a text: share of the weight and metres after half a second."""
+_GROUND_WORDS = (
+    ("on flights not used", "on runs not used"),
+    ("on the flight it was fitted to", "on the run it was fitted to"),
+    ("on held-out flight", "on held-out runs"),
+    ("What to fly next", "What to measure next"),
+    ("Faster, higher or rougher flight would show", "Larger, faster and returning loads would show"),
+    ("the believed vehicle describes", "the believed values describe"),
+    *WRENCH_WORDS.values(),
+)
+"""What is said of flights, as it is said of a stand or bench."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +78,10 @@ class Contents:
 
 def spoken(text: str, analysis: Analysis) -> str:
     """A text about flights as it is said of this kind of set."""
-    return text if analysis.recordings.vehicle.kind == "flight" else on_the_ground(text)
+    if analysis.recordings.vehicle.kind != "flight":
+        for flown, still in _GROUND_WORDS:
+            text = text.replace(flown, still).replace(capital(flown), capital(still))
+    return text
 
 
 def first_words(text: str, most: int = MOST_WORDS) -> str:

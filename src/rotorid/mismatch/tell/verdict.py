@@ -26,9 +26,7 @@ from rotorid.mismatch.decide.findings import (
     Finding,
     ValueRow,
     by_channel,
-    one_per_class,
     rms,
-    with_status,
 )
 from rotorid.mismatch.decide.sizes import Size, fitted_part, scales
 from rotorid.mismatch.tell.consistency import by_share, located_channels, missing_places, share_left, verdict_word
@@ -50,7 +48,7 @@ from rotorid.recordings.sufficient import basis_of
 _DESCRIBED = 0.1
 """Share of the weight, or of the moment that the rotors can make, that may stay off in a channel where a mistake in the
 set counts as corrected: of wrong corrections seen a quarter to a half stayed, of right ones next to nothing."""
-__all__ = ["Verdict", "main_channel", "make_verdict", "one_per_class", "spoken", "with_status"]
+__all__ = ["Verdict", "main_channel", "make_verdict", "spoken"]
 
 SCHEMA_PATH = Path(__file__).parents[4] / "workflow" / "schemas" / "verdict.schema.json"
 _SMALLEST_P = 1e-300

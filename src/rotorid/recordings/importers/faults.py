@@ -235,11 +235,11 @@ def further_motors(outputs: np.ndarray, motors: int) -> list[int]:
     return [motors + k for k in range(len(moves)) if moves[k] > 0 and left[k] < _UNEXPLAINED * moves[k]]
 
 
-def report_gaps(table: pd.DataFrame, factor: float = 3.0) -> list[ImportFault]:
-    """A fault where the clock steps by more than `factor` times its median step; nothing is filled in."""
+def report_gaps(table: pd.DataFrame) -> list[ImportFault]:
+    """A fault where the clock steps by more than three times its median step; nothing is filled in."""
     steps = np.diff(table[c.TIME].to_numpy(float))
-    long = steps > factor * np.median(steps)
-    found = f"{int(long.sum())} gaps longer than {factor:g} samples, the longest {steps.max(initial=0.0):.3g} s"
+    long = steps > 3.0 * np.median(steps)
+    found = f"{int(long.sum())} gaps longer than 3 samples, the longest {steps.max(initial=0.0):.3g} s"
     return fault_where(long, "gap", c.TIME, found, "left as a gap")
 
 

@@ -32,7 +32,7 @@ _FROM_FLIGHT, _GUESSED_COEFFICIENT = 0.1, 0.5
 _GUESSED_INERTIA, _GUESSED_TORQUE = 0.5, 0.5
 _CALM_RAD_S = 1.0
 """Body rate below which thrust and speeds of nearby instants are compared."""
-PLACES = {"front right": (1, 1), "rear left": (-1, -1), "front left": (1, -1), "rear right": (-1, 1)}
+_PLACES = {"front right": (1, 1), "rear left": (-1, -1), "front left": (1, -1), "rear right": (-1, 1)}
 """Signs of x and y of a rotor of a quadrotor in X shape."""
 ORDERS: dict[str, tuple[tuple[str, str], ...]] = {
     "px4": (("front right", "ccw"), ("rear left", "ccw"), ("front left", "cw"), ("rear right", "cw")),
@@ -70,7 +70,7 @@ class Known:
 def quad_x(order: str, x_m: float, y_m: float) -> tuple[Rotor, ...]:
     """Rotors of a quadrotor in X shape in an autopilot's order, at ±x, ±y (m)."""
     return tuple(
-        Rotor(x_m=PLACES[place][0] * x_m, y_m=PLACES[place][1] * y_m, spin=spin) for place, spin in ORDERS[order]
+        Rotor(x_m=_PLACES[place][0] * x_m, y_m=_PLACES[place][1] * y_m, spin=spin) for place, spin in ORDERS[order]
     )
 
 
@@ -234,7 +234,7 @@ def propose(
     remarks.append(f"the torque coefficient is C_F times {ratio:.4g} m ({ratio_note})")
     inertia, scale = _inertia(rotors, mass, template)
     remarks.append(f"the inertia is that of template {template_name} times {scale:.3g} (mass and arm squared)")
-    words = {signs: place for place, signs in PLACES.items()}
+    words = {signs: place for place, signs in _PLACES.items()}
     signs = [(int(np.sign(r.x_m)), int(np.sign(r.y_m))) for r in rotors]
     places = [words.get(own, f"at x {r.x_m:g}, y {r.y_m:g}") for own, r in zip(signs, rotors, strict=True)]
     lines = [

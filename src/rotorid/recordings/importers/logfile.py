@@ -158,7 +158,7 @@ def read_log(path: Path, mapping: Mapping | None = None) -> _Imported:
     if kind != "ros" and (size := path.stat().st_size) > LARGEST_FILE:  # a bag's pictures are not read
         raise InputError(f"{path}: has {size / 1e6:.0f} MB, expected at most {LARGEST_FILE / 1e6:.0f} MB")
     try:
-        with limited(path), _silent():
+        with _limited(path), _silent():
             return _read(path, kind, mapping)
     except InputError as error:
         said = printable(error)  # it may quote what stands in the file
@@ -227,7 +227,7 @@ def _px4(path: Path) -> _Imported:
 
 
 @contextmanager
-def limited(path: Path) -> Iterator[None]:
+def _limited(path: Path) -> Iterator[None]:
     """Inside, memory beyond the limit for this file is an InputError; nothing is limited where the system cannot."""
     try:
         import resource

@@ -50,7 +50,7 @@ def _read_matrix(path: Path) -> np.ndarray:
     return np.asarray(matrices[0], float)
 
 
-def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[ImportFault]]:
+def _convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[ImportFault]]:
     """Contract columns of a NeuroBEM matrix; NeuroBEM's prediction and accelerations ride as own columns."""
     ends = np.cumsum([width for _, width in _LAYOUT])
     parts = {name: part for (name, _), part in zip(_LAYOUT, np.split(matrix, ends, axis=1), strict=False)}
@@ -89,4 +89,4 @@ def convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[ImportFault]]:
 
 def read_neurobem(path: Path) -> tuple[pd.DataFrame, list[ImportFault]]:
     """One NeuroBEM flight in contract columns, and its faults."""
-    return convert(_read_matrix(path))
+    return _convert(_read_matrix(path))

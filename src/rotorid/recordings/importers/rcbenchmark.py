@@ -113,7 +113,7 @@ def _places(headings: list[str], where: str) -> tuple[dict[str, tuple[int, str, 
     return places, faults
 
 
-def convert(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
+def _convert(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
     """Contract columns of a stand with one rotor of what `_read_table` gives; measured values are kept as recorded.
 
     The thrust is a force along -z of the body, which the rotor passes on to the sensor. The torque is positive while
@@ -182,5 +182,5 @@ def read_rcbenchmark(path: Path) -> tuple[pd.DataFrame, list[ImportFault]]:
         raise InputError(f"{path}: file is missing") from None
     text, faults = decode_text(data)
     raw, more = _read_table(text, str(path))
-    table, converted_ = convert(raw)
+    table, converted_ = _convert(raw)
     return table, [*faults, *more, *converted_]

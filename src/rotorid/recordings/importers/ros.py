@@ -417,7 +417,7 @@ def _times(found: _BagContent) -> tuple[dict[tuple[str, str], np.ndarray], list[
     return times, list(faults.values())
 
 
-def convert(
+def _convert(
     series: dict[str, list[_TopicSeries]], faults: list[ImportFault], where: object
 ) -> tuple[pd.DataFrame, np.ndarray]:
     """Contract columns and where it flies (mask of rows), of the first series of each quantity."""
@@ -527,7 +527,7 @@ def read_ros(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault], st
     """Every flight of a bag (file or folder) or MCAP file by name, in contract columns, what was found, and the unit
     in which rotor speeds are stated."""
     series, faults = _read_series(path)
-    table, flying = convert(series, faults, path)
+    table, flying = _convert(series, faults, path)
     runs, cuts = flights(table, flying, (path.resolve() if path.is_dir() else path).name.split(".")[0], path)
     unit = "rpm" if "rpm" in series and "speeds" not in series else "rad/s"
     return runs, [*faults, *report_gaps(table), *cuts], unit

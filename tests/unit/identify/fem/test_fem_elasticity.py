@@ -5,7 +5,7 @@ import pytest
 
 from rotorid.errors import InputError
 from rotorid.identify.fem import elasticity
-from rotorid.identify.fem.elasticity import Bound, LooseParts, Pad, block, column, stacked
+from rotorid.identify.fem.elasticity import LooseParts, Pad, block, column, stacked
 from rotorid.identify.fem.placement import Material
 from rotorid.identify.fem.studies import FINENESSES, cantilever, kirsch_displacement_m, plate_with_hole
 
@@ -65,7 +65,7 @@ def test_bonded_boxes_stretch_as_one(counts, tolerance) -> None:
     nodes = body.nodes_m
     own = body.nodes_of("upper")
     own = own[np.abs(nodes[own, 2] - 1) < 1e-9]
-    bond = Bound(own, body.weights(nodes[own], "lower"), np.eye(3))
+    bond = (own, body.weights(nodes[own], "lower"), np.eye(3))
     fixed = np.stack([np.abs(nodes[:, axis]) < 1e-9 for axis in range(3)])
     top = body.mesh.facets_satisfying(lambda x: x[2] > 2 - 1e-9, boundaries_only=True)
     assert body.area_m2(top) == pytest.approx(1.0)

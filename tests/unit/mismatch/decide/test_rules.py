@@ -27,7 +27,7 @@ def test_an_unknown_rule_is_named_with_those_that_there_are():
 def test_every_rule_says_what_it_decides_and_every_limit_why():
     for name, rule in RULES.items():
         assert name == rule.name and rule.decides.endswith(".") and len(rule.decides.split()) >= 5
-        assert all(len(limit.why.split()) >= 4 for limit in rule.limits.values())
+        assert all(len(why.split()) >= 4 for _, why in rule.limits.values())
 
 
 def test_limits_are_read_by_name():

@@ -68,8 +68,8 @@ def test_the_simulation_run_forward_flies_in_the_wind_that_was_found():
         replace(r, table=r.table.assign(velocity_x_m_s=2.0, position_x_m=2.0 * r.time_s)) for r in made.recordings.runs
     )
     made = replace(made, recordings=replace(made.recordings, runs=runs))
-    with_wind = forward_channels(made).channels["velocity"].rmse.held_out.after
-    still = forward_channels(replace(made, winds=())).channels["velocity"].rmse.held_out.after
+    with_wind = forward_channels(made)[0]["velocity"].rmse.held_out.after
+    still = forward_channels(replace(made, winds=()))[0]["velocity"].rmse.held_out.after
     assert with_wind == pytest.approx(0.0, abs=1e-6)
     assert still > 0.1 * K_D * 4 * HOVER * 2.0 / 0.652
 
