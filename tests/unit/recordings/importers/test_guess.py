@@ -229,6 +229,13 @@ def test_the_range_of_throttles_is_found_or_asked(names: str, values: np.ndarray
     assert ("throttle" in found.open) == (ends == "?")
 
 
+def test_motors_of_thousands_are_asked_whether_they_are_speeds() -> None:
+    """Before: 15 bits without a question, of rpm and of ten thousandths."""
+    found = throttles_of("motor{}", 1500 + 5000 * SHARES)
+    assert found.mapping.channels["throttle"].range == "?"
+    assert "per ten thousand" in found.open["throttle"] and "are they speeds" in found.open["throttle"]
+
+
 ELECTRICAL = 60 / (2 * np.pi) * 7 * (900 + 100 * SHARES)  # of seven pairs of poles, turns a minute
 
 

@@ -21,6 +21,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     "10 bits": (0.0, 1023.0),
     "pulses in µs": (1000.0, 2000.0),
     "DShot": (48.0, 2047.0),
+    "per ten thousand": (0.0, 10_000.0),
     "15 bits": (0.0, 32767.0),
     "16 bits": (0.0, 65535.0),
 }
@@ -30,6 +31,7 @@ _RANGES_BY_NAME = {
     "DShot": frozenset(("dshot",)),
     "per cent": frozenset("percent pct".split()),
 }
+_AS_LARGE_AS_RPM = frozenset(("per ten thousand", "15 bits"))
 _BETAFLIGHTS = ("DShot", "pulses in µs")
 _UNNAMED = "no name says it"
 _OTHER_THINGS = frozenset("current amps temp temperature voltage volt volts power thrust torque force".split())
@@ -119,7 +121,7 @@ def _put(draft: Draft, quantity: str, family: Family, how: str) -> None:
         return
     betaflight = _is_betaflight(draft)
     found = _possible_ranges(values, family, betaflight)
-    speeds = how == _UNNAMED or (found == ["DShot"] and not betaflight and _can_be_speeds(values, family))
+    speeds = how == _UNNAMED or (not betaflight and _can_be_speeds(values, family, found))
     if found == ["a share"]:
         draft.put(quantity, family.columns, f"{evidence}, so a share", unit="1")
     elif len(found) == 1 and not speeds:
@@ -134,13 +136,17 @@ def _put(draft: Draft, quantity: str, family: Family, how: str) -> None:
         draft.put(quantity, family.columns, evidence, question, unit="raw", range=OPEN)
 
 
-def _can_be_speeds(values: np.ndarray, family: Family) -> bool:
-    """Whether numbers that fit DShot may be speeds in rad/s: never at an end of it, and no word says throttle."""
+def _can_be_speeds(values: np.ndarray, family: Family, ranges: list[str]) -> bool:
+    """Whether numbers that fit some ranges may be speeds, as no word says throttle: in rpm what fits the largest ranges
+    alone, in rad/s what fits DShot alone, and never at an end of them."""
     given = values[values > 0]
     low, high = _RANGES["DShot"]
-    words = {w for column in family.columns for w in named.words_of(column)}
-    plainly = words & frozenset.union(*_RANGES_BY_NAME.values(), frozenset(("throttle", "throttles", "thr")))
-    return not plainly and low < given.min() < _RANGES["pulses in µs"][0] < given.max() < high
+    words = {w.rstrip("0123456789") for column in family.columns for w in named.words_of(column)}
+    if words & frozenset.union(*_RANGES_BY_NAME.values(), frozenset(("throttle", "throttles", "thr"))):
+        return False
+    in_rad_s = low < given.min() < _RANGES["pulses in µs"][0] < given.max() < high
+    in_rpm = set(ranges) <= _AS_LARGE_AS_RPM and given.max() not in [_RANGES[kind][1] for kind in ranges]
+    return bool(ranges) and (in_rpm or (ranges == ["DShot"] and in_rad_s))
 
 
 def _is_betaflight(draft: Draft) -> bool:
@@ -168,7 +174,7 @@ def _possible_ranges(values: np.ndarray, family: Family, betaflight: bool) -> li
     for kind in among:
         bottom, full = _RANGES[kind]
         below = _LOWEST_PULSE_US if kind == "pulses in µs" else bottom - 0.02 * (full - bottom)
-        if kind == "-1 to 1" and low >= 0:
+        if (kind == "-1 to 1" and low >= 0) or (kind == "per ten thousand" and high <= _RANGES["DShot"][1]):
             continue
         if below <= low and high <= full + 0.02 * (full - bottom):
             held.append(kind)
