@@ -14,6 +14,7 @@ from dataclasses import replace
 from difflib import get_close_matches
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
 from rotorid.io.text.wording import listed
@@ -31,6 +32,13 @@ _LIFT_M_S2 = (5.0, 20.0)
 """Where the median of an accelerometer in flight lies, in its unit and axes."""
 _HIGHEST_VOLTAGE_V = 120.0
 _FASTEST_USUAL_RAD_S = 20.0
+_SLOWEST_HZ = 30.0
+"""Readings a second below which lines between them change what a verdict says of rotors."""
+_LEAST_JOINED, _MOSTLY, _ROUNDED, _SHARP = 200, 0.6, 2e-6, 30.0
+"""Samples, share of them on straight lines, and a bend, over the largest value, below which a line is straight as far
+as it was written, and how many times that bends are where lines meet."""
+_FOLLOWS = 0.8
+"""Correlation of a rotor's speed with a command from which it follows that command."""
 _LEAST_TURNING_RAD_S = 0.05
 """Spread of a body rate below which nothing can be said of it."""
 _AGREES, _CONTRADICTS = 0.5, -0.3
@@ -65,7 +73,9 @@ def physical_doubts(recordings: RecordingSet) -> tuple[Doubt, ...]:
             *_world(run, clock),
             *_rotors(run, clock, vehicle),
             *_throttle(run, vehicle),
+            *_command_order(run, clock, vehicle),
             *_held(run, vehicle),
+            *_joined(run, vehicle),
             *_rest(run, vehicle),
         ):
             found.append((run.name, doubt))
@@ -405,6 +415,30 @@ def _rotors(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
     )
 
 
+def _command_order(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
+    """Whether each rotor's measured speed follows its own command; if not, which one it follows."""
+    kinds = ("rotor_speed", "rotor_command", "throttle")
+    speeds, *asked = (_on(run, clock, c.rotor_columns(k, vehicle.rotor_count), 2 * _STEP_S) for k in kinds)
+    commands = next((own for own in asked if own is not None), None)
+    if speeds is None or commands is None or vehicle.rotor_count < 3:
+        return
+    known = np.isfinite(speeds).all(axis=1) & np.isfinite(commands).all(axis=1)
+    # By how they differ from each other: all of them grow together when the vehicle climbs.
+    apart = [own[known] - own[known].mean(axis=1, keepdims=True) for own in (speeds, commands)]
+    if known.sum() < 100 or not all((own.std(axis=0) > 0).all() for own in apart):
+        return
+    alike = np.corrcoef(*(own.T for own in apart))[: vehicle.rotor_count, vehicle.rotor_count :]
+    _, follows = linear_sum_assignment(alike, maximize=True)
+    wrong = [i for i, k in enumerate(follows) if i != k]
+    if (
+        wrong
+        and min(alike[i, follows[i]] for i in wrong) > _FOLLOWS
+        and max(alike[i, i] for i in wrong) < 0.5 * _FOLLOWS
+    ):
+        pairs = ", ".join(f"rotor {i + 1} follows command {follows[i] + 1}" for i in wrong)
+        yield Doubt("rotors", f"commands and measured speeds are in different orders: {pairs}", stops=True)
+
+
 def _throttle(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
     names = [n for n in c.rotor_columns("throttle", vehicle.rotor_count) if run.has(n)]
     if not names:
@@ -434,6 +468,28 @@ def _held(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
             f"{listed(held)} {'keeps' if len(held) == 1 else 'keep'} one value ({value:.4g}) throughout, expected the "
             "changes that keep a vehicle in the air: not measured, or a sensor that stands still",
         )
+
+
+def _joined(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
+    """Rotor speeds, rates and specific forces that were interpolated linearly between rarer readings."""
+    for names in (c.rotor_columns("rotor_speed", vehicle.rotor_count), c.ANGULAR_VELOCITY, c.SPECIFIC_FORCE):
+        values = run.array(names) if run.has(*names) else np.zeros((0, 1))
+        values = values[np.isfinite(values).all(axis=1)]
+        if len(values) < _LEAST_JOINED:
+            continue
+        steps, kinks = np.abs(np.diff(values, axis=0)), np.abs(np.diff(values, 2, axis=0))
+        least = _ROUNDED * np.abs(values).max(axis=0)
+        straight = (kinks <= least) & (steps[1:] > least)
+        # Smooth signals are nearly straight as well, but nowhere is there a sharp bend.
+        share, bends = straight.mean(), kinks / np.maximum(least, 1e-300)
+        if share > _MOSTLY and np.median(bends[~straight]) > _SHARP:
+            rate_hz = (1.0 - float(share)) * (len(values) - 1) / float(run.time_s[-1] - run.time_s[0])
+            yield Doubt(
+                names[0],
+                f"{listed(names)} lie on straight lines between about {rate_hz:.2g} readings a second: interpolated, "
+                "which looks like a lag; expected the readings themselves, and empty cells between them",
+                stops=rate_hz < _SLOWEST_HZ,
+            )
 
 
 def _rest(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:

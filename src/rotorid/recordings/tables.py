@@ -46,6 +46,8 @@ _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _MOST_ABOVE, _ROWS_BELOW = 200, 3
 """Lines that may stand above a heading, and rows of numbers below by which one is known."""
 _DECIMAL_COMMA = re.compile(r"\s*[-+]?\d+,\d+([eE][-+]?\d+)?\s*")
+_DECIMAL_POINT = re.compile(r"\s*[-+]?\d*\.\d+([eE][-+]?\d+)?\s*")
+_THOUSANDS = re.compile(r"\s*[-+]?\d{1,3},\d{3}\s*")
 _DECIMAL_COMMAS = 1.5
 """A line with so many times the cells of its heading has commas in its numbers."""
 _MISSING = frozenset(("", "nan", "na", "n/a", "null", "none", "<na>", "#n/a", "-nan"))
@@ -108,8 +110,13 @@ def _look_through(path: Path, foreign: bool = False) -> _CsvLayout:
             found, text = _heading(text, path, foreign)
             line += found.heading_line - 1
             below = text[:_PACKED_BLOCK].decode("utf-8", "replace").splitlines()[1 : 1 + _MOST_ABOVE]
-            commas = [_DECIMAL_COMMA.fullmatch(cell) for row in below for cell in _names(row, found.separator)]
-            if foreign and found.separator != "," and any(commas):
+            cells = [cell for row in below for cell in _names(row, found.separator)]
+            commas = list(filter(_DECIMAL_COMMA.fullmatch, cells)) if foreign and found.separator != "," else []
+            if commas:
+                point = next(filter(_DECIMAL_POINT.fullmatch, cells), "")
+                if point and all(map(_THOUSANDS.fullmatch, commas)):
+                    both = f"{commas[0].strip()!r} next to {point.strip()!r}"
+                    raise InputError(f"{path}: has {both}, expected nothing between thousands")
                 found = replace(found, decimal=",")
         quoted = quoted or b'"' in text
         if found and not quoted:

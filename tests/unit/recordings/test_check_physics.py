@@ -34,6 +34,10 @@ def test_a_sound_flight_raises_no_doubt(flown) -> None:
     assert doubts_of(flown) == ()
 
 
+def test_commands_in_the_order_of_the_rotors_raise_no_doubt(flown) -> None:
+    assert doubts_of(changed(flown, with_commands((0, 1, 2, 3)))) == ()
+
+
 def times(names, factor):
     def change(table):
         table[list(names)] = table[list(names)] * factor
@@ -51,6 +55,27 @@ def exchange(a: str, b: str):
 SPEEDS = c.rotor_columns("rotor_speed", 4)
 
 
+def joined(names, every: int):
+    """Every so many readings joined by straight lines."""
+
+    def change(table):
+        kept = np.arange(0, len(table), every)
+        for name in names:
+            table[name] = np.interp(np.arange(len(table)), kept, table[name].to_numpy()[kept]).round(4)
+
+    return change
+
+
+def with_commands(order: tuple[int, ...]):
+    """Commands that the speeds follow 40 ms later, their columns in another order."""
+
+    def change(table):
+        late = table[list(SPEEDS)].shift(-10).ffill().to_numpy()
+        table[list(c.rotor_columns("rotor_command", 4))] = late[:, order]
+
+    return change
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -62,6 +87,8 @@ SPEEDS = c.rotor_columns("rotor_speed", 4)
         (times(c.ANGULAR_VELOCITY[1:2], -1), "angular_velocity_y_rad_s turns against the attitude"),
         (exchange(*c.ANGULAR_VELOCITY[:2]), "axes are exchanged"),
         (exchange(SPEEDS[0], SPEEDS[1]), "order of the rotors"),
+        (with_commands((1, 0, 2, 3)), "rotor 1 follows command 2, rotor 2 follows command 1"),
+        (joined(SPEEDS, 20), "lie on straight lines between about"),
         (times(c.VELOCITY[1:2], -1), "velocity_y_m_s goes against the derivative of position_y_m"),
         (
             times(c.VELOCITY, 100),

@@ -139,6 +139,16 @@ def test_each_side_of_a_clock_that_was_set_back_is_a_run(tmp_path) -> None:
     assert list(read_log(tmp_path / "own.csv").runs) == ["own_1", "own_2"]
 
 
+@pytest.mark.parametrize("sign", [";", "\t"], ids=["semicolons", "tabs"])
+def test_commas_between_thousands_are_no_decimal_commas(sign: str, tmp_path: Path) -> None:
+    """Before: a speed of 10,153 turns was 10.153."""
+    path = tmp_path / "own.csv"
+    thousands = [f"{10 + k // 1000},{k % 1000:03d}" for k in range(len(table()))]
+    table().assign(turns=thousands).to_csv(path, sep=sign, index=False)
+    with pytest.raises(InputError, match="has '10,000' next to '0.0.*', expected nothing between thousands"):
+        read_by_mapping(path, None)
+
+
 def test_a_column_without_a_name_is_kept_by_its_number(tmp_path: Path) -> None:
     """pandas writes the index so, and many a logger a separator at the end of each line."""
     path = tmp_path / "own.csv"
