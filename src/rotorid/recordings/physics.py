@@ -478,7 +478,9 @@ def _joined(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
         if len(values) < _LEAST_JOINED:
             continue
         steps, kinks = np.abs(np.diff(values, axis=0)), np.abs(np.diff(values, 2, axis=0))
-        least = _ROUNDED * np.abs(values).max(axis=0)
+        apart = np.diff(np.unique(values))  # as far as readings were rounded
+        rounding = float(apart[apart > 1e-9 * np.abs(values).max()].min(initial=np.inf))
+        least = np.full(values.shape[1], max(_ROUNDED * float(np.abs(values).max()), 2.1 * rounding))
         straight = (kinks <= least) & (steps[1:] > least)
         # Smooth signals are nearly straight as well, but nowhere is there a sharp bend.
         share, bends = straight.mean(), kinks / np.maximum(least, 1e-300)
