@@ -13,14 +13,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 from rotorid.acquire import procedures
 from rotorid.acquire.cli import app
 from rotorid.acquire.emulators.devices import Faults
 from rotorid.acquire.recorder import Recorder, Timings, _source
 from rotorid.acquire.transport import AcquireError, SystemClock
-from rotorid.errors import InputError
 from rotorid.io import rawlog, wire
 from rotorid.io.frames import ANSWER, DATA, END, START, Frame, StreamDecoder, encode
 from rotorid.io.logs import read_log, read_tables
@@ -30,6 +28,8 @@ from rotorid.io.wire import TRAPEZOID, Programme
 from tests.acquire.conftest import ACQUIRE, QUICK
 from tests.acquire.fault_table import TABLE, seen
 from tests.acquire.test_faults import assert_metadata_agree, record
+from tests.command_line import invoke
+from tests.refusals import refused
 
 
 def recorded(loopback, samples: int = 250, name: str = "bench") -> Path:
@@ -46,7 +46,7 @@ def flip(path: Path, place: int) -> None:
 
 
 def command_line(*arguments: str) -> tuple[int, str]:
-    result = CliRunner().invoke(app, list(arguments))
+    result = invoke(*arguments, app=app)
     return result.exit_code, " ".join(result.output.split())
 
 
@@ -107,8 +107,7 @@ def test_another_recordings_bytes_are_refused(loopback, tmp_path):
     other = read_session(session_path(path)).model_copy(update={"id": "other", "log": "other.rlog"})
     write_session(other, tmp_path / "other.yaml")
     (tmp_path / "other.rlog").write_bytes(path.read_bytes())
-    with pytest.raises(InputError, match="holds the recording 'run-bench'.*those of 'other'"):
-        read_log(tmp_path / "other.rlog")
+    refused("holds the recording 'run-bench'.*those of 'other'", read_log, tmp_path / "other.rlog")
     assert command_line("check", str(tmp_path / "other.rlog"))[0] == 1
 
 
@@ -116,8 +115,7 @@ def test_another_recordings_bytes_are_refused(loopback, tmp_path):
 def test_bytes_that_are_not_those_recorded_are_refused_at_ingest(loopback):
     path = recorded(loopback)
     path.write_bytes(path.read_bytes() + rawlog.pack_chunk(rawlog.NOTE, 1 << 60, b"{}"))
-    with pytest.raises(InputError, match="not the bytes that were recorded: SHA-256"):
-        read_tables([path])
+    refused("not the bytes that were recorded: SHA-256", read_tables, [path])
     code, text = command_line("check", str(path))
     assert code == 1 and "not the bytes that were recorded" in text
 
@@ -209,15 +207,11 @@ class Script:
 
 
 ODD = {
-    "short start record": (START, b"\1\2\3"),
-    "start record with two strings": (START, start_record()[:-3]),
+    "short start record": (START, b"\1\2\3"), "start record with two strings": (START, start_record()[:-3]),
     "start record that is no UTF-8": (START, start_record()[:9] + b"\xff\0\xff\0\xff"),
-    "short end record": (END, b"\1"),
-    "long end record": (END, end_record(3) + b"\0"),
-    "empty answer": (ANSWER, b""),
-    "sample of 4 bytes": (DATA, b"\1\2\3\4"),
-    "unknown kind": (ord("Q"), b"\1\2\3\4"),
-}
+    "short end record": (END, b"\1"), "long end record": (END, end_record(3) + b"\0"), "empty answer": (ANSWER, b""),
+    "sample of 4 bytes": (DATA, b"\1\2\3\4"), "unknown kind": (ord("Q"), b"\1\2\3\4"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("what", ODD)
@@ -272,8 +266,7 @@ def test_a_note_that_is_none_hurts_nothing(loopback):
 def test_a_log_of_an_unknown_instrument_is_readable(tmp_path):
     path = tmp_path / "run.rlog"
     session_free(path, [(START, start_record(name="toaster")), (DATA, b"\1\2"), (END, end_record(1))])
-    with pytest.raises(InputError, match="unknown instrument 'toaster'; known are bench"):
-        read_log(path)  # nothing says what was expected
+    refused("unknown instrument 'toaster'; known are bench", read_log, path)  # nothing says what was expected
     write_session(
         Session(id="run", instrument="bench", started="2024-03-04T09:00:00-06:00", host_start_ns=0, log=path.name),
         tmp_path / "run.yaml",

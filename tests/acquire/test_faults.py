@@ -49,10 +49,8 @@ def frame_numbers(log):
 def assert_metadata_agree(log):
     """The recorder's live account and the parser's later one are the same."""
     counts = log.session.counts
-    assert counts.samples == len(log.table)
-    assert counts.missing == log.missing
-    assert counts.repeated == log.repeated
-    assert counts.resets == log.resets
+    assert counts.samples == len(log.table) and counts.missing == log.missing
+    assert counts.repeated == log.repeated and counts.resets == log.resets
     assert (counts.checksum_errors, counts.broken_frames) == (log.checksum_errors, log.broken_frames)
     assert [(g.segment, g.first_index, g.count) for g in log.session.gaps] == [
         (g.segment, g.first_index, g.count) for g in log.gaps
@@ -65,8 +63,7 @@ def test_a_good_line_loses_nothing(plugged, recorder_on):
     assert log.complete and log.end.sent == len(log.table) >= SAMPLES
     assert (log.table.quality == 0).all()
     np.testing.assert_allclose(np.diff(log.table.time_s), 0.02, atol=2e-6)
-    assert log.session.ended == Ended.FINISHED
-    assert log.session.warnings == []
+    assert log.session.ended == Ended.FINISHED and log.session.warnings == []
     assert_metadata_agree(log)
 
 
@@ -178,8 +175,7 @@ def test_everything_at_once_at_random(plugged, recorder_on, seed):
     line._rng = np.random.default_rng(seed)
     log = record(recorder_on("bench", ports.names[0]), samples=1000)
     done = line.done
-    numbers = frame_numbers(log)
-    assert (np.diff(numbers) > 0).all()
+    assert (np.diff(frame_numbers(log)) > 0).all()
     # what cannot arrive: dropped, corrupted, halved (with its neighbour), and at most one frame per garbage
     worst = done["drop"] + done["corrupt"] + 2 * done["half"] + done["garbage"] + done["swap"]
     assert line.count - len(log.table) <= worst
@@ -208,8 +204,7 @@ def test_a_reset_makes_a_thrust_test_void(plugged, recorder_on):
         with recorder_on("rotor", port) as recorder:
             procedures.thrust_test(recorder, 0.2, 1.0, 2.0)
     log = read_log(recorder.log_path)
-    assert len(log.table) == 80
-    assert log.session.ended == Ended.DEVICE_RESET
+    assert len(log.table) == 80 and log.session.ended == Ended.DEVICE_RESET
 
 
 def test_a_reset_before_the_command_is_a_reset_and_no_refusal(plugged, recorder_on):
@@ -234,8 +229,7 @@ def test_clock_rollover(plugged, recorder_on):
 @seen("device slower or faster than promised")
 def test_device_slower_or_faster_than_promised(plugged, recorder_on, pace, word, rate):
     log = record(recorder_on("bench", plugged("bench", Faults(pace=pace)).names[0]))
-    assert log.missing == 0
-    assert log.session.promised_rate_hz == 50.0
+    assert log.missing == 0 and log.session.promised_rate_hz == 50.0
     assert log.session.measured_rate_hz == pytest.approx(rate, rel=1e-3)
     assert any(f"{word} than promised" in warning for warning in log.session.warnings)
 
@@ -286,8 +280,7 @@ def test_sensor_that_resets_is_powered_and_initialised_again(plugged, recorder_o
         procedures.measure_wrench(recorder, 0.005, samples=200)
     log = read_log(recorder.log_path)
     assert log.resets == 1 and log.session.ended == Ended.FINISHED
-    after = log.table[log.table.segment == 1]
-    np.testing.assert_allclose(np.diff(after.time_s), 0.005, atol=2e-6)
+    np.testing.assert_allclose(np.diff(log.table[log.table.segment == 1].time_s), 0.005, atol=2e-6)
 
 
 @seen("a programme whose end record is lost still ends")

@@ -10,7 +10,6 @@ import pytest
 from rotorid.acquire import procedures
 from rotorid.acquire.emulators.devices import Faults
 from rotorid.acquire.recorder import LogWriter
-from rotorid.errors import InputError
 from rotorid.io import rawlog
 from rotorid.io.logs import read_log
 from rotorid.io.rawlog import read_raw
@@ -25,6 +24,7 @@ from rotorid.io.session import (
     write_session,
 )
 from rotorid.io.wire import EXPERIMENTS
+from tests.refusals import refused
 
 
 def short_log(loopback, samples):
@@ -94,17 +94,14 @@ def test_a_bit_flipped_anywhere_costs_two_samples_at_most_or_a_chunk(log_path, n
 def test_no_log_at_all(tmp_path):
     path = tmp_path / "table.rlog"
     path.write_text("time_s,force_x_n\n0,1\n")
-    with pytest.raises(InputError, match="table.rlog: does not begin with"):
-        read_log(path)
-    with pytest.raises(InputError, match="nothing.rlog: file is missing"):
-        read_log(tmp_path / "nothing.rlog")
+    refused("table.rlog: does not begin with", read_log, path)
+    refused("nothing.rlog: file is missing", read_log, tmp_path / "nothing.rlog")
 
 
 def test_nothing_says_which_instrument(tmp_path):
     path = tmp_path / "bare.rlog"
     path.write_bytes(rawlog.MAGIC)
-    with pytest.raises(InputError, match="nothing says which instrument"):
-        read_log(path)
+    refused("nothing says which instrument", read_log, path)
 
 
 def test_long_reads_are_split_into_chunks(tmp_path):
@@ -147,14 +144,11 @@ START = "id: a\ninstrument: bench\nstarted: '2024-03-04T09:00:00-06:00'\n"
 
 def test_metadata_errors_name_file_and_key(tmp_path):
     path = tmp_path / "a.yaml"
-    with pytest.raises(InputError, match="a.yaml: no such file"):
-        read_session(path)
+    refused("a.yaml: no such file", read_session, path)
     path.write_text(START + "host_start_ns: soon\nlog: a.rlog\n")
-    with pytest.raises(InputError, match="a.yaml: host_start_ns: found .soon., expected a whole number"):
-        read_session(path)
+    refused("a.yaml: host_start_ns: found .soon., expected a whole number", read_session, path)
     path.write_text(START + "host_start_ns: 1\nlog: a.rlog\nbatery: 4S\n")
-    with pytest.raises(InputError, match="batery"):
-        read_session(path)
+    refused("batery", read_session, path)
 
 
 def test_air_density():

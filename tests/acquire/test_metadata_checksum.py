@@ -7,13 +7,14 @@ import shutil
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 from rotorid.acquire.cli import app
 from rotorid.errors import InputError
 from rotorid.io.logs import read_log
 from rotorid.io.session import INDEX_KEY, read_index, read_session, write_index
 from tests.acquire.fault_table import seen
+from tests.command_line import invoke
+from tests.refusals import refused
 from workflow.scripts import ingest
 
 CAMPAIGN = Path(__file__).parents[2] / "raw" / "campaign" / "static"
@@ -39,7 +40,7 @@ def without_line(path: Path) -> bytes:
 
 
 def command(*words: str) -> tuple[int, str]:
-    done = CliRunner().invoke(app, list(words))
+    done = invoke(*words, app=app)
     return done.exit_code, done.output
 
 
@@ -53,8 +54,7 @@ def test_every_flipped_bit_is_noticed(log):
         changed = bytearray(good)
         changed[bit // 8] ^= 1 << bit % 8
         path.write_bytes(changed)
-        with pytest.raises(InputError, match=rf"{NAME}\.yaml"):
-            read_session(path)
+        refused(rf"{NAME}\.yaml", read_session, path)
     path.write_bytes(good)
     assert read_session(path).setup.load_gf == 35.715
 
@@ -79,8 +79,7 @@ def test_a_changed_load_is_one_sentence_and_an_edit_can_be_meant(log):
 def test_lines_behind_the_checksum_are_noticed_and_kept(log):
     path = metadata(log)
     path.write_bytes(path.read_bytes() + b"group: mine")
-    with pytest.raises(InputError, match="were changed after recording"):
-        read_session(path)
+    refused("were changed after recording", read_session, path)
     code, text = command("checksum", "--renew", str(path))
     assert code == 1 and "group" in text and "twice" in text  # no metadata: left as it was
     assert path.read_bytes().endswith(b"group: mine")
@@ -117,8 +116,7 @@ def test_no_recording_falls_out_of_the_index(log):
     path = metadata(log)
     for spoilt in (b"formau: ", b"Format: "):
         path.write_bytes(path.read_bytes().replace(path.read_bytes()[:8], spoilt, 1))
-        with pytest.raises(InputError, match="were changed after recording"):
-            write_index(log.parent)
+        refused("were changed after recording", write_index, log.parent)
 
 
 @seen("a bit of the index flipped", "78 of 200 changed a kind, a load or a path and nothing was said")
@@ -132,8 +130,7 @@ def test_every_flipped_bit_of_the_index_is_noticed(log):
         changed = bytearray(good)
         changed[bit // 8] ^= 1 << bit % 8
         path.write_bytes(changed)
-        with pytest.raises(InputError, match=r"sessions\.tsv"):
-            read_index(log.parent)
+        refused(r"sessions\.tsv", read_index, log.parent)
     path.write_bytes(good)
     assert [row["id"] for row in rows] == [NAME] and read_index(log.parent) == rows
 
@@ -161,8 +158,7 @@ def test_rows_behind_the_checksum_and_a_row_that_is_none_are_told(log):
     path = log.parent / "sessions.tsv"
     row = path.read_text().splitlines()[1]
     path.write_text(path.read_text() + row.replace(NAME, "mine", 1) + "\n")
-    with pytest.raises(InputError, match="the index was changed after it was written"):
-        read_index(log.parent)
+    refused("the index was changed after it was written", read_index, log.parent)
     assert command("checksum", "--renew", str(path))[0] == 0
     assert [row["id"] for row in read_index(log.parent)] == [NAME, "mine"]
     assert path.read_text().splitlines()[-1].startswith(INDEX_KEY)

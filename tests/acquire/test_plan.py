@@ -13,7 +13,6 @@ from pathlib import Path
 
 import pytest
 import yaml
-from typer.testing import CliRunner
 
 from rotorid.acquire import procedures
 from rotorid.acquire.cli import app
@@ -34,28 +33,20 @@ from rotorid.errors import InputError
 from rotorid.io.logs import read_log
 from rotorid.io.session import Ended, read_index
 from tests.acquire.fault_table import seen
+from tests.command_line import invoke
 
 GROUP = {
-    "name": "quiet-{load_gf}-r{repeat}",
-    "do": "stream",
-    "instrument": "bench",
-    "over": {"load_gf": [0.0, 100.0, 200.0, 300.0, 400.0]},
-    "repeats": 4,
-    "order": "random",
-    "ask": "put {load_gf} gf on",
-    "setup": {"axis": "z"},
-    "settings": {"samples": 10},
-}
+    "name": "quiet-{load_gf}-r{repeat}", "do": "stream", "instrument": "bench",
+    "over": {"load_gf": [0.0, 100.0, 200.0, 300.0, 400.0]}, "repeats": 4, "order": "random",
+    "ask": "put {load_gf} gf on", "setup": {"axis": "z"}, "settings": {"samples": 10},
+}  # fmt: skip
 
 
 def plan_with(tmp_path: Path, steps: list[dict] | None = None, **more) -> CampaignPlan:
     text = {
-        "name": "trial",
-        "out": str(tmp_path / "out"),
-        "ports": {"bench": "/dev/b", "rotor": "/dev/r"},
-        "checks": {"samples": 10, "disk_mb": 1},
-        "steps": steps or [GROUP],
-    } | more
+        "name": "trial", "out": str(tmp_path / "out"), "ports": {"bench": "/dev/b", "rotor": "/dev/r"},
+        "checks": {"samples": 10, "disk_mb": 1}, "steps": steps or [GROUP],
+    } | more  # fmt: skip
     path = tmp_path / "plan.yaml"
     path.write_text(yaml.safe_dump(text))
     return read_plan(path)
@@ -130,7 +121,7 @@ def test_a_campaign_of_twenty_steps_killed_twice(tmp_path):
         assert killed_at - 2 <= done <= killed_at
     finished = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert finished.returncode == 0 and "20 of 20 recordings are there" in finished.stdout, finished.stderr
-    shown = CliRunner().invoke(app, ["campaign", str(tmp_path / "plan.yaml"), "--show"]).output.splitlines()
+    shown = invoke("campaign", tmp_path / "plan.yaml", "--show", app=app).output.splitlines()
     assert len(shown) == 20 and all(line.startswith("done") for line in shown)
     rows = [row for row in read_index(plan.out) if row["id"].startswith("quiet")]
     whole = [row for row in rows if row["ended"] == "finished"]
@@ -146,7 +137,7 @@ def test_curves_of_a_campaign_in_a_terminal(tmp_path):
     """Two channels drawn while each step is recorded; a column of no instrument of the plan is a mistake."""
     plan_with(tmp_path, [GROUP | {"over": {"load_gf": [0.0, 100.0]}, "repeats": 1}], ports={"bench": "/dev/b"})
     words = ["campaign", str(tmp_path / "plan.yaml"), "--emulate", "--speed", "20", "--place-s", "0.2"]
-    assert CliRunner().invoke(app, [*words, "--plot", "throttle"]).exit_code == 2
+    assert invoke(*words, "--plot", "throttle", app=app).exit_code == 2
     master, slave = pty.openpty()
     fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 50, 160, 0, 0))
     command = [sys.executable, "-m", "rotorid.acquire", *words, "--plot", "cell_1_v", "--plot", "cell_4_v"]

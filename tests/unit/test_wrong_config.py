@@ -13,6 +13,7 @@ from rotorid.config import ConfigError, check, from_command_line
 from rotorid.errors import InputError
 from rotorid.identify.black_box import conformal_coverage, folds
 from rotorid_proof import plan
+from tests.refusals import refused
 
 ROOT = Path(__file__).parents[2]
 SOUND = yaml.safe_load((ROOT / "config.yaml").read_text())
@@ -209,8 +210,7 @@ def test_an_unknown_family_of_the_proof_is_named() -> None:
         InputError, match=r"proof\.seeds\.singel is no family of concealed cases; did you mean single\?"
     ):
         plan.check_families(cases, {"singel": 1})
-    with pytest.raises(InputError, match=r"proof\.released\.singel is no family"):
-        plan.check_families(cases, {"singel": 1}, "proof.released")
+    refused(r"proof\.released\.singel is no family", plan.check_families, cases, {"singel": 1}, "proof.released")
 
 
 def test_more_repetitions_than_a_family_has_are_named() -> None:
@@ -225,8 +225,7 @@ def test_a_proof_without_a_case_is_named() -> None:
     entry = plan.read_index(ROOT / "proof" / "rotorid_proof" / "concealed" / "cases.tsv")[:1]
     plan.check_chosen(entry, [], "")
     plan.check_chosen([], entry, "2026-11-30")
-    with pytest.raises(InputError, match=r"proof\.seeds and proof\.cases leave no case; expected"):
-        plan.check_chosen([], [], "")
+    refused(r"proof\.seeds and proof\.cases leave no case; expected", plan.check_chosen, [], [], "")
     with pytest.raises(InputError, match=r"proof\.release is '2026-11-30', but proof\.released and proof\.cases leave"):
         plan.check_chosen(entry, [], "2026-11-30")
 

@@ -4,8 +4,6 @@ its own simulation, and the same in the simulator as in the regression's columns
 It takes the effects from the catalogue itself: a new file of `rotorid.effects` is audited without a change here.
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from dataclasses import fields, replace
@@ -13,6 +11,7 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.optimize import least_squares
 
@@ -36,20 +35,9 @@ from rotorid.vehicle.improved import (
     speeds_of_commands,
 )
 from rotorid.vehicle.simulator import recording, simulate
-from tests.unit.mismatch.flights import recorded
+from tests.unit.mismatch.flights import recorded, with_table
 
-from .flown import (
-    DURATION_S,
-    STEP_S,
-    audit_vehicle,
-    commands,
-    entry,
-    fly,
-    motions,
-    segment,
-    start,
-    typical_values,
-)
+from .flown import DURATION_S, STEP_S, audit_vehicle, commands, entry, fly, motions, segment, start, typical_values
 
 CONTRACT = Path(__file__).parents[3] / "docs" / "recording-contract.md"
 NOISE = {"force": 0.1, "moment": 2e-3, "accelerometer": 0.15, "gyroscope": 0.02}
@@ -367,8 +355,7 @@ def test_the_simulator_turns_the_rotors_as_the_speed_path_says(effect, form):
     assert [(f.name, tuple(v)) for f, v in active_speed_forms(stated)] == [(form.name, tuple(values))]
     voltage = np.linspace(12.0, 10.0, len(commands().time_s))
     trace = simulate_as_stated(stated, commands(), DURATION_S, STEP_S, voltage, start=start())
-    motion = replace(motions(trace)[0], voltage=voltage)
-    one = segment(motion, command=commands().rotor_speed)
+    one = segment(replace(motions(trace)[0], voltage=voltage), command=commands().rotor_speed)
     expected = commanded_path(one, ((effect.id, form),), values, 0.0, 1500.0, 12.0)
     np.testing.assert_allclose(trace.rotor_speed[0], np.clip(expected, 0, 1500), rtol=1e-9)
     assert np.abs(trace.rotor_speed[0] - commands().rotor_speed).max() > 5.0 or form.excited_by == "time"
@@ -396,15 +383,9 @@ def fitted(function, form, suggested=()) -> tuple[np.ndarray, np.ndarray]:
     best = min(starts, key=lambda v: np.sum(function(np.clip(v, low, high)) ** 2))
     inside = np.clip(best, low + 1e-6 * (high - low), high - 1e-6 * (high - low))
     found = least_squares(
-        function,
-        inside,
-        bounds=(low, high),
-        x_scale=0.05 * (high - low),
-        xtol=1e-13,
-        ftol=1e-13,
-        gtol=1e-13,
+        function, inside, bounds=(low, high), x_scale=0.05 * (high - low), xtol=1e-13, ftol=1e-13, gtol=1e-13,
         max_nfev=40,
-    )
+    )  # fmt: skip
     return found.x, np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)))
 
 
@@ -452,17 +433,15 @@ def test_a_speed_form_recovers_its_own_parameters(effect, form):
 @pytest.fixture(scope="module")
 def sound() -> RecordingSet:
     """Two sound runs with every column that a fault may spoil."""
-    recordings = recorded(1, 2)
-    runs = []
-    for run in recordings.runs:
-        table = run.table.copy()
+
+    def whole(table: pd.DataFrame) -> None:
         for i in range(1, 5):
             table[f"rotor_command_{i}_rad_s"] = table[f"rotor_speed_{i}_rad_s"]
             table[f"throttle_{i}"] = table[f"rotor_speed_{i}_rad_s"] / 2500.0
         table["height_m"] = -table["position_z_m"]
         table["battery_voltage_v"] = 12.0 - 0.01 * table["time_s"]
-        runs.append(replace(run, table=table))
-    return replace(recordings, runs=tuple(runs))
+
+    return with_table(recorded(1, 2), whole)
 
 
 @pytest.mark.parametrize(("effect", "form"), list(set_forms()))

@@ -1,8 +1,6 @@
 """Raw logs, metadata, indexes, checkpoints, descriptions and plans that are none: one sentence each, soon, and little
 memory. What was seen before stands beside those that were not as they should be."""
 
-from __future__ import annotations
-
 import gzip
 import io
 import os

@@ -15,6 +15,7 @@ from rotorid.plan.candidates import Limits, Reference, candidates, joined, small
 from rotorid.plan.plan import NOTHING, SIZES, Plan, Tried, broken, yaw_acceleration
 from rotorid.plan.simulate import CompetingModel, commands, fly, followed, low_pass, recorded
 from rotorid.recordings import templates
+from tests.refusals import refused
 
 LIMITS = Limits(x_m=(-8, 8), y_m=(-8, 8), height_m=(1, 8), speed_m_s=5, climb_m_s=2, tilt_deg=35)
 VEHICLE = templates.read("thesis").model_copy(update={"ground_z_m": 0.0})
@@ -33,8 +34,7 @@ def test_a_piece_starts_and_ends_at_rest_in_one_place(piece) -> None:
     reference = piece.reference(0.01)
     velocity = np.gradient(reference.position_m, reference.time_s, axis=0)
     for end in (0, -1):
-        assert np.abs(reference.position_m[end]).max() < 1e-9
-        assert np.abs(velocity[end]).max() < 0.02
+        assert np.abs(reference.position_m[end]).max() < 1e-9 and np.abs(velocity[end]).max() < 0.02
     assert np.isfinite(reference.yaw_rad).all()
 
 
@@ -125,15 +125,13 @@ def piece(name: str):
 
 
 def left_of(flight, world) -> dict[str, np.ndarray]:
-    run = recorded(flight, world, COLUMNS, 500.0, "flight")
-    (segment,) = build_segments(run, VEHICLE, 500.0, 20.0)
+    (segment,) = build_segments(recorded(flight, world, COLUMNS, 500.0, "flight"), VEHICLE, 500.0, 20.0)
     return residual(segment, VEHICLE)
 
 
 def test_without_an_effect_nothing_is_left_of_the_rigid_body() -> None:
     world = CompetingModel(VEHICLE)
-    flight = fly(world, joined([piece("eight")], 0.002), 9.0, LIMITS.middle_m)
-    left = left_of(flight, world)
+    left = left_of(fly(world, joined([piece("eight")], 0.002), 9.0, LIMITS.middle_m), world)
     assert np.abs(left["force"]).max() < 2e-3 * VEHICLE.mass_kg * 9.81
     assert np.sqrt((left["moment"] ** 2).mean()) < 1e-5
 
@@ -154,8 +152,7 @@ def test_an_effect_of_the_model_is_what_is_left() -> None:
 def test_commands_lead_the_rotors_by_their_lag() -> None:
     form = next(f for f in catalogue()["motor_lag"].speed_forms if f.name == "one constant")
     world = CompetingModel(VEHICLE, chain=((form, np.array([0.05])),), full_speed_rad_s=2500.0)
-    flight = fly(world, joined([piece("shake height to 1 Hz")], 0.002), 9.0, LIMITS.middle_m)
-    motion = flight.motion
+    motion = fly(world, joined([piece("shake height to 1 Hz")], 0.002), 9.0, LIMITS.middle_m).motion
     lead = commands(world, motion) - motion.rotor_speed
     slope = np.gradient(motion.rotor_speed, motion.time_s, axis=0)
     inner = slice(500, -500)
@@ -167,8 +164,7 @@ def test_rotors_that_would_turn_backwards_are_refused() -> None:
     t = np.arange(0, 4, 0.01)
     falls = np.zeros((len(t), 3))
     falls[:, 2] = 20.0 * np.clip(t - 1, 0, None) ** 2
-    with pytest.raises(InputError, match="backwards"):
-        fly(CompetingModel(VEHICLE), Reference(t, falls, 2.0 * np.sin(30 * t)), 30.0, (0, 0, 100))
+    refused("backwards", fly, CompetingModel(VEHICLE), Reference(t, falls, 2.0 * np.sin(30 * t)), 30.0, (0, 0, 100))
 
 
 @pytest.fixture(scope="module")
@@ -198,8 +194,7 @@ def test_a_crazyflie_polynomial_goes_where_the_reference_goes_in_its_own_axes(a_
 def test_px4_setpoints_are_north_east_down_with_wrapped_yaw(a_plan: Plan) -> None:
     table = write.px4_offboard(a_plan)
     assert list(table.columns[:4]) == ["timestamp_s", "position[0]", "position[1]", "position[2]"]
-    assert table["position[2]"].max() < 0
-    assert table["yaw"].between(-np.pi, np.pi).all()
+    assert table["position[2]"].max() < 0 and table["yaw"].between(-np.pi, np.pi).all()
 
 
 def test_a_plan_is_written_whole(a_plan: Plan, tmp_path) -> None:

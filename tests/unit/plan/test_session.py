@@ -36,8 +36,7 @@ LIMITS = SessionLimits()
 @pytest.mark.parametrize("name", courses(LIMITS))
 def test_a_course_starts_and_ends_unloaded_and_reaches_the_largest_load(name: str) -> None:
     _, seconds, course = courses(LIMITS)[name]
-    t = np.arange(0, seconds + 2 * REST_S, 0.01)
-    load = course(t)
+    load = course(np.arange(0, seconds + 2 * REST_S, 0.01))
     assert abs(load[0]) < 1e-9 and abs(load[-1]) < 0.02
     assert load.max() == pytest.approx(1.0, abs=1e-6) and load.min() > -1e-9
 

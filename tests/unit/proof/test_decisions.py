@@ -22,15 +22,11 @@ from tests.unit.mismatch.decide.test_posterior import flight
 
 DRAG = {"id": "rotor_drag", "form": "", "equivalent": [], "size_over_noise": 1.0}
 ANSWER = {
-    "set": "set-1",
-    "case": "mixture/00/0",
-    "expected": ["mass_kg", "rotor_drag"],
+    "set": "set-1", "case": "mixture/00/0", "expected": ["mass_kg", "rotor_drag"],
     "effects": [DRAG | {"parameters": [{"symbol": "k_d", "value": 2.0, "unit": "N"}]}],
-    "wrong_parameters": {"mass_kg": {"true": 1.1, "believed": 1.0}},
-    "outside_catalogue": [],
-    "locations": [],
+    "wrong_parameters": {"mass_kg": {"true": 1.1, "believed": 1.0}}, "outside_catalogue": [], "locations": [],
     "verdict": ["explained"],
-}
+}  # fmt: skip
 NOTHING = {"expected": [], "effects": [], "wrong_parameters": {}, "verdict": ["no_mismatch"]}
 CLEAN = ANSWER | NOTHING | {"case": "clean/000"}
 

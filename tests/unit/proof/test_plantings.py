@@ -53,16 +53,13 @@ def recorded() -> RecordingSet:
         turn = smooth_noise(rng, n, 4, 1.0) * 0.1 + np.array([1.0, 0, 0, 0])
         speed = 1150 + 60 * smooth_noise(rng, n, 4, 8.0)
         columns = {
-            c.TIME: t[:, None],
-            c.POSITION: smooth_noise(rng, n, 3, 1.0),
+            c.TIME: t[:, None], c.POSITION: smooth_noise(rng, n, 3, 1.0),
             c.VELOCITY: 3 * smooth_noise(rng, n, 3, 1.0),
             c.QUATERNION: turn / np.linalg.norm(turn, axis=1, keepdims=True),
             c.ANGULAR_VELOCITY: smooth_noise(rng, n, 3, 6.0),
-            c.SPECIFIC_FORCE: smooth_noise(rng, n, 3, 6.0) + np.array([0, 0, -9.8]),
-            SPEEDS: speed,
-            COMMANDS: speed,
+            c.SPECIFIC_FORCE: smooth_noise(rng, n, 3, 6.0) + np.array([0, 0, -9.8]), SPEEDS: speed, COMMANDS: speed,
             c.BATTERY_VOLTAGE: (16.0 - 0.2 * t)[:, None],
-        }
+        }  # fmt: skip
         table = {}
         for names, values in columns.items():
             for j, name in enumerate((names,) if isinstance(names, str) else names):
@@ -159,8 +156,7 @@ def test_a_moved_accelerometer_feels_the_turning(recorded: RecordingSet) -> None
     r = np.array([sizes(truth)[f"r_{a}"] for a in "xyz"])
     run = recorded.runs[0]
     rate = run.array(c.ANGULAR_VELOCITY)
-    slope = np.gradient(rate, run.time_s, axis=0)
-    wanted = np.cross(slope, r) + np.cross(rate, np.cross(rate, r))
+    wanted = np.cross(np.gradient(rate, run.time_s, axis=0), r) + np.cross(rate, np.cross(rate, r))
     got = out.runs[0].array(c.SPECIFIC_FORCE) - run.array(c.SPECIFIC_FORCE)
     inside = slice(100, -100)
     assert np.abs(got[inside] - wanted[inside]).max() < 0.02 * np.abs(wanted).max()
@@ -188,8 +184,7 @@ def test_a_lag_brings_the_planted_command_back(recorded: RecordingSet) -> None:
     out, truth = planted(recorded, "motor_lag")
     command = out.runs[0].array(COMMANDS)
     speed = lagged(command, sizes(truth)["tau"], sizes(truth)["tau"], 1 / RATE_HZ, holds=False)
-    error = (speed - recorded.runs[0].array(SPEEDS))[200:-200]
-    assert np.abs(error).max() < 0.01 * 60
+    assert np.abs((speed - recorded.runs[0].array(SPEEDS))[200:-200]).max() < 0.01 * 60
 
 
 def test_a_throttle_that_no_pilot_could_give_says_nothing(recorded: RecordingSet) -> None:

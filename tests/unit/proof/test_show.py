@@ -10,13 +10,9 @@ from rotorid_proof import show, table
 
 def test_small_coefficients_stand_in_units_of_a_power_of_ten() -> None:
     row = {
-        "study": "a",
-        "effect": "rotor_drag",
-        "symbol": "k_d",
-        "found": 1.44e-6,
-        "low_95": 1.14e-6,
+        "study": "a", "effect": "rotor_drag", "symbol": "k_d", "found": 1.44e-6, "low_95": 1.14e-6,
         "high_95": 1.65e-6,
-    }
+    }  # fmt: skip
     table = pd.DataFrame([row | {"published": 1.95e-6, "unit": "kg/rad", "source": "s"}])
     shown = show.of_published(table).iloc[0]
     assert (shown["found"], shown["published"], shown["unit"]) == ("1.44 (1.14 to 1.65)", "1.95", "1e-6 kg/rad")
@@ -26,15 +22,9 @@ def test_small_coefficients_stand_in_units_of_a_power_of_ten() -> None:
 
 def test_a_wrong_value_is_named_without_its_unit() -> None:
     row = {
-        "study": "a",
-        "about": "b",
-        "word": "explained",
-        "found": "rotor_drag",
-        "expected": None,
-        "expected_found": None,
-        "values": "inertia_yy_kg_m2; mass_kg",
-        "unexplained_share": 1,
-    }
+        "study": "a", "about": "b", "word": "explained", "found": "rotor_drag", "expected": None,
+        "expected_found": None, "values": "inertia_yy_kg_m2; mass_kg", "unexplained_share": 1,
+    }  # fmt: skip
     errors = {f"force_{stage}": 0.1 for stage in ("before", "refitted", "after")}
     shown = show.of_studies(pd.DataFrame([row | errors])).iloc[0]
     assert shown["found"] == "rotor drag; wrong values: inertia yy, mass"
@@ -163,20 +153,14 @@ def test_plantings_are_counted_by_flight_and_family():
 def test_a_channel_that_got_worse_says_by_how_much() -> None:
     channels = pd.DataFrame(
         {
-            "example": "a",
-            "channel": ["force_x", "force_z", "force_z"],
-            "split": ["held_out", "held_out", "training"],
-            "unit": "N",
-            "before": [1.0, 0.106, 1.0],
-            "refitted": [1.0, 0.106, 1.0],
-            "after": [0.2, 0.456, 1.0],
-            "noise_floor": [0.1, None, 0.1],
+            "example": "a", "channel": ["force_x", "force_z", "force_z"],
+            "split": ["held_out", "held_out", "training"], "unit": "N", "before": [1.0, 0.106, 1.0],
+            "refitted": [1.0, 0.106, 1.0], "after": [0.2, 0.456, 1.0], "noise_floor": [0.1, None, 0.1],
         }
-    )
+    )  # fmt: skip
     shown = show.of_channels(channels)
     assert shown["channel"].tolist() == ["force x", "force z"]
-    assert shown["worse"].tolist() == ["", "330.2 %"]
-    assert shown["noise_floor"].tolist() == ["0.1", "–"]
+    assert shown["worse"].tolist() == ["", "330.2 %"] and shown["noise_floor"].tolist() == ["0.1", "–"]
 
 
 def test_the_numbers_of_the_campaign_say_how_many_are_inside() -> None:

@@ -10,15 +10,14 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from rotorid.cli import app
-from rotorid.errors import InputError
 from rotorid.recordings import Vehicle, templates, write_vehicle
 from rotorid.recordings.vehicle import Inertia, Rotor
 from rotorid.vehicle.exports import NAMES, export_vehicle, flown, forms
 from rotorid.vehicle.exports.flown import commands_of, in_drake, in_mujoco, in_pybullet, in_rotorpy, lagging
 from rotorid.vehicle.mixer import hover_speed_rad_s
+from tests.command_line import answer, refusal
+from tests.refusals import refused
 
 
 def with_effects(*effects: tuple[str, str, dict[str, float]]) -> Vehicle:
@@ -37,10 +36,8 @@ FLAP = ("flapping_moment", "at the hubs", {"k_flap": 2e-7})
 @pytest.mark.parametrize("effects", [(DRAG,), (OFFSET,), (PRODUCTS, FLAP)])
 def test_rotorpy_flies_the_same(effects) -> None:
     vehicle = with_effects(*effects)
-    exported = export_vehicle(vehicle, "rotorpy")
-    found = in_rotorpy(vehicle, exported, 0.05)
-    assert found.position_m < 1e-6 * found.flown_m
-    assert found.angle_rad < 1e-4 * found.turned_rad
+    found = in_rotorpy(vehicle, export_vehicle(vehicle, "rotorpy"), 0.05)
+    assert found.position_m < 1e-6 * found.flown_m and found.angle_rad < 1e-4 * found.turned_rad
     plain = in_rotorpy(vehicle, export_vehicle(with_effects(), "rotorpy"), 0.05)
     assert plain.position_m > 100 * found.position_m  # the effects show: the comparison could fail
 
@@ -49,8 +46,7 @@ def test_rotorpy_flies_the_same(effects) -> None:
 def test_the_lag_of_the_motors_goes_along() -> None:
     vehicle = with_effects(("motor_lag", "one constant", {"tau": 0.03}))
     found = in_rotorpy(vehicle, export_vehicle(vehicle, "rotorpy"), 0.1)
-    assert found.position_m < 1e-3 * found.flown_m
-    assert found.angle_rad < 0.02 * found.turned_rad
+    assert found.position_m < 1e-3 * found.flown_m and found.angle_rad < 0.02 * found.turned_rad
 
 
 @pytest.mark.slow
@@ -58,8 +54,7 @@ def test_mujoco_flies_the_same() -> None:
     pytest.importorskip("mujoco")
     vehicle = with_effects(OFFSET, PRODUCTS)
     found = in_mujoco(vehicle, export_vehicle(vehicle, "mjcf"), 0.3)
-    assert found.position_m < 1e-3 * found.flown_m
-    assert found.angle_rad < 0.02 * found.turned_rad
+    assert found.position_m < 1e-3 * found.flown_m and found.angle_rad < 0.02 * found.turned_rad
 
 
 LAG = ("motor_lag", "up and down", {"tau_up": 0.02, "tau_down": 0.04})
@@ -85,8 +80,7 @@ def other_than_a_file_holds() -> Vehicle:
 def test_a_trial_flight_compares_with_what_the_file_holds(form: str, fly) -> None:
     pytest.importorskip({"rotorpy": "rotorpy", "mjcf": "mujoco"}[form])
     vehicle = other_than_a_file_holds()
-    exported = export_vehicle(vehicle, form)
-    found = fly(vehicle, exported, 0.1)
+    found = fly(vehicle, export_vehicle(vehicle, form), 0.1)
     assert found.position_m < 1e-8 * found.flown_m and found.angle_rad < 1e-7 * found.turned_rad
     # With what the file leaves out ours parts from it: the comparison could fail.
     time, speeds = commands_of(vehicle, 0.1)
@@ -155,8 +149,7 @@ def test_the_sdf_model_flies_the_same_in_drake(effects) -> None:
     vehicle = with_effects(*effects)
     exported = export_vehicle(vehicle, "sdf")
     found = in_drake(vehicle, exported)
-    assert found.position_m < 5e-5 * found.flown_m
-    assert found.angle_rad < 5e-3 * found.turned_rad
+    assert found.position_m < 5e-5 * found.flown_m and found.angle_rad < 5e-3 * found.turned_rad
     # A sense the wrong way round shows: the comparison could fail.
     swapped = exported.text.replace(">ccw<", ">?<").replace(">cw<", ">ccw<").replace(">?<", ">cw<")
     assert in_drake(vehicle, dataclasses.replace(exported, text=swapped)).angle_rad > 100 * found.angle_rad
@@ -170,8 +163,7 @@ def test_the_urdf_flies_the_same_in_bullet(template: str, effects) -> None:
     vehicle = templates.read(template).model_copy(update={"effects": with_effects(*effects).effects})
     exported = export_vehicle(vehicle, "gym-pybullet-drones")
     found = in_pybullet(vehicle, exported, damping=0)
-    assert found.position_m < 5e-5 * found.flown_m
-    assert found.angle_rad < 5e-3 * found.turned_rad
+    assert found.position_m < 5e-5 * found.flown_m and found.angle_rad < 5e-3 * found.turned_rad
     turned = in_pybullet(vehicle, dataclasses.replace(exported, mirrored=not exported.mirrored), damping=0)
     assert turned.angle_rad > 100 * found.angle_rad
     # What the tool's own damping does is named, and is far more than the export's error.
@@ -205,13 +197,12 @@ def test_px4_parameters_say_places_and_senses() -> None:
 
 def test_the_exported_file_is_python_and_an_unknown_form_is_told(tmp_path) -> None:
     write_vehicle(with_effects(DRAG), tmp_path / "v.yaml")
-    done = CliRunner().invoke(app, ["export", str(tmp_path / "v.yaml"), "--to", "px4", "-o", str(tmp_path / "x")])
-    assert done.exit_code == 0 and (tmp_path / "x").is_file()
+    answer("export", tmp_path / "v.yaml", "--to", "px4", "-o", tmp_path / "x")
+    assert (tmp_path / "x").is_file()
     scope: dict = {}
     exec(export_vehicle(with_effects(DRAG), "rotorpy").text, scope)
     assert scope["quad_params"]["k_d"] == 6e-5
-    done = CliRunner().invoke(app, ["export", str(tmp_path / "v.yaml"), "--to", "rotorpi"])
-    assert done.exit_code == 1 and "did you mean rotorpy?" in done.output
+    assert "did you mean rotorpy?" in refusal("export", tmp_path / "v.yaml", "--to", "rotorpi")
 
 
 def matrix_of(element, prefix: str = "") -> np.ndarray:
@@ -319,8 +310,7 @@ def test_a_lag_of_the_thrust_goes_along_wherever_a_lag_is_known() -> None:
     actuators = ElementTree.fromstring(mjcf.text).findall("actuator/general")
     assert [(a.get("dyntype"), float(a.get("dynprm"))) for a in actuators] == [("filterexact", 0.04)] * 4
     assert mjcf.left_out == ()
-    nearly = export_vehicle(with_effects(LAG), "mjcf")
-    assert "taken as one of the thrust, 0.03 s" in nearly.left_out[0]
+    assert "taken as one of the thrust, 0.03 s" in export_vehicle(with_effects(LAG), "mjcf").left_out[0]
     for form in ("gym-pybullet-drones", "px4"):
         assert any(s.startswith("motor_lag (on thrust") for s in export_vehicle(vehicle, form).left_out)
 
@@ -355,21 +345,20 @@ def test_px4_has_a_map_of_its_own_for_a_thrust_curve_of_the_throttle() -> None:
     assert "THR_MDL_FAC\t1\t" in export_vehicle(limited(), "px4").text
 
 
-def exported_by_command(folder, vehicle: Vehicle, form: str, file: str):
+def export_words(folder, vehicle: Vehicle, form: str, file: str) -> list:
+    """The command that exports a vehicle to `folder`/out."""
     write_vehicle(vehicle, folder / "v.yaml")
-    return CliRunner().invoke(app, ["export", str(folder / "v.yaml"), "--to", form, "-o", str(folder / "out" / file)])
+    return ["export", folder / "v.yaml", "--to", form, "-o", folder / "out" / file]
 
 
 @pytest.mark.parametrize(("form", "module"), [("rotorpy", "rotorpy"), ("mjcf", "mujoco")])
 def test_the_trial_flight_is_made_for_any_chain(tmp_path, monkeypatch, form: str, module: str) -> None:
     pytest.importorskip(module)
-    done = exported_by_command(tmp_path, with_effects(*CHAIN, NEAR_GROUND, DRAG), form, "vehicle")
-    assert done.exit_code == 0, done.output
-    assert "next to our own flight of what the file holds" in done.output and (tmp_path / "out" / "vehicle").is_file()
+    said = answer(*export_words(tmp_path, with_effects(*CHAIN, NEAR_GROUND, DRAG), form, "vehicle"))
+    assert "next to our own flight of what the file holds" in said and (tmp_path / "out" / "vehicle").is_file()
     fly = {"rotorpy": in_rotorpy, "mjcf": in_mujoco}[form]
     vehicle = with_effects(*CHAIN)
-    exported = export_vehicle(vehicle, form)
-    found = fly(vehicle, exported)
+    found = fly(vehicle, export_vehicle(vehicle, form))
     assert found.position_m < 1e-4 * found.flown_m and found.angle_rad < 5e-3 * found.turned_rad
     # Twice the lag shows: the comparison could fail.
     other = export_vehicle(with_effects(("motor_lag", "on thrust", {"tau": 0.08})), form)
@@ -383,9 +372,7 @@ def test_a_trial_that_fails_is_one_sentence_and_the_file_is_there(tmp_path, monk
         raise trouble
 
     monkeypatch.setitem(flown.FLYERS, "rotorpy", ("a_module_that_nobody_has", fail))
-    done = exported_by_command(tmp_path, with_effects(THRUST_LAG), "rotorpy", "vehicle.py")
-    assert done.exit_code == 0, done.output
-    last = done.output.splitlines()[-1].strip()
+    last = answer(*export_words(tmp_path, with_effects(THRUST_LAG), "rotorpy", "vehicle.py")).splitlines()[-1].strip()
     assert last.startswith("not flown there") or last == "the trial flight there did not end: it fell"
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["vehicle.py"]
 
@@ -410,9 +397,7 @@ def six_rotors() -> Vehicle:
     ],
 )
 def test_what_a_tool_does_not_take_is_one_sentence_before_anything_is_written(tmp_path, vehicle, form, said) -> None:
-    done = exported_by_command(tmp_path, vehicle, form, "file")
-    assert done.exit_code == 1 and said in done.output
-    assert len(done.output.strip().splitlines()) == 1 and not (tmp_path / "out").exists()
+    assert said in refusal(*export_words(tmp_path, vehicle, form, "file")) and not (tmp_path / "out").exists()
 
 
 def test_a_tool_refuses_what_is_refused_for_it(monkeypatch) -> None:
@@ -420,8 +405,7 @@ def test_a_tool_refuses_what_is_refused_for_it(monkeypatch) -> None:
     monkeypatch.setattr("rotorid.vehicle.exports.refusal", lambda *asked: "")
     for vehicle, form, module in ((FLAT, "mjcf", "mujoco"), (six_rotors(), "rotorpy", "rotorpy")):
         pytest.importorskip(module)
-        with pytest.raises(InputError, match="does not read the exported vehicle"):
-            flown.try_out(vehicle, form, export_vehicle(vehicle, form))
+        refused("does not read the exported vehicle", flown.try_out, vehicle, form, export_vehicle(vehicle, form))
 
 
 def test_other_tools_take_what_one_refuses() -> None:
@@ -434,6 +418,5 @@ def test_other_tools_take_what_one_refuses() -> None:
 def test_a_file_that_the_tool_does_not_read_is_not_written(tmp_path, monkeypatch) -> None:
     pytest.importorskip("mujoco")
     monkeypatch.setattr("rotorid.vehicle.exports.refusal", lambda *asked: "")
-    done = exported_by_command(tmp_path, FLAT, "mjcf", "v.xml")
-    assert done.exit_code == 1 and "MuJoCo does not read the exported vehicle" in done.output
-    assert len(done.output.strip().splitlines()) == 1 and not (tmp_path / "out").exists()
+    said = refusal(*export_words(tmp_path, FLAT, "mjcf", "v.xml"))
+    assert "MuJoCo does not read the exported vehicle" in said and not (tmp_path / "out").exists()

@@ -10,6 +10,7 @@ from rotorid.identify import bench_tests as static
 from rotorid.identify.bench import CELLS, GF_N, SPIKE, Filter, bench_force, bench_set, prepare
 from rotorid.io.logs import read_sessions, read_tables
 from rotorid.io.session import Ended, Setup
+from tests.refusals import refused
 
 from .logs import cells, write_log
 from .test_reconstruct import GEOMETRY, forces_by_matrix
@@ -62,13 +63,10 @@ def test_a_log_that_did_not_end_is_listed_but_not_used(tmp_path) -> None:
 def test_logs_that_cannot_be_one_table_are_named(tmp_path) -> None:
     first = calibration_logs(tmp_path)[0]
     other = write_log(tmp_path, "t", "tensile", np.zeros((5, 2)), Setup(kind="tensile"), {})
-    with pytest.raises(InputError, match=r"t\.rlog: is of a tensile, expected one of a bench"):
-        read_tables([first, other])
+    refused(r"t\.rlog: is of a tensile, expected one of a bench", read_tables, [first, other])
     first.with_suffix(".yaml").unlink()
-    with pytest.raises(InputError, match="its metadata file is missing"):
-        read_tables([first])
-    with pytest.raises(InputError, match="no raw logs to read"):
-        read_tables([])
+    refused("its metadata file is missing", read_tables, [first])
+    refused("no raw logs to read", read_tables, [])
 
 
 def test_the_line_that_made_the_readings_comes_back(tmp_path) -> None:
@@ -149,8 +147,7 @@ def test_a_static_reading_without_its_spike(tmp_path) -> None:
 def test_directions_of_loads() -> None:
     assert static.direction("z") == pytest.approx([0, 0, -1])
     assert static.direction("xz") == pytest.approx([0.70710678, 0, -0.70710678])
-    with pytest.raises(InputError, match="not 'u'"):
-        static.direction("u")
+    refused("not 'u'", static.direction, "u")
 
 
 def test_points_by_hand() -> None:
@@ -158,8 +155,7 @@ def test_points_by_hand() -> None:
     means = static.Means(sessions, np.zeros((1, 6)), np.zeros((1, 6)), np.array([[0.0, 0, -2]]))
     row = static.points(means, np.array([[0.3, 0.4, -2.1]]), np.array([[0.1, 0.1, 0.02]]), "equations").iloc[0]
     assert (row["load_n"], row["force_n"], row["error_n"]) == pytest.approx((2.0, 2.1, 0.1))
-    assert row["across_n"] == pytest.approx(0.5)
-    assert row["uncertainty_n"] == pytest.approx(0.02)
+    assert row["across_n"] == pytest.approx(0.5) and row["uncertainty_n"] == pytest.approx(0.02)
     assert row["error_z_n"] == pytest.approx(-0.1)
 
 

@@ -8,9 +8,8 @@ from functools import cache
 
 import pytest
 from scipy.spatial.transform import Rotation
-from typer.testing import CliRunner
 
-from rotorid.cli import app, verdicts
+from rotorid.cli import verdicts
 from rotorid.cli.modelling import fly
 from rotorid.mismatch.decide.findings import Analysis
 from rotorid.mismatch.deliver.files import delivered, improved_vehicle
@@ -20,6 +19,7 @@ from rotorid.recordings import columns as c
 from rotorid.report.deliver import analysis_of, verdict_of, write_files
 from rotorid.vehicle.control import swings
 from rotorid_proof.delivered import row_of
+from tests.command_line import answer, invoke
 from tests.unit.mismatch.flights import QUAD, quad, recorded, with_table
 
 LIMITS = {"rotor_speed_limits_rad_s": (0.0, 1800.0)}
@@ -141,12 +141,8 @@ def test_a_fault_of_the_run_that_is_held_out_moves_no_value_of_the_file():
 
 
 def test_an_export_takes_the_lag_that_was_found(tmp_path):
-    vehicle = improved_vehicle(taken("chain")[1])
-    write_vehicle(vehicle, tmp_path / "v.yaml")
-    done = CliRunner().invoke(
-        app, ["export", str(tmp_path / "v.yaml"), "--to", "rotorpy", "-o", str(tmp_path / "p.py")]
-    )
-    assert done.exit_code == 0, done.output
+    write_vehicle(improved_vehicle(taken("chain")[1]), tmp_path / "v.yaml")
+    answer("export", tmp_path / "v.yaml", "--to", "rotorpy", "-o", tmp_path / "p.py")
     content: dict = {}
     exec((tmp_path / "p.py").read_text(), content)
     assert content["quad_params"]["tau_m"] == pytest.approx(0.05, rel=0.1)
@@ -163,10 +159,9 @@ def test_a_warning_is_on_the_page_on_the_screen_and_in_the_file(tmp_path, monkey
         return write_files(analysis, *(target / name for name in names))
 
     monkeypatch.setattr(verdicts, "deliver_set", deliver)
-    done = CliRunner().invoke(app, ["verdict", str(folder), "-q", "-o", str(tmp_path / "out")])
-    assert done.exit_code == 0, done.output
-    assert f"! {warning}" in done.output.splitlines() and verdict.sentence in done.output.splitlines()
-    assert done.output.splitlines()[0] == verdict.basis.sentence
+    said = answer("verdict", folder, "-q", "-o", tmp_path / "out")
+    assert f"! {warning}" in said.splitlines() and verdict.sentence in said.splitlines()
+    assert said.splitlines()[0] == verdict.basis.sentence
     assert warning in (tmp_path / "out" / "verdict.json").read_text()
     assert warning in (tmp_path / "out" / "report.html").read_text()
 
@@ -222,7 +217,7 @@ def test_values_that_were_only_proposed_are_said_before_the_verdict(tmp_path):
         for line in text.splitlines()
     )
     (folder / "vehicle.yaml").write_text(marked)
-    done = CliRunner().invoke(app, ["verdict", str(folder), "-q", "-o", str(tmp_path / "out")])
+    done = invoke("verdict", folder, "-q", "-o", tmp_path / "out")
     assert "! mass_kg is only proposed (template x500)." in done.output.splitlines()
     page = (tmp_path / "out" / "report.html").read_text()
     assert page.index("mass_kg is only proposed") < page.index("<h1>")

@@ -56,22 +56,10 @@ def instrument_for(loading: Loading, vehicle: Vehicle) -> InstrumentFacts:
     every = (0, 1, 2, 3, 4, 5)
     span = float(loading.time_s[-1])
     return InstrumentFacts(
-        vehicle=vehicle,
-        channels=every,
-        loaded=every,
-        rate_hz=RATE_HZ,
-        duration_s=span,
-        run_s=span,
-        runs=("a",),
-        largest=largest,
-        tilts=True,
-        returns=every,
-        temperature=True,
-        temperatures_c=(20.0, 20.3),
-        first_temperature_c=20.0,
-        session_s=200.0,
-        session_clock=True,
-    )
+        vehicle=vehicle, channels=every, loaded=every, rate_hz=RATE_HZ, duration_s=span, run_s=span, runs=("a",),
+        largest=largest, tilts=True, returns=every, temperature=True, temperatures_c=(20.0, 20.3),
+        first_temperature_c=20.0, session_s=200.0, session_clock=True,
+    )  # fmt: skip
 
 
 def bench_instrument():
@@ -135,8 +123,7 @@ def test_a_weight_under_tilt_is_read_in_level_axes_and_its_moment_by_hand():
     motion = Motion(time_s=np.arange(2.0), rotor_speed=np.zeros((2, 4)), rotation=rotation_of(roll, 0 * roll))
     # Level sensor: the weight pulls straight down. The mass is 0.05 m above the sensor along the leaning body axis:
     # arm = R (0, 0, −0.05) = (0, 0.05 sin 30°, −0.05 cos 30°), moment = arm × (0, 0, 6.3765).
-    found = weight(motion, vehicle)[0]
-    assert np.allclose(found, [0, 0, 6.3765, 0.025 * 6.3765, 0, 0], atol=1e-9)
+    assert np.allclose(weight(motion, vehicle)[0], [0, 0, 6.3765, 0.025 * 6.3765, 0, 0], atol=1e-9)
     tilting = weight(motion, stand_vehicle(sensor_mount="tilting"))[0]
     assert np.allclose(tilting[:3], [0, 6.3765 * 0.5, 6.3765 * np.sqrt(0.75)], atol=1e-9)
 
