@@ -15,13 +15,13 @@ from rotorid.acquire.cli import app
 from rotorid.acquire.lines import record_lines
 from rotorid.acquire.transport import AcquireError, DeviceSilent, Interrupted, SerialTransport, SystemClock
 from rotorid.acquire.view import LinesPanel, Plot
-from rotorid.errors import InputError
 from rotorid.io import rawlog
 from rotorid.io.lines import Description, LineDecoder, read_description, read_line_log
 from rotorid.io.rawlog import RECEIVED, read_raw
 from rotorid.io.session import Ended, Session, read_session, write_session
 from tests.acquire.fault_table import seen
 from tests.command_line import answer, invoke
+from tests.refusals import refused
 
 ROOT = Path(__file__).parents[2]
 FORMS = {
@@ -220,6 +220,4 @@ def test_the_look_at_lines_while_recording():
 def test_mistakes_in_a_description_get_one_sentence(tmp_path: Path, text, sentence):
     path = tmp_path / "d.yaml"
     path.write_text(text)
-    with pytest.raises(InputError) as error:
-        read_description(path)
-    assert sentence in str(error.value)
+    assert sentence in refused(None, read_description, path)

@@ -24,15 +24,14 @@ from rotorid.io.session import (
     write_session,
 )
 from rotorid.io.wire import EXPERIMENTS
+from tests.acquire.conftest import recorded
 from tests.refusals import refused
 
 
 def short_log(loopback, samples):
     """A short recording with a few faults in it."""
     _, recorder = loopback("bench", Faults(drop=frozenset({5}), repeat=frozenset({9}), swap=frozenset({12})))
-    with recorder:
-        procedures.stream(recorder, samples)
-    return recorder.log_path
+    return recorded(procedures.stream, recorder, samples).path
 
 
 @pytest.fixture
@@ -118,9 +117,7 @@ def test_long_reads_are_split_into_chunks(tmp_path):
 def test_saturated_samples_are_flagged(loopback, tmp_path):
     world, recorder = loopback("wrench")
     world.physics.sensor._zero = np.array([0, 0, 500.0, 0, 0, 0])
-    with recorder:
-        procedures.measure_wrench(recorder, 0.01, samples=5)
-    table = read_log(recorder.log_path).table
+    table = recorded(procedures.measure_wrench, recorder, 0.01, samples=5).table
     assert (table.quality == 8).all() and (table.force_z_n == 200.0).all()
 
 
@@ -164,7 +161,7 @@ def test_index(log_path):
     rows = write_index(raw)
     assert len(rows) == 1 and list(rows[0]) == INDEX_COLUMNS
     assert rows == read_index(raw)
-    assert rows[0]["file"] == "run-bench.rlog" and rows[0]["missing"] == "1" and rows[0]["ended"] == "finished"
+    assert [rows[0][k] for k in ("file", "missing", "ended")] == ["run-bench.rlog", "1", "finished"]
 
 
 def test_table_a1_spot_checks():

@@ -155,11 +155,10 @@ def _flipped_checkpoint(path: Path) -> None:
 
 
 def _bomb(path: Path) -> None:
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as parts:
-        with parts.open("w0.npy", "w", force_zip64=True) as part:
-            part.write(b"\x93NUMPY")
-            for _ in range(300):
-                part.write(bytes(1_000_000))
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as parts, parts.open("w0.npy", "w", force_zip64=True) as part:
+        part.write(b"\x93NUMPY")
+        for _ in range(300):
+            part.write(bytes(1_000_000))
 
 
 class _Runs:
