@@ -13,16 +13,11 @@ from rotorid_proof.units import same_unit
 
 
 def effect(id, status="established", alternatives=(), parameters=(), p=1e-9):
+    listed = [{"symbol": s, "value": v, "unit": u, "interval_95": [low, high]} for s, v, u, low, high in parameters]
     return {
-        "id": id,
-        "status": status,
-        "alternatives": list(alternatives),
-        "parameters": [
-            {"symbol": s, "value": v, "unit": u, "interval_95": [low, high]} for s, v, u, low, high in parameters
-        ],
-        "p_value": p,
+        "id": id, "status": status, "alternatives": list(alternatives), "parameters": listed, "p_value": p,
         "held_out_gain": None,
-    }
+    }  # fmt: skip
 
 
 def verdict(*effects, word="explained", values=None, locations=(), after=1.0):

@@ -31,9 +31,9 @@ def ids(findings) -> list[str]:
 
 
 def one(findings, name: str):
-    assert ids(findings) == [name] and findings[0].status == "established"
-    assert findings[0].p_value < 1e-6
-    return findings[0]
+    (finding,) = findings
+    assert finding.id == name and finding.status == "established" and finding.p_value < 1e-6
+    return finding
 
 
 def column(recordings: RecordingSet, name: str) -> np.ndarray:
@@ -135,11 +135,7 @@ IMAGINARY = list(COLUMNS["attitude"][1:])
         # East-north-up instead of north-east-down.
         ("axis_sign", holding(VELOCITY, [VELOCITY[k] for k in (1, 0, 2)], [1, 1, -1]), ["x, y, z hold y, x, −z"]),
         ("axis_sign", holding(IMAGINARY, IMAGINARY, -1.0), ["conjugated"]),
-        (
-            "rotor_order",
-            holding(ROTORS[1:3], ROTORS[2:0:-1]),
-            ["column 2 belongs to rotor 3", "column 3 belongs to rotor 2"],
-        ),
+        ("rotor_order", holding(ROTORS[1:3], ROTORS[2:0:-1]), [f"column {a} belongs to rotor {5 - a}" for a in (2, 3)]),
         ("rotor_order", holding(ROTORS, list(np.roll(ROTORS, 1))), []),
     ],
     ids=["axes of the velocity", "conjugated attitude", "two rotors", "rotors moved round by one"],
@@ -252,15 +248,9 @@ def test_two_readings_of_one_quantity_tell_time_where_their_gain_is_one(phase):
     moved, noise = (rng.standard_normal(shape) + 1j * rng.standard_normal(shape) for _ in range(2))
     size = np.where(frequency_hz > 5.0, 8.0, 0.0)[None, :, None]
     motion = moved / (1.0 + frequency_hz[None, :, None] ** 2)
-    blocks = Blocks(
-        frequency_hz,
-        motion + 0.1 * size * noise * np.exp(-1j * phase),
-        motion + size * noise,
-        np.zeros((40, len(frequency_hz), 0), complex),
-        np.zeros(40, int),
-        np.arange(40.0),
-    )
-    narrow = one_quantity(blocks, [0])
+    readings = motion + 0.1 * size * noise * np.exp(-1j * phase), motion + size * noise
+    others = np.zeros((40, len(frequency_hz), 0), complex)
+    narrow = one_quantity(Blocks(frequency_hz, *readings, others, np.zeros(40, int), np.arange(40.0)), [0])
     assert 2.0 < narrow.frequency_hz[-1] <= 5.3
     assert abs(lagged.fit(narrow).lag_s) < 1e-4
 
