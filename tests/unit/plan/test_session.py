@@ -71,11 +71,8 @@ def known():
     runs = []
     for i, levels in enumerate(([0.4, 0.8, 1.0, 0.5], [1.0, 0.2, 0.6], [0.7, 1.0, 0.3, 0.9])):
         load = -8.0 * through(t, levels)
-        table = {
-            "time_s": t,
-            "reference_force_z_n": load,
-            "force_z_n": crept(load) + 0.004 * rng.standard_normal(len(t)),
-        }
+        read = crept(load) + 0.004 * rng.standard_normal(len(t))
+        table = {"time_s": t, "reference_force_z_n": load, "force_z_n": read}
         runs.append(Run(f"run{i}", pd.DataFrame(table)))
     vehicle = Vehicle.model_validate({"name": "bench", "kind": "bench", "tared": True})
     return known_instrument(RecordingSet("bench", vehicle, tuple(runs), None))

@@ -123,11 +123,8 @@ def test_rotorpy_hovers_from_the_state_of_the_file() -> None:
 
 def test_the_page_lists_what_each_form_holds() -> None:
     page = (Path(__file__).parents[3] / "docs/own-vehicle.md").read_text()
-    rows = [
-        line.strip("| ").split(" | ")
-        for line in page.split("| `FORM` |")[1].split("\n\n")[0].splitlines()
-        if line.startswith("| `")
-    ]
+    table = page.split("| `FORM` |")[1].split("\n\n")[0].splitlines()
+    rows = [line.strip("| ").split(" | ") for line in table if line.startswith("| `")]
     listed = {form.strip("`"): set(re.findall("`([a-z_]+)`", held)) for form, _, held in rows}
     assert listed == forms.KNOWS
     assert set(forms.KNOWS) == set(NAMES)
@@ -207,10 +204,8 @@ def test_the_exported_file_is_python_and_an_unknown_form_is_told(tmp_path) -> No
 
 def matrix_of(element, prefix: str = "") -> np.ndarray:
     """The inertia of an SDF or URDF element, (3, 3)."""
-    get = (lambda k: float(element.findtext(f"i{k}"))) if not prefix else (lambda k: float(element.get(f"i{k}")))
-    return np.array(
-        [[get("xx"), get("xy"), get("xz")], [get("xy"), get("yy"), get("yz")], [get("xz"), get("yz"), get("zz")]]
-    )
+    get = element.get if prefix else element.findtext
+    return np.array([[float(get(f"i{''.join(sorted(a + b))}")) for a in "xyz"] for b in "xyz"])
 
 
 def numbers(text: str) -> np.ndarray:
@@ -218,17 +213,14 @@ def numbers(text: str) -> np.ndarray:
 
 
 def test_sdf_carries_the_vehicles_mass_and_inertia_once() -> None:
-    vehicle = with_effects(
-        DRAG, OFFSET, PRODUCTS, ("motor_lag", "up and down", {"tau_up": 0.03, "tau_down": 0.05}), FLAP
-    )
+    lag = ("motor_lag", "up and down", {"tau_up": 0.03, "tau_down": 0.05})
+    vehicle = with_effects(DRAG, OFFSET, PRODUCTS, lag, FLAP)
     exported = export_vehicle(vehicle, "sdf")
     model = ElementTree.fromstring(exported.text).find("model")
     mass, first, spread = 0.0, np.zeros(3), np.zeros((3, 3))
     for link in model.findall("link"):
         inertial = link.find("inertial")
-        place = (
-            numbers(link.findtext("pose", "0 0 0 0 0 0"))[:3] + numbers(inertial.findtext("pose", "0 0 0 0 0 0"))[:3]
-        )
+        place = sum(numbers(part.findtext("pose", "0 0 0 0 0 0"))[:3] for part in (link, inertial))
         own = float(inertial.findtext("mass"))
         mass, first = mass + own, first + own * place
         spread += matrix_of(inertial.find("inertia")) + own * (place @ place * np.eye(3) - np.outer(place, place))
@@ -256,9 +248,8 @@ def test_gym_pybullet_drones_makes_our_forces_of_the_same_speeds(order: str) -> 
     assert float(root[1][0][1].get("value")) == pytest.approx(vehicle.mass_kg)
     np.testing.assert_allclose(matrix_of(root[1][0][2], "u"), vehicle.inertia_kg_m2.matrix(), rtol=1e-8)
     assert float(root[1][2][1][0].get("radius")) > 0
-    places = [
-        numbers(link.find("inertial/origin").get("xyz")) for link in root.findall("link") if "prop" in link.get("name")
-    ]
+    props = [link for link in root.findall("link") if "prop" in link.get("name")]
+    places = [numbers(link.find("inertial/origin").get("xyz")) for link in props]
     said = next(s for s in exported.left_out if s.startswith("order of the rotors"))
     rotors = [int(w.strip(",")) - 1 for w in said.split("are rotors ")[1].split(" here")[0].split()]
     speed = np.array([500.0, 520.0, 480.0, 510.0])
@@ -276,12 +267,10 @@ def test_gym_pybullet_drones_makes_our_forces_of_the_same_speeds(order: str) -> 
 
 
 def test_gym_pybullet_drones_refuses_what_it_cannot_fly() -> None:
-    plus = with_effects().model_copy(
-        update={"rotors": tuple(r.model_copy(update={"y_m": 0.0}) for r in with_effects().rotors)}
-    )
-    for vehicle in (plus, with_effects().model_copy(update={"rotors": with_effects().rotors[:3]})):
+    four = with_effects().rotors
+    for rotors in (tuple(r.model_copy(update={"y_m": 0.0}) for r in four), four[:3]):
         with pytest.raises(ValueError, match="gym-pybullet-drones"):
-            export_vehicle(vehicle, "gym-pybullet-drones")
+            export_vehicle(with_effects().model_copy(update={"rotors": rotors}), "gym-pybullet-drones")
 
 
 THRUST_LAG = ("motor_lag", "on thrust", {"tau": 0.04})

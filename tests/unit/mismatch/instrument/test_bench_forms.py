@@ -242,9 +242,8 @@ def test_an_amplifier_that_is_nearly_a_delay_is_no_delay():
 
 
 def test_a_wrong_gain_stays_wrong_beside_a_curve():
-    analysis = analyse_instrument(
-        recorded(lambda load, run, warmth: 1.035 * load + 0.3 * np.array([1, -0.8, 0.9]) * (load / 20.0) ** 3)
-    )
+    bend = 0.3 * np.array([1, -0.8, 0.9])
+    analysis = analyse_instrument(recorded(lambda load, run, warmth: 1.035 * load + bend * (load / 20.0) ** 3))
     assert claimed(analysis) == {"load_nonlinearity"}
     assert analysis.values["reading_gain"][2] < 1.035 < analysis.values["reading_gain"][3]
 
