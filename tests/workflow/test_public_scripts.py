@@ -32,24 +32,17 @@ def report_into(folder: Path, available: bool) -> None:
 @pytest.fixture
 def bench(tmp_path: Path) -> Path:
     """A propeller on three motors, C_F 1.1, 1.2 and 1.3e-6 N s², offset -0.05 N, one speed missing."""
-    vehicle = Vehicle(
-        name="x", kind="stand", rotors=[{"x_m": 0, "y_m": 0, "spin": "ccw"}], thrust_coefficient_n_s2=1e-6
-    )
+    rotors = [{"x_m": 0, "y_m": 0, "spin": "ccw"}]
+    vehicle = Vehicle(name="x", kind="stand", rotors=rotors, thrust_coefficient_n_s2=1e-6)
     speed = np.linspace(500, 2000, 11)
     runs = []
     for motor, c_f in (("a", 1.1e-6), ("b", 1.2e-6), ("c", 1.3e-6)):
         for cells in ("2s", "3s"):
             read = speed.copy()
             read[0] = 0 if cells == "2s" else speed[0]
-            table = pd.DataFrame(
-                {
-                    "time_s": np.arange(11.0),
-                    "throttle_1": np.linspace(0.05, 1, 11),
-                    "rotor_speed_1_rad_s": read,
-                    "force_z_n": -(c_f * speed**2 - 0.05),
-                }
-            )
-            runs.append(Run(f"{motor}_{cells}", table))
+            table = {"time_s": np.arange(11.0), "throttle_1": np.linspace(0.05, 1, 11)}
+            table |= {"rotor_speed_1_rad_s": read, "force_z_n": -(c_f * speed**2 - 0.05)}
+            runs.append(Run(f"{motor}_{cells}", pd.DataFrame(table)))
     folder = write_set(RecordingSet("strawson-t5040c", vehicle, tuple(runs)), tmp_path)
     report_into(folder, True)
     return folder
