@@ -1,7 +1,5 @@
 """One thread for linear algebra, a guard that ends a test which reads the tree's outputs, no record of the user."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Generator
 

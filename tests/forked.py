@@ -1,7 +1,5 @@
 """The command line in a process of its own for each call, forked from one that has imported all: that takes seconds."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Where other laboratories' logs are, and the mark of a test that needs them."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

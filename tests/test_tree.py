@@ -13,18 +13,13 @@ from threadpoolctl import threadpool_info
 from tests.tree import GUARD, ROOT, tracked_in
 
 LOOKS = {
-    "exists": lambda path: path.exists(),
-    "is_dir": lambda path: path.is_dir(),
-    "os.path": lambda path: os.path.isfile(path),
-    "open": lambda path: path.read_text(),
-    "os.open": lambda path: os.open(path, os.O_RDONLY),
-    "glob": lambda path: list(path.glob("*.json")),
-    "walk": lambda path: list(os.walk(path)),
-    "pandas": lambda path: pd.read_csv(path),
-    "numpy": lambda path: np.load(path),
-    "a program": lambda path: subprocess.run(["cat", path]),
+    "exists": lambda path: path.exists(), "is_dir": lambda path: path.is_dir(),
+    "os.path": lambda path: os.path.isfile(path), "open": lambda path: path.read_text(),
+    "os.open": lambda path: os.open(path, os.O_RDONLY), "glob": lambda path: list(path.glob("*.json")),
+    "walk": lambda path: list(os.walk(path)), "pandas": lambda path: pd.read_csv(path),
+    "numpy": lambda path: np.load(path), "a program": lambda path: subprocess.run(["cat", path]),
     "swallowed": lambda path: swallowed(path),
-}
+}  # fmt: skip
 NOT_TRACKED = ["results/recordings/neurobem", "cache/public", ".snakemake/log", "raw/recordings/mine", "raw/local"]
 
 

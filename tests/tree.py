@@ -4,8 +4,6 @@ A test that reads `results/`, `cache/` or an own set under `raw/` passes or fail
 look at such a path in a test's process, also by `Path.exists` and also where nothing is there, ends the test.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -13,10 +13,18 @@ from rotorid.acquire.emulators.ports import EmulatedPorts, build
 from rotorid.acquire.emulators.truth import Truth
 from rotorid.acquire.recorder import Recorder, Timings
 from rotorid.acquire.transport import LoopbackTransport, SerialTransport, SystemClock, VirtualClock
+from rotorid.io.logs import Log, read_log
 from rotorid.io.wire import INSTRUMENTS
 
 ACQUIRE = (sys.executable, "-m", "rotorid.acquire")
 QUICK = Timings(poll_s=0.02, reply_s=0.5, tries=3, silence_s=2.0, retry_open_s=0.002, reconnect_s=5.0)
+
+
+def recorded(procedure: Callable, recorder: Recorder, *arguments, **options) -> Log:
+    """Record by a procedure, and read back what is on disk."""
+    with recorder:
+        procedure(recorder, *arguments, **options)
+    return read_log(recorder.log_path)
 
 
 @pytest.fixture
@@ -59,17 +67,10 @@ def loopback(tmp_path: Path) -> Callable[..., tuple]:
         clock = VirtualClock(datetime(2024, 3, 4, 15, tzinfo=UTC))
         clock.follow(world.run_until)
         recorders = [
-            Recorder(
-                line.device.instrument,
-                LoopbackTransport(line, clock),
-                clock,
-                tmp_path,
-                f"run-{line.device.instrument.name}",
-                timings=timings,
-                durable=False,
-            )
-            for line in world.lines
-        ]
+            Recorder(known, LoopbackTransport(line, clock), clock, tmp_path, f"run-{known.name}", timings=timings,
+                     durable=False)
+            for line in world.lines if (known := line.device.instrument)
+        ]  # fmt: skip
         return world, *recorders
 
     return make

@@ -20,8 +20,7 @@ DESCRIPTIONS = sorted(BENCH.glob("instruments/*.yaml"))
 
 @pytest.mark.parametrize("path", PLANS, ids=lambda path: path.stem)
 def test_a_plan_to_copy_has_steps_that_can_be_set_up(path):
-    plan = read_plan(path)
-    steps = steps_of(plan)
+    steps = steps_of(read_plan(path))
     assert len(steps) >= 4 and all(step.setup(None).kind and step.ask for step in steps)
 
 

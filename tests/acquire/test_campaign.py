@@ -52,15 +52,9 @@ def test_the_committed_campaign_is_what_the_recorders_make(tmp_path):
 
 def test_the_campaign_is_whole(index):
     assert Counter(row["kind"] for row in index) == {
-        "calibration": 6 * 8 * 3,
-        "static": 5 * 8 * 10,
-        "dynamic": 3 * 3,
-        "thrust": 50,
-        "torque": 2 * 20,
-        "dynamics": 2 * 48,
-        "tensile": 4 * 3,
-        "combined": 4 * 3 * 5,
-    }
+        "calibration": 6 * 8 * 3, "static": 5 * 8 * 10, "dynamic": 3 * 3, "thrust": 50, "torque": 2 * 20,
+        "dynamics": 2 * 48, "tensile": 4 * 3, "combined": 4 * 3 * 5,
+    }  # fmt: skip
     assert {row["ended"] for row in index} == {"finished"} and {row["source"] for row in index} == {"emulator"}
     assert {row["kind"] for row in index} == set(PARTS)
     assert len({row["id"] for row in index}) == len(index)

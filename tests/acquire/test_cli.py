@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rich.console import Console
-from typer.testing import CliRunner
 
 from rotorid.acquire import procedures
 from rotorid.acquire.cli import app, stable_name, udev_rule, who_is_there
@@ -21,6 +20,7 @@ from rotorid.io.logs import read_log, read_tables
 from rotorid.io.session import read_index
 from tests.acquire.conftest import ACQUIRE
 from tests.acquire.fault_table import seen
+from tests.command_line import answer, invoke
 
 
 @pytest.fixture
@@ -146,7 +146,7 @@ def test_wrench_operations(emulator, tmp_path):
 )
 def test_mistakes_get_one_clear_sentence(arguments, sentence, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    result = CliRunner().invoke(app, arguments)
+    result = invoke(*arguments, app=app)
     assert result.exit_code in (1, 2)
     text = " ".join(result.output.replace("│", " ").split())
     assert sentence in text and "Traceback" not in text
@@ -154,10 +154,9 @@ def test_mistakes_get_one_clear_sentence(arguments, sentence, tmp_path, monkeypa
 
 def test_ports_say_who_is_there(plugged):
     bench, rotor = plugged("bench").names[0], plugged("rotor").names[0]
-    result = CliRunner().invoke(app, ["ports", "--port", bench, "--port", rotor, "--port", "/dev/nothing"])
-    assert result.exit_code == 0
-    assert "bench, firmware bench 1.2 (emulated), serial EMU-BENCH-1" in result.output
-    assert "rotor, firmware rotor 1.2 (emulated)" in result.output and "no such port" in result.output
+    result = answer("ports", "--port", bench, "--port", rotor, "--port", "/dev/nothing", app=app)
+    assert "bench, firmware bench 1.2 (emulated), serial EMU-BENCH-1" in result
+    assert "rotor, firmware rotor 1.2 (emulated)" in result and "no such port" in result
 
 
 @seen("a device of no kind of ours on the port", "the message did not say what was heard")
@@ -189,8 +188,8 @@ def test_stable_names_and_a_udev_rule(tmp_path):
 
 
 def test_ports_lists_or_says_what_to_do():
-    result = CliRunner().invoke(app, ["ports"])
-    assert result.exit_code == 0 and result.output.strip()
+    result = answer("ports", app=app)
+    assert result.strip()
 
 
 def test_torque_test_with_tester_and_sensor(emulator, tmp_path):
@@ -223,8 +222,7 @@ def test_forces_are_shown_once_the_bench_is_tared(loopback):
     assert bench_forces(recorder) is None
     with recorder:
         procedures.static_test(recorder, prompt)
-    shown = bench_forces(recorder).plain
-    assert float(shown.split("z")[1]) == pytest.approx(-500 * GF_N, rel=0.005)
+    assert float(bench_forces(recorder).plain.split("z")[1]) == pytest.approx(-500 * GF_N, rel=0.005)
 
 
 def test_live_view_in_a_terminal(plugged, recorder_on):

@@ -10,6 +10,7 @@ from rotorid.io.frames import COMMAND, decode
 from rotorid.io.logs import read_log
 from rotorid.io.rawlog import RECEIVED, SENT, read_raw
 from rotorid.io.wire import INSTRUMENTS, TRAPEZOID, Programme, pack_initialise, pack_throttle
+from tests.acquire.conftest import recorded
 
 
 def said(path) -> list[str]:
@@ -21,49 +22,36 @@ def said(path) -> list[str]:
 
 
 def test_wrench(loopback):
-    _, recorder = loopback("wrench")
-    with recorder:
-        procedures.measure_wrench(recorder, 0.02, restart_times=2, measuring_times=30, offset=True)
+    options = {"restart_times": 2, "measuring_times": 30, "offset": True}
+    log = recorded(procedures.measure_wrench, loopback("wrench")[1], 0.02, **options)
     # 20,000 µs = 0x4e20; 2; 30; all little-endian
-    assert said(recorder.log_path) == ["?", "P 01", "I 204e000002001e000000", "O", "G 204e0000", "X", "P 00"]
-    assert len(read_log(recorder.log_path).table) == 90  # thirty samples and two restarts
+    assert said(log.path) == ["?", "P 01", "I 204e000002001e000000", "O", "G 204e0000", "X", "P 00"]
+    assert len(log.table) == 90  # thirty samples and two restarts
 
 
 def test_bench(loopback):
-    _, recorder = loopback("bench")
-    with recorder:
-        procedures.stream(recorder, 10, 0.001)
-    assert said(recorder.log_path) == ["?", "G e8030000", "X"]
+    log = recorded(procedures.stream, loopback("bench")[1], 10, 0.001)
+    assert said(log.path) == ["?", "G e8030000", "X"]
 
 
 @pytest.mark.parametrize("burst_s", [0.02, 6.0])
 def test_a_weight_has_its_time_on_a_host_that_receives_in_bursts(loopback, burst_s):
     _, recorder = loopback("bench", timings=Timings(poll_s=burst_s))
-    with recorder:
-        procedures.static_test(recorder, lambda text: procedures.countdown(200))
-    marks = recorder.session.marks
+    marks = recorded(procedures.static_test, recorder, lambda text: procedures.countdown(200)).session.marks
     assert marks["load"] - marks["tare_stop"] == 200
 
 
 def test_rotor(loopback):
-    _, recorder = loopback("rotor")
-    with recorder:
-        procedures.thrust_test(recorder, 0.25, 0.5, 2.0)
+    log = recorded(procedures.thrust_test, loopback("rotor")[1], 0.25, 0.5, 2.0)
     # throttle 0.25 = 2500 = 0x09c4, held by the tester itself for 2.5 s = 2500 ms at most
-    assert said(recorder.log_path) == ["?", "K d007", "G 00000000", "T c409c409", "T 00000000", "X"]
+    assert said(log.path) == ["?", "K d007", "G 00000000", "T c409c409", "T 00000000", "X"]
 
 
 def test_quadrotor(loopback):
-    _, recorder = loopback("quadrotor")
-    with recorder:
-        procedures.fly_programme(recorder, "r", Programme(TRAPEZOID, (0.2, 0.05, 0.05, 0.2), 1.0, 2.0, 0.0))
-    # trapezoid; 2000, 500, 500, 2000; 1000 ms, 2000 ms, 0 mHz
-    assert said(recorder.log_path) == [
-        "?",
-        "K d007",  # two seconds
-        "r 00" + "d007" + "f401" + "f401" + "d007" + "e803" + "d007" + "0000",
-    ]
-    log = read_log(recorder.log_path)
+    programme = Programme(TRAPEZOID, (0.2, 0.05, 0.05, 0.2), 1.0, 2.0, 0.0)
+    log = recorded(procedures.fly_programme, loopback("quadrotor")[1], "r", programme)
+    # the watchdog's two seconds; trapezoid; 2000, 500, 500, 2000; 1000 ms, 2000 ms, 0 mHz
+    assert said(log.path) == ["?", "K d007", "r 00" + "d007" + "f401" + "f401" + "d007" + "e803" + "d007" + "0000"]
     assert log.end is not None and log.table.throttle_2.max() == pytest.approx(0.05)
 
 
@@ -116,13 +104,9 @@ class _Replay:
 
 
 def test_a_log_played_back_gives_the_same_table(loopback, tmp_path):
-    _, recorder = loopback("bench")
-    with recorder:
-        procedures.stream(recorder, 100)
-    folder = tmp_path / "again"
-    replay = _Replay(recorder.log_path)
-    with Recorder(INSTRUMENTS["bench"], replay, SystemClock(), folder, "again", durable=False) as again:
-        procedures.stream(again, 100)
-    first, second = read_log(recorder.log_path).table, read_log(folder / "again.rlog").table
+    log = recorded(procedures.stream, loopback("bench")[1], 100)
+    bench, replay = INSTRUMENTS["bench"], _Replay(log.path)
+    again = Recorder(bench, replay, SystemClock(), tmp_path / "again", "again", durable=False)
+    first, second = log.table, recorded(procedures.stream, again, 100).table
     channels = [column for column in first if column != "host_time_s"]
     np.testing.assert_array_equal(first[channels], second[channels])

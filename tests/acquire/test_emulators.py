@@ -44,8 +44,7 @@ RNG = np.random.default_rng
 
 def test_geometry_by_hand():
     # eq. 2.9, row x, cell 3: D_135z / L = 21.2 / 225; row z: −1 / cos 45°
-    assert M[0, 2] == pytest.approx(21.2 / 225)
-    assert M[0, 0] == pytest.approx(-2 * 21.2 / 225)
+    assert M[0, 2] == pytest.approx(21.2 / 225) and M[0, 0] == pytest.approx(-2 * 21.2 / 225)
     assert M[1, 3] == pytest.approx((48.126099 - 50.457916) / (225 * math.sqrt(0.5)))
     assert body_forces(np.ones(6))[2] == pytest.approx(-3 - 3 * math.sqrt(2))
 
@@ -62,8 +61,7 @@ def test_the_emulated_bench_inverts_the_equations_along_one_axis(axis, force):
 def test_an_ideal_cell_reads_the_thesis_regression():
     # table 2.8, cell 1: y = −0.0829 + 39.7571 x, x in 1e-5 V; a load of 500 gf gives x = 500.0829/39.7571
     cells = LoadCells(CellsTruth(), RNG(0))
-    force = np.full(6, 500 * GF_N)
-    cells.process(0.02, force)
+    cells.process(0.02, np.full(6, 500 * GF_N))
     assert cells.volts()[0] * 1e5 == pytest.approx(500.0829 / 39.7571, rel=1e-9)
     np.testing.assert_allclose(cell_forces(cells.volts()) / GF_N, 500, rtol=1e-9)
 
@@ -218,8 +216,7 @@ def test_truth_keeps_the_thesis_and_round_trips(tmp_path):
     assert truth.rotor.thrust_coefficient_n_s2 == 1.3877e-6
     assert truth.rotor.torque_coefficient_n_m_s2 == 1.8558e-8
     assert (truth.vehicle.mass_kg, truth.vehicle.arm_m) == (0.652, 0.0884)
-    assert truth.plastic[100].modulus_pa == 1.9482e9
-    assert truth == draw_truth(7) != draw_truth(8)
+    assert truth.plastic[100].modulus_pa == 1.9482e9 and truth == draw_truth(7) != draw_truth(8)
     write_truth(truth, tmp_path / "sealed" / "truth.yaml", 7)
     assert read_truth(tmp_path / "sealed" / "truth.yaml") == truth
 

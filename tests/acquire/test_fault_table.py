@@ -13,30 +13,27 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 from rotorid.acquire import procedures
 from rotorid.acquire.cli import app
 from rotorid.acquire.emulators.devices import Faults
 from rotorid.acquire.recorder import Recorder, Timings, _source
 from rotorid.acquire.transport import AcquireError, SystemClock
-from rotorid.errors import InputError
 from rotorid.io import rawlog, wire
 from rotorid.io.frames import ANSWER, DATA, END, START, Frame, StreamDecoder, encode
 from rotorid.io.logs import read_log, read_tables
 from rotorid.io.rawlog import read_raw
 from rotorid.io.session import Ended, Session, read_session, session_path, write_session
 from rotorid.io.wire import TRAPEZOID, Programme
-from tests.acquire.conftest import ACQUIRE, QUICK
+from tests.acquire.conftest import ACQUIRE, QUICK, recorded
 from tests.acquire.fault_table import TABLE, seen
 from tests.acquire.test_faults import assert_metadata_agree, record
+from tests.command_line import invoke
+from tests.refusals import refused
 
 
-def recorded(loopback, samples: int = 250, name: str = "bench") -> Path:
-    _, recorder = loopback(name)
-    with recorder:
-        procedures.stream(recorder, samples)
-    return recorder.log_path
+def a_log(loopback, samples: int = 250) -> Path:
+    return recorded(procedures.stream, loopback("bench")[1], samples).path
 
 
 def flip(path: Path, place: int) -> None:
@@ -46,7 +43,7 @@ def flip(path: Path, place: int) -> None:
 
 
 def command_line(*arguments: str) -> tuple[int, str]:
-    result = CliRunner().invoke(app, list(arguments))
+    result = invoke(*arguments, app=app)
     return result.exit_code, " ".join(result.output.split())
 
 
@@ -55,7 +52,7 @@ def command_line(*arguments: str) -> tuple[int, str]:
 
 @seen("one bit of a log flipped", "123 of 251 samples survived, check printed 'finished' and ingest 0 missing")
 def test_a_flipped_bit_costs_one_sample_and_is_told(loopback):
-    path = recorded(loopback)
+    path = a_log(loopback)
     had = len(read_log(path).table)
     flip(path, path.stat().st_size // 2)
     log = read_log(path)
@@ -68,7 +65,7 @@ def test_a_flipped_bit_costs_one_sample_and_is_told(loopback):
 
 @seen("the length of a chunk flipped", "everything behind it was lost without a word")
 def test_a_damaged_length_costs_a_chunk(loopback):
-    path = recorded(loopback)
+    path = a_log(loopback)
     whole = read_log(path)
     data, chunks = path.read_bytes(), read_raw(path).chunks
     largest = max((c for c in chunks[6:]), key=lambda c: len(c.data))
@@ -80,7 +77,7 @@ def test_a_damaged_length_costs_a_chunk(loopback):
 
 @seen("a bit of a packed log flipped", "NotALog: nothing of it could be read")
 def test_a_damaged_packed_log_is_read_up_to_the_damage(loopback):
-    path = recorded(loopback)
+    path = a_log(loopback)
     had = len(read_log(path).table)
     packed = path.with_name(path.name + ".gz")
     packed.write_bytes(gzip.compress(path.read_bytes()))
@@ -92,7 +89,7 @@ def test_a_damaged_packed_log_is_read_up_to_the_damage(loopback):
 
 @seen("a log cut to its half", "0 missing, since nothing comes behind the last sample")
 def test_the_end_that_a_cut_took_is_counted(loopback):
-    path = recorded(loopback)
+    path = a_log(loopback)
     had = len(read_log(path).table)
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     log = read_log(path)
@@ -103,21 +100,19 @@ def test_the_end_that_a_cut_took_is_counted(loopback):
 
 @seen("another recording's bytes under this name", "read as complete; the metadata spoke of something else")
 def test_another_recordings_bytes_are_refused(loopback, tmp_path):
-    path = recorded(loopback)
+    path = a_log(loopback)
     other = read_session(session_path(path)).model_copy(update={"id": "other", "log": "other.rlog"})
     write_session(other, tmp_path / "other.yaml")
     (tmp_path / "other.rlog").write_bytes(path.read_bytes())
-    with pytest.raises(InputError, match="holds the recording 'run-bench'.*those of 'other'"):
-        read_log(tmp_path / "other.rlog")
+    refused("holds the recording 'run-bench'.*those of 'other'", read_log, tmp_path / "other.rlog")
     assert command_line("check", str(tmp_path / "other.rlog"))[0] == 1
 
 
 @seen("other bytes of the same name, no chunk damaged", "read as complete: log_sha256 was never compared")
 def test_bytes_that_are_not_those_recorded_are_refused_at_ingest(loopback):
-    path = recorded(loopback)
+    path = a_log(loopback)
     path.write_bytes(path.read_bytes() + rawlog.pack_chunk(rawlog.NOTE, 1 << 60, b"{}"))
-    with pytest.raises(InputError, match="not the bytes that were recorded: SHA-256"):
-        read_tables([path])
+    refused("not the bytes that were recorded: SHA-256", read_tables, [path])
     code, text = command_line("check", str(path))
     assert code == 1 and "not the bytes that were recorded" in text
 
@@ -209,15 +204,11 @@ class Script:
 
 
 ODD = {
-    "short start record": (START, b"\1\2\3"),
-    "start record with two strings": (START, start_record()[:-3]),
+    "short start record": (START, b"\1\2\3"), "start record with two strings": (START, start_record()[:-3]),
     "start record that is no UTF-8": (START, start_record()[:9] + b"\xff\0\xff\0\xff"),
-    "short end record": (END, b"\1"),
-    "long end record": (END, end_record(3) + b"\0"),
-    "empty answer": (ANSWER, b""),
-    "sample of 4 bytes": (DATA, b"\1\2\3\4"),
-    "unknown kind": (ord("Q"), b"\1\2\3\4"),
-}
+    "short end record": (END, b"\1"), "long end record": (END, end_record(3) + b"\0"), "empty answer": (ANSWER, b""),
+    "sample of 4 bytes": (DATA, b"\1\2\3\4"), "unknown kind": (ord("Q"), b"\1\2\3\4"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("what", ODD)
@@ -225,13 +216,10 @@ ODD = {
 def test_a_malformed_frame_is_counted_and_nothing_else_is_lost(tmp_path, what):
     bench = wire.INSTRUMENTS["bench"]
     recorder = Recorder(bench, Script([ODD[what]]), SystemClock(), tmp_path, "run", durable=False)
-    with recorder:
-        procedures.stream(recorder, 30)
-    log = read_log(tmp_path / "run.rlog")
+    log = recorded(procedures.stream, recorder, 30)
     assert log.session.ended == Ended.FINISHED and len(log.table) >= 29
-    unknown = what == "unknown kind"
+    counts, unknown = log.session.counts, what == "unknown kind"
     assert (log.malformed, log.unknown_kinds) == (int(not unknown), int(unknown))
-    counts = log.session.counts
     assert (counts.malformed, counts.unknown_kinds) == ((None, 1) if unknown else (1, None))
     assert log.missing == 0 and log.session.warnings
     assert_metadata_agree(log)
@@ -243,10 +231,9 @@ def test_a_firmware_of_another_layout_is_told_and_its_log_is_readable(tmp_path):
     script._number = 9
     recorder = Recorder(wire.INSTRUMENTS["bench"], script, SystemClock(), tmp_path, "run", durable=False)
     real = wire.INSTRUMENTS["bench"].layout.size
-    with pytest.raises(AcquireError, match=f"sample has {real} bytes, this one has 4.*update its firmware"):
-        with recorder:
-            script.read = lambda timeout_s, read=script.read: _only_odd(script)
-            procedures.stream(recorder, 30)
+    with pytest.raises(AcquireError, match=f"sample has {real} bytes, this one has 4.*update its firmware"), recorder:
+        script.read = lambda timeout_s, read=script.read: _only_odd(script)
+        procedures.stream(recorder, 30)
     log = read_log(tmp_path / "run.rlog")
     assert len(log.table) == 0 and log.malformed == log.session.counts.malformed >= 20
 
@@ -260,7 +247,7 @@ def _only_odd(script: Script) -> bytes:
 
 @seen("a note in the log that is no JSON object", "the reader raised json.JSONDecodeError")
 def test_a_note_that_is_none_hurts_nothing(loopback):
-    path = recorded(loopback, 20)
+    path = a_log(loopback, 20)
     session = read_session(session_path(path))
     for text in (b"not json", json.dumps([1]).encode()):
         path.write_bytes(path.read_bytes() + rawlog.pack_chunk(rawlog.NOTE, 1 << 60, text))
@@ -272,12 +259,9 @@ def test_a_note_that_is_none_hurts_nothing(loopback):
 def test_a_log_of_an_unknown_instrument_is_readable(tmp_path):
     path = tmp_path / "run.rlog"
     session_free(path, [(START, start_record(name="toaster")), (DATA, b"\1\2"), (END, end_record(1))])
-    with pytest.raises(InputError, match="unknown instrument 'toaster'; known are bench"):
-        read_log(path)  # nothing says what was expected
-    write_session(
-        Session(id="run", instrument="bench", started="2024-03-04T09:00:00-06:00", host_start_ns=0, log=path.name),
-        tmp_path / "run.yaml",
-    )
+    refused("unknown instrument 'toaster'; known are bench", read_log, path)  # nothing says what was expected
+    started = {"started": "2024-03-04T09:00:00-06:00", "host_start_ns": 0}
+    write_session(Session(id="run", instrument="bench", log=path.name, **started), tmp_path / "run.yaml")
     log = read_log(path)
     assert len(log.table) == 0 and log.malformed == 1 and "toaster" in log.faults[0]
 
@@ -321,11 +305,8 @@ def test_a_terminal_that_goes_away_stops_the_device(plugged, tmp_path):
 def test_a_killed_recorder_leaves_no_motor_running(plugged, tmp_path):
     ports = plugged("rotor", speed=1.0)
     command = [*ACQUIRE, "rotor", "--port", ports.names[0], "--throttle", "0.3"]
-    process = subprocess.Popen(
-        [*command, "--hold-s", "60", "--rest-s", "0.1", "--out", str(tmp_path), "--id", "run"],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
+    command += ["--hold-s", "60", "--rest-s", "0.1", "--out", str(tmp_path), "--id", "run"]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     device = ports._world.lines[0].device
     until(lambda: device._physics.rotors.throttle[0] > 0)
     process.kill()
@@ -345,33 +326,29 @@ def until(condition, seconds: float = 30.0) -> None:
 @seen("a motor commanded to turn with the watchdog off", "it turned: there was no watchdog")
 def test_nothing_moves_without_its_watchdog(loopback):
     _, recorder = loopback("rotor", timings=Timings(watchdog_s=None))
-    with pytest.raises(AcquireError, match="switch the watchdog on first"):
-        with recorder:
-            procedures.thrust_test(recorder, 0.2, 0.5, 1.0)
+    with pytest.raises(AcquireError, match="switch the watchdog on first"), recorder:
+        procedures.thrust_test(recorder, 0.2, 0.5, 1.0)
     _, recorder = loopback("quadrotor", timings=Timings(watchdog_s=None))
-    with pytest.raises(AcquireError, match="watchdog"):
-        with recorder:
-            procedures.fly_programme(recorder, "h", Programme(TRAPEZOID, (0.1,) * 4, 0.5, 1.0, 0.0))
+    with pytest.raises(AcquireError, match="watchdog"), recorder:
+        procedures.fly_programme(recorder, "h", Programme(TRAPEZOID, (0.1,) * 4, 0.5, 1.0, 0.0))
 
 
 @seen("firmware without a watchdog", "a motor was started all the same")
 def test_firmware_without_a_watchdog_is_refused(plugged, recorder_on):
     port = plugged("rotor", Faults(refuse=frozenset("K"))).names[0]
-    with pytest.raises(AcquireError, match="no watchdog.*Update its firmware"):
-        with recorder_on("rotor", port) as recorder:
-            procedures.thrust_test(recorder, 0.2, 0.5, 1.0)
+    with pytest.raises(AcquireError, match="no watchdog.*Update its firmware"), recorder_on("rotor", port) as recorder:
+        procedures.thrust_test(recorder, 0.2, 0.5, 1.0)
 
 
 @seen("the device ends its stream by a fault", "the recording was called finished")
 def test_an_end_by_the_devices_watchdog_is_no_finish(loopback):
     world, recorder = loopback("rotor")
-    with pytest.raises(AcquireError, match="heard nothing from this computer"):
-        with recorder:
-            recorder.guard()
-            recorder.start(resumable=False)
-            world.lines[0]._stop_unheard()
-            for _ in recorder.rows(100):
-                pass
+    with pytest.raises(AcquireError, match="heard nothing from this computer"), recorder:
+        recorder.guard()
+        recorder.start(resumable=False)
+        world.lines[0]._stop_unheard()
+        for _ in recorder.rows(100):
+            pass
     assert recorder.session.ended == Ended.DEVICE_FAULT
 
 
@@ -418,31 +395,24 @@ def test_a_name_never_leads_out_of_the_folder(tmp_path, name):
 def test_a_reading_that_is_never_steady_ends_with_a_sentence(loopback):
     _, recorder = loopback("bench")
     rule = procedures.SteadyRule(tolerance=-1.0)
-    with pytest.raises(AcquireError, match=r"not steady within 5 s.*cell_\d_v still moves.*--tolerance"):
-        with recorder:
-            procedures.static_test(recorder, lambda text: lambda: True, 50, rule, wait_s=5)
+    with pytest.raises(AcquireError, match=r"not steady within 5 s.*cell_\d_v still moves.*--tolerance"), recorder:
+        procedures.static_test(recorder, lambda text: lambda: True, 50, rule, wait_s=5)
     assert recorder.session.ended == Ended.GAVE_UP and recorder.ended is not None
 
 
 @seen("a weight that is never put on", "the recorder waited for ever")
 def test_a_weight_that_never_comes_ends_with_a_sentence(loopback):
     _, recorder = loopback("bench")
-    with pytest.raises(AcquireError, match="no load within 4 s"):
-        with recorder:
-            procedures.static_test(recorder, lambda text: lambda: False, wait_s=4)
+    with pytest.raises(AcquireError, match="no load within 4 s"), recorder:
+        procedures.static_test(recorder, lambda text: lambda: False, wait_s=4)
     assert recorder.session.ended == Ended.GAVE_UP
 
 
 @seen("standard input at its end while Enter is waited for", "the recorder waited for ever")
 def test_standard_input_at_its_end_is_an_answer(plugged, tmp_path):
-    done = subprocess.run(
-        [*ACQUIRE, "bench", "--port", plugged("bench", speed=20.0).names[0]]
-        + ["--test", "static", "--out", str(tmp_path), "--id", "run"],
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
+    words = ["bench", "--port", plugged("bench", speed=20.0).names[0], "--test", "static", "--out", str(tmp_path)]
+    how = {"stdin": subprocess.DEVNULL, "capture_output": True, "text": True, "timeout": 60}
+    done = subprocess.run([*ACQUIRE, *words, "--id", "run"], **how)
     assert done.returncode == 0 and "standard input is at its end" in done.stderr
     assert "input_over" in [event.what for event in read_session(tmp_path / "run.yaml").events]
 
@@ -479,10 +449,8 @@ def test_a_simulated_board_is_no_instrument(firmware, port):
 
 @seen("an instrument that sends every minute", "'gone silent' after two seconds")
 def test_a_slow_instrument_is_not_silent(loopback):
-    _, recorder = loopback("wrench")
-    with recorder:
-        procedures.measure_wrench(recorder, 5.0, samples=4)
-    assert recorder.session.ended == Ended.FINISHED and not recorder.session.events
+    log = recorded(procedures.measure_wrench, loopback("wrench")[1], 5.0, samples=4)
+    assert log.session.ended == Ended.FINISHED and not log.session.events
 
 
 def test_the_table_names_every_test_here_and_says_what_was_seen():

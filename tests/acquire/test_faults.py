@@ -12,33 +12,22 @@ import numpy as np
 import pytest
 
 from rotorid.acquire import procedures
+from rotorid.acquire import transport as t
 from rotorid.acquire.emulators.devices import Faults
-from rotorid.acquire.transport import (
-    AcquireError,
-    DeviceSilent,
-    DiskFull,
-    Interrupted,
-    PortLost,
-    PortMissing,
-    Refused,
-    SerialTransport,
-)
+from rotorid.acquire.transport import AcquireError, Refused, SerialTransport
 from rotorid.io import wire
 from rotorid.io.frames import Quality
 from rotorid.io.logs import Log, read_log
 from rotorid.io.session import Ended, read_session
 from rotorid.io.wire import TRAPEZOID, Programme
-from tests.acquire.conftest import ACQUIRE, QUICK
+from tests.acquire.conftest import ACQUIRE, QUICK, recorded
 from tests.acquire.fault_table import seen
 
 SAMPLES = 300
 
 
 def record(recorder, samples=SAMPLES, interval_s=0.0):
-    """Record, and read back what is on disk."""
-    with recorder:
-        procedures.stream(recorder, samples, interval_s)
-    return read_log(recorder.log_path)
+    return recorded(procedures.stream, recorder, samples, interval_s)
 
 
 def frame_numbers(log):
@@ -49,10 +38,8 @@ def frame_numbers(log):
 def assert_metadata_agree(log):
     """The recorder's live account and the parser's later one are the same."""
     counts = log.session.counts
-    assert counts.samples == len(log.table)
-    assert counts.missing == log.missing
-    assert counts.repeated == log.repeated
-    assert counts.resets == log.resets
+    assert counts.samples == len(log.table) and counts.missing == log.missing
+    assert counts.repeated == log.repeated and counts.resets == log.resets
     assert (counts.checksum_errors, counts.broken_frames) == (log.checksum_errors, log.broken_frames)
     assert [(g.segment, g.first_index, g.count) for g in log.session.gaps] == [
         (g.segment, g.first_index, g.count) for g in log.gaps
@@ -65,14 +52,13 @@ def test_a_good_line_loses_nothing(plugged, recorder_on):
     assert log.complete and log.end.sent == len(log.table) >= SAMPLES
     assert (log.table.quality == 0).all()
     np.testing.assert_allclose(np.diff(log.table.time_s), 0.02, atol=2e-6)
-    assert log.session.ended == Ended.FINISHED
-    assert log.session.warnings == []
+    assert log.session.ended == Ended.FINISHED and log.session.warnings == []
     assert_metadata_agree(log)
 
 
 @seen("port missing")
 def test_port_missing(recorder_on, tmp_path):
-    with pytest.raises(PortMissing, match="no such port.*rotorid-acquire ports"):
+    with pytest.raises(t.PortMissing, match="no such port.*rotorid-acquire ports"):
         with recorder_on("bench", str(tmp_path / "nothing")):
             pass
     assert list(tmp_path.iterdir()) == []
@@ -83,9 +69,8 @@ def test_port_busy(plugged, recorder_on, tmp_path):
     port = plugged("bench").names[0]
     other = SerialTransport(port, 115200)
     other.open()
-    with pytest.raises(PortMissing, match="another program holds this port"):
-        with recorder_on("bench", port):
-            pass
+    with pytest.raises(t.PortMissing, match="another program holds this port"), recorder_on("bench", port):
+        pass
     other.close()
     assert record(recorder_on("bench", port)).complete
 
@@ -123,11 +108,10 @@ def test_port_vanishes_for_good(plugged, recorder_on):
     ports = plugged("bench", replug_after_s=None)
     recorder = recorder_on("bench", ports.names[0], replace(QUICK, reconnect_s=0.02))
     pull_at(ports, recorder, 100)
-    with pytest.raises(PortLost, match="did not come back.*what came before is in the log"):
+    with pytest.raises(t.PortLost, match="did not come back.*what came before is in the log"):
         record(recorder, None)
     log = read_log(recorder.log_path)
-    assert len(log.table) >= 100 and log.missing == 0
-    assert log.session.ended == Ended.DEVICE_LOST
+    assert len(log.table) >= 100 and log.missing == 0 and log.session.ended == Ended.DEVICE_LOST
     assert_metadata_agree(log)
 
 
@@ -178,8 +162,7 @@ def test_everything_at_once_at_random(plugged, recorder_on, seed):
     line._rng = np.random.default_rng(seed)
     log = record(recorder_on("bench", ports.names[0]), samples=1000)
     done = line.done
-    numbers = frame_numbers(log)
-    assert (np.diff(numbers) > 0).all()
+    assert (np.diff(frame_numbers(log)) > 0).all()
     # what cannot arrive: dropped, corrupted, halved (with its neighbour), and at most one frame per garbage
     worst = done["drop"] + done["corrupt"] + 2 * done["half"] + done["garbage"] + done["swap"]
     assert line.count - len(log.table) <= worst
@@ -192,9 +175,7 @@ def test_everything_at_once_at_random(plugged, recorder_on, seed):
 def test_device_resets_and_the_recording_goes_on(plugged, recorder_on, same_boot_id):
     faults = Faults(reset_at=frozenset({120}), same_boot_id=same_boot_id)
     log = record(recorder_on("bench", plugged("bench", faults).names[0]))
-    assert log.resets == 1
-    assert (log.table.segment == 0).sum() == 120
-    assert (np.diff(log.table.time_s) > 0).all()
+    assert log.resets == 1 and (log.table.segment == 0).sum() == 120 and (np.diff(log.table.time_s) > 0).all()
     assert log.session.ended == Ended.FINISHED
     # A reset with the boot id it had before may first be noticed by the silence.
     assert [event.what for event in log.session.events if not (same_boot_id and event.what == "silence")] == ["reset"]
@@ -204,29 +185,25 @@ def test_device_resets_and_the_recording_goes_on(plugged, recorder_on, same_boot
 @seen("a reset makes a thrust test void")
 def test_a_reset_makes_a_thrust_test_void(plugged, recorder_on):
     port = plugged("rotor", Faults(reset_at=frozenset({80}))).names[0]
-    with pytest.raises(AcquireError, match="void.*record again"):
-        with recorder_on("rotor", port) as recorder:
-            procedures.thrust_test(recorder, 0.2, 1.0, 2.0)
+    with pytest.raises(AcquireError, match="void.*record again"), recorder_on("rotor", port) as recorder:
+        procedures.thrust_test(recorder, 0.2, 1.0, 2.0)
     log = read_log(recorder.log_path)
-    assert len(log.table) == 80
-    assert log.session.ended == Ended.DEVICE_RESET
+    assert len(log.table) == 80 and log.session.ended == Ended.DEVICE_RESET
 
 
 def test_a_reset_before_the_command_is_a_reset_and_no_refusal(plugged, recorder_on):
     port = plugged("rotor", Faults(reset_at=frozenset({1}))).names[0]  # on a busy computer: before it sends again
-    with pytest.raises(AcquireError, match="void.*record again"):
-        with recorder_on("rotor", port) as recorder:
-            recorder.guard()
-            recorder.start(resumable=False)
-            recorder.command(wire.THROTTLE, wire.pack_throttle(0.2, 1.0))
+    with pytest.raises(AcquireError, match="void.*record again"), recorder_on("rotor", port) as recorder:
+        recorder.guard()
+        recorder.start(resumable=False)
+        recorder.command(wire.THROTTLE, wire.pack_throttle(0.2, 1.0))
 
 
 @seen("clock rollover")
 def test_clock_rollover(plugged, recorder_on):
     faults = Faults(clock_start_us=(1 << 32) - 2_000_000)  # rolls over two seconds into the stream
     log = record(recorder_on("bench", plugged("bench", faults).names[0]))
-    assert log.session.counts.clock_rollovers == 1
-    assert log.resets == 0 and log.missing == 0
+    assert (log.session.counts.clock_rollovers, log.resets, log.missing) == (1, 0, 0)
     np.testing.assert_allclose(np.diff(log.table.time_s), 0.02, atol=2e-6)
 
 
@@ -234,8 +211,7 @@ def test_clock_rollover(plugged, recorder_on):
 @seen("device slower or faster than promised")
 def test_device_slower_or_faster_than_promised(plugged, recorder_on, pace, word, rate):
     log = record(recorder_on("bench", plugged("bench", Faults(pace=pace)).names[0]))
-    assert log.missing == 0
-    assert log.session.promised_rate_hz == 50.0
+    assert log.missing == 0 and log.session.promised_rate_hz == 50.0
     assert log.session.measured_rate_hz == pytest.approx(rate, rel=1e-3)
     assert any(f"{word} than promised" in warning for warning in log.session.warnings)
 
@@ -244,7 +220,7 @@ def test_device_slower_or_faster_than_promised(plugged, recorder_on, pace, word,
 @seen("a device that never comes back", "5 s, three questions")
 def test_silent_device(plugged, recorder_on):
     port = plugged("bench", Faults(silent_from=100)).names[0]
-    with pytest.raises(DeviceSilent, match="gone silent.*power and cable"):
+    with pytest.raises(t.DeviceSilent, match="gone silent.*power and cable"):
         record(recorder_on("bench", port, replace(QUICK, silence_s=0.03, reply_s=0.03, reconnect_s=0.2)))
     log = read_log(Path(port).with_name("run.rlog"))
     assert len(log.table) == 100 and log.session.ended == Ended.DEVICE_SILENT
@@ -254,7 +230,7 @@ def test_silent_device(plugged, recorder_on):
 def test_port_without_a_device(recorder_on, tmp_path):
     master, slave = os.openpty()
     try:
-        with pytest.raises(DeviceSilent, match="nothing on it answers"):
+        with pytest.raises(t.DeviceSilent, match="nothing on it answers"):
             with recorder_on("bench", os.ttyname(slave), replace(QUICK, reply_s=0.01)):
                 pass
     finally:
@@ -265,38 +241,32 @@ def test_port_without_a_device(recorder_on, tmp_path):
 
 @seen("another instrument on the port")
 def test_another_instrument_on_the_port(plugged, recorder_on):
-    with pytest.raises(Refused, match="is a 'bench'.*not a 'rotor'"):
-        with recorder_on("rotor", plugged("bench").names[0]):
-            pass
+    with pytest.raises(Refused, match="is a 'bench'.*not a 'rotor'"), recorder_on("rotor", plugged("bench").names[0]):
+        pass
 
 
 @seen("refused command")
 def test_refused_command(plugged, recorder_on):
     port = plugged("wrench", Faults(refuse=frozenset("I"))).names[0]
-    with pytest.raises(Refused, match="refused 'I'"):
-        with recorder_on("wrench", port) as recorder:
-            procedures.measure_wrench(recorder, 0.01, samples=10)
+    with pytest.raises(Refused, match="refused 'I'"), recorder_on("wrench", port) as recorder:
+        procedures.measure_wrench(recorder, 0.01, samples=10)
     assert read_session(recorder.session_path).ended == Ended.REFUSED
 
 
 @seen("sensor that resets is powered and initialised again")
 def test_sensor_that_resets_is_powered_and_initialised_again(plugged, recorder_on):
     port = plugged("wrench", Faults(reset_at=frozenset({50}))).names[0]
-    with recorder_on("wrench", port) as recorder:
-        procedures.measure_wrench(recorder, 0.005, samples=200)
-    log = read_log(recorder.log_path)
+    log = recorded(procedures.measure_wrench, recorder_on("wrench", port), 0.005, samples=200)
     assert log.resets == 1 and log.session.ended == Ended.FINISHED
-    after = log.table[log.table.segment == 1]
-    np.testing.assert_allclose(np.diff(after.time_s), 0.005, atol=2e-6)
+    np.testing.assert_allclose(np.diff(log.table[log.table.segment == 1].time_s), 0.005, atol=2e-6)
 
 
 @seen("a programme whose end record is lost still ends")
 def test_a_programme_whose_end_record_is_lost_still_ends(plugged, recorder_on):
     port = plugged("quadrotor", Faults(lose_end=True)).names[0]
     programme = Programme(TRAPEZOID, (0.1, 0.1, 0.1, 0.1), 0.5, 1.0, 0.0)
-    with recorder_on("quadrotor", port, replace(QUICK, silence_s=0.05)) as recorder:
-        procedures.fly_programme(recorder, "h", programme)
-    log = read_log(recorder.log_path)
+    recorder = recorder_on("quadrotor", port, replace(QUICK, silence_s=0.05))
+    log = recorded(procedures.fly_programme, recorder, "h", programme)
     assert log.end is None and log.table.throttle_1.max() == pytest.approx(0.1)
     assert log.table.throttle_1.iloc[-1] == 0 and log.session.ended == Ended.FINISHED
     assert [event.what for event in log.session.events] == ["silence", "end_lost"]
@@ -310,10 +280,9 @@ def test_disk_full(plugged, recorder_on, limit):
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     port = plugged("bench").names[0]
     try:
-        with pytest.raises(DiskFull, match="Free some space"):
-            with recorder_on("bench", port) as recorder:
-                resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
-                procedures.stream(recorder, 100_000)
+        with pytest.raises(t.DiskFull, match="Free some space"), recorder_on("bench", port) as recorder:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
+            procedures.stream(recorder, 100_000)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert recorder.log_path.stat().st_size == limit  # filled to the last byte
@@ -338,11 +307,11 @@ def test_a_recording_is_never_overwritten(plugged, recorder_on):
 def test_stop_asked_from_outside(plugged, recorder_on):
     recorder = recorder_on("bench", plugged("bench").names[0])
     recorder.on_row = lambda row: recorder.stop_asked.set() if row.index > 50 else None
-    with pytest.raises(Interrupted):
+    with pytest.raises(t.Interrupted):
         record(recorder, None)
     log = read_log(recorder.log_path)
-    assert log.complete  # the device was stopped and everything up to its end record is there
-    assert log.session.ended == Ended.INTERRUPTED
+    # the device was stopped and everything up to its end record is there
+    assert log.complete and log.session.ended == Ended.INTERRUPTED
 
 
 def hang_up_as_usual() -> None:
@@ -350,28 +319,17 @@ def hang_up_as_usual() -> None:
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
-def start_recorder(port: str, folder: Path, *more: str) -> subprocess.Popen:
-    """The command line in a process of its own."""
-    command = [*ACQUIRE, "bench", "--port", port, "--out", str(folder), "--id", "run", *more]
-    return subprocess.Popen(
-        command, preexec_fn=hang_up_as_usual, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-
-
-def wait_for_bytes(process: subprocess.Popen, path: Path, count: int) -> None:
-    """Until the log has so many bytes; fails at once if the recorder ended."""
-    while not path.exists() or path.stat().st_size < count:
+def ended_by(number: signal.Signals, port: str, folder: Path) -> tuple[subprocess.Popen, str, str, Log]:
+    """A recorder in a process of its own that is sent this signal in the midst: the process, what it said, its log."""
+    command = [*ACQUIRE, "bench", "--port", port, "--out", str(folder), "--id", "run"]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    process, path = subprocess.Popen(command, preexec_fn=hang_up_as_usual, **pipes), folder / "run.rlog"
+    while not path.exists() or path.stat().st_size < 3000:
         assert process.poll() is None, process.stderr.read()
         time.sleep(0.002)
-
-
-def ended_by(number: signal.Signals, port: str, folder: Path) -> tuple[subprocess.Popen, str, str, Log]:
-    """A recorder that is sent this signal in the midst: the ended process, what it said, and its log."""
-    process = start_recorder(port, folder)
-    wait_for_bytes(process, folder / "run.rlog", 3000)
     process.send_signal(number)
     out, err = process.communicate(timeout=20)
-    return process, out, err, read_log(folder / "run.rlog")
+    return process, out, err, read_log(path)
 
 
 @seen("ctrl c")

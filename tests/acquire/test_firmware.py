@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 
 from rotorid.acquire import procedures
-from rotorid.acquire.recorder import Timings
+from rotorid.acquire.recorder import Recorder, Timings
 from rotorid.acquire.transport import AcquireError, Refused
 from rotorid.io.logs import Log, read_log
 from rotorid.io.session import Ended
 from rotorid.io.wire import SINE, TRAPEZOID, VOLTS_PER_COUNT, Programme
-from tests.acquire.conftest import QUICK
+from tests.acquire.conftest import QUICK, recorded
 from tests.acquire.fault_table import seen
 from tests.acquire.test_faults import assert_metadata_agree
 
@@ -88,6 +88,21 @@ def on_avr(run_program, tmp_path) -> Callable[..., tuple[str, subprocess.Popen]]
     return start
 
 
+def put_by(recorder: Recorder, name: str) -> None:
+    """Give log and metadata another name, so that the next recording may have theirs."""
+    for path in (recorder.log_path, recorder.session_path):
+        path.rename(path.with_stem(name))
+
+
+def look_away(recorder: Recorder, after: int) -> None:
+    """After so many rows the instrument hears nothing for a second; then on to the end."""
+    for _ in recorder.rows(after):
+        pass
+    time.sleep(1.0)
+    for _ in recorder.rows(500):
+        pass
+
+
 def assert_pattern(log: Log) -> None:
     """Cell k of scan n reads 1000 n + k − 1; a scan is missing only where the line lost a sample that was counted."""
     counts = np.rint(log.table[list(log.instrument.columns)].to_numpy() / VOLTS_PER_COUNT).astype(int)
@@ -122,9 +137,8 @@ def test_esp32_board_file_sends_each_frame_and_gives_the_pulses_of_its_programme
     boots = []
     for name in ("a", "b"):
         recorder = recorder_on("quadrotor", on_host("esp32", tmp_path / "pulses"))
-        with recorder:
-            procedures.fly_programme(recorder, "h", Programme(TRAPEZOID, (0.4, 0.2, 0.1, 0.3), 0.2, 0.4, 0.0))
-        log = read_log(recorder.log_path)
+        programme = Programme(TRAPEZOID, (0.4, 0.2, 0.1, 0.3), 0.2, 0.4, 0.0)
+        log = recorded(procedures.fly_programme, recorder, "h", programme)
         assert log.complete and log.end.reason == 1 and log.missing == 0 and log.session.source == "emulator"
         assert log.end.sent == len(log.table) > 50 and log.end.skipped == log.session.counts.device_skipped
         assert (log.start.instrument, log.start.serial_number) == ("quadrotor", "240AC4000102")
@@ -136,8 +150,7 @@ def test_esp32_board_file_sends_each_frame_and_gives_the_pulses_of_its_programme
         assert (table[[0, -1], 1:5] == zero_ms).all()
         lamps = [int(pin) for pin in table[:, 5]]
         assert lamps[0] == lamps[-1] == 16 and {16, 17, 18} == set(lamps)  # red, yellow, green
-        for path in (recorder.log_path, recorder.session_path):
-            path.rename(path.with_stem(name))
+        put_by(recorder, name)
         assert_metadata_agree(log)
     assert boots == [1, 2]
 
@@ -146,14 +159,9 @@ def test_esp32_board_file_sends_each_frame_and_gives_the_pulses_of_its_programme
 def test_esp32_board_file_takes_the_pulses_back_when_nobody_is_heard(on_host, recorder_on, tmp_path):
     port = on_host("esp32", tmp_path / "pulses")
     recorder = recorder_on("quadrotor", port, Timings(poll_s=0.02, reply_s=0.5, watchdog_s=0.3))
-    with pytest.raises(AcquireError, match="heard nothing"):
-        with recorder:
-            procedures.start_programme(recorder, "b", Programme(SINE, (0.4, 0.4, 0.4, 0.4), 0.0, 30.0, 1.0))
-            for _ in recorder.rows(10):
-                pass
-            time.sleep(1.0)
-            for _ in recorder.rows(500):
-                pass
+    with pytest.raises(AcquireError, match="heard nothing"), recorder:
+        procedures.start_programme(recorder, "b", Programme(SINE, (0.4, 0.4, 0.4, 0.4), 0.0, 30.0, 1.0))
+        look_away(recorder, 10)
     log = read_log(recorder.log_path)
     assert log.end.reason == 3 and log.session.ended == Ended.DEVICE_FAULT and log.table.throttle_1.max() > 0
     pulses = np.loadtxt(tmp_path / "pulses", dtype=int)
@@ -165,14 +173,11 @@ def test_host_bench_sends_every_sample_and_counts_its_boots(on_host, recorder_on
     boots = []
     for name in ("a", "b"):
         recorder = recorder_on("bench", on_host("bench"))
-        with recorder:
-            procedures.stream(recorder, 200, 0.004)
-        log = read_log(recorder.log_path)
+        log = recorded(procedures.stream, recorder, 200, 0.004)
         assert log.missing == 0 and log.end.sent == len(log.table) >= 150 and log.session.source == "emulator"
         assert len(log.table) + log.end.skipped >= 200 or log.end.skipped == 0
         boots.append(log.start.boot_id)
-        for path in (recorder.log_path, recorder.session_path):
-            path.rename(path.with_stem(name))
+        put_by(recorder, name)
         assert_metadata_agree(log)
     assert boots[1] == boots[0] + 1
 
@@ -202,18 +207,13 @@ def test_what_g_does(on_host, recorder_on):
 def test_host_rotor_stops_when_nobody_is_heard(on_host, recorder_on):
     timings = Timings(poll_s=0.02, reply_s=0.5, watchdog_s=0.3)
     recorder = recorder_on("rotor", on_host("rotor"), timings)
-    with pytest.raises(AcquireError, match="heard nothing"):
-        with recorder:
-            with pytest.raises(Refused, match="watchdog"):
-                recorder.command("T", bytes.fromhex("c4096009"))
-            recorder.guard()
-            recorder.start(resumable=False)
+    with pytest.raises(AcquireError, match="heard nothing"), recorder:
+        with pytest.raises(Refused, match="watchdog"):
             recorder.command("T", bytes.fromhex("c4096009"))
-            for _ in recorder.rows(25):  # half a second: it hears from us four times in 0.3 s
-                pass
-            time.sleep(1.0)
-            for _ in recorder.rows(500):
-                pass
+        recorder.guard()
+        recorder.start(resumable=False)
+        recorder.command("T", bytes.fromhex("c4096009"))
+        look_away(recorder, 25)  # half a second: it hears from us four times in 0.3 s
     log = read_log(recorder.log_path)
     assert log.end.reason == 3 and log.session.ended == Ended.DEVICE_FAULT
     turning = log.table.time_s[log.table.throttle > 0]
@@ -223,16 +223,12 @@ def test_host_rotor_stops_when_nobody_is_heard(on_host, recorder_on):
 @needs_gcc
 def test_host_rotor_and_quadrotor_by_the_usual_procedures(on_host, recorder_on, tmp_path):
     recorder = recorder_on("rotor", on_host("rotor"))
-    with recorder:
-        procedures.thrust_test(recorder, 0.25, 0.2, 0.4)
-    log = read_log(recorder.log_path)
+    log = recorded(procedures.thrust_test, recorder, 0.25, 0.2, 0.4)
     assert log.table.throttle.max() == pytest.approx(0.25) and log.table.throttle.iloc[-1] == 0 and log.complete
     for path in (recorder.log_path, recorder.session_path, tmp_path / "tty"):
         path.unlink()
     recorder = recorder_on("quadrotor", on_host("quadrotor"))
-    with recorder:
-        procedures.fly_programme(recorder, "b", Programme(SINE, (0.4, 0.2, 0.2, 0.4), 0.0, 0.5, 2.0))
-    log = read_log(recorder.log_path)
+    log = recorded(procedures.fly_programme, recorder, "b", Programme(SINE, (0.4, 0.2, 0.2, 0.4), 0.0, 0.5, 2.0))
     assert log.table.throttle_1.max() == pytest.approx(0.4, abs=0.02) and log.table.throttle_1.iloc[-1] == 0
     assert log.end.reason == 1 and log.complete
 
@@ -245,9 +241,7 @@ def test_host_rotor_and_quadrotor_by_the_usual_procedures(on_host, recorder_on, 
 def test_avr_every_sample_of_the_pattern(on_avr, recorder_on, rate_hz):
     recorder = recorder_on("bench", on_avr()[0])
     wanted = 15 + rate_hz // 3
-    with recorder:
-        procedures.stream(recorder, wanted, 1 / rate_hz)
-    log = read_log(recorder.log_path)
+    log = recorded(procedures.stream, recorder, wanted, 1 / rate_hz)
     assert_pattern(log)
     assert log.missing == 0 and log.end.sent == len(log.table) >= wanted
     # A byte on the simulated SPI takes about 0.1 ms, six channels 9.5 ms: only at 250 Hz is any skipped.
@@ -261,9 +255,8 @@ def test_avr_every_sample_of_the_pattern(on_avr, recorder_on, rate_hz):
 
 @needs_avr
 def test_avr_an_interval_it_cannot_do_is_refused(on_avr, recorder_on):
-    with pytest.raises(Refused, match="shorter than it can do"):
-        with recorder_on("bench", on_avr()[0]) as recorder:
-            procedures.stream(recorder, 10, 0.003)
+    with pytest.raises(Refused, match="shorter than it can do"), recorder_on("bench", on_avr()[0]) as recorder:
+        procedures.stream(recorder, 10, 0.003)
 
 
 @needs_avr
@@ -279,9 +272,7 @@ def test_avr_reset_in_the_midst(on_avr, recorder_on, word):
             process.stdin.flush()
 
     recorder.on_row = hit
-    with recorder:
-        procedures.stream(recorder, 80, 0.01)
-    log = read_log(recorder.log_path)
+    log = recorded(procedures.stream, recorder, 80, 0.01)
     assert log.resets == 1 and log.session.ended == Ended.FINISHED
     assert (log.table.segment == 0).sum() >= 30 and (log.table.segment == 1).sum() >= 10
     assert_pattern(log)
@@ -304,9 +295,7 @@ def test_avr_and_host_starved_of_time(on_avr, recorder_on):
             os.kill(process.pid, signal.SIGCONT)
 
     recorder.on_row = starve
-    with recorder:
-        procedures.stream(recorder, 120, 0.01)
-    log = read_log(recorder.log_path)
+    log = recorded(procedures.stream, recorder, 120, 0.01)
     assert log.end.sent == len(log.table) + log.missing and log.resets == 0
     assert_pattern(log)
     assert_metadata_agree(log)
@@ -315,7 +304,5 @@ def test_avr_and_host_starved_of_time(on_avr, recorder_on):
 @needs_avr
 def test_avr_thrust_tester(on_avr, recorder_on):
     recorder = recorder_on("rotor", on_avr("rotor")[0])
-    with recorder:
-        procedures.thrust_test(recorder, 0.25, 0.2, 0.5)
-    log = read_log(recorder.log_path)
+    log = recorded(procedures.thrust_test, recorder, 0.25, 0.2, 0.5)
     assert log.complete and log.table.throttle.max() == pytest.approx(0.25) and log.table.throttle.iloc[-1] == 0

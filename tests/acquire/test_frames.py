@@ -77,8 +77,7 @@ def test_any_cutting_of_the_stream_gives_the_same_frames(sent, cuts):
 
 @given(st.binary(max_size=600), frames, frames)
 def test_garbage_never_costs_the_frame_after_the_next(garbage, first, second):
-    decoder = StreamDecoder()
-    found = decoder.feed(garbage + encode(first) + encode(second))
+    found = StreamDecoder().feed(garbage + encode(first) + encode(second))
     assert found[-1] == second
 
 
@@ -149,8 +148,7 @@ def test_idling_for_hours_between_two_streams_is_no_gap():
     tracker = Tracker()
     tracker.place(start())
     tracker.place(start(1, 1_800_000_000))
-    assert tracker.place(data(2, 1_800_001_000)).index == 2
-    assert tracker.missing == 0
+    assert tracker.place(data(2, 1_800_001_000)).index == 2 and tracker.missing == 0
 
 
 def test_a_late_frame_splits_its_gap():

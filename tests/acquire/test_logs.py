@@ -10,7 +10,6 @@ import pytest
 from rotorid.acquire import procedures
 from rotorid.acquire.emulators.devices import Faults
 from rotorid.acquire.recorder import LogWriter
-from rotorid.errors import InputError
 from rotorid.io import rawlog
 from rotorid.io.logs import read_log
 from rotorid.io.rawlog import read_raw
@@ -25,14 +24,14 @@ from rotorid.io.session import (
     write_session,
 )
 from rotorid.io.wire import EXPERIMENTS
+from tests.acquire.conftest import recorded
+from tests.refusals import refused
 
 
 def short_log(loopback, samples):
     """A short recording with a few faults in it."""
     _, recorder = loopback("bench", Faults(drop=frozenset({5}), repeat=frozenset({9}), swap=frozenset({12})))
-    with recorder:
-        procedures.stream(recorder, samples)
-    return recorder.log_path
+    return recorded(procedures.stream, recorder, samples).path
 
 
 @pytest.fixture
@@ -94,17 +93,14 @@ def test_a_bit_flipped_anywhere_costs_two_samples_at_most_or_a_chunk(log_path, n
 def test_no_log_at_all(tmp_path):
     path = tmp_path / "table.rlog"
     path.write_text("time_s,force_x_n\n0,1\n")
-    with pytest.raises(InputError, match="table.rlog: does not begin with"):
-        read_log(path)
-    with pytest.raises(InputError, match="nothing.rlog: file is missing"):
-        read_log(tmp_path / "nothing.rlog")
+    refused("table.rlog: does not begin with", read_log, path)
+    refused("nothing.rlog: file is missing", read_log, tmp_path / "nothing.rlog")
 
 
 def test_nothing_says_which_instrument(tmp_path):
     path = tmp_path / "bare.rlog"
     path.write_bytes(rawlog.MAGIC)
-    with pytest.raises(InputError, match="nothing says which instrument"):
-        read_log(path)
+    refused("nothing says which instrument", read_log, path)
 
 
 def test_long_reads_are_split_into_chunks(tmp_path):
@@ -121,9 +117,7 @@ def test_long_reads_are_split_into_chunks(tmp_path):
 def test_saturated_samples_are_flagged(loopback, tmp_path):
     world, recorder = loopback("wrench")
     world.physics.sensor._zero = np.array([0, 0, 500.0, 0, 0, 0])
-    with recorder:
-        procedures.measure_wrench(recorder, 0.01, samples=5)
-    table = read_log(recorder.log_path).table
+    table = recorded(procedures.measure_wrench, recorder, 0.01, samples=5).table
     assert (table.quality == 8).all() and (table.force_z_n == 200.0).all()
 
 
@@ -147,14 +141,11 @@ START = "id: a\ninstrument: bench\nstarted: '2024-03-04T09:00:00-06:00'\n"
 
 def test_metadata_errors_name_file_and_key(tmp_path):
     path = tmp_path / "a.yaml"
-    with pytest.raises(InputError, match="a.yaml: no such file"):
-        read_session(path)
+    refused("a.yaml: no such file", read_session, path)
     path.write_text(START + "host_start_ns: soon\nlog: a.rlog\n")
-    with pytest.raises(InputError, match="a.yaml: host_start_ns: found .soon., expected a whole number"):
-        read_session(path)
+    refused("a.yaml: host_start_ns: found .soon., expected a whole number", read_session, path)
     path.write_text(START + "host_start_ns: 1\nlog: a.rlog\nbatery: 4S\n")
-    with pytest.raises(InputError, match="batery"):
-        read_session(path)
+    refused("batery", read_session, path)
 
 
 def test_air_density():
@@ -170,7 +161,7 @@ def test_index(log_path):
     rows = write_index(raw)
     assert len(rows) == 1 and list(rows[0]) == INDEX_COLUMNS
     assert rows == read_index(raw)
-    assert rows[0]["file"] == "run-bench.rlog" and rows[0]["missing"] == "1" and rows[0]["ended"] == "finished"
+    assert [rows[0][k] for k in ("file", "missing", "ended")] == ["run-bench.rlog", "1", "finished"]
 
 
 def test_table_a1_spot_checks():

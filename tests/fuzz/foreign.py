@@ -34,20 +34,17 @@ def _px4() -> bytes:
     truth = flown()
     stamps = (truth[c.TIME] * 1e6 + 1e6).to_numpy(np.uint64)
 
-    def topic(text: str, name: str, values: np.ndarray):
-        rows = np.zeros(len(stamps), np.dtype([("timestamp", "<u8"), (name, "<f4", values.shape[1])]))
-        rows["timestamp"], rows[name] = stamps, values
-        return f"uint64_t timestamp;{text}", rows.dtype, rows
-
-    def of(names) -> np.ndarray:
-        return truth[list(names)].to_numpy()
+    def topic(text: str, name: str, columns) -> tuple[str, np.ndarray]:
+        rows = np.zeros(len(stamps), np.dtype([("timestamp", "<u8"), (name, "<f4", len(columns))]))
+        rows["timestamp"], rows[name] = stamps, truth[list(columns)].to_numpy()
+        return f"uint64_t timestamp;{text}", rows
 
     return test_importers.ulog_bytes(
         {
-            "vehicle_angular_velocity": topic("float[3] xyz;", "xyz", of(c.ANGULAR_VELOCITY)),
-            "vehicle_acceleration": topic("float[3] xyz;", "xyz", of(c.SPECIFIC_FORCE)),
-            "vehicle_attitude": topic("float[4] q;", "q", of(c.QUATERNION)),
-            "actuator_motors": topic("float[4] control;", "control", of(c.rotor_columns("throttle", 4))),
+            "vehicle_angular_velocity": topic("float[3] xyz;", "xyz", c.ANGULAR_VELOCITY),
+            "vehicle_acceleration": topic("float[3] xyz;", "xyz", c.SPECIFIC_FORCE),
+            "vehicle_attitude": topic("float[4] q;", "q", c.QUATERNION),
+            "actuator_motors": topic("float[4] control;", "control", c.rotor_columns("throttle", 4)),
         }
     )
 
@@ -92,18 +89,11 @@ def _bag(kind: str) -> bytes:
 
 
 SOUND: dict[str, Callable[[], bytes]] = {
-    "log.ulg": _px4,
-    "log.bbl": lambda: test_log_formats.blackbox(flown()),
-    "log.bin": lambda: test_log_formats.dataflash(flown(), test_log_formats.PARAMETERS),
-    "log.usd": _crazyflie,
-    "log.mat": _mat,
-    "log.csv": _csv,
-    "other.csv": _foreign_csv,
-    "bench.csv": _bench,
-    "log.parquet": _parquet,
-    "log.bag": lambda: _bag("bag"),
-    "log.mcap": lambda: _bag("mcap"),
-}
+    "log.ulg": _px4, "log.bbl": lambda: test_log_formats.blackbox(flown()),
+    "log.bin": lambda: test_log_formats.dataflash(flown(), test_log_formats.PARAMETERS), "log.usd": _crazyflie,
+    "log.mat": _mat, "log.csv": _csv, "other.csv": _foreign_csv, "bench.csv": _bench, "log.parquet": _parquet,
+    "log.bag": lambda: _bag("bag"), "log.mcap": lambda: _bag("mcap"),
+}  # fmt: skip
 
 
 @cache

@@ -7,12 +7,9 @@ import pytest
 
 CASES = Path(__file__).parents[2] / "results/proof/cases.csv"
 NAMED = (
-    "single/rotor_drag/strong/0",
-    "single/motor_lag/strong/0",
-    "mistake/rotor_order/all/1",
-    "stand/single/com_offset/moderate/0",
-    "bench/single/crosstalk/moderate/0",
-)
+    "single/rotor_drag/strong/0", "single/motor_lag/strong/0", "mistake/rotor_order/all/1",
+    "stand/single/com_offset/moderate/0", "bench/single/crosstalk/moderate/0",
+)  # fmt: skip
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not CASES.is_file(), reason="no proof has been run here")]
 
 

@@ -1,5 +1,6 @@
 """The configuration: what is accepted, and one sentence naming the key for what is not."""
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -32,45 +33,31 @@ def test_the_projects_own_files_are_valid(values: dict[str, Any]) -> None:
         check(merged(values, yaml.safe_load(path.read_text())), source=path.name)
 
 
-def test_an_unknown_key_is_named_with_what_was_meant(values: dict[str, Any]) -> None:
-    values["report"]["titel"] = "x"
+TWICE = ["introduction", "introduction"]
+
+
+@pytest.mark.parametrize(
+    ("over", "said"),
+    [
+        ({"report": {"titel": "x"}}, [r"report\.titel: no such key is known; did you mean title\?"]),
+        ({"report": {"zzz": 1}}, [r"report\.zzz: no such key is known; known here are chapters, subtitle and title"]),
+        ({"recordings": 7}, ["recordings: found 7, expected text"]),
+        ({"report": {"chapters": TWICE}}, [".*chapters must not name a chapter twice, but introduction is"]),
+        ({"recordings": 7, "more": 1}, ["more: no such key is known.*", "recordings: found 7, expected text"]),
+    ],
+    ids=["unknown key, with what was meant", "unknown key like no other", "wrong type", "impossible", "two at once"],
+)
+def test_each_wrong_key_gets_a_line(values: dict[str, Any], over: dict[str, Any], said: list[str]) -> None:
     with pytest.raises(InputError) as error:
-        check(values)
-    assert str(error.value) == "config.yaml: report.titel: no such key is known; did you mean title?"
-
-
-def test_an_unknown_key_like_no_other_gets_the_known_ones(values: dict[str, Any]) -> None:
-    values["report"]["zzz"] = 1
-    with pytest.raises(
-        InputError, match=r"report\.zzz: no such key is known; known here are chapters, subtitle and title"
-    ):
-        check(values)
+        check(merged(values, over))
+    for line, words in zip(str(error.value).splitlines(), said, strict=True):
+        assert re.fullmatch(rf"config\.yaml: {words}", line), line
 
 
 def test_a_missing_key_is_named(values: dict[str, Any]) -> None:
     del values["report"]["title"]
     with pytest.raises(InputError, match=r"^config\.yaml: report\.title: is missing$"):
         check(values)
-
-
-def test_a_wrong_type_is_named_with_value_and_what_is_expected(values: dict[str, Any]) -> None:
-    values["recordings"] = 7
-    with pytest.raises(InputError, match=r"^config\.yaml: recordings: found 7, expected text$"):
-        check(values)
-
-
-def test_an_impossible_value_is_named(values: dict[str, Any]) -> None:
-    values["report"]["chapters"] = ["introduction", "introduction"]
-    with pytest.raises(InputError, match=r"chapters must not name a chapter twice, but introduction is$"):
-        check(values)
-
-
-def test_every_wrong_key_gets_its_own_line(values: dict[str, Any]) -> None:
-    values["recordings"] = 7
-    values["more"] = 1
-    with pytest.raises(InputError) as error:
-        check(values)
-    assert len(str(error.value).splitlines()) == 2
 
 
 def test_the_committed_schema_is_the_models_own() -> None:

@@ -13,9 +13,11 @@ from rotorid.config import check, from_command_line
 from rotorid.errors import InputError
 from rotorid.identify.black_box import conformal_coverage, folds
 from rotorid_proof import plan
+from tests.refusals import refused
 
 ROOT = Path(__file__).parents[2]
 SOUND = yaml.safe_load((ROOT / "config.yaml").read_text())
+CASES = plan.read_index(ROOT / "proof" / "rotorid_proof" / "concealed" / "cases.tsv")
 INF, NAN = float("inf"), float("nan")
 WRONG = [
     ("recordings", 7, "expected text"),
@@ -171,25 +173,26 @@ def with_value(key: str, value: Any) -> dict[str, Any]:
     return changed
 
 
+def told(values: dict[str, Any]) -> str:
+    """The one sentence on a wrong configuration."""
+    with pytest.raises(InputError) as error:
+        check(values)
+    (sentence,) = str(error.value).splitlines()
+    return sentence
+
+
 @pytest.mark.parametrize(("key", "value", "said"), WRONG, ids=lambda x: repr(x)[:40])
 def test_a_wrong_value_is_named(key: str, value: Any, said: str) -> None:
-    with pytest.raises(InputError) as error:
-        check(with_value(key, value))
-    text = str(error.value)
-    assert text.startswith(f"config.yaml: {key}")
-    assert said in text
-    for foreign in ("Input should", "valid integer", "valid string", "pydantic", "NoneType"):
-        assert foreign not in text
-    assert len(text.splitlines()) == 1
+    text = told(with_value(key, value))
+    assert text.startswith(f"config.yaml: {key}") and said in text
+    foreign = ("Input should", "valid integer", "valid string", "pydantic", "NoneType")
+    assert not any(words in text for words in foreign), text
 
 
 @pytest.mark.parametrize(("key", "value", "said"), TOGETHER)
 def test_values_that_do_not_go_together_are_named(key: str, value: Any, said: str) -> None:
-    with pytest.raises(InputError) as error:
-        check(with_value(f"grey_box.{key}", value))
-    text = str(error.value)
+    text = told(with_value(f"grey_box.{key}", value))
     assert text.startswith("config.yaml: grey_box: ") and key in text and said in text
-    assert len(text.splitlines()) == 1
 
 
 @pytest.mark.parametrize("section", [k for k, v in SOUND.items() if isinstance(v, dict)])
@@ -203,41 +206,34 @@ def test_a_misspelled_key_of_each_section_gets_the_right_one(section: str) -> No
 
 
 def test_an_unknown_family_of_the_proof_is_named() -> None:
-    cases = plan.read_index(ROOT / "proof" / "rotorid_proof" / "concealed" / "cases.tsv")
-    plan.check_families(cases, SOUND["proof"]["seeds"])
-    with pytest.raises(
-        InputError, match=r"proof\.seeds\.singel is no family of concealed cases; did you mean single\?"
-    ):
-        plan.check_families(cases, {"singel": 1})
-    with pytest.raises(InputError, match=r"proof\.released\.singel is no family"):
-        plan.check_families(cases, {"singel": 1}, "proof.released")
+    plan.check_families(CASES, SOUND["proof"]["seeds"])
+    said = refused(r"proof\.seeds\.singel is no family of concealed cases", plan.check_families, CASES, {"singel": 1})
+    assert "cases; did you mean single?" in said
+    refused(r"proof\.released\.singel is no family", plan.check_families, CASES, {"singel": 1}, "proof.released")
 
 
 def test_more_repetitions_than_a_family_has_are_named() -> None:
     """Before: three were taken in place of 300, without a word."""
-    cases = plan.read_index(ROOT / "proof" / "rotorid_proof" / "concealed" / "cases.tsv")
-    with pytest.raises(InputError, match=r"proof\.seeds\.single is 300, expected at most 3, all that there are"):
-        plan.check_families(cases, {"single": 300})
+    said = r"proof\.seeds\.single is 300, expected at most 3, all that there are"
+    refused(said, plan.check_families, CASES, {"single": 300})
 
 
 def test_a_proof_without_a_case_is_named() -> None:
     """Before: tables of no case were made, and the report's chapter shown from them."""
-    entry = plan.read_index(ROOT / "proof" / "rotorid_proof" / "concealed" / "cases.tsv")[:1]
+    entry = CASES[:1]
     plan.check_chosen(entry, [], "")
     plan.check_chosen([], entry, "2026-11-30")
-    with pytest.raises(InputError, match=r"proof\.seeds and proof\.cases leave no case; expected"):
-        plan.check_chosen([], [], "")
-    with pytest.raises(InputError, match=r"proof\.release is '2026-11-30', but proof\.released and proof\.cases leave"):
-        plan.check_chosen(entry, [], "2026-11-30")
+    refused(r"proof\.seeds and proof\.cases leave no case; expected", plan.check_chosen, [], [], "")
+    said = r"proof\.release is '2026-11-30', but proof\.released and proof\.cases leave"
+    refused(said, plan.check_chosen, entry, [], "2026-11-30")
 
 
 def test_a_folder_of_tables_that_is_not_there_is_named(tmp_path: Path) -> None:
     plan.check_tables(str(ROOT / "docs" / "proof"), ["summary.csv", "state.json"])
     plan.check_tables("results/proof/", ["summary.csv"])
-    with pytest.raises(InputError, match=r"proof\.tables is '.*/none', expected a folder"):
-        plan.check_tables(str(tmp_path / "none"), ["summary.csv"])
-    with pytest.raises(InputError, match=r"a folder that lacks summary\.csv and state\.json$"):
-        plan.check_tables(str(tmp_path), ["summary.csv", "state.json"])
+    none, both = str(tmp_path / "none"), ["summary.csv", "state.json"]
+    refused(r"proof\.tables is '.*/none', expected a folder", plan.check_tables, none, ["summary.csv"])
+    refused(r"a folder that lacks summary\.csv and state\.json$", plan.check_tables, str(tmp_path), both)
 
 
 def given(text: str) -> dict[str, Any]:
@@ -279,16 +275,14 @@ def test_numbers_in_braces_on_the_command_line_are_read() -> None:
     ],
 )
 def test_a_wrong_value_in_braces_is_named(text: str, said: str) -> None:
-    with pytest.raises(InputError) as error:
-        check(over(text))
-    assert str(error.value).startswith(f"config.yaml: {said}") and len(str(error.value).splitlines()) == 1
+    assert told(over(text)).startswith(f"config.yaml: {said}")
 
 
 def test_a_misspelled_family_in_braces_gets_the_right_one() -> None:
     """Before: "found '1', expected a whole number", of a family that there is not."""
-    cases = plan.read_index(ROOT / "proof" / "rotorid_proof" / "concealed" / "cases.tsv")
-    with pytest.raises(InputError, match=r"proof\.released\.multibdy is no family .*; did you mean multibody\?"):
-        plan.check_families(cases, check(over("proof={released: {multibdy: 1}}")).proof.released, "proof.released")
+    released = check(over("proof={released: {multibdy: 1}}")).proof.released
+    said = r"proof\.released\.multibdy is no family .*; did you mean multibody\?"
+    refused(said, plan.check_families, CASES, released, "proof.released")
 
 
 def test_the_library_reads_yaml_in_one_place() -> None:
@@ -302,15 +296,15 @@ def test_the_library_reads_yaml_in_one_place() -> None:
 
 
 def test_a_pattern_that_fits_no_case_is_named() -> None:
-    cases = [entry.case for entry in plan.read_index(ROOT / "proof" / "rotorid_proof" / "concealed" / "cases.tsv")]
+    cases = [entry.case for entry in CASES]
     plan.check_patterns(cases, SOUND["ablation"]["cases"], "ablation.cases")
-    with pytest.raises(InputError, match=r"proof\.cases has 'singel/\*', expected a pattern that fits a name, as "):
-        plan.check_patterns(cases, ["*", "singel/*"], "proof.cases")
+    said = r"proof\.cases has 'singel/\*', expected a pattern that fits a name, as "
+    refused(said, plan.check_patterns, cases, ["*", "singel/*"], "proof.cases")
 
 
 def test_more_folds_than_experiments_are_refused() -> None:
-    with pytest.raises(InputError, match=r"black_box\.folds is 4, expected at most the 3 experiments"):
-        folds(np.array([1, 1, 2, 3]), 4, np.random.default_rng(0))
+    said = r"black_box\.folds is 4, expected at most the 3 experiments"
+    refused(said, folds, np.array([1, 1, 2, 3]), 4, np.random.default_rng(0))
 
 
 def test_an_interval_that_nothing_can_promise_is_refused() -> None:
@@ -318,5 +312,5 @@ def test_an_interval_that_nothing_can_promise_is_refused() -> None:
     experiments, values = np.repeat(np.arange(12), 2), np.zeros((24, 6))
     masks = [experiments % 3 == k for k in range(3)]
     conformal_coverage(values, values, experiments, masks, 0.88)
-    with pytest.raises(InputError, match=r"black_box\.share is 0\.95, expected at most 0\.889, .* 8 experiments"):
-        conformal_coverage(values, values, experiments, masks, 0.95)
+    said = r"black_box\.share is 0\.95, expected at most 0\.889, .* 8 experiments"
+    refused(said, conformal_coverage, values, values, experiments, masks, 0.95)

@@ -12,19 +12,9 @@ from tests.tree import GUARD
 
 ROOT = Path(__file__).parents[2]
 PARTS = (
-    "Snakefile",
-    "config.yaml",
-    "requirements.lock",
-    "profiles",
-    "workflow",
-    "src",
-    "proof",
-    "notebooks",
-    "raw",
-    "tests/configs",
-    "tests/sealed",
-    "docs/proof",
-)
+    "Snakefile", "config.yaml", "requirements.lock", "profiles", "workflow", "src", "proof", "notebooks", "raw",
+    "tests/configs", "tests/sealed", "docs/proof",
+)  # fmt: skip
 
 
 def left_out(folder: str, names: Iterable[str]) -> set[str]:

@@ -98,14 +98,8 @@ def made(folder: Path, packages: Path, **settings: str) -> str:
     own = {k: v for k, v in os.environ.items() if not k.startswith(("PIP_", "UV_", "MAKE")) and "VIRTUAL_ENV" not in k}
     own |= proxies | {"NO_PROXY": "127.0.0.1", "no_proxy": "127.0.0.1", "XDG_CONFIG_HOME": str(folder / "config")}
     own |= {"PIP_CONFIG_FILE": os.devnull, "PIP_RETRIES": "0", "UV_HTTP_RETRIES": "0", "UV_NO_CACHE": "1"}
-    done = subprocess.run(
-        ["make", "--no-print-directory", "environment"],
-        cwd=folder,
-        env=own | settings,
-        text=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-    )
+    how = {"cwd": folder, "env": own | settings, "text": True, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+    done = subprocess.run(["make", "--no-print-directory", "environment"], **how)
     assert done.returncode == 0, done.stdout
     subprocess.run([folder / ".venv/bin/python", "-c", "import iniconfig"], check=True)
     return done.stdout
@@ -116,8 +110,7 @@ def test_uv_takes_packages_from_the_index_that_pip_was_told_of(tmp_path: Path, p
     with mirror(packages / "simple") as (address, asked):
         (tmp_path / "pip.conf").write_text(f"[global]\nindex-url = {address}\n")
         said = made(tmp_path / "new", packages, PIP_CONFIG_FILE=str(tmp_path / "pip.conf"))
-    assert "uv did not work" not in said
-    assert ("uv", "/iniconfig/") in asked
+    assert "uv did not work" not in said and ("uv", "/iniconfig/") in asked
 
 
 @pytest.mark.slow
@@ -145,9 +138,8 @@ def test_settings_of_pip_and_uv_are_read_and_what_is_set_for_both_stays() -> Non
     package_index = runpy.run_path(str(ROOT / ".ci" / "package_index.py"))
     names = ("pip_settings", "uv_settings", "to_hand_over")
     pip_settings, uv_settings, to_hand_over = (package_index[name] for name in names)
-    pip = pip_settings(
-        ":env:.index-url='http://e'\nglobal.extra-index-url='\\nfile:///a\\nhttp://b'\nglobal.index-url='g'"
-    )
+    lines = ":env:.index-url='http://e'\nglobal.extra-index-url='\\nfile:///a\\nhttp://b'\nglobal.index-url='g'"
+    pip = pip_settings(lines)
     assert pip == {"index-url": ["http://e"], "extra-index-url": ["file:///a", "http://b"]}
     for variable in ("UV_DEFAULT_INDEX", "UV_INDEX_URL"):
         assert uv_settings({variable: "mine=http://u/?a=http://v"}, {}) == {"index-url": ["http://u/?a=http://v"]}

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rotorid.errors import InputError
+from tests.refusals import refused
 from workflow.scripts.tabulate_speed import first_table
 
 TEXT = "# Speed\n\nWords.\n\n| a, s | b |\n| --- | ---: |\n| x | 1.5 |\n| y | 2 |\n\n| other | table |\n"
@@ -21,5 +21,4 @@ def test_the_first_table_with_its_columns_renamed():
     ],
 )
 def test_what_is_no_such_table_is_one_sentence(text, columns, said):
-    with pytest.raises(InputError, match=said):
-        first_table(text, columns, "speed.md")
+    refused(said, first_table, text, columns, "speed.md")

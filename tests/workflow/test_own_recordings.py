@@ -17,12 +17,9 @@ from rotorid.io.session import read_index, write_index
 
 EXPERIMENTS = {"1", "3", "22", "23", "24", "27"}
 TARGETS = (
-    "results/bench/static_series.csv",
-    "results/bench/dynamic.json",
-    "results/bench/tensile.csv",
-    "results/stand/experiments.csv",
-    "results/black_box/experiments.csv",
-)
+    "results/bench/static_series.csv", "results/bench/dynamic.json", "results/bench/tensile.csv",
+    "results/stand/experiments.csv", "results/black_box/experiments.csv",
+)  # fmt: skip
 SOME_CHAPTERS = ("--config", "raw=mine", "report={chapters: [white_box, stand]}")
 WHITE_BOX = "White box: rotor coefficients and mass properties"
 ROTOR = {
@@ -33,27 +30,21 @@ ROTOR = {
 }
 FOLLOWS = {  # what one more recording of a kind reruns
     "calibration": {
-        "Ingest: calibration, bench",
-        "Filter: calibration, bench",
-        "Calibration: load cells of the campaign",
-        "Bench: static tests",
-        "Bench: dynamic tests",
+        "Ingest: calibration, bench", "Filter: calibration, bench", "Calibration: load cells of the campaign",
+        "Bench: static tests", "Bench: dynamic tests",
     },
     "static": {"Ingest: static, bench", "Filter: static, bench", "Bench: static tests"},
     "combined": {"Ingest: combined, bench", "Filter: combined, bench", "Bench: static tests"},
     # A flight of the dynamic tests is recorded by the bench or by the reference sensor; a group of them holds both.
     "dynamic": {
-        "Ingest: dynamic, bench",
-        "Filter: dynamic, bench",
-        "Ingest: dynamic, jr3",
-        "Filter: dynamic, jr3",
+        "Ingest: dynamic, bench", "Filter: dynamic, bench", "Ingest: dynamic, jr3", "Filter: dynamic, jr3",
         "Bench: dynamic tests",
     },
     "tensile": {"Ingest: tensile, tensile", "Bench: tensile tests"},
     "thrust": {"Ingest: thrust, rotor"} | ROTOR,
     "torque": {"Ingest: torque, rotor", "Ingest: torque, wrench"} | ROTOR,
     "dynamics": {"Ingest: dynamics, quadrotor", "Ingest: dynamics, wrench"} | (ROTOR - {WHITE_BOX}),
-}
+}  # fmt: skip
 
 
 def kept(row: dict[str, str]) -> bool:
@@ -107,15 +98,11 @@ def points(project: Project) -> dict[str, int]:
     read = lambda path: len(pd.read_csv(project.root / "results" / path))  # noqa: E731
     fits = json.loads((project.root / "results/white_box/parameters.json").read_text())
     return {
-        "calibration": read("calibration/campaign_readings.csv"),
-        "static": read("bench/static_points.csv"),
-        "dynamic": read("bench/dynamic_flights.csv"),
-        "combined": read("ingest/combined/bench.csv"),
-        "tensile": read("bench/tensile_specimens.csv"),
-        "thrust": fits["c_f"]["points"],
-        "torque": fits["c_q"]["points"],
-        "dynamics": read("stand/experiments.csv"),
-    }
+        "calibration": read("calibration/campaign_readings.csv"), "static": read("bench/static_points.csv"),
+        "dynamic": read("bench/dynamic_flights.csv"), "combined": read("ingest/combined/bench.csv"),
+        "tensile": read("bench/tensile_specimens.csv"), "thrust": fits["c_f"]["points"],
+        "torque": fits["c_q"]["points"], "dynamics": read("stand/experiments.csv"),
+    }  # fmt: skip
 
 
 @pytest.mark.slow
@@ -158,8 +145,7 @@ def test_a_folder_with_thrust_tests_alone_gives_the_thrust_coefficient(project: 
     write_index(elsewhere)
     project.snakemake("results/white_box/parameters.json", "--config", "raw=mine")
     fits = json.loads((project.root / "results/white_box/parameters.json").read_text())
-    assert fits["c_f"]["points"] == len(thrust)
-    assert "c_q" not in fits
+    assert fits["c_f"]["points"] == len(thrust) and "c_q" not in fits
     project.snakemake("results/report/chapters/bench.md", "--config", "raw=mine")
     text = (project.root / "results/report/chapters/bench.md").read_text()
     assert "needs calibration, static, combined, dynamic and tensile recordings" in text

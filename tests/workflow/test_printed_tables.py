@@ -23,16 +23,10 @@ FORMATS = {"bench": "<6i", "rotor": "<HHiHH", "wrench": "<6h", "jr3": "<6i", "qu
 """A sample of each instrument (docs/wire-formats.md)."""
 VOLTS_PER_COUNT = 2 * 2.5 / 64 / (2**23 - 1)
 TARGETS = (
-    "results/calibration/thesis.json",
-    "results/calibration/campaign.json",
-    "results/bench/static_series.csv",
-    "results/bench/reconstruction.json",
-    "results/bench/tensile.csv",
-    "results/white_box/parameters.json",
-    "results/stand/experiments.csv",
-    "results/stand/weight.json",
-    "results/grey_box/rotor.json",
-)
+    "results/calibration/thesis.json", "results/calibration/campaign.json", "results/bench/static_series.csv",
+    "results/bench/reconstruction.json", "results/bench/tensile.csv", "results/white_box/parameters.json",
+    "results/stand/experiments.csv", "results/stand/weight.json", "results/grey_box/rotor.json",
+)  # fmt: skip
 STUDENT_975 = {6: 2.446912, 19: 2.093024, 22: 2.073873, 49: 2.009575, 78: 1.990847, 2: 4.302653}
 """Upper 2.5 % points of Student's t by degrees of freedom, from a printed table."""
 

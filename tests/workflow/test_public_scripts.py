@@ -32,24 +32,17 @@ def report_into(folder: Path, available: bool) -> None:
 @pytest.fixture
 def bench(tmp_path: Path) -> Path:
     """A propeller on three motors, C_F 1.1, 1.2 and 1.3e-6 N s², offset -0.05 N, one speed missing."""
-    vehicle = Vehicle(
-        name="x", kind="stand", rotors=[{"x_m": 0, "y_m": 0, "spin": "ccw"}], thrust_coefficient_n_s2=1e-6
-    )
+    rotors = [{"x_m": 0, "y_m": 0, "spin": "ccw"}]
+    vehicle = Vehicle(name="x", kind="stand", rotors=rotors, thrust_coefficient_n_s2=1e-6)
     speed = np.linspace(500, 2000, 11)
     runs = []
     for motor, c_f in (("a", 1.1e-6), ("b", 1.2e-6), ("c", 1.3e-6)):
         for cells in ("2s", "3s"):
             read = speed.copy()
             read[0] = 0 if cells == "2s" else speed[0]
-            table = pd.DataFrame(
-                {
-                    "time_s": np.arange(11.0),
-                    "throttle_1": np.linspace(0.05, 1, 11),
-                    "rotor_speed_1_rad_s": read,
-                    "force_z_n": -(c_f * speed**2 - 0.05),
-                }
-            )
-            runs.append(Run(f"{motor}_{cells}", table))
+            table = {"time_s": np.arange(11.0), "throttle_1": np.linspace(0.05, 1, 11)}
+            table |= {"rotor_speed_1_rad_s": read, "force_z_n": -(c_f * speed**2 - 0.05)}
+            runs.append(Run(f"{motor}_{cells}", pd.DataFrame(table)))
     folder = write_set(RecordingSet("strawson-t5040c", vehicle, tuple(runs)), tmp_path)
     report_into(folder, True)
     return folder
@@ -66,8 +59,7 @@ def test_coefficients_of_a_bench_with_known_ones(bench: Path, tmp_path: Path) ->
     found = summary["propellers"]["t5040c"]
     assert found["offset"]["value"] == pytest.approx(1.2e-6)
     assert found["offset"]["between_sd"] == pytest.approx(1e-7, rel=1e-3)
-    assert found["mean_offset_n"] == pytest.approx(-0.05)
-    assert found["points_without_speed"] == 3
+    assert found["mean_offset_n"] == pytest.approx(-0.05) and found["points_without_speed"] == 3
     by_motor = motors[motors["form"] == "offset"].set_index("motor")["c_f_n_s2"]
     assert by_motor.tolist() == pytest.approx([1.1e-6, 1.2e-6, 1.3e-6])
 
@@ -76,8 +68,7 @@ def test_without_the_recordings_the_results_say_so(tmp_path: Path) -> None:
     folder = tmp_path / "strawson-t5040c"
     report_into(folder, False)
     summary, motors = fit([folder], tmp_path)
-    assert summary["available"] is False
-    assert "no answer from nowhere" in summary["reason"]
+    assert summary["available"] is False and "no answer from nowhere" in summary["reason"]
     assert len(motors) == 0 and "c_f_n_s2" in motors
     paths = {name: str(tmp_path / f"n_{name}") for name in ("summary", "flights", "bins", "points")}
     neurobem_residuals.main(str(folder), SETTINGS, **paths)
@@ -97,8 +88,7 @@ def test_an_import_without_files_leaves_every_set_with_its_reason(tmp_path: Path
         status=str(status),
     )
     found = json.loads(status.read_text())
-    assert found["available"] is False
-    assert found["files_missing"] == found["files"] == 11
+    assert found["available"] is False and found["files_missing"] == found["files"] == 11
     for name in sets_of("crazypad"):
         assert read_report(tmp_path / "sets" / name)["available"] is False
         assert not (tmp_path / "sets" / name / "vehicle.yaml").exists()
@@ -111,8 +101,7 @@ def test_the_check_writes_a_page_for_each_set_and_names_the_others(bench: Path, 
     (broken / "vehicle.yaml").write_text("name: x\n")
     check_recordings.main([str(bench), str(absent), str(broken)], str(tmp_path / "page.txt"))
     page = (tmp_path / "page.txt").read_text()
-    assert "strawson-t5040c: kind stand, 1 rotors, 6 runs" in page
-    assert "absent: not there; see" in page
+    assert "strawson-t5040c: kind stand, 1 rotors, 6 runs" in page and "absent: not there; see" in page
     assert "broken/vehicle.yaml: kind: is missing" in page
 
 

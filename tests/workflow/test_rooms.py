@@ -10,21 +10,10 @@ import pytest
 ROOT = Path(__file__).parents[2]
 HOMES = {"rotorid": ROOT / "src", "rotorid_proof": ROOT / "proof"}
 ORDER = (
-    "rotorid.errors",
-    "rotorid.steps",
-    "rotorid.io",
-    "rotorid.recordings",
-    "rotorid.effects",
-    "rotorid.vehicle",
-    "rotorid.identify",
-    "rotorid.mismatch",
-    "rotorid.report",
-    "rotorid.plan",
-    "rotorid.config",
-    "rotorid.api",
-    "rotorid.cli",
-    "rotorid_proof",
-)
+    "rotorid.errors", "rotorid.steps", "rotorid.io", "rotorid.recordings", "rotorid.effects", "rotorid.vehicle",
+    "rotorid.identify", "rotorid.mismatch", "rotorid.report", "rotorid.plan", "rotorid.config", "rotorid.api",
+    "rotorid.cli", "rotorid_proof",
+)  # fmt: skip
 """Lowest first: each imports from those before it alone. `rotorid.acquire` stands aside and uses the lowest two."""
 ASIDE = {"rotorid.acquire": {"rotorid.errors", "rotorid.io"}}
 OUTSIDE = sorted(

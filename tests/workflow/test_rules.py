@@ -55,8 +55,7 @@ def test_a_rule_only_runs_scripts(name: str) -> None:
 @pytest.mark.parametrize("name", WORKING)
 def test_a_rule_with_a_script_has_log_message_and_the_code_of_that_script(name: str) -> None:
     text = WORKING[name]
-    assert "log:" in text
-    assert "message:" in text
+    assert "log:" in text and "message:" in text
     script = re.search(r'script:\s+"\.\./scripts/(\w+)\.py"', text)
     assert script, "scripts live in workflow/scripts"
     assert (ROOT / "workflow" / "scripts" / f"{script[1]}.py").is_file()
@@ -70,8 +69,7 @@ def test_a_rule_with_a_script_has_log_message_and_the_code_of_that_script(name: 
 
 @pytest.mark.parametrize("name", WORKING)
 def test_only_provenance_takes_the_whole_configuration(name: str) -> None:
-    takes_all = re.search(r"=\s*(config|CONFIG)\s*,", WORKING[name])
-    assert bool(takes_all) == (name == "record_provenance")
+    assert bool(re.search(r"=\s*(config|CONFIG)\s*,", WORKING[name])) == (name == "record_provenance")
 
 
 @pytest.mark.parametrize("name", WORKING)
@@ -95,8 +93,7 @@ def test_every_page_of_the_site_is_kept_or_made_and_none_is_both() -> None:
     kept = {str(p.relative_to(ROOT / "docs")) for p in (ROOT / "docs").rglob("*.md")}
     made = SITE.pages()
     assert {"commands.md", "effects.md", "decision-reference.md", "licences.md", "results.md"} <= set(made)
-    assert not kept & set(made)
-    assert kept <= listed <= kept | set(made)
+    assert not kept & set(made) and kept <= listed <= kept | set(made)
 
 
 def test_every_script_belongs_to_a_rule() -> None:

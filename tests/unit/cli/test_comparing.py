@@ -4,17 +4,13 @@ import json
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from rotorid.cli import app
 from rotorid.cli.modelling import fly
 from rotorid.cli.verdicts import read
 from rotorid.errors import InputError
 from rotorid.recordings import read_set, templates
-
-
-def run(*words: object):
-    return CliRunner().invoke(app, [str(w) for w in words])
+from tests.command_line import answer, invoke
+from tests.refusals import refused
 
 
 @pytest.fixture(scope="module")
@@ -37,12 +33,11 @@ def test_logs_become_sets_of_one_vehicle(logs: list[Path]) -> None:
 
 
 def test_two_logs_are_compared(logs: list[Path], tmp_path: Path) -> None:
-    done = run("compare", *logs, "--like", "thesis", "--mass-kg", "0.652", "-q", "-o", tmp_path / "changes.json")
-    assert done.exit_code == 0, done.output
-    assert "from monday to friday" in done.output
+    said = answer("compare", *logs, "--like", "thesis", "--mass-kg", "0.652", "-q", "-o", tmp_path / "changes.json")
+    assert "from monday to friday" in said
     found = json.loads((tmp_path / "changes.json").read_text())
     assert not [c for c in found["changes"] if c["status"] in ("established", "ambiguous")]
-    assert found["level_1"]["nothing_changed"] and found["level_1"]["sentences"][0] in done.output
+    assert found["level_1"]["nothing_changed"] and found["level_1"]["sentences"][0] in said
 
 
 def test_what_differs_is_printed_before_its_explanation_is_sought(logs: list[Path], monkeypatch) -> None:
@@ -50,7 +45,7 @@ def test_what_differs_is_printed_before_its_explanation_is_sought(logs: list[Pat
         raise InputError("the explanation was sought")
 
     monkeypatch.setattr("rotorid.mismatch.changes.compare.changes_between", stopped)
-    done = run("compare", *logs, "--like", "thesis", "--mass-kg", "0.652", "-q")
+    done = invoke("compare", *logs, "--like", "thesis", "--mass-kg", "0.652", "-q")
     first, second = done.output.index("no trim, share of a rotor"), done.output.index("the explanation was sought")
     assert done.exit_code == 1 and first < second
 
@@ -63,11 +58,10 @@ def test_a_difference_without_a_name_fails_a_regression_test(logs: list[Path], t
     speeds = [name for name in table if name.startswith("rotor_") and "_2_" in name]
     weak = tmp_path / "weak.csv"
     table.assign(**{name: 1.15 * table[name] for name in speeds}).to_csv(weak, index=False)
-    done = run("compare", logs[0], weak, "--like", "thesis", "--mass-kg", "0.652", "-q", "--ci")
+    done = invoke("compare", logs[0], weak, "--like", "thesis", "--mass-kg", "0.652", "-q", "--ci")
     assert done.exit_code == 1 and "Rotor 2 is asked for" in done.output
 
 
 def test_one_set_or_no_set_is_one_sentence(logs: list[Path]) -> None:
-    assert "nothing to compare it with" in run("compare", logs[0]).output
-    with pytest.raises(InputError, match="nowhere"):
-        read([Path("nowhere"), logs[0]])
+    assert "nothing to compare it with" in invoke("compare", logs[0]).output
+    refused("nowhere", read, [Path("nowhere"), logs[0]])

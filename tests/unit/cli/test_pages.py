@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 import typer
-from typer.testing import CliRunner
 
 from rotorid.cli import app
+from tests.command_line import invoke
 
 ROOT = Path(__file__).parents[3]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -59,6 +59,6 @@ def test_the_blocks_of_a_page_run_as_they_stand(page: Path, tmp_path: Path, monk
             exec(compile(block, str(page), "exec"), scope)
             continue
         for line in block.strip().splitlines():
-            done = CliRunner().invoke(app, shlex.split(line, comments=True)[1:])
+            done = invoke(*shlex.split(line, comments=True)[1:])
             assert (done.exit_code == 0) == (kind == "bash"), f"{line}: {done.output}"
             assert "Traceback" not in done.output

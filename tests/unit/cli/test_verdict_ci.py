@@ -5,13 +5,12 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from typer.testing import CliRunner
 
-from rotorid.cli import app
 from rotorid.cli.modelling import fly
 from rotorid.cli.verdicts import faults_of, share_of
-from rotorid.errors import InputError
 from rotorid.recordings import read_set, templates, write_vehicle
+from tests.command_line import invoke
+from tests.refusals import refused
 
 
 def verdict(word="explained", share=0.0, doubts=(), warnings=()):
@@ -26,8 +25,7 @@ def test_a_share_is_a_percentage_or_a_number(text, share):
 
 @pytest.mark.parametrize("text", ["120%", "-1", "a fifth", "nan", ""])
 def test_what_is_no_share_is_refused(text):
-    with pytest.raises(InputError, match="--max-unexplained"):
-        share_of(text)
+    refused("--max-unexplained", share_of, text)
 
 
 def test_what_fails_a_regression_test_of_an_airframe():
@@ -50,7 +48,7 @@ def grams(tmp_path_factory) -> Path:
 
 
 def test_a_mass_in_grams_is_not_judged_and_said_first(grams: Path, tmp_path: Path):
-    done = CliRunner().invoke(app, ["verdict", str(grams), "-o", str(tmp_path / "out"), "-q", "--ci"])
+    done = invoke("verdict", grams, "-o", tmp_path / "out", "-q", "--ci")
     assert done.exit_code == 1, done.output
     basis, first, *rest = done.output.splitlines()
     assert basis.startswith("The verdict rests on 12 s in the air; none of it is on the ground; not recorded:")

@@ -1,7 +1,5 @@
 """Simulated flights for the audit of the catalogue: short, hard, and the same for every effect."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -33,8 +33,7 @@ def test_gain_at_a_tenth_of_the_rate_is_that_of_the_equation(share):
     for f_n, zeta in ((9.0, 0.04), (6.0, np.sqrt(0.5))):
         gain = 1 / (1 - (f / f_n) ** 2 + 2j * zeta * f / f_n)
         y = resonance(x, f_n, zeta, 1 / rate)[late, 0]
-        expected = (gain * np.exp(2j * np.pi * f * t[late])).imag
-        assert y == pytest.approx(expected, abs=2e-3 * abs(gain))
+        assert y == pytest.approx((gain * np.exp(2j * np.pi * f * t[late])).imag, abs=2e-3 * abs(gain))
     gain = 1 / (1 + 1j * f / 6.0)
     y = followed_now(x, 1 / (2 * np.pi * 6.0), 1 / rate)[late, 0]
     assert y == pytest.approx((gain * np.exp(2j * np.pi * f * t[late])).imag, abs=2e-3)
@@ -43,6 +42,5 @@ def test_gain_at_a_tenth_of_the_rate_is_that_of_the_equation(share):
 def test_a_command_is_refined_without_moving_its_samples():
     command = np.array([[0.0, 1.0], [1.0, 2.0], [4.0, 3.0], [9.0, 4.0]])
     fine = between(command, 4)
-    assert fine.shape == (13, 2)
-    assert fine[::4] == pytest.approx(command)
+    assert fine.shape == (13, 2) and fine[::4] == pytest.approx(command)
     assert fine[2, 0] == pytest.approx(0.25)  # of t²

@@ -3,8 +3,6 @@
 The thesis's quadrotor with every rotor at 1000 rad/s: T = 1.3877 N and Q = 0.018558 N m a rotor, hubs at ±d.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -185,8 +183,7 @@ def test_a_banked_vehicle_is_pushed_upright_by_the_ground():
 
 def test_a_vortex_ring_takes_most_at_the_hover_inflow():
     """v_h = √(mg/4 / (2 ρ π R²)) = √(1.599 / (2 · 1.2 · 0.012668)) = 7.25 m/s; half of k at 0.495 away (x = 1.495)."""
-    vehicle = thesis_vehicle(rotor_radius_m=0.0635)
-    inflow = hover_inflow_m_s(vehicle)
+    inflow = hover_inflow_m_s(thesis_vehicle(rotor_radius_m=0.0635))
     assert inflow == pytest.approx(7.2526, abs=1e-3)
     for share, left in ((1.0, 1.0), (1 + 0.7 * np.sqrt(0.5), 0.5), (0.2, 0.0), (-1.0, 0.0)):
         added = contribution("vortex_ring", "mean loss", [0.3], velocity=row(0, 0, share * inflow))
@@ -198,11 +195,7 @@ def slung_pull(world, values=(0.1, 0.0, 1.0, 0.05)):
     size = len(world)
     level = np.tile(NORTH, (size, 1, 1))
     motion = still(
-        size,
-        time_s=np.arange(size) / 200.0,
-        angular_velocity=np.zeros((size, 3)),
-        specific_force=world,
-        rotation=level,
+        size, time_s=np.arange(size) / 200.0, angular_velocity=np.zeros((size, 3)), specific_force=world, rotation=level
     )
     slung = {f.name: f for f in catalogue()["payload"].forms(thesis_vehicle())}["slung"]
     return slung.contribution(motion, thesis_vehicle(), np.array(values)).force

@@ -4,8 +4,6 @@ its own simulation, and the same in the simulator as in the regression's columns
 It takes the effects from the catalogue itself: a new file of `rotorid.effects` is audited without a change here.
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from dataclasses import fields, replace
@@ -13,6 +11,7 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.optimize import least_squares
 
@@ -36,53 +35,31 @@ from rotorid.vehicle.improved import (
     speeds_of_commands,
 )
 from rotorid.vehicle.simulator import recording, simulate
-from tests.unit.mismatch.flights import recorded
+from tests.unit.mismatch.flights import recorded, with_table
 
-from .flown import (
-    DURATION_S,
-    STEP_S,
-    audit_vehicle,
-    commands,
-    entry,
-    fly,
-    motions,
-    segment,
-    start,
-    typical_values,
-)
+from .flown import DURATION_S, STEP_S, audit_vehicle, commands, entry, fly, motions, segment, start, typical_values
 
 CONTRACT = Path(__file__).parents[3] / "docs" / "recording-contract.md"
 NOISE = {"force": 0.1, "moment": 2e-3, "accelerometer": 0.15, "gyroscope": 0.02}
 EFFECTS = list(catalogue().values())
 
 
-def wrench_forms():
+def each(forms_of) -> list:
+    """Effect and form, of every form that `forms_of` gives of an effect."""
+    return [pytest.param(e, form, id=f"{e.id}/{form.name}") for e in EFFECTS for form in forms_of(e)]
+
+
+def wrench_forms() -> list:
     """Every form that adds a wrench or a reading; a gust stands for its windows with one of them."""
-    for effect in EFFECTS:
-        forms = effect.forms(audit_vehicle())
-        if effect.id == "gust":
-            forms = (window_form(0.1, 0.5, 2),)
-        for form in forms:
-            yield pytest.param(effect, form, id=f"{effect.id}/{form.name}")
+    return each(lambda e: (window_form(0.1, 0.5, 2),) if e.id == "gust" else e.forms(audit_vehicle()))
 
 
-def speed_forms():
-    for effect in EFFECTS:
-        for form in effect.speed_forms:
-            yield pytest.param(effect, form, id=f"{effect.id}/{form.name}")
+def speed_forms() -> list:
+    return each(lambda e: e.speed_forms)
 
 
-def set_forms():
-    for effect in EFFECTS:
-        for form in effect.set_forms(audit_vehicle()):
-            yield pytest.param(effect, form, id=f"{effect.id}/{form.name}")
-
-
-def reading_forms():
-    """Every form of an instrument's own; what they add is held by `tests/unit/mismatch/instrument`."""
-    for effect in EFFECTS:
-        for form in instrument_forms(effect):
-            yield pytest.param(effect, form, id=f"{effect.id}/{form.name}")
+def set_forms() -> list:
+    return each(lambda e: e.set_forms(audit_vehicle()))
 
 
 def flown_with(effect, form) -> list[Motion]:
@@ -96,15 +73,10 @@ def flown_with(effect, form) -> list[Motion]:
 def ids_of_the_contract() -> dict[str, set[str]]:
     """Ids that the recording contract lists for flights: physics, sensors, mistakes."""
     text = CONTRACT.read_text().split("## Effect ids")[1]
-    found = {}
-    for kind, start_of_line in (
-        ("physics", "Physics, flight and stand:"),
-        ("sensor", "Sensors and logging:"),
-        ("mistake", "Mistakes in the set itself:"),
-    ):
-        line = next(line for line in text.splitlines() if line.startswith(start_of_line))
-        found[kind] = set(re.findall(r"`([a-z_]+)`", line))
-    return found
+    starts = {"physics": "Physics, flight and stand:", "sensor": "Sensors and logging:"}
+    starts["mistake"] = "Mistakes in the set itself:"
+    lines = {kind: next(x for x in text.splitlines() if x.startswith(start)) for kind, start in starts.items()}
+    return {kind: set(re.findall(r"`([a-z_]+)`", line)) for kind, line in lines.items()}
 
 
 def test_every_id_of_the_contract_is_in_the_catalogue():
@@ -143,8 +115,9 @@ def test_a_form_is_stated_in_full(effect, form):
         assert p.low <= value <= p.high
 
 
-@pytest.mark.parametrize(("effect", "form"), list(reading_forms()))
+@pytest.mark.parametrize(("effect", "form"), each(instrument_forms))
 def test_a_form_of_an_instrument_is_stated_in_full(effect, form):
+    """What it adds is held by `tests/unit/mismatch/instrument`."""
     assert "=" in form.equation and form.on_loading
     assert len({p.symbol for p in form.parameters}) == len(form.parameters) > 0
     for p in form.parameters:
@@ -209,9 +182,8 @@ def test_adding_an_effect_is_adding_one_file(tmp_path, monkeypatch):
         lifted = {"id": "buoyancy", "form": "balloon", "parameters": {"b": 0.652}}
         trace = simulate_as_stated(audit_vehicle(effects=(lifted,)), commands(), DURATION_S, STEP_S, start=start())
         # One metre per second squared less of gravity.
-        np.testing.assert_allclose(
-            trace.velocity[:, -1, 2], fly().velocity[:, -1, 2] - trace.time_s[-1], rtol=1e-6, atol=1e-9
-        )
+        expected = fly().velocity[:, -1, 2] - trace.time_s[-1]
+        np.testing.assert_allclose(trace.velocity[:, -1, 2], expected, rtol=1e-6, atol=1e-9)
     finally:
         catalogue.cache_clear()
         sys.modules.pop("rotorid.effects.buoyancy", None)
@@ -238,10 +210,8 @@ def test_a_wrench_form_is_zero_when_not_excited(effect, form):
     if excitation == ("always",):
         assert active > 0
         return
-    still = replace(
-        motion,
-        **{n: np.full(motion.size, 1e6) if n == "height" else np.zeros_like(getattr(motion, n)) for n in excitation},
-    )
+    none = {n: np.full(motion.size, 1e6) if n == "height" else np.zeros_like(getattr(motion, n)) for n in excitation}
+    still = replace(motion, **none)
     assert active > 1e-4
     assert size_of(form.contribution(still, vehicle, values)) < 1e-9 * active
 
@@ -367,8 +337,7 @@ def test_the_simulator_turns_the_rotors_as_the_speed_path_says(effect, form):
     assert [(f.name, tuple(v)) for f, v in active_speed_forms(stated)] == [(form.name, tuple(values))]
     voltage = np.linspace(12.0, 10.0, len(commands().time_s))
     trace = simulate_as_stated(stated, commands(), DURATION_S, STEP_S, voltage, start=start())
-    motion = replace(motions(trace)[0], voltage=voltage)
-    one = segment(motion, command=commands().rotor_speed)
+    one = segment(replace(motions(trace)[0], voltage=voltage), command=commands().rotor_speed)
     expected = commanded_path(one, ((effect.id, form),), values, 0.0, 1500.0, 12.0)
     np.testing.assert_allclose(trace.rotor_speed[0], np.clip(expected, 0, 1500), rtol=1e-9)
     assert np.abs(trace.rotor_speed[0] - commands().rotor_speed).max() > 5.0 or form.excited_by == "time"
@@ -396,15 +365,9 @@ def fitted(function, form, suggested=()) -> tuple[np.ndarray, np.ndarray]:
     best = min(starts, key=lambda v: np.sum(function(np.clip(v, low, high)) ** 2))
     inside = np.clip(best, low + 1e-6 * (high - low), high - 1e-6 * (high - low))
     found = least_squares(
-        function,
-        inside,
-        bounds=(low, high),
-        x_scale=0.05 * (high - low),
-        xtol=1e-13,
-        ftol=1e-13,
-        gtol=1e-13,
+        function, inside, bounds=(low, high), x_scale=0.05 * (high - low), xtol=1e-13, ftol=1e-13, gtol=1e-13,
         max_nfev=40,
-    )
+    )  # fmt: skip
     return found.x, np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)))
 
 
@@ -421,9 +384,8 @@ def test_a_form_recovers_its_own_parameters(effect, form):
         return np.concatenate([p.get(g, zero).ravel() / NOISE[g] for p in parts for g in groups])
 
     truth = np.concatenate([m[g].ravel() / NOISE[g] for m in measured for g in groups])
-    suggested = (
-        form.guess(list(zip([s.motion for s in stretches], measured, strict=True)), vehicle) if form.guess else ()
-    )
+    pairs = list(zip([s.motion for s in stretches], measured, strict=True))
+    suggested = form.guess(pairs, vehicle) if form.guess else ()
     found, sd = fitted(lambda v: model(v) - truth, form, suggested)
     # First order in a sensor's own error, as above.
     allowed = 0.05 * np.abs(values).max() if effect.kind == "sensor" else 0.0
@@ -452,17 +414,15 @@ def test_a_speed_form_recovers_its_own_parameters(effect, form):
 @pytest.fixture(scope="module")
 def sound() -> RecordingSet:
     """Two sound runs with every column that a fault may spoil."""
-    recordings = recorded(1, 2)
-    runs = []
-    for run in recordings.runs:
-        table = run.table.copy()
+
+    def whole(table: pd.DataFrame) -> None:
         for i in range(1, 5):
             table[f"rotor_command_{i}_rad_s"] = table[f"rotor_speed_{i}_rad_s"]
             table[f"throttle_{i}"] = table[f"rotor_speed_{i}_rad_s"] / 2500.0
         table["height_m"] = -table["position_z_m"]
         table["battery_voltage_v"] = 12.0 - 0.01 * table["time_s"]
-        runs.append(replace(run, table=table))
-    return replace(recordings, runs=tuple(runs))
+
+    return with_table(recorded(1, 2), whole)
 
 
 @pytest.mark.parametrize(("effect", "form"), list(set_forms()))
@@ -492,15 +452,9 @@ def test_a_fault_of_the_vehicle_file_is_recorded(effect, form):
     assert handed.runs[0].table.equals(expected.runs[0].table)
 
 
-def recognised_forms():
-    """The first form of every fault, on a set that holds its columns."""
-    for effect in EFFECTS:
-        for form in effect.set_forms(audit_vehicle())[:1]:
-            yield pytest.param(effect, form, id=f"{effect.id}/{form.name}")
-
-
-@pytest.mark.parametrize(("effect", "form"), list(recognised_forms()))
+@pytest.mark.parametrize(("effect", "form"), each(lambda e: e.set_forms(audit_vehicle())[:1]))
 def test_a_fault_is_recognised(effect, form):
+    """By the first form of each, on a set that holds its columns."""
     _, findings, _ = find_mistakes(form.apply(recorded(1, 2), np.array(form.example)))
     assert [f.id for f in findings] == [effect.id]
 

@@ -3,11 +3,10 @@
 import re
 
 import pytest
-from typer.testing import CliRunner
 
-from rotorid.cli import app
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.describe import in_full, listing, markdown, rows
+from tests.command_line import invoke
 from tests.hooks import hook
 
 
@@ -36,8 +35,7 @@ def test_one_in_full_says_equation_range_columns_and_what_to_fly():
 
 
 def test_forms_that_differ_by_a_number_share_a_row():
-    found = rows(catalogue()["unequal_rotors"])
-    assert found[0][0] == ("rotor 1", "rotor 2", "rotor 3", "rotor 4")
+    assert rows(catalogue()["unequal_rotors"])[0][0] == ("rotor 1", "rotor 2", "rotor 3", "rotor 4")
     assert sum(len(names) for names, *_ in rows(catalogue()["sensor_dropout"])) == 27
     assert len(rows(catalogue()["motor_lag"])) == 3
 
@@ -52,5 +50,5 @@ def test_forms_that_differ_by_a_number_share_a_row():
     ],
 )
 def test_the_command(arguments, code, shown):
-    result = CliRunner().invoke(app, arguments)
+    result = invoke(*arguments)
     assert result.exit_code == code and shown in result.output

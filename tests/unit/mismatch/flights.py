@@ -1,5 +1,7 @@
 """Flights made by hand for tests: a prescribed turning and thrust, everything else follows by rigid-body mechanics."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 from scipy.integrate import cumulative_trapezoid
@@ -135,13 +137,10 @@ class Flight:
         thrusts = np.linalg.solve(mixer, np.column_stack([lift, moment]).T).T
         speed = np.sqrt(np.maximum(thrusts, 1e-3) / self.vehicle.thrust_coefficient_n_s2)
         self.truth = {
-            "rotors": CubicSpline(t, speed),
-            "position": CubicSpline(t, position),
-            "velocity": CubicSpline(t, velocity),
-            "attitude": CubicSpline(t, q),
-            "gyroscope": CubicSpline(t, rate),
+            "rotors": CubicSpline(t, speed), "position": CubicSpline(t, position),
+            "velocity": CubicSpline(t, velocity), "attitude": CubicSpline(t, q), "gyroscope": CubicSpline(t, rate),
             "accelerometer": CubicSpline(t, exact),
-        }
+        }  # fmt: skip
         self.phase = cumulative_trapezoid(speed, t, axis=0, initial=0.0)
         self.time_s, self.duration_s, self.rng = t, duration_s, rng
 
@@ -178,7 +177,11 @@ def recorded(*seeds: int, flight=None, vehicle: Vehicle | None = None, **how) ->
     return RecordingSet("hand-made", vehicle or quad(), runs)
 
 
-def with_table(recordings: RecordingSet, change) -> RecordingSet:
-    """The set with `change(table) -> table` applied to every run's copy."""
-    runs = tuple(Run(r.name, change(r.table.copy())) for r in recordings.runs)
-    return RecordingSet(recordings.name, recordings.vehicle, runs, recordings.held_out)
+def with_table(recordings: RecordingSet, change, *only: str) -> RecordingSet:
+    """The set with every run's table, or those of `only` some runs, as `change` returns it, or changes it in place."""
+
+    def changed(run: Run) -> Run:
+        made = change(table := run.table.copy())
+        return replace(run, table=table if made is None else made)
+
+    return replace(recordings, runs=tuple(changed(r) if not only or r.name in only else r for r in recordings.runs))

@@ -51,17 +51,11 @@ def drag_finding(**changes) -> Finding:
     """Rotor drag at the centre of mass, established."""
     form = {f.name: f for f in catalogue()["rotor_drag"].forms(thesis_vehicle())}["at the centre of mass"]
     values = dict(
-        id="rotor_drag",
-        status="established",
-        form=form,
-        values=(K_D,),
-        equation=form.equation,
+        id="rotor_drag", status="established", form=form, values=(K_D,), equation=form.equation,
         sentence="the sideways force grows with airspeed times rotor speed",
-        parameters=(Estimate("k_d", K_D, "N s2/(rad m)", 5.8e-5, 6.2e-5),),
-        p_value=1e-9,
-        channels=("force_x",),
+        parameters=(Estimate("k_d", K_D, "N s2/(rad m)", 5.8e-5, 6.2e-5),), p_value=1e-9, channels=("force_x",),
         gain=(0.3, 0.25, 0.36),
-    )
+    )  # fmt: skip
     return Finding(**(values | changes))
 
 
@@ -90,18 +84,10 @@ def analysis(seed: int = 0, findings=(), bursts=(), dash: bool = True, pole: flo
             traces.append(ChannelTrace(r.name, channel, unit, time, after + taken, after + taken, after, after))
     vehicle = thesis_vehicle()
     values = dict(
-        recordings=RecordingSet("made", vehicle, runs, ("b",)),
-        split=Split(("a", "c"), ("b",)),
-        believed=vehicle,
-        refitted=vehicle,
-        improved=vehicle,
-        named=vehicle,
-        findings=tuple(findings),
-        values={},
-        not_testable={"ground_effect": "no height above ground"},
-        traces=tuple(traces),
+        recordings=RecordingSet("made", vehicle, runs, ("b",)), split=Split(("a", "c"), ("b",)), believed=vehicle,
+        refitted=vehicle, improved=vehicle, named=vehicle, findings=tuple(findings), values={},
+        not_testable={"ground_effect": "no height above ground"}, traces=tuple(traces),
         noise_floor={c: NOISE[c.split("_")[0]] for c in CHANNELS},
-        p_values={c: (1e-9 if findings and c == "force_x" else 0.4, 0.5) for c in CHANNELS},
-        regimes=regimes,
-    )
+        p_values={c: (1e-9 if findings and c == "force_x" else 0.4, 0.5) for c in CHANNELS}, regimes=regimes,
+    )  # fmt: skip
     return Analysis(**(values | changes))

@@ -13,26 +13,17 @@ from rotorid.recordings.importers.public_sets import PUBLIC_SETS, build, obtain
 from rotorid.report.deliver import judge
 from rotorid_proof.concealed import build as concealed
 from rotorid_proof.concealed import cases
+from tests.public_logs import PUBLIC
 from tests.unit.mismatch.flights import recorded, with_table
-from tests.unit.recordings.importers.test_public_sets import MANIFEST, REAL, VEHICLES, needs_data
+from tests.unit.recordings.importers.test_public_sets import MANIFEST, VEHICLES, needs_data
 
 GROUPS = {
-    "rotor_speeds": ("rotor_speed_",),
-    "commands": ("rotor_command_", "throttle_"),
-    "position": c.POSITION,
-    "velocity": c.VELOCITY,
-    "attitude": c.QUATERNION,
-    "gyroscope": c.ANGULAR_VELOCITY,
-    "accelerometer": c.SPECIFIC_FORCE,
-    "pose": (*c.POSITION, *c.VELOCITY, *c.QUATERNION),
-    "inertial": (*c.ANGULAR_VELOCITY, *c.SPECIFIC_FORCE),
-    "battery": (c.BATTERY_VOLTAGE, c.BATTERY_CURRENT),
-    "height": (c.HEIGHT,),
-    "forces": c.FORCE,
-    "moments": c.MOMENT,
-    "mount": c.MOUNT,
-    "reference": c.REFERENCE_FORCE,
-}
+    "rotor_speeds": ("rotor_speed_",), "commands": ("rotor_command_", "throttle_"), "position": c.POSITION,
+    "velocity": c.VELOCITY, "attitude": c.QUATERNION, "gyroscope": c.ANGULAR_VELOCITY,
+    "accelerometer": c.SPECIFIC_FORCE, "pose": (*c.POSITION, *c.VELOCITY, *c.QUATERNION),
+    "inertial": (*c.ANGULAR_VELOCITY, *c.SPECIFIC_FORCE), "battery": (c.BATTERY_VOLTAGE, c.BATTERY_CURRENT),
+    "height": (c.HEIGHT,), "forces": c.FORCE, "moments": c.MOMENT, "mount": c.MOUNT, "reference": c.REFERENCE_FORCE,
+}  # fmt: skip
 CONCEALED = ("clean/000", "rate/0025/000", "multibody/clean/development/000", "continuous/clean/development/000")
 INSTRUMENTS = (
     "bench/clean/000",
@@ -84,7 +75,7 @@ def real(tmp_path_factory: pytest.TempPathFactory):
     @functools.cache
     def made(name: str) -> RecordingSet:
         source = PUBLIC_SETS[name].source
-        obtained = obtain(source, MANIFEST[source], REAL, parent)
+        obtained = obtain(source, MANIFEST[source], PUBLIC, parent)
         return read_set(build(name, obtained, MANIFEST[source], VEHICLES, parent))
 
     return made

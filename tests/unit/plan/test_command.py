@@ -5,19 +5,17 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
 
-from rotorid.cli import app
 from rotorid.cli.modelling import fly
 from rotorid.recordings import templates
+from tests.command_line import answer, refusal
 
 
 @pytest.fixture(scope="module")
 def verdict(tmp_path_factory) -> Path:
     """A verdict's folder with its set beside it."""
     folder = tmp_path_factory.mktemp("sets")
-    vehicle = templates.read("thesis").model_copy(update={"ground_z_m": 0.0})
-    fly(vehicle, folder / "flights", 8.0, 2, 1)
+    fly(templates.read("thesis").model_copy(update={"ground_z_m": 0.0}), folder / "flights", 8.0, 2, 1)
     (folder / "answer").mkdir()
     content = {"set": "flights", "kind": "flight", "effects": []}
     (folder / "answer" / "verdict.json").write_text(json.dumps(content), encoding="utf-8")
@@ -26,21 +24,14 @@ def verdict(tmp_path_factory) -> Path:
     return folder / "answer"
 
 
-def run(*words):
-    return CliRunner().invoke(app, ["plan", *map(str, words), "-q"])
-
-
 def test_nothing_open_needs_no_flight(verdict: Path) -> None:
-    done = run(verdict)
-    assert done.exit_code == 0, done.output
-    assert "Nothing is open" in done.output
+    assert "Nothing is open" in answer("plan", verdict, "-q")
     assert [p.name for p in (verdict / "plan").iterdir()] == ["plan.json"]
 
 
 @pytest.mark.slow
 def test_an_interval_asked_for_is_planned_for(verdict: Path) -> None:
-    done = run(verdict, "--want", "torque_coefficient_n_m_s2=0.9%", "-o", verdict / "wish")
-    assert done.exit_code == 0, done.output
+    answer("plan", verdict, "--want", "torque_coefficient_n_m_s2=0.9%", "-o", verdict / "wish", "-q")
     content = json.loads((verdict / "wish" / "plan.json").read_text(encoding="utf-8"))
     (wish,) = [w for w in content["intervals"] if w["name"] == "torque_coefficient_n_m_s2"]
     assert wish["half_width_after"] < 0.85 * wish["half_width_before"]
@@ -54,19 +45,18 @@ def test_an_interval_asked_for_is_planned_for(verdict: Path) -> None:
 
 @pytest.mark.slow
 def test_a_value_that_cannot_be_told_is_refused(verdict: Path) -> None:
-    done = run(verdict, "--want", "rotor_radius_m=1%")
-    assert done.exit_code == 1 and "expected one of" in done.output
+    assert "expected one of" in refusal("plan", verdict, "--want", "rotor_radius_m=1%", "-q")
 
 
 @pytest.mark.slow
 def test_a_limit_of_absence_is_planned_for_where_the_effect_would_show(verdict: Path) -> None:
     room = verdict / "room.yaml"
     room.write_text("height_m: [0.15, 3]\n", encoding="utf-8")
-    done = run(verdict, "--want", "ground_effect=2%", "--limits", room, "-o", verdict / "low")
-    assert done.exit_code == 0, done.output
+    words = ["--want", "ground_effect=2%", "--limits", room, "-o", verdict / "low"]
+    said = answer("plan", verdict, *words, "-q")
     content = json.loads((verdict / "low" / "plan.json").read_text(encoding="utf-8"))
     (wish,) = [w for w in content["intervals"] if w["name"] == "ground_effect"]
     assert wish["unit"] == "of the weight"
     # The flights at hand were high above the ground.
     assert wish["half_width_before"] is None or wish["half_width_after"] < 0.5 * wish["half_width_before"]
-    assert content["manoeuvres"] and "% of the weight with this flight" in done.output
+    assert content["manoeuvres"] and "% of the weight with this flight" in said

@@ -14,18 +14,20 @@ from rotorid.plan import write
 from rotorid.plan.candidates import Limits, Reference, candidates, joined, smaller, standard
 from rotorid.plan.plan import NOTHING, SIZES, Plan, Tried, broken, yaw_acceleration
 from rotorid.plan.simulate import CompetingModel, commands, fly, followed, low_pass, recorded
+from rotorid.recordings import columns as c
 from rotorid.recordings import templates
+from tests.refusals import refused
 
 LIMITS = Limits(x_m=(-8, 8), y_m=(-8, 8), height_m=(1, 8), speed_m_s=5, climb_m_s=2, tilt_deg=35)
 VEHICLE = templates.read("thesis").model_copy(update={"ground_z_m": 0.0})
 PIECES = candidates(LIMITS, yaw_acceleration(VEHICLE))
-COLUMNS = (
-    *(f"rotor_speed_{i}_rad_s" for i in range(1, 5)),
-    *(f"specific_force_{a}_m_s2" for a in "xyz"),
-    *(f"angular_velocity_{a}_rad_s" for a in "xyz"),
-    *(f"velocity_{a}_m_s" for a in "xyz"),
-    *(f"quaternion_{a}" for a in "wxyz"),
-)
+COLUMNS = (*c.rotor_columns("rotor_speed", 4), *c.SPECIFIC_FORCE, *c.ANGULAR_VELOCITY, *c.VELOCITY, *c.QUATERNION)
+
+
+def flown(piece, world: CompetingModel | None = None):
+    """The flight of a candidate in the middle of the room, by the loop of the limits."""
+    world = world or CompetingModel(VEHICLE)
+    return fly(world, joined([piece], 0.01), LIMITS.attitude_bandwidth_rad_s, LIMITS.middle_m)
 
 
 @pytest.mark.parametrize("piece", PIECES, ids=lambda p: p.name)
@@ -33,22 +35,20 @@ def test_a_piece_starts_and_ends_at_rest_in_one_place(piece) -> None:
     reference = piece.reference(0.01)
     velocity = np.gradient(reference.position_m, reference.time_s, axis=0)
     for end in (0, -1):
-        assert np.abs(reference.position_m[end]).max() < 1e-9
-        assert np.abs(velocity[end]).max() < 0.02
+        assert np.abs(reference.position_m[end]).max() < 1e-9 and np.abs(velocity[end]).max() < 0.02
     assert np.isfinite(reference.yaw_rad).all()
 
 
 @pytest.mark.parametrize("piece", PIECES, ids=lambda p: p.name)
 def test_a_candidate_keeps_the_limits_or_says_which_it_does_not(piece) -> None:
     try:
-        flight = fly(CompetingModel(VEHICLE), joined([piece], 0.01), LIMITS.attitude_bandwidth_rad_s, LIMITS.middle_m)
+        flight = flown(piece)
     except InputError as error:
         assert "rotors" in str(error)
         return
     if broken(flight, LIMITS, VEHICLE):
         return
-    assert flight.speed_m_s <= 1.03 * LIMITS.speed_m_s
-    assert np.degrees(flight.tilt_rad) <= 1.03 * LIMITS.tilt_deg
+    assert flight.speed_m_s <= 1.03 * LIMITS.speed_m_s and np.degrees(flight.tilt_rad) <= 1.03 * LIMITS.tilt_deg
     assert flight.motion.height.min() >= LIMITS.height_m[0] - 0.1
 
 
@@ -57,9 +57,7 @@ def test_every_manoeuvre_can_be_flown_in_some_size() -> None:
     for share in SIZES:
         for piece in candidates(smaller(LIMITS, share), share * yaw_acceleration(VEHICLE)):
             try:
-                flight = fly(
-                    CompetingModel(VEHICLE), joined([piece], 0.01), LIMITS.attitude_bandwidth_rad_s, LIMITS.middle_m
-                )
+                flight = flown(piece)
             except InputError:
                 continue
             kept |= set() if broken(flight, LIMITS, VEHICLE) else {piece.name}
@@ -75,8 +73,7 @@ def test_the_standard_flight_is_as_long_as_asked_and_ends_where_it_starts(second
     velocity = np.gradient(reference.position_m, reference.time_s, axis=0)
     assert np.abs(reference.position_m[[0, -1]]).max() < 1e-9 and np.abs(velocity[[0, -1]]).max() < 0.02
     assert reference.yaw_rad[-1] == pytest.approx(0.0, abs=1e-9)
-    flight = fly(CompetingModel(VEHICLE), joined([made], 0.01), LIMITS.attitude_bandwidth_rad_s, LIMITS.middle_m)
-    assert broken(flight, LIMITS, VEHICLE) == ""
+    assert broken(flown(made), LIMITS, VEHICLE) == ""
 
 
 def test_without_a_manoeuvre_that_helps_the_plan_says_why() -> None:
@@ -125,15 +122,13 @@ def piece(name: str):
 
 
 def left_of(flight, world) -> dict[str, np.ndarray]:
-    run = recorded(flight, world, COLUMNS, 500.0, "flight")
-    (segment,) = build_segments(run, VEHICLE, 500.0, 20.0)
+    (segment,) = build_segments(recorded(flight, world, COLUMNS, 500.0, "flight"), VEHICLE, 500.0, 20.0)
     return residual(segment, VEHICLE)
 
 
 def test_without_an_effect_nothing_is_left_of_the_rigid_body() -> None:
     world = CompetingModel(VEHICLE)
-    flight = fly(world, joined([piece("eight")], 0.002), 9.0, LIMITS.middle_m)
-    left = left_of(flight, world)
+    left = left_of(fly(world, joined([piece("eight")], 0.002), 9.0, LIMITS.middle_m), world)
     assert np.abs(left["force"]).max() < 2e-3 * VEHICLE.mass_kg * 9.81
     assert np.sqrt((left["moment"] ** 2).mean()) < 1e-5
 
@@ -154,8 +149,7 @@ def test_an_effect_of_the_model_is_what_is_left() -> None:
 def test_commands_lead_the_rotors_by_their_lag() -> None:
     form = next(f for f in catalogue()["motor_lag"].speed_forms if f.name == "one constant")
     world = CompetingModel(VEHICLE, chain=((form, np.array([0.05])),), full_speed_rad_s=2500.0)
-    flight = fly(world, joined([piece("shake height to 1 Hz")], 0.002), 9.0, LIMITS.middle_m)
-    motion = flight.motion
+    motion = fly(world, joined([piece("shake height to 1 Hz")], 0.002), 9.0, LIMITS.middle_m).motion
     lead = commands(world, motion) - motion.rotor_speed
     slope = np.gradient(motion.rotor_speed, motion.time_s, axis=0)
     inner = slice(500, -500)
@@ -167,8 +161,7 @@ def test_rotors_that_would_turn_backwards_are_refused() -> None:
     t = np.arange(0, 4, 0.01)
     falls = np.zeros((len(t), 3))
     falls[:, 2] = 20.0 * np.clip(t - 1, 0, None) ** 2
-    with pytest.raises(InputError, match="backwards"):
-        fly(CompetingModel(VEHICLE), Reference(t, falls, 2.0 * np.sin(30 * t)), 30.0, (0, 0, 100))
+    refused("backwards", fly, CompetingModel(VEHICLE), Reference(t, falls, 2.0 * np.sin(30 * t)), 30.0, (0, 0, 100))
 
 
 @pytest.fixture(scope="module")
@@ -198,8 +191,7 @@ def test_a_crazyflie_polynomial_goes_where_the_reference_goes_in_its_own_axes(a_
 def test_px4_setpoints_are_north_east_down_with_wrapped_yaw(a_plan: Plan) -> None:
     table = write.px4_offboard(a_plan)
     assert list(table.columns[:4]) == ["timestamp_s", "position[0]", "position[1]", "position[2]"]
-    assert table["position[2]"].max() < 0
-    assert table["yaw"].between(-np.pi, np.pi).all()
+    assert table["position[2]"].max() < 0 and table["yaw"].between(-np.pi, np.pi).all()
 
 
 def test_a_plan_is_written_whole(a_plan: Plan, tmp_path) -> None:
@@ -232,10 +224,8 @@ def test_a_mission_goes_to_where_the_reference_turns_round() -> None:
     assert items[0]["command"] == write.TAKE_OFF and items[-1]["command"] == write.RETURN
     assert [i["doJumpId"] for i in items] == list(range(1, len(items) + 1))
     places = np.array([i["params"][4:] for i in items if i["command"] == write.WAYPOINT])
-    north = np.radians(places[:, 0] - 47.0) * write.EARTH_M
-    reference = plan.reference.position_m
-    assert north.max() == pytest.approx(reference[:, 0].max(), abs=0.05)
-    assert north.min() == pytest.approx(reference[:, 0].min(), abs=0.05)
+    north, reference = np.radians(places[:, 0] - 47.0) * write.EARTH_M, plan.reference.position_m[:, 0]
+    assert (north.min(), north.max()) == pytest.approx((reference.min(), reference.max()), abs=0.05)
     assert np.allclose(places[:, 1], 8.0)
     assert places[:, 2].max() == pytest.approx(LIMITS.height_m[1] - LIMITS.wall_margin_m, abs=0.05)
     speeds = [i["params"][1] for i in items if i["command"] == write.SPEED]

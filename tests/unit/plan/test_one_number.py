@@ -4,13 +4,12 @@ import json
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from rotorid.cli import app
 from rotorid.recordings import read_set
 from rotorid.report.deliver import analysis_of, write_files
 from rotorid_proof.concealed.build import build
 from rotorid_proof.concealed.planned import look_alikes
+from tests.command_line import answer
 
 CASE = "look_alike/thrust_tilt-com_offset/05"
 """Two calm flights with a tilted thrust: it may as well be a steady wind."""
@@ -36,8 +35,7 @@ def test_a_verdict_states_no_separation_that_the_plan_would_not(verdict: Path) -
     page = (verdict / "report.html").read_text(encoding="utf-8")
     section = page.split("<h2>What to fly next</h2>")[1].split("</section>")[0]
     assert "<code>rotorid plan</code> says which flight" in section and "standard errors" not in section
-    done = CliRunner().invoke(app, ["plan", str(verdict), "-q"])
-    assert done.exit_code == 0, done.output
+    printed = answer("plan", verdict, "-q")
     plan = json.loads((verdict / "plan" / "plan.json").read_text(encoding="utf-8"))
     assert [set(q["ids"]) for q in plan["questions"]] == [set(said["separates"])]
     assert said["predicted_separation_sigma"] in (None, plan["predicted_separation_sigma"])
@@ -47,7 +45,7 @@ def test_a_verdict_states_no_separation_that_the_plan_would_not(verdict: Path) -
     (standard,) = [f for f in (plan, *plan["others"]) if f["flight"] == "standard"]
     assert [f["flight"] for f in plan["others"]] != [] and standard["duration_s"] <= plan["limits"]["duration_s"]
     assert standard["predicted_separation_sigma"] <= plan["predicted_separation_sigma"]
-    assert "The standard flight, " in done.output
+    assert "The standard flight, " in printed
     # What the page then says is the plan's own number.
     with_plan = (verdict / "report.html").read_text(encoding="utf-8").split("<!-- plan -->")[1]
     for sigma in sigmas:

@@ -40,16 +40,12 @@ def hummingbird(parameters: dict) -> Vehicle:
     ]
     return Vehicle.model_validate(
         {
-            "name": "hummingbird",
-            "kind": "flight",
-            "mass_kg": parameters["mass"],
+            "name": "hummingbird", "kind": "flight", "mass_kg": parameters["mass"],
             "inertia_kg_m2": {"xx": parameters["Ixx"], "yy": parameters["Iyy"], "zz": parameters["Izz"]},
-            "rotors": rotors,
-            "thrust_coefficient_n_s2": parameters["k_eta"],
-            "torque_coefficient_n_m_s2": parameters["k_m"],
-            "ground_z_m": 0.0,
+            "rotors": rotors, "thrust_coefficient_n_s2": parameters["k_eta"],
+            "torque_coefficient_n_m_s2": parameters["k_m"], "ground_z_m": 0.0,
         }
-    )
+    )  # fmt: skip
 
 
 @pytest.mark.slow
@@ -71,19 +67,14 @@ def test_rotorpy_flies_a_plan_within_the_limits(names: tuple[str, ...]) -> None:
     first = flat(table, 0.0)
     hover = np.sqrt(quad_params["mass"] * 9.81 / 4 / quad_params["k_eta"])
     state = {
-        "x": first["x"],
-        "v": np.zeros(3),
-        "q": np.array([0.0, 0.0, 0.0, 1.0]),
-        "w": np.zeros(3),
-        "wind": np.zeros(3),
+        "x": first["x"], "v": np.zeros(3), "q": np.array([0.0, 0.0, 0.0, 1.0]), "w": np.zeros(3), "wind": np.zeros(3),
         "rotor_speeds": np.full(4, hover),
-    }
+    }  # fmt: skip
     plant = Multirotor(quad_params, state, control_abstraction="cmd_motor_speeds", aero=True)
     times = np.arange(0.0, reference.duration_s, STEP_S)
     flown, asked = [], []
     for t in times:
-        wanted = flat(table, t)
-        state = plant.step(state, controller.update(t, state, wanted), STEP_S)
+        state = plant.step(state, controller.update(t, state, flat(table, t)), STEP_S)
         flown.append([*state["x"], *state["v"], 1 - 2 * (state["q"][0] ** 2 + state["q"][1] ** 2)])
         asked.append(flat(table, t + STEP_S)["x"])
     flown, asked = np.array(flown), np.array(asked)

@@ -36,8 +36,7 @@ LIMITS = SessionLimits()
 @pytest.mark.parametrize("name", courses(LIMITS))
 def test_a_course_starts_and_ends_unloaded_and_reaches_the_largest_load(name: str) -> None:
     _, seconds, course = courses(LIMITS)[name]
-    t = np.arange(0, seconds + 2 * REST_S, 0.01)
-    load = course(t)
+    load = course(np.arange(0, seconds + 2 * REST_S, 0.01))
     assert abs(load[0]) < 1e-9 and abs(load[-1]) < 0.02
     assert load.max() == pytest.approx(1.0, abs=1e-6) and load.min() > -1e-9
 
@@ -72,11 +71,8 @@ def known():
     runs = []
     for i, levels in enumerate(([0.4, 0.8, 1.0, 0.5], [1.0, 0.2, 0.6], [0.7, 1.0, 0.3, 0.9])):
         load = -8.0 * through(t, levels)
-        table = {
-            "time_s": t,
-            "reference_force_z_n": load,
-            "force_z_n": crept(load) + 0.004 * rng.standard_normal(len(t)),
-        }
+        read = crept(load) + 0.004 * rng.standard_normal(len(t))
+        table = {"time_s": t, "reference_force_z_n": load, "force_z_n": read}
         runs.append(Run(f"run{i}", pd.DataFrame(table)))
     vehicle = Vehicle.model_validate({"name": "bench", "kind": "bench", "tared": True})
     return known_instrument(RecordingSet("bench", vehicle, tuple(runs), None))

@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
 
-from rotorid.cli import app
 from rotorid.cli.planning import sets_of
 from rotorid.errors import InputError
 from rotorid.mismatch.decide.findings import Finding
 from rotorid.plan.questions import answers, joined_sets
 from rotorid.recordings import RecordingSet, Run, templates
+from tests.command_line import refusal
+from tests.refusals import refused
 
 VEHICLE = templates.read("thesis")
 
@@ -25,11 +25,9 @@ def a_set(name: str, runs: int, columns: tuple[str, ...] = ("angular_velocity_x_
 
 
 def test_runs_carry_their_set_and_the_first_keeps_what_it_holds_out() -> None:
-    first = replace(a_set("first", 3), held_out=("run1",))
-    whole, notes = joined_sets(first, a_set("second", 1))
+    whole, notes = joined_sets(replace(a_set("first", 3), held_out=("run1",)), a_set("second", 1))
     assert [r.name for r in whole.runs] == ["1-run0", "1-run1", "1-run2", "2-run0"]
-    assert whole.held_out == ("1-run1",)
-    assert whole.name == "first+second"
+    assert whole.held_out == ("1-run1",) and whole.name == "first+second"
     assert len(notes) == 1
 
 
@@ -65,18 +63,15 @@ def test_a_verdict_of_several_sets_finds_each_of_them(tmp_path: Path, monkeypatc
     folder = tmp_path / "answer"
     folder.mkdir()
     assert [p.name for p in sets_of(folder, {"set": "first+second"})] == ["first", "second"]
-    with pytest.raises(InputError, match="the recording set third of this verdict"):
-        sets_of(folder, {"set": "first+third"})
+    refused("the recording set third of this verdict", sets_of, folder, {"set": "first+third"})
 
 
 def test_another_vehicle_is_refused_by_the_key_that_differs() -> None:
-    with pytest.raises(InputError, match="differ in mass_kg"):
-        joined_sets(a_set("first", 2), a_set("second", 1, mass_kg=9.0))
+    refused("differ in mass_kg", joined_sets, a_set("first", 2), a_set("second", 1, mass_kg=9.0))
 
 
 def test_nothing_in_common_is_refused() -> None:
-    with pytest.raises(InputError, match="no column in common"):
-        joined_sets(a_set("first", 1), a_set("second", 1, ("height_m",)))
+    refused("no column in common", joined_sets, a_set("first", 1), a_set("second", 1, ("height_m",)))
 
 
 def test_answers_say_what_was_settled_narrowed_or_left() -> None:
@@ -101,13 +96,10 @@ def test_answers_say_what_was_settled_narrowed_or_left() -> None:
 )
 def test_bad_input_ends_in_one_sentence(tmp_path: Path, monkeypatch, words, said: str) -> None:
     monkeypatch.chdir(tmp_path)
-    done = CliRunner().invoke(app, list(words))
-    assert done.exit_code == 1
-    assert said in done.output and len(done.output.strip().splitlines()) == 1
+    assert said in refusal(*words)
 
 
 def test_a_verdict_without_its_set_asks_for_it(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "verdict.json").write_text('{"set": "lost", "kind": "flight", "effects": []}', encoding="utf-8")
-    done = CliRunner().invoke(app, ["plan", str(tmp_path)])
-    assert done.exit_code == 1 and "--set" in done.output
+    assert "--set" in refusal("plan", tmp_path)

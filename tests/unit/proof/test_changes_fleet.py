@@ -16,15 +16,10 @@ TRUTH = {
 @pytest.mark.parametrize(
     ("since", "events", "right", "others"),
     [
-        (4, [(4, "lift/all")], 1, 0),
-        (4, [(4, "share/1")], 0, 1),
-        (4, [], 0, 0),
-        (4, [(5, "lift/all")], 0, 1),
-        (4, [(4, "lift/all"), (6, "noise/gyroscope")], 0, 1),
-        (None, [], 1, 0),
-        (None, [(7, "lift/all")], 0, 1),
+        (4, [(4, "lift/all")], 1, 0), (4, [(4, "share/1")], 0, 1), (4, [], 0, 0), (4, [(5, "lift/all")], 0, 1),
+        (4, [(4, "lift/all"), (6, "noise/gyroscope")], 0, 1), (None, [], 1, 0), (None, [(7, "lift/all")], 0, 1),
     ],
-)
+)  # fmt: skip
 def test_the_change_since_its_first_flight_and_nothing_else(monkeypatch, since, events, right, others):
     stated = pd.DataFrame([{"set": fleet.day_of(day), "id": name} for day, name in events], columns=EVENTS)
     truth = TRUTH if since is not None else {"changes": [], "fair": []}

@@ -4,10 +4,9 @@ import json
 from pathlib import Path
 
 import pandas as pd
-import pytest
 
-from rotorid.errors import InputError
 from rotorid_proof.keep_release import keep
+from tests.refusals import refused
 
 DATE = "2026-11-26"
 
@@ -44,5 +43,4 @@ def test_rows_of_the_date_are_replaced_and_the_rest_stays(tmp_path):
 
 def test_a_proof_without_the_date_is_refused(tmp_path):
     kept = tables(tmp_path / "kept", [""], right=0)
-    with pytest.raises(InputError, match="no case is of the release 2026-11-27"):
-        keep(tables(tmp_path / "fresh", [DATE], 1), kept, "2026-11-27")
+    refused("no case is of the release 2026-11-27", keep, tables(tmp_path / "fresh", [DATE], 1), kept, "2026-11-27")

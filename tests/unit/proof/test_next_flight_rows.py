@@ -30,19 +30,10 @@ def test_what_is_untrue_beside_what_is_true_is_wrong() -> None:
 
 def row(case: str, outcome: str, standard: str, predicted: float, measured: float, ids: str = "a b") -> Row:
     return Row(
-        case=case,
-        truth="a",
-        open=ids,
-        planned_s=30.0,
-        predicted_sigma=predicted,
-        predicted_low=0.8 * predicted,
-        predicted_high=1.2 * predicted,
-        measured_sigma=measured,
-        standard_sigma=measured / 2,
-        promised=True,
-        outcome=outcome,
-        standard_outcome=standard,
-    )
+        case=case, truth="a", open=ids, planned_s=30.0, predicted_sigma=predicted, predicted_low=0.8 * predicted,
+        predicted_high=1.2 * predicted, measured_sigma=measured, standard_sigma=measured / 2, promised=True,
+        outcome=outcome, standard_outcome=standard,
+    )  # fmt: skip
 
 
 def test_shares_are_of_the_sets_that_were_open() -> None:

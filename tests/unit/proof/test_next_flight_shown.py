@@ -9,25 +9,13 @@ ROWS = table(
             "a", "rotor_drag", "frame_drag rotor_drag", 30.0, 8.0, 6.0, 10.0, 7.0, 5.0, True, "right", "open", "", "abc"
         ),
         Row(
-            "b",
-            "com_offset",
-            "com_offset unequal_rotors",
-            30.0,
-            8.0,
-            6.0,
-            10.0,
-            0.0,
-            5.0,
-            True,
-            "open",
-            "open",
-            "",
+            "b", "com_offset", "com_offset unequal_rotors", 30.0, 8.0, 6.0, 10.0, 0.0, 5.0, True, "open", "open", "",
             "abc",
         ),
         Row("c", "com_offset", ""),
         Row("d", "delay", "delay motor_lag", outcome="no plan"),
     ]
-)
+)  # fmt: skip
 
 
 def test_shares_are_said_with_their_counts() -> None:

@@ -19,21 +19,12 @@ def problem(weights: dict[str, float], mass: float = 0.0, seed: int = 1) -> Prob
     y = mass * x[:, 0, 0] + sum(w * x[:, 0, 1 + NAMES.index(name)] for name, w in weights.items()) + noise
     time = np.arange(n) / 40
     return Problem(
-        keys=("mass", *(f"{name}/only" for name in NAMES)),
-        effects={f"{name}/only": name for name in NAMES},
-        values=("mass",),
-        believed={"mass": 2.0},
-        x=x,
-        y=y[:, None],
-        scale=np.array([0.1]),
-        channels=("force_x",),
-        training=time < 50,
-        held_out=time >= 50,
-        block=time.astype(int),
+        keys=("mass", *(f"{name}/only" for name in NAMES)), effects={f"{name}/only": name for name in NAMES},
+        values=("mass",), believed={"mass": 2.0}, x=x, y=y[:, None], scale=np.array([0.1]), channels=("force_x",),
+        training=time < 50, held_out=time >= 50, block=time.astype(int),
         regime={"forward_speed_m_s": speed, "body_rate_rad_s": rng.normal(size=n)},
-        runs={"training": ("a",), "held_out": ("b",)},
-        rest={"prior": {"mass": 0.05}},
-    )
+        runs={"training": ("a",), "held_out": ("b",)}, rest={"prior": {"mass": 0.05}},
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("ask", [stepwise.ask, sindy.ask, sample_split.ask, boosting.ask])

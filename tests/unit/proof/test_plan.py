@@ -92,7 +92,6 @@ def test_a_batch_of_other_cases_has_another_name() -> None:
 
 
 def test_the_announcement_counts_what_is_done() -> None:
-    entries = [plan.Entry(f"single/a/{k}", "s") for k in range(4)]
-    chosen = plan.batches(entries, 2)
+    chosen = plan.batches([plan.Entry(f"single/a/{k}", "s") for k in range(4)], 2)
     said = plan.announcement(chosen, [next(iter(chosen))], peers=False)
     assert "4 concealed cases in 2 batches, 2 judged before" in said

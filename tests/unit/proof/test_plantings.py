@@ -15,6 +15,7 @@ from rotorid.recordings import columns as c
 from rotorid_proof.plantings import judge, plan, score, sow, tables
 from rotorid_proof.plantings.flights import FLIGHTS, flight, taken
 from rotorid_proof.plantings.kinds import Ratio, Size, Truth, named
+from tests.unit.mismatch.flights import with_table
 
 ROOT = Path(__file__).parents[3]
 RATE_HZ, ARM = 400.0, 0.1
@@ -33,18 +34,12 @@ def smooth_noise(rng: np.random.Generator, n: int, columns: int, highest_hz: flo
 @pytest.fixture(scope="module")
 def recorded() -> RecordingSet:
     """Two runs with every column that a planting may change; smooth, so that it can be read between samples."""
+    hubs = ((1, 1, "ccw"), (1, -1, "cw"), (-1, -1, "ccw"), (-1, 1, "cw"))
     vehicle = Vehicle(
-        name="made up",
-        kind="flight",
-        mass_kg=0.8,
-        inertia_kg_m2=Inertia(xx=2e-3, yy=3e-3, zz=4e-3),
-        rotors=tuple(
-            Rotor(x_m=x * ARM, y_m=y * ARM, spin=s)
-            for x, y, s in ((1, 1, "ccw"), (1, -1, "cw"), (-1, -1, "ccw"), (-1, 1, "cw"))
-        ),
-        thrust_coefficient_n_s2=1.5e-6,
+        name="made up", kind="flight", mass_kg=0.8, inertia_kg_m2=Inertia(xx=2e-3, yy=3e-3, zz=4e-3),
+        rotors=tuple(Rotor(x_m=x * ARM, y_m=y * ARM, spin=s) for x, y, s in hubs), thrust_coefficient_n_s2=1.5e-6,
         torque_coefficient_n_m_s2=3e-8,
-    )
+    )  # fmt: skip
     rng = np.random.default_rng(3)
     runs = []
     for k in range(2):
@@ -53,16 +48,13 @@ def recorded() -> RecordingSet:
         turn = smooth_noise(rng, n, 4, 1.0) * 0.1 + np.array([1.0, 0, 0, 0])
         speed = 1150 + 60 * smooth_noise(rng, n, 4, 8.0)
         columns = {
-            c.TIME: t[:, None],
-            c.POSITION: smooth_noise(rng, n, 3, 1.0),
+            c.TIME: t[:, None], c.POSITION: smooth_noise(rng, n, 3, 1.0),
             c.VELOCITY: 3 * smooth_noise(rng, n, 3, 1.0),
             c.QUATERNION: turn / np.linalg.norm(turn, axis=1, keepdims=True),
             c.ANGULAR_VELOCITY: smooth_noise(rng, n, 3, 6.0),
-            c.SPECIFIC_FORCE: smooth_noise(rng, n, 3, 6.0) + np.array([0, 0, -9.8]),
-            SPEEDS: speed,
-            COMMANDS: speed,
+            c.SPECIFIC_FORCE: smooth_noise(rng, n, 3, 6.0) + np.array([0, 0, -9.8]), SPEEDS: speed, COMMANDS: speed,
             c.BATTERY_VOLTAGE: (16.0 - 0.2 * t)[:, None],
-        }
+        }  # fmt: skip
         table = {}
         for names, values in columns.items():
             for j, name in enumerate((names,) if isinstance(names, str) else names):
@@ -82,14 +74,13 @@ def sizes(truth: Truth) -> dict[str, float]:
 
 
 def without(recordings: RecordingSet, *names: str) -> RecordingSet:
-    return replace(recordings, runs=tuple(Run(r.name, r.table.drop(columns=list(names))) for r in recordings.runs))
+    return with_table(recordings, lambda t: t.drop(columns=list(names)))
 
 
 def by_throttle(recordings: RecordingSet, throttle) -> RecordingSet:
     """The set with a throttle, alike for all rotors, in place of speeds and commands."""
     columns = dict.fromkeys(c.rotor_columns("throttle", 4), throttle)
-    bare = without(recordings, *SPEEDS, *COMMANDS)
-    return replace(bare, runs=tuple(Run(r.name, r.table.assign(**columns)) for r in bare.runs))
+    return with_table(without(recordings, *SPEEDS, *COMMANDS), lambda t: t.assign(**columns))
 
 
 def wrench(recordings: RecordingSet, run: int = 0, about: np.ndarray | None = None) -> np.ndarray:
@@ -159,8 +150,7 @@ def test_a_moved_accelerometer_feels_the_turning(recorded: RecordingSet) -> None
     r = np.array([sizes(truth)[f"r_{a}"] for a in "xyz"])
     run = recorded.runs[0]
     rate = run.array(c.ANGULAR_VELOCITY)
-    slope = np.gradient(rate, run.time_s, axis=0)
-    wanted = np.cross(slope, r) + np.cross(rate, np.cross(rate, r))
+    wanted = np.cross(np.gradient(rate, run.time_s, axis=0), r) + np.cross(rate, np.cross(rate, r))
     got = out.runs[0].array(c.SPECIFIC_FORCE) - run.array(c.SPECIFIC_FORCE)
     inside = slice(100, -100)
     assert np.abs(got[inside] - wanted[inside]).max() < 0.02 * np.abs(wanted).max()
@@ -188,8 +178,7 @@ def test_a_lag_brings_the_planted_command_back(recorded: RecordingSet) -> None:
     out, truth = planted(recorded, "motor_lag")
     command = out.runs[0].array(COMMANDS)
     speed = lagged(command, sizes(truth)["tau"], sizes(truth)["tau"], 1 / RATE_HZ, holds=False)
-    error = (speed - recorded.runs[0].array(SPEEDS))[200:-200]
-    assert np.abs(error).max() < 0.01 * 60
+    assert np.abs((speed - recorded.runs[0].array(SPEEDS))[200:-200]).max() < 0.01 * 60
 
 
 def test_a_throttle_that_no_pilot_could_give_says_nothing(recorded: RecordingSet) -> None:
@@ -279,9 +268,8 @@ def test_batches_are_of_one_flight_and_named_by_what_is_in_them() -> None:
 def test_what_was_judged_is_not_judged_again(recorded: RecordingSet, tmp_path: Path, monkeypatch) -> None:
     seen = []
     monkeypatch.setattr(judge, "cut", lambda folder, name: recorded)
-    monkeypatch.setattr(
-        judge, "judged", lambda r: seen.append(r) or {"verdict": {"verdict": "x"}, "seconds": 1.0, "flown_s": 2.0}
-    )
+    made = {"verdict": {"verdict": "x"}, "seconds": 1.0, "flown_s": 2.0}
+    monkeypatch.setattr(judge, "judged", lambda r: seen.append(r) or made)
     wanted = [plan.Planting("made-up", "values", ("mass",), size, 0) for size in ("large", "small")]
     for out, plantings in (("one", wanted[:1]), ("two", wanted)):
         judge.judge_plantings(Path("x"), plantings, "abc", tmp_path / out, tmp_path / "memory", lambda text: None)
@@ -363,12 +351,8 @@ def test_what_cannot_show_is_counted_apart_even_where_it_is_named() -> None:
 
 def test_what_is_new_and_what_is_lost_beside_it() -> None:
     untouched = verdict(effect("rotor_drag"), effect("gyro_error"), mass_kg=(1.0, 1.1, 0.01))
-    now = verdict(
-        effect("rotor_drag", (), "ambiguous", ("frame_drag", "rotor_drag")),
-        effect("com_offset"),
-        effect("payload"),
-        arm_scale=(1.0, 1.2, 0.01),
-    )
+    drag = effect("rotor_drag", (), "ambiguous", ("frame_drag", "rotor_drag"))
+    now = verdict(drag, effect("com_offset"), effect("payload"), arm_scale=(1.0, 1.2, 0.01))
     found = score.beside(now, untouched, (OFFSET,))
     new = {"new": ("payload",), "values_new": ("arm_scale",)}
     assert found == new | {"lost": ("gyro_error",), "values_lost": ("mass_kg",)}
@@ -407,9 +391,8 @@ def test_a_target_holds_only_where_the_whole_interval_is_inside() -> None:
 
 
 def test_rows_judged_before_are_kept_with_their_own_code() -> None:
-    old = pd.DataFrame(
-        [row("a/values/mass/large/0", code="older"), row("a/values/arm/large/0", code="older")], columns=tables.COLUMNS
-    )
+    rows = [row(f"a/values/{kind}/large/0", code="older") for kind in ("mass", "arm")]
+    old = pd.DataFrame(rows, columns=tables.COLUMNS)
     new = pd.DataFrame([row("a/values/mass/large/0")], columns=tables.COLUMNS)
     found = tables.kept_with(new, old).set_index("planting")["code"]
     assert dict(found) == {"a/values/mass/large/0": "now", "a/values/arm/large/0": "older"}

@@ -39,8 +39,7 @@ def test_a_line_of_the_table() -> None:
     assert row["found"] == "rotor_drag" and row["expected_found"] == "rotor_drag"
     # 3-4-5
     assert (row["force_before"], row["force_after"]) == (pytest.approx(5.0), pytest.approx(0.5))
-    assert row["moment_after"] is None
-    assert list(row) == real.ROW_COLUMNS
+    assert row["moment_after"] is None and list(row) == real.ROW_COLUMNS
 
 
 def test_a_published_number_in_its_own_terms() -> None:

@@ -13,55 +13,38 @@ from rotorid_proof.units import same_unit
 
 
 def effect(id, status="established", alternatives=(), parameters=(), p=1e-9):
+    listed = [{"symbol": s, "value": v, "unit": u, "interval_95": [low, high]} for s, v, u, low, high in parameters]
     return {
-        "id": id,
-        "status": status,
-        "alternatives": list(alternatives),
-        "parameters": [
-            {"symbol": s, "value": v, "unit": u, "interval_95": [low, high]} for s, v, u, low, high in parameters
-        ],
-        "p_value": p,
+        "id": id, "status": status, "alternatives": list(alternatives), "parameters": listed, "p_value": p,
         "held_out_gain": None,
-    }
+    }  # fmt: skip
 
 
 def verdict(*effects, word="explained", values=None, locations=(), after=1.0):
     errors = {"before": 3.0, "refitted": 2.0, "after": after}
     return {
-        "set": "set-x",
-        "runs": {"training": ["a"], "held_out": ["b"]},
-        "verdict": word,
-        "effects": list(effects),
-        "parameters": values or {},
-        "locations": list(locations),
+        "set": "set-x", "runs": {"training": ["a"], "held_out": ["b"]}, "verdict": word, "effects": list(effects),
+        "parameters": values or {}, "locations": list(locations),
         "channels": {"force_x": {"rmse": {"training": errors, "held_out": errors}}},
-    }
+    }  # fmt: skip
 
 
 def hidden(id, equivalent=(), parameters=(), form=""):
     return {
-        "id": id,
-        "form": form,
-        "parameters": [{"symbol": s, "value": v, "unit": u} for s, v, u in parameters],
-        "size_over_noise": 1.5,
-        "equivalent": list(equivalent),
-    }
+        "id": id, "form": form, "parameters": [{"symbol": s, "value": v, "unit": u} for s, v, u in parameters],
+        "size_over_noise": 1.5, "equivalent": list(equivalent),
+    }  # fmt: skip
 
 
 def answer(
     *effects, case="single/rotor_drag/moderate/0", wrong=None, outside=(), locations=(), verdicts=("explained",)
 ):
     return {
-        "set": "set-x",
-        "case": case,
-        "expected": sorted([e["id"] for e in effects] + list(wrong or {})),
-        "effects": list(effects),
-        "wrong_parameters": wrong or {},
-        "outside_catalogue": list(outside),
-        "locations": list(locations),
-        "verdict": list(verdicts),
+        "set": "set-x", "case": case, "expected": sorted([e["id"] for e in effects] + list(wrong or {})),
+        "effects": list(effects), "wrong_parameters": wrong or {}, "outside_catalogue": list(outside),
+        "locations": list(locations), "verdict": list(verdicts),
         "oracle": {"runs": {"b": {"force_x": {"noise_rms": 0.8}, "kinematic_force_x": {"noise_rms": 9.0}}}},
-    }
+    }  # fmt: skip
 
 
 def test_the_right_effect_alone_scores_in_full() -> None:
@@ -69,8 +52,7 @@ def test_the_right_effect_alone_scores_in_full() -> None:
     assert s["named"] and s["top_one"] and s["inside"] and s["whole_set"] and s["ambiguity_right"]
     assert s["false_count"] == 0
     # 1.0 N left, 0.8 N of noise
-    assert s["held_out_after"] == pytest.approx(1.25)
-    assert s["held_out_before"] == pytest.approx(3.75)
+    assert s["held_out_after"] == pytest.approx(1.25) and s["held_out_before"] == pytest.approx(3.75)
 
 
 def test_a_wrong_name_is_false_and_misses() -> None:
@@ -175,8 +157,7 @@ def test_answers_in_the_catalogues_symbols() -> None:
 
 def test_overlap_of_times() -> None:
     # 3 s true, 2 s of them found, 1 s beyond: precision and recall two thirds
-    found = f1_of_times([("a", 12.0, 15.0)], [("a", 13.0, 16.0)])
-    assert found["f1"] == pytest.approx(2 / 3)
+    assert f1_of_times([("a", 12.0, 15.0)], [("a", 13.0, 16.0)])["f1"] == pytest.approx(2 / 3)
     assert f1_of_times([("a", 12.0, 15.0)], [("b", 12.0, 15.0)])["f1"] == 0
     # two channels with one stretch count once
     assert f1_of_times([("a", 0.0, 1.0)], [("a", 0.0, 1.0), ("a", 0.0, 1.0)])["f1"] == 1

@@ -10,13 +10,9 @@ from rotorid_proof import show, table
 
 def test_small_coefficients_stand_in_units_of_a_power_of_ten() -> None:
     row = {
-        "study": "a",
-        "effect": "rotor_drag",
-        "symbol": "k_d",
-        "found": 1.44e-6,
-        "low_95": 1.14e-6,
+        "study": "a", "effect": "rotor_drag", "symbol": "k_d", "found": 1.44e-6, "low_95": 1.14e-6,
         "high_95": 1.65e-6,
-    }
+    }  # fmt: skip
     table = pd.DataFrame([row | {"published": 1.95e-6, "unit": "kg/rad", "source": "s"}])
     shown = show.of_published(table).iloc[0]
     assert (shown["found"], shown["published"], shown["unit"]) == ("1.44 (1.14 to 1.65)", "1.95", "1e-6 kg/rad")
@@ -26,15 +22,9 @@ def test_small_coefficients_stand_in_units_of_a_power_of_ten() -> None:
 
 def test_a_wrong_value_is_named_without_its_unit() -> None:
     row = {
-        "study": "a",
-        "about": "b",
-        "word": "explained",
-        "found": "rotor_drag",
-        "expected": None,
-        "expected_found": None,
-        "values": "inertia_yy_kg_m2; mass_kg",
-        "unexplained_share": 1,
-    }
+        "study": "a", "about": "b", "word": "explained", "found": "rotor_drag", "expected": None,
+        "expected_found": None, "values": "inertia_yy_kg_m2; mass_kg", "unexplained_share": 1,
+    }  # fmt: skip
     errors = {f"force_{stage}": 0.1 for stage in ("before", "refitted", "after")}
     shown = show.of_studies(pd.DataFrame([row | errors])).iloc[0]
     assert shown["found"] == "rotor drag; wrong values: inertia yy, mass"
@@ -69,10 +59,8 @@ def test_drawn_cases_have_a_row_for_each_kind_and_the_state_of_their_targets() -
 
 def test_a_release_has_one_row_and_all_releases_one_more() -> None:
     cases = pd.DataFrame([drawn(r, kind, clean) for r in "ab" for kind in ("flight", "stand") for clean in (0, 1)])
-    named = pd.DataFrame(
-        [("development", "24d4aceab5", None), ("a", "40ff225aa7", "c87a46b8"), ("b", "dfbaf78b", "c9fa")]
-    )
-    shown = show.of_releases(cases, named.set_axis(["released", "commit", "code"], axis=1))
+    named = [("development", "24d4aceab5", None), ("a", "40ff225aa7", "c87a46b8"), ("b", "dfbaf78b", "c9fa")]
+    shown = show.of_releases(cases, pd.DataFrame(named, columns=["released", "commit", "code"]))
     assert shown["released"].tolist() == ["40ff225", "dfbaf78", "all"]
     assert shown["by"].tolist() == ["c87a46b", "c9fa", "each its own"]
     assert shown["right"].tolist() == ["2", "2", "4"] and shown["alarms"].tolist() == ["0 of 2", "0 of 2", "0 of 4"]
@@ -86,9 +74,8 @@ def test_questions_are_the_stored_summary_with_the_kinds_together() -> None:
     assert row["kinds"] == " / ".join(f"{100 * summary['value'][f'{p}single_weak']:.3g}" for p in prefixes) + " %"
     assert int(row["cases"]) == sum(summary["cases"][f"{p}single_weak"] for p in prefixes)
     of_flights_alone = shown.loc["Location: stated regime is the effect's"]
-    assert (
-        of_flights_alone["kinds"] == "" and of_flights_alone["measured"] == f"{100 * summary['value']['regime']:.1f} %"
-    )
+    assert of_flights_alone["kinds"] == ""
+    assert of_flights_alone["measured"] == f"{100 * summary['value']['regime']:.1f} %"
     # What has a target stands first.
     assert (shown["target"] != "").tolist() == sorted(shown["target"] != "", reverse=True)
 
@@ -163,42 +150,31 @@ def test_plantings_are_counted_by_flight_and_family():
 def test_a_channel_that_got_worse_says_by_how_much() -> None:
     channels = pd.DataFrame(
         {
-            "example": "a",
-            "channel": ["force_x", "force_z", "force_z"],
-            "split": ["held_out", "held_out", "training"],
-            "unit": "N",
-            "before": [1.0, 0.106, 1.0],
-            "refitted": [1.0, 0.106, 1.0],
-            "after": [0.2, 0.456, 1.0],
-            "noise_floor": [0.1, None, 0.1],
+            "example": "a", "channel": ["force_x", "force_z", "force_z"],
+            "split": ["held_out", "held_out", "training"], "unit": "N", "before": [1.0, 0.106, 1.0],
+            "refitted": [1.0, 0.106, 1.0], "after": [0.2, 0.456, 1.0], "noise_floor": [0.1, None, 0.1],
         }
-    )
+    )  # fmt: skip
     shown = show.of_channels(channels)
     assert shown["channel"].tolist() == ["force x", "force z"]
-    assert shown["worse"].tolist() == ["", "330.2 %"]
-    assert shown["noise_floor"].tolist() == ["0.1", "–"]
+    assert shown["worse"].tolist() == ["", "330.2 %"] and shown["noise_floor"].tolist() == ["0.1", "–"]
 
 
 def test_the_numbers_of_the_campaign_say_how_many_are_inside() -> None:
     row = {"set": "s", "effect": "com_offset", "numbers": 3, "held": 1, "symbol": "r_x", "unit": "m"}
     row |= {"truth": -4.045e-4, "found": -5.1e-4, "low_95": -5.2e-4, "high_95": -5.0e-4}
     shown = show.of_campaign_numbers(pd.DataFrame([row]))
-    assert shown.iloc[0][["inside", "truth", "found", "unit"]].tolist() == [
-        "1 of 3",
-        "−404.5",
-        "−510 (−520 to −500)",
-        "1e-6 m",
-    ]
+    cells = shown.iloc[0][["inside", "truth", "found", "unit"]].tolist()
+    assert cells == ["1 of 3", "−404.5", "−510 (−520 to −500)", "1e-6 m"]
 
 
 def test_an_effect_stands_with_its_class_and_its_interval_in_one_cell() -> None:
-    effects = pd.DataFrame(
-        [
-            ("rotor_drag", "established", None, "k_d", 4.08e-5, 3.9e-5, 4.34e-5, "N s2"),
-            ("axial_inflow", "suggested", "axial_inflow or frame_drag", None, None, None, None, None),
-        ],
-        columns=["effect", "status", "alternatives", "symbol", "value", "low_95", "high_95", "unit"],
-    )
+    rows = [
+        ("rotor_drag", "established", None, "k_d", 4.08e-5, 3.9e-5, 4.34e-5, "N s2"),
+        ("axial_inflow", "suggested", "axial_inflow or frame_drag", None, None, None, None, None),
+    ]
+    names = ["effect", "status", "alternatives", "symbol", "value", "low_95", "high_95", "unit"]
+    effects = pd.DataFrame(rows, columns=names)
     shown = show.of_effects(effects)
     assert shown.iloc[0].tolist() == ["rotor drag", "established", "k_d", "40.8 (39 to 43.4)", "1e-6 N s2"]
     unsure = pd.DataFrame([{**effects.iloc[0], "value": -4.38e-5, "low_95": -0.0052, "high_95": 0.0051}])

@@ -52,8 +52,7 @@ def test_throttles_say_it_where_no_speed_is_recorded():
 
 
 def test_without_rotors_the_time_alone_is_said():
-    made = flight().table.filter(regex="time|force")
-    found = basis_of(set_of(Run("a", made)))
+    found = basis_of(set_of(Run("a", flight().table.filter(regex="time|force"))))
     assert found.in_the_air_s is None and found.ground_share is None
     assert found.sentence.startswith("The verdict rests on 40 s of recordings; not recorded: rotor speeds, commands,")
 

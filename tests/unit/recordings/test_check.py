@@ -6,26 +6,19 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
 
-from rotorid.cli import app
 from rotorid.recordings import RecordingSet, Run, Vehicle, write_set
 from rotorid.recordings.check import as_text, check_set
+from tests.command_line import answer, refusal
 
 FLIGHT = Vehicle(
-    name="x",
-    kind="flight",
-    mass_kg=1.0,
-    inertia_kg_m2={"xx": 1e-3, "yy": 1e-3, "zz": 2e-3},
-    rotors=[{"x_m": 0.1, "y_m": 0.1, "spin": "ccw"}],
-    thrust_coefficient_n_s2=1e-6,
-    torque_coefficient_n_m_s2=1e-8,
-)
+    name="x", kind="flight", mass_kg=1.0, inertia_kg_m2={"xx": 1e-3, "yy": 1e-3, "zz": 2e-3},
+    rotors=[{"x_m": 0.1, "y_m": 0.1, "spin": "ccw"}], thrust_coefficient_n_s2=1e-6, torque_coefficient_n_m_s2=1e-8,
+)  # fmt: skip
 
 
 def flight(**columns: np.ndarray) -> RecordingSet:
-    count = len(next(iter(columns.values()), range(100)))
-    time = np.arange(count) * 0.01
+    time = np.arange(len(next(iter(columns.values()), range(100)))) * 0.01
     time[50:] += 0.1
     return RecordingSet("flight", FLIGHT, (Run("a", pd.DataFrame({"time_s": time, **columns})),))
 
@@ -34,10 +27,8 @@ def test_rate_duration_gaps_and_empty_cells() -> None:
     voltage = np.full(100, np.nan)
     voltage[::10] = 12.0
     run = check_set(flight(battery_voltage_v=voltage)).runs[0]
-    assert run.samples == 100
-    assert run.rate_hz == pytest.approx(100.0)
-    assert run.duration_s == pytest.approx(1.09)
-    assert run.gaps == 1
+    assert run.samples == 100 and run.rate_hz == pytest.approx(100.0)
+    assert run.duration_s == pytest.approx(1.09) and run.gaps == 1
     assert run.longest_gap_s == pytest.approx(0.11)
     assert run.empty == {"battery_voltage_v": pytest.approx(0.9)}
     assert run.value_rate_hz["battery_voltage_v"] == pytest.approx(10 / 1.09)
@@ -45,10 +36,8 @@ def test_rate_duration_gaps_and_empty_cells() -> None:
 
 def test_what_is_missing_is_said_with_what_it_means() -> None:
     lacks = " ".join(check_set(flight()).lacks)
-    assert "No rotor speeds, commands or throttles" in lacks
-    assert "force channels are missing" in lacks
-    assert "moment channels are missing" in lacks
-    assert "ground effect cannot be tested" in lacks
+    assert "No rotor speeds, commands or throttles" in lacks and "force channels are missing" in lacks
+    assert "moment channels are missing" in lacks and "ground effect cannot be tested" in lacks
     assert "One run only" in lacks
 
 
@@ -95,17 +84,12 @@ def sensed() -> dict[str, np.ndarray]:
 
 def test_the_command_checks_one_set_or_a_folder_of_them(tmp_path: Path) -> None:
     write_set(flight(**sensed()), tmp_path)
-    runner = CliRunner()
-    one = runner.invoke(app, ["check", str(tmp_path / "flight")])
-    assert one.exit_code == 0
-    assert runner.invoke(app, ["check", str(tmp_path)]).stdout == one.stdout
-    listed = json.loads(runner.invoke(app, ["check", "--json", str(tmp_path)]).stdout)
+    assert answer("check", tmp_path) == answer("check", tmp_path / "flight")
+    listed = json.loads(answer("check", "--json", tmp_path))
     assert listed[0]["runs"][0]["samples"] == 1000
 
 
 def test_the_command_fails_with_the_sentence_of_the_fault(tmp_path: Path) -> None:
     folder = write_set(flight(), tmp_path)
     (folder / "vehicle.yaml").write_text("name: x\n")
-    done = CliRunner().invoke(app, ["check", str(folder)])
-    assert done.exit_code == 1
-    assert "kind: is missing" in done.output
+    assert "kind: is missing" in refusal("check", folder)

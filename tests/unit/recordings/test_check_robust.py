@@ -1,7 +1,5 @@
 """`check` looks at what a verdict takes, needs little for it, and ends in one sentence whatever happens."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path
@@ -9,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
 
-from rotorid.cli import app, console
+from rotorid.cli import console
 from rotorid.recordings import RecordingSet, Run, read_set, read_vehicle
 from rotorid.recordings import columns as c
 from rotorid.recordings.check import check_folder, doubts_of
+from tests.command_line import answer, invoke
 from tests.unit.recordings.wrong_inputs import RUN, SPEEDS, sound, table
 
 
@@ -131,7 +129,7 @@ def test_what_nobody_foresaw_is_one_sentence_and_the_other_sets_are_checked(tmp_
         return ()
 
     monkeypatch.setattr("rotorid.recordings.check.doubts_of", fails_for_a)
-    done = CliRunner().invoke(app, ["check", "--json", str(tmp_path)])
+    done = invoke("check", "--json", tmp_path)
     assert done.exit_code == 1
     (line,) = done.stderr.strip().splitlines()
     assert line.startswith("rotorid: unexpected LinAlgError (Singular matrix) in recordings/check.py, line ")
@@ -148,7 +146,5 @@ def test_the_way_to_an_unexpected_error_can_be_shown(monkeypatch) -> None:
 def test_the_command_s_text_has_the_doubts(tmp_path: Path) -> None:
     folder = sound(tmp_path / "set")
     shutil.copy(folder / "run.csv", folder / "run2.csv")
-    done = CliRunner().invoke(app, ["check", str(folder)])
-    assert done.exit_code == 0
-    assert "Looks wrong:" in done.stdout
-    assert "- Run run2 repeats run run" in done.stdout
+    said = answer("check", folder)
+    assert "Looks wrong:" in said and "- Run run2 repeats run run" in said

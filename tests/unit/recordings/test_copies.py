@@ -1,7 +1,5 @@
 """A run that repeats another is named, however it was shifted; runs of the same manoeuvre are not."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest

@@ -1,7 +1,5 @@
 """Believed values that no multirotor has together: each is named with the unit that would explain it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,11 +7,12 @@ import numpy as np
 import pytest
 
 from rotorid.cli.modelling import fly
-from rotorid.recordings import RecordingSet, Run, Vehicle, read_set, read_vehicle, templates
+from rotorid.recordings import RecordingSet, Vehicle, read_set, read_vehicle, templates
 from rotorid.recordings import columns as c
 from rotorid.recordings.body import body_of, impossible
 from rotorid.recordings.check import doubts_of
 from rotorid.recordings.run import Doubt
+from tests.unit.mismatch.flights import with_table
 
 ROOT = Path(__file__).parents[3]
 RPM = 2 * np.pi / 60
@@ -45,9 +44,8 @@ def believed(recordings: RecordingSet, **factors: float) -> RecordingSet:
     return replace(recordings, vehicle=vehicle.model_copy(update=changed))
 
 
-CF, CQ, LIMITS, J = (
-    "thrust_coefficient_n_s2", "torque_coefficient_n_m_s2", "rotor_speed_limits_rad_s", "inertia_kg_m2",
-)  # fmt: skip
+CF, CQ, LIMITS = "thrust_coefficient_n_s2", "torque_coefficient_n_m_s2", "rotor_speed_limits_rad_s"
+J, G, PLACE = "inertia_kg_m2", "gravity_m_s2", "accelerometer_position_m"
 
 
 @pytest.mark.parametrize(
@@ -76,12 +74,8 @@ CF, CQ, LIMITS, J = (
         ({CQ: 1 / 1.3877e-6}, CQ, "the ratio of torque to thrust in m would fit"),
         ({CQ: 0.3}, CQ, "a figure of merit of 1.68"),
         ({LIMITS: 1 / RPM}, LIMITS, "revolutions per minute would fit"),
-        (
-            {"gravity_m_s2": 1 / 9.81},
-            "gravity_m_s2",
-            "gravity_m_s2 = 1: expected that of the earth, 9.5 to 10.1 m/s²; g",
-        ),
-        ({"gravity_m_s2": 2}, "gravity_m_s2", "gravity_m_s2 = 19.62"),
+        ({G: 1 / 9.81}, G, "gravity_m_s2 = 1: expected that of the earth, 9.5 to 10.1 m/s²; g"),
+        ({G: 2}, G, "gravity_m_s2 = 19.62"),
     ],
     ids=lambda value: str(value)[:40] if isinstance(value, dict) else "",
 )
@@ -108,22 +102,12 @@ def test_a_figure_of_merit_just_above_one_is_said_and_does_not_stop(flown) -> No
     assert "a figure of merit of 1.12" in doubt.sentence
 
 
-def with_columns(recordings: RecordingSet, change, only: tuple[str, ...] = ()) -> RecordingSet:
-    runs = []
-    for run in recordings.runs:
-        table = run.table.copy()
-        if not only or run.name in only:
-            change(table)
-        runs.append(Run(run.name, table))
-    return replace(recordings, runs=tuple(runs))
-
-
 def test_speeds_of_one_run_in_another_unit_are_named_with_the_run(flown) -> None:
     def per_minute(table) -> None:
         table[list(c.rotor_columns("rotor_speed", 4))] /= RPM
 
     last = flown.runs[-1].name
-    (doubt,) = doubts_of(with_columns(flown, per_minute, (last,)))
+    (doubt,) = doubts_of(with_table(flown, per_minute, last))
     assert (doubt.what, doubt.stops) == (SPEED, True)
     assert doubt.sentence.startswith(f"{last}: {SPEED} and its like")
     assert "revolutions per minute would fit" in doubt.sentence
@@ -133,8 +117,7 @@ def test_speeds_of_one_run_in_another_unit_are_named_with_the_run(flown) -> None
     ("volts", "said"), [(-12.0, "the sign is turned"), (16800.0, "mV would fit"), (168.0, "0.1 V would fit")]
 )
 def test_a_battery_that_is_not_in_volts_is_named(flown, volts, said) -> None:
-    recordings = with_columns(flown, lambda table: table.insert(1, c.BATTERY_VOLTAGE, volts))
-    (doubt,) = doubts_of(recordings)
+    (doubt,) = doubts_of(with_table(flown, lambda table: table.insert(1, c.BATTERY_VOLTAGE, volts)))
     assert (doubt.what, doubt.stops) == (c.BATTERY_VOLTAGE, True)
     assert f"has a median of {volts:.4g}, expected 0 to 120 V: {said}" in doubt.sentence
 
@@ -142,11 +125,7 @@ def test_a_battery_that_is_not_in_volts_is_named(flown, volts, said) -> None:
 @pytest.mark.parametrize(
     ("changed", "what", "said"),
     [
-        (
-            {"accelerometer_position_m": (12.0, 0.0, 3.0)},
-            "accelerometer_position_m",
-            "at most 0.247; cm or mm would fit",
-        ),
+        ({PLACE: (12.0, 0.0, 3.0)}, PLACE, "at most 0.247; cm or mm would fit"),
         ({"rotor_inertia_kg_m2": 8.5e-2}, "rotor_inertia_kg_m2", "at most 0.00024; g m² or lb in² or kg cm² would fit"),
     ],
     ids=["accelerometer", "rotor inertia"],
@@ -158,9 +137,7 @@ def test_an_optional_value_in_another_unit_is_named(flown, changed, what, said) 
 
 
 def doubts_without_flight(vehicle: Vehicle) -> list[Doubt]:
-    body = body_of(vehicle)
-    assert body is not None
-    return list(impossible(body))
+    return list(impossible(body_of(vehicle)))
 
 
 VEHICLES = [
@@ -179,5 +156,4 @@ def test_a_stand_is_looked_at_without_its_weight(flown) -> None:
     stand = templates.read("thesis").model_copy(update={"kind": "stand", "mass_kg": None, "inertia_kg_m2": None})
     assert doubts_without_flight(stand) == []
     (doubt,) = doubts_without_flight(stand.model_copy(update={CF: 1.3877e-6 * RPM**2}))
-    assert doubt.what == CF
-    assert "N per rpm² would fit" in doubt.sentence
+    assert doubt.what == CF and "N per rpm² would fit" in doubt.sentence

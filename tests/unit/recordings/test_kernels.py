@@ -1,7 +1,5 @@
 """Zero-phase low-pass and derivative kernels: gains at hand-chosen frequencies, nothing delayed."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d

@@ -1,7 +1,5 @@
 """Sensors whose readings come at random: an even grid of their own, in place of a flight cut into pieces."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -9,12 +7,13 @@ import pandas as pd
 import pytest
 
 from rotorid.cli.modelling import fly
-from rotorid.errors import InputError
 from rotorid.mismatch.evidence.motion import between_readings
 from rotorid.recordings import RecordingSet, Run, read_set, templates
 from rotorid.recordings import columns as c
 from rotorid.recordings.mended import evenly, is_scattered, noise_gain, on_one_side, on_own_rates, own_period_s
 from rotorid.recordings.sufficient import longest_stretch_s, moving_sensors, sufficient
+from tests.refusals import refused
+from tests.unit.mismatch.flights import with_table
 
 SPEEDS = c.rotor_columns("rotor_speed", 4)
 SENSORS = (SPEEDS, c.rotor_columns("rotor_command", 4), c.POSITION, c.VELOCITY, c.QUATERNION,
@@ -30,14 +29,21 @@ def with_holes(recordings: RecordingSet, share: float, by_cell: bool, seed: int 
     """Each sensor loses a share of its rows, or each of its columns of its cells, by chance."""
     rng = np.random.default_rng(seed)
 
-    def holed(run: Run) -> Run:
-        table = run.table.copy()
+    def holed(table: pd.DataFrame) -> None:
         for names in SENSORS:
             for part in [[n] for n in names] if by_cell else [list(names)]:
                 table.loc[rng.random(len(table)) < share, part] = np.nan
-        return replace(run, table=table)
 
-    return replace(recordings, runs=tuple(map(holed, recordings.runs)))
+    return with_table(recordings, holed)
+
+
+def without(names: tuple[str, ...], start_s: float, stop_s: float):
+    """A change of a table: no readings of these columns between two times."""
+
+    def change(table: pd.DataFrame) -> None:
+        table.loc[table[c.TIME].between(start_s, stop_s, "neither"), list(names)] = np.nan
+
+    return change
 
 
 @pytest.mark.parametrize(("share", "by_cell"), [(0.5, False), (0.3, True), (0.5, True)])
@@ -50,11 +56,10 @@ def test_half_empty_columns_are_used_in_one_piece(flown: RecordingSet, share: fl
     assert cut < 3 < 11.5 < whole and 0.01 < slowest < 0.03
     assert len(used.left_out) == len(SENSORS)
     empty = f"({share:.0%} of the cells are empty)"
-    assert any(
-        s.startswith("specific_force_x_m_s2 to specific_force_z_m_s2 come at random") and "the noise is" in s
-        for s in used.left_out
-    ), used.left_out
-    assert any(empty in s for s in used.left_out)
+    (said,) = (
+        s for s in used.left_out if s.startswith("specific_force_x_m_s2 to specific_force_z_m_s2 come at random")
+    )
+    assert "the noise is" in said and any(empty in s for s in used.left_out)
     assert sufficient(used).runs[0].table.equals(used.runs[0].table)  # once is enough
 
 
@@ -117,36 +122,28 @@ def test_commands_that_jitter_faster_than_the_grid_are_averaged_not_sampled() ->
 
 def test_a_hole_of_several_periods_stays_one_and_what_is_even_stays_as_it_is(flown: RecordingSet) -> None:
     holed = with_holes(flown, 0.4, False)
-    table = holed.runs[0].table.copy()
-    lost = (table[c.TIME] > 4) & (table[c.TIME] < 4.5)
-    table.loc[lost, list(c.ANGULAR_VELOCITY)] = np.nan
-    used = sufficient(replace(holed, runs=(replace(holed.runs[0], table=table), holed.runs[1])))
+    used = sufficient(with_table(holed, without(c.ANGULAR_VELOCITY, 4, 4.5), holed.runs[0].name))
     known = used.runs[0].time_s[np.isfinite(used.runs[0].array(c.ANGULAR_VELOCITY)).all(axis=1)]
     gap = np.argmax(np.diff(known))
     assert known[gap] == pytest.approx(4.0, abs=0.03) and known[gap + 1] == pytest.approx(4.5, abs=0.03)
     assert on_own_rates(flown) is flown
-    slow = flown.runs[0].table.copy()
-    slow.loc[slow.index % 5 != 0, list(c.VELOCITY)] = np.nan
-    even = replace(flown, runs=(replace(flown.runs[0], table=slow),))
+    even = with_table(flown, lambda t: t.assign(**{n: t[n].where(t.index % 5 == 0) for n in c.VELOCITY}))
     assert on_own_rates(even) is even
 
 
 def with_bursts(recordings: RecordingSet, lasting_s: float, every_s: float) -> RecordingSet:
     """Each sensor gives nothing for a time, again and again, no two of them at once."""
-    runs = []
-    for run in recordings.runs:
-        table = run.table.copy()
+
+    def burst(table: pd.DataFrame) -> None:
         for k, names in enumerate(SENSORS):
             for start in np.arange(0.3 + 0.07 * k, table[c.TIME].iloc[-1], every_s):
-                inside = (table[c.TIME] > start) & (table[c.TIME] < start + lasting_s)
-                table.loc[inside, list(names)] = np.nan
-        runs.append(replace(run, table=table))
-    return replace(recordings, runs=tuple(runs))
+                without(names, start, start + lasting_s)(table)
+
+    return with_table(recordings, burst)
 
 
 def test_gaps_of_a_tenth_of_a_second_everywhere_are_bridged(flown: RecordingSet) -> None:
-    torn = with_bursts(flown, 0.1, 0.7)
-    used = sufficient(torn)
+    used = sufficient(with_bursts(flown, 0.1, 0.7))
     assert len(used.runs) == 2 and any("brought to an even 50 Hz" in said for said in used.left_out)
     longest, _ = longest_stretch_s(used.runs[0], list(SENSORS))
     assert longest > 11.0
@@ -157,24 +154,20 @@ def test_gaps_of_a_tenth_of_a_second_everywhere_are_bridged(flown: RecordingSet)
 
 
 def test_longer_gaps_everywhere_leave_no_stretch(flown: RecordingSet) -> None:
-    with pytest.raises(InputError, match="the longest stretch in which every sensor has readings lasts 0"):
-        sufficient(with_bursts(flown, 0.3, 0.7))
+    refused("the longest stretch in which every sensor has readings lasts 0", sufficient, with_bursts(flown, 0.3, 0.7))
 
 
 def test_a_run_of_its_own_is_bridged_where_a_gap_would_leave_less_than_is_held_out_of(flown: RecordingSet) -> None:
-    table = flown.runs[0].table.copy()
-    middle = (table[c.TIME] > 6.0) & (table[c.TIME] < 6.08)
-    table.loc[middle, list(c.ANGULAR_VELOCITY)] = np.nan
-    alone = sufficient(replace(flown, runs=(replace(flown.runs[0], table=table),)))
+    one = replace(flown, runs=flown.runs[:1])
+    alone = sufficient(with_table(one, without(c.ANGULAR_VELOCITY, 6.0, 6.08)))
     assert longest_stretch_s(alone.runs[0], list(SENSORS))[0] > 11.0
 
 
 def test_a_sensor_of_next_to_no_readings_is_left_alone(flown: RecordingSet) -> None:
     holed = with_holes(flown, 0.5, False)
-    table = holed.runs[1].table.copy()
-    table.loc[table.index > 30, list(c.VELOCITY)] = np.nan
-    made = on_own_rates(replace(holed, runs=(holed.runs[0], replace(holed.runs[1], table=table))))
-    assert made.runs[1].table[list(c.VELOCITY)].equals(table[list(c.VELOCITY)])
+    holed = with_table(holed, without(c.VELOCITY, holed.runs[1].time_s[30], np.inf), holed.runs[1].name)
+    made = on_own_rates(holed)
+    assert made.runs[1].table[list(c.VELOCITY)].equals(holed.runs[1].table[list(c.VELOCITY)])
     assert not made.runs[0].table[list(c.VELOCITY)].equals(holed.runs[0].table[list(c.VELOCITY)])
 
 

@@ -1,7 +1,5 @@
 """A sensor that stands still for a part of a flight: named by `check`."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import pytest

@@ -1,7 +1,5 @@
 """Wrong recording sets, each with words that its one sentence must hold; made by code, none is kept as a file."""
 
-from __future__ import annotations
-
 import gzip
 import os
 from collections.abc import Callable, Iterator
@@ -100,21 +98,13 @@ def data(change: Callable[[pd.DataFrame], pd.DataFrame], what: str, *said: str) 
 
 def parquet(change: Callable[[pd.DataFrame], pd.DataFrame], what: str, *said: str) -> Wrong:
     """A run as Parquet whose table is changed."""
-
-    def spoil(folder: Path) -> None:
-        (folder / "run.csv").unlink()
-        change(table()).to_parquet(folder / "run.parquet", index=False)
-
+    spoil = _instead("run.parquet", lambda path: change(table()).to_parquet(path, index=False))
     return Wrong(f"parquet {what}", spoil, ("run.parquet", *said))
 
 
 def zipped(content: bytes, what: str, *said: str) -> Wrong:
     """A gzipped run with these bytes."""
-
-    def spoil(folder: Path) -> None:
-        (folder / "run.csv").unlink()
-        (folder / "run.csv.gz").write_bytes(content)
-
+    spoil = _instead("run.csv.gz", lambda path: path.write_bytes(content))
     return Wrong(f"gzip {what}", spoil, ("run.csv.gz", *said))
 
 
@@ -297,9 +287,8 @@ def runs() -> Iterator[Wrong]:
     yield file("run.csv", "\n".join(LINES[:100]) + "\n", "of five seconds", "at least 9 s")
     for encoding in ("utf-16", "utf-16-le", "utf-16-be"):
         yield file("run.csv", RUN.encode(encoding), f"as {encoding}", "UTF-16")
-    yield file(
-        "run.csv", RUN.replace("velocity_x_m_s", "größe_x_m", 1).encode("latin-1"), "as Latin-1", "line 1", "0xf6"
-    )
+    umlauts = RUN.replace("velocity_x_m_s", "größe_x_m", 1)
+    yield file("run.csv", umlauts.encode("latin-1"), "as Latin-1", "line 1", "0xf6")
     yield file("run.csv", RUN.encode() + b"\xff\xfe", "with bytes that are no text", f"line {len(LINES) + 1}", "0xff")
     yield file("run.csv", RUN[:3000].encode() + b"\0" * 40 + RUN[3000:].encode(), "with zero bytes", "zero byte")
     yield file("run.csv", np.random.default_rng(0).bytes(20000), "binary", "run.csv")
@@ -337,60 +326,41 @@ def runs() -> Iterator[Wrong]:
     yield run(cell(len(LINES), 0, "inf"), "that ends at inf", f"line {len(LINES)}", "time_s is inf")
     yield run(cell(7, 0, "0.3"), "with a time there twice", "line 8", "0.3 after 0.3", "increase strictly")
     yield run(cell(7, 0, "-5"), "with a time that goes back", "line 7", "increase strictly")
-    yield run(
-        lambda lines: lines.__setitem__(0, head.replace("time_s", "time")),
-        "time",
-        "time_s is missing",
-        "is time meant?",
-    )
-    yield run(lambda lines: lines.__setitem__(0, head.replace("time_s", "t")), "t", "time_s is missing", "is t meant?")
-    yield run(lambda lines: lines.__setitem__(0, head.replace("time_s", "Time_s")), "Time_s", "time_s is missing")
-    yield run(
-        lambda lines: lines.__setitem__(0, head.replace("_x_m_s,", "_y_m_s,", 1)), "same heading", "is there twice"
-    )
-    yield run(lambda lines: lines.__setitem__(0, head.replace("velocity_x_m_s", "", 1)), "no heading", "has no name")
-    yield run(lambda lines: lines.__setitem__(4, lines[4] + ",5"), "cell too many", "line 5", f"has {WIDTH + 1} cells")
-    yield run(
-        lambda lines: lines.__setitem__(4, lines[4].rsplit(",", 1)[0]),
-        "cell too few",
-        "line 5",
-        f"has {WIDTH - 1} cells",
-    )
-    yield run(
-        lambda lines: lines.__setitem__(slice(1, None), [x + ",1" for x in lines[1:]]),
-        "cells too many",
-        "line 2",
-        "cells",
-    )
-    yield run(
-        lambda lines: lines.__setitem__(slice(1, None), [x + "," for x in lines[1:]]),
-        "comma at each end",
-        "line 2",
-        "cells",
-    )
-    yield run(
-        lambda lines: lines.__setitem__(slice(1, None), ["7," + x for x in lines[1:]]), "index", "line 2", "cells"
-    )
-    yield run(lambda lines: lines.__setitem__(4, '"' + lines[4]), "quote never closed", "run.csv")
-    yield run(lambda lines: lines.__setitem__(0, '"time_s\nx",' + head), "heading over two lines", "run.csv")
+
+    def heading(old: str, new: str) -> Callable[[list[str]], None]:
+        return lambda lines: lines.__setitem__(0, head.replace(old, new, 1))
+
+    def line_5(change: Callable[[str], str]) -> Callable[[list[str]], None]:
+        return lambda lines: lines.__setitem__(4, change(lines[4]))
+
+    def all_but_heading(change: Callable[[str], str]) -> Callable[[list[str]], None]:
+        return lambda lines: lines.__setitem__(slice(1, None), map(change, lines[1:]))
+
+    yield run(heading("time_s", "time"), "time", "time_s is missing", "is time meant?")
+    yield run(heading("time_s", "t"), "t", "time_s is missing", "is t meant?")
+    yield run(heading("time_s", "Time_s"), "Time_s", "time_s is missing")
+    yield run(heading("_x_m_s,", "_y_m_s,"), "same heading", "is there twice")
+    yield run(heading("velocity_x_m_s", ""), "no heading", "has no name")
+    yield run(line_5(lambda line: line + ",5"), "cell too many", "line 5", f"has {WIDTH + 1} cells")
+    yield run(line_5(lambda line: line.rsplit(",", 1)[0]), "cell too few", "line 5", f"has {WIDTH - 1} cells")
+    yield run(all_but_heading(lambda line: line + ",1"), "cells too many", "line 2", "cells")
+    yield run(all_but_heading(lambda line: line + ","), "comma at each end", "line 2", "cells")
+    yield run(all_but_heading(lambda line: "7," + line), "index", "line 2", "cells")
+    yield run(line_5(lambda line: '"' + line), "quote never closed", "run.csv")
+    yield run(heading("time_s", '"time_s\nx",time_s'), "heading over two lines", "run.csv")
     for column, name in ((1, "rotor_speed_0_rad_s"), (4, "rotor_speed_5_rad_s")):
         words = "numbered from 1" if name.endswith("0_rad_s") else "lists 4 rotors only"
         yield run(cell(1, column, name), name, f"column {name}", words)
     yield data(lambda t: t.assign(throttle_9=0.5), "throttle_9", "column throttle_9", "lists 4 rotors only")
     for old, new in (
-        ("rotor_speed_1_rad_s", "rotor_speed1_rad_s"),
-        ("rotor_speed_1_rad_s", "Rotor_Speed_1_rad_s"),
-        ("rotor_speed_1_rad_s", "rotor_speed_01_rad_s"),
-        ("velocity_x_m_s", "velocity_x_ms"),
-        ("velocity_x_m_s", "velocty_x_m_s"),
-        ("quaternion_w", "quarternion_w"),
-        ("angular_velocity_z_rad_s", "angular_velocity_z_rads"),
-        ("specific_force_x_m_s2", "specific_force_x_ms2"),
-    ):
+        ("rotor_speed_1_rad_s", "rotor_speed1_rad_s"), ("rotor_speed_1_rad_s", "Rotor_Speed_1_rad_s"),
+        ("rotor_speed_1_rad_s", "rotor_speed_01_rad_s"), ("velocity_x_m_s", "velocity_x_ms"),
+        ("velocity_x_m_s", "velocty_x_m_s"), ("quaternion_w", "quarternion_w"),
+        ("angular_velocity_z_rad_s", "angular_velocity_z_rads"), ("specific_force_x_m_s2", "specific_force_x_ms2"),
+    ):  # fmt: skip
         rotor = old.startswith("rotor") and new != "rotor_speed_01_rad_s"
-        yield data(
-            lambda t, o=old, n=new: t.rename(columns={o: n}), f"{new} for {old}", old, new if not rotor else "rotor"
-        )
+        said = "rotor" if rotor else new
+        yield data(lambda t, o=old, n=new: t.rename(columns={o: n}), f"{new} for {old}", old, said)
 
 
 def contents() -> Iterator[Wrong]:
@@ -424,12 +394,10 @@ def contents() -> Iterator[Wrong]:
     yield data(put(tuple(LINES[0].split(",")[1:]), 0.0), "all zero", "run.csv")
     yield data(put(tuple(LINES[0].split(",")[5:]), 1.0), "all constant", "nothing can be compared")
     for name, most in (("velocity_x_m_s", 1e5), ("angular_velocity_x_rad_s", 1e6), ("specific_force_x_m_s2", 1e6)):
-        yield data(
-            at(9, (name,), most), f"{name} of {most:g}", f"line 11, column {name}", "expected a number of at most"
-        )
-    yield data(
-        lambda t: t.assign(my_sensor=np.where(t.index == 9, -1e300, 1)), "1e300 in my_sensor", "line 11", "my_sensor"
-    )
+        said = f"line 11, column {name}", "expected a number of at most"
+        yield data(at(9, (name,), most), f"{name} of {most:g}", *said)
+    huge = np.where(table().index == 9, -1e300, 1)
+    yield data(lambda t: t.assign(my_sensor=huge), "1e300 in my_sensor", "line 11", "my_sensor")
     yield data(clock(lambda t: t * 1e3), "in milliseconds", "step of 50 s", "milliseconds?")
     yield data(clock(lambda t: t * 1e6), "in microseconds", "step of 50000 s", "microseconds?")
     yield data(clock(lambda t: t * 1e9), "in nanoseconds", "nanoseconds?")
@@ -438,9 +406,8 @@ def contents() -> Iterator[Wrong]:
     yield data(clock(lambda t: t + 3600 * (t > 5)), "with a clock set to summer time", "line 103", "jumps by 3600.05 s")
     yield data(clock(lambda t: t + 1.7e9 * (t > 5)), "with the clock set", "line 103", "jumps by 1.7e+09 s")
     yield data(clock(lambda t: np.where(t > 9.9, 1e300, t)), "that ends at 1e300", "line 201", "jumps by 1e+300 s")
-    yield data(
-        lambda t: t.assign(**{n: t[n].where(t.index % 40 < 20) for n in SPEEDS}), "with holes", "longest stretch"
-    )
+    holes = {n: table()[n].where(table().index % 40 < 20) for n in SPEEDS}
+    yield data(lambda t: t.assign(**holes), "with holes", "longest stretch")
     yield data(lambda t: t.iloc[:60], "of three seconds", "too little data")
 
 
@@ -452,35 +419,25 @@ def tables() -> Iterator[Wrong]:
     yield parquet(lambda t: t.assign(time_s=text), "with text as time", "row 1, column time_s", "found 'a'")
     yield parquet(lambda t: t.assign(mode=text), "with text in another column", "row 1, column mode")
     yield parquet(lambda t: t.assign(velocity_x_m_s=True), "with true", "row 1, column velocity_x_m_s")
-    yield parquet(
-        lambda t: t.assign(time_s=pd.to_datetime(t["time_s"], unit="s")), "with dates", "row 1, column time_s"
-    )
+    dates = pd.to_datetime(table()["time_s"], unit="s")
+    yield parquet(lambda t: t.assign(time_s=dates), "with dates", "row 1, column time_s")
     yield parquet(lambda t: t.assign(x=[[1.0, 2.0]] * 200), "with lists", "row 1, column x")
     yield parquet(lambda t: t.assign(x=[{"a": 1}] * 200), "with mappings", "row 1, column x")
     yield parquet(lambda t: t.assign(x=[b"\0"] * 200), "with bytes", "row 1, column x")
     yield parquet(lambda t: t.iloc[:0], "without rows", "too little data")
     yield parquet(lambda t: t.iloc[:1], "with one row", "too little data")
-    yield parquet(
-        lambda t: t.assign(time_s=t["time_s"].iloc[::-1].to_numpy()), "backwards", "row 2", "increase strictly"
-    )
+    backwards = table()["time_s"].to_numpy()[::-1]
+    yield parquet(lambda t: t.assign(time_s=backwards), "backwards", "row 2", "increase strictly")
     yield parquet(lambda t: t.assign(velocity_x_m_s=np.inf), "with inf", "row 1, column velocity_x_m_s", "found inf")
     yield parquet(lambda t: t.rename(columns={"velocity_x_m_s": ""}), "with a column without a name", "has no name")
-    yield parquet(
-        lambda t: t.rename(columns={"velocity_x_m_s": "a\nb"}), "with a line break in a name", "control character"
-    )
+    broken_name = {"velocity_x_m_s": "a\nb"}
+    yield parquet(lambda t: t.rename(columns=broken_name), "with a line break in a name", "control character")
 
-    def whole(folder: Path) -> bytes:
-        table().to_parquet(folder / "x", index=False)
-        content = (folder / "x").read_bytes()
-        (folder / "x").unlink()
-        return content
+    def whole() -> bytes:
+        return table().to_parquet(None, index=False)
 
     def broken(change: Callable[[bytes], bytes]) -> Callable[[Path], None]:
-        def spoil(folder: Path) -> None:
-            (folder / "run.csv").unlink()
-            (folder / "run.parquet").write_bytes(change(whole(folder)))
-
-        return spoil
+        return _instead("run.parquet", lambda path: path.write_bytes(change(whole())))
 
     for what, change in (
         ("cut off", lambda x: x[: len(x) // 2]),
@@ -513,30 +470,20 @@ def tables() -> Iterator[Wrong]:
 def splits() -> Iterator[Wrong]:
     """Wrong splits."""
     for text, *said in (
-        ("held_out: 5\n", "expected a list of runs"),
-        ("held_out: run\n", "found run, expected a list of runs"),
-        ("held_out:\n", "found nothing"),
-        ("held_out: []\n", "names no run"),
-        ("held_out: {run: 1}\n", "found keys"),
-        ("held_out: [[a]]\n", "expected names of runs"),
-        ("held_out: [x]\n", "names run x, which is not in the set"),
+        ("held_out: 5\n", "expected a list of runs"), ("held_out: run\n", "found run, expected a list of runs"),
+        ("held_out:\n", "found nothing"), ("held_out: []\n", "names no run"), ("held_out: {run: 1}\n", "found keys"),
+        ("held_out: [[a]]\n", "expected names of runs"), ("held_out: [x]\n", "names run x, which is not in the set"),
         ("held_out: [runn]\n", "names run runn", "did you mean run?"),
-        ("held_out: [run.csv]\n", "names run run.csv", "did you mean run?"),
-        ("held_out: [002]\n", "names run 002"),
-        ("held_out: [yes]\n", "names run yes"),
-        ("held_out: [1e3]\n", "names run 1e3"),
-        ("held_out: [!!binary YQ==]\n", "line 1: found !!binary"),
-        ("held_out: [a, a]\n", "names run a twice"),
+        ("held_out: [run.csv]\n", "names run run.csv", "did you mean run?"), ("held_out: [002]\n", "names run 002"),
+        ("held_out: [yes]\n", "names run yes"), ("held_out: [1e3]\n", "names run 1e3"),
+        ("held_out: [!!binary YQ==]\n", "line 1: found !!binary"), ("held_out: [a, a]\n", "names run a twice"),
         ("held_out: [a, b, run]\n", "every run is held out"),
         ("held_out: [a]\ntraining: [b]\n", "training: no such key is known"),
         ("heldout: [a]\n", "heldout: no such key is known", "did you mean held_out?"),
-        ("held_out: [a]\nheld_out: [b]\n", "twice", "line 2"),
-        ("- a\n", "expected keys with values, found a list"),
-        ("", "found nothing"),
-        ("held_out: [a\n", "not valid YAML"),
-        ("held_out: &a [*a]\n", "refers to itself"),
+        ("held_out: [a]\nheld_out: [b]\n", "twice", "line 2"), ("- a\n", "expected keys with values, found a list"),
+        ("", "found nothing"), ("held_out: [a\n", "not valid YAML"), ("held_out: &a [*a]\n", "refers to itself"),
         ("held_out: ['a\n', b]\n", "held_out"),
-    ):
+    ):  # fmt: skip
         yield split(text, *said)
 
 
@@ -556,12 +503,10 @@ def places() -> Iterator[Wrong]:
         yield place(f"as {name}", _instead(name, Path.mkdir), name, "is a folder")
         yield place(f"pipe as {name}", _instead(name, os.mkfifo), name, "is a pipe")
         yield place(f"loop of links as {name}", _instead(name, lambda p: p.symlink_to(p)), name, "cannot be opened")
-        yield place(
-            f"dangling link as {name}", _instead(name, lambda p: p.symlink_to("nowhere")), name, "where no file is"
-        )
-    yield place(
-        "zero device as run.csv", _instead("run.csv", lambda p: p.symlink_to("/dev/zero")), "run.csv", "is a pipe"
-    )
+        dangling = _instead(name, lambda p: p.symlink_to("nowhere"))
+        yield place(f"dangling link as {name}", dangling, name, "where no file is")
+    device = _instead("run.csv", lambda p: p.symlink_to("/dev/zero"))
+    yield place("zero device as run.csv", device, "run.csv", "is a pipe")
 
 
 def instruments() -> Iterator[Wrong]:
@@ -581,28 +526,18 @@ def instruments() -> Iterator[Wrong]:
         return spoil
 
     for kind in ("bench", "stand"):
-        yield place(
-            f"{kind} that reads one value", instrument(kind, 200, 0.0), "one value in every run", "force_x_n = 2"
-        )
+        one_value = "one value in every run", "force_x_n = 2"
+        yield place(f"{kind} that reads one value", instrument(kind, 200, 0.0), *one_value)
         for count in (10, 40, 65):
-            yield place(
-                f"{kind} of {count} rows", instrument(kind, count, 0.1), "run.csv", "too little data",
-                "at least 3.6 s", "its last third",
-            )  # fmt: skip
+            said = "run.csv", "too little data", "at least 3.6 s", "its last third"
+            yield place(f"{kind} of {count} rows", instrument(kind, count, 0.1), *said)
 
 
 def large() -> Iterator[Wrong]:
     """Sets that are small on the disk, or quickly made, and larger than any recording."""
 
-    def instead(name: str, make: Callable[[Path], object]) -> Callable[[Path], None]:
-        def spoil(folder: Path) -> None:
-            (folder / "run.csv").unlink()
-            make(folder / name)
-
-        return spoil
-
     def case(what: str, name: str, make: Callable[[Path], object], *said: str) -> Wrong:
-        return Wrong(f"large {what}", instead(name, make), (name, *said))
+        return Wrong(f"large {what}", _instead(name, make), (name, *said))
 
     def sparse(content: bytes, size: int) -> Callable[[Path], None]:
         def make(path: Path) -> None:
@@ -627,6 +562,10 @@ def large() -> Iterator[Wrong]:
         options = {"compression": "zstd", "use_dictionary": False}
         parquet_file.write_table(pa.table({"time_s": np.arange(200) / 20.0, "note": text}), path, **options)
 
+    def more_runs(folder: Path) -> None:
+        for number in range(3000):
+            os.link(folder / "run.csv", folder / f"run{number:04}.csv")
+
     words = pa.DictionaryArray.from_arrays(pa.array(np.zeros(5000, "i4")), pa.array(["x" * 1_000_000]))
     lists = pa.concat_arrays([pa.array([[0.0] * 100_000] * 10)] * 25)
     end, samples = gzip.compress(b"", mtime=0), "has more than 5000000 samples"
@@ -637,26 +576,17 @@ def large() -> Iterator[Wrong]:
     yield case("parquet of 200 MB of lists", "run.parquet", columns(250, x=lists), "column x", "found list")
     yield case("parquet of 10 million rows", "run.parquet", columns(10_000_000), samples)
     yield case("CSV of 10 million rows", "run.csv", lambda p: p.write_bytes(b"time_s,x\n" + b"0,0\n" * 10**7), samples)
-    yield case(
-        "gzip of 300 000 parts", "run.csv.gz", lambda p: p.write_bytes(packed + end * 300_000), "20000 gzipped parts"
-    )
+    parts = packed + end * 300_000
+    yield case("gzip of 300 000 parts", "run.csv.gz", lambda p: p.write_bytes(parts), "20000 gzipped parts")
     yield case("sparse file of 3 GB", "run.csv", sparse(b"", 3 * 10**9), "has 3000 MB, expected at most 2500 MB")
     yield case("sparse file of 2 GB", "run.csv", sparse(RUN.encode(), 2 * 10**9), f"line {len(LINES) + 1}", "zero byte")
     yield case("sparse gzip of 2 GB", "run.csv.gz", sparse(packed, 2 * 10**9), "more than 1 MB of zero bytes")
     yield case("sparse parquet of 3 GB", "run.parquet", sparse(b"PAR1", 3 * 10**9), "cannot be read as a table")
-    yield place("large sparse vehicle of 3 GB", sparse_vehicle, "vehicle.yaml", "expected at most 1 MB")
-    yield place("large for its 3000 runs", many_runs, "has 3001 runs, expected at most 1000")
-
-
-def sparse_vehicle(folder: Path) -> None:
-    """A vehicle.yaml of 3 GB that takes no room."""
-    os.truncate(folder / "vehicle.yaml", 3 * 10**9)
-
-
-def many_runs(folder: Path) -> None:
-    """Three thousand runs more, all the same file."""
-    for number in range(3000):
-        os.link(folder / "run.csv", folder / f"run{number:04}.csv")
+    no_room = sparse(VEHICLE.encode(), 3 * 10**9)
+    yield place(
+        "large sparse vehicle of 3 GB", lambda f: no_room(f / "vehicle.yaml"), "vehicle.yaml", "expected at most 1 MB"
+    )
+    yield place("large for its 3000 runs", more_runs, "has 3001 runs, expected at most 1000")
 
 
 def all_wrong() -> list[Wrong]:

@@ -1,7 +1,5 @@
 """Flights and windows written down once more in numpy: what the compiled ones are compared with."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -78,15 +76,10 @@ def _motion(state, time_s, rotor_speed, rotor_acceleration, wind, height_offset)
     size = state.shape[1]
     rotation = rotation_from_quaternion(state[:, 3:7]) if size > 3 else None
     return Motion(
-        time_s=time_s,
-        rotor_speed=rotor_speed,
-        rotor_acceleration=rotor_acceleration,
-        angular_velocity=state[:, 0:3],
-        rotation=rotation,
-        velocity=np.einsum("nji,nj->ni", rotation, state[:, 7:10]) if size > 7 else None,
-        wind=wind,
-        height=height_offset - state[:, 12] if size > 7 else None,
-    )
+        time_s=time_s, rotor_speed=rotor_speed, rotor_acceleration=rotor_acceleration, angular_velocity=state[:, 0:3],
+        rotation=rotation, velocity=np.einsum("nji,nj->ni", rotation, state[:, 7:10]) if size > 7 else None,
+        wind=wind, height=height_offset - state[:, 12] if size > 7 else None,
+    )  # fmt: skip
 
 
 def _rates(vehicle, state, motion, turning, felt) -> np.ndarray:
@@ -105,8 +98,7 @@ def rk4_step(derivative, state, step_s):
     k1 = derivative(0.0, state)
     k2 = derivative(0.5, state + (0.5 * step_s) * k1)
     k3 = derivative(0.5, state + (0.5 * step_s) * k2)
-    k4 = derivative(1.0, state + step_s * k3)
-    out = state + (step_s / 6.0) * (k1 + 2 * (k2 + k3) + k4)
+    out = state + (step_s / 6.0) * (k1 + 2 * (k2 + k3) + derivative(1.0, state + step_s * k3))
     if out.shape[1] > 3:
         out[:, 3:7] /= np.linalg.norm(out[:, 3:7], axis=1, keepdims=True)
     return out

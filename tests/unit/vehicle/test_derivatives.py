@@ -1,7 +1,5 @@
 """Derivatives of a vehicle file: every flight adds the same, files come back as they were, exports fly like ours."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from xml.etree import ElementTree
@@ -9,9 +7,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import yaml
-from typer.testing import CliRunner
 
-from rotorid.cli import app
 from rotorid.effects.contract import Motion
 from rotorid.effects.instant import body_of
 from rotorid.errors import InputError
@@ -35,6 +31,8 @@ from rotorid.vehicle.exports.derivatives import MUJOCO_FILE, ROTORPY_FILE
 from rotorid.vehicle.exports.flown import gazebo_damping_of, in_drake, in_mujoco, in_rotorpy
 from rotorid.vehicle.improved import active_forms, flyable, hover, record_as_stated, simulate_as_stated, wrench_at_rest
 from rotorid.vehicle.simulator import Commands, simulate
+from tests.command_line import answer
+from tests.refusals import refused
 from tests.unit.effects.flown import audit_vehicle, commands, start
 from tests.unit.vehicle.by_numpy import by_numpy
 from tests.unit.vehicle.test_compiled import (
@@ -126,8 +124,7 @@ def test_a_batch_flies_them_and_changes_of_an_effect_and_of_the_mass():
         for name in TRACE[:4]:
             a, b = getattr(flown, name)[i], getattr(alone, name)[0, ::5]
             np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * max(1.0, np.abs(b).max()), err_msg=name)
-    with pytest.raises(InputError, match="has no parameter 'derivatives.X_u'"):
-        Batch(vehicle, 2, {"derivatives.X_u": drag})
+    refused("has no parameter 'derivatives.X_u'", Batch, vehicle, 2, {"derivatives.X_u": drag})
 
 
 def test_a_file_comes_back_byte_for_byte(tmp_path):
@@ -312,8 +309,7 @@ def test_what_drives_a_vehicle_on_makes_no_negative_drag():
 
 @pytest.mark.parametrize("form", NAMES)
 def test_every_form_names_what_it_has_no_place_for(form):
-    vehicle = stated(templates.read("x500"), at_random(QUANTITIES))
-    exported = export_vehicle(vehicle, form)
+    exported = export_vehicle(stated(templates.read("x500"), at_random(QUANTITIES)), form)
     said = [s for s in exported.left_out if s.startswith("derivatives")]
     assert 1 <= len(said) <= 2 and all(len(s) < 220 for s in said)
     assert f"Not expressed: {said[-1]}" in exported.text and "smaller)" in said[-1]
@@ -325,9 +321,8 @@ def test_the_command_writes_the_companion_next_to_the_file(tmp_path):
     write_vehicle(stated(templates.read("thesis")), tmp_path / "v.yaml")
     for form, file in (("rotorpy", ROTORPY_FILE), ("mjcf", MUJOCO_FILE)):
         folder = tmp_path / form
-        done = CliRunner().invoke(app, ["export", str(tmp_path / "v.yaml"), "--to", form, "-o", str(folder / "made")])
-        assert done.exit_code == 0, done.output
-        assert {p.name for p in folder.iterdir()} == {"made", file} and file in done.output
+        said = answer("export", tmp_path / "v.yaml", "--to", form, "-o", folder / "made")
+        assert {p.name for p in folder.iterdir()} == {"made", file} and file in said
 
 
 @pytest.mark.parametrize("name", ["x500", "neurobem"])
@@ -342,8 +337,7 @@ def test_a_control_asks_for_what_the_rotors_make(name):
         "moment_y": (thrust * hub[:, 0]).sum(),
         "moment_z": (vehicle.yaw_signs() * vehicle.torque_coefficients_n_m_s2() * square).sum(),
     }
-    still = Motion(time_s=np.zeros(1), rotor_speed=np.sqrt(square)[None])
-    x = quantities(still, vehicle)[0]
+    x = quantities(Motion(time_s=np.zeros(1), rotor_speed=np.sqrt(square)[None]), vehicle)[0]
     for channel, (quantity, unit) in own_controls(vehicle).items():
         hovering = unit if quantity == "thrust" else 0.0
         assert hovering + unit * x[QUANTITIES.index(quantity)] == pytest.approx(made[channel], rel=2e-3)

@@ -10,15 +10,14 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from rotorid.cli import app
-from rotorid.errors import InputError
 from rotorid.recordings import Vehicle, templates, write_vehicle
 from rotorid.recordings.vehicle import Inertia, Rotor
 from rotorid.vehicle.exports import NAMES, export_vehicle, flown, forms
 from rotorid.vehicle.exports.flown import commands_of, in_drake, in_mujoco, in_pybullet, in_rotorpy, lagging
 from rotorid.vehicle.mixer import hover_speed_rad_s
+from tests.command_line import answer, refusal
+from tests.refusals import refused
 
 
 def with_effects(*effects: tuple[str, str, dict[str, float]]) -> Vehicle:
@@ -37,10 +36,8 @@ FLAP = ("flapping_moment", "at the hubs", {"k_flap": 2e-7})
 @pytest.mark.parametrize("effects", [(DRAG,), (OFFSET,), (PRODUCTS, FLAP)])
 def test_rotorpy_flies_the_same(effects) -> None:
     vehicle = with_effects(*effects)
-    exported = export_vehicle(vehicle, "rotorpy")
-    found = in_rotorpy(vehicle, exported, 0.05)
-    assert found.position_m < 1e-6 * found.flown_m
-    assert found.angle_rad < 1e-4 * found.turned_rad
+    found = in_rotorpy(vehicle, export_vehicle(vehicle, "rotorpy"), 0.05)
+    assert found.position_m < 1e-6 * found.flown_m and found.angle_rad < 1e-4 * found.turned_rad
     plain = in_rotorpy(vehicle, export_vehicle(with_effects(), "rotorpy"), 0.05)
     assert plain.position_m > 100 * found.position_m  # the effects show: the comparison could fail
 
@@ -49,8 +46,7 @@ def test_rotorpy_flies_the_same(effects) -> None:
 def test_the_lag_of_the_motors_goes_along() -> None:
     vehicle = with_effects(("motor_lag", "one constant", {"tau": 0.03}))
     found = in_rotorpy(vehicle, export_vehicle(vehicle, "rotorpy"), 0.1)
-    assert found.position_m < 1e-3 * found.flown_m
-    assert found.angle_rad < 0.02 * found.turned_rad
+    assert found.position_m < 1e-3 * found.flown_m and found.angle_rad < 0.02 * found.turned_rad
 
 
 @pytest.mark.slow
@@ -58,8 +54,7 @@ def test_mujoco_flies_the_same() -> None:
     pytest.importorskip("mujoco")
     vehicle = with_effects(OFFSET, PRODUCTS)
     found = in_mujoco(vehicle, export_vehicle(vehicle, "mjcf"), 0.3)
-    assert found.position_m < 1e-3 * found.flown_m
-    assert found.angle_rad < 0.02 * found.turned_rad
+    assert found.position_m < 1e-3 * found.flown_m and found.angle_rad < 0.02 * found.turned_rad
 
 
 LAG = ("motor_lag", "up and down", {"tau_up": 0.02, "tau_down": 0.04})
@@ -85,8 +80,7 @@ def other_than_a_file_holds() -> Vehicle:
 def test_a_trial_flight_compares_with_what_the_file_holds(form: str, fly) -> None:
     pytest.importorskip({"rotorpy": "rotorpy", "mjcf": "mujoco"}[form])
     vehicle = other_than_a_file_holds()
-    exported = export_vehicle(vehicle, form)
-    found = fly(vehicle, exported, 0.1)
+    found = fly(vehicle, export_vehicle(vehicle, form), 0.1)
     assert found.position_m < 1e-8 * found.flown_m and found.angle_rad < 1e-7 * found.turned_rad
     # With what the file leaves out ours parts from it: the comparison could fail.
     time, speeds = commands_of(vehicle, 0.1)
@@ -129,11 +123,8 @@ def test_rotorpy_hovers_from_the_state_of_the_file() -> None:
 
 def test_the_page_lists_what_each_form_holds() -> None:
     page = (Path(__file__).parents[3] / "docs/own-vehicle.md").read_text()
-    rows = [
-        line.strip("| ").split(" | ")
-        for line in page.split("| `FORM` |")[1].split("\n\n")[0].splitlines()
-        if line.startswith("| `")
-    ]
+    table = page.split("| `FORM` |")[1].split("\n\n")[0].splitlines()
+    rows = [line.strip("| ").split(" | ") for line in table if line.startswith("| `")]
     listed = {form.strip("`"): set(re.findall("`([a-z_]+)`", held)) for form, _, held in rows}
     assert listed == forms.KNOWS
     assert set(forms.KNOWS) == set(NAMES)
@@ -155,8 +146,7 @@ def test_the_sdf_model_flies_the_same_in_drake(effects) -> None:
     vehicle = with_effects(*effects)
     exported = export_vehicle(vehicle, "sdf")
     found = in_drake(vehicle, exported)
-    assert found.position_m < 5e-5 * found.flown_m
-    assert found.angle_rad < 5e-3 * found.turned_rad
+    assert found.position_m < 5e-5 * found.flown_m and found.angle_rad < 5e-3 * found.turned_rad
     # A sense the wrong way round shows: the comparison could fail.
     swapped = exported.text.replace(">ccw<", ">?<").replace(">cw<", ">ccw<").replace(">?<", ">cw<")
     assert in_drake(vehicle, dataclasses.replace(exported, text=swapped)).angle_rad > 100 * found.angle_rad
@@ -170,8 +160,7 @@ def test_the_urdf_flies_the_same_in_bullet(template: str, effects) -> None:
     vehicle = templates.read(template).model_copy(update={"effects": with_effects(*effects).effects})
     exported = export_vehicle(vehicle, "gym-pybullet-drones")
     found = in_pybullet(vehicle, exported, damping=0)
-    assert found.position_m < 5e-5 * found.flown_m
-    assert found.angle_rad < 5e-3 * found.turned_rad
+    assert found.position_m < 5e-5 * found.flown_m and found.angle_rad < 5e-3 * found.turned_rad
     turned = in_pybullet(vehicle, dataclasses.replace(exported, mirrored=not exported.mirrored), damping=0)
     assert turned.angle_rad > 100 * found.angle_rad
     # What the tool's own damping does is named, and is far more than the export's error.
@@ -205,21 +194,18 @@ def test_px4_parameters_say_places_and_senses() -> None:
 
 def test_the_exported_file_is_python_and_an_unknown_form_is_told(tmp_path) -> None:
     write_vehicle(with_effects(DRAG), tmp_path / "v.yaml")
-    done = CliRunner().invoke(app, ["export", str(tmp_path / "v.yaml"), "--to", "px4", "-o", str(tmp_path / "x")])
-    assert done.exit_code == 0 and (tmp_path / "x").is_file()
+    answer("export", tmp_path / "v.yaml", "--to", "px4", "-o", tmp_path / "x")
+    assert (tmp_path / "x").is_file()
     scope: dict = {}
     exec(export_vehicle(with_effects(DRAG), "rotorpy").text, scope)
     assert scope["quad_params"]["k_d"] == 6e-5
-    done = CliRunner().invoke(app, ["export", str(tmp_path / "v.yaml"), "--to", "rotorpi"])
-    assert done.exit_code == 1 and "did you mean rotorpy?" in done.output
+    assert "did you mean rotorpy?" in refusal("export", tmp_path / "v.yaml", "--to", "rotorpi")
 
 
 def matrix_of(element, prefix: str = "") -> np.ndarray:
     """The inertia of an SDF or URDF element, (3, 3)."""
-    get = (lambda k: float(element.findtext(f"i{k}"))) if not prefix else (lambda k: float(element.get(f"i{k}")))
-    return np.array(
-        [[get("xx"), get("xy"), get("xz")], [get("xy"), get("yy"), get("yz")], [get("xz"), get("yz"), get("zz")]]
-    )
+    get = element.get if prefix else element.findtext
+    return np.array([[float(get(f"i{''.join(sorted(a + b))}")) for a in "xyz"] for b in "xyz"])
 
 
 def numbers(text: str) -> np.ndarray:
@@ -227,17 +213,14 @@ def numbers(text: str) -> np.ndarray:
 
 
 def test_sdf_carries_the_vehicles_mass_and_inertia_once() -> None:
-    vehicle = with_effects(
-        DRAG, OFFSET, PRODUCTS, ("motor_lag", "up and down", {"tau_up": 0.03, "tau_down": 0.05}), FLAP
-    )
+    lag = ("motor_lag", "up and down", {"tau_up": 0.03, "tau_down": 0.05})
+    vehicle = with_effects(DRAG, OFFSET, PRODUCTS, lag, FLAP)
     exported = export_vehicle(vehicle, "sdf")
     model = ElementTree.fromstring(exported.text).find("model")
     mass, first, spread = 0.0, np.zeros(3), np.zeros((3, 3))
     for link in model.findall("link"):
         inertial = link.find("inertial")
-        place = (
-            numbers(link.findtext("pose", "0 0 0 0 0 0"))[:3] + numbers(inertial.findtext("pose", "0 0 0 0 0 0"))[:3]
-        )
+        place = sum(numbers(part.findtext("pose", "0 0 0 0 0 0"))[:3] for part in (link, inertial))
         own = float(inertial.findtext("mass"))
         mass, first = mass + own, first + own * place
         spread += matrix_of(inertial.find("inertia")) + own * (place @ place * np.eye(3) - np.outer(place, place))
@@ -265,9 +248,8 @@ def test_gym_pybullet_drones_makes_our_forces_of_the_same_speeds(order: str) -> 
     assert float(root[1][0][1].get("value")) == pytest.approx(vehicle.mass_kg)
     np.testing.assert_allclose(matrix_of(root[1][0][2], "u"), vehicle.inertia_kg_m2.matrix(), rtol=1e-8)
     assert float(root[1][2][1][0].get("radius")) > 0
-    places = [
-        numbers(link.find("inertial/origin").get("xyz")) for link in root.findall("link") if "prop" in link.get("name")
-    ]
+    props = [link for link in root.findall("link") if "prop" in link.get("name")]
+    places = [numbers(link.find("inertial/origin").get("xyz")) for link in props]
     said = next(s for s in exported.left_out if s.startswith("order of the rotors"))
     rotors = [int(w.strip(",")) - 1 for w in said.split("are rotors ")[1].split(" here")[0].split()]
     speed = np.array([500.0, 520.0, 480.0, 510.0])
@@ -285,12 +267,10 @@ def test_gym_pybullet_drones_makes_our_forces_of_the_same_speeds(order: str) -> 
 
 
 def test_gym_pybullet_drones_refuses_what_it_cannot_fly() -> None:
-    plus = with_effects().model_copy(
-        update={"rotors": tuple(r.model_copy(update={"y_m": 0.0}) for r in with_effects().rotors)}
-    )
-    for vehicle in (plus, with_effects().model_copy(update={"rotors": with_effects().rotors[:3]})):
+    four = with_effects().rotors
+    for rotors in (tuple(r.model_copy(update={"y_m": 0.0}) for r in four), four[:3]):
         with pytest.raises(ValueError, match="gym-pybullet-drones"):
-            export_vehicle(vehicle, "gym-pybullet-drones")
+            export_vehicle(with_effects().model_copy(update={"rotors": rotors}), "gym-pybullet-drones")
 
 
 THRUST_LAG = ("motor_lag", "on thrust", {"tau": 0.04})
@@ -319,8 +299,7 @@ def test_a_lag_of_the_thrust_goes_along_wherever_a_lag_is_known() -> None:
     actuators = ElementTree.fromstring(mjcf.text).findall("actuator/general")
     assert [(a.get("dyntype"), float(a.get("dynprm"))) for a in actuators] == [("filterexact", 0.04)] * 4
     assert mjcf.left_out == ()
-    nearly = export_vehicle(with_effects(LAG), "mjcf")
-    assert "taken as one of the thrust, 0.03 s" in nearly.left_out[0]
+    assert "taken as one of the thrust, 0.03 s" in export_vehicle(with_effects(LAG), "mjcf").left_out[0]
     for form in ("gym-pybullet-drones", "px4"):
         assert any(s.startswith("motor_lag (on thrust") for s in export_vehicle(vehicle, form).left_out)
 
@@ -355,21 +334,20 @@ def test_px4_has_a_map_of_its_own_for_a_thrust_curve_of_the_throttle() -> None:
     assert "THR_MDL_FAC\t1\t" in export_vehicle(limited(), "px4").text
 
 
-def exported_by_command(folder, vehicle: Vehicle, form: str, file: str):
+def export_words(folder, vehicle: Vehicle, form: str, file: str) -> list:
+    """The command that exports a vehicle to `folder`/out."""
     write_vehicle(vehicle, folder / "v.yaml")
-    return CliRunner().invoke(app, ["export", str(folder / "v.yaml"), "--to", form, "-o", str(folder / "out" / file)])
+    return ["export", folder / "v.yaml", "--to", form, "-o", folder / "out" / file]
 
 
 @pytest.mark.parametrize(("form", "module"), [("rotorpy", "rotorpy"), ("mjcf", "mujoco")])
 def test_the_trial_flight_is_made_for_any_chain(tmp_path, monkeypatch, form: str, module: str) -> None:
     pytest.importorskip(module)
-    done = exported_by_command(tmp_path, with_effects(*CHAIN, NEAR_GROUND, DRAG), form, "vehicle")
-    assert done.exit_code == 0, done.output
-    assert "next to our own flight of what the file holds" in done.output and (tmp_path / "out" / "vehicle").is_file()
+    said = answer(*export_words(tmp_path, with_effects(*CHAIN, NEAR_GROUND, DRAG), form, "vehicle"))
+    assert "next to our own flight of what the file holds" in said and (tmp_path / "out" / "vehicle").is_file()
     fly = {"rotorpy": in_rotorpy, "mjcf": in_mujoco}[form]
     vehicle = with_effects(*CHAIN)
-    exported = export_vehicle(vehicle, form)
-    found = fly(vehicle, exported)
+    found = fly(vehicle, export_vehicle(vehicle, form))
     assert found.position_m < 1e-4 * found.flown_m and found.angle_rad < 5e-3 * found.turned_rad
     # Twice the lag shows: the comparison could fail.
     other = export_vehicle(with_effects(("motor_lag", "on thrust", {"tau": 0.08})), form)
@@ -383,9 +361,7 @@ def test_a_trial_that_fails_is_one_sentence_and_the_file_is_there(tmp_path, monk
         raise trouble
 
     monkeypatch.setitem(flown.FLYERS, "rotorpy", ("a_module_that_nobody_has", fail))
-    done = exported_by_command(tmp_path, with_effects(THRUST_LAG), "rotorpy", "vehicle.py")
-    assert done.exit_code == 0, done.output
-    last = done.output.splitlines()[-1].strip()
+    last = answer(*export_words(tmp_path, with_effects(THRUST_LAG), "rotorpy", "vehicle.py")).splitlines()[-1].strip()
     assert last.startswith("not flown there") or last == "the trial flight there did not end: it fell"
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["vehicle.py"]
 
@@ -410,9 +386,7 @@ def six_rotors() -> Vehicle:
     ],
 )
 def test_what_a_tool_does_not_take_is_one_sentence_before_anything_is_written(tmp_path, vehicle, form, said) -> None:
-    done = exported_by_command(tmp_path, vehicle, form, "file")
-    assert done.exit_code == 1 and said in done.output
-    assert len(done.output.strip().splitlines()) == 1 and not (tmp_path / "out").exists()
+    assert said in refusal(*export_words(tmp_path, vehicle, form, "file")) and not (tmp_path / "out").exists()
 
 
 def test_a_tool_refuses_what_is_refused_for_it(monkeypatch) -> None:
@@ -420,8 +394,7 @@ def test_a_tool_refuses_what_is_refused_for_it(monkeypatch) -> None:
     monkeypatch.setattr("rotorid.vehicle.exports.refusal", lambda *asked: "")
     for vehicle, form, module in ((FLAT, "mjcf", "mujoco"), (six_rotors(), "rotorpy", "rotorpy")):
         pytest.importorskip(module)
-        with pytest.raises(InputError, match="does not read the exported vehicle"):
-            flown.try_out(vehicle, form, export_vehicle(vehicle, form))
+        refused("does not read the exported vehicle", flown.try_out, vehicle, form, export_vehicle(vehicle, form))
 
 
 def test_other_tools_take_what_one_refuses() -> None:
@@ -434,6 +407,5 @@ def test_other_tools_take_what_one_refuses() -> None:
 def test_a_file_that_the_tool_does_not_read_is_not_written(tmp_path, monkeypatch) -> None:
     pytest.importorskip("mujoco")
     monkeypatch.setattr("rotorid.vehicle.exports.refusal", lambda *asked: "")
-    done = exported_by_command(tmp_path, FLAT, "mjcf", "v.xml")
-    assert done.exit_code == 1 and "MuJoCo does not read the exported vehicle" in done.output
-    assert len(done.output.strip().splitlines()) == 1 and not (tmp_path / "out").exists()
+    said = refusal(*export_words(tmp_path, FLAT, "mjcf", "v.xml"))
+    assert "MuJoCo does not read the exported vehicle" in said and not (tmp_path / "out").exists()

@@ -98,11 +98,7 @@ def test_matches_an_independent_integration_with_drag():
     recorded = States(truth[:, :3], truth[:, 3:7], truth[:, 7:10], truth[:, 10:])
     speeds = np.array([speed_of(t) for t in time])
     found = simulate_windows(vehicle, [(drag, values)], time, Inputs(speeds), recorded, step_s=0.002)
-    for name, columns in (
-        ("angular_velocity", slice(0, 3)),
-        ("velocity", slice(7, 10)),
-        ("position", slice(10, 13)),
-    ):
+    for name, columns in (("angular_velocity", slice(0, 3)), ("velocity", slice(7, 10)), ("position", slice(10, 13))):
         np.testing.assert_allclose(getattr(found.predicted, name), truth[found.sample][..., columns], atol=3e-6)
     plain = simulate_windows(vehicle, [], time, Inputs(speeds), recorded, step_s=0.002)
     assert np.abs(plain.predicted.velocity[:, -1] - truth[found.sample[:, -1], 7:10]).max() > 0.05
@@ -145,8 +141,7 @@ def test_windows_avoid_gaps_and_missing_samples():
 
 def test_long_steps_pass_over_samples():
     sample = plan_windows(np.arange(1001) / 1000, 0.5, step_s=0.01)
-    assert sample.shape == (2, 51)
-    assert list(sample[0, :3]) == [0, 10, 20]
+    assert sample.shape == (2, 51) and list(sample[0, :3]) == [0, 10, 20]
 
 
 @pytest.mark.parametrize("spins, count", [(("ccw",), 1), (("ccw", "cw") * 3, 6)])
@@ -166,8 +161,7 @@ def test_every_wrench_form_of_the_catalogue_can_be_simulated():
     time, speed_of, start = manoeuvre(201)
     truth = reference(vehicle, speed_of, start, time, lambda t, R, v, W: np.zeros(3))
     recorded = States(truth[:, :3], truth[:, 3:7], truth[:, 7:10], truth[:, 10:])
-    speeds = np.array([speed_of(t) for t in time])
-    inputs = Inputs(speeds, voltage=np.full(201, 11.0))
+    inputs = Inputs(np.array([speed_of(t) for t in time]), voltage=np.full(201, 11.0))
     tried = 0
     for effect in catalogue().values():
         if effect.kind != "physics":
@@ -189,10 +183,7 @@ def test_effects_of_a_vehicle_file():
     for entry, message in (
         (dict(id="magic"), "entry 1 has id 'magic', expected one of"),
         (dict(id="translational_lift", parameters={"k_h": 1}), "has form None, expected one of at the hubs"),
-        (
-            dict(id="translational_lift", form="at the hubs", parameters={"k": 1}),
-            "gives parameters k, expected k_h",
-        ),
+        (dict(id="translational_lift", form="at the hubs", parameters={"k": 1}), "gives parameters k, expected k_h"),
     ):
         with pytest.raises(ValueError, match=message):
             active_forms(thesis_vehicle(effects=[entry]))

@@ -6,16 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import rotorid
-from rotorid.cli import app
-from rotorid.errors import InputError
 from rotorid.identify.autopilot import MAPS, as_text, lagging, parameters_of, specific_drag
 from rotorid.identify.correlated import autoregression, fit
 from rotorid.recordings import RecordingSet, Run, write_set
 from rotorid.recordings import columns as c
 from rotorid_proof.autopilot_coverage import counted, drawn, flight, signal_of
+from tests.command_line import answer
+from tests.refusals import refused
 
 THROTTLES = c.rotor_columns("throttle", 4)
 
@@ -135,23 +134,19 @@ def test_what_the_recordings_lack_is_said() -> None:
     still = replace(made, runs=(Run("flight", table.drop(columns=list(c.VELOCITY))),))
     assert "drag needs attitude and velocity" in by_name(parameters_of(still, "px4"))["EKF2_MCOEF"].sentence
     blind = replace(made, runs=(Run("flight", table.drop(columns=list(c.SPECIFIC_FORCE))),))
-    with pytest.raises(InputError, match="need an accelerometer"):
-        parameters_of(blind, "px4")
-    with pytest.raises(InputError, match="did you mean betaflight?"):
-        parameters_of(made, "betaflihgt")
+    refused("need an accelerometer", parameters_of, blind, "px4")
+    refused("did you mean betaflight?", parameters_of, made, "betaflihgt")
 
 
 def test_the_command_writes_what_the_tool_loads(tmp_path: Path) -> None:
     rng = np.random.default_rng(11)
     truth = drawn("px4", rng)
-    made = flight(truth, rng, 25.0)
-    write_set(replace(made, name="set"), tmp_path)
+    write_set(replace(flight(truth, rng, 25.0), name="set"), tmp_path)
     file = tmp_path / "x.params"
-    done = CliRunner().invoke(app, ["parameters", str(tmp_path / "set"), "--to", "px4", "-o", str(file)])
-    assert done.exit_code == 0, done.output
+    answer("parameters", tmp_path / "set", "--to", "px4", "-o", file)
     rows = [line.split("\t") for line in file.read_text().splitlines() if line[0] != "#"]
     values = {name: float(value) for _, _, name, value, _ in rows}
     assert values["THR_MDL_FAC"] == pytest.approx(truth.shapes[0], abs=0.1)
     assert not set(values) & {"hover_signal", "motor_time_constant_s"}
-    said = CliRunner().invoke(app, ["parameters", str(tmp_path / "set"), "--to", "px4", "--json"])
-    assert {p["name"] for p in json.loads(said.stdout)} >= {"THR_MDL_FAC", "MPC_THR_HOVER", "EKF2_BCOEF_X"}
+    said = answer("parameters", tmp_path / "set", "--to", "px4", "--json")
+    assert {p["name"] for p in json.loads(said)} >= {"THR_MDL_FAC", "MPC_THR_HOVER", "EKF2_BCOEF_X"}

@@ -37,16 +37,9 @@ def write_log(
         data += rawlog.pack_chunk(rawlog.RECEIVED, frame.clock_us * 1000, encode(frame))
     path.write_bytes(data)
     session = Session(
-        id=name,
-        instrument=instrument,
-        started=started,
-        host_start_ns=0,
-        setup=setup,
-        marks=marks,
-        counts=Counts(samples=len(values)),
-        ended=ended,
-        log=path.name,
-    )
+        id=name, instrument=instrument, started=started, host_start_ns=0, setup=setup, marks=marks,
+        counts=Counts(samples=len(values)), ended=ended, log=path.name,
+    )  # fmt: skip
     write_session(session, session_path(path))
     return path
 

@@ -111,15 +111,11 @@ def test_a_recording_that_moves_a_slope_by_seven_per_cent_is_in_table_and_figure
     entry = {"cell": 3, "a0_gf": line.a0, "a1_gf_per_10uv": line.a1, "r": line.r, **loadcell.flags_as_dict(flagged)}
     assert abs(line.a1 / 40 - 1) == pytest.approx(0.07, abs=0.005) and line.r == pytest.approx(0.951, abs=1e-3)
     (row,) = loadcell.flags_as_table([entry]).to_dict("records")
-    assert (
-        (row["id"], row["flag"]) == ("r16", "no load was on")
-        and row["a1_with"] == line.a1
-        and row["a1_without"] == pytest.approx(40, rel=1e-3)
-    )
-    shown = flagged.assign(flag=flagged["flag"].replace("", None))
-    figure = plots.calibration_residuals(
-        pd.concat([shown.assign(cell=cell) for cell in range(1, 7)]), [{**entry, "cell": cell} for cell in range(1, 7)]
-    )
+    assert (row["id"], row["flag"], row["a1_with"]) == ("r16", "no load was on", line.a1)
+    assert row["a1_without"] == pytest.approx(40, rel=1e-3)
+    shown, cells_ = flagged.assign(flag=flagged["flag"].replace("", None)), range(1, 7)
+    each = pd.concat([shown.assign(cell=cell) for cell in cells_])
+    figure = plots.calibration_residuals(each, [{**entry, "cell": cell} for cell in cells_])
     (cross,) = (drawn for drawn in figure.axes[0].lines if drawn.get_marker() == "x")
     assert cross.get_xdata().tolist() == [500.5]
 
@@ -147,9 +143,8 @@ def test_the_thesis_table_has_no_flag_until_a_reading_is_spoilt(tmp_path) -> Non
     spoilt = pd.read_csv(THESIS / "table_2_7.csv")
     spoilt.loc[4, "cell_2_1e-5_v"] = 0.002
     spoilt.to_csv(tmp_path / "t.csv", index=False)
-    calibrate_load_cells.main(
-        str(THESIS / "table_2_6.csv"), str(tmp_path / "t.csv"), str(THESIS / "table_2_8.csv"), str(tmp_path / "o.json")
-    )
+    files = (THESIS / "table_2_6.csv", tmp_path / "t.csv", THESIS / "table_2_8.csv", tmp_path / "o.json")
+    calibrate_load_cells.main(*map(str, files))
     result = json.loads((tmp_path / "o.json").read_text())
     assert [len(cell["flagged"]) for cell in result["cells"]] == [0, 1, 0, 0, 0, 0]
     assert result["warnings"][0].startswith("cell 2, line 6: 343.445 gf as noted, ")

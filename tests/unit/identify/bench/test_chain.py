@@ -4,12 +4,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.errors import InputError
 from rotorid.identify import bench as reconstruct
 from rotorid.identify import bench_tests as static
 from rotorid.identify.bench import CELLS, GF_N, SPIKE, Filter, bench_force, bench_set, prepare
 from rotorid.io.logs import read_sessions, read_tables
 from rotorid.io.session import Ended, Setup
+from tests.refusals import refused
 
 from .logs import cells, write_log
 from .test_reconstruct import GEOMETRY, forces_by_matrix
@@ -40,6 +40,12 @@ def tables(paths, folder):
     return samples, read_sessions(folder / "sessions.csv")
 
 
+def prepared(paths, folder):
+    """Samples of logs, filtered, and their recordings."""
+    samples, sessions = tables(paths, folder)
+    return prepare(samples, sessions, SETTINGS), sessions
+
+
 def test_logs_become_tidy_tables(tmp_path) -> None:
     samples, sessions = tables(calibration_logs(tmp_path), tmp_path)
     assert len(samples) == 24 * 200 and len(sessions) == 24
@@ -62,18 +68,14 @@ def test_a_log_that_did_not_end_is_listed_but_not_used(tmp_path) -> None:
 def test_logs_that_cannot_be_one_table_are_named(tmp_path) -> None:
     first = calibration_logs(tmp_path)[0]
     other = write_log(tmp_path, "t", "tensile", np.zeros((5, 2)), Setup(kind="tensile"), {})
-    with pytest.raises(InputError, match=r"t\.rlog: is of a tensile, expected one of a bench"):
-        read_tables([first, other])
+    refused(r"t\.rlog: is of a tensile, expected one of a bench", read_tables, [first, other])
     first.with_suffix(".yaml").unlink()
-    with pytest.raises(InputError, match="its metadata file is missing"):
-        read_tables([first])
-    with pytest.raises(InputError, match="no raw logs to read"):
-        read_tables([])
+    refused("its metadata file is missing", read_tables, [first])
+    refused("no raw logs to read", read_tables, [])
 
 
 def test_the_line_that_made_the_readings_comes_back(tmp_path) -> None:
-    samples, sessions = tables(calibration_logs(tmp_path), tmp_path)
-    readings = reconstruct.readings(prepare(samples, sessions, SETTINGS), sessions)
+    readings = reconstruct.readings(*prepared(calibration_logs(tmp_path), tmp_path))
     # The zero of 1e-4 V is tared away; 100 gf read (100 − 0.5)/40 = 2.4875.
     assert readings.loc[readings["weight_gf"] == 100, "reading_10uv"].to_numpy() == pytest.approx(2.4875, abs=4e-3)
     # Of 140 samples under load the first 25 fill the window, and the filter takes as long to settle.
@@ -88,15 +90,8 @@ def test_the_line_that_made_the_readings_comes_back(tmp_path) -> None:
 
 def test_repeatability_and_linearity_by_hand() -> None:
     # Readings of 0 and 10 gf, twice each, 1 apart: on the line 0.5 | 10.5 nothing is left but ± 0.5.
-    table = pd.DataFrame(
-        {
-            "weight_gf": [0.0, 0.0, 10.0, 10.0, 5.0, 5.0],
-            "reading_10uv": [-0.5, 0.5, 9.5, 10.5, 5.5, 6.5],
-            "noise_10uv": 0.1,
-            "slope_v_s": 0.0,
-        }
-    )
-    found = reconstruct.calibrate_cell(table, np.zeros(3))
+    table = {"weight_gf": [0.0, 0.0, 10.0, 10.0, 5.0, 5.0], "reading_10uv": [-0.5, 0.5, 9.5, 10.5, 5.5, 6.5]}
+    found = reconstruct.calibrate_cell(pd.DataFrame(table | {"noise_10uv": 0.1, "slope_v_s": 0.0}), np.zeros(3))
     by_weight = found["a0_gf"] + found["a1_gf_per_10uv"] * np.array([0.0, 10.0, 6.0])
     assert found["linearity_gf"] == pytest.approx(np.abs(by_weight - [0, 10, 5]).max())
     # Two readings 1 apart have a standard deviation of 1/√2, times the slope.
@@ -108,8 +103,7 @@ def test_a_weight_put_on_long_after_its_mark_is_waited_for(tmp_path) -> None:
     loaded = np.array([2e-5, 0, 0, 0, 0, 0])
     setup = Setup(kind="calibration", cell=1, load_gf=80.0, repeat=1)
     path = write_log(tmp_path, "late", "bench", cells(loaded, rest=120, load=140), setup, {"load": 50})
-    samples, sessions = tables([path], tmp_path)
-    readings = reconstruct.readings(prepare(samples, sessions, SETTINGS), sessions)
+    readings = reconstruct.readings(*prepared([path], tmp_path))
     assert readings["reading_10uv"].item() == pytest.approx(2.0, abs=1e-3)
 
 
@@ -118,9 +112,8 @@ def test_a_reading_that_never_settles_is_refused(tmp_path) -> None:
     values[60:, 0] += np.linspace(0, 1e-4, 140)
     setup = Setup(kind="calibration", cell=1, load_gf=50.0, repeat=1)
     path = write_log(tmp_path, "drifting", "bench", values, setup, {"load": 61})
-    samples, sessions = tables([path], tmp_path)
-    with pytest.raises(InputError, match="drifting: the reading was not steady for the last 50 samples"):
-        reconstruct.readings(prepare(samples, sessions, SETTINGS), sessions)
+    said = "drifting: the reading was not steady for the last 50 samples"
+    refused(said, reconstruct.readings, *prepared([path], tmp_path))
 
 
 MARKS = {"tare_start": 20, "tare_stop": 44, "load": 70, "read_start": 120, "read_stop": 169}
@@ -136,10 +129,9 @@ def static_log(folder, name, loaded_v, axis, load_gf, repeat=1, spike_at=None, n
 
 def test_a_static_reading_without_its_spike(tmp_path) -> None:
     path = static_log(tmp_path, "s", [1e-5, 0, 0, 0, 0, 0], "x", 100.0, spike_at=150)
-    samples, sessions = tables([path], tmp_path)
-    prepared = prepare(samples, sessions, SETTINGS)
-    assert prepared.loc[prepared["index"] == 151, "quality"].item() == SPIKE
-    means = static.mean_readings(prepared, sessions, CELLS)
+    samples, sessions = prepared([path], tmp_path)
+    assert samples.loc[samples["index"] == 151, "quality"].item() == SPIKE
+    means = static.mean_readings(samples, sessions, CELLS)
     assert means.values[0] == pytest.approx([1e-5, 0, 0, 0, 0, 0], abs=5e-8)
     assert means.applied_n[0] == pytest.approx([100 * GF_N, 0, 0])
     # 49 samples left of 50, 25 of tare: variance σ²(1/49 + 1/25)
@@ -149,8 +141,7 @@ def test_a_static_reading_without_its_spike(tmp_path) -> None:
 def test_directions_of_loads() -> None:
     assert static.direction("z") == pytest.approx([0, 0, -1])
     assert static.direction("xz") == pytest.approx([0.70710678, 0, -0.70710678])
-    with pytest.raises(InputError, match="not 'u'"):
-        static.direction("u")
+    refused("not 'u'", static.direction, "u")
 
 
 def test_points_by_hand() -> None:
@@ -158,9 +149,7 @@ def test_points_by_hand() -> None:
     means = static.Means(sessions, np.zeros((1, 6)), np.zeros((1, 6)), np.array([[0.0, 0, -2]]))
     row = static.points(means, np.array([[0.3, 0.4, -2.1]]), np.array([[0.1, 0.1, 0.02]]), "equations").iloc[0]
     assert (row["load_n"], row["force_n"], row["error_n"]) == pytest.approx((2.0, 2.1, 0.1))
-    assert row["across_n"] == pytest.approx(0.5)
-    assert row["uncertainty_n"] == pytest.approx(0.02)
-    assert row["error_z_n"] == pytest.approx(-0.1)
+    assert tuple(row[["across_n", "uncertainty_n", "error_z_n"]]) == pytest.approx((0.5, 0.02, -0.1))
 
 
 def test_a_static_series_becomes_a_bench_set(tmp_path) -> None:
@@ -169,9 +158,8 @@ def test_a_static_series_becomes_a_bench_set(tmp_path) -> None:
         static_log(tmp_path, f"s{i}", [0, 0, v, 0, 0, 0], "z", w, noise_v=0.0, minute=i)
         for i, (v, w) in enumerate([(1e-5, 40), (2e-5, 80)])
     ]
-    samples, sessions = tables(paths, tmp_path)
     coefficients = np.array([[0.0, 40.0]] * 6)
-    made = bench_set("b", prepare(samples, sessions, SETTINGS), sessions, bench_force(coefficients, GEOMETRY), 0.01)
+    made = bench_set("b", *prepared(paths, tmp_path), bench_force(coefficients, GEOMETRY), 0.01)
     assert made.vehicle.kind == "bench" and made.vehicle.tared
     (run,) = made.runs
     assert run.name == "z-r01"

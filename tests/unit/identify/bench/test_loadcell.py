@@ -13,6 +13,7 @@ from rotorid.identify.loadcell import (
     read_calibration_table,
     shared_weight_error,
 )
+from tests.refusals import refused
 
 THESIS = Path(__file__).parents[4] / "raw" / "thesis"
 
@@ -27,8 +28,7 @@ WITH_IT = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 1.0])
 def test_a_line_by_hand() -> None:
     # x = 0, 1, 2, y = 0, 1, 3: slope 3/2, intercept -1/6, residuals 1/6, -1/3, 1/6, variance 1/6 on 1 degree.
     fit = fit_line([0, 1, 2], [0, 1, 3])
-    assert fit.a1 == pytest.approx(1.5)
-    assert fit.a0 == pytest.approx(-1 / 6)
+    assert fit.a1 == pytest.approx(1.5) and fit.a0 == pytest.approx(-1 / 6)
     assert fit.residuals == pytest.approx((1 / 6, -1 / 3, 1 / 6))
     assert fit.residual_sd == pytest.approx(np.sqrt(1 / 6))
     assert fit.residual_rms == pytest.approx(np.sqrt(1 / 18))
@@ -66,13 +66,10 @@ def test_the_combinations_weigh_what_their_elements_do() -> None:
 
 
 def test_messages(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="needs at least 3 pairs, found 2 readings and 2 values"):
-        fit_line([1, 2], [1, 2])
-    with pytest.raises(InputError, match="all readings are equal"):
-        fit_line([1, 1, 1], [1, 2, 3])
+    refused("needs at least 3 pairs, found 2 readings and 2 values", fit_line, [1, 2], [1, 2])
+    refused("all readings are equal", fit_line, [1, 1, 1], [1, 2, 3])
     (tmp_path / "t.csv").write_text("a,b\n1,2\n")
-    with pytest.raises(InputError, match="expected the columns weight_gf and cell_1"):
-        read_calibration_table(tmp_path / "t.csv")
+    refused("expected the columns weight_gf and cell_1", read_calibration_table, tmp_path / "t.csv")
 
 
 def readings_off_by(errors_gf: dict[int, float]) -> dict[int, np.ndarray]:

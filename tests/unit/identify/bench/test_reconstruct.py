@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rotorid.errors import InputError
 from rotorid.identify.bench import (
     GF_N,
     PULLED,
@@ -22,23 +21,21 @@ from rotorid.identify.bench import (
 )
 from rotorid.identify.bench_tests import lateral_as_vertical
 from rotorid.identify.loadcell import fit_line
+from tests.refusals import refused
 
 TABLE = Path(__file__).parents[4] / "raw" / "thesis" / "table_2_3.csv"
 GEOMETRY = read_geometry(TABLE)
 
 
 def test_table_2_3_in_metres() -> None:
-    assert GEOMETRY["L"] == pytest.approx(0.225)
-    assert GEOMETRY["D_246z"] == pytest.approx(0.050457916)
+    assert GEOMETRY["L"] == pytest.approx(0.225) and GEOMETRY["D_246z"] == pytest.approx(0.050457916)
 
 
 def test_input_components_by_hand() -> None:
     # Table 2.2 for a cell force of 1 N: 1/cos 60° = 2, 1/(cos 30° cos 45°) = 1.63299, 1/cos 45° = 1.41421.
     one = input_components(np.ones((1, 6)))
-    assert one["f_1x"] == pytest.approx([2.0])
-    assert one["f_2x"] == pytest.approx([1.6329932])
-    assert one["f_1y"] == pytest.approx([1.1547005])
-    assert one["f_2y"] == pytest.approx([2.8284271])
+    assert one["f_1x"] == pytest.approx([2.0]) and one["f_2x"] == pytest.approx([1.6329932])
+    assert one["f_1y"] == pytest.approx([1.1547005]) and one["f_2y"] == pytest.approx([2.8284271])
     assert one["f_4y"] == one["f_2z"] == pytest.approx([1.4142136])
     assert "f_4x" not in one and "f_3y" not in one and "f_1z" not in one
 
@@ -108,8 +105,7 @@ def test_propagated_uncertainty_is_that_of_repeated_draws() -> None:
         return [fit_line((weights + rng.normal(0, 5, 6)) / 40, weights) for _ in range(6)]
 
     fixed = lines()
-    coefficients = np.array([[line.a0, line.a1] for line in fixed])
-    cells = cell_forces(volts, coefficients)
+    cells = cell_forces(volts, np.array([[line.a0, line.a1] for line in fixed]))
     variance = cell_variance(volts, fixed, np.full(6, noise_v**2))
     stated = np.sqrt(np.diagonal(force_covariance(cells, variance, GEOMETRY), axis1=1, axis2=2))[0]
     drawn = []
@@ -122,5 +118,4 @@ def test_propagated_uncertainty_is_that_of_repeated_draws() -> None:
 def test_a_missing_distance_is_named(tmp_path) -> None:
     table = tmp_path / "t.csv"
     table.write_text("distance,value_mm\nD_1x,9\n")
-    with pytest.raises(InputError, match=r"t\.csv: the distance D_2x is missing"):
-        read_geometry(table)
+    refused(r"t\.csv: the distance D_2x is missing", read_geometry, table)

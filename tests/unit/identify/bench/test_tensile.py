@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from rotorid.errors import InputError
 from rotorid.identify.loadcell import evaluate
+from tests.refusals import refused
 
 GAUGE_MM, SECTION_MM2 = 40.0, 20.0
 
@@ -43,5 +43,4 @@ def test_more_slack_changes_nothing_but_the_slack() -> None:
 
 
 def test_a_brittle_specimen_is_named_as_such() -> None:
-    with pytest.raises(InputError, match="broke before it yielded"):
-        evaluate(*curve(0.05, yields=False), GAUGE_MM, SECTION_MM2)
+    refused("broke before it yielded", evaluate, *curve(0.05, yields=False), GAUGE_MM, SECTION_MM2)

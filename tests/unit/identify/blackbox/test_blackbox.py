@@ -84,8 +84,7 @@ def test_scores_by_hand():
     measured, predicted = np.array([[0.0], [2.0], [4.0], [2.5]]), np.array([[0.0], [2.0], [1.0], [2.5]])
     found = scores(measured, predicted, np.array([0, 0, 1, 1]), np.random.default_rng(0))
     # Errors 0, 0, 3, 0; mean 2.125, squares about it 4.515625 + 0.015625 + 3.515625 + 0.140625 = 8.1875.
-    assert found["rmse"][0] == pytest.approx(1.5)
-    assert found["r2"][0] == pytest.approx(1 - 9 / 8.1875)
+    assert found["rmse"][0] == pytest.approx(1.5) and found["r2"][0] == pytest.approx(1 - 9 / 8.1875)
 
 
 def test_conformal_width_by_hand():
@@ -148,8 +147,7 @@ def check_repeats(quadrotor: pd.DataFrame, wrench: pd.DataFrame, once: pd.DataFr
         )
         tables.append((samples, recordings))
     found = read_experiments(*tables, curve)
-    assert len(found) == 2 * len(once)
-    assert found["sample"].tolist() == list(range(1, len(found) + 1))
+    assert len(found) == 2 * len(once) and found["sample"].tolist() == list(range(1, len(found) + 1))
 
 
 def test_two_thrust_tests_at_one_throttle_count_as_one() -> None:

@@ -4,13 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.identify.grey_box import (
-    cut_windows,
-    fit_output_error,
-    simulate_rates,
-    tied,
-    untied,
-)
+from rotorid.identify.grey_box import cut_windows, fit_output_error, simulate_rates, tied, untied
 from rotorid.identify.inertias import band_signals, design, fit_flights, readings_at_hover
 from rotorid.recordings import Run
 from rotorid.vehicle.mixer import wrench_matrix
@@ -28,8 +22,7 @@ def flight(seconds=40.0, seed=0):
     for axis, size in enumerate((0.03, 0.03, 0.02)):
         for f in rng.uniform(1, 5, 8):
             moments[0, :, axis] += size * np.sin(2 * np.pi * f * t + rng.uniform(0, 6.28)) / 3
-    rates = simulate_rates(tied(np.log(TRUE)), np.zeros((1, 3)), moments, DT)
-    return rates[0], moments[0]
+    return simulate_rates(tied(np.log(TRUE)), np.zeros((1, 3)), moments, DT)[0], moments[0]
 
 
 def test_constant_moment_turns_at_a_constant_rate():
@@ -95,12 +88,10 @@ def test_designed_excitation_keeps_its_limits_and_beats_a_first_guess():
     assert np.max(errors / target) < np.max(first_errors / target)
     t = np.arange(0, 10, 0.01)
     wrench = np.column_stack([np.full(len(t), 0.652 * 9.81), best.moment(t)])
-    square = np.linalg.solve(wrench_matrix(vehicle), wrench.T)
-    speed = np.sqrt(square)
+    speed = np.sqrt(np.linalg.solve(wrench_matrix(vehicle), wrench.T))
     # The search looks at twelve instants of the fastest sine; between them a peak may stand out by a little.
     assert speed.min() > 0.98 * 550 and speed.max() < 1.02 * 1550
-    tilt = np.abs(best.integral(t, 2) / TRUE)[:, :2]
-    assert np.degrees(tilt.max()) < 12.1
+    assert np.degrees(np.abs(best.integral(t, 2) / TRUE)[:, :2].max()) < 12.1
 
 
 def test_multisine_integrals_are_integrals():
@@ -128,5 +119,4 @@ def test_flight_bounds_hold_the_truth():
     fits = fit_flights([part], 250.0, 1.0, rng)
     for fit, true in zip(fits[:2], TRUE[:2], strict=True):
         assert fit["lower"] < fit["estimate"] < fit["upper"]
-        assert fit["interval_95"][0] < true < fit["interval_95"][1]
-        assert fit["r2"] > 0.9
+        assert fit["interval_95"][0] < true < fit["interval_95"][1] and fit["r2"] > 0.9

@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.errors import InputError
 from rotorid.identify.clocks import device_time
 from rotorid.identify.rotor import COLUMNS, sample_noise, thrust_points, torque_points
+from tests.refusals import refused
 
 STEP_S = 0.02
 SPEED = 1600 * (np.arange(1, 21) / 20) ** 0.669
@@ -18,16 +18,11 @@ def drive(name: str, throttle: float, speed_rpm: float, thrust_n: float = 0.0) -
     on = (time >= 2) & (time < 6)
     return pd.DataFrame(
         {
-            "id": name,
-            "time_s": time,
-            "host_time_s": time,
-            "quality": 0,
-            "throttle": np.where(on, throttle, 0.0),
-            "speed_rpm": np.where(on, speed_rpm, 0.0),
-            "thrust_n": 0.5 + np.where(on, thrust_n, 0.0),
+            "id": name, "time_s": time, "host_time_s": time, "quality": 0, "throttle": np.where(on, throttle, 0.0),
+            "speed_rpm": np.where(on, speed_rpm, 0.0), "thrust_n": 0.5 + np.where(on, thrust_n, 0.0),
             "battery_voltage_v": 15.5,
         }
-    )
+    )  # fmt: skip
 
 
 def rows(*names: str, groups: list[str], start_s: float = 0.0) -> pd.DataFrame:
@@ -49,32 +44,25 @@ def test_a_torque_point_pairs_the_instruments_by_group_and_by_the_hosts_clock() 
     on = (sensor_time >= 3.5) & (sensor_time < 7.5)
     reading = pd.DataFrame(
         {
-            "id": "w",
-            "time_s": sensor_time,
-            "host_time_s": sensor_time,
-            "quality": 0,
+            "id": "w", "time_s": sensor_time, "host_time_s": sensor_time, "quality": 0,
             "moment_z_n_m": 0.01 - np.where(on, 0.03, 0.0),
         }
-    )
+    )  # fmt: skip
     rotor = (drive("r", 0.2, 9000.0), rows("r", groups=["one"], start_s=101.5))
     found = torque_points(rotor, (reading, rows("w", groups=["one"], start_s=100.0)))
-    assert found["test"].tolist() == ["one"]
-    assert found["value"][0] == pytest.approx(0.03)
-    with pytest.raises(InputError, match="without a recording of the wrench sensor"):
-        torque_points(rotor, (reading, rows("w", groups=["another"])))
+    assert found["test"].tolist() == ["one"] and found["value"][0] == pytest.approx(0.03)
+    refused("without a recording of the wrench sensor", torque_points, rotor, (reading, rows("w", groups=["another"])))
 
 
 def test_a_motor_that_never_ran_is_named() -> None:
-    with pytest.raises(InputError, match="idle: the motor never ran"):
-        thrust_points(drive("idle", 0.0, 0.0), rows("idle", groups=["idle"]))
+    refused("idle: the motor never ran", thrust_points, drive("idle", 0.0, 0.0), rows("idle", groups=["idle"]))
 
 
 def test_a_test_that_an_emulator_made_faster_than_life_is_taken_by_the_devices_own_time() -> None:
     """Five device seconds a host second: four seconds of throttle arrive within 0.8 s."""
     made = drive("fast", 0.2, 9000.0, 3.0)
     made["host_time_s"] = made["time_s"] / 5
-    found = thrust_points(made, rows("fast", groups=["fast"]))
-    np.testing.assert_allclose(found["value"], [3.0])
+    np.testing.assert_allclose(thrust_points(made, rows("fast", groups=["fast"]))["value"], [3.0])
     time = np.arange(0, 8, STEP_S)
     reading = pd.DataFrame({"id": "w", "time_s": time, "host_time_s": time / 5, "quality": 0})
     reading["moment_z_n_m"] = 0.01 - np.where((time >= 2) & (time < 6), 0.03, 0.0)

@@ -3,17 +3,9 @@
 import numpy as np
 import pytest
 
-from rotorid.errors import InputError
-from rotorid.identify.rotor import (
-    Points,
-    fit_coefficient,
-    fit_exponent,
-    modified_z_scores,
-    pool,
-    rest_reading,
-    usable,
-)
+from rotorid.identify.rotor import Points, fit_coefficient, fit_exponent, modified_z_scores, pool, rest_reading, usable
 from rotorid.recordings.mended import lost_speed
+from tests.refusals import refused
 
 SPEED = np.array([400.0, 800.0, 1200.0, 1600.0, 2000.0])
 
@@ -50,15 +42,13 @@ def test_equal_noise_gives_the_usual_formula_by_hand() -> None:
     thrust, square = np.array([1.0, 3.0, 8.0]), np.array([1.0, 4.0, 9.0])
     fit = fit_coefficient([points(thrust, [1000.0, 2000.0, 3000.0])], offset=False, equal_noise=True)
     variance = np.sum((thrust - 85 / 98 * square) ** 2) / 2
-    assert fit.standard_error == pytest.approx(np.sqrt(variance / 98) * 1e-6)
-    assert fit.freedom == 2
+    assert fit.standard_error == pytest.approx(np.sqrt(variance / 98) * 1e-6) and fit.freedom == 2
 
 
 def test_each_run_has_an_offset_of_its_own() -> None:
     runs = [points(1.2e-6 * SPEED**2 - 0.07, run="a"), points(1.2e-6 * SPEED**2 + 0.03, run="b")]
     fit = fit_coefficient(runs, offset=True)
-    assert fit.value == pytest.approx(1.2e-6)
-    assert fit.offsets_n == pytest.approx((-0.07, 0.03))
+    assert fit.value == pytest.approx(1.2e-6) and fit.offsets_n == pytest.approx((-0.07, 0.03))
     assert fit_coefficient(runs, offset=False).value != pytest.approx(1.2e-6, rel=1e-3)
 
 
@@ -75,8 +65,7 @@ def test_noise_in_the_speed_does_not_bias_and_is_in_the_interval() -> None:
         ignoring.append(fit_coefficient(run, offset=False).value)
         hits += fit.interval_95[0] < 1.3e-6 < fit.interval_95[1]
     assert np.mean(with_noise) == pytest.approx(1.3e-6, rel=0.004)
-    assert abs(np.mean(ignoring) / 1.3e-6 - 1) > 0.005
-    assert np.std(with_noise) < np.std(ignoring)
+    assert abs(np.mean(ignoring) / 1.3e-6 - 1) > 0.005 and np.std(with_noise) < np.std(ignoring)
     assert 0.92 < hits / 400 < 0.98
 
 
@@ -94,8 +83,7 @@ def test_an_offset_that_lowers_the_small_thrusts_is_not_taken_for_a_lost_speed()
 
 
 def test_too_few_points_are_told() -> None:
-    with pytest.raises(InputError, match="runs a: 1 points for 2 unknowns"):
-        fit_coefficient([points([1.0], [1000.0])], offset=True)
+    refused("runs a: 1 points for 2 unknowns", fit_coefficient, [points([1.0], [1000.0])], offset=True)
 
 
 def test_the_exponent_of_a_power_law() -> None:
@@ -115,10 +103,8 @@ def test_pooling_by_hand() -> None:
 
 
 def test_motors_that_agree_have_nothing_between_them() -> None:
-    found = pool([1.0, 1.001, 0.999], [0.1, 0.1, 0.1])
-    assert found["between_sd"] == 0.0
-    with pytest.raises(InputError, match="at least two motors, found 1"):
-        pool([1.0], [0.1])
+    assert pool([1.0, 1.001, 0.999], [0.1, 0.1, 0.1])["between_sd"] == 0.0
+    refused("at least two motors, found 1", pool, [1.0], [0.1])
 
 
 def test_the_pooled_interval_covers_the_mean_of_all_motors() -> None:
@@ -134,8 +120,7 @@ def test_the_pooled_interval_covers_the_mean_of_all_motors() -> None:
 
 def test_modified_z_scores_by_hand() -> None:
     # Median 3, absolute deviations 2 1 0 1 97, their median 1.
-    scores = modified_z_scores([1, 2, 3, 4, 100])
-    assert scores == pytest.approx([-1.349, -0.6745, 0, 0.6745, 65.4265])
+    assert modified_z_scores([1, 2, 3, 4, 100]) == pytest.approx([-1.349, -0.6745, 0, 0.6745, 65.4265])
     assert (modified_z_scores([1, 1, 1, 5]) == 0).all()
 
 

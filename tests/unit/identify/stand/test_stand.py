@@ -7,10 +7,10 @@ import pandas as pd
 import pytest
 
 from rotorid.effects.loading import rotation_of
-from rotorid.errors import InputError
 from rotorid.identify import stand
 from rotorid.identify.rotor import speed_law
 from rotorid.recordings.run import Run
+from tests.refusals import refused
 
 WRENCH = stand.WRENCH
 
@@ -26,8 +26,7 @@ def test_segments_of_a_trapezoid() -> None:
     found = stand.segments(time_s, programme(time_s))
     assert [s.kind for s in found] == ["rest", "ramp", "plateau", "ramp", "rest"]
     flat = stand.longest(found, stand.PLATEAU)
-    assert flat.start_s == pytest.approx(5.0, abs=0.06)
-    assert flat.stop_s == pytest.approx(13.0, abs=0.06)
+    assert flat.start_s == pytest.approx(5.0, abs=0.06) and flat.stop_s == pytest.approx(13.0, abs=0.06)
     whole = stand.programme(found)
     assert (whole.start_s, whole.stop_s) == pytest.approx((2.0, 16.0), abs=0.02)
 
@@ -35,16 +34,13 @@ def test_segments_of_a_trapezoid() -> None:
 def test_a_sine_has_no_plateau_and_rest_alone_is_refused() -> None:
     time_s = np.arange(0, 12, 0.02)
     sine = 0.1 * (1 - np.cos(2 * np.pi * 0.25 * time_s))
-    found = stand.segments(time_s, np.column_stack([sine] * 4))
-    assert stand.longest(found, stand.PLATEAU) is None
-    with pytest.raises(InputError, match="never ran"):
-        stand.segments(time_s, np.zeros((len(time_s), 4)))
+    assert stand.longest(stand.segments(time_s, np.column_stack([sine] * 4)), stand.PLATEAU) is None
+    refused("never ran", stand.segments, time_s, np.zeros((len(time_s), 4)))
 
 
 def test_tilt_and_weight_by_hand() -> None:
     # Pitch 30°: x forward goes up (−z), so R e_x = (cos 30°, 0, −sin 30°).
-    rotation = rotation_of(0.0, np.radians(30))
-    assert rotation @ [1, 0, 0] == pytest.approx([np.sqrt(3) / 2, 0, -0.5])
+    assert rotation_of(0.0, np.radians(30)) @ [1, 0, 0] == pytest.approx([np.sqrt(3) / 2, 0, -0.5])
     # Roll 30°: y right goes down, R e_y = (0, cos 30°, sin 30°).
     assert rotation_of(np.radians(30), 0.0) @ [0, 1, 0] == pytest.approx([0, np.sqrt(3) / 2, 0.5])
     # 2 kg at (0.1, 0, 0) on a level sensor with g = 10: F = (0, 0, 20), M = c × F = (0, −2, 0).
@@ -70,8 +66,7 @@ def experiment(roll: float, pitch: float, seed: int = 0, drift_n_s: float = 0.0)
 
 def test_steady_wrench_with_rest_and_drift_taken_off() -> None:
     found = stand.evaluate(experiment(0.0, 0.2, drift_n_s=0.05), None)
-    assert found.kind == "plateau"
-    assert found.throttle == pytest.approx([0.2, 0.1, 0.2, 0.2])
+    assert found.kind == "plateau" and found.throttle == pytest.approx([0.2, 0.1, 0.2, 0.2])
     # The zero drifts linearly, and the rest reading is interpolated: nothing of it stays.
     off = found.steady.mean - [0, 0, -4, 0, 0, 0]
     assert (np.abs(off) < 4 * found.steady.error).all()
@@ -132,5 +127,4 @@ def test_the_law_of_speed_comes_back() -> None:
         low, high = found[f"{name}_interval_95"]
         assert low < true < high
         assert high - low < 0.05 * true + 0.01
-    with pytest.raises(InputError, match="at least six points"):
-        speed_law(points[:5])
+    refused("at least six points", speed_law, points[:5])

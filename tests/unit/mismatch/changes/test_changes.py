@@ -8,9 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.constants import g
-from typer.testing import CliRunner
 
-from rotorid.cli import app
 from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
 from rotorid.mismatch.changes.compare import Change, Changes, changes_between, in_percent, price_of, regime_notes
@@ -22,6 +20,7 @@ from rotorid.mismatch.decide.status import Estimate
 from rotorid.recordings import RecordingSet, Vehicle, write_set
 from rotorid.recordings import columns as c
 from rotorid.report.page import make_changes_page
+from tests.command_line import answer, refusal
 from tests.unit.mismatch.flights import Flight, recorded
 
 
@@ -123,12 +122,10 @@ def test_the_result_as_json_is_what_the_sentences_say():
 
 def test_the_command_says_it_and_its_exit_code_is_that_of_a_regression_test(tmp_path):
     folders = [str(write_set(replace(monday(), name=name), tmp_path)) for name in ("monday", "friday")]
-    run = CliRunner().invoke(app, ["compare", *folders, "--ci", "-q", "-o", str(tmp_path / "changes.json")])
-    assert run.exit_code == 0, run.output
-    assert "Nothing changed" in run.output and json.loads((tmp_path / "changes.json").read_text())["changes"] == []
+    run = answer("compare", *folders, "--ci", "-q", "-o", tmp_path / "changes.json")
+    assert "Nothing changed" in run and json.loads((tmp_path / "changes.json").read_text())["changes"] == []
     (tmp_path / "friday" / "vehicle.yaml").unlink()
-    run = CliRunner().invoke(app, ["compare", *folders, "-q"])
-    assert run.exit_code == 1 and "vehicle.yaml" in run.output
+    assert "vehicle.yaml" in refusal("compare", *folders, "-q")
 
 
 def test_several_good_sets_are_one_reference_and_their_vehicle_must_be_one():

@@ -6,9 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.signal import bessel, sosfilt
-from typer.testing import CliRunner
 
-from rotorid.cli import app
 from rotorid.errors import InputError
 from rotorid.mismatch.changes.compare import Changes, changes_between
 from rotorid.mismatch.changes.of_instruments import Wander, between, wandering
@@ -16,6 +14,8 @@ from rotorid.mismatch.changes.words import as_json, sentences
 from rotorid.mismatch.evidence.gram import Evidence
 from rotorid.recordings import RecordingSet, write_set
 from rotorid.report.page import make_changes_page
+from tests.command_line import invoke
+from tests.refusals import refused
 from tests.unit.mismatch.instrument.stands import C_F, one_rotor
 from tests.unit.mismatch.instrument.test_instrument import RATE_HZ, bench_set, crosstalk
 from tests.unit.mismatch.instrument.test_stand import steady_run
@@ -61,8 +61,7 @@ def sure(found: Changes) -> list[set[str]]:
 def test_on_two_days_of_one_bench_nothing_changed_and_limits_say_by_how_much_at_most():
     found = compared("same")
     assert sure(found) == [] and found.kind == "bench"
-    limits = {x.id: x.at_most for x in found.limits}
-    assert 0.0 < limits["reading_gain"] < 0.02
+    assert 0.0 < {x.id: x.at_most for x in found.limits}["reading_gain"] < 0.02
     said = sentences(found)
     assert said[0].startswith("Nothing changed from calibrated to today") and "of the largest load" in said[-1]
     assert not any("alibrate it" in s for s in said)
@@ -116,14 +115,12 @@ def test_of_a_stand_of_one_rotor_more_thrust_may_be_a_gain_of_its_reading():
 def test_sets_that_cannot_be_compared_are_refused_with_the_reason():
     base = replace(bench_set(runs=3, seed=3), name="calibrated")
     slower = replace(base, name="slow", runs=tuple(replace(r, table=r.table.iloc[::3]) for r in base.runs))
-    with pytest.raises(InputError, match="slow: recorded at"):
-        changes_between(base, slower)
+    refused("slow: recorded at", changes_between, base, slower)
     fewer = [replace(r, table=r.table.drop(columns=["force_y_n"])) for r in base.runs]
     with pytest.raises(InputError, match="force_y_n is not in every run, expected as in calibrated"):
         changes_between(base, replace(base, name="fewer", runs=tuple(fewer)))
     stand = one_rotor([steady_run("a", 16.0, 1)])
-    with pytest.raises(InputError, match="kind is stand, expected bench as in calibrated"):
-        changes_between(base, stand)
+    refused("kind is stand, expected bench as in calibrated", changes_between, base, stand)
 
 
 def test_a_zero_of_each_environment_is_integrated_out_as_more_noise_of_its_column():
@@ -141,8 +138,7 @@ def test_a_zero_of_each_environment_is_integrated_out_as_more_noise_of_its_colum
 
 
 def test_the_variance_between_runs_is_beyond_what_each_run_says_of_itself():
-    rng = np.random.default_rng(1)
-    own, alike = rng.normal(0.0, 0.5, (400, 1)), np.full((400, 1), 1.0 / 0.1**2)
+    own, alike = np.random.default_rng(1).normal(0.0, 0.5, (400, 1)), np.full((400, 1), 1.0 / 0.1**2)
     assert between(own, alike)[0] == pytest.approx(own.var() - 0.01, rel=0.02)
     assert between(0.2 * own, alike)[0] < 0.002 and between(own[:1], alike[:1]) == [0.0]
 
@@ -150,7 +146,7 @@ def test_the_variance_between_runs_is_beyond_what_each_run_says_of_itself():
 def test_the_command_and_its_page(tmp_path):
     sets = {"calibrated": bench_set(runs=3, seed=3), "today": bench_set(crosstalk, runs=3, seed=4)}
     folders = [str(write_set(replace(s, name=name), tmp_path)) for name, s in sets.items()]
-    run = CliRunner().invoke(app, ["compare", *folders, "--ci", "-q"])
+    run = invoke("compare", *folders, "--ci", "-q")
     assert run.exit_code == 1 and "crosstalk" in run.output.lower() and "Calibrate it again" in run.output
     page = make_changes_page(compared("crosstalk"))
     assert "of the largest load" in page and "Reading less load" in page and page.count("<svg") == 2

@@ -183,8 +183,7 @@ def test_a_zero_that_two_forms_have_differs_no_more_than_one_that_one_form_has()
     spread = usual_spread(made, made, np.zeros(4), np.ones(1))
     usual = catalogue()["gyro_error"].between_flights
     assert np.hypot(spread[0], spread[1]) == pytest.approx(usual["rad/s"])
-    assert spread[2] == 0.0
-    assert spread[3] == pytest.approx(usual["rad"])
+    assert spread[2] == 0.0 and spread[3] == pytest.approx(usual["rad"])
 
 
 def test_the_error_of_a_form_is_shared_by_the_forms_that_it_may_look_like():

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.errors import InputError
 from rotorid.mismatch.changes.compare import Change, explaining, predicted
 from rotorid.mismatch.changes.level_one import (
     BUDGET,
@@ -26,7 +25,8 @@ from rotorid.mismatch.decide.status import Estimate
 from rotorid.recordings import RecordingSet, Run
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import Doubt
-from tests.unit.mismatch.flights import Flight, quad
+from tests.refusals import refused
+from tests.unit.mismatch.flights import Flight, quad, with_table
 
 
 def flights(name: str, numbers: range, **options) -> RecordingSet:
@@ -151,24 +151,19 @@ def test_one_flight_against_one_is_held_against_the_usual_scatter(good, later):
 def test_a_while_with_idle_rotors_does_not_move_the_shares(good, later):
     """Shares are divided by the rotors' mean thrust, which is next to nothing there."""
 
-    def idle(run: Run) -> Run:
-        names = [f"rotor_speed_{i}_rad_s" for i in range(1, 5)]
-        table = run.table.copy()
-        table.loc[200:260, names] = [1.0, 0.01, 0.01, 0.01]
-        return replace(run, table=table)
+    def idle(table) -> None:
+        table.loc[200:260, [f"rotor_speed_{i}_rad_s" for i in range(1, 5)]] = [1.0, 0.01, 0.01, 0.01]
 
-    found = level_one(good, replace(later, runs=tuple(idle(run) for run in later.runs)))
+    found = level_one(good, with_table(later, idle))
     assert all(abs(d.value) < 0.2 for d in found.differences if d.quantity.kind == "share")
     assert not [d for d in found.stated if d.quantity.kind == "share"]
 
 
 def test_other_numbers_of_rotors_and_no_stretch_are_one_sentence(good, later):
-    short = replace(later, runs=tuple(replace(r, table=r.table.iloc[:50].reset_index(drop=True)) for r in later.runs))
-    with pytest.raises(InputError, match="set later: no stretch of flight"):
-        level_one(good, short)
+    short = with_table(later, lambda t: t.iloc[:50].reset_index(drop=True))
+    refused("set later: no stretch of flight", level_one, good, short)
     fewer = replace(later, vehicle=quad(rotors=list(quad().model_dump()["rotors"])[:3]))
-    with pytest.raises(InputError, match="3 rotors, expected 4"):
-        level_one(good, fewer)
+    refused("3 rotors, expected 4", level_one, good, fewer)
 
 
 def change(name: str, **sizes: float) -> Change:

@@ -43,19 +43,13 @@ class Flight:
         kinds = range(int(environment.max()) + 1)
         x, y = ([rows[environment == e].reshape(-1, *rows.shape[2:]) for e in kinds] for rows in (self.x, self.y))
         return Evidence(
-            terms=self.terms,
-            start={t.key: i for i, t in enumerate(self.terms)},
-            channels=np.array([2]),
+            terms=self.terms, start={t.key: i for i, t in enumerate(self.terms)}, channels=np.array([2]),
             gram=np.array([[own.T @ own for own in x]]),
             cross=np.array([[own.T @ left for own, left in zip(x, y, strict=True)]]),
-            square=np.array([[left @ left for left in y]]),
-            blocks=np.bincount(environment),
-            bias_gram=np.zeros((1, count, count)),
-            bias_cross=np.zeros((1, count)),
-            apart_columns=np.zeros(0, int),
-            apart_channels=np.zeros(0, int),
-            active=tuple(active),
-        )
+            square=np.array([[left @ left for left in y]]), blocks=np.bincount(environment),
+            bias_gram=np.zeros((1, count, count)), bias_cross=np.zeros((1, count)), apart_columns=np.zeros(0, int),
+            apart_channels=np.zeros(0, int), active=tuple(active),
+        )  # fmt: skip
 
 
 def flight(beta, terms=None, seed=0, alike=0.3, noise=1.0):
@@ -112,20 +106,14 @@ def test_a_leftover_that_is_new_in_each_environment_is_no_evidence_of_an_effect(
 
 def test_noise_that_cancels_between_columns_cancels_beside_a_leftover_too():
     """Columns of one sensor have its noise in common; what does not cancel would be taken for what they have in sum."""
-    of = flight([0.0, 0.0, 0.5, 0.0, 0.0])
-    seen = of.evidence()
+    seen = flight([0.0, 0.0, 0.5, 0.0, 0.0]).evidence()
     both = np.concatenate([seen.gram, 0.01 * seen.gram]), np.concatenate([seen.cross, 0.1 * seen.cross])
     noise = np.zeros((2, 5, 5))
     noise[0, 2:4, 2:4] = 40.0 * np.array([[1.0, -1.0], [-1.0, 1.0]])
     two = replace(
-        seen,
-        channels=np.array([2, 3]),
-        gram=both[0],
-        cross=both[1],
-        square=np.concatenate([seen.square, seen.square]),
-        bias_gram=noise,
-        bias_cross=np.zeros((2, 5)),
-    )
+        seen, channels=np.array([2, 3]), gram=both[0], cross=both[1],
+        square=np.concatenate([seen.square, seen.square]), bias_gram=noise, bias_cross=np.zeros((2, 5)),
+    )  # fmt: skip
     asked = asked_of(two, 30.0)
     own_units = asked.bias / np.maximum(np.outer(asked.unit, asked.unit), 1e-300)
     assert own_units[2, 2] > 0
@@ -134,8 +122,7 @@ def test_noise_that_cancels_between_columns_cancels_beside_a_leftover_too():
 
 def test_a_value_that_is_plainly_wrong_is_freed_before_an_effect_stands_in():
     terms = (EvidenceTerm("thrust", "value", "", 1, (0.05,)), OFFSET, effect("drag/plain"), effect("lift/plain"))
-    found = decide(flight([0.5, 0.0, 0.0, 0.0], terms).evidence(), Prior())
-    assert found.model == ("thrust",)
+    assert decide(flight([0.5, 0.0, 0.0, 0.0], terms).evidence(), Prior()).model == ("thrust",)
 
 
 def test_of_a_ratio_one_side_stays_as_believed_and_its_doubt_is_the_others():
@@ -178,8 +165,7 @@ def test_of_the_forms_of_an_id_one_is_taken():
 
 def test_a_coefficient_stays_within_its_bounds():
     terms = (OFFSET, effect("drag/plain", low=0.0), effect("lift/plain"))
-    at = scored(problem(flight([0.0, -1.0, 0.5], terms)), ("drag/plain",))
-    assert at.mode.beta[-1] == 0.0
+    assert scored(problem(flight([0.0, -1.0, 0.5], terms)), ("drag/plain",)).mode.beta[-1] == 0.0
 
 
 @pytest.mark.parametrize("term", [effect("drag/plain", negligible=2.0), effect("drag/plain", must_show=(0,))])
@@ -192,8 +178,7 @@ def test_a_form_that_is_negligible_or_does_not_show_costs_more(term):
 
 
 def test_a_believed_value_does_not_move_further_than_its_trust_allows():
-    of = flight([1.0, 0.0, 0.0, 0.0, 0.0])
-    asked = problem(of)
+    asked = problem(flight([1.0, 0.0, 0.0, 0.0, 0.0]))
     beta = scored(asked, ()).mode.beta * asked.unit[asked.columns(())]
     assert beta[0] == pytest.approx(PLAIN.value_reach * 0.05)
 

@@ -115,8 +115,7 @@ def told(key: str):
     terms = [Term(key, "effect", effect_id, form, values, columns)]
     regression = build(rows, terms, {0: np.array([1.0])}, lambda run, t: run == "a", 1.0, RATE_HZ)
     search = Search(regression, Questions(lambda *_: np.ones(12), lambda *_: np.ones(12)))
-    fit = regression.fit([key], jackknife=True)
-    selection = Selection([key], fit, {key: 1e-9})
+    selection = Selection([key], regression.fit([key], jackknife=True), {key: 1e-9})
     noise = np.array([0.5, *[np.nan] * 11])
     return wrench_findings(Contributions(rows), regression, search, selection, noise, {}, selection.fit)
 

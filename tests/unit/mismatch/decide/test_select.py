@@ -39,8 +39,7 @@ def search_of(terms: list[Term], y: list[np.ndarray], x: list[list[np.ndarray]],
 def case(rng, columns: int, runs: int = 3, size: int = 1200):
     """Noise of one sigma with memory, and regressors with more memory, over some runs."""
     noise = [coloured(size, 1.0, rng, pole=0.8) for _ in range(runs)]
-    x = [[coloured(size, 1.0, rng, pole=0.95) for _ in range(columns)] for _ in range(runs)]
-    return noise, x
+    return noise, [[coloured(size, 1.0, rng, pole=0.95) for _ in range(columns)] for _ in range(runs)]
 
 
 def effects_of(search: Search) -> list[str]:
@@ -48,11 +47,9 @@ def effects_of(search: Search) -> list[str]:
 
 
 def test_the_effects_that_are_there_enter_and_no_other():
-    rng = np.random.default_rng(0)
-    noise, x = case(rng, 6)
+    noise, x = case(np.random.default_rng(0), 6)
     y = [n + 0.8 * columns[1] - 0.6 * columns[4] for n, columns in zip(noise, x, strict=True)]
-    search = search_of([term(f"e{k}") for k in range(6)], y, x)
-    selection = search.run()
+    selection = search_of([term(f"e{k}") for k in range(6)], y, x).run()
     assert sorted(selection.active) == ["e1/form", "e4/form"]
     assert all(p < 1e-4 for p in selection.p_values.values())
     values = dict(zip(selection.fit.columns, selection.fit.beta, strict=True))
@@ -70,8 +67,7 @@ def test_nothing_enters_where_nothing_is():
 
 
 def test_a_coefficient_of_the_wrong_sign_is_no_effect():
-    rng = np.random.default_rng(2)
-    noise, x = case(rng, 2)
+    noise, x = case(np.random.default_rng(2), 2)
     y = [n - 0.8 * columns[0] for n, columns in zip(noise, x, strict=True)]
     assert effects_of(search_of([term("drag", low=0.0), term("other")], y, x)) == []
     assert effects_of(search_of([term("drag"), term("other")], y, x)) == ["drag"]
@@ -79,14 +75,11 @@ def test_a_coefficient_of_the_wrong_sign_is_no_effect():
 
 def test_an_effect_that_does_not_matter_is_left_out():
     """Significant beyond doubt (a long recording), but 0.1 of the noise: too small to be worth a word."""
-    rng = np.random.default_rng(3)
-    noise, x = case(rng, 1, size=24000)
+    noise, x = case(np.random.default_rng(3), 1, size=24000)
     y = [n + 0.1 * columns[0] for n, columns in zip(noise, x, strict=True)]
-    search = search_of([term("tiny")], y, x)
-    selection = search.run()
+    selection = search_of([term("tiny")], y, x).run()
     assert selection.active == [] and "of the noise" in selection.not_established["tiny"]
-    large = search_of([term("tiny")], y, x, noise=0.25).run()
-    assert large.active == ["tiny/form"]
+    assert search_of([term("tiny")], y, x, noise=0.25).run().active == ["tiny/form"]
 
 
 def test_the_better_form_of_an_id_stands_for_it():
@@ -98,12 +91,10 @@ def test_the_better_form_of_an_id_stands_for_it():
 
 
 def test_what_differs_from_run_to_run_is_no_constant_of_the_vehicle():
-    rng = np.random.default_rng(5)
-    noise, x = case(rng, 1, runs=5, size=2400)
+    noise, x = case(np.random.default_rng(5), 1, runs=5, size=2400)
     y = [n + slope * columns[0] for n, columns, slope in zip(noise, x, (2.0, 0.1, 2.0, 0.1, 1.0), strict=True)]
     selection = search_of([term("odd")], y, x).run()
-    assert selection.active == []
-    assert "odd" in selection.not_established
+    assert selection.active == [] and "odd" in selection.not_established
 
 
 def test_copies_of_a_column_are_alternatives_and_others_are_not():
@@ -135,8 +126,7 @@ def test_two_that_cancel_are_not_both_claimed_where_the_rest_is_what_their_forms
 
 def test_what_displaces_another_must_hold_by_itself():
     """A near copy that explains more but does not matter may not take the place of the effect that is there."""
-    rng = np.random.default_rng(5)
-    noise, x = case(rng, 2)
+    noise, x = case(np.random.default_rng(5), 2)
     for columns in x:
         columns[1] = columns[0] + 0.5 * columns[1]
     y = [n + 0.8 * columns[1] for n, columns in zip(noise, x, strict=True)]
@@ -177,8 +167,7 @@ def test_of_two_exact_ids_none_is_what_the_other_is_wrong_by():
 
 def test_what_does_not_keep_its_promise_in_other_environments_is_refuted():
     """A coefficient that is 1.5 in one run and 0 in the two others promises there what it does not keep."""
-    rng = np.random.default_rng(6)
-    noise, x = case(rng, 1, runs=4)
+    noise, x = case(np.random.default_rng(6), 1, runs=4)
     steady = [n + 0.8 * columns[0] for n, columns in zip(noise, x, strict=True)]
     assert search_of([term("e")], steady, x).refuted_elsewhere(["e/form"]) is None
     once = [n + (1.5 if k == 0 else 0.0) * columns[0] for k, (n, columns) in enumerate(zip(noise, x, strict=True))]
@@ -187,8 +176,7 @@ def test_what_does_not_keep_its_promise_in_other_environments_is_refuted():
 
 def test_of_two_effects_that_cancel_each_other_one_goes():
     """Columns alike but for a twentieth: y needs 20 of their difference, and no term is 20 times what it does."""
-    rng = np.random.default_rng(11)
-    noise, x = case(rng, 2)
+    noise, x = case(np.random.default_rng(11), 2)
     x = [[a, a + 0.05 * b] for a, b in x]
     y = [n + 20 * (columns[1] - columns[0]) for n, columns in zip(noise, x, strict=True)]
     search = search_of([term("e0"), term("e1")], y, x)
@@ -196,16 +184,14 @@ def test_of_two_effects_that_cancel_each_other_one_goes():
 
 
 def test_effects_that_add_up_are_left_alone():
-    rng = np.random.default_rng(12)
-    noise, x = case(rng, 2)
+    noise, x = case(np.random.default_rng(12), 2)
     y = [n + 2 * columns[0] - 1.5 * columns[1] for n, columns in zip(noise, x, strict=True)]
     assert search_of([term("e0"), term("e1")], y, x).cancelling(["e0/form", "e1/form"]) is None
 
 
 def imitated_value(change: float, own: float, copied: float = 0.98) -> Search:
     """A value that is `change` off, trusted to a twentieth, and an effect that looks nearly like it, `own` at work."""
-    rng = np.random.default_rng(4)
-    noise, x = case(rng, 2)
+    noise, x = case(np.random.default_rng(4), 2)
     x = [[30 * a, 30 * (copied * a + np.sqrt(1 - copied**2) * b)] for a, b in x]
     y = [n + change * a + own * b for n, (a, b) in zip(noise, x, strict=True)]
     return search_of([Term("inertia_xx", "value", prior_sd=(0.05,)), term("unequal_rotors")], y, x)
@@ -215,8 +201,7 @@ def test_a_value_far_beyond_its_trust_is_not_taken_up_by_an_effect_that_looks_li
     """Held to 0.15 in the search, 0.3 in truth: with a free value the effect that absorbed the rest is not
     identifiable."""
     found = imitated_value(0.3, 0.0).run()
-    assert found.active == []
-    assert found.not_established["unequal_rotors"].rule == "free_values"
+    assert found.active == [] and found.not_established["unequal_rotors"].rule == "free_values"
 
 
 def test_an_effect_that_is_there_stays_next_to_a_value_that_is_off():
@@ -226,8 +211,7 @@ def test_an_effect_that_is_there_stays_next_to_a_value_that_is_off():
 
 def test_a_term_that_turns_a_value_from_one_side_of_its_belief_to_the_other_strains_it():
     """Without the term the value is three deviations low, with it five high: as far off, and pushed all the same."""
-    rng = np.random.default_rng(5)
-    noise, x = case(rng, 2)
+    noise, x = case(np.random.default_rng(5), 2)
     x = [[30 * a, 30 * (a + 0.1 * b)] for a, b in x]
     y = [n - 0.15 * columns[0] for n, columns in zip(noise, x, strict=True)]
     search = search_of([Term("thrust", "value", prior_sd=(0.05,)), term("curve")], y, x)
@@ -238,8 +222,7 @@ def test_a_term_that_turns_a_value_from_one_side_of_its_belief_to_the_other_stra
 
 def test_of_two_that_explain_the_same_to_what_filters_are_known_the_first_stays():
     """A copy that is off by 0.2 % of a strong contribution is no better for it; one that is off by 2 % is."""
-    rng = np.random.default_rng(6)
-    noise, x = case(rng, 2)
+    noise, x = case(np.random.default_rng(6), 2)
 
     def search_beside(share: float) -> Search:
         columns = [[one, one + share * other] for one, other in x]

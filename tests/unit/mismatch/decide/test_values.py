@@ -26,13 +26,10 @@ def options(logs, sd=0.01, trust=TRUST):
         ([0.0, -0.05, 0.0, 0.0], 0.01, set()),  # ten times more probable, of 99 times that are asked for
     ],
     ids=[
-        "as believed",
-        "a thrust coefficient changes the moments too",
-        "a mass the thrust alone",
-        "hardly shown",
+        "as believed", "a thrust coefficient changes the moments too", "a mass the thrust alone", "hardly shown",
         "not sure",
     ],
-)
+)  # fmt: skip
 def test_what_gains_call_wrong(logs, sd, wrong):
     assert called_wrong(options(logs, sd), LEAST_NATS) == wrong
 

@@ -10,13 +10,10 @@ from rotorid.mismatch.tell.sentences import _left_out, unexplained_words
 @pytest.mark.parametrize(
     ("value", "low", "high", "text"),
     [
-        (5.1e-5, 4.9e-5, 5.3e-5, "5.10e-5 ± 0.20e-5"),
-        (5.1e-5, 4.7e-5, 5.5e-5, "5.1e-5 ± 0.4e-5"),
-        (0.652, 0.647, 0.657, "0.652 ± 0.005"),
-        (1.0, 1.0, 1.0, "1.00"),
-        (1e-3, -5.0, 5.0, "not determined"),
+        (5.1e-5, 4.9e-5, 5.3e-5, "5.10e-5 ± 0.20e-5"), (5.1e-5, 4.7e-5, 5.5e-5, "5.1e-5 ± 0.4e-5"),
+        (0.652, 0.647, 0.657, "0.652 ± 0.005"), (1.0, 1.0, 1.0, "1.00"), (1e-3, -5.0, 5.0, "not determined"),
     ],
-)
+)  # fmt: skip
 def test_value_and_interval_end_at_the_same_place(value, low, high, text):
     assert plus_minus(value, low, high) == text
 

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotorid.errors import InputError
 from rotorid.mismatch.decide.findings import RunWind
 from rotorid.mismatch.decide.sizes import segments_of
 from rotorid.mismatch.deliver.files import (
@@ -19,6 +18,7 @@ from rotorid.mismatch.deliver.files import (
 from rotorid.mismatch.deliver.flown import model_of
 from rotorid.mismatch.tell.forward import delivered_model, errors_of, forward_channels
 from rotorid.report.deliver import write_files
+from tests.refusals import refused
 from tests.unit.mismatch.deliver.test_parts import WIND, sensor_error
 from tests.unit.mismatch.synthetic import HOVER, K_D, analysis, drag_finding
 
@@ -114,5 +114,4 @@ def test_nothing_found_is_empty():
 def test_a_file_that_does_not_fit_is_refused_in_one_sentence(tmp_path, text, said):
     path = tmp_path / "conditions.yaml"
     path.write_text(text)
-    with pytest.raises(InputError, match=said):
-        read_conditions(path)
+    refused(said, read_conditions, path)

@@ -25,21 +25,12 @@ def sensor_error(**changes) -> Finding:
 @pytest.mark.parametrize(
     ("effect_id", "place"),
     [
-        ("rotor_drag", "vehicle"),
-        ("motor_lag", "vehicle"),
-        ("com_offset", "vehicle"),
-        ("steady_wind", "conditions"),
-        ("gust", "conditions"),
-        ("gyro_error", "instruments"),
-        ("accelerometer_error", "instruments"),
-        ("clock_skew", "instruments"),
-        ("tare_offset", "instruments"),
-        ("compliance", "instruments"),
-        ("wall_interference", "instruments"),
-        ("rotor_order", None),
-        ("unit_error", None),
+        ("rotor_drag", "vehicle"), ("motor_lag", "vehicle"), ("com_offset", "vehicle"), ("steady_wind", "conditions"),
+        ("gust", "conditions"), ("gyro_error", "instruments"), ("accelerometer_error", "instruments"),
+        ("clock_skew", "instruments"), ("tare_offset", "instruments"), ("compliance", "instruments"),
+        ("wall_interference", "instruments"), ("rotor_order", None), ("unit_error", None),
     ],
-)
+)  # fmt: skip
 def test_every_finding_has_one_place(effect_id, place):
     assert place_of(Finding(id=effect_id, status="established")) == place
 
@@ -63,8 +54,7 @@ def test_a_sensor_that_drops_out_for_a_time_is_an_instrument():
 
 
 def test_nothing_suggested_is_in_any_file():
-    findings = [drag_finding(status="suggested"), sensor_error(status="suggested")]
-    made = analysis(findings=findings)
+    made = analysis(findings=[drag_finding(status="suggested"), sensor_error(status="suggested")])
     assert improved_vehicle(made).effects == ()
     assert not any(delivered(made, place) for place in ("vehicle", "conditions", "instruments"))
 
@@ -91,5 +81,4 @@ def test_what_is_not_in_the_chosen_vehicle_keeps_its_status():
 
 
 def test_an_entry_has_what_the_simulator_needs():
-    entry = entry_of(drag_finding())
-    assert set(entry) == {"id", "form", "parameters"}
+    assert set(entry_of(drag_finding())) == {"id", "form", "parameters"}

@@ -8,9 +8,8 @@ from functools import cache
 
 import pytest
 from scipy.spatial.transform import Rotation
-from typer.testing import CliRunner
 
-from rotorid.cli import app, verdicts
+from rotorid.cli import verdicts
 from rotorid.cli.modelling import fly
 from rotorid.mismatch.decide.findings import Analysis
 from rotorid.mismatch.deliver.files import delivered, improved_vehicle
@@ -20,6 +19,7 @@ from rotorid.recordings import columns as c
 from rotorid.report.deliver import analysis_of, verdict_of, write_files
 from rotorid.vehicle.control import swings
 from rotorid_proof.delivered import row_of
+from tests.command_line import answer, invoke
 from tests.unit.mismatch.flights import QUAD, quad, recorded, with_table
 
 LIMITS = {"rotor_speed_limits_rad_s": (0.0, 1800.0)}
@@ -48,16 +48,12 @@ def weak_pitch() -> Vehicle:
     return quad(inertia_kg_m2=inertia | {"yy": 1.5 * inertia["yy"]}, **LIMITS)
 
 
+CURVE = ("throttle_curve", "thrust curve of the throttle", {"b": 0.3})
+WINDY = {"drag": 0.35, "wind": (3.0, 1.0), "duration_s": 15}
 SETS = {
     "drag": lambda: flown("drag", ("rotor_drag", "at the hubs", {"k_d": 6e-5})),
-    "chain": lambda: flown(
-        "chain",
-        ("motor_lag", "one constant", {"tau": 0.05}),
-        ("throttle_curve", "thrust curve of the throttle", {"b": 0.3}),
-    ),
-    "air": lambda: with_table(
-        recorded(1, 2, flight={"drag": 0.35, "wind": (3.0, 1.0), "duration_s": 15}, vehicle=quad(**LIMITS)), pushed
-    ),
+    "chain": lambda: flown("chain", ("motor_lag", "one constant", {"tau": 0.05}), CURVE),
+    "air": lambda: with_table(recorded(1, 2, flight=WINDY, vehicle=quad(**LIMITS)), pushed),
     "mass": lambda: recorded(17, 18, flight={"drag": 0.0115, "duration_s": 12}, vehicle=quad(mass_kg=0.5, **LIMITS)),
     "gyroscope": lambda: with_table(recorded(5, 6, flight={"duration_s": 10}, vehicle=quad(**LIMITS)), turned),
     "pitch": lambda: recorded(7, 8, flight={"drag": 0.02, "duration_s": 12}, vehicle=weak_pitch()),
@@ -79,11 +75,7 @@ def test_what_is_delivered_hovers_flies_and_makes_nothing_worse(name):
     assert row["channels_worse"] == 0 and row["held_out_after"] <= min(1.0, row["held_out_refitted"])
     # Noise averages out over half a second, what is left of physics does not.
     assert 0 < row["half_second_after"] <= 1.05 * row["half_second_refitted"]
-    assert {key: row[key] for key in ("unfit", "not_flown_by", "failed")} == {
-        "unfit": "",
-        "not_flown_by": "",
-        "failed": "",
-    }
+    assert [row[key] for key in ("unfit", "not_flown_by", "failed")] == ["", "", ""]
     assert row["verdict"] in ("explained", "partly_explained")
 
 
@@ -141,12 +133,8 @@ def test_a_fault_of_the_run_that_is_held_out_moves_no_value_of_the_file():
 
 
 def test_an_export_takes_the_lag_that_was_found(tmp_path):
-    vehicle = improved_vehicle(taken("chain")[1])
-    write_vehicle(vehicle, tmp_path / "v.yaml")
-    done = CliRunner().invoke(
-        app, ["export", str(tmp_path / "v.yaml"), "--to", "rotorpy", "-o", str(tmp_path / "p.py")]
-    )
-    assert done.exit_code == 0, done.output
+    write_vehicle(improved_vehicle(taken("chain")[1]), tmp_path / "v.yaml")
+    answer("export", tmp_path / "v.yaml", "--to", "rotorpy", "-o", tmp_path / "p.py")
     content: dict = {}
     exec((tmp_path / "p.py").read_text(), content)
     assert content["quad_params"]["tau_m"] == pytest.approx(0.05, rel=0.1)
@@ -163,10 +151,9 @@ def test_a_warning_is_on_the_page_on_the_screen_and_in_the_file(tmp_path, monkey
         return write_files(analysis, *(target / name for name in names))
 
     monkeypatch.setattr(verdicts, "deliver_set", deliver)
-    done = CliRunner().invoke(app, ["verdict", str(folder), "-q", "-o", str(tmp_path / "out")])
-    assert done.exit_code == 0, done.output
-    assert f"! {warning}" in done.output.splitlines() and verdict.sentence in done.output.splitlines()
-    assert done.output.splitlines()[0] == verdict.basis.sentence
+    said = answer("verdict", folder, "-q", "-o", tmp_path / "out")
+    assert f"! {warning}" in said.splitlines() and verdict.sentence in said.splitlines()
+    assert said.splitlines()[0] == verdict.basis.sentence
     assert warning in (tmp_path / "out" / "verdict.json").read_text()
     assert warning in (tmp_path / "out" / "report.html").read_text()
 
@@ -217,12 +204,10 @@ def test_values_that_were_only_proposed_are_said_before_the_verdict(tmp_path):
     recordings, _, _ = taken("mass")
     folder = write_set(recordings, tmp_path)
     text = (folder / "vehicle.yaml").read_text()
-    marked = "".join(
-        f"{line}   # PROPOSED: template x500\n" if line.startswith("mass_kg") else f"{line}\n"
-        for line in text.splitlines()
-    )
-    (folder / "vehicle.yaml").write_text(marked)
-    done = CliRunner().invoke(app, ["verdict", str(folder), "-q", "-o", str(tmp_path / "out")])
+    proposed = "   # PROPOSED: template x500"
+    lines = [line + (proposed if line.startswith("mass_kg") else "") + "\n" for line in text.splitlines()]
+    (folder / "vehicle.yaml").write_text("".join(lines))
+    done = invoke("verdict", folder, "-q", "-o", tmp_path / "out")
     assert "! mass_kg is only proposed (template x500)." in done.output.splitlines()
     page = (tmp_path / "out" / "report.html").read_text()
     assert page.index("mass_kg is only proposed") < page.index("<h1>")

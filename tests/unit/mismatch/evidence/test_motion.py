@@ -42,8 +42,7 @@ def without(run: Run, *sensors: str) -> Run:
 
 def test_a_held_reading_counts_once():
     t = np.arange(1000) / 500.0
-    held = np.repeat(np.sin(np.arange(200.0)), 5)
-    assert own_rate_hz(t, held) == pytest.approx(100.0)
+    assert own_rate_hz(t, np.repeat(np.sin(np.arange(200.0)), 5)) == pytest.approx(100.0)
     assert own_rate_hz(t, np.sin(np.arange(1000.0))) == pytest.approx(500.0)
     missing = np.where(np.arange(1000) % 4 == 0, np.sin(np.arange(1000.0)), np.nan)
     assert own_rate_hz(t, missing) == pytest.approx(125.0)
@@ -62,8 +61,7 @@ def test_a_quarter_turn_of_yaw_takes_forward_to_east():
 
 
 def test_quaternions_that_flip_their_sign_are_made_continuous():
-    q = np.array([[1.0, 0, 0, 0], [-0.99, 0, 0, -0.1], [np.nan] * 4, [0.98, 0, 0, 0.15]])
-    out = continuous(q)
+    out = continuous(np.array([[1.0, 0, 0, 0], [-0.99, 0, 0, -0.1], [np.nan] * 4, [0.98, 0, 0, 0.15]]))
     np.testing.assert_allclose(out[:2, 0], [1.0, 0.99])
     assert np.isnan(out[2]).all() and out[3, 0] == 0.98
 
@@ -136,8 +134,7 @@ def test_a_long_hole_splits_the_run_and_a_short_one_is_bridged(run):
 
 def test_a_shift_undoes_a_late_sensor():
     late = recorded(3, late_s={"gyroscope": 0.04}).runs[0]
-    sound = recorded(3).runs[0]
-    (truth,) = build_segments(sound, quad(), RATE_HZ, CUTOFF_HZ)
+    (truth,) = build_segments(recorded(3).runs[0], quad(), RATE_HZ, CUTOFF_HZ)
     (spoiled,) = build_segments(late, quad(), RATE_HZ, CUTOFF_HZ)
     (mended,) = build_segments(late, quad(), RATE_HZ, CUTOFF_HZ, shift_s={"gyroscope": 0.04})
 

@@ -162,8 +162,7 @@ def noisy_case(rng, size: int = 8000, noise: float = 0.3):
 
 
 def test_a_noisy_regressor_attenuates_and_the_correction_undoes_it():
-    rng = np.random.default_rng(5)
-    read, again = noisy_case(rng)
+    read, again = noisy_case(np.random.default_rng(5))
     plain = regression([read], ["x"]).fit(["x"])
     corrected = regression([read], ["x"], noisy=[again]).fit(["x"])
     assert plain.beta[0] == pytest.approx(0.8, abs=0.02)
@@ -174,14 +173,12 @@ def test_a_noisy_regressor_attenuates_and_the_correction_undoes_it():
 
 def test_the_share_of_noise_in_a_column_beside_the_others():
     """Noise variance 0.25 of 1.25 in all; beside the noise-free signal it is all noise."""
-    rng = np.random.default_rng(6)
-    read, again = noisy_case(rng)
+    read, again = noisy_case(np.random.default_rng(6))
     alone = regression([read], ["x"], noisy=[again])
     assert alone.own_part(["x"], "x", np.ones(1))[1] == pytest.approx(0.2, abs=0.02)
     truth = coloured(8000, 1.0, np.random.default_rng(6), pole=0.9)
     both = [rows_of(read.y[:, 0], truth, read.x[:, 0, 0])]
-    more = [rows_of(read.y[:, 0], truth, again.x[:, 0, 0])]
-    beside = regression(both, ["truth", "x"], noisy=more)
+    beside = regression(both, ["truth", "x"], noisy=[rows_of(read.y[:, 0], truth, again.x[:, 0, 0])])
     assert beside.own_part(["truth", "x"], "x", np.ones(1))[1] > 0.8
 
 
@@ -219,8 +216,7 @@ def test_runs_that_agree_add_no_variance_and_runs_that_differ_do():
 def test_what_a_term_does_beyond_the_others_and_the_share_that_is_its_own():
     """x2 = x1 + z with z orthogonal and as large: its own part takes one x1 off and is half of its energy."""
     one = np.tile([1.0, 1.0, -1.0, -1.0], 200)
-    z = np.tile([1.0, -1.0, 1.0, -1.0], 200)
-    found = regression([rows_of(one, one, one + z)], ["one", "two"])
+    found = regression([rows_of(one, one, one + np.tile([1.0, -1.0, 1.0, -1.0], 200))], ["one", "two"])
     cols, beta = found.beyond(["one"], "two", np.array([2.0]))
     assert cols.tolist() == [0, 1]
     np.testing.assert_allclose(beta, [-2.0, 2.0], rtol=1e-6)
@@ -325,8 +321,7 @@ def test_the_noise_of_a_regressor_is_no_misfit():
     fit = made.fit(["x"])
     assert fit.beta[0] == pytest.approx(1.0, abs=0.05)
     assert fit.gain / 20_000 == pytest.approx(1.0, abs=0.08)
-    assert made.explained(["x"]) == pytest.approx(fit.gain, rel=1e-9)
-    assert made.shown("x").all()
+    assert made.explained(["x"]) == pytest.approx(fit.gain, rel=1e-9) and made.shown("x").all()
 
 
 # --- terms that some channels alone estimate
@@ -349,8 +344,7 @@ def two_channels(seed: int, apart: tuple[str, ...]) -> Regression:
 def test_what_the_model_of_other_channels_lacks_does_not_reach_a_term_estimated_apart():
     joint, cut = two_channels(0, ()).fit(["error", "other"]), two_channels(0, ("error",)).fit(["error", "other"])
     assert joint.beta[0] == pytest.approx(-0.15, abs=0.03)
-    assert cut.beta[0] == pytest.approx(0.05, abs=0.03)
-    assert cut.beta[1] == pytest.approx(0.7, abs=0.05)
+    assert cut.beta[0] == pytest.approx(0.05, abs=0.03) and cut.beta[1] == pytest.approx(0.7, abs=0.05)
     # It is scored on all channels: what it leaves of the moment is no gain.
     assert cut.gain < joint.gain
 

@@ -211,8 +211,7 @@ def test_thinning_keeps_every_signal_at_its_own_instant(rate_hz, step):
     t = np.arange(1003) / rate_hz
     assert thin.step == step and thin.rate_hz == rate_hz / step
     np.testing.assert_allclose(thin(t), thin.times(t), atol=1e-9)
-    both = thin(np.stack([t, np.full(1003, 5.0)], axis=1))
-    np.testing.assert_allclose(both[:, 1], 5.0, atol=1e-12)
+    np.testing.assert_allclose(thin(np.stack([t, np.full(1003, 5.0)], axis=1))[:, 1], 5.0, atol=1e-12)
 
 
 def test_thinning_is_a_weighted_sum_at_every_step_and_a_missing_column_stays_alone():
@@ -229,8 +228,7 @@ def test_thinning_is_a_weighted_sum_at_every_step_and_a_missing_column_stays_alo
 
 def test_rows_filter_both_sides_alike():
     """Force = 2 × a column with content up to the native rate: thinned alike, the factor is exact."""
-    rng = np.random.default_rng(0)
-    motion = still(600, velocity=rng.standard_normal((600, 3)))
+    motion = still(600, velocity=np.random.default_rng(0).standard_normal((600, 3)))
     form = {f.name: f for f in catalogue()["rotor_drag"].forms(thesis_vehicle())}["independent of rotor speed"]
     added = form.contribution(motion, thesis_vehicle(), np.array([2.0])).force
     flown = one(replace(motion, specific_force=motion.specific_force + added / MASS))
@@ -290,8 +288,7 @@ def test_a_scale_of_the_gyroscope_is_told_rightly_beside_inertias_that_are_far_o
     light = {k: v / 1.5 for k, v in vehicle.inertia_kg_m2.model_dump().items()}
     vehicle = vehicle.model_copy(update={"inertia_kg_m2": vehicle.inertia_kg_m2.model_copy(update=light)})
     prepared = prepare(replace(recordings, vehicle=vehicle))
-    model = wrench_model(prepared, prepared.terms)
-    regression = model.search.regression
+    regression = wrench_model(prepared, prepared.terms).search.regression
     fit = regression.fit([*regression.keys_of("nuisance"), "gyro_error/scale"])
     beta, covariance = coefficients(regression, fit, "gyro_error/scale")
     # Ω_m = 1.08 Ω; columns hold the measured rates, so the coefficient is 0.08 / 1.08.

@@ -77,8 +77,7 @@ def test_a_voltmeter_that_is_not_connected_is_not_believed():
     found = connected(recordings)
     fixed = found.recordings
     assert found.notes == ("battery_voltage_v of a reads below 0.5 V: taken as not connected.",)
-    assert not fixed.runs[0].has("battery_voltage_v")
-    assert fixed.runs[1] is recordings.runs[1]
+    assert not fixed.runs[0].has("battery_voltage_v") and fixed.runs[1] is recordings.runs[1]
     left = fixed.runs[2].column("battery_voltage_v")
     assert np.isnan(left[::10]).all() and (left[1:10] == 12.0).all()
 

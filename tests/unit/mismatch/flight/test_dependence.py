@@ -39,8 +39,7 @@ def test_p_values_are_uniform_when_a_coloured_residual_is_independent_of_coloure
 def test_a_dependence_of_a_third_of_the_noise_is_seen():
     rng = np.random.default_rng(1)
     inputs = np.stack([coloured(2400, 1.0, rng, pole=0.95) for _ in range(4)], axis=1)
-    noise = coloured(2400, 1.0, rng, pole=0.6)
-    assert p_of(noise + 0.35 * inputs[:, 2], inputs) < 1e-5
+    assert p_of(coloured(2400, 1.0, rng, pole=0.6) + 0.35 * inputs[:, 2], inputs) < 1e-5
 
 
 def read_by_noisy_tachometers(slope: float, pole: float, seed: int):
@@ -91,14 +90,9 @@ def test_the_inputs_are_those_the_recording_has():
     velocity = np.tile([3.0, -4.0, 1.0], (400, 1))
     found = probes(one(still(400, velocity=velocity, height=np.full(400, 0.3))), prepared)
     by_hand = {
-        "velocity_y": -4.0,
-        "velocity_y_abs": -16.0,
-        "airspeed_squared": 25.0,
-        "north": 1.0,
-        "rotor_speed": 1000.0,
-        "thrust": 1e6,
-        "height": 1 / (1 + 9.0),
-    }
+        "velocity_y": -4.0, "velocity_y_abs": -16.0, "airspeed_squared": 25.0, "north": 1.0, "rotor_speed": 1000.0,
+        "thrust": 1e6, "height": 1 / (1 + 9.0),
+    }  # fmt: skip
     for name, value in by_hand.items():
         np.testing.assert_allclose(found[name], value, rtol=1e-9, err_msg=name)
     bare = probes(one(still(400, velocity=None, rotation=None, angular_velocity=None)), prepared)

@@ -90,8 +90,7 @@ def test_height_is_the_mean_from_the_first_to_the_last_strong_knot():
     """Knots of 0, 3, 1, 5, 0 m/s to the north: 3, 1 and 5 have a mean of 3 and a variance of 8/3; the mean's variance
     is 0.01 / 3 from the fit and 8/3 / 3 from the flutter."""
     wind = np.array([[0.0, 0.0], [3.0, 0.0], [1.0, 0.0], [5.0, 0.0], [0.0, 0.0]])
-    gust = Gust("run", np.arange(5.0), wind, 0.01 * np.eye(10), 0.0)
-    height, sd = gust.height()
+    height, sd = Gust("run", np.arange(5.0), wind, 0.01 * np.eye(10), 0.0).height()
     np.testing.assert_allclose(height, [3.0, 0.0], atol=1e-12)
     np.testing.assert_allclose(sd, np.sqrt([0.01 / 3 + 8 / 9, 0.01 / 3]))
 
@@ -104,8 +103,7 @@ def test_a_wind_that_blows_throughout_is_stated_as_a_velocity():
     assert set(found) == {"steady_wind", "rotor_drag"}
     assert [p.symbol for p in found["steady_wind"].parameters] == ["w_north", "w_east"]
     for estimate, wind in zip(found["steady_wind"].parameters, (3.0, -1.5), strict=True):
-        assert abs(estimate.value - wind) < 0.15
-        assert estimate.low < wind < estimate.high
+        assert abs(estimate.value - wind) < 0.15 and estimate.low < wind < estimate.high
 
 
 STEADY_M_S, SQUARE_DRAG = (-1.0, 3.0), 0.06
@@ -122,7 +120,6 @@ def test_a_wind_beside_a_drag_of_the_square(blown):
     found = {f.id: f for f in blown.findings if f.status == "established"}
     assert set(found) == {"steady_wind", "frame_drag"}
     for estimate, wind in zip(found["steady_wind"].parameters, STEADY_M_S, strict=True):
-        assert estimate.low < wind < estimate.high
-        assert abs(estimate.value - wind) < 0.3
+        assert estimate.low < wind < estimate.high and abs(estimate.value - wind) < 0.3
     sideways = [p.value for p in found["frame_drag"].parameters][:2]  # it hardly climbs
     assert np.allclose(sideways, 0.652 * SQUARE_DRAG, rtol=0.1)

@@ -67,9 +67,8 @@ def test_of_a_single_run_the_last_third_is_held_out_after_a_gap():
     rule = training_rule(split, [])
     border = split.border_s
     assert border == pytest.approx(time_s[0] + (time_s[-1] - time_s[0]) * 2 / 3)
-    assert [rule("a", border + dt) for dt in (-5, -GAP_S / 2 - 0.1, 0, GAP_S / 2 + 0.1, 5)] == [
-        *[True, True, None, False, False]
-    ]
+    around = (-5, -GAP_S / 2 - 0.1, 0, GAP_S / 2 + 0.1, 5)
+    assert [rule("a", border + dt) for dt in around] == [True, True, None, False, False]
 
 
 def test_of_several_runs_whole_ones_are_held_out():
@@ -124,8 +123,7 @@ def test_each_axis_has_its_own_noise_and_rotors_are_alike():
 def test_trust_of_the_user_or_else_a_default():
     vehicle = quad(trust={"mass_kg": 0.002, "inertia_kg_m2": 0.3, "inertia_zz_kg_m2": 0.4})
     assert prior_of("mass", vehicle) == 0.002
-    assert prior_of("inertia_xx", vehicle) == 0.3
-    assert prior_of("inertia_zz", vehicle) == 0.4
+    assert (prior_of("inertia_xx", vehicle), prior_of("inertia_zz", vehicle)) == (0.3, 0.4)
     assert prior_of("thrust", vehicle) == DEFAULT_TRUST["thrust"]
 
 
@@ -217,12 +215,8 @@ def test_thrusts_of_a_comparison_are_what_effects_leave_of_them():
 def flown(size: int = 50) -> Motion:
     """A motion that has what the maker reads."""
     rng = np.random.default_rng(1)
-    return Motion(
-        time_s=np.arange(size) / 50,
-        rotor_speed=np.full((size, 4), 500.0),
-        velocity=rng.standard_normal((size, 3)),
-        rotation=np.tile(np.eye(3), (size, 1, 1)),
-    )
+    level, velocity = np.tile(np.eye(3), (size, 1, 1)), rng.standard_normal((size, 3))
+    return Motion(np.arange(size) / 50, np.full((size, 4), 500.0), velocity=velocity, rotation=level)
 
 
 @pytest.fixture

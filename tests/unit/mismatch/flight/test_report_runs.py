@@ -18,7 +18,7 @@ from rotorid.mismatch.instrument.analyse import analyse_instrument
 from rotorid.mismatch.tell.consistency import EXPLAINED_SHARE
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.report.deliver import ledger, text_of, verdict_of
-from tests.unit.mismatch.flights import Flight
+from tests.unit.mismatch.flights import Flight, with_table
 
 HELD = "run02"
 AT_WORK = ("established", "ambiguous", "suggested")
@@ -34,18 +34,13 @@ def recordings() -> RecordingSet:
 
 def disturbed(size_m_s2: float) -> RecordingSet:
     """The set with a slow force in the run held out that no effect makes."""
-    whole = recordings()
 
-    def changed(run: Run) -> Run:
-        if run.name != HELD:
-            return run
-        table = run.table.copy()
-        wave = size_m_s2 * np.sin(2 * np.pi * 0.4 * run.time_s)
+    def pushed(table: pd.DataFrame) -> None:
+        wave = size_m_s2 * np.sin(2 * np.pi * 0.4 * table["time_s"])
         for name in ("specific_force_x_m_s2", "specific_force_y_m_s2"):
-            table[name] = table[name] + wave
-        return Run(run.name, table)
+            table[name] += wave
 
-    return replace(whole, runs=tuple(changed(r) for r in whole.runs))
+    return with_table(recordings(), pushed, HELD)
 
 
 @cache
@@ -162,8 +157,7 @@ def test_the_runs_held_out_share_what_was_flown():
     calm, fast, faster = (Flight(k, 10.0, excitation=size) for k, size in ((1, 0.05), (2, 1.0), (3, 1.0)))
     runs = (fast.record(50.0, name="run01"), calm.record(50.0, name="run02"), faster.record(50.0, name="run03"))
     whole = RecordingSet("made", calm.vehicle, runs)
-    assert split_runs(whole).held_out != ("run02",)
-    assert split_runs(whole) == split_runs(whole)
+    assert split_runs(whole).held_out != ("run02",) and split_runs(whole) == split_runs(whole)
 
 
 def test_of_two_runs_along_each_axis_one_each_is_held_out():

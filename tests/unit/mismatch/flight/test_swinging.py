@@ -36,8 +36,7 @@ def shaken(seed: int, seconds: float = 30.0):
 
 def sideways(hanging, time_s, start, noise_n: float, seed: int):
     """Sideways force at 10 Hz of a load that set out from `start`, with noise."""
-    own = np.array([[0.0, *start]])
-    pull = MASS_KG * cable_pull(hanging, time_s, LENGTH_M, RATIO, G, own)[:, :2]
+    pull = MASS_KG * cable_pull(hanging, time_s, LENGTH_M, RATIO, G, np.array([[0.0, *start]]))[:, :2]
     at_s = time_s[10::20]
     force = np.stack([np.interp(at_s, time_s, column) for column in pull.T], axis=1)
     return at_s, force + noise_n * np.random.default_rng(seed).standard_normal(force.shape)

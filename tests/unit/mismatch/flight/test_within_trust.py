@@ -36,8 +36,7 @@ def model_of(monkeypatch, thrust: float, helps: bool = True):
         change=relative_change,
         coefficient=coefficient_of,
     )
-    rng = np.random.default_rng(0)
-    noise = rng.standard_normal((4000, 12))
+    noise = np.random.default_rng(0).standard_normal((4000, 12))
 
     def residuals(_, keys, values):
         better = len(keys) == len(TRUST)
@@ -50,15 +49,13 @@ def model_of(monkeypatch, thrust: float, helps: bool = True):
 
 def test_a_thrust_within_its_trust_is_corrected(monkeypatch):
     """By −3 % of a trust of 5 %: both values move together, and one of them is worth a word."""
-    model = model_of(monkeypatch, -0.03)
-    fit, moved = settled(model, {}, ())
+    fit, moved = settled(model_of(monkeypatch, -0.03), {}, ())
     assert len(fit.columns) == 2 and moved["thrust"][0] == pytest.approx(-0.03) and moved["mass"][0] == 0.0
     assert in_words(moved) == ("thrust coefficient −3.0 ± 0.0 %",)
 
 
 def test_a_value_called_wrong_is_not_told_twice(monkeypatch):
-    model = model_of(monkeypatch, -0.03)
-    _, moved = settled(model, {"thrust": (-0.03, 0.001)}, ())
+    _, moved = settled(model_of(monkeypatch, -0.03), {"thrust": (-0.03, 0.001)}, ())
     assert list(moved) == ["mass"]
 
 
@@ -77,6 +74,5 @@ def test_beyond_trust_something_else_is_missing(monkeypatch):
 
 
 def test_values_that_help_no_held_out_channel_stay(monkeypatch):
-    model = model_of(monkeypatch, -0.03, helps=False)
-    fit, moved = settled(model, {}, ())
+    fit, moved = settled(model_of(monkeypatch, -0.03, helps=False), {}, ())
     assert moved == {} and len(fit.columns) == 0

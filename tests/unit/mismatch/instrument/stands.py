@@ -14,16 +14,11 @@ BENCH = Vehicle.model_validate({"name": "bench", "kind": "bench", "tared": True}
 def stand_vehicle(hubs=HUBS, **changes) -> Vehicle:
     """A vehicle of 0.65 kg, its rotors at `hubs` (x, y, turning sense), 0.05 m above a level sensor, not tared."""
     content = {
-        "name": "stand",
-        "kind": "stand",
-        "mass_kg": MASS_KG,
-        "rotors": [{"x_m": x, "y_m": y, "spin": s} for x, y, s in hubs],
-        "thrust_coefficient_n_s2": C_F,
-        "torque_coefficient_n_m_s2": C_Q,
-        "rotor_radius_m": 0.06,
-        "sensor_position_m": [0.0, 0.0, SENSOR_Z_M],
+        "name": "stand", "kind": "stand", "mass_kg": MASS_KG,
+        "rotors": [{"x_m": x, "y_m": y, "spin": s} for x, y, s in hubs], "thrust_coefficient_n_s2": C_F,
+        "torque_coefficient_n_m_s2": C_Q, "rotor_radius_m": 0.06, "sensor_position_m": [0.0, 0.0, SENSOR_Z_M],
         "tared": False,
-    }
+    }  # fmt: skip
     return Vehicle.model_validate(content | changes)
 
 

@@ -83,8 +83,7 @@ def test_air_of_a_room_goes_as_a_power_of_the_speed() -> None:
 
 def test_a_cable_rubs_as_the_tilt_turns_over() -> None:
     """Up to 0.2 rad and back to 0: the branch is 1 going up, −1 going down, and has turned over after 2 · 0.004 rad."""
-    tilt = np.concatenate([np.linspace(0, 0.2, 201), np.linspace(0.2, 0, 201)[1:]])
-    branch = friction(tilt)
+    branch = friction(np.concatenate([np.linspace(0, 0.2, 201), np.linspace(0.2, 0, 201)[1:]]))
     assert branch[100] == pytest.approx(1.0) and branch[300] == pytest.approx(-1.0)
     assert branch[204] == pytest.approx(0.0, abs=1e-9)  # 0.004 rad below the top
     assert not friction(np.zeros(5)).any()
@@ -219,8 +218,7 @@ def test_the_voltage_of_a_stand_is_what_can_be_expected_of_it() -> None:
     with_volts = replace(loading, command=command, motion=replace(loading.motion, voltage=read))
     (found,) = without_voltmeter_noise([with_volts])
     inner = slice(250, -250)
-    assert (found.motion.voltage - true)[inner].std() < 0.004
-    assert found.voltage_read is read
+    assert (found.motion.voltage - true)[inner].std() < 0.004 and found.voltage_read is read
     (same,) = without_voltmeter_noise([replace(with_volts, command=None)])
     assert same.motion.voltage is read
 

@@ -24,21 +24,10 @@ RATE_HZ = 50.0
 
 def instrument(**changes) -> InstrumentFacts:
     given = dict(
-        vehicle=BENCH,
-        channels=(0, 1, 2),
-        loaded=(0, 1, 2),
-        rate_hz=RATE_HZ,
-        duration_s=30.0,
-        run_s=30.0,
-        runs=("a", "b", "c"),
-        largest=(10.0, 10.0, 20.0, 1.0, 1.0, 1.0),
-        returns=(0, 1, 2),
-        temperature=True,
-        temperatures_c=(20.0, 24.0),
-        first_temperature_c=20.0,
-        session_s=100.0,
-        session_clock=True,
-    )
+        vehicle=BENCH, channels=(0, 1, 2), loaded=(0, 1, 2), rate_hz=RATE_HZ, duration_s=30.0, run_s=30.0,
+        runs=("a", "b", "c"), largest=(10.0, 10.0, 20.0, 1.0, 1.0, 1.0), returns=(0, 1, 2), temperature=True,
+        temperatures_c=(20.0, 24.0), first_temperature_c=20.0, session_s=100.0, session_clock=True,
+    )  # fmt: skip
     return InstrumentFacts(**given | changes)
 
 
@@ -90,8 +79,7 @@ def test_a_zero_that_goes_with_the_temperature_was_right_at_one():
 
 def test_the_temperature_of_the_zero_is_read_off_the_readings():
     """b = (0.1, −0.2, 0.4) N/K from 21 °C on, beside a gain of one per cent, which is none of it."""
-    rng = np.random.default_rng(0)
-    given = loading(5 * rng.standard_normal(500))
+    given = loading(5 * np.random.default_rng(0).standard_normal(500))
     warmth = np.linspace(20, 24, 500)
     drift = (warmth - 21.0)[:, None] * np.array([0.1, -0.2, 0.4])
     reading = 1.01 * given.load
@@ -217,8 +205,7 @@ def test_loads_that_mix_differently_in_each_run_are_left_over():
         return load
 
     analysis = analyse_instrument(recorded(change))
-    assert claimed(analysis) == set()
-    assert "run" in analysis.unexplained_depends_on
+    assert claimed(analysis) == set() and "run" in analysis.unexplained_depends_on
 
 
 @pytest.mark.slow
@@ -232,8 +219,7 @@ def test_beside_an_s_shape_the_gains_stay_at_their_belief():
     analysis = analyse_instrument(recorded(lambda load, run, warmth: load + 0.3 * np.sin(np.pi * load / 30.0)))
     assert claimed(analysis) == {"load_nonlinearity"} and not analysis.values
     found = next(f for f in analysis.findings if f.id == "load_nonlinearity")
-    assert found.form.name == "S-shape"
-    assert found.values[:3] == pytest.approx([0.3] * 3, abs=0.01)
+    assert found.form.name == "S-shape" and found.values[:3] == pytest.approx([0.3] * 3, abs=0.01)
     setup = set_up(recorded(lambda load, run, warmth: load))
     model = reading_model(setup, make_terms(setup)[0])
     key = next(k for k in model.search.terms if k.startswith("load_nonlinearity/S-shape of Fz"))
@@ -256,9 +242,8 @@ def test_an_amplifier_that_is_nearly_a_delay_is_no_delay():
 
 
 def test_a_wrong_gain_stays_wrong_beside_a_curve():
-    analysis = analyse_instrument(
-        recorded(lambda load, run, warmth: 1.035 * load + 0.3 * np.array([1, -0.8, 0.9]) * (load / 20.0) ** 3)
-    )
+    bend = 0.3 * np.array([1, -0.8, 0.9])
+    analysis = analyse_instrument(recorded(lambda load, run, warmth: 1.035 * load + bend * (load / 20.0) ** 3))
     assert claimed(analysis) == {"load_nonlinearity"}
     assert analysis.values["reading_gain"][2] < 1.035 < analysis.values["reading_gain"][3]
 

@@ -70,8 +70,7 @@ def lagging_set(between) -> RecordingSet:
         knots = np.arange(0, 20.4, 0.4) + 0.1 * rng.random(51)
         places = np.repeat(knots, 2)[1:-1] + 0.0371 * np.tile([0, 1], 50)
         course = np.interp(t, places, np.repeat(rng.uniform(400, 900, 50), 2))
-        command = between(course)
-        speed = lagged(command[:, None], TAU_S, TAU_S, DT_S / FINE)[::FINE, 0]
+        speed = lagged(between(course)[:, None], TAU_S, TAU_S, DT_S / FINE)[::FINE, 0]
         read = speed + 0.5 * rng.standard_normal(len(speed))
         table = {
             "time_s": t[::FINE],
@@ -89,8 +88,7 @@ def test_a_lag_is_found_whatever_the_command_did_between_its_samples(between):
     setup = set_up(parts_of(made, split_runs(made))[0], made)
     (found,) = [f for f in find_chain(setup).findings if f.id == "motor_lag"]
     first = found.parameters[0]
-    assert first.low < TAU_S < first.high
-    assert first.high - first.low < 0.04 * TAU_S
+    assert first.low < TAU_S < first.high and first.high - first.low < 0.04 * TAU_S
 
 
 def test_the_acceleration_of_a_cubic_is_exact():

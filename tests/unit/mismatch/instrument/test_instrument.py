@@ -9,7 +9,6 @@ import pytest
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Motion
 from rotorid.effects.loading import InstrumentFacts, Loading, at_sensor, forms_of, rotation_of, weight
-from rotorid.errors import InputError
 from rotorid.mismatch.deliver.files import read_instruments
 from rotorid.mismatch.evidence.rows import Rows, form_reading
 from rotorid.mismatch.instrument.analyse import analyse_instrument
@@ -19,6 +18,7 @@ from rotorid.mismatch.instrument.sampling import step_of
 from rotorid.mismatch.instrument.setup import set_up
 from rotorid.recordings import RecordingSet, Run, Vehicle, read_vehicle
 from rotorid.report.deliver import deliver
+from tests.refusals import refused
 from tests.unit.mismatch.instrument.stands import BENCH, bench_run, claimed, stand_vehicle
 
 NEW = (
@@ -46,9 +46,8 @@ def stand_loading(vehicle: Vehicle, seconds: float = 30.0, tilt=(0.2, -0.1), see
     moment[:, 0], moment[:, 1] = thrust @ hubs[:, 1], -thrust @ hubs[:, 0]
     heavy = weight(motion, vehicle)
     load = at_sensor(force, moment, motion, vehicle) + heavy
-    return Loading(
-        "a", t, t, load, load, heavy[0], motion, (roll, pitch), 1e-2 * t, 20 + 1e-2 * t, session_time_s=t + 100.0
-    )
+    warmth = 20 + 1e-2 * t
+    return Loading("a", t, t, load, load, heavy[0], motion, (roll, pitch), 1e-2 * t, warmth, session_time_s=t + 100.0)
 
 
 def instrument_for(loading: Loading, vehicle: Vehicle) -> InstrumentFacts:
@@ -56,22 +55,10 @@ def instrument_for(loading: Loading, vehicle: Vehicle) -> InstrumentFacts:
     every = (0, 1, 2, 3, 4, 5)
     span = float(loading.time_s[-1])
     return InstrumentFacts(
-        vehicle=vehicle,
-        channels=every,
-        loaded=every,
-        rate_hz=RATE_HZ,
-        duration_s=span,
-        run_s=span,
-        runs=("a",),
-        largest=largest,
-        tilts=True,
-        returns=every,
-        temperature=True,
-        temperatures_c=(20.0, 20.3),
-        first_temperature_c=20.0,
-        session_s=200.0,
-        session_clock=True,
-    )
+        vehicle=vehicle, channels=every, loaded=every, rate_hz=RATE_HZ, duration_s=span, run_s=span, runs=("a",),
+        largest=largest, tilts=True, returns=every, temperature=True, temperatures_c=(20.0, 20.3),
+        first_temperature_c=20.0, session_s=200.0, session_clock=True,
+    )  # fmt: skip
 
 
 def bench_instrument():
@@ -81,9 +68,8 @@ def bench_instrument():
 def forms():
     vehicle = stand_vehicle()
     instrument, bench = instrument_for(stand_loading(vehicle), vehicle), bench_instrument()
-    return [
-        (key, form) for key in NEW for form in forms_of(catalogue()[key], bench if key == "compliance" else instrument)
-    ]
+    of = {key: bench if key == "compliance" else instrument for key in NEW}
+    return [(key, form) for key in NEW for form in forms_of(catalogue()[key], of[key])]
 
 
 @pytest.mark.parametrize(("key", "form"), forms(), ids=lambda x: getattr(x, "name", x))
@@ -108,9 +94,10 @@ def test_a_form_of_an_instrument_is_linear_and_recovers_its_own_parameters(key, 
     assert np.allclose(np.stack(columns, axis=1) @ found, reading.ravel(), atol=1e-9 * np.abs(reading).max())
 
 
-@pytest.mark.parametrize(
-    "key", [k for k in NEW if k not in ("tare_offset", "zero_drift", "com_offset", "cable_stiffness")]
-)
+WITHOUT_A_LOAD = ("tare_offset", "zero_drift", "com_offset", "cable_stiffness")
+
+
+@pytest.mark.parametrize("key", [k for k in NEW if k not in WITHOUT_A_LOAD])
 def test_an_effect_of_the_reading_is_nothing_without_a_load(key):
     vehicle = stand_vehicle()
     loading = stand_loading(vehicle)
@@ -135,8 +122,7 @@ def test_a_weight_under_tilt_is_read_in_level_axes_and_its_moment_by_hand():
     motion = Motion(time_s=np.arange(2.0), rotor_speed=np.zeros((2, 4)), rotation=rotation_of(roll, 0 * roll))
     # Level sensor: the weight pulls straight down. The mass is 0.05 m above the sensor along the leaning body axis:
     # arm = R (0, 0, −0.05) = (0, 0.05 sin 30°, −0.05 cos 30°), moment = arm × (0, 0, 6.3765).
-    found = weight(motion, vehicle)[0]
-    assert np.allclose(found, [0, 0, 6.3765, 0.025 * 6.3765, 0, 0], atol=1e-9)
+    assert np.allclose(weight(motion, vehicle)[0], [0, 0, 6.3765, 0.025 * 6.3765, 0, 0], atol=1e-9)
     tilting = weight(motion, stand_vehicle(sensor_mount="tilting"))[0]
     assert np.allclose(tilting[:3], [0, 6.3765 * 0.5, 6.3765 * np.sqrt(0.75)], atol=1e-9)
 
@@ -161,9 +147,8 @@ def bench_set(change=lambda f: f, runs: int = 4, seed: int = 0, noise_n: float =
     made = []
     for number in range(runs):
         t = np.arange(int(30 * RATE_HZ)) / RATE_HZ
-        load = np.stack(
-            [np.interp(t, np.linspace(0, 30, 13), np.r_[0, rng.uniform(-8, 8, 11), 0]) for _ in range(3)], axis=1
-        )
+        corners = np.linspace(0, 30, 13)
+        load = np.stack([np.interp(t, corners, np.r_[0, rng.uniform(-8, 8, 11), 0]) for _ in range(3)], axis=1)
         read = change(load.copy()) + noise_n * rng.standard_normal(load.shape)
         made.append(bench_run(f"run{number + 1}", t, load, read))
     return RecordingSet("bench", BENCH, tuple(made))
@@ -209,8 +194,8 @@ def test_gram_force_is_recognised():
 
 def test_nothing_to_compare_is_one_sentence():
     run = Run("a", pd.DataFrame({"time_s": np.arange(10.0), "force_x_n": np.zeros(10)}))
-    with pytest.raises(InputError, match="no force or moment is recorded in every run together with its reference"):
-        set_up(RecordingSet("b", BENCH, (run,)))
+    said = "no force or moment is recorded in every run together with its reference"
+    refused(said, set_up, RecordingSet("b", BENCH, (run,)))
 
 
 def test_the_files_of_a_bench_hold_its_model(tmp_path):

@@ -42,8 +42,7 @@ def test_commands_all_a_share_too_low_are_a_thrust_coefficient_and_no_curve_of_t
 
 
 def test_a_curve_of_the_throttle_stays_one_beside_it():
-    found = find_chain(set_up(commanded(0.0, 0.8)))
-    assert claimed(found) == {"throttle_curve"}
+    assert claimed(find_chain(set_up(commanded(0.0, 0.8)))) == {"throttle_curve"}
 
 
 def test_a_centre_of_mass_on_a_tilting_mount_is_no_tare_of_single_runs():

@@ -24,12 +24,9 @@ def steady_run(name: str, volts: float, seed: int) -> Run:
     v = volts * (1 - 0.01 * u)
     speed = FULL_RAD_S * ((u - 0.04) / 0.96) ** 0.65 * (v / 16.0) ** 0.8 + 3.0 * rng.standard_normal(len(u))
     table = {
-        "time_s": np.arange(len(u), dtype=float),
-        "throttle_1": u,
-        "rotor_speed_1_rad_s": speed,
-        "battery_voltage_v": v,
-        "force_z_n": -C_F * speed**2 + 0.003 * rng.standard_normal(len(u)),
-    }
+        "time_s": np.arange(len(u), dtype=float), "throttle_1": u, "rotor_speed_1_rad_s": speed,
+        "battery_voltage_v": v, "force_z_n": -C_F * speed**2 + 0.003 * rng.standard_normal(len(u)),
+    }  # fmt: skip
     return Run(name, pd.DataFrame(table))
 
 

@@ -31,10 +31,9 @@ def ids(findings) -> list[str]:
 
 
 def one(findings, name: str):
-    assert ids(findings) == [name]
-    assert findings[0].status == "established"
-    assert findings[0].p_value < 1e-6
-    return findings[0]
+    (finding,) = findings
+    assert finding.id == name and finding.status == "established" and finding.p_value < 1e-6
+    return finding
 
 
 def column(recordings: RecordingSet, name: str) -> np.ndarray:
@@ -80,15 +79,10 @@ def test_a_sound_set_is_left_alone(seed, rate_hz):
         {"late_s": {"rotors": 0.003, "attitude": -0.002}},
     ],
     ids=[
-        "torque",
-        "mass",
-        "thrust",
-        "inertia",
-        "strong drag",
-        "hover that moves nothing",
+        "torque", "mass", "thrust", "inertia", "strong drag", "hover that moves nothing",
         "late by less than a sample",
     ],
-)
+)  # fmt: skip
 def test_wrong_values_effects_and_small_offsets_are_no_mistakes(flown):
     assert find_mistakes(recorded(3, 4, **flown))[1] == ()
 
@@ -96,13 +90,10 @@ def test_wrong_values_effects_and_small_offsets_are_no_mistakes(flown):
 @pytest.mark.parametrize(
     ("sensor", "factor", "word"),
     [
-        ("rotors", 60 / (2 * np.pi), "rpm"),
-        ("gyroscope", 180 / np.pi, "deg/s"),
-        ("accelerometer", 1 / 9.80665, "g"),
-        ("velocity", 100.0, "cm/s"),
-        ("position", 1000.0, "mm"),
+        ("rotors", 60 / (2 * np.pi), "rpm"), ("gyroscope", 180 / np.pi, "deg/s"), ("accelerometer", 1 / 9.80665, "g"),
+        ("velocity", 100.0, "cm/s"), ("position", 1000.0, "mm"),
     ],
-)
+)  # fmt: skip
 def test_units(sound, sensor, factor, word):
     names = list(COLUMNS[sensor])
     fixed, findings, _ = find_mistakes(with_table(sound, holding(names, names, factor)))
@@ -144,11 +135,7 @@ IMAGINARY = list(COLUMNS["attitude"][1:])
         # East-north-up instead of north-east-down.
         ("axis_sign", holding(VELOCITY, [VELOCITY[k] for k in (1, 0, 2)], [1, 1, -1]), ["x, y, z hold y, x, −z"]),
         ("axis_sign", holding(IMAGINARY, IMAGINARY, -1.0), ["conjugated"]),
-        (
-            "rotor_order",
-            holding(ROTORS[1:3], ROTORS[2:0:-1]),
-            ["column 2 belongs to rotor 3", "column 3 belongs to rotor 2"],
-        ),
+        ("rotor_order", holding(ROTORS[1:3], ROTORS[2:0:-1]), [f"column {a} belongs to rotor {5 - a}" for a in (2, 3)]),
         ("rotor_order", holding(ROTORS, list(np.roll(ROTORS, 1))), []),
     ],
     ids=["axes of the velocity", "conjugated attitude", "two rotors", "rotors moved round by one"],
@@ -188,8 +175,7 @@ def test_delays(late_s, sensors, value, word):
     finding = one(findings, "delay")
     assert set(finding.channels) == set(sensors)
     estimate = finding.parameters[0]
-    assert estimate.low <= value <= estimate.high
-    assert estimate.value == pytest.approx(value, abs=5e-4)
+    assert estimate.low <= value <= estimate.high and estimate.value == pytest.approx(value, abs=5e-4)
     assert f" ms {word} against" in finding.sentence
     assert find_mistakes(fixed)[1] == ()
 
@@ -199,8 +185,7 @@ def test_a_drifting_clock(growth):
     fixed, findings, _ = find_mistakes(recorded(41, 42, growth={"rotors": growth}))
     finding = one(findings, "clock_skew")
     assert finding.channels == ("rotor_speed_1_rad_s",)
-    estimate = finding.parameters[0]
-    assert estimate.value == pytest.approx(growth, abs=6e-5)
+    assert finding.parameters[0].value == pytest.approx(growth, abs=6e-5)
     assert find_mistakes(fixed)[1] == ()
 
 
@@ -263,15 +248,9 @@ def test_two_readings_of_one_quantity_tell_time_where_their_gain_is_one(phase):
     moved, noise = (rng.standard_normal(shape) + 1j * rng.standard_normal(shape) for _ in range(2))
     size = np.where(frequency_hz > 5.0, 8.0, 0.0)[None, :, None]
     motion = moved / (1.0 + frequency_hz[None, :, None] ** 2)
-    blocks = Blocks(
-        frequency_hz,
-        motion + 0.1 * size * noise * np.exp(-1j * phase),
-        motion + size * noise,
-        np.zeros((40, len(frequency_hz), 0), complex),
-        np.zeros(40, int),
-        np.arange(40.0),
-    )
-    narrow = one_quantity(blocks, [0])
+    readings = motion + 0.1 * size * noise * np.exp(-1j * phase), motion + size * noise
+    others = np.zeros((40, len(frequency_hz), 0), complex)
+    narrow = one_quantity(Blocks(frequency_hz, *readings, others, np.zeros(40, int), np.arange(40.0)), [0])
     assert 2.0 < narrow.frequency_hz[-1] <= 5.3
     assert abs(lagged.fit(narrow).lag_s) < 1e-4
 
@@ -394,8 +373,7 @@ def without_attitude(table):
 
 
 def test_short_runs_without_a_mistake(short):
-    assert find_mistakes(short)[1] == ()
-    assert find_mistakes(with_table(short, without_attitude))[1] == ()
+    assert find_mistakes(short)[1] == () and find_mistakes(with_table(short, without_attitude))[1] == ()
 
 
 @pytest.mark.parametrize("lag_s", [0.0, 0.045])
@@ -430,8 +408,7 @@ def test_two_rotors_exchanged_in_short_runs(short, pair):
 @pytest.mark.parametrize("sensor", ["gyroscope", "rotors"])
 def test_a_drifting_clock_in_short_runs(sensor):
     bad = recorded(61, 62, 63, 64, flight={"duration_s": 9.0}, growth={sensor: 0.002})
-    finding = next(f for f in find_mistakes(bad)[1] if f.id == "clock_skew")
-    estimate = finding.parameters[0]
+    estimate = next(f for f in find_mistakes(bad)[1] if f.id == "clock_skew").parameters[0]
     assert min(abs(estimate.low), abs(estimate.high)) <= 0.002 <= max(abs(estimate.low), abs(estimate.high))
 
 

@@ -24,8 +24,7 @@ def test_an_unexplained_burst_is_found_to_a_fraction_of_a_second():
     assert found[0].start_s == pytest.approx(20.0, abs=0.2)
     assert found[0].stop_s == pytest.approx(23.0, abs=0.2)
     # 120 samples at 37 σ² beside 1560 at 1 σ²: (120 · 37) / (1440 + 4440) = 0.76.
-    assert found[0].energy_share == pytest.approx(0.76, abs=0.1)
-    assert found[0].p_value < 1e-6
+    assert found[0].energy_share == pytest.approx(0.76, abs=0.1) and found[0].p_value < 1e-6
 
 
 @pytest.mark.parametrize("pole", [0.0, 0.6, 0.9])
@@ -43,8 +42,7 @@ def test_drag_is_located_in_the_dash_and_its_regime_is_airspeed():
     assert [(f.run, f.channel) for f in found] == [(r, "force_x") for r in "abc"]
     for f in found:
         assert f.start_s == pytest.approx(DASH_S[0], abs=0.3)
-        assert f.stop_s == pytest.approx(DASH_S[1], abs=0.3)
-        assert f.regime.variable == "airspeed_m_s"
+        assert f.stop_s == pytest.approx(DASH_S[1], abs=0.3) and f.regime.variable == "airspeed_m_s"
         assert 0 < f.regime.low < 5.0 <= f.regime.high + 0.1
 
 
@@ -131,14 +129,9 @@ def test_what_the_accelerometer_alone_reads_is_located_nowhere(alone):
     (burst,) = [t for t in made.traces if (t.run, t.channel) == ("b", "force_y")]
     read = np.where((burst.time_s > 20.0) & (burst.time_s < 23.0), burst.after, 0.0) / made.improved.mass_kg
     sensors = replace(
-        burst,
-        channel="accelerometer_y",
-        unit="m/s2",
-        before=read,
-        refitted=read,
-        named=read * alone,
+        burst, channel="accelerometer_y", unit="m/s2", before=read, refitted=read, named=read * alone,
         after=read * alone,
-    )
+    )  # fmt: skip
     found = locate(replace(made, force_source="accelerometer", between_sensors=(sensors,)))
     assert [(f.run, f.channel) for f in found] == ([] if alone else [("b", "force_y")])
 

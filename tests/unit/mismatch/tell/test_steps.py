@@ -50,8 +50,7 @@ def test_a_class_is_named_as_one_of_its_members():
 
 
 def test_what_is_not_delivered_takes_nothing_off():
-    verdict = shrunk("refitted", 0.65, 0.45, 0.50)
-    whole = together(steps_of(verdict.channels, "refitted"))
+    whole = together(steps_of(shrunk("refitted", 0.65, 0.45, 0.50).channels, "refitted"))
     assert (whole.values, whole.named, whole.delivered) == pytest.approx((0.65, 0.65, 0.50), abs=1e-4)
 
 

@@ -95,8 +95,7 @@ def left_with(share: float, findings, values):
 )
 def test_the_word(findings, values, share, word):
     found = make_verdict(left_with(share, findings, values), [], {})
-    assert found.verdict == word
-    assert found.unexplained.share == pytest.approx(share, abs=0.05)
+    assert found.verdict == word and found.unexplained.share == pytest.approx(share, abs=0.05)
 
 
 def test_an_error_that_did_not_get_smaller_is_not_sold_as_a_gain():
@@ -110,8 +109,7 @@ def test_an_error_that_did_not_get_smaller_is_not_sold_as_a_gain():
 
 
 def test_a_burst_that_nothing_explains_is_unexplained():
-    made = analysis(bursts=[("b", "moment_y", 20.0, 23.0, 6.0)])
-    found = verdict_of(made)
+    found = verdict_of(analysis(bursts=[("b", "moment_y", 20.0, 23.0, 6.0)]))
     assert found.verdict == "unexplained"
     assert "pitch moment" in found.sentence and "none of the known effects" in found.sentence
 
@@ -175,8 +173,7 @@ def test_the_sentence_goes_by_size_and_names_what_stays_off():
     made = replace(made, traces=tuple(map(changed, made.traces)), noise_floor=made.noise_floor | {"force_x": 0.002})
     found = verdict_of(made)
     assert "the pitch moment stays 0.32 N m off" in found.sentence
-    assert "% of the available pitch moment" in found.sentence
-    assert "rotor drag" in found.sentence
+    assert "% of the available pitch moment" in found.sentence and "rotor drag" in found.sentence
 
 
 def test_a_doubt_that_stops_makes_the_set_not_judged():

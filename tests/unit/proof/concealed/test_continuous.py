@@ -70,8 +70,7 @@ def test_turning_freely_follows_euler_and_an_accelerometer_off_centre_feels_it()
 
 
 def test_thrust_to_the_front_pitches_up_and_a_centre_ahead_of_it_pitches_down():
-    gain = np.where(CRAFT.hubs[:, 0] > 0, 1.05, 0.95)
-    out, _ = derivative(Nature(lag=0.03, gain=gain))
+    out, _ = derivative(Nature(lag=0.03, gain=np.where(CRAFT.hubs[:, 0] > 0, 1.05, 0.95)))
     assert out[11] > 0
     out, _ = derivative(Nature(lag=0.03, centre=np.array([0.002, 0, 0])))
     moment = CRAFT.inertia @ out[10:13]

@@ -78,8 +78,7 @@ def test_free_fall_feels_nothing_and_gains_g():
 
 
 def _tumble(step_s, duration_s=2.0):
-    values = physics.clean_physics(THESIS)
-    p = physics.to_record(values)
+    p = physics.to_record(physics.clean_physics(THESIS))
     n, size = 4, physics.state_size(4)
     y = np.zeros(size)
     y[6] = 1.0
@@ -212,10 +211,8 @@ def test_nothing_hidden_leaves_nothing_but_noise(vehicle, rate_hz):
 
 @pytest.mark.parametrize("effect", ["rotor_drag", "axial_inflow", "com_offset", "accelerometer_error"])
 def test_effects_stand_at_the_wanted_size_over_the_noise(effect):
-    plan = Plan(runs=(Run("rich", 12.0),), hidden=(Hidden(effect, size=1.5),))
-    _, truth, _ = scene.make(plan, 2)
-    e = truth["effects"][0]
-    numbers = truth["oracle"]["runs"]["run01"][e["main_channel"]]
+    _, truth, _ = scene.make(Plan(runs=(Run("rich", 12.0),), hidden=(Hidden(effect, size=1.5),)), 2)
+    numbers = truth["oracle"]["runs"]["run01"][truth["effects"][0]["main_channel"]]
     assert numbers["mismatch_rms"] / numbers["noise_rms"] == pytest.approx(1.5, rel=0.2)
 
 
@@ -225,8 +222,7 @@ def test_step_response_of_a_lagging_motor_in_flight():
     segments = [manoeuvres.Segment("pulses", 8.0, 0.06), manoeuvres.Segment("hover", 2.0)]
     reference = manoeuvres.build(segments, 5.0, a.step_s, 4, np.random.default_rng(0))
     f = flight.fly(a, flight.tuned(values, 250.0), reference)
-    slope = np.gradient(f.speed_rad_s, a.step_s, axis=0)
-    lagged = f.speed_rad_s + 0.05 * slope
+    lagged = f.speed_rad_s + 0.05 * np.gradient(f.speed_rad_s, a.step_s, axis=0)
     assert np.abs(lagged - f.command_rad_s)[5:-5].max() < 1.0
 
 

@@ -1,22 +1,19 @@
 """ArduPilot logs of older firmware: tables made here, and two public logs compared with a plain reading of their
 messages."""
 
-import os
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import ardupilot
 from rotorid.recordings.importers.faults import off_the_ground
+from tests.public_logs import LOGS
+from tests.refusals import refused
 from tests.unit.recordings.importers.test_log_formats import PARAMETERS, dataflash, flown
 
-ROOT = Path(__file__).parents[4]
-_named = os.environ.get("ROTORID_PUBLIC_DATA")
-LOGS = ((ROOT / _named).resolve() if _named else ROOT / ".." / "shared" / "data") / "logs" / "ardupilot"
 THROTTLES = list(c.rotor_columns("throttle", 4))
 LIMITS = {"MOT_PWM_MIN": 0.0, "MOT_PWM_MAX": 0.0, "RC3_MIN": 1070.0, "RC3_MAX": 1989.0}
 
@@ -36,9 +33,9 @@ def tables(values: dict[str, float], **more: pd.DataFrame) -> dict[str, pd.DataF
 
 def public(name: str) -> Path:
     pytest.importorskip("pymavlink")
-    if not (LOGS / name).is_file():
+    if not (LOGS / "ardupilot" / name).is_file():
         pytest.skip("the public logs are not on this machine")
-    return LOGS / name
+    return LOGS / "ardupilot" / name
 
 
 @pytest.mark.parametrize(
@@ -226,17 +223,15 @@ def test_damaged_events_and_batteries_are_passed_over() -> None:
 
 FUNCTIONS = [*range(33, 41), *range(82, 86)]
 """Output functions of motors 1 to 12."""
+FOUR = dict(zip(range(1, 5), FUNCTIONS, strict=False))
 
 
 def framed(values: dict[str, float], outputs: dict[int, int], **more: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """A log whose outputs (from 1) have functions, output n at n hundredths of full throttle."""
-    log = tables({"MOT_PWM_MIN": 1000.0, "MOT_PWM_MAX": 2000.0, **values, **functions(outputs)}, **more)
+    functions = {f"SERVO{n}_FUNCTION": float(function) for n, function in outputs.items()}
+    log = tables({"MOT_PWM_MIN": 1000.0, "MOT_PWM_MAX": 2000.0, **values, **functions}, **more)
     pulses = {f"C{n}": np.full(100, 1000.0 + 10 * n) for n in range(1, 15)}
     return log | {"RCOU": pd.DataFrame({c.TIME: log["IMU"][c.TIME], **pulses})}
-
-
-def functions(outputs: dict[int, int]) -> dict[str, float]:
-    return {f"SERVO{n}_FUNCTION": float(function) for n, function in outputs.items()}
 
 
 def throttles_of(log: dict[str, pd.DataFrame]) -> dict[str, float]:
@@ -262,18 +257,17 @@ def test_a_frame_of_a_script_has_the_motors_that_its_functions_name(frame: int) 
     assert throttles_of(log) == pytest.approx({f"throttle_{n}": n / 100 for n in range(1, 6)})
 
 
+OTHER_FRAMES = {
+    6: "a helicopter, ", 7: "a tricopter", 8: "a singlecopter", 9: "a coaxial copter", 10: "a tailsitter",
+    11: "a helicopter of two rotors", 13: "a helicopter of four rotors", 16: "point in several directions",
+    99: "not known here",
+}  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("values", "said", "name"),
     [
-        ({"FRAME_CLASS": 6}, "", "a helicopter, .*FRAME_CLASS 6"),
-        ({"FRAME_CLASS": 7}, "", "a tricopter.*FRAME_CLASS 7"),
-        ({"FRAME_CLASS": 8}, "", "a singlecopter.*FRAME_CLASS 8"),
-        ({"FRAME_CLASS": 9}, "", "a coaxial copter.*FRAME_CLASS 9"),
-        ({"FRAME_CLASS": 10}, "", "a tailsitter.*FRAME_CLASS 10"),
-        ({"FRAME_CLASS": 11}, "", "a helicopter of two rotors.*FRAME_CLASS 11"),
-        ({"FRAME_CLASS": 13}, "", "a helicopter of four rotors.*FRAME_CLASS 13"),
-        ({"FRAME_CLASS": 16}, "", "point in several directions.*FRAME_CLASS 16"),
-        ({"FRAME_CLASS": 99}, "", "not known here.*FRAME_CLASS 99"),
+        *(({"FRAME_CLASS": kind}, "", f"{name}.*FRAME_CLASS {kind}") for kind, name in OTHER_FRAMES.items()),
         ({"Q_ENABLE": 1, "Q_FRAME_CLASS": 1}, "ArduPlane V4.5.7 (2a3dc4b7)", "quadplane"),
         ({"Q_ENABLE": 0}, "ArduPlane V4.5.7 (2a3dc4b7)", "a plane"),
         ({"FRAME_CLASS": 1}, "ArduRover V4.5.7 (2a3dc4b7)", "a rover"),
@@ -285,16 +279,14 @@ def test_a_frame_of_a_script_has_the_motors_that_its_functions_name(frame: int) 
     ],
 )
 def test_what_is_no_multirotor_of_fixed_rotors_is_refused_by_its_name(values, said: str, name: str) -> None:
-    log = framed(values, {n: 32 + n for n in range(1, 5)})
-    with pytest.raises(InputError, match=f"{name}.*only multirotors"):
-        ardupilot.convert(log | {"MSG": pd.DataFrame({"Message": [said, "Low battery"]})}, "log")
+    log = framed(values, FOUR) | {"MSG": pd.DataFrame({"Message": [said, "Low battery"]})}
+    refused(f"{name}.*only multirotors", ardupilot.convert, log, "log")
 
 
 @pytest.mark.parametrize("build", ardupilot.OTHER_BUILDS)
 def test_the_build_of_another_vehicle_is_refused(build: int) -> None:
-    log = framed({"FRAME_CLASS": 1}, {n: 32 + n for n in range(1, 5)})
-    with pytest.raises(InputError, match=f"VER.BU {build}"):
-        ardupilot.convert(log | {"VER": pd.DataFrame({"BU": [build]})}, "log")
+    log = framed({"FRAME_CLASS": 1}, FOUR)
+    refused(f"VER.BU {build}", ardupilot.convert, log | {"VER": pd.DataFrame({"BU": [build]})}, "log")
     assert len(throttles_of(log | {"VER": pd.DataFrame({"BU": [2]})})) == 4
 
 
@@ -347,7 +339,7 @@ def test_a_pulse_is_read_by_the_parameters_that_held_then(change, before: float,
 
 @pytest.mark.parametrize("name", ["MOT_THST_EXPO", "MOT_SPIN_MIN", "MOT_SPIN_MAX", "FRAME_TYPE"])
 def test_a_change_of_what_else_is_compared_is_stated(name: str) -> None:
-    log = framed({"FRAME_CLASS": 1, name: 1.0}, {n: 32 + n for n in range(1, 5)})
+    log = framed({"FRAME_CLASS": 1, name: 1.0}, FOUR)
     _, faults, _ = ardupilot.convert(set_later(log, [(1.0, name, 0.0), (1.0, "ATC_RAT_RLL_P", 0.2)]), "log")
     assert [f.found.split()[0] for f in faults if f.kind == "parameter_changed"] == [name]
 

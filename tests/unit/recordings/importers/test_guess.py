@@ -1,7 +1,5 @@
 """Guessing what columns are: by names and numbers, with evidence, and open where neither decides."""
 
-from __future__ import annotations
-
 import warnings
 from pathlib import Path
 
@@ -10,18 +8,17 @@ import pandas as pd
 import pytest
 import yaml
 from scipy.spatial.transform import Rotation
-from typer.testing import CliRunner
 
-from rotorid.cli import app
 from rotorid.cli.modelling import fly
-from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings import read_set, templates
 from rotorid.recordings.importers.faults import join_rows
 from rotorid.recordings.importers.guessing import as_text, guess
 from rotorid.recordings.importers.guessing import names as column_names
 from rotorid.recordings.importers.mapping import BODY, TRAVEL, UNITS, WORLD, convert, read_columns, read_mapping
+from tests.command_line import refusal
 from tests.public_logs import LOGS, needs_logs
+from tests.refusals import refused
 
 NAMES = {
     "angular_velocity": ("gyro_{}", "omega_{}", "ang_vel_{}", "w{}", "imu.gyro.{}", "angularVelocity.{}", "Gyr{}"),
@@ -95,13 +92,10 @@ def test_names_that_end_as_others_do_are_told_apart_in_a_public_table() -> None:
     found = guess(pd.read_csv(LOGS / "csv-ddd/quadrotor_model.csv"))
     columns = {name: channel.columns for name, channel in found.mapping.channels.items()}
     assert columns == {
-        "time": ("timestamp",),
-        "angular_velocity": ("ang_vel_x", "ang_vel_y", "ang_vel_z"),
-        "attitude": ("q0", "q1", "q2", "q3"),
-        "specific_force": ("acc_b_x", "acc_b_y", "acc_b_z"),
-        "velocity": ("vx", "vy", "vz"),
-        "throttle": ("u0", "u1", "u2", "u3"),
-    }
+        "time": ("timestamp",), "angular_velocity": ("ang_vel_x", "ang_vel_y", "ang_vel_z"),
+        "attitude": ("q0", "q1", "q2", "q3"), "specific_force": ("acc_b_x", "acc_b_y", "acc_b_z"),
+        "velocity": ("vx", "vy", "vz"), "throttle": ("u0", "u1", "u2", "u3"),
+    }  # fmt: skip
     assert not found.open and (found.mapping.body, found.mapping.world) == ("frd", "ned")
     assert found.mapping.channels["velocity"].axes == "world" and found.mapping.channels["attitude"].form == "wxyz"
 
@@ -139,11 +133,9 @@ def test_what_is_not_sure_is_left_open_and_import_waits_for_the_answer(
     path.write_text(as_text(found, "own.csv"))
     table.to_csv(own, index=False)
     assert f"# OPEN: {found.open[open_at]}" in path.read_text() and yaml.safe_load(path.read_text())["channels"]
-    with pytest.raises(InputError, match=rf"{path}: still open \(\?\): .*{open_at}"):
-        read_mapping(path)
-    words = ["import", str(own), "--mapping", str(path), "--like", "thesis", "-o", str(tmp_path / "set")]
-    done = CliRunner().invoke(app, words)
-    assert done.exit_code == 1 and "still open" in done.output and not (tmp_path / "set").exists()
+    refused(rf"{path}: still open \(\?\): .*{open_at}", read_mapping, path)
+    said = refusal("import", own, "--mapping", path, "--like", "thesis", "-o", tmp_path / "set")
+    assert "still open" in said and not (tmp_path / "set").exists()
 
 
 def test_columns_of_no_known_name_are_taken_by_what_they_integrate_to(flown: pd.DataFrame) -> None:
@@ -158,18 +150,11 @@ def test_columns_of_no_known_name_are_taken_by_what_they_integrate_to(flown: pd.
 @pytest.mark.parametrize(
     ("names", "quantity"),
     [
-        ("ang_vel_{}", "angular_velocity"),
-        ("gyro_bias_{}", None),
-        ("acc_sp_{}", None),
-        ("ang_acc_b_{}", None),
-        ("vel_ref_{}", None),
-        ("magnetometer_{}", None),
-        ("estimate.v{}", "velocity"),
-        ("gyro_{}_deg_s", "angular_velocity"),
-        ("{}", "position"),
-        ("pos_{}[mm]", "position"),
+        ("ang_vel_{}", "angular_velocity"), ("gyro_bias_{}", None), ("acc_sp_{}", None), ("ang_acc_b_{}", None),
+        ("vel_ref_{}", None), ("magnetometer_{}", None), ("estimate.v{}", "velocity"),
+        ("gyro_{}_deg_s", "angular_velocity"), ("{}", "position"), ("pos_{}[mm]", "position"),
     ],
-)
+)  # fmt: skip
 def test_names(names: str, quantity: str | None) -> None:
     (family,) = column_names.families([names.format(a) for a in "xyz"], "xyz")
     named = [q for q in column_names.TRIPLES if column_names.is_named(family, q)]
@@ -307,8 +292,7 @@ def test_slow_turns_are_asked_although_the_names_say_rpm() -> None:
 def test_what_a_mapping_lacks_is_named(line: str, said: str, tmp_path: Path) -> None:
     path = tmp_path / "mapping.yaml"
     path.write_text(f"channels:\n  time: {{columns: [t], unit: s}}\n  {line}\n")
-    with pytest.raises(InputError, match=said):
-        read_mapping(path)
+    refused(said, read_mapping, path)
 
 
 # Axes, orders and units that differ between channels -----------------------------------------------
@@ -414,8 +398,7 @@ def test_the_unit_of_a_gyroscope_follows_from_the_attitude(flown: pd.DataFrame, 
     table = plain(flown)
     table[["gyro_x", "gyro_y", "gyro_z"]] /= factor
     found = guess(table)
-    channel = found.mapping.channels["angular_velocity"]
-    assert channel.unit == unit
+    assert found.mapping.channels["angular_velocity"].unit == unit
     if unit == "?":
         scale = float(found.open["angular_velocity"].split("scale: ")[1].rstrip(")"))
         assert scale == pytest.approx(factor, rel=0.01)
@@ -458,8 +441,7 @@ def test_the_names_of_mavlink(flown: pd.DataFrame, message: str, force: str, rat
         f"SERVO_OUTPUT_RAW.servo{k}_raw": np.where(k < 5, 1500 + 100 * np.sin(k * table["t_s"]), 0)
         for k in range(1, 17)
     }
-    kept = ["t_s", *(["qw", "qx", "qy", "qz"] if attitude else [])]
-    found = guess(table[kept].assign(**own))
+    found = guess(table[["t_s", *(["qw", "qx", "qy", "qz"] if attitude else [])]].assign(**own))
     channels = found.mapping.channels
     assert channels["specific_force"].unit == force and channels["angular_velocity"].unit == rate, found.open
     assert channels["angular_velocity"].columns == tuple(f"{message}.{a}gyro" for a in "xyz")
@@ -522,20 +504,15 @@ def test_the_body_rates_of_mavlinks_attitude(flown: pd.DataFrame) -> None:
 def test_a_telemetry_log_points_to_its_converter(tmp_path: Path) -> None:
     path = tmp_path / "flight.tlog"
     path.write_bytes((1_700_000_000_000_000).to_bytes(8, "big") + b"\xfd\x09" + bytes(40))
-    done = CliRunner().invoke(app, ["import", str(path), "-o", str(tmp_path / "set")])
-    assert done.exit_code == 1 and "mavlogdump.py --format csv" in done.output and "flight.tlog" in done.output
+    said = refusal("import", path, "-o", tmp_path / "set")
+    assert "mavlogdump.py --format csv" in said and "flight.tlog" in said
 
 
 def test_columns_that_hold_nothing_are_no_channels() -> None:
     """A telemetry log names every message that it could have: columns without a cell raise nothing and mean nothing."""
-    names = [f"RAW_IMU.{a}{kind}" for kind in ("acc", "gyro") for a in "xyz"] + [
-        "thrust",
-        "torque",
-        "rpm",
-        "roll",
-        "pitch",
-    ]
-    names += ["yaw", *(f"servo{k}_raw" for k in range(1, 5)), *(f"eRPM[{k}]" for k in range(4))]
+    names = [f"RAW_IMU.{a}{kind}" for kind in ("acc", "gyro") for a in "xyz"]
+    names += ["thrust", "torque", "rpm", "roll", "pitch", "yaw"]
+    names += [*(f"servo{k}_raw" for k in range(1, 5)), *(f"eRPM[{k}]" for k in range(4))]
     empty = pd.DataFrame({"t_s": 0.01 * np.arange(100)} | {n: np.nan for n in names})
     with warnings.catch_warnings():
         warnings.simplefilter("error")

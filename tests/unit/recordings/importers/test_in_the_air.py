@@ -1,20 +1,17 @@
 """One detector of flight for every importer, on tables whose time in the air is known and on public logs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
 
-from rotorid.cli import app
 from rotorid.cli.modelling import fly
 from rotorid.recordings import columns as c
 from rotorid.recordings import read_set, templates
 from rotorid.recordings.importers.faults import airborne
 from rotorid.recordings.importers.logfile import read_log
+from tests.command_line import answer
 from tests.public_logs import PUBLIC, needs_logs
 
 SPEEDS = list(c.rotor_columns("rotor_speed", 4))
@@ -37,11 +34,7 @@ def day(kinds: str, hover: float = 800.0, hz: float = 100.0) -> tuple[pd.DataFra
     table = {c.TIME: np.arange(len(rows)) / hz}
     table |= dict(zip(SPEEDS, speed.T, strict=True))
     force = np.array([pull[k] for k in rows]) + 0.3 * noise[:, 0]
-    table |= {
-        c.SPECIFIC_FORCE[0]: 0.1 * noise[:, 1],
-        c.SPECIFIC_FORCE[1]: 0.1 * noise[:, 2],
-        c.SPECIFIC_FORCE[2]: -force,
-    }
+    table |= dict(zip(c.SPECIFIC_FORCE, (0.1 * noise[:, 1], 0.1 * noise[:, 2], -force), strict=True))
     swing = np.sin(2 * np.pi * np.arange(len(rows)) / hz)
     rate = np.array([turns[k] for k in rows]) * swing
     table |= {c.ANGULAR_VELOCITY[0]: rate, c.ANGULAR_VELOCITY[1]: 0 * rate, c.ANGULAR_VELOCITY[2]: 0 * rate}
@@ -61,8 +54,7 @@ def test_what_is_in_the_air_is_found_within_half_a_second_an_edge(kinds: str, ki
 
 def test_a_range_finder_decides_what_thrust_does_not() -> None:
     table, _ = day("hhsshh")
-    assert not airborne(table)[0][700:1100].any()
-    assert airborne(table.assign(**{c.HEIGHT: 2.0}))[0].all()
+    assert not airborne(table)[0][700:1100].any() and airborne(table.assign(**{c.HEIGHT: 2.0}))[0].all()
     down = np.where(np.arange(len(table)) < 600, 0.02, 2.0)
     assert not airborne(table.assign(**{c.HEIGHT: down}))[0][:500].any()
 
@@ -71,23 +63,19 @@ def test_what_the_log_calls_flight_is_only_narrowed() -> None:
     table, _ = day("hhsshh")
     stated = np.arange(len(table)) > 100
     found, (fault,) = airborne(table, stated)
-    assert (
-        not found[:100].any() and fault.kind == "on_ground" and "6 s of 17 s that the log calls flight" in fault.found
-    )
+    assert fault.kind == "on_ground" and "6 s of 17 s that the log calls flight" in fault.found
+    assert not found[:100].any()
     without = table.drop(columns=list(c.SPECIFIC_FORCE))
     assert (airborne(without, stated)[0] == stated).all()
 
 
 def test_the_ground_of_a_csv_is_cut_as_help_says(tmp_path: Path) -> None:
-    table, _ = day("rihhhir")
-    path = tmp_path / "flight.csv"
-    table.to_csv(path, index=False)
-    done = CliRunner().invoke(app, ["import", str(path), "--like", "thesis", "-o", str(tmp_path / "set")])
-    assert done.exit_code == 0 and "in the air from" in done.output, done.output
+    day("rihhhir")[0].to_csv(tmp_path / "flight.csv", index=False)
+    assert "in the air from" in answer("import", tmp_path / "flight.csv", "--like", "thesis", "-o", tmp_path / "set")
     (run,) = read_set(tmp_path / "set").runs
     assert run.time_s[-1] == pytest.approx(9 - 1.5, abs=0.5)
     assert run.array(tuple(SPEEDS)).min() > 0.85 * 800 * 0.9
-    assert "Only the part in the air is kept" in CliRunner().invoke(app, ["import", "--help"]).output
+    assert "Only the part in the air is kept" in answer("import", "--help")
 
 
 @pytest.mark.parametrize("template", templates.names())

@@ -3,15 +3,17 @@
 Written by rosbags' own writers from one known flight.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
+
+from tests.command_line import invoke
+from tests.refusals import refused
 
 pytest.importorskip("rosbags")
 from rosbags.rosbag1 import Writer as Writer1
@@ -19,9 +21,7 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.spatial.transform import Rotation
-from typer.testing import CliRunner
 
-from rotorid.cli import app
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import ros
@@ -74,8 +74,7 @@ class Flight:
         self.two, self.types, self.table = two, store(two).types, flown()
         t = self.table
         self.quaternion = t[list(c.QUATERNION)].to_numpy()  # FRD to NED
-        turn = Rotation.from_quat(self.quaternion[:, [1, 2, 3, 0]]).as_matrix()
-        self.turn = FLU @ turn @ FLU
+        self.turn = FLU @ Rotation.from_quat(self.quaternion[:, [1, 2, 3, 0]]).as_matrix() @ FLU
         self.place, self.moves, self.rates, self.force = (
             t[list(names)].to_numpy() @ FLU for names in (c.POSITION, c.VELOCITY, c.ANGULAR_VELOCITY, c.SPECIFIC_FORCE)
         )
@@ -162,7 +161,7 @@ def written(path: Path, flight: Flight, topics: dict[str, tuple[Callable, Callab
 
 def usual(flight: Flight, *names: str) -> dict[str, tuple[Callable, Callable, int]]:
     """Topics of a flight stamped at the time of recording."""
-    at = stamped(flight)
+    _, at = stamped(flight)
     every = {
         "/imu": (lambda k: flight.imu(k, at(k)), at, 1),
         "/odom": (lambda k: flight.odometry(k, at(k)), at, 1),
@@ -171,8 +170,18 @@ def usual(flight: Flight, *names: str) -> dict[str, tuple[Callable, Callable, in
     return {name: every[name] for name in names or every}
 
 
-def stamped(flight: Flight) -> Callable[[int], float]:
-    return lambda k: EPOCH_S + float(flight.table[c.TIME].iloc[k])
+def stamped(flight: Flight) -> tuple[Flight, Callable[[int], float]]:
+    """The flight, and when its rows are recorded, s."""
+    return flight, lambda k: EPOCH_S + float(flight.table[c.TIME].iloc[k])
+
+
+def read_back(
+    path: Path, flight: Flight, topics: dict[str, tuple[Callable, Callable, int]]
+) -> tuple[pd.DataFrame, list]:
+    """The one run of a bag of these topics, and its faults."""
+    runs, faults, _ = ros.read_ros(written(path, flight, topics))
+    (run,) = runs.values()
+    return run, faults
 
 
 def kinds(faults) -> list[str]:
@@ -190,7 +199,7 @@ COLUMNS = {ATTITUDE: c.QUATERNION, RATES: c.ANGULAR_VELOCITY, FORCE: c.SPECIFIC_
 @pytest.mark.parametrize("which", [ATTITUDE, RATES, FORCE])
 def test_a_covariance_of_minus_one_states_nothing_and_another_topic_is_taken(tmp_path: Path, two, which: int) -> None:
     """The first topic has most messages, and a value that means nothing."""
-    flight, (at, off) = Flight(two), (stamped(Flight(two)), [None, None, None])
+    (flight, at), off = stamped(Flight(two)), [None, None, None]
     off[which] = MINUS
     nothing = {"turn": flight.no_turn(1.0)} if which == ATTITUDE else {("", "rates", "force")[which]: (99, 98, 97)}
     topics = {
@@ -198,8 +207,7 @@ def test_a_covariance_of_minus_one_states_nothing_and_another_topic_is_taken(tmp
         "/data": (lambda k: flight.imu(k, at(k)), at, 2),
         **usual(flight, "/motors"),
     }
-    runs, faults, _ = ros.read_ros(written(tmp_path / "a.bag", flight, topics))
-    (run,) = runs.values()
+    run, faults = read_back(tmp_path / "a.bag", flight, topics)
     names = COLUMNS[which]
     assert run[list(names)].notna().mean().min() == pytest.approx(0.5, abs=0.02)
     if which == ATTITUDE:
@@ -209,61 +217,54 @@ def test_a_covariance_of_minus_one_states_nothing_and_another_topic_is_taken(tmp
     # alone, the quantity is not there, and nothing is made up
     del topics["/data"]
     topics |= usual(flight, "/odom") if which == RATES else {}
-    runs, _, _ = ros.read_ros(written(tmp_path / "b.bag", flight, topics))
-    assert not set(names) & set(next(iter(runs.values())))
+    run, _ = read_back(tmp_path / "b.bag", flight, topics)
+    assert not set(names) & set(run)
 
 
 @pytest.mark.parametrize("which", [RATES, FORCE])
 def test_what_nobody_has_set_states_nothing(tmp_path: Path, which: int) -> None:
-    flight = Flight()
-    at, zero = stamped(flight), {("", "rates", "force")[which]: (0.0, 0.0, 0.0)}
+    (flight, at), zero = stamped(Flight()), {("", "rates", "force")[which]: (0.0, 0.0, 0.0)}
     topics = usual(flight, "/odom", "/motors") | {"/imu": (lambda k: flight.imu(k, at(k), **zero), at, 1)}
-    runs, faults, _ = ros.read_ros(written(tmp_path / "a", flight, topics))
-    assert not set(COLUMNS[which]) & set(next(iter(runs.values())))
+    run, faults = read_back(tmp_path / "a", flight, topics)
+    assert not set(COLUMNS[which]) & set(run)
     assert any(f.kind == "stuck" and "/imu" in f.found for f in faults)
 
 
 @pytest.mark.parametrize("w", [0.0, 1.0])
 def test_an_odometry_without_attitude_leaves_it_to_the_imu(tmp_path: Path, w: float) -> None:
     """A quaternion of zeros, or ROS 2's default of no turn; the velocity in body axes is turned by the IMU's."""
-    flight = Flight()
-    at = stamped(flight)
+    flight, at = stamped(Flight())
     topics = usual(flight, "/imu", "/motors")
     topics["/odom"] = (lambda k: flight.odometry(k, at(k), turn=flight.no_turn(w)), at, 1)
-    runs, _, _ = ros.read_ros(written(tmp_path / "a", flight, topics))
-    (run,) = runs.values()
+    run, _ = read_back(tmp_path / "a", flight, topics)
     check_against(run, flight.table, (*c.QUATERNION, *c.VELOCITY, *c.POSITION), 1e-4)
 
 
 def test_a_velocity_in_body_axes_without_any_attitude_is_left_out(tmp_path: Path) -> None:
-    flight = Flight()
-    at, none = stamped(flight), (MINUS, None, None)
+    (flight, at), none = stamped(Flight()), (MINUS, None, None)
     topics = usual(flight, "/motors") | {
         "/imu": (lambda k: flight.imu(k, at(k), covariances=none), at, 1),
         "/odom": (lambda k: flight.odometry(k, at(k), turn=flight.no_turn()), at, 1),
     }
-    runs, faults, _ = ros.read_ros(written(tmp_path / "a", flight, topics))
-    (run,) = runs.values()
+    run, faults = read_back(tmp_path / "a", flight, topics)
     assert not {*c.VELOCITY, *c.QUATERNION} & set(run) and set(c.POSITION) <= set(run)
     assert "no_attitude" in kinds(faults)
 
 
 def test_a_bag_without_a_pose_is_read(tmp_path: Path) -> None:
     flight = Flight()
-    runs, _, _ = ros.read_ros(written(tmp_path / "a", flight, usual(flight, "/imu", "/motors")))
-    (run,) = runs.values()
+    run, _ = read_back(tmp_path / "a", flight, usual(flight, "/imu", "/motors"))
     check_against(run, flight.table, (*c.ANGULAR_VELOCITY, *c.SPECIFIC_FORCE, *c.QUATERNION, *SPEEDS), 1e-4)
     assert not {*c.POSITION, *c.VELOCITY} & set(run)
 
 
 def test_a_twist_that_nobody_fills_is_no_velocity(tmp_path: Path) -> None:
     """As motion capture's odometry has it."""
-    flight = Flight()
-    at = stamped(flight)
+    flight, at = stamped(Flight())
     topics = usual(flight, "/imu", "/motors")
     topics["/odom"] = (lambda k: flight.odometry(k, at(k), moves=(0.0, 0.0, 0.0)), at, 1)
-    runs, _, _ = ros.read_ros(written(tmp_path / "a", flight, topics))
-    assert not set(c.VELOCITY) & set(next(iter(runs.values())))
+    run, _ = read_back(tmp_path / "a", flight, topics)
+    assert not set(c.VELOCITY) & set(run)
 
 
 POSES = {
@@ -286,21 +287,19 @@ POSES = {
 @pytest.mark.parametrize("kind", POSES)
 def test_each_message_with_an_attitude_is_read_whatever_its_covariance(tmp_path: Path, kind: str) -> None:
     """A covariance of -1 states nothing in an Imu message alone."""
-    flight = Flight()
-    at, none = stamped(flight), (MINUS, None, None)
+    (flight, at), none = stamped(Flight()), (MINUS, None, None)
     topics = usual(flight, "/motors") | {
         "/imu": (lambda k: flight.imu(k, at(k), turn=flight.no_turn(1.0), covariances=none), at, 1),
         "/pose": (lambda k: POSES[kind](flight, k, at(k)), at, 1),
     }
-    runs, _, _ = ros.read_ros(written(tmp_path / "a", flight, topics))
+    run, _ = read_back(tmp_path / "a", flight, topics)
     names = c.QUATERNION if kind == "VehicleAttitude" else (*c.QUATERNION, *c.POSITION)
-    check_against(next(iter(runs.values())), flight.table, names, 1e-4)
+    check_against(run, flight.table, names, 1e-4)
 
 
 @pytest.mark.parametrize("frame", ["base_link", "map"])
 def test_a_twist_is_in_the_axes_that_its_frame_names(tmp_path: Path, frame: str) -> None:
-    flight = Flight()
-    at = stamped(flight)
+    flight, at = stamped(Flight())
 
     def twist(k: int):
         own = flight.turn[k].T @ flight.moves[k] if frame == "base_link" else flight.moves[k]
@@ -308,13 +307,13 @@ def test_a_twist_is_in_the_axes_that_its_frame_names(tmp_path: Path, frame: str)
         return flight("geometry_msgs/msg/TwistStamped", header=flight.header(at(k), frame), twist=whole)
 
     topics = usual(flight, "/imu", "/motors") | {"/velocity": (twist, at, 1)}
-    runs, _, _ = ros.read_ros(written(tmp_path / "a", flight, topics))
-    check_against(next(iter(runs.values())), flight.table, c.VELOCITY, 1e-4)
+    run, _ = read_back(tmp_path / "a", flight, topics)
+    check_against(run, flight.table, c.VELOCITY, 1e-4)
 
 
 def test_px4s_own_messages_have_its_own_axes(tmp_path: Path) -> None:
-    flight = Flight()
-    at, t = stamped(flight), flight.table
+    flight, at = stamped(Flight())
+    t = flight.table
 
     def of(kind: str, **fields: Callable):
         return lambda k: flight(
@@ -349,8 +348,8 @@ def test_px4s_own_messages_have_its_own_axes(tmp_path: Path) -> None:
         "/w": (of("VehicleAngularVelocity", xyz=columns(c.ANGULAR_VELOCITY)), at, 1),
         "/f": (of("VehicleAcceleration", xyz=columns(c.SPECIFIC_FORCE)), at, 1),
     }
-    runs, _, _ = ros.read_ros(written(tmp_path / "b", flight, {**apart, "/m": topics["/fmu/out/actuator_motors"]}))
-    check_against(next(iter(runs.values())), flight.table, (*c.ANGULAR_VELOCITY, *c.SPECIFIC_FORCE), 1e-4)
+    run, _ = read_back(tmp_path / "b", flight, {**apart, "/m": topics["/fmu/out/actuator_motors"]})
+    check_against(run, flight.table, (*c.ANGULAR_VELOCITY, *c.SPECIFIC_FORCE), 1e-4)
 
 
 # Rotors -------------------------------------------------------------------------------------------
@@ -378,17 +377,13 @@ def items(flight: Flight, values: np.ndarray, kind: str) -> list:
 @pytest.mark.parametrize("two", [True, False], ids=["ROS 2", "ROS 1"])
 @pytest.mark.parametrize("kind", ROTORS)
 def test_each_type_that_carries_rotors_is_read_with_a_turning_sense_as_its_sign(tmp_path: Path, kind: str, two) -> None:
-    flight = Flight(two)
-    at, sense, (made, column) = stamped(flight), np.array([-1.0, 1.0, 1.0, -1.0]), ROTORS[kind]
+    (flight, at), sense, (made, column) = stamped(Flight(two)), np.array([-1.0, 1.0, 1.0, -1.0]), ROTORS[kind]
 
     def message(k: int):
         speeds = sense * flight.speeds[k] if k else flight.speeds[k][:0]  # an empty one first
         return flight(kind, header=flight.header(at(k)), **made(flight, speeds))
 
-    runs, faults, _ = ros.read_ros(
-        written(tmp_path / "a.bag", flight, usual(flight, "/imu") | {"/m": (message, at, 1)})
-    )
-    (run,) = runs.values()
+    run, faults = read_back(tmp_path / "a.bag", flight, usual(flight, "/imu") | {"/m": (message, at, 1)})
     names = c.rotor_columns(column, 4)
     truth = flight.table.rename(columns=dict(zip(SPEEDS, names, strict=True)))
     check_against(run, truth, names, 2e-3)
@@ -398,15 +393,13 @@ def test_each_type_that_carries_rotors_is_read_with_a_turning_sense_as_its_sign(
 def test_a_rotor_that_turns_back_for_a_time_has_empty_cells_there(tmp_path: Path) -> None:
     flight = Flight()
     flight.speeds = flight.speeds * np.where((np.arange(1200) // 100 == 5)[:, None], [1, -1, 1, 1], 1.0)
-    runs, faults, _ = ros.read_ros(written(tmp_path / "a", flight, usual(flight)))
-    (run,) = runs.values()
+    run, faults = read_back(tmp_path / "a", flight, usual(flight))
     assert run[SPEEDS[1]].isna().sum() == 100 and run[SPEEDS[0]].notna().all()
     assert [f.column for f in faults if f.kind == "reversed"] == [SPEEDS[1]]
 
 
 def test_a_topic_called_command_holds_commands_next_to_measured_speeds(tmp_path: Path) -> None:
-    flight = Flight()
-    at = stamped(flight)
+    flight, at = stamped(Flight())
 
     def asked(k: int):
         message = flight.motors(k, at(k))
@@ -414,22 +407,19 @@ def test_a_topic_called_command_holds_commands_next_to_measured_speeds(tmp_path:
                       velocity=message.velocity + 10, normalized=EMPTY)  # fmt: skip
 
     topics = usual(flight, "/imu", "/motors") | {"/command/motor_speed": (asked, at, 1)}
-    runs, _, _ = ros.read_ros(written(tmp_path / "a", flight, topics))
-    (run,) = runs.values()
+    run, _ = read_back(tmp_path / "a", flight, topics)
     difference = run[list(c.rotor_columns("rotor_command", 4))].to_numpy() - run[list(SPEEDS)].to_numpy()
     np.testing.assert_allclose(difference, 10, atol=1e-6)
     del topics["/motors"]
-    runs, _, _ = ros.read_ros(written(tmp_path / "b", flight, topics))
-    assert set(SPEEDS) <= set(next(iter(runs.values())))
+    run, _ = read_back(tmp_path / "b", flight, topics)
+    assert set(SPEEDS) <= set(run)
 
 
 @pytest.mark.parametrize("motors", [4, 6, 8, 12])
 def test_an_array_of_all_outputs_gives_every_motor_and_no_servo(tmp_path: Path, motors: int) -> None:
     """Next to a gimbal and a switch; a template of four rotors is refused for more."""
-    flight = Flight()
-    at, rng = stamped(flight), np.random.default_rng(0)
-    mix = np.vstack([np.eye(4), rng.dirichlet(np.ones(4), motors - 4)])
-    throttle = flight.throttles @ mix.T
+    (flight, at), rng = stamped(Flight()), np.random.default_rng(0)
+    throttle = flight.throttles @ np.vstack([np.eye(4), rng.dirichlet(np.ones(4), motors - 4)]).T
     gimbal = 1500 + 100 * np.sin(2.3 * flight.table[c.TIME].to_numpy())
     switch = np.where(flight.table[c.TIME] > 6, 1900, 1100)
     still = np.full(len(gimbal), 1500)
@@ -447,24 +437,22 @@ def test_an_array_of_all_outputs_gives_every_motor_and_no_servo(tmp_path: Path, 
     assert [n for n in run if n.startswith("throttle")] == list(names)
     (said,) = [f.found for f in faults if f.kind == "servo"]
     assert f"channels {motors + 1}, {motors + 3} of" in said
-    words = ["import", str(path), "--like", "x500", "--mass-kg", "2", "-o", str(tmp_path / "set")]
-    done = CliRunner().invoke(app, words)
+    done = invoke("import", path, "--like", "x500", "--mass-kg", "2", "-o", tmp_path / "set")
     assert (done.exit_code == 0) == (motors == 4), done.output
     assert motors == 4 or f"drives {motors} rotors, the vehicle has 4" in done.output
 
 
 def test_what_is_not_read_is_listed_where_something_is_missing(tmp_path: Path) -> None:
-    flight = Flight()
-    at = stamped(flight)
+    flight, at = stamped(Flight())
 
     def turns(k: int):
         return flight("mystery_msgs/msg/Turns", header=flight.header(at(k)), turns=flight.speeds[k].astype(np.float32))
 
     topics = usual(flight) | {"/esc/turns": (turns, at, 2)}
-    _, faults, _ = ros.read_ros(written(tmp_path / "a", flight, topics))
+    _, faults = read_back(tmp_path / "a", flight, topics)
     assert "unread" not in kinds(faults)
     del topics["/motors"]
-    _, faults, _ = ros.read_ros(written(tmp_path / "b", flight, topics))
+    _, faults = read_back(tmp_path / "b", flight, topics)
     (said,) = [f.sentence for f in faults if f.kind == "unread"]
     assert "rotors" in said and "/esc/turns (mystery_msgs/msg/Turns, 50 Hz)" in said
 
@@ -494,8 +482,7 @@ def test_a_topic_has_one_clock(tmp_path: Path, stamps: str, two: bool) -> None:
         "/odom": (lambda k: flight.odometry(k, own[1](k)), recorded, 1),
         "/motors": (lambda k: flight.motors(k, own[2](k)), recorded, 1),
     }
-    runs, faults, _ = ros.read_ros(written(tmp_path / "a.bag", flight, topics))
-    (run,) = runs.values()
+    run, faults = read_back(tmp_path / "a.bag", flight, topics)
     within = 0.02 if stamps == "some topics have none" else 1e-3
     check_against(run, flight.table, (*c.ANGULAR_VELOCITY, *c.VELOCITY, *c.QUATERNION, *SPEEDS), within)
     assert np.diff(run[c.TIME]) == pytest.approx(0.01, abs=1e-5)
@@ -621,13 +608,11 @@ def _without_summary(records: bytes) -> bytes:
 
 def test_a_file_of_nothing_but_foreign_channels_names_them(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
-    body = record(1, text("") + text("test")) + record(
-        3, struct.pack("<H", 1) + text("S") + text("jsonschema") + text("{}")
-    )
+    body = record(1, text("") + text("test"))
+    body += record(3, struct.pack("<H", 1) + text("S") + text("jsonschema") + text("{}"))
     body += record(4, struct.pack("<HH", 1, 1) + text("/state") + text("json") + text(""))
     path.write_bytes(b"\x89MCAP0\r\n" + body + record(2, bytes(20)) + b"\x89MCAP0\r\n")
-    with pytest.raises(InputError, match=r"no topic of a type that is known; found /state \(json\)"):
-        ros.read_ros(path)
+    refused(r"no topic of a type that is known; found /state \(json\)", ros.read_ros, path)
 
 
 # Which topic, and which axes ----------------------------------------------------------------------
@@ -643,12 +628,7 @@ def moving(two: bool = True) -> Flight:
     return flight
 
 
-OTHERS = {
-    "/mavros/setpoint_position/local": 1,
-    "/vehicle/reference/pose": 1,
-    "/vicon/cart/pose": 1,
-    "/another/pose": 2,
-}
+OTHERS = {"/mavros/setpoint_position/local": 1, "/vehicle/reference/pose": 1, "/vicon/cart/pose": 1, "/another/pose": 2}
 """Topics with a pose that is not that of the vehicle, and how often they come."""
 
 
@@ -656,8 +636,7 @@ OTHERS = {
 @pytest.mark.parametrize("every", [1, 2])
 def test_the_pose_is_that_of_the_body_that_turns_as_measured(tmp_path: Path, topic: str, every: int) -> None:
     """Another body, or one that is asked for, moves too, as often or more often."""
-    flight = moving()
-    at = stamped(flight)
+    flight, at = stamped(moving())
     other = moving()
     other.place, other.quaternion = flight.place[::-1] * 1.5, flight.quaternion[::-1]
     topics = usual(flight, "/imu", "/motors") | {
@@ -666,8 +645,7 @@ def test_the_pose_is_that_of_the_body_that_turns_as_measured(tmp_path: Path, top
     }
     del topics["/imu"]  # an inertial sensor is none that is asked for, whatever its vehicle is called
     topics["/target_1/imu"] = (lambda k: flight.imu(k, at(k), covariances=(MINUS, None, None)), at, 1)
-    runs, faults, _ = ros.read_ros(written(tmp_path / "a", flight, topics))
-    (run,) = runs.values()
+    run, faults = read_back(tmp_path / "a", flight, topics)
     place = run[list(c.POSITION)].dropna().to_numpy() @ FLU
     first = np.linalg.norm(flight.place - place[0], axis=1).argmin()
     np.testing.assert_allclose(place, flight.place[first::every][: len(place)], atol=1e-6)
@@ -679,8 +657,7 @@ def test_the_pose_is_that_of_the_body_that_turns_as_measured(tmp_path: Path, top
 @pytest.mark.parametrize("message", ["Odometry", "TwistStamped"])
 def test_the_axes_of_a_velocity_by_what_it_integrates_to(tmp_path: Path, stated: str, true: str, message: str) -> None:
     """An odometry is in body axes by its definition, whatever its frames are called."""
-    flight = moving()
-    at = stamped(flight)
+    flight, at = stamped(moving())
     own = [flight.turn[k].T @ flight.moves[k] if true == "body" else flight.moves[k] for k in range(len(flight.moves))]
 
     def twist(k: int):
@@ -692,8 +669,8 @@ def test_the_axes_of_a_velocity_by_what_it_integrates_to(tmp_path: Path, stated:
         topics["/odom"] = (lambda k: flight.odometry(k, at(k), moves=own[k]), at, 1)
     else:
         topics |= {"/pose": (lambda k: POSES["PoseStamped"](flight, k, at(k)), at, 1), "/velocity": (twist, at, 1)}
-    runs, faults, _ = ros.read_ros(written(tmp_path / "a", flight, topics))
-    check_against(next(iter(runs.values())), flight.table, c.VELOCITY, 1e-4)
+    run, faults = read_back(tmp_path / "a", flight, topics)
+    check_against(run, flight.table, c.VELOCITY, 1e-4)
     said = "body" if message == "Odometry" or stated == "base_link" else "world"
     assert any(f.kind == "axes" for f in faults) == (said != true)
 
@@ -701,13 +678,11 @@ def test_the_axes_of_a_velocity_by_what_it_integrates_to(tmp_path: Path, stated:
 @pytest.mark.parametrize("turn", [[[0, -1, 0], [0, 0, -1], [1, 0, 0]], [[1, 0, 0], [0, -1, 0], [0, 0, -1]]])
 def test_an_inertial_sensor_whose_axes_are_not_the_vehicles(tmp_path: Path, turn) -> None:
     """A camera's that comes more often, or one in forward-right-down: passed over, refused where it is the only one."""
-    flight = moving()
-    at, turn = stamped(flight), np.array(turn)
+    (flight, at), turn = stamped(moving()), np.array(turn)
     camera = (lambda k: flight.imu(k, at(k), rates=turn @ flight.rates[k], force=turn @ flight.force[k]), at, 1)
     topics = usual(flight, "/odom", "/motors") | {"/camera/imu": camera}
     topics["/imu"] = (lambda k: flight.imu(k, at(k)), at, 2)
-    runs, _, _ = ros.read_ros(written(tmp_path / "a", flight, topics))
-    (run,) = runs.values()
+    run, _ = read_back(tmp_path / "a", flight, topics)
     read = run[[*c.ANGULAR_VELOCITY, *c.SPECIFIC_FORCE]].dropna().reset_index(drop=True)
     check_against(read, flight.table[::2].reset_index(drop=True), c.SPECIFIC_FORCE, 1e-4)
     del topics["/imu"]
@@ -718,12 +693,11 @@ def test_an_inertial_sensor_whose_axes_are_not_the_vehicles(tmp_path: Path, turn
 @pytest.mark.parametrize("sign", [-1, 1])
 def test_a_battery_that_is_discharged_has_a_positive_current(tmp_path: Path, sign: int) -> None:
     """Negative by the message's definition; many drivers state it as positive."""
-    flight = Flight()
-    at = stamped(flight)
+    flight, at = stamped(Flight())
     kind, zeros = "sensor_msgs/msg/BatteryState", np.zeros(0, np.float32)
     plain = dict.fromkeys(("temperature", "charge", "capacity", "design_capacity", "percentage"), 0.0)
     plain |= dict.fromkeys([f"power_supply_{n}" for n in ("status", "health", "technology")], 0)
     plain |= {"present": True, "cell_voltage": zeros, "cell_temperature": zeros, "location": "", "serial_number": ""}
     make = lambda k: flight(kind, header=flight.header(at(k)), voltage=15.0, current=sign * 12.0, **plain)  # noqa: E731
-    runs, _, _ = ros.read_ros(written(tmp_path / "a", flight, usual(flight) | {"/battery": (make, at, 10)}))
-    assert set(next(iter(runs.values()))[c.BATTERY_CURRENT].dropna()) == {12.0}
+    run, _ = read_back(tmp_path / "a", flight, usual(flight) | {"/battery": (make, at, 10)})
+    assert set(run[c.BATTERY_CURRENT].dropna()) == {12.0}

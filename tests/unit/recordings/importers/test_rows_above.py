@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.guessing import guess
 from rotorid.recordings.importers.logfile import format_of, read_log
 from rotorid.recordings.importers.mapping import Mapping, read_by_mapping, read_columns
+from tests.refusals import refused
 
 TIME = np.arange(0, 20, 0.01)
 PLACE = np.column_stack([np.sin(TIME), 1 + 0.1 * np.cos(3 * TIME), np.cos(TIME)])
@@ -28,11 +28,9 @@ def motive(bodies: int = 1, end: str = "\n") -> str:
     for k in range(bodies):
         for group, letters in (("Rotation", "XYZW"), ("Position", "XYZ"), ("Mean Marker Error", " ")):
             for letter in letters:
-                kinds.append("Rigid Body")
-                names.append(f"Drone{k}")
-                ids.append(f"{k}")
-                groups.append(group)
-                axes.append(letter.strip())
+                column = ("Rigid Body", f"Drone{k}", f"{k}", group, letter.strip())
+                for row, cell in zip((kinds, names, ids, groups, axes), column, strict=True):
+                    row.append(cell)
     head = ["Format Version,1.23,Take Name,a,Rotation Type,Quaternion,Length Units,Meters,Coordinate Space,Global", ""]
     head += [",".join(r) for r in (kinds, names, ids, groups, axes)]
     body = np.column_stack([np.arange(len(TIME)), TIME, *[np.column_stack([TURN, PLACE, 0 * TIME])] * bodies])
@@ -76,8 +74,7 @@ def test_qtm(tmp_path: Path) -> None:
 def test_an_export_without_a_heading_says_so(tmp_path: Path) -> None:
     path = tmp_path / "take.tsv"
     path.write_text(QTM + rows(np.column_stack([TIME, PLACE]), "\t"))
-    with pytest.raises(InputError, match="line 6: .*found numbers"):
-        read_columns(path)
+    refused("line 6: .*found numbers", read_columns, path)
 
 
 @pytest.mark.parametrize(
@@ -104,8 +101,7 @@ def test_a_cell_that_is_no_number_is_named_by_its_line_in_the_file(tmp_path: Pat
     path = tmp_path / "own.csv"
     path.write_text("my log\n\nt,ax\n0.0,1\n0.1,1\n0.2,1\n0.3,oops\n0.4,1\n")
     mapping = Mapping.model_validate({"channels": {"time": {"columns": ["t"]}}, "keep": ["ax"]})
-    with pytest.raises(InputError, match="line 7, column ax: expected a number, found 'oops'"):
-        read_by_mapping(path, mapping)
+    refused("line 7, column ax: expected a number, found 'oops'", read_by_mapping, path, mapping)
     path.write_text(path.read_text().replace("oops", "1"))
     _, faults, _ = read_by_mapping(path, mapping)
     assert "1 lines above the heading in line 3" in faults[0].sentence
@@ -133,8 +129,7 @@ def test_blackbox_explorer(cut: int, tmp_path: Path) -> None:
     path = tmp_path / "log.bbl.csv"
     path.write_text((head + body)[: -cut or None])
     assert format_of(path) == "betaflight"
-    found = read_log(path)
-    (run,) = found.runs.values()
+    (run,) = read_log(path).runs.values()
     assert len(run) == n - (cut > 0)
     assert run[c.ANGULAR_VELOCITY[0]].mean() == pytest.approx(np.radians(57.3), rel=1e-6)
     assert run[c.SPECIFIC_FORCE[2]].mean() == pytest.approx(-9.80665)

@@ -1,7 +1,5 @@
 """Rotor speeds in the unit that carries the weight, and a geometry that was never set."""
 
-from __future__ import annotations
-
 from itertools import permutations
 from pathlib import Path
 
@@ -15,13 +13,8 @@ from rotorid.recordings import templates
 from rotorid.recordings.files import vehicle_of
 from rotorid.recordings.importers import known
 from rotorid.recordings.importers.known import propose
-from rotorid.recordings.importers.logfile import (
-    carrying_unit,
-    in_unit_of_weight,
-    read_log,
-    set_of_logs,
-    usual_coefficient,
-)
+from rotorid.recordings.importers.logfile import carrying_unit, in_unit_of_weight, read_log, set_of_logs
+from rotorid.recordings.importers.logfile import usual_coefficient as coefficient
 from rotorid.recordings.importers.mapping import UNITS, Mapping
 from tests.public_logs import PUBLIC
 
@@ -108,9 +101,8 @@ def test_a_geometry_of_one_metre_is_directions_alone() -> None:
     template = templates.read("x500")
     text, remarks = propose("own", [], found, template, "x500", 2.0)
     rotors = vehicle_of(parse_yaml(text, ""), "").rotors
-    assert [np.hypot(r.x_m, r.y_m) for r in rotors] == pytest.approx(
-        [np.hypot(template.rotors[0].x_m, template.rotors[0].y_m)] * 4, rel=1e-4
-    )
+    arm_m = np.hypot(template.rotors[0].x_m, template.rotors[0].y_m)
+    assert [np.hypot(r.x_m, r.y_m) for r in rotors] == pytest.approx([arm_m] * 4, rel=1e-4)
     assert [(np.sign(r.x_m), np.sign(r.y_m), r.spin) for r in rotors] == [
         (1, 1, "ccw"), (-1, -1, "ccw"), (1, -1, "cw"), (-1, 1, "cw"),
     ]  # fmt: skip
@@ -121,10 +113,9 @@ def test_a_geometry_of_one_metre_is_directions_alone() -> None:
 
 def test_speeds_that_no_unit_explains_are_named_and_kept() -> None:
     """Electrical turns taken for turns: seven times too many."""
+    speed = 7 * np.sqrt(0.65 * 9.81 / 4 / coefficient(0.65, 4))
     time_s = np.arange(0, 10, 0.01)
-    speed = 7 * np.sqrt(0.65 * 9.81 / 4 / usual_coefficient(0.65, 4))
-    names = c.rotor_columns("rotor_speed", 4)
-    table = pd.DataFrame({c.TIME: time_s, c.SPECIFIC_FORCE[2]: -9.81} | {n: speed + np.sin(time_s) for n in names})
+    table = pd.DataFrame({c.TIME: time_s, c.SPECIFIC_FORCE[2]: -9.81} | {n: speed + np.sin(time_s) for n in SPEEDS})
     runs, faults = in_unit_of_weight({"a": table}, {"a": "rpm"}, 0.65, 4)
     assert runs["a"].equals(table)
     assert "7 times the speed that carries" in faults[0].sentence and "electrical turns" in faults[0].sentence

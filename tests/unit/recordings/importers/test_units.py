@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.guessing import guess
 from rotorid.recordings.importers.logfile import format_of, set_of_logs
 from rotorid.recordings.importers.mapping import SPELLINGS, UNITS, bracketed, converted, read_columns, stated, unit_of
 from rotorid.recordings.importers.rcbenchmark import HEADINGS, read_rcbenchmark
+from tests.refusals import refused
 
 POUND, OUNCE, FOOT, INCH = 4.44822161526, 0.278013850954, 0.3048, 0.0254
 WRITTEN = {  # kind: a text and what 1 of it is in the contract's unit
@@ -106,6 +106,16 @@ COLUMNS = {"Time": c.TIME, "Thrust": "force_z_n", "Torque": "moment_z_n_m", "Vol
 KINDS = {title: kind for title, (_, kind, _) in HEADINGS.items()}
 
 
+def stand_file(folder: Path, spin: str) -> Path:
+    """The vehicle file of a stand whose one rotor turns so."""
+    (folder / "stand.yaml").write_text(
+        "name: stand\nkind: stand\nmass_kg: 0.05\ninertia_kg_m2: {xx: 1.0e-5, yy: 1.0e-5, zz: 1.0e-5}\n"
+        f"rotors:\n  - {{x_m: 0.0, y_m: 0.0, spin: {spin}}}\nthrust_coefficient_n_s2: 1.45e-6\n"
+        "torque_coefficient_n_m_s2: 2.5e-8\ntared: true\n"
+    )
+    return folder / "stand.yaml"
+
+
 def export(path: Path, more=(), drop=(), **units: str | None) -> Path:
     """An export in which the quantities are in these units (None: the heading names none)."""
     table = {}
@@ -138,8 +148,8 @@ def test_a_heading_without_a_unit_is_said_to_be_assumed(tmp_path: Path, title: s
 
 @pytest.mark.parametrize("title", [t for t in COLUMNS if t != "Time"])
 def test_an_unknown_unit_is_refused_by_name(tmp_path: Path, title: str) -> None:
-    with pytest.raises(InputError, match=rf"column {title} \(stone\): no known unit"):
-        read_rcbenchmark(export(tmp_path / "a.csv", **{title: "stone"}))
+    path = export(tmp_path / "a.csv", **{title: "stone"})
+    refused(rf"column {title} \(stone\): no known unit", read_rcbenchmark, path)
 
 
 def test_a_1580_has_torque_and_columns_that_begin_alike(tmp_path: Path) -> None:
@@ -157,13 +167,7 @@ def test_the_torque_has_the_sign_of_the_stated_spin(tmp_path: Path, counted: int
     table = pd.read_csv(export(tmp_path / "a.csv"))
     table["Torque (N·m)"] *= counted
     table.to_csv(tmp_path / "a.csv", index=False)
-    vehicle = tmp_path / "stand.yaml"
-    vehicle.write_text(
-        "name: stand\nkind: stand\nmass_kg: 0.05\ninertia_kg_m2: {xx: 1.0e-5, yy: 1.0e-5, zz: 1.0e-5}\n"
-        f"rotors:\n  - {{x_m: 0.0, y_m: 0.0, spin: {spin}}}\nthrust_coefficient_n_s2: 1.45e-6\n"
-        "torque_coefficient_n_m_s2: 2.5e-8\ntared: true\n"
-    )
-    found = set_of_logs([tmp_path / "a.csv"], "stand", vehicle_file=vehicle)
+    found = set_of_logs([tmp_path / "a.csv"], "stand", vehicle_file=stand_file(tmp_path, spin))
     np.testing.assert_allclose(found.runs["a"]["moment_z_n_m"], sign * TRUE["Torque"], atol=1e-12)
     assert any(spin in sentence and "torque" in sentence for sentence in found.sentences)
 
@@ -220,14 +224,8 @@ def test_a_table_of_another_stand(
     pd.DataFrame(wrote).to_csv(path, index=False, sep=separator)
     found = guess(read_columns(path))
     assert not found.open, (found.open, found.evidence)
-    vehicle = tmp_path / "stand.yaml"
-    vehicle.write_text(
-        "name: stand\nkind: stand\nmass_kg: 0.05\ninertia_kg_m2: {xx: 1.0e-5, yy: 1.0e-5, zz: 1.0e-5}\n"
-        "rotors:\n  - {x_m: 0.0, y_m: 0.0, spin: cw}\nthrust_coefficient_n_s2: 2.0e-6\n"
-        "torque_coefficient_n_m_s2: 2.5e-8\ntared: true\n"
-    )
-    with pytest.raises(InputError, match="needs --vehicle"):
-        set_of_logs([path], "stand", mapping=found.mapping)
+    refused("needs --vehicle", set_of_logs, [path], "stand", mapping=found.mapping)
+    vehicle = stand_file(tmp_path, "cw")
     run = set_of_logs([path], "stand", vehicle_file=vehicle, mapping=found.mapping).runs["stand"]
     for name, values in true.items():
         np.testing.assert_allclose(run[name], values, atol=1e-9, err_msg=name)
@@ -236,10 +234,8 @@ def test_a_table_of_another_stand(
 
 
 def test_a_stand_whose_heading_names_no_unit_is_asked() -> None:
-    table = pd.DataFrame(
-        {"t_s": 0.1 * np.arange(100), "thrust": np.linspace(0, 9, 100), "rpm": np.linspace(0, 9e3, 100)}
-    )
-    assert set(guess(table).open) == {"thrust"}
+    table = {"t_s": 0.1 * np.arange(100), "thrust": np.linspace(0, 9, 100), "rpm": np.linspace(0, 9e3, 100)}
+    assert set(guess(pd.DataFrame(table)).open) == {"thrust"}
 
 
 def test_a_flight_with_a_column_called_thrust_is_no_stand() -> None:
@@ -260,15 +256,9 @@ STEADY = np.repeat(np.linspace(0, 1, 20), 3)
 )
 def test_steady_points_of_a_stand(name: str, factor: float, unit: str, speed: str, turns: float, unit_of_speed) -> None:
     """2 Hz are no 2 kHz; what the program of another stand calls an ESC signal is no export of RCbenchmark's."""
-    table = pd.DataFrame(
-        {
-            name: 0.5 * factor * np.arange(60),
-            "ESC signal (%)": 100 * STEADY,
-            "Thrust (N)": 8 * STEADY**2,
-            speed: turns * STEADY,
-        }
-    )
-    found = guess(table).mapping.channels
+    table = {name: 0.5 * factor * np.arange(60), "ESC signal (%)": 100 * STEADY}
+    table |= {"Thrust (N)": 8 * STEADY**2, speed: turns * STEADY}
+    found = guess(pd.DataFrame(table)).mapping.channels
     assert found["time"].unit == unit and found["rotor_speed"].unit == unit_of_speed
     assert found["throttle"].range == (0.0, 100.0)
 

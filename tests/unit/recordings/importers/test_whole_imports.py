@@ -1,7 +1,5 @@
 """An import is all or nothing: neither a kill nor a full disk leaves half a set that is taken for a whole one."""
 
-from __future__ import annotations
-
 import errno
 import os
 import signal
@@ -12,9 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
 
-from rotorid.cli import app
 from rotorid.errors import InputError
 from rotorid.io.text import writing
 from rotorid.recordings import list_sets, read_set, write_set
@@ -22,6 +18,8 @@ from rotorid.recordings.files import FILE_NAME
 from rotorid.recordings.importers import logfile as writer
 from rotorid.recordings.importers.faults import read_report
 from rotorid.recordings.importers.logfile import SetOfLogs
+from tests.command_line import answer, refusal
+from tests.refusals import refused
 from tests.unit.recordings.wrong_inputs import RUN, VEHICLE, sound, table
 
 MOST_STEPS = 80
@@ -146,10 +144,8 @@ def test_a_full_disk_is_one_sentence_and_loses_nothing(when: str, there: bool, t
     monkeypatch.setattr(writer, "write_table", write_table)
     if when == "when the disk is waited for":
         monkeypatch.setattr(writing, "_to_disk", to_disk)
-    words = ["import", *logs, "-o", folder, *([] if there else ["--like", "thesis"])]
-    done = CliRunner().invoke(app, [str(word) for word in words])
-    assert done.exit_code == 1 and "no space left on device" in done.output
-    assert len(done.output.strip().splitlines()) == 1
+    like = [] if there else ["--like", "thesis"]
+    assert "no space left on device" in refusal("import", *logs, "-o", folder, *like)
     assert before == {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
 
 
@@ -172,13 +168,11 @@ def test_the_command_killed_between_two_runs_leaves_no_set(tmp_path: Path) -> No
     logs = [tmp_path / f"run{k}.csv" for k in (1, 2, 3)]
     for log in logs:
         log.write_text(RUN)
-    words = ["import", *logs, "--like", "thesis", "-o", tmp_path / "set"]
-    words = [str(word) for word in words]
+    words = ["import", *map(str, logs), "--like", "thesis", "-o", str(tmp_path / "set")]
     done = subprocess.run([sys.executable, "-c", KILLED, *words], capture_output=True, text=True, timeout=120)
     assert done.returncode == -signal.SIGKILL
     assert not (tmp_path / "set").exists()
-    again = CliRunner().invoke(app, words)
-    assert again.exit_code == 0, again.output
+    answer(*words)
     assert names_of(tmp_path / "set") == ["run1", "run2", "run3"]
     assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
 
@@ -205,11 +199,10 @@ def test_a_change_by_hand_is_said_by_check_and_verdict_and_can_be_taken_over(
 ) -> None:
     change(folder)
     for command in (["check", folder], ["verdict", folder, "-q", "-o", folder.parent / "out"]):
-        done = CliRunner().invoke(app, [str(word) for word in command])
-        assert done.exit_code == 1 and len(done.output.strip().splitlines()) == 1
-        assert f"{folder}: by manifest.json, {said}" in done.output and f"rotorid check {folder} --renew" in done.output
-    assert CliRunner().invoke(app, ["check", str(folder), "--renew"]).exit_code == 0
-    assert CliRunner().invoke(app, ["check", str(folder)]).exit_code == 0
+        told = refusal(*command)
+        assert f"{folder}: by manifest.json, {said}" in told and f"rotorid check {folder} --renew" in told
+    answer("check", folder, "--renew")
+    answer("check", folder)
 
 
 def test_the_vehicle_and_the_split_may_be_edited(folder: Path) -> None:
@@ -221,9 +214,8 @@ def test_the_vehicle_and_the_split_may_be_edited(folder: Path) -> None:
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"runs": [1]}', '{"runs": {"a": 1}}', "[" * 100_000, "\0"])
 def test_a_list_that_is_none_is_one_sentence(folder: Path, text: str) -> None:
     (folder / FILE_NAME).write_text(text)
-    with pytest.raises(InputError) as error:
-        read_set(folder)
-    assert str(error.value).startswith(str(folder / FILE_NAME)) and str(error.value).isprintable()
+    told = refused(None, read_set, folder)
+    assert told.startswith(str(folder / FILE_NAME)) and told.isprintable()
 
 
 def test_an_import_onto_a_set_changes_nothing_that_is_there(folder: Path) -> None:
@@ -234,8 +226,7 @@ def test_an_import_onto_a_set_changes_nothing_that_is_there(folder: Path) -> Non
         (other, "run2.csv"),
         (found("run3", vehicle=VEHICLE.replace("0.652", "0.7")), "vehicle.yaml"),
     ):
-        with pytest.raises(InputError, match=f"{name} is there already and would change"):
-            changed.write(folder, as_csv=True)
+        refused(f"{name} is there already and would change", changed.write, folder, as_csv=True)
     with pytest.raises(InputError, match="run1.csv is there already, and run1.parquet would be the same run again"):
         found("run1", kept=True).write(folder)
     assert before == {path.name: path.read_bytes() for path in folder.iterdir()}
@@ -252,8 +243,7 @@ def test_the_same_import_again_changes_no_byte_and_another_adds_to_the_report(fo
 
 def test_a_set_that_is_not_whole_is_not_added_to(folder: Path) -> None:
     (folder / "run2.csv").unlink()
-    with pytest.raises(InputError, match="run run2.csv is missing"):
-        found("run3", kept=True).write(folder, as_csv=True)
+    refused("run run2.csv is missing", found("run3", kept=True).write, folder, as_csv=True)
 
 
 def test_a_set_that_is_simulated_is_whole_too(tmp_path: Path, monkeypatch) -> None:

@@ -1,7 +1,5 @@
 """Tables of one's own, as `rotorid import` reads them: by the reader of sets, and nothing is lost in silence."""
 
-from __future__ import annotations
-
 import gzip
 import re
 from pathlib import Path
@@ -9,18 +7,18 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from typer.testing import CliRunner
 
-from rotorid.cli import app
-from rotorid.errors import InputError
 from rotorid.recordings import read_set
 from rotorid.recordings.importers.guessing import guess
 from rotorid.recordings.importers.logfile import read_log
 from rotorid.recordings.importers.mapping import Mapping, read_by_mapping, read_columns
+from tests.command_line import answer, refusal
+from tests.refusals import refused
 from tests.unit.recordings.wrong_inputs import LINES, RUN, SPEEDS, WIDTH, table
 
 WORDS = table().assign(angular_velocity_x_rad_s="oops").to_csv(index=False)
 DECIMAL_COMMAS = "\n".join([LINES[0], *(line.replace(".", ",") for line in LINES[1:])]) + "\n"
+POINTS = RUN.replace(",", ";").replace(".", ",").replace("\n0,05;", "\n1.000,05;")
 SHIFTED = "\n".join([LINES[0], *("7," + line for line in LINES[1:])]) + "\n"
 CUT = RUN[:-40]
 SUMMER_TIME = table().assign(time_s=lambda t: t["time_s"] + 3600 * (t["time_s"] > 5)).to_csv(index=False)
@@ -28,11 +26,7 @@ WRONG = (
     ("words in a column", WORDS, "line 2, column angular_velocity_x_rad_s: expected a number, found 'oops'"),
     ("a word in a cell", RUN.replace("0.05,", "soon,", 1), "line 3, column time_s: expected a number, found 'soon'"),
     ("decimal commas", DECIMAL_COMMAS, "the heading has 18 (are decimals written with commas? expected points)"),
-    (
-        "decimal commas and thousands' points",
-        RUN.replace(",", ";").replace(".", ",").replace("\n0,05;", "\n1.000,05;"),
-        "line 3, column time_s: expected a number, found '1.000,05'",
-    ),
+    ("decimal commas and thousands' points", POINTS, "line 3, column time_s: expected a number, found '1.000,05'"),
     ("a cell too many at each start", SHIFTED, f"line 2: has {WIDTH + 1} cells, the heading has {WIDTH}"),
     ("a cell too many in a line", RUN.replace("\n0.05,", "\n0.05,7,"), f"line 3: has {WIDTH + 1} cells"),
     ("a column twice", RUN.replace("velocity_y_m_s", "velocity_x_m_s", 1), "column velocity_x_m_s is there twice"),
@@ -60,11 +54,8 @@ def test_a_wrong_table_is_one_sentence(
 ) -> None:
     path = tmp_path / ("own.csv.gz" if packed else "own.csv")
     path.write_bytes(gzip.compress(text.encode()) if packed else text.encode())
-    with pytest.raises(InputError) as error:
-        read_by_mapping(path, mapping)
-    assert str(error.value).startswith(str(path)) and str(error.value).isprintable()
-    for words in said:
-        assert words in str(error.value)
+    told = refused(None, read_by_mapping, path, mapping)
+    assert told.startswith(str(path)) and told.isprintable() and all(words in told for words in said), told
 
 
 @pytest.mark.parametrize("command", ["import", "verdict"])
@@ -73,16 +64,13 @@ def test_the_commands_say_so_and_write_nothing(command: str, text: str, tmp_path
     """Before: exit code 0, a column emptied, 797 of 800 rows dropped, columns moved by one."""
     path, out = tmp_path / "own.csv", tmp_path / "out"
     path.write_text(text)
-    done = CliRunner().invoke(app, [command, str(path), "--like", "thesis", "-o", str(out)])
-    assert done.exit_code == 1 and len(done.output.strip().splitlines()) == 1
-    assert str(path) in done.output and not out.exists()
+    assert str(path) in refusal(command, path, "--like", "thesis", "-o", out) and not out.exists()
 
 
 @pytest.mark.parametrize("sign", [",", ";", "\t", "|", " "], ids=["commas", "semicolons", "tabs", "bars", "blanks"])
 def test_columns_may_be_separated_by_other_signs(sign: str, tmp_path: Path) -> None:
-    path = tmp_path / "own.csv"
-    path.write_text(RUN.replace(",", sign))
-    found, faults, _ = read_by_mapping(path, None)
+    (tmp_path / "own.csv").write_text(RUN.replace(",", sign))
+    found, faults, _ = read_by_mapping(tmp_path / "own.csv", None)
     pd.testing.assert_frame_equal(found, table())
     assert faults == []
 
@@ -145,8 +133,7 @@ def test_commas_between_thousands_are_no_decimal_commas(sign: str, tmp_path: Pat
     path = tmp_path / "own.csv"
     thousands = [f"{10 + k // 1000},{k % 1000:03d}" for k in range(len(table()))]
     table().assign(turns=thousands).to_csv(path, sep=sign, index=False)
-    with pytest.raises(InputError, match="has '10,000' next to '0.0.*', expected nothing between thousands"):
-        read_by_mapping(path, None)
+    refused("has '10,000' next to '0.0.*', expected nothing between thousands", read_by_mapping, path, None)
 
 
 def test_a_column_without_a_name_is_kept_by_its_number(tmp_path: Path) -> None:
@@ -170,25 +157,19 @@ def test_text_that_no_channel_names_is_no_fault_and_the_proposal_says_what_it_le
 def test_a_parquet_is_read_by_the_same_rules(tmp_path: Path) -> None:
     path = tmp_path / "own.parquet"
     table().assign(velocity_x_m_s="oops").to_parquet(path, index=False)
-    with pytest.raises(InputError, match="row 1, column velocity_x_m_s: expected a number, found 'oops'"):
-        read_by_mapping(path, None)
+    refused("row 1, column velocity_x_m_s: expected a number, found 'oops'", read_by_mapping, path, None)
     assert read_by_mapping(path, MAPPING)[0]["angular_velocity_x_rad_s"].notna().all()
 
 
 def test_a_log_with_a_jump_is_refused_before_anything_is_written(tmp_path: Path) -> None:
     (tmp_path / "own.csv").write_text(SUMMER_TIME)
-    done = CliRunner().invoke(
-        app, ["import", str(tmp_path / "own.csv"), "--like", "thesis", "-o", str(tmp_path / "set")]
-    )
-    assert done.exit_code == 1 and not (tmp_path / "set").exists()
+    refusal("import", tmp_path / "own.csv", "--like", "thesis", "-o", tmp_path / "set")
+    assert not (tmp_path / "set").exists()
 
 
 def test_a_sound_table_comes_back_exactly(tmp_path: Path) -> None:
     (tmp_path / "own.csv").write_text(RUN)
-    done = CliRunner().invoke(
-        app, ["import", str(tmp_path / "own.csv"), "--like", "thesis", "-o", str(tmp_path / "set")]
-    )
-    assert done.exit_code == 0, done.output
+    answer("import", tmp_path / "own.csv", "--like", "thesis", "-o", tmp_path / "set")
     again = read_set(tmp_path / "set").runs[0].table
     np.testing.assert_array_equal(again.to_numpy(), table().to_numpy())
 
