@@ -26,7 +26,7 @@ def test_a_sound_flight_raises_no_doubt(flown) -> None:
 
 
 def test_commands_in_the_order_of_the_rotors_raise_no_doubt(flown) -> None:
-    assert doubts_of(changed(flown, with_commands((0, 1, 2, 3)))) == ()
+    assert doubts_of(with_table(flown, with_commands((0, 1, 2, 3)))) == ()
 
 
 def times(names, factor):
