@@ -132,7 +132,8 @@ def _put(draft: Draft, quantity: str, family: Family, how: str) -> None:
         kinds = " or ".join(f"[{_RANGES[k][0]:g}, {_RANGES[k][1]:g}] ({k})" for k in found)
         question = f"which readings are no and full throttle: {kinds or 'no usual range holds them'}?"
         if speeds:
-            question += " Or are they speeds? Then call the channel rotor_speed and state their unit"
+            name = "rotor_command" if "rotor_speed" in draft.channels else "rotor_speed"
+            question += f" Or are they speeds? Then call the channel {name} and state their unit"
         draft.put(quantity, family.columns, evidence, question, unit="raw", range=OPEN)
 
 
