@@ -7,8 +7,8 @@
 # nothing.
 #
 # Why it matters: a thrust stand may write one file in a session, a segment each time that somebody presses record. The
-# first run is then at a time at which it did not take place, at another rate: spin-up times and lags found in it are off by
-# the ratio of the intervals, and no other log can be aligned with it.
+# first run is then at a time at which it did not take place, at another rate: spin-up times and lags found in it are
+# off by the ratio of the intervals, and no other log can be aligned with it.
 #
 # Output seen:
 #   npTDMS 1.13.0 numpy 2.4.6
