@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# One would guess: DCM(rpy=angles) and Quaternion(rpy=angles) of ahrs are the same attitude ("with both approaches the
-# same quaternion is obtained", says the latter), and to_rpy() gives back the angles that went in.
+# One would guess: DCM(rpy=angles) and Quaternion(rpy=angles) of ahrs are the same attitude, as the documentation of the
+# latter has it, and to_rpy() gives back the angles that went in.
 #
 # What happens: the quaternion takes roll, pitch, yaw; the matrix takes yaw, pitch, roll under the same name. to_rpy()
 # reads the matrix as its transpose: neither the one order nor the other comes back, not even in size.
