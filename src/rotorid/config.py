@@ -3,8 +3,6 @@
 Every value is written out in `config.yaml`; the model holds no defaults, so what the file says is what runs.
 A stage that needs settings adds one class here and one field to `Config`; the JSON schema in
 `workflow/schemas/config.schema.json` is generated from it (`python -m rotorid.config --write-schema`).
-
-Readings of the identification flight; apart from what flies it, so that the configuration is checked at once.
 """
 
 from __future__ import annotations

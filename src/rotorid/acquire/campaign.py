@@ -1,9 +1,8 @@
 """The whole campaign of the thesis, recorded by the recorders from the emulators on a virtual clock.
 
 `python -m rotorid.acquire.campaign` writes `raw/campaign/` (logs packed, metadata next to them), the index
-`raw/sessions.tsv` and, outside `raw/`, the sealed truth. The same seed gives the same bytes.
-
-The calibration weights and their eight combinations (thesis tables 2.6 and 2.7), in gf.
+`raw/sessions.tsv` and, outside `raw/`, the sealed truth. The same seed gives the same bytes. Calibration weights and
+their eight combinations are those of thesis tables 2.6 and 2.7, in gf.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """`rotorid-acquire`: record the instruments, or emulate them.
 
-Who is on a serial port: stable names, and the question that every instrument answers.
-
-The options that all recording commands share, in one place.
+Each instrument is a command; what all of them share (options, stable names of serial ports, the question that every
+instrument answers with its name) stands here once.
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
-"""The recorder: reads a transport, writes every byte, then looks at what it wrote.
+"""The recorder: reads a transport, appends every byte to a raw log, and only then looks at what it wrote.
 
 A recording is a `with` block around a `Recorder`; what a procedure does with the instrument (tare, throttle,
 programme) stands in its own module and only uses `command`, `start`, `rows` and `stop`. However the block
 ends, the log is closed and the metadata next to it say how it ended.
-
-Appends chunks to a raw log. Bytes are on disk before anything looks at them.
 """
 
 from __future__ import annotations

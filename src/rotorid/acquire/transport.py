@@ -1,10 +1,8 @@
-"""Where bytes come from: a serial port, or an emulator in the same process.
+"""What is below the recorder: where bytes come from, the host's clock, and what can go wrong with an instrument.
 
-The seam below the recorder: a transport knows bytes and ports, nothing of frames.
-
-The host's clock, real or virtual. Recorders take one, so that a test or a campaign never waits.
-
-What can go wrong with an instrument. Every message says what happened and what to do.
+Bytes come from a serial port, or from an emulator in the same process: a transport knows bytes and ports, nothing of
+frames. The clock is real or virtual, so that a test or a campaign never waits. Each error says what happened and what
+to do.
 """
 
 from __future__ import annotations

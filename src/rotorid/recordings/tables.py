@@ -1,9 +1,7 @@
 """Tables of runs, CSV (plain or gzipped) and Parquet, read strictly: the place of what is not a number is reported.
 
-The text of a CSV file, plain or gzipped, looked through in blocks: it never stands in the memory as a whole.
-
-What is no table (other text, another encoding, a line with a cell too many, a file cut off, a bomb) is refused with its
-line before anything is made of it.
+A CSV file is looked through in blocks, never as a whole in the memory. What is no table (other text, another encoding,
+a line with a cell too many, a file cut off, a bomb) is refused with its line before anything is made of it.
 """
 
 from __future__ import annotations

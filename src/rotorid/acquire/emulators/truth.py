@@ -3,10 +3,9 @@
 Rotors, mass and geometry are the thesis's (tables 2.3, 2.5, 4.1), load cells have table 2.8's calibration;
 everything else is drawn here and concealed from the pipeline, for its mismatch stage to find.
 
-The bench's geometry: cell forces to body forces (thesis eqs 2.3–2.9, table 2.3), and the inverse.
-
-The recorder shows forces with it; the emulated bench uses the inverse. The pipeline has its own
-implementation, so that one can be checked against the other.
+The bench's geometry turns cell forces into body forces (thesis eqs 2.3–2.9, table 2.3) and back: the recorder shows
+forces with it, the emulated bench uses the inverse. The pipeline has an implementation of its own, so that one can be
+checked against the other. Weights are put down as an operator does, never twice in quite the same place.
 """
 
 from __future__ import annotations

@@ -1,11 +1,8 @@
 """What changed between two sets of flights: statements, and limits of all that did not.
 
-A payload that swings below the vehicle in the second set alone.
-
-How it swings depends on the length of its cable and on how it hung, and the first set tells neither. Both are read from
-the sideways force that the first set's model leaves in the second set.
-
-What keeps two sets of flights from being compared fully: a larger residual, and flight that the first has not.
+A payload that swings below the vehicle in the second set alone is read from the sideways force that the first set's
+model leaves there: how it swings depends on the length of its cable and on how it hung, and the first set tells
+neither. A larger residual, or flight that the first set has not, keeps two sets from being compared fully.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
-"""What the analysis of a recording set found, before it is put into words, figures and files.
+"""What the analysis of a recording set found, before it is put into words, figures and files, and how probable it is.
 
-How probable each effect of the chosen model is, and the status that this leaves it.
-
-The posterior is taken at the model that was chosen, and at its neighbours: without each effect, and with each other
-effect in its place (`statements`). What the regression does not decide (chain, wind, mistakes) has no probability here.
+Probabilities are those of the posterior at the model that was chosen and at its neighbours: without each effect, and
+with each other effect in its place (`statements`). What the regression does not decide (chain, wind, mistakes) has
+none.
 """
 
 from __future__ import annotations

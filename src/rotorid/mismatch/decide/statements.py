@@ -1,12 +1,9 @@
 """What the posterior says of each id: at work, how sure, in place of which others; else how large it may be at most.
 
-The posterior at a model that was chosen from a regression by other means.
-
-How large each id that was not found may be all the same: upper limits at 95 %.
-
-The limit of an id is that of its form which may be largest: with it added to the most probable model, the size that its
-coefficients have with 95 % probability at most. The leftover is part of their covariance: where a flight is not
-understood, little is excluded.
+The posterior is taken at the model that was chosen, by whatever means. The upper limit of an id that was not found is
+that of its form which may be largest: with it added to the most probable model, the size that its coefficients have
+with 95 % probability at most. The leftover is part of their covariance: where a flight is not understood, little is
+excluded.
 """
 
 from __future__ import annotations

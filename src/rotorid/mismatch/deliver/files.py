@@ -1,13 +1,10 @@
-"""`conditions.yaml` and `instruments.yaml`: what was found in a recording and is no property of the vehicle.
+"""The three files that a finding may belong to: the vehicle, the conditions of a flight, the instruments.
 
-Wind, gusts and a payload for a time belong to a run and to its instants; errors of sensors, clocks and stamps belong to
-the instruments. The vehicle has a file of its own, which the simulator runs. All three are read back before they are
-delivered, and the simulation run forward uses each where it belongs.
-
-To which file a finding belongs: the vehicle, the conditions of a flight, or the instruments.
-
-Only what is established, or one member of a class, belongs anywhere. A wind blows on one afternoon and a gyroscope's
-bias is no property of the airframe: a vehicle that held them would fly worse than the one believed.
+Only what is established, or one member of a class, belongs anywhere. Wind, gusts and a payload for a time belong to a
+run and to its instants (`conditions.yaml`), errors of sensors, clocks and stamps to the instruments
+(`instruments.yaml`): a vehicle that held them would fly worse than the one believed. The vehicle's file is what the
+simulator runs. All three are read back before they are delivered, and the simulation run forward uses each where it
+belongs.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Vehicles flown in windows of half a second that are restarted from the recording, and how far they drift off.
+"""Vehicles with their effects, flown in windows of half a second that are restarted from the recording, and how far
+they drift off.
 
-An error is the length of the vector between simulation and recording (for attitude the angle of the rotation between
-them), taken over all samples of a window but the restart itself.
-
-A vehicle with its effects, ready to be simulated, and what belongs to the run and to the readings.
+What belongs to the run (wind, a payload for a time) and to the readings is taken from their files. An error is the
+length of the vector between simulation and recording (for attitude the angle of the rotation between them), taken over
+all samples of a window but the restart itself.
 """
 
 from __future__ import annotations

@@ -1,11 +1,8 @@
-"""Whether a vehicle is a body that hovers and flies: what the fit of its values alone does not ask.
+"""Whether a vehicle is a body that hovers and flies, and the model of a flight with fewer of its parts.
 
 A value can leave every channel better and still be that of no vehicle: a thrust coefficient that absorbs a drag may
-leave a maximum thrust below the weight.
-
-The model of a flight with fewer of its parts: what is only suggested takes no part in what is delivered.
-
-Believed values, nuisances and the effects that stay are fitted anew without it.
+leave a maximum thrust below the weight. What is only suggested takes no part in what is delivered: believed values,
+nuisances and the effects that stay are fitted anew without it.
 """
 
 from __future__ import annotations

@@ -1,24 +1,17 @@
 """From a recorded run to evenly sampled stretches of flight, with what is missing derived where that is honest:
-velocity, height, voltage and regime variables.
+velocity, height, voltage and regime variables (what a mismatch may depend on).
 
-Whether a recorded velocity is an estimate made from the recorded accelerometer.
+A recorded velocity may be an estimate made from the recorded accelerometer. An autopilot's filter integrates its
+accelerometer between the fixes of a slower sensor: the accelerometer's errors, its noise and the vibrations that it
+feels are then in the velocity, too, and comparing the two shows nothing of them. It shows at frequencies above those at
+which a vehicle moves: the change of an independent velocity is that sensor's own noise there and has nothing in common
+with the accelerometer.
 
-An autopilot's filter integrates its accelerometer between the fixes of a slower sensor: the accelerometer's errors,
-its noise and the vibrations that it feels are then in the velocity, too, and comparing the two shows nothing of them.
-It shows at frequencies above those at which a vehicle moves: the change of an independent velocity is that sensor's
-own noise there and has nothing in common with the accelerometer.
-
-Height above ground without its sensor's flutter, which the steep laws of ground effect would take for thrust.
-
-Regime variables of a flight: what a mismatch may depend on.
-
-The battery's voltage without its voltmeter's noise.
-
-A voltage is a regressor of the battery's sag, and noise in a regressor flattens what multiplies it: the exponent comes
-out too small, and what is left follows the command (which loads the battery), as a throttle curve would. A battery
-changes slowly, and quickly only as it is loaded: the reading's slow part, and of its quick part what follows the
-commanded load, is what can be expected of the voltage. Noise of any colour stays out of it, for it knows no commands
-(two-stage least squares with time and load as instruments).
+The height is freed of its sensor's flutter, which the steep laws of ground effect would take for thrust, and the
+battery's voltage of its voltmeter's noise: noise in a regressor flattens what multiplies it, so the exponent of the sag
+comes out too small, and what is left follows the command (which loads the battery), as a throttle curve would. A
+battery changes slowly, and quickly only as it is loaded: the reading's slow part, and of its quick part what follows
+the commanded load, is what can be expected of the voltage (two-stage least squares with time and load as instruments).
 """
 
 from __future__ import annotations

@@ -1,13 +1,9 @@
 """What is delivered: values called wrong, named effects, winds and nuisances, and what they leave of the rows.
 
-With them believed values as the recordings have them, where they stay within what was believed. Terms without a name
-stay out: an improved vehicle cannot hold them. The same for flights, stands and benches.
-
-Believed values as the recordings have them, where they stay within what was believed.
-
-No laboratory knows its thrust coefficient to a percent, and a percent of the weight is ten times a good sensor's noise.
-Such a value is not wrong and is not called so; what is delivered holds it as the recordings do, all values at once and
-each held by its trust.
+Terms without a name stay out: an improved vehicle cannot hold them. The same for flights, stands and benches. With them
+go believed values as the recordings have them, where they stay within what was believed: no laboratory knows its thrust
+coefficient to a percent, and a percent of the weight is ten times a good sensor's noise. Such a value is not wrong and
+is not called so; all of them move at once, each held by its trust.
 """
 
 from __future__ import annotations

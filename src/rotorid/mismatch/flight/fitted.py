@@ -1,15 +1,10 @@
-"""What is fitted to a set: what lies between command and rotor speed, and the model of force, moment and sensors;
-and what to do next about the first class that a set leaves open.
+"""What is fitted to a set: what lies between command and rotor speed, and the model of force, moment and sensors.
 
 1. the chain from command to speed, 2. the grouped search over force, moment and sensor effects with the believed
 values free, refined in its nonlinear parameters, the wind and the gusts, 3. the chain once more with the effects found
-known, 4. less what may as well be nothing.
-
-What to do next about the first class that a set leaves open.
-
-By how many standard errors a flight would separate the class is not stated here: that hangs on what can be flown, and
-takes every candidate flown in simulation by every competing model, ten seconds and more. `rotorid plan`
-(`rotorid.plan.plan`) computes it, and is the only one to state it.
+known, 4. less what may as well be nothing. Then what to do next about the first class that is left open; by how many
+standard errors a flight would separate it, `rotorid plan` alone computes and states (`rotorid.plan.plan`): every
+candidate is flown in simulation by every competing model.
 """
 
 from __future__ import annotations

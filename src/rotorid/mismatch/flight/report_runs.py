@@ -1,14 +1,12 @@
-"""The runs held out, opened once: what a model that was chosen without them makes of them, and what is left where one
-stated effect is left out and all else is fitted anew.
+"""The runs held out, opened once: what a model that was chosen without them makes of them, and what each effect is
+worth.
 
 Nothing here can change the model. Effects, values and their numbers come from the runs that were fitted. What belongs
 to a run and not to the vehicle (the wind of a gust, when a payload is on board, a thrust per mass that differs from run
 to run) is read from the run itself: it says how the run was flown, not what the vehicle is.
 
-What is left of every channel where one stated effect is left out and all else is fitted anew.
-
-This is what an effect is worth to the reader: the difference between the model with it and the model without it, on
-runs that neither was fitted to.
+An effect is worth the difference between the model with it and the model without it, all else fitted anew, on runs that
+neither was fitted to.
 """
 
 from __future__ import annotations

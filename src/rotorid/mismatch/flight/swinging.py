@@ -1,10 +1,8 @@
-"""How a slung payload hung in each run, read from the run itself; and when a payload is picked up or dropped in flight.
+"""A slung payload: how it hung in each run, read from the run itself, and when it is picked up or dropped in flight.
 
 A load that swings far soon swings otherwise than a pendulum that was started once: after some seconds nothing is left
 of its phase. What is left of the sideways force shows where it hung, a few seconds at a time. As the wind of a gust
 this belongs to a run and not to the vehicle; the mass, the cable and the damping are the same in all runs.
-
-When a payload is on board, where it is picked up or dropped in flight.
 
 Added mass is seen in every half second by itself: by it the thrust exceeds what the accelerometer accounts for, and
 off the centre it turns the vehicle. Where these loads are two plateaus with a sudden change between them in the

@@ -1,11 +1,10 @@
-"""The model of force, moment and sensor effects: rows, whitening, search and refinement.
+"""The model of force, moment and sensor effects: rows, whitening, search, refinement, and the chain before the rotors.
 
-How late a loop that answers the gyroscope's noise makes its rotors look.
-
-A controller turns the noise n of the gyroscope into commands, M = H n, and the recorded angular acceleration holds
-dn/dt: the two go together although no rotor did anything. Fitted as a lateness d of the commanded moment, I dn/dt =
-−d dM/dt, this is Σ −I Re(H) ω² S_n / Σ ω² S_M over the frequencies that are compared: the bias of the direct method in
-a closed loop (Ljung, System Identification, 2nd ed., ch. 13.4). A hover that does nothing else shows 10 ms of it.
+A loop that answers the gyroscope's noise makes its rotors look late (`closed_loop_bias_s`). A controller turns the
+noise n of the gyroscope into commands, M = H n, and the recorded angular acceleration holds dn/dt: the two go together
+although no rotor did anything. Fitted as a lateness d of the commanded moment, I dn/dt = −d dM/dt, this is
+Σ −I Re(H) ω² S_n / Σ ω² S_M over the frequencies that are compared: the bias of the direct method in a closed loop
+(Ljung, System Identification, 2nd ed., ch. 13.4). A hover that does nothing else shows 10 ms of it.
 """
 
 from __future__ import annotations

@@ -1,21 +1,15 @@
 """From a recording set of kind `stand` or `bench` to what is off in it, in the same form as for a flight.
 
 1. mistakes in the set, 2. what lies between command and rotor speed, 3. the grouped search over everything that acts
-on the load or on its reading, with the believed values free, 4. nonlinear parameters refined, 5. a word on each id.
+on the load or on its reading, with the believed values free, 4. nonlinear parameters refined, 5. a word on each id,
+6. the runs held out, opened once, as for a flight.
 
-The runs held out of a stand or bench, opened once: what a model that was chosen without them makes of them.
-
-From the selected terms of an instrument to a word on each id.
-
-Believed values that only make up for the form of an effect, which is approximate.
-
-A law of nature has one form, an effect of the catalogue has many: another laboratory's thrust curve, cable or room is
-never quite that of any equation written down before. What a strong effect's form leaves follows the same inputs, is far
-above the noise, and a believed value will fit it. So a value that seems wrong must also be needed where the effect is
-free to have any smooth form: its contribution times hat functions of the load's size and of its own, and a little late.
-Effects whose equation is geometry or a definition (`Effect.exact`) have that form and no other.
-
-Gains of a reading that only look wrong because its characteristic is curved.
+Two things may look like a wrong value and are none. A law of nature has one form, an effect of the catalogue has many:
+another laboratory's thrust curve, cable or room is never quite that of any equation written down before. What a strong
+effect's form leaves follows the same inputs, is far above the noise, and a believed value will fit it. So a value that
+seems wrong must also be needed where the effect is free to have any smooth form: its contribution times hat functions
+of the load's size and of its own, and a little late. Effects whose equation is geometry or a definition
+(`Effect.exact`) have that form and no other. And a gain only looks wrong where a characteristic is curved.
 """
 
 from __future__ import annotations

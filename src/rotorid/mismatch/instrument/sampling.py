@@ -5,13 +5,11 @@ Steps are noise where they are coarse relative to it. A bench's reference jumps 
 swings. The moments after a jump are left out where readings differ from jump to jump by more than their noise: an
 instrument's own dynamics would repeat themselves.
 
-Measured rotor speeds without the noise of their measurement.
-
-On a stand the speeds are the load: their noise is an error of the regressor, of which a play or a filter of the load
-takes away what is small or quick, and so looks like one. A rotor's inertia keeps its speed smooth, the noise of a
-counter is white: on a plateau every instant gets the longest window whose parabola agrees with those of all shorter
-ones (intersection of confidence intervals; A. Goldenshluger and A. Nemirovski, 1997); at a step the reading stays.
-What is quick may also be the rotors' own: the reading shows which, for it follows rotors but not their counters.
+On a stand measured rotor speeds are the load: their noise is an error of the regressor, of which a play or a filter of
+the load takes away what is small or quick, and so looks like one. A rotor's inertia keeps its speed smooth, the noise
+of a counter is white: on a plateau every instant gets the longest window whose parabola agrees with those of all
+shorter ones (intersection of confidence intervals; A. Goldenshluger and A. Nemirovski, 1997); at a step the reading
+stays. What is quick may also be the rotors' own: the reading shows which, for it follows rotors but not their counters.
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
-"""Fits of one group of signals to another with a free delay, in blocks of the frequency domain.
+"""Fits of what two sensors say of the same motion, with a free delay, in blocks of the frequency domain.
 
 Y(f) = M X(f) e^(-i 2π f τ) + N Z(f): the matrices real, one delay τ for all; Z are nuisances on Y's own clock.
 Every output is weighted by the spectrum of what the fit leaves, so that coloured residuals count for what they
 are; covariances are sandwiches over blocks of time, so that they hold whatever the spectrum's model misses.
-
-What two sensors say of the same motion, as blocks of spectra ready to be fitted.
 
 In each comparison X is the less noisy side, because noise in X would shrink the gain. Comparisons between
 position, velocity, attitude, gyroscope and accelerometer hold for any body; those with the rotors use the

@@ -1,9 +1,8 @@
-"""The verdict on a recording set: a typed model of `verdict.json` and how it follows from an analysis.
+"""The verdict on a recording set: a typed model of `verdict.json`, and how it follows from an analysis.
 
 The JSON schema in `workflow/schemas/verdict.schema.json` is generated from this model
-(`python -m rotorid.mismatch.tell.verdict --write-schema`). A number that is not known is written as null.
-
-What stands in the way of believing a verdict: doubts of `check`, less those that the analysis corrected.
+(`python -m rotorid.mismatch.tell.verdict --write-schema`). A number that is not known is written as null. What stands
+in the way of believing a verdict are the doubts of `check`, less those that the analysis corrected.
 """
 
 from __future__ import annotations
