@@ -49,6 +49,8 @@ _REVERSED = 0.02
 """Share of the largest value that a value of the other sign must exceed to be one: less is noise about zero."""
 _SHUFFLED, LATE_STEPS = 0.05, 100.0
 """Share of steps back from which rows are in no order, and how many usual steps late a row in order may come."""
+_FEW_STEPS = 5.0
+"""Usual steps back, and rows after them, below which no clock was set."""
 _UNEXPLAINED = 0.2
 """Share of its variance that the motors of a mixer may leave of another motor's signal."""
 
@@ -170,17 +172,21 @@ def in_order(table: pd.DataFrame, time: str) -> tuple[pd.DataFrame, list[ImportF
 def _set_back(table: pd.DataFrame, clock: np.ndarray, row: int, usual: float) -> bool:
     """Whether a clock that steps back after a row was set: from there it goes on step by step, past where it had been.
 
-    Rows that only come late end with a jump ahead; rows that are sent twice are the same.
+    Stamps that jitter step back by less than a few steps; rows that only come late end with a jump ahead; rows that are
+    sent twice are the same.
     """
     by = clock[row] - clock[row + 1]
     past = np.flatnonzero(clock[row + 1 :] > clock[row])
     stop = row + 1 + past[0] if len(past) else len(clock)
     ahead = clock[stop] - clock[stop - 1] if len(past) else 0.0
-    if ahead > 0.5 * by + usual or (stop - row - 1) * usual < 0.5 * min(by, clock[stop - 1] - clock[row + 1]):
+    count = stop - row - 1
+    if min(by / usual, count) < _FEW_STEPS or ahead > 0.5 * by + usual:
+        return False
+    if count * usual < 0.5 * min(by, clock[stop - 1] - clock[row + 1]):
         return False
     again = table.iloc[row + 1 : stop].reset_index(drop=True)
     earlier = table.iloc[: row + 1].drop_duplicates()
-    return len(again.merge(earlier.drop_duplicates(), how="inner")) < 0.5 * len(again)
+    return len(again.merge(earlier, how="inner")) < 0.5 * len(again)
 
 
 def join_rows(table: pd.DataFrame, time: str) -> pd.DataFrame:

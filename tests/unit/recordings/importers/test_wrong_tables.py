@@ -119,6 +119,16 @@ def test_rows_that_are_sent_twice_are_no_clock_set_back(tmp_path) -> None:
     assert len(found) == len(own) and "clock_set_back" not in [f.kind for f in faults]
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_stamps_that_jitter_are_no_clock_set_back(seed: int, tmp_path) -> None:
+    own = table()
+    own["time_s"] += np.random.default_rng(seed).choice([0.0, 0.06], len(own), p=[0.98, 0.02])
+    own.to_csv(tmp_path / "own.csv", index=False)
+    found, faults, _ = read_by_mapping(tmp_path / "own.csv", None)
+    assert len(found) == len(own) and "clock_set_back" not in [f.kind for f in faults]
+    assert np.diff(found["time_s"]).max() < 0.2
+
+
 def test_each_side_of_a_clock_that_was_set_back_is_a_run(tmp_path) -> None:
     own = table()
     own["time_s"] *= 2
