@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 
 import numpy as np
 
@@ -347,9 +346,7 @@ def findings_outside(found: Fitted, prepared: Prepared) -> list[Finding]:
     return [throttle_or_thrust(f) for f in findings] if found.commanded else findings
 
 
-def findings_inside(
-    found: Fitted, prepared: Prepared, delivered: Fit, changed: Values = MappingProxyType({})
-) -> list[Finding]:
+def findings_inside(found: Fitted, prepared: Prepared, delivered: Fit, changed: Values | None = None) -> list[Finding]:
     """A finding for every term that the regression of force, moment and sensors selected or dropped.
 
     Numbers are those for the believed vehicle with its values `changed`.
@@ -363,7 +360,7 @@ def findings_inside(
         model.noise,
         nonlinear_intervals(prepared, model, model.segments),
         delivered,
-        lambda term: on_vehicle(term, model.segments, prepared.vehicle, changed, model.noise),
+        lambda term: on_vehicle(term, model.segments, prepared.vehicle, changed or {}, model.noise),
     )
     return [throttle_or_thrust(f) for f in findings] if found.commanded else findings
 

@@ -14,13 +14,12 @@ from dataclasses import replace
 import numpy as np
 
 from rotorid.effects.contract import Motion
+from rotorid.mismatch.decide.problem import Values
+from rotorid.mismatch.decide.selected import Factors, as_fitted
 from rotorid.mismatch.evidence.motion import Segment
 from rotorid.mismatch.evidence.rows import Term
 from rotorid.mismatch.flight.values import changed_vehicle
 from rotorid.recordings import Vehicle
-
-Values = Mapping[str, tuple[float, float]]
-"""Relative changes of believed values and their one-sigma."""
 
 
 def acting_over_rows(believed: Vehicle, delivered: Vehicle) -> np.ndarray:
@@ -31,13 +30,13 @@ def acting_over_rows(believed: Vehicle, delivered: Vehicle) -> np.ndarray:
 
 def on_vehicle(
     term: Term, segments: Sequence[Segment], believed: Vehicle, changed: Values, noise: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Factors by which a term's linear coefficients are larger on the vehicle with values `changed`, and their
-    one-sigma, (k,) each; 1 and 0 for what acts on sensors alone. `noise` (6 or more) weighs the channels."""
+) -> Factors:
+    """By how much a term's linear coefficients are larger on the vehicle with values `changed`; 1, without a doubt, for
+    what acts on sensors alone. `noise` (6 or more) weighs the channels."""
     size = len(term.form.linear)
     segments = [s for s in segments if term.run in ("", s.run)]
     if not changed or not size:
-        return np.ones(size), np.zeros(size)
+        return as_fitted(term)
     weight = 1.0 / np.square(noise[:6])
     weight = np.where(np.isfinite(weight), weight, 0.0)
     rows = [_columns(term, s.motion, believed) for s in segments]

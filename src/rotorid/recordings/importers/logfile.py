@@ -193,9 +193,10 @@ def _read(path: Path, kind: str, mapping: Mapping | None) -> _Imported:
         return _Imported(kind, {_stem(path): table}, tuple(faults), axes, kind="stand")
     table, faults, axes = read_by_mapping(path, mapping)
     stand, runs, cuts = bool(set(table) & {*c.FORCE, *c.MOMENT}), {_stem(path): table}, []
-    apart = _apart(table, faults)
-    if not stand and (apart.any() or not airborne(table)[0].all()):
-        runs, cuts = flights(table, airborne(table)[0], _stem(path), path, apart)
+    if not stand:
+        flying, apart = airborne(table)[0], _apart(table, faults)
+        if apart.any() or not flying.all():
+            runs, cuts = flights(table, flying, _stem(path), path, apart)
     speeds = None if mapping is None else mapping.channels.get("rotor_speed") or mapping.channels.get("rotor_command")
     unit = (speeds.unit if speeds else "") or "rad/s"
     unit = "rpm" if unit in ELECTRICAL else unit  # they are turns of the rotor by now
