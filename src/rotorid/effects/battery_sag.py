@@ -1,4 +1,10 @@
-"""Rotor speed that falls with the battery's voltage."""
+"""Rotor speed that falls with the battery's voltage.
+
+Where no speed is recorded it is stated about the mean voltage of the set, as what commands alone determine: by how
+many percent the thrust falls for one percent less voltage (`about`).
+"""
+
+import re
 
 import numpy as np
 
@@ -21,6 +27,33 @@ def drift(path, values):
     return path.speed * np.maximum(1.0 - values[0] * minutes, 0.05)[:, None]
 
 
+_ABOUT = re.compile(r"power about ([0-9.e-]+)")
+
+
+def about(share):
+    """The form about a voltage, a share of the set's largest, at which it changes nothing."""
+
+    def apply(path, values):
+        return path.speed * ((path.voltage / path.full_voltage / share) ** (0.5 * values[0]))[:, None]
+
+    return SpeedForm(
+        f"power about {share:.6g}",
+        f"T ∝ V^e_V, as commanded at {share:.3g} of the largest voltage",
+        (Parameter("e_V", "1", 0.0, 6.0, meaning="percent less thrust for one percent less voltage", negligible=0.1),),
+        SUPPLY,
+        apply,
+        (0.0,),
+        ("voltage",),
+        "voltage",
+    )
+
+
+def form_named(name):
+    """The form about a voltage, from the name that `about` gave it."""
+    found = _ABOUT.fullmatch(name)
+    return about(float(found[1])) if found else None
+
+
 P = Parameter("p", "1", 0.0, 3.0, meaning="exponent of the voltage; 1 for a speed proportional to it")
 
 EFFECT = Effect(
@@ -28,6 +61,7 @@ EFFECT = Effect(
     name="the sag of the battery",
     sentence="all rotors turn slower than commanded as the battery's voltage falls",
     forms=lambda vehicle: (),
+    form_named=form_named,
     speed_forms=(
         SpeedForm("power of voltage", "ω = ω_c (V/V_0)^p", (P,), SUPPLY, power, (0.0,), ("voltage",), "voltage"),
         SpeedForm(

@@ -312,8 +312,9 @@ class Effect:
     """Whether it is of the stand or of the room around it, and no property of the vehicle."""
     set_forms: Callable[[Vehicle], tuple[SetForm, ...]] = lambda vehicle: ()
     """Forms that spoil a recorded set."""
-    form_named: Callable[[str], Form | None] = lambda name: None
-    """A form that the data give rise to (a gust in its window), from its name in a vehicle file."""
+    form_named: Callable[[str], Form | SpeedForm | None] = lambda name: None
+    """A form that the data give rise to (a gust in its window, a curve about the hover command), from its name in a
+    vehicle file."""
     reading_forms: Callable[[InstrumentFacts], tuple[Form, ...]] | None = None
     """Forms of kinds `stand` and `bench`, whose contribution takes a `Loading` and gives a `reading`; None where the
     forms for a flight hold on a stand as well."""

@@ -1,4 +1,10 @@
-"""Steady rotor speed that is not proportional to its command."""
+"""Steady rotor speed that is not proportional to its command.
+
+Where no speed is recorded the curve is stated about the hover command, as what commands alone determine: by how many
+percent the thrust grows for one percent more command (`about`).
+"""
+
+import re
 
 import numpy as np
 
@@ -42,6 +48,40 @@ def _power_from(path, values):
     return path.full_speed * (_dead_zone(path, values[:1]) / path.full_speed) ** values[1]
 
 
+_ABOUT = re.compile(r"(power|line) about ([0-9.e-]+)")
+
+
+def about(reference, shape="power"):
+    """The form about a command `reference`, a share of the full one, at which it changes nothing.
+
+    `power`: thrust goes with a power of the command; `line`: the speed is a straight line of it.
+    """
+    law = {"power": "T ∝ u^e_u", "line": "√T ∝ 1 + e_u (u/u_h − 1)/2"}[shape]
+
+    def apply(path, values):
+        u = path.speed / (path.full_speed * reference)
+        if shape == "power":
+            over = np.maximum(u, 0.0) ** (0.5 * values[0])
+        else:
+            over = np.maximum(1.0 + 0.5 * values[0] * (u - 1.0), 0.0)
+        return path.full_speed * reference * over
+
+    return SpeedForm(
+        f"{shape} about {reference:.6g}",
+        f"{law}, u_h = {reference:.3g}",
+        (Parameter("e_u", "1", 0.3, 6.0, meaning="percent more thrust for one percent more command", negligible=0.04),),
+        CURVE,
+        apply,
+        (2.0,),
+    )
+
+
+def form_named(name):
+    """The form about a command, from the name that `about` gave it."""
+    found = _ABOUT.fullmatch(name)
+    return about(float(found[2]), found[1]) if found else None
+
+
 _LINEAR = 0.005
 """No speed controller is proportional to its command within less, and a calibration of its throttle is no better."""
 
@@ -51,6 +91,7 @@ EFFECT = Effect(
     name="the curve between throttle and rotor speed",
     sentence="the steady rotor speed is not proportional to its command",
     forms=lambda vehicle: (),
+    form_named=form_named,
     speed_forms=(
         SpeedForm(
             "affine",
@@ -125,7 +166,7 @@ EFFECT = Effect(
     source="PX4's THR_MDL_FAC; Quan, Introduction to Multicopter Design and Control, ch. 6; catalogue F2",
     sign=(
         "positive a_0 and a_1 turn faster than commanded; positive u_0 is a dead zone; b = 0 and n = 1 "
-        "are a speed proportional to the command"
+        "are a speed proportional to the command, as is e_u = 2"
     ),
     validity="static and the same for all rotors; at one voltage, or together with battery_sag",
     confusers=("battery_sag", "thrust_curve", "command_saturation"),

@@ -27,7 +27,7 @@ from rotorid.mismatch.decide.findings import (
     rms,
     with_probabilities,
 )
-from rotorid.mismatch.decide.selected import coefficients, throttle_or_thrust, wrench_findings
+from rotorid.mismatch.decide.selected import coefficients, wrench_findings
 from rotorid.mismatch.decide.sizes import fitted_part
 from rotorid.mismatch.decide.statements import UpperLimit
 from rotorid.mismatch.decide.status import CLAIMED
@@ -40,7 +40,7 @@ from rotorid.mismatch.deliver.usable import chain_ids, question_of, with_only
 from rotorid.mismatch.evidence.motion import Segment, full_speed, regime_variables, stretches
 from rotorid.mismatch.evidence.regression import Fit
 from rotorid.mismatch.evidence.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE
-from rotorid.mismatch.evidence.speedpath import CommandChain, SpeedResult, commanded_path
+from rotorid.mismatch.evidence.speedpath import CommandChain, SpeedResult
 from rotorid.mismatch.evidence.split import parts_of, split_runs
 from rotorid.mismatch.flight.absent import absent, absorbed_findings, chosen_already
 from rotorid.mismatch.flight.delivered import Values, believed_residuals, beyond_trust, in_words, residuals_of, settled
@@ -55,10 +55,8 @@ from rotorid.mismatch.flight.values import (
     changed_vehicle,
     contract_values,
     only_throttle,
-    speed_for_coefficients,
-    stated_of_commands,
-    throttle_scale,
     with_square_term,
+    with_thrust_per_command,
     with_values_in_question,
 )
 from rotorid.mismatch.flight.wrench import WrenchModel, linear_drag, nonlinear_intervals
@@ -110,29 +108,22 @@ def _analysed(recordings: RecordingSet, mistakes, remarks, watch: Watch) -> Anal
     found = fitted(prepared)
     model, values = found.model, found.values
 
-    to_state, scale = values, {}
-    if only_throttle(recordings):
-        to_state = speed_for_coefficients(values, prepared.vehicle)
-        if prepared.vehicle.rotor_speed_limits_rad_s is None:
-            to_state, scale = throttle_scale(values, model, full_speed(known.runs, prepared.vehicle))
     fit, moved = settled(model, values, model.selection.active)
 
     outside = [*mistakes, *findings_outside(found, prepared)]
-    findings = [*outside, *findings_inside(found, prepared, fit, {**moved, **to_state})]
+    findings = [*outside, *findings_inside(found, prepared, fit, {**moved, **values})]
     findings = payload_or_offset(findings, {**moved, **values})
     findings += absorbed_findings(model, values, findings)
-    findings, to_state = with_square_term(findings, to_state, model)
-    if found.commanded:
-        to_state = stated_of_commands(findings, to_state)
+    findings, to_state = with_square_term(findings, values, model)
     chosen = chosen_already(model)
     findings = with_probabilities(together(findings), chosen)
     stated_ids = {i for f in findings for i in (f.id, *f.alternatives)}
     limits = tuple(limit for limit in absent(model, chosen) if limit.id not in stated_ids)
-    choice = _Choice(recordings, split, found, to_state, scale, tuple(findings), limits, tuple(remarks))
+    full = full_speed(known.runs, prepared.vehicle) if only_throttle(recordings) else None
+    choice = _Choice(recordings, split, found, to_state, full, tuple(findings), limits, tuple(remarks))
 
     # The last decision is made: the runs held out are opened.
-    stated = {**contract_values(prepared.vehicle, to_state), **scale}
-    watch(Decided(found, tuple(outside), tuple(findings), stated))
+    watch(Decided(found, tuple(outside), tuple(findings), contract_values(prepared.vehicle, to_state)))
     seen = on_every_run(found, recordings, split, unseen)
     choice = replace(choice, findings=_with_windows(findings, seen))
     plain = values_alone(model)
@@ -151,19 +142,22 @@ class _Choice:
     found: Fitted
     stated: Values
     """Wrong values as they are stated (by the keys of `PARAMETER_NAMES`)."""
-    scale: dict[str, tuple[float, float, float, float]]
-    """A full speed that nobody stated, by its contract name."""
+    full_rad_s: float | None
+    """Where throttle alone was recorded, the speed that a full one was taken for."""
     findings: tuple[Finding, ...]
     absent: tuple[UpperLimit, ...]
     """Ids that were tested and not found, and how large they may be."""
     remarks: tuple[str, ...]
 
-    def vehicle(self, moved: Values, stated: Values) -> Vehicle:
-        """The believed vehicle with values moved within their trust and wrong ones as stated."""
+    def vehicle(self, moved: Values, stated: Values, believed: bool = False) -> Vehicle:
+        """The believed vehicle with values moved within their trust and wrong ones as stated.
+
+        Where commands alone are recorded its rotors make the thrust that was felt, unless it is the `believed` one.
+        """
         changed = changed_vehicle(self.found.prepared.vehicle, {k: v[0] for k, v in {**moved, **stated}.items()})
-        for _, full, _, _ in self.scale.values():
-            changed = changed.model_copy(update={"rotor_speed_limits_rad_s": (0.0, full)})
-        return changed
+        if not self.found.commanded:
+            return changed
+        return with_thrust_per_command(changed, 1.0 if believed else self.found.chain.scale, self.full_rad_s)
 
 
 def _with_windows(findings: Sequence[Finding], seen: WrenchModel) -> tuple[Finding, ...]:
@@ -212,7 +206,7 @@ def _account(
         improved=choice.vehicle(moved, stated),
         named=choice.vehicle(moved, stated),
         findings=tuple(findings),
-        values={**contract_values(prepared.vehicle, stated), **choice.scale},
+        values=contract_values(prepared.vehicle, stated),
         not_testable=not_testable(prepared, found.chain, findings),
         absent=choice.absent,
         traces=traces,
@@ -270,12 +264,11 @@ def _offered(
     def stated_of(candidate: Candidate) -> Values:
         given = candidate.values
         if candidate.model == "named" or not choice.stated:
-            both = {"thrust", "torque"} <= set(given)  # which a full speed stands for
-            return {k: v for k, v in choice.stated.items() if k in given or (k == "speed" and both)}
-        return speed_for_coefficients(given, vehicle) if only_throttle(choice.recordings) else given
+            return {k: v for k, v in choice.stated.items() if k in given}
+        return given
 
     def improved(candidate: Candidate) -> Vehicle:
-        return choice.vehicle(candidate.moved, stated_of(candidate))
+        return choice.vehicle(candidate.moved, stated_of(candidate), candidate.model == "believed")
 
     def vehicle_of(candidate: Candidate, findings: Sequence[Finding]) -> Vehicle:
         inside = {model.search.terms[k].effect for k in candidate.active}
@@ -343,7 +336,7 @@ def findings_outside(found: Fitted, prepared: Prepared) -> list[Finding]:
         findings.append(gust_finding(model.gusts))
     if found.chain is not None:
         findings += _speed_findings(found.chain.result, prepared, found.measured, found.chain.full_speed)
-    return [throttle_or_thrust(f) for f in findings] if found.commanded else findings
+    return findings
 
 
 def findings_inside(found: Fitted, prepared: Prepared, delivered: Fit, changed: Values | None = None) -> list[Finding]:
@@ -362,7 +355,7 @@ def findings_inside(found: Fitted, prepared: Prepared, delivered: Fit, changed: 
         delivered,
         lambda term: on_vehicle(term, model.segments, prepared.vehicle, changed or {}, model.noise),
     )
-    return [throttle_or_thrust(f) for f in findings] if found.commanded else findings
+    return findings
 
 
 def _payload_for_a_time(finding: Finding, windows: tuple[tuple[str, float, float], ...]) -> Finding:
@@ -378,6 +371,8 @@ def not_testable(prepared: Prepared, chain: CommandChain | None, findings: list[
         reasons.update({k: "no rotor commands recorded" for k in before_the_rotors()})
     elif chain.full_voltage is None:
         reasons = {**dict.fromkeys(ids_of_stage(SUPPLY), "no battery voltage"), **reasons}
+    if chain is not None:
+        reasons = {**chain.result.silent, **reasons}
     known = {f.id for f in findings if f.status in CLAIMED}
     return {k: v for k, v in reasons.items() if k not in known}
 
@@ -460,6 +455,7 @@ def _speed_findings(result: SpeedResult, prepared: Prepared, measured: bool, ful
         found = Finding(
             id=key,
             status="established",
+            speed_form=form,
             values=tuple(float(v) for v in values),
             equation=form.equation,
             sentence=effects[key].sentence,
@@ -507,10 +503,7 @@ def _make_traces(
                     )
                 )
         if chain is not None and found.measured:
-            result = chain.result
-            path = commanded_path(
-                segment, result.fit.chain, result.fit.values, result.fit.shift_s, *chain.full, result.fit.holds
-            )
+            path = chain.speeds(segment)
             believed = prepared.thinner(segment.motion.rotor_speed - segment.command)
             left = prepared.thinner(segment.motion.rotor_speed - path)
             for i in range(believed.shape[1]):
@@ -576,9 +569,7 @@ def _speed_floor(found: Fitted) -> np.ndarray:
     """
     thinner, left, inputs = found.prepared.thinner, [], []
     for segment in found.prepared.segments:
-        fit = found.chain.result.fit
-        path = commanded_path(segment, fit.chain, fit.values, fit.shift_s, *found.chain.full, fit.holds)
-        left.append(thinner(segment.motion.rotor_speed - path))
+        left.append(thinner(segment.motion.rotor_speed - found.chain.speeds(segment)))
         command = segment.command / max(float(np.abs(segment.command).max()), 1e-12)
         slope = np.gradient(command, segment.dt_s, axis=0)
         volts = np.zeros(len(command)) if segment.motion.voltage is None else segment.motion.voltage

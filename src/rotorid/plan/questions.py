@@ -34,7 +34,7 @@ from rotorid.mismatch.evidence.comparison import ENVIRONMENT_S
 from rotorid.mismatch.evidence.motion import HIGHEST_CUTOFF_HZ, Segment
 from rotorid.mismatch.evidence.regression import Regression, autoregression
 from rotorid.mismatch.evidence.rows import Term, residual
-from rotorid.mismatch.evidence.speedpath import commanded_path, starts_of
+from rotorid.mismatch.evidence.speedpath import starts_of
 from rotorid.mismatch.evidence.split import parts_of, split_runs
 from rotorid.mismatch.flight.absent import chosen_already
 from rotorid.mismatch.flight.delivered import ways
@@ -69,11 +69,8 @@ class _ChainModel:
 
 def _leftover(found: Fitted, segments: Sequence[Segment]) -> Callable[[tuple, np.ndarray], np.ndarray]:
     """A function of chain and values: what these leave of segments, whitened (m,), the shared linear terms free."""
-    prepared, search, (result, full, volt) = found.prepared, found.model.search, found.chain
-
-    def path(segment: Segment, chain, values) -> np.ndarray:
-        """Rotor speeds (n, k), rad/s, that a chain makes of the segment's commands."""
-        return commanded_path(segment, chain, values, result.fit.shift_s, full, volt, result.fit.holds)
+    prepared, search, result = found.prepared, found.model.search, found.chain.result
+    path = found.chain.speeds
 
     if found.measured:
         raws = [s.motion.rotor_speed - path(s, result.fit.chain, result.fit.values) for s in prepared.segments]
@@ -88,7 +85,7 @@ def _leftover(found: Fitted, segments: Sequence[Segment]) -> Callable[[tuple, np
 
     keys, filters = [*search.always, *found.model.selection.active], search.regression.filters
     effects = chosen(found.model)
-    turned = path_segments(list(segments), result, full, volt, prepared.thinner.cutoff_hz)
+    turned = path_segments(list(segments), found.chain, prepared.thinner.cutoff_hz)
     rows = assemble_rows(prepared, [search.terms[k] for k in keys], turned, effects)
     channels = [c for c in filters if c < 6 and np.isfinite(rows[0].y[:, c]).all()]
     edge = max(*(len(filters[c]) for c in channels), int(_EDGE_S * prepared.thinner.rate_hz))

@@ -243,7 +243,7 @@ def _of_flight(
             asked = commands(replace(world, chain=tuple(chain)), flight.motion)
             apart.append(chain_squares(known.fitted, segments_of(replace(flight, command_rad_s=asked)), true, rival))
     if known.fitted.commanded:
-        segments = path_segments(segments, *known.fitted.chain, prepared.thinner.cutoff_hz)
+        segments = path_segments(segments, known.fitted.chain, prepared.thinner.cutoff_hz)
     effects = model.effects if model.effects is not None else chosen(model)
     acting = [*nuisances, *acting]
     rows = assemble_rows(prepared, acting, segments, effects if change is None else list(world.effects))

@@ -20,7 +20,7 @@ from rotorid.mismatch.evidence.gram import Evidence, LinearParameter, evidence_f
 from rotorid.mismatch.evidence.motion import Segment
 from rotorid.mismatch.evidence.regression import autoregression, build
 from rotorid.mismatch.evidence.rows import Rows, Term
-from rotorid.mismatch.evidence.speedpath import Chain, candidate_forms, commanded_path
+from rotorid.mismatch.evidence.speedpath import Chain, candidate_forms
 from rotorid.mismatch.flight.fitted import Fitted
 from rotorid.mismatch.flight.prepare import assemble_rows
 from rotorid.mismatch.flight.report_runs import as_flown
@@ -129,7 +129,7 @@ def chain_terms(found: Fitted, segments: Sequence[Segment]) -> ChainTerms | None
     """The chain of a set's model, and one form of every other id; None where no commands are recorded."""
     if found.chain is None:
         return None
-    result, _, full_voltage = found.chain
+    result, full_voltage = found.chain.result, found.chain.full_voltage
     chain, values = list(result.fit.chain), [float(v) for v in result.fit.values]
     taken = {effect for effect, _ in chain}
     for effect, form in candidate_forms(list(segments), full_voltage is not None):
@@ -174,14 +174,9 @@ def speed_rows(segments: Sequence[Segment], found: Fitted, chain: ChainTerms, fi
 
     `first` is the first set's chain: what the rows leave is that of it.
     """
-    result, full_speed, full_voltage = found.chain
-    shift_s, holds = result.fit.shift_s, result.fit.holds
     out = []
     for segment in segments:
-        now, *moved = (
-            commanded_path(segment, own.chain, own.values, shift_s, full_speed, full_voltage, holds)
-            for own in (chain, *chain.stepped())
-        )
+        now, *moved = (found.chain.speeds(segment, own.chain, own.values) for own in (chain, *chain.stepped()))
         x = np.stack([(other - now) / step for other, step in zip(moved, chain.steps, strict=True)], axis=2)
         y = segment.motion.rotor_speed - now + x @ (chain.values - first.values)
         out.append(Rows(segment.run, segment.motion.time_s, y, x))

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.effects.contract import Form
+from rotorid.effects.contract import Form, SpeedForm
 from rotorid.effects.loading import InstrumentFacts, Loading
 from rotorid.mismatch.decide.posterior import Found
 from rotorid.mismatch.decide.statements import LIKELY, SURE, Statement, share_of, statements_of, weights_of
@@ -48,8 +48,10 @@ class Finding:
     status: Status
     form: Form | None = None
     """The form that fits best (None for mistakes and effects that are no wrench, such as `sensor_dropout`)."""
+    speed_form: SpeedForm | None = None
+    """The form of one that lies between command and rotor speed."""
     values: tuple[float, ...] = ()
-    """Parameter values of `form`, in its order."""
+    """Parameter values of `form` or `speed_form`, in its order."""
     equation: str = ""
     sentence: str = ""
     parameters: tuple[Estimate, ...] = ()

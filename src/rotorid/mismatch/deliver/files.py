@@ -206,9 +206,9 @@ def empty(content: Conditions | Instruments) -> bool:
 
 
 def form_of(finding: Finding) -> Form | SpeedForm | None:
-    """The form of a finding; one between command and rotor speed is known by its equation."""
-    if finding.form is not None or not finding.values or finding.id not in catalogue():
-        return finding.form
+    """The form of a finding; on a stand one between command and rotor speed is known by its equation."""
+    if finding.form or finding.speed_form or not finding.values or finding.id not in catalogue():
+        return finding.form or finding.speed_form
     speed_forms = catalogue()[finding.id].speed_forms
     return next((f for f in speed_forms if f.equation == finding.equation), None)
 

@@ -45,17 +45,14 @@ def errors_of(segments: Sequence[Segment], model: Model) -> list[WindowErrors]:
 
 def driven_by(segments: Sequence[Segment], model: Model) -> tuple[list[Inputs], list[States]]:
     """Inputs and recorded states of every segment, rotor speeds by the model's chain where only commanded."""
-    commands = [float(np.nanmax(s.command)) for s in segments if s.command is not None]
-    limits = model.vehicle.rotor_speed_limits_rad_s
-    full_speed = limits[1] if limits else max(commands, default=1.0)
     voltages = [float(np.nanmax(s.motion.voltage)) for s in segments if s.motion.voltage is not None]
+    commands = [float(np.nanmax(s.command)) for s in segments if s.command is not None]
     inputs, states = [], []
     for segment in segments:
         motion = segment.motion
         speed, acceleration = motion.rotor_speed, motion.rotor_acceleration
-        if model.chain and not segment.measured_speed and segment.command is not None:
-            values = np.asarray(model.chain_values)
-            speed = commanded_path(segment, model.chain, values, 0.0, full_speed, max(voltages, default=None))
+        if not segment.measured_speed and segment.command is not None:
+            speed = _commanded(segment, model, max(commands), max(voltages, default=None))
             acceleration = np.gradient(speed, motion.time_s, axis=0)
         wind = model.conditions.wind(segment.run, motion.time_s) if model.conditions else None
         turning = replace(motion, rotor_speed=speed, wind=wind)
@@ -67,6 +64,17 @@ def driven_by(segments: Sequence[Segment], model: Model) -> tuple[list[Inputs], 
         inputs.append(Inputs(speed, acceleration, motion.height, motion.voltage, wind, force, moment))
         states.append(_states(segment, model))
     return inputs, states
+
+
+def _commanded(segment: Segment, model: Model, largest_rad_s: float, full_voltage: float | None) -> np.ndarray:
+    """Rotor speeds (n, k), rad/s, that the model makes of a segment's commands; a throttle is a share of its own full
+    speed."""
+    limits = model.vehicle.rotor_speed_limits_rad_s
+    full_speed = limits[1] if limits else largest_rad_s
+    if segment.full_speed is not None and limits:
+        segment = replace(segment, command=segment.command * (full_speed / segment.full_speed))
+    values = np.asarray(model.chain_values)
+    return commanded_path(segment, model.chain, values, 0.0, full_speed, full_voltage)
 
 
 def _states(segment: Segment, model: Model) -> States:

@@ -97,33 +97,35 @@ def cannot_hover(vehicle: Vehicle, recorded_share: float) -> str:
     )
 
 
-def _recorded_hover(runs: Sequence[Run], vehicle: Vehicle) -> tuple[np.ndarray, bool, float] | None:
+def _recorded_hover(runs: Sequence[Run], vehicle: Vehicle) -> tuple[np.ndarray, str, float] | None:
     """What was recorded in the air, medians over time; None where the runs do not have all of it.
 
-    Rotor speeds, (k,), rad/s, whether they are measured or commanded, and the upward specific force, m/s².
+    Rotor speeds, (k,), rad/s (of a throttle its share of the full speed), which of the three they are, and the upward
+    specific force, m/s².
     """
-    limits, force = vehicle.rotor_speed_limits_rad_s, c.SPECIFIC_FORCE[2]
+    force = c.SPECIFIC_FORCE[2]
     for group in ("rotor_speed", "rotor_command", "throttle"):
         names = list(c.rotor_columns(group, vehicle.rotor_count))
         own = [r.table[[*names, force]].to_numpy() for r in runs if r.has(*names, force)]
-        if own and (limits is not None or group != "throttle"):
+        if own:
             table = np.concatenate(own)
-            table[:, :-1] *= limits[1] if group == "throttle" else 1.0
             square = (table[:, :-1] ** 2).mean(axis=1)
             flying = table[square > _LIGHT * np.nanquantile(square, 0.99)]
             if len(flying):
                 middle = np.nanmedian(flying, axis=0)
-                return middle[:-1], group == "rotor_speed", -float(middle[-1])
+                return middle[:-1], group, -float(middle[-1])
     return None
 
 
-def _off_as_recorded(vehicle: Vehicle, recorded: tuple[np.ndarray, bool, float] | None) -> str:
+def _off_as_recorded(vehicle: Vehicle, recorded: tuple[np.ndarray, str, float] | None) -> str:
     """Why its force at the rotor speeds of `_recorded_hover` is not the one that was felt; empty where it is."""
     if recorded is None or recorded[2] <= 0:
         return ""
-    speed_rad_s, measured, specific_force_m_s2 = recorded
+    speed_rad_s, group, specific_force_m_s2 = recorded
     flown = flyable(vehicle)[0]
-    path = None if measured else command_path(flown)
+    if group == "throttle":
+        speed_rad_s = speed_rad_s * flown.rotor_speed_limits_rad_s[1]
+    path = None if group == "rotor_speed" else command_path(flown)
     up = wrench_of_command(flown, path, speed_rad_s, _HIGH_ABOVE_GROUND_M)[0]
     share = float(up) / (vehicle.mass_kg * specific_force_m_s2)
     if _CARRIES[0] <= share <= _CARRIES[1]:
@@ -210,7 +212,7 @@ def with_only(found: Fitted, ids: Collection[str], values: Values) -> Fitted:
         segments, noisy = model.segments, model.noisy_segments
         if gone and found.commanded:
             cutoff = model.prepared.thinner.cutoff_hz
-            segments, noisy = (path_segments(s, *chain, cutoff) for s in (segments, noisy))
+            segments, noisy = (path_segments(s, chain, cutoff) for s in (segments, noisy))
         steady = None if model.wind is None else np.array([*model.wind, 0.0])
         if calm:
             segments, noisy = ([_in_air(s, steady) for s in own] for own in (segments, noisy))

@@ -72,7 +72,9 @@ class Segment:
     kinematic_specific_force: np.ndarray | None = None
     kinematic_angular_velocity: np.ndarray | None = None
     command: np.ndarray | None = None
-    """Commanded rotor speeds, (n, k), rad/s; throttle times the upper limit where only throttle is recorded."""
+    """Commanded rotor speeds, (n, k), rad/s; throttle times `full_speed` where only throttle is recorded."""
+    full_speed: float | None = None
+    """rad/s; None where speeds are commanded."""
     measured_speed: bool = True
     independent_velocity: bool = True
     """Whether the velocity knows nothing of the accelerometer, so that comparing the two shows errors of the latter."""
@@ -262,10 +264,12 @@ def build_segments(
     count = vehicle.rotor_count
     speed = take(c.rotor_columns("rotor_speed", count), "rotors", smooth=False)
     command = take(c.rotor_columns("rotor_command", count), "commands", smooth=False)
+    of_full = None
     if command is None:
         throttle = take(c.rotor_columns("throttle", count), "commands", smooth=False)
         if throttle is not None:
-            command = throttle * (full_speed_rad_s or full_speed((run,), vehicle))
+            of_full = full_speed_rad_s or full_speed((run,), vehicle)
+            command = throttle * of_full
     measured = speed is not None
     used_speed = speed if measured else command
     gyro = take(c.ANGULAR_VELOCITY, "gyroscope")
@@ -365,6 +369,7 @@ def build_segments(
                 kinematic_specific_force=kinematic_force,
                 kinematic_angular_velocity=kinematic_rate,
                 command=core(command),
+                full_speed=of_full,
                 measured_speed=measured,
                 extra=extra,
             )

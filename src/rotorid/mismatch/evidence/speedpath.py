@@ -1,13 +1,12 @@
 """What lies between command and rotor speed: lag, delay, throttle curve, sag, saturation.
 
-Where speeds are measured in addition to the commands they are the response; where only commands (or throttle) are
-recorded the response is the wrench, and the believed values are free throughout. In both cases a chain of speed
-forms is fitted by nonlinear least squares on whitened residuals, grown one id at a time.
+Where speeds are measured they are the response: a chain of speed forms is fitted by nonlinear least squares on whitened
+residuals, grown one id at a time. Where only commands (or throttle) are recorded `evidence.lift` reads the path.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import NamedTuple
@@ -32,10 +31,6 @@ COST_PER_PARAMETER = 10.0
 SMALLEST_SIZE = 0.15
 _LEAST_RESPONSE = 0.25
 """Least slope of a throttle curve in units of its mean: thrust proportional to throttle has a half."""
-LIFT_SD = 0.02
-"""One-sigma of mean thrust over mean weight with the values as fitted: a vehicle in flight is supported by its rotors.
-Whitened residuals of a hover say little of their mean, and a curve of too little thrust would explain moments that do
-not respond. Two percent are an accelerometer's scale."""
 _PLAINLY_LESS = 0.98
 """Share of the squares that commands which hold leave, below which commands are smooth: a lag imitates either."""
 _HARDLY_FOLLOWS = "rotors would hardly follow their commands with it"
@@ -103,6 +98,10 @@ class SpeedResult:
     """Where a lag shares its lateness with a delay or a curve: the lag as it would be without these."""
     without: dict[str, SpeedFit] = field(default_factory=dict)
     """The chain fitted with one id less."""
+    silent: Mapping[str, str] = field(default_factory=dict)
+    """Ids of which the recording says nothing, with the reason."""
+    turned_by_commands: bool = True
+    """Whether roll or pitch follow the commands in some band; else commands follow roll and pitch."""
 
 
 class CommandChain(NamedTuple):
@@ -113,11 +112,17 @@ class CommandChain(NamedTuple):
     """rad/s, at full throttle."""
     full_voltage: float | None
     """V, at which the full speed is reached; None where no voltage is recorded."""
+    scale: float = 1.0
+    """Rotor speed over the one that the chain makes: where no speed is recorded, what the believed C_F needs to carry
+    what was felt. Commands alone determine thrust; C_F and the full speed are one number with it."""
 
-    @property
-    def full(self) -> tuple[float, float | None]:
-        """Full speed and voltage, as `commanded_path` takes them."""
-        return self.full_speed, self.full_voltage
+    def speeds(self, segment: Segment, chain: Chain | None = None, values: np.ndarray | None = None) -> np.ndarray:
+        """Rotor speeds (n, k), rad/s, of the segment's commands; by another `chain` with `values` where given."""
+        fit = self.result.fit
+        if chain is None:
+            chain, values = fit.chain, fit.values
+        full = self.full_speed, self.full_voltage
+        return self.scale * commanded_path(segment, chain, values, fit.shift_s, *full, fit.holds)
 
 
 def commanded_path(
@@ -167,11 +172,14 @@ def moved(path: SpeedPath, values: np.ndarray) -> np.ndarray:
     return sum(w * held[first + i : first + i + count] for i, w in enumerate(weights) if w)
 
 
-class _SpeedProblem:
-    """Whitened residual of a chain over the training segments; subclasses say what the response is."""
+class MeasuredSpeed:
+    """Whitened residual of a chain over the training segments: the measured rotor speeds are the response."""
 
     def __init__(self, segments: list[Segment], full_speed: float, full_voltage: float | None):
         self.segments = segments
+        self.rate_hz = segments[0].rate_hz
+        spread = np.concatenate([(s.motion.rotor_speed - s.command).ravel() for s in segments]).std()
+        self.scale = max(float(spread), 1e-9)
         self.full_speed = full_speed
         self.full_voltage = full_voltage
         self.filters: list[np.ndarray] | None = None
@@ -184,19 +192,13 @@ class _SpeedProblem:
         return commanded_path(segment, chain, values, shift_s, *full, self.holds, last)
 
     def raw(self, chain: Chain, values, shift_s: float) -> list[np.ndarray]:
-        """Residual of every segment, (n, channels), unwhitened."""
-        raise NotImplementedError
-
-    rate_hz: float = 0.0
+        """Residual of every segment, (n, rotors), unwhitened."""
+        return [s.motion.rotor_speed - self.path(s, chain, values, shift_s) for s in self.segments]
 
     def whitened(self, chain: Chain, values, shift_s: float) -> list[np.ndarray]:
-        """Whitened residual of every segment, (n, channels), and after them what priors add to the squares."""
-        return self.white(self.raw(chain, values, shift_s))
-
-    def white(self, parts: list[np.ndarray]) -> list[np.ndarray]:
-        """Residuals of every segment, (n, channels), whitened by the noise learnt."""
+        """Residual of every segment, (n, rotors), whitened by the noise learnt."""
         out = []
-        for part in parts:
+        for part in self.raw(chain, values, shift_s):
             if self.filters is None:
                 out.append(part / self.scale)
                 continue
@@ -262,127 +264,6 @@ class _SpeedProblem:
         """Rows of each second of a stretch."""
         return np.array_split(np.arange(rows), max(1, rows // max(2, int(round(self.rate_hz)))))
 
-    def largest_second(self, base: SpeedFit, fit: SpeedFit) -> float:
-        """What must not decide of what a fit explains more than another, whitened squares: nothing here."""
-        return 0.0
-
-
-class MeasuredSpeed(_SpeedProblem):
-    """Response: the measured rotor speeds."""
-
-    def __init__(self, segments, full_speed, full_voltage):
-        super().__init__(segments, full_speed, full_voltage)
-        self.rate_hz = segments[0].rate_hz
-        spread = np.concatenate([(s.motion.rotor_speed - s.command).ravel() for s in segments]).std()
-        self.scale = max(float(spread), 1e-9)
-
-    def raw(self, chain, values, shift_s):
-        return [s.motion.rotor_speed - self.path(s, chain, values, shift_s) for s in self.segments]
-
-
-class WrenchOnly(_SpeedProblem):
-    """Response: force and moment; `residual_of(segment, speed)` gives thinned rows (n, c) and columns (n, c, q)."""
-
-    def __init__(
-        self,
-        segments,
-        full_speed,
-        full_voltage,
-        rate_hz,
-        residual_of: Callable,
-        precision: np.ndarray,
-        force_z: int | None = None,
-        closed_loop_bias_s: float = 0.0,
-    ):
-        """`force_z` is the channel of the force along the rotors' axis, if there is one; `closed_loop_bias_s` is by how
-        much the commands may look late through the gyroscope's noise alone."""
-        super().__init__(segments, full_speed, full_voltage)
-        self.shift_prior_s = float(np.hypot(self.shift_prior_s, closed_loop_bias_s))
-        self.force_z = force_z
-        self.rate_hz, self.residual_of, self.precision = rate_hz, residual_of, precision
-        self._known: tuple[np.ndarray, np.ndarray] | None = None
-        self.columns = [residual_of(s, s.command, True)[1] for s in segments]
-        rows = np.concatenate([residual_of(s, s.command, False)[0] for s in segments])
-        self.scale = np.maximum(rows.std(axis=0), 1e-12)
-        self.lift_sd_n = None if force_z is None else LIFT_SD * self.weight_n()
-
-    def weight_n(self) -> float:
-        """Mean force along the rotors' axis that is left where no rotor turns, N."""
-        still = np.concatenate([self.residual_of(s, 0.0 * s.command, False)[0] for s in self.segments])
-        return abs(float(still[:, self.force_z].mean()))
-
-    def refresh(self, fit: SpeedFit) -> None:
-        """Recompute the believed values' columns at the path found."""
-        self._known = None
-        self.columns = [
-            self.residual_of(s, self.path(s, fit.chain, fit.values, fit.shift_s), True)[1] for s in self.segments
-        ]
-
-    def raw(self, chain, values, shift_s):
-        return [self.residual_of(s, self.path(s, chain, values, shift_s), False)[0] for s in self.segments]
-
-    def largest_second(self, base: SpeedFit, fit: SpeedFit) -> float:
-        """What a fit explains more than another in the second that speaks most for it, whitened squares.
-
-        A limit shows in speeds that are measured; in the forces of one moment anything may be taken for one.
-        """
-        before, after = (self.whitened(f.chain, f.values, f.shift_s) for f in (base, fit))
-        gains = [
-            float((x[part] ** 2 - y[part] ** 2).sum())
-            for x, y in zip(before, after, strict=True)
-            for part in self.seconds(len(x))
-        ]
-        return max(0.0, *gains)
-
-    def whitened(self, chain, values, shift_s):
-        parts = self.raw(chain, values, shift_s)
-        rows = self.white(parts)
-        if self.lift_sd_n:
-            rows = [*rows, np.concatenate(parts)[:, self.force_z].mean(keepdims=True)[:, None] / self.lift_sd_n]
-        columns, solved = self._believed()
-        flat = np.concatenate([r.ravel() for r in rows])
-        beta = solved @ flat
-        left = np.split(flat - columns @ beta, np.cumsum([r.size for r in rows])[:-1])
-        # What a chain's gain and the believed values could share goes to the chain: the values pay for moving.
-        moved = (np.sqrt(self.precision) * beta)[:, None]
-        return [*(part.reshape(r.shape) for part, r in zip(left, rows, strict=True)), moved]
-
-    def _believed(self) -> tuple[np.ndarray, np.ndarray]:
-        """Whitened columns of the believed values (rows, q), and what makes their values of a residual (q, rows)."""
-        if self._known is None:
-            parts = [self._white_column(part) for part in self.columns]
-            if self.lift_sd_n:
-                own = np.concatenate(self.columns)[:, self.force_z].mean(axis=0) / self.lift_sd_n
-                parts = [*parts, own[None, None, :]]
-            size = parts[0].shape[-1]
-            columns = np.concatenate([part.reshape(-1, size) for part in parts])
-            gram = columns.T @ columns + np.diag(self.precision)
-            solved = np.linalg.solve(gram + 1e-9 * np.trace(gram) / size * np.eye(size), columns.T)
-            self._known = (columns, solved)
-        return self._known
-
-    def _white_column(self, part: np.ndarray) -> np.ndarray:
-        """Columns of one segment, (n, c, q), whitened by the noise learnt."""
-        if self.filters is None:
-            return part / self.scale[:, None]
-        longest = max(len(f) for f in self.filters) - 1
-        return np.stack([causal(f, part[:, j]) for j, f in enumerate(self.filters)], axis=1)[longest:]
-
-    def learn_noise(self, chain, values, shift_s):
-        parts = self.raw(chain, values, shift_s)
-        # The believed values must not count as noise.
-        weight = 1.0 / self.scale
-        size = self.columns[0].shape[-1]
-        gram = np.diag(self.precision) + 1e-12 * np.eye(size)
-        cross = np.zeros(size)
-        for c, r in zip(self.columns, parts, strict=True):
-            gram = gram + np.einsum("ncp,ncq,c->pq", c, c, weight**2)
-            cross = cross + np.einsum("ncp,nc,c->p", c, r, weight**2)
-        beta = np.linalg.solve(gram, cross)
-        left = [r - c @ beta for r, c in zip(parts, self.columns, strict=True)]
-        self._known = None
-        self.filters = [autoregression([p[:, j] for p in left]) for j in range(left[0].shape[1])]
-
 
 def candidate_forms(segments: list[Segment], voltage: bool = True) -> list[tuple[str, SpeedForm]]:
     """Every speed form that this set can test; `voltage` says whether a voltage is known in every run."""
@@ -406,7 +287,7 @@ def starts_of(form: SpeedForm) -> list[np.ndarray]:
 class SpeedSearch:
     """Grow the chain one id at a time, replace forms, prune, and look for alternatives."""
 
-    def __init__(self, problem: _SpeedProblem, forms: list[tuple[str, SpeedForm]]):
+    def __init__(self, problem: MeasuredSpeed, forms: list[tuple[str, SpeedForm]]):
         self.problem, self.forms = problem, forms
 
     def best_fit(self, chain: Chain, base: SpeedFit, added: SpeedForm) -> SpeedFit:
@@ -445,8 +326,6 @@ class SpeedSearch:
         smooth = self.problem.fit(fit.chain, fit.values, fit.shift_s)
         self.problem.holds = bool(smooth.cost > _PLAINLY_LESS * fit.cost)
         fit = fit if self.problem.holds else smooth
-        if isinstance(self.problem, WrenchOnly):
-            self.problem.refresh(fit)
         self.problem.learn_noise(fit.chain, fit.values, fit.shift_s)
 
     def size(self, fit: SpeedFit, key: str) -> float:
@@ -471,16 +350,15 @@ class SpeedSearch:
         return best
 
     def judge(self, base: SpeedFit, fit: SpeedFit, key: str) -> tuple[float, float, float]:
-        """p-value, score and inflation of an id that `fit` has and `base` has not: no single second decides."""
+        """p-value, score and inflation of an id that `fit` has and `base` has not."""
         own = fit.slice_of(key)
         count = own.stop - own.start
         inflation = fit.inflation
         gain = (base.cost - fit.cost) / inflation
-        lasting = gain - self.problem.largest_second(base, fit) / inflation
         # What the fit gains and what its parameters are sure of must agree: the shift in time bends the first.
         away = fit.values[own] - self.neutral(fit.of(key)[0])
-        sure = lasting if fit.covariance is None else quadratic_form(away, fit.covariance[own, own])
-        return float(chi2.sf(max(min(lasting, sure), 0.0), count)), gain - COST_PER_PARAMETER * count, inflation
+        sure = gain if fit.covariance is None else quadratic_form(away, fit.covariance[own, own])
+        return float(chi2.sf(max(min(gain, sure), 0.0), count)), gain - COST_PER_PARAMETER * count, inflation
 
     def neutral(self, form: SpeedForm) -> np.ndarray:
         """Parameter values that change nothing; of a limit, the outermost command."""
@@ -517,12 +395,12 @@ class SpeedSearch:
                     dropped[key] = f"its size is {size:.2g} of the noise"
                     continue
                 grown = True
-                refitted = self._with_new_columns(self._better_forms(fit, key, current, others))
+                refitted = self._better_forms(fit, key, current, others)
+                refitted = refitted if refitted.covariance is not None else self.problem.with_covariance(refitted)
                 if self.responds(refitted):
                     current = refitted
                 else:
                     dropped[key] = _HARDLY_FOLLOWS
-                    self._with_new_columns(current)
                 break
             if not grown:
                 break
@@ -534,19 +412,10 @@ class SpeedSearch:
             p_values[key] = self.judge(base, current, key)[0]
             sizes[key] = self.size(current, key)
             alternatives[key] = self._alternatives(current, base, key)
-        noise = None
-        if isinstance(self.problem, MeasuredSpeed):
-            parts = self.problem.raw(current.chain, current.values, current.shift_s)
-            noise = float(np.sqrt(np.mean([np.mean(p**2) for p in parts])))
+        parts = self.problem.raw(current.chain, current.values, current.shift_s)
+        noise = float(np.sqrt(np.mean([np.mean(p**2) for p in parts])))
         lag = self._lag_alone(current)
         return SpeedResult(current, p_values, alternatives, sizes, dropped, noise, lag, fewer)
-
-    def _with_new_columns(self, fit: SpeedFit) -> SpeedFit:
-        """The chain fitted anew with the believed values' columns at the speeds that it makes."""
-        if not isinstance(self.problem, WrenchOnly):
-            return fit
-        self.problem.refresh(fit)
-        return self.problem.with_covariance(self.problem.fit(fit.chain, fit.values, fit.shift_s))
 
     def _lag_alone(self, fit: SpeedFit) -> SpeedFit | None:
         """A lag of one constant and nothing else: what most publications fit."""

@@ -17,14 +17,13 @@ import numpy as np
 from rotorid.effects.catalogue import catalogue, ids_of, ids_of_stage
 from rotorid.effects.contract import CURVE, Form
 from rotorid.effects.describe import advice
-from rotorid.effects.throttle_curve import SLOPE
 from rotorid.mismatch.decide import rules
-from rotorid.mismatch.decide.findings import Finding, Reason
+from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.decide.select import COST_PER_EFFECT, COST_PER_PARAMETER
 from rotorid.mismatch.decide.selected import coefficients
 from rotorid.mismatch.evidence.rows import RUN_SCALE, Term
-from rotorid.mismatch.evidence.speedpath import CommandChain, SpeedResult
-from rotorid.mismatch.flight.delivered import Values, beyond_trust
+from rotorid.mismatch.evidence.speedpath import CommandChain
+from rotorid.mismatch.flight.delivered import Values
 from rotorid.mismatch.flight.gains import wrong_values_of
 from rotorid.mismatch.flight.gusts import with_gusts
 from rotorid.mismatch.flight.prepare import Prepared
@@ -62,8 +61,11 @@ from rotorid.vehicle.mixer import hover_speed_rad_s
 
 CURVES = (*ids_of_stage(CURVE), *ids_of("curves_thrust"))
 """Between throttle and speed, and between speed and thrust: one column where no speed is measured."""
-TAKEN_UP = "the curve between throttle and rotor speed takes it up"
+TAKEN_UP = "without recorded rotor speeds it is one with the curve between throttle and thrust"
 """Why an effect is not looked for that on commands alone is that curve."""
+FOLLOWED = "in this recording commands follow roll and pitch, and not roll and pitch the commands"
+"""Why what turns a vehicle is not asked for where its controller answers disturbances alone."""
+_GAINS_OF_MOMENTS = frozenset({"torque", "arm", "inertia_xx", "inertia_yy", "inertia_zz"})
 _RUN_P = 1e-6
 _RUN_SPREAD = 0.007
 """Relative spread of the thrust coefficient between runs below which one number serves all."""
@@ -108,7 +110,7 @@ def fitted(prepared: Prepared) -> Fitted:
     if chain is None or measured:
         model = refined_model(prepared, *turning(prepared))
     else:
-        chain, model = _with_chain(prepared, chain)
+        model = refined_model(known_by_commands(prepared, chain), *turning(prepared, chain))
     values, instead = wrong_values_of(model)
     return Fitted(model, values, chain, measured, instead)
 
@@ -118,62 +120,34 @@ def turning(prepared: Prepared, chain: CommandChain | None = None):
     both = prepared.segments, prepared.noisy_segments
     if chain is None:
         return both
-    return tuple(path_segments(segments, *chain, prepared.thinner.cutoff_hz) for segments in both)
+    return tuple(path_segments(segments, chain, prepared.thinner.cutoff_hz) for segments in both)
 
 
-def _with_chain(prepared: Prepared, chain: CommandChain) -> tuple[CommandChain, WrenchModel]:
-    """The chain and the model where rotor speeds are known from commands alone."""
+def known_by_commands(prepared: Prepared, chain: CommandChain) -> Prepared:
+    """The set with what commands alone can determine: no curve of the thrust, which is one of the throttle.
 
-    def modelled(chain: CommandChain) -> WrenchModel:
-        return refined_model(without_same_curves(prepared, chain), *turning(prepared, chain))
-
-    model = modelled(chain)
-    known, trusted = bool(model.selection.active), strains(model)
-    for _ in range(_CHAIN_ROUNDS if known or trusted else 0):
-        # The wrench effects found change what the commands must explain, and what values beyond their trust made room
-        # for is not delivered: once more with the effects known and such values as believed.
-        chain = speed_path(prepared, chosen(model), trusted=trusted)
-        model = modelled(chain)
-        if trusted or not (trusted := strains(model)):
-            break
-    if rules.MERE_SCALE(only_scales(chain.result)):
-        curves = ids_of_stage(CURVE)
-        chain = speed_path(prepared, chosen(model), tuple(curves), trusted=trusted)
-        reason = Reason("mere_scale", "another thrust coefficient explains as much")
-        dropped = {**chain.result.dropped, **dict.fromkeys(curves, reason)}
-        chain = chain._replace(result=replace(chain.result, dropped=dropped))
-        model = modelled(chain)
-    return chain, model
-
-
-def without_same_curves(prepared: Prepared, chain: CommandChain) -> Prepared:
-    """The set without the curves of the thrust that on commands alone are a curve of the throttle, where one is found.
-
-    The two would grow against each other without end.
+    Where commands follow the motion, and not the motion the commands, moments show trims alone: neither their gains
+    nor what turning adds to them.
     """
-    same = {i for key, _ in chain.result.fit.chain for i in ids_of("same_on_commands", key)}
-    if not same:
-        return prepared
+    same = {i for key in ids_of_stage(CURVE) for i in ids_of("same_on_commands", key)}
     taken = dict.fromkeys(sorted(same), TAKEN_UP)
     terms = [t for t in prepared.terms if t.effect not in same]
+    if not chain.result.turned_by_commands:
+        gone = {t.key: t.effect for t in terms if t.key in _GAINS_OF_MOMENTS or _of_turning(t, prepared)}
+        terms = [t for t in terms if t.key not in gone]
+        left = {t.effect for t in terms}
+        taken |= {i: FOLLOWED for i in sorted(set(gone.values()) - left - {""})}
     return replace(prepared, terms=terms, not_testable={**prepared.not_testable, **taken})
 
 
-def strains(model: WrenchModel) -> bool:
-    """Whether the recordings ask a value that is not called wrong to move beyond its trust."""
-    return beyond_trust(model, wrong_values_of(model)[0], model.selection.active)
-
-
-def only_scales(result: SpeedResult) -> bool:
-    """Whether a throttle curve between command and speed is nothing but another slope, as far as it is known."""
-    key, form = next(((k, f) for k, f in result.fit.chain if f.stage == CURVE), (None, None))
-    if form is None or SLOPE not in [p.symbol for p in form.parameters]:
+def _of_turning(term: Term, prepared: Prepared) -> bool:
+    """Whether a term is a moment that comes and goes as the vehicle turns, and no trim."""
+    if term.kind != "effect":
         return False
-    where = result.fit.slice_of(key)
-    sd = np.sqrt(np.diag(result.fit.covariance)[where])
-    least = np.maximum(1.96 * sd, [p.negligible for p in form.parameters])
-    away = np.abs(result.fit.values[where] - np.array(form.neutral)) > least
-    return not any(away[i] for i, p in enumerate(form.parameters) if p.symbol != SLOPE)
+    segment = max(prepared.segments, key=lambda s: s.motion.size)
+    values = np.where(np.asarray(term.values) == 0.0, 1.0, term.values)
+    moment = term.form.contribution(segment.motion, prepared.vehicle, values).moment
+    return moment is not None and bool((moment.mean(axis=0) ** 2).sum() < moment.var(axis=0).sum())
 
 
 def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:

@@ -256,12 +256,14 @@ def prior_of(key: str, vehicle: Vehicle) -> float:
 
 def make_terms(vehicle: Vehicle, segments: list[Segment], groups) -> tuple[list[Term], dict[str, str]]:
     """Every term that this set can test, and the ids that it cannot, with the reason."""
-    terms, reasons = [], {}
-    values = []
+    terms, reasons, values = [], {}, []
     if "force" in groups:
         values += ["thrust", "mass"]
     if "moment" in groups:
         values += ["thrust", "torque", "inertia_xx", "inertia_yy", "inertia_zz", "arm"]
+    if any(s.command is not None and not s.measured_speed for s in segments):
+        # Commands alone determine thrust per mass: C_F and mass are labels of one number, which the path holds.
+        values = [key for key in values if key not in ("thrust", "mass")]
     for key in PARAMETER_NAMES:
         if key in values:
             terms.append(Term(key, "value", prior_sd=(prior_of(key, vehicle),)))

@@ -22,7 +22,7 @@ from rotorid.mismatch.decide.status import CLAIMED
 from rotorid.mismatch.evidence.motion import Segment
 from rotorid.mismatch.evidence.regression import Fit
 from rotorid.mismatch.evidence.rows import CHANNELS, RUN_SCALE, Contributions, Rows, Term
-from rotorid.mismatch.evidence.speedpath import CommandChain, commanded_path
+from rotorid.mismatch.evidence.speedpath import CommandChain
 from rotorid.mismatch.flight.delivered import Values, residuals_of, settled
 from rotorid.mismatch.flight.fitted import Fitted
 from rotorid.mismatch.flight.gusts import with_gusts_of_new_runs
@@ -101,7 +101,7 @@ def as_flown(segments: list[Segment], found: Fitted) -> list[Segment]:
     """Stretches with the rotors turning as the chain makes of their commands, in the wind that was found."""
     model = found.model
     if found.commanded:
-        segments = path_segments(segments, *found.chain, model.prepared.thinner.cutoff_hz)
+        segments = path_segments(segments, found.chain, model.prepared.thinner.cutoff_hz)
     return segments if model.wind is None else in_wind(segments, model.wind)
 
 
@@ -200,7 +200,7 @@ def without_each(
             out[finding.id] = _speeds_without(found, seen, finding.id, traces)
         elif in_chain:
             cutoff_hz = seen.prepared.thinner.cutoff_hz
-            segments = path_segments(seen.prepared.segments, *chain_without(found, finding.id), cutoff_hz)
+            segments = path_segments(seen.prepared.segments, chain_without(found, finding.id), cutoff_hz)
             out[finding.id] = on_traces(traces, seen.rows, made_by(seen, segments, fit))
         elif finding.id in ids_of("air_moves", "all the time") and seen.wind is not None:
             still = [replace(s, motion=replace(s.motion, wind=without_wind(s, seen.wind))) for s in seen.segments]
@@ -253,11 +253,10 @@ def _speeds_without(
     found: Fitted, seen: WrenchModel, key: str, traces: tuple[ChannelTrace, ...]
 ) -> tuple[np.ndarray, ...]:
     """Measured less modelled rotor speeds on the traces, with one id less between command and speed."""
-    result, *rest = chain_without(found, key)
+    chain = chain_without(found, key)
     thinner, known = seen.prepared.thinner, {}
     for r, segment in zip(seen.rows, seen.prepared.segments, strict=True):
-        path = commanded_path(segment, result.fit.chain, result.fit.values, result.fit.shift_s, *rest, result.fit.holds)
-        left = thinner(segment.motion.rotor_speed - path)
+        left = thinner(segment.motion.rotor_speed - chain.speeds(segment))
         known |= {(r.run, first_s(r.time_s), f"rotor_speed_{i + 1}"): own for i, own in enumerate(left.T)}
     return tuple(known.get((t.run, first_s(t.time_s), t.channel), t.named) for t in traces)
 

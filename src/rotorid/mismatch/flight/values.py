@@ -1,5 +1,5 @@
-"""Believed values as the contract states them: their numbers, a vehicle with them changed, and what throttle alone or a
-curve leaves of what is said about them."""
+"""Believed values as the contract states them: their numbers, a vehicle with them changed, and what a curve leaves of
+what is said about them."""
 
 from __future__ import annotations
 
@@ -8,13 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from rotorid.effects.catalogue import catalogue, ids_of, ids_of_stage
-from rotorid.effects.contract import CURVE, SUPPLY
-from rotorid.effects.throttle_curve import SLOPE
+from rotorid.effects.catalogue import catalogue, ids_of
 from rotorid.effects.thrust_curve import SQUARE
 from rotorid.mismatch.decide import rules
 from rotorid.mismatch.decide.findings import Analysis, Finding
-from rotorid.mismatch.decide.selected import SMALLEST_CHANGE, VALUE_Z
 from rotorid.mismatch.decide.status import CLAIMED, Estimate
 from rotorid.mismatch.decide.words import effect_words, listed
 from rotorid.mismatch.evidence.rows import PARAMETER_NAMES
@@ -85,61 +82,16 @@ def only_throttle(recordings: RecordingSet) -> bool:
     )
 
 
-def speed_for_coefficients(values: dict, vehicle: Vehicle) -> dict:
-    """Thrust and torque coefficients off by one factor are one speed at full throttle off by its root."""
-    if not {"thrust", "torque"} <= set(values) or vehicle.rotor_speed_limits_rad_s is None:
-        return values
-    (thrust, thrust_sd), (torque, torque_sd) = values["thrust"], values["torque"]
-    if abs(thrust - torque) > 2.0 * np.hypot(thrust_sd, torque_sd) + 0.005:
-        return values
-    weight = 1.0 / np.square([thrust_sd, torque_sd])
-    change = float(weight @ [thrust, torque] / weight.sum())
-    factor = np.sqrt(1.0 + change)
-    rest = {k: v for k, v in values.items() if k not in ("thrust", "torque")}
-    return {**rest, "speed": (float(factor - 1.0), float(0.5 / factor / np.sqrt(weight.sum())))}
+def with_thrust_per_command(vehicle: Vehicle, scale: float, full_rad_s: float | None) -> Vehicle:
+    """The vehicle whose rotors turn `scale` times as fast at every command, with the believed C_F.
 
-
-def throttle_scale(values: Values, model: WrenchModel, full_rad_s: float):
-    """Values less what only says how fast rotors turn at full throttle, and that speed, which nobody stated.
-
-    The scale of the throttle rests on the believed thrust coefficient and mass: it is known as well as they are.
+    Of a throttle (`full_rad_s`, the speed that a full one was taken for) that is another full speed; where speeds are
+    commanded, another C_F and C_Q.
     """
-    trust = {t.key: t.prior_sd[0] for t in model.regression.terms if t.kind == "value"}
-    full = full_rad_s * float(np.sqrt(1 + values.get("thrust", (0.0, 0.0))[0]))
-    reach = 1.96 * full * 0.5 * float(np.hypot(trust.get("thrust", 0.0), trust.get("mass", 0.0)))
-    return _without_common_scale(values), {PARAMETER_NAMES["speed"]: (float("nan"), full, full - reach, full + reach)}
-
-
-def _without_common_scale(values: Values) -> Values:
-    """Values where the scale of the rotors' speed is not known: no thrust, nor the mass that it carries, and a torque
-    less its part in the scale."""
-    (thrust, thrust_sd), (torque, torque_sd) = (values.get(k, (0.0, 0.0)) for k in ("thrust", "torque"))
-    kept = {k: v for k, v in values.items() if k not in ("thrust", "torque", "speed", "mass")}
-    change, sd = (1 + torque) / (1 + thrust) - 1, float(np.hypot(thrust_sd, torque_sd))
-    if "torque" in values and abs(change) > max(VALUE_Z * sd, SMALLEST_CHANGE):
-        kept["torque"] = (change, sd)
-    return kept
-
-
-def stated_of_commands(findings: list[Finding], values: Values) -> Values:
-    """Wrong values to state where rotor speeds are known from commands alone: none that only says their scale.
-
-    At which voltage the believed values hold is not stated (the largest in the set is only a guess), and a curve of the
-    throttle has a slope of its own.
-    """
-    if any(f.id in ids_of_stage(SUPPLY) and f.status in CLAIMED for f in findings):
-        values = _without_common_scale(values)
-    return without_scale_of_curve(findings, values)
-
-
-def without_scale_of_curve(findings: list[Finding], values: Values) -> Values:
-    """Values without a thrust per mass given a throttle curve that has a scale of its own.
-
-    Where rotor speeds are known from commands alone, a thrust coefficient larger by x is a scale larger by x/2.
-    """
-    curve = next((f for f in findings if f.id in ids_of_stage(CURVE) and f.status in CLAIMED), None)
-    has_scale = curve is not None and SLOPE in [p.symbol for p in curve.parameters]
-    return _without_common_scale(values) if has_scale else values
+    if full_rad_s is not None:
+        low = (vehicle.rotor_speed_limits_rad_s or (0.0, 0.0))[0]
+        return vehicle.model_copy(update={"rotor_speed_limits_rad_s": (low, full_rad_s * scale)})
+    return changed_vehicle(vehicle, dict.fromkeys(("thrust", "torque"), scale**2 - 1.0))
 
 
 def with_square_term(findings: list[Finding], values: dict, model: WrenchModel) -> tuple[list[Finding], dict]:

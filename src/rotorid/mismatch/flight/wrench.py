@@ -1,11 +1,4 @@
-"""The model of force, moment and sensor effects: rows, whitening, search, refinement, and the chain before the rotors.
-
-A loop that answers the gyroscope's noise makes its rotors look late (`closed_loop_bias_s`). A controller turns the
-noise n of the gyroscope into commands, M = H n, and the recorded angular acceleration holds dn/dt: the two go together
-although no rotor did anything. Fitted as a lateness d of the commanded moment, I dn/dt = −d dM/dt, this is
-Σ −I Re(H) ω² S_n / Σ ω² S_M over the frequencies that are compared: the bias of the direct method in a closed loop
-(Ljung, System Identification, 2nd ed., ch. 13.4). A hover that does nothing else shows 10 ms of it.
-"""
+"""The model of force, moment and sensor effects: rows, whitening, search, refinement; the chain before the rotors."""
 
 from __future__ import annotations
 
@@ -14,16 +7,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
-from scipy.signal import csd, welch
 
 from rotorid.effects.catalogue import ids_of, moving_air
 from rotorid.effects.contract import Form
-from rotorid.effects.scale import rotor_radius_m
 from rotorid.effects.steady_wind import through_drag
-from rotorid.mismatch.decide import rules
 from rotorid.mismatch.decide.select import LEAST_PROMISE, LEAST_TRANSFER, Questions, Search, Selection
 from rotorid.mismatch.decide.selected import coefficient_of, coefficients, relative_change
-from rotorid.mismatch.evidence.motion import Segment
+from rotorid.mismatch.evidence.lift import chain_of_lift
+from rotorid.mismatch.evidence.motion import Segment, own_rate_hz
 from rotorid.mismatch.evidence.regression import (
     AGREEMENT,
     NOISE_BAND,
@@ -40,32 +31,24 @@ from rotorid.mismatch.evidence.rows import (
     Term,
     baseline_wrench,
     compared_alone,
-    residual,
     state_terms,
 )
 from rotorid.mismatch.evidence.speedpath import (
     CommandChain,
     MeasuredSpeed,
-    SpeedResult,
     SpeedSearch,
-    WrenchOnly,
     candidate_forms,
-    commanded_path,
     smoothed_acceleration,
 )
 from rotorid.mismatch.evidence.split import training_rule
 from rotorid.mismatch.evidence.unknowns import UNKNOWNS
 from rotorid.mismatch.flight.prepare import Prepared, assemble_rows, form_terms
 from rotorid.recordings import Vehicle
+from rotorid.recordings.columns import rotor_columns
 from rotorid.recordings.signal.kernels import causal
 from rotorid.steps import step
-from rotorid.vehicle.mixer import wrench_matrix
 
-_WINDOW_S = 2.0
-_LOWEST_HZ = 0.5
 _LONGEST_BLOCKS = 400
-_TRUSTED_SD = 1e-4
-"""Relative one-sigma of a believed value that is not to move."""
 _MOST_NOISE = 0.3
 """Share of a column's energy in a channel that may be noise of the sensors it is made of."""
 SAME_WRENCH = 0.004
@@ -73,9 +56,6 @@ SAME_WRENCH = 0.004
 _SIDEWAYS = 0.25
 WORTH_STATING = 3.0
 """Times that share which counts as noise where it is asked whether something matters."""
-_STEADY_ARM = 0.1
-"""One-sigma of a steady moment over thrust, as a share of the longest arm, while what lies between command and speed is
-searched: a centre of mass is seldom further off."""
 _MEMORY_GRID = 37
 """Points over a nonlinear parameter's range, a tenth apart, where its cost may have several minima."""
 
@@ -370,26 +350,19 @@ class Seconds:
         return self._grams[cols]
 
 
-def path_segments(segments: list[Segment], result: SpeedResult, full_speed, full_voltage, cutoff_hz) -> list[Segment]:
+def path_segments(segments: list[Segment], chain: CommandChain, cutoff_hz: float) -> list[Segment]:
     """Segments whose rotor speeds are what the chain makes of the commands."""
     out = []
     for s in segments:
-        fit = result.fit
-        speed = commanded_path(s, fit.chain, fit.values, fit.shift_s, full_speed, full_voltage, fit.holds)
+        speed = chain.speeds(s)
         acceleration = smoothed_acceleration(speed, s.rate_hz, cutoff_hz)
         out.append(replace(s, motion=replace(s.motion, rotor_speed=speed, rotor_acceleration=acceleration)))
     return out
 
 
 @step("from command to rotor speed")
-def speed_path(
-    prepared: Prepared,
-    known: list[tuple[Form, np.ndarray]] | None = None,
-    refused: Sequence[str] = (),
-    trusted: bool = False,
-) -> CommandChain | None:
-    """Search between command and rotor speed, without ids that are refused; None where no command is recorded, or
-    nothing can show it. Where only commands are recorded believed values are free with it unless `trusted`."""
+def speed_path(prepared: Prepared) -> CommandChain | None:
+    """What lies between command and rotor speed; None where no command is recorded, or nothing can show it."""
     segments = [s for s in prepared.segments if s.run in prepared.split.training]
     if not segments or any(s.command is None for s in segments):
         return None
@@ -400,110 +373,23 @@ def speed_path(
     full_voltage = max(float(v.max()) for v in voltages) if all(v is not None for v in voltages) else None
     if segments[0].measured_speed:
         problem = MeasuredSpeed(segments, full_speed, full_voltage)
-    else:
-        groups = [g for g in ("force", "moment") if g in prepared.groups]
-        if not groups:
-            return None
-        # The chain has a bounded shift of its own; a free time offset of the rotors would swallow any lag.
-        terms = [t for t in prepared.terms if t.kind != "effect" and not t.key.startswith("offset:rotors")]
-        sure = _TRUSTED_SD if trusted else np.inf
-        precision = np.concatenate(
-            [1 / np.square(np.minimum(t.prior_sd, sure if t.kind == "value" else np.inf)) for t in terms]
-        )
-        if "moment" in groups:
-            # A vehicle of one central rotor has no arm; its rotor's radius says how wide it is.
-            arm_m = float(np.linalg.norm(vehicle.rotor_positions_m(), axis=1).max()) or rotor_radius_m(vehicle)
-            precision = np.append(precision, np.full(3, (_STEADY_ARM * arm_m) ** -2.0))
-        keep = np.concatenate([np.arange(3) + 3 * ("force", "moment").index(g) for g in groups])
-
-        # The rotors' wrench is linear in the squared speeds, and all else that is measured stays as it is.
-        thrust, *moments = wrench_matrix(vehicle)
-        of_squares = np.stack([0 * thrust, 0 * thrust, -thrust, *moments])[keep].T
-        laws = {id(s): _in_squares(s, prepared, known or [], of_squares, groups) for s in segments}
-
-        def residual_of(segment: Segment, speed: np.ndarray, columns: bool):
-            if columns:
-                moved = _at_speed(segment, speed)
-                r = assemble_rows(prepared, terms, [moved], known)[0]
-                return r.y[:, keep], np.concatenate([r.x[:, keep], steady_moments(moved, prepared, groups)], axis=2)
-            still, per_square, others = laws[id(segment)]
-            if not others:
-                return still - prepared.thinner(speed**2) @ per_square, None
-            moved = _at_speed(segment, speed)
-            wrench = speed**2 @ per_square + sum(_wrench_of(moved, effect, vehicle, groups) for effect in others)
-            return still - prepared.thinner(wrench), None
-
-        force_z = 2 if "force" in groups else None
-        rate_hz = prepared.thinner.rate_hz
-        noisy = [s for s in prepared.noisy_segments if s.run in prepared.split.training]
-        late_s = (
-            closed_loop_bias_s(segments, noisy, vehicle, prepared.thinner.cutoff_hz)
-            if noisy and "moment" in groups
-            else 0.0
-        )
-        late_s = late_s if rules.CLOSED_LOOP_BIAS(late_s > 0.0) else 0.0
-        problem = WrenchOnly(segments, full_speed, full_voltage, rate_hz, residual_of, precision, force_z, late_s)
-    forms = [f for f in candidate_forms(segments, full_voltage is not None) if f[0] not in refused]
-    return CommandChain(SpeedSearch(problem, forms).run(), full_speed, full_voltage)
+        search = SpeedSearch(problem, candidate_forms(segments, full_voltage is not None))
+        return CommandChain(search.run(), full_speed, full_voltage)
+    if "force" not in prepared.groups:
+        return None
+    return chain_of_lift(segments, vehicle, full_speed, full_voltage, _command_rate_hz(prepared))
 
 
-def _at_speed(segment: Segment, speed: np.ndarray) -> Segment:
-    """A segment whose rotors turn at other speeds (n, k), rad/s."""
-    return replace(segment, motion=replace(segment.motion, rotor_speed=speed))
-
-
-def _wrench_of(
-    segment: Segment, effect: tuple[Form, np.ndarray], vehicle: Vehicle, groups: Sequence[str]
-) -> np.ndarray:
-    """What a form with its values adds to force and moment, (n, 3 groups), at the native rate."""
-    form, values = effect
-    extra = form.contribution(segment.motion, vehicle, values)
-    parts = [getattr(extra, name) for name in groups]
-    nothing = np.zeros((len(segment.motion.time_s), 3))
-    return np.concatenate([nothing if part is None else part for part in parts], axis=1)
-
-
-def _in_squares(segment: Segment, prepared: Prepared, known, of_squares: np.ndarray, groups: Sequence[str]):
-    """What is left of a segment's rows with rotors at rest (m, 3 groups), what each squared rotor speed takes of it
-    (k, 3 groups), and the effects of `known` that are no such law here.
-
-    Of a rotor that is tilted or weak, a swinging load, a gust elsewhere: asked once, not at every path that is tried.
-    """
-    at_rest = _at_speed(segment, 0.0 * segment.command)
-    still, others = _thinned_residual(at_rest, prepared, groups), []
-    count, rotors = segment.command.shape
-    wobble = np.sin(np.outer(np.arange(count), 0.9 + 0.17 * np.arange(rotors)))
-    speed = segment.command * (1.0 + 0.4 * wobble)
-    for effect in known:
-        alone = _wrench_of(at_rest, effect, prepared.vehicle, groups)
-        moved = _wrench_of(_at_speed(segment, speed), effect, prepared.vehicle, groups) - alone
-        per_square = np.linalg.lstsq(speed**2, moved, rcond=None)[0]
-        least = 1e-9 * max(1.0, float(np.abs(moved).max()))
-        if np.allclose(speed**2 @ per_square, moved, rtol=1e-7, atol=least):
-            still, of_squares = still - prepared.thinner(alone), of_squares + per_square
-        else:
-            others.append(effect)
-    return still, of_squares, others
-
-
-def _thinned_residual(segment: Segment, prepared: Prepared, groups: Sequence[str]) -> np.ndarray:
-    """Measured minus baseline of a segment, (m, 3 groups), filtered and thinned."""
-    parts = residual(segment, prepared.vehicle)
-    return np.concatenate([prepared.thinner(parts[g]) for g in groups], axis=1)
-
-
-def steady_moments(segment: Segment, prepared: Prepared, groups: Sequence[str]) -> np.ndarray:
-    """Columns (n, 3 groups, 3 or 0) of a moment about each axis in proportion to the thrust.
-
-    A centre of mass off its place, or rotors that differ, make such moments: no curve between command and speed is to
-    explain them.
-    """
-    thrust = segment.motion.rotor_speed**2 @ prepared.vehicle.thrust_coefficients_n_s2()
-    thrust = prepared.thinner(thrust[:, None])
-    columns = np.zeros((len(thrust), 3 * len(groups), 3 if "moment" in groups else 0))
-    for axis in range(columns.shape[2]):
-        columns[:, 3 * groups.index("moment") + axis, axis] = thrust[:, 0]
-    return columns
+def _command_rate_hz(prepared: Prepared) -> float:
+    """Fresh commands a second, in the run that has fewest."""
+    rates = []
+    for run in prepared.recordings.runs:
+        for group in ("rotor_command", "throttle"):
+            names = rotor_columns(group, prepared.vehicle.rotor_count)
+            if names and run.has(*names):
+                rates.append(own_rate_hz(run.time_s, run.array(names)))
+                break
+    return min(rates)
 
 
 def chosen(model: WrenchModel) -> list[tuple[Form, np.ndarray]]:
@@ -785,29 +671,3 @@ def after_residual(model: WrenchModel) -> list[np.ndarray]:
 def model_filters(model: WrenchModel) -> dict[int, np.ndarray]:
     """Whitening filters that the model's regression was built with."""
     return model.regression.filters
-
-
-def closed_loop_bias_s(segments: list[Segment], noisy: list[Segment], vehicle: Vehicle, cutoff_hz: float) -> float:
-    """Seconds by which roll or pitch, whichever is worse, seem to follow their commands late through noise alone.
-
-    `noisy` are the same segments with the sensors' noise added once more. Zero without commands or body rates.
-    """
-    inertia = np.diag(vehicle.inertia_kg_m2.matrix())
-    late = [0.0]
-    for axis in (0, 1):
-        echoed = commanded = 0.0
-        for plain, again in zip(segments, noisy, strict=True):
-            rate = plain.motion.angular_velocity
-            if plain.command is None or rate is None or again.motion.angular_velocity is None:
-                continue
-            moment = baseline_wrench(replace(plain.motion, rotor_speed=plain.command), vehicle)[1][:, axis]
-            noise = again.motion.angular_velocity[:, axis] - rate[:, axis]
-            how = {"fs": plain.rate_hz, "nperseg": min(len(moment), int(_WINDOW_S * plain.rate_hz))}
-            f_hz, s_rate = welch(rate[:, axis], **how)
-            answer = csd(rate[:, axis], moment, **how)[1] / np.maximum(s_rate, 1e-300)
-            weight = np.where((f_hz > _LOWEST_HZ) & (f_hz < cutoff_hz), f_hz**2, 0.0) * len(moment)
-            echoed -= float(weight @ (answer.real * welch(noise, **how)[1])) * inertia[axis]
-            commanded += float(weight @ welch(moment, **how)[1])
-        if commanded > 0.0:
-            late.append(echoed / commanded)
-    return max(late)

@@ -22,12 +22,14 @@ import numpy as np
 from rotorid.effects.catalogue import before_the_rotors, catalogue, ids_of, ids_of_stage
 from rotorid.effects.contract import CURVE, SUPPLY
 from rotorid.effects.loading import CHANNELS, NO_ROTORS, UNITS, Loading
+from rotorid.effects.throttle_curve import SLOPE
 from rotorid.mismatch.decide import rules
 from rotorid.mismatch.decide.enough import weighed
 from rotorid.mismatch.decide.findings import Analysis, ChannelTrace, Finding, with_probabilities
 from rotorid.mismatch.decide.select import KEEP_P, SHARE_OF_LARGEST, Selection
 from rotorid.mismatch.decide.selected import (
     SMALLEST_CHANGE,
+    VALUE_Z,
     WIDEST_TRUST,
     coefficients,
     estimates,
@@ -47,7 +49,7 @@ from rotorid.mismatch.flight.absent import absorbed_findings
 from rotorid.mismatch.flight.delivered import Values, in_words, residuals_of, settled
 from rotorid.mismatch.flight.fitted import TAKEN_UP, next_flight
 from rotorid.mismatch.flight.report_runs import first_s, on_traces
-from rotorid.mismatch.flight.values import changed_vehicle, contract_values, stated_of_commands
+from rotorid.mismatch.flight.values import changed_vehicle, contract_values
 from rotorid.mismatch.instrument.chain import (
     ChainResult,
     find_chain,
@@ -184,7 +186,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     findings += absorbed_findings(model, values, findings)
     findings = with_probabilities(findings, chosen_already(model))
     fit, moved_values = settled(model, values, model.selection.active)
-    to_state = values if measured else stated_of_commands(findings, values)
+    to_state = values if measured else _stated_of_commands(findings, values)
     choice = _InstrumentChoice(
         setup, model, chain, measured, values, to_state, tuple(findings), reasons, tuple(remarks)
     )
@@ -194,6 +196,27 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     refitted, moved_plain = settled(model, plain, [])
     first = _account(choice, recordings, seen, fit, moved_values, refitted, {**moved_plain, **plain})
     return as_delivered(_offered(choice, weighed(first), seen, plain, moved_values, moved_plain))
+
+
+def _stated_of_commands(findings: list[Finding], values: Values) -> Values:
+    """Wrong values to state where rotor speeds are known from commands alone: none that only says their scale.
+
+    At which voltage the believed values hold is not stated (the largest in the set is only a guess), and a curve of the
+    throttle has a slope of its own: no thrust then, and a torque less its part in the scale.
+    """
+    claims = [f for f in findings if f.status in CLAIMED]
+    curves = (f for f in claims if f.id in ids_of_stage(CURVE))
+    if not (
+        any(f.id in ids_of_stage(SUPPLY) for f in claims)
+        or any(SLOPE in [p.symbol for p in f.parameters] for f in curves)
+    ):
+        return values
+    (thrust, thrust_sd), (torque, torque_sd) = (values.get(k, (0.0, 0.0)) for k in ("thrust", "torque"))
+    kept = {k: v for k, v in values.items() if k not in ("thrust", "torque", "speed", "mass")}
+    change, sd = (1 + torque) / (1 + thrust) - 1, float(np.hypot(thrust_sd, torque_sd))
+    if "torque" in values and abs(change) > max(VALUE_Z * sd, SMALLEST_CHANGE):
+        kept["torque"] = (change, sd)
+    return kept
 
 
 @dataclass(frozen=True)
