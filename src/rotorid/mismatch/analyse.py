@@ -30,7 +30,7 @@ from rotorid.mismatch.decide.findings import (
 from rotorid.mismatch.decide.selected import coefficients, wrench_findings
 from rotorid.mismatch.decide.sizes import fitted_part
 from rotorid.mismatch.decide.statements import UpperLimit
-from rotorid.mismatch.decide.status import CLAIMED
+from rotorid.mismatch.decide.status import CLAIMED, Estimate
 from rotorid.mismatch.deliver.by_vehicle import acting_over_rows, on_vehicle
 from rotorid.mismatch.deliver.candidates import Candidate, Ground
 from rotorid.mismatch.deliver.files import claimed, conditions_of, instruments_of, place_of, with_effects
@@ -222,6 +222,7 @@ def _account(
         next_manoeuvre=fly.manoeuvre,
         next_separates=fly.separates,
         force_source=model.segments[0].force_source,
+        command_path=_command_path(found.chain),
         notes=(*choice.remarks, *run_scale_notes(model), *_lag_alone_notes(found.chain)),
         instead=_instead_in_words(found.instead),
         corrected=in_words(moved),
@@ -383,6 +384,12 @@ def _instead_in_words(instead: Mapping[str, Sequence[Values]]) -> dict[str, tupl
         PARAMETER_NAMES[key]: tuple(filter(None, (" with ".join(in_words(x)) for x in as_well)))
         for key, as_well in instead.items()
     }
+
+
+def _command_path(chain: CommandChain | None) -> tuple[Estimate, ...]:
+    """What is known of the path from command to thrust about the hover command."""
+    known = {} if chain is None else chain.result.about_hover
+    return tuple(in_interval(symbol, value, unit, sd) for symbol, (value, sd, unit) in known.items())
 
 
 def _lag_alone_notes(chain: CommandChain | None) -> list[str]:

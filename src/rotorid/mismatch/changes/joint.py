@@ -31,7 +31,7 @@ from rotorid.mismatch.evidence.regression import NEVER_EXCITED, Regression, buil
 from rotorid.mismatch.evidence.rows import Rows, Term
 from rotorid.mismatch.flight.absent import squares_of
 from rotorid.mismatch.flight.fitted import Fitted, fitted
-from rotorid.mismatch.flight.prepare import assemble_rows, prepare, prepare_like
+from rotorid.mismatch.flight.prepare import assemble_rows, prepare, prepare_like, value_terms
 from rotorid.mismatch.flight.report_runs import as_flown, comparable
 from rotorid.mismatch.flight.wrench import WrenchModel, block_seconds, chosen, model_filters
 from rotorid.mismatch.mistakes import find_mistakes, in_its_units
@@ -131,7 +131,9 @@ def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> FittedReference
     base, mistakes, _ = find_mistakes(replace(base, held_out=()))
     found = fitted(prepare(base, cutoff_hz))
     model = found.model
-    terms = [t for t in model.terms if not t.run]
+    # What one set's commands cannot tell apart from their own scale changes all the same from set to set.
+    values = value_terms(model.prepared.vehicle, model.prepared.groups)
+    terms = [*values, *(t for t in model.terms if not t.run and t.kind != "value")]
     # As another set's stretches are made: what making them leaves out is left out of both.
     recorded, noisy = _recorded_stretches(found, base)
     chain = chain_terms(found, recorded)
@@ -399,10 +401,10 @@ def by_run(evidence: Evidence, regression: Regression) -> tuple[Evidence, ...]:
 
 def _known_effects(model: WrenchModel, terms: Sequence[Term]) -> np.ndarray:
     """Coefficients (K,) of the effects that the first set's model holds, on the columns of `terms`."""
-    columns, fit = model.regression.columns([t.key for t in terms]), model.selection.fit
-    active = set(model.regression.columns(model.selection.active))
-    found = {c: b for c, b in zip(fit.columns, fit.beta, strict=True) if c in active}
-    return np.array([found.get(c, 0.0) for c in columns])
+    known, fit, active = model.regression.start, model.selection.fit, model.selection.active
+    found = dict(zip(fit.columns.tolist(), fit.beta, strict=True))
+    columns = [(known[t.key] + i if t.key in active else None) for t in terms for i in range(t.size)]
+    return np.array([found.get(column, 0.0) for column in columns])
 
 
 def _with_known_effects(evidence: Evidence, known: np.ndarray) -> Evidence:

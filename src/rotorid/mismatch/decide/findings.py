@@ -225,6 +225,8 @@ class Analysis:
     """Kinds `stand` and `bench`: what is known of the instrument."""
     loadings: tuple[Loading, ...] = ()
     """Kinds `stand` and `bench`: loads and readings as analysed, rotor speeds as the improved model has them."""
+    command_path: tuple[Estimate, ...] = ()
+    """Where commands alone are recorded: what is known of the path from command to thrust about the hover command."""
     notes: tuple[str, ...] = field(default_factory=tuple)
     """Things a reader must know (what was derived, what was corrected)."""
     instead: Mapping[str, tuple[str, ...]] = field(default_factory=dict)

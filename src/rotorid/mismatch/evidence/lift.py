@@ -510,5 +510,8 @@ def chain_of_lift(
     )
     every = {key: alternatives.get(key, ()) for key, _ in chain}
     turned = not {"roll", "pitch"}.isdisjoint(found.bands)
-    result = SpeedResult(fit, p_values, every, {}, silent=found.reasons, turned_by_commands=turned)
+    known = {"e_u": found.elasticity, "e_V": found.voltage, "tau": found.lag_s}
+    about = {key: (*own, "s" if key == "tau" else "1") for key, own in known.items() if own is not None}
+    about = {"u_h": (found.reference / full_speed, 0.0, "1"), **about}
+    result = SpeedResult(fit, p_values, every, {}, silent=found.reasons, about_hover=about, turned_by_commands=turned)
     return CommandChain(result, full_speed, full_voltage, found.scale)

@@ -100,6 +100,10 @@ class SpeedResult:
     """The chain fitted with one id less."""
     silent: Mapping[str, str] = field(default_factory=dict)
     """Ids of which the recording says nothing, with the reason."""
+    about_hover: Mapping[str, tuple[float, float, str]] = field(default_factory=dict)
+    """Where commands alone are recorded: hover command `u_h`, what one percent more of it (`e_u`) and of the voltage
+    (`e_V`) adds to the thrust in percent, and by how much rotors are late (`tau`), as far as the recording says it.
+    Each with its one-sigma and unit."""
     turned_by_commands: bool = True
     """Whether roll or pitch follow the commands in some band; else commands follow roll and pitch."""
 

@@ -136,18 +136,20 @@ def known_by_commands(prepared: Prepared, chain: CommandChain) -> Prepared:
         gone = {t.key: t.effect for t in terms if t.key in _GAINS_OF_MOMENTS or _of_turning(t, prepared)}
         terms = [t for t in terms if t.key not in gone]
         left = {t.effect for t in terms}
-        taken |= {i: FOLLOWED for i in sorted(set(gone.values()) - left - {""})}
+        taken |= {i: FOLLOWED for i in sorted(set(gone.values()) & set(catalogue()) - left)}
     return replace(prepared, terms=terms, not_testable={**prepared.not_testable, **taken})
 
 
 def _of_turning(term: Term, prepared: Prepared) -> bool:
-    """Whether a term is a moment that comes and goes as the vehicle turns, and no trim."""
+    """Whether a term is a moment alone that comes and goes as the vehicle turns, and no trim."""
     if term.kind != "effect":
         return False
     segment = max(prepared.segments, key=lambda s: s.motion.size)
     values = np.where(np.asarray(term.values) == 0.0, 1.0, term.values)
-    moment = term.form.contribution(segment.motion, prepared.vehicle, values).moment
-    return moment is not None and bool((moment.mean(axis=0) ** 2).sum() < moment.var(axis=0).sum())
+    made = term.form.contribution(segment.motion, prepared.vehicle, values)
+    if made.moment is None or (made.force is not None and made.force.any()):
+        return False
+    return bool((made.moment.mean(axis=0) ** 2).sum() < made.moment.var(axis=0).sum())
 
 
 def refined_model(prepared: Prepared, segments, noisy) -> WrenchModel:

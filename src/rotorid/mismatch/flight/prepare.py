@@ -254,19 +254,20 @@ def prior_of(key: str, vehicle: Vehicle) -> float:
     return DEFAULT_TRUST["inertia" if key.startswith("inertia") else key]
 
 
+def value_terms(vehicle: Vehicle, groups: Sequence[str]) -> list[Term]:
+    """A term for each believed value that acts in the groups of channels."""
+    values = {"thrust", "mass"} if "force" in groups else set()
+    if "moment" in groups:
+        values |= {"thrust", "torque", "inertia_xx", "inertia_yy", "inertia_zz", "arm"}
+    return [Term(key, "value", prior_sd=(prior_of(key, vehicle),)) for key in PARAMETER_NAMES if key in values]
+
+
 def make_terms(vehicle: Vehicle, segments: list[Segment], groups) -> tuple[list[Term], dict[str, str]]:
     """Every term that this set can test, and the ids that it cannot, with the reason."""
-    terms, reasons, values = [], {}, []
-    if "force" in groups:
-        values += ["thrust", "mass"]
-    if "moment" in groups:
-        values += ["thrust", "torque", "inertia_xx", "inertia_yy", "inertia_zz", "arm"]
+    terms, reasons = value_terms(vehicle, groups), {}
     if any(s.command is not None and not s.measured_speed for s in segments):
         # Commands alone determine thrust per mass: C_F and mass are labels of one number, which the path holds.
-        values = [key for key in values if key not in ("thrust", "mass")]
-    for key in PARAMETER_NAMES:
-        if key in values:
-            terms.append(Term(key, "value", prior_sd=(prior_of(key, vehicle),)))
+        terms = [t for t in terms if t.key not in ("thrust", "mass")]
     longest_sample = max(1.0 / s.rate_hz for s in segments)
     partner = {
         "offset:rotors-accelerometer": "force",

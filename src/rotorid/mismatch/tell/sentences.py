@@ -185,8 +185,26 @@ def details(contents: Contents) -> list[str]:
     if contents.word in ("partly_explained", "unexplained"):
         described = analysis.unexplained_description
         out.append(capital(_rest(contents)) + (f" {capital(described)}." if described else ""))
-    out += [_not_found(analysis.absent), *_run_forward(contents.forward)]
+    out += [_of_commands(analysis), _not_found(analysis.absent), *_run_forward(contents.forward)]
     return [text for text in out if text]
+
+
+def _of_commands(analysis: Analysis) -> str:
+    """What is known of the path from command to thrust where no rotor speed is recorded; empty for nothing."""
+    known = {e.symbol: e for e in analysis.command_path}
+
+    def number(e: Estimate, times: float = 1.0, digits: int = 1) -> str:
+        value, low, high = (f"{times * x:.{digits}f}" for x in (e.value, e.low, e.high))
+        return f"{value} ({low} to {high})"
+
+    parts = []
+    if "e_u" in known:
+        parts.append(f"1 % more throttle makes {number(known['e_u'])} % more thrust")
+    if "e_V" in known:
+        parts.append(f"1 % less voltage {number(known['e_V'])} % less")
+    if "tau" in known:
+        parts.append(f"rotors follow {number(known['tau'], 1e3, 0)} ms late")
+    return f"About the hover command {listed(parts)}." if parts else ""
 
 
 def _not_found(limits: Sequence[UpperLimit]) -> str:

@@ -28,6 +28,7 @@ from rotorid.mismatch.decide.findings import (
     rms,
 )
 from rotorid.mismatch.decide.sizes import Size, fitted_part, scales
+from rotorid.mismatch.decide.status import Estimate
 from rotorid.mismatch.tell.consistency import by_share, located_channels, missing_places, share_left, verdict_word
 from rotorid.mismatch.tell.sentences import (
     Contents,
@@ -326,6 +327,10 @@ class Verdict(_KeysOfVerdict):
     parameters: dict[str, WrongValue]
     believed_values: dict[str, BelievedValue]
     correlations: tuple[Correlated, ...]
+    command_path: tuple[ParameterEstimate, ...] = Field(
+        description="Without recorded rotor speeds, about the hover command u_h: percent more thrust for one percent "
+        "more command (e_u) and voltage (e_V), lateness of the rotors (tau); what the recording does not say is absent."
+    )
     not_testable: tuple[NotTestable, ...]
     unexplained: Unexplained
     next_experiment: NextExperiment
@@ -381,6 +386,7 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
         },
         believed_values={row.name: _believed_value_of(row, analysis) for row in analysis.believed_values},
         correlations=tuple(Correlated(values=pair, correlation=r) for pair, r in analysis.value_correlations.items()),
+        command_path=_estimates(analysis.command_path),
         not_testable=tuple(NotTestable(id=i, reason=r) for i, r in sorted(analysis.not_testable.items())),
         unexplained=Unexplained(
             share=float(np.clip(contents.left, 0.0, 1.0)),
@@ -393,6 +399,12 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
             separates=analysis.next_separates,
             predicted_separation_sigma=None,
         ),
+    )
+
+
+def _estimates(numbers: Sequence[Estimate]) -> tuple[ParameterEstimate, ...]:
+    return tuple(
+        ParameterEstimate(symbol=e.symbol, value=e.value, unit=e.unit, interval_95=(e.low, e.high)) for e in numbers
     )
 
 
@@ -508,10 +520,7 @@ def effect_verdict(finding: Finding, share: float | None, size: Size | None = No
         share=share,
         equation=finding.equation or (finding.form.equation if finding.form else ""),
         channels=finding.channels,
-        parameters=tuple(
-            ParameterEstimate(symbol=e.symbol, value=e.value, unit=e.unit, interval_95=(e.low, e.high))
-            for e in finding.parameters
-        ),
+        parameters=_estimates(finding.parameters),
         probability=finding.probability,
         p_value=finding.p_value,
         held_out_gain=None

@@ -9,10 +9,8 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import SpeedPath
 from rotorid.mismatch.evidence.motion import Segment
 from rotorid.mismatch.evidence.speedpath import (
-    LIFT_SD,
     MeasuredSpeed,
     SpeedSearch,
-    WrenchOnly,
     at_its_bounds,
     candidate_forms,
     commanded_path,
@@ -176,44 +174,6 @@ def test_a_curve_at_the_edge_of_what_is_physical_is_no_estimate():
     assert at_its_bounds(form("command_saturation", "upper limit"), np.array([0.3000001]))
     # A lag of nothing is the absence of one, and is judged by its size.
     assert not at_its_bounds(lag, np.array([lag.parameters[0].low]))
-
-
-def test_a_curve_without_thrust_costs_as_much_as_the_weight_is_sure():
-    """Weight 6.06 N, supported at the commanded 900 and 1100 rad/s: at half the speed a quarter of it is."""
-    segment = replace(recorded(2), command=np.repeat([[900.0] * 4, [1100.0] * 4], 200, axis=0))
-
-    def residual_of(moving, speed, columns):
-        force = np.zeros((len(speed), 3))
-        force[:, 2] = -6.06 + 1.5e-6 * (speed**2).sum(axis=1)
-        return force + 1e-3 * np.random.default_rng(0).standard_normal(force.shape), np.zeros((len(speed), 3, 1))
-
-    problem = WrenchOnly([segment], FULL, None, RATE_HZ, residual_of, np.ones(1), 2)
-    curve = form("throttle_curve", "affine")
-    for slope, lift in ((0.0, 1.0), (-0.5, 0.25), (0.2, 1.44)):
-        priors = problem.whitened((("throttle_curve", curve),), np.array([0.0, slope]), 0.0)[len(problem.segments) :]
-        cost = sum(float((p**2).sum()) for p in priors)
-        assert cost == pytest.approx(((1.0 - lift) / LIFT_SD) ** 2, rel=1e-3, abs=0.01)
-
-
-@pytest.mark.parametrize("times", [1, 6])
-def test_where_only_forces_are_known_no_single_second_shows_a_limit(times):
-    """Commands of 1650 rad/s for a fifth of a second, of which rotors follow 1450."""
-    segment = recorded(7)
-    command = np.minimum(segment.command, 1450.0)
-    for k in range(times):
-        command[200 + 300 * k : 220 + 300 * k] = 1650.0
-    rng = np.random.default_rng(8)
-    force = 1.5e-6 * (np.minimum(command, 1450.0) ** 2).sum(axis=1) + 0.02 * rng.standard_normal(len(command))
-
-    def residual_of(moving, speed, columns):
-        left = np.zeros((len(force), 3))
-        left[:, 2] = 1.5e-6 * (np.broadcast_to(speed, command.shape) ** 2).sum(axis=1) - force
-        return left + 1e-9 * rng.standard_normal(left.shape), np.zeros((len(force), 3, 1))
-
-    flown = [replace(segment, command=command)]
-    problem = WrenchOnly(flown, FULL, None, RATE_HZ, residual_of, np.ones(1))
-    found = SpeedSearch(problem, [(k, f) for k, f in candidate_forms(flown) if k == "command_saturation"]).run()
-    assert [k for k, _ in found.fit.chain] == ["command_saturation"] * (times > 1)
 
 
 @pytest.mark.parametrize("holds", [True, False])

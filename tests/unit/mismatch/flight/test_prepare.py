@@ -14,7 +14,7 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Motion
 from rotorid.mismatch.evidence.speedpath import CommandChain, SpeedFit, SpeedResult
 from rotorid.mismatch.evidence.split import GAP_S, training_rule
-from rotorid.mismatch.flight.fitted import only_scales, without_same_curves
+from rotorid.mismatch.flight.fitted import known_by_commands
 from rotorid.mismatch.flight.prepare import (
     DEFAULT_TRUST,
     LastMade,
@@ -267,18 +267,15 @@ def chain_of(effect_id: str, name: str, values, sd: float = 1e-4) -> CommandChai
     return CommandChain(SpeedResult(fit, {}, {}, {}), 2500.0, None)
 
 
-@pytest.mark.parametrize(
-    ("values", "sd", "scale"), [((0.0026, 0.04), 1e-4, True), ((0.02, 0.04), 1e-4, False), ((0.02, 0.04), 0.02, True)]
-)
-def test_a_curve_whose_start_is_negligible_or_not_known_is_another_scale(values, sd, scale):
-    """Half a percent of the full speed is negligible."""
-    assert only_scales(chain_of("throttle_curve", "affine", values, sd).result) == scale
-
-
-def test_next_to_a_curve_of_the_throttle_no_curve_of_the_thrust_is_looked_for():
+def test_commands_alone_show_no_curve_of_the_thrust_and_where_they_follow_the_motion_no_gain_of_moments():
     prepared = prepare(recorded(1, flight={"duration_s": 10.0}))
-    assert "thrust_curve" in {t.effect for t in prepared.terms}
-    fewer = without_same_curves(prepared, chain_of("throttle_curve", "affine", (0.1, 0.1)))
-    assert {t.effect for t in prepared.terms} - {t.effect for t in fewer.terms} == {"thrust_curve"}
-    assert "throttle" in fewer.not_testable["thrust_curve"]
-    assert without_same_curves(prepared, chain_of("motor_lag", "one constant", (0.05,))) is prepared
+    keys = {t.key for t in prepared.terms}
+    turned = known_by_commands(prepared, chain_of("motor_lag", "one constant", (0.05,)))
+    assert {t.effect for t in prepared.terms} - {t.effect for t in turned.terms} == {"thrust_curve"}
+    assert "throttle" in turned.not_testable["thrust_curve"]
+    chain = chain_of("motor_lag", "one constant", (0.05,))
+    answering = chain._replace(result=replace(chain.result, turned_by_commands=False))
+    left = known_by_commands(prepared, answering)
+    gone = keys - {t.key for t in left.terms}
+    assert {"arm", "torque", "inertia_xx", "inertia_yy", "inertia_zz"} <= gone
+    assert "com_offset" in {t.effect for t in left.terms} and "rotational_damping" in left.not_testable

@@ -5,15 +5,14 @@ about a believed value where something beside it would make up for it.
 import numpy as np
 import pytest
 
-from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.decide.select import Selection
 from rotorid.mismatch.decide.selected import SMALLEST_CHANGE, main_channels, relative_change, wrong_values
-from rotorid.mismatch.decide.status import Estimate
 from rotorid.mismatch.evidence.regression import build
 from rotorid.mismatch.evidence.rows import Rows, Term
-from rotorid.mismatch.flight.values import with_values_in_question, without_scale_of_curve
+from rotorid.mismatch.flight.values import with_thrust_per_command, with_values_in_question
 from tests.unit.mismatch import synthetic
 from tests.unit.mismatch.evidence.test_regression import RATE_HZ
+from tests.unit.mismatch.flights import quad
 from tests.unit.mismatch.synthetic import coloured
 
 TRUST = {"thrust": 0.1, "torque": 0.2, "mass": 0.05, "inertia_zz": 0.15}
@@ -115,18 +114,11 @@ def test_a_value_that_a_member_of_an_open_class_would_change_is_suggested_with_t
     assert with_values_in_question(synthetic.analysis(findings=[suggested], values={"mass_kg": mass})).values
 
 
-def curve(symbol: str, status: str = "established") -> list[Finding]:
-    """A throttle curve with one parameter."""
-    found = Estimate(symbol, 0.3, "1", 0.2, 0.4)
-    return [Finding(id="throttle_curve", status=status, sentence="", parameters=(found,))]
-
-
-@pytest.mark.parametrize(
-    ("findings", "named"),
-    [(curve("a_1"), False), (curve("u_0"), True), (curve("a_1", "not_established"), True), ([], True)],
-)
-def test_a_thrust_beside_a_throttle_curve_with_a_scale_of_its_own_is_not_called_wrong(findings, named):
-    """Nor is a mass: where speeds are known from commands alone a flight knows the ratio of the two."""
-    values = {"thrust": (-0.02, 0.002), "mass": (0.05, 0.001)}
-    assert ("thrust" in without_scale_of_curve(findings, values)) is named
-    assert ("mass" in without_scale_of_curve(findings, values)) is named  # only thrust over mass is known
+def test_thrust_per_command_is_another_full_speed_of_a_throttle_and_another_coefficient_of_commanded_speeds():
+    """Rotors that turn 1.1 times as fast as believed at every command lift 1.21 times as much."""
+    vehicle = quad(rotor_speed_limits_rad_s=(0.0, 2000.0))
+    assert with_thrust_per_command(vehicle, 1.1, 2000.0).rotor_speed_limits_rad_s == pytest.approx((0.0, 2200.0))
+    faster = with_thrust_per_command(vehicle, 1.1, None)
+    assert faster.rotor_speed_limits_rad_s == (0.0, 2000.0)
+    ratio = faster.thrust_coefficients_n_s2() / vehicle.thrust_coefficients_n_s2()
+    np.testing.assert_allclose(ratio, 1.21)

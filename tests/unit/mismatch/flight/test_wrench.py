@@ -3,9 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
-from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.evidence.motion import Segment
 from rotorid.mismatch.evidence.regression import full_fit_residuals
 from rotorid.mismatch.evidence.rows import Rows
@@ -16,11 +14,9 @@ from rotorid.mismatch.flight.wrench import (
     Seconds,
     channel_floor,
     inflated_channels,
-    steady_moments,
     without_unseen,
 )
 from rotorid.recordings import Vehicle
-from rotorid.vehicle.mixer import wrench_matrix
 from tests.unit.mismatch.evidence.test_rows import still
 from tests.unit.mismatch.flights import recorded
 
@@ -121,50 +117,6 @@ def test_no_channel_is_known_better_than_a_share_of_the_rotors_own_changes():
     segment = Segment("run", 100.0, still(400, rotor_speed=speed), "accelerometer")
     floor = channel_floor([segment], vehicle)
     np.testing.assert_allclose(floor[:6], SAME_WRENCH * np.array([0.375, 0.375, 1.5, 0.0, 0.15, 0.015]), atol=1e-12)
-
-
-def test_steady_moments_go_with_the_thrust_about_each_axis():
-    """What a centre of mass off its place makes is free while the chain is searched."""
-    prepared = prepare(recorded(1, 2))
-    segment = prepared.segments[0]
-    columns = steady_moments(segment, prepared, ("force", "moment"))
-    thrust = prepared.thinner((1.3877e-6 * (segment.motion.rotor_speed**2)).sum(axis=1, keepdims=True))[:, 0]
-    assert columns.shape == (len(thrust), 6, 3) and not columns[:, :3].any()
-    for axis in range(3):
-        np.testing.assert_allclose(columns[:, 3 + axis], np.outer(thrust, np.eye(3)[axis]), rtol=1e-9)
-    assert steady_moments(segment, prepared, ("force",)).shape == (len(thrust), 3, 0)
-
-
-@pytest.mark.parametrize(
-    ("effect", "name", "values", "others"),
-    [
-        ("thrust_tilt", "rotor 3", (0.02, -0.05), 0),
-        ("inertia_products", "products", (1e-4, 2e-4, -1e-4), 0),
-        ("rotor_drag", "at the centre of mass", (1e-4,), 1),
-    ],
-)
-def test_what_is_known_beside_commands_costs_a_path_nothing_where_it_follows_squared_speeds(
-    effect, name, values, others
-):
-    """What is left of the rows at any speeds is the same as where each effect is asked anew; a drag follows the
-    speeds themselves and stays apart."""
-    prepared = prepare(recorded(1))
-    segment = prepared.segments[0]
-    segment = replace(segment, command=segment.motion.rotor_speed)
-    form = next(f for f in catalogue()[effect].forms(prepared.vehicle) if f.name == name)
-    known, groups = [(form, np.array(values))], ("force", "moment")
-    thrust, *moments = wrench_matrix(prepared.vehicle)
-    of_squares = np.stack([0 * thrust, 0 * thrust, -thrust, *moments]).T
-    still, per_square, apart = wrench._in_squares(segment, prepared, known, of_squares, groups)
-    assert len(apart) == others
-    speed = segment.command * (1.0 + 0.1 * np.cos(segment.motion.time_s)[:, None])
-    moved = wrench._at_speed(segment, speed)
-    left = still - prepared.thinner(speed**2) @ per_square
-    for one in apart:
-        left = left - prepared.thinner(wrench._wrench_of(moved, one, prepared.vehicle, groups))
-    asked_anew = wrench._thinned_residual(moved, prepared, groups)
-    asked_anew = asked_anew - prepared.thinner(wrench._wrench_of(moved, known[0], prepared.vehicle, groups))
-    np.testing.assert_allclose(left, asked_anew, atol=1e-8)
 
 
 def test_a_channel_known_to_be_above_what_the_catalogue_leaves_is_searched_once(monkeypatch):

@@ -38,7 +38,7 @@ def test_the_file_has_the_keys_of_the_contract():
         *("set", "kind", "runs", "verdict", "basis", "doubts", "sentence", "size", "details", "warnings", "channels"),
         "locations",
         *("effects", "delivered", "derivatives", "absent", "parameters", "believed_values", "correlations"),
-        *("not_testable", "unexplained", "next_experiment"),
+        *("command_path", "not_testable", "unexplained", "next_experiment"),
     ]
     channel = content["channels"]["force_x"]
     assert list(channel) == ["unit", "noise_floor", "rmse", "p_value"]
