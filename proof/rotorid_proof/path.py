@@ -1,6 +1,7 @@
 """The path from command to thrust: what a verdict states of it, beside what is true.
 
     python -m rotorid_proof.path [--quick] [--cases 'imrc-brushless/*'] [--kept FOLDER] [--out TABLE.csv]
+    python -m rotorid_proof.path --feedback development [--each 5] [--quick]
 
 *Concealed speeds* are real flights whose rotor speeds were recorded and are taken out of the set before it is judged.
 The truth is what the recorded speeds say, by a fit of its own (`recorded_path`): speed ∝ uⁿ Vᵖ, late by a first-order
@@ -13,12 +14,14 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shutil
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from fnmatch import fnmatch
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -35,10 +38,15 @@ from rotorid.recordings import RecordingSet, Run, read_set
 from rotorid.recordings import columns as c
 from rotorid.recordings.files import write_set
 from rotorid.report.deliver import analysis_of, verdict_of
+from rotorid_proof.concealed import cases, drawn
+from rotorid_proof.concealed.write import write_set as write_drawn
 from rotorid_proof.decisions.collect import selection_of
 from rotorid_proof.intervals import wilson
-from rotorid_proof.score import CLAIMED
+from rotorid_proof.row_by_row import as_read
+from rotorid_proof.score import CLAIMED, claims_of, equivalents
 
+FINEST = {"elasticity": 0.0, "late_s": 0.005, "voltage": 0.0}
+"""And what is never too far off: a sample."""
 QUANTITIES = {"elasticity": (0.2, True), "late_s": (0.35, True), "voltage": (0.2, False)}
 """What is asked: n of speed ∝ uⁿ about the hover command, lag with delay (s), p of speed ∝ Vᵖ. Each with how far off a
 right number may be, and whether that is a share of the truth."""
@@ -238,11 +246,11 @@ def _commands(count: int) -> tuple[tuple[str, ...], ...]:
 
 
 def _late(steady: np.ndarray, dt: float, lag: float, delay: float) -> np.ndarray:
-    """Columns late by a delay and a first-order lag."""
+    """Columns late by a delay and a first-order lag; a command holds until the next."""
     t = np.arange(len(steady)) * dt
     late = np.column_stack([np.interp(t - delay, t, x) for x in steady.T])
     a = np.exp(-dt / lag)
-    return lfilter([1 - a], [1, -a], late, axis=0, zi=a * late[:1])[0]
+    return lfilter([0, 1 - a], [1, -a], late, axis=0, zi=late[:1])[0]
 
 
 def _cut(run: Run, start: float, stop: float) -> Run:
@@ -353,7 +361,8 @@ def status_of(quantity: str, true: Number | None, stated: Number | None) -> str:
     if stated is None:
         return "silent"
     allowed, relative = QUANTITIES[quantity]
-    return "right" if abs(stated.value - true.value) <= allowed * (abs(true.value) if relative else 1.0) else "wrong"
+    reach = max(FINEST[quantity], allowed * (abs(true.value) if relative else 1.0))
+    return "right" if abs(stated.value - true.value) <= reach else "wrong"
 
 
 def rows_of_case(
@@ -382,11 +391,6 @@ def rows_of_case(
     return out
 
 
-def table(rows: Sequence[Row]) -> pd.DataFrame:
-    """One row a set and quantity."""
-    return pd.DataFrame([asdict(r) for r in rows], columns=[f.name for f in fields(Row)])
-
-
 def summary(rows: pd.DataFrame) -> pd.DataFrame:
     """A row each quantity and one of all: of the sets `asked` those `claimed`, `right`, whose interval `held`."""
     out = []
@@ -409,6 +413,88 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(out)
+
+
+# Drawn flights in gusts -------------------------------------------------------------------------------------------
+
+
+def feedback_names(date: str, each: int) -> list[str]:
+    """Names of drawn flights, `each` of a family, for development or for a commit's hash."""
+    return [f"feedback/{family}/{date}/{k:03d}" for k in range(each) for family in drawn.SIMULATORS["feedback"]]
+
+
+def feedback_rows(item: tuple[str], quick: bool = False) -> list[dict[str, Any]]:
+    """The row of a drawn flight, in a list."""
+    return [feedback_row(item[0], quick)]
+
+
+def feedback_row(name: str, quick: bool = False) -> dict[str, Any]:
+    """A drawn flight: names and values that are wrong, and each quantity, true and stated.
+
+    Where there is no curve, no lag or no sag, a claim of it is a wrong name, whatever its number.
+    """
+    case = cases.named(name)
+    recording, truth, _ = drawn.make(name, case.seed)
+    verdict, vehicle, seconds = judged(as_read(recording, write_drawn, case.set_name), quick)
+    limits = recording.vehicle["rotor_speed_limits_rad_s"]
+    speeds = any("rotor_command_1_rad_s" in t for t in recording.runs.values())
+    stated = stated_path(verdict, vehicle, truth["path"]["hover"] * (limits[1] if speeds else 1.0))
+    near = equivalents(truth).values()
+    fair = frozenset(truth["fair"]).union(*near)
+    claims = claims_of({"effects": [{"p_value": None, **e} for e in verdict["effects"]]})
+    row = {
+        "set": name,
+        "recorded": f"{'speed' if speeds else 'throttle'} {truth['grade']}",
+        "claims": len(claims),
+        "wrong_names": "; ".join(c.id for c in claims if not c.members & fair),
+        "wrong_values": "; ".join(verdict.get("parameters", {})),
+    }
+    for quantity, true in truth["path"].items():
+        if quantity in QUANTITIES:
+            known, said = None if true is None else Number(true), stated[quantity]
+            status = status_of(quantity, known, said)
+            row |= {f"{quantity}_true": true, f"{quantity}_stated": said and said.value, f"{quantity}_status": status}
+            row[f"{quantity}_held"] = said.holds(true) if said and known else None
+    row |= {
+        "word": "; ".join(filter(None, [verdict["verdict"], verdict.get("failed", "")])),
+        "seconds": round(seconds, 1),
+    }
+    numbers = (f"{q} {row[f'{q}_true']} {row[f'{q}_stated']} {row[f'{q}_status']}" for q in QUANTITIES)
+    wrong = " ".join(filter(None, (row["wrong_names"], row["wrong_values"])))
+    said = "; ".join(numbers) + (f"; WRONG {wrong}" if wrong else "")
+    print(f"{name} ({row['recorded']}): {said} | {row['word']} {seconds:.0f} s", flush=True)
+    return row
+
+
+def feedback_summary(rows: pd.DataFrame) -> pd.DataFrame:
+    """Drawn flights with a wrong name or value, and of each quantity how many are claimed, right and held."""
+    wrong = int(rows["wrong_names"].astype(bool).sum()), int(rows["wrong_values"].astype(bool).sum())
+    out = [
+        {"what": what, "count": count, "of": len(rows), **_interval(count, len(rows))}
+        for what, count in zip(("sets with a wrong name", "sets with a wrong value"), wrong, strict=True)
+    ]
+    for quantity in QUANTITIES:
+        for there in (True, False):
+            neutral = 1.0 if quantity == "elasticity" else 0.0
+            own = rows[(rows[f"{quantity}_true"].fillna(neutral) != neutral) == there]
+            said = own[own[f"{quantity}_stated"].notna()]
+            right, what = (
+                int((said[f"{quantity}_status"] == "right").sum()),
+                quantity + ("" if there else ", none there"),
+            )
+            out.append(
+                {"what": f"{what}: claimed", "count": len(said), "of": len(own), **_interval(len(said), len(own))}
+            )
+            if there:
+                held = int((said[f"{quantity}_held"].map(str) == "True").sum())
+                out.append({"what": f"{what}: right", "count": right, "of": len(said), **_interval(right, len(said))})
+                out.append({"what": f"{what}: held", "count": held, "of": len(said), **_interval(held, len(said))})
+    return pd.DataFrame(out)
+
+
+def _interval(count: int, of: int) -> dict[str, float]:
+    low, high = wilson(count, of)
+    return {"low_95": round(low, 3), "high_95": round(high, 3)}
 
 
 # Judging ----------------------------------------------------------------------------------------------------------
@@ -444,25 +530,57 @@ def judged(recordings: RecordingSet, quick: bool = False) -> tuple[dict[str, Any
     return verdict, vehicle, time.process_time() - start
 
 
-def prepared(folder: Path, sources: Callable[[], Sequence[RecordingSet]]) -> list[tuple[str, Path, float, dict]]:
-    """Cases below `folder`, made where they are not there yet: name, folder of the set, hover command and truth."""
+def prepared(
+    folder: Path, sources: Callable[[], Sequence[RecordingSet]], code: str = ""
+) -> list[tuple[str, Path, float, dict]]:
+    """Cases below `folder`: name, folder of the set, hover command and truth.
+
+    They are made where there are none yet, or where those were made by another `code` than the one given.
+    """
     index = folder / "truths.json"
-    if not index.is_file():
+    known = json.loads(index.read_text(encoding="utf-8")) if index.is_file() else None
+    if known is None or code not in ("", known["code"]):
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
         found = []
         for recordings in sources():
             for case in cases_of(recordings):
                 truth = recorded_path(case.recordings.runs, case.recordings.vehicle.rotor_count)
-                if not any(truth.values()):
-                    continue
-                place = write_set(without_speeds(case), folder)
-                known = {q: None if t is None else asdict(t) for q, t in truth.items()}
-                found.append([case.name, place.name, hover_command(case), known])
-        index.parent.mkdir(parents=True, exist_ok=True)
-        index.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+                if any(truth.values()):
+                    place = write_set(without_speeds(case), folder)
+                    said = {q: None if t is None else asdict(t) for q, t in truth.items()}
+                    found.append([case.name, place.name, hover_command(case), said])
+        known = {"code": code, "cases": found}
+        index.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
     return [
         (name, folder / place, hover, {q: None if t is None else Number(**t) for q, t in truth.items()})
-        for name, place, hover, truth in json.loads(index.read_text(encoding="utf-8"))
+        for name, place, hover, truth in known["cases"]
     ]
+
+
+def concealed_rows(item: tuple[str, Path, float, dict], quick: bool = False) -> list[dict[str, Any]]:
+    """Rows of a prepared set, one a quantity."""
+    name, folder, hover, truth = item
+    verdict, vehicle, seconds = judged(read_set(folder), quick)
+    word = "; ".join(filter(None, [verdict["verdict"], verdict.get("failed", "")]))
+    own = rows_of_case(name, truth, stated_path(verdict, vehicle, hover), word, seconds)
+    print(line_of(own), flush=True)
+    return [asdict(row) for row in own]
+
+
+def kept_rows(items: Sequence[tuple], rows_of: Callable, kept: Path, code: str) -> pd.DataFrame:
+    """Rows of every item (its first part is its name), each written to the CSV `kept` as it comes.
+
+    What was judged by the same `code` is not judged again.
+    """
+    kept.parent.mkdir(parents=True, exist_ok=True)
+    rows = pd.read_csv(kept, keep_default_na=False, na_values=[""]).to_dict("records") if kept.is_file() else []
+    rows = [r for r in rows if str(r["judged_by"]) == code]
+    for item in items:
+        if item[0] not in {r["set"] for r in rows}:
+            rows += [{**row, "judged_by": code} for row in rows_of(item)]
+            pd.DataFrame(rows).to_csv(kept, index=False)
+    return pd.DataFrame([r for item in items for r in rows if r["set"] == item[0]])
 
 
 def line_of(rows: Sequence[Row]) -> str:
@@ -502,19 +620,25 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--kept", type=Path, default=Path(tempfile.gettempdir()) / "rotorid-concealed-speeds")
     parser.add_argument("--cases", default="*", help="shell patterns on names, comma-separated")
     parser.add_argument("--quick", action="store_true", help="stop where the fitted runs have decided")
-    parser.add_argument("--out", type=Path, help="the table as CSV")
+    parser.add_argument("--feedback", metavar="DATE", help="drawn flights in gusts instead: development, or a hash")
+    parser.add_argument("--each", type=int, default=5, help="of each family of drawn flights")
+    parser.add_argument("--out", type=Path, help="the table as CSV; what is in it by the same --code is kept")
+    parser.add_argument("--code", default=str(time.time()), help="of what judges")
     args = parser.parse_args(argv)
     files = os.environ.get("ROTORID_PUBLIC_DATA")
-    rows: list[Row] = []
-    for name, folder, hover, truth in prepared(args.kept, lambda: public_sets(args.recordings, files and Path(files))):
-        if any(fnmatch(name, pattern) for pattern in args.cases.split(",")):
-            verdict, vehicle, seconds = judged(read_set(folder), args.quick)
-            own = rows_of_case(name, truth, stated_path(verdict, vehicle, hover), verdict["verdict"], seconds)
-            print(line_of(own) + (f" {verdict['failed']}" if "failed" in verdict else ""), flush=True)
-            rows += own
-            if args.out:
-                table(rows).to_csv(args.out, index=False)
-    print(summary(table(rows)).to_string(index=False))
+    with tempfile.TemporaryDirectory() as place:
+        if args.feedback:
+            items, rows_of, summed = (
+                [(n,) for n in feedback_names(args.feedback, args.each)],
+                feedback_rows,
+                feedback_summary,
+            )
+        else:
+            items = prepared(args.kept, lambda: public_sets(args.recordings, files and Path(files)))
+            rows_of, summed = concealed_rows, summary
+        chosen = [item for item in items if any(fnmatch(item[0], pattern) for pattern in args.cases.split(","))]
+        found = kept_rows(chosen, partial(rows_of, quick=args.quick), args.out or Path(place) / "rows.csv", args.code)
+    print(summed(found).to_string(index=False))
     return 0
 
 
