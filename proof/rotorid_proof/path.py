@@ -415,6 +415,36 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(out)
 
 
+def page_table(rows: pd.DataFrame) -> str:
+    """For the proof's page: a line a set, what recorded speeds say and what is stated without; a line of counts."""
+    heads = "flights | n | stated | lag + delay, ms | stated | p | stated"
+    lines = [f"| {heads} |", "| --- |" + " ---: |" * 6]
+
+    def number(x: float, unit: float, form: str) -> str:
+        return "" if pd.isna(x) else form.format(unit * x)
+
+    def stated(row: Any, unit: float, form: str) -> str:
+        low, high = number(row.low_95, unit, form), number(row.high_95, unit, form)
+        reach = f" ({low} to {high})" if low and high else ""
+        mark = {"right": "", "wrong": " ✗"}.get(row.status, "")
+        return number(row.stated, unit, form) + reach + mark if number(row.stated, unit, form) else "–"
+
+    forms = {"elasticity": (1.0, "{:.2f}"), "late_s": (1e3, "{:.0f}"), "voltage": (1.0, "{:.2f}")}
+    for name, own in rows.groupby("set", sort=False):
+        cells = [name.replace("/", ", ")]
+        for quantity, (unit, form) in forms.items():
+            row = next(own[own["quantity"] == quantity].itertuples())
+            known = row.status != "unknown"
+            cells += [number(row.true, unit, form) if known else "", stated(row, unit, form) if known else ""]
+        lines.append(f"| {' | '.join(cells)} |")
+    counts = summary(rows).set_index("quantity")
+    cells = ["right of claimed of asked"]
+    for quantity in forms:
+        count = counts.loc[quantity]
+        cells += ["", f"{count['right']} of {count['claimed']} of {count['asked']}"]
+    return "\n".join([*lines, f"| {' | '.join(cells)} |"]) + "\n"
+
+
 # Drawn flights in gusts -------------------------------------------------------------------------------------------
 
 
@@ -637,8 +667,12 @@ def main(argv: Sequence[str] | None = None) -> int:
             items = prepared(args.kept, lambda: public_sets(args.recordings, files and Path(files)))
             rows_of, summed = concealed_rows, summary
         chosen = [item for item in items if any(fnmatch(item[0], pattern) for pattern in args.cases.split(","))]
+        if not chosen:
+            parser.error(f"no set fits {args.cases!r}; there are {', '.join(item[0] for item in items) or 'none'}")
         found = kept_rows(chosen, partial(rows_of, quick=args.quick), args.out or Path(place) / "rows.csv", args.code)
     print(summed(found).to_string(index=False))
+    if not args.feedback and len(found):
+        print(page_table(found))
     return 0
 
 

@@ -42,7 +42,10 @@ def main(
 if __name__ == "__main__":
     with log.to(snakemake.log[0]):
         main(
-            **snakemake.output,
+            speeds=snakemake.output.speeds,
+            speeds_summary=snakemake.output.speeds_summary,
+            feedback=snakemake.output.feedback,
+            feedback_summary=snakemake.output.feedback_summary,
             so_far=snakemake.params.so_far,
             recordings=snakemake.params.recordings,
             folder=snakemake.params.folder,
