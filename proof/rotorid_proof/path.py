@@ -440,7 +440,7 @@ def page_table(rows: pd.DataFrame) -> str:
     counts = summary(rows).set_index("quantity")
     cells = ["right of claimed of asked"]
     for quantity in forms:
-        count = counts.loc[quantity]
+        count = counts.loc[quantity, ["right", "claimed", "asked"]].astype(int)
         cells += ["", f"{count['right']} of {count['claimed']} of {count['asked']}"]
     return "\n".join([*lines, f"| {' | '.join(cells)} |"]) + "\n"
 
