@@ -5,8 +5,9 @@
 
 *Concealed speeds* are real flights whose rotor speeds were recorded and are taken out of the set before it is judged.
 The truth is what the recorded speeds say, by a fit of its own (`recorded_path`): speed ∝ uⁿ Vᵖ, late by a first-order
-lag and a delay. Prepared sets and their truths are kept in a folder. `--quick` stops where the fitted runs have decided:
-three quarters of the time, before words are weighed once more and anything is delivered, so that a number may differ.
+lag and a delay. Prepared sets and their truths are kept in a folder. `--quick` stops where the fitted runs have
+decided: three quarters of the time, before words are weighed once more and anything is delivered, so that a number may
+differ.
 """
 
 from __future__ import annotations
