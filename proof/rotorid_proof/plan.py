@@ -25,7 +25,7 @@ BUILD_S, JUDGE_S, PEERS_S, START_S = 6.0, 8.0, 3.0, 4.0
 INSTRUMENT_S = 2.5
 """The same to record and judge a case of a stand or a bench, of which no peer is asked."""
 INSTRUMENTS = ("stand", "bench")
-DRAWN = ("multibody", "continuous", "stand-rig", "bench-rig")
+DRAWN = ("multibody", "continuous", "feedback", "stand-rig", "bench-rig")
 """Simulators whose cases are drawn whole from one seed."""
 DEVELOPMENT = "/development/"
 MADE = Path("results/proof")

@@ -292,6 +292,7 @@ def holds(
 SIMULATORS = {
     ("flight", "multibody"): "Drawn flights, multibody engine",
     ("flight", "continuous"): "Drawn flights, differential equations",
+    ("flight", "feedback"): "Drawn flights in gusts, commands alone",
     ("stand", "rig"): "Drawn stands",
     ("bench", "rig"): "Drawn benches",
 }

@@ -230,6 +230,31 @@ rule prove_fleet:
         "../scripts/prove_fleet.py"
 
 
+rule prove_path:
+    """The path from command to thrust: real flights whose rotor speeds are concealed, drawn flights in gusts; slow."""
+    message:
+        "Proof: the path from command to thrust"
+    input:
+        public=PUBLIC_SHOWN,
+    output:
+        speeds="results/proof/concealed_speeds.csv",
+        speeds_summary="results/proof/concealed_speeds_summary.csv",
+        feedback="results/proof/feedback.csv",
+        feedback_summary="results/proof/feedback_summary.csv",
+    params:
+        so_far="results/path",
+        recordings="results/recordings",
+        folder=PUBLIC_FOLDER,
+        seed=CONFIG.proof.release or "development",
+        each=CONFIG.proof.released.get("feedback", 5),
+        concealing=code_that_conceals,
+        code=code_of("prove_path"),
+    log:
+        "results/logs/prove_path.log",
+    script:
+        "../scripts/prove_path.py"
+
+
 rule prove_next_session:
     """The same of stands and benches, drawn for the release: on request."""
     message:

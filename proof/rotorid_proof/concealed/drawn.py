@@ -10,6 +10,7 @@ import hashlib
 import re
 from pathlib import Path
 
+from . import feedback
 from .continuous import cases as continuous
 from .continuous.equations import Strayed
 from .multibody import cases as multibody
@@ -23,10 +24,13 @@ CLEAN = 40
 SIMULATORS = {
     "multibody": multibody.FAMILIES,
     "continuous": continuous.FAMILIES,
+    "feedback": feedback.FAMILIES,
     "bench/rig": rig.BENCH,
     "stand/rig": rig.STAND,
 }
-NAME = re.compile(r"(multibody|continuous|bench/rig|stand/rig)/(\w+)/(development|\d{4}-\d\d-\d\d|[0-9a-f]{8})/(\d{3})")
+NAME = re.compile(
+    r"(multibody|continuous|feedback|bench/rig|stand/rig)/(\w+)/(development|\d{4}-\d\d-\d\d|[0-9a-f]{8})/(\d{3})"
+)
 
 
 def seed_of(date: str, family: str, number: int) -> int:
@@ -58,9 +62,11 @@ def make(name: str, seed: int):
             made = multibody.make(family, seed)
         elif simulator == "continuous":
             made = continuous.make(family, seed)
+        elif simulator == "feedback":
+            made = feedback.make(family, seed)
         else:
             made = rig.make(simulator.split("/")[0], family, seed)
-    except Strayed:
+    except (Strayed, feedback.Strayed):
         return make(name, seed_of(f"{seed} again", f"{simulator}/{family}", number))
     recording, truth, ideals = made
     truth["released"] = "" if date == DEVELOPMENT or name in looked_at() else date

@@ -16,7 +16,15 @@ from rotorid_proof.plantings.flights import FLIGHTS
 from rotorid_proof.plantings.plan import SECONDS, Planting
 from rotorid_proof.studies import Study
 
-DRAWN_S = {"multibody": 22.0, "continuous": 15.0, "richsim": 30.0, "rotorpy": 30.0, "rig": 4.0, "ground": 4.0}
+DRAWN_S = {
+    "multibody": 22.0,
+    "continuous": 15.0,
+    "feedback": 15.0,
+    "richsim": 30.0,
+    "rotorpy": 30.0,
+    "rig": 4.0,
+    "ground": 4.0,
+}
 """Usual seconds of one core to record and judge a set of each simulator."""
 STUDY_S = 120.0
 

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pandas as pd
 
+from rotorid_proof.path import page_table, summary
+
 PROOF = Path(__file__).parents[3] / "docs" / "proof"
 PAGE = (PROOF / "README.md").read_text(encoding="utf-8")
 METHOD = (PROOF / "method.md").read_text(encoding="utf-8")
@@ -38,3 +40,9 @@ def test_every_kept_table_is_in_the_method_and_every_table_that_it_lists_is_kept
     listed = METHOD[METHOD.index("## The files") : METHOD.index("- `holds`")]
     assert set(re.findall(r"`([\w.]+\.(?:csv|tsv|json))`", listed)) <= kept
     assert not {name for name in kept if f"`{name}`" not in METHOD and f"/{name}" not in METHOD}
+
+
+def test_the_page_shows_what_is_stated_without_the_recorded_speeds() -> None:
+    rows = pd.read_csv(PROOF / "concealed_speeds.csv")
+    assert page_table(rows) in PAGE
+    pd.testing.assert_frame_equal(pd.read_csv(PROOF / "concealed_speeds_summary.csv"), summary(rows), check_dtype=False)
