@@ -32,9 +32,6 @@ from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
 from rotorid.api import recording_set
-from rotorid.effects.catalogue import catalogue
-from rotorid.effects.contract import CURVE, SpeedPath
-from rotorid.mismatch.deliver.files import improved_vehicle
 from rotorid.recordings import RecordingSet, Run, read_set
 from rotorid.recordings import columns as c
 from rotorid.recordings.files import write_set
@@ -44,7 +41,7 @@ from rotorid_proof.concealed.write import write_set as write_drawn
 from rotorid_proof.decisions.collect import selection_of
 from rotorid_proof.intervals import wilson
 from rotorid_proof.row_by_row import as_read
-from rotorid_proof.score import CLAIMED, claims_of, equivalents
+from rotorid_proof.score import claims_of, equivalents
 
 FINEST = {"elasticity": 0.0, "late_s": 0.005, "voltage": 0.0}
 """And what is never too far off: a sample."""
@@ -71,87 +68,11 @@ class Number:
 # What a verdict states --------------------------------------------------------------------------------------------
 
 
-def stated_path(verdict: Mapping[str, Any], vehicle: Mapping[str, Any], hover: float) -> dict[str, Number | None]:
-    """What a verdict claims of each of QUANTITIES; None where it claims nothing.
-
-    Parameters
-    ----------
-    verdict
-        `verdict.json`. An effect that is established counts, and one that is `ambiguous` with its own number.
-    vehicle
-        `improved_vehicle.yaml`: its full speed turns a commanded speed into a share of the full command.
-    hover
-        Mean command of the flights: a throttle (below 2), or a commanded speed, rad/s.
-    """
-    claims: dict[str, dict[str, Number]] = {}
-    for effect in verdict.get("effects", ()):
-        if effect["status"] in CLAIMED and not _of_a_sensor(effect):
-            numbers = {p["symbol"]: Number(p["value"], *(p.get("interval_95") or ())) for p in effect["parameters"]}
-            claims.setdefault(effect["id"], numbers)
-    limits = vehicle.get("rotor_speed_limits_rad_s") or (0.0, 1.0)
-    share = hover if hover < 2.0 else hover / float(limits[1])
-    late = [_lateness(claims[i], names) for i, names in _LATE.items() if i in claims]
-    return {
-        "elasticity": _elasticity(claims.get("throttle_curve", {}), share),
-        "late_s": _sum(late),
-        "voltage": _voltage(claims.get("battery_sag", {})),
-    }
-
-
-_LATE = {"motor_lag": ("tau", "tau_up", "tau_down"), "delay": ("tau_d", "T")}
-
-
-def _of_a_sensor(effect: Mapping[str, Any]) -> bool:
-    """Whether a delay is one of a sensor's stamps, not of the command."""
-    return effect["id"] == "delay" and "written at" in effect.get("equation", "")
-
-
-def _lateness(numbers: Mapping[str, Number], names: Sequence[str]) -> Number | None:
-    """The mean of a lag's time constants (up and down), or a delay."""
-    own = [numbers[n] for n in names if n in numbers]
-    return _weighted(own, [1 / len(own)] * len(own)) if own else None
-
-
-def _sum(parts: Sequence[Number | None]) -> Number | None:
-    known = [p for p in parts if p is not None]
-    return _weighted(known, [1.0] * len(known)) if known else None
-
-
-def _voltage(numbers: Mapping[str, Number]) -> Number | None:
-    if "e_V" in numbers:
-        return _weighted([numbers["e_V"]], [0.5])
-    return numbers.get("p")
-
-
-def _elasticity(numbers: Mapping[str, Number], share: float) -> Number | None:
-    """Relative change of speed over that of the command, at a share of the full command."""
-    if "e_u" in numbers:
-        return _weighted([numbers["e_u"]], [0.5])
-    for form in catalogue()["throttle_curve"].speed_forms if numbers else ():
-        names = [p.symbol for p in form.parameters]
-        if form.stage == CURVE and set(names) == set(numbers):
-            values = np.array([numbers[n].value for n in names])
-
-            def local(v: np.ndarray, form=form) -> float:
-                around = share * np.exp([-1e-3, 1e-3])
-                path = SpeedPath(around[:, None], np.array([0.0, 1.0]), 1.0)
-                low, high = np.maximum(form.apply(path, v)[:, 0], 1e-9)
-                return float(np.log(high / low) / 2e-3)
-
-            slopes = [(local(values + step) - local(values - step)) / 2e-4 for step in 1e-4 * np.eye(len(names))]
-            return _weighted([numbers[n] for n in names], slopes, local(values))
-    return None
-
-
-def _weighted(parts: Sequence[Number], weights: Sequence[float], value: float | None = None) -> Number:
-    """Σ w x (or a `value` with these slopes); its interval as of parts that are independent, none without theirs."""
-    if value is None:
-        value = sum(w * p.value for w, p in zip(weights, parts, strict=True))
-    if any(p.low is None or p.high is None for p in parts):
-        return Number(value)
-    ends = [sorted((w * (p.low - p.value), w * (p.high - p.value))) for w, p in zip(weights, parts, strict=True)]
-    low, high = (float(np.sqrt(sum(e[k] ** 2 for e in ends))) for k in (0, 1))
-    return Number(value, value - low, value + high)
+def stated_path(verdict: Mapping[str, Any]) -> dict[str, Number | None]:
+    """What `command_path` of a verdict states of each of QUANTITIES, of the speed; None where it states nothing."""
+    known = {p["symbol"]: (p["value"], *p["interval_95"]) for p in verdict.get("command_path", ())}
+    halves = {"elasticity": ("e_u", 0.5), "late_s": ("tau", 1.0), "voltage": ("e_V", 0.5)}
+    return {q: Number(*(share * x for x in known[s])) if s in known else None for q, (s, share) in halves.items()}
 
 
 # What the recorded speeds say -------------------------------------------------------------------------------------
@@ -325,13 +246,6 @@ def without_speeds(case: Case) -> RecordingSet:
     return replace(case.recordings, runs=tuple(kept(r) for r in case.recordings.runs))
 
 
-def hover_command(case: Case) -> float:
-    """Mean command over the flights, as `stated_path` takes it."""
-    names = _commands(case.recordings.vehicle.rotor_count)
-    own = [next(n for n in names if case.recordings.runs[0].has(*n))]
-    return float(np.mean([np.nanmean(r.array(own[0])) for r in case.recordings.runs]))
-
-
 @dataclass(frozen=True)
 class Row:
     """One quantity of one set."""
@@ -466,10 +380,9 @@ def feedback_row(name: str, quick: bool = False) -> dict[str, Any]:
     """
     case = cases.named(name)
     recording, truth, _ = drawn.make(name, case.seed)
-    verdict, vehicle, seconds = judged(as_read(recording, write_drawn, case.set_name), quick)
-    limits = recording.vehicle["rotor_speed_limits_rad_s"]
+    verdict, seconds = judged(as_read(recording, write_drawn, case.set_name), quick)
     speeds = any("rotor_command_1_rad_s" in t for t in recording.runs.values())
-    stated = stated_path(verdict, vehicle, truth["path"]["hover"] * (limits[1] if speeds else 1.0))
+    stated = stated_path(verdict)
     near = equivalents(truth).values()
     fair = frozenset(truth["fair"]).union(*near)
     claims = claims_of({"effects": [{"p_value": None, **e} for e in verdict["effects"]]})
@@ -535,17 +448,19 @@ class _Decided(Exception):
     """The fitted runs have decided, and nobody asks for more."""
 
 
-def judged(recordings: RecordingSet, quick: bool = False) -> tuple[dict[str, Any], dict[str, Any], float]:
-    """Verdict and improved vehicle of a set, and the processor's seconds; `failed` in place of a verdict that is none.
+def judged(recordings: RecordingSet, quick: bool = False) -> tuple[dict[str, Any], float]:
+    """Verdict of a set, and the processor's seconds; `failed` in place of a verdict that is none.
 
-    `quick`: what the fitted runs decide, before anything is delivered, with the believed vehicle.
+    `quick`: what the fitted runs decide, before anything is delivered.
     """
     start = time.process_time()
-    believed = recordings.vehicle.model_dump(mode="json")
     seen: list[dict[str, Any]] = []
 
     def stop(decided: Any) -> None:
-        seen.append(selection_of(decided))
+        path = decided.found.chain.result.about_hover if decided.found.chain else {}
+        numbers = ((k, v, [v - 1.96 * sd, v + 1.96 * sd]) for k, (v, sd, _) in path.items())
+        stated = [{"symbol": k, "value": v, "interval_95": reach} for k, v, reach in numbers]
+        seen.append({**selection_of(decided), "command_path": stated})
         raise _Decided
 
     try:
@@ -553,18 +468,17 @@ def judged(recordings: RecordingSet, quick: bool = False) -> tuple[dict[str, Any
             analysis_of(recordings, watch=stop)
         analysis = analysis_of(recordings)
         verdict = json.loads(verdict_of(analysis).text())
-        vehicle = improved_vehicle(analysis).model_dump(mode="json")
     except _Decided:
-        verdict, vehicle = {"verdict": "", **seen[0]}, believed
+        verdict = {"verdict": "", **seen[0]}
     except Exception as error:  # any fault of the stage is a result here
-        verdict, vehicle = {"verdict": "stopped", "failed": f"{type(error).__name__}: {error}", "effects": []}, believed
-    return verdict, vehicle, time.process_time() - start
+        verdict = {"verdict": "stopped", "failed": f"{type(error).__name__}: {error}", "effects": []}
+    return verdict, time.process_time() - start
 
 
 def prepared(
     folder: Path, sources: Callable[[], Sequence[RecordingSet]], code: str = ""
-) -> list[tuple[str, Path, float, dict]]:
-    """Cases below `folder`: name, folder of the set, hover command and truth.
+) -> list[tuple[str, Path, dict]]:
+    """Cases below `folder`: name, folder of the set and truth.
 
     They are made where there are none yet, or where those were made by another `code` than the one given.
     """
@@ -580,21 +494,21 @@ def prepared(
                 if any(truth.values()):
                     place = write_set(without_speeds(case), folder)
                     said = {q: None if t is None else asdict(t) for q, t in truth.items()}
-                    found.append([case.name, place.name, hover_command(case), said])
+                    found.append([case.name, place.name, said])
         known = {"code": code, "cases": found}
         index.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
     return [
-        (name, folder / place, hover, {q: None if t is None else Number(**t) for q, t in truth.items()})
-        for name, place, hover, truth in known["cases"]
+        (name, folder / place, {q: None if t is None else Number(**t) for q, t in truth.items()})
+        for name, place, truth in known["cases"]
     ]
 
 
-def concealed_rows(item: tuple[str, Path, float, dict], quick: bool = False) -> list[dict[str, Any]]:
+def concealed_rows(item: tuple[str, Path, dict], quick: bool = False) -> list[dict[str, Any]]:
     """Rows of a prepared set, one a quantity."""
-    name, folder, hover, truth = item
-    verdict, vehicle, seconds = judged(read_set(folder), quick)
+    name, folder, truth = item
+    verdict, seconds = judged(read_set(folder), quick)
     word = "; ".join(filter(None, [verdict["verdict"], verdict.get("failed", "")]))
-    own = rows_of_case(name, truth, stated_path(verdict, vehicle, hover), word, seconds)
+    own = rows_of_case(name, truth, stated_path(verdict), word, seconds)
     print(line_of(own), flush=True)
     return [asdict(row) for row in own]
 

@@ -12,49 +12,18 @@ from rotorid.recordings import RecordingSet, Run
 from rotorid_proof import path
 from rotorid_proof.concealed import drawn, feedback
 
-LIMITS = {"rotor_speed_limits_rad_s": [0.0, 2000.0]}
+
+def verdict(**numbers):
+    return {"command_path": [{"symbol": s, "value": v, "interval_95": [v - 0.1, v + 0.1]} for s, v in numbers.items()]}
 
 
-def claim(id, status="established", equation="", **numbers):
-    parameters = [{"symbol": s, "value": v, "unit": "", "interval_95": [v - 0.1, v + 0.1]} for s, v in numbers.items()]
-    return {"id": id, "status": status, "alternatives": [], "equation": equation, "parameters": parameters}
-
-
-def stated(*effects, hover=0.3):
-    found = path.stated_path({"effects": effects}, LIMITS, hover)
-    return {q: n and n.value for q, n in found.items()}
-
-
-@pytest.mark.parametrize(
-    "numbers, expected",
-    [
-        ({"a_0": 0.4, "a_1": -0.6}, 0.12 / 0.52),
-        ({"u_0": 0.1}, 0.3 / 0.2),
-        ({"u_0": 0.1, "n": 0.5}, 0.5 * 0.3 / 0.2),
-        ({"n": 0.7}, 0.7),
-        ({"b": 1.0}, 0.5),
-        ({"e_u": 1.6}, 0.8),
-    ],
-)
-def test_the_elasticity_of_every_form_is_that_of_the_speed_about_the_hover_command(numbers, expected):
-    assert stated(claim("throttle_curve", **numbers))["elasticity"] == pytest.approx(expected, abs=1e-4)
-    # 600 rad/s of 2000 are the same share of the full command.
-    assert stated(claim("throttle_curve", **numbers), hover=600.0)["elasticity"] == pytest.approx(expected, abs=1e-4)
-
-
-def test_lag_and_command_delay_add_up_and_only_claims_count():
-    late = [claim("motor_lag", tau_up=0.03, tau_down=0.05), claim("delay", equation="ω(t) = ω_c(t − T)", T=0.01)]
-    assert stated(*late)["late_s"] == pytest.approx(0.05)
-    assert stated(claim("motor_lag", tau=0.04), claim("delay", tau_d=0.01))["late_s"] == pytest.approx(0.05)
-    assert stated(claim("delay", equation="written at t: the value of t − T", T=0.3))["late_s"] is None
-    assert stated(claim("motor_lag", "suggested", tau=0.04)) == dict.fromkeys(path.QUANTITIES)
-    assert stated(claim("battery_sag", e_V=1.6))["voltage"] == stated(claim("battery_sag", p=0.8))["voltage"] == 0.8
-
-
-def test_intervals_follow_the_numbers_that_they_are_made_of():
-    (n,) = (v for v in path.stated_path({"effects": [claim("throttle_curve", e_u=1.6)]}, {}, 0.3).values() if v)
+def test_what_is_stated_of_the_thrust_is_half_as_much_of_the_speed():
+    found = path.stated_path(verdict(u_h=0.6, e_u=1.6, e_V=1.8, tau=0.2))
+    assert {q: n.value for q, n in found.items()} == {"elasticity": 0.8, "late_s": 0.2, "voltage": 0.9}
+    n = found["elasticity"]
     assert (n.low, n.high) == (pytest.approx(0.75), pytest.approx(0.85))
     assert n.holds(0.84) and not n.holds(0.9) and path.Number(1.0).holds(1.0) is None
+    assert path.stated_path(verdict(u_h=0.6)) == dict.fromkeys(path.QUANTITIES)
 
 
 def flown(name, n=0.8, lag=0.04, delay=0.006, p=0.9, seconds=16.0, seed=1):
@@ -94,7 +63,6 @@ def test_a_set_is_concealed_with_each_kind_of_command_and_shows_no_speed():
     assert {"set/throttle/whole", "set/speed/whole", "set/throttle/a"} <= cases.keys()
     columns = set(cases["set/throttle/whole"].runs[0].table)
     assert columns == {"time_s", "battery_voltage_v", "specific_force_z_m_s2", *(f"throttle_{i}" for i in range(1, 5))}
-    assert path.hover_command(path.cases_of(whole)[0]) == pytest.approx(0.4, abs=0.01)
 
 
 def test_a_number_is_right_within_what_is_allowed_and_silence_is_counted_apart():
@@ -118,8 +86,6 @@ def test_what_one_code_has_judged_is_not_judged_again(tmp_path):
         path.kept_rows([("a",), ("b",)], rows_of, tmp_path / "rows.csv", code)
     assert judged == ["a", "b"] * 2
 
-
-def test_a_drawn_path_carries_the_weight_at_its_hover_command_with_its_elasticity():
     for family in feedback.FAMILIES:
         for seed in range(6):
             own = feedback.drafted(family, seed).path

@@ -38,6 +38,8 @@ from rotorid.vehicle.improved import command_path, flyable, wrench_at_rest, wren
 _MOST_HOVER_SHARE = 0.9
 """Share of the full thrust at which a vehicle may hover: what steers it needs the rest."""
 _HIGH_ABOVE_GROUND_M = 1e3
+_MOST_TRIM = 0.1
+"""Share of the weight that a constant force of the derivatives may be: more is lift that the rotors do not make."""
 _BEYOND_ALL = 1e6
 """Weights that no rotors lift: asked for, each turns at its limit."""
 _CARRIES = (0.7, 1.4)
@@ -68,10 +70,27 @@ def _questions(believed: Vehicle, runs: Sequence[Run]) -> tuple[_Question, ...]:
     share, recorded = recorded_share(runs, believed), _recorded_hover(runs, believed)
     return (
         no_body,
-        lambda vehicle: cannot_hover(vehicle, share),
-        lambda vehicle: _off_as_recorded(vehicle, recorded),
+        _held_by_a_constant,
+        lambda vehicle: cannot_hover(_by_its_rotors(vehicle), share),
+        lambda vehicle: _off_as_recorded(_by_its_rotors(vehicle), recorded),
         cannot_fly,
     )
+
+
+def _by_its_rotors(vehicle: Vehicle) -> Vehicle:
+    """The vehicle without the constants of its derivatives, which lift whether rotors turn or not."""
+    kept = tuple(d for d in vehicle.derivatives if d.quantity != "constant")
+    return vehicle.model_copy(update={"derivatives": kept})
+
+
+def _held_by_a_constant(vehicle: Vehicle) -> str:
+    """Which constant force would carry it; empty where all are trims."""
+    weight = vehicle.mass_kg * vehicle.gravity_m_s2
+    for d in vehicle.derivatives:
+        if d.quantity == "constant" and d.channel.startswith("force") and abs(d.value) > _MOST_TRIM * weight:
+            share = 100 * abs(d.value) / weight
+            return f"its derivatives hold a constant {d.channel} of {d.value:.3g} N, {share:.0f} % of its weight"
+    return ""
 
 
 def no_body(vehicle: Vehicle) -> str:

@@ -48,13 +48,32 @@ def share_left(channels: Mapping[str, Channel], located: Sequence[str]) -> float
     return min(1.0, max(0.0, named - noise) / max(before - noise, noise)) if noise else 0.0
 
 
-def verdict_word(analysis: Analysis, locations: Sequence[Location], left: float) -> str:
-    """One of the four words, from what was found and the share that is left."""
+MOST_OFF = 0.2
+"""Share of the weight that a force may be off by in what is called explained."""
+
+
+def verdict_word(
+    analysis: Analysis, locations: Sequence[Location], left: float, channels: Mapping[str, Channel]
+) -> str:
+    """One of the four words, from what was found, the share that is left, and the errors of the channels.
+
+    Nothing is explained while a force stays off by more than a fifth of the weight.
+    """
     if not with_status(analysis, *CLAIMED) and not analysis.wrong_values:
         return "unexplained" if locations else "no_mismatch"
     if left <= EXPLAINED_SHARE:
-        return "explained"
+        return "partly_explained" if _force_is_off(analysis, channels) else "explained"
     return "partly_explained" if left < 1.0 - EXPLAINED_SHARE else "unexplained"
+
+
+def _force_is_off(analysis: Analysis, channels: Mapping[str, Channel]) -> bool:
+    """Whether some force of a flight is off by more than MOST_OFF of the weight with what is named."""
+    vehicle = analysis.believed
+    if vehicle.kind != "flight":
+        return False
+    forces = [c.rmse.held_out for name, c in channels.items() if name.startswith("force")]
+    off_n = max((errors.named for errors in forces if errors is not None), default=0.0)
+    return off_n > MOST_OFF * vehicle.mass_kg * vehicle.gravity_m_s2
 
 
 def located_channels(locations: Sequence[Location], channels: Mapping[str, Channel]) -> tuple[str, ...]:

@@ -355,7 +355,7 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
     located = located_channels(locations, inverse)
     left = share_left(inverse, located)
     shares = analysis.shares
-    word = "not_judged" if _stopping(analysis) else verdict_word(analysis, locations, left)
+    word = "not_judged" if _stopping(analysis) else verdict_word(analysis, locations, left, inverse)
     contents = Contents(analysis, word, locations, inverse, shares, left if word != "no_mismatch" else 0.0, forward)
     return Verdict(
         set=analysis.recordings.name,

@@ -29,6 +29,7 @@ from rotorid.mismatch.flight.fitted import fitted
 from rotorid.mismatch.flight.prepare import prepare
 from rotorid.recordings import RecordingSet, Run, read_set, templates
 from rotorid.recordings import columns as c
+from rotorid.recordings.vehicle import Derivative
 from rotorid.report.deliver import analysis_of
 from rotorid.vehicle.control import FLIGHTS, SECONDS, SEED
 from rotorid.vehicle.mixer import allocation_matrix
@@ -52,6 +53,21 @@ def test_a_thrust_coefficient_below_the_weight_cannot_hover():
     weak = vehicle(thrust_coefficient_n_s2=0.72 * 0.652 * 9.81 / (4 * 1600**2))
     assert "full thrust is 4.61 N for a weight of 6.4 N" in cannot_hover(weak, 0.0)
     assert cannot_hover(vehicle(), 0.0) == ""
+
+
+def constant(value: float):
+    """A constant vertical force among the derivatives, N."""
+    known = {"channel": "force_z", "quantity": "constant", "unit": "N", "interval_95": (value, value)}
+    return (Derivative(**known, value=value, low=1.0, high=1.0),)
+
+
+def test_a_constant_of_the_derivatives_is_a_trim_and_lifts_nothing():
+    """Weight 6.4 N: 0.5 N are a trim, 5 N hold a vehicle whose rotors do not."""
+    asked, _ = question_of(vehicle(), ())
+    assert asked(vehicle(derivatives=constant(-0.5))) == ""
+    assert "constant force_z of -5 N, 78 % of its weight" in asked(vehicle(derivatives=constant(-5.0)))
+    weak = vehicle(thrust_coefficient_n_s2=0.95 * 0.652 * 9.81 / (4 * 1600**2), derivatives=constant(-0.6))
+    assert "full thrust is 6.08 N" in asked(weak)
 
 
 def test_a_vehicle_recorded_near_its_full_thrust_may_hover_there():

@@ -155,4 +155,4 @@ def test_a_channel_that_stays_far_above_its_floor_is_located(before, after, wron
     places = missing_places(analysis, (), {"moment_x": channel(before, after)})
     assert [name for name, _ in places] == located
     if not wrong_values:
-        assert verdict_word(analysis, places, 1.0) == ("unexplained" if located else "no_mismatch")
+        assert verdict_word(analysis, places, 1.0, {}) == ("unexplained" if located else "no_mismatch")

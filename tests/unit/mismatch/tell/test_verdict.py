@@ -207,3 +207,12 @@ def test_of_many_wrong_values_the_others_are_counted():
     values |= {f"inertia_{a}{a}_kg_m2": (0.01, 0.012, 0.011, 0.013) for a in "xy"}
     one, two = (verdict_of(analysis(values=dict(list(values.items())[:n]))).sentence for n in (3, 4))
     assert one.endswith("and one more value is wrong.") and two.endswith("and 2 more values are wrong.")
+
+
+def test_nothing_is_explained_while_a_force_is_off_by_more_than_a_fifth_of_the_weight():
+    made = analysis(findings=[drag_finding()])
+    assert verdict_of(made).verdict == "explained"
+    weight_n = made.believed.mass_kg * made.believed.gravity_m_s2
+    far = [replace(t, named=t.named + 0.25 * weight_n) if t.channel == "force_z" else t for t in made.traces]
+    unknown = replace(made, traces=tuple(far), noise_floor={**made.noise_floor, "force_z": weight_n})
+    assert verdict_of(unknown).verdict == "partly_explained"
