@@ -72,7 +72,6 @@ EFFECT = Effect(
             _power_of_reference,
             (0.0, 0.0),
             ("voltage",),
-            own_scale=True,
         ),
         SpeedForm(
             "drift in time",

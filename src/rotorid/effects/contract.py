@@ -256,8 +256,6 @@ class SpeedForm:
     excited_by: Literal["command", "change", "voltage", "limit", "time"] = "command"
     """What it takes to show: any command, a command that changes, a voltage below the largest, a command beyond
     the limit, or time since the start of the run."""
-    own_scale: bool = False
-    """Whether a parameter scales all speeds, as another full speed would."""
 
 
 @dataclass(frozen=True)

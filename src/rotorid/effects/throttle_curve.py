@@ -103,7 +103,6 @@ EFFECT = Effect(
             CURVE,
             affine,
             (0.0, 0.0),
-            own_scale=True,
         ),
         SpeedForm(
             "quadratic",
@@ -115,7 +114,6 @@ EFFECT = Effect(
             CURVE,
             quadratic,
             (0.0, 0.0),
-            own_scale=True,
         ),
         SpeedForm(
             "dead zone",

@@ -197,7 +197,7 @@ def _account(
     refitted_left = residuals_of(seen, plain_fit)
     traces = _make_traces(seen, found, refitted_left, delivered)
     between = _sensor_traces(seen, refitted_left, delivered)
-    fly = next_flight(findings, choice.recordings, found)
+    fly = next_flight(findings, choice.recordings)
     return Analysis(
         recordings=choice.recordings,
         split=choice.split,

@@ -38,7 +38,7 @@ from rotorid.mismatch.evidence.speedpath import starts_of
 from rotorid.mismatch.evidence.split import parts_of, split_runs
 from rotorid.mismatch.flight.absent import chosen_already
 from rotorid.mismatch.flight.delivered import ways
-from rotorid.mismatch.flight.fitted import CURVES, Fitted, beyond_flying, fitted
+from rotorid.mismatch.flight.fitted import Fitted, fitted
 from rotorid.mismatch.flight.prepare import Prepared, assemble_rows, prepare
 from rotorid.mismatch.flight.wrench import chosen, path_segments
 from rotorid.mismatch.mistakes import find_mistakes
@@ -252,17 +252,12 @@ def known(
     questions, chains, unanswerable, seen = [], [], [], set()
     for finding in findings:
         ids = tuple(finding.alternatives) if finding.status == "ambiguous" else ()
-        if found.commanded and finding.id in CURVES and finding.status in CLAIMED:
-            # Whichever was found: known from commands alone the other would do as well.
-            ids = tuple(sorted({*ids, *CURVES}))
         if not ids and finding.id in suggested and finding.status in ("established", "suggested"):
             ids = (finding.id,)
         if not ids or frozenset(ids) in seen:
             continue
         seen.add(frozenset(ids))
-        if needed := beyond_flying(found, ids):
-            unanswerable.append((ids, needed))
-        elif finding.id in chain:
+        if finding.id in chain:
             if between := _chain_question(found, finding, ids):
                 chains.append(between)
             else:

@@ -157,14 +157,6 @@ SETTLED = rule("settled", "Values not called wrong move within their trust where
 
 OWN_SCALES = rule("own_scales", "Where thrust differs between runs each run has its own scale.")
 PAYLOAD_WINDOWS = rule("payload_windows", "A load with two plateaus is a payload that is on board for a part of a run.")
-MERE_SCALE = rule(
-    "mere_scale",
-    "Without measured rotor speeds a throttle curve is a thrust coefficient if only its slope is significant.",
-)
-CLOSED_LOOP_BIAS = rule(
-    "closed_loop_bias",
-    "A delay is not stated if a controller that answers the gyroscope's noise would make commands look as late.",
-)
 COLOURED_NOISE = rule(
     "coloured_noise", "Noise of speeds and gyroscope in the band analysed may be more than its white part."
 )

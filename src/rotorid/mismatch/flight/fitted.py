@@ -57,10 +57,7 @@ from rotorid.mismatch.flight.wrench import (
 )
 from rotorid.recordings import RecordingSet
 from rotorid.recordings.signal.kernels import causal
-from rotorid.vehicle.mixer import hover_speed_rad_s
 
-CURVES = (*ids_of_stage(CURVE), *ids_of("curves_thrust"))
-"""Between throttle and speed, and between speed and thrust: one column where no speed is measured."""
 TAKEN_UP = "without recorded rotor speeds it is one with the curve between throttle and thrust"
 """Why an effect is not looked for that on commands alone is that curve."""
 FOLLOWED = "in this recording commands follow roll and pitch, and not roll and pitch the commands"
@@ -316,35 +313,13 @@ class NextFlight:
     separates: tuple[str, ...] = ()
 
 
-def next_flight(findings: Sequence[Finding], recordings: RecordingSet, found: Fitted | None = None) -> NextFlight:
-    """For the first class that the data leave open; `found` is the model of a flight's set."""
+def next_flight(findings: Sequence[Finding], recordings: RecordingSet) -> NextFlight:
+    """For the first class that the data leave open."""
     for finding in findings:
         if finding.status == "ambiguous":
             ids = tuple(finding.alternatives)
-            needed = "" if found is None else beyond_flying(found, ids)
-            return NextFlight(needed or advice(catalogue()[finding.id], recordings), ids)
+            return NextFlight(advice(catalogue()[finding.id], recordings), ids)
     return NextFlight()
-
-
-def beyond_flying(found: Fitted, ids: Sequence[str]) -> str:
-    """What it takes to settle a class that no flight with the columns of its set can settle; empty where one may."""
-    if not (found.commanded and set(CURVES) <= set(ids)):
-        return ""
-    throttle, thrust = _speeds_in_hover(found)
-    return (
-        f"record the rotor speeds, or hold an optical tachometer to a rotor in hover ({throttle:.0f} rad/s if the "
-        f"throttle is curved, {thrust:.0f} rad/s if the thrust is): where speeds are known from their commands alone "
-        "both curves are one"
-    )
-
-
-def _speeds_in_hover(found: Fitted) -> tuple[float, float]:
-    """Rotor speed, rad/s, in hover if a throttle curve is at work, and if a thrust curve is.
-
-    With a throttle curve the rotors turn as fast as the believed C_F needs; with a thrust curve as commanded.
-    """
-    commands = np.concatenate([s.command.mean(axis=1) for s in found.prepared.segments if s.command is not None])
-    return hover_speed_rad_s(found.prepared.vehicle), float(np.median(commands))
 
 
 @dataclass(frozen=True)
