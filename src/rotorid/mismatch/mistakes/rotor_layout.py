@@ -58,7 +58,7 @@ _STEP_S, _PAST_STEPS = 0.016, 12
 _LEAST_LIFT = 0.6
 """Share of the specific force along the rotors' axis that they must explain to show by it how late their stamps are."""
 _MOTORS_S = (0.0, 0.02, 0.05, 0.1)
-_LEAST_FORETOLD, _LEAST_FORETOLD_IN_PART = 5.0, 2.0
+_LEAST_FORETOLD, _LEAST_FORETOLD_IN_PART = 3.5, 0.5
 """Standard errors by which past torques must improve what past rates foretell: in all runs; in those held out, and in
 the others."""
 _LATER_S = np.arange(0.005, 0.1001, 0.005)
@@ -195,8 +195,11 @@ def _contest(axis_moments: list[_Moments], believed: list[np.ndarray], other: li
     return step, float(student.sf(step / sd, max(count - 1, 1)))
 
 
-def find(recordings: ReadSet) -> Corrected:
-    """The layout (order of the columns, turning senses) that needs the fewest changes among those that fit."""
+def find(recordings: ReadSet, by_yaw: bool = True) -> Corrected:
+    """The layout (order of the columns, turning senses) that needs the fewest changes among those that fit.
+
+    Without `by_yaw` the order by roll and pitch alone.
+    """
     vehicle = recordings.vehicle
     if not 3 <= vehicle.rotor_count <= 8:
         return Corrected(recordings)
@@ -210,7 +213,7 @@ def find(recordings: ReadSet) -> Corrected:
     parts = [axis.moments[0] for axis in rolling]
     rows = _rows_of(vehicle)
     orders = _orders_to_try(vehicle.rotor_count)
-    yawing = _yaw_axis(signals, vehicle, sensor, free)
+    yawing = _yaw_axis(signals, vehicle, sensor, free) if by_yaw else None
     yaw = yawing.moments if yawing else []
     believed = vehicle.yaw_signs()
     senses = np.array(list(product((1.0, -1.0), repeat=vehicle.rotor_count))) if yaw else believed[None]
@@ -229,37 +232,40 @@ def find(recordings: ReadSet) -> Corrected:
     order, spun = ranked[0]
     if costs[order, spun] == 0:
         return Corrected(recordings)
-    # Only axes on which the two layouts differ can distinguish them.
+    # Only axes on which the two layouts differ can distinguish them; the moment about yaw is asked for senses alone.
     contested = [
         (axis, 0, partial(_best_gain, row=row), partial(_best_gain, row=row[orders[order]]))
         for axis, row in zip(rolling, rows, strict=True)
         if not np.array_equal(row, row[orders[order]])
     ]
-    same = int(np.flatnonzero((senses == believed).all(axis=1))[0])
-    as_believed, best = (sum(_loss(c[0].moments[0], c[side](c[0].moments[0])) for c in contested) for side in (2, 3))
-    if yaw and spun != same:
+    expected = int(np.flatnonzero((senses == believed[orders[order]]).all(axis=1))[0]) if yaw else spun
+    turns = spun != expected
+    if turns:
         own = int(by_lag[:, spun].argmin())
-        contested.append((yawing, own, *(partial(_yaw_row, signs=senses[k]) for k in (same, spun))))
-        as_believed, best = as_believed + yaw_losses[same], best + yaw_losses[spun]
+        contested.append((yawing, own, *(partial(_yaw_row, signs=senses[k]) for k in (expected, spun))))
     now, then = ([c[side](c[0].moments[c[1]]) for c in contested] for side in (2, 3))
-    step, p_value = _contest([axis.moments[lag] for axis, lag, _, _ in contested], now, then)
+    seen = [axis.moments[lag] for axis, lag, _, _ in contested]
+    as_believed, best = (sum(map(_loss, seen, side)) for side in (now, then))
+    if turns:
+        as_believed += yaw_losses[expected] - _loss(seen[-1], now[-1])
+    step, p_value = _contest(seen, now, then)
     p_value = min(1.0, p_value * losses.size)
-    disputed = float(sum(axis.moments[lag].square.sum() for axis, lag, _, _ in contested))
+    disputed = float(sum(m.square.sum() for m in seen))
     likely = (as_believed - best) / OVERLAP > _LEAST_LIKELIHOOD
     explains = disputed - best > _LEAST_ADVANTAGE * (disputed - as_believed)
     if not (likely and explains and step > _LEAST_STEP and p_value < _P_LIMIT):
         return Corrected(recordings)
-    held_out = _held_out(recordings)
-    turns = bool(yaw) and spun != same
-    why = ""
-    if turns and not _foretells(recordings, sensor, believed, senses[spun], held_out):
-        why = "torques that came before do not foretell the yaw rate so, and a controller's answers look alike"
-    elif order and _fits_early(blocks, free, rows) < best - OVERLAP * _LEAST_LIKELIHOOD:
-        why = "the believed order fits better with torques after the motion, as late stamps would have it"
-    elif not _holds(contested, held_out):
-        why = "the recordings held out do not confirm it"
-    if why:
-        return _doubted(recordings, turns, why)
+    if order and _fits_early(blocks, free, rows) < least - yaw_losses.min() - OVERLAP * _LEAST_LIKELIHOOD:
+        # The believed order, with stamps of the rotors that are late: `timing` finds them.
+        return Corrected(recordings)
+    held_out = _held_out(recordings, blocks)
+    same = int(np.flatnonzero((senses == believed).all(axis=1))[0])
+    if yaw and spun != same and not _foretells(recordings, sensor, believed, senses[spun], held_out):
+        # The moment about yaw has no say, be it of senses or, by those of the columns, of the order.
+        why = "torques that came before do not foretell the yaw rate so"
+        return _doubted(recordings, turns, why).then(partial(find, by_yaw=False))
+    if not _holds(contested, held_out):
+        return _doubted(recordings, turns, "the recordings held out do not confirm it")
     cost = int(costs[order, spun])
     if not any({"attitude", "gyroscope"} <= set(s.values) for s in signals):
         gyroscope = _turned_gyroscope(recordings, parts, rows, yaw, believed, _tie(whole, least), cost, p_value)
@@ -393,11 +399,14 @@ def _fits_early(blocks: Blocks, free: LaggedFit, rows: np.ndarray) -> float:
     return sum(_loss(m, _best_gain(m, row)) for m, row in zip(moments, rows, strict=True))
 
 
-def _held_out(recordings: ReadSet) -> Callable[[int, float], bool]:
-    """Whether a time (s since its start) of a run (its number) is held out; the last third of each where no run is."""
+def _held_out(recordings: ReadSet, blocks: Blocks) -> Callable[[int, float], bool]:
+    """Whether a time (s since its start) of a run (its number) is held out.
+
+    The last third of each run where no run is, or where those that are, or all others, have none of the blocks.
+    """
     split = split_runs(recordings)
     held = [run.name in split.held_out for run in recordings.runs]
-    if any(held) and not all(held):
+    if {held[k] for k in blocks.run} == {True, False}:
         return lambda run, time_s: held[run]
     ends = [(1 - HELD_OUT_SHARE) * float(run.time_s[-1] - run.time_s[0]) for run in recordings.runs]
     return lambda run, time_s: time_s > ends[run]
@@ -484,7 +493,7 @@ def _past_and_next(signals: Signals, vehicle: Vehicle, sensor: str):
 
 
 def _doubted(recordings: ReadSet, turns: bool, why: str) -> Corrected:
-    """The set as it is, with a doubt about its rotors."""
+    """The set as it is, with a doubt about its rotors' turning senses, or their order."""
     what = "turning senses" if turns else "order of the rotors"
     doubt = Doubt("rotors", f"Another {what} than vehicle.yaml's fits the moments, but {why}: left as it is.")
     return Corrected(replace(recordings, proposed=(*recordings.proposed, doubt)))
