@@ -402,8 +402,10 @@ def _means(q: Quantity, flights: Sequence[Sequence[Flown]], every: Sequence[Flow
     slope, without = _ridge(gram, cross, KINDS[q.kind].penalty)
     away = without - without.mean(axis=0)
     doubt = away.T @ away * (len(away) - 1) / len(away)
-    moved = _moved_by_the_rest(gram, cross, np.concatenate([run.square[q.key] for run in every]), KINDS[q.kind].penalty)
-    doubt += np.diag([b**2 if CONDITIONS[k] in VELOCITY else 0.0 for k, b in zip(at, moved, strict=True)])
+    if KINDS[q.kind].moves:
+        square = np.concatenate([run.square[q.key] for run in every])
+        feigned = _moved_by_the_rest(gram, cross, square, KINDS[q.kind].penalty)
+        doubt += np.diag([b**2 if CONDITIONS[k] in VELOCITY else 0.0 for k, b in zip(at, feigned, strict=True)])
     for k in (at.index(k) for k in at if CONDITIONS[k] == "voltage"):
         slope[k] = np.clip(slope[k], *BY_VOLTAGE)
         doubt[k, k] += DOUBT_OF_VOLTAGE**2
@@ -440,7 +442,7 @@ def _slope(q: Quantity, runs: Sequence[Flown]) -> tuple[float, float, float]:
         # Of a scale that all axes share an axis says as much as it is excited.
         share = excited[k] / excited.sum() if q.member == "all" else sign
         value, without = value + share * slope[k], without + share * others[:, k]
-        if other:
+        if not KINDS[q.kind].moves:
             again, _ = _ridge(np.concatenate([run.gram[:, other][:, :, other] for run in runs]), cross[:, other], 1e-6)
             feigned += abs(share * (slope[k] - again[k]))
         else:

@@ -58,6 +58,8 @@ class _Kind:
     """Whether it is one: differences are relative."""
     other: tuple[str, ...] = ()
     """The conditions of a slope by another sensor, whose noise is in no response with the same sign."""
+    moves: bool = False
+    """Whether it is a force, and what is left of it moves the vehicle: the velocity follows."""
 
 
 KINDS = {
@@ -66,7 +68,7 @@ KINDS = {
         _Kind("share", "of its own mean share", VELOCITY, 3.0),
         _Kind("trim", "of the thrust times the arm", VELOCITY, 3.0),
         _Kind("yaw_trim", "of the torque of all rotors", VELOCITY, 3.0),
-        _Kind("sideways", "of the weight", (*VELOCITY, "load"), 0.1),
+        _Kind("sideways", "of the weight", (*VELOCITY, "load"), 0.1, moves=True),
         _Kind("lift", "", VELOCITY, 1.0, logarithm=True),
         _Kind("lift_of_throttle", "", ("voltage", "load"), 0.1, logarithm=True),
         _Kind("lift_without_voltage", "", ("load",), 0.1, logarithm=True),
@@ -75,7 +77,7 @@ KINDS = {
         _Kind("gyroscope", "rad/s", ("p", "q", "r"), 0.1),
         _Kind("gyroscope_scale", "of the rate", ("p", "q", "r"), other=CONDITIONS[-3:]),
         _Kind("gyroscope_turn", "rad", ("p", "q", "r"), other=CONDITIONS[-3:]),
-        _Kind("drag", "of the weight per hover's inflow", VELOCITY),
+        _Kind("drag", "of the weight per hover's inflow", VELOCITY, moves=True),
         _Kind("noise", "", logarithm=True),
     )
 }
