@@ -403,9 +403,8 @@ def _means(q: Quantity, flights: Sequence[Sequence[Flown]], every: Sequence[Flow
     away = without - without.mean(axis=0)
     doubt = away.T @ away * (len(away) - 1) / len(away)
     if KINDS[q.kind].moves:
-        square = np.concatenate([run.square[q.key] for run in every])
-        feigned = _moved_by_the_rest(gram, cross, square, KINDS[q.kind].penalty)
-        doubt += np.diag([b**2 if CONDITIONS[k] in VELOCITY else 0.0 for k, b in zip(at, feigned, strict=True)])
+        feigned = dict(zip(VELOCITY, _moved_by_the_rest(q.key, every), strict=True))
+        doubt += np.diag([feigned.get(CONDITIONS[k], 0.0) ** 2 for k in at])
     for k in (at.index(k) for k in at if CONDITIONS[k] == "voltage"):
         slope[k] = np.clip(slope[k], *BY_VOLTAGE)
         doubt[k, k] += DOUBT_OF_VOLTAGE**2
@@ -425,7 +424,7 @@ def _slope(q: Quantity, runs: Sequence[Flown]) -> tuple[float, float, float]:
     """A slope in a flight, its variance by the flight's pieces (jackknife), and the most that is feigned of it.
 
     In a closed loop what is left of a response drives what the slope is by: force the velocity, noise of the gyroscope
-    the rates. A force can feign at most what is left of it over what moves the velocity (`_moved_by_the_rest`). Noise
+    the rates. A force can feign at most what is left of it at the velocity's frequencies. Noise
     of the gyroscope is in its own rates, which makes the slope by them too large; by those of the attitude it is too
     small; the truth is between.
     """
@@ -446,20 +445,14 @@ def _slope(q: Quantity, runs: Sequence[Flown]) -> tuple[float, float, float]:
             again, _ = _ridge(np.concatenate([run.gram[:, other][:, :, other] for run in runs]), cross[:, other], 1e-6)
             feigned += abs(share * (slope[k] - again[k]))
         else:
-            square = np.concatenate([run.square[response] for run in runs])
-            feigned += abs(share) * _moved_by_the_rest(gram, cross[:, at], square, 1e-6)[k]
+            feigned += abs(share) * _moved_by_the_rest(response, runs)[k]
     return value, (len(without) - 1) ** 2 / len(without) * float(np.var(without)), feigned
 
 
-def _moved_by_the_rest(gram: np.ndarray, cross: np.ndarray, square: np.ndarray, penalty: float) -> np.ndarray:
-    """By how much each slope (k,) is wrong where all that is left of the response moves with what the slope is by.
-
-    The one-sigma of what is left over that of the condition, as far as the other conditions do not say it.
-    """
-    whole, right = gram.sum(axis=0), cross.sum(axis=0)
-    slope, _ = _ridge(gram, cross, penalty)
-    left = max(float(square.sum() - 2 * right @ slope + slope @ whole @ slope), 0.0)
-    return np.sqrt(left * np.diag(np.linalg.inv(whole + np.diag(penalty * np.diag(whole) + 1e-12))))
+def _moved_by_the_rest(force: str, runs: Sequence[Flown]) -> np.ndarray:
+    """By how much the slope of a force by each velocity (3,) is wrong where all that is left of it moves these."""
+    common, squares = sum(run.feigned[force] for run in runs)
+    return common / np.maximum(squares, 1e-12)
 
 
 def _ridge(gram: np.ndarray, cross: np.ndarray, penalty: float) -> tuple[np.ndarray, np.ndarray]:

@@ -125,8 +125,8 @@ class Flown:
     """Key of a mean quantity, or of what a slope is of, to its mean in each piece, (P,)."""
     cross: Mapping[str, np.ndarray]
     """The same to its products with the conditions, (P, 13), both about their means in the run."""
-    square: Mapping[str, np.ndarray]
-    """The same to its squares about its mean in the run, (P,)."""
+    feigned: Mapping[str, np.ndarray]
+    """Key of a force to what it can feign by each velocity, and the velocity's squares, (2, 3) (`_feigned`)."""
     noise: Mapping[str, float]
     """Key of a noise to its logarithm."""
 
@@ -189,9 +189,19 @@ def flown(run: Run, vehicle: Vehicle, grid: Grid) -> Flown | None:
         gram=np.array([about[cut].T @ about[cut] for cut in cuts]),
         y={k: np.array([v[cut].mean() for cut in cuts]) for k, v in y.items()},
         cross={k: np.array([(v[cut] - v.mean()) @ about[cut] for cut in cuts]) for k, v in y.items()},
-        square={k: np.array([np.sum((v[cut] - v.mean()) ** 2) for cut in cuts]) for k, v in y.items()},
+        feigned={k: _feigned(v - v.mean(), about[:, :3]) for k, v in y.items() if KINDS[k.split("/")[0]].moves},
         noise=_noise(run, vehicle, grid),
     )
+
+
+def _feigned(force: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    """The most that a force (n,) has in common with each velocity (n, 3) that it moves, over the velocity's squares.
+
+    All that a regression leaves of the force, at the velocity's own frequencies, in phase with it: (2, 3).
+    """
+    slope = np.linalg.lstsq(velocity, force, rcond=None)[0]
+    left, moved = np.abs(np.fft.rfft(force - velocity @ slope)), np.abs(np.fft.rfft(velocity, axis=0))
+    return np.stack([left @ moved, np.sum(moved**2, axis=0)])
 
 
 def _rows(segment: Segment, vehicle: Vehicle, thin: Thinner, grid: Grid):

@@ -50,6 +50,8 @@ _PIECE_BINS = 6
 pieces of a block are nearly independent. Short flights have too few blocks to be judged by: what stands at eight
 standard errors is no chance, and yet 1 in 20,000 by Student's t of eight blocks."""
 LONGEST_LAG_S = 0.15
+CAUSES_S = np.arange(0.0, LONGEST_LAG_S + 1e-9, 0.005)
+"""How much later than its cause a motion may be."""
 _MOTOR_LAGS_S = np.concatenate([[0.0], np.geomspace(0.004, 0.25, 24)])
 _DEAD_TIMES_S = np.arange(-0.03, 0.061, 0.005)
 _UNDECIDED = 12.0

@@ -30,6 +30,7 @@ from rotorid.mismatch.mistakes import lagged
 from rotorid.mismatch.mistakes.axes import Turn, turned
 from rotorid.mismatch.mistakes.lagged import (
     BANDS_HZ,
+    CAUSES_S,
     OVERLAP,
     Blocks,
     LaggedFit,
@@ -51,8 +52,6 @@ _LEAST_STEP = 0.6
 _P_LIMIT = 1e-6
 _P_HELD_OUT = 0.01
 """Chance of a layout on the runs held out alone, its gains from the others."""
-_CAUSES_S = np.arange(0.0, lagged.LONGEST_LAG_S + 1e-9, 0.005)
-"""How much later than the torque the motion may be."""
 _STEP_S, _PAST_STEPS = 0.016, 12
 """Length of the intervals over which rates and torques are averaged, and how many of them foretell the next rate."""
 _LEAST_LIFT = 0.6
@@ -206,7 +205,7 @@ def find(recordings: ReadSet, by_yaw: bool = True) -> Corrected:
     signals = recordings.signals
     sensor = next((n for n in map(speeds_of, signals) if n), None)
     blocks = _thrust_blocks(signals, vehicle, sensor) if sensor else None
-    free = lagged.fit(blocks, _CAUSES_S - _late_stamps(signals, vehicle, sensor)) if blocks else None
+    free = lagged.fit(blocks, CAUSES_S - _late_stamps(signals, vehicle, sensor)) if blocks else None
     if free is None:
         return Corrected(recordings)
     rolling = [_Axis(blocks, axis, (free.lag_s,), free.weight[axis]) for axis in (0, 1)]
@@ -394,7 +393,7 @@ def _late_stamps(signals: list[Signals], vehicle: Vehicle, sensor: str) -> float
 
 def _fits_early(blocks: Blocks, free: LaggedFit, rows: np.ndarray) -> float:
     """What the believed order leaves of roll and pitch where the torque may come after the motion."""
-    early = lagged.fit(blocks, -_CAUSES_S[::-1])
+    early = lagged.fit(blocks, -CAUSES_S[::-1])
     moments = [_moments(blocks, axis, early.lag_s, free.weight[axis]) for axis in (0, 1)]
     return sum(_loss(m, _best_gain(m, row)) for m, row in zip(moments, rows, strict=True))
 
