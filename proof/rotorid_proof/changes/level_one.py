@@ -8,7 +8,6 @@ The usual scatter is learnt without the laboratory of the flights that are judge
 
 from __future__ import annotations
 
-import hashlib
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -20,7 +19,7 @@ import numpy as np
 
 from rotorid.mismatch.changes.level_one import Difference, differences, flights_of, found_in, usual_scatter
 from rotorid.mismatch.changes.quantities import KINDS, Flown, Grid, flown, grid_of
-from rotorid.recordings import RecordingSet, read_set
+from rotorid.recordings import RecordingSet, Run, read_set
 from rotorid_proof.intervals import wilson
 from rotorid_proof.plantings import geometry, sensors, values
 from rotorid_proof.plantings.columns import has
@@ -40,8 +39,8 @@ LABORATORIES = {
 """Real flights, each set of a vehicle in which nothing changed, and the laboratory in the table of usual scatter."""
 LABELLED = (("crazypad-normal", "crazypad-weight", "3"), ("crazypad-normal", "crazypad-cut", "3"))
 """Two sets, and the rotor at which their authors changed something."""
-MOST_SPLITS = 60
-"""Splits of a set that are looked at, chosen by hash."""
+PIECE_S = 8.0
+"""Least length of the pieces of runs that are compared as if they were flights."""
 SEEDS = 4
 TWO_DEGREES = float(np.deg2rad(2.0))
 Flights = dict[str, list[Flown]]
@@ -69,12 +68,33 @@ def flights(recordings: RecordingSet, grid: Grid) -> Flights:
     return out
 
 
-def splits(names: Sequence[str], key: str) -> Iterator[tuple[tuple[str, ...], tuple[str, ...]]]:
-    """Every way to split flights in two, at most MOST_SPLITS of them: exchanged, both parts differ by as much."""
-    every = [own for size in range(1, len(names)) for own in combinations(names, size) if names[0] in own]
-    every.sort(key=lambda own: hashlib.sha256(f"{key}{own}".encode()).hexdigest())
-    for own in every[:MOST_SPLITS]:
-        yield own, tuple(n for n in names if n not in own)
+def splits(names: Sequence[str]) -> Iterator[tuple[tuple[str, ...], tuple[str, ...]]]:
+    """Every way to split flights in two: exchanged, both parts differ by as much."""
+    for size in range(1, len(names)):
+        for own in combinations(names[1:], size - 1):
+            yield (names[0], *own), tuple(n for n in names[1:] if n not in own)
+
+
+def pieces(recordings: RecordingSet, grid: Grid) -> Flights:
+    """What pieces of PIECE_S or more of all runs show, each as a flight of its own."""
+    out: Flights = {}
+    for run in recordings.runs:
+        count = max(1, int((run.time_s[-1] - run.time_s[0]) / PIECE_S))
+        for k, part in enumerate(np.array_split(np.arange(len(run.time_s)), count)):
+            piece = Run(f"{run.name}/{k}", run.table.iloc[part].reset_index(drop=True))
+            if (own := flown(piece, recordings.vehicle, grid)) is not None:
+                out[piece.name] = [own]
+    return out
+
+
+def by_liveliness(own: Flights) -> Iterator[tuple[tuple[str, ...], tuple[str, ...]]]:
+    """The quietest flights against the others, wherever the line is drawn: what is flown differs most there."""
+    spread = {
+        n: sum(float(np.trace(run.gram.sum(axis=0)[:6, :6])) / run.rows.sum() for run in r) for n, r in own.items()
+    }
+    names = sorted(own, key=spread.__getitem__)
+    for k in range(1, len(names)):
+        yield tuple(names[:k]), tuple(names[k:])
 
 
 def _turned(recordings: RecordingSet, key: str) -> tuple[RecordingSet, Truth]:
@@ -187,9 +207,21 @@ def main(recordings: Path) -> None:
     total = [0, 0]
     for n, own in shown.items():
         usual = usual_scatter(LABORATORIES[n])
-        for what, every in (("splits", list(splits(list(own), n))), ("one against one", list(combinations(own, 2)))):
-            pairs = [((a,), (b,)) for a, b in every] if what != "splits" else every
-            found = [differences({k: own[k] for k in a}, {k: own[k] for k in b}, usual)[0] for a, b in pairs]
+        cut = pieces(sets[n], grids[n])
+        single = [((a,), (b,)) for a, b in combinations(own, 2)]
+        ways = (
+            ("splits", own, list(splits(list(own)))),
+            ("one against one", own, single),
+            ("pieces, the quiet against the lively", cut, list(by_liveliness(cut))),
+            (
+                "pieces, one against all others",
+                cut,
+                [((k,), tuple(o for o in cut if o != k)) for k in cut if len(cut) > 1],
+            ),
+        )
+        for what, flights_of_way, pairs in ways:
+            parts = [[{k: flights_of_way[k] for k in side} for side in pair] for pair in pairs]
+            found = [differences(a, b, usual)[0] for a, b in parts]
             alarms = [d for d in found if d.stated]
             total = [total[0] + len(alarms), total[1] + len(found)]
             if found:

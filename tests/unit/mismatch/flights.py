@@ -171,6 +171,49 @@ COLUMNS = {
 }
 
 
+def controlled(seed: int, duration_s: float = 20.0, away_m: float = 0.0, drag: float = 0.0, name: str = "run") -> Run:
+    """A flight under a controller that answers disturbances and its gyroscope's noise; no accelerometer.
+
+    It keeps its place, or follows a figure of eight of `away_m`; `drag` decelerates it, 1/s. Logged as speeds is what
+    the rotors were told; theirs follow 30 ms later.
+    """
+    rng, step, motor_s = np.random.default_rng(seed), 0.004, 0.03
+    vehicle = quad()
+    mass, inertia, at = vehicle.mass_kg, np.diag(vehicle.inertia_kg_m2.matrix()), vehicle.rotor_positions_m()
+    lever = vehicle.torque_coefficient_n_m_s2 / vehicle.thrust_coefficient_n_s2
+    mixer = np.stack([np.ones(4), -at[:, 1], at[:, 0], lever * vehicle.yaw_signs()])
+    allot, thrust = np.linalg.inv(mixer), np.full(4, mass * GRAVITY / 4)
+    angle, rate, place, velocity, push, turn = np.zeros((6, 3))
+    rows = []
+    for k in range(int(duration_s / step)):
+        t = k * step
+        read = rate + 0.02 * rng.standard_normal(3)
+        target = away_m * np.array([np.sin(0.9 * t), np.cos(0.7 * t), 0.0])
+        moving = away_m * np.array([0.9 * np.cos(0.9 * t), -0.7 * np.sin(0.7 * t), 0.0])
+        wish = np.clip(0.15 * (velocity - moving) + 0.08 * (place - target), -0.2, 0.2)
+        asked = np.array([6.0, 6.0, 2.0]) * (np.array([-wish[1], wish[0], 0.0]) - angle)
+        moment = inertia * np.array([12.0, 12.0, 4.0]) * (asked - read)
+        lift = mass * (GRAVITY + 3.0 * velocity[2] + 2.0 * place[2])
+        told = np.maximum(allot @ np.array([lift, *moment]), 0.05)
+        if k % 2 == 0:
+            rows.append([t, *np.sqrt(told / vehicle.thrust_coefficient_n_s2), *place, *velocity, *angle, *read])
+        thrust += step / motor_s * (told - thrust)
+        push += -push * step / 0.5 + np.sqrt(2 * step / 0.5) * 0.004 * mass * GRAVITY * rng.standard_normal(3)
+        turn += -turn * step / 0.3 + np.sqrt(2 * step / 0.3) * 0.1 * inertia * rng.standard_normal(3)
+        given = mixer @ thrust
+        rate += step * (given[1:] + turn) / inertia
+        angle += step * rate
+        turned = Rotation.from_euler("ZYX", angle[::-1]).as_matrix()
+        velocity += step * ((push - given[0] * turned[:, 2]) / mass - drag * velocity * (1, 1, 0) + (0, 0, GRAVITY))
+        place += step * velocity
+    table = np.array(rows)
+    quaternion = Rotation.from_euler("ZYX", table[:, 13:10:-1]).as_quat()[:, [3, 0, 1, 2]]
+    parts = {"rotors": table[:, 1:5], "position": table[:, 5:8], "velocity": table[:, 8:11]}
+    parts |= {"attitude": quaternion, "gyroscope": table[:, 14:17]}
+    columns = {n: v[:, k] for sensor, v in parts.items() for k, n in enumerate(COLUMNS[sensor])}
+    return Run(name, pd.DataFrame({"time_s": table[:, 0], **columns}))
+
+
 def recorded(*seeds: int, flight=None, vehicle: Vehicle | None = None, **how) -> RecordingSet:
     """A set of one run for every seed."""
     runs = tuple(Flight(seed, **(flight or {})).record(name=f"run{k:02d}", **how) for k, seed in enumerate(seeds))

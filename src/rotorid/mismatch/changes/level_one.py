@@ -7,7 +7,8 @@ two sets' means follows Student's t by two yardsticks, of which the rarer counts
   degrees of freedom (Smyth, Statistical Applications in Genetics and Molecular Biology 3, 2004, eq. 3: a moderated t);
 - the largest scatter that the flights of any laboratory showed, taken as known.
 
-No flight is known better than its own pieces tell. A false-alarm rate counts all quantities that are looked at.
+No flight is known better than its own pieces tell. Of a slope only what a closed loop cannot feign counts (`_slope`).
+A false-alarm rate counts all quantities that are looked at.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from rotorid.mismatch.changes.quantities import (
     KINDS,
     PART,
     SLOPES,
+    VELOCITY,
     Flown,
     Quantity,
     flown,
@@ -157,6 +159,8 @@ class Difference:
     """One-sigma from flight to flight that it is held against."""
     false_alarms: float
     """How often a difference as rare, of any quantity, is seen where nothing changed."""
+    feigned: float
+    """The most that disturbances and noise, answered by the controllers, can feign of it; 0 of what is no slope."""
     smallest: float
     """Smallest change that is stated in 19 of 20 comparisons like this."""
 
@@ -167,7 +171,7 @@ class Difference:
 
     def interval(self, share: float = 0.95) -> tuple[float, float]:
         """The interval that holds the difference with this probability."""
-        reach = float(stdtrit(self.freedom, 0.5 + 0.5 * share)) * self.sd
+        reach = float(stdtrit(self.freedom, 0.5 + 0.5 * share)) * self.sd + self.feigned
         return self.value - reach, self.value + reach
 
 
@@ -366,6 +370,8 @@ class _Numbers:
     """(F, k) mean conditions of each."""
     doubt: np.ndarray
     """(k, k) covariance of the slopes by those conditions."""
+    feigned: np.ndarray
+    """(F,) the most that a closed loop can feign of each."""
 
 
 def measured(flights: Sequence[Sequence[Flown]]) -> dict[Quantity, _Numbers]:
@@ -378,11 +384,11 @@ def _numbers(q: Quantity, flights: Sequence[Sequence[Flown]], every: Sequence[Fl
     if q.kind not in SLOPES and q.kind != "noise":
         return _means(q, flights, every)
     if q.kind == "noise":
-        pairs = [(np.mean([run.noise[q.key] for run in runs]), 0.0) for runs in flights]
+        parts = [(np.mean([run.noise[q.key] for run in runs]), 0.0, 0.0) for runs in flights]
     else:
-        pairs = [_slope(q, runs) for runs in flights]
-    values, own = np.array(pairs, float).T
-    return _Numbers(values, own, np.zeros((len(values), 0)), np.zeros((0, 0)))
+        parts = [_slope(q, runs) for runs in flights]
+    values, own, feigned = np.array(parts, float).T
+    return _Numbers(values, own, np.zeros((len(values), 0)), np.zeros((0, 0)), feigned)
 
 
 def _means(q: Quantity, flights: Sequence[Sequence[Flown]], every: Sequence[Flown]) -> _Numbers:
@@ -396,6 +402,9 @@ def _means(q: Quantity, flights: Sequence[Sequence[Flown]], every: Sequence[Flow
     slope, without = _ridge(gram, cross, KINDS[q.kind].penalty)
     away = without - without.mean(axis=0)
     doubt = away.T @ away * (len(away) - 1) / len(away)
+    if KINDS[q.kind].moves:
+        feigned = dict(zip(VELOCITY, _moved_by_the_rest(q.key, every), strict=True))
+        doubt += np.diag([feigned.get(CONDITIONS[k], 0.0) ** 2 for k in at])
     for k in (at.index(k) for k in at if CONDITIONS[k] == "voltage"):
         slope[k] = np.clip(slope[k], *BY_VOLTAGE)
         doubt[k, k] += DOUBT_OF_VOLTAGE**2
@@ -408,23 +417,42 @@ def _means(q: Quantity, flights: Sequence[Sequence[Flown]], every: Sequence[Flow
         values.append(np.average(y, weights=rows))
         variances.append(np.average((y - values[-1]) ** 2, weights=rows) / max(len(rows) - 1, 1))
         places.append(np.average(x, axis=0, weights=rows))
-    return _Numbers(np.array(values), np.array(variances), np.array(places), doubt)
+    return _Numbers(np.array(values), np.array(variances), np.array(places), doubt, np.zeros(len(values)))
 
 
-def _slope(q: Quantity, runs: Sequence[Flown]) -> tuple[float, float]:
-    """A slope in a flight, and its variance by the flight's pieces (jackknife)."""
+def _slope(q: Quantity, runs: Sequence[Flown]) -> tuple[float, float, float]:
+    """A slope in a flight, its variance by the flight's pieces (jackknife), and the most that is feigned of it.
+
+    In a closed loop what is left of a response drives what the slope is by: force the velocity, noise of the gyroscope
+    the rates. A force can feign at most what is left of it at the velocity's frequencies. Noise
+    of the gyroscope is in its own rates, which makes the slope by them too large; by those of the attitude it is too
+    small; the truth is between.
+    """
     at = _places(q.kind)
+    other = [CONDITIONS.index(name) for name in KINDS[q.kind].other]
     gram = np.concatenate([run.gram[:, at][:, :, at] for run in runs])
     excited = np.diag(gram.sum(axis=0))
     parts = SLOPES[q.kind][q.member]
-    value, without = 0.0, np.zeros(len(gram))
+    value, feigned, without = 0.0, 0.0, np.zeros(len(gram))
     for response, by, sign in parts:
-        slope, others = _ridge(gram, np.concatenate([run.cross[response][:, at] for run in runs]), 1e-6)
+        cross = np.concatenate([run.cross[response] for run in runs])
+        slope, others = _ridge(gram, cross[:, at], 1e-6)
         k = KINDS[q.kind].at.index(by)
         # Of a scale that all axes share an axis says as much as it is excited.
         share = excited[k] / excited.sum() if q.member == "all" else sign
         value, without = value + share * slope[k], without + share * others[:, k]
-    return value, (len(without) - 1) ** 2 / len(without) * float(np.var(without))
+        if not KINDS[q.kind].moves:
+            again, _ = _ridge(np.concatenate([run.gram[:, other][:, :, other] for run in runs]), cross[:, other], 1e-6)
+            feigned += abs(share * (slope[k] - again[k]))
+        else:
+            feigned += abs(share) * _moved_by_the_rest(response, runs)[k]
+    return value, (len(without) - 1) ** 2 / len(without) * float(np.var(without)), feigned
+
+
+def _moved_by_the_rest(force: str, runs: Sequence[Flown]) -> np.ndarray:
+    """By how much the slope of a force by each velocity (3,) is wrong where all that is left of it moves these."""
+    common, squares = sum(run.feigned[force] for run in runs)
+    return common / np.maximum(squares, 1e-12)
 
 
 def _ridge(gram: np.ndarray, cross: np.ndarray, penalty: float) -> tuple[np.ndarray, np.ndarray]:
@@ -445,6 +473,8 @@ def _difference(
     total = usual.freedom + freedom
     joint = (usual.freedom * usual.sd**2 + freedom * found) / total
     value = float(values[1].mean() - values[0].mean())
+    feigned = float(numbers.feigned[first].mean() + numbers.feigned[second].mean())
+    beyond = max(abs(value) - feigned, 0.0)
     apart = numbers.places[second].mean(axis=0) - numbers.places[first].mean(axis=0)
     believed = _overstated(numbers.own, found, freedom)
     tests = []
@@ -452,14 +482,15 @@ def _difference(
         each = [variance + w if q.kind in SLOPES else np.maximum(variance, believed * w) for w in owns]
         sd = float(np.sqrt(sum(v.mean() / len(v) for v in each) + apart @ numbers.doubt @ apart))
         reach = -stdtrit(degrees, 0.25 * FALSE_ALARMS * share) - stdtrit(degrees, 0.05)
-        tests.append((2.0 * float(stdtr(degrees, -abs(value) / sd)), sd, degrees, variance, float(reach) * sd))
+        tests.append((2.0 * float(stdtr(degrees, -beyond / sd)), sd, degrees, variance, float(reach) * sd + feigned))
     rate, sd, degrees, variance, _ = min(tests)
     flights = [
         _OneFlight(n, float(v), float(np.sqrt(w))) for n, v, w in zip(names, numbers.values, numbers.own, strict=True)
     ]
     rate, smallest = min(1.0, 2.0 * rate / share), min(test[-1] for test in tests)
     scatter = float(np.sqrt(variance))
-    return Difference(q, tuple(flights[first]), tuple(flights[second]), value, sd, degrees, scatter, rate, smallest)
+    sides = tuple(flights[first]), tuple(flights[second])
+    return Difference(q, *sides, value, sd, degrees, scatter, rate, feigned, smallest)
 
 
 def _overstated(own: np.ndarray, found: float, freedom: int) -> float:

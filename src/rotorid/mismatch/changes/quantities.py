@@ -25,9 +25,10 @@ from rotorid.mismatch.evidence.rows import Thinner, residual
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
 
-CONDITIONS = ("u", "v", "w", "p", "q", "r", "a_x", "a_y", "load", "voltage")
+VELOCITY = ("u", "v", "w")
+CONDITIONS = (*VELOCITY, "p", "q", "r", "a_x", "a_y", "load", "voltage", "turned_p", "turned_q", "turned_r")
 """Velocity over the hover's inflow and body rates (rad/s), body axes; specific force along x and y, and the thrust that
-is felt less one, over gravity; logarithm of the battery's voltage."""
+is felt less one, over gravity; logarithm of the battery's voltage; body rates by the attitude (rad/s)."""
 _AXES = ("x", "y", "z")
 _TURNS = ("roll", "pitch", "yaw")
 _LEAST_FELT = 0.3
@@ -55,25 +56,28 @@ class _Kind:
     """Of the ridge by which a mean depends on its conditions, over their variance within runs."""
     logarithm: bool = False
     """Whether it is one: differences are relative."""
+    other: tuple[str, ...] = ()
+    """The conditions of a slope by another sensor, whose noise is in no response with the same sign."""
+    moves: bool = False
+    """Whether it is a force, and what is left of it moves the vehicle: the velocity follows."""
 
 
-_VELOCITY = ("u", "v", "w")
 KINDS = {
     k.name: k
     for k in (
-        _Kind("share", "of its own mean share", _VELOCITY, 3.0),
-        _Kind("trim", "of the thrust times the arm", _VELOCITY, 3.0),
-        _Kind("yaw_trim", "of the torque of all rotors", _VELOCITY, 3.0),
-        _Kind("sideways", "of the weight", (*_VELOCITY, "load"), 0.1),
-        _Kind("lift", "", _VELOCITY, 1.0, logarithm=True),
+        _Kind("share", "of its own mean share", VELOCITY, 3.0),
+        _Kind("trim", "of the thrust times the arm", VELOCITY, 3.0),
+        _Kind("yaw_trim", "of the torque of all rotors", VELOCITY, 3.0),
+        _Kind("sideways", "of the weight", (*VELOCITY, "load"), 0.1, moves=True),
+        _Kind("lift", "", VELOCITY, 1.0, logarithm=True),
         _Kind("lift_of_throttle", "", ("voltage", "load"), 0.1, logarithm=True),
         _Kind("lift_without_voltage", "", ("load",), 0.1, logarithm=True),
         _Kind("follows", "", logarithm=True),
         _Kind("accelerometer", "g"),
         _Kind("gyroscope", "rad/s", ("p", "q", "r"), 0.1),
-        _Kind("gyroscope_scale", "of the rate", ("p", "q", "r")),
-        _Kind("gyroscope_turn", "rad", ("p", "q", "r")),
-        _Kind("drag", "of the weight per hover's inflow", _VELOCITY),
+        _Kind("gyroscope_scale", "of the rate", ("p", "q", "r"), other=CONDITIONS[-3:]),
+        _Kind("gyroscope_turn", "rad", ("p", "q", "r"), other=CONDITIONS[-3:]),
+        _Kind("drag", "of the weight per hover's inflow", VELOCITY, moves=True),
         _Kind("noise", "", logarithm=True),
     )
 }
@@ -89,7 +93,7 @@ SLOPES: dict[str, dict[str, tuple[tuple[str, str, float], ...]]] = {
     "drag": {a: ((f"sideways/{a}", by, 1.0),) for a, by in zip(_AXES[:2], "uv", strict=True)},
 }
 """Of each kind of slope, by member: of which response, by which condition, with which sign. Body rates' own moments
-(L_p, M_q) are none: a closed loop feigns them."""
+(L_p, M_q) are none: a closed loop feigns them. What it can feign of these is taken off before they count."""
 
 
 @dataclass(frozen=True)
@@ -114,13 +118,15 @@ class Flown:
     rows: np.ndarray
     """(P,) rows of each piece."""
     x: np.ndarray
-    """(P, 10) mean CONDITIONS; NaN of those that are not recorded."""
+    """(P, 13) mean CONDITIONS; NaN of those that are not recorded."""
     gram: np.ndarray
-    """(P, 10, 10) products of the conditions about their means in the run; 0 of those that are not recorded."""
+    """(P, 13, 13) products of the conditions about their means in the run; 0 of those that are not recorded."""
     y: Mapping[str, np.ndarray]
     """Key of a mean quantity, or of what a slope is of, to its mean in each piece, (P,)."""
     cross: Mapping[str, np.ndarray]
-    """The same to its products with the conditions, (P, 10), both about their means in the run."""
+    """The same to its products with the conditions, (P, 13), both about their means in the run."""
+    feigned: Mapping[str, np.ndarray]
+    """Key of a force to what it can feign by each velocity, and the velocity's squares, (2, 3) (`_feigned`)."""
     noise: Mapping[str, float]
     """Key of a noise to its logarithm."""
 
@@ -183,12 +189,23 @@ def flown(run: Run, vehicle: Vehicle, grid: Grid) -> Flown | None:
         gram=np.array([about[cut].T @ about[cut] for cut in cuts]),
         y={k: np.array([v[cut].mean() for cut in cuts]) for k, v in y.items()},
         cross={k: np.array([(v[cut] - v.mean()) @ about[cut] for cut in cuts]) for k, v in y.items()},
+        feigned={k: _feigned(v - v.mean(), about[:, :3]) for k, v in y.items() if KINDS[k.split("/")[0]].moves},
         noise=_noise(run, vehicle, grid),
     )
 
 
+def _feigned(force: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    """The most that a force (n,) has in common with each velocity (n, 3) that it moves, over the velocity's squares.
+
+    All that a regression leaves of the force, at the velocity's own frequencies, in phase with it: (2, 3).
+    """
+    slope = np.linalg.lstsq(velocity, force, rcond=None)[0]
+    left, moved = np.abs(np.fft.rfft(force - velocity @ slope)), np.abs(np.fft.rfft(velocity, axis=0))
+    return np.stack([left @ moved, np.sum(moved**2, axis=0)])
+
+
 def _rows(segment: Segment, vehicle: Vehicle, thin: Thinner, grid: Grid):
-    """Times, conditions (n, 10) and responses of a stretch, thinned."""
+    """Times, conditions (n, 13) and responses of a stretch, thinned."""
     motion, time_s = segment.motion, thin.times(segment.motion.time_s)
     x, y = np.full((len(time_s), len(CONDITIONS)), np.nan), {}
     if motion.velocity is not None:
@@ -208,6 +225,8 @@ def _rows(segment: Segment, vehicle: Vehicle, thin: Thinner, grid: Grid):
     for name, unit in (("accelerometer", vehicle.gravity_m_s2), ("gyroscope", 1.0)):
         if name in groups:
             y |= {f"{name}/{a}": column / unit for a, column in zip(_AXES, thin(groups[name]).T, strict=True)}
+    if "gyroscope" in groups:
+        x[:, -3:] = x[:, 3:6] - thin(groups["gyroscope"])
     lift = "lift"
     if grid.throttle and not grid.speeds:
         # A throttle gives less thrust as the battery empties; a speed does not.

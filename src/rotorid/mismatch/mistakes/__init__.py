@@ -11,7 +11,10 @@ from rotorid.steps import step
 
 @step("looking for mistakes in the recordings")
 def find_mistakes(recordings: RecordingSet) -> tuple[RecordingSet, tuple[Finding, ...], tuple[str, ...]]:
-    """The set of a vehicle in flight as corrected, what was wrong with it, and notes for the reader."""
+    """The set of a vehicle in flight as corrected, what was wrong with it, and notes for the reader.
+
+    `proposed` of the set that comes out holds what was doubted and left as it is.
+    """
     before = _read(recordings)
     recordings, lost = dropout.find(before)
     notes: tuple[str, ...] = ()
@@ -34,4 +37,6 @@ def _read(recordings: RecordingSet) -> ReadSet:
 
 
 def _written(recordings: ReadSet) -> RecordingSet:
-    return RecordingSet(recordings.name, recordings.vehicle, recordings.runs, recordings.held_out)
+    return RecordingSet(
+        recordings.name, recordings.vehicle, recordings.runs, recordings.held_out, proposed=recordings.proposed
+    )

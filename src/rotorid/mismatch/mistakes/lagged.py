@@ -50,6 +50,8 @@ _PIECE_BINS = 6
 pieces of a block are nearly independent. Short flights have too few blocks to be judged by: what stands at eight
 standard errors is no chance, and yet 1 in 20,000 by Student's t of eight blocks."""
 LONGEST_LAG_S = 0.15
+CAUSES_S = np.arange(0.0, LONGEST_LAG_S + 1e-9, 0.005)
+"""How much later than its cause a motion may be."""
 _MOTOR_LAGS_S = np.concatenate([[0.0], np.geomspace(0.004, 0.25, 24)])
 _DEAD_TIMES_S = np.arange(-0.03, 0.061, 0.005)
 _UNDECIDED = 12.0
@@ -239,7 +241,7 @@ def delay(frequency_hz: np.ndarray, lag_s) -> np.ndarray:
 def fit(blocks: Blocks | None, lags_s: np.ndarray | None = None) -> LaggedFit | None:
     """The best delay with free real gains; None where there are too few blocks.
 
-    `lags_s` is the grid to search, `[0]` to hold it there.
+    `lags_s` is the grid to search, `[0]` to hold it there; the delay stays between its ends.
     """
     if blocks is None or blocks.count < FEWEST_BLOCKS:
         return None
@@ -247,6 +249,7 @@ def fit(blocks: Blocks | None, lags_s: np.ndarray | None = None) -> LaggedFit | 
     if lags_s is None:
         step = 1.0 / (8 * frequency[-1])
         lags_s = np.arange(-LONGEST_LAG_S, LONGEST_LAG_S + step / 2, step)
+    ends = lags_s[0], lags_s[-1]
     trusted = _coherence(blocks) + 1e-6
     weight = trusted * _noise_weight(blocks, blocks.y)
     products = _by_frequency(blocks)
@@ -260,9 +263,9 @@ def fit(blocks: Blocks | None, lags_s: np.ndarray | None = None) -> LaggedFit | 
         lag = _peak(lags_s, explained_by(lags_s))
         if len(lags_s) > 1:
             step = lags_s[1] - lags_s[0]
-            fine = lag + np.linspace(-1, 1, 5) * step / 4
+            fine = _within(lag + np.linspace(-1, 1, 5) * step / 4, ends)
             lag = _peak(fine, explained_by(fine))
-            lags_s = lag + np.linspace(-3, 3, 13) * step
+            lags_s = _within(lag + np.linspace(-3, 3, 13) * step, ends)
         x = np.concatenate([blocks.delayed(lag).x, blocks.z], axis=2)
         gram_b, cross_b = _moments(x, blocks.y, weight)
         weight = trusted * _noise_weight(blocks, blocks.y - x @ _solve(gram_b.sum(axis=0), cross_b.sum(axis=0)).T)
@@ -307,6 +310,11 @@ def beyond_nuisances(turn: np.ndarray, z: np.ndarray, weight: np.ndarray) -> np.
         cross = np.real(np.einsum("bmk,bm->k", z.conj() * w, turn[:, :, j]))
         out[:, :, j] = turn[:, :, j] - z @ (np.linalg.pinv(gram, hermitian=True) @ cross)
     return out
+
+
+def _within(lags_s: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
+    """Those of some delays that are between two."""
+    return lags_s[(lags_s > ends[0] - 1e-9) & (lags_s < ends[1] + 1e-9)]
 
 
 def _peak(at: np.ndarray, score: np.ndarray) -> float:

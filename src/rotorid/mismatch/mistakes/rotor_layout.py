@@ -3,24 +3,34 @@
 In a closed loop every rotor answers every disturbance, so one rotor at a time misleads. Here whole layouts
 compete: each predicts roll, pitch and yaw acceleration from all squared speeds in a band (2-25 Hz; yaw from
 0.7 Hz), with a free positive gain an axis so that a wrong C_F, C_Q or inertia does not matter.
+
+Causes come first. A controller answers each rate, and each noise of the gyroscope, with a torque that fits as well as
+the rotors' own, of the other sign and after the motion. So torques count before the motion alone, a layout must hold on
+the runs held out, and turning senses must foretell the yaw rate from what is past (`_foretells`). What fits and fails
+in this is a doubt.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import combinations, permutations, product
 
 import numpy as np
 from scipy.optimize import nnls
+from scipy.signal import lfilter
 from scipy.sparse.csgraph import connected_components
 from scipy.stats import t as student
 
 from rotorid.mismatch.decide.findings import Finding
+from rotorid.mismatch.evidence.motion import stretches
+from rotorid.mismatch.evidence.split import HELD_OUT_SHARE, split_runs
 from rotorid.mismatch.mistakes import lagged
 from rotorid.mismatch.mistakes.axes import Turn, turned
 from rotorid.mismatch.mistakes.lagged import (
     BANDS_HZ,
+    CAUSES_S,
     OVERLAP,
     Blocks,
     LaggedFit,
@@ -31,6 +41,7 @@ from rotorid.mismatch.mistakes.lagged import (
 )
 from rotorid.mismatch.mistakes.signals import Corrected, ReadSet, Signals, replace_columns, sensor_columns
 from rotorid.recordings import Run, Vehicle
+from rotorid.recordings.run import Doubt
 
 _MOST_ROTORS_FOR_EVERY_ORDER = 6
 _LEAST_LIKELIHOOD = 25.0
@@ -39,6 +50,16 @@ _LEAST_ADVANTAGE = 1.5
 """What the right layout explains over what the believed one explains, at least."""
 _LEAST_STEP = 0.6
 _P_LIMIT = 1e-6
+_P_HELD_OUT = 0.01
+"""Chance of a layout on the runs held out alone, its gains from the others."""
+_STEP_S, _PAST_STEPS = 0.016, 12
+"""Length of the intervals over which rates and torques are averaged, and how many of them foretell the next rate."""
+_LEAST_LIFT = 0.6
+"""Share of the specific force along the rotors' axis that they must explain to show by it how late their stamps are."""
+_MOTORS_S = (0.0, 0.02, 0.05, 0.1)
+_LEAST_FORETOLD, _LEAST_FORETOLD_IN_PART = 3.5, 0.5
+"""Standard errors by which past torques must improve what past rates foretell: in all runs; in those held out, and in
+the others."""
 _LATER_S = np.arange(0.005, 0.1001, 0.005)
 """By how much longer the torque of rotors may lag behind their commands than the delay that roll shows."""
 _TIED_LIKELIHOOD, _TIED_SHARE = 12.0, 0.02
@@ -77,6 +98,27 @@ def _moments(blocks: Blocks, output: int, lag_s: float, weight: np.ndarray) -> _
     cross = [np.real(np.einsum("bmk,bm->bk", x.conj() * w[:, None], y)) for x, y, w in parts]
     gram = [np.real(np.einsum("bmk,bml->bkl", x.conj() * w[:, None], x)) for x, _, w in parts]
     return _Moments(*(np.concatenate(part) for part in (square, cross, gram)))
+
+
+@dataclass(frozen=True)
+class _Axis:
+    """One axis whose acceleration layouts predict."""
+
+    blocks: Blocks
+    output: int
+    lags_s: tuple[float, ...]
+    """Delays of the rotors that are tried."""
+    weight: np.ndarray
+    """(m,)."""
+
+    @cached_property
+    def moments(self) -> list[_Moments]:
+        """With each of the delays."""
+        return [_moments(self.blocks, self.output, lag_s, self.weight) for lag_s in self.lags_s]
+
+    def part(self, chosen: np.ndarray) -> _Axis:
+        """The same of some of the blocks only."""
+        return replace(self, blocks=self.blocks.part(chosen))
 
 
 def _rows_of(vehicle: Vehicle) -> np.ndarray:
@@ -152,21 +194,26 @@ def _contest(axis_moments: list[_Moments], believed: list[np.ndarray], other: li
     return step, float(student.sf(step / sd, max(count - 1, 1)))
 
 
-def find(recordings: ReadSet) -> Corrected:
-    """The layout (order of the columns, turning senses) that needs the fewest changes among those that fit."""
+def find(recordings: ReadSet, by_yaw: bool = True) -> Corrected:
+    """The layout (order of the columns, turning senses) that needs the fewest changes among those that fit.
+
+    Without `by_yaw` the order by roll and pitch alone.
+    """
     vehicle = recordings.vehicle
     if not 3 <= vehicle.rotor_count <= 8:
         return Corrected(recordings)
     signals = recordings.signals
     sensor = next((n for n in map(speeds_of, signals) if n), None)
     blocks = _thrust_blocks(signals, vehicle, sensor) if sensor else None
-    free = lagged.fit(blocks)
+    free = lagged.fit(blocks, CAUSES_S - _late_stamps(signals, vehicle, sensor)) if blocks else None
     if free is None:
         return Corrected(recordings)
-    parts = [_moments(blocks, axis, free.lag_s, free.weight[axis]) for axis in (0, 1)]
+    rolling = [_Axis(blocks, axis, (free.lag_s,), free.weight[axis]) for axis in (0, 1)]
+    parts = [axis.moments[0] for axis in rolling]
     rows = _rows_of(vehicle)
     orders = _orders_to_try(vehicle.rotor_count)
-    yaw = _yaw_moments(signals, vehicle, sensor, free)
+    yawing = _yaw_axis(signals, vehicle, sensor, free) if by_yaw else None
+    yaw = yawing.moments if yawing else []
     believed = vehicle.yaw_signs()
     senses = np.array(list(product((1.0, -1.0), repeat=vehicle.rotor_count))) if yaw else believed[None]
     # Every layout with the delay that suits it best: half a period of an oscillation late is the other sense.
@@ -184,28 +231,40 @@ def find(recordings: ReadSet) -> Corrected:
     order, spun = ranked[0]
     if costs[order, spun] == 0:
         return Corrected(recordings)
-    # Only axes on which the two layouts differ can distinguish them.
-    contested, now, then = [], [], []
-    for a, m in enumerate(parts):
-        if not np.array_equal(rows[a], rows[a][orders[order]]):
-            contested.append(m)
-            now.append(_best_gain(m, rows[a]))
-            then.append(_best_gain(m, rows[a][orders[order]]))
-    same = int(np.flatnonzero((senses == believed).all(axis=1))[0])
-    as_believed, best = (sum(_loss(m, row) for m, row in zip(contested, side, strict=True)) for side in (now, then))
-    if yaw and spun != same:
-        own = yaw[int(by_lag[:, spun].argmin())]
-        contested.append(own)
-        now.append(_yaw_row(own, senses[same]))
-        then.append(_yaw_row(own, senses[spun]))
-        as_believed, best = as_believed + yaw_losses[same], best + yaw_losses[spun]
-    step, p_value = _contest(contested, now, then)
+    # Only axes on which the two layouts differ can distinguish them; the moment about yaw is asked for senses alone.
+    contested = [
+        (axis, 0, partial(_best_gain, row=row), partial(_best_gain, row=row[orders[order]]))
+        for axis, row in zip(rolling, rows, strict=True)
+        if not np.array_equal(row, row[orders[order]])
+    ]
+    expected = int(np.flatnonzero((senses == believed[orders[order]]).all(axis=1))[0]) if yaw else spun
+    turns = spun != expected
+    if turns:
+        own = int(by_lag[:, spun].argmin())
+        contested.append((yawing, own, *(partial(_yaw_row, signs=senses[k]) for k in (expected, spun))))
+    now, then = ([c[side](c[0].moments[c[1]]) for c in contested] for side in (2, 3))
+    seen = [axis.moments[lag] for axis, lag, _, _ in contested]
+    as_believed, best = (sum(map(_loss, seen, side)) for side in (now, then))
+    if turns:
+        as_believed += yaw_losses[expected] - _loss(seen[-1], now[-1])
+    step, p_value = _contest(seen, now, then)
     p_value = min(1.0, p_value * losses.size)
-    disputed = float(sum(m.square.sum() for m in contested))
+    disputed = float(sum(m.square.sum() for m in seen))
     likely = (as_believed - best) / OVERLAP > _LEAST_LIKELIHOOD
     explains = disputed - best > _LEAST_ADVANTAGE * (disputed - as_believed)
     if not (likely and explains and step > _LEAST_STEP and p_value < _P_LIMIT):
         return Corrected(recordings)
+    if order and _fits_early(blocks, free, rows) < least - yaw_losses.min() - OVERLAP * _LEAST_LIKELIHOOD:
+        # The believed order, with stamps of the rotors that are late: `timing` finds them.
+        return Corrected(recordings)
+    held_out = _held_out(recordings, blocks)
+    same = int(np.flatnonzero((senses == believed).all(axis=1))[0])
+    if yaw and spun != same and not _foretells(recordings, sensor, believed, senses[spun], held_out):
+        # The moment about yaw has no say, be it of senses or, by those of the columns, of the order.
+        why = "torques that came before do not foretell the yaw rate so"
+        return _doubted(recordings, turns, why).then(partial(find, by_yaw=False))
+    if not _holds(contested, held_out):
+        return _doubted(recordings, turns, "the recordings held out do not confirm it")
     cost = int(costs[order, spun])
     if not any({"attitude", "gyroscope"} <= set(s.values) for s in signals):
         gyroscope = _turned_gyroscope(recordings, parts, rows, yaw, believed, _tie(whole, least), cost, p_value)
@@ -302,13 +361,13 @@ def _reordered(recordings: ReadSet, order: np.ndarray, p: float, ambiguous: bool
     return Corrected(recordings if ambiguous else replace_columns(recordings, change), (finding,))
 
 
-def _yaw_moments(signals: list[Signals], vehicle: Vehicle, sensor: str, roll: LaggedFit) -> list[_Moments]:
-    """Yaw acceleration against every rotor's torque (k) and acceleration (k); none without a torque coefficient.
+def _yaw_axis(signals: list[Signals], vehicle: Vehicle, sensor: str, roll: LaggedFit) -> _Axis | None:
+    """Yaw acceleration against every rotor's torque (k) and acceleration (k); None without a torque coefficient.
 
     Measured rotors are as late as roll says. Commands may be later: of rotors that lag, torque and acceleration are.
     """
     if not np.any(vehicle.torque_coefficients_n_m_s2()):
-        return []
+        return None
 
     def make(s: Signals):
         rate = s.values["gyroscope"]
@@ -321,8 +380,122 @@ def _yaw_moments(signals: list[Signals], vehicle: Vehicle, sensor: str, roll: La
     sharp = roll.lag_sd < 0.005
     late = roll.lag_s if sharp else 0.0
     free = lagged.fit(blocks, np.array([late]))
-    lags = [late] if sensor == "rotors" else [late, *(late + _LATER_S)]
-    return [_moments(blocks, 0, lag, free.weight[0]) for lag in lags] if free else []
+    lags = (late,) if sensor == "rotors" else (late, *(late + _LATER_S))
+    return _Axis(blocks, 0, lags, free.weight[0]) if free else None
+
+
+def _late_stamps(signals: list[Signals], vehicle: Vehicle, sensor: str) -> float:
+    """By how much the rotors' stamps are late, s, where the force that they carry shows it: the lift has one sign."""
+    lift = lagged.fit(lagged.lifting(signals, vehicle, sensor))
+    known = lift is not None and lift.explained[0] > _LEAST_LIFT and lift.gain[0, 0] > 0
+    return max(0.0, -lift.lag_s - 2 * lift.lag_sd) if known else 0.0
+
+
+def _fits_early(blocks: Blocks, free: LaggedFit, rows: np.ndarray) -> float:
+    """What the believed order leaves of roll and pitch where the torque may come after the motion."""
+    early = lagged.fit(blocks, -CAUSES_S[::-1])
+    moments = [_moments(blocks, axis, early.lag_s, free.weight[axis]) for axis in (0, 1)]
+    return sum(_loss(m, _best_gain(m, row)) for m, row in zip(moments, rows, strict=True))
+
+
+def _held_out(recordings: ReadSet, blocks: Blocks) -> Callable[[int, float], bool]:
+    """Whether a time (s since its start) of a run (its number) is held out.
+
+    The last third of each run where no run is, or where those that are, or all others, have none of the blocks.
+    """
+    split = split_runs(recordings)
+    held = [run.name in split.held_out for run in recordings.runs]
+    if {held[k] for k in blocks.run} == {True, False}:
+        return lambda run, time_s: held[run]
+    ends = [(1 - HELD_OUT_SHARE) * float(run.time_s[-1] - run.time_s[0]) for run in recordings.runs]
+    return lambda run, time_s: time_s > ends[run]
+
+
+def _holds(contested: list, held_out: Callable[[int, float], bool]) -> bool:
+    """Whether the data held out go from the believed rows to the others, each with its gains from the other data.
+
+    `contested` has an axis, the number of its delay, and of each layout the row that a moment gives.
+    """
+    seen, now, then = [], [], []
+    for axis, lag, believed, other in contested:
+        out = np.array([held_out(*at) for at in zip(axis.blocks.run, axis.blocks.time_s, strict=True)])
+        if out.all() or not out.any():
+            return False
+        fitted, unseen = (axis.part(part).moments[lag] for part in (~out, out))
+        seen.append(unseen)
+        now.append(believed(fitted))
+        then.append(other(fitted))
+    step, p_value = _contest(seen, now, then)
+    return step > _LEAST_STEP and p_value < _P_HELD_OUT
+
+
+def _foretells(
+    recordings: ReadSet, sensor: str, believed: np.ndarray, other: np.ndarray, held_out: Callable[[int, float], bool]
+) -> bool:
+    """Whether torques with `other` senses, and not those with the believed ones, foretell the yaw rate.
+
+    Each rate is foretold by the rates before it, and what past torques add to that is what they caused: in a closed
+    loop such a fit is unbiased, because what the controller answers to is in those rates (the direct method: Ljung,
+    System Identification, 1999, 13.4). Torques of the same interval are left out, because an answer may be in them.
+    """
+    rows = [_past_and_next(s, recordings.vehicle, sensor) for s in recordings.signals]
+    out = np.concatenate(
+        [[held_out(k, t) for t in part[0]] for k, part in enumerate(rows) if part is not None] or [np.zeros(0, bool)]
+    ).astype(bool)
+    if not out.any() or out.all():
+        return False
+    _, rate, past, torques = (np.concatenate(v) for v in zip(*(p for p in rows if p is not None), strict=True))
+
+    def added(chosen: np.ndarray, senses: np.ndarray) -> float:
+        """By how many standard errors."""
+        basis, _ = np.linalg.qr(past[chosen])
+        y, x = rate[chosen], torques[chosen] @ senses
+        y, x = y - basis @ (basis.T @ y), x - basis @ (basis.T @ x)
+        square = np.maximum(np.sum(x**2, axis=0), 1e-300)
+        gain = y @ x / square
+        left = np.maximum(np.sum((y[:, None] - gain * x) ** 2, axis=0), 1e-300) / max(len(y) - basis.shape[1] - 1, 1)
+        scores = gain / np.sqrt(left / square)
+        return float(scores[np.argmax(np.abs(scores))])
+
+    parts = ((out | True, _LEAST_FORETOLD), (out, _LEAST_FORETOLD_IN_PART), (~out, _LEAST_FORETOLD_IN_PART))
+    if min(out.sum(), (~out).sum()) < 3 * past.shape[1]:
+        parts = parts[:1]
+    return all(added(chosen, other) > max(least, added(chosen, believed)) for chosen, least in parts)
+
+
+def _past_and_next(signals: Signals, vehicle: Vehicle, sensor: str):
+    """Of each interval of a run its time (n,), yaw rate (n,), rates before it (n, 36), and what motors of _MOTORS_S
+    have made of each rotor's torque before it, (n, motors, k); None for none.
+
+    Intervals do not overlap, so that nothing of the next one is in those before.
+    """
+    if not {"gyroscope", sensor} <= set(signals.values):
+        return None
+    own_s = 1.0 / min(max(signals.own_rate_hz[n], 1e-3) for n in ("gyroscope", sensor))
+    length = max(1, round(max(_STEP_S, own_s) * signals.rate_hz))
+    step_s = length / signals.rate_hz
+    torque = vehicle.torque_coefficients_n_m_s2() / vehicle.thrust_coefficients_n_s2()
+    both = np.concatenate([signals.values["gyroscope"], squared_speeds(signals, vehicle, sensor) * torque], axis=1)
+    parts = []
+    for start, stop in stretches(np.isfinite(both).all(axis=1)):
+        count = (stop - start) // length
+        if count < 3 * _PAST_STEPS:
+            continue
+        mean = both[start : start + count * length].reshape(count, length, -1).mean(axis=1)
+        mean -= mean.mean(axis=0)
+        keep = [np.exp(-step_s / motor_s) if motor_s else 0.0 for motor_s in _MOTORS_S]
+        made = np.stack([lfilter([0.0, 1.0 - a], [1.0, -a], mean[:, 3:], axis=0) for a in keep], axis=1)
+        past = np.concatenate([mean[_PAST_STEPS - k : count - k, :3] for k in range(1, _PAST_STEPS + 1)], axis=1)
+        time_s = (start + (np.arange(_PAST_STEPS, count) + 0.5) * length) / signals.rate_hz
+        parts.append((time_s, mean[_PAST_STEPS:, 2], past, made[_PAST_STEPS:]))
+    return tuple(np.concatenate(v) for v in zip(*parts, strict=True)) if parts else None
+
+
+def _doubted(recordings: ReadSet, turns: bool, why: str) -> Corrected:
+    """The set as it is, with a doubt about its rotors' turning senses, or their order."""
+    what = "turning senses" if turns else "order of the rotors"
+    doubt = Doubt("rotors", f"Another {what} than vehicle.yaml's fits the moments, but {why}: left as it is.")
+    return Corrected(replace(recordings, proposed=(*recordings.proposed, doubt)))
 
 
 def _spun(recordings: ReadSet, rotors: list[int], p_value: float, ambiguous: bool) -> Corrected:

@@ -194,7 +194,10 @@ def _sensor_pairs(recordings: ReadSet) -> list[_SensorPair]:
             if blocks is None:
                 continue
         found = lagged.fit(blocks)
-        if found is None:
+        if late == "gyroscope" and found and np.any(np.diag(found.gain) < 0):
+            # A torque that is against the motion is a controller's answer to it, not its cause.
+            found = lagged.fit(blocks, lagged.CAUSES_S)
+        if found is None or late == "gyroscope" and np.any(np.diag(found.gain) < 0):
             continue
         if late == "velocity":
             shares = _shares_of(all_signals, vehicle, source, [0, 1] if over == "attitude" else [2], found)

@@ -548,7 +548,7 @@ def with_doubts(analysis: Analysis, recordings: RecordingSet) -> Analysis:
         left = doubts_of(replace(analysis.recordings, vehicle=corrected(analysis)))
     standing = {d.what for d in left}
     said = tuple(d if d.what in standing or not d.stops else _as_corrected(d) for d in found)
-    return replace(analysis, doubts=(*said, *recordings.proposed))
+    return replace(analysis, doubts=tuple(dict.fromkeys((*said, *recordings.proposed, *analysis.recordings.proposed))))
 
 
 def _still_off(analysis: Analysis) -> float:

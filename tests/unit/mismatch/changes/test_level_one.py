@@ -26,7 +26,7 @@ from rotorid.recordings import RecordingSet, Run
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import Doubt
 from tests.refusals import refused
-from tests.unit.mismatch.flights import Flight, quad, with_table
+from tests.unit.mismatch.flights import Flight, controlled, quad, with_table
 
 
 def flights(name: str, numbers: range, **options) -> RecordingSet:
@@ -197,3 +197,25 @@ def test_what_changes_predict_has_the_sign_of_what_is_seen(good, later):
     seen = level_one(good, replace(later, vehicle=moved))
     pitch = next(d for d in seen.stated if d.quantity.key == "trim/pitch")
     assert pitch.value == pytest.approx(predicted(change("com_offset", r_x=-0.02), moved)["trim/pitch"], rel=0.2)
+
+
+def under_control(seeds: range, **options) -> RecordingSet:
+    """Flights under a controller."""
+    return RecordingSet("controlled", quad(), tuple(controlled(k, name=f"run{k}", **options) for k in seeds))
+
+
+def test_what_disturbances_do_in_a_hover_is_no_drag_and_noise_no_scale():
+    """In a hover forces move the vehicle, and the gyroscope reads its own noise: both have slopes that mean nothing."""
+    hover, moving = under_control(range(1, 4)), under_control(range(4, 5), away_m=0.6)
+    found = level_one(hover, moving)
+    assert not found.stated
+    slopes = [d for d in found.differences if d.quantity.kind in ("drag", "gyroscope_scale")]
+    assert len(slopes) == 3 and max(abs(d.value) for d in slopes) > 0.1
+    assert all(d.interval()[0] < 0 < d.interval()[1] for d in slopes)
+
+
+def test_a_drag_that_motion_shows_is_stated():
+    good, new = under_control(range(1, 4), away_m=3.0), under_control(range(4, 6), away_m=3.0, drag=1.0)
+    (first, *_) = level_one(good, new).stated
+    low, high = first.interval()
+    assert first.quantity.kind == "drag" and high < 0 and first.feigned > 0

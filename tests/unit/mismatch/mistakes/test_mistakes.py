@@ -11,7 +11,7 @@ from rotorid.mismatch.mistakes.lagged import Blocks
 from rotorid.mismatch.mistakes.timing import Lateness, in_agreement, one_quantity
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings.signal.kernels import gaussian
-from tests.unit.mismatch.flights import COLUMNS, quad, recorded, with_table
+from tests.unit.mismatch.flights import COLUMNS, controlled, quad, recorded, with_table
 
 
 @pytest.fixture(scope="module")
@@ -462,3 +462,31 @@ def test_a_sensor_that_is_badly_known_does_not_join_two_that_part():
     values, sd = np.array([1e-3, 0.0, 0.0, 2e-3]), np.array([1e-3, 1e-5, 1e-5, 1e-5])
     known = Lateness(names, values, np.eye(4), sd, np.zeros(4), [names])
     assert sorted(in_agreement(known, names, dict.fromkeys(names, 1e-4), 3.0, 0.0)) == names[:3]
+
+
+@pytest.fixture(scope="module")
+def hovering() -> RecordingSet:
+    """A quiet hover under a controller, which answers its gyroscope's noise."""
+    return RecordingSet("hovering", quad(), (controlled(1, 30.0),))
+
+
+@pytest.mark.parametrize("change", [lambda table: table, without_attitude], ids=["all", "gyroscope alone"])
+def test_answers_of_a_controller_are_no_layout_but_a_doubt(hovering, change):
+    fixed, findings, _ = find_mistakes(with_table(hovering, change))
+    assert not {"spin_direction", "rotor_order", "axis_sign"} & set(ids(findings))
+    assert fixed.vehicle == hovering.vehicle
+    (doubt,) = fixed.proposed
+    assert "turning senses" in doubt.sentence and "do not foretell" in doubt.sentence and not doubt.stops
+
+
+def test_rotors_exchanged_are_found_next_to_answers_of_a_controller(hovering):
+    fixed, findings, _ = find_mistakes(with_table(hovering, holding(ROTORS[1:3], ROTORS[2:0:-1])))
+    assert "rotor_order" in ids(findings) and "spin_direction" not in ids(findings)
+    assert_restored(fixed, hovering, ROTORS)
+
+
+def test_a_layout_that_half_of_the_recordings_contradict_is_a_doubt(sound):
+    """The second run, held out, has its rotors in order, the first has two exchanged."""
+    bad = with_table(replace(sound, held_out=("run01",)), holding(ROTORS[1:3], ROTORS[2:0:-1]), "run00")
+    fixed, findings, _ = find_mistakes(bad)
+    assert "rotor_order" not in ids(findings)
