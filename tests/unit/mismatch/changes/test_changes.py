@@ -45,7 +45,7 @@ def monday() -> RecordingSet:
 @cache
 def compared(case: str) -> Changes:
     """Monday's flights against Friday's."""
-    new = flights("friday", (3, 4), drag=1.2 if case == "dragging" else 0.6)
+    new = flights("friday", (3, 4), drag=2.4 if case == "dragging" else 0.6)
     if case == "believed lighter":
         new = replace(new, vehicle=lighter(new.vehicle, 1.1))
     return changes_between(monday(), new)
