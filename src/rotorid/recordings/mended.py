@@ -25,6 +25,7 @@ from scipy.interpolate import BSpline
 from scipy.sparse import diags, eye_array
 from scipy.sparse.linalg import spsolve
 
+from rotorid.io.text.wording import listed
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import RecordingSet, Run, means_of
 
@@ -45,6 +46,8 @@ _LEAST_SPIKES = 3
 """Fewer in all runs may be what a vehicle does once: a bump, a touch of the ground."""
 _REPEATED = 0.1
 """Share of the spikes that one value must have to be named."""
+_REVERSED = 0.02
+"""Share of the largest value that a value of the other sign must exceed to be one: less is noise about zero."""
 _TOO_SLOW = 1.35
 """A point whose F/ω² exceeds the run's median by this factor has lost part of its speed pulses.
 
@@ -312,6 +315,40 @@ def spikes(values: np.ndarray) -> np.ndarray:
     if scatter.min() > 0 and between.sum() < far.sum() <= _MOST * len(x):
         found[known[inner][far]] = True
     return found
+
+
+def by_sense(values: np.ndarray, sense: float | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Sizes of signed speeds or commands (n, k), and the cells (n, k) in which a rotor turns backwards: empty there.
+
+    A sign is a turning sense where a rotor keeps it. A cell against the usual sign of its column, or against `sense`
+    where it is given, is a rotor that pushes the other way, for which the contract has no column.
+    """
+    values = np.asarray(values, float)
+    signs = np.sign(np.nansum(np.sign(values), axis=0)) if sense is None else np.full(values.shape[1], sense)
+    own = values * np.where(signs == 0, 1.0, signs)
+    largest = np.nanmax(np.abs(own), axis=0, initial=0.0, where=np.isfinite(own))
+    against = own < -_REVERSED * largest
+    return np.where(against, np.nan, np.abs(own) if sense is None else np.clip(own, 0, None)), against
+
+
+def with_sizes_of_speeds(recordings: RecordingSet) -> RecordingSet:
+    """The set with sizes in place of signed rotor speeds; a sentence in `left_out` for what their signs say."""
+    count = recordings.vehicle.rotor_count
+    names = [n for kind in ("rotor_speed", "rotor_command") for n in c.rotor_columns(kind, count)]
+    signed = [n for n in names if any(run.has(n) and np.nanmin(run.column(n)) < 0 for run in recordings.runs)]
+    if not signed:
+        return recordings
+    runs, against = [], dict.fromkeys(signed, 0)
+    for run in recordings.runs:
+        own = [n for n in signed if run.has(n)]
+        sizes, backwards = by_sense(run.array(tuple(own)))
+        against |= {n: against[n] + int(lost.sum()) for n, lost in zip(own, backwards.T, strict=True)}
+        runs.append(replace(run, table=run.table.assign(**dict(zip(own, sizes.T, strict=True)))))
+    said = [
+        f"{listed(signed)}: negative readings; a sign that a rotor keeps is its turning sense, and its size is read."
+    ]
+    said += [f"{n}: the rotor turns backwards in {k} readings: left out." for n, k in against.items() if k]
+    return replace(recordings, runs=tuple(runs), left_out=(*recordings.left_out, *said))
 
 
 def _around(sizes: np.ndarray) -> np.ndarray:

@@ -38,9 +38,8 @@ from rotorid.recordings.importers.faults import (
     GOES_ON,
     ImportFault,
     airborne,
-    fault_where,
     flights,
-    increasing,
+    moving_on,
     one_sense,
     report_gaps,
     table_on,
@@ -281,9 +280,8 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[ImportFault], n
     if END in log:
         found = f"the file ends inside a message, after {int(log[END]['bytes'].iloc[0])} bytes of it"
         faults.append(ImportFault("cut_off", "", found, "what came before is kept; the log stopped before its end", 0))
-    late = ~increasing(grid)
-    faults += fault_where(late, "repeated_time", c.TIME, f"{late.sum()} messages do not move the clock on", "left out")
-    grid = grid[~late]
+    keep, more = moving_on(grid)
+    faults, grid = faults + more, grid[keep]
     parts: list[tuple] = []
 
     def put(names, table: pd.DataFrame | None, fields) -> bool:

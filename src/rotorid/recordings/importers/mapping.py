@@ -45,7 +45,15 @@ from rotorid.io.models import KnownKeys
 from rotorid.io.text.files import read_yaml
 from rotorid.io.text.wording import explain
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.faults import ImportFault, drop_repeated_times, in_order, join_rows, report_gaps
+from rotorid.recordings.importers.faults import (
+    ImportFault,
+    drop_repeated_times,
+    in_order,
+    join_rows,
+    one_sense,
+    report_gaps,
+    within,
+)
 from rotorid.recordings.tables import clock_jump, numbers, read_cells, read_parquet_cells
 
 G = 9.80665
@@ -312,6 +320,7 @@ def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFra
     table, late = in_order(table.loc[:, ~table.columns.duplicated()], clock)
     table = join_rows(table, clock)
     out: dict[str, np.ndarray] = {}
+    faults: list[ImportFault] = []
     rotation = None
     order = sorted(mapping.channels, key=lambda n: n != "attitude")
     for name in order:
@@ -322,7 +331,7 @@ def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFra
             values = values * channel.scale
         if name == "throttle" and channel.range is not None:
             low, high = channel.range
-            values = np.clip((values - low) / (high - low), 0, 1)
+            values = (values - low) / (high - low)
         elif name != "attitude" or channel.form in EULER:
             values = converted(values, kind, channel.unit)
         if channel.unit in ELECTRICAL:
@@ -347,12 +356,18 @@ def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFra
             values = turned
         if not columns:
             columns = c.rotor_columns(name, len(channel.columns))
+            both = name != "throttle" or channel.range is None or channel.range[0] == 0  # below it is backwards
+            values, more = one_sense(values, columns, None if name != "throttle" else 1.0) if both else (values, [])
+            faults += more
+            if name == "throttle":
+                values, more = within(values, columns)
+                faults += more
         out.update(zip(columns, values.T, strict=True))
     for name in mapping.keep:
         out[name] = table[name].to_numpy(float)
     out[c.TIME] = out[c.TIME] - np.nanmin(out[c.TIME])
-    table, faults = _clocked(pd.DataFrame({c.TIME: out.pop(c.TIME), **out}), where)
-    return table, late + faults
+    table, more = _clocked(pd.DataFrame({c.TIME: out.pop(c.TIME), **out}), where)
+    return table, late + faults + more
 
 
 def _clocked(table: pd.DataFrame, where: object) -> tuple[pd.DataFrame, list[ImportFault]]:

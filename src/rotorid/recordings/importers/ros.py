@@ -27,7 +27,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -43,7 +43,7 @@ from rotorid.recordings.importers.faults import (
     airborne,
     flights,
     further_motors,
-    increasing,
+    moving_on,
     one_sense,
     report_gaps,
     table_on,
@@ -293,7 +293,8 @@ def _read_series(path: Path) -> tuple[dict[str, list[_TopicSeries]], list[Import
             continue
         order = np.argsort(time_s, kind="stable")
         time_s, values = time_s[order], values[order]
-        keep = increasing(time_s)
+        keep, odd_times = moving_on(time_s)
+        faults += [replace(fault, column=topic) for fault in odd_times if fault.kind == "apart"]
         own = _TopicSeries(topic, time_s[keep], values[keep])
         if quantity in _UNSET and (own.values == _UNSET[quantity]).all():
             seen = f"{quantity.replace('_', ' ')} of {topic} was never set ({_UNSET[quantity][0]:g}, 0, … throughout)"
