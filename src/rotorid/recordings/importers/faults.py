@@ -54,6 +54,7 @@ _LEAP_S, _LEAP_STEPS = 0.5, 20.0
 """A clock leaps where it goes on by more than so many seconds and usual steps, or back by so many seconds."""
 _FEW_S, _FEW_ROWS = 0.3, 0.02
 """Rows between leaps are apart where they last less and are a smaller share of the longest part."""
+_AROUND_RESET_S = 0.2
 _OUTSIDE = 0.01
 """Share of the range by which a throttle may lie outside of it unnoticed."""
 _UNEXPLAINED = 0.2
@@ -250,6 +251,32 @@ def one_sense(
         found = f"the rotor turns backwards (against its usual sign) in {lost.mean():.1%} of the samples"
         faults += fault_where(lost, "reversed", name, found, "made empty cells")
     return sizes, faults
+
+
+def stops(values: np.ndarray, names: Sequence[str], how: str) -> tuple[np.ndarray, list[ImportFault]]:
+    """Throttles (n, k) with 0 where a log says, by no number in a column that has some, that a motor is stopped.
+
+    `how` the log says so, in words; a fault for each motor that is stopped while others turn.
+    """
+    given, faults = np.isfinite(values), []
+    stopped = ~given & given.any(axis=0)
+    for name, own in zip(names, (stopped & given.any(axis=1)[:, None]).T, strict=True):
+        found = f"the motor is stopped ({how}) in {own.mean():.0%} of the messages while others turn"
+        faults += fault_where(own, "stopped", name, found, "read as 0")
+    return np.where(stopped, 0.0, values), faults
+
+
+def jumps_at(grid_s: np.ndarray, times_s: np.ndarray, what: str) -> tuple[np.ndarray, list[ImportFault]]:
+    """Rows (n,) of a grid, s, about instants at which an estimate jumps, which no run may hold, and the fault of it."""
+    times_s = np.unique(times_s[(times_s >= grid_s[0]) & (times_s <= grid_s[-1])])
+    rows = np.zeros(len(grid_s), bool)
+    for at in times_s:
+        rows |= np.abs(grid_s - at) <= _AROUND_RESET_S
+    if not len(times_s):
+        return rows, []
+    count = len(times_s[np.diff(times_s, prepend=-np.inf) > _AROUND_RESET_S])
+    found = f"{what} {count} times, first at {times_s[0]:.2f} s"
+    return rows, [ImportFault("estimator_reset", "", found, "a run ends at each of them in the air", count)]
 
 
 def changes_of(values: np.ndarray) -> int:

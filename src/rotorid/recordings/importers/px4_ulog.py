@@ -36,9 +36,11 @@ from rotorid.recordings.importers.faults import (
     fault_where,
     further_motors,
     goes_on,
+    jumps_at,
     on_grid,
     one_sense,
     report_gaps,
+    stops,
     within,
     without_pauses,
 )
@@ -82,7 +84,7 @@ _UAVCAN_WITH_MOTORS = 3
 """UAVCAN_ENABLE from which the bus drives motors."""
 _PLAUSIBLE = 0.5
 """Share of the range by which outputs that turn may lie outside of it; farther, they are in another unit."""
-_AROUND_RESET_S = 0.2
+JUMPED = "PX4's estimator jumped in position, velocity or attitude"
 RESETS = (
     ("vehicle_local_position", "xy_reset_counter", ("delta_xy[0]", "delta_xy[1]"), 0.02),
     ("vehicle_local_position", "z_reset_counter", ("delta_z",), 0.02),
@@ -274,12 +276,8 @@ def of_motors(
     names, times = c.rotor_columns("throttle", rotors), _time(data, sampled=False)
     values = _stack(data, _indexed("control", rotors))
     faults = _more_rotors("actuator_motors", driven_motors(data), rotors)
-    given = np.isfinite(values)
-    stopped = ~given & given.any(axis=0)
-    for name, own in zip(names, (stopped & given.any(axis=1)[:, None]).T, strict=True):
-        found = f"PX4 stops the motor (NaN) in {own.mean():.0%} of the messages while others turn"
-        faults += fault_where(own, "stopped", name, found, "read as 0")
-    values, reversed_ = one_sense(np.where(stopped, 0.0, values), names, 1.0)
+    values, stopped = stops(values, names, "NaN")
+    values, reversed_ = one_sense(values, names, 1.0)
     for start, stop, stated in parameters.spans(_CHANGED[0][0]):
         inside, curve = (times >= start) & (times < stop), float(stated.get("THR_MDL_FAC", 0.0))
         if 0 < curve <= 1 and inside.any():  # PX4 turns the thrust asked for into the signal by this curve
@@ -287,7 +285,7 @@ def of_motors(
             values[inside] = np.sqrt(half**2 + values[inside] / curve) - half
             seen = f"THR_MDL_FAC is {curve:g}: actuator_motors holds thrusts"
             faults += fault_where(inside, "unit", ", ".join(names), seen, "turned into signals by PX4's own curve")
-    return values, times, faults + reversed_
+    return values, times, faults + stopped + reversed_
 
 
 def _no_throttle(
@@ -650,13 +648,9 @@ def convert(log: Px4Log, rotors: int) -> tuple[pd.DataFrame, list[ImportFault], 
     table = pd.DataFrame({k: v for k, v in columns.items() if k == c.TIME or np.isfinite(v).any()})
     flying, ground = airborne(table, _flying(log, grid))
     faults += ground
-    jumps = np.zeros(len(grid), bool)
-    for reset in _resets(log.topics):
-        jumps |= np.abs(grid - reset) * 1e-6 <= _AROUND_RESET_S
-    if jumps.any():
-        times = int(np.count_nonzero(np.diff(jumps.astype(int), prepend=0) > 0))
-        found = f"PX4's estimator jumped {times} times in position, velocity or attitude"
-        faults.append(ImportFault("estimator_reset", "", found, "a run ends at each jump in the air", times))
+    times = (_resets(log.topics) - grid[0]) * 1e-6
+    jumps, reset = jumps_at(columns[c.TIME], times, JUMPED)
+    faults += reset
     faults += log.parameters.faults(_CHANGED, float(grid[0]), 1e-6)
     if log.rest:
         found = f"the file ends inside a message, after {log.rest} bytes of it"
