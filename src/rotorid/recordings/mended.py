@@ -21,9 +21,11 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
+from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import BSpline
 from scipy.sparse import diags, eye_array
 from scipy.sparse.linalg import spsolve
+from scipy.spatial.transform import Rotation
 
 from rotorid.io.text.wording import listed
 from rotorid.recordings import columns as c
@@ -46,6 +48,14 @@ _LEAST_SPIKES = 3
 """Fewer in all runs may be what a vehicle does once: a bump, a touch of the ground."""
 _REPEATED = 0.1
 """Share of the spikes that one value must have to be named."""
+_LEAST_JUMP_RAD, _FASTEST_RAD_S = 0.25, 40.0
+"""An attitude jumps by at least so much; where no gyroscope says how far it turns, faster than any vehicle."""
+_LEAST_JUMP_M, _FASTEST_M_S, _LEAST_JUMP_M_S, _FASTEST_M_S2 = 0.1, 60.0, 1.0, 200.0
+"""The same of a position and a velocity."""
+_MOST_JUMPED = 0.3
+"""Share of the readings that those may be that a sensor jumps to and back from."""
+_CUT_READINGS = 8
+"""Readings emptied about a jump that stays: a longer gap than the one that is bridged (`_HOLE_PERIODS`)."""
 _REVERSED = 0.02
 """Share of the largest value that a value of the other sign must exceed to be one: less is noise about zero."""
 _TOO_SLOW = 1.35
@@ -315,6 +325,111 @@ def spikes(values: np.ndarray) -> np.ndarray:
     if scatter.min() > 0 and between.sum() < far.sum() <= _MOST * len(x):
         found[known[inner][far]] = True
     return found
+
+
+def without_jumps(recordings: RecordingSet) -> RecordingSet:
+    """Flights without readings of attitude, position or velocity to which they jump, faster than anything moves, and
+    from which they jump back; a sentence in `left_out` for each sensor that has some.
+
+    A tracker takes a marker pattern for another of its poses, bodies are exchanged. What jumps and stays was set anew:
+    there the flight is cut by a hole.
+    """
+    if recordings.vehicle.kind != "flight":
+        return recordings
+    runs, said = list(recordings.runs), []
+    for names, what in ((c.QUATERNION, "attitude"), (c.POSITION, "position"), (c.VELOCITY, "velocity")):
+        lost, anew, read, largest = 0, 0, 0, 0.0
+        for k, run in enumerate(runs):
+            if not _is_read(run, names):
+                continue
+            out, size, count = _jumps(run, names)
+            read += int(np.isfinite(run.array(names)).all(axis=1).sum())
+            if out.any():
+                lost, anew, largest = lost + int(out.sum()), anew + count, max(largest, size)
+                values = np.where(out[:, None], np.nan, run.array(names))
+                runs[k] = replace(run, table=run.table.assign(**dict(zip(names, values.T, strict=True))))
+        if lost:
+            far = (
+                f"{np.degrees(largest):.0f} degrees"
+                if names == c.QUATERNION
+                else f"{largest:.3g} {c.unit_of(names[0])}"
+            )
+            stays = f" ({anew} of the jumps stay: it was set anew, and the flight is cut there)" if anew else ""
+            said.append(
+                f"{names[0]} to {names[-1]}: the {what} jumps by up to {far} from one reading to the next, as no "
+                f"motion does: {lost} readings ({100 * lost / read:.2g} %) are left out{stays}."
+            )
+    return replace(recordings, runs=tuple(runs), left_out=(*recordings.left_out, *said)) if said else recordings
+
+
+def _jumps(run: Run, names: tuple[str, ...]) -> tuple[np.ndarray, float, int]:
+    """Rows (n,) whose reading of a sensor is to be emptied, the largest jump (rad, m, m/s), and how many stay."""
+    out = np.zeros(len(run.time_s), bool)
+    values = run.array(names)
+    if names == c.QUATERNION:
+        values[~(np.linalg.norm(np.nan_to_num(values), axis=1) > 0.1)] = np.nan
+    rows = np.flatnonzero(np.isfinite(values).all(axis=1))
+    if len(rows) < _LEAST_OF_SPIKES:
+        return out, 0.0, 0
+    time_s, values = run.time_s[rows], values[rows]
+    dt = np.diff(time_s)
+    steps, least, fastest, excess = _excess(run, names, time_s, values)
+    size, step = np.linalg.norm(excess, axis=1), np.linalg.norm(steps, axis=1)
+    usual = float(np.quantile(size, 0.9))
+    jump = np.minimum(size, step) > np.maximum(np.maximum(least, _FAR * usual), fastest * dt)
+    jump &= dt < _LONGEST_USUAL * np.median(dt)
+    edges = np.flatnonzero(jump) + 1
+    if not len(edges) or len(edges) > _MOST * len(rows):
+        return out, 0.0, 0
+    parts = np.split(np.arange(len(rows)), edges)
+    # Where each part lies against the first, by all jumps before it; parts that lie alike belong together.
+    places, group = _places(names, excess[edges - 1]), []
+    for k in range(len(parts)):
+        alike = (j for j in range(k) if _apart(names, places[k], places[j]) < 0.3 * size[edges - 1].min())
+        group.append(group[j] if (j := next(alike, None)) is not None else k)
+    counts = {g: sum(len(p) for p, own in zip(parts, group, strict=True) if own == g) for g in set(group)}
+    usual_group, stays = max(counts, key=counts.get), 0
+    for part, own in zip(parts, group, strict=True):
+        if own != usual_group and counts[own] < _MOST_JUMPED * len(rows):
+            out[rows[part]] = True
+    for edge in edges:
+        if not out[rows[edge - 1]] and not out[rows[edge]]:
+            stays += 1
+            out[rows[max(edge - _CUT_READINGS // 2, 0) : edge + _CUT_READINGS // 2]] = True
+    return out, float(size[edges - 1].max()), stays
+
+
+def _excess(run: Run, names: tuple[str, ...], time_s: np.ndarray, values: np.ndarray):
+    """Steps (n - 1, 3) of readings (n, k), the least jump and the fastest motion (rad, m, m/s, a second), and what of
+    the steps no other sensor explains."""
+    if names != c.QUATERNION:
+        steps = np.diff(values, axis=0)
+        least, fastest = (_LEAST_JUMP_M, _FASTEST_M_S) if names == c.POSITION else (_LEAST_JUMP_M_S, _FASTEST_M_S2)
+        return steps, least, fastest, steps
+    turn = Rotation.from_quat(values[:, [1, 2, 3, 0]])
+    steps = turn[:-1].inv() * turn[1:]
+    if not _is_read(run, c.ANGULAR_VELOCITY):
+        return steps.as_rotvec(), _LEAST_JUMP_RAD, _FASTEST_RAD_S, steps.as_rotvec()
+    rates = run.array(c.ANGULAR_VELOCITY)
+    known = np.isfinite(rates).all(axis=1)
+    total = cumulative_trapezoid(rates[known], run.time_s[known], axis=0, initial=0)
+    turned = np.column_stack([np.interp(time_s, run.time_s[known], column) for column in total.T])
+    excess = (Rotation.from_rotvec(np.diff(turned, axis=0)).inv() * steps).as_rotvec()
+    return steps.as_rotvec(), _LEAST_JUMP_RAD, 0.0, excess
+
+
+def _places(names: tuple[str, ...], jumps: np.ndarray) -> list:
+    """Where each part between jumps (m, 3) lies against the first: rotations of the body, else vectors."""
+    if names != c.QUATERNION:
+        return [np.zeros(3), *np.cumsum(jumps, axis=0)]
+    places = [Rotation.identity()]
+    for jump in jumps:
+        places.append(places[-1] * Rotation.from_rotvec(jump))
+    return places
+
+
+def _apart(names: tuple[str, ...], one, other) -> float:
+    return float((one.inv() * other).magnitude() if names == c.QUATERNION else np.linalg.norm(one - other))
 
 
 def by_sense(values: np.ndarray, sense: float | None = None) -> tuple[np.ndarray, np.ndarray]:

@@ -48,6 +48,13 @@ GOES_ON = 0.9
 """Share of the readings of others of its kind that a sensor has at least, if it neither stands still nor ends early."""
 _SHUFFLED, LATE_STEPS = 0.05, 100.0
 """Share of steps back from which rows are in no order, and how many usual steps late a row in order may come."""
+_TURNS = {
+    scale * length: length not in (2.0**16, 2.0**24, 2.0**31, 2.0**32)
+    for length in (3600.0, 43200.0, 86400.0, 604800.0, 2.0**16, 2.0**24, 2.0**31, 2.0**32)
+    for scale in (1.0, 1e-9, 1e-6, 1e-3, 1e3, 1e6, 1e9)
+}
+"""After how much of its units a clock may begin anew: an hour, half a day, a day, a week, counters of 16 to 32 bits;
+and whether it is a time of day or of the week, which never is below 0."""
 _FEW_STEPS = 5.0
 """Usual steps back, and rows after them, below which no clock was set."""
 _LEAP_S, _LEAP_STEPS = 0.5, 20.0
@@ -177,16 +184,18 @@ def in_order(table: pd.DataFrame, time: str) -> tuple[pd.DataFrame, list[ImportF
 
     `time` names the clock's column, in any unit.
     """
-    clock = table[time].to_numpy(float)
+    clock, faults = _unwrapped(table[time].to_numpy(float))
+    if faults:
+        attrs, table = table.attrs, table.assign(**{time: clock})
+        table.attrs = attrs
     steps = np.diff(clock)
     back = steps < 0
     if not back.any():
-        return table, []
+        return table, faults
     usual = float(np.median(np.diff(np.unique(clock[np.isfinite(clock)]))))
     anew = (
         [] if back.mean() >= _SHUFFLED else [int(k) for k in np.flatnonzero(back) if _set_back(table, clock, k, usual)]
     )
-    faults = []
     for row in anew:
         by = clock[row] - clock[row + 1]
         clock = np.append(clock[: row + 1], clock[row + 1 :] + by + LATE_STEPS * usual)
@@ -202,6 +211,35 @@ def in_order(table: pd.DataFrame, time: str) -> tuple[pd.DataFrame, list[ImportF
         faults.append(ImportFault("order", c.TIME, found, "sorted by their time", int(late.sum())))
     ordered.attrs = table.attrs
     return ordered, faults
+
+
+def _unwrapped(clock: np.ndarray) -> tuple[np.ndarray, list[ImportFault]]:
+    """A clock (n,) that begins anew where its counter or its day ends goes on, and a fault where it does.
+
+    It then has been through the whole of its range.
+    """
+    known = np.flatnonzero(np.isfinite(clock))
+    steps, span = np.diff(clock[known]), np.ptp(clock[known]) if len(known) else 0.0
+    if not (steps > 0).any():
+        return clock, []
+    usual = float(np.median(steps[steps > 0]))
+    low, high = np.nanmin(clock), np.nanmax(clock)
+    turn = next(
+        (
+            t
+            for t, of_day in sorted(_TURNS.items())
+            if 0.8 * t <= span <= t and t > 20 * usual and (not of_day or 0 <= low <= high <= t)
+        ),
+        None,
+    )
+    anew = np.flatnonzero((steps < 0) & (steps + (turn or 0.0) >= 0) & (steps + (turn or 0.0) <= _FEW_STEPS * usual))
+    if turn is None or not len(anew):
+        return clock, []
+    out = clock.copy()
+    for k in anew:
+        out[known[k + 1] :] += turn
+    found = f"the clock begins anew {len(anew)} times, after {turn:.10g} of its units"
+    return out, [ImportFault("clock_turn", c.TIME, found, "goes on", len(anew))]
 
 
 def _set_back(table: pd.DataFrame, clock: np.ndarray, row: int, usual: float) -> bool:

@@ -315,8 +315,8 @@ def test_a_twist_is_in_the_axes_that_its_frame_names(tmp_path: Path, frame: str)
 
 @pytest.mark.parametrize("order", [(0, 1, 2, 3), (2, 0, 3, 1)])
 def test_px4s_own_messages_mean_what_its_logs_mean(tmp_path: Path, order: tuple[int, ...]) -> None:
-    """The k-th controller drives motor `order[k]`; controller 0 is not heard in one message of twenty, motor 3 is stopped
-    for a time, the vehicle lands, and the attitude is set anew in the air."""
+    """The k-th controller drives motor `order[k]`; controller 0 is not heard in one message of twenty, motor 3 is
+    stopped for a time, the vehicle takes off late, and the attitude is set anew in the air."""
     flight, at = stamped(Flight())
     t, n = flight.table, len(flight.table)
     silent, stopped, anew = (lambda k: k % 20 == 3), (lambda k: 500 < k < 550), 960
