@@ -11,7 +11,13 @@ the knots and averages the noise above it. Its values at the knots are the new r
 which jump, are joined by straight lines. What this costs is stated: the rate, its band, and the noise there. Where
 packets are lost several at a time, hardly a stretch is left in which every sensor has readings; there a sensor that is
 faster than the analysis needs has the rate that the analysis needs, whose periods bridge such gaps. A sensor that comes
-evenly, however slow, stays as it is, and so does a hole of several of its own periods.
+evenly stays as it is, and so does a hole of several of its own periods.
+
+But rotors that come evenly and seldom (telemetry of 4 or 10 Hz) are joined by a curve of their own band: straight lines
+take a tenth off a motion at a fifth of their rate, which the other sensors keep, and the difference gets names.
+
+Jumps of attitude, position and velocity that no motion makes (a tracker that takes a pattern of markers for another of
+its poses, an estimator set anew) and the signs of rotor speeds are seen to before all this.
 """
 
 from __future__ import annotations
@@ -22,14 +28,14 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 from scipy.integrate import cumulative_trapezoid
-from scipy.interpolate import BSpline
+from scipy.interpolate import BSpline, make_interp_spline
 from scipy.sparse import diags, eye_array
 from scipy.sparse.linalg import spsolve
 from scipy.spatial.transform import Rotation
 
 from rotorid.io.text.wording import listed
 from rotorid.recordings import columns as c
-from rotorid.recordings.run import RecordingSet, Run, means_of
+from rotorid.recordings.run import RecordingSet, Run, means_of, stretches
 
 _FAR = 10.0
 """Standard deviations of the readings about their neighbours from which one is a spike."""
@@ -80,6 +86,11 @@ _RATE_ENOUGH_HZ = 50.0
 """What the analysis needs: its highest cutoff, 20 Hz, over USED_BAND."""
 _USED_BAND = 0.4
 """Highest frequency, over the rate, that the analysis uses of a sensor."""
+_MOSTLY_FRESH, _EVEN = 0.5, 0.2
+"""Share of the rows that bring a new reading, below which a sensor is repeated; and how far from the usual step one is
+even."""
+_SMOOTH_DEGREE = 7
+"""Of the curve through readings that come seldom: its gain is 0.997 at a third of their rate, a cubic's 0.95."""
 _LINES_A_PERIOD = 4.0
 """Values a period on straight lines between readings: few would cut the corners off."""
 _LEAST_READINGS = 20
@@ -100,6 +111,7 @@ def on_own_rates(recordings: RecordingSet) -> RecordingSet:
         return recordings
     kinds = ("rotor_speed", "rotor_command", "throttle")
     rotors = [c.rotor_columns(kind, recordings.vehicle.rotor_count) for kind in kinds]
+    recordings = _with_slow_joined(recordings, rotors)
     sensors = (*rotors, c.POSITION, c.VELOCITY, c.QUATERNION, c.ANGULAR_VELOCITY, c.SPECIFIC_FORCE, (c.HEIGHT,))
     there = {names: [run for run in recordings.runs if _is_read(run, names)] for names in sensors}
     scattered = [names for names, runs in there.items() if any(is_scattered(run, names) for run in runs)]
@@ -118,6 +130,46 @@ def on_own_rates(recordings: RecordingSet) -> RecordingSet:
         return recordings
     said = [_sentence(there[n], n, period, n in rotors) for n, period in own.items()]
     return replace(even, left_out=(*recordings.left_out, *said))
+
+
+def _with_slow_joined(recordings: RecordingSet, rotors: Collection[tuple[str, ...]]) -> RecordingSet:
+    """The set with rotors' readings that come evenly and too seldom to be joined by lines joined by a curve of their
+    band; a sentence for each kind of them."""
+    runs, said = list(recordings.runs), []
+    for names in rotors:
+        rates = []
+        for k, run in enumerate(runs):
+            if not _is_read(run, names):
+                continue
+            values = run.array(names)
+            rows = np.flatnonzero(np.isfinite(values).all(axis=1))
+            fresh = np.diff(values[rows], axis=0, prepend=np.nan).any(axis=1)
+            if names[0].startswith("rotor_speed") and fresh.mean() < _MOSTLY_FRESH:
+                rows = rows[fresh]  # a logger that is faster than the sensor repeats its last reading
+            steps = np.diff(run.time_s[rows])
+            period = float(np.median(steps)) if len(steps) > _LEAST_READINGS else 0.0
+            even = (np.abs(steps / period - 1) < _EVEN).mean() > _COVERED if period else False
+            if not even or not 2 * np.median(np.diff(run.time_s)) < period or period <= 1.0 / _RATE_ENOUGH_HZ:
+                continue
+            out = np.full(values.shape, np.nan)
+            for start, stop in stretches(np.append(True, steps <= _HOLE_PERIODS * period)):
+                # A stretch begins with the reading before it: the first step of the mask is from that.
+                own = rows[max(start - 1, 0) : stop]
+                if len(own) > _SMOOTH_DEGREE:
+                    inside = np.arange(own[0], own[-1] + 1)
+                    curve = make_interp_spline(run.time_s[own], values[own], _SMOOTH_DEGREE)
+                    out[inside] = curve(run.time_s[inside])
+            lowest = 0.0 if np.nanmin(values) >= 0 else -np.inf
+            runs[k] = replace(run, table=run.table.assign(**dict(zip(names, np.maximum(out, lowest).T, strict=True))))
+            rates.append(1 / period)
+        if rates:
+            rate = min(rates)
+            said.append(
+                f"{names[0]} to {names[-1]} come {rate:.3g} times a second: joined by a curve of their band; what is "
+                f"faster than {_USED_BAND * rate:.2g} Hz is not in them, and a lag of the motors shorter than "
+                f"{1 / rate:.2g} s cannot be distinguished from a delay."
+            )
+    return replace(recordings, runs=tuple(runs), left_out=(*recordings.left_out, *said)) if said else recordings
 
 
 def _with_grids(
