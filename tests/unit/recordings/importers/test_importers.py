@@ -12,6 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
+from rotorid.recordings import templates
+from rotorid.recordings.files import check_belief
 from rotorid.recordings.importers import crazyflie, known, px4_ulog
 from rotorid.recordings.importers.crazyflie import TYPES, decode_usd_log, read_usd_log
 from rotorid.recordings.importers.faults import (
@@ -808,6 +810,18 @@ def test_px4_what_a_vehicle_file_cannot_hold_is_named(values: dict[str, float], 
     assert (
         not known.px4_vehicle(dict.fromkeys(values, 0.0) | {k: 0.05 for k in values if "KM" in k}, 4)[1] or "CT" in said
     )
+
+
+@pytest.mark.parametrize("apart_m", [0.0, 0.05])
+def test_coaxial_rotors_make_a_vehicle_and_are_named_where_no_distance_is_stated(apart_m: float) -> None:
+    values = {}
+    for i in range(6):
+        own = {"PX": np.cos(i // 2), "PY": np.sin(i // 2), "PZ": apart_m * (i % 2), "KM": 0.05 * (-1) ** i}
+        values |= {f"CA_ROTOR{i}_{name}": value for name, value in own.items()}
+    vehicle, faults = known.px4_vehicle(values, 6)
+    said = [f.found for f in faults if f.kind == "coaxial"]
+    assert len(said) == (not apart_m) and all("rotors 1 and 2, 3 and 4, 5 and 6 are on one spot" in s for s in said)
+    check_belief(templates.read("x500").model_copy(update={"rotors": vehicle.rotors}), "vehicle.yaml")
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
