@@ -302,6 +302,7 @@ def guess_attitude_and_rates(draft: Draft) -> None:
         if agreed.correlation >= enough and agreed.size > MOVES["angle"]:
             _confirmed(draft, turns, found, best, why, bool(offered))
             return
+        turns = [t for t in turns if t.signs is None]
         if offered:
             _rates_alone(draft, offered[0], in_words(agreed, "angle", "the attitude"), _mirrored(draft, turns, family))
     elif offered:
