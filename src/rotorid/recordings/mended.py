@@ -58,6 +58,8 @@ _LEAST_JUMP_RAD, _FASTEST_RAD_S = 0.25, 40.0
 """An attitude jumps by at least so much; where no gyroscope says how far it turns, faster than any vehicle."""
 _LEAST_JUMP_M, _FASTEST_M_S, _LEAST_JUMP_M_S, _FASTEST_M_S2 = 0.1, 60.0, 1.0, 200.0
 """The same of a position and a velocity."""
+_MEASURED = {c.QUATERNION: 1e3, c.POSITION: 1e7, c.VELOCITY: 1e4}
+"""Largest size of a reading that is one."""
 _MOST_JUMPED = 0.3
 """Share of the readings that those may be that a sensor jumps to and back from."""
 _CUT_READINGS = 8
@@ -421,8 +423,8 @@ def _jumps(run: Run, names: tuple[str, ...]) -> tuple[np.ndarray, float, int]:
     if names == c.QUATERNION:
         values[~(np.linalg.norm(np.nan_to_num(values), axis=1) > 0.1)] = np.nan
     rows = np.flatnonzero(np.isfinite(values).all(axis=1))
-    if len(rows) < _LEAST_OF_SPIKES:
-        return out, 0.0, 0
+    if len(rows) < _LEAST_OF_SPIKES or np.abs(values[rows]).max() > _MEASURED[names]:
+        return out, 0.0, 0  # numbers that nothing measures are refused, not mended
     time_s, values = run.time_s[rows], values[rows]
     dt = np.diff(time_s)
     steps, least, fastest, excess = _excess(run, names, time_s, values)
@@ -494,8 +496,10 @@ def by_sense(values: np.ndarray, sense: float | None = None) -> tuple[np.ndarray
     signs = np.sign(np.nansum(np.sign(values), axis=0)) if sense is None else np.full(values.shape[1], sense)
     own = values * np.where(signs == 0, 1.0, signs)
     largest = np.nanmax(np.abs(own), axis=0, initial=0.0, where=np.isfinite(own))
-    against = own < -_REVERSED * largest
-    return np.where(against, np.nan, np.abs(own) if sense is None else np.clip(own, 0, None)), against
+    known = np.isfinite(own)
+    against = known & (own < -_REVERSED * largest)
+    sizes = np.abs(own) if sense is None else np.clip(own, 0, None)
+    return np.where(against, np.nan, np.where(known, sizes, values)), against
 
 
 def with_sizes_of_speeds(recordings: RecordingSet) -> RecordingSet:
