@@ -276,12 +276,16 @@ def check_belief(vehicle: Vehicle, where: str) -> None:
     for key in vehicle.trust:
         if key not in _TRUSTED:
             raise InputError(f"{where}: trust.{key}: no such value is known{hint(key, _TRUSTED)}")
-    hubs = vehicle.rotor_positions_m()
+    hubs, spins = vehicle.rotor_positions_m(), vehicle.yaw_signs()
     for first in range(len(hubs)):
-        near = np.flatnonzero(np.linalg.norm(hubs[first + 1 :] - hubs[first], axis=1) < _ONE_SPOT_M)
+        # Two that turn against each other are coaxial: autopilots leave the distance between them out.
+        near = np.linalg.norm(hubs[first + 1 :] - hubs[first], axis=1) < _ONE_SPOT_M
+        near = np.flatnonzero(near & (spins[first + 1 :] == spins[first]))
         if len(near):
             spot = listed([f"{name} {value:g} m" for name, value in zip("xyz", hubs[first], strict=True)])
-            raise InputError(f"{where}: rotors {first + 1} and {first + 2 + near[0]} are on one spot ({spot})")
+            raise InputError(
+                f"{where}: rotors {first + 1} and {first + 2 + near[0]} are on one spot ({spot}) and turn the same way"
+            )
     if vehicle.inertia_kg_m2 is not None:
         least, middle, largest = np.linalg.eigvalsh(vehicle.inertia_kg_m2.matrix())
         if largest > NO_BODY * (least + middle):

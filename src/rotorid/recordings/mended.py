@@ -11,7 +11,13 @@ the knots and averages the noise above it. Its values at the knots are the new r
 which jump, are joined by straight lines. What this costs is stated: the rate, its band, and the noise there. Where
 packets are lost several at a time, hardly a stretch is left in which every sensor has readings; there a sensor that is
 faster than the analysis needs has the rate that the analysis needs, whose periods bridge such gaps. A sensor that comes
-evenly, however slow, stays as it is, and so does a hole of several of its own periods.
+evenly stays as it is, and so does a hole of several of its own periods.
+
+But rotors that come evenly and seldom (telemetry of 4 or 10 Hz) are joined by a curve of their own band: straight lines
+take a tenth off a motion at a fifth of their rate, which the other sensors keep, and the difference gets names.
+
+Jumps of attitude, position and velocity that no motion makes (a tracker that takes a pattern of markers for another of
+its poses, an estimator set anew) and the signs of rotor speeds are seen to before all this.
 """
 
 from __future__ import annotations
@@ -21,12 +27,15 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
-from scipy.interpolate import BSpline
+from scipy.integrate import cumulative_trapezoid
+from scipy.interpolate import BSpline, make_interp_spline
 from scipy.sparse import diags, eye_array
 from scipy.sparse.linalg import spsolve
+from scipy.spatial.transform import Rotation
 
+from rotorid.io.text.wording import listed
 from rotorid.recordings import columns as c
-from rotorid.recordings.run import RecordingSet, Run, means_of
+from rotorid.recordings.run import RecordingSet, Run, means_of, stretches
 
 _FAR = 10.0
 """Standard deviations of the readings about their neighbours from which one is a spike."""
@@ -45,6 +54,18 @@ _LEAST_SPIKES = 3
 """Fewer in all runs may be what a vehicle does once: a bump, a touch of the ground."""
 _REPEATED = 0.1
 """Share of the spikes that one value must have to be named."""
+_LEAST_JUMP_RAD, _FASTEST_RAD_S = 0.25, 40.0
+"""An attitude jumps by at least so much; where no gyroscope says how far it turns, faster than any vehicle."""
+_LEAST_JUMP_M, _FASTEST_M_S, _LEAST_JUMP_M_S, _FASTEST_M_S2 = 0.1, 60.0, 1.0, 200.0
+"""The same of a position and a velocity."""
+_MEASURED = {c.QUATERNION: 1e3, c.POSITION: 1e7, c.VELOCITY: 1e4}
+"""Largest size of a reading that is one."""
+_MOST_JUMPED = 0.3
+"""Share of the readings that those may be that a sensor jumps to and back from."""
+_CUT_READINGS = 8
+"""Readings emptied about a jump that stays: a longer gap than the one that is bridged (`_HOLE_PERIODS`)."""
+_REVERSED = 0.02
+"""Share of the largest value that a value of the other sign must exceed to be one: less is noise about zero."""
 _TOO_SLOW = 1.35
 """A point whose F/ω² exceeds the run's median by this factor has lost part of its speed pulses.
 
@@ -67,6 +88,11 @@ _RATE_ENOUGH_HZ = 50.0
 """What the analysis needs: its highest cutoff, 20 Hz, over USED_BAND."""
 _USED_BAND = 0.4
 """Highest frequency, over the rate, that the analysis uses of a sensor."""
+_MOSTLY_FRESH, _EVEN = 0.5, 0.2
+"""Share of the rows that bring a new reading, below which a sensor is repeated; and how far from the usual step one is
+even."""
+_SMOOTH_DEGREE = 7
+"""Of the curve through readings that come seldom: its gain is 0.997 at a third of their rate, a cubic's 0.95."""
 _LINES_A_PERIOD = 4.0
 """Values a period on straight lines between readings: few would cut the corners off."""
 _LEAST_READINGS = 20
@@ -87,6 +113,7 @@ def on_own_rates(recordings: RecordingSet) -> RecordingSet:
         return recordings
     kinds = ("rotor_speed", "rotor_command", "throttle")
     rotors = [c.rotor_columns(kind, recordings.vehicle.rotor_count) for kind in kinds]
+    recordings = _with_slow_joined(recordings, rotors)
     sensors = (*rotors, c.POSITION, c.VELOCITY, c.QUATERNION, c.ANGULAR_VELOCITY, c.SPECIFIC_FORCE, (c.HEIGHT,))
     there = {names: [run for run in recordings.runs if _is_read(run, names)] for names in sensors}
     scattered = [names for names, runs in there.items() if any(is_scattered(run, names) for run in runs)]
@@ -105,6 +132,46 @@ def on_own_rates(recordings: RecordingSet) -> RecordingSet:
         return recordings
     said = [_sentence(there[n], n, period, n in rotors) for n, period in own.items()]
     return replace(even, left_out=(*recordings.left_out, *said))
+
+
+def _with_slow_joined(recordings: RecordingSet, rotors: Collection[tuple[str, ...]]) -> RecordingSet:
+    """The set with rotors' readings that come evenly and too seldom to be joined by lines joined by a curve of their
+    band; a sentence for each kind of them."""
+    runs, said = list(recordings.runs), []
+    for names in rotors:
+        rates = []
+        for k, run in enumerate(runs):
+            if not _is_read(run, names):
+                continue
+            values = run.array(names)
+            rows = np.flatnonzero(np.isfinite(values).all(axis=1))
+            fresh = np.diff(values[rows], axis=0, prepend=np.nan).any(axis=1)
+            if names[0].startswith("rotor_speed") and fresh.mean() < _MOSTLY_FRESH:
+                rows = rows[fresh]  # a logger that is faster than the sensor repeats its last reading
+            steps = np.diff(run.time_s[rows])
+            period = float(np.median(steps)) if len(steps) > _LEAST_READINGS else 0.0
+            even = (np.abs(steps / period - 1) < _EVEN).mean() > _COVERED if period else False
+            if not even or not 2 * np.median(np.diff(run.time_s)) < period or period <= 1.0 / _RATE_ENOUGH_HZ:
+                continue
+            out = np.full(values.shape, np.nan)
+            for start, stop in stretches(np.append(True, steps <= _HOLE_PERIODS * period)):
+                # A stretch begins with the reading before it: the first step of the mask is from that.
+                own = rows[max(start - 1, 0) : stop]
+                if len(own) > _SMOOTH_DEGREE:
+                    inside = np.arange(own[0], own[-1] + 1)
+                    curve = make_interp_spline(run.time_s[own], values[own], _SMOOTH_DEGREE)
+                    out[inside] = curve(run.time_s[inside])
+            lowest = 0.0 if np.nanmin(values) >= 0 else -np.inf
+            runs[k] = replace(run, table=run.table.assign(**dict(zip(names, np.maximum(out, lowest).T, strict=True))))
+            rates.append(1 / period)
+        if rates:
+            rate = min(rates)
+            said.append(
+                f"{names[0]} to {names[-1]} come {rate:.3g} times a second: joined by a curve of their band; what is "
+                f"faster than {_USED_BAND * rate:.2g} Hz is not in them, and a lag of the motors shorter than "
+                f"{1 / rate:.2g} s cannot be distinguished from a delay."
+            )
+    return replace(recordings, runs=tuple(runs), left_out=(*recordings.left_out, *said)) if said else recordings
 
 
 def _with_grids(
@@ -312,6 +379,147 @@ def spikes(values: np.ndarray) -> np.ndarray:
     if scatter.min() > 0 and between.sum() < far.sum() <= _MOST * len(x):
         found[known[inner][far]] = True
     return found
+
+
+def without_jumps(recordings: RecordingSet) -> RecordingSet:
+    """Flights without readings of attitude, position or velocity to which they jump, faster than anything moves, and
+    from which they jump back; a sentence in `left_out` for each sensor that has some.
+
+    A tracker takes a marker pattern for another of its poses, bodies are exchanged. What jumps and stays was set anew:
+    there the flight is cut by a hole.
+    """
+    if recordings.vehicle.kind != "flight":
+        return recordings
+    runs, said = list(recordings.runs), []
+    for names, what in ((c.QUATERNION, "attitude"), (c.POSITION, "position"), (c.VELOCITY, "velocity")):
+        lost, anew, read, largest = 0, 0, 0, 0.0
+        for k, run in enumerate(runs):
+            if not _is_read(run, names):
+                continue
+            out, size, count = _jumps(run, names)
+            read += int(np.isfinite(run.array(names)).all(axis=1).sum())
+            if out.any():
+                lost, anew, largest = lost + int(out.sum()), anew + count, max(largest, size)
+                values = np.where(out[:, None], np.nan, run.array(names))
+                runs[k] = replace(run, table=run.table.assign(**dict(zip(names, values.T, strict=True))))
+        if lost:
+            far = (
+                f"{np.degrees(largest):.0f} degrees"
+                if names == c.QUATERNION
+                else f"{largest:.3g} {c.unit_of(names[0])}"
+            )
+            stays = f" ({anew} of the jumps stay: it was set anew, and the flight is cut there)" if anew else ""
+            said.append(
+                f"{names[0]} to {names[-1]}: the {what} jumps by up to {far} from one reading to the next, as no "
+                f"motion does: {lost} readings ({100 * lost / read:.2g} %) are left out{stays}."
+            )
+    return replace(recordings, runs=tuple(runs), left_out=(*recordings.left_out, *said)) if said else recordings
+
+
+def _jumps(run: Run, names: tuple[str, ...]) -> tuple[np.ndarray, float, int]:
+    """Rows (n,) whose reading of a sensor is to be emptied, the largest jump (rad, m, m/s), and how many stay."""
+    out = np.zeros(len(run.time_s), bool)
+    values = run.array(names)
+    if names == c.QUATERNION:
+        values[~(np.linalg.norm(np.nan_to_num(values), axis=1) > 0.1)] = np.nan
+    rows = np.flatnonzero(np.isfinite(values).all(axis=1))
+    if len(rows) < _LEAST_OF_SPIKES or np.abs(values[rows]).max() > _MEASURED[names]:
+        return out, 0.0, 0  # numbers that nothing measures are refused, not mended
+    time_s, values = run.time_s[rows], values[rows]
+    dt = np.diff(time_s)
+    steps, least, fastest, excess = _excess(run, names, time_s, values)
+    size, step = np.linalg.norm(excess, axis=1), np.linalg.norm(steps, axis=1)
+    usual = float(np.quantile(size, 0.9))
+    jump = np.minimum(size, step) > np.maximum(np.maximum(least, _FAR * usual), fastest * dt)
+    jump &= dt < _LONGEST_USUAL * np.median(dt)
+    edges = np.flatnonzero(jump) + 1
+    if not len(edges) or len(edges) > _MOST * len(rows):
+        return out, 0.0, 0
+    parts = np.split(np.arange(len(rows)), edges)
+    # Where each part lies against the first, by all jumps before it; parts that lie alike belong together.
+    places, group = _places(names, excess[edges - 1]), []
+    for k in range(len(parts)):
+        alike = (j for j in range(k) if _apart(names, places[k], places[j]) < 0.3 * size[edges - 1].min())
+        group.append(group[j] if (j := next(alike, None)) is not None else k)
+    counts = {g: sum(len(p) for p, own in zip(parts, group, strict=True) if own == g) for g in set(group)}
+    usual_group, stays = max(counts, key=counts.get), 0
+    for part, own in zip(parts, group, strict=True):
+        if own != usual_group and counts[own] < _MOST_JUMPED * len(rows):
+            out[rows[part]] = True
+    for edge in edges:
+        if not out[rows[edge - 1]] and not out[rows[edge]]:
+            stays += 1
+            out[rows[max(edge - _CUT_READINGS // 2, 0) : edge + _CUT_READINGS // 2]] = True
+    return out, float(size[edges - 1].max()), stays
+
+
+def _excess(run: Run, names: tuple[str, ...], time_s: np.ndarray, values: np.ndarray):
+    """Steps (n - 1, 3) of readings (n, k), the least jump and the fastest motion (rad, m, m/s, a second), and what of
+    the steps no other sensor explains."""
+    if names != c.QUATERNION:
+        steps = np.diff(values, axis=0)
+        least, fastest = (_LEAST_JUMP_M, _FASTEST_M_S) if names == c.POSITION else (_LEAST_JUMP_M_S, _FASTEST_M_S2)
+        return steps, least, fastest, steps
+    turn = Rotation.from_quat(values[:, [1, 2, 3, 0]])
+    steps = turn[:-1].inv() * turn[1:]
+    if not _is_read(run, c.ANGULAR_VELOCITY):
+        return steps.as_rotvec(), _LEAST_JUMP_RAD, _FASTEST_RAD_S, steps.as_rotvec()
+    rates = run.array(c.ANGULAR_VELOCITY)
+    known = np.isfinite(rates).all(axis=1)
+    total = cumulative_trapezoid(rates[known], run.time_s[known], axis=0, initial=0)
+    turned = np.column_stack([np.interp(time_s, run.time_s[known], column) for column in total.T])
+    excess = (Rotation.from_rotvec(np.diff(turned, axis=0)).inv() * steps).as_rotvec()
+    return steps.as_rotvec(), _LEAST_JUMP_RAD, 0.0, excess
+
+
+def _places(names: tuple[str, ...], jumps: np.ndarray) -> list:
+    """Where each part between jumps (m, 3) lies against the first: rotations of the body, else vectors."""
+    if names != c.QUATERNION:
+        return [np.zeros(3), *np.cumsum(jumps, axis=0)]
+    places = [Rotation.identity()]
+    for jump in jumps:
+        places.append(places[-1] * Rotation.from_rotvec(jump))
+    return places
+
+
+def _apart(names: tuple[str, ...], one, other) -> float:
+    return float((one.inv() * other).magnitude() if names == c.QUATERNION else np.linalg.norm(one - other))
+
+
+def by_sense(values: np.ndarray, sense: float | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Sizes of signed speeds or commands (n, k), and the cells (n, k) in which a rotor turns backwards: empty there.
+
+    A sign is a turning sense where a rotor keeps it. A cell against the usual sign of its column, or against `sense`
+    where it is given, is a rotor that pushes the other way, for which the contract has no column.
+    """
+    values = np.asarray(values, float)
+    signs = np.sign(np.nansum(np.sign(values), axis=0)) if sense is None else np.full(values.shape[1], sense)
+    own = values * np.where(signs == 0, 1.0, signs)
+    largest = np.nanmax(np.abs(own), axis=0, initial=0.0, where=np.isfinite(own))
+    known = np.isfinite(own)
+    against = known & (own < -_REVERSED * largest)
+    sizes = np.abs(own) if sense is None else np.clip(own, 0, None)
+    return np.where(against, np.nan, np.where(known, sizes, values)), against
+
+
+def with_sizes_of_speeds(recordings: RecordingSet) -> RecordingSet:
+    """The set with sizes in place of signed rotor speeds; a sentence in `left_out` for what their signs say."""
+    count = recordings.vehicle.rotor_count
+    names = [n for kind in ("rotor_speed", "rotor_command") for n in c.rotor_columns(kind, count)]
+    signed = [n for n in names if any(run.has(n) and np.nanmin(run.column(n)) < 0 for run in recordings.runs)]
+    if not signed:
+        return recordings
+    runs, against = [], dict.fromkeys(signed, 0)
+    for run in recordings.runs:
+        own = [n for n in signed if run.has(n)]
+        sizes, backwards = by_sense(run.array(tuple(own)))
+        against |= {n: against[n] + int(lost.sum()) for n, lost in zip(own, backwards.T, strict=True)}
+        runs.append(replace(run, table=run.table.assign(**dict(zip(own, sizes.T, strict=True)))))
+    said = [
+        f"{listed(signed)}: negative readings; a sign that a rotor keeps is its turning sense, and its size is read."
+    ]
+    said += [f"{n}: the rotor turns backwards in {k} readings: left out." for n, k in against.items() if k]
+    return replace(recordings, runs=tuple(runs), left_out=(*recordings.left_out, *said))
 
 
 def _around(sizes: np.ndarray) -> np.ndarray:

@@ -499,7 +499,7 @@ def _rest(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
     if not kinds:
         return
     values = run.array(c.rotor_columns(kinds[0], vehicle.rotor_count))
-    mean = values[np.isfinite(values).all(axis=1)].mean(axis=1)
+    mean = np.abs(values[np.isfinite(values).all(axis=1)]).mean(axis=1)
     at_rest = float((mean < _AT_REST * np.median(mean[mean > 0])).mean()) if (mean > 0).any() else 1.0
     if at_rest > 0.02:
         yield Doubt(

@@ -21,6 +21,8 @@ from rotorid.recordings.mended import (
     LEAST_VALUES,
     on_own_rates,
     whole_stretches,
+    with_sizes_of_speeds,
+    without_jumps,
     without_spikes,
 )
 from rotorid.recordings.run import RecordingSet, Run, stretches
@@ -79,7 +81,8 @@ def sufficient(recordings: RecordingSet) -> RecordingSet:
         # A bench compares readings with known loads: rotors that are listed but not recorded play no part.
         without = {"rotors": (), "thrust_coefficient_n_s2": None, "torque_coefficient_n_m_s2": None}
         recordings = replace(recordings, vehicle=vehicle.model_copy(update=without))
-    recordings = on_own_rates(without_spikes(_without_dead_sensors(recordings)))
+    recordings = without_jumps(_without_dead_sensors(with_sizes_of_speeds(recordings)))
+    recordings = on_own_rates(without_spikes(recordings))
     for run in recordings.runs:
         _check_spelling(run, recordings.vehicle)
     usable, reasons = [], []

@@ -122,6 +122,13 @@ def test_a_throttle_in_microseconds_and_a_rest_are_named(flown) -> None:
     assert "it is in µs" in found and "all rotors are at rest in 8% of the samples" in found
 
 
+def test_rotors_whose_speeds_have_signs_are_not_at_rest(flown) -> None:
+    def signed(table) -> None:
+        table[list(c.rotor_columns("rotor_speed", 4))] *= [1, -1, 1, -1]
+
+    assert not any("at rest" in doubt.sentence for doubt in doubts_of(with_table(flown, signed)))
+
+
 def test_few_and_rare_samples_are_named(flown) -> None:
     def rare(table):
         table.loc[table.index % 100 != 0, list(SPEEDS)] = np.nan

@@ -120,6 +120,24 @@ def test_commands_that_jitter_faster_than_the_grid_are_averaged_not_sampled() ->
     assert abs(np.mean(off)) < 0.001 and noise_gain(run, names, 0.02, jumps=True) < 1.3
 
 
+@pytest.mark.parametrize("repeated", [False, True])
+def test_rotors_that_come_seldom_keep_their_motion(flown: RecordingSet, repeated: bool) -> None:
+    """At 10 Hz, swinging at 2 Hz: by straight lines a ninth of it would be lost."""
+    time_s = np.arange(0, 20, 0.01)
+    true = 600 + 50 * np.sin(2 * np.pi * 2.0 * time_s)
+    read = pd.Series(np.where(np.arange(len(time_s)) % 10 == 0, true, np.nan))
+    read[(time_s > 10) & (time_s < 12)] = np.nan  # a hole stays one
+    read = read.ffill() if repeated else read
+    run = Run("run", pd.DataFrame({c.TIME: time_s} | dict.fromkeys(SPEEDS, read)))
+    made = on_own_rates(replace(flown, runs=(run,)))
+    speed = made.runs[0].column(SPEEDS[0])
+    inside = np.abs(time_s - 5) < 3
+    assert np.abs(speed - true)[inside].max() < 1.0
+    assert repeated or np.isnan(speed[(time_s > 10.1) & (time_s < 11.9)]).all()
+    (said,) = made.left_out
+    assert "come 10 times a second" in said and "faster than 4 Hz is not in them" in said
+
+
 def test_a_hole_of_several_periods_stays_one_and_what_is_even_stays_as_it_is(flown: RecordingSet) -> None:
     holed = with_holes(flown, 0.4, False)
     used = sufficient(with_table(holed, without(c.ANGULAR_VELOCITY, 4, 4.5), holed.runs[0].name))

@@ -3,10 +3,11 @@
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.spatial.transform import Rotation
 
 from rotorid.recordings import RecordingSet, Run, templates
 from rotorid.recordings import columns as c
-from rotorid.recordings.mended import spikes, without_spikes
+from rotorid.recordings.mended import spikes, with_sizes_of_speeds, without_jumps, without_spikes
 from rotorid.recordings.sufficient import sufficient
 
 RATE_HZ, SECONDS = 80.0, 60.0
@@ -91,3 +92,85 @@ def test_a_stand_with_spikes_is_used_without_them() -> None:
     table = pd.DataFrame({c.TIME: TIME, "force_z_n": -wrong(SLOW + NOISE, lambda x: 0.78 + 0 * x), **speeds})
     found = sufficient(RecordingSet("set", vehicle, tuple(Run(n, table.assign(k=k)) for k, n in enumerate("abc"))))
     assert any("spikes" in sentence for sentence in found.left_out) and len(found.runs) == 3
+
+
+# Jumps that no motion makes ----------------------------------------------------------------------
+
+
+def swinging(gyroscope: bool = True) -> pd.DataFrame:
+    """Sixty seconds of roll, pitch and yaw with their body rates, and of position and velocity."""
+    angles = np.column_stack([0.4 * np.sin(2 * np.pi * f * TIME) for f in (0.4, 0.7, 0.2)])
+    turn = Rotation.from_euler("ZYX", angles[:, ::-1])
+    rates = (turn[:-1].inv() * turn[1:]).as_rotvec() * RATE_HZ
+    table = {c.TIME: TIME} | dict(zip(c.QUATERNION, turn.as_quat()[:, [3, 0, 1, 2]].T, strict=True))
+    if gyroscope:
+        noisy = np.vstack([rates, rates[-1:]]) + 0.02 * RNG.standard_normal((len(TIME), 3))
+        table |= dict(zip(c.ANGULAR_VELOCITY, noisy.T, strict=True))
+    place = np.column_stack([3 * np.sin(2 * np.pi * f * TIME) for f in (0.1, 0.15, 0.05)])
+    table |= dict(zip(c.POSITION, place.T, strict=True))
+    table |= dict(zip(c.VELOCITY, np.gradient(place, 1 / RATE_HZ, axis=0).T, strict=True))
+    return pd.DataFrame(table)
+
+
+def mended(table: pd.DataFrame) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    made = without_jumps(RecordingSet("set", templates.read("thesis"), (Run("run", table),)))
+    return made.runs[0].table, made.left_out
+
+
+JUMPED = ((TIME > 10) & (TIME < 10.4)) | ((TIME > 30) & (TIME < 30.2)) | (np.abs(TIME - 50) < 0.01)
+
+
+@pytest.mark.parametrize("gyroscope", [True, False])
+@pytest.mark.parametrize("turn", [np.pi, -0.7])
+def test_an_attitude_that_jumps_and_comes_back_is_left_out_there(gyroscope: bool, turn: float) -> None:
+    table = swinging(gyroscope)
+    true = Rotation.from_quat(table[list(c.QUATERNION)].to_numpy()[:, [1, 2, 3, 0]])
+    wrong = (true * Rotation.from_rotvec([0, 0, turn])).as_quat()[:, [3, 0, 1, 2]]
+    table[list(c.QUATERNION)] = np.where(JUMPED[:, None], wrong, table[list(c.QUATERNION)])
+    made, said = mended(table)
+    assert (made[c.QUATERNION[0]].isna().to_numpy() == JUMPED).all()
+    assert len(said) == 1 and f"jumps by up to {np.degrees(abs(turn)):.0f} degrees" in said[0]
+
+
+@pytest.mark.parametrize(("names", "by"), [(c.POSITION, 1.5), (c.VELOCITY, 6.0)])
+def test_a_position_or_velocity_that_jumps_is_left_out_there(names, by: float) -> None:
+    table = swinging()
+    table.loc[JUMPED, names[1]] += by
+    made, said = mended(table)
+    assert (made[names[0]].isna().to_numpy() == JUMPED).all() and len(said) == 1
+
+
+def test_an_attitude_that_is_set_anew_is_cut_there() -> None:
+    table = swinging()
+    true = Rotation.from_quat(table[list(c.QUATERNION)].to_numpy()[:, [1, 2, 3, 0]])
+    anew = (Rotation.from_rotvec([0, 0, 0.6]) * true).as_quat()[:, [3, 0, 1, 2]]
+    table[list(c.QUATERNION)] = np.where((TIME > 25)[:, None], anew, table[list(c.QUATERNION)])
+    made, said = mended(table)
+    gone = TIME[made[c.QUATERNION[0]].isna()]
+    assert len(gone) == 8 and np.abs(gone - 25).max() < 0.1 and "set anew" in said[0]
+
+
+def test_what_moves_fast_does_not_jump() -> None:
+    """A flip within half a second, quaternions of either sign, and a gyroscope in degrees are no jumps."""
+    angle = 2 * np.pi * np.clip((TIME - 20) / 0.5, 0, 1)
+    turn = Rotation.from_rotvec(np.outer(angle, [1, 0, 0])).as_quat()[:, [3, 0, 1, 2]]
+    table = pd.DataFrame({c.TIME: TIME} | dict(zip(c.QUATERNION, turn.T, strict=True)))
+    rates = np.gradient(angle, 1 / RATE_HZ)
+    for factor in (1.0, 180 / np.pi):
+        own = table.assign(**dict(zip(c.ANGULAR_VELOCITY, (factor * rates, 0 * rates, 0 * rates), strict=True)))
+        assert mended(own)[1] == ()
+    cut = swinging()
+    flipped = np.where(RNG.random(len(TIME)) < 0.5, -1.0, 1.0)
+    cut[list(c.QUATERNION)] *= flipped[:, None]
+    assert mended(cut)[1] == () and mended(swinging(False))[1] == ()
+
+
+def test_a_sign_that_a_rotor_keeps_is_its_sense_and_one_that_changes_is_told() -> None:
+    speeds = c.rotor_columns("rotor_speed", 4)
+    own = 600 + 20 * np.sin(TIME)
+    table = pd.DataFrame({c.TIME: TIME} | {n: (-1.0) ** k * own for k, n in enumerate(speeds)})
+    table.loc[JUMPED, speeds[1]] = 300.0
+    made = with_sizes_of_speeds(RecordingSet("set", templates.read("thesis"), (Run("run", table),)))
+    sizes = made.runs[0].table
+    assert np.allclose(sizes[speeds[3]], own) and (sizes[speeds[1]].isna() == JUMPED).all()
+    assert "turning sense" in made.left_out[0] and f"{speeds[1]}: the rotor turns backwards" in made.left_out[1]

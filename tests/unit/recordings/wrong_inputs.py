@@ -187,7 +187,7 @@ def vehicles() -> Iterator[Wrong]:
         ("x_m: 0.0884, y_m: 0.0884", "x: 0.0884, y_m: 0.0884", "rotors.0", "x"),
         ("x_m: 0.0884, y_m: 0.0884", "x_m: a, y_m: 0.0884", "rotors.0.x_m", "a number"),
         ("x_m: 0.0884, y_m: 0.0884", "x_m: 88.4e3, y_m: 0.0884", "rotors.0.x_m", "at most 100"),
-        ("x_m: 0.0884, y_m: 0.0884", "x_m: -0.0884, y_m: 0.0884", "rotors 1 and 4 are on one spot"),
+        ("x_m: 0.0884, y_m: 0.0884", "x_m: -0.0884, y_m: -0.0884", "rotors 1 and 3 are on one spot"),
         ("  - {x_m: 0.0884, y_m: 0.0884, spin: ccw}\n", "  - 5\n", "rotors.0"),
         ("thrust_coefficient_n_s2: 1.3877e-6", "thrust_coefficient_n_s2: [1e-6, 1e-6]", "2 values for 4 rotors"),
         ("thrust_coefficient_n_s2: 1.3877e-6", "thrust_coefficient_n_s2: [1e-6, 1e-6, 1e-6, -1e-6]", "positive"),

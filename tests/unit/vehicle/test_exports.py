@@ -409,3 +409,11 @@ def test_a_file_that_the_tool_does_not_read_is_not_written(tmp_path, monkeypatch
     monkeypatch.setattr("rotorid.vehicle.exports.refusal", lambda *asked: "")
     said = refusal(*export_words(tmp_path, FLAT, "mjcf", "v.xml"))
     assert "MuJoCo does not read the exported vehicle" in said and not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("size", "told"), [(1.0, False), (1e-3, True)])
+def test_an_inertia_that_sih_cannot_invert_is_named(size: float, told: bool) -> None:
+    """Its inverse of 100 times the inertia is zero below a determinant of single precision's epsilon."""
+    inertia = Inertia(xx=1.7e-2 * size, yy=1.7e-2 * size, zz=2.9e-2 * size)
+    vehicle = templates.read("x500").model_copy(update={"inertia_kg_m2": inertia})
+    assert any("too small for SIH" in said for said in export_vehicle(vehicle, "px4-sih").left_out) == told

@@ -1,11 +1,13 @@
 """ArduPilot DataFlash logs (`.bin`) through pymavlink.
 
 ArduPilot's frames are the contract's: body forward-right-down, world north-east-down. Read are `IMU` (or `ACC` and
-`GYR`), `XKQ`/`NKQ` or `ATT` for the attitude, `XKF1`/`NKF1` for velocity and position, `RCOU` with the motors' channels
-by `SERVOn_FUNCTION` and their range by `MOT_PWM_MIN` and `MOT_PWM_MAX` (the throttle channel's where these are 0),
-`ESC` (`ESC1` to `ESC8` before 4.1) for rotor speeds, `BAT` (`CURR` where it is absent), and a range finder that looks
-down. Attitude, velocity and position are those of the estimator's core that flew the vehicle (`PI` of `XKF4`); where
-another takes over, a run ends. Of several inertial sensors the first is read that goes on changing. Older firmware
+`GYR`), `XKQ`/`NKQ`, `ATT` or `ANG` for the attitude, `XKF1`/`NKF1` for velocity and position, `RCOU` with the motors'
+channels by `SERVOn_FUNCTION` and their range by `MOT_PWM_TYPE`: `MOT_PWM_MIN` and `MOT_PWM_MAX` (the throttle channel's
+where these are 0), or each channel's own; `ESC` (`ESC1` to `ESC8` before 4.1) for rotor speeds, `BAT` (`CURR` where it
+is absent), and a range finder that looks down. Attitude, velocity and position are those of the estimator's core that
+flew the vehicle (`PI` of `XKF4`), or throughout those of the one that took over and was never left; where a core is
+left for another, or is set anew, a run ends. Of several inertial sensors that of this core is read, else the first one,
+if it goes on changing. Older firmware
 (3.3-dev) counts time in `TimeMS` and numbers outputs as `Ch1`. Its events have no clock and take the time of the
 message before them. Its estimate `EKF1` is read where `AHRS_EKF_USE` is 1.
 
@@ -17,7 +19,9 @@ for the servo of the tail. Those, and whatever is no multirotor of fixed rotors,
 change within a log; each pulse is read by those that held then.
 
 Sources: ArduPilot, Onboard Message Log Messages; Motor order diagrams; parameters `SERVOn_FUNCTION`, `FRAME_CLASS`,
-`FRAME_TYPE`, `MOT_PWM_MIN`; `AP_MotorsMulticopter::get_pwm_output_min` for limits of 0; `AP_Motors::motor_frame_class`;
+`FRAME_TYPE`, `MOT_PWM_MIN`, `MOT_PWM_TYPE`; `AP_MotorsMulticopter::get_pwm_output_min` for limits of 0;
+`AP_Motors::rc_write`, `SRV_Channel::pwm_from_angle` for channels of their own range; `AP_Motors::motor_frame_class`;
+`LogEvent` for the resets of estimators;
 `SRV_Channel.h`; `APM_BUILD_*` for the builds of `VER`.
 """
 
@@ -25,6 +29,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -38,19 +43,23 @@ from rotorid.recordings.importers.faults import (
     GOES_ON,
     ImportFault,
     airborne,
-    fault_where,
+    changes_of,
     flights,
-    increasing,
+    goes_on,
+    jumps_at,
+    moving_on,
     one_sense,
     report_gaps,
+    stops,
     table_on,
+    within,
 )
 from rotorid.recordings.importers.known import Parameters, Values
 from rotorid.recordings.importers.mapping import PULSE_US, RPM, continuous, quaternion_from_euler_frd
 
 _KINDS = (
-    "IMU", "ACC", "GYR", "XKQ", "NKQ", "ATT", "XKF1", "NKF1", "XKF4", "NKF4", "EKF1", "RCOU", "RCO2", "RCO3", "ESC",
-    *(f"ESC{n}" for n in range(1, 9)), "BAT", "CURR", "BARO", "RFND", "EV", "PARM", "MSG", "VER",
+    "IMU", "ACC", "GYR", "XKQ", "NKQ", "ATT", "XKF1", "NKF1", "ANG", "XKF4", "NKF4", "EKF1", "RCOU", "RCO2", "RCO3",
+    "ESC", *(f"ESC{n}" for n in range(1, 9)), "BAT", "CURR", "BARO", "RFND", "EV", "PARM", "MSG", "VER",
 )  # fmt: skip
 _MOTORS = {33 + i: i for i in range(8)} | {82 + i: 8 + i for i in range(4)} | {160 + i: 12 + i for i in range(20)}
 """`SERVOn_FUNCTION` to the number of the motor, from 0."""
@@ -88,7 +97,7 @@ TILTED_TYPES = {4: "V-tail", 5: "A-tail"}
 """`FRAME_TYPE` of quadrotors whose rear rotors lean outwards."""
 _CHANGED = (
     (
-        r"MOT_PWM_(MIN|MAX)|SERVO\d+_FUNCTION|RCMAP_THROTTLE|RC\d+_(MIN|MAX)",
+        r"MOT_PWM_(MIN|MAX|TYPE)|SERVO\d+_(FUNCTION|MIN|MAX|TRIM|REVERSED)|RCMAP_THROTTLE|RC\d+_(MIN|MAX)",
         "throttle",
         "each pulse is read by the value that held then",
     ),
@@ -110,7 +119,18 @@ _HEAD, END = b"\xa3\x95", "END"
 """First bytes of a message, and the key under which stands how many bytes of the last one came."""
 _CLOCKS = {"TimeUS": 1e-6, "TimeMS": 1e-3}
 """Fields of a message's clock, to the seconds that they count in."""
-_AROUND_SWITCH_S = 0.2
+_BY_CHANNEL = {8: "PWMRange", 9: "PWMAngle"}
+"""`MOT_PWM_TYPE` with which each output has its own range."""
+_SHORT, _TIMES_SHORTER, _LONGEST_SHORT_US = (1, 2), 8, 300.0
+"""`MOT_PWM_TYPE` of OneShot, by how much OneShot125 is shorter than a usual pulse, and the longest such pulse."""
+_RESET_EVENTS = {60: "the estimator set the height anew", 62: "the estimator set the heading anew"}
+"""Events EKF_ALT_RESET and EKF_YAW_RESET."""
+_REALIGNED = re.compile(r"(?!.*initial).*\byaw\b.*\b(re-?)?align|.*\byaw reset\b", re.IGNORECASE)
+_LEAST_RESET_M = 0.02
+_LATE_CORE_S = 1.0
+"""A core whose estimate begins so much later than that of others is not read throughout."""
+_ENOUGH_HZ = 50.0
+"""Rate from which an attitude is followed well: none is preferred for a higher one."""
 
 Log = Mapping[str, pd.DataFrame]
 
@@ -219,27 +239,62 @@ def _of_first(table: pd.DataFrame | None, key: str = "I") -> pd.DataFrame | None
     return table
 
 
-def _of_sensor(log: Log, kind: str) -> tuple[pd.DataFrame | None, list[ImportFault]]:
-    """The rows of the first inertial sensor that goes on changing, and a fault where that is not the first of all."""
+def _of_sensor(log: Log, kind: str, wished: float | None = None) -> tuple[pd.DataFrame | None, list[ImportFault]]:
+    """The rows of an inertial sensor that goes on changing: the wished one, else the first; and a fault where that is
+    not the first of all."""
     table = log.get(kind)
     if table is None or "I" not in table or not len(table):
         return table, []
-    changes = {
-        number: int((np.diff(own.filter(regex="^(Gyr|Acc)").to_numpy(float), axis=0) != 0).any(axis=1).sum())
-        for number, own in table.groupby("I")
-    }
-    first = min(changes)
-    taken = next(number for number, count in changes.items() if count >= GOES_ON * max(changes.values()))
-    faults = []
-    if taken != first:
-        counts = f"its readings change {changes[first]} times, those of {kind} {taken} {changes[taken]} times"
-        found = f"{kind} {first} stands still or ends early ({counts})"
-        faults.append(ImportFault("stuck", "inertial sensor", found, f"{kind} {taken} taken", 0))
-    return table[table["I"] == taken], faults
+    changes = {number: changes_of(own.filter(regex="^(Gyr|Acc)").to_numpy(float)) for number, own in table.groupby("I")}
+    taken, faults = goes_on(changes, kind)
+    if wished in changes and wished != taken and changes[wished] >= GOES_ON * max(changes.values()):
+        taken = wished
+        found = f"the vehicle flew by {kind} {wished:g}, that of its estimator"
+        faults = [ImportFault("instances", "", found, f"{kind} {wished:g} taken", 0)]
+    return table[table["I"] == taken], [replace(fault, column="inertial sensor") for fault in faults]
 
 
-def _of_primary(log: Log, kinds: tuple[str, ...]) -> pd.DataFrame | None:
-    """The rows, of the first kind that is logged, of the estimator's core that flew the vehicle then.
+@dataclass(frozen=True)
+class _Flown:
+    """By which core of the estimator the vehicle flew: one throughout, else (None) the primary one of each time."""
+
+    core: float | None = None
+    sensor: float | None = None
+    """The inertial sensor of that core."""
+    switches_s: tuple[float, ...] = ()
+    """When a core was left for another, where none is read throughout."""
+    faults: tuple[ImportFault, ...] = ()
+
+
+def _flown_by(log: Log) -> _Flown:
+    """By `PI` of `XKF4` or `NKF4`. A core that took over and was never left was right before, too."""
+    values = parameters(log).start
+    kind = next((k for k in _estimators(values) if f"{k}F4" in log), "XK")
+    primary = log.get(f"{kind}F4")
+    if primary is None or not {"PI", c.TIME} <= set(primary) or not (primary["PI"] >= 0).any():
+        return _Flown()
+    primary = primary[primary["PI"] >= 0].sort_values(c.TIME, kind="stable")
+    times, cores = (primary[name].to_numpy(float) for name in (c.TIME, "PI"))
+    changed = np.flatnonzero(np.diff(cores) != 0)
+    last, switches = cores[-1], tuple(times[changed + 1])
+    estimates = [log[k] for k in (f"{kind}F1", f"{kind}Q") if "C" in log.get(k, ())]
+    late = any(not (t.loc[t["C"] == last, c.TIME].min() <= t[c.TIME].min() + _LATE_CORE_S) for t in estimates)
+    if len(changed) and (last in cores[changed] or late):
+        return _Flown(None, None, switches)
+    mask = int(values.get(f"E{kind[0].replace('X', 'K3').replace('N', 'K2')}_IMU_MASK", 0))
+    sensor = next((float(n) for k, n in enumerate(n for n in range(8) if mask >> n & 1) if k == last), None)
+    if len(changed):
+        found = f"core {last:g} of the estimator took over for good"
+        return _Flown(last, sensor, (), (ImportFault("estimate", "", found, "its estimate is taken throughout", 0),))
+    if any(t["C"].min() < last for t in estimates):
+        found = f"the vehicle flew by core {last:g} of the estimator"
+        return _Flown(last, sensor, (), (ImportFault("instances", "", found, "that one taken", 0),))
+    return _Flown(last, sensor)
+
+
+def _of_primary(log: Log, kinds: tuple[str, ...], core: float | None) -> pd.DataFrame | None:
+    """The rows, of the first kind that is logged, of a core of the estimator, or (None) of the one that flew the
+    vehicle then.
 
     Of the first core where no message says which.
     """
@@ -247,6 +302,8 @@ def _of_primary(log: Log, kinds: tuple[str, ...]) -> pd.DataFrame | None:
     table, primary = log.get(kind), log.get(f"{kind[:1]}KF4")
     if table is None or primary is None or not {"PI", c.TIME} <= set(primary) or "C" not in table:
         return _of_first(table, "C")
+    if core is not None:
+        return table[table["C"] == core] if (table["C"] == core).any() else _of_first(table, "C")
     held = np.searchsorted(primary[c.TIME], table[c.TIME], side="right") - 1
     return table[table["C"].to_numpy() == primary["PI"].to_numpy()[np.maximum(held, 0)]]
 
@@ -256,34 +313,35 @@ def _estimators(values: Values) -> tuple[str, str]:
     return ("NK", "XK") if values.get("AHRS_EKF_TYPE") == 2 else ("XK", "NK")
 
 
-def _clock(log: Log, where: object) -> np.ndarray:
-    """Times of the inertial sensor's messages, else of the attitude's, s; InputError where there are none."""
-    offered = (*(_of_sensor(log, kind)[0] for kind in ("IMU", "GYR", "ACC")), _of_first(log.get("ATT")))
+def _clock(log: Log, where: object) -> tuple[np.ndarray, list[ImportFault]]:
+    """Times of the inertial sensor's messages, else of the attitude's, s, and what was wrong with them; InputError
+    where there are none."""
+    wished = _flown_by(log).sensor
+    offered = (*(_of_sensor(log, kind, wished)[0] for kind in ("IMU", "GYR", "ACC")), _of_first(log.get("ATT")))
     clock = next((t for t in offered if t is not None and len(t) > 1), None)
     if clock is None:
         raise InputError(f"{where}: no message IMU, GYR or ATT to take the clock from")
-    return clock[c.TIME].to_numpy(float)
+    times = clock[c.TIME].to_numpy(float)
+    keep, faults = moving_on(times)
+    return times[keep], faults
 
 
 def _in_flight(log: Log, where: object) -> Values:
     """The parameters as they held for most of the flight."""
-    grid = _clock(log, where)
+    grid, _ = _clock(log, where)
     flown = _flying(log, grid)
     return parameters(log).mostly(grid if flown is None or not flown.any() else grid[flown])
 
 
 def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[ImportFault], np.ndarray]:
     """Contract columns of a whole log, its faults, and where it flies (mask of rows)."""
-    grid = _clock(log, where)
-    stated, values = parameters(log), _in_flight(log, where)
+    grid, faults = _clock(log, where)
+    stated, values, flown = parameters(log), _in_flight(log, where), _flown_by(log)
     _check_frame(log, values, where)
-    faults = stated.faults(_CHANGED, grid[0])
+    faults += [*stated.faults(_CHANGED, grid[0]), *flown.faults]
     if END in log:
         found = f"the file ends inside a message, after {int(log[END]['bytes'].iloc[0])} bytes of it"
         faults.append(ImportFault("cut_off", "", found, "what came before is kept; the log stopped before its end", 0))
-    late = ~increasing(grid)
-    faults += fault_where(late, "repeated_time", c.TIME, f"{late.sum()} messages do not move the clock on", "left out")
-    grid = grid[~late]
     parts: list[tuple] = []
 
     def put(names, table: pd.DataFrame | None, fields) -> bool:
@@ -293,19 +351,12 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[ImportFault], n
         return True
 
     for names, kind, letters in ((c.ANGULAR_VELOCITY, "GYR", "Gyr"), (c.SPECIFIC_FORCE, "ACC", "Acc")):
-        sensor, more = _of_sensor(log, "IMU" if "IMU" in log else kind)
+        sensor, more = _of_sensor(log, "IMU" if "IMU" in log else kind, flown.sensor)
         put(names, sensor, [f"{letters}{axis}" for axis in "XYZ"])
         faults += [fault for fault in more if fault not in faults]
     cores = _estimators(values)
-    quaternion = _of_primary(log, tuple(f"{core}Q" for core in cores))
-    attitude = _of_first(log.get("ATT"))
-    if quaternion is not None and {"Q1", "Q2", "Q3", "Q4"} <= set(quaternion):
-        turns = continuous(quaternion[["Q1", "Q2", "Q3", "Q4"]].to_numpy(float))
-        parts.append((c.QUATERNION, quaternion[c.TIME].to_numpy(float), turns))
-    elif attitude is not None and {"Roll", "Pitch", "Yaw"} <= set(attitude):
-        angles = np.radians(attitude[["Roll", "Pitch", "Yaw"]].to_numpy(float))
-        parts.append((c.QUATERNION, attitude[c.TIME].to_numpy(float), quaternion_from_euler_frd(*angles.T)))
-    estimate = _of_primary(log, tuple(f"{core}F1" for core in cores))
+    parts += _attitude(log, cores, flown, faults)
+    estimate = _of_primary(log, tuple(f"{core}F1" for core in cores), flown.core)
     if estimate is None and (estimate := log.get("EKF1")) is not None and values.get("AHRS_EKF_USE") != 1:
         found = "EKF1 did not fly the vehicle (AHRS_EKF_USE is not 1)"
         faults.append(ImportFault("estimate", "velocity, position", found, "columns left out", len(estimate)))
@@ -329,6 +380,29 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[ImportFault], n
     return table, [*faults, *ground, *report_gaps(table)], flying
 
 
+def _attitude(log: Log, cores: tuple[str, str], flown: _Flown, faults: list[ImportFault]) -> list[tuple]:
+    """The attitude of the estimator, of `ATT` or of `ANG`: of several the first that comes often enough, else that
+    which comes most often; the others are named."""
+    offered = {}
+    quaternion = _of_primary(log, tuple(f"{core}Q" for core in cores), flown.core)
+    if quaternion is not None and {"Q1", "Q2", "Q3", "Q4"} <= set(quaternion):
+        turns = continuous(quaternion[["Q1", "Q2", "Q3", "Q4"]].to_numpy(float))
+        offered["the estimator's quaternion"] = quaternion[c.TIME].to_numpy(float), turns
+    for kind in ("ATT", "ANG"):
+        table = _of_first(log.get(kind))
+        if table is not None and {"Roll", "Pitch", "Yaw"} <= set(table):
+            angles = np.radians(table[["Roll", "Pitch", "Yaw"]].to_numpy(float))
+            offered[kind] = table[c.TIME].to_numpy(float), quaternion_from_euler_frd(*angles.T)
+    if not offered:
+        return []
+    rates = {name: (len(t) - 1) / max(np.ptp(t), 1e-9) if len(t) > 1 else 0.0 for name, (t, _) in offered.items()}
+    taken = max(rates, key=lambda name: round(min(rates[name], _ENOUGH_HZ)))
+    if taken != next(iter(offered)):
+        seen = ", ".join(f"{name} at {rate:.3g} Hz" for name, rate in rates.items())
+        faults.append(ImportFault("instances", "attitude", f"several state it: {seen}", f"{taken} taken", 0))
+    return [(c.QUATERNION, *offered[taken])]
+
+
 def _outputs(log: Log) -> pd.DataFrame | None:
     """Pulses of all outputs: `RCOU`, and `RCO2` and `RCO3`, which are written with it; None where none is logged."""
     outputs = _of_first(log.get("RCOU"))
@@ -344,17 +418,20 @@ def _channels(values: Values, outputs: pd.DataFrame) -> tuple[dict[int, int], li
     """To each motor (from 0) its output (from 1) by frame class and output functions, and what of it is doubtful."""
     count = _MULTIROTORS.get(int(values.get("FRAME_CLASS", 0)), 0)
     by_motor: dict[int, int] = {}
+    faults = []
     for number in _OUTPUTS:
         motor = _MOTORS.get(int(values.get(f"SERVO{number}_FUNCTION", -1)))
-        if motor is not None:
-            by_motor.setdefault(motor, number)
+        if motor is not None and by_motor.setdefault(motor, number) != number:
+            found = f"outputs {by_motor[motor]} and {number} are both motor {motor + 1}"
+            faults.append(
+                ImportFault("instances", f"throttle_{motor + 1}", found, f"output {by_motor[motor]} taken", 0)
+            )
     if not by_motor:
         count = count or 4
         found = "no SERVOn_FUNCTION is a motor"
         action = f"channels 1 to {count} taken for motors 1 to {count}"
         logged = {i: i + 1 for i in range(count) if f"C{i + 1}" in outputs}
         return logged, [ImportFault("order", "throttle", found, action, 0)]
-    faults = []
     count = count or max(by_motor) + 1
     unused = [number for motor, number in sorted(by_motor.items()) if motor >= count]
     if unused:
@@ -372,19 +449,52 @@ def _channels(values: Values, outputs: pd.DataFrame) -> tuple[dict[int, int], li
 
 
 def _throttles(outputs: pd.DataFrame, stated: Parameters, frame: float, faults: list[ImportFault]) -> list[tuple]:
-    """Throttles with their times, each pulse by the parameters that held then."""
+    """Throttles with their times, each pulse by the parameters that held then; no pulse stops a motor."""
     times, throttles = outputs[c.TIME].to_numpy(float), {}
     for start, stop, values in stated.spans(_CHANGED[0][0]):
         inside = (times >= start) & (times < stop)
         if not inside.any():
             continue
-        low, high, more = _limits(values, int(inside.sum()))
-        faults += more
-        for motor, number in _channels({**values, "FRAME_CLASS": frame}, outputs)[0].items():
-            pulses = outputs.loc[inside, f"C{number}"].to_numpy(float)
-            own = throttles.setdefault(f"throttle_{motor + 1}", np.full(len(times), np.nan))
-            own[inside] = np.where(pulses > 0, np.clip((pulses - low) / (high - low), 0, 1), np.nan)
-    return [((name,), times, own) for name, own in sorted(throttles.items())]
+        channels, kind = _channels({**values, "FRAME_CLASS": frame}, outputs)[0], int(values.get("MOT_PWM_TYPE", 0))
+        every = outputs.loc[inside, [f"C{number}" for number in channels.values()]].to_numpy(float)
+        short = kind in _SHORT and 0 < np.nanmax(every, initial=0.0) <= _LONGEST_SHORT_US
+        if kind in _BY_CHANNEL:
+            found = f"MOT_PWM_TYPE is {kind} ({_BY_CHANNEL[kind]})"
+            action = "each output is read by its own SERVOn_MIN, _MAX, _TRIM and _REVERSED"
+            faults.append(ImportFault("unit", "throttle", found, action, int(inside.sum())))
+        else:
+            low, high, more = _limits(values, int(inside.sum()))
+            faults += more
+        if short:
+            found = f"MOT_PWM_TYPE is {kind} and no pulse is longer than {np.nanmax(every):g} µs (OneShot125)"
+            faults.append(ImportFault("unit", "throttle", found, f"taken {_TIMES_SHORTER} times as long", len(every)))
+        for (motor, number), pulses in zip(channels.items(), every.T, strict=True):
+            pulses = pulses * (_TIMES_SHORTER if short else 1)
+            name, given = f"throttle_{motor + 1}", pulses > 0
+            share = (
+                _of_own_range(pulses, values, number, kind) if kind in _BY_CHANNEL else (pulses - low) / (high - low)
+            )
+            own = throttles.setdefault(name, np.full(len(times), np.nan))
+            own[inside] = np.where(given, share, np.nan)
+    if not throttles:
+        return []
+    names = sorted(throttles)
+    shares = np.column_stack([throttles[name] for name in names])
+    shares, stopped = stops(shares, names, "no pulse (0)")
+    shares, outside = within(shares, names)
+    faults += [*stopped, *outside]
+    return [(names, times, shares)]
+
+
+def _of_own_range(pulses: np.ndarray, values: Values, number: int, kind: int) -> np.ndarray:
+    """Shares of a channel's own range, of an angle's two halves on either side of its trim, from the other end where it
+    is reversed."""
+    defaults = {"MIN": 1100.0, "TRIM": 1500.0, "MAX": 1900.0}
+    low, trim, high = (values.get(f"SERVO{number}_{word}", default) for word, default in defaults.items())
+    share = (pulses - low) / max(high - low, 1.0)
+    if kind == 9 and low < trim < high:
+        share = 0.5 + 0.5 * np.where(pulses > trim, (pulses - trim) / (high - trim), (pulses - trim) / (trim - low))
+    return 1 - share if values.get(f"SERVO{number}_REVERSED", 0) > 0 else share
 
 
 def _limits(values: Values, pulses: int) -> tuple[float, float, list[ImportFault]]:
@@ -408,24 +518,33 @@ def _limits(values: Values, pulses: int) -> tuple[float, float, list[ImportFault
 
 
 def _battery(log: Log, faults: list[ImportFault]) -> list[tuple]:
-    """Voltage (V) and current (A) of `BAT`, of `CURR` where there is none; what is 0 throughout is not measured.
+    """Voltage (V) and current (A) of `BAT`, of `CURR` where there is none; what is 0 throughout is not measured, and
+    batteries after the first have names of their own.
 
     `CURR` counts in hundredths where its format holds whole numbers (Copter 3.3 and before).
     """
     kind = "BAT" if log.get("BAT") is not None else "CURR"
-    table, parts = _of_first(log.get(kind)), []
-    for column, name in ((c.BATTERY_VOLTAGE, "Volt"), (c.BATTERY_CURRENT, "Curr")):
-        if table is None or name not in table:
-            continue
-        values = table[[name]].to_numpy()
-        if values.dtype.kind not in "iuf":
-            continue  # damaged: no numbers
-        values = values.astype(float) * (0.01 if kind == "CURR" and values.dtype.kind in "iu" else 1.0)
-        if (values == 0).all():
-            seen = f"{kind}.{name} is 0 throughout"
-            faults.append(ImportFault("stuck", column, seen, "column left out", len(values)))
-            continue
-        parts.append(((column,), table[c.TIME].to_numpy(float), values))
+    table, parts = log.get(kind), []
+    if table is None:
+        return []
+    key = next((name for name in ("Inst", "Instance", "I") if name in table), None)
+    every = [(f" of battery {k}", own) for k, own in table.groupby(key)] if key else [("", table)]
+    every.sort(key=lambda battery: "Volt" not in table or not np.any(battery[1]["Volt"]))  # first one with a voltage
+    for number, (which, own) in enumerate(every, 1):
+        for column, name in ((c.BATTERY_VOLTAGE, "Volt"), (c.BATTERY_CURRENT, "Curr")):
+            if name not in table or table[name].dtype.kind not in "iuf":
+                continue  # not there, or damaged: no numbers
+            values = own[[name]].to_numpy()
+            values = values.astype(float) * (0.01 if kind == "CURR" and values.dtype.kind in "iu" else 1.0)
+            column = column if number == 1 else f"battery_{number}_{column.removeprefix('battery_')}"
+            seen = f"{kind}.{name}{which if len(every) > 1 else ''}"
+            if (values == 0).all():
+                faults.append(ImportFault("stuck", column, f"{seen} is 0 throughout", "column left out", len(values)))
+                continue
+            if number > 1:
+                action = "kept under a name of its own"
+                faults.append(ImportFault("instances", column, f"{seen} is logged, too", action, len(values)))
+            parts.append(((column,), own[c.TIME].to_numpy(float), values))
     return parts
 
 
@@ -467,21 +586,32 @@ def _flying(log: Log, grid: np.ndarray) -> np.ndarray | None:
     return None
 
 
+def _resets(log: Log) -> list[tuple[np.ndarray, str]]:
+    """Times of all that sets an estimate anew, s, and what it is in words."""
+    found = [(np.array(_flown_by(log).switches_s), "another core of the estimator took over")]
+    events, said = log.get("EV"), log.get("MSG")
+    for event, words in _RESET_EVENTS.items():
+        if events is not None and {"Id", c.TIME} <= set(events):
+            found.append((events.loc[events["Id"] == event, c.TIME].to_numpy(float), words))
+    if said is not None and {"Message", c.TIME} <= set(said):
+        again = said["Message"].astype(str).str.match(_REALIGNED)
+        found.append((said.loc[again, c.TIME].to_numpy(float), "the heading was aligned anew"))
+    for kind in ("XKF4", "NKF4"):
+        table = _of_first(log.get(kind), "C")
+        if table is not None and {"OFN", "OFE", c.TIME} <= set(table) and len(table) > 1:
+            moved = np.linalg.norm(np.diff(table[["OFN", "OFE"]].to_numpy(float), axis=0), axis=1) > _LEAST_RESET_M
+            found.append((table[c.TIME].to_numpy(float)[1:][moved], "the estimator set the position anew"))
+    return [(times, words) for times, words in found if len(times)]
+
+
 def read_ardupilot(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault], str]:
     """Every flight of a DataFlash log by name, what was found, and the key of the rotors' order."""
     log = read_messages(path)
     table, faults, flying = convert(log, path)
-    values = _in_flight(log, path)
-    order, more = order_of(values)
-    primary = log.get("NKF4" if _estimators(values)[0] == "NK" and "NKF4" in log else "XKF4")
-    switches = np.zeros(0)  # times at which another core of the estimator took over
-    if primary is not None and {"PI", c.TIME} <= set(primary):
-        switches = primary[c.TIME].to_numpy(float)[1:][np.diff(primary["PI"].to_numpy(float)) != 0]
-    switches, jumps = switches - _clock(log, path)[0], np.zeros(len(table), bool)
-    for switch in switches:
-        jumps |= np.abs(table[c.TIME].to_numpy() - switch) <= _AROUND_SWITCH_S
-    if len(switches):
-        found = f"another core of the estimator took over {len(switches)} times, first at {switches[0]:.2f} s"
-        more.append(ImportFault("estimator_reset", "", found, "a run ends at each change in the air", len(switches)))
+    order, more = order_of(_in_flight(log, path))
+    grid, jumps = table[c.TIME].to_numpy(), np.zeros(len(table), bool)
+    for times, words in _resets(log):
+        own, found = jumps_at(grid, times - _clock(log, path)[0][0], words)
+        jumps, more = jumps | own, more + found
     runs, cuts = flights(table, flying, path.name.split(".")[0], path, jumps)
     return runs, [*faults, *more, *cuts], order

@@ -30,7 +30,7 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.faults import ImportFault, airborne, fault_where, flights, increasing, report_gaps
+from rotorid.recordings.importers.faults import ImportFault, airborne, flights, moving_on, report_gaps
 from rotorid.recordings.importers.mapping import G, half_turn_about_x, quaternion_to_frd_ned
 
 _FIRST_LINE = b"H Product:Blackbox"
@@ -153,9 +153,8 @@ def convert(
         raise InputError(f"{where}: the log has no field time")
     raw, faults = _known_names(raw)
     time = raw["time"].to_numpy(float) * 1e-6
-    keep = np.isfinite(time) & increasing(np.nan_to_num(time, nan=-np.inf))
-    found = f"{(~keep).sum()} frames do not move the clock on"
-    faults += fault_where(~keep, "repeated_time", c.TIME, found, "left out")
+    keep, more = moving_on(time)
+    faults += more
     raw, time = raw[keep].reset_index(drop=True), time[keep]
     table = pd.DataFrame({c.TIME: time - time[0]})
 

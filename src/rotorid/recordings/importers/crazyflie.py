@@ -127,6 +127,15 @@ FORMS: dict[tuple[str, ...], tuple[tuple[tuple[str, ...], Callable[[np.ndarray],
 BODY_VELOCITY = _names("kalman", "statePX statePY statePZ")
 
 
+def is_log(head: bytes) -> bool:
+    """Whether the first bytes of a file are those of a uSD log: its mark, a version, kinds of events and a name."""
+    if len(head) < 8 or head[0] != _MAGIC:
+        return False
+    version, count = struct.unpack_from("<HH", head, 1)
+    name = head[7:].split(b"\0")[0]
+    return 0 < version < 256 and 0 < count < 256 and name.isascii() and name.decode("latin-1").isprintable()
+
+
 def is_table(names: Collection[str]) -> bool:
     """Whether the columns of a table have the firmware's names of its motors and of a state or sensor."""
     stated = any(set(own) <= set(names) for forms in FORMS.values() for own, _ in forms)
@@ -271,7 +280,7 @@ def flights(
     path = Path(path)
     prefix = prefix or path.name.split(".")[0]
     with open(path, "rb") as file:
-        binary = file.read(1) == bytes([_MAGIC])
+        binary = file.read(1) == bytes([_MAGIC])  # no text that can be read begins so
     tables, faults = read_usd_log(path) if binary else _read_table(path)
     if _EVENT not in tables:
         raise InputError(f"{path}: no event {_EVENT} in this log, found {', '.join(tables) or 'none'}")

@@ -7,7 +7,7 @@ row nearest in time, so that nothing is interpolated.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from itertools import pairwise
 from pathlib import Path
@@ -17,6 +17,7 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
+from rotorid.recordings.mended import by_sense
 from rotorid.recordings.run import stretches
 
 _SHORTEST_FLIGHT_S = 4.0
@@ -45,12 +46,24 @@ _SMOOTHED_S = 1.0
 _SPEEDS = ("rotor_speed", "rotor_command")
 GOES_ON = 0.9
 """Share of the readings of others of its kind that a sensor has at least, if it neither stands still nor ends early."""
-_REVERSED = 0.02
-"""Share of the largest value that a value of the other sign must exceed to be one: less is noise about zero."""
 _SHUFFLED, LATE_STEPS = 0.05, 100.0
 """Share of steps back from which rows are in no order, and how many usual steps late a row in order may come."""
+_TURNS = {
+    scale * length: length not in (2.0**16, 2.0**24, 2.0**31, 2.0**32)
+    for length in (3600.0, 43200.0, 86400.0, 604800.0, 2.0**16, 2.0**24, 2.0**31, 2.0**32)
+    for scale in (1.0, 1e-9, 1e-6, 1e-3, 1e3, 1e6, 1e9)
+}
+"""After how much of its units a clock may begin anew: an hour, half a day, a day, a week, counters of 16 to 32 bits;
+and whether it is a time of day or of the week, which never is below 0."""
 _FEW_STEPS = 5.0
 """Usual steps back, and rows after them, below which no clock was set."""
+_LEAP_S, _LEAP_STEPS = 0.5, 20.0
+"""A clock leaps where it goes on by more than so many seconds and usual steps, or back by so many seconds."""
+_FEW_S, _FEW_ROWS = 0.3, 0.02
+"""Rows between leaps are apart where they last less and are a smaller share of the longest part."""
+_AROUND_RESET_S = 0.2
+_OUTSIDE = 0.01
+"""Share of the range by which a throttle may lie outside of it unnoticed."""
 _UNEXPLAINED = 0.2
 """Share of its variance that the motors of a mixer may leave of another motor's signal."""
 
@@ -127,14 +140,43 @@ def read_report(folder: Path) -> dict:
 
 
 def drop_repeated_times(table: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
-    """Rows whose time is not later than every row before are left out and reported."""
-    time = table[c.TIME].to_numpy(float)
-    latest = np.maximum.accumulate(np.where(np.isnan(time), -np.inf, time))
-    keep = ~np.isnan(time) & (np.concatenate([[-np.inf], latest[:-1]]) < time)
-    if keep.all():
-        return table, []
-    found = f"{(~keep).sum()} rows do not move the clock on (first at {time[~keep][0]:.6g} s)"
-    return table[keep].reset_index(drop=True), fault_where(~keep, "repeated_time", c.TIME, found, "left out")
+    """The table without the rows that `moving_on` leaves out, and what these were."""
+    keep, faults = moving_on(table[c.TIME].to_numpy(float))
+    return (table if keep.all() else table[keep].reset_index(drop=True)), faults
+
+
+def moving_on(time_s: np.ndarray) -> tuple[np.ndarray, list[ImportFault]]:
+    """Instants (n,), s, that are of the recording and later than every one before: their mask, and what is left out.
+
+    A few rows behind or before a leap of the clock are of no flight: what stood in a buffer, a first line of zeros, the
+    end of another log.
+    """
+    known = np.flatnonzero(np.isfinite(time_s))
+    time, keep = time_s[known], np.zeros(len(time_s), bool)
+    if not len(time):
+        return keep, []
+    steps = np.diff(time)
+    usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    leaps = np.flatnonzero((steps > max(_LEAP_S, _LEAP_STEPS * usual)) | (steps < -_LEAP_S))
+    parts = np.split(np.arange(len(time)), leaps + 1)
+    long = max(map(len, parts))
+    apart = [p for p in parts if len(p) <= _FEW_ROWS * long and np.ptp(time[p]) < _FEW_S] if len(leaps) else []
+    alone = np.concatenate([np.zeros(0, int), *apart])
+    stays = np.delete(np.arange(len(time)), alone)
+    latest = np.maximum.accumulate(time[stays])
+    keep[known[stays[np.concatenate([[True], time[stays][1:] > latest[:-1]])]]] = True
+    lone = np.zeros(len(time_s), bool)
+    lone[known[alone]] = True
+    late = ~keep & ~lone
+    faults = []
+    if lone.any():
+        where = "first of all" if lone[known[0]] else f"at {time_s[lone][0]:.6g} s"
+        found = f"{lone.sum()} samples ({where}) are apart from all others by a leap of the clock: not of this flight"
+        faults = fault_where(lone, "apart", c.TIME, found, "left out")
+    found = f"{late.sum()} rows do not move the clock on" + (
+        f" (first at {time_s[late][0]:.6g} s)" if late.any() else ""
+    )
+    return keep, faults + fault_where(late, "repeated_time", c.TIME, found, "left out")
 
 
 def in_order(table: pd.DataFrame, time: str) -> tuple[pd.DataFrame, list[ImportFault]]:
@@ -142,16 +184,18 @@ def in_order(table: pd.DataFrame, time: str) -> tuple[pd.DataFrame, list[ImportF
 
     `time` names the clock's column, in any unit.
     """
-    clock = table[time].to_numpy(float)
+    clock, faults = _unwrapped(table[time].to_numpy(float))
+    if faults:
+        attrs, table = table.attrs, table.assign(**{time: clock})
+        table.attrs = attrs
     steps = np.diff(clock)
     back = steps < 0
     if not back.any():
-        return table, []
+        return table, faults
     usual = float(np.median(np.diff(np.unique(clock[np.isfinite(clock)]))))
     anew = (
         [] if back.mean() >= _SHUFFLED else [int(k) for k in np.flatnonzero(back) if _set_back(table, clock, k, usual)]
     )
-    faults = []
     for row in anew:
         by = clock[row] - clock[row + 1]
         clock = np.append(clock[: row + 1], clock[row + 1 :] + by + LATE_STEPS * usual)
@@ -167,6 +211,35 @@ def in_order(table: pd.DataFrame, time: str) -> tuple[pd.DataFrame, list[ImportF
         faults.append(ImportFault("order", c.TIME, found, "sorted by their time", int(late.sum())))
     ordered.attrs = table.attrs
     return ordered, faults
+
+
+def _unwrapped(clock: np.ndarray) -> tuple[np.ndarray, list[ImportFault]]:
+    """A clock (n,) that begins anew where its counter or its day ends goes on, and a fault where it does.
+
+    It then has been through the whole of its range.
+    """
+    known = np.flatnonzero(np.isfinite(clock))
+    steps, span = np.diff(clock[known]), np.ptp(clock[known]) if len(known) else 0.0
+    if not (steps > 0).any():
+        return clock, []
+    usual = float(np.median(steps[steps > 0]))
+    low, high = np.nanmin(clock), np.nanmax(clock)
+    turn = next(
+        (
+            t
+            for t, of_day in sorted(_TURNS.items())
+            if 0.8 * t <= span <= t and t > 20 * usual and (not of_day or 0 <= low <= high <= t)
+        ),
+        None,
+    )
+    anew = np.flatnonzero((steps < 0) & (steps + (turn or 0.0) >= 0) & (steps + (turn or 0.0) <= _FEW_STEPS * usual))
+    if turn is None or not len(anew):
+        return clock, []
+    out = clock.copy()
+    for k in anew:
+        out[known[k + 1] :] += turn
+    found = f"the clock begins anew {len(anew)} times, after {turn:.10g} of its units"
+    return out, [ImportFault("clock_turn", c.TIME, found, "goes on", len(anew))]
 
 
 def _set_back(table: pd.DataFrame, clock: np.ndarray, row: int, usual: float) -> bool:
@@ -209,21 +282,63 @@ def join_rows(table: pd.DataFrame, time: str) -> pd.DataFrame:
 def one_sense(
     values: np.ndarray, names: Sequence[str], sense: float | None = None
 ) -> tuple[np.ndarray, list[ImportFault]]:
-    """Magnitudes of signed speeds or commands (n, k) and a fault for each column that is reversed for a time.
-
-    A sign is a turning sense where a rotor keeps it. A cell against the usual sense of its column, or against `sense`
-    where it is given, is a rotor that pushes the other way, for which the contract has no column: it becomes empty.
-    """
-    values = np.asarray(values, float)
-    signs = np.sign(np.nansum(np.sign(values), axis=0)) if sense is None else np.full(values.shape[1], sense)
-    own = values * np.where(signs == 0, 1.0, signs)
-    largest = np.nanmax(np.abs(own), axis=0, initial=0.0, where=np.isfinite(own))
-    against = own < -_REVERSED * largest
+    """Sizes of signed speeds or commands (n, k) as `by_sense` has them, and a fault for each rotor that is reversed."""
+    sizes, against = by_sense(values, sense)
     faults = []
     for name, lost in zip(names, against.T, strict=True):
-        found = f"against its usual sign in {lost.mean():.1%} of the samples"
+        found = f"the rotor turns backwards (against its usual sign) in {lost.mean():.1%} of the samples"
         faults += fault_where(lost, "reversed", name, found, "made empty cells")
-    return np.where(against, np.nan, np.abs(own) if sense is None else np.clip(own, 0, None)), faults
+    return sizes, faults
+
+
+def stops(values: np.ndarray, names: Sequence[str], how: str) -> tuple[np.ndarray, list[ImportFault]]:
+    """Throttles (n, k) with 0 where a log says, by no number in a column that has some, that a motor is stopped.
+
+    `how` the log says so, in words; a fault for each motor that is stopped while others turn.
+    """
+    given, faults = np.isfinite(values), []
+    stopped = ~given & given.any(axis=0)
+    for name, own in zip(names, (stopped & given.any(axis=1)[:, None]).T, strict=True):
+        found = f"the motor is stopped ({how}) in {own.mean():.0%} of the messages while others turn"
+        faults += fault_where(own, "stopped", name, found, "read as 0")
+    return np.where(stopped, 0.0, values), faults
+
+
+def jumps_at(grid_s: np.ndarray, times_s: np.ndarray, what: str) -> tuple[np.ndarray, list[ImportFault]]:
+    """Rows (n,) of a grid, s, about instants at which an estimate jumps, which no run may hold, and the fault of it."""
+    times_s = np.unique(times_s[(times_s >= grid_s[0]) & (times_s <= grid_s[-1])])
+    rows = np.zeros(len(grid_s), bool)
+    for at in times_s:
+        rows |= np.abs(grid_s - at) <= _AROUND_RESET_S
+    if not len(times_s):
+        return rows, []
+    count = len(times_s[np.diff(times_s, prepend=-np.inf) > _AROUND_RESET_S])
+    found = f"{what} {count} times, first at {times_s[0]:.2f} s"
+    return rows, [ImportFault("estimator_reset", "", found, "a run ends at each of them in the air", count)]
+
+
+def changes_of(values: np.ndarray) -> int:
+    """How often readings (n, k) change: a sensor that stands still says no more."""
+    return int((np.diff(values, axis=0) != 0).any(axis=1).sum())
+
+
+def goes_on(changes: Mapping[int, int], what: str) -> tuple[int, list[ImportFault]]:
+    """The first instance of a sensor that goes on changing as long as any other, by how often each changes, and a fault
+    where that is not the first of all."""
+    first, most = min(changes), max(changes.values())
+    taken = next(number for number in sorted(changes) if changes[number] >= GOES_ON * most)
+    if taken == first:
+        return taken, []
+    counts = f"its readings change {changes[first]} times, those of {what} {taken} {changes[taken]} times"
+    found = f"{what} {first} stands still or ends early ({counts})"
+    return taken, [ImportFault("stuck", "", found, f"{what} {taken} taken", 0)]
+
+
+def within(shares: np.ndarray, names: Sequence[str]) -> tuple[np.ndarray, list[ImportFault]]:
+    """Throttles (n, k) cut off at 0 and 1, and a fault where some lie outside."""
+    outside = (shares < -_OUTSIDE) | (shares > 1 + _OUTSIDE)
+    found = f"{outside.any(axis=1).mean():.0%} of the rows lie outside the range (disarmed motors get less)"
+    return np.clip(shares, 0, 1), fault_where(outside, "range", ", ".join(names), found, "cut off at 0 and 1")
 
 
 def further_motors(outputs: np.ndarray, motors: int) -> list[int]:
@@ -296,21 +411,19 @@ def cut(table: pd.DataFrame, start_s: float, stop_s: float) -> pd.DataFrame:
 
 
 def on_grid(grid: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Values (n, k) put into the row of the grid nearest in time; NaN elsewhere (the last one wins a shared row).
+    """Values (n, k) put into the row of the grid nearest in time, of several for one row the nearest; NaN elsewhere.
 
-    Both times in one unit, as floats or whole numbers.
+    Both times in one unit, as floats or whole numbers. What is more than two usual steps from any row is in a hole of
+    the grid and has no row.
     """
     values = np.asarray(values, float).reshape(len(time), -1)
     out = np.full((len(grid), values.shape[1]), np.nan)
-    inside = (time >= grid[0]) & (time <= grid[-1])
-    out[np.searchsorted((grid[1:] + grid[:-1]) / 2, time[inside])] = values[inside]
+    row = np.searchsorted((grid[1:] + grid[:-1]) / 2, time)
+    far = np.abs(time - grid[row])
+    kept = np.flatnonzero((time >= grid[0]) & (time <= grid[-1]) & (far <= 2 * np.median(np.diff(grid))))
+    kept = kept[np.argsort(-far[kept], kind="stable")]  # of several for one row the nearest is written last
+    out[row[kept]] = values[kept]
     return out
-
-
-def increasing(time_s: np.ndarray) -> np.ndarray:
-    """Mask of the instants later than every one before, (n,)."""
-    latest = np.maximum.accumulate(time_s)
-    return np.concatenate([[True], time_s[1:] > latest[:-1]])
 
 
 def table_on(grid_s: np.ndarray, parts: Sequence[tuple[Sequence[str], np.ndarray, np.ndarray]]) -> pd.DataFrame:

@@ -72,6 +72,10 @@ _IMPOSSIBLE = 3.5
 _POSSIBLE = 2.2
 """Speeds of hover within this factor are."""
 _GZIP = b"\x1f\x8b"
+_WITHIN = ((b"H Product:Blackbox", "betaflight"), (b"\xa3\x95\x80\x80\x59FMT", "ardupilot"))
+"""What the first lines or messages of a log hold, behind what may be left of another in the logger's memory."""
+_EPOCHS_US = (9e14, 5e15)
+"""Times from 1998 to 2128 in µs, as telemetry logs of MAVLink have them before each message."""
 _BY_FIRST_BYTES = (
     (b"H Product:Blackbox", "betaflight"),
     (b'"Product","Blackbox', "betaflight"),
@@ -123,13 +127,14 @@ def format_of(path: Path) -> str:
         raise InputError(f"{path}: the file is empty")
     if head.startswith(b"ULog\x01\x12\x35"):
         return "px4"
-    if head[0] == 0xBC:
+    if crazyflie.is_log(head):
         return "crazyflie"
     if head.startswith(_GZIP):
         return "csv"
     if head.startswith(b"PAR1"):
         return "parquet"
-    if head[8:9] in (b"\xfe", b"\xfd") and path.suffix.lower() in (".tlog", ".rlog"):
+    epoch = _EPOCHS_US[0] < int.from_bytes(head[:8], "big") < _EPOCHS_US[1]
+    if head[8:9] in (b"\xfe", b"\xfd") and (epoch or path.suffix.lower() in (".tlog", ".rlog")):
         raise InputError(
             f"{path}: a telemetry log of MAVLink, which is not read; take the autopilot's own log (.bin, .ulg), or "
             "make a table of it (`pip install pymavlink`, then `mavlogdump.py --format csv --types "
@@ -138,6 +143,8 @@ def format_of(path: Path) -> str:
     for start, name in _BY_FIRST_BYTES:
         if head.startswith(start):
             return name
+    if found := next((name for words, name in _WITHIN if words in head), None):
+        return found
     if path.suffix.lower() == ".mat":
         return "neurobem"
     text = head.decode("utf-8", errors="replace")

@@ -8,6 +8,7 @@ A mapping names columns, units and frames::
       time: {columns: [t], unit: us}
       specific_force: {columns: [ax, ay, az], unit: g}
       attitude: {columns: [qx, qy, qz, qw], form: xyzw}       # wxyz | xyzw | euler | euler_xyz (roll, pitch, yaw)
+      attitude: {columns: [roll, pitch, heading], form: euler, unit: ddeg, signs: [1, -1, 1]}   # of any channel
       velocity: {columns: [vx, vy, vz], unit: m/s, axes: body}  # world (default) | body
       position: {columns: [x, y, z], unit: m, world: neu}       # where its axes are not those of the attitude
       throttle: {columns: [m1, m2, m3, m4], unit: us, range: [1000, 2000]}
@@ -45,7 +46,15 @@ from rotorid.io.models import KnownKeys
 from rotorid.io.text.files import read_yaml
 from rotorid.io.text.wording import explain
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.faults import ImportFault, drop_repeated_times, in_order, join_rows, report_gaps
+from rotorid.recordings.importers.faults import (
+    ImportFault,
+    drop_repeated_times,
+    in_order,
+    join_rows,
+    one_sense,
+    report_gaps,
+    within,
+)
 from rotorid.recordings.tables import clock_jump, numbers, read_cells, read_parquet_cells
 
 G = 9.80665
@@ -62,7 +71,7 @@ UNITS: dict[str, dict[str, float]] = {
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "ft": _FOOT_M},
     "velocity": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
     "rate": {"rad/s": 1.0, "deg/s": np.pi / 180, "mrad/s": 1e-3},
-    "angle": {"rad": 1.0, "deg": np.pi / 180, "mrad": 1e-3, "cdeg": np.pi / 18000},
+    "angle": {"rad": 1.0, "deg": np.pi / 180, "mrad": 1e-3, "cdeg": np.pi / 18000, "ddeg": np.pi / 1800},
     "acceleration": {"m/s2": 1.0, "g": G, "mg": G / 1000, "cm/s2": 1e-2, "mm/s2": 1e-3, "ft/s2": _FOOT_M},
     "rotor": {"rad/s": 1.0, "rpm": RPM, "hz": 2 * np.pi},
     "turns": {
@@ -88,7 +97,8 @@ SPELLINGS: dict[str, dict[str, str]] = {
                "ft": "foot feet"},
     "velocity": {"m/s": "ms mps ms1", "cm/s": "cms cmps", "mm/s": "mms mmps"},
     "rate": {"rad/s": "rads radps rads1", "deg/s": "degs dps degps degrees/s degree/s degs1", "mrad/s": "mrads mradps"},
-    "angle": {"rad": "radian radians", "deg": "degree degrees", "mrad": "", "cdeg": "centideg centidegrees"},
+    "angle": {"rad": "radian radians", "deg": "degree degrees", "mrad": "", "cdeg": "centideg centidegrees",
+              "ddeg": "decideg decidegrees"},
     "acceleration": {"m/s2": "ms2 mps2 m/s/s m/ss", "g": "gs g0 gn", "mg": "milligee",
                      "cm/s2": "cms2 cm/s/s gal", "mm/s2": "mms2 mm/s/s", "ft/s2": "fts2 ft/s/s"},
     "rotor": {"rad/s": "rads radps rads1", "rpm": "r/min rev/min revs/min 1/min u/min min1 revolutions/min rpms",
@@ -145,7 +155,9 @@ WORLD = {
 TRAVEL = WORLD | {"neu": np.diag([1.0, 1.0, -1.0])}
 """Axes that position and velocity may have, too: a left-handed system has no attitude."""
 ELECTRICAL = ("erpm", "100erpm")
-_DATE, _TIME_OF_DAY = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d"), re.compile(r"\d{1,2}:\d\d:\d\d(\.\d+)?")
+_DATE, _TIME_OF_DAY = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d"), re.compile(r"\d{1,2}:\d\d(:\d\d)?([.,]\d+)?")
+_DAY_FIRST = re.compile(r"(\d{1,2})([./])(\d{1,2})\2(\d{4})[T ]+(?=\d)")
+"""A date that begins with its day or, with slashes, its month."""
 
 
 class MappedChannel(KnownKeys, frozen=True):
@@ -155,6 +167,8 @@ class MappedChannel(KnownKeys, frozen=True):
     unit: str = ""
     scale: float | Literal["?"] = 1.0
     """What one count is in the unit."""
+    signs: tuple[Literal[1, -1], ...] | Literal["?"] | None = None
+    """By which each column is multiplied: 1 or -1 (an angle that is positive nose down, where the axes want it up)."""
     form: Literal["wxyz", "xyzw", "euler", "euler_xyz", "?"] = "wxyz"
     """Attitude only."""
     axes: Literal["world", "body", "?"] = "world"
@@ -195,6 +209,7 @@ def _open_questions(mapping: Mapping) -> list[str]:
             "axes": "world or body",
             "world": " or ".join(TRAVEL),
             "scale": "what one count is in the unit",
+            "signs": "1 or -1 for each column",
             "range": "[reading of no throttle, of full throttle]",
             "poles": "magnetic poles of a motor",
         }
@@ -233,6 +248,8 @@ def read_mapping(path: Path) -> Mapping:
             raise InputError(f"{path}: {name}: range [{low:g}, {high:g}], expected no throttle below full throttle")
         if channel.unit in ELECTRICAL and not (channel.poles or 0) > 0:
             raise InputError(f"{path}: {name}: unit {channel.unit} needs poles, the magnetic poles of a motor")
+        if channel.signs is not None and len(channel.signs) != len(channel.columns):
+            raise InputError(f"{path}: {name}: {len(channel.signs)} signs for {len(channel.columns)} columns")
         if channel.scale == 0:
             raise InputError(f"{path}: {name}: scale 0, expected what one count is in the unit")
         if wanted and len(channel.columns) != wanted:
@@ -260,21 +277,37 @@ def read_columns(path: Path) -> pd.DataFrame:
 
 
 def _clocks_as_seconds(table: pd.DataFrame) -> pd.DataFrame:
-    """The table with columns of dates or times of day, each cell one, as seconds."""
+    """The table with columns of dates or times of day, each cell one, as seconds; their fractions may have commas."""
     for name in table.columns:
         column = table[name]
         if pd.api.types.is_numeric_dtype(column.dtype) or not (known := column.notna()).any():
             continue
         first = str(column[known].iloc[0]).strip()
-        if _DATE.match(first):
-            since = pd.to_datetime(column, format="ISO8601", utc=True, errors="coerce") - pd.Timestamp(0, tz="UTC")
+        if _DATE.match(first) or _DAY_FIRST.match(first):
+            since = _seconds_of_dates(column)
         elif _TIME_OF_DAY.fullmatch(first):
-            since = pd.to_timedelta(column, errors="coerce")
+            text = column.astype("string").str.strip().str.replace(",", ".")
+            whole = text.where(text.str.count(":") == 2, "0:" + text)  # minutes and seconds
+            since = pd.to_timedelta(whole, errors="coerce").dt.total_seconds()
         else:
             continue
         if since.notna().equals(known):
-            table[name] = since.dt.total_seconds()
+            table[name] = since
     return table
+
+
+def _seconds_of_dates(column: pd.Series) -> pd.Series:
+    """Dates and times as seconds. Of a day and a month in either order those are meant in which less time goes by."""
+    text, read = column.astype("string").str.strip().str.replace(",", "."), []
+    for order in (r"\4-\3-\1 ", r"\4-\1-\3 "):
+        iso = text.str.replace(_DAY_FIRST, lambda m, o=order: _two_digits(m.expand(o)), regex=True)
+        since = pd.to_datetime(iso, format="ISO8601", utc=True, errors="coerce") - pd.Timestamp(0, tz="UTC")
+        read.append(since.dt.total_seconds())
+    return min(read, key=lambda s: (int(s.isna().sum()), float(s.max() - s.min())))
+
+
+def _two_digits(date: str) -> str:
+    return re.sub(r"-(\d)(?=[- ])", r"-0\1", date)
 
 
 def read_by_mapping(path: Path, mapping: Mapping | None) -> tuple[pd.DataFrame, list[ImportFault], str]:
@@ -312,6 +345,7 @@ def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFra
     table, late = in_order(table.loc[:, ~table.columns.duplicated()], clock)
     table = join_rows(table, clock)
     out: dict[str, np.ndarray] = {}
+    faults: list[ImportFault] = []
     rotation = None
     order = sorted(mapping.channels, key=lambda n: n != "attitude")
     for name in order:
@@ -320,9 +354,11 @@ def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFra
         kind, columns = CHANNELS[name]
         if channel.scale != 1.0:
             values = values * channel.scale
+        if channel.signs is not None:
+            values = values * channel.signs
         if name == "throttle" and channel.range is not None:
             low, high = channel.range
-            values = np.clip((values - low) / (high - low), 0, 1)
+            values = (values - low) / (high - low)
         elif name != "attitude" or channel.form in EULER:
             values = converted(values, kind, channel.unit)
         if channel.unit in ELECTRICAL:
@@ -347,20 +383,30 @@ def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFra
             values = turned
         if not columns:
             columns = c.rotor_columns(name, len(channel.columns))
+            both = name != "throttle" or channel.range is None or channel.range[0] == 0  # below it is backwards
+            values, more = one_sense(values, columns, None if name != "throttle" else 1.0) if both else (values, [])
+            faults += more
+            if name == "throttle":
+                values, more = within(values, columns)
+                faults += more
         out.update(zip(columns, values.T, strict=True))
     for name in mapping.keep:
         out[name] = table[name].to_numpy(float)
     out[c.TIME] = out[c.TIME] - np.nanmin(out[c.TIME])
-    table, faults = _clocked(pd.DataFrame({c.TIME: out.pop(c.TIME), **out}), where)
-    return table, late + faults
+    table, more = _clocked(pd.DataFrame({c.TIME: out.pop(c.TIME), **out}), where)
+    return table, late + faults + more
 
 
 def _clocked(table: pd.DataFrame, where: object) -> tuple[pd.DataFrame, list[ImportFault]]:
     """The rows that move the clock on, and what is wrong with the others; InputError where the clock was set."""
     known = table[c.TIME].notna().to_numpy()
-    if known.all() and (jumped := clock_jump(table[c.TIME].to_numpy(float), str(where))):
-        raise InputError(jumped)
+    whole = table[c.TIME].to_numpy(float)
     table, faults = drop_repeated_times(table)
+    if any(fault.kind == "apart" for fault in faults):
+        table = table.assign(**{c.TIME: table[c.TIME] - table[c.TIME].iloc[0]})
+        whole = table[c.TIME].to_numpy(float)
+    if known.all() and (jumped := clock_jump(whole, str(where))):
+        raise InputError(jumped)
     if len(table) < 2:
         raise InputError(f"{where}: {c.TIME} moves on in {len(table)} of {len(known)} rows, expected at least two")
     return table, faults + report_gaps(table)

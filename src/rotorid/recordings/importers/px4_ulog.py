@@ -1,4 +1,4 @@
-"""PX4 flight logs (ULog) through pyulog.
+"""PX4 flight logs (ULog) through pyulog, and what PX4's topics mean, for bags of `px4_msgs` as well.
 
 PX4's frames are the contract's: body forward-right-down, world north-east-down, quaternion scalar first.
 Each topic has its own clock; a run is laid out on the times of the fastest inertial topic and each other
@@ -6,16 +6,18 @@ value stands in the row nearest in time, so nothing is interpolated.
 
 What PX4 marks as invalid is a missing sample: positions and velocities by `xy_valid`, `z_valid`, `v_xy_valid`,
 `v_z_valid`, the height by `dist_bottom_valid`, a speed controller by `esc_online_flags`, a battery by `connected`,
-a current of -1. Position, velocity and attitude are the flight controller's estimates; where it resets one of them, a
-run ends. Parameters may change within a log; each throttle is read by those that held then.
+a current of -1. A control that is NaN stops its motor. Position, velocity and attitude are the flight controller's
+estimates; where it resets one of them, a run ends. Parameters may change within a log; each throttle is read by those
+that held then.
 
-Sources: PX4 `msg/`, `src/modules/control_allocator/module.yaml`, `src/lib/mixer_module`; the ULog file format.
+Sources: PX4 `msg/`, `src/modules/control_allocator/module.yaml`, `src/lib/mixer_module`, `src/drivers/dshot`,
+`src/drivers/pwm_out/module.yaml`, `src/drivers/uavcan/module.yaml`; the ULog file format.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,15 +29,19 @@ from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.faults import (
-    GOES_ON,
     ImportFault,
     airborne,
+    changes_of,
     drop_repeated_times,
     fault_where,
     further_motors,
+    goes_on,
+    jumps_at,
     on_grid,
     one_sense,
     report_gaps,
+    stops,
+    within,
     without_pauses,
 )
 from rotorid.recordings.importers.known import Parameters, Values
@@ -54,13 +60,31 @@ OTHER_AIRFRAMES |= {7: "a vehicle whose motors point in several directions", 8: 
 OTHER_AIRFRAMES |= {n: "a helicopter" for n in (10, 11, 12)} | {n: "a spacecraft" for n in (14, 15)}
 """CA_AIRFRAME of what is no multirotor of fixed rotors."""
 _CHANGED = (
-    (r"THR_MDL_FAC|CA_R_REV|PWM_(MAIN|AUX)_\w+", "throttle", "each value is read by what held then"),
+    (
+        r"THR_MDL_FAC|CA_R_REV|DSHOT_CONFIG|(PWM_(MAIN|AUX|EXTRA)|PCA9685|UAVCAN_EC|SIM_GZ_EC|HIL_ACT)_\w+",
+        "throttle",
+        "each value is read by what held then",
+    ),
     (r"CA_ROTOR\w+|CA_AIRFRAME|MAV_TYPE", "vehicle.yaml", "the value that held for most of the flight is taken"),
     (r"MPC_THR_HOVER|EKF2_BCOEF_[XY]|EKF2_MCOEF", "", "no column depends on it"),
 )
 """Parameters on which a value depends, or that `rotorid parameters` states: names, column, what a change means."""
-_PLAUSIBLE_PULSE_US = (500.0, 2500.0)
-_AROUND_RESET_S = 0.2
+_ENDS = {
+    **dict.fromkeys(("PWM_MAIN", "PWM_AUX", "PWM_EXTRA", "PCA9685"), PULSE_US),
+    "UAVCAN_EC": (1.0, 8191.0),
+    "SIM_GZ_EC": (0.0, 1000.0),
+    "HIL_ACT": (0.0, 1.0),
+}
+"""To the drivers of outputs, as their parameters are called, no and full throttle where no parameter states them."""
+_DSHOT = (1.0, 1999.0)
+"""The same of DShot (0 is disarmed), which PX4 logs less its 48 commands."""
+_DSHOT_TIMERS = (-5, -4, -3, -2)
+"""Values of PWM_*_TIMn that are DShot of some speed; larger ones are pulses."""
+_UAVCAN_WITH_MOTORS = 3
+"""UAVCAN_ENABLE from which the bus drives motors."""
+_PLAUSIBLE = 0.5
+"""Share of the range by which outputs that turn may lie outside of it; farther, they are in another unit."""
+JUMPED = "PX4's estimator jumped in position, velocity or attitude"
 RESETS = (
     ("vehicle_local_position", "xy_reset_counter", ("delta_xy[0]", "delta_xy[1]"), 0.02),
     ("vehicle_local_position", "z_reset_counter", ("delta_z",), 0.02),
@@ -73,7 +97,11 @@ RESETS = (
 rad; half of the angle) is within the noise of an estimate."""
 _ARMED = 2
 
-_Topics = Mapping[str, Sequence[Mapping[str, np.ndarray]]]
+_Fields = Mapping[str, np.ndarray]
+"""Fields of one instance of a topic, (n,) each, named as pyulog does: `q[0]`, `esc[1].esc_rpm`."""
+_Topics = Mapping[str, Sequence[_Fields]]
+_Parts = tuple[dict[tuple[str, ...], tuple[np.ndarray, np.ndarray]], list[ImportFault]]
+_UNKNOWN = Parameters({})
 
 
 @dataclass(frozen=True)
@@ -82,7 +110,7 @@ class Px4Log:
     which the file ends."""
 
     topics: _Topics
-    parameters: Parameters = Parameters({})
+    parameters: Parameters = _UNKNOWN
     lost_s: tuple[float, ...] = ()
     damaged: bool = False
     rest: int = 0
@@ -172,16 +200,15 @@ def rotor_count(log: Px4Log) -> int:
             what, by = OTHER_AIRFRAMES[airframe], f"CA_AIRFRAME {airframe}"
         raise InputError(f"the log is of {what} ({by}); only multirotors can be imported")
     stated = int(values.get("CA_ROTOR_COUNT", 0)) or (_ROTORS_OF_TYPE[kind] if "MAV_TYPE" in values else 0)
-    return stated or _driven_motors(log.topics) or 4
+    return stated or driven_motors(_first(log.topics, "actuator_motors")[0]) or 4
 
 
-def _driven_motors(topics: _Topics) -> int:
-    """Number of motors to which `actuator_motors` gives a value; the others are NaN throughout."""
-    motors = _first(topics, "actuator_motors")
-    given = [
-        i for i, name in enumerate(_indexed("control", _MOST_MOTORS), 1) if np.isfinite(motors.get(name, [])).any()
-    ]
-    return max(given, default=0)
+def driven_motors(data: _Fields) -> int:
+    """Number of motors to which `actuator_motors` or `esc_status` gives a value; the other controls are NaN
+    throughout."""
+    given = [i for i, name in enumerate(_indexed("control", _MOST_MOTORS), 1) if np.isfinite(data.get(name, [])).any()]
+    given += [motor + 1 for motor in _slots_of_motors(data)]
+    return max(given, default=int(np.max(data.get("esc_count", [0]), initial=0)))
 
 
 # Clocks -------------------------------------------------------------------------------------------
@@ -210,11 +237,18 @@ def _stack(data: Mapping[str, np.ndarray], fields: Sequence[str]) -> np.ndarray 
     return np.column_stack([data[f] for f in fields]).astype(float) if set(fields) <= set(data) else None
 
 
-def _first(topics: _Topics, name: str) -> Mapping[str, np.ndarray]:
-    """The first instance of a topic that goes on as long as any other; empty where there is none."""
-    counts = [len(data["timestamp"]) for data in topics.get(name, [])]
-    chosen = next((k for k, count in enumerate(counts) if count >= GOES_ON * max(counts)), None)
-    return {} if chosen is None else topics[name][chosen]
+def _first(topics: _Topics, name: str) -> tuple[_Fields, list[ImportFault]]:
+    """The first instance of a topic that goes on changing as long as any other, and a fault where that is not the first
+    of all; empty where there is none."""
+    instances = topics.get(name, [])
+    if len(instances) < 2:
+        return (instances[0] if instances else {}), []
+    numbers = [np.column_stack([v for f, v in d.items() if not f.startswith("timestamp")]) for d in instances]
+    changes = {k: changes_of(values) for k, values in enumerate(numbers)}
+    if not any(changes.values()):
+        changes = {k: len(values) for k, values in enumerate(numbers)}
+    taken, faults = goes_on(changes, name)
+    return instances[taken], faults
 
 
 # Rotors -------------------------------------------------------------------------------------------
@@ -222,25 +256,36 @@ def _first(topics: _Topics, name: str) -> Mapping[str, np.ndarray]:
 
 def _throttles(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray, list[ImportFault]]:
     """Throttles (n, rotors) with their times, µs, from either generation of actuator topics."""
-    names = ", ".join(c.rotor_columns("throttle", rotors))
-    motors = _first(log.topics, "actuator_motors")
-    values = _stack(motors, _indexed("control", rotors))
-    if values is not None:
-        times = _time(motors, sampled=False)
-        faults = _more_rotors("actuator_motors", _driven_motors(log.topics), rotors)
-        values, reversed_ = one_sense(values, c.rotor_columns("throttle", rotors), 1.0)
-        for start, stop, stated in log.parameters.spans(_CHANGED[0][0]):
-            inside, curve = (times >= start) & (times < stop), float(stated.get("THR_MDL_FAC", 0.0))
-            if 0 < curve <= 1 and inside.any():  # PX4 turns the thrust asked for into the signal by this curve
-                half = (1 - curve) / (2 * curve)
-                values[inside] = np.sqrt(half**2 + values[inside] / curve) - half
-                seen = f"THR_MDL_FAC is {curve:g}: actuator_motors holds thrusts"
-                faults += fault_where(inside, "unit", names, seen, "turned into signals by PX4's own curve")
-        return values, times, faults + reversed_
+    motors, faults = _first(log.topics, "actuator_motors")
+    if f"control[{rotors - 1}]" in motors:
+        values, times, more = of_motors(motors, rotors, log.parameters)
+        return values, times, faults + more
     instances = log.topics.get("actuator_outputs", [])
     if not instances:
         return _no_throttle("no_command", "", "neither actuator_motors nor actuator_outputs is logged")
-    return _from_pulses(log, instances, rotors, names)
+    return _from_outputs(log, instances, rotors, ", ".join(c.rotor_columns("throttle", rotors)))
+
+
+def of_motors(
+    data: _Fields, rotors: int, parameters: Parameters = _UNKNOWN
+) -> tuple[np.ndarray, np.ndarray, list[ImportFault]]:
+    """Throttles (n, rotors) of `actuator_motors`, their times, µs, and what was found.
+
+    NaN stops a motor, and all of them where PX4 is disarmed; one that never has a value is none.
+    """
+    names, times = c.rotor_columns("throttle", rotors), _time(data, sampled=False)
+    values = _stack(data, _indexed("control", rotors))
+    faults = _more_rotors("actuator_motors", driven_motors(data), rotors)
+    values, stopped = stops(values, names, "NaN")
+    values, reversed_ = one_sense(values, names, 1.0)
+    for start, stop, stated in parameters.spans(_CHANGED[0][0]):
+        inside, curve = (times >= start) & (times < stop), float(stated.get("THR_MDL_FAC", 0.0))
+        if 0 < curve <= 1 and inside.any():  # PX4 turns the thrust asked for into the signal by this curve
+            half = (1 - curve) / (2 * curve)
+            values[inside] = np.sqrt(half**2 + values[inside] / curve) - half
+            seen = f"THR_MDL_FAC is {curve:g}: actuator_motors holds thrusts"
+            faults += fault_where(inside, "unit", ", ".join(names), seen, "turned into signals by PX4's own curve")
+    return values, times, faults + stopped + reversed_
 
 
 def _no_throttle(
@@ -257,13 +302,13 @@ def _more_rotors(topic: str, driven: int, rotors: int) -> list[ImportFault]:
     return [ImportFault("order", "", found, "the others are left out; check CA_ROTOR_COUNT and MAV_TYPE", 0)]
 
 
-def _from_pulses(log: Px4Log, instances, rotors: int, names: str):
-    """Throttles of `actuator_outputs`, pulse widths in µs."""
+def _from_outputs(log: Px4Log, instances, rotors: int, names: str):
+    """Throttles of `actuator_outputs` by the parameters that state what drives the motors, and in what unit."""
     flown = in_flight(log)
     port, outputs = _outputs_of_motors(flown, rotors)
     if outputs is None:
-        found = f"no output of PWM_MAIN_FUNC* or PWM_AUX_FUNC* is motor {port}, and actuator_motors is not logged"
-        return _no_throttle("no_command", "", found)
+        found = f"no output of PWM_MAIN_FUNC*, PWM_AUX_FUNC* or their like is motor {port}, and actuator_motors is not"
+        return _no_throttle("no_command", "", f"{found} logged")
     faults = []
     stacks = [_stack(data, [f"output[{k}]" for k in outputs]) for data in instances]
     usable = [i for i, s in enumerate(stacks) if s is not None]
@@ -276,67 +321,91 @@ def _from_pulses(log: Px4Log, instances, rotors: int, names: str):
     if not any("_FUNC" in name for name in flown):  # no output states what it is
         every = _stack(instances[chosen], [f for f in _indexed("output", 16) if f in instances[chosen]])
         faults += _more_rotors("actuator_outputs", rotors + len(further_motors(every, rotors)), rotors)
-    times, pulses = _time(instances[chosen], sampled=False), stacks[chosen]
-    turning = pulses[pulses > 0]
-    if len(turning) and not (turning.min() >= _PLAUSIBLE_PULSE_US[0] and turning.max() <= _PLAUSIBLE_PULSE_US[1]):
-        found = f"outputs from {turning.min():g} to {turning.max():g} are no pulse widths in µs"
-        return _no_throttle("unit", names, found, len(pulses), faults)
-    throttle = np.full(pulses.shape, np.nan)
+    times, given = _time(instances[chosen], sampled=False), stacks[chosen]
+    throttle = np.full(given.shape, np.nan)
     for start, stop, values in log.parameters.spans(_CHANGED[0][0]):
         inside = (times >= start) & (times < stop)
-        low, high, stated = _pulse_range(values, port, outputs)
-        throttle[inside] = (pulses[inside] - low) / (high - low)
-        if not stated and inside.any():
+        low, high, by = _ends_of(values, port, outputs)
+        share = (given[inside] - low) / (high - low)
+        turning = given[inside] > 0
+        if (np.abs(share[turning] - 0.5) > 0.5 + _PLAUSIBLE).any():
+            own = given[inside][turning]
+            found = f"outputs from {own.min():g} to {own.max():g} are not {by or 'pulse widths in µs'}"
+            return _no_throttle("unit", names, found, len(given), faults)
+        throttle[inside] = share
+        if not inside.any():
+            continue
+        ends = f"{low[0]:g} and {high[0]:g}"
+        if not by:
             found = "no parameter states the pulse widths of no and full throttle"
-            faults += fault_where(inside, "unit", names, found, f"taken as {low[0]:g} and {high[0]:g} µs")
+            faults += fault_where(inside, "unit", names, found, f"taken as {ends} µs")
+        elif not by.startswith("pulses"):
+            faults += fault_where(inside, "unit", names, f"the outputs are {by}", f"no and full throttle are {ends}")
     both = [i for i in range(rotors) if int(flown.get("CA_R_REV", 0)) >> i & 1]  # 0 in the middle of their range
     throttle[:, both], backwards = one_sense(
         2 * throttle[:, both] - 1, [c.rotor_columns("throttle", rotors)[i] for i in both], 1.0
     )
-    outside = (throttle < -0.01) | (throttle > 1.01)
-    found = f"{outside.any(axis=1).mean():.0%} of the rows lie outside the range (disarmed motors get less)"
-    faults += fault_where(outside, "range", names, found, "cut off at 0 and 1")
-    return np.clip(throttle, 0, 1), times, faults + backwards
+    throttle, outside = within(throttle, c.rotor_columns("throttle", rotors))
+    return throttle, times, faults + backwards + outside
 
 
 def _outputs_of_motors(parameters: Values, rotors: int) -> tuple[str | int, list[int] | None]:
-    """The port (`MAIN` or `AUX`) and the indices of its outputs that drive motors 1 to `rotors`; the first ones of
-    `MAIN` where no function is stated, and the number of a motor that has no output where one is missing."""
+    """The driver (of `_ENDS`) and the indices of its outputs that drive motors 1 to `rotors`; where no function is
+    stated the first ones, of the bus where UAVCAN_ENABLE says so; the number of a motor that has no output where one is
+    missing."""
     by_port, stated = {}, False
-    for port in ("MAIN", "AUX"):
-        named = rf"PWM_{port}_FUNC(\d+)"
+    for port in _ENDS:
+        named = rf"{port}_FUNC(\d+)"
         functions = {int(v): int(m[1]) for k, v in parameters.items() if (m := re.fullmatch(named, k))}
         by_port[port] = [functions.get(_FIRST_MOTOR + i) for i in range(rotors)]
         stated |= bool(functions)
     if not stated:
-        return "MAIN", list(range(rotors))
+        on_bus = parameters.get("UAVCAN_ENABLE", 0) >= _UAVCAN_WITH_MOTORS
+        return "UAVCAN_EC" if on_bus else "PWM_MAIN", list(range(rotors))
     port, motors = min(by_port.items(), key=lambda item: item[1].count(None))
     return (motors.index(None) + 1, None) if None in motors else (port, [k - 1 for k in motors])
 
 
-def _pulse_range(parameters: Values, port: str, outputs: Sequence[int]) -> tuple[np.ndarray, np.ndarray, bool]:
-    """Pulse widths of no and full throttle by output, µs, and whether a parameter states them."""
+def _ends_of(parameters: Values, port: str, outputs: Sequence[int]) -> tuple[np.ndarray, np.ndarray, str]:
+    """Outputs of no and full throttle by motor, and in words what a parameter says that they are, empty where none
+    does."""
+    timers = [int(v) for k, v in parameters.items() if re.fullmatch(rf"{port}_TIM\d+", k)]
+    timer = next((t for t in timers if t in _DSHOT_TIMERS), None) if set(timers) <= set(_DSHOT_TIMERS) else None
+    if port.startswith("PWM") and (parameters.get("DSHOT_CONFIG", 0) > 0 or timer is not None):
+        name = f"{port}_TIMn {timer}" if timer is not None else f"DSHOT_CONFIG {parameters['DSHOT_CONFIG']:g}"
+        low, high = (np.full(len(outputs), end) for end in _DSHOT)
+        return low, high, f"DShot by {name}"
     ends, stated = [], True
-    for word, default in zip(("MIN", "MAX"), PULSE_US, strict=True):
-        common = next((parameters[k] for k in (f"PWM_{port}_{word}", f"PWM_{word}") if parameters.get(k, 0) > 0), None)
-        own = [parameters.get(f"PWM_{port}_{word}{k + 1}", -1) for k in outputs]
+    for word, default in zip(("MIN", "MAX"), _ENDS[port], strict=True):
+        common = next((parameters[k] for k in (f"{port}_{word}", f"PWM_{word}") if parameters.get(k, 0) > 0), None)
+        own = [parameters.get(f"{port}_{word}{k + 1}", -1) for k in outputs]
         stated &= common is not None or all(v > 0 for v in own)
         ends.append(np.array([v if v > 0 else (common or default) for v in own], float))
-    reverse = [bool(int(parameters.get(f"PWM_{port}_REV", 0)) >> k & 1) for k in outputs]
     low, high = ends
-    return np.where(reverse, high, low), np.where(reverse, low, high), stated
+    if not port.startswith(("PWM", "PCA9685")):
+        return low, high, f"those of {port}_MINn and {port}_MAXn" if stated else f"those of {port}"
+    reverse = [bool(int(parameters.get(f"{port}_REV", 0)) >> k & 1) for k in outputs]
+    return np.where(reverse, high, low), np.where(reverse, low, high), f"pulses by {port}_*" if stated else ""
 
 
 def _speeds(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray, list[ImportFault]]:
-    """Rotor speeds (n, rotors), rad/s, of `esc_status`, NaN where a controller is not heard."""
+    """Rotor speeds (n, rotors), rad/s, of `esc_status`."""
     instances = log.topics.get("esc_status", [])
     turning = [d for d in instances if any(np.any(v) for field, v in d.items() if field.endswith(".esc_rpm"))]
     if not instances:
         return None, np.zeros(0), []
-    data = (turning or instances)[0]
-    slots = [i for i in range(8) if f"esc[{i}].esc_rpm" in data]
-    function = {i: int(np.median(data.get(f"esc[{i}].actuator_function", [0]))) for i in slots}
-    by_function = {f - _FIRST_MOTOR: i for i, f in function.items() if f >= _FIRST_MOTOR}
+    values, times, faults = of_controllers((turning or instances)[0], rotors)
+    if values is not None and len(turning) > 1:
+        found = f"{len(turning)} instances of esc_status hold speeds"
+        faults.append(ImportFault("instances", "rotor_speed", found, "the first of them taken", 0))
+    return values, times, faults
+
+
+def of_controllers(data: _Fields, rotors: int) -> tuple[np.ndarray | None, np.ndarray, list[ImportFault]]:
+    """Rotor speeds (n, rotors), rad/s, of `esc_status`, each by the motor that its controller drives, with their times,
+    µs; NaN where a controller is not heard, None where there is no speed."""
+    slots = _controllers(data)
+    by_function = _slots_of_motors(data)
     place = {r: by_function.get(r, r) if by_function else r for r in range(rotors)}
     if not set(place.values()) <= set(slots):
         found = f"esc_status holds {len(slots)} controllers for {rotors} rotors"
@@ -344,9 +413,6 @@ def _speeds(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray, li
     online = np.asarray(data.get("esc_online_flags", np.full(len(data["timestamp"]), -1))).astype(np.int64)
     values = np.column_stack([np.asarray(data[f"esc[{place[r]}].esc_rpm"], float) for r in range(rotors)]) * RPM
     values, faults = one_sense(values, c.rotor_columns("rotor_speed", rotors))
-    if len(turning) > 1:
-        found = f"{len(turning)} instances of esc_status hold speeds"
-        faults.append(ImportFault("instances", "rotor_speed", found, "the first of them taken", 0))
     heard = np.column_stack([(online >> place[r]) & 1 for r in range(rotors)]).astype(bool)
     others = [i for i in slots if i not in place.values() and np.any(data[f"esc[{i}].esc_rpm"])]
     faults += _more_rotors("esc_status", rotors + len(others), rotors)
@@ -358,37 +424,43 @@ def _speeds(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray, li
     return np.where(heard, values, np.nan), _time(data, sampled=False), faults
 
 
+def _controllers(data: _Fields) -> list[int]:
+    return [i for i in range(8) if f"esc[{i}].esc_rpm" in data]
+
+
+def _slots_of_motors(data: _Fields) -> dict[int, int]:
+    """To a motor (from 0) the place of its controller in `esc_status`, where the message states what each drives."""
+    function = {i: int(np.median(data.get(f"esc[{i}].actuator_function", [0]))) for i in _controllers(data)}
+    return {f - _FIRST_MOTOR: i for i, f in function.items() if f >= _FIRST_MOTOR}
+
+
 # The rest -----------------------------------------------------------------------------------------
 
 
-def _inertial(topics: _Topics) -> dict[str, tuple[tuple[str, ...], np.ndarray, np.ndarray]]:
-    """Accelerometer and gyroscope: topic to (columns, time in µs, values), each from the topic with most samples."""
-    combined = _first(topics, "sensor_combined")
+def _combined(data: _Fields) -> _Parts:
+    time, relative = _time(data), np.asarray(data.get("accelerometer_timestamp_relative", 0)).astype(np.int64)
+    near = np.broadcast_to(np.abs(relative) < 1_000_000, time.shape)
     found = {}
-    for columns, field, other in (
-        (c.SPECIFIC_FORCE, "accelerometer_m_s2", "vehicle_acceleration"),
-        (c.ANGULAR_VELOCITY, "gyro_rad", "vehicle_angular_velocity"),
-    ):
-        offered = {"sensor_combined": _stack(combined, _indexed(field, 3))}
-        offered[other] = _stack(_first(topics, other), _indexed("xyz", 3))
-        offered = {name: values for name, values in offered.items() if values is not None}
-        if not offered:
-            continue
-        name = max(offered, key=lambda name: len(offered[name]))
-        time, values = _time(_first(topics, name)), offered[name]
-        if name == "sensor_combined" and columns == c.SPECIFIC_FORCE:
-            late = np.asarray(combined.get("accelerometer_timestamp_relative", np.zeros(len(time)))).astype(np.int64)
-            near = np.abs(late) < 1_000_000
-            time, values = time + np.where(near, late, 0), np.where(near[:, None], values, np.nan)
-        found[name, columns] = (columns, time, values)
-    return found
+    if (rates := _stack(data, _indexed("gyro_rad", 3))) is not None:
+        found[c.ANGULAR_VELOCITY] = time, rates
+    if (force := _stack(data, _indexed("accelerometer_m_s2", 3))) is not None:
+        found[c.SPECIFIC_FORCE] = time + np.where(near, relative, 0), np.where(near[:, None], force, np.nan)
+    return found, []
 
 
-def _local_position(data: Mapping[str, np.ndarray]) -> tuple[dict[tuple[str, ...], np.ndarray], list[ImportFault]]:
-    """Position, velocity and height of `vehicle_local_position`, NaN where PX4 calls them invalid."""
-    count = len(data["timestamp"])
-    values: dict[tuple[str, ...], np.ndarray] = {}
-    faults = []
+def _columns(names: tuple[str, ...], fields: Sequence[str]) -> Callable[[_Fields], _Parts]:
+    """A topic that holds one quantity."""
+
+    def read(data: _Fields) -> _Parts:
+        values = _stack(data, fields)
+        return ({} if values is None else {names: (_time(data), values)}), []
+
+    return read
+
+
+def _local_position(data: _Fields) -> _Parts:
+    """Position, velocity and height, NaN where PX4 calls them invalid."""
+    count, values, faults = len(data["timestamp"]), {}, []
     for names, fields, flags in (
         (c.POSITION, ("x", "y", "z"), ("xy_valid", "xy_valid", "z_valid")),
         (c.VELOCITY, ("vx", "vy", "vz"), ("v_xy_valid", "v_xy_valid", "v_z_valid")),
@@ -404,100 +476,166 @@ def _local_position(data: Mapping[str, np.ndarray]) -> tuple[dict[tuple[str, ...
         bad = ", ".join(n for n, column in zip(names, known.T, strict=True) if not column.all())
         found = f"PX4 calls it invalid in {(~known).any(axis=1).mean():.0%} of the messages"
         faults += fault_where(~known, "invalid", bad, found, "made empty cells")
-        values[names] = np.where(known, raw, np.nan)
+        values[names] = _time(data), np.where(known, raw, np.nan)
     return values, faults
+
+
+def _odometry(data: _Fields) -> _Parts:
+    """The estimate that PX4 sends to companions, as far as it is in its world axes."""
+    values = {}
+    for names, fields, frame, world in (
+        (c.POSITION, _indexed("position", 3), "pose_frame", 1),
+        (c.VELOCITY, _indexed("velocity", 3), "velocity_frame", 1),
+        (c.QUATERNION, _indexed("q", 4), "pose_frame", 1),
+    ):
+        raw, frames = _stack(data, fields), data.get(frame)
+        if raw is not None and frames is not None and (np.asarray(frames) == world).all():
+            values[names] = _time(data), raw
+    return values, []
+
+
+def _battery(data: _Fields) -> _Parts:
+    """Voltage and current of a battery, NaN where they are not measured; nothing of one that is not connected."""
+    if "voltage_v" not in data or ("connected" in data and not np.any(data["connected"])):
+        return {}, []
+    time, voltage = _time(data), np.asarray(data["voltage_v"], float)
+    current = np.asarray(data.get("current_a", np.full(len(voltage), -1.0)), float)
+    values = {(c.BATTERY_VOLTAGE,): (time, np.where(voltage > 0, voltage, np.nan)[:, None])}
+    if (current < 0).all():
+        found = "-1 A throughout: not measured"
+        return values, [ImportFault("not_measured", c.BATTERY_CURRENT, found, "column left out", 0)]
+    return values | {(c.BATTERY_CURRENT,): (time, np.where(current < 0, np.nan, current)[:, None])}, []
+
+
+TOPICS: Mapping[str, Callable[[_Fields], _Parts]] = {
+    "sensor_combined": _combined,
+    "vehicle_angular_velocity": _columns(c.ANGULAR_VELOCITY, _indexed("xyz", 3)),
+    "vehicle_acceleration": _columns(c.SPECIFIC_FORCE, _indexed("xyz", 3)),
+    "vehicle_attitude": _columns(c.QUATERNION, _indexed("q", 4)),
+    "vehicle_local_position": _local_position,
+    "vehicle_odometry": _odometry,
+    "battery_status": _battery,
+}
+"""What a topic states of the vehicle: columns of the contract with times, µs, and values (n, k), and what was found.
+Motors, controllers, flight and resets: `of_motors`, `of_controllers`, `in_the_air`, `resets_of`."""
+
+
+def _inertial(topics: _Topics) -> tuple[dict[tuple[str, ...], tuple[np.ndarray, np.ndarray]], list[ImportFault]]:
+    """Accelerometer and gyroscope: columns to times, µs, and values, each of the topic with most samples."""
+    found, faults = {}, []
+    for columns, other in (
+        (c.SPECIFIC_FORCE, "vehicle_acceleration"), (c.ANGULAR_VELOCITY, "vehicle_angular_velocity")
+    ):  # fmt: skip
+        offered = []
+        for name in ("sensor_combined", other):
+            data, more = _first(topics, name)
+            part = TOPICS[name](data)[0].get(columns) if data else None
+            offered += [] if part is None else [(part, more)]
+        if offered:
+            found[columns], more = max(offered, key=lambda offer: len(offer[0][0]))
+            faults += [fault for fault in more if fault not in faults]
+    return found, faults
 
 
 def _batteries(topics: _Topics) -> tuple[list[tuple[tuple[str, ...], np.ndarray, np.ndarray]], list[ImportFault]]:
     """Voltage and current of every battery; those after the first under names of their own."""
     out, faults, number = [], [], 0
     for data in topics.get("battery_status", []):
-        if "voltage_v" not in data or ("connected" in data and not np.any(data["connected"])):
-            continue
-        number += 1
-        voltage = np.asarray(data["voltage_v"], float)
-        voltage = np.where(voltage > 0, voltage, np.nan)
-        current = np.asarray(data.get("current_a", np.full(len(voltage), -1.0)), float)
-        unknown = current < 0
-        names = (c.BATTERY_VOLTAGE, c.BATTERY_CURRENT)
-        if number > 1:
-            names = (f"battery_{number}_voltage_v", f"battery_{number}_current_a")
-            found = f"battery {number} is logged, too, at {np.nanmedian(voltage):.4g} V"
-            faults.append(ImportFault("instances", names[0], found, "kept under a name of its own", len(voltage)))
-        time = _time(data)
-        out.append(((names[0],), time, voltage[:, None]))
-        if unknown.all():
-            faults.append(ImportFault("not_measured", names[1], "-1 A throughout: not measured", "column left out", 0))
-        else:
-            out.append(((names[1],), time, np.where(unknown, np.nan, current)[:, None]))
+        parts, more = TOPICS["battery_status"](data)
+        number += bool(parts)
+        faults += more if number == 1 else []
+        for (name,), (time, values) in parts.items():
+            if number > 1:
+                name = f"battery_{number}_{name.removeprefix('battery_')}"
+                if name.endswith("_v"):
+                    found = f"battery {number} is logged, too, at {np.nanmedian(values):.4g} V"
+                    faults.append(ImportFault("instances", name, found, "kept under a name of its own", len(values)))
+            out.append(((name,), time, values))
     return out, faults
 
 
-def _resets(topics: _Topics) -> np.ndarray:
-    """Times, µs, at which the estimator of PX4 jumped in position, velocity, heading or attitude."""
-    jumps = [np.zeros(0, np.int64)]
+def resets_of(name: str, data: _Fields) -> np.ndarray:
+    """Messages (n,) of a topic at which the estimator of PX4 has jumped in position, velocity, heading or attitude."""
+    jumped = np.zeros(len(data["timestamp"]), bool)
     for topic, counter, fields, small in RESETS:
-        data = _first(topics, topic)
-        if counter in data:
-            jumped = np.diff(np.asarray(data[counter]).astype(int)) != 0
+        if topic == name and counter in data:
+            own = np.diff(np.asarray(data[counter]).astype(int)) != 0
             by = _stack(data, fields)
-            if by is not None:
-                jumped &= ~(np.linalg.norm(by[1:], axis=1) < small)
-            jumps.append(_time(data)[1:][jumped])
+            jumped[1:] |= own if by is None else own & ~(np.linalg.norm(by[1:], axis=1) < small)
+    return jumped
+
+
+def _resets(topics: _Topics) -> np.ndarray:
+    """Times, µs, of the resets."""
+    jumps = [np.zeros(0, np.int64)]
+    for name in dict.fromkeys(topic for topic, *_ in RESETS):
+        data = _first(topics, name)[0]
+        if data:
+            jumps.append(_time(data)[resets_of(name, data)])
     return np.unique(np.concatenate(jumps))
+
+
+def in_the_air(name: str, data: _Fields) -> np.ndarray | None:
+    """Messages (n,) of the land detector or of the status by which the vehicle may fly; None where they say nothing."""
+    if name == "vehicle_land_detected" and "landed" in data:
+        flags = [data[f] for f in ("landed", "maybe_landed", "ground_contact") if f in data]
+        return ~np.any(np.asarray(flags).astype(bool), axis=0)
+    if name == "vehicle_status" and "arming_state" in data:
+        return np.asarray(data["arming_state"]) == _ARMED
+    return None
 
 
 def _flying(log: Px4Log, grid: np.ndarray) -> np.ndarray | None:
     """Rows in which the vehicle is in the air by PX4's land detector, and armed; None where the log says neither."""
-    land, status = _first(log.topics, "vehicle_land_detected"), _first(log.topics, "vehicle_status")
-    if "landed" not in land and "arming_state" not in status:
+    said = []
+    for name in ("vehicle_land_detected", "vehicle_status"):
+        data = _first(log.topics, name)[0]
+        if data and (up := in_the_air(name, data)) is not None:
+            said.append((_time(data), up))
+    return flying_by(said, grid, 1e-6)
+
+
+def flying_by(said: Sequence[tuple[np.ndarray, np.ndarray]], grid: np.ndarray, unit_s: float) -> np.ndarray | None:
+    """Rows of a grid (n,) in which all of several say (times, and whether it may fly) that the vehicle flies."""
+    if not said:
         return None
-    up = np.ones(len(grid), bool)
-    if "landed" in land:
-        time = _time(land)
-        for name in ("landed", "maybe_landed", "ground_contact"):
-            if name in land:
-                up &= _held(grid, time, land[name], 1.0) < 0.5
-    if "arming_state" in status:
-        up &= _held(grid, _time(status), status["arming_state"], 0.0) == _ARMED
-    return without_pauses(up, (grid - grid[0]) * 1e-6)
+    up = np.all([_held(grid, time, values, 0.0) > 0.5 for time, values in said], axis=0)
+    return without_pauses(up, (grid - grid[0]) * unit_s)
 
 
 def _clock(topics: _Topics) -> np.ndarray:
     """Times, µs, of the inertial topic with most samples, or of the attitude; empty where there is none."""
-    attitude = _first(topics, "vehicle_attitude")
-    clocks = [time for _, time, _ in _inertial(topics).values()] + ([_time(attitude)] if attitude else [])
+    attitude = _first(topics, "vehicle_attitude")[0]
+    clocks = [time for time, _ in _inertial(topics)[0].values()] + ([_time(attitude)] if attitude else [])
     return max(clocks, key=len, default=np.zeros(0, np.int64))
 
 
 def convert(log: Px4Log, rotors: int) -> tuple[pd.DataFrame, list[ImportFault], np.ndarray, np.ndarray]:
     """Contract columns of a whole log, its faults, the rows (n,) in which it flies, and those (n,) in which the
     estimator is reset, so that no run may hold them; InputError where there is no clock."""
-    inertial = _inertial(log.topics)
-    attitude = _first(log.topics, "vehicle_attitude")
+    inertial, faults = _inertial(log.topics)
     base = _clock(log.topics)
     if not len(base):
         raise InputError(
             "no topic vehicle_angular_velocity, sensor_combined or vehicle_attitude to take the clock from"
         )
-    frame, faults = drop_repeated_times(pd.DataFrame({c.TIME: (base - base[0]) * 1e-6}))
+    frame, repeated = drop_repeated_times(pd.DataFrame({c.TIME: (base - base[0]) * 1e-6}))
     grid = (frame[c.TIME].to_numpy() * 1e6).round().astype(np.int64) + base[0]
-    columns: dict[str, np.ndarray] = {c.TIME: (grid - grid[0]) * 1e-6}
+    faults, columns = repeated + faults, {c.TIME: (grid - grid[0]) * 1e-6}
 
     def put(names: Sequence[str], time: np.ndarray, values: np.ndarray) -> None:
+        if names == c.QUATERNION:
+            values = continuous(values)
         columns.update(zip(names, on_grid(grid, time, values).T, strict=True))
 
-    for names, time, values in inertial.values():
+    for names, (time, values) in inertial.items():
         put(names, time, values)
-    quaternion = _stack(attitude, _indexed("q", 4)) if attitude else None
-    if quaternion is not None:
-        put(c.QUATERNION, _time(attitude), continuous(quaternion))
-    place = _first(log.topics, "vehicle_local_position")
-    if place:
-        values, found = _local_position(place)
-        faults += found
-        for names, block in values.items():
-            put(names, _time(place), block)
+    for name in ("vehicle_attitude", "vehicle_local_position"):
+        data, found = _first(log.topics, name)
+        values, more = TOPICS[name](data) if data else ({}, [])
+        faults += found + more
+        for names, (time, block) in values.items():
+            put(names, time, block)
     batteries, found = _batteries(log.topics)
     faults += found
     for names, time, values in batteries:
@@ -510,13 +648,9 @@ def convert(log: Px4Log, rotors: int) -> tuple[pd.DataFrame, list[ImportFault], 
     table = pd.DataFrame({k: v for k, v in columns.items() if k == c.TIME or np.isfinite(v).any()})
     flying, ground = airborne(table, _flying(log, grid))
     faults += ground
-    jumps = np.zeros(len(grid), bool)
-    for reset in _resets(log.topics):
-        jumps |= np.abs(grid - reset) * 1e-6 <= _AROUND_RESET_S
-    if jumps.any():
-        times = int(np.count_nonzero(np.diff(jumps.astype(int), prepend=0) > 0))
-        found = f"PX4's estimator jumped {times} times in position, velocity or attitude"
-        faults.append(ImportFault("estimator_reset", "", found, "a run ends at each jump in the air", times))
+    times = (_resets(log.topics) - grid[0]) * 1e-6
+    jumps, reset = jumps_at(columns[c.TIME], times, JUMPED)
+    faults += reset
     faults += log.parameters.faults(_CHANGED, float(grid[0]), 1e-6)
     if log.rest:
         found = f"the file ends inside a message, after {log.rest} bytes of it"

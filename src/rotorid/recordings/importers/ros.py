@@ -1,23 +1,24 @@
 """ROS 1 bags, ROS 2 bags and MCAP files through rosbags: no ROS is needed.
 
 By ROS's REP 103 the body is forward-left-up and the world has z up; half a turn about x makes them forward-right-down
-and z down; PX4's own messages are forward-right-down and north-east-down. Of each quantity the topic of a known type
-that states most values is read, of several attitudes the one that follows the body rates; a command is no measurement:
+and z down. Of each quantity the topic of a known type that states most values is read, of several attitudes the one
+that follows the body rates; a command is no measurement:
 
 | quantity | types |
 | --- | --- |
-| body rates, specific force | `sensor_msgs/Imu`; `SensorCombined`, `VehicleAngularVelocity`, `VehicleAcceleration` |
-| attitude | poses (`_POSES`), then `sensor_msgs/Imu`; `VehicleAttitude` |
-| position, velocity | poses, `nav_msgs/Odometry` (twist in body axes), `TwistStamped`; `VehicleLocalPosition` |
+| body rates, specific force | `sensor_msgs/Imu` |
+| attitude | poses (`_POSES`), then `sensor_msgs/Imu` |
+| position, velocity | poses, `nav_msgs/Odometry` (twist in body axes), `TwistStamped` |
 | rotor speeds, rad/s | `Actuators` of `mav_msgs` and `actuator_msgs`, `mav_msgs/MotorSpeed` |
-| rotor speeds, rpm | `mavros_msgs/ESCStatus`, `mavros_msgs/ESCTelemetry`; `EscStatus` |
+| rotor speeds, rpm | `mavros_msgs/ESCStatus`, `mavros_msgs/ESCTelemetry` |
 | commanded speeds | `mav_msgs/CommandMotorSpeed`, `Actuators` of a topic called a command next to another |
-| throttles | `mavros_msgs/RCOut` (µs); `ActuatorMotors` |
+| throttles | `mavros_msgs/RCOut` (µs) |
 | battery, height | `sensor_msgs/BatteryState`, `sensor_msgs/Range` |
 
-Behind the semicolon are those of `px4_msgs`. `sensor_msgs/Imu` states nothing of a quantity whose covariance begins
-with -1; neither does a quaternion of length zero, nor a topic that holds what an unset message does throughout. What a
-bag holds and is not read is listed where a quantity is missing.
+Messages of `px4_msgs` mean what the topics of PX4's own logs mean (`px4_ulog`): with its axes, the motor that each
+controller drives, what is invalid, stopped or not heard, resets and the land detector. `sensor_msgs/Imu` states nothing
+of a quantity whose covariance begins with -1; neither does a quaternion of length zero, nor a topic that holds what an
+unset message does throughout. What a bag holds and is not read is listed where a quantity is missing.
 
 A topic has one clock: its messages' own stamps, unless all of them are zero or they jump; then the times of recording,
 which the topic of the inertial sensor relates to its stamps. Stamps that are off from those by a constant are shifted.
@@ -26,8 +27,8 @@ which the topic of the inertial sensor relates to its stamps. Stamps that are of
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -43,7 +44,8 @@ from rotorid.recordings.importers.faults import (
     airborne,
     flights,
     further_motors,
-    increasing,
+    jumps_at,
+    moving_on,
     one_sense,
     report_gaps,
     table_on,
@@ -51,6 +53,16 @@ from rotorid.recordings.importers.faults import (
 from rotorid.recordings.importers.guessing import agreement as by
 from rotorid.recordings.importers.guessing.agreement import CONFIRMED, is_clear
 from rotorid.recordings.importers.mapping import PULSE_US, RPM, continuous, half_turn_about_x, quaternion_to_frd_ned
+from rotorid.recordings.importers.px4_ulog import (
+    JUMPED,
+    TOPICS,
+    driven_motors,
+    flying_by,
+    in_the_air,
+    of_controllers,
+    of_motors,
+    resets_of,
+)
 
 
 def _xyz(v) -> list[float]:
@@ -81,17 +93,6 @@ def _twist(m) -> dict[str, list[float]]:
     return {"body_velocity" if of_body else "velocity": _xyz(m.twist.linear)}
 
 
-def _local_position(m) -> dict[str, list[float]]:
-    flags = ("xy_valid", "z_valid", "v_xy_valid", "v_z_valid")
-    xy, z, v_xy, v_z = (1.0 if getattr(m, flag, True) else np.nan for flag in flags)
-    return {"position": [m.x * xy, -m.y * xy, -m.z * z], "velocity": [m.vx * v_xy, -m.vy * v_xy, -m.vz * v_z]}
-
-
-def _flipped(v) -> list[float]:
-    """PX4's forward-right-down and north-east-down, as the rest of a bag: half a turn about x."""
-    return [v[0], -v[1], -v[2]]
-
-
 _POSES: dict[str, Callable] = {
     "geometry_msgs/msg/PoseStamped": lambda m: _pose(m.pose),
     "geometry_msgs/msg/PoseWithCovarianceStamped": lambda m: _pose(m.pose.pose),
@@ -112,17 +113,18 @@ _READERS: dict[str, Callable] = _POSES | {
     "mavros_msgs/msg/RCOut": lambda m: {"pulses": list(m.channels)},
     "sensor_msgs/msg/BatteryState": lambda m: {"voltage": [m.voltage], "current": [-m.current]},
     "sensor_msgs/msg/Range": lambda m: {"range": [m.range]},
-    "px4_msgs/msg/SensorCombined": lambda m: {
-        "rates": _flipped(m.gyro_rad), "force": _flipped(m.accelerometer_m_s2),
-    },
-    "px4_msgs/msg/VehicleAngularVelocity": lambda m: {"rates": _flipped(m.xyz)},
-    "px4_msgs/msg/VehicleAcceleration": lambda m: {"force": _flipped(m.xyz)},
-    "px4_msgs/msg/VehicleAttitude": lambda m: {"attitude": [m.q[0], m.q[1], -m.q[2], -m.q[3]]},
-    "px4_msgs/msg/VehicleLocalPosition": _local_position,
-    "px4_msgs/msg/ActuatorMotors": lambda m: {"throttle": list(m.control)},
-    "px4_msgs/msg/EscStatus": lambda m: {"rpm": [e.esc_rpm for e in m.esc[: m.esc_count]]},
 }  # fmt: skip
 """To the type of a message what it states by quantity; several types may hold one."""
+_ROTORS_OF_PX4 = {"actuator_motors": ("throttle", of_motors, 1.0), "esc_status": ("rpm", of_controllers, 1 / RPM)}
+"""To a topic of PX4 the quantity of its rotors, its reader, and what one of the reader's units is of the quantity."""
+_OF_PX4 = {
+    c.ANGULAR_VELOCITY: "rates", c.SPECIFIC_FORCE: "force", c.QUATERNION: "attitude", c.POSITION: "position",
+    c.VELOCITY: "velocity", (c.HEIGHT,): "range", (c.BATTERY_VOLTAGE,): "voltage", (c.BATTERY_CURRENT,): "current",
+}  # fmt: skip
+"""Columns of PX4's other topics to the quantities here."""
+_PX4_TOPICS = {*TOPICS, *_ROTORS_OF_PX4, "vehicle_land_detected", "vehicle_status"}
+_SAID = ("reset", "flying")
+"""What messages say by a flag (n, 1): that the estimate has jumped, and that the vehicle may fly."""
 _WANTED = {
     "body rates": ("rates",), "specific force": ("force",), "attitude": ("attitude", "imu_attitude"),
     "velocity": ("velocity", "body_velocity"), "rotors": ("speeds", "rpm", "commands", "throttle", "pulses"),
@@ -163,6 +165,8 @@ class _BagContent:
     with their type and number of messages, and whether the file ends early. Stamps are 0 where there are none."""
 
     rows: dict[tuple[str, str], list[tuple[float, float, list[float]]]] = field(default_factory=dict)
+    px4: dict[tuple[str, str], list[tuple[float, dict[str, float]]]] = field(default_factory=dict)
+    """To a topic of `px4_msgs` and its name in PX4's logs the time of recording and the fields of each message."""
     unread: dict[str, tuple[str, int]] = field(default_factory=dict)
     foreign: dict[str, str] = field(default_factory=dict)
     cut: bool = False
@@ -171,6 +175,9 @@ class _BagContent:
     lost_chunks: int = 0
 
     def add(self, topic: str, msgtype: str, recorded_ns: int, message) -> None:
+        if (name := _px4_topic(msgtype)) in _PX4_TOPICS:
+            self.px4.setdefault((topic, name), []).append((recorded_ns * 1e-9, dict(_fields(message))))
+            return
         stamp = getattr(getattr(message, "header", None), "stamp", None)
         stamp_s = getattr(message, "timestamp", 0) * 1e-6 if stamp is None else stamp.sec + stamp.nanosec * 1e-9
         for quantity, values in _READERS[msgtype](message).items():
@@ -180,17 +187,68 @@ class _BagContent:
         self.unread[topic] = msgtype, self.unread.get(topic, ("", 0))[1] + messages
 
 
+def _px4_topic(msgtype: str) -> str:
+    """PX4's name of the topic of a message of `px4_msgs`, `vehicle_attitude` of `VehicleAttitude`; empty for others."""
+    return re.sub(r"(?<!^)(?=[A-Z])", "_", msgtype.removeprefix("px4_msgs/msg/")).lower() * msgtype.startswith("px4_")
+
+
+def _is_read(msgtype: str) -> bool:
+    return msgtype in _READERS or _px4_topic(msgtype) in _PX4_TOPICS
+
+
+def _fields(message, before: str = "") -> Iterator[tuple[str, float]]:
+    """The numbers of a message by their names in PX4's logs: `q[0]`, `esc[1].esc_rpm`."""
+    for name in message.__dataclass_fields__:
+        value = getattr(message, name)
+        listed = isinstance(value, list | tuple | np.ndarray)
+        for k, own in enumerate(value if listed else [value]):
+            label = f"{before}{name}[{k}]" if listed else f"{before}{name}"
+            if hasattr(own, "__dataclass_fields__"):
+                yield from _fields(own, f"{label}.")
+            elif not isinstance(own, str):
+                yield label, own
+
+
+def _read_px4(found: _BagContent) -> list[ImportFault]:
+    """Put what messages of `px4_msgs` state among the rows of a bag, and what was found in them."""
+    faults = []
+    for (topic, name), messages in found.px4.items():
+        names = set.intersection(*(set(fields) for _, fields in messages)) - {"__msgtype__"}
+        data = {n: np.array([fields[n] for _, fields in messages]) for n in names}
+        if "timestamp" not in data:
+            continue
+        stamp = data["timestamp"].astype(np.int64)
+        stated = {"reset": (stamp, resets_of(name, data)[:, None])}
+        if (up := in_the_air(name, data)) is not None:
+            stated["flying"] = stamp, up[:, None]
+        if name in _ROTORS_OF_PX4:
+            quantity, read, times = _ROTORS_OF_PX4[name]
+            values, stamp, more = read(data, driven_motors(data))
+            stated |= {} if values is None else {quantity: (stamp, values * times)}
+        else:
+            parts, more = TOPICS[name](data) if name in TOPICS else ({}, [])
+            for columns, (at, values) in parts.items():
+                turned = [1, 1, -1, -1] if columns == c.QUATERNION else [1, -1, -1] if len(columns) == 3 else 1
+                stated[_OF_PX4[columns]] = at, values * turned
+        faults += [replace(fault, found=f"{topic}: {fault.found}") for fault in more]
+        for quantity, (at, values) in stated.items():
+            rows = zip(at * 1e-6, (recorded for recorded, _ in messages), values.tolist(), strict=True)
+            if quantity != "reset" or values.any():
+                found.rows[quantity, topic] = list(rows)
+    return faults
+
+
 def _by_rosbags(path: Path) -> _BagContent:
     """A bag, MCAP file or folder of one that is whole and holds ROS alone."""
     highlevel = needs("rosbags.highlevel", "ros", path)
     typesys = needs("rosbags.typesys", "ros", path)
     found = _BagContent()
     with highlevel.AnyReader([path], default_typestore=typesys.get_typestore(typesys.Stores.LATEST)) as bag:
-        known = [k for k in bag.connections if k.msgtype in _READERS]
+        known = [k for k in bag.connections if _is_read(k.msgtype)]
         for k in bag.connections:
             if (encoding := getattr(k.ext, "serialization_format", "cdr")) != "cdr":
                 found.foreign[k.topic] = encoding
-            elif k.msgtype not in _READERS:
+            elif not _is_read(k.msgtype):
                 found.skip(k.topic, k.msgtype, k.msgcount)
         for connection, recorded_ns, raw in bag.messages(connections=known) if known else ():
             found.add(connection.topic, connection.msgtype, recorded_ns, bag.deserialize(raw, connection.msgtype))
@@ -206,7 +264,7 @@ def _by_records(path: Path) -> _BagContent:
         listed = list(records.messages())
         stores = typestores([k for k in records.channels.values() if k.of_ros], path)
         for channel, recorded_ns, raw in listed:
-            if channel.msgtype in _READERS:
+            if _is_read(channel.msgtype):
                 store = stores[channel.encoding]
                 read = store.deserialize_ros1 if channel.encoding == "ros1" else store.deserialize_cdr
                 try:
@@ -240,7 +298,7 @@ def _found(path: Path) -> _BagContent:
         raise
     except Exception:
         found = _BagContent()
-    if not (found.rows or found.unread or found.foreign):
+    if not (found.rows or found.px4 or found.unread or found.foreign):
         raise InputError(f"{path}: not a bag or MCAP file that can be read ({why})")
     return found
 
@@ -251,6 +309,7 @@ def _read_series(path: Path) -> tuple[dict[str, list[_TopicSeries]], list[Import
     InputError where it cannot be read or holds no known type.
     """
     found = _found(path)
+    by_px4 = _read_px4(found)
     at = [row[1] for rows in found.rows.values() for row in (rows[0], rows[-1])]
     lasts_s = max(max(at, default=0.0) - min(at, default=0.0), 1e-9)
     others = [
@@ -272,7 +331,7 @@ def _read_series(path: Path) -> tuple[dict[str, list[_TopicSeries]], list[Import
         (foreign, ImportFault("unread", "", f"{strange} hold no messages of ROS", "left out")),
     )
     times, more = _times(found)
-    faults = [*(fault for there, fault in met if there), *more]
+    faults = [*(fault for there, fault in met if there), *more, *by_px4]
     series: dict[str, list[_TopicSeries]] = {}
     for (quantity, topic), rows in found.rows.items():
         widths = [len(values) for *_, values in rows]
@@ -289,11 +348,15 @@ def _read_series(path: Path) -> tuple[dict[str, list[_TopicSeries]], list[Import
         if "attitude" in quantity:
             stated = np.linalg.norm(values, axis=1) > 0.5  # a quaternion of length zero is none
             time_s, values = time_s[stated], values[stated]
+        if quantity in _SAID:
+            series.setdefault(quantity, []).append(_TopicSeries(topic, time_s, values))
+            continue
         if len(time_s) < 2:
             continue
         order = np.argsort(time_s, kind="stable")
         time_s, values = time_s[order], values[order]
-        keep = increasing(time_s)
+        keep, odd_times = moving_on(time_s)
+        faults += [replace(fault, column=topic) for fault in odd_times if fault.kind == "apart"]
         own = _TopicSeries(topic, time_s[keep], values[keep])
         if quantity in _UNSET and (own.values == _UNSET[quantity]).all():
             seen = f"{quantity.replace('_', ' ')} of {topic} was never set ({_UNSET[quantity][0]:g}, 0, … throughout)"
@@ -310,7 +373,7 @@ def _read_series(path: Path) -> tuple[dict[str, list[_TopicSeries]], list[Import
         )
         faults.append(ImportFault("unread", "", seen + more, "export what is missing as a CSV", 0))
     for quantity, offered in series.items():
-        if len(offered) > 1:
+        if len(offered) > 1 and quantity not in _SAID:
             seen = f"{', '.join(s.topic for s in offered)} hold it"
             faults.append(ImportFault("instances", quantity, seen, f"{offered[0].topic} taken"))
     return series, faults
@@ -419,8 +482,9 @@ def _times(found: _BagContent) -> tuple[dict[tuple[str, str], np.ndarray], list[
 
 def _convert(
     series: dict[str, list[_TopicSeries]], faults: list[ImportFault], where: object
-) -> tuple[pd.DataFrame, np.ndarray]:
-    """Contract columns and where it flies (mask of rows), of the first series of each quantity."""
+) -> tuple[pd.DataFrame, np.ndarray, np.ndarray]:
+    """Contract columns of the first series of each quantity, where it flies, and where an estimate jumps (masks of
+    rows)."""
     first = {quantity: offered[0] for quantity, offered in series.items()}
     if "attitude" not in first and "imu_attitude" in first:
         size = np.linalg.norm(first["imu_attitude"].values, axis=1)
@@ -463,7 +527,15 @@ def _convert(
                 values = -values
             parts.append(((name,), first[quantity].time_s, values))
     table = table_on(grid, parts)
-    return table, airborne(table)[0]
+    # Of several vehicles in one bag what is said of this one.
+    own = clock.topic.rsplit("/", 1)[0]
+    said = {q: [s for s in series.get(q, []) if s.topic.rsplit("/", 1)[0] == own] or series.get(q, []) for q in _SAID}
+    stated = flying_by([(s.time_s, s.values[:, 0]) for s in said["flying"]], grid, 1.0)
+    flying, ground = airborne(table, stated)
+    resets = [s.time_s[s.values[:, 0] > 0] - grid[0] for s in said["reset"]]
+    jumps, reset = jumps_at(grid - grid[0], np.concatenate([np.zeros(0), *resets]), JUMPED)
+    faults += ground + reset
+    return table, flying, jumps
 
 
 def _velocity(series: dict[str, list[_TopicSeries]], faults: list[ImportFault]) -> list[tuple]:
@@ -527,7 +599,8 @@ def read_ros(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault], st
     """Every flight of a bag (file or folder) or MCAP file by name, in contract columns, what was found, and the unit
     in which rotor speeds are stated."""
     series, faults = _read_series(path)
-    table, flying = _convert(series, faults, path)
-    runs, cuts = flights(table, flying, (path.resolve() if path.is_dir() else path).name.split(".")[0], path)
+    table, flying, jumps = _convert(series, faults, path)
+    name = (path.resolve() if path.is_dir() else path).name.split(".")[0]
+    runs, cuts = flights(table, flying, name, path, jumps)
     unit = "rpm" if "rpm" in series and "speeds" not in series else "rad/s"
     return runs, [*faults, *report_gaps(table), *cuts], unit

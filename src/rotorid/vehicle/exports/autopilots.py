@@ -41,6 +41,9 @@ _SENSES = (1, 1, -1, -1)
 """Signs of the yaw moments: front right and rear left turn counter-clockwise."""
 _FASTEST_S = 0.005
 """Shortest SIH_T_TAU that its Euler step of 4 ms stands."""
+_INERTIA_TIMES, _LEAST_DETERMINANT = 100.0, np.finfo(np.float32).eps
+"""SIH inverts so many times the inertia, and its 3 by 3 inverse is zero where the determinant is not above this, single
+precision's epsilon (sih.cpp, `init_variables`; matrix/SquareMatrix.hpp, `inv`)."""
 FASTEST_RAD_S = 6 * np.pi
 """SIH holds each body rate within ±6π rad/s (simulator_sih, `Sih::equations_of_motion`)."""
 _OF_THE_TOOL = (
@@ -135,6 +138,12 @@ def px4_sih(vehicle: Vehicle) -> Exported:
     left.append("motor signals: in SIH thrust is proportional to them, so THR_MDL_FAC belongs to 0 there")
     if vehicle.gravity_m_s2 != 9.81:
         left.append(f"gravity of {vehicle.gravity_m_s2:g} m/s²: SIH has that of its latitude")
+    if not np.linalg.det(_INERTIA_TIMES * j) > _LEAST_DETERMINANT:
+        least = (_LEAST_DETERMINANT / _INERTIA_TIMES**3) ** (1 / 3)
+        left.append(
+            f"turning: the inertia is too small for SIH's inverse of it (about {least:.1g} kg m² on each axis are "
+            "needed), which is then zero, and this vehicle cannot rotate there at all"
+        )
     values = {
         "SIH_MASS": parts.mass_kg,
         "SIH_IXX": j[0, 0], "SIH_IYY": j[1, 1], "SIH_IZZ": j[2, 2],

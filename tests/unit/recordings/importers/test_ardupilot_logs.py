@@ -399,12 +399,13 @@ def test_of_several_sensors_the_first_that_goes_on_is_read(kind: str, letters: s
 
 @pytest.mark.parametrize("estimator", ["XK", "NK"])
 @pytest.mark.parametrize("both", [False, True])
-@pytest.mark.parametrize("switch_s", [None, 0.5, 1.5])
-def test_the_estimate_is_that_of_the_core_that_flew(estimator: str, both: bool, switch_s: float | None) -> None:
-    """Core 1 states a velocity of 1, core 0 of 0, another estimator that did not fly of 9 m/s."""
+@pytest.mark.parametrize(("switch_s", "back_s"), [(None, 9), (0.5, 9), (1.5, 9), (0.5, 1.5)])
+def test_the_estimate_is_that_of_the_core_that_flew(estimator: str, both: bool, switch_s, back_s: float) -> None:
+    """Core 1 states a velocity of 1, core 0 of 0, another estimator that did not fly of 9 m/s. A core that took over
+    and was not left is read throughout."""
     time_s = np.repeat(np.arange(100) / 50, 2)
     core = np.tile([0, 1], 100)
-    primary = np.zeros(200) if switch_s is None else (time_s >= switch_s).astype(float)
+    primary = np.zeros(200) if switch_s is None else ((time_s >= switch_s) & (time_s < back_s)).astype(float)
     names = ("VN", "VE", "VD", "PN", "PE", "PD")
     estimate = pd.DataFrame({c.TIME: time_s, "C": core, **dict.fromkeys(names, core)})
     log = tables(LIMITS | {"AHRS_EKF_TYPE": 2.0 if estimator == "NK" else 3.0})
@@ -412,18 +413,89 @@ def test_the_estimate_is_that_of_the_core_that_flew(estimator: str, both: bool, 
         log |= {f"{other}F1": estimate.assign(VN=9) for other in ("XK", "NK")}
     log |= {f"{estimator}F1": estimate, f"{estimator}F4": pd.DataFrame({c.TIME: time_s, "C": core, "PI": primary})}
     table, _, _ = ardupilot.convert(log, "log")
-    assert table[c.VELOCITY[0]].to_numpy() == pytest.approx(primary[::2])
+    assert table[c.VELOCITY[0]].to_numpy() == pytest.approx(primary[::2] if back_s < 2 else np.full(100, primary[-1]))
 
 
-def test_a_run_ends_where_another_core_takes_over(tmp_path: Path, monkeypatch) -> None:
+def test_the_imu_is_that_of_the_core_that_flew() -> None:
+    time_s = np.repeat(np.arange(100) / 50, 2)
+    names = [f"{kind}{axis}" for kind in ("Gyr", "Acc") for axis in "XYZ"]
+    reading = np.sin(time_s) + np.tile([0, 1], 100)
+    log = tables(LIMITS | {"EK3_IMU_MASK": 3.0})
+    log["IMU"] = pd.DataFrame({c.TIME: time_s, "I": np.tile([0, 1], 100), **dict.fromkeys(names, reading)})
+    log["XKF4"] = pd.DataFrame({c.TIME: time_s, "C": 0, "PI": 1})
+    table, faults, _ = ardupilot.convert(log, "log")
+    assert table[c.ANGULAR_VELOCITY[0]].to_numpy() == pytest.approx(reading[1::2])
+    assert [f.action for f in faults if f.column == "inertial sensor"] == ["IMU 1 taken"]
+
+
+RESETS = {
+    "another core of the estimator took over": {"XKF4": {"C": 0, "PI": lambda t: ((t >= 8) & (t < 9)) * 1}},
+    "the estimator set the heading anew": {"EV": {"Id": lambda t: np.where(np.abs(t - 8) < 0.01, 62, 0)}},
+    "the estimator set the height anew": {"EV": {"Id": lambda t: np.where(np.abs(t - 8) < 0.01, 60, 0)}},
+    "the estimator set the position anew": {"NKF4": {"C": 0, "OFN": lambda t: (t >= 8) * 0.5, "OFE": 0.0}},
+    "the heading was aligned anew": {
+        "MSG": {"Message": lambda t: np.where(np.abs(t - 8) < 0.01, "EKF3 IMU0 in-flight yaw alignment complete", "")}
+    },
+}
+
+
+@pytest.mark.parametrize("what", RESETS)
+def test_a_run_ends_where_an_estimate_is_set_anew(tmp_path: Path, monkeypatch, what: str) -> None:
     time_s = np.arange(1000) / 50
-    table = pd.DataFrame({c.TIME: time_s})
-    log = tables(LIMITS) | {"XKF4": pd.DataFrame({c.TIME: time_s, "C": 0, "PI": (time_s >= 8).astype(int)})}
+    more = {kind: pd.DataFrame({c.TIME: time_s} | {n: v(time_s) if callable(v) else v for n, v in fields.items()})
+            for kind, fields in RESETS[what].items()}  # fmt: skip
+    log, table = tables(LIMITS) | more, pd.DataFrame({c.TIME: time_s})
     monkeypatch.setattr(ardupilot, "read_messages", lambda path: log)
     monkeypatch.setattr(ardupilot, "convert", lambda log, path: (table, [], np.ones(1000, bool)))
     runs, faults, _ = ardupilot.read_ardupilot(tmp_path / "log.bin")
-    assert [run[c.TIME].iloc[-1] for run in runs.values()] == pytest.approx([7.28, 10.76], abs=0.1)
-    assert any("another core of the estimator took over 1 times, first at 8.00 s" in f.found for f in faults)
+    assert [run[c.TIME].iloc[-1] for run in runs.values()] == pytest.approx([7.28, 9.8], abs=1.2)
+    assert any(f"{what}" in f.found and "first at 8.00 s" in f.found for f in faults)
+
+
+# How an output becomes a pulse --------------------------------------------------------------------
+
+OWN = {"SERVO1_MIN": 1100.0, "SERVO1_TRIM": 1400.0, "SERVO1_MAX": 1900.0}
+
+
+@pytest.mark.parametrize(
+    ("values", "pulses", "shares"),
+    [
+        (OWN | {"MOT_PWM_TYPE": 8.0}, (1100, 1500, 1900), (0, 0.5, 1)),
+        (OWN | {"MOT_PWM_TYPE": 8.0, "SERVO1_REVERSED": 1.0}, (1100, 1300, 1900), (1, 0.75, 0)),
+        (OWN | {"MOT_PWM_TYPE": 9.0}, (1100, 1400, 1650), (0, 0.5, 0.75)),
+        (OWN | {"MOT_PWM_TYPE": 0.0, "SERVO1_REVERSED": 1.0}, (1000, 1500, 2000), (0, 0.5, 1)),
+        ({"MOT_PWM_TYPE": 2.0}, (125, 200, 250), (0, 0.6, 1)),
+        ({"MOT_PWM_TYPE": 6.0}, (900, 1500, 2000), (0, 0.5, 1)),
+        ({}, (0, 1500, 2000), (0, 0.5, 1)),
+    ],
+)
+def test_a_pulse_is_a_share_by_the_type_of_the_outputs(values, pulses, shares) -> None:
+    log = tables({"MOT_PWM_MIN": 1000.0, "MOT_PWM_MAX": 2000.0, "SERVO1_FUNCTION": 33.0, "FRAME_CLASS": 15.0} | values)
+    log["RCOU"] = log["RCOU"].assign(C1=np.array(pulses, float)[np.arange(100) % 3])
+    table, faults, _ = ardupilot.convert(log, "log")
+    assert table["throttle_1"].iloc[:3].to_numpy() == pytest.approx(shares)
+    assert any(f.kind == "range" for f in faults) == (min(pulses) == 900)
+
+
+def test_several_outputs_of_one_motor_and_several_batteries_are_named() -> None:
+    time_s = np.arange(100) / 50
+    own = [pd.DataFrame({c.TIME: time_s, "Inst": k, "Volt": volts, "Curr": 1.0 + time_s})
+           for k, volts in enumerate((0.0, 16.0, 12.0))]  # fmt: skip
+    log = tables(LIMITS | {"SERVO1_FUNCTION": 33.0, "SERVO2_FUNCTION": 33.0, "FRAME_CLASS": 15.0})
+    table, faults, _ = ardupilot.convert(log | {"BAT": pd.concat(own, ignore_index=True)}, "log")
+    assert table[c.BATTERY_VOLTAGE].iloc[0] == 16 and table["battery_2_voltage_v"].iloc[0] == 12
+    assert any(f.found == "outputs 1 and 2 are both motor 1" for f in faults)
+
+
+@pytest.mark.parametrize(("every", "taken"), [(1, "ATT"), (10, "ANG")])
+def test_of_several_attitudes_one_that_comes_often_enough_is_read(every: int, taken: str) -> None:
+    time_s = np.arange(100) / 50
+    angles = {"Pitch": 0.0, "Yaw": 0.0}
+    log = tables(LIMITS) | {"ANG": pd.DataFrame({c.TIME: time_s, "Roll": 2.0, **angles})}
+    log["ATT"] = pd.DataFrame({c.TIME: time_s, "Roll": 1.0, **angles})[::every]
+    table, faults, _ = ardupilot.convert(log, "log")
+    assert np.degrees(2 * table["quaternion_x"].iloc[0]) == pytest.approx(1 if taken == "ATT" else 2, abs=1e-3)
+    assert any("ATT at" in f.found and "ANG at" in f.found for f in faults) == (taken == "ANG")
 
 
 # Speeds -------------------------------------------------------------------------------------------

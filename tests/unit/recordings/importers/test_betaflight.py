@@ -12,6 +12,7 @@ from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import betaflight as format_
 from rotorid.recordings.importers.betaflight import convert, throttles
+from rotorid.recordings.importers.faults import moving_on
 from rotorid.recordings.importers.logfile import read_log
 from tests.refusals import refused
 
@@ -214,6 +215,16 @@ def test_the_clock_that_begins_anew(first_us: int) -> None:
     time = session.values[:, 1]
     assert session.damaged == 0 and (np.diff(time) > 0).all()
     np.testing.assert_array_equal(time % MOST, values[:, 1])
+
+
+@pytest.mark.parametrize("early_us", [-11_100_000, 11_100_000])
+def test_a_first_frame_that_is_left_from_before_is_no_part_of_the_flight(early_us: int) -> None:
+    values = main_values(first_us=50_000_000)
+    values[0, 1] += early_us
+    session = only(HEAD + b"".join(written(values)) + END)
+    keep, faults = moving_on(session.values[:, 1] * 1e-6)
+    assert keep.sum() >= len(values) - 40 and session.values[keep, 1].min() >= 50_000_000
+    assert np.diff(session.values[keep, 1]).max() < 1_000_000
 
 
 EVENTS = {

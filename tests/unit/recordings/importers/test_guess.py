@@ -15,7 +15,16 @@ from rotorid.recordings import read_set, templates
 from rotorid.recordings.importers.faults import join_rows
 from rotorid.recordings.importers.guessing import as_text, guess
 from rotorid.recordings.importers.guessing import names as column_names
-from rotorid.recordings.importers.mapping import BODY, TRAVEL, UNITS, WORLD, convert, read_columns, read_mapping
+from rotorid.recordings.importers.mapping import (
+    BODY,
+    TRAVEL,
+    UNITS,
+    WORLD,
+    Mapping,
+    convert,
+    read_columns,
+    read_mapping,
+)
 from tests.command_line import refusal
 from tests.public_logs import LOGS, needs_logs
 from tests.refusals import refused
@@ -381,6 +390,26 @@ def test_the_order_of_roll_pitch_and_yaw_is_decided_by_the_gyroscope(
     assert (read.inv() * turn).magnitude().max() < 1e-6
 
 
+@pytest.mark.parametrize(("names", "unit"), [(("roll", "pitch", "heading"), "deg"), (("attitude[{}]",) * 3, "ddeg")])
+@pytest.mark.parametrize(("body", "signs"), [("frd", (1, -1, 1)), ("flu", (1, 1, -1))])
+def test_angles_have_the_signs_that_the_gyroscope_shows(flown, names, unit: str, body: str, signs) -> None:
+    """A pitch that is positive nose down and a compass heading, 0 to 360 degrees, in whatever axes of the sensors."""
+    turn = Rotation.from_quat(flown[list(c.QUATERNION)].to_numpy()[:, [1, 2, 3, 0]])
+    angles = np.degrees(turn.as_euler("ZYX")[:, ::-1]) * [1, -1, 1]
+    angles[:, 2] %= 360
+    named = [name.format(k) for k, name in enumerate(names)]
+    table = plain(flown).drop(columns=["qw", "qx", "qy", "qz", "vx", "vy", "vz"])
+    if body == "flu":
+        table[["gyro_y", "gyro_z", "acc_y", "acc_z"]] *= -1
+    table = table.assign(**dict(zip(named, angles.T * (10 if unit == "ddeg" else 1), strict=True)))
+    found = guess(table)
+    channel = found.mapping.channels["attitude"]
+    assert (channel.columns, channel.unit, channel.signs) == (tuple(named), unit, signs), found.open
+    made, _ = convert(table, Mapping.model_validate(yaml.safe_load(as_text(found, "own.csv"))), "own.csv")
+    read = Rotation.from_quat(made[list(c.QUATERNION)].to_numpy()[:, [1, 2, 3, 0]])
+    assert (read.inv() * turn).magnitude().max() < 1e-6
+
+
 def test_an_order_that_nothing_shows_is_asked_where_it_matters(flown: pd.DataFrame) -> None:
     angles = 0.4 * np.sin(np.outer(flown[c.TIME], [1.0, 1.3, 0.7]))
     table = flown[[c.TIME]].rename(columns={c.TIME: "t_s"})
@@ -529,6 +558,13 @@ def test_columns_that_hold_nothing_are_no_channels() -> None:
         ("time", lambda t: [f"2024-05-01T10:00:{x:09.6f}Z" for x in t], "s"),
         ("utc_time", lambda t: pd.Timestamp("2024-05-01") + pd.to_timedelta(t, "s"), "s"),
         ("time", lambda t: [f"9:59:{x:09.6f}" for x in t], "s"),
+        ("time", lambda t: [f"9:59:{x:09.6f}".replace(".", ",") for x in t], "s"),
+        ("time", lambda t: [f"2024-05-01 10:00:{x:09.6f}".replace(".", ",") for x in t], "s"),
+        ("time", lambda t: [f"1.5.2024 10:00:{x:09.6f}" for x in t], "s"),
+        ("time", lambda t: [f"05/13/2024 10:00:{x:09.6f}" for x in t], "s"),
+        ("time", lambda t: (pd.Timestamp("23:59:55") + pd.to_timedelta(t, "s")).strftime("%H:%M:%S.%f"), "s"),
+        ("IMU.TimeUS", lambda t: np.round(t * 1e6 + 2**32 - 5e6) % 2**32, "us"),
+        ("time_ms", lambda t: (t * 1e3 + 60_000) % 65_536, "ms"),
         ("%time", lambda t: 1.7e18 + np.round(t * 1e9), "ns"),
         ("field.header.stamp", lambda t: 1.7e18 + np.round(t * 1e9), "ns"),
         ("elapsed (ms)", lambda t: t * 1000, "ms"),

@@ -12,6 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
+from rotorid.recordings import templates
+from rotorid.recordings.files import check_belief
 from rotorid.recordings.importers import crazyflie, known, px4_ulog
 from rotorid.recordings.importers.crazyflie import TYPES, decode_usd_log, read_usd_log
 from rotorid.recordings.importers.faults import (
@@ -19,6 +21,8 @@ from rotorid.recordings.importers.faults import (
     cut,
     drop_repeated_times,
     flights,
+    moving_on,
+    on_grid,
     report_gaps,
     true_stretches,
 )
@@ -808,6 +812,18 @@ def test_px4_what_a_vehicle_file_cannot_hold_is_named(values: dict[str, float], 
     )
 
 
+@pytest.mark.parametrize("apart_m", [0.0, 0.05])
+def test_coaxial_rotors_make_a_vehicle_and_are_named_where_no_distance_is_stated(apart_m: float) -> None:
+    values = {}
+    for i in range(6):
+        own = {"PX": np.cos(i // 2), "PY": np.sin(i // 2), "PZ": apart_m * (i % 2), "KM": 0.05 * (-1) ** i}
+        values |= {f"CA_ROTOR{i}_{name}": value for name, value in own.items()}
+    vehicle, faults = known.px4_vehicle(values, 6)
+    said = [f.found for f in faults if f.kind == "coaxial"]
+    assert len(said) == (not apart_m) and all("rotors 1 and 2, 3 and 4, 5 and 6 are on one spot" in s for s in said)
+    check_belief(templates.read("x500").model_copy(update={"rotors": vehicle.rotors}), "vehicle.yaml")
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_px4_a_motor_that_is_reversed_for_a_time_has_empty_cells_there(sign: float) -> None:
     """A speed's sign is a turning sense where it stays; a command's is reverse thrust always."""
@@ -821,6 +837,39 @@ def test_px4_a_motor_that_is_reversed_for_a_time_has_empty_cells_there(sign: flo
         assert made[name.format(1)].dropna().to_numpy() == pytest.approx(size)
         assert made[name.format(2)].to_numpy() == pytest.approx(size)
     assert [f.column for f in found if f.kind == "reversed"] == ["throttle_1", "rotor_speed_1_rad_s"]
+
+
+def test_px4_a_control_of_nan_stops_a_motor_and_one_without_any_is_none() -> None:
+    asked = np.full((10, 4), [0.5, 0.5, 0.5, np.nan])
+    asked[4:, 2], asked[:2] = np.nan, np.nan  # PX4 is disarmed in the first two, and stops motor 3 later
+    motors = {"timestamp": np.arange(10) * 1000} | {f"control[{i}]": own for i, own in enumerate(asked.T)}
+    made, found, *_ = px4_ulog.convert(px4(sensor_combined=gyro(10), actuator_motors=motors), 4)
+    assert made["throttle_3"].tolist() == [0.0] * 2 + [0.5] * 2 + [0.0] * 6 and "throttle_4" not in made
+    assert [f.column for f in found if f.kind == "stopped"] == ["throttle_3"]
+
+
+@pytest.mark.parametrize(
+    ("values", "sent", "share"),
+    [
+        ({"DSHOT_CONFIG": 600}, (1.0, 1000.0, 1999.0), (0, 0.5, 1)),
+        ({"DSHOT_CONFIG": 600}, (800.0, 1000.0, 1900.0), (799 / 1998, 0.5, 1899 / 1998)),
+        ({"DSHOT_CONFIG": 0}, (1000.0, 1500.0, 2000.0), (0, 0.5, 1)),
+        ({"PWM_MAIN_TIM0": -4, "PWM_MAIN_FUNC1": 101}, (1.0, 1000.0, 1999.0), (0, 0.5, 1)),
+        ({"PWM_MAIN_TIM0": 400, "PWM_MAIN_FUNC1": 101}, (1000.0, 1500.0, 2000.0), (0, 0.5, 1)),
+        ({"UAVCAN_ENABLE": 3}, (1.0, 4096.0, 8191.0), (0, 0.5, 1)),
+        ({"UAVCAN_EC_FUNC1": 101, "UAVCAN_EC_MAX1": 4096}, (1.0, 2048.5, 4096.0), (0, 0.5, 1)),
+        ({"SIM_GZ_EC_FUNC1": 101, "SIM_GZ_EC_MIN1": 200}, (200.0, 600.0, 1000.0), (0, 0.5, 1)),
+        ({}, (1.0, 1000.0, 1999.0), None),
+        ({"UAVCAN_EC_FUNC1": 101, "UAVCAN_EC_MAX1": 100}, (1.0, 4096.0, 8191.0), None),
+    ],
+)
+def test_px4_outputs_are_in_the_unit_that_a_parameter_states(values, sent, share) -> None:
+    given = {"timestamp": np.arange(3) * 1000, "output[0]": np.array(sent)}
+    table, found, *_ = px4_ulog.convert(px4(values, sensor_combined=gyro(3), actuator_outputs=given), 1)
+    if share is None:
+        assert "throttle_1" not in table and any("no throttle columns" in f.action for f in found)
+    else:
+        assert table["throttle_1"].tolist() == pytest.approx(list(share), abs=1e-4)
 
 
 @pytest.mark.parametrize("port", ["MAIN", "AUX"])
@@ -901,3 +950,28 @@ def test_px4_a_log_cut_off_anywhere_keeps_every_whole_message(tmp_path: Path) ->
         assert len(made) == 40 - -(-lost // size)
         assert ("cut_off" in kinds(found)) == (lost % size > 0)
     refused("VTOL", px4_ulog.rotor_count, px4({"MAV_TYPE": 22}))
+
+
+# What all importers share -------------------------------------------------------------------------
+
+
+def test_of_several_readings_for_one_row_the_nearest_is_taken_and_none_across_a_hole() -> None:
+    grid = np.array([0.0, 1.0, 2.0, 10.0, 11.0])
+    made = on_grid(grid, np.array([0.9, 1.0, 1.4, 5.0, 10.6]), np.arange(5.0))
+    assert made[:, 0] == pytest.approx([np.nan, 1.0, np.nan, np.nan, 4.0], nan_ok=True)
+
+
+@pytest.mark.parametrize("first", [[-11.1], [95.0], [-30.0, -29.99, -29.98]])
+def test_samples_apart_from_a_flight_are_left_out_at_either_end(first: list[float]) -> None:
+    flight = np.arange(0, 12, 0.01)
+    for time_s in (np.array([*first, *flight]), np.array([*flight, *np.add(first, 200)])):
+        keep, faults = moving_on(time_s)
+        assert time_s[keep].tolist() == flight.tolist()
+        assert [f.kind for f in faults] == ["apart"] and f"{len(first)} samples" in faults[0].found
+
+
+def test_what_a_logger_loses_and_parts_of_a_second_are_no_samples_apart() -> None:
+    time_s = np.arange(0, 12, 0.01)
+    for gone in ((time_s % 3 > 1.5) & (time_s % 3 < 2.6), time_s % 1 < 0.7):
+        keep, faults = moving_on(time_s[~gone])
+        assert keep.all() and not faults

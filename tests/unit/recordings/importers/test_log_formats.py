@@ -372,6 +372,24 @@ def test_a_missing_package_is_named_with_how_to_get_it(tmp_path: Path, monkeypat
     refused(r"pip install 'rotorid\[ardupilot\]'", read_log, path)
 
 
+@pytest.mark.parametrize(
+    ("start", "name"),
+    [
+        (b"\xff" * 40 + b"H Product:Blackbox flight data recorder\n", "betaflight"),
+        (bytes(7) + b"\xa3\x95\x80\x80\x59FMT\0", "ardupilot"),
+        (b"\xbc\x02\x00\x01\x00\x07\x00fixedFrequency\0", "crazyflie"),
+        (b"\xbc\xff\xff\xff\xff\x07\x00\x01", None),
+        ((1_700_000_000_000_000).to_bytes(8, "big") + b"\xfd" + bytes(40), None),
+    ],
+)
+def test_a_format_is_recognised_by_more_than_its_first_byte(tmp_path: Path, start: bytes, name: str | None) -> None:
+    (tmp_path / "log.dat").write_bytes(start + bytes(60))
+    if name is None:
+        refused("not a log that rotorid knows|telemetry log of MAVLink", format_of, tmp_path / "log.dat")
+    else:
+        assert format_of(tmp_path / "log.dat") == name
+
+
 def test_a_folder_is_a_bag_only_with_its_metadata(tmp_path: Path) -> None:
     refused("expected a log, found a folder", format_of, tmp_path)
 

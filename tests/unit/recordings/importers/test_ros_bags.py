@@ -46,13 +46,14 @@ MORE = {
     "px4_msgs/msg/SensorCombined": "uint64 timestamp\nfloat32[3] gyro_rad\nfloat32[3] accelerometer_m_s2\n",
     "px4_msgs/msg/VehicleAngularVelocity": "uint64 timestamp\nfloat32[3] xyz\n",
     "px4_msgs/msg/VehicleAcceleration": "uint64 timestamp\nfloat32[3] xyz\n",
-    "px4_msgs/msg/VehicleAttitude": "uint64 timestamp\nfloat32[4] q\n",
+    "px4_msgs/msg/VehicleAttitude": "uint64 timestamp\nfloat32[4] q\nuint8 quat_reset_counter\n",
+    "px4_msgs/msg/VehicleLandDetected": "uint64 timestamp\nbool landed\n",
     "px4_msgs/msg/VehicleLocalPosition": "uint64 timestamp\n"
     + "".join(f"float32 {name}\n" for name in ("x", "y", "z", "vx", "vy", "vz"))
     + "".join(f"bool {name}\n" for name in ("xy_valid", "z_valid", "v_xy_valid", "v_z_valid")),
     "px4_msgs/msg/ActuatorMotors": "uint64 timestamp\nfloat32[12] control\n",
-    "px4_msgs/msg/EscReport": "int32 esc_rpm\n",
-    "px4_msgs/msg/EscStatus": "uint64 timestamp\nuint8 esc_count\npx4_msgs/EscReport[8] esc\n",
+    "px4_msgs/msg/EscReport": "int32 esc_rpm\nuint8 actuator_function\n",
+    "px4_msgs/msg/EscStatus": "uint64 timestamp\nuint8 esc_count\nuint8 esc_online_flags\npx4_msgs/EscReport[8] esc\n",
     "mystery_msgs/msg/Turns": "std_msgs/Header header\nfloat32[] turns\n",
 }
 SPEEDS, THROTTLES = c.rotor_columns("rotor_speed", 4), c.rotor_columns("throttle", 4)
@@ -279,7 +280,8 @@ POSES = {
     ),
     "Odometry": lambda f, k, at: f.odometry(k, at, covariance=-1.0),
     "VehicleAttitude": lambda f, k, at: f(
-        "px4_msgs/msg/VehicleAttitude", timestamp=round(at * 1e6), q=f.quaternion[k].astype(np.float32)
+        "px4_msgs/msg/VehicleAttitude", timestamp=round(at * 1e6), q=f.quaternion[k].astype(np.float32),
+        quat_reset_counter=0,
     ),
 }  # fmt: skip
 
@@ -311,9 +313,13 @@ def test_a_twist_is_in_the_axes_that_its_frame_names(tmp_path: Path, frame: str)
     check_against(run, flight.table, c.VELOCITY, 1e-4)
 
 
-def test_px4s_own_messages_have_its_own_axes(tmp_path: Path) -> None:
+@pytest.mark.parametrize("order", [(0, 1, 2, 3), (2, 0, 3, 1)])
+def test_px4s_own_messages_mean_what_its_logs_mean(tmp_path: Path, order: tuple[int, ...]) -> None:
+    """The k-th controller drives motor `order[k]`; controller 0 is not heard in one message of twenty, motor 3 is
+    stopped for a time, the vehicle takes off late, and the attitude is set anew in the air."""
     flight, at = stamped(Flight())
-    t = flight.table
+    t, n = flight.table, len(flight.table)
+    silent, stopped, anew = (lambda k: k % 20 == 3), (lambda k: 500 < k < 550), 960
 
     def of(kind: str, **fields: Callable):
         return lambda k: flight(
@@ -323,26 +329,43 @@ def test_px4s_own_messages_have_its_own_axes(tmp_path: Path) -> None:
     def columns(names) -> Callable:
         return lambda k: t[list(names)].iloc[k].to_numpy(np.float32)
 
+    def control(k: int) -> np.ndarray:
+        own = [np.nan if stopped(k) and i == 2 else v for i, v in enumerate(flight.throttles[k])]
+        return np.array([*own, *[np.nan] * 8], np.float32)
+
+    def reports(k: int) -> list:
+        heard = [0 if silent(k) and i == 0 else flight.speeds[k][m] * 60 / (2 * np.pi) for i, m in enumerate(order)]
+        functions = [101 + m for m in order] if order[0] else [0] * 4
+        return [
+            flight("px4_msgs/msg/EscReport", esc_rpm=round(v), actuator_function=f)
+            for v, f in zip([*heard, 0, 0, 0, 0], [*functions, 0, 0, 0, 0], strict=True)
+        ]
+
     place = {n: (lambda k, m=m: float(t[m].iloc[k])) for n, m in zip(
         ("x", "y", "z", "vx", "vy", "vz"), (*c.POSITION, *c.VELOCITY), strict=True
     )}  # fmt: skip
     place |= dict.fromkeys(("xy_valid", "z_valid", "v_xy_valid", "v_z_valid"), lambda _: True)
-    control = lambda k: np.concatenate([flight.throttles[k], np.full(8, np.nan)]).astype(np.float32)  # noqa: E731
-    report = lambda k: [  # noqa: E731
-        flight("px4_msgs/msg/EscReport", esc_rpm=round(v * 60 / (2 * np.pi))) for v in (*flight.speeds[k], 0, 0, 0, 0)
-    ]
     both = {"gyro_rad": columns(c.ANGULAR_VELOCITY), "accelerometer_m_s2": columns(c.SPECIFIC_FORCE)}
+    turned = {"q": columns(c.QUATERNION), "quat_reset_counter": lambda k: int(k >= anew)}
+    escs = {"esc_count": lambda _: 4, "esc_online_flags": lambda k: 14 if silent(k) else 15, "esc": reports}
     topics = {
         "/fmu/out/sensor_combined": (of("SensorCombined", **both), at, 1),
-        "/fmu/out/vehicle_attitude": (of("VehicleAttitude", q=columns(c.QUATERNION)), at, 1),
+        "/fmu/out/vehicle_attitude": (of("VehicleAttitude", **turned), at, 1),
         "/fmu/out/vehicle_local_position": (of("VehicleLocalPosition", **place), at, 1),
         "/fmu/out/actuator_motors": (of("ActuatorMotors", control=control), at, 1),
-        "/fmu/out/esc_status": (of("EscStatus", esc_count=lambda _: 4, esc=report), at, 1),
+        "/fmu/out/esc_status": (of("EscStatus", **escs), at, 1),
+        "/fmu/out/vehicle_land_detected": (of("VehicleLandDetected", landed=lambda k: k < 320), at, 1),
     }
-    runs, _, unit = ros.read_ros(written(tmp_path / "a", flight, topics))
+    runs, faults, unit = ros.read_ros(written(tmp_path / "a", flight, topics))
+    found = {f.kind for f in faults}
+    assert {"estimator_reset", "speed_missing", "stopped"} <= found and unit == "rpm"
     (run,) = runs.values()
     every = (*c.ANGULAR_VELOCITY, *c.SPECIFIC_FORCE, *c.QUATERNION, *c.POSITION, *c.VELOCITY, *SPEEDS, *THROTTLES)
-    check_against(run, flight.table, every, 1e-3)
+    true = t.copy()
+    true.loc[[stopped(k) for k in range(n)], "throttle_3"] = 0.0
+    check_against(run, true, every, 1e-3)
+    assert [run[name].isna().mean() > 0.04 for name in SPEEDS] == [m == order[0] for m in range(4)]
+    assert run[c.TIME].iloc[-1] == pytest.approx(9.6 - 0.2 - 0.5 - 4.2, abs=0.1)
     assert unit == "rpm" and c.rotor_columns("throttle", 5)[4] not in run
     apart = {
         "/w": (of("VehicleAngularVelocity", xyz=columns(c.ANGULAR_VELOCITY)), at, 1),

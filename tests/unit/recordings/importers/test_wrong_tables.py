@@ -129,6 +129,26 @@ def test_stamps_that_jitter_are_no_clock_set_back(seed: int, tmp_path) -> None:
     assert np.diff(found["time_s"]).max() < 0.2
 
 
+def test_a_first_line_of_zeros_is_no_part_of_a_log(tmp_path) -> None:
+    own = table().assign(time_s=lambda t: t["time_s"] + 1000)
+    pd.concat([own[:1] * 0, own]).to_csv(tmp_path / "own.csv", index=False)
+    found, faults, _ = read_by_mapping(tmp_path / "own.csv", None)
+    assert np.allclose(found["time_s"], own["time_s"] - 1000) and [f.kind for f in faults] == ["apart"]
+
+
+@pytest.mark.parametrize(("scale", "kept"), [([1, 1, -1, -1], [1, 1, 1, 1]), ([1, 1, -1, -1], [0.5, 1, 1, 1])])
+def test_speeds_of_a_mapping_have_sizes_and_what_turns_backwards_is_told(scale, kept, tmp_path) -> None:
+    own = table()
+    signed = own.copy()
+    signed[list(SPEEDS)] *= scale
+    signed.loc[50 : 50 + 200 * (kept[0] < 1), SPEEDS[0]] *= np.sign(kept[0] - 0.7)
+    signed.to_csv(tmp_path / "own.csv", index=False)
+    found, faults, _ = read_by_mapping(tmp_path / "own.csv", MAPPING)
+    np.testing.assert_allclose(found[SPEEDS[3]], own[SPEEDS[3]])
+    told = [f.column for f in faults if "turns backwards" in f.found]
+    assert told == ([SPEEDS[0]] if kept[0] < 1 else [])
+
+
 def test_each_side_of_a_clock_that_was_set_back_is_a_run(tmp_path) -> None:
     own = table()
     own["time_s"] *= 2

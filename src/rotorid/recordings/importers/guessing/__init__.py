@@ -266,6 +266,9 @@ def _world(draft: Draft, up: np.ndarray, what: str) -> str:
         return OPEN
     if up[2] < 0:
         return "ned"
+    if draft.compass:
+        draft.evidence["world"] += ", so z is up, and the heading counts from north"
+        return "nwu"
     draft.evidence["world"] += ", so z is up; nwu is the same but for what is called north, which no verdict rests on"
     return "enu"
 

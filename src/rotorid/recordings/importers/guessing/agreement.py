@@ -153,6 +153,8 @@ class Draft:
     wxyz: np.ndarray | None = None
     """Attitude as recorded (n, 4), where its order is known."""
     instants: np.ndarray | None = None
+    compass: bool = False
+    """Whether the attitude's yaw is a compass heading, clockwise where the world's z is up."""
     world: str = OPEN
     """Axes that the attitude refers to, where they are known."""
 

@@ -228,6 +228,8 @@ class _Turn:
     wxyz: np.ndarray
     unit: str = ""
     inverse: bool = False
+    signs: tuple[int, ...] | None = None
+    """Of angles that are not all positive about the axes of the body."""
 
 
 def _attitudes(draft: Draft) -> tuple[list[_Turn], str]:
@@ -256,16 +258,19 @@ def _attitudes(draft: Draft) -> tuple[list[_Turn], str]:
         return [], ""
     columns, stated = found
     top = float(np.nanmax(np.abs(values)))
-    by_size = ["rad", "deg"] if top < _MOST_RAD else ["deg"] if top < _MOST_DEG else ["cdeg", "mrad"]
+    by_size = ["rad", "deg"] if top < _MOST_RAD else ["deg"] if top < _MOST_DEG else ["ddeg", "cdeg", "mrad"]
     units = [stated] if stated in UNITS["angle"] else by_size
-    turns = []
-    known = np.isfinite(values).all(axis=1)
-    for unit_, form in product(units, EULER):
-        wxyz = np.full((len(values), 4), np.nan)
-        if known.any():
-            wxyz[known] = from_angles(values[known] * UNITS["angle"][unit_], form).as_quat()[:, [3, 0, 1, 2]]
-        turns.append(_Turn(columns, form, wxyz, unit_))
+    turns = [_of_angles(columns, values, form, unit_) for unit_, form in product(units, EULER)]
     return turns, "roll, pitch, yaw by their names"
+
+
+def _of_angles(columns: tuple[str, ...], values: np.ndarray, form: str, unit: str, signs=None) -> _Turn:
+    """Roll, pitch and yaw (n, 3) as an attitude, each times its sign."""
+    known, wxyz = np.isfinite(values).all(axis=1), np.full((len(values), 4), np.nan)
+    if known.any():
+        angles = values[known] * UNITS["angle"][unit] * (signs or (1, 1, 1))
+        wxyz[known] = from_angles(angles, form).as_quat()[:, [3, 0, 1, 2]]
+    return _Turn(columns, form, wxyz, unit, signs=signs)
 
 
 def guess_attitude_and_rates(draft: Draft) -> None:
@@ -274,11 +279,22 @@ def guess_attitude_and_rates(draft: Draft) -> None:
     rates = {"rad": "rad/s", "deg": "deg/s", "mrad": "mrad/s"}  # `gyro_rad` of PX4
     offered = [replace(f, unit=rates.get(f.unit, f.unit)) for f in triples if named.is_named(f, "angular_velocity")]
     found: dict[tuple[int, Family], Agreement] = {}
-    if draft.instants is not None:
-        for k, turn in enumerate(turns):
+
+    def look(first: int) -> None:
+        for k, turn in enumerate(turns[first:], first):
             moved = by.turned(draft.instants, draft.time_s, signed_continuous(turn.wxyz))
             for family in offered or triples:
                 found[k, family] = by.compare(moved, draft.integrated(draft.values(family.columns)))
+
+    if draft.instants is not None:
+        look(0)
+        best = max(found, key=lambda key: _rank(found[key], turns[key[0]]), default=None)
+        if turns and turns[0].form in EULER and best is not None and offered and _has_other_signs(found[best]):
+            # Pitch may be positive nose down and yaw a heading, whatever the axes of the gyroscope.
+            count, values = len(turns), draft.values(turns[0].columns)
+            signs = list(product((1, -1), repeat=3))[1:]
+            turns += [_of_angles(t.columns, values, t.form, t.unit, own) for t in turns[:count] for own in signs]
+            look(count)
     best = max(found, key=lambda key: _rank(found[key], turns[key[0]]), default=None)
     if best is not None:
         agreed, family = found[best], best[1]
@@ -286,6 +302,7 @@ def guess_attitude_and_rates(draft: Draft) -> None:
         if agreed.correlation >= enough and agreed.size > MOVES["angle"]:
             _confirmed(draft, turns, found, best, why, bool(offered))
             return
+        turns = [t for t in turns if t.signs is None]
         if offered:
             _rates_alone(draft, offered[0], in_words(agreed, "angle", "the attitude"), _mirrored(draft, turns, family))
     elif offered:
@@ -294,10 +311,16 @@ def guess_attitude_and_rates(draft: Draft) -> None:
         _attitude_alone(draft, turns, why)
 
 
+def _has_other_signs(agreed: Agreement) -> bool:
+    """Whether no reading of angles as they are agrees about each axis."""
+    return agreed.correlation < CONFIRMED or min(agreed.by_axis) < -CONTRADICTED
+
+
 def _rank(agreed: Agreement, turn: _Turn) -> float:
     """Correlation of a reading; a factor that no unit has, and an attitude that must be inverted, rank lower."""
     fits = any(abs(agreed.slope / f - 1) < FACTOR_OFF for f in UNITS["rate"].values())
-    return agreed.correlation - (0.0 if fits else 0.05) - (0.02 if turn.inverse else 0.0)
+    straight = not turn.inverse and turn.signs is None
+    return agreed.correlation - (0.0 if fits else 0.05) - (0.0 if straight else 0.02)
 
 
 def _confirmed(draft: Draft, turns: list[_Turn], found: dict, best: tuple[int, Family], why: str, by_name: bool):
@@ -321,14 +344,16 @@ def _confirmed(draft: Draft, turns: list[_Turn], found: dict, best: tuple[int, F
         question,
         unit=unit,
     )
-    others = [a for (k, f), a in found.items() if f == family and turns[k].form != turn.form]
+    alike = {k for k, t in enumerate(turns) if (t.unit, t.signs) == (turn.unit, turn.signs)}
+    others = [a for (k, f), a in found.items() if k in alike and f == family and turns[k].form != turn.form]
     runner_up = max(others, key=lambda a: a.correlation, default=Agreement())
-    more = {"unit": turn.unit} if turn.unit else {}
+    more = ({"unit": turn.unit} if turn.unit else {}) | ({"signs": turn.signs} if turn.signs else {})
+    draft.compass = turn.signs is not None and turn.signs[2] < 0
     question, form = "", turn.form
     if turn.inverse:
         question, form = "it turns the world into the body: change the signs of x, y, z (or that of w)", OPEN
     elif not is_clear(agreed, runner_up) and form in EULER:
-        apart = _apart(turns, turn.unit)
+        apart = _apart([turns[k] for k in alike], turn.unit)
         form, question = ("euler", "") if apart < _SAME_ORDER_RAD else (OPEN, _which_order(apart))
         why += f", {np.degrees(apart):.2g}° apart at most in the two orders"
     elif not is_clear(agreed, runner_up):
@@ -343,7 +368,8 @@ def _confirmed(draft: Draft, turns: list[_Turn], found: dict, best: tuple[int, F
         **more,
     )
     if form != OPEN:
-        draft.wxyz = signed_continuous(next(t for t in turns if (t.form, t.unit) == (form, turn.unit)).wxyz)
+        own = (form, turn.unit, turn.signs)
+        draft.wxyz = signed_continuous(next(t for t in turns if (t.form, t.unit, t.signs) == own).wxyz)
 
 
 def _apart(turns: list[_Turn], unit: str) -> float:
@@ -418,8 +444,14 @@ def _attitude_alone(draft: Draft, turns: list[_Turn], why: str) -> None:
         unit = units[0] if len(units) == 1 else OPEN
         apart = max(_apart(straight_turns, u) for u in units)
         form = "euler" if apart < _SAME_ORDER_RAD else OPEN
-        asked = ["rad or deg: no gyroscope shows which"] * (unit == OPEN) + [_which_order(apart)] * (form == OPEN)
-        draft.put("attitude", first.columns, why, "; ".join(asked), form=form, unit=unit)
+        asked = [f"{' or '.join(units)}: no gyroscope shows which"] * (unit == OPEN)
+        asked += [_which_order(apart)] * (form == OPEN)
+        signs = {} if np.nanmax(np.abs(draft.values(first.columns))) < _MOST_DEG else {"signs": OPEN}
+        if signs:  # as firmwares write them that have axes of their own
+            asked.append(
+                "signs of roll, pitch and yaw as the body's axes want them ([1, -1, 1] where nose down counts)"
+            )
+        draft.put("attitude", first.columns, why, "; ".join(asked), form=form, unit=unit, **signs)
         if not asked:
             draft.wxyz = signed_continuous(first.wxyz)
     else:

@@ -16,7 +16,7 @@ _UNIT_WORDS: dict[str, str] = {
     "cm_s2": "cm/s2", "cm_s^2": "cm/s2", "mm_s2": "mm/s2", "mm_s^2": "mm/s2", "ft_s2": "ft/s2", "ft_s^2": "ft/s2",
     "m_s": "m/s", "mps": "m/s", "cm_s": "cm/s", "mm_s": "mm/s",
     "rad_s": "rad/s", "rads": "rad/s", "radps": "rad/s", "deg_s": "deg/s", "dps": "deg/s", "degps": "deg/s",
-    "mrad_s": "mrad/s", "mrad": "mrad", "cdeg": "cdeg",
+    "mrad_s": "mrad/s", "mrad": "mrad", "cdeg": "cdeg", "ddeg": "ddeg",
     "rad": "rad", "deg": "deg", "m": "m", "cm": "cm", "mm": "mm", "ft": "ft", "rpm": "rpm", "krpm": "krpm", "hz": "hz",
     "erpm": "erpm", "kgf": "kgf", "gf": "gf", "lbf": "lbf", "n_m": "N.m", "nm": "N.m", "m_nm": "mN.m", "mn_m": "mN.m",
 }  # fmt: skip
@@ -68,6 +68,8 @@ _ROTORS: dict[str, frozenset[str]] = {
 }  # fmt: skip
 _QUATERNION = frozenset("q quat quaternion att_q attitude_q orientation rotation".split())
 _ANGLES = ({"roll", "phi"}, {"pitch", "theta"}, {"yaw", "psi", "heading"})
+_THREE_ANGLES = frozenset("attitude att euler angle angles rpy attitude_angles euler_angles".split())
+"""Stems of roll, pitch and yaw that are numbered in this order."""
 _TURNING = frozenset("rate rates speed vel gyro gyr omega".split())
 """Words that make a name of an angle one of a body rate."""
 _SCALARS: dict[str, tuple[str, ...]] = {
@@ -264,7 +266,12 @@ def is_quaternion(family: Family) -> bool:
 
 
 def angles(names: Sequence[str]) -> tuple[tuple[str, str, str], str] | None:
-    """Roll, pitch and yaw by their names, and the unit that these state."""
+    """Roll, pitch and yaw by their names or numbers, and the unit that these state."""
+    names = list(names)
+    for family in (f for axes in ("012", "123") for f in families(names, axes)):
+        longer = any(family.stem == f.stem and len(f.columns) > 3 for f in numbered(names))
+        if family.stem in _THREE_ANGLES and not longer and not family.words & (OTHER_THINGS | _TURNING):
+            return family.columns, family.unit
     found, units = [], []
     for meant in _ANGLES:
         for name in names:

@@ -105,13 +105,13 @@ def _put(draft: Draft, quantity: str, family: Family, how: str) -> None:
     values = draft.values(family.columns)
     if not np.isfinite(values).any():
         return
-    top = float(np.nanquantile(values, 0.99))
+    top = float(np.nanquantile(np.abs(values), 0.99))
     evidence = f"{how}; up to {top:.5g}"
     follows = _carries(draft, family)
     if follows > CONTRADICTED:
         evidence += f"; with them grows the specific force along z (correlation {follows:.2f})"
     if quantity != "throttle":
-        unit, why = _speed_unit(family, float(np.nanmedian(values)), _is_betaflight(draft))
+        unit, why = _speed_unit(family, float(np.nanmedian(np.abs(values))), _is_betaflight(draft))
         question, more = "" if unit != OPEN else why, {}
         if _is_electrical(family):
             more = {"poles": OPEN}
