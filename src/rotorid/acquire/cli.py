@@ -29,6 +29,7 @@ from rotorid.errors import InputError
 from rotorid.io import wire
 from rotorid.io.frames import COMMAND, START, Frame, Intake, encode
 from rotorid.io.session import Ended, RoomAir, Setup
+from rotorid.io.text.writing import all_or_none
 from rotorid.io.wire import EXPERIMENTS, IDENTIFY, INSTRUMENTS
 
 _DEFAULT_OUT = Path("raw/local")
@@ -400,7 +401,8 @@ def check(
     if session is not None and session.metadata_sha256 is None and not repaired:
         typer.echo(without_checksum(1, session_path(log)))
     if csv is not None:
-        table.to_csv(csv, index=False)
+        with all_or_none(csv) as (part,):
+            table.to_csv(part, index=False)
         typer.echo(f"table: {csv}")
     if parsed.faults:
         raise typer.Exit(1)

@@ -11,6 +11,7 @@ import errno
 import json
 import os
 import re
+import tempfile
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
@@ -802,9 +803,9 @@ class LogWriter:
             # Never with a name, however early this program is killed.
             self._ballast = os.open(self.path.parent, os.O_WRONLY | os.O_TMPFILE, 0o600)
         except (AttributeError, OSError):  # not every system, nor every file system, has such files
-            path = self.path.with_name(self.path.name + ".ballast")
-            self._ballast = os.open(path, os.O_WRONLY | os.O_CREAT, 0o600)
-            path.unlink()
+            # A new file that nobody can have laid a link for.
+            self._ballast, path = tempfile.mkstemp(".ballast", f"{self.path.name}.", self.path.parent)
+            os.unlink(path)
         data = bytes(_BALLAST_BYTES)
         while data:
             data = data[os.write(self._ballast, data) :]
