@@ -228,6 +228,8 @@ class Recorder:
             self.session.ended, self.session.message = _how(error)
             self.phase = str(self.session.ended)
             self._fill_session()
+            with open(self.log_path, "rb") as log:
+                self.session.log_sha256 = file_digest(log, "sha256").hexdigest()
             try:
                 write_session(self.session, self.session_path)
             except OSError as late:
@@ -693,8 +695,6 @@ class Recorder:
             if host_s > 4 * self._timings.poll_s / _RATE_TOLERANCE:
                 session.device_clock_ratio = round(device_s / host_s, 6)
         session.warnings = list(_warnings(session))
-        with open(self.log_path, "rb") as log:
-            session.log_sha256 = file_digest(log, "sha256").hexdigest()
 
 
 def _source(identity: wire.StartRecord, port: str) -> str:
