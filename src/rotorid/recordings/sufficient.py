@@ -452,8 +452,8 @@ def _check_not_constant(recordings: RecordingSet) -> None:
             held = np.nanmax(runs[0].array(names), axis=0)
             found = listed([f"{n} = {v:g}" for n, v in zip(names, held, strict=True)], most=6)
             raise InputError(
-                f"{recordings.path or recordings.name}: nothing can be compared: the rotors' commands hold one value in "
-                f"every run ({found}), expected the changes that keep a vehicle in the air; leave the columns out where "
+                f"{recordings.path or recordings.name}: nothing can be compared: the rotors' commands hold one value "
+                f"in every run ({found}), expected the changes that keep a vehicle in the air; leave them out where "
                 "nothing was recorded"
             )
         return
