@@ -1,5 +1,6 @@
 """Files are written together or not at all; numbers to the digits that are not chance."""
 
+import errno
 import signal
 import stat
 import subprocess
@@ -146,6 +147,13 @@ def test_a_full_disk_leaves_what_was_there(tmp_path: Path) -> None:
         second.write_text("new")
     assert (one.read_text(), two.read_text()) == ("old", "old")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["one", "two"]
+
+
+def test_a_full_disk_names_the_folder_that_was_to_be(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="No space left on device: .*set'"), writing.staging(tmp_path / "set") as part:
+        raise OSError(errno.ENOSPC, "No space left on device", str(part / "run.parquet"))
+    with pytest.raises(OSError, match="No space left on device: .*set'"), writing.staging(tmp_path / "set"):
+        raise OSError(errno.ENOSPC, "No space left on device")
 
 
 def test_the_twelfth_digit_is_no_difference() -> None:

@@ -169,7 +169,7 @@ def staging(path: Path) -> Iterator[Path]:
     """An empty folder next to `path`, to write files in that are to take their names later; gone when the block ends.
 
     Its name cannot be known before, and it is its owner's alone. What a process that was killed left there is swept
-    away by the next that writes the same path.
+    away by the next that writes the same path. OSError names `path` where the disk is full.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     _sweep(path)
@@ -179,6 +179,10 @@ def staging(path: Path) -> Iterator[Path]:
         raise OSError(error.errno, error.strerror, str(path)) from error
     try:
         yield part
+    except OSError as error:
+        if error.errno in _FULL and (error.filename is None or part in Path(str(error.filename)).parents):
+            raise OSError(error.errno, error.strerror, str(path)) from error
+        raise
     finally:
         shutil.rmtree(part, ignore_errors=True)
 
