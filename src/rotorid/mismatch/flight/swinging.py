@@ -264,10 +264,6 @@ def largest_pieces(stretches: Sequence[HangingStretch], cable: Cable) -> list[Ha
     return sorted(pieces, key=lambda p: -p.squares)[:_LARGEST]
 
 
-_LEAN_OF_NOTHING = 1e6
-"""A force so many times the weight of what hangs is none of a swing."""
-
-
 def seems_to_swing(stretches: Sequence[HangingStretch], cable: Cable) -> bool:
     """Whether a swing explains anything of the largest pieces."""
     return share_left(stretches, cable) <= 1.0 - _LEAST_SHARE
@@ -315,10 +311,9 @@ def fitted_piece(piece: HangingStretch, cable: Cable, state: np.ndarray, mass_kg
     It is looked for near `state` and near what the first quarter of a swing shows.
     """
     near = _fitted_near(piece, cable, state, mass_kg)
-    first = _seen_at_first(piece, cable, near[1]) if near[1] > 0.0 else None
-    if first is None:
+    if near[1] <= 0.0:
         return near
-    seen = _fitted_near(piece, cable, first, mass_kg)
+    seen = _fitted_near(piece, cable, _seen_at_first(piece, cable, near[1]), mass_kg)
     return min(near, seen, key=lambda found: found[2])
 
 
@@ -346,16 +341,14 @@ def _fitted_near(piece: HangingStretch, cable: Cable, state: np.ndarray, mass_kg
     return own, mass_of(pull), float(((piece.force - mass_of(pull) * pull) ** 2).sum())
 
 
-def _seen_at_first(piece: HangingStretch, cable: Cable, mass_kg: float) -> np.ndarray | None:
-    """The state (6,) in which a piece begins as its first quarter of a swing shows it: force is mass times lean; None
-    where a mass of next to nothing makes the lean no number."""
+def _seen_at_first(piece: HangingStretch, cable: Cable, mass_kg: float) -> np.ndarray:
+    """The state (6,) in which a piece begins as its first quarter of a swing shows it: force is mass times lean."""
     first = piece.at_s <= piece.at_s[0] + max(_QUARTER / cable.rate, 3.0 / _RATE_HZ)
     since_s = piece.at_s[first] - piece.time_s[0]
-    weight = mass_kg * np.linalg.norm(piece.hanging, axis=1).mean()
-    leans = piece.force[first] / max(weight, 1e-300)
-    if not np.isfinite(leans).all() or np.abs(leans).max() > _LEAN_OF_NOTHING:
-        return None
-    (rate, lean) = np.polyfit(since_s, leans, 1)
+    weight = max(mass_kg * np.linalg.norm(piece.hanging, axis=1).mean(), 1e-9)
+    # A piece may begin with one force, at its first instant: then nothing is known of the rate.
+    design = np.stack([since_s, np.ones(len(since_s))], axis=1)
+    (rate, lean), *_ = np.linalg.lstsq(design, piece.force[first] / weight, rcond=None)
     lean /= max(1.0, float(np.linalg.norm(lean)) / _MOST_LEAN)
     down = np.sqrt(1.0 - lean @ lean)
     return np.array([*lean, down, *rate, -(lean @ rate) / down])
