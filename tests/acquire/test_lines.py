@@ -5,20 +5,32 @@ import os
 import threading
 import time
 import tty
+from contextlib import suppress
+from datetime import UTC, datetime
 from hashlib import sha256
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rich.console import Console
 
 from rotorid.acquire.cli import app
 from rotorid.acquire.lines import record_lines
-from rotorid.acquire.transport import AcquireError, DeviceSilent, Interrupted, SerialTransport, SystemClock
+from rotorid.acquire.transport import (
+    AcquireError,
+    DeviceSilent,
+    Interrupted,
+    PortLost,
+    PortMissing,
+    SerialTransport,
+    SystemClock,
+    VirtualClock,
+)
 from rotorid.acquire.view import LinesPanel, Plot
 from rotorid.io import rawlog
 from rotorid.io.lines import Description, LineDecoder, read_description, read_line_log
 from rotorid.io.rawlog import RECEIVED, read_raw
-from rotorid.io.session import Ended, Session, read_session, write_session
+from rotorid.io.session import Counts, Ended, Session, read_session, write_session
 from tests.acquire.fault_table import seen
 from tests.command_line import answer, invoke
 from tests.refusals import refused
@@ -161,6 +173,75 @@ def test_an_instrument_is_told_to_stop_whatever_the_end(line, tmp_path):
     assert os.read(master, 100) == b"S\r\n"
 
 
+class Scripted:
+    """A port that gives bytes, raises errors, or is away, one after the other; then silence."""
+
+    name, baud_rate = "scripted", 9600
+
+    def __init__(self, *said: bytes | BaseException) -> None:
+        self.said, self.sent = list(said), []
+
+    def open(self) -> None:
+        if self.said and isinstance(self.said[0], PortMissing):
+            raise self.said.pop(0)
+
+    def read(self, timeout_s: float) -> bytes:
+        said = self.said.pop(0) if self.said else b""
+        if isinstance(said, BaseException):
+            raise said
+        return said
+
+    def write(self, data: bytes) -> None:
+        self.sent.append(data)
+
+    def close(self) -> None:
+        pass
+
+
+def recorded(folder: Path, *said: bytes | BaseException, begin: str = "") -> tuple[list[bytes], Session]:
+    """What is sent to an instrument that says this, and the metadata."""
+    description = Description(name="x", begin=begin, end="S", separator=",", columns={"force_z_n": {"field": 1}})
+    port, clock = Scripted(*said), VirtualClock(datetime(2026, 1, 1, tzinfo=UTC))
+    with suppress(AcquireError, KeyboardInterrupt):
+        record_lines(description, port, clock, folder, "run", samples=3)
+    return port.sent, read_session(folder / "run.yaml")
+
+
+def test_a_line_that_is_stopped_twice_was_interrupted_and_one_that_failed_failed(tmp_path: Path) -> None:
+    assert recorded(tmp_path / "twice", b"0,1\n", KeyboardInterrupt())[1].ended == Ended.INTERRUPTED
+    with pytest.raises(ZeroDivisionError):
+        recorded(tmp_path / "fault", ZeroDivisionError())
+    assert read_session(tmp_path / "fault" / "run.yaml").ended == Ended.FAILED
+
+
+def test_a_plug_that_comes_back_goes_on_and_the_gap_is_in_the_metadata(tmp_path: Path) -> None:
+    sent, session = recorded(tmp_path, b"0,1\n0,", PortLost("gone"), PortMissing("no"), b"5,2\n", b"6,3\n", begin="R")
+    assert session.ended == Ended.FINISHED and sent == [b"R", b"R", b"S"]
+    assert [event.what for event in session.events] == ["port_lost", "port_back"]
+    found = read_line_log(tmp_path / "run.rlog")
+    assert list(found.table.force_z_n) == [1, 2, 3] and found.counts == session.counts  # no "0,5" of two halves
+    assert "the port went away 1 times" in answer("check", tmp_path / "run.rlog", app=app)
+
+
+def test_a_killed_recording_of_lines_is_completed(tmp_path: Path) -> None:
+    _, whole = recorded(tmp_path, b"0,1\n", b"0,2\nno\n0,3\n")
+    change = {"ended": Ended.RECORDING, "counts": Counts(), "log_sha256": None, "warnings": []}
+    write_session(whole.model_copy(update=change), tmp_path / "run.yaml")
+    shown = answer("check", tmp_path / "run.rlog", app=app)
+    assert "never finished; completed now" in shown and "ended: recording" in shown
+    completed = read_session(tmp_path / "run.yaml")
+    assert completed.counts == whole.counts and completed.log_sha256 == whole.log_sha256
+
+
+def test_a_wrong_baud_rate_is_noticed(tmp_path: Path) -> None:
+    noise = bytes(np.random.default_rng(1).integers(0, 256, 5000, dtype=np.uint8))
+    _, session = recorded(tmp_path / "all", noise)
+    assert session.ended == Ended.REFUSED and "is the baud rate right (9600)" in session.message
+    _, session = recorded(tmp_path / "some", noise[:300], KeyboardInterrupt())
+    assert "is the baud rate right (9600)" in session.warnings[0]
+    assert "is the baud rate right (9600)" in answer("check", tmp_path / "some" / "run.rlog", app=app)
+
+
 @seen("a bit of a log of plain lines flipped", "two halves made a line of a wrong number, and nothing was reported")
 def test_damage_joins_no_halves_of_lines_and_is_told(tmp_path):
     description = Description(name="x", **FORMS["csv"][0])
@@ -182,6 +263,12 @@ def test_damage_joins_no_halves_of_lines_and_is_told(tmp_path):
     assert list(found.table.force_z_n) == [3.0, 9.0] and len(found.faults) == 2  # not 2 and 5 as 25
     shown = invoke("check", path, app=app)
     assert shown.exit_code == 1 and shown.output.count("NOT AS RECORDED") == 2
+    # The last chunk, of a recording that was killed: it is whole, so nothing was cut.
+    write_session(session.model_copy(update={"procedure": told, "log_sha256": None}), tmp_path / "run.yaml")
+    data[-3] ^= 1
+    path.write_bytes(data)
+    shown = invoke("check", path, app=app)
+    assert shown.exit_code == 1 and "damaged in one place" in shown.output and "cut off" not in shown.output
 
 
 def test_a_limit_ends_the_recording_and_columns_are_those_of_the_description(line, tmp_path):

@@ -131,7 +131,7 @@ def command(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Commands]:
     ("name", "make", "said"),
     [
         ("log.mat", mat_bomb, "memory"),
-        ("log.bag", bag_bomb, "memory"),
+        ("log.bag", bag_bomb, "unpacks"),
         ("log.csv.gz", lambda: gzip.compress(b"time_s,x\n" + b"0,0\n" * 60_000_000, 1), "more than 5000000 samples"),
         ("wide.csv.gz", lambda: gzip.compress(b"time_s,x\n" + b"0,%b\n" % (b"0" * 1000) * 300_000, 1), "unpacks to"),
     ],

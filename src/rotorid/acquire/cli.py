@@ -29,6 +29,7 @@ from rotorid.errors import InputError
 from rotorid.io import wire
 from rotorid.io.frames import COMMAND, START, Frame, Intake, encode
 from rotorid.io.session import Ended, RoomAir, Setup
+from rotorid.io.text.writing import all_or_none
 from rotorid.io.wire import EXPERIMENTS, IDENTIFY, INSTRUMENTS
 
 _DEFAULT_OUT = Path("raw/local")
@@ -374,13 +375,16 @@ def check(
         session = read_session(session_path(log)) if session_path(log).exists() else None
         of_lines = session is not None and "description" in session.procedure
         parsed = (read_line_log if of_lines else read_log)(log)
-        repaired = not of_lines and repair(log, parsed)
+        repaired = repair(log, parsed)
     except (InputError, OSError) as error:
         _fail(str(error))
     table = parsed.table
     if of_lines:
         typer.echo(f"{log}: {len(table)} lines read, {parsed.unreadable} could not be", nl=False)
         typer.echo(f", {parsed.damaged_bytes} bytes damaged" if parsed.damaged_bytes else "")
+        for sentence in parsed.warnings:
+            typer.echo(sentence)
+        session = parsed.session
     else:
         session = parsed.session
         typer.echo(f"{log}: {parsed.instrument.title} ({parsed.start.firmware}), {len(table)} samples", nl=False)
@@ -395,12 +399,13 @@ def check(
         typer.echo(f"NOT AS RECORDED: {fault}")
     if repaired:
         typer.echo("its metadata were never finished; completed now from the log")
-    if session is not None and not of_lines:
+    if session is not None:
         typer.echo(f"ended: {session.ended} – {session.message}")
     if session is not None and session.metadata_sha256 is None and not repaired:
         typer.echo(without_checksum(1, session_path(log)))
     if csv is not None:
-        table.to_csv(csv, index=False)
+        with all_or_none(csv) as (part,):
+            table.to_csv(part, index=False)
         typer.echo(f"table: {csv}")
     if parsed.faults:
         raise typer.Exit(1)
@@ -525,6 +530,7 @@ def lines(
                 stop_asked=stop,
                 silence_s=silence_s,
                 on_row=see,
+                say=console.print,
             )
 
         view.watch([], work, stop, plots, console, [panel])

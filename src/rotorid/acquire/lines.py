@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import threading
 from collections.abc import Callable
 from contextlib import suppress
-from hashlib import file_digest
 from pathlib import Path
 
 from rotorid.acquire.recorder import Recorder
-from rotorid.acquire.transport import AcquireError, Clock, DeviceSilent, Interrupted, Transport
+from rotorid.acquire.transport import AcquireError, Clock, DeviceSilent, Refused, Transport
 from rotorid.io import rawlog, wire
-from rotorid.io.lines import Description, LineDecoder
-from rotorid.io.session import Counts, Ended, Session, Setup, write_session
+from rotorid.io.lines import Description, LineDecoder, line_counts, line_warnings
+from rotorid.io.session import Session, Setup
 
 _SILENCE_S = 60.0
+_UNREADABLE_BYTES = 4096
+"""Bytes without one line that can be read, after which a recording is given up: headings are shorter."""
 
 
 def record_lines(
@@ -30,55 +30,90 @@ def record_lines(
     stop_asked: threading.Event | None = None,
     silence_s: float = _SILENCE_S,
     on_row: Callable[[tuple[float, ...]], None] = lambda values: None,
+    say: Callable[[str], None] = lambda text: None,
 ) -> Session:
     """Record `samples` lines, or until `stop_asked`. Returns the metadata; raises AcquireError, and then, too, log and
-    metadata are there."""
-    instrument = wire.Instrument(description.name, description.name, description.baud_rate, 0, (), {})
-    procedure = {"name": "lines", "description": description.model_dump(mode="json", exclude_none=True)}
-    holder = Recorder(instrument, transport, clock, folder, name, setup, procedure=procedure)  # names, folder, log
-    holder.check_name()
-    transport.open()
-    decoder, received, failure = LineDecoder(description), 0, None
-    session = holder.session
-    session.source = "instrument"
-    try:
-        holder._create()
-        holder._note("begin", id=session.id, description=json.loads(description.model_dump_json(exclude_none=True)))
-        if description.begin:
-            holder._write(rawlog.SENT, description.begin.encode())
-            transport.write(description.begin.encode())
-        last_ns = clock.now_ns()
-        while samples is None or decoder.lines < samples:
-            if stop_asked is not None and stop_asked.is_set():
-                raise Interrupted("stopped at your wish; everything received until then is in the log")
-            data = transport.read(0.1)
-            if data:
-                last_ns = clock.now_ns()
-                holder._write(rawlog.RECEIVED, data)
-                received += len(data)
-                for values in decoder.feed(data):
-                    on_row(values)
-            elif clock.now_ns() - last_ns > silence_s * 1e9:
-                raise DeviceSilent(f"{transport.name}: no byte for {silence_s:g} s; what came before is in the log")
-    except AcquireError as error:
-        failure = error
-        raise
-    finally:
-        if holder.begun and description.end:  # whatever the end was, the instrument is stopped
-            with suppress(AcquireError):
-                transport.write(description.end.encode())
-                holder._write(rawlog.SENT, description.end.encode())
-        transport.close()
-        if holder.begun:
-            holder._writer.close()
-            session.ended = failure.ended if failure else Ended.FINISHED
-            session.message = str(failure) if failure else "all that was asked for is there"
-            session.counts = Counts(bytes_received=received, samples=decoder.lines, broken_frames=decoder.unreadable)
-            if decoder.unreadable:
-                session.warnings = [
-                    f"{decoder.unreadable} lines could not be read, the last of them {decoder.unread!r}"
-                ]
-            with open(holder.log_path, "rb") as log:
-                session.log_sha256 = file_digest(log, "sha256").hexdigest()
-            write_session(session, holder.session_path)
-    return session
+    metadata are there. `say` prints to the person at the keyboard."""
+    recorder = _LineRecorder(description, transport, clock, folder, name, setup, stop_asked, silence_s, on_row, say)
+    with recorder:
+        while samples is None or recorder.lines < samples:
+            recorder.pump()
+    return recorder.session
+
+
+class _LineRecorder(Recorder):
+    """The recorder of frames, for a device that knows no frames: it is never asked, and only `begin` and `end` are sent
+    to it."""
+
+    def __init__(
+        self, description: Description, transport, clock, folder, name, setup, stop_asked, silence_s, on_row, say
+    ) -> None:
+        self._description, self._patience_s, self._on_values = description, silence_s, on_row
+        self._stated = description.model_dump(mode="json", exclude_none=True)
+        instrument = wire.Instrument(description.name, description.name, description.baud_rate, 0, (), {})
+        procedure = {"name": "lines", "description": self._stated}
+        super().__init__(
+            instrument, transport, clock, folder, name, setup, procedure=procedure, say=say, stop_asked=stop_asked
+        )
+        self._decoder = LineDecoder(description)
+
+    @property
+    def lines(self) -> int:
+        """Lines read so far."""
+        return self._decoder.lines
+
+    def stop(self) -> None:
+        self._write_text(self._description.end)
+        self._streaming = False
+
+    def _identify(self) -> None:
+        self.session.source = "instrument"
+        self._note("description", description=self._stated)
+        self.begin_stream()
+        self._write_text(self._description.begin)
+
+    def _write_text(self, text: str) -> None:
+        if text:
+            self._write(rawlog.SENT, text.encode())
+            self._transport.write(text.encode())
+
+    def _send(self, letter: str, arguments: bytes) -> None:
+        """Whatever the end was, the instrument is stopped: the only command that is sent unasked."""
+        with suppress(AcquireError):
+            self._write_text(self._description.end)
+
+    def _absorb(self, data: bytes, now_ns: int) -> None:
+        self._bytes += len(data)
+        self._last_sample_ns = now_ns
+        for values in self._decoder.feed(data):
+            self._on_values(values)
+        if not self._decoder.lines and self._bytes >= _UNREADABLE_BYTES and not self._closing:
+            raise Refused(self._warnings()[0] + ". What came is in the log.")
+
+    def _overhear(self, data: bytes) -> None:
+        """Nothing is waited for behind a full disk."""
+
+    def _silence_s(self) -> float:
+        return self._patience_s
+
+    def _after_silence(self) -> None:
+        raise DeviceSilent(
+            f"{self._transport.name}: no byte for {self._patience_s:g} s; what came before is in the log"
+        )
+
+    def _after_restart(self) -> None:
+        self._restarted = False
+        self._write_text(self._description.begin)
+
+    def _warnings(self) -> list[str]:
+        decoder = self._decoder
+        return line_warnings(
+            self._description, self._bytes, decoder.lines, decoder.unreadable, decoder.unread, self._port_losses
+        )
+
+    def _fill_session(self) -> None:
+        decoder = self._decoder
+        self.session.counts = line_counts(self._bytes, decoder.lines, decoder.unreadable, self._port_losses)
+        self.session.warnings = self._warnings()
+        for warning in self.session.warnings:
+            self.say(f"note: {warning}")

@@ -11,6 +11,7 @@ import errno
 import json
 import os
 import re
+import tempfile
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
@@ -227,6 +228,8 @@ class Recorder:
             self.session.ended, self.session.message = _how(error)
             self.phase = str(self.session.ended)
             self._fill_session()
+            with open(self.log_path, "rb") as log:
+                self.session.log_sha256 = file_digest(log, "sha256").hexdigest()
             try:
                 write_session(self.session, self.session_path)
             except OSError as late:
@@ -692,8 +695,6 @@ class Recorder:
             if host_s > 4 * self._timings.poll_s / _RATE_TOLERANCE:
                 session.device_clock_ratio = round(device_s / host_s, 6)
         session.warnings = list(_warnings(session))
-        with open(self.log_path, "rb") as log:
-            session.log_sha256 = file_digest(log, "sha256").hexdigest()
 
 
 def _source(identity: wire.StartRecord, port: str) -> str:
@@ -802,9 +803,9 @@ class LogWriter:
             # Never with a name, however early this program is killed.
             self._ballast = os.open(self.path.parent, os.O_WRONLY | os.O_TMPFILE, 0o600)
         except (AttributeError, OSError):  # not every system, nor every file system, has such files
-            path = self.path.with_name(self.path.name + ".ballast")
-            self._ballast = os.open(path, os.O_WRONLY | os.O_CREAT, 0o600)
-            path.unlink()
+            # A new file that nobody can have laid a link for.
+            self._ballast, path = tempfile.mkstemp(".ballast", f"{self.path.name}.", self.path.parent)
+            os.unlink(path)
         data = bytes(_BALLAST_BYTES)
         while data:
             data = data[os.write(self._ballast, data) :]

@@ -430,22 +430,26 @@ def repair(log: Path, parsed: Log) -> bool:
         return False
     table = parsed.table
     raw = read_raw(log)
-    received = sum(len(chunk.data) for chunk in raw.chunks if chunk.tag == RECEIVED)
-    session.counts = Counts(
-        bytes_received=received,
-        samples=len(table),
-        missing=parsed.missing,
-        repeated=parsed.repeated,
-        checksum_errors=parsed.checksum_errors,
-        broken_frames=parsed.broken_frames,
-        resets=parsed.resets,
-        malformed=parsed.malformed or None,
-        unknown_kinds=parsed.unknown_kinds or None,
-    )
+    if isinstance(parsed, Log):
+        received = sum(len(chunk.data) for chunk in raw.chunks if chunk.tag == RECEIVED)
+        session.counts = Counts(
+            bytes_received=received,
+            samples=len(table),
+            missing=parsed.missing,
+            repeated=parsed.repeated,
+            checksum_errors=parsed.checksum_errors,
+            broken_frames=parsed.broken_frames,
+            resets=parsed.resets,
+            malformed=parsed.malformed or None,
+            unknown_kinds=parsed.unknown_kinds or None,
+        )
+        session.gaps = parsed.gaps[:1000]
+        session.gaps_left_out = max(0, len(parsed.gaps) - 1000)
+        time_s = table.time_s
+    else:
+        session.counts, session.warnings, time_s = parsed.counts, parsed.warnings, table.host_time_s
     if not parsed.faults:  # from now on a change of the log is noticed
         session.log_sha256 = raw.sha256
-    session.gaps = parsed.gaps[:1000]
-    session.gaps_left_out = max(0, len(parsed.gaps) - 1000)
-    session.duration_s = round(float(table.time_s.iloc[-1]), 6) if len(table) else 0.0
+    session.duration_s = round(float(time_s.iloc[-1]), 6) if len(table) else 0.0
     write_session(session, session_path(log))
     return True

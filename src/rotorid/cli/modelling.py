@@ -20,7 +20,7 @@ import typer
 from rotorid.cli.console import one_sentence, progress
 from rotorid.cli.sets import Like, MappingFile, MassKg, VehicleFile, name_of, set_of
 from rotorid.errors import InputError
-from rotorid.io.text.writing import write_texts
+from rotorid.io.text.writing import copy_together, staging, write_texts
 from rotorid.steps import step
 
 if TYPE_CHECKING:
@@ -70,39 +70,40 @@ def model(
 
 def _write_model(folder: Path, target: Path, to: str, quiet: bool = True) -> tuple[list[Path], list[str]]:
     """Judge the set in `folder`, write verdict, export and comparison into `target`; the files, and what to say."""
-    with progress("model", quiet), warnings.catch_warnings():
+    with progress("model", quiet), warnings.catch_warnings(), staging(target / "model") as aside:
         warnings.simplefilter("ignore")
         from rotorid.recordings import read_set
 
         recordings = read_set(folder)
         from rotorid.recordings import read_vehicle
-        from rotorid.report.deliver import analysis_of, write_files
+        from rotorid.report.deliver import FILES, OTHERS, analysis_of, write_files
         from rotorid.report.next_to_log import next_to_log
         from rotorid.vehicle.exports import export_vehicle
         from rotorid.vehicle.exports.autopilots import gazebo_airframe
 
         analysis = analysis_of(recordings)
-        files = [target / n for n in ("verdict.json", "report.html", "improved_vehicle.yaml")]
-        verdict = write_files(analysis, *files)
-        improved = read_vehicle(files[2])
+        verdict = write_files(analysis, *(aside / name for name in FILES[:3]))
+        improved = read_vehicle(aside / FILES[2])
         exported = gazebo_airframe(improved) if to == "sdf" else export_vehicle(improved, to)
         texts = {exported.file_name: exported.text, **exported.companions}
-        written = [target / name for name in texts]
-        write_texts(dict(zip(written, texts.values(), strict=True)))
+        write_texts({aside / name: text for name, text in texts.items()})
+        written = list(texts)
         said = [verdict.sentence, *(f"! {doubt.sentence}" for doubt in verdict.doubts)]
         said += [f"  - not expressed: {sentence}" for sentence in exported.left_out]
         try:
             with step("flying it next to the log"):
                 found = next_to_log(analysis, to, exported)
+            written += _comparison(found, aside)
+            first, *rest = found.sentences()
+            said += [first, *(f"  - {sentence}" for sentence in rest)]
         except InputError as error:
-            return written, [*said, f"not flown next to the log: {error}"]
-        written += _comparison(found, target)
-        first, *rest = found.sentences()
-        return written, [*said, first, *(f"  - {sentence}" for sentence in rest)]
+            said.append(f"not flown next to the log: {error}")
+        copy_together(aside, target, FILES[0], OTHERS)
+        return [target / name for name in written], said
 
 
-def _comparison(found, target: Path) -> list[Path]:
-    """Write `next_to_log.csv` (a row a model and channel) and `next_to_log.png`."""
+def _comparison(found, folder: Path) -> tuple[str, str]:
+    """Write `next_to_log.csv` (a row a model and channel) and `next_to_log.png`; returns their names."""
     import pandas as pd
 
     from rotorid.mismatch.deliver.flown import UNITS
@@ -113,10 +114,11 @@ def _comparison(found, target: Path) -> list[Path]:
         for model, channels in found.errors.items()
         for channel in channels
     ]
-    table, figure = target / "next_to_log.csv", target / "next_to_log.png"
-    pd.DataFrame(rows, columns=["model", "channel", "rms_error", "unit", "windows"]).to_csv(table, index=False)
-    draw(found, figure)
-    return [table, figure]
+    names = "next_to_log.csv", "next_to_log.png"
+    columns = ["model", "channel", "rms_error", "unit", "windows"]
+    pd.DataFrame(rows, columns=columns).to_csv(folder / names[0], index=False)
+    draw(found, folder / names[1])
+    return names
 
 
 def simulate(

@@ -18,6 +18,7 @@ import typer
 from rotorid.cli.console import INTERRUPTED, one_sentence
 from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
+from rotorid.io.text.writing import write_texts
 
 if TYPE_CHECKING:
     from rotorid.recordings.importers.logfile import SetOfLogs
@@ -105,7 +106,7 @@ def _write_mapping(logs: list[Path], target: Path, as_json: bool) -> None:
     if format_of(logs[0]) not in ("csv", "parquet"):
         raise InputError(f"{logs[0]}: its columns are known, no mapping is needed")
     found = guess(read_columns(logs[0]))
-    target.write_text(as_text(found, logs[0].name), encoding="utf-8")
+    write_texts({target: as_text(found, logs[0].name)})
     channels = found.mapping.channels
     if as_json:
         said = {
@@ -254,8 +255,7 @@ def init(
             text = re.sub(r"(?m)^name:.*$", lambda _: f"name: {as_yaml(name)}", text)
         # What is written must be read again: a mass beyond the contract's bounds is refused here, not by `check`.
         vehicle_of(parse_yaml(text, str(path)), str(path))
-        folder.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
+        write_texts({path: text})
         typer.echo(
             f"{path}: written from template {like}. Put runs (CSV or Parquet, columns as in the recording contract) "
             f"next to it, then `rotorid check {folder}`"

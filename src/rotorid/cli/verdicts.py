@@ -236,12 +236,13 @@ def compare(
 
             found = changes_between(good, second, seen=seen)
         text = json.dumps(words.as_json(found), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-        if out is not None:
-            write_texts({out: text})
+        texts = {} if out is None else {out: text}
         if page is not None:
             from rotorid.report.page import make_changes_page
 
-            write_texts({page: make_changes_page(found)})
+            texts[page] = make_changes_page(found)
+        if texts:
+            write_texts(texts)
         if as_json:
             typer.echo(text, nl=False)
         else:

@@ -1,4 +1,4 @@
-"""A low-pass of the amplifier, common to all channels."""
+"""A low-pass of the amplifier, or a mean over the last readings, common to all channels."""
 
 import numpy as np
 from scipy.signal import bessel, lfilter, sosfilt
@@ -41,6 +41,19 @@ def _fourth_order(loading, vehicle, values):
     return Contribution(reading=sosfilt(sos, unsmoothed(load), axis=0) - load)
 
 
+def _moving_mean(loading, vehicle, values):
+    """Mean of the readings of the last T seconds, as programs that average return it; a part of one counts in part."""
+    load = since_the_first(loading)
+    count = max(values[0] / loading.dt_s, 1.0)
+    plain = unsmoothed(load)
+    total, at = np.cumsum(plain, axis=0), np.arange(len(plain))
+    before = np.stack([np.interp(at - count, at, t, left=0.0) for t in total.T], axis=1)
+    # Between rest and the first reading the sum grows as between any two.
+    early = (at - count > -1.0) & (at < count)
+    before[early] = (at[early] - count + 1.0)[:, None] * plain[0]
+    return Contribution(reading=(total - before) / count - load)
+
+
 def reading_forms(instrument):
     lowest, highest = 1.0 / max(instrument.duration_s, 1.0), 0.4 * instrument.rate_hz
     starts = tuple(f for f in (0.3, 0.8, 2.0, 5.0, 12.0, 30.0) if 3 * lowest < f < highest)
@@ -57,7 +70,18 @@ def reading_forms(instrument):
         Form("first order", "y = F / (1 + i f/f_c)", (cutoff(first),), _first_order),
         Form("second order", "|y| = |F| / √(1 + (f/f_c)⁴)", (cutoff(second),), _second_order),
         Form("fourth order", "y = F / B₄(i f/f_c), B₄ the reverse Bessel polynomial", (cutoff(second),), _fourth_order),
+        *_means(instrument),
     )
+
+
+def _means(instrument):
+    """The moving mean over T, where it may be as long as is late by two samples."""
+    shortest, longest = 5.0 / instrument.rate_hz, 0.2 * instrument.duration_s
+    starts = tuple(t for t in (0.1, 0.25, 0.6, 1.5, 4.0) if shortest < t < longest)
+    if not starts:
+        return ()
+    length = Parameter("T", "s", shortest, longest, nonlinear=True, starts=starts, meaning="length of the mean")
+    return (Form("moving mean", "y = (1/T) ∫ F over the last T", (length,), _moving_mean),)
 
 
 EFFECT = Effect(

@@ -27,6 +27,7 @@ from scipy.signal import lfilter
 
 from rotorid.errors import InputError
 from rotorid.identify.correlated import EstimatedNumber, Stretch, fit, stretches_of
+from rotorid.io.text.wording import printable
 from rotorid.recordings import RecordingSet
 
 _WIDEST_SHARE = 0.5
@@ -506,7 +507,7 @@ def as_text(found: Sequence[AutopilotParameter], to: str) -> str:
     for p in found:
         low, high = p.interval_95
         shown = f"{p.value:.{p.decimals}f} [{low:.{p.decimals}f}, {high:.{p.decimals}f}] {p.unit}".rstrip()
-        lines.append(f"# {p.name} = {shown}: {p.sentence}")
+        lines.append(f"# {p.name} = {shown}: {printable(p.sentence)}")
         if p.to_set is None:
             continue
         value = f"{p.to_set:.{p.decimals}f}"

@@ -11,7 +11,6 @@ numpy's cost of small arrays.
 from __future__ import annotations
 
 import logging
-import os
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -25,6 +24,7 @@ from numba import njit
 from rotorid.errors import InputError
 from rotorid.io.text.files import LARGEST_CHECKPOINT, check_file
 from rotorid.io.text.wording import printable
+from rotorid.io.text.writing import all_or_none
 
 _CODES = {"linear": 0, "sigmoid": 1}
 _LOGGER = logging.getLogger("rotorid.identify.networks")
@@ -197,10 +197,8 @@ def _groups(training: Training, epoch: int, count: int) -> list:
 def _store(path: Path, epoch: int, weights, biases, history) -> None:
     arrays = {f"w{i}": w for i, w in enumerate(weights)}
     arrays |= {f"b{i}": b for i, b in enumerate(biases) if b is not None}
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_suffix(".part.npz")
-    np.savez(part, epoch=epoch, history=history, **arrays)
-    os.replace(part, path)
+    with all_or_none(path) as (part,), part.open("wb") as file:
+        np.savez(file, epoch=epoch, history=history, **arrays)
 
 
 def _restore(path: Path, weights, biases, history) -> int:

@@ -25,8 +25,8 @@ from pydantic import Field, ValidationError, model_validator
 from rotorid.errors import InputError
 from rotorid.io.logs import faults_of, same_recording
 from rotorid.io.models import KnownKeys, Number, read_model
-from rotorid.io.rawlog import RECEIVED, Damage, read_raw
-from rotorid.io.session import read_session, session_path
+from rotorid.io.rawlog import NOTE, RECEIVED, Damage, read_raw
+from rotorid.io.session import Counts, Session, read_session, session_path
 from rotorid.io.text.wording import explain
 
 _MAX_LINE = 4096
@@ -112,9 +112,11 @@ class LineDecoder:
         self._pending = b""
         self._broken = False
 
-    def break_off(self) -> None:
-        """Bytes are missing here: what was begun is no line, nor is what comes up to the next end of one."""
-        self._pending, self._broken = b"", True
+    def break_off(self, within: bool = False) -> None:
+        """Bytes are missing here: what was begun is no line, nor, `within` a stream, what comes up to the next end of
+        one. After a port was away it begins as at first, with the line that comes."""
+        self.unreadable += bool(self._pending.strip()) and not within
+        self._pending, self._broken = b"", within
 
     def feed(self, data: bytes) -> list[tuple[float, ...]]:
         """Values of the lines that these bytes complete."""
@@ -138,6 +140,27 @@ class LineDecoder:
         return found
 
 
+def line_counts(received: int, lines: int, unreadable: int, port_losses: int) -> Counts:
+    """What the metadata of a log of lines count."""
+    return Counts(bytes_received=received, samples=lines, broken_frames=unreadable, port_losses=port_losses)
+
+
+def line_warnings(
+    description: Description, received: int, lines: int, unreadable: int, unread: str, port_losses: int
+) -> list[str]:
+    """One sentence for each thing a person should look at."""
+    last = f", the last of them {unread!r}" if unread else ""
+    asked = f"is the baud rate right ({description.baud_rate}), and does the description fit?"
+    found = []
+    if received and not lines:
+        found.append(f"not one line of {received} bytes could be read{last}: {asked}")
+    elif unreadable:
+        found.append(f"{unreadable} lines could not be read{last}" + (f": {asked}" if unreadable > lines else ""))
+    if port_losses:
+        found.append(f"the port went away {port_losses} times; lines are missing there, and nothing counts them")
+    return found
+
+
 @dataclass(frozen=True)
 class _LineLog:
     """`table`: `host_time_s` (when the line's end was read, from the beginning of the log), `index` and the columns.
@@ -147,6 +170,9 @@ class _LineLog:
     unreadable: int
     cut_at: int | None
     damaged_bytes: int
+    session: Session | None
+    counts: Counts
+    warnings: list[str]
     faults: tuple[str, ...] = ()
 
 
@@ -165,14 +191,21 @@ def read_line_log(path: Path, description: Description | None = None) -> _LineLo
             description = Description.model_validate(stored)
         except ValidationError as error:
             raise InputError(f"{beside}: procedure.description." + explain(error, Description)) from None
-    raw, decoder, rows = read_raw(path), LineDecoder(description), []
+    raw, decoder, rows, received, losses = read_raw(path), LineDecoder(description), [], 0, 0
     same_recording(path, raw, session)
     for piece in raw.pieces():
         if isinstance(piece, Damage):  # a line has no checksum of its own: nothing of a damaged chunk is taken
+            decoder.break_off(within=True)
+        elif piece.tag == NOTE and b'"note":"port_lost"' in piece.data:
+            losses += 1
             decoder.break_off()
         elif piece.tag == RECEIVED:
+            received += len(piece.data)
             host_s = (piece.host_ns - raw.chunks[0].host_ns) / 1e9
             rows += [(host_s, *values) for values in decoder.feed(piece.data)]
     table = pd.DataFrame(rows, columns=["host_time_s", *description.columns])
     table.insert(1, "index", range(len(table)))
-    return _LineLog(table, decoder.unreadable, raw.cut_at, raw.lost_bytes, tuple(faults_of(raw, session)))
+    counts = line_counts(received, decoder.lines, decoder.unreadable, losses)
+    warnings = line_warnings(description, received, decoder.lines, decoder.unreadable, decoder.unread, losses)
+    faults = tuple(faults_of(raw, session))
+    return _LineLog(table, decoder.unreadable, raw.cut_at, raw.lost_bytes, session, counts, warnings, faults)

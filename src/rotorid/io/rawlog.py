@@ -56,9 +56,9 @@ class Damage(NamedTuple):
 
 @dataclass(frozen=True)
 class RawLog:
-    """All intact chunks. `cut_at` is the byte (of the unpacked file) behind which nothing is intact, None for a
-    log that goes to its end; `damages` are the places before that where bytes were changed; `sha256` is that of
-    the unpacked file as it is."""
+    """All intact chunks. `cut_at` is the byte (of the unpacked file) where it stops in the middle of a chunk, None
+    for a log that goes to its end; `damages` are the places where bytes were changed; `sha256` is that of the unpacked
+    file as it is."""
 
     chunks: tuple[_Chunk, ...]
     cut_at: int | None
@@ -77,6 +77,7 @@ class RawLog:
             while damages and damages[0].after <= number:
                 yield damages.pop(0)
             yield chunk
+        yield from damages
 
 
 def pack_chunk(tag: int, host_ns: int, data: bytes) -> bytes:
@@ -109,6 +110,10 @@ def read_raw(path: str | Path) -> RawLog:
         chunks.append(chunk)
         position = end
     cut = position if truncated or position < len(data) else None
+    if cut is not None and not truncated and not _is_cut(data[position:]):
+        last = _rescued(data, position, len(data), chunks, None)
+        damages.append(Damage(position, len(data), len(chunks), last))
+        cut = None
     return RawLog(tuple(chunks), cut, tuple(damages), digest)
 
 
@@ -150,8 +155,19 @@ def _walk(data: bytes, position: int) -> Iterator[tuple[_Chunk, int, int]]:
         position += 1
 
 
-def _rescued(data: bytes, start: int, stop: int, before: list[_Chunk], following: _Chunk) -> _Chunk | None:
-    """The content of one damaged chunk of received bytes whose length still leads to the next chunk."""
+def _is_cut(rest: bytes) -> bool:
+    """Whether these last bytes can be the beginning of a chunk, or zeros that a power cut left; else bits changed."""
+    if not rest.strip(b"\0"):
+        return True
+    if _TAG.match(rest) is None:
+        return False
+    if len(rest) < _CHUNK_HEAD.size:
+        return True
+    return _CHUNK_HEAD.size + _CHUNK_HEAD.unpack_from(rest)[2] + _CHUNK_TAIL.size > len(rest)
+
+
+def _rescued(data: bytes, start: int, stop: int, before: list[_Chunk], following: _Chunk | None) -> _Chunk | None:
+    """The content of one damaged chunk of received bytes whose length still leads to the next chunk, or the end."""
     if stop - start < _CHUNK_HEAD.size + _CHUNK_TAIL.size:
         return None
     tag, host_ns, length = _CHUNK_HEAD.unpack_from(data, start)
@@ -159,4 +175,4 @@ def _rescued(data: bytes, start: int, stop: int, before: list[_Chunk], following
         return None
     earliest = before[-1].host_ns if before else 0
     content = data[start + _CHUNK_HEAD.size : stop - _CHUNK_TAIL.size]
-    return _Chunk(tag, min(max(host_ns, earliest), following.host_ns), content)
+    return _Chunk(tag, min(max(host_ns, earliest), following.host_ns if following else 2**64 - 1), content)

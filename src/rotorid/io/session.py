@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import csv
 import io
-import os
 import re
 from datetime import datetime
 from enum import StrEnum
@@ -27,6 +26,7 @@ from rotorid.io import metadata_checksum
 from rotorid.io.models import KnownKeys, Number, Whole, read_model
 from rotorid.io.text.files import LARGEST_INDEX, LARGEST_METADATA, MOST_METADATA_VALUES, check_text, read_bytes
 from rotorid.io.text.wording import hint, listed
+from rotorid.io.text.writing import all_or_none
 
 INDEX_COLUMNS = (
     "id group kind instrument platform axis load_gf cell experiment mount_roll_deg mount_pitch_deg throttle "
@@ -211,16 +211,8 @@ def write_session(session: Session, path: str | Path) -> None:
 
 def _replace_bytes(path: Path, data: bytes) -> None:
     """Put a whole new content in the place of a file, or leave it as it is. Raises OSError."""
-    temporary = path.with_name(path.name + ".tmp")
-    try:
-        with open(temporary, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except OSError:
-        temporary.unlink(missing_ok=True)
-        raise
+    with all_or_none(path) as (part,):
+        part.write_bytes(data)
 
 
 def read_session(path: str | Path) -> Session:
@@ -315,9 +307,12 @@ def renew_checksum(path: Path) -> bool:
 
 
 def metadata_files(raw: Path) -> list[Path]:
-    """Metadata of the recordings below `raw`, those in `raw/local` left out."""
+    """Metadata of the recordings below `raw`; those in `raw/local`, and what is half written, left out."""
+    found = ((path, path.relative_to(raw).parts) for path in sorted(raw.rglob("*.yaml")))
     return [
-        path for path in sorted(raw.rglob("*.yaml")) if path.relative_to(raw).parts[0] != _LOCAL and _is_session(path)
+        path
+        for path, parts in found
+        if parts[0] != _LOCAL and not any(part.startswith(".") for part in parts[:-1]) and _is_session(path)
     ]
 
 

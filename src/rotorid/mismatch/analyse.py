@@ -92,7 +92,8 @@ def analyse(recordings: RecordingSet, watch: Watch = unwatched) -> Analysis:
         analysis = _analysed(replace(recordings, runs=tuple(left), held_out=None), mistakes, remarks, watch)
     if analysis is None:
         raise InputError(
-            f"set {recordings.name}: no run can be held out with every column that the others are fitted by"
+            f"set {recordings.name}: in no run that can be held out is there a stretch of flight with readings of "
+            "every sensor that the others are fitted by"
         )
     return analysis
 

@@ -21,7 +21,7 @@ from pydantic import ValidationError
 from rotorid.errors import InputError
 from rotorid.io.text.files import MOST_CELLS, MOST_RUNS, check_file, read_text, read_yaml, with_exponents
 from rotorid.io.text.wording import explain, hint, listed, neighbour, printable
-from rotorid.io.text.writing import staging, take_name, write_texts
+from rotorid.io.text.writing import only_writer, staging, take_name, take_place, write_texts
 from rotorid.recordings import columns as c
 from rotorid.recordings.run import Doubt, RecordingSet, Run
 from rotorid.recordings.tables import (
@@ -234,7 +234,9 @@ def write_set(recordings: RecordingSet, parent: Path, suffix: str = "") -> Path:
     suffix = suffix or (".parquet" if parquet_is_here() else ".csv.gz")
     folder = Path(parent) / recordings.name
     if folder.is_dir():
-        _write_files(recordings, folder, suffix)
+        with staging(folder / "set") as part, only_writer(folder):
+            for path in _write_files(recordings, part, suffix):
+                take_place(path, folder / path.name)
     else:
         with staging(folder) as part:
             _write_files(recordings, part, suffix)
@@ -242,12 +244,16 @@ def write_set(recordings: RecordingSet, parent: Path, suffix: str = "") -> Path:
     return folder
 
 
-def _write_files(recordings: RecordingSet, folder: Path, suffix: str) -> None:
-    write_vehicle(recordings.vehicle, folder / VEHICLE)
-    for run in recordings.runs:
-        write_table(run.table, folder / f"{run.name}{suffix}")
+def _write_files(recordings: RecordingSet, folder: Path, suffix: str) -> list[Path]:
+    """Write the files of a set; returns them."""
+    written = [folder / VEHICLE, *(folder / f"{run.name}{suffix}" for run in recordings.runs)]
+    write_vehicle(recordings.vehicle, written[0])
+    for run, path in zip(recordings.runs, written[1:], strict=True):
+        write_table(run.table, path)
     if recordings.held_out is not None:
-        (folder / _SPLIT).write_text(yaml.safe_dump({"held_out": list(recordings.held_out)}), encoding="utf-8")
+        written.append(folder / _SPLIT)
+        written[-1].write_text(yaml.safe_dump({"held_out": list(recordings.held_out)}), encoding="utf-8")
+    return written
 
 
 def list_sets(parent: Path) -> list[str]:

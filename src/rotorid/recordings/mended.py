@@ -318,7 +318,8 @@ def _spline(time_s: np.ndarray, values: np.ndarray, period_s: float) -> BSpline:
     """The cubic least-squares spline through readings (n,) whose knots are a period apart."""
     count = int(np.ceil((time_s[-1] - time_s[0]) / period_s)) + 1
     knots = time_s[0] + period_s * np.arange(-_CUBIC, count + _CUBIC)
-    design = BSpline.design_matrix(time_s, knots, _CUBIC)
+    # A whole number of periods may end, by rounding, a hair before the last reading.
+    design = BSpline.design_matrix(np.minimum(time_s, knots[-_CUBIC - 1]), knots, _CUBIC)
     size = design.shape[1]
     difference = eye_array(size, format="csr")
     for n in range(_CUBIC):

@@ -7,7 +7,7 @@ What a verdict then rests on: time in the air, share of the recordings on the gr
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -81,8 +81,7 @@ def sufficient(recordings: RecordingSet) -> RecordingSet:
         # A bench compares readings with known loads: rotors that are listed but not recorded play no part.
         without = {"rotors": (), "thrust_coefficient_n_s2": None, "torque_coefficient_n_m_s2": None}
         recordings = replace(recordings, vehicle=vehicle.model_copy(update=without))
-    recordings = without_jumps(_without_dead_sensors(with_sizes_of_speeds(recordings)))
-    recordings = on_own_rates(without_spikes(recordings))
+    recordings = mended(recordings)
     for run in recordings.runs:
         _check_spelling(run, recordings.vehicle)
     usable, reasons = [], []
@@ -104,23 +103,46 @@ def sufficient(recordings: RecordingSet) -> RecordingSet:
     return _with_split_of_the_rest(kept)
 
 
-def _without_dead_sensors(recordings: RecordingSet) -> RecordingSet:
-    """The flights without sensors that hold one value throughout every run: nothing was read from them."""
+def mended(recordings: RecordingSet, dead: Iterable[tuple[str, ...]] = ()) -> RecordingSet:
+    """The set with what logs do to readings mended, as every command that looks at them needs it; what was done stands
+    in `left_out`. Sensors that are `dead` elsewhere are left out as well."""
+    known = _without_dead_sensors(with_sizes_of_speeds(recordings), dead)
+    return on_own_rates(without_spikes(without_jumps(known)))
+
+
+def mended_alike(sets: Sequence[RecordingSet]) -> tuple[RecordingSet, ...]:
+    """Sets that are to be compared, mended, with the same sensors: one that is dead in a set shows no change."""
+    dead = [names for own in sets for names in dead_sensors(own)]
+    return tuple(mended(own, dict.fromkeys(dead)) for own in sets)
+
+
+def dead_sensors(recordings: RecordingSet) -> list[tuple[str, ...]]:
+    """Sensors of flights that hold one value throughout every run: nothing was read from them."""
     if recordings.vehicle.kind != "flight":
-        return recordings
+        return []
     dead = [names for names in SENSORS if _holds_one_value(recordings.runs, names)]
     speeds, *ordered = rotor_groups(recordings.vehicle).values()
     turn = any(run.has(*speeds) and np.nanmax(run.array(speeds)) > 0 for run in recordings.runs)
     dead += [names for names in ordered if turn and _holds_one_value(recordings.runs, names, 0.0)]
     if c.QUATERNION in dead and any(_no_attitude(run, recordings.vehicle) for run in recordings.runs):
         dead.remove(c.QUATERNION)
-    if not dead:
+    return dead
+
+
+def _without_dead_sensors(recordings: RecordingSet, elsewhere: Iterable[tuple[str, ...]]) -> RecordingSet:
+    """The flights without their dead sensors, and those that are dead in sets that they are compared with."""
+    own = dead_sensors(recordings)
+    others = [names for names in elsewhere if names not in own and any(run.has(names[0]) for run in recordings.runs)]
+    if not own and not others:
         return recordings
-    gone = [name for names in dead for name in names]
+    gone = [name for names in (*own, *others) for name in names]
     kept = (replace(r, table=r.table.drop(columns=[n for n in gone if n in r.table])) for r in recordings.runs)
-    said = tuple(
-        f"Left out: {names[0]} to {names[-1]} hold one value in every run, so nothing was read from that sensor."
-        for names in dead
+    said = (
+        *(
+            f"Left out: {names[0]} to {names[-1]} hold one value in every run, so nothing was read from that sensor."
+            for names in own
+        ),
+        *(f"Left out: {names[0]} to {names[-1]}, which hold one value in another set." for names in others),
     )
     return replace(recordings, runs=tuple(kept), left_out=(*recordings.left_out, *said))
 
@@ -423,9 +445,20 @@ _LOOKS: tuple[Callable[[Run, Vehicle], str | None], ...] = (
 
 
 def _check_not_constant(recordings: RecordingSet) -> None:
-    """InputError where a stand or bench reads one value, and its load is one value, throughout every run."""
+    """InputError where a stand or bench reads one value, and its load is one value, throughout every run; of flights
+    where every rotor's command does."""
     vehicle, runs = recordings.vehicle, recordings.runs
     if vehicle.kind == "flight":
+        names = driven_by(runs[0], vehicle)
+        ordered = names in list(rotor_groups(vehicle).values())[1:]
+        if ordered and all(driven_by(run, vehicle) == names for run in runs) and _holds_one_value(runs, names):
+            held = np.nanmax(runs[0].array(names), axis=0)
+            found = listed([f"{n} = {v:g}" for n, v in zip(names, held, strict=True)], most=6)
+            raise InputError(
+                f"{recordings.path or recordings.name}: nothing can be compared: the rotors' commands hold one value "
+                f"in every run ({found}), expected the changes that keep a vehicle in the air; leave them out where "
+                "nothing was recorded"
+            )
         return
     read = list(dict.fromkeys(name for run in runs for name in compared_readings(run, vehicle)))
     values = {name: np.concatenate([run.column(name) for run in runs]) for name in read}

@@ -145,10 +145,10 @@ class Vehicle(KnownKeys, frozen=True, allow_inf_nan=False):
     @model_validator(mode="after")
     def _complete(self) -> Vehicle:
         if self.kind == "flight":
-            missing = [key for key in _FLIGHT_NEEDS if not getattr(self, key)]
+            missing = [key for key in _FLIGHT_NEEDS if getattr(self, key) in (None, ())]
             if missing:
                 raise ValueError(f"kind flight needs {', '.join(missing)}")
-        if self.kind == "stand" and not (self.rotors and self.thrust_coefficient_n_s2):
+        if self.kind == "stand" and (not self.rotors or self.thrust_coefficient_n_s2 is None):
             raise ValueError("kind stand needs rotors and thrust_coefficient_n_s2")
         count = len(self.rotors)
         for key in ("thrust_coefficient_n_s2", "torque_coefficient_n_m_s2"):

@@ -18,7 +18,7 @@ import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from rotorid.io.text.files import parse_yaml
-from rotorid.io.text.writing import all_or_none, rounded
+from rotorid.io.text.writing import all_or_none, rounded, write_texts
 from rotorid.mismatch.analyse import analyse
 from rotorid.mismatch.decide import rules
 from rotorid.mismatch.decide.findings import Analysis, Finding
@@ -276,11 +276,8 @@ class Result:
 
     def save(self, folder: str | Path) -> Path:
         """Write `verdict.json`, `report.html`, the vehicle and whatever else there is; returns the page's path."""
-        folder = Path(folder)
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, text in self.files.items():
-            (folder / name).write_text(text, encoding="utf-8")
-        return folder / "report.html"
+        write_texts({Path(folder) / name: text for name, text in self.files.items()})
+        return Path(folder) / "report.html"
 
     def __repr__(self) -> str:
         return f"<rotorid verdict on {self.verdict.set}: {self.word}. {self.sentence}>"

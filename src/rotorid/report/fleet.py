@@ -12,9 +12,7 @@ from __future__ import annotations
 import hashlib
 import json
 import multiprocessing
-import os
 import re
-import shutil
 import sys
 import tempfile
 import time
@@ -28,6 +26,7 @@ import pandas as pd
 from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
 from rotorid.io.text.files import read_yaml
+from rotorid.io.text.writing import copy_together, only_writer, staging, take_name
 from rotorid.mismatch.changes.level_one import (
     FALSE_ALARMS,
     Difference,
@@ -42,7 +41,7 @@ from rotorid.mismatch.changes.quantities import Flown, flown, grid_of
 from rotorid.mismatch.changes.words import difference_words, in_unit_of_words, quantity_words, unit_of
 from rotorid.recordings import RecordingSet, read_set
 from rotorid.recordings.templates import read
-from rotorid.report.deliver import FILES, deliver
+from rotorid.report.deliver import FILES, OTHERS, deliver
 from rotorid.report.page import drawing, filled
 from rotorid.vehicle.control import swings
 
@@ -75,7 +74,7 @@ def judge_sets(
     for folder, known in places.items():
         start = time.monotonic()
         if known.is_dir():
-            shutil.copytree(known, out / folder.name, dirs_exist_ok=True)
+            _hand_over(known, out / folder.name)
         else:
             _judge_apart(folder, known, out / folder.name)
         failed = " (failed)" if (out / folder.name / FAILED).is_file() else ""
@@ -103,12 +102,7 @@ def _load() -> None:
 
 def _judge_apart(folder: Path, known: Path, out: Path) -> None:
     """Judge a set in a process of its own; results appear as the folder `known`, whole or not at all, and in `out`."""
-    part = known.with_name(f".{known.name}.{os.getpid()}.part")
-    # Nobody else judges this set: what lies here was left by a process that was killed.
-    for left in known.parent.glob(f".{known.name}.*.part"):
-        shutil.rmtree(left, ignore_errors=True)
-    part.mkdir(parents=True)
-    try:
+    with staging(known) as part:
         context = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
         process = context.Process(target=_judge_one, args=(folder, part))
         process.start()
@@ -117,11 +111,17 @@ def _judge_apart(folder: Path, known: Path, out: Path) -> None:
             raise OSError(f"{folder.name}: {(part / FAILED).read_text(encoding='utf-8')}")
         if process.exitcode not in (0, _UNREADABLE):
             _write_failure(part, f"its process ended by signal or exit code {process.exitcode}", fault=True)
-        shutil.copytree(part, out, dirs_exist_ok=True)
-        if process.exitcode == 0 and not known.is_dir():
-            os.replace(part, known)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
+        _hand_over(part, out)
+        # Another batch may have judged the same set meanwhile.
+        with only_writer(known.parent):
+            if process.exitcode == 0 and not known.is_dir():
+                take_name(part, known)
+
+
+def _hand_over(judged: Path, out: Path) -> None:
+    """Copy the files of a judged set, or why there are none."""
+    first = FILES[0] if (judged / FILES[0]).is_file() else FAILED
+    copy_together(judged, out, first, (*FILES, *OTHERS, FAILED))
 
 
 _DISK, _UNREADABLE = 74, 66

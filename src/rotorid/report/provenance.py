@@ -15,7 +15,6 @@ from __future__ import annotations
 import ast
 import hashlib
 import json
-import os
 import platform
 import re
 import subprocess
@@ -28,6 +27,7 @@ from pathlib import Path
 from typing import Any
 
 import rotorid
+from rotorid.io.text.writing import write_texts
 
 _PACKAGES = {"rotorid": "src", "rotorid_proof": "proof"}
 """Each package of the project and the folder, from the top, that holds it."""
@@ -178,10 +178,7 @@ class Code:
         entries = {str(path.relative_to(self.root)): facts for path, facts in self._facts.items()}
         if self._memory is None or entries.items() <= self._remembered.items():
             return
-        self._memory.parent.mkdir(parents=True, exist_ok=True)
-        new = self._memory.with_suffix(f".{os.getpid()}")
-        new.write_text(json.dumps({"made_by": _made_by(), "files": entries}), encoding="utf-8")
-        new.replace(self._memory)
+        write_texts({self._memory: json.dumps({"made_by": _made_by(), "files": entries})})
 
     def _recall(self) -> dict[str, dict[str, Any]]:
         try:

@@ -1,13 +1,20 @@
 """Files are written together or not at all; numbers to the digits that are not chance."""
 
+import errno
 import signal
+import stat
 import subprocess
 import sys
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
-from rotorid.io.text.writing import all_or_none, rounded
+from rotorid.errors import InputError
+from rotorid.io.text import writing
+from rotorid.io.text.writing import all_or_none, only_writer, rounded, write_texts
 
 
 def test_files_take_their_names_together(tmp_path: Path) -> None:
@@ -92,9 +99,41 @@ def test_the_part_of_a_living_writer_stays(tmp_path: Path) -> None:
     with all_or_none(tmp_path / "one") as (part,):
         part.write_text("mine")
         with all_or_none(tmp_path / "one") as (other,):
-            assert other == part  # the same process; what matters is that nothing was swept away
-            assert other.read_text() == "mine"
+            other.write_text("other")
+        assert part.read_text() == "mine"
+    assert (tmp_path / "one").read_text() == "mine"
+
+
+def test_nobody_can_lay_a_link_where_a_part_will_be(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a folder that others may write: neither the name nor, once it is known, the place is theirs."""
+    made: list[Path] = []
+    real = tempfile.mkdtemp
+    monkeypatch.setattr(writing.tempfile, "mkdtemp", lambda *a: made.append(Path(real(*a))) or str(made[-1]))
+    with all_or_none(tmp_path / "one"), all_or_none(tmp_path / "one") as (part,):
         part.write_text("mine")
+        assert made[0].name != made[1].name and {stat.S_IMODE(p.stat().st_mode) for p in made} == {0o700}
+        made[0].joinpath("one").write_text("first")
+    assert stat.S_IMODE((tmp_path / "one").stat().st_mode) & 0o600 == 0o600
+
+
+def test_a_second_writer_waits_and_is_told_where_it_takes_too_long(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names = ("verdict", "page")
+    with ThreadPoolExecutor() as pool, only_writer(tmp_path):
+        with all_or_none(tmp_path / "mine") as (part,):  # whoever holds the folder writes on
+            part.write_text("mine")
+        with monkeypatch.context() as impatient:
+            impatient.setattr(writing, "_PATIENCE_S", 0.1)
+            refused = pool.submit(write_texts, {tmp_path / name: "third" for name in names})
+            with pytest.raises(InputError, match="another command is writing"):
+                refused.result()
+        waits = pool.submit(write_texts, {tmp_path / name: "second" for name in names})
+        time.sleep(0.1)
+        assert not waits.done() and not (tmp_path / "page").exists()
+    waits.result()
+    assert {(tmp_path / name).read_text() for name in names} == {"second"}
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["mine", "page", "verdict"]
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
@@ -102,12 +141,19 @@ def test_a_full_disk_leaves_what_was_there(tmp_path: Path) -> None:
     one, two = tmp_path / "one", tmp_path / "two"
     one.write_text("old")
     two.write_text("old")
-    with pytest.raises(OSError, match="No space left"), all_or_none(one, two) as (first, second):
+    with pytest.raises(OSError, match="No space left on device: .*two"), all_or_none(one, two) as (first, second):
         first.write_text("new")
         second.symlink_to("/dev/full")
         second.write_text("new")
     assert (one.read_text(), two.read_text()) == ("old", "old")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["one", "two"]
+
+
+def test_a_full_disk_names_the_folder_that_was_to_be(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="No space left on device: .*set'"), writing.staging(tmp_path / "set") as part:
+        raise OSError(errno.ENOSPC, "No space left on device", str(part / "run.parquet"))
+    with pytest.raises(OSError, match="No space left on device: .*set'"), writing.staging(tmp_path / "set"):
+        raise OSError(errno.ENOSPC, "No space left on device")
 
 
 def test_the_twelfth_digit_is_no_difference() -> None:

@@ -9,13 +9,13 @@ from rotorid.io.public_list import of_one_motor
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.recordings import RecordingSet, read_set
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.public_sets import PUBLIC_SETS, build, obtain
+from rotorid.recordings.importers.public_sets import PUBLIC_SETS
 from rotorid.report.deliver import judge
 from rotorid_proof.concealed import build as concealed
 from rotorid_proof.concealed import cases
-from tests.public_logs import PUBLIC
+from tests.public_logs import built
 from tests.unit.mismatch.flights import recorded, with_table
-from tests.unit.recordings.importers.test_public_sets import MANIFEST, VEHICLES, needs_data
+from tests.unit.recordings.importers.test_public_sets import MANIFEST, VEHICLES
 
 GROUPS = {
     "rotor_speeds": ("rotor_speed_",), "commands": ("rotor_command_", "throttle_"), "position": c.POSITION,
@@ -74,9 +74,7 @@ def real(tmp_path_factory: pytest.TempPathFactory):
 
     @functools.cache
     def made(name: str) -> RecordingSet:
-        source = PUBLIC_SETS[name].source
-        obtained = obtain(source, MANIFEST[source], PUBLIC, parent)
-        return read_set(build(name, obtained, MANIFEST[source], VEHICLES, parent))
+        return read_set(built(name, MANIFEST, VEHICLES, parent))
 
     return made
 
@@ -95,7 +93,6 @@ def hidden(tmp_path_factory: pytest.TempPathFactory):
     return made
 
 
-@needs_data
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in PUBLIC_SETS if not of_one_motor(name)])
 def test_a_public_set_without_each_group_of_columns(real, name):

@@ -207,3 +207,15 @@ def test_a_half_empty_column_of_ones_own_is_read_between_its_readings() -> None:
     values = np.array([2.0, np.nan, 4.0, np.nan, np.nan, 7.0])
     assert between_readings(time_s, time_s, values).tolist() == [2, 3, 4, 5, 6, 7]
     assert between_readings(time_s, time_s, np.full(6, np.nan)).tolist() == [0] * 6
+
+
+@pytest.mark.parametrize("first_s", [0.0, 0.27, 12.34])
+def test_a_whole_number_of_periods_ends_with_the_last_reading_whatever_is_rounded(first_s: float) -> None:
+    rng = np.random.default_rng(1)
+    for rate_hz in (50.0, 100.0, 187.0, 250.0):
+        time_s = np.round(first_s + np.arange(1200) / rate_hz, 5)
+        for count in range(300, 320):
+            read_s = np.sort(rng.choice(time_s[1:-1], count, replace=False))
+            run = Run("r", pd.DataFrame({c.TIME: time_s, "height_m": np.where(np.isin(time_s, read_s), 1.0, np.nan)}))
+            made = evenly(run, ("height_m",), float(np.diff(read_s).mean()), jumps=False)
+            assert np.nanmax(np.abs(made - 1.0)) < 1e-6

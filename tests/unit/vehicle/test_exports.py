@@ -3,6 +3,7 @@
 Drake and pybullet are large and no dependency: `pip install drake pybullet` into the environment runs their tests.
 """
 
+import ast
 import dataclasses
 import re
 from pathlib import Path
@@ -11,6 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from rotorid.errors import InputError
 from rotorid.recordings import Vehicle, templates, write_vehicle
 from rotorid.recordings.vehicle import Inertia, Rotor
 from rotorid.vehicle.exports import NAMES, export_vehicle, flown, forms
@@ -169,7 +171,7 @@ def test_the_urdf_flies_the_same_in_bullet(template: str, effects) -> None:
 
 
 def test_what_a_form_cannot_express_is_named() -> None:
-    vehicle = with_effects(DRAG, ("ground_effect", "any", {"a": 1.0}))
+    vehicle = with_effects(DRAG, ("ground_effect", "inverse square", {"c": 1.0}))
     assert [s.split()[0] for s in export_vehicle(vehicle, "rotorpy").left_out] == ["ground_effect", "rotors"]
     mjcf = export_vehicle(vehicle, "mjcf")
     assert "rotor_drag" in mjcf.left_out[0] and "Not expressed: rotor_drag" in mjcf.text
@@ -417,3 +419,27 @@ def test_an_inertia_that_sih_cannot_invert_is_named(size: float, told: bool) -> 
     inertia = Inertia(xx=1.7e-2 * size, yy=1.7e-2 * size, zz=2.9e-2 * size)
     vehicle = templates.read("x500").model_copy(update={"inertia_kg_m2": inertia})
     assert any("too small for SIH" in said for said in export_vehicle(vehicle, "px4-sih").left_out) == told
+
+
+WRONG_NAMES = ('quad"""; marker = 1 #', "quad\\", "two\nmarker = 1", "-->\x01---", "a\u2028marker = 1\r\x0c")
+
+
+@pytest.mark.parametrize("name", WRONG_NAMES)
+@pytest.mark.parametrize("to", NAMES)
+def test_a_name_never_becomes_code_of_another_file(name: str, to: str) -> None:
+    vehicle = with_effects(DRAG, OFFSET).model_copy(update={"name": name})
+    exported, plain = (export_vehicle(v, to) for v in (vehicle, with_effects(DRAG, OFFSET)))
+    assert exported.companions.keys() == plain.companions.keys()
+    if to == "rotorpy":
+        code = ([ast.dump(n) for n in ast.parse(e.text).body[1:]] for e in (exported, plain))
+    elif to in ("mjcf", "sdf", "gym-pybullet-drones"):
+        code = ([n.tag for n in ElementTree.fromstring(e.text).iter()] for e in (exported, plain))
+    else:
+        code = ([row for row in e.text.splitlines() if row[:1] != "#"] for e in (exported, plain))
+    assert next(code) == next(code)
+
+
+def test_an_effect_that_is_none_is_not_written_into_a_comment() -> None:
+    vehicle = with_effects(("rotor_drag\nmarker = 1", "", {}))
+    with pytest.raises(InputError, match="has id"):
+        export_vehicle(vehicle, "px4")

@@ -9,6 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from rotorid.errors import InputError
+from rotorid.io.text.writing import all_or_none
 
 SEED, SECONDS, FLIGHTS, EVERY = 7, 16.0, 2, 4
 """How the flights were made: seed of the sensors' noise, length of each, how many, and every how many steps of 2 ms."""
@@ -27,7 +28,7 @@ def write(folder: Path) -> tuple[Path, ...]:
     for path in paths:
         if path.exists():
             raise InputError(f"{path} is there already; nothing was written")
-    folder.mkdir(parents=True, exist_ok=True)
-    for path in paths:
-        path.write_bytes(files(__name__).joinpath(path.name).read_bytes())
+    with all_or_none(*paths) as parts:
+        for part in parts:
+            part.write_bytes(files(__name__).joinpath(part.name).read_bytes())
     return paths

@@ -221,6 +221,7 @@ def changes_from(
             *_refused_notes([c.alternatives or (c.id,) for c in refused]),
             *_notes_of(joint, base.name, new.name),
             *notes,
+            *(f"{own.name}: {text}" for own in (base, new) for text in dict.fromkeys(own.left_out)),
         ),
         kind=new.vehicle.kind,
         level_1=seen,

@@ -23,6 +23,7 @@ from scipy.special import polygamma, stdtr, stdtrit
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
+from rotorid.io.text.wording import printable
 from rotorid.mismatch.changes.quantities import (
     BY_VOLTAGE,
     CONDITIONS,
@@ -37,6 +38,7 @@ from rotorid.mismatch.changes.quantities import (
     grid_of,
 )
 from rotorid.recordings import RecordingSet, Vehicle
+from rotorid.recordings.sufficient import mended_alike
 from rotorid.steps import step
 
 FALSE_ALARMS = 0.01
@@ -223,8 +225,16 @@ def level_one(base: RecordingSet, new: RecordingSet) -> LevelOne:
     return LevelOne(base.name, new.name, differences(*sides, usual_scatter()), tuple(left_out))
 
 
+_NO_PROPERTIES = {"name", "noise", "trust"}
+"""Of a vehicle file what is no property of the vehicle: its name, and what is believed of sensors and values."""
+
+
+def _shown(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else printable(value)
+
+
 def as_one(sets: Sequence[RecordingSet]) -> RecordingSet:
-    """Several sets of one vehicle as one, each run named after its set.
+    """Several sets of one vehicle as one, each run named after its set; a value that one of them states holds for all.
 
     Raises
     ------
@@ -232,11 +242,17 @@ def as_one(sets: Sequence[RecordingSet]) -> RecordingSet:
         Their vehicles are not believed to be the same.
     """
     first, *others = sets
-    for other in others:
-        if other.vehicle != first.vehicle:
-            raise InputError(
-                f"{other.name}/vehicle.yaml: differs from that of {first.name}; expected one vehicle in all good sets"
-            )
+    stated: dict[str, tuple[RecordingSet, object]] = {}
+    for own in sets:
+        for key in sorted(own.vehicle.model_fields_set - _NO_PROPERTIES):
+            value = getattr(own.vehicle, key)
+            earlier, known = stated.setdefault(key, (own, value))
+            if value != known:
+                raise InputError(
+                    f"{own.name}/vehicle.yaml: {key} is {_shown(value)}, that of {earlier.name} {_shown(known)}; "
+                    "expected one vehicle in all good sets"
+                )
+    first = replace(first, vehicle=first.vehicle.model_copy(update={key: value for key, (_, value) in stated.items()}))
     if not others:
         return first
     runs = tuple(replace(run, name=f"{own.name}-{run.name}") for own in sets for run in own.runs)
@@ -249,10 +265,12 @@ def seen_by(base: RecordingSet, new: RecordingSet) -> LevelOne | None:
 
 
 def of_one_vehicle(sets: Sequence[RecordingSet]) -> tuple[RecordingSet, ...]:
-    """The sets with one number for each value that an importer proposed in some of them: nobody's guess is compared.
+    """The sets, mended alike, with one number for each value that an importer proposed in some of them: nobody's guess
+    is compared.
 
     It is that of the first set in which somebody stated it, else the first one's guess.
     """
+    sets = mended_alike(sets)
     guessed = [{doubt.what for doubt in own.proposed} for own in sets]
     same = {}
     for key in set().union(*guessed) & set(Vehicle.model_fields):

@@ -101,7 +101,8 @@ class Ground:
         """Squares of what is left of channels, (n, channels), and their number, (channels, 2, units)."""
         judged, count = self.unit >= 0, self.units
         unit = self.unit[judged]
-        return np.array([[np.bincount(unit, s, count), np.bincount(unit, None, count)] for s in left[judged].T ** 2])
+        found = [[np.bincount(unit, s, count), np.bincount(unit, None, count)] for s in left[judged].T ** 2]
+        return np.array(found).reshape(-1, 2, count)
 
     def compared(self, candidates: Sequence[Candidate]) -> np.ndarray:
         """Mask of the channels that every candidate says something of, (channels,)."""

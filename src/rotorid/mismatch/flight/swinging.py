@@ -345,8 +345,10 @@ def _seen_at_first(piece: HangingStretch, cable: Cable, mass_kg: float) -> np.nd
     """The state (6,) in which a piece begins as its first quarter of a swing shows it: force is mass times lean."""
     first = piece.at_s <= piece.at_s[0] + max(_QUARTER / cable.rate, 3.0 / _RATE_HZ)
     since_s = piece.at_s[first] - piece.time_s[0]
-    weight = mass_kg * np.linalg.norm(piece.hanging, axis=1).mean()
-    (rate, lean) = np.polyfit(since_s, piece.force[first] / weight, 1)
+    weight = max(mass_kg * np.linalg.norm(piece.hanging, axis=1).mean(), 1e-9)
+    # A piece may begin with one force, at its first instant: then nothing is known of the rate.
+    design = np.stack([since_s, np.ones(len(since_s))], axis=1)
+    (rate, lean), *_ = np.linalg.lstsq(design, piece.force[first] / weight, rcond=None)
     lean /= max(1.0, float(np.linalg.norm(lean)) / _MOST_LEAN)
     down = np.sqrt(1.0 - lean @ lean)
     return np.array([*lean, down, *rate, -(lean @ rate) / down])

@@ -22,9 +22,14 @@ from rotorid.mismatch.evidence.split import split_runs
 from rotorid.mismatch.instrument.sampling import noise_of, quieter, settling_s, without_noise, without_settling
 from rotorid.recordings import RecordingSet, Run, Split, Vehicle
 from rotorid.recordings import columns as c
+from rotorid.recordings.sufficient import driven_by
 
 _GAP_STEPS = 4.0
 """Where readings are missing for longer than this many median steps they are not compared."""
+_USUAL = 0.75
+"""Share of a column's steps that are no longer than its usual one."""
+_SLOWER = 1.5
+"""Readings whose usual step is so many of the rows' are taken at their own rate."""
 _UNEVEN = 0.3
 """Deviation of a step from the median, as a share of it, beyond which samples are interpolated to an even grid."""
 _SHORTEST = 4
@@ -69,6 +74,8 @@ class _Preparation:
     session: _SessionTimes
     distance: str
     """Name of the column of a distance to a wall or fixture; empty where there is none."""
+    rows: Mapping[str, np.ndarray]
+    """By run the mask of the rows, (n,), that are looked at: those with readings, where they are slower than rows."""
 
     def stretches(self, recordings: RecordingSet) -> list[Loading]:
         """The stretches of all runs with their loads predicted."""
@@ -137,6 +144,33 @@ def _filled(run: Run, name: str) -> np.ndarray | None:
     return values if known.all() else np.interp(time_s, time_s[known], values[known])
 
 
+def _is_known(run: Run, names: tuple[str, ...]) -> np.ndarray:
+    """Mask of the rows, (n,), in which every column that is there has a value, or lies between two that are no more
+    than some of its own steps apart: what is missing for longer is no straight line."""
+    time_s, good = run.time_s, np.ones(len(run.time_s), bool)
+    for name in filter(run.has, names):
+        known_s = time_s[np.isfinite(run.column(name))]
+        if len(known_s) == len(time_s):
+            continue
+        good &= (time_s >= known_s[0]) & (time_s <= known_s[-1])
+        if len(known_s) > 1:
+            within = _within(time_s, known_s, _GAP_STEPS * float(np.quantile(np.diff(known_s), _USUAL)))
+            good &= True if within is None else within
+    return good
+
+
+def _reading_rows(runs: Sequence[Run], channels: tuple[int, ...]) -> dict[str, np.ndarray]:
+    """By run the mask of its rows, (n,), that are looked at: those with a reading in every channel where readings come
+    more slowly than rows, else all rows, of which some lack readings."""
+    names = tuple((c.FORCE + c.MOMENT)[k] for k in channels)
+    read = {run.name: np.isfinite(run.array(names)).all(axis=1) for run in runs}
+    steps_s = np.concatenate([np.zeros(0), *(np.diff(run.time_s[read[run.name]]) for run in runs)])
+    rows_s = np.concatenate([np.zeros(0), *(np.diff(run.time_s) for run in runs)])
+    if len(steps_s) and np.median(steps_s) < _SLOWER * np.median(rows_s):
+        return {name: np.ones(len(mask), bool) for name, mask in read.items()}
+    return read
+
+
 def _several(run: Run, names: tuple[str, ...]) -> np.ndarray | None:
     columns = [_filled(run, n) for n in names]
     return None if not columns or any(x is None for x in columns) else np.stack(columns, axis=1)
@@ -185,8 +219,9 @@ def _stretches_of(run: Run, how: _Preparation) -> list[Loading]:
     if vehicle.kind == "bench":
         known = [_filled(run, name) for name in c.REFERENCE_FORCE]
         reference = np.stack([np.zeros(len(run.time_s)) if x is None else x for x in known], axis=1)
-        keep &= np.isfinite(run.array(c.REFERENCE_FORCE)[:, [k for k in channels]]).all(axis=1)
+        keep &= _is_known(run, tuple(c.REFERENCE_FORCE[k] for k in channels))
     count = vehicle.rotor_count
+    keep &= _is_known(run, (*driven_by(run, vehicle), *c.MOUNT))
     speeds = _several(run, c.rotor_columns("rotor_speed", count)) if count else None
     command, throttle = commands(run, count) if count else (None, False)
     if command is not None and throttle:
@@ -197,8 +232,8 @@ def _stretches_of(run: Run, how: _Preparation) -> list[Loading]:
         for name in (c.BATTERY_VOLTAGE, c.TEMPERATURE, c.HEIGHT, *run.unknown_columns)
         if run.has(name)
     }
-    out = []
-    for piece in _pieces(run.time_s, keep, dt_s):
+    out, rows = [], np.flatnonzero(how.rows[run.name])
+    for piece in (rows[p] for p in _pieces(run.time_s[rows], keep[rows], dt_s)):
         stamps, good = run.time_s[piece], keep[piece]
         grid = _even(stamps, dt_s)
 
@@ -388,9 +423,10 @@ def set_up(recordings: RecordingSet, whole: RecordingSet | None = None) -> Prepa
     """
     vehicle, whole = recordings.vehicle, whole or recordings
     channels, session = compared_channels(whole), session_of(whole)
-    dt_s = float(np.median(np.concatenate([np.diff(r.time_s) for r in recordings.runs])))
+    rows = _reading_rows(recordings.runs, channels)
+    dt_s = float(np.median(np.concatenate([np.diff(r.time_s[rows[r.name]]) for r in recordings.runs])))
     full, estimated = _full_speed_of(recordings, channels)
-    how, noisier = _Preparation(vehicle, channels, dt_s, full, session, _distance_column(recordings)), None
+    how, noisier = _Preparation(vehicle, channels, dt_s, full, session, _distance_column(recordings), rows), None
     loadings = how.stretches(recordings)
     if vehicle.kind == "stand" and loadings:
         loadings = without_voltmeter_noise(loadings)
@@ -438,7 +474,15 @@ def with_unseen(setup: PreparedInstrument, unseen: RecordingSet) -> PreparedInst
     runs = [r for r in unseen.runs if r.has(*needed)]
     runs = [r for r in runs if not commanded or commands(r, vehicle.rotor_count)[0] is not None]
     dt_s = 1.0 / instrument.rate_hz
-    how = _Preparation(unseen.vehicle, instrument.channels, dt_s, setup.full_speed, setup.session, instrument.distance)
+    how = _Preparation(
+        vehicle=unseen.vehicle,
+        channels=instrument.channels,
+        dt_s=dt_s,
+        full_speed=setup.full_speed,
+        session=setup.session,
+        distance=instrument.distance,
+        rows=_reading_rows(runs, instrument.channels),
+    )
     own = how.stretches(replace(unseen, runs=tuple(runs)))
     if own and any(x.voltage_read is not None for x in setup.loadings):
         own = _with_expected_voltages(own)

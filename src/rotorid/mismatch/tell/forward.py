@@ -114,11 +114,13 @@ def _segments(analysis: Analysis) -> list[Segment]:
 
 
 def _rms(errors: Sequence[WindowErrors], name: str, part, sign: int) -> float | None:
-    """Error over the windows that lie wholly in the fitted (+1) or held-out (-1) part; None without any."""
+    """Error over the windows that lie wholly in the fitted (+1) or held-out (-1) part; None without any, and where a
+    simulation left all bounds."""
     own = [e for e in errors if name in e.channels]
     kept = [e.channels[name][(part(e.run, e.start_s) == sign) & (part(e.run, e.stop_s) == sign)] for e in own]
     values = np.concatenate([np.zeros(0), *(k.ravel() for k in kept)])
-    return float(np.sqrt(np.mean(values**2))) if len(values) else None
+    error = float(np.sqrt(np.mean(values**2))) if len(values) else np.nan
+    return error if np.isfinite(error) else None
 
 
 def noise_floor(segments: Sequence[Segment], model: Model, noise: SensorNoise) -> dict[str, float]:

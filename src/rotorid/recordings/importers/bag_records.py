@@ -14,13 +14,16 @@ import bz2
 import sqlite3
 import struct
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
+from unittest.mock import patch
 
 from rotorid.errors import InputError
+from rotorid.io.text.files import LEAST_UNPACKED, MOST_UNPACKED
 
 _MCAP, _BAG = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n"
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 0x02, 0x03, 0x04, 0x05, 0x06
@@ -126,16 +129,12 @@ class Records:
 
     def _unpacked(self, data: bytes, compression: str) -> bytes:
         """Bytes of a chunk, as many as can be unpacked of one that is cut off."""
-        if compression == "bz2":
-            reader = bz2.BZ2Decompressor()
-        elif compression == "lz4":
-            reader = needs("lz4.frame", "ros", self.path).LZ4FrameDecompressor()
-        elif compression == "zstd":
-            reader = needs("rosbags.rosbag2.storage_mcap", "ros", self.path).zstd.ZstdDecompressor()
-        else:
+        if compression not in ("bz2", "lz4", "zstd"):
             return data
         try:
-            return reader.decompress(data)
+            return Unpacking(self.path).of(compression, data, whole=False)
+        except (MemoryError, InputError):
+            raise
         except Exception:  # each library raises its own
             self.lost_chunks += 1
             return b""
@@ -158,6 +157,89 @@ class Records:
                         yield channel, at, body
             except sqlite3.DatabaseError:
                 self.cut = True
+
+
+class Unpacking:
+    """Unpacks parts of a bag, none of them, nor all that go to the disk, to more than packed files here may hold.
+
+    InputError once they would. `_by_rosbags` unpacks by it too (`in_rosbags`): that library has no bounds of its own.
+    """
+
+    def __init__(self, path: Path) -> None:
+        files = [path] if path.is_file() else [p for p in path.iterdir() if p.is_file()]
+        self.path = path
+        self.most = max(LEAST_UNPACKED, MOST_UNPACKED * sum(p.stat().st_size for p in files))
+        self.on_disk = 0
+        self.too_large: InputError | None = None
+
+    def check(self, size: int) -> None:
+        """InputError where so many bytes are too many; it is kept, since a library may put its own in its place."""
+        if size > self.most:
+            said = f"{self.path}: unpacks to more than {self.most / 1e6:.0f} MB, far more than a bag does"
+            self.too_large = InputError(said)
+            raise self.too_large
+
+    def of(self, compression: str, data: bytes, whole: bool = True) -> bytes:
+        """What a part packed as `bz2`, `lz4` or `zstd` holds; EOFError where it is cut off and `whole` is wanted."""
+        make = {
+            "bz2": lambda: bz2.BZ2Decompressor(),
+            "lz4": lambda: needs("lz4.frame", "ros", self.path).LZ4FrameDecompressor(),
+            "zstd": lambda: needs("rosbags.rosbag2.storage_mcap", "ros", self.path).zstd.ZstdDecompressor(),
+        }[compression]
+        out, size, reader = [], 0, make()
+        while True:
+            out.append(reader.decompress(data, self.most - size + 1))
+            size += len(out[-1])
+            self.check(size)
+            data = b""
+            if reader.eof:
+                data, reader = reader.unused_data or b"", make()
+                if not data:
+                    return b"".join(out)
+            elif not out[-1]:
+                if whole:
+                    raise EOFError("a packed part is cut off")
+                return b"".join(out)
+
+    @contextmanager
+    def in_rosbags(self) -> Iterator[None]:
+        """Inside, rosbags unpacks within the bounds."""
+        ros1, mcap, ros2 = (
+            needs(f"rosbags.{name}", "ros", self.path)
+            for name in ("rosbag1.reader", "rosbag2.storage_mcap", "rosbag2.reader")
+        )
+        bounded = {name: partial(self.of, name) for name in ("bz2", "lz4", "zstd")}
+        of_files = SimpleNamespace(decompress=bounded["zstd"], open=partial(_BoundedFile, self, ros2.zstd))
+        with (
+            patch.dict(ros1.decompressors, {k: v for k, v in bounded.items() if k in ros1.decompressors}),
+            patch.dict(mcap.DECOMPRESSORS, {k: lambda x, _, k=k: bounded[k](x) for k in ("lz4", "zstd")}),
+            patch.object(ros2, "zstd", of_files),
+        ):
+            try:
+                yield
+            except Exception:
+                if self.too_large is not None:
+                    raise self.too_large from None
+                raise
+
+
+class _BoundedFile:
+    """A file packed by zstd whose content counts against what may be unpacked to the disk."""
+
+    def __init__(self, bounds: Unpacking, zstd: ModuleType, *arguments) -> None:
+        self._bounds, self._file = bounds, zstd.open(*arguments)
+
+    def __enter__(self) -> _BoundedFile:
+        return self
+
+    def __exit__(self, *error) -> None:
+        self._file.close()
+
+    def read(self, size: int = -1) -> bytes:
+        data = self._file.read(size)
+        self._bounds.on_disk += len(data)
+        self._bounds.check(self._bounds.on_disk)
+        return data
 
 
 def typestores(channels: list[_Topic], path: Path) -> dict[str, object]:

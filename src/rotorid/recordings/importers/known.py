@@ -21,6 +21,7 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.io.text.files import as_yaml
+from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.faults import ImportFault
 from rotorid.recordings.templates import names
@@ -269,7 +270,7 @@ def propose(
         f"torque_coefficient_n_m_s2: {_GUESSED_TORQUE:g}, inertia_xx_kg_m2: {_GUESSED_INERTIA:g}, "
         f"inertia_yy_kg_m2: {_GUESSED_INERTIA:g}, inertia_zz_kg_m2: {_GUESSED_INERTIA:g}}}",
     ]
-    return "\n".join(lines) + "\n", tuple(remarks)
+    return "\n".join(map(printable, lines)) + "\n", tuple(remarks)
 
 
 def closer_template(lift_n_s2_kg: float, template: Vehicle, template_name: str) -> str | None:

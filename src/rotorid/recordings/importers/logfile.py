@@ -40,7 +40,7 @@ from rotorid.io.text.files import (
     read_text,
 )
 from rotorid.io.text.wording import printable
-from rotorid.io.text.writing import staging, take_name, take_place
+from rotorid.io.text.writing import only_writer, staging, take_name, take_place
 from rotorid.recordings import Run, read_vehicle, templates
 from rotorid.recordings import columns as c
 from rotorid.recordings.files import (
@@ -395,7 +395,7 @@ class SetOfLogs:
             folder.name, True, ", ".join(files), "", "", "", files, self.axes, self.faults, self.remarks
         )
         if folder.is_dir():
-            with staging(folder / "import") as part:
+            with staging(folder / "import") as part, only_writer(folder):
                 _add_to_set(self._write_files(part, as_csv), report, folder)
         else:
             with staging(folder) as part:

@@ -25,6 +25,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.errors import InputError
+from rotorid.io.text.writing import all_or_none
 from rotorid.recordings import RecordingSet, Run, read_set, read_vehicle, write_set
 from rotorid.recordings import columns as c
 from rotorid.recordings.check import check_set
@@ -352,10 +353,8 @@ def _download(url: str, wanted: str, path: Path) -> None:
     found = hashlib.sha256(data).hexdigest()
     if found != wanted:
         raise InputError(f"{url}: SHA-256 is {found}, expected {wanted}")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(path.name + ".part")
-    partial.write_bytes(data)
-    partial.rename(path)
+    with all_or_none(path) as (part,):
+        part.write_bytes(data)
 
 
 def _in_folder(path: Path, file: dict) -> str:

@@ -38,7 +38,7 @@ from scipy.spatial.transform import Rotation
 from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.bag_records import Records, needs, typestores
+from rotorid.recordings.importers.bag_records import Records, Unpacking, needs, typestores
 from rotorid.recordings.importers.faults import (
     ImportFault,
     airborne,
@@ -243,7 +243,10 @@ def _by_rosbags(path: Path) -> _BagContent:
     highlevel = needs("rosbags.highlevel", "ros", path)
     typesys = needs("rosbags.typesys", "ros", path)
     found = _BagContent()
-    with highlevel.AnyReader([path], default_typestore=typesys.get_typestore(typesys.Stores.LATEST)) as bag:
+    with (
+        Unpacking(path).in_rosbags(),
+        highlevel.AnyReader([path], default_typestore=typesys.get_typestore(typesys.Stores.LATEST)) as bag,
+    ):
         known = [k for k in bag.connections if _is_read(k.msgtype)]
         for k in bag.connections:
             if (encoding := getattr(k.ext, "serialization_format", "cdr")) != "cdr":
@@ -288,13 +291,13 @@ def _found(path: Path) -> _BagContent:
     needs("rosbags.highlevel", "ros", path)
     try:
         return _by_rosbags(path)
-    except MemoryError:
+    except (MemoryError, InputError):
         raise
     except Exception as error:  # rosbags lets whatever a broken file raises through
         why = printable(error)[:150]
     try:
         found = _by_records(path)
-    except MemoryError:
+    except (MemoryError, InputError):
         raise
     except Exception:
         found = _BagContent()

@@ -11,7 +11,8 @@ from difflib import get_close_matches
 from rotorid.errors import InputError
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.exports.autopilots import ardupilot_json, px4_sih
-from rotorid.vehicle.exports.forms import FORMS, KNOWS, Exported, parts_of, refusal
+from rotorid.vehicle.exports.forms import FORMS, KNOWS, Exported, named_in_one_line, parts_of, refusal
+from rotorid.vehicle.improved import all_forms
 
 _WRITERS: dict[str, Callable[[Vehicle], Exported]] = {**FORMS, "px4-sih": px4_sih, "ardupilot-json": ardupilot_json}
 NAMES = tuple(_WRITERS)
@@ -26,6 +27,8 @@ def export_vehicle(vehicle: Vehicle, to: str) -> Exported:
         raise InputError(f"no form is called {to!r}{meant}")
     if vehicle.kind == "bench" or vehicle.mass_kg is None or vehicle.inertia_kg_m2 is None:
         raise InputError(f"vehicle {vehicle.name}: only a vehicle with mass, inertia and rotors can be exported")
+    all_forms(vehicle)  # an effect that is none of the catalogue's is refused
+    vehicle = named_in_one_line(vehicle)
     if why := refusal(to, vehicle.rotor_count, parts_of(vehicle, KNOWS[to]).inertia):
         raise InputError(f"{vehicle.name}: {why}")
     return _WRITERS[to](vehicle)

@@ -25,7 +25,7 @@ from scipy.optimize import brentq
 from rotorid.errors import InputError
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.exports.derivatives import left_of_one_damping, own_damping
-from rotorid.vehicle.exports.forms import KNOWS, Exported, Parts, allocated, parts_of, sdf
+from rotorid.vehicle.exports.forms import KNOWS, Exported, Parts, allocated, named_in_one_line, parts_of, sdf
 from rotorid.vehicle.mixer import hover_speed_rad_s
 
 _NUMBER = 22000
@@ -189,6 +189,7 @@ def sih_inertia(values: dict[str, float]) -> np.ndarray:
 
 def gazebo_airframe(vehicle: Vehicle) -> Exported:
     """The model with sensors, `model.config`, and the airframe script, the last two as companions."""
+    vehicle = named_in_one_line(vehicle)
     model = sdf(vehicle)
     # A name that a shell and Gazebo take.
     name = re.sub(r"[^a-z0-9]+", "_", vehicle.name.lower()).strip("_") or "vehicle"

@@ -83,7 +83,7 @@ def _table(vehicle: Vehicle) -> str:
 
 def rotorpy_companion(vehicle: Vehicle) -> str:
     """A subclass of RotorPy's Multirotor that adds them."""
-    return f'''# {" ".join(vehicle.name.split())}, exported by rotorid.
+    return f'''# {vehicle.name}, exported by rotorid.
 """Derivatives for RotorPy: fly `WithDerivatives(quad_params, ...)` in place of `Multirotor(quad_params, ...)`.
 
 Force, N, and moment, N m, are MATRIX @ x of x = (1, velocity through the air, m/s, body rates, rad/s), each held
@@ -107,7 +107,7 @@ class WithDerivatives(Multirotor):
 
 def mujoco_companion(vehicle: Vehicle) -> str:
     """MuJoCo's callback for passive forces that adds them."""
-    return f'''# {" ".join(vehicle.name.split())}, exported by rotorid.
+    return f'''# {vehicle.name}, exported by rotorid.
 """Derivatives for MuJoCo: `mujoco.set_mjcb_passive(passive)` once, and every step adds them.
 
 Force, N, and moment, N m, are MATRIX @ x of x = (1, velocity through the air, m/s, body rates, rad/s), each held

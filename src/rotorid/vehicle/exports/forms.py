@@ -9,6 +9,7 @@ estimate). A tool that wants more takes nothing from the vehicle: its file is no
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from xml.sax.saxutils import quoteattr
@@ -16,7 +17,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.io.text.wording import listed
+from rotorid.io.text.wording import listed, printable
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.exports.derivatives import (
     MUJOCO_FILE,
@@ -111,6 +112,11 @@ _GRAVITY_M_S2 = {"rotorpy": 9.81}
 """Of tools that have their own, which no file changes and no caller of theirs sets."""
 
 
+def named_in_one_line(vehicle: Vehicle) -> Vehicle:
+    """The vehicle with a name that ends no comment: text of a file is never a line of another."""
+    return vehicle.model_copy(update={"name": printable(" ".join(vehicle.name.split()))})
+
+
 def expressed(vehicle: Vehicle, to: str) -> Vehicle:
     """What the file of a form holds of a vehicle, as a vehicle that our simulator flies.
 
@@ -154,7 +160,7 @@ def parts_of(vehicle: Vehicle, knows: frozenset[str]) -> Parts:
     left = _left_of_its_own(values, knows)
     for entry in vehicle.effects:
         name, form, p = entry["id"], entry.get("form", ""), {k: float(v) for k, v in entry["parameters"].items()}
-        said = f"{name} ({form}: {', '.join(f'{k} = {v:.4g}' for k, v in p.items())})"
+        said = printable(f"{name} ({form}: {', '.join(f'{k} = {v:.4g}' for k, v in p.items())})")
         taken = name in knows and _take(values, name, form, p)
         if not taken:
             left.append(said)
@@ -241,7 +247,7 @@ def _numbers(values: Iterable[float]) -> str:
 
 def _comments(left: Iterable[str]) -> str:
     """What a file does not express, as comments of XML."""
-    return "".join(f"  <!-- Not expressed: {s.replace('--', '- -')} -->\n" for s in left)
+    return "".join(f"  <!-- Not expressed: {re.sub('-(?=-)', '- ', s)} -->\n" for s in left)
 
 
 def _in_flu(inertia: np.ndarray) -> np.ndarray:
@@ -290,8 +296,9 @@ def rotorpy(vehicle: Vehicle) -> Exported:
         "tau_m": (up + down) / 2 or AT_ONCE_S,
         "rotor_speed_min": low, "rotor_speed_max": high, "motor_noise_std": 0.0,
     }  # fmt: skip
-    lines = [f'"""{vehicle.name}, exported by rotorid for RotorPy (body forward-left-up, SI units)."""', ""]
-    lines = [line.replace("\\", "/") for line in lines] + ["import numpy as np", ""]
+    # As Python writes a text: whatever is in the name, it stays one.
+    lines = [repr(f"{vehicle.name}, exported by rotorid for RotorPy (body forward-left-up, SI units)."), ""]
+    lines += ["import numpy as np", ""]
     lines += [f"# Not expressed: {sentence}" for sentence in left]
     lines.append("quad_params = {")
     for key, value in values.items():

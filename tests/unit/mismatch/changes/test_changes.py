@@ -132,8 +132,14 @@ def test_several_good_sets_are_one_reference_and_their_vehicle_must_be_one():
     first, second = flights("monday", (1,)), flights("tuesday", (2,))
     both = as_one([first, second])
     assert [r.name for r in both.runs] == ["monday-run01", "tuesday-run02"]
-    with pytest.raises(InputError, match="tuesday/vehicle.yaml: differs from that of monday"):
-        as_one([first, replace(second, vehicle=lighter(second.vehicle, 1.1))])
+    renamed = second.vehicle.model_copy(update={"name": "tuesday", "trust": {"mass_kg": 0.1}})
+    stated = Vehicle.model_validate(renamed.model_dump(exclude_unset=True) | {"ground_z_m": 1.0})
+    both = as_one([first, replace(second, vehicle=stated)])
+    assert both.vehicle.name == first.vehicle.name and both.vehicle.ground_z_m == 1.0
+    heavier = lighter(second.vehicle, 1.1)
+    said = f"tuesday/vehicle.yaml: .* is {heavier.mass_kg:g}, that of monday {first.vehicle.mass_kg:g}"
+    with pytest.raises(InputError, match=said):
+        as_one([first, replace(second, vehicle=heavier)])
 
 
 def test_every_value_has_its_change_with_an_interval():

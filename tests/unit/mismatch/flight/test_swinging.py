@@ -106,3 +106,11 @@ def test_a_load_on_a_cable_is_told_with_its_mass_and_length():
     for symbol, truth in (("m_p", 0.08), ("L", 0.6)):
         assert numbers[symbol].low < truth < numbers[symbol].high
         assert numbers[symbol].value == pytest.approx(truth, rel=0.02)
+
+
+def test_a_piece_that_begins_with_one_force_at_its_first_instant_says_nothing_of_the_rate():
+    hanging, time_s = shaken(7, 5.0)
+    at_s = np.r_[time_s[0], time_s[time_s > time_s[0] + 2.0][::20]]
+    force = 0.2 * np.random.default_rng(4).standard_normal((len(at_s), 2))
+    stretch = HangingStretch(hanging, time_s, at_s, force)
+    assert np.isfinite(fitted_piece(stretch, CABLE, moved(DOWN, np.zeros(4), 4.0), MASS_KG)[2])

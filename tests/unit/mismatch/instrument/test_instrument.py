@@ -232,3 +232,30 @@ def test_what_shows_in_few_seconds_has_the_size_of_the_strongest_tenth() -> None
     rows = [Rows("r", np.arange(len(column)) / per, np.zeros((len(column), 6)), column)]
     size = size_of_columns(rows, np.full(6, 0.1), per)(np.array([0]), np.array([2.0]))
     assert size == pytest.approx([0, 0, 2.0 / 0.1 * np.sqrt(0.5), 0, 0, 0])
+
+
+@pytest.mark.parametrize("every", [2, 5])
+def test_readings_slower_than_rows_are_taken_at_their_own_rate(every: int) -> None:
+    whole = bench_set()
+    runs = []
+    for run in whole.runs:
+        forces = [n for n in run.table if n.startswith("force")]
+        table = run.table.copy()
+        table.loc[np.arange(len(table)) % every != 1, forces] = np.nan
+        runs.append(Run(run.name, table))
+    setup, known = set_up(replace(whole, runs=tuple(runs))), set_up(whole)
+    assert setup.instrument.rate_hz == pytest.approx(known.instrument.rate_hz / every, rel=1e-3)
+    assert sum(x.size for x in setup.loadings) == pytest.approx(sum(x.size for x in known.loadings) / every, rel=0.02)
+
+
+@pytest.mark.parametrize("hole", [slice(0, 500), slice(300, 800), slice(-500, None)])
+def test_a_hole_of_what_drives_the_model_is_no_straight_line(hole: slice) -> None:
+    whole = bench_set(runs=1)
+    table = whole.runs[0].table.copy()
+    lost = table.index[hole]
+    table.loc[lost, [n for n in table if n.startswith("reference")]] = np.nan
+    table.loc[table.index[50], [n for n in table if n.startswith("reference")]] = np.nan  # a cell is joined
+    setup = set_up(replace(whole, runs=(Run("r", table),)))
+    at = np.concatenate([x.time_s if x.keep is None else x.time_s[x.keep] for x in setup.loadings])
+    inside = (at > table.time_s[lost[0]]) & (at < table.time_s[lost[-1]])
+    assert not inside.any() and len(at) > 0.9 * (len(table) - len(lost))

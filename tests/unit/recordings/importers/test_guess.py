@@ -26,7 +26,7 @@ from rotorid.recordings.importers.mapping import (
     read_mapping,
 )
 from tests.command_line import refusal
-from tests.public_logs import LOGS, needs_logs
+from tests.public_logs import public
 from tests.refusals import refused
 
 NAMES = {
@@ -95,10 +95,9 @@ def test_units_axes_and_orders_are_found_by_numbers(flown: pd.DataFrame, seed: i
         np.testing.assert_allclose(made[list(names)], flown[list(names)], atol=1e-5)
 
 
-@needs_logs
 def test_names_that_end_as_others_do_are_told_apart_in_a_public_table() -> None:
     """`ang_vel_x` was taken for a velocity, `acc_b_x` for a position, and `vx` was left out."""
-    found = guess(pd.read_csv(LOGS / "csv-ddd/quadrotor_model.csv"))
+    found = guess(pd.read_csv(public("logs/csv-ddd/quadrotor_model.csv")))
     columns = {name: channel.columns for name, channel in found.mapping.channels.items()}
     assert columns == {
         "time": ("timestamp",), "angular_velocity": ("ang_vel_x", "ang_vel_y", "ang_vel_z"),

@@ -12,7 +12,7 @@ from rotorid.recordings import read_set, templates
 from rotorid.recordings.importers.faults import airborne
 from rotorid.recordings.importers.logfile import read_log
 from tests.command_line import answer
-from tests.public_logs import PUBLIC, needs_logs
+from tests.public_logs import public
 
 SPEEDS = list(c.rotor_columns("rotor_speed", 4))
 
@@ -87,7 +87,6 @@ def test_a_csv_that_is_in_the_air_throughout_keeps_every_row(tmp_path: Path, tem
     assert len(found.runs["own"]) == len(run.table) and not found.faults
 
 
-@needs_logs
 @pytest.mark.parametrize(
     ("log", "needs", "flights"),
     [
@@ -104,6 +103,6 @@ def test_a_csv_that_is_in_the_air_throughout_keeps_every_row(tmp_path: Path, tem
 def test_public_logs(log: str, needs: str, flights: list[float]) -> None:
     """Lengths, s: of Copter 3.4, Betaflight, log10 and PX4 looked at second by second, of the others what it gave."""
     pytest.importorskip(needs)
-    found = read_log(PUBLIC / log)
+    found = read_log(public(log))
     lasts = [float(t[c.TIME].iloc[-1]) for t in found.runs.values()]
     assert lasts == pytest.approx(flights, abs=0.5)

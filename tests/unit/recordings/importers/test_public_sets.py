@@ -20,13 +20,11 @@ from rotorid.recordings.importers.faults import read_report
 from rotorid.recordings.importers.public_sets import PUBLIC_SETS, address, build, obtain, sha256
 from rotorid_proof.plantings import sow
 from rotorid_proof.plantings.flights import FLIGHTS as PLANTED
-from tests.public_logs import PUBLIC
+from tests.public_logs import built
 
 ROOT = Path(__file__).parents[4]
 MANIFEST = read_manifest(ROOT / "workflow" / "public_data.yaml")
 VEHICLES = ROOT / "workflow" / "vehicles"
-
-needs_data = pytest.mark.skipif(not PUBLIC.is_dir(), reason="the public recordings are not on this machine")
 
 
 def source_of(content: bytes) -> dict:
@@ -157,30 +155,23 @@ def test_neurobem_beliefs_are_the_issue_s() -> None:
 def real(tmp_path_factory: pytest.TempPathFactory):
     """Build sets from the real files, each once."""
     parent = tmp_path_factory.mktemp("sets")
-    obtained = {}
 
     @functools.cache
     def made(name: str):
-        source = PUBLIC_SETS[name].source
-        if source not in obtained:
-            obtained[source] = obtain(source, MANIFEST[source], PUBLIC, parent)
-        folder = build(name, obtained[source], MANIFEST[source], VEHICLES, parent)
+        folder = built(name, MANIFEST, VEHICLES, parent)
         return read_set(folder), read_report(folder)
 
     made.parent = parent
     return made
 
 
-@needs_data
 @pytest.mark.parametrize("name", [name for name in PUBLIC_SETS if not of_one_motor(name)])
 def test_a_real_set_fits_the_contract_and_repeats_byte_for_byte(name: str, real, tmp_path: Path) -> None:
     recordings, report = real(name)
     assert report["available"]
     assert recordings.runs
     assert all(fault["sentence"].endswith(".") for fault in report["faults"])
-    source = PUBLIC_SETS[name].source
-    found = obtain(source, MANIFEST[source], PUBLIC, tmp_path)
-    again = build(name, found, MANIFEST[source], VEHICLES, tmp_path)
+    again = built(name, MANIFEST, VEHICLES, tmp_path)
     assert set(report["files"]) == set(PUBLIC_SETS[name].files)
     for path in sorted(again.iterdir()):
         assert path.read_bytes() == (real.parent / name / path.name).read_bytes()
@@ -193,7 +184,6 @@ def _dense(run, names) -> np.ndarray:
     return run.table[list(names)].interpolate(limit_direction="both").to_numpy(float)
 
 
-@needs_data
 @pytest.mark.parametrize("name", FLIGHTS)
 def test_the_axes_agree_with_each_other(name: str, real) -> None:
     """The derivative of the position is the velocity, and thrust along -z of the body explains most of it."""
@@ -215,7 +205,6 @@ def test_the_axes_agree_with_each_other(name: str, real) -> None:
                 assert np.corrcoef(pushed, acceleration[:, axis])[0, 1] > 0.6, (run.name, axis)
 
 
-@needs_data
 @pytest.mark.parametrize("name", ["neurobem", "imrc-brushless", "appius-ground-effect"])
 def test_the_believed_thrust_carries_the_weight(name: str, real) -> None:
     recordings, _ = real(name)
@@ -226,7 +215,6 @@ def test_the_believed_thrust_carries_the_weight(name: str, real) -> None:
         assert np.mean(thrust * tilt) == pytest.approx(vehicle.mass_kg * 9.81, rel=0.06)
 
 
-@needs_data
 @pytest.mark.parametrize("name", ["neurobem", "imrc-brushless", "imrc-brushed"])
 def test_rotors_stand_and_spin_where_the_vehicle_file_says(name: str, real) -> None:
     """Joint regression of the angular acceleration on all squared speeds, 2 to 15 Hz."""
@@ -251,7 +239,6 @@ def test_rotors_stand_and_spin_where_the_vehicle_file_says(name: str, real) -> N
         assert (np.sign(np.median(signs["z"], axis=0)) == recordings.vehicle.yaw_signs()).all()
 
 
-@needs_data
 def test_the_traps_of_the_real_files_are_caught(real) -> None:
     def faults(name):
         return {(f["run"], f["column"], f["kind"]) for f in real(name)[1]["faults"]}
@@ -268,21 +255,17 @@ def test_the_traps_of_the_real_files_are_caught(real) -> None:
     assert {kind for _, _, kind in faults("crazypad-cut")} >= {"no_pitch", "cut"}
 
 
-@needs_data
 def test_the_tables_of_the_report_count_runs_not_sets_twice(real, tmp_path: Path) -> None:
     folders = []
     for name in ("imrc-brushed", "crazypad-normal", "crazypad-cut"):
         real(name)
-        source = PUBLIC_SETS[name].source
-        found = obtain(source, MANIFEST[source], PUBLIC, tmp_path)
-        folders.append(build(name, found, MANIFEST[source], VEHICLES, tmp_path))
+        folders.append(built(name, MANIFEST, VEHICLES, tmp_path))
     table = public_sets.faults(folders)
     pitch = table[table["fault"] == "pitch not recorded"]
     assert pitch[["source", "runs"]].to_numpy().tolist() == [["crazypad", 16]]
     assert public_sets.recordings(folders)["runs"].tolist() == [2, 10, 6]
 
 
-@needs_data
 def test_the_list_of_plantings_is_that_of_the_public_sets(real) -> None:
     for flight in PLANTED:
         real(flight.set)

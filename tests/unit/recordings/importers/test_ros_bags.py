@@ -24,7 +24,7 @@ from scipy.spatial.transform import Rotation
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers import ros
+from rotorid.recordings.importers import bag_records, ros
 from rotorid.recordings.importers.bag_records import Records
 from tests.unit.recordings.importers.test_log_formats import FLU, check_against, flown
 
@@ -143,7 +143,7 @@ def written(path: Path, flight: Flight, topics: dict[str, tuple[Callable, Callab
     if flight.two:
         writer = Writer2(path, version=9, storage_plugin=how.get("plugin", StoragePlugin.MCAP))
         if how.get("zstd"):
-            writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+            writer.set_compression(CompressionMode[how["zstd"]], CompressionFormat.ZSTD)
     else:
         writer = Writer1(path)
         if how.get("compression"):
@@ -156,6 +156,8 @@ def written(path: Path, flight: Flight, topics: dict[str, tuple[Callable, Callab
                 connections[topic] = writer.add_connection(topic, kind, typestore=own)
             raw = own.serialize_cdr(message, kind) if flight.two else own.serialize_ros1(message, kind)
             writer.write(connections[topic], ns, raw)
+    if how.get("zstd") in ("FILE", "MESSAGE"):  # what the folder says is needed to read it
+        return path
     files = [*path.glob("*.mcap"), *path.glob("*.db3")] if path.is_dir() else [path]
     return files[0]
 
@@ -518,7 +520,7 @@ def test_a_topic_has_one_clock(tmp_path: Path, stamps: str, two: bool) -> None:
 FORMS = {
     "bag": (False, {}), "bag bz2": (False, {"compression": Writer1.CompressionFormat.BZ2}),
     "bag lz4": (False, {"compression": Writer1.CompressionFormat.LZ4}),
-    "mcap": (True, {}), "mcap zstd": (True, {"zstd": True}), "db3": (True, {"plugin": StoragePlugin.SQLITE3}),
+    "mcap": (True, {}), "mcap zstd": (True, {"zstd": "STORAGE"}), "db3": (True, {"plugin": StoragePlugin.SQLITE3}),
 }  # fmt: skip
 
 
@@ -576,6 +578,25 @@ def test_a_chunk_that_cannot_be_unpacked_is_named(form, tmp_path: Path, name: st
     records = Records(path)
     kept = len(list(records.messages()))
     assert records.lost_chunks >= 1 and kept < 3 * 1200
+
+
+PACKED = {name: FORMS[name] for name in ("bag bz2", "bag lz4", "mcap zstd")}
+PACKED |= {mode: (True, {"plugin": StoragePlugin.SQLITE3, "zstd": mode}) for mode in ("FILE", "MESSAGE")}
+
+
+@pytest.mark.parametrize("name", PACKED)
+def test_a_packed_bag_unpacks_to_no_more_than_other_packed_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    two, how = PACKED[name]
+    flight = Flight(two)
+    path = written(tmp_path / ("flight" if two else "flight.bag"), flight, usual(flight), **how)
+    assert len(ros._found(path).rows["rates", "/imu"]) == 1200
+    monkeypatch.setattr(bag_records, "LEAST_UNPACKED", 100)
+    monkeypatch.setattr(bag_records, "MOST_UNPACKED", 0)
+    for read in (ros._found, *([ros._by_records] if path.is_file() else [])):
+        with pytest.raises(InputError, match="unpacks to more than"):
+            read(path)
 
 
 @pytest.mark.parametrize("name", FORMS)

@@ -92,7 +92,7 @@ def test_nothing_is_judged_twice_but_what_changed(sets: Path, told: Path, tmp_pa
     assert told.read_text() == "d-killed\n"  # what killed it may be gone
     told.write_text("")
     (sets / "e-sound" / "run.csv").write_text("time_s\n0\n")
-    left = tmp_path / "memory" / "c0de" / f".{fleet.content_of(sets / 'e-sound')}.1.part"
+    left = tmp_path / "memory" / "c0de" / f".{fleet.content_of(sets / 'e-sound')}.-99999999.x.part"
     left.mkdir()  # by a process that was killed
     judged(sets, tmp_path / "third")
     assert not left.exists()

@@ -16,6 +16,7 @@ import pandas as pd
 import yaml
 
 from rotorid.errors import InputError
+from rotorid.io.text.wording import printable
 from rotorid.recordings.importers.faults import in_order, join_rows
 from rotorid.recordings.importers.guessing import agreement as by
 from rotorid.recordings.importers.guessing import names as named
@@ -74,13 +75,13 @@ def guess(table: pd.DataFrame) -> Draft:
 
 def as_text(found: Draft, source: str) -> str:
     """A mapping file in which each line has its evidence, and what is open is marked."""
-    mapping = found.mapping
+    mapping, source = found.mapping, printable(source)
     lines = [f"# What the columns of {source} are, proposed by rotorid from names and numbers. Look through it, then:"]
     lines += [f"#   rotorid import {source} --mapping THIS_FILE --mass-kg … --like …"]
     if found.open:
         said = f"# Nothing is imported while a {OPEN!r} is left: write the answer in its place, or remove the channel."
         lines.append(said)
-    lines += [f"# {sentence}" for sentence in found.left_out]
+    lines += [f"# {printable(sentence)}" for sentence in found.left_out]
     for key, words in (("body", " | ".join(BODY)), ("world", " | ".join(WORLD))):
         lines += _comment(found, key, "")
         value = getattr(mapping, key)
@@ -103,8 +104,8 @@ def as_text(found: Draft, source: str) -> str:
 
 
 def _comment(found: Draft, key: str, indent: str) -> list[str]:
-    lines = [f"{indent}# {found.evidence[key]}"] if found.evidence.get(key) else []
-    return lines + ([f"{indent}# OPEN: {found.open[key]}"] if key in found.open else [])
+    lines = [f"{indent}# {printable(found.evidence[key])}"] if found.evidence.get(key) else []
+    return lines + ([f"{indent}# OPEN: {printable(found.open[key])}"] if key in found.open else [])
 
 
 def _guess_time(draft: Draft) -> None:
