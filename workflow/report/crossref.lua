@@ -170,6 +170,20 @@ local resolve = {
     end
     return out
   end,
+  -- []{.page of="fig:x"}: the page of a label, in print.
+  Span = function(span)
+    if not span.classes:includes("page") then
+      return nil
+    end
+    local of = span.attributes.of
+    if not numbers[of] then
+      error("report: there is nothing called " .. of .. " to refer to.")
+    end
+    if not is_typst then
+      return pandoc.Inlines({})
+    end
+    return pandoc.RawInline("typst", "(p.~#context counter(page).at(<" .. of .. ">).first())")
+  end,
   Image = function(image)
     -- A figure that moves on the page stands still in the PDF.
     if image.attributes.moving and not is_typst then
