@@ -204,7 +204,7 @@ def of_published(coefficients: pd.DataFrame) -> pd.DataFrame:
     """Coefficients found next to published ones, as text: small ones in units of a power of ten."""
     rows = []
     for row in coefficients.itertuples():
-        power = power_of(row.found)
+        power = power_of(max(abs(row.found), abs(row.published)))
         found, low, high, published = (
             f"{x / 10**power:.3g}" for x in (row.found, row.low_95, row.high_95, row.published)
         )
@@ -242,12 +242,13 @@ def labelled_state(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     for one in found if not missing else ():
         verdict = one["verdict"]
         claimed = [e for e in verdict["effects"] if e["status"] in CLAIMED]
-        by_id = {
-            name: next(
-                ({**e, "numbers": {p["symbol"]: p for p in e["parameters"]}} for e in claimed if holds(e, name)), None
-            )
-            for name in ("unequal_rotors", "com_offset", "payload", "motor_lag")
-        }
+        by_id = {}
+        for name in ("unequal_rotors", "com_offset", "payload", "motor_lag"):
+            effect = next((e for e in claimed if name in (e["id"], *e["alternatives"])), None)
+            if effect:
+                ids = [words(x) for x in dict.fromkeys((effect["id"], *effect["alternatives"]))]
+                effect = {**effect, "ids": ids, "numbers": {p["symbol"]: p for p in effect["parameters"]}}
+            by_id[name] = effect
         held = {name: channel["rmse"]["held_out"] for name, channel in verdict["channels"].items()}
         sets[one["study"].removeprefix("crazypad-")] = {
             **quoted.said(verdict),
@@ -263,38 +264,29 @@ def labelled_state(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return {"available": bool(sets), "reason": reason, "sets": sets}
 
 
-def holds(effect: Mapping[str, Any], name: str) -> bool:
-    """Whether an effect's class holds the id `name`."""
-    return name in (effect["id"], *effect["alternatives"])
-
-
 def of_labelled(judged: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
-    """Claimed effects of labelled sets with equation and numbers, a row a number, as text."""
+    """Claimed effects of labelled sets, a row an effect, as text: class, equation, numbers with intervals, share."""
     rows = []
     for name, verdict in judged.items():
-        for effect in verdict["effects"]:
-            if effect["status"] not in CLAIMED:
-                continue
-            others = " or ".join(x for x in effect["alternatives"] if x != effect["id"])
-            for p in effect["parameters"] or [{"symbol": None, "value": None, "unit": None, "interval_95": None}]:
-                low, high = p["interval_95"] or (None, None)
-                numbers = {"value": p["value"], "low_95": low, "high_95": high}
-                one = {"effect": effect["id"], "alternatives": others, "status": effect["status"], **numbers}
-                rows.append(
-                    {
-                        "set": LABELLED[name],
-                        "equation": effect["equation"],
-                        **one,
-                        **{k: p[k] for k in ("symbol", "unit")},
-                    }
-                )
-    if not rows:
-        return pd.DataFrame(columns=["set", "effect", "equation", "symbol", "value", "unit"])
-    table_of = pd.DataFrame(rows)
-    shown = of_effects(table_of)
-    shown.insert(0, "set", table_of["set"])
-    shown["equation"] = table_of["equation"]
-    return shown
+        for effect in (e for e in verdict["effects"] if e["status"] in CLAIMED):
+            others = [words(x) for x in effect["alternatives"] if x != effect["id"]]
+            numbers = []
+            for p in effect["parameters"]:
+                low, high = p["interval_95"]
+                scale, unit = (1000.0, "mm") if p["unit"] == "m" else (1.0, "" if p["unit"] == "1" else p["unit"])
+                value, low, high = (f"{scale * x:.2g}".replace("-", "−") for x in (p["value"], low, high))
+                numbers.append(f"{p['symbol']} = {value} ({low} to {high}) {unit}".strip())
+            share = effect["share"]
+            rows.append(
+                {
+                    "set": LABELLED[name],
+                    "effect": words(effect["id"]) + (f" (or: {' or '.join(others)})" if others else ""),
+                    "equation": effect["equation"],
+                    "numbers": "; ".join(numbers),
+                    "share": "–" if share is None else f"{100 * share:.0f} %",
+                }
+            )
+    return pd.DataFrame(rows, columns=["set", "effect", "equation", "numbers", "share"])
 
 
 def of_errors(judged: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
@@ -305,13 +297,11 @@ def of_errors(judged: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
             if channel not in verdict["channels"]:
                 continue
             own = verdict["channels"][channel]
-            held = own["rmse"]["held_out"]
-            numbers = {
-                k: "–" if held[k] is None else f"{held[k]:.3g}" for k in ("before", "refitted", "named", "after")
-            }
-            noise = own["noise_floor"]
-            row = {"set": LABELLED[name], "channel": words(channel), "unit": own["unit"], **numbers}
-            rows.append(row | {"noise": "–" if noise is None else f"{noise:.2g}"})
+            scale, unit = (1000.0, "mN m") if own["unit"] == "N m" else (1.0, own["unit"])
+            held = own["rmse"]["held_out"] | {"noise": own["noise_floor"]}
+            stages = ("before", "refitted", "named", "after", "noise")
+            numbers = {k: "–" if held[k] is None else f"{scale * held[k]:.3g}" for k in stages}
+            rows.append({"set": LABELLED[name], "channel": words(channel), "unit": unit, **numbers})
     return pd.DataFrame(rows, columns=["set", "channel", "unit", "before", "refitted", "named", "after", "noise"])
 
 

@@ -59,7 +59,7 @@ NOTICE = (
 
 
 CITED = read_yaml(Path("CITATION.cff"))
-PROJECT = f"**rotorid** {CITED['version']}, {', '.join(author['name'] for author in CITED['authors'])}. {CITED['license']} licence."
+PROJECT = f"rotorid {CITED['version']}, {', '.join(author['name'] for author in CITED['authors'])}. {CITED['license']} licence."
 ORIGIN = in_words(ROOT, CODE.of("workflow/scripts/judge.py"))
 
 
