@@ -143,6 +143,16 @@ local count = {
   end,
 }
 
+-- Whether a label lies in a chapter that this report leaves out.
+local function is_left_out(label)
+  for _, name in ipairs(left_out) do
+    if not numbers[label] and label:match("^%a+:(.*)$"):sub(1, #name) == name then
+      return true
+    end
+  end
+  return false
+end
+
 -- Second walk: references, and paths of images as typst wants them.
 local resolve = {
   Cite = function(cite)
@@ -153,11 +163,8 @@ local resolve = {
         return nil
       end
       local number = numbers[citation.id]
-      local chapter_of_it = citation.id:match("^%a+:(.*)$")
-      for _, name in ipairs(left_out) do
-        if not number and chapter_of_it:sub(1, #name) == name then
-          return pandoc.Str("a part that this report leaves out")
-        end
+      if is_left_out(citation.id) then
+        return pandoc.Str("a part that this report leaves out")
       end
       if not number then
         error("report: there is nothing called " .. citation.id .. " to refer to.")
@@ -176,10 +183,10 @@ local resolve = {
       return nil
     end
     local of = span.attributes.of
-    if not numbers[of] then
+    if not numbers[of] and not is_left_out(of) then
       error("report: there is nothing called " .. of .. " to refer to.")
     end
-    if not is_typst then
+    if not is_typst or not numbers[of] then
       return pandoc.Inlines({})
     end
     return pandoc.RawInline("typst", "(p.~#context counter(page).at(<" .. of .. ">).first())")

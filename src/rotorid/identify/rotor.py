@@ -437,8 +437,8 @@ def speed_law(points: pd.DataFrame) -> dict:
 
     `points` has the columns `test throttle speed_rad_s speed_sd_rad_s samples voltage_v`; each point counts by the
     standard error of its mean speed, and the intervals are as wide as the residuals in these units ask for. `apart` are
-    the tests that lie off the law by more than chance, against the spread of the others: one law does not hold for them.
-    Raises InputError for fewer than six points at which the motor turns.
+    the tests that lie off the law by more than chance, against the spread of the others. Raises InputError
+    for fewer than six points at which the motor turns.
     """
     kept = points[(points["speed_rad_s"] > 0) & (points["throttle"] > 0)]
     if len(kept) < 6:

@@ -355,7 +355,8 @@ def _columns_pt(
 
 def _seen(markdown: str) -> str:
     """About what is seen of a cell's markdown: without the signs for mathematics, raised and escaped letters."""
-    return re.sub(r"[$^{}\\_]", "", markdown)
+    placed = re.sub(r"@\S+\[\]\{\.page [^}]*\}", "Figure.12.3.(p.45)", markdown.replace("\u00a0[", "["))
+    return re.sub(r"[$^{}\\_`]", "", placed)
 
 
 def _shares_of(headings: Sequence[str], cells: Sequence[Sequence[str]]) -> str:
@@ -451,7 +452,7 @@ def code(value: Any) -> str:
 
 def place(label: Any) -> str:
     """What carries a label (`fig:bench-dynamic`) by its number, and in print its page."""
-    return f'@{label} []{{.page of="{label}"}}'
+    return f'@{label}\u00a0[]{{.page of="{label}"}}'
 
 
 def unit(value: Any) -> str:
