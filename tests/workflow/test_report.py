@@ -253,8 +253,8 @@ def test_a_place_in_a_table_is_a_number_with_its_page(chapters: list[str]) -> No
     cells = typeset.table_of([{"w": "fig:first-box"}], "Places.", [("w", "Where", "place")], "tbl:places")
     Path("three.md").write_text(f"# Third {{#sec:third}}\n\n{cells}")
     chapters = [*chapters, "three.md"]
-    source, page = typst_of(chapters), plain(html_of(chapters))
-    assert "[Figure~1.1]" in source and "counter(page).at(<fig:first-box>)" in source and "Figure\u00a01.1" in page
+    assert "context counter(page).at(<fig:first-box>)" in typst_of(chapters)
+    assert html_of(chapters).count('href="#fig:first-box"') == html_of(chapters[:2]).count('href="#fig:first-box"') + 1
     typeset.pdf("report.typ", "report.pdf")
     Path("three.md").write_text(Path("three.md").read_text().replace("first-box", "nothing"))
     refused("there is nothing called fig:nothing", typst_of, chapters)
