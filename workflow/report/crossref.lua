@@ -222,7 +222,7 @@ local lists = {
       lines:insert(pandoc.Para(line))
     end
     if is_typst then
-      lines:insert(1, pandoc.RawBlock("typst", "#columns(2, gutter: 1.6em)[#set text(size: 8.3pt)\n#set par(leading: 0.4em, spacing: 0.55em, justify: false)"))
+      lines:insert(1, pandoc.RawBlock("typst", "#columns(3, gutter: 1.2em)[#set text(size: 7pt)\n#set par(leading: 0.35em, spacing: 0.4em, justify: false)"))
       lines:insert(pandoc.RawBlock("typst", "]"))
     end
     return pandoc.Div(lines, { class = "listing" })
