@@ -9,7 +9,6 @@ local kinds = {
 }
 local chapter, counts, sections = 0, {}, {}
 local numbers = {} -- identifier -> number as text
-local listed = { fig = {}, tbl = {} } -- identifier, number and first sentence of each caption, in reading order
 local left_out = {} -- chapters that are not in this report
 local is_typst = FORMAT:match("typst") ~= nil
 
@@ -35,47 +34,11 @@ local function with_number(word, number, inlines)
   return out
 end
 
--- First sentence of a caption, without the words that say what the figure is made of.
--- What is emulated or stored stays marked, since a list has nothing else that says so.
-local function first_sentence(inlines)
-  local out, started, open = pandoc.Inlines({}), false, 0
-  local first = inlines[1]
-  local emulated = first and first.t == "Emph" and pandoc.utils.stringify(first):match("^Emulated")
-  local stored, skipping = false, false
-  for position, inline in ipairs(inlines) do
-    if not started and inline.t == "Str" and inline.text:match("^Stored[.;,]$") then
-      stored, skipping = true, true
-    end
-    if skipping then
-      skipping = not (inline.t == "Str" and inline.text:match("%.$"))
-    elseif inline.t ~= "RawInline" and not (position == 1 and inline.t == "Emph") and (started or inline.t ~= "Space") then
-      started = true
-      out:insert(inline)
-      if inline.t == "Str" then
-        open = open + select(2, inline.text:gsub("%(", "")) - select(2, inline.text:gsub("%)", ""))
-      end
-      if inline.t == "Str" and open <= 0 and inline.text:match("[.;]$") and not inline.text:match("eqs?%.$") then
-        out[#out] = pandoc.Str((inline.text:gsub("[.;]$", "")))
-        break
-      end
-    end
-  end
-  if emulated then
-    out:extend(pandoc.Inlines({ pandoc.Space(), pandoc.Str("(emulated)") }))
-  end
-  if stored then
-    out:extend(pandoc.Inlines({ pandoc.Space(), pandoc.Str("(stored)") }))
-  end
-  return out
-end
-
 local function number_caption(element, word, number)
   local long = element.caption.long
   if #long == 0 then
     long = pandoc.Blocks({ pandoc.Plain({}) })
   end
-  local kind = word == "Figure" and "fig" or "tbl"
-  table.insert(listed[kind], { element.identifier, number, first_sentence(long[1].content) })
   long[1].content = with_number(word, number, long[1].content)
   element.caption.long = long
   return element
@@ -204,31 +167,6 @@ local resolve = {
   end,
 }
 
--- ::: {#list-of-figures} and ::: {#list-of-tables} become lists with links, in the PDF with page numbers.
-local lists = {
-  Div = function(div)
-    local kind = ({ ["list-of-figures"] = "fig", ["list-of-tables"] = "tbl" })[div.identifier]
-    if not kind then
-      return nil
-    end
-    local lines = pandoc.Blocks({})
-    for _, entry in ipairs(listed[kind]) do
-      local identifier, number, words = table.unpack(entry)
-      local line = pandoc.Inlines({ pandoc.Link({ pandoc.Str(number) }, "#" .. identifier), pandoc.Str("\u{2002}") })
-      line:extend(words)
-      if is_typst and identifier ~= "" then
-        line:insert(pandoc.RawInline("typst", "#h(0.4em)#box(width: 1fr, repeat[.#h(0.3em)])#h(0.4em)#context counter(page).at(<" .. identifier .. ">).first()"))
-      end
-      lines:insert(pandoc.Para(line))
-    end
-    if is_typst then
-      lines:insert(1, pandoc.RawBlock("typst", "#columns(3, gutter: 1.2em)[#set text(size: 7pt)\n#set par(leading: 0.35em, spacing: 0.4em, justify: false)"))
-      lines:insert(pandoc.RawBlock("typst", "]"))
-    end
-    return pandoc.Div(lines, { class = "listing" })
-  end,
-}
-
 -- In print a figure or table that does not fit on the page may stand some sentences later, so that no page ends half
 -- empty: metadata `later` says how many steps (`fig:a=1,tbl:b=2`). A step never cuts a sentence or passes a heading or
 -- another figure. Marks say where the text before each one ends, and whether it may go further.
@@ -299,5 +237,5 @@ function Pandoc(document)
     end
     document.blocks = spread(document.blocks, later)
   end
-  return document:walk(count):walk(lists):walk(resolve)
+  return document:walk(count):walk(resolve)
 end
