@@ -132,7 +132,8 @@ def results_page() -> str:
     lines += [f"| `{e}` | {own['what']} | {own.get('holds', '')} |" for e, own in known.items() if e not in listed]
     lines += [
         "",
-        "`results/logs/<rule>/` holds the log of each job with its traceback, and the executed notebooks.",
+        "`results/logs/<rule>/` holds the log of each job with its traceback, `results/notebooks/` the executed",
+        "notebooks with their figures and tables.",
         "",
     ]
     return "\n".join(lines)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -102,4 +103,56 @@ def nothing(reason: str) -> Figure:
     fig, ax = style.figure(0.8)
     ax.set_axis_off()
     ax.text(0.5, 0.5, reason, ha="center", va="center", color=style.GREY, transform=ax.transAxes)
+    return fig
+
+
+_SMOOTHED_S = 0.2
+"""Residuals are shown as means over this time: what is faster is noise of the derivatives."""
+
+
+def _smoothed(time_s: np.ndarray, values: np.ndarray, over_s: float) -> np.ndarray:
+    """Running mean (n,) over `over_s` seconds of evenly sampled values (n,)."""
+    width = max(1, round(over_s / float(np.median(np.diff(time_s)))))
+    kernel = np.ones(width)
+    return np.convolve(values, kernel, "same") / np.convolve(np.ones(len(values)), kernel, "same")
+
+
+def moments(left: Mapping[str, pd.DataFrame]) -> Figure:
+    """Roll and pitch moment over time, measured less modelled, a column a set: believed vehicle, and with the names.
+
+    Each table has `time_s`, `moment_x_before`, `moment_x_after` and the same of y (N m).
+    """
+    fig, axes = style.figure(3.1 if len(left) > 1 else 2.5, 2, len(left), sharey="row", squeeze=False)
+    for column, (name, table) in enumerate(left.items()):
+        time = table["time_s"].to_numpy() - table["time_s"].iloc[0]
+        for row, channel in enumerate(("moment_x", "moment_y")):
+            axis = axes[row, column]
+            for stage, label in (("before", "as believed"), ("after", "with what was named")):
+                values = 1000 * _smoothed(time, table[f"{channel}_{stage}"].to_numpy(), _SMOOTHED_S)
+                axis.plot(time, values, color=style.COLOUR[stage], lw=0.9, label=label)
+            axis.axhline(0.0, color=style.GREY, lw=0.6)
+            symbol, _ = style.CHANNELS[channel]
+            if not column:
+                axis.set_ylabel(f"{symbol} (mN m)")
+        if len(left) > 1:
+            axes[0, column].set_title(name)
+        axes[1, column].set_xlabel("time (s)")
+    fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
+    return fig
+
+
+def bench_error(traces: pd.DataFrame, channels: Sequence[str]) -> Figure:
+    """Reading less reference of one run, means over a second, a row a channel: as believed and with the names."""
+    fig, axes = style.figure(0.5 + 0.95 * len(channels), len(channels), 1, sharex=True, squeeze=False)
+    for axis, channel in zip(axes[:, 0], channels, strict=True):
+        part = traces[traces["channel"] == channel]
+        time = part["time_s"].to_numpy()
+        for stage, label in (("before", "as believed"), ("after", "with what was named")):
+            axis.plot(
+                time, _smoothed(time, part[stage].to_numpy(), 1.0), color=style.COLOUR[stage], lw=1.1, label=label
+            )
+        symbol, unit = style.CHANNELS[channel]
+        axis.set_ylabel(f"{symbol} ({unit})")
+    axes[-1, 0].set_xlabel("time (s)")
+    fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
     return fig

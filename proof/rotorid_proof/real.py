@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from rotorid.recordings import RecordingSet
 from rotorid_proof.studies import Study
@@ -25,6 +26,19 @@ STATED = ("established", "ambiguous")
 def with_split(recordings: RecordingSet, wanted: Study) -> RecordingSet:
     """The set with the runs held out that the study asks for."""
     return recordings if wanted.held_out is None else replace(recordings, held_out=wanted.held_out)
+
+
+SHOWN_HZ = 50.0
+"""Rate at which residuals are kept for figures."""
+
+
+def left_of(residuals: pd.DataFrame, verdict: Mapping[str, Any]) -> pd.DataFrame:
+    """Residuals of force and moment over time of the first run held out, thinned: a verdict's `residuals_of`."""
+    own = residuals[residuals["run"].isin(verdict["runs"]["held_out"][:1])].reset_index(drop=True)
+    if own.empty:
+        return own
+    step = max(round(1 / SHOWN_HZ / float(np.median(np.diff(own["time_s"])))), 1)
+    return own[[c for c in own if c in ("run", "time_s") or c.split("_")[0] in ("force", "moment")]].iloc[::step]
 
 
 def mean_total_speed(recordings: RecordingSet) -> float | None:

@@ -4,26 +4,15 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import pandas as pd
 
-from rotorid_proof import table
+from rotorid_proof import quoted, table
 from rotorid_proof.intervals import wilson
 
-RATIOS = ("location_f1", "oracle")
-"""Rows whose value is no share."""
-METHODS = {
-    "rotorid": "rotorid",
-    "refit_only": "refit only",
-    "stepwise_pse": "stepwise, PSE",
-    "pysindy": "PySINDy",
-    "boosting": "gradient boosting",
-    "sample_split": "sample-split F-test",
-}
 NOT_KEPT = "not kept"
-DEVELOPMENT = "development"
-"""In the place of a release's date: the commit that stored the development cases, of which no hash was kept."""
 
 
 def short_code(code: object) -> str:
@@ -32,241 +21,67 @@ def short_code(code: object) -> str:
     return " ".join(part[:7] for part in known) or NOT_KEPT
 
 
-def codes_of(tables: Mapping[str, pd.DataFrame], stored_with: str = "") -> dict[str, str]:
-    """Beginnings of the hashes of the code that judged each stored table's rows, in words.
-
-    Where no hash was kept, `stored_with` is the commit that stored the rows: no later code judged them.
-    """
-    unknown = f"{NOT_KEPT} (of commit {stored_with} or before)" if stored_with else NOT_KEPT
-    found = {}
-    for name, stored in tables.items():
-        column = "judged_by" if "judged_by" in stored else "code"
-        rows = stored[column] if column in stored else pd.Series([None])
-        codes = sorted({short_code(code) for code in rows}, key=lambda code: (code == NOT_KEPT, code))
-        found[name] = ", ".join(unknown if code == NOT_KEPT else code for code in codes)
-    return found
-
-
-def commits(releases: pd.DataFrame) -> dict[str, str]:
-    """Short name of each release by the date that its cases are drawn from: the commit whose code met them first."""
-    return {str(row.released): str(row.commit)[:7] for row in releases.itertuples()}
-
-
 DRAWN_KINDS = {"flights": ("flight",), "stands": ("stand",), "benches": ("bench",), "all": table.KINDS}
 
 
-def of_drawn(cases: pd.DataFrame, released: str) -> pd.DataFrame:
-    """Drawn cases of one release, judged once by one code, as text: a row a kind, one of all, their target and state.
+def of_stored(cases: pd.DataFrame, plantings: pd.DataFrame, released: str) -> pd.DataFrame:
+    """What is too dear for the run that makes a report, a row a count: drawn cases of one release, and plantings.
 
-    `right`: of the sets with something hidden (`hidden`), those in which all of it was named and nothing else;
-    `share`, with its 95 % interval (Wilson); `wrong`: those with a wrong name; `alarms`: of the clean sets; `names`:
-    wrong ones of all.
+    `what` is counted, `key` names the row for a text, `count` and `of` are sets (causes in real flights), `share` their
+    quotient with its 95 % interval (Wilson), `code` the beginning of the hash of the code that judged.
     """
     own = cases[cases["released"].astype(str) == released]
-    rows = [{"kind": name, **_drawn(own[own["kind"].isin(kinds)])} for name, kinds in DRAWN_KINDS.items()]
-    rows = [row for row in rows if row["hidden"]]
-    if rows:
-        states = _states_of_drawn(own)
-        rows.append(
-            {"kind": "target", "alarms": f"≤ {100 * table.MOST_ALARMS:g} %", "names": f"≤ {100 * table.MOST_WRONG:g} %"}
-        )
-        rows.append({"kind": "state", **states})
-    return pd.DataFrame(rows, columns=["kind", "hidden", "right", "share", "wrong", "alarms", "names"]).fillna("")
-
-
-def of_releases(cases: pd.DataFrame, releases: pd.DataFrame) -> pd.DataFrame:
-    """The same for each release, a row each, all its kinds together, and one for all releases; `releases`: their code.
-
-    `state`: what the alarms are, held against their target.
-    """
-    drawn = cases[cases["released"].notna()]
+    clean, right = own["clean"].astype(bool), own["right"].astype(bool)
+    named = own["truth"].notna() | own["values_true"].notna()
+    code = ", ".join(sorted({short_code(code) for code in own["judged_by"]}))
     rows = []
-    for release in releases.itertuples():
-        own = drawn[drawn["released"].astype(str) == str(release.released)]
-        if len(own):
-            named = {"released": str(release.commit)[:7], "by": short_code(release.code)}
-            rows.append({**named, **_drawn(own), "state": _states_of_drawn(own)["alarms"]})
-    if len(rows) > 1:
-        rows.append({"released": "all", "by": "each its own", **_drawn(drawn), "state": ""})
-    columns = ["released", "by", "hidden", "right", "share", "wrong", "alarms", "state", "names"]
-    return pd.DataFrame(rows, columns=columns)
-
-
-def _drawn(own: pd.DataFrame) -> dict[str, str]:
-    """Counts of drawn cases as text."""
-    clean = own["clean"].astype(bool)
-    hidden, nothing = own[~clean], own[clean]
-    right = int(hidden["right"].astype(bool).sum())
-    return {
-        "hidden": str(len(hidden)) if len(hidden) else "",
-        "right": str(right),
-        "share": span("", *wilson(right, len(hidden))) if len(hidden) else "–",
-        "wrong": str(int((hidden["false_count"] > 0).sum())),
-        "alarms": f"{int(nothing['false_alarm'].astype(bool).sum())} of {len(nothing)}" if len(nothing) else "–",
-        "names": f"{int(own['false_count'].sum())} of {int(own['claim_count'].sum())}",
-    }
-
-
-def _states_of_drawn(own: pd.DataFrame) -> dict[str, str]:
-    scores = own.to_dict("records")
-    alarms = table.rate([s for s in scores if s["clean"]], lambda s: s["false_alarm"])
-    wrong = table.false_discoveries(scores)
-    return {
-        name: table.finished(name, "", None, most, found)["holds"] or ""
-        for name, most, found in (("alarms", table.MOST_ALARMS, alarms), ("names", table.MOST_WRONG, wrong))
-    }
-
-
-def of_questions(cases: pd.DataFrame, parameters: pd.DataFrame, better: pd.DataFrame) -> pd.DataFrame:
-    """Cases for development as text, a row a question: those of flights, stands and benches together where all have it.
-
-    `kinds`: what was measured of each kind of recordings alone, where more than one has the question. `better`: rows
-    of the summary that count no cases, put below.
-    """
-    listed = [s for s in table.scores_from(cases, parameters) if (s["kind"], s["family"]) not in table.SIMULATORS]
-    by_kind = [table.rows_of([s for s in listed if s["kind"] == kind]) for kind in table.KINDS]
-    together = table.rows_of(listed)
-    rows = []
-    for k, whole in enumerate(together):
-        shared = whole["id"] in table.GROUND_ROWS
-        own = [of_one[k] for of_one in by_kind]
-        known = [number(row["id"], row["value"]) for row in own if row["cases"]] if shared else []
-        rows.append({**(whole if shared else own[0]), "kinds": _side_by_side(known)})
-    measured = pd.DataFrame([*(row for row in rows if row["cases"]), *better.to_dict("records")])
-    shown = _shown(measured).assign(kinds=measured["kinds"].fillna(""))
-    # What has a target stands first.
-    return shown.loc[(shown["target"] == "").sort_values(kind="stable").index]
-
-
-def _side_by_side(numbers: list[str]) -> str:
-    """Numbers of several kinds in one cell, the unit once; nothing where they are one."""
-    if len(numbers) < 2:
-        return ""
-    unit = " %" if numbers[-1].endswith(" %") else ""
-    return " / ".join(text.removesuffix(" %").removesuffix(".0") for text in numbers) + unit
-
-
-def _of(score: pd.Series) -> str:
-    """A share as `14 of 25`."""
-    count = int(score["count"])
-    return f"{round(float(score['value']) * count)} of {count}" if count else "–"
-
-
-PLANTED = {
-    "named": "named",
-    "size covered": "covered",
-    "ids new or lost a set": "moved",
-    "values new or lost a set": "values",
-}
-"""Scores of the planted sets that the report shows, and their columns."""
-PLANTED_KINDS = ("code", "all", "target", "state", "flight", "family")
-"""What a row of the plantings is of, in the order shown; those of single causes stay in the stored table."""
-
-
-def of_plantings(now: pd.DataFrame) -> pd.DataFrame:
-    """What was planted in real flights at the larger size, as text: by one code, by all; then by flight and family.
-
-    `named`, `covered` (size inside the 95 % interval) as counts, `moved` and `values` a set. Below the first two stand
-    the targets, and whether these hold by the one code. `kind` says what a row is of.
-    """
-    large = now[now["size"] == "large"]
-    rows, judged = [], large[large["group"] == "all"]
-    for group, own in large.groupby("group", sort=False):
-        kind, _, name = str(group).partition(" ")
-        if kind not in PLANTED_KINDS:
-            continue
-        row = {"group": {"code": group, "all": "all codes"}.get(kind) or words(name), "kind": kind}
-        for what, column in PLANTED.items():
-            score = own[own["what"] == what].iloc[0]
-            share = what in ("named", "size covered")
-            row[column] = _of(score) if share else f"{score['value']:.2f}"
-        rows.append(row)
-        judged = own if kind == "code" else judged
-    by_score = judged.set_index("what")
-    for name, cell in (("target", _target_of_planting), ("state", lambda score: score["state"])):
-        rows.append({"group": name, "kind": name})
-        rows[-1].update({column: cell(by_score.loc[what]) for what, column in PLANTED.items()})
-    out = pd.DataFrame(rows, columns=["group", "kind", *PLANTED.values()]).fillna("")
-    return out.loc[out["kind"].map(PLANTED_KINDS.index).sort_values(kind="stable").index]
-
-
-def _target_of_planting(score: pd.Series) -> str:
-    if pd.notna(score["at_least"]):
-        return f"≥ {number('', score['at_least'])}"
-    return f"≤ {score['at_most']:g}" if pd.notna(score["at_most"]) else ""
-
-
-def _shown(rows: pd.DataFrame) -> pd.DataFrame:
-    out = pd.DataFrame(
-        [
-            {
-                "what": row["what"],
-                "measured": number(row["id"], row["value"]),
-                "interval": ""
-                if pd.isna(row["low_95"]) or pd.isna(row["value"])
-                else span(row["id"], row["low_95"], row["high_95"]),
-                "cases": "" if pd.isna(row["cases"]) else str(int(row["cases"])),
-                "target": target(row).replace("\u00a0", " "),
-                "holds": "" if pd.isna(row["holds"]) else row["holds"],
-            }
-            for _, row in rows.iterrows()
-        ]
-    )
-    out["with_interval"] = [
-        f"{row.measured} ({row.interval})" if row.interval else row.measured for row in out.itertuples()
+    for kind, kinds in DRAWN_KINDS.items():
+        here = own["kind"].isin(kinds) & ~clean & named
+        key = "all" if kind == "all" else "kind"
+        rows.append((key, f"something to be named, {kind}: all of it named and no wrong name", right & here, here))
+    hidden, other = ~clean & named, ~clean & ~named
+    further = own.apply(has_further_name, axis=1)
+    rows += [
+        (
+            "further",
+            "of these right ones: a further name that the score allows",
+            further & right & hidden,
+            right & hidden,
+        ),
+        ("outside", "outside the catalogue, or too small to be named: no wrong name", right & other, other),
+        ("allowed", "of these right ones: a name that is not what is hidden", further & right & other, right & other),
+        ("wrong", "something hidden: a wrong name", ~clean & (own["false_count"] > 0), ~clean),
+        ("alarms", "nothing hidden: an alarm", clean & own["false_alarm"].astype(bool), clean),
     ]
-    return out
+    out = [_counted(key, what, int(part.sum()), int(whole.sum()), code) for key, what, part, whole in rows]
+    large = plantings[(plantings["size"] == "large") & plantings["group"].str.startswith("code ")]
+    for key, what in PLANTED.items():
+        for score in large[large["what"] == what].to_dict("records"):
+            of = int(score["count"])
+            planted = short_code(score["group"].removeprefix("code "))
+            out.append(_counted(key, PLANTED_WORDS[key], round(float(score["value"]) * of), of, planted))
+    columns = ["key", "what", "count", "of", "share", "code"]
+    return pd.DataFrame([row for row in out if row["of"]], columns=columns)
 
 
-def of_next_flights(summary: pd.DataFrame) -> pd.DataFrame:
-    """`what`, `count`, `share` and its interval of the next flight's proof, as text; shares of nothing are left out."""
-    known = summary[summary["of"] > 0]
-    return pd.DataFrame(
-        [
-            {
-                "what": row["what"],
-                "count": f"{int(row['count'])} of {int(row['of'])}",
-                "share": f"{100 * row['share']:.0f} %",
-                "interval": f"{100 * row['low']:.0f} to {100 * row['high']:.0f} %",
-            }
-            for _, row in known.iterrows()
-        ],
-        columns=["what", "count", "share", "interval"],
-    )
+def has_further_name(case: pd.Series) -> bool:
+    """Whether a case has a name whose class holds nothing of what is hidden."""
+    hidden = {*str(case["truth"]).split("; "), str(case["primary"])}
+    claims = [] if pd.isna(case["claims"]) else str(case["claims"]).split("; ")
+    return any(not hidden & set(claim.split(" or ")) for claim in claims)
 
 
-def number(key: str, value: float) -> str:
-    """A share as percent, a ratio with two decimals, nothing as a dash."""
-    if pd.isna(value):
-        return "–"
-    key = key.removeprefix("stand_").removeprefix("bench_")
-    if key == "better":
-        return "yes" if value else "no"
-    return f"{value:.2f}" if key in RATIOS else f"{100 * value:.1f} %"
+PLANTED = {"planted": "named", "planted_size": "size covered"}
+PLANTED_WORDS = {
+    "planted": "a cause planted in a real flight: named",
+    "planted_size": "a cause planted in a real flight: its size inside the stated interval",
+}
 
 
-def span(key: str, low: float, high: float) -> str:
-    """Two ends, the unit once, kept on one line."""
-    return f"{number(key, low).removesuffix(' %')} to {number(key, high)}".replace(" ", "\u00a0")
-
-
-def target(row: pd.Series) -> str:
-    """The target in words."""
-    low, high = row["at_least"], row["at_most"]
-    if pd.notna(low) and pd.notna(high):
-        return span(row["id"], low, high)
-    if pd.notna(low):
-        return "yes" if row["id"] == "better" else f"≥ {number(row['id'], low)}"
-    return f"≤ {number(row['id'], high)}" if pd.notna(high) else ""
-
-
-def of_methods(peers: pd.DataFrame) -> pd.DataFrame:
-    """One row a method, shares as percent."""
-    out = peers.copy()
-    for column in out.columns.drop(["method", "cases"]):
-        out[column] = [number(column, value) for value in out[column]]
-    out["method"] = [METHODS.get(name, name) for name in out["method"]]
-    return out
+def _counted(key: str, what: str, count: int, of: int, code: str) -> dict[str, object]:
+    low, high = wilson(count, of) if of else (0.0, 0.0)
+    share = f"{100 * count / of:.0f} % ({100 * low:.0f} to {100 * high:.0f})" if of else ""
+    return {"key": key, "what": what, "count": count, "of": of, "share": share.replace(" ", "\u00a0"), "code": code}
 
 
 def of_studies(real: pd.DataFrame) -> pd.DataFrame:
@@ -389,7 +204,7 @@ def of_published(coefficients: pd.DataFrame) -> pd.DataFrame:
     """Coefficients found next to published ones, as text: small ones in units of a power of ten."""
     rows = []
     for row in coefficients.itertuples():
-        power = power_of(row.found)
+        power = power_of(max(abs(row.found), abs(row.published)))
         found, low, high, published = (
             f"{x / 10**power:.3g}" for x in (row.found, row.low_95, row.high_95, row.published)
         )
@@ -405,3 +220,104 @@ def of_published(coefficients: pd.DataFrame) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows)
+
+
+LABELLED = {
+    "crazypad-normal": "unharmed",
+    "crazypad-cut": "propeller 3 cut",
+    "crazypad-weight": "weight near rotor 3",
+}
+"""Sets whose authors say what they did, in words."""
+SHOWN_CHANNELS = ("force_z", "moment_x", "moment_y", "position", "velocity", "attitude")
+CLAIMED = ("established", "ambiguous")
+
+
+def labelled_state(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """What the verdicts on labelled sets say, by set, for a text; `reason` where one could not be had.
+
+    `unequal` and `com` are the claimed effects that the authors' changes are, or None; `parameters` by symbol.
+    """
+    missing = [one["reason"] for one in found if not one["available"]]
+    sets = {}
+    for one in found if not missing else ():
+        verdict = one["verdict"]
+        claimed = [e for e in verdict["effects"] if e["status"] in CLAIMED]
+        by_id = {}
+        for name in ("unequal_rotors", "com_offset", "payload", "motor_lag"):
+            effect = next((e for e in claimed if name in (e["id"], *e["alternatives"])), None)
+            if effect:
+                ids = [words(x) for x in dict.fromkeys((effect["id"], *effect["alternatives"]))]
+                effect = {**effect, "ids": ids, "numbers": {p["symbol"]: p for p in effect["parameters"]}}
+            by_id[name] = effect
+        held = {name: channel["rmse"]["held_out"] for name, channel in verdict["channels"].items()}
+        sets[one["study"].removeprefix("crazypad-")] = {
+            **quoted.said(verdict),
+            "names": [words(" or ".join(dict.fromkeys((e["id"], *e["alternatives"])))) for e in claimed],
+            "held_out": verdict["runs"]["held_out"],
+            "training": len(verdict["runs"]["training"]),
+            "left": verdict["unexplained"]["share"],
+            "open": verdict["unexplained"]["description"],
+            "rmse": held,
+            **by_id,
+        }
+    reason = missing[0] if missing else "" if found else "they are not among the studies of this run"
+    return {"available": bool(sets), "reason": reason, "sets": sets}
+
+
+def of_labelled(judged: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
+    """Claimed effects of labelled sets, a row an effect, as text: class, equation, numbers with intervals, share."""
+    rows = []
+    for name, verdict in judged.items():
+        for effect in (e for e in verdict["effects"] if e["status"] in CLAIMED):
+            others = [words(x) for x in effect["alternatives"] if x != effect["id"]]
+            numbers = []
+            for p in effect["parameters"]:
+                low, high = p["interval_95"]
+                scale, unit = (1000.0, "mm") if p["unit"] == "m" else (1.0, "" if p["unit"] == "1" else p["unit"])
+                value, low, high = (f"{scale * x:.2g}".replace("-", "−") for x in (p["value"], low, high))
+                numbers.append(f"{p['symbol']} = {value} ({low} to {high}) {unit}".strip())
+            share = effect["share"]
+            rows.append(
+                {
+                    "set": LABELLED[name],
+                    "effect": words(effect["id"]) + (f" (or: {' or '.join(others)})" if others else ""),
+                    "equation": effect["equation"],
+                    "numbers": "; ".join(numbers),
+                    "share": "–" if share is None else f"{100 * share:.0f} %",
+                }
+            )
+    return pd.DataFrame(rows, columns=["set", "effect", "equation", "numbers", "share"])
+
+
+def of_errors(judged: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
+    """Errors on runs held out of labelled sets: believed, refitted, with the names; half a second simulated too."""
+    rows = []
+    for name, verdict in judged.items():
+        for channel in SHOWN_CHANNELS:
+            if channel not in verdict["channels"]:
+                continue
+            own = verdict["channels"][channel]
+            scale, unit = (1000.0, "mN m") if own["unit"] == "N m" else (1.0, own["unit"])
+            held = own["rmse"]["held_out"] | {"noise": own["noise_floor"]}
+            stages = ("before", "refitted", "named", "after", "noise")
+            numbers = {k: "–" if held[k] is None else f"{scale * held[k]:.3g}" for k in stages}
+            rows.append({"set": LABELLED[name], "channel": words(channel), "unit": unit, **numbers})
+    return pd.DataFrame(rows, columns=["set", "channel", "unit", "before", "refitted", "named", "after", "noise"])
+
+
+def of_differences(compared: Mapping[str, Any]) -> pd.DataFrame:
+    """What `rotorid compare` states of labelled pairs, a row a quantity: difference, and how large it must be."""
+    rows = []
+    for name, pair in compared["pairs"].items():
+        for d in pair["level_1"]["quantities"]:
+            if not d["stated"]:
+                continue
+            quantity = pair["names"][d["id"]]
+            scale = 100.0 if quantity.endswith("(%)") else math.degrees(1.0) if "(°)" in quantity else 1.0
+            low, high = (scale * x for x in d["interval_95"])
+            found = f"{scale * d['difference']:.3g} ({low:.3g} to {high:.3g})".replace("-", "−")
+            limit = f"{scale * d['smallest_stated']:.2g}"
+            rows.append(
+                {"pair": LABELLED[f"crazypad-{name}"], "quantity": quantity, "difference": found, "limit": limit}
+            )
+    return pd.DataFrame(rows, columns=["pair", "quantity", "difference", "limit"])

@@ -109,7 +109,8 @@ def test_an_experiment_at_five_times_the_speed_of_life_is_ingested_and_aligned(e
 
 def test_rotor_and_tensile(emulator, tmp_path):
     (port,) = emulator("rotor", "ttyROTOR", more=("--speed", "20"))
-    recorded(f"rotor --port {port} --throttle 0.3", tmp_path, "r")
+    recorded(f"rotor --port {port} --throttle 0.3 --rotor spare", tmp_path, "r")
+    assert "rotor: spare" in (tmp_path / "r.yaml").read_text()
     table = read_log(tmp_path / "r.rlog").table
     assert table.throttle.max() == pytest.approx(0.3) and table.throttle.iloc[-1] == 0
     assert table.thrust_n.max() > 1.5

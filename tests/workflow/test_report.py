@@ -247,3 +247,14 @@ def test_a_browser_runs_nothing_in_the_html(named: list[str]) -> None:
             browser.open(Path("put.html"), 800)
             assert browser.value("document.title") == "Title"
             assert any("Content Security Policy" in said for said in browser.said), browser.said
+
+
+def test_a_place_in_a_table_is_a_number_with_its_page(chapters: list[str]) -> None:
+    cells = typeset.table_of([{"w": "fig:first-box"}], "Places.", [("w", "Where", "place")], "tbl:places")
+    Path("three.md").write_text(f"# Third {{#sec:third}}\n\n{cells}")
+    chapters = [*chapters, "three.md"]
+    assert "context counter(page).at(<fig:first-box>)" in typst_of(chapters)
+    assert html_of(chapters).count('href="#fig:first-box"') == html_of(chapters[:2]).count('href="#fig:first-box"') + 1
+    typeset.pdf("report.typ", "report.pdf")
+    Path("three.md").write_text(Path("three.md").read_text().replace("first-box", "nothing"))
+    refused("there is nothing called fig:nothing", typst_of, chapters)

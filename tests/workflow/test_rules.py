@@ -135,3 +135,16 @@ def test_what_a_notebook_takes_from_the_library_is_there(path: Path) -> None:
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebooks_kernel_is_the_environments_own(path: Path) -> None:
     assert json.loads(path.read_text())["metadata"]["kernelspec"]["name"] == "python3"
+
+
+def test_a_chapter_that_shows_something_has_a_notebook_whose_cells_show_it() -> None:
+    shown = r"\{\{ (?:figure|table)\("
+    showing = {name for name in CHAPTERS if re.search(shown, (ROOT / "notebooks" / f"{name}.md").read_text())}
+    assert showing - {"abstract"} == {path.stem for path in NOTEBOOKS}
+    for path in NOTEBOOKS:
+        cells = nbformat.read(path, as_version=4).cells
+        assert "style.save(" not in path.read_text() and ".to_csv(" not in path.read_text()
+        for before, cell in zip(cells, cells[1:], strict=False):
+            if "style.show(" in cell.source:
+                sentences = re.findall(r"[.:?](?:\s|$)", re.sub(r"^#.*$", "", before.source, flags=re.MULTILINE))
+                assert before.cell_type == "markdown" and len(sentences) >= 2, (path.stem, cell.source)

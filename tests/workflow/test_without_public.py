@@ -19,8 +19,7 @@ SAID = {
     "public_recordings": "Of 6 sources 0 could be obtained for this report. What was left out, and why:",
     "rotor_coefficients": "which could not be obtained: ",
     "neurobem": "which could not be obtained:",
-    "changes": "because the flights could not be obtained: ",
-    "mismatch": "a piece of real flights, was left out: ",
+    "real_flights": "**The labelled flights are left out here:** ",
 }
 
 
@@ -86,17 +85,6 @@ def test_the_conclusions_say_of_real_propellers_what_this_report_has(tmp_path: P
     text = render(section, {"propellers": str(tmp_path / "propellers.json")})
     assert ("their thrust is no exact parabola" in text) == available
     assert ("could not be\nobtained (@sec:rotor-coefficients).\n\n## Next" in text) != available
-
-
-def test_the_chapter_on_changes_says_which_pairs_are_left_out_and_what_is_stored_of_them(tmp_path: Path) -> None:
-    reason = "11 files could not be had: no answer from nowhere"
-    found = tmp_path / "found.json"
-    found.write_text(json.dumps({"available": False, "reason": reason, "pairs": {}}))
-    files = {"found": str(found), "measured": str(ROOT / "docs" / "proof" / "changes_summary.csv")}
-    text = render(ROOT / "notebooks" / "changes.md", files)
-    assert "a small weight taped near\nrotor 3" in text and "cut off the propeller" in text
-    assert f"**Both pairs are left out here**, because the flights could not be obtained: {reason}." in text
-    assert "Nothing changed" not in text and "![" not in text and "drawn pairs in simulators it named all" in text
 
 
 @pytest.mark.parametrize("available", [True, False])

@@ -9,7 +9,6 @@ local kinds = {
 }
 local chapter, counts, sections = 0, {}, {}
 local numbers = {} -- identifier -> number as text
-local listed = { fig = {}, tbl = {} } -- identifier, number and first sentence of each caption, in reading order
 local left_out = {} -- chapters that are not in this report
 local is_typst = FORMAT:match("typst") ~= nil
 
@@ -35,47 +34,11 @@ local function with_number(word, number, inlines)
   return out
 end
 
--- First sentence of a caption, without the words that say what the figure is made of.
--- What is emulated or stored stays marked, since a list has nothing else that says so.
-local function first_sentence(inlines)
-  local out, started, open = pandoc.Inlines({}), false, 0
-  local first = inlines[1]
-  local emulated = first and first.t == "Emph" and pandoc.utils.stringify(first):match("^Emulated")
-  local stored, skipping = false, false
-  for position, inline in ipairs(inlines) do
-    if not started and inline.t == "Str" and inline.text:match("^Stored[.;,]$") then
-      stored, skipping = true, true
-    end
-    if skipping then
-      skipping = not (inline.t == "Str" and inline.text:match("%.$"))
-    elseif inline.t ~= "RawInline" and not (position == 1 and inline.t == "Emph") and (started or inline.t ~= "Space") then
-      started = true
-      out:insert(inline)
-      if inline.t == "Str" then
-        open = open + select(2, inline.text:gsub("%(", "")) - select(2, inline.text:gsub("%)", ""))
-      end
-      if inline.t == "Str" and open <= 0 and inline.text:match("[.;]$") and not inline.text:match("eqs?%.$") then
-        out[#out] = pandoc.Str((inline.text:gsub("[.;]$", "")))
-        break
-      end
-    end
-  end
-  if emulated then
-    out:extend(pandoc.Inlines({ pandoc.Space(), pandoc.Str("(emulated)") }))
-  end
-  if stored then
-    out:extend(pandoc.Inlines({ pandoc.Space(), pandoc.Str("(stored)") }))
-  end
-  return out
-end
-
 local function number_caption(element, word, number)
   local long = element.caption.long
   if #long == 0 then
     long = pandoc.Blocks({ pandoc.Plain({}) })
   end
-  local kind = word == "Figure" and "fig" or "tbl"
-  table.insert(listed[kind], { element.identifier, number, first_sentence(long[1].content) })
   long[1].content = with_number(word, number, long[1].content)
   element.caption.long = long
   return element
@@ -143,6 +106,16 @@ local count = {
   end,
 }
 
+-- Whether a label lies in a chapter that this report leaves out.
+local function is_left_out(label)
+  for _, name in ipairs(left_out) do
+    if not numbers[label] and label:match("^%a+:(.*)$"):sub(1, #name) == name then
+      return true
+    end
+  end
+  return false
+end
+
 -- Second walk: references, and paths of images as typst wants them.
 local resolve = {
   Cite = function(cite)
@@ -153,11 +126,8 @@ local resolve = {
         return nil
       end
       local number = numbers[citation.id]
-      local chapter_of_it = citation.id:match("^%a+:(.*)$")
-      for _, name in ipairs(left_out) do
-        if not number and chapter_of_it:sub(1, #name) == name then
-          return pandoc.Str("a part that this report leaves out")
-        end
+      if is_left_out(citation.id) then
+        return pandoc.Str("a part that this report leaves out")
       end
       if not number then
         error("report: there is nothing called " .. citation.id .. " to refer to.")
@@ -170,6 +140,20 @@ local resolve = {
     end
     return out
   end,
+  -- []{.page of="fig:x"}: the page of a label, in print.
+  Span = function(span)
+    if not span.classes:includes("page") then
+      return nil
+    end
+    local of = span.attributes.of
+    if not numbers[of] and not is_left_out(of) then
+      error("report: there is nothing called " .. of .. " to refer to.")
+    end
+    if not is_typst or not numbers[of] then
+      return pandoc.Inlines({})
+    end
+    return pandoc.RawInline("typst", "(p.~#context counter(page).at(<" .. of .. ">).first())")
+  end,
   Image = function(image)
     -- A figure that moves on the page stands still in the PDF.
     if image.attributes.moving and not is_typst then
@@ -180,31 +164,6 @@ local resolve = {
       image.src = "/" .. image.src
     end
     return image
-  end,
-}
-
--- ::: {#list-of-figures} and ::: {#list-of-tables} become lists with links, in the PDF with page numbers.
-local lists = {
-  Div = function(div)
-    local kind = ({ ["list-of-figures"] = "fig", ["list-of-tables"] = "tbl" })[div.identifier]
-    if not kind then
-      return nil
-    end
-    local lines = pandoc.Blocks({})
-    for _, entry in ipairs(listed[kind]) do
-      local identifier, number, words = table.unpack(entry)
-      local line = pandoc.Inlines({ pandoc.Link({ pandoc.Str(number) }, "#" .. identifier), pandoc.Str("\u{2002}") })
-      line:extend(words)
-      if is_typst and identifier ~= "" then
-        line:insert(pandoc.RawInline("typst", "#h(0.4em)#box(width: 1fr, repeat[.#h(0.3em)])#h(0.4em)#context counter(page).at(<" .. identifier .. ">).first()"))
-      end
-      lines:insert(pandoc.Para(line))
-    end
-    if is_typst then
-      lines:insert(1, pandoc.RawBlock("typst", "#columns(2, gutter: 1.6em)[#set text(size: 8.3pt)\n#set par(leading: 0.4em, spacing: 0.55em, justify: false)"))
-      lines:insert(pandoc.RawBlock("typst", "]"))
-    end
-    return pandoc.Div(lines, { class = "listing" })
   end,
 }
 
@@ -278,5 +237,5 @@ function Pandoc(document)
     end
     document.blocks = spread(document.blocks, later)
   end
-  return document:walk(count):walk(lists):walk(resolve)
+  return document:walk(count):walk(resolve)
 end

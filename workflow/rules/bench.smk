@@ -190,6 +190,6 @@ rule chapter_bench:
         code=code_of_chapter("bench"),
     log:
         "results/logs/chapter_bench/run.log",
-        notebook="results/logs/chapter_bench/bench.ipynb",
+        notebook="results/notebooks/bench.ipynb",
     script:
         "../scripts/run_notebook.py"

@@ -114,6 +114,6 @@ rule chapter_black_box:
         code=code_of_chapter("black_box"),
     log:
         "results/logs/chapter_black_box/run.log",
-        notebook="results/logs/chapter_black_box/black_box.ipynb",
+        notebook="results/notebooks/black_box.ipynb",
     script:
         "../scripts/run_notebook.py"

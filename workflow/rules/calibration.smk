@@ -41,12 +41,14 @@ rule chapter_loadcell:
             caption="../report/captions/loadcell.rst",
             labels={"figure": "printed"},
         ),
+        weighed="results/report/loadcell/weighed.csv",
+        read="results/report/loadcell/read.csv",
         coefficients="results/report/loadcell/coefficients.csv",
         flagged="results/report/loadcell/flagged.csv",
     params:
         code=code_of_chapter("loadcell"),
     log:
         "results/logs/chapter_loadcell/run.log",
-        notebook="results/logs/chapter_loadcell/loadcell.ipynb",
+        notebook="results/notebooks/loadcell.ipynb",
     script:
         "../scripts/run_notebook.py"

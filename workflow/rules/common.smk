@@ -97,19 +97,5 @@ def results_behind(*files):
     return sorted(found)
 
 
-def rules_behind(*files):
-    """Pairs of rules, the one that makes a file and the one that reads it, on the way to these files."""
-    found, seen, waiting = set(), set(), [(path, None) for path in files]
-    while waiting:
-        path, reader = waiting.pop()
-        for producer, inputs in producers_of(path):
-            if reader not in (None, producer):
-                found.add((producer, reader))
-            if path not in seen:
-                seen.add(path)
-                waiting += [(file, producer) for file in inputs]
-    return sorted(found)
-
-
 wildcard_constraints:
     chapter="[a-z][a-z0-9_]*",

@@ -1,12 +1,5 @@
 """Worked examples of the mismatch stage and their chapter, made in the run that makes the report."""
 
-# A piece of two real flights: the first is fitted, the second held out.
-EXAMPLE_FLIGHTS = {
-    "flights": ["20210218170320seg2", "20210223104803seg2"],
-    "start_s": 8.0,
-    "stop_s": 22.0,
-    "every": 2,
-}
 # Sets recorded by the simulators of the proof, in which something is hidden, or nothing.
 EXAMPLE_CASES = {
     "bench": "bench/single/crosstalk/moderate/0",
@@ -16,11 +9,9 @@ EXAMPLE_CASES = {
 
 
 rule judge_examples:
-    """The mismatch stage on four examples."""
+    """The mismatch stage on three examples."""
     message:
         "Mismatch: worked examples"
-    input:
-        flights=public_set("neurobem"),
     output:
         state="results/examples/state.json",
         channels="results/examples/channels.csv",
@@ -28,7 +19,6 @@ rule judge_examples:
         locations="results/examples/locations.csv",
         traces="results/examples/traces.csv",
     params:
-        real=EXAMPLE_FLIGHTS,
         cases=EXAMPLE_CASES,
         folder="results/examples",
         concealing=code_that_conceals,
@@ -101,18 +91,6 @@ rule chapter_mismatch:
         campaign_sets=rules.score_campaign.output.sets,
         campaign_numbers=rules.score_campaign.output.numbers,
     output:
-        real_error=report(
-            "results/report/mismatch/real_error.svg",
-            category="Mismatch",
-            caption="../report/captions/mismatch.rst",
-            labels={"figure": "real error"},
-        ),
-        real_channels=report(
-            "results/report/mismatch/real_channels.svg",
-            category="Mismatch",
-            caption="../report/captions/mismatch.rst",
-            labels={"figure": "real channels"},
-        ),
         bench_error=report(
             "results/report/mismatch/bench_error.svg",
             category="Mismatch",
@@ -124,12 +102,11 @@ rule chapter_mismatch:
         set_channels="results/report/mismatch/set_channels.csv",
         sets="results/report/mismatch/sets.csv",
         numbers="results/report/mismatch/numbers.csv",
-        real_effects="results/report/mismatch/real_effects.csv",
         bench_effects="results/report/mismatch/bench_effects.csv",
     params:
         code=code_of_chapter("mismatch"),
     log:
         "results/logs/chapter_mismatch/run.log",
-        notebook="results/logs/chapter_mismatch/mismatch.ipynb",
+        notebook="results/notebooks/mismatch.ipynb",
     script:
         "../scripts/run_notebook.py"

@@ -145,6 +145,6 @@ rule chapter_fem:
         code=code_of_chapter("fem"),
     log:
         "results/logs/chapter_fem/run.log",
-        notebook="results/logs/chapter_fem/fem.ipynb",
+        notebook="results/notebooks/fem.ipynb",
     script:
         "../scripts/run_notebook.py"

@@ -154,6 +154,13 @@ rule chapter_grey_box:
         validation=rules.validate_models.output.summary,
         validation_flights=rules.validate_models.output.flights,
     output:
+        networks=report(
+            "results/report/grey_box/networks.svg",
+            category="Grey box",
+            caption="../report/captions/grey_box.rst",
+            labels={"figure": "the networks"},
+        ),
+        printed="results/report/grey_box/printed.csv",
         rotor_networks=report(
             "results/report/grey_box/rotor_networks.svg",
             category="Grey box",
@@ -203,6 +210,6 @@ rule chapter_grey_box:
         code=code_of_chapter("grey_box"),
     log:
         "results/logs/chapter_grey_box/run.log",
-        notebook="results/logs/chapter_grey_box/grey_box.ipynb",
+        notebook="results/notebooks/grey_box.ipynb",
     script:
         "../scripts/run_notebook.py"

@@ -52,6 +52,6 @@ rule chapter_neurobem:
         code=code_of_chapter("neurobem"),
     log:
         "results/logs/chapter_neurobem/run.log",
-        notebook="results/logs/chapter_neurobem/neurobem.ipynb",
+        notebook="results/notebooks/neurobem.ipynb",
     script:
         "../scripts/run_notebook.py"

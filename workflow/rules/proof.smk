@@ -145,6 +145,7 @@ rule study_real:
         recordings=set_of_study,
     output:
         result="results/proof/real/{study}.json",
+        residuals="results/proof/real/{study}.csv",
     params:
         code=code_of("study_real"),
     log:
@@ -295,38 +296,22 @@ rule draw_proof:
 
 
 rule chapter_proof:
-    """Tables of the proof's chapter, from the folder that the configuration names."""
+    """Table of the proof's chapter, from the folder that the configuration names."""
     message:
         "Chapter proof: tables"
     input:
         notebook="notebooks/proof.ipynb",
-        summary=f"{CONFIG.proof.tables}/summary.csv",
         cases=f"{CONFIG.proof.tables}/cases.csv",
-        parameters=f"{CONFIG.proof.tables}/parameters.csv",
-        peers=f"{CONFIG.proof.tables}/peers.csv",
-        state=f"{CONFIG.proof.tables}/state.json",
-        real=f"{CONFIG.proof.tables}/real.csv",
-        coefficients=f"{CONFIG.proof.tables}/coefficients.csv",
-        next_flight="docs/proof/next_flight.csv",
-        next_flight_summary="docs/proof/next_flight_summary.csv",
-        releases_named="docs/proof/releases.csv",
-        plantings_rows="docs/proof/plantings.csv",
+        releases="docs/proof/releases.csv",
         plantings="docs/proof/plantings_summary.csv",
     output:
-        fresh="results/report/proof/fresh.csv",
-        releases="results/report/proof/releases.csv",
-        questions="results/report/proof/questions.csv",
-        methods="results/report/proof/methods.csv",
-        studies="results/report/proof/studies.csv",
-        published="results/report/proof/published.csv",
-        planted="results/report/proof/planted.csv",
-        flights="results/report/proof/flights.csv",
-        stored="results/report/proof/stored.json",
+        counted="results/report/proof/counted.csv",
+        state="results/report/proof/state.json",
     params:
         code=code_of_chapter("proof"),
     log:
         "results/logs/chapter_proof/run.log",
-        notebook="results/logs/chapter_proof/proof.ipynb",
+        notebook="results/notebooks/proof.ipynb",
     script:
         "../scripts/run_notebook.py"
 

@@ -82,6 +82,6 @@ rule chapter_public_recordings:
         code=code_of_chapter("public_recordings"),
     log:
         "results/logs/chapter_public_recordings/run.log",
-        notebook="results/logs/chapter_public_recordings/public_recordings.ipynb",
+        notebook="results/notebooks/public_recordings.ipynb",
     script:
         "../scripts/run_notebook.py"

@@ -17,6 +17,7 @@ KINDS_OF_CHAPTER = {
     "black_box": ["thrust", "torque", "dynamics"],
     "abstract": ALL_KINDS,
     "conclusions": ALL_KINDS,
+    "thesis": ALL_KINDS,
 }
 # Results that a text without a rule of its own quotes.
 QUOTED = {
@@ -30,24 +31,18 @@ QUOTED = {
     "improved": "results/grey_box/inertias.json",
     "black_box": "results/black_box/summary.json",
     "held_out": "results/black_box/held_out_scores.csv",
-    "proof_rows": f"{CONFIG.proof.tables}/summary.csv",
 }
-# What the abstract counts is what the proof's chapter prints.
+# What the abstract counts is what the chapters print.
 PRINTED = {
-    "fresh": rules.chapter_proof.output.fresh,
-    "plantings": rules.chapter_proof.output.planted,
-    "planned_flights": rules.chapter_proof.output.flights,
-    "proof_real": f"{CONFIG.proof.tables}/real.csv",
-    "proof_coefficients": f"{CONFIG.proof.tables}/coefficients.csv",
+    "counted": rules.chapter_proof.output.counted,
+    "real_state": rules.chapter_real_flights.output.state,
+    "mission": rules.chapter_real_flights.output.mission,
+    "studies": rules.chapter_real_flights.output.studies,
+    "campaign_numbers": rules.score_campaign.output.numbers,
+    "effects": rules.chapter_catalogue.output.effects,
 }
 QUOTED_BY = {
-    "fem": {"both_meshes": rules.chapter_speed.output.fem},
     "white_box": {"truth": rules.score_campaign.output.state},
-    "proof": {
-        "power": f"{CONFIG.proof.tables}/power.csv",
-        "families": f"{CONFIG.proof.tables}/families.csv",
-    },
-    "changes": {"measured": "docs/proof/changes_summary.csv"},
     "abstract": QUOTED | PRINTED,
     "conclusions": QUOTED | PRINTED | {"propellers": "results/rotor/coefficients.json"},
 }
@@ -63,6 +58,8 @@ NOTICE = (
 )
 
 
+CITED = read_yaml(Path("CITATION.cff"))
+PROJECT = f"rotorid {CITED['version']}, {', '.join(author['name'] for author in CITED['authors'])}. {CITED['license']} licence."
 ORIGIN = in_words(ROOT, CODE.of("workflow/scripts/judge.py"))
 
 
@@ -148,6 +145,7 @@ rule typeset_pdf:
         left_out=LEFT_OUT,
         notice=NOTICE,
         origin=ORIGIN,
+        project=PROJECT,
         code=code_of("typeset_pdf"),
     log:
         "results/logs/typeset_pdf.log",
@@ -174,6 +172,7 @@ rule build_html:
         left_out=LEFT_OUT,
         notice=NOTICE,
         origin=ORIGIN,
+        project=PROJECT,
         code=code_of("build_html"),
     log:
         "results/logs/build_html.log",

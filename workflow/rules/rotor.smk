@@ -48,6 +48,6 @@ rule chapter_rotor_coefficients:
         code=code_of_chapter("rotor_coefficients"),
     log:
         "results/logs/chapter_rotor_coefficients/run.log",
-        notebook="results/logs/chapter_rotor_coefficients/rotor_coefficients.ipynb",
+        notebook="results/notebooks/rotor_coefficients.ipynb",
     script:
         "../scripts/run_notebook.py"

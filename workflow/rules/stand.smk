@@ -120,6 +120,6 @@ rule chapter_stand:
         code=code_of_chapter("stand"),
     log:
         "results/logs/chapter_stand/run.log",
-        notebook="results/logs/chapter_stand/stand.ipynb",
+        notebook="results/notebooks/stand.ipynb",
     script:
         "../scripts/run_notebook.py"

@@ -70,6 +70,13 @@ rule chapter_white_box:
         flight=rules.simulate_attitude.output.flight,
         summary=rules.simulate_attitude.output.summary,
     output:
+        control=report(
+            "results/report/white_box/control.svg",
+            category="White box",
+            caption="../report/captions/white_box.rst",
+            labels={"figure": "controller"},
+        ),
+        parts="results/report/white_box/parts.csv",
         rotor=report(
             "results/report/white_box/rotor.svg",
             category="White box",
@@ -99,6 +106,6 @@ rule chapter_white_box:
         code=code_of_chapter("white_box"),
     log:
         "results/logs/chapter_white_box/run.log",
-        notebook="results/logs/chapter_white_box/white_box.ipynb",
+        notebook="results/notebooks/white_box.ipynb",
     script:
         "../scripts/run_notebook.py"

@@ -14,5 +14,6 @@ if __name__ == "__main__":
             left_out=snakemake.params.left_out,
             notice=snakemake.params.notice,
             origin=snakemake.params.origin,
+            project=snakemake.params.project,
         )
         typeset.html(document, snakemake.output.html)

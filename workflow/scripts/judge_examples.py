@@ -1,40 +1,26 @@
-"""Four worked examples for the mismatch chapter, judged in this run.
+"""Worked examples for the mismatch chapter, judged in this run.
 
-- A piece of two real flights, one of them held out; and, recorded by simulators that share no code with the library, a
-  bench, a flight with nothing wrong and a flight with a cause outside the catalogue.
-- What the verdicts say, and the error over time that the first leaves on the flight held out.
+- Recorded by simulators that share no code with the library: a bench, a flight with nothing wrong and a flight with a
+  cause outside the catalogue.
+- What the verdicts say, and the error over time that each leaves on a run held out.
 """
 
 import json
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from rotorid.recordings import RecordingSet, Run, read_set
-from rotorid.recordings.importers.faults import read_report
+from rotorid.recordings import RecordingSet, read_set
 from rotorid.report import log
 from rotorid.report.deliver import analysis_of, write_files
 from rotorid_proof import quoted
 
 SHOWN_HZ = 50.0
-OTHER_MODEL = "neurobem_"
 INSTRUMENT = ("force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z")
-
-
-def piece(recordings: RecordingSet, flights: Sequence[str], start_s: float, stop_s: float, every: int) -> RecordingSet:
-    """A stretch of some flights, thinned; the last of them is held out."""
-    runs = []
-    for name in flights:
-        table = recordings.run(name).table
-        # What another model predicts is no property of the flight: a mismatch is not to be located by it.
-        table = table[[column for column in table.columns if not column.startswith(OTHER_MODEL)]]
-        since = table["time_s"] - table["time_s"].iloc[0]
-        runs.append(Run(name, table[since.between(start_s, stop_s)].iloc[::every].reset_index(drop=True)))
-    return RecordingSet(recordings.name, recordings.vehicle, tuple(runs), (flights[-1],))
 
 
 def recorded(wanted: Mapping[str, str]) -> dict[str, RecordingSet]:
@@ -69,16 +55,11 @@ def rows_of(example: str, verdict: Mapping[str, Any]) -> tuple[list[dict], list[
     return quoted.channels(example, verdict), effects, locations
 
 
-def main(flights: str, real: Mapping[str, Any], cases: Mapping[str, str], out: Mapping[str, str], folder: str) -> None:
+def main(cases: Mapping[str, str], out: Mapping[str, str], folder: str) -> None:
     """Judge the examples and write their state (JSON) and tables (CSV); each verdict's own files go to `folder`."""
     state: dict[str, Any] = {"examples": {}}
     channels, effects, locations, traces = [], [], [], []
-    report = read_report(Path(flights))
-    state["real_available"], state["real_missing"] = report["available"], report["reason"]
-    sets = recorded(cases)
-    if report["available"]:
-        sets = {"real": piece(read_set(Path(flights)), **real)} | sets
-    for name, recordings in sets.items():
+    for name, recordings in recorded(cases).items():
         analysis = analysis_of(recordings)
         place = Path(folder) / name
         files = [place / file for file in ("verdict.json", "report.html", "improved_vehicle.yaml")]
@@ -87,10 +68,6 @@ def main(flights: str, real: Mapping[str, Any], cases: Mapping[str, str], out: M
             **quoted.said(verdict),
             "runs": len(recordings.runs),
             "seconds": float(sum(run.time_s[-1] - run.time_s[0] for run in recordings.runs)),
-            "values": [
-                {"name": key, **{part: value[part] for part in ("believed", "refitted")}}
-                for key, value in verdict["parameters"].items()
-            ],
             "unexplained_share": (verdict.get("unexplained") or {}).get("share"),
         }
         for whole, part in zip((channels, effects, locations), rows_of(name, verdict), strict=True):
@@ -111,8 +88,6 @@ def main(flights: str, real: Mapping[str, Any], cases: Mapping[str, str], out: M
 if __name__ == "__main__":
     with log.to(snakemake.log[0]):
         main(
-            flights=snakemake.input.flights,
-            real=dict(snakemake.params.real),
             cases=dict(snakemake.params.cases),
             out=dict(snakemake.output.items()),
             folder=snakemake.params.folder,

@@ -1,4 +1,4 @@
-"""Tables of the report's appendix: settings, controller, excitation of the experiments, what was read; graph of rules.
+"""Tables of the report's appendix: settings, controller, excitation of the experiments, what was read.
 
 - Gains and references of the attitude controller, as the code holds them.
 - Amplitudes and frequencies of the experiments on the stand (table A.1 of the thesis).
@@ -15,8 +15,6 @@ import pandas as pd
 
 from rotorid.io.wire import EXPERIMENTS
 from rotorid.report import log, provenance
-from rotorid.report.plots import style
-from rotorid.report.plots.instruments import rule_graph
 from rotorid.report.provenance import sha256
 from rotorid.vehicle.control import THESIS_GAINS, AttitudeReference, training_reference, validation_reference
 
@@ -91,13 +89,9 @@ def main(
     lock: str,
     project: str,
     read: Sequence[str],
-    steps: Sequence[Sequence[str]],
     out: Mapping[str, str],
 ) -> None:
-    """Write the tables (CSV) and the graph (SVG).
-
-    `read` are the files whose hashes are given, `steps` pairs of a rule and one that reads its files.
-    """
+    """Write the tables (CSV); `read` are the files whose hashes are given."""
     gains().to_csv(out["gains"], index=False)
     references = reference_rows(training_reference()) + reference_rows(validation_reference())
     pd.DataFrame(references).to_csv(out["references"], index=False, float_format="%.4g")
@@ -109,7 +103,6 @@ def main(
     pd.DataFrame(versions, columns=["package", "version"]).to_csv(out["versions"], index=False)
     hashes = [{"file": path, "sha256": sha256(Path(path))[:16]} for path in read]
     pd.DataFrame(hashes).to_csv(out["hashes"], index=False)
-    style.save(rule_graph([(a, b) for a, b in steps]), out["rule_graph"])
 
 
 if __name__ == "__main__":
@@ -119,6 +112,5 @@ if __name__ == "__main__":
             lock=snakemake.input.lock,
             project=snakemake.input.project,
             read=list(snakemake.input),
-            steps=list(snakemake.params.steps),
             out=dict(snakemake.output.items()),
         )

@@ -21,5 +21,6 @@ if __name__ == "__main__":
             left_out=snakemake.params.left_out,
             notice=snakemake.params.notice,
             origin=snakemake.params.origin,
+            project=snakemake.params.project,
         )
         main(document, snakemake.output.source, snakemake.output.pdf)

@@ -38,6 +38,7 @@ _WAIT_S = 2.5  # an UNO restarts when its port is opened, and its boot loader ke
 app = typer.Typer(no_args_is_help=True, add_completion=False, help=__doc__, pretty_exceptions_enable=False)
 
 _Port = Annotated[str, typer.Option("--port", "-p", help="serial port; `rotorid-acquire ports` lists them")]
+_Rotor = Annotated[str | None, typer.Option("--rotor", help="whose rotor it is, e.g. 'vehicle A, motor 1'")]
 _Propeller = Annotated[str | None, typer.Option(help="propeller, e.g. '5040 three-blade'")]
 _BatteryName = Annotated[str | None, typer.Option("--battery", help="battery, e.g. '4S 1500 mAh no. 1'")]
 _PlaceS = Annotated[
@@ -189,13 +190,14 @@ def rotor(
     throttle: Annotated[float, typer.Option(min=0, max=1, help="fraction of full throttle")],
     rest_s: Annotated[float, typer.Option(help="rest before and after, s")] = 1.0,
     hold_s: Annotated[float, typer.Option(help="throttle on, s")] = 4.0,
+    rotor: _Rotor = None,
     propeller: _Propeller = None,
     battery: _BatteryName = None,
     *,
     shared: _Shared,
 ) -> None:
     """Record the thrust tester: rest, throttle, rest. Keep clear of the propeller."""
-    setup = Setup(kind="thrust", throttle=throttle, propeller=propeller, battery=battery, motor=1)
+    setup = Setup(kind="thrust", throttle=throttle, rotor=rotor, propeller=propeller, battery=battery, motor=1)
     settings = {"throttle": throttle, "rest_s": rest_s, "hold_s": hold_s}
     run = functools.partial(procedures.thrust_test, **settings)
     _record({"rotor": port}, setup, run, {"name": "thrust_test", **settings}, shared)
@@ -312,6 +314,7 @@ def torque(
     wrench_port: Annotated[str, typer.Option(help="serial port of the six-axis sensor below the vehicle")],
     rest_s: Annotated[float, typer.Option(help="rest before and after, s")] = 2.0,
     hold_s: Annotated[float, typer.Option(help="throttle on, s")] = 6.0,
+    rotor: _Rotor = None,
     propeller: _Propeller = None,
     battery: _BatteryName = None,
     *,
@@ -326,6 +329,7 @@ def torque(
         mount_roll_deg=0.0,
         mount_pitch_deg=0.0,
         tared=False,
+        rotor=rotor,
         propeller=propeller,
         battery=battery,
     )

@@ -67,6 +67,10 @@ COLUMNS = (
     *("value", "value_sd", "samples", "rest_samples", "voltage_v"),
 )
 """`rest_samples`: of how many samples the mean would be as uncertain as the tare is."""
+APART_LEVEL = 0.001
+"""Share of pools of one rotor's tests in which any is called apart by chance."""
+_MEDIAN_OF_NORMAL = 0.6745
+"""Median of the size of a normal variable over its standard deviation."""
 SPEED_LAW_PARAMETERS = ("speed_at_half_rad_s", "throttle_exponent", "dead_throttle", "voltage_exponent")
 
 
@@ -431,8 +435,9 @@ def speed_by_law(values: np.ndarray, throttle: np.ndarray, voltage_share: np.nda
 def speed_law(points: pd.DataFrame) -> dict:
     """ω = ω_½ ((u − u₀)/(½ − u₀))ⁿ (V/V̄)ᵐ from steady points, with 95 % intervals.
 
-    `points` has the columns `throttle speed_rad_s speed_sd_rad_s samples voltage_v`; each point counts by the standard
-    error of its mean speed, and the intervals are as wide as the residuals in these units ask for. Raises InputError
+    `points` has the columns `test throttle speed_rad_s speed_sd_rad_s samples voltage_v`; each point counts by the
+    standard error of its mean speed, and the intervals are as wide as the residuals in these units ask for. `apart` are
+    the tests that lie off the law by more than chance, against the spread of the others. Raises InputError
     for fewer than six points at which the motor turns.
     """
     kept = points[(points["speed_rad_s"] > 0) & (points["throttle"] > 0)]
@@ -457,7 +462,10 @@ def speed_law(points: pd.DataFrame) -> dict:
     out = {"mean_voltage_v": voltage_v, "residual_rms_relative": float(np.sqrt(np.mean(relative**2)))}
     for name, value, width in zip(SPEED_LAW_PARAMETERS, fit.x.tolist(), half.tolist(), strict=True):
         out |= {name: value, f"{name}_interval_95": [value - width, value + width]}
-    return out | {"points": len(kept)}
+    spread = float(np.median(np.abs(fit.fun))) / _MEDIAN_OF_NORMAL
+    limit = student_quantile(freedom, 1 - APART_LEVEL / (2 * len(kept)))
+    apart = kept["test"][np.abs(fit.fun) > limit * max(spread, 1e-12)].tolist() if "test" in kept else []
+    return out | {"points": len(kept), "apart": apart}
 
 
 def sample_noise(points: pd.DataFrame) -> dict:

@@ -91,6 +91,7 @@ class Setup(KnownKeys):
     infill_percent: Whole | None = None
     gauge_length_mm: Number | None = None
     cross_section_mm2: Number | None = None
+    rotor: str | None = None  # whose motor and propeller turned: tests of one rotor are pooled
     propeller: str | None = None
     battery: str | None = None
     mount_roll_deg: Number | None = None

@@ -78,11 +78,6 @@ def own_commit() -> str:
     return "" if _git(folder, "ls-files", "--error-unmatch", "__init__.py") is None else commit(folder)
 
 
-def stored_with(folder: str | Path, path: str) -> str:
-    """The commit that last changed a file of a checkout, and its day: `09827fa, 2026-11-23`; or `not known`."""
-    return _git(folder, "log", "-1", "--format=%h, %cs", "--abbrev=7", "--", path) or "not known"
-
-
 def in_words(folder: str | Path, judging: str) -> str:
     """Commit, its date and the hash of the code that judges recordings, in one sentence for a title page."""
     made, day = commit(folder), _git(folder, "log", "-1", "--format=%cs")

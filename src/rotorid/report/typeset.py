@@ -31,6 +31,7 @@ _MADE_OF = {
     "thesis": "Real, printed in the thesis.",
     "stated": "Stated in the thesis.",
     "mixed": "Real and simulated recordings.",
+    "thesis_computed": "Computed, and from tables printed in the thesis.",
     "campaign_simulated": "Recorded on the instruments, and simulated.",
     "emulated_simulated": "Emulated instruments, and simulated.",
     "drawn": "Drawn after the thesis.",
@@ -62,6 +63,8 @@ class Document:
     """What the title page says of the data."""
     origin: str = ""
     """Commit, date and code, for the title page."""
+    project: str = ""
+    """Project and authors, for the title page."""
 
 
 def typst_source(document: Document, out: str | Path, later: Mapping[str, int] | None = None) -> None:
@@ -173,6 +176,7 @@ def _pandoc(document: Document, options: Sequence[str]) -> None:
         "--metadata=left-out:" + ",".join(name.replace("_", "-") for name in document.left_out),
         f"--metadata=notice:{document.notice}",
         f"--metadata=origin:{document.origin}",
+        f"--metadata=project:{document.project}",
         "--metadata=reference-section-title:References",
         *options,
     ]
@@ -302,8 +306,9 @@ def table_of(rows: Sequence[Mapping[str, Any]], caption: str, columns: Sequence[
     """A pandoc pipe table, with its caption (markdown) and its `label` for references.
 
     `columns`: `(key, heading)` or `(key, heading, form)`; `form` is `text`, `name` and `unit` (text that stays on one
-    line; of a unit with its powers raised), `symbol` (`J_xx` set as mathematics), `fixN`, `sciN` or `percentN` with N
-    decimals, or `sigN` with N significant digits.
+    line; of a unit with its powers raised), `code` (an identifier), `place` (a label: its number with a link, and in
+    print its page), `symbol` (`J_xx` set as mathematics), `fixN`, `sciN` or `percentN` with N decimals, or `sigN` with
+    N significant digits.
     """
     headings = [column[1] for column in columns]
     forms = [column[2] if len(column) > 2 else "text" for column in columns]
@@ -323,7 +328,7 @@ def table_of(rows: Sequence[Mapping[str, Any]], caption: str, columns: Sequence[
     return "\n".join(lines) + f"\n\n: {caption} {{#{label}{attributes}}}\n"
 
 
-_WORDS = ("text", "name", "unit", "symbol")
+_WORDS = ("text", "name", "unit", "symbol", "code", "place")
 """Forms of columns that are set from the left."""
 LINE_PT = 453.0
 """Width of the page's text, pt."""
@@ -350,7 +355,8 @@ def _columns_pt(
 
 def _seen(markdown: str) -> str:
     """About what is seen of a cell's markdown: without the signs for mathematics, raised and escaped letters."""
-    return re.sub(r"[$^{}\\_]", "", markdown)
+    placed = re.sub(r"@\S+\[\]\{\.page [^}]*\}", "Figure.12.3.(p.45)", markdown.replace("\u00a0[", "["))
+    return re.sub(r"[$^{}\\_`]", "", placed)
 
 
 def _shares_of(headings: Sequence[str], cells: Sequence[Sequence[str]]) -> str:
@@ -370,7 +376,8 @@ def _row(cells: Sequence[str]) -> str:
 def _formatted(value: Any, form: str) -> str:
     name, decimals = form.rstrip("0123456789"), form[len(form.rstrip("0123456789")) :]
     if name in _WORDS:
-        return {"text": text, "name": one_line, "unit": unit, "symbol": symbol}[name](value)
+        forms = {"text": text, "name": one_line, "unit": unit, "symbol": symbol, "code": code, "place": place}
+        return forms[name](value)
     if name not in ("fix", "sci", "sig", "percent") or not decimals:
         raise ValueError(
             f"{form} is not a form of a number; forms are {', '.join(_WORDS)}, fixN, sciN, sigN and percentN"
@@ -422,7 +429,9 @@ _GREEK = {"tau": "tau", "eps": "varepsilon", "alpha": "alpha", "beta": "beta", "
 
 def symbol(value: str) -> str:
     """A symbol with its index as mathematics: `J_xx` is `$J_{xx}$`, `tau` a Greek letter, `gain_x` upright."""
-    letter, _, index = value.partition("_")
+    letter, _, index = (value or "").partition("_")
+    if not letter:
+        return ""
     if letter in _GREEK:
         letter = "\\" + _GREEK[letter]
     elif len(letter) > 1:
@@ -434,6 +443,16 @@ def symbol(value: str) -> str:
 def one_line(value: Any) -> str:
     """A text that is not broken at its spaces and hyphens."""
     return text(value).replace(" ", "\u00a0").replace("-", "\u2011")
+
+
+def code(value: Any) -> str:
+    """An identifier as it is typed."""
+    return f"`{value}`"
+
+
+def place(label: Any) -> str:
+    """What carries a label (`fig:bench-dynamic`) by its number, and in print its page."""
+    return f'@{label}\u00a0[]{{.page of="{label}"}}'
 
 
 def unit(value: Any) -> str:

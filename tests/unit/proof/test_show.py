@@ -32,52 +32,75 @@ def test_a_wrong_value_is_named_without_its_unit() -> None:
 
 
 STORED = Path(__file__).parents[3] / "docs" / "proof"
-MOST_ROWS = {"of_questions": 28, "of_releases": 12, "of_drawn": 6, "of_plantings": 4}
-"""Rows of the tables in the proof's chapter: all of them together fill two pages, and it stays one that is read."""
 
 
 def stored(name: str) -> pd.DataFrame:
     return pd.read_csv(STORED / f"{name}.csv", low_memory=False)
 
 
-def drawn(released: str, kind: str, clean: bool, right: bool = True, false: int = 0) -> dict:
-    counts = {"claim_count": 0 if clean else 1, "false_count": false, "false_alarm": clean and not right}
-    return {"released": released, "kind": kind, "clean": clean, "right": right, "judged_by": "c87a46b88923", **counts}
+def test_what_had_to_be_named_is_counted_apart_from_what_had_not() -> None:
+    def case(**changes):
+        row = {
+            "released": "aa",
+            "kind": "flight",
+            "clean": False,
+            "right": True,
+            "false_count": 0,
+            "false_alarm": False,
+        }
+        row |= {"truth": "motor_lag", "primary": "motor_lag", "values_true": None, "claims": "motor_lag"}
+        return row | {"judged_by": "c87a46b88923"} | changes
+
+    outside = {"truth": None, "primary": None}
+    cases = [case(), case(claims="motor_lag; vibration"), case(right=False, false_count=1, claims="gust")]
+    cases += [case(truth=None, primary=None, values_true="mass_kg", claims=None), case(**outside, claims=None)]
+    cases += [case(**outside, claims="axial_inflow"), case(clean=True, **outside, claims=None), case(released="bb")]
+    planted = [("code 07ac8cc", "named", 0.75, 8), ("code 07ac8cc", "size covered", 0.5, 4), ("all", "named", 1.0, 99)]
+    plantings = pd.DataFrame([(*row, "large") for row in planted], columns=["group", "what", "value", "count", "size"])
+    shown = show.of_stored(pd.DataFrame(cases), plantings, "aa").set_index("key")
+    counts = {key: (row["count"], row["of"]) for key, row in shown.iterrows()}
+    assert counts["all"] == (3, 4) and counts["further"] == (1, 3) and counts["outside"] == (2, 2)
+    assert counts["allowed"] == (1, 2) and counts["wrong"] == (1, 6) and counts["alarms"] == (0, 1)
+    assert counts["planted"] == (6, 8) and shown.loc["planted_size", "code"] == "07ac8cc"
+    assert show.of_stored(pd.DataFrame(cases), plantings, "cc")["key"].tolist() == ["planted", "planted_size"]
 
 
-def test_drawn_cases_have_a_row_for_each_kind_and_the_state_of_their_targets() -> None:
-    cases = [drawn("aa", "flight", clean=False, right=k > 0, false=int(k == 0)) for k in range(8)]
-    cases += [drawn("aa", "bench", clean=False)] + [drawn("aa", "flight", clean=True, right=k > 9) for k in range(20)]
-    cases = pd.DataFrame([*cases, drawn("bb", "stand", clean=False), {"released": None, "kind": "flight"}])
-    shown = show.of_drawn(cases, "aa")
-    assert shown["kind"].tolist() == ["flights", "benches", "all", "target", "state"]
-    assert shown["hidden"].tolist() == ["8", "1", "9", "", ""] and shown["right"].tolist()[:3] == ["7", "1", "8"]
-    assert shown["alarms"].tolist() == ["10 of 20", "–", "10 of 20", "≤ 1 %", "fails"]
-    assert shown["names"].tolist()[2:] == ["1 of 9", "≤ 5 %", "not refuted"] and shown["wrong"][2] == "1"
-    assert show.of_drawn(cases, "cc").empty
+def test_the_stored_table_counts_what_the_page_says() -> None:
+    """The page of the proof and the report are of the same rows."""
+    last = str(stored("releases")["released"].iloc[-1])
+    shown = show.of_stored(stored("cases"), stored("plantings_summary"), last).set_index("key")
+    page = (STORED / "README.md").read_text(encoding="utf-8")
+    for key in ("all", "outside", "wrong"):
+        assert f"{shown.loc[key, 'count']} of {shown.loc[key, 'of']}" in page
+    assert set(shown["code"]) <= set(show.short_code(c) for c in stored("cases")["judged_by"]) | {"07ac8cc"}
 
 
-def test_a_release_has_one_row_and_all_releases_one_more() -> None:
-    cases = pd.DataFrame([drawn(r, kind, clean) for r in "ab" for kind in ("flight", "stand") for clean in (0, 1)])
-    named = [("development", "24d4aceab5", None), ("a", "40ff225aa7", "c87a46b8"), ("b", "dfbaf78b", "c9fa")]
-    shown = show.of_releases(cases, pd.DataFrame(named, columns=["released", "commit", "code"]))
-    assert shown["released"].tolist() == ["40ff225", "dfbaf78", "all"]
-    assert shown["by"].tolist() == ["c87a46b", "c9fa", "each its own"]
-    assert shown["right"].tolist() == ["2", "2", "4"] and shown["alarms"].tolist() == ["0 of 2", "0 of 2", "0 of 4"]
+def labelled(**changes):
+    effect = {"id": "unequal_rotors", "status": "established", "alternatives": [], "equation": "C_F (1 + d_i)"}
+    effect["share"] = 0.14
+    number = {"symbol": "d_3", "value": -0.11, "unit": "1", "interval_95": [-0.16, 0.08]}
+    held_out = dict.fromkeys(("before", "refitted", "named", "after"), 0.5)
+    verdict = {
+        "verdict": "explained", "sentence": "s", "basis": {"sentence": "b"}, "doubts": [], "warnings": [],
+        "effects": [effect | {"parameters": [number]}, effect | {"id": "gust", "status": "suggested"}],
+        "runs": {"held_out": ["b"], "training": ["a"]}, "unexplained": {"share": 0.1, "description": ""},
+        "channels": {"moment_x": {"unit": "N m", "noise_floor": 0.1, "rmse": {"held_out": held_out}}},
+    }  # fmt: skip
+    return {"study": "crazypad-cut", "available": True, "reason": "", "verdict": verdict | changes}
 
 
-def test_questions_are_the_stored_summary_with_the_kinds_together() -> None:
-    summary, better = stored("summary").set_index("id"), stored("summary").tail(0)
-    shown = show.of_questions(stored("cases"), stored("parameters"), better).set_index("what")
-    row = shown.loc["Single effects, weak: right one named"]
-    prefixes = ("", "stand_", "bench_")
-    assert row["kinds"] == " / ".join(f"{100 * summary['value'][f'{p}single_weak']:.3g}" for p in prefixes) + " %"
-    assert int(row["cases"]) == sum(summary["cases"][f"{p}single_weak"] for p in prefixes)
-    of_flights_alone = shown.loc["Location: stated regime is the effect's"]
-    assert of_flights_alone["kinds"] == ""
-    assert of_flights_alone["measured"] == f"{100 * summary['value']['regime']:.1f} %"
-    # What has a target stands first.
-    assert (shown["target"] != "").tolist() == sorted(shown["target"] != "", reverse=True)
+def test_a_labelled_set_shows_what_is_claimed_of_it() -> None:
+    state = show.labelled_state([labelled()])
+    assert state["available"] and state["sets"]["cut"]["unequal_rotors"]["numbers"]["d_3"]["value"] == -0.11
+    assert state["sets"]["cut"]["names"] == ["unequal rotors"] and state["sets"]["cut"]["com_offset"] is None
+    verdicts = {"crazypad-cut": labelled()["verdict"]}
+    named, errors = show.of_labelled(verdicts), show.of_errors(verdicts)
+    assert named.drop(columns="equation").values.tolist() == [
+        ["propeller 3 cut", "unequal rotors", "d_3 = −0.11 (−0.16 to 0.08)", "14 %"]
+    ]
+    assert errors[["channel", "unit", "named", "noise"]].values.tolist() == [["moment x", "mN m", "500", "100"]]
+    gone = show.labelled_state([labelled(), {"study": "x", "available": False, "reason": "no answer"}])
+    assert gone == {"available": False, "reason": "no answer", "sets": {}}
 
 
 def test_the_stored_summary_follows_from_the_stored_cases() -> None:
@@ -88,37 +111,6 @@ def test_the_stored_summary_follows_from_the_stored_cases() -> None:
     assert (rows["holds"].fillna("") == kept["holds"].fillna("")).all() and (rows["cases"] == kept["cases"]).all()
     for column in ("value", "low_95", "high_95"):
         np.testing.assert_allclose(rows[column].astype(float), kept[column], rtol=1e-5)
-
-
-def test_the_chapter_stays_one_that_is_read_to_the_end() -> None:
-    """Before: thirteen pages of 94 targets, one for each family of each release."""
-    releases = stored("releases")
-    planted = show.of_plantings(stored("plantings_summary"))
-    sizes = {
-        "of_questions": len(show.of_questions(stored("cases"), stored("parameters"), stored("summary").tail(0))),
-        "of_releases": len(show.of_releases(stored("cases"), releases)),
-        "of_drawn": len(show.of_drawn(stored("cases"), str(releases["released"].iloc[-1]))),
-        "of_plantings": int(planted["kind"].isin(["code", "all", "target", "state"]).sum()),
-    }
-    assert {name: most for name, most in MOST_ROWS.items() if sizes[name] > most} == {}
-    assert min(sizes.values()) > 3
-
-
-def test_codes_of_stored_tables() -> None:
-    tables = {"a": pd.DataFrame({"judged_by": ["c87a46b88923cd47", None]}), "b": pd.DataFrame({"x": [1]})}
-    assert show.codes_of(tables) == {"a": "c87a46b, not kept", "b": "not kept"}
-    assert show.codes_of(tables, "24d4ace")["a"] == "c87a46b, not kept (of commit 24d4ace or before)"
-
-
-def test_every_stored_table_of_the_repository_has_a_code_or_a_commit() -> None:
-    names = show.commits(stored("releases"))
-    tables = {name: stored(name) for name in ("cases", "confusion", "power", "peers", "real")}
-    codes = show.codes_of(tables, names[show.DEVELOPMENT])
-    assert codes["confusion"] == codes["power"] == codes["peers"] == "not kept (of commit 24d4ace or before)"
-    assert codes["cases"].endswith(codes["power"]) and "not kept" not in codes["real"]
-    drawn = tables["cases"].dropna(subset="released")
-    by_release = stored("releases").set_index("released")["code"]
-    assert (drawn["judged_by"] == drawn["released"].map(by_release)).all()
 
 
 def test_what_was_expected_of_a_real_set_is_shown_and_whether_it_was_found() -> None:
@@ -132,19 +124,6 @@ def test_what_was_expected_of_a_real_set_is_shown_and_whether_it_was_found() -> 
     assert shown["confirmed"].tolist() == [0, 1, ""]
     halted = show.of_studies(pd.DataFrame([rows[0] | {"word": "stopped"}])).iloc[0]
     assert (halted["found"], halted["error"], halted["confirmed"]) == ("the stage stopped", "–", 0)
-
-
-def test_plantings_are_counted_by_flight_and_family():
-    def scores(group: str, named: float, count: int) -> list[dict]:
-        values = {"named": named, "size covered": 0.5, "ids new or lost a set": 0.68, "values new or lost a set": 0.0}
-        rated = {"size": "large", "count": count, "at_least": float("nan"), "at_most": 0.1, "state": "fails"}
-        return [{"group": group, "what": w, "value": v, **rated} for w, v in values.items()]
-
-    groups = [("family air", 1.0, 2), ("all", 0.56, 25), ("code 07ac8cc", 0.5, 10), ("kind mass", 0.0, 2)]
-    shown = show.of_plantings(pd.DataFrame([score for group in groups for score in scores(*group)]))
-    assert list(shown["group"]) == ["code 07ac8cc", "all codes", "target", "state", "air"]
-    assert list(shown["named"]) == ["5 of 10", "14 of 25", "≤ 0.1", "fails", "2 of 2"]
-    assert shown.iloc[0]["moved"] == "0.68"
 
 
 def test_a_channel_that_got_worse_says_by_how_much() -> None:

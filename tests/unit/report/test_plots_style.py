@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from rotorid.report.plots import style
@@ -36,3 +37,17 @@ def test_thinning_leaves_short_traces_and_bears_missing_samples() -> None:
 def test_a_placeholder_says_why(tmp_path: Path) -> None:
     style.placeholder(tmp_path / "empty.svg", "recordings not obtained")
     assert (tmp_path / "empty.svg").stat().st_size > 1000
+
+
+def test_what_a_notebook_shows_is_what_it_saves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before: executed notebooks held neither figure nor table."""
+    displayed = []
+    monkeypatch.setattr("IPython.display.display", displayed.append)
+    fig, axes = style.figure(2.0)
+    axes.plot([0, 1], [0, 1])
+    style.show(fig, tmp_path / "new" / "line.svg")
+    style.show(pd.DataFrame({"a": [1.5]}), tmp_path / "table.csv")
+    style.show("recordings not obtained", tmp_path / "empty.svg")
+    assert displayed[0].data.startswith(b"\x89PNG") and (tmp_path / "new" / "line.svg").stat().st_size > 1000
+    assert displayed[1]["a"].item() == 1.5 and (tmp_path / "table.csv").read_text() == "a\n1.5\n"
+    assert displayed[2] == "recordings not obtained" and (tmp_path / "empty.svg").stat().st_size > 1000

@@ -79,19 +79,3 @@ dependencies = ["numpy>=2", "scipy"]
 all = ["own[logs]", "ros-bags[x]>=0.1,!=0.2", "numpy"]
 """
     assert provenance.asked_for(project) == ["numpy", "scipy", "ros-bags"]
-
-
-@pytest.mark.skipif(shutil.which("git") is None, reason="git is not installed")
-def test_a_stored_file_is_called_by_the_commit_that_changed_it_last(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))
-    assert provenance.stored_with(tmp_path, "table.csv") == "not known"
-    git(tmp_path, "init", "-q")
-    for name in ("table.csv", "other.csv"):
-        (tmp_path / name).write_text("1")
-        git(tmp_path, "add", ".")
-        git(tmp_path, "commit", "-q", "-m", name)
-    first = git(tmp_path, "rev-parse", "HEAD~1")[:7]
-    assert provenance.stored_with(tmp_path, "table.csv").startswith(f"{first}, 20")
-    assert provenance.stored_with(tmp_path, "absent.csv") == "not known"

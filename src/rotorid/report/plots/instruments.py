@@ -1,7 +1,8 @@
-"""Drawings: the instruments and the vehicle, from their measures, the way of the data, and the workflow's rules."""
+"""Drawings: the instruments and the vehicle, from their measures, and schemes of what is joined to what."""
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,19 +10,13 @@ import numpy as np
 from rotorid.report.plots import style
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from rotorid.recordings.vehicle import Vehicle
 
-_TOGETHER = ("import_public",)
-"""Rules whose names begin with one of these are drawn as one."""
-_SWEEPS = 30
-_LINE_CHARACTERS = 15
-_COLOURS = {"ingest": "#dcefe6", "import": "#dcefe6", "prepare": "#dcefe6", "chapter": "#fdf0d5", "render": "#f4dfe9"}
-"""By the first word of a rule's name; others are pale blue."""
 _BAR_MM = (70.0, 12.0)
 """Length and width of a cell as drawn; neither is printed in the thesis."""
 _BELOW_MM = 25.0
@@ -194,142 +189,144 @@ _STEPS = (
 
 def signal_chain() -> Figure:
     """From the instruments to the report."""
-    from matplotlib.patches import FancyBboxPatch
+    boxes = {title: (0.9, 3.7 - 1.1 * row, f"{title}\n{text}") for row, (title, text) in enumerate(_CHAIN)}
+    steps = [title for title, _ in _STEPS]
+    boxes |= {t: (3.0 + 1.72 * k, 2.05, f"{t}\n{text}".strip()) for k, (t, text) in enumerate(_STEPS)}
+    arrows = [(title, steps[0]) for title, _ in _CHAIN] + list(itertools.pairwise(steps))
+    return scheme(boxes, arrows, 2.6, (-0.2, 10.5), (-0.2, 4.4))
 
-    fig, axis = style.figure(2.6)
 
-    def box(x, y, width, title, text, colour) -> None:
-        look = FancyBboxPatch(
-            (x, y), width, 0.8, boxstyle="round,pad=0.02", facecolor=colour, edgecolor="black", lw=0.7
-        )
-        axis.add_patch(look)
-        axis.text(
-            x + width / 2, y + (0.62 if text else 0.4), title, ha="center", va="center", fontsize=8.5, fontweight="bold"
-        )
-        axis.text(x + width / 2, y + 0.25, text, ha="center", va="center", fontsize=7.5)
-
-    for row, (title, text) in enumerate(_CHAIN):
-        box(0, 3.3 - 1.1 * row, 1.75, title, text, "#e8f1f8")
-        axis.annotate("", (2.25, 1.95), (1.8, 3.7 - 1.1 * row), arrowprops={"arrowstyle": "-|>", "lw": 0.9})
-    for place, (title, text) in enumerate(_STEPS):
-        box(2.3 + 1.72 * place, 1.55, 1.35 if text else 0.8, title, text, "#f4f4f4")
-        if place:
-            axis.annotate(
-                "",
-                (2.26 + 1.72 * place, 1.95),
-                (1.98 + 1.72 * place, 1.95),
-                arrowprops={"arrowstyle": "-|>", "lw": 0.9},
-            )
-    axis.set_xlim(-0.1, 10.1)
-    axis.set_ylim(-0.2, 4.3)
+def scheme(
+    boxes: Mapping[str, tuple[float, float, str]],
+    arrows: Sequence[tuple[str, ...]],
+    height_in: float,
+    across: tuple[float, float],
+    up: tuple[float, float],
+) -> Figure:
+    """Boxes by name (place and text) and arrows from one to another, `(from, to)` or `(from, to, label)`."""
+    fig, axis = style.figure(height_in)
+    look = {"boxstyle": "round,pad=0.35", "facecolor": "#eef3f8", "edgecolor": "#555555", "linewidth": 0.6}
+    drawn = {
+        name: axis.text(x, y, text, ha="center", va="center", fontsize=8, linespacing=1.15, bbox=look, zorder=2)
+        for name, (x, y, text) in boxes.items()
+    }
+    axis.set_xlim(*across)
+    axis.set_ylim(*up)
     axis.set_axis_off()
+    for start, stop, *label in arrows:
+        way = {"arrowstyle": "-|>", "lw": 0.9, "color": "#444444", "shrinkA": 1, "shrinkB": 3}
+        way |= {"patchA": drawn[start].get_bbox_patch(), "patchB": drawn[stop].get_bbox_patch()}
+        ends = boxes[start][:2], boxes[stop][:2]
+        axis.annotate("", ends[1], ends[0], arrowprops=way, zorder=1)
+        for text in label:
+            middle = (ends[0][0] + ends[1][0]) / 2, (ends[0][1] + ends[1][1]) / 2
+            white = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
+            axis.text(*middle, text, ha="center", va="center", fontsize=7.5, bbox=white, zorder=3)
     return fig
 
 
-def merged(steps: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
-    """Pairs with the rules of one kind drawn together."""
-
-    def name(rule: str) -> str:
-        return next((kind for kind in _TOGETHER if rule.startswith(kind)), rule)
-
-    pairs = {(name(a), name(b)) for a, b in steps}
-    return sorted((a, b) for a, b in pairs if a != b)
-
-
-def reduced(pairs: list[tuple[str, str]]) -> list[tuple[str, str]]:
-    """The pairs that no way over other rules implies."""
-    after: dict[str, set[str]] = {}
-    for a, b in pairs:
-        after.setdefault(a, set()).add(b)
-    behind: dict[str, set[str]] = {}
-
-    def all_behind(rule: str) -> set[str]:
-        if rule not in behind:
-            behind[rule] = set().union(*({b} | all_behind(b) for b in after.get(rule, ())))
-        return behind[rule]
-
-    return [(a, b) for a, b in pairs if not any(b in all_behind(other) for other in after[a] - {b})]
+def wiring() -> Figure:
+    """The bench's electronics: six cells, two converters, one microcontroller (figure 2.19 of the thesis)."""
+    boxes = {f"cell {k}": (0.0, 6.0 - k, f"cell {k}") for k in range(1, 7)}
+    boxes |= {
+        "a": (2.6, 4.0, "ADS1256, 24 bit\nthree cells"),
+        "b": (2.6, 1.0, "ADS1256, 24 bit\nthree cells"),
+        "uno": (5.4, 2.5, "Arduino UNO"),
+        "pc": (8.0, 2.5, "computer\nrecorder"),
+    }
+    arrows = [(f"cell {k}", "a" if k < 4 else "b") for k in range(1, 7)]
+    arrows += [("a", "uno", "SPI"), ("b", "uno", "SPI"), ("uno", "pc", "USB serial")]
+    return scheme(boxes, arrows, 2.3, (-0.7, 9.0), (-0.5, 5.5))
 
 
-def columns(pairs: list[tuple[str, str]]) -> dict[str, int]:
-    """Rule to its column: one more than the last of the rules whose files it reads; chapters share a column."""
-    rules = sorted({rule for pair in pairs for rule in pair})
-    before = {rule: [a for a, b in pairs if b == rule] for rule in rules}
-    place: dict[str, int] = {}
-
-    def of(rule: str) -> int:
-        if rule not in place:
-            place[rule] = max((of(known) + 1 for known in before[rule]), default=0)
-        return place[rule]
-
-    for rule in rules:
-        of(rule)
-    chapters = [rule for rule in rules if rule.startswith("chapter_")]
-    last = max((place[rule] for rule in chapters), default=0)
-    for rule in chapters:
-        place[rule] = last
-    shift = max((last + 1 - place[rule] for rule in rules if rule.startswith("render")), default=0)
-    for rule in rules:
-        if rule.startswith(("render", "typeset", "build")):
-            place[rule] += max(shift, 0)
-    return place
-
-
-def heights(pairs: list[tuple[str, str]], place: dict[str, int]) -> dict[str, float]:
-    """Rule to its height, 0 to 1: columns are ordered again and again by the middle of what their rules join to."""
-    by_column: dict[int, list[str]] = {}
-    for rule in sorted(place):
-        by_column.setdefault(place[rule], []).append(rule)
-    height = {}
-
-    def spread(rules: list[str]) -> None:
-        for k, rule in enumerate(rules):
-            height[rule] = (k + 0.5) / len(rules)
-
-    for rules in by_column.values():
-        spread(rules)
-    for sweep in range(_SWEEPS):
-        for column in sorted(by_column, reverse=bool(sweep % 2)):
-            middle = {}
-            for rule in by_column[column]:
-                joined = [height[b] for a, b in pairs if a == rule] + [height[a] for a, b in pairs if b == rule]
-                middle[rule] = float(np.mean(joined)) if joined else height[rule]
-            by_column[column].sort(key=lambda rule: (middle[rule], rule))
-            spread(by_column[column])
-    return height
+def bench_flow() -> Figure:
+    """What the bench's recorder does with a stream of samples (figure 2.35 of the thesis)."""
+    boxes = {
+        "open": (0.0, 1.0, "open\nthe port"),
+        "first": (1.75, 1.0, "10 samples:\nlink and spikes"),
+        "filter": (3.7, 1.0, "read and\nlow-pass"),
+        "tare": (5.6, 1.0, "25 samples:\ntare"),
+        "force": (7.5, 1.0, "voltage to cell\nto force"),
+        "store": (7.5, -0.5, "store with\ntime stamp"),
+        "end": (5.6, -0.5, "export"),
+    }
+    arrows = [("open", "first"), ("first", "filter"), ("filter", "tare", "steady"), ("tare", "force")]
+    arrows += [("force", "store"), ("store", "end", "done")]
+    fig = scheme(boxes, arrows, 1.7, (-0.8, 8.6), (-1.0, 1.9))
+    axis = fig.axes[0]
+    loop = {"arrowstyle": "-|>", "lw": 0.9, "color": "#444444"}
+    bent = "arc3,rad=-1.1"
+    axis.annotate("", (3.35, 1.3), (4.05, 1.3), arrowprops=loop | {"connectionstyle": "arc3,rad=0.9"})
+    axis.text(3.7, 1.72, "not steady", ha="center", fontsize=7.5)
+    axis.annotate("", (8.15, 0.8), (8.1, -0.3), arrowprops=loop | {"connectionstyle": bent.replace("-1.1", "0.4")})
+    axis.text(8.55, 0.25, "more", ha="center", fontsize=7.5)
+    return fig
 
 
-def wrapped(rule: str) -> str:
-    """A rule's name on lines of a box's width."""
-    lines, line = [], ""
-    for word in rule.split("_"):
-        if line and len(line) + 1 + len(word) > _LINE_CHARACTERS:
-            lines, line = [*lines, line], word
-        else:
-            line = f"{line} {word}".strip()
-    return "\n".join([*lines, line])
+def control() -> Figure:
+    """The attitude controller and what it drives (figure 4.8 of the thesis)."""
+    boxes = {
+        "reference": (0.0, 1.0, "references\n$F_{T_d}$, $\\phi_d$, $\\theta_d$, $\\psi_d$"),
+        "pid": (2.2, 1.0, "PID\non the angles"),
+        "map": (4.2, 1.0, "$C_A^{-1}$\nto $\\omega_i^2$"),
+        "vehicle": (6.1, 1.0, "vehicle\n(rigid body)"),
+        "out": (8.2, 1.0, "angles, rates,\naccelerations"),
+        "disturbance": (6.1, 2.1, "disturbance"),
+        "noise": (8.2, 2.1, "noise"),
+    }
+    arrows = [("reference", "pid"), ("pid", "map", "$\\tau$"), ("map", "vehicle"), ("vehicle", "out")]
+    arrows += [("disturbance", "vehicle"), ("noise", "out")]
+    fig = scheme(boxes, arrows, 1.6, (-0.9, 9.1), (-0.1, 2.4))
+    axis = fig.axes[0]
+    axis.plot([8.2, 8.2, 2.2], [0.62, 0.05, 0.05], color="#444444", lw=0.9)
+    axis.annotate("", (2.2, 0.66), (2.2, 0.05), arrowprops={"arrowstyle": "-|>", "lw": 0.9, "color": "#444444"})
+    axis.text(5.2, 0.12, "$\\phi$, $\\theta$, $\\psi$", ha="center", fontsize=8)
+    return fig
 
 
-def rule_graph(steps: Iterable[tuple[str, str]]) -> Figure:
-    """The graph, from pairs of a rule and one that reads its files."""
-    pairs = merged(steps)
-    place = columns(pairs)
-    pairs = reduced(pairs)
-    height = heights(pairs, place)
-    most = max(np.bincount(list(place.values())))
-    fig, axis = style.figure(0.6 + 0.4 * most)
-    width = 0.8
-    for a, b in pairs:
-        start, stop = (place[a] + width / 2, height[a]), (place[b] - width / 2, height[b])
-        arrow = {"arrowstyle": "-|>", "lw": 0.4, "color": "#8a8a8a", "shrinkA": 0, "shrinkB": 0, "mutation_scale": 6}
-        axis.annotate("", stop, start, arrowprops=arrow, zorder=1)
-    for rule, column in place.items():
-        colour = _COLOURS.get(rule.split("_")[0], "#e8f1f8")
-        axis.text(
-            column, height[rule], wrapped(rule), ha="center", va="center", fontsize=7, linespacing=0.95, zorder=2,
-            bbox={"boxstyle": "round,pad=0.25", "facecolor": colour, "edgecolor": "#555555", "linewidth": 0.5},
-        )  # fmt: skip
-    axis.set_xlim(-0.55, max(place.values()) + 0.55)
-    axis.set_ylim(1.0, 0.0)
-    axis.set_axis_off()
+_NETWORKS = {
+    "rotor: 1–4–1, linear": ([["$\\omega^2$"], [""] * 4, ["$F$ or $Q$"]], None),
+    "inertias: masked, linear": (
+        [
+            ["$qr$", "$pr$", "$pq$", "$\\tau_\\phi$", "$\\tau_\\theta$", "$\\tau_\\psi$"],
+            ["$\\dot p$", "$\\dot q$", "$\\dot r$"],
+        ],
+        {(k, k % 3) for k in range(6)},
+    ),
+    "wrench: 6–20–20–6, sigmoid": (
+        [
+            ["$F_1$", "$F_2$", "$F_3$", "$F_4$", "$\\phi$", "$\\theta$"],
+            [""] * 5 + ["⋮", ""],
+            [""] * 5 + ["⋮", ""],
+            ["$F_x$", "$F_y$", "$F_z$", "$M_x$", "$M_y$", "$M_z$"],
+        ],
+        None,
+    ),
+}
+"""Nodes of each layer of the thesis's three networks, and which first-layer weights there are (None: all)."""
+
+
+def networks() -> Figure:
+    """The thesis's three networks (figures 4.17, 4.21, 4.24), twenty hidden nodes drawn as seven."""
+    fig, axes = style.figure(2.3, 1, 3, width_ratios=(1, 1, 1.5))
+    for axis, (title, (layers, joined)) in zip(axes, _NETWORKS.items(), strict=True):
+        places = [[(k, len(nodes) / 2 - i - 0.5) for i in range(len(nodes))] for k, nodes in enumerate(layers)]
+        for left, right in itertools.pairwise(range(len(layers))):
+            for (i, a), (j, b) in itertools.product(enumerate(places[left]), enumerate(places[right])):
+                hidden = "⋮" in (layers[left][i], layers[right][j])
+                if not hidden and (joined is None or (i, j) in joined):
+                    axis.plot(*zip(a, b, strict=True), color="#888888", lw=0.35, zorder=0)
+        for k, nodes in enumerate(layers):
+            for (x, y), name in zip(places[k], nodes, strict=True):
+                if name == "⋮":
+                    axis.text(x, y, name, ha="center", va="center")
+                    continue
+                colour = "white" if k == 0 else style.SKY
+                axis.plot(x, y, "s" if k == 0 else "o", ms=6, mfc=colour, mec="black", mew=0.6)
+                side = -0.14 if k == 0 else 0.14
+                if name:
+                    axis.text(x + side, y, name, ha="right" if k == 0 else "left", va="center", fontsize=8.5)
+        axis.set_xlim(-0.6, len(layers) - 0.4)
+        axis.set_title(title)
+        axis.set_axis_off()
     return fig

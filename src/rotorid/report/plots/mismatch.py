@@ -1,9 +1,9 @@
-"""Figures of a verdict (before and after, where, in which regime, how much better), of a comparison of two sets and of
+"""Figures of a comparison of two sets, and of
 a fleet (in how many sets each effect shows, numbers from set to set and since the first)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,47 +22,6 @@ _MOST_PARAMETERS = 4
 _MOST_NAMED = 6
 """Vehicles that still have a colour each."""
 _WORDS = {"established": style.BLUE, "ambiguous": style.ORANGE, "suggested": style.GREY}
-_SHADE = "#f3e6d8"
-_STAGES = {"before": "as believed", "refitted": "values refitted", "after": "improved"}
-
-
-def errors_over_time(traces: pd.DataFrame, channels: Sequence[str], located: pd.DataFrame) -> Figure:
-    """Measured minus simulated over time, believed and improved vehicle, one channel a row; tinted: located.
-
-    `traces` has `time_s channel run before after` of one run, `located` `run channel start_s stop_s`.
-    """
-    fig, axes = style.figure(0.4 + 1.15 * len(channels), len(channels), 1, sharex=True, squeeze=False)
-    for axis, channel in zip(axes[:, 0], channels, strict=True):
-        part = traces[traces["channel"] == channel]
-        here = located[(located["channel"] == channel) & located["run"].isin(part["run"])]
-        for row in here.itertuples():
-            axis.axvspan(row.start_s, row.stop_s, color=_SHADE, lw=0, zorder=0)
-        for stage in ("before", "after"):
-            axis.plot(part["time_s"], part[stage], color=style.COLOUR[stage], lw=0.8, label=_STAGES[stage])
-        label, unit = style.CHANNELS[channel]
-        axis.set_ylabel(f"{label} ({unit})")
-    axes[-1, 0].set_xlabel("time (s)")
-    fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
-    return fig
-
-
-def errors_by_channel(channels: pd.DataFrame) -> Figure:
-    """Held-out error of each channel over the sensors' noise: as believed, values refitted, with the effects.
-
-    `channels` has `channel before refitted after noise_floor`.
-    """
-    fig, axis = style.figure(2.6)
-    places = np.arange(len(channels))
-    for shift, (stage, name) in zip((-0.2, 0.0, 0.2), _STAGES.items(), strict=True):
-        error = channels[stage] / channels["noise_floor"]
-        axis.plot(places + shift, error, "o", color=style.COLOUR[stage], label=name, markersize=5)
-    axis.axhline(1, color=style.COLOUR["noise"], lw=1, ls="--")
-    axis.text(len(channels) - 0.45, 1.0, "noise", color=style.COLOUR["noise"], va="bottom", ha="right", fontsize=8.5)
-    axis.set_yscale("log")
-    axis.set_xticks(places, [style.CHANNELS[name][0] for name in channels["channel"]])
-    axis.set_ylabel("error / sensors' noise")
-    fig.legend(loc="outside upper right", ncols=3)
-    return fig
 
 
 _CLAIMED = ("established", "ambiguous")

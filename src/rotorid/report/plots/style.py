@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 TEXT_WIDTH_IN = 6.3
@@ -120,6 +122,29 @@ def save(fig: Figure, path: str | Path) -> None:
     dated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
     fig.savefig(path, metadata=dated.get(path.suffix))
     plt.close(fig)
+
+
+def show(thing: Figure | pd.DataFrame | str, path: str | Path, **csv: Any) -> None:
+    """Save a chapter's figure (SVG) or table (CSV) and display it in the notebook whose cell calls this.
+
+    A text is a figure that cannot be made: it says why. `csv`: passed on to `DataFrame.to_csv`.
+    """
+    from IPython.display import Image, display
+
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if isinstance(thing, str):
+        placeholder(path, thing)
+        display(thing)
+    elif hasattr(thing, "to_csv"):
+        thing.to_csv(path, index=False, **csv)
+        display(thing)
+    else:
+        save(thing, path)
+        # The saved file is large where it holds many points; a picture of it is what a page of a notebook carries.
+        picture = io.BytesIO()
+        thing.savefig(picture, format="png", dpi=110)
+        display(Image(picture.getvalue()))
 
 
 def placeholder(path: str | Path, reason: str) -> None:

@@ -122,9 +122,14 @@ def test_the_law_of_speed_comes_back() -> None:
     speed = 1900 * ((throttle - 0.004) / 0.496) ** 0.67 * (voltage / voltage.mean()) ** 0.8
     speed += rng.normal(0, 0.1, 50)  # means of 100 readings that scatter by 1 rad/s
     points = pd.DataFrame({"throttle": throttle, "speed_rad_s": speed, "voltage_v": voltage})
-    found = speed_law(points.assign(speed_sd_rad_s=1.0, samples=100))
+    points = points.assign(speed_sd_rad_s=1.0, samples=100, test=[f"thrust-{k}" for k in range(50)])
+    found = speed_law(points)
     for name, true in (("throttle_exponent", 0.67), ("dead_throttle", 0.004), ("voltage_exponent", 0.8)):
         low, high = found[f"{name}_interval_95"]
         assert low < true < high
         assert high - low < 0.05 * true + 0.01
+    assert found["apart"] == []
     refused("at least six points", speed_law, points[:5])
+    # Before: a recording of another rotor was pooled in silence.
+    mine = points.iloc[[40]].assign(test="mine", speed_rad_s=1.002 * speed[40])
+    assert speed_law(pd.concat([points, mine], ignore_index=True))["apart"] == ["mine"]
