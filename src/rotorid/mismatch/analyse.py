@@ -313,7 +313,7 @@ def _offered(
         values=values,
         active=tuple(model.selection.active),
         plain=values_alone(found.model),
-        believed_left=believed_residuals(fewer.prepared, model.rows, fewer.commanded),
+        believed_left=believed_residuals(fewer.prepared, model.rows, fewer.chain if fewer.commanded else None),
         believed=vehicle,
         names=PARAMETER_NAMES,
         whole=whole,
@@ -498,7 +498,7 @@ def _make_traces(
 ) -> tuple[ChannelTrace, ...]:
     """Residual of every channel before refitting, after refitting and with the effects, (n, 12) each per stretch."""
     prepared, chain = model.prepared, found.chain
-    believed_left = believed_residuals(prepared, model.rows, found.commanded)
+    believed_left = believed_residuals(prepared, model.rows, chain if found.commanded else None)
     out = []
     parts = (model.rows, prepared.segments, believed_left, refitted, delivered)
     for r, segment, before, plain, after in zip(*parts, strict=True):

@@ -509,9 +509,17 @@ def chain_of_lift(
         tuple(chain), np.array(values), 0.0, 0.0, np.diag(variances) if chain else np.zeros((0, 0)), holds=False
     )
     every = {key: alternatives.get(key, ()) for key, _ in chain}
-    turned = not {"roll", "pitch"}.isdisjoint(found.bands)
     known = {"e_u": found.elasticity, "e_V": found.voltage, "tau": found.lag_s}
     about = {key: (*own, "s" if key == "tau" else "1") for key, own in known.items() if own is not None}
     about = {"u_h": (found.reference / full_speed, 0.0, "1"), **about}
-    result = SpeedResult(fit, p_values, every, {}, silent=found.reasons, about_hover=about, turned_by_commands=turned)
+    result = SpeedResult(
+        fit,
+        p_values,
+        every,
+        {},
+        silent=found.reasons,
+        about_hover=about,
+        lifted_by_commands="lift" in found.bands,
+        turned_by_commands=not {"roll", "pitch"}.isdisjoint(found.bands),
+    )
     return CommandChain(result, full_speed, full_voltage, found.scale)

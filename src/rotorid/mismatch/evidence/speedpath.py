@@ -104,8 +104,9 @@ class SpeedResult:
     """Where commands alone are recorded: hover command `u_h`, what one percent more of it (`e_u`) and of the voltage
     (`e_V`) adds to the thrust in percent, and by how much rotors are late (`tau`), as far as the recording says it.
     Each with its one-sigma and unit."""
+    lifted_by_commands: bool = True
     turned_by_commands: bool = True
-    """Whether roll or pitch follow the commands in some band; else commands follow roll and pitch."""
+    """Whether lift, and roll or pitch, follow the commands in some band; else commands follow them."""
 
 
 class CommandChain(NamedTuple):

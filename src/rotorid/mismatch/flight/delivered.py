@@ -23,7 +23,9 @@ from rotorid.mismatch.decide.words import parameter_words
 from rotorid.mismatch.evidence.comparison import growth
 from rotorid.mismatch.evidence.regression import Fit, Regression
 from rotorid.mismatch.evidence.rows import PARAMETER_NAMES, Contributions, Rows, residual
+from rotorid.mismatch.evidence.speedpath import CommandChain
 from rotorid.mismatch.flight.prepare import Prepared
+from rotorid.mismatch.flight.wrench import caused
 
 _BEYOND_TRUST = 2.0
 """Standard deviations of trust up to which a value may move: beyond, something else is missing that pulls at it."""
@@ -117,14 +119,15 @@ def residuals_of(model: FittedModel, fit: Fit) -> list[np.ndarray]:
     return [r.y - part for r, part in zip(model.rows, added, strict=True)]
 
 
-def believed_residuals(prepared: Prepared, rows: list[Rows], commanded: bool) -> list[np.ndarray]:
-    """What the believed vehicle leaves of every stretch of a flight, (n, 12); if `commanded`, rotors turn as
-    commanded."""
-    if not commanded:
+def believed_residuals(prepared: Prepared, rows: list[Rows], chain: CommandChain | None) -> list[np.ndarray]:
+    """What the believed vehicle leaves of every stretch of a flight, (n, 12); where a `chain` is known by commands
+    alone, rotors turn as commanded, as far as commands are no answers."""
+    if chain is None:
         return [r.y for r in rows]
     out = []
     for r, segment in zip(rows, prepared.segments, strict=True):
-        left, groups = np.full_like(r.y, np.nan), residual(segment, prepared.vehicle)
+        turning = replace(segment.motion, rotor_speed=caused(segment.command, segment.dt_s, chain))
+        left, groups = np.full_like(r.y, np.nan), residual(replace(segment, motion=turning), prepared.vehicle)
         for index, group in enumerate(("force", "moment")):
             if group in groups:
                 left[:, 3 * index : 3 * index + 3] = prepared.thinner(groups[group])

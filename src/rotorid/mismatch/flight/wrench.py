@@ -14,7 +14,7 @@ from rotorid.effects.steady_wind import through_drag
 from rotorid.mismatch.decide.select import LEAST_PROMISE, LEAST_TRANSFER, Questions, Search, Selection
 from rotorid.mismatch.decide.selected import coefficient_of, coefficients, relative_change
 from rotorid.mismatch.evidence.lift import chain_of_lift
-from rotorid.mismatch.evidence.motion import Segment, own_rate_hz
+from rotorid.mismatch.evidence.motion import Segment, own_rate_hz, running_mean
 from rotorid.mismatch.evidence.regression import (
     AGREEMENT,
     NOISE_BAND,
@@ -62,6 +62,8 @@ _MEMORY_GRID = 37
 
 _MOST_P_OF_WIND = 1e-3
 """p-value up to which a wind is seen by the fit through the drag."""
+ANSWERED_S = 3.0
+"""Seconds over which commands that answer disturbances are averaged: trims are slower, answers quicker."""
 _WIND_ROUNDS = 3
 """Searches in a wind at most: in moving air another drag may explain more, and through it the wind is another."""
 _SURE_Z = 3.0
@@ -351,13 +353,30 @@ class Seconds:
 
 
 def path_segments(segments: list[Segment], chain: CommandChain, cutoff_hz: float) -> list[Segment]:
-    """Segments whose rotor speeds are what the chain makes of the commands."""
+    """Segments whose rotor speeds are what the chain makes of the commands.
+
+    What commands do in answer to lift or moments is no cause of them: of these the mean over ANSWERED_S counts.
+    """
     out = []
     for s in segments:
-        speed = chain.speeds(s)
+        speed = caused(chain.speeds(s), s.dt_s, chain)
         acceleration = smoothed_acceleration(speed, s.rate_hz, cutoff_hz)
         out.append(replace(s, motion=replace(s.motion, rotor_speed=speed, rotor_acceleration=acceleration)))
     return out
+
+
+def caused(speed: np.ndarray, dt_s: float, chain: CommandChain) -> np.ndarray:
+    """Rotor speeds (n, k) with the mean over ANSWERED_S of their collective, and of what they differ by, where these
+    are answers."""
+    lifted, turned = chain.result.lifted_by_commands, chain.result.turned_by_commands
+    if lifted and turned:
+        return speed
+    squares = speed**2
+    size = min(len(squares) - 1, int(ANSWERED_S / dt_s)) | 1
+    slow = np.stack([running_mean(column, size) for column in squares.T], axis=1)
+    collective, differing = ((squares if own else slow) for own in (lifted, turned))
+    parts = collective.mean(axis=1, keepdims=True) + differing - differing.mean(axis=1, keepdims=True)
+    return np.sqrt(np.maximum(parts, 0.0))
 
 
 @step("from command to rotor speed")

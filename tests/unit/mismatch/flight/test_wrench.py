@@ -3,15 +3,18 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from rotorid.mismatch.evidence.motion import Segment
 from rotorid.mismatch.evidence.regression import full_fit_residuals
 from rotorid.mismatch.evidence.rows import Rows
+from rotorid.mismatch.evidence.speedpath import CommandChain, SpeedFit, SpeedResult
 from rotorid.mismatch.flight import wrench
 from rotorid.mismatch.flight.prepare import prepare
 from rotorid.mismatch.flight.wrench import (
     SAME_WRENCH,
     Seconds,
+    caused,
     channel_floor,
     inflated_channels,
     without_unseen,
@@ -131,3 +134,16 @@ def test_a_channel_known_to_be_above_what_the_catalogue_leaves_is_searched_once(
     own = wrench.after_residual(before)
     assert all(np.array_equal(left[:, 0], part[:, 0]) for left, part in zip(searches[0], own, strict=True))
     assert not np.array_equal(searches[0][0][:, 1], own[0][:, 1])
+
+
+@pytest.mark.parametrize(("lifted", "turned"), [(True, True), (True, False), (False, True), (False, False)])
+def test_of_commands_that_are_answers_the_mean_over_seconds_counts(lifted, turned):
+    """Squares of 1 plus a wave of the collective at 2 Hz and one between the rotors at 3 Hz; trims stay."""
+    time_s = np.arange(0.0, 12.0, 0.01)[:, None]
+    together, apart = 0.2 * np.sin(4 * np.pi * time_s), 0.1 * np.sin(6 * np.pi * time_s) * np.array([1, -1, 1, -1])
+    trim = np.array([0.04, 0.0, 0.0, -0.04])
+    result = SpeedResult(SpeedFit((), np.zeros(0), 0.0, 0.0), {}, {}, {}, lifted_by_commands=lifted)
+    chain = CommandChain(replace(result, turned_by_commands=turned), 1.0, None)
+    found = caused(np.sqrt(1.0 + trim + together + apart), 0.01, chain) ** 2
+    expected = 1.0 + trim + lifted * together + turned * apart
+    np.testing.assert_allclose(found[300:-300], np.broadcast_to(expected, found.shape)[300:-300], atol=3e-3)
