@@ -29,6 +29,7 @@ OPEN = (
     "plantings.sow",
     "plantings.tables",
     "plantings.write",
+    "path",
     "plots",
     "quoted",
     "real",

@@ -62,6 +62,7 @@ EFFECT = Effect(
     sentence="all rotors turn slower than commanded as the battery's voltage falls",
     forms=lambda vehicle: (),
     form_named=form_named,
+    about=about,
     speed_forms=(
         SpeedForm("power of voltage", "ω = ω_c (V/V_0)^p", (P,), SUPPLY, power, (0.0,), ("voltage",), "voltage"),
         SpeedForm(
@@ -72,6 +73,7 @@ EFFECT = Effect(
             _power_of_reference,
             (0.0, 0.0),
             ("voltage",),
+            own_scale=True,
         ),
         SpeedForm(
             "drift in time",

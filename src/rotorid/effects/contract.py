@@ -256,6 +256,8 @@ class SpeedForm:
     excited_by: Literal["command", "change", "voltage", "limit", "time"] = "command"
     """What it takes to show: any command, a command that changes, a voltage below the largest, a command beyond
     the limit, or time since the start of the run."""
+    own_scale: bool = False
+    """Whether a parameter scales all speeds, as another full speed would."""
 
 
 @dataclass(frozen=True)
@@ -306,6 +308,8 @@ class Effect:
     may be its form."""
     speed_forms: tuple[SpeedForm, ...] = ()
     """Forms that act between command and rotor speed."""
+    about: Callable[..., SpeedForm] | None = None
+    """The form about a command or a voltage that is stated where no rotor speed is recorded."""
     of_the_rig: bool = False
     """Whether it is of the stand or of the room around it, and no property of the vehicle."""
     set_forms: Callable[[Vehicle], tuple[SetForm, ...]] = lambda vehicle: ()

@@ -92,6 +92,7 @@ EFFECT = Effect(
     sentence="the steady rotor speed is not proportional to its command",
     forms=lambda vehicle: (),
     form_named=form_named,
+    about=about,
     speed_forms=(
         SpeedForm(
             "affine",
@@ -103,6 +104,7 @@ EFFECT = Effect(
             CURVE,
             affine,
             (0.0, 0.0),
+            own_scale=True,
         ),
         SpeedForm(
             "quadratic",
@@ -114,6 +116,7 @@ EFFECT = Effect(
             CURVE,
             quadratic,
             (0.0, 0.0),
+            own_scale=True,
         ),
         SpeedForm(
             "dead zone",

@@ -4,8 +4,8 @@ Commands answer disturbances: in a loop, force and moment regressed on commands 
 the controller's own. So the path is read where the loop is not the cause:
 
 - *Gauge.* Commands alone determine the thrust per mass as a function of command and voltage. C_F and the full speed
-  are one number with it: rotors turn as fast as the believed C_F needs to carry what was felt (`CommandChain.scale`).
-- *Curve and voltage* from the force along the rotors' axis, its mean included: a vehicle in the air is carried. Errors
+  are one number with it: rotors turn as fast as the believed C_F needs for the lift that was felt.
+- *Curve and voltage* from the force along the rotors' axis, its mean included: what flies is lifted. Errors
   are weighted by the spectrum of what is left, learnt anew after each fit.
 - *Lag and delay* from the frequency bands of lift, roll and pitch in which the response is that of a cause
   (`causal_bands`): coherent, with a gain that a vehicle can have and that a lag and a delay explain together with the
@@ -27,10 +27,8 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
-from rotorid.effects import battery_sag, throttle_curve
 from rotorid.effects.catalogue import catalogue
-from rotorid.effects.contract import SpeedForm
-from rotorid.effects.motor_lag import lagged
+from rotorid.effects.contract import CURVE, DELAY, LAG, SUPPLY, Effect, SpeedForm, SpeedPath
 from rotorid.mismatch.evidence.motion import Segment
 from rotorid.mismatch.evidence.speedpath import CommandChain, SpeedFit, SpeedResult
 from rotorid.recordings import Vehicle
@@ -69,7 +67,6 @@ _SQUARE, _SLIGHT = 2.0, 0.04
 """Elasticity of a speed proportional to the command, and a difference from it that nobody notices."""
 _WIDEST_LAG = 0.6
 """The same of a lateness."""
-IDS = ("throttle_curve", "battery_sag", "motor_lag", "delay")
 LIFT_SILENT = (
     "what moves the commands of this recording is mostly what the controller answers: fly brisk climbs and descents"
 )
@@ -120,15 +117,15 @@ class LiftPath:
     voltage: tuple[float, float] | None = None
     lag_s: tuple[float, float] | None = None
     """All of the lateness."""
-    late_by: str = "motor_lag"
-    """Whether it is a lag or a delay."""
+    late_by: int = LAG
+    """Stage at which: a lag or a delay."""
     one_of_two: bool = False
     """Whether the other of the two explains as much."""
     scale: float = 1.0
-    """Rotor speed over the believed one such that the felt force is carried."""
+    """Rotor speed over the believed one that makes the felt force."""
     shape: str = "power"
-    reasons: Mapping[str, str] = field(default_factory=dict)
-    """To ids of which nothing is said, why."""
+    reasons: Mapping[int, str] = field(default_factory=dict)
+    """To stages of the path of which nothing is said, why."""
     bands: Mapping[str, Bands] = field(default_factory=dict)
     """To `lift`, `roll`, `pitch` the bands in which the response is that of a cause."""
 
@@ -232,7 +229,8 @@ class _Problem:
             thrust = law(f.command / self.reference, exponents[0])
             if f.ratio is not None and exponents[1]:
                 thrust = thrust * (f.ratio ** exponents[1])[:, None]
-            speed = lagged(np.sqrt(thrust), tau_s, tau_s, f.dt_s, holds=False)
+            path = SpeedPath(np.sqrt(thrust), f.dt_s * np.arange(len(thrust)), 1.0, holds=False)
+            speed = _of_stage(LAG).speed_forms[0].apply(path, [tau_s])
             squares = speed**2 * self.reference**2
             made = squares @ self.mixer[: len(self.channels)].T
             wrench.append(self.pieces(f, thinned_by(f.every, made)))
@@ -240,6 +238,11 @@ class _Problem:
                 columns = np.stack([speed.mean(axis=1) * f.climb[:, 0], f.climb[:, 1]], axis=1)
                 others.append(self.pieces(f, thinned_by(f.every, columns)))
         return np.concatenate(wrench), np.concatenate(others) if air else None
+
+
+def _of_stage(stage: int) -> Effect:
+    """The effect that acts at a stage between command and speed."""
+    return next(e for e in catalogue().values() if any(f.stage == stage for f in e.speed_forms))
 
 
 def _power(u: np.ndarray, elasticity: float) -> np.ndarray:
@@ -328,7 +331,7 @@ class _Fit:
 def _fit(problem: _Problem, law: Callable, free: Sequence[int], start: Sequence[float], weights, air: bool = False):
     """Least squares of the lift up to LIFT_TOP_HZ with the parameters `free`; `weights` (bins,) or None to learn them.
 
-    Returns the fit and the weights. Rotors carry what is felt: the gain is free, the mean is a bin like any other.
+    Returns the fit and the weights. Rotors make what is felt: the gain is free, the mean is a bin like any other.
     """
     low, high = np.array([ELASTICITY[0] / 2, -2.0, 0.0]), np.array([6.0, 6.0, 0.3])
     values, free, learn = np.array(start, float), list(free), weights is None
@@ -385,7 +388,7 @@ def read_path(segments: Sequence[Segment], vehicle: Vehicle, command_rate_hz: fl
     problem = _Problem(segments, vehicle)
     if not problem.flown:
         reason = f"no stretch of {problem.piece_s:.1f} s with commands"
-        return LiftPath(problem.reference, None, reasons=dict.fromkeys(IDS, reason))
+        return LiftPath(problem.reference, None, reasons=dict.fromkeys((CURVE, SUPPLY, LAG, DELAY), reason))
     f_hz, top_hz = problem.frequencies_hz, command_rate_hz / _COMMANDS_PER_PERIOD
     made = problem.made(_power, (2.0, 0.0), 0.0, False)[0]
     mean, wanted = made[:, 0, 0].real, problem.felt[:, 0, 0].real
@@ -418,13 +421,11 @@ def read_path(segments: Sequence[Segment], vehicle: Vehicle, command_rate_hz: fl
             scale = fit.scale
         if elasticity is not None and knows and 1.96 * sd[1] <= _WIDEST_VOLTAGE:
             voltage = fit.values[1], sd[1]
-    reasons |= {
-        key: LIFT_SILENT for key, own in (("throttle_curve", elasticity), ("battery_sag", voltage)) if own is None
-    }
+    reasons |= {key: LIFT_SILENT for key, own in ((CURVE, elasticity), (SUPPLY, voltage)) if own is None}
     lag = _together(list(late.values())) if late else None
     if lag is None or 1.96 * lag[1] > _WIDEST_LAG * lag[0] + 0.5 / command_rate_hz:
         lag, words = None, LAG_SILENT if top_hz >= LIFT_TOP_HZ else _slow_commands(command_rate_hz)
-        reasons |= dict.fromkeys(("motor_lag", "delay"), words)
+        reasons |= dict.fromkeys((LAG, DELAY), words)
     return LiftPath(
         problem.reference,
         problem.voltage_reference_v,
@@ -468,10 +469,10 @@ def _together(known: Sequence[tuple[float, float]]) -> tuple[float, float]:
     return mean, float(np.sqrt(max(1.0, scatter) / weight.sum()))
 
 
-def _lag_or_delay(bands: Sequence[Bands]) -> tuple[str, bool]:
-    """Whether a lag or a delay explains bands, and whether either would do."""
+def _lag_or_delay(bands: Sequence[Bands]) -> tuple[int, bool]:
+    """Stage of the lateness, whether a lag or a delay explains bands, and whether either would do."""
     only_lag, only_delay = (sum(b.alone[i] for b in bands) for i in (0, 1))
-    return "delay" if only_delay < only_lag - _PLAINER else "motor_lag", abs(only_lag - only_delay) < _PLAINER
+    return DELAY if only_delay < only_lag - _PLAINER else LAG, abs(only_lag - only_delay) < _PLAINER
 
 
 def _slow_commands(rate_hz: float) -> str:
@@ -489,22 +490,24 @@ def chain_of_lift(
     found = read_path(segments, vehicle, command_rate_hz)
     chain, values, variances, p_values, alternatives = [], [], [], {}, {}
 
-    def add(key: str, form: SpeedForm, number: tuple[float, float]) -> None:
-        value, sd = number
+    def add(effect: Effect, form: SpeedForm, number: tuple[float, float]) -> None:
+        (value, sd), key = number, effect.id
         chain.append((key, form))
         values.append(value)
         variances.append(sd**2)
         p_values[key] = float(chi2.sf(((value - form.neutral[0]) / sd) ** 2, 1))
 
     if found.curved:
-        add("throttle_curve", throttle_curve.about(found.reference / full_speed, found.shape), found.elasticity)
+        curve = _of_stage(CURVE)
+        add(curve, curve.about(found.reference / full_speed, found.shape), found.elasticity)
     if found.sags:
-        add("battery_sag", battery_sag.about(found.voltage_reference_v / full_voltage), found.voltage)
+        supply = _of_stage(SUPPLY)
+        add(supply, supply.about(found.voltage_reference_v / full_voltage), found.voltage)
     if found.lag_s is not None and found.lag_s[0] > 1.96 * found.lag_s[1]:
-        late = found.late_by
-        add(late, catalogue()[late].speed_forms[0], found.lag_s)
+        late = _of_stage(found.late_by)
+        add(late, late.speed_forms[0], found.lag_s)
         if found.one_of_two:
-            alternatives["motor_lag"] = ("delay",)
+            alternatives[late.id] = (_of_stage(LAG + DELAY - found.late_by).id,)
     fit = SpeedFit(
         tuple(chain), np.array(values), 0.0, 0.0, np.diag(variances) if chain else np.zeros((0, 0)), holds=False
     )
@@ -517,7 +520,7 @@ def chain_of_lift(
         p_values,
         every,
         {},
-        silent=found.reasons,
+        silent={_of_stage(stage).id: why for stage, why in found.reasons.items()},
         about_hover=about,
         lifted_by_commands="lift" in found.bands,
         turned_by_commands=not {"roll", "pitch"}.isdisjoint(found.bands),

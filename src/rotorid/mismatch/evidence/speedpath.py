@@ -118,8 +118,8 @@ class CommandChain(NamedTuple):
     full_voltage: float | None
     """V, at which the full speed is reached; None where no voltage is recorded."""
     scale: float = 1.0
-    """Rotor speed over the one that the chain makes: where no speed is recorded, what the believed C_F needs to carry
-    what was felt. Commands alone determine thrust; C_F and the full speed are one number with it."""
+    """Rotor speed over the one that the chain makes: where no speed is recorded, what the believed C_F needs for
+    the lift that was felt. Commands alone determine thrust; C_F and the full speed are one number with it."""
 
     def speeds(self, segment: Segment, chain: Chain | None = None, values: np.ndarray | None = None) -> np.ndarray:
         """Rotor speeds (n, k), rad/s, of the segment's commands; by another `chain` with `values` where given."""

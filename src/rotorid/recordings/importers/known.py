@@ -120,7 +120,7 @@ def _untaken(parameters: Mapping[str, float], rotors: int) -> list[ImportFault]:
     faults = fault("tilted_rotor", [i + 1 for i in tilted], found, "its thrust is taken along -z")
     places = list(zip(*(stated(name, 0.0) for name in ("PX", "PY", "PZ")), strict=True))
     pairs = [f"{i + 1} and {k + 1}" for k in range(rotors) for i in range(k) if places[i] == places[k] != (0, 0, 0)]
-    if pairs:
+    if pairs and 2 * len(pairs) <= rotors:
         found = f"rotors {', '.join(pairs)} are on one spot (CA_ROTOR*_PZ states no distance along z)"
         faults.append(ImportFault("coaxial", "vehicle.yaml", found, "taken so: write z_m of each by what you measure"))
     by_servo = [i + 1 for i, servo in enumerate(stated("TILT", 0.0)) if servo > 0]

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rotorid.effects.contract import LAG
 from rotorid.effects.motor_lag import lagged
 from rotorid.mismatch.evidence.lift import causal_bands, chain_of_lift, read_path
 from rotorid.mismatch.evidence.motion import Segment
@@ -99,7 +100,7 @@ def test_where_the_controller_answers_gusts_nothing_is_stated(gain, noise):
 
 def test_commands_that_come_too_slowly_say_no_lag():
     found = read_path([flown(asked(k), 1.4, 0.05, np.random.default_rng(4)) for k in (9, 10)], VEHICLE, 5.0)
-    assert found.lag_s is None and "5 times a second" in found.reasons["motor_lag"]
+    assert found.lag_s is None and "5 times a second" in found.reasons[LAG]
 
 
 def response(gain, tau_s: float, delay_s: float, noise: float = 0.05):

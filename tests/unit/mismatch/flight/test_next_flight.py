@@ -2,9 +2,7 @@
 
 import re
 from dataclasses import replace
-from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 from rotorid.effects.catalogue import catalogue
@@ -12,7 +10,7 @@ from rotorid.effects.describe import RECORDABLE, advice
 from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.flight.fitted import NextFlight, next_flight
 from rotorid.recordings import RecordingSet, Run
-from tests.unit.mismatch.flights import quad, recorded
+from tests.unit.mismatch.flights import recorded
 
 
 def of(name: str, *alternatives: str, status: str = "ambiguous") -> Finding:
@@ -23,12 +21,6 @@ def with_column(recordings: RecordingSet, name: str) -> RecordingSet:
     """The set with one more column in every run."""
     runs = (Run(r.name, r.table.assign(**{name: 12.0})) for r in recordings.runs)
     return replace(recordings, runs=tuple(runs))
-
-
-def commanded() -> SimpleNamespace:
-    """A fitted set whose rotor speeds are known from commands of 900 rad/s alone."""
-    prepared = SimpleNamespace(vehicle=quad(), segments=[SimpleNamespace(command=np.full((10, 4), 900.0))])
-    return SimpleNamespace(commanded=True, prepared=prepared)
 
 
 def test_only_an_open_class_is_worth_a_flight():
@@ -66,12 +58,3 @@ def test_no_manoeuvre_asks_for_a_column_by_itself():
     columns = "position|rotor speed|temperature|voltage|current"
     for effect in catalogue().values():
         assert not re.search(f"record[^,;]*({columns})|({columns})s? recorded", effect.separating_manoeuvre), effect.id
-
-
-def test_what_no_flight_tells_apart_is_said_with_what_it_takes():
-    curves = [of("thrust_curve", "throttle_curve", "thrust_curve")]
-    said = next_flight(curves, recorded(1), commanded()).manoeuvre
-    assert said.startswith("record the rotor speeds, or hold an optical tachometer")
-    assert "1073 rad/s if the throttle is curved, 900 rad/s if the thrust is" in said
-    measured = SimpleNamespace(commanded=False)
-    assert "tachometer" not in next_flight(curves, recorded(1), measured).manoeuvre
