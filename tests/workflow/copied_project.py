@@ -12,8 +12,8 @@ from tests.tree import GUARD
 
 ROOT = Path(__file__).parents[2]
 PARTS = (
-    "Snakefile", "CITATION.cff", "config.yaml", "requirements.lock", "profiles", "workflow", "src", "proof", "notebooks",
-    "raw", "tests/configs", "tests/sealed", "docs/proof",
+    "Snakefile", "CITATION.cff", "config.yaml", "requirements.lock", "profiles", "workflow", "src", "proof",
+    "notebooks", "raw", "tests/configs", "tests/sealed", "docs/proof",
 )  # fmt: skip
 
 
