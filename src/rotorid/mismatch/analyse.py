@@ -370,7 +370,9 @@ def not_testable(prepared: Prepared, chain: CommandChain | None, findings: list[
     """Reasons why ids cannot be tested on this set, those aside that were found all the same."""
     reasons = dict(prepared.not_testable)
     if chain is None:
-        reasons.update({k: "no rotor commands recorded" for k in before_the_rotors()})
+        recorded = all(s.command is not None for s in prepared.segments)
+        why = "no force is known to compare commands with" if recorded else "no rotor commands recorded"
+        reasons.update(dict.fromkeys(before_the_rotors(), why))
     elif chain.full_voltage is None:
         reasons = {**dict.fromkeys(ids_of_stage(SUPPLY), "no battery voltage"), **reasons}
     if chain is not None:

@@ -143,7 +143,7 @@ class LiftPath:
 
 
 @dataclass(frozen=True)
-class _Flown:
+class _Driven:
     """A stretch thinned: what was commanded and what was felt."""
 
     command: np.ndarray
@@ -202,11 +202,11 @@ class _Problem:
                 v = s.motion.air_velocity
                 climb = np.stack([v[:, 2], v[:, 0] ** 2 + v[:, 1] ** 2], axis=1)
             thinned = thinned_by(every, np.stack(felt, axis=1))
-            self.flown.append(_Flown(s.command, ratio, climb, thinned, s.dt_s, every))
+            self.flown.append(_Driven(s.command, ratio, climb, thinned, s.dt_s, every))
         self.climbs = all(f.climb is not None for f in self.flown)
         self.felt = np.concatenate([self.pieces(f, f.felt) for f in self.flown]) if self.flown else None
 
-    def pieces(self, flown: _Flown, values: np.ndarray) -> np.ndarray:
+    def pieces(self, flown: _Driven, values: np.ndarray) -> np.ndarray:
         """Spectra (pieces, bins, columns) of thinned values (m, columns)."""
         size = int(self.piece_s / (flown.dt_s * flown.every))
         window = np.hanning(size)
@@ -386,7 +386,7 @@ def read_path(segments: Sequence[Segment], vehicle: Vehicle, command_rate_hz: fl
     `command_rate_hz` is the rate at which commands change; where it is low a lag is not asked for.
     """
     problem = _Problem(segments, vehicle)
-    if not problem.flown:
+    if problem.felt is None or not len(problem.felt):
         reason = f"no stretch of {problem.piece_s:.1f} s with commands"
         return LiftPath(problem.reference, None, reasons=dict.fromkeys((CURVE, SUPPLY, LAG, DELAY), reason))
     f_hz, top_hz = problem.frequencies_hz, command_rate_hz / _COMMANDS_PER_PERIOD
