@@ -82,6 +82,11 @@ class Card:
     seconds: float
 
 
+def _of_a_body(inertia: np.ndarray) -> np.ndarray:
+    """Moments of inertia (3,), the last no larger than the sum of the others."""
+    return np.array([*inertia[:2], min(inertia[2], 0.97 * inertia[:2].sum())])
+
+
 def drafted(family: str, seed: int) -> Card:
     """A card of a family."""
     rng = np.random.default_rng([seed, 1])
@@ -106,7 +111,7 @@ def drafted(family: str, seed: int) -> Card:
         path=Path(**own),
         mass=mass,
         arm=arm,
-        inertia=np.array([0.25, 0.25, 0.45]) * mass * arm**2 * spread,
+        inertia=_of_a_body(np.array([0.25, 0.25, 0.45]) * mass * arm**2 * spread),
         gust=float(np.exp(rng.uniform(np.log(0.003), np.log(0.03)))),
         memory_s=float(rng.uniform(0.2, 1.0)),
         away_m=float(rng.choice([0.0, 0.0, rng.uniform(0.3, 1.0)])),
