@@ -412,7 +412,8 @@ def feedback_row(name: str, quick: bool = False) -> dict[str, Any]:
 
 def feedback_summary(rows: pd.DataFrame) -> pd.DataFrame:
     """Drawn flights with a wrong name or value, and of each quantity how many are claimed, right and held."""
-    wrong = int(rows["wrong_names"].astype(bool).sum()), int(rows["wrong_values"].astype(bool).sum())
+    # Rows that were kept are read back with nothing in place of no name.
+    wrong = [int(rows[key].astype(object).fillna("").astype(bool).sum()) for key in ("wrong_names", "wrong_values")]
     out = [
         {"what": what, "count": count, "of": len(rows), **_interval(count, len(rows))}
         for what, count in zip(("sets with a wrong name", "sets with a wrong value"), wrong, strict=True)
