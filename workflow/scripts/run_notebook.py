@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import nbformat
 import papermill
 from traitlets.config import Config
 
@@ -49,9 +50,22 @@ def main(notebook: str, parameters: Mapping[str, Any], outputs: Mapping[str, str
             start_timeout=PATIENCE_S,
             config=Config({"KernelManager": {"transport": "ipc", "ip": f"{sockets}/kernel"}}),
         )
+    without_the_run(Path(executed))
     missing = [path for path in outputs.values() if not Path(path).is_file()]
     if missing:
         raise FileNotFoundError(f"{notebook}: ended without writing {', '.join(missing)}.")
+
+
+def without_the_run(executed: Path) -> None:
+    """Leave out of an executed notebook when, how long and in which folder it ran: two builds give the same file."""
+    notebook = nbformat.read(executed, as_version=4)
+    notebook.metadata.pop("papermill", None)
+    for number, cell in enumerate(notebook.cells, 1):
+        cell.id = f"cell-{number}"
+        cell.source = cell.source.replace(f"{Path.cwd()}/", "")
+        for key in ("papermill", "execution"):
+            cell.metadata.pop(key, None)
+    nbformat.write(notebook, executed)
 
 
 def absolute(files: Mapping[str, Any]) -> dict[str, Any]:
