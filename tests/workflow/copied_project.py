@@ -66,11 +66,11 @@ class Project:
         return {line.split()[0] for line in table[1].splitlines()} - {"all", "report"}
 
     def results(self) -> dict[str, bytes]:
-        """Every result by its path, without logs and provenance."""
+        """Every result by its path, without logs (an executed notebook is one) and provenance."""
         files = (path for path in (self.root / "results").rglob("*") if path.is_file())
         named = {str(path.relative_to(self.root)): path for path in files}
         return {
             name: path.read_bytes()
             for name, path in sorted(named.items())
-            if not name.startswith("results/logs/") and name != "results/report/provenance.json"
+            if not name.startswith(("results/logs/", "results/notebooks/")) and name != "results/report/provenance.json"
         }
