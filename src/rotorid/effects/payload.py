@@ -7,7 +7,8 @@ from rotorid.effects.instant import Wrench
 from rotorid.effects.pendulum import cable_pull, likely_lengths
 from rotorid.effects.scale import scale
 
-_LENGTHS_M = (0.15, 6.0)
+_SHORTEST_M, _LONGEST_M, _LONGEST_ARMS = 0.15, 6.0, 30.0
+"""Cables: nobody slings a load below a vehicle by more than this many of its arms."""
 _DAMPING_RATIO = 0.03
 
 
@@ -47,6 +48,11 @@ def _slung_in_air(motion, vehicle, values):
     return _pull(motion, vehicle, values, slowed * through_air)
 
 
+def _lengths_m(vehicle) -> tuple[float, float]:
+    """Shortest and longest cable of a vehicle, m."""
+    return _SHORTEST_M, max(4 * _SHORTEST_M, min(_LONGEST_M, _LONGEST_ARMS * scale(vehicle).arm_m))
+
+
 def _slung_starts(parts, vehicle):
     """The likeliest lengths of a cable, each with its damping."""
     stretches = []
@@ -58,7 +64,7 @@ def _slung_starts(parts, vehicle):
             pulls.append(np.cross(left["moment"], [0.0, 0.0, 1.0]))
         world = [np.einsum("nij,nj->ni", motion.rotation, x)[:, :2] for x in (velocity, *pulls)]
         stretches.append((motion.time_s, hanging_acceleration(motion), world[0], world[1:]))
-    return likely_lengths(stretches, _LENGTHS_M, _DAMPING_RATIO, vehicle.gravity_m_s2)
+    return likely_lengths(stretches, _lengths_m(vehicle), _DAMPING_RATIO, vehicle.gravity_m_s2)
 
 
 def _rigid(m, v, p, w):
@@ -99,10 +105,12 @@ def forms(vehicle):
         Parameter("m_p y", "kg m", -reach, reach, meaning="its mass times its place to the right"),
         Parameter("m_p z", "kg m", -reach, reach, meaning="its mass times its place downward"),
     )
+    lengths_m = _lengths_m(vehicle)
+    starts = tuple(x for x in (0.3, 0.6, 1.2, 2.4) if x < lengths_m[1])
     cable = (
         m_p,
         Parameter("m_p z", "kg m", -reach, reach, meaning="its mass times how far below the centre its hook is"),
-        Parameter("L", "m", *_LENGTHS_M, True, (0.3, 0.6, 1.2, 2.4), "length of the cable"),
+        Parameter("L", "m", *lengths_m, True, starts, "length of the cable"),
         Parameter("ζ", "1", 0.002, 0.3, True, (_DAMPING_RATIO,), "damping of its swing, share of the critical"),
     )
     products = tuple(

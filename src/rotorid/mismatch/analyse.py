@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -36,7 +37,7 @@ from rotorid.mismatch.deliver.candidates import Candidate, Ground
 from rotorid.mismatch.deliver.files import claimed, conditions_of, instruments_of, place_of, with_effects
 from rotorid.mismatch.deliver.final import Offered, Stretches, as_delivered
 from rotorid.mismatch.deliver.flown import model_of, squares_of_windows
-from rotorid.mismatch.deliver.usable import chain_ids, question_of, with_only
+from rotorid.mismatch.deliver.usable import as_a_body, chain_ids, question_of, with_only
 from rotorid.mismatch.evidence.motion import Segment, full_speed, regime_variables, stretches
 from rotorid.mismatch.evidence.regression import Fit
 from rotorid.mismatch.evidence.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE
@@ -117,9 +118,9 @@ def _analysed(recordings: RecordingSet, mistakes, remarks, watch: Watch) -> Anal
     findings += absorbed_findings(model, values, findings)
     findings, to_state = with_square_term(findings, values, model)
     chosen = chosen_already(model)
-    findings = with_probabilities(together(findings), chosen)
+    findings = with_probabilities(together(findings), chosen.found, chosen.support)
     stated_ids = {i for f in findings for i in (f.id, *f.alternatives)}
-    limits = tuple(limit for limit in absent(model, chosen) if limit.id not in stated_ids)
+    limits = tuple(limit for limit in absent(model, chosen.found) if limit.id not in stated_ids)
     full = full_speed(known.runs, prepared.vehicle) if only_throttle(recordings) else None
     choice = _Choice(recordings, split, found, to_state, full, tuple(findings), limits, tuple(remarks))
 
@@ -131,7 +132,8 @@ def _analysed(recordings: RecordingSet, mistakes, remarks, watch: Watch) -> Anal
     plain_fit, plain_moved = settled(model, plain, ())
     first = _account(choice, seen, fit, moved, plain_fit, {**plain_moved, **plain})
     words = with_values_in_question(weighed(first))
-    return with_noise_held_out(as_delivered(_offered(choice, words, seen, unseen, moved, plain_moved)))
+    offer = partial(_offered, choice, seen=seen, unseen=unseen, moved=moved, plain_moved=plain_moved)
+    return with_noise_held_out(as_delivered(words, offer))
 
 
 @dataclass(frozen=True)
@@ -327,6 +329,7 @@ def _offered(
         chain_is_named=found.commanded,
         larger=lambda c, term: on_vehicle(term, model.segments, vehicle, {**c.moved, **stated_of(c)}, model.noise)[0],
         in_rows=lambda other: acting_over_rows(vehicle, other),
+        embodied=partial(as_a_body, vehicle),
     )
 
 

@@ -244,7 +244,8 @@ def known(
     prepared = prepare(fit_part, cutoff_hz, unseen=tuple(r.name for r in unseen.runs))
     found = fitted(prepared)
     way = ways(found.model, found.values, found.model.selection.active)[0]
-    inside = with_probabilities(findings_inside(found, prepared, way.fit), chosen_already(found.model))
+    chosen = chosen_already(found.model)
+    inside = with_probabilities(findings_inside(found, prepared, way.fit), chosen.found, chosen.support)
     findings = (*mistakes, *findings_outside(found, prepared), *inside)
     chain = () if found.chain is None else tuple(k for k, _ in found.chain[0].fit.chain)
     if claimed is not None:

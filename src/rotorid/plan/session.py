@@ -111,7 +111,8 @@ def known_instrument(recordings: RecordingSet, claimed: Collection[str] | None =
     model = with_plainer_forms(model, loadings)
     holder = KnownInstrument(recordings, model, chain, (), ())
     questions, unanswerable = [], [(f.alternatives, f.sentence) for f in mistakes if f.status == "ambiguous"]
-    inside = with_probabilities(reading_findings(model), chosen_already(model))
+    chosen = chosen_already(model)
+    inside = with_probabilities(reading_findings(model), chosen.found, chosen.support)
     for finding in (*inside, *(() if chain is None else chain.findings)):
         ids = tuple(finding.alternatives) if finding.status == "ambiguous" else ()
         if claimed is not None and finding.id not in claimed:

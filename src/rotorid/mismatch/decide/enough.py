@@ -32,6 +32,7 @@ _LEAST_SHARE = 0.01
 than 0.7 % of what a model explains."""
 _LARGE_GAIN = 0.9
 """Error with an effect over that without up to which its gain in a channel is large, however small its share of all."""
+NOTHING = "every number of it may be nothing"
 _LEAST_EXCITED = 0.1
 """Size of a contribution on the held-out runs, relative to that on the fitted ones, below which they do not excite
 it."""
@@ -108,15 +109,22 @@ def judged(
     reason = ""
     if rules.BELOW_LEFTOVER(not beyond):
         reason = "it is smaller than what the model leaves over"
-    elif rules.MAY_BE_NOTHING(bool(finding.parameters) and all(p.low <= 0.0 <= p.high for p in finding.parameters)):
-        reason = "every number of it may be nothing"
+    elif may_be_nothing(finding):
+        reason = NOTHING
     elif rules.SLIGHT(bool(share < _LEAST_SHARE and slight and not finding.windows)):
         reason = f"it takes {100 * share:.1f} % of the error that goes"
     finding = replace(finding, gain=next(iter(reported.values()), None))
-    return _lowered(finding, reason) if reason else finding
+    return lowered(finding, reason) if reason else finding
 
 
-def _lowered(finding: Finding, reason: str) -> Finding:
+def may_be_nothing(finding: Finding) -> bool:
+    """Whether the interval of every size of an effect holds zero: a length or a time says how it acts, not whether."""
+    linear = {finding.form.parameters[i].symbol for i in finding.form.linear} if finding.form else set()
+    sizes = [p for p in finding.parameters if p.symbol in linear] or finding.parameters
+    return rules.MAY_BE_NOTHING(bool(sizes) and all(p.low <= 0.0 <= p.high for p in sizes))
+
+
+def lowered(finding: Finding, reason: str) -> Finding:
     """A claim that does not stand: suggested, or not established where it is at work and too small to matter."""
     if finding.probability is None or finding.probability < SURE:
         return replace(finding, status="suggested", objection=reason)

@@ -8,7 +8,7 @@ none.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
@@ -20,6 +20,8 @@ from rotorid.effects.loading import InstrumentFacts, Loading
 from rotorid.mismatch.decide.posterior import Found
 from rotorid.mismatch.decide.statements import LIKELY, SURE, Statement, share_of, statements_of, weights_of
 from rotorid.mismatch.decide.status import CLAIMED, Estimate, Status
+from rotorid.mismatch.decide.support import Support
+from rotorid.mismatch.evidence.unknowns import UNKNOWNS
 from rotorid.recordings import RecordingSet, Split, Vehicle
 from rotorid.recordings.run import Doubt
 
@@ -271,11 +273,12 @@ def one_per_class(findings: Sequence[Finding]) -> list[Finding]:
     return kept
 
 
-def with_probabilities(findings: Iterable[Finding], found: Found) -> list[Finding]:
+def with_probabilities(findings: Iterable[Finding], found: Found, support: Support | None = None) -> list[Finding]:
     """The findings with the posterior probability of each, of a class that one of it is at work.
 
     A claim below 0.99 becomes the smallest class of which one is at work with 0.99; without such a class it is
-    `suggested`, below 0.5 `not_established`. `found` is the posterior at the model that the findings are of.
+    `suggested`, below 0.5 `not_established`. `found` is the posterior at the model that the findings are of; a claim
+    that has too little `support` becomes the smallest class that has enough, or is `suggested`.
     """
     stated = {s.id: s for s in statements_of(found)}  # first: it visits every rival
     weights = weights_of(found)
@@ -285,11 +288,27 @@ def with_probabilities(findings: Iterable[Finding], found: Found) -> list[Findin
         if not decided & _members(one):
             return one
         probability = min(1.0, share_of(found, weights, _members(one)))
-        return _with_probability(one, probability, stated.get(one.id))
+        one = _with_probability(one, probability, stated.get(one.id))
+        return one if support is None else _supported(one, support, decided)
 
     out = [weighed(one) for one in findings]
     rivals = set().union(*(one.alternatives for one in out if one.status in CLAIMED))
     return [one for one in out if one.status != "not_established" or one.id not in rivals]
+
+
+def _supported(claim: Finding, support: Support, decided: Collection[str]) -> Finding:
+    """A claim as far as draws of the recording's seconds support it: itself, a class, or only suggested.
+
+    What is at work next to it (`decided`) does not stand in its place.
+    """
+    members = _members(claim)
+    if not members:
+        return claim
+    found = support.class_of(members, frozenset(decided) - members | UNKNOWNS.keys())
+    if found is None:
+        share = f"where the recording's seconds are weighed anew it is at work in {100 * support.of(members):.0f} %"
+        return replace(claim, status="suggested", alternatives=(), objection=share)
+    return claim if found == members else claim.or_else(found)
 
 
 def _members(finding: Finding) -> set[str]:

@@ -200,7 +200,7 @@ def problem_of(evidence: Evidence, spectrum: Spectrum, variance: np.ndarray, pri
     bias_cross = (seen.kept @ evidence.bias_cross) * unit
     root = limiting(seen.gram, seen.bias, prior)
     rows = spectrum.rows
-    place, gram_apart, cross_apart = _scaled_apart(evidence, unit)
+    place, gram_apart, cross_apart = scaled_apart(evidence, unit)
     sd, low, high, is_value = believed(evidence.terms, _trusts_of(evidence.terms), columns_of, unit, rows, prior)
     effects = {t.key: t.key if t.run else t.effect for t in evidence.terms if t.kind == "effect"}
     trusts = _trusts_of(evidence.terms)
@@ -242,14 +242,20 @@ def limiting(gram: np.ndarray, bias: np.ndarray, prior: Prior) -> np.ndarray:
     return np.sqrt(np.minimum(1.0, prior.attenuation * energy / np.maximum(np.diag(bias), TINY)))
 
 
-def _scaled_apart(evidence: Evidence, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Place of the columns that some channels alone estimate, and those channels' products, scaled."""
+def scaled_apart(
+    evidence: Evidence, unit: np.ndarray, weights: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Place of the columns that some channels alone estimate, and those channels' products, scaled.
+
+    `weights` (E,) are those of the environments, by default 1.
+    """
     columns = evidence.apart_columns
     place = np.full(len(unit), -1)
     place[columns] = np.arange(len(columns))
     own = np.isin(evidence.channels, evidence.apart_channels)
-    gram = (evidence.gram.sum(axis=1) - evidence.bias_gram)[own].sum(axis=0)
-    cross = (evidence.cross.sum(axis=1) - evidence.bias_cross)[own].sum(axis=0)
+    weights = np.ones(evidence.gram.shape[1]) if weights is None else weights
+    gram = np.einsum("e,ceij->ij", weights, evidence.gram[own]) - evidence.bias_gram[own].sum(axis=0)
+    cross = np.einsum("e,cei->i", weights, evidence.cross[own]) - evidence.bias_cross[own].sum(axis=0)
     return place, (gram * np.outer(unit, unit))[columns], (cross * unit)[columns]
 
 

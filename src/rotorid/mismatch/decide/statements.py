@@ -17,8 +17,7 @@ import numpy as np
 from rotorid.mismatch.decide.posterior import Found, Model, Posterior, Scored, joint, places, ranked, scored, without
 from rotorid.mismatch.decide.problem import Prior, Problem, problem_of
 from rotorid.mismatch.decide.status import CLAIMED, Estimate, Status
-from rotorid.mismatch.evidence.gram import TINY, evidence_from, spectrum_of
-from rotorid.mismatch.evidence.regression import Regression
+from rotorid.mismatch.evidence.gram import TINY, Evidence, Spectrum
 from rotorid.mismatch.evidence.unknowns import UNKNOWNS
 
 PROBABILITY = 0.95
@@ -280,15 +279,14 @@ def parameters(problem: Problem, at: Scored, key: str, form_sd: float = 0.0) -> 
     return tuple(out)
 
 
-def posterior_at(regression: Regression, active: Iterable[str]) -> Found:
+def posterior_at(evidence: Evidence, spectrum: Spectrum, active: Iterable[str]) -> Found:
     """The posterior at the model of the effects `active`, with the leftover that it leaves.
 
-    The leftover is learnt from none and from all being leftover, as in a search (`search.decide`): where both ends are
-    about as probable the larger is believed. What the effects' forms are wrong by, in nats half its whitened squares,
-    says nothing for the larger. The regression keeps its products by channel.
+    The leftover is learnt from none and from all being leftover, as in a search (`posterior.decide`): where both ends
+    are about as probable the larger is believed. What the effects' forms are wrong by, in nats half its whitened
+    squares, says nothing for the larger.
     """
-    evidence, chosen, prior = evidence_from(regression), tuple(sorted(active)), Prior()
-    spectrum = spectrum_of(evidence)
+    chosen, prior = tuple(sorted(active)), Prior()
 
     def settled(variance: np.ndarray) -> Found:
         for _ in range(_ROUNDS):

@@ -12,9 +12,10 @@ from math import exp
 
 import numpy as np
 
-from rotorid.mismatch.decide.enough import with_shares
+from rotorid.mismatch.decide.enough import NOTHING, lowered, may_be_nothing, with_shares
 from rotorid.mismatch.decide.findings import Analysis, ChannelTrace, Delivery, Finding, ValueRow
 from rotorid.mismatch.decide.selected import coefficients
+from rotorid.mismatch.decide.status import CLAIMED
 from rotorid.mismatch.deliver.candidates import Candidate, CandidateScore, Ground, choose
 from rotorid.mismatch.deliver.derivatives import Learnt, learn
 from rotorid.mismatch.deliver.files import claimed, improved_vehicle, place_of
@@ -72,24 +73,37 @@ class Offered:
     """Factors of a term's coefficients on a candidate's vehicle (`rotorid.mismatch.deliver.by_vehicle`)."""
     in_rows: Callable[[Vehicle], np.ndarray] = lambda vehicle: np.ones(len(CHANNELS) // 2)
     """Force and moment on a vehicle over those that its rows hold, (6,)."""
+    embodied: Callable[[Values, Values], Values] = lambda values, moved: moved
+    """Values moved within their trust such that next to those called wrong they are of one body (`as_a_body`)."""
     restates: bool = True
     """Whether numbers are stated by the fit that is delivered even where nothing else than that was found."""
 
 
 @step("choosing what is delivered")
-def as_delivered(offered: Offered) -> Analysis:
-    """What an offer amounts to once a vehicle is chosen; statuses, wrong values and their reasons stay."""
-    words, model = offered.words, offered.model
+def as_delivered(words: Analysis, offer: Callable[[Analysis], Offered]) -> Analysis:
+    """What an analysis amounts to once a vehicle is chosen; wrong values and their reasons stay.
+
+    Statuses stay, too, but for an effect whose numbers, fitted as they are delivered, may all be nothing: what is
+    offered is then what is left.
+    """
+    offered = offer(words)
+    named = _fitted_candidate("named", offered, offered.values, offered.active)
+    findings = words.findings
+    if offered.restates or not offered.whole:
+        findings = _restated(words.findings, offered, named)
+        nothing = {f.id for f in findings if f.status in CLAIMED and f.values and may_be_nothing(f)}
+        if nothing:
+            stand = tuple(lowered(f, NOTHING) if f.id in nothing else f for f in words.findings)
+            return as_delivered(replace(words, findings=stand), offer)
+    model = offered.model
     ground = _ground_of(offered)
     believed = Candidate("believed", {}, (), None, {}, np.concatenate(offered.believed_left)[:, : len(CHANNELS) // 2])
     refitted = _fitted_candidate("refitted", offered, offered.plain, ())
-    named = _fitted_candidate("named", offered, offered.values, offered.active)
     candidates = [believed, refitted]
     if offered.active or offered.values != offered.plain:
         candidates.append(named)
     if offered.stretches:
         candidates += [c.with_derivatives(learnt) for c in candidates if (learnt := _learnt_of(offered, c)).derivatives]
-    findings = _restated(words.findings, offered, named) if offered.restates or not offered.whole else words.findings
     candidates = [replace(c, flown=offered.flown(c, findings, ground)) for c in candidates]
     chosen, scored = choose(
         candidates,
@@ -132,7 +146,7 @@ def _fitted_candidate(name: str, offered: Offered, values: Values, active: Seque
     """A candidate with the other values as believed, or moved within their trust where that pays (`ways`)."""
     way = ways(offered.model, values, active)[0]
     left = np.concatenate(way.left)[:, : len(CHANNELS) // 2]
-    return Candidate(name, values, tuple(active), way.fit, way.moved, left)
+    return Candidate(name, values, tuple(active), way.fit, offered.embodied(values, way.moved), left)
 
 
 def _learnt_of(offered: Offered, candidate: Candidate) -> Learnt:

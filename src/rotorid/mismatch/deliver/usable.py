@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from rotorid.mismatch.flight.delivered import Values
 from rotorid.mismatch.flight.fitted import Fitted
 from rotorid.mismatch.flight.prepare import assemble_rows
 from rotorid.mismatch.flight.report_runs import chain_without, without_wind
+from rotorid.mismatch.flight.values import changed_vehicle
 from rotorid.mismatch.flight.wrench import WrenchModel, block_seconds, path_segments
 from rotorid.recordings import Run, Vehicle
 from rotorid.recordings import columns as c
@@ -48,6 +50,11 @@ one may make: airspeed and climb change the thrust at the same speed by some ten
 _LIGHT = 0.5
 """Share of the largest recorded thrust below which a vehicle is not taken to be in the air."""
 
+
+_SPLITS = (("arm", "inertia_xx", "inertia_yy"), ("torque", "inertia_zz"))
+"""Values of which a flight knows the ratio of the first to each of the others."""
+_SPLIT_STEPS = np.linspace(-1.2, 1.2, 61)
+"""Logarithms of the factors that are tried: up to three times."""
 
 _Question = Callable[[Vehicle], str]
 """Takes a vehicle of kind `flight`; gives why it is not fit for use, without a full stop, or nothing."""
@@ -100,6 +107,27 @@ def no_body(vehicle: Vehicle) -> str:
         return f"its principal moments of inertia {least:.3g}, {middle:.3g} and {largest:.3g} kg m2 are of no body"
     wrong = unfit(body_of(vehicle, None))
     return f"it would have {wrong[0].words}" if wrong else ""
+
+
+def as_a_body(believed: Vehicle, values: Values, moved: Values) -> Values:
+    """Values `moved` within their trust such that, next to the `values` called wrong, they are those of one body.
+
+    A flight knows the ratios C_F l/J_xx, C_F l/J_yy and C_Q/J_zz, and not how each is split. Where its split is of no
+    body, arm and inertias about it, or C_Q and the yaw inertia, change by one factor each, the nearest that give a
+    body; what is predicted stays. A value that is called wrong stays as it is stated, and so does one that nobody
+    holds for a body anyway.
+    """
+    given = {key: change for key, (change, _) in {**moved, **values}.items()}
+    if no_body(believed) or not no_body(changed_vehicle(believed, given)):
+        return moved
+    free = [keys for keys in _SPLITS if not set(keys) & set(values)]
+    tried = sorted(product(_SPLIT_STEPS, repeat=len(free)), key=lambda own: sum(x * x for x in own))
+    for logarithms in tried:
+        factors = {key: float(np.exp(x)) for keys, x in zip(free, logarithms, strict=True) for key in keys}
+        turned = {key: (1.0 + given.get(key, 0.0)) * factor - 1.0 for key, factor in factors.items() if factor != 1.0}
+        if not no_body(changed_vehicle(believed, {**given, **turned})):
+            return {**moved, **{key: (change, moved.get(key, (0.0, 0.0))[1]) for key, change in turned.items()}}
+    return moved
 
 
 def cannot_hover(vehicle: Vehicle, recorded_share: float) -> str:

@@ -239,6 +239,17 @@ class Spectrum:
             kept[c] = (own.values * shrunk).sum() / max(own.values.sum(), TINY)
         return Weighed(gram, cross, np.tensordot(kept, self.bias, 1), kept)
 
+    def by_environment(self, variance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What `weighed` sums up, of each environment: products (E, K, K) and (E, K) over all channels."""
+        size, count = len(self.unit), len(self.channels[0].values)
+        gram, cross = np.zeros((count, size, size)), np.zeros((count, size))
+        for own, t in zip(self.channels, variance, strict=True):
+            shrunk = 1.0 / (1.0 + t * own.values)
+            root = own.vectors * np.sqrt(own.values * shrunk)[:, None, :]
+            gram[:, own.columns[:, None], own.columns] += root @ root.transpose(0, 2, 1)
+            cross[:, own.columns] += np.einsum("eik,ek->ei", own.vectors, shrunk * own.turned)
+        return gram, cross
+
     def evidence_of(self, variance: np.ndarray) -> float:
         """Log marginal likelihood of a leftover of `variance` (C,) where no model explains anything, nats, less a
         constant."""

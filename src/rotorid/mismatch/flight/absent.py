@@ -16,7 +16,8 @@ import numpy as np
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.decide.posterior import Found
-from rotorid.mismatch.decide.statements import UpperLimit, limits_of, posterior_at
+from rotorid.mismatch.decide.statements import UpperLimit, limits_of
+from rotorid.mismatch.decide.support import Chosen, chosen_at
 from rotorid.mismatch.evidence.gram import Evidence, evidence_from
 from rotorid.mismatch.evidence.regression import Regression, build
 from rotorid.mismatch.evidence.rows import Rows, Term, compared_alone
@@ -41,9 +42,9 @@ def absent(model: WrenchModel, found: Found) -> tuple[UpperLimit, ...]:
     return limits_of(found, squares_of(model, effects))
 
 
-def chosen_already(model: WrenchModel) -> Found:
-    """The posterior at the model of a flight that was chosen."""
-    return posterior_at(_by_channel(model), model.selection.active)
+def chosen_already(model: WrenchModel) -> Chosen:
+    """The model of a flight that was chosen, with its posterior and support."""
+    return chosen_at(_by_channel(model), model.selection.active)
 
 
 def evidence_of(model: WrenchModel) -> Evidence:

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -184,7 +185,8 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
 
     plain = values_of(Selection([], model.selection.fit))
     findings += absorbed_findings(model, values, findings)
-    findings = with_probabilities(findings, chosen_already(model))
+    chosen = chosen_already(model)
+    findings = with_probabilities(findings, chosen.found, chosen.support)
     fit, moved_values = settled(model, values, model.selection.active)
     to_state = values if measured else _stated_of_commands(findings, values)
     choice = _InstrumentChoice(
@@ -195,7 +197,8 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     seen = _on_every_run(model, chain, unseen)
     refitted, moved_plain = settled(model, plain, [])
     first = _account(choice, recordings, seen, fit, moved_values, refitted, {**moved_plain, **plain})
-    return as_delivered(_offered(choice, weighed(first), seen, plain, moved_values, moved_plain))
+    offer = partial(_offered, choice, seen=seen, plain=plain, moved=moved_values, moved_plain=moved_plain)
+    return as_delivered(weighed(first), offer)
 
 
 def _stated_of_commands(findings: list[Finding], values: Values) -> Values:

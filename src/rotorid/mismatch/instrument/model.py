@@ -14,9 +14,8 @@ from rotorid.effects.catalogue import before_the_rotors, catalogue
 from rotorid.effects.contract import Form, not_testable_reason
 from rotorid.effects.loading import NO_ROTORS, Loading, forms_of, weight
 from rotorid.mismatch.decide import rules
-from rotorid.mismatch.decide.posterior import Found
 from rotorid.mismatch.decide.select import Questions, Search, Selection
-from rotorid.mismatch.decide.statements import posterior_at
+from rotorid.mismatch.decide.support import Chosen, chosen_at
 from rotorid.mismatch.evidence.comparison import LEAST_RUNS
 from rotorid.mismatch.evidence.regression import (
     MOST_ATTENUATION,
@@ -166,11 +165,11 @@ def kept_values(search: Search, active: Sequence[str]) -> list[str]:
     return [k for k in search.always if k not in taken]
 
 
-def chosen_already(model: ReadingModel) -> Found:
-    """The posterior at the model of a stand or bench that was chosen."""
+def chosen_already(model: ReadingModel) -> Chosen:
+    """The model of a stand or bench that was chosen, with its posterior and support."""
     rate_hz, filters = model.setup.rate_hz, model.regression.filters
     block_s = model.rows_per_block / rate_hz
-    return posterior_at(
+    return chosen_at(
         build(model.rows, model.terms, filters, everything, block_s, rate_hz, by_channel=True), model.selection.active
     )
 

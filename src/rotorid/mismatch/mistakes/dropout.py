@@ -182,6 +182,7 @@ def _in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[_Dropout]:
             found += _standing_commands(run, vehicle, present, noisy) if len(present) > 1 else []
             continue
         zero = standing_rotors(run, vehicle, names) if sensor == "rotors" and len(present) == len(names) > 2 else {}
+        zero = {n: less for n, mask in zero.items() if (less := _not_asked_for(run, vehicle, n, mask)).any()}
         frozen = []
         if len(present) > 1 and not zero and flown:
             alive = not noisy.isdisjoint(present)
@@ -196,9 +197,27 @@ def _in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[_Dropout]:
             rest = np.where(stands, np.nan, values)
             against = contradiction(run, vehicle, [name]) if flown and sensor == "rotors" else None
             for mask, p in [*held(run.time_s, rest[:, None], noisy=name in noisy, contradicted=against), *frozen]:
+                if sensor == "rotors" and not _not_asked_for(run, vehicle, name, mask).any():
+                    continue
                 if flown or load_went_on(run, vehicle, values, mask):
                     found += _as_dropouts(run, name, "held", mask, p)
     return found
+
+
+def _not_asked_for(run: Run, vehicle: Vehicle, name: str, mask: np.ndarray) -> np.ndarray:
+    """A mask less its stretches in which the rotor's own command stands still too: it turned as it was told to, or the
+    reading is an echo of the command."""
+    kind, number = c.rotor_number(name)
+    commands = [c.rotor_columns(f, vehicle.rotor_count)[number - 1] for f in ("rotor_command", "throttle") if f != kind]
+    command = next((run.column(n) for n in commands if run.has(n)), None)
+    out = mask.copy()
+    if command is None:
+        return out
+    for start, stop in stretches(mask):
+        own = command[start:stop][np.isfinite(command[start:stop])]
+        if len(own) > 1 and np.ptp(own) == 0.0:
+            out[start:stop] = False
+    return out
 
 
 def _standing_commands(run: Run, vehicle: Vehicle, names: list[str], noisy: set[str]) -> list[_Dropout]:

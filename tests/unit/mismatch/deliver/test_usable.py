@@ -14,6 +14,7 @@ from rotorid.errors import InputError
 from rotorid.mismatch.deliver import usable
 from rotorid.mismatch.deliver.final import delivered_value
 from rotorid.mismatch.deliver.usable import (
+    as_a_body,
     cannot_fly,
     cannot_hover,
     exports_lost,
@@ -27,6 +28,7 @@ from rotorid.mismatch.evidence.rows import Term
 from rotorid.mismatch.evidence.split import parts_of, split_runs
 from rotorid.mismatch.flight.fitted import fitted
 from rotorid.mismatch.flight.prepare import prepare
+from rotorid.mismatch.flight.values import changed_vehicle
 from rotorid.recordings import RecordingSet, Run, read_set, templates
 from rotorid.recordings import columns as c
 from rotorid.recordings.vehicle import Derivative
@@ -95,6 +97,32 @@ def test_an_inertia_is_that_of_the_body(factor):
     j = thesis_vehicle().inertia_kg_m2
     wrong = vehicle(inertia_kg_m2=j.model_copy(update={k: getattr(j, k) * factor for k in ("xx", "yy", "zz")}))
     assert "radius of gyration" in no_body(wrong) and no_body(vehicle()) == ""
+
+
+@pytest.mark.parametrize("stated", ["", "inertia_zz", "inertia_xx"])
+def test_what_is_known_as_a_ratio_alone_is_split_into_that_of_a_body(stated):
+    """A yaw inertia three times too large for the others: predicted motion stays, one of the two groups gives way."""
+    believed = vehicle()
+    moved = {"inertia_zz": (2.0, 0.1), "inertia_xx": (-0.1, 0.02), "mass": (0.01, 0.002)}
+    values = {stated: moved.pop(stated)} if stated else {}
+    before = changed_vehicle(believed, {k: v for k, (v, _) in {**moved, **values}.items()})
+    assert "of no body" in no_body(before)
+    split = as_a_body(believed, values, moved)
+    after = changed_vehicle(believed, {k: v for k, (v, _) in {**split, **values}.items()})
+    assert no_body(after) == "" and not set(split) & set(values)
+
+    def accelerates(v):
+        arm, inertia = np.abs(v.rotor_positions_m()).max(), v.inertia_kg_m2
+        return [arm / inertia.xx, arm / inertia.yy, v.torque_coefficient_n_m_s2 / inertia.zz, v.mass_kg]
+
+    np.testing.assert_allclose(accelerates(after), accelerates(before), rtol=1e-9)
+
+
+def test_a_body_stays_as_it_is_and_nothing_is_split_about_values_that_are_called_wrong():
+    believed, sound = vehicle(), {"inertia_zz": (0.05, 0.01)}
+    assert as_a_body(believed, {}, sound) == sound
+    wrong = {"inertia_zz": (2.0, 0.1), "inertia_xx": (-0.1, 0.1)}
+    assert as_a_body(believed, wrong, {}) == {}
 
 
 def test_no_rotor_is_better_than_an_ideal_one():

@@ -210,6 +210,21 @@ def test_dropouts(sound, kind):
     assert np.isnan(run.column(name)[inside]).all() and np.isfinite(run.column(name)[~inside]).all()
 
 
+@pytest.mark.parametrize("value", [0.0, None])
+def test_a_rotor_that_stands_as_it_was_commanded_is_no_lost_sensor(sound, value):
+    """A simulated rotor at its lower limit, and speeds that are an echo of commands which stand still."""
+
+    def spoil(table, commanded):
+        name, inside = "rotor_speed_3_rad_s", (table["time_s"] >= 8.0) & (table["time_s"] <= 8.6)
+        table.loc[inside, name] = table.loc[table["time_s"] < 8.0, name].iloc[-1] if value is None else value
+        return table.assign(**{COMMANDS[n]: table[n] for n in ROTORS}) if commanded else table
+
+    def named(commanded):
+        return {c for f in find_mistakes(with_table(sound, lambda t: spoil(t, commanded)))[1] for c in f.channels}
+
+    assert named(False) == {"rotor_speed_3_rad_s"} and "rotor_speed_3_rad_s" not in named(True)
+
+
 BENCH = Vehicle.model_validate({"name": "b", "kind": "bench", "tared": True})
 
 

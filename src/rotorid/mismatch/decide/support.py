@@ -1,0 +1,116 @@
+"""Whether a name survives the recordings' own doubt: how often it is at work when their seconds are weighed anew.
+
+The posterior of one recording takes its seconds as they are. Where the model is not quite true, as on every real
+vehicle, it is then sure of one of several names that explain about as much, and of another one when half a second is
+cut off. So the environments of the evidence (about 5 s each) are given random weights, the models about the chosen one
+are scored anew, and the posteriors of all draws are averaged: bagged posteriors (Huggins and Miller, Bayesian Analysis
+18, 2023) by the Bayesian bootstrap (Rubin, Annals of Statistics 9, 1981). Names that replace each other from draw to
+draw are a class; one that comes and goes without another in its place is not established.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rotorid.mismatch.decide import rules
+from rotorid.mismatch.decide.posterior import Found, Posterior, ranked
+from rotorid.mismatch.decide.problem import Problem, scaled_apart
+from rotorid.mismatch.decide.statements import posterior_at, statements_of, weights_of
+from rotorid.mismatch.evidence.gram import Evidence, Spectrum, evidence_from, spectrum_of
+from rotorid.mismatch.evidence.regression import Regression
+
+DRAWS = 20
+_NEAR = 60.0
+"""Nats below the chosen model up to which a draw may prefer another one."""
+_RANKED_NEAR = 15.0
+"""Nats below a draw's best model, as ranked, up to which one is scored exactly: the ranking is off by some five."""
+_MOST_MEMBERS = 4
+"""Ids of a class at most: more say no more than that something is off."""
+
+
+@dataclass(frozen=True)
+class Support:
+    """Posterior probabilities of sets of ids, averaged over draws."""
+
+    shares: Mapping[frozenset[str], float]
+    """Probability of each set of ids to be what is at work; they add up to 1."""
+
+    def of(self, members: Iterable[str]) -> float:
+        """Probability that at least one of some ids is at work."""
+        members = set(members)
+        return sum(share for ids, share in self.shares.items() if ids & members)
+
+    def class_of(self, members: Iterable[str], excluded: Iterable[str] = ()) -> frozenset[str] | None:
+        """The fewest ids, `members` among them, that have enough together; None where no class of four has it.
+
+        What is added must be at work where the members are not: one that is there anyway stands for none of them.
+        """
+        found = frozenset(members)
+        others = frozenset().union(*self.shares) - found - frozenset(excluded)
+        while rules.SUPPORT(self.of(found) < rules.SUPPORT["share"]):
+            if len(found) >= _MOST_MEMBERS or not others:
+                return None
+            best = max(sorted(others), key=lambda other: self.of({*found, other}))
+            if self.of({*found, best}) <= self.of(found):
+                return None
+            found, others = found | {best}, others - {best}
+        return found
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """A model that was chosen, by whatever means: the posterior at it, and how it fares on draws."""
+
+    found: Found
+    support: Support
+
+
+def chosen_at(regression: Regression, active: Iterable[str]) -> Chosen:
+    """The posterior at the model of the effects `active` and its support; the regression keeps its products by
+    channel."""
+    evidence = evidence_from(regression)
+    spectrum = spectrum_of(evidence)
+    found = posterior_at(evidence, spectrum, active)
+    statements_of(found)  # visits every rival: the draws are asked of the best model near the chosen one
+    return Chosen(found, support_of(evidence, spectrum, found))
+
+
+def support_of(evidence: Evidence, spectrum: Spectrum, found: Found) -> Support:
+    """The support that a flight gives to the names of the model `found`, and to those that would replace them.
+
+    Asked are the models that were visited about it, with the leftover as it is: no draw searches anew, for what a
+    search by the posterior alone finds is further from the truth (docs/decisions/0012-names-that-stay.md).
+    """
+    near = sorted(m for m, value in found.posterior.visited.items() if value > found.log_posterior - _NEAR)
+    terms, shares = found.problem.terms, {}
+    for problem in _drawn(evidence, spectrum, found.problem):
+        posterior = Posterior(problem)
+        about = ranked(problem, near)
+        for m, value in zip(near, about, strict=True):
+            if value > about.max() - _RANKED_NEAR:
+                posterior(m)
+        best = max(posterior.visited, key=posterior.visited.__getitem__)
+        for model, weight in weights_of(Found(posterior, best, posterior(best))).items():
+            ids = frozenset(terms[key].effect for key in model if key in problem.effects)
+            shares[ids] = shares.get(ids, 0.0) + weight / DRAWS
+    return Support(shares)
+
+
+def _drawn(evidence: Evidence, spectrum: Spectrum, problem: Problem) -> Iterable[Problem]:
+    """The problem with its environments weighed anew, DRAWS times; the same numbers at every call."""
+    gram, cross = spectrum.by_environment(problem.variance)
+    count, random = len(gram), np.random.default_rng(0)
+    for _ in range(DRAWS):
+        weights = random.standard_exponential(count)
+        weights *= count / weights.sum()
+        _, gram_apart, cross_apart = scaled_apart(evidence, spectrum.unit, weights)
+        yield replace(
+            problem,
+            gram=np.tensordot(weights, gram, 1),
+            cross=weights @ cross,
+            gram_apart=gram_apart,
+            cross_apart=cross_apart,
+        )
