@@ -447,7 +447,7 @@ def with_columns(recordings: RecordingSet, names: tuple[str, ...], change: Calla
         if run.has(*names):
             table = run.table.copy()
             table[list(names)] = change(run, run.array(names).copy())
-            run = Run(run.name, table)
+            run = replace(run, table=table)
         runs.append(run)
     return replace(recordings, runs=tuple(runs))
 

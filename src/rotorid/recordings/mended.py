@@ -162,7 +162,8 @@ def _with_slow_joined(recordings: RecordingSet, rotors: Collection[tuple[str, ..
                     curve = make_interp_spline(run.time_s[own], values[own], _SMOOTH_DEGREE)
                     out[inside] = curve(run.time_s[inside])
             lowest = 0.0 if np.nanmin(values) >= 0 else -np.inf
-            runs[k] = replace(run, table=run.table.assign(**dict(zip(names, np.maximum(out, lowest).T, strict=True))))
+            table = run.table.assign(**dict(zip(names, np.maximum(out, lowest).T, strict=True)))
+            runs[k] = replace(run, table=table, joined_hz={**run.joined_hz, **dict.fromkeys(names, 1 / period)})
             rates.append(1 / period)
         if rates:
             rate = min(rates)

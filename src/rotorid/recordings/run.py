@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -52,6 +53,8 @@ class Run:
     table: pd.DataFrame
     path: str = ""
     """File that it was read from, for messages; empty where there is none."""
+    joined_hz: Mapping[str, float] = field(default_factory=dict, compare=False)
+    """Columns that came evenly and seldom and are joined by a curve of their band, each with its own rate."""
 
     @cached_property
     def time_s(self) -> np.ndarray:

@@ -125,7 +125,7 @@ class ValueRow:
     estimate: float
     low: float
     high: float
-    """95 % interval of the estimate; the trust is part of it."""
+    """95 % interval of the estimate, its trust a part of it; NaN where a bound holds the value: it has none then."""
     delivered: float
     """What stands in the improved vehicle."""
 

@@ -8,12 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from math import exp
+from math import exp, nan
 
 import numpy as np
 
 from rotorid.mismatch.decide.enough import NOTHING, lowered, may_be_nothing, with_shares
 from rotorid.mismatch.decide.findings import Analysis, ChannelTrace, Delivery, Finding, ValueRow
+from rotorid.mismatch.decide.select import NEAR_LIMIT
 from rotorid.mismatch.decide.selected import coefficients
 from rotorid.mismatch.decide.status import CLAIMED
 from rotorid.mismatch.deliver.candidates import Candidate, CandidateScore, Ground, choose
@@ -251,6 +252,8 @@ def _value_rows(
             change, sd = model.change(key, float(beta[0]), float(np.sqrt(covariance[0, 0])))
         was = believed_value(believed, key)
         low, high = (was * (1 + change + z * sd) for z in (-1.96, 1.96))
+        if key not in named.values and abs(beta[0]) > NEAR_LIMIT * model.regression.limit[model.regression.start[key]]:
+            low = high = nan  # a bound holds it: what the recordings say of it is not known
         given = delivered_value(improved, believed, key)
         rows.append(ValueRow(names[key], was, was * (1 + change), low, high, given))
     return tuple(rows)

@@ -222,7 +222,7 @@ def analysis_rate_hz(runs: tuple[Run, ...], vehicle: Vehicle, highest_cutoff_hz:
                 break
         for names in inertial:
             if run.has(*names):
-                own.append(own_rate_hz(t, run.array(names)))
+                own.append(min(own_rate_hz(t, run.array(names)), run.joined_hz.get(names[0], np.inf)))
         rates.append(base)
         cutoffs.append(0.4 * min([r for r in own if r > 0], default=base))
     return float(np.median(rates)), float(min(highest_cutoff_hz, *cutoffs))

@@ -80,7 +80,7 @@ def parts_of(recordings: RecordingSet, split: Split) -> tuple[RecordingSet, Reco
         (run,) = recordings.runs
         early = run.time_s < split.border_s - GAP_S / 2
         late = run.time_s >= split.border_s + GAP_S / 2
-        fitted, held = ([Run(run.name, run.table[mask].reset_index(drop=True))] for mask in (early, late))
+        fitted, held = ([replace(run, table=run.table[mask].reset_index(drop=True))] for mask in (early, late))
     return tuple(replace(recordings, runs=tuple(runs), held_out=()) for runs in (fitted, held))
 
 

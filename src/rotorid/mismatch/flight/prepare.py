@@ -214,7 +214,7 @@ def representative(runs: Sequence[Run], rate_hz: float) -> list[Run]:
     ]
     kept = np.unique(np.linspace(0, len(pieces) - 1, int(most_s / _PIECE_S)).round().astype(int))
     return [
-        Run(run.name, run.table.iloc[first:stop].reset_index(drop=True))
+        replace(run, table=run.table.iloc[first:stop].reset_index(drop=True))
         for run, first, stop in map(pieces.__getitem__, kept)
     ]
 

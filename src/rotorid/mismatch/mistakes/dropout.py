@@ -132,7 +132,7 @@ def what_is_left(recordings: RecordingSet, before: RecordingSet, lost: Finding) 
         if stop - start >= LEAST_SINGLE_S:
             inside = run.table[(run.time_s >= start) & (run.time_s <= stop)].reset_index(drop=True)
             note = f"Of {run.name} only {start:.2f} to {stop:.2f} s are analysed, where every sensor has readings."
-            return replace(recordings, runs=(Run(run.name, inside),)), (note,)
+            return replace(recordings, runs=(replace(run, table=inside),)), (note,)
     elif not short:
         return recordings, ()
     elif 2 * len(short) < len(recordings.runs):
@@ -148,7 +148,7 @@ def what_is_left(recordings: RecordingSet, before: RecordingSet, lost: Finding) 
         )
         return rest, (note, *more)
     gone = {n for own in sensors.values() for names in own if set(names) & set(lost.channels) for n in names}
-    runs = tuple(Run(r.name, r.table.drop(columns=[n for n in gone if n in r.table])) for r in recordings.runs)
+    runs = tuple(replace(r, table=r.table.drop(columns=[n for n in gone if n in r.table])) for r in recordings.runs)
     if not all(driven_by(run, vehicle) and channels_of(run) for run in runs):
         if len(runs) > 1:
             return recordings, ()  # what the runs hold at other times may suffice

@@ -138,7 +138,7 @@ def replace_columns(recordings: RecordingSet, change) -> RecordingSet:
     runs = []
     for run in recordings.runs:
         columns = change(run)
-        runs.append(Run(run.name, run.table.assign(**columns)) if columns else run)
+        runs.append(replace(run, table=run.table.assign(**columns)) if columns else run)
     return replace(recordings, runs=tuple(runs))
 
 

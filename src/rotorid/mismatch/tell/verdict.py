@@ -225,7 +225,7 @@ class BelievedValue(_KeysOfVerdict):
 
     believed: _Number
     estimate: _Number
-    interval_95: _Interval
+    interval_95: _Interval = Field(description="Null of a value that a bound holds: it has none.")
     delivered: _Number = Field(description="What stands in improved_vehicle.yaml.")
     wrong: bool = Field(description="Whether it is among `parameters`.")
 

@@ -193,6 +193,8 @@ def test_all_believed_values_stand_in_one_table():
     value = found.believed_values["mass_kg"]
     assert (value.believed, value.estimate, value.interval_95, value.delivered) == (0.652, 0.70, (0.68, 0.72), 0.652)
     assert found.correlations[0].correlation == 0.999
+    held = replace(row, low=float("nan"), high=float("nan"))
+    assert verdict_of(replace(made, believed_values=(held,))).believed_values["mass_kg"].interval_95 == (None, None)
 
 
 def test_a_floor_is_no_larger_than_an_error_that_is_reached_where_nothing_was_fitted():
