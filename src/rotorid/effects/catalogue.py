@@ -1,24 +1,41 @@
-"""The catalogue: every module of this package that defines `EFFECT`; adding an effect is adding one file."""
+"""The catalogue: every module of this package that defines `EFFECT`, and every entry point of the group `rotorid.effects`
+of packages that are installed; adding an effect is adding one file, here or in a package of one's own."""
 
 from __future__ import annotations
 
 import importlib
 import pkgutil
 from functools import cache
+from importlib.metadata import entry_points
 from typing import Literal
 
 import rotorid.effects
 from rotorid.effects.contract import Effect
+from rotorid.errors import InputError
+
+_GROUP = "rotorid.effects"
 
 
 @cache
 def catalogue() -> dict[str, Effect]:
-    """Every wrench and sensor effect by id, in alphabetical order."""
+    """Every wrench and sensor effect by id, in alphabetical order.
+
+    Raises InputError where a package's entry point is no effect, or has the id of another one.
+    """
     found = {}
     for module in pkgutil.iter_modules(rotorid.effects.__path__):
         effect = getattr(importlib.import_module(f"rotorid.effects.{module.name}"), "EFFECT", None)
         if effect is not None:
             found[effect.id] = effect
+    for point in entry_points(group=_GROUP):
+        effect = point.load()
+        if not isinstance(effect, Effect):
+            raise InputError(f"entry point {point.value} of {_GROUP}: expected an Effect, not {type(effect).__name__}")
+        if effect.id in found:
+            raise InputError(
+                f"entry point {point.value} of {_GROUP}: an effect {effect.id} is in the catalogue already"
+            )
+        found[effect.id] = effect
     return dict(sorted(found.items()))
 
 
