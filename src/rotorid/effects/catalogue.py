@@ -1,5 +1,6 @@
-"""The catalogue: every module of this package that defines `EFFECT`, and every entry point `rotorid.effects` of installed
-packages; adding an effect is adding one file, here or in a package of one's own."""
+"""The catalogue: every module of this package that defines `EFFECT`, and every entry point `rotorid.effects` of
+packages that are installed. Adding an effect is adding one file, here or in a package of one's own.
+"""
 
 from __future__ import annotations
 
