@@ -197,7 +197,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     seen = _on_every_run(model, chain, unseen)
     refitted, moved_plain = settled(model, plain, [])
     first = _account(choice, recordings, seen, fit, moved_values, refitted, {**moved_plain, **plain})
-    offer = partial(_offered, choice, seen=seen, plain=plain, moved=moved_values, moved_plain=moved_plain)
+    offer = partial(_offered, choice, seen=seen, plain=plain, moved=moved_values, plain_moved=moved_plain)
     return as_delivered(weighed(first), offer)
 
 
