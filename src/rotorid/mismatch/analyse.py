@@ -84,7 +84,8 @@ def analyse(recordings: RecordingSet, watch: Watch = unwatched) -> Analysis:
     """
     recordings, mistakes, remarks = find_mistakes(recordings)
     analysis = _analysed(recordings, mistakes, remarks, watch)
-    left = [r for r in recordings.runs if r.name not in split_runs(recordings).held_out]
+    opened = split_runs(recordings).held_out if analysis is None else ()
+    left = [r for r in recordings.runs if r.name not in opened]
     if analysis is None and left:
         # What is held out lost a sensor throughout: something else must show what the model is worth.
         names = ", ".join(r.name for r in recordings.runs if r not in left)
