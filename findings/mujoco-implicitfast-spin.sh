@@ -9,8 +9,8 @@
 # MuJoCo turns its sign.
 #
 # Output seen:
-#   mujoco 3.3.7, energy after 10 s over that at the start: {"Euler": 1.9752059219340563, "implicitfast": 1.9752059219340563, "implicit": 0.6270274378265449, "RK4": 0.9999999996360677}
-#   mujoco 4.0.0, energy after 10 s over that at the start: {"Euler": 1.9752059219339837, "implicitfast": 0.6270274378265437, "implicit": 0.6270274378265471, "RK4": 0.9999999996360711}
+#   mujoco 3.3.7, energy after 10 s over that at the start: {"Euler": 1.975206, "implicitfast": 1.975206, "implicit": 0.627027, "RK4": 1.0}
+#   mujoco 4.0.0, energy after 10 s over that at the start: {"Euler": 1.975206, "implicitfast": 0.627027, "implicit": 0.627027, "RK4": 1.0}
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
