@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rotorid.effects import amplifier_filter
 from rotorid.effects.contract import Form
 from rotorid.mismatch.decide import sizes
 
@@ -20,3 +21,11 @@ def test_there_is_a_series_for_each_trace(monkeypatch: pytest.MonkeyPatch) -> No
     got = sizes.shares(analysis, segments, {"force_x": traces, "moment_x": traces, "force": traces})
     assert list(got) == [0] and list(got[0]) == ["force_x"]
     np.testing.assert_array_equal(got[0]["force_x"], [np.zeros(3), np.ones(3), np.zeros(3)])
+
+
+def test_a_cutoff_above_half_the_rate_of_a_slow_stretch(monkeypatch: pytest.MonkeyPatch) -> None:
+    load = np.sin(np.arange(60.0))[:, None] * np.ones(6)
+    monkeypatch.setattr(amplifier_filter, "since_the_first", lambda loading: load)
+    monkeypatch.setattr(amplifier_filter, "unsmoothed", lambda load: load)
+    late = amplifier_filter._fourth_order(SimpleNamespace(dt_s=0.16), None, np.array([5.0])).reading
+    assert np.isfinite(late).all()
