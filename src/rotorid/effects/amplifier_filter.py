@@ -8,6 +8,9 @@ from rotorid.effects.creep import followed
 from rotorid.effects.loading import TOO_SHORT, since_the_first, unsmoothed
 from rotorid.effects.structural_resonance import resonance
 
+_HIGHEST = 0.49
+"""Share of its rate up to which a digital filter has a cutoff."""
+
 
 def _first_order(loading, vehicle, values):
     """y = F / (1 + i f/f_c)."""
@@ -37,7 +40,9 @@ def _second_order(loading, vehicle, values):
 def _fourth_order(loading, vehicle, values):
     """Bessel of fourth order with cutoff f_c, as amplifiers of strain gauges have: nearly a delay, and smooth."""
     load = since_the_first(loading)
-    sos = bessel(4, values[0], fs=1.0 / loading.dt_s, output="sos", norm="mag")
+    # A stretch that comes more seldom than the others sees next to nothing of a cutoff above half its own rate.
+    cutoff_hz = min(max(values[0], 1e-3), _HIGHEST / loading.dt_s)
+    sos = bessel(4, cutoff_hz, fs=1.0 / loading.dt_s, output="sos", norm="mag")
     return Contribution(reading=sosfilt(sos, unsmoothed(load), axis=0) - load)
 
 

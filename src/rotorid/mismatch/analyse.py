@@ -15,6 +15,7 @@ import numpy as np
 from rotorid.effects.catalogue import before_the_rotors, catalogue, ids_of, ids_of_stage, moving_air
 from rotorid.effects.contract import LIMIT, SUPPLY, SpeedForm, SpeedPath
 from rotorid.errors import InputError
+from rotorid.io.text.wording import listed
 from rotorid.mismatch.decide import rules
 from rotorid.mismatch.decide.enough import weighed
 from rotorid.mismatch.decide.findings import (
@@ -50,7 +51,7 @@ from rotorid.mismatch.flight.gains import values_alone
 from rotorid.mismatch.flight.gusts import gust_finding
 from rotorid.mismatch.flight.leftover import dependence, leftover
 from rotorid.mismatch.flight.prepare import Prepared, prepare, prepare_like
-from rotorid.mismatch.flight.report_runs import comparable, on_every_run, scaled_by_run, without_each
+from rotorid.mismatch.flight.report_runs import lacking, on_every_run, scaled_by_run, without_each
 from rotorid.mismatch.flight.swinging import loads, on_board
 from rotorid.mismatch.flight.values import (
     changed_vehicle,
@@ -84,29 +85,48 @@ def analyse(recordings: RecordingSet, watch: Watch = unwatched) -> Analysis:
     `watch` is called with what was chosen, just before.
     """
     recordings, mistakes, remarks = find_mistakes(recordings)
-    analysis = _analysed(recordings, mistakes, remarks, watch)
-    left = [r for r in recordings.runs if r.name not in split_runs(recordings).held_out]
-    if analysis is None and left:
+    try:
+        return _analysed(recordings, mistakes, remarks, watch)
+    except _NothingToCompare as error:
+        opened = split_runs(recordings).held_out
+        left, lost = [r for r in recordings.runs if r.name not in opened], error
+    if left:
         # What is held out lost a sensor throughout: something else must show what the model is worth.
         names = ", ".join(r.name for r in recordings.runs if r not in left)
         remarks = (*remarks, f"Nothing of {names} could be compared; other recordings were held out instead.")
-        analysis = _analysed(replace(recordings, runs=tuple(left), held_out=None), mistakes, remarks, watch)
-    if analysis is None:
-        raise InputError(
-            f"set {recordings.name}: in no run that can be held out is there a stretch of flight with readings of "
-            "every sensor that the others are fitted by"
+        try:
+            return _analysed(replace(recordings, runs=tuple(left), held_out=None), mistakes, remarks, watch)
+        except _NothingToCompare as error:
+            lost = error if error.lacking else lost
+    raise InputError(
+        f"set {recordings.name}: no run can be held out: "
+        + (
+            f"{listed(lost.runs)} {'lacks' if len(lost.runs) == 1 else 'lack'} {listed(lost.lacking)} in flight, by "
+            "which the others are fitted; record it in all runs, or leave its columns out of all"
+            if lost.lacking
+            else f"{listed(lost.runs)} {'has' if len(lost.runs) == 1 else 'have'} no stretch of flight in which all "
+            "sensors read"
         )
-    return analysis
+    )
 
 
-def _analysed(recordings: RecordingSet, mistakes, remarks, watch: Watch) -> Analysis | None:
-    """The analysis of a set whose mistakes are undone; None where nothing of the runs held out can be compared."""
+class _NothingToCompare(Exception):
+    """Nothing of the runs held out can be compared: they lack, in words, what the fitted ones have."""
+
+    def __init__(self, runs: tuple[str, ...], lacking: tuple[str, ...]) -> None:
+        super().__init__(runs, lacking)
+        self.runs, self.lacking = runs, lacking
+
+
+def _analysed(recordings: RecordingSet, mistakes, remarks, watch: Watch) -> Analysis:
+    """The analysis of a set whose mistakes are undone; _NothingToCompare where the runs held out lack a sensor."""
     split = split_runs(recordings)
     known, held_out = parts_of(recordings, split)
     prepared = prepare(known, unseen=tuple(r.name for r in held_out.runs))
     unseen = prepare_like(prepared, held_out)
-    if not any(comparable(s, prepared.segments[0]) for s in unseen[0]):
-        return None
+    lost = [lacking(s, prepared.segments[0]) for s in unseen[0]]
+    if all(lost):
+        raise _NothingToCompare(split.held_out, min(lost, key=len, default=()))
     found = fitted(prepared)
     model, values = found.model, found.values
 

@@ -495,6 +495,8 @@ def by_sense(values: np.ndarray, sense: float | None = None) -> tuple[np.ndarray
     where it is given, is a rotor that pushes the other way, for which the contract has no column.
     """
     values = np.asarray(values, float)
+    if sense in (None, 1.0) and not (values < 0).any():
+        return values, np.zeros(values.shape, bool)
     signs = np.sign(np.nansum(np.sign(values), axis=0)) if sense is None else np.full(values.shape[1], sense)
     own = values * np.where(signs == 0, 1.0, signs)
     largest = np.nanmax(np.abs(own), axis=0, initial=0.0, where=np.isfinite(own))

@@ -10,7 +10,7 @@ import csv
 import io
 import re
 import zlib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.util import find_spec
@@ -37,10 +37,16 @@ from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 
 _BLOCK = 1 << 20
+_PIECE_CELLS = 1 << 21
+"""Cells of a table that are parsed at once: 16 MB as floats, several times that as text."""
+MANY_ROWS = 200_000
+"""Rows from which a table's columns stay apart: one block of all is quicker to select from, but takes them twice."""
 _PACKED_BLOCK = 1 << 16
 """Bytes taken from a gzipped file at once: what is left of them is copied for each of its parts."""
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+_UTF_8, _LATIN_1 = "utf-8", "cp1252"
+"""How text is written; the second is Latin-1 as Windows has it, in which instruments and spreadsheets write `°`."""
 _MOST_ABOVE, _ROWS_BELOW = 200, 3
 """Lines that may stand above a heading, and rows of numbers below by which one is known."""
 _DECIMAL_COMMA = re.compile(r"\s*[-+]?\d+,\d+([eE][-+]?\d+)?\s*")
@@ -90,24 +96,41 @@ class _CsvLayout:
     """Whether the last line ends before its last cell."""
     decimal: str = "."
     """The sign before the fraction of a number."""
+    encoding: str = _UTF_8
+    lines: int = 0
+    """Lines of the file: it has not more rows."""
+
+
+class _NoUtf8(Exception):
+    """A foreign table is Latin-1."""
 
 
 def _look_through(path: Path, foreign: bool = False) -> _CsvLayout:
+    """How the table of a file is written; the rest as `_looked_through`."""
+    try:
+        return _looked_through(path, foreign, _UTF_8)
+    except _NoUtf8:
+        return _looked_through(path, foreign, _LATIN_1)
+
+
+def _looked_through(path: Path, foreign: bool, encoding: str) -> _CsvLayout:
     """How the table of a file is written.
 
     `foreign`: a table of one's own, not of a recording set. Its columns may be separated by semicolons, tabs, bars or
     blanks as well (its numbers may then have decimal commas), one without a name is called by its number (`column_3`),
-    lines may stand above the heading, the heading may have several lines, and the last line may be cut off.
+    lines may stand above the heading, the heading may have several lines, the last line may be cut off, and it may be
+    Latin-1. _NoUtf8 where it is that and not yet read as such.
     InputError where the file is no table, has a line with more or fewer cells than its heading, or is too large.
     """
-    found, quoted, cut = None, False, False
+    found, quoted, cut, lines = None, False, False, 0
     for line, text in _whole_lines(path):
-        check_text(text, path, line)
+        _check_encoding(text, path, line, foreign, encoding)
+        lines = line + text.count(b"\n" if b"\n" in text else b"\r")
         _check_size(line - 2, len(found.names) if found else 0, path)
         if found is None and text.strip():
-            found, text = _heading(text, path, foreign)
+            found, text = _heading(text, path, foreign, encoding)
             line += found.heading_line - 1
-            below = text[:_PACKED_BLOCK].decode("utf-8", "replace").splitlines()[1 : 1 + _MOST_ABOVE]
+            below = text[:_PACKED_BLOCK].decode(encoding, "replace").splitlines()[1 : 1 + _MOST_ABOVE]
             cells = [cell for row in below for cell in _names(row, found.separator)]
             commas = list(filter(_DECIMAL_COMMA.fullmatch, cells)) if foreign and found.separator != "," else []
             if commas:
@@ -122,8 +145,26 @@ def _look_through(path: Path, foreign: bool = False) -> _CsvLayout:
     if found is None:
         raise InputError(f"{path}: is empty, expected a line of column names and samples below")
     if quoted:
-        cut = _check_quoted(path, found, foreign)
-    return replace(found, cut_off=cut)
+        cut = _check_quoted(path, replace(found, encoding=encoding), foreign)
+    return replace(found, cut_off=cut, encoding=encoding, lines=lines)
+
+
+def _check_encoding(text: bytes, path: Path, line: int, foreign: bool, encoding: str) -> None:
+    """_NoUtf8 where a foreign table turns out to be Latin-1; InputError where bytes are no text at all."""
+    try:
+        check_text(text, path, line)
+    except InputError:
+        if not foreign or b"\0" in text or text.startswith((b"\xff\xfe", b"\xfe\xff")):
+            raise
+        try:
+            text.decode(_LATIN_1)
+        except UnicodeDecodeError:
+            pass
+        else:
+            if encoding == _UTF_8:
+                raise _NoUtf8 from None
+            return
+        raise
 
 
 def _check_size(rows: int, columns: int, where: object) -> None:
@@ -203,13 +244,13 @@ def _whole_lines(path: Path) -> Iterator[tuple[int, bytes]]:
         yield line, rest
 
 
-def _heading(text: bytes, path: Path, foreign: bool) -> tuple[_CsvLayout, bytes]:
+def _heading(text: bytes, path: Path, foreign: bool, encoding: str) -> tuple[_CsvLayout, bytes]:
     """How the table is written by the beginning of its text, and the text from the last line of the heading on."""
-    if foreign and (below := _below_other_lines(text, path)) is not None:
+    if foreign and (below := _below_other_lines(text, path, encoding)) is not None:
         layout, rest = below
         _check_heading(layout.names, path, layout.heading_line)
         return layout, rest
-    first = text.lstrip(b"\r\n").splitlines()[0].decode("utf-8")
+    first = text.lstrip(b"\r\n").splitlines()[0].decode(encoding)
     separator = _separator(first)
     widths = {",": len(_names(first, ",")), separator: len(_names(first, separator))}
     if not foreign:
@@ -237,7 +278,7 @@ def _numbered(names: list[str]) -> list[str]:
     return [name or f"column_{number}" for number, name in enumerate(names, 1)]
 
 
-def _below_other_lines(text: bytes, path: Path) -> tuple[_CsvLayout, bytes] | None:
+def _below_other_lines(text: bytes, path: Path, encoding: str) -> tuple[_CsvLayout, bytes] | None:
     """The layout of a table with other lines above its heading, or several of heading; None where line 1 is all.
 
     A heading is what stands above three rows of numbers with as many cells. Where it names columns alike, or nothing
@@ -248,14 +289,14 @@ def _below_other_lines(text: bytes, path: Path) -> tuple[_CsvLayout, bytes] | No
     lines = text[:_BLOCK].split(b"\n")[: _MOST_ABOVE + _ROWS_BELOW + 1]
     cells = []
     for line in lines:
-        decoded = line.decode("utf-8").rstrip("\r")
+        decoded = line.decode(encoding).rstrip("\r")
         sign = _separator(decoded)
         cells.append((_names(decoded, sign), sign))
     for k in range(1, len(cells) - _ROWS_BELOW):
         if k > 1 and not _is_row(cells[k - 1][0]) and all(_is_row(row) for row, _ in cells[k : k + _ROWS_BELOW]):
             raise InputError(f"{path}, line {k + 1}: expected the names of the columns above, found numbers")
         names, sign = cells[k]
-        below = [_names(line.decode("utf-8").rstrip("\r"), sign) for line in lines[k + 1 : k + 1 + _ROWS_BELOW]]
+        below = [_names(line.decode(encoding).rstrip("\r"), sign) for line in lines[k + 1 : k + 1 + _ROWS_BELOW]]
         if _is_row(names) or not all(len(row) == len(names) and _is_row(row) for row in below):
             continue
         if k and len(cells[0][0]) == len(names) and _is_row(cells[1][0]):
@@ -268,7 +309,7 @@ def _below_other_lines(text: bytes, path: Path) -> tuple[_CsvLayout, bytes] | No
         ):
             first -= 1
             names = [" ".join(filter(None, pair)) for pair in zip(cells[first][0], names, strict=True)]
-        above = tuple(line.decode("utf-8").strip() for line in lines[:first] if line.strip())
+        above = tuple(line.decode(encoding).strip() for line in lines[:first] if line.strip())
         return _CsvLayout(_numbered(names), sign, above, k + 1), b"\n".join(text.split(b"\n", k)[k:])
     return None
 
@@ -339,7 +380,8 @@ def _check_cells(text: bytes, first_line: int, count: int, separator: str, path:
 def _check_quoted(path: Path, layout: _CsvLayout, foreign: bool) -> bool:
     """The same where some cells stand in quotes."""
     count, short = len(layout.names), None
-    with io.TextIOWrapper(_opened(path), "utf-8-sig", newline="") as text:
+    encoding = "utf-8-sig" if layout.encoding == _UTF_8 else layout.encoding
+    with io.TextIOWrapper(_opened(path), encoding, newline="") as text:
         for _ in range(layout.heading_line - 1):
             text.readline()
         reader = csv.reader(text, delimiter=layout.separator, skipinitialspace=True)
@@ -369,29 +411,64 @@ class UnusableRun(InputError):
     """A run that is a table and cannot be used: a set can do without it."""
 
 
-def read_cells(path: Path, foreign: bool = False) -> pd.DataFrame:
+def read_cells(path: Path, foreign: bool = False, used: Collection[str] | None = None) -> pd.DataFrame:
     """The cells of a CSV file, plain or gzipped: numbers where a column holds nothing else.
 
-    `foreign` as in `_look_through`; the table's `attrs` then hold the `layout` that was found.
+    `foreign` as in `_looked_through`; the table's `attrs` then hold the `layout` that was found. `used` names the
+    columns that are wanted, those of them that are there; None is all. The table is in the memory once.
     """
     layout = _look_through(path, foreign)
+    kept = [k for k, name in enumerate(layout.names) if used is None or name in used] or [0]
     try:
         with _opened(path) as file:
             for _ in range(layout.heading_line - 1):
                 file.readline()
-            how = {"skipinitialspace": True, "index_col": False, "low_memory": False}
-            table = pd.read_csv(file, sep=layout.separator, decimal=layout.decimal, **how)
+            how = {"skipinitialspace": True, "index_col": False, "low_memory": False, "encoding": layout.encoding}
+            at_once = max(1, _PIECE_CELLS // len(layout.names))
+            with pd.read_csv(
+                file, sep=layout.separator, decimal=layout.decimal, usecols=kept, chunksize=at_once, **how
+            ) as pieces:
+                columns, rows = _joined(pieces, len(kept), layout)
     except (pd.errors.ParserError, pd.errors.EmptyDataError, OverflowError) as error:
         raise InputError(f"{path}: cannot be read as a table ({printable(error)})") from None
-    _check_size(*table.shape, path)
-    table = table.iloc[: len(table) - layout.cut_off]
-    table.columns = layout.names
-    if layout.decimal == ",":  # a column with another cell among its numbers is text as a whole
-        for name in table.columns[[not pd.api.types.is_numeric_dtype(kind) for kind in table.dtypes]]:
-            table[name] = table[name].map(_with_point, na_action="ignore")
+    _check_size(rows, len(kept), path)
+    table = pd.DataFrame(dict(enumerate(columns)), copy=rows < MANY_ROWS).iloc[: rows - layout.cut_off]
+    table.columns = [layout.names[k] for k in kept]
     if foreign:
         table.attrs["layout"] = layout
     return table
+
+
+def _joined(pieces: Iterable[pd.DataFrame], count: int, layout: _CsvLayout) -> tuple[list[np.ndarray | pd.Series], int]:
+    """The columns of a table that comes in pieces, and its rows.
+
+    A column of numbers is filled into one array as they come. One with anything else is text in the pieces that have
+    it, and its numbers are those of the others.
+    """
+    filled = [np.empty(layout.lines) for _ in range(count)]
+    others: dict[int, list[pd.Series]] = {}
+    row = 0
+    for piece in pieces:
+        for k in range(count):
+            column = piece.iloc[:, k]
+            numeric = pd.api.types.is_numeric_dtype(column.dtype) and not pd.api.types.is_bool_dtype(column.dtype)
+            if numeric and k not in others:
+                filled[k][row : row + len(piece)] = column
+                continue
+            if not numeric and not pd.api.types.is_bool_dtype(column.dtype) and layout.decimal == ",":
+                column = column.map(_with_point, na_action="ignore")
+            others.setdefault(k, [pd.Series(filled[k][:row])] if row else []).append(column)
+        row += len(piece)
+    return [_one_column(others[k]) if k in others else filled[k][:row] for k in range(count)], row
+
+
+def _one_column(parts: list[pd.Series]) -> pd.Series:
+    """The parts of a column of which one at least is no numbers."""
+    if len({part.dtype for part in parts}) > 1:
+        truths = [pd.api.types.is_bool_dtype(part.dtype) for part in parts]
+        parts = [p.astype(str if truth else object) for p, truth in zip(parts, truths, strict=True)]
+        parts = [part.astype(object) for part in parts]
+    return pd.concat(parts, ignore_index=True)
 
 
 NO_PARQUET = "Parquet files need pyarrow, which is not installed: pip install 'rotorid[parquet]'"
@@ -511,6 +588,10 @@ def numbers(table: pd.DataFrame, path: object) -> pd.DataFrame:
     repeated = table.columns[table.columns.duplicated()]
     if len(repeated):
         raise InputError(f"{path}: column {printable(repeated[0])} is there twice")
+    if all(kind == np.float64 for kind in table.dtypes):
+        same = table.copy(deep=False)  # a large table would be there twice
+        same.attrs = {}
+        return same
     out = {}
     heading_line = table.attrs["layout"].heading_line if "layout" in table.attrs else 1
     for name in table.columns:

@@ -19,7 +19,7 @@ What each finding adds to each channel, on the instants of the traces.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -212,10 +212,13 @@ def fitted_part(analysis: Analysis) -> Callable[[str, np.ndarray], np.ndarray]:
     return part
 
 
-def shares(analysis: Analysis, segments: list[Segment]) -> dict[int, dict[str, list[np.ndarray]]]:
-    """Number of a finding to channel to its contribution on each of that channel's traces, in their order.
+def shares(
+    analysis: Analysis, segments: list[Segment], channels: Mapping[str, Sequence[ChannelTrace]]
+) -> dict[int, dict[str, list[np.ndarray]]]:
+    """Number of a finding to channel to its contribution on each of that channel's traces, in the order of `channels`.
 
-    Only findings at work whose form adds a wrench or a reading; others are left out.
+    Only findings at work whose form adds a wrench or a reading; others are left out. In a run in which a finding
+    shows nowhere it contributes nothing to the channels that it has in others.
     """
     out: dict[int, dict[str, list[np.ndarray]]] = {}
     by_run: dict[str, list[Segment]] = {}
@@ -226,13 +229,15 @@ def shares(analysis: Analysis, segments: list[Segment]) -> dict[int, dict[str, l
         if not at_work or finding.windows or not isinstance(finding.form, Form):
             continue
         series = {run: _series(finding, parts, analysis.improved) for run, parts in by_run.items()}
-        for trace in analysis.traces:
-            group, _, axis = trace.channel.rpartition("_")
-            if axis not in ("x", "y", "z") or group not in series.get(trace.run, {}):
+        for channel, traces in channels.items():
+            group, _, axis = channel.rpartition("_")
+            own = [series.get(trace.run, {}).get(group) for trace in traces]
+            if axis not in ("x", "y", "z") or all(found is None for found in own):
                 continue
-            time_s, values = series[trace.run][group]
-            on_trace = np.interp(trace.time_s, time_s, values[:, "xyz".index(axis)])
-            out.setdefault(at, {}).setdefault(trace.channel, []).append(on_trace)
+            out.setdefault(at, {})[channel] = [
+                np.zeros(len(t.time_s)) if o is None else np.interp(t.time_s, o[0], o[1][:, "xyz".index(axis)])
+                for t, o in zip(traces, own, strict=True)
+            ]
     return out
 
 

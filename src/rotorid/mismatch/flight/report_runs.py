@@ -92,9 +92,19 @@ def on_every_run(
 
 def comparable(segment: Segment, fitted: Segment) -> bool:
     """Whether a stretch has every quantity that one of those fitted has: the model's rows are made of them."""
-    own = ("command", "kinematic_specific_force", "kinematic_angular_velocity")
+    return not lacking(segment, fitted)
+
+
+def lacking(segment: Segment, fitted: Segment) -> tuple[str, ...]:
+    """Quantities, in words, that one of the fitted stretches has and this one has not."""
+    own = {
+        "command": "commands",
+        "kinematic_specific_force": "position or velocity next to the accelerometer",
+        "kinematic_angular_velocity": "attitude next to the gyroscope",
+    }
     pairs = [(segment, fitted, n) for n in own] + [(segment.motion, fitted.motion, n) for n in _COMPARED]
-    return all(getattr(known, n) is None or getattr(new, n) is not None for new, known, n in pairs)
+    words = own | {n: n.replace("_", " ") for n in _COMPARED} | {"rotation": "attitude"}
+    return tuple(words[n] for new, known, n in pairs if getattr(known, n) is not None and getattr(new, n) is None)
 
 
 def as_flown(segments: list[Segment], found: Fitted) -> list[Segment]:

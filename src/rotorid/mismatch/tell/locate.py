@@ -214,7 +214,7 @@ def _explained(analysis: Analysis, segments: list[Segment]) -> tuple[list[_Inter
     taken away from its channels does. A wrong value is wrong throughout.
     """
     channels = _long_enough(analysis)
-    causes = [{c: x for c, x in found.items() if c in channels} for found in shares(analysis, segments).values()]
+    causes = list(shares(analysis, segments, channels).values())
     spoken_for = {channel for found in causes for channel in found}
     rest = {c: [_mismatch_of(t, True) for t in ts] for c, ts in channels.items() if c not in spoken_for}
     at_work = with_status(analysis, *CLAIMED)

@@ -32,6 +32,7 @@ forward-right-down (FRD) and a world with z down: y and z change sign, of a quat
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Literal
@@ -55,7 +56,7 @@ from rotorid.recordings.importers.faults import (
     report_gaps,
     within,
 )
-from rotorid.recordings.tables import clock_jump, numbers, read_cells, read_parquet_cells
+from rotorid.recordings.tables import MANY_ROWS, clock_jump, numbers, read_cells, read_parquet_cells
 
 G = 9.80665
 """Standard gravity, m/s²."""
@@ -264,16 +265,24 @@ def _near(name: str, names) -> str:
     return f"; did you mean {near[0]}?" if near else f"; there are: {', '.join(names)}"
 
 
-def read_columns(path: Path) -> pd.DataFrame:
-    """The cells of a CSV or Parquet file, numbers or text; InputError where it is no table."""
+def read_columns(path: Path, used: Collection[str] | None = None) -> pd.DataFrame:
+    """The cells of a CSV or Parquet file, numbers or text; InputError where it is no table.
+
+    `used` names the columns that are wanted of a CSV file, None all of them.
+    """
     path = Path(path)
-    table = read_parquet_cells(path) if path.name.endswith(".parquet") else read_cells(path, foreign=True)
-    if len(table.columns) < 2 or len(table) < 2:
+    table = read_parquet_cells(path) if path.name.endswith(".parquet") else read_cells(path, True, used)
+    count = len(_there(table))
+    if count < 2 or len(table) < 2:
         raise InputError(
-            f"{path}: expected a table of numbers with a heading, found {len(table.columns)} columns and "
-            f"{len(table)} rows"
+            f"{path}: expected a table of numbers with a heading, found {count} columns and {len(table)} rows"
         )
     return _clocks_as_seconds(table)
+
+
+def _there(table: pd.DataFrame) -> list[str]:
+    """Names of the columns of a table's file, those that were not read, too."""
+    return table.attrs["layout"].names if "layout" in table.attrs else list(table.columns)
 
 
 def _clocks_as_seconds(table: pd.DataFrame) -> pd.DataFrame:
@@ -315,8 +324,11 @@ def read_by_mapping(path: Path, mapping: Mapping | None) -> tuple[pd.DataFrame, 
 
     Without a mapping the columns must have the contract's names; InputError says how to get a mapping.
     """
-    raw = read_columns(path)
+    wanted = None if mapping is None else {n for of in mapping.channels.values() for n in of.columns} | {*mapping.keep}
+    raw = read_columns(path, wanted)
     layout, lost = raw.attrs.get("layout"), []
+    if layout and layout.encoding != "utf-8":
+        lost.append(ImportFault("encoding", "", "file is not UTF-8", "read as Latin-1"))
     if layout and layout.above:
         found = f"{len(layout.above)} lines above the heading in line {layout.heading_line}"
         lost.append(ImportFault("above", "", found, "left out"))
@@ -336,13 +348,20 @@ def read_by_mapping(path: Path, mapping: Mapping | None) -> tuple[pd.DataFrame, 
 
 
 def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFrame, list[ImportFault]]:
-    """Contract columns of a table by a mapping; InputError names a column that is not there or no numbers."""
+    """Contract columns of a table by a mapping; InputError names a column that is not there or no numbers.
+
+    `raw` is emptied on the way, so that a large table is in the memory once.
+    """
     _check_answered(mapping, f"the mapping of {where}")
     body, world = BODY[mapping.body], WORLD[mapping.world]
     wanted = [(name, channel.columns) for name, channel in mapping.channels.items()] + [("keep", mapping.keep)]
-    table = pd.concat([_numbers(raw, columns, name, where) for name, columns in wanted if columns], axis=1)
+    parts = [_numbers(raw, columns, name, where) for name, columns in wanted if columns]
+    table = pd.DataFrame({name: part[name] for part in parts for name in part.columns}, copy=False)
+    del parts
+    for name in list(raw.columns):
+        del raw[name]
     clock = mapping.channels["time"].columns[0]
-    table, late = in_order(table.loc[:, ~table.columns.duplicated()], clock)
+    table, late = in_order(table, clock)
     table = join_rows(table, clock)
     out: dict[str, np.ndarray] = {}
     faults: list[ImportFault] = []
@@ -351,6 +370,8 @@ def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFra
     for name in order:
         channel = mapping.channels[name]
         values = table[list(channel.columns)].to_numpy(float)
+        later = {n for of in order[order.index(name) + 1 :] for n in mapping.channels[of].columns} | {*mapping.keep}
+        table = table.drop(columns=[n for n in dict.fromkeys(channel.columns) if n not in later])
         kind, columns = CHANNELS[name]
         if channel.scale != 1.0:
             values = values * channel.scale
@@ -393,7 +414,8 @@ def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFra
     for name in mapping.keep:
         out[name] = table[name].to_numpy(float)
     out[c.TIME] = out[c.TIME] - np.nanmin(out[c.TIME])
-    table, more = _clocked(pd.DataFrame({c.TIME: out.pop(c.TIME), **out}), where)
+    out = {c.TIME: out.pop(c.TIME), **out}
+    table, more = _clocked(pd.DataFrame(out, copy=len(out[c.TIME]) < MANY_ROWS), where)
     return table, late + faults + more
 
 
@@ -415,7 +437,7 @@ def _clocked(table: pd.DataFrame, where: object) -> tuple[pd.DataFrame, list[Imp
 def _numbers(raw: pd.DataFrame, columns, channel: str, where: str) -> pd.DataFrame:
     for name in columns:
         if name not in raw.columns:
-            raise InputError(f"{where}: {channel} wants column {name!r}, which is not there{_near(name, raw.columns)}")
+            raise InputError(f"{where}: {channel} wants column {name!r}, which is not there{_near(name, _there(raw))}")
     return numbers(raw[list(dict.fromkeys(columns))], where)
 
 
@@ -428,13 +450,17 @@ def _attitude(values: np.ndarray, form: str, body: np.ndarray, world: np.ndarray
     """Quaternions (n, 4), scalar first, FRD to NED; NaN where a value is missing."""
     out = np.full((len(values), 4), np.nan)
     known = np.isfinite(values).all(axis=1)
-    if form in EULER:
-        turn = from_angles(values[known], form)
-    else:
-        known &= np.linalg.norm(np.nan_to_num(values), axis=1) > 0
-        turn = Rotation.from_quat(values[known] if form == "xyzw" else values[known][:, [1, 2, 3, 0]])
-    turn = Rotation.from_matrix(world) * turn * Rotation.from_matrix(body).inv()
-    out[known] = continuous(turn.as_quat()[:, [3, 0, 1, 2]])
+    if form not in EULER:
+        known &= np.linalg.norm(values, axis=1) > 0
+    # In pieces: turns take some times the memory of what they are made of.
+    for rows in np.array_split(np.flatnonzero(known), known.sum() // MANY_ROWS + 1):
+        if form in EULER:
+            turn = from_angles(values[rows], form)
+        else:
+            turn = Rotation.from_quat(values[rows] if form == "xyzw" else values[rows][:, [1, 2, 3, 0]])
+        turn = Rotation.from_matrix(world) * turn * Rotation.from_matrix(body).inv()
+        out[rows] = turn.as_quat()[:, [3, 0, 1, 2]]
+    out[known] = continuous(out[known])
     return out
 
 

@@ -10,7 +10,7 @@ import pytest
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import ardupilot
 from rotorid.recordings.importers.faults import off_the_ground
-from tests.public_logs import LOGS
+from tests import public_logs
 from tests.refusals import refused
 from tests.unit.recordings.importers.test_log_formats import PARAMETERS, dataflash, flown
 
@@ -33,9 +33,7 @@ def tables(values: dict[str, float], **more: pd.DataFrame) -> dict[str, pd.DataF
 
 def public(name: str) -> Path:
     pytest.importorskip("pymavlink")
-    if not (LOGS / "ardupilot" / name).is_file():
-        pytest.skip("the public logs are not on this machine")
-    return LOGS / "ardupilot" / name
+    return public_logs.public(Path("logs") / "ardupilot" / name)
 
 
 @pytest.mark.parametrize(

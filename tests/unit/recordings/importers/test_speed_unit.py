@@ -16,7 +16,7 @@ from rotorid.recordings.importers.known import propose
 from rotorid.recordings.importers.logfile import carrying_unit, in_unit_of_weight, read_log, set_of_logs
 from rotorid.recordings.importers.logfile import usual_coefficient as coefficient
 from rotorid.recordings.importers.mapping import UNITS, Mapping
-from tests.public_logs import PUBLIC
+from tests.public_logs import public
 
 SPEEDS = list(c.rotor_columns("rotor_speed", 4))
 
@@ -84,9 +84,7 @@ def test_import_says_which_unit_it_took(tmp_path: Path) -> None:
     ],
 )
 def test_public_logs_keep_their_unit(log: str, mass_kg: float, unit: str) -> None:
-    if not (PUBLIC / log).exists():
-        pytest.skip("the public logs are not on this machine")
-    found = read_log(PUBLIC / log)
+    found = read_log(public(log))
     assert found.speed_unit == unit
     for table in found.runs.values():
         assert carrying_unit([table], "rotor_speed", unit, mass_kg, 4)[0] == unit

@@ -8,6 +8,7 @@ import pytest
 
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.guessing import guess
+from rotorid.recordings.importers.guessing.names import families
 from rotorid.recordings.importers.logfile import format_of, set_of_logs
 from rotorid.recordings.importers.mapping import SPELLINGS, UNITS, bracketed, converted, read_columns, stated, unit_of
 from rotorid.recordings.importers.rcbenchmark import HEADINGS, read_rcbenchmark
@@ -289,3 +290,11 @@ def test_a_load_cell_of_six_axes(sign: int, body: str, names, units) -> None:
     found = guess(pd.DataFrame(table)).mapping
     assert (found.channels["force"].unit, found.channels["moment"].unit) == units and found.body == body
     assert "specific_force" not in found.channels and "rotor_speed" in found.channels
+
+
+@pytest.mark.parametrize("turns", ["°/s", "º/s", "deg/s"])
+@pytest.mark.parametrize("pushes", ["m/s²", "m/s2"])
+def test_signs_of_units_in_names(turns: str, pushes: str) -> None:
+    names = [f"gyro_{a} ({turns})" for a in "xyz"] + [f"acc_{a} [{pushes}]" for a in "xyz"]
+    found = {family.stem: family.unit for family in families(names, "xyz")}
+    assert found == {"gyro": "deg/s", "acc": "m/s2"}

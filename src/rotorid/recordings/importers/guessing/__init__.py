@@ -95,12 +95,14 @@ def as_text(found: Draft, source: str) -> str:
             content["axes"] = channel.axes
         content = {k: list(v) if isinstance(v, tuple) else v for k, v in content.items()}
         lines += _comment(found, name, "  ")
-        lines.append(
-            f"  {name}: {yaml.safe_dump(content, default_flow_style=True, width=10**6, sort_keys=False).strip()}"
-        )
-    kept = yaml.safe_dump(list(mapping.keep), default_flow_style=True, width=10**6).strip()
+        lines.append(f"  {name}: {_in_one_line(content)}")
+    kept = _in_one_line(list(mapping.keep))
     lines.append(f"keep: {kept}   # other columns, kept as candidates for what an error depends on")
     return "\n".join(lines) + "\n"
+
+
+def _in_one_line(content: dict | list) -> str:
+    return yaml.safe_dump(content, default_flow_style=True, width=10**6, sort_keys=False, allow_unicode=True).strip()
 
 
 def _comment(found: Draft, key: str, indent: str) -> list[str]:

@@ -21,6 +21,8 @@ _UNIT_WORDS: dict[str, str] = {
     "erpm": "erpm", "kgf": "kgf", "gf": "gf", "lbf": "lbf", "n_m": "N.m", "nm": "N.m", "m_nm": "mN.m", "mn_m": "mN.m",
 }  # fmt: skip
 """Words of a unit at the end of a name to the mapping's unit."""
+_SIGNS = str.maketrans({"°": "deg", "º": "deg", "²": "2"})
+"""Signs of units as the letters that `_UNIT_WORDS` has: `m/s²` without its last one is a velocity's."""
 _QUALIFIERS = frozenset(
     "adc b body bodyframe w world i inertial n frd flu ned enu nwu imu raw smooth smoothed filt filtered est estimate "
     "lin linear meas measured 0".split()
@@ -118,7 +120,7 @@ class Family:
 def words_of(name: str) -> list[str]:
     """The words of a name in small letters."""
     parted = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", str(name).replace("eRPM", "erpm"))
-    return [w for w in re.split(r"[^a-z0-9^µ]+", parted.lower()) if w]
+    return [w for w in re.split(r"[^a-z0-9^µ]+", parted.translate(_SIGNS).lower()) if w]
 
 
 def _without_unit(words: list[str]) -> tuple[list[str], str]:
