@@ -609,10 +609,11 @@ def _curved_gains(model: ReadingModel, values: Values) -> set[str]:
     """Gains called wrong given a curved characteristic that is right at small loads, or right over all of them.
 
     The gain of a curve is a convention: a reading that saturates is right at small loads, one with a dead band nearly
-    so over all, and the slope that a polynomial has at no load is neither. A wrong calibration is off in both.
+    so over all, and the slope that a polynomial has at no load is neither. A wrong calibration is off in both. A
+    structure that gives way curves the reading of its own axis as a sensor does.
     """
     instrument = model.setup.instrument
-    if not any(model.search.terms[k].effect in _characteristics() for k in model.selection.active):
+    if not any(model.search.terms[k].effect in _curving() for k in model.selection.active):
         return set()
     out = set()
     for key, (change, _) in values.items():
@@ -625,15 +626,16 @@ def _curved_gains(model: ReadingModel, values: Values) -> set[str]:
     return out if rules.CURVED_GAIN(bool(out)) else set()
 
 
-def _characteristics() -> frozenset[str]:
-    """Ids of a sensor's curves."""
-    return ids_of("curve_of_load") & ids_of("kind", "sensor")
+def _curving() -> frozenset[str]:
+    """Ids that curve a reading over its own load: a sensor's curves, and what of a rig is confused with them."""
+    sensor = ids_of("curve_of_load") & ids_of("kind", "sensor")
+    return sensor | {e.id for e in catalogue().values() if e.of_the_rig and sensor & set(e.confusers)}
 
 
 def _slope_of(model: ReadingModel, channel: int, most: float) -> float:
-    """Slope, less one, of a reading over loads up to `most` in size, less all effects but a curved characteristic."""
+    """Slope, less one, of a reading over loads up to `most` in size, less all effects that do not curve it."""
     fit, search = model.selection.fit, model.search
-    others = [k for k in model.selection.active if search.terms[k].effect not in _characteristics()]
+    others = [k for k in model.selection.active if search.terms[k].effect not in _curving()]
     known = np.isin(fit.columns, model.regression.columns(others))
     load, left = [], []
     for rows, loads in zip(model.rows, _loads_of_rows(model), strict=True):

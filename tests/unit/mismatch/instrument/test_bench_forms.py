@@ -208,6 +208,27 @@ def test_loads_that_mix_differently_in_each_run_are_left_over():
     assert claimed(analysis) == set() and "run" in analysis.unexplained_depends_on
 
 
+def one_axis_a_run(rng, largest: float = 10.0) -> RecordingSet:
+    """Three runs an axis, loaded along it alone in ramps: x reads 0.5 of y, each run a little otherwise."""
+    made = []
+    for number in range(9):
+        t = np.arange(int(20 * RATE_HZ)) / RATE_HZ
+        load = np.zeros((len(t), 3))
+        load[:, number // 3] = np.interp(t, np.linspace(0, 20, 9), np.r_[0, rng.uniform(0, largest, 7), 0])
+        read = load + 0.01 * rng.standard_normal(load.shape)
+        read[:, 0] += (0.5 + (0.02, -0.02, 0.01)[number % 3]) * load[:, 1]
+        made.append(bench_run(f"run{number + 1}", t + 30.0 * number, load, read))
+    return RecordingSet("bench", BENCH, tuple(made))
+
+
+def test_crosstalk_of_runs_that_load_one_axis_each_keeps_its_name():
+    """Loads mixed anew in each run hold any crosstalk there, and what the runs differ by: they had taken its place."""
+    analysis = analyse_instrument(one_axis_a_run(np.random.default_rng(3)))
+    assert claimed(analysis) == {"crosstalk"} and not analysis.values
+    found = {p.symbol: p for f in analysis.findings if f.id == "crosstalk" for p in f.parameters}
+    assert 0.48 < found["C_Fx,Fy"].low < found["C_Fx,Fy"].high < 0.53
+
+
 @pytest.mark.slow
 def test_crosstalk_and_a_loop_on_the_mixed_load_bring_no_company():
     assert claimed(analyse_instrument(recorded(mixed_loop))) == {"crosstalk", "hysteresis"}
