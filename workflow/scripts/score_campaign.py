@@ -43,6 +43,7 @@ def main(
     if LINE in found:
         ledger = json.loads(Path(ledgers[list(found).index(LINE)]).read_text(encoding="utf-8"))
         state["line"] = campaign.straight_line(*_readings(sets[LINE], found[LINE]["runs"]["held_out"]))
+        state["line"]["crosstalk"] = _stated(found[LINE], "crosstalk")
         state["line"]["ledger"] = [entry["sentence"] for entry in ledger if entry["on"] == "crosstalk"]
     rows, numbers = [], []
     if truth:
@@ -60,6 +61,12 @@ def main(
     table = pd.concat(numbers) if numbers else pd.DataFrame()
     table.reindex(columns=NUMBERS).to_csv(out["numbers"], index=False, float_format="%.6g")
     Path(out["state"]).write_text(json.dumps(state, indent=1) + "\n", encoding="utf-8")
+
+
+def _stated(verdict: Mapping, effect_id: str) -> dict[str, tuple[float, float, float]]:
+    """Value and 95 % interval of each parameter of an effect that is claimed; empty where it is not."""
+    claimed = [e for e in verdict["effects"] if e["id"] == effect_id and e["status"] in ("established", "ambiguous")]
+    return {p["symbol"]: (p["value"], *p["interval_95"]) for e in claimed for p in e["parameters"]}
 
 
 def _as_displaced(verdict: Mapping, known: Mapping, true: Mapping) -> dict:
