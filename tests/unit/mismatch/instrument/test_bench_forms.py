@@ -13,7 +13,7 @@ from rotorid.effects.hysteresis import settling
 from rotorid.effects.loading import InstrumentFacts, Loading, forms_of
 from rotorid.mismatch.evidence.rows import form_reading
 from rotorid.mismatch.evidence.unknowns import UNKNOWNS
-from rotorid.mismatch.instrument.analyse import analyse_instrument
+from rotorid.mismatch.instrument.analyse import _parameters_of, _with_alternatives, analyse_instrument
 from rotorid.mismatch.instrument.model import kept_values, make_terms, reading_model
 from rotorid.mismatch.instrument.setup import session_of, set_up, zero_temperature
 from rotorid.recordings import RecordingSet, Run
@@ -227,6 +227,18 @@ def test_crosstalk_of_runs_that_load_one_axis_each_keeps_its_name():
     assert claimed(analysis) == {"crosstalk"} and not analysis.values
     found = {p.symbol: p for f in analysis.findings if f.id == "crosstalk" for p in f.parameters}
     assert 0.48 < found["C_Fx,Fy"].low < found["C_Fx,Fy"].high < 0.53
+
+
+def test_an_interval_holds_the_number_next_to_what_explains_the_same():
+    """Bending and a curved sensor are alike along one axis: a number given the one holds for both at work, too."""
+    setup = set_up(recorded(lambda load, run, warmth: load + 0.002 * load * np.abs(load)))
+    model = reading_model(setup, make_terms(setup)[0])
+    key = next(k for k in model.selection.active if model.search.terms[k].effect in ("load_nonlinearity", "compliance"))
+    other = {"load_nonlinearity": "compliance", "compliance": "load_nonlinearity"}[model.search.terms[key].effect]
+    (together,) = _with_alternatives(model, {other, model.search.terms[key].effect})
+    alone, wider = _parameters_of(model, key), _parameters_of(model, key, [together])
+    assert all(b.low <= a.low and a.high <= b.high and a.value == b.value for a, b in zip(alone, wider, strict=True))
+    assert max((b.high - b.low) / (a.high - a.low) for a, b in zip(alone, wider, strict=True)) > 1.5
 
 
 @pytest.mark.slow
