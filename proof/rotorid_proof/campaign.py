@@ -66,6 +66,21 @@ def furthest(table: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def sensor_for_both(known: Mapping[str, Mapping[str, float]], places_m: np.ndarray) -> dict[str, dict[str, float]]:
+    """Numbers that a displaced sensor and unequal rotors have if the sensor stands for the centre of mass as well.
+
+    The weight's moment shows the sum of both displacements, the thrust's the sensor's alone: what the sensor is given
+    too much the rotors, at `places_m` (n, 3), take back, with the smallest differences that do.
+    """
+    own, centre = known["sensor_origin"], known["com_offset"]
+    both = {f"d_{a}": own[f"d_{a}"] + centre[f"r_{a}"] for a in "xyz"}
+    excess = np.array([centre["r_x"], centre["r_y"]])
+    count = len(places_m)
+    change = -np.linalg.pinv(np.vstack([places_m[:, :2].T, np.ones(count)])) @ np.append(count * excess, 0.0)
+    rotors = {f"d_{i + 1}": known["unequal_rotors"][f"d_{i + 1}"] + float(change[i]) for i in range(count)}
+    return {"sensor_origin": both, "unequal_rotors": rotors}
+
+
 def straight_line(load_n: np.ndarray, error_n: np.ndarray, held_out: np.ndarray) -> dict[str, Any]:
     """What a straight line in the loads, fitted to training runs, leaves of the reading's error on those held out.
 

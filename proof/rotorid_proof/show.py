@@ -321,3 +321,31 @@ def of_differences(compared: Mapping[str, Any]) -> pd.DataFrame:
                 {"pair": LABELLED[f"crazypad-{name}"], "quantity": quantity, "difference": found, "limit": limit}
             )
     return pd.DataFrame(rows, columns=["pair", "quantity", "difference", "limit"])
+
+
+_OF_THE_PATH = {
+    "elasticity": "thrust by throttle, % a %",
+    "late_s": "delay of the rotors, s",
+    "voltage": "thrust by voltage, % a %",
+}
+_SHOWN_PATH = "imrc-brushless/throttle/whole"
+
+
+def of_concealed(speeds: pd.DataFrame) -> pd.DataFrame:
+    """Numbers of the path from command to thrust, a row a quantity: how often they are stated without the recorded
+    speeds and right, and one recording's own.
+
+    `speeds` has a row a recording and quantity: what the recorded speeds say (`true`, NaN where nothing), what is
+    `stated`, its interval, `status` (right, wrong, silent, unknown) and the code that judged.
+    """
+    columns = ["what", "known", "stated", "right", "inside", "recorded", "found", "code"]
+    rows = []
+    for quantity, words in _OF_THE_PATH.items() if len(speeds) else ():
+        of = speeds[(speeds["quantity"] == quantity) & speeds["true"].notna()]
+        stated = of[of["status"].isin(["right", "wrong"])]
+        row = {"what": words, "known": len(of), "stated": len(stated), "right": int((of["status"] == "right").sum())}
+        row["inside"] = int((stated["held"].astype(str) == "True").sum())
+        for one in of[of["set"] == _SHOWN_PATH].itertuples():
+            row |= {"recorded": f"{one.true:.2g}", "found": f"{one.stated:.2g} ({one.low_95:.2g} to {one.high_95:.2g})"}
+        rows.append(row | {"code": of["judged_by"].iloc[0]})
+    return pd.DataFrame(rows, columns=columns)

@@ -84,6 +84,27 @@ def test_html_needs_no_other_file(chapters: list[str]) -> None:
     assert not re.search(r'(?:src|href)="(?!#|data:|https://doi)[^"]+"', page)
 
 
+def test_pages_that_do_not_settle_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A heading that asks where it stands and then breaks the page stands elsewhere: every second round differs."""
+    monkeypatch.chdir(tmp_path)
+    Path("moves.typ").write_text("#v(60%)\n#context { if here().position().y > 300pt { pagebreak() } }\nText.\n")
+    refused("moves.typ.*converge", typeset.pdf, "moves.typ", "moves.pdf")
+    Path("stays.typ").write_text("Text.\n")
+    typeset.pdf("stays.typ", "stays.pdf")
+
+
+def test_a_chapter_begins_on_the_page_before_only_where_room_is_left(chapters: list[str]) -> None:
+    """Twelve chapters of two thirds of a page and of a third: their pages settle."""
+    texts = []
+    for k in range(12):
+        Path(f"chapter{k}.md").write_text(
+            f"# Chapter {k} {{#sec:c{k}}}\n\n" + "Words. " * (900 if k % 2 else 300) + "\n"
+        )
+        texts.append(f"chapter{k}.md")
+    typeset.typst_source(typeset.Document(texts, "Title", "Subtitle", PARTS), "report.typ")
+    typeset.pdf("report.typ", "report.pdf")
+
+
 def test_typst_says_the_same_numbers_and_makes_a_pdf(chapters: list[str]) -> None:
     source = typst_of(chapters)
     assert "#link(<fig:first-box>)[Figure~1.1]" in source

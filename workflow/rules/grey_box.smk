@@ -160,6 +160,12 @@ rule chapter_grey_box:
             caption="../report/captions/grey_box.rst",
             labels={"figure": "the networks"},
         ),
+        learning=report(
+            "results/report/grey_box/learning.svg",
+            category="Grey box",
+            caption="../report/captions/grey_box.rst",
+            labels={"figure": "how a network learns"},
+        ),
         printed="results/report/grey_box/printed.csv",
         rotor_networks=report(
             "results/report/grey_box/rotor_networks.svg",

@@ -1,7 +1,7 @@
 """Verdicts on the campaign's own sets against the emulators' truth, opened here and nowhere else.
 
 - What is at work in each set, what the verdict names of it, and which of its numbers are inside their intervals.
-- Whether the stand's numbers are those of a displaced sensor taken for a displaced centre of mass and unequal rotors.
+- Whether the stand's numbers are those of one displacement, of sensor or centre of mass, that is taken for both.
 - What a straight line in the loads leaves of the aluminium bench's error, which the verdict may call unexplained.
 """
 
@@ -43,6 +43,7 @@ def main(
     if LINE in found:
         ledger = json.loads(Path(ledgers[list(found).index(LINE)]).read_text(encoding="utf-8"))
         state["line"] = campaign.straight_line(*_readings(sets[LINE], found[LINE]["runs"]["held_out"]))
+        state["line"]["crosstalk"] = _stated(found[LINE], "crosstalk")
         state["line"]["ledger"] = [entry["sentence"] for entry in ledger if entry["on"] == "crosstalk"]
     rows, numbers = [], []
     if truth:
@@ -50,7 +51,8 @@ def main(
         known = true["sets"]
         state["torque_sensor"] = {"force_into_moment_z": true["force_into_moment_z_m"]}
         if STAND in found:
-            state["sensor"] = _as_displaced(found[STAND], known[STAND], true)
+            places_m = read_set(Path(sets[STAND])).vehicle.rotor_positions_m()
+            state["sensor"] = _as_displaced(found[STAND], known[STAND], true, places_m)
         for name, verdict in found.items():
             named = campaign.names(verdict, known[name]["ids"])
             row = {"set": name, "verdict": verdict["verdict"], "hidden": "; ".join(known[name]["ids"])}
@@ -62,17 +64,42 @@ def main(
     Path(out["state"]).write_text(json.dumps(state, indent=1) + "\n", encoding="utf-8")
 
 
-def _as_displaced(verdict: Mapping, known: Mapping, true: Mapping) -> dict:
-    """How many of the stand's numbers are those of centre and rotors, and of a displaced sensor taken for these."""
-    alike = true["displaced"]
+def _stated(verdict: Mapping, effect_id: str) -> dict[str, tuple[float, float, float]]:
+    """Value and 95 % interval of each parameter of an effect that is claimed; empty where it is not."""
+    claimed = [e for e in verdict["effects"] if e["id"] == effect_id and e["status"] in ("established", "ambiguous")]
+    return {p["symbol"]: (p["value"], *p["interval_95"]) for e in claimed for p in e["parameters"]}
+
+
+def _as_displaced(verdict: Mapping, known: Mapping, true: Mapping, places_m: np.ndarray) -> dict:
+    """How many of the stand's numbers are the true ones, and how many those of one displacement that is taken for two.
+
+    A displaced sensor and a displaced centre of mass are at work, and the verdict names one of them.
+    """
+    claimed = [e["id"] for e in campaign.stated(verdict) if e["id"] in ("sensor_origin", "com_offset")]
+    named = claimed[0] if claimed else "com_offset"
+    alike = campaign.sensor_for_both(known["numbers"], places_m) if named == "sensor_origin" else true["displaced"]
     seen = campaign.numbers(verdict, alike)
     own = campaign.numbers(verdict, {name: known["numbers"][name] for name in alike})
     own = own[own["symbol"].isin(seen["symbol"])]
+    rotors = own[own["effect"] == "unequal_rotors"].set_index("symbol")
+    furthest = (rotors["found"] - rotors["truth"]).abs().idxmax() if len(rotors) else None
     return {
+        "named": named,
         "place_error_m": true["sensor_place_error_m"],
+        "sum_m": [
+            known["numbers"]["sensor_origin"][f"d_{a}"] + known["numbers"]["com_offset"][f"r_{a}"] for a in "xyz"
+        ],
         "numbers": len(seen),
         "inside_truth": int(own["inside"].sum()),
         "inside_displaced": int(seen["inside"].sum()),
+        "rotor": None
+        if furthest is None
+        else {
+            "number": int(furthest.split("_")[1]),
+            "found": float(rotors.loc[furthest, "found"]),
+            "truth": float(rotors.loc[furthest, "truth"]),
+            "displaced": alike["unequal_rotors"][furthest],
+        },
     }
 
 

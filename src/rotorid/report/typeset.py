@@ -139,13 +139,21 @@ def gaps(source: str | Path) -> list[tuple[str, int, float, bool]]:
 
 
 def pdf(source: str | Path, out: str | Path) -> None:
-    """Typst source to PDF, with typst's own fonts only, and dated nowhere so that it is byte-stable."""
+    """Typst source to PDF, with typst's own fonts only, and dated nowhere so that it is byte-stable.
+
+    Raises InputError where typst refuses it, and where pages do not settle: numbers of pages would be wrong then.
+    """
     import typst
 
     try:
-        typst.compile(str(source), output=str(out), root=".", ignore_system_fonts=True, timestamp=0, pdf_standards=[])
+        _, warnings = typst.compile_with_warnings(
+            str(source), output=str(out), root=".", ignore_system_fonts=True, timestamp=0, pdf_standards=[]
+        )
     except typst.TypstError as error:
         raise InputError(f"{source}: typst says: {error}") from None
+    unsettled = [w.message for w in warnings if "did not converge" in w.message]
+    if unsettled:
+        raise InputError(f"{source}: typst says: {unsettled[0]}")
 
 
 def html(document: Document, out: str | Path) -> None:

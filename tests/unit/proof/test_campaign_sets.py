@@ -1,6 +1,7 @@
 """What a verdict on one of the campaign's sets states of the truth."""
 
 import numpy as np
+import pytest
 
 from rotorid_proof import campaign
 
@@ -49,3 +50,18 @@ def test_a_straight_line_is_fitted_to_some_runs_and_judged_on_others() -> None:
     np.testing.assert_allclose(found["slopes"], slopes, atol=1e-12)
     np.testing.assert_allclose(found["after_n"], [0.0, 1.0, 0.0], atol=1e-12)
     np.testing.assert_allclose(found["before_n"][2], np.sqrt(np.mean(error[held_out, 2] ** 2)))
+
+
+def test_a_sensor_that_stands_for_both_displacements_leaves_the_thrusts_moment_to_the_rotors():
+    """Rotors at (±0.1, ±0.1) m, all with thrust F: the sensor has 10 mm along x too much, so that 4 F less 0.01 m must
+    come from rotors that differ: Σ d_i F x_i = −0.04 F m with d = −0.1 in front and +0.1 at the rear.
+    """
+    places = np.array([[0.1, 0.1, 0.0], [0.1, -0.1, 0.0], [-0.1, -0.1, 0.0], [-0.1, 0.1, 0.0]])
+    known = {
+        "sensor_origin": {"d_x": 0.002, "d_y": 0.0, "d_z": 0.0},
+        "com_offset": {"r_x": 0.01, "r_y": 0.0, "r_z": 0.001},
+        "unequal_rotors": {"d_1": 0.02, "d_2": 0.0, "d_3": -0.02, "d_4": 0.0},
+    }
+    found = campaign.sensor_for_both(known, places)
+    assert found["sensor_origin"] == pytest.approx({"d_x": 0.012, "d_y": 0.0, "d_z": 0.001})
+    assert list(found["unequal_rotors"].values()) == pytest.approx([-0.08, -0.1, 0.08, 0.1])

@@ -38,6 +38,13 @@ _REGIME_WORDS = {
     "pitch_rad": ("pitch of the mount", "rad"),
 }
 """Regime variables in words, with their unit; any other is named from its column."""
+_MAGNITUDE_WORDS = {
+    "forward_speed_m_s": "speed forwards or backwards",
+    "sideward_speed_m_s": "speed to either side",
+    "vertical_speed_over_hover_inflow": "speed of climb or descent over hover inflow",
+    "rotor_acceleration_rad_s2": "rate of the rotor speed, up or down",
+}
+"""Magnitudes of regime variables in words; of any other, either sign is said."""
 _PARAMETER_WORDS = {
     "mass_kg": ("mass", "kg"),
     "thrust_coefficient_n_s2": ("thrust coefficient", "N s²"),
@@ -66,8 +73,11 @@ def channel_words(channel: str) -> str:
     return channel.replace("_", " ")
 
 
-def regime_words(variable: str) -> tuple[str, str]:
-    """Name and unit of a regime variable."""
+def regime_words(variable: str, either_sign: bool = False) -> tuple[str, str]:
+    """Name and unit of a regime variable, or of its magnitude."""
+    if either_sign:
+        name, unit = regime_words(variable)
+        return _MAGNITUDE_WORDS.get(variable, f"{name}, either sign"), unit
     if variable in _REGIME_WORDS:
         return _REGIME_WORDS[variable]
     return variable.removesuffix(unit_suffix(variable)).replace("_", " "), unit_of(variable)

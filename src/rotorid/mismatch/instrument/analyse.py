@@ -68,6 +68,7 @@ from rotorid.mismatch.instrument.model import (
     chosen_already,
     everything,
     fitted_model,
+    kept_values,
     make_terms,
     nonlinear_deviation,
     restrain,
@@ -455,23 +456,51 @@ def _on_every_run(model: ReadingModel, chain: ChainResult | None, unseen: Record
 
 def reading_findings(model: ReadingModel) -> list[Finding]:
     """Findings of the terms of a reading, each with the channels that it shows in, the strongest first."""
-    fit, search = model.selection.fit, model.search
+    fit, search, active = model.selection.fit, model.search, model.selection.active
+    alternatives = {key: search.alternatives(key, active) for key in active}
+    together = _with_alternatives(model, {i for others in alternatives.values() for i in others})
 
     def report_of(key: str):
         size = search.ask.sizes_of(key, fit.beta[fit.places(model.regression.columns([key]))])
         order = np.argsort(-size)
         channels = tuple(CHANNELS[c] for c in order if size[c] > _SHOWS * size[order[0]])
-        others = search.alternatives(key, model.selection.active)
-        return active_values(model, key), _parameters_of(model, key), channels, others
+        return active_values(model, key), _parameters_of(model, key, together), channels, alternatives[key]
 
     return findings_of(search, model.selection, report_of)
 
 
-def _parameters_of(model: ReadingModel, key: str) -> tuple[Estimate, ...]:
-    """Parameters of a term at work with 95 % intervals."""
+def _with_alternatives(model: ReadingModel, ids: Collection[str]) -> list[Fit]:
+    """The model with each id that explains the same as one at work next to it: both may be at work.
+
+    A displaced sensor and a displaced centre of mass move the weight alike, and the thrust not: a model with one of
+    them gives it the sum, and pays for the thrust with unequal rotors.
+    """
+    search, selection = model.search, model.selection
+    always = kept_values(search, selection.active)
+    taken = {search.terms[k].effect for k in selection.active}
+    fits = []
+    for effect in sorted(set(ids) - taken):
+        terms = [t for t in search.terms.values() if t.effect == effect and t.kind == "effect" and not t.run]
+        if not terms:
+            continue
+        worth = search.worth_with([*selection.active], terms)
+        best = terms[int(np.argmax(worth))]
+        fits.append(model.regression.fit([*always, *selection.active, best.key]))
+    return fits
+
+
+def _parameters_of(model: ReadingModel, key: str, together: Iterable[Fit] = ()) -> tuple[Estimate, ...]:
+    """Parameters of a term at work with 95 % intervals, which hold what it has in each of the fits `together`, too."""
     term = model.search.terms[key]
     if not term.form.nonlinear:
-        return estimates(model.regression, model.selection.fit, model.search, key)
+        regression, fit = model.regression, model.selection.fit
+        stated = estimates(regression, fit, model.search, key)
+        for other in together:
+            wider = estimates(regression, fit, model.search, key, other)
+            stated = tuple(
+                replace(a, low=min(a.low, b.low), high=max(a.high, b.high)) for a, b in zip(stated, wider, strict=True)
+            )
+        return stated
     values, sd = active_values(model, key), nonlinear_deviation(model, key)
     return tuple(
         Estimate(p.symbol, float(v), p.unit, float(v - _REACH * s), float(v + _REACH * s))
@@ -612,10 +641,11 @@ def _curved_gains(model: ReadingModel, values: Values) -> set[str]:
     """Gains called wrong given a curved characteristic that is right at small loads, or right over all of them.
 
     The gain of a curve is a convention: a reading that saturates is right at small loads, one with a dead band nearly
-    so over all, and the slope that a polynomial has at no load is neither. A wrong calibration is off in both.
+    so over all, and the slope that a polynomial has at no load is neither. A wrong calibration is off in both. A
+    structure that gives way curves the reading of its own axis as a sensor does.
     """
     instrument = model.setup.instrument
-    if not any(model.search.terms[k].effect in _characteristics() for k in model.selection.active):
+    if not any(model.search.terms[k].effect in _curving() for k in model.selection.active):
         return set()
     out = set()
     for key, (change, _) in values.items():
@@ -628,15 +658,16 @@ def _curved_gains(model: ReadingModel, values: Values) -> set[str]:
     return out if rules.CURVED_GAIN(bool(out)) else set()
 
 
-def _characteristics() -> frozenset[str]:
-    """Ids of a sensor's curves."""
-    return ids_of("curve_of_load") & ids_of("kind", "sensor")
+def _curving() -> frozenset[str]:
+    """Ids that curve a reading over its own load: a sensor's curves, and what of a rig is confused with them."""
+    sensor = ids_of("curve_of_load") & ids_of("kind", "sensor")
+    return sensor | {e.id for e in catalogue().values() if e.of_the_rig and sensor & set(e.confusers)}
 
 
 def _slope_of(model: ReadingModel, channel: int, most: float) -> float:
-    """Slope, less one, of a reading over loads up to `most` in size, less all effects but a curved characteristic."""
+    """Slope, less one, of a reading over loads up to `most` in size, less all effects that do not curve it."""
     fit, search = model.selection.fit, model.search
-    others = [k for k in model.selection.active if search.terms[k].effect not in _characteristics()]
+    others = [k for k in model.selection.active if search.terms[k].effect not in _curving()]
     known = np.isin(fit.columns, model.regression.columns(others))
     load, left = [], []
     for rows, loads in zip(model.rows, _loads_of_rows(model), strict=True):

@@ -90,6 +90,14 @@ class ReadingSearch(Search):
     def candidates(self, active, *rest):
         return iter(()) if len(active) >= _MOST_AT_ONCE else super().candidates(active, *rest)
 
+    def swapped(self, active, dropped):
+        """A model with one id in another's place, of which no nameless one takes a named one's.
+
+        What mixes the loads anew in each run holds every crosstalk and a little more; it may only join.
+        """
+        nameless = {t.once for t in self.terms.values() if t.effect in UNKNOWNS}
+        return super().swapped(active, {**dropped, **dict.fromkeys(nameless, "without a name")})
+
     def unsteady(self, active):
         """None: an instrument's runs load different axes, and no coefficient could be asked of each."""
         return None

@@ -75,6 +75,10 @@ _HELD_BACK = 3.0
 REGIME_BLOCK_S = 0.5
 _REGIME_BINS = 8
 _REGIME_P = 1e-3
+_EITHER_SIGN = 0.1
+"""Share of the flight that a variable must be on the rarer side of zero for its magnitude to be tried."""
+_BETTER_BY_MAGNITUDE = 1.1
+"""How much better than the variable itself its magnitude must separate."""
 _CONTRAST = 2.0
 """Energy of the strongest bin over the weakest, below which a variable does not separate anything."""
 _EXCESS_SHARE = 0.25
@@ -528,8 +532,10 @@ def _regime_of(analysis: Analysis, channel: str, explained: bool) -> Regime | No
     """The variable and its range that separate the mismatch's energy best; None if none does.
 
     Analysis of variance of the log energy of half-second blocks over bins of equal counts, each variable in
-    turn; blocks, not samples, are the units, so that colour within a block does not count as evidence. Time is
-    chosen only where nothing else separates half as well.
+    turn; blocks, not samples, are the units, so that colour within a block does not count as evidence. A variable that
+    goes to both sides of zero is tried by its magnitude, too: a drag errs flying forwards and backwards. Of the
+    separation counts the part of the mismatch that the range holds, so that one side of zero does not stand for both.
+    Time is chosen only where nothing else separates half as well.
     """
     traces = [t for t in analysis.traces if t.channel == channel]
     if not traces:
@@ -544,20 +550,27 @@ def _regime_of(analysis: Analysis, channel: str, explained: bool) -> Regime | No
     flown = [analysis.regimes.get(t.run, {}) for t in traces]
     names, scored = set.intersection(*map(set, flown)), []
     for name in sorted(names):
-        value = by_block(np.interp(t.time_s, r["time_s"], r[name]) for t, r in zip(traces, flown, strict=True))
-        found = _separation(energy, value)
-        if found is not None:
-            share, p, low, high = found
-            if p < _REGIME_P / len(names):
-                scored.append((share * (0.5 if name == "time_s" else 1.0), name, low, high))
+        lines = [np.interp(t.time_s, r["time_s"], r[name]) for t, r in zip(traces, flown, strict=True)]
+        value = by_block(lines)
+        tried = [(value, False)]
+        if min((value > 0).mean(), (value < 0).mean()) >= _EITHER_SIGN:
+            tried.append((by_block(map(np.abs, lines)), True))
+        for values, either_sign in tried:
+            found = _separation(energy, values)
+            if found is not None and found[1] < _REGIME_P / len(names):
+                share, _, low, high, held = found
+                weight = 0.5 if name == "time_s" else 1.0 / _BETTER_BY_MAGNITUDE if either_sign else 1.0
+                scored.append((share * held * weight, name, low, high, either_sign))
     if not scored:
         return None
-    _, name, low, high = max(scored)
-    return Regime(variable=name, low=low, high=high)
+    _, name, low, high, either_sign = max(scored)
+    return Regime(variable=name, low=low, high=high, either_sign=either_sign)
 
 
-def _separation(energy: np.ndarray, value: np.ndarray) -> tuple[float, float, float, float] | None:
-    """Share of variance between bins, its p-value, and the range of the bins in which the energy lies."""
+def _separation(energy: np.ndarray, value: np.ndarray) -> tuple[float, float, float, float, float] | None:
+    """Share of variance between bins, its p-value, the range of the bins in which the energy lies, and the part of
+    the energy above the quietest bin's that lies there.
+    """
     good = np.isfinite(value) & np.isfinite(energy)
     energy, value = energy[good], value[good]
     # A load turned into other axes is 1e-17 where it should be nothing: two bins of nothing, and no words for either.
@@ -577,7 +590,7 @@ def _separation(energy: np.ndarray, value: np.ndarray) -> tuple[float, float, fl
     p = f.sf(between / between_free / max(within / within_free, 1e-300), between_free, within_free)
     means = np.array([energy[which == b].mean() for b in bins])
     floor = means.min()
-    if means.max() < _CONTRAST * floor:
+    if means.max() <= _CONTRAST * floor:
         return None
     inside = means - floor >= _EXCESS_SHARE * (means.max() - floor)
     first = last = int(np.argmax(means))
@@ -585,4 +598,6 @@ def _separation(energy: np.ndarray, value: np.ndarray) -> tuple[float, float, fl
         first -= 1
     while last < len(bins) - 1 and inside[last + 1]:
         last += 1
-    return between / total, float(p), float(edges[bins[first]]), float(edges[bins[last] + 1])
+    excess = np.array([(energy[which == b] - floor).sum() for b in bins])
+    held = float(excess[first : last + 1].sum() / excess.sum())
+    return between / total, float(p), float(edges[bins[first]]), float(edges[bins[last] + 1]), held

@@ -27,6 +27,7 @@ from rotorid.mismatch.decide.words import (
     sure,
 )
 from rotorid.mismatch.tell.consistency import by_share, carrying, quoted
+from rotorid.mismatch.tell.places import in_a_regime, regime_values, size_at
 
 if TYPE_CHECKING:
     from rotorid.mismatch.decide.statements import UpperLimit
@@ -117,10 +118,12 @@ def headline(contents: Contents) -> str:
     rest = "" if contents.word == "explained" else f"; {unexplained_words(contents.left)}"
     still, short = (_still_off(contents, main, how) for how in ("both", "share"))
     surely, where, in_metres, off, off_in_metres, plain = places
+    # Where a place is said with its own error, the error that falls is that of the whole.
+    overall = better if where == off else _better_in_short(main, contents.channels, overall=True)
     for parts in (
-        (surely, causes, better, rest, still),
-        (where, causes, better, rest, short),
-        (in_metres, causes, better, rest, short),
+        (surely, causes, overall, rest, still),
+        (where, causes, overall, rest, short),
+        (in_metres, causes, overall, rest, short),
         (where, causes, "", rest, short),
         (off, causes, "", rest, short),
         (off_in_metres, causes, "", rest, short),
@@ -248,12 +251,14 @@ def _corrected_mistakes(stated: Sequence[Finding]) -> str:
     return first_words("; ".join(texts), MOST_WORDS - 15) + ("." if len(texts) == 1 else f" ({len(texts)} faults).")
 
 
-def _off_words(main: str, channels: Mapping[str, Channel], size: Size | None, how: _SizeWords) -> str:
-    """How much a channel is off, in words; with its size, as far as asked."""
+def _off_words(
+    main: str, channels: Mapping[str, Channel], size: Size | None, how: _SizeWords, here: float | None = None
+) -> str:
+    """How much a channel is off, in all or by `here`, in words; with its size, as far as asked."""
     if not main:
         return "the model and the recordings differ"
     said = _size_words(size, how) if size is not None else ""
-    off = f"{number(quoted(channels[main]).before)} {channels[main].unit} off"
+    off = f"{number(quoted(channels[main]).before if here is None else here)} {channels[main].unit} off"
     return f"the {channel_words(main)} is {off}{f', {said}' if said else ''}"
 
 
@@ -264,14 +269,15 @@ def _size_words(size: Size, how: _SizeWords = "both") -> str:
     return " or ".join(filter(None, (share, metres)))
 
 
-def _better_in_short(main: str, channels: Mapping[str, Channel]) -> str:
+def _better_in_short(main: str, channels: Mapping[str, Channel], overall: bool = False) -> str:
     errors = quoted(channels[main]) if main else None
     if errors is None or errors.before is None or errors.named is None:
         return ""
     unit, floor = channels[main].unit, number(channels[main].noise_floor)
     if errors.named >= errors.before:
         return f"; the error is not smaller with this ({number(errors.named)} {unit})"
-    return f"; the error falls to {number(errors.named)} {unit} (noise {floor})"
+    falls = f"overall the error falls from {number(errors.before)}" if overall else "the error falls"
+    return f"; {falls} to {number(errors.named)} {unit} (noise {floor})"
 
 
 def warnings_of(channels: Mapping[str, Channel]) -> list[str]:
@@ -309,7 +315,7 @@ def _run_forward(forward: Mapping[str, Channel]) -> list[str]:
     if not any(groups.values()):
         return []
     texts = [f"{word}: {listed(own)}" for word, own in groups.items() if own]
-    return [f"Simulated forward for half a second with the improved vehicle, {'; '.join(texts)}."]
+    return [f"Simulated forward with the improved vehicle, RMS over windows of half a second, {'; '.join(texts)}."]
 
 
 def _concerns_the_recording(finding: Finding) -> bool:
@@ -344,8 +350,8 @@ def surest_location(here: Sequence[Location]) -> Location:
 def _places(main: str, contents: Contents) -> tuple[str, str, str, str, str, str]:
     """Where and how much the main channel is off, from all that can be said to the least.
 
-    With regime, both sizes and significance; without the significance; with the metres alone; the same two without
-    regime; and the error alone.
+    With regime, size and significance; without the significance; with the metres alone; the same two without regime;
+    and the error alone. With a regime or time all sizes are those of this place.
     """
     analysis, channels = contents.analysis, contents.channels
     size = main_size(analysis, main, channels)
@@ -356,16 +362,21 @@ def _places(main: str, contents: Contents) -> tuple[str, str, str, str, str, str
     best = surest_location(here)
     doubt = f" ({sure(best.p_value)})" if best.p_value is not None and best.p_value < _WORTH_SAYING_P else ""
     when = _when(best, here, analysis)
-    return f"{when}{both}{doubt}", f"{when}{both}", f"{when}{metres}", both, metres, plain
+    there = size_at(analysis, best) if when else None
+    if there is None:
+        return f"{both}{doubt}", both, metres, both, metres, plain
+    said, short = (f"{when}{_off_words(main, channels, there, how, there.rms)}" for how in ("both", "metres"))
+    return f"{said}{doubt}", said, short, both, metres, plain
 
 
 def _when(best: Location, here: Sequence[Location], analysis: Analysis) -> str:
     """Lead-in that says in which regime, else at what time, the mismatch shows."""
     regime = best.regime
-    if regime is not None and regime.variable != "time_s" and regime.low is not None and regime.high is not None:
-        name, unit = regime_words(regime.variable)
+    if in_a_regime(best):
+        name, unit = regime_words(regime.variable, regime.either_sign)
         space = f" {unit}" if unit else ""
-        flown = np.concatenate([r[regime.variable] for r in analysis.regimes.values() if regime.variable in r])
+        known = [r for r in analysis.regimes.values() if regime.variable in r]
+        flown = np.concatenate([regime_values(r, regime) for r in known])
         to_the_end = regime.high >= np.nanquantile(flown, 0.98)
         from_the_start = regime.low <= np.nanquantile(flown, 0.02)
         if from_the_start and to_the_end:
@@ -408,7 +419,7 @@ def _left_out(finding: Finding, share: float | None) -> str:
     said = [
         parameters,
         "" if finding.probability is None else f"probability {percent(finding.probability)}",
-        "" if share is None else f"{100 * share:.0f} % of the error that goes",
+        "" if share is None else f"{100 * share:.0f} % of the squared error that goes needs it",
     ]
     numbers = f" ({', '.join(filter(None, said))})" if any(said) else ""
     if _concerns_the_recording(finding):

@@ -70,9 +70,12 @@ def together(steps: Mapping[str, _Steps]) -> _Steps | None:
 
 def steps_sentence(verdict: Verdict) -> str:
     """What each step takes off the error on flights not used for fitting; empty where nothing is compared."""
-    whole = together(steps_of(verdict.channels, verdict.delivered.model))
+    compared = steps_of(verdict.channels, verdict.delivered.model)
+    whole = together(compared)
     if whole is None or verdict.kind != "flight":
         return ""
+    # The geometric mean: one channel may lose nearly all of its error and another none.
+    errors = f"errors of the {len(compared)} forces and moments on average" if len(compared) > 1 else "error"
     held = any(c.rmse.held_out.after is not None for c in verdict.channels.values())
     claimed = {
         e.id: listed([effect_words(i) for i in dict.fromkeys((e.id, *e.alternatives))], "or")
@@ -96,12 +99,12 @@ def steps_sentence(verdict: Verdict) -> str:
     for name, share, verb in taken:
         if share >= _WORTH_SAYING:
             what = f"{100 * share:.0f} %"
-            parts.append(f"{name} another {what}" if parts else f"{name} {verb} {what} of the error off")
+            parts.append(f"{name} another {what}" if parts else f"{name} {verb} {what} off the {errors}")
     nameless = whole.named - whole.delivered
     if nameless >= _WORTH_SAYING:
         parts.append(f"{100 * nameless:.0f} % {'more ' if parts else ''}is predictable and has no name yet")
     if not parts:
-        parts.append("nothing that was found takes a part of the error off")
+        parts.append(f"nothing that was found takes a part off the {errors}")
     left = (
         "the rest is noise"
         if whole.delivered <= _AT_THE_NOISE * whole.noise
@@ -251,7 +254,7 @@ def _where(verdict: Verdict, main: str) -> _Tile:
 def _when(best: Location, here: Sequence[Location]) -> str:
     regime = best.regime
     if regime is not None and regime.low is not None and regime.high is not None:
-        name, unit = regime_words(regime.variable)
+        name, unit = regime_words(regime.variable, regime.either_sign)
         return f"{name} {number(regime.low)} to {number(regime.high)} {unit}".strip()
     if best.energy_share < 0.99 and best.start_s is not None and best.stop_s is not None:
         more = f" and {len(here) - 1} more stretches" if len(here) > 1 else ""

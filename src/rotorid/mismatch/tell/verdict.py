@@ -125,6 +125,7 @@ class Regime(_KeysOfVerdict):
     variable: str
     low: _Number
     high: _Number
+    either_sign: bool = Field(default=False, description="Whether the range is that of the variable's magnitude.")
 
 
 class Location(_KeysOfVerdict):

@@ -263,7 +263,7 @@ def _where_text(verdict: Verdict) -> list[str]:
             regimes.setdefault(loc.channel, loc.regime)
     texts = []
     for channel, regime in regimes.items():
-        name, unit = regime_words(regime.variable)
+        name, unit = regime_words(regime.variable, regime.either_sign)
         span = f"{number(regime.low)} to {number(regime.high)} {unit}".strip()
         texts.append(f"{channel_words(channel)}: {name} {span}")
     channels = dict.fromkeys(loc.channel for loc in verdict.locations)

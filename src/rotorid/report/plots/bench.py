@@ -326,6 +326,7 @@ def steady(table: pd.DataFrame) -> Figure:
             linewidth=0.8,
             label="measured",
         )
+        axis.margins(y=0.12)  # no mark is cut at an end
         axis.set_ylabel(f"{label} ({'N' if k < 3 else 'mN m'})")
     style.label_outer(axes, "experiment")
     fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)

@@ -330,3 +330,58 @@ def networks() -> Figure:
         axis.set_title(title)
         axis.set_axis_off()
     return fig
+
+
+def learning() -> Figure:
+    """What a network is and how it learns: a node, its functions, errors that go back, samples a step (thesis 4.10 to
+    4.16)."""
+    fig, (node, function, layers, samples) = style.figure(1.9, 1, 4, width_ratios=(1.15, 0.8, 1.15, 1.2))
+    for k, y in enumerate((0.6, 0.0, -0.6)):
+        node.plot(0, y, "s", ms=6, mfc="white", mec="black", mew=0.6)
+        node.text(-0.12, y, f"$x_{k + 1}$", ha="right", va="center")
+        _arrow(node, (0.06, y), (0.85, 0.13 * y))
+        beside = {"va": "top"} if y < 0 else {"va": "bottom"}
+        node.text(0.42, 0.66 * y + (0.05 if y >= 0 else -0.07), f"$w_{k + 1}$", ha="center", fontsize=8.5, **beside)
+    node.plot(1, 0, "o", ms=13, mfc=style.SKY, mec="black", mew=0.6)
+    _arrow(node, (1, 0.75), (1, 0.17))
+    node.text(1, 0.8, "$b$", ha="center", va="bottom")
+    _arrow(node, (1.15, 0), (1.75, 0))
+    node.text(1.8, 0, "$y$", va="center")
+    node.text(0.95, -0.9, r"$y = \varphi(\sum w_i x_i + b)$", ha="center", va="center", fontsize=8.5)
+    node.set(xlim=(-0.45, 2.0), ylim=(-1.1, 1.1), title="A node")
+
+    v = np.linspace(-4, 4, 101)
+    function.plot(v, v / 4, color=style.BLUE)
+    function.plot(v, 1 / (1 + np.exp(-v)), color=style.RED)
+    function.text(-3.9, 0.55, "sigmoid", color=style.RED, fontsize=8.5)
+    function.text(0.2, -0.75, "linear", color=style.BLUE, fontsize=8.5)
+    function.set(title=r"Its function $\varphi(v)$", xticks=[0], yticks=[0, 1], xlabel="$v$")
+
+    sizes = (2, 3, 2)
+    places = [[(k, (n - 1) / 2 - i) for i in range(n)] for k, n in enumerate(sizes)]
+    for left, right in itertools.pairwise(places):
+        for a, b in itertools.product(left, right):
+            layers.plot(*zip(a, b, strict=True), color="#888888", lw=0.5, zorder=0)
+    for k, own in enumerate(places):
+        for x, y in own:
+            layers.plot(x, y, "o" if k else "s", ms=7, mfc=style.SKY if k else "white", mec="black", mew=0.6)
+    _arrow(layers, (0.2, 1.45), (1.8, 1.45))
+    layers.text(1, 1.52, "samples", ha="center", va="bottom", fontsize=8.5)
+    _arrow(layers, (1.8, -1.45), (0.2, -1.45), colour=style.RED)
+    layers.text(1, -1.65, r"errors $\delta$, weights $\Delta w$", ha="center", va="top", fontsize=8.5, color=style.RED)
+    layers.set(xlim=(-0.3, 2.3), ylim=(-2.1, 2.1), title="Back-propagation")
+
+    for y, (name, groups) in zip(
+        (2, 1, 0), (("stochastic", [1] * 10), ("mini-batch", [3, 3, 4]), ("batch", [10])), strict=True
+    ):
+        at = 0
+        for number, count in enumerate(groups):
+            colour = style.SKY if number % 2 == 0 else style.ORANGE
+            samples.bar([at + i + 0.5 for i in range(count)], 0.3, 0.85, bottom=y, color=colour)
+            at += count
+        steps = f"{len(groups)} step{'s' if len(groups) > 1 else ''}"
+        samples.text(0, y + 0.34, f"{name}: {steps}", va="bottom", fontsize=8.5)
+    samples.set(xlim=(-0.2, 10.2), ylim=(-0.3, 2.9), title="Ten samples, one epoch")
+    for axis in (node, layers, samples):
+        axis.set_axis_off()
+    return fig

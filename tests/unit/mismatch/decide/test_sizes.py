@@ -7,6 +7,8 @@ import pytest
 
 from rotorid.mismatch.decide.sizes import WINDOW_S, channel_metres, channel_size, drift_m, effect_sizes
 from rotorid.mismatch.tell.locate import locate
+from rotorid.mismatch.tell.places import size_at
+from rotorid.mismatch.tell.sentences import surest_location
 from rotorid.mismatch.tell.verdict import make_verdict
 from rotorid.vehicle.improved import simulate_as_stated
 from rotorid.vehicle.simulator import Commands
@@ -72,4 +74,8 @@ def test_the_first_sentence_has_the_metres_and_so_have_page_and_file():
     verdict = make_verdict(made, locate(made), {})
     metres = verdict.size.metres_after_half_a_second
     assert verdict.size.channel == "force_x" and verdict.size.of == "the weight"
-    assert f"8 % of the weight or {metres:.3f} m after 0.5 s simulated" in verdict.sentence
+    assert 0.05 < metres < 0.2
+    # The sentence states a regime, and the sizes of this regime: all of the time at 5 m/s, not an eighth of it.
+    there = size_at(made, surest_location(verdict.locations))
+    assert there.metres > 2 * metres
+    assert f"the forward force is {there.rms:.1f} N off, {there.metres:.2f} m after 0.5 s" in verdict.sentence

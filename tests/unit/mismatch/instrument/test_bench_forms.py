@@ -13,7 +13,7 @@ from rotorid.effects.hysteresis import settling
 from rotorid.effects.loading import InstrumentFacts, Loading, forms_of
 from rotorid.mismatch.evidence.rows import form_reading
 from rotorid.mismatch.evidence.unknowns import UNKNOWNS
-from rotorid.mismatch.instrument.analyse import analyse_instrument
+from rotorid.mismatch.instrument.analyse import _parameters_of, _with_alternatives, analyse_instrument
 from rotorid.mismatch.instrument.model import kept_values, make_terms, reading_model
 from rotorid.mismatch.instrument.setup import session_of, set_up, zero_temperature
 from rotorid.recordings import RecordingSet, Run
@@ -206,6 +206,39 @@ def test_loads_that_mix_differently_in_each_run_are_left_over():
 
     analysis = analyse_instrument(recorded(change))
     assert claimed(analysis) == set() and "run" in analysis.unexplained_depends_on
+
+
+def one_axis_a_run(rng, largest: float = 10.0) -> RecordingSet:
+    """Three runs an axis, loaded along it alone in ramps: x reads 0.5 of y, each run a little otherwise."""
+    made = []
+    for number in range(9):
+        t = np.arange(int(20 * RATE_HZ)) / RATE_HZ
+        load = np.zeros((len(t), 3))
+        load[:, number // 3] = np.interp(t, np.linspace(0, 20, 9), np.r_[0, rng.uniform(0, largest, 7), 0])
+        read = load + 0.01 * rng.standard_normal(load.shape)
+        read[:, 0] += (0.5 + (0.02, -0.02, 0.01)[number % 3]) * load[:, 1]
+        made.append(bench_run(f"run{number + 1}", t + 30.0 * number, load, read))
+    return RecordingSet("bench", BENCH, tuple(made))
+
+
+def test_crosstalk_of_runs_that_load_one_axis_each_keeps_its_name():
+    """Loads mixed anew in each run hold any crosstalk there, and what the runs differ by: they had taken its place."""
+    analysis = analyse_instrument(one_axis_a_run(np.random.default_rng(3)))
+    assert claimed(analysis) == {"crosstalk"} and not analysis.values
+    found = {p.symbol: p for f in analysis.findings if f.id == "crosstalk" for p in f.parameters}
+    assert 0.48 < found["C_Fx,Fy"].low < found["C_Fx,Fy"].high < 0.53
+
+
+def test_an_interval_holds_the_number_next_to_what_explains_the_same():
+    """Bending and a curved sensor are alike along one axis: a number given the one holds for both at work, too."""
+    setup = set_up(recorded(lambda load, run, warmth: load + 0.002 * load * np.abs(load)))
+    model = reading_model(setup, make_terms(setup)[0])
+    key = next(k for k in model.selection.active if model.search.terms[k].effect in ("load_nonlinearity", "compliance"))
+    other = {"load_nonlinearity": "compliance", "compliance": "load_nonlinearity"}[model.search.terms[key].effect]
+    (together,) = _with_alternatives(model, {other, model.search.terms[key].effect})
+    alone, wider = _parameters_of(model, key), _parameters_of(model, key, [together])
+    assert all(b.low <= a.low and a.high <= b.high and a.value == b.value for a, b in zip(alone, wider, strict=True))
+    assert max((b.high - b.low) / (a.high - a.low) for a, b in zip(alone, wider, strict=True)) > 1.5
 
 
 @pytest.mark.slow

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from rotorid.mismatch.tell.consistency import missing_places, verdict_word
-from rotorid.mismatch.tell.locate import _separation, locate
+from rotorid.mismatch.tell.locate import _regime_of, _separation, locate
+from rotorid.mismatch.tell.places import size_at
+from rotorid.mismatch.tell.verdict import Location, Regime
 from tests.unit.mismatch.synthetic import DASH_S, LENGTH_S, analysis, drag_finding
 
 
@@ -118,8 +120,44 @@ def test_nothing_turned_into_other_axes_is_nothing():
     rng = np.random.default_rng(0)
     value = np.concatenate([rng.uniform(-1e-17, 1e-17, 400), rng.uniform(1.0, 2.0, 400)])
     energy = np.where(value > 0.5, 1.0, 20.0) * rng.chisquare(20, 800) / 20
-    _, _, low, high = _separation(energy, value)
+    _, _, low, high, _ = _separation(energy, value)
     assert low == 0.0 and 0.0 <= high <= 1.1
+
+
+def back_and_forth(odd: bool):
+    """Three runs with a forward speed of -4 to 4 m/s: an error of 0.2 N a m/s both ways, or flying forwards alone."""
+    made, regimes, traces = analysis(), {}, []
+    for name, known in made.regimes.items():
+        speed = 4.0 * np.sin(0.7 * known["time_s"])
+        regimes[name] = {"time_s": known["time_s"], "forward_speed_m_s": speed}
+    for t in made.traces:
+        speed = regimes[t.run]["forward_speed_m_s"]
+        drag = -0.2 * (speed if odd else np.maximum(speed, 0.0)) * (t.channel == "force_x")
+        traces.append(replace(t, before=t.after + drag, refitted=t.after + drag))
+    return replace(made, traces=tuple(traces), regimes=regimes)
+
+
+def test_the_regime_of_an_odd_effect_is_one_of_magnitudes():
+    both = _regime_of(back_and_forth(odd=True), "force_x", True)
+    assert (both.variable, both.either_sign) == ("forward_speed_m_s", True) and 1.0 < both.low < both.high < 4.1
+    forwards = _regime_of(back_and_forth(odd=False), "force_x", True)
+    assert (forwards.variable, forwards.either_sign) == ("forward_speed_m_s", False) and forwards.low > 0.5
+
+
+def test_the_error_in_a_place_is_the_place_s_own():
+    made = back_and_forth(odd=True)
+    everywhere = dict(run="b", channel="force_x", start_s=0.0, stop_s=LENGTH_S, p_value=1e-9, energy_share=1.0)
+    regime = Regime(variable="forward_speed_m_s", low=3.0, high=4.0, either_sign=True)
+    # 0.2 N a m/s between 3 and 4 m/s of a sine: the speed's mean square is 13.2.
+    assert size_at(made, Location(**everywhere, regime=regime)).rms == pytest.approx(
+        np.sqrt(0.04 * 13.2 + 0.05**2), rel=0.02
+    )
+    # Over the whole run half of 16.
+    assert size_at(made, Location(**everywhere, regime=None)).rms == pytest.approx(
+        np.sqrt(0.04 * 8.0 + 0.05**2), rel=0.05
+    )
+    beyond = regime.model_copy(update={"low": 7.0, "high": 9.0})
+    assert size_at(made, Location(**everywhere, regime=beyond)) is None
 
 
 @pytest.mark.parametrize("alone", [True, False])

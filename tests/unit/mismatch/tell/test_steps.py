@@ -24,21 +24,25 @@ def shrunk(model: str, refitted: float, named: float, after: float):
 
 def test_the_sentence_has_each_step():
     assert steps_sentence(shrunk("named", 0.65, 0.45, 0.33)) == (
-        "On flights not used for fitting, values take 35 % of the error off, rotor drag another 20 %, 12 % more is "
+        "On flights not used for fitting, values take 35 % off the errors of the 6 forces and moments on average, "
+        "rotor drag another 20 %, 12 % more is "
         "predictable and has no name yet; 33 % is left (noise alone: 5 %)."
     )
 
 
 def test_values_that_do_not_help_take_nothing_off():
     said = steps_sentence(shrunk("named", 1.05, 0.40, 0.40))
-    assert "rotor drag takes 60 % of the error off;" in said and "values" not in said
+    assert (
+        "rotor drag takes 60 % off the errors of the 6 forces and moments on average;" in said and "values" not in said
+    )
 
 
 def test_without_rotor_speeds_what_is_between_command_and_speed_counts_with_the_values():
     verdict = shrunk("named", 0.65, 0.45, 0.45)
     lag = next(e for e in verdict.effects if e.id == "rotor_drag").model_copy(update={"id": "motor_lag"})
     said = steps_sentence(verdict.model_copy(update={"effects": [*verdict.effects, lag]}))
-    assert "values and the lag of the motors take 35 % of the error off, rotor drag another 20 %" in said
+    assert "values and the lag of the motors take 35 % off the errors of the 6 forces and moments" in said
+    assert "rotor drag another 20 %" in said
 
 
 def test_a_class_is_named_as_one_of_its_members():

@@ -117,7 +117,7 @@ def test_a_burst_that_nothing_explains_is_unexplained():
 def test_the_sentence_says_where_what_and_how_much_better():
     found = verdict_of(analysis(findings=[drag_finding()]))
     assert "m/s of airspeed on, the forward force is" in found.sentence
-    assert "rotor drag was left out; the error falls to 0.049 N (noise 0.049)" in found.sentence
+    assert "rotor drag was left out; overall the error falls from 0.49 to 0.049 N (noise 0.049)" in found.sentence
     told = " ".join(found.details)
     assert "Rotor drag was left out: the sideways force grows with airspeed times rotor speed" in told
     assert "k_d = 6.00e-5 ± 0.20e-5 N s2/(rad m)" in told
