@@ -120,6 +120,8 @@ def keys_of(terms: Iterable[Term]) -> list[str]:
 class Search:
     """Forward search with replacement of forms and backward checks."""
 
+    begins_in_halves = True
+    """Whether halves of the environments hold about the same manoeuvres, so that a search of one says where to begin."""
     refused: Mapping[str, str] = {}
     """Ids that are not to enter, with the reason."""
 
@@ -353,7 +355,7 @@ class Search:
         ends in one of several models, and half a second more or less in another. So searches of halves of the
         environments say where else to begin, and of all ends the one that is worth most counts.
         """
-        if active is not None or not rules.STARTS.on:
+        if active is not None or not self.begins_in_halves or not rules.STARTS.on:
             return self._ended(active or ())
         found, seen = self._ended(()), set()
         best, worth = found, self.worth(found.active)
