@@ -121,7 +121,7 @@ class Search:
     """Forward search with replacement of forms and backward checks."""
 
     begins_in_halves = True
-    """Whether halves of the environments hold about the same manoeuvres, so that a search of one says where to begin."""
+    """Whether halves of the environments hold about the same manoeuvres, so that one says where to begin."""
     refused: Mapping[str, str] = {}
     """Ids that are not to enter, with the reason."""
 

@@ -419,7 +419,7 @@ def _left_out(finding: Finding, share: float | None) -> str:
     said = [
         parameters,
         "" if finding.probability is None else f"probability {percent(finding.probability)}",
-        "" if share is None else f"{100 * share:.0f} % of the squared error that goes needs it",
+        "" if not share else f"{100 * share:.0f} % of the squared error that goes needs it",
     ]
     numbers = f" ({', '.join(filter(None, said))})" if any(said) else ""
     if _concerns_the_recording(finding):
