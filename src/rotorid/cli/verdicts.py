@@ -134,12 +134,18 @@ def deliver_set(folder: Path, target: Path, quiet: bool, series: bool = False) -
 
     With `series` the residuals are written, too, as `series.parquet` and for the viewers whose packages are installed.
     """
+    with progress("verdict", quiet):
+        return write_verdict(folder, target, series)
+
+
+def write_verdict(folder: Path, target: Path, series: bool = False) -> Verdict:
+    """`deliver_set` without showing how far it is; who listens to `rotorid.steps` hears it."""
     from rotorid.recordings.tables import NO_PARQUET, parquet_is_here, write_table
 
     if series and not parquet_is_here():
         raise InputError(f"{target / 'series.parquet'}: {NO_PARQUET}")
     # What a module warns of goes to no log here; the verdict itself says what a reader must know.
-    with progress("verdict", quiet), warnings.catch_warnings():
+    with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         from rotorid.recordings import read_set
 

@@ -86,7 +86,7 @@ _BY_FIRST_BYTES = (
 )
 _RCBENCHMARK = re.compile(r"ESC signal ?[(,](.*[,;])?\s*\"?Motor (Electrical|Optical) Speed ?[(,\r\n]", re.DOTALL)
 """Headings of RCbenchmark's stands of one rotor; those of other stands are read by a mapping."""
-_TEMPLATES = {"px4": "x500", "betaflight": "five-inch", "crazyflie": "crazyflie-2.1", "neurobem": "neurobem"}
+TEMPLATES = {"px4": "x500", "betaflight": "five-inch", "crazyflie": "crazyflie-2.1", "neurobem": "neurobem"}
 """Template vehicle that supplies what a log of an autopilot or format does not say."""
 
 
@@ -463,7 +463,7 @@ def set_of_logs(
     else:
         if kinds != {"flight"}:
             raise InputError(f"{logs[0]}: a log of a {kinds.pop()} needs --vehicle vehicle.yaml")
-        template = like or _TEMPLATES.get(found[0].known.autopilot) or _TEMPLATES.get(found[0].format)
+        template = like or TEMPLATES.get(found[0].known.autopilot) or TEMPLATES.get(found[0].format)
         if template is None:
             raise InputError(
                 f"{logs[0]}: nothing says what vehicle this is; give --vehicle vehicle.yaml, or --like with one of "
