@@ -113,9 +113,7 @@ def _verdict(folder: Path, state: dict[str, Any], say: Callable[..., None]) -> d
         found = write_verdict(own, answer)
     _pack(own, answer / "recording_set.zip")
     exported = _exports(answer)
-    said = [found.basis.sentence, *(f"! {text}" for text in (*(d.sentence for d in found.doubts), *found.warnings))]
-    if steps := steps_sentence(found):
-        said.append(steps)
+    said = [text for text in (steps_sentence(found),) if text]  # doubts and warnings stand on top of the report
     return {"sentence": found.sentence, "said": said, "exports": exported, "page": "report.html"}
 
 

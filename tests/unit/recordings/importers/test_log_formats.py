@@ -191,7 +191,6 @@ PARAMETERS |= {f"SERVO{n}_FUNCTION": 28 + n for n in range(5, 9)}
 
 @pytest.mark.parametrize("before_4_1", [False, True])
 def test_ardupilot(before_4_1: bool, tmp_path: Path) -> None:
-    pytest.importorskip("pymavlink")
     path, truth = tmp_path / "00000001.BIN", flown()
     path.write_bytes(dataflash(truth, PARAMETERS, before_4_1))
     found = read_log(path)
@@ -203,7 +202,6 @@ def test_ardupilot(before_4_1: bool, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("form", "order"), [(1, "ardupilot"), (12, "betaflight"), (0, "")])
 def test_the_frame_type_says_the_order_of_the_rotors(tmp_path: Path, form: int, order: str) -> None:
-    pytest.importorskip("pymavlink")
     path = tmp_path / "log.bin"
     path.write_bytes(dataflash(flown(), PARAMETERS | {"FRAME_TYPE": form}))
     found = read_log(path)
@@ -365,11 +363,20 @@ def test_a_file_that_is_cut_off_or_broken_gets_one_sentence(tmp_path: Path, head
 def test_a_missing_package_is_named_with_how_to_get_it(tmp_path: Path, monkeypatch) -> None:
     import sys
 
+    path = tmp_path / "log.bag"
+    path.write_bytes(b"#ROSBAG V2.0\n" + bytes(64))
+    for module in [m for m in sys.modules if m.split(".")[0] == "rosbags"] + ["rosbags"]:
+        monkeypatch.setitem(sys.modules, module, None)
+    refused(r"pip install 'rotorid\[ros\]'", read_log, path)
+
+
+def test_dataflash_needs_no_package_of_others(tmp_path: Path, monkeypatch) -> None:
+    import sys
+
+    monkeypatch.setitem(sys.modules, "pymavlink", None)
     path = tmp_path / "log.bin"
     path.write_bytes(dataflash(flown(), PARAMETERS))
-    for module in [m for m in sys.modules if m.split(".")[0] == "pymavlink"] + ["pymavlink"]:
-        monkeypatch.setitem(sys.modules, module, None)
-    refused(r"pip install 'rotorid\[ardupilot\]'", read_log, path)
+    assert list(read_log(path).runs) == ["log"]
 
 
 @pytest.mark.parametrize(

@@ -170,7 +170,7 @@ function answer(state) {
   return [
     title(state.name),
     el("p", { class: "headline" }, state.sentence),
-    state.said.length ? list(state.said, { class: "soft" }) : null,
+    state.said.length > 1 ? list(state.said) : state.said.length ? el("p", {}, state.said[0]) : null,
     el("p", { class: "soft" }, `It took ${Math.round(state.seconds)} s. `, el("a", { href: file(state.page), target: "_blank", rel: "noopener" }, "The report in a tab of its own")),
     el("iframe", { src: file(state.page), title: `Report on ${state.name}`, sandbox: "allow-scripts allow-popups" }),
     el("h3", {}, "Files"),
@@ -178,7 +178,7 @@ function answer(state) {
     exports.length ? el("h3", {}, "The improved vehicle for other tools") : null,
     exports.length ? el("ul", {}, exports.map((e) => el("li", {},
       el("strong", {}, e.form), ": ", e.file ? download(e.file, bytes[e.file]) : "none",
-      e.left_out.length ? el("details", {}, el("summary", {}, e.file ? "What it leaves out" : "Why"), list(e.left_out)) : null))) : null,
+      e.left_out.length ? el("details", {}, el("summary", {}, e.file ? `What it leaves out (${e.left_out.length})` : "Why"), list(e.left_out)) : null))) : null,
     el("div", { class: "actions" }, el("button", { type: "button", onclick: () => again(state) }, "Ask again with other values")),
   ].filter(Boolean);
 }
