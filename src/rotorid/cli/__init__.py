@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli import modelling, page, planning, sets, verdicts
+from rotorid.cli import histories, modelling, page, planning, sets, verdicts
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -51,6 +51,7 @@ def main(
 
 app.command("verdict")(verdicts.verdict)
 app.command("compare")(verdicts.compare)
+app.command("history")(histories.history)
 app.command("page")(page.page)
 app.command("plan")(planning.plan)
 app.command("together")(planning.together)

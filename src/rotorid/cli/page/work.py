@@ -18,8 +18,9 @@ import threading
 import time
 import warnings
 import zipfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -151,28 +152,25 @@ def _pack(folder: Path, target: Path) -> None:
 
 def _compare(folder: Path, state: dict[str, Any], say: Callable[..., None]) -> dict[str, Any]:
     """Hold the log in question against the others: what differs is said as soon as it is known."""
-    from rotorid.cli.verdicts import read
-    from rotorid.mismatch.changes import words
-    from rotorid.mismatch.changes.compare import changes_between
-    from rotorid.mismatch.changes.level_one import as_one, of_one_vehicle, seen_by
+    from rotorid.cli.verdicts import compared, words_as_json
     from rotorid.report.page import make_changes_page
 
     asked = state["in_question"]
     logs = [folder / LOGS / name for name in (*(n for n in state["logs"] if n != asked), asked)]
     answer, said = folder / ANSWER, []
-    with _heard("compare", say), warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        *known, new = of_one_vehicle(read(logs, *Wishes(**state["wishes"]).files(folder)[:4]))
-        good = as_one(known)
-        if (seen := seen_by(good, new)) is not None:
-            said = list(words.level_one_sentences(seen))
-            say(said=said)
-        found = changes_between(good, new, seen=seen)
-    text = json.dumps(words.as_json(found), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+    def tell(sentences: Sequence[str]) -> None:
+        said.extend(sentences)
+        say(said=said)
+
+    with _heard("compare on the page", say):
+        found, changed = compared(logs, tell, lambda command: nullcontext(), *Wishes(**state["wishes"]).files(folder))
+    content = {"parameters": [asdict(d) for d in changed], **words_as_json(found)}
+    text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     write_texts({answer / "changes.html": make_changes_page(found), answer / "changes.json": text})
-    explained = list(words.level_two_sentences(found))
-    first = next(iter(said or explained), "Nothing differs.")
-    return {"sentence": first, "said": [*said[1:], *explained], "exports": [], "page": "changes.html"}
+    first = next(iter(words_as_json(found)["sentences"]), "Nothing differs.")
+    said = [s for s in said if not s.startswith("What explains it comes next") and s != first]
+    return {"sentence": first, "said": said, "exports": [], "page": "changes.html"}
 
 
 def main(words: list[str]) -> None:

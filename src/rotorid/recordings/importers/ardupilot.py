@@ -606,3 +606,13 @@ def read_ardupilot(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFaul
         jumps, more = jumps | own, more + found
     runs, cuts = flights(table, flying, path.name.split(".")[0], path, jumps)
     return runs, [*faults, *more, *cuts], order
+
+
+def stated_parameters(path: Path) -> dict[str, float]:
+    """The parameters that a DataFlash log states, each as it states it first."""
+    found, _ = read_dataflash(path, ("PARM",))
+    columns = found["PARM"].columns if "PARM" in found else {}
+    if not {"Name", "Value"} <= set(columns) or columns["Value"].dtype.kind not in "if":
+        return {}
+    pairs = zip(columns["Name"].tolist(), columns["Value"].tolist(), strict=True)
+    return dict(reversed([(str(name), float(value)) for name, value in pairs if np.isfinite(value)]))

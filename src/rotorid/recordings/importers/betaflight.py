@@ -624,3 +624,24 @@ def _numbers_of(headers: Mapping[str, str], name: str) -> list[int]:
     """Whole numbers of a header's list; empty where it is not there or holds something else."""
     parts = headers.get(name, "").split(",")
     return [int(p) for p in parts] if all(re.fullmatch(r"-?\d{1,10}", p.strip()) for p in parts) else []
+
+
+_EXPORTED_LINE = re.compile(rb'^"([^"\n]{1,80})","?([^"\n]*)"?\r?$', re.MULTILINE)
+_LARGEST_HEADER = 65_536
+_NO_SETTING = re.compile(
+    r"Field .*|Product|Data version|[IP] interval|Log start.*|Craft name|Firmware.*|Board.*|P ratio"
+)
+"""Lines of a header that say how the log is laid out, or what flew: no settings."""
+
+
+def stated_parameters(path: Path) -> dict[str, str]:
+    """The settings in the header of a blackbox's first session, or of its export, as text."""
+    head = Path(path).read_bytes()[:_LARGEST_HEADER]
+    out: dict[str, str] = {}
+    for line in (_EXPORTED_LINE if head.startswith(b'"') else _HEADER_LINE).finditer(head):
+        name, value = (part.decode("utf-8", "replace").strip() for part in line.groups())
+        if name == "Product" and out:  # that of the next session
+            break
+        if not _NO_SETTING.fullmatch(name):
+            out.setdefault(name, value)
+    return out

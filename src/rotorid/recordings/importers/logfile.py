@@ -61,6 +61,7 @@ from rotorid.recordings.importers.faults import LATE_STEPS, SET_BACK, ImportFaul
 from rotorid.recordings.importers.known import Known, propose, px4_vehicle, thrust_coefficient
 from rotorid.recordings.importers.mapping import ELECTRICAL, UNITS, Mapping, read_by_mapping
 from rotorid.recordings.importers.rcbenchmark import signed_by_spin
+from rotorid.recordings.settings import Settings, write_settings
 from rotorid.recordings.tables import check_table, parquet_is_here, write_table
 from rotorid.recordings.vehicle import Vehicle
 
@@ -102,6 +103,8 @@ class _Imported:
     kind: str = "flight"
     speed_unit: str = "rad/s"
     """Unit in which the log states rotor speeds."""
+    settings: Settings = field(default_factory=dict)
+    """The autopilot's parameters, as they held for most of the flight or, where that is not told, at its start."""
 
 
 def _files_of(path: Path) -> dict[str, Path]:
@@ -182,11 +185,13 @@ def _read(path: Path, kind: str, mapping: Mapping | None) -> _Imported:
     if kind == "betaflight":
         runs, faults = betaflight.read_betaflight(path)
         axes = "body forward-left-up, turned by half a turn about x into FRD"
-        return _Imported(kind, runs, tuple(faults), axes, Known("betaflight"), speed_unit="rpm")
+        settings = betaflight.stated_parameters(path)
+        return _Imported(kind, runs, tuple(faults), axes, Known("betaflight"), speed_unit="rpm", settings=settings)
     if kind == "ardupilot":
         runs, faults, order = ardupilot.read_ardupilot(path)
         axes = "ArduPilot's: body forward-right-down, world north-east-down, as the contract's"
-        return _Imported(kind, runs, tuple(faults), axes, Known(order), speed_unit="rpm")
+        settings = ardupilot.stated_parameters(path)
+        return _Imported(kind, runs, tuple(faults), axes, Known(order), speed_unit="rpm", settings=settings)
     if kind == "ros":
         runs, faults, unit = ros.read_ros(path)
         axes = "REP 103: body forward-left-up, world z up, turned by half a turn about x into FRD and z down"
@@ -228,10 +233,11 @@ def _px4(path: Path) -> _Imported:
         table, found, flying, jumps = px4_ulog.convert(log, rotors)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    known, faults = px4_vehicle(px4_ulog.in_flight(log), rotors)
+    settings = {name: value for name, value in px4_ulog.in_flight(log).items() if isinstance(value, int | float)}
+    known, faults = px4_vehicle(settings, rotors)
     runs, cuts = flights(table, flying, path.stem, path, jumps)
     axes = "PX4's: body forward-right-down, world north-east-down, as the contract's"
-    return _Imported("px4", runs, (*found, *faults, *cuts), axes, known, speed_unit="rpm")
+    return _Imported("px4", runs, (*found, *faults, *cuts), axes, known, speed_unit="rpm", settings=settings)
 
 
 @contextmanager
@@ -375,6 +381,8 @@ class SetOfLogs:
     """To the name of a log its SHA-256."""
     kept_vehicle: bool = False
     """Whether the vehicle's text is that of a file which stays as it is."""
+    settings: Names[str, Settings] = field(default_factory=dict)
+    """To the name of a log the parameters of its autopilot."""
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -397,11 +405,13 @@ class SetOfLogs:
         if folder.is_dir():
             with staging(folder / "import") as part, only_writer(folder):
                 _add_to_set(self._write_files(part, as_csv), report, folder)
+                write_settings(folder, self.settings)
         else:
             with staging(folder) as part:
                 files = self._write_files(part, as_csv)
                 write_manifest(part, [path for path in files if path.name != VEHICLE])
                 report.write(part)
+                write_settings(part, self.settings)
                 take_name(part, folder)
 
     def _write_files(self, folder: Path, as_csv: bool) -> list[Path]:
@@ -494,9 +504,10 @@ def set_of_logs(
         text,
         (*remarks, *left_out),
         tuple(dict.fromkeys(faults)),
-        found[0].axes,
-        {name: sha256(file) for path in logs for name, file in _files_of(path).items()},
-        kept,
+        axes=found[0].axes,
+        files={name: sha256(file) for path in logs for name, file in _files_of(path).items()},
+        kept_vehicle=kept,
+        settings={path.name: imported.settings for path, imported in zip(logs, found, strict=True)},
     )
 
 

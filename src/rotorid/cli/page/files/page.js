@@ -157,7 +157,7 @@ function progress(state) {
   $("steps").replaceChildren(...seen.map((s, n) => el("li", n === seen.length - 1 ? { class: "now", "aria-current": "step" } : {}, s)));
   if ((state.said || []).length) {
     if (!$("said").hasChildNodes()) say("What differs is known.");
-    $("said").replaceChildren(el("h3", {}, "What differs"), list(state.said), el("p", { class: "soft" }, "What explains it comes next."));
+    $("said").replaceChildren(el("h3", {}, "What differs"), list(state.said));
   }
 }
 
