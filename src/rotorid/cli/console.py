@@ -174,7 +174,7 @@ def one_sentence() -> Iterator[None]:
 
 
 def sentence_of(error: Exception) -> str | None:
-    """What a person is told of an error in one sentence; None where it is to be raised as it is."""
+    """What is said of an error to a person, in one sentence; None where it is to be raised as it is."""
     if isinstance(error, InputError):
         return str(error)
     if isinstance(error, OSError):  # a full disk, a folder that cannot be written

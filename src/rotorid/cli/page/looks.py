@@ -161,7 +161,9 @@ def _can(recordings: RecordingSet, columns: Sequence[str]) -> list[str]:
     speeds = has(*c.rotor_columns("rotor_speed", count))
     drives = has(*c.rotor_columns("throttle", count)) or has(*c.rotor_columns("rotor_command", count))
     if speeds:
-        out.append("Rotor speeds are recorded: thrust, mass, battery and differences between rotors can be told apart.")
+        out.append(
+            "Rotor speeds are recorded: thrust, mass, battery and differences between rotors can be distinguished."
+        )
     if drives:
         out.append("Commands are recorded: how thrust follows them (curve, lag, delay) can be asked.")
     if has(*c.SPECIFIC_FORCE):

@@ -104,7 +104,7 @@ class _Imported:
     speed_unit: str = "rad/s"
     """Unit in which the log states rotor speeds."""
     settings: Settings = field(default_factory=dict)
-    """The autopilot's parameters, as they held for most of the flight or, where that is not told, at its start."""
+    """The autopilot's parameters, as they held for most of the flight or at its start."""
 
 
 def _files_of(path: Path) -> dict[str, Path]:
