@@ -26,13 +26,13 @@ from rotorid.cli.junit import as_junit
 from rotorid.cli.sets import Like, MappingFile, MassKg, VehicleFile, make_set, name_of, set_of
 from rotorid.errors import InputError
 from rotorid.io.text.writing import write_texts
-from rotorid.recordings.settings import Differing, Settings, differing, differing_sentences, read_settings
 from rotorid.steps import step
 
 if TYPE_CHECKING:
     from rotorid.mismatch.changes.compare import Changes
     from rotorid.mismatch.tell.verdict import Verdict
     from rotorid.recordings import RecordingSet
+    from rotorid.recordings.settings import Differing, Settings
 
 JunitFile = Annotated[Path | None, typer.Option("--junit", help="File for the checks as JUnit XML, which a CI shows.")]
 _MOST_PARAMETERS = 20
@@ -319,6 +319,8 @@ def compared(
     the explanation. `watch` gives the context, by a command's name, in which a part of the work is done and shown.
     """
     with watch("compare: what differs"):
+        from rotorid.recordings.settings import differing, differing_sentences
+
         given = read_given(paths, mass_kg, like, vehicle, mapping)
         changed = differing([own for one in given[:-1] for own in one.settings], [own for own in given[-1].settings])
         tell(differing_sentences(changed, _MOST_PARAMETERS))
@@ -391,6 +393,7 @@ def read_given(
     """
     from rotorid.recordings import read_set
     from rotorid.recordings.files import is_bag
+    from rotorid.recordings.settings import read_settings
 
     out = []
     with TemporaryDirectory() as made:
