@@ -73,7 +73,7 @@ _IMPOSSIBLE = 3.5
 _POSSIBLE = 2.2
 """Speeds of hover within this factor are."""
 _GZIP = b"\x1f\x8b"
-_WITHIN = ((b"H Product:Blackbox", "betaflight"), (b"\xa3\x95\x80\x80\x59FMT", "ardupilot"))
+_WITHIN = ((b"H Product:Blackbox", "betaflight"), (b"\xa3\x95\x80\x80\x59FMT", "ardupilot"), (px4_ulog.MAGIC, "px4"))
 """What the first lines or messages of a log hold, behind what may be left of another in the logger's memory."""
 _EPOCHS_US = (9e14, 5e15)
 """Times from 1998 to 2128 in µs, as telemetry logs of MAVLink have them before each message."""
@@ -128,7 +128,7 @@ def format_of(path: Path) -> str:
         head = file.read(4096)
     if not head:
         raise InputError(f"{path}: the file is empty")
-    if head.startswith(b"ULog\x01\x12\x35"):
+    if head.startswith(px4_ulog.MAGIC):
         return "px4"
     if crazyflie.is_log(head):
         return "crazyflie"

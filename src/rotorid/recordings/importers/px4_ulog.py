@@ -16,6 +16,7 @@ Sources: PX4 `msg/`, `src/modules/control_allocator/module.yaml`, `src/lib/mixer
 
 from __future__ import annotations
 
+import io
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -114,6 +115,8 @@ class Px4Log:
     lost_s: tuple[float, ...] = ()
     damaged: bool = False
     rest: int = 0
+    stray: int = 0
+    """Bytes in front of the header, which are no part of the log."""
 
 
 class _Subscriptions(dict):
@@ -123,6 +126,12 @@ class _Subscriptions(dict):
         if number in self:
             super().__setitem__(-1 - len(self), self[number])
         super().__setitem__(number, subscription)
+
+
+MAGIC = b"ULog\x01\x12\x35"
+"""First bytes of a ULog file."""
+_MOST_STRAY = 4096
+"""Bytes among which the header is looked for, as by whoever recognises the file."""
 
 
 class _Reader(ULog):
@@ -137,8 +146,10 @@ def open_log(path: Path) -> Px4Log:
     """Read a ULog file; InputError where it is none."""
     if not Path(path).is_file():
         raise InputError(f"{path}: file is missing")
+    data = Path(path).read_bytes()
+    stray = max(data.find(MAGIC, 0, _MOST_STRAY), 0)
     try:
-        log = _Reader(str(path))
+        log = _Reader(io.BytesIO(data[stray:]))
     except MemoryError:
         raise
     except Exception as error:
@@ -156,7 +167,8 @@ def open_log(path: Path) -> Px4Log:
         Parameters.of(changed, log.initial_parameters),
         tuple(d.duration / 1000 for d in log.dropouts),
         log.file_corruption,
-        0 if log.file_corruption else _cut_message(Path(path).read_bytes()),
+        0 if log.file_corruption else _cut_message(data[stray:]),
+        stray,
     )
 
 
@@ -652,6 +664,8 @@ def convert(log: Px4Log, rotors: int) -> tuple[pd.DataFrame, list[ImportFault], 
     jumps, reset = jumps_at(columns[c.TIME], times, JUMPED)
     faults += reset
     faults += log.parameters.faults(_CHANGED, float(grid[0]), 1e-6)
+    if log.stray:
+        faults.append(ImportFault("damaged", "", f"{log.stray} bytes stand in front of the header", "left out", 0))
     if log.rest:
         found = f"the file ends inside a message, after {log.rest} bytes of it"
         faults.append(ImportFault("cut_off", "", found, "what came before is kept; the log stopped before its end", 0))

@@ -18,6 +18,7 @@ from rotorid.recordings import columns as c
 from rotorid.recordings.importers.known import ORDERS, quad_x
 from rotorid.recordings.importers.logfile import format_of, read_log
 from tests.command_line import answer, invoke, refusal
+from tests.public_logs import public
 from tests.refusals import refused
 
 RATE_HZ, SECONDS, REST_S = 100.0, 12.0, 2.0
@@ -384,6 +385,7 @@ def test_dataflash_needs_no_package_of_others(tmp_path: Path, monkeypatch) -> No
     [
         (b"\xff" * 40 + b"H Product:Blackbox flight data recorder\n", "betaflight"),
         (bytes(7) + b"\xa3\x95\x80\x80\x59FMT\0", "ardupilot"),
+        (b"\0" + b"ULog\x01\x12\x35\x01", "px4"),
         (b"\xbc\x02\x00\x01\x00\x07\x00fixedFrequency\0", "crazyflie"),
         (b"\xbc\xff\xff\xff\xff\x07\x00\x01", None),
         ((1_700_000_000_000_000).to_bytes(8, "big") + b"\xfd" + bytes(40), None),
@@ -395,6 +397,23 @@ def test_a_format_is_recognised_by_more_than_its_first_byte(tmp_path: Path, star
         refused("not a log that rotorid knows|telemetry log of MAVLink", format_of, tmp_path / "log.dat")
     else:
         assert format_of(tmp_path / "log.dat") == name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "log",
+    ["px4-flight-review/motor_failure.ulg", "logs/ardupilot/copter-3.4_22.BIN", "logs/betaflight/shortLog.BFL"],
+)
+def test_stray_bytes_before_the_first_header_cost_nothing(tmp_path: Path, log: str) -> None:
+    whole = public(log)
+    damaged = tmp_path / whole.name
+    damaged.write_bytes(b"\0\xff\x17" + whole.read_bytes())
+    plain, found = read_log(whole), read_log(damaged)
+    assert list(found.runs) == list(plain.runs)
+    for name, table in plain.runs.items():
+        pd.testing.assert_frame_equal(found.runs[name], table)
+    if found.format == "px4":
+        assert any("3 bytes stand in front of the header" in fault.sentence for fault in found.faults)
 
 
 def test_a_folder_is_a_bag_only_with_its_metadata(tmp_path: Path) -> None:

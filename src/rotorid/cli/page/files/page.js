@@ -44,7 +44,7 @@ async function listSets() {
     const day = new Date(s.made_s * 1000).toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
     return el("li", {},
       el("button", { class: "go", type: "button", "aria-current": s.id === shownId ? "true" : null, onclick: () => open(s.id) },
-        el("strong", {}, s.name || "no log"), el("span", { class: "line" }, `${day}: ${s.sentence || WORDS[s.stage] || ""}`)),
+        el("strong", {}, s.name || "no log"), el("span", { class: "line", title: s.sentence }, `${day}: ${s.sentence || WORDS[s.stage] || ""}`)),
       el("button", { type: "button", "aria-label": `Delete ${s.name}, ${day}`, onclick: () => remove(s) }, "Delete"));
   }));
 }
@@ -145,8 +145,8 @@ function waiting(state) {
 function progress(state) {
   const now = state.now || {}, step = now.step || "";
   if (state.stage === "waiting") {
-    $("line").textContent = `Waits for its turn; ${state.before || 1} before it.`;
-    say("Waits for its turn.");
+    $("line").textContent = state.before ? `Waits for its turn; ${state.before} before it.` : "Starts now.";
+    say(state.before ? "Waits for its turn." : "Starts now.");
     return;
   }
   $("line").textContent = now.line || "Starting: the libraries take some seconds.";
@@ -213,7 +213,7 @@ function layout(rotors) {
 
 function looked(state) {
   const look = state.look, out = [title(state.name)];
-  if (state.sentence) out.push(el("p", { class: "alert" }, state.sentence));
+  if (state.sentence) out.push(el("p", { class: "alert", role: "alert" }, state.sentence));
   if (!look) {
     if (state.logs.length) out.push(el("div", { class: "actions" }, el("button", { type: "button", onclick: () => again_look(state, {}) }, "Look again")));
     return out;
