@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +75,7 @@ def look(folder: Path, logs: Sequence[Path], wishes: Wishes) -> dict[str, Any]:
     mass_kg, like, vehicle, mapping = wishes.files(folder)
     formats = [format_of(path) for path in logs]
     if mapping is None and formats[0] in ("csv", "parquet") and (guessed := _guessed(logs[0])):
-        return guessed | {"format": _FORMATS[formats[0]], "templates": _templates()}
+        return guessed | {"format": _FORMATS[formats[0]], "templates": known_templates()}
     unknown = like is None and vehicle is None and not _says_what_it_is(formats[0])
     read = read_mapping(mapping) if mapping else None
     found = set_of_logs(logs, logs[0].name.split(".")[0], mass_kg, like or (_USUAL if unknown else None), vehicle, read)
@@ -101,7 +102,7 @@ def look(folder: Path, logs: Sequence[Path], wishes: Wishes) -> dict[str, Any]:
         "mass_why": mass_why.replace(" and give --mass-kg", ""),
         "remarks": [r for r in found.remarks if r != mass_why],
         "like": like or ("" if unknown else _template_of(found.remarks)),
-        "templates": _templates(),
+        "templates": known_templates(),
         "vehicle": found.vehicle_text,
         "mapping": wishes.mapping,
         "rotors": [r.model_dump() for r in believed.rotors or ()],
@@ -126,7 +127,9 @@ def _template_of(remarks: Sequence[str]) -> str:
     return next((name for name in sorted(templates.names(), key=len, reverse=True) if name in " ".join(remarks)), "")
 
 
-def _templates() -> list[dict[str, Any]]:
+@cache
+def known_templates() -> list[dict[str, Any]]:
+    """Name and description of each template of a vehicle that flies."""
     known = {name: templates.read(name) for name in templates.names()}
     return [{"name": n, "says": f"{v.name}, {v.mass_kg:g} kg"} for n, v in known.items() if v.kind == "flight"]
 

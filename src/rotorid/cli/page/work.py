@@ -56,7 +56,16 @@ def _speaker() -> Callable[..., None]:
 
 def _looks(say: Callable[..., None]) -> None:
     """Answer requests until nobody asks."""
-    from rotorid.recordings.importers import logfile  # noqa: F401 - loaded before the first log comes
+    # Loaded before the first log comes: what importers and checks load when they need it.
+    import scipy.interpolate
+    import scipy.optimize
+    import scipy.signal
+    import scipy.sparse.linalg  # noqa: F401
+
+    from rotorid.cli.page import looks
+    from rotorid.recordings.importers import guessing, logfile  # noqa: F401
+
+    looks.known_templates()
 
     for line in sys.stdin:
         asked = json.loads(line)
