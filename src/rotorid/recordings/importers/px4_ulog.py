@@ -16,11 +16,11 @@ Sources: PX4 `msg/`, `src/modules/control_allocator/module.yaml`, `src/lib/mixer
 
 from __future__ import annotations
 
-import io
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pandas as pd
@@ -142,6 +142,14 @@ class _Reader(ULog):
         super()._load_file(*arguments, **named)
 
 
+def _read_behind(data: bytes) -> _Reader:
+    """A log that stands behind stray bytes: pyulog does not end on some damaged data that is no file of its own."""
+    with TemporaryDirectory() as folder:
+        alone = Path(folder) / "log.ulg"
+        alone.write_bytes(data)
+        return _Reader(str(alone))
+
+
 def open_log(path: Path) -> Px4Log:
     """Read a ULog file; InputError where it is none."""
     if not Path(path).is_file():
@@ -149,7 +157,7 @@ def open_log(path: Path) -> Px4Log:
     data = Path(path).read_bytes()
     stray = max(data.find(MAGIC, 0, _MOST_STRAY), 0)
     try:
-        log = _Reader(io.BytesIO(data[stray:]))
+        log = _Reader(str(path)) if not stray else _read_behind(data[stray:])
     except MemoryError:
         raise
     except Exception as error:
