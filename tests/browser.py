@@ -7,6 +7,7 @@ import json
 import os
 import shutil
 import subprocess
+import time
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -84,12 +85,16 @@ class Browser:
 
     def open(self, page: Path, width: int, height: int = 900, dark: bool = False) -> None:
         """Show a file at a width in CSS pixels."""
+        self.visit(page.resolve().as_uri(), width, height, dark)
+
+    def visit(self, address: str, width: int, height: int = 900, dark: bool = False) -> None:
+        """Show an address at a width in CSS pixels."""
         self.do("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         self.do("Emulation.setEmulatedMedia", features=[scheme])
         self._events.clear()
-        self.do("Page.navigate", url=page.resolve().as_uri())
-        while "Page.loadEventFired" not in self._events:
+        loads = "loaderId" in self.do("Page.navigate", url=address)  # not where only the part behind '#' is another
+        while loads and "Page.loadEventFired" not in self._events:
             self._note(self._message())
 
     def value(self, script: str) -> Any:
@@ -99,10 +104,26 @@ class Browser:
             raise RuntimeError(answer["exceptionDetails"]["exception"].get("description", "error in the page"))
         return answer["result"].get("value")
 
+    def wait_for(self, script: str, patience_s: float = PATIENCE_S) -> None:
+        """Wait until an expression is true in the page; TimeoutError with what is to be read there."""
+        until = time.monotonic() + patience_s
+        while not self.value(f"Boolean({script})"):
+            if time.monotonic() > until:
+                raise TimeoutError(f"{script}: {self.value('document.body.innerText')[:2000]}")
+            time.sleep(0.05)
+
+    def give_files(self, selector: str, *paths: Path) -> None:
+        """Choose files in an input for files, as a person does in its dialogue."""
+        root = self.do("DOM.getDocument")["root"]["nodeId"]
+        node = self.do("DOM.querySelector", nodeId=root, selector=selector)["nodeId"]
+        self.do("DOM.setFileInputFiles", nodeId=node, files=[str(path) for path in paths])
+
     def press(self, key: str) -> None:
         """A key, as `Tab`, `ArrowLeft` or `+`."""
-        printed = {"text": key} if len(key) == 1 else {}
-        code = {"Tab": 9, "ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40, " ": 32}.get(key, 0)
+        printed = {"text": "\r" if key == "Enter" else key} if len(key) == 1 or key == "Enter" else {}
+        code = {"Tab": 9, "Enter": 13, "ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40, " ": 32}.get(
+            key, 0
+        )
         for kind in ("keyDown", "keyUp"):
             self.do("Input.dispatchKeyEvent", type=kind, key=key, windowsVirtualKeyCode=code, **printed)
 

@@ -18,7 +18,7 @@ from rotorid.recordings.importers.mapping import read_columns
 from tests.forked import Commands, commands
 from tests.fuzz.foreign import SOUND, look, sound
 
-NEEDS = {"log.bin": "pymavlink", "log.bag": "rosbags", "log.mcap": "rosbags"}
+NEEDS = {"log.bag": "rosbags", "log.mcap": "rosbags"}
 SLOW = ("log.bag", "log.mcap")
 DAMAGE = Path(__file__).parent / "damage"
 """What was found to end in a traceback, one file each."""

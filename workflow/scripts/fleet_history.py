@@ -5,14 +5,11 @@
 """
 
 import re
-import tempfile
 from pathlib import Path
 
-import pandas as pd
-
 from rotorid.report import log
-from rotorid.report.fleet import history, make_vehicle_page, sets_of_vehicles
-from rotorid.report.plots.mismatch import draw_history, draw_vehicle
+from rotorid.report.fleet import history, sets_of_vehicles, vehicle_page
+from rotorid.report.plots.mismatch import draw_history
 
 
 def main(folders: list[str], good: int, numbers: str, events: str, figure: str, pages: str) -> None:
@@ -24,22 +21,13 @@ def main(folders: list[str], good: int, numbers: str, events: str, figure: str, 
     draw_history(rows, found, Path(figure))
     Path(pages).mkdir(parents=True, exist_ok=True)
     for number, (vehicle, own) in enumerate(rows.groupby("vehicle", sort=False)):
-        write_page(
-            vehicle, own, found[found["vehicle"] == vehicle], Path(pages) / f"{number:04d}-{file_of(vehicle)}.html"
-        )
+        page = vehicle_page(vehicle, own, found[found["vehicle"] == vehicle])
+        (Path(pages) / f"{number:04d}-{file_of(vehicle)}.html").write_text(page, encoding="utf-8")
 
 
 def file_of(vehicle: str) -> str:
     """A vehicle's name as part of a file's."""
     return re.sub(r"[^A-Za-z0-9-]+", "-", vehicle).strip("-")[:60]
-
-
-def write_page(vehicle: str, numbers: pd.DataFrame, events: pd.DataFrame, page: Path) -> None:
-    """Write the page of one vehicle."""
-    with tempfile.TemporaryDirectory() as folder:
-        figure = Path(folder) / "figure.svg"
-        draw_vehicle(numbers, events, figure)
-        page.write_text(make_vehicle_page(vehicle, numbers, events, figure), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli import modelling, planning, sets, verdicts
+from rotorid.cli import histories, modelling, page, planning, sets, verdicts
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -20,6 +20,7 @@ app = typer.Typer(
         "`rotorid import flight.ulg --mass-kg 1.52 -o flights`  a recording set of your logs\n\n"
         "`rotorid check flights`  what is in it, what it lacks, what looks wrong\n\n"
         "`rotorid verdict flights`  what the believed vehicle leaves out, and a better one\n\n"
+        "Or `rotorid page`: the same in a browser, on this computer.\n\n"
         "Exit codes: 0 done, whatever the verdict says; 1 something in your files must be mended (one sentence says "
         "what); 2 the command itself was not understood."
     ),
@@ -50,6 +51,8 @@ def main(
 
 app.command("verdict")(verdicts.verdict)
 app.command("compare")(verdicts.compare)
+app.command("history")(histories.history)
+app.command("page")(page.page)
 app.command("plan")(planning.plan)
 app.command("together")(planning.together)
 app.command("import")(sets.import_logs)

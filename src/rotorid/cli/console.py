@@ -161,25 +161,28 @@ def one_sentence() -> Iterator[None]:
     """Bad input, and what nobody foresaw, end the command with one sentence and exit code 1, without a traceback."""
     try:
         yield
-    except InputError as error:
-        typer.echo(f"rotorid: {error}", err=True)
-        raise typer.Exit(1) from None
-    except OSError as error:  # a full disk, a folder that cannot be written
-        if error.errno is None or error.errno == errno.EPIPE:
-            raise
-        where = f"{error.filename}: " if error.filename else ""
-        typer.echo(f"rotorid: {where}{(error.strerror or str(error)).lower()}", err=True)
-        raise typer.Exit(1) from None
     except KeyboardInterrupt:
         typer.echo("rotorid: stopped; nothing is left half written", err=True)
         raise typer.Exit(INTERRUPTED) from None
     except typer.Exit:
         raise
     except Exception as error:
-        if os.environ.get(TRACEBACK):
+        if (said := sentence_of(error)) is None:
             raise
-        typer.echo(f"rotorid: {_unexpected(error)}", err=True)
+        typer.echo(f"rotorid: {said}", err=True)
         raise typer.Exit(1) from None
+
+
+def sentence_of(error: Exception) -> str | None:
+    """What is said of an error to a person, in one sentence; None where it is to be raised as it is."""
+    if isinstance(error, InputError):
+        return str(error)
+    if isinstance(error, OSError):  # a full disk, a folder that cannot be written
+        if error.errno is None or error.errno == errno.EPIPE:
+            return None
+        where = f"{error.filename}: " if error.filename else ""
+        return f"{where}{(error.strerror or str(error)).lower()}"
+    return None if os.environ.get(TRACEBACK) else _unexpected(error)
 
 
 def _unexpected(error: Exception) -> str:

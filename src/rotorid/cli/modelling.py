@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 def model(
     paths: Annotated[list[Path], typer.Argument(metavar="SET|LOG", help="A recording set, or logs of one vehicle.")],
     to: Annotated[
-        str, typer.Option("--to", help="px4-sih, sdf, ardupilot-json, mjcf, rotorpy or gym-pybullet-drones.")
+        str, typer.Option("--to", help="px4-sih, sdf, ardupilot-json, mjcf, rotorpy, gym-pybullet-drones or crazyflow.")
     ],
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for all of it; default NAME-FORM.")] = None,
     mass_kg: MassKg = None,
@@ -170,7 +170,10 @@ def fly(
 def export(
     vehicle_file: Annotated[Path, typer.Argument(metavar="VEHICLE", help="vehicle.yaml or improved_vehicle.yaml.")],
     to: Annotated[
-        str, typer.Option("--to", help="rotorpy, mjcf, sdf, gym-pybullet-drones, px4, px4-sih or ardupilot-json.")
+        str,
+        typer.Option(
+            "--to", help="rotorpy, mjcf, sdf, gym-pybullet-drones, px4, px4-sih, ardupilot-json or crazyflow."
+        ),
     ],
     out: Annotated[Path | None, typer.Option("--out", "-o", help="File to write; default by the form.")] = None,
 ) -> None:

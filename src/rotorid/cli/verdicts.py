@@ -7,23 +7,38 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import time
 import warnings
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
+from statistics import median
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rotorid.cli.console import one_sentence, progress
+from rotorid.cli.console import keep, one_sentence, progress, read_record
+from rotorid.cli.junit import as_junit
 from rotorid.cli.sets import Like, MappingFile, MassKg, VehicleFile, make_set, name_of, set_of
 from rotorid.errors import InputError
 from rotorid.io.text.writing import write_texts
 from rotorid.steps import step
 
 if TYPE_CHECKING:
+    from rotorid.mismatch.changes.compare import Changes
     from rotorid.mismatch.tell.verdict import Verdict
     from rotorid.recordings import RecordingSet
+    from rotorid.recordings.settings import Differing, Settings
+
+JunitFile = Annotated[Path | None, typer.Option("--junit", help="File for the checks as JUnit XML, which a CI shows.")]
+_MOST_PARAMETERS = 20
+"""Parameters that differ and are printed, each in a line."""
+_PACE, _LATEST, _USUAL_PACE = "compare: pace", 5, 2.0
+"""Name under which the pace of comparisons is kept, how many count, and seconds that a second of recording takes."""
 
 
 def verdict(
@@ -51,6 +66,7 @@ def verdict(
     max_unexplained: Annotated[
         str, typer.Option("--max-unexplained", help="With --ci: largest share that may stay unexplained, 20% or 0.2.")
     ] = "100%",
+    junit: JunitFile = None,
     no_doubts: Annotated[
         bool, typer.Option("--no-doubts", help="With --ci: no doubt about the set, and no warning, is let pass.")
     ] = False,
@@ -99,6 +115,9 @@ def verdict(
                 typer.echo(steps)
             others = ", ".join(sorted(p.name for p in target.iterdir() if p.suffix in (".json", ".yaml")))
             typer.echo(f"{target / 'report.html'} (and {others}), {time.monotonic() - start:.0f} s")
+        if junit is not None:
+            cases = checks_of(found, limit, no_doubts)
+            write_texts({junit: as_junit(f"verdict {folder.name}", cases, time.monotonic() - start)})
         faults = faults_of(found, limit, no_doubts) if ci else []
         for fault in faults:
             typer.echo(f"ci: {fault}", err=True)
@@ -118,15 +137,23 @@ def share_of(text: str) -> float:
     return share
 
 
+def checks_of(verdict: Verdict, most: float, no_doubts: bool) -> dict[str, list[str]]:
+    """What a regression test of an airframe asks of a verdict, each with the sentences by which it fails."""
+    share = verdict.unexplained.share
+    over = [f"{100 * share:.0f} % stays unexplained, more than {100 * most:.0f} %"] if share > most else []
+    out = {
+        "the set is judged": ["the set is not judged"] if verdict.verdict == "not_judged" else [],
+        f"at most {100 * most:.0f} % stays unexplained": over,
+    }
+    if no_doubts:
+        out |= {"no doubt about the set": [d.sentence for d in verdict.doubts]}
+        out |= {"no warning": list(verdict.warnings)}
+    return out
+
+
 def faults_of(verdict: Verdict, most: float, no_doubts: bool) -> list[str]:
     """Why a verdict fails as a regression test of an airframe, one sentence each."""
-    out = ["the set is not judged"] if verdict.verdict == "not_judged" else []
-    share = verdict.unexplained.share
-    if share > most:
-        out.append(f"{100 * share:.0f} % stays unexplained, more than {100 * most:.0f} %")
-    if no_doubts:
-        out += [d.sentence for d in verdict.doubts] + list(verdict.warnings)
-    return out
+    return [sentence for sentences in checks_of(verdict, most, no_doubts).values() for sentence in sentences]
 
 
 def deliver_set(folder: Path, target: Path, quiet: bool, series: bool = False) -> Verdict:
@@ -134,12 +161,18 @@ def deliver_set(folder: Path, target: Path, quiet: bool, series: bool = False) -
 
     With `series` the residuals are written, too, as `series.parquet` and for the viewers whose packages are installed.
     """
+    with progress("verdict", quiet):
+        return write_verdict(folder, target, series)
+
+
+def write_verdict(folder: Path, target: Path, series: bool = False) -> Verdict:
+    """`deliver_set` without showing how far it is; who listens to `rotorid.steps` hears it."""
     from rotorid.recordings.tables import NO_PARQUET, parquet_is_here, write_table
 
     if series and not parquet_is_here():
         raise InputError(f"{target / 'series.parquet'}: {NO_PARQUET}")
     # What a module warns of goes to no log here; the verdict itself says what a reader must know.
-    with progress("verdict", quiet), warnings.catch_warnings():
+    with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         from rotorid.recordings import read_set
 
@@ -187,6 +220,7 @@ def compare(
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
     ci: Annotated[bool, typer.Option("--ci", help="Exit code 1 where a change is stated (probability 0.99).")] = False,
+    junit: JunitFile = None,
     mass_kg: MassKg = None,
     like: Like = None,
     vehicle: VehicleFile = None,
@@ -194,7 +228,8 @@ def compare(
 ) -> None:
     """Say what differs from the sets that were good, then what changed, and by how much at most everything else.
 
-    What differs is stated within seconds and without a cause: trims, each rotor's share of the thrust, sensors, noise.
+    First the autopilot's parameters that differ, where the logs state them. What differs in flight is stated within
+    seconds and without a cause: trims, each rotor's share of the thrust, sensors, noise. Then what explains it.
 
     Flights of one vehicle, or recordings of one stand or bench: there the answer is whether to calibrate it again.
     Each set is held against its own vehicle.yaml: what was changed on purpose and is written there is no change. With
@@ -213,71 +248,180 @@ def compare(
     `rotorid compare bench-after-calibration bench-today`
 
     `rotorid compare good.ulg today.ulg --vehicle vehicle.yaml`
+
+    `rotorid compare 'log.bin#1' 'log.bin#3'`, two flights of one log
     """
     with one_sentence():
         if len(sets) < 2:
             raise InputError(
                 f"{sets[0]}: nothing to compare it with; expected two sets or more, the last one in question"
             )
-        with progress("compare: what differs", quiet):
-            from rotorid.mismatch.changes.level_one import as_one, of_one_vehicle, seen_by
-            from rotorid.mismatch.changes.words import level_one_sentences
-
-            *known, second = of_one_vehicle(read(sets, mass_kg, like, vehicle, mapping))
-            good = as_one(known)
-            seen = seen_by(good, second)
-        # What cannot be wrong comes first, and before the minutes that its explanation takes.
-        if seen is not None and not as_json:
-            for line in level_one_sentences(seen):
-                typer.echo(line)
-        with progress("compare", quiet), step("comparing"):
-            from rotorid.mismatch.changes import words
-            from rotorid.mismatch.changes.compare import changes_between
-
-            found = changes_between(good, second, seen=seen)
-        text = json.dumps(words.as_json(found), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+        start = time.monotonic()
+        watch = partial(progress, quiet=quiet)
+        found, changed = compared(sets, _said(as_json), watch, mass_kg, like, vehicle, mapping)
+        content = {"parameters": [asdict(d) for d in changed], **words_as_json(found)}
+        text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
         texts = {} if out is None else {out: text}
         if page is not None:
             from rotorid.report.page import make_changes_page
 
             texts[page] = make_changes_page(found)
+        if junit is not None:
+            texts[junit] = as_junit(f"compare {found.new}", _cases_of(found, changed), time.monotonic() - start)
         if texts:
             write_texts(texts)
         if as_json:
             typer.echo(text, nl=False)
-        else:
-            for line in words.level_two_sentences(found):
-                typer.echo(line)
     differs = found.level_1 is not None and bool(found.level_1.stated)
     if ci and (differs or any(c.status in ("established", "ambiguous") for c in found.changes)):
         raise typer.Exit(1)
 
 
+def _said(as_json: bool) -> Callable[[Sequence[str]], None]:
+    """What is done with sentences as they become known."""
+    return lambda lines: None if as_json else [typer.echo(line) for line in lines] and None
+
+
+def words_as_json(found: Changes) -> dict:
+    """The comparison as JSON's values."""
+    from rotorid.mismatch.changes import words
+
+    return words.as_json(found)
+
+
+def _cases_of(found: Changes, changed: Sequence[Differing]) -> dict[str, list[str]]:
+    """Cases of a test: each quantity of level 1, each change that is stated, the autopilot's parameters (which fail
+    nothing: they were set on purpose)."""
+    from rotorid.mismatch.changes import words
+
+    out: dict[str, list[str]] = {f"parameter {d.name} differs": [] for d in changed if d.good and d.new}
+    if found.level_1 is not None:
+        for d in found.level_1.differences:
+            out[f"unchanged: {words.quantity_words(d)}"] = [words.difference_words(d)] if d.stated else []
+    for change in found.changes:
+        if change.status in ("established", "ambiguous"):
+            out[f"unchanged: {words.name_words(change.id)}"] = [words.change_words(change)]
+    return out
+
+
+def compared(
+    paths: Sequence[Path],
+    tell: Callable[[Sequence[str]], None],
+    watch: Callable[[str], AbstractContextManager],
+    mass_kg: float | None = None,
+    like: str | None = None,
+    vehicle: Path | None = None,
+    mapping: Path | None = None,
+) -> tuple[Changes, tuple[Differing, ...]]:
+    """What changed from all sets and logs but the last one to it, and the autopilot's parameters that differ.
+
+    `tell` gets sentences as soon as they are known: parameters, what differs, how long its explanation will take, and
+    the explanation. `watch` gives the context, by a command's name, in which a part of the work is done and shown.
+    """
+    with watch("compare: what differs"):
+        from rotorid.recordings.settings import differing, differing_sentences
+
+        given = read_given(paths, mass_kg, like, vehicle, mapping)
+        changed = differing([own for one in given[:-1] for own in one.settings], [own for own in given[-1].settings])
+        tell(differing_sentences(changed, _MOST_PARAMETERS))
+        from rotorid.mismatch.changes.level_one import as_one, of_one_vehicle, seen_by
+        from rotorid.mismatch.changes.words import level_one_sentences
+
+        *known, second = of_one_vehicle([one.recordings for one in given])
+        good = as_one(known)
+        seen = seen_by(good, second)
+    # What cannot be wrong comes first, and before the minutes that its explanation takes.
+    flown_s = sum(float(run.time_s[-1] - run.time_s[0]) for own in (good, second) for run in own.runs)
+    if seen is not None:
+        tell([*level_one_sentences(seen), explanation_takes(flown_s)])
+    began = time.monotonic()
+    with watch("compare"), step("comparing"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from rotorid.mismatch.changes.compare import changes_between
+        from rotorid.mismatch.changes.words import level_two_sentences
+
+        found = changes_between(good, second, seen=seen)
+    keep(_PACE, [("s a second of recording", (time.monotonic() - began) / max(flown_s, 1.0))])
+    tell(level_two_sentences(found))
+    return found, changed
+
+
+def explanation_takes(flown_s: float) -> str:
+    """How long level 2 will take: by the latest comparisons on this computer, else by those of an idle one."""
+    paces = [seconds for run in read_record().get(_PACE, []) for _, seconds in run][-_LATEST:]
+    likely_s = flown_s * (median(paces) if paces else _USUAL_PACE)
+    shown = f"{max(likely_s, 10.0):.0f} s" if likely_s < 95 else f"{likely_s / 60:.0f} min"
+    by = "by the last comparisons on this computer" if paces else "if this computer is like the one it was measured on"
+    return f"What explains it comes next, in about {shown} ({by})."
+
+
+@dataclass(frozen=True)
+class Given:
+    """A set that a command was given, or that was made of a log."""
+
+    recordings: RecordingSet
+    settings: tuple[Settings, ...]
+    """Parameters of the autopilot, one entry a log; empty where they are not known."""
+
+
 def read(
-    paths: list[Path],
+    paths: Sequence[Path],
     mass_kg: float | None = None,
     like: str | None = None,
     vehicle: Path | None = None,
     mapping: Path | None = None,
 ) -> list[RecordingSet]:
+    """The sets of folders and logs, as `read_given`."""
+    return [one.recordings for one in read_given(paths, mass_kg, like, vehicle, mapping)]
+
+
+def read_given(
+    paths: Sequence[Path],
+    mass_kg: float | None = None,
+    like: str | None = None,
+    vehicle: Path | None = None,
+    mapping: Path | None = None,
+) -> list[Given]:
     """The sets of folders and logs, each log a set of its own; all logs have one vehicle.
+
+    `log.bin#2` is the second flight in a log, `set#2` the second run of a set, as `rotorid import` lists them.
 
     Raises
     ------
     InputError
-        A path is neither.
+        A path is neither, or has no such flight.
     """
     from rotorid.recordings import read_set
     from rotorid.recordings.files import is_bag
+    from rotorid.recordings.settings import read_settings
 
     out = []
     with TemporaryDirectory() as made:
-        for path in paths:
+        sets: dict[Path, Path] = {}
+        for whole in paths:
+            path, number = one_flight(whole)
             if path.is_dir() and not is_bag(path):
-                out.append(read_set(path))
-                continue
-            folder = Path(made) / str(len(out)) / path.stem
-            make_set([path], folder, mass_kg, like, vehicle, mapping)
-            out.append(read_set(folder))
-            vehicle, mass_kg, like = folder / "vehicle.yaml", None, None
+                folder = path
+            elif (folder := sets.get(path)) is None:
+                folder = sets[path] = Path(made) / str(len(sets)) / path.stem
+                make_set([path], folder, mass_kg, like, vehicle, mapping)
+                vehicle, mass_kg, like = folder / "vehicle.yaml", None, None
+            found = read_set(folder)
+            if number is not None:
+                if not 1 <= number <= len(found.runs):
+                    names = ", ".join(run.name for run in found.runs)
+                    raise InputError(
+                        f"{whole}: has {len(found.runs)} flights ({names}), expected #1 to #{len(found.runs)}"
+                    )
+                name = f"{found.name}#{number}"
+                found = replace(found, name=name, runs=(found.runs[number - 1],), held_out=None)
+            out.append(Given(found, tuple(read_settings(folder).values())))
         return out
+
+
+def one_flight(path: Path) -> tuple[Path, int | None]:
+    """A path and the number of the flight that `#2` behind it asks for; None where it asks for all."""
+    asked = re.fullmatch(r"(.+)#(\d{1,6})", path.name)
+    if asked is None or path.exists():
+        return path, None
+    return path.with_name(asked[1]), int(asked[2])

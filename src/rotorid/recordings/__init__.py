@@ -34,6 +34,7 @@ OPEN = (
     "importers.public_sets",
     "mended",
     "run",
+    "settings",
     "signal",
     "signal.*",
     "sufficient",

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.signal import fftconvolve
+import scipy
 
 from rotorid.io.text.wording import listed
 from rotorid.recordings import columns as c
@@ -370,7 +370,7 @@ def _lies_in(block: np.ndarray, noise: np.ndarray) -> bool:
             continue
         total = np.concatenate([[0.0], np.cumsum(other**2)])
         there = total[_BLOCK:] - total[:-_BLOCK]
-        product = fftconvolve(other, own[::-1], mode="valid")
+        product = scipy.signal.fftconvolve(other, own[::-1], mode="valid")
         # Where the other run stands still there is no noise to compare.
         alike += (there > 0.01 * energy) & (product > _SAME_NOISE * np.sqrt(energy * np.maximum(there, 0.0)))
     return bool((alike >= _LEAST_NOISY).any())

@@ -27,10 +27,7 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
-from scipy.integrate import cumulative_trapezoid
-from scipy.interpolate import BSpline, make_interp_spline
-from scipy.sparse import diags, eye_array
-from scipy.sparse.linalg import spsolve
+import scipy
 from scipy.spatial.transform import Rotation
 
 from rotorid.io.text.wording import listed
@@ -159,7 +156,7 @@ def _with_slow_joined(recordings: RecordingSet, rotors: Collection[tuple[str, ..
                 own = rows[max(start - 1, 0) : stop]
                 if len(own) > _SMOOTH_DEGREE:
                     inside = np.arange(own[0], own[-1] + 1)
-                    curve = make_interp_spline(run.time_s[own], values[own], _SMOOTH_DEGREE)
+                    curve = scipy.interpolate.make_interp_spline(run.time_s[own], values[own], _SMOOTH_DEGREE)
                     out[inside] = curve(run.time_s[inside])
             lowest = 0.0 if np.nanmin(values) >= 0 else -np.inf
             table = run.table.assign(**dict(zip(names, np.maximum(out, lowest).T, strict=True)))
@@ -315,20 +312,22 @@ def _on_lines(time_s: np.ndarray, values: np.ndarray, at_s: np.ndarray, step_s: 
     return np.where(last - first > 1, means_of(values, first, last), np.interp(at_s, time_s, values))
 
 
-def _spline(time_s: np.ndarray, values: np.ndarray, period_s: float) -> BSpline:
+def _spline(time_s: np.ndarray, values: np.ndarray, period_s: float) -> scipy.interpolate.BSpline:
     """The cubic least-squares spline through readings (n,) whose knots are a period apart."""
     count = int(np.ceil((time_s[-1] - time_s[0]) / period_s)) + 1
     knots = time_s[0] + period_s * np.arange(-_CUBIC, count + _CUBIC)
     # A whole number of periods may end, by rounding, a hair before the last reading.
-    design = BSpline.design_matrix(np.minimum(time_s, knots[-_CUBIC - 1]), knots, _CUBIC)
+    design = scipy.interpolate.BSpline.design_matrix(np.minimum(time_s, knots[-_CUBIC - 1]), knots, _CUBIC)
     size = design.shape[1]
-    difference = eye_array(size, format="csr")
+    difference = scipy.sparse.eye_array(size, format="csr")
     for n in range(_CUBIC):
-        difference = diags([-1.0, 1.0], [0, 1], shape=(size - n - 1, size - n)) @ difference
+        difference = scipy.sparse.diags([-1.0, 1.0], [0, 1], shape=(size - n - 1, size - n)) @ difference
     normal = design.T @ design
     weight = _STIFFNESS * normal.diagonal().mean()
-    found = spsolve((normal + weight * difference.T @ difference).tocsc(), design.T @ (values - values.mean()))
-    return BSpline(knots, found + values.mean(), _CUBIC)
+    found = scipy.sparse.linalg.spsolve(
+        (normal + weight * difference.T @ difference).tocsc(), design.T @ (values - values.mean())
+    )
+    return scipy.interpolate.BSpline(knots, found + values.mean(), _CUBIC)
 
 
 def on_one_side(quaternion: np.ndarray) -> np.ndarray:
@@ -468,7 +467,7 @@ def _excess(run: Run, names: tuple[str, ...], time_s: np.ndarray, values: np.nda
         return steps.as_rotvec(), _LEAST_JUMP_RAD, _FASTEST_RAD_S, steps.as_rotvec()
     rates = run.array(c.ANGULAR_VELOCITY)
     known = np.isfinite(rates).all(axis=1)
-    total = cumulative_trapezoid(rates[known], run.time_s[known], axis=0, initial=0)
+    total = _integrated(rates[known], run.time_s[known])
     turned = np.column_stack([np.interp(time_s, run.time_s[known], column) for column in total.T])
     excess = (Rotation.from_rotvec(np.diff(turned, axis=0)).inv() * steps).as_rotvec()
     return steps.as_rotvec(), _LEAST_JUMP_RAD, 0.0, excess
@@ -563,3 +562,9 @@ def lost_speed(speed_rad_s: np.ndarray, thrust_n: np.ndarray) -> np.ndarray:
         return turning
     ratio = np.where(turning, thrust_n, 0.0) / np.where(turning, speed_rad_s, 1.0) ** 2
     return turning & (ratio > _TOO_SLOW * np.median(ratio[turning]))
+
+
+def _integrated(values: np.ndarray, time_s: np.ndarray) -> np.ndarray:
+    """Integral over time of columns (n, k) from the first sample on, by trapezoids (scipy would take time to load)."""
+    steps = np.diff(time_s)[:, None] * (values[1:] + values[:-1]) / 2.0
+    return np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(steps, axis=0)])

@@ -14,7 +14,7 @@ from dataclasses import replace
 from difflib import get_close_matches
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 from scipy.spatial.transform import Rotation
 
 from rotorid.io.text.wording import listed
@@ -428,7 +428,7 @@ def _command_order(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Do
     if known.sum() < 100 or not all((own.std(axis=0) > 0).all() for own in apart):
         return
     alike = np.corrcoef(*(own.T for own in apart))[: vehicle.rotor_count, vehicle.rotor_count :]
-    _, follows = linear_sum_assignment(alike, maximize=True)
+    _, follows = scipy.optimize.linear_sum_assignment(alike, maximize=True)
     wrong = [i for i, k in enumerate(follows) if i != k]
     if (
         wrong

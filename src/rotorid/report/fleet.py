@@ -19,6 +19,7 @@ import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pandas as pd
@@ -268,6 +269,16 @@ def _vehicle(folder: Path) -> str:
         return str(read_yaml(folder / "vehicle.yaml")["name"])
     except (InputError, KeyError):
         return folder.name
+
+
+def vehicle_page(vehicle: str, numbers: pd.DataFrame, events: pd.DataFrame) -> str:
+    """The page of one vehicle with its figure, from its rows of the tables of `history`."""
+    from rotorid.report.plots.mismatch import draw_vehicle
+
+    with TemporaryDirectory() as folder:
+        figure = Path(folder) / "figure.svg"
+        draw_vehicle(numbers, events, figure)
+        return make_vehicle_page(vehicle, numbers, events, figure)
 
 
 def make_vehicle_page(vehicle: str, numbers: pd.DataFrame, events: pd.DataFrame, figure: Path) -> str:

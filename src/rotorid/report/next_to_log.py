@@ -319,5 +319,6 @@ FLYERS: dict[str, tuple[str, str, Callable[[Vehicle, Exported, Sequence[LogWindo
     "mjcf": ("MuJoCo", "mujoco", _in_mujoco),
     "sdf": ("our simulator with what the SDF file expresses", "", as_expressed("sdf")),
     "gym-pybullet-drones": ("our simulator with what the URDF expresses", "", as_expressed("gym-pybullet-drones")),
+    "crazyflow": ("our simulator with what crazyflow's section expresses", "", as_expressed("crazyflow")),
 }
 """By form what flies it, the package that must be there, and the flight."""

@@ -2,15 +2,19 @@
 
 import json
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
+from rotorid.cli.console import keep
+from rotorid.cli.junit import as_junit
 from rotorid.cli.modelling import fly
-from rotorid.cli.verdicts import read
+from rotorid.cli.verdicts import explanation_takes, one_flight, read
 from rotorid.errors import InputError
 from rotorid.recordings import read_set, templates
 from tests.command_line import answer, invoke
 from tests.refusals import refused
+from tests.unit.recordings.importers.test_log_formats import PARAMETERS, dataflash, flown
 
 
 @pytest.fixture(scope="module")
@@ -58,10 +62,76 @@ def test_a_difference_without_a_name_fails_a_regression_test(logs: list[Path], t
     speeds = [name for name in table if name.startswith("rotor_") and "_2_" in name]
     weak = tmp_path / "weak.csv"
     table.assign(**{name: 1.15 * table[name] for name in speeds}).to_csv(weak, index=False)
-    done = invoke("compare", logs[0], weak, "--like", "thesis", "--mass-kg", "0.652", "-q", "--ci")
+    report = tmp_path / "changes.xml"
+    done = invoke("compare", logs[0], weak, "--like", "thesis", "--mass-kg", "0.652", "-q", "--ci", "--junit", report)
     assert done.exit_code == 1 and "Rotor 2 is asked for" in done.output
+    root = ElementTree.parse(report).getroot()
+    failed = [case for case in root.iter("testcase") if case.find("failure") is not None]
+    assert int(root.get("failures")) == len(failed) and int(root.get("tests")) > len(failed) > 0
+    share = next(case for case in failed if case.get("name") == "unchanged: thrust asked of rotor 2 (%)")
+    assert "Rotor 2 is asked for" in share.find("failure").get("message")
 
 
 def test_one_set_or_no_set_is_one_sentence(logs: list[Path]) -> None:
     assert "nothing to compare it with" in invoke("compare", logs[0]).output
     refused("nowhere", read, [Path("nowhere"), logs[0]])
+
+
+def test_the_time_of_the_explanation_is_said_before_it_is_sought(logs: list[Path], tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr("rotorid.cli.console.record_file", lambda: tmp_path / "waiting.json")
+    assert "if this computer is like" in explanation_takes(60.0) and "about 2 min" in explanation_takes(60.0)
+    for pace in (0.5, 0.4, 0.6):
+        keep("compare: pace", [("s a second of recording", pace)])
+    assert explanation_takes(60.0).startswith("What explains it comes next, in about 30 s (by the last comparisons")
+
+    def stopped(*args, **options):
+        raise InputError("the explanation was sought")
+
+    monkeypatch.setattr("rotorid.mismatch.changes.compare.changes_between", stopped)
+    done = invoke("compare", *logs, "--like", "thesis", "--mass-kg", "0.652", "-q")
+    assert done.output.index("What explains it comes next, in about") < done.output.index("the explanation was sought")
+
+
+def test_a_flight_inside_a_log_or_set_is_asked_for_by_its_number(logs: list[Path], tmp_path: Path) -> None:
+    folder = fly(templates.read("thesis"), tmp_path / "flights", 12.0, 3, 1)
+    first, third = read([Path(f"{folder}#1"), Path(f"{folder}#3")])
+    assert (first.name, third.name) == ("flights#1", "flights#3")
+    assert [run.name for run in third.runs] == [read_set(folder).runs[2].name]
+    refused("has 3 flights .* expected #1 to #3", read, [Path(f"{folder}#4")])
+    odd = tmp_path / "odd#2"
+    odd.mkdir()
+    assert one_flight(odd) == (odd, None)  # a name that is there is meant
+    only = read([Path(f"{logs[0]}#1"), Path(f"{logs[0]}#1")], mass_kg=0.652, like="thesis")
+    assert [own.name for own in only] == ["monday#1", "monday#1"]
+
+
+def test_parameters_of_the_autopilot_that_differ_are_said_first(tmp_path: Path, monkeypatch) -> None:
+    good, new = tmp_path / "good.bin", tmp_path / "new.bin"
+    good.write_bytes(dataflash(flown(), PARAMETERS | {"ATC_RAT_RLL_P": 0.135, "STAT_FLTTIME": 9, "OLD": 1}))
+    new.write_bytes(dataflash(flown(), PARAMETERS | {"ATC_RAT_RLL_P": 0.18, "STAT_FLTTIME": 99, "NEW": 1}))
+
+    def stopped(*args, **options):
+        raise InputError("what differs in flight was sought")
+
+    monkeypatch.setattr("rotorid.mismatch.changes.level_one.seen_by", stopped)
+    for sets in ((good, new), tuple(made(path) for path in (good, new))):  # logs, and sets that were made of them
+        said = invoke("compare", *sets, "--like", "x500", "--mass-kg", "1.5", "-q").output.splitlines()
+        assert said[:2] == [
+            "Parameters of the autopilot that differ: 1.",
+            "  ATC_RAT_RLL_P: 0.135 in the good logs, now 0.18",
+        ]
+        assert "only the good logs state: 1 (OLD)" in said[2] and "only the new log states: 1 (NEW)" in said[3]
+        assert "what differs in flight was sought" in said[-1] and "STAT" not in "".join(said)
+
+
+def made(log: Path) -> Path:
+    folder = log.parent / f"set-of-{log.stem}"
+    answer("import", log, "-o", folder, "--like", "x500", "--mass-kg", "1.5")
+    return folder
+
+
+def test_junit_holds_any_text() -> None:
+    text = as_junit("a<b>&\x07", {'case "1"\n': [], "two": ["no < & \x1b[31m", "second"]}, 1.5)
+    root = ElementTree.fromstring(text)
+    assert (root.get("tests"), root.get("failures")) == ("2", "1")
+    assert root.find(".//failure").text.splitlines()[1] == "second"

@@ -111,7 +111,7 @@ def sentences(found: Changes) -> list[str]:
 
 def level_two_sentences(found: Changes) -> list[str]:
     """One sentence a change, the most probable first, and one on what did not change."""
-    out = [_change_words(c) for c in found.changes]
+    out = [change_words(c) for c in found.changes]
     if not out and found.level_1 is not None and found.level_1.stated:
         out.append("No known effect explains this: it stays as it is stated.")
     elif not out:
@@ -133,7 +133,7 @@ def advice(found: Changes) -> list[str]:
     return []
 
 
-def _change_words(change: Change) -> str:
+def change_words(change: Change) -> str:
     """`The mass changed: +8.3 ± 0.9 % (99.9 %).`"""
     names = listed([name_words(i) for i in change.alternatives or (change.id,)], "or")
     sizes = [_size_words(p) for p in change.parameters if p.low * p.high > 0]

@@ -1,4 +1,4 @@
-"""ArduPilot DataFlash logs (`.bin`) through pymavlink.
+"""ArduPilot DataFlash logs (`.bin`).
 
 ArduPilot's frames are the contract's: body forward-right-down, world north-east-down. Read are `IMU` (or `ACC` and
 `GYR`), `XKQ`/`NKQ`, `ATT` or `ANG` for the attitude, `XKF1`/`NKF1` for velocity and position, `RCOU` with the motors'
@@ -36,9 +36,8 @@ import numpy as np
 import pandas as pd
 
 from rotorid.errors import InputError
-from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.bag_records import needs
+from rotorid.recordings.importers.dataflash import read_dataflash
 from rotorid.recordings.importers.faults import (
     GOES_ON,
     ImportFault,
@@ -115,8 +114,8 @@ _LANDED, _FLYING = 18, 28
 """Events LAND_COMPLETE and NOT_LANDED."""
 _GOOD, _DOWN = 4, 25
 """Status of a range finder that reads, and the orientation of one that looks down."""
-_HEAD, END = b"\xa3\x95", "END"
-"""First bytes of a message, and the key under which stands how many bytes of the last one came."""
+END = "END"
+"""The key under which stands how many bytes of the last message came."""
 _CLOCKS = {"TimeUS": 1e-6, "TimeMS": 1e-3}
 """Fields of a message's clock, to the seconds that they count in."""
 _BY_CHANNEL = {8: "PWMRange", 9: "PWMAngle"}
@@ -138,48 +137,40 @@ Log = Mapping[str, pd.DataFrame]
 def read_messages(path: Path) -> dict[str, pd.DataFrame]:
     """Tables of the messages that are needed by kind, with `time_s`, and `END` where the file ends inside a message.
 
-    InputError where the file is no DataFlash log.
+    InputError where the file holds none of them.
     """
-    reader = needs("pymavlink.DFReader", "ardupilot", path)
-    rows: dict[str, list[dict]] = {}
-    latest_s = 0.0
-    try:
-        log = reader.DFReader_binary(str(path), zero_time_base=True)
-        while (message := log.recv_match(type=list(_KINDS))) is not None:
-            kind, row = message.get_type(), message.to_dict()
-            stamp = next((row[name] * unit for name, unit in _CLOCKS.items() if name in row), None)
-            if stamp is not None or kind in ("EV", "PARM"):
-                latest_s = row[c.TIME] = latest_s if stamp is None else float(stamp)
-            rows.setdefault(kind, []).append(row)
-        if came := _cut_message(log.data_map, log.offset):
-            rows[END] = [{c.TIME: latest_s, "bytes": came}]
-    except MemoryError:
-        raise
-    except Exception as error:  # pymavlink lets whatever a broken file raises through
-        raise InputError(f"{path}: not a DataFlash log that can be read ({printable(error)[:150]})") from None
-    if not set(rows) - {END}:
+    found, came = read_dataflash(path, _KINDS)
+    if not found:
         raise InputError(f"{path}: a DataFlash log with no message that is needed (IMU, ATT, RCOU)")
-    tables = {}
-    for kind, found in rows.items():
-        table = pd.DataFrame(found)
-        if c.TIME not in table and kind not in ("PARM", "MSG"):
+    clocks = {kind: _stamps(messages.columns) for kind, messages in found.items()}
+    stamped = [(found[kind].offsets, times) for kind, times in clocks.items() if times is not None]
+    offsets, times = (np.concatenate(part) for part in zip(*stamped, strict=True)) if stamped else (np.zeros(0),) * 2
+    order = np.argsort(offsets, kind="stable")
+    offsets, times = offsets[order], times[order]
+    tables: dict[str, pd.DataFrame] = {}
+    for kind in sorted(found, key=lambda kind: found[kind].offsets[0]):
+        own_s, table = clocks[kind], pd.DataFrame(found[kind].columns)
+        if own_s is None and kind in ("EV", "PARM"):  # without a clock: that of the message before
+            before = np.searchsorted(offsets, found[kind].offsets) - 1
+            own_s = np.where(before >= 0, times[np.maximum(before, 0)], 0.0) if len(times) else np.zeros(len(table))
+        if own_s is not None:
+            table[c.TIME] = own_s
+        elif kind not in ("PARM", "MSG"):
             continue  # damaged: a message without its clock has no place
         if kind == "RCOU":
             table = table.rename(columns={f"Ch{n}": f"C{n}" for n in range(1, 17)})
         if number := re.fullmatch(r"ESC(\d)", kind):  # before 4.1 each controller has a message of its own
             kind, table = "ESC", pd.concat([tables.get("ESC"), table.assign(Instance=int(number[1]) - 1)])
         tables[kind] = table
+    if came:
+        tables[END] = pd.DataFrame({c.TIME: [times[-1] if len(times) else 0.0], "bytes": [came]})
     return tables
 
 
-def _cut_message(data, offset: int) -> int:
-    """Bytes of the message that a file ends in, by where its reader stopped; 0 where it ends between two.
-
-    A single byte of a head is not looked for: every 256th whole file ends with it.
-    """
-    if bytes(data[max(offset - 3, 0) : max(offset - 1, 0)]) == _HEAD:  # a head whose message did not come
-        return len(data) - offset + 3
-    return len(_HEAD) if bytes(data[len(data) - len(_HEAD) :]) == _HEAD else 0
+def _stamps(columns: Mapping[str, np.ndarray]) -> np.ndarray | None:
+    """Times of messages by their own clock, s; None where they have none."""
+    name = next((name for name in _CLOCKS if name in columns and columns[name].dtype.kind in "if"), None)
+    return None if name is None else columns[name] * _CLOCKS[name]
 
 
 def parameters(log: Log) -> Parameters:
@@ -615,3 +606,13 @@ def read_ardupilot(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFaul
         jumps, more = jumps | own, more + found
     runs, cuts = flights(table, flying, path.name.split(".")[0], path, jumps)
     return runs, [*faults, *more, *cuts], order
+
+
+def stated_parameters(path: Path) -> dict[str, float]:
+    """The parameters that a DataFlash log states, each as it states it first."""
+    found, _ = read_dataflash(path, ("PARM",))
+    columns = found["PARM"].columns if "PARM" in found else {}
+    if not {"Name", "Value"} <= set(columns) or columns["Value"].dtype.kind not in "if":
+        return {}
+    pairs = zip(columns["Name"].tolist(), columns["Value"].tolist(), strict=True)
+    return dict(reversed([(str(name), float(value)) for name, value in pairs if np.isfinite(value)]))

@@ -380,15 +380,31 @@ def _signed(data: bytes, at: int) -> tuple[int, int]:
     return value >> 1 ^ -(value & 1), at
 
 
+_SIGNED = tuple(byte >> 1 ^ -(byte & 1) for byte in range(128))
+_SIGNED_BYTES = bytes(value & 255 for value in _SIGNED) + bytes(128)
+
+
 def _extended(value: int, bits: int) -> int:
     """The lowest bits of a number, of which the highest is the sign."""
     sign = 1 << bits - 1
     return (value & (sign << 1) - 1 ^ sign) - sign
 
 
-def _one_signed(data: bytes, at: int, count: int) -> tuple[list[int], int]:
-    value, at = _signed(data, at)
-    return [value], at
+def _many_signed(data: bytes, at: int, count: int) -> tuple[list[int], int]:
+    """Signed numbers one behind the other; most have one byte, whose number is looked up."""
+    part = data[at : at + count]
+    if len(part) == count and part.isascii():  # one byte each
+        return memoryview(part.translate(_SIGNED_BYTES)).cast("b").tolist(), at + count
+    values = []
+    for _ in range(count):
+        byte = data[at]
+        if byte < 128:
+            at += 1
+            values.append(_SIGNED[byte])
+        else:
+            value, at = _signed(data, at)
+            values.append(value)
+    return values, at
 
 
 def _one(turned: Callable[[int], int]) -> Callable[[bytes, int, int], tuple[list[int], int]]:
@@ -404,13 +420,16 @@ def _one(turned: Callable[[int], int]) -> Callable[[bytes, int, int], tuple[list
 def _up_to_eight(data: bytes, at: int, count: int) -> tuple[list[int], int]:
     """A bit for each number that is not zero, then those."""
     if count == 1:
-        return _one_signed(data, at, 1)
+        return _many_signed(data, at, 1)
     given, values = data[at], []
     at += 1
     for k in range(count):
         value = 0
         if given >> k & 1:
-            value, at = _signed(data, at)
+            if (byte := data[at]) < 128:
+                value, at = _SIGNED[byte], at + 1
+            else:
+                value, at = _signed(data, at)
         values.append(value)
     return values, at
 
@@ -449,7 +468,7 @@ def _three(layouts: tuple) -> Callable[[bytes, int, int], tuple[list[int], int]]
 
 
 _ENCODINGS: dict[int, tuple[Callable, int]] = {
-    0: (_one_signed, 1),
+    0: (_many_signed, 1),
     1: (_one(lambda value: value), 1),
     3: (_one(lambda value: -_extended(value, 14)), 1),
     6: (_up_to_eight, 8),
@@ -465,6 +484,42 @@ _RESUMED, _ADJUSTED, _ENDED = 14, 13, 255
 
 
 # Frames -------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Predictions:
+    """Which fields of a kind of frame are predicted how: by the frame before, the line through the two before, their
+    mean, a value of the header, a count, or the first motor."""
+
+    constant: tuple[int, ...]
+    straight: tuple[int, ...]
+    mean: tuple[int, ...]
+    fixed: tuple[tuple[int, int], ...]
+    counted: tuple[int, ...]
+    as_read: tuple[int, ...]
+    """By the first motor before it is predicted itself: fields in front of it."""
+    motor: tuple[int, ...]
+    all: tuple[int, ...]
+    unknown: tuple[int, ...]
+
+    @classmethod
+    def of(cls, predictors: list[int], fixed: Mapping[int, int], motor: int) -> _Predictions:
+        """By the numbers of the header; `motor` is the first motor's field."""
+
+        def those(number: int) -> tuple[int, ...]:
+            return tuple(k for k, predictor in enumerate(predictors) if predictor == number)
+
+        return cls(
+            constant=those(1),
+            straight=those(2),
+            mean=those(3),
+            fixed=tuple((k, fixed[p]) for k, p in enumerate(predictors) if p in fixed),
+            counted=those(6),
+            as_read=tuple(k for k in those(5) if k < motor),
+            motor=tuple(k for k in those(5) if k >= motor),
+            all=tuple(k for k, predictor in enumerate(predictors) if predictor),
+            unknown=tuple(p for p in predictors if p not in (0, 1, 2, 3, 5, 6, *fixed)),
+        )
 
 
 class _Frames:
@@ -491,6 +546,8 @@ class _Frames:
         first = {name: (_numbers_of(headers, name) or [default])[0]
                  for name, default in (("minthrottle", 1150), ("vbatref", 4095), ("motorOutput", 0))}  # fmt: skip
         self._fixed = {4: first["minthrottle"], 8: 1500, 9: first["vbatref"], 11: first["motorOutput"]}
+        self._predictions = {k: _Predictions.of(own, self._fixed, self._motor) for k, own in self._predictors.items()}
+        self._zero = [0] * len(self.names)
         self._key_every = max((_numbers_of(headers, "I interval") or [1])[0], 1)
         share = [int(n) for n in re.findall(r"\d+", headers.get("P interval", "1"))] or [1]
         self._of, self._every = (share[0], max(share[1], 1)) if len(share) > 1 else (1, max(share[0], 1))
@@ -571,27 +628,29 @@ class _Frames:
 
     def _predicted(self, letter: int) -> list[int]:
         """The fields of a main frame: what was read and its predictions."""
-        now, zero = self._now, [0] * len(self.names)
-        before, earlier = self._history if letter == ord("P") else (zero, zero)
-        for k, predictor in enumerate(self._predictors[letter]):
-            if predictor == 0:
-                continue
-            if predictor == 1:
-                now[k] += before[k]
-            elif predictor == 2:
-                now[k] += 2 * before[k] - earlier[k]
-            elif predictor == 3:
-                now[k] += int((before[k] + earlier[k]) / 2)  # towards zero, as the firmware divides
-            elif predictor == 5:
-                now[k] += now[self._motor]
-            elif predictor == 6:
-                now[k] = before[k] + 1 + self._left_out()
-            elif predictor in self._fixed:
-                now[k] += self._fixed[predictor]
-            else:
-                raise InputError(f"the header of the log is damaged: there is no predictor {predictor}")
-            if not -_TURN // 2 <= now[k] < _TURN // 2:
-                now[k] = now[k] % _TURN if k == self.time else _extended(now[k], 32)
+        now, plan = self._now, self._predictions[letter]
+        if plan.unknown:
+            raise InputError(f"the header of the log is damaged: there is no predictor {plan.unknown[0]}")
+        before, earlier = self._history if letter == ord("P") else (self._zero, self._zero)
+        for k in plan.as_read:
+            now[k] += now[self._motor]
+        for k in plan.constant:
+            now[k] += before[k]
+        for k in plan.straight:
+            now[k] += 2 * before[k] - earlier[k]
+        for k in plan.mean:
+            both = before[k] + earlier[k]
+            now[k] += both + (both < 0) >> 1  # towards zero, as the firmware divides
+        for k, value in plan.fixed:
+            now[k] += value
+        for k in plan.counted:
+            now[k] = before[k] + 1 + self._left_out()
+        for k in plan.motor:
+            now[k] += now[self._motor]
+        if max(now) >= _TURN // 2 or min(now) < -_TURN // 2:
+            for k in plan.all:
+                if not -_TURN // 2 <= now[k] < _TURN // 2:
+                    now[k] = now[k] % _TURN if k == self.time else _extended(now[k], 32)
         now[self.time] %= _TURN
         return now
 
@@ -613,6 +672,8 @@ def _plan(encodings: list[int], count: int, letter: str) -> list[tuple[Callable,
         read, takes = _ENCODINGS[encodings[k]]
         if encodings[k] == 6:
             takes = next((n for n in range(1, 8) if encodings[k + n : k + n + 1] != [6]), 8)
+        while encodings[k] == 0 and encodings[k + takes : k + takes + 1] == [0]:
+            takes += 1
         plan.append((read, takes))
         k += takes
     if k != count:
@@ -624,3 +685,24 @@ def _numbers_of(headers: Mapping[str, str], name: str) -> list[int]:
     """Whole numbers of a header's list; empty where it is not there or holds something else."""
     parts = headers.get(name, "").split(",")
     return [int(p) for p in parts] if all(re.fullmatch(r"-?\d{1,10}", p.strip()) for p in parts) else []
+
+
+_EXPORTED_LINE = re.compile(rb'^"([^"\n]{1,80})","?([^"\n]*)"?\r?$', re.MULTILINE)
+_LARGEST_HEADER = 65_536
+_NO_SETTING = re.compile(
+    r"Field .*|Product|Data version|[IP] interval|Log start.*|Craft name|Firmware.*|Board.*|P ratio"
+)
+"""Lines of a header that say how the log is laid out, or what flew: no settings."""
+
+
+def stated_parameters(path: Path) -> dict[str, str]:
+    """The settings in the header of a blackbox's first session, or of its export, as text."""
+    head = Path(path).read_bytes()[:_LARGEST_HEADER]
+    out: dict[str, str] = {}
+    for line in (_EXPORTED_LINE if head.startswith(b'"') else _HEADER_LINE).finditer(head):
+        name, value = (part.decode("utf-8", "replace").strip() for part in line.groups())
+        if name == "Product" and out:  # that of the next session
+            break
+        if not _NO_SETTING.fullmatch(name):
+            out.setdefault(name, value)
+    return out

@@ -61,6 +61,7 @@ from rotorid.recordings.importers.faults import LATE_STEPS, SET_BACK, ImportFaul
 from rotorid.recordings.importers.known import Known, propose, px4_vehicle, thrust_coefficient
 from rotorid.recordings.importers.mapping import ELECTRICAL, UNITS, Mapping, read_by_mapping
 from rotorid.recordings.importers.rcbenchmark import signed_by_spin
+from rotorid.recordings.settings import Settings, write_settings
 from rotorid.recordings.tables import check_table, parquet_is_here, write_table
 from rotorid.recordings.vehicle import Vehicle
 
@@ -72,7 +73,7 @@ _IMPOSSIBLE = 3.5
 _POSSIBLE = 2.2
 """Speeds of hover within this factor are."""
 _GZIP = b"\x1f\x8b"
-_WITHIN = ((b"H Product:Blackbox", "betaflight"), (b"\xa3\x95\x80\x80\x59FMT", "ardupilot"))
+_WITHIN = ((b"H Product:Blackbox", "betaflight"), (b"\xa3\x95\x80\x80\x59FMT", "ardupilot"), (px4_ulog.MAGIC, "px4"))
 """What the first lines or messages of a log hold, behind what may be left of another in the logger's memory."""
 _EPOCHS_US = (9e14, 5e15)
 """Times from 1998 to 2128 in µs, as telemetry logs of MAVLink have them before each message."""
@@ -86,7 +87,7 @@ _BY_FIRST_BYTES = (
 )
 _RCBENCHMARK = re.compile(r"ESC signal ?[(,](.*[,;])?\s*\"?Motor (Electrical|Optical) Speed ?[(,\r\n]", re.DOTALL)
 """Headings of RCbenchmark's stands of one rotor; those of other stands are read by a mapping."""
-_TEMPLATES = {"px4": "x500", "betaflight": "five-inch", "crazyflie": "crazyflie-2.1", "neurobem": "neurobem"}
+TEMPLATES = {"px4": "x500", "betaflight": "five-inch", "crazyflie": "crazyflie-2.1", "neurobem": "neurobem"}
 """Template vehicle that supplies what a log of an autopilot or format does not say."""
 
 
@@ -102,6 +103,8 @@ class _Imported:
     kind: str = "flight"
     speed_unit: str = "rad/s"
     """Unit in which the log states rotor speeds."""
+    settings: Settings = field(default_factory=dict)
+    """The autopilot's parameters, as they held for most of the flight or at its start."""
 
 
 def _files_of(path: Path) -> dict[str, Path]:
@@ -125,7 +128,7 @@ def format_of(path: Path) -> str:
         head = file.read(4096)
     if not head:
         raise InputError(f"{path}: the file is empty")
-    if head.startswith(b"ULog\x01\x12\x35"):
+    if head.startswith(px4_ulog.MAGIC):
         return "px4"
     if crazyflie.is_log(head):
         return "crazyflie"
@@ -182,11 +185,13 @@ def _read(path: Path, kind: str, mapping: Mapping | None) -> _Imported:
     if kind == "betaflight":
         runs, faults = betaflight.read_betaflight(path)
         axes = "body forward-left-up, turned by half a turn about x into FRD"
-        return _Imported(kind, runs, tuple(faults), axes, Known("betaflight"), speed_unit="rpm")
+        settings = betaflight.stated_parameters(path)
+        return _Imported(kind, runs, tuple(faults), axes, Known("betaflight"), speed_unit="rpm", settings=settings)
     if kind == "ardupilot":
         runs, faults, order = ardupilot.read_ardupilot(path)
         axes = "ArduPilot's: body forward-right-down, world north-east-down, as the contract's"
-        return _Imported(kind, runs, tuple(faults), axes, Known(order), speed_unit="rpm")
+        settings = ardupilot.stated_parameters(path)
+        return _Imported(kind, runs, tuple(faults), axes, Known(order), speed_unit="rpm", settings=settings)
     if kind == "ros":
         runs, faults, unit = ros.read_ros(path)
         axes = "REP 103: body forward-left-up, world z up, turned by half a turn about x into FRD and z down"
@@ -228,10 +233,11 @@ def _px4(path: Path) -> _Imported:
         table, found, flying, jumps = px4_ulog.convert(log, rotors)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    known, faults = px4_vehicle(px4_ulog.in_flight(log), rotors)
+    settings = {name: value for name, value in px4_ulog.in_flight(log).items() if isinstance(value, int | float)}
+    known, faults = px4_vehicle(settings, rotors)
     runs, cuts = flights(table, flying, path.stem, path, jumps)
     axes = "PX4's: body forward-right-down, world north-east-down, as the contract's"
-    return _Imported("px4", runs, (*found, *faults, *cuts), axes, known, speed_unit="rpm")
+    return _Imported("px4", runs, (*found, *faults, *cuts), axes, known, speed_unit="rpm", settings=settings)
 
 
 @contextmanager
@@ -375,6 +381,8 @@ class SetOfLogs:
     """To the name of a log its SHA-256."""
     kept_vehicle: bool = False
     """Whether the vehicle's text is that of a file which stays as it is."""
+    settings: Names[str, Settings] = field(default_factory=dict)
+    """To the name of a log the parameters of its autopilot."""
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -397,11 +405,13 @@ class SetOfLogs:
         if folder.is_dir():
             with staging(folder / "import") as part, only_writer(folder):
                 _add_to_set(self._write_files(part, as_csv), report, folder)
+                write_settings(folder, self.settings)
         else:
             with staging(folder) as part:
                 files = self._write_files(part, as_csv)
                 write_manifest(part, [path for path in files if path.name != VEHICLE])
                 report.write(part)
+                write_settings(part, self.settings)
                 take_name(part, folder)
 
     def _write_files(self, folder: Path, as_csv: bool) -> list[Path]:
@@ -463,7 +473,7 @@ def set_of_logs(
     else:
         if kinds != {"flight"}:
             raise InputError(f"{logs[0]}: a log of a {kinds.pop()} needs --vehicle vehicle.yaml")
-        template = like or _TEMPLATES.get(found[0].known.autopilot) or _TEMPLATES.get(found[0].format)
+        template = like or TEMPLATES.get(found[0].known.autopilot) or TEMPLATES.get(found[0].format)
         if template is None:
             raise InputError(
                 f"{logs[0]}: nothing says what vehicle this is; give --vehicle vehicle.yaml, or --like with one of "
@@ -494,9 +504,10 @@ def set_of_logs(
         text,
         (*remarks, *left_out),
         tuple(dict.fromkeys(faults)),
-        found[0].axes,
-        {name: sha256(file) for path in logs for name, file in _files_of(path).items()},
-        kept,
+        axes=found[0].axes,
+        files={name: sha256(file) for path in logs for name, file in _files_of(path).items()},
+        kept_vehicle=kept,
+        settings={path.name: imported.settings for path, imported in zip(logs, found, strict=True)},
     )
 
 

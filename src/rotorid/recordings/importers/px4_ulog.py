@@ -20,6 +20,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pandas as pd
@@ -114,6 +115,8 @@ class Px4Log:
     lost_s: tuple[float, ...] = ()
     damaged: bool = False
     rest: int = 0
+    stray: int = 0
+    """Bytes in front of the header, which are no part of the log."""
 
 
 class _Subscriptions(dict):
@@ -125,6 +128,12 @@ class _Subscriptions(dict):
         super().__setitem__(number, subscription)
 
 
+MAGIC = b"ULog\x01\x12\x35"
+"""First bytes of a ULog file."""
+_MOST_STRAY = 4096
+"""Bytes among which the header is looked for, as by whoever recognises the file."""
+
+
 class _Reader(ULog):
     """pyulog's reader, which forgets what came before a topic is subscribed once more under the same number."""
 
@@ -133,12 +142,22 @@ class _Reader(ULog):
         super()._load_file(*arguments, **named)
 
 
+def _read_behind(data: bytes) -> _Reader:
+    """A log that stands behind stray bytes: pyulog does not end on some damaged data that is no file of its own."""
+    with TemporaryDirectory() as folder:
+        alone = Path(folder) / "log.ulg"
+        alone.write_bytes(data)
+        return _Reader(str(alone))
+
+
 def open_log(path: Path) -> Px4Log:
     """Read a ULog file; InputError where it is none."""
     if not Path(path).is_file():
         raise InputError(f"{path}: file is missing")
+    data = Path(path).read_bytes()
+    stray = max(data.find(MAGIC, 0, _MOST_STRAY), 0)
     try:
-        log = _Reader(str(path))
+        log = _Reader(str(path)) if not stray else _read_behind(data[stray:])
     except MemoryError:
         raise
     except Exception as error:
@@ -156,7 +175,8 @@ def open_log(path: Path) -> Px4Log:
         Parameters.of(changed, log.initial_parameters),
         tuple(d.duration / 1000 for d in log.dropouts),
         log.file_corruption,
-        0 if log.file_corruption else _cut_message(Path(path).read_bytes()),
+        0 if log.file_corruption else _cut_message(data[stray:]),
+        stray,
     )
 
 
@@ -652,6 +672,8 @@ def convert(log: Px4Log, rotors: int) -> tuple[pd.DataFrame, list[ImportFault], 
     jumps, reset = jumps_at(columns[c.TIME], times, JUMPED)
     faults += reset
     faults += log.parameters.faults(_CHANGED, float(grid[0]), 1e-6)
+    if log.stray:
+        faults.append(ImportFault("damaged", "", f"{log.stray} bytes stand in front of the header", "left out", 0))
     if log.rest:
         found = f"the file ends inside a message, after {log.rest} bytes of it"
         faults.append(ImportFault("cut_off", "", found, "what came before is kept; the log stopped before its end", 0))

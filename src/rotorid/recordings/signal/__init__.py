@@ -7,8 +7,7 @@ known as its blocks say, since neighbouring samples are not independent.
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, median_filter, minimum_filter1d
-from scipy.signal import butter, lfilter, sosfiltfilt
+import scipy
 
 from rotorid.errors import InputError
 
@@ -32,7 +31,7 @@ def first_order(values: np.ndarray, cutoff_hz: float, rate_hz: float) -> np.ndar
         return values.copy()
     alpha = smoothing(cutoff_hz, rate_hz)
     start = (1 - alpha) * values[:1]
-    return lfilter([alpha], [1, alpha - 1], values, axis=0, zi=start)[0]
+    return scipy.signal.lfilter([alpha], [1, alpha - 1], values, axis=0, zi=start)[0]
 
 
 def zero_phase(values: np.ndarray, cutoff_hz: float, rate_hz: float) -> np.ndarray:
@@ -45,9 +44,9 @@ def zero_phase(values: np.ndarray, cutoff_hz: float, rate_hz: float) -> np.ndarr
         raise InputError(f"a cutoff of {cutoff_hz:g} Hz must lie below half the rate of {rate_hz:g} Hz")
     # Two runs halve the power twice; the single run's cutoff is raised so that both together halve it once.
     single = cutoff_hz / (np.sqrt(2) - 1) ** (1 / (2 * _ZERO_PHASE_ORDER))
-    sections = butter(_ZERO_PHASE_ORDER, min(single, 0.49 * rate_hz), fs=rate_hz, output="sos")
+    sections = scipy.signal.butter(_ZERO_PHASE_ORDER, min(single, 0.49 * rate_hz), fs=rate_hz, output="sos")
     pad = min(len(values) - 1, int(3 * rate_hz / cutoff_hz))
-    return sosfiltfilt(sections, values, axis=0, padlen=max(pad, 0)) if len(values) > 1 else values.copy()
+    return scipy.signal.sosfiltfilt(sections, values, axis=0, padlen=max(pad, 0)) if len(values) > 1 else values.copy()
 
 
 def spikes(values: np.ndarray, window: int, threshold: float) -> np.ndarray:
@@ -58,7 +57,7 @@ def spikes(values: np.ndarray, window: int, threshold: float) -> np.ndarray:
     """
     values = np.asarray(values, float)
     size = (window,) + (1,) * (values.ndim - 1)
-    off = values - median_filter(values, size=size, mode="nearest")
+    off = values - scipy.ndimage.median_filter(values, size=size, mode="nearest")
     scale = _MAD_TO_SIGMA * np.median(np.abs(off), axis=0)
     return np.abs(off) > threshold * np.where(scale > 0, scale, np.inf)
 
@@ -82,8 +81,8 @@ def steady(filtered: np.ndarray, window: int, tolerance: float) -> np.ndarray:
     filtered = np.asarray(filtered, float)
     columns = filtered.reshape(len(filtered), -1)
     origin = (window - 1) // 2  # shifts the centred window so that it ends at the sample
-    high = maximum_filter1d(columns, window, axis=0, origin=origin, mode="nearest")
-    low = minimum_filter1d(columns, window, axis=0, origin=origin, mode="nearest")
+    high = scipy.ndimage.maximum_filter1d(columns, window, axis=0, origin=origin, mode="nearest")
+    low = scipy.ndimage.minimum_filter1d(columns, window, axis=0, origin=origin, mode="nearest")
     flat = ((high - low) <= tolerance).all(axis=1)
     flat[: window - 1] = False
     return flat

@@ -5,8 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from scipy.signal import fftconvolve, oaconvolve, upfirdn
-from scipy.signal.windows import kaiser
+import scipy
 
 _ATTENUATION_BETA = 5.0
 """Kaiser window for about 50 dB in the stop band."""
@@ -24,7 +23,7 @@ def low_pass(rate_hz: float, cutoff_hz: float) -> np.ndarray:
     """Windowed-sinc low-pass of unit gain at zero frequency, shape (2 half_length + 1,); -6 dB at the cutoff."""
     half = half_length(rate_hz, cutoff_hz)
     k = np.arange(-half, half + 1)
-    kernel = np.sinc(2 * cutoff_hz * k / rate_hz) * kaiser(2 * half + 1, _ATTENUATION_BETA)
+    kernel = np.sinc(2 * cutoff_hz * k / rate_hz) * scipy.signal.windows.kaiser(2 * half + 1, _ATTENUATION_BETA)
     return kernel / kernel.sum()
 
 
@@ -50,14 +49,14 @@ def derivative(rate_hz: float, cutoff_hz: float) -> np.ndarray:
 def apply(kernel: np.ndarray, signal: np.ndarray) -> np.ndarray:
     """Convolve along axis 0 and keep only samples that the kernel fully covers."""
     shape = (len(kernel),) + (1,) * (signal.ndim - 1)
-    return fftconvolve(signal, kernel.reshape(shape), mode="valid", axes=0)
+    return scipy.signal.fftconvolve(signal, kernel.reshape(shape), mode="valid", axes=0)
 
 
 def causal(taps: np.ndarray, signal: np.ndarray) -> np.ndarray:
     """`scipy.signal.lfilter(taps, [1], signal, axis=0)`, without its loop in Python over the columns."""
     if signal.ndim == 1:
         return np.convolve(signal, taps)[: len(signal)]
-    return upfirdn(taps, signal, axis=0)[: len(signal)]
+    return scipy.signal.upfirdn(taps, signal, axis=0)[: len(signal)]
 
 
 def gaussian(signal: np.ndarray, sigma_samples: float) -> np.ndarray:
@@ -66,4 +65,4 @@ def gaussian(signal: np.ndarray, sigma_samples: float) -> np.ndarray:
     kernel = np.exp(-0.5 * (np.arange(-half, half + 1) / sigma_samples) ** 2)
     padded = np.pad(signal, [(half, half)] + [(0, 0)] * (signal.ndim - 1), mode="symmetric")
     shape = (-1,) + (1,) * (signal.ndim - 1)
-    return oaconvolve(padded, (kernel / kernel.sum()).reshape(shape), mode="valid", axes=0)
+    return scipy.signal.oaconvolve(padded, (kernel / kernel.sum()).reshape(shape), mode="valid", axes=0)

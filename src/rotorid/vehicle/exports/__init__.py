@@ -11,10 +11,16 @@ from difflib import get_close_matches
 from rotorid.errors import InputError
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.exports.autopilots import ardupilot_json, px4_sih
+from rotorid.vehicle.exports.crazyflow import crazyflow
 from rotorid.vehicle.exports.forms import FORMS, KNOWS, Exported, named_in_one_line, parts_of, refusal
 from rotorid.vehicle.improved import all_forms
 
-_WRITERS: dict[str, Callable[[Vehicle], Exported]] = {**FORMS, "px4-sih": px4_sih, "ardupilot-json": ardupilot_json}
+_WRITERS: dict[str, Callable[[Vehicle], Exported]] = {
+    **FORMS,
+    "px4-sih": px4_sih,
+    "ardupilot-json": ardupilot_json,
+    "crazyflow": crazyflow,
+}
 NAMES = tuple(_WRITERS)
 __all__ = ["Exported", "export_vehicle"]
 

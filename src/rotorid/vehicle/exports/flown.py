@@ -21,7 +21,7 @@ import numpy as np
 from rotorid.errors import InputError
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.exports.derivatives import MUJOCO_FILE, ROTORPY_FILE
-from rotorid.vehicle.exports.forms import AT_ONCE_S, FLU, Exported, expressed
+from rotorid.vehicle.exports.forms import AT_ONCE_S, FLU, KNOWS, Exported, expressed, parts_of
 from rotorid.vehicle.improved import simulate_as_stated
 from rotorid.vehicle.mixer import hover_speed_rad_s
 from rotorid.vehicle.simulator import Commands, Start
@@ -355,11 +355,44 @@ def in_pybullet(
     return difference((np.array(position), np.array(attitude)), ours(same, speeds), where)
 
 
+def in_crazyflow(vehicle: Vehicle, exported: Exported, duration_s: float = 2.0) -> _FlightDifference:
+    """Integrate crazyflow's own dynamics with the numbers of the exported section next to ours with what it holds."""
+    import tomllib
+
+    from crazyflow.dynamics.first_principles import dynamics
+
+    (section,) = tomllib.loads(exported.text).values()
+    values = {name: np.asarray(value) for name, value in section.items() if name not in ("thrust_min", "thrust_max")}
+    same = expressed(vehicle, "crazyflow")
+    time, speeds = commands_of(same, duration_s)
+    up, down = 1 / values["rotor_dyn_coef"][[0, 2]]
+    turns = lagging(speeds, up, down) if parts_of(vehicle, KNOWS["crazyflow"]).tau_s[0] else speeds
+    fixed = dict(values, gravity_vec=np.array([0.0, 0.0, -9.81]), J_inv=np.linalg.inv(values["J"]))
+
+    def rates(state: np.ndarray, rpm: np.ndarray) -> np.ndarray:
+        found = dynamics(state[:3], state[3:7], state[7:10], state[10:13], rpm, rpm, **fixed)
+        return np.concatenate([np.asarray(part) for part in found[:4]])
+
+    state = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, _START_M_S, -_START_M_S, 0.0, 0.0, 0.0, 0.0])
+    states = [state]
+    for rpm in turns[:-1] * 60 / (2 * np.pi):
+        one = rates(state, rpm)
+        two = rates(state + _STEP_S / 2 * one, rpm)
+        three = rates(state + _STEP_S / 2 * two, rpm)
+        four = rates(state + _STEP_S * three, rpm)
+        state = state + _STEP_S / 6 * (one + 2 * two + 2 * three + four)
+        state[3:7] /= np.linalg.norm(state[3:7])
+        states.append(state)
+    path = np.array(states)
+    return difference((path[:, :3], path[:, [6, 3, 4, 5]]), ours(same, turns), "crazyflow's first-principles dynamics")
+
+
 FLYERS: dict[str, tuple[str, Callable[[Vehicle, Exported], _FlightDifference]]] = {
     "rotorpy": ("rotorpy", in_rotorpy),
     "mjcf": ("mujoco", in_mujoco),
     "sdf": ("pydrake", in_drake),
     "gym-pybullet-drones": ("pybullet", in_pybullet),
+    "crazyflow": ("crazyflow", in_crazyflow),
 }
 """By form, the module that must be there, and the flight."""
 

@@ -32,7 +32,7 @@ from rotorid.vehicle.exports.derivatives import (
 )
 from rotorid.vehicle.mixer import hover_speed_rad_s
 
-_FOUR_ROTORS = {"rotorpy": "RotorPy", "gym-pybullet-drones": "gym-pybullet-drones"}
+_FOUR_ROTORS = {"rotorpy": "RotorPy", "gym-pybullet-drones": "gym-pybullet-drones", "crazyflow": "crazyflow"}
 """Forms of tools that fly four rotors and no other number."""
 _EXACT_BODIES = {"mjcf": "MuJoCo", "sdf": "Gazebo"}
 """Forms of tools that take no inertia with a principal moment above the sum of the others, by however little."""
@@ -98,6 +98,7 @@ KNOWS = {
         "sdf": "rotor_drag motor_lag com_offset inertia_products command_saturation derivatives each_thrust "
         "each_torque",
         "gym-pybullet-drones": "rotor_drag com_offset command_saturation",
+        "crazyflow": "rotor_drag com_offset motor_lag inertia_products command_saturation each_thrust each_torque",
         "px4": "com_offset throttle_curve each_thrust each_torque",
         "px4-sih": "rotor_drag rotational_damping motor_lag inertia_products command_saturation derivatives",
         "ardupilot-json": "rotor_drag frame_drag rotational_damping com_offset command_saturation throttle_curve "
@@ -106,9 +107,9 @@ KNOWS = {
 }
 """By form, ids of the effects that it has a place for; `each_thrust`, `each_torque` where it has coefficients of each
 rotor; `derivatives` where it says itself what it takes of them. `inertia_products` are the vehicle's own, too."""
-_DRAG_AT_CENTRE = ("gym-pybullet-drones",)
+_DRAG_AT_CENTRE = ("gym-pybullet-drones", "crazyflow")
 """Forms whose rotor drag acts at the centre of mass."""
-_GRAVITY_M_S2 = {"rotorpy": 9.81}
+_GRAVITY_M_S2 = {"rotorpy": 9.81, "crazyflow": 9.81}
 """Of tools that have their own, which no file changes and no caller of theirs sets."""
 
 
@@ -408,7 +409,7 @@ def px4(vehicle: Vehicle) -> Exported:
     return Exported("\n".join([*comments, *lines]) + "\n", "vehicle.params", tuple(left))
 
 
-def _left_of_the_lowest_speed(parts: Parts) -> list[str]:
+def left_of_the_lowest_speed(parts: Parts) -> list[str]:
     """A sentence for tools that know no lowest rotor speed."""
     low = 0.0 if parts.limits_rad_s is None else parts.limits_rad_s[0]
     return [f"lowest rotor speed of {low:.4g} rad/s: rotors may stand still there"] if low > 0 else []
@@ -422,7 +423,7 @@ def sdf(vehicle: Vehicle) -> Exported:
     `src/systems/multicopter_motor_model`; the models of PX4's x500.
     """
     parts = parts_of(vehicle, KNOWS["sdf"])
-    left = [*parts.left_out, *left_of_gazebo(vehicle), *_left_of_the_lowest_speed(parts)]
+    left = [*parts.left_out, *left_of_gazebo(vehicle), *left_of_the_lowest_speed(parts)]
     up, down = parts.tau_s
     if up == 0:
         left.append(f"rotors that follow at once: Gazebo's motor model needs a lag, {AT_ONCE_S:g} s is taken")
@@ -507,7 +508,7 @@ def _gym_pybullet_drones(vehicle: Vehicle) -> Exported:
     `BaseAviary._parseURDFParameters`, `_physics`, `_drag`, `_groundEffect`, and `cf2x.urdf`.
     """
     parts = parts_of(vehicle, KNOWS["gym-pybullet-drones"])
-    left = [*parts.left_out, *_left_of_the_lowest_speed(parts)]
+    left = [*parts.left_out, *left_of_the_lowest_speed(parts)]
     if parts.drag[0]:
         left.append("rotor drag at the hubs: it acts at the centre of mass there, and with Physics.PYB_DRAG alone")
     order, turned = _round_the_left(parts.places, vehicle.yaw_signs(), vehicle.name)

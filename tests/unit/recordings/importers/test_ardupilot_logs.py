@@ -32,7 +32,6 @@ def tables(values: dict[str, float], **more: pd.DataFrame) -> dict[str, pd.DataF
 
 
 def public(name: str) -> Path:
-    pytest.importorskip("pymavlink")
     return public_logs.public(Path("logs") / "ardupilot" / name)
 
 
@@ -79,7 +78,7 @@ def test_a_battery_of_zero_throughout_is_not_measured() -> None:
 
 def plain(path: Path, *kinds: str) -> dict[str, pd.DataFrame]:
     """Rows of a log by pymavlink alone."""
-    from pymavlink import mavutil
+    mavutil = pytest.importorskip("pymavlink.mavutil")
 
     log, rows = mavutil.mavlink_connection(str(path)), {kind: [] for kind in kinds}
     while (message := log.recv_match(type=list(kinds))) is not None:
@@ -350,7 +349,6 @@ def test_the_frame_is_the_one_that_flew() -> None:
 
 
 def test_a_log_cut_off_anywhere_keeps_every_whole_message(tmp_path: Path) -> None:
-    pytest.importorskip("pymavlink")
     data, path = dataflash(flown().iloc[:40], PARAMETERS), tmp_path / "log.bin"
     whole = sum(map(len, (plain := ardupilot.read_messages(written(path, data))).values()))
     assert ardupilot.END not in plain

@@ -90,8 +90,8 @@ def test_a_csv_that_is_in_the_air_throughout_keeps_every_row(tmp_path: Path, tem
 @pytest.mark.parametrize(
     ("log", "needs", "flights"),
     [
-        ("logs/ardupilot/copter-3.4_22.BIN", "pymavlink", [20.2, 53.9, 15.7]),
-        ("logs/ardupilot/copter-3.3-dev_31.BIN", "pymavlink", [132.8, 63.1, 31.6, 10.5, 83.2, 22.0]),
+        ("logs/ardupilot/copter-3.4_22.BIN", "rotorid", [20.2, 53.9, 15.7]),
+        ("logs/ardupilot/copter-3.3-dev_31.BIN", "rotorid", [132.8, 63.1, 31.6, 10.5, 83.2, 22.0]),
         ("logs/betaflight/shortLog.BFL", "rotorid", [14.9]),
         ("px4-ulog/sample_px4_events.ulg", "pyulog", [6.6]),
         ("crazyflie-arpl/log10", "rotorid", [35.1]),

@@ -18,6 +18,7 @@ from rotorid.recordings import columns as c
 from rotorid.recordings.importers.known import ORDERS, quad_x
 from rotorid.recordings.importers.logfile import format_of, read_log
 from tests.command_line import answer, invoke, refusal
+from tests.public_logs import public
 from tests.refusals import refused
 
 RATE_HZ, SECONDS, REST_S = 100.0, 12.0, 2.0
@@ -191,7 +192,6 @@ PARAMETERS |= {f"SERVO{n}_FUNCTION": 28 + n for n in range(5, 9)}
 
 @pytest.mark.parametrize("before_4_1", [False, True])
 def test_ardupilot(before_4_1: bool, tmp_path: Path) -> None:
-    pytest.importorskip("pymavlink")
     path, truth = tmp_path / "00000001.BIN", flown()
     path.write_bytes(dataflash(truth, PARAMETERS, before_4_1))
     found = read_log(path)
@@ -203,7 +203,6 @@ def test_ardupilot(before_4_1: bool, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("form", "order"), [(1, "ardupilot"), (12, "betaflight"), (0, "")])
 def test_the_frame_type_says_the_order_of_the_rotors(tmp_path: Path, form: int, order: str) -> None:
-    pytest.importorskip("pymavlink")
     path = tmp_path / "log.bin"
     path.write_bytes(dataflash(flown(), PARAMETERS | {"FRAME_TYPE": form}))
     found = read_log(path)
@@ -365,11 +364,20 @@ def test_a_file_that_is_cut_off_or_broken_gets_one_sentence(tmp_path: Path, head
 def test_a_missing_package_is_named_with_how_to_get_it(tmp_path: Path, monkeypatch) -> None:
     import sys
 
+    path = tmp_path / "log.bag"
+    path.write_bytes(b"#ROSBAG V2.0\n" + bytes(64))
+    for module in [m for m in sys.modules if m.split(".")[0] == "rosbags"] + ["rosbags"]:
+        monkeypatch.setitem(sys.modules, module, None)
+    refused(r"pip install 'rotorid\[ros\]'", read_log, path)
+
+
+def test_dataflash_needs_no_package_of_others(tmp_path: Path, monkeypatch) -> None:
+    import sys
+
+    monkeypatch.setitem(sys.modules, "pymavlink", None)
     path = tmp_path / "log.bin"
     path.write_bytes(dataflash(flown(), PARAMETERS))
-    for module in [m for m in sys.modules if m.split(".")[0] == "pymavlink"] + ["pymavlink"]:
-        monkeypatch.setitem(sys.modules, module, None)
-    refused(r"pip install 'rotorid\[ardupilot\]'", read_log, path)
+    assert list(read_log(path).runs) == ["log"]
 
 
 @pytest.mark.parametrize(
@@ -377,6 +385,7 @@ def test_a_missing_package_is_named_with_how_to_get_it(tmp_path: Path, monkeypat
     [
         (b"\xff" * 40 + b"H Product:Blackbox flight data recorder\n", "betaflight"),
         (bytes(7) + b"\xa3\x95\x80\x80\x59FMT\0", "ardupilot"),
+        (b"\0" + b"ULog\x01\x12\x35\x01", "px4"),
         (b"\xbc\x02\x00\x01\x00\x07\x00fixedFrequency\0", "crazyflie"),
         (b"\xbc\xff\xff\xff\xff\x07\x00\x01", None),
         ((1_700_000_000_000_000).to_bytes(8, "big") + b"\xfd" + bytes(40), None),
@@ -388,6 +397,23 @@ def test_a_format_is_recognised_by_more_than_its_first_byte(tmp_path: Path, star
         refused("not a log that rotorid knows|telemetry log of MAVLink", format_of, tmp_path / "log.dat")
     else:
         assert format_of(tmp_path / "log.dat") == name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "log",
+    ["px4-flight-review/motor_failure.ulg", "logs/ardupilot/copter-3.4_22.BIN", "logs/betaflight/shortLog.BFL"],
+)
+def test_stray_bytes_before_the_first_header_cost_nothing(tmp_path: Path, log: str) -> None:
+    whole = public(log)
+    damaged = tmp_path / whole.name
+    damaged.write_bytes(b"\0\xff\x17" + whole.read_bytes())
+    plain, found = read_log(whole), read_log(damaged)
+    assert list(found.runs) == list(plain.runs)
+    for name, table in plain.runs.items():
+        pd.testing.assert_frame_equal(found.runs[name], table)
+    if found.format == "px4":
+        assert any("3 bytes stand in front of the header" in fault.sentence for fault in found.faults)
 
 
 def test_a_folder_is_a_bag_only_with_its_metadata(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import pandas as pd
 
 from rotorid.recordings import RecordingSet, write_set
 from rotorid.recordings.templates import read
-from rotorid.report.fleet import change_points, history, sets_of_vehicles, shown_by
+from rotorid.report.fleet import change_points, history, sets_of_vehicles, shown_by, vehicle_page
 from rotorid.report.plots.mismatch import draw_history
 from rotorid.vehicle.control import swings
 from workflow.scripts import fleet_history
@@ -87,7 +87,7 @@ def test_the_history_is_drawn(tmp_path: Path):
 
 def test_a_vehicle_has_a_page_with_its_events_and_every_quantity(tmp_path: Path):
     numbers, events = made()
-    fleet_history.write_page("heron <1>", numbers, events, tmp_path / "heron.html")
+    (tmp_path / "heron.html").write_text(vehicle_page("heron <1>", numbers, events), encoding="utf-8")
     page = (tmp_path / "heron.html").read_text(encoding="utf-8")
     assert "heron &lt;1&gt;" in page and "6 sets, from heron-2026-10-01 to heron-2026-10-06" in page
     assert page.count("<svg") == 1 and "heron, from heron-2026-10-05 on: " in page

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
-from scipy.integrate import cumulative_trapezoid
+import scipy
 from scipy.spatial.transform import Rotation
 
 from rotorid.recordings.importers.guessing import names as named
@@ -100,7 +100,7 @@ def integrated(instants: np.ndarray, time_s: np.ndarray, values: np.ndarray) -> 
     known = np.isfinite(values).all(axis=1)
     if known.sum() < 2:
         return np.full((len(instants) - 1, values.shape[1]), np.nan)
-    total = cumulative_trapezoid(values[known], time_s[known], axis=0, initial=0)
+    total = scipy.integrate.cumulative_trapezoid(values[known], time_s[known], axis=0, initial=0)
     return changes(instants, time_s[known], total)
 
 

@@ -1,0 +1,180 @@
+"""What logs hold, said before anything is computed: flights, rates, what can be asked, what must be known, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from rotorid.errors import InputError
+from rotorid.recordings import RecordingSet, Run, Vehicle, templates
+from rotorid.recordings import columns as c
+from rotorid.recordings.check import check_set
+from rotorid.recordings.files import proposed_in, vehicle_of
+from rotorid.recordings.sufficient import sufficient
+
+_FORMATS = {
+    "px4": "PX4 ULog", "betaflight": "Betaflight blackbox", "ardupilot": "ArduPilot DataFlash",
+    "crazyflie": "Crazyflie log", "ros": "ROS bag", "neurobem": "NeuroBEM recording", "csv": "table (CSV)",
+    "parquet": "table (Parquet)", "rcbenchmark": "RCbenchmark stand",
+}  # fmt: skip
+_USUAL = "x500"
+"""Template with which logs that say nothing of their vehicle are looked at; the visitor must choose one."""
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What a visitor says of logs; what is empty is proposed."""
+
+    mass_kg: float | None = None
+    like: str = ""
+    """A template vehicle."""
+    vehicle: str = ""
+    """Text of a `vehicle.yaml`, in place of mass and template."""
+    mapping: str = ""
+    """Text of a mapping of a table's columns."""
+
+    @classmethod
+    def of(cls, said: Any) -> Wishes:
+        """Of what the form sent; InputError where it is none of this."""
+        if not isinstance(said, dict):
+            raise InputError("the form sent no values")
+        mass = said.get("mass_kg")
+        if mass is not None and (not isinstance(mass, int | float) or isinstance(mass, bool) or not 1e-3 < mass < 1e4):
+            raise InputError("the mass is expected in kg, a number of more than 0.001")
+        texts = {name: said.get(name) or "" for name in ("like", "vehicle", "mapping")}
+        if wrong := [name for name, text in texts.items() if not isinstance(text, str)]:
+            raise InputError(f"{wrong[0]} is expected as text")
+        return cls(mass, **texts)
+
+    def files(self, folder: Path) -> tuple[float | None, str | None, Path | None, Path | None]:
+        """Mass, template, vehicle's file and mapping's file, as the importers take them; the texts are written."""
+        paths = []
+        for name in ("vehicle", "mapping"):
+            path, text = folder / f"stated_{name}.yaml", getattr(self, name)
+            if text.strip():
+                path.write_text(text, encoding="utf-8")
+            else:
+                path.unlink(missing_ok=True)
+            paths.append(path if text.strip() else None)
+        vehicle, mapping = paths
+        return (None, None, vehicle, mapping) if vehicle else (self.mass_kg, self.like or None, None, mapping)
+
+
+def look(folder: Path, logs: Sequence[Path], wishes: Wishes) -> dict[str, Any]:
+    """What `logs` hold, as the page shows it; texts that the wishes state are written into `folder`.
+
+    InputError in one sentence where they cannot be read. Of a table whose columns nobody knows the answer has a
+    proposal of what they are (`mapping`, `evidence`, `open`) and no flights.
+    """
+    from rotorid.recordings.importers.logfile import format_of, set_of_logs
+    from rotorid.recordings.importers.mapping import read_mapping
+
+    mass_kg, like, vehicle, mapping = wishes.files(folder)
+    formats = [format_of(path) for path in logs]
+    if mapping is None and formats[0] in ("csv", "parquet") and (guessed := _guessed(logs[0])):
+        return guessed | {"format": _FORMATS[formats[0]], "templates": known_templates()}
+    unknown = like is None and vehicle is None and not _says_what_it_is(formats[0])
+    read = read_mapping(mapping) if mapping else None
+    found = set_of_logs(logs, logs[0].name.split(".")[0], mass_kg, like or (_USUAL if unknown else None), vehicle, read)
+    believed = vehicle_of(_parsed(found.vehicle_text), "the vehicle")
+    runs = tuple(Run(name, table) for name, table in sorted(found.runs.items()))
+    recordings = RecordingSet(found.name, believed, runs, proposed=proposed_in(found.vehicle_text))
+    refused = ""
+    try:
+        sufficient(recordings)
+    except InputError as error:
+        refused = str(error)
+    checked = check_set(recordings)
+    mass_why = next((r for r in found.remarks if r.startswith("the mass is")), "as you stated it")
+    return {
+        "format": ", ".join(dict.fromkeys(_FORMATS[kind] for kind in formats)),
+        "runs": [asdict(run) for run in checked.runs],
+        "can": _can(recordings, checked.columns),
+        "cannot": list(checked.lacks),
+        "doubts": [{"sentence": str(d), "stops": d.stops} for d in checked.doubts],
+        "found": list(found.sentences),
+        "refused": refused,
+        "unknown_vehicle": unknown,
+        "mass_kg": believed.mass_kg,
+        "mass_why": mass_why.replace(" and give --mass-kg", ""),
+        "remarks": [r for r in found.remarks if r != mass_why],
+        "like": like or ("" if unknown else _template_of(found.remarks)),
+        "templates": known_templates(),
+        "vehicle": found.vehicle_text,
+        "mapping": wishes.mapping,
+        "rotors": [r.model_dump() for r in believed.rotors or ()],
+        "kind": believed.kind,
+    }
+
+
+def _parsed(text: str) -> dict[str, Any]:
+    from rotorid.io.text.files import parse_yaml
+
+    return parse_yaml(text, "the vehicle")
+
+
+def _says_what_it_is(kind: str) -> bool:
+    from rotorid.recordings.importers.logfile import TEMPLATES
+
+    return kind in TEMPLATES
+
+
+def _template_of(remarks: Sequence[str]) -> str:
+    """The template that the proposal took; the remarks name it."""
+    return next((name for name in sorted(templates.names(), key=len, reverse=True) if name in " ".join(remarks)), "")
+
+
+@cache
+def known_templates() -> list[dict[str, Any]]:
+    """Name and description of each template of a vehicle that flies."""
+    known = {name: templates.read(name) for name in templates.names()}
+    return [{"name": n, "says": f"{v.name}, {v.mass_kg:g} kg"} for n, v in known.items() if v.kind == "flight"]
+
+
+def _guessed(path: Path) -> dict[str, Any] | None:
+    """What the columns of a table seem to be; None where they have the contract's names."""
+    from rotorid.recordings.importers.guessing import as_text, guess
+    from rotorid.recordings.importers.mapping import read_columns
+
+    raw = read_columns(path)
+    if c.TIME in raw.columns and sum(c.is_known(name) for name in raw.columns) > 1:
+        return None
+    found = guess(raw)
+    return {
+        "mapping": as_text(found, path.name),
+        "evidence": [f"{name}: {why}" for name, why in found.evidence.items()],
+        "open": [f"{name}: {question}" for name, question in found.open.items()],
+        "left_out": list(found.left_out),
+    }
+
+
+def _can(recordings: RecordingSet, columns: Sequence[str]) -> list[str]:
+    """What the columns allow to be asked, one sentence each."""
+    vehicle: Vehicle = recordings.vehicle
+    if vehicle.kind != "flight":
+        return ["Thrust and torque of the rotors against what the stand read."]
+
+    def has(*names: str) -> bool:
+        return set(names) <= set(columns)
+
+    count, out = vehicle.rotor_count, []
+    speeds = has(*c.rotor_columns("rotor_speed", count))
+    drives = has(*c.rotor_columns("throttle", count)) or has(*c.rotor_columns("rotor_command", count))
+    if speeds:
+        out.append(
+            "Rotor speeds are recorded: thrust, mass, battery and differences between rotors can be distinguished."
+        )
+    if drives:
+        out.append("Commands are recorded: how thrust follows them (curve, lag, delay) can be asked.")
+    if has(*c.SPECIFIC_FORCE):
+        out.append("The accelerometer is there: forces are compared with those that the model expects.")
+    if has(*c.ANGULAR_VELOCITY):
+        out.append("The gyroscope is there: moments, the inertia and the places of rotors and weights can be asked.")
+    if has(*c.VELOCITY) or has(*c.POSITION):
+        out.append("Velocity is there: drag of rotors and frame, and wind, can be asked.")
+    if has(c.BATTERY_VOLTAGE):
+        out.append("The battery's voltage is there: how thrust falls with it can be asked.")
+    return out
