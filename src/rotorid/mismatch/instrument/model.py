@@ -57,6 +57,8 @@ _ROWS_PER_COLUMN = 8
 _STRONGEST = 0.9
 """Quantile of the seconds' energies above which a contribution's size is taken: what shows only after a change of load
 is in few of them."""
+_MOST_OF_IT = 0.5
+"""Share of what a nameless id explains from which a named one is not given up for it."""
 _ROUNDS = 4
 _SETTLED = 1e-3
 """Relative change of nonlinear parameters from round to round below which they have settled."""
@@ -93,12 +95,25 @@ class ReadingSearch(Search):
         return iter(()) if len(active) >= _MOST_AT_ONCE else super().candidates(active, *rest)
 
     def swapped(self, active, dropped):
-        """A model with one id in another's place, of which no nameless one takes a named one's.
+        """A model with one id in another's place; no nameless one takes that of a named one that explains most of it.
 
-        What mixes the loads anew in each run holds every crosstalk and a little more; it may only join.
+        What mixes the loads anew in each run holds every crosstalk of runs that load one axis each, and a little more.
         """
+        found = super().swapped(active, dropped)
+        if found is None or not self._displaces_a_name(active, found):
+            return found
         nameless = {t.once for t in self.terms.values() if t.effect in UNKNOWNS}
         return super().swapped(active, {**dropped, **dict.fromkeys(nameless, "without a name")})
+
+    def _displaces_a_name(self, active: list[str], found: list[str]) -> bool:
+        """Whether a nameless id stands in `found` for named ones that explain most of what it does."""
+        new = [k for k in found if k not in active]
+        gone = [k for k in active if k not in found]
+        if not any(self.terms[k].effect in UNKNOWNS for k in new) or not gone:
+            return False
+        rest = [*self.always, *(k for k in found if k in active)]
+        base, named, nameless = (self.regression.explained([*rest, *own]) for own in ([], gone, new))
+        return named - base > _MOST_OF_IT * (nameless - base)
 
     def unsteady(self, active):
         """None: an instrument's runs load different axes, and no coefficient could be asked of each."""
