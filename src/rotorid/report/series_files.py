@@ -17,7 +17,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.mismatch.decide.findings import Analysis
+from rotorid.mismatch.decide.findings import Analysis, by_channel
 from rotorid.mismatch.decide.sizes import segments_of, shares
 
 _COLOURS = ("#d55e00", "#e69f00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#000000", "#f0e442")
@@ -38,7 +38,7 @@ class _Series:
 
 def series_of(analysis: Analysis) -> list[_Series]:
     """Every channel of every run, in the order of time."""
-    added = shares(analysis, segments_of(analysis))
+    added = shares(analysis, segments_of(analysis), by_channel(analysis.traces))
     seen: dict[str, int] = {}
     out = []
     for trace in analysis.traces:

@@ -205,7 +205,7 @@ def _in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[_Dropout]:
 
 
 def _not_asked_for(run: Run, vehicle: Vehicle, name: str, mask: np.ndarray) -> np.ndarray:
-    """A mask less its stretches in which the rotor's own command stands still too: it turned as it was told to, or the
+    """A mask less its stretches in which the rotor's own command stands still too: it turned as it was asked to, or the
     reading is an echo of the command."""
     kind, number = c.rotor_number(name)
     commands = [c.rotor_columns(f, vehicle.rotor_count)[number - 1] for f in ("rotor_command", "throttle") if f != kind]
