@@ -33,7 +33,7 @@ site: $(READY) ## the pages as a site, strictly: results/site/index.html (SERVE=
 	@echo "The site: results/site/index.html"
 
 campaign: $(READY) ## record the emulated campaign anew into raw/campaign
-	@$(BIN)/python -m rotorid.acquire.campaign
+	@$(BIN)/python -m rotorid_acquire.campaign
 
 proof: $(READY) ## hide, find, score: about two hours; what is done stays done (kept in docs/proof)
 	@$(BIN)/snakemake --cores $(CORES) proof $(OPTIONS)

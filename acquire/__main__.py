@@ -1,5 +1,5 @@
 """`python -m acquire` in a clone is `rotorid-acquire`."""
 
-from rotorid.acquire.cli import app
+from rotorid_acquire.cli import app
 
 app()

@@ -22,10 +22,10 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 import skfem
 
-from rotorid.identify.bench import read_geometry
-from rotorid.identify.fem import studies
-from rotorid.identify.fem.bench import judge_statements, ratios
-from rotorid.identify.fem.placement import read_assumed, read_moduli
+from rotorid_lab.bench import read_geometry
+from rotorid_lab.fem import studies
+from rotorid_lab.fem.bench import judge_statements, ratios
+from rotorid_lab.fem.placement import read_assumed, read_moduli
 
 ROOT = Path(__file__).resolve().parents[1]
 DRAWS, SEED = 12, 1

@@ -23,8 +23,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from pyulog import ULog
 
 from rotorid.errors import InputError
-from rotorid.io.logs import read_log
 from rotorid.recordings.importers.logfile import read_log as import_log
+from rotorid_acquire.io.logs import read_log
 
 ROOT = Path(__file__).resolve().parents[1]
 REPEATS = 3

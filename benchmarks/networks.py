@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 import pandas as pd
 
-from rotorid.identify.black_box import fit_thesis_network
+from rotorid_lab.black_box import fit_thesis_network
 from tests.unit.identify.blackbox.samples import generated_experiments
 from tests.unit.vehicle.thesis import thesis_vehicle
 

@@ -28,11 +28,11 @@ import numpy as np
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.instant import Wrench
-from rotorid.vehicle.batch import Batch
 from rotorid.vehicle.control import AttitudePid, training_reference
 from rotorid.vehicle.improved import active_forms
 from rotorid.vehicle.simulator import Commands, Motors, Start, simulate
 from rotorid.vehicle.windows import Inputs, States, simulate_windows
+from rotorid_lab.batch import Batch
 from tests.unit.effects.flown import audit_vehicle, entry, typical_values
 from tests.unit.vehicle.test_simulator import UP_LEFT, rotorpy_vehicle, wiggle
 

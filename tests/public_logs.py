@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from rotorid.io.public_list import read_manifest
-from rotorid.recordings.importers.public_sets import PUBLIC_SETS, build, obtain, sha256
+from rotorid_lab.public_list import read_manifest
+from rotorid_lab.public_sets import PUBLIC_SETS, build, obtain, sha256
 
 _named = os.environ.get("ROTORID_PUBLIC_DATA")
 ROOT = Path(__file__).resolve().parents[1]

@@ -231,7 +231,7 @@ def signatures() -> dict[str, str]:
     """To the path of each effect's picture its SVG, drawn from the effect's own equations."""
     from rotorid.effects.catalogue import catalogue
     from rotorid.report.plots import style
-    from rotorid.report.plots.signature import signature, signature_figure
+    from rotorid_lab.plots.signature import signature, signature_figure
 
     found = {}
     with tempfile.TemporaryDirectory() as folder:

@@ -1,6 +1,6 @@
 """Verdicts on the campaign's own sets against what the emulators were given.
 
-The truth is stated in the words of the catalogue by the emulators' side (`rotorid.acquire.emulators.physics`).
+The truth is stated in the words of the catalogue by the emulators' side (`rotorid_acquire.emulators.physics`).
 """
 
 from __future__ import annotations

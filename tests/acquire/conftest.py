@@ -8,15 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from rotorid.acquire.emulators.devices import Faults
-from rotorid.acquire.emulators.ports import EmulatedPorts, build
-from rotorid.acquire.emulators.truth import Truth
-from rotorid.acquire.recorder import Recorder, Timings
-from rotorid.acquire.transport import LoopbackTransport, SerialTransport, SystemClock, VirtualClock
-from rotorid.io.logs import Log, read_log
-from rotorid.io.wire import INSTRUMENTS
+from rotorid_acquire.emulators.devices import Faults
+from rotorid_acquire.emulators.ports import EmulatedPorts, build
+from rotorid_acquire.emulators.truth import Truth
+from rotorid_acquire.io.logs import Log, read_log
+from rotorid_acquire.io.wire import INSTRUMENTS
+from rotorid_acquire.recorder import Recorder, Timings
+from rotorid_acquire.transport import LoopbackTransport, SerialTransport, SystemClock, VirtualClock
 
-ACQUIRE = (sys.executable, "-m", "rotorid.acquire")
+ACQUIRE = (sys.executable, "-m", "rotorid_acquire")
 QUICK = Timings(poll_s=0.02, reply_s=0.5, tries=3, silence_s=2.0, retry_open_s=0.002, reconnect_s=5.0)
 
 

@@ -9,8 +9,8 @@ from zipfile import ZipFile
 
 import pytest
 
-from rotorid.acquire.run_plan import read_plan, steps_of
-from rotorid.io.lines import read_description
+from rotorid_acquire.io.lines import read_description
+from rotorid_acquire.run_plan import read_plan, steps_of
 
 ROOT = Path(__file__).parents[2]
 BENCH = ROOT / "acquire"

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotorid.acquire.campaign import COMBINATIONS, PARTS, run_campaign, weight_gf
-from rotorid.acquire.emulators.truth import SLOPE, body_forces, cell_forces
-from rotorid.io.logs import read_log
-from rotorid.io.session import read_index, read_session
+from rotorid_acquire.campaign import COMBINATIONS, PARTS, run_campaign, weight_gf
+from rotorid_acquire.emulators.truth import SLOPE, body_forces, cell_forces
+from rotorid_acquire.io.logs import read_log
+from rotorid_acquire.io.session import read_index, read_session
 
 RAW = Path(__file__).parents[2] / "raw"
 SEALED = Path(__file__).parents[1] / "sealed" / "campaign_truth.yaml"

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from rotorid.acquire import procedures
-from rotorid.acquire.cli import app, stable_name, udev_rule, who_is_there
-from rotorid.acquire.emulators.truth import GF_N, body_forces, cell_forces
-from rotorid.acquire.view import Plot, bench_forces, braille, panel, watch
-from rotorid.identify import clocks
-from rotorid.identify.stand import read_pairs
-from rotorid.io.logs import read_log, read_tables
-from rotorid.io.session import read_index
+from rotorid_acquire import procedures
+from rotorid_acquire.cli import app, stable_name, udev_rule, who_is_there
+from rotorid_acquire.emulators.truth import GF_N, body_forces, cell_forces
+from rotorid_acquire.io.logs import read_log, read_tables
+from rotorid_acquire.io.session import read_index
+from rotorid_acquire.view import Plot, bench_forces, braille, panel, watch
+from rotorid_lab import clocks
+from rotorid_lab.stand import read_pairs
 from tests.acquire.conftest import ACQUIRE
 from tests.acquire.fault_table import seen
 from tests.command_line import answer, invoke
@@ -260,6 +260,6 @@ def test_braille_curve_by_hand():
 def test_starting_imports_nothing_that_only_analysis_needs() -> None:
     """A person at the bench waits for it at every command: numpy is a quarter of a second, pandas and scipy more."""
     heavy = "('numpy', 'pandas', 'scipy', 'matplotlib', 'numba')"
-    code = f"import sys, rotorid.acquire.cli; print(*[m for m in {heavy} if m in sys.modules])"
+    code = f"import sys, rotorid_acquire.cli; print(*[m for m in {heavy} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from rotorid.acquire import procedures
-from rotorid.acquire.recorder import Recorder, Timings
-from rotorid.acquire.transport import PortLost, SystemClock
-from rotorid.io.frames import COMMAND, decode
-from rotorid.io.logs import read_log
-from rotorid.io.rawlog import RECEIVED, SENT, read_raw
-from rotorid.io.wire import INSTRUMENTS, TRAPEZOID, Programme, pack_initialise, pack_throttle
+from rotorid_acquire import procedures
+from rotorid_acquire.io.frames import COMMAND, decode
+from rotorid_acquire.io.logs import read_log
+from rotorid_acquire.io.rawlog import RECEIVED, SENT, read_raw
+from rotorid_acquire.io.wire import INSTRUMENTS, TRAPEZOID, Programme, pack_initialise, pack_throttle
+from rotorid_acquire.recorder import Recorder, Timings
+from rotorid_acquire.transport import PortLost, SystemClock
 from tests.acquire.conftest import recorded
 
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from rotorid.acquire.cli import app
-from rotorid.io.session import Ended
-from rotorid.io.wire import INSTRUMENTS
+from rotorid_acquire.cli import app
+from rotorid_acquire.io.session import Ended
+from rotorid_acquire.io.wire import INSTRUMENTS
 
 DOCS = Path(__file__).parents[2] / "docs"
 WIRE = (DOCS / "wire-formats.md").read_text(encoding="utf-8")

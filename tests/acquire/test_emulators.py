@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from rotorid.acquire.emulators.devices import programme_share
-from rotorid.acquire.emulators.physics import (
+from rotorid_acquire.emulators.devices import programme_share
+from rotorid_acquire.emulators.physics import (
     GAUGE_MM,
     SECTION_MM2,
     Battery,
@@ -18,8 +18,8 @@ from rotorid.acquire.emulators.physics import (
     TurningRotors,
     tilt_matrix,
 )
-from rotorid.acquire.emulators.ports import build
-from rotorid.acquire.emulators.truth import (
+from rotorid_acquire.emulators.ports import build
+from rotorid_acquire.emulators.truth import (
     GF_N,
     BatteryTruth,
     BenchTruth,
@@ -36,8 +36,8 @@ from rotorid.acquire.emulators.truth import (
     read_truth,
     write_truth,
 )
-from rotorid.acquire.procedures import Steadiness, SteadyRule, programme_of
-from rotorid.io.wire import EXPERIMENTS, GREEN, RED, SINE, TRAPEZOID, YELLOW, Programme
+from rotorid_acquire.io.wire import EXPERIMENTS, GREEN, RED, SINE, TRAPEZOID, YELLOW, Programme
+from rotorid_acquire.procedures import Steadiness, SteadyRule, programme_of
 
 RNG = np.random.default_rng
 

@@ -14,17 +14,17 @@ from pathlib import Path
 
 import pytest
 
-from rotorid.acquire import procedures
-from rotorid.acquire.cli import app
-from rotorid.acquire.emulators.devices import Faults
-from rotorid.acquire.recorder import Recorder, Timings, _source
-from rotorid.acquire.transport import AcquireError, SystemClock
-from rotorid.io import rawlog, wire
-from rotorid.io.frames import ANSWER, DATA, END, START, Frame, StreamDecoder, encode
-from rotorid.io.logs import read_log, read_tables
-from rotorid.io.rawlog import read_raw
-from rotorid.io.session import Ended, Session, read_session, session_path, write_session
-from rotorid.io.wire import TRAPEZOID, Programme
+from rotorid_acquire import procedures
+from rotorid_acquire.cli import app
+from rotorid_acquire.emulators.devices import Faults
+from rotorid_acquire.io import rawlog, wire
+from rotorid_acquire.io.frames import ANSWER, DATA, END, START, Frame, StreamDecoder, encode
+from rotorid_acquire.io.logs import read_log, read_tables
+from rotorid_acquire.io.rawlog import read_raw
+from rotorid_acquire.io.session import Ended, Session, read_session, session_path, write_session
+from rotorid_acquire.io.wire import TRAPEZOID, Programme
+from rotorid_acquire.recorder import Recorder, Timings, _source
+from rotorid_acquire.transport import AcquireError, SystemClock
 from tests.acquire.conftest import ACQUIRE, QUICK, recorded
 from tests.acquire.fault_table import TABLE, seen
 from tests.acquire.test_faults import assert_metadata_agree, record

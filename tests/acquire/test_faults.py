@@ -11,15 +11,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotorid.acquire import procedures
-from rotorid.acquire import transport as t
-from rotorid.acquire.emulators.devices import Faults
-from rotorid.acquire.transport import AcquireError, Refused, SerialTransport
-from rotorid.io import wire
-from rotorid.io.frames import Quality
-from rotorid.io.logs import Log, read_log
-from rotorid.io.session import Ended, read_session
-from rotorid.io.wire import TRAPEZOID, Programme
+from rotorid_acquire import procedures
+from rotorid_acquire import transport as t
+from rotorid_acquire.emulators.devices import Faults
+from rotorid_acquire.io import wire
+from rotorid_acquire.io.frames import Quality
+from rotorid_acquire.io.logs import Log, read_log
+from rotorid_acquire.io.session import Ended, read_session
+from rotorid_acquire.io.wire import TRAPEZOID, Programme
+from rotorid_acquire.transport import AcquireError, Refused, SerialTransport
 from tests.acquire.conftest import ACQUIRE, QUICK, recorded
 from tests.acquire.fault_table import seen
 

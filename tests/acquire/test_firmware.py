@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotorid.acquire import procedures
-from rotorid.acquire.recorder import Recorder, Timings
-from rotorid.acquire.transport import AcquireError, Refused
-from rotorid.io.logs import Log, read_log
-from rotorid.io.session import Ended
-from rotorid.io.wire import SINE, TRAPEZOID, VOLTS_PER_COUNT, Programme
+from rotorid_acquire import procedures
+from rotorid_acquire.io.logs import Log, read_log
+from rotorid_acquire.io.session import Ended
+from rotorid_acquire.io.wire import SINE, TRAPEZOID, VOLTS_PER_COUNT, Programme
+from rotorid_acquire.recorder import Recorder, Timings
+from rotorid_acquire.transport import AcquireError, Refused
 from tests.acquire.conftest import QUICK, recorded
 from tests.acquire.fault_table import seen
 from tests.acquire.test_faults import assert_metadata_agree

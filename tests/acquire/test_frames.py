@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rotorid.io import wire
-from rotorid.io.frames import (
+from rotorid_acquire.io import wire
+from rotorid_acquire.io.frames import (
     DATA,
     START,
     BrokenFrame,

@@ -14,9 +14,13 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from rotorid.acquire.cli import app
-from rotorid.acquire.lines import record_lines
-from rotorid.acquire.transport import (
+from rotorid_acquire.cli import app
+from rotorid_acquire.io import rawlog
+from rotorid_acquire.io.lines import Description, LineDecoder, read_description, read_line_log
+from rotorid_acquire.io.rawlog import RECEIVED, read_raw
+from rotorid_acquire.io.session import Counts, Ended, Session, read_session, write_session
+from rotorid_acquire.lines import record_lines
+from rotorid_acquire.transport import (
     AcquireError,
     DeviceSilent,
     Interrupted,
@@ -26,11 +30,7 @@ from rotorid.acquire.transport import (
     SystemClock,
     VirtualClock,
 )
-from rotorid.acquire.view import LinesPanel, Plot
-from rotorid.io import rawlog
-from rotorid.io.lines import Description, LineDecoder, read_description, read_line_log
-from rotorid.io.rawlog import RECEIVED, read_raw
-from rotorid.io.session import Counts, Ended, Session, read_session, write_session
+from rotorid_acquire.view import LinesPanel, Plot
 from tests.acquire.fault_table import seen
 from tests.command_line import answer, invoke
 from tests.refusals import refused

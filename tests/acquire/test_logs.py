@@ -7,13 +7,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.acquire import procedures
-from rotorid.acquire.emulators.devices import Faults
-from rotorid.acquire.recorder import LogWriter
-from rotorid.io import rawlog
-from rotorid.io.logs import read_log
-from rotorid.io.rawlog import read_raw
-from rotorid.io.session import (
+from rotorid_acquire import procedures
+from rotorid_acquire.emulators.devices import Faults
+from rotorid_acquire.io import rawlog
+from rotorid_acquire.io.logs import read_log
+from rotorid_acquire.io.rawlog import read_raw
+from rotorid_acquire.io.session import (
     INDEX_COLUMNS,
     RoomAir,
     Session,
@@ -23,7 +22,8 @@ from rotorid.io.session import (
     write_index,
     write_session,
 )
-from rotorid.io.wire import EXPERIMENTS
+from rotorid_acquire.io.wire import EXPERIMENTS
+from rotorid_acquire.recorder import LogWriter
 from tests.acquire.conftest import recorded
 from tests.refusals import refused
 

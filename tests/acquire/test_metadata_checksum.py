@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from rotorid.acquire.cli import app
-from rotorid.io.logs import read_log
-from rotorid.io.session import INDEX_KEY, read_index, read_session, write_index
+from rotorid_acquire.cli import app
+from rotorid_acquire.io.logs import read_log
+from rotorid_acquire.io.session import INDEX_KEY, read_index, read_session, write_index
 from tests.acquire.fault_table import seen
 from tests.command_line import invoke
 from tests.refusals import refused

@@ -14,10 +14,12 @@ from pathlib import Path
 import pytest
 import yaml
 
-from rotorid.acquire import procedures
-from rotorid.acquire.cli import app
-from rotorid.acquire.procedures import record
-from rotorid.acquire.run_plan import (
+from rotorid_acquire import procedures
+from rotorid_acquire.cli import app
+from rotorid_acquire.io.logs import read_log
+from rotorid_acquire.io.session import Ended, read_index
+from rotorid_acquire.procedures import record
+from rotorid_acquire.run_plan import (
     CampaignPlan,
     Desk,
     attempts,
@@ -28,9 +30,7 @@ from rotorid.acquire.run_plan import (
     run,
     steps_of,
 )
-from rotorid.acquire.transport import AcquireError
-from rotorid.io.logs import read_log
-from rotorid.io.session import Ended, read_index
+from rotorid_acquire.transport import AcquireError
 from tests.acquire.fault_table import seen
 from tests.command_line import invoke
 from tests.refusals import refused
@@ -108,7 +108,7 @@ def test_steps_one_by_one_one_skipped_one_again_and_the_index(tmp_path, emulated
 def test_a_campaign_of_twenty_steps_killed_twice(tmp_path):
     """By the command line; what was killed has left its log, and the next start goes on."""
     plan = plan_with(tmp_path, ports={"bench": "/dev/b"})
-    command = [sys.executable, "-m", "rotorid.acquire", "campaign", str(tmp_path / "plan.yaml"), "--emulate"]
+    command = [sys.executable, "-m", "rotorid_acquire", "campaign", str(tmp_path / "plan.yaml"), "--emulate"]
     command += ["--speed", "50", "--place-s", "0.2"]
     for killed_at in (5, 12):
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -140,7 +140,7 @@ def test_curves_of_a_campaign_in_a_terminal(tmp_path):
     assert invoke(*words, "--plot", "throttle", app=app).exit_code == 2
     master, slave = pty.openpty()
     fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 50, 160, 0, 0))
-    command = [sys.executable, "-m", "rotorid.acquire", *words, "--plot", "cell_1_v", "--plot", "cell_4_v"]
+    command = [sys.executable, "-m", "rotorid_acquire", *words, "--plot", "cell_1_v", "--plot", "cell_4_v"]
     process = subprocess.Popen(command, stdin=slave, stdout=slave, stderr=slave, env=os.environ | {"TERM": "xterm"})
     os.close(slave)
     shown = b""

@@ -5,8 +5,8 @@ import time
 import numpy as np
 import pytest
 
-from rotorid.acquire import procedures
-from rotorid.io.logs import read_log
+from rotorid_acquire import procedures
+from rotorid_acquire.io.logs import read_log
 
 
 def record_at_1_khz(recorder, seconds: int) -> float:

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotorid.acquire.campaign import STATED
-from rotorid.acquire.emulators import physics
-from rotorid.acquire.emulators.physics import CORNERS
-from rotorid.acquire.emulators.truth import BenchTruth, SensorTruth, Truth, VehicleTruth, read_truth
+from rotorid_acquire.campaign import STATED
+from rotorid_acquire.emulators import physics
+from rotorid_acquire.emulators.physics import CORNERS
+from rotorid_acquire.emulators.truth import BenchTruth, SensorTruth, Truth, VehicleTruth, read_truth
 
 SEALED = Path(__file__).parents[1] / "sealed"
 

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotorid.acquire.campaign import SEED, run_campaign
-from rotorid.acquire.emulators.truth import draw_truth
-from rotorid.identify.rotor import torque_points
-from rotorid.io.logs import read_tables
+from rotorid_acquire.campaign import SEED, run_campaign
+from rotorid_acquire.emulators.truth import draw_truth
+from rotorid_acquire.io.logs import read_tables
+from rotorid_lab.rotor import torque_points
 
 
 def deviation(folder: Path, seed: int) -> float:

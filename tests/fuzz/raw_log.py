@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from rotorid.errors import InputError
-from rotorid.io import rawlog
-from rotorid.io.frames import DATA, END, START, Frame, encode
-from rotorid.io.lines import Description, LineDecoder
-from rotorid.io.logs import read_log
-from rotorid.io.wire import INSTRUMENTS, StartRecord
+from rotorid_acquire.io import rawlog
+from rotorid_acquire.io.frames import DATA, END, START, Frame, encode
+from rotorid_acquire.io.lines import Description, LineDecoder
+from rotorid_acquire.io.logs import read_log
+from rotorid_acquire.io.wire import INSTRUMENTS, StartRecord
 
 KINDS = (DATA, START, END, ord("A"), ord("C"), ord("x"))
 NAMES = (*INSTRUMENTS, "toaster")

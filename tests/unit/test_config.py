@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 import yaml
 
-from rotorid.config import SCHEMA_PATH, Config, check, schema_text
 from rotorid.errors import InputError
+from rotorid_lab.config import SCHEMA_PATH, Config, check, schema_text
 
 ROOT = Path(__file__).parents[2]
 
@@ -61,7 +61,7 @@ def test_a_missing_key_is_named(values: dict[str, Any]) -> None:
 
 
 def test_the_committed_schema_is_the_models_own() -> None:
-    assert SCHEMA_PATH.read_text() == schema_text(), "run: python -m rotorid.config --write-schema"
+    assert SCHEMA_PATH.read_text() == schema_text(), "run: python -m rotorid_lab.config --write-schema"
 
 
 def leaves(schema: dict[str, Any], whole: dict[str, Any], at: str = "") -> Iterator[tuple[str, dict[str, Any]]]:

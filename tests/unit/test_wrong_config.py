@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import yaml
 
-from rotorid.config import check, from_command_line
 from rotorid.errors import InputError
-from rotorid.identify.black_box import conformal_coverage, folds
+from rotorid_lab.black_box import conformal_coverage, folds
+from rotorid_lab.config import check, from_command_line
 from rotorid_proof import plan
 from tests.refusals import refused
 

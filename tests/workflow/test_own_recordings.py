@@ -12,8 +12,8 @@ import yaml
 from copied_project import Project
 from test_campaign import rewrite_index
 
-from rotorid.io import rawlog
-from rotorid.io.session import read_index, write_index
+from rotorid_acquire.io import rawlog
+from rotorid_acquire.io.session import read_index, write_index
 
 EXPERIMENTS = {"1", "3", "22", "23", "24", "27"}
 TARGETS = (

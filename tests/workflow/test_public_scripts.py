@@ -9,7 +9,7 @@ import pytest
 
 from rotorid.recordings import RecordingSet, Run, Vehicle, write_set
 from rotorid.recordings.importers.faults import ImportReport, read_report
-from rotorid.recordings.importers.public_sets import sets_of
+from rotorid_lab.public_sets import sets_of
 from tests.unit.mismatch.flights import Flight
 from workflow.scripts import (
     check_recordings,

@@ -41,7 +41,7 @@ def test_two_builds_give_the_same_bytes(built: Project, project: Project) -> Non
 
 
 def test_a_comment_in_library_or_script_reruns_nothing(built: Project) -> None:
-    library = built.root / "src/rotorid/report/typeset.py"
+    library = built.root / "src/rotorid_lab/typeset.py"
     script = built.root / "workflow/scripts/render_chapter.py"
     with edited(library, "import csv\n", "import csv  # rows\n"):
         with edited(script, "def main", "# The one function.\ndef main"):
@@ -56,7 +56,7 @@ def test_a_constant_two_imports_away_reruns_what_uses_it(built: Project) -> None
 
 
 def test_a_changed_formula_reruns_its_stage_and_what_follows_only(built: Project) -> None:
-    with edited(built.root / "src/rotorid/identify/loadcell.py", "a1 = sxy / sxx", "a1 = 2 * sxy / sxx"):
+    with edited(built.root / "src/rotorid_lab/loadcell.py", "a1 = sxy / sxx", "a1 = 2 * sxy / sxx"):
         assert built.would_run() == {"calibrate_load_cells", *AFTER_CALIBRATION}
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from rotorid.report import typeset
-from rotorid.report.typeset import render
+from rotorid_lab import typeset
+from rotorid_lab.typeset import render
 from tests.browser import CHROMIUM, Browser
 from tests.refusals import refused
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from copied_project import ROOT, Project
 
-from rotorid.io.public_list import read_manifest
-from rotorid.recordings.importers import public_sets
-from rotorid.report.typeset import render
+from rotorid_lab import public_sets
+from rotorid_lab.public_list import read_manifest
+from rotorid_lab.typeset import render
 from workflow.scripts import import_public
 
 NOWHERE = "http://127.0.0.1:9"

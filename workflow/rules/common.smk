@@ -9,9 +9,9 @@ from pathlib import Path
 
 from snakemake.persistence import PersistenceBase
 
-from rotorid.report import log as logs
+from rotorid_lab import log as logs
 from rotorid.report.provenance import Code
-from rotorid.config import check, from_command_line
+from rotorid_lab.config import check, from_command_line
 from rotorid.errors import InputError
 from rotorid.io.text.files import read_yaml
 

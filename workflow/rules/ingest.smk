@@ -1,7 +1,7 @@
 """From raw logs to tidy tables: one table of samples and one of recordings for each kind of test and instrument."""
 
 from rotorid.errors import InputError
-from rotorid.io.session import read_index
+from rotorid_acquire.io.session import read_index
 
 INDEX = f"{CONFIG.raw}/sessions.tsv"
 

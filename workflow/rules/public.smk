@@ -2,7 +2,7 @@
 
 import os
 
-from rotorid.io.public_list import of_one_motor, read_manifest
+from rotorid_lab.public_list import of_one_motor, read_manifest
 
 MANIFEST = "workflow/public_data.yaml"
 PUBLIC_SOURCES = read_manifest(MANIFEST)

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.identify.bench import bench_force, bench_set, read_geometry
-from rotorid.io.logs import read_sessions
 from rotorid.recordings import write_set
-from rotorid.report import log
+from rotorid_acquire.io.logs import read_sessions
+from rotorid_lab import log
+from rotorid_lab.bench import bench_force, bench_set, read_geometry
 
 
 def main(

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from rotorid.report import log, typeset
+from rotorid_lab import log, typeset
 
 if __name__ == "__main__":
     with log.to(snakemake.log[0]):

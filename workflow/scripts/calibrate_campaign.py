@@ -10,11 +10,10 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid.identify import bench as reconstruct
-from rotorid.identify import loadcell
-from rotorid.identify.loadcell import FLAG_LEVEL
-from rotorid.io.logs import read_sessions
-from rotorid.report import log
+from rotorid_acquire.io.logs import read_sessions
+from rotorid_lab import bench as reconstruct
+from rotorid_lab import loadcell, log
+from rotorid_lab.loadcell import FLAG_LEVEL
 
 LOGGER = logging.getLogger("rotorid.calibration")
 

@@ -13,9 +13,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid.identify import loadcell
-from rotorid.identify.loadcell import FLAG_LEVEL
-from rotorid.report import log
+from rotorid_lab import loadcell, log
+from rotorid_lab.loadcell import FLAG_LEVEL
 
 TUBE = "Carbon Fiber Tube"
 LOGGER = logging.getLogger("rotorid.calibration")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rotorid.errors import InputError
 from rotorid.recordings.check import as_text, check_folder
-from rotorid.report import log
+from rotorid_lab import log
 
 
 def main(folders: Sequence[str], out: str) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from rotorid.recordings import read_set
 from rotorid.recordings.importers.faults import read_report
-from rotorid.report import log
+from rotorid_lab import log
 from rotorid_proof.decisions import truths
 from rotorid_proof.decisions.collect import Made, collect
 from rotorid_proof.decisions.plan import Item, in_order

@@ -12,8 +12,9 @@ import numpy as np
 import pandas as pd
 from scipy.special import stdtrit as student_quantile
 
-from rotorid.identify import black_box
-from rotorid.identify.black_box import (
+from rotorid.recordings import read_vehicle
+from rotorid_lab import black_box, log
+from rotorid_lab.black_box import (
     INPUTS,
     OUTPUTS,
     conformal_coverage,
@@ -22,8 +23,6 @@ from rotorid.identify.black_box import (
     scores,
     within_training,
 )
-from rotorid.recordings import read_vehicle
-from rotorid.report import log
 
 ASKED = {
     "hover, level": (1.0, 1.0, 1.0, 1.0, 0.0, 0.0),

@@ -13,7 +13,7 @@ from rotorid.mismatch.changes.joint import reference_of
 from rotorid.mismatch.changes.words import quantity_words
 from rotorid.recordings import read_set
 from rotorid.recordings.importers.faults import read_report
-from rotorid.report import log
+from rotorid_lab import log
 
 
 def main(normal: str, changed: dict[str, str], found: str) -> None:

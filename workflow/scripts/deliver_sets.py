@@ -7,7 +7,7 @@
 import json
 from pathlib import Path
 
-from rotorid.report import log
+from rotorid_lab import log
 from rotorid_proof.delivered import rows_of
 
 

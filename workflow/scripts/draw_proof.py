@@ -5,8 +5,8 @@
 
 import pandas as pd
 
-from rotorid.report import log
 from rotorid.report.plots import style
+from rotorid_lab import log
 from rotorid_proof import plots as proof
 
 

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.identify.inertias import band_signals, fit_flights
 from rotorid.recordings import read_set
 from rotorid.recordings.importers.faults import read_report
-from rotorid.report import log
+from rotorid_lab import log
+from rotorid_lab.inertias import band_signals, fit_flights
 
 DELAYS_S = np.arange(0.0, 0.0201, 0.0025)
 COLUMNS = "set axis published lower estimate upper low_95 high_95 ratio r2 delay_ms".split()

@@ -12,8 +12,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.config import READING_S
-from rotorid.identify.grey_box import (
+from rotorid.recordings import read_vehicle
+from rotorid.vehicle.control import AttitudePid, training_reference, validation_reference
+from rotorid.vehicle.mixer import wrench_matrix
+from rotorid.vehicle.simulator import Disturbance, Motors, Start, simulate
+from rotorid_lab import log
+from rotorid_lab.config import READING_S
+from rotorid_lab.grey_box import (
     WEIGHT_NAMES,
     check_consistency,
     cut_windows,
@@ -22,12 +27,7 @@ from rotorid.identify.grey_box import (
     untied,
     weights_of_inertias,
 )
-from rotorid.identify.inertias import WINDOW_S, ExcitedHold, Readings, design, promised_errors, readings_at_hover
-from rotorid.recordings import read_vehicle
-from rotorid.report import log
-from rotorid.vehicle.control import AttitudePid, training_reference, validation_reference
-from rotorid.vehicle.mixer import wrench_matrix
-from rotorid.vehicle.simulator import Disturbance, Motors, Start, simulate
+from rotorid_lab.inertias import WINDOW_S, ExcitedHold, Readings, design, promised_errors, readings_at_hover
 
 AXES = ("xx", "yy", "zz")
 

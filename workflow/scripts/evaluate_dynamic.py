@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.identify import bench_tests as static
-from rotorid.identify.bench import CELLS, Geometry, cell_forces, forces, read_geometry
-from rotorid.io.logs import by_recording, read_sessions
-from rotorid.report import log
+from rotorid_acquire.io.logs import by_recording, read_sessions
+from rotorid_lab import bench_tests as static
+from rotorid_lab import log
+from rotorid_lab.bench import CELLS, Geometry, cell_forces, forces, read_geometry
 
 KINDS = ("", "_low_pass", "_zero_phase")
 

@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.identify import stand as wrench
-from rotorid.identify.black_box import stand_wrench, thrust_of_throttle
-from rotorid.identify.rotor import SPEED_LAW_PARAMETERS, speed_by_law, speed_law
-from rotorid.io.logs import read_sessions
-from rotorid.io.wire import EXPERIMENTS
 from rotorid.recordings import read_set
-from rotorid.report import log
+from rotorid_acquire.io.logs import read_sessions
+from rotorid_acquire.io.wire import EXPERIMENTS
+from rotorid_lab import log
+from rotorid_lab import stand as wrench
+from rotorid_lab.black_box import stand_wrench, thrust_of_throttle
+from rotorid_lab.rotor import SPEED_LAW_PARAMETERS, speed_by_law, speed_law
 
 
 def main(

@@ -6,9 +6,8 @@
 
 import pandas as pd
 
-from rotorid.identify import loadcell
-from rotorid.io.logs import read_sessions
-from rotorid.report import log
+from rotorid_acquire.io.logs import read_sessions
+from rotorid_lab import loadcell, log
 
 
 def main(samples: str, recordings: str, printed: str, specimens: str, infill: str, curves: str) -> None:

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid.identify.rotor import PROPELLER_COLUMNS, summarise_propeller
 from rotorid.recordings import read_set
 from rotorid.recordings.importers.faults import read_report
-from rotorid.report import log
+from rotorid_lab import log
+from rotorid_lab.rotor import PROPELLER_COLUMNS, summarise_propeller
 
 
 def main(

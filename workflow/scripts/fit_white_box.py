@@ -15,9 +15,10 @@ import numpy as np
 import pandas as pd
 from scipy.special import stdtr
 
-from rotorid.identify import grey_box
-from rotorid.identify.inertias import compose, read_components
-from rotorid.identify.rotor import (
+from rotorid_acquire.io.logs import read_sessions
+from rotorid_lab import grey_box, log
+from rotorid_lab.inertias import compose, read_components
+from rotorid_lab.rotor import (
     COLUMNS,
     LEAST_FORCE_SD_N,
     fit_coefficient,
@@ -25,8 +26,6 @@ from rotorid.identify.rotor import (
     thrust_points,
     torque_points,
 )
-from rotorid.io.logs import read_sessions
-from rotorid.report import log
 
 LEAST_TORQUE_SD_N_M = 1e-6
 

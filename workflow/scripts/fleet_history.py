@@ -7,9 +7,9 @@
 import re
 from pathlib import Path
 
-from rotorid.report import log
 from rotorid.report.fleet import history, sets_of_vehicles, vehicle_page
 from rotorid.report.plots.mismatch import draw_history
+from rotorid_lab import log
 
 
 def main(folders: list[str], good: int, numbers: str, events: str, figure: str, pages: str) -> None:

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rotorid.identify.fem import studies
-from rotorid.identify.fem.placement import read_assumed, read_moduli
-from rotorid.identify.fem.studies import printed_slope
-from rotorid.io import wire
-from rotorid.report import log
+from rotorid_acquire.io import wire
+from rotorid_lab import log
+from rotorid_lab.fem import studies
+from rotorid_lab.fem.placement import read_assumed, read_moduli
+from rotorid_lab.fem.studies import printed_slope
 
 
 def main(sizes: str, moduli: str, calibration: str, mesh: str, chain: str, variants: str) -> None:

@@ -9,11 +9,10 @@ import logging
 from collections.abc import Sequence
 from pathlib import Path
 
-from rotorid.io.public_list import read_manifest
-from rotorid.recordings.importers import public_sets
 from rotorid.recordings.importers.faults import read_report
-from rotorid.recordings.importers.public_sets import obtain
-from rotorid.report import log
+from rotorid_lab import log, public_sets
+from rotorid_lab.public_list import read_manifest
+from rotorid_lab.public_sets import obtain
 
 LOGGER = logging.getLogger("rotorid.public")
 

@@ -7,9 +7,9 @@
 import logging
 from collections.abc import Sequence
 
-from rotorid.io.logs import read_tables
-from rotorid.io.metadata_checksum import without_checksum
-from rotorid.report import log
+from rotorid_acquire.io.logs import read_tables
+from rotorid_acquire.io.metadata_checksum import without_checksum
+from rotorid_lab import log
 
 LOGGER = logging.getLogger("rotorid.ingest")
 

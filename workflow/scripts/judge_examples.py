@@ -15,8 +15,8 @@ import numpy as np
 import pandas as pd
 
 from rotorid.recordings import RecordingSet, read_set
-from rotorid.report import log
 from rotorid.report.deliver import analysis_of, write_files
+from rotorid_lab import log
 from rotorid_proof import quoted
 
 SHOWN_HZ = 50.0

@@ -8,8 +8,8 @@
 import sys
 from pathlib import Path
 
-from rotorid.report import log
 from rotorid.report.fleet import judge_sets
+from rotorid_lab import log
 
 
 def main(folders: list[str], code: str, verdicts: str, memory: str) -> None:

@@ -9,8 +9,8 @@ import sys
 from pathlib import Path
 
 from rotorid.recordings import read_set
-from rotorid.report import log
 from rotorid.report.deliver import deliver
+from rotorid_lab import log
 
 
 def main(folder: str, verdict: str, page: str, improved: str, off: list[str]) -> None:

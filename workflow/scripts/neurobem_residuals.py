@@ -8,10 +8,10 @@
 import json
 from pathlib import Path
 
-from rotorid.identify.rigid_body_residuals import compare_with_neurobem, no_neurobem
 from rotorid.recordings import read_set
 from rotorid.recordings.importers.faults import read_report
-from rotorid.report import log
+from rotorid_lab import log
+from rotorid_lab.rigid_body_residuals import compare_with_neurobem, no_neurobem
 
 
 def main(folder: str, settings: dict, summary: str, flights: str, bins: str, points: str) -> None:

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 
 import pandas as pd
 
-from rotorid.identify.bench import Filter, prepare
-from rotorid.io.logs import read_sessions
-from rotorid.report import log
+from rotorid_acquire.io.logs import read_sessions
+from rotorid_lab import log
+from rotorid_lab.bench import Filter, prepare
 
 
 def main(samples: str, recordings: str, settings: Mapping, prepared: str) -> None:

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from rotorid.identify.black_box import read_experiments, thrust_of_throttle
-from rotorid.io.logs import read_sessions
-from rotorid.report import log
+from rotorid_acquire.io.logs import read_sessions
+from rotorid_lab import log
+from rotorid_lab.black_box import read_experiments, thrust_of_throttle
 
 
 def main(quadrotor: Sequence[str], wrench: Sequence[str], thrust: str, experiments: str) -> None:

@@ -11,7 +11,7 @@ import warnings
 from functools import partial
 from pathlib import Path
 
-from rotorid.report import log
+from rotorid_lab import log
 from rotorid_proof.changes import pairs, score
 from rotorid_proof.row_by_row import rows_of
 

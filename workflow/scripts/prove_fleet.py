@@ -8,7 +8,7 @@
 import warnings
 from pathlib import Path
 
-from rotorid.report import log
+from rotorid_lab import log
 from rotorid_proof.changes import fleet
 from rotorid_proof.row_by_row import rows_of
 

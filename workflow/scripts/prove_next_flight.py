@@ -16,8 +16,8 @@ from rotorid.plan.plan import plan
 from rotorid.plan.questions import FittedSet, known, known_from
 from rotorid.plan.write import sampled
 from rotorid.recordings import RecordingSet
-from rotorid.report import log
 from rotorid.report.deliver import judge
+from rotorid_lab import log
 from rotorid_proof import next_flight as proof
 from rotorid_proof.row_by_row import as_read, rows_of
 

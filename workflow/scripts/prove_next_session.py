@@ -24,8 +24,8 @@ from rotorid.plan.session import (
     table_of,
 )
 from rotorid.recordings import RecordingSet
-from rotorid.report import log
 from rotorid.report.deliver import judge
+from rotorid_lab import log
 from rotorid_proof import next_flight as proof
 from rotorid_proof.row_by_row import as_read, rows_of
 

@@ -8,7 +8,7 @@
 import warnings
 from pathlib import Path
 
-from rotorid.report import log
+from rotorid_lab import log
 from rotorid_proof import path
 
 

@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.identify import bench_tests as static
-from rotorid.identify.bench import CELLS, FORCES, force_matrix, line_of, read_geometry
-from rotorid.identify.bench_tests import as_dict
-from rotorid.io.logs import read_sessions
-from rotorid.report import log
+from rotorid_acquire.io.logs import read_sessions
+from rotorid_lab import bench_tests as static
+from rotorid_lab import log
+from rotorid_lab.bench import CELLS, FORCES, force_matrix, line_of, read_geometry
+from rotorid_lab.bench_tests import as_dict
 
 
 def main(

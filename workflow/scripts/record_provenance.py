@@ -5,7 +5,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rotorid.report import log, provenance
+from rotorid.report import provenance
+from rotorid_lab import log
 
 
 def main(raw: Sequence[str], lock: str, config: Mapping[str, Any], out: str) -> None:

@@ -6,8 +6,8 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from rotorid.report import log
-from rotorid.report.typeset import not_recorded, render
+from rotorid_lab import log
+from rotorid_lab.typeset import not_recorded, render
 
 
 def main(text: str, files: Mapping[str, str], lacking: Sequence[str], index: str, emulated: bool, out: str) -> None:

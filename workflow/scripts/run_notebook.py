@@ -15,7 +15,7 @@ import nbformat
 import papermill
 from traitlets.config import Config
 
-from rotorid.report import log
+from rotorid_lab import log
 
 LOGGER = logging.getLogger("rotorid.notebook")
 PATIENCE_S = 600

@@ -5,7 +5,7 @@
 
 from pathlib import Path
 
-from rotorid.report import log
+from rotorid_lab import log
 from rotorid_proof import ablation
 from rotorid_proof.without_rules import read_stored
 

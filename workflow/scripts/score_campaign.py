@@ -15,7 +15,7 @@ import pandas as pd
 from rotorid.io.text.files import read_yaml
 from rotorid.mismatch.tell.consistency import EXPLAINED_SHARE
 from rotorid.recordings import read_set
-from rotorid.report import log
+from rotorid_lab import log
 from rotorid_proof import campaign, quoted
 
 LINE, STAND = "campaign-bench-al", "campaign-stand"

@@ -6,7 +6,7 @@
 
 from pathlib import Path
 
-from rotorid.report import log
+from rotorid_lab import log
 from rotorid_proof.write import write_tables
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid.report import log
+from rotorid_lab import log
 from rotorid_proof.plantings.judge import cut
 from rotorid_proof.plantings.plan import parsed
 from rotorid_proof.plantings.tables import mistake_rows

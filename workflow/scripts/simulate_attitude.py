@@ -11,10 +11,10 @@ import numpy as np
 import pandas as pd
 
 from rotorid.recordings import read_vehicle
-from rotorid.report import log
 from rotorid.vehicle.control import AttitudePid, training_reference
 from rotorid.vehicle.mixer import wrench_matrix
 from rotorid.vehicle.simulator import Disturbance, simulate
+from rotorid_lab import log
 
 
 def traces(trace, vehicle, reference, rate_noise: float, acceleration_noise: float, rng) -> pd.DataFrame:

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid.identify.bench import read_geometry
-from rotorid.identify.fem import studies
-from rotorid.identify.fem.bench import ratios
-from rotorid.identify.fem.placement import read_assumed, read_moduli
-from rotorid.report import log
+from rotorid_lab import log
+from rotorid_lab.bench import read_geometry
+from rotorid_lab.fem import studies
+from rotorid_lab.fem.bench import ratios
+from rotorid_lab.fem.placement import read_assumed, read_moduli
 
 
 def main(

@@ -11,14 +11,14 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid.identify import stand as sets
-from rotorid.identify.black_box import thrust_of_throttle
-from rotorid.identify.clocks import align, clock_summary, clock_table, skew
-from rotorid.io.logs import read_sessions
 from rotorid.recordings import read_vehicle, write_set
-from rotorid.report import log
+from rotorid_acquire.io.logs import read_sessions
+from rotorid_lab import log
+from rotorid_lab import stand as sets
+from rotorid_lab.black_box import thrust_of_throttle
+from rotorid_lab.clocks import align, clock_summary, clock_table, skew
 
-LOGGER = logging.getLogger("rotorid.identify.stand")
+LOGGER = logging.getLogger("rotorid_lab.stand")
 
 
 def main(

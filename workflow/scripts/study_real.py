@@ -14,8 +14,8 @@ import pandas as pd
 
 from rotorid.recordings import read_set
 from rotorid.recordings.importers.faults import read_report
-from rotorid.report import log
 from rotorid.report.deliver import analysis_of, residuals_of, verdict_of
+from rotorid_lab import log
 from rotorid_proof import real
 from rotorid_proof.studies import study
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid.report import log
 from rotorid.report.fleet import by_effect, by_vehicle, collect, make_page
 from rotorid.report.plots.mismatch import draw_fleet
+from rotorid_lab import log
 
 
 def main(

@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from rotorid.io.wire import EXPERIMENTS
-from rotorid.report import log, provenance
+from rotorid.report import provenance
 from rotorid.report.provenance import sha256
 from rotorid.vehicle.control import THESIS_GAINS, AttitudeReference, training_reference, validation_reference
+from rotorid_acquire.io.wire import EXPERIMENTS
+from rotorid_lab import log
 
 AXES = ("roll", "pitch", "yaw")
 

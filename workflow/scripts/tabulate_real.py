@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from rotorid.report import log
+from rotorid_lab import log
 from rotorid_proof import real
 from rotorid_proof.studies import study
 

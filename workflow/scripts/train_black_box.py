@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 
 from rotorid.errors import InputError
-from rotorid.identify.black_box import OUTPUTS, fit_thesis_network
-from rotorid.report import log
+from rotorid_lab import log
+from rotorid_lab.black_box import OUTPUTS, fit_thesis_network
 
 
 def main(

@@ -16,8 +16,9 @@ import numpy as np
 import pandas as pd
 from scipy.special import chdtri
 
-from rotorid.identify import grey_box
-from rotorid.identify.grey_box import (
+from rotorid.recordings import read_vehicle
+from rotorid_lab import grey_box, log
+from rotorid_lab.grey_box import (
     WEIGHT_NAMES,
     NetworkFit,
     check_consistency,
@@ -26,9 +27,7 @@ from rotorid.identify.grey_box import (
     inertias_of_weights,
     weights_of_inertias,
 )
-from rotorid.identify.networks import Training
-from rotorid.recordings import read_vehicle
-from rotorid.report import log
+from rotorid_lab.networks import Training
 
 THESIS_EPOCHS = 20_000
 """Where the thesis reads off its figure 4.22 that the error of the yaw acceleration has converged."""

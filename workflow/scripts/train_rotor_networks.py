@@ -11,11 +11,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.identify import grey_box
-from rotorid.identify.grey_box import fit_coefficient_network
-from rotorid.identify.networks import Training
-from rotorid.identify.rotor import fit_coefficient
-from rotorid.report import log
+from rotorid_lab import grey_box, log
+from rotorid_lab.grey_box import fit_coefficient_network
+from rotorid_lab.networks import Training
+from rotorid_lab.rotor import fit_coefficient
 
 HISTORY = ["coefficient", "epoch", "mse"]
 SIZES = ["coefficient", "hidden", "epoch", "mse"]

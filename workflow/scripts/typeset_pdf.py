@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from rotorid.report import log, typeset
+from rotorid_lab import log, typeset
 
 
 def main(document: typeset.Document, source: str, pdf: str) -> None:

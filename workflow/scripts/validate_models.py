@@ -11,15 +11,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rotorid.identify import grey_box
-from rotorid.identify.inertias import band_signals, fit_flights
 from rotorid.recordings import Inertia, Run, Vehicle, read_set, read_vehicle
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.faults import read_report
-from rotorid.report import log
 from rotorid.vehicle.control import AttitudePid, validation_reference
 from rotorid.vehicle.simulator import simulate
 from rotorid.vehicle.windows import Inputs, States, simulate_windows
+from rotorid_lab import grey_box, log
+from rotorid_lab.inertias import band_signals, fit_flights
 
 WINDOW_S = 0.25
 STEP_S = 0.002

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rotorid.identify.bench import read_geometry
-from rotorid.identify.fem import studies
-from rotorid.identify.fem.bench import EVEN, MIDDLE, NEARLY, judge_statements
-from rotorid.identify.fem.placement import read_assumed, read_moduli
-from rotorid.report import log
+from rotorid_lab import log
+from rotorid_lab.bench import read_geometry
+from rotorid_lab.fem import studies
+from rotorid_lab.fem.bench import EVEN, MIDDLE, NEARLY, judge_statements
+from rotorid_lab.fem.placement import read_assumed, read_moduli
 
 
 def main(sizes: str, moduli: str, geometry: str, mesh: str, draws: int, seed: int, benches: str, judged: str) -> None:

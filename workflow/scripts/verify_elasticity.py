@@ -3,8 +3,8 @@
 - A cantilever against beam theory and a plate with a round hole against Kirsch, on three meshes each.
 """
 
-from rotorid.identify.fem import studies
-from rotorid.report import log
+from rotorid_lab import log
+from rotorid_lab.fem import studies
 
 
 def main(out: str) -> None:

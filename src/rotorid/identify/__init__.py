@@ -1,20 +1,4 @@
-"""Parameters from measurements of known things: bench, stand, rotor, estimates, networks, finite elements."""
+"""What flights determine of an autopilot's parameters."""
 
-OPEN = (
-    "autopilot",
-    "bench",
-    "bench_tests",
-    "black_box",
-    "clocks",
-    "fem.bench",
-    "fem.placement",
-    "fem.studies",
-    "grey_box",
-    "inertias",
-    "loadcell",
-    "networks",
-    "rigid_body_residuals",
-    "rotor",
-    "stand",
-)
+OPEN = ("autopilot",)
 """Modules that other rooms may import; all else is this room's own."""

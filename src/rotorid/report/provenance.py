@@ -29,7 +29,7 @@ from typing import Any
 import rotorid
 from rotorid.io.text.writing import write_texts
 
-_PACKAGES = {"rotorid": "src", "rotorid_proof": "proof"}
+_PACKAGES = {"rotorid": "src", "rotorid_lab": "src", "rotorid_acquire": "src", "rotorid_proof": "proof"}
 """Each package of the project and the folder, from the top, that holds it."""
 _RESOURCES = "importlib.resources"
 _READ_BY_TESTS = (["OPEN"], ["ROOMS"])

@@ -2,7 +2,6 @@
 
 OPEN = (
     "attitude",
-    "batch",
     "control",
     "derivatives",
     "exports",

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.report.plots.signature import HOVER_RAD_S, explained, signature
+from rotorid_lab.plots.signature import HOVER_RAD_S, explained, signature
 
 WITHOUT = {"gust", "quantisation"}
 """A gust is a window of the data's own; a step of the last digit is nothing on a made-up load."""

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from rotorid.identify.networks import Network, Training, build, gradients, sigmoid, train
+from rotorid_lab.networks import Network, Training, build, gradients, sigmoid, train
 
 
 def test_delta_rule_by_hand():

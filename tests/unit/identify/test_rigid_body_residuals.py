@@ -4,7 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.identify.rigid_body_residuals import (
+from rotorid.recordings import RecordingSet, Run, Vehicle
+from rotorid.recordings import columns as c
+from rotorid.recordings.importers.neurobem import ANGULAR_ACCELERATION, PREDICTED_FORCE, PREDICTED_MOMENT
+from rotorid_lab.rigid_body_residuals import (
     by_airspeed,
     compare_with_neurobem,
     low_pass,
@@ -12,9 +15,6 @@ from rotorid.identify.rigid_body_residuals import (
     rmse,
     rotor_wrench,
 )
-from rotorid.recordings import RecordingSet, Run, Vehicle
-from rotorid.recordings import columns as c
-from rotorid.recordings.importers.neurobem import ANGULAR_ACCELERATION, PREDICTED_FORCE, PREDICTED_MOMENT
 from tests.refusals import refused
 
 VEHICLE = Vehicle(

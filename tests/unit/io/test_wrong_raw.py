@@ -17,12 +17,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotorid.acquire.run_plan import read_plan, steps_of
-from rotorid.identify.networks import Training, build, train
-from rotorid.io import rawlog
-from rotorid.io.lines import read_description
-from rotorid.io.logs import read_log, read_tables
-from rotorid.io.session import INDEX_COLUMNS, index_with_checksum, read_index, read_session, write_index
+from rotorid_acquire.io import rawlog
+from rotorid_acquire.io.lines import read_description
+from rotorid_acquire.io.logs import read_log, read_tables
+from rotorid_acquire.io.session import INDEX_COLUMNS, index_with_checksum, read_index, read_session, write_index
+from rotorid_acquire.run_plan import read_plan, steps_of
+from rotorid_lab.networks import Training, build, train
 from tests.refusals import refused
 
 MOST_S = 10.0
@@ -309,7 +309,7 @@ def test_the_sound_ones_are_taken(tmp_path: Path) -> None:
 
 CHECK = """
 import re, sys
-from rotorid.acquire.cli import app
+from rotorid_acquire.cli import app
 try:
     app(["check", sys.argv[1]])
 finally:

@@ -5,12 +5,12 @@ import functools
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.io.public_list import of_one_motor
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.recordings import RecordingSet, read_set
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.public_sets import PUBLIC_SETS
 from rotorid.report.deliver import judge
+from rotorid_lab.public_list import of_one_motor
+from rotorid_lab.public_sets import PUBLIC_SETS
 from rotorid_proof.concealed import build as concealed
 from rotorid_proof.concealed import cases
 from tests.public_logs import built

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.report import log
+from rotorid_lab import log
 
 
 def test_messages_and_warnings_are_in_the_file(tmp_path: Path) -> None:

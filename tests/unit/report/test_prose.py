@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.report.typeset import (
+from rotorid_lab.typeset import (
     LETTER_PT,
     LINE_PT,
     fix,

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rotorid.identify import grey_box
+from rotorid_lab import grey_box
 
 
 @pytest.mark.parametrize(

@@ -12,15 +12,15 @@ from rotorid.effects.contract import Motion
 from rotorid.effects.gust import window_form
 from rotorid.effects.instant import Wrench, body_of, records
 from rotorid.errors import InputError
-from rotorid.identify.inertias import ExcitedHold, Multisine
 from rotorid.vehicle.attitude import quaternion_from_euler, rotation_from_quaternion
-from rotorid.vehicle.batch import Batch
 from rotorid.vehicle.compiled import _invert
 from rotorid.vehicle.control import AttitudePid, training_reference
 from rotorid.vehicle.fast import _adds_wrench
 from rotorid.vehicle.improved import simulate_as_stated
 from rotorid.vehicle.simulator import Commands, Disturbance, Motors, Start, WhiteNoise, simulate
 from rotorid.vehicle.windows import Inputs, States, simulate_windows
+from rotorid_lab.batch import Batch
+from rotorid_lab.inertias import ExcitedHold, Multisine
 from tests.unit.effects.flown import audit_vehicle, commands, start, typical_values
 from tests.unit.vehicle.by_numpy import by_numpy
 

@@ -14,7 +14,6 @@ from rotorid.errors import InputError
 from rotorid.recordings import Vehicle, read_vehicle, templates, write_vehicle
 from rotorid.recordings.vehicle import Derivative, unit_of
 from rotorid.report import next_to_log
-from rotorid.vehicle.batch import Batch
 from rotorid.vehicle.control import swings, turned_over
 from rotorid.vehicle.derivatives import (
     CHANNELS,
@@ -31,6 +30,7 @@ from rotorid.vehicle.exports.derivatives import MUJOCO_FILE, ROTORPY_FILE
 from rotorid.vehicle.exports.flown import gazebo_damping_of, in_drake, in_mujoco, in_rotorpy
 from rotorid.vehicle.improved import active_forms, flyable, hover, record_as_stated, simulate_as_stated, wrench_at_rest
 from rotorid.vehicle.simulator import Commands, simulate
+from rotorid_lab.batch import Batch
 from tests.command_line import answer
 from tests.refusals import refused
 from tests.unit.effects.flown import audit_vehicle, commands, start

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from rotorid.identify.inertias import COLUMNS, compose, own_inertia, read_components
+from rotorid_lab.inertias import COLUMNS, compose, own_inertia, read_components
 
 
 def write(path, *rows):

@@ -8,7 +8,6 @@ import pytest
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.instant import body_of
-from rotorid.identify.inertias import ExcitedHold, Multisine
 from rotorid.vehicle import fast
 from rotorid.vehicle.attitude import (
     euler_from_quaternion,
@@ -26,6 +25,7 @@ from rotorid.vehicle.simulator import (
     recording,
     simulate,
 )
+from rotorid_lab.inertias import ExcitedHold, Multisine
 from tests.unit.vehicle.thesis import D, thesis_vehicle
 
 CF, CQ = 1.3877e-6, 1.8558e-8

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from rotorid.io import rawlog, wire
-from rotorid.io.frames import DATA, END, START, Frame, encode
-from rotorid.io.session import Counts, Ended, Session, Setup, session_path, write_session
+from rotorid_acquire.io import rawlog, wire
+from rotorid_acquire.io.frames import DATA, END, START, Frame, encode
+from rotorid_acquire.io.session import Counts, Ended, Session, Setup, session_path, write_session
 
 CODES = {"H": "H", "h": "h", "i": "i", "I": "I", "B": "B"}
 

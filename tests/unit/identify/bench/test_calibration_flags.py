@@ -10,10 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.identify import loadcell
-from rotorid.identify.bench import prepare
-from rotorid.identify.loadcell import FLAG_LEVEL, find_outliers
-from rotorid.report.plots import bench as plots
+from rotorid_lab import loadcell
+from rotorid_lab.bench import prepare
+from rotorid_lab.loadcell import FLAG_LEVEL, find_outliers
+from rotorid_lab.plots import bench as plots
 from workflow.scripts import calibrate_campaign, calibrate_load_cells
 
 from .logs import cells, write_log

@@ -7,10 +7,10 @@ import pandas as pd
 import pytest
 import yaml
 
-from rotorid.identify import bench as reconstruct
-from rotorid.identify import loadcell
-from rotorid.identify.bench import prepare
-from rotorid.io.logs import read_tables
+from rotorid_acquire.io.logs import read_tables
+from rotorid_lab import bench as reconstruct
+from rotorid_lab import loadcell
+from rotorid_lab.bench import prepare
 
 from .test_chain import SETTINGS
 

@@ -4,11 +4,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.identify import bench as reconstruct
-from rotorid.identify import bench_tests as static
-from rotorid.identify.bench import CELLS, GF_N, SPIKE, Filter, bench_force, bench_set, prepare
-from rotorid.io.logs import read_sessions, read_tables
-from rotorid.io.session import Ended, Setup
+from rotorid_acquire.io.logs import read_sessions, read_tables
+from rotorid_acquire.io.session import Ended, Setup
+from rotorid_lab import bench as reconstruct
+from rotorid_lab import bench_tests as static
+from rotorid_lab.bench import CELLS, GF_N, SPIKE, Filter, bench_force, bench_set, prepare
 from tests.refusals import refused
 
 from .logs import cells, write_log

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.identify.bench_tests import agreement, sets_of
+from rotorid_lab.bench_tests import agreement, sets_of
 
 
 def sessions(*rows: tuple[str, str, str, int]) -> pd.DataFrame:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.identify.loadcell import (
+from rotorid_lab.loadcell import (
     balance_disagreement,
     check_weights,
     fit_line,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rotorid.errors import InputError
-from rotorid.identify.bench_tests import calibrate
+from rotorid_lab.bench_tests import calibrate
 
 RESPONSE = np.array([[1.0, 0, 0], [0, 2.0, 0], [0, 0, -4.0], [1, 1, 0], [0, 1, 1], [1, 0, 1]]) * 1e-5
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rotorid.identify.bench import (
+from rotorid_lab.bench import (
     GF_N,
     PULLED,
     Geometry,
@@ -19,8 +19,8 @@ from rotorid.identify.bench import (
     moments,
     read_geometry,
 )
-from rotorid.identify.bench_tests import lateral_as_vertical
-from rotorid.identify.loadcell import fit_line
+from rotorid_lab.bench_tests import lateral_as_vertical
+from rotorid_lab.loadcell import fit_line
 from tests.refusals import refused
 
 TABLE = Path(__file__).parents[4] / "raw" / "thesis" / "table_2_3.csv"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rotorid.identify.loadcell import evaluate
+from rotorid_lab.loadcell import evaluate
 from tests.refusals import refused
 
 GAUGE_MM, SECTION_MM2 = 40.0, 20.0

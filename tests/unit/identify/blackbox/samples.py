@@ -3,9 +3,9 @@
 import numpy as np
 import pandas as pd
 
-from rotorid.identify.black_box import COLUMNS, INPUTS, OUTPUTS, PLATEAU_BLOCKS, SINE_BLOCKS, stand_wrench
-from rotorid.io.wire import EXPERIMENTS
 from rotorid.recordings.vehicle import Vehicle
+from rotorid_acquire.io.wire import EXPERIMENTS
+from rotorid_lab.black_box import COLUMNS, INPUTS, OUTPUTS, PLATEAU_BLOCKS, SINE_BLOCKS, stand_wrench
 
 
 def generated_experiments(

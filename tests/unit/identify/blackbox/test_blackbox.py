@@ -2,7 +2,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.identify.black_box import (
+from rotorid_lab.black_box import (
     INPUTS,
     OUTPUTS,
     conformal_coverage,

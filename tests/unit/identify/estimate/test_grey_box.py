@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rotorid.identify.grey_box import (
+from rotorid_lab.grey_box import (
     MASK,
     check_consistency,
     coefficient,
@@ -14,7 +14,7 @@ from rotorid.identify.grey_box import (
     inertias_of_weights,
     weights_of_inertias,
 )
-from rotorid.identify.networks import Network, Training
+from rotorid_lab.networks import Network, Training
 
 THESIS_INERTIAL = np.array([-1.7592, 0.0076, 4.0810, 401.5602, 388.2557, 218.0455])
 TRUE = np.array([2.489e-3, 2.5743e-3, 4.6838e-3])

@@ -4,10 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.identify.grey_box import cut_windows, fit_output_error, simulate_rates, tied, untied
-from rotorid.identify.inertias import band_signals, design, fit_flights, readings_at_hover
 from rotorid.recordings import Run
 from rotorid.vehicle.mixer import wrench_matrix
+from rotorid_lab.grey_box import cut_windows, fit_output_error, simulate_rates, tied, untied
+from rotorid_lab.inertias import band_signals, design, fit_flights, readings_at_hover
 from tests.unit.vehicle.thesis import thesis_vehicle
 
 TRUE = np.array([2.489e-3, 2.5743e-3, 4.6838e-3])

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from rotorid.identify.bench import read_geometry
-from rotorid.identify.fem.placement import read_assumed, read_moduli
+from rotorid_lab.bench import read_geometry
+from rotorid_lab.fem.placement import read_assumed, read_moduli
 
 ROOT = Path(__file__).parents[4]
 

@@ -7,12 +7,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.identify.fem import studies
-from rotorid.identify.fem.bench import DOWN, build, judge_statements, solve, strain_per_newton
-from rotorid.identify.fem.elasticity import on
-from rotorid.identify.fem.placement import Material, materials, read_assumed
-from rotorid.identify.fem.studies import counts_per_newton, printed_slope, volts_per_newton
-from rotorid.io.wire import GAIN, REFERENCE_V
+from rotorid_acquire.io.wire import GAIN, REFERENCE_V
+from rotorid_lab.fem import studies
+from rotorid_lab.fem.bench import DOWN, build, judge_statements, solve, strain_per_newton
+from rotorid_lab.fem.elasticity import on
+from rotorid_lab.fem.placement import Material, materials, read_assumed
+from rotorid_lab.fem.studies import counts_per_newton, printed_slope, volts_per_newton
 from tests.refusals import refused
 
 ROOT = Path(__file__).parents[4]

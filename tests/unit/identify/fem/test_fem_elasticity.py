@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from rotorid.identify.fem import elasticity
-from rotorid.identify.fem.elasticity import LooseParts, Pad, block, column, stacked
-from rotorid.identify.fem.placement import Material
-from rotorid.identify.fem.studies import FINENESSES, cantilever, kirsch_displacement_m, plate_with_hole
+from rotorid_lab.fem import elasticity
+from rotorid_lab.fem.elasticity import LooseParts, Pad, block, column, stacked
+from rotorid_lab.fem.placement import Material
+from rotorid_lab.fem.studies import FINENESSES, cantilever, kirsch_displacement_m, plate_with_hole
 from tests.refusals import refused
 
 STEEL = Material(200e9, 0.3)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from rotorid.identify.bench import forces, input_components, moments
-from rotorid.identify.fem import placement
+from rotorid_lab.bench import forces, input_components, moments
+from rotorid_lab.fem import placement
 
 
 def acting(cell: int, sense: np.ndarray) -> np.ndarray:

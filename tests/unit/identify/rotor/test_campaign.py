@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.identify.clocks import device_time
-from rotorid.identify.rotor import COLUMNS, sample_noise, thrust_points, torque_points
+from rotorid_lab.clocks import device_time
+from rotorid_lab.rotor import COLUMNS, sample_noise, thrust_points, torque_points
 from tests.refusals import refused
 
 STEP_S = 0.02

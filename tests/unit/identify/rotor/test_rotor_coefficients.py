@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from rotorid.identify.rotor import Points, fit_coefficient, fit_exponent, modified_z_scores, pool, rest_reading, usable
 from rotorid.recordings.mended import lost_speed
+from rotorid_lab.rotor import Points, fit_coefficient, fit_exponent, modified_z_scores, pool, rest_reading, usable
 from tests.refusals import refused
 
 SPEED = np.array([400.0, 800.0, 1200.0, 1600.0, 2000.0])

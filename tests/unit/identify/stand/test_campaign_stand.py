@@ -6,12 +6,12 @@ import pandas as pd
 import pytest
 import yaml
 
-from rotorid.identify import clocks, grey_box
-from rotorid.identify.black_box import thrust_of_throttle
-from rotorid.identify.rotor import fit_coefficient, speed_law, thrust_points, torque_points
-from rotorid.identify.stand import read_pairs
-from rotorid.io.logs import read_tables
-from rotorid.io.wire import EXPERIMENTS
+from rotorid_acquire.io.logs import read_tables
+from rotorid_acquire.io.wire import EXPERIMENTS
+from rotorid_lab import clocks, grey_box
+from rotorid_lab.black_box import thrust_of_throttle
+from rotorid_lab.rotor import fit_coefficient, speed_law, thrust_points, torque_points
+from rotorid_lab.stand import read_pairs
 
 ROOT = Path(__file__).parents[4]
 CAMPAIGN = ROOT / "raw" / "campaign"

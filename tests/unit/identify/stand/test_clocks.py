@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rotorid.identify import clocks
-from rotorid.identify.clocks import Lag, follow, lower_edge, pooled
+from rotorid_lab import clocks
+from rotorid_lab.clocks import Lag, follow, lower_edge, pooled
 from tests.refusals import refused
 
 OFFSET_S, LAG_S = -0.083, 0.055

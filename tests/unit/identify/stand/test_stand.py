@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 
 from rotorid.effects.loading import rotation_of
-from rotorid.identify import stand
-from rotorid.identify.rotor import speed_law
 from rotorid.recordings.run import Run
+from rotorid_lab import stand
+from rotorid_lab.rotor import speed_law
 from tests.refusals import refused
 
 WRENCH = stand.WRENCH

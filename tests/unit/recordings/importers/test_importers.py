@@ -34,8 +34,8 @@ from rotorid.recordings.importers.mapping import (
     quaternion_to_frd_ned,
 )
 from rotorid.recordings.importers.neurobem import USED, read_neurobem
-from rotorid.recordings.importers.public_sets import read_imrc_bench, read_vicon_csv
 from rotorid.recordings.importers.rcbenchmark import decode_text, read_rcbenchmark
+from rotorid_lab.public_sets import read_imrc_bench, read_vicon_csv
 from tests.refusals import refused
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from rotorid.io.public_list import read_manifest
-from rotorid.recordings.importers import public_sets
+from rotorid_lab import public_sets
+from rotorid_lab.public_list import read_manifest
 from tests import public_logs
 
 MANIFEST = Path(__file__).parents[4] / "workflow" / "public_data.yaml"

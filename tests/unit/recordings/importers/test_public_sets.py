@@ -12,12 +12,12 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
-from rotorid.io.public_list import of_one_motor, read_manifest
 from rotorid.recordings import columns as c
 from rotorid.recordings import read_set, read_vehicle
-from rotorid.recordings.importers import public_sets
 from rotorid.recordings.importers.faults import read_report
-from rotorid.recordings.importers.public_sets import PUBLIC_SETS, address, build, obtain, sha256
+from rotorid_lab import public_sets
+from rotorid_lab.public_list import of_one_motor, read_manifest
+from rotorid_lab.public_sets import PUBLIC_SETS, address, build, obtain, sha256
 from rotorid_proof.plantings import sow
 from rotorid_proof.plantings.flights import FLIGHTS as PLANTED
 from tests.public_logs import built
