@@ -25,7 +25,8 @@ from rotorid.vehicle.derivatives import (
     table_of,
     wrench,
 )
-from rotorid.vehicle.exports import NAMES, autopilots, export_vehicle
+from rotorid.vehicle.exports import autopilots, export_vehicle
+from rotorid.vehicle.exports import names as names_of_forms
 from rotorid.vehicle.exports.derivatives import MUJOCO_FILE, ROTORPY_FILE
 from rotorid.vehicle.exports.flown import gazebo_damping_of, in_drake, in_mujoco, in_rotorpy
 from rotorid.vehicle.improved import active_forms, flyable, hover, record_as_stated, simulate_as_stated, wrench_at_rest
@@ -307,7 +308,7 @@ def test_what_drives_a_vehicle_on_makes_no_negative_drag():
     assert frame["mdrag_coef"] == 0 and frame["refRotRate"] == 0
 
 
-@pytest.mark.parametrize("form", NAMES)
+@pytest.mark.parametrize("form", names_of_forms())
 def test_every_form_names_what_it_has_no_place_for(form):
     exported = export_vehicle(stated(templates.read("x500"), at_random(QUANTITIES)), form)
     said = [s for s in exported.left_out if s.startswith("derivatives")]

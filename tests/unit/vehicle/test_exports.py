@@ -15,7 +15,9 @@ import pytest
 from rotorid.errors import InputError
 from rotorid.recordings import Vehicle, templates, write_vehicle
 from rotorid.recordings.vehicle import Inertia, Rotor
-from rotorid.vehicle.exports import NAMES, export_vehicle, flown, forms
+from rotorid.vehicle import exports
+from rotorid.vehicle.exports import export_vehicle, flown, forms
+from rotorid.vehicle.exports import names as names_of_forms
 from rotorid.vehicle.exports.flown import commands_of, in_drake, in_mujoco, in_pybullet, in_rotorpy, lagging
 from rotorid.vehicle.mixer import hover_speed_rad_s
 from tests.command_line import answer, refusal
@@ -129,7 +131,7 @@ def test_the_page_lists_what_each_form_holds() -> None:
     rows = [line.strip("| ").split(" | ") for line in table if line.startswith("| `")]
     listed = {form.strip("`"): set(re.findall("`([a-z_]+)`", held)) for form, _, held in rows}
     assert listed == forms.KNOWS
-    assert set(forms.KNOWS) == set(NAMES)
+    assert set(forms.KNOWS) == set(names_of_forms())
 
 
 def test_the_flights_beside_turn_about_every_axis() -> None:
@@ -425,7 +427,7 @@ WRONG_NAMES = ('quad"""; marker = 1 #', "quad\\", "two\nmarker = 1", "-->\x01---
 
 
 @pytest.mark.parametrize("name", WRONG_NAMES)
-@pytest.mark.parametrize("to", NAMES)
+@pytest.mark.parametrize("to", names_of_forms())
 def test_a_name_never_becomes_code_of_another_file(name: str, to: str) -> None:
     vehicle = with_effects(DRAG, OFFSET).model_copy(update={"name": name})
     exported, plain = (export_vehicle(v, to) for v in (vehicle, with_effects(DRAG, OFFSET)))
@@ -443,3 +445,24 @@ def test_an_effect_that_is_none_is_not_written_into_a_comment() -> None:
     vehicle = with_effects(("rotor_drag\nmarker = 1", "", {}))
     with pytest.raises(InputError, match="has id"):
         export_vehicle(vehicle, "px4")
+
+
+def test_a_form_of_an_installed_package_is_written_and_none_takes_the_name_of_one_of_ours(tmp_path, monkeypatch):
+    (tmp_path / "hangar.py").write_text(
+        "from rotorid.vehicle.exports import Exported\n\n"
+        "def card(vehicle):\n    return Exported(vehicle.name, 'card.txt', ('all else: a card has a name alone',))\n"
+    )
+    info = tmp_path / "hangar-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: hangar\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[rotorid.exports]\ncard = hangar:card\nmjcf = hangar:card\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    exports._of_packages.cache_clear()
+    try:
+        assert "card" in names_of_forms() and list(names_of_forms()).count("mjcf") == 1
+        vehicle = templates.read("x500")
+        made = export_vehicle(vehicle, "card")
+        assert made.file_name == "card.txt" and made.text == vehicle.name and "a name alone" in made.left_out[0]
+        assert export_vehicle(vehicle, "mjcf").file_name != "card.txt"
+    finally:
+        exports._of_packages.cache_clear()

@@ -130,12 +130,12 @@ def _verdict(folder: Path, state: dict[str, Any], say: Callable[..., None]) -> d
 def _exports(answer: Path) -> list[dict[str, Any]]:
     """Write the improved vehicle in every form that takes it; to each form its file, or why there is none."""
     from rotorid.recordings import read_vehicle
-    from rotorid.vehicle.exports import NAMES, export_vehicle
+    from rotorid.vehicle.exports import export_vehicle, names
 
     vehicle, out = answer / "improved_vehicle.yaml", []
     if not vehicle.is_file():
         return out
-    for form in NAMES:
+    for form in names():
         try:
             made = export_vehicle(read_vehicle(vehicle), form)
         except InputError as error:
