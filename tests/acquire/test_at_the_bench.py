@@ -44,7 +44,7 @@ def test_the_folder_runs_the_same_commands():
     assert shown.returncode == 0 and "campaign" in shown.stdout
 
 
-def test_a_wheel_holds_one_package(tmp_path):
+def test_a_wheel_holds_the_three_programs_and_nothing_of_another_name(tmp_path):
     """Nothing of another name comes into site-packages, where it would lie in the way of others."""
     source = tmp_path / "source"
     source.mkdir()
@@ -55,5 +55,10 @@ def test_a_wheel_holds_one_package(tmp_path):
     subprocess.run([*command, "--wheel-dir", str(tmp_path)], check=True, capture_output=True)
     (wheel,) = tmp_path.glob("*.whl")
     names = ZipFile(wheel).namelist()
-    assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == {"rotorid"}
-    assert "rotorid/acquire/cli.py" in names and "rotorid/acquire/emulators/truth.py" in names
+    packages = {"rotorid", "rotorid_lab", "rotorid_acquire"}
+    assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == packages
+    assert (
+        "rotorid_acquire/cli.py" in names
+        and "rotorid_acquire/emulators/truth.py" in names
+        and "rotorid/py.typed" in names
+    )

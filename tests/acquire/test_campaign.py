@@ -121,7 +121,7 @@ def test_static_reading_by_the_recorders_marks():
 def test_the_workflow_never_names_the_sealed_truth():
     root = RAW.parent
     files = [root / "Snakefile", root / "config.yaml", *(root / "workflow").rglob("*"), *(root / "src").rglob("*.py")]
-    files = [p for p in files if "acquire" not in p.parts]  # the emulator, which writes it
+    files = [p for p in files if "rotorid_acquire" not in p.parts]  # the emulator, which writes it
     texts = {p: p.read_text(errors="replace") for p in files if p.is_file() and p.suffix != ".pyc"}
     assert [p for p, text in texts.items() if "campaign_truth" in text] == []
 

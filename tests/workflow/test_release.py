@@ -46,8 +46,9 @@ def test_classifiers_are_known() -> None:
     assert set(PROJECT["classifiers"]) <= known
 
 
-def test_the_package_is_made_of_the_library_alone() -> None:
+def test_the_package_is_made_of_the_three_programs_alone() -> None:
     found = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]["find"]
     assert found["where"] == ["src"] and all(
-        p.name == "rotorid" or p.name.endswith(".egg-info") for p in (ROOT / "src").iterdir()
+        p.name in ("rotorid", "rotorid_lab", "rotorid_acquire") or p.name.endswith(".egg-info")
+        for p in (ROOT / "src").iterdir()
     )
