@@ -8,7 +8,7 @@ none.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
@@ -273,7 +273,9 @@ def one_per_class(findings: Sequence[Finding]) -> list[Finding]:
     return kept
 
 
-def with_probabilities(findings: Iterable[Finding], found: Found, support: Support | None = None) -> list[Finding]:
+def with_probabilities(
+    findings: Iterable[Finding], found: Found, support: Callable[[], Support] | None = None
+) -> list[Finding]:
     """The findings with the posterior probability of each, of a class that one of it is at work.
 
     A claim below 0.99 becomes the smallest class of which one is at work with 0.99; without such a class it is
@@ -282,6 +284,7 @@ def with_probabilities(findings: Iterable[Finding], found: Found, support: Suppo
     """
     stated = {s.id: s for s in statements_of(found)}  # first: it visits every rival
     weights = weights_of(found)
+    drawn = None if support is None else support()
     decided = {found.problem.terms[key].effect for key in found.model if key in found.problem.effects}
 
     def weighed(one: Finding) -> Finding:
@@ -289,7 +292,7 @@ def with_probabilities(findings: Iterable[Finding], found: Found, support: Suppo
             return one
         probability = min(1.0, share_of(found, weights, _members(one)))
         one = _with_probability(one, probability, stated.get(one.id))
-        return one if support is None else _supported(one, support, decided)
+        return one if drawn is None else _supported(one, drawn, decided)
 
     out = [weighed(one) for one in findings]
     rivals = set().union(*(one.alternatives for one in out if one.status in CLAIMED))

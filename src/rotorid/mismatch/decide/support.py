@@ -18,7 +18,7 @@ import numpy as np
 from rotorid.mismatch.decide import rules
 from rotorid.mismatch.decide.posterior import Found, Posterior, ranked
 from rotorid.mismatch.decide.problem import Problem, scaled_apart
-from rotorid.mismatch.decide.statements import posterior_at, statements_of, weights_of
+from rotorid.mismatch.decide.statements import posterior_at, weights_of
 from rotorid.mismatch.evidence.gram import Evidence, Spectrum, evidence_from, spectrum_of
 from rotorid.mismatch.evidence.regression import Regression
 
@@ -27,6 +27,8 @@ _NEAR = 60.0
 """Nats below the chosen model up to which a draw may prefer another one."""
 _RANKED_NEAR = 15.0
 """Nats below a draw's best model, as ranked, up to which one is scored exactly: the ranking is off by some five."""
+_REPLACES = 2.0
+"""Times as often as beside another that a name must be at work without it, to stand in its place."""
 _MOST_MEMBERS = 4
 """Ids of a class at most: more say no more than that something is off."""
 
@@ -46,10 +48,19 @@ class Support:
     def class_of(self, members: Iterable[str], excluded: Iterable[str] = ()) -> frozenset[str] | None:
         """The fewest ids, `members` among them, that have enough together; None where no class of four has it.
 
-        What is added must be at work where the members are not: one that is there anyway stands for none of them.
+        What is added must be at work where the members are not, and hardly where they are: one that is there anyway
+        stands for none of them.
         """
         found = frozenset(members)
-        others = frozenset().union(*self.shares) - found - frozenset(excluded)
+        there = {ids for ids in self.shares if ids & found}
+        present, absent = sum(self.shares[i] for i in there), sum(s for i, s in self.shares.items() if i not in there)
+
+        def replaces(other: str) -> bool:
+            beside = sum(s for i, s in self.shares.items() if i in there and other in i)
+            instead = sum(s for i, s in self.shares.items() if i not in there and other in i)
+            return instead * present > _REPLACES * beside * absent
+
+        others = {i for i in frozenset().union(*self.shares) - found - frozenset(excluded) if replaces(i)}
         while rules.SUPPORT(self.of(found) < rules.SUPPORT["share"]):
             if len(found) >= _MOST_MEMBERS or not others:
                 return None
@@ -62,20 +73,22 @@ class Support:
 
 @dataclass(frozen=True)
 class Chosen:
-    """A model that was chosen, by whatever means: the posterior at it, and how it fares on draws."""
+    """A model that was chosen, by whatever means: the posterior at it, and what it is asked again by."""
 
     found: Found
-    support: Support
+    evidence: Evidence
+    spectrum: Spectrum
+
+    def support(self) -> Support:
+        """How the model's names fare on draws; asked once the rivals are visited (`statements_of`)."""
+        return support_of(self.evidence, self.spectrum, self.found)
 
 
 def chosen_at(regression: Regression, active: Iterable[str]) -> Chosen:
-    """The posterior at the model of the effects `active` and its support; the regression keeps its products by
-    channel."""
+    """The posterior at the model of the effects `active`; the regression keeps its products by channel."""
     evidence = evidence_from(regression)
     spectrum = spectrum_of(evidence)
-    found = posterior_at(evidence, spectrum, active)
-    statements_of(found)  # visits every rival: the draws are asked of the best model near the chosen one
-    return Chosen(found, support_of(evidence, spectrum, found))
+    return Chosen(posterior_at(evidence, spectrum, active), evidence, spectrum)
 
 
 def support_of(evidence: Evidence, spectrum: Spectrum, found: Found) -> Support:

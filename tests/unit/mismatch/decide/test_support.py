@@ -31,7 +31,7 @@ def judged(of: Flight, *ids: str) -> tuple[dict[str, Finding], Support]:
     found = posterior_at(evidence, spectrum, [f"{i}/a" for i in ids])
     statements_of(found)
     support = support_of(evidence, spectrum, found)
-    stated = with_probabilities([Finding(i, "established") for i in ids], found, support)
+    stated = with_probabilities([Finding(i, "established") for i in ids], found, lambda: support)
     return {f.id: f for f in stated}, support
 
 
