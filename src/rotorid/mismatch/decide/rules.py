@@ -139,11 +139,6 @@ EXCHANGE = rule(
     "exchange",
     "An id gives way to another that explains more, a free form of an id to a plain one and another id.",
 )
-STARTS = rule(
-    "starts",
-    "A search begins from nothing and where searches of halves of the recording end; the end worth most counts.",
-    least=(4.0, "whitened squares: half the cost of a parameter, by which another end must be better"),
-)
 FREE_VALUES = rule("free_values", "An effect is significant given believed values that are free.")
 
 # Classes

@@ -52,7 +52,6 @@ _MOST_JUDGED = 20_000
 """Terms in models of which a search remembers what it said."""
 _MOST_TRIALS = 12
 """Exchanges looked at closely, the most promising first."""
-_PAIRS_OF_HALVES = 2
 LEAST_TRANSFER = rules.TRANSFER["share"]
 LEAST_PROMISE = rules.TRANSFER["promise"]
 NEAR_LIMIT = 0.98
@@ -120,8 +119,6 @@ def keys_of(terms: Iterable[Term]) -> list[str]:
 class Search:
     """Forward search with replacement of forms and backward checks."""
 
-    begins_in_halves = True
-    """Whether halves of the environments hold about the same manoeuvres, so that one says where to begin."""
     refused: Mapping[str, str] = {}
     """Ids that are not to enter, with the reason."""
 
@@ -348,32 +345,9 @@ class Search:
         weak = [(score, key, reason) for key, reason, score in found if reason]
         return min(weak)[1:] if weak else None
 
-    def run(self, active: Sequence[str] | None = None) -> Selection:
-        """The selection that grows from a model `active`; without one, the best of those from several starts.
-
-        Of two effects that explain much the same the first to enter decides what enters next: a search from nothing
-        ends in one of several models, and half a second more or less in another. So searches of halves of the
-        environments say where else to begin, and of all ends the one that is worth most counts.
-        """
-        if active is not None or not self.begins_in_halves or not rules.STARTS.on:
-            return self._ended(active or ())
-        found, seen = self._ended(()), set()
-        best, worth = found, self.worth(found.active)
-        for regression in self.regression.halves(_PAIRS_OF_HALVES):
-            half = Search(regression, self.ask)
-            half.refused = self.refused
-            start = frozenset(half._ended(()).active)
-            if start in seen or start == frozenset(found.active):
-                continue
-            seen.add(start)
-            end = self._ended(sorted(start, key=self._place))
-            if rules.STARTS((own := self.worth(end.active)) > worth + rules.STARTS["least"]):
-                best, worth = end, own
-        return best
-
-    def _ended(self, active: Iterable[str]) -> Selection:
-        """Grow a model, take out what the held-out runs refute, and grow again without it until nothing changes."""
-        active = list(active)
+    def run(self, active: list[str] | None = None) -> Selection:
+        """Grow the model, take out what the held-out runs refute, and grow again without it until nothing changes."""
+        active = list(active or [])
         refuted: dict[str, str] = dict(self.refused)
         for _ in range(_MOST_EFFECTS):
             dropped = dict(refuted)

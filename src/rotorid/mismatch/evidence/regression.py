@@ -109,10 +109,6 @@ def autoregression(parts: list[np.ndarray], floor: float = 0.0) -> np.ndarray:
     return best[1]
 
 
-_LEAST_HALVED = 4
-"""Environments from which a recording has halves."""
-
-
 @dataclass(frozen=True)
 class Solution:
     """Coefficients of some terms on the training blocks."""
@@ -581,17 +577,6 @@ class Regression:
     def _environment(self) -> np.ndarray:
         """Number of the environment of every fitted block."""
         return environments(self.run[self.training], self.block_s)
-
-    def halves(self, pairs: int) -> list[Regression]:
-        """The regression with a half of its environments fitted, and with the other half, `pairs` times; none where
-        they are fewer than four. The same halves at every call."""
-        own = self._environment
-        count, random = int(own.max(initial=-1)) + 1, np.random.default_rng(0)
-        of_block = np.full(len(self.training), -1)
-        of_block[self.training] = own
-        orders = [random.permutation(count) for _ in range(pairs if count >= _LEAST_HALVED else 0)]
-        parts = [part for order in orders for part in (order[::2], order[1::2])]
-        return [replace(self, training=self.training & np.isin(of_block, part)) for part in parts]
 
     @cached_property
     def _environments(self) -> _Products:

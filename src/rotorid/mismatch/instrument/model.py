@@ -74,8 +74,6 @@ UNMOVED = 1e-9
 class ReadingSearch(Search):
     """The search, which also asks whether nonlinear parameters are resolved and which others carry over."""
 
-    begins_in_halves = False  # a load is applied in a few steps, each once
-
     def __init__(self, regression: Regression, ask: Questions, refused: Mapping[str, str] | None = None):
         super().__init__(regression, ask)
         self.refused = refused or {}

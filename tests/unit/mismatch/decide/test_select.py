@@ -3,10 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from rotorid.effects.contract import Form, Parameter
-from rotorid.mismatch.decide.select import Questions, Search, Selection
+from rotorid.mismatch.decide.select import Questions, Search
 from rotorid.mismatch.evidence.regression import autoregression, build
 from rotorid.mismatch.evidence.rows import Term
 from tests.unit.mismatch.evidence.test_regression import RATE_HZ, rows_of
@@ -232,49 +231,3 @@ def test_of_two_that_explain_the_same_to_what_filters_are_known_the_first_stays(
 
     assert search_beside(0.002).swapped(["there/form"], {}) is None
     assert search_beside(0.02).swapped(["there/form"], {}) == ["copy/form"]
-
-
-def test_halves_of_the_environments_are_complementary_and_the_same_at_every_call():
-    noise, x = case(np.random.default_rng(1), 2)
-    regression = search_of([term("e0"), term("e1")], noise, x).regression
-    halves, again = regression.halves(2), regression.halves(2)
-    assert len(halves) == 4
-    assert all(np.array_equal(a.training, b.training) for a, b in zip(halves, again, strict=True))
-    for first, second in (halves[:2], halves[2:]):
-        assert not (first.training & second.training).any()
-        np.testing.assert_array_equal(first.training | second.training, regression.training)
-    few = replace(regression, training=regression.training & (np.arange(len(regression.training)) < 3))
-    assert few.halves(2) == []
-
-
-@pytest.mark.parametrize(("better_by", "ends_in"), [(20.0, ["e1/form", "e2/form"]), (3.0, ["e0/form"])])
-def test_of_the_ends_from_several_starts_the_one_that_is_worth_clearly_more_counts(monkeypatch, better_by, ends_in):
-    noise, x = case(np.random.default_rng(1), 3)
-    search = search_of([term(f"e{k}") for k in range(3)], noise, x)
-    of_all, asked = search.regression, []
-
-    def ended(self, active):
-        asked.append((self.regression is of_all, tuple(active)))
-        if self.regression is not of_all:
-            return Selection(["e2/form"], None)
-        return Selection(["e1/form", "e2/form"] if active else ["e0/form"], None)
-
-    monkeypatch.setattr(Search, "_ended", ended)
-    monkeypatch.setattr(Search, "worth", lambda self, keys: better_by if len(keys) == 2 else 0.0)
-    assert search.run().active == ends_in
-    # Four halves end alike: from there one search of all is enough; from a model that is given there is no other start.
-    assert asked.count((True, ("e2/form",))) == 1 and sum(not whole for whole, _ in asked) == 4
-    asked.clear()
-    search.run(["e1/form"])
-    assert asked == [(True, ("e1/form",))]
-
-
-def test_a_search_that_goes_wrong_from_nothing_is_mended_by_where_its_halves_begin():
-    """Two effects of opposite sign in two columns that are nearly one, and a third that stands for neither."""
-    noise, x = case(np.random.default_rng(5), 3, size=2400)
-    x = [[a, a + 0.35 * b, a + 0.1 * c] for a, b, c in x]
-    y = [n + 1.5 * columns[1] - 1.2 * columns[2] for n, columns in zip(noise, x, strict=True)]
-    search = search_of([term(f"e{k}") for k in range(3)], y, x)
-    found = search.run()
-    assert search.worth(found.active) >= search.worth(search._ended(()).active)
-    assert sorted(found.active) == ["e1/form", "e2/form"]
