@@ -33,6 +33,8 @@ than 0.7 % of what a model explains."""
 _LARGE_GAIN = 0.9
 """Error with an effect over that without up to which its gain in a channel is large, however small its share of all."""
 NOTHING = "every number of it may be nothing"
+_NEAR_AN_END = 0.01
+"""Share of a range from its end at which a length or a damping is held there."""
 _LEAST_EXCITED = 0.1
 """Size of a contribution on the held-out runs, relative to that on the fitted ones, below which they do not excite
 it."""
@@ -111,6 +113,8 @@ def judged(
         reason = "it is smaller than what the model leaves over"
     elif may_be_nothing(finding):
         reason = NOTHING
+    elif _at_the_end_of_a_cable(finding):
+        reason = "its cable or its damping is at the end of what is looked for"
     elif rules.SLIGHT(bool(share < _LEAST_SHARE and slight and not finding.windows)):
         reason = f"it takes {100 * share:.1f} % of the error that goes"
     finding = replace(finding, gain=next(iter(reported.values()), None))
@@ -122,6 +126,14 @@ def may_be_nothing(finding: Finding) -> bool:
     linear = {finding.form.parameters[i].symbol for i in finding.form.linear} if finding.form else set()
     sizes = [p for p in finding.parameters if p.symbol in linear] or finding.parameters
     return rules.MAY_BE_NOTHING(bool(sizes) and all(p.low <= 0.0 <= p.high for p in sizes))
+
+
+def _at_the_end_of_a_cable(finding: Finding) -> bool:
+    """Whether what swings is best on a cable at a limit of its length or damping: it is no cable then."""
+    if finding.form is None or not finding.form.swings:
+        return False
+    free = [(finding.form.parameters[i], finding.values[i]) for i in finding.form.nonlinear]
+    return any(min(v - p.low, p.high - v) < _NEAR_AN_END * (p.high - p.low) for p, v in free)
 
 
 def lowered(finding: Finding, reason: str) -> Finding:

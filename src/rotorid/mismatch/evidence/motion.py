@@ -102,6 +102,9 @@ class Segment:
         )
 
 
+_SELDOM_HZ = 5.0
+"""Rate below which readings of rotors limit the band: of what a vehicle does within a second they hold nothing, while
+a curve through ten readings a second follows motions of one and a half hertz."""
 _WIDEST_SLOPE = 0.4
 """Highest cutoff of a derivative, as a share of the rate: at 0.45 its gain below 4 Hz is 1.5 to 3 % too large."""
 
@@ -222,7 +225,8 @@ def analysis_rate_hz(runs: tuple[Run, ...], vehicle: Vehicle, highest_cutoff_hz:
                 break
         for names in inertial:
             if run.has(*names):
-                own.append(min(own_rate_hz(t, run.array(names)), run.joined_hz.get(names[0], np.inf)))
+                joined_hz = run.joined_hz.get(names[0], np.inf)
+                own.append(min(own_rate_hz(t, run.array(names)), joined_hz if joined_hz < _SELDOM_HZ else np.inf))
         rates.append(base)
         cutoffs.append(0.4 * min([r for r in own if r > 0], default=base))
     return float(np.median(rates)), float(min(highest_cutoff_hz, *cutoffs))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rotorid.effects.catalogue import catalogue
-from rotorid.mismatch.decide.enough import may_be_nothing
+from rotorid.mismatch.decide.enough import _at_the_end_of_a_cable, may_be_nothing
 from rotorid.mismatch.decide.findings import Finding, with_probabilities
 from rotorid.mismatch.decide.statements import posterior_at, statements_of
 from rotorid.mismatch.decide.status import Estimate
@@ -88,6 +88,13 @@ def test_sizes_that_may_all_be_nothing_are_nothing_however_well_a_cable_is_known
     assert any(p.low > 0 for p in payload.parameters) and may_be_nothing(payload)
     heavy = [Estimate(p.symbol, 0.2, p.unit, 0.1, 0.3) if p.symbol == "m_p" else p for p in numbers]
     assert not may_be_nothing(Finding("payload", "established", form=form, parameters=tuple(heavy)))
+
+
+@pytest.mark.parametrize(("damping", "held"), [(0.1, False), (0.2985, True), (0.0021, True)])
+def test_a_cable_at_a_limit_of_its_damping_is_none(damping, held):
+    form = next(f for f in catalogue()["payload"].forms(quad()) if f.swings)
+    values = tuple({"L": 1.0, "ζ": damping}.get(p.symbol, 0.1) for p in form.parameters)
+    assert _at_the_end_of_a_cable(Finding("payload", "established", form=form, values=values)) is held
 
 
 def test_a_cable_is_no_longer_than_such_a_vehicle_carries():

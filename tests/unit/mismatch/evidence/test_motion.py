@@ -91,6 +91,10 @@ def test_the_slowest_needed_sensor_sets_the_cutoff(run):
     for name in COLUMNS["gyroscope"]:
         table[name] = table[name].where(np.arange(len(table)) % 8 == 0)
     assert analysis_rate_hz((replace(run, table=table),), quad(), 20.0)[1] == pytest.approx(0.4 * 25.0)
+    # Rotors that came four times a second, joined by a curve, hold nothing quicker; ten times a second they do.
+    for rate_hz, cutoff_hz in ((4.0, 1.6), (10.0, 20.0)):
+        joined = replace(run, joined_hz={"rotor_speed_1_rad_s": rate_hz})
+        assert analysis_rate_hz((joined,), quad(), 20.0)[1] == pytest.approx(cutoff_hz)
 
 
 def test_everything_recorded_is_read_as_it_is(run):
