@@ -20,7 +20,7 @@ ORDER = (
 """Lowest first: each imports from those before it alone. `rotorid_acquire` stands aside and uses the lowest two; what
 instruments wrote is read by it for the laboratory's chapters."""
 ASIDE = {"rotorid_acquire": {"rotorid.errors", "rotorid.io"}}
-BESIDE = {"rotorid_lab": {"rotorid_acquire"}, "rotorid_proof": {"rotorid_acquire"}}
+NEXT_TO = {"rotorid_lab": {"rotorid_acquire"}, "rotorid_proof": {"rotorid_acquire"}}
 OUTSIDE = sorted(
     path
     for folder in ("workflow/scripts", "benchmarks", "acquire", "docs/hooks")
@@ -103,7 +103,7 @@ def test_every_package_and_loose_module_has_its_place_in_the_order() -> None:
 def test_a_room_imports_from_lower_ones_and_by_their_facades_alone(name: str) -> None:
     own = room(name)
     others = {module for module in imported(IN_ROOMS[name]) if room(module) != own and module != "rotorid"}
-    below = ASIDE.get(own) or {*ORDER[: ORDER.index(own)], *BESIDE.get(own, ())}
+    below = ASIDE.get(own) or {*ORDER[: ORDER.index(own)], *NEXT_TO.get(own, ())}
     assert {room(module) for module in others} <= below
     assert not {module for module in others if past_the_facade(module)}
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import time
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
@@ -74,22 +73,23 @@ def history(
             with step("drawing"):
                 target = out or Path(f"{name}-history")
                 page = vehicle_page(name, numbers, events)
-        table = partial(_table, float_format="%.6g")
         texts = {
             target / "history.html": page,
-            target / "numbers.csv": table(numbers),
-            target / "events.csv": table(events),
+            target / "numbers.csv": numbers.to_csv(index=False, float_format="%.6g"),
+            target / "events.csv": events.to_csv(index=False, float_format="%.6g"),
         }
         compared = list(dict.fromkeys(numbers["set"]))
         if junit is not None:
-            cases = {f"unchanged at {own}": _said_of(events, own) for own in compared[good:]}
+            cases = {
+                f"unchanged at {own}": events.loc[events["set"] == own, "sentence"].tolist() for own in compared[good:]
+            }
             texts[junit] = as_junit(f"history {name}", cases, time.monotonic() - start)
         write_texts(texts)
         if as_json:
             said = {"sets": compared, "good": good, "events": events.to_dict("records"), "left_out": left_out}
             typer.echo(json.dumps(said, indent=1, ensure_ascii=False))
         else:
-            for line in left_out[:-1] if left_out and left_out[-1].endswith(" sets") else left_out:
+            for line in left_out:
                 typer.echo(f"! {line}")
             for sentence in events["sentence"]:
                 typer.echo(sentence)
@@ -98,14 +98,6 @@ def history(
             typer.echo(f"{target / 'history.html'} (and numbers.csv, events.csv), {time.monotonic() - start:.0f} s")
     if ci and len(events):
         raise typer.Exit(1)
-
-
-def _said_of(events, name: str) -> list[str]:
-    return events.loc[events["set"] == name, "sentence"].tolist()
-
-
-def _table(frame, **options) -> str:
-    return frame.to_csv(index=False, **options)
 
 
 def _sets_in(

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from rotorid.recordings.settings import Differing, Settings
 
 JunitFile = Annotated[Path | None, typer.Option("--junit", help="File for the checks as JUnit XML, which a CI shows.")]
-_MOST_PARAMETERS = 20
+MOST_PARAMETERS = 20
 """Parameters that differ and are printed, each in a line."""
 _PACE, _LATEST, _USUAL_PACE = "compare: pace", 5, 2.0
 """Name under which the pace of comparisons is kept, how many count, and seconds that a second of recording takes."""
@@ -258,9 +258,9 @@ def compare(
             )
         start = time.monotonic()
         watch = partial(progress, quiet=quiet)
-        found, changed = compared(sets, _said(as_json), watch, mass_kg, like, vehicle, mapping)
-        content = {"parameters": [asdict(d) for d in changed], **words_as_json(found)}
-        text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+        tell = _nothing if as_json else _each_line
+        found, changed = compared(sets, tell, watch, mass_kg, like, vehicle, mapping)
+        text = changes_text(found, changed)
         texts = {} if out is None else {out: text}
         if page is not None:
             from rotorid.report.page import make_changes_page
@@ -277,16 +277,21 @@ def compare(
         raise typer.Exit(1)
 
 
-def _said(as_json: bool) -> Callable[[Sequence[str]], None]:
-    """What is done with sentences as they become known."""
-    return lambda lines: None if as_json else [typer.echo(line) for line in lines] and None
+def _each_line(sentences: Sequence[str]) -> None:
+    for line in sentences:
+        typer.echo(line)
 
 
-def words_as_json(found: Changes) -> dict:
-    """The comparison as JSON's values."""
+def _nothing(sentences: Sequence[str]) -> None:
+    """The JSON has them at the end."""
+
+
+def changes_text(found: Changes, changed: Sequence[Differing]) -> str:
+    """A comparison as JSON."""
     from rotorid.mismatch.changes import words
 
-    return words.as_json(found)
+    content = {"parameters": [asdict(d) for d in changed], **words.as_json(found)}
+    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def _cases_of(found: Changes, changed: Sequence[Differing]) -> dict[str, list[str]]:
@@ -323,7 +328,7 @@ def compared(
 
         given = read_given(paths, mass_kg, like, vehicle, mapping)
         changed = differing([own for one in given[:-1] for own in one.settings], [own for own in given[-1].settings])
-        tell(differing_sentences(changed, _MOST_PARAMETERS))
+        tell(differing_sentences(changed, MOST_PARAMETERS))
         from rotorid.mismatch.changes.level_one import as_one, of_one_vehicle, seen_by
         from rotorid.mismatch.changes.words import level_one_sentences
 
@@ -362,17 +367,6 @@ class Given:
     recordings: RecordingSet
     settings: tuple[Settings, ...]
     """Parameters of the autopilot, one entry a log; empty where they are not known."""
-
-
-def read(
-    paths: Sequence[Path],
-    mass_kg: float | None = None,
-    like: str | None = None,
-    vehicle: Path | None = None,
-    mapping: Path | None = None,
-) -> list[RecordingSet]:
-    """The sets of folders and logs, as `read_given`."""
-    return [one.recordings for one in read_given(paths, mass_kg, like, vehicle, mapping)]
 
 
 def read_given(

@@ -90,8 +90,8 @@ def differing_sentences(found: tuple[Differing, ...], most: int) -> list[str]:
     out += [f"  {d.sentence}" for d in changed[:most]]
     if len(changed) > most:
         out.append(f"  and {len(changed) - most} more (--json has all)")
-    for side, words in (("new", "only the good logs state"), ("good", "only the new log states")):
-        names = [d.name for d in found if not getattr(d, "good" if side == "good" else "new")]
+    lost, gained = ([d.name for d in found if not side(d)] for side in (lambda d: d.new, lambda d: d.good))
+    for names, words in ((lost, "only the good logs state"), (gained, "only the new log states")):
         if names:
             shown = ", ".join(names[:5]) + (", …" if len(names) > 5 else "")
             out.append(f"Parameters that {words}: {len(names)} ({shown}).")

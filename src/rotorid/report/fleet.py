@@ -347,11 +347,11 @@ def sets_of_vehicles(
 
 
 def history(
-    sets: Mapping[str, Sequence[RecordingSet]], good: int, progress: Callable[[str], None] = lambda text: None
+    sets: Mapping[str, Sequence[RecordingSet]], good: int, left_out: Callable[[str], None] = lambda text: None
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Numbers and events of every vehicle, by sets in the order they were flown, of which the first `good` surely are.
 
-    `progress` gets one line a vehicle, and one for each set that is left out.
+    `left_out` gets a line for each vehicle and each set that is left out.
 
     Returns
     -------
@@ -370,13 +370,12 @@ def history(
         try:
             own = of_one_vehicle(own)
             as_one(own[:good])
-            shown = shown_by(own, good, lambda text, v=vehicle: progress(f"{v}: {text}"))
+            shown = shown_by(own, good, lambda text, v=vehicle: left_out(f"{v}: {text}"))
         except InputError as error:
-            progress(f"{vehicle} is left out: {error}")
+            left_out(f"{vehicle} is left out: {error}")
             continue
         numbers += _numbers_of(vehicle, shown, good)
         events += [row for point in change_points(shown, good) for row in _rows_of(vehicle, *point)]
-        progress(f"{vehicle}: {len(shown)} sets")
     return pd.DataFrame(numbers, columns=_NUMBERS), pd.DataFrame(events, columns=EVENTS)
 
 
@@ -384,7 +383,7 @@ _Shown = Mapping[str, Sequence[Flown]]
 """What the runs of each set show, in the order they were flown; each set counts as one flight."""
 
 
-def shown_by(sets: Sequence[RecordingSet], good: int, progress: Callable[[str], None]) -> _Shown:
+def shown_by(sets: Sequence[RecordingSet], good: int, left_out: Callable[[str], None]) -> _Shown:
     """What each set shows; one that lacks something that the good ones have is left out, with a line.
 
     Raises InputError: a good set has no stretch of flight that is long enough.
@@ -399,7 +398,7 @@ def shown_by(sets: Sequence[RecordingSet], good: int, progress: Callable[[str], 
                 raise InputError(f"set {own.name}: no stretch of flight is long enough; expected some seconds")
             needed |= set(runs[0].y)
         elif not runs or any(needed - set(run.y) for run in runs):
-            progress(f"{own.name} is left out: it lacks flight or columns that the first sets have")
+            left_out(f"{own.name} is left out: it lacks flight or columns that the first sets have")
             continue
         out[own.name] = runs
     return out

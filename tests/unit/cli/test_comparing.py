@@ -9,7 +9,7 @@ import pytest
 from rotorid.cli.console import keep
 from rotorid.cli.junit import as_junit
 from rotorid.cli.modelling import fly
-from rotorid.cli.verdicts import explanation_takes, one_flight, read
+from rotorid.cli.verdicts import explanation_takes, one_flight, read_given
 from rotorid.errors import InputError
 from rotorid.recordings import read_set, templates
 from tests.command_line import answer, invoke
@@ -27,6 +27,11 @@ def logs(tmp_path_factory) -> list[Path]:
         out.append(folder / f"{name}.csv")
         one.table.to_csv(out[-1], index=False)
     return out
+
+
+def read(paths: list[Path], **of_vehicle) -> list:
+    """The sets of what a comparison is given."""
+    return [one.recordings for one in read_given(paths, **of_vehicle)]
 
 
 def test_logs_become_sets_of_one_vehicle(logs: list[Path]) -> None:

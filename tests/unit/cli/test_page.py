@@ -21,7 +21,7 @@ pytest.importorskip("starlette")
 pytest.importorskip("uvicorn")
 
 from rotorid.cli.page import jobs
-from rotorid.cli.page.shelf import INTERRUPTED, Absent, Shelf, safe_name
+from rotorid.cli.page.shelf import INTERRUPTED, NotThere, Shelf, safe_name
 from tests.browser import CHROMIUM, Browser
 from tests.command_line import refusal
 from tests.public_logs import public
@@ -163,7 +163,7 @@ def test_names_of_logs_are_made_safe_and_stay_apart(tmp_path: Path) -> None:
         place = shelf.place_for(id_, "Flight.ulg" if wanted.startswith("F") else "flight.ulg")
         assert place.name.casefold() == wanted.casefold()
         place.write_bytes(b"x")
-    with pytest.raises(Absent):
+    with pytest.raises(NotThere):
         shelf.path("..")
 
 

@@ -10,7 +10,7 @@ from contextlib import suppress
 from typing import Any
 
 from rotorid.cli.page.looks import Wishes
-from rotorid.cli.page.shelf import Absent, Shelf
+from rotorid.cli.page.shelf import NotThere, Shelf
 
 _PATIENCE_S = 120.0
 """How long a look may take: a log of hundreds of MB takes some tens of seconds."""
@@ -122,7 +122,7 @@ class Queue:
                     self._new.clear()
                     await self._new.wait()
                 id_, question = self._asked.pop(0)
-                with suppress(Absent, OSError):  # deleted meanwhile, or the disk is full: the next one's turn
+                with suppress(NotThere, OSError):  # deleted meanwhile, or the disk is full: the next one's turn
                     await self._answer(id_, question)
                 self.lines.pop(id_, None)
                 self._now = None

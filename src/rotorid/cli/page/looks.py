@@ -69,17 +69,18 @@ def look(folder: Path, logs: Sequence[Path], wishes: Wishes) -> dict[str, Any]:
     InputError in one sentence where they cannot be read. Of a table whose columns nobody knows the answer has a
     proposal of what they are (`mapping`, `evidence`, `open`) and no flights.
     """
-    from rotorid.recordings.importers.logfile import format_of, set_of_logs
+    from rotorid.io.text.files import parse_yaml
+    from rotorid.recordings.importers.logfile import TEMPLATES, format_of, set_of_logs
     from rotorid.recordings.importers.mapping import read_mapping
 
     mass_kg, like, vehicle, mapping = wishes.files(folder)
     formats = [format_of(path) for path in logs]
     if mapping is None and formats[0] in ("csv", "parquet") and (guessed := _guessed(logs[0])):
         return guessed | {"format": _FORMATS[formats[0]], "templates": known_templates()}
-    unknown = like is None and vehicle is None and not _says_what_it_is(formats[0])
+    unknown = like is None and vehicle is None and formats[0] not in TEMPLATES
     read = read_mapping(mapping) if mapping else None
     found = set_of_logs(logs, logs[0].name.split(".")[0], mass_kg, like or (_USUAL if unknown else None), vehicle, read)
-    believed = vehicle_of(_parsed(found.vehicle_text), "the vehicle")
+    believed = vehicle_of(parse_yaml(found.vehicle_text, "the vehicle"), "the vehicle")
     runs = tuple(Run(name, table) for name, table in sorted(found.runs.items()))
     recordings = RecordingSet(found.name, believed, runs, proposed=proposed_in(found.vehicle_text))
     refused = ""
@@ -108,18 +109,6 @@ def look(folder: Path, logs: Sequence[Path], wishes: Wishes) -> dict[str, Any]:
         "rotors": [r.model_dump() for r in believed.rotors or ()],
         "kind": believed.kind,
     }
-
-
-def _parsed(text: str) -> dict[str, Any]:
-    from rotorid.io.text.files import parse_yaml
-
-    return parse_yaml(text, "the vehicle")
-
-
-def _says_what_it_is(kind: str) -> bool:
-    from rotorid.recordings.importers.logfile import TEMPLATES
-
-    return kind in TEMPLATES
 
 
 def _template_of(remarks: Sequence[str]) -> str:

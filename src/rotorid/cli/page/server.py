@@ -25,7 +25,7 @@ from starlette.routing import Mount, Route
 
 from rotorid.cli.page.jobs import Looker, Queue
 from rotorid.cli.page.looks import Wishes
-from rotorid.cli.page.shelf import WORKING, Absent, Shelf, safe_name
+from rotorid.cli.page.shelf import WORKING, NotThere, Shelf, safe_name
 from rotorid.errors import InputError
 
 LARGEST_LOG = 500_000_000
@@ -107,7 +107,7 @@ def application(shelf: Shelf, token: str, hosts: tuple[str, ...], largest_log: i
     async def page(request: Request) -> Response:
         name = request.path_params.get("name", "page.html")
         if name not in _KINDS:
-            raise Absent(name)
+            raise NotThere(name)
         text = files("rotorid.cli.page").joinpath("files", name).read_text(encoding="utf-8")
         return Response(text, media_type=_KINDS[name], headers={"Content-Security-Policy": _POLICY})
 
@@ -192,7 +192,7 @@ def application(shelf: Shelf, token: str, hosts: tuple[str, ...], largest_log: i
     async def file(request: Request) -> Response:
         name = request.path_params["name"]
         if (path := shelf.files(request.path_params["id"]).get(name)) is None:
-            raise Absent(name)
+            raise NotThere(name)
         if name in _SHOWN and "download" not in request.query_params:
             return FileResponse(path, media_type="text/html")
         return FileResponse(path, filename=name, content_disposition_type="attachment")
@@ -258,7 +258,7 @@ def _one_sentence(app: Callable[..., Awaitable[None]]) -> Callable[..., Awaitabl
             return await app(scope, receive, headed)
         except ClientDisconnect:
             return None
-        except Absent:
+        except NotThere:
             status, said = 404, _GONE
         except InputError as error:
             status, said = 400, str(error)

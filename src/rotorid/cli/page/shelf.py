@@ -30,7 +30,7 @@ WORKING = ("waiting", "working")
 INTERRUPTED = "The page was closed while it worked; the logs are still here, ask again."
 
 
-class Absent(KeyError):
+class NotThere(KeyError):
     """There is no set of that id, or no file of that name in it."""
 
 
@@ -58,10 +58,10 @@ class Shelf:
                 self.change(state["id"], stage="failed", sentence=INTERRUPTED)
 
     def path(self, id_: str) -> Path:
-        """The folder of a set; Absent where there is none."""
+        """The folder of a set; NotThere where there is none."""
         path = self.folder / id_ if _ID.fullmatch(id_) else None
         if path is None or path.is_symlink() or not path.is_dir():
-            raise Absent(id_)
+            raise NotThere(id_)
         return path
 
     def new(self) -> str:
@@ -81,7 +81,7 @@ class Shelf:
         return sorted(found, key=lambda state: -state["made_s"])
 
     def state(self, id_: str) -> dict[str, Any]:
-        """What is known of a set; Absent where there is none.
+        """What is known of a set; NotThere where there is none.
 
         Of a folder whose state cannot be read its name is known, so that it can be deleted.
         """
@@ -97,7 +97,7 @@ class Shelf:
         return {"id": id_, "name": id_, "made_s": made_s, "stage": "failed", "sentence": said, "logs": []}
 
     def change(self, id_: str, **values: Any) -> dict[str, Any]:
-        """Write down what is new of a set, and return all of it; Absent where it was deleted."""
+        """Write down what is new of a set, and return all of it; NotThere where it was deleted."""
         state = self.state(id_) | values
         self._write(self.path(id_), state)
         return state
@@ -131,7 +131,7 @@ class Shelf:
         return {p.name: p for p in sorted(folder.iterdir()) if p.is_file() and not p.is_symlink()}
 
     def delete(self, id_: str) -> None:
-        """Delete a set with its logs and answers; Absent where there is none."""
+        """Delete a set with its logs and answers; NotThere where there is none."""
         path = self.path(id_)
         aside = self.folder / f".deleted-{secrets.token_hex(4)}"
         path.rename(aside)  # gone in one step, whatever happens while its files go

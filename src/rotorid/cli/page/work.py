@@ -20,7 +20,6 @@ import warnings
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -75,10 +74,10 @@ def _looks(say: Callable[..., None]) -> None:
                 folder = Path(asked["folder"])
                 say(look=look(folder, [folder / LOGS / n for n in asked["logs"]], Wishes(**asked["wishes"])))
         except Exception as error:
-            say(refused=_told(error, Path(asked["folder"])))
+            say(refused=_sentence_on(error, Path(asked["folder"])))
 
 
-def _told(error: Exception, folder: Path) -> str:
+def _sentence_on(error: Exception, folder: Path) -> str:
     """The sentence on an error, without the page's own folders: a visitor knows the log's name alone."""
     said = sentence_of(error) or f"unexpected {type(error).__name__}"
     for own in (folder / LOGS, folder / SET, folder):
@@ -132,12 +131,13 @@ def _exports(answer: Path) -> list[dict[str, Any]]:
     from rotorid.recordings import read_vehicle
     from rotorid.vehicle.exports import export_vehicle, names
 
-    vehicle, out = answer / "improved_vehicle.yaml", []
-    if not vehicle.is_file():
+    path, out = answer / "improved_vehicle.yaml", []
+    if not path.is_file():
         return out
+    vehicle = read_vehicle(path)
     for form in names():
         try:
-            made = export_vehicle(read_vehicle(vehicle), form)
+            made = export_vehicle(vehicle, form)
         except InputError as error:
             out.append({"form": form, "file": "", "left_out": [str(error)]})
             continue
@@ -161,7 +161,9 @@ def _pack(folder: Path, target: Path) -> None:
 
 def _compare(folder: Path, state: dict[str, Any], say: Callable[..., None]) -> dict[str, Any]:
     """Hold the log in question against the others: what differs is said as soon as it is known."""
-    from rotorid.cli.verdicts import compared, words_as_json
+    from rotorid.cli.verdicts import MOST_PARAMETERS, changes_text, compared
+    from rotorid.mismatch.changes.words import sentences
+    from rotorid.recordings.settings import differing_sentences
     from rotorid.report.page import make_changes_page
 
     asked = state["in_question"]
@@ -174,11 +176,10 @@ def _compare(folder: Path, state: dict[str, Any], say: Callable[..., None]) -> d
 
     with _heard("compare on the page", say):
         found, changed = compared(logs, tell, lambda command: nullcontext(), *Wishes(**state["wishes"]).files(folder))
-    content = {"parameters": [asdict(d) for d in changed], **words_as_json(found)}
-    text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    write_texts({answer / "changes.html": make_changes_page(found), answer / "changes.json": text})
-    first = next(iter(words_as_json(found)["sentences"]), "Nothing differs.")
-    said = [s for s in said if not s.startswith("What explains it comes next") and s != first]
+    texts = {"changes.html": make_changes_page(found), "changes.json": changes_text(found, changed)}
+    write_texts({answer / name: text for name, text in texts.items()})
+    first, *more = sentences(found)
+    said = [*differing_sentences(changed, MOST_PARAMETERS), *more]
     return {"sentence": first, "said": said, "exports": [], "page": "changes.html"}
 
 
@@ -198,7 +199,7 @@ def main(words: list[str]) -> None:
         (folder / ANSWER).mkdir()
         found = {"verdict": _verdict, "compare": _compare}[question](folder, state, say)
     except Exception as error:
-        say(refused=_told(error, folder))
+        say(refused=_sentence_on(error, folder))
         return
     say(done=found | {"seconds": round(time.monotonic() - started, 1)})
 

@@ -8,8 +8,9 @@ excluded.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain
 
 import numpy as np
@@ -117,7 +118,7 @@ def _statement(
 ) -> Statement:
     """What is said of one effect of the most probable model, given the ids that could stand in its place."""
     effect = found.problem.terms[key].effect
-    members = _smallest_class(found, weights, effect, others)
+    members = smallest_class({effect}, others, partial(share_of, found, weights), SURE)
     alone, joint = (share_of(found, weights, own) for own in ({effect}, members))
     if not _matters(found, at, key):
         status: Status = "not_established"  # sure or not, it is too small to matter
@@ -144,14 +145,17 @@ def visited_instead(found: Found, weights: Mapping[Model, float]) -> set[str]:
     return visited - own - {"", *UNKNOWNS}
 
 
-def _smallest_class(found: Found, weights: Mapping[Model, float], effect: str, others: Sequence[str]) -> set[str]:
-    """The fewest ids, an effect and some of `others`, of which one is surely at work; as sure as it gets."""
-    members, left = {effect}, set(others) - {effect}
-    while left and share_of(found, weights, members) < SURE and len(members) < _MOST_MEMBERS:
-        best = max(sorted(left), key=lambda other: share_of(found, weights, {*members, other}))
-        members.add(best)
+def smallest_class(
+    members: Iterable[str], others: Iterable[str], share: Callable[[set[str]], float], enough: float
+) -> set[str]:
+    """The fewest ids, `members` and some of `others`, of which one is at work by a share that is enough; of four at
+    most, as sure as it gets."""
+    found, left = set(members), set(others) - set(members)
+    while left and share(found) < enough and len(found) < _MOST_MEMBERS:
+        best = max(sorted(left), key=lambda other: share({*found, other}))
+        found.add(best)
         left.remove(best)
-    return members
+    return found
 
 
 def weights_of(found: Found) -> dict[Model, float]:

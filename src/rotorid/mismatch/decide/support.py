@@ -18,7 +18,7 @@ import numpy as np
 from rotorid.mismatch.decide import rules
 from rotorid.mismatch.decide.posterior import Found, Posterior, ranked
 from rotorid.mismatch.decide.problem import Problem, scaled_apart
-from rotorid.mismatch.decide.statements import posterior_at, weights_of
+from rotorid.mismatch.decide.statements import posterior_at, smallest_class, weights_of
 from rotorid.mismatch.evidence.gram import Evidence, Spectrum, evidence_from, spectrum_of
 from rotorid.mismatch.evidence.regression import Regression
 
@@ -28,9 +28,7 @@ _NEAR = 60.0
 _RANKED_NEAR = 15.0
 """Nats below a draw's best model, as ranked, up to which one is scored exactly: the ranking is off by some five."""
 _REPLACES = 2.0
-"""Times as often as beside another that a name must be at work without it, to stand in its place."""
-_MOST_MEMBERS = 4
-"""Ids of a class at most: more say no more than that something is off."""
+"""Times as often as jointly with another that a name must be at work without it, to stand in its place."""
 
 
 @dataclass(frozen=True)
@@ -51,24 +49,20 @@ class Support:
         What is added must be at work where the members are not, and hardly where they are: one that is there anyway
         stands for none of them.
         """
-        found = frozenset(members)
+        found, enough = set(members), rules.SUPPORT["share"]
+        if not rules.SUPPORT(self.of(found) < enough):
+            return frozenset(found)
         there = {ids for ids in self.shares if ids & found}
         present, absent = sum(self.shares[i] for i in there), sum(s for i, s in self.shares.items() if i not in there)
 
         def replaces(other: str) -> bool:
-            beside = sum(s for i, s in self.shares.items() if i in there and other in i)
+            jointly = sum(s for i, s in self.shares.items() if i in there and other in i)
             instead = sum(s for i, s in self.shares.items() if i not in there and other in i)
-            return instead * present > _REPLACES * beside * absent
+            return instead * present > _REPLACES * jointly * absent
 
         others = {i for i in frozenset().union(*self.shares) - found - frozenset(excluded) if replaces(i)}
-        while rules.SUPPORT(self.of(found) < rules.SUPPORT["share"]):
-            if len(found) >= _MOST_MEMBERS or not others:
-                return None
-            best = max(sorted(others), key=lambda other: self.of({*found, other}))
-            if self.of({*found, best}) <= self.of(found):
-                return None
-            found, others = found | {best}, others - {best}
-        return found
+        grown = smallest_class(found, others, self.of, enough)
+        return frozenset(grown) if self.of(grown) >= enough else None
 
 
 @dataclass(frozen=True)
@@ -94,8 +88,8 @@ def chosen_at(regression: Regression, active: Iterable[str]) -> Chosen:
 def support_of(evidence: Evidence, spectrum: Spectrum, found: Found) -> Support:
     """The support that a flight gives to the names of the model `found`, and to those that would replace them.
 
-    Asked are the models that were visited about it, with the leftover as it is: no draw searches anew, for what a
-    search by the posterior alone finds is further from the truth (docs/decisions/0012-names-that-stay.md).
+    Scored are the models that were visited about it, with the leftover as it is; no draw searches anew
+    (docs/decisions/0012-names-that-stay.md).
     """
     near = sorted(m for m, value in found.posterior.visited.items() if value > found.log_posterior - _NEAR)
     terms, shares = found.problem.terms, {}

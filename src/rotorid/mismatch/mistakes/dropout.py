@@ -206,7 +206,7 @@ def _in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[_Dropout]:
 
 def _not_asked_for(run: Run, vehicle: Vehicle, name: str, mask: np.ndarray) -> np.ndarray:
     """A mask less its stretches in which the rotor's own command stands still too: it turned as it was asked to, or the
-    reading is an echo of the command."""
+    reading is a copy of the command."""
     kind, number = c.rotor_number(name)
     commands = [c.rotor_columns(f, vehicle.rotor_count)[number - 1] for f in ("rotor_command", "throttle") if f != kind]
     command = next((run.column(n) for n in commands if run.has(n)), None)

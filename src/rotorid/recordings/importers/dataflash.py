@@ -29,7 +29,7 @@ _LETTERS = {
 
 
 @dataclass(frozen=True)
-class _Layout:
+class _MessageLayout:
     """How the messages of a type lie in the file."""
 
     name: str
@@ -82,7 +82,7 @@ def read_dataflash(path: Path, kinds: Collection[str]) -> tuple[dict[str, Messag
     return found, cut
 
 
-def _walk(data: bytes) -> tuple[dict[int, _Layout], dict[int, list[int]], int]:
+def _walk(data: bytes) -> tuple[dict[int, _MessageLayout], dict[int, list[int]], int]:
     """To each type its layout and where its whole messages begin, and the bytes of a message that the file ends in."""
     layouts, offsets, sizes = {}, {_FMT: []}, {_FMT: _FMT_BYTES}
     at, end = 0, len(data)
@@ -110,10 +110,10 @@ def _walk(data: bytes) -> tuple[dict[int, _Layout], dict[int, list[int]], int]:
         at += size
 
 
-def _layout(body: bytes) -> _Layout:
+def _layout(body: bytes) -> _MessageLayout:
     """What an FMT message says: type, length, name, format, columns."""
     name, letters, columns = (_text(part) for part in (body[2:6], body[6:22], body[22:86]))
-    return _Layout(name, body[1], letters, tuple(columns.split(",")) if columns else ())
+    return _MessageLayout(name, body[1], letters, tuple(columns.split(",")) if columns else ())
 
 
 def _text(raw: bytes) -> str:

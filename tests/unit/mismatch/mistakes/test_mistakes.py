@@ -212,7 +212,7 @@ def test_dropouts(sound, kind):
 
 @pytest.mark.parametrize("value", [0.0, None])
 def test_a_rotor_that_stands_as_it_was_commanded_is_no_lost_sensor(sound, value):
-    """A simulated rotor at its lower limit, and speeds that are an echo of commands which stand still."""
+    """A simulated rotor at its lower limit, and speeds that are a copy of commands which stand still."""
 
     def spoil(table, commanded):
         name, inside = "rotor_speed_3_rad_s", (table["time_s"] >= 8.0) & (table["time_s"] <= 8.6)

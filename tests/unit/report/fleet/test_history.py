@@ -111,7 +111,7 @@ def test_a_vehicle_whose_first_sets_believe_different_things_is_left_out_with_a_
     first, second = flown(1), flown(2)
     other = replace(second, vehicle=second.vehicle.model_copy(update={"mass_kg": 2.0 * second.vehicle.mass_kg}))
     said: list[str] = []
-    numbers, events = history({"heron": [first, other, flown(3)]}, good=2, progress=said.append)
+    numbers, events = history({"heron": [first, other, flown(3)]}, good=2, left_out=said.append)
     assert numbers.empty and events.empty
     masses = f"{other.vehicle.mass_kg:g}, that of heron-2026-10-01 {first.vehicle.mass_kg:g}"
     assert said == [
