@@ -10,7 +10,7 @@ import pytest
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers import betaflight as format_
+from rotorid.recordings.importers import blackbox as format_
 from rotorid.recordings.importers.betaflight import convert, throttles
 from rotorid.recordings.importers.faults import moving_on
 from rotorid.recordings.importers.logfile import read_log
