@@ -39,8 +39,8 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
+import scipy
 from pydantic import ValidationError
-from scipy.spatial.transform import Rotation
 
 from rotorid.errors import InputError
 from rotorid.io.models import KnownKeys
@@ -399,7 +399,7 @@ def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFra
                 raise InputError(f"{where}: velocity in body axes needs an attitude to be turned into the world")
             known = np.isfinite(values).all(axis=1) & np.isfinite(rotation).all(axis=1)
             turned = np.full_like(values, np.nan)
-            turn = Rotation.from_quat(rotation[known][:, [1, 2, 3, 0]])
+            turn = scipy.spatial.transform.Rotation.from_quat(rotation[known][:, [1, 2, 3, 0]])
             turned[known] = turn.apply(values[known] @ body.T)
             values = turned
         if not columns:
@@ -441,9 +441,9 @@ def _numbers(raw: pd.DataFrame, columns, channel: str, where: str) -> pd.DataFra
     return numbers(raw[list(dict.fromkeys(columns))], where)
 
 
-def from_angles(angles: np.ndarray, form: str) -> Rotation:
+def from_angles(angles: np.ndarray, form: str) -> scipy.spatial.transform.Rotation:
     """Rotations by roll, pitch and yaw (n, 3), rad, in one of the orders of `EULER`."""
-    return Rotation.from_euler(EULER[form], angles if form == "euler_xyz" else angles[:, ::-1])
+    return scipy.spatial.transform.Rotation.from_euler(EULER[form], angles if form == "euler_xyz" else angles[:, ::-1])
 
 
 def _attitude(values: np.ndarray, form: str, body: np.ndarray, world: np.ndarray) -> np.ndarray:
@@ -457,8 +457,10 @@ def _attitude(values: np.ndarray, form: str, body: np.ndarray, world: np.ndarray
         if form in EULER:
             turn = from_angles(values[rows], form)
         else:
-            turn = Rotation.from_quat(values[rows] if form == "xyzw" else values[rows][:, [1, 2, 3, 0]])
-        turn = Rotation.from_matrix(world) * turn * Rotation.from_matrix(body).inv()
+            xyzw = values[rows] if form == "xyzw" else values[rows][:, [1, 2, 3, 0]]
+            turn = scipy.spatial.transform.Rotation.from_quat(xyzw)
+        to_world, to_body = (scipy.spatial.transform.Rotation.from_matrix(axes) for axes in (world, body))
+        turn = to_world * turn * to_body.inv()
         out[rows] = turn.as_quat()[:, [3, 0, 1, 2]]
     out[known] = continuous(out[known])
     return out
