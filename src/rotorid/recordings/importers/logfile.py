@@ -41,13 +41,14 @@ from rotorid.io.text.files import (
 )
 from rotorid.io.text.wording import printable
 from rotorid.io.text.writing import only_writer, staging, take_name, take_place
-from rotorid.recordings import Run, read_vehicle, templates
+from rotorid.recordings import RecordingSet, Run, read_vehicle, templates
 from rotorid.recordings import columns as c
 from rotorid.recordings.files import (
     VEHICLE,
     check_manifest,
     is_bag,
     listed_runs,
+    proposed_in,
     run_files,
     run_name,
     sha256,
@@ -388,6 +389,12 @@ class SetOfLogs:
     def sentences(self) -> tuple[str, ...]:
         """The faults in words, each once."""
         return tuple(fault.sentence for fault in self.faults)
+
+    def recordings(self) -> RecordingSet:
+        """The set without files of its own, as `write` and `read_set` would give it."""
+        believed = vehicle_of(parse_yaml(self.vehicle_text, "the vehicle"), "the vehicle")
+        runs = tuple(Run(name, table) for name, table in sorted(self.runs.items()))
+        return RecordingSet(self.name, believed, runs, proposed=proposed_in(self.vehicle_text))
 
     def write(self, folder: Path, as_csv: bool = False) -> None:
         """Write `vehicle.yaml` (unless it was there and is kept), a file a run, a report and the list of the runs.

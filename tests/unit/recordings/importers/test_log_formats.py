@@ -15,8 +15,9 @@ from scipy.spatial.transform import Rotation
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
+from rotorid.recordings import read_set
 from rotorid.recordings.importers.known import ORDERS, quad_x
-from rotorid.recordings.importers.logfile import format_of, read_log
+from rotorid.recordings.importers.logfile import format_of, read_log, set_of_logs
 from tests.command_line import answer, invoke, refusal
 from tests.public_logs import public
 from tests.refusals import refused
@@ -458,3 +459,17 @@ def test_a_table_with_the_names_of_the_crazyflies_firmware(
     check_against(run, truth, (*BODY, *c.QUATERNION, *c.VELOCITY, *THROTTLES), 1e-6)
     table.drop(columns=clock).to_csv(path, index=False)
     refused("the clock: no column is named as a time", read_log, path)
+
+
+def test_a_set_in_memory_is_the_one_that_its_files_give(tmp_path: Path) -> None:
+    path = tmp_path / "LOG00001.BFL"
+    path.write_bytes(blackbox(flown()))
+    made = set_of_logs([path], "own", mass_kg=0.6)
+    made.write(tmp_path / "own")
+    one, other = made.recordings(), read_set(tmp_path / "own")
+    assert (one.name, one.vehicle, one.proposed, one.left_out) == (
+        other.name, other.vehicle, other.proposed, other.left_out
+    )  # fmt: skip
+    assert [run.name for run in one.runs] == [run.name for run in other.runs]
+    for mine, theirs in zip(one.runs, other.runs, strict=True):
+        pd.testing.assert_frame_equal(mine.table, theirs.table)
