@@ -15,7 +15,7 @@ from rotorid.recordings.check import check_set
 from rotorid.recordings.sufficient import sufficient
 
 _FORMATS = {
-    "px4": "PX4 ULog", "betaflight": "Betaflight blackbox", "ardupilot": "ArduPilot DataFlash",
+    "px4": "PX4 ULog", "betaflight": "blackbox (Betaflight, iNAV, EmuFlight)", "ardupilot": "ArduPilot DataFlash",
     "crazyflie": "Crazyflie log", "ros": "ROS bag", "neurobem": "NeuroBEM recording", "csv": "table (CSV)",
     "parquet": "table (Parquet)", "rcbenchmark": "RCbenchmark stand",
 }  # fmt: skip

@@ -1,13 +1,17 @@
-"""What the fields of Betaflight's blackbox logs mean by the header of their session.
+"""What the fields of blackbox logs of Betaflight, iNAV and EmuFlight mean by the header of their session.
 
 Betaflight's body axes are forward-left-up (a positive pitch rate lowers the nose, a positive yaw rate turns left, and
 the accelerometer reads +1 g along z at rest): half a turn about x makes them forward-right-down. Units by the log's own
 header: `gyro_scale` (deg/s) and `blackbox_high_resolution` (tenths of it), `acc_1G`, `motorOutput` (range of the
 motors' commands) and `features` (3D), `motor_poles`; `eRPM` in hundreds of electrical turns a minute; voltage and
-current by the version. Blackbox logs hold no velocity; an attitude only since `imuQuaternion` is logged.
+current by the version. Its logs hold no velocity; an attitude only since `imuQuaternion` is logged.
 
-Sources: Betaflight `src/main/blackbox/` (`blackbox.c`, `blackbox_encoding.c`, `blackbox_fielddefs.h`),
-`src/main/drivers/dshot.c`, `src/main/flight/mixer_init.c`, Blackbox Explorer `flightlog_fields_presenter.js`.
+EmuFlight's logs are Betaflight's, with the battery's voltage in the unit of its `vbatcellvoltage`. iNAV's have the
+same body axes, rates in deg/s, motors in µs, an attitude (tenths of a degree; a positive pitch lowers the nose), and
+position and velocity (cm, cm/s; north, east, up).
+
+Sources: Betaflight, iNAV and EmuFlight `src/main/blackbox/blackbox.c`, Betaflight `src/main/drivers/dshot.c` and
+`src/main/flight/mixer_init.c`, iNAV `src/main/flight/imu.c`, Blackbox Explorer `flightlog_fields_presenter.js`.
 """
 
 from __future__ import annotations
@@ -27,7 +31,7 @@ from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.blackbox import HEADER_LINE, BlackboxSession, sessions
 from rotorid.recordings.importers.faults import ImportFault, airborne, flights, moving_on, report_gaps
-from rotorid.recordings.importers.mapping import G, half_turn_about_x, quaternion_to_frd_ned
+from rotorid.recordings.importers.mapping import G, continuous, from_angles, half_turn_about_x, quaternion_to_frd_ned
 
 _DEFAULT_POLES = 14
 _QUATERNION_SCALE = 32767.0
@@ -44,9 +48,13 @@ _DEADBAND_3D = (1406.0, 1514.0)
 """Betaflight's own dead band of 3D where motors have pulses in µs; the header does not hold what was set."""
 _SLOWEST_PULSE_US = 900.0
 """Commands of motors that turn below this are none of pulses in µs."""
-_VOLTS = (((4, 0), 100), ((3, 1), 10))
-_AMPERES = (((3, 1), 100),)
-"""Since which version so many counts of a field are 1 V or 1 A; before that it counts steps of the converter."""
+_COUNTS: dict[str, dict[str, tuple[tuple[tuple[int, int], int], ...]]] = {
+    "betaflight": {"vbatLatest": (((4, 0), 100), ((3, 1), 10)), "amperageLatest": (((3, 1), 100),)},
+    "inav": {"vbatLatest": (((2, 0), 100),), "amperageLatest": (((2, 0), 100),)},
+    "emuflight": {"amperageLatest": (((0, 0), 100),)},
+}
+"""To a firmware since which version so many counts of a field are 1 V or 1 A; Betaflight's before that counts steps of
+the converter."""
 _CONVERTER_STEP_MV = 3300 / 4095
 
 
@@ -111,10 +119,15 @@ def _cell(text: str) -> float:
 def _flights(session: BlackboxSession, name: str, path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
     headers = session.headers
     firmware = headers.get("Firmware revision", headers.get("Firmware type", ""))
-    if "betaflight" not in firmware.lower():
+    if "rotorflight" in firmware.lower():
         raise InputError(
-            f"{path}: a blackbox log of {firmware or 'an unknown firmware'}; only Betaflight's axes and units are "
-            "known, turn it into CSV (blackbox_decode), then `rotorid import FILE.csv`"
+            f"{path}: a blackbox log of a helicopter ({firmware}), whose main rotor's blades are turned to steer; only "
+            "multirotors of fixed rotors can be imported"
+        )
+    if _firmware(headers) is None:
+        raise InputError(
+            f"{path}: a blackbox log of {firmware or 'an unknown firmware'}; only the axes and units of Betaflight, "
+            "iNAV and EmuFlight are known, turn it into CSV (blackbox_decode), then `rotorid import FILE.csv`"
         )
     if len(session.values) < 2:
         raise InputError(f"{path}: holds {len(session.values)} samples")
@@ -137,6 +150,9 @@ def convert(
     """Flights in contract columns of the main frames of one session (`time` in µs) and its header."""
     if "time" not in raw:
         raise InputError(f"{where}: the log has no field time")
+    firmware = _firmware(headers)
+    if firmware == "inav":
+        raw = raw.rename(columns={"vbat": "vbatLatest", "amperage": "amperageLatest"})
     raw, faults = _known_names(raw)
     time = raw["time"].to_numpy(float) * 1e-6
     keep, more = moving_on(time)
@@ -168,6 +184,8 @@ def convert(
         xyz = attitude / _QUATERNION_SCALE
         w = np.sqrt(np.clip(1 - np.sum(xyz**2, axis=1), 0, None))
         table[list(c.QUATERNION)] = quaternion_to_frd_ned(np.column_stack([w, xyz]))
+    if firmware == "inav":
+        table = table.assign(**_navigation(raw))
     motors = [n for i in range(8) if (n := f"motor[{i}]") in raw]
     if not motors:
         raise InputError(f"{where}: no motor[0], motor[1], … is logged, so that nothing shows when the vehicle flies")
@@ -198,6 +216,27 @@ def convert(
     faults += report_gaps(table)
     runs, cuts = flights(table, airborne(table)[0], name, where)
     return runs, [*faults, *cuts]
+
+
+def _firmware(headers: Mapping[str, str]) -> str | None:
+    """The firmware that wrote a log, of those whose axes and units are known."""
+    stated = headers.get("Firmware revision", headers.get("Firmware type", "")).lower()
+    return next((name for name in _COUNTS if name in stated), None)
+
+
+def _navigation(raw: pd.DataFrame) -> dict[str, np.ndarray]:
+    """Attitude, position and velocity as iNAV's estimator has them, in contract columns; NaN where it does not trust
+    them by `navFlags` (1: height, 4: place)."""
+    out: dict[str, np.ndarray] = {}
+    if {f"attitude[{k}]" for k in range(3)} <= set(raw):
+        angles = np.radians(raw[[f"attitude[{k}]" for k in range(3)]].to_numpy(float) / 10)
+        xyzw = from_angles(angles * [1, -1, 1], "euler").as_quat()  # a positive pitch lowers the nose
+        out |= dict(zip(c.QUATERNION, continuous(xyzw[:, [3, 0, 1, 2]]).T, strict=True))
+    for field, names in (("navPos", c.POSITION), ("navVel", c.VELOCITY)):
+        for k, bit, unit_m in ((0, 4, 0.01), (1, 4, 0.01), (2, 1, -0.01)):
+            if {f"{field}[{k}]", "navFlags"} <= set(raw) and (trusted := (raw["navFlags"].astype(int) & bit) > 0).any():
+                out[names[k]] = np.where(trusted, raw[f"{field}[{k}]"] * unit_m, np.nan)
+    return out
 
 
 def _known_names(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
@@ -246,22 +285,22 @@ def throttles(motors: np.ndarray, headers: Mapping[str, str]) -> tuple[np.ndarra
 
 def _battery(raw: pd.DataFrame, headers: Mapping[str, str]) -> tuple[dict[str, np.ndarray], list[ImportFault]]:
     """Voltage and current of the battery in contract columns, as far as they are logged and their unit is known."""
-    version = _version(headers)
+    version, firmware = _version(headers), _firmware(headers)
     found, faults = {}, []
-    for field, column, since in (
-        ("vbatLatest", c.BATTERY_VOLTAGE, _VOLTS),
-        ("amperageLatest", c.BATTERY_CURRENT, _AMPERES),
-    ):
+    for field, column in (("vbatLatest", c.BATTERY_VOLTAGE), ("amperageLatest", c.BATTERY_CURRENT)):
         if field not in raw or not raw[field].max() > 0:
             continue
         values = raw[field].to_numpy(float)
-        counts = next((n for first, n in since if version >= first), None)
+        counts = next((n for first, n in _COUNTS.get(firmware, {}).get(field, ()) if version >= first), None)
+        if firmware == "emuflight" and field == "vbatLatest":  # in the unit of the voltages of a cell
+            counts = {2: 10, 3: 100}.get(len(headers.get("vbatcellvoltage", "").rpartition(",")[2].strip()))
+        raw_counts = firmware == "betaflight" and version
         offset, per_ampere = _pair(headers, "currentMeter") or _pair(headers, "currentSensor") or (0.0, 0.0)
         if counts is not None:
             found[column] = values / counts
-        elif version and field == "vbatLatest" and (scale := _number(headers, "vbatscale", 0)) > 0:
+        elif raw_counts and field == "vbatLatest" and (scale := _number(headers, "vbatscale", 0)) > 0:
             found[column] = values * _CONVERTER_STEP_MV * scale * 1e-4  # the divider in tenths, mV
-        elif version and field == "amperageLatest" and per_ampere > 0:
+        elif raw_counts and field == "amperageLatest" and per_ampere > 0:
             found[column] = (values * _CONVERTER_STEP_MV - offset) * 10 / per_ampere
         else:
             why = "the header does not state the version or the scale that its unit depends on"

@@ -31,6 +31,8 @@ _LARGEST_STEP_US = 10_000_000
 """A main frame that leaps farther ahead in iterations or time than this, or back, is damaged."""
 _TURN = 1 << 32
 """Numbers have 32 bits: a clock in microseconds begins anew after 71.6 minutes."""
+_KEY_EVERY = 32
+"""Iterations from key frame to key frame where the header does not say."""
 _WINDOW = 1 << 18
 """Bytes whose frames are read at once."""
 
@@ -204,8 +206,8 @@ _ENCODINGS: dict[int, tuple[Callable[[_Bytes, np.ndarray, int], _Read], int]] = 
     10: (_three(((1, ((4, 2), (2, 2), (0, 2))), (2, ((9, 5), (4, 5), (0, 4))), (3, ((14, 8), (7, 7), (0, 7))))), 3),
 }
 """To the number of an encoding its reader and how many fields it packs together (`_up_to_eight`: at most)."""
-_EVENTS: dict[int, int] = {0: 1, 14: 2, 15: 1, 30: 2}
-"""To an event how many unsigned numbers follow: beep, log resumed, disarmed, flight mode."""
+_EVENTS: dict[int, int] = {0: 1, 14: 2, 15: 1, 30: 2, 40: 1}
+"""To an event how many unsigned numbers follow: beep, log resumed, disarmed, flight mode, a sensor's fault (iNAV)."""
 _RESUMED, _ADJUSTED = 14, 13
 
 
@@ -238,7 +240,7 @@ class _Layout:
         first = {name: (_numbers_of(headers, name) or [default])[0]
                  for name, default in (("minthrottle", 1150), ("vbatref", 4095), ("motorOutput", 0))}  # fmt: skip
         self._fixed = {4: first["minthrottle"], 8: 1500, 9: first["vbatref"], 11: first["motorOutput"]}
-        self._key_every = max((_numbers_of(headers, "I interval") or [1])[0], 1)
+        self._key_every = max((_numbers_of(headers, "I interval") or [_KEY_EVERY])[0], 1)
         share = [int(n) for n in re.findall(r"\d+", headers.get("P interval", "1"))] or [1]
         self._of, self._every = (share[0], max(share[1], 1)) if len(share) > 1 else (1, max(share[0], 1))
 
