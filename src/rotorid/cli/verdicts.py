@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 JunitFile = Annotated[Path | None, typer.Option("--junit", help="File for the checks as JUnit XML, which a CI shows.")]
 MOST_PARAMETERS = 20
 """Parameters that differ and are printed, each in a line."""
-_PACE, _LATEST, _USUAL_PACE = "compare: pace", 5, 2.0
+_PACE, _LATEST, _USUAL_PACE = "compare: pace", 5, 0.2
 """Name under which the pace of comparisons is kept, how many count, and seconds that a second of recording takes."""
 
 
