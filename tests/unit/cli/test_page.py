@@ -136,7 +136,8 @@ def test_the_folder_of_a_bag_is_one_log(page: Page, tmp_path: Path) -> None:
     assert (state["stage"], state["logs"], state["look"]["format"]) == ("looked", ["flight"], "ROS bag"), state
     assert [run["name"] for run in state["look"]["runs"]]
     assert page.ask("PUT", f"sets/{id_}/logs/log.bin", body=b"1")[0] == 201
-    assert "has the name of the folder" in page.ask("PUT", f"sets/{id_}/logs/a.db3?bag=log.bin", body=b"1")[1]["sentence"]
+    said = page.ask("PUT", f"sets/{id_}/logs/a.db3?bag=log.bin", body=b"1")[1]["sentence"]
+    assert "has the name of the folder" in said
 
 
 def test_it_listens_on_this_computer_alone(page: Page) -> None:
