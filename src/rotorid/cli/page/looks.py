@@ -16,6 +16,7 @@ from rotorid.recordings.sufficient import sufficient
 
 _FORMATS = {
     "px4": "PX4 ULog", "betaflight": "blackbox (Betaflight, iNAV, EmuFlight)", "ardupilot": "ArduPilot DataFlash",
+    "mavlink": "telemetry of MAVLink",
     "crazyflie": "Crazyflie log", "ros": "ROS bag", "neurobem": "NeuroBEM recording", "csv": "table (CSV)",
     "parquet": "table (Parquet)", "rcbenchmark": "RCbenchmark stand",
 }  # fmt: skip

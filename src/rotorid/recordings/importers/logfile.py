@@ -56,7 +56,7 @@ from rotorid.recordings.files import (
     vehicle_of,
     write_manifest,
 )
-from rotorid.recordings.importers import ardupilot, betaflight, crazyflie, neurobem, px4_ulog, rcbenchmark, ros
+from rotorid.recordings.importers import ardupilot, betaflight, crazyflie, mavlink, neurobem, px4_ulog, rcbenchmark, ros
 from rotorid.recordings.importers.faults import FILE_NAME as REPORT
 from rotorid.recordings.importers.faults import LATE_STEPS, SET_BACK, ImportFault, ImportReport, airborne, flights
 from rotorid.recordings.importers.known import Known, propose, px4_vehicle, thrust_coefficient
@@ -116,7 +116,7 @@ def _files_of(path: Path) -> dict[str, Path]:
 
 
 def format_of(path: Path) -> str:
-    """`px4`, `crazyflie`, `betaflight`, `ardupilot`, `ros`, `neurobem`, `rcbenchmark`, `csv` or `parquet`.
+    """`px4`, `crazyflie`, `betaflight`, `ardupilot`, `mavlink`, `ros`, `neurobem`, `rcbenchmark`, `csv` or `parquet`.
 
     InputError for what is none of them.
     """
@@ -139,11 +139,7 @@ def format_of(path: Path) -> str:
         return "parquet"
     epoch = _EPOCHS_US[0] < int.from_bytes(head[:8], "big") < _EPOCHS_US[1]
     if head[8:9] in (b"\xfe", b"\xfd") and (epoch or path.suffix.lower() in (".tlog", ".rlog")):
-        raise InputError(
-            f"{path}: a telemetry log of MAVLink, which is not read; take the autopilot's own log (.bin, .ulg), or "
-            "make a table of it (`pip install pymavlink`, then `mavlogdump.py --format csv --types "
-            f"RAW_IMU,ATTITUDE,SERVO_OUTPUT_RAW {path.name} > flight.csv`) and import that"
-        )
+        return "mavlink"
     for start, name in _BY_FIRST_BYTES:
         if head.startswith(start):
             return name
@@ -154,8 +150,8 @@ def format_of(path: Path) -> str:
     text = head.decode("utf-8", errors="replace")
     if "\0" in text:
         raise InputError(
-            f"{path}: not a log that rotorid knows (PX4 ULog, Betaflight, ArduPilot, ROS bag, MCAP, Crazyflie uSD, "
-            "NeuroBEM .mat, RCbenchmark CSV, any CSV, Parquet); its first bytes are " + head[:8].hex(" ")
+            f"{path}: not a log that rotorid knows (PX4 ULog, blackbox, ArduPilot, its telemetry, ROS bag, MCAP, Crazyflie "
+            "uSD, NeuroBEM .mat, RCbenchmark CSV, any CSV, Parquet); its first bytes are " + head[:8].hex(" ")
         )
     if crazyflie.is_table([name.strip(' "') for name in re.split("[,;\t]", text.splitlines()[0])]):
         return "crazyflie"
@@ -192,6 +188,12 @@ def _read(path: Path, kind: str, mapping: Mapping | None) -> _Imported:
         runs, faults, order = ardupilot.read_ardupilot(path)
         axes = "ArduPilot's: body forward-right-down, world north-east-down, as the contract's"
         settings = ardupilot.stated_parameters(path)
+        return _Imported(kind, runs, tuple(faults), axes, Known(order), speed_unit="rpm", settings=settings)
+    if kind == "mavlink":
+        log = mavlink.read_telemetry(path)
+        runs, faults, order = ardupilot.read_ardupilot(path, log)
+        axes = "ArduPilot's: body forward-right-down, world north-east-down, as the contract's"
+        settings = ardupilot.parameters(log).start
         return _Imported(kind, runs, tuple(faults), axes, Known(order), speed_unit="rpm", settings=settings)
     if kind == "ros":
         runs, faults, unit = ros.read_ros(path)

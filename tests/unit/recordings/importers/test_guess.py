@@ -553,13 +553,6 @@ def test_the_body_rates_of_mavlinks_attitude(flown: pd.DataFrame) -> None:
     assert found.mapping.channels["angular_velocity"].unit == "rad/s"
 
 
-def test_a_telemetry_log_points_to_its_converter(tmp_path: Path) -> None:
-    path = tmp_path / "flight.tlog"
-    path.write_bytes((1_700_000_000_000_000).to_bytes(8, "big") + b"\xfd\x09" + bytes(40))
-    said = refusal("import", path, "-o", tmp_path / "set")
-    assert "mavlogdump.py --format csv" in said and "flight.tlog" in said
-
-
 def test_columns_that_hold_nothing_are_no_channels() -> None:
     """A telemetry log names every message that it could have: columns without a cell raise nothing and mean nothing."""
     names = [f"RAW_IMU.{a}{kind}" for kind in ("acc", "gyro") for a in "xyz"]
