@@ -150,8 +150,8 @@ def format_of(path: Path) -> str:
     text = head.decode("utf-8", errors="replace")
     if "\0" in text:
         raise InputError(
-            f"{path}: not a log that rotorid knows (PX4 ULog, blackbox, ArduPilot, its telemetry, ROS bag, MCAP, Crazyflie "
-            "uSD, NeuroBEM .mat, RCbenchmark CSV, any CSV, Parquet); its first bytes are " + head[:8].hex(" ")
+            f"{path}: not a log that rotorid knows (PX4 ULog, blackbox, ArduPilot, its telemetry, ROS bag, MCAP, "
+            "Crazyflie uSD, NeuroBEM .mat, RCbenchmark CSV, any CSV, Parquet); its first bytes are " + head[:8].hex(" ")
         )
     if crazyflie.is_table([name.strip(' "') for name in re.split("[,;\t]", text.splitlines()[0])]):
         return "crazyflie"
