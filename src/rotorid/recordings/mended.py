@@ -28,7 +28,6 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import scipy
-from scipy.spatial.transform import Rotation
 
 from rotorid.io.text.wording import listed
 from rotorid.recordings import columns as c
@@ -372,9 +371,12 @@ def spikes(values: np.ndarray) -> np.ndarray:
     inner = slice(_NEIGHBOURS, len(x) - _NEIGHBOURS)
     rise, fall = x[inner] - medians[: len(x) - 2 * _NEIGHBOURS], x[inner] - medians[_NEIGHBOURS + 1 :]
     size = np.where(np.sign(rise) == np.sign(fall), np.minimum(np.abs(rise), np.abs(fall)), 0.0)
-    scatter = _around(np.abs(rise + fall) / 2) * 1.4826
-    scatter = np.maximum(scatter, _FINEST * float(np.subtract(*np.quantile(x, [0.95, 0.05]))))
-    size -= 2 * _around(np.maximum(np.abs(rise), np.abs(fall)))  # what moves fast turns round fast
+    apart, moved = np.abs(rise + fall) / 2, np.maximum(np.abs(rise), np.abs(fall))
+    finest = _FINEST * float(np.subtract(*np.quantile(x, [0.95, 0.05])))
+    if not (size - 2 * np.median(moved) > _FAR * max(1.4826 * np.median(apart), finest)).any():
+        return found  # medians around each are no smaller
+    scatter = np.maximum(_around(apart) * 1.4826, finest)
+    size -= 2 * _around(moved)  # what moves fast turns round fast
     far = _alone(size > _FAR * scatter, size, x[inner])
     between = (size > _NEAR * scatter) & (size <= _FAR * scatter)
     if scatter.min() > 0 and between.sum() < far.sum() <= _MOST * len(x):
@@ -461,7 +463,7 @@ def _excess(run: Run, names: tuple[str, ...], time_s: np.ndarray, values: np.nda
         steps = np.diff(values, axis=0)
         least, fastest = (_LEAST_JUMP_M, _FASTEST_M_S) if names == c.POSITION else (_LEAST_JUMP_M_S, _FASTEST_M_S2)
         return steps, least, fastest, steps
-    turn = Rotation.from_quat(values[:, [1, 2, 3, 0]])
+    turn = scipy.spatial.transform.Rotation.from_quat(values[:, [1, 2, 3, 0]])
     steps = turn[:-1].inv() * turn[1:]
     if not _is_read(run, c.ANGULAR_VELOCITY):
         return steps.as_rotvec(), _LEAST_JUMP_RAD, _FASTEST_RAD_S, steps.as_rotvec()
@@ -469,7 +471,7 @@ def _excess(run: Run, names: tuple[str, ...], time_s: np.ndarray, values: np.nda
     known = np.isfinite(rates).all(axis=1)
     total = _integrated(rates[known], run.time_s[known])
     turned = np.column_stack([np.interp(time_s, run.time_s[known], column) for column in total.T])
-    excess = (Rotation.from_rotvec(np.diff(turned, axis=0)).inv() * steps).as_rotvec()
+    excess = (scipy.spatial.transform.Rotation.from_rotvec(np.diff(turned, axis=0)).inv() * steps).as_rotvec()
     return steps.as_rotvec(), _LEAST_JUMP_RAD, 0.0, excess
 
 
@@ -477,9 +479,9 @@ def _places(names: tuple[str, ...], jumps: np.ndarray) -> list:
     """Where each part between jumps (m, 3) lies against the first: rotations of the body, else vectors."""
     if names != c.QUATERNION:
         return [np.zeros(3), *np.cumsum(jumps, axis=0)]
-    places = [Rotation.identity()]
+    places = [scipy.spatial.transform.Rotation.identity()]
     for jump in jumps:
-        places.append(places[-1] * Rotation.from_rotvec(jump))
+        places.append(places[-1] * scipy.spatial.transform.Rotation.from_rotvec(jump))
     return places
 
 

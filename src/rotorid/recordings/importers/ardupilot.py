@@ -595,9 +595,9 @@ def _resets(log: Log) -> list[tuple[np.ndarray, str]]:
     return [(times, words) for times, words in found if len(times)]
 
 
-def read_ardupilot(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault], str]:
-    """Every flight of a DataFlash log by name, what was found, and the key of the rotors' order."""
-    log = read_messages(path)
+def read_ardupilot(path: Path, log: Log | None = None) -> tuple[dict[str, pd.DataFrame], list[ImportFault], str]:
+    """Every flight of a DataFlash log (or of its tables) by name, what was found, and the key of the rotors' order."""
+    log = read_messages(path) if log is None else log
     table, faults, flying = convert(log, path)
     order, more = order_of(_in_flight(log, path))
     grid, jumps = table[c.TIME].to_numpy(), np.zeros(len(table), bool)

@@ -41,13 +41,14 @@ from rotorid.io.text.files import (
 )
 from rotorid.io.text.wording import printable
 from rotorid.io.text.writing import only_writer, staging, take_name, take_place
-from rotorid.recordings import Run, read_vehicle, templates
+from rotorid.recordings import RecordingSet, Run, read_vehicle, templates
 from rotorid.recordings import columns as c
 from rotorid.recordings.files import (
     VEHICLE,
     check_manifest,
     is_bag,
     listed_runs,
+    proposed_in,
     run_files,
     run_name,
     sha256,
@@ -55,7 +56,7 @@ from rotorid.recordings.files import (
     vehicle_of,
     write_manifest,
 )
-from rotorid.recordings.importers import ardupilot, betaflight, crazyflie, neurobem, px4_ulog, rcbenchmark, ros
+from rotorid.recordings.importers import ardupilot, betaflight, crazyflie, mavlink, neurobem, px4_ulog, rcbenchmark, ros
 from rotorid.recordings.importers.faults import FILE_NAME as REPORT
 from rotorid.recordings.importers.faults import LATE_STEPS, SET_BACK, ImportFault, ImportReport, airborne, flights
 from rotorid.recordings.importers.known import Known, propose, px4_vehicle, thrust_coefficient
@@ -115,7 +116,7 @@ def _files_of(path: Path) -> dict[str, Path]:
 
 
 def format_of(path: Path) -> str:
-    """`px4`, `crazyflie`, `betaflight`, `ardupilot`, `ros`, `neurobem`, `rcbenchmark`, `csv` or `parquet`.
+    """`px4`, `crazyflie`, `betaflight`, `ardupilot`, `mavlink`, `ros`, `neurobem`, `rcbenchmark`, `csv` or `parquet`.
 
     InputError for what is none of them.
     """
@@ -138,11 +139,7 @@ def format_of(path: Path) -> str:
         return "parquet"
     epoch = _EPOCHS_US[0] < int.from_bytes(head[:8], "big") < _EPOCHS_US[1]
     if head[8:9] in (b"\xfe", b"\xfd") and (epoch or path.suffix.lower() in (".tlog", ".rlog")):
-        raise InputError(
-            f"{path}: a telemetry log of MAVLink, which is not read; take the autopilot's own log (.bin, .ulg), or "
-            "make a table of it (`pip install pymavlink`, then `mavlogdump.py --format csv --types "
-            f"RAW_IMU,ATTITUDE,SERVO_OUTPUT_RAW {path.name} > flight.csv`) and import that"
-        )
+        return "mavlink"
     for start, name in _BY_FIRST_BYTES:
         if head.startswith(start):
             return name
@@ -153,8 +150,8 @@ def format_of(path: Path) -> str:
     text = head.decode("utf-8", errors="replace")
     if "\0" in text:
         raise InputError(
-            f"{path}: not a log that rotorid knows (PX4 ULog, Betaflight, ArduPilot, ROS bag, MCAP, Crazyflie uSD, "
-            "NeuroBEM .mat, RCbenchmark CSV, any CSV, Parquet); its first bytes are " + head[:8].hex(" ")
+            f"{path}: not a log that rotorid knows (PX4 ULog, blackbox, ArduPilot, its telemetry, ROS bag, MCAP, "
+            "Crazyflie uSD, NeuroBEM .mat, RCbenchmark CSV, any CSV, Parquet); its first bytes are " + head[:8].hex(" ")
         )
     if crazyflie.is_table([name.strip(' "') for name in re.split("[,;\t]", text.splitlines()[0])]):
         return "crazyflie"
@@ -191,6 +188,12 @@ def _read(path: Path, kind: str, mapping: Mapping | None) -> _Imported:
         runs, faults, order = ardupilot.read_ardupilot(path)
         axes = "ArduPilot's: body forward-right-down, world north-east-down, as the contract's"
         settings = ardupilot.stated_parameters(path)
+        return _Imported(kind, runs, tuple(faults), axes, Known(order), speed_unit="rpm", settings=settings)
+    if kind == "mavlink":
+        log = mavlink.read_telemetry(path)
+        runs, faults, order = ardupilot.read_ardupilot(path, log)
+        axes = "ArduPilot's: body forward-right-down, world north-east-down, as the contract's"
+        settings = ardupilot.parameters(log).start
         return _Imported(kind, runs, tuple(faults), axes, Known(order), speed_unit="rpm", settings=settings)
     if kind == "ros":
         runs, faults, unit = ros.read_ros(path)
@@ -388,6 +391,12 @@ class SetOfLogs:
     def sentences(self) -> tuple[str, ...]:
         """The faults in words, each once."""
         return tuple(fault.sentence for fault in self.faults)
+
+    def recordings(self) -> RecordingSet:
+        """The set without files of its own, as `write` and `read_set` would give it."""
+        believed = vehicle_of(parse_yaml(self.vehicle_text, "the vehicle"), "the vehicle")
+        runs = tuple(Run(name, table) for name, table in sorted(self.runs.items()))
+        return RecordingSet(self.name, believed, runs, proposed=proposed_in(self.vehicle_text))
 
     def write(self, folder: Path, as_csv: bool = False) -> None:
         """Write `vehicle.yaml` (unless it was there and is kept), a file a run, a report and the list of the runs.
