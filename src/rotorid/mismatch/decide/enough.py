@@ -130,11 +130,15 @@ def may_be_nothing(finding: Finding) -> bool:
 
 
 def _at_the_end_of_a_cable(finding: Finding) -> bool:
-    """Whether what swings is best on a cable at a limit of its length or damping: it is no cable then."""
+    """Whether what swings is best on a cable at a limit of its length or damping: it is no cable then.
+
+    No damping at all is that of a thin cable in air.
+    """
     if finding.form is None or not finding.form.swings:
         return False
     free = [(finding.form.parameters[i], finding.values[i]) for i in finding.form.nonlinear]
-    return any(min(v - p.low, p.high - v) < _NEAR_AN_END * (p.high - p.low) for p, v in free)
+    ends = [(v, p.high - p.low, end) for p, v in free for end in ((p.low, p.high) if p.unit == "m" else (p.high,))]
+    return any(abs(v - end) < _NEAR_AN_END * span for v, span, end in ends)
 
 
 def lowered(finding: Finding, reason: str) -> Finding:
