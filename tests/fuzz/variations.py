@@ -118,8 +118,8 @@ def _stand(seed: int, kind: str) -> RecordingSet:
     return RecordingSet("stand", believed, tuple(runs))
 
 
-def varied(seed: int) -> tuple[RecordingSet, str]:
-    """A set, and what was done to it: two or three changes of each run."""
+def varied(seed: int) -> tuple[RecordingSet, RecordingSet, str]:
+    """A set, the same with up to three changes of each run, and what these were."""
     rng = np.random.default_rng([seed, 7])
     kind = ("bench", "stand", "flight")[seed % 3]
     if kind == "flight":
@@ -135,4 +135,4 @@ def varied(seed: int) -> tuple[RecordingSet, str]:
                 table = change(table, rng)
         runs.append((run.name, table))
     said = f"seed {seed}: {kind}, {', '.join(change.__name__ for change in chosen)}"
-    return RecordingSet(kind, made.vehicle, tuple(Run(name, table) for name, table in runs)), said
+    return made, RecordingSet(kind, made.vehicle, tuple(Run(name, table) for name, table in runs)), said
