@@ -456,8 +456,12 @@ def _with_missing_places(
     analysis: Analysis, locations: Sequence[Location], channels: Mapping[str, Channel]
 ) -> list[Location]:
     """Locations, and those that the rest of the verdict speaks of and nothing located."""
-    out = list(locations)
-    for channel, p_value in missing_places(analysis, locations, channels):
+    out, part = list(locations), fitted_part(analysis)
+    fewest = {}
+    for channel, traces in by_channel(analysis.traces).items():
+        signs = np.concatenate([part(t.run, t.time_s) for t in traces])
+        fewest[channel] = max(min(int((signs > 0).sum()), int((signs < 0).sum())), 1)
+    for channel, p_value in missing_places(analysis, locations, channels, fewest):
         traces = [t for t in analysis.traces if t.channel == channel and len(t.time_s)]
         for run in dict.fromkeys(t.run for t in traces):
             own = [t for t in traces if t.run == run]
