@@ -35,6 +35,8 @@ _UNEVEN = 0.3
 _STRAIGHT, _CURVED = 0.02, 12.0
 """Change of a column's slope from one reading to the next, as a share of its range, and in the lower quartile of such
 changes, up to which it is straight between the two."""
+_LOAD_BENDS = 0.05
+"""What a load, which is no noise, may bend by at most, as a share of its largest value."""
 _SHORTEST = 4
 _NO_ROWS = f"{{}}: no run has {_SHORTEST} samples in a row with every channel"
 SHORT = 60
@@ -211,13 +213,14 @@ def _even(time_s: np.ndarray, dt_s: float) -> np.ndarray | None:
     return time_s[0] + dt_s * np.arange(int((time_s[-1] - time_s[0]) / dt_s) + 1)
 
 
-def _straight(time_s: np.ndarray, known_s: np.ndarray, values: np.ndarray) -> np.ndarray:
+def _straight(time_s: np.ndarray, known_s: np.ndarray, values: np.ndarray, load: bool) -> np.ndarray:
     """Mask of the instants, (n,), at which a column with these readings has one, or is straight between two: a step of
-    the load between two readings was at any time between them."""
+    a `load` between two readings was at any time between them."""
     if len(known_s) < _SHORTEST:
         return np.ones(len(time_s), bool)
     bends = np.abs(np.diff(values, 2, prepend=values[0], append=values[-1]))
     least = max(_STRAIGHT * float(np.ptp(values)), _CURVED * float(np.quantile(bends, 0.25)))
+    least = min(least, _LOAD_BENDS * float(np.abs(values).max())) if load else least
     after = np.searchsorted(known_s, time_s).clip(1, len(known_s) - 1)
     off_s = np.minimum(np.abs(time_s - known_s[after - 1]), np.abs(known_s[after] - time_s))
     bent = np.minimum(bends[after - 1], bends[after]) > least
@@ -225,13 +228,13 @@ def _straight(time_s: np.ndarray, known_s: np.ndarray, values: np.ndarray) -> np
 
 
 def _compared(run: Run, vehicle: Vehicle, time_s: np.ndarray, known_s: np.ndarray, dt_s: float) -> np.ndarray | None:
-    """Mask of the instants, (n,), that are compared: near known rows, no column bent between its readings; None for all."""
+    """Mask of the instants, (n,), near known rows, at which no column is bent between its readings; None for all."""
     near = _within(time_s, known_s, _GAP_STEPS * dt_s)
     out = np.ones(len(time_s), bool) if near is None else near
     for name in filter(run.has, (*compared_readings(run, vehicle), *driven_by(run, vehicle), *c.MOUNT)):
         values = run.column(name)
         known = np.isfinite(values)
-        out &= _straight(time_s, run.time_s[known], values[known])
+        out &= _straight(time_s, run.time_s[known], values[known], name not in c.FORCE + c.MOMENT)
     return None if out.all() else out
 
 
