@@ -65,6 +65,8 @@ from rotorid.recordings.tables import numbers
 _MAGIC = 0xBC
 _CHECKSUM = 4
 """Bytes of it at the end of a log."""
+_CLOCK_TURN = 2.0**32
+"""Milliseconds after which the clock of version 1 begins anew."""
 _TIME, _EVENT = "time_s", "fixedFrequency"
 TYPES = {"e": "<f2", "f": "<f4", "d": "<f8", "b": "i1", "B": "u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4"}
 TYPES |= {"q": "<i8", "Q": "<u8"}
@@ -367,7 +369,9 @@ def decode_usd_log(data: bytes, where: str = "log") -> tuple[dict[str, pd.DataFr
     for identifier, (name, layout) in types.items():
         starts = np.asarray(offsets[identifier], int)
         rows = raw[starts[:, None] + np.arange(layout.itemsize)].copy().view(layout)[:, 0]
-        columns = {_TIME: rows["__clock"].astype(float) * scale}
+        clock = rows["__clock"].astype(float)
+        turns = np.cumsum(np.diff(clock, prepend=clock[:1]) < -0.5 * _CLOCK_TURN) if version == 1 else 0
+        columns = {_TIME: (clock + _CLOCK_TURN * turns) * scale}
         tables[name] = pd.DataFrame(columns | {n: rows[n].astype(float) for n in layout.names[2:]})
     return tables, _faults_of_end(data, offset, whole, unknown, inside)
 

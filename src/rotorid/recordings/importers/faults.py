@@ -45,7 +45,7 @@ _GROUND_M, _CLEAR_M = 0.05, 0.5
 _SMOOTHED_S = 1.0
 _SPEEDS = ("rotor_speed", "rotor_command")
 GOES_ON = 0.9
-"""Share of the readings of others of its kind that a sensor has at least, if it neither stands still nor ends early."""
+"""Share of the time that others of its kind go on which a sensor has at least, unless it stands still or ends early."""
 _SHUFFLED, LATE_STEPS = 0.05, 100.0
 """Share of steps back from which rows are in no order, and how many usual steps late a row in order may come."""
 _TURNS = {
@@ -317,20 +317,21 @@ def jumps_at(grid_s: np.ndarray, times_s: np.ndarray, what: str) -> tuple[np.nda
     return rows, [ImportFault("estimator_reset", "", found, "a run ends at each of them in the air", count)]
 
 
-def changes_of(values: np.ndarray) -> int:
-    """How often readings (n, k) change: a sensor that stands still says no more."""
-    return int((np.diff(values, axis=0) != 0).any(axis=1).sum())
+def alive_s(time_s: np.ndarray, values: np.ndarray) -> float:
+    """For how long readings (n, k) go on changing, s: one that stands still says no more, at whatever rate it comes."""
+    changed_s = time_s[1:][(np.diff(values, axis=0) != 0).any(axis=1)]
+    return float(np.clip(np.diff(changed_s), 0.0, _LONGEST_PAUSE_S).sum())
 
 
-def goes_on(changes: Mapping[int, int], what: str) -> tuple[int, list[ImportFault]]:
-    """The first instance of a sensor that goes on changing as long as any other, by how often each changes, and a fault
+def goes_on(alive: Mapping[int, float], what: str) -> tuple[int, list[ImportFault]]:
+    """The first instance of a sensor that goes on changing as long as any other, by `alive_s` of each, and a fault
     where that is not the first of all."""
-    first, most = min(changes), max(changes.values())
-    taken = next(number for number in sorted(changes) if changes[number] >= GOES_ON * most)
+    first, most = min(alive), max(alive.values())
+    taken = next(number for number in sorted(alive) if alive[number] >= GOES_ON * most)
     if taken == first:
         return taken, []
-    counts = f"its readings change {changes[first]} times, those of {what} {taken} {changes[taken]} times"
-    found = f"{what} {first} stands still or ends early ({counts})"
+    lasts = f"its readings change for {alive[first]:.1f} s, those of {what} {taken} for {alive[taken]:.1f} s"
+    found = f"{what} {first} stands still or ends early ({lasts})"
     return taken, [ImportFault("stuck", "", found, f"{what} {taken} taken", 0)]
 
 

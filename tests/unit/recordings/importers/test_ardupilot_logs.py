@@ -371,7 +371,9 @@ def written(path: Path, data: bytes) -> Path:
 
 
 @pytest.mark.parametrize(("kind", "letters"), [("IMU", "GyrAcc"), ("GYR", "Gyr"), ("ACC", "Acc")])
-@pytest.mark.parametrize(("first", "taken"), [("goes on", 0.0), ("stands still", 1.0), ("ends", 1.0)])
+@pytest.mark.parametrize(
+    ("first", "taken"), [("goes on", 0.0), ("comes at half the rate", 0.0), ("stands still", 1.0), ("ends", 1.0)]
+)
 def test_of_several_sensors_the_first_that_goes_on_is_read(kind: str, letters: str, first: str, taken: float) -> None:
     """The second sensor reads 1 more than the first."""
     time_s = np.arange(100) / 50
@@ -384,6 +386,8 @@ def test_of_several_sensors_the_first_that_goes_on_is_read(kind: str, letters: s
     ]
     if first == "ends":
         sensors[0] = sensors[0][:50]
+    if first == "comes at half the rate":
+        reading, sensors[0] = reading[::2], sensors[0][::2]
     log = tables(LIMITS) | {kind: pd.concat(sensors).sort_values([c.TIME, "I"], ignore_index=True)}
     if kind != "IMU":
         del log["IMU"]
