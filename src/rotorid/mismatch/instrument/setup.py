@@ -216,8 +216,8 @@ def _even(time_s: np.ndarray, dt_s: float) -> np.ndarray | None:
 def _straight(time_s: np.ndarray, known_s: np.ndarray, values: np.ndarray, load: bool) -> np.ndarray:
     """Mask of the instants, (n,), at which a column with these readings has one, or is straight between two: a step of
     a `load` between two readings was at any time between them."""
-    if len(known_s) < _SHORTEST:
-        return np.ones(len(time_s), bool)
+    if len(known_s) < 3:
+        return np.isin(time_s, known_s)
     bends = np.abs(np.diff(values, 2, prepend=values[0], append=values[-1]))
     least = max(_STRAIGHT * float(np.ptp(values)), _CURVED * float(np.quantile(bends, 0.25)))
     least = min(least, _LOAD_BENDS * float(np.abs(values).max())) if load else least

@@ -360,7 +360,7 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[ImportFault], n
     parts += _battery(log, faults)
     below = log.get("RFND")
     if below is not None and {"Dist", "Stat", "Orient"} <= set(below):
-        put((c.HEIGHT,), below[(below["Stat"] == _GOOD) & (below["Orient"] == _DOWN)], ("Dist",))
+        put((c.HEIGHT,), _of_first(below[(below["Stat"] == _GOOD) & (below["Orient"] == _DOWN)], "Instance"), ("Dist",))
     outputs = _outputs(log)
     if outputs is None:
         faults.append(ImportFault("no_command", "", "RCOU is not logged", "no throttle columns", 0))
@@ -538,6 +538,7 @@ def _battery(log: Log, faults: list[ImportFault]) -> list[tuple]:
             if number > 1:
                 action = "kept under a name of its own"
                 faults.append(ImportFault("instances", column, f"{seen} is logged, too", action, len(values)))
+            values = np.where(values > 0, values, np.nan) if name == "Volt" else values
             parts.append(((column,), own[c.TIME].to_numpy(float), values))
     return parts
 

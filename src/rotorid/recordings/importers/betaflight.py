@@ -269,6 +269,7 @@ def _battery(raw: pd.DataFrame, headers: Mapping[str, str]) -> tuple[dict[str, n
         if field not in raw or not raw[field].max() > 0:
             continue
         values = raw[field].to_numpy(float)
+        values = np.where(values > 0, values, np.nan) if field == "vbatLatest" else values
         counts = next((n for first, n in since if version >= first), None)
         offset, per_ampere = _pair(headers, "currentMeter") or _pair(headers, "currentSensor") or (0.0, 0.0)
         if counts is not None:

@@ -49,6 +49,7 @@ from rotorid.recordings.importers.faults import (
     report_gaps,
     stretches_of,
     true_stretches,
+    without_wild,
 )
 from rotorid.recordings.importers.guessing import guess
 from rotorid.recordings.importers.mapping import (
@@ -212,9 +213,10 @@ def convert(log: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
         put(_SPEEDS, log[speeds].to_numpy(float) * RPM)
     for name, a_volt in (("pm.vbatMV", 1000), ("pm.vbat", 1)):
         if name in log and c.BATTERY_VOLTAGE not in columns:
-            columns[c.BATTERY_VOLTAGE] = log[name].to_numpy(float) / a_volt
+            columns[c.BATTERY_VOLTAGE] = (log[name].where(log[name] > 0) / a_volt).to_numpy(float)
     table, repeated = drop_repeated_times(pd.DataFrame(columns))
-    return table, faults + repeated
+    table, wild = without_wild(table)
+    return table, faults + repeated + wild
 
 
 def in_the_air(table: pd.DataFrame, shortest_s: float = 4.0, margin_s: float = 1.0) -> list[tuple[float, float]]:

@@ -68,6 +68,8 @@ _UNEXPLAINED = 0.2
 """Share of its variance that the motors of a mixer may leave of another motor's signal."""
 
 
+_WILD = 1e9
+"""No quantity of a vehicle in SI units is larger."""
 SET_BACK = "clock_set_back"
 
 
@@ -392,6 +394,16 @@ def blank_held(
     return table[~empty].reset_index(drop=True), faults
 
 
+def without_wild(table: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
+    """The table of a log without readings that are none, infinite or absurd by damage, and the fault of them."""
+    wild = {n: table[n].abs() > _WILD for n in table if n != c.TIME and table[n].abs().max() > _WILD}
+    if not wild:
+        return table, []
+    cells = pd.DataFrame(wild).to_numpy()
+    found = fault_where(cells, "wild", ", ".join(wild), f"infinite, or beyond {_WILD:g}", "made empty cells")
+    return table.assign(**{n: table[n].mask(own) for n, own in wild.items()}), found
+
+
 def true_stretches(mask: np.ndarray, time_s: np.ndarray, shortest_s: float) -> list[tuple[float, float]]:
     """Start and stop times of every stretch of True that lasts at least `shortest_s`."""
     ends = ((float(time_s[start]), float(time_s[stop - 1])) for start, stop in stretches(mask))
@@ -550,6 +562,7 @@ def flights(
     few these are.
     """
     time_s = table[c.TIME].to_numpy(float)
+    table, wild = without_wild(table)
     flying = without_pauses(flying, time_s)
     if jumps is not None:
         flying &= ~jumps
@@ -566,7 +579,7 @@ def flights(
         elif throttles and not (table[throttles] > _DRIVEN).any().any():
             why += ": no motor is ever driven"
         raise InputError(f"{where}: {why}")
-    runs, cuts = {}, []
+    runs, cuts = {}, wild
     for number, (start, stop) in enumerate(found, 1):
         run = name if len(found) == 1 else f"{name}_{number}"
         first, last = _inside(start, stop, time_s)

@@ -191,7 +191,8 @@ def channel(before: float, after: float):
     ],
 )
 def test_a_channel_that_stays_far_above_its_floor_is_located(before, after, wrong_values, samples, located):
-    analysis = SimpleNamespace(findings=(), wrong_values=wrong_values, without={}, p_values={}, unexplained_channels=())
+    analysis = SimpleNamespace(findings=(), wrong_values=wrong_values, without={}, p_values={}, unexplained_channels=(),
+                               noise_floor={"moment_x": 1.0})  # fmt: skip
     places = missing_places(analysis, (), {"moment_x": channel(before, after)}, {"moment_x": samples})
     assert [name for name, _ in places] == located
     if not wrong_values:

@@ -487,6 +487,15 @@ def test_several_outputs_of_one_motor_and_several_batteries_are_named() -> None:
     assert any(f.found == "outputs 1 and 2 are both motor 1" for f in faults)
 
 
+def test_no_voltage_and_a_second_range_finder_are_not_read() -> None:
+    time_s = np.arange(100) / 50
+    log = tables(LIMITS) | {"BAT": pd.DataFrame({c.TIME: time_s, "Inst": 0, "Volt": 16.0 * (np.arange(100) % 5 > 0)})}
+    below = [pd.DataFrame({c.TIME: time_s, "Instance": k, "Dist": 2.0 + k, "Stat": 4, "Orient": 25}) for k in (0, 1)]
+    table, *_ = ardupilot.convert(log | {"RFND": pd.concat(below, ignore_index=True)}, "log")
+    assert table[c.BATTERY_VOLTAGE].isna().sum() == 20 and set(table[c.BATTERY_VOLTAGE].dropna()) == {16.0}
+    assert set(table[c.HEIGHT]) == {2.0}
+
+
 @pytest.mark.parametrize(("every", "taken"), [(1, "ATT"), (10, "ANG")])
 def test_of_several_attitudes_one_that_comes_often_enough_is_read(every: int, taken: str) -> None:
     time_s = np.arange(100) / 50
