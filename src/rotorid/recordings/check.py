@@ -53,6 +53,8 @@ _SMALL_CHANGES = 0.2
 """Median change of a reading from row to row, as a share of its range, below which it is noise and no load."""
 _GOES_ON = 0.2
 """Share of its range by which the middle half of a force changes while its reference stands still."""
+_HELD = 0.5
+"""Share of rows that repeat the reading before, from which an inertial sensor comes more slowly than the rows."""
 _APART = 0.1
 """Share of rows from which rotors have their values in different rows."""
 _TABLES = ("csv", "tsv", "parquet", "feather", "xlsx", "xls", "ods", "h5", "hdf5", "mat", "npz")
@@ -283,7 +285,8 @@ def check_recordings(recordings: RecordingSet) -> SetCheck:
     usable = sufficient(recordings)
     found = _contents(recordings)
     # A run that is left out would raise doubts about values that no verdict takes from it.
-    return replace(found, lacks=(*usable.left_out, *found.lacks), doubts=doubts_of(usable))
+    doubts = *doubts_of(usable), *_held_sensors(recordings)  # a grid of its own hides that a sensor is held
+    return replace(found, lacks=(*usable.left_out, *found.lacks), doubts=doubts)
 
 
 def check_folder(folder: Path) -> SetCheck:
@@ -566,3 +569,20 @@ def _scattered_rotors(recordings: RecordingSet) -> Iterator[Doubt]:
                 f"between its own each {kind.replace('_', ' ')} is a straight line, and a lag, a delay or a curve that "
                 "is found may be that",
             )
+
+
+def _held_sensors(recordings: RecordingSet) -> Iterator[Doubt]:
+    """One doubt for a gyroscope or accelerometer of a flight that mostly repeats its last reading, the whole of it."""
+    for names in (c.ANGULAR_VELOCITY, c.SPECIFIC_FORCE) if recordings.vehicle.kind == "flight" else ():
+        for run in (r for r in recordings.runs if r.has(*names)):
+            values = run.array(names)
+            known = np.isfinite(values).all(axis=1)
+            again = (np.diff(values[known], axis=0) == 0).all(axis=1)
+            if 1.0 > again.mean() > _HELD:
+                rate = (~again).sum() / (run.time_s[-1] - run.time_s[0])
+                yield Doubt(
+                    names[0],
+                    f"{names[0]} to {names[-1]} repeat their last reading in {again.mean():.0%} of the rows of "
+                    f"{run.name}: they come {rate:.3g} times a second, and later than the rows say",
+                )
+                break
