@@ -251,7 +251,7 @@ def doubts_of(recordings: RecordingSet) -> tuple[Doubt, ...]:
     if recordings.vehicle.kind == "flight":
         found += physical_doubts(recordings)
     found += [*_still_readings(recordings), *_stuck_readings(recordings), *still_sensors(recordings)]
-    found += [*_coarse_readings(recordings), *_scattered_rotors(recordings)]
+    found += [*_coarse_readings(recordings), *_scattered_rotors(recordings), *_scattered_readings(recordings)]
     return tuple(found)
 
 
@@ -569,6 +569,23 @@ def _scattered_rotors(recordings: RecordingSet) -> Iterator[Doubt]:
                 f"between its own each {kind.replace('_', ' ')} is a straight line, and a lag, a delay or a curve that "
                 "is found may be that",
             )
+
+
+def _scattered_readings(recordings: RecordingSet) -> Iterator[Doubt]:
+    """One doubt for all columns of a stand or bench that lack values now and then, in no order."""
+    runs, vehicle = recordings.runs, recordings.vehicle
+    found: dict[str, float] = {}
+    for run in runs if vehicle.kind != "flight" else ():
+        for name in (*compared_readings(run, vehicle), *c.rotor_columns("rotor_speed", vehicle.rotor_count)):
+            steps = np.diff(np.flatnonzero(np.isfinite(run.column(name)))) if run.has(name) else np.zeros(0)
+            if len(steps) and (steps != np.median(steps)).mean() > _APART:
+                found[name] = max(found.get(name, 0.0), 1.0 - len(steps) / len(run.table))
+    if found:
+        yield Doubt(
+            next(iter(found)),
+            f"{listed(list(found))}: up to {max(found.values()):.0%} of the values are missing, now and then; between "
+            "others each is a straight line, and what is found may be that",
+        )
 
 
 def _held_sensors(recordings: RecordingSet) -> Iterator[Doubt]:

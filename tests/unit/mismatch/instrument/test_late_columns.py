@@ -82,9 +82,10 @@ def stuck(name: str):
         ("stand", stuck(SPEEDS[1]), SPEEDS[1], "stands still in r0"),
         ("bench", stuck("reference_force_x_n"), "reference_force_x_n", "stands still in r0"),
         ("stand", lambda table: table.round({"force_z_n": 0}), "force_z_n", "in steps of 1"),
+        ("stand", scattered(["force_z_n"]), "force_z_n", "of the values are missing"),
     ],
 )
-def test_what_stands_still_or_is_rounded_is_doubted(kind: str, change, name: str, words: str) -> None:
+def test_what_stands_still_is_rounded_or_scattered_is_doubted(kind: str, change, name: str, words: str) -> None:
     assert doubts_of(changed(kind, lambda table: table)) == ()
     (doubt,) = doubts_of(changed(kind, change))
     assert doubt.what == name and words in doubt.sentence and not doubt.stops
