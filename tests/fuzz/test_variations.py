@@ -14,8 +14,8 @@ from tests.fuzz.variations import varied
 
 FEW, SEEDS, A_TEST = (0, 3, 4), 600, 20
 OTHERWISE, UNDOUBTED = 2, "no doubt is said"
-"""Of the sets of a test at most so many are answered otherwise in silence: three of a hundred stands are (speeds held in
-few rows, a hole next to a noise floor that is low by chance). None ends in a fault."""
+"""Of the sets of a test at most so many are answered otherwise in silence: three of a hundred stands are (speeds held
+in few rows, a hole next to a noise floor that is low by chance). None ends in a fault."""
 WORSE = ("no_mismatch", "not_judged", "explained", "partly_explained", "unexplained")
 MEANT = {"sensor_dropout", "quantisation"}
 """Names of what a hole, a sensor that stands still, or rounding is."""
