@@ -15,7 +15,7 @@ from rotorid_acquire.transport import AcquireError, Clock, DeviceSilent, Refused
 
 _SILENCE_S = 60.0
 _UNREADABLE_BYTES = 4096
-"""Bytes without one line that can be read, after which a recording is given up: headings are shorter."""
+"""Bytes in a row without a line that can be read, after which a recording is given up: headings are shorter."""
 
 
 def record_lines(
@@ -56,6 +56,7 @@ class _LineRecorder(Recorder):
             instrument, transport, clock, folder, name, setup, procedure=procedure, say=say, stop_asked=stop_asked
         )
         self._decoder = LineDecoder(description)
+        self._unread_from = 0
 
     @property
     def lines(self) -> int:
@@ -87,8 +88,12 @@ class _LineRecorder(Recorder):
         self._last_sample_ns = now_ns
         for values in self._decoder.feed(data):
             self._on_values(values)
-        if not self._decoder.lines and self._bytes >= _UNREADABLE_BYTES and not self._closing:
-            raise Refused(self._warnings()[0] + ". What came is in the log.")
+            self._unread_from = self._bytes
+        if self._bytes - self._unread_from >= _UNREADABLE_BYTES and not self._closing:
+            raise Refused(
+                f"no line of the last {self._bytes - self._unread_from} bytes could be read: is the baud rate right "
+                f"({self._description.baud_rate}), and does the description fit? What came is in the log."
+            )
 
     def _overhear(self, data: bytes) -> None:
         """Nothing is waited for behind a full disk."""

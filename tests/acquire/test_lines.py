@@ -237,6 +237,8 @@ def test_a_wrong_baud_rate_is_noticed(tmp_path: Path) -> None:
     noise = bytes(np.random.default_rng(1).integers(0, 256, 5000, dtype=np.uint8))
     _, session = recorded(tmp_path / "all", noise)
     assert session.ended == Ended.REFUSED and "is the baud rate right (9600)" in session.message
+    _, session = recorded(tmp_path / "later", b"0,1\n", noise)
+    assert session.ended == Ended.REFUSED and "is the baud rate right (9600)" in session.message
     _, session = recorded(tmp_path / "some", noise[:300], KeyboardInterrupt())
     assert "is the baud rate right (9600)" in session.warnings[0]
     assert "is the baud rate right (9600)" in answer("check", tmp_path / "some" / "run.rlog", app=app)

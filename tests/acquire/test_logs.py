@@ -70,7 +70,12 @@ def test_gzipped_logs_whole_and_cut(log_path, tmp_path):
     pd.testing.assert_frame_equal(read_log(packed).table, whole.table)
     packed.write_bytes(packed.read_bytes()[:600])
     log = read_log(packed)
-    assert log.cut_at is not None and len(log.table) <= len(whole.table)
+    assert log.cut_at is not None and len(log.table) <= len(whole.table) and not log.faults
+    changed = bytearray(gzip.compress(log_path.read_bytes()))
+    changed[len(changed) // 2] ^= 1
+    packed.write_bytes(changed)
+    session_path(packed).unlink(missing_ok=True)  # without the checksum there
+    assert "damaged in one place" in read_log(packed).faults[0]
 
 
 @pytest.mark.parametrize("number", range(1, 60, 4))

@@ -13,9 +13,9 @@ _G = 9.81
 Change = Callable[[pd.DataFrame, np.random.Generator], pd.DataFrame]
 
 
-def _some(table: pd.DataFrame, rng: np.random.Generator) -> list[str]:
+def _some(table: pd.DataFrame, rng: np.random.Generator, without: str = "time_s") -> list[str]:
     """A sensor's columns, or a few chosen by chance."""
-    names = [n for n in table.columns if n != "time_s"]
+    names = [n for n in table.columns if n != "time_s" and not n.startswith(without)]
     stem = str(rng.choice(names)).split("_")[0]
     own = [n for n in names if n.startswith(stem)]
     return own if rng.random() < 0.7 else [str(n) for n in rng.choice(names, min(3, len(names)), replace=False)]
@@ -41,7 +41,8 @@ def slow(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
 
 
 def held(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
-    names, every = _some(table, rng), int(rng.integers(2, 21))
+    """Not a reference: its steps would be late, which nothing could show."""
+    names, every = _some(table, rng, "reference"), int(rng.integers(2, 21))
     table[names] = table[names].to_numpy()[np.arange(len(table)) // every * every]
     return table
 
@@ -54,7 +55,8 @@ def standing(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
 
 
 def rounded(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
-    for name in _some(table, rng):
+    """Not a reference: another load would be stated."""
+    for name in _some(table, rng, "reference"):
         table[name] = table[name].round(int(rng.integers(0, 4)))
     return table
 
@@ -85,11 +87,12 @@ def without(table: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
 
 
 CHANGES: tuple[Change, ...] = (
-    hole, scattered, slow, held, standing, rounded, uneven, jittered, thinned, short, later, without,
+    thinned, short, uneven, jittered, later, held, hole, scattered, slow, standing, rounded, without,
 )  # fmt: skip
+"""In the order in which they are made: what was held and is thinned then is late by as much as nobody knows."""
 
 
-def _stand(seed: int, kind: str) -> RecordingSet:
+def stand(seed: int, kind: str) -> RecordingSet:
     """Steps of four rotors on a six-axis sensor, or of a known load on a bench."""
     rng, thesis, runs = np.random.default_rng(seed), templates.read("thesis"), []
     rate, seconds = float(rng.choice([10.0, 50.0, 100.0])), float(rng.choice([6.0, 15.0]))
@@ -99,7 +102,8 @@ def _stand(seed: int, kind: str) -> RecordingSet:
         speed, table = 600.0 + 900.0 * steps, {"time_s": time_s}
         if kind == "stand":
             thrust = thesis.thrust_coefficients_n_s2() * speed**2
-            table |= {f"rotor_speed_{i + 1}_rad_s": speed[:, i] for i in range(4)}
+            counted = speed + rng.standard_normal(speed.shape)
+            table |= {f"rotor_speed_{i + 1}_rad_s": counted[:, i] for i in range(4)}
             places, torque = thesis.rotor_positions_m(), thesis.torque_coefficients_n_m_s2() * speed**2
             read = {
                 "force_z_n": -thrust.sum(axis=1),
@@ -118,15 +122,15 @@ def _stand(seed: int, kind: str) -> RecordingSet:
     return RecordingSet("stand", believed, tuple(runs))
 
 
-def varied(seed: int) -> tuple[RecordingSet, str]:
-    """A set, and what was done to it: two or three changes of each run."""
+def varied(seed: int) -> tuple[RecordingSet, RecordingSet, str]:
+    """A set, the same with up to three changes of each run, and what these were."""
     rng = np.random.default_rng([seed, 7])
     kind = ("bench", "stand", "flight")[seed % 3]
     if kind == "flight":
         made = swings(templates.read("thesis"), "flight", float(rng.choice([4.0, 7.0, 11.0])), 2, seed)
     else:
-        made = _stand(seed, kind)
-    chosen = [CHANGES[k] for k in rng.choice(len(CHANGES), int(rng.integers(1, 4)), replace=False)]
+        made = stand(seed, kind)
+    chosen = [CHANGES[k] for k in sorted(rng.choice(len(CHANGES), int(rng.integers(1, 4)), replace=False))]
     runs = []
     for run in made.runs:
         table = run.table.copy()
@@ -135,4 +139,4 @@ def varied(seed: int) -> tuple[RecordingSet, str]:
                 table = change(table, rng)
         runs.append((run.name, table))
     said = f"seed {seed}: {kind}, {', '.join(change.__name__ for change in chosen)}"
-    return RecordingSet(kind, made.vehicle, tuple(Run(name, table) for name, table in runs)), said
+    return made, RecordingSet(kind, made.vehicle, tuple(Run(name, table) for name, table in runs)), said

@@ -38,6 +38,7 @@ from rotorid.recordings.held import (
     held,
     noisy_columns,
     standing_together,
+    step_of,
 )
 from rotorid.recordings.physics import gravity, impossible_values, near_names, physical_doubts, voltages
 from rotorid.recordings.run import Doubt, RecordingSet, Run
@@ -46,6 +47,16 @@ from rotorid.recordings.vehicle import Vehicle
 
 _STILL_S = 1.0
 """A sensor of a flight that repeats one reading for so long is named."""
+_STUCK_ROWS, _STUCK_TIMES = 8, 4.0
+"""Readings from which a sensor of a stand stands still, and how many times as long as it ever does else."""
+_SMALL_CHANGES = 0.2
+"""Median change of a reading from row to row, as a share of its range, below which it is noise and no load."""
+_GOES_ON = 0.2
+"""Share of its range by which the middle half of a force changes while its reference stands still."""
+_HELD = 0.5
+"""Share of rows that repeat the reading before, from which an inertial sensor comes more slowly than the rows."""
+_APART = 0.1
+"""Share of rows from which rotors have their values in different rows."""
 _TABLES = ("csv", "tsv", "parquet", "feather", "xlsx", "xls", "ods", "h5", "hdf5", "mat", "npz")
 _LOGS = ("ulg", "bin", "bbl", "bfl", "mcap", "db3", "bag", "tlog")
 _PACKED = ("zip", "gz", "bz2", "xz", "zst", "7z", "tar", "tgz")
@@ -241,7 +252,8 @@ def doubts_of(recordings: RecordingSet) -> tuple[Doubt, ...]:
         found += [*gravity(recordings.vehicle), *impossible_values(recordings)]
     if recordings.vehicle.kind == "flight":
         found += physical_doubts(recordings)
-    found += [*_still_readings(recordings), *still_sensors(recordings)]
+    found += [*_still_readings(recordings), *_stuck_readings(recordings), *still_sensors(recordings)]
+    found += [*_coarse_readings(recordings), *_scattered_rotors(recordings), *_scattered_readings(recordings)]
     return tuple(found)
 
 
@@ -277,7 +289,8 @@ def check_recordings(recordings: RecordingSet) -> SetCheck:
     usable = sufficient(recordings)
     found = _contents(recordings)
     # A run that is left out would raise doubts about values that no verdict takes from it.
-    return replace(found, lacks=(*usable.left_out, *found.lacks), doubts=doubts_of(usable))
+    doubts = *doubts_of(usable), *_held_sensors(recordings)  # a grid of its own hides that a sensor is held
+    return replace(found, lacks=(*usable.left_out, *found.lacks), doubts=doubts)
 
 
 def check_folder(folder: Path) -> SetCheck:
@@ -477,3 +490,122 @@ def _still_readings(recordings: RecordingSet) -> Iterator[Doubt]:
             "not measured, or a sensor that stands still",
             stops=len(still) == len(own),
         )
+
+
+def _stuck_readings(recordings: RecordingSet) -> Iterator[Doubt]:
+    """One doubt for each column of a stand or bench that stands still for a time: a reading or a measured speed by its
+    noise, a reference while the force that it states goes on."""
+    vehicle = recordings.vehicle
+    if vehicle.kind == "flight":
+        return
+    speeds = c.rotor_columns("rotor_speed", vehicle.rotor_count)
+    found: dict[str, tuple[str, float, float]] = {}
+    names = {run.name: [*filter(run.has, (*compared_readings(run, vehicle), *speeds))] for run in recordings.runs}
+    noisy = {n for run in recordings.runs for n in names[run.name] if _is_noisy(run.column(n))}
+    for run in recordings.runs:
+        for name in names[run.name]:
+            values = run.column(name)
+            rows, usual = _longest_stand(values)
+            if name in c.REFERENCE_FORCE:
+                stuck = _goes_on(run.column(c.FORCE[c.REFERENCE_FORCE.index(name)]), rows)
+            else:
+                stuck = len(rows) >= _STUCK_TIMES * usual and name in noisy and values[rows[0]] != 0
+            if stuck and len(rows) >= _STUCK_ROWS:
+                found.setdefault(name, (run.name, run.time_s[rows[0]], run.time_s[rows[-1]]))
+    for name, (run, start, stop) in found.items():
+        yield Doubt(
+            name,
+            f"{name} stands still in {run} from {start:.2f} to {stop:.2f} s while others go on: its driver or its link "
+            "stopped, and nothing was read there",
+        )
+
+
+def _is_noisy(values: np.ndarray) -> bool:
+    """Whether most changes of a column (n,) are small: noise, and no steps of a load."""
+    known = values[np.isfinite(values)]
+    changes = np.abs(np.diff(known))
+    changes = changes[changes > 0]
+    return len(changes) > 0 and float(np.median(changes)) < _SMALL_CHANGES * float(np.ptp(known))
+
+
+def _longest_stand(values: np.ndarray) -> tuple[np.ndarray, int]:
+    """Rows of the longest stretch in which a column (n,) keeps one value, and how many the next long one has."""
+    known = np.flatnonzero(np.isfinite(values))
+    parts = sorted(np.split(known, np.flatnonzero(np.diff(values[known]) != 0) + 1), key=len)
+    return parts[-1], len(parts[-2]) if len(parts) > 1 else 0
+
+
+def _goes_on(values: np.ndarray, rows: np.ndarray) -> bool:
+    """Whether a column (n,) changes in these rows by a fair share of what it does at all."""
+    inside, every = values[rows][np.isfinite(values[rows])], values[np.isfinite(values)]
+    return len(inside) > 0 and float(np.ptp(np.quantile(inside, [0.25, 0.75]))) > _GOES_ON * float(np.ptp(every)) > 0
+
+
+def _coarse_readings(recordings: RecordingSet) -> Iterator[Doubt]:
+    """One doubt for each reading of a stand or bench whose steps are larger than its noise."""
+    runs, vehicle = recordings.runs, recordings.vehicle
+    if vehicle.kind == "flight":
+        return
+    found: dict[str, float] = {}
+    for run in runs:
+        for name in (n for n in compared_readings(run, vehicle) if n in c.FORCE + c.MOMENT):
+            values = run.column(name)[np.isfinite(run.column(name))]
+            step = step_of(values) if (np.diff(values) == 0).sum() > 0.5 * len(values) else 0.0
+            found[name] = max(found.get(name, 0.0), step)
+    for name, step in found.items():
+        if step:
+            yield Doubt(
+                name,
+                f"{name} comes in steps of {step:.3g}, larger than its noise: what is smaller than half of one is "
+                "rounding, and no effect",
+            )
+
+
+def _scattered_rotors(recordings: RecordingSet) -> Iterator[Doubt]:
+    """One doubt for each kind of columns of a flight's rotors that have their values in different rows."""
+    if recordings.vehicle.kind != "flight":
+        return
+    for kind, names in rotor_groups(recordings.vehicle).items():
+        known = [np.isfinite(run.array(names)) for run in recordings.runs if names and run.has(*names)]
+        apart = [float((own.any(axis=1) & ~own.all(axis=1)).mean()) for own in known]
+        if max(apart, default=0.0) > _APART:
+            yield Doubt(
+                names[0],
+                f"{names[0]} to {names[-1]} have their values in different rows ({max(apart):.0%} of them lack some): "
+                f"between its own each {kind.replace('_', ' ')} is a straight line, and a lag, a delay or a curve that "
+                "is found may be that",
+            )
+
+
+def _scattered_readings(recordings: RecordingSet) -> Iterator[Doubt]:
+    """One doubt for all columns of a stand or bench that lack values now and then, in no order."""
+    runs, vehicle = recordings.runs, recordings.vehicle
+    found: dict[str, float] = {}
+    for run in runs if vehicle.kind != "flight" else ():
+        for name in (*compared_readings(run, vehicle), *c.rotor_columns("rotor_speed", vehicle.rotor_count)):
+            steps = np.diff(np.flatnonzero(np.isfinite(run.column(name)))) if run.has(name) else np.zeros(0)
+            if len(steps) and (steps != np.median(steps)).mean() > _APART:
+                found[name] = max(found.get(name, 0.0), 1.0 - len(steps) / len(run.table))
+    if found:
+        yield Doubt(
+            next(iter(found)),
+            f"{listed(list(found))}: up to {max(found.values()):.0%} of the values are missing, now and then; between "
+            "others each is a straight line, and what is found may be that",
+        )
+
+
+def _held_sensors(recordings: RecordingSet) -> Iterator[Doubt]:
+    """One doubt for a gyroscope or accelerometer of a flight that mostly repeats its last reading, the whole of it."""
+    for names in (c.ANGULAR_VELOCITY, c.SPECIFIC_FORCE) if recordings.vehicle.kind == "flight" else ():
+        for run in (r for r in recordings.runs if r.has(*names)):
+            values = run.array(names)
+            known = np.isfinite(values).all(axis=1)
+            again = (np.diff(values[known], axis=0) == 0).all(axis=1)
+            if 1.0 > again.mean() > _HELD:
+                rate = (~again).sum() / (run.time_s[-1] - run.time_s[0])
+                yield Doubt(
+                    names[0],
+                    f"{names[0]} to {names[-1]} repeat their last reading in {again.mean():.0%} of the rows of "
+                    f"{run.name}: they come {rate:.3g} times a second, and later than the rows say",
+                )
+                break

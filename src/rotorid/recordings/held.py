@@ -29,6 +29,9 @@ _LEAST_JUMP = 5.0
 
 _LONG_S = 2.0
 """Readings without noise that repeat for so long did not stand truly where what they must follow moves."""
+_ON_GRID = 0.99
+_OFF_GRID = 0.02
+"""Distance to the grid, as a share of a step, that still counts as on it."""
 _BLOCK_S = 0.2
 _BEYOND_NOISE = 3.0
 """Times the scatter of means over `_BLOCK_S` by noise alone from which a column moves."""
@@ -116,6 +119,24 @@ def _steps_and_bends(parts: list[np.ndarray]) -> tuple[float, float]:
         step.append(first[first > 0])
         bend.append(second[first[1:] > 0])
     return tuple(float(np.median(x)) if len(x) else 0.0 for x in map(np.concatenate, (step, bend)))
+
+
+def step_of(values: np.ndarray) -> float:
+    """Step of a grid that readings lie on, 0.0 if they lie on none.
+
+    The step is the smallest difference between two different values that is not rounding; nearly every value must
+    then lie on the grid.
+    """
+    values = values[np.isfinite(values)]
+    levels = np.unique(np.round(values, 9))
+    if len(levels) < 3 or len(levels) > 0.5 * len(values):
+        return 0.0
+    gaps = np.diff(levels)
+    step = float(np.min(gaps[gaps > 1e-3 * np.median(gaps)]))
+    # Refine: the mean of all gaps in units of the step.
+    step = float(np.sum(gaps) / np.sum(np.round(gaps / step)))
+    off = np.abs(gaps / step - np.round(gaps / step))
+    return step if np.mean(off < _OFF_GRID) >= _ON_GRID else 0.0
 
 
 def noisy_columns(runs: Iterable[Run], names: Iterable[str]) -> set[str]:

@@ -93,9 +93,9 @@ def pack_chunk(tag: int, host_ns: int, data: bytes) -> bytes:
 def read_raw(path: str | Path) -> RawLog:
     """Read a log, whole, cut or damaged, plain or gzipped. Raises InputError where there is none."""
     data = read_bytes(Path(path), LARGEST_RAW_LOG)
-    truncated = False
+    truncated = changed = False
     if data[:2] == b"\x1f\x8b":
-        data, truncated = _unpacked(data)
+        data, truncated, changed = _unpacked(data)
         if len(data) > LARGEST_RAW_LOG:
             raise InputError(f"{path}: unpacks to more than {LARGEST_RAW_LOG / 1e6:g} MB, expected at most that")
     if not MAGIC.startswith(data[: len(MAGIC)]):
@@ -109,16 +109,16 @@ def read_raw(path: str | Path) -> RawLog:
             damages.append(Damage(position, begin, len(chunks), _rescued(data, position, begin, chunks, chunk)))
         chunks.append(chunk)
         position = end
-    cut = position if truncated or position < len(data) else None
-    if cut is not None and not truncated and not _is_cut(data[position:]):
+    cut = position if truncated or changed or position < len(data) else None
+    if changed or (cut is not None and not truncated and not _is_cut(data[position:])):
         last = _rescued(data, position, len(data), chunks, None)
         damages.append(Damage(position, len(data), len(chunks), last))
-        cut = None
+        cut = cut if changed else None  # of a packed file nothing behind the damage can be read
     return RawLog(tuple(chunks), cut, tuple(damages), digest)
 
 
-def _unpacked(data: bytes) -> tuple[bytes, bool]:
-    """What a gzip stream holds up to its end or to where it is damaged, and whether that is less than all.
+def _unpacked(data: bytes) -> tuple[bytes, bool, bool]:
+    """What a gzip stream holds up to its end or to where it is damaged, whether it is cut off, whether it is damaged.
 
     Ends soon behind `LARGEST_RAW_LOG` bytes.
     """
@@ -129,8 +129,8 @@ def _unpacked(data: bytes) -> tuple[bytes, bool]:
             if len(out) > LARGEST_RAW_LOG or not MAGIC.startswith(out[: len(MAGIC)]):
                 break
     except zlib.error:
-        return bytes(out), True
-    return bytes(out), not unpacker.eof
+        return bytes(out), False, True
+    return bytes(out), not unpacker.eof, False
 
 
 def _walk(data: bytes, position: int) -> Iterator[tuple[_Chunk, int, int]]:

@@ -8,7 +8,8 @@ import pandas as pd
 import pytest
 
 from rotorid.recordings import RecordingSet, Run, Vehicle, write_set
-from rotorid.recordings.check import as_text, check_set
+from rotorid.recordings import columns as c
+from rotorid.recordings.check import as_text, check_recordings, check_set
 from tests.command_line import answer, refusal
 
 FLIGHT = Vehicle(
@@ -80,6 +81,12 @@ def sensed() -> dict[str, np.ndarray]:
              (("specific_force", "m_s2"), ("angular_velocity", "rad_s"))]  # fmt: skip
     rng = np.random.default_rng(0)
     return {name: rng.standard_normal(1000) for name in [*names, "rotor_speed_1_rad_s"]}
+
+
+def test_a_gyroscope_that_repeats_its_readings_is_doubted() -> None:
+    rates = np.random.default_rng(1).standard_normal((1000, 3))[np.arange(1000) // 5 * 5]
+    found = check_recordings(flight(**sensed() | dict(zip(c.ANGULAR_VELOCITY, rates.T, strict=True)))).doubts
+    assert any("repeat their last reading in 80% of the rows" in doubt.sentence for doubt in found)
 
 
 def test_the_command_checks_one_set_or_a_folder_of_them(tmp_path: Path) -> None:

@@ -49,7 +49,7 @@ def _slopes(setup: PreparedInstrument) -> list[_Slope]:
     Of a moment what goes with the forces across it is taken off first: a lever arm that nobody stated makes any sign.
     """
     out = []
-    for run in setup.instrument.runs:
+    for run in dict.fromkeys(x.run for x in setup.loadings):
         parts = [x for x in setup.loadings if x.run == run]
         loads, reads = (np.concatenate([getattr(x, name) for x in parts]) for name in ("load", "reading"))
         for k in setup.instrument.channels:

@@ -25,7 +25,9 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import CHANNELS, UNITS, Loading
 from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.decide.status import Estimate
-from rotorid.recordings import columns
+from rotorid.mismatch.mistakes.signals import replace_columns
+from rotorid.recordings import RecordingSet, Run, columns
+from rotorid.recordings.held import step_of
 
 WIDTHS = (5, 9, 17, 33, 65, 129, 257)
 """Samples of the windows."""
@@ -56,27 +58,30 @@ _SLACK_S = 0.1
 _COARSE_SHARE = 0.25
 """Share of the noise's variance that the steps must make, q²/12 relative to σ²."""
 _LEAST_SAMPLES = 200
-_ON_GRID = 0.99
-_OFF_GRID = 0.02
-"""Distance to the grid, as a share of a step, that still counts as on it."""
+_HELD_SHARE = 0.3
+"""Share of readings that repeat the one before, from which a column is held between readings."""
+_LEAST_CHANGES, _SMALL_CHANGES = 20, 0.05
+"""How often it changes at least, and the median of its changes as a share of its range: other steps are the load's."""
 
 
-def step_of(values: np.ndarray) -> float:
-    """Step of a grid that readings lie on, 0.0 if they lie on none.
+def without_repeats(recordings: RecordingSet) -> RecordingSet:
+    """A stand or bench without readings and speeds that only repeat the one before, where a column with noise of its
+    own often does so: it comes more slowly than the rows."""
 
-    The step is the smallest difference between two different values that is not rounding; nearly every value must
-    then lie on the grid.
-    """
-    values = values[np.isfinite(values)]
-    levels = np.unique(np.round(values, 9))
-    if len(levels) < 3 or len(levels) > 0.5 * len(values):
-        return 0.0
-    gaps = np.diff(levels)
-    step = float(np.min(gaps[gaps > 1e-3 * np.median(gaps)]))
-    # Refine: the mean of all gaps in units of the step.
-    step = float(np.sum(gaps) / np.sum(np.round(gaps / step)))
-    off = np.abs(gaps / step - np.round(gaps / step))
-    return step if np.mean(off < _OFF_GRID) >= _ON_GRID else 0.0
+    def change(run: Run) -> dict:
+        names = (*columns.FORCE, *columns.MOMENT, *columns.rotor_columns("rotor_speed", recordings.vehicle.rotor_count))
+        own = {n: run.table[n].ffill().diff() for n in names if run.has(n)}
+        return {n: run.table[n].mask(steps == 0) for n, steps in own.items() if _is_held(run.column(n), steps)}
+
+    return replace_columns(recordings, change)
+
+
+def _is_held(values: np.ndarray, steps: np.ndarray) -> bool:
+    """Whether a column (n,) with these steps from row to row is held, on no grid, and most of its changes are noise."""
+    changes = np.abs(steps[steps != 0])
+    if not (steps == 0).mean() > _HELD_SHARE or len(changes) < _LEAST_CHANGES or step_of(values):
+        return False
+    return float(np.nanmedian(changes)) < _SMALL_CHANGES * float(np.nanmax(values) - np.nanmin(values))
 
 
 def quantisation(setup, noise: np.ndarray) -> tuple[Finding | None, str | None]:

@@ -22,7 +22,7 @@ from rotorid.mismatch.evidence.split import split_runs
 from rotorid.mismatch.instrument.sampling import noise_of, quieter, settling_s, without_noise, without_settling
 from rotorid.recordings import RecordingSet, Run, Split, Vehicle
 from rotorid.recordings import columns as c
-from rotorid.recordings.sufficient import driven_by
+from rotorid.recordings.sufficient import compared_readings, driven_by
 
 _GAP_STEPS = 4.0
 """Where readings are missing for longer than this many median steps they are not compared."""
@@ -32,7 +32,13 @@ _SLOWER = 1.5
 """Readings whose usual step is so many of the rows' are taken at their own rate."""
 _UNEVEN = 0.3
 """Deviation of a step from the median, as a share of it, beyond which samples are interpolated to an even grid."""
+_STRAIGHT, _CURVED = 0.02, 12.0
+"""Change of a column's slope from one reading to the next, as a share of its range, and in the lower quartile of such
+changes, up to which it is straight between the two."""
+_LOAD_BENDS = 0.05
+"""What a load, which is no noise, may bend by at most, as a share of its largest value."""
 _SHORTEST = 4
+_NO_ROWS = f"{{}}: no run has {_SHORTEST} samples in a row with every channel"
 SHORT = 60
 """Stretches of fewer samples or rows are blocks: too short to learn the colour of their noise from."""
 _MOST_VALUES = 45_000
@@ -207,6 +213,31 @@ def _even(time_s: np.ndarray, dt_s: float) -> np.ndarray | None:
     return time_s[0] + dt_s * np.arange(int((time_s[-1] - time_s[0]) / dt_s) + 1)
 
 
+def _straight(time_s: np.ndarray, known_s: np.ndarray, values: np.ndarray, load: bool) -> np.ndarray:
+    """Mask of the instants, (n,), at which a column with these readings has one, or is straight between two: a step of
+    a `load` between two readings was at any time between them."""
+    if len(known_s) < 3:
+        return np.isin(time_s, known_s)
+    bends = np.abs(np.diff(values, 2, prepend=values[0], append=values[-1]))
+    least = max(_STRAIGHT * float(np.ptp(values)), _CURVED * float(np.quantile(bends, 0.25)))
+    least = min(least, _LOAD_BENDS * float(np.abs(values).max())) if load else least
+    after = np.searchsorted(known_s, time_s).clip(1, len(known_s) - 1)
+    off_s = np.minimum(np.abs(time_s - known_s[after - 1]), np.abs(known_s[after] - time_s))
+    bent = np.minimum(bends[after - 1], bends[after]) > least
+    return ~bent | (off_s < 1e-3 * float(np.median(np.diff(known_s))))
+
+
+def _compared(run: Run, vehicle: Vehicle, time_s: np.ndarray, known_s: np.ndarray, dt_s: float) -> np.ndarray | None:
+    """Mask of the instants, (n,), near known rows, at which no column is bent between its readings; None for all."""
+    near = _within(time_s, known_s, _GAP_STEPS * dt_s)
+    out = np.ones(len(time_s), bool) if near is None else near
+    for name in filter(run.has, (*compared_readings(run, vehicle), *driven_by(run, vehicle), *c.MOUNT)):
+        values = run.column(name)
+        known = np.isfinite(values)
+        out &= _straight(time_s, run.time_s[known], values[known], name not in c.FORCE + c.MOMENT)
+    return None if out.all() else out
+
+
 def _stretches_of(run: Run, how: _Preparation) -> list[Loading]:
     """Loadings of one run, load still empty."""
     vehicle, channels, dt_s, session = how.vehicle, how.channels, how.dt_s, how.session
@@ -286,7 +317,7 @@ def _stretches_of(run: Run, how: _Preparation) -> list[Loading]:
                 command=ordered,
                 measured=speed is not None,
                 distance=own.get(how.distance),
-                keep=_within(time_s, stamps[good], _GAP_STEPS * dt_s),
+                keep=_compared(run, vehicle, time_s, stamps[good], dt_s),
                 extra={k: v for k, v in own.items() if k not in (c.BATTERY_VOLTAGE, c.TEMPERATURE, c.HEIGHT)},
             )
         )
@@ -435,7 +466,7 @@ def set_up(recordings: RecordingSet, whole: RecordingSet | None = None) -> Prepa
             noisier = tuple(loaded_by(_turned(x, _noised), vehicle) for x in loadings)
             loadings = calm
     if not loadings:
-        raise InputError(f"{recordings.name}: no run has {_SHORTEST} samples in a row with every channel")
+        raise InputError(_NO_ROWS.format(recordings.name))
     instrument = _instrument_of(recordings, how, loadings)
     wait_s = 0.0
     if instrument.bench and 1 / dt_s > _STEADY_HZ:
@@ -445,13 +476,16 @@ def set_up(recordings: RecordingSet, whole: RecordingSet | None = None) -> Prepa
             instrument = replace(instrument, by_hand=True)
     total = sum(x.size for x in loadings) * len(channels)
     average = max(1, int(np.ceil(total / _MOST_VALUES)))
+    average = average if 1 / dt_s / average > _STEADY_HZ else 1
+    if not any(pieces_of(x, average) for x in loadings):
+        raise InputError(_NO_ROWS.format(recordings.name))
     return PreparedInstrument(
         recordings=recordings,
         vehicle=vehicle,
         split=split_runs(whole),
         instrument=instrument,
         loadings=tuple(loadings),
-        average=average if 1 / dt_s / average > _STEADY_HZ else 1,
+        average=average,
         full_speed=full,
         estimated_full_speed=estimated,
         settling_s=wait_s,

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.stats import f
 
 from rotorid.mismatch.decide.findings import Analysis, Finding, with_status
 from rotorid.mismatch.decide.status import CLAIMED
@@ -24,6 +25,8 @@ EXPLAINED_SHARE = 0.15
 findings are said to explain nothing that matters."""
 _PLAINLY_OFF = 1.5
 """Error of a force or moment in units of its noise floor, from which it is a mismatch, wherever it is."""
+_CHANCE, _BEYOND_CHANCE = 0.001, 1.2
+"""Probability of a ratio of two root mean squares by chance, and how far beyond such a ratio an error must be."""
 
 
 def quoted(channel: Channel) -> Errors:
@@ -42,9 +45,11 @@ def _energies(channels: Mapping[str, Channel], located: Sequence[str]) -> tuple[
     return before, named, noise
 
 
-def share_left(channels: Mapping[str, Channel], located: Sequence[str]) -> float:
-    """Share of the mismatch that is left, from the errors printed."""
+def share_left(channels: Mapping[str, Channel], located: Sequence[str], samples: Mapping[str, int]) -> float:
+    """Share of the mismatch that is left, from the errors printed; of an error that is by chance what it is, none."""
     before, named, noise = _energies(channels, located)
+    if before <= noise * _by_chance(min((samples[name] for name in located), default=1)) ** 2:
+        return 0.0
     return min(1.0, max(0.0, named - noise) / max(before - noise, noise)) if noise else 0.0
 
 
@@ -82,13 +87,24 @@ def located_channels(locations: Sequence[Location], channels: Mapping[str, Chann
     return tuple(c for c in channels if c in named) or tuple(channels)
 
 
+def _by_chance(samples: int) -> float:
+    """Ratio of two root mean squares of so many samples of one noise that hardly any exceeds."""
+    return float(np.sqrt(f.isf(_CHANCE, samples, samples)))
+
+
+def _plainly_off(samples: int) -> float:
+    """Error in units of the noise floor from which a channel is off, where both come of so few samples."""
+    return max(_PLAINLY_OFF, _BEYOND_CHANCE * _by_chance(samples))
+
+
 def missing_places(
-    analysis: Analysis, locations: Sequence[Location], channels: Mapping[str, Channel]
+    analysis: Analysis, locations: Sequence[Location], channels: Mapping[str, Channel], samples: Mapping[str, int]
 ) -> list[tuple[str, float]]:
     """Channels (with p-values) that must be located too: sentence, list and pictures speak of the same ones.
 
     Of each effect that a model holds the channel it betters most; what stays unexplained though nothing was located;
-    a channel whose error on the runs held out is far above its noise floor.
+    a channel whose error is far above its noise floor: on the fitted runs above their own, since a run with more noise
+    than others is no mismatch. `samples`: of each channel those fitted or held out, the fewer.
     """
     there = {location.channel for location in locations}
     out: dict[str, float] = {}
@@ -102,10 +118,10 @@ def missing_places(
     # Where nothing is stated, values corrected within their trust may be all that it takes.
     stated = with_status(analysis, *CLAIMED) or analysis.wrong_values
     for name, channel in channels.items():
-        both = (channel.rmse.held_out, channel.rmse.training)
-        errors = [x for e in both if (x := e.before if stated else e.named) is not None]
+        both = (channel.rmse.held_out, channel.noise_floor), (channel.rmse.training, analysis.noise_floor.get(name))
+        errors = [x / n for e, n in both if (x := e.before if stated else e.named) is not None and n]
         wrench = name.split("_")[0] in ("force", "moment")
-        if wrench and name not in there and max(errors, default=0.0) > _PLAINLY_OFF * (channel.noise_floor or np.inf):
+        if wrench and name not in there and max(errors, default=0.0) > _plainly_off(samples[name]):
             out.setdefault(name, analysis.p_values.get(name, (1.0, 1.0))[0])
     return [(c, p) for c, p in out.items() if c not in {location.channel for location in locations}]
 

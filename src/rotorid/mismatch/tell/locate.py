@@ -387,9 +387,10 @@ def _evened(traces: Sequence[ChannelTrace], white: list[np.ndarray], hard) -> li
     the fit held back to it, so that a mismatch that comes and goes does not count as noise.
     """
     energies, efforts, lengths = [], [], []
+    unknown = np.zeros(1), np.zeros((1, next((s.shape[1] for _, s in hard.values()), 0)))
     for trace, w in zip(traces, white, strict=True):
         width = REGIME_BLOCK_S / _period(trace)
-        time_s, squares = hard[trace.run]
+        time_s, squares = hard.get(trace.run, unknown)  # of some runs commands alone are compared
         on_trace = [np.interp(trace.time_s, time_s, column) for column in squares.T]
         efforts.append(np.stack([np.ones(len(w)), *(_moving_mean(x, width) for x in on_trace)], axis=1))
         energies.append(_moving_mean(w**2, width))

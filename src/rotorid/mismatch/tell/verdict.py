@@ -354,7 +354,7 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
     inverse = _inverse_channels(analysis)
     locations = _with_missing_places(analysis, locations, inverse)
     located = located_channels(locations, inverse)
-    left = share_left(inverse, located)
+    left = share_left(inverse, located, _fewest(analysis))
     shares = analysis.shares
     word = "not_judged" if _stopping(analysis) else verdict_word(analysis, locations, left, inverse)
     contents = Contents(analysis, word, locations, inverse, shares, left if word != "no_mismatch" else 0.0, forward)
@@ -457,7 +457,7 @@ def _with_missing_places(
 ) -> list[Location]:
     """Locations, and those that the rest of the verdict speaks of and nothing located."""
     out = list(locations)
-    for channel, p_value in missing_places(analysis, locations, channels):
+    for channel, p_value in missing_places(analysis, locations, channels, _fewest(analysis)):
         traces = [t for t in analysis.traces if t.channel == channel and len(t.time_s)]
         for run in dict.fromkeys(t.run for t in traces):
             own = [t for t in traces if t.run == run]
@@ -472,6 +472,15 @@ def _with_missing_places(
                     regime=None,
                 )
             )
+    return out
+
+
+def _fewest(analysis: Analysis) -> dict[str, int]:
+    """To each channel how many of its samples are fitted or held out, the fewer of both."""
+    out, part = {}, fitted_part(analysis)
+    for channel, traces in by_channel(analysis.traces).items():
+        signs = np.concatenate([part(t.run, t.time_s) for t in traces])
+        out[channel] = max(min(int((signs > 0).sum()), int((signs < 0).sum())), 1)
     return out
 
 

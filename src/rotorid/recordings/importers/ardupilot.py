@@ -42,7 +42,7 @@ from rotorid.recordings.importers.faults import (
     GOES_ON,
     ImportFault,
     airborne,
-    changes_of,
+    alive_s,
     flights,
     goes_on,
     jumps_at,
@@ -236,9 +236,12 @@ def _of_sensor(log: Log, kind: str, wished: float | None = None) -> tuple[pd.Dat
     table = log.get(kind)
     if table is None or "I" not in table or not len(table):
         return table, []
-    changes = {number: changes_of(own.filter(regex="^(Gyr|Acc)").to_numpy(float)) for number, own in table.groupby("I")}
-    taken, faults = goes_on(changes, kind)
-    if wished in changes and wished != taken and changes[wished] >= GOES_ON * max(changes.values()):
+    alive = {
+        number: alive_s(own[c.TIME].to_numpy(float), own.filter(regex="^(Gyr|Acc)").to_numpy(float))
+        for number, own in table.groupby("I")
+    }
+    taken, faults = goes_on(alive, kind)
+    if wished in alive and wished != taken and alive[wished] >= GOES_ON * max(alive.values()):
         taken = wished
         found = f"the vehicle flew by {kind} {wished:g}, that of its estimator"
         faults = [ImportFault("instances", "", found, f"{kind} {wished:g} taken", 0)]
@@ -357,7 +360,7 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[ImportFault], n
     parts += _battery(log, faults)
     below = log.get("RFND")
     if below is not None and {"Dist", "Stat", "Orient"} <= set(below):
-        put((c.HEIGHT,), below[(below["Stat"] == _GOOD) & (below["Orient"] == _DOWN)], ("Dist",))
+        put((c.HEIGHT,), _of_first(below[(below["Stat"] == _GOOD) & (below["Orient"] == _DOWN)], "Instance"), ("Dist",))
     outputs = _outputs(log)
     if outputs is None:
         faults.append(ImportFault("no_command", "", "RCOU is not logged", "no throttle columns", 0))
@@ -535,6 +538,7 @@ def _battery(log: Log, faults: list[ImportFault]) -> list[tuple]:
             if number > 1:
                 action = "kept under a name of its own"
                 faults.append(ImportFault("instances", column, f"{seen} is logged, too", action, len(values)))
+            values = np.where(values > 0, values, np.nan) if name == "Volt" else values
             parts.append(((column,), own[c.TIME].to_numpy(float), values))
     return parts
 

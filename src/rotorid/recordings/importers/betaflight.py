@@ -291,6 +291,7 @@ def _battery(raw: pd.DataFrame, headers: Mapping[str, str]) -> tuple[dict[str, n
         if field not in raw or not raw[field].max() > 0:
             continue
         values = raw[field].to_numpy(float)
+        values = np.where(values > 0, values, np.nan) if field == "vbatLatest" else values
         counts = next((n for first, n in _COUNTS.get(firmware, {}).get(field, ()) if version >= first), None)
         if firmware == "emuflight" and field == "vbatLatest":  # in the unit of the voltages of a cell
             counts = {2: 10, 3: 100}.get(len(headers.get("vbatcellvoltage", "").rpartition(",")[2].strip()))

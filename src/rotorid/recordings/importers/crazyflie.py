@@ -49,6 +49,7 @@ from rotorid.recordings.importers.faults import (
     report_gaps,
     stretches_of,
     true_stretches,
+    without_wild,
 )
 from rotorid.recordings.importers.guessing import guess
 from rotorid.recordings.importers.mapping import (
@@ -65,6 +66,8 @@ from rotorid.recordings.tables import numbers
 _MAGIC = 0xBC
 _CHECKSUM = 4
 """Bytes of it at the end of a log."""
+_CLOCK_TURN = 2.0**32
+"""Milliseconds after which the clock of version 1 begins anew."""
 _TIME, _EVENT = "time_s", "fixedFrequency"
 TYPES = {"e": "<f2", "f": "<f4", "d": "<f8", "b": "i1", "B": "u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4"}
 TYPES |= {"q": "<i8", "Q": "<u8"}
@@ -211,9 +214,10 @@ def convert(log: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
         put(_SPEEDS, log[speeds].to_numpy(float) * RPM)
     for name, a_volt in (("pm.vbatMV", 1000), ("pm.vbat", 1)):
         if name in log and c.BATTERY_VOLTAGE not in columns:
-            columns[c.BATTERY_VOLTAGE] = log[name].to_numpy(float) / a_volt
+            columns[c.BATTERY_VOLTAGE] = (log[name].where(log[name] > 0) / a_volt).to_numpy(float)
     table, repeated = drop_repeated_times(pd.DataFrame(columns))
-    return table, faults + repeated
+    table, wild = without_wild(table)
+    return table, faults + repeated + wild
 
 
 def in_the_air(table: pd.DataFrame, shortest_s: float = 4.0, margin_s: float = 1.0) -> list[tuple[float, float]]:
@@ -368,7 +372,9 @@ def decode_usd_log(data: bytes, where: str = "log") -> tuple[dict[str, pd.DataFr
     for identifier, (name, layout) in types.items():
         starts = np.asarray(offsets[identifier], int)
         rows = raw[starts[:, None] + np.arange(layout.itemsize)].copy().view(layout)[:, 0]
-        columns = {_TIME: rows["__clock"].astype(float) * scale}
+        clock = rows["__clock"].astype(float)
+        turns = np.cumsum(np.diff(clock, prepend=clock[:1]) < -0.5 * _CLOCK_TURN) if version == 1 else 0
+        columns = {_TIME: (clock + _CLOCK_TURN * turns) * scale}
         tables[name] = pd.DataFrame(columns | {n: rows[n].astype(float) for n in layout.names[2:]})
     return tables, _faults_of_end(data, offset, whole, unknown, inside)
 

@@ -46,7 +46,7 @@ _GROUND_M, _CLEAR_M = 0.05, 0.5
 _SMOOTHED_S = 1.0
 _SPEEDS = ("rotor_speed", "rotor_command")
 GOES_ON = 0.9
-"""Share of the readings of others of its kind that a sensor has at least, if it neither stands still nor ends early."""
+"""Share of the time that others of its kind go on which a sensor has at least, unless it stands still or ends early."""
 _SHUFFLED, LATE_STEPS = 0.05, 100.0
 """Share of steps back from which rows are in no order, and how many usual steps late a row in order may come."""
 _TURNS = {
@@ -69,6 +69,8 @@ _UNEXPLAINED = 0.2
 """Share of its variance that the motors of a mixer may leave of another motor's signal."""
 
 
+_WILD = 1e9
+"""No quantity of a vehicle in SI units is larger."""
 SET_BACK = "clock_set_back"
 ENDING = "ending"
 
@@ -327,20 +329,21 @@ def jumps_at(grid_s: np.ndarray, times_s: np.ndarray, what: str) -> tuple[np.nda
     return rows, [ImportFault("estimator_reset", "", found, "a run ends at each of them in the air", count)]
 
 
-def changes_of(values: np.ndarray) -> int:
-    """How often readings (n, k) change: a sensor that stands still says no more."""
-    return int((np.diff(values, axis=0) != 0).any(axis=1).sum())
+def alive_s(time_s: np.ndarray, values: np.ndarray) -> float:
+    """For how long readings (n, k) go on changing, s: one that stands still says no more, at whatever rate it comes."""
+    changed_s = time_s[1:][(np.diff(values, axis=0) != 0).any(axis=1)]
+    return float(np.clip(np.diff(changed_s), 0.0, _LONGEST_PAUSE_S).sum())
 
 
-def goes_on(changes: Mapping[int, int], what: str) -> tuple[int, list[ImportFault]]:
-    """The first instance of a sensor that goes on changing as long as any other, by how often each changes, and a fault
+def goes_on(alive: Mapping[int, float], what: str) -> tuple[int, list[ImportFault]]:
+    """The first instance of a sensor that goes on changing as long as any other, by `alive_s` of each, and a fault
     where that is not the first of all."""
-    first, most = min(changes), max(changes.values())
-    taken = next(number for number in sorted(changes) if changes[number] >= GOES_ON * most)
+    first, most = min(alive), max(alive.values())
+    taken = next(number for number in sorted(alive) if alive[number] >= GOES_ON * most)
     if taken == first:
         return taken, []
-    counts = f"its readings change {changes[first]} times, those of {what} {taken} {changes[taken]} times"
-    found = f"{what} {first} stands still or ends early ({counts})"
+    lasts = f"its readings change for {alive[first]:.1f} s, those of {what} {taken} for {alive[taken]:.1f} s"
+    found = f"{what} {first} stands still or ends early ({lasts})"
     return taken, [ImportFault("stuck", "", found, f"{what} {taken} taken", 0)]
 
 
@@ -399,6 +402,16 @@ def blank_held(
         faults.append(ImportFault("held", ", ".join(columns), found, "repeats made empty cells", int(same.sum())))
     empty = table.drop(columns=c.TIME).isna().all(axis=1)
     return table[~empty].reset_index(drop=True), faults
+
+
+def without_wild(table: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
+    """The table of a log without readings that are none, infinite or absurd by damage, and the fault of them."""
+    wild = {n: table[n].abs() > _WILD for n in table if n != c.TIME and table[n].abs().max() > _WILD}
+    if not wild:
+        return table, []
+    cells = pd.DataFrame(wild).to_numpy()
+    found = fault_where(cells, "wild", ", ".join(wild), f"infinite, or beyond {_WILD:g}", "made empty cells")
+    return table.assign(**{n: table[n].mask(own) for n, own in wild.items()}), found
 
 
 def true_stretches(mask: np.ndarray, time_s: np.ndarray, shortest_s: float) -> list[tuple[float, float]]:
@@ -559,6 +572,7 @@ def flights(
     few these are.
     """
     time_s = table[c.TIME].to_numpy(float)
+    table, wild = without_wild(table)
     flying = without_pauses(flying, time_s)
     if jumps is not None:
         flying &= ~jumps
@@ -575,7 +589,7 @@ def flights(
         elif throttles and not (table[throttles] > _DRIVEN).any().any():
             why += ": no motor is ever driven"
         raise InputError(f"{where}: {why}")
-    runs, cuts = {}, []
+    runs, cuts = {}, wild
     for number, (start, stop) in enumerate(found, 1):
         run = name if len(found) == 1 else f"{name}_{number}"
         first, last = _inside(start, stop, time_s)

@@ -90,6 +90,8 @@ UNITS: dict[str, dict[str, float]] = {
     },
 }  # fmt: skip
 """To each kind of quantity its units, and the factor to the contract's (`turns`: electrical ones per pair of poles)."""
+_LEAST_LENGTH = 0.5
+"""Length of a quaternion below which it is none."""
 _ZEROS = {"degF": -32 * 5 / 9, "K": -273.15}
 """What a reading of 0 is in the contract's unit, where that is not 0."""
 SPELLINGS: dict[str, dict[str, str]] = {
@@ -483,10 +485,13 @@ def quaternion_to_frd_ned(wxyz: np.ndarray) -> np.ndarray:
 
 
 def continuous(wxyz: np.ndarray) -> np.ndarray:
-    """The same attitudes with signs chosen so that neighbours are close (q and -q are one attitude)."""
-    dots = np.sum(wxyz[1:] * wxyz[:-1], axis=1)
-    signs = np.cumprod(np.concatenate([[1.0], np.where(dots < 0, -1.0, 1.0)]))
-    return wxyz * signs[:, None]
+    """The same attitudes with signs chosen so that neighbours are close (q and -q are one attitude), NaN where a
+    quaternion has no length: it states none."""
+    stated = np.linalg.norm(wxyz, axis=1) > _LEAST_LENGTH
+    out, own = np.full(wxyz.shape, np.nan), wxyz[stated]
+    signs = np.where(np.sum(own[1:] * own[:-1], axis=1) < 0, -1.0, 1.0)
+    out[stated] = own * np.cumprod(np.append(1.0, signs))[: len(own), None]
+    return out
 
 
 def quaternion_from_euler_frd(roll: np.ndarray, pitch: np.ndarray, yaw: np.ndarray) -> np.ndarray:

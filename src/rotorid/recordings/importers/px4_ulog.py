@@ -30,9 +30,10 @@ from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.faults import (
+    GOES_ON,
     ImportFault,
     airborne,
-    changes_of,
+    alive_s,
     drop_repeated_times,
     fault_where,
     further_motors,
@@ -264,10 +265,10 @@ def _first(topics: _Topics, name: str) -> tuple[_Fields, list[ImportFault]]:
     if len(instances) < 2:
         return (instances[0] if instances else {}), []
     numbers = [np.column_stack([v for f, v in d.items() if not f.startswith("timestamp")]) for d in instances]
-    changes = {k: changes_of(values) for k, values in enumerate(numbers)}
-    if not any(changes.values()):
-        changes = {k: len(values) for k, values in enumerate(numbers)}
-    taken, faults = goes_on(changes, name)
+    alive = {k: alive_s(d["timestamp"] * 1e-6, own) for k, (d, own) in enumerate(zip(instances, numbers, strict=True))}
+    if not any(alive.values()):
+        alive = {k: float(len(values)) for k, values in enumerate(numbers)}
+    taken, faults = goes_on(alive, name)
     return instances[taken], faults
 
 
@@ -338,6 +339,11 @@ def _from_outputs(log: Px4Log, instances, rotors: int, names: str):
     if len(instances) > 1:
         found = f"{len(instances)} instances of actuator_outputs"
         faults.append(ImportFault("instances", names, found, f"instance {chosen}, whose outputs move, taken", 0))
+    stated = [int(v) for k, v in flown.items() if re.fullmatch(rf"{port}_FUNC\d+", k)]
+    for motor in (m for m in range(rotors) if stated.count(_FIRST_MOTOR + m) > 1):
+        found = f"{stated.count(_FIRST_MOTOR + motor)} outputs of {port} are motor {motor + 1}"
+        action = f"output {outputs[motor] + 1} taken"
+        faults.append(ImportFault("instances", f"throttle_{motor + 1}", found, action, 0))
     if not any("_FUNC" in name for name in flown):  # no output states what it is
         every = _stack(instances[chosen], [f for f in _indexed("output", 16) if f in instances[chosen]])
         faults += _more_rotors("actuator_outputs", rotors + len(further_motors(every, rotors)), rotors)
@@ -376,7 +382,8 @@ def _outputs_of_motors(parameters: Values, rotors: int) -> tuple[str | int, list
     by_port, stated = {}, False
     for port in _ENDS:
         named = rf"{port}_FUNC(\d+)"
-        functions = {int(v): int(m[1]) for k, v in parameters.items() if (m := re.fullmatch(named, k))}
+        stating = sorted((int(m[1]), int(v)) for k, v in parameters.items() if (m := re.fullmatch(named, k)))
+        functions = {motor: number for number, motor in reversed(stating)}  # the first output of each
         by_port[port] = [functions.get(_FIRST_MOTOR + i) for i in range(rotors)]
         stated |= bool(functions)
     if not stated:
@@ -414,11 +421,12 @@ def _speeds(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray, li
     turning = [d for d in instances if any(np.any(v) for field, v in d.items() if field.endswith(".esc_rpm"))]
     if not instances:
         return None, np.zeros(0), []
-    values, times, faults = of_controllers((turning or instances)[0], rotors)
-    if values is not None and len(turning) > 1:
+    data, stuck = _first({"esc_status": turning or instances}, "esc_status")
+    values, times, faults = of_controllers(data, rotors)
+    if values is not None and len(turning) > 1 and not stuck:
         found = f"{len(turning)} instances of esc_status hold speeds"
         faults.append(ImportFault("instances", "rotor_speed", found, "the first of them taken", 0))
-    return values, times, faults
+    return values, times, faults + stuck
 
 
 def of_controllers(data: _Fields, rotors: int) -> tuple[np.ndarray | None, np.ndarray, list[ImportFault]]:
@@ -541,7 +549,7 @@ Motors, controllers, flight and resets: `of_motors`, `of_controllers`, `in_the_a
 
 
 def _inertial(topics: _Topics) -> tuple[dict[tuple[str, ...], tuple[np.ndarray, np.ndarray]], list[ImportFault]]:
-    """Accelerometer and gyroscope: columns to times, µs, and values, each of the topic with most samples."""
+    """Accelerometer and gyroscope: columns to times, µs, and values, each of the fastest topic that goes on."""
     found, faults = {}, []
     for columns, other in (
         (c.SPECIFIC_FORCE, "vehicle_acceleration"), (c.ANGULAR_VELOCITY, "vehicle_angular_velocity")
@@ -552,7 +560,9 @@ def _inertial(topics: _Topics) -> tuple[dict[tuple[str, ...], tuple[np.ndarray, 
             part = TOPICS[name](data)[0].get(columns) if data else None
             offered += [] if part is None else [(part, more)]
         if offered:
-            found[columns], more = max(offered, key=lambda offer: len(offer[0][0]))
+            alive = [alive_s(time * 1e-6, values) for (time, values), _ in offered]
+            lasting = [o for o, own in zip(offered, alive, strict=True) if own >= GOES_ON * max(alive)]
+            found[columns], more = max(lasting, key=lambda offer: len(offer[0][0]))
             faults += [fault for fault in more if fault not in faults]
     return found, faults
 

@@ -40,8 +40,10 @@ from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.bag_records import Records, Unpacking, needs, typestores
 from rotorid.recordings.importers.faults import (
+    GOES_ON,
     ImportFault,
     airborne,
+    alive_s,
     flights,
     further_motors,
     jumps_at,
@@ -93,6 +95,8 @@ def _twist(m) -> dict[str, list[float]]:
     return {"body_velocity" if of_body else "velocity": _xyz(m.twist.linear)}
 
 
+_NO_PULSE = 65535
+"""In place of a pulse: the channel is not stated."""
 _POSES: dict[str, Callable] = {
     "geometry_msgs/msg/PoseStamped": lambda m: _pose(m.pose),
     "geometry_msgs/msg/PoseWithCovarianceStamped": lambda m: _pose(m.pose.pose),
@@ -110,9 +114,11 @@ _READERS: dict[str, Callable] = _POSES | {
     "mav_msgs/msg/CommandMotorSpeed": lambda m: {"commands": list(m.motor_speed)},
     "mavros_msgs/msg/ESCStatus": lambda m: {"rpm": [e.rpm for e in m.esc_status]},
     "mavros_msgs/msg/ESCTelemetry": lambda m: {"rpm": [e.rpm for e in m.esc_telemetry]},
-    "mavros_msgs/msg/RCOut": lambda m: {"pulses": list(m.channels)},
-    "sensor_msgs/msg/BatteryState": lambda m: {"voltage": [m.voltage], "current": [-m.current]},
-    "sensor_msgs/msg/Range": lambda m: {"range": [m.range]},
+    "mavros_msgs/msg/RCOut": lambda m: {"pulses": [np.nan if p == _NO_PULSE else p for p in m.channels]},
+    "sensor_msgs/msg/BatteryState": lambda m: {
+        "voltage": [m.voltage if m.voltage > 0 else np.nan], "current": [-m.current],
+    },
+    "sensor_msgs/msg/Range": lambda m: {"range": [m.range if m.min_range <= m.range <= m.max_range else np.nan]},
 }  # fmt: skip
 """To the type of a message what it states by quantity; several types may hold one."""
 _ROTORS_OF_PX4 = {"actuator_motors": ("throttle", of_motors, 1.0), "esc_status": ("rpm", of_controllers, 1 / RPM)}
@@ -157,6 +163,11 @@ class _TopicSeries:
     def changes(self) -> int:
         """How often its values change: a topic that repeats what it has states no more for it."""
         return int((np.diff(self.values, axis=0) != 0).any(axis=1).sum())
+
+    @property
+    def alive_s(self) -> float:
+        """For how long they go on changing, s."""
+        return alive_s(self.time_s, self.values)
 
 
 @dataclass
@@ -407,10 +418,12 @@ def _rank(series: dict[str, list[_TopicSeries]], path: Path) -> None:
 
     Inertial sensors that feel the thrust along z before others (those of cameras); attitudes by how far they follow the
     body rates (other bodies do not); position and velocity of the attitude's topic first; else by what they state.
+    Topics of the inertial sensor's own vehicle before those of another, what stands still or ends early last.
     InputError where no inertial sensor feels the thrust along z.
     """
     for offered in series.values():
-        offered.sort(key=lambda s: -s.changes)
+        most = max((s.alive_s for s in offered), default=0.0)
+        offered.sort(key=lambda s, most=most: (s.alive_s < GOES_ON * most, -s.changes))
     along = {s.topic: np.median(s.values, axis=0) for s in series.get("force", [])}
     size = {topic: np.linalg.norm(felt) for topic, felt in along.items()}
     turned = {t for t in along if _WEIGHT_M_S2[0] < size[t] < _WEIGHT_M_S2[1] and along[t][2] < 0.7 * size[t]}
@@ -435,6 +448,15 @@ def _rank(series: dict[str, list[_TopicSeries]], path: Path) -> None:
         attitudes.sort(key=lambda s: -round(follows[s.topic], 1))
     for quantity in ("position", "body_velocity"):
         series.get(quantity, []).sort(key=lambda s: not attitudes or s.topic != attitudes[0].topic)
+    if "rates" in series:
+        own = _vehicle_of(series["rates"][0].topic)
+        for quantity in ("speeds", "rpm", "commands", "throttle", "pulses", "voltage", "current", "range"):
+            series.get(quantity, []).sort(key=lambda s: _vehicle_of(s.topic) != own)
+
+
+def _vehicle_of(topic: str) -> str:
+    """The namespace in which a topic of several vehicles stands: `/drone_1` of `/drone_1/imu/data`."""
+    return topic.strip("/").split("/")[0]
 
 
 def _times(found: _BagContent) -> tuple[dict[tuple[str, str], np.ndarray], list[ImportFault]]:
@@ -583,7 +605,8 @@ def _velocity(series: dict[str, list[_TopicSeries]], faults: list[ImportFault]) 
 def _of_pulses(outputs: _TopicSeries, faults: list[ImportFault]) -> tuple:
     """Throttles of an array of all outputs, which names no motors: the first four that move are motors, and each other
     whose signal follows from theirs."""
-    moving = np.flatnonzero(np.ptp(outputs.values, axis=0) > 0)
+    steps = np.diff(pd.DataFrame(outputs.values).ffill().to_numpy(), axis=0)
+    moving = np.flatnonzero((np.abs(np.nan_to_num(steps)) > 0).any(axis=0))
     pulses = outputs.values[:, moving]
     used = [*range(min(_MIXED, len(moving))), *further_motors(pulses, _MIXED)]
     low, high = PULSE_US

@@ -180,17 +180,20 @@ def channel(before: float, after: float):
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "wrong_values", "located"),
+    ("before", "after", "wrong_values", "samples", "located"),
     [
-        (1.6, 1.6, {}, ["moment_x"]),
-        (1.6, 1.0, {}, []),  # corrected within what was believed: no mismatch
-        (1.6, 1.0, {"mass_kg": (1.0, 1.1, 1.05, 1.15)}, ["moment_x"]),
-        (1.2, 1.2, {}, []),
+        (1.6, 1.6, {}, 1000, ["moment_x"]),
+        (1.6, 1.6, {}, 50, []),  # by chance
+        (2.6, 2.6, {}, 50, ["moment_x"]),
+        (1.6, 1.0, {}, 1000, []),  # corrected within what was believed: no mismatch
+        (1.6, 1.0, {"mass_kg": (1.0, 1.1, 1.05, 1.15)}, 1000, ["moment_x"]),
+        (1.2, 1.2, {}, 1000, []),
     ],
 )
-def test_a_channel_that_stays_far_above_its_floor_is_located(before, after, wrong_values, located):
-    analysis = SimpleNamespace(findings=(), wrong_values=wrong_values, without={}, p_values={}, unexplained_channels=())
-    places = missing_places(analysis, (), {"moment_x": channel(before, after)})
+def test_a_channel_that_stays_far_above_its_floor_is_located(before, after, wrong_values, samples, located):
+    analysis = SimpleNamespace(findings=(), wrong_values=wrong_values, without={}, p_values={}, unexplained_channels=(),
+                               noise_floor={"moment_x": 1.0})  # fmt: skip
+    places = missing_places(analysis, (), {"moment_x": channel(before, after)}, {"moment_x": samples})
     assert [name for name, _ in places] == located
     if not wrong_values:
         assert verdict_word(analysis, places, 1.0, {}) == ("unexplained" if located else "no_mismatch")

@@ -371,7 +371,9 @@ def written(path: Path, data: bytes) -> Path:
 
 
 @pytest.mark.parametrize(("kind", "letters"), [("IMU", "GyrAcc"), ("GYR", "Gyr"), ("ACC", "Acc")])
-@pytest.mark.parametrize(("first", "taken"), [("goes on", 0.0), ("stands still", 1.0), ("ends", 1.0)])
+@pytest.mark.parametrize(
+    ("first", "taken"), [("goes on", 0.0), ("comes at half the rate", 0.0), ("stands still", 1.0), ("ends", 1.0)]
+)
 def test_of_several_sensors_the_first_that_goes_on_is_read(kind: str, letters: str, first: str, taken: float) -> None:
     """The second sensor reads 1 more than the first."""
     time_s = np.arange(100) / 50
@@ -384,6 +386,8 @@ def test_of_several_sensors_the_first_that_goes_on_is_read(kind: str, letters: s
     ]
     if first == "ends":
         sensors[0] = sensors[0][:50]
+    if first == "comes at half the rate":
+        reading, sensors[0] = reading[::2], sensors[0][::2]
     log = tables(LIMITS) | {kind: pd.concat(sensors).sort_values([c.TIME, "I"], ignore_index=True)}
     if kind != "IMU":
         del log["IMU"]
@@ -481,6 +485,15 @@ def test_several_outputs_of_one_motor_and_several_batteries_are_named() -> None:
     table, faults, _ = ardupilot.convert(log | {"BAT": pd.concat(own, ignore_index=True)}, "log")
     assert table[c.BATTERY_VOLTAGE].iloc[0] == 16 and table["battery_2_voltage_v"].iloc[0] == 12
     assert any(f.found == "outputs 1 and 2 are both motor 1" for f in faults)
+
+
+def test_no_voltage_and_a_second_range_finder_are_not_read() -> None:
+    time_s = np.arange(100) / 50
+    log = tables(LIMITS) | {"BAT": pd.DataFrame({c.TIME: time_s, "Inst": 0, "Volt": 16.0 * (np.arange(100) % 5 > 0)})}
+    below = [pd.DataFrame({c.TIME: time_s, "Instance": k, "Dist": 2.0 + k, "Stat": 4, "Orient": 25}) for k in (0, 1)]
+    table, *_ = ardupilot.convert(log | {"RFND": pd.concat(below, ignore_index=True)}, "log")
+    assert table[c.BATTERY_VOLTAGE].isna().sum() == 20 and set(table[c.BATTERY_VOLTAGE].dropna()) == {16.0}
+    assert set(table[c.HEIGHT]) == {2.0}
 
 
 @pytest.mark.parametrize(("every", "taken"), [(1, "ATT"), (10, "ANG")])

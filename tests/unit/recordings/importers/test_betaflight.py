@@ -442,6 +442,11 @@ def test_battery_by_the_version(revision: str, stated: dict, volts: float, amper
     assert middle(run, c.BATTERY_CURRENT) == pytest.approx(amperes)
 
 
+def test_no_voltage_is_none() -> None:
+    run, _ = run_of(frames_of(vbatLatest=np.where(np.arange(1000) % 10, 1600.0, 0.0)))
+    assert run[c.BATTERY_VOLTAGE].isna().mean() == pytest.approx(0.1) and run[c.BATTERY_VOLTAGE].min() == 16.0
+
+
 @pytest.mark.parametrize("stated", [{"Firmware revision": "Betaflight"}, {"Firmware revision": "Betaflight 3.0.1"}])
 def test_a_battery_whose_unit_is_not_known_is_named(stated: dict) -> None:
     run, told = run_of(frames_of(), vbatscale=None, **stated)

@@ -146,6 +146,17 @@ def test_what_is_not_sure_is_left_open_and_import_waits_for_the_answer(
     assert "still open" in said and not (tmp_path / "set").exists()
 
 
+def test_of_two_accelerometers_the_one_that_goes_on_is_proposed(flown: pd.DataFrame) -> None:
+    force = flown[list(c.SPECIFIC_FORCE)].to_numpy()
+    still = force[np.minimum(np.arange(len(force)), len(force) // 2)]
+    both = {
+        f"imu{n}_acc_{a}": v for n, values in enumerate((still, force)) for a, v in zip("xyz", values.T, strict=True)
+    }
+    found = guess(plain(flown).drop(columns=[n for n in plain(flown) if n.startswith("acc")]).assign(**both))
+    assert found.mapping.channels["specific_force"].columns == ("imu1_acc_x", "imu1_acc_y", "imu1_acc_z")
+    assert "imu0_acc_x and its like stand still" in found.evidence["specific_force"]
+
+
 def test_columns_of_no_known_name_are_taken_by_what_they_integrate_to(flown: pd.DataFrame) -> None:
     table = plain(flown).rename(columns=lambda n: n.replace("gyro_", "k_").replace("acc_", "h_").replace("v", "g_"))
     found = guess(table.assign(sun_x=1.0, sun_y=2.0, sun_z=3.0))

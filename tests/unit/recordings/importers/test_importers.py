@@ -337,6 +337,11 @@ def test_version_1_counts_milliseconds() -> None:
     assert tables["fixedFrequency"]["time_s"].tolist() == [0.0, 0.002]
 
 
+def test_the_clock_of_version_1_goes_on_where_it_begins_anew() -> None:
+    data = usd_bytes([("a", "f")], [(1,), (2,), (3,)], version=1, times=[2**32 - 2, 0, 2])
+    assert np.diff(decode_usd_log(data)[0]["fixedFrequency"]["time_s"]).tolist() == pytest.approx([0.002, 0.002])
+
+
 def test_a_wrong_checksum_is_told_and_the_log_kept() -> None:
     data = bytearray(usd_bytes([("a", "f")], [(1,), (2,)]))
     data[-6] ^= 0xFF
@@ -625,6 +630,11 @@ def test_px4_motors_are_found_by_the_function_of_an_output() -> None:
     log = px4(parameters, sensor_combined=gyro(), actuator_outputs=outputs(1250.0, 1750.0))
     table = px4_ulog.convert(log, rotors=2)[0]
     assert table[["throttle_1", "throttle_2"]].iloc[0].tolist() == [0.75, 0.25]
+    twice = px4(
+        parameters | {"PWM_MAIN_FUNC3": 101}, sensor_combined=gyro(), actuator_outputs=outputs(1250, 1750, 1900)
+    )
+    table, found, *_ = px4_ulog.convert(twice, rotors=2)
+    assert table["throttle_1"].iloc[0] == 0.75 and "2 outputs of PWM_MAIN are motor 1" in found[0].found
     silent = px4({"PWM_MAIN_FUNC1": 201}, sensor_combined=gyro(), actuator_outputs=outputs(1250.0, 1750.0))
     assert kinds(px4_ulog.convert(silent, rotors=2)[1]) == ["no_command"]
 
@@ -672,6 +682,31 @@ def test_px4_of_several_instances_the_first_that_goes_on_is_read(first: int, tak
     ]
     table = px4_ulog.convert(px4(sensor_combined=gyro(20), vehicle_attitude=instances), 1)[0]
     assert table["quaternion_x"].iloc[0] == taken
+
+
+def test_px4_of_several_sensors_the_one_that_goes_on_is_read_whatever_its_rate() -> None:
+    """The gyroscope of 1000 Hz stands still from half on, its controllers do, too, and an attitude is not stated."""
+    fast, slow = np.arange(20_000), np.arange(0, 20_000, 5)
+    still = np.minimum(fast, 10_000) * 1e-3
+
+    def gyroscope(values: np.ndarray, kind: str) -> dict:
+        return {f"{kind}[{k}]": values for k in range(3)}
+
+    esc = [
+        {"timestamp": at * 1000, "esc[0].esc_rpm": 3000.0 + extra + np.minimum(at, last)}
+        for at, last, extra in ((fast, 10_000, 0.0), (slow, 20_000, 500.0))
+    ]
+    turns = np.tile([1.0, 0.0, 0.0, 0.0], (len(slow), 1)) * (slow > 50)[:, None]
+    log = px4(
+        sensor_combined={"timestamp": fast * 1000, **gyroscope(still, "gyro_rad")},
+        vehicle_angular_velocity={"timestamp": slow * 1000, **gyroscope(slow * 1e-3, "xyz")},
+        vehicle_attitude={"timestamp": slow * 1000, **{f"q[{k}]": turns[:, k] for k in range(4)}},
+        esc_status=esc,
+    )
+    table, *_ = px4_ulog.convert(log, 1)
+    assert table["angular_velocity_x_rad_s"].iloc[-1] == pytest.approx(slow[-1] * 1e-3)
+    assert table["rotor_speed_1_rad_s"].iloc[0] == pytest.approx(3500 * np.pi / 30)
+    assert table["quaternion_w"].isna().sum() == 11
 
 
 def test_px4_invalid_positions_heights_and_currents_are_missing() -> None:

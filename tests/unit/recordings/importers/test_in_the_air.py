@@ -9,7 +9,7 @@ import pytest
 from rotorid.cli.modelling import fly
 from rotorid.recordings import columns as c
 from rotorid.recordings import read_set, templates
-from rotorid.recordings.importers.faults import airborne
+from rotorid.recordings.importers.faults import airborne, flights
 from rotorid.recordings.importers.logfile import read_log
 from tests.command_line import answer
 from tests.public_logs import public
@@ -106,3 +106,12 @@ def test_public_logs(log: str, needs: str, flights: list[float]) -> None:
     found = read_log(public(log))
     lasts = [float(t[c.TIME].iloc[-1]) for t in found.runs.values()]
     assert lasts == pytest.approx(flights, abs=0.5)
+
+
+def test_readings_that_no_vehicle_has_are_empty_cells() -> None:
+    """One damaged cell is no reason to refuse a log."""
+    wild = np.where(np.arange(1000) == 500, np.inf, 0.1)
+    table = pd.DataFrame({c.TIME: np.arange(1000) / 100, c.ANGULAR_VELOCITY[0]: wild, "velocity_x_m_s": 1.0})
+    runs, faults = flights(table, np.ones(1000, bool), "run", "log")
+    assert runs["run"][c.ANGULAR_VELOCITY[0]].isna().sum() == 1 and runs["run"]["velocity_x_m_s"].notna().all()
+    assert [(f.kind, f.column, f.samples) for f in faults if f.kind == "wild"] == [("wild", c.ANGULAR_VELOCITY[0], 1)]

@@ -734,6 +734,40 @@ def test_an_inertial_sensor_whose_axes_are_not_the_vehicles(tmp_path: Path, turn
         ros.read_ros(written(tmp_path / "b", flight, topics))
 
 
+def test_numbers_that_mean_nothing_are_empty_cells(tmp_path: Path) -> None:
+    """65535 in place of a pulse, a range beyond its sensor's."""
+    flight, at = stamped(Flight())
+    pulses = np.round(1000 + 1000 * flight.throttles).astype(np.uint16)
+    pulses[::5, 1] = 65535
+
+    def out(k: int):
+        return flight("mavros_msgs/msg/RCOut", header=flight.header(at(k)), channels=pulses[k].copy())
+
+    def below(k: int):
+        metres = (2.0, np.inf, -np.inf, 30.0)[k // 10 % 4]
+        return flight("sensor_msgs/msg/Range", header=flight.header(at(k)), radiation_type=0, field_of_view=0.1,
+                      min_range=0.1, max_range=20.0, range=metres, variance=0.0)  # fmt: skip
+
+    topics = usual(flight, "/imu", "/odom") | {"/mavros/rc/out": (out, at, 1), "/range": (below, at, 10)}
+    run, _ = read_back(tmp_path / "a", flight, topics)
+    assert run["throttle_2"].isna().mean() == pytest.approx(0.2, abs=0.01) and run["throttle_2"].max() < 1
+    assert set(run[c.HEIGHT].dropna()) == {2.0}
+
+
+def test_an_inertial_sensor_that_stands_still_is_not_read_however_fast_it_is(tmp_path: Path) -> None:
+    """And the rotors are those of its vehicle, though another's change more often."""
+    (flight, at), half = stamped(Flight()), len(flown()) // 2
+    still = lambda k: flight.imu(k, at(k), rates=flight.rates[min(k, half)], force=flight.force[min(k, half)])  # noqa: E731
+    topics = usual(flight, "/odom") | {
+        "/a/fast": (still, at, 1), "/a/imu": (lambda k: flight.imu(k, at(k)), at, 3),
+        "/b/motors": (lambda k: flight.motors(k, at(k)), at, 1), "/a/motors": usual(flight, "/motors")["/motors"],
+    }  # fmt: skip
+    topics["/a/motors"] = (*topics["/a/motors"][:2], 2)
+    _, faults = read_back(tmp_path / "a", flight, topics)
+    taken = {f.column: f.action for f in faults if f.kind == "instances"}
+    assert taken["rates"] == taken["force"] == "/a/imu taken" and taken["speeds"] == "/a/motors taken"
+
+
 @pytest.mark.parametrize("sign", [-1, 1])
 def test_a_battery_that_is_discharged_has_a_positive_current(tmp_path: Path, sign: int) -> None:
     """Negative by the message's definition; many drivers state it as positive."""

@@ -17,7 +17,7 @@ import yaml
 
 from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
-from rotorid.recordings.importers.faults import in_order, join_rows
+from rotorid.recordings.importers.faults import alive_s, goes_on, in_order, join_rows
 from rotorid.recordings.importers.guessing import agreement as by
 from rotorid.recordings.importers.guessing import names as named
 from rotorid.recordings.importers.guessing.agreement import CONFIRMED, RATES_HZ, Draft, triples_of
@@ -195,10 +195,10 @@ def _guess_specific_force(draft: Draft) -> None:
     norms = {f: float(np.nanmedian(np.linalg.norm(draft.values(f.columns), axis=1))) for f in triples}
     fits = [f for f in offered if _force_unit(f, norms[f])]
     if fits:
-        family = fits[0]
+        family, stuck = _first_that_goes_on(draft, fits)
         unit = _force_unit(family, norms[family])
         read = norms[family] * UNITS["acceleration"][unit]
-        evidence = f"by their names; the median of its norm is {norms[family]:.4g} {unit} ({read:.3g} m/s²)"
+        evidence = f"by their names; the median of its norm is {norms[family]:.4g} {unit} ({read:.3g} m/s²){stuck}"
         draft.put("specific_force", family.columns, evidence, unit=unit)
     elif offered:
         family, read = offered[0], norms[offered[0]]
@@ -216,6 +216,17 @@ def _guess_specific_force(draft: Draft) -> None:
         if len(near) == 1:
             evidence = f"no name says it; the median of its norm is {norms[near[0]]:.4g}, along z"
             draft.put("specific_force", near[0].columns, evidence, unit="m/s2")
+
+
+def _first_that_goes_on(draft: Draft, families: list[Family]) -> tuple[Family, str]:
+    """Of several sensors the first that goes on changing as long as any, and in words which one does not."""
+    alive, rows = {}, np.arange(len(draft.table), dtype=float)
+    for number, family in enumerate(families):
+        values = draft.values(family.columns)
+        known = np.isfinite(values).all(axis=1)
+        alive[number] = alive_s((rows if draft.time_s is None else draft.time_s)[known], values[known])
+    taken, faults = goes_on(alive, "sensor")
+    return families[taken], f"; {families[0].columns[0]} and its like stand still or end early" if faults else ""
 
 
 def _force_unit(family: Family, norm: float) -> str:
