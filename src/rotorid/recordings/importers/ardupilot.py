@@ -37,7 +37,8 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.dataflash import read_dataflash
+from rotorid.recordings.importers.contract import Imported, Importer
+from rotorid.recordings.importers.dataflash import HEAD, read_dataflash
 from rotorid.recordings.importers.faults import (
     GOES_ON,
     ImportFault,
@@ -53,7 +54,7 @@ from rotorid.recordings.importers.faults import (
     table_on,
     within,
 )
-from rotorid.recordings.importers.known import Parameters, Values
+from rotorid.recordings.importers.known import Known, Parameters, Values
 from rotorid.recordings.importers.mapping import PULSE_US, RPM, continuous, quaternion_from_euler_frd
 
 _KINDS = (
@@ -595,8 +596,8 @@ def _resets(log: Log) -> list[tuple[np.ndarray, str]]:
     return [(times, words) for times, words in found if len(times)]
 
 
-def read_ardupilot(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault], str]:
-    """Every flight of a DataFlash log by name, what was found, and the key of the rotors' order."""
+def _read(path: Path) -> Imported:
+    """Every flight of a DataFlash log."""
     log = read_messages(path)
     table, faults, flying = convert(log, path)
     order, more = order_of(_in_flight(log, path))
@@ -605,10 +606,12 @@ def read_ardupilot(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFaul
         own, found = jumps_at(grid, times - _clock(log, path)[0][0], words)
         jumps, more = jumps | own, more + found
     runs, cuts = flights(table, flying, path.name.split(".")[0], path, jumps)
-    return runs, [*faults, *more, *cuts], order
+    axes = "ArduPilot's: body forward-right-down, world north-east-down, as the contract's"
+    found, settings = [*faults, *more, *cuts], _stated_parameters(path)
+    return Imported(runs, found, axes, Known(order), speed_unit="rpm", settings=settings)
 
 
-def stated_parameters(path: Path) -> dict[str, float]:
+def _stated_parameters(path: Path) -> dict[str, float]:
     """The parameters that a DataFlash log states, each as it states it first."""
     found, _ = read_dataflash(path, ("PARM",))
     columns = found["PARM"].columns if "PARM" in found else {}
@@ -616,3 +619,15 @@ def stated_parameters(path: Path) -> dict[str, float]:
         return {}
     pairs = zip(columns["Name"].tolist(), columns["Value"].tolist(), strict=True)
     return dict(reversed([(str(name), float(value)) for name, value in pairs if np.isfinite(value)]))
+
+
+IMPORTER = Importer(
+    "ardupilot",
+    "ArduPilot DataFlash",
+    _read,
+    "frame by `FRAME_CLASS`; `IMU`, `XKQ` or `ATT`, `XKF1`, `RCOU` by `SERVOn_FUNCTION` and the parameters that held "
+    "then, `ESC`, `BAT` or `CURR`, `RFND`; clocks `TimeUS` or `TimeMS`; the part in the air by its event, throttle and "
+    "specific force",
+    starts=(HEAD,),
+    inside=(HEAD + b"\x80\x80\x59FMT",),
+)

@@ -30,7 +30,9 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
+from rotorid.recordings.importers.contract import Imported, Importer
 from rotorid.recordings.importers.faults import ImportFault, airborne, flights, moving_on, report_gaps
+from rotorid.recordings.importers.known import Known
 from rotorid.recordings.importers.mapping import G, half_turn_about_x, quaternion_to_frd_ned
 
 _FIRST_LINE = b"H Product:Blackbox"
@@ -64,8 +66,8 @@ _AMPERES = (((3, 1), 100),)
 _CONVERTER_STEP_MV = 3300 / 4095
 
 
-def read_betaflight(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
-    """Every flight of every session in a blackbox file by name, in contract columns, and what was found.
+def _read(path: Path) -> Imported:
+    """Every flight of every session in a blackbox file.
 
     InputError where the file is of another firmware, cannot be read, or holds no flight.
     """
@@ -88,7 +90,8 @@ def read_betaflight(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFau
         faults += more
     if not runs:
         raise InputError(f"{path}: {reasons[-1] if reasons else 'holds no log'}")
-    return runs, faults
+    axes = "body forward-left-up, turned by half a turn about x into FRD"
+    return Imported(runs, faults, axes, Known("betaflight"), speed_unit="rpm", settings=_stated_parameters(path))
 
 
 def _exported(data: bytes, path: Path) -> BlackboxSession:
@@ -695,7 +698,7 @@ _NO_SETTING = re.compile(
 """Lines of a header that say how the log is laid out, or what flew: no settings."""
 
 
-def stated_parameters(path: Path) -> dict[str, str]:
+def _stated_parameters(path: Path) -> dict[str, str]:
     """The settings in the header of a blackbox's first session, or of its export, as text."""
     head = Path(path).read_bytes()[:_LARGEST_HEADER]
     out: dict[str, str] = {}
@@ -706,3 +709,14 @@ def stated_parameters(path: Path) -> dict[str, str]:
         if not _NO_SETTING.fullmatch(name):
             out.setdefault(name, value)
     return out
+
+
+IMPORTER = Importer(
+    "betaflight",
+    "Betaflight blackbox, and its export by Blackbox Explorer",
+    _read,
+    "every session, a broken-off one too: gyroscope, accelerometer, motors, `eRPM`, battery, by the header's units",
+    starts=(_FIRST_LINE, b'"Product","Blackbox'),
+    inside=(_FIRST_LINE,),
+    template="five-inch",
+)

@@ -27,8 +27,9 @@ Source: bitcraze/crazyflie-firmware, `usddeck.c` and `tools/usdlog/cfusdlog.py` 
 
 from __future__ import annotations
 
+import re
 import struct
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from pathlib import Path
 from zlib import crc32
 
@@ -38,6 +39,7 @@ from scipy.spatial.transform import Rotation
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
+from rotorid.recordings.importers.contract import Imported, Importer, text_of
 from rotorid.recordings.importers.faults import (
     ImportFault,
     airborne,
@@ -51,6 +53,7 @@ from rotorid.recordings.importers.faults import (
     true_stretches,
 )
 from rotorid.recordings.importers.guessing import guess
+from rotorid.recordings.importers.known import Known
 from rotorid.recordings.importers.mapping import (
     RPM,
     UNITS,
@@ -127,21 +130,17 @@ FORMS: dict[tuple[str, ...], tuple[tuple[tuple[str, ...], Callable[[np.ndarray],
 BODY_VELOCITY = _names("kalman", "statePX statePY statePZ")
 
 
-def is_log(head: bytes) -> bool:
-    """Whether the first bytes of a file are those of a uSD log: its mark, a version, kinds of events and a name."""
-    if len(head) < 8 or head[0] != _MAGIC:
-        return False
-    version, count = struct.unpack_from("<HH", head, 1)
-    name = head[7:].split(b"\0")[0]
-    return 0 < version < 256 and 0 < count < 256 and name.isascii() and name.decode("latin-1").isprintable()
-
-
-def is_table(names: Collection[str]) -> bool:
-    """Whether the columns of a table have the firmware's names of its motors and of a state or sensor."""
-    stated = any(set(own) <= set(names) for forms in FORMS.values() for own, _ in forms)
-    return stated and any(
-        {pattern.format(i) for i in _ROTORS} <= set(names) for pattern in ("motor.m{}", "pwm.m{}_pwm")
-    )
+def _is_log(path: Path, head: bytes) -> bool:
+    """Whether a file's first bytes are those of a uSD log (its mark, a version, kinds of events and a name), or of a
+    table with the firmware's names of its motors and of a state or sensor."""
+    if len(head) >= 8 and head[0] == _MAGIC:
+        version, count = struct.unpack_from("<HH", head, 1)
+        name = head[7:].split(b"\0")[0]
+        return 0 < version < 256 and 0 < count < 256 and name.isascii() and name.decode("latin-1").isprintable()
+    heading = next(iter(text_of(head).splitlines()), "")
+    names = {name.strip(' "') for name in re.split("[,;\t]", heading)}
+    stated = any(set(own) <= names for forms in FORMS.values() for own, _ in forms)
+    return stated and any({pattern.format(i) for i in _ROTORS} <= names for pattern in ("motor.m{}", "pwm.m{}_pwm"))
 
 
 def _read_table(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
@@ -398,3 +397,22 @@ def read_usd_log(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault]
     except FileNotFoundError:
         raise InputError(f"{path}: file is missing") from None
     return decode_usd_log(data, str(path))
+
+
+def _read(path: Path) -> Imported:
+    runs, faults = flights(path)
+    axes = "body forward-left-up and world z up, turned by half a turn about x into FRD and NED"
+    return Imported(runs, faults, axes, Known("crazyflie"), speed_unit="rpm")
+
+
+IMPORTER = Importer(
+    "crazyflie",
+    "Crazyflie log (uSD, or CSV of its client)",
+    _read,
+    "`fixedFrequency`: gyroscope, accelerometer, estimate (quaternion, compressed, or roll, pitch, yaw), PWM, rpm; the "
+    "part in the air",
+    recognises=_is_log,
+    known_by="first bytes, or names of the columns",
+    template="crazyflie-2.1",
+    by_mapping=True,
+)

@@ -29,12 +29,14 @@ from pyulog import ULog
 from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
+from rotorid.recordings.importers.contract import Imported, Importer
 from rotorid.recordings.importers.faults import (
     ImportFault,
     airborne,
     changes_of,
     drop_repeated_times,
     fault_where,
+    flights,
     further_motors,
     goes_on,
     jumps_at,
@@ -45,7 +47,7 @@ from rotorid.recordings.importers.faults import (
     within,
     without_pauses,
 )
-from rotorid.recordings.importers.known import Parameters, Values
+from rotorid.recordings.importers.known import Parameters, Values, px4_vehicle
 from rotorid.recordings.importers.mapping import PULSE_US, RPM, continuous
 
 _FIRST_MOTOR = 101
@@ -128,7 +130,7 @@ class _Subscriptions(dict):
         super().__setitem__(number, subscription)
 
 
-MAGIC = b"ULog\x01\x12\x35"
+_MAGIC = b"ULog\x01\x12\x35"
 """First bytes of a ULog file."""
 _MOST_STRAY = 4096
 """Bytes among which the header is looked for, as by whoever recognises the file."""
@@ -155,7 +157,7 @@ def open_log(path: Path) -> Px4Log:
     if not Path(path).is_file():
         raise InputError(f"{path}: file is missing")
     data = Path(path).read_bytes()
-    stray = max(data.find(MAGIC, 0, _MOST_STRAY), 0)
+    stray = max(data.find(_MAGIC, 0, _MOST_STRAY), 0)
     try:
         log = _Reader(str(path)) if not stray else _read_behind(data[stray:])
     except MemoryError:
@@ -683,3 +685,31 @@ def convert(log: Px4Log, rotors: int) -> tuple[pd.DataFrame, list[ImportFault], 
         found = f"the logger lost {len(log.lost_s)} stretches, {sum(log.lost_s):.3g} s in all"
         faults.append(ImportFault("dropout", c.TIME, found, "left as gaps", len(log.lost_s)))
     return table, faults + report_gaps(table), flying & ~jumps, jumps
+
+
+def _read(path: Path) -> Imported:
+    """Every flight of a ULog file."""
+    log = open_log(path)
+    try:
+        rotors = rotor_count(log)
+        table, found, flying, jumps = convert(log, rotors)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    settings = {name: value for name, value in in_flight(log).items() if isinstance(value, int | float)}
+    known, faults = px4_vehicle(settings, rotors)
+    runs, cuts = flights(table, flying, path.stem, path, jumps)
+    axes = "PX4's: body forward-right-down, world north-east-down, as the contract's"
+    return Imported(runs, (*found, *faults, *cuts), axes, known, speed_unit="rpm", settings=settings)
+
+
+IMPORTER = Importer(
+    "px4",
+    "PX4 ULog",
+    _read,
+    "inertial sensors, attitude, position and velocity where valid, throttles of either generation of actuator topics "
+    "with their ranges, `esc_status`, batteries, range finder; rotor positions, directions of rotation and torque "
+    "ratio from `CA_ROTOR*`; the part in the air",
+    starts=(_MAGIC,),
+    inside=(_MAGIC,),
+    template="x500",
+)

@@ -38,7 +38,9 @@ from scipy.spatial.transform import Rotation
 from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
+from rotorid.recordings.files import is_bag
 from rotorid.recordings.importers.bag_records import Records, Unpacking, needs, typestores
+from rotorid.recordings.importers.contract import Imported, Importer
 from rotorid.recordings.importers.faults import (
     ImportFault,
     airborne,
@@ -598,12 +600,25 @@ def _of_pulses(outputs: _TopicSeries, faults: list[ImportFault]) -> tuple:
     return c.rotor_columns("throttle", len(used)), outputs.time_s, throttle
 
 
-def read_ros(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault], str]:
-    """Every flight of a bag (file or folder) or MCAP file by name, in contract columns, what was found, and the unit
-    in which rotor speeds are stated."""
+def _read(path: Path) -> Imported:
+    """Every flight of a bag (file or folder) or MCAP file."""
     series, faults = _read_series(path)
     table, flying, jumps = _convert(series, faults, path)
     name = (path.resolve() if path.is_dir() else path).name.split(".")[0]
     runs, cuts = flights(table, flying, name, path, jumps)
     unit = "rpm" if "rpm" in series and "speeds" not in series else "rad/s"
-    return runs, [*faults, *report_gaps(table), *cuts], unit
+    axes = "REP 103: body forward-left-up, world z up, turned by half a turn about x into FRD and z down"
+    return Imported(runs, [*faults, *report_gaps(table), *cuts], axes, speed_unit=unit)
+
+
+IMPORTER = Importer(
+    "ros",
+    "ROS 1 or 2 bag, MCAP",
+    _read,
+    "`Imu`, `Odometry`, poses, twists, `Actuators`, `MotorSpeed`, `ESCStatus`, `ESCTelemetry`, `RCOut`, "
+    "`BatteryState`, `Range`, PX4's own; whole messages of a file that ends early; `'rotorid[ros]'`",
+    starts=(b"#ROSBAG V2.0", b"\x89MCAP0", b"SQLite format 3"),
+    recognises=lambda path, head: path.is_dir() and is_bag(path),
+    known_by="first bytes, or a folder with `metadata.yaml`",
+    any_size=True,
+)
