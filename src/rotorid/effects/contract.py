@@ -87,10 +87,11 @@ class Motion:
         return len(self.time_s)
 
     @property
-    def air_velocity(self) -> np.ndarray:
-        """Velocity through the air, (n, 3), m/s, body axes."""
-        if self.wind is None:
+    def air_velocity(self) -> np.ndarray | None:
+        """Velocity through the air, (n, 3), m/s, body axes; None where no velocity is known."""
+        if self.wind is None or self.velocity is None:
             return self.velocity
+        assert self.rotation is not None, "a wind is known in world axes"
         wind = np.broadcast_to(self.wind, self.velocity.shape)
         return self.velocity - np.einsum("nji,nj->ni", self.rotation, wind)
 

@@ -9,7 +9,7 @@ pocket calculator gets the same word.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from rotorid.mismatch.decide.status import CLAIMED
 if TYPE_CHECKING:
     from rotorid.mismatch.tell.verdict import Channel, Errors, Location
 
+VerdictWord = Literal["no_mismatch", "explained", "partly_explained", "unexplained", "not_judged"]
 EXPLAINED_SHARE = 0.15
 """Up to this share of the mismatch's energy may be left for the word `explained`; from all but this share on the
 findings are said to explain nothing that matters."""
@@ -54,7 +55,7 @@ MOST_OFF = 0.2
 
 def verdict_word(
     analysis: Analysis, locations: Sequence[Location], left: float, channels: Mapping[str, Channel]
-) -> str:
+) -> VerdictWord:
     """One of the four words, from what was found, the share that is left, and the errors of the channels.
 
     Nothing is explained while a force stays off by more than a fifth of the weight.

@@ -29,7 +29,14 @@ from rotorid.mismatch.decide.findings import (
 )
 from rotorid.mismatch.decide.sizes import Size, fitted_part, scales
 from rotorid.mismatch.decide.status import Estimate
-from rotorid.mismatch.tell.consistency import by_share, located_channels, missing_places, share_left, verdict_word
+from rotorid.mismatch.tell.consistency import (
+    VerdictWord,
+    by_share,
+    located_channels,
+    missing_places,
+    share_left,
+    verdict_word,
+)
 from rotorid.mismatch.tell.sentences import (
     Contents,
     details,
@@ -312,7 +319,7 @@ class Verdict(_KeysOfVerdict):
     set: str
     kind: Literal["flight", "stand", "bench"]
     runs: Runs
-    verdict: Literal["no_mismatch", "explained", "partly_explained", "unexplained", "not_judged"]
+    verdict: VerdictWord
     basis: BasisOfVerdict
     doubts: tuple[DoubtOfSet, ...]
     sentence: str
@@ -356,7 +363,7 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
     located = located_channels(locations, inverse)
     left = share_left(inverse, located)
     shares = analysis.shares
-    word = "not_judged" if _stopping(analysis) else verdict_word(analysis, locations, left, inverse)
+    word: VerdictWord = "not_judged" if _stopping(analysis) else verdict_word(analysis, locations, left, inverse)
     contents = Contents(analysis, word, locations, inverse, shares, left if word != "no_mismatch" else 0.0, forward)
     return Verdict(
         set=analysis.recordings.name,
@@ -448,7 +455,8 @@ def _believed_value_of(row: ValueRow, analysis: Analysis) -> BelievedValue:
 
 def _delivered_of(analysis: Analysis) -> Delivered:
     """Which candidate is taken home, and every candidate's number."""
-    scores = tuple(Score(**dict(zip(Score.model_fields, s, strict=True))) for s in analysis.delivery.scores)
+    rows = (dict(zip(Score.model_fields, score, strict=True)) for score in analysis.delivery.scores)
+    scores = tuple(Score.model_validate(row) for row in rows)
     return Delivered(model=analysis.delivery.model, derivatives=analysis.delivery.derivatives, scores=scores)
 
 
