@@ -133,14 +133,9 @@ def _analysed(recordings: RecordingSet, mistakes, remarks, watch: Watch) -> Anal
     fit, moved = settled(model, values, model.selection.active)
 
     outside = [*mistakes, *findings_outside(found, prepared)]
-    findings = [*outside, *findings_inside(found, prepared, fit, {**moved, **values})]
-    findings = payload_or_offset(findings, {**moved, **values})
-    findings += absorbed_findings(model, values, findings)
-    findings, to_state = with_square_term(findings, values, model)
-    chosen = chosen_already(model)
-    findings = with_probabilities(together(findings), chosen.found, chosen.support)
+    findings, to_state = decided(found, outside, fit, moved)
     stated_ids = {i for f in findings for i in (f.id, *f.alternatives)}
-    limits = tuple(limit for limit in absent(model, chosen.found) if limit.id not in stated_ids)
+    limits = tuple(limit for limit in absent(model, chosen_already(model).found) if limit.id not in stated_ids)
     full = full_speed(known.runs, prepared.vehicle) if only_throttle(recordings) else None
     choice = _Choice(recordings, split, found, to_state, full, tuple(findings), limits, tuple(remarks))
 
@@ -154,6 +149,20 @@ def _analysed(recordings: RecordingSet, mistakes, remarks, watch: Watch) -> Anal
     words = with_values_in_question(weighed(first))
     offer = partial(_offered, choice, seen=seen, unseen=unseen, moved=moved, plain_moved=plain_moved)
     return with_noise_held_out(as_delivered(words, offer))
+
+
+def decided(found: Fitted, outside: Sequence[Finding], fit: Fit, moved: Values) -> tuple[tuple[Finding, ...], Values]:
+    """What is decided of a set fitted: its findings, those `outside` the model among them, and wrong values as stated.
+
+    `fit` with `moved` is what is delivered.
+    """
+    model, values = found.model, found.values
+    findings = [*outside, *findings_inside(found, found.prepared, fit, {**moved, **values})]
+    findings = payload_or_offset(findings, {**moved, **values})
+    findings += absorbed_findings(model, values, findings)
+    findings, to_state = with_square_term(findings, values, model)
+    chosen = chosen_already(model)
+    return tuple(with_probabilities(together(findings), chosen.found, chosen.support)), to_state
 
 
 @dataclass(frozen=True)
