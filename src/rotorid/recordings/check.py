@@ -15,7 +15,7 @@ are not and what that means for testing; and what cannot be right:
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
 from itertools import combinations
 from pathlib import Path
@@ -234,13 +234,8 @@ def _contents(recordings: RecordingSet) -> SetCheck:
 
 def doubts_of(recordings: RecordingSet) -> tuple[Doubt, ...]:
     """What cannot be right in a set, its vehicle and its runs together; empty where nothing is in doubt."""
-    found = [*_unread_files(recordings), *near_names(recordings), *copies(recordings), *voltages(recordings)]
-    if recordings.vehicle.kind != "bench":
-        found += [*gravity(recordings.vehicle), *impossible_values(recordings)]
-    if recordings.vehicle.kind == "flight":
-        found += physical_doubts(recordings)
-    found += [*_still_readings(recordings), *still_sensors(recordings)]
-    return tuple(found)
+    kind = recordings.vehicle.kind
+    return tuple(doubt for look, kinds in _LOOKS if kind in kinds for doubt in look(recordings))
 
 
 def as_text(check: SetCheck) -> str:
@@ -395,8 +390,6 @@ def _unread_files(recordings: RecordingSet) -> tuple[Doubt, ...]:
 def still_sensors(recordings: RecordingSet) -> Iterator[Doubt]:
     """One doubt for each sensor of a flight that stands still for a time, with the first run and its seconds."""
     runs, vehicle = recordings.runs, recordings.vehicle
-    if vehicle.kind != "flight":
-        return
     groups = (*SENSORS, *rotor_groups(vehicle).values())
     noisy = noisy_columns(runs, [n for names in groups for n in names])
     found: dict[tuple[str, ...], list[tuple[str, float, float]]] = {}
@@ -449,8 +442,6 @@ def _alone(run: Run, vehicle: Vehicle, name: str, names: tuple[str, ...], noisy:
 def _still_readings(recordings: RecordingSet) -> Iterator[Doubt]:
     """One doubt for all such readings; it stops a verdict where no reading of the instrument changes."""
     runs, vehicle = recordings.runs, recordings.vehicle
-    if vehicle.kind == "flight":
-        return
     names = list(dict.fromkeys(name for run in runs for name in compared_readings(run, vehicle)))
     spans = {}
     for name in names:
@@ -471,3 +462,18 @@ def _still_readings(recordings: RecordingSet) -> Iterator[Doubt]:
             "not measured, or a sensor that stands still",
             stops=len(still) == len(own),
         )
+
+
+_LOOKS: tuple[tuple[Callable[[RecordingSet], Iterable[Doubt]], tuple[str, ...]], ...] = (
+    (_unread_files, ("flight", "stand", "bench")),
+    (near_names, ("flight", "stand", "bench")),
+    (copies, ("flight", "stand", "bench")),
+    (voltages, ("flight", "stand", "bench")),
+    (gravity, ("flight", "stand")),
+    (impossible_values, ("flight", "stand")),
+    (physical_doubts, ("flight",)),
+    (_still_readings, ("stand", "bench")),
+    (still_sensors, ("flight",)),
+)
+"""Everything that is looked for in a set as it was given, and in which kinds of sets: by `check`, by the page before a
+verdict, and by the verdict, which looks once more at the set that it corrected."""

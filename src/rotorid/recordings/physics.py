@@ -61,24 +61,14 @@ _AT_REST = 0.2
 
 def physical_doubts(recordings: RecordingSet) -> tuple[Doubt, ...]:
     """What cannot be right in a set of kind `flight`; empty where all agrees."""
-    vehicle = recordings.vehicle
-    found: list[tuple[str, Doubt]] = []
-    for run in recordings.runs:
-        clock = _clock(run)
-        if clock is None:
-            continue
-        for doubt in (
-            *_accelerometer(run, clock),
-            *_gyroscope(run, clock),
-            *_world(run, clock),
-            *_rotors(run, clock, vehicle),
-            *_throttle(run, vehicle),
-            *_command_order(run, clock, vehicle),
-            *_held(run, vehicle),
-            *_joined(run, vehicle),
-            *_rest(run, vehicle),
-        ):
-            found.append((run.name, doubt))
+    looks = _accelerometer, _gyroscope, _world, _rotors, _throttle, _command_order, _held, _joined, _rest
+    found = [
+        (run.name, doubt)
+        for run in recordings.runs
+        if (clock := _clock(run)) is not None
+        for look in looks
+        for doubt in look(run, clock, recordings.vehicle)
+    ]
     return (*_once(found), *_amount(recordings))
 
 
@@ -190,9 +180,9 @@ def impossible_values(recordings: RecordingSet) -> tuple[Doubt, ...]:
     )
 
 
-def gravity(vehicle: Vehicle) -> tuple[Doubt, ...]:
+def gravity(recordings: RecordingSet) -> tuple[Doubt, ...]:
     """A gravity that is not the earth's."""
-    value, (low, high) = vehicle.gravity_m_s2, _GRAVITY_M_S2
+    value, (low, high) = recordings.vehicle.gravity_m_s2, _GRAVITY_M_S2
     if low <= value <= high:
         return ()
     units = [
@@ -222,7 +212,8 @@ def voltages(recordings: RecordingSet) -> tuple[Doubt, ...]:
 # Doubts -------------------------------------------------------------------------------------------
 
 
-def _accelerometer(run: Run, clock: np.ndarray) -> Iterator[Doubt]:
+def _accelerometer(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
+    """Whether it feels the thrust that carries the vehicle, in m/s² and along -z."""
     force = _on(run, clock, c.SPECIFIC_FORCE)
     if force is None:
         return
@@ -251,7 +242,8 @@ def _accelerometer(run: Run, clock: np.ndarray) -> Iterator[Doubt]:
     yield Doubt(f"specific_force_{axis}_m_s2", said, stops=True)
 
 
-def _gyroscope(run: Run, clock: np.ndarray) -> Iterator[Doubt]:
+def _gyroscope(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
+    """Whether it is the derivative of the attitude; without one, whether anything turns so fast."""
     gyro, attitude = _on(run, clock, c.ANGULAR_VELOCITY), _on(run, clock, c.QUATERNION)
     if gyro is None:
         return
@@ -298,7 +290,8 @@ def _gyroscope(run: Run, clock: np.ndarray) -> Iterator[Doubt]:
             yield Doubt(name, said, stops=True)
 
 
-def _world(run: Run, clock: np.ndarray) -> Iterator[Doubt]:
+def _world(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
+    """Whether velocity, position, attitude and specific force agree on world axes and units."""
     attitude, force = _on(run, clock, c.QUATERNION), _on(run, clock, c.SPECIFIC_FORCE)
     velocity, position = _on(run, clock, c.VELOCITY), _on(run, clock, c.POSITION)
     if velocity is not None and position is not None:
@@ -439,7 +432,8 @@ def _command_order(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Do
         yield Doubt("rotors", f"commands and measured speeds are in different orders: {pairs}", stops=True)
 
 
-def _throttle(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
+def _throttle(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
+    """Whether throttles are fractions."""
     names = [n for n in c.rotor_columns("throttle", vehicle.rotor_count) if run.has(n)]
     if not names:
         return
@@ -452,7 +446,7 @@ def _throttle(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
         )
 
 
-def _held(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
+def _held(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
     """Rotor speeds that keep one value while the vehicle moves: they were not measured."""
     kinds = [
         k for k in ("rotor_speed", "rotor_command", "throttle") if run.has(*c.rotor_columns(k, vehicle.rotor_count))
@@ -470,7 +464,7 @@ def _held(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
         )
 
 
-def _joined(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
+def _joined(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
     """Rotor speeds, rates and specific forces that were interpolated linearly between rarer readings."""
     for names in (c.rotor_columns("rotor_speed", vehicle.rotor_count), c.ANGULAR_VELOCITY, c.SPECIFIC_FORCE):
         values = run.array(names) if run.has(*names) else np.zeros((0, 1))
@@ -494,7 +488,8 @@ def _joined(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
             )
 
 
-def _rest(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
+def _rest(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
+    """Whether the vehicle stood on the ground for a part of the run."""
     kinds = [k for k in ("rotor_speed", "throttle") if run.has(*c.rotor_columns(k, vehicle.rotor_count))]
     if not kinds:
         return
