@@ -29,6 +29,7 @@ from rotorid.mismatch.decide.findings import (
     rms,
     with_probabilities,
 )
+from rotorid.mismatch.decide.posterior import Found
 from rotorid.mismatch.decide.selected import coefficients, wrench_findings
 from rotorid.mismatch.decide.sizes import fitted_part
 from rotorid.mismatch.decide.statements import UpperLimit
@@ -133,9 +134,9 @@ def _analysed(recordings: RecordingSet, mistakes, remarks, watch: Watch) -> Anal
     fit, moved = settled(model, values, model.selection.active)
 
     outside = [*mistakes, *findings_outside(found, prepared)]
-    findings, to_state = decided(found, outside, fit, moved)
+    findings, to_state, posterior = decided(found, outside, fit, moved)
     stated_ids = {i for f in findings for i in (f.id, *f.alternatives)}
-    limits = tuple(limit for limit in absent(model, chosen_already(model).found) if limit.id not in stated_ids)
+    limits = tuple(limit for limit in absent(model, posterior) if limit.id not in stated_ids)
     full = full_speed(known.runs, prepared.vehicle) if only_throttle(recordings) else None
     choice = _Choice(recordings, split, found, to_state, full, tuple(findings), limits, tuple(remarks))
 
@@ -151,8 +152,11 @@ def _analysed(recordings: RecordingSet, mistakes, remarks, watch: Watch) -> Anal
     return with_noise_held_out(as_delivered(words, offer))
 
 
-def decided(found: Fitted, outside: Sequence[Finding], fit: Fit, moved: Values) -> tuple[tuple[Finding, ...], Values]:
-    """What is decided of a set fitted: its findings, those `outside` the model among them, and wrong values as stated.
+def decided(
+    found: Fitted, outside: Sequence[Finding], fit: Fit, moved: Values
+) -> tuple[tuple[Finding, ...], Values, Found]:
+    """What is decided of a set fitted: its findings, those `outside` the model among them, wrong values as stated, and
+    the posterior at the chosen model.
 
     `fit` with `moved` is what is delivered.
     """
@@ -162,7 +166,7 @@ def decided(found: Fitted, outside: Sequence[Finding], fit: Fit, moved: Values) 
     findings += absorbed_findings(model, values, findings)
     findings, to_state = with_square_term(findings, values, model)
     chosen = chosen_already(model)
-    return tuple(with_probabilities(together(findings), chosen.found, chosen.support)), to_state
+    return tuple(with_probabilities(together(findings), chosen.found, chosen.support)), to_state, chosen.found
 
 
 @dataclass(frozen=True)

@@ -243,7 +243,7 @@ def known(
     prepared = prepare(fit_part, cutoff_hz, unseen=tuple(r.name for r in unseen.runs))
     found = fitted(prepared)
     way = ways(found.model, found.values, found.model.selection.active)[0]
-    findings, _ = decided(found, (*mistakes, *findings_outside(found, prepared)), way.fit, way.moved)
+    findings, *_ = decided(found, (*mistakes, *findings_outside(found, prepared)), way.fit, way.moved)
     chain = () if found.chain is None else tuple(k for k, _ in found.chain[0].fit.chain)
     if claimed is not None:
         findings = tuple(f for f in findings if f.id in claimed or f.id in suggested)
