@@ -181,7 +181,7 @@ def formats_table() -> str:
 DECISION = """# Reference of the decision
 
 This page is made of the code of `rotorid.mismatch` and lists what [how it decides](mismatch.md) leaves out; terms are
-explained there.
+explained there. A number that one formula alone uses stands next to it in the code, with its reason.
 
 ## Rules
 

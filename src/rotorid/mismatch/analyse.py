@@ -72,11 +72,6 @@ _UNITS = {"force": "N", "moment": "N m"}
 _SENSOR_UNITS = {2: "m/s2", 3: "rad/s"}
 _NO_DEPENDENCE_P = 0.01
 """p-value of a residual's dependence on what is recorded from which it is taken for noise."""
-_SURELY_HEAVIER = 2.0
-"""Standard errors by which a vehicle must be heavier than believed to carry a payload."""
-_TIMING_FLOOR = 0.05
-"""One-sigma, in samples, that no time is better known by: between two samples commands hold, or change, as nobody
-recorded."""
 
 
 def analyse(recordings: RecordingSet, watch: Watch = unwatched) -> Analysis:
@@ -488,13 +483,16 @@ def _wind_finding(model: WrenchModel) -> Finding:
 
 def _speed_findings(result: SpeedResult, prepared: Prepared, measured: bool, full_speed: float) -> list[Finding]:
     """Findings between command and rotor speed."""
+    # One-sigma, in samples, that no time is better known by: between two samples commands hold, or change, as nobody
+    # recorded.
+    timing_floor = 0.05
     effects = catalogue()
     out = []
     channels = tuple(f"rotor_speed_{i + 1}" for i in range(prepared.vehicle.rotor_count)) if measured else ("force_z",)
     for key, form in result.fit.chain:
         where = result.fit.slice_of(key)
         values = result.fit.values[where]
-        least = [_TIMING_FLOOR / prepared.segments[0].rate_hz if p.unit == "s" else 0.0 for p in form.parameters]
+        least = [timing_floor / prepared.segments[0].rate_hz if p.unit == "s" else 0.0 for p in form.parameters]
         sd = np.hypot(np.sqrt(np.diag(result.fit.covariance)[where]), least)
         numbers = zip(form.parameters, values, sd, strict=True)
         alternatives = result.alternatives[key]
@@ -520,7 +518,8 @@ def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
 
     The payload would bring products of inertia along: found with such an offset they belong to the same question.
     """
-    sure = {key: change for key, (change, sd) in values.items() if abs(change) > _SURELY_HEAVIER * sd}
+    surely_heavier = 2.0  # Standard errors by which a vehicle must be heavier than believed to carry a payload.
+    sure = {key: change for key, (change, sd) in values.items() if abs(change) > surely_heavier * sd}
     heavier = sure.get("mass", 0.0) > 0 or sure.get("thrust", 0.0) < 0
     stated = [f for f in findings if f.status in CLAIMED]
     load = next(e for e in catalogue().values() if e.like_on_heavier)

@@ -52,8 +52,6 @@ from rotorid.plan.simulate import (
 from rotorid.recordings import Vehicle
 from rotorid.steps import step
 
-_HANDLING_S = 300.0
-"""A step by hand takes this long: land, work, take off."""
 SHARE = "of the weight"
 """Unit of an upper limit."""
 _YAW_SHARE = 0.2
@@ -98,7 +96,8 @@ class Handled:
     @property
     def minutes(self) -> float:
         """The work and the hover, min."""
-        return (_HANDLING_S + self.hover_s) / 60.0
+        handling_s = 300.0  # A step by hand takes this long: land, work, take off.
+        return (handling_s + self.hover_s) / 60.0
 
     @property
     def sigma(self) -> float | None:

@@ -49,8 +49,6 @@ from rotorid.vehicle.derivatives import derivative_form, own_controls, quantitie
 _MOST_EVALUATIONS = 40
 _EDGE_S = 0.5
 """Left out at both ends of a flight: a command that leads has nothing to lead from there."""
-_LEAST_WEIGHT = 0.05
-"""Relative probability from which a form may as well be the true one."""
 _MAY_DIFFER = ("name", "noise", "effects", "ground_z_m")
 """Keys of vehicle.yaml that say nothing of the vehicle itself."""
 
@@ -330,11 +328,12 @@ def _hypothesis_of(
     regression: Regression, shared: Sequence[str], name: str, choices, terms: dict[str, Term], own: str
 ) -> Hypothesis:
     """The model of an id in its best form, `own` where that is one of its `choices`, with the forms nearly as good."""
+    least_weight = 0.05  # Relative probability from which a form may as well be the true one.
     worth = partial(_worth, regression, shared, terms)
     best = (own,) if (own,) in choices else best_of(regression, shared, choices, terms)
     weights = {keys: float(np.exp(min(worth(keys) - worth(best), 0.0) / 2)) for keys in choices if keys != best}
     others = (
-        replace(_hypothesis(regression, shared, name, k), weight=w) for k, w in weights.items() if w > _LEAST_WEIGHT
+        replace(_hypothesis(regression, shared, name, k), weight=w) for k, w in weights.items() if w > least_weight
     )
     return replace(_hypothesis(regression, shared, name, best), others=tuple(others))
 

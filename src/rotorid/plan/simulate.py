@@ -44,8 +44,6 @@ _EDGE = 8
 """Samples by which a flight is longer on both sides while its derivatives are taken."""
 _ROUNDS = 6
 """Times that rotor speeds and attitude are solved for with the effects at their last values."""
-_STEPS_BACK = 8
-"""Rounds of the inversion of what lies between command and speed."""
 OF_PROPELLER = ("unequal_rotors",)
 """Effects whose coefficients, one a rotor, go with the propeller. A tilt stays with the motor's mount."""
 OF_CENTRE = "com_offset"
@@ -53,8 +51,6 @@ WITH_MASS_OF_ITS_OWN = ("payload",)
 """Effects whose parameters are of a further mass: with a known one attached their columns are not those of before."""
 MASS_SHARE = 0.05
 """A mass to attach over the vehicle's."""
-_PLACE_SD_M, _MASS_SD = 0.002, 0.01
-"""How well the place of an attached mass is known, and its size as a share of it."""
 
 
 @dataclass(frozen=True)
@@ -220,11 +216,12 @@ def _held_longer(reference: Reference, step_s: float) -> Reference:
 
 def commands(world: CompetingModel, motion: Motion) -> np.ndarray:
     """Commands (n, k), rad/s, that make the rotor speeds of a motion through the model's chain."""
+    steps_back = 8  # Rounds of the inversion of what lies between command and speed.
     wanted = command = motion.rotor_speed
     if not world.chain:
         return command
     start = SpeedPath(command, motion.time_s, world.full_speed_rad_s, motion.voltage, world.full_voltage_v)
-    for _ in range(_STEPS_BACK):
+    for _ in range(steps_back):
         path = replace(start, speed=command)
         for form, values in sorted(world.chain, key=lambda pair: pair[0].stage):
             path = replace(path, speed=form.apply(path, values))
@@ -347,6 +344,7 @@ def _by_propeller(form: Form, order: np.ndarray) -> Form:
 
 def _attached(vehicle: Vehicle, place_m: tuple[float, float, float], words: str) -> ChangedVehicle:
     """A mass of MASS_SHARE of the vehicle's attached at `place_m` (forward, right, down of the believed centre)."""
+    place_sd_m, mass_sd = 0.002, 0.01  # How well the place of an attached mass is known, and its size as a share of it.
     mass, more = vehicle.mass_kg, MASS_SHARE * vehicle.mass_kg
     place = np.array(place_m)
     centre = more / (mass + more) * place
@@ -374,7 +372,7 @@ def _attached(vehicle: Vehicle, place_m: tuple[float, float, float], words: str)
         return replace(form, contribution=lambda m, v, values: form.contribution(m, v, share * np.asarray(values)))
 
     # The mass sits next to where it should, or weighs other than stated: either moves the centre.
-    doubt = np.hypot(_PLACE_SD_M, _MASS_SD * np.linalg.norm(place)) * (1.0 - share)
+    doubt = np.hypot(place_sd_m, mass_sd * np.linalg.norm(place)) * (1.0 - share)
     plane = catalogue()[OF_CENTRE].forms(vehicle)[0]
     nuisance = Term("by hand/place", "effect", "", plane, (0.0, 0.0), 2, (doubt, doubt))
     inertias = {f"inertia_{a}{a}": own[i, i] / inertia[i, i] for i, a in enumerate("xyz")}

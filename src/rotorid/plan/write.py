@@ -71,9 +71,6 @@ _SHOWN_HZ = 25.0
 _FILE_HZ = 100.0
 _PIECES_AT_ONCE = 31
 """Pieces that the trajectory memory of a Crazyflie (4096 bytes, 132 a piece) holds."""
-_COARSEST_S, _FINEST_S = 2.0, 0.1
-_WORST_FIT_M, _WORST_FIT_M_S2 = 0.01, 0.4
-"""Quick motions are millimetres large: that the path is met does not say that the acceleration is."""
 _FLIP = np.array([1.0, -1.0, -1.0])
 """North-east-down to forward-left-up."""
 
@@ -127,6 +124,9 @@ def crazyflie(plan: Plan) -> tuple[pd.DataFrame, float]:
 
     Pieces are as long as the fit allows (WORST_FIT_M, WORST_FIT_M_S2), between FINEST_S and COARSEST_S.
     """
+    # Quick motions are millimetres large: that the path is met does not say that the acceleration is.
+    coarsest_s, finest_s = 2.0, 0.1
+    worst_fit_m, worst_fit_m_s2 = 0.01, 0.4
     reference, middle = plan.reference, plan.limits.middle_m
     t, step = reference.time_s, reference.time_s[1] - reference.time_s[0]
     place = (reference.position_m + np.array([middle[0], middle[1], -middle[2]])) * _FLIP
@@ -137,7 +137,7 @@ def crazyflie(plan: Plan) -> tuple[pd.DataFrame, float]:
     states = np.stack(derivatives, axis=1)
     rows, worst, at = [], 0.0, 0
     while at < len(t) - 1:
-        length = int(round(_COARSEST_S / step))
+        length = int(round(coarsest_s / step))
         while True:
             end = min(at + length, len(t) - 1)
             seconds = t[end] - t[at]
@@ -146,7 +146,7 @@ def crazyflie(plan: Plan) -> tuple[pd.DataFrame, float]:
             off = float(np.linalg.norm((powers @ fitted - every[at : end + 1])[:, :3], axis=1).max())
             bend = powers[:, :6] @ (fitted[2:] * (np.arange(2, 8) * np.arange(1, 7))[:, None])
             pushed = float(np.linalg.norm((bend - states[at : end + 1, 2])[:, :3], axis=1).max())
-            if (off <= _WORST_FIT_M and pushed <= _WORST_FIT_M_S2) or length <= _FINEST_S / step:
+            if (off <= worst_fit_m and pushed <= worst_fit_m_s2) or length <= finest_s / step:
                 break
             length //= 2
         worst, at = max(worst, off), end

@@ -44,8 +44,6 @@ from rotorid.recordings.run import Doubt, RecordingSet, Run
 from rotorid.recordings.sufficient import SENSORS, compared_readings, rotor_groups, sufficient
 from rotorid.recordings.vehicle import Vehicle
 
-_STILL_S = 1.0
-"""A sensor of a flight that repeats one reading for so long is named."""
 _TABLES = ("csv", "tsv", "parquet", "feather", "xlsx", "xls", "ods", "h5", "hdf5", "mat", "npz")
 _LOGS = ("ulg", "bin", "bbl", "bfl", "mcap", "db3", "bag", "tlog")
 _PACKED = ("zip", "gz", "bz2", "xz", "zst", "7z", "tar", "tgz")
@@ -64,12 +62,6 @@ _BY_CHANCE = 3.0
 _BLOCK, _BLOCKS, _JUMP = 256, 5, 4.0
 _SAME_NOISE = 0.95
 """Correlation of second differences that independent noise does not reach in a block."""
-_MOST_CORRELATED = 5_000_000
-"""Samples by runs to correlate with, which take some seconds."""
-_GAP_FACTOR = 3.0
-"""A step of the clock longer than this many median steps is a gap."""
-_SLOWEST_SPEEDS_HZ = 20.0
-"""Rate of rotor speeds below which motors (time constants of some hundredths of a second) are faster than their log."""
 
 
 @dataclass(frozen=True)
@@ -112,9 +104,10 @@ class SetCheck:
 
 def check_run(run: Run) -> _RunCheck:
     """Sampling of one run."""
+    gap_factor = 3.0  # A step of the clock longer than this many median steps is a gap.
     steps = np.diff(run.time_s)
     median = float(np.median(steps))
-    gaps = steps[steps > _GAP_FACTOR * median]
+    gaps = steps[steps > gap_factor * median]
     duration = float(run.time_s[-1] - run.time_s[0])
     empty = {n: float(run.table[n].isna().mean()) for n in run.table.columns if run.table[n].isna().any()}
     return _RunCheck(
@@ -174,12 +167,14 @@ def _lacks_of_flight(has, count: int) -> list[str]:
 
 def _slow_speeds(recordings: RecordingSet) -> list[str]:
     """A sentence where rotor speeds come too seldom to carry what is fast between command and speed."""
+    # Rate of rotor speeds below which motors (time constants of some hundredths of a second) are faster than their log.
+    slowest_speeds_hz = 20.0
     names = c.rotor_columns("rotor_speed", recordings.vehicle.rotor_count)
     runs = [run for run in recordings.runs if run.has(*names)]
     if not runs:
         return []
     rate = min(float(run.table[names[0]].notna().sum() / (run.time_s[-1] - run.time_s[0])) for run in runs)
-    if rate >= _SLOWEST_SPEEDS_HZ:
+    if rate >= slowest_speeds_hz:
         return []
     return [
         f"Rotor speeds come {rate:.2g} times a second only: a lag or delay of the motors shorter than "
@@ -278,6 +273,7 @@ def check_folder(folder: Path) -> SetCheck:
 
 def copies(recordings: RecordingSet) -> tuple[Doubt, ...]:
     """One doubt for each run that repeats samples of an earlier one."""
+    most_correlated = 5_000_000  # Samples by runs to correlate with, which take some seconds.
     columns = dict.fromkeys(n for run in recordings.runs for n in run.table.columns if n != c.TIME)
     names = [n for n in columns if all(run.has(n) for run in recordings.runs)]
     if len(recordings.runs) < 2 or len(names) < _LEAST_EQUAL:
@@ -291,7 +287,7 @@ def copies(recordings: RecordingSet) -> tuple[Doubt, ...]:
     if (
         len(noisy) >= _LEAST_NOISY
         and len(rest) > 1
-        and sum(len(run.table) for run in rest) * len(rest) <= _MOST_CORRELATED
+        and sum(len(run.table) for run in rest) * len(rest) <= most_correlated
     ):
         for first, second in _same_noise(rest, noisy):
             found.setdefault(second, (first, "even the noise of its sensors is the same"))
@@ -389,6 +385,7 @@ def _unread_files(recordings: RecordingSet) -> tuple[Doubt, ...]:
 
 def still_sensors(recordings: RecordingSet) -> Iterator[Doubt]:
     """One doubt for each sensor of a flight that stands still for a time, with the first run and its seconds."""
+    still_s = 1.0  # A sensor of a flight that repeats one reading for so long is named.
     runs, vehicle = recordings.runs, recordings.vehicle
     groups = (*SENSORS, *rotor_groups(vehicle).values())
     noisy = noisy_columns(runs, [n for names in groups for n in names])
@@ -405,7 +402,7 @@ def still_sensors(recordings: RecordingSet) -> Iterator[Doubt]:
             for own, stands in masks.items():
                 times = [(float(run.time_s[m][0]), float(run.time_s[m][-1])) for m in stands]
                 for start, stop in times:
-                    if stop - start >= _STILL_S:
+                    if stop - start >= still_s:
                         found.setdefault(own, []).append((run.name, start, stop))
     for names, where in found.items():
         run, start, stop = where[0]

@@ -45,8 +45,6 @@ _AGREES, _CONTRADICTS = 0.5, -0.3
 """Correlations: above, two signals agree; below, one of them is turned round."""
 _TOP = 0.99
 """Share of the rotor speeds below their highest that counts: single samples may be faults."""
-_SAME_UNIT = (0.2, 5.0)
-"""Of two signals that agree, the ratio of their spreads that noise and smoothing explain."""
 _SLOW_S, _LATEST_STEPS, _LEAST_EXPLAINED = 0.5, 4, 0.4
 """Regression of turning on rotor speeds: slower changes left out, latest lag tried, least share explained."""
 _SURE_Z, _ALIKE, _RIDGE = 6.0, 5.0, 0.02
@@ -292,6 +290,7 @@ def _gyroscope(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]
 
 def _world(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
     """Whether velocity, position, attitude and specific force agree on world axes and units."""
+    same_unit = (0.2, 5.0)  # Of two signals that agree, the ratio of their spreads that noise and smoothing explain.
     attitude, force = _on(run, clock, c.QUATERNION), _on(run, clock, c.SPECIFIC_FORCE)
     velocity, position = _on(run, clock, c.VELOCITY), _on(run, clock, c.POSITION)
     if velocity is not None and position is not None:
@@ -311,7 +310,7 @@ def _world(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
                     "exchanged"
                 )
                 yield Doubt(own, said, stops=True)
-            elif r > _AGREES and not _SAME_UNIT[0] < scale < _SAME_UNIT[1]:
+            elif r > _AGREES and not same_unit[0] < scale < same_unit[1]:
                 # Units that are used as well as metres are smaller: the column with the larger numbers is the one.
                 what, which = (own, "the velocity") if scale > 1 else (place, "the position")
                 said = f"{own} is {scale:.3g} times the derivative of {place}, expected 1: {which} is in another unit"

@@ -118,8 +118,6 @@ ASSUMED = {"lift_without_voltage": (0.1, 3)}
 """One-sigma and degrees of freedom of what no laboratory shows: here of a battery whose voltage is not recorded."""
 _FEWEST_FLIGHTS, _FEWEST_LABORATORIES = 3, 3
 """A laboratory's largest scatter needs so many flights; of a kind that fewer laboratories have, it is doubled."""
-_FREEDOM_OF_PIECES = 2.0
-"""As how many degrees of freedom between flights the doubt by a flight's own pieces counts."""
 _KNOWN = 1e6
 """Degrees of freedom of a scatter that is taken as known."""
 _FREEDOM = (2.0, 10.0)
@@ -517,9 +515,10 @@ def _overstated(own: np.ndarray, found: float, freedom: int) -> float:
     Pieces of a manoeuvre differ by more than flights that repeat it: where flights are known to differ by less (by
     `found`, the variance between them), pieces are believed by so much less. Without such flights they are believed.
     """
+    freedom_of_pieces = 2.0  # As how many degrees of freedom between flights the doubt by a flight's own pieces counts.
     mean = float(own.mean())
     seen = min(1.0, found / mean) if mean > 0 else 1.0
-    return (_FREEDOM_OF_PIECES + freedom * seen) / (_FREEDOM_OF_PIECES + freedom)
+    return (freedom_of_pieces + freedom * seen) / (freedom_of_pieces + freedom)
 
 
 def _scatter_of(values: Sequence[np.ndarray], owns: Sequence[np.ndarray], kind: str) -> tuple[float, int]:

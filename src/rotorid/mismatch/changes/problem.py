@@ -50,9 +50,6 @@ from rotorid.mismatch.evidence.regression import NEVER_EXCITED
 from rotorid.mismatch.evidence.rows import PARAMETER_NAMES
 from rotorid.mismatch.instrument.model import VALUE_NAMES
 
-_SAME_SD, _SAME_BODY_SD = 0.01, 0.003
-"""Relative one-sigma between two flights in which nothing changed of a rotor's coefficient (3 K of air change
-its density by a hundredth), and of mass, inertia and arm."""
 _OF_THE_AIR = ("thrust", "torque")
 """Values that the air's density changes."""
 _DERIVED = "rotor_acceleration"
@@ -68,8 +65,6 @@ _LEAST_GAIN = 0.005
 _FREE = 10.0
 """Variance of what is common to both sets, in units of what one row determines. With 1 more unseen pairs got a wrong
 name; with 100 a change of mass in gentle flight is halved (docs/compare.md)."""
-_NOT_COMMON = 1e-9
-"""The same of what only one set can have."""
 _UNCHANGED = "unchanged"
 """Kind of a term that is common to both sets and did not change by assumption."""
 _RIDGE = 1e-4
@@ -317,10 +312,11 @@ def _products_of_changes(
 
 def _free_of(terms: Mapping[str, EvidenceTerm], columns_of: Mapping[str, np.ndarray], rows: int | float) -> np.ndarray:
     """Variance (K,) of the coefficients common to both sets, scaled; next to none of what one set has alone."""
+    not_common = 1e-9  # The same of what only one set can have.
     out = np.full(sum(t.size for t in terms.values()), _FREE * rows)
     for key, term in terms.items():
         if term.alone:
-            out[columns_of[key]] = _NOT_COMMON
+            out[columns_of[key]] = not_common
     return out
 
 
@@ -371,13 +367,16 @@ def usual_spread(
     the inertia, of the second vehicle.yaml over the first one's in each channel: residual noise grows with it.
     `form_sd` is the share of what effects contribute that their forms are wrong by.
     """
+    # Relative one-sigma between two flights in which nothing changed of a rotor's coefficient (3 K of air change its
+    # density by a hundredth), and of mass, inertia and arm.
+    same_sd, same_body_sd = 0.01, 0.003
     hidden = _hidden_by_noise(new, inertia) - _hidden_by_noise(base, np.ones(len(inertia)))
     out = form_spread(base, known, form_sd)
     forms = Counter((t.effect, p.symbol) for t in base.terms for p in t.linear)
     for term in base.terms:
         at = base.start[term.key] + np.arange(term.size)
         if term.kind == "value":
-            out[at] = np.hypot(_SAME_SD if term.key in _OF_THE_AIR else _SAME_BODY_SD, hidden[at])
+            out[at] = np.hypot(same_sd if term.key in _OF_THE_AIR else same_body_sd, hidden[at])
         elif term.effect in catalogue() and term.linear:
             effect = catalogue()[term.effect]
             usual = np.array([effect.between_flights.get(p.unit, 0.0) for p in term.linear])

@@ -30,8 +30,6 @@ _USUAL = 0.75
 """Share of a column's steps that are no longer than its usual one."""
 _SLOWER = 1.5
 """Readings whose usual step is so many of the rows' are taken at their own rate."""
-_UNEVEN = 0.3
-"""Deviation of a step from the median, as a share of it, beyond which samples are interpolated to an even grid."""
 _SHORTEST = 4
 SHORT = 60
 """Stretches of fewer samples or rows are blocks: too short to learn the colour of their noise from."""
@@ -39,8 +37,6 @@ _MOST_VALUES = 45_000
 """Samples times channels that are analysed; longer sets are averaged over several samples first."""
 _LEAST_SHARE = 0.05
 """Share of the largest load from which a channel is loaded, or a sample is, and of the samples that come back."""
-_LEAST_WARMTH_K = 0.1
-"""A temperature that changes by less says nothing."""
 _STEADY_HZ = 5.0
 """Below this rate a recording is a list of steady points: nothing that takes time can be seen."""
 _QUARTIC = np.array([[-25.0, 48.0, -36.0, 16.0, -3.0], [-3.0, -10.0, 18.0, -6.0, 1.0]])
@@ -201,8 +197,10 @@ def _within(time_s: np.ndarray, known_s: np.ndarray, longest_s: float) -> np.nda
 
 def _even(time_s: np.ndarray, dt_s: float) -> np.ndarray | None:
     """An even grid to interpolate to, None where the samples are even already."""
+    # Deviation of a step from the median, as a share of it, beyond which samples are interpolated to an even grid.
+    uneven = 0.3
     steps = np.diff(time_s)
-    if np.all(np.abs(steps - np.median(steps)) < _UNEVEN * np.median(steps)):
+    if np.all(np.abs(steps - np.median(steps)) < uneven * np.median(steps)):
         return None
     return time_s[0] + dt_s * np.arange(int((time_s[-1] - time_s[0]) / dt_s) + 1)
 
@@ -542,6 +540,7 @@ def _distance_column(recordings: RecordingSet) -> str:
 
 def _instrument_of(recordings: RecordingSet, how: _Preparation, loadings: Sequence[Loading]) -> InstrumentFacts:
     """What the forms of effects need to know beforehand."""
+    least_warmth_k = 0.1  # A temperature that changes by less says nothing.
     channels, session = how.channels, how.session
     load = np.concatenate([x.load for x in loadings])
     spread = np.concatenate([x.load - x.rest for x in loadings]).std(axis=0)
@@ -571,10 +570,10 @@ def _instrument_of(recordings: RecordingSet, how: _Preparation, loadings: Sequen
         returns=tuple(k for k in loaded if _comes_back(loadings, k, float(largest[k]))),
         tilts=any(np.ptp(a) > 0.02 for a in attitudes),
         temperature=all(x.temperature is not None for x in loadings)
-        and any(np.ptp(x.temperature) > _LEAST_WARMTH_K for x in loadings),
-        temperatures_c=(float(warmth.min()), float(warmth.max())) if np.ptp(warmth) > _LEAST_WARMTH_K else (0.0, 0.0),
+        and any(np.ptp(x.temperature) > least_warmth_k for x in loadings),
+        temperatures_c=(float(warmth.min()), float(warmth.max())) if np.ptp(warmth) > least_warmth_k else (0.0, 0.0),
         first_temperature_c=float(warmth[0]),
-        zero_temperature_c=zero_temperature(loadings, channels) if np.ptp(warmth) > _LEAST_WARMTH_K else None,
+        zero_temperature_c=zero_temperature(loadings, channels) if np.ptp(warmth) > least_warmth_k else None,
         session_s=session.length_s,
         session_clock=session.clock,
         distance=how.distance,

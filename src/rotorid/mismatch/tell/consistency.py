@@ -23,8 +23,6 @@ VerdictWord = Literal["no_mismatch", "explained", "partly_explained", "unexplain
 EXPLAINED_SHARE = 0.15
 """Up to this share of the mismatch's energy may be left for the word `explained`; from all but this share on the
 findings are said to explain nothing that matters."""
-_PLAINLY_OFF = 1.5
-"""Error of a force or moment in units of its noise floor, from which it is a mismatch, wherever it is."""
 
 
 def quoted(channel: Channel) -> Errors:
@@ -91,6 +89,8 @@ def missing_places(
     Of each effect that a model holds the channel it betters most; what stays unexplained though nothing was located;
     a channel whose error on the runs held out is far above its noise floor.
     """
+    # Error of a force or moment in units of its noise floor, from which it is a mismatch, wherever it is.
+    plainly_off = 1.5
     there = {location.channel for location in locations}
     out: dict[str, float] = {}
     for finding in with_status(analysis, *CLAIMED):
@@ -106,7 +106,7 @@ def missing_places(
         both = (channel.rmse.held_out, channel.rmse.training)
         errors = [x for e in both if (x := e.before if stated else e.named) is not None]
         wrench = name.split("_")[0] in ("force", "moment")
-        if wrench and name not in there and max(errors, default=0.0) > _PLAINLY_OFF * (channel.noise_floor or np.inf):
+        if wrench and name not in there and max(errors, default=0.0) > plainly_off * (channel.noise_floor or np.inf):
             out.setdefault(name, analysis.p_values.get(name, (1.0, 1.0))[0])
     return [(c, p) for c, p in out.items() if c not in {location.channel for location in locations}]
 

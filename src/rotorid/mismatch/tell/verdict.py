@@ -52,9 +52,6 @@ from rotorid.recordings.check import doubts_of
 from rotorid.recordings.run import Doubt
 from rotorid.recordings.sufficient import basis_of
 
-_DESCRIBED = 0.1
-"""Share of the weight, or of the moment that the rotors can make, that may stay off in a channel where a mistake in the
-set counts as corrected: of wrong corrections seen a quarter to a half stayed, of right ones next to nothing."""
 __all__ = ["Verdict", "main_channel", "make_verdict", "spoken"]
 
 SCHEMA_PATH = Path(__file__).parents[4] / "workflow" / "schemas" / "verdict.schema.json"
@@ -551,9 +548,12 @@ def with_doubts(analysis: Analysis, recordings: RecordingSet) -> Analysis:
     Corrected is a doubt that the recordings as analysed, with the improved vehicle, no longer raise, where the model
     then describes them. Axes can be exchanged so that all sensors agree and the vehicle is another one.
     """
+    # Share of the weight, or of the moment that the rotors can make, that may stay off in a channel where a mistake in
+    # the set counts as corrected: of wrong corrections seen a quarter to a half stayed, of right ones next to nothing.
+    described = 0.1
     found = doubts_of(recordings)
     left = found
-    if any(d.stops for d in found) and _still_off(analysis) < _DESCRIBED:
+    if any(d.stops for d in found) and _still_off(analysis) < described:
         left = doubts_of(replace(analysis.recordings, vehicle=corrected(analysis)))
     standing = {d.what for d in left}
     said = tuple(d if d.what in standing or not d.stops else _as_corrected(d) for d in found)

@@ -59,8 +59,6 @@ _WORDS = {
 _MOST_LOCATIONS = 12
 _NARROWEST = 0.03
 """Interval over plausible range below which the range is zoomed in."""
-_LIMIT_DECADES = 5.0
-"""Decades below the weight that the bars of the limits show."""
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -207,8 +205,9 @@ def by_share(effects: Sequence[EffectVerdict]) -> list[EffectVerdict]:
 
 def _limit_row(limit: Absent) -> dict[str, str]:
     """A row of the table of what was not found; `bar` is a share of the scale from 0.001 % to 100 % of the weight."""
+    limit_decades = 5.0  # Decades below the weight that the bars of the limits show.
     share = limit.share_of_weight
-    decades = 0.0 if not share else float(np.clip(1.0 + np.log10(share) / _LIMIT_DECADES, 0.0, 1.0))
+    decades = 0.0 if not share else float(np.clip(1.0 + np.log10(share) / limit_decades, 0.0, 1.0))
     size = Markup("")
     if limit.at_most is not None:
         size = Markup("|{}| ≤ {}").format(

@@ -34,8 +34,6 @@ _FRAMES_PER_S = 25.0
 _BUDGET = 800_000
 """Values that the page may hold of all traces together; 800 000 are 2.2 MB."""
 _MOST_BLOCKS = 4000
-_LONGEST_LAG_S = 1.0
-_MOST_LAGS = 60
 _MISSING = -32768
 
 
@@ -200,6 +198,8 @@ def _correlations(
 
     `band` is what 99 % of correlations of white noise lie within (2.58 over the square root of the samples).
     """
+    longest_lag_s = 1.0
+    most_lags = 60
     part = fitted_part(analysis)
     out = {}
     for channel in channels:
@@ -208,8 +208,8 @@ def _correlations(
         if not held:
             continue
         period = float(np.median(np.diff(held[0].time_s)))
-        step = max(1, int(round(_LONGEST_LAG_S / period / _MOST_LAGS)))
-        lags = np.arange(0, int(_LONGEST_LAG_S / period) + 1, step)
+        step = max(1, int(round(longest_lag_s / period / most_lags)))
+        lags = np.arange(0, int(longest_lag_s / period) + 1, step)
         samples = sum(len(t.time_s) for t in held)
         out[channel] = {
             "lag_s": [round(float(x), 5) for x in lags * period],
