@@ -124,8 +124,8 @@ def crazyflie(plan: Plan) -> tuple[pd.DataFrame, float]:
 
     Pieces are as long as the fit allows (WORST_FIT_M, WORST_FIT_M_S2), between FINEST_S and COARSEST_S.
     """
-    # Quick motions are millimetres large: that the path is met does not say that the acceleration is.
     coarsest_s, finest_s = 2.0, 0.1
+    # Quick motions are millimetres large: that the path is met does not say that the acceleration is.
     worst_fit_m, worst_fit_m_s2 = 0.01, 0.4
     reference, middle = plan.reference, plan.limits.middle_m
     t, step = reference.time_s, reference.time_s[1] - reference.time_s[0]

@@ -289,10 +289,10 @@ def _on_lines(time_s: np.ndarray, values: np.ndarray, at_s: np.ndarray, step_s: 
 
 def _spline(time_s: np.ndarray, values: np.ndarray, period_s: float) -> scipy.interpolate.BSpline:
     """The cubic least-squares spline through readings (n,) whose knots are a period apart."""
+    cubic = 3
     # Weight of the third differences of the spline: a smooth line where there are no readings. With half the cells
     # empty by chance noise then is as even over the band as of an even sensor, and the gain at 0.3 of the rate is right
     # to 2 %.
-    cubic = 3
     stiffness = 5e-4
     count = int(np.ceil((time_s[-1] - time_s[0]) / period_s)) + 1
     knots = time_s[0] + period_s * np.arange(-cubic, count + cubic)

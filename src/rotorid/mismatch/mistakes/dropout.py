@@ -290,9 +290,8 @@ def missing(time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 def standing_rotors(run: Run, vehicle: Vehicle, names: tuple[str, ...]) -> dict[str, np.ndarray]:
     """Column to mask of samples in which a rotor reads (near) zero while the others carry the vehicle."""
-    # A rotor below this share of what the others turn at, relative to its own habit, stands still.
     shortest_stand_s = 0.15
-    standing = 0.2
+    standing = 0.2  # A rotor below this share of what the others turn at, relative to its own habit, stands still.
     # A rotor that at its fastest gives less than this share of its part of the others' thrust is not being read.
     implausible_thrust = 0.45
     speed = run.array(names)

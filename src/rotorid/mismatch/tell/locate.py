@@ -458,8 +458,8 @@ def _moves(part: np.ndarray, whole: np.ndarray, most: int) -> bool:
     What bodies and air do lasts longer than a sample; a sensor that is shaken or badly received has a higher variance,
     no more. Decided by the correlations at one of the first lags, or at all up to `most` together.
     """
-    # Standard errors (Fisher's transform) by which larger residuals must follow each other otherwise than usual.
     first_lags = 4
+    # Standard errors (Fisher's transform) by which larger residuals must follow each other otherwise than usual.
     moves_z = 4.0
     count = len(part)
     lags = np.arange(1, min(most, count - 5) + 1)

@@ -45,9 +45,6 @@ _LARGEST_STEP_US = 10_000_000
 """A main frame that leaps farther ahead in iterations or time than this, or back, is damaged."""
 _TURN = 1 << 32
 """Numbers have 32 bits: a clock in microseconds begins anew after 71.6 minutes."""
-_DEFAULT_POLES = 14
-_QUATERNION_SCALE = 32767.0
-"""`imuQuaternion` holds x, y and z of the unit quaternion times this; w is what is missing to length 1."""
 _OTHER_NAMES = {"gyroADC": ("gyroData", "gyroUnfilt"), "accSmooth": ("accADC",), "eRPM": ("eRPM(/100)",)}
 """To a field its names in other releases, and what holds the same before a filter."""
 _FEWER_MOTORS = {1: "a fixed wing", 2: "a bicopter or a fixed wing", 3: "a tricopter, whose tail rotor a servo tilts"}
@@ -56,14 +53,6 @@ _FEATURE_3D = 1 << 12
 _DSHOT = (48.0, 2047.0)
 _DSHOT_FORWARD = 1048.0
 """With 3D, DShot's commands below this turn a motor backwards, from 48 on the faster the larger."""
-_DEADBAND_3D = (1406.0, 1514.0)
-"""Betaflight's own dead band of 3D where motors have pulses in µs; the header does not hold what was set."""
-_SLOWEST_PULSE_US = 900.0
-"""Commands of motors that turn below this are none of pulses in µs."""
-_VOLTS = (((4, 0), 100), ((3, 1), 10))
-_AMPERES = (((3, 1), 100),)
-"""Since which version so many counts of a field are 1 V or 1 A; before that it counts steps of the converter."""
-_CONVERTER_STEP_MV = 3300 / 4095
 
 
 def _read(path: Path) -> Imported:
@@ -152,6 +141,9 @@ def convert(
     raw: pd.DataFrame, headers: Mapping[str, str], name: str, where: object
 ) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
     """Flights in contract columns of the main frames of one session (`time` in µs) and its header."""
+    default_poles = 14
+    # `imuQuaternion` holds x, y and z of the unit quaternion times this; w is what is missing to length 1.
+    quaternion_scale = 32767.0
     if "time" not in raw:
         raise InputError(f"{where}: the log has no field time")
     raw, faults = _known_names(raw)
@@ -182,7 +174,7 @@ def convert(
         faults.append(ImportFault("missing", ", ".join(c.SPECIFIC_FORCE), found, "no specific force", 0))
     attitude = fields("imuQuaternion", 3)
     if attitude is not None:
-        xyz = attitude / _QUATERNION_SCALE
+        xyz = attitude / quaternion_scale
         w = np.sqrt(np.clip(1 - np.sum(xyz**2, axis=1), 0, None))
         table[list(c.QUATERNION)] = quaternion_to_frd_ned(np.column_stack([w, xyz]))
     motors = [n for i in range(8) if (n := f"motor[{i}]") in raw]
@@ -200,8 +192,8 @@ def convert(
     if np.nanmax(turns) > 0:
         poles = _number(headers, "motor_poles", 0)
         if not poles > 0:
-            poles, found = _DEFAULT_POLES, "the header does not state motor_poles"
-            faults.append(ImportFault("unit", "rotor_speed", found, f"taken as {_DEFAULT_POLES}", 0))
+            poles, found = default_poles, "the header does not state motor_poles"
+            faults.append(ImportFault("unit", "rotor_speed", found, f"taken as {default_poles}", 0))
         speeds = np.where(np.isnan(throttle), np.nan, turns * 100 / (poles / 2) * 2 * np.pi / 60)
         for column, own in zip(c.rotor_columns("rotor_speed", turns.shape[1]), speeds.T, strict=True):
             if np.nanmax(own, initial=0.0) > 0:
@@ -237,21 +229,24 @@ def throttles(motors: np.ndarray, headers: Mapping[str, str]) -> tuple[np.ndarra
 
     With 3D a motor also turns backwards; the contract has no fraction for that, so these are NaN.
     """
+    # Betaflight's own dead band of 3D where motors have pulses in µs; the header does not hold what was set.
+    deadband_3d = (1406.0, 1514.0)
+    slowest_pulse_us = 900.0  # Commands of motors that turn below this are none of pulses in µs.
     faults = []
     low, high = _pair(headers, "motorOutput") or (0.0, 0.0)
     if not high > low:
         low, high = _number(headers, "minthrottle", 1000.0), _number(headers, "maxthrottle", 2000.0)
         turning = motors[motors > 0]
-        if len(turning) and np.quantile(turning, 0.01) < _SLOWEST_PULSE_US:
+        if len(turning) and np.quantile(turning, 0.01) < slowest_pulse_us:
             low, high = _DSHOT
         found = "the header does not state motorOutput"
         faults.append(ImportFault("unit", "throttle", found, f"no and full throttle taken as {low:g} and {high:g}", 0))
     backwards = np.zeros(motors.shape, bool)
     if int(_number(headers, "features", 0)) & _FEATURE_3D:
-        if low < _SLOWEST_PULSE_US:
+        if low < slowest_pulse_us:
             backwards, low = (motors > 0) & (motors < _DSHOT_FORWARD), _DSHOT_FORWARD + low - _DSHOT[0]
         else:
-            backwards, low = motors < _DEADBAND_3D[0], _DEADBAND_3D[1]
+            backwards, low = motors < deadband_3d[0], deadband_3d[1]
             found = "pulses in µs with 3D, whose dead band the header does not state"
             faults.append(ImportFault("unit", "throttle", found, f"no throttle taken as {low:g} µs, Betaflight's own"))
     share = np.clip((motors - low) / (high - low), 0, 1)
@@ -263,11 +258,15 @@ def throttles(motors: np.ndarray, headers: Mapping[str, str]) -> tuple[np.ndarra
 
 def _battery(raw: pd.DataFrame, headers: Mapping[str, str]) -> tuple[dict[str, np.ndarray], list[ImportFault]]:
     """Voltage and current of the battery in contract columns, as far as they are logged and their unit is known."""
+    # Since which version so many counts of a field are 1 V or 1 A; before that it counts steps of the converter.
+    volts = (((4, 0), 100), ((3, 1), 10))
+    amperes = (((3, 1), 100),)
+    converter_step_mv = 3300 / 4095
     version = _version(headers)
     found, faults = {}, []
     for field, column, since in (
-        ("vbatLatest", c.BATTERY_VOLTAGE, _VOLTS),
-        ("amperageLatest", c.BATTERY_CURRENT, _AMPERES),
+        ("vbatLatest", c.BATTERY_VOLTAGE, volts),
+        ("amperageLatest", c.BATTERY_CURRENT, amperes),
     ):
         if field not in raw or not raw[field].max() > 0:
             continue
@@ -277,9 +276,9 @@ def _battery(raw: pd.DataFrame, headers: Mapping[str, str]) -> tuple[dict[str, n
         if counts is not None:
             found[column] = values / counts
         elif version and field == "vbatLatest" and (scale := _number(headers, "vbatscale", 0)) > 0:
-            found[column] = values * _CONVERTER_STEP_MV * scale * 1e-4  # the divider in tenths, mV
+            found[column] = values * converter_step_mv * scale * 1e-4  # the divider in tenths, mV
         elif version and field == "amperageLatest" and per_ampere > 0:
-            found[column] = (values * _CONVERTER_STEP_MV - offset) * 10 / per_ampere
+            found[column] = (values * converter_step_mv - offset) * 10 / per_ampere
         else:
             why = "the header does not state the version or the scale that its unit depends on"
             faults.append(ImportFault("unit", column, f"{field}: {why}", "left out", len(raw)))

@@ -45,8 +45,6 @@ ORDERS: dict[str, tuple[tuple[str, str], ...]] = {
 """Rotors 1 to 4 of a quadrotor in X shape by autopilot: place and turning sense (Betaflight: propellers in)."""
 
 
-_TILTED_DEG = 1.0
-"""Angle between a rotor's axis and body z from which on it is tilted."""
 _ALIKE = 0.01
 """Relative difference of a coefficient up to which rotors are alike."""
 Values = Mapping[str, float]
@@ -101,6 +99,7 @@ def px4_vehicle(parameters: Mapping[str, float], rotors: int) -> tuple[Known, li
 
 def _untaken(parameters: Mapping[str, float], rotors: int) -> list[ImportFault]:
     """A fault for each thing that control allocation states of the rotors and a vehicle.yaml has no place for."""
+    tilted_deg = 1.0  # Angle between a rotor's axis and body z from which on it is tilted.
 
     def stated(name: str, default: float) -> list[float]:
         return [float(parameters.get(f"CA_ROTOR{i}_{name}", default)) for i in range(rotors)]
@@ -114,7 +113,7 @@ def _untaken(parameters: Mapping[str, float], rotors: int) -> list[ImportFault]:
     axes = np.column_stack([stated("AX", 0.0), stated("AY", 0.0), stated("AZ", -1.0)])
     size = np.linalg.norm(axes, axis=1)  # PX4 makes each axis a unit vector
     lean = np.degrees(np.arccos(np.clip(-axes[:, 2] / np.where(size > 0, size, 1.0), -1, 1)))
-    tilted = [i for i in range(rotors) if lean[i] > _TILTED_DEG]
+    tilted = [i for i in range(rotors) if lean[i] > tilted_deg]
     degrees = ", ".join(f"{lean[i]:.3g}" for i in tilted)
     found = f"{{}} tilted against body z by {degrees} degrees (CA_ROTOR*_AX, _AY, _AZ)"
     faults = fault("tilted_rotor", [i + 1 for i in tilted], found, "its thrust is taken along -z")

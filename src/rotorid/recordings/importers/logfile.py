@@ -74,8 +74,6 @@ _IMPOSSIBLE = 3.5
 """Speeds of hover so many times off, or more, are not in the unit that is stated."""
 _POSSIBLE = 2.2
 """Speeds of hover within this factor are."""
-_EPOCHS_US = (9e14, 5e15)
-"""Times from 1998 to 2128 in µs, as telemetry logs of MAVLink have them before each message."""
 _GROUP = "rotorid.importers"
 
 
@@ -102,6 +100,8 @@ def importers() -> dict[str, Importer]:
 
 def importer_of(path: Path) -> Importer:
     """The importer that reads a log; InputError for what is none."""
+    # Times from 1998 to 2128 in µs, as telemetry logs of MAVLink have them before each message.
+    epochs_us = (9e14, 5e15)
     head = b""
     if not path.is_dir():
         check_file(path)
@@ -112,7 +112,7 @@ def importer_of(path: Path) -> Importer:
     known = importers().values()
     if found := next((i for i in known if head.startswith(i.starts)), None):
         return found
-    epoch = _EPOCHS_US[0] < int.from_bytes(head[:8], "big") < _EPOCHS_US[1]
+    epoch = epochs_us[0] < int.from_bytes(head[:8], "big") < epochs_us[1]
     if head[8:9] in (b"\xfe", b"\xfd") and (epoch or path.suffix.lower() in (".tlog", ".rlog")):
         raise InputError(
             f"{path}: a telemetry log of MAVLink, which is not read; take the autopilot's own log (.bin, .ulg), or "

@@ -81,12 +81,6 @@ _ENDS = {
 """To the drivers of outputs, as their parameters are called, no and full throttle where no parameter states them."""
 _DSHOT = (1.0, 1999.0)
 """The same of DShot (0 is disarmed), which PX4 logs less its 48 commands."""
-_DSHOT_TIMERS = (-5, -4, -3, -2)
-"""Values of PWM_*_TIMn that are DShot of some speed; larger ones are pulses."""
-_UAVCAN_WITH_MOTORS = 3
-"""UAVCAN_ENABLE from which the bus drives motors."""
-_PLAUSIBLE = 0.5
-"""Share of the range by which outputs that turn may lie outside of it; farther, they are in another unit."""
 JUMPED = "PX4's estimator jumped in position, velocity or attitude"
 RESETS = (
     ("vehicle_local_position", "xy_reset_counter", ("delta_xy[0]", "delta_xy[1]"), 0.02),
@@ -98,7 +92,6 @@ RESETS = (
 )
 """What the estimator sets anew at once: topic, counter, the fields that hold by how much, and how much of it (m, m/s,
 rad; half of the angle) is within the noise of an estimate."""
-_ARMED = 2
 
 _Fields = Mapping[str, np.ndarray]
 """Fields of one instance of a topic, (n,) each, named as pyulog does: `q[0]`, `esc[1].esc_rpm`."""
@@ -132,8 +125,6 @@ class _Subscriptions(dict):
 
 _MAGIC = b"ULog\x01\x12\x35"
 """First bytes of a ULog file."""
-_MOST_STRAY = 4096
-"""Bytes among which the header is looked for, as by whoever recognises the file."""
 
 
 class _Reader(ULog):
@@ -154,10 +145,11 @@ def _read_behind(data: bytes) -> _Reader:
 
 def open_log(path: Path) -> Px4Log:
     """Read a ULog file; InputError where it is none."""
+    most_stray = 4096  # Bytes among which the header is looked for, as by whoever recognises the file.
     if not Path(path).is_file():
         raise InputError(f"{path}: file is missing")
     data = Path(path).read_bytes()
-    stray = max(data.find(_MAGIC, 0, _MOST_STRAY), 0)
+    stray = max(data.find(_MAGIC, 0, most_stray), 0)
     try:
         log = _Reader(str(path)) if not stray else _read_behind(data[stray:])
     except MemoryError:
@@ -326,6 +318,8 @@ def _more_rotors(topic: str, driven: int, rotors: int) -> list[ImportFault]:
 
 def _from_outputs(log: Px4Log, instances, rotors: int, names: str):
     """Throttles of `actuator_outputs` by the parameters that state what drives the motors, and in what unit."""
+    # Share of the range by which outputs that turn may lie outside of it; farther, they are in another unit.
+    plausible = 0.5
     flown = in_flight(log)
     port, outputs = _outputs_of_motors(flown, rotors)
     if outputs is None:
@@ -350,7 +344,7 @@ def _from_outputs(log: Px4Log, instances, rotors: int, names: str):
         low, high, by = _ends_of(values, port, outputs)
         share = (given[inside] - low) / (high - low)
         turning = given[inside] > 0
-        if (np.abs(share[turning] - 0.5) > 0.5 + _PLAUSIBLE).any():
+        if (np.abs(share[turning] - 0.5) > 0.5 + plausible).any():
             own = given[inside][turning]
             found = f"outputs from {own.min():g} to {own.max():g} are not {by or 'pulse widths in µs'}"
             return _no_throttle("unit", names, found, len(given), faults)
@@ -375,6 +369,7 @@ def _outputs_of_motors(parameters: Values, rotors: int) -> tuple[str | int, list
     """The driver (of `_ENDS`) and the indices of its outputs that drive motors 1 to `rotors`; where no function is
     stated the first ones, of the bus where UAVCAN_ENABLE says so; the number of a motor that has no output where one is
     missing."""
+    uavcan_with_motors = 3  # UAVCAN_ENABLE from which the bus drives motors.
     by_port, stated = {}, False
     for port in _ENDS:
         named = rf"{port}_FUNC(\d+)"
@@ -382,7 +377,7 @@ def _outputs_of_motors(parameters: Values, rotors: int) -> tuple[str | int, list
         by_port[port] = [functions.get(_FIRST_MOTOR + i) for i in range(rotors)]
         stated |= bool(functions)
     if not stated:
-        on_bus = parameters.get("UAVCAN_ENABLE", 0) >= _UAVCAN_WITH_MOTORS
+        on_bus = parameters.get("UAVCAN_ENABLE", 0) >= uavcan_with_motors
         return "UAVCAN_EC" if on_bus else "PWM_MAIN", list(range(rotors))
     port, motors = min(by_port.items(), key=lambda item: item[1].count(None))
     return (motors.index(None) + 1, None) if None in motors else (port, [k - 1 for k in motors])
@@ -391,8 +386,9 @@ def _outputs_of_motors(parameters: Values, rotors: int) -> tuple[str | int, list
 def _ends_of(parameters: Values, port: str, outputs: Sequence[int]) -> tuple[np.ndarray, np.ndarray, str]:
     """Outputs of no and full throttle by motor, and in words what a parameter says that they are, empty where none
     does."""
+    dshot_timers = (-5, -4, -3, -2)  # Values of PWM_*_TIMn that are DShot of some speed; larger ones are pulses.
     timers = [int(v) for k, v in parameters.items() if re.fullmatch(rf"{port}_TIM\d+", k)]
-    timer = next((t for t in timers if t in _DSHOT_TIMERS), None) if set(timers) <= set(_DSHOT_TIMERS) else None
+    timer = next((t for t in timers if t in dshot_timers), None) if set(timers) <= set(dshot_timers) else None
     if port.startswith("PWM") and (parameters.get("DSHOT_CONFIG", 0) > 0 or timer is not None):
         name = f"{port}_TIMn {timer}" if timer is not None else f"DSHOT_CONFIG {parameters['DSHOT_CONFIG']:g}"
         low, high = (np.full(len(outputs), end) for end in _DSHOT)
@@ -599,11 +595,12 @@ def _resets(topics: _Topics) -> np.ndarray:
 
 def in_the_air(name: str, data: _Fields) -> np.ndarray | None:
     """Messages (n,) of the land detector or of the status by which the vehicle may fly; None where they say nothing."""
+    armed = 2
     if name == "vehicle_land_detected" and "landed" in data:
         flags = [data[f] for f in ("landed", "maybe_landed", "ground_contact") if f in data]
         return ~np.any(np.asarray(flags).astype(bool), axis=0)
     if name == "vehicle_status" and "arming_state" in data:
-        return np.asarray(data["arming_state"]) == _ARMED
+        return np.asarray(data["arming_state"]) == armed
     return None
 
 

@@ -22,7 +22,6 @@ from rotorid.recordings.importers.faults import ImportFault, drop_repeated_times
 from rotorid.recordings.importers.mapping import UNITS, bracketed, converted, unit_of
 from rotorid.recordings.mended import lost_speed
 
-_ESC_LOW_US, _ESC_HIGH_US = 1000.0, 2000.0
 HEADINGS: dict[str, tuple[str, str, str]] = {
     "Time": ("time", "time", "s"),
     "ESC signal": ("esc", "share", "us"),
@@ -61,6 +60,7 @@ def _read_table(text: str, where: str) -> tuple[pd.DataFrame, list[ImportFault]]
 
     `time` s, `esc` from 0 to 1, `thrust` N, `torque` N m, `voltage` V, `current` A, `speed` and `optical` rad/s.
     """
+    esc_low_us, esc_high_us = 1000.0, 2000.0
     try:
         rows = [row for row in csv.reader(text.split("\n")) if any(cell.strip() for cell in row)]
     except csv.Error as error:
@@ -85,7 +85,7 @@ def _read_table(text: str, where: str) -> tuple[pd.DataFrame, list[ImportFault]]
                 raise InputError(f"{where}, line {line}, column {heading}: expected a number, found {cell!r}") from None
     read = {name: converted(np.array(columns[name]), kind, unit) for name, (_, kind, unit) in places.items()}
     if places["esc"][2] == "us":
-        read["esc"] = (read["esc"] - _ESC_LOW_US) / (_ESC_HIGH_US - _ESC_LOW_US)
+        read["esc"] = (read["esc"] - esc_low_us) / (esc_high_us - esc_low_us)
     return pd.DataFrame(read), faults
 
 

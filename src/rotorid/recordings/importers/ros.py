@@ -138,10 +138,6 @@ _UNSET |= dict.fromkeys(("rates", "force", "position", "velocity", "body_velocit
 _COMMANDED = re.compile(r"command|cmd|setpoint|desired|target|reference", re.IGNORECASE)
 _SAME_CLOCK_S = 1.0
 """Stamps further than this from those of the inertial sensor, or from one message to the next, are another clock."""
-_STEADY_S = 0.2
-"""Spread of the difference of two clocks up to which it is a constant."""
-_MIXED = 4
-"""Motors of a mixer whose signals say those of all others: it has four demands."""
 _LISTED = 8
 _WEIGHT_M_S2 = (5.0, 20.0)
 """Median size of the readings of an accelerometer that feels what carries the vehicle."""
@@ -444,6 +440,7 @@ def _times(found: _BagContent) -> tuple[dict[tuple[str, str], np.ndarray], list[
 
     A topic whose stamps are all zero, jump, or run at another rate has those at which its messages were recorded.
     """
+    steady_s = 0.2  # Spread of the difference of two clocks up to which it is a constant.
     stamps = {key: np.array([row[0] for row in rows]) for key, rows in found.rows.items()}
     recorded = {key: np.array([row[1] for row in rows]) for key, rows in found.rows.items()}
     sound = set()
@@ -477,7 +474,7 @@ def _times(found: _BagContent) -> tuple[dict[tuple[str, str], np.ndarray], list[
             times[key], seen = own, ""
         else:
             seen = f"its stamps are {off:.4g} s from those of {base[1]}"
-            steady = np.ptp(np.quantile(own - on_base, [0.05, 0.95])) < _STEADY_S
+            steady = np.ptp(np.quantile(own - on_base, [0.05, 0.95])) < steady_s
             times[key] = own - off if steady else on_base
             action = "shifted by that" if steady else "the times at which its messages were recorded hold"
         if seen:
@@ -585,9 +582,10 @@ def _velocity(series: dict[str, list[_TopicSeries]], faults: list[ImportFault]) 
 def _of_pulses(outputs: _TopicSeries, faults: list[ImportFault]) -> tuple:
     """Throttles of an array of all outputs, which names no motors: the first four that move are motors, and each other
     whose signal follows from theirs."""
+    mixed = 4  # Motors of a mixer whose signals say those of all others: it has four demands.
     moving = np.flatnonzero(np.ptp(outputs.values, axis=0) > 0)
     pulses = outputs.values[:, moving]
-    used = [*range(min(_MIXED, len(moving))), *further_motors(pulses, _MIXED)]
+    used = [*range(min(mixed, len(moving))), *further_motors(pulses, mixed)]
     low, high = PULSE_US
     seen = f"channels {', '.join(str(moving[k] + 1) for k in used)} of {outputs.topic} move"
     action = f"taken for motors in order, {low:g} to {high:g} µs"
