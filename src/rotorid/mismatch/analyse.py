@@ -46,7 +46,15 @@ from rotorid.mismatch.evidence.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE
 from rotorid.mismatch.evidence.speedpath import CommandChain, SpeedResult
 from rotorid.mismatch.evidence.split import parts_of, split_runs
 from rotorid.mismatch.flight.absent import absent, absorbed_findings, chosen_already
-from rotorid.mismatch.flight.delivered import Values, believed_residuals, beyond_trust, in_words, residuals_of, settled
+from rotorid.mismatch.flight.delivered import (
+    Values,
+    believed_residuals,
+    beyond_trust,
+    in_words,
+    residuals_of,
+    settled,
+    values_without_path,
+)
 from rotorid.mismatch.flight.fitted import Decided, Fitted, Watch, fitted, next_flight, unwatched
 from rotorid.mismatch.flight.gains import values_alone
 from rotorid.mismatch.flight.gusts import gust_finding
@@ -225,15 +233,19 @@ def _account(
         delivered if beyond_trust(model, values, model.selection.active) else None,
         bool(values) or any(f.status in CLAIMED for f in findings),
     )
-    refitted_left = residuals_of(seen, plain_fit)
-    traces = _make_traces(seen, found, refitted_left, delivered)
-    between = _sensor_traces(seen, refitted_left, delivered)
+    refitted_left = on_path = residuals_of(seen, plain_fit)
+    refitted = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in plain_values.items()})
+    if found.commanded:
+        gains, refitted_left = values_without_path(seen.prepared, seen.rows, found.chain, len(model.rows))
+        refitted = choice.vehicle(gains, {}, believed=True)
+    traces = _make_traces(seen, found, refitted_left, on_path, delivered)
+    between = _sensor_traces(seen, on_path, delivered)
     fly = next_flight(findings, choice.recordings)
     return Analysis(
         recordings=choice.recordings,
         split=choice.split,
         believed=prepared.vehicle,
-        refitted=changed_vehicle(prepared.vehicle, {k: v[0] for k, v in plain_values.items()}),
+        refitted=refitted,
         improved=choice.vehicle(moved, stated),
         named=choice.vehicle(moved, stated),
         findings=tuple(findings),
@@ -531,22 +543,24 @@ def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
 
 
 def _make_traces(
-    model: WrenchModel, found: Fitted, refitted: list[np.ndarray], delivered: list[np.ndarray]
+    model: WrenchModel,
+    found: Fitted,
+    refitted: list[np.ndarray],
+    on_path: list[np.ndarray],
+    delivered: list[np.ndarray],
 ) -> tuple[ChannelTrace, ...]:
-    """Residual of every channel before refitting, after refitting and with the effects, (n, 12) each per stretch."""
+    """Residual of every channel before refitting, after it (alone and `ChannelTrace.on_path`) and with the effects,
+    (n, 12) each per stretch."""
     prepared, chain = model.prepared, found.chain
     believed_left = believed_residuals(prepared, model.rows, chain if found.commanded else None)
     out = []
-    parts = (model.rows, prepared.segments, believed_left, refitted, delivered)
-    for r, segment, before, plain, after in zip(*parts, strict=True):
+    parts = (model.rows, prepared.segments, believed_left, refitted, on_path, delivered)
+    for r, segment, before, plain, path, after in zip(*parts, strict=True):
         for c in range(6):
             if np.isfinite(r.y[:, c]).all():
                 unit = _UNITS[CHANNELS[c].split("_")[0]]
-                out.append(
-                    ChannelTrace(
-                        r.run, CHANNELS[c], unit, r.time_s, before[:, c], plain[:, c], after[:, c], after[:, c]
-                    )
-                )
+                own = (part[:, c] for part in (before, plain, after, after, path))
+                out.append(ChannelTrace(r.run, CHANNELS[c], unit, r.time_s, *own))
         if chain is not None and found.measured:
             path = chain.speeds(segment)
             believed = prepared.thinner(segment.motion.rotor_speed - segment.command)

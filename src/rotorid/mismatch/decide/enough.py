@@ -94,7 +94,8 @@ def judged(
 ) -> Finding:
     """A finding with its gain on the held-out runs and the status that the fitted ones allow, a mistake as it is.
 
-    `share` is its part of the explained error.
+    `share` is its part of the explained error. What the lift says of the path from command to thrust has the doubt of
+    the loop in its interval: how much else of the forces has no name makes it no less sure.
     """
     if finding.status not in CLAIMED or finding.id not in analysis.without or finding.late_s is not None:
         return finding
@@ -109,7 +110,7 @@ def judged(
         reported, _ = contribution(analysis, without, windows, acts_on)
     slight = found and next(iter(found.values()))[0] > _LARGE_GAIN
     reason = ""
-    if rules.BELOW_LEFTOVER(not beyond):
+    if rules.BELOW_LEFTOVER(not beyond and not (analysis.command_path and finding.speed_form)):
         reason = "it is smaller than what the model leaves over"
     elif may_be_nothing(finding):
         reason = NOTHING

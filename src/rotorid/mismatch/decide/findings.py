@@ -140,14 +140,18 @@ class ChannelTrace:
     time_s: np.ndarray
     before: np.ndarray
     refitted: np.ndarray
+    """Of values alone: without a form of the path from command to thrust, too."""
     named: np.ndarray
     """With the effects, one member of each class."""
     after: np.ndarray
     """Of the vehicle that is delivered, derivatives included."""
+    on_path: np.ndarray | None = None
+    """Of values behind the path from command to thrust, where commands alone are recorded; None where speeds are."""
 
     def of_model(self, model: str) -> np.ndarray:
         """What a candidate (`Delivery.model`) leaves without derivatives, (n,)."""
-        return {"believed": self.before, "refitted": self.refitted, "named": self.named}[model]
+        refitted = self.refitted if self.on_path is None else self.on_path
+        return {"believed": self.before, "refitted": refitted, "named": self.named}[model]
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,7 @@ _EDGE = 0.002
 _LEAST_FOLDS = 3
 _LEAST_GAIN = 0.3
 """Share of what is asked that rotors make at least: less is what a controller leaves that cancels a disturbance."""
+_LEVELLED = ("force_x", "force_y")
 _DAMPED_BY = ("u", "v", "w", "p", "q", "r")
 """Of each channel the quantity that its own motion is: X_u, Y_v, Z_w, L_p, M_q and N_r are damping, or nothing."""
 
@@ -49,13 +50,18 @@ class Learnt:
 
 
 def learn(
-    x: np.ndarray, y: np.ndarray, fold: np.ndarray, controls: Mapping[str, tuple[str, float]] = MappingProxyType({})
+    x: np.ndarray,
+    y: np.ndarray,
+    fold: np.ndarray,
+    controls: Mapping[str, tuple[str, float]] = MappingProxyType({}),
+    one_run: bool = False,
 ) -> Learnt:
     """Derivatives by the quantities x (n, 12) of what is left of the channels, y (n, 6), N and N m.
 
     NaN is not recorded. `fold` (n,) numbers what is left out together; rows of -1 take no part. `controls` (as from
     `own_controls`) are used where they are exogenous. Intervals are the jackknife's over folds, by Student's t: what is
-    common to a run is the same in all of its rows.
+    common to a run is the same in all of its rows. With rows of `one_run` alone a constant force along x or y is the
+    levelling of that day as well: it is fitted and left out.
     """
     known = np.isfinite(x).mean(axis=0) > 0.5
     known[QUANTITIES.index(CONTROLS[0]) :] = False  # what a controller commands follows what disturbs it
@@ -84,12 +90,14 @@ def learn(
         if not np.isfinite(y[rows, c]).all():
             continue
         kept = np.array([q not in CONTROLS or q == asked.get(channel) for q in names])
-        beta, without, penalty = _ridge([(z[f], y[f, c]) for f in folds], kept)
+        parts = [(z[f], y[f, c]) for f in folds]
+        level = middle / np.maximum(scale, 1e-12) if one_run and channel in _LEVELLED else None
+        beta, without, penalty = _ridge(parts, kept, level)
         own = names.index(_DAMPED_BY[c]) if _DAMPED_BY[c] in names else 0
         if own and beta[own] > 0:
             # No air drives a motion on: a positive one is what a closed loop feigns, and flown it runs away.
             kept[own] = False
-            beta, without, penalty = _ridge([(z[f], y[f, c]) for f in folds], kept)
+            beta, without, penalty = _ridge(parts, kept, level)
         if penalty is None:
             continue
         for f, b in zip(folds, without, strict=True):
@@ -140,10 +148,12 @@ def _exogenous(state: np.ndarray, asked: np.ndarray, left: np.ndarray) -> bool:
     return first * last > 0 and abs(first) <= 2.0 * abs(last)
 
 
-def _ridge(parts: list[tuple[np.ndarray, np.ndarray]], kept: np.ndarray) -> tuple[np.ndarray, np.ndarray, float | None]:
+def _ridge(
+    parts: list[tuple[np.ndarray, np.ndarray]], kept: np.ndarray, level: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray, float | None]:
     """Coefficients (k,) of all folds' rows, those without each fold, (folds, k), and the penalty that leaves least
     there; no penalty where the channel is better without any. Columns that are not kept, (k,), have 0; the first is a
-    constant, which is not shrunk."""
+    constant, which is not shrunk, and which with a `level`, the columns at zero, is such that nothing is made there."""
     parts = [(x[:, kept], y) for x, y in parts]
     grams, rights = np.array([x.T @ x for x, _ in parts]), np.array([x.T @ y for x, y in parts])
     sizes = np.array([len(y) for _, y in parts])
@@ -153,7 +163,10 @@ def _ridge(parts: list[tuple[np.ndarray, np.ndarray]], kept: np.ndarray) -> tupl
         weight = np.ones(len(right))
         weight[0] = 0.0
         normal = gram + count * (_PENALTIES[:, None, None] * np.diag(weight) + 1e-9 * np.eye(len(right)))
-        return np.linalg.solve(normal, np.broadcast_to(right[:, None], (len(_PENALTIES), len(right), 1)))[:, :, 0]
+        found = np.linalg.solve(normal, np.broadcast_to(right[:, None], (len(_PENALTIES), len(right), 1)))[:, :, 0]
+        if level is not None:
+            found[:, 0] = found[:, 1:] @ level[kept][1:]
+        return found
 
     gram, right, size = grams.sum(axis=0), rights.sum(axis=0), int(sizes.sum())
     without = np.array([solved(gram - g, right - r, size - n) for g, r, n in zip(grams, rights, sizes, strict=True)])

@@ -157,7 +157,7 @@ def _learnt_of(offered: Offered, candidate: Candidate) -> Learnt:
     regression = offered.model.regression
     folds = np.concatenate(regression.of_rows(regression.folds()))
     acting = offered.in_rows(vehicle)
-    learnt = learn(x, acting * candidate.left, folds, own_controls(vehicle))
+    learnt = learn(x, acting * candidate.left, folds, own_controls(vehicle), one_run=not regression.leaves_runs)
     return replace(learnt, left_out=learnt.left_out / acting)
 
 

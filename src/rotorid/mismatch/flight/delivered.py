@@ -22,7 +22,7 @@ from rotorid.mismatch.decide.selected import WIDEST_TRUST, coefficients
 from rotorid.mismatch.decide.words import parameter_words
 from rotorid.mismatch.evidence.comparison import growth
 from rotorid.mismatch.evidence.regression import Fit, Regression
-from rotorid.mismatch.evidence.rows import PARAMETER_NAMES, Contributions, Rows, residual
+from rotorid.mismatch.evidence.rows import CHANNELS, PARAMETER_NAMES, Contributions, Rows, residual
 from rotorid.mismatch.evidence.speedpath import CommandChain
 from rotorid.mismatch.flight.prepare import Prepared
 from rotorid.mismatch.flight.wrench import caused
@@ -35,6 +35,9 @@ _WORSE_RATIO = 1.01
 _LEAST_Z = 2.0
 """Standard errors over blocks of a second by which squares must have changed, either way."""
 _WORTH_A_WORD = 0.002
+_GAINS = (0.5, 2.0)
+"""Factors of thrust and moments within which they are values: commands that follow gusts feign a vehicle that does not
+answer, of which half a second ahead seems well predicted."""
 
 
 class FittedModel(Protocol):
@@ -119,20 +122,46 @@ def residuals_of(model: FittedModel, fit: Fit) -> list[np.ndarray]:
     return [r.y - part for r, part in zip(model.rows, added, strict=True)]
 
 
-def believed_residuals(prepared: Prepared, rows: list[Rows], chain: CommandChain | None) -> list[np.ndarray]:
+def believed_residuals(
+    prepared: Prepared, rows: list[Rows], chain: CommandChain | None, times: float = 1.0
+) -> list[np.ndarray]:
     """What the believed vehicle leaves of every stretch of a flight, (n, 12); where a `chain` is known by commands
-    alone, rotors turn as commanded, as far as commands are no answers."""
+    alone, rotors turn `times` as fast as commanded, as far as commands are no answers."""
     if chain is None:
         return [r.y for r in rows]
     out = []
     for r, segment in zip(rows, prepared.segments, strict=True):
-        turning = replace(segment.motion, rotor_speed=caused(segment.command, segment.dt_s, chain))
+        turning = replace(segment.motion, rotor_speed=times * caused(segment.command, segment.dt_s, chain))
         left, groups = np.full_like(r.y, np.nan), residual(replace(segment, motion=turning), prepared.vehicle)
         for index, group in enumerate(("force", "moment")):
             if group in groups:
                 left[:, 3 * index : 3 * index + 3] = prepared.thinner(groups[group])
         out.append(left)
     return out
+
+
+def values_without_path(
+    prepared: Prepared, rows: list[Rows], chain: CommandChain, fitted: int
+) -> tuple[Values, list[np.ndarray]]:
+    """Values refitted where rotors turn as commanded, and what they leave of every stretch, (n, 12).
+
+    By least squares on the first `fitted` stretches: one factor of the thrust, and one of each moment, which goes into
+    the inertia about its axis; what is beyond GAINS stays as believed.
+    """
+    before = believed_residuals(prepared, rows, chain)
+    twice = believed_residuals(prepared, rows, chain, times=np.sqrt(2.0))  # thrust and moments go with the square
+    made = [a - b for a, b in zip(before, twice, strict=True)]
+    own, left = (np.concatenate(parts[:fitted])[:, 2:6] for parts in (made, before))
+    known = np.isfinite(own) & np.isfinite(left)
+    own, left = np.where(known, own, 0.0), np.where(known, left, 0.0)
+    gain = 1.0 + (own * left).sum(axis=0) / np.maximum((own**2).sum(axis=0), 1e-300)
+    gain = np.where((gain < _GAINS[0]) | (gain > _GAINS[1]), 1.0, gain)
+    lift, *moments = (float(g) for g in gain)
+    inertias = {f"inertia_{a}{a}": (lift / g - 1.0, 0.0) for a, g in zip("xyz", moments, strict=True)}
+    values = {"thrust": (lift - 1.0, 0.0), "torque": (lift - 1.0, 0.0), **inertias}
+    by_channel = np.ones(len(CHANNELS))
+    by_channel[:6] = [lift, lift, *gain]
+    return values, [a + (1.0 - by_channel) * m for a, m in zip(before, made, strict=True)]
 
 
 def beyond_trust(model: FittedModel, values: Values, active: Sequence[str]) -> bool:

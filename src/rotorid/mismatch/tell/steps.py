@@ -80,18 +80,11 @@ def steps_sentence(verdict: Verdict) -> str:
         for e in verdict.effects
         if e.delivered
     }
-    # Without measured rotor speeds the values are fitted with what lies between command and speed.
-    measured = any(name.startswith("rotor_speed") for name in verdict.channels)
-    between = [] if measured else [i for i in claimed if i in before_the_rotors()]
-    rest = [i for i in claimed if i not in between]
     values = min(whole.values, 1.0)  # values alone that do not help take nothing off
+    verb = "takes" if len(claimed) < 2 else "take"
     taken = [
-        (_named(["values", *map(claimed.get, between)]), 1.0 - values, "take"),
-        (
-            _named(map(claimed.get, rest)) or "named physics",
-            values - whole.named,
-            "takes" if len(rest) < 2 else "take",
-        ),
+        ("values", 1.0 - values, "take"),
+        (_named(claimed.values()) or "named physics", values - whole.named, verb),
     ]
     parts: list[str] = []
     for name, share, verb in taken:
@@ -100,7 +93,7 @@ def steps_sentence(verdict: Verdict) -> str:
             parts.append(f"{name} another {what}" if parts else f"{name} {verb} {what} off the {errors}")
     nameless = whole.named - whole.delivered
     if nameless >= worth_saying:
-        parts.append(f"{100 * nameless:.0f} % {'more ' if parts else ''}is predictable and has no name yet")
+        parts.append(f"{100 * nameless:.0f} % {'more ' if parts else ''}is predictable{_nameless(verdict, claimed)}")
     if not parts:
         parts.append(f"nothing that was found takes a part off the {errors}")
     left = (
@@ -110,6 +103,15 @@ def steps_sentence(verdict: Verdict) -> str:
     )
     where = "On flights not used for fitting" if held else "On the flight that was fitted"
     return f"{where}, {', '.join(parts)}; {left}."
+
+
+def _nameless(verdict: Verdict, claimed: Mapping[str, str]) -> str:
+    """What is said of the part that named physics does not take; `claimed`: ids of what is claimed, in words."""
+    measured = any(name.startswith("rotor_speed") for name in verdict.channels)
+    path = [words for i, words in claimed.items() if i in before_the_rotors()]
+    if path and not measured and verdict.delivered.model == "refitted":
+        return f": {_named(path)}, and what has no name yet"  # refitted values fly behind the path that was found
+    return " and has no name yet"
 
 
 def _named(words: Iterable[str]) -> str:
