@@ -21,7 +21,7 @@ from rotorid.mismatch.decide.findings import with_probabilities
 from rotorid.mismatch.evidence.regression import Regression, build
 from rotorid.mismatch.evidence.rows import Rows, Term
 from rotorid.mismatch.evidence.split import parts_of, split_runs
-from rotorid.mismatch.instrument.analyse import first_model, reading_findings, with_plainer_forms
+from rotorid.mismatch.instrument.analyse import decided_of_reading, first_model, with_plainer_forms
 from rotorid.mismatch.instrument.chain import ChainResult, moved
 from rotorid.mismatch.instrument.mistakes import find_mistakes
 from rotorid.mismatch.instrument.model import (
@@ -107,7 +107,7 @@ def known_instrument(recordings: RecordingSet, claimed: Collection[str] | None =
     holder = KnownInstrument(recordings, model, chain, (), ())
     questions, unanswerable = [], [(f.alternatives, f.sentence) for f in mistakes if f.status == "ambiguous"]
     chosen = chosen_already(model)
-    inside = with_probabilities(reading_findings(model), chosen.found, chosen.support)
+    inside = with_probabilities(decided_of_reading(model), chosen.found, chosen.support)
     for finding in (*inside, *(() if chain is None else chain.findings)):
         ids = tuple(finding.alternatives) if finding.status == "ambiguous" else ()
         if claimed is not None and finding.id not in claimed:

@@ -115,6 +115,13 @@ def _one_load(finding: Finding, setup: PreparedInstrument) -> Finding:
     )
 
 
+def decided_of_reading(model: ReadingModel) -> list[Finding]:
+    """Findings on the load and on its reading, with what one load or commands alone cannot distinguish."""
+    found = [_one_load(f, model.setup) for f in reading_findings(model)]
+    measured = all(x.measured for x in model.setup.loadings)
+    return found if measured else [throttle_or_thrust(f) for f in found]
+
+
 @step("searching what acts")
 def first_model(
     setup: PreparedInstrument, terms: list[Term]
@@ -170,8 +177,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     while needless := (_needless_values(model, values) | _curved_gains(model, values)) - refused:
         refused |= needless
         values = values_of(model.selection, refused)
-    found = [_one_load(f, setup) for f in reading_findings(model)]
-    findings += found if measured else [throttle_or_thrust(f) for f in found]
+    findings += decided_of_reading(model)
     coarse, why = quantisation(setup, model.noise)
     if coarse is not None:
         findings.append(coarse)
