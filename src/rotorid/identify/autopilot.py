@@ -38,8 +38,6 @@ _AT_A_BOUND = 0.01
 """Share of the range searched within which a value is at its end."""
 _HOVERS = {"px4": ("MPC_THR_HOVER", (0.1, 0.8)), "ardupilot": ("MOT_THST_HOVER", (0.125, 0.6875))}
 """By autopilot the parameter for the share of thrust that hovers, and what it may be."""
-_MOST_SHARE = 1.5
-"""Shares of thrust up to which Betaflight's curve is inverted: a signal above its range is no use."""
 _CURVE_POINTS = 3001
 _SPIN_MAX = 0.95
 """Default of ArduPilot's MOT_SPIN_MAX, at which its curve ends."""
@@ -111,7 +109,8 @@ def _ardupilot(signal: np.ndarray, voltage: np.ndarray | None, shape: np.ndarray
 
 def _betaflight(signal: np.ndarray, voltage: np.ndarray | None, shape: np.ndarray) -> np.ndarray:
     """T/T_max = x where u = x (1 + k (1 − x)²), k = thrust_linear/100; below k = 3 one x for each u."""
-    x = np.linspace(0.0, _MOST_SHARE, _CURVE_POINTS)
+    most_share = 1.5  # Shares of thrust up to which Betaflight's curve is inverted: a signal above its range is no use.
+    x = np.linspace(0.0, most_share, _CURVE_POINTS)
     return np.interp(signal, x * (1 + shape[0] * (1 - x) ** 2), x)
 
 

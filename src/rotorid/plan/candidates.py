@@ -33,8 +33,6 @@ _ROOM = 0.85
 _PIECE_S = 10.0
 _HEAVE_RAD_S = 3.0
 """Rate of the waves: thrust then changes by a good part while the speed over ground stays."""
-_LONGEST_S = 30.0
-"""A turn that the rotors' torque makes more slowly is no candidate."""
 
 
 @dataclass(frozen=True)
@@ -216,6 +214,7 @@ def _passes(limits: Limits) -> list[ManoeuvrePiece]:
 
 
 def _turns(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
+    longest_s = 30.0  # A turn that the rotors' torque makes more slowly is no candidate.
     room = min(limits.room_m[:2])
     amplitude, rate = _largest(limits, room, 0.8)
     # The ramp of a turn reaches its rate in RAMP_S, at most 1.9 times as fast in its midst.
@@ -259,7 +258,7 @@ def _turns(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
         ("drift", "to and fro over ground while the nose turns all round", drift, 0.6 * yaw_rate),
     ):
         duration = _whole(speed, 12.0, 2 * np.pi)
-        if duration <= _LONGEST_S:
+        if duration <= longest_s:
             pieces.append(ManoeuvrePiece(name, words, make, duration))
     return pieces
 

@@ -38,12 +38,8 @@ from rotorid.vehicle.mixer import allocation_matrix
 _DAMPING = 0.8
 _FASTER = 5.0
 """Bandwidth of rotors and filters over that of the attitude loop."""
-_SLOWER = 0.2
-"""Bandwidth of the position loop over that of the attitude loop, where its bandwidth is not stated."""
 _EDGE = 8
 """Samples by which a flight is longer on both sides while its derivatives are taken."""
-_ROUNDS = 6
-"""Times that rotor speeds and attitude are solved for with the effects at their last values."""
 OF_PROPELLER = ("unequal_rotors",)
 """Effects whose coefficients, one a rotor, go with the propeller. A tilt stays with the motor's mount."""
 OF_CENTRE = "com_offset"
@@ -147,12 +143,14 @@ def fly(
 
     Raises InputError: the rotors cannot do it: one would have to turn backwards.
     """
+    slower = 0.2  # Bandwidth of the position loop over that of the attitude loop, where its bandwidth is not stated.
+    rounds = 6  # Times that rotor speeds and attitude are solved for with the effects at their last values.
     vehicle, step = world.vehicle, float(reference.time_s[1] - reference.time_s[0])
     gravity, reference = np.array([0.0, 0.0, vehicle.gravity_m_s2]), _held_longer(reference, step)
     t = reference.time_s
     ground = vehicle.ground_z_m or 0.0
     start = np.array([place_m[0], place_m[1], ground - place_m[2]])
-    outer = _SLOWER * bandwidth_rad_s if position_rad_s is None else position_rad_s
+    outer = slower * bandwidth_rad_s if position_rad_s is None else position_rad_s
     rotors = low_pass(_FASTER * bandwidth_rad_s)
     level = followed(reference.position_m[:, :2], outer, np.polymul(low_pass(bandwidth_rad_s), rotors), step)
     # The height needs no tilt.
@@ -167,7 +165,7 @@ def fly(
     speed = np.full((len(t), vehicle.rotor_count), hover)
     inner = slice(_EDGE, -_EDGE)
     rotation = _attitude(-wanted, yaw)
-    for _ in range(_ROUNDS if (*world.effects, *world.derivatives) else 1):
+    for _ in range(rounds if (*world.effects, *world.derivatives) else 1):
         left = wanted - np.einsum("nij,nj->ni", rotation, force)
         rotation = _attitude(-left, yaw)
         rates = _body_rates(rotation, step)

@@ -439,8 +439,6 @@ _STRAIGHT = ("hover", "ladder", "pass", "climb", "face")
 """First words of the manoeuvres that are waypoints."""
 _STILL = 0.03
 """Share of the largest speed below which the vehicle turns round or waits."""
-_HELD_S = 0.5
-"""Shorter rests are turns, not waits."""
 TAKE_OFF, WAYPOINT, SPEED, RETURN = 22, 16, 178, 20
 _RELATIVE = 3
 """MAVLink frame: latitude, longitude, height above home."""
@@ -462,6 +460,7 @@ def _stops(reference: Reference) -> list[tuple[np.ndarray, float, float, float]]
     The place (north, east, down from the volume's middle), m, the yaw, rad, how long to stay, s, and how fast to get
     there, m/s.
     """
+    held_s = 0.5  # Shorter rests are turns, not waits.
     t = reference.time_s
     speed = np.linalg.norm(np.gradient(reference.position_m, t, axis=0), axis=1)
     turning = np.abs(np.gradient(reference.yaw_rad, t))
@@ -470,7 +469,7 @@ def _stops(reference: Reference) -> list[tuple[np.ndarray, float, float, float]]
     out, last = [], 0
     for start, stop in edges:
         middle, wait = (start + stop - 1) // 2, float(t[stop - 1] - t[start])
-        way, held = float(speed[last : start + 1].max()), wait if wait > _HELD_S else 0.0
+        way, held = float(speed[last : start + 1].max()), wait if wait > held_s else 0.0
         out.append((reference.position_m[middle], float(reference.yaw_rad[middle]), held, way))
         last = stop
     return out

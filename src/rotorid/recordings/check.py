@@ -55,10 +55,6 @@ _NOISY = (*c.SPECIFIC_FORCE, *c.ANGULAR_VELOCITY, *c.FORCE, *c.MOMENT)
 """Columns with white noise of their own; commands and loads may repeat truly, what a filter made is smooth."""
 _LEAST_EQUAL, _LEAST_NOISY = 2, 3
 """Columns that must agree: to the last digit, or in their noise."""
-_LEAST_ROWS, _LEAST_SHARE = 20, 0.05
-"""Equal samples, and their share of the shorter run, from which two runs overlap."""
-_BY_CHANCE = 3.0
-"""So many times as often as within one run: readings in coarse steps repeat by themselves."""
 _BLOCK, _BLOCKS, _JUMP = 256, 5, 4.0
 _SAME_NOISE = 0.95
 """Correlation of second differences that independent noise does not reach in a block."""
@@ -303,6 +299,9 @@ def copies(recordings: RecordingSet) -> tuple[Doubt, ...]:
 
 def _equal_samples(runs: tuple[Run, ...], names: list[str]) -> Iterator[tuple[str, str, float, float]]:
     """Pairs of runs with equal samples: names, share of the shorter run, and how much later in the second, s."""
+    # Equal samples, and their share of the shorter run, from which two runs overlap.
+    least_rows, least_share = 20, 0.05
+    by_chance = 3.0  # So many times as often as within one run: readings in coarse steps repeat by themselves.
     tables, repeated = [], []
     for number, run in enumerate(runs):
         values = run.table[names]
@@ -319,8 +318,8 @@ def _equal_samples(runs: tuple[Run, ...], names: list[str]) -> Iterator[tuple[st
     pairs = pairs[pairs["run"] != pairs["run_first"]]
     for (a, b), equal in pairs.groupby(["run_first", "run"]):
         share = len(equal) / min(sizes[a], sizes[b])
-        least = max(_LEAST_SHARE, _BY_CHANCE * max(repeated[a], repeated[b]))
-        if len(equal) >= _LEAST_ROWS and share >= least:
+        least = max(least_share, by_chance * max(repeated[a], repeated[b]))
+        if len(equal) >= least_rows and share >= least:
             yield runs[a].name, runs[b].name, share, float((equal["time_s"] - equal["time_s_first"]).median())
 
 

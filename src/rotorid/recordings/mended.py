@@ -47,8 +47,6 @@ _REPEATED = 0.1
 """Share of the spikes that one value must have to be named."""
 _MEASURED = {c.QUATERNION: 1e3, c.POSITION: 1e7, c.VELOCITY: 1e4}
 """Largest size of a reading that is one."""
-_REVERSED = 0.02
-"""Share of the largest value that a value of the other sign must exceed to be one: less is noise about zero."""
 _HOLE_PERIODS = 6.0
 """Where a sensor gives nothing for longer than so many of its own periods, the flight is cut in two."""
 _LONGEST_USUAL = 10.0
@@ -444,7 +442,7 @@ def _excess(run: Run, names: tuple[str, ...], time_s: np.ndarray, values: np.nda
     the steps no other sensor explains."""
     # An attitude jumps by at least so much; where no gyroscope says how far it turns, faster than any vehicle.
     least_jump_rad, fastest_rad_s = 0.25, 40.0
-    # The same of a position and a velocity.
+    # A position and a velocity jump by at least so much, and faster than any vehicle.
     least_jump_m, fastest_m_s, least_jump_m_s, fastest_m_s2 = 0.1, 60.0, 1.0, 200.0
     if names != c.QUATERNION:
         steps = np.diff(values, axis=0)
@@ -482,6 +480,8 @@ def by_sense(values: np.ndarray, sense: float | None = None) -> tuple[np.ndarray
     A sign is a turning sense where a rotor keeps it. A cell against the usual sign of its column, or against `sense`
     where it is given, is a rotor that pushes the other way, for which the contract has no column.
     """
+    # Share of the largest value that a value of the other sign must exceed to be one: less is noise about zero.
+    reversed_share = 0.02
     values = np.asarray(values, float)
     if sense in (None, 1.0) and not (values < 0).any():
         return values, np.zeros(values.shape, bool)
@@ -489,7 +489,7 @@ def by_sense(values: np.ndarray, sense: float | None = None) -> tuple[np.ndarray
     own = values * np.where(signs == 0, 1.0, signs)
     largest = np.nanmax(np.abs(own), axis=0, initial=0.0, where=np.isfinite(own))
     known = np.isfinite(own)
-    against = known & (own < -_REVERSED * largest)
+    against = known & (own < -reversed_share * largest)
     sizes = np.abs(own) if sense is None else np.clip(own, 0, None)
     return np.where(against, np.nan, np.where(known, sizes, values)), against
 

@@ -34,9 +34,6 @@ _HIGHEST_VOLTAGE_V = 120.0
 _FASTEST_USUAL_RAD_S = 20.0
 _SLOWEST_HZ = 30.0
 """Readings a second below which lines between them change what a verdict says of rotors."""
-_LEAST_JOINED, _MOSTLY, _ROUNDED, _SHARP = 200, 0.6, 2e-6, 30.0
-"""Samples, share of them on straight lines, and a bend, over the largest value, below which a line is straight as far
-as it was written, and how many times that bends are where lines meet."""
 _FOLLOWS = 0.8
 """Correlation of a rotor's speed with a command from which it follows that command."""
 _LEAST_TURNING_RAD_S = 0.05
@@ -465,19 +462,22 @@ def _held(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
 
 def _joined(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
     """Rotor speeds, rates and specific forces that were interpolated linearly between rarer readings."""
+    # Samples, share of them on straight lines, and a bend, over the largest value, below which a line is straight as
+    # far as it was written, and how many times that bends are where lines meet.
+    least_joined, mostly, rounded, sharp = 200, 0.6, 2e-6, 30.0
     for names in (c.rotor_columns("rotor_speed", vehicle.rotor_count), c.ANGULAR_VELOCITY, c.SPECIFIC_FORCE):
         values = run.array(names) if run.has(*names) else np.zeros((0, 1))
         values = values[np.isfinite(values).all(axis=1)]
-        if len(values) < _LEAST_JOINED:
+        if len(values) < least_joined:
             continue
         steps, kinks = np.abs(np.diff(values, axis=0)), np.abs(np.diff(values, 2, axis=0))
         apart = np.diff(np.unique(values))  # as far as readings were rounded
         rounding = float(apart[apart > 1e-9 * np.abs(values).max()].min(initial=np.inf))
-        least = np.full(values.shape[1], max(_ROUNDED * float(np.abs(values).max()), 2.1 * rounding))
+        least = np.full(values.shape[1], max(rounded * float(np.abs(values).max()), 2.1 * rounding))
         straight = (kinks <= least) & (steps[1:] > least)
         # Smooth signals are nearly straight as well, but nowhere is there a sharp bend.
         share, bends = straight.mean(), kinks / np.maximum(least, 1e-300)
-        if share > _MOSTLY and np.median(bends[~straight]) > _SHARP:
+        if share > mostly and np.median(bends[~straight]) > sharp:
             rate_hz = (1.0 - float(share)) * (len(values) - 1) / float(run.time_s[-1] - run.time_s[0])
             yield Doubt(
                 names[0],

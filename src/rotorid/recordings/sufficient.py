@@ -34,8 +34,6 @@ _PAUSE_S, _PAUSE_STEPS = 5.0, 20
 _MOST_NAMES = 12
 _LEAST_FLIGHT_HZ = 2.0
 """Slower flights show no motion of their own: between two samples a quadrotor has turned and come back."""
-_LEAST_READINGS = 10
-"""Readings of a stand or a bench that are there in every compared channel at once, in a run."""
 _LARGEST = {
     c.POSITION: 1e7,
     c.VELOCITY: 1e4,
@@ -393,6 +391,7 @@ def compared_readings(run: Run, vehicle: Vehicle) -> list[str]:
 
 def _too_short(run: Run, vehicle: Vehicle) -> str | None:
     """A run without a stretch that is long enough to be compared."""
+    least_readings = 10  # Readings of a stand or a bench that are there in every compared channel at once, in a run.
     # A stretch of flight without a hole must last LEAST_STRETCH_S, and so many samples of its slowest sensor. Of a
     # single run (LEAST_SINGLE_S) a third is held out, after a gap of two seconds; both parts need two seconds.
     least_stretch_samples = 30
@@ -407,11 +406,11 @@ def _too_short(run: Run, vehicle: Vehicle) -> str | None:
         )
     names = compared_readings(run, vehicle)
     count = int(np.isfinite(run.array(tuple(names))).all(axis=1).sum())
-    if count >= _LEAST_READINGS:
+    if count >= least_readings:
         return None
     return (
         f"{_whereof(run)}: too little data: {count} samples have a value in {listed(names)} at once, expected at least "
-        f"{_LEAST_READINGS}"
+        f"{least_readings}"
     )
 
 

@@ -25,8 +25,6 @@ from rotorid.mismatch.flight.fitted import Fitted
 from rotorid.mismatch.flight.prepare import assemble_rows
 from rotorid.mismatch.flight.report_runs import as_flown
 
-_CHAIN_ROUNDS = 4
-"""Times that the chain's columns are taken, at most."""
 _STEP_S, _STEP = 0.002, 0.01
 """Changes of a time and of another parameter from which its column is taken."""
 _OF_ROTORS = "offset:rotors"
@@ -245,8 +243,9 @@ def _option_of(
     same
         Keys of the chain's forms that did not change, by assumption.
     """
+    chain_rounds = 4  # Times that the chain's columns are taken, at most.
     now = start
-    for _ in range(_CHAIN_ROUNDS):
+    for _ in range(chain_rounds):
         option = _decided_at(now, products_at, spread, prior, same)
         chain = first.at(first.values + _change_of_chain(option.found, first))
         if np.all(np.abs(chain.values - now.values) < first.spread):

@@ -54,14 +54,10 @@ _OF_THE_AIR = ("thrust", "torque")
 """Values that the air's density changes."""
 _DERIVED = "rotor_acceleration"
 """What is a derivative of recorded speeds: how much of it is noise depends on the flight, and is not known."""
-_FEWEST_FLIGHTS = 3
-"""Two good flights give one difference alone, of which no variance is known."""
 NAMES = {**VALUE_NAMES, **PARAMETER_NAMES}
 """Key of every believed value, of a flight or an instrument, to the contract's name."""
 _LEAST_CHANGE, MOST_CHANGE = 0.015, 0.6
 """Relative change of a value up to which it does not matter, and the largest."""
-_LEAST_GAIN = 0.005
-"""The least one of a reading's gain."""
 _FREE = 10.0
 """Variance of what is common to both sets, in units of what one row determines. With 1 more unseen pairs got a wrong
 name; with 100 a change of mass in gentle flight is halved (docs/compare.md)."""
@@ -350,10 +346,11 @@ def _in_units(spread: np.ndarray, unit: np.ndarray) -> np.ndarray:
 
 def _as_change(term: EvidenceTerm) -> EvidenceTerm:
     """A believed value as something that may have changed, named as the contract names it; another term as it is."""
+    least_gain = 0.005  # The least one of a reading's gain.
     if term.kind != "value":
         return term
     name = NAMES[term.key]
-    least = _LEAST_GAIN if term.key.startswith("gain") else _LEAST_CHANGE
+    least = least_gain if term.key.startswith("gain") else _LEAST_CHANGE
     change = LinearParameter(name, "1", -MOST_CHANGE, MOST_CHANGE, least)
     return replace(term, kind="effect", effect=name, linear=(change,))
 
@@ -472,8 +469,9 @@ def spread_of_flights(flights: Sequence[Evidence], decide: Callable[[Evidence, E
 
     Of a class each member gets what makes it contribute as much. A variance of n flights is widened by (n + 1)/(n − 1).
     """
+    fewest_flights = 3  # Two good flights give one difference alone, of which no variance is known.
     number = len(flights)
-    if number < _FEWEST_FLIGHTS:
+    if number < fewest_flights:
         return 0.0
     squares = np.zeros(flights[0].gram.shape[-1])
     for k, flight in enumerate(flights):

@@ -50,8 +50,6 @@ _MOST_BLOCKS = 400
 _STEADY_BLOCKS = 40
 _FINER = 4
 """Steps of a chain that takes time to one sample."""
-_FAR = 0.05
-"""Share of a cost by which a fit is still above it after a few steps when it will not come down to it."""
 _ALIKE = rules.ELSEWHERE["squares"]
 """Whitened squares within which another form explains as well."""
 
@@ -350,8 +348,10 @@ class _ChainProblem:
 
     def fit_to(self, chain: Chain, start: np.ndarray, cost: float) -> _ChainFit:
         """As `fit`, but left where a cost is reached, or where it would not be at the pace of the last few steps."""
+        # Share of a cost by which a fit is still above it after a few steps when it will not come down to it.
+        far = 0.05
         fit = self.fit(chain, start, _QUICK_FIT)
-        if fit.cost > (1 + _FAR) * cost:
+        if fit.cost > (1 + far) * cost:
             return fit
         for more in reversed(range(_MOST_STEPS // _QUICK_FIT)):
             if fit.cost < cost:

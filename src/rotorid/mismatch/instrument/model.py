@@ -57,9 +57,6 @@ _ROWS_PER_COLUMN = 8
 _STRONGEST = 0.9
 """Quantile of the seconds' energies above which a contribution's size is taken: what shows only after a change of load
 is in few of them."""
-_ROUNDS = 4
-_SETTLED = 1e-3
-"""Relative change of nonlinear parameters from round to round below which they have settled."""
 MOST_OFFSET = 2.0
 """Samples by which reading and load may lie apart before it is a finding. The derivative of a reading that lags by τ is
 what it lacks, divided by τ: an offset in time without end would be that filter itself."""
@@ -402,8 +399,11 @@ def fitted_model(
     What is noise is learnt anew after the first refinement: whitened by a ring or a lag that no column had before it,
     the regression would be deaf at the very frequencies where the effect shows.
     """
+    rounds = 4
+    # Relative change of nonlinear parameters from round to round below which they have settled.
+    settled = 1e-3
     model = reading_model(setup, terms, active, loadings, refused=refused)
-    for number in range(_ROUNDS):
+    for number in range(rounds):
         before, start = model.selection.active, _nonlinear_values(model)
         if not len(start):
             break
@@ -411,7 +411,7 @@ def fitted_model(
         kept = (model.noise, model.regression.filters) if number else None
         model = reading_model(setup, terms, before, loadings, kept, refused)
         values = _nonlinear_values(model)
-        if set(model.selection.active) == set(before) and np.allclose(values, start, rtol=_SETTLED):
+        if set(model.selection.active) == set(before) and np.allclose(values, start, rtol=settled):
             break
     rivals = _rivals_refined(model)
     if not rivals:

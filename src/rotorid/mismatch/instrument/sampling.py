@@ -29,12 +29,6 @@ from rotorid.recordings import columns
 
 WIDTHS = (5, 9, 17, 33, 65, 129, 257)
 """Samples of the windows."""
-_LEVEL = 2.0
-"""Ratio of the power in the two halves beyond which there is signal up there, and nothing is done."""
-_SMALLER, _LARGER = 0.98, 1.01
-"""Smoothed speeds are the better ones where they lower the quick errors of some load to this share, and raise none."""
-_LOCAL_S = 1.0
-"""Time over which the size of the noise is read off: it may grow with the speed."""
 _LEAST_STEPS = 4
 _CALM_S, _LOOK_S = 0.8, 3.0
 """Time before and after a step without another, and time after it that is looked at."""
@@ -193,8 +187,10 @@ def quieter(as_read: list[Loading], smoothed: list[Loading]) -> list[Loading]:
 
     Compared by the squares of the steps from sample to sample, in which effects of the instrument are small.
     """
+    # Smoothed speeds are the better ones where they lower the quick errors of some load to this share, and raise none.
+    smaller, larger = 0.98, 1.01
     ratio = _steps(smoothed) / np.maximum(_steps(as_read), 1e-300)
-    better = len(ratio) > 0 and np.nanmin(ratio) < _SMALLER and np.nanmax(ratio) < _LARGER
+    better = len(ratio) > 0 and np.nanmin(ratio) < smaller and np.nanmax(ratio) < larger
     return smoothed if better else as_read
 
 
@@ -206,19 +202,21 @@ def _steps(loadings: list[Loading]) -> np.ndarray:
 
 def _noisy(speed: np.ndarray) -> bool:
     """Whether the upper end of the spectrum is white."""
+    level = 2.0  # Ratio of the power in the two halves beyond which there is signal up there, and nothing is done.
     band = (0.5, 0.75, 1.0)  # Shares of the highest frequency in which the noise must be white, in two halves.
     frequency, power = welch(speed, nperseg=WIDTHS[-1] - 1, detrend="linear")
     share = frequency / frequency[-1]
     lower, upper = (float(np.median(power[(share >= a) & (share < b)])) for a, b in zip(band, band[1:], strict=False))
-    return upper > 0 and 1 / _LEVEL < lower / upper < _LEVEL
+    return upper > 0 and 1 / level < lower / upper < level
 
 
 def _spread(speed: np.ndarray, rate_hz: float) -> np.ndarray:
     """Local one-sigma of white noise, (n,)."""
+    local_s = 1.0  # Time over which the size of the noise is read off: it may grow with the speed.
     quick = np.abs(speed - savgol_filter(speed, WIDTHS[0], 2))
     # Of white noise a parabola over five samples leaves 1 − 17/35 of the variance at its middle.
     spread = 1.4826 / np.sqrt(1.0 - savgol_coeffs(WIDTHS[0], 2)[WIDTHS[0] // 2])
-    return spread * median_filter(quick, int(_LOCAL_S * rate_hz) | 1, mode="nearest")
+    return spread * median_filter(quick, int(local_s * rate_hz) | 1, mode="nearest")
 
 
 def _smoothed(speed: np.ndarray, rate_hz: float) -> np.ndarray:

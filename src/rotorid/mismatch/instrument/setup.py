@@ -26,15 +26,9 @@ from rotorid.recordings.sufficient import driven_by
 
 _GAP_STEPS = 4.0
 """Where readings are missing for longer than this many median steps they are not compared."""
-_USUAL = 0.75
-"""Share of a column's steps that are no longer than its usual one."""
-_SLOWER = 1.5
-"""Readings whose usual step is so many of the rows' are taken at their own rate."""
 _SHORTEST = 4
 SHORT = 60
 """Stretches of fewer samples or rows are blocks: too short to learn the colour of their noise from."""
-_MOST_VALUES = 45_000
-"""Samples times channels that are analysed; longer sets are averaged over several samples first."""
 _LEAST_SHARE = 0.05
 """Share of the largest load from which a channel is loaded, or a sample is, and of the samples that come back."""
 _STEADY_HZ = 5.0
@@ -143,6 +137,7 @@ def _filled(run: Run, name: str) -> np.ndarray | None:
 def _is_known(run: Run, names: tuple[str, ...]) -> np.ndarray:
     """Mask of the rows, (n,), in which every column that is there has a value, or lies between two that are no more
     than some of its own steps apart: what is missing for longer is no straight line."""
+    usual = 0.75  # Share of a column's steps that are no longer than its usual one.
     time_s, good = run.time_s, np.ones(len(run.time_s), bool)
     for name in filter(run.has, names):
         known_s = time_s[np.isfinite(run.column(name))]
@@ -150,7 +145,7 @@ def _is_known(run: Run, names: tuple[str, ...]) -> np.ndarray:
             continue
         good &= (time_s >= known_s[0]) & (time_s <= known_s[-1])
         if len(known_s) > 1:
-            within = _within(time_s, known_s, _GAP_STEPS * float(np.quantile(np.diff(known_s), _USUAL)))
+            within = _within(time_s, known_s, _GAP_STEPS * float(np.quantile(np.diff(known_s), usual)))
             good &= True if within is None else within
     return good
 
@@ -158,11 +153,12 @@ def _is_known(run: Run, names: tuple[str, ...]) -> np.ndarray:
 def _reading_rows(runs: Sequence[Run], channels: tuple[int, ...]) -> dict[str, np.ndarray]:
     """By run the mask of its rows, (n,), that are looked at: those with a reading in every channel where readings come
     more slowly than rows, else all rows, of which some lack readings."""
+    slower = 1.5  # Readings whose usual step is so many of the rows' are taken at their own rate.
     names = tuple((c.FORCE + c.MOMENT)[k] for k in channels)
     read = {run.name: np.isfinite(run.array(names)).all(axis=1) for run in runs}
     steps_s = np.concatenate([np.zeros(0), *(np.diff(run.time_s[read[run.name]]) for run in runs)])
     rows_s = np.concatenate([np.zeros(0), *(np.diff(run.time_s) for run in runs)])
-    if len(steps_s) and np.median(steps_s) < _SLOWER * np.median(rows_s):
+    if len(steps_s) and np.median(steps_s) < slower * np.median(rows_s):
         return {name: np.ones(len(mask), bool) for name, mask in read.items()}
     return read
 
@@ -419,6 +415,8 @@ def set_up(recordings: RecordingSet, whole: RecordingSet | None = None) -> Prepa
         The set that they are of, if that has more: which channels every run has, when each was recorded, and which runs
         are held out. Nothing else of the other runs is used.
     """
+    # Samples times channels that are analysed; longer sets are averaged over several samples first.
+    most_values = 45_000
     vehicle, whole = recordings.vehicle, whole or recordings
     channels, session = compared_channels(whole), session_of(whole)
     rows = _reading_rows(recordings.runs, channels)
@@ -442,7 +440,7 @@ def set_up(recordings: RecordingSet, whole: RecordingSet | None = None) -> Prepa
             loadings = without_settling(loadings, instrument.loaded, instrument.largest, wait_s)
             instrument = replace(instrument, by_hand=True)
     total = sum(x.size for x in loadings) * len(channels)
-    average = max(1, int(np.ceil(total / _MOST_VALUES)))
+    average = max(1, int(np.ceil(total / most_values)))
     return PreparedInstrument(
         recordings=recordings,
         vehicle=vehicle,

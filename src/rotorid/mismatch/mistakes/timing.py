@@ -65,10 +65,6 @@ _LAG_STEP_S = 0.001
 _LATE_FLOOR_S = 2e-5
 _BAND_STEP, _LEAST_BAND = 1.5, 5.0
 """Ratio of the bands that are tried, and of the narrowest's ends (0.4 to 2 Hz)."""
-_LEAST_GAIN = 0.97
-"""Gain between two readings of one quantity, over that at the lowest frequencies, below which noise decides."""
-_SCALES = (0.85, 1.25)
-"""Gain at the lowest frequencies that may be a sensor's scale (a filter's velocity of a fast flight: 1.15)."""
 
 
 @dataclass(frozen=True)
@@ -205,6 +201,10 @@ def one_quantity(blocks: Blocks, own: Sequence[int]) -> Blocks | None:
     decides, and the lateness with it: a vibration seen through aliasing is in an autopilot's estimate of the velocity,
     too, with a phase of its own. `own` says which column of X is the same quantity as each output.
     """
+    # Gain between two readings of one quantity, over that at the lowest frequencies, below which noise decides.
+    least_gain = 0.97
+    # Gain at the lowest frequencies that may be a sensor's scale (a filter's velocity of a fast flight: 1.15).
+    scales = (0.85, 1.25)
     lowest, top = blocks.frequency_hz[0], blocks.frequency_hz[-1]
     tops = top / _BAND_STEP ** np.arange(1 + int(np.log(top / (_LEAST_BAND * lowest)) / np.log(_BAND_STEP)))
     bands = [b for b in (blocks.up_to(f) for f in tops) if b.frequency_hz.size > 1]
@@ -214,9 +214,9 @@ def one_quantity(blocks: Blocks, own: Sequence[int]) -> Blocks | None:
         if found is None:
             return blocks
         gains.append(float(np.mean(found.gain[range(len(own)), own])))
-    if not gains or not _SCALES[0] < gains[-1] < _SCALES[1]:
+    if not gains or not scales[0] < gains[-1] < scales[1]:
         return None
-    return next(b for b, gain in zip(bands, gains, strict=True) if gain > _LEAST_GAIN * gains[-1])
+    return next(b for b, gain in zip(bands, gains, strict=True) if gain > least_gain * gains[-1])
 
 
 def _shares_of(

@@ -28,8 +28,6 @@ _LEAST_MEDIAN = 3.0
 """Power at the order over that next to it in half of the windows, at least."""
 _SCALES = np.arange(0.85, 1.151, 0.015)
 """Factors on a commanded speed that are tried: the window distinguishes speeds of 18 rad/s."""
-_MOST_WINDOWS = 30
-"""Windows of a run that the factor is found from."""
 
 
 @dataclass(frozen=True)
@@ -132,9 +130,10 @@ def _as_commanded(s: Signals, full_rad_s: float | None) -> np.ndarray | None:
 
 def _strongest_line(signals: list[Signals]) -> float:
     """Power at the order over that next to it, in half of the windows, of the accelerometer's clearest line."""
+    most_windows = 30  # Windows of a run that the factor is found from.
     best = 0.0
     for order in _ORDERS:
-        seen = [(s, _turns(s, order, _MOST_WINDOWS)) for s in signals if "accelerometer" in s.values]
+        seen = [(s, _turns(s, order, most_windows)) for s in signals if "accelerometer" in s.values]
         for axis in range(3):
             powers = [_powers(s.values["accelerometer"][:, axis], own) for s, own in seen if own is not None]
             found = np.concatenate([(line / beside).ravel() for line, beside, _ in powers] or [np.zeros(0)])

@@ -37,8 +37,6 @@ from rotorid.mismatch.mistakes.signals import channel_of
 from rotorid.mismatch.tell.verdict import Location, Regime
 from rotorid.recordings.signal.kernels import causal
 
-_LOCAL_S = 0.1
-"""Length over which the local size of an explained mismatch is taken."""
 _ON_SHARE_OF_PEAK = 0.2
 _ON_SHARE_OF_NOISE = 0.15
 _LOST_AT_ENDS_S = 1.0
@@ -263,7 +261,8 @@ def _tested(traces: Sequence[ChannelTrace], masks: Sequence[np.ndarray], count: 
 
 def _local_size(values: np.ndarray, period_s: float) -> np.ndarray:
     """Local root mean square, (n,)."""
-    return np.sqrt(_moving_mean(np.nan_to_num(values) ** 2, _LOCAL_S / period_s))
+    local_s = 0.1  # Length over which the local size of an explained mismatch is taken.
+    return np.sqrt(_moving_mean(np.nan_to_num(values) ** 2, local_s / period_s))
 
 
 def _moving_mean(values: np.ndarray, width: float) -> np.ndarray:

@@ -49,10 +49,6 @@ _OTHER_NAMES = {"gyroADC": ("gyroData", "gyroUnfilt"), "accSmooth": ("accADC",),
 """To a field its names in other releases, and what holds the same before a filter."""
 _FEWER_MOTORS = {1: "a fixed wing", 2: "a bicopter or a fixed wing", 3: "a tricopter, whose tail rotor a servo tilts"}
 """What Betaflight's mixers make of fewer motors than four."""
-_FEATURE_3D = 1 << 12
-_DSHOT = (48.0, 2047.0)
-_DSHOT_FORWARD = 1048.0
-"""With 3D, DShot's commands below this turn a motor backwards, from 48 on the faster the larger."""
 
 
 def _read(path: Path) -> Imported:
@@ -229,6 +225,10 @@ def throttles(motors: np.ndarray, headers: Mapping[str, str]) -> tuple[np.ndarra
 
     With 3D a motor also turns backwards; the contract has no fraction for that, so these are NaN.
     """
+    feature_3d = 1 << 12
+    dshot = (48.0, 2047.0)
+    # With 3D, DShot's commands below this turn a motor backwards, from 48 on the faster the larger.
+    dshot_forward = 1048.0
     # Betaflight's own dead band of 3D where motors have pulses in µs; the header does not hold what was set.
     deadband_3d = (1406.0, 1514.0)
     slowest_pulse_us = 900.0  # Commands of motors that turn below this are none of pulses in µs.
@@ -238,13 +238,13 @@ def throttles(motors: np.ndarray, headers: Mapping[str, str]) -> tuple[np.ndarra
         low, high = _number(headers, "minthrottle", 1000.0), _number(headers, "maxthrottle", 2000.0)
         turning = motors[motors > 0]
         if len(turning) and np.quantile(turning, 0.01) < slowest_pulse_us:
-            low, high = _DSHOT
+            low, high = dshot
         found = "the header does not state motorOutput"
         faults.append(ImportFault("unit", "throttle", found, f"no and full throttle taken as {low:g} and {high:g}", 0))
     backwards = np.zeros(motors.shape, bool)
-    if int(_number(headers, "features", 0)) & _FEATURE_3D:
+    if int(_number(headers, "features", 0)) & feature_3d:
         if low < slowest_pulse_us:
-            backwards, low = (motors > 0) & (motors < _DSHOT_FORWARD), _DSHOT_FORWARD + low - _DSHOT[0]
+            backwards, low = (motors > 0) & (motors < dshot_forward), dshot_forward + low - dshot[0]
         else:
             backwards, low = motors < deadband_3d[0], deadband_3d[1]
             found = "pulses in µs with 3D, whose dead band the header does not state"

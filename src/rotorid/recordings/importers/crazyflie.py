@@ -73,7 +73,6 @@ TYPES = {"e": "<f2", "f": "<f4", "d": "<f8", "b": "i1", "B": "u1", "h": "<i2", "
 TYPES |= {"q": "<i8", "Q": "<u8"}
 _STANDARD_GRAVITY_M_S2 = 9.81
 """The firmware's g: accelerometer logs are in multiples of this."""
-_FULL_SCALE = 65536.0
 _ROTORS = range(1, 5)
 _SPEEDS = list(c.rotor_columns("rotor_speed", 4))
 THROTTLES = list(c.rotor_columns("throttle", 4))
@@ -174,6 +173,7 @@ def attitude_without_pitch(
 
 def convert(log: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
     """Contract columns of the table `fixedFrequency` of a uSD log, the whole log with its own clock."""
+    full_scale = 65536.0
     columns: dict[str, np.ndarray] = {c.TIME: log["time_s"].to_numpy(float)}
     faults: list[ImportFault] = []
 
@@ -201,9 +201,9 @@ def convert(log: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
     request = [f"motor.m{i}" for i in _ROTORS]
     drive = output if set(output) <= set(log.columns) else request
     if set(drive) <= set(log.columns):
-        put(THROTTLES, log[drive].to_numpy(float) / _FULL_SCALE)
+        put(THROTTLES, log[drive].to_numpy(float) / full_scale)
         if drive is output and set(request) <= set(log.columns):
-            put([f"thrust_request_{i}" for i in _ROTORS], log[request].to_numpy(float) / _FULL_SCALE)
+            put([f"thrust_request_{i}" for i in _ROTORS], log[request].to_numpy(float) / full_scale)
     speeds = [f"rpm.m{i}" for i in _ROTORS]
     if set(speeds) <= set(log.columns):
         put(_SPEEDS, log[speeds].to_numpy(float) * RPM)

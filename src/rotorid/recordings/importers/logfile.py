@@ -72,8 +72,6 @@ _USUAL_COEFFICIENT = 1.7e-5
 its third. The templates (Crazyflie to x500) have 1.4e-5 to 2.1e-5."""
 _IMPOSSIBLE = 3.5
 """Speeds of hover so many times off, or more, are not in the unit that is stated."""
-_POSSIBLE = 2.2
-"""Speeds of hover within this factor are."""
 _GROUP = "rotorid.importers"
 
 
@@ -265,6 +263,7 @@ def carrying_unit(
 
     The stated one where its speeds are possible, or no other's are.
     """
+    possible = 2.2  # Speeds of hover within this factor are.
     flown = thrust_coefficient(tables, mass_kg, rotors, kind=kind)
     if flown is None:
         return stated, np.nan
@@ -274,7 +273,7 @@ def carrying_unit(
         return stated, off
     others = {u: abs(np.log(off * f / UNITS["rotor"][stated])) for u, f in UNITS["rotor"].items() if u != stated}
     best = min(others, key=others.get)
-    return (best, off) if others[best] < np.log(_POSSIBLE) else (stated, off)
+    return (best, off) if others[best] < np.log(possible) else (stated, off)
 
 
 @dataclass(frozen=True)

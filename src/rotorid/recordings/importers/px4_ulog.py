@@ -80,8 +80,6 @@ _ENDS = {
     "HIL_ACT": (0.0, 1.0),
 }
 """To the drivers of outputs, as their parameters are called, no and full throttle where no parameter states them."""
-_DSHOT = (1.0, 1999.0)
-"""The same of DShot (0 is disarmed), which PX4 logs less its 48 commands."""
 JUMPED = "PX4's estimator jumped in position, velocity or attitude"
 RESETS = (
     ("vehicle_local_position", "xy_reset_counter", ("delta_xy[0]", "delta_xy[1]"), 0.02),
@@ -387,12 +385,13 @@ def _outputs_of_motors(parameters: Values, rotors: int) -> tuple[str | int, list
 def _ends_of(parameters: Values, port: str, outputs: Sequence[int]) -> tuple[np.ndarray, np.ndarray, str]:
     """Outputs of no and full throttle by motor, and in words what a parameter says that they are, empty where none
     does."""
+    dshot = (1.0, 1999.0)  # No and full throttle of DShot (0 is disarmed), which PX4 logs less its 48 commands.
     dshot_timers = (-5, -4, -3, -2)  # Values of PWM_*_TIMn that are DShot of some speed; larger ones are pulses.
     timers = [int(v) for k, v in parameters.items() if re.fullmatch(rf"{port}_TIM\d+", k)]
     timer = next((t for t in timers if t in dshot_timers), None) if set(timers) <= set(dshot_timers) else None
     if port.startswith("PWM") and (parameters.get("DSHOT_CONFIG", 0) > 0 or timer is not None):
         name = f"{port}_TIMn {timer}" if timer is not None else f"DSHOT_CONFIG {parameters['DSHOT_CONFIG']:g}"
-        low, high = (np.full(len(outputs), end) for end in _DSHOT)
+        low, high = (np.full(len(outputs), end) for end in dshot)
         return low, high, f"DShot by {name}"
     ends, stated = [], True
     for word, default in zip(("MIN", "MAX"), _ENDS[port], strict=True):

@@ -505,19 +505,16 @@ _QUANTITY_WORDS = {
 }
 
 
-_FARTHEST = 100.0
-"""Error over noise at which the bar of the table of errors ends."""
-
-
 def _bars(channel: Channel) -> Markup:
     """Errors as believed (open) and improved (full) next to the noise (line), on a logarithmic scale."""
+    farthest = 100.0  # Error over noise at which the bar of the table of errors ends.
     errors, _ = errors_of(channel)
     if not channel.noise_floor or errors.before is None or errors.after is None:
         return Markup("")
 
     def at(value: float) -> float:
-        ratio = min(max(value / channel.noise_floor, 0.5), _FARTHEST)
-        return 6 + 100 * math.log(ratio / 0.5) / math.log(_FARTHEST / 0.5)
+        ratio = min(max(value / channel.noise_floor, 0.5), farthest)
+        return 6 + 100 * math.log(ratio / 0.5) / math.log(farthest / 0.5)
 
     return Markup(
         '<svg viewBox="0 0 112 14" role="img" aria-label="{}">'

@@ -28,8 +28,6 @@ from rotorid.vehicle.exports.derivatives import left_of_one_damping, own_damping
 from rotorid.vehicle.exports.forms import KNOWS, Exported, Parts, allocated, named_in_one_line, parts_of, sdf
 from rotorid.vehicle.mixer import hover_speed_rad_s
 
-_NUMBER = 22000
-"""SYS_AUTOSTART: PX4 leaves 22000 to 22999 to airframes of one's own."""
 _CORNERS = ((1, 1), (-1, -1), (1, -1), (-1, 1))
 """Signs of the places (x forward, y right) in that order."""
 _SENSES = (1, 1, -1, -1)
@@ -183,13 +181,14 @@ def sih_inertia(values: dict[str, float]) -> np.ndarray:
 
 def gazebo_airframe(vehicle: Vehicle) -> Exported:
     """The model with sensors, `model.config`, and the airframe script, the last two as companions."""
+    autostart = 22000  # SYS_AUTOSTART: PX4 leaves 22000 to 22999 to airframes of one's own.
     vehicle = named_in_one_line(vehicle)
     model = sdf(vehicle)
     # A name that a shell and Gazebo take.
     name = re.sub(r"[^a-z0-9]+", "_", vehicle.name.lower()).strip("_") or "vehicle"
     text = model.text.replace("    </link>\n", f"{_sensors(vehicle)}    </link>\n", 1)
     text = re.sub(r"<model name=(\"[^\"]*\"|'[^']*')>", f'<model name="{name}">', text, count=1)
-    companions = {"model.config": _description(vehicle, name), f"{_NUMBER}_gz_{name}": _airframe(vehicle, name)}
+    companions = {"model.config": _description(vehicle, name), f"{autostart}_gz_{name}": _airframe(vehicle, name)}
     said = f"places of the files: model.sdf and model.config in a folder {name} on GZ_SIM_RESOURCE_PATH"
     return replace(model, text=text, left_out=(*model.left_out, said), companions=companions)
 

@@ -36,8 +36,6 @@ _BETAFLIGHTS = ("DShot", "pulses in µs")
 _UNNAMED = "no name says it"
 _OTHER_THINGS = frozenset("current amps temp temperature voltage volt volts power thrust torque force".split())
 """Words of what a motor has besides a speed and a throttle."""
-_HOVERS = (0.12, 0.92)
-"""Shares of full throttle at which multirotors spend most of a flight."""
 
 
 def guess_rotors(draft: Draft, quantity: str) -> None:
@@ -154,6 +152,7 @@ def _possible_ranges(values: np.ndarray, family: Family, betaflight: bool) -> li
 
     Where several do, one whose end the throttles reach exactly.
     """
+    hovers = (0.12, 0.92)  # Shares of full throttle at which multirotors spend most of a flight.
     lowest_pulse_us = 880.0  # Pulses of motors that are disarmed go down to 900 µs.
     # Above this in hover and never below 1000, DShot would be a motor that never gets less than half of its power.
     pulses_of_hover_us = 1300.0
@@ -176,7 +175,7 @@ def _possible_ranges(values: np.ndarray, family: Family, betaflight: bool) -> li
         if below <= low and high <= full + 0.02 * (full - bottom):
             held.append(kind)
     if named_so is None and not betaflight:
-        fits = [k for k in held if _HOVERS[0] <= (middle - _RANGES[k][0]) / np.ptp(_RANGES[k]) <= _HOVERS[1]]
+        fits = [k for k in held if hovers[0] <= (middle - _RANGES[k][0]) / np.ptp(_RANGES[k]) <= hovers[1]]
         held = fits or [k for k in held if k in ("a share", "-1 to 1")][:1] or held
         if low >= _RANGES["pulses in µs"][0] and middle > pulses_of_hover_us:
             held = [k for k in held if k != "DShot"]
