@@ -97,6 +97,7 @@ EFFECT = Effect(
     name="an offset of the centre of mass",
     sentence="a roll or pitch moment proportional to thrust",
     forms=forms,
+    turns_like="unequal_rotors",
     shows_in=("share", "trim"),
     source="rigid-body mechanics; Titterton and Weston, ch. 4 (lever arm); catalogue F15",
     sign=(

@@ -337,6 +337,8 @@ class Effect:
     """Believed values (keys of vehicle.yaml) that it would change by itself."""
     like_on_heavier: tuple[str, ...] = ()
     """Ids that on a vehicle heavier than believed may be this one; those after the first only with the first."""
+    turns_like: str = ""
+    """Id of another that rolls and pitches a hovering vehicle as it does."""
     same_on_commands: str = ""
     """Id from which it cannot be distinguished where rotor speeds are known from their commands alone."""
     contradiction: bool = False

@@ -118,6 +118,7 @@ EFFECT = Effect(
     sentence="one or more rotors give more or less thrust than the others",
     forms=forms,
     reading_forms=reading_forms,
+    turns_like="com_offset",
     shows_in=("share", "trim", "yaw_trim"),
     source="rotor coefficients per rotor, no further assumption; catalogue F17",
     sign="positive d_i: rotor i gives more than the coefficient believed",

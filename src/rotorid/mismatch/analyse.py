@@ -42,7 +42,7 @@ from rotorid.mismatch.deliver.flown import model_of, squares_of_windows
 from rotorid.mismatch.deliver.usable import as_a_body, chain_ids, question_of, with_only
 from rotorid.mismatch.evidence.motion import Segment, full_speed, regime_variables, stretches
 from rotorid.mismatch.evidence.regression import Fit
-from rotorid.mismatch.evidence.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE
+from rotorid.mismatch.evidence.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE, Term
 from rotorid.mismatch.evidence.speedpath import CommandChain, SpeedResult
 from rotorid.mismatch.evidence.split import parts_of, split_runs
 from rotorid.mismatch.flight.absent import absent, absorbed_findings, chosen_already
@@ -169,7 +169,8 @@ def decided(
     findings += absorbed_findings(model, values, findings)
     findings, to_state = with_square_term(findings, values, model)
     chosen = chosen_already(model)
-    return tuple(with_probabilities(together(findings), chosen.found, chosen.support)), to_state, chosen.found
+    findings = with_probabilities(together(findings), chosen.found, chosen.support)
+    return tuple(rotors_or_offset(findings, model, fit)), to_state, chosen.found
 
 
 @dataclass(frozen=True)
@@ -540,6 +541,36 @@ def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
     if not rules.PAYLOAD_OR_OFFSET(offset is not None and heavier):
         return findings
     return [f.or_else([load.id]) if f is offset or (f.id in others and f in stated) else f for f in findings]
+
+
+def rotors_or_offset(findings: Sequence[Finding], model: WrenchModel, fit: Fit) -> list[Finding]:
+    """Findings in which effects that roll and pitch the vehicle alike in these runs are one class.
+
+    In a hover one rotor's thrust is a moment about the centre of mass, and so is an offset of that centre. `fit` is of
+    the terms at work.
+    """
+    terms, out = model.search.terms, list(findings)
+    for place, f in enumerate(findings):
+        other = catalogue()[f.id].turns_like
+        own = [k for k in model.selection.active if terms[k].effect == f.id]
+        # In space an offset has a further parameter, which is another axis'.
+        others = [t for t in terms.values() if t.effect == other and t.kind == "effect"]
+        if f.status not in CLAIMED or not other or other in f.alternatives or not own or not others:
+            continue
+        cols = model.regression.columns(own)
+        made = np.concatenate(model.contributions.of(cols, fit.beta[fit.places(cols)]))[:, 3:5].ravel()
+        share = max(_share_made(model, t, made) for t in others)
+        if rules.ROTORS_OR_OFFSET(share >= rules.ROTORS_OR_OFFSET["share"]):
+            out[place] = f.or_else([other])
+    return out
+
+
+def _share_made(model: WrenchModel, term: Term, moment: np.ndarray) -> float:
+    """Share of the squares of a rolling and pitching moment (2 n,), N m, that a term's columns can make."""
+    cols = model.regression.columns([term.key])
+    columns = np.concatenate([r.x[:, 3:5, cols].reshape(-1, len(cols)) for r in model.rows])
+    left = moment - columns @ np.linalg.lstsq(columns, moment, rcond=None)[0]
+    return 1.0 - float(left @ left) / max(float(moment @ moment), 1e-300)
 
 
 def _make_traces(

@@ -149,6 +149,11 @@ SUPPORT = rule(
     share=(0.8, "of the draws' posterior: no true name of 26 drawn flights had less"),
 )
 PAYLOAD_OR_OFFSET = rule("payload_or_offset", "An offset of the centre of mass on a heavier vehicle may be a payload.")
+ROTORS_OR_OFFSET = rule(
+    "rotors_or_offset",
+    "Rotors that differ and an offset of the centre of mass are a class where they roll and pitch a vehicle alike.",
+    share=(0.8, "of the squares of one's moment that the other must make: odds did not separate them on real flights"),
+)
 THROTTLE_OR_THRUST = rule("throttle_or_thrust", "Without measured rotor speeds a thrust curve may be a throttle curve.")
 
 # Believed values

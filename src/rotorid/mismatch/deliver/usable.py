@@ -17,16 +17,14 @@ from rotorid.effects.catalogue import moving_air
 from rotorid.errors import InputError
 from rotorid.mismatch.decide.select import Selection
 from rotorid.mismatch.evidence.motion import Segment
-from rotorid.mismatch.evidence.regression import build
-from rotorid.mismatch.evidence.rows import Contributions, compared_alone
-from rotorid.mismatch.evidence.split import training_rule
+from rotorid.mismatch.evidence.rows import Contributions
 from rotorid.mismatch.evidence.unknowns import UNKNOWNS
 from rotorid.mismatch.flight.delivered import Values
 from rotorid.mismatch.flight.fitted import Fitted
 from rotorid.mismatch.flight.prepare import assemble_rows
 from rotorid.mismatch.flight.report_runs import chain_without, without_wind
 from rotorid.mismatch.flight.values import changed_vehicle
-from rotorid.mismatch.flight.wrench import WrenchModel, block_seconds, path_segments
+from rotorid.mismatch.flight.wrench import WrenchModel, path_segments, whitened
 from rotorid.recordings import Run, Vehicle
 from rotorid.recordings import columns as c
 from rotorid.recordings.body import body_of, unfit
@@ -286,10 +284,7 @@ def _rebuilt(
     terms = [t for t in old.terms if t.kind not in kinds or t.key in active]
     rows = assemble_rows(prepared, terms, list(segments), model.effects)
     again = assemble_rows(prepared, terms, list(noisy), model.effects) if noisy else None
-    rate = prepared.thinner.rate_hz
-    rule = training_rule(prepared.split, list(segments))
-    block_s, alone = block_seconds(rows, rate), compared_alone(terms, rows)
-    regression = build(rows, terms, old.filters, rule, block_s, rate, again, *alone)
+    regression = whitened(prepared, rows, terms, old.filters, list(segments), again, apart=True)
     return replace(
         model,
         terms=terms,
@@ -297,7 +292,7 @@ def _rebuilt(
         regression=regression,
         segments=list(segments),
         noisy_segments=list(noisy),
-        contributions=Contributions(rows, again, rate),
+        contributions=Contributions(rows, again, prepared.thinner.rate_hz),
         selection=Selection(list(active), model.selection.fit),
     )
 

@@ -65,10 +65,11 @@ _WIDEST_VOLTAGE = 0.8
 """The same of the voltage's exponent, absolute."""
 _SQUARE, _SLIGHT = 2.0, 0.04
 """Elasticity of a speed proportional to the command, and a difference from it that nobody notices."""
-_LATEST_S = 0.15
-"""Lateness beyond which no controller holds a vehicle level: it is another's, of a logger or a disturbance."""
 _WIDEST_LAG = 0.6
 """The same of a lateness."""
+_LATEST = 2.0
+"""The largest lateness in units of √(arm/g), in which a vehicle without power tips over: no controller holds one level
+whose rotors are later, and what is so late is a logger or a disturbance."""
 LIFT_SILENT = (
     "what moves the commands of this recording is mostly what the controller answers: fly brisk climbs and descents"
 )
@@ -425,7 +426,9 @@ def read_path(segments: Sequence[Segment], vehicle: Vehicle, command_rate_hz: fl
             voltage = fit.values[1], sd[1]
     reasons |= {key: LIFT_SILENT for key, own in ((CURVE, elasticity), (SUPPLY, voltage)) if own is None}
     lag = _together(list(late.values())) if late else None
-    if lag is None or lag[0] > _LATEST_S or 1.96 * lag[1] > _WIDEST_LAG * lag[0] + 0.5 / command_rate_hz:
+    arm_m = float(np.linalg.norm(vehicle.rotor_positions_m()[:, :2], axis=1).max())
+    latest_s = _LATEST * np.sqrt(arm_m / vehicle.gravity_m_s2) if arm_m > 0 else np.inf
+    if lag is None or lag[0] > latest_s or 1.96 * lag[1] > _WIDEST_LAG * lag[0] + 0.5 / command_rate_hz:
         lag, words = None, LAG_SILENT if top_hz >= LIFT_TOP_HZ else _slow_commands(command_rate_hz)
         reasons |= dict.fromkeys((LAG, DELAY), words)
     return LiftPath(

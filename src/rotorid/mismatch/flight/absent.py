@@ -19,12 +19,11 @@ from rotorid.mismatch.decide.posterior import Found
 from rotorid.mismatch.decide.statements import UpperLimit, limits_of
 from rotorid.mismatch.decide.support import Chosen, chosen_at
 from rotorid.mismatch.evidence.gram import Evidence, evidence_from
-from rotorid.mismatch.evidence.regression import Regression, build
-from rotorid.mismatch.evidence.rows import Rows, Term, compared_alone
-from rotorid.mismatch.evidence.split import training_rule
+from rotorid.mismatch.evidence.regression import Regression
+from rotorid.mismatch.evidence.rows import Rows, Term
 from rotorid.mismatch.evidence.unknowns import UNKNOWNS
 from rotorid.mismatch.flight.delivered import FittedModel, Values
-from rotorid.mismatch.flight.wrench import WrenchModel, block_seconds
+from rotorid.mismatch.flight.wrench import WrenchModel, whitened
 from rotorid.recordings import Vehicle
 
 _ABSORBED_P = 1e-6
@@ -54,18 +53,11 @@ def evidence_of(model: WrenchModel) -> Evidence:
 
 def _by_channel(model: WrenchModel) -> Regression:
     """The regression of a flight with its products channel by channel."""
-    rate_hz = model.prepared.thinner.rate_hz
-    return build(
-        model.rows,
-        model.terms,
-        model.regression.filters,
-        training_rule(model.prepared.split, model.segments),
-        block_seconds(model.rows, rate_hz),
-        rate_hz,
-        model.contributions.noisy,
-        *compared_alone(model.terms, model.rows),
-        by_channel=True,
-    ).without_winds()
+    filters, noisy = model.regression.filters, model.contributions.noisy
+    every = whitened(
+        model.prepared, model.rows, model.terms, filters, model.segments, noisy, apart=True, by_channel=True
+    )
+    return every.without_winds()
 
 
 def squares_of(model: WrenchModel, terms: Sequence[Term]) -> dict[str, np.ndarray]:

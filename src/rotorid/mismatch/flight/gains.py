@@ -24,12 +24,11 @@ from rotorid.mismatch.decide.problem import GAINS, LogGain, Prior, called_wrong,
 from rotorid.mismatch.decide.select import Selection
 from rotorid.mismatch.decide.selected import SMALLEST_CHANGE, SMALLEST_SIZE, coefficients, wrong_values
 from rotorid.mismatch.decide.statements import SURE
-from rotorid.mismatch.evidence.regression import DOUBT_OF_CORRECTION, Regression, build, ridge_inverse
-from rotorid.mismatch.evidence.rows import compared_alone, winds_last
-from rotorid.mismatch.evidence.split import training_rule
+from rotorid.mismatch.evidence.regression import DOUBT_OF_CORRECTION, Regression, ridge_inverse
+from rotorid.mismatch.evidence.rows import winds_last
 from rotorid.mismatch.flight.delivered import Values
 from rotorid.mismatch.flight.prepare import assemble_rows
-from rotorid.mismatch.flight.wrench import WrenchModel, after_residual, block_seconds, chosen, model_filters
+from rotorid.mismatch.flight.wrench import WrenchModel, after_residual, chosen, model_filters, whitened
 from rotorid.recordings.signal.kernels import low_pass
 
 _VALUE_BAND = (0.2, 0.6)
@@ -245,7 +244,7 @@ def _regression_of_gains(
 
     With `measured_moment` the measured moments are the regressors in place of the predicted ones.
     """
-    prepared, rate_hz = model.prepared, model.prepared.thinner.rate_hz
+    prepared = model.prepared
     active = [model.search.terms[k] for k in model.selection.active]
     terms = winds_last([*(t for t in model.terms if t.kind != "effect"), *active])
     if measured_moment:
@@ -254,17 +253,7 @@ def _regression_of_gains(
         own = model.regression.columns([t.key for t in terms])
         made = model.contributions
         rows, noisy = ([replace(r, x=r.x[:, :, own]) for r in part] for part in (made.rows, made.noisy or []))
-    regression = build(
-        rows,
-        terms,
-        filters,
-        training_rule(prepared.split, model.segments),
-        block_seconds(rows, rate_hz),
-        rate_hz,
-        noisy or None,
-        *compared_alone(terms, rows),
-    )
-    return regression.without_winds()
+    return whitened(prepared, rows, terms, filters, model.segments, noisy or None, apart=True).without_winds()
 
 
 def _band_filters(model: WrenchModel, band: tuple[float, float]) -> dict[int, np.ndarray]:

@@ -23,16 +23,16 @@ from rotorid.mismatch.decide import rules
 from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.decide.status import Estimate
 from rotorid.mismatch.evidence.motion import Segment
-from rotorid.mismatch.evidence.regression import NOISE_BAND, Fit, Regression, band_power, build
+from rotorid.mismatch.evidence.regression import NOISE_BAND, Fit, Regression, band_power
 from rotorid.mismatch.evidence.rows import Rows, Term
 from rotorid.mismatch.evidence.split import training_rule
 from rotorid.mismatch.flight.prepare import Prepared, assemble_rows
 from rotorid.mismatch.flight.wrench import (
     WrenchModel,
     after_residual,
-    block_seconds,
     chosen,
     model_filters,
+    whitened,
     with_linear,
     wrench_model,
 )
@@ -414,14 +414,12 @@ def estimated(prepared: Prepared, model: WrenchModel, winds: dict[str, tuple[Ter
     active = [model.search.terms[k] for k in _lasting(model)]
     values = dict(zip(model.selection.active, chosen(model), strict=True))
     effects = [values[t.key] for t in active]
-    rate = prepared.thinner.rate_hz
     own = [*always, *active, *asked]
     covariances = {}
     for _ in range(steps):
         moved = _in_gusts(model.segments, winds)
         rows = assemble_rows(prepared, own, moved, effects)
-        rule = training_rule(prepared.split, moved)
-        regression = build(rows, own, model_filters(model), rule, block_seconds(rows, rate), rate)
+        regression = whitened(prepared, rows, own, model_filters(model), moved)
         fit = regression.fit([t.key for t in own])
         effects = [with_linear(e, regression, fit, t) for t, e in zip(active, effects, strict=True)]
         for term in asked:

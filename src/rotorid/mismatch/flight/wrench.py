@@ -240,16 +240,7 @@ def searched(
     for c in present:
         noise[c] = np.hypot(np.concatenate([r[:, c] for r in left]).std(), floor[c])
     rate = prepared.thinner.rate_hz
-    regression = build(
-        rows,
-        terms,
-        filters,
-        training_rule(prepared.split, segments),
-        block_seconds(rows, rate),
-        rate,
-        noisy,
-        *compared_alone(terms, rows),
-    )
+    regression = whitened(prepared, rows, terms, filters, segments, noisy, apart=True)
     contributions = Contributions(rows, noisy, rate)
     per = max(2, int(rate))
 
@@ -269,6 +260,27 @@ def searched(
     search = Search(regression.without_winds(), ask)
     selection = search.run(start)
     return WrenchModel(prepared, terms, rows, regression, search, selection, noise, noise, contributions=contributions)
+
+
+def whitened(
+    prepared: Prepared,
+    rows: list[Rows],
+    terms: list[Term],
+    filters: dict[int, np.ndarray],
+    segments: list[Segment],
+    noisy: list[Rows] | None = None,
+    apart: bool = False,
+    by_channel: bool = False,
+) -> Regression:
+    """The regression of a flight's rows: blocks of the runs that are fitted count.
+
+    `noisy` are the rows with the sensors' noise added once more. With `apart`, errors of a sensor that is compared with
+    another are estimated by that comparison alone. `by_channel` as in `regression.build`.
+    """
+    rate_hz = prepared.thinner.rate_hz
+    rule, block_s = training_rule(prepared.split, segments), block_seconds(rows, rate_hz)
+    alone = compared_alone(terms, rows) if apart else ()
+    return build(rows, terms, filters, rule, block_s, rate_hz, noisy, *alone, by_channel=by_channel)
 
 
 def without_unseen(rows: list[Rows], noisy: list[Rows], rate_hz: float, cutoff_hz: float) -> dict[int, np.ndarray]:
@@ -496,10 +508,7 @@ def nonlinear_intervals(prepared: Prepared, model: WrenchModel, segments) -> dic
     rows = assemble_rows(prepared, terms + fixed, segments, chosen(model))
     width = sum(t.size for t in terms)
     rows = [replace(r, y=r.y - r.x[:, :, width:].sum(axis=2), x=r.x[:, :, :width]) for r in rows]
-    rate = prepared.thinner.rate_hz
-    regression = build(
-        rows, terms, model_filters(model), training_rule(prepared.split, segments), block_seconds(rows, rate), rate
-    )
+    regression = whitened(prepared, rows, terms, model_filters(model), segments)
     fit = regression.fit([t.key for t in terms], jackknife=True)
     out = {}
     for term in active:
@@ -624,8 +633,7 @@ def _blown_by(prepared: Prepared, model: WrenchModel, segments, noisy, terms: li
 
 def regression_of(prepared: Prepared, terms: list[Term], effects, segments, filters) -> Regression:
     """The regression of these terms alone, whitened as a model's was; `effects` are the forms at work."""
-    rows, rate = assemble_rows(prepared, terms, segments, effects), prepared.thinner.rate_hz
-    return build(rows, terms, filters, training_rule(prepared.split, segments), block_seconds(rows, rate), rate)
+    return whitened(prepared, assemble_rows(prepared, terms, segments, effects), terms, filters, segments)
 
 
 def _fitted_wind(prepared: Prepared, terms: list[Term], effects, wind: np.ndarray, segments, filters):
