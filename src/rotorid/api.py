@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,11 +17,10 @@ from typing import TypeAlias
 import pandas as pd
 
 from rotorid.errors import InputError
-from rotorid.io.text.files import parse_yaml
 from rotorid.io.text.wording import hint
 from rotorid.recordings import RecordingSet, Run, Vehicle, read_set, read_vehicle, templates, vehicle_of
 from rotorid.recordings.check import SetCheck, check_recordings
-from rotorid.recordings.files import check_belief, check_rotors, proposed_in, usable_runs
+from rotorid.recordings.files import check_belief, check_rotors, usable_runs
 from rotorid.recordings.tables import check_table, numbers
 from rotorid.report.deliver import FILES, OTHERS, Result
 from rotorid.steps import heard_by
@@ -179,12 +179,8 @@ def _of_logs(logs, name, vehicle, mass_kg, like, mapping) -> RecordingSet:
         like if vehicle is None or like else "thesis",  # the proposal is then not looked at
         mapping=read_mapping(Path(mapping)) if mapping else None,
     )
-    believed = _believed_vehicle(vehicle) if vehicle is not None else vehicle_of(
-        parse_yaml(found.vehicle_text, "the vehicle proposed"), "the vehicle proposed"
-    )  # fmt: skip
-    runs = tuple(Run(run, table) for run, table in sorted(found.runs.items()))
-    proposed = proposed_in(found.vehicle_text) if vehicle is None else ()
-    return RecordingSet(name, believed, runs, proposed=proposed)
+    recordings = found.recordings()
+    return recordings if vehicle is None else replace(recordings, vehicle=_believed_vehicle(vehicle), proposed=())
 
 
 def template(name: str, **changes) -> Vehicle:

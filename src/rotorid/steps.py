@@ -1,4 +1,4 @@
-"""The steps of a long computation, as whoever waits for it hears of them; nothing where nobody listens."""
+"""The steps of a long computation, as whoever waits for it hears of them, and how many threads it has."""
 
 from __future__ import annotations
 
@@ -34,3 +34,16 @@ def step(name: str) -> Iterator[None]:
     finally:
         _open.reset(token)
         tell(outer)
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Linear algebra in one thread, as a block or on a function.
+
+    The matrices are small: a second thread saves no time where a core is free, and where none is the two wait for each
+    other and take several times as long.
+    """
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1):
+        yield

@@ -12,7 +12,7 @@ import typer
 
 from rotorid.cli.console import one_sentence, progress
 from rotorid.cli.junit import as_junit
-from rotorid.cli.sets import Like, MappingFile, MassKg, VehicleFile, make_set
+from rotorid.cli.sets import Like, MappingFile, MassKg, VehicleFile
 from rotorid.cli.verdicts import JunitFile
 from rotorid.errors import InputError
 from rotorid.io.text.writing import write_texts
@@ -111,6 +111,8 @@ def _sets_in(
     """Sets and logs of a folder in the order they were flown; all logs get one vehicle. What cannot be used is said."""
     from rotorid.recordings import read_set
     from rotorid.recordings.files import VEHICLE, is_bag
+    from rotorid.recordings.importers.logfile import set_of_logs
+    from rotorid.recordings.importers.mapping import read_mapping
     from rotorid.report.fleet import day_of
 
     if not folder.is_dir():
@@ -118,21 +120,23 @@ def _sets_in(
     if (folder / VEHICLE).is_file():
         raise InputError(f"{folder}: is one recording set; expected a folder of several, or of logs")
     paths = [p for p in folder.iterdir() if not p.name.startswith(".")]
-    out = []
+    columns, out = read_mapping(mapping) if mapping else None, []
     with TemporaryDirectory() as made:
-        for number, path in enumerate(sorted(paths, key=lambda p: (day_of(p.name), p.name))):
+        for path in sorted(paths, key=lambda p: (day_of(p.name), p.name)):
             try:
-                own = path
                 if not path.is_dir() or is_bag(path):
                     if path.suffix.lower() in (".md", ".txt", ".yaml", ".json", ".html", ".pdf"):
                         continue
-                    own = Path(made) / str(number) / path.name.split(".")[0]
                     with step("importing"):
-                        make_set([path], own, mass_kg, like, vehicle, mapping)
-                    vehicle, mass_kg, like = own / VEHICLE, None, None
-                elif not (path / VEHICLE).is_file():
+                        own = set_of_logs([path], path.name.split(".")[0], mass_kg, like, vehicle, columns)
+                    if vehicle is None:
+                        vehicle = Path(made) / VEHICLE
+                        vehicle.write_text(own.vehicle_text, encoding="utf-8")
+                    found = own.recordings()
+                elif (path / VEHICLE).is_file():
+                    found = read_set(path)
+                else:
                     continue
-                found = read_set(own)
             except InputError as error:
                 left_out.append(f"{path.name} is left out: {error}")
                 continue

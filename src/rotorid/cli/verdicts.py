@@ -23,7 +23,7 @@ import typer
 
 from rotorid.cli.console import keep, one_sentence, progress, read_record
 from rotorid.cli.junit import as_junit
-from rotorid.cli.sets import Like, MappingFile, MassKg, VehicleFile, make_set, name_of, set_of
+from rotorid.cli.sets import Like, MappingFile, MassKg, VehicleFile, name_of, set_of
 from rotorid.errors import InputError
 from rotorid.io.text.writing import write_texts
 from rotorid.steps import step
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 JunitFile = Annotated[Path | None, typer.Option("--junit", help="File for the checks as JUnit XML, which a CI shows.")]
 MOST_PARAMETERS = 20
 """Parameters that differ and are printed, each in a line."""
-_PACE, _LATEST, _USUAL_PACE = "compare: pace", 5, 2.0
+_PACE, _LATEST, _USUAL_PACE = "compare: pace", 5, 0.2
 """Name under which the pace of comparisons is kept, how many count, and seconds that a second of recording takes."""
 
 
@@ -387,20 +387,27 @@ def read_given(
     """
     from rotorid.recordings import read_set
     from rotorid.recordings.files import is_bag
+    from rotorid.recordings.importers.logfile import set_of_logs
+    from rotorid.recordings.importers.mapping import read_mapping
     from rotorid.recordings.settings import read_settings
 
     out = []
-    with TemporaryDirectory() as made:
-        sets: dict[Path, Path] = {}
+    columns = read_mapping(mapping) if mapping else None
+    with TemporaryDirectory() as folder:
+        sets: dict[Path, Given] = {}
         for whole in paths:
             path, number = one_flight(whole)
-            if path.is_dir() and not is_bag(path):
-                folder = path
-            elif (folder := sets.get(path)) is None:
-                folder = sets[path] = Path(made) / str(len(sets)) / path.stem
-                make_set([path], folder, mass_kg, like, vehicle, mapping)
-                vehicle, mass_kg, like = folder / "vehicle.yaml", None, None
-            found = read_set(folder)
+            if path in sets:
+                pass
+            elif path.is_dir() and not is_bag(path):
+                sets[path] = Given(read_set(path), tuple(read_settings(path).values()))
+            else:
+                made = set_of_logs([path], path.stem, mass_kg, like, vehicle, columns)
+                sets[path] = Given(made.recordings(), tuple(own for own in made.settings.values() if own))
+                if vehicle is None:
+                    vehicle = Path(folder) / "vehicle.yaml"
+                    vehicle.write_text(made.vehicle_text, encoding="utf-8")
+            found = sets[path].recordings
             if number is not None:
                 if not 1 <= number <= len(found.runs):
                     names = ", ".join(run.name for run in found.runs)
@@ -409,7 +416,7 @@ def read_given(
                     )
                 name = f"{found.name}#{number}"
                 found = replace(found, name=name, runs=(found.runs[number - 1],), held_out=None)
-            out.append(Given(found, tuple(read_settings(folder).values())))
+            out.append(replace(sets[path], recordings=found))
         return out
 
 

@@ -553,7 +553,7 @@ def rotors_or_offset(findings: Sequence[Finding], model: WrenchModel, fit: Fit) 
     for place, f in enumerate(findings):
         other = catalogue()[f.id].turns_like
         own = [k for k in model.selection.active if terms[k].effect == f.id]
-        # In space an offset has a further parameter, which is another axis'.
+
         others = [t for t in terms.values() if t.effect == other and t.kind == "effect"]
         if f.status not in CLAIMED or not other or other in f.alternatives or not own or not others:
             continue

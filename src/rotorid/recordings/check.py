@@ -90,6 +90,8 @@ class SetCheck:
     """One sentence for each thing that is missing: what it is and what cannot be tested without it."""
     doubts: tuple[Doubt, ...] = ()
     """What cannot be right, with the numbers that raised it."""
+    endings: tuple[str, ...] = ()
+    """What happened in the last seconds of flights that did not end as a landing does, as the import saw it."""
 
     def as_dict(self) -> dict:
         return asdict(self)
@@ -249,6 +251,8 @@ def as_text(check: SetCheck) -> str:
         lines.append("Kept as regime variables: " + ", ".join(check.other_columns))
     if check.doubts:
         lines += ["", "Looks wrong:", *(f"- {doubt}" for doubt in check.doubts)]
+    if check.endings:
+        lines += ["", "How it ended:", *(f"- {sentence}" for sentence in check.endings)]
     lines.append("")
     lines += [f"- {sentence}" for sentence in check.lacks] or ["Nothing that the contract knows is missing."]
     return "\n".join(lines) + "\n"
@@ -264,7 +268,9 @@ def check_recordings(recordings: RecordingSet) -> SetCheck:
 
 def check_folder(folder: Path) -> SetCheck:
     """Read a set and check it; InputError if it does not fit the contract or nothing in it can be compared."""
-    return check_recordings(read_set(Path(folder)))
+    from rotorid.recordings.importers.faults import endings_of
+
+    return replace(check_recordings(read_set(Path(folder))), endings=endings_of(Path(folder)))
 
 
 def copies(recordings: RecordingSet) -> tuple[Doubt, ...]:

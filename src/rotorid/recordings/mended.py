@@ -28,7 +28,6 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import scipy
-from scipy.spatial.transform import Rotation
 
 from rotorid.io.text.wording import listed
 from rotorid.recordings import columns as c
@@ -352,9 +351,12 @@ def spikes(values: np.ndarray) -> np.ndarray:
     inner = slice(neighbours, len(x) - neighbours)
     rise, fall = x[inner] - medians[: len(x) - 2 * neighbours], x[inner] - medians[neighbours + 1 :]
     size = np.where(np.sign(rise) == np.sign(fall), np.minimum(np.abs(rise), np.abs(fall)), 0.0)
-    scatter = _around(np.abs(rise + fall) / 2) * 1.4826
-    scatter = np.maximum(scatter, finest * float(np.subtract(*np.quantile(x, [0.95, 0.05]))))
-    size -= 2 * _around(np.maximum(np.abs(rise), np.abs(fall)))  # what moves fast turns round fast
+    apart, moved = np.abs(rise + fall) / 2, np.maximum(np.abs(rise), np.abs(fall))
+    least = finest * float(np.subtract(*np.quantile(x, [0.95, 0.05])))
+    if not (size - 2 * np.median(moved) > _FAR * max(1.4826 * np.median(apart), least)).any():
+        return found  # medians around each are no smaller
+    scatter = np.maximum(_around(apart) * 1.4826, least)
+    size -= 2 * _around(moved)  # what moves fast turns round fast
     far = _alone(size > _FAR * scatter, size, x[inner])
     between = (size > _NEAR * scatter) & (size <= _FAR * scatter)
     if scatter.min() > 0 and between.sum() < far.sum() <= _MOST * len(x):
@@ -448,7 +450,7 @@ def _excess(run: Run, names: tuple[str, ...], time_s: np.ndarray, values: np.nda
         steps = np.diff(values, axis=0)
         least, fastest = (least_jump_m, fastest_m_s) if names == c.POSITION else (least_jump_m_s, fastest_m_s2)
         return steps, least, fastest, steps
-    turn = Rotation.from_quat(values[:, [1, 2, 3, 0]])
+    turn = scipy.spatial.transform.Rotation.from_quat(values[:, [1, 2, 3, 0]])
     steps = turn[:-1].inv() * turn[1:]
     if not _is_read(run, c.ANGULAR_VELOCITY):
         return steps.as_rotvec(), least_jump_rad, fastest_rad_s, steps.as_rotvec()
@@ -456,7 +458,7 @@ def _excess(run: Run, names: tuple[str, ...], time_s: np.ndarray, values: np.nda
     known = np.isfinite(rates).all(axis=1)
     total = _integrated(rates[known], run.time_s[known])
     turned = np.column_stack([np.interp(time_s, run.time_s[known], column) for column in total.T])
-    excess = (Rotation.from_rotvec(np.diff(turned, axis=0)).inv() * steps).as_rotvec()
+    excess = (scipy.spatial.transform.Rotation.from_rotvec(np.diff(turned, axis=0)).inv() * steps).as_rotvec()
     return steps.as_rotvec(), least_jump_rad, 0.0, excess
 
 
@@ -464,9 +466,9 @@ def _places(names: tuple[str, ...], jumps: np.ndarray) -> list:
     """Where each part between jumps (m, 3) lies against the first: rotations of the body, else vectors."""
     if names != c.QUATERNION:
         return [np.zeros(3), *np.cumsum(jumps, axis=0)]
-    places = [Rotation.identity()]
+    places = [scipy.spatial.transform.Rotation.identity()]
     for jump in jumps:
-        places.append(places[-1] * Rotation.from_rotvec(jump))
+        places.append(places[-1] * scipy.spatial.transform.Rotation.from_rotvec(jump))
     return places
 
 

@@ -15,7 +15,6 @@ from difflib import get_close_matches
 
 import numpy as np
 import scipy
-from scipy.spatial.transform import Rotation
 
 from rotorid.io.text.wording import listed
 from rotorid.recordings import columns as c
@@ -258,7 +257,8 @@ def _gyroscope(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]
     known = np.isfinite(norm) & (norm > 0.1)
     both = known[:-2] & known[2:]
     first, last = attitude[:-2][both], attitude[2:][both]
-    turn = Rotation.from_quat(first[:, [1, 2, 3, 0]]).inv() * Rotation.from_quat(last[:, [1, 2, 3, 0]])
+    start, stop = (scipy.spatial.transform.Rotation.from_quat(mean[:, [1, 2, 3, 0]]) for mean in (first, last))
+    turn = start.inv() * stop
     derived[1:-1][both] = turn.as_rotvec() / (2 * _STEP_S)
     for k, axis in enumerate("xyz"):
         if not np.nanstd(derived[:, k]) > _LEAST_TURNING_RAD_S:
@@ -318,7 +318,7 @@ def _world(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
     known &= np.linalg.norm(np.nan_to_num(attitude), axis=1) > 0.1
     if known.sum() < 50:
         return
-    turn = Rotation.from_quat(attitude[known][:, [1, 2, 3, 0]])
+    turn = scipy.spatial.transform.Rotation.from_quat(attitude[known][:, [1, 2, 3, 0]])
     world = turn.apply(force[known])
     if np.median(world[:, 2]) > 5.0 and np.median(force[known][:, 2]) < 0:
         yield Doubt(
@@ -417,6 +417,8 @@ def _command_order(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Do
     if known.sum() < 100 or not all((own.std(axis=0) > 0).all() for own in apart):
         return
     alike = np.corrcoef(*(own.T for own in apart))[: vehicle.rotor_count, vehicle.rotor_count :]
+    if (alike.argmax(axis=1) == np.arange(vehicle.rotor_count)).all():
+        return
     _, follows = scipy.optimize.linear_sum_assignment(alike, maximize=True)
     wrong = [i for i, k in enumerate(follows) if i != k]
     if (

@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import TypeVar
 
 import pandas as pd
-from threadpoolctl import threadpool_limits
 
 from rotorid.io.text.files import parse_yaml
 from rotorid.io.text.writing import all_or_none, rounded, write_texts
@@ -46,11 +45,9 @@ from rotorid.mismatch.tell.verdict import Verdict, main_channel, make_verdict, w
 from rotorid.recordings import RecordingSet, Vehicle, read_vehicle, vehicle_of, write_vehicle
 from rotorid.recordings.sufficient import sufficient
 from rotorid.report.page import make_page, pretty
-from rotorid.steps import step
+from rotorid.steps import one_thread, step
 
 _Content = TypeVar("_Content", Conditions, Instruments)
-_ONE_THREAD = threadpool_limits.wrap(limits=1)
-"""The matrices are small: a second thread of the linear algebra costs half as much again and saves no time."""
 FILES = ("verdict.json", "report.html", "improved_vehicle.yaml", "ledger.json")
 """Files that every verdict has."""
 OTHERS = (CONDITIONS, INSTRUMENTS)
@@ -64,7 +61,7 @@ def deliver(
     return write_files(analysis_of(recordings, off), verdict_path, page_path, improved_path)
 
 
-@_ONE_THREAD
+@one_thread()
 def analysis_of(recordings: RecordingSet, off: Collection[str] = (), watch: Watch = unwatched) -> Analysis:
     """The analysis for the kind of the set, without the rules named in `off`.
 
@@ -102,7 +99,7 @@ def judge(recordings: RecordingSet) -> Verdict:
     return verdict_of(analysis_of(recordings))
 
 
-@_ONE_THREAD
+@one_thread()
 def verdict_of(analysis: Analysis) -> Verdict:
     """The verdict that an analysis amounts to."""
     forward = forward_channels(analysis)[0] if analysis.instrument is None else {}
@@ -123,7 +120,7 @@ def _written(content: _Content, path: Path, read: Callable[[Path], _Content]) ->
     return read(path)
 
 
-@_ONE_THREAD
+@one_thread()
 def write_files(analysis: Analysis, verdict_path: Path, page_path: Path, improved_path: Path) -> Verdict:
     """Write what an analysis amounts to; what is taken home is read back and simulated as proof.
 

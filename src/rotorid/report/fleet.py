@@ -44,6 +44,7 @@ from rotorid.recordings import RecordingSet, read_set
 from rotorid.recordings.templates import read
 from rotorid.report.deliver import FILES, OTHERS, deliver
 from rotorid.report.page import drawing, filled
+from rotorid.steps import one_thread
 from rotorid.vehicle.control import swings
 
 _NUMBERS = ("vehicle", "set", "day", "good", "name", "quantity", "unit", "change", "low_95", "high_95", "limit")
@@ -346,6 +347,7 @@ def sets_of_vehicles(
     return out
 
 
+@one_thread()
 def history(
     sets: Mapping[str, Sequence[RecordingSet]], good: int, left_out: Callable[[str], None] = lambda text: None
 ) -> tuple[pd.DataFrame, pd.DataFrame]:

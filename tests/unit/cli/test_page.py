@@ -26,6 +26,7 @@ from tests.browser import CHROMIUM, Browser
 from tests.command_line import refusal
 from tests.public_logs import public
 from tests.unit.recordings.importers.test_log_formats import PARAMETERS, dataflash, flown
+from tests.unit.recordings.importers.test_ros_bags import Flight, usual, written
 
 EXAMPLE = files("rotorid.cli.examples")
 PATIENCE_S = 120
@@ -124,6 +125,19 @@ def test_only_the_address_with_its_token_and_its_own_host_is_answered(page: Page
         assert status == 403 and text.decode().count(".") <= 4, headers
     assert page.raw("GET", own, headers={"Host": f"localhost:{page.port}"})[0] == 200
     assert page.raw("POST", f"{own}api/sets", b"", {"Origin": f"http://127.0.0.1:{page.port}"})[0] == 201
+
+
+def test_the_folder_of_a_bag_is_one_log(page: Page, tmp_path: Path) -> None:
+    flight = Flight(True)
+    bag, id_ = written(tmp_path / "flight", flight, usual(flight)).parent, page.drop()
+    for path in sorted(bag.iterdir()):
+        assert page.ask("PUT", f"sets/{id_}/logs/{path.name}?bag=..%2F..%2Fflight", body=path.read_bytes())[0] == 201
+    state = page.ask("POST", f"sets/{id_}/look", {"like": "x500", "mass_kg": 1.5})[1]
+    assert (state["stage"], state["logs"], state["look"]["format"]) == ("looked", ["flight"], "ROS bag"), state
+    assert [run["name"] for run in state["look"]["runs"]]
+    assert page.ask("PUT", f"sets/{id_}/logs/log.bin", body=b"1")[0] == 201
+    said = page.ask("PUT", f"sets/{id_}/logs/a.db3?bag=log.bin", body=b"1")[1]["sentence"]
+    assert "has the name of the folder" in said
 
 
 def test_it_listens_on_this_computer_alone(page: Page) -> None:

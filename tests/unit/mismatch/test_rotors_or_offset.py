@@ -35,7 +35,7 @@ FIT = SimpleNamespace(beta=np.array([0.05]), places=lambda cols: [0])
 
 
 @pytest.mark.parametrize(
-    ("differing", "alternatives"), [(0.01, ("com_offset", "unequal_rotors")), (0.2, ())], ids=["hover", "lively"]
+    ("differing", "alternatives"), [(0.001, ("com_offset", "unequal_rotors")), (0.02, ())], ids=["hover", "lively"]
 )
 def test_one_rotor_is_an_offset_too_in_a_hover_and_not_where_rotors_differ_much(differing, alternatives):
     random = np.random.default_rng(0)

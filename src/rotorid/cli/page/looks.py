@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from rotorid.errors import InputError
-from rotorid.recordings import RecordingSet, Run, Vehicle, templates
+from rotorid.recordings import RecordingSet, Vehicle, templates
 from rotorid.recordings import columns as c
 from rotorid.recordings.check import check_set
-from rotorid.recordings.files import proposed_in, vehicle_of
 from rotorid.recordings.sufficient import sufficient
 
 _USUAL = "x500"
@@ -64,7 +63,6 @@ def look(folder: Path, logs: Sequence[Path], wishes: Wishes) -> dict[str, Any]:
     InputError in one sentence where they cannot be read. Of a table whose columns nobody knows the answer has a
     proposal of what they are (`mapping`, `evidence`, `open`) and no flights.
     """
-    from rotorid.io.text.files import parse_yaml
     from rotorid.recordings.importers.logfile import importer_of, set_of_logs
     from rotorid.recordings.importers.mapping import read_mapping
 
@@ -75,10 +73,8 @@ def look(folder: Path, logs: Sequence[Path], wishes: Wishes) -> dict[str, Any]:
     unknown = like is None and vehicle is None and not formats[0].template
     read = read_mapping(mapping) if mapping else None
     found = set_of_logs(logs, logs[0].name.split(".")[0], mass_kg, like or (_USUAL if unknown else None), vehicle, read)
-    believed = vehicle_of(parse_yaml(found.vehicle_text, "the vehicle"), "the vehicle")
-    runs = tuple(Run(name, table) for name, table in sorted(found.runs.items()))
-    recordings = RecordingSet(found.name, believed, runs, proposed=proposed_in(found.vehicle_text))
-    refused = ""
+    recordings, refused = found.recordings(), ""
+    believed = recordings.vehicle
     try:
         sufficient(recordings)
     except InputError as error:

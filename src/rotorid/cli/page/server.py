@@ -127,7 +127,10 @@ def application(shelf: Shelf, token: str, hosts: tuple[str, ...], largest_log: i
         return Response(status_code=204)
 
     async def take(request: Request) -> Response:
-        """A log, byte by byte as it comes: it takes its name only when all of it is there."""
+        """A log, byte by byte as it comes: it takes its name only when all of it is there.
+
+        Of a ROS 2 bag that is a folder, `bag` names the folder that the file belongs to.
+        """
         id_, name = request.path_params["id"], request.path_params["name"]
         _not_at_work(shelf, id_)
         said = f"{safe_name(name)}: has more than {largest_log / 1e6:.0f} MB, the most that the page takes; "
@@ -144,7 +147,7 @@ def application(shelf: Shelf, token: str, hosts: tuple[str, ...], largest_log: i
                     file.write(part)
             if not size:
                 raise InputError(f"{safe_name(name)}: the file is empty")
-            place = shelf.place_for(id_, name)
+            place = shelf.place_for(id_, name, request.query_params.get("bag", ""))
             coming.rename(place)
         finally:
             coming.unlink(missing_ok=True)

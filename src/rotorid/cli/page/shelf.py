@@ -105,9 +105,14 @@ class Shelf:
     def _write(self, path: Path, state: Mapping[str, Any]) -> None:
         write_texts({path / STATE: json.dumps(state, ensure_ascii=False)})
 
-    def place_for(self, id_: str, name: str) -> Path:
-        """Where a log that is coming is written, under a name that no other of the set has."""
+    def place_for(self, id_: str, name: str, bag: str = "") -> Path:
+        """Where a log, or a file of a bag's folder, is written that is coming, under a name that no other has there."""
         folder = self.path(id_) / LOGS
+        if bag:
+            folder /= safe_name(bag)
+            if folder.is_file():
+                raise InputError(f"{folder.name}: a log of this set has the name of the folder; rename one of them")
+            folder.mkdir(exist_ok=True)
         there = {p.name.casefold() for p in folder.iterdir()}
         if len(there) >= MOST_LOGS:
             raise InputError(f"a set takes at most {MOST_LOGS} logs here; make several sets of them")
@@ -120,8 +125,8 @@ class Shelf:
         return folder / wanted
 
     def logs(self, id_: str) -> list[Path]:
-        """The logs of a set in the order of their names."""
-        return sorted(p for p in (self.path(id_) / LOGS).iterdir() if p.is_file())
+        """The logs of a set in the order of their names; of ROS 2 bags the folders that are whole."""
+        return sorted(p for p in (self.path(id_) / LOGS).iterdir() if p.is_file() or (p / "metadata.yaml").is_file())
 
     def files(self, id_: str) -> dict[str, Path]:
         """The files of the answer by name."""

@@ -96,7 +96,7 @@ from rotorid.mismatch.flight.swinging import (
 )
 from rotorid.mismatch.flight.values import believed_value
 from rotorid.recordings import RecordingSet, Vehicle
-from rotorid.steps import step
+from rotorid.steps import one_thread, step
 
 _LARGER = 2.0
 """How many times the residual of the first set that of the second must be, in some force or moment, to be noted."""
@@ -154,6 +154,7 @@ class Changes:
     """Key of a quantity that level 1 states to the ids that predict its difference."""
 
 
+@one_thread()
 def changes_between(
     base: RecordingSet,
     new: RecordingSet,
@@ -167,6 +168,7 @@ def changes_between(
     return changes_from(instrument_reference_of(base), new, prior)
 
 
+@one_thread()
 def changes_from(
     reference: FittedReference | InstrumentReference,
     new: RecordingSet,

@@ -594,9 +594,10 @@ def _resets(log: Log) -> list[tuple[np.ndarray, str]]:
     return [(times, words) for times, words in found if len(times)]
 
 
-def _read(path: Path) -> Imported:
-    """Every flight of a DataFlash log."""
-    log = read_messages(path)
+def read(path: Path, log: Log | None = None) -> Imported:
+    """Every flight of a DataFlash log, or of tables like its own (`log`)."""
+    settings = _stated_parameters(path) if log is None else parameters(log).start
+    log = read_messages(path) if log is None else log
     table, faults, flying = convert(log, path)
     order, more = order_of(_in_flight(log, path))
     grid, jumps = table[c.TIME].to_numpy(), np.zeros(len(table), bool)
@@ -605,8 +606,7 @@ def _read(path: Path) -> Imported:
         jumps, more = jumps | own, more + found
     runs, cuts = flights(table, flying, path.name.split(".")[0], path, jumps)
     axes = "ArduPilot's: body forward-right-down, world north-east-down, as the contract's"
-    found, settings = [*faults, *more, *cuts], _stated_parameters(path)
-    return Imported(runs, found, axes, Known(order), speed_unit="rpm", settings=settings)
+    return Imported(runs, [*faults, *more, *cuts], axes, Known(order), speed_unit="rpm", settings=settings)
 
 
 def _stated_parameters(path: Path) -> dict[str, float]:
@@ -622,7 +622,7 @@ def _stated_parameters(path: Path) -> dict[str, float]:
 IMPORTER = Importer(
     "ardupilot",
     "ArduPilot DataFlash",
-    _read,
+    read,
     "frame by `FRAME_CLASS`; `IMU`, `XKQ` or `ATT`, `XKF1`, `RCOU` by `SERVOn_FUNCTION` and the parameters that held "
     "then, `ESC`, `BAT` or `CURR`, `RFND`; clocks `TimeUS` or `TimeMS`; the part in the air by its event, throttle and "
     "specific force",

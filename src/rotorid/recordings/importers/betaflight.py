@@ -1,17 +1,17 @@
-"""Betaflight's blackbox logs: read byte by byte, and what the fields of a session mean by its own header.
-
-Each session has lines of text (`H name:value`) that say how its frames are packed. Key frames (I) stand alone; a frame
-between them (P) holds differences from a prediction. A frame is whole where the next one begins with a known letter.
-After damage nothing is taken until the next key frame, because the frames between count from the damaged one.
+"""What the fields of blackbox logs of Betaflight, iNAV and EmuFlight mean by the header of their session.
 
 Betaflight's body axes are forward-left-up (a positive pitch rate lowers the nose, a positive yaw rate turns left, and
 the accelerometer reads +1 g along z at rest): half a turn about x makes them forward-right-down. Units by the log's own
 header: `gyro_scale` (deg/s) and `blackbox_high_resolution` (tenths of it), `acc_1G`, `motorOutput` (range of the
 motors' commands) and `features` (3D), `motor_poles`; `eRPM` in hundreds of electrical turns a minute; voltage and
-current by the version. Blackbox logs hold no velocity; an attitude only since `imuQuaternion` is logged.
+current by the version. Its logs hold no velocity; an attitude only since `imuQuaternion` is logged.
 
-Sources: Betaflight `src/main/blackbox/` (`blackbox.c`, `blackbox_encoding.c`, `blackbox_fielddefs.h`),
-`src/main/drivers/dshot.c`, `src/main/flight/mixer_init.c`, Blackbox Explorer `flightlog_fields_presenter.js`.
+EmuFlight's logs are Betaflight's, with the battery's voltage in the unit of its `vbatcellvoltage`. iNAV's have the
+same body axes, rates in deg/s, motors in µs, an attitude (tenths of a degree; a positive pitch lowers the nose), and
+position and velocity (cm, cm/s; north, east, up).
+
+Sources: Betaflight, iNAV and EmuFlight `src/main/blackbox/blackbox.c`, Betaflight `src/main/drivers/dshot.c` and
+`src/main/flight/mixer_init.c`, iNAV `src/main/flight/imu.c`, Blackbox Explorer `flightlog_fields_presenter.js`.
 """
 
 from __future__ import annotations
@@ -21,8 +21,7 @@ import io
 import re
 import struct
 from array import array
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -30,25 +29,24 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
+from rotorid.recordings.importers.blackbox import HEADER_LINE, BlackboxSession, sessions
 from rotorid.recordings.importers.contract import Imported, Importer
 from rotorid.recordings.importers.faults import ImportFault, airborne, flights, moving_on, report_gaps
 from rotorid.recordings.importers.known import Known
-from rotorid.recordings.importers.mapping import G, half_turn_about_x, quaternion_to_frd_ned
+from rotorid.recordings.importers.mapping import G, continuous, from_angles, half_turn_about_x, quaternion_to_frd_ned
 
 _FIRST_LINE = b"H Product:Blackbox"
-_HEADER_LINE = re.compile(rb"H ([^:\n]{1,80}):([^\n]*)\n")
-_FRAMES = b"IPGHSE"
-_END_OF_LOG = b"End of log"
-_LONGEST_FRAME = _MOST_FIELDS = 256
-_LARGEST_STEP = 5000
-_LARGEST_STEP_US = 10_000_000
-"""A main frame that leaps farther ahead in iterations or time than this, or back, is damaged."""
-_TURN = 1 << 32
-"""Numbers have 32 bits: a clock in microseconds begins anew after 71.6 minutes."""
 _OTHER_NAMES = {"gyroADC": ("gyroData", "gyroUnfilt"), "accSmooth": ("accADC",), "eRPM": ("eRPM(/100)",)}
 """To a field its names in other releases, and what holds the same before a filter."""
 _FEWER_MOTORS = {1: "a fixed wing", 2: "a bicopter or a fixed wing", 3: "a tricopter, whose tail rotor a servo tilts"}
 """What Betaflight's mixers make of fewer motors than four."""
+_COUNTS: dict[str, dict[str, tuple[tuple[tuple[int, int], int], ...]]] = {
+    "betaflight": {"vbatLatest": (((4, 0), 100), ((3, 1), 10)), "amperageLatest": (((3, 1), 100),)},
+    "inav": {"vbatLatest": (((2, 0), 100),), "amperageLatest": (((2, 0), 100),)},
+    "emuflight": {"amperageLatest": (((0, 0), 100),)},
+}
+"""To a firmware since which version so many counts of a field are 1 V or 1 A; Betaflight's before that counts steps of
+the converter."""
 
 
 def _read(path: Path) -> Imported:
@@ -113,10 +111,15 @@ def _cell(text: str) -> float:
 def _flights(session: BlackboxSession, name: str, path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
     headers = session.headers
     firmware = headers.get("Firmware revision", headers.get("Firmware type", ""))
-    if "betaflight" not in firmware.lower():
+    if "rotorflight" in firmware.lower():
         raise InputError(
-            f"{path}: a blackbox log of {firmware or 'an unknown firmware'}; only Betaflight's axes and units are "
-            "known, turn it into CSV (blackbox_decode), then `rotorid import FILE.csv`"
+            f"{path}: a blackbox log of a helicopter ({firmware}), whose main rotor's blades are turned to steer; only "
+            "multirotors of fixed rotors can be imported"
+        )
+    if _firmware(headers) is None:
+        raise InputError(
+            f"{path}: a blackbox log of {firmware or 'an unknown firmware'}; only the axes and units of Betaflight, "
+            "iNAV and EmuFlight are known, turn it into CSV (blackbox_decode), then `rotorid import FILE.csv`"
         )
     if len(session.values) < 2:
         raise InputError(f"{path}: holds {len(session.values)} samples")
@@ -142,6 +145,9 @@ def convert(
     quaternion_scale = 32767.0
     if "time" not in raw:
         raise InputError(f"{where}: the log has no field time")
+    firmware = _firmware(headers)
+    if firmware == "inav":
+        raw = raw.rename(columns={"vbat": "vbatLatest", "amperage": "amperageLatest"})
     raw, faults = _known_names(raw)
     time = raw["time"].to_numpy(float) * 1e-6
     keep, more = moving_on(time)
@@ -173,6 +179,8 @@ def convert(
         xyz = attitude / quaternion_scale
         w = np.sqrt(np.clip(1 - np.sum(xyz**2, axis=1), 0, None))
         table[list(c.QUATERNION)] = quaternion_to_frd_ned(np.column_stack([w, xyz]))
+    if firmware == "inav":
+        table = table.assign(**_navigation(raw))
     motors = [n for i in range(8) if (n := f"motor[{i}]") in raw]
     if not motors:
         raise InputError(f"{where}: no motor[0], motor[1], … is logged, so that nothing shows when the vehicle flies")
@@ -203,6 +211,27 @@ def convert(
     faults += report_gaps(table)
     runs, cuts = flights(table, airborne(table)[0], name, where)
     return runs, [*faults, *cuts]
+
+
+def _firmware(headers: Mapping[str, str]) -> str | None:
+    """The firmware that wrote a log, of those whose axes and units are known."""
+    stated = headers.get("Firmware revision", headers.get("Firmware type", "")).lower()
+    return next((name for name in _COUNTS if name in stated), None)
+
+
+def _navigation(raw: pd.DataFrame) -> dict[str, np.ndarray]:
+    """Attitude, position and velocity as iNAV's estimator has them, in contract columns; NaN where it does not trust
+    them by `navFlags` (1: height, 4: place)."""
+    out: dict[str, np.ndarray] = {}
+    if {f"attitude[{k}]" for k in range(3)} <= set(raw):
+        angles = np.radians(raw[[f"attitude[{k}]" for k in range(3)]].to_numpy(float) / 10)
+        xyzw = from_angles(angles * [1, -1, 1], "euler").as_quat()  # a positive pitch lowers the nose
+        out |= dict(zip(c.QUATERNION, continuous(xyzw[:, [3, 0, 1, 2]]).T, strict=True))
+    for field, names in (("navPos", c.POSITION), ("navVel", c.VELOCITY)):
+        for k, bit, unit_m in ((0, 4, 0.01), (1, 4, 0.01), (2, 1, -0.01)):
+            if {f"{field}[{k}]", "navFlags"} <= set(raw) and (trusted := (raw["navFlags"].astype(int) & bit) > 0).any():
+                out[names[k]] = np.where(trusted, raw[f"{field}[{k}]"] * unit_m, np.nan)
+    return out
 
 
 def _known_names(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
@@ -258,26 +287,23 @@ def throttles(motors: np.ndarray, headers: Mapping[str, str]) -> tuple[np.ndarra
 
 def _battery(raw: pd.DataFrame, headers: Mapping[str, str]) -> tuple[dict[str, np.ndarray], list[ImportFault]]:
     """Voltage and current of the battery in contract columns, as far as they are logged and their unit is known."""
-    # Since which version so many counts of a field are 1 V or 1 A; before that it counts steps of the converter.
-    volts = (((4, 0), 100), ((3, 1), 10))
-    amperes = (((3, 1), 100),)
     converter_step_mv = 3300 / 4095
-    version = _version(headers)
+    version, firmware = _version(headers), _firmware(headers)
     found, faults = {}, []
-    for field, column, since in (
-        ("vbatLatest", c.BATTERY_VOLTAGE, volts),
-        ("amperageLatest", c.BATTERY_CURRENT, amperes),
-    ):
+    for field, column in (("vbatLatest", c.BATTERY_VOLTAGE), ("amperageLatest", c.BATTERY_CURRENT)):
         if field not in raw or not raw[field].max() > 0:
             continue
         values = raw[field].to_numpy(float)
-        counts = next((n for first, n in since if version >= first), None)
+        counts = next((n for first, n in _COUNTS.get(firmware, {}).get(field, ()) if version >= first), None)
+        if firmware == "emuflight" and field == "vbatLatest":  # in the unit of the voltages of a cell
+            counts = {2: 10, 3: 100}.get(len(headers.get("vbatcellvoltage", "").rpartition(",")[2].strip()))
+        raw_counts = firmware == "betaflight" and version
         offset, per_ampere = _pair(headers, "currentMeter") or _pair(headers, "currentSensor") or (0.0, 0.0)
         if counts is not None:
             found[column] = values / counts
-        elif version and field == "vbatLatest" and (scale := _number(headers, "vbatscale", 0)) > 0:
+        elif raw_counts and field == "vbatLatest" and (scale := _number(headers, "vbatscale", 0)) > 0:
             found[column] = values * converter_step_mv * scale * 1e-4  # the divider in tenths, mV
-        elif version and field == "amperageLatest" and per_ampere > 0:
+        elif raw_counts and field == "amperageLatest" and per_ampere > 0:
             found[column] = (values * converter_step_mv - offset) * 10 / per_ampere
         else:
             why = "the header does not state the version or the scale that its unit depends on"
@@ -306,389 +332,6 @@ def _version(headers: Mapping[str, str]) -> tuple[int, ...]:
     return (int(found[1]), int(found[2])) if found else ()
 
 
-@dataclass(frozen=True)
-class BlackboxSession:
-    """One session of a blackbox file.
-
-    `names` and `values` (n, k), whole numbers: the main frames in the order of the file, `time` in µs without the
-    clock's new beginnings. `whole`: the event of the end is there. `damaged`: frames that could not be read, or count
-    from such a one.
-    """
-
-    headers: Mapping[str, str]
-    names: tuple[str, ...]
-    values: np.ndarray
-    whole: bool
-    damaged: int
-
-
-def sessions(data: bytes) -> list[BlackboxSession | InputError]:
-    """Every session of a blackbox file in its order; for one whose header cannot be read the reason."""
-    starts = [match.start() for match in re.finditer(re.escape(_FIRST_LINE), data)]
-    found: list[BlackboxSession | InputError] = []
-    for start, stop in zip(starts, [*starts[1:], len(data)], strict=True):
-        try:
-            found.append(_session(data[start:stop]))
-        except InputError as error:
-            found.append(error)
-    return found
-
-
-def _session(data: bytes) -> BlackboxSession:
-    headers, at = _headers(data)
-    frames = _Frames(headers, data)
-    whole = frames.read(at)
-    values = np.array(frames.values, dtype=np.int64).reshape(-1, len(frames.names))
-    time = values[:, frames.time]
-    values[:, frames.time] = time + _TURN * np.cumsum(np.diff(time, prepend=time[:1]) < -_TURN // 2)
-    return BlackboxSession(headers, frames.names, values, whole, frames.damaged)
-
-
-def _headers(data: bytes) -> tuple[dict[str, str], int]:
-    """The lines of a header by name, and where the frames begin; what is no line is passed over."""
-    headers: dict[str, str] = {}
-    at = 0
-    while at < len(data):
-        if line := _HEADER_LINE.match(data, at):
-            name, value = (part.decode("utf-8", "replace").strip() for part in line.groups())
-            headers[name] = value
-            at = line.end()
-        elif data[at] in _FRAMES.replace(b"H", b""):
-            break
-        else:
-            at += 1
-    return headers, at
-
-
-# Numbers ------------------------------------------------------------------------------------------
-
-
-def _unsigned(data: bytes, at: int) -> tuple[int, int]:
-    """A number of seven bits a byte, the lowest first, and where the next begins."""
-    value = shift = 0
-    while True:
-        byte = data[at]
-        at += 1
-        value |= (byte & 127) << shift
-        if byte < 128:
-            return value & _TURN - 1, at
-        shift += 7
-        if shift > 28:
-            return 0, at
-
-
-def _signed(data: bytes, at: int) -> tuple[int, int]:
-    value, at = _unsigned(data, at)
-    return value >> 1 ^ -(value & 1), at
-
-
-_SIGNED = tuple(byte >> 1 ^ -(byte & 1) for byte in range(128))
-_SIGNED_BYTES = bytes(value & 255 for value in _SIGNED) + bytes(128)
-
-
-def _extended(value: int, bits: int) -> int:
-    """The lowest bits of a number, of which the highest is the sign."""
-    sign = 1 << bits - 1
-    return (value & (sign << 1) - 1 ^ sign) - sign
-
-
-def _many_signed(data: bytes, at: int, count: int) -> tuple[list[int], int]:
-    """Signed numbers one behind the other; most have one byte, whose number is looked up."""
-    part = data[at : at + count]
-    if len(part) == count and part.isascii():  # one byte each
-        return memoryview(part.translate(_SIGNED_BYTES)).cast("b").tolist(), at + count
-    values = []
-    for _ in range(count):
-        byte = data[at]
-        if byte < 128:
-            at += 1
-            values.append(_SIGNED[byte])
-        else:
-            value, at = _signed(data, at)
-            values.append(value)
-    return values, at
-
-
-def _one(turned: Callable[[int], int]) -> Callable[[bytes, int, int], tuple[list[int], int]]:
-    """One number, turned into what it stands for."""
-
-    def read(data: bytes, at: int, count: int) -> tuple[list[int], int]:
-        value, at = _unsigned(data, at)
-        return [turned(value)], at
-
-    return read
-
-
-def _up_to_eight(data: bytes, at: int, count: int) -> tuple[list[int], int]:
-    """A bit for each number that is not zero, then those."""
-    if count == 1:
-        return _many_signed(data, at, 1)
-    given, values = data[at], []
-    at += 1
-    for k in range(count):
-        value = 0
-        if given >> k & 1:
-            if (byte := data[at]) < 128:
-                value, at = _SIGNED[byte], at + 1
-            else:
-                value, at = _signed(data, at)
-        values.append(value)
-    return values, at
-
-
-def _four(data: bytes, at: int, count: int) -> tuple[list[int], int]:
-    """Two bits for the width of each number (0, 4, 8, 16 bits), then these one behind the other."""
-    widths = [(0, 4, 8, 16)[data[at] >> shift & 3] for shift in (0, 2, 4, 6)]
-    size = -(-sum(widths) // 8)
-    packed, left, values = int.from_bytes(data[at + 1 : at + 1 + size], "big"), 8 * size, []
-    for width in widths:
-        left -= width
-        values.append(_extended(packed >> left, width) if width else 0)
-    return values, at + 1 + size
-
-
-def _three(layouts: tuple) -> Callable[[bytes, int, int], tuple[list[int], int]]:
-    """Three numbers by the layout that the highest two bits choose: bytes, and shift and width of each number.
-
-    The last choice gives each number whole bytes, from one to four, the lowest first.
-    """
-
-    def read(data: bytes, at: int, count: int) -> tuple[list[int], int]:
-        lead = data[at]
-        if lead >> 6 < 3:
-            size, fields = layouts[lead >> 6]
-            packed = int.from_bytes(data[at : at + size], "big")
-            return [_extended(packed >> shift, width) for shift, width in fields], at + size
-        values, at = [], at + 1
-        for shift in (0, 2, 4):
-            size = (lead >> shift & 3) + 1
-            values.append(int.from_bytes(data[at : at + size], "little", signed=True))
-            at += size
-        return values, at
-
-    return read
-
-
-_ENCODINGS: dict[int, tuple[Callable, int]] = {
-    0: (_many_signed, 1),
-    1: (_one(lambda value: value), 1),
-    3: (_one(lambda value: -_extended(value, 14)), 1),
-    6: (_up_to_eight, 8),
-    7: (_three(((1, ((4, 2), (2, 2), (0, 2))), (2, ((8, 4), (4, 4), (0, 4))), (3, ((16, 6), (8, 6), (0, 6))))), 3),
-    8: (_four, 4),
-    9: (lambda data, at, count: ([0], at), 1),
-    10: (_three(((1, ((4, 2), (2, 2), (0, 2))), (2, ((9, 5), (4, 5), (0, 4))), (3, ((14, 8), (7, 7), (0, 7))))), 3),
-}
-"""To the number of an encoding its reader and how many fields it packs together (`_up_to_eight`: at most)."""
-_EVENTS: dict[int, int] = {0: 1, 14: 2, 15: 1, 30: 2}
-"""To an event how many unsigned numbers follow: beep, log resumed, disarmed, flight mode."""
-_RESUMED, _ADJUSTED, _ENDED = 14, 13, 255
-
-
-# Frames -------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class _Predictions:
-    """Which fields of a kind of frame are predicted how: by the frame before, the line through the two before, their
-    mean, a value of the header, a count, or the first motor."""
-
-    constant: tuple[int, ...]
-    straight: tuple[int, ...]
-    mean: tuple[int, ...]
-    fixed: tuple[tuple[int, int], ...]
-    counted: tuple[int, ...]
-    as_read: tuple[int, ...]
-    """By the first motor before it is predicted itself: fields in front of it."""
-    motor: tuple[int, ...]
-    all: tuple[int, ...]
-    unknown: tuple[int, ...]
-
-    @classmethod
-    def of(cls, predictors: list[int], fixed: Mapping[int, int], motor: int) -> _Predictions:
-        """By the numbers of the header; `motor` is the first motor's field."""
-
-        def those(number: int) -> tuple[int, ...]:
-            return tuple(k for k, predictor in enumerate(predictors) if predictor == number)
-
-        return cls(
-            constant=those(1),
-            straight=those(2),
-            mean=those(3),
-            fixed=tuple((k, fixed[p]) for k, p in enumerate(predictors) if p in fixed),
-            counted=those(6),
-            as_read=tuple(k for k in those(5) if k < motor),
-            motor=tuple(k for k in those(5) if k >= motor),
-            all=tuple(k for k, predictor in enumerate(predictors) if predictor),
-            unknown=tuple(p for p in predictors if p not in (0, 1, 2, 3, 5, 6, *fixed)),
-        )
-
-
-class _Frames:
-    """Reads the frames of one session into `values`, a row of fields behind the other."""
-
-    def __init__(self, headers: Mapping[str, str], data: bytes) -> None:
-        self._data, self.values, self.damaged = data, array("q"), 0
-        self.names = tuple(headers.get("Field I name", "").split(","))
-        if not {"time", "loopIteration"} <= set(self.names):
-            raise InputError("the header of the log is damaged: it does not name the fields loopIteration and time")
-        if len(self.names) > _MOST_FIELDS:
-            raise InputError(f"the header of the log is damaged: it names {len(self.names)} fields")
-        self.time, self._iteration = self.names.index("time"), self.names.index("loopIteration")
-        self._motor = self.names.index("motor[0]") if "motor[0]" in self.names else 0
-        self._plans = {}
-        for letter in _FRAMES.decode().replace("E", ""):
-            encodings = _numbers_of(headers, f"Field {letter} encoding")
-            if encodings or letter == "I":
-                count = len(self.names) if letter in "IP" else len(encodings)
-                self._plans[ord(letter)] = _plan(encodings, count, letter)
-        self._predictors = {ord(k): _numbers_of(headers, f"Field {k} predictor") for k in "IP"}
-        if any(len(self._predictors[k]) != len(self.names) for k in self._predictors if k in self._plans):
-            raise InputError("the header of the log is damaged: its lists of fields have different lengths")
-        first = {name: (_numbers_of(headers, name) or [default])[0]
-                 for name, default in (("minthrottle", 1150), ("vbatref", 4095), ("motorOutput", 0))}  # fmt: skip
-        self._fixed = {4: first["minthrottle"], 8: 1500, 9: first["vbatref"], 11: first["motorOutput"]}
-        self._predictions = {k: _Predictions.of(own, self._fixed, self._motor) for k, own in self._predictors.items()}
-        self._zero = [0] * len(self.names)
-        self._key_every = max((_numbers_of(headers, "I interval") or [1])[0], 1)
-        share = [int(n) for n in re.findall(r"\d+", headers.get("P interval", "1"))] or [1]
-        self._of, self._every = (share[0], max(share[1], 1)) if len(share) > 1 else (1, max(share[0], 1))
-        self._history: list[list[int]] = []
-        self._last: tuple[int, int] | None = None
-        """Iteration and time of the last main frame, or of the event that the log resumes."""
-
-    def read(self, at: int) -> bool:
-        """Read from a place on to the event of the end, or of the data; whether that event was there."""
-        data, size, sound = self._data, len(self._data), False
-        while at < size:
-            letter, start = data[at], at
-            if letter == ord("E"):
-                if data.startswith(_END_OF_LOG, at + 2) and data[at + 1] == _ENDED:
-                    return True
-                after = self._event(at + 1)
-            else:
-                after = self._frame(letter, at + 1) if letter in self._plans else None
-            if after is None or not self._begins(after) or after - start > _LONGEST_FRAME:
-                # What is no frame is looked through byte by byte for the next one.
-                self.damaged += sound or letter == ord("I")
-                at, sound = start + 1, False
-                continue
-            if letter in b"IP":
-                sound = self._take(letter, sound)
-                self.damaged += not sound
-            at = after
-        return False
-
-    def _begins(self, at: int) -> bool:
-        return at == len(self._data) or (at < len(self._data) and self._data[at] in _FRAMES)
-
-    def _frame(self, letter: int, at: int) -> int | None:
-        """Where the frame that begins here ends, its numbers in `_now`; None where the data end in it."""
-        self._now: list[int] = []
-        try:
-            for read, count in self._plans[letter]:
-                values, at = read(self._data, at, count)
-                self._now += values
-        except IndexError:
-            return None
-        return at if at <= len(self._data) else None
-
-    def _event(self, at: int) -> int | None:
-        """Where an event ends; None where it is not known, or the data end in it."""
-        data = self._data
-        try:
-            kind, at = data[at], at + 1
-            if kind == _ADJUSTED:
-                return at + 5 if data[at] & 128 else _signed(data, at + 1)[1]
-            if kind not in _EVENTS:
-                return None
-            values = []
-            for _ in range(_EVENTS[kind]):
-                value, at = _unsigned(data, at)
-                values.append(value)
-        except IndexError:
-            return None
-        if kind == _RESUMED and self._begins(at):
-            self._last = values[0], values[1]
-        return at
-
-    def _take(self, letter: int, sound: bool) -> bool:
-        """Add the main frame just read; whether it, and what counts from it, can be relied on."""
-        if letter == ord("P") and not sound:
-            return False
-        now = self._predicted(letter)
-        at = now[self._iteration], now[self.time]
-        follows = self._last is None or (
-            0 <= at[0] - self._last[0] < _LARGEST_STEP and (at[1] - self._last[1]) % _TURN < _LARGEST_STEP_US
-        )
-        self._last = at  # a key frame after a true leap is not taken, the next one is
-        if not follows:
-            return False
-        self._history = [now, now] if letter == ord("I") else [now, self._history[0]]
-        self.values.extend(now)
-        return True
-
-    def _predicted(self, letter: int) -> list[int]:
-        """The fields of a main frame: what was read and its predictions."""
-        now, plan = self._now, self._predictions[letter]
-        if plan.unknown:
-            raise InputError(f"the header of the log is damaged: there is no predictor {plan.unknown[0]}")
-        before, earlier = self._history if letter == ord("P") else (self._zero, self._zero)
-        for k in plan.as_read:
-            now[k] += now[self._motor]
-        for k in plan.constant:
-            now[k] += before[k]
-        for k in plan.straight:
-            now[k] += 2 * before[k] - earlier[k]
-        for k in plan.mean:
-            both = before[k] + earlier[k]
-            now[k] += both + (both < 0) >> 1  # towards zero, as the firmware divides
-        for k, value in plan.fixed:
-            now[k] += value
-        for k in plan.counted:
-            now[k] = before[k] + 1 + self._left_out()
-        for k in plan.motor:
-            now[k] += now[self._motor]
-        if max(now) >= _TURN // 2 or min(now) < -_TURN // 2:
-            for k in plan.all:
-                if not -_TURN // 2 <= now[k] < _TURN // 2:
-                    now[k] = now[k] % _TURN if k == self.time else _extended(now[k], 32)
-        now[self.time] %= _TURN
-        return now
-
-    def _left_out(self) -> int:
-        """Iterations behind the last frame that the log leaves out by its rate."""
-        following = self._history[0][self._iteration] + 1
-        for count in range(self._key_every):
-            if ((following + count) % self._key_every + self._of - 1) % self._every < self._of:
-                return count
-        return 0
-
-
-def _plan(encodings: list[int], count: int, letter: str) -> list[tuple[Callable, int]]:
-    """Readers of the fields of a kind of frame, each with the number of fields that it takes."""
-    plan, k = [], 0
-    while k < len(encodings):
-        if encodings[k] not in _ENCODINGS:
-            raise InputError(f"the header of the log is damaged: there is no encoding {encodings[k]}")
-        read, takes = _ENCODINGS[encodings[k]]
-        if encodings[k] == 6:
-            takes = next((n for n in range(1, 8) if encodings[k + n : k + n + 1] != [6]), 8)
-        while encodings[k] == 0 and encodings[k + takes : k + takes + 1] == [0]:
-            takes += 1
-        plan.append((read, takes))
-        k += takes
-    if k != count:
-        raise InputError(f"the header of the log is damaged: the fields of frames {letter} are packed for {k} numbers")
-    return plan
-
-
-def _numbers_of(headers: Mapping[str, str], name: str) -> list[int]:
-    """Whole numbers of a header's list; empty where it is not there or holds something else."""
-    parts = headers.get(name, "").split(",")
-    return [int(p) for p in parts] if all(re.fullmatch(r"-?\d{1,10}", p.strip()) for p in parts) else []
-
-
 _EXPORTED_LINE = re.compile(rb'^"([^"\n]{1,80})","?([^"\n]*)"?\r?$', re.MULTILINE)
 _LARGEST_HEADER = 65_536
 _NO_SETTING = re.compile(
@@ -701,7 +344,7 @@ def _stated_parameters(path: Path) -> dict[str, str]:
     """The settings in the header of a blackbox's first session, or of its export, as text."""
     head = Path(path).read_bytes()[:_LARGEST_HEADER]
     out: dict[str, str] = {}
-    for line in (_EXPORTED_LINE if head.startswith(b'"') else _HEADER_LINE).finditer(head):
+    for line in (_EXPORTED_LINE if head.startswith(b'"') else HEADER_LINE).finditer(head):
         name, value = (part.decode("utf-8", "replace").strip() for part in line.groups())
         if name == "Product" and out:  # that of the next session
             break
@@ -712,9 +355,10 @@ def _stated_parameters(path: Path) -> dict[str, str]:
 
 IMPORTER = Importer(
     "betaflight",
-    "Betaflight blackbox, and its export by Blackbox Explorer",
+    "blackbox of Betaflight, iNAV and EmuFlight, and its export by Blackbox Explorer",
     _read,
-    "every session, a broken-off one too: gyroscope, accelerometer, motors, `eRPM`, battery, by the header's units",
+    "every session, a broken-off one too: gyroscope, accelerometer, motors, `eRPM`, battery, by the units of the "
+    "header; iNAV's attitude, position and velocity where it trusts them",
     starts=(_FIRST_LINE, b'"Product","Blackbox'),
     inside=(_FIRST_LINE,),
     template="five-inch",

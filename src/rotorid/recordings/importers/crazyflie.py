@@ -35,7 +35,7 @@ from zlib import crc32
 
 import numpy as np
 import pandas as pd
-from scipy.spatial.transform import Rotation
+import scipy
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
@@ -165,9 +165,9 @@ def attitude_without_pitch(
     body z and air drag is small. Returns quaternions (n, 4), scalar first, and body specific force (n, 3) in
     g; its x component is zero by construction and so no measurement.
     """
-    level = Rotation.from_euler("Z", yaw_rad[:, None]).inv().apply(specific_force_world_g)
+    level = scipy.spatial.transform.Rotation.from_euler("Z", yaw_rad[:, None]).inv().apply(specific_force_world_g)
     pitch = np.arctan2(level[:, 0], level[:, 2])
-    attitude = Rotation.from_euler("ZYX", np.column_stack([yaw_rad, pitch, roll_rad]))
+    attitude = scipy.spatial.transform.Rotation.from_euler("ZYX", np.column_stack([yaw_rad, pitch, roll_rad]))
     return attitude.as_quat()[:, [3, 0, 1, 2]], attitude.inv().apply(specific_force_world_g)
 
 
@@ -187,7 +187,8 @@ def convert(log: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
                 break
     if not set(c.VELOCITY) & set(columns) and set(BODY_VELOCITY) <= set(log.columns) and c.QUATERNION[0] in columns:
         xyzw = np.column_stack([columns[n] for n in c.QUATERNION])[:, [1, 2, 3, 0]]
-        put(c.VELOCITY, Rotation.from_quat(xyzw).apply(half_turn_about_x(log[list(BODY_VELOCITY)].to_numpy(float))))
+        turn = scipy.spatial.transform.Rotation.from_quat(xyzw)
+        put(c.VELOCITY, turn.apply(half_turn_about_x(log[list(BODY_VELOCITY)].to_numpy(float))))
     names = _names("stateEstimate", "ax ay az roll yaw")
     if c.QUATERNION[0] not in columns and set(names) <= set(log.columns):
         estimate, (roll, yaw) = log[list(names[:3])].to_numpy(float), np.radians(log[list(names[3:])].to_numpy(float)).T

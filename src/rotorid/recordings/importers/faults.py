@@ -17,6 +17,7 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
+from rotorid.recordings.importers.endings import ending
 from rotorid.recordings.mended import by_sense
 from rotorid.recordings.run import stretches
 
@@ -52,6 +53,7 @@ _OUTSIDE = 0.01
 
 
 SET_BACK = "clock_set_back"
+ENDING = "ending"
 
 
 @dataclass(frozen=True)
@@ -120,6 +122,14 @@ class ImportReport:
 def read_report(folder: Path) -> dict:
     """The import report of a set's folder."""
     return json.loads((Path(folder) / FILE_NAME).read_text(encoding="utf-8"))
+
+
+def endings_of(folder: Path) -> tuple[str, ...]:
+    """What the import saw in the last seconds of a set's flights; empty where there is no report of it."""
+    try:
+        return tuple(str(fault["sentence"]) for fault in read_report(folder)["faults"] if fault["kind"] == ENDING)
+    except (OSError, ValueError, KeyError, TypeError):
+        return ()
 
 
 def drop_repeated_times(table: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
@@ -570,6 +580,8 @@ def flights(
         runs[run] = part.dropna(axis=1, how="all")
         seen = f"in the air from {start:.2f} to {stop:.2f} s of {time_s[-1]:.0f} s"
         cuts.append(ImportFault("cut", c.TIME, seen, f"{first:.2f} to {last:.2f} s kept", len(table) - len(part), run))
+        if happened := ending(table, start, stop):
+            cuts.append(ImportFault(ENDING, "", *happened, 0, run))
     if not runs:
         raise InputError(f"{where}: next to no samples of its {len(found)} flights are there")
     return runs, cuts

@@ -44,12 +44,13 @@ from rotorid.io.text.files import (
 )
 from rotorid.io.text.wording import printable
 from rotorid.io.text.writing import only_writer, staging, take_name, take_place
-from rotorid.recordings import Run, read_vehicle, templates
+from rotorid.recordings import RecordingSet, Run, read_vehicle, templates
 from rotorid.recordings import columns as c
 from rotorid.recordings.files import (
     VEHICLE,
     check_manifest,
     listed_runs,
+    proposed_in,
     run_files,
     run_name,
     sha256,
@@ -98,8 +99,6 @@ def importers() -> dict[str, Importer]:
 
 def importer_of(path: Path) -> Importer:
     """The importer that reads a log; InputError for what is none."""
-    # Times from 1998 to 2128 in µs, as telemetry logs of MAVLink have them before each message.
-    epochs_us = (9e14, 5e15)
     head = b""
     if not path.is_dir():
         check_file(path)
@@ -110,13 +109,6 @@ def importer_of(path: Path) -> Importer:
     known = importers().values()
     if found := next((i for i in known if head.startswith(i.starts)), None):
         return found
-    epoch = epochs_us[0] < int.from_bytes(head[:8], "big") < epochs_us[1]
-    if head[8:9] in (b"\xfe", b"\xfd") and (epoch or path.suffix.lower() in (".tlog", ".rlog")):
-        raise InputError(
-            f"{path}: a telemetry log of MAVLink, which is not read; take the autopilot's own log (.bin, .ulg), or "
-            "make a table of it (`pip install pymavlink`, then `mavlogdump.py --format csv --types "
-            f"RAW_IMU,ATTITUDE,SERVO_OUTPUT_RAW {path.name} > flight.csv`) and import that"
-        )
     by_content = (i for i in known if i.recognises(path, head) or any(words in head for words in i.inside))
     if found := next(by_content, None):
         return found
@@ -301,6 +293,12 @@ class SetOfLogs:
     def sentences(self) -> tuple[str, ...]:
         """The faults in words, each once."""
         return tuple(fault.sentence for fault in self.faults)
+
+    def recordings(self) -> RecordingSet:
+        """The set without files of its own, as `write` and `read_set` would give it."""
+        believed = vehicle_of(parse_yaml(self.vehicle_text, "the vehicle"), "the vehicle")
+        runs = tuple(Run(name, table) for name, table in sorted(self.runs.items()))
+        return RecordingSet(self.name, believed, runs, proposed=proposed_in(self.vehicle_text))
 
     def write(self, folder: Path, as_csv: bool = False) -> None:
         """Write `vehicle.yaml` (unless it was there and is kept), a file a run, a report and the list of the runs.

@@ -8,6 +8,7 @@ A mapping names columns, units and frames::
       time: {columns: [t], unit: us}
       specific_force: {columns: [ax, ay, az], unit: g}
       attitude: {columns: [qx, qy, qz, qw], form: xyzw}       # wxyz | xyzw | euler | euler_xyz (roll, pitch, yaw)
+      attitude: {columns: [RX, RY, RZ], form: rotvec, unit: deg}          # one turn about an axis, as Vicon writes it
       attitude: {columns: [roll, pitch, heading], form: euler, unit: ddeg, signs: [1, -1, 1]}   # of any channel
       velocity: {columns: [vx, vy, vz], unit: m/s, axes: body}  # world (default) | body
       position: {columns: [x, y, z], unit: m, world: neu}       # where its axes are not those of the attitude
@@ -39,8 +40,8 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
+import scipy
 from pydantic import ValidationError
-from scipy.spatial.transform import Rotation
 
 from rotorid.errors import InputError
 from rotorid.io.models import KnownKeys
@@ -175,7 +176,7 @@ class MappedChannel(KnownKeys, frozen=True):
     """What one count is in the unit."""
     signs: tuple[Literal[1, -1], ...] | Literal["?"] | None = None
     """By which each column is multiplied: 1 or -1 (an angle that is positive nose down, where the axes want it up)."""
-    form: Literal["wxyz", "xyzw", "euler", "euler_xyz", "?"] = "wxyz"
+    form: Literal["wxyz", "xyzw", "euler", "euler_xyz", "rotvec", "?"] = "wxyz"
     """Attitude only."""
     axes: Literal["world", "body", "?"] = "world"
     """Velocity only."""
@@ -198,6 +199,8 @@ class Mapping(KnownKeys, frozen=True):
 
 EULER = {"euler": "ZYX", "euler_xyz": "XYZ"}
 """Orders of the turns about the axes of the body as they come."""
+THREE = (*EULER, "rotvec")
+"""Forms of an attitude that have three angles."""
 OPEN = "?"
 """What stands for an answer that only a person can give."""
 
@@ -211,7 +214,7 @@ def _open_questions(mapping: Mapping) -> list[str]:
         expected = {
             "columns": "a column's name",
             "unit": " or ".join(units),
-            "form": "wxyz, xyzw, euler or euler_xyz",
+            "form": "wxyz, xyzw, euler, euler_xyz or rotvec",
             "axes": "world or body",
             "world": " or ".join(TRAVEL),
             "scale": "what one count is in the unit",
@@ -248,7 +251,7 @@ def read_mapping(path: Path) -> Mapping:
             raise InputError(f"{path}: {name}: unit {channel.unit!r}, expected one of {', '.join(known)}")
         wanted = len(CHANNELS[name][1])
         if name == "attitude":
-            wanted = 3 if channel.form in EULER else 4
+            wanted = 3 if channel.form in THREE else 4
         if channel.range is not None and not channel.range[1] > channel.range[0]:
             low, high = channel.range
             raise InputError(f"{path}: {name}: range [{low:g}, {high:g}], expected no throttle below full throttle")
@@ -385,7 +388,7 @@ def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFra
         if name == "throttle" and channel.range is not None:
             low, high = channel.range
             values = (values - low) / (high - low)
-        elif name != "attitude" or channel.form in EULER:
+        elif name != "attitude" or channel.form in THREE:
             values = converted(values, kind, channel.unit)
         if channel.unit in ELECTRICAL:
             values = values / (channel.poles / 2)
@@ -404,7 +407,7 @@ def convert(raw: pd.DataFrame, mapping: Mapping, where: str) -> tuple[pd.DataFra
                 raise InputError(f"{where}: velocity in body axes needs an attitude to be turned into the world")
             known = np.isfinite(values).all(axis=1) & np.isfinite(rotation).all(axis=1)
             turned = np.full_like(values, np.nan)
-            turn = Rotation.from_quat(rotation[known][:, [1, 2, 3, 0]])
+            turn = scipy.spatial.transform.Rotation.from_quat(rotation[known][:, [1, 2, 3, 0]])
             turned[known] = turn.apply(values[known] @ body.T)
             values = turned
         if not columns:
@@ -446,24 +449,28 @@ def _numbers(raw: pd.DataFrame, columns, channel: str, where: str) -> pd.DataFra
     return numbers(raw[list(dict.fromkeys(columns))], where)
 
 
-def from_angles(angles: np.ndarray, form: str) -> Rotation:
-    """Rotations by roll, pitch and yaw (n, 3), rad, in one of the orders of `EULER`."""
-    return Rotation.from_euler(EULER[form], angles if form == "euler_xyz" else angles[:, ::-1])
+def from_angles(angles: np.ndarray, form: str) -> scipy.spatial.transform.Rotation:
+    """Rotations by angles (n, 3), rad: roll, pitch and yaw in one of the orders of `EULER`, or a rotation vector."""
+    if form == "rotvec":
+        return scipy.spatial.transform.Rotation.from_rotvec(angles)
+    return scipy.spatial.transform.Rotation.from_euler(EULER[form], angles if form == "euler_xyz" else angles[:, ::-1])
 
 
 def _attitude(values: np.ndarray, form: str, body: np.ndarray, world: np.ndarray) -> np.ndarray:
     """Quaternions (n, 4), scalar first, FRD to NED; NaN where a value is missing."""
     out = np.full((len(values), 4), np.nan)
     known = np.isfinite(values).all(axis=1)
-    if form not in EULER:
+    if form not in THREE:
         known &= np.linalg.norm(values, axis=1) > 0
     # In pieces: turns take some times the memory of what they are made of.
     for rows in np.array_split(np.flatnonzero(known), known.sum() // MANY_ROWS + 1):
-        if form in EULER:
+        if form in THREE:
             turn = from_angles(values[rows], form)
         else:
-            turn = Rotation.from_quat(values[rows] if form == "xyzw" else values[rows][:, [1, 2, 3, 0]])
-        turn = Rotation.from_matrix(world) * turn * Rotation.from_matrix(body).inv()
+            xyzw = values[rows] if form == "xyzw" else values[rows][:, [1, 2, 3, 0]]
+            turn = scipy.spatial.transform.Rotation.from_quat(xyzw)
+        to_world, to_body = (scipy.spatial.transform.Rotation.from_matrix(axes) for axes in (world, body))
+        turn = to_world * turn * to_body.inv()
         out[rows] = turn.as_quat()[:, [3, 0, 1, 2]]
     out[known] = continuous(out[known])
     return out

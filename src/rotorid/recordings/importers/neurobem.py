@@ -13,8 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.io import loadmat
-from scipy.spatial.transform import Rotation
+import scipy
 
 from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
@@ -39,7 +38,7 @@ def _read_matrix(path: Path) -> np.ndarray:
     if not Path(path).is_file():
         raise InputError(f"{path}: file is missing")
     try:
-        content = loadmat(path)
+        content = scipy.io.loadmat(path)
     except MemoryError:
         raise
     except Exception as error:
@@ -55,7 +54,7 @@ def _convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[ImportFault]]:
     """Contract columns of a NeuroBEM matrix; NeuroBEM's prediction and accelerations ride as own columns."""
     ends = np.cumsum([width for _, width in _LAYOUT])
     parts = {name: part for (name, _), part in zip(_LAYOUT, np.split(matrix, ends, axis=1), strict=False)}
-    attitude = Rotation.from_quat(parts["quaternion_xyzw"])
+    attitude = scipy.spatial.transform.Rotation.from_quat(parts["quaternion_xyzw"])
     vectors = {
         c.POSITION: parts["position"],
         c.VELOCITY: attitude.apply(parts["velocity_body"]),

@@ -33,7 +33,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.spatial.transform import Rotation
+import scipy
 
 from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
@@ -557,7 +557,7 @@ def _velocity(series: dict[str, list[_TopicSeries]], faults: list[ImportFault]) 
     readings = {"velocity": velocity.values}
     if attitude is not None:
         nearest = np.searchsorted((attitude.time_s[1:] + attitude.time_s[:-1]) / 2, velocity.time_s)
-        turn = Rotation.from_quat(attitude.values[nearest][:, [1, 2, 3, 0]])
+        turn = scipy.spatial.transform.Rotation.from_quat(attitude.values[nearest][:, [1, 2, 3, 0]])
         readings["body_velocity"] = turn.apply(velocity.values)
     elif stated == "body_velocity":
         seen = f"the velocity of {velocity.topic} is in body axes, and no topic states an attitude"

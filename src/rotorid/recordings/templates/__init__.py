@@ -29,4 +29,4 @@ def text(name: str) -> str:
 
 def read(name: str) -> Vehicle:
     """A template vehicle; InputError as `text`."""
-    return vehicle_of(parse_yaml(text(name), f"{name}.yaml"), f"{name}.yaml")
+    return vehicle_of(parse_yaml(text(name), f"{name}.yaml", compiled=True), f"{name}.yaml")

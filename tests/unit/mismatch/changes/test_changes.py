@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.constants import g
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
@@ -21,6 +22,7 @@ from rotorid.recordings import RecordingSet, Vehicle, write_set
 from rotorid.recordings import columns as c
 from rotorid.report.page import make_changes_page
 from tests.command_line import answer, refusal
+from tests.refusals import refused
 from tests.unit.mismatch.flights import Flight, recorded
 
 
@@ -234,3 +236,14 @@ def test_a_payload_that_came_to_hang_below_the_vehicle_is_named_with_its_mass():
 def test_without_a_payload_nothing_hangs():
     found = changes_between(recorded(1, 2), recorded(3, 4, flight={"excitation": 1.5}))
     assert "payload" not in {i for c in found.changes for i in (c.id, *c.alternatives)}
+
+
+def test_a_comparison_has_one_thread_of_linear_algebra(monkeypatch) -> None:
+    """Two that wait for each other take several times as long."""
+
+    def threads(sets: object) -> None:
+        raise InputError(str({own["num_threads"] for own in threadpool_info() if own["user_api"] == "blas"}))
+
+    monkeypatch.setattr("rotorid.mismatch.changes.compare.of_one_vehicle", threads)
+    with threadpool_limits(2):
+        refused(r"\{1\}", changes_between, None, None)

@@ -2,6 +2,8 @@
 which values depend, over its range."""
 
 import struct
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +12,7 @@ import pytest
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers import betaflight as format_
+from rotorid.recordings.importers import blackbox as format_
 from rotorid.recordings.importers.betaflight import convert, throttles
 from rotorid.recordings.importers.faults import moving_on
 from rotorid.recordings.importers.logfile import read_log
@@ -503,3 +505,10 @@ def test_a_session_that_holds_no_flight_is_named(tmp_path: Path) -> None:
     path.write_bytes(flight() + END + HEAD + END)
     found = read_log(path)
     assert len(found.runs) == 1 and "session 2" in " ".join(f.sentence for f in found.faults)
+
+
+def test_the_readers_load_nothing_that_takes_time_before_a_log_needs_it() -> None:
+    """Each of these takes a tenth of a second or more."""
+    heavy = "('scipy.spatial', 'scipy.io', 'scipy.optimize', 'numba')"
+    read = f"import sys, rotorid.recordings.importers.logfile; sys.exit(any(m in sys.modules for m in {heavy}))"
+    assert subprocess.run([sys.executable, "-c", read]).returncode == 0

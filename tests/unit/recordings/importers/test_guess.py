@@ -389,6 +389,30 @@ def test_the_order_of_roll_pitch_and_yaw_is_decided_by_the_gyroscope(
     assert (read.inv() * turn).magnitude().max() < 1e-6
 
 
+@pytest.mark.parametrize("unit", ["rad", "deg"])
+@pytest.mark.parametrize("gyroscope", [True, False])
+def test_vicons_rotation_vector(flown: pd.DataFrame, unit: str, gyroscope: bool) -> None:
+    """RX, RY, RZ next to a place in mm: a gyroscope shows that they are one turn about an axis, else it is asked."""
+    table = plain(flown)
+    turn = Rotation.from_quat(table[["qx", "qy", "qz", "qw"]].to_numpy())
+    place = {f"T{a} mm": 1000 * flown[name] for a, name in zip("XYZ", c.POSITION, strict=True)}
+    angles = dict(zip((f"R{a} {unit}" for a in "XYZ"), turn.as_rotvec().T / UNITS["angle"][unit], strict=True))
+    own = table[["t_s", *(n for n in table if n.startswith(("gyro", "acc")) and gyroscope)]].assign(**angles, **place)
+    found = guess(own)
+    attitude, position = (found.mapping.channels[name] for name in ("attitude", "position"))
+    assert (attitude.columns, attitude.unit, position.unit) == (tuple(angles), unit, "mm"), found.open
+    assert attitude.form == ("rotvec" if gyroscope else "?")
+    answers = {
+        "attitude": attitude.model_copy(update={"form": "rotvec"}),
+        "position": position.model_copy(update={"world": None}),
+    }
+    channels = dict(found.mapping.channels) | answers
+    sure = found.mapping.model_copy(update={"channels": channels, "body": "frd", "world": "ned"})
+    made, _ = convert(own, sure, "own.csv")
+    read = Rotation.from_quat(made[list(c.QUATERNION)].to_numpy()[:, [1, 2, 3, 0]])
+    assert (read.inv() * turn).magnitude().max() < 1e-6
+
+
 @pytest.mark.parametrize(("names", "unit"), [(("roll", "pitch", "heading"), "deg"), (("attitude[{}]",) * 3, "ddeg")])
 @pytest.mark.parametrize(("body", "signs"), [("frd", (1, -1, 1)), ("flu", (1, 1, -1))])
 def test_angles_have_the_signs_that_the_gyroscope_shows(flown, names, unit: str, body: str, signs) -> None:
@@ -527,13 +551,6 @@ def test_the_body_rates_of_mavlinks_attitude(flown: pd.DataFrame) -> None:
     found = guess(plain(flown).drop(columns=["qw", "qx", "qy", "qz"]).rename(columns=names))
     assert found.mapping.channels["angular_velocity"].columns == tuple(names.values())
     assert found.mapping.channels["angular_velocity"].unit == "rad/s"
-
-
-def test_a_telemetry_log_points_to_its_converter(tmp_path: Path) -> None:
-    path = tmp_path / "flight.tlog"
-    path.write_bytes((1_700_000_000_000_000).to_bytes(8, "big") + b"\xfd\x09" + bytes(40))
-    said = refusal("import", path, "-o", tmp_path / "set")
-    assert "mavlogdump.py --format csv" in said and "flight.tlog" in said
 
 
 def test_columns_that_hold_nothing_are_no_channels() -> None:

@@ -15,8 +15,9 @@ from scipy.spatial.transform import Rotation
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
+from rotorid.recordings import read_set
 from rotorid.recordings.importers.known import ORDERS, quad_x
-from rotorid.recordings.importers.logfile import importer_of, read_log
+from rotorid.recordings.importers.logfile import importer_of, read_log, set_of_logs
 from tests.command_line import answer, invoke, refusal
 from tests.public_logs import public
 from tests.refusals import refused
@@ -82,8 +83,13 @@ def signed_vb(value: int) -> bytes:
     return bytes([*out, rest])
 
 
-def blackbox(truth: pd.DataFrame, firmware: str = "Betaflight 4.4.2 (abc) STM32F7X2") -> bytes:
-    """A blackbox log of key frames alone: forward-left-up, deg/s, 2048 to 1 g, DShot, eRPM in hundreds."""
+def blackbox(
+    truth: pd.DataFrame, firmware: str = "Betaflight 4.4.2 (abc) STM32F7X2", stated: tuple[str, ...] = (), **fields
+) -> bytes:
+    """A blackbox log of key frames alone: forward-left-up, deg/s, 2048 to 1 g, DShot, eRPM in hundreds.
+
+    `stated` are more lines of its header, `fields` more fields, or others in place of these (None: without).
+    """
     names = ["loopIteration", "time", *(f"gyroADC[{i}]" for i in range(3)), *(f"accSmooth[{i}]" for i in range(3)),
              *(f"motor[{i}]" for i in range(4)), *(f"eRPM[{i}]" for i in range(4)), "vbatLatest"]  # fmt: skip
     rates = np.degrees(truth[list(c.ANGULAR_VELOCITY)].to_numpy() @ FLU) * 10  # gyro_scale 0.1
@@ -94,6 +100,8 @@ def blackbox(truth: pd.DataFrame, firmware: str = "Betaflight 4.4.2 (abc) STM32F
     columns = [
         count, truth[c.TIME] * 1e6 + 5e6, *rates.T, *force.T, *motors.T, *turns.T, truth["battery_voltage_v"] * 100,
     ]  # fmt: skip
+    written = dict(zip(names, columns, strict=True)) | fields
+    names, columns = zip(*((n, column) for n, column in written.items() if column is not None), strict=True)
     scale = struct.unpack("<I", struct.pack("<f", 0.1))[0]
     zeros, ones = ",".join("0" * len(names)), ",".join("1" * len(names))
     lines = [
@@ -102,6 +110,7 @@ def blackbox(truth: pd.DataFrame, firmware: str = "Betaflight 4.4.2 (abc) STM32F
         f"Field I encoding:{zeros}", f"Field P predictor:{zeros}", f"Field P encoding:{zeros}",
         f"Firmware revision:{firmware}", "minthrottle:1070", "maxthrottle:2000", "vbatref:1600",
         f"gyro_scale:0x{scale:08x}", "acc_1G:2048", "motorOutput:158,2047", "motor_poles:14",
+        *stated,
     ]  # fmt: skip
     head = "".join(f"H {line}\n" for line in lines).encode()
     table = np.rint(np.column_stack(columns)).astype(int)
@@ -124,10 +133,59 @@ def test_betaflight(tmp_path: Path) -> None:
     assert run[c.SPECIFIC_FORCE[2]].mean() == pytest.approx(-9.81, abs=0.3)
 
 
-def test_blackbox_of_another_firmware_is_refused(tmp_path: Path) -> None:
+def inav(truth: pd.DataFrame, trusted: np.ndarray | int = 5) -> dict[str, np.ndarray]:
+    """Fields of iNAV: tenths of a degree, the nose lowered by a positive pitch; cm and cm/s, north-east-up; 0.01 V."""
+    yaw, pitch, roll = Rotation.from_quat(truth[list(c.QUATERNION)].to_numpy()[:, [1, 2, 3, 0]]).as_euler("ZYX").T
+    attitude = np.degrees([roll, -pitch, yaw % (2 * np.pi)]) * 10
+    fields = {f"attitude[{k}]": attitude[k] for k in range(3)}
+    for field, names in (("navPos", c.POSITION), ("navVel", c.VELOCITY)):
+        fields |= {f"{field}[{k}]": (100, 100, -100)[k] * truth[name] for k, name in enumerate(names)}
+    none = {f"eRPM[{k}]": None for k in range(4)} | {"vbatLatest": None}
+    return none | fields | {"vbat": truth["battery_voltage_v"] * 100, "navFlags": trusted + np.zeros(len(truth))}
+
+
+def test_blackbox_of_inav(tmp_path: Path) -> None:
+    path, truth = tmp_path / "LOG00001.TXT", flown()
+    path.write_bytes(blackbox(truth, "INAV 7.1.2 (abc) MATEKF405", **inav(truth)))
+    (run,) = read_log(path).runs.values()
+    check_against(run, truth, (*BODY, *THROTTLES), 2.5e-3)
+    check_against(run, truth, (*STATE, c.BATTERY_VOLTAGE), 1e-3, half_step=5e-3)
+
+
+def test_places_that_inav_does_not_trust_are_empty(tmp_path: Path) -> None:
+    path, truth = tmp_path / "LOG00001.TXT", flown()
+    trusted = np.where(np.arange(len(truth)) < len(truth) // 2, 5, 1)
+    path.write_bytes(blackbox(truth, "INAV 7.1.2 (abc) MATEKF405", **inav(truth, trusted)))
+    (run,) = read_log(path).runs.values()
+    assert run[c.POSITION[2]].notna().all() and 0.3 < run[c.VELOCITY[0]].notna().mean() < 0.7
+    path.write_bytes(blackbox(truth, "INAV 1.7.2 (abc) MATEKF405", **inav(truth, 0)))
+    found = read_log(path)
+    (run,) = found.runs.values()
+    assert not {*c.POSITION, *c.VELOCITY, c.BATTERY_VOLTAGE} & set(run) and c.QUATERNION[0] in run
+    assert "vbatLatest: the header does not state" in " ".join(f.sentence for f in found.faults)
+
+
+@pytest.mark.parametrize(("cells", "volts"), [("33,35,43", 10), ("330,350,430", 100)])
+def test_blackbox_of_emuflight(tmp_path: Path, cells: str, volts: int) -> None:
+    path, truth = tmp_path / "LOG00001.BBL", flown()
+    counts = truth["battery_voltage_v"] * volts
+    stated = (f"vbatcellvoltage:{cells}",)
+    path.write_bytes(blackbox(truth, "EmuFlight 3.7.0 (abc) HELIOSPRING", stated, vbatLatest=counts))
+    (run,) = read_log(path).runs.values()
+    check_against(run, truth, (*BODY, *THROTTLES, c.BATTERY_VOLTAGE), 2.5e-3, half_step=0.5 / volts)
+
+
+@pytest.mark.parametrize(
+    ("firmware", "why"),
+    [
+        ("Rotorflight 4.3.0 (abc) STM32F7", "of a helicopter"),
+        ("Baseflight 1.0", "only the axes and units of Betaflight"),
+    ],
+)
+def test_blackbox_of_another_firmware_is_refused(tmp_path: Path, firmware: str, why: str) -> None:
     path = tmp_path / "LOG.TXT"
-    path.write_bytes(blackbox(flown(), "INAV 6.1.1 (abc) MATEKF405"))
-    refused("blackbox log of INAV", read_log, path)
+    path.write_bytes(blackbox(flown(), firmware))
+    refused(f"{firmware.split()[0]}.*{why}|{why}.*{firmware.split()[0]}", read_log, path)
 
 
 # ArduPilot ----------------------------------------------------------------------------------------
@@ -388,13 +446,13 @@ def test_dataflash_needs_no_package_of_others(tmp_path: Path, monkeypatch) -> No
         (b"\0" + b"ULog\x01\x12\x35\x01", "px4"),
         (b"\xbc\x02\x00\x01\x00\x07\x00fixedFrequency\0", "crazyflie"),
         (b"\xbc\xff\xff\xff\xff\x07\x00\x01", None),
-        ((1_700_000_000_000_000).to_bytes(8, "big") + b"\xfd" + bytes(40), None),
+        ((1_700_000_000_000_000).to_bytes(8, "big") + b"\xfd" + bytes(40), "mavlink"),
     ],
 )
 def test_a_format_is_recognised_by_more_than_its_first_byte(tmp_path: Path, start: bytes, name: str | None) -> None:
     (tmp_path / "log.dat").write_bytes(start + bytes(60))
     if name is None:
-        refused("not a log that rotorid knows|telemetry log of MAVLink", importer_of, tmp_path / "log.dat")
+        refused("not a log that rotorid knows", importer_of, tmp_path / "log.dat")
     else:
         assert importer_of(tmp_path / "log.dat").name == name
 
@@ -458,3 +516,17 @@ def test_a_table_with_the_names_of_the_crazyflies_firmware(
     check_against(run, truth, (*BODY, *c.QUATERNION, *c.VELOCITY, *THROTTLES), 1e-6)
     table.drop(columns=clock).to_csv(path, index=False)
     refused("the clock: no column is named as a time", read_log, path)
+
+
+def test_a_set_in_memory_is_the_one_that_its_files_give(tmp_path: Path) -> None:
+    path = tmp_path / "LOG00001.BFL"
+    path.write_bytes(blackbox(flown()))
+    made = set_of_logs([path], "own", mass_kg=0.6)
+    made.write(tmp_path / "own")
+    one, other = made.recordings(), read_set(tmp_path / "own")
+    assert (one.name, one.vehicle, one.proposed, one.left_out) == (
+        other.name, other.vehicle, other.proposed, other.left_out
+    )  # fmt: skip
+    assert [run.name for run in one.runs] == [run.name for run in other.runs]
+    for mine, theirs in zip(one.runs, other.runs, strict=True):
+        pd.testing.assert_frame_equal(mine.table, theirs.table)

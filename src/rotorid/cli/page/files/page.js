@@ -75,9 +75,9 @@ async function take(files) {
     clearTimeout(timer);
     const mine = ++token, { id } = await ask("POST", "sets");
     try {
-      for (const file of files) {
+      for (const { file, bag } of files) {
         say(`Taking ${file.name}, ${size(file.size)} …`);
-        await ask("PUT", `sets/${id}/logs/${encodeURIComponent(file.name)}`, file);
+        await ask("PUT", `sets/${id}/logs/${encodeURIComponent(file.name)}?bag=${encodeURIComponent(bag)}`, file);
       }
     } catch (error) {
       await ask("DELETE", `sets/${id}`).catch(() => null);
@@ -90,15 +90,24 @@ async function take(files) {
     else say(`${state.name} is in the list.`);
   });
 }
-$("logs").addEventListener("change", (event) => { take([...event.target.files]); event.target.value = ""; });
+const plain = (files) => [...files].map((file) => ({ file, bag: "" }));
+const fileOf = (entry) => new Promise((found, failed) => entry.file(found, failed));
+// The files right in a folder; those of a ROS 2 bag stay together.
+async function inside(folder) {
+  const reader = folder.createReader(), entries = [];
+  for (let part = null; !part || part.length; entries.push(...part)) part = await new Promise((found, failed) => reader.readEntries(found, failed));
+  const bag = entries.some((e) => e.name === "metadata.yaml") ? folder.name : "";
+  return Promise.all(entries.filter((e) => e.isFile && !e.name.startsWith(".")).map(async (e) => ({ file: await fileOf(e), bag })));
+}
+$("logs").addEventListener("change", (event) => { take(plain(event.target.files)); event.target.value = ""; });
 for (const name of ["dragenter", "dragover"]) document.addEventListener(name, (e) => { e.preventDefault(); $("zone").classList.add("over"); });
 document.addEventListener("dragleave", (e) => { if (!e.relatedTarget) $("zone").classList.remove("over"); });
 document.addEventListener("drop", (e) => {
   e.preventDefault();
   $("zone").classList.remove("over");
   const items = [...e.dataTransfer.items].map((i) => i.webkitGetAsEntry && i.webkitGetAsEntry());
-  if (items.some((i) => i && i.isDirectory)) warn("Drop the log files themselves; of a folder nothing was taken.");
-  else take([...e.dataTransfer.files]);
+  if (!items.some((i) => i && i.isDirectory)) { take(plain(e.dataTransfer.files)); return; }
+  guarded(async () => take((await Promise.all(items.filter(Boolean).map(async (i) => (i.isDirectory ? inside(i) : [{ file: await fileOf(i), bag: "" }])))).flat()));
 });
 
 // The set that is shown -----------------------------------------------------------------------------

@@ -112,6 +112,8 @@ def _guess_time(draft: Draft) -> None:
     name = named.scalar(draft.table.columns, "time")
     if name is None:
         question = "no column is named as a time, and without one nothing can be imported"
+        if frame := next((str(n) for n in draft.table if str(n).lower() == "frame"), ""):
+            question += f" (columns: [{frame}], unit: s, scale: 0.01 where 100 frames come in a second)"
         draft.put("time", [OPEN], "", question, unit=OPEN)
         return
     draft.table = join_rows(in_order(draft.table, name)[0], name)

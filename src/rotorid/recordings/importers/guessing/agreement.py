@@ -12,7 +12,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pandas as pd
 import scipy
-from scipy.spatial.transform import Rotation
 
 from rotorid.recordings.importers.guessing import names as named
 from rotorid.recordings.importers.guessing.names import Family
@@ -110,15 +109,15 @@ def turned(instants: np.ndarray, time_s: np.ndarray, wxyz: np.ndarray) -> np.nda
     both = known[1:] & known[:-1]
     full = np.full((len(instants), 4), [0.0, 0.0, 0.0, 1.0])
     full[known] = rotation.as_quat()
-    every = Rotation.from_quat(full)
+    every = scipy.spatial.transform.Rotation.from_quat(full)
     out[both] = (every[:-1].inv() * every[1:]).as_rotvec()[both]
     return out
 
 
-def rotations(wxyz: np.ndarray) -> tuple[Rotation, np.ndarray] | None:
+def rotations(wxyz: np.ndarray) -> tuple[scipy.spatial.transform.Rotation, np.ndarray] | None:
     """Rotations of the quaternions (n, 4) that are known, and their mask; None where there is none."""
     known = np.isfinite(wxyz).all(axis=1) & (np.linalg.norm(np.nan_to_num(wxyz), axis=1) > 1e-6)
-    return (Rotation.from_quat(wxyz[known][:, [1, 2, 3, 0]]), known) if known.any() else None
+    return (scipy.spatial.transform.Rotation.from_quat(wxyz[known][:, [1, 2, 3, 0]]), known) if known.any() else None
 
 
 def into_world(time_s: np.ndarray, wxyz: np.ndarray, vectors: np.ndarray) -> np.ndarray:

@@ -25,7 +25,7 @@ from rotorid.recordings.importers.guessing.agreement import (
     unit_by_factor,
 )
 from rotorid.recordings.importers.guessing.names import Family
-from rotorid.recordings.importers.mapping import EULER, OPEN, TRAVEL, UNITS, from_angles
+from rotorid.recordings.importers.mapping import EULER, OPEN, THREE, TRAVEL, UNITS, from_angles
 
 _MOST_RAD, _MOST_DEG = 7.0, 400.0
 """Largest angle in rad, and in degrees."""
@@ -253,15 +253,17 @@ def _attitudes(draft: Draft) -> tuple[list[_Turn], str]:
             turns = [_Turn(chosen.columns, "wxyz", values), _Turn(chosen.columns, "xyzw", values[:, [3, 0, 1, 2]])]
         inverse = [_Turn(t.columns, t.form, t.wxyz * [1, -1, -1, -1], inverse=True) for t in turns]
         return turns + inverse, f"{how}, of length {np.nanmedian(lengths[chosen]):.4g}"
-    found = named.angles(free)
+    found, forms, why = named.angles(free), tuple(EULER), "roll, pitch, yaw by their names"
+    if found is None:
+        found, forms, why = named.rotation_vector(free), ("rotvec", "euler_xyz"), "three angles as Vicon names them"
     if found is None or not np.isfinite(values := draft.values(found[0])).all(axis=1).any():
         return [], ""
     columns, stated = found
     top = float(np.nanmax(np.abs(values)))
     by_size = ["rad", "deg"] if top < _MOST_RAD else ["deg"] if top < _MOST_DEG else ["ddeg", "cdeg", "mrad"]
     units = [stated] if stated in UNITS["angle"] else by_size
-    turns = [_of_angles(columns, values, form, unit_) for unit_, form in product(units, EULER)]
-    return turns, "roll, pitch, yaw by their names"
+    turns = [_of_angles(columns, values, form, unit_) for unit_, form in product(units, forms)]
+    return turns, why
 
 
 def _of_angles(columns: tuple[str, ...], values: np.ndarray, form: str, unit: str, signs=None) -> _Turn:
@@ -352,9 +354,9 @@ def _confirmed(draft: Draft, turns: list[_Turn], found: dict, best: tuple[int, F
     question, form = "", turn.form
     if turn.inverse:
         question, form = "it turns the world into the body: change the signs of x, y, z (or that of w)", OPEN
-    elif not is_clear(agreed, runner_up) and form in EULER:
+    elif not is_clear(agreed, runner_up) and form in THREE:
         apart = _apart([turns[k] for k in alike], turn.unit)
-        form, question = ("euler", "") if apart < _SAME_ORDER_RAD else (OPEN, _which_order(apart))
+        form, question = (turns[0].form, "") if apart < _SAME_ORDER_RAD else (OPEN, _which_order(apart, turns[0].form))
         why += f", {np.degrees(apart):.2g}° apart at most in the two orders"
     elif not is_clear(agreed, runner_up):
         question, form = f"the gyroscope hardly decides the order ({runner_up.correlation:.2f} for the other)", OPEN
@@ -380,9 +382,11 @@ def _apart(turns: list[_Turn], unit: str) -> float:
     return float(np.quantile((first[0].inv() * second[0]).magnitude(), 0.95))
 
 
-def _which_order(apart: float) -> str:
+def _which_order(apart: float, first: str) -> str:
+    """The question of the form of three angles, the first of which is `first`."""
+    what = "one turn about an axis" if first == "rotvec" else "yaw, then pitch, then roll: z-y'-x''"
     return (
-        "euler (yaw, then pitch, then roll: z-y'-x'') or euler_xyz (roll first: x-y'-z'', usual in motion captures)? "
+        f"{first} ({what}) or euler_xyz (roll first: x-y'-z'', usual in motion captures)? "
         f"The two are {np.degrees(apart):.2g}° apart here, and no gyroscope shows which"
     )
 
@@ -435,17 +439,17 @@ def _attitude_alone(draft: Draft, turns: list[_Turn], why: str) -> None:
     ranked = sorted(straight, key=lambda k: -level[k])
     said = ", ".join(f"{turns[k].form or turns[k].unit} {level[k]:.2f}" for k in straight)
     chosen = turns[ranked[0]]
-    if first.form not in EULER and level[ranked[0]] > 0.95 and level[ranked[1]] < 0.8:
+    if first.form not in THREE and level[ranked[0]] > 0.95 and level[ranked[1]] < 0.8:
         evidence = f"{why}; level most of the time in this order (cosine of the tilt: {said})"
         draft.put("attitude", chosen.columns, evidence, form=chosen.form)
         draft.wxyz = signed_continuous(chosen.wxyz)
-    elif first.form in EULER:
+    elif first.form in THREE:
         units = list(dict.fromkeys(t.unit for t in straight_turns))
         unit = units[0] if len(units) == 1 else OPEN
         apart = max(_apart(straight_turns, u) for u in units)
-        form = "euler" if apart < _SAME_ORDER_RAD else OPEN
+        form = first.form if apart < _SAME_ORDER_RAD else OPEN
         asked = [f"{' or '.join(units)}: no gyroscope shows which"] * (unit == OPEN)
-        asked += [_which_order(apart)] * (form == OPEN)
+        asked += [_which_order(apart, first.form)] * (form == OPEN)
         signs = {} if np.nanmax(np.abs(draft.values(first.columns))) < _MOST_DEG else {"signs": OPEN}
         if signs:  # as firmwares write them that have axes of their own
             asked.append(

@@ -95,6 +95,7 @@ _SCALARS: dict[str, tuple[str, ...]] = {
     "throttle": (r"(throttle|esc|pwm|motor command)([ _(\[,/].*)?",),
 }  # fmt: skip
 _MAVLINK = "xyz of MAVLink"
+_VICON_PLACE = "t"
 AXES = ("xyz", "012", "123", "ned", "enu")
 FOURS = ("wxyz", "0123", "1234")
 
@@ -241,6 +242,8 @@ def _ends_in(stem: str, words: frozenset[str]) -> bool:
 
 def is_named(family: Family, quantity: str) -> bool:
     """Whether three columns are named as a quantity of motion; `ang_vel` is no velocity, `acc_bias` no acceleration."""
+    if family.stem == _VICON_PLACE and family.unit in ("m", "cm", "mm"):
+        return quantity == "position"
     endings, whole = TRIPLES[quantity]
     if family.words & OTHER_THINGS - endings or family.axes in ("012", "123") and family.stem == "":
         return False
@@ -286,6 +289,13 @@ def angles(names: Sequence[str]) -> tuple[tuple[str, str, str], str] | None:
         else:
             return None
     return (found[0], found[1], found[2]), _the_one(units)
+
+
+def rotation_vector(names: Sequence[str]) -> tuple[tuple[str, ...], str] | None:
+    """Vicon's `RX`, `RY`, `RZ` next to a place `TX`, `TY`, `TZ`, and the unit that they state."""
+    by_stem = {family.stem: family for family in families(names, "xyz")}
+    turn = by_stem.get("r") if _VICON_PLACE in by_stem else None
+    return turn and (turn.columns, turn.unit)
 
 
 def scalar(names: Iterable[str], quantity: str) -> str | None:
