@@ -48,9 +48,10 @@ plantings: $(READY) ## put something exact into real flights and score what is n
 test: $(TESTED) ## run every check; does nothing when nothing has changed since it last passed
 	@echo "Every check has passed on these files."
 
-check: $(READY) ## the checks of form alone: lint, format, stripped notebooks
+check: $(READY) ## the checks of form alone: lint, format, types of the open modules, stripped notebooks
 	@$(BIN)/ruff check --quiet .
 	@$(BIN)/ruff format --check --quiet .
+	@$(BIN)/mypy --no-error-summary
 	@$(BIN)/snakefmt --check Snakefile workflow 2>&1 || { echo "Run: .venv/bin/snakefmt Snakefile workflow"; exit 1; }
 	@$(BIN)/nbstripout --verify notebooks/*.ipynb || { echo "Run: .venv/bin/nbstripout notebooks/*.ipynb"; exit 1; }
 

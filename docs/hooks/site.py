@@ -48,8 +48,9 @@ def pages() -> dict[str, str]:
 
 
 def on_page_markdown(markdown: str, page, config, files) -> str:
-    """Links to the benchmarks' pages as the site has them; equations and pictures in the catalogue of effects."""
-    markdown = markdown.replace("](../benchmarks/", "](benchmarks/")
+    """Links to the benchmarks' pages as the site has them; equations and pictures in the catalogue of effects; the
+    formats of logs where `<!-- formats -->` stands."""
+    markdown = markdown.replace("](../benchmarks/", "](benchmarks/").replace("<!-- formats -->", formats_table())
     return with_signatures(markdown) if page.file.src_uri == "effects.md" else markdown
 
 
@@ -164,12 +165,23 @@ def commands_page() -> str:
     return "\n".join(lines)
 
 
+# Formats of logs ----------------------------------------------------------------------------------
+
+
+def formats_table() -> str:
+    """A line for each importer: what it reads, and how a log is recognised."""
+    from rotorid.recordings.importers.logfile import importers
+
+    lines = ["| log | how it is recognised | what is read |", "| --- | --- | --- |"]
+    return "\n".join([*lines, *(f"| {i.title} | {i.known_by} | {i.holds} |" for i in importers().values())])
+
+
 # The decision -------------------------------------------------------------------------------------
 
 DECISION = """# Reference of the decision
 
 This page is made of the code of `rotorid.mismatch` and lists what [how it decides](mismatch.md) leaves out; terms are
-explained there.
+explained there. A number that one formula alone uses stands next to it in the code, with its reason.
 
 ## Rules
 

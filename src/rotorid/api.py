@@ -12,6 +12,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TypeAlias
 
 import pandas as pd
 
@@ -25,9 +26,9 @@ from rotorid.report.deliver import FILES, OTHERS, Result
 from rotorid.steps import heard_by
 from rotorid.vehicle.exports import Exported, export_vehicle
 
-Believed = Vehicle | Mapping | str | Path
+Believed: TypeAlias = Vehicle | Mapping | str | Path
 """A vehicle, the keys of a `vehicle.yaml`, the path of one, or the name of a template."""
-_Recorded = RecordingSet | pd.DataFrame | Mapping[str, pd.DataFrame] | Sequence | str | Path
+_Recorded: TypeAlias = RecordingSet | pd.DataFrame | Mapping[str, pd.DataFrame] | Sequence | str | Path
 """A set, a table, tables by name, a folder, a log, or several tables or logs."""
 
 
@@ -208,7 +209,7 @@ def read_log(path: str | Path, mapping: str | Path | None = None) -> dict[str, p
     from rotorid.recordings.importers.logfile import read_log as read
     from rotorid.recordings.importers.mapping import read_mapping
 
-    return read(Path(path), read_mapping(Path(mapping)) if mapping else None).runs
+    return dict(read(Path(path), read_mapping(Path(mapping)) if mapping else None).runs)
 
 
 def simulate(vehicle: Believed, seconds: float = 20.0, flights: int = 2, seed: int = 1) -> RecordingSet:

@@ -98,12 +98,12 @@ def import_logs(
 
 def _write_mapping(logs: list[Path], target: Path, as_json: bool) -> None:
     from rotorid.recordings.importers.guessing import as_text, guess
-    from rotorid.recordings.importers.logfile import format_of
+    from rotorid.recordings.importers.logfile import importer_of
     from rotorid.recordings.importers.mapping import read_columns
 
     if target.exists():
         raise InputError(f"{target} is there already; choose another name")
-    if format_of(logs[0]) not in ("csv", "parquet"):
+    if importer_of(logs[0]).name != "table":
         raise InputError(f"{logs[0]}: its columns are known, no mapping is needed")
     found = guess(read_columns(logs[0]))
     write_texts({target: as_text(found, logs[0].name)})
@@ -276,13 +276,13 @@ def check(
     from rotorid.recordings import list_sets
     from rotorid.recordings.check import as_text, check_folder
     from rotorid.recordings.files import is_bag, run_paths, write_manifest
-    from rotorid.recordings.importers.logfile import format_of
+    from rotorid.recordings.importers.logfile import importer_of
 
     with one_sentence():
         if folder.is_file() and (folder.parent / "vehicle.yaml").is_file():
             said = f"is a file of a recording set; check the set: `rotorid check {folder.parent}`"
             raise InputError(f"{folder}: {said}")
-        if is_bag(folder) or folder.is_file() and format_of(folder):
+        if is_bag(folder) or folder.is_file() and importer_of(folder):
             said = f"is a log, not a recording set; make a set of it first: `rotorid import {folder}`"
             raise InputError(f"{folder}: {said}")
     is_set = (folder / "vehicle.yaml").is_file()

@@ -79,4 +79,5 @@ EFFECT = Effect(
     # Ten kelvin of half a milli-g a kelvin (35 mg over 70 K: InvenSense MPU-6000, product specification, 6.2); 0.02
     # to 0.06 between flights of two laboratories (docs/compare.md). How much it turns on its mount is assumed.
     between_flights={"m/s2": 0.05, "rad": 0.003},
+    cases=("single/accelerometer_error/moderate/0", "single/thrust_tilt/strong/0"),
 )

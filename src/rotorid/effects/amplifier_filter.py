@@ -109,4 +109,5 @@ EFFECT = Effect(
     kind="sensor",
     shows="after a change of load",
     lack_on=lambda instrument: TOO_SHORT,
+    cases=("bench/single/amplifier_filter/strong/0", "bench/single/creep/moderate/0"),
 )

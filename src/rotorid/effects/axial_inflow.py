@@ -52,4 +52,5 @@ EFFECT = Effect(
     confusers=("frame_drag", "motor_lag", "rotational_damping"),
     separating_manoeuvre="fly steady climbs and descents",
     feels_air=True,
+    cases=("single/axial_inflow/moderate/0", "single/frame_drag/strong/0"),
 )

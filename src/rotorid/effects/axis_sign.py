@@ -47,4 +47,5 @@ EFFECT = Effect(
     kind="mistake",
     fitted=False,
     contradiction=True,
+    cases=("mistake/axis_sign/velocity_y_m_s/7", "mistake/rotor_order/all/1"),
 )

@@ -95,4 +95,5 @@ EFFECT = Effect(
     confusers=("throttle_curve", "command_saturation"),
     separating_manoeuvre="rest the battery and repeat the same hover",
     separating_columns=("voltage",),
+    cases=("single/battery_sag/strong/0", "single/command_saturation/moderate/0"),
 )

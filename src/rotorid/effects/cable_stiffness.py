@@ -137,4 +137,5 @@ EFFECT = Effect(
         if instrument.vehicle.tared
         else "the mount is never tilted"
     ),
+    cases=("stand/single/cable_stiffness/weak/0", "stand/single/sensor_origin/strong/0"),
 )

@@ -89,4 +89,5 @@ EFFECT = Effect(
     kind="sensor",
     exact=True,
     shows="after a change of load",
+    cases=("bench/single/clock_skew/strong/0", "bench/single/compliance/strong/0"),
 )

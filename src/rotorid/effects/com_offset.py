@@ -118,4 +118,5 @@ EFFECT = Effect(
         if instrument.vehicle.tared
         else "no mass is stated or no moment is read"
     ),
+    cases=("single/com_offset/moderate/0", "single/thrust_tilt/strong/0"),
 )

@@ -46,4 +46,5 @@ EFFECT = Effect(
     confusers=("throttle_curve", "motor_lag"),
     separating_manoeuvre="repeat the manoeuvre at half the amplitude",
     separating_columns=("rotor_speed",),
+    cases=("single/command_saturation/moderate/0", "single/motor_lag/moderate/0"),
 )

@@ -85,4 +85,5 @@ EFFECT = Effect(
         if instrument.bench
         else "a stand has no known load whose direction could be seen to turn"
     ),
+    cases=("bench/single/compliance/strong/0", "bench/single/crosstalk/strong/0"),
 )

@@ -87,10 +87,11 @@ class Motion:
         return len(self.time_s)
 
     @property
-    def air_velocity(self) -> np.ndarray:
-        """Velocity through the air, (n, 3), m/s, body axes."""
-        if self.wind is None:
+    def air_velocity(self) -> np.ndarray | None:
+        """Velocity through the air, (n, 3), m/s, body axes; None where no velocity is known."""
+        if self.wind is None or self.velocity is None:
             return self.velocity
+        assert self.rotation is not None, "a wind is known in world axes"
         wind = np.broadcast_to(self.wind, self.velocity.shape)
         return self.velocity - np.einsum("nji,nj->ni", self.rotation, wind)
 
@@ -303,6 +304,9 @@ class Effect:
     separating_columns: tuple[str, ...] = ()
     """What to record for this (`rotorid.effects.describe.RECORDABLE`)."""
     kind: Literal["physics", "sensor", "mistake"] = "physics"
+    cases: tuple[str, ...] = ()
+    """Concealed cases of the proof (`proof/rotorid_proof/concealed/cases.tsv`): one in which it is claimed, and one in
+    which it must not be; a test makes verdicts on both."""
     exact: bool = False
     """Whether its equation is geometry or a definition and can have no other form; else what it leaves of a reading
     may be its form."""

@@ -107,4 +107,5 @@ EFFECT = Effect(
     kind="sensor",
     shows="in what takes time",
     lack_on=lambda instrument: TOO_SHORT,
+    cases=("bench/single/creep/moderate/0", "bench/single/zero_drift/strong/0"),
 )

@@ -58,4 +58,5 @@ EFFECT = Effect(
     separating_manoeuvre="put known weights on along one axis after the other",
     kind="sensor",
     lack_on=lambda instrument: "one channel only is read",
+    cases=("bench/single/crosstalk/strong/0", "bench/single/mount_tilt/strong/0"),
 )

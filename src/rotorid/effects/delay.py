@@ -91,4 +91,5 @@ EFFECT = Effect(
     exact=True,
     shows="after a change of load",
     like_of_reading=("amplifier_filter", "delay"),
+    cases=("single/delay/strong/0", "single/motor_lag/moderate/0"),
 )

@@ -81,4 +81,5 @@ EFFECT = Effect(
     confusers=("rotor_interference", "rotor_drag"),
     separating_manoeuvre="fly forward, backward and sideways at several speeds",
     feels_air=True,
+    cases=("single/flapping_moment/strong/0", "single/rotor_drag/strong/0"),
 )

@@ -93,4 +93,5 @@ EFFECT = Effect(
     separating_manoeuvre="fly a speed sweep beyond 10 m/s in both directions",
     feels_air=True,
     drag=True,
+    cases=("single/frame_drag/strong/0", "single/rotor_drag/strong/0"),
 )

@@ -89,4 +89,5 @@ EFFECT = Effect(
     excited_by=("height",),
     confusers=("translational_lift", "axial_inflow"),
     separating_manoeuvre="hover at a ladder of heights from half to ten rotor radii",
+    cases=("multibody/ground/f0e7b8f8/001", "single/axial_inflow/moderate/0"),
 )

@@ -68,4 +68,5 @@ EFFECT = Effect(
     confusers=("payload", "steady_wind"),
     separating_manoeuvre="repeat the flight in still air",
     air_moves="in windows",
+    cases=("single/gust/strong/0", "single/steady_wind/strong/0"),
 )

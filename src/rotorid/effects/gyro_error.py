@@ -83,4 +83,5 @@ EFFECT = Effect(
     # Zeros: against the recorded attitude they differ by 0.001 rad/s between four flights of NeuroBEM, by 0.003 between
     # six of imrc's, widened for so few. Alignment: assumed, of a board on rubber that turns a little.
     between_flights={"rad/s": 0.004, "rad": 0.003},
+    cases=("single/gyro_error/weak/0", "single/inertia_products/moderate/0"),
 )

@@ -201,4 +201,5 @@ EFFECT = Effect(
     separating_manoeuvre="load up and down in the same steps at two rates",
     kind="sensor",
     lack_on=lambda instrument: "the load never comes back from above to a value other than none",
+    cases=("bench/single/hysteresis/strong/0", "bench/single/amplifier_filter/strong/0"),
 )

@@ -36,4 +36,5 @@ EFFECT = Effect(
     confusers=("com_offset",),
     separating_manoeuvre="excite roll, pitch and yaw by doublets",
     kind="sensor",
+    cases=("single/imu_lever_arm/moderate/0", "single/com_offset/moderate/0"),
 )

@@ -41,4 +41,5 @@ EFFECT = Effect(
     excited_by=("angular_velocity", "angular_acceleration"),
     confusers=("gyro_error", "rotor_gyroscopic"),
     separating_manoeuvre="excite roll, pitch and yaw one after the other by doublets",
+    cases=("single/inertia_products/moderate/0", "single/rotor_gyroscopic/weak/0"),
 )

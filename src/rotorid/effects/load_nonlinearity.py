@@ -94,4 +94,5 @@ EFFECT = Effect(
     separating_manoeuvre="load with dead weights over the whole range, motors off",
     kind="sensor",
     curve_of_load=True,
+    cases=("bench/single/load_nonlinearity/strong/0", "bench/single/compliance/strong/0"),
 )

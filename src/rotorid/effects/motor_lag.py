@@ -88,4 +88,5 @@ EFFECT = Effect(
     separating_manoeuvre="excite collective and attitude up to 8 Hz",
     separating_columns=("rotor_speed",),
     like_of_reading=("amplifier_filter",),
+    cases=("single/motor_lag/moderate/0", "single/delay/strong/0"),
 )

@@ -83,4 +83,5 @@ EFFECT = Effect(
     kind="sensor",
     exact=True,
     lack_on=lambda instrument: NO_ROTORS if instrument.bench else "one channel only is read",
+    cases=("bench/single/mount_tilt/strong/0", "bench/single/crosstalk/strong/0"),
 )

@@ -187,4 +187,5 @@ EFFECT = Effect(
         *(f"inertia_{axis}_kg_m2" for axis in ("xx", "yy", "zz")),
     ),
     like_on_heavier=("com_offset", "inertia_products"),
+    cases=("multibody/rigid_payload/2026-11-30/000", "single/com_offset/moderate/0"),
 )

@@ -21,4 +21,5 @@ EFFECT = Effect(
     separating_manoeuvre="read with a finer range, or add a small known dither",
     kind="sensor",
     fitted=False,
+    cases=("bench/single/quantisation/strong/0", "bench/single/hysteresis/strong/0"),
 )

@@ -49,4 +49,5 @@ EFFECT = Effect(
     excited_by=("angular_velocity",),
     confusers=("axial_inflow", "delay", "gyro_error"),
     separating_manoeuvre="excite roll, pitch and yaw by doublets of several lengths",
+    cases=("single/rotational_damping/strong/0", "single/axial_inflow/moderate/0"),
 )

@@ -34,4 +34,5 @@ EFFECT = Effect(
     separating_manoeuvre="excite yaw on both sides of 1 Hz",
     exact=True,
     shows="in what takes time",
+    cases=("single/rotor_acceleration_torque/strong/0", "single/motor_lag/moderate/0"),
 )

@@ -97,4 +97,5 @@ EFFECT = Effect(
     separating_manoeuvre="fly a speed sweep beyond 10 m/s in both directions, once light and once loaded",
     feels_air=True,
     drag=True,
+    cases=("single/rotor_drag/strong/0", "single/thrust_tilt/strong/0"),
 )

@@ -37,4 +37,5 @@ EFFECT = Effect(
     excited_by=("angular_velocity",),
     confusers=("inertia_products",),
     separating_manoeuvre="roll and pitch quickly while yawing, so that the rotors' net spin is large",
+    cases=("single/rotor_gyroscopic/weak/0", "single/inertia_products/moderate/0"),
 )

@@ -69,4 +69,5 @@ EFFECT = Effect(
     confusers=("flapping_moment", "rotor_drag"),
     separating_manoeuvre="fly forward and backward at several speeds and heights of the rotor plane",
     feels_air=True,
+    cases=("single/rotor_interference/moderate/0", "single/flapping_moment/strong/0"),
 )

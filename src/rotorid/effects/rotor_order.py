@@ -38,4 +38,5 @@ EFFECT = Effect(
     separating_manoeuvre="raise one motor at a time with the propellers off and watch which column moves",
     kind="mistake",
     fitted=False,
+    cases=("mistake/rotor_order/all/1", "mistake/spin_direction/all/2"),
 )

@@ -66,4 +66,5 @@ EFFECT = Effect(
     kind="sensor",
     fitted=False,
     contradiction=True,
+    cases=("single/sensor_dropout/moderate/0", "multibody/ground/f0e7b8f8/001"),
 )

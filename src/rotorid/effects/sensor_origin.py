@@ -59,4 +59,5 @@ EFFECT = Effect(
     kind="sensor",
     exact=True,
     lack_on=lambda instrument: "no moment is read",
+    cases=("stand/single/sensor_origin/strong/0", "stand/single/cable_stiffness/weak/0"),
 )

@@ -42,4 +42,5 @@ EFFECT = Effect(
     separating_manoeuvre="look at the propellers, or yaw to both sides with sharp inputs",
     kind="mistake",
     fitted=False,
+    cases=("mistake/spin_direction/all/2", "mistake/rotor_order/all/1"),
 )

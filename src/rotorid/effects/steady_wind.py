@@ -98,4 +98,5 @@ EFFECT = Effect(
     confusers=("accelerometer_error", "thrust_tilt", "rotor_drag"),
     separating_manoeuvre="hover while yawing through 360 degrees, and fly the same leg in both directions",
     air_moves="all the time",
+    cases=("single/steady_wind/strong/0", "single/thrust_tilt/strong/0"),
 )

@@ -68,4 +68,5 @@ EFFECT = Effect(
     kind="physics",
     shows="after a change of load",
     lack_on=lambda instrument: TOO_SHORT,
+    cases=("bench/single/structural_resonance/strong/0", "bench/single/amplifier_filter/strong/0"),
 )

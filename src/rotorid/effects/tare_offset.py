@@ -64,4 +64,5 @@ EFFECT = Effect(
     separating_manoeuvre="record a few seconds without a load before and after, at every attitude of the mount",
     kind="sensor",
     exact=True,
+    cases=("bench/single/tare_offset/strong/0", "bench/single/zero_drift/strong/0"),
 )

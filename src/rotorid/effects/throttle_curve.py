@@ -174,4 +174,5 @@ EFFECT = Effect(
     separating_manoeuvre="step the throttle up and down over its whole range with two battery charges",
     separating_columns=("rotor_speed",),
     would_change=("thrust_coefficient_n_s2", "torque_coefficient_n_m_s2", "rotor_speed_limits_rad_s"),
+    cases=("stand/single/throttle_curve/strong/0", "single/thrust_curve/strong/0"),
 )

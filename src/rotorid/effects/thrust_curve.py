@@ -140,4 +140,5 @@ EFFECT = Effect(
     curves_thrust=True,
     curve_of_load=True,
     lack_on=lambda instrument: NO_ROTORS,
+    cases=("single/thrust_curve/strong/0", "single/axial_inflow/moderate/0"),
 )

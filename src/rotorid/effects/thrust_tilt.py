@@ -113,4 +113,5 @@ EFFECT = Effect(
     confusers=("accelerometer_error", "steady_wind", "com_offset"),
     separating_manoeuvre="yaw through 360 degrees in hover",
     separating_columns=("position",),
+    cases=("single/thrust_tilt/strong/0", "single/accelerometer_error/moderate/0"),
 )

@@ -46,4 +46,5 @@ EFFECT = Effect(
     confusers=("thrust_curve", "axial_inflow"),
     separating_manoeuvre="fly level at constant rotor speed and several airspeeds",
     feels_air=True,
+    cases=("single/translational_lift/moderate/0", "single/axial_inflow/moderate/0"),
 )

@@ -129,4 +129,5 @@ EFFECT = Effect(
     separating_manoeuvre="swap two propellers and repeat the hover, or excite roll, pitch and yaw",
     shows_in_moments=True,
     lack_on=lambda instrument: NO_ROTORS,
+    cases=("single/unequal_rotors/strong/0", "single/thrust_tilt/strong/0"),
 )

@@ -47,4 +47,5 @@ EFFECT = Effect(
     kind="mistake",
     fitted=False,
     contradiction=True,
+    cases=("mistake/unit_error/mm/12", "single/accelerometer_error/moderate/0"),
 )

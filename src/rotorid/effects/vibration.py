@@ -50,4 +50,5 @@ EFFECT = Effect(
     confusers=("thrust_curve", "accelerometer_error"),
     separating_manoeuvre="balance the propellers, or hover at several speeds of the rotors",
     kind="sensor",
+    cases=("single/vibration/moderate/0", "single/accelerometer_error/moderate/0"),
 )

@@ -44,4 +44,5 @@ EFFECT = Effect(
     excited_by=("velocity",),
     confusers=("gust", "axial_inflow"),
     separating_manoeuvre="descend vertically at 0.5, 1 and 1.5 times the hover inflow, and climb likewise",
+    cases=("single/vortex_ring/weak/0", "single/axial_inflow/moderate/0"),
 )

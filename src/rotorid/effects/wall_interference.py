@@ -118,4 +118,5 @@ EFFECT = Effect(
     confusers=("battery_sag", "creep", "ground_effect"),
     separating_manoeuvre="turn the propeller round (puller, pusher), or move the wall and repeat",
     lack_on=lambda instrument: NO_ROTORS if instrument.bench else TOO_SHORT,
+    cases=("stand/single/wall_interference/strong/0", "stand/single/cable_stiffness/weak/0"),
 )

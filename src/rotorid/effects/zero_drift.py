@@ -101,4 +101,5 @@ EFFECT = Effect(
     separating_columns=("temperature",),
     kind="sensor",
     lack_on=lambda instrument: TOO_SHORT,
+    cases=("bench/single/zero_drift/strong/0", "bench/single/tare_offset/strong/0"),
 )

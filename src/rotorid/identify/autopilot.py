@@ -36,27 +36,17 @@ _WIDEST_HOVER = 0.1
 _WIDEST_WIND_M_S = 1.0
 _AT_A_BOUND = 0.01
 """Share of the range searched within which a value is at its end."""
-_LARGEST_BCOEF = 200.0
-"""kg/m²: PX4 takes no more (EKF2_BCOEF_X, its range)."""
 _HOVERS = {"px4": ("MPC_THR_HOVER", (0.1, 0.8)), "ardupilot": ("MOT_THST_HOVER", (0.125, 0.6875))}
 """By autopilot the parameter for the share of thrust that hovers, and what it may be."""
-_MOST_SHARE = 1.5
-"""Shares of thrust up to which Betaflight's curve is inverted: a signal above its range is no use."""
 _CURVE_POINTS = 3001
 _SPIN_MAX = 0.95
 """Default of ArduPilot's MOT_SPIN_MAX, at which its curve ends."""
 _SPIN_MIN_BELIEVED = 0.3 / np.sqrt(12)
 """MOT_SPIN_MIN is believed to lie in what ArduPilot takes, 0 to 0.3: the deviation of an even spread. Without it a
 curve that is nearly a square (MOT_THST_EXPO near 1) leaves a line of pairs that fit alike."""
-_STANDARD_GRAVITY = 9.80665
-"""m/s²: grams of thrust are by it."""
-_ACCELEROMETER_ZERO_M_S2 = 0.1
-"""Standard deviation of the error of an accelerometer's zero that is believed."""
 _TIME_CONSTANTS_S = (0.002, 0.4)
 _RATE_HZ = 100.0
 """Residuals are averaged down to about so many a second: there is nothing above that the motors could do."""
-_VOLTAGE_MOVES = 0.01
-"""Share of the voltage that it must vary by for its part to be estimated."""
 _DRIFT, _AXIAL, _LIFT = 0.1, 1.0, 0.05
 """Usual sizes: share of thrust that drifts over a run, m/s² per m/s of axial speed, m/s² per (m/s)² across."""
 _AIR_DENSITY_KG_M3 = 1.225
@@ -65,8 +55,6 @@ _DRAG_RATE_HZ = 20.0
 _LEAST_AIRSPEED_M_S = 1e-3
 _ZERO_M_S2 = 0.3
 """Believed deviation of the specific force at rest: the accelerometer's zero, and rotors whose axis is not quite z."""
-_WIND_M_S = 5.0
-"""Believed deviation of each component of the wind about none."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +109,8 @@ def _ardupilot(signal: np.ndarray, voltage: np.ndarray | None, shape: np.ndarray
 
 def _betaflight(signal: np.ndarray, voltage: np.ndarray | None, shape: np.ndarray) -> np.ndarray:
     """T/T_max = x where u = x (1 + k (1 − x)²), k = thrust_linear/100; below k = 3 one x for each u."""
-    x = np.linspace(0.0, _MOST_SHARE, _CURVE_POINTS)
+    most_share = 1.5  # Shares of thrust up to which Betaflight's curve is inverted: a signal above its range is no use.
+    x = np.linspace(0.0, most_share, _CURVE_POINTS)
     return np.interp(signal, x * (1 + shape[0] * (1 - x) ** 2), x)
 
 
@@ -214,7 +203,8 @@ def _fit_thrust(stretches: Sequence[Stretch], chosen: _ThrustMap, mass_kg: float
 
 def _per_share(values: np.ndarray, chosen: _ThrustMap, mass_kg: float, rotors: int) -> float:
     """m/s² that all rotors make by a share (or a gram a rotor)."""
-    return rotors * 1e-3 * _STANDARD_GRAVITY / mass_kg if chosen.in_grams else float(np.exp(values[0]))
+    standard_gravity = 9.80665  # m/s²: grams of thrust are by it.
+    return rotors * 1e-3 * standard_gravity / mass_kg if chosen.in_grams else float(np.exp(values[0]))
 
 
 def _solve(rising: Callable[[float], float], wanted: float) -> float:
@@ -245,6 +235,8 @@ class _Layout:
 
 
 def _layout(used: Sequence[Stretch], chosen: _ThrustMap) -> _Layout:
+    accelerometer_zero_m_s2 = 0.1  # Standard deviation of the error of an accelerometer's zero that is believed.
+    voltage_moves = 0.01  # Share of the voltage that it must vary by for its part to be estimated.
     rows: list[tuple[float, float, float, float, float]] = []
 
     def add(start: float, low: float, high: float, scale: float, prior: float = np.inf) -> int:
@@ -258,13 +250,13 @@ def _layout(used: Sequence[Stretch], chosen: _ThrustMap) -> _Layout:
         add(shape.start, shape.low, shape.high, (shape.high - shape.low) / 10, shape.believed)
     shapes = slice(first, len(rows))
     lag = add(np.log(0.04), *np.log(_TIME_CONSTANTS_S), 0.3)
-    zero = add(0.0, -2.0, 2.0, _ACCELEROMETER_ZERO_M_S2, _ACCELEROMETER_ZERO_M_S2)
+    zero = add(0.0, -2.0, 2.0, accelerometer_zero_m_s2, accelerometer_zero_m_s2)
     voltage, drift, mean = None, {}, 1.0
     if not chosen.in_grams:
         if all(s.voltage is not None for s in used):
             volts = np.concatenate([s.voltage for s in used])
             mean = float(volts.mean())
-            if np.ptp(volts) > _VOLTAGE_MOVES * mean:
+            if np.ptp(volts) > voltage_moves * mean:
                 voltage = add(1.0, -2.0, 5.0, 0.5)
         else:
             drift = {name: add(0.0, -1.0, 1.0, _DRIFT) for name in dict.fromkeys(s.run for s in used)}
@@ -338,6 +330,7 @@ def _fit_drag(stretches: Sequence[Stretch]) -> tuple | None:
     Estimates of 1/EKF2_BCOEF_X and 1/EKF2_BCOEF_Y, m²/kg, and EKF2_MCOEF, 1/s; by run those of the wind towards north
     and east, m/s; 99 % quantile of the horizontal speed, m/s.
     """
+    wind_m_s = 5.0  # Believed deviation of each component of the wind about none.
     used = [s for s in stretches if s.attitude is not None and s.velocity is not None]
     if not used:
         return None
@@ -348,7 +341,7 @@ def _fit_drag(stretches: Sequence[Stretch]) -> tuple | None:
     low = np.array([-0.2, -0.2, -1.0, -3, -3, *[-30.0] * (2 * len(runs))])
     high = np.array([1.0, 1.0, 3.0, 3, 3, *[30.0] * (2 * len(runs))])
     scale = np.array([0.02, 0.02, 0.1, _ZERO_M_S2, _ZERO_M_S2, *[2.0] * (2 * len(runs))])
-    prior = np.array([np.inf, np.inf, np.inf, _ZERO_M_S2, _ZERO_M_S2, *[_WIND_M_S] * (2 * len(runs))])
+    prior = np.array([np.inf, np.inf, np.inf, _ZERO_M_S2, _ZERO_M_S2, *[wind_m_s] * (2 * len(runs))])
 
     def residuals(values: np.ndarray) -> list[np.ndarray]:
         out = []
@@ -472,6 +465,7 @@ def _of_thrust(shapes, lag, hover, share, throttle_range, chosen: _ThrustMap, to
 
 
 def _of_drag(drag, wind, fastest_m_s: float) -> list[AutopilotParameter]:
+    largest_bcoef = 200.0  # kg/m²: PX4 takes no more (EKF2_BCOEF_X, its range).
     flown = f"speeds up to {fastest_m_s:.1f} m/s were flown"
     out = []
     for name, estimate in zip(("EKF2_BCOEF_X", "EKF2_BCOEF_Y"), drag, strict=False):
@@ -484,7 +478,7 @@ def _of_drag(drag, wind, fastest_m_s: float) -> list[AutopilotParameter]:
             at_least = f"; at least {ends[0]:.3g} kg/m²" if np.isfinite(ends[0]) and ends[0] > 0 else ""
             sentence = f"{_NOT}: {flown}; fly faster, there and back{at_least}"
         number = EstimatedNumber(value, ends)
-        out.append(_stated(name, number, "kg/m²", fine, sentence, min(value, _LARGEST_BCOEF), 1))
+        out.append(_stated(name, number, "kg/m²", fine, sentence, min(value, largest_bcoef), 1))
     momentum = drag[2]
     fine = momentum.half_width <= _WIDEST_SHARE * abs(momentum.value)
     sentence = f"{'drag of the rotors, jointly with the wind' if fine else _NOT}; {flown}"

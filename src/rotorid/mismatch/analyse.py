@@ -29,6 +29,7 @@ from rotorid.mismatch.decide.findings import (
     rms,
     with_probabilities,
 )
+from rotorid.mismatch.decide.posterior import Found
 from rotorid.mismatch.decide.selected import coefficients, wrench_findings
 from rotorid.mismatch.decide.sizes import fitted_part
 from rotorid.mismatch.decide.statements import UpperLimit
@@ -79,11 +80,6 @@ _UNITS = {"force": "N", "moment": "N m"}
 _SENSOR_UNITS = {2: "m/s2", 3: "rad/s"}
 _NO_DEPENDENCE_P = 0.01
 """p-value of a residual's dependence on what is recorded from which it is taken for noise."""
-_SURELY_HEAVIER = 2.0
-"""Standard errors by which a vehicle must be heavier than believed to carry a payload."""
-_TIMING_FLOOR = 0.05
-"""One-sigma, in samples, that no time is better known by: between two samples commands hold, or change, as nobody
-recorded."""
 
 
 def analyse(recordings: RecordingSet, watch: Watch = unwatched) -> Analysis:
@@ -141,15 +137,9 @@ def _analysed(recordings: RecordingSet, mistakes, remarks, watch: Watch) -> Anal
     fit, moved = settled(model, values, model.selection.active)
 
     outside = [*mistakes, *findings_outside(found, prepared)]
-    findings = [*outside, *findings_inside(found, prepared, fit, {**moved, **values})]
-    findings = payload_or_offset(findings, {**moved, **values})
-    findings += absorbed_findings(model, values, findings)
-    findings, to_state = with_square_term(findings, values, model)
-    chosen = chosen_already(model)
-    findings = with_probabilities(together(findings), chosen.found, chosen.support)
-    findings = rotors_or_offset(findings, model, fit)
+    findings, to_state, posterior = decided(found, outside, fit, moved)
     stated_ids = {i for f in findings for i in (f.id, *f.alternatives)}
-    limits = tuple(limit for limit in absent(model, chosen.found) if limit.id not in stated_ids)
+    limits = tuple(limit for limit in absent(model, posterior) if limit.id not in stated_ids)
     full = full_speed(known.runs, prepared.vehicle) if only_throttle(recordings) else None
     choice = _Choice(recordings, split, found, to_state, full, tuple(findings), limits, tuple(remarks))
 
@@ -163,6 +153,24 @@ def _analysed(recordings: RecordingSet, mistakes, remarks, watch: Watch) -> Anal
     words = with_values_in_question(weighed(first))
     offer = partial(_offered, choice, seen=seen, unseen=unseen, moved=moved, plain_moved=plain_moved)
     return with_noise_held_out(as_delivered(words, offer))
+
+
+def decided(
+    found: Fitted, outside: Sequence[Finding], fit: Fit, moved: Values
+) -> tuple[tuple[Finding, ...], Values, Found]:
+    """What is decided of a set fitted: its findings, those `outside` the model among them, wrong values as stated, and
+    the posterior at the chosen model.
+
+    `fit` with `moved` is what is delivered.
+    """
+    model, values = found.model, found.values
+    findings = [*outside, *findings_inside(found, found.prepared, fit, {**moved, **values})]
+    findings = payload_or_offset(findings, {**moved, **values})
+    findings += absorbed_findings(model, values, findings)
+    findings, to_state = with_square_term(findings, values, model)
+    chosen = chosen_already(model)
+    findings = with_probabilities(together(findings), chosen.found, chosen.support)
+    return tuple(rotors_or_offset(findings, model, fit)), to_state, chosen.found
 
 
 @dataclass(frozen=True)
@@ -488,13 +496,16 @@ def _wind_finding(model: WrenchModel) -> Finding:
 
 def _speed_findings(result: SpeedResult, prepared: Prepared, measured: bool, full_speed: float) -> list[Finding]:
     """Findings between command and rotor speed."""
+    # One-sigma, in samples, that no time is better known by: between two samples commands hold, or change, as nobody
+    # recorded.
+    timing_floor = 0.05
     effects = catalogue()
     out = []
     channels = tuple(f"rotor_speed_{i + 1}" for i in range(prepared.vehicle.rotor_count)) if measured else ("force_z",)
     for key, form in result.fit.chain:
         where = result.fit.slice_of(key)
         values = result.fit.values[where]
-        least = [_TIMING_FLOOR / prepared.segments[0].rate_hz if p.unit == "s" else 0.0 for p in form.parameters]
+        least = [timing_floor / prepared.segments[0].rate_hz if p.unit == "s" else 0.0 for p in form.parameters]
         sd = np.hypot(np.sqrt(np.diag(result.fit.covariance)[where]), least)
         numbers = zip(form.parameters, values, sd, strict=True)
         alternatives = result.alternatives[key]
@@ -520,7 +531,8 @@ def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:
 
     The payload would bring products of inertia along: found with such an offset they belong to the same question.
     """
-    sure = {key: change for key, (change, sd) in values.items() if abs(change) > _SURELY_HEAVIER * sd}
+    surely_heavier = 2.0  # Standard errors by which a vehicle must be heavier than believed to carry a payload.
+    sure = {key: change for key, (change, sd) in values.items() if abs(change) > surely_heavier * sd}
     heavier = sure.get("mass", 0.0) > 0 or sure.get("thrust", 0.0) < 0
     stated = [f for f in findings if f.status in CLAIMED]
     load = next(e for e in catalogue().values() if e.like_on_heavier)

@@ -26,11 +26,6 @@ _GRAVITY_M_S2 = 9.81
 _RAMP_S = 2.0
 _SLOW_RAMP_S = 4.0
 """Of motions over ground: in RAMP_S a fast pass would tilt more to start than to turn round."""
-_BANDS_HZ = ((0.3, 1.0), (0.8, 2.0), (1.5, 4.0), (0.3, 8.0))
-"""Oscillations of the acceleration asked for. Of the fastest little is left in the path, but what the attitude loop
-makes of them turns the vehicle as hard as doublets do."""
-_DOUBLET_S = 0.3
-"""Half of a doublet."""
 STANDARD = {"eight": 0.3, "climb at 1": 0.2, "shake all to 8 Hz": 0.2, "turn": 0.15, "doublets": 0.15}
 """Parts of the standard flight, in their order, and the share of its time that each takes."""
 _ROOM = 0.85
@@ -38,8 +33,6 @@ _ROOM = 0.85
 _PIECE_S = 10.0
 _HEAVE_RAD_S = 3.0
 """Rate of the waves: thrust then changes by a good part while the speed over ground stays."""
-_LONGEST_S = 30.0
-"""A turn that the rotors' torque makes more slowly is no candidate."""
 
 
 @dataclass(frozen=True)
@@ -221,6 +214,7 @@ def _passes(limits: Limits) -> list[ManoeuvrePiece]:
 
 
 def _turns(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
+    longest_s = 30.0  # A turn that the rotors' torque makes more slowly is no candidate.
     room = min(limits.room_m[:2])
     amplitude, rate = _largest(limits, room, 0.8)
     # The ramp of a turn reaches its rate in RAMP_S, at most 1.9 times as fast in its midst.
@@ -264,7 +258,7 @@ def _turns(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
         ("drift", "to and fro over ground while the nose turns all round", drift, 0.6 * yaw_rate),
     ):
         duration = _whole(speed, 12.0, 2 * np.pi)
-        if duration <= _LONGEST_S:
+        if duration <= longest_s:
             pieces.append(ManoeuvrePiece(name, words, make, duration))
     return pieces
 
@@ -289,6 +283,9 @@ def _climbs(limits: Limits) -> list[ManoeuvrePiece]:
 
 def _oscillations(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
     """Multisines of the acceleration along some axes (and of yaw) with harmonics of their own each."""
+    # Oscillations of the acceleration asked for. Of the fastest little is left in the path, but what the attitude loop
+    # makes of them turns the vehicle as hard as doublets do.
+    bands_hz = ((0.3, 1.0), (0.8, 2.0), (1.5, 4.0), (0.3, 8.0))
     most = _most_level_m_s2(limits)
     families = (
         ("shake all", ("x", "y", "z", "yaw"), "small quick motions along and about all axes at once"),
@@ -298,7 +295,7 @@ def _oscillations(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
     )
     out = []
     for name, axes, words in families:
-        for low_hz, high_hz in _BANDS_HZ:
+        for low_hz, high_hz in bands_hz:
 
             def make(t, axes=axes, low_hz=low_hz, high_hz=high_hz):
                 inner = t[-1]
@@ -329,19 +326,20 @@ def _oscillations(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
 
 def _doublets(limits: Limits, most_rad_s2: float) -> ManoeuvrePiece:
     """Pushes of the tilt forwards, sideways and of the nose, each followed by its opposite, which leads back."""
+    doublet_s = 0.3  # Half of a doublet.
     most = _most_level_m_s2(limits)
-    push = min(most, limits.speed_m_s / _DOUBLET_S, min(limits.room_m[:2]) / _DOUBLET_S**2)
-    fastest = 0.5 * np.radians(limits.yaw_rate_deg_s) * _DOUBLET_S
-    turn = min(np.radians(20.0), fastest, most_rad_s2 * _DOUBLET_S**2 / 5.77)
+    push = min(most, limits.speed_m_s / doublet_s, min(limits.room_m[:2]) / doublet_s**2)
+    fastest = 0.5 * np.radians(limits.yaw_rate_deg_s) * doublet_s
+    turn = min(np.radians(20.0), fastest, most_rad_s2 * doublet_s**2 / 5.77)
 
     def make(t):
         position, yaw = np.zeros((len(t), 3)), np.zeros(len(t))
-        step, each = t[1] - t[0], 4.0 * _DOUBLET_S
-        half = int(round(_DOUBLET_S / step))
+        step, each = t[1] - t[0], 4.0 * doublet_s
+        half = int(round(doublet_s / step))
         edge = np.hanning(max(half // 3, 3))
-        for number in range(int((t[-1] - _DOUBLET_S) / (2 * each))):
+        for number in range(int((t[-1] - doublet_s) / (2 * each))):
             # + - at once, - + a little later: at rest again, and back.
-            start = int(round((_DOUBLET_S / 2 + 2 * each * number) / step))
+            start = int(round((doublet_s / 2 + 2 * each * number) / step))
             wave = np.zeros(len(t))
             for place, sign in ((0, 1.0), (half, -1.0), (4 * half, -1.0), (5 * half, 1.0)):
                 wave[start + place : start + place + half] = sign
@@ -354,7 +352,7 @@ def _doublets(limits: Limits, most_rad_s2: float) -> ManoeuvrePiece:
         return position, yaw
 
     words = "quick pushes to and fro: forwards, sideways, of the nose"
-    return ManoeuvrePiece("doublets", words, make, 8.0 * _DOUBLET_S * 6 + 1.0)
+    return ManoeuvrePiece("doublets", words, make, 8.0 * doublet_s * 6 + 1.0)
 
 
 def joined(pieces: tuple[ManoeuvrePiece, ...] | list[ManoeuvrePiece], step_s: float, still_s: float = 1.0) -> Reference:

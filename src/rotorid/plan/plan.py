@@ -52,12 +52,8 @@ from rotorid.plan.simulate import (
 from rotorid.recordings import Vehicle
 from rotorid.steps import step
 
-_HANDLING_S = 300.0
-"""A step by hand takes this long: land, work, take off."""
 SHARE = "of the weight"
 """Unit of an upper limit."""
-_YAW_SHARE = 0.2
-"""Share of the hovering rotors' torque that a planned turn may ask for: the rest is kept for roll and pitch."""
 SIZES = (1.0, 0.75, 0.5)
 """Sizes of a manoeuvre that are tried, the largest that keeps the limits is taken."""
 _QUICK = ("shake all to 2 Hz", "shake all to 4 Hz")
@@ -98,7 +94,8 @@ class Handled:
     @property
     def minutes(self) -> float:
         """The work and the hover, min."""
-        return (_HANDLING_S + self.hover_s) / 60.0
+        handling_s = 300.0  # A step by hand takes this long: land, work, take off.
+        return (handling_s + self.hover_s) / 60.0
 
     @property
     def sigma(self) -> float | None:
@@ -329,9 +326,11 @@ class Plan(Forecast):
 
 def yaw_acceleration(vehicle: Vehicle) -> float:
     """Yaw acceleration, rad/s2, that a share of the hovering rotors' torque makes."""
+    # Share of the hovering rotors' torque that a planned turn may ask for: the rest is kept for roll and pitch.
+    yaw_share = 0.2
     weight = vehicle.mass_kg * vehicle.gravity_m_s2
     torque = weight * vehicle.torque_coefficients_n_m_s2().sum() / vehicle.thrust_coefficients_n_s2().sum()
-    return _YAW_SHARE * torque / vehicle.inertia_kg_m2.zz
+    return yaw_share * torque / vehicle.inertia_kg_m2.zz
 
 
 def broken(flight: SimulatedFlight, limits: Limits, vehicle: Vehicle) -> str:

@@ -25,8 +25,8 @@ from scipy.optimize import least_squares
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.contract import Form, SpeedForm
 from rotorid.errors import InputError
-from rotorid.mismatch.analyse import findings_inside, findings_outside
-from rotorid.mismatch.decide.findings import Analysis, Finding, with_probabilities
+from rotorid.mismatch.analyse import decided, findings_outside
+from rotorid.mismatch.decide.findings import Analysis, Finding
 from rotorid.mismatch.decide.select import COST_PER_PARAMETER
 from rotorid.mismatch.decide.status import CLAIMED
 from rotorid.mismatch.deliver.derivatives import learn
@@ -36,7 +36,6 @@ from rotorid.mismatch.evidence.regression import Regression, autoregression
 from rotorid.mismatch.evidence.rows import Term, residual
 from rotorid.mismatch.evidence.speedpath import starts_of
 from rotorid.mismatch.evidence.split import parts_of, split_runs
-from rotorid.mismatch.flight.absent import chosen_already
 from rotorid.mismatch.flight.delivered import ways
 from rotorid.mismatch.flight.fitted import Fitted, fitted
 from rotorid.mismatch.flight.prepare import Prepared, assemble_rows, prepare
@@ -50,8 +49,6 @@ from rotorid.vehicle.derivatives import derivative_form, own_controls, quantitie
 _MOST_EVALUATIONS = 40
 _EDGE_S = 0.5
 """Left out at both ends of a flight: a command that leads has nothing to lead from there."""
-_LEAST_WEIGHT = 0.05
-"""Relative probability from which a form may as well be the true one."""
 _MAY_DIFFER = ("name", "noise", "effects", "ground_z_m")
 """Keys of vehicle.yaml that say nothing of the vehicle itself."""
 
@@ -244,9 +241,7 @@ def known(
     prepared = prepare(fit_part, cutoff_hz, unseen=tuple(r.name for r in unseen.runs))
     found = fitted(prepared)
     way = ways(found.model, found.values, found.model.selection.active)[0]
-    chosen = chosen_already(found.model)
-    inside = with_probabilities(findings_inside(found, prepared, way.fit), chosen.found, chosen.support)
-    findings = (*mistakes, *findings_outside(found, prepared), *inside)
+    findings, *_ = decided(found, (*mistakes, *findings_outside(found, prepared)), way.fit, way.moved)
     chain = () if found.chain is None else tuple(k for k, _ in found.chain[0].fit.chain)
     if claimed is not None:
         findings = tuple(f for f in findings if f.id in claimed or f.id in suggested)
@@ -333,11 +328,12 @@ def _hypothesis_of(
     regression: Regression, shared: Sequence[str], name: str, choices, terms: dict[str, Term], own: str
 ) -> Hypothesis:
     """The model of an id in its best form, `own` where that is one of its `choices`, with the forms nearly as good."""
+    least_weight = 0.05  # Relative probability from which a form may as well be the true one.
     worth = partial(_worth, regression, shared, terms)
     best = (own,) if (own,) in choices else best_of(regression, shared, choices, terms)
     weights = {keys: float(np.exp(min(worth(keys) - worth(best), 0.0) / 2)) for keys in choices if keys != best}
     others = (
-        replace(_hypothesis(regression, shared, name, k), weight=w) for k, w in weights.items() if w > _LEAST_WEIGHT
+        replace(_hypothesis(regression, shared, name, k), weight=w) for k, w in weights.items() if w > least_weight
     )
     return replace(_hypothesis(regression, shared, name, best), others=tuple(others))
 

@@ -41,9 +41,6 @@ from rotorid.steps import step
 _DRAWS = 400
 _LEAST_RATE_HZ = 400.0
 """Flights are simulated at least this finely."""
-_SLOWER_LOOPS = (1.0, 0.7)
-"""Shares of the stated bandwidths that flights are simulated with: what is asked of quick motions only a loop as fast
-as stated flies."""
 FITTED_SHARE = 1.0 - HELD_OUT_SHARE
 """Share of a later recording that the joint judgement fits: the rest is held out (`rotorid.plan.questions`)."""
 _SIZES = np.geomspace(1e-2, 1e2, 41)
@@ -187,8 +184,11 @@ def _columns_of(known: FittedSet) -> tuple[str, ...]:
 @step("flying a manoeuvre in simulation")
 def flown(world: CompetingModel, reference: Reference, limits: Limits) -> tuple[SimulatedFlight, ...]:
     """A reference flown by a competing model, with the loops as stated and slower (SLOWER_LOOPS)."""
+    # Shares of the stated bandwidths that flights are simulated with: what is asked of quick motions only a loop as
+    # fast as stated flies.
+    slower_loops = (1.0, 0.7)
     fast, slow = limits.attitude_bandwidth_rad_s, limits.position_bandwidth_rad_s
-    return tuple(fly(world, reference, s * fast, limits.middle_m, slow and s * slow) for s in _SLOWER_LOOPS)
+    return tuple(fly(world, reference, s * fast, limits.middle_m, slow and s * slow) for s in slower_loops)
 
 
 def of_flights(

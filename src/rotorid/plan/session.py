@@ -21,14 +21,13 @@ from rotorid.mismatch.decide.findings import with_probabilities
 from rotorid.mismatch.evidence.regression import Regression, build
 from rotorid.mismatch.evidence.rows import Rows, Term
 from rotorid.mismatch.evidence.split import parts_of, split_runs
-from rotorid.mismatch.instrument.analyse import reading_findings, with_plainer_forms
-from rotorid.mismatch.instrument.chain import ChainResult, find_chain, moved
+from rotorid.mismatch.instrument.analyse import decided_of_reading, first_model, with_plainer_forms
+from rotorid.mismatch.instrument.chain import ChainResult, moved
 from rotorid.mismatch.instrument.mistakes import find_mistakes
 from rotorid.mismatch.instrument.model import (
     ReadingModel,
     chosen_already,
     everything,
-    fitted_model,
     make_terms,
     rows_of,
     whole_reading,
@@ -103,16 +102,12 @@ def known_instrument(recordings: RecordingSet, claimed: Collection[str] | None =
     recordings, mistakes, _ = find_mistakes(recordings)
     part, _ = parts_of(recordings, split_runs(recordings))
     setup = set_up(part, recordings)
-    terms, _ = make_terms(setup)
-    chain = find_chain(setup)
-    measured = all(x.measured for x in setup.loadings)
-    loadings = None if chain is None or measured else moved(setup, chain)
-    model = fitted_model(setup, terms, loadings=loadings)
+    model, chain, loadings = first_model(setup, make_terms(setup)[0])
     model = with_plainer_forms(model, loadings)
     holder = KnownInstrument(recordings, model, chain, (), ())
     questions, unanswerable = [], [(f.alternatives, f.sentence) for f in mistakes if f.status == "ambiguous"]
     chosen = chosen_already(model)
-    inside = with_probabilities(reading_findings(model), chosen.found, chosen.support)
+    inside = with_probabilities(decided_of_reading(model), chosen.found, chosen.support)
     for finding in (*inside, *(() if chain is None else chain.findings)):
         ids = tuple(finding.alternatives) if finding.status == "ambiguous" else ()
         if claimed is not None and finding.id not in claimed:

@@ -38,14 +38,8 @@ from rotorid.vehicle.mixer import allocation_matrix
 _DAMPING = 0.8
 _FASTER = 5.0
 """Bandwidth of rotors and filters over that of the attitude loop."""
-_SLOWER = 0.2
-"""Bandwidth of the position loop over that of the attitude loop, where its bandwidth is not stated."""
 _EDGE = 8
 """Samples by which a flight is longer on both sides while its derivatives are taken."""
-_ROUNDS = 6
-"""Times that rotor speeds and attitude are solved for with the effects at their last values."""
-_STEPS_BACK = 8
-"""Rounds of the inversion of what lies between command and speed."""
 OF_PROPELLER = ("unequal_rotors",)
 """Effects whose coefficients, one a rotor, go with the propeller. A tilt stays with the motor's mount."""
 OF_CENTRE = "com_offset"
@@ -53,8 +47,6 @@ WITH_MASS_OF_ITS_OWN = ("payload",)
 """Effects whose parameters are of a further mass: with a known one attached their columns are not those of before."""
 MASS_SHARE = 0.05
 """A mass to attach over the vehicle's."""
-_PLACE_SD_M, _MASS_SD = 0.002, 0.01
-"""How well the place of an attached mass is known, and its size as a share of it."""
 
 
 @dataclass(frozen=True)
@@ -151,12 +143,14 @@ def fly(
 
     Raises InputError: the rotors cannot do it: one would have to turn backwards.
     """
+    slower = 0.2  # Bandwidth of the position loop over that of the attitude loop, where its bandwidth is not stated.
+    rounds = 6  # Times that rotor speeds and attitude are solved for with the effects at their last values.
     vehicle, step = world.vehicle, float(reference.time_s[1] - reference.time_s[0])
     gravity, reference = np.array([0.0, 0.0, vehicle.gravity_m_s2]), _held_longer(reference, step)
     t = reference.time_s
     ground = vehicle.ground_z_m or 0.0
     start = np.array([place_m[0], place_m[1], ground - place_m[2]])
-    outer = _SLOWER * bandwidth_rad_s if position_rad_s is None else position_rad_s
+    outer = slower * bandwidth_rad_s if position_rad_s is None else position_rad_s
     rotors = low_pass(_FASTER * bandwidth_rad_s)
     level = followed(reference.position_m[:, :2], outer, np.polymul(low_pass(bandwidth_rad_s), rotors), step)
     # The height needs no tilt.
@@ -171,7 +165,7 @@ def fly(
     speed = np.full((len(t), vehicle.rotor_count), hover)
     inner = slice(_EDGE, -_EDGE)
     rotation = _attitude(-wanted, yaw)
-    for _ in range(_ROUNDS if (*world.effects, *world.derivatives) else 1):
+    for _ in range(rounds if (*world.effects, *world.derivatives) else 1):
         left = wanted - np.einsum("nij,nj->ni", rotation, force)
         rotation = _attitude(-left, yaw)
         rates = _body_rates(rotation, step)
@@ -220,11 +214,12 @@ def _held_longer(reference: Reference, step_s: float) -> Reference:
 
 def commands(world: CompetingModel, motion: Motion) -> np.ndarray:
     """Commands (n, k), rad/s, that make the rotor speeds of a motion through the model's chain."""
+    steps_back = 8  # Rounds of the inversion of what lies between command and speed.
     wanted = command = motion.rotor_speed
     if not world.chain:
         return command
     start = SpeedPath(command, motion.time_s, world.full_speed_rad_s, motion.voltage, world.full_voltage_v)
-    for _ in range(_STEPS_BACK):
+    for _ in range(steps_back):
         path = replace(start, speed=command)
         for form, values in sorted(world.chain, key=lambda pair: pair[0].stage):
             path = replace(path, speed=form.apply(path, values))
@@ -347,6 +342,7 @@ def _by_propeller(form: Form, order: np.ndarray) -> Form:
 
 def _attached(vehicle: Vehicle, place_m: tuple[float, float, float], words: str) -> ChangedVehicle:
     """A mass of MASS_SHARE of the vehicle's attached at `place_m` (forward, right, down of the believed centre)."""
+    place_sd_m, mass_sd = 0.002, 0.01  # How well the place of an attached mass is known, and its size as a share of it.
     mass, more = vehicle.mass_kg, MASS_SHARE * vehicle.mass_kg
     place = np.array(place_m)
     centre = more / (mass + more) * place
@@ -374,7 +370,7 @@ def _attached(vehicle: Vehicle, place_m: tuple[float, float, float], words: str)
         return replace(form, contribution=lambda m, v, values: form.contribution(m, v, share * np.asarray(values)))
 
     # The mass sits next to where it should, or weighs other than stated: either moves the centre.
-    doubt = np.hypot(_PLACE_SD_M, _MASS_SD * np.linalg.norm(place)) * (1.0 - share)
+    doubt = np.hypot(place_sd_m, mass_sd * np.linalg.norm(place)) * (1.0 - share)
     plane = catalogue()[OF_CENTRE].forms(vehicle)[0]
     nuisance = Term("by hand/place", "effect", "", plane, (0.0, 0.0), 2, (doubt, doubt))
     inertias = {f"inertia_{a}{a}": own[i, i] / inertia[i, i] for i, a in enumerate("xyz")}

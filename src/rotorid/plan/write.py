@@ -71,9 +71,6 @@ _SHOWN_HZ = 25.0
 _FILE_HZ = 100.0
 _PIECES_AT_ONCE = 31
 """Pieces that the trajectory memory of a Crazyflie (4096 bytes, 132 a piece) holds."""
-_COARSEST_S, _FINEST_S = 2.0, 0.1
-_WORST_FIT_M, _WORST_FIT_M_S2 = 0.01, 0.4
-"""Quick motions are millimetres large: that the path is met does not say that the acceleration is."""
 _FLIP = np.array([1.0, -1.0, -1.0])
 """North-east-down to forward-left-up."""
 
@@ -127,6 +124,9 @@ def crazyflie(plan: Plan) -> tuple[pd.DataFrame, float]:
 
     Pieces are as long as the fit allows (WORST_FIT_M, WORST_FIT_M_S2), between FINEST_S and COARSEST_S.
     """
+    coarsest_s, finest_s = 2.0, 0.1
+    # Quick motions are millimetres large: that the path is met does not say that the acceleration is.
+    worst_fit_m, worst_fit_m_s2 = 0.01, 0.4
     reference, middle = plan.reference, plan.limits.middle_m
     t, step = reference.time_s, reference.time_s[1] - reference.time_s[0]
     place = (reference.position_m + np.array([middle[0], middle[1], -middle[2]])) * _FLIP
@@ -137,7 +137,7 @@ def crazyflie(plan: Plan) -> tuple[pd.DataFrame, float]:
     states = np.stack(derivatives, axis=1)
     rows, worst, at = [], 0.0, 0
     while at < len(t) - 1:
-        length = int(round(_COARSEST_S / step))
+        length = int(round(coarsest_s / step))
         while True:
             end = min(at + length, len(t) - 1)
             seconds = t[end] - t[at]
@@ -146,7 +146,7 @@ def crazyflie(plan: Plan) -> tuple[pd.DataFrame, float]:
             off = float(np.linalg.norm((powers @ fitted - every[at : end + 1])[:, :3], axis=1).max())
             bend = powers[:, :6] @ (fitted[2:] * (np.arange(2, 8) * np.arange(1, 7))[:, None])
             pushed = float(np.linalg.norm((bend - states[at : end + 1, 2])[:, :3], axis=1).max())
-            if (off <= _WORST_FIT_M and pushed <= _WORST_FIT_M_S2) or length <= _FINEST_S / step:
+            if (off <= worst_fit_m and pushed <= worst_fit_m_s2) or length <= finest_s / step:
                 break
             length //= 2
         worst, at = max(worst, off), end
@@ -439,8 +439,6 @@ _STRAIGHT = ("hover", "ladder", "pass", "climb", "face")
 """First words of the manoeuvres that are waypoints."""
 _STILL = 0.03
 """Share of the largest speed below which the vehicle turns round or waits."""
-_HELD_S = 0.5
-"""Shorter rests are turns, not waits."""
 TAKE_OFF, WAYPOINT, SPEED, RETURN = 22, 16, 178, 20
 _RELATIVE = 3
 """MAVLink frame: latitude, longitude, height above home."""
@@ -462,6 +460,7 @@ def _stops(reference: Reference) -> list[tuple[np.ndarray, float, float, float]]
     The place (north, east, down from the volume's middle), m, the yaw, rad, how long to stay, s, and how fast to get
     there, m/s.
     """
+    held_s = 0.5  # Shorter rests are turns, not waits.
     t = reference.time_s
     speed = np.linalg.norm(np.gradient(reference.position_m, t, axis=0), axis=1)
     turning = np.abs(np.gradient(reference.yaw_rad, t))
@@ -470,7 +469,7 @@ def _stops(reference: Reference) -> list[tuple[np.ndarray, float, float, float]]
     out, last = [], 0
     for start, stop in edges:
         middle, wait = (start + stop - 1) // 2, float(t[stop - 1] - t[start])
-        way, held = float(speed[last : start + 1].max()), wait if wait > _HELD_S else 0.0
+        way, held = float(speed[last : start + 1].max()), wait if wait > held_s else 0.0
         out.append((reference.position_m[middle], float(reference.yaw_rad[middle]), held, way))
         last = stop
     return out

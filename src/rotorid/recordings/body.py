@@ -28,15 +28,9 @@ _C_T = (0.002, 0.2)
 _FIGURE_OF_MERIT = (0.07, 1.0)
 _SURE_FIGURE_OF_MERIT = (0.07, 1.5)
 """Between 1 and this coefficients are impossible, and by some tens of percent."""
-_ROUGH_FIGURE_OF_MERIT = (0.05, 1.5)
-"""With a radius that is itself estimated from C_F."""
 _DISC_LOADING_N_M2 = (3.0, 3000.0)
 _HIGHEST_TIP_M_S = 306.0
 """Mach 0.9."""
-_WEIGHT = (0.55, 1.9)
-"""Thrust over what carries the vehicle; outside, mass or thrust is wrong by about a factor of two."""
-_WEIGHT_BY_THROTTLE = (0.2, 5.0)
-"""The same where speed is throttle times limit, which no real throttle obeys."""
 _LIMIT_OVER_HOVER = (0.8, 8.0)
 _PLACE_ARMS = (0.0, 2.0)
 _ROTOR_INERTIA = (0.0, 0.1)
@@ -178,6 +172,7 @@ def body_of(
 
 def quantities(body: Body) -> Iterator[_CoupledNumber]:
     """What couples the believed values, as far as they are stated."""
+    rough_figure_of_merit = (0.05, 1.5)  # With a radius that is itself estimated from C_F.
     radius, c_f = body.radius_m, body.thrust_coefficient_n_s2
     stated = body.rotor_radius_m is not None
     length = "rotor_radius_m" if stated else "thrust_coefficient_n_s2"
@@ -199,7 +194,7 @@ def quantities(body: Body) -> Iterator[_CoupledNumber]:
         merit = c_f**1.5 / (body.torque_coefficient_n_m_s2 * sqrt(2 * _AIR_KG_M3 * pi) * radius)
         words = f"a figure of merit of {merit:.3g} (C_F^1.5 over C_Q √(2 ρ π) R)"
         keys = ("torque_coefficient_n_m_s2", "thrust_coefficient_n_s2", length)
-        limits, sure = (_FIGURE_OF_MERIT, _SURE_FIGURE_OF_MERIT) if stated else (_ROUGH_FIGURE_OF_MERIT, None)
+        limits, sure = (_FIGURE_OF_MERIT, _SURE_FIGURE_OF_MERIT) if stated else (rough_figure_of_merit, None)
         yield _CoupledNumber(keys, merit, limits, words, sure)
     if body.mass_kg:
         loading = body.mass_kg * 9.81 / (body.count * pi * radius**2)
@@ -219,6 +214,9 @@ def quantities(body: Body) -> Iterator[_CoupledNumber]:
 
 def _turning(body: Body, disc: str) -> Iterator[_CoupledNumber]:
     """What couples the values with the rotor speeds."""
+    # Thrust over what carries the vehicle; outside, mass or thrust is wrong by about a factor of two.
+    weight = (0.55, 1.9)
+    weight_by_throttle = (0.2, 5.0)  # The same where speed is throttle times limit, which no real throttle obeys.
     hover, top = body.rotor_speeds
     source = "rotor_speed_limits_rad_s" if body.by_throttle else "rotor_speeds"
     tip = top * body.radius_m
@@ -227,7 +225,7 @@ def _turning(body: Body, disc: str) -> Iterator[_CoupledNumber]:
     if body.mass_kg and body.lift_m_s2:
         ratio = body.count * body.thrust_coefficient_n_s2 * hover**2 / (body.mass_kg * body.lift_m_s2)
         words = f"the thrust is {ratio:.3g} times what carries the vehicle (C_F Σω² over mass times specific force)"
-        limits = _WEIGHT_BY_THROTTLE if body.by_throttle else _WEIGHT
+        limits = weight_by_throttle if body.by_throttle else weight
         yield _CoupledNumber(("mass_kg", "thrust_coefficient_n_s2", source), ratio, limits, words)
         if body.rotor_speed_limits_rad_s and not body.by_throttle:
             share = body.rotor_speed_limits_rad_s / hover

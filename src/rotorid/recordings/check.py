@@ -15,7 +15,7 @@ are not and what that means for testing; and what cannot be right:
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
 from itertools import combinations
 from pathlib import Path
@@ -45,8 +45,6 @@ from rotorid.recordings.run import Doubt, RecordingSet, Run
 from rotorid.recordings.sufficient import SENSORS, compared_readings, rotor_groups, sufficient
 from rotorid.recordings.vehicle import Vehicle
 
-_STILL_S = 1.0
-"""A sensor of a flight that repeats one reading for so long is named."""
 _STUCK_ROWS, _STUCK_TIMES = 8, 4.0
 """Readings from which a sensor of a stand stands still, and how many times as long as it ever does else."""
 _SMALL_CHANGES = 0.2
@@ -68,19 +66,9 @@ _NOISY = (*c.SPECIFIC_FORCE, *c.ANGULAR_VELOCITY, *c.FORCE, *c.MOMENT)
 """Columns with white noise of their own; commands and loads may repeat truly, what a filter made is smooth."""
 _LEAST_EQUAL, _LEAST_NOISY = 2, 3
 """Columns that must agree: to the last digit, or in their noise."""
-_LEAST_ROWS, _LEAST_SHARE = 20, 0.05
-"""Equal samples, and their share of the shorter run, from which two runs overlap."""
-_BY_CHANCE = 3.0
-"""So many times as often as within one run: readings in coarse steps repeat by themselves."""
 _BLOCK, _BLOCKS, _JUMP = 256, 5, 4.0
 _SAME_NOISE = 0.95
 """Correlation of second differences that independent noise does not reach in a block."""
-_MOST_CORRELATED = 5_000_000
-"""Samples by runs to correlate with, which take some seconds."""
-_GAP_FACTOR = 3.0
-"""A step of the clock longer than this many median steps is a gap."""
-_SLOWEST_SPEEDS_HZ = 20.0
-"""Rate of rotor speeds below which motors (time constants of some hundredths of a second) are faster than their log."""
 
 
 @dataclass(frozen=True)
@@ -125,9 +113,10 @@ class SetCheck:
 
 def check_run(run: Run) -> _RunCheck:
     """Sampling of one run."""
+    gap_factor = 3.0  # A step of the clock longer than this many median steps is a gap.
     steps = np.diff(run.time_s)
     median = float(np.median(steps))
-    gaps = steps[steps > _GAP_FACTOR * median]
+    gaps = steps[steps > gap_factor * median]
     duration = float(run.time_s[-1] - run.time_s[0])
     empty = {n: float(run.table[n].isna().mean()) for n in run.table.columns if run.table[n].isna().any()}
     return _RunCheck(
@@ -187,12 +176,14 @@ def _lacks_of_flight(has, count: int) -> list[str]:
 
 def _slow_speeds(recordings: RecordingSet) -> list[str]:
     """A sentence where rotor speeds come too seldom to carry what is fast between command and speed."""
+    # Rate of rotor speeds below which motors (time constants of some hundredths of a second) are faster than their log.
+    slowest_speeds_hz = 20.0
     names = c.rotor_columns("rotor_speed", recordings.vehicle.rotor_count)
     runs = [run for run in recordings.runs if run.has(*names)]
     if not runs:
         return []
     rate = min(float(run.table[names[0]].notna().sum() / (run.time_s[-1] - run.time_s[0])) for run in runs)
-    if rate >= _SLOWEST_SPEEDS_HZ:
+    if rate >= slowest_speeds_hz:
         return []
     return [
         f"Rotor speeds come {rate:.2g} times a second only: a lag or delay of the motors shorter than "
@@ -247,14 +238,8 @@ def _contents(recordings: RecordingSet) -> SetCheck:
 
 def doubts_of(recordings: RecordingSet) -> tuple[Doubt, ...]:
     """What cannot be right in a set, its vehicle and its runs together; empty where nothing is in doubt."""
-    found = [*_unread_files(recordings), *near_names(recordings), *copies(recordings), *voltages(recordings)]
-    if recordings.vehicle.kind != "bench":
-        found += [*gravity(recordings.vehicle), *impossible_values(recordings)]
-    if recordings.vehicle.kind == "flight":
-        found += physical_doubts(recordings)
-    found += [*_still_readings(recordings), *_stuck_readings(recordings), *still_sensors(recordings)]
-    found += [*_coarse_readings(recordings), *_scattered_rotors(recordings), *_scattered_readings(recordings)]
-    return tuple(found)
+    kind = recordings.vehicle.kind
+    return tuple(doubt for look, kinds in _LOOKS if kind in kinds for doubt in look(recordings))
 
 
 def as_text(check: SetCheck) -> str:
@@ -302,6 +287,7 @@ def check_folder(folder: Path) -> SetCheck:
 
 def copies(recordings: RecordingSet) -> tuple[Doubt, ...]:
     """One doubt for each run that repeats samples of an earlier one."""
+    most_correlated = 5_000_000  # Samples by runs to correlate with, which take some seconds.
     columns = dict.fromkeys(n for run in recordings.runs for n in run.table.columns if n != c.TIME)
     names = [n for n in columns if all(run.has(n) for run in recordings.runs)]
     if len(recordings.runs) < 2 or len(names) < _LEAST_EQUAL:
@@ -315,7 +301,7 @@ def copies(recordings: RecordingSet) -> tuple[Doubt, ...]:
     if (
         len(noisy) >= _LEAST_NOISY
         and len(rest) > 1
-        and sum(len(run.table) for run in rest) * len(rest) <= _MOST_CORRELATED
+        and sum(len(run.table) for run in rest) * len(rest) <= most_correlated
     ):
         for first, second in _same_noise(rest, noisy):
             found.setdefault(second, (first, "even the noise of its sensors is the same"))
@@ -331,6 +317,9 @@ def copies(recordings: RecordingSet) -> tuple[Doubt, ...]:
 
 def _equal_samples(runs: tuple[Run, ...], names: list[str]) -> Iterator[tuple[str, str, float, float]]:
     """Pairs of runs with equal samples: names, share of the shorter run, and how much later in the second, s."""
+    # Equal samples, and their share of the shorter run, from which two runs overlap.
+    least_rows, least_share = 20, 0.05
+    by_chance = 3.0  # So many times as often as within one run: readings in coarse steps repeat by themselves.
     tables, repeated = [], []
     for number, run in enumerate(runs):
         values = run.table[names]
@@ -347,8 +336,8 @@ def _equal_samples(runs: tuple[Run, ...], names: list[str]) -> Iterator[tuple[st
     pairs = pairs[pairs["run"] != pairs["run_first"]]
     for (a, b), equal in pairs.groupby(["run_first", "run"]):
         share = len(equal) / min(sizes[a], sizes[b])
-        least = max(_LEAST_SHARE, _BY_CHANCE * max(repeated[a], repeated[b]))
-        if len(equal) >= _LEAST_ROWS and share >= least:
+        least = max(least_share, by_chance * max(repeated[a], repeated[b]))
+        if len(equal) >= least_rows and share >= least:
             yield runs[a].name, runs[b].name, share, float((equal["time_s"] - equal["time_s_first"]).median())
 
 
@@ -413,9 +402,8 @@ def _unread_files(recordings: RecordingSet) -> tuple[Doubt, ...]:
 
 def still_sensors(recordings: RecordingSet) -> Iterator[Doubt]:
     """One doubt for each sensor of a flight that stands still for a time, with the first run and its seconds."""
+    still_s = 1.0  # A sensor of a flight that repeats one reading for so long is named.
     runs, vehicle = recordings.runs, recordings.vehicle
-    if vehicle.kind != "flight":
-        return
     groups = (*SENSORS, *rotor_groups(vehicle).values())
     noisy = noisy_columns(runs, [n for names in groups for n in names])
     found: dict[tuple[str, ...], list[tuple[str, float, float]]] = {}
@@ -431,7 +419,7 @@ def still_sensors(recordings: RecordingSet) -> Iterator[Doubt]:
             for own, stands in masks.items():
                 times = [(float(run.time_s[m][0]), float(run.time_s[m][-1])) for m in stands]
                 for start, stop in times:
-                    if stop - start >= _STILL_S:
+                    if stop - start >= still_s:
                         found.setdefault(own, []).append((run.name, start, stop))
     for names, where in found.items():
         run, start, stop = where[0]
@@ -468,8 +456,6 @@ def _alone(run: Run, vehicle: Vehicle, name: str, names: tuple[str, ...], noisy:
 def _still_readings(recordings: RecordingSet) -> Iterator[Doubt]:
     """One doubt for all such readings; it stops a verdict where no reading of the instrument changes."""
     runs, vehicle = recordings.runs, recordings.vehicle
-    if vehicle.kind == "flight":
-        return
     names = list(dict.fromkeys(name for run in runs for name in compared_readings(run, vehicle)))
     spans = {}
     for name in names:
@@ -496,8 +482,6 @@ def _stuck_readings(recordings: RecordingSet) -> Iterator[Doubt]:
     """One doubt for each column of a stand or bench that stands still for a time: a reading or a measured speed by its
     noise, a reference while the force that it states goes on."""
     vehicle = recordings.vehicle
-    if vehicle.kind == "flight":
-        return
     speeds = c.rotor_columns("rotor_speed", vehicle.rotor_count)
     found: dict[str, tuple[str, float, float]] = {}
     names = {run.name: [*filter(run.has, (*compared_readings(run, vehicle), *speeds))] for run in recordings.runs}
@@ -543,11 +527,9 @@ def _goes_on(values: np.ndarray, rows: np.ndarray) -> bool:
 
 def _coarse_readings(recordings: RecordingSet) -> Iterator[Doubt]:
     """One doubt for each reading of a stand or bench whose steps are larger than its noise."""
-    runs, vehicle = recordings.runs, recordings.vehicle
-    if vehicle.kind == "flight":
-        return
+    vehicle = recordings.vehicle
     found: dict[str, float] = {}
-    for run in runs:
+    for run in recordings.runs:
         for name in (n for n in compared_readings(run, vehicle) if n in c.FORCE + c.MOMENT):
             values = run.column(name)[np.isfinite(run.column(name))]
             step = step_of(values) if (np.diff(values) == 0).sum() > 0.5 * len(values) else 0.0
@@ -563,8 +545,6 @@ def _coarse_readings(recordings: RecordingSet) -> Iterator[Doubt]:
 
 def _scattered_rotors(recordings: RecordingSet) -> Iterator[Doubt]:
     """One doubt for each kind of columns of a flight's rotors that have their values in different rows."""
-    if recordings.vehicle.kind != "flight":
-        return
     for kind, names in rotor_groups(recordings.vehicle).items():
         known = [np.isfinite(run.array(names)) for run in recordings.runs if names and run.has(*names)]
         apart = [float((own.any(axis=1) & ~own.all(axis=1)).mean()) for own in known]
@@ -579,9 +559,9 @@ def _scattered_rotors(recordings: RecordingSet) -> Iterator[Doubt]:
 
 def _scattered_readings(recordings: RecordingSet) -> Iterator[Doubt]:
     """One doubt for all columns of a stand or bench that lack values now and then, in no order."""
-    runs, vehicle = recordings.runs, recordings.vehicle
+    vehicle = recordings.vehicle
     found: dict[str, float] = {}
-    for run in runs if vehicle.kind != "flight" else ():
+    for run in recordings.runs:
         for name in (*compared_readings(run, vehicle), *c.rotor_columns("rotor_speed", vehicle.rotor_count)):
             steps = np.diff(np.flatnonzero(np.isfinite(run.column(name)))) if run.has(name) else np.zeros(0)
             if len(steps) and (steps != np.median(steps)).mean() > _APART:
@@ -609,3 +589,22 @@ def _held_sensors(recordings: RecordingSet) -> Iterator[Doubt]:
                     f"{run.name}: they come {rate:.3g} times a second, and later than the rows say",
                 )
                 break
+
+
+_LOOKS: tuple[tuple[Callable[[RecordingSet], Iterable[Doubt]], tuple[str, ...]], ...] = (
+    (_unread_files, ("flight", "stand", "bench")),
+    (near_names, ("flight", "stand", "bench")),
+    (copies, ("flight", "stand", "bench")),
+    (voltages, ("flight", "stand", "bench")),
+    (gravity, ("flight", "stand")),
+    (impossible_values, ("flight", "stand")),
+    (physical_doubts, ("flight",)),
+    (_still_readings, ("stand", "bench")),
+    (_stuck_readings, ("stand", "bench")),
+    (still_sensors, ("flight",)),
+    (_coarse_readings, ("stand", "bench")),
+    (_scattered_rotors, ("flight",)),
+    (_scattered_readings, ("stand", "bench")),
+)
+"""Everything that is looked for in a set as it was given, and in which kinds of sets: by `check`, by the page before a
+verdict, and by the verdict, which looks once more at the set that it corrected."""

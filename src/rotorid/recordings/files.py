@@ -50,7 +50,6 @@ _TRUSTED = (
 """Names that `trust` may give a one-sigma of."""
 NO_BODY = 1.25
 """A principal moment is at most the sum of the others; an inertia believed may be wrong by this factor."""
-_ONE_SPOT_M = 1e-4
 _LINE = re.compile(r"^(?P<key>\w+):.*?#\s*PROPOSED:?\s*(?P<why>.*)$")
 RUN_SUFFIXES = (".csv", ".csv.gz", ".parquet")
 VEHICLE, _SPLIT = "vehicle.yaml", "split.yaml"
@@ -273,6 +272,7 @@ def proposed_in(text: str) -> tuple[Doubt, ...]:
 
 def check_belief(vehicle: Vehicle, where: str) -> None:
     """InputError in one sentence for what no vehicle of a recording set can be; `where` names its file."""
+    one_spot_m = 1e-4
     for key in ("effects", "derivatives", "reading_gain"):
         if getattr(vehicle, key):
             raise InputError(
@@ -285,7 +285,7 @@ def check_belief(vehicle: Vehicle, where: str) -> None:
     hubs, spins = vehicle.rotor_positions_m(), vehicle.yaw_signs()
     for first in range(len(hubs)):
         # Two that turn against each other are coaxial: autopilots leave the distance between them out.
-        near = np.linalg.norm(hubs[first + 1 :] - hubs[first], axis=1) < _ONE_SPOT_M
+        near = np.linalg.norm(hubs[first + 1 :] - hubs[first], axis=1) < one_spot_m
         near = np.flatnonzero(near & (spins[first + 1 :] == spins[first]))
         if len(near):
             spot = listed([f"{name} {value:g} m" for name, value in zip("xyz", hubs[first], strict=True)])

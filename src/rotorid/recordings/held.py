@@ -20,8 +20,6 @@ SHORTEST_GAP_PERIODS = 12
 SHORTEST_FREEZE_PERIODS = 8
 SHORTEST_FREEZE_S = 0.04
 """Where all columns of a sensor stand still at once, a shorter stretch is no chance."""
-_BY_CHANCE = 1e-9
-"""p-value above which repeated readings may be chance."""
 _SMOOTH = 0.3
 """Second differences of a reading without noise are this share of its first ones at most; white noise has 1.7."""
 _LEAST_JUMP = 5.0
@@ -61,6 +59,7 @@ def held(
     `noisy` says that other runs show noise of the sensor's own; `contradicted`, whether other columns say of a mask
     (n,) that the readings cannot have stood.
     """
+    by_chance = 1e-9  # p-value above which repeated readings may be chance.
     index = np.flatnonzero(np.isfinite(values).all(axis=1))
     if len(index) < 100:
         return []
@@ -82,7 +81,7 @@ def held(
         habit = np.quantile(others, 0.99) if len(others) > 20 else 1
         repeat = (others - 1).sum() / len(v)
         p = float(min(1.0, len(v) * max(repeat, 1.0 / len(v)) ** (length / max(habit, 1))))
-        if p > _BY_CHANCE or length < 8 * habit:
+        if p > by_chance or length < 8 * habit:
             continue
         mask = np.zeros(len(values), bool)
         # The first of the repeated readings is a true one, but where it is a jump (to zero) by itself.

@@ -39,35 +39,13 @@ _NEAR = 4.0
 """Fewer readings than spikes lie between this and `_FAR`, or the sensor's noise is what makes them."""
 _MOST = 0.1
 """A sensor with a larger share of far readings is no sensor with spikes."""
-_NEIGHBOURS = 3
-"""Readings on each side whose medians a spike is far from: two of three may be spikes themselves."""
-_AROUND = 31
-"""Readings over which the scatter is local: a burst of vibration is none of spikes."""
-_FINEST = 1e-3
-"""Share of a sensor's usual span below which its scatter is not believed."""
 _LEAST_OF_SPIKES = 60
 _LEAST_SPIKES = 3
 """Fewer in all runs may be what a vehicle does once: a bump, a touch of the ground."""
 _REPEATED = 0.1
 """Share of the spikes that one value must have to be named."""
-_LEAST_JUMP_RAD, _FASTEST_RAD_S = 0.25, 40.0
-"""An attitude jumps by at least so much; where no gyroscope says how far it turns, faster than any vehicle."""
-_LEAST_JUMP_M, _FASTEST_M_S, _LEAST_JUMP_M_S, _FASTEST_M_S2 = 0.1, 60.0, 1.0, 200.0
-"""The same of a position and a velocity."""
 _MEASURED = {c.QUATERNION: 1e3, c.POSITION: 1e7, c.VELOCITY: 1e4}
 """Largest size of a reading that is one."""
-_MOST_JUMPED = 0.3
-"""Share of the readings that those may be that a sensor jumps to and back from."""
-_CUT_READINGS = 8
-"""Readings emptied about a jump that stays: a longer gap than the one that is bridged (`_HOLE_PERIODS`)."""
-_REVERSED = 0.02
-"""Share of the largest value that a value of the other sign must exceed to be one: less is noise about zero."""
-_TOO_SLOW = 1.35
-"""A point whose F/ω² exceeds the run's median by this factor has lost part of its speed pulses.
-
-An offset of the balance or a curve that bends makes the low points' F/ω² smaller, not larger, in these data,
-so the rule is one-sided: it must not remove what the offset explains.
-"""
 _HOLE_PERIODS = 6.0
 """Where a sensor gives nothing for longer than so many of its own periods, the flight is cut in two."""
 _LONGEST_USUAL = 10.0
@@ -76,8 +54,6 @@ _COVERED = 0.95
 """Share of the steps between readings that a step of the new grid is as long as."""
 _LONG_STEP, _SCATTERED = 1.5, 0.15
 """A sensor is scattered where more than such a share of its steps is longer than so many usual ones."""
-_TORN = 0.8
-"""Share of a flight in long stretches in which every sensor has readings: below it, gaps are bridged."""
 LEAST_STRETCH_S, LEAST_SINGLE_S = 3.0, 9.0
 """A stretch that can be used lasts so long; of a single run, a third of which is held out."""
 _RATE_ENOUGH_HZ = 50.0
@@ -87,17 +63,11 @@ _USED_BAND = 0.4
 _MOSTLY_FRESH, _EVEN = 0.5, 0.2
 """Share of the rows that bring a new reading, below which a sensor is repeated; and how far from the usual step one is
 even."""
-_SMOOTH_DEGREE = 7
-"""Of the curve through readings that come seldom: its gain is 0.997 at a third of their rate, a cubic's 0.95."""
 _LINES_A_PERIOD = 4.0
 """Values a period on straight lines between readings: few would cut the corners off."""
 _LEAST_READINGS = 20
 LEAST_VALUES = 4
 """Complete readings from which a sensor counts as recorded."""
-_CUBIC = 3
-_STIFFNESS = 5e-4
-"""Weight of the third differences of the spline: a smooth line where there are no readings. With half the cells empty
-by chance noise then is as even over the band as of an even sensor, and the gain at 0.3 of the rate is right to 2 %."""
 
 
 def on_own_rates(recordings: RecordingSet) -> RecordingSet:
@@ -105,6 +75,7 @@ def on_own_rates(recordings: RecordingSet) -> RecordingSet:
 
     A set that the rule of usual steps cuts at holes alone stays as it is, unless they are everywhere.
     """
+    torn = 0.8  # Share of a flight in long stretches in which every sensor has readings: below it, gaps are bridged.
     if recordings.vehicle.kind != "flight":
         return recordings
     kinds = ("rotor_speed", "rotor_command", "throttle")
@@ -118,7 +89,7 @@ def on_own_rates(recordings: RecordingSet) -> RecordingSet:
     even = _with_grids(recordings, own, rotors)
     read = [names for names, runs in there.items() if runs]
     long_s = LEAST_SINGLE_S if len(even.runs) == 1 else LEAST_STRETCH_S
-    if any(_whole_share(run, read, long_s) < _TORN for run in even.runs):
+    if any(_whole_share(run, read, long_s) < torn for run in even.runs):
         gaps = [n for n in read if n in own or any(_cuts(_whole_steps_s(run, n)) for run in there[n])]
         wide = {n: max(1.0 / _RATE_ENOUGH_HZ, *(own_period_s(run, n) for run in there[n])) for n in gaps}
         bridged = _with_grids(recordings, wide, rotors)
@@ -133,6 +104,8 @@ def on_own_rates(recordings: RecordingSet) -> RecordingSet:
 def _with_slow_joined(recordings: RecordingSet, rotors: Collection[tuple[str, ...]]) -> RecordingSet:
     """The set with rotors' readings that come evenly and too seldom to be joined by lines joined by a curve of their
     band; a sentence for each kind of them."""
+    # Of the curve through readings that come seldom: its gain is 0.997 at a third of their rate, a cubic's 0.95.
+    smooth_degree = 7
     runs, said = list(recordings.runs), []
     for names in rotors:
         rates = []
@@ -153,9 +126,9 @@ def _with_slow_joined(recordings: RecordingSet, rotors: Collection[tuple[str, ..
             for start, stop in stretches(np.append(True, steps <= _HOLE_PERIODS * period)):
                 # A stretch begins with the reading before it: the first step of the mask is from that.
                 own = rows[max(start - 1, 0) : stop]
-                if len(own) > _SMOOTH_DEGREE:
+                if len(own) > smooth_degree:
                     inside = np.arange(own[0], own[-1] + 1)
-                    curve = scipy.interpolate.make_interp_spline(run.time_s[own], values[own], _SMOOTH_DEGREE)
+                    curve = scipy.interpolate.make_interp_spline(run.time_s[own], values[own], smooth_degree)
                     out[inside] = curve(run.time_s[inside])
             lowest = 0.0 if np.nanmin(values) >= 0 else -np.inf
             table = run.table.assign(**dict(zip(names, np.maximum(out, lowest).T, strict=True)))
@@ -313,20 +286,25 @@ def _on_lines(time_s: np.ndarray, values: np.ndarray, at_s: np.ndarray, step_s: 
 
 def _spline(time_s: np.ndarray, values: np.ndarray, period_s: float) -> scipy.interpolate.BSpline:
     """The cubic least-squares spline through readings (n,) whose knots are a period apart."""
+    cubic = 3
+    # Weight of the third differences of the spline: a smooth line where there are no readings. With half the cells
+    # empty by chance noise then is as even over the band as of an even sensor, and the gain at 0.3 of the rate is right
+    # to 2 %.
+    stiffness = 5e-4
     count = int(np.ceil((time_s[-1] - time_s[0]) / period_s)) + 1
-    knots = time_s[0] + period_s * np.arange(-_CUBIC, count + _CUBIC)
+    knots = time_s[0] + period_s * np.arange(-cubic, count + cubic)
     # A whole number of periods may end, by rounding, a hair before the last reading.
-    design = scipy.interpolate.BSpline.design_matrix(np.minimum(time_s, knots[-_CUBIC - 1]), knots, _CUBIC)
+    design = scipy.interpolate.BSpline.design_matrix(np.minimum(time_s, knots[-cubic - 1]), knots, cubic)
     size = design.shape[1]
     difference = scipy.sparse.eye_array(size, format="csr")
-    for n in range(_CUBIC):
+    for n in range(cubic):
         difference = scipy.sparse.diags([-1.0, 1.0], [0, 1], shape=(size - n - 1, size - n)) @ difference
     normal = design.T @ design
-    weight = _STIFFNESS * normal.diagonal().mean()
+    weight = stiffness * normal.diagonal().mean()
     found = scipy.sparse.linalg.spsolve(
         (normal + weight * difference.T @ difference).tocsc(), design.T @ (values - values.mean())
     )
-    return scipy.interpolate.BSpline(knots, found + values.mean(), _CUBIC)
+    return scipy.interpolate.BSpline(knots, found + values.mean(), cubic)
 
 
 def on_one_side(quaternion: np.ndarray) -> np.ndarray:
@@ -361,21 +339,23 @@ def without_spikes(recordings: RecordingSet) -> RecordingSet:
 
 def spikes(values: np.ndarray) -> np.ndarray:
     """Mask of the spikes among the readings of one sensor (n,); NaN where there is no reading."""
+    neighbours = 3  # Readings on each side whose medians a spike is far from: two of three may be spikes themselves.
+    finest = 1e-3  # Share of a sensor's usual span below which its scatter is not believed.
     found = np.zeros(len(values), bool)
     known = np.flatnonzero(np.isfinite(values))
     if len(known) < _LEAST_OF_SPIKES:
         return found
     x = values[known]
-    windows = np.lib.stride_tricks.sliding_window_view(x, _NEIGHBOURS)
+    windows = np.lib.stride_tricks.sliding_window_view(x, neighbours)
     medians = np.median(windows, axis=1)
-    inner = slice(_NEIGHBOURS, len(x) - _NEIGHBOURS)
-    rise, fall = x[inner] - medians[: len(x) - 2 * _NEIGHBOURS], x[inner] - medians[_NEIGHBOURS + 1 :]
+    inner = slice(neighbours, len(x) - neighbours)
+    rise, fall = x[inner] - medians[: len(x) - 2 * neighbours], x[inner] - medians[neighbours + 1 :]
     size = np.where(np.sign(rise) == np.sign(fall), np.minimum(np.abs(rise), np.abs(fall)), 0.0)
     apart, moved = np.abs(rise + fall) / 2, np.maximum(np.abs(rise), np.abs(fall))
-    finest = _FINEST * float(np.subtract(*np.quantile(x, [0.95, 0.05])))
-    if not (size - 2 * np.median(moved) > _FAR * max(1.4826 * np.median(apart), finest)).any():
+    least = finest * float(np.subtract(*np.quantile(x, [0.95, 0.05])))
+    if not (size - 2 * np.median(moved) > _FAR * max(1.4826 * np.median(apart), least)).any():
         return found  # medians around each are no smaller
-    scatter = np.maximum(_around(apart) * 1.4826, finest)
+    scatter = np.maximum(_around(apart) * 1.4826, least)
     size -= 2 * _around(moved)  # what moves fast turns round fast
     far = _alone(size > _FAR * scatter, size, x[inner])
     between = (size > _NEAR * scatter) & (size <= _FAR * scatter)
@@ -421,6 +401,9 @@ def without_jumps(recordings: RecordingSet) -> RecordingSet:
 
 def _jumps(run: Run, names: tuple[str, ...]) -> tuple[np.ndarray, float, int]:
     """Rows (n,) whose reading of a sensor is to be emptied, the largest jump (rad, m, m/s), and how many stay."""
+    most_jumped = 0.3  # Share of the readings that those may be that a sensor jumps to and back from.
+    # Readings emptied about a jump that stays: a longer gap than the one that is bridged (`_HOLE_PERIODS`).
+    cut_readings = 8
     out = np.zeros(len(run.time_s), bool)
     values = run.array(names)
     if names == c.QUATERNION:
@@ -447,32 +430,36 @@ def _jumps(run: Run, names: tuple[str, ...]) -> tuple[np.ndarray, float, int]:
     counts = {g: sum(len(p) for p, own in zip(parts, group, strict=True) if own == g) for g in set(group)}
     usual_group, stays = max(counts, key=counts.get), 0
     for part, own in zip(parts, group, strict=True):
-        if own != usual_group and counts[own] < _MOST_JUMPED * len(rows):
+        if own != usual_group and counts[own] < most_jumped * len(rows):
             out[rows[part]] = True
     for edge in edges:
         if not out[rows[edge - 1]] and not out[rows[edge]]:
             stays += 1
-            out[rows[max(edge - _CUT_READINGS // 2, 0) : edge + _CUT_READINGS // 2]] = True
+            out[rows[max(edge - cut_readings // 2, 0) : edge + cut_readings // 2]] = True
     return out, float(size[edges - 1].max()), stays
 
 
 def _excess(run: Run, names: tuple[str, ...], time_s: np.ndarray, values: np.ndarray):
     """Steps (n - 1, 3) of readings (n, k), the least jump and the fastest motion (rad, m, m/s, a second), and what of
     the steps no other sensor explains."""
+    # An attitude jumps by at least so much; where no gyroscope says how far it turns, faster than any vehicle.
+    least_jump_rad, fastest_rad_s = 0.25, 40.0
+    # A position and a velocity jump by at least so much, and faster than any vehicle.
+    least_jump_m, fastest_m_s, least_jump_m_s, fastest_m_s2 = 0.1, 60.0, 1.0, 200.0
     if names != c.QUATERNION:
         steps = np.diff(values, axis=0)
-        least, fastest = (_LEAST_JUMP_M, _FASTEST_M_S) if names == c.POSITION else (_LEAST_JUMP_M_S, _FASTEST_M_S2)
+        least, fastest = (least_jump_m, fastest_m_s) if names == c.POSITION else (least_jump_m_s, fastest_m_s2)
         return steps, least, fastest, steps
     turn = scipy.spatial.transform.Rotation.from_quat(values[:, [1, 2, 3, 0]])
     steps = turn[:-1].inv() * turn[1:]
     if not _is_read(run, c.ANGULAR_VELOCITY):
-        return steps.as_rotvec(), _LEAST_JUMP_RAD, _FASTEST_RAD_S, steps.as_rotvec()
+        return steps.as_rotvec(), least_jump_rad, fastest_rad_s, steps.as_rotvec()
     rates = run.array(c.ANGULAR_VELOCITY)
     known = np.isfinite(rates).all(axis=1)
     total = _integrated(rates[known], run.time_s[known])
     turned = np.column_stack([np.interp(time_s, run.time_s[known], column) for column in total.T])
     excess = (scipy.spatial.transform.Rotation.from_rotvec(np.diff(turned, axis=0)).inv() * steps).as_rotvec()
-    return steps.as_rotvec(), _LEAST_JUMP_RAD, 0.0, excess
+    return steps.as_rotvec(), least_jump_rad, 0.0, excess
 
 
 def _places(names: tuple[str, ...], jumps: np.ndarray) -> list:
@@ -495,6 +482,8 @@ def by_sense(values: np.ndarray, sense: float | None = None) -> tuple[np.ndarray
     A sign is a turning sense where a rotor keeps it. A cell against the usual sign of its column, or against `sense`
     where it is given, is a rotor that pushes the other way, for which the contract has no column.
     """
+    # Share of the largest value that a value of the other sign must exceed to be one: less is noise about zero.
+    reversed_share = 0.02
     values = np.asarray(values, float)
     if sense in (None, 1.0) and not (values < 0).any():
         return values, np.zeros(values.shape, bool)
@@ -502,7 +491,7 @@ def by_sense(values: np.ndarray, sense: float | None = None) -> tuple[np.ndarray
     own = values * np.where(signs == 0, 1.0, signs)
     largest = np.nanmax(np.abs(own), axis=0, initial=0.0, where=np.isfinite(own))
     known = np.isfinite(own)
-    against = known & (own < -_REVERSED * largest)
+    against = known & (own < -reversed_share * largest)
     sizes = np.abs(own) if sense is None else np.clip(own, 0, None)
     return np.where(against, np.nan, np.where(known, sizes, values)), against
 
@@ -529,7 +518,8 @@ def with_sizes_of_speeds(recordings: RecordingSet) -> RecordingSet:
 
 def _around(sizes: np.ndarray) -> np.ndarray:
     """The median of sizes (n,) around each of them, or of all where that is more."""
-    local = pd.Series(sizes).rolling(_AROUND, center=True, min_periods=_AROUND // 2).median()
+    around = 31  # Readings over which the scatter is local: a burst of vibration is none of spikes.
+    local = pd.Series(sizes).rolling(around, center=True, min_periods=around // 2).median()
     return np.fmax(local.to_numpy(), np.median(sizes))
 
 
@@ -559,11 +549,15 @@ def _of_spikes(runs: tuple[Run, ...], name: str, masks: dict[tuple[str, str], np
 
 def lost_speed(speed_rad_s: np.ndarray, thrust_n: np.ndarray) -> np.ndarray:
     """Points that turn but whose speed is too low for their thrust, shape (n,), bool."""
+    # A point whose F/ω² exceeds the run's median by this factor has lost part of its speed pulses. An offset of the
+    # balance or a curve that bends makes the low points' F/ω² smaller, not larger, in these data, so the rule is one-
+    # sided: it must not remove what the offset explains.
+    too_slow = 1.35
     turning = speed_rad_s > 0
     if not turning.any():
         return turning
     ratio = np.where(turning, thrust_n, 0.0) / np.where(turning, speed_rad_s, 1.0) ** 2
-    return turning & (ratio > _TOO_SLOW * np.median(ratio[turning]))
+    return turning & (ratio > too_slow * np.median(ratio[turning]))
 
 
 def _integrated(values: np.ndarray, time_s: np.ndarray) -> np.ndarray:

@@ -33,9 +33,6 @@ _HIGHEST_VOLTAGE_V = 120.0
 _FASTEST_USUAL_RAD_S = 20.0
 _SLOWEST_HZ = 30.0
 """Readings a second below which lines between them change what a verdict says of rotors."""
-_LEAST_JOINED, _MOSTLY, _ROUNDED, _SHARP = 200, 0.6, 2e-6, 30.0
-"""Samples, share of them on straight lines, and a bend, over the largest value, below which a line is straight as far
-as it was written, and how many times that bends are where lines meet."""
 _FOLLOWS = 0.8
 """Correlation of a rotor's speed with a command from which it follows that command."""
 _LEAST_TURNING_RAD_S = 0.05
@@ -44,8 +41,6 @@ _AGREES, _CONTRADICTS = 0.5, -0.3
 """Correlations: above, two signals agree; below, one of them is turned round."""
 _TOP = 0.99
 """Share of the rotor speeds below their highest that counts: single samples may be faults."""
-_SAME_UNIT = (0.2, 5.0)
-"""Of two signals that agree, the ratio of their spreads that noise and smoothing explain."""
 _SLOW_S, _LATEST_STEPS, _LEAST_EXPLAINED = 0.5, 4, 0.4
 """Regression of turning on rotor speeds: slower changes left out, latest lag tried, least share explained."""
 _SURE_Z, _ALIKE, _RIDGE = 6.0, 5.0, 0.02
@@ -60,24 +55,14 @@ _AT_REST = 0.2
 
 def physical_doubts(recordings: RecordingSet) -> tuple[Doubt, ...]:
     """What cannot be right in a set of kind `flight`; empty where all agrees."""
-    vehicle = recordings.vehicle
-    found: list[tuple[str, Doubt]] = []
-    for run in recordings.runs:
-        clock = _clock(run)
-        if clock is None:
-            continue
-        for doubt in (
-            *_accelerometer(run, clock),
-            *_gyroscope(run, clock),
-            *_world(run, clock),
-            *_rotors(run, clock, vehicle),
-            *_throttle(run, vehicle),
-            *_command_order(run, clock, vehicle),
-            *_held(run, vehicle),
-            *_joined(run, vehicle),
-            *_rest(run, vehicle),
-        ):
-            found.append((run.name, doubt))
+    looks = _accelerometer, _gyroscope, _world, _rotors, _throttle, _command_order, _held, _joined, _rest
+    found = [
+        (run.name, doubt)
+        for run in recordings.runs
+        if (clock := _clock(run)) is not None
+        for look in looks
+        for doubt in look(run, clock, recordings.vehicle)
+    ]
     return (*_once(found), *_amount(recordings))
 
 
@@ -189,9 +174,9 @@ def impossible_values(recordings: RecordingSet) -> tuple[Doubt, ...]:
     )
 
 
-def gravity(vehicle: Vehicle) -> tuple[Doubt, ...]:
+def gravity(recordings: RecordingSet) -> tuple[Doubt, ...]:
     """A gravity that is not the earth's."""
-    value, (low, high) = vehicle.gravity_m_s2, _GRAVITY_M_S2
+    value, (low, high) = recordings.vehicle.gravity_m_s2, _GRAVITY_M_S2
     if low <= value <= high:
         return ()
     units = [
@@ -221,7 +206,8 @@ def voltages(recordings: RecordingSet) -> tuple[Doubt, ...]:
 # Doubts -------------------------------------------------------------------------------------------
 
 
-def _accelerometer(run: Run, clock: np.ndarray) -> Iterator[Doubt]:
+def _accelerometer(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
+    """Whether it feels the thrust that carries the vehicle, in m/s² and along -z."""
     force = _on(run, clock, c.SPECIFIC_FORCE)
     if force is None:
         return
@@ -250,7 +236,8 @@ def _accelerometer(run: Run, clock: np.ndarray) -> Iterator[Doubt]:
     yield Doubt(f"specific_force_{axis}_m_s2", said, stops=True)
 
 
-def _gyroscope(run: Run, clock: np.ndarray) -> Iterator[Doubt]:
+def _gyroscope(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
+    """Whether it is the derivative of the attitude; without one, whether anything turns so fast."""
     gyro, attitude = _on(run, clock, c.ANGULAR_VELOCITY), _on(run, clock, c.QUATERNION)
     if gyro is None:
         return
@@ -298,7 +285,9 @@ def _gyroscope(run: Run, clock: np.ndarray) -> Iterator[Doubt]:
             yield Doubt(name, said, stops=True)
 
 
-def _world(run: Run, clock: np.ndarray) -> Iterator[Doubt]:
+def _world(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
+    """Whether velocity, position, attitude and specific force agree on world axes and units."""
+    same_unit = (0.2, 5.0)  # Of two signals that agree, the ratio of their spreads that noise and smoothing explain.
     attitude, force = _on(run, clock, c.QUATERNION), _on(run, clock, c.SPECIFIC_FORCE)
     velocity, position = _on(run, clock, c.VELOCITY), _on(run, clock, c.POSITION)
     if velocity is not None and position is not None:
@@ -318,7 +307,7 @@ def _world(run: Run, clock: np.ndarray) -> Iterator[Doubt]:
                     "exchanged"
                 )
                 yield Doubt(own, said, stops=True)
-            elif r > _AGREES and not _SAME_UNIT[0] < scale < _SAME_UNIT[1]:
+            elif r > _AGREES and not same_unit[0] < scale < same_unit[1]:
                 # Units that are used as well as metres are smaller: the column with the larger numbers is the one.
                 what, which = (own, "the velocity") if scale > 1 else (place, "the position")
                 said = f"{own} is {scale:.3g} times the derivative of {place}, expected 1: {which} is in another unit"
@@ -441,7 +430,8 @@ def _command_order(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Do
         yield Doubt("rotors", f"commands and measured speeds are in different orders: {pairs}", stops=True)
 
 
-def _throttle(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
+def _throttle(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
+    """Whether throttles are fractions."""
     names = [n for n in c.rotor_columns("throttle", vehicle.rotor_count) if run.has(n)]
     if not names:
         return
@@ -454,7 +444,7 @@ def _throttle(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
         )
 
 
-def _held(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
+def _held(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
     """Rotor speeds that keep one value while the vehicle moves: they were not measured."""
     kinds = [
         k for k in ("rotor_speed", "rotor_command", "throttle") if run.has(*c.rotor_columns(k, vehicle.rotor_count))
@@ -472,21 +462,24 @@ def _held(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
         )
 
 
-def _joined(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
+def _joined(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
     """Rotor speeds, rates and specific forces that were interpolated linearly between rarer readings."""
+    # Samples, share of them on straight lines, and a bend, over the largest value, below which a line is straight as
+    # far as it was written, and how many times that bends are where lines meet.
+    least_joined, mostly, rounded, sharp = 200, 0.6, 2e-6, 30.0
     for names in (c.rotor_columns("rotor_speed", vehicle.rotor_count), c.ANGULAR_VELOCITY, c.SPECIFIC_FORCE):
         values = run.array(names) if run.has(*names) else np.zeros((0, 1))
         values = values[np.isfinite(values).all(axis=1)]
-        if len(values) < _LEAST_JOINED:
+        if len(values) < least_joined:
             continue
         steps, kinks = np.abs(np.diff(values, axis=0)), np.abs(np.diff(values, 2, axis=0))
         apart = np.diff(np.unique(values))  # as far as readings were rounded
         rounding = float(apart[apart > 1e-9 * np.abs(values).max()].min(initial=np.inf))
-        least = np.full(values.shape[1], max(_ROUNDED * float(np.abs(values).max()), 2.1 * rounding))
+        least = np.full(values.shape[1], max(rounded * float(np.abs(values).max()), 2.1 * rounding))
         straight = (kinks <= least) & (steps[1:] > least)
         # Smooth signals are nearly straight as well, but nowhere is there a sharp bend.
         share, bends = straight.mean(), kinks / np.maximum(least, 1e-300)
-        if share > _MOSTLY and np.median(bends[~straight]) > _SHARP:
+        if share > mostly and np.median(bends[~straight]) > sharp:
             rate_hz = (1.0 - float(share)) * (len(values) - 1) / float(run.time_s[-1] - run.time_s[0])
             yield Doubt(
                 names[0],
@@ -496,7 +489,8 @@ def _joined(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
             )
 
 
-def _rest(run: Run, vehicle: Vehicle) -> Iterator[Doubt]:
+def _rest(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
+    """Whether the vehicle stood on the ground for a part of the run."""
     kinds = [k for k in ("rotor_speed", "throttle") if run.has(*c.rotor_columns(k, vehicle.rotor_count))]
     if not kinds:
         return

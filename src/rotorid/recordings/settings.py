@@ -21,8 +21,6 @@ _COUNTED = re.compile(
     r"(Log start|Firmware) \w+|deviceUID|Device UID|.*DEV_?ID"
 )
 """What is counted, measured at the start or numbers a part: no setting of a person."""
-_SAME = 1e-6
-"""Share within which two numbers are one: they were logged with seven digits."""
 
 
 @dataclass(frozen=True)
@@ -99,9 +97,10 @@ def differing_sentences(found: tuple[Differing, ...], most: int) -> list[str]:
 
 
 def _same(a: float | str, b: float | str) -> bool:
+    same = 1e-6  # Share within which two numbers are one: they were logged with seven digits.
     if isinstance(a, str) or isinstance(b, str):
         return a == b
-    return math.isclose(a, b, rel_tol=_SAME) or (math.isnan(a) and math.isnan(b))
+    return math.isclose(a, b, rel_tol=same) or (math.isnan(a) and math.isnan(b))
 
 
 def _each_once(values: Iterable[float | str]) -> tuple[float | str, ...]:

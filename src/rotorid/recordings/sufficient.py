@@ -29,24 +29,11 @@ from rotorid.recordings.run import RecordingSet, Run, stretches
 from rotorid.recordings.tables import clock_jump, place
 from rotorid.recordings.vehicle import Vehicle
 
-_IDLE_SHARE, _LARGEST_QUANTILE = 0.2, 0.98
-"""Rotors idle below this share of nearly the largest thrust of their run, by the squares of their speeds."""
-_GROUND_S = 1.0
-"""Rotors that idle so long leave a vehicle on the ground: in the air it would have fallen five metres."""
-_RESTING_G = 0.5
-"""Specific force, over gravity, that the ground exerts on it at least; a vehicle that falls has next to none."""
 _PAUSE_S, _PAUSE_STEPS = 5.0, 20
 """A stand's or bench's samples that are further apart than both are of two recordings, and nothing between them."""
 _MOST_NAMES = 12
 _LEAST_FLIGHT_HZ = 2.0
 """Slower flights show no motion of their own: between two samples a quadrotor has turned and come back."""
-_LEAST_STRETCH_SAMPLES = 30
-"""A stretch of flight without a hole must last LEAST_STRETCH_S, and so many samples of its slowest sensor. Of a single
-run (LEAST_SINGLE_S) a third is held out, after a gap of two seconds; both parts need two seconds."""
-_SINGLE_GAP_S, _HELD_OUT_SHARE = 2.0, 1 / 3
-"""Of a single run this share is held out, after a gap."""
-_LEAST_READINGS = 10
-"""Readings of a stand or a bench that are there in every compared channel at once, in a run."""
 _LARGEST = {
     c.POSITION: 1e7,
     c.VELOCITY: 1e4,
@@ -66,9 +53,6 @@ _QUATERNION_NORM = (0.5, 2.0)
 SENSORS = (c.POSITION, c.VELOCITY, c.QUATERNION, c.ANGULAR_VELOCITY, c.SPECIFIC_FORCE)
 _SURELY_MEANT = 0.85
 """Likeness from which an unknown column is taken for the missing one of a sensor whose other columns are there."""
-_LIFTING = 0.25
-_LEAST_LIFT_N = 1.0
-"""Share of the weight, and force, by which a stand's reading beyond the weight shows that its rotors turned."""
 
 
 def sufficient(recordings: RecordingSet) -> RecordingSet:
@@ -327,6 +311,9 @@ def _likely(run: Run, missing: Iterable[str]) -> str:
 
 def _still_rotors(run: Run, vehicle: Vehicle) -> str | None:
     """Rotor speeds that are zero throughout although something lifts: they were not measured."""
+    # Share of the weight, and force, by which a stand's reading beyond the weight shows that its rotors turned.
+    lifting = 0.25
+    least_lift_n = 1.0
     if vehicle.kind == "bench":
         return None
     names = driven_by(run, vehicle)
@@ -343,7 +330,7 @@ def _still_rotors(run: Run, vehicle: Vehicle) -> str | None:
         largest = float(np.quantile(force, 0.9))
         ordered = [n for k, g in rotor_groups(vehicle).items() if k != "rotor_speed" and run.has(*g) for n in g]
         commanded = bool(ordered) and np.nanmax(np.abs(run.array(tuple(ordered)))) > 0
-        if largest <= supported + max(_LIFTING * weight, _LEAST_LIFT_N) and not commanded:
+        if largest <= supported + max(lifting * weight, least_lift_n) and not commanded:
             return None
         because = f" although the sensor reads {largest:.3g} N" + (" and commands are given" if commanded else "")
     return (
@@ -404,9 +391,13 @@ def compared_readings(run: Run, vehicle: Vehicle) -> list[str]:
 
 def _too_short(run: Run, vehicle: Vehicle) -> str | None:
     """A run without a stretch that is long enough to be compared."""
+    least_readings = 10  # Readings of a stand or a bench that are there in every compared channel at once, in a run.
+    # A stretch of flight without a hole must last LEAST_STRETCH_S, and so many samples of its slowest sensor. Of a
+    # single run (LEAST_SINGLE_S) a third is held out, after a gap of two seconds; both parts need two seconds.
+    least_stretch_samples = 30
     if vehicle.kind == "flight":
         longest, period = longest_stretch_s(run, [driven_by(run, vehicle), *moving_sensors(run)])
-        needed = max(LEAST_STRETCH_S, _LEAST_STRETCH_SAMPLES * period) if np.isfinite(period) else LEAST_STRETCH_S
+        needed = max(LEAST_STRETCH_S, least_stretch_samples * period) if np.isfinite(period) else LEAST_STRETCH_S
         if longest >= needed:
             return None
         return (
@@ -415,11 +406,11 @@ def _too_short(run: Run, vehicle: Vehicle) -> str | None:
         )
     names = compared_readings(run, vehicle)
     count = int(np.isfinite(run.array(tuple(names))).all(axis=1).sum())
-    if count >= _LEAST_READINGS:
+    if count >= least_readings:
         return None
     return (
         f"{_whereof(run)}: too little data: {count} samples have a value in {listed(names)} at once, expected at least "
-        f"{_LEAST_READINGS}"
+        f"{least_readings}"
     )
 
 
@@ -473,11 +464,12 @@ def _check_not_constant(recordings: RecordingSet) -> None:
 
 def _check_single(recordings: RecordingSet) -> None:
     """InputError where a single run is too short to hold out a part of it."""
+    single_gap_s, held_out_share = 2.0, 1 / 3  # Of a single run this share is held out, after a gap.
     run, vehicle = recordings.runs[0], recordings.vehicle
     if vehicle.kind != "flight":
         # The last third, less half the gap before it, must be more than next to nothing.
         known = run.time_s[np.isfinite(run.array(tuple(compared_readings(run, vehicle)))).all(axis=1)]
-        needed = (_SINGLE_GAP_S / 2 + LEAST_VALUES * float(np.median(np.diff(known)))) / _HELD_OUT_SHARE
+        needed = (single_gap_s / 2 + LEAST_VALUES * float(np.median(np.diff(known)))) / held_out_share
         lasts = float(known[-1] - known[0])
         if lasts < needed:
             raise InputError(
@@ -574,20 +566,26 @@ def basis_of(recordings: RecordingSet) -> _Basis:
 
 def on_the_ground_s(run: Run, vehicle: Vehicle) -> float | None:
     """How long a run is on the ground, s; None where no rotors are recorded."""
+    # Rotors idle below this share of nearly the largest thrust of their run, by the squares of their speeds.
+    idle_share, largest_quantile = 0.2, 0.98
+    # Rotors that idle so long leave a vehicle on the ground: in the air it would have fallen five metres.
+    ground_s = 1.0
+    # Specific force, over gravity, that the ground exerts on it at least; a vehicle that falls has next to none.
+    resting_g = 0.5
     values = run.array(driven_by(run, vehicle))
     rows = np.flatnonzero(np.isfinite(values).all(axis=1))
     if not values.shape[1] or not len(rows):
         return None
     thrust = (values[rows] ** 2).sum(axis=1)
     time_s, force = run.time_s[rows], run.array(c.SPECIFIC_FORCE)[rows]
-    idle = thrust < _IDLE_SHARE * np.quantile(thrust, _LARGEST_QUANTILE)
+    idle = thrust < idle_share * np.quantile(thrust, largest_quantile)
     total = 0.0
     for start, stop in stretches(idle):
         lasted = float(time_s[min(stop, len(time_s) - 1)] - time_s[start])
         felt = np.linalg.norm(force[start:stop], axis=1)
         felt = felt[np.isfinite(felt)]
-        rests = not len(felt) or float(np.median(felt)) > _RESTING_G * vehicle.gravity_m_s2
-        total += lasted if lasted >= _GROUND_S and rests else 0.0
+        rests = not len(felt) or float(np.median(felt)) > resting_g * vehicle.gravity_m_s2
+        total += lasted if lasted >= ground_s and rests else 0.0
     return total
 
 

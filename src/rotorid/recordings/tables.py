@@ -56,8 +56,6 @@ _DECIMAL_COMMAS = 1.5
 """A line with so many times the cells of its heading has commas in its numbers."""
 _MISSING = frozenset(("", "nan", "na", "n/a", "null", "none", "<na>", "#n/a", "-nan"))
 """What stands for a missing sample, in small letters."""
-_JUMP_STEPS = 10.0
-"""A step of the clock longer than so many usual ones is a jump; a slow clock has long steps throughout."""
 
 
 class _Content(io.RawIOBase):
@@ -560,12 +558,14 @@ def clock_jump(time_s: np.ndarray, where: str) -> str | None:
 
     `time_s` has shape (n,), seconds; `where` is the file that the sample's place is named in.
     """
+    # A step of the clock longer than so many usual ones is a jump; a slow clock has long steps throughout.
+    jump_steps = 10.0
     with np.errstate(over="ignore"):
         steps = np.abs(np.diff(time_s))
     if not len(steps):
         return None
     usual, row = float(np.median(steps)), int(np.argmax(steps))
-    long = steps[row] > max(LONGEST_JUMP_S, _JUMP_STEPS * usual)
+    long = steps[row] > max(LONGEST_JUMP_S, jump_steps * usual)
     if not long and steps.sum() <= usual * max(MOST_GRID, MOST_HOLES * len(steps)):
         return None
     return (

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from html import escape
 from pathlib import Path
+from typing import TypeVar
 
 import pandas as pd
 
@@ -25,6 +26,8 @@ from rotorid.mismatch.decide.rules import RULES
 from rotorid.mismatch.deliver.files import (
     CONDITIONS,
     INSTRUMENTS,
+    Conditions,
+    Instruments,
     conditions_of,
     empty,
     improved_vehicle,
@@ -44,6 +47,7 @@ from rotorid.recordings.sufficient import sufficient
 from rotorid.report.page import make_page, pretty
 from rotorid.steps import one_thread, step
 
+_Content = TypeVar("_Content", Conditions, Instruments)
 FILES = ("verdict.json", "report.html", "improved_vehicle.yaml", "ledger.json")
 """Files that every verdict has."""
 OTHERS = (CONDITIONS, INSTRUMENTS)
@@ -108,6 +112,14 @@ def _with_first_details(verdict: Verdict, analysis: Analysis) -> Verdict:
     return verdict.model_copy(update={"details": (*first, *analysis.recordings.left_out, *verdict.details)})
 
 
+def _written(content: _Content, path: Path, read: Callable[[Path], _Content]) -> _Content:
+    """Content as it is read back from its file, which is written where there is something to write."""
+    if empty(content):
+        return content
+    path.write_text(file_text(content), encoding="utf-8")
+    return read(path)
+
+
 @one_thread()
 def write_files(analysis: Analysis, verdict_path: Path, page_path: Path, improved_path: Path) -> Verdict:
     """Write what an analysis amounts to; what is taken home is read back and simulated as proof.
@@ -121,14 +133,8 @@ def write_files(analysis: Analysis, verdict_path: Path, page_path: Path, improve
     with all_or_none(*paths, optional=others) as parts:
         verdict_part, page_part, improved_part, ledger_part, *other_parts = parts
         write_vehicle(improved, improved_part)
-        contents = conditions_of(analysis), instruments_of(analysis)
-        for content, part in zip(contents, other_parts, strict=True):
-            if not empty(content):
-                part.write_text(file_text(content), encoding="utf-8")
-        conditions, instruments = (
-            read(part) if part.exists() else content
-            for read, part, content in zip((read_conditions, read_instruments), other_parts, contents, strict=True)
-        )
+        conditions = _written(conditions_of(analysis), other_parts[0], read_conditions)
+        instruments = _written(instruments_of(analysis), other_parts[1], read_instruments)
         reloaded = read_vehicle(improved_part)
         if analysis.instrument is None:
             forward, notes = forward_channels(analysis)

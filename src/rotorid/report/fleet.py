@@ -52,8 +52,6 @@ EVENTS = ("vehicle", "set", "day", "id", "lasts", "sentence")
 _Z95 = 1.96
 FAILED = "failed.json"
 """What stands in its place where there is none: `reason`, and `fault` where it is none of the set's."""
-_WORTH_A_START = 4
-"""Sets to judge from which on it pays to load beforehand what every one of them would load by itself."""
 _SHOWN = ("established", "ambiguous", "suggested")
 """Words of effects that a summary counts; what is absorbed or not established shows nothing."""
 _DATE = re.compile(r"(?<!\d)(20\d\d)[-_]?(0[1-9]|1[0-2])[-_]?(0[1-9]|[12]\d|3[01])(?!\d)")
@@ -69,9 +67,11 @@ def judge_sets(
     gets one line a set. OSError: the disk is full, or the like, no fault of a set; what was judged before stays
     remembered.
     """
+    # Sets to judge from which on it pays to load beforehand what every one of them would load by itself.
+    worth_a_start = 4
     out.mkdir(parents=True, exist_ok=True)
     places = {folder: memory / code / content_of(folder) for folder in folders}
-    if sum(not known.is_dir() for known in places.values()) >= _WORTH_A_START:
+    if sum(not known.is_dir() for known in places.values()) >= worth_a_start:
         _load()
     for folder, known in places.items():
         start = time.monotonic()

@@ -28,8 +28,6 @@ from rotorid.vehicle.exports.flown import multirotor_of, passive_forces, read_by
 from rotorid.vehicle.exports.forms import FLU, KNOWS, Exported, expressed, parts_of
 from rotorid.vehicle.windows import Inputs, States, plan_windows, simulate_windows
 
-_MOST_WINDOWS = 40
-"""Windows that are flown, spread evenly over the log: RotorPy takes a second for five."""
 _STEP_S = 0.002
 _SHOWN = ("velocity", "attitude", "position", "angular_velocity")
 
@@ -83,6 +81,7 @@ def next_to_log(analysis: Analysis, to: str, exported: Exported) -> NextToLog:
 
     InputError where the recordings do not allow it, or nothing flies such a form here.
     """
+    most_windows = 40  # Windows that are flown, spread evenly over the log: RotorPy takes a second for five.
     improved = delivered_model(analysis)
     if to not in FLYERS:
         raise InputError(f"nothing flies {to} here, expected one of {', '.join(FLYERS)}")
@@ -108,7 +107,7 @@ def next_to_log(analysis: Analysis, to: str, exported: Exported) -> NextToLog:
         raise InputError(
             f"{analysis.recordings.name}: no half second in which rotors, attitude and body rates are recorded"
         )
-    chosen = np.unique(np.linspace(0, len(found) - 1, min(_MOST_WINDOWS, len(found))).astype(int))
+    chosen = np.unique(np.linspace(0, len(found) - 1, min(most_windows, len(found))).astype(int))
     first = found[0]
     windows = tuple(found[k] for k in chosen if len(found[k].time_s) == len(first.time_s))
     flown = tuple(fly(improved.vehicle, exported, windows))

@@ -21,7 +21,6 @@ from rotorid.mismatch.decide.findings import Analysis, by_channel
 from rotorid.mismatch.decide.sizes import segments_of, shares
 
 _COLOURS = ("#d55e00", "#e69f00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#000000", "#f0e442")
-_PLOTS_A_TAB = 3
 _NO_MCAP = "MCAP files need mcap, which is not installed: pip install 'rotorid[mcap]'"
 
 
@@ -128,15 +127,16 @@ def _stacked(names: Sequence[str]):
 
 def plotjuggler_layout(series: Sequence[_Series]) -> str:
     """A layout of PlotJuggler for the MCAP: tabs of a few plots, a plot a channel."""
+    plots_a_tab = 3
     topics = list(topics_of(series).items())
     tabs = []
     for run in dict.fromkeys(topic.split("/")[1] for topic, _ in topics):
         own = [pair for pair in topics if pair[0].split("/")[1] == run]
-        for start in range(0, len(own), _PLOTS_A_TAB):
-            part = own[start : start + _PLOTS_A_TAB]
+        for start in range(0, len(own), plots_a_tab):
+            part = own[start : start + plots_a_tab]
             sizes = ";".join(f"{1 / len(part):.6f}" for _ in part)
             areas = "".join(_plot(topic, fields) for topic, fields in part)
-            name = quoteattr(f"{run} {start // _PLOTS_A_TAB + 1}")
+            name = quoteattr(f"{run} {start // plots_a_tab + 1}")
             tabs.append(
                 f"""  <Tab containers="1" tab_name={name}>
    <Container>

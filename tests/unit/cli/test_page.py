@@ -133,7 +133,9 @@ def test_the_folder_of_a_bag_is_one_log(page: Page, tmp_path: Path) -> None:
     for path in sorted(bag.iterdir()):
         assert page.ask("PUT", f"sets/{id_}/logs/{path.name}?bag=..%2F..%2Fflight", body=path.read_bytes())[0] == 201
     state = page.ask("POST", f"sets/{id_}/look", {"like": "x500", "mass_kg": 1.5})[1]
-    assert (state["stage"], state["logs"], state["look"]["format"]) == ("looked", ["flight"], "ROS bag"), state
+    assert (state["stage"], state["logs"], state["look"]["format"]) == ("looked", ["flight"], "ROS 1 or 2 bag, MCAP"), (
+        state
+    )
     assert [run["name"] for run in state["look"]["runs"]]
     assert page.ask("PUT", f"sets/{id_}/logs/log.bin", body=b"1")[0] == 201
     said = page.ask("PUT", f"sets/{id_}/logs/a.db3?bag=log.bin", body=b"1")[1]["sentence"]

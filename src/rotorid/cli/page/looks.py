@@ -14,12 +14,6 @@ from rotorid.recordings import columns as c
 from rotorid.recordings.check import check_set
 from rotorid.recordings.sufficient import sufficient
 
-_FORMATS = {
-    "px4": "PX4 ULog", "betaflight": "blackbox (Betaflight, iNAV, EmuFlight)", "ardupilot": "ArduPilot DataFlash",
-    "mavlink": "telemetry of MAVLink",
-    "crazyflie": "Crazyflie log", "ros": "ROS bag", "neurobem": "NeuroBEM recording", "csv": "table (CSV)",
-    "parquet": "table (Parquet)", "rcbenchmark": "RCbenchmark stand",
-}  # fmt: skip
 _USUAL = "x500"
 """Template with which logs that say nothing of their vehicle are looked at; the visitor must choose one."""
 
@@ -69,14 +63,14 @@ def look(folder: Path, logs: Sequence[Path], wishes: Wishes) -> dict[str, Any]:
     InputError in one sentence where they cannot be read. Of a table whose columns nobody knows the answer has a
     proposal of what they are (`mapping`, `evidence`, `open`) and no flights.
     """
-    from rotorid.recordings.importers.logfile import TEMPLATES, format_of, set_of_logs
+    from rotorid.recordings.importers.logfile import importer_of, set_of_logs
     from rotorid.recordings.importers.mapping import read_mapping
 
     mass_kg, like, vehicle, mapping = wishes.files(folder)
-    formats = [format_of(path) for path in logs]
-    if mapping is None and formats[0] in ("csv", "parquet") and (guessed := _guessed(logs[0])):
-        return guessed | {"format": _FORMATS[formats[0]], "templates": known_templates()}
-    unknown = like is None and vehicle is None and formats[0] not in TEMPLATES
+    formats = [importer_of(path) for path in logs]
+    if mapping is None and formats[0].name == "table" and (guessed := _guessed(logs[0])):
+        return guessed | {"format": formats[0].title, "templates": known_templates()}
+    unknown = like is None and vehicle is None and not formats[0].template
     read = read_mapping(mapping) if mapping else None
     found = set_of_logs(logs, logs[0].name.split(".")[0], mass_kg, like or (_USUAL if unknown else None), vehicle, read)
     recordings, refused = found.recordings(), ""
@@ -88,7 +82,7 @@ def look(folder: Path, logs: Sequence[Path], wishes: Wishes) -> dict[str, Any]:
     checked = check_set(recordings)
     mass_why = next((r for r in found.remarks if r.startswith("the mass is")), "as you stated it")
     return {
-        "format": ", ".join(dict.fromkeys(_FORMATS[kind] for kind in formats)),
+        "format": ", ".join(dict.fromkeys(known.title for known in formats)),
         "runs": [asdict(run) for run in checked.runs],
         "can": _can(recordings, checked.columns),
         "cannot": list(checked.lacks),

@@ -30,10 +30,6 @@ from rotorid.errors import InputError
 from rotorid.io.text.writing import write_texts
 from rotorid.steps import heard_by
 
-_NICE = 5
-"""By how much a verdict gives way to the page and to whatever else runs."""
-_SAY_EVERY_S = 1.0
-
 
 def _speaker() -> Callable[..., None]:
     """A function that writes messages where standard output was; what libraries print goes nowhere from now on."""
@@ -88,10 +84,11 @@ def _sentence_on(error: Exception, folder: Path) -> str:
 @contextmanager
 def _heard(command: str, say: Callable[..., None]) -> Iterator[None]:
     """Inside, it is said every second at which step the work is and how long is left, where earlier runs tell."""
+    say_every_s = 1.0
     waiting, over = Waiting(read_record().get(command, [])), threading.Event()
 
     def tell() -> None:
-        while not over.wait(_SAY_EVERY_S):
+        while not over.wait(say_every_s):
             say(step=": ".join(waiting.path[-2:]) or "reading", line=waiting.line().strip())
 
     teller = threading.Thread(target=tell, daemon=True)
@@ -185,13 +182,14 @@ def _compare(folder: Path, state: dict[str, Any], say: Callable[..., None]) -> d
 
 def main(words: list[str]) -> None:
     """Do what the words say; see the module."""
+    nice = 5  # By how much a verdict gives way to the page and to whatever else runs.
     say = _speaker()
     if words == ["look"]:
         _looks(say)
         return
     question, folder = words[0], Path(words[1])
     if hasattr(os, "nice"):
-        os.nice(_NICE)
+        os.nice(nice)
     started = time.monotonic()
     try:
         state = json.loads((folder / STATE).read_text(encoding="utf-8"))

@@ -87,8 +87,6 @@ _BRANCHES = ("float", "tuple[float, ...]", "constrained-float", "int", "str", "c
 """Parts of a pydantic location that name a kind of value, not a key."""
 LONGEST = 80
 """Characters of a value that is quoted."""
-_MOST_KEYS = 8
-"""Keys that are listed where none is like the one given."""
 
 
 def explain(error: ValidationError, model: type[BaseModel]) -> str:
@@ -113,11 +111,12 @@ def explained(error: ValidationError, model: type[BaseModel]) -> list[str]:
 
 
 def _clause(entry: Mapping[str, Any], model: type[BaseModel]) -> str:
+    most_keys = 8  # Keys that are listed where none is like the one given.
     location, kind = entry["loc"], entry["type"]
     key = printable(".".join(str(part) for part in location if part not in _BRANCHES))
     if kind == "extra_forbidden":
         known = sorted(_keys_at(model, location))
-        near = hint(str(location[-1]), known) or f"; known here are {listed(known, _MOST_KEYS)}"
+        near = hint(str(location[-1]), known) or f"; known here are {listed(known, most_keys)}"
         return f"{key}: no such key is known{near}"
     if kind == "missing":
         return f"{key}: is missing"

@@ -25,10 +25,6 @@ try:
 except ImportError:  # pragma: no cover - depends on the platform
     fcntl = None
 
-_DIGITS = 6
-"""Significant digits that verdicts and vehicles state."""
-_FORGOTTEN_S = 86400.0
-"""Age at which the part of a file written by another computer counts as left behind."""
 _PATIENCE_S = 20.0
 """How long a writer waits for another one of the same folder: names are taken in milliseconds, a report in seconds."""
 _HOST = platform.node().replace(".", "_")
@@ -213,6 +209,7 @@ def take_place(part: Path, path: Path) -> None:
 
 def _sweep(path: Path) -> None:
     """Remove parts of a file or folder whose writer is gone: of this computer by its process, else after a day."""
+    forgotten_s = 86400.0  # Age at which the part of a file written by another computer counts as left behind.
     named = re.compile(re.escape(f".{path.name}.") + r"(?P<host>[^.]*)-(?P<process>\d+)(\.\w+)?\.part")
     for part in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
         writer = named.fullmatch(part.name)
@@ -221,7 +218,7 @@ def _sweep(path: Path) -> None:
         try:
             state = part.lstat()
             here = writer["host"] in (_HOST, "")
-            gone = _dead(writer["process"]) if here else time.time() - state.st_mtime > _FORGOTTEN_S
+            gone = _dead(writer["process"]) if here else time.time() - state.st_mtime > forgotten_s
         except FileNotFoundError:
             continue
         if gone and stat.S_ISDIR(state.st_mode):
@@ -252,10 +249,11 @@ def _to_disk(path: Path) -> None:
 
 def rounded(value: Any) -> Any:
     """Numbers to DIGITS significant digits, in lists, tuples and mappings as well; anything else as it is."""
+    digits = 6  # Significant digits that verdicts and vehicles state.
     if isinstance(value, dict):
         return {key: rounded(v) for key, v in value.items()}
     if isinstance(value, (list, tuple)):
         return type(value)(rounded(v) for v in value)
     if isinstance(value, float) and math.isfinite(value):
-        return float(f"{value:.{_DIGITS - 1}e}")
+        return float(f"{value:.{digits - 1}e}")
     return value

@@ -25,17 +25,8 @@ from rotorid.mismatch.flight.fitted import Fitted
 from rotorid.mismatch.flight.prepare import assemble_rows
 from rotorid.mismatch.flight.report_runs import as_flown
 
-_SAME_TIME_SD, _SAME_SHARE_SD = 0.03, 0.01
-"""One-sigma between two flights in which nothing changed: of a time constant relative to itself, and of a number
-without unit (another charge of the battery)."""
-_CHAIN_ROUNDS = 4
-"""Times that the chain's columns are taken, at most."""
-_SAME_PHASE_SD = 0.29
-"""One-sigma of the instant between two samples at which commands are stamped, in samples: evenly spread over one."""
 _STEP_S, _STEP = 0.002, 0.01
 """Changes of a time and of another parameter from which its column is taken."""
-_START_S = 0.025
-"""By how much longer or shorter time constants are from which a change is sought, too."""
 _OF_ROTORS = "offset:rotors"
 """Start of the keys of offsets in time that are a delay of the commands: the chain has it."""
 
@@ -67,11 +58,17 @@ class ChainTerms:
     @property
     def spread(self) -> np.ndarray:
         """One-sigma (P,) of each parameter between two flights in which nothing changed, in its unit."""
+        # One-sigma between two flights in which nothing changed: of a time constant relative to itself, and of a number
+        # without unit (another charge of the battery).
+        same_time_sd, same_share_sd = 0.03, 0.01
+        # One-sigma of the instant between two samples at which commands are stamped, in samples: evenly spread over
+        # one.
+        same_phase_sd = 0.29
         times = np.array([p.unit == "s" for p in self.parameters])
         least = np.array([p.negligible for p in self.parameters])
         late = np.array([form.stage == DELAY for _, form in self.chain for _ in form.parameters])
-        usual = np.where(times, _SAME_TIME_SD * np.abs(self.values), _SAME_SHARE_SD)
-        return np.sqrt(usual**2 + least**2 + np.where(late, _SAME_PHASE_SD / self.rate_hz, 0.0) ** 2)
+        usual = np.where(times, same_time_sd * np.abs(self.values), same_share_sd)
+        return np.sqrt(usual**2 + least**2 + np.where(late, same_phase_sd / self.rate_hz, 0.0) ** 2)
 
     @property
     def steps(self) -> np.ndarray:
@@ -87,12 +84,13 @@ class ChainTerms:
 
     def starts(self) -> list[tuple[str, ChainTerms]]:
         """Chains to start from, each with the key of the form whose time constants are longer or shorter than here."""
+        start_s = 0.025  # By how much longer or shorter time constants are from which a change is sought, too.
         out, at = [("", self)], 0
         for term in self.terms:
             own = np.arange(at, at + term.size)
             times = [i for i in own if self.parameters[i].unit == "s"]
             at += term.size
-            for away in (_START_S, -_START_S) if times else ():
+            for away in (start_s, -start_s) if times else ():
                 values = self.values.copy()
                 values[times] += away
                 moved = self.at(values)
@@ -245,8 +243,9 @@ def _option_of(
     same
         Keys of the chain's forms that did not change, by assumption.
     """
+    chain_rounds = 4  # Times that the chain's columns are taken, at most.
     now = start
-    for _ in range(_CHAIN_ROUNDS):
+    for _ in range(chain_rounds):
         option = _decided_at(now, products_at, spread, prior, same)
         chain = first.at(first.values + _change_of_chain(option.found, first))
         if np.all(np.abs(chain.values - now.values) < first.spread):

@@ -449,10 +449,6 @@ def _later_by(first: Finding, second: Finding) -> Estimate | None:
     return replace(new, value=away, low=away - reach, high=away + reach) if abs(away) > reach else None
 
 
-_SURELY = 0.999
-"""Probability of the interval outside of which a prediction contradicts what differs."""
-
-
 def explaining(
     changes: Sequence[Change], seen: LevelOne, vehicle: Vehicle
 ) -> tuple[list[Change], list[Change], dict[str, tuple[str, ...]]]:
@@ -460,6 +456,7 @@ def explaining(
 
     Together they predict; where that lies outside of a difference's interval, the change that predicts most of it goes.
     """
+    surely = 0.999  # Probability of the interval outside of which a prediction contradicts what differs.
     left, refused = list(changes), []
     known = {d.quantity.key: d for d in seen.differences}
     while True:
@@ -468,7 +465,7 @@ def explaining(
         wrong = [
             (abs(size) / known[key].sd, c)
             for c, key, size in parts
-            for low, high in [known[key].interval(_SURELY)]
+            for low, high in [known[key].interval(surely)]
             if not low <= sums[key] <= high and size * (sums[key] - known[key].value) > 0
         ]
         if not wrong:

@@ -42,8 +42,6 @@ Effects = Sequence[tuple[Form, np.ndarray]]
 """Forms with the values of their parameters."""
 _FORCES = (0, 1, 2)
 """Channels of the forces."""
-_REACH_OF_KNOWN = 3.0
-"""Standard errors by which a coefficient of the first set may be other than its model has it."""
 _AIRSPEED = "airspeed_m_s"
 _REGIMES = (_AIRSPEED, "rotor_speed_rad_s", "body_rate_rad_s", "tilt_rad")
 """Regime variables by which two sets are compared."""
@@ -430,8 +428,9 @@ def within_bounds(evidence: Evidence, reference: FittedReference) -> Evidence:
 
     What the first set has is known to a few standard errors of its column; where it never excites one, not at all.
     """
+    reach_of_known = 3.0  # Standard errors by which a coefficient of the first set may be other than its model has it.
     energy = np.einsum("cekk->k", reference.evidence.gram)
-    reach = np.where(energy > NEVER_EXCITED, _REACH_OF_KNOWN / np.sqrt(np.maximum(energy, NEVER_EXCITED)), np.inf)
+    reach = np.where(energy > NEVER_EXCITED, reach_of_known / np.sqrt(np.maximum(energy, NEVER_EXCITED)), np.inf)
 
     def bounded(term: EvidenceTerm) -> EvidenceTerm:
         if term.kind != "effect" or term.of_change:

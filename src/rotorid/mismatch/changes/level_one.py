@@ -116,10 +116,6 @@ SCATTER = (
 Of a slope what goes beyond the flights' own doubt, or half of that doubt where it explains all."""
 ASSUMED = {"lift_without_voltage": (0.1, 3)}
 """One-sigma and degrees of freedom of what no laboratory shows: here of a battery whose voltage is not recorded."""
-_FEWEST_FLIGHTS, _FEWEST_LABORATORIES = 3, 3
-"""A laboratory's largest scatter needs so many flights; of a kind that fewer laboratories have, it is doubled."""
-_FREEDOM_OF_PIECES = 2.0
-"""As how many degrees of freedom between flights the doubt by a flight's own pieces counts."""
 _KNOWN = 1e6
 """Degrees of freedom of a scatter that is taken as known."""
 _FREEDOM = (2.0, 10.0)
@@ -302,6 +298,8 @@ def usual_scatter(without: str = "") -> dict[str, _Usual]:
 
     Its degrees of freedom follow from how much the logarithms of the laboratories' variances differ (Smyth, eq. 10).
     """
+    # A laboratory's largest scatter needs so many flights; of a kind that fewer laboratories have, it is doubled.
+    fewest_flights, fewest_laboratories = 3, 3
     out = {}
     for kind in KINDS:
         every = [row for row in SCATTER if row[0] == kind]
@@ -318,8 +316,8 @@ def usual_scatter(without: str = "") -> dict[str, _Usual]:
         counts = 2.0 * brentq(lambda x, y=apart: polygamma(1, x) - np.clip(y, 0.1, 1e3), 1e-2, 1e2)
         counts = float(np.clip(counts, *_FREEDOM))
         mean = float(np.exp(0.5 * (np.mean(logs) + polygamma(0, 0.5 * counts) - np.log(0.5 * counts))))
-        wider = 1.0 if len(rows) >= _FEWEST_LABORATORIES else 2.0
-        most = max([mean, *sd[freedom >= _FEWEST_FLIGHTS - 1]])
+        wider = 1.0 if len(rows) >= fewest_laboratories else 2.0
+        most = max([mean, *sd[freedom >= fewest_flights - 1]])
         out[kind] = _Usual(wider * mean, counts, float(wider * most))
     return out
 
@@ -517,9 +515,10 @@ def _overstated(own: np.ndarray, found: float, freedom: int) -> float:
     Pieces of a manoeuvre differ by more than flights that repeat it: where flights are known to differ by less (by
     `found`, the variance between them), pieces are believed by so much less. Without such flights they are believed.
     """
+    freedom_of_pieces = 2.0  # As how many degrees of freedom between flights the doubt by a flight's own pieces counts.
     mean = float(own.mean())
     seen = min(1.0, found / mean) if mean > 0 else 1.0
-    return (_FREEDOM_OF_PIECES + freedom * seen) / (_FREEDOM_OF_PIECES + freedom)
+    return (freedom_of_pieces + freedom * seen) / (freedom_of_pieces + freedom)
 
 
 def _scatter_of(values: Sequence[np.ndarray], owns: Sequence[np.ndarray], kind: str) -> tuple[float, int]:

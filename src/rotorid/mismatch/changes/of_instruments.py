@@ -58,31 +58,14 @@ from rotorid.mismatch.instrument.setup import (
 )
 from rotorid.recordings import RecordingSet
 
-_OTHER_RATE = 0.3
-"""Relative difference of two sampling rates from which one set's columns are not the other's."""
-_FEWEST_RUNS = 3
-"""Runs that each set must have for its runs to be the environments in which a coefficient must be the same."""
-_TARE_NOISE = 0.5
-"""One-sigma of a zero over that of a row's noise, at least: it is the mean of a few samples."""
 _WANDERS = {"zero": ("constant", "b_{own}"), "drift": ("linear in time", "b_{own}")}
 """To what differs from run to run (`Effect.differs_between_runs`) how the names of its forms begin, and its symbol."""
 _OF_OTHER_AXES = "of other axes", ("", "C_{own},{load}")
 """The same of a load on another axis."""
-_MOUNTED_RAD = 0.001
-"""One-sigma of the angle by which a load, or the vehicle, stands otherwise on another day: a twentieth of a degree."""
-_WIDE = 20.0
-"""One-sigmas between days in which nothing changed that a change is believed to have at least: narrower, its estimate
-would be drawn to nothing by as much as the two differ."""
 _FORM_SD_OF_READING = 0.1
 """Share of what the first set's effects add to a reading that their forms are wrong by: loops and creep hang on what
 was loaded before. Also the share of what effects that take time do together up to which the others may be the form of
 one of them."""
-_HARDLY = 1e-3
-"""Share of all runs' squares of a column below which one run says nothing of it."""
-_MOST_REFINED = 4
-"""Ids whose nonlinear parameters are refined on the second set, the most promising first."""
-_LEAST_MOMENT_N_M = 1e-6
-"""Largest moment of the load below which none is put on."""
 
 
 @dataclass(frozen=True)
@@ -161,6 +144,8 @@ def joint_of_instruments(reference: InstrumentReference, new: RecordingSet) -> J
     InputError
         They have not the same channels, columns or rate.
     """
+    # Runs that each set must have for its runs to be the environments in which a coefficient must be the same.
+    fewest_runs = 3
     _must_compare(reference.recordings, new)
     new, mistakes, _ = find_mistakes(replace(new, held_out=()))
     model = reference.model
@@ -177,7 +162,7 @@ def joint_of_instruments(reference: InstrumentReference, new: RecordingSet) -> J
         base, second = _on_columns(_rows_like(model, terms, model.loadings), terms, model), of_new(terms)
     count, more = (len(base.by_run), len(second.by_run)), _mounted_anew(terms, setup)
     both: Sequence[Sequence[Evidence]] = (base.by_run, second.by_run)
-    if min(count) >= _FEWEST_RUNS:
+    if min(count) >= fewest_runs:
         both = [[wandering(_as_one_environment(run), reference.wander) for run in own] for own in both]
     else:
         more = np.hypot(more, _between_sets(reference.wander, len(more), sum(1.0 / n for n in count)))
@@ -220,6 +205,7 @@ def _refined_on(second: _OnColumns, setup: PreparedInstrument, reference: Instru
     A filter or a resonance at the first set's values, or at those a search starts from, would leave much of itself,
     and several others would be needed to make up for it. `setup` holds the second set's stretches.
     """
+    most_refined = 4  # Ids whose nonlinear parameters are refined on the second set, the most promising first.
     model, terms = reference.model, {t.key: t for t in reference.terms}
     problem = _problem_without_leftover(reference.own.evidence, second.evidence)
     posterior, best = Posterior(problem), {}
@@ -228,7 +214,7 @@ def _refined_on(second: _OnColumns, setup: PreparedInstrument, reference: Instru
             gain = posterior((key,)) - posterior(())
             if gain > best.get(effect, ("", 0.0))[1]:
                 best[effect] = key, gain
-    chosen = sorted(best.values(), key=lambda of: -of[1])[:_MOST_REFINED]
+    chosen = sorted(best.values(), key=lambda of: -of[1])[:most_refined]
     at_work = [k for k in model.selection.active if k in terms]
     own = replace(
         model,
@@ -264,7 +250,10 @@ def _decide_instrument_changes(
     much, and a leftover is learnt, too, from what the most promising of these leaves: `sizes` (C, K, K) are products
     that sizes of contributions are taken from.
     """
-    prior = replace(prior, value_reach=_WIDE, change_reach=0.0)
+    # One-sigmas between days in which nothing changed that a change is believed to have at least: narrower, its
+    # estimate would be drawn to nothing by as much as the two differ.
+    wide = 20.0
+    prior = replace(prior, value_reach=wide, change_reach=0.0)
     unit = unit_of(base, new)
     spectra = spectrum_of(base, unit), spectrum_of(new, unit)
     starts = [np.zeros(len(unit)), difference_of(spectra)]
@@ -318,6 +307,7 @@ def _steps_of(setup: PreparedInstrument, model: ReadingModel) -> tuple[Finding, 
 
 def _must_compare(base: RecordingSet, new: RecordingSet) -> None:
     """InputError unless both sets are of the same kind, with the same channels, rotors, columns and rate."""
+    other_rate = 0.3  # Relative difference of two sampling rates from which one set's columns are not the other's.
     first, second = base.vehicle, new.vehicle
     alike = {
         "kind": (first.kind, second.kind),
@@ -334,7 +324,7 @@ def _must_compare(base: RecordingSet, new: RecordingSet) -> None:
     if compared_channels(base) != compared_channels(new):
         raise InputError(f"set {new.name}: other forces or moments are read in every run than in {base.name}")
     step_s = [float(np.median(np.concatenate([np.diff(r.time_s) for r in own.runs]))) for own in (base, new)]
-    if abs(step_s[1] / step_s[0] - 1.0) > _OTHER_RATE:
+    if abs(step_s[1] / step_s[0] - 1.0) > other_rate:
         raise InputError(
             f"set {new.name}: recorded at {1 / step_s[1]:.3g} Hz, expected {1 / step_s[0]:.3g} Hz as {base.name}"
         )
@@ -396,6 +386,7 @@ def _wander_of(terms: Sequence[Term], own: _OnColumns, known: np.ndarray, model:
     The variance between runs is the moment estimate of DerSimonian and Laird (Controlled Clinical Trials 7, 1986). A
     variance of n runs is widened by (n + 1)/(n − 1).
     """
+    tare_noise = 0.5  # One-sigma of a zero over that of a row's noise, at least: it is the mean of a few samples.
     columns, variances = [], []
     for place, channel in enumerate(own.evidence.channels):
         alike = _wandering_columns(terms, own.evidence, model.setup.instrument.loaded, int(channel))
@@ -403,7 +394,7 @@ def _wander_of(terms: Sequence[Term], own: _OnColumns, known: np.ndarray, model:
         every = own.evidence.gram[place].sum(axis=0)[at, at]
         found = [_estimate_of_run(run, place, at, known, every) for run in own.by_run]
         variance = between(*(np.array(part) for part in zip(*found, strict=True)))
-        variance[0] = max(variance[0], (_TARE_NOISE * model.noise[channel]) ** 2)
+        variance[0] = max(variance[0], (tare_noise * model.noise[channel]) ** 2)
         columns.append(tuple(alike))
         variances.append(variance)
     return Wander(tuple(columns), tuple(variances))
@@ -416,9 +407,10 @@ def _estimate_of_run(
 
     A column that a run hardly excites next to all runs, whose squares are `every` (k,), has weight 0.
     """
+    hardly = 1e-3  # Share of all runs' squares of a column below which one run says nothing of it.
     gram, cross = run.gram[place].sum(axis=0), run.cross[place].sum(axis=0)
     estimate, weight = np.zeros(len(at)), np.zeros(len(at))
-    shown = np.flatnonzero(gram[at, at] > _HARDLY * every)
+    shown = np.flatnonzero(gram[at, at] > hardly * every)
     if len(shown):
         of_shown = at[shown]
         inverse = ridge_inverse(gram[np.ix_(of_shown, of_shown)])
@@ -494,6 +486,8 @@ def _mounted_anew(terms: Sequence[Term], setup: PreparedInstrument) -> np.ndarra
 
     The forms in which a coefficient stands have it in equal shares, so that their sum has it once.
     """
+    # One-sigma of the angle by which a load, or the vehicle, stands otherwise on another day: a twentieth of a degree.
+    mounted_rad = 0.001
     scale = dict(zip(AXES, _scales(setup.instrument.largest), strict=True))
     role, _ = _OF_OTHER_AXES
     symbols = [
@@ -505,7 +499,7 @@ def _mounted_anew(terms: Sequence[Term], setup: PreparedInstrument) -> np.ndarra
     for k, symbol in enumerate(every):
         if symbol:
             target, source = symbol.removeprefix("C_").split(",")
-            out[k] = _MOUNTED_RAD * scale[target] / scale[source] / np.sqrt(every.count(symbol))
+            out[k] = mounted_rad * scale[target] / scale[source] / np.sqrt(every.count(symbol))
     return np.nan_to_num(out)
 
 
@@ -523,5 +517,6 @@ def _how_large(loadings: Sequence[Loading], channels: Sequence[int]) -> dict[str
 
 def _scales(largest: Sequence[float]) -> np.ndarray:
     """The largest force, N, and the largest moment, N m, of each channel's kind, (6,)."""
+    least_moment_n_m = 1e-6  # Largest moment of the load below which none is put on.
     force, moment = max(largest[:3]), max(largest[3:])
-    return np.repeat([force, moment if moment > _LEAST_MOMENT_N_M else np.inf], 3)
+    return np.repeat([force, moment if moment > least_moment_n_m else np.inf], 3)

@@ -50,26 +50,17 @@ from rotorid.mismatch.evidence.regression import NEVER_EXCITED
 from rotorid.mismatch.evidence.rows import PARAMETER_NAMES
 from rotorid.mismatch.instrument.model import VALUE_NAMES
 
-_SAME_SD, _SAME_BODY_SD = 0.01, 0.003
-"""Relative one-sigma between two flights in which nothing changed of a rotor's coefficient (3 K of air change
-its density by a hundredth), and of mass, inertia and arm."""
 _OF_THE_AIR = ("thrust", "torque")
 """Values that the air's density changes."""
 _DERIVED = "rotor_acceleration"
 """What is a derivative of recorded speeds: how much of it is noise depends on the flight, and is not known."""
-_FEWEST_FLIGHTS = 3
-"""Two good flights give one difference alone, of which no variance is known."""
 NAMES = {**VALUE_NAMES, **PARAMETER_NAMES}
 """Key of every believed value, of a flight or an instrument, to the contract's name."""
 _LEAST_CHANGE, MOST_CHANGE = 0.015, 0.6
 """Relative change of a value up to which it does not matter, and the largest."""
-_LEAST_GAIN = 0.005
-"""The least one of a reading's gain."""
 _FREE = 10.0
 """Variance of what is common to both sets, in units of what one row determines. With 1 more unseen pairs got a wrong
 name; with 100 a change of mass in gentle flight is halved (docs/compare.md)."""
-_NOT_COMMON = 1e-9
-"""The same of what only one set can have."""
 _UNCHANGED = "unchanged"
 """Kind of a term that is common to both sets and did not change by assumption."""
 _RIDGE = 1e-4
@@ -317,10 +308,11 @@ def _products_of_changes(
 
 def _free_of(terms: Mapping[str, EvidenceTerm], columns_of: Mapping[str, np.ndarray], rows: int | float) -> np.ndarray:
     """Variance (K,) of the coefficients common to both sets, scaled; next to none of what one set has alone."""
+    not_common = 1e-9  # The same of what only one set can have.
     out = np.full(sum(t.size for t in terms.values()), _FREE * rows)
     for key, term in terms.items():
         if term.alone:
-            out[columns_of[key]] = _NOT_COMMON
+            out[columns_of[key]] = not_common
     return out
 
 
@@ -354,10 +346,11 @@ def _in_units(spread: np.ndarray, unit: np.ndarray) -> np.ndarray:
 
 def _as_change(term: EvidenceTerm) -> EvidenceTerm:
     """A believed value as something that may have changed, named as the contract names it; another term as it is."""
+    least_gain = 0.005  # The least one of a reading's gain.
     if term.kind != "value":
         return term
     name = NAMES[term.key]
-    least = _LEAST_GAIN if term.key.startswith("gain") else _LEAST_CHANGE
+    least = least_gain if term.key.startswith("gain") else _LEAST_CHANGE
     change = LinearParameter(name, "1", -MOST_CHANGE, MOST_CHANGE, least)
     return replace(term, kind="effect", effect=name, linear=(change,))
 
@@ -371,13 +364,16 @@ def usual_spread(
     the inertia, of the second vehicle.yaml over the first one's in each channel: residual noise grows with it.
     `form_sd` is the share of what effects contribute that their forms are wrong by.
     """
+    # Relative one-sigma between two flights in which nothing changed of a rotor's coefficient (3 K of air change its
+    # density by a hundredth), and of mass, inertia and arm.
+    same_sd, same_body_sd = 0.01, 0.003
     hidden = _hidden_by_noise(new, inertia) - _hidden_by_noise(base, np.ones(len(inertia)))
     out = form_spread(base, known, form_sd)
     forms = Counter((t.effect, p.symbol) for t in base.terms for p in t.linear)
     for term in base.terms:
         at = base.start[term.key] + np.arange(term.size)
         if term.kind == "value":
-            out[at] = np.hypot(_SAME_SD if term.key in _OF_THE_AIR else _SAME_BODY_SD, hidden[at])
+            out[at] = np.hypot(same_sd if term.key in _OF_THE_AIR else same_body_sd, hidden[at])
         elif term.effect in catalogue() and term.linear:
             effect = catalogue()[term.effect]
             usual = np.array([effect.between_flights.get(p.unit, 0.0) for p in term.linear])
@@ -473,8 +469,9 @@ def spread_of_flights(flights: Sequence[Evidence], decide: Callable[[Evidence, E
 
     Of a class each member gets what makes it contribute as much. A variance of n flights is widened by (n + 1)/(n − 1).
     """
+    fewest_flights = 3  # Two good flights give one difference alone, of which no variance is known.
     number = len(flights)
-    if number < _FEWEST_FLIGHTS:
+    if number < fewest_flights:
         return 0.0
     squares = np.zeros(flights[0].gram.shape[-1])
     for k, flight in enumerate(flights):

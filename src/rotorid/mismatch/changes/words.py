@@ -99,8 +99,6 @@ WHOLE = {"flight": "the weight", "stand": "the largest load", "bench": "the larg
 _SHARE = {"flight": "share_of_weight", "stand": "share_of_largest_load", "bench": "share_of_largest_load"}
 _GAINS = frozenset(name for name in VALUE_NAMES.values() if name.startswith("reading_gain"))
 """Values that a calibration measures, by dead weights on one axis after the other."""
-_MOST_LIMITS = 4
-"""Things that did not change and are named with their limit; more are counted."""
 
 
 def sentences(found: Changes) -> list[str]:
@@ -162,14 +160,15 @@ def _unchanged_words(limits: tuple[UpperLimit, ...], whole: str) -> str:
 
     `whole` is what shares are of, in words.
     """
+    most_limits = 4  # Things that did not change and are named with their limit; more are counted.
     values = [
         f"{name_words(x.id)} by at most {percent_words(x.at_most)}" for x in limits if x.id in VALUES and x.at_most
     ]
     # A limit above the weight excludes nothing: the page has it in its table.
     others = [x for x in limits if x.id not in VALUES and 0 < x.share < 1]
-    named = [f"{name_words(x.id)} by at most {percent_words(x.share)} of {whole}" for x in others[:_MOST_LIMITS]]
-    if len(others) > _MOST_LIMITS:
-        named.append(f"{len(others) - _MOST_LIMITS} others by less")
+    named = [f"{name_words(x.id)} by at most {percent_words(x.share)} of {whole}" for x in others[:most_limits]]
+    if len(others) > most_limits:
+        named.append(f"{len(others) - most_limits} others by less")
     return f"Not changed, with 95 % probability: {listed([*values, *named])}."
 
 

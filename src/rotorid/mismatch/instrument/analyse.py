@@ -81,15 +81,9 @@ from rotorid.mismatch.instrument.setup import PreparedInstrument, averaged, piec
 from rotorid.recordings import RecordingSet, Vehicle
 from rotorid.steps import step
 
-_SMALL_LOADS = 0.3
-"""Share of the largest load up to which a load is small."""
-_KNOTS = (0.0, 1 / 3, 2 / 3, 1.0)
-"""Where the hat functions stand, as shares of the largest."""
 _MOST_SHARE = 0.5
 """A value is weaker than an effect where it adds less than this share of what the effect explains by itself, and is not
 needed where less than this share of what it adds remains given the effect's free form."""
-_LATE_ROWS = (1, 2, 4, 8)
-"""Rows by which a free form may also be late."""
 _FREE = "free form"
 _GAIN = "gain"
 _SHOWS = 0.33
@@ -119,6 +113,13 @@ def _one_load(finding: Finding, setup: PreparedInstrument) -> Finding:
     return replace(
         finding, status="ambiguous", alternatives=tuple(sorted({*ids_of("curve_of_load"), *finding.alternatives}))
     )
+
+
+def decided_of_reading(model: ReadingModel) -> list[Finding]:
+    """Findings on the load and on its reading, with what one load or commands alone cannot distinguish."""
+    found = [_one_load(f, model.setup) for f in reading_findings(model)]
+    measured = all(x.measured for x in model.setup.loadings)
+    return found if measured else [throttle_or_thrust(f) for f in found]
 
 
 @step("searching what acts")
@@ -177,8 +178,7 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     while needless := (_needless_values(model, values) | _curved_gains(model, values)) - refused:
         refused |= needless
         values = values_of(model.selection, refused)
-    found = [_one_load(f, setup) for f in reading_findings(model)]
-    findings += found if measured else [throttle_or_thrust(f) for f in found]
+    findings += decided_of_reading(model)
     coarse, why = quantisation(setup, model.noise)
     if coarse is not None:
         findings.append(coarse)
@@ -532,11 +532,13 @@ def with_plainer_forms(model: ReadingModel, loadings: tuple[Loading, ...] | None
 
 def hats(values: np.ndarray) -> np.ndarray:
     """Hat functions at KNOTS of values (n,) between 0 and 1, (n, 4): they add up to one."""
-    return np.stack([np.interp(values, _KNOTS, row) for row in np.eye(len(_KNOTS))], axis=1)
+    knots = (0.0, 1 / 3, 2 / 3, 1.0)  # Where the hat functions stand, as shares of the largest.
+    return np.stack([np.interp(values, knots, row) for row in np.eye(len(knots))], axis=1)
 
 
 def _freed(model: ReadingModel, key: str, beta: np.ndarray, channels: list[int]) -> list[np.ndarray]:
     """Columns of a term's free form on the rows of every part, (n, 6, m), apart in each of the channels."""
+    late_rows = (1, 2, 4, 8)  # Rows by which a free form may also be late.
     cols = model.regression.columns([key])
     parts = [r.x[:, :, cols] @ beta for r in model.rows]
     own_largest = np.maximum(np.max([np.abs(p).max(axis=0) for p in parts], axis=0), 1e-300)
@@ -551,7 +553,7 @@ def _freed(model: ReadingModel, key: str, beta: np.ndarray, channels: list[int])
         block = []
         for c in channels:
             own = part[:, c, None]
-            late = [np.concatenate([own[:1].repeat(min(rows, len(own)), axis=0), own[:-rows]]) for rows in _LATE_ROWS]
+            late = [np.concatenate([own[:1].repeat(min(rows, len(own)), axis=0), own[:-rows]]) for rows in late_rows]
             shapes = [own * g for g in (*gains, hats(np.abs(own[:, 0]) / own_largest[c])[:, 1:-1])]
             columns = np.concatenate([*shapes, np.gradient(own, axis=0), *late], axis=1)
             block.append(np.eye(6)[c][None, :, None] * columns[:, None, :])
@@ -645,13 +647,14 @@ def _curved_gains(model: ReadingModel, values: Values) -> set[str]:
     so over all, and the slope that a polynomial has at no load is neither. A wrong calibration is off in both. A
     structure that gives way curves the reading of its own axis as a sensor does.
     """
+    small_loads = 0.3  # Share of the largest load up to which a load is small.
     instrument = model.setup.instrument
     if not any(model.search.terms[k].effect in _curving() for k in model.selection.active):
         return set()
     out = set()
     for key, (change, _) in values.items():
         of_key = [c for c in instrument.loaded if c < 3 and key in ("gain", f"gain_{'xyz'[c]}")]
-        for share in (_SMALL_LOADS, 1.0) if of_key else ():
+        for share in (small_loads, 1.0) if of_key else ():
             # Channels may curve to either side: what they have in common is the gain.
             slope = np.mean([_slope_of(model, c, share * instrument.largest[c]) for c in of_key])
             if np.sign(change) * slope < SMALLEST_CHANGE:

@@ -42,22 +42,14 @@ _MOST_STEPS, _QUICK_FIT = 30, 6
 """Evaluations of the Jacobian at most: of a fit, and of one that is to say whether another is worth it."""
 _MOST = 4
 """Forms of a chain, forms that are fitted to the end before the next one enters, and starts of each, at most."""
-_MOST_DOUBT = 3.0
-"""Standard deviations by which a command may differ from the curve through its samples."""
 _SUB_SAMPLE = 1.2
 """Offsets in time up to so many samples are a nuisance."""
-_LEAST_SPAN = 0.02
-"""Relative span of the voltage below which its effect cannot be tested."""
-_REMEMBERED = 24
-"""Speeds of each stretch that are remembered: those of one Jacobian."""
 _BLOCK_S = 1.0
 _LEAST_BLOCKS = 12
 _MOST_BLOCKS = 400
 _STEADY_BLOCKS = 40
 _FINER = 4
 """Steps of a chain that takes time to one sample."""
-_FAR = 0.05
-"""Share of a cost by which a fit is still above it after a few steps when it will not come down to it."""
 _ALIKE = rules.ELSEWHERE["squares"]
 """Whitened squares within which another form explains as well."""
 
@@ -224,6 +216,7 @@ class _ChainProblem:
 
         Remembered for a while: a Jacobian moves one value after another, and what the forms before it make stays.
         """
+        remembered = 24  # Speeds of each stretch that are remembered: those of one Jacobian.
         start = self.start_of(loading, finer)
         if not chain:
             return start.command
@@ -235,7 +228,7 @@ class _ChainProblem:
             # A curve may have no real value far from its truth; a rotor at rest is the honest limit.
             with np.errstate(invalid="ignore"):
                 speed = form.apply(path, np.array(values[own:]))
-            if len(self._made) > _REMEMBERED * len(self.fitted):
+            if len(self._made) > remembered * len(self.fitted):
                 del self._made[next(iter(self._made))]
             self._made[key] = speed if np.isfinite(speed).all() else np.nan_to_num(speed)
         return self._made[key]
@@ -320,6 +313,7 @@ class _ChainProblem:
         return unknown_courses(chain, 1.0 / self.setup.instrument.rate_hz)
 
     def bounds(self, chain: Chain) -> tuple[np.ndarray, np.ndarray]:
+        most_doubt = 3.0  # Standard deviations by which a command may differ from the curve through its samples.
         low = [0.2 * self.first_full] if self.scaled else []
         high = [5.0 * self.first_full] if self.scaled else []
         for _, form in chain:
@@ -328,7 +322,7 @@ class _ChainProblem:
             early = -_SUB_SAMPLE / self.setup.instrument.rate_hz if delays else -np.inf
             low += [max(p.low, early) for p in form.parameters]
             high += [p.high for p in form.parameters]
-        reach = _MOST_DOUBT * self.unknown(chain)
+        reach = most_doubt * self.unknown(chain)
         return np.array([*low, *-reach]), np.array([*high, *reach])
 
     def fit(self, chain: Chain, start: np.ndarray, most: int = _MOST_STEPS) -> _ChainFit:
@@ -354,8 +348,10 @@ class _ChainProblem:
 
     def fit_to(self, chain: Chain, start: np.ndarray, cost: float) -> _ChainFit:
         """As `fit`, but left where a cost is reached, or where it would not be at the pace of the last few steps."""
+        # Share of a cost by which a fit is still above it after a few steps when it will not come down to it.
+        far = 0.05
         fit = self.fit(chain, start, _QUICK_FIT)
-        if fit.cost > (1 + _FAR) * cost:
+        if fit.cost > (1 + far) * cost:
             return fit
         for more in reversed(range(_MOST_STEPS // _QUICK_FIT)):
             if fit.cost < cost:
@@ -401,11 +397,12 @@ class _ChainProblem:
 
 def supply_reason(setup: PreparedInstrument) -> str | None:
     """Why the sag of the battery cannot be tested on the runs that are fitted; None if it can."""
+    least_span = 0.02  # Relative span of the voltage below which its effect cannot be tested.
     known = [x.motion.voltage for x in _thinned(list(setup.loadings)) if x.motion.voltage is not None]
     # The lowest and highest hundredth of the samples left out.
     volts = np.concatenate(known) if known else np.ones(1)
     volts = volts[(volts >= np.quantile(volts, 0.01)) & (volts <= np.quantile(volts, 0.99))]
-    if not known or np.ptp(volts) >= _LEAST_SPAN * volts.mean():
+    if not known or np.ptp(volts) >= least_span * volts.mean():
         return None
     return f"the supply voltage hardly varies in the runs that are fitted ({volts.min():.1f} to {volts.max():.1f} V)"
 

@@ -57,13 +57,6 @@ _ROWS_PER_COLUMN = 8
 _STRONGEST = 0.9
 """Quantile of the seconds' energies above which a contribution's size is taken: what shows only after a change of load
 is in few of them."""
-_MOST_OF_IT = 0.5
-"""Share of what a nameless id explains from which a named one is not given up for it."""
-_ROUNDS = 4
-_SETTLED = 1e-3
-"""Relative change of nonlinear parameters from round to round below which they have settled."""
-_MOST_AT_ONCE = 6
-"""More causes than this at once are not distinguished by six channels: what they leave is stated as unexplained."""
 MOST_OFFSET = 2.0
 """Samples by which reading and load may lie apart before it is a finding. The derivative of a reading that lags by τ is
 what it lacks, divided by τ: an offset in time without end would be that filter itself."""
@@ -90,7 +83,9 @@ class ReadingSearch(Search):
         return super().physical(term, beta, error)
 
     def candidates(self, active, *rest):
-        return iter(()) if len(active) >= _MOST_AT_ONCE else super().candidates(active, *rest)
+        # More causes than this at once are not distinguished by six channels: what they leave is stated as unexplained.
+        most_at_once = 6
+        return iter(()) if len(active) >= most_at_once else super().candidates(active, *rest)
 
     def swapped(self, active, dropped):
         """A model with one id in another's place; no nameless one takes that of a named one that explains most of it.
@@ -105,13 +100,14 @@ class ReadingSearch(Search):
 
     def _displaces_a_name(self, active: list[str], found: list[str]) -> bool:
         """Whether a nameless id stands in `found` for named ones that explain most of what it does."""
+        most_of_it = 0.5  # Share of what a nameless id explains from which a named one is not given up for it.
         new = [k for k in found if k not in active]
         gone = [k for k in active if k not in found]
         if not any(self.terms[k].effect in UNKNOWNS for k in new) or not gone:
             return False
         rest = [*self.always, *(k for k in found if k in active)]
         base, named, nameless = (self.regression.explained([*rest, *own]) for own in ([], gone, new))
-        return named - base > _MOST_OF_IT * (nameless - base)
+        return named - base > most_of_it * (nameless - base)
 
     def unsteady(self, active):
         """None: an instrument's runs load different axes, and no coefficient could be asked of each."""
@@ -403,8 +399,11 @@ def fitted_model(
     What is noise is learnt anew after the first refinement: whitened by a ring or a lag that no column had before it,
     the regression would be deaf at the very frequencies where the effect shows.
     """
+    rounds = 4
+    # Relative change of nonlinear parameters from round to round below which they have settled.
+    settled = 1e-3
     model = reading_model(setup, terms, active, loadings, refused=refused)
-    for number in range(_ROUNDS):
+    for number in range(rounds):
         before, start = model.selection.active, _nonlinear_values(model)
         if not len(start):
             break
@@ -412,7 +411,7 @@ def fitted_model(
         kept = (model.noise, model.regression.filters) if number else None
         model = reading_model(setup, terms, before, loadings, kept, refused)
         values = _nonlinear_values(model)
-        if set(model.selection.active) == set(before) and np.allclose(values, start, rtol=_SETTLED):
+        if set(model.selection.active) == set(before) and np.allclose(values, start, rtol=settled):
             break
     rivals = _rivals_refined(model)
     if not rivals:

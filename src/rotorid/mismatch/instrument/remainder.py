@@ -22,11 +22,6 @@ from rotorid.mismatch.instrument.setup import averaged, full_voltage_of, loaded_
 from rotorid.recordings import Vehicle
 from rotorid.vehicle.improved import speeds_of_commands
 
-_SAME = 1e-5
-"""Relative difference above which a vehicle read back is not the model written."""
-_LEAST_CHANGE = 0.02
-"""Spread of a load in one run, by its spread over all, from which the run says what depends on it."""
-
 
 def _probes(loading: Loading, model: ReadingModel) -> dict[str, np.ndarray]:
     """Generic inputs on the rows of a stretch, by the names that a person knows."""
@@ -117,6 +112,8 @@ def dependence(model: ReadingModel, before: list[np.ndarray], after: list[np.nda
 
 def _runs(model: ReadingModel) -> list[tuple[list[int], list[np.ndarray]]]:
     """Of every run the numbers of its rows and the loads that change in it, (n, k) each; a bench alone knows them."""
+    # Spread of a load in one run, by its spread over all, from which the run says what depends on it.
+    least_change = 0.02
     if not model.setup.instrument.bench:
         return []
     names, inputs = _inputs(model)
@@ -125,7 +122,7 @@ def _runs(model: ReadingModel) -> list[tuple[list[int], list[np.ndarray]]]:
     for run in dict.fromkeys(r.run for r in model.rows):
         numbers = [k for k, r in enumerate(model.rows) if r.run == run]
         loads = [inputs[k][:, columns] for k in numbers]
-        keep = np.concatenate(loads).std(axis=0) > _LEAST_CHANGE
+        keep = np.concatenate(loads).std(axis=0) > least_change
         out.append((numbers, [z[:, keep] for z in loads]))
     return out
 
@@ -254,11 +251,12 @@ def _is_chain(entry: dict) -> bool:
 
 def prove(analysis: Analysis, written: Vehicle, reloaded: Vehicle, errors: Instruments) -> None:
     """RuntimeError unless vehicle and instruments read back predict the readings that the model predicts."""
+    same = 1e-5  # Relative difference above which a vehicle read back is not the model written.
     ours_of = instruments_of(analysis)
     volts = full_voltage_of(analysis.loadings)
     for loading in analysis.loadings:
         ours = _predicted(written, analysis.instrument, loading, volts, ours_of)
         theirs = _predicted(reloaded, analysis.instrument, loading, volts, errors)
         scale = max(float(np.abs(ours).max()), 1e-12)
-        if not np.allclose(ours, theirs, rtol=0, atol=_SAME * scale):
+        if not np.allclose(ours, theirs, rtol=0, atol=same * scale):
             raise RuntimeError(f"improved_vehicle.yaml read back predicts another reading in {loading.run}")

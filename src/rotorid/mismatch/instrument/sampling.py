@@ -31,20 +31,6 @@ from rotorid.recordings.held import step_of
 
 WIDTHS = (5, 9, 17, 33, 65, 129, 257)
 """Samples of the windows."""
-_STEADY_WIDTH = 33
-"""Samples that must agree for a reading to be replaced: near a step a window bends what it smooths."""
-_GAMMA = 2.6
-"""Half-width of the confidence intervals, in standard errors."""
-_BAND = (0.5, 0.75, 1.0)
-"""Shares of the highest frequency in which the noise must be white, in two halves."""
-_LEVEL = 2.0
-"""Ratio of the power in the two halves beyond which there is signal up there, and nothing is done."""
-_SMALLER, _LARGER = 0.98, 1.01
-"""Smoothed speeds are the better ones where they lower the quick errors of some load to this share, and raise none."""
-_LOCAL_S = 1.0
-"""Time over which the size of the noise is read off: it may grow with the speed."""
-_STEP_SHARE = 0.02
-"""Change from sample to sample, as a share of the largest load, from which a load jumps."""
 _LEAST_STEPS = 4
 _CALM_S, _LOOK_S = 0.8, 3.0
 """Time before and after a step without another, and time after it that is looked at."""
@@ -55,8 +41,6 @@ _SMOOTH = 5
 """Samples over which the scatter is smoothed."""
 _SLACK_S = 0.1
 """Time left out before a step, and after the readings have settled."""
-_COARSE_SHARE = 0.25
-"""Share of the noise's variance that the steps must make, q²/12 relative to σ²."""
 _LEAST_SAMPLES = 200
 _HELD_SHARE = 0.3
 """Share of readings that repeat the one before, from which a column is held between readings."""
@@ -86,6 +70,7 @@ def _is_held(values: np.ndarray, steps: np.ndarray) -> bool:
 
 def quantisation(setup, noise: np.ndarray) -> tuple[Finding | None, str | None]:
     """Finding where steps make a good part of the noise; or the reason why it cannot be tested."""
+    coarse_share = 0.25  # Share of the noise's variance that the steps must make, q²/12 relative to σ².
     effect = catalogue()["quantisation"]
     names = columns.FORCE + columns.MOMENT
     total = sum(len(r.table) for r in setup.recordings.runs)
@@ -96,7 +81,7 @@ def quantisation(setup, noise: np.ndarray) -> tuple[Finding | None, str | None]:
         values = np.concatenate([r.column(names[k]) for r in setup.recordings.runs])
         step = step_of(values)
         sigma = _noise_of_samples(setup.loadings, k)
-        if step and step**2 / 12 > _COARSE_SHARE * max(sigma**2, 1e-300) and step < 1e3 * max(sigma, step / 12):
+        if step and step**2 / 12 > coarse_share * max(sigma**2, 1e-300) and step < 1e3 * max(sigma, step / 12):
             found.append((k, step, sigma))
     if not found:
         return None, None
@@ -130,7 +115,8 @@ def _noise_of_samples(loadings, channel: int) -> float:
 
 def _steps_of(loading: Loading, channel: int, largest: float) -> np.ndarray:
     """Samples at which a load jumps from one sample to the next and does not before and after."""
-    jumps = np.abs(np.diff(loading.load[:, channel])) > _STEP_SHARE * largest
+    step_share = 0.02  # Change from sample to sample, as a share of the largest load, from which a load jumps.
+    jumps = np.abs(np.diff(loading.load[:, channel])) > step_share * largest
     calm = max(2, int(_CALM_S / loading.dt_s))
     at = np.flatnonzero(jumps) + 1
     alone = [not jumps[max(0, k - 1 - calm) : k - 1].any() and not jumps[k : k + calm].any() for k in at]
@@ -206,8 +192,10 @@ def quieter(as_read: list[Loading], smoothed: list[Loading]) -> list[Loading]:
 
     Compared by the squares of the steps from sample to sample, in which effects of the instrument are small.
     """
+    # Smoothed speeds are the better ones where they lower the quick errors of some load to this share, and raise none.
+    smaller, larger = 0.98, 1.01
     ratio = _steps(smoothed) / np.maximum(_steps(as_read), 1e-300)
-    better = len(ratio) > 0 and np.nanmin(ratio) < _SMALLER and np.nanmax(ratio) < _LARGER
+    better = len(ratio) > 0 and np.nanmin(ratio) < smaller and np.nanmax(ratio) < larger
     return smoothed if better else as_read
 
 
@@ -219,29 +207,35 @@ def _steps(loadings: list[Loading]) -> np.ndarray:
 
 def _noisy(speed: np.ndarray) -> bool:
     """Whether the upper end of the spectrum is white."""
+    level = 2.0  # Ratio of the power in the two halves beyond which there is signal up there, and nothing is done.
+    band = (0.5, 0.75, 1.0)  # Shares of the highest frequency in which the noise must be white, in two halves.
     frequency, power = welch(speed, nperseg=WIDTHS[-1] - 1, detrend="linear")
     share = frequency / frequency[-1]
-    lower, upper = (float(np.median(power[(share >= a) & (share < b)])) for a, b in zip(_BAND, _BAND[1:], strict=False))
-    return upper > 0 and 1 / _LEVEL < lower / upper < _LEVEL
+    lower, upper = (float(np.median(power[(share >= a) & (share < b)])) for a, b in zip(band, band[1:], strict=False))
+    return upper > 0 and 1 / level < lower / upper < level
 
 
 def _spread(speed: np.ndarray, rate_hz: float) -> np.ndarray:
     """Local one-sigma of white noise, (n,)."""
+    local_s = 1.0  # Time over which the size of the noise is read off: it may grow with the speed.
     quick = np.abs(speed - savgol_filter(speed, WIDTHS[0], 2))
     # Of white noise a parabola over five samples leaves 1 − 17/35 of the variance at its middle.
     spread = 1.4826 / np.sqrt(1.0 - savgol_coeffs(WIDTHS[0], 2)[WIDTHS[0] // 2])
-    return spread * median_filter(quick, int(_LOCAL_S * rate_hz) | 1, mode="nearest")
+    return spread * median_filter(quick, int(local_s * rate_hz) | 1, mode="nearest")
 
 
 def _smoothed(speed: np.ndarray, rate_hz: float) -> np.ndarray:
+    # Samples that must agree for a reading to be replaced: near a step a window bends what it smooths.
+    steady_width = 33
+    gamma = 2.6  # Half-width of the confidence intervals, in standard errors.
     weights = [savgol_coeffs(width, 2) for width in WIDTHS]
     sd = _spread(speed, rate_hz)
-    best, low, high = speed.copy(), speed - _GAMMA * sd, speed + _GAMMA * sd
+    best, low, high = speed.copy(), speed - gamma * sd, speed + gamma * sd
     agrees = np.ones(len(speed), bool)
     for width, weight in zip(WIDTHS, weights, strict=True):
-        value, doubt = savgol_filter(speed, width, 2), _GAMMA * sd * np.sqrt(weight @ weight)
+        value, doubt = savgol_filter(speed, width, 2), gamma * sd * np.sqrt(weight @ weight)
         low, high = np.maximum(low, value - doubt), np.minimum(high, value + doubt)
         agrees &= low <= high
-        if width >= _STEADY_WIDTH:
+        if width >= steady_width:
             best = np.where(agrees, value, best)
     return best

@@ -26,12 +26,6 @@ from rotorid.recordings.sufficient import compared_readings, driven_by
 
 _GAP_STEPS = 4.0
 """Where readings are missing for longer than this many median steps they are not compared."""
-_USUAL = 0.75
-"""Share of a column's steps that are no longer than its usual one."""
-_SLOWER = 1.5
-"""Readings whose usual step is so many of the rows' are taken at their own rate."""
-_UNEVEN = 0.3
-"""Deviation of a step from the median, as a share of it, beyond which samples are interpolated to an even grid."""
 _STRAIGHT, _CURVED = 0.02, 12.0
 """Change of a column's slope from one reading to the next, as a share of its range, and in the lower quartile of such
 changes, up to which it is straight between the two."""
@@ -41,12 +35,8 @@ _SHORTEST = 4
 _NO_ROWS = f"{{}}: no run has {_SHORTEST} samples in a row with every channel"
 SHORT = 60
 """Stretches of fewer samples or rows are blocks: too short to learn the colour of their noise from."""
-_MOST_VALUES = 45_000
-"""Samples times channels that are analysed; longer sets are averaged over several samples first."""
 _LEAST_SHARE = 0.05
 """Share of the largest load from which a channel is loaded, or a sample is, and of the samples that come back."""
-_LEAST_WARMTH_K = 0.1
-"""A temperature that changes by less says nothing."""
 _STEADY_HZ = 5.0
 """Below this rate a recording is a list of steady points: nothing that takes time can be seen."""
 _QUARTIC = np.array([[-25.0, 48.0, -36.0, 16.0, -3.0], [-3.0, -10.0, 18.0, -6.0, 1.0]])
@@ -153,6 +143,7 @@ def _filled(run: Run, name: str) -> np.ndarray | None:
 def _is_known(run: Run, names: tuple[str, ...]) -> np.ndarray:
     """Mask of the rows, (n,), in which every column that is there has a value, or lies between two that are no more
     than some of its own steps apart: what is missing for longer is no straight line."""
+    usual = 0.75  # Share of a column's steps that are no longer than its usual one.
     time_s, good = run.time_s, np.ones(len(run.time_s), bool)
     for name in filter(run.has, names):
         known_s = time_s[np.isfinite(run.column(name))]
@@ -160,7 +151,7 @@ def _is_known(run: Run, names: tuple[str, ...]) -> np.ndarray:
             continue
         good &= (time_s >= known_s[0]) & (time_s <= known_s[-1])
         if len(known_s) > 1:
-            within = _within(time_s, known_s, _GAP_STEPS * float(np.quantile(np.diff(known_s), _USUAL)))
+            within = _within(time_s, known_s, _GAP_STEPS * float(np.quantile(np.diff(known_s), usual)))
             good &= True if within is None else within
     return good
 
@@ -168,11 +159,12 @@ def _is_known(run: Run, names: tuple[str, ...]) -> np.ndarray:
 def _reading_rows(runs: Sequence[Run], channels: tuple[int, ...]) -> dict[str, np.ndarray]:
     """By run the mask of its rows, (n,), that are looked at: those with a reading in every channel where readings come
     more slowly than rows, else all rows, of which some lack readings."""
+    slower = 1.5  # Readings whose usual step is so many of the rows' are taken at their own rate.
     names = tuple((c.FORCE + c.MOMENT)[k] for k in channels)
     read = {run.name: np.isfinite(run.array(names)).all(axis=1) for run in runs}
     steps_s = np.concatenate([np.zeros(0), *(np.diff(run.time_s[read[run.name]]) for run in runs)])
     rows_s = np.concatenate([np.zeros(0), *(np.diff(run.time_s) for run in runs)])
-    if len(steps_s) and np.median(steps_s) < _SLOWER * np.median(rows_s):
+    if len(steps_s) and np.median(steps_s) < slower * np.median(rows_s):
         return {name: np.ones(len(mask), bool) for name, mask in read.items()}
     return read
 
@@ -207,8 +199,10 @@ def _within(time_s: np.ndarray, known_s: np.ndarray, longest_s: float) -> np.nda
 
 def _even(time_s: np.ndarray, dt_s: float) -> np.ndarray | None:
     """An even grid to interpolate to, None where the samples are even already."""
+    # Deviation of a step from the median, as a share of it, beyond which samples are interpolated to an even grid.
+    uneven = 0.3
     steps = np.diff(time_s)
-    if np.all(np.abs(steps - np.median(steps)) < _UNEVEN * np.median(steps)):
+    if np.all(np.abs(steps - np.median(steps)) < uneven * np.median(steps)):
         return None
     return time_s[0] + dt_s * np.arange(int((time_s[-1] - time_s[0]) / dt_s) + 1)
 
@@ -452,6 +446,8 @@ def set_up(recordings: RecordingSet, whole: RecordingSet | None = None) -> Prepa
         The set that they are of, if that has more: which channels every run has, when each was recorded, and which runs
         are held out. Nothing else of the other runs is used.
     """
+    # Samples times channels that are analysed; longer sets are averaged over several samples first.
+    most_values = 45_000
     vehicle, whole = recordings.vehicle, whole or recordings
     channels, session = compared_channels(whole), session_of(whole)
     rows = _reading_rows(recordings.runs, channels)
@@ -475,7 +471,7 @@ def set_up(recordings: RecordingSet, whole: RecordingSet | None = None) -> Prepa
             loadings = without_settling(loadings, instrument.loaded, instrument.largest, wait_s)
             instrument = replace(instrument, by_hand=True)
     total = sum(x.size for x in loadings) * len(channels)
-    average = max(1, int(np.ceil(total / _MOST_VALUES)))
+    average = max(1, int(np.ceil(total / most_values)))
     average = average if 1 / dt_s / average > _STEADY_HZ else 1
     if not any(pieces_of(x, average) for x in loadings):
         raise InputError(_NO_ROWS.format(recordings.name))
@@ -576,6 +572,7 @@ def _distance_column(recordings: RecordingSet) -> str:
 
 def _instrument_of(recordings: RecordingSet, how: _Preparation, loadings: Sequence[Loading]) -> InstrumentFacts:
     """What the forms of effects need to know beforehand."""
+    least_warmth_k = 0.1  # A temperature that changes by less says nothing.
     channels, session = how.channels, how.session
     load = np.concatenate([x.load for x in loadings])
     spread = np.concatenate([x.load - x.rest for x in loadings]).std(axis=0)
@@ -605,10 +602,10 @@ def _instrument_of(recordings: RecordingSet, how: _Preparation, loadings: Sequen
         returns=tuple(k for k in loaded if _comes_back(loadings, k, float(largest[k]))),
         tilts=any(np.ptp(a) > 0.02 for a in attitudes),
         temperature=all(x.temperature is not None for x in loadings)
-        and any(np.ptp(x.temperature) > _LEAST_WARMTH_K for x in loadings),
-        temperatures_c=(float(warmth.min()), float(warmth.max())) if np.ptp(warmth) > _LEAST_WARMTH_K else (0.0, 0.0),
+        and any(np.ptp(x.temperature) > least_warmth_k for x in loadings),
+        temperatures_c=(float(warmth.min()), float(warmth.max())) if np.ptp(warmth) > least_warmth_k else (0.0, 0.0),
         first_temperature_c=float(warmth[0]),
-        zero_temperature_c=zero_temperature(loadings, channels) if np.ptp(warmth) > _LEAST_WARMTH_K else None,
+        zero_temperature_c=zero_temperature(loadings, channels) if np.ptp(warmth) > least_warmth_k else None,
         session_s=session.length_s,
         session_clock=session.clock,
         distance=how.distance,

@@ -28,8 +28,6 @@ _LEAST_EXPLAINED = 0.4
 """Share of an axis that the other sensor must explain before anything is said of it."""
 _LEAST_T = 8.0
 """Standard errors from zero of a gain that names an axis."""
-_DOMINANCE = 3.0
-"""The largest entry of a row over the next, for an axis to be identified."""
 _LEAST_GRAVITY = 0.6
 """Share of gravity that the mean specific force must show along an axis for its sign to count."""
 
@@ -87,6 +85,7 @@ def read(fit: LaggedFit | None) -> _Reading | None:
 
     An axis that moves too little keeps the sign of the others' rule (itself).
     """
+    dominance = 3.0  # The largest entry of a row over the next, for an axis to be identified.
     if fit is None:
         return None
     source, sign, gains, p_values = [0, 1, 2], [1, 1, 1], [], []
@@ -96,7 +95,7 @@ def read(fit: LaggedFit | None) -> _Reading | None:
         best = int(order[0])
         if fit.explained[j] < _LEAST_EXPLAINED or abs(row[best]) < _LEAST_T * sd[best]:
             continue
-        if abs(row[best]) < _DOMINANCE * abs(row[order[1]]):
+        if abs(row[best]) < dominance * abs(row[order[1]]):
             continue
         # Row j of M names the column of X that is true axis j.
         source[best], sign[best] = j, int(np.sign(row[best]))

@@ -36,20 +36,9 @@ from rotorid.recordings.sufficient import (
     whole_stretches,
 )
 
-_SHORTEST_EMPTY_S = 1.0
-"""Empty cells say themselves that nothing was read: a link that loses half a second now and then is no lost sensor."""
-_SHORTEST_STAND_S = 0.15
-_STANDING = 0.2
-"""A rotor below this share of what the others turn at, relative to its own habit, stands still."""
-_IMPLAUSIBLE_THRUST = 0.45
-"""A rotor that at its fastest gives less than this share of its part of the others' thrust is not being read."""
 _LARGEST_UNTOUCHED_SHARE = 0.5
 _LEAST_OF_A_SIDE = 0.5
 """Share of the fitted or held-out part of a single run in which every sensor must have readings."""
-_PLAIN_CHANGE = 8.0
-"""Times the noise by which a reading should have changed to be called held."""
-_PLAIN_STEPS = 2.0
-"""The same in steps of a coarse reading, which stands still until the load has changed by one."""
 
 
 @dataclass(frozen=True)
@@ -245,6 +234,8 @@ def load_went_on(run: Run, vehicle: Vehicle, reading: np.ndarray, held_mask: np.
 
     By its regression elsewhere on what drives it: the known load of a bench, on a stand thrusts and tilts.
     """
+    plain_change = 8.0  # Times the noise by which a reading should have changed to be called held.
+    plain_steps = 2.0  # The same in steps of a coarse reading, which stands still until the load has changed by one.
     families = (c.rotor_columns(f, vehicle.rotor_count) for f in ("rotor_speed", "rotor_command", "throttle"))
     rotors = next((n for n in families if n and run.has(*n)), ())
     drivers = [run.column(n) for n in c.REFERENCE_FORCE if run.has(n)]
@@ -263,7 +254,7 @@ def load_went_on(run: Run, vehicle: Vehicle, reading: np.ndarray, held_mask: np.
     step = float(steps[steps > 0].min()) if steps.any() else 0.0
     expected = x[inside] @ slopes
     off = np.abs(expected - reading[inside])
-    return bool(max(np.ptp(expected), np.nanmedian(off)) > max(_PLAIN_CHANGE * noise, _PLAIN_STEPS * step))
+    return bool(max(np.ptp(expected), np.nanmedian(off)) > max(plain_change * noise, plain_steps * step))
 
 
 def _as_dropouts(run: Run, name: str, kind: str, mask: np.ndarray, p_value: float = 0.0) -> list[_Dropout]:
@@ -283,13 +274,15 @@ def _as_dropouts(run: Run, name: str, kind: str, mask: np.ndarray, p_value: floa
 
 def missing(time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Mask of holes inside a column that are far longer than its own period."""
+    # Empty cells say themselves that nothing was read: a link that loses half a second now and then is no lost sensor.
+    shortest_empty_s = 1.0
     index = np.flatnonzero(np.isfinite(values))
     mask = np.zeros(len(values), bool)
     if len(index) < 10:
         return mask
     gap = np.diff(time_s[index])
     # The second shortest tenth of the recording's habit: a sensor with many holes keeps its own period.
-    longest = max(_SHORTEST_EMPTY_S, SHORTEST_GAP_PERIODS * float(np.median(gap)), 3 * float(np.quantile(gap, 0.98)))
+    longest = max(shortest_empty_s, SHORTEST_GAP_PERIODS * float(np.median(gap)), 3 * float(np.quantile(gap, 0.98)))
     for k in np.flatnonzero(gap > longest):
         mask[index[k] + 1 : index[k + 1]] = True
     return mask
@@ -297,6 +290,10 @@ def missing(time_s: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 def standing_rotors(run: Run, vehicle: Vehicle, names: tuple[str, ...]) -> dict[str, np.ndarray]:
     """Column to mask of samples in which a rotor reads (near) zero while the others carry the vehicle."""
+    shortest_stand_s = 0.15
+    standing = 0.2  # A rotor below this share of what the others turn at, relative to its own habit, stands still.
+    # A rotor that at its fastest gives less than this share of its part of the others' thrust is not being read.
+    implausible_thrust = 0.45
     speed = run.array(names)
     out = {}
     usual = np.array([np.quantile(v[v > 0], 0.75) if (v > 0).any() else np.nan for v in speed.T])
@@ -313,14 +310,14 @@ def standing_rotors(run: Run, vehicle: Vehicle, names: tuple[str, ...]) -> dict[
             continue
         read = speed[flying][:, np.isfinite(speed[flying]).any(axis=0)]
         thrust = np.nanquantile(speed[flying, i], 0.98) ** 2 / max(np.nanmedian(read, axis=0).max() ** 2, 1e-9)
-        if thrust < _IMPLAUSIBLE_THRUST and _balanced(vehicle, i):
+        if thrust < implausible_thrust and _balanced(vehicle, i):
             out[name] = np.isfinite(speed[:, i])
             continue
-        zero = flying & (speed[:, i] < _STANDING * top)
+        zero = flying & (speed[:, i] < standing * top)
         sudden = np.zeros(len(zero), bool)
         for start, stop in stretches(zero):
             # A saturated motor may truly stand for a moment.
-            if run.time_s[stop - 1] - run.time_s[start] < _SHORTEST_STAND_S:
+            if run.time_s[stop - 1] - run.time_s[start] < shortest_stand_s:
                 continue
             # A rotor cannot stop and start within a sample or two: look at its readings just outside.
             near = np.concatenate([speed[max(start - 2, 0) : start, i], speed[stop : stop + 2, i]])

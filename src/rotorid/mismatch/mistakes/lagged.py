@@ -33,13 +33,9 @@ BANDS_HZ = {
     "following": (0.5, 15.0),
 }
 """Of each comparison the frequencies that are looked at."""
-_NYQUIST_SHARE = 0.35
-"""Highest frequency used, as a share of the slower sensor's own rate."""
 BLOCK_S = 2.56
 _OVERSAMPLING = 5.0
 """Rate of the thinned signals over the cutoff."""
-_PERFECTION = 1e-3
-"""Share of an output's own power that is always taken as noise: files hold columns computed from each other."""
 _SMOOTHED = 5
 """Neighbouring frequencies over which powers are averaged."""
 OVERLAP = 1.94
@@ -172,8 +168,10 @@ class LaggedFit:
 
 def _noise_weight(blocks: Blocks, left: np.ndarray) -> np.ndarray:
     """1 / power of a residual (b, m, q), with a floor, (q, m)."""
+    # Share of an output's own power that is always taken as noise: files hold columns computed from each other.
+    perfection = 1e-3
     power, own = (_smooth(np.mean(np.abs(v) ** 2, axis=0)).T for v in (left, blocks.y))
-    return 1.0 / (power + _PERFECTION * own + 1e-30)
+    return 1.0 / (power + perfection * own + 1e-30)
 
 
 def _coherence(blocks: Blocks) -> np.ndarray:
@@ -373,8 +371,9 @@ def squared_speeds(signals: Signals, vehicle: Vehicle, sensor: str) -> np.ndarra
 
 def _band(all_signals: list[Signals], sensors: tuple[str, ...], wanted: tuple[float, float]) -> tuple[float, float]:
     """A band that the slowest of some sensors can follow in every run."""
+    nyquist_share = 0.35  # Highest frequency used, as a share of the slower sensor's own rate.
     rates = [s.own_rate_hz[n] for s in all_signals for n in sensors if n in s.values and s.own_rate_hz[n] > 0]
-    return wanted[0], min(wanted[1], _NYQUIST_SHARE * min(rates, default=0.0))
+    return wanted[0], min(wanted[1], nyquist_share * min(rates, default=0.0))
 
 
 def gather(all_signals: list[Signals], sensors: tuple[str, ...], wanted: tuple[float, float], make) -> Blocks | None:

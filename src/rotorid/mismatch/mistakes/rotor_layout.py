@@ -46,24 +46,18 @@ from rotorid.recordings.run import Doubt
 _MOST_ROTORS_FOR_EVERY_ORDER = 6
 _LEAST_LIKELIHOOD = 25.0
 """Log-likelihood that the right layout must bring over none, and over the believed one."""
-_LEAST_ADVANTAGE = 1.5
-"""What the right layout explains over what the believed one explains, at least."""
 _LEAST_STEP = 0.6
 _P_LIMIT = 1e-6
 _P_HELD_OUT = 0.01
 """Chance of a layout on the runs held out alone, its gains from the others."""
 _STEP_S, _PAST_STEPS = 0.016, 12
 """Length of the intervals over which rates and torques are averaged, and how many of them foretell the next rate."""
-_LEAST_LIFT = 0.6
-"""Share of the specific force along the rotors' axis that they must explain to show by it how late their stamps are."""
 _MOTORS_S = (0.0, 0.02, 0.05, 0.1)
 _LEAST_FORETOLD, _LEAST_FORETOLD_IN_PART = 3.5, 0.5
 """Standard errors by which past torques must improve what past rates foretell: in all runs; in those held out, and in
 the others."""
 _LATER_S = np.arange(0.005, 0.1001, 0.005)
 """By how much longer the torque of rotors may lag behind their commands than the delay that roll shows."""
-_TIED_LIKELIHOOD, _TIED_SHARE = 12.0, 0.02
-"""Layouts within this log-likelihood, or this share of what is explained, are not distinguished."""
 
 
 @dataclass(frozen=True)
@@ -142,7 +136,9 @@ def _loss(m: _Moments, row: np.ndarray) -> float:
 
 def _tie(whole: float, best: float) -> float:
     """Largest loss that still counts as the best."""
-    return best + max(OVERLAP * _TIED_LIKELIHOOD, _TIED_SHARE * (whole - best))
+    # Layouts within this log-likelihood, or this share of what is explained, are not distinguished.
+    tied_likelihood, tied_share = 12.0, 0.02
+    return best + max(OVERLAP * tied_likelihood, tied_share * (whole - best))
 
 
 def _losses_of_orders(m: list[_Moments], rows: np.ndarray, orders: np.ndarray) -> np.ndarray:
@@ -199,6 +195,7 @@ def find(recordings: ReadSet, by_yaw: bool = True) -> Corrected:
 
     Without `by_yaw` the order by roll and pitch alone.
     """
+    least_advantage = 1.5  # What the right layout explains over what the believed one explains, at least.
     vehicle = recordings.vehicle
     if not 3 <= vehicle.rotor_count <= 8:
         return Corrected(recordings)
@@ -251,7 +248,7 @@ def find(recordings: ReadSet, by_yaw: bool = True) -> Corrected:
     p_value = min(1.0, p_value * losses.size)
     disputed = float(sum(m.square.sum() for m in seen))
     likely = (as_believed - best) / OVERLAP > _LEAST_LIKELIHOOD
-    explains = disputed - best > _LEAST_ADVANTAGE * (disputed - as_believed)
+    explains = disputed - best > least_advantage * (disputed - as_believed)
     if not (likely and explains and step > _LEAST_STEP and p_value < _P_LIMIT):
         return Corrected(recordings)
     if order and _fits_early(blocks, free, rows) < least - yaw_losses.min() - OVERLAP * _LEAST_LIKELIHOOD:
@@ -386,8 +383,10 @@ def _yaw_axis(signals: list[Signals], vehicle: Vehicle, sensor: str, roll: Lagge
 
 def _late_stamps(signals: list[Signals], vehicle: Vehicle, sensor: str) -> float:
     """By how much the rotors' stamps are late, s, where the force that they carry shows it: the lift has one sign."""
+    # Share of the specific force along the rotors' axis that they must explain to show by it how late their stamps are.
+    least_lift = 0.6
     lift = lagged.fit(lagged.lifting(signals, vehicle, sensor))
-    known = lift is not None and lift.explained[0] > _LEAST_LIFT and lift.gain[0, 0] > 0
+    known = lift is not None and lift.explained[0] > least_lift and lift.gain[0, 0] > 0
     return max(0.0, -lift.lag_s - 2 * lift.lag_sd) if known else 0.0
 
 

@@ -20,8 +20,6 @@ from rotorid.mismatch.evidence.motion import (
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
 
-_LEAST_V = 0.5
-"""No battery that turns a rotor has less."""
 COMMANDED = ("commands", "throttle")
 """Sensors that are what was asked of the rotors, not what was measured."""
 P_LIMIT = 1e-9
@@ -168,18 +166,19 @@ class Corrected:
 
 def connected(recordings: RecordingSet) -> Corrected:
     """The set without voltages that no battery has, and a note for every run whose voltmeter read mostly such."""
+    least_v = 0.5  # No battery that turns a rotor has less.
     notes = []
 
     def change(run: Run):
         if not run.has(c.BATTERY_VOLTAGE):
             return {}
         voltage = run.table[c.BATTERY_VOLTAGE]
-        dead = voltage < _LEAST_V
+        dead = voltage < least_v
         if not dead.any():
             return {}
         mostly = dead.sum() > voltage.notna().sum() / 2
         if mostly:
-            notes.append(f"{c.BATTERY_VOLTAGE} of {run.name} reads below {_LEAST_V} V: taken as not connected.")
+            notes.append(f"{c.BATTERY_VOLTAGE} of {run.name} reads below {least_v} V: taken as not connected.")
         return {c.BATTERY_VOLTAGE: np.nan if mostly else voltage.mask(dead)}
 
     return Corrected(replace_columns(recordings, change), notes=tuple(notes))

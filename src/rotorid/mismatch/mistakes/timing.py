@@ -40,22 +40,13 @@ from rotorid.mismatch.mistakes.signals import (
 )
 from rotorid.recordings import Run, Vehicle
 
-_LEAST_ALONE = 0.9
-"""Share of the motion that commands must explain to show a constant lateness: below it the motors' lag, fitted later,
-shows their dead time better. A growth of it is bounded by what disturbances can feign (`_disturbed_s`)."""
 _LEAST_SHARE = 0.1
 """A sensor that moves a comparison's lateness by less than this share of its own is not connected by it."""
-_SHARE_STEP_S = 0.004
-"""By how much a sensor is made late to see how far a comparison's lateness follows."""
 _LEAST_EXPLAINED = 0.6
 _P_LIMIT, _P_LATE = 1e-6, 1e-4
 """Chance of a growth of lateness, and of a constant one beyond a sample; both have to bring LEAST_LIKELIHOOD too."""
 _LEAST_LIKELIHOOD = 60.0
 """Rise of the log-likelihood that a delay, or its growth, must bring."""
-_MOTOR_FORM = 0.15
-"""A dead time up to this share of a motor's lag is the lag's form (no motor is exactly first order)."""
-_MOTOR_SLOWS_PER_S = 0.1 / 30.0
-"""Share of itself by which a motor's lag grows in a second: no battery loses a tenth of its voltage within 30 s."""
 _FILTER_SAMPLES, _FILTER_S = 2.6, 0.008
 """One inertial sensor, or the commands, alone off by less than both is a filter or a controller, not a logger."""
 _SMALL_LAGS = {
@@ -66,8 +57,6 @@ _SMALL_LAGS = {
 }
 _RUN_AGREEMENT, _RUN_SIGMAS = 0.1, 3.0
 """Share of a drift, and one-sigmas of its own, that a run's drift may be off all runs'."""
-_AS_WELL = 9.0
-"""Squared standard errors within which two explanations of all growths are as good."""
 _LARGEST_SKEW = 1.2e-2
 _LONGEST_DRIFT_S = 0.4
 _COARSE_SKEWS = 6
@@ -76,10 +65,6 @@ _LAG_STEP_S = 0.001
 _LATE_FLOOR_S = 2e-5
 _BAND_STEP, _LEAST_BAND = 1.5, 5.0
 """Ratio of the bands that are tried, and of the narrowest's ends (0.4 to 2 Hz)."""
-_LEAST_GAIN = 0.97
-"""Gain between two readings of one quantity, over that at the lowest frequencies, below which noise decides."""
-_SCALES = (0.85, 1.25)
-"""Gain at the lowest frequencies that may be a sensor's scale (a filter's velocity of a fast flight: 1.15)."""
 
 
 @dataclass(frozen=True)
@@ -142,12 +127,16 @@ class _LatenessFound:
         must show in every run, and what other disturbances feign in each of them has a mean that is smaller by the root
         of their number.
         """
+        # A dead time up to this share of a motor's lag is the lag's form (no motor is exactly first order).
+        motor_form = 0.15
+        # Share of itself by which a motor's lag grows in a second: no battery loses a tenth of its voltage within 30 s.
+        motor_slows_per_s = 0.1 / 30.0
         if key == 0:
-            return max(self.bias_s, _MOTOR_FORM * self.of.motor_s)
+            return max(self.bias_s, motor_form * self.of.motor_s)
         blocks = self.of.blocks
         longest_s = float(blocks.time_s.max()) + lagged.BLOCK_S / 2
         disturbed = 2 * self.bias_s / np.sqrt(len(np.unique(blocks.run))) / longest_s
-        return max(disturbed, _MOTOR_SLOWS_PER_S * self.of.motor_s)
+        return max(disturbed, motor_slows_per_s * self.of.motor_s)
 
 
 def find(recordings: ReadSet) -> Corrected:
@@ -212,6 +201,10 @@ def one_quantity(blocks: Blocks, own: Sequence[int]) -> Blocks | None:
     decides, and the lateness with it: a vibration seen through aliasing is in an autopilot's estimate of the velocity,
     too, with a phase of its own. `own` says which column of X is the same quantity as each output.
     """
+    # Gain between two readings of one quantity, over that at the lowest frequencies, below which noise decides.
+    least_gain = 0.97
+    # Gain at the lowest frequencies that may be a sensor's scale (a filter's velocity of a fast flight: 1.15).
+    scales = (0.85, 1.25)
     lowest, top = blocks.frequency_hz[0], blocks.frequency_hz[-1]
     tops = top / _BAND_STEP ** np.arange(1 + int(np.log(top / (_LEAST_BAND * lowest)) / np.log(_BAND_STEP)))
     bands = [b for b in (blocks.up_to(f) for f in tops) if b.frequency_hz.size > 1]
@@ -221,9 +214,9 @@ def one_quantity(blocks: Blocks, own: Sequence[int]) -> Blocks | None:
         if found is None:
             return blocks
         gains.append(float(np.mean(found.gain[range(len(own)), own])))
-    if not gains or not _SCALES[0] < gains[-1] < _SCALES[1]:
+    if not gains or not scales[0] < gains[-1] < scales[1]:
         return None
-    return next(b for b, gain in zip(bands, gains, strict=True) if gain > _LEAST_GAIN * gains[-1])
+    return next(b for b, gain in zip(bands, gains, strict=True) if gain > least_gain * gains[-1])
 
 
 def _shares_of(
@@ -234,7 +227,8 @@ def _shares_of(
     In gentle flight level motion follows the tilt; in a fast one the force itself changes more. Both late together move
     the velocity's lateness by all of it, so that the shares sum to one.
     """
-    steps = max(1, round(_SHARE_STEP_S * all_signals[0].rate_hz))
+    share_step_s = 0.004  # By how much a sensor is made late to see how far a comparison's lateness follows.
+    steps = max(1, round(share_step_s * all_signals[0].rate_hz))
     moved = [_late(s, "attitude", steps) for s in all_signals]
     blocks = accelerating(moved, vehicle, source)
     again = lagged.fit(blocks.outputs(outputs)) if blocks is not None else None
@@ -350,7 +344,10 @@ def _waves(frequency_hz: tuple[float, ...], first_s: float, count: int) -> tuple
 
 def differences(known: list[_SensorPair], drifting: bool) -> list[_LatenessFound]:
     """Every difference of lateness that a comparison is good enough to show."""
-    least = dict.fromkeys(COMMANDED, _LEAST_EXPLAINED if drifting else _LEAST_ALONE)
+    # Share of the motion that commands must explain to show a constant lateness: below it the motors' lag, fitted
+    # later, shows their dead time better. A growth of it is bounded by what disturbances can feign (`_disturbed_s`).
+    least_alone = 0.9
+    least = dict.fromkeys(COMMANDED, _LEAST_EXPLAINED if drifting else least_alone)
     found = [_difference(c, drifting) for c in known]
     return [d for d in found if d.explained > least.get(d.of.over, _LEAST_EXPLAINED)]
 
@@ -571,6 +568,7 @@ def _one_clock(differences: list[_LatenessFound], growing: list[_LatenessFound])
     Candidates are the two sides of the comparisons with a significant growth. Nothing but height rests on the
     position, so that it is none of them.
     """
+    as_well = 9.0  # Squared standard errors within which two explanations of all growths are as good.
     names = {n for d in growing for n in d.of.sensors} - {"position"}
     left = {}
     for name in names:
@@ -579,7 +577,7 @@ def _one_clock(differences: list[_LatenessFound], growing: list[_LatenessFound])
             (d.growth - d.of.part([name]) * rate) ** 2 / (d.sd(1) ** 2 + d.bound(1) ** 2) for d in differences
         )
     trusted = {n: _PREFERRED.index(n) if n in _PREFERRED else len(_PREFERRED) for n in names}
-    alike = [n for n in names if left[n] < min(left.values()) + _AS_WELL]
+    alike = [n for n in names if left[n] < min(left.values()) + as_well]
     return tuple(sorted(alike, key=lambda n: (-trusted[n], n)))
 
 

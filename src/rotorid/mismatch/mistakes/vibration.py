@@ -26,18 +26,8 @@ _SIDE_BINS = (-6, -5, -4, -3, 3, 4, 5, 6)
 _ORDERS = (1, 2)
 _LEAST_MEDIAN = 3.0
 """Power at the order over that next to it in half of the windows, at least."""
-_LEAST_AMPLITUDE = 0.5
-"""Line over the reading's own scatter next to it (one sigma a sample), at least, to matter."""
 _SCALES = np.arange(0.85, 1.151, 0.015)
 """Factors on a commanded speed that are tried: the window distinguishes speeds of 18 rad/s."""
-_COMMAND_LAG_S = 0.03
-"""How late rotors follow their commands, roughly."""
-_MOST_WINDOWS = 30
-"""Windows of a run that the factor is found from."""
-_MOST_MEASURED = 1000
-"""Windows of a run, spread over it, that a line is measured from."""
-_LOWEST_HZ = 8.0
-"""Aliases below this fall among the flight's own motion and are left out."""
 
 
 @dataclass(frozen=True)
@@ -71,8 +61,10 @@ class _Line:
 
 def find(recordings: ReadSet) -> Corrected:
     """A vibration that follows the rotors, if there is a clear one; the set stays as it is."""
+    least_amplitude = 0.5  # Line over the reading's own scatter next to it (one sigma a sample), at least, to matter.
+    most_measured = 1000  # Windows of a run, spread over it, that a line is measured from.
     signals = _turning(recordings)
-    turns = {order: [_turns(s, order, _MOST_MEASURED) for s in signals] for order in _ORDERS}
+    turns = {order: [_turns(s, order, most_measured) for s in signals] for order in _ORDERS}
     lines = []
     for sensor, columns, unit in (
         ("accelerometer", c.SPECIFIC_FORCE, "m/s2"),
@@ -83,7 +75,7 @@ def find(recordings: ReadSet) -> Corrected:
             for order in _ORDERS:
                 seen = [(signals[k].values[sensor][:, axis], turns[order][k]) for k in have]
                 line = _measure(seen, column, unit, order)
-                if line and line.p_value < P_LIMIT and line.over_noise > _LEAST_AMPLITUDE:
+                if line and line.p_value < P_LIMIT and line.over_noise > least_amplitude:
                     lines.append(line)
     if not lines:
         return Corrected(recordings)
@@ -124,22 +116,24 @@ def _turning(recordings: ReadSet) -> list[Signals]:
 
 def _as_commanded(s: Signals, full_rad_s: float | None) -> np.ndarray | None:
     """Speeds (n, k) of rotors that turn as commanded, COMMAND_LAG_S late; None without commands."""
+    command_lag_s = 0.03  # How late rotors follow their commands, roughly.
     if "commands" in s.values:
         speed = s.values["commands"]
     elif "throttle" in s.values and full_rad_s is not None:
         speed = full_rad_s * s.values["throttle"]
     else:
         return None
-    keep = np.exp(-1.0 / (s.rate_hz * _COMMAND_LAG_S))
+    keep = np.exp(-1.0 / (s.rate_hz * command_lag_s))
     start = np.nan_to_num(speed[:1]) * keep
     return lfilter([1.0 - keep], [1.0, -keep], np.nan_to_num(speed), axis=0, zi=start)[0]
 
 
 def _strongest_line(signals: list[Signals]) -> float:
     """Power at the order over that next to it, in half of the windows, of the accelerometer's clearest line."""
+    most_windows = 30  # Windows of a run that the factor is found from.
     best = 0.0
     for order in _ORDERS:
-        seen = [(s, _turns(s, order, _MOST_WINDOWS)) for s in signals if "accelerometer" in s.values]
+        seen = [(s, _turns(s, order, most_windows)) for s in signals if "accelerometer" in s.values]
         for axis in range(3):
             powers = [_powers(s.values["accelerometer"][:, axis], own) for s, own in seen if own is not None]
             found = np.concatenate([(line / beside).ravel() for line, beside, _ in powers] or [np.zeros(0)])
@@ -191,6 +185,7 @@ def _tapered(length: int) -> np.ndarray:
 
 def _turns(s: Signals, order: int, most: int) -> _Turns | None:
     """The rotors of a run at an order, in no more than `most` windows spread over it; None of too few samples."""
+    lowest_hz = 8.0  # Aliases below this fall among the flight's own motion and are left out.
     length, speed, dt = int(_WINDOW_S * s.rate_hz), s.values["rotors"], 1.0 / s.rate_hz
     if length < 24:
         return None
@@ -203,7 +198,7 @@ def _turns(s: Signals, order: int, most: int) -> _Turns | None:
     steps[:, 0] = 0.0
     follow = np.exp(-1j * np.cumsum(steps, axis=1))
     turned = np.abs((order * speed.mean(axis=1) * dt + np.pi) % (2 * np.pi) - np.pi)
-    clear = turned / (2 * np.pi * dt) > _LOWEST_HZ + 6 / _WINDOW_S
+    clear = turned / (2 * np.pi * dt) > lowest_hz + 6 / _WINDOW_S
     # Rotors of nearly one speed add to each other's line, with phases that wander: their powers add.
     together = np.matmul((_tapered(length)[:, None] * follow.conj()).transpose(0, 2, 1), follow) / length
     return _Turns(windows, length, follow, clear, np.sum(np.abs(together) ** 2, axis=2))

@@ -9,7 +9,7 @@ pocket calculator gets the same word.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from scipy.stats import f
@@ -20,11 +20,10 @@ from rotorid.mismatch.decide.status import CLAIMED
 if TYPE_CHECKING:
     from rotorid.mismatch.tell.verdict import Channel, Errors, Location
 
+VerdictWord = Literal["no_mismatch", "explained", "partly_explained", "unexplained", "not_judged"]
 EXPLAINED_SHARE = 0.15
 """Up to this share of the mismatch's energy may be left for the word `explained`; from all but this share on the
 findings are said to explain nothing that matters."""
-_PLAINLY_OFF = 1.5
-"""Error of a force or moment in units of its noise floor, from which it is a mismatch, wherever it is."""
 _CHANCE, _BEYOND_CHANCE = 0.001, 1.2
 """Probability of a ratio of two root mean squares by chance, and how far beyond such a ratio an error must be."""
 
@@ -59,7 +58,7 @@ MOST_OFF = 0.2
 
 def verdict_word(
     analysis: Analysis, locations: Sequence[Location], left: float, channels: Mapping[str, Channel]
-) -> str:
+) -> VerdictWord:
     """One of the four words, from what was found, the share that is left, and the errors of the channels.
 
     Nothing is explained while a force stays off by more than a fifth of the weight.
@@ -94,7 +93,8 @@ def _by_chance(samples: int) -> float:
 
 def _plainly_off(samples: int) -> float:
     """Error in units of the noise floor from which a channel is off, where both come of so few samples."""
-    return max(_PLAINLY_OFF, _BEYOND_CHANCE * _by_chance(samples))
+    plainly_off = 1.5
+    return max(plainly_off, _BEYOND_CHANCE * _by_chance(samples))
 
 
 def missing_places(

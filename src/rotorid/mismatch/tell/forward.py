@@ -31,9 +31,6 @@ from rotorid.mismatch.tell.verdict import Channel, Errors, PValues, SplitErrors,
 from rotorid.steps import step
 from rotorid.vehicle.windows import States
 
-_SAME = 1e-5
-"""Relative difference above which a vehicle read back is not the model written (errors are stated to six digits)."""
-
 
 @step("running the simulation forward")
 def forward_channels(analysis: Analysis) -> tuple[dict[str, Channel], tuple[str, ...]]:
@@ -92,6 +89,8 @@ def prove(analysis: Analysis, reloaded: Model, channels: Mapping[str, Channel], 
 
     `channels` and `notes` are those of `forward_channels`.
     """
+    # Relative difference above which a vehicle read back is not the model written (errors are stated to six digits).
+    same = 1e-5
     segments = _segments(analysis)
     if not channels or not segments or any("leaves out" in note for note in notes):
         return
@@ -100,7 +99,7 @@ def prove(analysis: Analysis, reloaded: Model, channels: Mapping[str, Channel], 
         for sign, stated in ((1, channel.rmse.training.after), (-1, channel.rmse.held_out.after)):
             found = _rms(errors, name, part, sign)
             unknown = found is None or stated is None
-            if not (found is stated if unknown else abs(found - stated) <= _SAME * abs(stated) + 1e-12):
+            if not (found is stated if unknown else abs(found - stated) <= same * abs(stated) + 1e-12):
                 raise RuntimeError(
                     f"improved_vehicle.yaml read back gives an error of {found} in {name}, the model gave {stated}"
                 )

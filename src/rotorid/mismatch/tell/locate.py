@@ -37,14 +37,6 @@ from rotorid.mismatch.mistakes.signals import channel_of
 from rotorid.mismatch.tell.verdict import Location, Regime
 from rotorid.recordings.signal.kernels import causal
 
-_FAMILY_ERROR = 0.002
-"""Chance of any false interval in a whole set."""
-_SCAN_ERROR = 1e-4
-"""The same for the scan of what is left; smaller, because the tails of real noise are heavier than assumed."""
-_LOCAL_S = 0.1
-"""Length over which the local size of an explained mismatch is taken."""
-_MATTERS = 0.3
-"""Local size relative to the channel's noise from which an explained mismatch matters at all."""
 _ON_SHARE_OF_PEAK = 0.2
 _ON_SHARE_OF_NOISE = 0.15
 _LOST_AT_ENDS_S = 1.0
@@ -61,28 +53,13 @@ _AT_WORK = 0.03
 _SCAN_S = (0.5, 1.0, 2.0, 4.0)
 _LARGER = 4.0
 """Energy of a window over the usual, below which noise of higher variance is not called a mismatch."""
-_MOVES_S = 0.2
-"""Lags over which larger residuals may follow each other."""
-_FIRST_LAGS = 4
-_MOVES_Z = 4.0
-"""Standard errors (Fisher's transform) by which larger residuals must follow each other otherwise than usual."""
-_WILD = 4.0
-"""Whitened residual beyond which a single sample counts no more."""
 _SHIFTED = 0.4
 """Mean of a window relative to the residual's usual size, below which a shift does not matter."""
-_HELD_BACK = 3.0
-"""Energy of a block over the noise expected there, beyond which it does not count as noise in full."""
 REGIME_BLOCK_S = 0.5
 _REGIME_BINS = 8
 _REGIME_P = 1e-3
 _EITHER_SIGN = 0.1
 """Share of the flight that a variable must be on the rarer side of zero for its magnitude to be tried."""
-_BETTER_BY_MAGNITUDE = 1.1
-"""How much better than the variable itself its magnitude must separate."""
-_CONTRAST = 2.0
-"""Energy of the strongest bin over the weakest, below which a variable does not separate anything."""
-_EXCESS_SHARE = 0.25
-"""Bins with at least this share of the largest excess belong to the regime."""
 
 
 @dataclass(frozen=True)
@@ -254,10 +231,11 @@ def _share_at_work(contributions: Mapping[str, tuple[Sequence[ChannelTrace], Seq
 
 def _acting(traces: Sequence[ChannelTrace], series: Sequence[np.ndarray]) -> list[np.ndarray] | None:
     """Masks of where a contribution to a channel matters relative to its noise; None where it never does."""
+    matters = 0.3  # Local size relative to the channel's noise from which an explained mismatch matters at all.
     noise = _channel_noise(traces)
     levels = [_local_size(x, _period(t)) for x, t in zip(series, traces, strict=True)]
     peak = float(np.quantile(np.concatenate(levels), 0.99))
-    if not peak > _MATTERS * noise:
+    if not peak > matters * noise:
         return None
     threshold = max(_ON_SHARE_OF_PEAK * peak, _ON_SHARE_OF_NOISE * noise)
     masks = [_closed(level > threshold, _period(t)) for level, t in zip(levels, traces, strict=True)]
@@ -268,6 +246,7 @@ def _acting(traces: Sequence[ChannelTrace], series: Sequence[np.ndarray]) -> lis
 
 def _tested(traces: Sequence[ChannelTrace], masks: Sequence[np.ndarray], count: int) -> list[_Interval]:
     """Intervals of the masks in which the residual before is larger than coloured noise allows."""
+    family_error = 0.002  # Chance of any false interval in a whole set.
     noise, freedom = _channel_noise(traces), _freedom_per_sample(traces)
     found = []
     for trace, mask in zip(traces, masks, strict=True):
@@ -275,14 +254,15 @@ def _tested(traces: Sequence[ChannelTrace], masks: Sequence[np.ndarray], count: 
         spans = [(a, b) for a, b in stretches(mask) if energy[b] - energy[a] >= _SMALLEST_SHARE * energy[-1]]
         for start, stop in spans:
             p = _energy_p(trace.before[start:stop], noise, freedom)
-            if p < _FAMILY_ERROR / max(len(spans) * count, 1):
+            if p < family_error / max(len(spans) * count, 1):
                 found.append(_Interval(trace, start, stop, p, True))
     return found
 
 
 def _local_size(values: np.ndarray, period_s: float) -> np.ndarray:
     """Local root mean square, (n,)."""
-    return np.sqrt(_moving_mean(np.nan_to_num(values) ** 2, _LOCAL_S / period_s))
+    local_s = 0.1  # Length over which the local size of an explained mismatch is taken.
+    return np.sqrt(_moving_mean(np.nan_to_num(values) ** 2, local_s / period_s))
 
 
 def _moving_mean(values: np.ndarray, width: float) -> np.ndarray:
@@ -326,18 +306,21 @@ def _energy_p(values: np.ndarray, noise: float, freedom: float) -> float:
 
 def _unexplained(analysis: Analysis, segments: list[Segment]) -> list[_Interval]:
     """Stretches in which the residual after the effects is larger or shifted."""
+    # The same for the scan of what is left; smaller, because the tails of real noise are heavier than assumed.
+    scan_error = 1e-4
+    wild = 4.0  # Whitened residual beyond which a single sample counts no more.
     channels = _long_enough(analysis)
     windows = sum(
         2 * len(_window_starts(len(t.named), length)) for ts in channels.values() for t in ts for length in _lengths(t)
     )
-    limit = _SCAN_ERROR / max(windows, 1)
+    limit = scan_error / max(windows, 1)
     found, hard = [], effort(segments)
     for traces in channels.values():
         parts = [np.nan_to_num(t.named) for t in traces]
         taps = autoregression(parts)
         white = [causal(taps, p) for p in parts]
         # One or two wild samples are a glitch; a mismatch lasts.
-        white = [np.clip(w, -_WILD, _WILD) for w in _evened(traces, white, hard)]
+        white = [np.clip(w, -wild, wild) for w in _evened(traces, white, hard)]
         for w in white:
             w[: len(taps)] = 0.0
         found += _louder(traces, white, limit) + _shifted(traces, white, parts, limit)
@@ -386,6 +369,7 @@ def _evened(traces: Sequence[ChannelTrace], white: list[np.ndarray], hard) -> li
     The energy of half-second blocks is fitted by non-negative least squares on the effort, twice, blocks far above
     the fit held back to it, so that a mismatch that comes and goes does not count as noise.
     """
+    held_back = 3.0  # Energy of a block over the noise expected there, beyond which it does not count as noise in full.
     energies, efforts, lengths = [], [], []
     unknown = np.zeros(1), np.zeros((1, next((s.shape[1] for _, s in hard.values()), 0)))
     for trace, w in zip(traces, white, strict=True):
@@ -401,7 +385,7 @@ def _evened(traces: Sequence[ChannelTrace], white: list[np.ndarray], hard) -> li
     usual = np.full(len(y), max(float(np.median(y)), 1e-300))
     for _ in range(3):
         weight = 1.0 / usual
-        coefficients, _ = nnls(x / scale * weight[:, None], np.minimum(y, _HELD_BACK * usual) * weight)
+        coefficients, _ = nnls(x / scale * weight[:, None], np.minimum(y, held_back * usual) * weight)
         usual = np.maximum(x / scale @ coefficients, 1e-3 * float(np.median(y)) + 1e-300)
     floor = 1e-3 * float(np.median(y)) + 1e-300
     return [w / np.sqrt(np.maximum(e / scale @ coefficients, floor)) for w, e in zip(white, efforts, strict=True)]
@@ -444,6 +428,7 @@ def _nearby(trace: ChannelTrace, start: int, stop: int) -> slice:
 
 def _louder(traces, white, limit) -> list[_Interval]:
     """Windows with more energy than the spread of the windows' energies allows."""
+    moves_s = 0.2  # Lags over which larger residuals may follow each other.
     hits = []
     for length in _lengths(min(traces, key=lambda t: len(t.named))):
         means = [_window_sums(w**2, length) / length for w in white]
@@ -461,7 +446,7 @@ def _louder(traces, white, limit) -> list[_Interval]:
         variance = max(float(np.mean(w[start:stop] ** 2)), 1.2)
         likelihood = -0.5 * np.log(variance) + 0.5 * w[here] ** 2 * (1.0 - 1.0 / variance)
         first, last = (here.start + edge for edge in _best_segment(likelihood))
-        if _moves(w[first:last], w, int(_MOVES_S / _period(trace))):
+        if _moves(w[first:last], w, int(moves_s / _period(trace))):
             out.append(_Interval(trace, first, last, p, False))
     return out
 
@@ -473,11 +458,14 @@ def _moves(part: np.ndarray, whole: np.ndarray, most: int) -> bool:
     What bodies and air do lasts longer than a sample; a sensor that is shaken or badly received has a higher variance,
     no more. Decided by the correlations at one of the first lags, or at all up to `most` together.
     """
+    first_lags = 4
+    # Standard errors (Fisher's transform) by which larger residuals must follow each other otherwise than usual.
+    moves_z = 4.0
     count = len(part)
     lags = np.arange(1, min(most, count - 5) + 1)
     usual, here = (np.array([_correlation(x, lag) for lag in lags]).clip(-0.999, 0.999) for x in (whole, part))
     sure = (np.arctanh(here) - np.arctanh(usual)) * np.sqrt(count - lags - 3)
-    return len(lags) > 0 and max(np.abs(sure[:_FIRST_LAGS]).max(), abs(sure.sum()) / np.sqrt(len(lags))) > _MOVES_Z
+    return len(lags) > 0 and max(np.abs(sure[:first_lags]).max(), abs(sure.sum()) / np.sqrt(len(lags))) > moves_z
 
 
 def _correlation(values: np.ndarray, lag: int) -> float:
@@ -538,6 +526,7 @@ def _regime_of(analysis: Analysis, channel: str, explained: bool) -> Regime | No
     separation counts the part of the mismatch that the range holds, so that one side of zero does not stand for both.
     Time is chosen only where nothing else separates half as well.
     """
+    better_by_magnitude = 1.1  # How much better than the variable itself its magnitude must separate.
     traces = [t for t in analysis.traces if t.channel == channel]
     if not traces:
         return None
@@ -560,7 +549,7 @@ def _regime_of(analysis: Analysis, channel: str, explained: bool) -> Regime | No
             found = _separation(energy, values)
             if found is not None and found[1] < _REGIME_P / len(names):
                 share, _, low, high, held = found
-                weight = 0.5 if name == "time_s" else 1.0 / _BETTER_BY_MAGNITUDE if either_sign else 1.0
+                weight = 0.5 if name == "time_s" else 1.0 / better_by_magnitude if either_sign else 1.0
                 scored.append((share * held * weight, name, low, high, either_sign))
     if not scored:
         return None
@@ -572,6 +561,8 @@ def _separation(energy: np.ndarray, value: np.ndarray) -> tuple[float, float, fl
     """Share of variance between bins, its p-value, the range of the bins in which the energy lies, and the part of
     the energy above the quietest bin's that lies there.
     """
+    contrast = 2.0  # Energy of the strongest bin over the weakest, below which a variable does not separate anything.
+    excess_share = 0.25  # Bins with at least this share of the largest excess belong to the regime.
     good = np.isfinite(value) & np.isfinite(energy)
     energy, value = energy[good], value[good]
     # A load turned into other axes is 1e-17 where it should be nothing: two bins of nothing, and no words for either.
@@ -591,9 +582,9 @@ def _separation(energy: np.ndarray, value: np.ndarray) -> tuple[float, float, fl
     p = f.sf(between / between_free / max(within / within_free, 1e-300), between_free, within_free)
     means = np.array([energy[which == b].mean() for b in bins])
     floor = means.min()
-    if means.max() <= _CONTRAST * floor:
+    if means.max() <= contrast * floor:
         return None
-    inside = means - floor >= _EXCESS_SHARE * (means.max() - floor)
+    inside = means - floor >= excess_share * (means.max() - floor)
     first = last = int(np.argmax(means))
     while first > 0 and inside[first - 1]:
         first -= 1

@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 MOST_WORDS = 40
 _NEARLY_ALL = 0.99
 """Share that stays unexplained from which the causes named explain next to nothing."""
-_MOST_LIMITS = 3
-"""Effects that were not found and are named with their limit; more are counted."""
 MOST_NAMES = 2
 """Effects or values that the sentence names; more are counted."""
 _WORTH_SAYING_P = 0.05
@@ -212,10 +210,11 @@ def _of_commands(analysis: Analysis) -> str:
 
 def _not_found(limits: Sequence[UpperLimit]) -> str:
     """What was tested and not found, and how large it may be at most with 95 % probability."""
+    most_limits = 3  # Effects that were not found and are named with their limit; more are counted.
     sized = [(effect_words(x.id), percent_words(x.share)) for x in limits if x.share > 0]
     if not sized:
         return ""
-    first, rest = sized[:_MOST_LIMITS], sized[_MOST_LIMITS:]
+    first, rest = sized[:most_limits], sized[most_limits:]
     named = [f"{name} (at most {share} of the weight)" for name, share in first]
     if rest:
         named.append(f"{len(rest)} others (at most {rest[0][1]})" if len(rest) > 1 else f"{rest[0][0]} ({rest[0][1]})")

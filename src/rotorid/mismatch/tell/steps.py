@@ -28,10 +28,6 @@ from rotorid.mismatch.tell.verdict import Channel, EffectVerdict, Errors, Locati
 from rotorid.recordings import Vehicle
 from rotorid.vehicle.derivatives import CHANNELS, QUANTITIES
 
-_WORTH_SAYING = 0.02
-"""Share of the error below which a step takes nothing off that is worth a word."""
-_AT_THE_NOISE = 1.1
-"""Error over the noise floor up to which what is left is called noise."""
 _SWING = {**dict.fromkeys("uvw", 5.0), **dict.fromkeys("pqr", 2.0)}
 """Of each quantity, m/s and rad/s, how far a catalogue form is moved to see what it makes of it."""
 
@@ -70,6 +66,8 @@ def together(steps: Mapping[str, _Steps]) -> _Steps | None:
 
 def steps_sentence(verdict: Verdict) -> str:
     """What each step takes off the error on flights not used for fitting; empty where nothing is compared."""
+    worth_saying = 0.02  # Share of the error below which a step takes nothing off that is worth a word.
+    at_the_noise = 1.1  # Error over the noise floor up to which what is left is called noise.
     compared = steps_of(verdict.channels, verdict.delivered.model)
     whole = together(compared)
     if whole is None or verdict.kind != "flight":
@@ -90,17 +88,17 @@ def steps_sentence(verdict: Verdict) -> str:
     ]
     parts: list[str] = []
     for name, share, verb in taken:
-        if share >= _WORTH_SAYING:
+        if share >= worth_saying:
             what = f"{100 * share:.0f} %"
             parts.append(f"{name} another {what}" if parts else f"{name} {verb} {what} off the {errors}")
     nameless = whole.named - whole.delivered
-    if nameless >= _WORTH_SAYING:
+    if nameless >= worth_saying:
         parts.append(f"{100 * nameless:.0f} % {'more ' if parts else ''}is predictable{_nameless(verdict, claimed)}")
     if not parts:
         parts.append(f"nothing that was found takes a part off the {errors}")
     left = (
         "the rest is noise"
-        if whole.delivered <= _AT_THE_NOISE * whole.noise
+        if whole.delivered <= at_the_noise * whole.noise
         else f"{100 * whole.delivered:.0f} % is left (noise alone: {100 * whole.noise:.0f} %)"
     )
     where = "On flights not used for fitting" if held else "On the flight that was fitted"

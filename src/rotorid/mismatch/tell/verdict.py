@@ -29,7 +29,14 @@ from rotorid.mismatch.decide.findings import (
 )
 from rotorid.mismatch.decide.sizes import Size, fitted_part, scales
 from rotorid.mismatch.decide.status import Estimate
-from rotorid.mismatch.tell.consistency import by_share, located_channels, missing_places, share_left, verdict_word
+from rotorid.mismatch.tell.consistency import (
+    VerdictWord,
+    by_share,
+    located_channels,
+    missing_places,
+    share_left,
+    verdict_word,
+)
 from rotorid.mismatch.tell.sentences import (
     Contents,
     details,
@@ -45,9 +52,6 @@ from rotorid.recordings.check import doubts_of
 from rotorid.recordings.run import Doubt
 from rotorid.recordings.sufficient import basis_of
 
-_DESCRIBED = 0.1
-"""Share of the weight, or of the moment that the rotors can make, that may stay off in a channel where a mistake in the
-set counts as corrected: of wrong corrections seen a quarter to a half stayed, of right ones next to nothing."""
 __all__ = ["Verdict", "main_channel", "make_verdict", "spoken"]
 
 SCHEMA_PATH = Path(__file__).parents[4] / "workflow" / "schemas" / "verdict.schema.json"
@@ -312,7 +316,7 @@ class Verdict(_KeysOfVerdict):
     set: str
     kind: Literal["flight", "stand", "bench"]
     runs: Runs
-    verdict: Literal["no_mismatch", "explained", "partly_explained", "unexplained", "not_judged"]
+    verdict: VerdictWord
     basis: BasisOfVerdict
     doubts: tuple[DoubtOfSet, ...]
     sentence: str
@@ -356,7 +360,7 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
     located = located_channels(locations, inverse)
     left = share_left(inverse, located, _fewest(analysis))
     shares = analysis.shares
-    word = "not_judged" if _stopping(analysis) else verdict_word(analysis, locations, left, inverse)
+    word: VerdictWord = "not_judged" if _stopping(analysis) else verdict_word(analysis, locations, left, inverse)
     contents = Contents(analysis, word, locations, inverse, shares, left if word != "no_mismatch" else 0.0, forward)
     return Verdict(
         set=analysis.recordings.name,
@@ -448,7 +452,8 @@ def _believed_value_of(row: ValueRow, analysis: Analysis) -> BelievedValue:
 
 def _delivered_of(analysis: Analysis) -> Delivered:
     """Which candidate is taken home, and every candidate's number."""
-    scores = tuple(Score(**dict(zip(Score.model_fields, s, strict=True))) for s in analysis.delivery.scores)
+    rows = (dict(zip(Score.model_fields, score, strict=True)) for score in analysis.delivery.scores)
+    scores = tuple(Score.model_validate(row) for row in rows)
     return Delivered(model=analysis.delivery.model, derivatives=analysis.delivery.derivatives, scores=scores)
 
 
@@ -552,9 +557,12 @@ def with_doubts(analysis: Analysis, recordings: RecordingSet) -> Analysis:
     Corrected is a doubt that the recordings as analysed, with the improved vehicle, no longer raise, where the model
     then describes them. Axes can be exchanged so that all sensors agree and the vehicle is another one.
     """
+    # Share of the weight, or of the moment that the rotors can make, that may stay off in a channel where a mistake in
+    # the set counts as corrected: of wrong corrections seen a quarter to a half stayed, of right ones next to nothing.
+    described = 0.1
     found = doubts_of(recordings)
     left = found
-    if any(d.stops for d in found) and _still_off(analysis) < _DESCRIBED:
+    if any(d.stops for d in found) and _still_off(analysis) < described:
         left = doubts_of(replace(analysis.recordings, vehicle=corrected(analysis)))
     standing = {d.what for d in left}
     said = tuple(d if d.what in standing or not d.stops else _as_corrected(d) for d in found)

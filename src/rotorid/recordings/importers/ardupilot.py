@@ -37,7 +37,8 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.dataflash import read_dataflash
+from rotorid.recordings.importers.contract import Imported, Importer
+from rotorid.recordings.importers.dataflash import HEAD, read_dataflash
 from rotorid.recordings.importers.faults import (
     GOES_ON,
     ImportFault,
@@ -53,7 +54,7 @@ from rotorid.recordings.importers.faults import (
     table_on,
     within,
 )
-from rotorid.recordings.importers.known import Parameters, Values
+from rotorid.recordings.importers.known import Known, Parameters, Values
 from rotorid.recordings.importers.mapping import PULSE_US, RPM, continuous, quaternion_from_euler_frd
 
 _KINDS = (
@@ -65,8 +66,6 @@ _MOTORS = {33 + i: i for i in range(8)} | {82 + i: 8 + i for i in range(4)} | {1
 _OUTPUTS = range(1, 33)
 _MULTIROTORS = {1: 4, 2: 6, 3: 8, 4: 8, 5: 6, 12: 12, 14: 10}
 """`FRAME_CLASS` of multirotors of fixed rotors to their number of motors."""
-_SCRIPTED = (0, 15, 17)
-"""Frame classes whose motors are those that the output functions name: none chosen, a matrix of a script."""
 _OTHER_CLASSES = {
     6: "a helicopter, whose motor functions are the servos of its swash plate",
     7: "a tricopter, whose tail rotor a servo tilts",
@@ -112,8 +111,6 @@ _ORDER_OF_FRAME = {1: "ardupilot", 12: "betaflight"}
 """`FRAME_TYPE` of a quadrotor to the key of `known.ORDERS`: X, and X with Betaflight's order."""
 _LANDED, _FLYING = 18, 28
 """Events LAND_COMPLETE and NOT_LANDED."""
-_GOOD, _DOWN = 4, 25
-"""Status of a range finder that reads, and the orientation of one that looks down."""
 END = "END"
 """The key under which stands how many bytes of the last message came."""
 _CLOCKS = {"TimeUS": 1e-6, "TimeMS": 1e-3}
@@ -128,8 +125,6 @@ _REALIGNED = re.compile(r"(?!.*initial).*\byaw\b.*\b(re-?)?align|.*\byaw reset\b
 _LEAST_RESET_M = 0.02
 _LATE_CORE_S = 1.0
 """A core whose estimate begins so much later than that of others is not read throughout."""
-_ENOUGH_HZ = 50.0
-"""Rate from which an attitude is followed well: none is preferred for a higher one."""
 
 Log = Mapping[str, pd.DataFrame]
 
@@ -185,6 +180,8 @@ def parameters(log: Log) -> Parameters:
 
 def _check_frame(log: Log, values: Values, where: object) -> None:
     """InputError that names the vehicle where it is no multirotor of fixed rotors."""
+    # Frame classes whose motors are those that the output functions name: none chosen, a matrix of a script.
+    scripted = (0, 15, 17)
     kind = int(values.get("FRAME_CLASS", 0))
     builds = log.get("VER", pd.DataFrame()).get("BU", [])
     said = [str(line) for line in log.get("MSG", pd.DataFrame()).get("Message", [])]
@@ -200,7 +197,7 @@ def _check_frame(log: Log, values: Values, where: object) -> None:
         by, what = "its messages", other
     elif "FRAME_CLASS" not in values and any(name.startswith(("H_SW", "H_RSC")) for name in values):
         by, what = "parameters H_*", _OTHER_CLASSES[6]
-    elif kind not in _MULTIROTORS and kind not in _SCRIPTED:
+    elif kind not in _MULTIROTORS and kind not in scripted:
         by, what = f"FRAME_CLASS {kind}", "of a frame that is not known here"
     else:
         return
@@ -329,6 +326,7 @@ def _in_flight(log: Log, where: object) -> Values:
 
 def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[ImportFault], np.ndarray]:
     """Contract columns of a whole log, its faults, and where it flies (mask of rows)."""
+    good, down = 4, 25  # Status of a range finder that reads, and the orientation of one that looks down.
     grid, faults = _clock(log, where)
     stated, values, flown = parameters(log), _in_flight(log, where), _flown_by(log)
     _check_frame(log, values, where)
@@ -360,7 +358,7 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[ImportFault], n
     parts += _battery(log, faults)
     below = log.get("RFND")
     if below is not None and {"Dist", "Stat", "Orient"} <= set(below):
-        put((c.HEIGHT,), _of_first(below[(below["Stat"] == _GOOD) & (below["Orient"] == _DOWN)], "Instance"), ("Dist",))
+        put((c.HEIGHT,), _of_first(below[(below["Stat"] == good) & (below["Orient"] == down)], "Instance"), ("Dist",))
     outputs = _outputs(log)
     if outputs is None:
         faults.append(ImportFault("no_command", "", "RCOU is not logged", "no throttle columns", 0))
@@ -377,6 +375,7 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[ImportFault], n
 def _attitude(log: Log, cores: tuple[str, str], flown: _Flown, faults: list[ImportFault]) -> list[tuple]:
     """The attitude of the estimator, of `ATT` or of `ANG`: of several the first that comes often enough, else that
     which comes most often; the others are named."""
+    enough_hz = 50.0  # Rate from which an attitude is followed well: none is preferred for a higher one.
     offered = {}
     quaternion = _of_primary(log, tuple(f"{core}Q" for core in cores), flown.core)
     if quaternion is not None and {"Q1", "Q2", "Q3", "Q4"} <= set(quaternion):
@@ -390,7 +389,7 @@ def _attitude(log: Log, cores: tuple[str, str], flown: _Flown, faults: list[Impo
     if not offered:
         return []
     rates = {name: (len(t) - 1) / max(np.ptp(t), 1e-9) if len(t) > 1 else 0.0 for name, (t, _) in offered.items()}
-    taken = max(rates, key=lambda name: round(min(rates[name], _ENOUGH_HZ)))
+    taken = max(rates, key=lambda name: round(min(rates[name], enough_hz)))
     if taken != next(iter(offered)):
         seen = ", ".join(f"{name} at {rate:.3g} Hz" for name, rate in rates.items())
         faults.append(ImportFault("instances", "attitude", f"several state it: {seen}", f"{taken} taken", 0))
@@ -599,8 +598,9 @@ def _resets(log: Log) -> list[tuple[np.ndarray, str]]:
     return [(times, words) for times, words in found if len(times)]
 
 
-def read_ardupilot(path: Path, log: Log | None = None) -> tuple[dict[str, pd.DataFrame], list[ImportFault], str]:
-    """Every flight of a DataFlash log (or of its tables) by name, what was found, and the key of the rotors' order."""
+def read(path: Path, log: Log | None = None) -> Imported:
+    """Every flight of a DataFlash log, or of tables like its own (`log`)."""
+    settings = _stated_parameters(path) if log is None else parameters(log).start
     log = read_messages(path) if log is None else log
     table, faults, flying = convert(log, path)
     order, more = order_of(_in_flight(log, path))
@@ -609,10 +609,11 @@ def read_ardupilot(path: Path, log: Log | None = None) -> tuple[dict[str, pd.Dat
         own, found = jumps_at(grid, times - _clock(log, path)[0][0], words)
         jumps, more = jumps | own, more + found
     runs, cuts = flights(table, flying, path.name.split(".")[0], path, jumps)
-    return runs, [*faults, *more, *cuts], order
+    axes = "ArduPilot's: body forward-right-down, world north-east-down, as the contract's"
+    return Imported(runs, [*faults, *more, *cuts], axes, Known(order), speed_unit="rpm", settings=settings)
 
 
-def stated_parameters(path: Path) -> dict[str, float]:
+def _stated_parameters(path: Path) -> dict[str, float]:
     """The parameters that a DataFlash log states, each as it states it first."""
     found, _ = read_dataflash(path, ("PARM",))
     columns = found["PARM"].columns if "PARM" in found else {}
@@ -620,3 +621,15 @@ def stated_parameters(path: Path) -> dict[str, float]:
         return {}
     pairs = zip(columns["Name"].tolist(), columns["Value"].tolist(), strict=True)
     return dict(reversed([(str(name), float(value)) for name, value in pairs if np.isfinite(value)]))
+
+
+IMPORTER = Importer(
+    "ardupilot",
+    "ArduPilot DataFlash",
+    read,
+    "frame by `FRAME_CLASS`; `IMU`, `XKQ` or `ATT`, `XKF1`, `RCOU` by `SERVOn_FUNCTION` and the parameters that held "
+    "then, `ESC`, `BAT` or `CURR`, `RFND`; clocks `TimeUS` or `TimeMS`; the part in the air by its event, throttle and "
+    "specific force",
+    starts=(HEAD,),
+    inside=(HEAD + b"\x80\x80\x59FMT",),
+)

@@ -28,8 +28,6 @@ from rotorid.io.text.files import LEAST_UNPACKED, MOST_UNPACKED
 _MCAP, _BAG = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n"
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 0x02, 0x03, 0x04, 0x05, 0x06
 """Codes of MCAP's records."""
-_BAG_MESSAGE, _BAG_HEADER, _BAG_CHUNK, _BAG_CONNECTION = 0x02, 0x03, 0x05, 0x07
-"""Codes of the records of a bag."""
 _ROS_ENCODINGS = {("ros1msg", "ros1"), ("ros2msg", "cdr"), ("ros2idl", "cdr"), ("omgidl", "cdr")}
 """Encodings of a schema and of its messages that are ROS's."""
 
@@ -103,26 +101,27 @@ class Records:
         self.cut |= not in_chunk or at < len(data)
 
     def _of_bag(self, data: bytes, in_chunk: bool) -> Iterator[tuple[_Topic, int, bytes]]:
+        bag_message, bag_header, bag_chunk, bag_connection = 0x02, 0x03, 0x05, 0x07  # Codes of the records of a bag.
         at, indexed = 0, in_chunk
         while at < len(data):
             fields, at = _fields(data, at)
             size = struct.unpack_from("<I", data, at)[0] if at + 4 <= len(data) else len(data)
             body, at = data[at + 4 : at + 4 + size], at + 4 + size
             code = fields.get("op", b"\0")[0]
-            if code == _BAG_CHUNK:
+            if code == bag_chunk:
                 yield from self._of_bag(self._unpacked(body, fields["compression"].decode()), True)
             if len(body) < size:
                 self.cut = True
                 return
-            if code == _BAG_HEADER:
+            if code == bag_header:
                 indexed = struct.unpack("<Q", fields["index_pos"])[0] > 0
-            elif code == _BAG_CONNECTION:
+            elif code == bag_connection:
                 own, _ = _fields(struct.pack("<I", len(body)) + body, 0)
                 kind, text = own["type"].decode(), own["message_definition"].decode(errors="replace")
                 self.channels[_u32(fields["conn"])] = _Topic(
                     fields["topic"].decode(), _spelled(kind), "ros1msg", text, "ros1"
                 )
-            elif code == _BAG_MESSAGE and (channel := self.channels.get(_u32(fields["conn"]))):
+            elif code == bag_message and (channel := self.channels.get(_u32(fields["conn"]))):
                 seconds, rest = struct.unpack("<II", fields["time"])
                 yield channel, seconds * 10**9 + rest, body
         self.cut |= not indexed

@@ -30,24 +30,16 @@ import pandas as pd
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.blackbox import HEADER_LINE, BlackboxSession, sessions
+from rotorid.recordings.importers.contract import Imported, Importer
 from rotorid.recordings.importers.faults import ImportFault, airborne, flights, moving_on, report_gaps
+from rotorid.recordings.importers.known import Known
 from rotorid.recordings.importers.mapping import G, continuous, from_angles, half_turn_about_x, quaternion_to_frd_ned
 
-_DEFAULT_POLES = 14
-_QUATERNION_SCALE = 32767.0
-"""`imuQuaternion` holds x, y and z of the unit quaternion times this; w is what is missing to length 1."""
+_FIRST_LINE = b"H Product:Blackbox"
 _OTHER_NAMES = {"gyroADC": ("gyroData", "gyroUnfilt"), "accSmooth": ("accADC",), "eRPM": ("eRPM(/100)",)}
 """To a field its names in other releases, and what holds the same before a filter."""
 _FEWER_MOTORS = {1: "a fixed wing", 2: "a bicopter or a fixed wing", 3: "a tricopter, whose tail rotor a servo tilts"}
 """What Betaflight's mixers make of fewer motors than four."""
-_FEATURE_3D = 1 << 12
-_DSHOT = (48.0, 2047.0)
-_DSHOT_FORWARD = 1048.0
-"""With 3D, DShot's commands below this turn a motor backwards, from 48 on the faster the larger."""
-_DEADBAND_3D = (1406.0, 1514.0)
-"""Betaflight's own dead band of 3D where motors have pulses in µs; the header does not hold what was set."""
-_SLOWEST_PULSE_US = 900.0
-"""Commands of motors that turn below this are none of pulses in µs."""
 _COUNTS: dict[str, dict[str, tuple[tuple[tuple[int, int], int], ...]]] = {
     "betaflight": {"vbatLatest": (((4, 0), 100), ((3, 1), 10)), "amperageLatest": (((3, 1), 100),)},
     "inav": {"vbatLatest": (((2, 0), 100),), "amperageLatest": (((2, 0), 100),)},
@@ -55,11 +47,10 @@ _COUNTS: dict[str, dict[str, tuple[tuple[tuple[int, int], int], ...]]] = {
 }
 """To a firmware since which version so many counts of a field are 1 V or 1 A; Betaflight's before that counts steps of
 the converter."""
-_CONVERTER_STEP_MV = 3300 / 4095
 
 
-def read_betaflight(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
-    """Every flight of every session in a blackbox file by name, in contract columns, and what was found.
+def _read(path: Path) -> Imported:
+    """Every flight of every session in a blackbox file.
 
     InputError where the file is of another firmware, cannot be read, or holds no flight.
     """
@@ -82,7 +73,8 @@ def read_betaflight(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFau
         faults += more
     if not runs:
         raise InputError(f"{path}: {reasons[-1] if reasons else 'holds no log'}")
-    return runs, faults
+    axes = "body forward-left-up, turned by half a turn about x into FRD"
+    return Imported(runs, faults, axes, Known("betaflight"), speed_unit="rpm", settings=_stated_parameters(path))
 
 
 def _exported(data: bytes, path: Path) -> BlackboxSession:
@@ -148,6 +140,9 @@ def convert(
     raw: pd.DataFrame, headers: Mapping[str, str], name: str, where: object
 ) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
     """Flights in contract columns of the main frames of one session (`time` in µs) and its header."""
+    default_poles = 14
+    # `imuQuaternion` holds x, y and z of the unit quaternion times this; w is what is missing to length 1.
+    quaternion_scale = 32767.0
     if "time" not in raw:
         raise InputError(f"{where}: the log has no field time")
     firmware = _firmware(headers)
@@ -181,7 +176,7 @@ def convert(
         faults.append(ImportFault("missing", ", ".join(c.SPECIFIC_FORCE), found, "no specific force", 0))
     attitude = fields("imuQuaternion", 3)
     if attitude is not None:
-        xyz = attitude / _QUATERNION_SCALE
+        xyz = attitude / quaternion_scale
         w = np.sqrt(np.clip(1 - np.sum(xyz**2, axis=1), 0, None))
         table[list(c.QUATERNION)] = quaternion_to_frd_ned(np.column_stack([w, xyz]))
     if firmware == "inav":
@@ -201,8 +196,8 @@ def convert(
     if np.nanmax(turns) > 0:
         poles = _number(headers, "motor_poles", 0)
         if not poles > 0:
-            poles, found = _DEFAULT_POLES, "the header does not state motor_poles"
-            faults.append(ImportFault("unit", "rotor_speed", found, f"taken as {_DEFAULT_POLES}", 0))
+            poles, found = default_poles, "the header does not state motor_poles"
+            faults.append(ImportFault("unit", "rotor_speed", found, f"taken as {default_poles}", 0))
         speeds = np.where(np.isnan(throttle), np.nan, turns * 100 / (poles / 2) * 2 * np.pi / 60)
         for column, own in zip(c.rotor_columns("rotor_speed", turns.shape[1]), speeds.T, strict=True):
             if np.nanmax(own, initial=0.0) > 0:
@@ -259,21 +254,28 @@ def throttles(motors: np.ndarray, headers: Mapping[str, str]) -> tuple[np.ndarra
 
     With 3D a motor also turns backwards; the contract has no fraction for that, so these are NaN.
     """
+    feature_3d = 1 << 12
+    dshot = (48.0, 2047.0)
+    # With 3D, DShot's commands below this turn a motor backwards, from 48 on the faster the larger.
+    dshot_forward = 1048.0
+    # Betaflight's own dead band of 3D where motors have pulses in µs; the header does not hold what was set.
+    deadband_3d = (1406.0, 1514.0)
+    slowest_pulse_us = 900.0  # Commands of motors that turn below this are none of pulses in µs.
     faults = []
     low, high = _pair(headers, "motorOutput") or (0.0, 0.0)
     if not high > low:
         low, high = _number(headers, "minthrottle", 1000.0), _number(headers, "maxthrottle", 2000.0)
         turning = motors[motors > 0]
-        if len(turning) and np.quantile(turning, 0.01) < _SLOWEST_PULSE_US:
-            low, high = _DSHOT
+        if len(turning) and np.quantile(turning, 0.01) < slowest_pulse_us:
+            low, high = dshot
         found = "the header does not state motorOutput"
         faults.append(ImportFault("unit", "throttle", found, f"no and full throttle taken as {low:g} and {high:g}", 0))
     backwards = np.zeros(motors.shape, bool)
-    if int(_number(headers, "features", 0)) & _FEATURE_3D:
-        if low < _SLOWEST_PULSE_US:
-            backwards, low = (motors > 0) & (motors < _DSHOT_FORWARD), _DSHOT_FORWARD + low - _DSHOT[0]
+    if int(_number(headers, "features", 0)) & feature_3d:
+        if low < slowest_pulse_us:
+            backwards, low = (motors > 0) & (motors < dshot_forward), dshot_forward + low - dshot[0]
         else:
-            backwards, low = motors < _DEADBAND_3D[0], _DEADBAND_3D[1]
+            backwards, low = motors < deadband_3d[0], deadband_3d[1]
             found = "pulses in µs with 3D, whose dead band the header does not state"
             faults.append(ImportFault("unit", "throttle", found, f"no throttle taken as {low:g} µs, Betaflight's own"))
     share = np.clip((motors - low) / (high - low), 0, 1)
@@ -285,6 +287,7 @@ def throttles(motors: np.ndarray, headers: Mapping[str, str]) -> tuple[np.ndarra
 
 def _battery(raw: pd.DataFrame, headers: Mapping[str, str]) -> tuple[dict[str, np.ndarray], list[ImportFault]]:
     """Voltage and current of the battery in contract columns, as far as they are logged and their unit is known."""
+    converter_step_mv = 3300 / 4095
     version, firmware = _version(headers), _firmware(headers)
     found, faults = {}, []
     for field, column in (("vbatLatest", c.BATTERY_VOLTAGE), ("amperageLatest", c.BATTERY_CURRENT)):
@@ -300,9 +303,9 @@ def _battery(raw: pd.DataFrame, headers: Mapping[str, str]) -> tuple[dict[str, n
         if counts is not None:
             found[column] = values / counts
         elif raw_counts and field == "vbatLatest" and (scale := _number(headers, "vbatscale", 0)) > 0:
-            found[column] = values * _CONVERTER_STEP_MV * scale * 1e-4  # the divider in tenths, mV
+            found[column] = values * converter_step_mv * scale * 1e-4  # the divider in tenths, mV
         elif raw_counts and field == "amperageLatest" and per_ampere > 0:
-            found[column] = (values * _CONVERTER_STEP_MV - offset) * 10 / per_ampere
+            found[column] = (values * converter_step_mv - offset) * 10 / per_ampere
         else:
             why = "the header does not state the version or the scale that its unit depends on"
             faults.append(ImportFault("unit", column, f"{field}: {why}", "left out", len(raw)))
@@ -338,7 +341,7 @@ _NO_SETTING = re.compile(
 """Lines of a header that say how the log is laid out, or what flew: no settings."""
 
 
-def stated_parameters(path: Path) -> dict[str, str]:
+def _stated_parameters(path: Path) -> dict[str, str]:
     """The settings in the header of a blackbox's first session, or of its export, as text."""
     head = Path(path).read_bytes()[:_LARGEST_HEADER]
     out: dict[str, str] = {}
@@ -349,3 +352,15 @@ def stated_parameters(path: Path) -> dict[str, str]:
         if not _NO_SETTING.fullmatch(name):
             out.setdefault(name, value)
     return out
+
+
+IMPORTER = Importer(
+    "betaflight",
+    "blackbox of Betaflight, iNAV and EmuFlight, and its export by Blackbox Explorer",
+    _read,
+    "every session, a broken-off one too: gyroscope, accelerometer, motors, `eRPM`, battery, by the units of the "
+    "header; iNAV's attitude, position and velocity where it trusts them",
+    starts=(_FIRST_LINE, b'"Product","Blackbox'),
+    inside=(_FIRST_LINE,),
+    template="five-inch",
+)

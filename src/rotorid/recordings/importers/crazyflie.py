@@ -27,8 +27,9 @@ Source: bitcraze/crazyflie-firmware, `usddeck.c` and `tools/usdlog/cfusdlog.py` 
 
 from __future__ import annotations
 
+import re
 import struct
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from pathlib import Path
 from zlib import crc32
 
@@ -38,6 +39,7 @@ import scipy
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
+from rotorid.recordings.importers.contract import Imported, Importer, text_of
 from rotorid.recordings.importers.faults import (
     ImportFault,
     airborne,
@@ -52,6 +54,7 @@ from rotorid.recordings.importers.faults import (
     without_wild,
 )
 from rotorid.recordings.importers.guessing import guess
+from rotorid.recordings.importers.known import Known
 from rotorid.recordings.importers.mapping import (
     RPM,
     UNITS,
@@ -73,7 +76,6 @@ TYPES = {"e": "<f2", "f": "<f4", "d": "<f8", "b": "i1", "B": "u1", "h": "<i2", "
 TYPES |= {"q": "<i8", "Q": "<u8"}
 _STANDARD_GRAVITY_M_S2 = 9.81
 """The firmware's g: accelerometer logs are in multiples of this."""
-_FULL_SCALE = 65536.0
 _ROTORS = range(1, 5)
 _SPEEDS = list(c.rotor_columns("rotor_speed", 4))
 THROTTLES = list(c.rotor_columns("throttle", 4))
@@ -130,21 +132,17 @@ FORMS: dict[tuple[str, ...], tuple[tuple[tuple[str, ...], Callable[[np.ndarray],
 BODY_VELOCITY = _names("kalman", "statePX statePY statePZ")
 
 
-def is_log(head: bytes) -> bool:
-    """Whether the first bytes of a file are those of a uSD log: its mark, a version, kinds of events and a name."""
-    if len(head) < 8 or head[0] != _MAGIC:
-        return False
-    version, count = struct.unpack_from("<HH", head, 1)
-    name = head[7:].split(b"\0")[0]
-    return 0 < version < 256 and 0 < count < 256 and name.isascii() and name.decode("latin-1").isprintable()
-
-
-def is_table(names: Collection[str]) -> bool:
-    """Whether the columns of a table have the firmware's names of its motors and of a state or sensor."""
-    stated = any(set(own) <= set(names) for forms in FORMS.values() for own, _ in forms)
-    return stated and any(
-        {pattern.format(i) for i in _ROTORS} <= set(names) for pattern in ("motor.m{}", "pwm.m{}_pwm")
-    )
+def _is_log(path: Path, head: bytes) -> bool:
+    """Whether a file's first bytes are those of a uSD log (its mark, a version, kinds of events and a name), or of a
+    table with the firmware's names of its motors and of a state or sensor."""
+    if len(head) >= 8 and head[0] == _MAGIC:
+        version, count = struct.unpack_from("<HH", head, 1)
+        name = head[7:].split(b"\0")[0]
+        return 0 < version < 256 and 0 < count < 256 and name.isascii() and name.decode("latin-1").isprintable()
+    heading = next(iter(text_of(head).splitlines()), "")
+    names = {name.strip(' "') for name in re.split("[,;\t]", heading)}
+    stated = any(set(own) <= names for forms in FORMS.values() for own, _ in forms)
+    return stated and any({pattern.format(i) for i in _ROTORS} <= names for pattern in ("motor.m{}", "pwm.m{}_pwm"))
 
 
 def _read_table(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
@@ -178,6 +176,7 @@ def attitude_without_pitch(
 
 def convert(log: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
     """Contract columns of the table `fixedFrequency` of a uSD log, the whole log with its own clock."""
+    full_scale = 65536.0
     columns: dict[str, np.ndarray] = {c.TIME: log["time_s"].to_numpy(float)}
     faults: list[ImportFault] = []
 
@@ -206,9 +205,9 @@ def convert(log: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
     request = [f"motor.m{i}" for i in _ROTORS]
     drive = output if set(output) <= set(log.columns) else request
     if set(drive) <= set(log.columns):
-        put(THROTTLES, log[drive].to_numpy(float) / _FULL_SCALE)
+        put(THROTTLES, log[drive].to_numpy(float) / full_scale)
         if drive is output and set(request) <= set(log.columns):
-            put([f"thrust_request_{i}" for i in _ROTORS], log[request].to_numpy(float) / _FULL_SCALE)
+            put([f"thrust_request_{i}" for i in _ROTORS], log[request].to_numpy(float) / full_scale)
     speeds = [f"rpm.m{i}" for i in _ROTORS]
     if set(speeds) <= set(log.columns):
         put(_SPEEDS, log[speeds].to_numpy(float) * RPM)
@@ -405,3 +404,22 @@ def read_usd_log(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault]
     except FileNotFoundError:
         raise InputError(f"{path}: file is missing") from None
     return decode_usd_log(data, str(path))
+
+
+def _read(path: Path) -> Imported:
+    runs, faults = flights(path)
+    axes = "body forward-left-up and world z up, turned by half a turn about x into FRD and NED"
+    return Imported(runs, faults, axes, Known("crazyflie"), speed_unit="rpm")
+
+
+IMPORTER = Importer(
+    "crazyflie",
+    "Crazyflie log (uSD, or CSV of its client)",
+    _read,
+    "`fixedFrequency`: gyroscope, accelerometer, estimate (quaternion, compressed, or roll, pitch, yaw), PWM, rpm; the "
+    "part in the air",
+    recognises=_is_log,
+    known_by="first bytes, or names of the columns",
+    template="crazyflie-2.1",
+    by_mapping=True,
+)

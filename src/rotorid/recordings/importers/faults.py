@@ -32,17 +32,6 @@ _NEAR_WEIGHT = 0.85
 """Share of the throttle of flight below which the rotors do not carry the weight."""
 _LIFTS = 0.95
 """Share of the throttle of flight that a stretch begins and ends with: less is spool-up or a vehicle that settles."""
-_FALLING = 0.9
-"""Share of the usual specific force, or of 1 g where that is more, below which a vehicle falls: on the ground it stays
-at 1 g, and lively flights take more."""
-_ONE_G_M_S2 = 9.81
-_NEAR_WEIGHT_ALONE = 0.7
-"""The same where no accelerometer distinguishes a fall from the ground."""
-_TURNS_RAD_S = 1.0
-"""Root mean square of slow body rates above which a vehicle whose rotors turn is in the air. A public log has one that
-rocks on the ground at 0.3 to 0.8 with rotors at two thirds of what flight takes."""
-_GROUND_M, _CLEAR_M = 0.05, 0.5
-"""Heights below which a vehicle is on the ground, and above which it is in the air."""
 _SMOOTHED_S = 1.0
 _SPEEDS = ("rotor_speed", "rotor_command")
 GOES_ON = 0.9
@@ -58,15 +47,9 @@ _TURNS = {
 and whether it is a time of day or of the week, which never is below 0."""
 _FEW_STEPS = 5.0
 """Usual steps back, and rows after them, below which no clock was set."""
-_LEAP_S, _LEAP_STEPS = 0.5, 20.0
-"""A clock leaps where it goes on by more than so many seconds and usual steps, or back by so many seconds."""
-_FEW_S, _FEW_ROWS = 0.3, 0.02
-"""Rows between leaps are apart where they last less and are a smaller share of the longest part."""
 _AROUND_RESET_S = 0.2
 _OUTSIDE = 0.01
 """Share of the range by which a throttle may lie outside of it unnoticed."""
-_UNEXPLAINED = 0.2
-"""Share of its variance that the motors of a mixer may leave of another motor's signal."""
 
 
 _WILD = 1e9
@@ -163,16 +146,20 @@ def moving_on(time_s: np.ndarray) -> tuple[np.ndarray, list[ImportFault]]:
     A few rows behind or before a leap of the clock are of no flight: what stood in a buffer, a first line of zeros, the
     end of another log.
     """
+    # A clock leaps where it goes on by more than so many seconds and usual steps, or back by so many seconds.
+    leap_s, leap_steps = 0.5, 20.0
+    # Rows between leaps are apart where they last less and are a smaller share of the longest part.
+    few_s, few_rows = 0.3, 0.02
     known = np.flatnonzero(np.isfinite(time_s))
     time, keep = time_s[known], np.zeros(len(time_s), bool)
     if not len(time):
         return keep, []
     steps = np.diff(time)
     usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
-    leaps = np.flatnonzero((steps > max(_LEAP_S, _LEAP_STEPS * usual)) | (steps < -_LEAP_S))
+    leaps = np.flatnonzero((steps > max(leap_s, leap_steps * usual)) | (steps < -leap_s))
     parts = np.split(np.arange(len(time)), leaps + 1)
     long = max(map(len, parts))
-    apart = [p for p in parts if len(p) <= _FEW_ROWS * long and np.ptp(time[p]) < _FEW_S] if len(leaps) else []
+    apart = [p for p in parts if len(p) <= few_rows * long and np.ptp(time[p]) < few_s] if len(leaps) else []
     alone = np.concatenate([np.zeros(0, int), *apart])
     stays = np.delete(np.arange(len(time)), alone)
     latest = np.maximum.accumulate(time[stays])
@@ -360,13 +347,14 @@ def further_motors(outputs: np.ndarray, motors: int) -> list[int]:
     A mixer makes the signals of all motors from four demands, so that four of them say the others; a gimbal or a switch
     they do not say.
     """
+    unexplained = 0.2  # Share of its variance that the motors of a mixer may leave of another motor's signal.
     known = outputs[np.isfinite(outputs).all(axis=1)]
     if len(known) < 10 * (motors + 1):
         return []
     basis = np.column_stack([known[:, :motors], np.ones(len(known))])
     rest = known[:, motors:] - basis @ np.linalg.lstsq(basis, known[:, motors:], rcond=None)[0]
     moves, left = known[:, motors:].var(axis=0), rest.var(axis=0)
-    return [motors + k for k in range(len(moves)) if moves[k] > 0 and left[k] < _UNEXPLAINED * moves[k]]
+    return [motors + k for k in range(len(moves)) if moves[k] > 0 and left[k] < unexplained * moves[k]]
 
 
 def report_gaps(table: pd.DataFrame) -> list[ImportFault]:
@@ -508,6 +496,15 @@ def off_the_ground(
     rad/s, specific force and body rates (n, 3), None where they are not recorded; `time_s` the clock (n,); `height`
     what a range finder or a motion capture says of the height above ground (n,), m.
     """
+    # Share of the usual specific force, or of 1 g where that is more, below which a vehicle falls: on the ground it
+    # stays at 1 g, and lively flights take more.
+    falling = 0.9
+    one_g_m_s2 = 9.81
+    near_weight_alone = 0.7  # The same where no accelerometer distinguishes a fall from the ground.
+    # Root mean square of slow body rates above which a vehicle whose rotors turn is in the air. A public log has one
+    # that rocks on the ground at 0.3 to 0.8 with rotors at two thirds of what flight takes.
+    turns_rad_s = 1.0
+    ground_m, clear_m = 0.05, 0.5  # Heights below which a vehicle is on the ground, and above which it is in the air.
     step_s = max(float(np.median(np.diff(time_s))), 1e-4)
     rows = max(int(_SMOOTHED_S / step_s), 1)
 
@@ -521,19 +518,17 @@ def off_the_ground(
     if full <= _DRIVEN:
         return flying
     of_flight = np.median(given[given > 0.5 * full])
-    turning = np.zeros(len(throttle), bool) if rates is None else _turning(rates, step_s) > _TURNS_RAD_S
+    turning = np.zeros(len(throttle), bool) if rates is None else _turning(rates, step_s) > turns_rad_s
     up = np.zeros(len(throttle), bool)
     if force is not None and np.isfinite(force).any():
         pull = smooth(np.linalg.norm(force, axis=1))
-        flown = (throttle >= _NEAR_WEIGHT * of_flight) | (
-            pull < _FALLING * min(np.nanmedian(pull[flying]), _ONE_G_M_S2)
-        )
+        flown = (throttle >= _NEAR_WEIGHT * of_flight) | (pull < falling * min(np.nanmedian(pull[flying]), one_g_m_s2))
     else:
-        flown = throttle >= _NEAR_WEIGHT_ALONE * of_flight
+        flown = throttle >= near_weight_alone * of_flight
     if height is not None and np.isfinite(height).any():
         above = smooth(height)
-        up = above > _CLEAR_M
-        flown &= ~(above < _GROUND_M)
+        up = above > clear_m
+        flown &= ~(above < ground_m)
     flown |= (turning | up) & (throttle >= 0.5 * of_flight)
     flown = flying & without_pauses(flown, time_s)
     lifts, out = (throttle >= _LIFTS * of_flight) | turning | up, np.zeros(len(flying), bool)

@@ -1,4 +1,4 @@
-"""Logs that rotorid knows, recognised by their first bytes, as flights in contract columns and as a recording set.
+"""Logs of the formats that there are importers for, as flights in contract columns and as a recording set.
 
 Other people's readers are at work: with a limit on their memory where the system can (Linux), so that a packed log made
 to unpack to anything ends as one sentence and not with the machine, and without what they print, a line for each byte
@@ -13,21 +13,24 @@ third for vehicles from 27 g to 2 kg, or from a known thrust coefficient, while 
 
 from __future__ import annotations
 
+import importlib
 import io
 import json
 import os
-import re
+import pkgutil
 import sys
 from collections.abc import Iterator, Sequence
 from collections.abc import Mapping as Names
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass, field, replace
+from functools import cache, partial
+from importlib.metadata import entry_points
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+import rotorid.recordings.importers
 from rotorid.errors import InputError
 from rotorid.io.text.files import (
     LARGEST_FILE,
@@ -46,7 +49,6 @@ from rotorid.recordings import columns as c
 from rotorid.recordings.files import (
     VEHICLE,
     check_manifest,
-    is_bag,
     listed_runs,
     proposed_in,
     run_files,
@@ -56,12 +58,12 @@ from rotorid.recordings.files import (
     vehicle_of,
     write_manifest,
 )
-from rotorid.recordings.importers import ardupilot, betaflight, crazyflie, mavlink, neurobem, px4_ulog, rcbenchmark, ros
+from rotorid.recordings.importers.contract import Imported, Importer, text_of
 from rotorid.recordings.importers.faults import FILE_NAME as REPORT
-from rotorid.recordings.importers.faults import LATE_STEPS, SET_BACK, ImportFault, ImportReport, airborne, flights
-from rotorid.recordings.importers.known import Known, propose, px4_vehicle, thrust_coefficient
-from rotorid.recordings.importers.mapping import ELECTRICAL, UNITS, Mapping, read_by_mapping
-from rotorid.recordings.importers.rcbenchmark import signed_by_spin
+from rotorid.recordings.importers.faults import ImportFault, ImportReport
+from rotorid.recordings.importers.known import propose, thrust_coefficient
+from rotorid.recordings.importers.mapping import IMPORTER as TABLE
+from rotorid.recordings.importers.mapping import UNITS, Mapping, read_table
 from rotorid.recordings.settings import Settings, write_settings
 from rotorid.recordings.tables import check_table, parquet_is_here, write_table
 from rotorid.recordings.vehicle import Vehicle
@@ -71,176 +73,75 @@ _USUAL_COEFFICIENT = 1.7e-5
 its third. The templates (Crazyflie to x500) have 1.4e-5 to 2.1e-5."""
 _IMPOSSIBLE = 3.5
 """Speeds of hover so many times off, or more, are not in the unit that is stated."""
-_POSSIBLE = 2.2
-"""Speeds of hover within this factor are."""
-_GZIP = b"\x1f\x8b"
-_WITHIN = ((b"H Product:Blackbox", "betaflight"), (b"\xa3\x95\x80\x80\x59FMT", "ardupilot"), (px4_ulog.MAGIC, "px4"))
-"""What the first lines or messages of a log hold, behind what may be left of another in the logger's memory."""
-_EPOCHS_US = (9e14, 5e15)
-"""Times from 1998 to 2128 in µs, as telemetry logs of MAVLink have them before each message."""
-_BY_FIRST_BYTES = (
-    (b"H Product:Blackbox", "betaflight"),
-    (b'"Product","Blackbox', "betaflight"),
-    (b"\xa3\x95", "ardupilot"),
-    (b"#ROSBAG V2.0", "ros"),
-    (b"\x89MCAP0", "ros"),
-    (b"SQLite format 3", "ros"),
-)
-_RCBENCHMARK = re.compile(r"ESC signal ?[(,](.*[,;])?\s*\"?Motor (Electrical|Optical) Speed ?[(,\r\n]", re.DOTALL)
-"""Headings of RCbenchmark's stands of one rotor; those of other stands are read by a mapping."""
-TEMPLATES = {"px4": "x500", "betaflight": "five-inch", "crazyflie": "crazyflie-2.1", "neurobem": "neurobem"}
-"""Template vehicle that supplies what a log of an autopilot or format does not say."""
+_GROUP = "rotorid.importers"
 
 
-@dataclass(frozen=True)
-class _Imported:
-    """Flights of one log by name, in contract columns, with what was found on the way."""
+@cache
+def importers() -> dict[str, Importer]:
+    """Every importer by name: `IMPORTER` of each module here, and the entry points of installed packages.
 
-    format: str
-    runs: dict[str, pd.DataFrame]
-    faults: tuple[ImportFault, ...]
-    axes: str
-    known: Known = Known("")
-    kind: str = "flight"
-    speed_unit: str = "rad/s"
-    """Unit in which the log states rotor speeds."""
-    settings: Settings = field(default_factory=dict)
-    """The autopilot's parameters, as they held for most of the flight or at its start."""
-
-
-def _files_of(path: Path) -> dict[str, Path]:
-    """The files of a log by name: itself, or all that lie in the folder of a bag."""
-    if not path.is_dir():
-        return {path.name: path}
-    return {f"{path.resolve().name}/{p.name}": p for p in sorted(path.iterdir()) if p.is_file()}
-
-
-def format_of(path: Path) -> str:
-    """`px4`, `crazyflie`, `betaflight`, `ardupilot`, `mavlink`, `ros`, `neurobem`, `rcbenchmark`, `csv` or `parquet`.
-
-    InputError for what is none of them.
+    InputError where an entry point is no importer, or has the name of another one.
     """
-    if path.is_dir():
-        if is_bag(path):
-            return "ros"
-        raise InputError(f"{path}: expected a log, found a folder (that of a ROS 2 bag has a metadata.yaml)")
-    check_file(path)
-    with open(path, "rb") as file:
-        head = file.read(4096)
-    if not head:
-        raise InputError(f"{path}: the file is empty")
-    if head.startswith(px4_ulog.MAGIC):
-        return "px4"
-    if crazyflie.is_log(head):
-        return "crazyflie"
-    if head.startswith(_GZIP):
-        return "csv"
-    if head.startswith(b"PAR1"):
-        return "parquet"
-    epoch = _EPOCHS_US[0] < int.from_bytes(head[:8], "big") < _EPOCHS_US[1]
-    if head[8:9] in (b"\xfe", b"\xfd") and (epoch or path.suffix.lower() in (".tlog", ".rlog")):
-        return "mavlink"
-    for start, name in _BY_FIRST_BYTES:
-        if head.startswith(start):
-            return name
-    if found := next((name for words, name in _WITHIN if words in head), None):
+    found = {}
+    for module in pkgutil.iter_modules(rotorid.recordings.importers.__path__):
+        importer = getattr(importlib.import_module(f"rotorid.recordings.importers.{module.name}"), "IMPORTER", None)
+        if importer is not None:
+            found[importer.name] = importer
+    for point in entry_points(group=_GROUP):
+        importer, where = point.load(), f"entry point {point.value} of {_GROUP}"
+        if not isinstance(importer, Importer):
+            raise InputError(f"{where}: expected an Importer, not {type(importer).__name__}")
+        if importer.name in found:
+            raise InputError(f"{where}: an importer {importer.name} is there already")
+        found[importer.name] = importer
+    return found
+
+
+def importer_of(path: Path) -> Importer:
+    """The importer that reads a log; InputError for what is none."""
+    head = b""
+    if not path.is_dir():
+        check_file(path)
+        with open(path, "rb") as file:
+            head = file.read(4096)
+        if not head:
+            raise InputError(f"{path}: the file is empty")
+    known = importers().values()
+    if found := next((i for i in known if head.startswith(i.starts)), None):
         return found
-    if path.suffix.lower() == ".mat":
-        return "neurobem"
-    text = head.decode("utf-8", errors="replace")
-    if "\0" in text:
+    by_content = (i for i in known if i.recognises(path, head) or any(words in head for words in i.inside))
+    if found := next(by_content, None):
+        return found
+    if path.is_dir():
+        raise InputError(f"{path}: expected a log, found a folder (that of a ROS 2 bag has a metadata.yaml)")
+    if not text_of(head):
         raise InputError(
-            f"{path}: not a log that rotorid knows (PX4 ULog, blackbox, ArduPilot, its telemetry, ROS bag, MCAP, "
-            "Crazyflie uSD, NeuroBEM .mat, RCbenchmark CSV, any CSV, Parquet); its first bytes are " + head[:8].hex(" ")
+            f"{path}: not a log that rotorid knows ({', '.join(i.title for i in known)}); its first bytes are "
+            + head[:8].hex(" ")
         )
-    if crazyflie.is_table([name.strip(' "') for name in re.split("[,;\t]", text.splitlines()[0])]):
-        return "crazyflie"
-    return "rcbenchmark" if _RCBENCHMARK.search(text) and "Thrust" in text else "csv"
+    return TABLE
 
 
-def read_log(path: Path, mapping: Mapping | None = None) -> _Imported:
+def read_log(path: Path, mapping: Mapping | None = None) -> Imported:
     """Every flight in a log; InputError in one sentence where the file holds none."""
     path = Path(path)
-    kind = format_of(path)
-    if kind != "ros" and (size := path.stat().st_size) > LARGEST_FILE:  # a bag's pictures are not read
+    importer = importer_of(path)
+    if not importer.any_size and (size := path.stat().st_size) > LARGEST_FILE:
         raise InputError(f"{path}: has {size / 1e6:.0f} MB, expected at most {LARGEST_FILE / 1e6:.0f} MB")
     try:
         with _limited(path), _silent():
-            return _read(path, kind, mapping)
+            mapped = mapping is not None and importer.by_mapping
+            found = read_table(path, mapping) if mapped else importer.read(path)
     except InputError as error:
         said = printable(error)  # it may quote what stands in the file
         raise InputError(said if said.startswith(str(path)) else f"{path}: {said}") from None
+    return replace(found, format=importer.name)
 
 
-def _read(path: Path, kind: str, mapping: Mapping | None) -> _Imported:
-    if kind == "px4":
-        return _px4(path)
-    if kind == "crazyflie" and mapping is None:
-        runs, faults = crazyflie.flights(path)
-        axes = "body forward-left-up and world z up, turned by half a turn about x into FRD and NED"
-        return _Imported(kind, runs, tuple(faults), axes, Known("crazyflie"), speed_unit="rpm")
-    if kind == "betaflight":
-        runs, faults = betaflight.read_betaflight(path)
-        axes = "body forward-left-up, turned by half a turn about x into FRD"
-        settings = betaflight.stated_parameters(path)
-        return _Imported(kind, runs, tuple(faults), axes, Known("betaflight"), speed_unit="rpm", settings=settings)
-    if kind == "ardupilot":
-        runs, faults, order = ardupilot.read_ardupilot(path)
-        axes = "ArduPilot's: body forward-right-down, world north-east-down, as the contract's"
-        settings = ardupilot.stated_parameters(path)
-        return _Imported(kind, runs, tuple(faults), axes, Known(order), speed_unit="rpm", settings=settings)
-    if kind == "mavlink":
-        log = mavlink.read_telemetry(path)
-        runs, faults, order = ardupilot.read_ardupilot(path, log)
-        axes = "ArduPilot's: body forward-right-down, world north-east-down, as the contract's"
-        settings = ardupilot.parameters(log).start
-        return _Imported(kind, runs, tuple(faults), axes, Known(order), speed_unit="rpm", settings=settings)
-    if kind == "ros":
-        runs, faults, unit = ros.read_ros(path)
-        axes = "REP 103: body forward-left-up, world z up, turned by half a turn about x into FRD and z down"
-        return _Imported(kind, runs, tuple(faults), axes, speed_unit=unit)
-    if kind == "neurobem":
-        table, faults = neurobem.read_neurobem(path)
-        return _Imported(kind, {path.stem: table}, tuple(faults), "NeuroBEM's, turned into FRD and NED")
-    if kind == "rcbenchmark":
-        table, faults = rcbenchmark.read_rcbenchmark(path)
-        axes = "thrust along -z of the body"
-        return _Imported(kind, {_stem(path): table}, tuple(faults), axes, kind="stand")
-    table, faults, axes = read_by_mapping(path, mapping)
-    stand, runs, cuts = bool(set(table) & {*c.FORCE, *c.MOMENT}), {_stem(path): table}, []
-    if not stand:
-        flying, apart = airborne(table)[0], _apart(table, faults)
-        if apart.any() or not flying.all():
-            runs, cuts = flights(table, flying, _stem(path), path, apart)
-    speeds = None if mapping is None else mapping.channels.get("rotor_speed") or mapping.channels.get("rotor_command")
-    unit = (speeds.unit if speeds else "") or "rad/s"
-    unit = "rpm" if unit in ELECTRICAL else unit  # they are turns of the rotor by now
-    return _Imported(kind, runs, (*faults, *cuts), axes, kind="stand" if stand else "flight", speed_unit=unit)
-
-
-def _apart(table: pd.DataFrame, faults: Sequence[ImportFault]) -> np.ndarray:
-    """Rows, (n,), that begin anew after a clock that was set back: no run goes on over them."""
-    steps_s = np.diff(table[c.TIME].to_numpy(float), prepend=table[c.TIME].iloc[0])
-    set_back = any(fault.kind == SET_BACK for fault in faults)
-    return set_back & (steps_s > 0.5 * LATE_STEPS * np.median(steps_s[1:]))
-
-
-def _stem(path: Path) -> str:
-    return path.name.removesuffix(".gz").rsplit(".", 1)[0]
-
-
-def _px4(path: Path) -> _Imported:
-    log = px4_ulog.open_log(path)
-    try:
-        rotors = px4_ulog.rotor_count(log)
-        table, found, flying, jumps = px4_ulog.convert(log, rotors)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    settings = {name: value for name, value in px4_ulog.in_flight(log).items() if isinstance(value, int | float)}
-    known, faults = px4_vehicle(settings, rotors)
-    runs, cuts = flights(table, flying, path.stem, path, jumps)
-    axes = "PX4's: body forward-right-down, world north-east-down, as the contract's"
-    return _Imported("px4", runs, (*found, *faults, *cuts), axes, known, speed_unit="rpm", settings=settings)
+def template_for(log: Imported) -> str:
+    """The template vehicle of a log's autopilot or format; empty where nothing says what vehicle it is."""
+    known = (importers().get(name) for name in (log.known.autopilot, log.format))
+    return next((importer.template for importer in known if importer and importer.template), "")
 
 
 @contextmanager
@@ -354,6 +255,7 @@ def carrying_unit(
 
     The stated one where its speeds are possible, or no other's are.
     """
+    possible = 2.2  # Speeds of hover within this factor are.
     flown = thrust_coefficient(tables, mass_kg, rotors, kind=kind)
     if flown is None:
         return stated, np.nan
@@ -363,7 +265,7 @@ def carrying_unit(
         return stated, off
     others = {u: abs(np.log(off * f / UNITS["rotor"][stated])) for u, f in UNITS["rotor"].items() if u != stated}
     best = min(others, key=others.get)
-    return (best, off) if others[best] < np.log(_POSSIBLE) else (stated, off)
+    return (best, off) if others[best] < np.log(possible) else (stated, off)
 
 
 @dataclass(frozen=True)
@@ -482,8 +384,8 @@ def set_of_logs(
     else:
         if kinds != {"flight"}:
             raise InputError(f"{logs[0]}: a log of a {kinds.pop()} needs --vehicle vehicle.yaml")
-        template = like or TEMPLATES.get(found[0].known.autopilot) or TEMPLATES.get(found[0].format)
-        if template is None:
+        template = like or template_for(found[0])
+        if not template:
             raise InputError(
                 f"{logs[0]}: nothing says what vehicle this is; give --vehicle vehicle.yaml, or --like with one of "
                 f"{', '.join(templates.names())} and --mass-kg"
@@ -503,9 +405,8 @@ def set_of_logs(
         known = float(np.mean(vehicle.thrust_coefficients_n_s2()))
         runs, changed = in_unit_of_weight(runs, units, vehicle.mass_kg, vehicle.rotor_count, known)
         faults += changed
-    unsigned = all(f.format == "rcbenchmark" for f in found) or (mapping is not None and "torque" in mapping.channels)
-    if kinds == {"stand"} and unsigned:
-        runs, changed = signed_by_spin(runs, vehicle)
+    if kinds == {"stand"} and all(f.unsigned_torque for f in found):
+        runs, changed = _signed_by_spin(runs, vehicle)
         faults += changed
     return SetOfLogs(
         name,
@@ -518,6 +419,31 @@ def set_of_logs(
         kept_vehicle=kept,
         settings={path.name: imported.settings for path, imported in zip(logs, found, strict=True)},
     )
+
+
+def _signed_by_spin(
+    runs: Names[str, pd.DataFrame], vehicle: Vehicle
+) -> tuple[Names[str, pd.DataFrame], list[ImportFault]]:
+    """Runs of a stand whose torque has the sign that the stated spin of the rotor gives it.
+
+    A rotor that turns ccw pushes its mount to positive z.
+    """
+    mine = [name for name, table in runs.items() if c.MOMENT[2] in table]
+    spin = vehicle.rotors[0].spin if vehicle.rotors else "ccw"
+    if not mine:
+        return runs, []
+    sign = 1.0 if spin == "ccw" else -1.0
+    found = "an export does not say which way its torque counts"
+    done = f"its sign is that of a rotor that turns {spin}, as the vehicle's file states"
+    signed = {name: runs[name].assign(**{c.MOMENT[2]: sign * runs[name][c.MOMENT[2]]}) for name in mine}
+    return {**runs, **signed}, [ImportFault("sign", c.MOMENT[2], found, done, 0)]
+
+
+def _files_of(path: Path) -> dict[str, Path]:
+    """The files of a log by name: itself, or all that lie in the folder of a bag."""
+    if not path.is_dir():
+        return {path.name: path}
+    return {f"{path.resolve().name}/{p.name}": p for p in sorted(path.iterdir()) if p.is_file()}
 
 
 def _check_rotors(runs: Names[str, pd.DataFrame], vehicle: Vehicle, log: Path) -> None:

@@ -33,7 +33,7 @@ forward-right-down (FRD) and a world with z down: y and z change sign, of a quat
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Literal
@@ -48,9 +48,14 @@ from rotorid.io.models import KnownKeys
 from rotorid.io.text.files import read_yaml
 from rotorid.io.text.wording import explain
 from rotorid.recordings import columns as c
+from rotorid.recordings.importers.contract import Imported, Importer
 from rotorid.recordings.importers.faults import (
+    LATE_STEPS,
+    SET_BACK,
     ImportFault,
+    airborne,
     drop_repeated_times,
+    flights,
     in_order,
     join_rows,
     one_sense,
@@ -546,3 +551,45 @@ def stated(name: str, kind: str) -> str:
 def converted(values: np.ndarray, kind: str, unit: str) -> np.ndarray:
     """Values of a kind in the contract's unit; without a unit as they are."""
     return values * UNITS[kind].get(unit, 1.0) + _ZEROS.get(unit, 0.0)
+
+
+def read_table(path: Path, mapping: Mapping | None = None) -> Imported:
+    """Every flight in a table, or the run of a stand; see `read_by_mapping`."""
+    table, faults, axes = read_by_mapping(path, mapping)
+    name = path.name.removesuffix(".gz").rsplit(".", 1)[0]
+    stand, runs, cuts = bool(set(table) & {*c.FORCE, *c.MOMENT}), {name: table}, []
+    if not stand:
+        flying, apart = airborne(table)[0], _apart(table, faults)
+        if apart.any() or not flying.all():
+            runs, cuts = flights(table, flying, name, path, apart)
+    channels = {} if mapping is None else mapping.channels
+    speeds = channels.get("rotor_speed") or channels.get("rotor_command")
+    unit = (speeds.unit if speeds else "") or "rad/s"
+    return Imported(
+        runs,
+        (*faults, *cuts),
+        axes,
+        kind="stand" if stand else "flight",
+        speed_unit="rpm" if unit in ELECTRICAL else unit,  # they are turns of the rotor by now
+        unsigned_torque="torque" in channels,
+    )
+
+
+def _apart(table: pd.DataFrame, faults: Sequence[ImportFault]) -> np.ndarray:
+    """Rows, (n,), that begin anew after a clock that was set back: no run goes on over them."""
+    steps_s = np.diff(table[c.TIME].to_numpy(float), prepend=table[c.TIME].iloc[0])
+    set_back = any(fault.kind == SET_BACK for fault in faults)
+    return set_back & (steps_s > 0.5 * LATE_STEPS * np.median(steps_s[1:]))
+
+
+IMPORTER = Importer(
+    "table",
+    "any table (CSV, Parquet)",
+    read_table,
+    "by a mapping file; lines above the heading (Motive, QTM), a heading of several lines, and a last line that is cut "
+    "off are left out and named",
+    starts=(b"\x1f\x8b", b"PAR1"),
+    known_by="text that is no other format's, or first bytes",
+    by_mapping=True,
+)
+"""A text that no other importer knows is read by it, too."""

@@ -21,6 +21,8 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
+from rotorid.recordings.importers import ardupilot
+from rotorid.recordings.importers.contract import Importer
 from rotorid.recordings.importers.mapping import G
 
 _FIRST, _SECOND = 0xFE, 0xFD
@@ -143,3 +145,20 @@ def _tables(rows: dict[int, list[tuple]], later_s: float) -> dict[str, dict[str,
                 for name in (c.TIME, "Instance", "RPM")},
         "PARM": dict(zip((c.TIME, "Name", "Value"), zip(*told, strict=True), strict=True)) if told else {c.TIME: []},
     }  # fmt: skip
+
+
+def _is_telemetry(path: Path, head: bytes) -> bool:
+    """Whether a time in µs from 1998 to 2128, or a name of telemetry, stands before a message's first byte."""
+    epoch = 9e14 < int.from_bytes(head[:8], "big") < 5e15
+    return head[8:9] in (b"\xfe", b"\xfd") and (epoch or path.suffix.lower() in (".tlog", ".rlog"))
+
+
+IMPORTER = Importer(
+    "mavlink",
+    "telemetry of ArduPilot by MAVLink (`.tlog`)",
+    lambda path: ardupilot.read(path, read_telemetry(path)),
+    "`ATTITUDE` with body rates, `RAW_IMU` or `SCALED_IMU`, `LOCAL_POSITION_NED`, `SERVO_OUTPUT_RAW` by the parameters "
+    "that were sent, `ESC_TELEMETRY`, `SYS_STATUS`; it comes a few times a second: the log on board says more",
+    recognises=_is_telemetry,
+    known_by="a clock and a message's first byte",
+)

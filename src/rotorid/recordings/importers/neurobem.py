@@ -18,6 +18,7 @@ import scipy
 from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
+from rotorid.recordings.importers.contract import Imported, Importer
 from rotorid.recordings.importers.faults import ImportFault, drop_repeated_times, report_gaps
 from rotorid.recordings.importers.mapping import half_turn_about_x, quaternion_to_frd_ned
 
@@ -89,3 +90,19 @@ def _convert(matrix: np.ndarray) -> tuple[pd.DataFrame, list[ImportFault]]:
 def read_neurobem(path: Path) -> tuple[pd.DataFrame, list[ImportFault]]:
     """One NeuroBEM flight in contract columns, and its faults."""
     return _convert(_read_matrix(path))
+
+
+def _read(path: Path) -> Imported:
+    table, faults = read_neurobem(path)
+    return Imported({path.stem: table}, faults, "NeuroBEM's, turned into FRD and NED")
+
+
+IMPORTER = Importer(
+    "neurobem",
+    "NeuroBEM .mat",
+    _read,
+    "as the laboratory wrote it",
+    recognises=lambda path, head: path.suffix.lower() == ".mat",
+    known_by="name",
+    template="neurobem",
+)

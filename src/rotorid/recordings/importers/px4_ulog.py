@@ -29,6 +29,7 @@ from pyulog import ULog
 from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
+from rotorid.recordings.importers.contract import Imported, Importer
 from rotorid.recordings.importers.faults import (
     GOES_ON,
     ImportFault,
@@ -36,6 +37,7 @@ from rotorid.recordings.importers.faults import (
     alive_s,
     drop_repeated_times,
     fault_where,
+    flights,
     further_motors,
     goes_on,
     jumps_at,
@@ -46,8 +48,9 @@ from rotorid.recordings.importers.faults import (
     within,
     without_pauses,
 )
-from rotorid.recordings.importers.known import Parameters, Values
+from rotorid.recordings.importers.known import Known, Parameters, Values
 from rotorid.recordings.importers.mapping import PULSE_US, RPM, continuous
+from rotorid.recordings.vehicle import Rotor
 
 _FIRST_MOTOR = 101
 """Number of motor 1 among PX4's output functions."""
@@ -78,14 +81,6 @@ _ENDS = {
     "HIL_ACT": (0.0, 1.0),
 }
 """To the drivers of outputs, as their parameters are called, no and full throttle where no parameter states them."""
-_DSHOT = (1.0, 1999.0)
-"""The same of DShot (0 is disarmed), which PX4 logs less its 48 commands."""
-_DSHOT_TIMERS = (-5, -4, -3, -2)
-"""Values of PWM_*_TIMn that are DShot of some speed; larger ones are pulses."""
-_UAVCAN_WITH_MOTORS = 3
-"""UAVCAN_ENABLE from which the bus drives motors."""
-_PLAUSIBLE = 0.5
-"""Share of the range by which outputs that turn may lie outside of it; farther, they are in another unit."""
 JUMPED = "PX4's estimator jumped in position, velocity or attitude"
 RESETS = (
     ("vehicle_local_position", "xy_reset_counter", ("delta_xy[0]", "delta_xy[1]"), 0.02),
@@ -97,7 +92,6 @@ RESETS = (
 )
 """What the estimator sets anew at once: topic, counter, the fields that hold by how much, and how much of it (m, m/s,
 rad; half of the angle) is within the noise of an estimate."""
-_ARMED = 2
 
 _Fields = Mapping[str, np.ndarray]
 """Fields of one instance of a topic, (n,) each, named as pyulog does: `q[0]`, `esc[1].esc_rpm`."""
@@ -129,10 +123,8 @@ class _Subscriptions(dict):
         super().__setitem__(number, subscription)
 
 
-MAGIC = b"ULog\x01\x12\x35"
+_MAGIC = b"ULog\x01\x12\x35"
 """First bytes of a ULog file."""
-_MOST_STRAY = 4096
-"""Bytes among which the header is looked for, as by whoever recognises the file."""
 
 
 class _Reader(ULog):
@@ -153,10 +145,11 @@ def _read_behind(data: bytes) -> _Reader:
 
 def open_log(path: Path) -> Px4Log:
     """Read a ULog file; InputError where it is none."""
+    most_stray = 4096  # Bytes among which the header is looked for, as by whoever recognises the file.
     if not Path(path).is_file():
         raise InputError(f"{path}: file is missing")
     data = Path(path).read_bytes()
-    stray = max(data.find(MAGIC, 0, _MOST_STRAY), 0)
+    stray = max(data.find(_MAGIC, 0, most_stray), 0)
     try:
         log = _Reader(str(path)) if not stray else _read_behind(data[stray:])
     except MemoryError:
@@ -325,6 +318,8 @@ def _more_rotors(topic: str, driven: int, rotors: int) -> list[ImportFault]:
 
 def _from_outputs(log: Px4Log, instances, rotors: int, names: str):
     """Throttles of `actuator_outputs` by the parameters that state what drives the motors, and in what unit."""
+    # Share of the range by which outputs that turn may lie outside of it; farther, they are in another unit.
+    plausible = 0.5
     flown = in_flight(log)
     port, outputs = _outputs_of_motors(flown, rotors)
     if outputs is None:
@@ -354,7 +349,7 @@ def _from_outputs(log: Px4Log, instances, rotors: int, names: str):
         low, high, by = _ends_of(values, port, outputs)
         share = (given[inside] - low) / (high - low)
         turning = given[inside] > 0
-        if (np.abs(share[turning] - 0.5) > 0.5 + _PLAUSIBLE).any():
+        if (np.abs(share[turning] - 0.5) > 0.5 + plausible).any():
             own = given[inside][turning]
             found = f"outputs from {own.min():g} to {own.max():g} are not {by or 'pulse widths in µs'}"
             return _no_throttle("unit", names, found, len(given), faults)
@@ -379,6 +374,7 @@ def _outputs_of_motors(parameters: Values, rotors: int) -> tuple[str | int, list
     """The driver (of `_ENDS`) and the indices of its outputs that drive motors 1 to `rotors`; where no function is
     stated the first ones, of the bus where UAVCAN_ENABLE says so; the number of a motor that has no output where one is
     missing."""
+    uavcan_with_motors = 3  # UAVCAN_ENABLE from which the bus drives motors.
     by_port, stated = {}, False
     for port in _ENDS:
         named = rf"{port}_FUNC(\d+)"
@@ -387,7 +383,7 @@ def _outputs_of_motors(parameters: Values, rotors: int) -> tuple[str | int, list
         by_port[port] = [functions.get(_FIRST_MOTOR + i) for i in range(rotors)]
         stated |= bool(functions)
     if not stated:
-        on_bus = parameters.get("UAVCAN_ENABLE", 0) >= _UAVCAN_WITH_MOTORS
+        on_bus = parameters.get("UAVCAN_ENABLE", 0) >= uavcan_with_motors
         return "UAVCAN_EC" if on_bus else "PWM_MAIN", list(range(rotors))
     port, motors = min(by_port.items(), key=lambda item: item[1].count(None))
     return (motors.index(None) + 1, None) if None in motors else (port, [k - 1 for k in motors])
@@ -396,11 +392,13 @@ def _outputs_of_motors(parameters: Values, rotors: int) -> tuple[str | int, list
 def _ends_of(parameters: Values, port: str, outputs: Sequence[int]) -> tuple[np.ndarray, np.ndarray, str]:
     """Outputs of no and full throttle by motor, and in words what a parameter says that they are, empty where none
     does."""
+    dshot = (1.0, 1999.0)  # No and full throttle of DShot (0 is disarmed), which PX4 logs less its 48 commands.
+    dshot_timers = (-5, -4, -3, -2)  # Values of PWM_*_TIMn that are DShot of some speed; larger ones are pulses.
     timers = [int(v) for k, v in parameters.items() if re.fullmatch(rf"{port}_TIM\d+", k)]
-    timer = next((t for t in timers if t in _DSHOT_TIMERS), None) if set(timers) <= set(_DSHOT_TIMERS) else None
+    timer = next((t for t in timers if t in dshot_timers), None) if set(timers) <= set(dshot_timers) else None
     if port.startswith("PWM") and (parameters.get("DSHOT_CONFIG", 0) > 0 or timer is not None):
         name = f"{port}_TIMn {timer}" if timer is not None else f"DSHOT_CONFIG {parameters['DSHOT_CONFIG']:g}"
-        low, high = (np.full(len(outputs), end) for end in _DSHOT)
+        low, high = (np.full(len(outputs), end) for end in dshot)
         return low, high, f"DShot by {name}"
     ends, stated = [], True
     for word, default in zip(("MIN", "MAX"), _ENDS[port], strict=True):
@@ -607,11 +605,12 @@ def _resets(topics: _Topics) -> np.ndarray:
 
 def in_the_air(name: str, data: _Fields) -> np.ndarray | None:
     """Messages (n,) of the land detector or of the status by which the vehicle may fly; None where they say nothing."""
+    armed = 2
     if name == "vehicle_land_detected" and "landed" in data:
         flags = [data[f] for f in ("landed", "maybe_landed", "ground_contact") if f in data]
         return ~np.any(np.asarray(flags).astype(bool), axis=0)
     if name == "vehicle_status" and "arming_state" in data:
-        return np.asarray(data["arming_state"]) == _ARMED
+        return np.asarray(data["arming_state"]) == armed
     return None
 
 
@@ -693,3 +692,100 @@ def convert(log: Px4Log, rotors: int) -> tuple[pd.DataFrame, list[ImportFault], 
         found = f"the logger lost {len(log.lost_s)} stretches, {sum(log.lost_s):.3g} s in all"
         faults.append(ImportFault("dropout", c.TIME, found, "left as gaps", len(log.lost_s)))
     return table, faults + report_gaps(table), flying & ~jumps, jumps
+
+
+# Vehicle ------------------------------------------------------------------------------------------
+
+
+def px4_vehicle(parameters: Mapping[str, float], rotors: int) -> tuple[Known, list[ImportFault]]:
+    """Places, turning senses and torque ratio of PX4's control allocation (`CA_ROTOR*`), where a log holds them, and
+    what it states of the rotors that a vehicle.yaml cannot hold.
+
+    Places of ±1 m are what a generic airframe has until somebody sets them: they are directions, not distances.
+    A positive `CA_ROTORi_KM` is a rotor that turns counter-clockwise seen from above.
+    """
+    faults = _untaken(parameters, rotors)
+    keys = [[f"CA_ROTOR{i}_{k}" for k in ("PX", "PY", "PZ", "KM")] for i in range(rotors)]
+    if not all(k in parameters for row in keys for k in row):
+        return Known("px4"), faults
+    values = [[float(parameters[k]) for k in row] for row in keys]
+    if not any(abs(x) + abs(y) > 0 for x, y, _, _ in values):
+        return Known("px4"), faults
+    rotor = tuple(
+        Rotor(x_m=round(x, 6), y_m=round(y, 6), z_m=round(z, 6), spin="ccw" if k > 0 else "cw") for x, y, z, k in values
+    )
+    ratio = sum(abs(k) for *_, k in values) / rotors
+    where = "CA_ROTOR* of the log's parameters"
+    if all(abs(v) in (0.0, 1.0) for x, y, *_ in values for v in (x, y)):
+        return Known("px4", None, round(ratio, 6) or None, where, directions=rotor), faults
+    return Known("px4", rotor, round(ratio, 6) or None, where), faults
+
+
+def _untaken(parameters: Mapping[str, float], rotors: int) -> list[ImportFault]:
+    """A fault for each thing that control allocation states of the rotors and a vehicle.yaml has no place for."""
+    alike = 0.01  # Relative difference of a coefficient up to which rotors are alike.
+    tilted_deg = 1.0  # Angle between a rotor's axis and body z from which on it is tilted.
+
+    def stated(name: str, default: float) -> list[float]:
+        return [float(parameters.get(f"CA_ROTOR{i}_{name}", default)) for i in range(rotors)]
+
+    def fault(kind: str, which: list[int], found: str, action: str) -> list[ImportFault]:
+        if not which:
+            return []
+        who = f"rotor{'s' * (len(which) > 1)} {', '.join(map(str, which))}"
+        return [ImportFault(kind, "vehicle.yaml", found.format(who), action, 0)]
+
+    axes = np.column_stack([stated("AX", 0.0), stated("AY", 0.0), stated("AZ", -1.0)])
+    size = np.linalg.norm(axes, axis=1)  # PX4 makes each axis a unit vector
+    lean = np.degrees(np.arccos(np.clip(-axes[:, 2] / np.where(size > 0, size, 1.0), -1, 1)))
+    tilted = [i for i in range(rotors) if lean[i] > tilted_deg]
+    degrees = ", ".join(f"{lean[i]:.3g}" for i in tilted)
+    found = f"{{}} tilted against body z by {degrees} degrees (CA_ROTOR*_AX, _AY, _AZ)"
+    faults = fault("tilted_rotor", [i + 1 for i in tilted], found, "its thrust is taken along -z")
+    places = list(zip(*(stated(name, 0.0) for name in ("PX", "PY", "PZ")), strict=True))
+    pairs = [f"{i + 1} and {k + 1}" for k in range(rotors) for i in range(k) if places[i] == places[k] != (0, 0, 0)]
+    if pairs and 2 * len(pairs) <= rotors:
+        found = f"rotors {', '.join(pairs)} are on one spot (CA_ROTOR*_PZ states no distance along z)"
+        faults.append(ImportFault("coaxial", "vehicle.yaml", found, "taken so: write z_m of each by what you measure"))
+    by_servo = [i + 1 for i, servo in enumerate(stated("TILT", 0.0)) if servo > 0]
+    faults += fault("tilted_rotor", by_servo, "a servo tilts {} (CA_ROTOR*_TILT)", "its thrust is taken along -z")
+    if parameters.get("CA_SV_CS_COUNT", 0) > 0 or parameters.get("CA_SV_TL_COUNT", 0) > 0:
+        found = "the vehicle has servos (CA_SV_CS_COUNT, CA_SV_TL_COUNT)"
+        faults.append(ImportFault("servo", "vehicle.yaml", found, "what they move is not taken", 0))
+    for name, default, action in (
+        ("KM", 0.05, "their mean size is taken for the ratio of torque to thrust"),
+        ("CT", 6.5, "one thrust coefficient is taken for all"),
+    ):
+        size = np.abs(stated(name, default))
+        usual = float(np.median(size))
+        other = [i + 1 for i in range(rotors) if abs(size[i] - usual) > alike * usual]
+        faults += fault("unequal_rotors", other, f"CA_ROTOR*_{name} of {{}} is not that of the others", action)
+    return faults
+
+
+def _read(path: Path) -> Imported:
+    """Every flight of a ULog file."""
+    log = open_log(path)
+    try:
+        rotors = rotor_count(log)
+        table, found, flying, jumps = convert(log, rotors)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    settings = {name: value for name, value in in_flight(log).items() if isinstance(value, int | float)}
+    known, faults = px4_vehicle(settings, rotors)
+    runs, cuts = flights(table, flying, path.stem, path, jumps)
+    axes = "PX4's: body forward-right-down, world north-east-down, as the contract's"
+    return Imported(runs, (*found, *faults, *cuts), axes, known, speed_unit="rpm", settings=settings)
+
+
+IMPORTER = Importer(
+    "px4",
+    "PX4 ULog",
+    _read,
+    "inertial sensors, attitude, position and velocity where valid, throttles of either generation of actuator topics "
+    "with their ranges, `esc_status`, batteries, range finder; rotor positions, directions of rotation and torque "
+    "ratio from `CA_ROTOR*`; the part in the air",
+    starts=(_MAGIC,),
+    inside=(_MAGIC,),
+    template="x500",
+)

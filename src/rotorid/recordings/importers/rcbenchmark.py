@@ -9,6 +9,7 @@ plausible thrust coefficient). The 1520 has no torque.
 from __future__ import annotations
 
 import csv
+import re
 from pathlib import Path
 
 import numpy as np
@@ -16,12 +17,11 @@ import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.recordings import columns as c
+from rotorid.recordings.importers.contract import Imported, Importer, text_of
 from rotorid.recordings.importers.faults import ImportFault, drop_repeated_times, fault_where
 from rotorid.recordings.importers.mapping import UNITS, bracketed, converted, unit_of
 from rotorid.recordings.mended import lost_speed
-from rotorid.recordings.vehicle import Vehicle
 
-_ESC_LOW_US, _ESC_HIGH_US = 1000.0, 2000.0
 HEADINGS: dict[str, tuple[str, str, str]] = {
     "Time": ("time", "time", "s"),
     "ESC signal": ("esc", "share", "us"),
@@ -33,8 +33,9 @@ HEADINGS: dict[str, tuple[str, str, str]] = {
     "Motor Optical Speed": ("optical", "rotor", "rpm"),
 }
 """To a heading the column here, the kind of its unit, and the unit where the heading names none."""
+_HEADING = re.compile(r"ESC signal ?[(,](.*[,;])?\s*\"?Motor (Electrical|Optical) Speed ?[(,\r\n]", re.DOTALL)
+"""Headings of RCbenchmark's stands of one rotor; those of other stands are read by a mapping."""
 _NOT_ALWAYS = ("torque", "speed", "optical")
-_TORQUE = c.MOMENT[2]
 
 
 def decode_text(data: bytes) -> tuple[str, list[ImportFault]]:
@@ -59,6 +60,7 @@ def _read_table(text: str, where: str) -> tuple[pd.DataFrame, list[ImportFault]]
 
     `time` s, `esc` from 0 to 1, `thrust` N, `torque` N m, `voltage` V, `current` A, `speed` and `optical` rad/s.
     """
+    esc_low_us, esc_high_us = 1000.0, 2000.0
     try:
         rows = [row for row in csv.reader(text.split("\n")) if any(cell.strip() for cell in row)]
     except csv.Error as error:
@@ -83,7 +85,7 @@ def _read_table(text: str, where: str) -> tuple[pd.DataFrame, list[ImportFault]]
                 raise InputError(f"{where}, line {line}, column {heading}: expected a number, found {cell!r}") from None
     read = {name: converted(np.array(columns[name]), kind, unit) for name, (_, kind, unit) in places.items()}
     if places["esc"][2] == "us":
-        read["esc"] = (read["esc"] - _ESC_LOW_US) / (_ESC_HIGH_US - _ESC_LOW_US)
+        read["esc"] = (read["esc"] - esc_low_us) / (esc_high_us - esc_low_us)
     return pd.DataFrame(read), faults
 
 
@@ -117,7 +119,7 @@ def _convert(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
     """Contract columns of a stand with one rotor of what `_read_table` gives; measured values are kept as recorded.
 
     The thrust is a force along -z of the body, which the rotor passes on to the sensor. The torque is positive while
-    the rotor turns; `signed_by_spin` gives it the sign of its rotor.
+    the rotor turns; `logfile.signed_by_spin` gives it the sign of its rotor.
     """
     faults, kept = [], "kept as recorded"
     thrust_n = raw["thrust"].to_numpy()
@@ -151,27 +153,9 @@ def _convert(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
     )
     if "torque" in raw and raw["torque"].notna().any():
         torque = raw["torque"].to_numpy()
-        table[_TORQUE] = torque * (-1.0 if np.nansum(torque * speed) < 0 else 1.0)
+        table[c.MOMENT[2]] = torque * (-1.0 if np.nansum(torque * speed) < 0 else 1.0)
     table, repeated = drop_repeated_times(table)
     return table, faults + repeated
-
-
-def signed_by_spin(
-    runs: dict[str, pd.DataFrame], vehicle: Vehicle
-) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
-    """Runs of `read_rcbenchmark` whose torque has the sign that the stated spin of the rotor gives it.
-
-    The export does not say which way its torque counts: a rotor that turns ccw pushes its mount to positive z.
-    """
-    mine = [name for name, table in runs.items() if _TORQUE in table]
-    spin = vehicle.rotors[0].spin if vehicle.rotors else "ccw"
-    if not mine:
-        return runs, []
-    sign = 1.0 if spin == "ccw" else -1.0
-    found = "an export does not say which way its torque counts"
-    done = f"its sign is that of a rotor that turns {spin}, as the vehicle's file states"
-    signed = {name: runs[name].assign(**{_TORQUE: sign * runs[name][_TORQUE]}) for name in mine}
-    return {**runs, **signed}, [ImportFault("sign", _TORQUE, found, done, 0)]
 
 
 def read_rcbenchmark(path: Path) -> tuple[pd.DataFrame, list[ImportFault]]:
@@ -184,3 +168,24 @@ def read_rcbenchmark(path: Path) -> tuple[pd.DataFrame, list[ImportFault]]:
     raw, more = _read_table(text, str(path))
     table, converted_ = _convert(raw)
     return table, [*faults, *more, *converted_]
+
+
+def _read(path: Path) -> Imported:
+    table, faults = read_rcbenchmark(path)
+    name = path.name.removesuffix(".gz").rsplit(".", 1)[0]
+    return Imported({name: table}, faults, "thrust along -z of the body", kind="stand", unsigned_torque=True)
+
+
+def _is_export(path: Path, head: bytes) -> bool:
+    text = text_of(head)
+    return "Thrust" in text and _HEADING.search(text) is not None
+
+
+IMPORTER = Importer(
+    "rcbenchmark",
+    "RCbenchmark CSV (1520, 1580, 1585)",
+    _read,
+    "throttle, thrust, torque, speed, voltage, current, each in the unit that its heading names",
+    recognises=_is_export,
+    known_by="heading",
+)

@@ -38,7 +38,9 @@ import scipy
 from rotorid.errors import InputError
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
+from rotorid.recordings.files import is_bag
 from rotorid.recordings.importers.bag_records import Records, Unpacking, needs, typestores
+from rotorid.recordings.importers.contract import Imported, Importer
 from rotorid.recordings.importers.faults import (
     GOES_ON,
     ImportFault,
@@ -142,10 +144,6 @@ _UNSET |= dict.fromkeys(("rates", "force", "position", "velocity", "body_velocit
 _COMMANDED = re.compile(r"command|cmd|setpoint|desired|target|reference", re.IGNORECASE)
 _SAME_CLOCK_S = 1.0
 """Stamps further than this from those of the inertial sensor, or from one message to the next, are another clock."""
-_STEADY_S = 0.2
-"""Spread of the difference of two clocks up to which it is a constant."""
-_MIXED = 4
-"""Motors of a mixer whose signals say those of all others: it has four demands."""
 _LISTED = 8
 _WEIGHT_M_S2 = (5.0, 20.0)
 """Median size of the readings of an accelerometer that feels what carries the vehicle."""
@@ -464,6 +462,7 @@ def _times(found: _BagContent) -> tuple[dict[tuple[str, str], np.ndarray], list[
 
     A topic whose stamps are all zero, jump, or run at another rate has those at which its messages were recorded.
     """
+    steady_s = 0.2  # Spread of the difference of two clocks up to which it is a constant.
     stamps = {key: np.array([row[0] for row in rows]) for key, rows in found.rows.items()}
     recorded = {key: np.array([row[1] for row in rows]) for key, rows in found.rows.items()}
     sound = set()
@@ -497,7 +496,7 @@ def _times(found: _BagContent) -> tuple[dict[tuple[str, str], np.ndarray], list[
             times[key], seen = own, ""
         else:
             seen = f"its stamps are {off:.4g} s from those of {base[1]}"
-            steady = np.ptp(np.quantile(own - on_base, [0.05, 0.95])) < _STEADY_S
+            steady = np.ptp(np.quantile(own - on_base, [0.05, 0.95])) < steady_s
             times[key] = own - off if steady else on_base
             action = "shifted by that" if steady else "the times at which its messages were recorded hold"
         if seen:
@@ -605,10 +604,11 @@ def _velocity(series: dict[str, list[_TopicSeries]], faults: list[ImportFault]) 
 def _of_pulses(outputs: _TopicSeries, faults: list[ImportFault]) -> tuple:
     """Throttles of an array of all outputs, which names no motors: the first four that move are motors, and each other
     whose signal follows from theirs."""
+    mixed = 4  # Motors of a mixer whose signals say those of all others: it has four demands.
     steps = np.diff(pd.DataFrame(outputs.values).ffill().to_numpy(), axis=0)
     moving = np.flatnonzero((np.abs(np.nan_to_num(steps)) > 0).any(axis=0))
     pulses = outputs.values[:, moving]
-    used = [*range(min(_MIXED, len(moving))), *further_motors(pulses, _MIXED)]
+    used = [*range(min(mixed, len(moving))), *further_motors(pulses, mixed)]
     low, high = PULSE_US
     seen = f"channels {', '.join(str(moving[k] + 1) for k in used)} of {outputs.topic} move"
     action = f"taken for motors in order, {low:g} to {high:g} µs"
@@ -621,12 +621,25 @@ def _of_pulses(outputs: _TopicSeries, faults: list[ImportFault]) -> tuple:
     return c.rotor_columns("throttle", len(used)), outputs.time_s, throttle
 
 
-def read_ros(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault], str]:
-    """Every flight of a bag (file or folder) or MCAP file by name, in contract columns, what was found, and the unit
-    in which rotor speeds are stated."""
+def _read(path: Path) -> Imported:
+    """Every flight of a bag (file or folder) or MCAP file."""
     series, faults = _read_series(path)
     table, flying, jumps = _convert(series, faults, path)
     name = (path.resolve() if path.is_dir() else path).name.split(".")[0]
     runs, cuts = flights(table, flying, name, path, jumps)
     unit = "rpm" if "rpm" in series and "speeds" not in series else "rad/s"
-    return runs, [*faults, *report_gaps(table), *cuts], unit
+    axes = "REP 103: body forward-left-up, world z up, turned by half a turn about x into FRD and z down"
+    return Imported(runs, [*faults, *report_gaps(table), *cuts], axes, speed_unit=unit)
+
+
+IMPORTER = Importer(
+    "ros",
+    "ROS 1 or 2 bag, MCAP",
+    _read,
+    "`Imu`, `Odometry`, poses, twists, `Actuators`, `MotorSpeed`, `ESCStatus`, `ESCTelemetry`, `RCOut`, "
+    "`BatteryState`, `Range`, PX4's own; whole messages of a file that ends early; `'rotorid[ros]'`",
+    starts=(b"#ROSBAG V2.0", b"\x89MCAP0", b"SQLite format 3"),
+    recognises=lambda path, head: path.is_dir() and is_bag(path),
+    known_by="first bytes, or a folder with `metadata.yaml`",
+    any_size=True,
+)

@@ -11,10 +11,6 @@ import scipy
 
 from rotorid.errors import InputError
 
-_ZERO_PHASE_ORDER = 2
-"""Order of the Butterworth filter that runs forward and backward."""
-_MAD_TO_SIGMA = 1.4826
-
 
 def smoothing(cutoff_hz: float, rate_hz: float) -> float:
     """α of the first-order low-pass for a cutoff: 1 − exp(−2π f_c / f_s)."""
@@ -39,12 +35,13 @@ def zero_phase(values: np.ndarray, cutoff_hz: float, rate_hz: float) -> np.ndarr
 
     Raises InputError where the cutoff is not below half the rate.
     """
+    zero_phase_order = 2  # Order of the Butterworth filter that runs forward and backward.
     values = np.asarray(values, float)
     if not 0 < cutoff_hz < rate_hz / 2:
         raise InputError(f"a cutoff of {cutoff_hz:g} Hz must lie below half the rate of {rate_hz:g} Hz")
     # Two runs halve the power twice; the single run's cutoff is raised so that both together halve it once.
-    single = cutoff_hz / (np.sqrt(2) - 1) ** (1 / (2 * _ZERO_PHASE_ORDER))
-    sections = scipy.signal.butter(_ZERO_PHASE_ORDER, min(single, 0.49 * rate_hz), fs=rate_hz, output="sos")
+    single = cutoff_hz / (np.sqrt(2) - 1) ** (1 / (2 * zero_phase_order))
+    sections = scipy.signal.butter(zero_phase_order, min(single, 0.49 * rate_hz), fs=rate_hz, output="sos")
     pad = min(len(values) - 1, int(3 * rate_hz / cutoff_hz))
     return scipy.signal.sosfiltfilt(sections, values, axis=0, padlen=max(pad, 0)) if len(values) > 1 else values.copy()
 
@@ -55,10 +52,11 @@ def spikes(values: np.ndarray, window: int, threshold: float) -> np.ndarray:
     A sample is a spike where it differs from the median of `window` samples around it by more than `threshold`
     robust standard deviations of the whole record's such differences. A step is none: the median steps with it.
     """
+    mad_to_sigma = 1.4826
     values = np.asarray(values, float)
     size = (window,) + (1,) * (values.ndim - 1)
     off = values - scipy.ndimage.median_filter(values, size=size, mode="nearest")
-    scale = _MAD_TO_SIGMA * np.median(np.abs(off), axis=0)
+    scale = mad_to_sigma * np.median(np.abs(off), axis=0)
     return np.abs(off) > threshold * np.where(scale > 0, scale, np.inf)
 
 

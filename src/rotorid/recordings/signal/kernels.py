@@ -7,23 +7,21 @@ from functools import lru_cache
 import numpy as np
 import scipy
 
-_ATTENUATION_BETA = 5.0
-"""Kaiser window for about 50 dB in the stop band."""
-_HALF_LENGTH_CYCLES = 2.4
-"""Half the kernel's length in periods of the cutoff: the transition is 0.6 of the cutoff wide."""
-
 
 def half_length(rate_hz: float, cutoff_hz: float) -> int:
     """Samples lost at each end by a kernel of this cutoff."""
-    return max(2, int(np.ceil(_HALF_LENGTH_CYCLES * rate_hz / cutoff_hz)))
+    # Half the kernel's length in periods of the cutoff: the transition is 0.6 of the cutoff wide.
+    half_length_cycles = 2.4
+    return max(2, int(np.ceil(half_length_cycles * rate_hz / cutoff_hz)))
 
 
 @lru_cache(maxsize=64)
 def low_pass(rate_hz: float, cutoff_hz: float) -> np.ndarray:
     """Windowed-sinc low-pass of unit gain at zero frequency, shape (2 half_length + 1,); -6 dB at the cutoff."""
+    attenuation_beta = 5.0  # Kaiser window for about 50 dB in the stop band.
     half = half_length(rate_hz, cutoff_hz)
     k = np.arange(-half, half + 1)
-    kernel = np.sinc(2 * cutoff_hz * k / rate_hz) * scipy.signal.windows.kaiser(2 * half + 1, _ATTENUATION_BETA)
+    kernel = np.sinc(2 * cutoff_hz * k / rate_hz) * scipy.signal.windows.kaiser(2 * half + 1, attenuation_beta)
     return kernel / kernel.sum()
 
 

@@ -59,8 +59,6 @@ _WORDS = {
 _MOST_LOCATIONS = 12
 _NARROWEST = 0.03
 """Interval over plausible range below which the range is zoomed in."""
-_LIMIT_DECADES = 5.0
-"""Decades below the weight that the bars of the limits show."""
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -83,66 +81,90 @@ def make_page(
     environment.filters |= {"channel": channel_words, "value": parameter_words, "regime": regime_words}
     environment.filters["effect"] = lambda id_: capital(effect_words(id_))
     environment.globals["symbol_of"] = symbol_of
+    data = page_data(analysis, verdict, main)
+    data["regimes"]["first"] = _first_variable(verdict, main, data["regimes"]["variables"])
+    page = environment.from_string(page_file("page.html")).render(
+        v=verdict,
+        word=_WORDS[verdict.verdict],
+        next=next_text(verdict, analysis.recordings),
+        ledger=[_ledger_row(row) for row in ledger],
+        notes=_notes(analysis, forward_notes),
+        **_figures(data),
+        **_at_the_top(verdict, main),
+        **_what(verdict, analysis),
+        **_where(verdict, analysis),
+        **_better(verdict, data["fit_percent"]),
+        **_not_found(verdict),
+    )
+    return spoken(page, analysis)
+
+
+def _figures(data: Mapping) -> dict:
+    """What the figures are drawn from, and which of them there are."""
+    scripts = page_file("uPlot.iife.min.js"), page_file("page.js")
+    return {
+        "css": Markup(page_file("uPlot.min.css") + page_file("page.css")),
+        "policy": _policy_for(*scripts),
+        "library": Markup(scripts[0]),
+        "script": Markup(scripts[1]),
+        "data": _embedded(data),
+        "has_figure": bool(data["traces"]),
+        "has_regimes": bool(data["regimes"]["channels"]),
+        "has_replay": data["replay"] is not None,
+    }
+
+
+def _at_the_top(verdict: Verdict, main: str) -> dict:
+    """The section above all others."""
+    return {"runs": _runs_text(verdict), "tiles": tiles(verdict, main), "steps": _step_rows(verdict)}
+
+
+def _what(verdict: Verdict, analysis: Analysis) -> dict:
+    """The section on what was left out, and the one on what is predictable without a name."""
+    claimed = by_share([e for e in verdict.effects if e.status in ("established", "ambiguous")])
+    suggested = [e for e in verdict.effects if e.status == "suggested"]
+    return {
+        "what_text": _what_text(verdict),
+        "effects": [_effect_block(e, _finding_of(e, analysis)) for e in claimed],
+        "suggested": [_effect_block(e, _finding_of(e, analysis)) for e in suggested],
+        "values": [_value_range(name, *v) for name, v in analysis.values.items()],
+        "correlated": _correlated_text(verdict),
+        # Those first whose interval leaves out nothing.
+        "derivatives": sorted(verdict.derivatives, key=lambda d: not (d.interval_95[0] > 0 or d.interval_95[1] < 0)),
+        "quantities": _QUANTITY_WORDS,
+        "causes": lambda d: [effect_words(i) for i in would_explain(d.channel, d.quantity, verdict)],
+    }
+
+
+def _where(verdict: Verdict, analysis: Analysis) -> dict:
+    """The section on where it shows."""
     shown, more = _shown_locations(verdict.locations)
+    strip_of = strip(analysis, verdict)
+    return {"where_text": _where_text(verdict), "strip": strip_of, "locations": shown, "more_locations": more}
+
+
+def _better(verdict: Verdict, fit_percent: Mapping[str, tuple[float, float]]) -> dict:
+    """The section on how much better the improved vehicle is, and the one on what remains."""
+    return {
+        "models": _MODELS,
+        "better_text": _better_text(verdict),
+        "forward_text": _forward_text(verdict),
+        "table": _error_table(verdict.channels, fit_percent),
+        "rest": _rest_text(verdict),
+    }
+
+
+def _not_found(verdict: Verdict) -> dict:
+    """The section on what was ruled out."""
     known = {row.id for row in (*verdict.effects, *verdict.not_testable, *verdict.absent)}
     known |= {i for e in verdict.effects for i in e.alternatives}
     flown = verdict.kind == "flight"
     silent = [effect_words(i) for i, e in catalogue().items() if i not in known and not (flown and e.of_the_rig)]
-    data = page_data(analysis, verdict, main)
-    data["regimes"]["first"] = _first_variable(verdict, main, data["regimes"]["variables"])
-    claimed = by_share([e for e in verdict.effects if e.status in ("established", "ambiguous")])
-    scripts = page_file("uPlot.iife.min.js"), page_file("page.js")
-    page = environment.from_string(page_file("page.html")).render(
-        css=Markup(page_file("uPlot.min.css") + page_file("page.css")),
-        policy=_policy_for(*scripts),
-        library=Markup(scripts[0]),
-        script=Markup(scripts[1]),
-        data=_embedded(data),
-        has_figure=bool(data["traces"]),
-        has_regimes=bool(data["regimes"]["channels"]),
-        has_replay=data["replay"] is not None,
-        set=verdict.set,
-        runs=_runs_text(verdict),
-        word=_WORDS[verdict.verdict],
-        word_class=verdict.verdict,
-        headline=pretty(verdict.sentence),
-        basis=verdict.basis.sentence,
-        doubts=[{"sentence": pretty(d.sentence), "stops": d.stops} for d in verdict.doubts],
-        warnings=[pretty(text) for text in verdict.warnings],
-        tiles=[
-            {"heading": t.heading, "large": pretty(t.large), "small": pretty(t.small)} for t in tiles(verdict, main)
-        ],
-        steps=_step_rows(verdict),
-        details=[pretty(text) for text in verdict.details],
-        where_text=_where_text(verdict),
-        strip=strip(analysis, verdict),
-        locations=shown,
-        more_locations=more,
-        what_text=_what_text(verdict),
-        effects=[_effect_block(e, _finding_of(e, analysis)) for e in claimed],
-        suggested=[_effect_block(e, _finding_of(e, analysis)) for e in verdict.effects if e.status == "suggested"],
-        values=[_value_range(name, *v) for name, v in analysis.values.items()],
-        all_values=verdict.believed_values,
-        correlated=_correlated_text(verdict),
-        # Those first whose interval leaves out nothing.
-        derivatives=sorted(verdict.derivatives, key=lambda d: not (d.interval_95[0] > 0 or d.interval_95[1] < 0)),
-        quantities=_QUANTITY_WORDS,
-        causes=lambda d: [effect_words(i) for i in would_explain(d.channel, d.quantity, verdict)],
-        delivered=verdict.delivered,
-        models=_MODELS,
-        better_text=_better_text(verdict),
-        forward_text=_forward_text(verdict),
-        table=_error_table(verdict.channels, data["fit_percent"]),
-        rest=_rest_text(verdict),
-        ruled_out=[_ruled_out(e) for e in verdict.effects if e.status in ("absorbed", "not_established")],
-        silent=listed(silent),
-        limits=[_limit_row(a) for a in verdict.absent],
-        not_testable=verdict.not_testable,
-        next=next_text(verdict, analysis.recordings),
-        ledger=[_ledger_row(row) for row in ledger],
-        notes=_notes(analysis, forward_notes),
-    )
-    return spoken(page, analysis)
+    return {
+        "ruled_out": [_ruled_out(e) for e in verdict.effects if e.status in ("absorbed", "not_established")],
+        "silent": listed(silent),
+        "limits": [_limit_row(a) for a in verdict.absent],
+    }
 
 
 def _policy_for(*scripts: str) -> str:
@@ -183,8 +205,9 @@ def by_share(effects: Sequence[EffectVerdict]) -> list[EffectVerdict]:
 
 def _limit_row(limit: Absent) -> dict[str, str]:
     """A row of the table of what was not found; `bar` is a share of the scale from 0.001 % to 100 % of the weight."""
+    limit_decades = 5.0  # Decades below the weight that the bars of the limits show.
     share = limit.share_of_weight
-    decades = 0.0 if not share else float(np.clip(1.0 + np.log10(share) / _LIMIT_DECADES, 0.0, 1.0))
+    decades = 0.0 if not share else float(np.clip(1.0 + np.log10(share) / limit_decades, 0.0, 1.0))
     size = Markup("")
     if limit.at_most is not None:
         size = Markup("|{}| ≤ {}").format(
@@ -482,19 +505,16 @@ _QUANTITY_WORDS = {
 }
 
 
-_FARTHEST = 100.0
-"""Error over noise at which the bar of the table of errors ends."""
-
-
 def _bars(channel: Channel) -> Markup:
     """Errors as believed (open) and improved (full) next to the noise (line), on a logarithmic scale."""
+    farthest = 100.0  # Error over noise at which the bar of the table of errors ends.
     errors, _ = errors_of(channel)
     if not channel.noise_floor or errors.before is None or errors.after is None:
         return Markup("")
 
     def at(value: float) -> float:
-        ratio = min(max(value / channel.noise_floor, 0.5), _FARTHEST)
-        return 6 + 100 * math.log(ratio / 0.5) / math.log(_FARTHEST / 0.5)
+        ratio = min(max(value / channel.noise_floor, 0.5), farthest)
+        return 6 + 100 * math.log(ratio / 0.5) / math.log(farthest / 0.5)
 
     return Markup(
         '<svg viewBox="0 0 112 14" role="img" aria-label="{}">'

@@ -33,18 +33,15 @@ _FIRST_SHOWN_S = 10.0
 _FRAMES_PER_S = 25.0
 _BUDGET = 800_000
 """Values that the page may hold of all traces together; 800 000 are 2.2 MB."""
-_MOST_BLOCKS = 4000
-_LONGEST_LAG_S = 1.0
-_MOST_LAGS = 60
-_MISSING = -32768
 
 
 def packed(values: np.ndarray) -> dict:
     """A series (n,) as 16-bit integers times a scale; NaN as the smallest integer."""
+    missing = -32768
     values = np.asarray(values, float)
     top = float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else 0.0
     scale = float(f"{top / 32767:.6e}") if top > 0 else 1.0
-    whole = np.full(len(values), _MISSING, "<i2")
+    whole = np.full(len(values), missing, "<i2")
     known = np.isfinite(values)
     whole[known] = np.clip(np.rint(values[known] / scale), -32767, 32767)
     return {"scale": scale, "data": base64.b64encode(whole.tobytes()).decode()}
@@ -154,6 +151,7 @@ def _frames(run: str, flown: dict[str, np.ndarray]) -> dict:
 
 def _regimes(analysis: Analysis, by_pair: dict[tuple[str, str], list[ChannelTrace]]) -> dict:
     """Size of the error by half seconds next to what was flown: variables and, by channel, before and after."""
+    most_blocks = 4000
     variables = sorted({v for known in analysis.regimes.values() for v in known if v != "time_s"})
     channels = list(dict.fromkeys(c for _, c in by_pair))
     rows: dict[str, dict[str, list[np.ndarray]]] = {}
@@ -181,7 +179,7 @@ def _regimes(analysis: Analysis, by_pair: dict[tuple[str, str], list[ChannelTrac
     out: dict[str, dict] = {}
     for channel, columns in rows.items():
         joined = {k: np.concatenate(v) for k, v in columns.items()}
-        every = max(1, int(np.ceil(len(joined["before"]) / _MOST_BLOCKS)))
+        every = max(1, int(np.ceil(len(joined["before"]) / most_blocks)))
         out[channel] = {k: packed(v[::every]) for k, v in joined.items() if np.isfinite(v).any()}
     names = {v: " ".join(filter(None, (regime_words(v)[0], f"({regime_words(v)[1]})" if regime_words(v)[1] else "")))
              for v in variables}  # fmt: skip
@@ -200,6 +198,8 @@ def _correlations(
 
     `band` is what 99 % of correlations of white noise lie within (2.58 over the square root of the samples).
     """
+    longest_lag_s = 1.0
+    most_lags = 60
     part = fitted_part(analysis)
     out = {}
     for channel in channels:
@@ -208,8 +208,8 @@ def _correlations(
         if not held:
             continue
         period = float(np.median(np.diff(held[0].time_s)))
-        step = max(1, int(round(_LONGEST_LAG_S / period / _MOST_LAGS)))
-        lags = np.arange(0, int(_LONGEST_LAG_S / period) + 1, step)
+        step = max(1, int(round(longest_lag_s / period / most_lags)))
+        lags = np.arange(0, int(longest_lag_s / period) + 1, step)
         samples = sum(len(t.time_s) for t in held)
         out[channel] = {
             "lag_s": [round(float(x), 5) for x in lags * period],

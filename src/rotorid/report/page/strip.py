@@ -30,8 +30,6 @@ _WIDTH, _LEFT, _RIGHT, _BETWEEN = 640, 104, 62, 6
 _LINE, _HEAD, _FOOT, _APART = 18, 30, 30, 14
 _LETTER = 4.6
 """Width of a letter of a run's name."""
-_SHARP = 2
-"""Columns of a picture per unit of width."""
 _STAGES = {"before": "as believed", "after": "improved"}
 
 _Sizes = Mapping[tuple[str, str, str], tuple[np.ndarray, np.ndarray]]
@@ -149,7 +147,8 @@ def _span(run: str, sizes: _Sizes) -> tuple[float, float]:
 
 def _picture(place: _Place, sizes: Sequence[tuple[np.ndarray, np.ndarray] | None]) -> str:
     """The sizes of each channel as a PNG's address: a channel is five lines high, the lowest of them empty."""
-    columns = max(1, round(_SHARP * place.width))
+    sharp = 2  # Columns of a picture per unit of width.
+    columns = max(1, round(sharp * place.width))
     at_s = place.start_s + (np.arange(columns) + 0.5) / columns * (place.stop_s - place.start_s)
     pixels = np.zeros((5 * len(sizes), columns, 4), np.uint8)
     for line, own in enumerate(sizes):

@@ -27,8 +27,6 @@ _WORDS = {"established": style.BLUE, "ambiguous": style.ORANGE, "suggested": sty
 _CLAIMED = ("established", "ambiguous")
 _ABREAST = 4
 """Quantities next to each other."""
-_MOST_POINTS = 1500
-"""Points of a line at most: more are not seen at the width of a page."""
 
 
 def draw_values(found: Changes, names: Mapping[str, str], path: Path) -> None:
@@ -48,13 +46,14 @@ def draw_values(found: Changes, names: Mapping[str, str], path: Path) -> None:
 
 def draw_residuals(found: Changes, names: Mapping[str, str], path: Path) -> None:
     """What each set's believed vehicle leaves of every force and moment, over the time of a stretch of each."""
+    most_points = 1500  # Points of a line at most: more are not seen at the width of a page.
     channels = [c for c in found.residuals[0] if c in found.residuals[1]]
     fig, axes = style.figure(1.25 * max(1, len(channels)) + 0.4, max(1, len(channels)), 1, squeeze=False, sharex=True)
     for axis, channel in zip(axes[:, 0], channels, strict=False):
         names_of_sets = ("good flights" if found.kind == "flight" else found.base, found.new)
         for sets, name, colour in zip(found.residuals, names_of_sets, (style.BLUE, style.RED), strict=True):
             left = sets[channel]
-            step = max(1, len(left.time_s) // _MOST_POINTS)
+            step = max(1, len(left.time_s) // most_points)
             axis.plot(left.time_s[::step] - left.time_s[0], left.values[::step], color=colour, lw=0.7, label=name)
         axis.set_ylabel(f"{names[channel]}\n({'N' if channel.startswith('force') else 'N m'})")
     if channels:
@@ -174,18 +173,15 @@ def _over_time(axis, own: pd.DataFrame, order: dict[str, int], count: int) -> No
         axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
-_MOST_HISTORIES = 8
-"""Vehicles whose history is drawn, those with the most events first."""
-
-
 def draw_history(numbers: pd.DataFrame, events: pd.DataFrame, path: Path) -> None:
     """Each vehicle's trims, shares and thrust over its sets, as changes since its first ones with intervals (95 %).
 
     `numbers` and `events` are the tables of `rotorid.report.fleet.history`. A quantity that differs from
     some set on has a colour, the others are grey; a line stands where an event begins.
     """
+    most_histories = 8  # Vehicles whose history is drawn, those with the most events first.
     counts = events["vehicle"].value_counts()
-    vehicles = sorted(numbers["vehicle"].unique(), key=lambda v: (-counts.get(v, 0), v))[:_MOST_HISTORIES]
+    vehicles = sorted(numbers["vehicle"].unique(), key=lambda v: (-counts.get(v, 0), v))[:most_histories]
     rows = max(1, len(vehicles))
     fig, axes = style.figure(1.7 * rows + 0.3, rows, 1, squeeze=False)
     if not vehicles:

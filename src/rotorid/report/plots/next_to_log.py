@@ -10,12 +10,12 @@ from rotorid.mismatch.deliver.flown import UNITS
 from rotorid.report.next_to_log import NextToLog
 from rotorid.report.plots import style
 
-_SHOWN_WINDOWS = 8
 _LINES = {"believed": ("before", "believed vehicle"), "improved": ("after", "improved vehicle, here")}
 
 
 def draw(found: NextToLog, path: Path) -> None:
     """Write the figure as PNG: growth of the error in velocity and attitude, and velocities of some windows."""
+    shown_windows = 8
     style.use()
     import matplotlib.pyplot as plt
 
@@ -32,7 +32,7 @@ def draw(found: NextToLog, path: Path) -> None:
         ax.set_ylim(bottom=0)
     axes[0].legend()
     ax, velocity = axes[-1], found.flown[0].velocity is not None
-    chosen = np.unique(np.linspace(0, len(found.windows) - 1, min(_SHOWN_WINDOWS, len(found.windows))).astype(int))
+    chosen = np.unique(np.linspace(0, len(found.windows) - 1, min(shown_windows, len(found.windows))).astype(int))
     for place, k in enumerate(chosen):
         window, made = found.windows[k], found.flown[k]
         series = (window.recorded.velocity, made.velocity) if velocity else (

@@ -28,19 +28,10 @@ from rotorid.vehicle.exports.derivatives import left_of_one_damping, own_damping
 from rotorid.vehicle.exports.forms import KNOWS, Exported, Parts, allocated, named_in_one_line, parts_of, sdf
 from rotorid.vehicle.mixer import hover_speed_rad_s
 
-_NUMBER = 22000
-"""SYS_AUTOSTART: PX4 leaves 22000 to 22999 to airframes of one's own."""
-_LOW_START = 0.05
-"""Share of the highest speed below which the lowest counts as none: PX4's curve has no start above 0."""
-_GYROSCOPE_RAD_S = 8.7e-4
-_ACCELEROMETER_M_S2 = (6.4e-3, 6.4e-3, 6.9e-3)
-"""Noise of the sensors where the vehicle states none: that of the x500."""
 _CORNERS = ((1, 1), (-1, -1), (1, -1), (-1, 1))
 """Signs of the places (x forward, y right) in that order."""
 _SENSES = (1, 1, -1, -1)
 """Signs of the yaw moments: front right and rear left turn counter-clockwise."""
-_FASTEST_S = 0.005
-"""Shortest SIH_T_TAU that its Euler step of 4 ms stands."""
 _INERTIA_TIMES, _LEAST_DETERMINANT = 100.0, np.finfo(np.float32).eps
 """SIH inverts so many times the inertia, and its 3 by 3 inverse is zero where the determinant is not above this, single
 precision's epsilon (sih.cpp, `init_variables`; matrix/SquareMatrix.hpp, `inv`)."""
@@ -114,6 +105,7 @@ def px4_sih(vehicle: Vehicle) -> Exported:
     SIH_L_PITCH; drag −SIH_KDV v and damping −SIH_KDW Ω. The file says what of the tool flies otherwise
     (`_OF_THE_TOOL`).
     """
+    fastest_s = 0.005  # Shortest SIH_T_TAU that its Euler step of 4 ms stands.
     parts, order, full, left = _in_x(vehicle, "px4-sih", "PX4's SIH")
     places, thrust, torque = parts.places[order], parts.thrust[order], parts.torque[order]
     for words, values in (("roll", places[:, 1]), ("pitch", places[:, 0])):
@@ -132,9 +124,9 @@ def px4_sih(vehicle: Vehicle) -> Exported:
     own, weights = own_damping(vehicle, turning=True)
     damping = max(float(np.mean(parts.damping) + np.average(own, weights=weights / np.diag(j) ** 2)), 0.0)
     up, down = parts.tau_s
-    tau_s = max((up + down) / 2, _FASTEST_S)
+    tau_s = max((up + down) / 2, fastest_s)
     if tau_s > (up + down) / 2:
-        left.append(f"rotors that follow within {(up + down) / 2:g} s: SIH's steps stand {_FASTEST_S:g} s")
+        left.append(f"rotors that follow within {(up + down) / 2:g} s: SIH's steps stand {fastest_s:g} s")
     left.append("motor signals: in SIH thrust is proportional to them, so THR_MDL_FAC belongs to 0 there")
     if vehicle.gravity_m_s2 != 9.81:
         left.append(f"gravity of {vehicle.gravity_m_s2:g} m/s²: SIH has that of its latitude")
@@ -189,22 +181,26 @@ def sih_inertia(values: dict[str, float]) -> np.ndarray:
 
 def gazebo_airframe(vehicle: Vehicle) -> Exported:
     """The model with sensors, `model.config`, and the airframe script, the last two as companions."""
+    autostart = 22000  # SYS_AUTOSTART: PX4 leaves 22000 to 22999 to airframes of one's own.
     vehicle = named_in_one_line(vehicle)
     model = sdf(vehicle)
     # A name that a shell and Gazebo take.
     name = re.sub(r"[^a-z0-9]+", "_", vehicle.name.lower()).strip("_") or "vehicle"
     text = model.text.replace("    </link>\n", f"{_sensors(vehicle)}    </link>\n", 1)
     text = re.sub(r"<model name=(\"[^\"]*\"|'[^']*')>", f'<model name="{name}">', text, count=1)
-    companions = {"model.config": _description(vehicle, name), f"{_NUMBER}_gz_{name}": _airframe(vehicle, name)}
+    companions = {"model.config": _description(vehicle, name), f"{autostart}_gz_{name}": _airframe(vehicle, name)}
     said = f"places of the files: model.sdf and model.config in a folder {name} on GZ_SIM_RESOURCE_PATH"
     return replace(model, text=text, left_out=(*model.left_out, said), companions=companions)
 
 
 def _sensors(vehicle: Vehicle) -> str:
     """IMU, barometer, magnetometer and satellite receiver of the body's link."""
-    gyro = vehicle.noise.angular_velocity_rad_s or _GYROSCOPE_RAD_S
+    # Noise of the sensors where the vehicle states none: that of the x500.
+    gyroscope_rad_s = 8.7e-4
+    accelerometer_m_s2 = (6.4e-3, 6.4e-3, 6.9e-3)
+    gyro = vehicle.noise.angular_velocity_rad_s or gyroscope_rad_s
     stated = vehicle.noise.specific_force_m_s2
-    accelerometer = (stated,) * 3 if stated else _ACCELEROMETER_M_S2
+    accelerometer = (stated,) * 3 if stated else accelerometer_m_s2
     place = " ".join(f"{v:.9g}" for v in np.asarray(vehicle.accelerometer_position_m) * [1, -1, -1])
 
     def axes(values) -> str:
@@ -249,6 +245,8 @@ def _description(vehicle: Vehicle, name: str) -> str:
 
 def _airframe(vehicle: Vehicle, name: str) -> str:
     """The airframe script: places, senses and torques of the rotors, the range of their speeds, the hover."""
+    # Share of the highest speed below which the lowest counts as none: PX4's curve has no start above 0.
+    low_start = 0.05
     parts = parts_of(vehicle, frozenset({"com_offset", "command_saturation"}))
     low, high = parts.limits_rad_s or (0.0, _RICHEST * hover_speed_rad_s(vehicle))
     lines = [
@@ -266,7 +264,7 @@ def _airframe(vehicle: Vehicle, name: str) -> str:
             f"param set-default SIM_GZ_EC_MAX{i} {round(high)}",
         ]
     share = vehicle.mass_kg * vehicle.gravity_m_s2 / float((parts.thrust * high**2).sum())
-    squared = low < _LOW_START * high
+    squared = low < low_start * high
     # The signal at which speeds from the lowest to the highest make that share of the thrust.
     hover = share if squared else (float(np.sqrt(share)) - low / high) / (1 - low / high)
     lines += [

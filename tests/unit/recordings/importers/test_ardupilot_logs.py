@@ -104,7 +104,8 @@ def test_copter_3_3_is_read_by_its_clock_in_milliseconds() -> None:
     own = plain(path, "IMU", "RCOU", "ATT")
     assert len(log["IMU"]) == len(own["IMU"]) == 21322
     assert log["IMU"][c.TIME].to_numpy() == pytest.approx(own["IMU"]["TimeMS"].to_numpy() * 1e-3)
-    runs, faults, order = ardupilot.read_ardupilot(path)
+    found = ardupilot.IMPORTER.read(path)
+    runs, faults, order = found.runs, found.faults, found.known.autopilot
     assert order == "ardupilot"
     start = own["IMU"]["TimeMS"].iloc[0] * 1e-3
     assert any("EKF1" in f.found and "AHRS_EKF_USE" in f.found for f in faults)
@@ -183,7 +184,8 @@ def test_the_public_logs_keep_what_is_in_the_air() -> None:
     """Rows that are kept have the throttle of flight; idle, spool-up and the wait after a crash are gone."""
     kept = {}
     for name in ("copter-3.4_22.BIN", "copter-3.3-dev_31.BIN"):
-        runs, faults, _ = ardupilot.read_ardupilot(public(name))
+        found = ardupilot.IMPORTER.read(public(name))
+        runs, faults = found.runs, found.faults
         assert any(f.kind == "on_ground" for f in faults)
         for run in runs.values():
             mean = run[THROTTLES].mean(axis=1).dropna()
@@ -446,8 +448,10 @@ def test_a_run_ends_where_an_estimate_is_set_anew(tmp_path: Path, monkeypatch, w
             for kind, fields in RESETS[what].items()}  # fmt: skip
     log, table = tables(LIMITS) | more, pd.DataFrame({c.TIME: time_s})
     monkeypatch.setattr(ardupilot, "read_messages", lambda path: log)
+    monkeypatch.setattr(ardupilot, "_stated_parameters", lambda path: {})
     monkeypatch.setattr(ardupilot, "convert", lambda log, path: (table, [], np.ones(1000, bool)))
-    runs, faults, _ = ardupilot.read_ardupilot(tmp_path / "log.bin")
+    found = ardupilot.IMPORTER.read(tmp_path / "log.bin")
+    runs, faults = found.runs, found.faults
     assert [run[c.TIME].iloc[-1] for run in runs.values()] == pytest.approx([7.28, 9.8], abs=1.2)
     assert any(f"{what}" in f.found and "first at 8.00 s" in f.found for f in faults)
 

@@ -14,7 +14,7 @@ from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings import templates
 from rotorid.recordings.files import check_belief
-from rotorid.recordings.importers import crazyflie, known, px4_ulog
+from rotorid.recordings.importers import crazyflie, px4_ulog
 from rotorid.recordings.importers.crazyflie import TYPES, decode_usd_log, read_usd_log
 from rotorid.recordings.importers.faults import (
     blank_held,
@@ -763,11 +763,11 @@ def test_px4_rotors_and_torque_come_from_control_allocation() -> None:
     for i, (x, y, km) in enumerate([(0.1, 0.2, 0.05), (-0.1, -0.2, -0.03)]):
         parameters |= {f"CA_ROTOR{i}_PX": x, f"CA_ROTOR{i}_PY": y, f"CA_ROTOR{i}_PZ": 0.0, f"CA_ROTOR{i}_KM": km}
     assert px4_ulog.rotor_count(px4(parameters)) == 2
-    found, faults = known.px4_vehicle(parameters, 2)
+    found, faults = px4_ulog.px4_vehicle(parameters, 2)
     assert [(r.x_m, r.y_m, r.spin) for r in found.rotors] == [(0.1, 0.2, "ccw"), (-0.1, -0.2, "cw")]
     assert found.torque_over_thrust_m == pytest.approx(0.04)
     assert kinds(faults) == ["unequal_rotors"]
-    assert known.px4_vehicle({}, 4)[0].rotors is None
+    assert px4_ulog.px4_vehicle({}, 4)[0].rotors is None
 
 
 @pytest.mark.parametrize(
@@ -824,7 +824,7 @@ def test_px4_a_tilted_rotor_is_named_by_its_whole_axis(axis: dict[str, float], t
     values = {f"CA_ROTOR2_{k}": v for k, v in axis.items()}
     if places:
         values |= {f"CA_ROTOR{i}_{k}": 0.1 for i in range(4) for k in ("PX", "PY", "PZ", "KM")}
-    _, faults = known.px4_vehicle(values, 4)
+    _, faults = px4_ulog.px4_vehicle(values, 4)
     assert kinds(faults) == ["tilted_rotor"] * tilted
     assert all("rotor 3 tilted" in f.found for f in faults)
 
@@ -840,10 +840,11 @@ def test_px4_a_tilted_rotor_is_named_by_its_whole_axis(axis: dict[str, float], t
     ],
 )
 def test_px4_what_a_vehicle_file_cannot_hold_is_named(values: dict[str, float], kind: str, said: str) -> None:
-    _, faults = known.px4_vehicle(values, 4)
+    _, faults = px4_ulog.px4_vehicle(values, 4)
     assert kinds(faults) == [kind] and said in faults[0].found
     assert (
-        not known.px4_vehicle(dict.fromkeys(values, 0.0) | {k: 0.05 for k in values if "KM" in k}, 4)[1] or "CT" in said
+        not px4_ulog.px4_vehicle(dict.fromkeys(values, 0.0) | {k: 0.05 for k in values if "KM" in k}, 4)[1]
+        or "CT" in said
     )
 
 
@@ -853,7 +854,7 @@ def test_coaxial_rotors_make_a_vehicle_and_are_named_where_no_distance_is_stated
     for i in range(6):
         own = {"PX": np.cos(i // 2), "PY": np.sin(i // 2), "PZ": apart_m * (i % 2), "KM": 0.05 * (-1) ** i}
         values |= {f"CA_ROTOR{i}_{name}": value for name, value in own.items()}
-    vehicle, faults = known.px4_vehicle(values, 6)
+    vehicle, faults = px4_ulog.px4_vehicle(values, 6)
     said = [f.found for f in faults if f.kind == "coaxial"]
     assert len(said) == (not apart_m) and all("rotors 1 and 2, 3 and 4, 5 and 6 are on one spot" in s for s in said)
     check_belief(templates.read("x500").model_copy(update={"rotors": vehicle.rotors}), "vehicle.yaml")

@@ -17,7 +17,7 @@ from rotorid.errors import InputError
 from rotorid.recordings import columns as c
 from rotorid.recordings import read_set
 from rotorid.recordings.importers.known import ORDERS, quad_x
-from rotorid.recordings.importers.logfile import format_of, read_log, set_of_logs
+from rotorid.recordings.importers.logfile import importer_of, read_log, set_of_logs
 from tests.command_line import answer, invoke, refusal
 from tests.public_logs import public
 from tests.refusals import refused
@@ -452,9 +452,9 @@ def test_dataflash_needs_no_package_of_others(tmp_path: Path, monkeypatch) -> No
 def test_a_format_is_recognised_by_more_than_its_first_byte(tmp_path: Path, start: bytes, name: str | None) -> None:
     (tmp_path / "log.dat").write_bytes(start + bytes(60))
     if name is None:
-        refused("not a log that rotorid knows", format_of, tmp_path / "log.dat")
+        refused("not a log that rotorid knows", importer_of, tmp_path / "log.dat")
     else:
-        assert format_of(tmp_path / "log.dat") == name
+        assert importer_of(tmp_path / "log.dat").name == name
 
 
 @pytest.mark.slow
@@ -475,7 +475,7 @@ def test_stray_bytes_before_the_first_header_cost_nothing(tmp_path: Path, log: s
 
 
 def test_a_folder_is_a_bag_only_with_its_metadata(tmp_path: Path) -> None:
-    refused("expected a log, found a folder", format_of, tmp_path)
+    refused("expected a log, found a folder", importer_of, tmp_path)
 
 
 def test_a_betaflight_log_becomes_a_set_with_betaflights_order_of_rotors(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from rotorid.recordings import columns as c
-from rotorid.recordings.importers.logfile import format_of, read_log
+from rotorid.recordings.importers.logfile import importer_of, read_log
 from tests.refusals import refused
 from tests.unit.recordings.importers.test_log_formats import PARAMETERS, SPEEDS, STATE, THROTTLES, check_against, flown
 
@@ -78,5 +78,5 @@ def test_another_vehicles_telemetry_is_one_sentence(tmp_path: Path) -> None:
     path.write_bytes(telemetry(flown().head(20), kind=PLANE))
     refused("the telemetry is of no multirotor \\(MAV_TYPE 1\\)", read_log, path)
     path.write_bytes(telemetry(flown().head(20))[:400])
-    assert format_of(path) == "mavlink"
+    assert importer_of(path).name == "mavlink"
     refused("holds no ATTITUDE", read_log, path)

@@ -182,7 +182,8 @@ def read_back(
     path: Path, flight: Flight, topics: dict[str, tuple[Callable, Callable, int]]
 ) -> tuple[pd.DataFrame, list]:
     """The one run of a bag of these topics, and its faults."""
-    runs, faults, _ = ros.read_ros(written(path, flight, topics))
+    found = ros.IMPORTER.read(written(path, flight, topics))
+    runs, faults = found.runs, found.faults
     (run,) = runs.values()
     return run, faults
 
@@ -358,7 +359,8 @@ def test_px4s_own_messages_mean_what_its_logs_mean(tmp_path: Path, order: tuple[
         "/fmu/out/esc_status": (of("EscStatus", **escs), at, 1),
         "/fmu/out/vehicle_land_detected": (of("VehicleLandDetected", landed=lambda k: k < 320), at, 1),
     }
-    runs, faults, unit = ros.read_ros(written(tmp_path / "a", flight, topics))
+    found = ros.IMPORTER.read(written(tmp_path / "a", flight, topics))
+    runs, faults, unit = found.runs, found.faults, found.speed_unit
     found = {f.kind for f in faults}
     assert {"estimator_reset", "speed_missing", "stopped"} <= found and unit == "rpm"
     (run,) = runs.values()
@@ -454,7 +456,8 @@ def test_an_array_of_all_outputs_gives_every_motor_and_no_servo(tmp_path: Path, 
         return flight("mavros_msgs/msg/RCOut", header=flight.header(at(k)), channels=pulses[k].copy())
 
     path = written(tmp_path / "a", flight, usual(flight, "/imu", "/odom") | {"/mavros/rc/out": (out, at, 1)})
-    runs, faults, _ = ros.read_ros(path)
+    found = ros.IMPORTER.read(path)
+    runs, faults = found.runs, found.faults
     (run,) = runs.values()
     names = c.rotor_columns("throttle", motors)
     truth = flight.table.assign(**dict(zip(names, throttle.T, strict=True)))
@@ -549,7 +552,8 @@ def test_a_bag_that_ends_early_keeps_what_came(form, tmp_path: Path, name: str, 
     found = ros._found(path)
     times = [row[1] for row in found.rows["rates", "/imu"]]
     assert found.cut and len(times) > 0.6 * share * 1200, len(times)
-    runs, faults, _ = ros.read_ros(path)
+    found = ros.IMPORTER.read(path)
+    runs, faults = found.runs, found.faults
     assert "cut_off" in kinds(faults)
     check_against(next(iter(runs.values())), flown(), (*c.ANGULAR_VELOCITY, *c.VELOCITY, *SPEEDS), 1e-4)
 
@@ -633,7 +637,8 @@ def test_a_channel_that_is_not_of_ros_is_named_and_the_rest_is_read(
     path = tmp_path / "log.mcap"
     whole = _without_summary(data[first:])
     path.write_bytes(head + channels + message + whole + message + record(2, bytes(20)) + data[:8])
-    runs, faults, _ = ros.read_ros(path)
+    found = ros.IMPORTER.read(path)
+    runs, faults = found.runs, found.faults
     check_against(next(iter(runs.values())), flown(), (*c.ANGULAR_VELOCITY, *SPEEDS), 1e-4)
     (said,) = [f.sentence for f in faults if f.kind == "unread"]
     assert f"/state ({encoding})" in said and "cut_off" not in kinds(faults)
@@ -656,7 +661,7 @@ def test_a_file_of_nothing_but_foreign_channels_names_them(tmp_path: Path) -> No
     body += record(3, struct.pack("<H", 1) + text("S") + text("jsonschema") + text("{}"))
     body += record(4, struct.pack("<HH", 1, 1) + text("/state") + text("json") + text(""))
     path.write_bytes(b"\x89MCAP0\r\n" + body + record(2, bytes(20)) + b"\x89MCAP0\r\n")
-    refused(r"no topic of a type that is known; found /state \(json\)", ros.read_ros, path)
+    refused(r"no topic of a type that is known; found /state \(json\)", ros.IMPORTER.read, path)
 
 
 # Which topic, and which axes ----------------------------------------------------------------------
@@ -731,7 +736,7 @@ def test_an_inertial_sensor_whose_axes_are_not_the_vehicles(tmp_path: Path, turn
     check_against(read, flight.table[::2].reset_index(drop=True), c.SPECIFIC_FORCE, 1e-4)
     del topics["/imu"]
     with pytest.raises(InputError, match=r"/camera/imu reads .* m/s² along [yz] in the median, expected 9.8 along z"):
-        ros.read_ros(written(tmp_path / "b", flight, topics))
+        ros.IMPORTER.read(written(tmp_path / "b", flight, topics))
 
 
 def test_numbers_that_mean_nothing_are_empty_cells(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.guessing import guess
-from rotorid.recordings.importers.logfile import format_of, read_log
+from rotorid.recordings.importers.logfile import importer_of, read_log
 from rotorid.recordings.importers.mapping import Mapping, read_by_mapping, read_columns
 from tests.refusals import refused
 
@@ -128,7 +128,7 @@ def test_blackbox_explorer(cut: int, tmp_path: Path) -> None:
     body = pd.DataFrame(table).to_csv(index=False, na_rep="NaN")
     path = tmp_path / "log.bbl.csv"
     path.write_text((head + body)[: -cut or None])
-    assert format_of(path) == "betaflight"
+    assert importer_of(path).name == "betaflight"
     (run,) = read_log(path).runs.values()
     assert len(run) == n - (cut > 0)
     assert run[c.ANGULAR_VELOCITY[0]].mean() == pytest.approx(np.radians(57.3), rel=1e-6)

@@ -11,7 +11,7 @@ from rotorid.io.text.files import parse_yaml
 from rotorid.recordings import columns as c
 from rotorid.recordings import templates
 from rotorid.recordings.files import vehicle_of
-from rotorid.recordings.importers import known
+from rotorid.recordings.importers import px4_ulog
 from rotorid.recordings.importers.known import propose
 from rotorid.recordings.importers.logfile import carrying_unit, in_unit_of_weight, read_log, set_of_logs
 from rotorid.recordings.importers.logfile import usual_coefficient as coefficient
@@ -94,7 +94,7 @@ def test_a_geometry_of_one_metre_is_directions_alone() -> None:
     parameters: dict[str, float] = {}
     for i, (x, y, km) in enumerate([(1, 1, 0.05), (-1, -1, 0.05), (1, -1, -0.05), (-1, 1, -0.05)]):
         parameters |= {f"CA_ROTOR{i}_PX": x, f"CA_ROTOR{i}_PY": y, f"CA_ROTOR{i}_PZ": 0.0, f"CA_ROTOR{i}_KM": km}
-    found, _ = known.px4_vehicle(parameters, 4)
+    found, _ = px4_ulog.px4_vehicle(parameters, 4)
     assert found.rotors is None and len(found.directions) == 4
     template = templates.read("x500")
     text, remarks = propose("own", [], found, template, "x500", 2.0)
@@ -105,7 +105,7 @@ def test_a_geometry_of_one_metre_is_directions_alone() -> None:
         (1, 1, "ccw"), (-1, -1, "ccw"), (1, -1, "cw"), (-1, 1, "cw"),
     ]  # fmt: skip
     assert any("±1 m is unset" in remark for remark in remarks)
-    real, _ = known.px4_vehicle(parameters | {"CA_ROTOR0_PX": 0.9}, 4)
+    real, _ = px4_ulog.px4_vehicle(parameters | {"CA_ROTOR0_PX": 0.9}, 4)
     assert real.rotors is not None and real.directions is None
 
 

@@ -9,7 +9,7 @@ import pytest
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.guessing import guess
 from rotorid.recordings.importers.guessing.names import families
-from rotorid.recordings.importers.logfile import format_of, set_of_logs
+from rotorid.recordings.importers.logfile import importer_of, set_of_logs
 from rotorid.recordings.importers.mapping import SPELLINGS, UNITS, bracketed, converted, read_columns, stated, unit_of
 from rotorid.recordings.importers.rcbenchmark import HEADINGS, read_rcbenchmark
 from tests.refusals import refused
@@ -269,8 +269,8 @@ def test_steady_points_of_a_stand(name: str, factor: float, unit: str, speed: st
 )
 def test_an_export_of_another_stand_is_a_table(tmp_path: Path, heading: str) -> None:
     (tmp_path / "a.csv").write_text(f"Time (s),{heading}\n0,1,2,3\n")
-    assert format_of(tmp_path / "a.csv") == "csv"
-    assert format_of(export(tmp_path / "b.csv")) == "rcbenchmark"
+    assert importer_of(tmp_path / "a.csv").name == "table"
+    assert importer_of(export(tmp_path / "b.csv")).name == "rcbenchmark"
 
 
 @pytest.mark.parametrize(("sign", "body"), [(1, "flu"), (-1, "frd")])

@@ -37,10 +37,6 @@ _USUAL = {"voltage": (60.0, 2.5, 60.0), "current": (60.0, 0.0, 150.0), "temperat
 
 _USUAL_ACCELERATIONS = ("m/s2", "g", "mg")
 """Units of accelerometers that names need not state; counts can be as large as others."""
-_SLOWEST_STAND_HZ = 0.05
-"""Steady points of a stand may come so seldom."""
-_MOVES_ON = 0.5
-"""Share of the rows in which a clock moves on at least."""
 
 
 def guess(table: pd.DataFrame) -> Draft:
@@ -111,6 +107,8 @@ def _comment(found: Draft, key: str, indent: str) -> list[str]:
 
 
 def _guess_time(draft: Draft) -> None:
+    slowest_stand_hz = 0.05  # Steady points of a stand may come so seldom.
+    moves_on = 0.5  # Share of the rows in which a clock moves on at least.
     name = named.scalar(draft.table.columns, "time")
     if name is None:
         question = "no column is named as a time, and without one nothing can be imported"
@@ -125,7 +123,7 @@ def _guess_time(draft: Draft) -> None:
     steps = steps[steps > 0]
     usual = float(np.median(steps)) if len(steps) else np.nan
     stand = any(named.scalar(draft.table.columns, quantity) for quantity in ("thrust", "torque")) or six_axes(draft)
-    slowest = _SLOWEST_STAND_HZ if stand else RATES_HZ[0]
+    slowest = slowest_stand_hz if stand else RATES_HZ[0]
     fits = [u for u, f in UNITS["time"].items() if slowest <= 1 / (usual * f) <= RATES_HZ[1]] if usual > 0 else []
     stated = named.time_unit(name)
     seen = f"its usual step is {usual:.6g}"
@@ -136,7 +134,7 @@ def _guess_time(draft: Draft) -> None:
     else:
         unit, evidence = OPEN, f"by its name; {seen}"
         question = f"its name says {stated}, its step {' or '.join(fits)}" if stated else "its unit is not clear"
-    if moves < _MOVES_ON:
+    if moves < moves_on:
         unit, question = OPEN, f"it moves on in {moves:.0%} of the rows: is its fraction in another column?"
     draft.put("time", [name], evidence, question, unit=unit)
     if unit != OPEN and len(steps):

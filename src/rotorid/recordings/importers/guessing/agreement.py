@@ -28,12 +28,8 @@ MOVES = {"angle": 0.02, "velocity": 0.1, "position": 0.05}
 """Changes over a step below which a table says nothing: rad, m/s, m."""
 FACTOR_OFF = 0.15
 """How far a factor may be from that of a unit."""
-_FACTOR_OFF_COUNTS = 0.03
-"""The same where counts of usual sensors are near: 16.4 to 1 deg/s are 1.064 thousandths of rad/s each."""
 RATES_HZ = (5.0, 8000.0)
 """Rates at which tables are recorded."""
-_THOUSANDTHS = 100.0
-"""Median size of an accelerometer's reading above which it counts thousandths of g."""
 FASTEST_GYRO_RAD_S = 40.0
 STEP_S = 0.2
 
@@ -188,12 +184,13 @@ def triples_of(draft: Draft) -> list[Family]:
 
 def _with_units(draft: Draft, families: list[Family]) -> list[Family]:
     """MAVLink's sensors: m/s² and rad/s in HIGHRES_IMU; thousandths of g and rad/s in the messages of raw integers."""
+    thousandths = 100.0  # Median size of an accelerometer's reading above which it counts thousandths of g.
     message = {f.words - {f.stem}: f for f in named.of_mavlink(draft.table.columns) if f.stem == "acc"}
     out = []
     for family in families:
         if (force := message.get(family.words - {family.stem})) is not None:
             sizes = np.linalg.norm(draft.values(force.columns), axis=1)
-            raw = bool(np.isfinite(sizes).any()) and float(np.nanmedian(sizes)) > _THOUSANDTHS
+            raw = bool(np.isfinite(sizes).any()) and float(np.nanmedian(sizes)) > thousandths
             units = {"acc": ("m/s2", "mg"), "gyro": ("rad/s", "mrad/s")}[family.stem]
             family = replace(family, unit=units[raw])
         out.append(family)
@@ -215,7 +212,9 @@ def is_clear(agreed: Agreement, other: Agreement) -> bool:
 
 def unit_by_factor(kind: str, slope: float) -> str | None:
     """The unit whose factor a slope is within `FACTOR_OFF` of; None where there is none."""
-    off = {"mrad/s": _FACTOR_OFF_COUNTS}
+    # The same where counts of usual sensors are near: 16.4 to 1 deg/s are 1.064 thousandths of rad/s each.
+    factor_off_counts = 0.03
+    off = {"mrad/s": factor_off_counts}
     return next((u for u, f in UNITS[kind].items() if abs(slope / f - 1) < off.get(u, FACTOR_OFF)), None)
 
 

@@ -36,15 +36,6 @@ _BETAFLIGHTS = ("DShot", "pulses in µs")
 _UNNAMED = "no name says it"
 _OTHER_THINGS = frozenset("current amps temp temperature voltage volt volts power thrust torque force".split())
 """Words of what a motor has besides a speed and a throttle."""
-_LOWEST_PULSE_US = 880.0
-"""Pulses of motors that are disarmed go down to 900 µs."""
-_PULSES_OF_HOVER_US = 1300.0
-"""Above this in hover and never below 1000, DShot would be a motor that never gets less than half of its power."""
-_HOVERS = (0.12, 0.92)
-"""Shares of full throttle at which multirotors spend most of a flight."""
-_SLOWEST_ELECTRICAL_RPM = 3000.0
-_FASTEST_HUNDREDS = 12_000.0
-"""In hundreds of electrical turns a minute no motor turns faster than this in the middle of a flight."""
 
 
 def guess_rotors(draft: Draft, quantity: str) -> None:
@@ -161,6 +152,10 @@ def _possible_ranges(values: np.ndarray, family: Family, betaflight: bool) -> li
 
     Where several do, one whose end the throttles reach exactly.
     """
+    hovers = (0.12, 0.92)  # Shares of full throttle at which multirotors spend most of a flight.
+    lowest_pulse_us = 880.0  # Pulses of motors that are disarmed go down to 900 µs.
+    # Above this in hover and never below 1000, DShot would be a motor that never gets less than half of its power.
+    pulses_of_hover_us = 1300.0
     known = values[np.isfinite(values)]
     given = known[known > 0] if (known >= 0).all() else known
     if not len(given):
@@ -174,15 +169,15 @@ def _possible_ranges(values: np.ndarray, family: Family, betaflight: bool) -> li
     held = []
     for kind in among:
         bottom, full = _RANGES[kind]
-        below = _LOWEST_PULSE_US if kind == "pulses in µs" else bottom - 0.02 * (full - bottom)
+        below = lowest_pulse_us if kind == "pulses in µs" else bottom - 0.02 * (full - bottom)
         if (kind == "-1 to 1" and low >= 0) or (kind == "per ten thousand" and high <= _RANGES["DShot"][1]):
             continue
         if below <= low and high <= full + 0.02 * (full - bottom):
             held.append(kind)
     if named_so is None and not betaflight:
-        fits = [k for k in held if _HOVERS[0] <= (middle - _RANGES[k][0]) / np.ptp(_RANGES[k]) <= _HOVERS[1]]
+        fits = [k for k in held if hovers[0] <= (middle - _RANGES[k][0]) / np.ptp(_RANGES[k]) <= hovers[1]]
         held = fits or [k for k in held if k in ("a share", "-1 to 1")][:1] or held
-        if low >= _RANGES["pulses in µs"][0] and middle > _PULSES_OF_HOVER_US:
+        if low >= _RANGES["pulses in µs"][0] and middle > pulses_of_hover_us:
             held = [k for k in held if k != "DShot"]
     reached = [k for k in held if given.max() == _RANGES[k][1] or (_RANGES[k][0] > 0 and given.min() == _RANGES[k][0])]
     return reached if len(reached) == 1 and len(held) > 1 else held
@@ -194,12 +189,15 @@ def _is_electrical(family: Family) -> bool:
 
 def _speed_unit(family: Family, middle: float, betaflight: bool) -> tuple[str, str]:
     """Unit of rotor speeds by their names, else by where only one is possible; and why."""
+    slowest_electrical_rpm = 3000.0
+    # In hundreds of electrical turns a minute no motor turns faster than this in the middle of a flight.
+    fastest_hundreds = 12_000.0
     if _is_electrical(family):
         if family.unit == "100erpm" or betaflight:
             return "100erpm", "hundreds of electrical turns a minute, as Betaflight logs them"
-        if middle < _SLOWEST_ELECTRICAL_RPM:
+        if middle < slowest_electrical_rpm:
             return "100erpm", f"a median of {middle:.4g} electrical turns a minute is too slow: these are hundreds"
-        if middle > _FASTEST_HUNDREDS:
+        if middle > fastest_hundreds:
             return "erpm", f"electrical turns a minute by the names; a median of {middle:.4g} is too fast for hundreds"
         return OPEN, f"a median of {middle:.4g} can be electrical turns a minute (erpm) or hundreds of them (100erpm)"
     if family.unit in UNITS["rotor"]:
