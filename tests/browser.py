@@ -112,6 +112,12 @@ class Browser:
                 raise TimeoutError(f"{script}: {self.value('document.body.innerText')[:2000]}")
             time.sleep(0.05)
 
+    def drop(self, *paths: Path) -> None:
+        """Files and folders let go of in the middle of the page."""
+        data = {"items": [], "files": [str(p) for p in paths], "dragOperationsMask": 1}
+        for kind in ("dragEnter", "dragOver", "drop"):
+            self.do("Input.dispatchDragEvent", type=kind, x=200, y=200, data=data)
+
     def give_files(self, selector: str, *paths: Path) -> None:
         """Choose files in an input for files, as a person does in its dialogue."""
         root = self.do("DOM.getDocument")["root"]["nodeId"]

@@ -338,6 +338,22 @@ def test_from_a_drop_to_the_report_in_a_browser(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_a_folder_of_logs_is_dropped_in_a_browser(tmp_path: Path) -> None:
+    if CHROMIUM is None:
+        pytest.skip("no Chromium on this machine")
+    folder = tmp_path / "monday"
+    folder.mkdir()
+    for name in ("flight_1.csv.gz", "flight_2.csv.gz"):
+        (folder / name).write_bytes(EXAMPLE.joinpath(name).read_bytes())
+    with running(tmp_path / "shelf") as page, Browser(tmp_path) as browser:
+        browser.visit(page.address, 1280)
+        browser.drop(folder)
+        browser.wait_for("document.querySelector('#mass')")
+        assert "2 flights" in browser.value("document.querySelector('#current').innerText")
+        assert not [text for text in browser.said if "favicon" not in text], browser.said
+
+
+@pytest.mark.slow
 def test_a_real_log_is_looked_at_within_a_second_or_so(page: Page) -> None:
     id_ = page.drop(("gps_interference.ulg", public("px4-flight-review/gps_interference.ulg").read_bytes()))
     page.ask("POST", f"sets/{id_}/look", {})
