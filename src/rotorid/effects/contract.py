@@ -305,8 +305,8 @@ class Effect:
     """What to record for this (`rotorid.effects.describe.RECORDABLE`)."""
     kind: Literal["physics", "sensor", "mistake"] = "physics"
     cases: tuple[str, ...] = ()
-    """Concealed cases of the proof (`proof/rotorid_proof/concealed/cases.tsv`): one in which it is claimed, and one in
-    which it must not be; a test makes verdicts on both."""
+    """Drawn cases of the proof (`cases.tsv` there): one in which it is claimed, and one in which it must not be; a test
+    makes verdicts on both."""
     exact: bool = False
     """Whether its equation is geometry or a definition and can have no other form; else what it leaves of a reading
     may be its form."""

@@ -132,8 +132,8 @@ def _tables(rows: dict[int, list[tuple]], later_s: float) -> dict[str, dict[str,
     battery = named(_STATUS, 4, "Volt Curr")
     escs = [(number, first + k, 12 + k) for number, first in _ESCS.items() for k in range(4) if rows[number]]
     speeds = [named(number, place, "RPM") | {"Instance": np.array([float(n)])} for number, n, place in escs]
-    told = sorted((ground - later_s, values[3].split(b"\0")[0].decode("ascii", "replace"), values[0])
-                  for ground, _, *values in rows[_PARAMETER])  # fmt: skip
+    stated = sorted((ground - later_s, values[3].split(b"\0")[0].decode("ascii", "replace"), values[0])
+                    for ground, _, *values in rows[_PARAMETER])  # fmt: skip
     return {
         "GYR": named(_ATTITUDE, 4, "GyrX GyrY GyrZ"),
         "ACC": named(inertial, 1, "AccX AccY AccZ", G / 1000),
@@ -143,7 +143,8 @@ def _tables(rows: dict[int, list[tuple]], later_s: float) -> dict[str, dict[str,
         "BAT": battery | {"Volt": battery["Volt"] / 1000, "Curr": np.maximum(battery["Curr"], 0) / 100},
         "ESC": {name: np.concatenate([np.broadcast_to(own[name], len(own[c.TIME])) for own in speeds] or [np.zeros(0)])
                 for name in (c.TIME, "Instance", "RPM")},
-        "PARM": dict(zip((c.TIME, "Name", "Value"), zip(*told, strict=True), strict=True)) if told else {c.TIME: []},
+        "PARM": dict(zip((c.TIME, "Name", "Value"), zip(*stated, strict=True), strict=True))
+                if stated else {c.TIME: []},
     }  # fmt: skip
 
 
