@@ -54,14 +54,14 @@ def learn(
     y: np.ndarray,
     fold: np.ndarray,
     controls: Mapping[str, tuple[str, float]] = MappingProxyType({}),
-    one_run: bool = False,
+    of_the_day: bool = False,
 ) -> Learnt:
     """Derivatives by the quantities x (n, 12) of what is left of the channels, y (n, 6), N and N m.
 
     NaN is not recorded. `fold` (n,) numbers what is left out together; rows of -1 take no part. `controls` (as from
     `own_controls`) are used where they are exogenous. Intervals are the jackknife's over folds, by Student's t: what is
-    common to a run is the same in all of its rows. With rows of `one_run` alone a constant force along x or y is the
-    levelling of that day as well: it is fitted and left out.
+    common to a run is the same in all of its rows. A constant force along x or y that is `of_the_day`, its levelling as
+    well as the vehicle, is fitted and left out.
     """
     known = np.isfinite(x).mean(axis=0) > 0.5
     known[QUANTITIES.index(CONTROLS[0]) :] = False  # what a controller commands follows what disturbs it
@@ -91,7 +91,7 @@ def learn(
             continue
         kept = np.array([q not in CONTROLS or q == asked.get(channel) for q in names])
         parts = [(z[f], y[f, c]) for f in folds]
-        level = middle / np.maximum(scale, 1e-12) if one_run and channel in _LEVELLED else None
+        level = middle / np.maximum(scale, 1e-12) if of_the_day and channel in _LEVELLED else None
         beta, without, penalty = _ridge(parts, kept, level)
         own = names.index(_DAMPED_BY[c]) if _DAMPED_BY[c] in names else 0
         if own and beta[own] > 0:
@@ -163,17 +163,19 @@ def _ridge(
         weight = np.ones(len(right))
         weight[0] = 0.0
         normal = gram + count * (_PENALTIES[:, None, None] * np.diag(weight) + 1e-9 * np.eye(len(right)))
-        found = np.linalg.solve(normal, np.broadcast_to(right[:, None], (len(_PENALTIES), len(right), 1)))[:, :, 0]
-        if level is not None:
-            found[:, 0] = found[:, 1:] @ level[kept][1:]
-        return found
+        return np.linalg.solve(normal, np.broadcast_to(right[:, None], (len(_PENALTIES), len(right), 1)))[:, :, 0]
 
     gram, right, size = grams.sum(axis=0), rights.sum(axis=0), int(sizes.sum())
     without = np.array([solved(gram - g, right - r, size - n) for g, r, n in zip(grams, rights, sizes, strict=True)])
     left = np.array([((y[:, None] - x @ b.T) ** 2).sum(axis=0) for (x, y), b in zip(parts, without, strict=True)])
-    own = np.array([float(y @ y) for _, y in parts])
     best = int(np.argmin(left.sum(axis=0)))
-    pays = left[:, best].sum() < _MOST_LEFT * own.sum() and np.mean(left[:, best] < own) >= _HELPS_IN
+    whole, without = solved(gram, right, size)[best], without[:, best]
+    if level is not None:
+        for b in (whole, *without):
+            b[0] = b[1:] @ level[kept][1:]
+    left = np.array([((y - x @ b) ** 2).sum() for (x, y), b in zip(parts, without, strict=True)])
+    own = np.array([float(y @ y) for _, y in parts])
+    pays = left.sum() < _MOST_LEFT * own.sum() and np.mean(left < own) >= _HELPS_IN
     beta, others = np.zeros(len(kept)), np.zeros((len(parts), len(kept)))
-    beta[kept], others[:, kept] = solved(gram, right, size)[best], without[:, best]
+    beta[kept], others[:, kept] = whole, without
     return beta, others, float(_PENALTIES[best]) if pays else None

@@ -107,3 +107,20 @@ def test_two_folds_are_too_few_and_a_channel_that_was_not_recorded_has_none():
     y = left(6, force_x_by_u=-0.2, moment_x_by_p=-0.2)
     y[:, 3:] = np.nan
     assert {d.channel for d in learn(flown(6), y, FOLD).derivatives} == {"force_x"}
+
+
+def test_a_side_force_of_the_day_is_left_out_and_what_goes_with_the_airspeed_stays():
+    random = np.random.default_rng(3)
+    fold = np.repeat(np.arange(6), 100)
+    x = np.full((600, 12), np.nan)
+    x[:, 0], x[:, 1:4] = 1.0, random.standard_normal((600, 3)) + [0.5, 0.0, 0.0]
+    y = np.zeros((600, 6))
+    y[:, 0] = 0.1 - 0.3 * x[:, 1] + 0.01 * random.standard_normal(600)
+    y[:, 3] = 0.02 + 0.001 * random.standard_normal(600)
+    made = {day: {(d.channel, d.quantity): d.value for d in learn(x, y, fold, {}, day).derivatives} for day in (0, 1)}
+    assert made[0]["force_x", "constant"] == pytest.approx(0.1, abs=0.02)
+    assert made[1]["force_x", "constant"] == pytest.approx(0.0, abs=1e-9)
+    assert made[1]["force_x", "u"] == pytest.approx(-0.3, abs=0.02)
+    assert made[1]["moment_x", "constant"] == pytest.approx(0.02, abs=0.001)
+    left = learn(x, y, fold, {}, True).left_out
+    assert np.quantile(np.abs(left[:, 0] + 0.3 * x[:, 1]), 0.99) < 0.02
