@@ -366,11 +366,6 @@ class Search:
         reasons = {self.terms[name].effect if name in self.terms else name: r for name, r in dropped.items()}
         return Selection(active, fit, final, {e: r for e, r in reasons.items() if e not in kept})
 
-    def anew(self, weights: np.ndarray) -> frozenset[str]:
-        """Ids that a search from nothing finds where fitted environments count `weights` (environments,) times."""
-        selection = Search(self.regression.weighed(weights), self.ask).run()
-        return frozenset(i for key in selection.active if (i := self.terms[key].effect) not in UNKNOWNS)
-
     def _grown(self, active: list[str], dropped: dict[str, str]) -> list[str]:
         """The model grown, its forms replaced and its weak terms taken out; `dropped` is filled."""
         for _ in range(4 * _MOST_EFFECTS):

@@ -6,15 +6,11 @@ cut off. So the environments of the evidence (about 5 s each) are given random w
 are scored anew, and the posteriors of all draws are averaged: bagged posteriors (Huggins and Miller, Bayesian Analysis
 18, 2023) by the Bayesian bootstrap (Rubin, Annals of Statistics 9, 1981). Names that replace each other from draw to
 draw are a class; one that comes and goes without another in its place is not established.
-
-A flight is also searched anew, from nothing, in a few more draws (stability selection; Shah and Samworth, Journal of
-the Royal Statistical Society B 75, 2013): another path of the search is what draws about the chosen model cannot show.
-Both count alike.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,7 +23,6 @@ from rotorid.mismatch.evidence.gram import Evidence, Spectrum, evidence_from, sp
 from rotorid.mismatch.evidence.regression import Regression
 
 DRAWS = 20
-SEARCHES = 6
 _NEAR = 60.0
 """Nats below the chosen model up to which a draw may prefer another one."""
 _RANKED_NEAR = 15.0
@@ -77,34 +72,24 @@ class Chosen:
     found: Found
     evidence: Evidence
     spectrum: Spectrum
-    anew: Callable[[np.ndarray], frozenset[str]] | None
-    """Gives the ids that a search from nothing finds with weights (environments,); None where none is begun."""
 
     def support(self) -> Support:
         """How the model's names fare on draws; asked once the rivals are visited (`statements_of`)."""
-        about = support_of(self.evidence, self.spectrum, self.found)
-        if self.anew is None:
-            return about
-        again: dict[frozenset[str], float] = {}
-        for weights in _weights(self.spectrum.environments, SEARCHES):
-            ids = self.anew(weights)
-            again[ids] = again.get(ids, 0.0) + 1.0 / SEARCHES
-        return Support({i: (about.shares.get(i, 0.0) + again.get(i, 0.0)) / 2 for i in {**about.shares, **again}})
+        return support_of(self.evidence, self.spectrum, self.found)
 
 
-def chosen_at(
-    regression: Regression, active: Iterable[str], anew: Callable[[np.ndarray], frozenset[str]] | None = None
-) -> Chosen:
+def chosen_at(regression: Regression, active: Iterable[str]) -> Chosen:
     """The posterior at the model of the effects `active`; the regression keeps its products by channel."""
     evidence = evidence_from(regression)
     spectrum = spectrum_of(evidence)
-    return Chosen(posterior_at(evidence, spectrum, active), evidence, spectrum, anew)
+    return Chosen(posterior_at(evidence, spectrum, active), evidence, spectrum)
 
 
 def support_of(evidence: Evidence, spectrum: Spectrum, found: Found) -> Support:
     """The support that a flight gives to the names of the model `found`, and to those that would replace them.
 
-    Scored are the models that were visited about it, with the leftover as it is.
+    Scored are the models that were visited about it, with the leftover as it is; no draw searches anew
+    (docs/decisions/0012-names-that-stay.md).
     """
     near = sorted(m for m, value in found.posterior.visited.items() if value > found.log_posterior - _NEAR)
     terms, shares = found.problem.terms, {}
@@ -124,7 +109,10 @@ def support_of(evidence: Evidence, spectrum: Spectrum, found: Found) -> Support:
 def _drawn(evidence: Evidence, spectrum: Spectrum, problem: Problem) -> Iterable[Problem]:
     """The problem with its environments weighed anew, DRAWS times; the same numbers at every call."""
     gram, cross = spectrum.by_environment(problem.variance)
-    for weights in _weights(len(gram), DRAWS):
+    count, random = len(gram), np.random.default_rng(0)
+    for _ in range(DRAWS):
+        weights = random.standard_exponential(count)
+        weights *= count / weights.sum()
         _, gram_apart, cross_apart = scaled_apart(evidence, spectrum.unit, weights)
         yield replace(
             problem,
@@ -133,11 +121,3 @@ def _drawn(evidence: Evidence, spectrum: Spectrum, problem: Problem) -> Iterable
             gram_apart=gram_apart,
             cross_apart=cross_apart,
         )
-
-
-def _weights(count: int, draws: int) -> Iterable[np.ndarray]:
-    """Weights of `count` environments, of mean 1, for each draw of a Bayesian bootstrap; the same at every call."""
-    random = np.random.default_rng(0)
-    for _ in range(draws):
-        weights = random.standard_exponential(count)
-        yield weights * count / weights.sum()

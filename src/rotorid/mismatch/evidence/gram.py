@@ -239,14 +239,9 @@ class Spectrum:
             kept[c] = (own.values * shrunk).sum() / max(own.values.sum(), TINY)
         return Weighed(gram, cross, np.tensordot(kept, self.bias, 1), kept)
 
-    @property
-    def environments(self) -> int:
-        """Number of environments."""
-        return len(self.channels[0].values)
-
     def by_environment(self, variance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What `weighed` sums up, of each environment: products (E, K, K) and (E, K) over all channels."""
-        size, count = len(self.unit), self.environments
+        size, count = len(self.unit), len(self.channels[0].values)
         gram, cross = np.zeros((count, size, size)), np.zeros((count, size))
         for own, t in zip(self.channels, variance, strict=True):
             shrunk = 1.0 / (1.0 + t * own.values)

@@ -573,16 +573,6 @@ class Regression:
         out[self.training] = folds(environments(run, self.block_s), run, whole)
         return out
 
-    def weighed(self, weights: np.ndarray) -> Regression:
-        """The same with every fitted environment counted `weights` (environments,) times."""
-        own = np.ones(len(self.training))
-        own[self.training] = weights[self._environment]
-        apart = self.apart
-        if apart is not None:
-            apart = replace(apart, gram=apart.gram * own[:, None, None], cross=apart.cross * own[:, None])
-        gram, cross = self.gram * own[:, None, None], self.cross * own[:, None]
-        return replace(self, gram=gram, cross=cross, square=self.square * own, apart=apart)
-
     @cached_property
     def _environment(self) -> np.ndarray:
         """Number of the environment of every fitted block."""

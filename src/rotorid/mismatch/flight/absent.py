@@ -43,7 +43,7 @@ def absent(model: WrenchModel, found: Found) -> tuple[UpperLimit, ...]:
 
 def chosen_already(model: WrenchModel) -> Chosen:
     """The model of a flight that was chosen, with its posterior and support."""
-    return chosen_at(_by_channel(model), model.selection.active, model.search.anew)
+    return chosen_at(_by_channel(model), model.selection.active)
 
 
 def evidence_of(model: WrenchModel) -> Evidence:
