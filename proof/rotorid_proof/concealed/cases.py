@@ -599,4 +599,7 @@ def named(name: str) -> Case:
 def with_names(names: Sequence[str]) -> list[Case]:
     """The cases of these names, listed or released, in their order; a KeyError for a name that no case has."""
     listed = {c.name: c for c in all_cases()}
+    lost = [n for n in names if n not in listed and not drawn_cases.parts(n)]
+    if lost:
+        raise KeyError(f"no case is called {lost[0]}; README.md beside this file says how one is made")
     return [named(n) if drawn_cases.parts(n) else listed[n] for n in names]
