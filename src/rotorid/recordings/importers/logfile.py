@@ -92,9 +92,7 @@ def importers() -> dict[str, Importer]:
         if not isinstance(importer, Importer):
             raise InputError(f"{where}: expected an Importer, not {type(importer).__name__}")
         if importer.name in found:
-            raise InputError(
-                f"{where}: an importer {importer.name} is there already; give it another name, or remove one of the two"
-            )
+            raise InputError(f"{where}: an importer {importer.name} is there already; rename one of the two")
         found[importer.name] = importer
     return found
 
