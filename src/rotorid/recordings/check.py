@@ -50,7 +50,9 @@ _STUCK_ROWS, _STUCK_TIMES = 8, 4.0
 _SMALL_CHANGES = 0.2
 """Median change of a reading from row to row, as a share of its range, below which it is noise and no load."""
 _GOES_ON = 0.2
-"""Share of its range by which the middle half of a force changes while its reference stands still."""
+"""Share of its range by which the middle half of a force changes while every reference stands still."""
+_ROUNDING = 1e-3
+"""Share of its range up to which a step of a reading is rounding that nobody notices."""
 _HELD = 0.5
 """Share of rows that repeat the reading before, from which an inertial sensor comes more slowly than the rows."""
 _APART = 0.1
@@ -491,7 +493,9 @@ def _stuck_readings(recordings: RecordingSet) -> Iterator[Doubt]:
             values = run.column(name)
             rows, usual = _longest_stand(values)
             if name in c.REFERENCE_FORCE:
-                stuck = _goes_on(run.column(c.FORCE[c.REFERENCE_FORCE.index(name)]), rows)
+                # A load along another axis moves this one by crosstalk.
+                still = all(np.ptp(run.column(n)[rows]) == 0 for n in c.REFERENCE_FORCE if run.has(n))
+                stuck = still and _goes_on(run.column(c.FORCE[c.REFERENCE_FORCE.index(name)]), rows)
             else:
                 stuck = len(rows) >= _STUCK_TIMES * usual and name in noisy and values[rows[0]] != 0
             if stuck and len(rows) >= _STUCK_ROWS:
@@ -533,7 +537,8 @@ def _coarse_readings(recordings: RecordingSet) -> Iterator[Doubt]:
         for name in (n for n in compared_readings(run, vehicle) if n in c.FORCE + c.MOMENT):
             values = run.column(name)[np.isfinite(run.column(name))]
             step = step_of(values) if (np.diff(values) == 0).sum() > 0.5 * len(values) else 0.0
-            found[name] = max(found.get(name, 0.0), step)
+            if step > _ROUNDING * float(np.ptp(values)):
+                found[name] = max(found.get(name, 0.0), step)
     for name, step in found.items():
         if step:
             yield Doubt(
