@@ -368,10 +368,13 @@ def _seen(markdown: str) -> str:
 
 
 def _shares_of(headings: Sequence[str], cells: Sequence[Sequence[str]]) -> str:
-    """Shares of the line for each column, `0.20,0.80`: never less than its longest word, the rest by what is longer."""
+    """Shares of the line for each column, `0.20,0.80`: never less than its longest word, the rest by what is longer in
+    the mean and at most."""
     columns = _columns_pt(headings, cells, _MOST_LETTERS)
     least = [word for word, _ in columns]
-    more = [whole - word for word, whole in columns]
+    letters = [[min(len(_seen(entry)), _MOST_LETTERS) for entry in column] for column in zip(*cells, strict=True)]
+    means = [LETTER_PT * sum(own) / len(own) + _GAP_PT for own in letters]
+    more = [(max(mean - word, 0.0) + whole - word) for mean, (word, whole) in zip(means, columns, strict=True)]
     room = max(LINE_PT - sum(least), 0.0)
     wanted = [word + room * extra / max(sum(more), 1e-9) for word, extra in zip(least, more, strict=True)]
     return ",".join(f"{width / sum(wanted):.3f}" for width in wanted)
