@@ -372,9 +372,11 @@ def _shares_of(headings: Sequence[str], cells: Sequence[Sequence[str]]) -> str:
     the mean and at most."""
     columns = _columns_pt(headings, cells, _MOST_LETTERS)
     least = [word for word, _ in columns]
-    letters = [[min(len(_seen(entry)), _MOST_LETTERS) for entry in column] for column in zip(*cells, strict=True)]
-    means = [LETTER_PT * sum(own) / len(own) + _GAP_PT for own in letters]
-    more = [(max(mean - word, 0.0) + whole - word) for mean, (word, whole) in zip(means, columns, strict=True)]
+    letters = [
+        [min(len(_seen(entry)), _MOST_LETTERS) for entry in own] for _, *own in zip(headings, *cells, strict=True)
+    ]
+    means = [LETTER_PT * sum(own) / max(len(own), 1) + _GAP_PT for own in letters]
+    more = [max(mean - word, 0.0) + whole - word for mean, (word, whole) in zip(means, columns, strict=True)]
     room = max(LINE_PT - sum(least), 0.0)
     wanted = [word + room * extra / max(sum(more), 1e-9) for word, extra in zip(least, more, strict=True)]
     return ",".join(f"{width / sum(wanted):.3f}" for width in wanted)
