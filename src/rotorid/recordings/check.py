@@ -493,9 +493,10 @@ def _stuck_readings(recordings: RecordingSet) -> Iterator[Doubt]:
             values = run.column(name)
             rows, usual = _longest_stand(values)
             if name in c.REFERENCE_FORCE:
-                # A load along another axis moves this one by crosstalk.
-                still = all(np.ptp(run.column(n)[rows]) == 0 for n in c.REFERENCE_FORCE if run.has(n))
-                stuck = still and _goes_on(run.column(c.FORCE[c.REFERENCE_FORCE.index(name)]), rows)
+                # A load along another axis moves this one by crosstalk: no load, or one all the time, is stated so.
+                alone = any(np.ptp(run.column(n)[rows]) > 0 for n in c.REFERENCE_FORCE if run.has(n))
+                moved = values[rows[0]] != 0 and len(rows) < np.isfinite(values).sum()
+                stuck = (moved or not alone) and _goes_on(run.column(c.FORCE[c.REFERENCE_FORCE.index(name)]), rows)
             else:
                 stuck = len(rows) >= _STUCK_TIMES * usual and name in noisy and values[rows[0]] != 0
             if stuck and len(rows) >= _STUCK_ROWS:
