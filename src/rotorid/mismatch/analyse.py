@@ -234,12 +234,14 @@ def _account(
         delivered if beyond_trust(model, values, model.selection.active) else None,
         bool(values) or any(f.status in CLAIMED for f in findings),
     )
+    believed_left = believed_residuals(seen.prepared, seen.rows, found.chain if found.commanded else None)
     refitted_left = on_path = residuals_of(seen, plain_fit)
     refitted = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in plain_values.items()})
     if found.commanded:
-        gains, refitted_left = values_without_path(seen.prepared, seen.rows, found.chain, len(model.rows))
+        faster = believed_residuals(seen.prepared, seen.rows, found.chain, times=np.sqrt(2.0))
+        gains, refitted_left = values_without_path(believed_left, faster, len(model.rows))
         refitted = choice.vehicle(gains, {}, believed=True)
-    traces = _make_traces(seen, found, refitted_left, on_path, delivered)
+    traces = _make_traces(seen, found, believed_left, refitted_left, on_path, delivered)
     between = _sensor_traces(seen, on_path, delivered)
     fly = next_flight(findings, choice.recordings)
     return Analysis(
@@ -552,10 +554,11 @@ def rotors_or_offset(findings: Sequence[Finding], model: WrenchModel, fit: Fit) 
     terms, out = model.search.terms, list(findings)
     for place, f in enumerate(findings):
         other = catalogue()[f.id].turns_like
+        if f.status not in CLAIMED or not other or other in f.alternatives:
+            continue
         own = [k for k in model.selection.active if terms[k].effect == f.id]
-
-        others = [t for t in terms.values() if t.effect == other and t.kind == "effect"]
-        if f.status not in CLAIMED or not other or other in f.alternatives or not own or not others:
+        others = [t for t in terms.values() if t.kind == "effect" and t.effect == other]
+        if not own or not others:
             continue
         cols = model.regression.columns(own)
         made = np.concatenate(model.contributions.of(cols, fit.beta[fit.places(cols)]))[:, 3:5].ravel()
@@ -576,6 +579,7 @@ def _share_made(model: WrenchModel, term: Term, moment: np.ndarray) -> float:
 def _make_traces(
     model: WrenchModel,
     found: Fitted,
+    believed: list[np.ndarray],
     refitted: list[np.ndarray],
     on_path: list[np.ndarray],
     delivered: list[np.ndarray],
@@ -583,9 +587,8 @@ def _make_traces(
     """Residual of every channel before refitting, after it (alone and `ChannelTrace.on_path`) and with the effects,
     (n, 12) each per stretch."""
     prepared, chain = model.prepared, found.chain
-    believed_left = believed_residuals(prepared, model.rows, chain if found.commanded else None)
     out = []
-    parts = (model.rows, prepared.segments, believed_left, refitted, on_path, delivered)
+    parts = (model.rows, prepared.segments, believed, refitted, on_path, delivered)
     for r, segment, before, plain, path, after in zip(*parts, strict=True):
         for c in range(6):
             if np.isfinite(r.y[:, c]).all():
@@ -594,12 +597,12 @@ def _make_traces(
                 out.append(ChannelTrace(r.run, CHANNELS[c], unit, r.time_s, *own))
         if chain is not None and found.measured:
             path = chain.speeds(segment)
-            believed = prepared.thinner(segment.motion.rotor_speed - segment.command)
+            asked = prepared.thinner(segment.motion.rotor_speed - segment.command)
             left = prepared.thinner(segment.motion.rotor_speed - path)
-            for i in range(believed.shape[1]):
+            for i in range(asked.shape[1]):
                 name = f"rotor_speed_{i + 1}"
                 out.append(
-                    ChannelTrace(r.run, name, "rad/s", r.time_s, believed[:, i], believed[:, i], left[:, i], left[:, i])
+                    ChannelTrace(r.run, name, "rad/s", r.time_s, asked[:, i], asked[:, i], left[:, i], left[:, i])
                 )
     return tuple(out)
 

@@ -39,6 +39,7 @@ from rotorid.recordings.held import (
     noisy_columns,
     standing_together,
     step_of,
+    usual_change,
 )
 from rotorid.recordings.physics import gravity, impossible_values, near_names, physical_doubts, voltages
 from rotorid.recordings.run import Doubt, RecordingSet, Run
@@ -487,7 +488,7 @@ def _stuck_readings(recordings: RecordingSet) -> Iterator[Doubt]:
     speeds = c.rotor_columns("rotor_speed", vehicle.rotor_count)
     found: dict[str, tuple[str, float, float]] = {}
     names = {run.name: [*filter(run.has, (*compared_readings(run, vehicle), *speeds))] for run in recordings.runs}
-    noisy = {n for run in recordings.runs for n in names[run.name] if _is_noisy(run.column(n))}
+    noisy = {n for run in recordings.runs for n in names[run.name] if usual_change(run.column(n)) < _SMALL_CHANGES}
     for run in recordings.runs:
         for name in names[run.name]:
             values = run.column(name)
@@ -507,14 +508,6 @@ def _stuck_readings(recordings: RecordingSet) -> Iterator[Doubt]:
             f"{name} stands still in {run} from {start:.2f} to {stop:.2f} s while others go on: its driver or its link "
             "stopped, and nothing was read there",
         )
-
-
-def _is_noisy(values: np.ndarray) -> bool:
-    """Whether most changes of a column (n,) are small: noise, and no steps of a load."""
-    known = values[np.isfinite(values)]
-    changes = np.abs(np.diff(known))
-    changes = changes[changes > 0]
-    return len(changes) > 0 and float(np.median(changes)) < _SMALL_CHANGES * float(np.ptp(known))
 
 
 def _longest_stand(values: np.ndarray) -> tuple[np.ndarray, int]:
@@ -538,15 +531,14 @@ def _coarse_readings(recordings: RecordingSet) -> Iterator[Doubt]:
         for name in (n for n in compared_readings(run, vehicle) if n in c.FORCE + c.MOMENT):
             values = run.column(name)[np.isfinite(run.column(name))]
             step = step_of(values) if (np.diff(values) == 0).sum() > 0.5 * len(values) else 0.0
-            if step > _ROUNDING * float(np.ptp(values)):
+            if step and step > _ROUNDING * float(np.ptp(values)):
                 found[name] = max(found.get(name, 0.0), step)
     for name, step in found.items():
-        if step:
-            yield Doubt(
-                name,
-                f"{name} comes in steps of {step:.3g}, larger than its noise: what is smaller than half of one is "
-                "rounding, and no effect",
-            )
+        yield Doubt(
+            name,
+            f"{name} comes in steps of {step:.3g}, larger than its noise: what is smaller than half of one is "
+            "rounding, and no effect",
+        )
 
 
 def _scattered_rotors(recordings: RecordingSet) -> Iterator[Doubt]:
@@ -587,7 +579,7 @@ def _held_sensors(recordings: RecordingSet) -> Iterator[Doubt]:
             values = run.array(names)
             known = np.isfinite(values).all(axis=1)
             again = (np.diff(values[known], axis=0) == 0).all(axis=1)
-            if 1.0 > again.mean() > _HELD:
+            if len(again) and 1.0 > again.mean() > _HELD:
                 rate = (~again).sum() / (run.time_s[-1] - run.time_s[0])
                 yield Doubt(
                     names[0],

@@ -120,6 +120,15 @@ def _steps_and_bends(parts: list[np.ndarray]) -> tuple[float, float]:
     return tuple(float(np.median(x)) if len(x) else 0.0 for x in map(np.concatenate, (step, bend)))
 
 
+def usual_change(values: np.ndarray) -> float:
+    """Median change of a column (n,) from one reading to another one, as a share of its range: small for noise, large
+    for the steps of a load. Infinite where it never changes."""
+    known = values[np.isfinite(values)]
+    changes = np.abs(np.diff(known))
+    changes = changes[changes > 0]
+    return float(np.median(changes) / np.ptp(known)) if len(changes) else np.inf
+
+
 def step_of(values: np.ndarray) -> float:
     """Step of a grid that readings lie on, 0.0 if they lie on none.
 

@@ -4,6 +4,7 @@ import pytest
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.errors import InputError
+from tests import packages
 
 SQUARED = """
 from dataclasses import replace
@@ -18,13 +19,8 @@ def installed(tmp_path, monkeypatch):
     """Installs a package whose effect has an id, under an entry point to one of its names."""
 
     def install(effect_id: str, name: str = "EFFECT") -> None:
-        (tmp_path / "parachutes.py").write_text(SQUARED.format(id=effect_id))
-        info = tmp_path / "parachutes-1.0.dist-info"
-        info.mkdir()
-        (info / "METADATA").write_text("Metadata-Version: 2.1\nName: parachutes\nVersion: 1.0\n")
-        (info / "entry_points.txt").write_text(f"[rotorid.effects]\nparachute = parachutes:{name}\n")
-        monkeypatch.syspath_prepend(tmp_path)
-        monkeypatch.delitem(__import__("sys").modules, "parachutes", raising=False)
+        text, points = SQUARED.format(id=effect_id), f"[rotorid.effects]\nparachute = parachutes:{name}\n"
+        packages.installed(tmp_path, monkeypatch, "parachutes", text, points)
         catalogue.cache_clear()
 
     yield install

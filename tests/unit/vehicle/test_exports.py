@@ -20,6 +20,7 @@ from rotorid.vehicle.exports import export_vehicle, flown, forms
 from rotorid.vehicle.exports import names as names_of_forms
 from rotorid.vehicle.exports.flown import commands_of, in_drake, in_mujoco, in_pybullet, in_rotorpy, lagging
 from rotorid.vehicle.mixer import hover_speed_rad_s
+from tests import packages
 from tests.command_line import answer, refusal
 from tests.refusals import refused
 
@@ -448,15 +449,12 @@ def test_an_effect_that_is_none_is_not_written_into_a_comment() -> None:
 
 
 def test_a_form_of_an_installed_package_is_written_and_none_takes_the_name_of_one_of_ours(tmp_path, monkeypatch):
-    (tmp_path / "hangar.py").write_text(
+    text = (
         "from rotorid.vehicle.exports import Exported\n\n"
         "def card(vehicle):\n    return Exported(vehicle.name, 'card.txt', ('all else: a card has a name alone',))\n"
     )
-    info = tmp_path / "hangar-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: hangar\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[rotorid.exports]\ncard = hangar:card\nmjcf = hangar:card\n")
-    monkeypatch.syspath_prepend(tmp_path)
+    points = "[rotorid.exports]\ncard = hangar:card\nmjcf = hangar:card\n"
+    packages.installed(tmp_path, monkeypatch, "hangar", text, points)
     exports._of_packages.cache_clear()
     try:
         assert "card" in names_of_forms() and list(names_of_forms()).count("mjcf") == 1

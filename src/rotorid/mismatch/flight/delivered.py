@@ -141,17 +141,16 @@ def believed_residuals(
 
 
 def values_without_path(
-    prepared: Prepared, rows: list[Rows], chain: CommandChain, fitted: int
+    believed: list[np.ndarray], faster: list[np.ndarray], fitted: int
 ) -> tuple[Values, list[np.ndarray]]:
     """Values refitted where rotors turn as commanded, and what they leave of every stretch, (n, 12).
 
     By least squares on the first `fitted` stretches: one factor of the thrust, and one of each moment, which goes into
-    the inertia about its axis; what is beyond GAINS stays as believed.
+    the inertia about its axis; what is beyond GAINS stays as believed. Given is what the `believed` vehicle leaves, and
+    what it leaves where its rotors turn √2 times as `faster`: thrust and moments go with the square.
     """
-    before = believed_residuals(prepared, rows, chain)
-    twice = believed_residuals(prepared, rows, chain, times=np.sqrt(2.0))  # thrust and moments go with the square
-    made = [a - b for a, b in zip(before, twice, strict=True)]
-    own, left = (np.concatenate(parts[:fitted])[:, 2:6] for parts in (made, before))
+    made = [a - b for a, b in zip(believed, faster, strict=True)]
+    own, left = (np.concatenate(parts[:fitted])[:, 2:6] for parts in (made, believed))
     known = np.isfinite(own) & np.isfinite(left)
     own, left = np.where(known, own, 0.0), np.where(known, left, 0.0)
     gain = 1.0 + (own * left).sum(axis=0) / np.maximum((own**2).sum(axis=0), 1e-300)
@@ -161,7 +160,7 @@ def values_without_path(
     values = {"thrust": (lift - 1.0, 0.0), "torque": (lift - 1.0, 0.0), **inertias}
     by_channel = np.ones(len(CHANNELS))
     by_channel[:6] = [lift, lift, *gain]
-    return values, [a + (1.0 - by_channel) * m for a, m in zip(before, made, strict=True)]
+    return values, [a + (1.0 - by_channel) * m for a, m in zip(believed, made, strict=True)]
 
 
 def beyond_trust(model: FittedModel, values: Values, active: Sequence[str]) -> bool:

@@ -76,7 +76,7 @@ from rotorid.mismatch.instrument.model import (
     whole_reading,
 )
 from rotorid.mismatch.instrument.remainder import dependence, leftover, regimes
-from rotorid.mismatch.instrument.sampling import quantisation, without_repeats
+from rotorid.mismatch.instrument.sampling import quantisation
 from rotorid.mismatch.instrument.setup import PreparedInstrument, averaged, pieces_of, set_up, with_unseen
 from rotorid.recordings import RecordingSet, Vehicle
 from rotorid.steps import step
@@ -151,7 +151,6 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     Model, values and words are chosen from the fitted runs alone; the runs held out are opened once, after that.
     """
     recordings, findings, remarks = find_mistakes(recordings)
-    recordings = without_repeats(recordings)
     known, unseen = parts_of(recordings, split_runs(recordings))
     setup = set_up(known, recordings)
     terms, reasons = make_terms(setup)

@@ -14,6 +14,7 @@ import numpy as np
 from rotorid.effects.loading import CHANNELS
 from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.decide.status import Estimate
+from rotorid.mismatch.instrument.sampling import without_repeats
 from rotorid.mismatch.instrument.setup import PreparedInstrument, loaded_by, set_up, with_speed
 from rotorid.mismatch.mistakes import dropout
 from rotorid.recordings import RecordingSet, Run
@@ -70,7 +71,7 @@ def _rest_beside(columns: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def find_mistakes(recordings: RecordingSet) -> tuple[RecordingSet, list[Finding], list[str]]:
-    """The set with overwhelming mistakes corrected, their findings, and notes."""
+    """The set with overwhelming mistakes corrected and held readings left out, their findings, and notes."""
     recordings, findings, notes = _degrees(recordings)
     recordings, lost = dropout.find(recordings)
     findings += [lost] if lost else []
@@ -82,7 +83,7 @@ def find_mistakes(recordings: RecordingSet) -> tuple[RecordingSet, list[Finding]
             findings.append(finding)
             notes.append(note)
             setup = set_up(recordings)
-    return recordings, findings, notes
+    return without_repeats(recordings), findings, notes
 
 
 def _scaled(run: Run, factors: dict[str, float]) -> Run:

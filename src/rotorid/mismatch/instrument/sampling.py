@@ -27,7 +27,7 @@ from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.decide.status import Estimate
 from rotorid.mismatch.mistakes.signals import replace_columns
 from rotorid.recordings import RecordingSet, Run, columns
-from rotorid.recordings.held import step_of
+from rotorid.recordings.held import step_of, usual_change
 
 WIDTHS = (5, 9, 17, 33, 65, 129, 257)
 """Samples of the windows."""
@@ -62,10 +62,8 @@ def without_repeats(recordings: RecordingSet) -> RecordingSet:
 
 def _is_held(values: np.ndarray, steps: np.ndarray) -> bool:
     """Whether a column (n,) with these steps from row to row is held, on no grid, and most of its changes are noise."""
-    changes = np.abs(steps[steps != 0])
-    if not (steps == 0).mean() > _HELD_SHARE or len(changes) < _LEAST_CHANGES or step_of(values):
-        return False
-    return float(np.nanmedian(changes)) < _SMALL_CHANGES * float(np.nanmax(values) - np.nanmin(values))
+    often = (steps == 0).mean() > _HELD_SHARE and (steps != 0).sum() >= _LEAST_CHANGES
+    return bool(often) and not step_of(values) and usual_change(values) < _SMALL_CHANGES
 
 
 def quantisation(setup, noise: np.ndarray) -> tuple[Finding | None, str | None]:

@@ -8,6 +8,7 @@ import pytest
 
 from rotorid.errors import InputError
 from rotorid.recordings.importers.logfile import importers, read_log, set_of_logs
+from tests import packages
 
 ROOT = Path(__file__).parents[4]
 OWN = re.search(r"```\n(\"\"\"Logs.*?)```", (ROOT / "docs/own-log.md").read_text(encoding="utf-8"), re.DOTALL)[1]
@@ -19,13 +20,8 @@ def installed(tmp_path, monkeypatch):
     """Installs a package with an importer of a name, under an entry point to one of its names."""
 
     def install(name: str = "hangar", point: str = "IMPORTER") -> None:
-        (tmp_path / "hangars.py").write_text(OWN.replace('    "hangar",', f"    {name!r},") + "\nNONE = 3\n")
-        info = tmp_path / "hangars-1.0.dist-info"
-        info.mkdir()
-        (info / "METADATA").write_text("Metadata-Version: 2.1\nName: hangars\nVersion: 1.0\n")
-        (info / "entry_points.txt").write_text(f"[rotorid.importers]\nhangar = hangars:{point}\n")
-        monkeypatch.syspath_prepend(tmp_path)
-        monkeypatch.delitem(__import__("sys").modules, "hangars", raising=False)
+        text = OWN.replace('    "hangar",', f"    {name!r},") + "\nNONE = 3\n"
+        packages.installed(tmp_path, monkeypatch, "hangars", text, f"[rotorid.importers]\nhangar = hangars:{point}\n")
         importers.cache_clear()
 
     yield install
