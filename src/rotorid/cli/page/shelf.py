@@ -107,15 +107,17 @@ class Shelf:
 
     def place_for(self, id_: str, name: str, bag: str = "") -> Path:
         """Where a log, or a file of a bag's folder, is written that is coming, under a name that no other has there."""
-        folder = self.path(id_) / LOGS
-        if bag:
-            folder /= safe_name(bag)
-            if folder.is_file():
-                raise InputError(f"{folder.name}: a log of this set has the name of the folder; rename one of them")
-            folder.mkdir(exist_ok=True)
-        there = {p.name.casefold() for p in folder.iterdir()}
+        logs = self.path(id_) / LOGS
+        folder = logs / safe_name(bag) if bag else logs
+        if folder.is_file():
+            raise InputError(f"{folder.name}: a log of this set has the name of the folder; rename one of them")
+        # A folder that is new counts among the logs, a file in one among those of the folder.
+        there = {p.name.casefold() for p in (folder if folder.is_dir() else logs).iterdir()}
         if len(there) >= MOST_LOGS:
             raise InputError(f"a set takes at most {MOST_LOGS} logs here; make several sets of them")
+        if not folder.is_dir():
+            folder.mkdir()
+            there = set()
         wanted = safe_name(name)
         stem, dot, suffix = wanted.partition(".")
         number = 1

@@ -55,7 +55,7 @@ def ending(table: pd.DataFrame, start_s: float, stop_s: float) -> tuple[str, str
     The flight is in the air from `start_s` to `stop_s`. None where it ends as a landing does, or nothing shows.
     """
     time_s = table[c.TIME].to_numpy(float)
-    flight = _Flight(table[(time_s >= start_s) & (time_s <= stop_s + _AFTER_S)], stop_s)
+    flight = _Ending(table[(time_s >= start_s) & (time_s <= stop_s + _AFTER_S)], stop_s)
     if flight.begins_s <= start_s:
         return None
     signs = sorted((*flight.of_rotors(), *flight.of_all(), *flight.of_attitude()), key=lambda sign: sign.time_s)
@@ -71,7 +71,7 @@ def ending(table: pd.DataFrame, start_s: float, stop_s: float) -> tuple[str, str
     return f"the last seconds in the air: {happened}", f"what fits, the likeliest first: {'; '.join(ranked)}"
 
 
-class _Flight:
+class _Ending:
     """A flight and what is usual in it before its last seconds."""
 
     def __init__(self, table: pd.DataFrame, stop_s: float) -> None:

@@ -37,7 +37,7 @@ _MULTIROTORS = (2, 13, 14, 29, 35)
 
 
 @dataclass(frozen=True)
-class _Kind:
+class _Message:
     """A message that is read: extra byte of its checksum, layout, and the vehicle's clock in it, s."""
 
     extra: int
@@ -49,15 +49,15 @@ _HEARTBEAT, _STATUS, _PARAMETER, _SCALED_IMU, _RAW_IMU, _ATTITUDE, _POSITION, _O
 _ESCS = {11030: 0, 11031: 4, 11032: 8}
 """To messages of speed controllers the number of their first."""
 _KINDS = {
-    _HEARTBEAT: _Kind(50, struct.Struct("<I5B")),
-    _STATUS: _Kind(124, struct.Struct("<3I2Hh6Hb")),
-    _PARAMETER: _Kind(220, struct.Struct("<fHH16sB")),
-    _SCALED_IMU: _Kind(170, struct.Struct("<I9h"), 1e-3),
-    _RAW_IMU: _Kind(144, struct.Struct("<Q9h"), 1e-6),
-    _ATTITUDE: _Kind(39, struct.Struct("<I6f"), 1e-3),
-    _POSITION: _Kind(185, struct.Struct("<I6f"), 1e-3),
-    _OUTPUTS: _Kind(222, struct.Struct("<I8HB8H"), 1e-6),
-    **dict(zip(_ESCS, (_Kind(extra, struct.Struct("<20H4B")) for extra in (144, 133, 85)), strict=True)),
+    _HEARTBEAT: _Message(50, struct.Struct("<I5B")),
+    _STATUS: _Message(124, struct.Struct("<3I2Hh6Hb")),
+    _PARAMETER: _Message(220, struct.Struct("<fHH16sB")),
+    _SCALED_IMU: _Message(170, struct.Struct("<I9h"), 1e-3),
+    _RAW_IMU: _Message(144, struct.Struct("<Q9h"), 1e-6),
+    _ATTITUDE: _Message(39, struct.Struct("<I6f"), 1e-3),
+    _POSITION: _Message(185, struct.Struct("<I6f"), 1e-3),
+    _OUTPUTS: _Message(222, struct.Struct("<I8HB8H"), 1e-6),
+    **dict(zip(_ESCS, (_Message(extra, struct.Struct("<20H4B")) for extra in (144, 133, 85)), strict=True)),
 }
 
 
