@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -37,7 +36,7 @@ from rotorid.mismatch.decide.status import CLAIMED, Estimate
 from rotorid.mismatch.deliver.by_vehicle import acting_over_rows, on_vehicle
 from rotorid.mismatch.deliver.candidates import Candidate, Ground
 from rotorid.mismatch.deliver.files import claimed, conditions_of, instruments_of, place_of, with_effects
-from rotorid.mismatch.deliver.final import Offered, Stretches, as_delivered
+from rotorid.mismatch.deliver.final import Choice, Stretches, delivered
 from rotorid.mismatch.deliver.flown import model_of, squares_of_windows
 from rotorid.mismatch.deliver.usable import as_a_body, chain_ids, question_of, with_only
 from rotorid.mismatch.evidence.motion import Segment, full_speed, regime_variables, stretches
@@ -72,7 +71,7 @@ from rotorid.mismatch.flight.values import (
 )
 from rotorid.mismatch.flight.wrench import WrenchModel, linear_drag, nonlinear_intervals
 from rotorid.mismatch.mistakes import find_mistakes
-from rotorid.recordings import RecordingSet, Split, Vehicle
+from rotorid.recordings import RecordingSet, Vehicle
 from rotorid.vehicle.derivatives import quantities
 from rotorid.vehicle.improved import active_forms
 
@@ -141,18 +140,30 @@ def _analysed(recordings: RecordingSet, mistakes, remarks, watch: Watch) -> Anal
     stated_ids = {i for f in findings for i in (f.id, *f.alternatives)}
     limits = tuple(limit for limit in absent(model, posterior) if limit.id not in stated_ids)
     full = full_speed(known.runs, prepared.vehicle) if only_throttle(recordings) else None
-    choice = _Choice(recordings, split, found, to_state, full, tuple(findings), limits, tuple(remarks))
 
     # The last decision is made: the runs held out are opened.
     watch(Decided(found, tuple(outside), tuple(findings), contract_values(prepared.vehicle, to_state)))
     seen = on_every_run(found, recordings, split, unseen)
-    choice = replace(choice, findings=_with_windows(findings, seen))
-    plain = values_alone(model)
-    plain_fit, plain_moved = settled(model, plain, ())
-    first = _account(choice, seen, fit, moved, plain_fit, {**plain_moved, **plain})
-    words = with_values_in_question(weighed(first))
-    offer = partial(_offered, choice, seen=seen, unseen=unseen, moved=moved, plain_moved=plain_moved)
-    return with_noise_held_out(as_delivered(words, offer))
+    question, faults = question_of(prepared.vehicle, recordings.runs)
+    choice = FlightChoice(
+        model=model,
+        values=values,
+        plain=values_alone(model),
+        stated=to_state,
+        findings=_with_windows(findings, seen),
+        split=split,
+        believed=prepared.vehicle,
+        question=question,
+        remarks=faults,
+        recordings=recordings,
+        found=found,
+        full_rad_s=full,
+        absent=limits,
+        corrected=tuple(remarks),
+        unseen=unseen,
+        seen=seen,
+    )
+    return with_noise_held_out(delivered(choice, lambda first: with_values_in_question(weighed(first))))
 
 
 def decided(
@@ -174,30 +185,165 @@ def decided(
 
 
 @dataclass(frozen=True)
-class _Choice:
-    """What was chosen on the fitted runs alone."""
+class FlightChoice(Choice):
+    """The answer on a set of flights."""
 
     recordings: RecordingSet
-    split: Split
     found: Fitted
-    stated: Values
-    """Wrong values as they are stated (by the keys of `PARAMETER_NAMES`)."""
     full_rad_s: float | None
     """Where throttle alone was recorded, the speed that a full one was taken for."""
-    findings: tuple[Finding, ...]
     absent: tuple[UpperLimit, ...]
     """Ids that were tested and not found, and how large they may be."""
-    remarks: tuple[str, ...]
+    corrected: tuple[str, ...]
+    """What was corrected in the set, a sentence each."""
+    unseen: tuple[list[Segment], list[Segment]]
+    """Stretches of the runs held out, and the same with noise added once more (`prepare_like`)."""
+    seen: WrenchModel
+    """The model with the rows of every run."""
 
-    def vehicle(self, moved: Values, stated: Values, believed: bool = False) -> Vehicle:
+    names = PARAMETER_NAMES
+
+    @property
+    def commanded(self) -> bool:
+        """Whether rotor speeds are known from their commands alone."""
+        return self.found.commanded
+
+    def only(self, words: Analysis) -> FlightChoice:
+        """The choice with what is claimed alone at work, all that stays fitted without effects that are only suggested.
+
+        A value that is only suggested, because a payload that is not excluded would change it, is delivered as it is:
+        the vehicle flies with that number, whichever of the two it is.
+        """
+        ids = {f.id for f in claimed(words.findings)}
+        if ids >= {f.id for f in words.findings if f.id in words.without}:
+            return self
+        found = with_only(self.found, ids, self.values)
+        stated = {k: v for k, v in self.stated.items() if k in self.values}
+        seen = on_every_run(found, self.recordings, self.split, self.unseen)
+        return replace(self, model=found.model, found=found, seen=seen, stated=stated)
+
+    def with_values(self, moved: Values, stated: Values, believed: bool = False) -> Vehicle:
         """The believed vehicle with values moved within their trust and wrong ones as stated.
 
         Where commands alone are recorded its rotors make the thrust that was felt, unless it is the `believed` one.
         """
-        changed = changed_vehicle(self.found.prepared.vehicle, {k: v[0] for k, v in {**moved, **stated}.items()})
-        if not self.found.commanded:
+        changed = changed_vehicle(self.believed, {k: v[0] for k, v in {**moved, **stated}.items()})
+        if not self.commanded:
             return changed
         return with_thrust_per_command(changed, 1.0 if believed else self.found.chain.scale, self.full_rad_s)
+
+    def stated_of(self, candidate: Candidate) -> Values:
+        """Wrong values of a candidate, as they are stated."""
+        if candidate.model == "named" or not self.stated:
+            return {k: v for k, v in self.stated.items() if k in candidate.values}
+        return candidate.values
+
+    def without_effects(self, candidate: Candidate) -> Vehicle:
+        """A candidate's vehicle without effects."""
+        return self.with_values(candidate.moved, self.stated_of(candidate), candidate.model == "believed")
+
+    def believed_left(self) -> list[np.ndarray]:
+        """What the believed vehicle leaves of every fitted stretch, (n, 12)."""
+        return believed_residuals(self.found.prepared, self.model.rows, self.found.chain if self.commanded else None)
+
+    def stretches(self, every_run: bool = False) -> Stretches:
+        """Of the fitted rows, or of those of every run."""
+        of, thinner = self.seen if every_run else self.model, self.found.prepared.thinner
+        pairs = zip(of.rows, of.segments, strict=True)
+        return [(r.run, r.time_s, thinner(quantities(s.motion, self.believed))) for r, s in pairs]
+
+    def vehicle(self, candidate: Candidate, findings: Sequence[Finding]) -> Vehicle:
+        """A candidate's vehicle as it would be written, given what is claimed."""
+        inside = {self.model.search.terms[k].effect for k in candidate.active}
+        if candidate.model != "believed" or not self.commanded:
+            inside |= chain_ids(self.found)
+        kept = [f for f in claimed(findings) if f.id in inside and place_of(f) == "vehicle"]
+        derivatives = candidate.learnt.derivatives if candidate.learnt else ()
+        whole = with_effects(self.without_effects(candidate), kept)
+        return whole.model_copy(update={"derivatives": derivatives})
+
+    def flown(self, candidate: Candidate, findings: Sequence[Finding], ground: Ground, words: Analysis) -> np.ndarray:
+        """Errors of a candidate's vehicle run forward, each window by derivatives learnt without its run or piece."""
+        segments = [s for s in self.found.prepared.segments if s.motion.has(("rotor_speed", "angular_velocity"))]
+        parts = (conditions_of(words), instruments_of(words)) if candidate.model == "named" else ()
+        vehicle = self.vehicle(candidate, findings)
+        whole, of_unit = model_of(vehicle, *parts), None
+        if candidate.learnt:
+            regression = self.model.regression
+            fold = dict(zip(regression.left_out_together(), regression.folds(), strict=True))
+            own = [vehicle.model_copy(update={"derivatives": d}) for d in candidate.learnt.without]
+            models = [replace(whole, forms=tuple(active_forms(v))) for v in own]
+            of_unit = lambda unit: models[fold[unit]]  # noqa: E731
+        return squares_of_windows(segments, whole, ground.unit_at, ground.units, of_unit)
+
+    def larger(self, candidate: Candidate, term: Term) -> np.ndarray:
+        """Factors of a term's coefficients on a candidate's vehicle (`rotorid.mismatch.deliver.by_vehicle`)."""
+        changed = {**candidate.moved, **self.stated_of(candidate)}
+        return on_vehicle(term, self.model.segments, self.believed, changed, self.model.noise)[0]
+
+    def in_rows(self, vehicle: Vehicle) -> np.ndarray:
+        """Force and moment on a vehicle over those that its rows hold, (6,)."""
+        return acting_over_rows(self.believed, vehicle)
+
+    def embodied(self, values: Values, moved: Values) -> Values:
+        """Values moved within their trust such that next to those called wrong they are of one body."""
+        return as_a_body(self.believed, values, moved)
+
+    def account(self, findings: tuple[Finding, ...]) -> Analysis:
+        """What the choice amounts to on every run, given the words on it so far."""
+        found, seen, model, named, refitted = self.found, self.seen, self.model, self.named, self.refitted
+        fit, plain_fit = scaled_by_run(seen, named.fit), scaled_by_run(seen, refitted.fit)
+        delivered = residuals_of(seen, fit)
+        before, after, depends = dependence(seen.prepared, seen, seen.segments, seen.noisy_segments)
+        unexplained_channels, depends_on, description = leftover(
+            seen.prepared,
+            seen,
+            seen.segments,
+            seen.noisy_segments,
+            after,
+            depends,
+            delivered if beyond_trust(model, self.values, model.selection.active) else None,
+            bool(self.values) or any(f.status in CLAIMED for f in findings),
+        )
+        believed_left = believed_residuals(seen.prepared, seen.rows, found.chain if found.commanded else None)
+        refitted_left = on_path = residuals_of(seen, plain_fit)
+        by_values = changed_vehicle(self.believed, {k: v[0] for k, v in {**refitted.moved, **refitted.values}.items()})
+        if found.commanded:
+            faster = believed_residuals(seen.prepared, seen.rows, found.chain, times=np.sqrt(2.0))
+            gains, refitted_left = values_without_path(believed_left, faster, len(model.rows))
+            by_values = self.with_values(gains, {}, believed=True)
+        traces = _make_traces(seen, found, believed_left, refitted_left, on_path, delivered)
+        between = _sensor_traces(seen, on_path, delivered)
+        fly, improved = next_flight(findings, self.recordings), self.with_values(named.moved, self.stated)
+        return Analysis(
+            recordings=self.recordings,
+            split=self.split,
+            believed=self.believed,
+            refitted=by_values,
+            improved=improved,
+            named=improved,
+            findings=findings,
+            values=contract_values(self.believed, self.stated),
+            not_testable=not_testable(found.prepared, found.chain, findings),
+            absent=self.absent,
+            traces=traces,
+            between_sensors=between,
+            without=without_each(found, seen, self.values, fit, findings, (*traces, *between)),
+            noise_floor=_noise_floors(found),
+            p_values={c: (before[c], after[c]) for c in before},
+            regimes=_regimes_by_run(seen.segments, seen.prepared),
+            winds=_winds_of(seen),
+            unexplained_channels=unexplained_channels,
+            unexplained_depends_on=depends_on,
+            unexplained_description=description,
+            next_manoeuvre=fly.manoeuvre,
+            next_separates=fly.separates,
+            force_source=model.segments[0].force_source,
+            command_path=_command_path(found.chain),
+            notes=(*self.corrected, *run_scale_notes(model), *_lag_alone_notes(found.chain)),
+            instead=_instead_in_words(found.instead),
+            corrected=in_words(named.moved),
+        )
 
 
 def _with_windows(findings: Sequence[Finding], seen: WrenchModel) -> tuple[Finding, ...]:
@@ -211,70 +357,6 @@ def _with_windows(findings: Sequence[Finding], seen: WrenchModel) -> tuple[Findi
     return tuple(out)
 
 
-def _account(
-    choice: _Choice, seen: WrenchModel, fit: Fit, moved: Values, plain_fit: Fit, plain_values: Values
-) -> Analysis:
-    """What a choice amounts to on every run, before any word is weighed.
-
-    `seen` is the model with the rows of every run, `fit` with `moved` what is delivered, `plain_fit` with
-    `plain_values` the believed vehicle with values refitted.
-    """
-    found, stated, findings = choice.found, choice.stated, list(choice.findings)
-    model, values, prepared = found.model, found.values, found.prepared
-    fit, plain_fit = scaled_by_run(seen, fit), scaled_by_run(seen, plain_fit)
-    delivered = residuals_of(seen, fit)
-    before, after, depends = dependence(seen.prepared, seen, seen.segments, seen.noisy_segments)
-    unexplained_channels, depends_on, description = leftover(
-        seen.prepared,
-        seen,
-        seen.segments,
-        seen.noisy_segments,
-        after,
-        depends,
-        delivered if beyond_trust(model, values, model.selection.active) else None,
-        bool(values) or any(f.status in CLAIMED for f in findings),
-    )
-    believed_left = believed_residuals(seen.prepared, seen.rows, found.chain if found.commanded else None)
-    refitted_left = on_path = residuals_of(seen, plain_fit)
-    refitted = changed_vehicle(prepared.vehicle, {k: v[0] for k, v in plain_values.items()})
-    if found.commanded:
-        faster = believed_residuals(seen.prepared, seen.rows, found.chain, times=np.sqrt(2.0))
-        gains, refitted_left = values_without_path(believed_left, faster, len(model.rows))
-        refitted = choice.vehicle(gains, {}, believed=True)
-    traces = _make_traces(seen, found, believed_left, refitted_left, on_path, delivered)
-    between = _sensor_traces(seen, on_path, delivered)
-    fly = next_flight(findings, choice.recordings)
-    return Analysis(
-        recordings=choice.recordings,
-        split=choice.split,
-        believed=prepared.vehicle,
-        refitted=refitted,
-        improved=choice.vehicle(moved, stated),
-        named=choice.vehicle(moved, stated),
-        findings=tuple(findings),
-        values=contract_values(prepared.vehicle, stated),
-        not_testable=not_testable(prepared, found.chain, findings),
-        absent=choice.absent,
-        traces=traces,
-        between_sensors=between,
-        without=without_each(found, seen, values, fit, findings, (*traces, *between)),
-        noise_floor=_noise_floors(found),
-        p_values={c: (before[c], after[c]) for c in before},
-        regimes=_regimes_by_run(seen.segments, seen.prepared),
-        winds=_winds_of(seen),
-        unexplained_channels=unexplained_channels,
-        unexplained_depends_on=depends_on,
-        unexplained_description=description,
-        next_manoeuvre=fly.manoeuvre,
-        next_separates=fly.separates,
-        force_source=model.segments[0].force_source,
-        command_path=_command_path(found.chain),
-        notes=(*choice.remarks, *run_scale_notes(model), *_lag_alone_notes(found.chain)),
-        instead=_instead_in_words(found.instead),
-        corrected=in_words(moved),
-    )
-
-
 def _winds_of(seen: WrenchModel) -> tuple[RunWind, ...]:
     """The winds in which a model flies its runs."""
     out = [RunWind(g.run, "in windows", g.knots_s, g.wind_m_s) for g in seen.gusts]
@@ -285,95 +367,6 @@ def _winds_of(seen: WrenchModel) -> tuple[RunWind, ...]:
         span = np.array([own[0][0], own[-1][-1]])
         out.append(RunWind(run, "all the time", span, np.tile(np.asarray(seen.wind, float), (2, 1))))
     return tuple(out)
-
-
-def _offered(
-    choice: _Choice,
-    words: Analysis,
-    seen: WrenchModel,
-    unseen: tuple[list[Segment], list[Segment]],
-    moved: Values,
-    plain_moved: Values,
-) -> Offered:
-    """What a choice offers for delivery: what is claimed, fitted without effects that are only suggested.
-
-    A value that is only suggested, because a payload that is not excluded would change it, is offered as it is: the
-    vehicle flies with that number, whichever of the two it is. `words` is the analysis of the whole choice with its
-    statuses; `moved` and `plain_moved` are the values that it and the refitted vehicle moved within their trust.
-    """
-    found, vehicle = choice.found, choice.found.prepared.vehicle
-    ids = {f.id for f in claimed(words.findings)}
-    values = found.values
-    whole = ids >= {f.id for f in words.findings if f.id in words.without}
-    fewer = found if whole else with_only(found, ids, values)
-    model, thinner = fewer.model, found.prepared.thinner
-
-    def stated_of(candidate: Candidate) -> Values:
-        given = candidate.values
-        if candidate.model == "named" or not choice.stated:
-            return {k: v for k, v in choice.stated.items() if k in given}
-        return given
-
-    def improved(candidate: Candidate) -> Vehicle:
-        return choice.vehicle(candidate.moved, stated_of(candidate), candidate.model == "believed")
-
-    def vehicle_of(candidate: Candidate, findings: Sequence[Finding]) -> Vehicle:
-        inside = {model.search.terms[k].effect for k in candidate.active}
-        if candidate.model != "believed" or not found.commanded:
-            inside |= chain_ids(fewer)
-        kept = [f for f in claimed(findings) if f.id in inside and place_of(f) == "vehicle"]
-        whole_vehicle = with_effects(improved(candidate), kept)
-        derivatives = candidate.learnt.derivatives if candidate.learnt else ()
-        return whole_vehicle.model_copy(update={"derivatives": derivatives})
-
-    def stretches_of(every: WrenchModel) -> Stretches:
-        pairs = zip(every.rows, every.segments, strict=True)
-        return [(r.run, r.time_s, thinner(quantities(s.motion, vehicle))) for r, s in pairs]
-
-    def again(named: Candidate, refitted: Candidate, findings: tuple[Finding, ...]) -> tuple[Analysis, Stretches]:
-        if whole and named.moved.keys() == moved.keys() and refitted.moved.keys() == plain_moved.keys():
-            return words, stretches_of(seen)
-        last = replace(choice, found=fewer, stated=stated_of(named), findings=findings)
-        every = seen if whole else on_every_run(fewer, choice.recordings, choice.split, unseen)
-        plain = {**refitted.moved, **refitted.values}
-        return _account(last, every, named.fit, named.moved, refitted.fit, plain), stretches_of(every)
-
-    def flown(candidate: Candidate, findings: Sequence[Finding], ground: Ground) -> np.ndarray:
-        """Each window by derivatives that were learnt without its run or piece."""
-        segments = [s for s in found.prepared.segments if s.motion.has(("rotor_speed", "angular_velocity"))]
-        parts = (conditions_of(words), instruments_of(words)) if candidate.model == "named" else ()
-        vehicle = vehicle_of(candidate, findings)
-        whole_model, of_unit = model_of(vehicle, *parts), None
-        if candidate.learnt:
-            fold = dict(zip(model.regression.left_out_together(), model.regression.folds(), strict=True))
-            own = [vehicle.model_copy(update={"derivatives": d}) for d in candidate.learnt.without]
-            models = [replace(whole_model, forms=tuple(active_forms(v))) for v in own]
-            of_unit = lambda unit: models[fold[unit]]  # noqa: E731
-        return squares_of_windows(segments, whole_model, ground.unit_at, ground.units, of_unit)
-
-    question, faults = question_of(vehicle, choice.recordings.runs)
-    return Offered(
-        words=words,
-        model=model,
-        values=values,
-        active=tuple(model.selection.active),
-        plain=values_alone(found.model),
-        believed_left=believed_residuals(fewer.prepared, model.rows, fewer.chain if fewer.commanded else None),
-        believed=vehicle,
-        names=PARAMETER_NAMES,
-        whole=whole,
-        improved=improved,
-        again=again,
-        stretches=stretches_of(model),
-        vehicle=vehicle_of,
-        flown=flown,
-        unfit=question,
-        remarks=faults,
-        chain_is_named=found.commanded,
-        larger=lambda c, term: on_vehicle(term, model.segments, vehicle, {**c.moved, **stated_of(c)}, model.noise)[0],
-        in_rows=lambda other: acting_over_rows(vehicle, other),
-        embodied=partial(as_a_body, vehicle),
-    )
 
 
 def findings_outside(found: Fitted, prepared: Prepared) -> list[Finding]:

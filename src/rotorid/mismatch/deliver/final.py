@@ -5,10 +5,13 @@ What is stated is what is delivered: numbers of effects and believed values by t
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 from math import exp, nan
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -24,7 +27,7 @@ from rotorid.mismatch.deliver.usable import exports_lost
 from rotorid.mismatch.evidence.rows import CHANNELS, Term
 from rotorid.mismatch.flight.delivered import FittedModel, Values, all_free, ways
 from rotorid.mismatch.flight.values import believed_value
-from rotorid.recordings import Vehicle
+from rotorid.recordings import Split, Vehicle
 from rotorid.steps import step
 from rotorid.vehicle.derivatives import about_hover_of, own_controls
 
@@ -35,85 +38,139 @@ Stretches = Sequence[tuple[str, np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True)
-class Offered:
-    """What an analysis offers for delivery."""
+class Choice(ABC):
+    """What was chosen on the fitted runs alone: the answer, of which everything is asked that comes after.
 
-    words: Analysis
-    """Of the whole choice, with its statuses, which stay."""
+    A kind of set says how it is accounted for on every run, and what is left of it where less is claimed.
+    """
+
     model: FittedModel
-    """Of the fitted runs, with what is claimed alone."""
+    """Of the fitted runs."""
     values: Values
     """Values called wrong."""
-    active: tuple[str, ...]
-    """Terms of what is claimed."""
     plain: Values
     """Values called wrong where no effect is at work."""
-    believed_left: list[np.ndarray]
-    """What the believed vehicle leaves of every fitted stretch, (n, channels)."""
+    stated: Values
+    """Wrong values as they are stated."""
+    findings: tuple[Finding, ...]
+    split: Split
     believed: Vehicle
-    names: Mapping[str, str]
-    """Keys of values to their contract names."""
-    whole: bool
-    """Whether `model` lacks nothing of the choice."""
-    improved: Callable[[Candidate], Vehicle]
-    """A candidate's vehicle without effects."""
-    again: Callable[[Candidate, Candidate, tuple[Finding, ...]], tuple[Analysis, Stretches]]
-    """The named and the refitted candidate accounted for on every run, and the stretches of every run."""
-    stretches: Stretches = ()
-    """Of the fitted rows; none where there are no derivatives (stands and benches)."""
-    vehicle: Callable[[Candidate, Sequence[Finding]], Vehicle] = lambda candidate, findings: None
-    """A candidate's vehicle as it would be written, given what is claimed."""
-    flown: Callable[[Candidate, Sequence[Finding], Ground], np.ndarray] = lambda c, findings, ground: c.flown
-    """Errors of a candidate's vehicle run forward in windows of the fitted runs (`Candidate.flown`)."""
-    unfit: Callable[[Vehicle], str] = lambda vehicle: ""
+    question: Callable[[Vehicle], str]
     """Why a vehicle is no body that hovers and flies; empty where it is."""
-    remarks: tuple[str, ...] = ()
-    chain_is_named: bool = False
-    """Whether what lies between command and speed is known by force and moment alone: the believed vehicle lacks it."""
-    larger: Callable[[Candidate, Term], np.ndarray] = lambda candidate, term: np.ones(len(term.form.linear))
-    """Factors of a term's coefficients on a candidate's vehicle (`rotorid.mismatch.deliver.by_vehicle`)."""
-    in_rows: Callable[[Vehicle], np.ndarray] = lambda vehicle: np.ones(len(CHANNELS) // 2)
-    """Force and moment on a vehicle over those that its rows hold, (6,)."""
-    embodied: Callable[[Values, Values], Values] = lambda values, moved: moved
-    """Values moved within their trust such that next to those called wrong they are of one body (`as_a_body`)."""
-    restates: bool = True
+    remarks: tuple[str, ...]
+
+    names: ClassVar[Mapping[str, str]]
+    """Keys of values to their contract names."""
+    restates: ClassVar[bool] = True
     """Whether numbers are stated by the fit that is delivered even where nothing else than that was found."""
+
+    @abstractmethod
+    def account(self, findings: tuple[Finding, ...]) -> Analysis:
+        """What the choice amounts to on every run, given the words on it so far."""
+
+    @abstractmethod
+    def only(self, words: Analysis) -> Choice:
+        """The choice with what an analysis of it claims alone at work; the same where that is all."""
+
+    @abstractmethod
+    def without_effects(self, candidate: Candidate) -> Vehicle:
+        """A candidate's vehicle without effects."""
+
+    @abstractmethod
+    def believed_left(self) -> list[np.ndarray]:
+        """What the believed vehicle leaves of every fitted stretch, (n, channels)."""
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """Terms of the effects at work."""
+        return tuple(self.model.selection.active)
+
+    @property
+    def commanded(self) -> bool:
+        """Whether what lies between command and speed is known by force and moment alone: the believed vehicle lacks
+        it."""
+        return False
+
+    def stretches(self, every_run: bool = False) -> Stretches:
+        """Of the fitted rows, or of those of every run; none where there are no derivatives (stands and benches)."""
+        return ()
+
+    def vehicle(self, candidate: Candidate, findings: Sequence[Finding]) -> Vehicle:
+        """A candidate's vehicle as it would be written, given what is claimed."""
+        return self.without_effects(candidate)
+
+    def flown(self, candidate: Candidate, findings: Sequence[Finding], ground: Ground, words: Analysis) -> np.ndarray:
+        """Errors of a candidate's vehicle run forward in windows of the fitted runs (`Candidate.flown`).
+
+        `words` is the analysis with conditions and instruments.
+        """
+        return candidate.flown
+
+    def larger(self, candidate: Candidate, term: Term) -> np.ndarray:
+        """Factors of a term's coefficients on a candidate's vehicle (`rotorid.mismatch.deliver.by_vehicle`)."""
+        return np.ones(len(term.form.linear))
+
+    def in_rows(self, vehicle: Vehicle) -> np.ndarray:
+        """Force and moment on a vehicle over those that its rows hold, (6,)."""
+        return np.ones(len(CHANNELS) // 2)
+
+    def embodied(self, values: Values, moved: Values) -> Values:
+        """Values moved within their trust such that next to those called wrong they are of one body (`as_a_body`)."""
+        return moved
+
+    @cached_property
+    def named(self) -> Candidate:
+        """The candidate with the effects at work."""
+        return self._candidate("named", self.values, self.active)
+
+    @cached_property
+    def refitted(self) -> Candidate:
+        """The candidate with values alone."""
+        return self._candidate("refitted", self.plain, ())
+
+    def _candidate(self, model: Literal["named", "refitted"], values: Values, active: tuple[str, ...]) -> Candidate:
+        """A candidate with the other values as believed, or moved within their trust where that pays (`ways`)."""
+        way = ways(self.model, values, active)[0]
+        left = np.concatenate(way.left)[:, : len(CHANNELS) // 2]
+        return Candidate(model, values, active, way.fit, self.embodied(values, way.moved), left)
+
+
+def delivered(choice: Choice, in_words: Callable[[Analysis], Analysis]) -> Analysis:
+    """What a choice amounts to on every run once its words are weighed (`in_words`) and a vehicle is chosen."""
+    return _as_delivered(in_words(choice.account(choice.findings)), choice)
 
 
 @step("choosing what is delivered")
-def as_delivered(words: Analysis, offer: Callable[[Analysis], Offered]) -> Analysis:
-    """What an analysis amounts to once a vehicle is chosen; wrong values and their reasons stay.
+def _as_delivered(words: Analysis, choice: Choice) -> Analysis:
+    """The analysis with a vehicle chosen; wrong values and their reasons stay.
 
     Statuses stay, too, but for an effect whose numbers, fitted as they are delivered, may all be nothing: what is
-    offered is then what is left.
+    delivered is then what is left.
     """
-    offered = offer(words)
-    named = _fitted_candidate("named", offered, offered.values, offered.active)
+    offered = choice.only(words)
     findings = words.findings
-    if offered.restates or not offered.whole:
-        findings = _restated(words.findings, offered, named)
+    if offered.restates or offered is not choice:
+        findings = _restated(words.findings, offered)
         nothing = {f.id for f in findings if f.status in CLAIMED and f.values and may_be_nothing(f)}
         if nothing:
             stand = tuple(lowered(f, NOTHING) if f.id in nothing else f for f in words.findings)
-            return as_delivered(replace(words, findings=stand), offer)
-    model = offered.model
+            return _as_delivered(replace(words, findings=stand), choice)
     ground = _ground_of(offered)
-    believed = Candidate("believed", {}, (), None, {}, np.concatenate(offered.believed_left)[:, : len(CHANNELS) // 2])
-    refitted = _fitted_candidate("refitted", offered, offered.plain, ())
-    candidates = [believed, refitted]
+    left = np.concatenate(offered.believed_left())[:, : len(CHANNELS) // 2]
+    candidates = [Candidate("believed", {}, (), None, {}, left), offered.refitted]
     if offered.active or offered.values != offered.plain:
-        candidates.append(named)
-    if offered.stretches:
+        candidates.append(offered.named)
+    if offered.stretches():
         candidates += [c.with_derivatives(learnt) for c in candidates if (learnt := _learnt_of(offered, c)).derivatives]
-    candidates = [replace(c, flown=offered.flown(c, findings, ground)) for c in candidates]
+    candidates = [replace(c, flown=offered.flown(c, findings, ground, words)) for c in candidates]
     chosen, scored = choose(
         candidates,
         ground,
-        lambda c: "" if c.name == ("believed", False) else offered.unfit(offered.vehicle(c, findings)),
+        lambda c: "" if c.name == ("believed", False) else offered.question(offered.vehicle(c, findings)),
     )
     taken = chosen.candidate
     findings = tuple(replace(f, withheld=_why_not(f, taken, scored, offered)) for f in findings)
-    accounted, stretches = offered.again(named, refitted, findings)
+    accounted = words if offered is choice else offered.account(findings)
     last = replace(
         accounted,
         findings=findings,
@@ -121,18 +178,18 @@ def as_delivered(words: Analysis, offer: Callable[[Analysis], Offered]) -> Analy
         suggested_values=words.suggested_values,
         instead=words.instead,
         not_testable=words.not_testable,
-        improved=offered.improved(taken),
+        improved=offered.without_effects(taken),
     )
-    last = _with_taken(last, taken, scored, stretches, offered)
+    last = _with_taken(last, taken, scored, offered)
     return replace(
         with_shares(last),
         notes=(*last.notes, *offered.remarks, *exports_lost(improved_vehicle(last), offered.believed)),
-        believed_values=_value_rows(model, named, last.improved, offered.believed, offered.names),
-        value_correlations=_value_correlations(model, named, offered.names),
+        believed_values=_value_rows(offered, last.improved),
+        value_correlations=_value_correlations(offered),
     )
 
 
-def _ground_of(offered: Offered) -> Ground:
+def _ground_of(offered: Choice) -> Ground:
     """The fitted rows, by what is left out together."""
     regression = offered.model.regression
     units = regression.of_rows(regression.left_out_together())
@@ -143,32 +200,25 @@ def _ground_of(offered: Offered) -> Ground:
     return Ground(np.concatenate(units), joined)
 
 
-def _fitted_candidate(name: str, offered: Offered, values: Values, active: Sequence[str]) -> Candidate:
-    """A candidate with the other values as believed, or moved within their trust where that pays (`ways`)."""
-    way = ways(offered.model, values, active)[0]
-    left = np.concatenate(way.left)[:, : len(CHANNELS) // 2]
-    return Candidate(name, values, tuple(active), way.fit, offered.embodied(values, way.moved), left)
-
-
-def _learnt_of(offered: Offered, candidate: Candidate) -> Learnt:
+def _learnt_of(offered: Choice, candidate: Candidate) -> Learnt:
     """The derivatives of what a candidate leaves."""
-    vehicle = offered.improved(candidate)
-    x = about_hover_of(np.concatenate([x for _, _, x in offered.stretches]), offered.believed, vehicle)
+    vehicle = offered.without_effects(candidate)
+    x = about_hover_of(np.concatenate([x for _, _, x in offered.stretches()]), offered.believed, vehicle)
     regression = offered.model.regression
     folds = np.concatenate(regression.of_rows(regression.folds()))
     acting = offered.in_rows(vehicle)
     # Runs held out show that a side force of one or two runs is theirs alone; of a single run nothing shows it.
-    of_the_day = offered.words.split.border_s is None and not regression.leaves_runs
+    of_the_day = offered.split.border_s is None and not regression.leaves_runs
     learnt = learn(x, acting * candidate.left, folds, own_controls(vehicle), of_the_day)
     return replace(learnt, left_out=learnt.left_out / acting)
 
 
-def _why_not(finding: Finding, taken: Candidate, scored: Sequence[CandidateScore], offered: Offered) -> str:
+def _why_not(finding: Finding, taken: Candidate, scored: Sequence[CandidateScore], offered: Choice) -> str:
     """Why a claimed property of the vehicle is not in the vehicle that is taken home; empty where it is."""
     if finding not in claimed([finding]) or place_of(finding) != "vehicle" or taken.model == "named":
         return ""
     between = finding.form is None  # command and speed: the refitted vehicle has it, too
-    if between and not (offered.chain_is_named and taken.model == "believed"):
+    if between and not (offered.commanded and taken.model == "believed"):
         return ""  # fitted and judged in the rotors' speeds
     having = ("named", "refitted") if between else ("named",)
     best = min((s for s in scored if s.candidate.model in having), key=lambda s: s.score, default=None)
@@ -183,16 +233,14 @@ def _why_not(finding: Finding, taken: Candidate, scored: Sequence[CandidateScore
     )
 
 
-def _with_taken(
-    analysis: Analysis, taken: Candidate, scored: Sequence[CandidateScore], stretches: Stretches, offered: Offered
-) -> Analysis:
+def _with_taken(analysis: Analysis, taken: Candidate, scored: Sequence[CandidateScore], offered: Choice) -> Analysis:
     """The analysis with the traces that the vehicle taken home leaves, and that vehicle's derivatives."""
     derivatives = taken.learnt.derivatives if taken.learnt else ()
     acting = offered.in_rows(analysis.improved)
     added = {
         (run, float(time_s[0])): taken.learnt.of(about_hover_of(x, offered.believed, analysis.improved)) / acting
-        for run, time_s, x in stretches
-        if len(time_s) and derivatives
+        for run, time_s, x in (offered.stretches(every_run=True) if derivatives else ())
+        if len(time_s)
     }
 
     def left(trace: ChannelTrace) -> ChannelTrace:
@@ -211,9 +259,9 @@ def _with_taken(
     )
 
 
-def _restated(findings: Sequence[Finding], offered: Offered, named: Candidate) -> tuple[Finding, ...]:
+def _restated(findings: Sequence[Finding], offered: Choice) -> tuple[Finding, ...]:
     """Findings with their linear parameters by a settled fit; intervals reach to where the findings had them."""
-    model = offered.model
+    model, named = offered.model, offered.named
     key_of = {model.search.terms[k].form: k for k in named.active}
     out = []
     for finding in findings:
@@ -236,14 +284,9 @@ def _restated(findings: Sequence[Finding], offered: Offered, named: Candidate) -
     return tuple(out)
 
 
-def _value_rows(
-    model: FittedModel,
-    named: Candidate,
-    improved: Vehicle,
-    believed: Vehicle,
-    names: Mapping[str, str],
-) -> tuple[ValueRow, ...]:
+def _value_rows(offered: Choice, improved: Vehicle) -> tuple[ValueRow, ...]:
     """Every believed value before and after: estimated jointly with the delivered effects, all free, and delivered."""
+    model, named, believed, names = offered.model, offered.named, offered.believed, offered.names
     fit = all_free(model, named.values, list(named.active))[1]
     rows = []
     for key in model.values_beside(named.active):
@@ -273,8 +316,9 @@ def delivered_value(improved: Vehicle, believed: Vehicle, key: str) -> float:
     return believed_value(improved, key)
 
 
-def _value_correlations(model: FittedModel, named: Candidate, names: Mapping[str, str]) -> dict[tuple[str, str], float]:
+def _value_correlations(offered: Choice) -> dict[tuple[str, str], float]:
     """Correlations of two values' estimates from ONLY_A_RATIO on, trust left out: what the recordings alone know."""
+    model, named, names = offered.model, offered.named, offered.names
     keys = model.values_beside(named.active)
     loose = dict.fromkeys(keys, 1.0)
     fit = model.regression.fit([*model.regression.keys_of("nuisance", "wind"), *keys, *named.active], loose=loose)

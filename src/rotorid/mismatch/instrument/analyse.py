@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -41,7 +40,7 @@ from rotorid.mismatch.decide.selected import (
 from rotorid.mismatch.decide.status import CLAIMED, Estimate
 from rotorid.mismatch.deliver.candidates import Candidate
 from rotorid.mismatch.deliver.files import claimed
-from rotorid.mismatch.deliver.final import Offered, Stretches, as_delivered
+from rotorid.mismatch.deliver.final import Choice, delivered
 from rotorid.mismatch.evidence.regression import Fit, Regression, build
 from rotorid.mismatch.evidence.rows import Rows, Term
 from rotorid.mismatch.evidence.split import parts_of, split_runs
@@ -188,18 +187,26 @@ def analyse_instrument(recordings: RecordingSet) -> Analysis:
     findings += absorbed_findings(model, values, findings)
     chosen = chosen_already(model)
     findings = with_probabilities(findings, chosen.found, chosen.support)
-    fit, moved_values = settled(model, values, model.selection.active)
     to_state = values if measured else _stated_of_commands(findings, values)
-    choice = _InstrumentChoice(
-        setup, model, chain, measured, values, to_state, tuple(findings), reasons, tuple(remarks)
-    )
 
     # The last decision is made: the runs held out are opened.
-    seen = _on_every_run(model, chain, unseen)
-    refitted, moved_plain = settled(model, plain, [])
-    first = _account(choice, recordings, seen, fit, moved_values, refitted, {**moved_plain, **plain})
-    offer = partial(_offered, choice, seen=seen, plain=plain, moved=moved_values, plain_moved=moved_plain)
-    return as_delivered(weighed(first), offer)
+    choice = InstrumentChoice(
+        model=model,
+        values=values,
+        plain=plain,
+        stated=to_state,
+        findings=tuple(findings),
+        split=setup.split,
+        believed=setup.vehicle,
+        question=lambda vehicle: "",
+        remarks=(),
+        recordings=recordings,
+        chain=chain,
+        reasons=reasons,
+        corrected=tuple(remarks),
+        seen=_on_every_run(model, chain, unseen),
+    )
+    return delivered(choice, weighed)
 
 
 def _stated_of_commands(findings: list[Finding], values: Values) -> Values:
@@ -224,125 +231,95 @@ def _stated_of_commands(findings: list[Finding], values: Values) -> Values:
 
 
 @dataclass(frozen=True)
-class _InstrumentChoice:
-    """What was chosen on the fitted runs alone."""
+class InstrumentChoice(Choice):
+    """The answer on a set of a stand or bench."""
 
-    setup: PreparedInstrument
     model: ReadingModel
+    recordings: RecordingSet
     chain: ChainResult | None
-    measured: bool
-    values: Values
-    stated: Values
-    """Wrong values as they are stated."""
-    findings: tuple[Finding, ...]
+    """What lies between command and speed; None where no command is recorded."""
     reasons: Mapping[str, str]
-    remarks: tuple[str, ...]
+    """To ids that cannot be tested, why."""
+    corrected: tuple[str, ...]
+    """What was corrected in the set, a sentence each."""
+    seen: ReadingModel
+    """The model with the rows of every run."""
 
-    def vehicle(self, changed: Values) -> Vehicle:
-        """The believed vehicle with values changed, and with a full speed that nobody stated."""
-        vehicle = improved(self.setup.vehicle, changed)
-        if self.chain is None or not self.setup.estimated_full_speed:
+    names = VALUE_NAMES
+    restates = False
+
+    @property
+    def chain_of_speeds(self) -> ChainResult | None:
+        """What lies between command and speed, where both are recorded."""
+        return self.chain if all(x.measured for x in self.model.setup.loadings) else None
+
+    def only(self, words: Analysis) -> InstrumentChoice:
+        """The choice with what is claimed alone at work, fitted without effects that are only suggested."""
+        model, chain = self.model, self.chain
+        ids = {f.id for f in claimed(words.findings)}
+        active = [k for k in model.selection.active if model.search.terms[k].effect in {*ids, *UNKNOWNS}]
+        gone = [k for k, _ in self.chain_of_speeds.fit.chain if k not in ids] if self.chain_of_speeds else []
+        if len(active) == len(model.selection.active) and not gone:
+            return self
+        for key in gone:
+            chain = without_id(chain, key)
+        fewer = _with_terms(model, active)
+        return replace(self, model=fewer, chain=chain, seen=replace(self.seen, selection=fewer.selection))
+
+    def without_effects(self, candidate: Candidate) -> Vehicle:
+        """A candidate's vehicle without effects, with a full speed that nobody stated."""
+        vehicle = improved(self.believed, {**candidate.moved, **candidate.values})
+        if self.chain is None or not self.model.setup.estimated_full_speed:
             return vehicle
         return vehicle.model_copy(update={"rotor_speed_limits_rad_s": (0.0, self.chain.full_speed)})
 
+    def believed_left(self) -> list[np.ndarray]:
+        """What the believed vehicle leaves of every fitted stretch, (n, 6)."""
+        return [np.nan_to_num(r.y) for r in self.model.rows]
 
-def _account(
-    choice: _InstrumentChoice,
-    recordings: RecordingSet,
-    seen: ReadingModel,
-    fit: Fit,
-    moved_values: Values,
-    refitted: Fit,
-    plain: Values,
-) -> Analysis:
-    """What a choice amounts to on every run, before any word is weighed.
-
-    `seen` is the model with the rows of every run, `fit` with `moved_values` what is delivered, `refitted` with `plain`
-    the believed values fitted anew.
-    """
-    setup, model, chain, findings = choice.setup, choice.model, choice.chain, choice.findings
-    # The most significant class first.
-    step = next_flight(sorted(findings, key=lambda f: f.p_value), recordings)
-    traces, before, after = _make_traces(seen, refitted, fit)
-    p_before, p_after, depends = dependence(seen, before, after)
-    channels, description = leftover(seen, after, p_after, depends)
-    if chain is not None and choice.measured:
-        traces += speed_traces(seen.setup, chain)
-        if _speed_left(seen.setup, chain, traces) > _LOST_SHARE:
-            channels = (*channels, *(f"rotor_speed_{i + 1}" for i in range(setup.vehicle.rotor_count)))
-            depends = [*depends, "battery_voltage_v"] if supply_reason(setup) else depends
-            description = "; ".join([*([description] if description else []), _SPEED_LEFT])
-    claimed_ids = {f.id for f in findings if f.status in CLAIMED}
-    own_chain = chain if choice.measured else None
-    return Analysis(
-        recordings=recordings,
-        split=setup.split,
-        believed=setup.vehicle,
-        refitted=improved(setup.vehicle, plain),
-        improved=choice.vehicle({**moved_values, **choice.values}),
-        named=choice.vehicle({**moved_values, **choice.values}),
-        findings=findings,
-        values=contract_values(setup.vehicle, choice.stated, VALUE_NAMES) | _full_speed_value(setup, chain),
-        not_testable={k: v for k, v in choice.reasons.items() if k not in claimed_ids},
-        traces=traces,
-        noise_floor=_noise_floors(setup, model, chain),
-        p_values={c: (p_before[c], p_after[c]) for c in p_before},
-        regimes=regimes(seen),
-        unexplained_channels=channels,
-        unexplained_depends_on=tuple(depends),
-        unexplained_description=description,
-        next_manoeuvre=step.manoeuvre,
-        next_separates=step.separates,
-        force_source="sensor",
-        samples_per_row=setup.average,
-        instrument=setup.instrument,
-        loadings=seen.loadings,
-        notes=(*choice.remarks, *_notes_of(setup)),
-        corrected=in_words(moved_values, VALUE_NAMES),
-        without=_without_each(model, seen, choice.values, own_chain, list(findings), traces),
-    )
-
-
-def _offered(
-    choice: _InstrumentChoice, words: Analysis, seen: ReadingModel, plain: Values, moved: Values, plain_moved: Values
-) -> Offered:
-    """What a choice offers for delivery: what is claimed, fitted without effects that are only suggested.
-
-    `words` is the analysis of the whole choice with its statuses; `plain` are the values called wrong where no effect
-    is at work, `moved` and `plain_moved` those that the choice and the refitted model moved within their trust.
-    """
-    model, chain = choice.model, choice.chain
-    ids = {f.id for f in claimed(words.findings)}
-    active = [k for k in model.selection.active if model.search.terms[k].effect in {*ids, *UNKNOWNS}]
-    fewer = _with_terms(model, active)
-    gone = [k for k, _ in chain.fit.chain if k not in ids] if chain is not None and choice.measured else []
-
-    def again(named: Candidate, refitted: Candidate, findings: tuple[Finding, ...]) -> tuple[Analysis, Stretches]:
-        same = len(active) == len(model.selection.active) and not gone
-        if same and named.moved.keys() == moved.keys() and refitted.moved.keys() == plain_moved.keys():
-            return words, ()
-        shorter = chain
-        for key in gone:
-            shorter = without_id(shorter, key)
-        stated = {k: v for k, v in choice.stated.items() if k in named.values}
-        own = replace(choice, model=fewer, chain=shorter, values=named.values, stated=stated, findings=findings)
-        every, changed = replace(seen, selection=fewer.selection), {**refitted.moved, **refitted.values}
-        return _account(own, words.recordings, every, named.fit, named.moved, refitted.fit, changed), ()
-
-    return Offered(
-        words=words,
-        model=fewer,
-        values=choice.values,
-        active=tuple(active),
-        plain=plain,
-        believed_left=[np.nan_to_num(r.y) for r in model.rows],
-        believed=choice.setup.vehicle,
-        names=VALUE_NAMES,
-        whole=len(active) == len(model.selection.active) and not gone,
-        improved=lambda candidate: choice.vehicle({**candidate.moved, **candidate.values}),
-        again=again,
-        restates=False,
-    )
+    def account(self, findings: tuple[Finding, ...]) -> Analysis:
+        """What the choice amounts to on every run, given the words on it so far."""
+        model, seen, chain, named, refitted = self.model, self.seen, self.chain, self.named, self.refitted
+        setup, of_speeds, whole = model.setup, self.chain_of_speeds, self.without_effects(named)
+        # The most significant class first.
+        step = next_flight(sorted(findings, key=lambda f: f.p_value), self.recordings)
+        traces, before, after = _make_traces(seen, refitted.fit, named.fit)
+        p_before, p_after, depends = dependence(seen, before, after)
+        channels, description = leftover(seen, after, p_after, depends)
+        if of_speeds is not None:
+            traces += speed_traces(seen.setup, of_speeds)
+            if _speed_left(seen.setup, of_speeds, traces) > _LOST_SHARE:
+                channels = (*channels, *(f"rotor_speed_{i + 1}" for i in range(setup.vehicle.rotor_count)))
+                depends = [*depends, "battery_voltage_v"] if supply_reason(setup) else depends
+                description = "; ".join([*([description] if description else []), _SPEED_LEFT])
+        claimed_ids = {f.id for f in findings if f.status in CLAIMED}
+        return Analysis(
+            recordings=self.recordings,
+            split=self.split,
+            believed=self.believed,
+            refitted=improved(self.believed, {**refitted.moved, **refitted.values}),
+            improved=whole,
+            named=whole,
+            findings=findings,
+            values=contract_values(self.believed, self.stated, VALUE_NAMES) | _full_speed_value(setup, chain),
+            not_testable={k: v for k, v in self.reasons.items() if k not in claimed_ids},
+            traces=traces,
+            noise_floor=_noise_floors(setup, model, chain),
+            p_values={c: (p_before[c], p_after[c]) for c in p_before},
+            regimes=regimes(seen),
+            unexplained_channels=channels,
+            unexplained_depends_on=tuple(depends),
+            unexplained_description=description,
+            next_manoeuvre=step.manoeuvre,
+            next_separates=step.separates,
+            force_source="sensor",
+            samples_per_row=setup.average,
+            instrument=setup.instrument,
+            loadings=seen.loadings,
+            notes=(*self.corrected, *_notes_of(setup)),
+            corrected=in_words(named.moved, VALUE_NAMES),
+            without=_without_each(model, seen, self.values, of_speeds, findings, traces),
+        )
 
 
 def _with_terms(model: ReadingModel, active: Sequence[str]) -> ReadingModel:
