@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotorid.effects.catalogue import before_the_rotors, catalogue, ids_of, ids_of_stage, moving_air
-from rotorid.effects.contract import LIMIT, SUPPLY, SpeedForm, SpeedPath
+from rotorid.effects.contract import SUPPLY, SpeedForm, SpeedPath
 from rotorid.errors import InputError
 from rotorid.io.text.wording import listed
 from rotorid.mismatch.decide import rules
@@ -24,12 +24,11 @@ from rotorid.mismatch.decide.findings import (
     RunWind,
     by_channel,
     in_interval,
-    not_held,
     rms,
     with_probabilities,
 )
 from rotorid.mismatch.decide.posterior import Found
-from rotorid.mismatch.decide.selected import coefficients, wrench_findings
+from rotorid.mismatch.decide.selected import coefficients, path_findings, wrench_findings
 from rotorid.mismatch.decide.sizes import fitted_part
 from rotorid.mismatch.decide.statements import UpperLimit
 from rotorid.mismatch.decide.status import CLAIMED, Estimate
@@ -42,7 +41,7 @@ from rotorid.mismatch.deliver.usable import as_a_body, chain_ids, question_of, w
 from rotorid.mismatch.evidence.motion import Segment, full_speed, regime_variables, stretches
 from rotorid.mismatch.evidence.regression import Fit
 from rotorid.mismatch.evidence.rows import CHANNELS, PARAMETER_NAMES, RUN_SCALE, Term
-from rotorid.mismatch.evidence.speedpath import CommandChain, SpeedResult
+from rotorid.mismatch.evidence.speedpath import CommandChain
 from rotorid.mismatch.evidence.split import parts_of, split_runs
 from rotorid.mismatch.flight.absent import absent, absorbed_findings, chosen_already
 from rotorid.mismatch.flight.delivered import (
@@ -79,6 +78,10 @@ _UNITS = {"force": "N", "moment": "N m"}
 _SENSOR_UNITS = {2: "m/s2", 3: "rad/s"}
 _NO_DEPENDENCE_P = 0.01
 """p-value of a residual's dependence on what is recorded from which it is taken for noise."""
+
+_TIMING_FLOOR = 0.05
+"""One-sigma, in samples, that no time is better known by: between two samples commands hold, or change, as nobody
+recorded."""
 
 
 def analyse(recordings: RecordingSet, watch: Watch = unwatched) -> Analysis:
@@ -376,7 +379,13 @@ def findings_outside(found: Fitted, prepared: Prepared) -> list[Finding]:
     if model.gusts:
         findings.append(gust_finding(model.gusts))
     if found.chain is not None:
-        findings += _speed_findings(found.chain.result, prepared, found.measured, found.chain.full_speed)
+        rotors, full = prepared.vehicle.rotor_count, found.chain.full_speed
+        findings += path_findings(
+            found.chain.result,
+            tuple(f"rotor_speed_{i + 1}" for i in range(rotors)) if found.measured else ("force_z",),
+            _TIMING_FLOOR / prepared.segments[0].rate_hz,
+            lambda form, values: _limited_windows(prepared.segments, form, values, full),
+        )
     return findings
 
 
@@ -487,38 +496,6 @@ def _wind_finding(model: WrenchModel) -> Finding:
         p_value=float(np.exp(-0.5 * min(1400.0, np.sum((w / sd) ** 2)))),
         channels=("force_x", "force_y"),
     )
-
-
-def _speed_findings(result: SpeedResult, prepared: Prepared, measured: bool, full_speed: float) -> list[Finding]:
-    """Findings between command and rotor speed."""
-    # One-sigma, in samples, that no time is better known by: between two samples commands hold, or change, as nobody
-    # recorded.
-    timing_floor = 0.05
-    effects = catalogue()
-    out = []
-    channels = tuple(f"rotor_speed_{i + 1}" for i in range(prepared.vehicle.rotor_count)) if measured else ("force_z",)
-    for key, form in result.fit.chain:
-        where = result.fit.slice_of(key)
-        values = result.fit.values[where]
-        least = [timing_floor / prepared.segments[0].rate_hz if p.unit == "s" else 0.0 for p in form.parameters]
-        sd = np.hypot(np.sqrt(np.diag(result.fit.covariance)[where]), least)
-        numbers = zip(form.parameters, values, sd, strict=True)
-        alternatives = result.alternatives[key]
-        found = Finding(
-            id=key,
-            status="established",
-            speed_form=form,
-            values=tuple(float(v) for v in values),
-            equation=form.equation,
-            sentence=effects[key].sentence,
-            parameters=tuple(in_interval(p.symbol, v, p.unit, s) for p, v, s in numbers),
-            p_value=result.p_values[key],
-            channels=channels,
-            windows=_limited_windows(prepared.segments, form, values, full_speed) if form.stage == LIMIT else (),
-        )
-        out.append(found.or_else(alternatives) if alternatives else found)
-    stated = {f.id for f in out}
-    return out + [not_held(key, reason) for key, reason in result.dropped.items() if key not in stated]
 
 
 def payload_or_offset(findings: list[Finding], values: dict) -> list[Finding]:

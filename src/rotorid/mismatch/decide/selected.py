@@ -9,12 +9,14 @@ import numpy as np
 from scipy.stats import t as student
 
 from rotorid.effects.catalogue import catalogue
+from rotorid.effects.contract import LIMIT, SpeedForm
 from rotorid.mismatch.decide import rules
-from rotorid.mismatch.decide.findings import Finding, not_held
+from rotorid.mismatch.decide.findings import Finding, in_interval, not_held
 from rotorid.mismatch.decide.select import NEAR_LIMIT, SMALLEST_SIZE, VALUE_FLOOR, Search, Selection
 from rotorid.mismatch.decide.status import CLAIMED, Estimate
 from rotorid.mismatch.evidence.regression import MOST_ATTENUATION, Fit, Regression
 from rotorid.mismatch.evidence.rows import CHANNELS, Contributions, Rows, Term
+from rotorid.mismatch.evidence.speedpath import SpeedResult
 from rotorid.mismatch.evidence.unknowns import UNKNOWNS
 
 _COST_PER_VALUE = 12.0
@@ -130,6 +132,41 @@ def findings_of(search: Search, selection: Selection, report_of: Callable[[str],
         if effect_id not in named and effect_id not in UNKNOWNS:
             findings.append(not_held(effect_id, reason, rule=getattr(reason, "rule", "")))
     return findings
+
+
+def path_findings(
+    result: SpeedResult,
+    channels: tuple[str, ...],
+    least_sd_s: float = 0.0,
+    limited: Callable[[SpeedForm, np.ndarray], tuple[tuple[str, float, float], ...]] = lambda form, values: (),
+) -> list[Finding]:
+    """Findings between command and rotor speed; `limited` gives the windows in which a limit holds a command.
+
+    `channels` are those in which they show; no time is better known than `least_sd_s`.
+    """
+    effects, out = catalogue(), []
+    for key, form in result.fit.chain:
+        where = result.fit.slice_of(key)
+        values = result.fit.values[where]
+        least = [least_sd_s if p.unit == "s" else 0.0 for p in form.parameters]
+        sd = np.hypot(np.sqrt(np.diag(result.fit.covariance)[where]), least)
+        numbers = zip(form.parameters, values, sd, strict=True)
+        alternatives = result.alternatives[key]
+        found = Finding(
+            id=key,
+            status="established",
+            speed_form=form,
+            values=tuple(float(v) for v in values),
+            equation=form.equation,
+            sentence=effects[key].sentence,
+            parameters=tuple(in_interval(p.symbol, v, p.unit, s) for p, v, s in numbers),
+            p_value=result.p_values[key],
+            channels=channels,
+            windows=limited(form, values) if form.stage == LIMIT else (),
+        )
+        out.append(found.or_else(alternatives) if alternatives else found)
+    stated = {f.id for f in out}
+    return out + [not_held(key, reason) for key, reason in result.dropped.items() if key not in stated]
 
 
 def wrench_findings(

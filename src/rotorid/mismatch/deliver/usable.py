@@ -246,11 +246,10 @@ def with_only(found: Fitted, ids: Collection[str], values: Values) -> Fitted:
 
     Rows are built anew where what goes lies between command and speed, or is air that moves.
     """
-    model, chain = found.model, found.chain
+    model = found.model
     active = [k for k in model.selection.active if model.search.terms[k].effect in {*ids, *UNKNOWNS}]
     gone = sorted(chain_ids(found) - set(ids))
-    for key in gone:
-        chain = chain_without(replace(found, chain=chain), key)
+    chain = chain_without(found, gone) if gone else found.chain
     still = model.wind is not None and moving_air("all the time").id not in ids
     calm = bool(model.gusts) and moving_air("in windows").id not in ids
     if (gone and found.commanded) or still or calm:

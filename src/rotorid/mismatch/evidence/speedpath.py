@@ -1,19 +1,21 @@
 """What lies between command and rotor speed: lag, delay, throttle curve, sag, saturation.
 
-Where speeds are measured they are the response: a chain of speed forms is fitted by nonlinear least squares on whitened
-residuals, grown one id at a time. Where only commands (or throttle) are recorded `evidence.lift` reads the path.
+A chain of speed forms is fitted by nonlinear least squares on whitened residuals, grown one id at a time: the same
+search for the measured speeds of flights, and for stands (`rotorid.mismatch.instrument.chain`), whose response may be
+the wrench. Of flights with commands (or throttle) alone `evidence.lift` reads the path.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import chi2
+from scipy.stats import f as f_distribution
 
 from rotorid.effects.catalogue import before_the_rotors, catalogue
 from rotorid.effects.contract import CURVE, DELAY, LAG, LIMIT, SpeedForm, SpeedPath
@@ -32,7 +34,8 @@ SMALLEST_SIZE = 0.15
 _LEAST_RESPONSE = 0.25
 """Least slope of a throttle curve in units of its mean: thrust proportional to throttle has a half."""
 _PLAINLY_LESS = 0.98
-"""Share of the squares that commands which hold leave, below which commands are smooth: a lag imitates either."""
+"""Share of the squares that commands leave as they are first taken, which hold or are smooth, below which they are the
+other: a lag imitates either."""
 _HARDLY_FOLLOWS = "rotors would hardly follow their commands with it"
 _LIMIT_WAYS = (0.97, 0.9, 0.8, 0.65, 0.5)
 _MOST_LIMITED = 0.5
@@ -52,26 +55,21 @@ LastSteps = dict[int, list[tuple[np.ndarray, tuple, np.ndarray]]]
 
 @dataclass(frozen=True)
 class SpeedFit:
-    """A fitted chain. `values` holds the parameters of every form in order; `shift_s` is a nuisance."""
+    """A fitted chain."""
 
     chain: Chain
     values: np.ndarray
-    shift_s: float
+    """Parameters of every form, in order."""
+    beside: np.ndarray
+    """What the recording leaves unknown of the path itself (`PathProblem.unknown`); of flights the shift in time, s."""
     cost: float
     covariance: np.ndarray | None = None
     inflation: float = 1.0
     holds: bool = True
     """Whether commands hold from sample to sample; else they are smooth, and recorded now and then."""
-
-    def of(self, effect_id: str) -> tuple[SpeedForm, np.ndarray]:
-        """Form and values of one id."""
-        at = 0
-        for key, form in self.chain:
-            size = len(form.parameters)
-            if key == effect_id:
-                return form, self.values[at : at + size]
-            at += size
-        raise KeyError(effect_id)
+    beside_sd: np.ndarray | None = None
+    blocks: int = 2
+    """Blocks that the covariance is made of."""
 
     def slice_of(self, effect_id: str) -> slice:
         """Where the id's parameters stand in `values`."""
@@ -82,6 +80,17 @@ class SpeedFit:
             at += len(form.parameters)
         raise KeyError(effect_id)
 
+    def of(self, effect_id: str) -> tuple[SpeedForm, np.ndarray]:
+        """Form and values of one id."""
+        return dict(self.chain)[effect_id], self.values[self.slice_of(effect_id)]
+
+    def without(self, effect_id: str) -> SpeedFit:
+        """The same chain with one id less, the numbers of the others as they are."""
+        where = self.slice_of(effect_id)
+        chain = tuple((k, f) for k, f in self.chain if k != effect_id)
+        values = np.delete(self.values, np.arange(where.start, where.stop))
+        return replace(self, chain=chain, values=values, covariance=None)
+
 
 @dataclass(frozen=True)
 class SpeedResult:
@@ -90,10 +99,9 @@ class SpeedResult:
     fit: SpeedFit
     p_values: dict[str, float]
     alternatives: dict[str, tuple[str, ...]]
-    sizes: dict[str, float]
     dropped: dict[str, str] = field(default_factory=dict)
-    noise_rad_s: float | None = None
-    """One-sigma of the rotor speed residual, where speeds are measured."""
+    noise: np.ndarray | None = None
+    """One-sigma of the residual of each rotor's speed, rad/s, or of each channel of the wrench, N or N m."""
     lag_alone: SpeedFit | None = None
     """Where a lag shares its lateness with a delay or a curve: the lag as it would be without these."""
     without: dict[str, SpeedFit] = field(default_factory=dict)
@@ -107,6 +115,13 @@ class SpeedResult:
     lifted_by_commands: bool = True
     turned_by_commands: bool = True
     """Whether lift, and roll or pitch, follow the commands in some band; else commands follow them."""
+
+    def less(self, ids: Sequence[str]) -> SpeedResult:
+        """The result with fewer ids at work: fitted anew where one goes, of more the others' numbers stay."""
+        fit = self.without[ids[0]] if len(ids) == 1 and ids[0] in self.without else self.fit
+        for key in ids:
+            fit = fit.without(key) if key in dict(fit.chain) else fit
+        return replace(self, fit=fit)
 
 
 class CommandChain(NamedTuple):
@@ -127,7 +142,7 @@ class CommandChain(NamedTuple):
         if chain is None:
             chain, values = fit.chain, fit.values
         full = self.full_speed, self.full_voltage
-        return self.scale * commanded_path(segment, chain, values, fit.shift_s, *full, fit.holds)
+        return self.scale * commanded_path(segment, chain, values, float(fit.beside[0]), *full, fit.holds)
 
 
 def commanded_path(
@@ -177,97 +192,173 @@ def moved(path: SpeedPath, values: np.ndarray) -> np.ndarray:
     return sum(w * held[first + i : first + i + count] for i, w in enumerate(weights) if w)
 
 
-class MeasuredSpeed:
-    """Whitened residual of a chain over the training segments: the measured rotor speeds are the response."""
+class PathProblem(ABC):
+    """Residuals of a chain on what is fitted, whitened. A kind of recording says what the response is.
 
-    def __init__(self, segments: list[Segment], full_speed: float, full_voltage: float | None):
-        self.segments = segments
-        self.rate_hz = segments[0].rate_hz
-        spread = np.concatenate([(s.motion.rotor_speed - s.command).ravel() for s in segments]).std()
-        self.scale = max(float(spread), 1e-9)
-        self.full_speed = full_speed
-        self.full_voltage = full_voltage
-        self.filters: list[np.ndarray] | None = None
-        self.shift_prior_s = 0.5 / segments[0].rate_hz
+    Next to the forms' parameters stands what nobody recorded of the path itself, the same for every chain.
+    """
+
+    unknown: np.ndarray
+    """One-sigma, lower and upper bound of each such number, (k, 3); each is nothing where nothing is unknown."""
+    coloured = True
+    """Whether residuals are whitened by their colour; else by their size alone: what they have in common is what the
+    chain lacks, no noise, and it takes nothing off what a form gains."""
+
+    def __init__(
+        self, commands: list[tuple[np.ndarray, np.ndarray]], rate_hz: float, full_speed: float, scale: np.ndarray
+    ) -> None:
+        """`commands` of every stretch, (n, rotors), rad/s, with their instants (n,), s; `scale` of the channels of the
+        response until their noise is known."""
+        self.commands, self.rate_hz, self.full_speed = commands, rate_hz, full_speed
+        self.filters = [np.array([1.0 / s]) for s in scale]
         self.holds = True
-        self._last: dict[int, LastSteps] = {id(s): {} for s in segments}
 
-    def path(self, segment: Segment, chain: Chain, values, shift_s: float) -> np.ndarray:
-        full, last = (self.full_speed, self.full_voltage), self._last[id(segment)]
-        return commanded_path(segment, chain, values, shift_s, *full, self.holds, last)
+    @abstractmethod
+    def raw(self, chain: Chain, values, beside) -> list[np.ndarray]:
+        """Residual of every stretch, (n, channels), unwhitened."""
 
-    def raw(self, chain: Chain, values, shift_s: float) -> list[np.ndarray]:
-        """Residual of every segment, (n, rotors), unwhitened."""
-        return [s.motion.rotor_speed - self.path(s, chain, values, shift_s) for s in self.segments]
+    @abstractmethod
+    def blocks(self, sizes: Sequence[int]) -> list[list[np.ndarray]]:
+        """Rows of each block of residuals that stand one after the other, by what is compared as one.
 
-    def whitened(self, chain: Chain, values, shift_s: float) -> list[np.ndarray]:
-        """Residual of every segment, (n, rotors), whitened by the noise learnt."""
-        out = []
-        for part in self.raw(chain, values, shift_s):
-            if self.filters is None:
-                out.append(part / self.scale)
-                continue
-            longest = max(len(f) for f in self.filters) - 1
-            white = np.stack([causal(f, part[:, j]) for j, f in enumerate(self.filters)], axis=1)
-            out.append(white[longest:])
-        return out
+        `sizes` are the rows of every stretch.
+        """
 
-    def learn_noise(self, chain: Chain, values, shift_s: float) -> None:
+    @abstractmethod
+    def late_s(self, fit: SpeedFit) -> float:
+        """What is unknown of the time by which commands arrive, s: a delay takes it back."""
+
+    def noticed_s(self, form: SpeedForm) -> float:
+        """Time by which rotors must be late by a form to be called so: between two samples nobody recorded anything."""
+        return 0.5 / self.rate_hz if form.stage >= DELAY else 0.0
+
+    def low_of(self, form: SpeedForm) -> list[float]:
+        """Lower bounds of a form's parameters."""
+        return [p.low for p in form.parameters]
+
+    def whitened(self, chain: Chain, values, beside) -> list[np.ndarray]:
+        """Residual of every stretch, (n, channels), whitened by the noise learnt."""
+        longest = max(len(f) for f in self.filters) - 1
+        parts = self.raw(chain, values, beside)
+        return [np.stack([causal(f, p[:, j]) for j, f in enumerate(self.filters)], axis=1)[longest:] for p in parts]
+
+    def left(self, chain: Chain, values, beside) -> float:
+        """Whitened squares that a chain leaves."""
+        return sum(float((w**2).sum()) for w in self.whitened(chain, values, beside))
+
+    def learn_noise(self, fit: SpeedFit) -> None:
         """Take the residual of a rich chain as the noise."""
-        parts = self.raw(chain, values, shift_s)
-        self.filters = [autoregression([p[:, j] for p in parts]) for j in range(parts[0].shape[1])]
+        parts = self.raw(fit.chain, fit.values, fit.beside)
+        if self.coloured:
+            self.filters = [autoregression([p[:, j] for p in parts]) for j in range(parts[0].shape[1])]
+        else:
+            self.filters = [np.array([1.0 / s]) for s in self.noise_of(parts)]
 
-    def fit(self, chain: Chain, start: np.ndarray, shift_s: float = 0.0) -> SpeedFit:
+    @staticmethod
+    def noise_of(parts: Sequence[np.ndarray]) -> np.ndarray:
+        """Root mean square of residuals by channel, (channels,)."""
+        return np.maximum(np.sqrt(np.mean(np.concatenate(parts) ** 2, axis=0)), 1e-12)
+
+    def nothing(self) -> SpeedFit:
+        """The fit of rotors that follow at once."""
+        return self.fit((), np.zeros(0))
+
+    def fit(self, chain: Chain, start: np.ndarray, beside: np.ndarray | None = None) -> SpeedFit:
         """Nonlinear least squares of a chain from a start; bounded by the forms' physical bounds."""
-        low = np.array([p.low for _, f in chain for p in f.parameters] + [-2 * self.shift_prior_s])
-        high = np.array([p.high for _, f in chain for p in f.parameters] + [2 * self.shift_prior_s])
-        x0 = np.clip(np.append(start, shift_s), low + 1e-9, high - 1e-9)
+        sd, low, high = self.unknown.T
+        own = len(start)
+        low = np.append([x for _, f in chain for x in self.low_of(f)], low)
+        high = np.append([p.high for _, f in chain for p in f.parameters], high)
+        x0 = np.append(start, np.zeros(len(sd)) if beside is None else beside)
+        if not len(x0):
+            return SpeedFit(chain, x0, x0, self.left(chain, x0, x0), holds=self.holds)
+        x0 = np.clip(x0, low + 1e-9, high - 1e-9)
         scale = np.where(np.abs(x0) > 1e-3, np.abs(x0), 0.02)
-        scale[-1] = self.shift_prior_s
+        scale[own:] = np.where(np.isfinite(sd), sd, 0.1)
 
         def function(x):
-            rows = np.concatenate([w.ravel() for w in self.whitened(chain, x[:-1], x[-1])])
-            return np.append(rows, x[-1] / self.shift_prior_s)
+            rows = [w.ravel() for w in self.whitened(chain, x[:own], x[own:])]
+            return np.concatenate([*rows, x[own:] / sd])
 
         found = least_squares(
             function, x0, bounds=(low, high), x_scale=scale, diff_step=1e-4, max_nfev=25, ftol=1e-5, xtol=1e-5
         )
-        return SpeedFit(chain, found.x[:-1], float(found.x[-1]), 2 * found.cost, holds=self.holds)
+        return SpeedFit(chain, found.x[:own], found.x[own:], 2 * found.cost, holds=self.holds)
 
     def with_covariance(self, fit: SpeedFit) -> SpeedFit:
-        """The fit with a covariance that is robust against what whitening left (blocks of a second)."""
-        x = np.append(fit.values, fit.shift_s)
-        base = self.whitened(fit.chain, x[:-1], x[-1])
+        """The fit with a covariance that is robust against what whitening left, and allows for few blocks."""
+        x, own, sd = np.append(fit.values, fit.beside), len(fit.values), self.unknown[:, 0]
+        base = self.whitened(fit.chain, fit.values, fit.beside)
+        least = np.append(np.full(own, 1e-2), np.where(np.isfinite(sd), sd, 1e-2))
         columns = []
         for j in range(len(x)):
-            step = 1e-4 * max(abs(x[j]), 1e-2 if j < len(x) - 1 else self.shift_prior_s)
+            step = 1e-4 * max(abs(x[j]), least[j])
             up = x.copy()
             up[j] += step
-            moved = self.whitened(fit.chain, up[:-1], up[-1])
-            columns.append([(b - a) / step for a, b in zip(base, moved, strict=True)])
-        gram = np.zeros((len(x), len(x)))
-        scores = []
-        for k, residual in enumerate(base):
-            jacobian = np.stack([c[k] for c in columns], axis=-1)
-            for part in self.seconds(len(residual)):
-                flat = jacobian[part].reshape(-1, len(x))
-                gram += flat.T @ flat
-                scores.append(flat.T @ residual[part].ravel())
-        gram[-1, -1] += 1.0 / self.shift_prior_s**2
+            moved = self.whitened(fit.chain, up[:own], up[own:])
+            columns.append(np.concatenate([(b - a) / step for a, b in zip(base, moved, strict=True)]))
+        if not columns:
+            return replace(fit, covariance=np.zeros((0, 0)), beside_sd=np.zeros(0))
+        jacobian, left = np.stack(columns, axis=-1), np.concatenate(base)
+        gram, scores = np.zeros((len(x), len(x))), []
+        for block in (b for group in self.blocks([len(w) for w in base]) for b in group):
+            flat = jacobian[block].reshape(-1, len(x))
+            gram += flat.T @ flat
+            scores.append(flat.T @ left[block].ravel())
+        gram += np.diag(np.append(np.zeros(own), sd**-2.0))
         # A limit that is never reached changes nothing: its variance is large, and finite.
         gram += np.diag(np.where(np.diag(gram) < _LEAST_INFORMATION, _LEAST_INFORMATION, 0.0))
-        scale = 1.0 / np.sqrt(np.diag(gram))
-        inverse = np.linalg.pinv(gram * np.outer(scale, scale), hermitian=True) * np.outer(scale, scale)
-        scores = np.array(scores)
-        robust = inverse @ (scores.T @ scores) @ inverse
+        unit = 1.0 / np.sqrt(np.diag(gram))
+        inverse = np.linalg.pinv(gram * np.outer(unit, unit), hermitian=True) * np.outer(unit, unit)
+        count, scores = len(scores), np.array(scores)
+        robust = inverse @ (scores.T @ scores) @ inverse * count / max(count - len(x), 1)
         covariance = at_least(robust, inverse)
-        ratio = np.diag(covariance)[:-1] / np.maximum(np.diag(inverse)[:-1], 1e-300)
-        inflation = float(np.median(ratio)) if len(ratio) else 1.0
-        return replace(fit, covariance=covariance[:-1, :-1], inflation=max(1.0, inflation))
+        ratio = np.diag(covariance)[:own] / np.maximum(np.diag(inverse)[:own], 1e-300)
+        return replace(
+            fit,
+            covariance=covariance[:own, :own],
+            inflation=max(1.0, float(np.median(ratio))) if own and self.coloured else 1.0,
+            beside_sd=np.sqrt(np.diag(covariance)[own:]),
+            blocks=count,
+        )
 
-    def seconds(self, rows: int) -> list[np.ndarray]:
-        """Rows of each second of a stretch."""
-        return np.array_split(np.arange(rows), max(1, rows // max(2, int(round(self.rate_hz)))))
+
+class MeasuredSpeed(PathProblem):
+    """The measured rotor speeds of a flight are the response; unknown is a shift in time within a sample."""
+
+    def __init__(self, segments: list[Segment], full_speed: float, full_voltage: float | None):
+        spread = np.concatenate([(s.motion.rotor_speed - s.command).ravel() for s in segments]).std()
+        rotors = segments[0].command.shape[1]
+        super().__init__(
+            [(s.command, s.motion.time_s) for s in segments],
+            segments[0].rate_hz,
+            full_speed,
+            np.full(rotors, max(float(spread), 1e-9)),
+        )
+        self.segments, self.full_voltage = segments, full_voltage
+        self.unknown = 0.5 / self.rate_hz * np.array([[1.0, -2.0, 2.0]])
+        self._last: dict[int, LastSteps] = {id(s): {} for s in segments}
+
+    def raw(self, chain: Chain, values, beside) -> list[np.ndarray]:
+        """Measured less modelled speeds of every segment, (n, rotors), rad/s."""
+        full = self.full_speed, self.full_voltage, self.holds
+        return [
+            s.motion.rotor_speed - commanded_path(s, chain, values, float(beside[0]), *full, self._last[id(s)])
+            for s in self.segments
+        ]
+
+    def late_s(self, fit: SpeedFit) -> float:
+        """The shift in time."""
+        return float(fit.beside[0])
+
+    def blocks(self, sizes: Sequence[int]) -> list[list[np.ndarray]]:
+        """Seconds of each stretch."""
+        starts = np.cumsum([0, *sizes])
+        per = max(2, int(round(self.rate_hz)))
+        return [
+            np.array_split(np.arange(start, start + size), max(1, size // per))
+            for start, size in zip(starts, sizes, strict=False)
+        ]
 
 
 def candidate_forms(segments: list[Segment], voltage: bool = True) -> list[tuple[str, SpeedForm]]:
@@ -292,24 +383,23 @@ def starts_of(form: SpeedForm) -> list[np.ndarray]:
 class SpeedSearch:
     """Grow the chain one id at a time, replace forms, prune, and look for alternatives."""
 
-    def __init__(self, problem: MeasuredSpeed, forms: list[tuple[str, SpeedForm]]):
+    def __init__(self, problem: PathProblem, forms: list[tuple[str, SpeedForm]]):
         self.problem, self.forms = problem, forms
 
     def best_fit(self, chain: Chain, base: SpeedFit, added: SpeedForm) -> SpeedFit:
         """The chain of `base` plus one form, from the one of the form's starts that leaves least."""
 
         def left(start: np.ndarray) -> float:
-            parts = self.problem.whitened(chain, np.append(base.values, start), base.shift_s)
-            return sum(float((w**2).sum()) for w in parts)
+            return self.problem.left(chain, np.append(base.values, start), base.beside)
 
-        return self.problem.fit(chain, np.append(base.values, min(self.starts(added), key=left)), base.shift_s)
+        return self.problem.fit(chain, np.append(base.values, min(self.starts(added), key=left)), base.beside)
 
     def starts(self, form: SpeedForm) -> list[np.ndarray]:
         """Starting values of a form: of a limit shares of the way from the usual command to the outermost (nothing acts
         beyond it, and nothing says there which way to go)."""
         if form.stage != LIMIT:
             return starts_of(form)
-        shares = np.concatenate([s.command.ravel() for s in self.problem.segments]) / self.problem.full_speed
+        shares = np.concatenate([c.ravel() for c, _ in self.problem.commands]) / self.problem.full_speed
         middle = float(np.median(shares))
         outermost = float(self.neutral(form)[0])
         return [np.array([middle + way * (outermost - middle)]) for way in _LIMIT_WAYS]
@@ -324,35 +414,29 @@ class SpeedSearch:
         for key, form in self.forms:
             if key in before_the_rotors() and form.stage != LIMIT and key not in rich:
                 rich[key] = form
-        fit = self.problem.fit((), np.zeros(0))
+        fit = self.problem.nothing()
         for key, form in rich.items():
-            fit = self.best_fit((*fit.chain, (key, form)), fit, form)
-        self.problem.holds = False
-        smooth = self.problem.fit(fit.chain, fit.values, fit.shift_s)
-        self.problem.holds = bool(smooth.cost > _PLAINLY_LESS * fit.cost)
-        fit = fit if self.problem.holds else smooth
-        self.problem.learn_noise(fit.chain, fit.values, fit.shift_s)
+            richer = self.best_fit((*fit.chain, (key, form)), fit, form)
+            fit = richer if richer.cost < fit.cost else fit  # a start may be far from all that is there
+        self.problem.holds = not self.problem.holds
+        other = self.problem.fit(fit.chain, fit.values, fit.beside)
+        fit = other if other.cost <= _PLAINLY_LESS * fit.cost else fit
+        self.problem.holds = fit.holds
+        self.problem.learn_noise(fit)
 
     def size(self, fit: SpeedFit, key: str) -> float:
         """Change that an id makes in units of the residual's own noise, strongest tenth of the seconds.
 
         Of a limit, which acts where it is reached alone, the strongest second.
         """
-        kept = tuple((k, f) for k, f in fit.chain if k != key)
-        where = fit.slice_of(key)
-        values = np.delete(fit.values, np.arange(where.start, where.stop))
-        with_it = self.problem.raw(fit.chain, fit.values, fit.shift_s)
-        without = self.problem.raw(kept, values, fit.shift_s)
-        noise = np.sqrt(np.mean([np.mean(w**2, axis=0) for w in with_it], axis=0))
-        per = max(2, int(self.problem.rate_hz))
+        less = fit.without(key)
+        with_it, without = (self.problem.raw(f.chain, f.values, f.beside) for f in (fit, less))
+        change = np.concatenate(without) - np.concatenate(with_it)
+        noise = np.maximum(self.problem.noise_of(with_it), 1e-12)
         quantile = 1.0 if fit.of(key)[0].stage == LIMIT else 0.9
-        best = 0.0
-        for a, b in zip(with_it, without, strict=True):
-            count = len(a) // per
-            if count:
-                local = np.sqrt(((b - a)[: count * per].reshape(count, per, -1) ** 2).mean(axis=1))
-                best = max(best, float(np.quantile(local / np.maximum(noise, 1e-12), quantile, axis=0).max()))
-        return best
+        groups = self.problem.blocks([len(p) for p in with_it])
+        local = ([np.sqrt((change[b] ** 2).mean(axis=0)) for b in group] for group in groups)
+        return max(float(np.quantile(np.array(own) / noise, quantile, axis=0).max()) for own in local)
 
     def judge(self, base: SpeedFit, fit: SpeedFit, key: str) -> tuple[float, float, float]:
         """p-value, score and inflation of an id that `fit` has and `base` has not."""
@@ -363,19 +447,22 @@ class SpeedSearch:
         # What the fit gains and what its parameters are sure of must agree: the shift in time bends the first.
         away = fit.values[own] - self.neutral(fit.of(key)[0])
         sure = gain if fit.covariance is None else quadratic_form(away, fit.covariance[own, own])
-        return float(chi2.sf(max(min(gain, sure), 0.0), count)), gain - COST_PER_PARAMETER * count, inflation
+        # Hotelling's T² over blocks.
+        free = max(fit.blocks - count, 1)
+        p = f_distribution.sf(max(min(gain, sure), 0.0) * free / (count * max(fit.blocks - 1, 1)), count, free)
+        return float(p), gain - COST_PER_PARAMETER * count, inflation
 
     def neutral(self, form: SpeedForm) -> np.ndarray:
         """Parameter values that change nothing; of a limit, the outermost command."""
         if form.stage != LIMIT:
             return np.array(form.neutral)
-        shares = [s.command / self.problem.full_speed for s in self.problem.segments]
+        shares = [c / self.problem.full_speed for c, _ in self.problem.commands]
         return np.clip(form.neutral, min(float(s.min()) for s in shares), max(float(s.max()) for s in shares))
 
     def run(self) -> SpeedResult:
         """The whole search."""
         self.rich_noise()
-        current = self.problem.fit((), np.zeros(0))
+        current = self.problem.nothing()
         dropped: dict[str, str] = {}
         for _ in range(5):
             taken = {k for k, _ in current.chain} | set(dropped)
@@ -393,34 +480,28 @@ class SpeedSearch:
             for score, p, key, fit in options:
                 if score <= 0:
                     break
-                if p > ENTER_P or self.negligible(fit, key) or not self.responds(fit):
+                if p > ENTER_P or self.negligible(fit, key):
                     continue
                 size = self.size(fit, key)
                 if size < SMALLEST_SIZE:
                     dropped[key] = f"its size is {size:.2g} of the noise"
                     continue
-                grown = True
                 refitted = self._better_forms(fit, key, current, others)
-                refitted = refitted if refitted.covariance is not None else self.problem.with_covariance(refitted)
                 if self.responds(refitted):
-                    current = refitted
-                else:
-                    dropped[key] = _HARDLY_FOLLOWS
-                break
+                    grown = True
+                    current = refitted if refitted.covariance is not None else self.problem.with_covariance(refitted)
+                    break
             if not grown:
                 break
         current, bases = self._pruned(current, dropped)
-        p_values, alternatives, sizes, fewer = {}, {}, {}, {}
+        p_values, alternatives, fewer = {}, {}, {}
         for key, _ in current.chain:
             base = bases[key]
             fewer[key] = self.problem.with_covariance(base) if base.chain else base
             p_values[key] = self.judge(base, current, key)[0]
-            sizes[key] = self.size(current, key)
             alternatives[key] = self._alternatives(current, base, key)
-        parts = self.problem.raw(current.chain, current.values, current.shift_s)
-        noise = float(np.sqrt(np.mean([np.mean(p**2) for p in parts])))
-        lag = self._lag_alone(current)
-        return SpeedResult(current, p_values, alternatives, sizes, dropped, noise, lag, fewer)
+        noise = self.problem.noise_of(self.problem.raw(current.chain, current.values, current.beside))
+        return SpeedResult(current, p_values, alternatives, dropped, noise, self._lag_alone(current), fewer)
 
     def _lag_alone(self, fit: SpeedFit) -> SpeedFit | None:
         """A lag of one constant and nothing else: what most publications fit."""
@@ -435,8 +516,8 @@ class SpeedSearch:
         """Whether rotors still follow their commands: a flat curve would explain any difference between them."""
         if any(at_its_bounds(form, fit.values[fit.slice_of(key)]) for key, form in fit.chain):
             return False
-        low = min(float(s.command.min()) for s in self.problem.segments)
-        high = max(float(s.command.max()) for s in self.problem.segments)
+        low = min(float(c.min()) for c, _ in self.problem.commands)
+        high = max(float(c.max()) for c, _ in self.problem.commands)
         grid = np.linspace(low, high, 9)[:, None]
         path = SpeedPath(grid, 0.01 * np.arange(9.0), self.problem.full_speed)
         for key, form in fit.chain:
@@ -452,8 +533,7 @@ class SpeedSearch:
     def _always_limited(self, form: SpeedForm, values: np.ndarray) -> bool:
         """Whether a limit holds some rotor most of the time: nobody flies so, but in a hover of hardly any commands it
         makes up for whatever keeps the rotors apart."""
-        segments = self.problem.segments
-        paths = [SpeedPath(s.command, s.motion.time_s, self.problem.full_speed) for s in segments]
+        paths = [SpeedPath(*own, self.problem.full_speed) for own in self.problem.commands]
         held = np.concatenate([form.apply(p, values) != p.speed for p in paths])
         return bool(held.mean(axis=0).max() > _MOST_LIMITED)
 
@@ -465,20 +545,19 @@ class SpeedSearch:
         """
         form, values = fit.of(key)
         delays = form.stage == DELAY
-        least = 0.5 / self.problem.segments[0].rate_hz if form.stage >= DELAY else 0.0
-        away = values + fit.shift_s if delays else values
+        least = self.problem.noticed_s(form)
+        away = values + self.problem.late_s(fit) if delays else values
         limits = [max(p.negligible, least) for p in form.parameters]
         return all(abs(v - n) < limit for v, n, limit in zip(away, form.neutral, limits, strict=True))
 
     def _without(self, fit: SpeedFit, key: str) -> SpeedFit:
-        where = fit.slice_of(key)
-        chain = tuple((k, f) for k, f in fit.chain if k != key)
-        values = np.delete(fit.values, np.arange(where.start, where.stop))
-        return self.problem.fit(chain, values, fit.shift_s)
+        less = fit.without(key)
+        return self.problem.fit(less.chain, less.values, less.beside)
 
     @step("other forms")
     def _better_forms(self, fit: SpeedFit, new: str, current: SpeedFit, others) -> SpeedFit:
-        """Try the other forms of each id in the chain; the cheapest for its parameters stays.
+        """Try the other forms of each id in the chain; of those with which rotors follow their commands the cheapest for
+        its parameters stays.
 
         `others` are fits of `current` plus a form, of which that of the id `new` is `fit`.
         """
@@ -494,7 +573,7 @@ class SpeedSearch:
                 # By one inflation for both: its own would charge a form for what it alone explains.
                 saved = (best.cost - tried.cost) / max(best.inflation, tried.inflation)
                 more = len(tried.values) - len(best.values)
-                if saved > COST_PER_PARAMETER * more and self.responds(tried):
+                if self.responds(tried) and (saved > COST_PER_PARAMETER * more or not self.responds(best)):
                     best = tried
             fit = best
         return fit

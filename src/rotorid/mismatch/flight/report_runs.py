@@ -210,7 +210,7 @@ def without_each(
             out[finding.id] = _speeds_without(found, seen, finding.id, traces)
         elif in_chain:
             cutoff_hz = seen.prepared.thinner.cutoff_hz
-            segments = path_segments(seen.prepared.segments, chain_without(found, finding.id), cutoff_hz)
+            segments = path_segments(seen.prepared.segments, chain_without(found, [finding.id]), cutoff_hz)
             out[finding.id] = on_traces(traces, seen.rows, made_by(seen, segments, fit))
         elif finding.id in ids_of("air_moves", "all the time") and seen.wind is not None:
             still = [replace(s, motion=replace(s.motion, wind=without_wind(s, seen.wind))) for s in seen.segments]
@@ -227,19 +227,14 @@ def without_wind(segment, wind: np.ndarray) -> np.ndarray:
     return segment.motion.wind - np.array([*wind, 0.0])
 
 
-def chain_without(found: Fitted, key: str) -> CommandChain:
-    """What lies between command and speed with one id less.
+def chain_without(found: Fitted, ids: Sequence[str]) -> CommandChain:
+    """What lies between command and speed with fewer ids.
 
-    Fitted anew where speeds are measured. Where commands alone are, forces and moments are fitted with the chain as it
-    is: it stays so but for the id, or the two would no longer belong together.
+    Fitted anew where speeds are measured and one goes. Where commands alone are, forces and moments are fitted with the
+    chain as it is: it stays so but for the ids, or the two would no longer belong together.
     """
     result = found.chain.result
-    if found.measured:
-        return found.chain._replace(result=replace(result, fit=result.without[key]))
-    where = result.fit.slice_of(key)
-    chain = tuple((k, f) for k, f in result.fit.chain if k != key)
-    values = np.delete(result.fit.values, np.arange(where.start, where.stop))
-    return found.chain._replace(result=replace(result, fit=replace(result.fit, chain=chain, values=values)))
+    return found.chain._replace(result=(result if found.measured else replace(result, without={})).less(ids))
 
 
 def made_by(model: WrenchModel, segments, fit: Fit) -> list[np.ndarray]:
@@ -263,7 +258,7 @@ def _speeds_without(
     found: Fitted, seen: WrenchModel, key: str, traces: tuple[ChannelTrace, ...]
 ) -> tuple[np.ndarray, ...]:
     """Measured less modelled rotor speeds on the traces, with one id less between command and speed."""
-    chain = chain_without(found, key)
+    chain = chain_without(found, [key])
     thinner, known = seen.prepared.thinner, {}
     for r, segment in zip(seen.rows, seen.prepared.segments, strict=True):
         left = thinner(segment.motion.rotor_speed - chain.speeds(segment))

@@ -56,7 +56,6 @@ from rotorid.mismatch.instrument.chain import (
     moved,
     speed_traces,
     supply_reason,
-    without_id,
 )
 from rotorid.mismatch.instrument.mistakes import find_mistakes
 from rotorid.mismatch.instrument.model import (
@@ -255,14 +254,13 @@ class InstrumentChoice(Choice):
 
     def only(self, words: Analysis) -> InstrumentChoice:
         """The choice with what is claimed alone at work, fitted without effects that are only suggested."""
-        model, chain = self.model, self.chain
+        model = self.model
         ids = {f.id for f in claimed(words.findings)}
         active = [k for k in model.selection.active if model.search.terms[k].effect in {*ids, *UNKNOWNS}]
-        gone = [k for k, _ in self.chain_of_speeds.fit.chain if k not in ids] if self.chain_of_speeds else []
+        gone = [k for k, _ in self.chain_of_speeds.result.fit.chain if k not in ids] if self.chain_of_speeds else []
         if len(active) == len(model.selection.active) and not gone:
             return self
-        for key in gone:
-            chain = without_id(chain, key)
+        chain = self.chain.less(gone) if gone else self.chain
         fewer = _with_terms(model, active)
         return replace(self, model=fewer, chain=chain, seen=replace(self.seen, selection=fewer.selection))
 
@@ -343,8 +341,8 @@ def _without_each(
         if effect in names:
             fewer = settled(model, values, [k for k in active if model.search.terms[k].effect != effect])[0]
             out[effect] = on_traces(traces, seen.rows, residuals_of(seen, fewer))
-    for key in [] if chain is None else [k for k, _ in chain.fit.chain if k in names and k not in out]:
-        own = speed_traces(seen.setup, without_id(chain, key))
+    for key in [] if chain is None else [k for k, _ in chain.result.fit.chain if k in names and k not in out]:
+        own = speed_traces(seen.setup, chain.less([key]))
         left = {(t.run, t.channel, first_s(t.time_s)): t.named for t in own}
         out[key] = tuple(left.get((t.run, t.channel, first_s(t.time_s)), t.named) for t in traces)
     return out
@@ -355,7 +353,7 @@ def _speed_left(setup: PreparedInstrument, chain: ChainResult, traces: tuple[Cha
     own = [t for t in traces if t.channel.startswith("rotor_speed") and t.run in setup.split.held_out]
     if not own or not chain.findings or set(setup.split.held_out) & set(setup.split.training):
         return 0.0
-    floor = (chain.noise_rad_s or 0.0) ** 2 * sum(len(t.before) for t in own)
+    floor = float(np.mean(chain.result.noise**2)) * sum(len(t.before) for t in own)
     start, left = (sum(float(x @ x) for x in stage) for stage in ([t.before for t in own], [t.named for t in own]))
     return float(np.clip((left - floor) / max(start - floor, 1e-9), 0.0, 1.0)) if left > floor else 0.0
 
@@ -373,8 +371,8 @@ def _full_speed_value(
 def _noise_floors(setup: PreparedInstrument, model: ReadingModel, chain: ChainResult | None) -> dict[str, float]:
     """Noise of each channel."""
     out = {CHANNELS[c]: float(model.noise[c]) for c in setup.instrument.channels}
-    if chain is not None and chain.noise_rad_s is not None:
-        out |= {f"rotor_speed_{i + 1}": chain.noise_rad_s for i in range(setup.vehicle.rotor_count)}
+    if chain is not None and all(x.measured for x in setup.loadings):
+        out |= {f"rotor_speed_{i + 1}": float(sd) for i, sd in enumerate(chain.result.noise)}
     return out
 
 

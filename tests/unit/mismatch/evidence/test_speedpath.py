@@ -82,7 +82,7 @@ def test_a_lag_is_found_with_its_time_constant(tau):
     sd = np.sqrt(result.fit.covariance[0, 0])
     assert abs(result.fit.values[0] - tau) < 4 * sd and sd < 0.002
     assert result.p_values["motor_lag"] < 1e-5 and result.alternatives["motor_lag"] == ()
-    assert result.noise_rad_s == pytest.approx(10.0, rel=0.1)
+    assert result.noise == pytest.approx(np.full(4, 10.0), rel=0.1)
 
 
 def test_a_lag_of_less_than_half_a_sample_is_none():
@@ -110,7 +110,7 @@ def test_the_forms_at_work_are_found_with_their_values_and_no_others(seed, volta
     assert {key: found.name for key, found in fit.chain} == {key: name for key, (name, *_) in at_work.items()}
     for key, (_, values, allowed) in at_work.items():
         # The nuisance shift of half a sample shares a delay.
-        found = fit.of(key)[1] + (fit.shift_s if key == "delay" else 0.0)
+        found = fit.of(key)[1] + (fit.beside[0] if key == "delay" else 0.0)
         np.testing.assert_allclose(found, values, atol=allowed)
 
 
