@@ -556,7 +556,7 @@ class SpeedSearch:
 
     @step("other forms")
     def _better_forms(self, fit: SpeedFit, new: str, current: SpeedFit, others) -> SpeedFit:
-        """Try the other forms of each id in the chain; of those with which rotors follow their commands the cheapest for
+        """Try the other forms of each id in the chain; of those with which rotors follow commands the cheapest for
         its parameters stays.
 
         `others` are fits of `current` plus a form, of which that of the id `new` is `fit`.

@@ -41,7 +41,7 @@ from rotorid.mismatch.decide.status import CLAIMED, Estimate
 from rotorid.mismatch.deliver.candidates import Candidate
 from rotorid.mismatch.deliver.files import claimed
 from rotorid.mismatch.deliver.final import Choice, delivered
-from rotorid.mismatch.evidence.regression import Fit, Regression, build
+from rotorid.mismatch.evidence.regression import Fit, Regression
 from rotorid.mismatch.evidence.rows import Rows, Term
 from rotorid.mismatch.evidence.split import parts_of, split_runs
 from rotorid.mismatch.evidence.unknowns import UNKNOWNS
@@ -62,14 +62,12 @@ from rotorid.mismatch.instrument.model import (
     VALUE_NAMES,
     ReadingModel,
     active_values,
-    block_length,
     chosen_already,
-    everything,
     fitted_model,
     kept_values,
     make_terms,
     nonlinear_deviation,
-    restrain,
+    regression_of,
     rows_of,
     whole_reading,
 )
@@ -537,7 +535,7 @@ def _freed(model: ReadingModel, key: str, beta: np.ndarray, channels: list[int])
 
 def _with_free(model: ReadingModel, keys: list[str], free: list[np.ndarray]) -> Regression:
     """The regression of some terms with the columns of a free form, key FREE, added."""
-    regression, setup = model.regression, model.setup
+    regression = model.regression
     kept = [t for t in regression.terms if t.key in keys or t.kind != "effect"]
     cols = regression.columns([t.key for t in kept])
     size = free[0].shape[2]
@@ -546,10 +544,7 @@ def _with_free(model: ReadingModel, keys: list[str], free: list[np.ndarray]) -> 
         Rows(r.run, r.time_s, r.y, np.concatenate([r.x[:, :, cols], f], axis=2))
         for r, f in zip(model.rows, free, strict=True)
     ]
-    per = block_length(setup, rows)
-    out = build(rows, [*kept, term], regression.filters, everything, per / setup.rate_hz, setup.rate_hz)
-    restrain(out, setup)
-    return out
+    return regression_of(model.setup, rows, [*kept, term], regression.filters)
 
 
 def _left_of(model: ReadingModel, value: str, strong: str, active: list[str], channels: list[int]) -> float:

@@ -186,16 +186,28 @@ def kept_values(search: Search, active: Sequence[str]) -> list[str]:
 
 def chosen_already(model: ReadingModel) -> Chosen:
     """The model of a stand or bench that was chosen, with its posterior and support."""
-    rate_hz, filters = model.setup.rate_hz, model.regression.filters
-    block_s = model.rows_per_block / rate_hz
-    return chosen_at(
-        build(model.rows, model.terms, filters, everything, block_s, rate_hz, by_channel=True), model.selection.active
-    )
+    taps = model.regression.filters
+    return chosen_at(regression_of(model.setup, model.rows, model.terms, taps, by_channel=True), model.selection.active)
 
 
 def everything(run: str, time_s: float) -> bool:
     """Every block is fitted: what is held out is not here."""
     return True
+
+
+def regression_of(
+    setup: PreparedInstrument,
+    rows: list[Rows],
+    terms: list[Term],
+    filters: dict[int, np.ndarray],
+    noisy: list[Rows] | None = None,
+    by_channel: bool = False,
+) -> Regression:
+    """The regression of a reading's rows; `filters`, `noisy` and `by_channel` as in `regression.build`."""
+    block_s = block_length(setup, rows) / setup.rate_hz
+    out = build(rows, terms, filters, everything, block_s, setup.rate_hz, noisy, by_channel=by_channel)
+    restrain(out, setup)
+    return out
 
 
 def block_length(setup: PreparedInstrument, rows: list[Rows]) -> int:
@@ -271,9 +283,7 @@ def reading_model(
     rows = rows_of(setup, terms, loadings, whole)
     noise, taps = _noise_and_filters(setup, terms, rows) if filters is None else filters
     short = np.median([len(r.y) for r in rows]) < SHORT
-    per = block_length(setup, rows)
-    regression = build(rows, terms, taps, everything, per / setup.rate_hz, setup.rate_hz, noisy)
-    restrain(regression, setup)
+    regression = regression_of(setup, rows, terms, taps, noisy)
     joint_sizes = size_of_columns(rows, noise, max(1, int(setup.rate_hz)) if not short else 1)
     sizes = _size_function(regression, joint_sizes)
     search = ReadingSearch(regression, Questions(sizes, joint_sizes), refused)
@@ -484,9 +494,7 @@ def nonlinear_deviation(model: ReadingModel, key: str) -> np.ndarray:
         # The form itself, at gain one, is in the model: only its slopes are fitted.
         known = rows_of(setup, [own], model.loadings)
         rows = [Rows(r.run, r.time_s, r.y - k.x[:, :, 0], r.x) for r, k in zip(rows, known, strict=True)]
-    block_s = block_length(setup, rows) / setup.rate_hz
-    regression = build(rows, terms, model.regression.filters, everything, block_s, setup.rate_hz)
-    restrain(regression, setup)
+    regression = regression_of(setup, rows, terms, model.regression.filters)
     fit = regression.fit([t.key for t in terms], jackknife=True)
     sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
     out = np.zeros(len(form.parameters))
