@@ -29,6 +29,7 @@ from rotorid.mismatch.evidence.rows import CHANNELS
 from rotorid.mismatch.evidence.unknowns import DEPENDS_ON, UNKNOWNS
 from rotorid.mismatch.flight.prepare import assemble_rows
 from rotorid.mismatch.flight.wrench import WORTH_STATING, channel_floor
+from rotorid.recordings import Split
 from rotorid.recordings.signal.kernels import causal
 
 ALARM_P = 1e-5
@@ -119,17 +120,11 @@ def _channels_of(prepared, model, segments, full, added, slow, p_after, delivere
     `full` is the fit of the whole model, `added` (n, 12) of each stretch what it makes of the channels; `least` is how
     much of the noise's energy must be kept by values to count.
     """
-    _, inputs = _standardised(prepared, segments)
+    inputs = standardised([probes(s, prepared) for s in segments])[1]
     unnamed = model.unnamed(full.columns)
-    training = [r.run in prepared.split.training for r in model.rows]
-    if prepared.split.training == prepared.split.held_out:
-        training = [True] * len(training)
-    judged = [i for i, t in enumerate(training) if not t] or list(range(len(training)))
-    features = [_features(z) for z in inputs]
-    size = features[0].shape[1]
-    gram = sum(f.T @ f for f, t in zip(features, training, strict=True) if t)
-    weights = gram + 1e-2 * np.trace(gram) / size * np.eye(size)
     runs = [r.run for r in model.rows]
+    flexible_of = Flexible([with_products(z) for z in inputs], runs, prepared.split)
+    judged = flexible_of.judged
     least_noise = WORTH_STATING * channel_floor(segments, prepared.vehicle)
     out = []
     for c, name in enumerate(CHANNELS[:6]):
@@ -137,12 +132,9 @@ def _channels_of(prepared, model, segments, full, added, slow, p_after, delivere
             continue
         left = left_by(model.rows, c, added)
         empirical = [r.x[:, c][:, full.columns[unnamed]] @ full.beta[unnamed] for r in model.rows]
-        cross = sum(f.T @ e for f, e, t in zip(features, left, training, strict=True) if t)
-        beta = np.linalg.solve(weights, cross)
         count = sum(len(left[i]) for i in judged)
-        energy = _energy(left[i] for i in judged)
+        energy, flexible = flexible_of.energies(left)
         outside = _energy(empirical[i] for i in judged)
-        flexible = min(_energy(left[i] - features[i] @ beta for i in judged), energy)
         # A simulator without noise leaves nothing, and any share of nothing is large.
         flexible = max(flexible, count * least_noise[c] ** 2)
         diffuse = p_after[name] < ALARM_P and energy - flexible > SMALLEST_SHARE_OF_NOISE**2 * flexible
@@ -222,10 +214,33 @@ def _unit(channel: str) -> str:
     return "N m" if channel.startswith("moment") else "N"
 
 
-def _features(z: np.ndarray) -> np.ndarray:
+def with_products(z: np.ndarray) -> np.ndarray:
     """Inputs and their pairwise products, (n, p + p(p+1)/2)."""
     i, j = np.triu_indices(z.shape[1])
     return np.concatenate([z, z[:, i] * z[:, j]], axis=1)
+
+
+class Flexible:
+    """A ridge regression on features that stands for whatever could be explained: fitted on training runs, judged on
+    those held out; on all where no run is."""
+
+    def __init__(self, features: Sequence[np.ndarray], runs: Sequence[str], split: Split):
+        """`features` (n, p) of every stretch, and its run."""
+        self._features = features
+        self._fitted = [split.training == split.held_out or run in split.training for run in runs]
+        self.judged = [i for i, fitted in enumerate(self._fitted) if not fitted] or list(range(len(runs)))
+        """Numbers of the stretches that are judged."""
+        gram, size = self._products(features), features[0].shape[1]
+        self._weights = gram + 1e-2 * np.trace(gram) / size * np.eye(size)
+
+    def _products(self, other: Sequence[np.ndarray]) -> np.ndarray:
+        return sum(f.T @ x for f, x, fitted in zip(self._features, other, self._fitted, strict=True) if fitted)
+
+    def energies(self, left: Sequence[np.ndarray]) -> tuple[float, float]:
+        """Energy of residuals (n,) of every stretch where it is judged, and what the regression leaves of it."""
+        beta = np.linalg.solve(self._weights, self._products(left))
+        energy = _energy(left[i] for i in self.judged)
+        return energy, min(_energy(left[i] - self._features[i] @ beta for i in self.judged), energy)
 
 
 def slow_excess(prepared, model, segments, noisy, contributions) -> dict[str, tuple[float, float]]:
@@ -321,20 +336,18 @@ def probes(segment: Segment, prepared) -> dict[str, np.ndarray]:
     return out
 
 
-def _standardised(prepared, segments, also=()):
-    """Names of the inputs that vary, and per stretch their values (n, p), of mean 0 and deviation 1 over `segments`.
-
-    Stretches of `also` follow on the same scale.
-    """
-    parts = [probes(s, prepared) for s in (*segments, *also)]
+def standardised(
+    parts: Sequence[Mapping[str, np.ndarray]], count: int | None = None
+) -> tuple[list[str], list[np.ndarray]]:
+    """Names of the inputs that vary, and per stretch their values (n, p), of mean 0 and deviation 1 over the first
+    `count` stretches (default all): the others follow on the same scale."""
     names = [n for n in parts[0] if all(n in z for z in parts)]
     stacked = [np.stack([z[n] for n in names], axis=1) for z in parts]
-    every = np.concatenate(stacked[: len(segments)])
+    every = np.concatenate(stacked[:count])
     mean, spread = every.mean(axis=0), every.std(axis=0)
     keep = spread > 1e-9
-    return [n for n, k in zip(names, keep, strict=True) if k], [
-        ((z - mean) / np.where(spread > 0, spread, 1))[:, keep] for z in stacked
-    ]
+    scaled = [((z - mean) / np.where(keep, spread, 1))[:, keep] for z in stacked]
+    return [n for n, k in zip(names, keep, strict=True) if k], scaled
 
 
 def _added_noise(prepared, segments, noisy) -> list[np.ndarray]:
@@ -365,7 +378,7 @@ def dependence(prepared, model, segments, noisy):
 
     `noisy` are the segments with the sensors' noise added once more; empty where that is not known.
     """
-    names, inputs = _standardised(prepared, segments, noisy)
+    names, inputs = standardised([probes(s, prepared) for s in (*segments, *noisy)], len(segments))
     inputs, again = inputs[: len(segments)], inputs[len(segments) :]
     noise = _added_noise(prepared, segments, noisy) if noisy else []
     moved = [b - a for a, b in zip(inputs, again, strict=True)] if noisy else []
@@ -383,8 +396,8 @@ def dependence(prepared, model, segments, noisy):
         rate_hz = prepared.thinner.rate_hz
         runs = [r.run for r in model.rows]
         shared = [(d[:, c], z) for d, z in zip(noise, moved, strict=True)] or None
-        p_before, _ = _wald(raw, inputs, taps, rate_hz, shared, most)
-        p_after, t = _wald(left, inputs, taps, rate_hz, shared, most)
+        p_before, _ = wald(raw, inputs, taps, rate_hz, shared, most)
+        p_after, t = wald(left, inputs, taps, rate_hz, shared, most)
         # Neither on the inputs nor on the run: the smaller of two p-values, doubled.
         before[CHANNELS[c]] = min(1.0, 2 * min(p_before, compared(runs, raw, rate_hz)[1]))
         after[CHANNELS[c]] = min(1.0, 2 * min(p_after, compared(runs, left, rate_hz)[1]))
@@ -404,7 +417,7 @@ def left_by(rows, channel: int, added) -> list[np.ndarray]:
     return left if sum(float(x @ x) for x in left) <= sum(float(y @ y) for y in raw) else raw
 
 
-def _wald(parts, inputs, taps, rate_hz, shared=None, most=1.0, memory=0):
+def wald(parts, inputs, taps, rate_hz, shared=None, most=1.0, memory=0):
     """Block-robust Hotelling test of a regression of the whitened residual on the whitened inputs.
 
     `shared` holds per stretch what one more draw of the sensors' noise changes in residual (n,) and inputs (n, p);

@@ -16,7 +16,14 @@ from rotorid.errors import InputError
 from rotorid.mismatch.decide.findings import Analysis
 from rotorid.mismatch.deliver.files import Instruments, instruments_of
 from rotorid.mismatch.evidence.rows import form_reading
-from rotorid.mismatch.flight.leftover import ALARM_P, SMALLEST_SHARE_OF_NOISE, _wald
+from rotorid.mismatch.flight.leftover import (
+    ALARM_P,
+    SMALLEST_SHARE_OF_NOISE,
+    Flexible,
+    standardised,
+    wald,
+    with_products,
+)
 from rotorid.mismatch.instrument.model import MEMORY, ReadingModel
 from rotorid.mismatch.instrument.setup import averaged, full_voltage_of, loaded_by, pieces_of, with_speed
 from rotorid.recordings import Vehicle
@@ -67,15 +74,9 @@ def regimes(model: ReadingModel) -> dict[str, dict[str, np.ndarray]]:
 
 
 def _inputs(model: ReadingModel) -> tuple[list[str], list[np.ndarray]]:
-    parts = _on_rows(model)
-    names = [n for n in parts[0] if all(n in p for p in parts) and n != "rotor_speed_rad_s"]
-    stacked = [np.stack([np.nan_to_num(p[n]) for n in names], axis=1) for p in parts]
-    every = np.concatenate(stacked)
-    mean, spread = every.mean(axis=0), every.std(axis=0)
-    keep = spread > 1e-9
-    return [n for n, k in zip(names, keep, strict=True) if k], [
-        ((z - mean) / np.where(keep, spread, 1))[:, keep] for z in stacked
-    ]
+    """Inputs that vary, on the rows of every part."""
+    unlike = "rotor_speed_rad_s"
+    return standardised([{n: np.nan_to_num(v) for n, v in p.items() if n != unlike} for p in _on_rows(model)])
 
 
 def _changing(model: ReadingModel, names: list[str], inputs: list[np.ndarray]) -> tuple[list[str], list[np.ndarray]]:
@@ -97,8 +98,8 @@ def dependence(model: ReadingModel, before: list[np.ndarray], after: list[np.nda
     first, last, depends = {}, {}, {}
     for c in model.setup.instrument.channels:
         taps, rate_hz = model.regression.filters[c], model.setup.rate_hz
-        p_first, _ = _wald([b[:, c] for b in before], inputs, taps, rate_hz, memory=MEMORY)
-        p_last, t = _wald([a[:, c] for a in after], inputs, taps, rate_hz, memory=MEMORY)
+        p_first, _ = wald([b[:, c] for b in before], inputs, taps, rate_hz, memory=MEMORY)
+        p_last, t = wald([a[:, c] for a in after], inputs, taps, rate_hz, memory=MEMORY)
         first[CHANNELS[c]] = min(1.0, 2 * min(p_first, _in_a_run(model, before, c)))
         p_run = _in_a_run(model, after, c)
         last[CHANNELS[c]] = min(1.0, 2 * min(p_last, p_run))
@@ -134,7 +135,7 @@ def _in_a_run(model: ReadingModel, residuals: list[np.ndarray], channel: int) ->
     """
     taps, rate_hz = model.regression.filters[channel], model.setup.rate_hz
     found = [
-        _wald([residuals[k][:, channel] for k in numbers], z, taps, rate_hz, memory=MEMORY)[0]
+        wald([residuals[k][:, channel] for k in numbers], z, taps, rate_hz, memory=MEMORY)[0]
         for numbers, z in _runs(model)
         if z[0].shape[1]
     ]
@@ -158,21 +159,12 @@ def leftover(model: ReadingModel, after, p_after, depends):
     A ridge regression on all inputs and their products stands for "whatever could be explained"; it is fitted on the
     training runs and judged on the held-out ones. What differs from run to run is fitted and judged within each.
     """
-    _, inputs = _inputs(model)
-    split = model.setup.split
-    training = [r.run in split.training for r in model.rows]
-    if split.training == split.held_out:
-        training = [True] * len(training)
-    judged = [i for i, t in enumerate(training) if not t] or list(range(len(training)))
-    channels = []
+    features = [np.hstack([np.ones((len(z), 1)), with_products(z)]) for z in _inputs(model)[1]]
+    flexible_of = Flexible(features, [r.run for r in model.rows], model.setup.split)
+    judged, channels = flexible_of.judged, []
     for c in model.setup.instrument.channels:
-        features = [_features(z) for z in inputs]
-        gram = sum(f.T @ f for f, t in zip(features, training, strict=True) if t)
-        cross = sum(f.T @ a[:, c] for f, a, t in zip(features, after, training, strict=True) if t)
-        beta = np.linalg.solve(gram + 1e-2 * np.trace(gram) / len(gram) * np.eye(len(gram)), cross)
         count = sum(len(after[i]) for i in judged)
-        energy = sum(float(after[i][:, c] @ after[i][:, c]) for i in judged)
-        flexible = min(sum(float(np.sum((after[i][:, c] - features[i] @ beta) ** 2)) for i in judged), energy)
+        energy, flexible = flexible_of.energies([a[:, c] for a in after])
         flexible = min(flexible, energy - float(_explained_in_runs(model, after, c)[judged].sum()))
         gained = np.sqrt(max(energy - flexible, 0.0) / count)
         if p_after[CHANNELS[c]] < ALARM_P and gained > SMALLEST_SHARE_OF_NOISE * np.sqrt(flexible / count):
@@ -182,12 +174,6 @@ def leftover(model: ReadingModel, after, p_after, depends):
     named = " and ".join(d.replace("_", " ") for d in depends) or "the load"
     text = f"{', '.join(channels)} still depend on {named}; the cause is not in the catalogue"
     return tuple(channels), text
-
-
-def _features(z: np.ndarray) -> np.ndarray:
-    """A constant, inputs and their pairwise products."""
-    i, j = np.triu_indices(z.shape[1])
-    return np.concatenate([np.ones((len(z), 1)), z, z[:, i] * z[:, j]], axis=1)
 
 
 def _entries(vehicle: Vehicle, instrument: InstrumentFacts) -> tuple[list[tuple[Form, np.ndarray]], bool]:

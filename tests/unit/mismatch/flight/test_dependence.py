@@ -8,7 +8,7 @@ from scipy.stats import kstest
 
 from rotorid.mismatch.evidence.regression import autoregression
 from rotorid.mismatch.evidence.rows import Thinner
-from rotorid.mismatch.flight.leftover import _features, _wald, kept_by_values, left_by, most_noise, probes
+from rotorid.mismatch.flight.leftover import kept_by_values, left_by, most_noise, probes, wald, with_products
 from tests.unit.mismatch.evidence.test_rows import one, still, thesis_vehicle
 from tests.unit.mismatch.synthetic import coloured
 
@@ -18,7 +18,7 @@ RATE_HZ = 40.0
 def p_of(noise: np.ndarray, inputs: np.ndarray) -> float:
     half = len(noise) // 2
     taps = autoregression([noise[:half], noise[half:]])
-    return _wald([noise[:half], noise[half:]], [inputs[:half], inputs[half:]], taps, RATE_HZ)[0]
+    return wald([noise[:half], noise[half:]], [inputs[:half], inputs[half:]], taps, RATE_HZ)[0]
 
 
 @pytest.mark.parametrize("pole", [0.0, 0.9])
@@ -54,17 +54,17 @@ def read_by_noisy_tachometers(slope: float, pole: float, seed: int):
 def test_the_noise_that_residual_and_input_share_is_no_dependence():
     """The noise is six times as strong as its white part (0.4² of 1²) says; where it may be, nothing is called."""
     residual, inputs, taps, shared = read_by_noisy_tachometers(0.0, pole=0.8, seed=3)
-    assert _wald(residual, inputs, taps, RATE_HZ)[0] < 1e-9
-    assert _wald(residual, inputs, taps, RATE_HZ, shared)[0] < 1e-5
-    assert _wald(residual, inputs, taps, RATE_HZ, shared, most=20.0)[0] > 0.01
+    assert wald(residual, inputs, taps, RATE_HZ)[0] < 1e-9
+    assert wald(residual, inputs, taps, RATE_HZ, shared)[0] < 1e-5
+    assert wald(residual, inputs, taps, RATE_HZ, shared, most=20.0)[0] > 0.01
 
 
 def test_a_dependence_beyond_what_shared_noise_makes_is_still_seen():
     """The other sign, and the same sign with noise that cannot be as strong as that."""
     residual, inputs, taps, shared = read_by_noisy_tachometers(1.2, pole=0.8, seed=4)
-    assert _wald(residual, inputs, taps, RATE_HZ, shared, most=20.0)[0] < 1e-6
+    assert wald(residual, inputs, taps, RATE_HZ, shared, most=20.0)[0] < 1e-6
     residual, inputs, taps, shared = read_by_noisy_tachometers(-0.8, pole=0.8, seed=5)
-    assert _wald(residual, inputs, taps, RATE_HZ, shared, most=2.0)[0] < 1e-6
+    assert wald(residual, inputs, taps, RATE_HZ, shared, most=2.0)[0] < 1e-6
 
 
 def test_noise_has_no_more_energy_than_the_combination_of_rotors_that_moves_least():
@@ -103,7 +103,7 @@ def test_the_inputs_are_those_the_recording_has():
 
 
 def test_products_of_inputs():
-    np.testing.assert_array_equal(_features(np.array([[2.0, 3.0]])), [[2, 3, 4, 6, 9]])
+    np.testing.assert_array_equal(with_products(np.array([[2.0, 3.0]])), [[2, 3, 4, 6, 9]])
 
 
 def test_what_free_values_explain_and_no_wrong_value_tells_is_left_over():
