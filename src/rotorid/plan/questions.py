@@ -31,7 +31,7 @@ from rotorid.mismatch.decide.select import COST_PER_PARAMETER
 from rotorid.mismatch.decide.status import CLAIMED
 from rotorid.mismatch.deliver.derivatives import learn
 from rotorid.mismatch.evidence.comparison import ENVIRONMENT_S
-from rotorid.mismatch.evidence.motion import HIGHEST_CUTOFF_HZ, Segment
+from rotorid.mismatch.evidence.motion import Segment
 from rotorid.mismatch.evidence.regression import Regression, autoregression
 from rotorid.mismatch.evidence.rows import Term, residual
 from rotorid.mismatch.evidence.speedpath import starts_of
@@ -62,6 +62,12 @@ class _ChainModel:
     values: np.ndarray
     doubt: float
     """Relative one-sigma of the id's own parameters."""
+
+    @property
+    def steps(self) -> tuple[tuple[SpeedForm, np.ndarray], ...]:
+        """Speed forms with their values, in the order of the chain."""
+        ends = np.cumsum([len(form.parameters) for _, form in self.chain])
+        return tuple(zip((form for _, form in self.chain), np.split(self.values, ends[:-1]), strict=True))
 
 
 def _leftover(found: Fitted, segments: Sequence[Segment]) -> Callable[[tuple, np.ndarray], np.ndarray]:
@@ -203,7 +209,6 @@ class FittedSet:
     recordings: RecordingSet
     prepared: Prepared
     fitted: Fitted
-    findings: tuple[Finding, ...]
     questions: tuple[Question, ...]
     chains: tuple[tuple[_ChainModel, ...], ...]
     """The same of what lies between command and rotor speed."""
@@ -224,7 +229,6 @@ def known(
     recordings: RecordingSet,
     suggested: Sequence[str] = (),
     claimed: Collection[str] | None = None,
-    cutoff_hz: float = HIGHEST_CUTOFF_HZ,
 ) -> FittedSet:
     """The set fitted, and its open questions: classes left open, and ids in `suggested` that may as well be nothing.
 
@@ -238,7 +242,7 @@ def known(
     recordings, mistakes, _ = find_mistakes(recordings)
     split = split_runs(recordings)
     fit_part, unseen = parts_of(recordings, split)
-    prepared = prepare(fit_part, cutoff_hz, unseen=tuple(r.name for r in unseen.runs))
+    prepared = prepare(fit_part, unseen=tuple(r.name for r in unseen.runs))
     found = fitted(prepared)
     way = ways(found.model, found.values, found.model.selection.active)[0]
     findings, *_ = decided(found, (*mistakes, *findings_outside(found, prepared)), way.fit, way.moved)
@@ -271,7 +275,7 @@ def known(
     form = derivative_form(vehicle.model_copy(update={"derivatives": learnt.derivatives}))
     own = () if form is None else (form,)
     asked = tuple(questions), tuple(chains), tuple(unanswerable)
-    return FittedSet(recordings, prepared, found, findings, *asked, derivatives=own)
+    return FittedSet(recordings, prepared, found, *asked, derivatives=own)
 
 
 def known_from(recordings: RecordingSet, verdict: dict) -> FittedSet:
@@ -327,22 +331,21 @@ def best_of(regression: Regression, shared: Sequence[str], choices, terms: dict[
 def _hypothesis_of(
     regression: Regression, shared: Sequence[str], name: str, choices, terms: dict[str, Term], own: str
 ) -> Hypothesis:
-    """The model of an id in its best form, `own` where that is one of its `choices`, with the forms nearly as good."""
+    """The model of an id in its best form, `own` where that is one of its `choices`, with the forms nearly as good.
+
+    Each has its coefficients as this set has them.
+    """
     least_weight = 0.05  # Relative probability from which a form may as well be the true one.
     worth = partial(_worth, regression, shared, terms)
     best = (own,) if (own,) in choices else best_of(regression, shared, choices, terms)
     weights = {keys: float(np.exp(min(worth(keys) - worth(best), 0.0) / 2)) for keys in choices if keys != best}
-    others = (
-        replace(_hypothesis(regression, shared, name, k), weight=w) for k, w in weights.items() if w > least_weight
-    )
-    return replace(_hypothesis(regression, shared, name, best), others=tuple(others))
 
+    def with_terms(keys: tuple[str, ...], weight: float = 1.0, others: tuple[Hypothesis, ...] = ()) -> Hypothesis:
+        fit = regression.fit([*shared, *keys])
+        where = fit.places(regression.columns(keys))
+        return Hypothesis(name, keys, fit.beta[where], fit.covariance[np.ix_(where, where)], weight, others)
 
-def _hypothesis(regression: Regression, shared: Sequence[str], name: str, keys: tuple[str, ...]) -> Hypothesis:
-    """A competing model with its coefficients as this set has them."""
-    fit = regression.fit([*shared, *keys])
-    where = fit.places(regression.columns(keys))
-    return Hypothesis(name, keys, fit.beta[where], fit.covariance[np.ix_(where, where)])
+    return with_terms(best, others=tuple(with_terms(k, w) for k, w in weights.items() if w > least_weight))
 
 
 def joined_sets(first: RecordingSet, *others: RecordingSet) -> tuple[RecordingSet, tuple[str, ...]]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -34,9 +35,9 @@ from rotorid.mismatch.instrument.model import (
 )
 from rotorid.mismatch.instrument.setup import set_up, with_unseen
 from rotorid.plan.candidates import SessionLimits
-from rotorid.plan.plan import Forecast, Plan, Tried, chosen_pieces
+from rotorid.plan.plan import Forecast, Plan, Tried, better_first, first_and_second
 from rotorid.plan.questions import Question, claimed_in, in_thirds, question_of
-from rotorid.plan.separation import FITTED_SHARE, Information, of_set, separations
+from rotorid.plan.separation import FITTED_SHARE, Information, asked_terms, of_set, placed, separations
 from rotorid.plan.write import by_hand_as_data, draw_separations, questions_as_data, sentences
 from rotorid.recordings import RecordingSet, Run
 from rotorid.recordings import columns as c
@@ -212,10 +213,8 @@ def options(known: KnownInstrument, limits: SessionLimits) -> list[SessionStep]:
                     level = course(t) if bench else np.sqrt(np.maximum(course(t), 0.0))
                     return level[:, None] * share
 
-                step = SessionStep(
-                    f"{name} {where}{' ' + leaning if leaning else ''}", mounted + what + words, 0.0, make, tilt
-                )
-                out.append(replace(step, duration_s=seconds + 2 * REST_S))
+                called = f"{name} {where}{' ' + leaning if leaning else ''}"
+                out.append(SessionStep(called, mounted + what + words, seconds + 2 * REST_S, make, tilt))
     return out
 
 
@@ -240,14 +239,6 @@ def table_of(known: KnownInstrument, step: SessionStep) -> pd.DataFrame:
         if all(r.has(name) for r in known.recordings.runs):
             table[name] = np.full(len(t), np.nanmedian(first.column(name)))
     return pd.DataFrame(table)
-
-
-def asked(known: KnownInstrument) -> list[Term]:
-    """Terms that any open question needs, in the order of the regression."""
-    wanted = {*known.model.search.always, *known.model.selection.active}
-    for question in known.questions:
-        wanted |= {*question.shared, *(k for choices in question.rivals.values() for keys in choices for k in keys)}
-    return [t for t in known.regression.terms if t.key in wanted]
 
 
 @step("predicting a step")
@@ -279,10 +270,7 @@ def _of_run(known: KnownInstrument, run: Run, terms: Sequence[Term]) -> Informat
     rows = [Rows(r.run, r.time_s, np.nan_to_num(r.y), r.x) for r in rows]
     rate = model.setup.rate_hz
     added = build(rows, list(terms), known.regression.filters, everything, model.regression.block_s, rate)
-    every = known.regression.columns([t.key for t in terms])
-    gram = np.zeros_like(known.regression.gram[0])
-    gram[np.ix_(every, every)] = added.gram.sum(axis=0)
-    return Information(gram, None, seconds)
+    return Information(placed(known, terms, added.gram.sum(axis=0)), None, seconds)
 
 
 def _fitted_runs(known: KnownInstrument, steps: Sequence[SessionStep]) -> list[Run]:
@@ -297,7 +285,7 @@ def _forecast(known: KnownInstrument, name: str, taken: Sequence[Tried]) -> Fore
     """What is expected of steps taken."""
     # What is mounted alike, and what is done alike, follows each other.
     taken = sorted(taken, key=lambda t: (t.piece.tilt_rad != (0.0, 0.0), t.piece.tilt_rad, t.piece.name))
-    steps, terms, before = tuple(t.piece for t in taken), asked(known), of_set(known)
+    steps, terms, before = tuple(t.piece for t in taken), asked_terms(known), of_set(known)
     after = before
     for run in _fitted_runs(known, steps) if steps else ():
         after = after + _of_run(known, run, terms)
@@ -319,21 +307,16 @@ def plan_session(known: KnownInstrument, limits: SessionLimits) -> SessionPlan:
     about |= {"unanswerable": known.unanswerable}
     if not known.questions:
         return SessionPlan("chosen", (), None, None, (), (), **about, table=pd.DataFrame())
-    terms, tried = asked(known), []
+    terms, tried = asked_terms(known), []
     for tested in options(known, limits):
         try:
             tried.append(Tried(tested, of_step(known, tested, terms), tested.duration_s))
         except InputError as error:
             tried.append(Tried(tested, None, tested.duration_s, str(error)))
-    taken, _ = chosen_pieces(known, limits, tried, _MOST_STEPS)
-    found = [_forecast(known, "chosen", taken)]
-    rest = [t for t in tried if taken and t.piece is not taken[0].piece]
-    if second := chosen_pieces(known, limits, rest, _MOST_STEPS)[0] if rest else []:
-        found.append(_forecast(known, "second", second))
+    found, _ = first_and_second(known, limits, tried, partial(_forecast, known), _MOST_STEPS)
     if usual := _standard_steps(tried, limits):
         found.append(_forecast(known, "standard", usual))
-    found.sort(key=lambda f: (-round(f.reached(limits.target_sigma), 2), f.duration_s))
-    best, *others = found
+    best, *others = better_first(found, limits.target_sigma)
     parts = [table_of(known, s).assign(run=f"step{i + 1:02d}") for i, s in enumerate(best.pieces)]
     table = pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
     readings = [n for n in table.columns if n in c.FORCE + c.MOMENT]

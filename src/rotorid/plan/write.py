@@ -24,6 +24,7 @@ import pandas as pd
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.io.text.writing import all_or_none, rounded
+from rotorid.mismatch.decide.words import capital
 from rotorid.plan.candidates import Reference
 from rotorid.plan.plan import BETWEEN_S, SHARE, Forecast, Handled, Plan
 from rotorid.plan.separation import Questions, Separation
@@ -280,7 +281,9 @@ def sentences(
         out.append(f"No {schedule} with these columns settles {' or '.join(_words_of(i) for i in ids)}: {what}.")
     if not out:
         out.append(f"Nothing is open: no {needed} is needed to distinguish effects.")
-    expected = {h.of: f" {_expected_by_hand(h, plan.limits.target_sigma)}" for h in plan.by_hand if h.sigma is not None}
+    expected = {
+        h.change.of: f" {_expected_by_hand(h, plan.limits.target_sigma)}" for h in plan.by_hand if h.sigma is not None
+    }
     return out + [f"By hand: {step}.{expected.get(i, '')}" for i, step in _manual_steps(plan).items()]
 
 
@@ -305,19 +308,18 @@ def _manual_steps(plan: Plan) -> dict[str, str]:
 def _expected_by_hand(step: Handled, target: float) -> str:
     """What a step by hand is expected to separate, as a sentence."""
     settles = "this settles it" if step.sigma >= target else "this alone does not settle it"
-    words = step.words[0].upper() + step.words[1:]
     return (
-        f"{words}, and hover for {step.hover_s:.0f} s (about {step.minutes:.0f} min in all): {step.sigma:.1f} standard "
-        f"errors at the least, {settles}."
+        f"{capital(step.change.words)}, and hover for {step.hover_s:.0f} s (about {step.minutes:.0f} min in all): "
+        f"{step.sigma:.1f} standard errors at the least, {settles}."
     )
 
 
 def by_hand_as_data(plan: Plan) -> list[dict]:
     """Manual steps, for JSON; `predicted` is null where no separation is."""
-    target, found = plan.limits.target_sigma, {h.of: h for h in plan.by_hand}
+    target, found = plan.limits.target_sigma, {h.change.of: h for h in plan.by_hand}
 
     def predicted(step: Handled) -> dict:
-        said = {"words": step.words, "hover_s": step.hover_s, "minutes": step.minutes}
+        said = {"words": step.change.words, "hover_s": step.hover_s, "minutes": step.minutes}
         questions = questions_as_data(step.questions, target)
         return said | {"predicted_separation_sigma": step.sigma, "questions": questions}
 
