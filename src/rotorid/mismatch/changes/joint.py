@@ -23,7 +23,6 @@ from rotorid.mismatch.changes.chain import (
 from rotorid.mismatch.changes.problem import decide_changes, of_environments
 from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.decide.posterior import Found
-from rotorid.mismatch.decide.problem import Prior
 from rotorid.mismatch.decide.statements import FORM_SD
 from rotorid.mismatch.evidence.gram import Evidence, EvidenceTerm, evidence_from
 from rotorid.mismatch.evidence.motion import Segment, regime_variables
@@ -85,7 +84,7 @@ class Joint:
     """(K,) one-sigma of each coefficient between sets in which nothing changed, beyond `usual_spread`."""
     form_sd: float = FORM_SD
     """Share of what effects contribute that their forms are wrong by."""
-    decide: Callable[[Evidence, Evidence, np.ndarray, Prior], Found] = decide_changes
+    decide: Callable[[Evidence, Evidence, np.ndarray], Found] = decide_changes
     """The most probable changes from one set's evidence to another's, given the usual spread (K,)."""
 
 
@@ -123,11 +122,11 @@ class FittedReference:
 
 
 @step("the first set")
-def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> FittedReference:
+def reference_of(base: RecordingSet) -> FittedReference:
     """The first set as a verdict fits it, all of its runs."""
     as_recorded = base
     base, mistakes, _ = find_mistakes(replace(base, held_out=()))
-    found = fitted(prepare(base, cutoff_hz))
+    found = fitted(prepare(base))
     model = found.model
     # What one set's commands cannot tell apart from their own scale changes all the same from set to set.
     values = value_terms(model.prepared.vehicle, model.prepared.groups)

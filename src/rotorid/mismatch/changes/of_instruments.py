@@ -18,19 +18,10 @@ from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import AXES, CHANNELS, Loading
 from rotorid.errors import InputError
 from rotorid.mismatch.changes.joint import Joint, by_run
-from rotorid.mismatch.changes.problem import (
-    change_of,
-    difference_of,
-    joined,
-    joint,
-    leftover_of,
-    problem_of_changes,
-    settled,
-)
+from rotorid.mismatch.changes.problem import PRIOR, change_of, joined, pair_of
 from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.decide.posterior import Found, Model, Posterior
-from rotorid.mismatch.decide.problem import Prior, Problem
-from rotorid.mismatch.evidence.gram import TINY, Evidence, evidence_from, spectrum_of, unit_of
+from rotorid.mismatch.evidence.gram import TINY, Evidence, evidence_from
 from rotorid.mismatch.evidence.regression import Regression, build, ridge_inverse
 from rotorid.mismatch.evidence.rows import Rows, Term
 from rotorid.mismatch.flight.absent import mean_squares
@@ -207,7 +198,9 @@ def _refined_on(second: _OnColumns, setup: PreparedInstrument, reference: Instru
     """
     most_refined = 4  # Ids whose nonlinear parameters are refined on the second set, the most promising first.
     model, terms = reference.model, {t.key: t for t in reference.terms}
-    problem = _problem_without_leftover(reference.own.evidence, second.evidence)
+    # All that no change explains is white noise here.
+    pair = pair_of(reference.own.evidence, second.evidence, np.zeros(len(reference.known)))
+    problem = pair.problem(np.zeros(len(pair.new.channels)))
     posterior, best = Posterior(problem), {}
     for key, effect in problem.effects.items():
         if key in terms and terms[key].form is not None and terms[key].form.nonlinear:
@@ -234,16 +227,7 @@ def _refined_on(second: _OnColumns, setup: PreparedInstrument, reference: Instru
     return out
 
 
-def _problem_without_leftover(base: Evidence, new: Evidence) -> Problem:
-    """The problem of all changes between two sets where all that no change explains is white noise."""
-    unit = unit_of(base, new)
-    spectra = spectrum_of(base, unit), spectrum_of(new, unit)
-    return problem_of_changes(new, spectra, np.zeros(len(new.channels)), np.zeros(len(unit)), Prior())
-
-
-def _decide_instrument_changes(
-    base: Evidence, new: Evidence, spread: np.ndarray, prior: Prior, sizes: np.ndarray
-) -> Found:
+def _decide_instrument_changes(base: Evidence, new: Evidence, spread: np.ndarray, sizes: np.ndarray) -> Found:
     """The most probable changes between two sets on the same columns.
 
     As `problem.decide_changes`, but with one effect that takes time in place of several where it explains nearly as
@@ -253,17 +237,15 @@ def _decide_instrument_changes(
     # One-sigmas between days in which nothing changed that a change is believed to have at least: narrower, its
     # estimate would be drawn to nothing by as much as the two differ.
     wide = 20.0
-    prior = replace(prior, value_reach=wide, change_reach=0.0)
-    unit = unit_of(base, new)
-    spectra = spectrum_of(base, unit), spectrum_of(new, unit)
-    starts = [np.zeros(len(unit)), difference_of(spectra)]
-    white = Posterior(problem_of_changes(new, spectra, np.zeros(len(new.channels)), spread, prior))
+    plain = pair_of(base, new, spread, replace(PRIOR, value_reach=wide, change_reach=0.0))
+    starts, white = [np.zeros(len(plain.unit)), plain.difference()], plain.at((), np.zeros(len(new.channels)))
     if of_time := [k for k, effect in white.problem.effects.items() if _takes_time(effect)]:
-        best = max(of_time, key=lambda k: white((k,)))
-        starts.append(change_of(Found(white, (best,), white((best,)))))
-    best, *others = (settled(new, spectra, leftover_of(spectra, d), spread, prior, sizes) for d in starts)
+        best = max(of_time, key=lambda k: white.posterior((k,)))
+        starts.append(change_of(Found(white.posterior, (best,), white.posterior((best,)))))
+    pair = replace(plain, sizes=sizes)
+    best, *others = (pair.settled(pair.leftover(d)) for d in starts)
     for found in others:
-        if joint(spectra, found, spread) - joint(spectra, best, spread) > prior.leftover_nats:
+        if pair.joint(found) - pair.joint(best) > PRIOR.leftover_nats:
             best = found
     return _with_one_of_time(best)
 
