@@ -17,7 +17,7 @@ import numpy as np
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import AXES, CHANNELS, Loading
 from rotorid.errors import InputError
-from rotorid.mismatch.changes.joint import Joint, by_run
+from rotorid.mismatch.changes.joint import Joint, by_run, coefficients_on
 from rotorid.mismatch.changes.problem import PRIOR, change_of, joined, pair_of
 from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.decide.posterior import Found, Model, Posterior
@@ -114,7 +114,8 @@ def instrument_reference_of(base: RecordingSet) -> InstrumentReference:
     setup = set_up(base)
     model, chain, loadings = first_model(setup, make_terms(setup)[0])
     terms = _compared_terms(model.terms, setup)
-    own, known = _on_columns(_rows_like(model, terms, model.loadings), terms, model), _known_effects(model, terms)
+    own = _on_columns(_rows_like(model, terms, model.loadings), terms, model)
+    known = coefficients_on(terms, model, model.regression.start)
     return InstrumentReference(
         recordings=base,
         model=model,
@@ -322,27 +323,12 @@ def _compared_terms(terms: Sequence[Term], setup: PreparedInstrument) -> list[Te
 
     A stand's gain is as good as its last calibration; a verdict takes it as it is, and asks of the rotors alone.
     """
-    kept = [t for t in terms if t.form is None or not _of_single_runs(t, setup)]
+    endings = tuple(f"({run})" for run in setup.instrument.runs)
+    kept = [t for t in terms if t.form is None or not any(p.symbol.endswith(endings) for p in t.form.parameters)]
     there = {t.key for t in kept}
     loaded = [k for k in setup.instrument.loaded if k < 3]
     gains = ["gain", *(f"gain_{'xyz'[k]}" for k in loaded if len(loaded) > 1)]
     return [*(Term(key, "value", prior_sd=(1.0,)) for key in gains if key not in there), *kept]
-
-
-def _of_single_runs(term: Term, setup: PreparedInstrument) -> bool:
-    """Whether parameters of a form are those of single runs, named after them."""
-    return any(p.symbol.endswith(f"({run})") for p in term.form.parameters for run in setup.instrument.runs)
-
-
-def _known_effects(model: ReadingModel, terms: Sequence[Term]) -> np.ndarray:
-    """Coefficients (K,) of what is at work in the first set's model, and of its values, on the columns of `terms`."""
-    fit, keys = model.selection.fit, {t.key for t in model.regression.terms}
-    found = {c: b for c, b in zip(fit.columns, fit.beta, strict=True)}
-    out: list[float] = []
-    for term in terms:
-        own = model.regression.columns([term.key]) if term.key in keys else [-1] * term.size
-        out += [found.get(c, 0.0) for c in own]
-    return np.array(out)
 
 
 def _loadings_of(reference: InstrumentReference, new: RecordingSet) -> tuple[Loading, ...]:
