@@ -21,7 +21,7 @@ from rotorid.mismatch.flight.wrench import block_seconds
 from rotorid.plan.plan import Plan
 from rotorid.plan.questions import FittedSet, Question, answers, best_of, joined_sets
 from rotorid.plan.separation import Separation, asked_terms, expecting
-from rotorid.plan.session import KnownInstrument, SessionPlan
+from rotorid.plan.session import KnownInstrument
 from rotorid.plan.simulate import ChangedVehicle
 from rotorid.recordings import RecordingSet
 from rotorid.report.deliver import analysis_of
@@ -93,7 +93,7 @@ def outcome_of(ids: tuple[str, ...], findings: tuple[Finding, ...], truth: set[s
     return ("right" if named <= truth else "wrong"), answer["sentence"]
 
 
-def predicted(plan: Plan | SessionPlan, ids: tuple[str, ...], truth: set[str]) -> Separation | None:
+def predicted(plan: Plan, ids: tuple[str, ...], truth: set[str]) -> Separation | None:
     """Separation of the true model from its nearest rival; None where the truth is none of the class."""
     found = [s for own, separations in plan.questions if set(own) == set(ids) for s in separations]
     return next((s for s in found if s.true in truth), None)
@@ -111,7 +111,7 @@ def measured(
     """
     if question is None or true not in question.rivals:
         return float("nan")
-    search, active = joint.fitted.model.search, joint.fitted.model.selection.active
+    search, active = joint.model.search, joint.model.selection.active
     shared = [*search.always, *(k for k in active if search.terms[k].effect not in question.ids)]
 
     def able(name: str) -> list[tuple[str, ...]]:
@@ -168,7 +168,7 @@ def measured_after(
 def recorded_after(known: FittedSet, change: ChangedVehicle, recorded: RecordingSet) -> Regression:
     """Normal equations of a set and of a flight `recorded` after a change by hand, in the terms that a question needs
     and the nuisances of the change; every block of both is fitted."""
-    model, terms = known.fitted.model, asked_terms(known)
+    model, terms = known.model, asked_terms(known)
     acting = [*change.nuisances, *(change.term(t) for t in terms)]
     prepared = replace(known.prepared, vehicle=change.vehicle)
     segments = prepare_like(prepared, replace(recorded, vehicle=change.vehicle))[0]

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.mismatch.decide.select import VALUE_FLOOR
@@ -99,7 +100,7 @@ class Handled:
 def _steps_for(known: FittedSet) -> list[tuple[list[ChangedVehicle], list[Question]]]:
     """Choices of each kind of step with the questions that it is there for."""
     vehicle, out = known.prepared.vehicle, []
-    present = {known.fitted.model.search.terms[k].effect for k in known.fitted.model.selection.active}
+    present = {known.model.search.terms[k].effect for k in known.model.selection.active}
 
     def asking(effects) -> list[Question]:
         return [q for q in known.questions if set(q.ids) & set(effects)]
@@ -144,7 +145,7 @@ def _of_change(
     base = of_set(known)
     known = expecting(known, [])
     terms, before = asked_terms(known), of_set(known)
-    effect_of = {id(t.form): t.effect for t in (*known.fitted.model.search.terms.values(), *known.regression.terms)}
+    effect_of = {id(t.form): t.effect for t in (*known.model.search.terms.values(), *known.regression.terms)}
 
     def after(question: Question, hypothesis: Hypothesis) -> Information:
         world = change.world(world_of(known, question, hypothesis), effect_of)
@@ -182,7 +183,7 @@ class _Width:
 
 def _able(known: FittedSet) -> dict[str, tuple[str, ...]]:
     """To everything that can be wished for its terms: believed values, and effects that are not at work."""
-    search, active = known.fitted.model.search, known.fitted.model.selection.active
+    search, active = known.model.search, known.model.selection.active
     out = {name: (key,) for key, name in PARAMETER_NAMES.items() if key in search.always}
     at_work = {search.terms[k].effect for k in active}
     for key, term in search.terms.items():
@@ -210,7 +211,7 @@ def widths(known: FittedSet, before: Information, after: Information, wishes: di
     A doubt that the engine found beyond the usual one (blocks that differ more than their noise) is taken to stay. Of
     the loops that the flight may be flown with the worse counts.
     """
-    model, regression, names = known.fitted.model, known.regression, _able(known)
+    model, regression, names = known.model, known.regression, _able(known)
     out = []
     for name, wished in wishes.items():
         if name in PARAMETER_NAMES.values():
@@ -233,7 +234,7 @@ def widths(known: FittedSet, before: Information, after: Information, wishes: di
 
 def _half(known: FittedSet, before: Information, information: Information, column: int, floor: float = 0.0) -> float:
     """Half the 95 % interval of a column of the model."""
-    fit, at = known.fitted.model.selection.fit, np.array([column])
+    fit, at = known.model.selection.fit, np.array([column])
     plain = float(_covariance(known, before.each[0], at)[0, 0])
     own = max(float(_covariance(known, gram, at)[0, 0]) for gram in information.each)
     (place,) = fit.places(at)
@@ -258,7 +259,7 @@ def _limit(known: FittedSet, information: Information, flown: Information, key: 
 
 def _covariance(known: FittedSet, gram: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """Plain covariance (k, k) of some columns next to the model, from normal equations (K, K)."""
-    model, regression = known.fitted.model, known.regression
+    model, regression = known.model, known.regression
     every = np.union1d(regression.columns([*model.search.always, *model.selection.active]), columns)
     inverse = ridge_inverse(gram[np.ix_(every, every)] + np.diag(regression.precision[every]))
     where = np.searchsorted(every, columns)
@@ -321,6 +322,10 @@ class Plan(Forecast):
     tried: tuple[Tried, ...] = ()
     unanswerable: tuple[tuple[tuple[str, ...], str], ...] = ()
     not_testable: tuple[tuple[str, str], ...] = ()
+    kind: str = "flight"
+    """Of the set: of a `stand` or `bench` a session is planned."""
+    table: pd.DataFrame | None = None
+    """What a session loads, throttles and tilts."""
 
     @property
     def settles(self) -> bool:

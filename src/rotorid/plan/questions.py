@@ -39,7 +39,8 @@ from rotorid.mismatch.evidence.split import parts_of, split_runs
 from rotorid.mismatch.flight.delivered import ways
 from rotorid.mismatch.flight.fitted import Fitted, fitted
 from rotorid.mismatch.flight.prepare import Prepared, assemble_rows, prepare
-from rotorid.mismatch.flight.wrench import chosen, path_segments
+from rotorid.mismatch.flight.wrench import WrenchModel, chosen, path_segments
+from rotorid.mismatch.instrument.model import ReadingModel
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.recordings import RecordingSet
 from rotorid.recordings.signal.kernels import causal
@@ -220,9 +221,14 @@ class FittedSet:
     """Of what the fitted model leaves, as a form with its values; none where they do not predict."""
 
     @property
+    def model(self) -> WrenchModel:
+        """The model of the set."""
+        return self.fitted.model
+
+    @property
     def regression(self) -> Regression:
         """The engine's normal equations of the set."""
-        return self.fitted.model.search.regression if self.whitened is None else self.whitened
+        return self.model.search.regression if self.whitened is None else self.whitened
 
 
 def known(
@@ -264,7 +270,7 @@ def known(
                 needed = "these columns give no chain of the others to compare with"
                 more = "" if found.measured else "; record the rotor speeds next to the commands"
                 unanswerable.append((ids, needed + more))
-        elif (question := question_of(found, finding, ids)) is not None:
+        elif (question := question_of(found.model, finding, ids)) is not None:
             questions.append(question)
         else:
             unanswerable.append((ids, "these columns give no model of the others to compare with"))
@@ -293,9 +299,9 @@ def claimed_in(verdict: dict) -> set[str]:
     return {i for e in claims for i in (e["id"], *e["alternatives"])}
 
 
-def question_of(found: Fitted, finding: Finding, ids: tuple[str, ...]) -> Question | None:
+def question_of(model: WrenchModel | ReadingModel, finding: Finding, ids: tuple[str, ...]) -> Question | None:
     """The competing models of a class of which `finding` is the one in the model; None with fewer than two models."""
-    search, selection = found.model.search, found.model.selection
+    search, selection = model.search, model.selection
     own = next((k for k in selection.active if search.terms[k].effect == finding.id), None)
     if own is None:
         return None

@@ -55,26 +55,19 @@ class Information:
     gram: np.ndarray
     """Normal equations of the set's terms, in the columns of the set's regression: (K, K), of a flight (C, K, K), one
     for each of SLOWER_LOOPS."""
-    squares: np.ndarray | None = None
-    """λ of every pair of competing chains, (P,) or (C, P); None for nothing."""
+    squares: np.ndarray | float = 0.0
+    """λ of every pair of competing chains, (P,) or (C, P); 0 for nothing."""
     seconds: float = 0.0
     """How long they are."""
     shares: np.ndarray | float = 0.0
     """Products (K, K) of the columns as shares of the weight, summed over these seconds; of flights alone."""
 
     def __add__(self, other: Information) -> Information:
-        known = [i.squares for i in (self, other) if i.squares is not None]
-        return Information(
-            self.gram + other.gram,
-            sum(known[1:], known[0]) if known else None,
-            self.seconds + other.seconds,
-            self.shares + other.shares,
-        )
+        return Information(*(a + b for a, b in zip(vars(self).values(), vars(other).values(), strict=True)))
 
     def share(self, of: float) -> Information:
         """A share of it: a part of the recordings in which the same is done."""
-        squares = None if self.squares is None else of * self.squares
-        return Information(of * self.gram, squares, of * self.seconds, of * self.shares)
+        return Information(*(of * value for value in vars(self).values()))
 
     @property
     def each(self) -> list[np.ndarray]:
@@ -99,7 +92,7 @@ class Separation:
 
 def asked_terms(known: FittedSet, ids: Iterable[str] = ()) -> list[Term]:
     """Terms that any open question needs, or that stand for some `ids`, in the order of the regression."""
-    wanted = {*known.fitted.model.search.always, *known.fitted.model.selection.active}
+    wanted = {*known.model.search.always, *known.model.selection.active}
     for question in known.questions:
         wanted |= {*question.shared, *(k for choices in question.rivals.values() for keys in choices for k in keys)}
     return [t for t in known.regression.terms if t.key in wanted or (t.effect and t.effect in ids)]
@@ -119,8 +112,8 @@ def of_set(known: FittedSet) -> Information:
     gram, _, bias, _ = regression.normal(np.arange(len(regression.precision)))
     seconds = float(regression.training.sum() * regression.block_s)
     flight = isinstance(known, FittedSet)
-    shares = seconds * _shares_of(known.fitted.model.rows, known.prepared.vehicle) if flight else 0.0
-    return Information(gram - bias, None, seconds, shares)
+    shares = seconds * _shares_of(known.model.rows, known.prepared.vehicle) if flight else 0.0
+    return Information(gram - bias, seconds=seconds, shares=shares)
 
 
 def _shares_of(rows: Sequence[Rows], vehicle: Vehicle) -> np.ndarray:
@@ -134,7 +127,7 @@ def world_of(
     known: FittedSet, question: Question | None = None, hypothesis: Hypothesis | None = None
 ) -> CompetingModel:
     """The model of a hypothesis of a question, to fly; the model as fitted where none is given, or none with terms."""
-    model, regression = known.fitted.model, known.regression
+    model, regression = known.model, known.regression
     effects = chosen(model)
     if hypothesis is not None and hypothesis.keys:
         keys = (*question.shared, *hypothesis.keys)
@@ -193,9 +186,8 @@ def of_flights(
     After a `change` of the vehicle by hand all of the flight is compared with the set.
     """
     found = [_of_flight(known, flight, world, terms, change) for flight in flights]
-    squares = [i.squares for i in found if i.squares is not None]
-    grams = np.stack([i.gram for i in found])
-    whole = Information(grams, np.stack(squares) if squares else None, found[0].seconds, found[0].shares)
+    grams, squares = np.stack([i.gram for i in found]), np.stack([i.squares for i in found])
+    whole = Information(grams, squares, found[0].seconds, found[0].shares)
     return whole.share(FITTED_SHARE) if change is None else whole
 
 
@@ -211,7 +203,7 @@ def _of_flight(
     After a `change` by hand the columns are those of the changed vehicle in the parameters of the set, less what the
     nuisances of the change take over.
     """
-    model, prepared = known.fitted.model, known.prepared
+    model, prepared = known.model, known.prepared
     acting, effects = list(terms), model.effects if model.effects is not None else chosen(model)
     if change is not None:
         prepared = replace(prepared, vehicle=change.vehicle)
@@ -230,9 +222,7 @@ def _of_flight(
     seconds = float(flight.motion.time_s[-1] - flight.motion.time_s[0])
     gram = own.gram.sum(axis=0) if change is None else _after_change(own, terms, change)
     shares = seconds * _shares_of(rows, prepared.vehicle) if change is None else 0.0
-    return Information(
-        placed(known, terms, gram), np.array(apart) if apart else None, seconds, placed(known, terms, shares)
-    )
+    return Information(placed(known, terms, gram), np.array(apart), seconds, placed(known, terms, shares))
 
 
 def _stretches_of(
@@ -266,7 +256,7 @@ def expecting(known: FittedSet, flights: Sequence[tuple[SimulatedFlight, Competi
     much of a quick flight, in which it cannot. What the model leaves of the set is what it will leave of the flight,
     but no less than the share of the flight's own forces and moments below which the engine distinguishes nothing.
     """
-    model, prepared = known.fitted.model, known.prepared
+    model, prepared = known.model, known.prepared
     regression, segments = model.search.regression, list(model.segments)
     for number, (flight, world) in enumerate(flights):
         segments += _stretches_of(known, prepared, flight, world, f"planned {number}")
@@ -430,7 +420,7 @@ def chain_separations(
     for models in known.chains:
         found: dict[str, Separation] = {}
         for true, rival in permutations(models, 2):
-            every = np.zeros(1) if information.squares is None else np.sqrt(information.squares[..., at].ravel())
+            every = np.sqrt(information.squares[..., at].ravel()) if np.ndim(information.squares) else np.zeros(1)
             at += 1
             sigma, most = float(every.min()), float(every.max())
             if true.id not in found or sigma < found[true.id].sigma:

@@ -38,11 +38,18 @@ from rotorid.plan.candidates import SessionLimits
 from rotorid.plan.plan import Forecast, Plan, Tried, better_first, first_and_second
 from rotorid.plan.questions import Question, claimed_in, in_thirds, question_of
 from rotorid.plan.separation import FITTED_SHARE, Information, asked_terms, of_set, placed, separations
-from rotorid.plan.write import by_hand_as_data, draw_separations, questions_as_data, sentences
+from rotorid.plan.write import (
+    by_hand_as_data,
+    draw_separations,
+    draw_starts,
+    forecast_as_data,
+    sentences,
+    unanswerable_as_data,
+)
 from rotorid.recordings import RecordingSet, Run
 from rotorid.recordings import columns as c
 from rotorid.recordings.sufficient import sufficient
-from rotorid.report.plots.style import GREY, figure, use
+from rotorid.report.plots.style import figure, use
 from rotorid.steps import step
 
 REST_S = 2.0
@@ -81,19 +88,6 @@ class KnownInstrument:
         """The engine's normal equations of the set."""
         return self.model.regression
 
-    @property
-    def fitted(self) -> KnownInstrument:
-        """Where the questions of flights look for the model."""
-        return self
-
-
-@dataclass(frozen=True, kw_only=True)
-class SessionPlan(Plan):
-    """What to do next on a stand or bench, and what else was considered."""
-
-    kind: str
-    table: pd.DataFrame
-
 
 def known_instrument(recordings: RecordingSet, claimed: Collection[str] | None = None) -> KnownInstrument:
     """The set fitted as `rotorid.mismatch.instrument.analyse` does, and its open questions.
@@ -105,7 +99,6 @@ def known_instrument(recordings: RecordingSet, claimed: Collection[str] | None =
     setup = set_up(part, recordings)
     model, chain, loadings = first_model(setup, make_terms(setup)[0])
     model = with_plainer_forms(model, loadings)
-    holder = KnownInstrument(recordings, model, chain, (), ())
     questions, unanswerable = [], [(f.alternatives, f.sentence) for f in mistakes if f.status == "ambiguous"]
     chosen = chosen_already(model)
     inside = with_probabilities(decided_of_reading(model), chosen.found, chosen.support)
@@ -115,14 +108,14 @@ def known_instrument(recordings: RecordingSet, claimed: Collection[str] | None =
             continue
         if not ids or any(set(ids) == set(q.ids) for q in questions):
             continue
-        question = question_of(holder, finding, ids)
+        question = question_of(model, finding, ids)
         if question is None:
             unanswerable.append(
                 (ids, "it lies between command and rotor speed; record the speeds next to the commands")
             )
         else:
             questions.append(question)
-    return replace(holder, questions=tuple(questions), unanswerable=tuple(unanswerable))
+    return KnownInstrument(recordings, model, chain, tuple(questions), tuple(unanswerable))
 
 
 def known_instrument_from(recordings: RecordingSet, verdict: dict) -> KnownInstrument:
@@ -270,7 +263,7 @@ def _of_run(known: KnownInstrument, run: Run, terms: Sequence[Term]) -> Informat
     rows = [Rows(r.run, r.time_s, np.nan_to_num(r.y), r.x) for r in rows]
     rate = model.setup.rate_hz
     added = build(rows, list(terms), known.regression.filters, everything, model.regression.block_s, rate)
-    return Information(placed(known, terms, added.gram.sum(axis=0)), None, seconds)
+    return Information(placed(known, terms, added.gram.sum(axis=0)), seconds=seconds)
 
 
 def _fitted_runs(known: KnownInstrument, steps: Sequence[SessionStep]) -> list[Run]:
@@ -301,12 +294,12 @@ def _standard_steps(tried: Sequence[Tried], limits: SessionLimits) -> list[Tried
     return once * min(int(limits.duration_s / seconds), _MOST_STEPS // len(once)) if once else []
 
 
-def plan_session(known: KnownInstrument, limits: SessionLimits) -> SessionPlan:
+def plan_session(known: KnownInstrument, limits: SessionLimits) -> Plan:
     """The steps that settle most in the time allowed; none where nothing is open or nothing helps."""
     about = {"set": known.recordings.name, "kind": known.recordings.vehicle.kind, "limits": limits}
     about |= {"unanswerable": known.unanswerable}
     if not known.questions:
-        return SessionPlan("chosen", (), None, None, (), (), **about, table=pd.DataFrame())
+        return Plan("chosen", (), None, None, (), (), **about)
     terms, tried = asked_terms(known), []
     for tested in options(known, limits):
         try:
@@ -320,10 +313,10 @@ def plan_session(known: KnownInstrument, limits: SessionLimits) -> SessionPlan:
     parts = [table_of(known, s).assign(run=f"step{i + 1:02d}") for i, s in enumerate(best.pieces)]
     table = pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
     readings = [n for n in table.columns if n in c.FORCE + c.MOMENT]
-    return SessionPlan(**vars(best), **about, table=table.drop(columns=readings), others=tuple(others))
+    return Plan(**vars(best), **about, table=table.drop(columns=readings), others=tuple(others))
 
 
-def text(plan: SessionPlan) -> list[str]:
+def text(plan: Plan) -> list[str]:
     """The session in sentences, for the screen and for a page."""
     return sentences(
         plan,
@@ -337,7 +330,7 @@ def text(plan: SessionPlan) -> list[str]:
     )
 
 
-def _forecast_as_data(session: Forecast, target: float) -> dict:
+def _session_as_data(session: Forecast, target: float) -> dict:
     """A session and what is expected of it, for JSON; its steps in the order in which they are recorded."""
     steps = [
         {
@@ -350,34 +343,29 @@ def _forecast_as_data(session: Forecast, target: float) -> dict:
         }
         for i, s in enumerate(session.pieces)
     ]
-    return {
-        "duration_s": session.duration_s,
-        "predicted_separation_sigma": session.sigma,
-        "steps": steps,
-        "questions": questions_as_data(session.questions, target),
-    }
+    return forecast_as_data(session, target, {"steps": steps})
 
 
-def _summary(plan: SessionPlan) -> dict:
+def _summary(plan: Plan) -> dict:
     """The session as data, for `plan.json`."""
     target = plan.limits.target_sigma
     return rounded(
         {"set": plan.set, "kind": plan.kind, "settles": plan.settles}
-        | _forecast_as_data(plan, target)
+        | _session_as_data(plan, target)
         | {
-            "others": [{"name": other.name} | _forecast_as_data(other, target) for other in plan.others],
-            "not_by_loading": [{"ids": list(ids), "what_it_takes": what} for ids, what in plan.unanswerable],
+            "others": [{"name": other.name} | _session_as_data(other, target) for other in plan.others],
+            "not_by_loading": unanswerable_as_data(plan),
             "by_hand": by_hand_as_data(plan),
             "limits": plan.limits.model_dump(mode="json"),
         }
     )
 
 
-def _draw(plan: SessionPlan, path: Path) -> None:
+def _draw(plan: Plan, path: Path) -> None:
     """Write the picture as PNG: the loads or speeds of the session one after the other, and the separations."""
     use()
     bench = plan.kind == "bench"
-    stem = [n for n in c.REFERENCE_FORCE] if bench else [n for n in plan.table.columns if n.startswith("rotor_speed")]
+    stem = list(c.REFERENCE_FORCE) if bench else [n for n in plan.table.columns if n.startswith("rotor_speed")]
     stem = stem or [n for n in plan.table.columns if n.startswith(("rotor_command", "throttle"))]
     fig, axes = figure(4.2, 2, 1)
     step = float(plan.table[c.TIME].iloc[1] - plan.table[c.TIME].iloc[0])
@@ -390,16 +378,12 @@ def _draw(plan: SessionPlan, path: Path) -> None:
     unit = "load [N]" if bench else ("throttle [-]" if stem[0].startswith("throttle") else "rotor speed [rad/s]")
     axes[0].set(xlabel="time [s]", ylabel=unit, xlim=(0, t[-1]))
     axes[0].legend(loc="upper right", ncols=4)
-    start = 0.0
-    for i, s in enumerate(plan.pieces):
-        axes[0].axvline(start, color=GREY, lw=0.5, ls=":")
-        axes[0].annotate(str(i + 1), (start, 1.0), xycoords=("data", "axes fraction"), va="bottom", fontsize=8)
-        start += s.duration_s
+    draw_starts(axes[0], np.cumsum([0.0, *(s.duration_s for s in plan.pieces[:-1])]), numbered=True)
     draw_separations(axes[1], plan, "session")
     fig.savefig(path, format="png")
 
 
-def write(plan: SessionPlan, folder: Path) -> list[Path]:
+def write(plan: Plan, folder: Path) -> list[Path]:
     """Write everything; returns the files, the picture last. Nothing is left half written."""
     paths = [folder / n for n in ("plan.json", *(("session.csv", "plan.png") if plan.pieces else ()))]
     with all_or_none(*paths) as parts:

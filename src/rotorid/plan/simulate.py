@@ -351,16 +351,12 @@ def _attached(vehicle: Vehicle, place_m: tuple[float, float, float], words: str)
     rotors = tuple(
         Rotor(x_m=r.x_m - centre[0], y_m=r.y_m - centre[1], z_m=r.z_m - centre[2], spin=r.spin) for r in vehicle.rotors
     )
+    moments = {a + b: float(inertia["xyz".index(a), "xyz".index(b)]) for a, b in ("xx", "yy", "zz", "xy", "xz", "yz")}
     after = vehicle.model_copy(
         update={
             "mass_kg": mass + more,
             "rotors": rotors,
-            "inertia_kg_m2": Inertia(
-                **{
-                    a + b: float(inertia["xyz".index(a), "xyz".index(b)])
-                    for a, b in ("xx", "yy", "zz", "xy", "xz", "yz")
-                }
-            ),
+            "inertia_kg_m2": Inertia(**moments),
             "accelerometer_position_m": tuple(float(v) for v in np.array(vehicle.accelerometer_position_m) - centre),
         }
     )

@@ -194,22 +194,32 @@ def questions_as_data(questions: Questions, target: float) -> list[dict]:
     ]
 
 
-def _forecast_as_data(flight: Forecast, target: float) -> dict:
-    """A flight and what is expected of it, for JSON."""
-    known = {w.name: [s if np.isfinite(s) else None for s in (w.before, w.after)] for w in flight.widths}
+def forecast_as_data(forecast: Forecast, target: float, pieces: dict[str, list[dict]]) -> dict:
+    """What is expected of a flight or session, for JSON, with its `pieces` by what they are called."""
     return {
-        "flight": flight.name,
-        "duration_s": flight.duration_s,
-        "predicted_separation_sigma": flight.sigma,
-        "manoeuvres": [{"name": p.name, "words": p.words, "duration_s": p.duration_s} for p in flight.pieces],
-        "questions": questions_as_data(flight.questions, target),
-        "intervals": [
-            {"name": w.name, "unit": w.unit}
-            | dict(zip(("half_width_before", "half_width_after"), known[w.name], strict=True))
-            | ({"wished": w.wished} if w.wished else {})
-            for w in flight.widths
-        ],
+        "duration_s": forecast.duration_s,
+        "predicted_separation_sigma": forecast.sigma,
+        **pieces,
+        "questions": questions_as_data(forecast.questions, target),
     }
+
+
+def _flight_as_data(flight: Forecast, target: float) -> dict:
+    """A flight and what is expected of it, for JSON."""
+    manoeuvres = [{"name": p.name, "words": p.words, "duration_s": p.duration_s} for p in flight.pieces]
+    sizes = [[s if np.isfinite(s) else None for s in (w.before, w.after)] for w in flight.widths]
+    intervals = [
+        {"name": w.name, "unit": w.unit, "half_width_before": before, "half_width_after": after}
+        | ({"wished": w.wished} if w.wished else {})
+        for w, (before, after) in zip(flight.widths, sizes, strict=True)
+    ]
+    data = forecast_as_data(flight, target, {"manoeuvres": manoeuvres})
+    return {"flight": flight.name, **data, "intervals": intervals}
+
+
+def unanswerable_as_data(plan: Plan) -> list[dict]:
+    """Classes that nothing with these columns settles, for JSON."""
+    return [{"ids": list(ids), "what_it_takes": what} for ids, what in plan.unanswerable]
 
 
 def _summary(plan: Plan) -> dict:
@@ -218,9 +228,9 @@ def _summary(plan: Plan) -> dict:
         {
             "set": plan.set,
             "settles": plan.settles,
-            **_forecast_as_data(plan, plan.limits.target_sigma),
-            "others": [_forecast_as_data(f, plan.limits.target_sigma) for f in plan.others],
-            "not_by_flying": [{"ids": list(ids), "what_it_takes": what} for ids, what in plan.unanswerable],
+            **_flight_as_data(plan, plan.limits.target_sigma),
+            "others": [_flight_as_data(f, plan.limits.target_sigma) for f in plan.others],
+            "not_by_flying": unanswerable_as_data(plan),
             "by_hand": by_hand_as_data(plan),
             "not_testable": [{"id": i, "reason": reason} for i, reason in plan.not_testable],
             "not_flown": [{"name": t.piece.name, "reason": t.reason} for t in plan.tried if t.reason],
@@ -407,10 +417,7 @@ def _draw(plan: Plan, path: Path) -> None:
     for ax, values, label in series:
         ax.plot(t, values[: len(t)], color=BLUE)
         ax.set(xlabel="time [s]", ylabel=label, xlim=(0, t[-1]))
-        for i, start in enumerate(starts[:-1]):
-            ax.axvline(start, color=GREY, lw=0.5, ls=":")
-            if ax is axes[0, 1]:
-                ax.annotate(str(i + 1), (start, 1.0), xycoords=("data", "axes fraction"), va="bottom", fontsize=8)
+        draw_starts(ax, starts[:-1], numbered=ax is axes[0, 1])
     ax = axes[2, 1]
     if any(own for _, own in plan.questions):
         draw_separations(ax, plan, "flight")
@@ -418,6 +425,14 @@ def _draw(plan: Plan, path: Path) -> None:
     else:
         ax.set_axis_off()
     fig.savefig(path, format="png")
+
+
+def draw_starts(ax, starts_s: np.ndarray, numbered: bool) -> None:
+    """Draw where each piece begins, with its number where they are `numbered`."""
+    for i, start in enumerate(starts_s):
+        ax.axvline(start, color=GREY, lw=0.5, ls=":")
+        if numbered:
+            ax.annotate(str(i + 1), (start, 1.0), xycoords=("data", "axes fraction"), va="bottom", fontsize=8)
 
 
 def draw_separations(ax, plan: Plan, kind: str) -> None:

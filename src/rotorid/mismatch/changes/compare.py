@@ -189,7 +189,8 @@ def changes_from(
         stated, notes = changes_in(options), command_notes(*stretches, base.name, new.name)
     else:
         joint, of_speeds = joint_of_instruments(reference, new), None
-        found = joint.decide(joint.base, joint.new, _yardstick(joint, reference.runs))
+        # A bench's runs load different axes: none can be compared with the others.
+        found = joint.decide(joint.base, joint.new, _yardstick(joint, ()))
         stated, notes = statements_of(found, of_change=True), ()
     limits = limits_of(found, joint.squares)
     if of_speeds:

@@ -47,7 +47,7 @@ from rotorid.mismatch.instrument.setup import (
     set_up,
     with_unseen,
 )
-from rotorid.recordings import RecordingSet
+from rotorid.recordings import RecordingSet, Vehicle
 
 _WANDERS = {"zero": ("constant", "b_{own}"), "drift": ("linear in time", "b_{own}")}
 """To what differs from run to run (`Effect.differs_between_runs`) how the names of its forms begin, and its symbol."""
@@ -102,11 +102,6 @@ class InstrumentReference:
         """Rows of all stretches."""
         return self.own.rows
 
-    @property
-    def runs(self) -> tuple[Evidence, ...]:
-        """None: a bench's runs load different axes, and none can be compared with the others."""
-        return ()
-
 
 def instrument_reference_of(base: RecordingSet) -> InstrumentReference:
     """The first set of a stand or bench as a verdict fits it, all of its runs."""
@@ -114,7 +109,7 @@ def instrument_reference_of(base: RecordingSet) -> InstrumentReference:
     setup = set_up(base)
     model, chain, loadings = first_model(setup, make_terms(setup)[0])
     terms = _compared_terms(model.terms, setup)
-    own = _on_columns(_rows_like(model, terms, model.loadings), terms, model)
+    own = _on_columns(model, terms, model.loadings)
     known = coefficients_on(terms, model, model.regression.start)
     return InstrumentReference(
         recordings=base,
@@ -144,14 +139,12 @@ def joint_of_instruments(reference: InstrumentReference, new: RecordingSet) -> J
     setup = replace(model.setup, recordings=new, loadings=_loadings_of(reference, new))
     if not any(pieces_of(x, setup.average) for x in setup.loadings):
         raise InputError(f"set {new.name}: no stretch is long enough to be compared with {reference.recordings.name}")
-
-    def of_new(terms: Sequence[Term]) -> _OnColumns:
-        return _on_columns(_against_own(_rows_like(model, terms, setup.loadings), reference, setup, new), terms, model)
-
-    terms, base, second = list(reference.terms), reference.own, of_new(reference.terms)
+    terms, base = list(reference.terms), reference.own
+    second = _on_columns(model, terms, setup.loadings, new.vehicle)
     if more_terms := _refined_on(second, setup, reference):
         terms += more_terms
-        base, second = _on_columns(_rows_like(model, terms, model.loadings), terms, model), of_new(terms)
+        base = _on_columns(model, terms, model.loadings)
+        second = _on_columns(model, terms, setup.loadings, new.vehicle)
     count, more = (len(base.by_run), len(second.by_run)), _mounted_anew(terms, setup)
     both: Sequence[Sequence[Evidence]] = (base.by_run, second.by_run)
     if min(count) >= fewest_runs:
@@ -177,16 +170,21 @@ def joint_of_instruments(reference: InstrumentReference, new: RecordingSet) -> J
     )
 
 
-def _rows_like(model: ReadingModel, terms: Sequence[Term], loadings: Sequence[Loading]) -> list[Rows]:
-    """Rows of stretches with columns of `terms`, what is at work in the model moved by its clock."""
-    return rows_of(model.setup, list(terms), loadings, whole_reading(model.terms, model.selection.active))
+def _on_columns(
+    model: ReadingModel, terms: Sequence[Term], loadings: Sequence[Loading], vehicle: Vehicle | None = None
+) -> _OnColumns:
+    """What stretches hold on the columns of `terms`, whitened as the model's, with its products by channel.
 
-
-def _on_columns(rows: Sequence[Rows], terms: Sequence[Term], model: ReadingModel) -> _OnColumns:
-    """What some rows hold, whitened as the model's, with its products by channel."""
-    rate_hz = model.setup.rate_hz
+    What is at work in the model is moved by its clock. The rows of another set have what its own `vehicle` leaves of
+    every channel; the columns stay the first's.
+    """
+    setup, rate_hz = model.setup, model.setup.rate_hz
+    rows = rows_of(setup, list(terms), loadings, whole_reading(model.terms, model.selection.active))
+    if vehicle not in (None, setup.vehicle):
+        own = rows_of(setup, [], [loaded_by(x, vehicle) for x in loadings])
+        rows = [replace(r, y=o.y) for r, o in zip(rows, own, strict=True)]
     block_s = model.rows_per_block / rate_hz
-    regression = build(list(rows), list(terms), model.regression.filters, everything, block_s, rate_hz, by_channel=True)
+    regression = build(rows, list(terms), model.regression.filters, everything, block_s, rate_hz, by_channel=True)
     evidence = evidence_from(regression)
     return _OnColumns(tuple(rows), regression, evidence, by_run(evidence, regression))
 
@@ -336,16 +334,6 @@ def _loadings_of(reference: InstrumentReference, new: RecordingSet) -> tuple[Loa
     setup = replace(reference.model.setup, session=session_of(new))
     own = with_unseen(setup, replace(new, vehicle=setup.vehicle)).loadings[len(setup.loadings) :]
     return own if reference.chain is None else moved(replace(setup, loadings=own), reference.chain)
-
-
-def _against_own(
-    rows: list[Rows], reference: InstrumentReference, setup: PreparedInstrument, new: RecordingSet
-) -> list[Rows]:
-    """Rows of the second set with what its own vehicle.yaml leaves of every channel; the columns stay the first's."""
-    if new.vehicle == setup.vehicle:
-        return rows
-    own = rows_of(setup, [], [loaded_by(x, new.vehicle) for x in setup.loadings])
-    return [replace(r, y=o.y) for r, o in zip(rows, own, strict=True)]
 
 
 def _wander_of(terms: Sequence[Term], own: _OnColumns, known: np.ndarray, model: ReadingModel) -> Wander:
