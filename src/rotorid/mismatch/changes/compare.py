@@ -31,11 +31,10 @@ from rotorid.mismatch.changes.joint import (
     Effects,
     FittedReference,
     Joint,
-    evidence_at,
     joined_at,
     joints_of,
     moved_by,
-    on_terms,
+    on_columns,
     reference_of,
 )
 from rotorid.mismatch.changes.level_one import CAUSES, LevelOne, of_one_vehicle, seen_by
@@ -279,7 +278,10 @@ def _flight_options(reference: FittedReference, joint: Joint) -> list[ChainOptio
         at = joined_at(reference, joint.recordings, joint.recorded, chain, joint.mistakes_of_new, joint.own_effects)
         return at.base, at.new
 
-    spread, base_at = _yardstick(joint, reference.runs), partial(evidence_at, reference)
+    def base_at(chain: ChainTerms) -> Evidence:
+        return on_columns(reference, reference.terms, chain).evidence
+
+    spread = _yardstick(joint, reference.runs)
     options = options_of(first, products_at, spread, base_at)
     found = options[0].found
     if first is not None and found.model:
@@ -529,7 +531,7 @@ def _carrying(reference: FittedReference, joint: Joint) -> tuple[FittedReference
     # One term of each form: the others keep the lengths that they have.
     first = {t.form.name: t.key for t in reversed(swings)}
     terms = [on_cable(t, cable) if t in swings and first[t.form.name] == t.key else t for t in reference.terms]
-    other = on_terms(reference, terms)
+    other = on_columns(reference, terms, reference.chain)
     recorded = tuple(hanging(s, h.motion.hung) for s, h in zip(joint.recorded, hung, strict=True))
     both = moved_by(other, replace(joint, recorded=recorded), [as_effect(swings[0], cable, mass_kg)])
     keys = {t.key for t in swings}

@@ -161,24 +161,15 @@ def reference_of(base: RecordingSet) -> FittedReference:
     )
 
 
-def on_terms(reference: FittedReference, terms: Sequence[Term]) -> FittedReference:
-    """The first set with the nonlinear parameters of its columns at other values."""
-    found, chain = reference.found, reference.chain
-    _, rows = _rows_of(found, terms, chain, reference.recorded)
+def on_columns(reference: FittedReference, terms: Sequence[Term], chain: ChainTerms | None) -> FittedReference:
+    """The first set with its columns at other nonlinear parameters of `terms`, or at another chain than its own."""
+    found, first = reference.found, reference.chain
+    _, rows = _rows_of(found, terms, chain, reference.recorded, first)
     of_chain = chain.terms if found.commanded else []
     regression = _regression_of(rows, [*terms, *of_chain], found.model, reference.block_s)
-    chains = (chain, chain) if of_chain else ()
-    evidence = _evidence_of(regression, reference.noise, reference.known, *chains)
+    evidence = _evidence_of(regression, reference.noise, reference.known, *((chain, first) if of_chain else ()))
     runs = by_run(evidence, regression)
     return replace(reference, terms=tuple(terms), rows=tuple(rows), evidence=evidence, runs=runs)
-
-
-def evidence_at(reference: FittedReference, chain: ChainTerms) -> Evidence:
-    """Evidence of the first set, known by commands, with its columns taken at another chain than its own."""
-    found, first = reference.found, reference.chain
-    _, rows = _rows_of(found, reference.terms, chain, reference.recorded, first)
-    regression = _regression_of(rows, [*reference.terms, *chain.terms], found.model, reference.block_s)
-    return _evidence_of(regression, reference.noise, reference.known, chain, first)
 
 
 def _evidence_of(

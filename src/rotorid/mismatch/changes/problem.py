@@ -401,21 +401,17 @@ def form_spread(evidence: Evidence, known: np.ndarray, form_sd: float) -> np.nda
     explained = np.einsum("k,ckl,l->c", known, gram, known)
     total = np.maximum(own.sum(axis=0), TINY)
     form = form_sd * np.sqrt((own * explained[:, None]).sum(axis=0)) / total
-    out = np.zeros(len(known))
-    for term in evidence.terms:
-        if term.kind == "effect":
-            at = evidence.start[term.key] + np.arange(term.size)
-            out[at] = form[at]
-    return share_of_form(evidence) * out
+    return share_of_form(evidence) * form
 
 
 def share_of_form(evidence: Evidence) -> np.ndarray:
     """What part of an effect's one-sigma each coefficient (K,) has: of its forms one is at work, no matter which.
 
     Forms of one effect look alike. Were each to differ by the whole, the effect would by the root of their number more.
+    What is no effect has no part.
     """
     forms = Counter(t.effect for t in evidence.terms if t.kind == "effect")
-    out = np.ones(evidence.gram.shape[-1])
+    out = np.zeros(evidence.gram.shape[-1])
     for term in evidence.terms:
         if term.kind == "effect":
             out[evidence.start[term.key] + np.arange(term.size)] = forms[term.effect] ** -0.5
