@@ -141,9 +141,9 @@ def world_of(
     effects = tuple(e for e in effects if e[0].name not in unnamed)
     limits, segments = known.prepared.vehicle.rotor_speed_limits_rad_s, known.prepared.segments
     commanded = (float(s.command.max()) for s in segments if s.command is not None)
-    chain, full, volt = (), limits[1] if limits else max(commanded, default=1.0), None
+    chain, full, volt, scale = (), limits[1] if limits else max(commanded, default=1.0), None, 1.0
     if known.fitted.chain is not None:
-        result, full, volt, _ = known.fitted.chain
+        result, full, volt, scale = known.fitted.chain
         chain = tuple((form, result.fit.of(key)[1]) for key, form in result.fit.chain)
     voltages = [s.motion.voltage.mean() for s in segments if s.motion.voltage is not None]
     return CompetingModel(
@@ -152,6 +152,7 @@ def world_of(
         derivatives=known.derivatives,
         chain=chain,
         full_speed_rad_s=full,
+        scale=scale,
         voltage_v=float(np.mean(voltages)) if voltages else None,
         full_voltage_v=volt,
         wind_m_s=None if model.wind is None else np.array([*model.wind, 0.0]),
