@@ -73,11 +73,10 @@ class _ChainModel:
 
 def _leftover(found: Fitted, segments: Sequence[Segment]) -> Callable[[tuple, np.ndarray], np.ndarray]:
     """A function of chain and values: what these leave of segments, whitened (m,), the shared linear terms free."""
-    prepared, search, result = found.prepared, found.model.search, found.chain.result
-    path = found.chain.speeds
+    prepared, search, path = found.prepared, found.model.search, found.chain.speeds
 
     if found.measured:
-        raws = [s.motion.rotor_speed - path(s, result.fit.chain, result.fit.values) for s in prepared.segments]
+        raws = [s.motion.rotor_speed - path(s) for s in prepared.segments]
         by_rotor = [autoregression([r[:, j] for r in raws]) for j in range(raws[0].shape[1])]
 
         def white_speeds(segment: Segment, chain, values) -> np.ndarray:
@@ -114,9 +113,8 @@ def _leftover(found: Fitted, segments: Sequence[Segment]) -> Callable[[tuple, np
                 for name in ("force", "moment"):
                     if name in own and getattr(extra, name) is not None:
                         own[name] = own[name] - getattr(extra, name)
-            groups = [prepared.thinner(own[g]) if g in own else None for g in ("force", "moment")]
-            size = next(len(g) for g in groups if g is not None)
-            y = np.concatenate([np.zeros((size, 3)) if g is None else g for g in groups], axis=1)
+            nothing = np.zeros((moved.motion.size, 3))
+            y = np.concatenate([prepared.thinner(own.get(g, nothing)) for g in ("force", "moment")], axis=1)
             parts.append(white(y[:, :, None])[:, 0])
         y = np.concatenate([*parts, np.zeros(len(unit))])
         return y - basis @ (basis.T @ y)

@@ -20,7 +20,7 @@ from rotorid.errors import InputError
 from rotorid.io.text.writing import all_or_none, rounded
 from rotorid.mismatch.decide.findings import with_probabilities
 from rotorid.mismatch.evidence.regression import Regression, build
-from rotorid.mismatch.evidence.rows import Rows, Term
+from rotorid.mismatch.evidence.rows import Term
 from rotorid.mismatch.evidence.split import parts_of, split_runs
 from rotorid.mismatch.instrument.analyse import decided_of_reading, first_model, with_plainer_forms
 from rotorid.mismatch.instrument.chain import ChainResult, moved
@@ -259,10 +259,9 @@ def _of_run(known: KnownInstrument, run: Run, terms: Sequence[Term]) -> Informat
     own = setup.loadings[len(model.setup.loadings) :]
     if known.chain is not None and not all(x.measured for x in setup.loadings):
         own = moved(replace(setup, loadings=own), known.chain)
-    rows = rows_of(model.setup, list(terms), own, whole_reading(model.terms, model.selection.active))
-    rows = [Rows(r.run, r.time_s, np.nan_to_num(r.y), r.x) for r in rows]
-    rate = model.setup.rate_hz
-    added = build(rows, list(terms), known.regression.filters, everything, model.regression.block_s, rate)
+    made = rows_of(model.setup, list(terms), own, whole_reading(model.terms, model.selection.active))
+    rows, rate_hz = [replace(r, y=np.nan_to_num(r.y)) for r in made], model.setup.rate_hz
+    added = build(rows, list(terms), known.regression.filters, everything, model.regression.block_s, rate_hz)
     return Information(placed(known, terms, added.gram.sum(axis=0)), seconds=seconds)
 
 
