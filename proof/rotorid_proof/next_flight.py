@@ -8,18 +8,20 @@ same with sessions in place of flights.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 
 import numpy as np
 import pandas as pd
 
 from rotorid.mismatch.decide.findings import Finding
-from rotorid.mismatch.evidence.regression import Regression
+from rotorid.mismatch.evidence.regression import Regression, build
 from rotorid.mismatch.evidence.rows import Term
+from rotorid.mismatch.flight.prepare import assemble_rows, prepare_like
+from rotorid.mismatch.flight.wrench import block_seconds
 from rotorid.plan.plan import Plan
 from rotorid.plan.questions import FittedSet, Question, answers, best_of, joined_sets
-from rotorid.plan.separation import Separation, recorded_after
-from rotorid.plan.session import KnownInstrument, SessionPlan
+from rotorid.plan.separation import Separation, asked_terms, expecting
+from rotorid.plan.session import KnownInstrument
 from rotorid.plan.simulate import ChangedVehicle
 from rotorid.recordings import RecordingSet
 from rotorid.report.deliver import analysis_of
@@ -91,7 +93,7 @@ def outcome_of(ids: tuple[str, ...], findings: tuple[Finding, ...], truth: set[s
     return ("right" if named <= truth else "wrong"), answer["sentence"]
 
 
-def predicted(plan: Plan | SessionPlan, ids: tuple[str, ...], truth: set[str]) -> Separation | None:
+def predicted(plan: Plan, ids: tuple[str, ...], truth: set[str]) -> Separation | None:
     """Separation of the true model from its nearest rival; None where the truth is none of the class."""
     found = [s for own, separations in plan.questions if set(own) == set(ids) for s in separations]
     return next((s for s in found if s.true in truth), None)
@@ -109,7 +111,7 @@ def measured(
     """
     if question is None or true not in question.rivals:
         return float("nan")
-    search, active = joint.fitted.model.search, joint.fitted.model.selection.active
+    search, active = joint.model.search, joint.model.selection.active
     shared = [*search.always, *(k for k in active if search.terms[k].effect not in question.ids)]
 
     def able(name: str) -> list[tuple[str, ...]]:
@@ -161,6 +163,24 @@ def measured_after(
                 gain = joint.explained([*shared, *keys, *more]) - joint.explained([*shared, *keys])
                 left.append(gain - sum(sizes[k] for k in more))
     return float(np.sqrt(max(min(left), 0.0))) if left else float("nan")
+
+
+def recorded_after(known: FittedSet, change: ChangedVehicle, recorded: RecordingSet) -> Regression:
+    """Normal equations of a set and of a flight `recorded` after a change by hand, in the terms that a question needs
+    and the nuisances of the change; every block of both is fitted."""
+    model, terms = known.model, asked_terms(known)
+    acting = [*change.nuisances, *(change.term(t) for t in terms)]
+    prepared = replace(known.prepared, vehicle=change.vehicle)
+    segments = prepare_like(prepared, replace(recorded, vehicle=change.vehicle))[0]
+    starts = dict(zip([t.key for t in model.terms], np.cumsum([0, *(t.size for t in model.terms)]), strict=False))
+    at = np.concatenate([starts[t.key] + np.arange(t.size) for t in terms])
+    extra = sum(t.size for t in change.nuisances)
+    share = np.concatenate([np.ones(extra), *(np.full(t.size, change.shares.get(t.key, 1.0)) for t in terms)])
+    rows = [replace(r, x=np.pad(r.x[:, :, at], ((0, 0), (0, 0), (extra, 0)))) for r in model.rows]
+    rows += [replace(r, x=r.x * share) for r in assemble_rows(prepared, acting, segments, None)]
+    rate_hz = prepared.thinner.rate_hz
+    filters = expecting(known, []).regression.filters
+    return build(rows, acting, filters, lambda run, t: True, block_seconds(rows, rate_hz), rate_hz)
 
 
 def table(rows: list[Row]) -> pd.DataFrame:

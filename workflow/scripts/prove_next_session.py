@@ -15,8 +15,8 @@ import numpy as np
 import pandas as pd
 
 from rotorid.plan.candidates import SessionLimits
+from rotorid.plan.plan import Plan
 from rotorid.plan.session import (
-    SessionPlan,
     SessionStep,
     known_instrument,
     known_instrument_from,
@@ -30,7 +30,7 @@ from rotorid_proof import next_flight as proof
 from rotorid_proof.row_by_row import as_read, rows_of
 
 
-def standard_as_long(made: SessionPlan) -> list[SessionStep]:
+def standard_as_long(made: Plan) -> list[SessionStep]:
     """The standard steps in turn, each place as often as the others, about as long as the planned session."""
     usual = next((s for s in (made, *made.others) if s.name == "standard"), None)
     once = list({s.name: s for s in usual.pieces}.values()) if usual else []

@@ -65,6 +65,15 @@ class ManoeuvrePiece:
         return Reference(t, position, yaw)
 
 
+def _motion(t: np.ndarray, yaw=0.0, **along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Position (n, 3) of what moves `along` x, y or z, each (n,), and yaw (n,); at rest in all else."""
+    position, turned = np.zeros((len(t), 3)), np.zeros(len(t))
+    turned[:] = yaw
+    for axis, values in along.items():
+        position[:, "xyz".index(axis)] = values
+    return position, turned
+
+
 def _smooth(s: np.ndarray) -> np.ndarray:
     """From 0 to 1, twice differentiable, while s goes from 0 to 1."""
     s = np.clip(s, 0, 1)
@@ -96,6 +105,11 @@ def _swing(
     angle = _phase(t, rate_rad_s, ramp_s=ramp_s)
     fastest = float(np.gradient(angle, t).max())
     return amplitude * min(1.0, (1.05 * rate_rad_s / fastest) ** 2), angle
+
+
+def _to_and_fro(t: np.ndarray, amplitude: float, rate_rad_s: float) -> np.ndarray:
+    """A swing over ground (n,) that always has its amplitude."""
+    return amplitude * np.sin(_phase(t, rate_rad_s, ramp_s=_SLOW_RAMP_S))
 
 
 def _whole(rate_rad_s: float, about_s: float, unit_rad: float = np.pi, ramp_s: float = _RAMP_S) -> float:
@@ -149,7 +163,7 @@ def standard(parts: Mapping[str, ManoeuvrePiece], duration_s: float) -> Manoeuvr
 
     def make(t):
         edges = np.round(np.cumsum([0.0, *STANDARD.values()]) * (len(t) - 1)).astype(int)
-        position, yaw = np.zeros((len(t), 3)), np.zeros(len(t))
+        position, yaw = _motion(t)
         for name, start, stop in zip(STANDARD, edges, edges[1:], strict=False):
             position[start : stop + 1], yaw[start : stop + 1] = parts[name].make(t[start : stop + 1] - t[start])
         return position, yaw
@@ -161,22 +175,19 @@ def standard(parts: Mapping[str, ManoeuvrePiece], duration_s: float) -> Manoeuvr
 def _still(limits: Limits) -> list[ManoeuvrePiece]:
     change_s = max(1.5, 2.0 * limits.room_m[2] / limits.climb_m_s)
 
-    def hover(t):
-        return np.zeros((len(t), 3)), np.zeros(len(t))
-
     def ladder(t):
         # Down to the lowest height, up to the highest, in held steps.
         steps = np.array([0, -1, -0.5, 0, 0.5, 1, 0]) * limits.room_m[2]
         at = np.linspace(0, t[-1], len(steps) + 1)
-        out = np.zeros((len(t), 3))
+        down = np.zeros(len(t))
         for before, after, when in zip(steps, steps[1:], at[1:], strict=False):
-            out[:, 2] -= (after - before) * _smooth((t - when) / change_s + 0.5)
-        return out, np.zeros(len(t))
+            down -= (after - before) * _smooth((t - when) / change_s + 0.5)
+        return _motion(t, z=down)
 
     low, high = limits.height_m[0], limits.height_m[1] - limits.wall_margin_m
     words = f"hover at held heights from {low:.1f} to {high:.1f} m"
     return [
-        ManoeuvrePiece("hover", "hover on the spot", hover),
+        ManoeuvrePiece("hover", "hover on the spot", _motion),
         ManoeuvrePiece("ladder", words, ladder, 7 * (change_s + 1.5)),
     ]
 
@@ -186,28 +197,25 @@ def _passes(limits: Limits) -> list[ManoeuvrePiece]:
     for share in (0.4, 0.7, 1.0):
         for degrees in (0, 45, 90):
             angle = np.radians(degrees)
-            ahead = np.array([np.cos(angle), np.sin(angle), 0.0])
-            room = min(r / abs(a) for r, a in zip(limits.room_m[:2], ahead[:2], strict=True) if abs(a) > 1e-9)
+            ahead = np.cos(angle), np.sin(angle)
+            room = min(r / abs(a) for r, a in zip(limits.room_m, ahead, strict=False) if abs(a) > 1e-9)
             amplitude, rate = _largest(limits, room, share)
 
             def make(t, amplitude=amplitude, rate=rate, ahead=ahead):
-                return amplitude * np.sin(_phase(t, rate, ramp_s=_SLOW_RAMP_S))[:, None] * ahead, np.zeros(len(t))
+                way = _to_and_fro(t, amplitude, rate)
+                return _motion(t, x=way * ahead[0], y=way * ahead[1])
 
             way = {0: "along the nose", 45: "across the diagonal", 90: "sideways"}[degrees]
             words = f"to and fro {way}, {amplitude:.1f} m each way at up to {amplitude * rate:.1f} m/s, nose held"
             duration_s = _whole(rate, 15.0, ramp_s=_SLOW_RAMP_S)
             out.append(ManoeuvrePiece(f"pass {degrees} at {share:g}", words, make, duration_s))
-    for degrees, axis in ((0, 0), (90, 1)):
-        amplitude, rate = _largest(limits, limits.room_m[axis], 0.8)
+    for degrees, axis, way in ((0, "x", "along the nose"), (90, "y", "sideways")):
+        amplitude, rate = _largest(limits, limits.room_m["xyz".index(axis)], 0.8)
         heave = min(limits.room_m[2], 0.6 * limits.climb_m_s / _HEAVE_RAD_S, 0.3 * _GRAVITY_M_S2 / _HEAVE_RAD_S**2)
 
         def make(t, amplitude=amplitude, rate=rate, axis=axis, heave=heave):
-            out = np.zeros((len(t), 3))
-            out[:, axis] = amplitude * np.sin(_phase(t, rate, ramp_s=_SLOW_RAMP_S))
-            out[:, 2] = heave * np.sin(_phase(t, _HEAVE_RAD_S))
-            return out, np.zeros(len(t))
+            return _motion(t, z=heave * np.sin(_phase(t, _HEAVE_RAD_S)), **{axis: _to_and_fro(t, amplitude, rate)})
 
-        way = "along the nose" if axis == 0 else "sideways"
         words = f"to and fro {way} at up to {amplitude * rate:.1f} m/s in waves of {heave:.1f} m up and down"
         out.append(ManoeuvrePiece(f"waves {degrees}", words, make, _whole(rate, 15.0, ramp_s=_SLOW_RAMP_S)))
     return out
@@ -221,26 +229,22 @@ def _turns(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
     yaw_rate = min(0.8 * np.radians(limits.yaw_rate_deg_s), most_rad_s2 * _RAMP_S / 1.9)
 
     def spin(t):
-        return np.zeros((len(t), 3)), _phase(t, yaw_rate, 2 * np.pi)
+        return _motion(t, _phase(t, yaw_rate, 2 * np.pi))
 
     def eight(t):
         size, angle = _swing(t, amplitude, rate / np.sqrt(2))
-        out = np.zeros((len(t), 3))
-        out[:, 0], out[:, 1] = size * np.sin(angle), size / 2 * np.sin(2 * angle)
-        return out, np.zeros(len(t))
+        return _motion(t, x=size * np.sin(angle), y=size / 2 * np.sin(2 * angle))
 
     def turn(t):
         # One way in the first half, back in the second: the nose ends where it was.
         half = t[: (len(t) + 1) // 2]
         speed = yaw_rate * _envelope(half)
         there = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(half))])
-        return np.zeros((len(t), 3)), np.concatenate([there, there[: len(t) // 2][::-1]])
+        return _motion(t, np.concatenate([there, there[: len(t) // 2][::-1]]))
 
     def drift(t):
         # To and fro over ground while the nose turns: body axes and world axes part.
-        out = np.zeros((len(t), 3))
-        out[:, 0] = amplitude * np.sin(_phase(t, rate, ramp_s=_SLOW_RAMP_S))
-        return out, _phase(t, 0.6 * yaw_rate, 2 * np.pi)
+        return _motion(t, _phase(t, 0.6 * yaw_rate, 2 * np.pi), x=_to_and_fro(t, amplitude, rate))
 
     words = f"a figure of eight, {amplitude:.1f} m each way, nose held"
     pieces = [ManoeuvrePiece("eight", words, eight, _whole(rate / np.sqrt(2), 15.0, ramp_s=_SLOW_RAMP_S))]
@@ -248,7 +252,7 @@ def _turns(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
     half_s = max(1.875 * np.pi / (0.8 * np.radians(limits.yaw_rate_deg_s)), np.sqrt(5.77 * np.pi / most_rad_s2), 1.0)
 
     def face(t):
-        return np.zeros((len(t), 3)), np.pi * _smooth(np.minimum(t - 1.0, t[-1] - 1.0 - t) / half_s)
+        return _motion(t, np.pi * _smooth(np.minimum(t - 1.0, t[-1] - 1.0 - t) / half_s))
 
     pieces.append(ManoeuvrePiece("face", "turn the nose half round, hover, turn it back", face, 2 * half_s + 4.0))
     degrees = np.degrees(yaw_rate)
@@ -272,9 +276,7 @@ def _climbs(limits: Limits) -> list[ManoeuvrePiece]:
 
         def make(t, amplitude=amplitude, rate=rate):
             size, angle = _swing(t, amplitude, rate, _RAMP_S)
-            out = np.zeros((len(t), 3))
-            out[:, 2] = -size * np.sin(angle)
-            return out, np.zeros(len(t))
+            return _motion(t, z=-size * np.sin(angle))
 
         words = f"climb and descend by {amplitude:.1f} m each way at up to {amplitude * rate:.1f} m/s"
         out.append(ManoeuvrePiece(f"climb at {share:g}", words, make, _whole(rate, _PIECE_S)))
@@ -300,7 +302,7 @@ def _oscillations(limits: Limits, most_rad_s2: float) -> list[ManoeuvrePiece]:
             def make(t, axes=axes, low_hz=low_hz, high_hz=high_hz):
                 inner = t[-1]
                 count = np.arange(int(np.ceil(low_hz * inner)), int(high_hz * inner) + 1)
-                position, yaw = np.zeros((len(t), 3)), np.zeros(len(t))
+                position, yaw = _motion(t)
                 for i, axis in enumerate(axes):
                     own = count[i :: len(axes)].astype(float)
                     wave = _multisine(t, own, i) * _envelope(t)
@@ -333,7 +335,7 @@ def _doublets(limits: Limits, most_rad_s2: float) -> ManoeuvrePiece:
     turn = min(np.radians(20.0), fastest, most_rad_s2 * doublet_s**2 / 5.77)
 
     def make(t):
-        position, yaw = np.zeros((len(t), 3)), np.zeros(len(t))
+        position, yaw = _motion(t)
         step, each = t[1] - t[0], 4.0 * doublet_s
         half = int(round(doublet_s / step))
         edge = np.hanning(max(half // 3, 3))

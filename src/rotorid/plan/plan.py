@@ -13,10 +13,12 @@ a known mass attached it is of another one (`rotorid.plan.simulate`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
+import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.mismatch.decide.select import VALUE_FLOOR
@@ -26,7 +28,7 @@ from rotorid.mismatch.evidence.regression import NEVER_EXCITED, ridge_inverse
 from rotorid.mismatch.evidence.rows import PARAMETER_NAMES
 from rotorid.mismatch.evidence.unknowns import UNKNOWNS
 from rotorid.plan.candidates import STANDARD, Limits, ManoeuvrePiece, Reference, candidates, joined, smaller, standard
-from rotorid.plan.questions import FittedSet, Question
+from rotorid.plan.questions import FittedSet, Hypothesis, Question
 from rotorid.plan.separation import (
     Information,
     Questions,
@@ -36,6 +38,7 @@ from rotorid.plan.separation import (
     flown,
     of_flights,
     of_set,
+    separation_of,
     separations,
     step_of,
     world_of,
@@ -45,6 +48,7 @@ from rotorid.plan.simulate import (
     OF_PROPELLER,
     WITH_MASS_OF_ITS_OWN,
     ChangedVehicle,
+    CompetingModel,
     SimulatedFlight,
     masses,
     swaps,
@@ -82,16 +86,6 @@ class Handled:
     """Of the questions that the step is there for: ids, and how far apart their models will be."""
 
     @property
-    def of(self) -> str:
-        """The effect that the step is there for."""
-        return self.change.of
-
-    @property
-    def words(self) -> str:
-        """What to do."""
-        return self.change.words
-
-    @property
     def minutes(self) -> float:
         """The work and the hover, min."""
         handling_s = 300.0  # A step by hand takes this long: land, work, take off.
@@ -106,7 +100,7 @@ class Handled:
 def _steps_for(known: FittedSet) -> list[tuple[list[ChangedVehicle], list[Question]]]:
     """Choices of each kind of step with the questions that it is there for."""
     vehicle, out = known.prepared.vehicle, []
-    present = {known.fitted.model.search.terms[k].effect for k in known.fitted.model.selection.active}
+    present = {known.model.search.terms[k].effect for k in known.model.selection.active}
 
     def asking(effects) -> list[Question]:
         return [q for q in known.questions if set(q.ids) & set(effects)]
@@ -145,21 +139,32 @@ def _handled(
 
 @step("predicting what is changed by hand")
 def _of_change(
-    known: FittedSet, limits: Limits, reference, change: ChangedVehicle, questions: list[Question]
+    known: FittedSet, limits: Limits, reference: Reference, change: ChangedVehicle, questions: list[Question]
 ) -> Questions:
     """Separations of each question's models with the flight after a change."""
     base = of_set(known)
     known = expecting(known, [])
     terms, before = asked_terms(known), of_set(known)
-    effect_of = {id(t.form): t.effect for t in (*known.fitted.model.search.terms.values(), *known.regression.terms)}
+    effect_of = {id(t.form): t.effect for t in (*known.model.search.terms.values(), *known.regression.terms)}
+
+    def after(question: Question, hypothesis: Hypothesis) -> Information:
+        world = change.world(world_of(known, question, hypothesis), effect_of)
+        return before + of_flights(known, flown(world, reference, limits), world, terms, change)
+
+    return _by_each_model(known, questions, base, after)
+
+
+def _by_each_model(
+    known: FittedSet,
+    questions: Iterable[Question],
+    before: Information,
+    after: Callable[[Question, Hypothesis], Information],
+) -> Questions:
+    """How far apart the models of each question will be, each by what recordings hold (`after`) where it is true."""
     out = []
     for question in questions:
-        separated = []
-        for hypothesis in question.hypotheses:
-            world = change.world(world_of(known, question, hypothesis if hypothesis.keys else None), effect_of)
-            more: Information = of_flights(known, flown(world, reference, limits), world, terms, change)
-            separated += [s for s in separations(known, question, base, before + more) if s.true == hypothesis.id]
-        out.append((question.ids, tuple(separated)))
+        found = (separation_of(known, question, h, before, after(question, h)) for h in question.hypotheses)
+        out.append((question.ids, tuple(s for s in found if s is not None)))
     return tuple(out)
 
 
@@ -178,7 +183,7 @@ class _Width:
 
 def _able(known: FittedSet) -> dict[str, tuple[str, ...]]:
     """To everything that can be wished for its terms: believed values, and effects that are not at work."""
-    search, active = known.fitted.model.search, known.fitted.model.selection.active
+    search, active = known.model.search, known.model.selection.active
     out = {name: (key,) for key, name in PARAMETER_NAMES.items() if key in search.always}
     at_work = {search.terms[k].effect for k in active}
     for key, term in search.terms.items():
@@ -206,7 +211,7 @@ def widths(known: FittedSet, before: Information, after: Information, wishes: di
     A doubt that the engine found beyond the usual one (blocks that differ more than their noise) is taken to stay. Of
     the loops that the flight may be flown with the worse counts.
     """
-    model, regression, names = known.fitted.model, known.regression, _able(known)
+    model, regression, names = known.model, known.regression, _able(known)
     out = []
     for name, wished in wishes.items():
         if name in PARAMETER_NAMES.values():
@@ -229,7 +234,7 @@ def widths(known: FittedSet, before: Information, after: Information, wishes: di
 
 def _half(known: FittedSet, before: Information, information: Information, column: int, floor: float = 0.0) -> float:
     """Half the 95 % interval of a column of the model."""
-    fit, at = known.fitted.model.selection.fit, np.array([column])
+    fit, at = known.model.selection.fit, np.array([column])
     plain = float(_covariance(known, before.each[0], at)[0, 0])
     own = max(float(_covariance(known, gram, at)[0, 0]) for gram in information.each)
     (place,) = fit.places(at)
@@ -254,7 +259,7 @@ def _limit(known: FittedSet, information: Information, flown: Information, key: 
 
 def _covariance(known: FittedSet, gram: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """Plain covariance (k, k) of some columns next to the model, from normal equations (K, K)."""
-    model, regression = known.fitted.model, known.regression
+    model, regression = known.model, known.regression
     every = np.union1d(regression.columns([*model.search.always, *model.selection.active]), columns)
     inverse = ridge_inverse(gram[np.ix_(every, every)] + np.diag(regression.precision[every]))
     where = np.searchsorted(every, columns)
@@ -317,6 +322,10 @@ class Plan(Forecast):
     tried: tuple[Tried, ...] = ()
     unanswerable: tuple[tuple[tuple[str, ...], str], ...] = ()
     not_testable: tuple[tuple[str, str], ...] = ()
+    kind: str = "flight"
+    """Of the set: of a `stand` or `bench` a session is planned."""
+    table: pd.DataFrame | None = None
+    """What a session loads, throttles and tilts."""
 
     @property
     def settles(self) -> bool:
@@ -358,32 +367,39 @@ def broken(flight: SimulatedFlight, limits: Limits, vehicle: Vehicle) -> str:
     return ""
 
 
+def _by_size(known: FittedSet, limits: Limits) -> list[dict[str, ManoeuvrePiece]]:
+    """Every candidate by its name in each of SIZES."""
+    most = yaw_acceleration(known.prepared.vehicle)
+    return [{p.name: p for p in candidates(smaller(limits, s), s * most)} for s in SIZES]
+
+
+def _flown_alone(
+    known: FittedSet, world: CompetingModel, limits: Limits, piece: ManoeuvrePiece
+) -> tuple[tuple[SimulatedFlight, ...], list[str]]:
+    """A piece flown with each of the loops, and which limit each flight does not keep, in words; empty for none."""
+    try:
+        flights = flown(world, joined([piece], step_of(known), BETWEEN_S), limits)
+    except InputError as error:
+        return (), [str(error)]
+    return flights, [broken(f, limits, known.prepared.vehicle) for f in flights]
+
+
 def _tried(known: FittedSet, limits: Limits, wishes: Iterable[str] = ()) -> list[Tried]:
     """Every candidate flown in simulation by the model as fitted, as large as the limits allow it to be flown.
 
     The controller makes some motions larger than they are asked for: where a limit would be broken a smaller size of
     the same manoeuvre is tried.
     """
-    world, terms, step = world_of(known, None, None), asked_terms(known, wishes), step_of(known)
-    vehicle = known.prepared.vehicle
-    most = yaw_acceleration(vehicle)
-    sizes = [{p.name: p for p in candidates(smaller(limits, s), s * most)} for s in SIZES]
+    world, terms, sizes = world_of(known), asked_terms(known, wishes), _by_size(known, limits)
     out = []
     for name in sizes[0]:
-        for options in sizes:
-            if name not in options:
-                continue
-            piece = options[name]
-            try:
-                flights = flown(world, joined([piece], step, BETWEEN_S), limits)
-                reason = next((b for f in flights if (b := broken(f, limits, vehicle))), "")
-            except InputError as error:
-                reason = str(error)
+        for piece in (options[name] for options in sizes if name in options):
+            flights, reasons = _flown_alone(known, world, limits, piece)
+            reason = next(filter(None, reasons), "")
             if not reason:
                 break
-        seconds = piece.duration_s + BETWEEN_S
         information = None if reason else of_flights(known, flights, world, terms)
-        out.append(Tried(piece, information, seconds, reason))
+        out.append(Tried(piece, information, piece.duration_s + BETWEEN_S, reason))
     return out
 
 
@@ -441,36 +457,48 @@ def chosen_pieces(
     return taken, judged
 
 
+def first_and_second(
+    known: FittedSet,
+    limits: Limits,
+    options: list[Tried],
+    expected: Callable[[str, list[Tried]], Forecast],
+    most: int = _MOST_PIECES,
+    wishes: dict[str, float] | None = None,
+) -> tuple[list[Forecast], list[Tried]]:
+    """What is `expected` of the best choice and of the best one without its first piece, and all options with their
+    progress."""
+    taken, judged = chosen_pieces(known, limits, options, most, wishes)
+    found = [expected("chosen", taken)]
+    rest = [t for t in options if taken and t.piece is not taken[0].piece]
+    if rest and (second := chosen_pieces(known, limits, rest, most, wishes)[0]):
+        found.append(expected("second", second))
+    return found, judged
+
+
+def better_first(found: list[Forecast], target_sigma: float) -> list[Forecast]:
+    """What reaches more of the goals first, of those alike the shorter."""
+    return sorted(found, key=lambda f: (-round(f.reached(target_sigma), 2), f.duration_s))
+
+
 def _expecting_quick(known: FittedSet, limits: Limits) -> FittedSet:
     """The set as the engine would whiten it next to a quick flight: the first of QUICK that the limits allow."""
-    world, step, vehicle = world_of(known, None, None), step_of(known), known.prepared.vehicle
-    for share in SIZES:
-        options = {p.name: p for p in candidates(smaller(limits, share), share * yaw_acceleration(vehicle))}
+    world = world_of(known)
+    for options in _by_size(known, limits):
         for piece in (options[n] for n in _QUICK if n in options):
-            try:
-                flight, *_ = flown(world, joined([piece], step, BETWEEN_S), limits)
-            except InputError:
-                continue
-            if not broken(flight, limits, vehicle):
-                return expecting(known, [(flight, world)])
+            flights, reasons = _flown_alone(known, world, limits, piece)
+            if not reasons[0]:
+                return expecting(known, [(flights[0], world)])
     return known
 
 
 def _standard_piece(known: FittedSet, limits: Limits, options: list[Tried], duration_s: float) -> ManoeuvrePiece | None:
     """The standard flight of that length as large as the limits allow; None where they allow none."""
-    world, step, vehicle = world_of(known, None, None), step_of(known), known.prepared.vehicle
-    able = {t.piece.name: t.piece for t in options if t.information is not None}
-    sizes = [{p.name: p for p in candidates(smaller(limits, s), s * yaw_acceleration(vehicle))} for s in SIZES]
-    for parts in (able, *sizes):
-        if not set(STANDARD) <= set(parts):
-            continue
-        piece = standard(parts, duration_s)
-        try:
-            flights = flown(world, joined([piece], step, BETWEEN_S), limits)
-        except InputError:
-            continue
-        if not any(broken(f, limits, vehicle) for f in flights):
-            return piece
+    world, able = world_of(known), {t.piece.name: t.piece for t in options if t.information is not None}
+    for parts in (able, *_by_size(known, limits)):
+        if set(STANDARD) <= set(parts):
+            piece = standard(parts, duration_s)
+            if not any(_flown_alone(known, world, limits, piece)[1]):
+                return piece
     return None
 
 
@@ -487,29 +515,26 @@ def _forecast(
         questions = [(q.ids, tuple(separations(known, q, base, base))) for q in known.questions]
         questions += chain_separations(known, base)
         return Forecast(name, (), NOTHING, None, tuple(questions), tuple(widths(known, base, base, wishes)))
-    reference, world = joined(pieces, step_of(known), BETWEEN_S), world_of(known, None, None)
+    reference, world = joined(pieces, step_of(known), BETWEEN_S), world_of(known)
     flights = flown(world, reference, limits)
     known = expecting(known, [(flights[0], world)])
     terms, before = asked_terms(known, wishes), of_set(known)
     after = before + of_flights(known, flights, world, terms)
-    questions = []
-    for question in known.questions:
-        found = []
-        for hypothesis in question.hypotheses:
-            own = after
-            if hypothesis.keys:
-                try:
-                    by = world_of(known, question, hypothesis)
-                    own = before + of_flights(known, flown(by, reference, limits), by, terms)
-                except InputError:
-                    own = after
-            found += [s for s in separations(known, question, base, own) if s.true == hypothesis.id]
-        questions.append((question.ids, tuple(found)))
-    questions += chain_separations(known, after)
-    return Forecast(name, pieces, reference, flights[0], tuple(questions), tuple(widths(alone, base, after, wishes)))
+
+    def after_of(question: Question, hypothesis: Hypothesis) -> Information:
+        if not hypothesis.keys:
+            return after
+        try:
+            by = world_of(known, question, hypothesis)
+            return before + of_flights(known, flown(by, reference, limits), by, terms)
+        except InputError:
+            return after
+
+    questions = (*_by_each_model(known, known.questions, base, after_of), *chain_separations(known, after))
+    return Forecast(name, pieces, reference, flights[0], questions, tuple(widths(alone, base, after, wishes)))
 
 
-def _expected(known: FittedSet, limits: Limits, name: str, taken: list[Tried], wishes) -> Forecast:
+def _expected(known: FittedSet, limits: Limits, wishes: dict[str, float], name: str, taken: list[Tried]) -> Forecast:
     """What is expected of manoeuvres taken; flown again and again where they do not suffice and time is left.
 
     They are flown for LEAST_S at least: an effect that one pass shows is none that the engine finds wherever it looks.
@@ -534,16 +559,13 @@ def plan(known: FittedSet, limits: Limits, wishes: dict[str, float] | None = Non
         return Plan(**vars(_forecast(known, limits, "chosen", (), {})), **about, not_testable=reasons)
     quick = _expecting_quick(known, limits)
     options = _tried(quick, limits, wishes)
-    taken, judged = chosen_pieces(quick, limits, options, wishes=wishes)
-    others = [t for t in judged if not taken or t.piece is not taken[0].piece]
-    found = [_expected(known, limits, "chosen", taken, wishes)]
-    if taken and (second := chosen_pieces(quick, limits, others, wishes=wishes)[0]):
-        found.append(_expected(known, limits, "second", second, wishes))
+    expected = partial(_expected, known, limits, wishes)
+    found, judged = first_and_second(quick, limits, options, expected, wishes=wishes)
     longest = found[0].duration_s or limits.duration_s
     if (piece := _standard_piece(known, limits, options, longest - 2 * BETWEEN_S)) is not None:
         found.append(_forecast(known, limits, "standard", (piece,), wishes))
-    found.sort(key=lambda f: (-round(f.reached(limits.target_sigma), 2), f.duration_s))
+    best, *others = better_first(found, limits.target_sigma)
     hover = next((t.piece for t in options if t.piece.name == "hover" and t.information is not None), None)
     hands = () if hover is None else _handled(known, limits, hover, _LEAST_S, BETWEEN_S)
-    about |= {"others": tuple(found[1:]), "by_hand": hands, "tried": tuple(judged), "not_testable": reasons}
-    return Plan(**vars(found[0]), **about)
+    about |= {"others": tuple(others), "by_hand": hands, "tried": tuple(judged), "not_testable": reasons}
+    return Plan(**vars(best), **about)

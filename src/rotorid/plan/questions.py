@@ -31,7 +31,7 @@ from rotorid.mismatch.decide.select import COST_PER_PARAMETER
 from rotorid.mismatch.decide.status import CLAIMED
 from rotorid.mismatch.deliver.derivatives import learn
 from rotorid.mismatch.evidence.comparison import ENVIRONMENT_S
-from rotorid.mismatch.evidence.motion import HIGHEST_CUTOFF_HZ, Segment
+from rotorid.mismatch.evidence.motion import Segment
 from rotorid.mismatch.evidence.regression import Regression, autoregression
 from rotorid.mismatch.evidence.rows import Term, residual
 from rotorid.mismatch.evidence.speedpath import starts_of
@@ -39,7 +39,8 @@ from rotorid.mismatch.evidence.split import parts_of, split_runs
 from rotorid.mismatch.flight.delivered import ways
 from rotorid.mismatch.flight.fitted import Fitted, fitted
 from rotorid.mismatch.flight.prepare import Prepared, assemble_rows, prepare
-from rotorid.mismatch.flight.wrench import chosen, path_segments
+from rotorid.mismatch.flight.wrench import WrenchModel, chosen, path_segments
+from rotorid.mismatch.instrument.model import ReadingModel
 from rotorid.mismatch.mistakes import find_mistakes
 from rotorid.recordings import RecordingSet
 from rotorid.recordings.signal.kernels import causal
@@ -63,14 +64,19 @@ class _ChainModel:
     doubt: float
     """Relative one-sigma of the id's own parameters."""
 
+    @property
+    def steps(self) -> tuple[tuple[SpeedForm, np.ndarray], ...]:
+        """Speed forms with their values, in the order of the chain."""
+        ends = np.cumsum([len(form.parameters) for _, form in self.chain])
+        return tuple(zip((form for _, form in self.chain), np.split(self.values, ends[:-1]), strict=True))
+
 
 def _leftover(found: Fitted, segments: Sequence[Segment]) -> Callable[[tuple, np.ndarray], np.ndarray]:
     """A function of chain and values: what these leave of segments, whitened (m,), the shared linear terms free."""
-    prepared, search, result = found.prepared, found.model.search, found.chain.result
-    path = found.chain.speeds
+    prepared, search, path = found.prepared, found.model.search, found.chain.speeds
 
     if found.measured:
-        raws = [s.motion.rotor_speed - path(s, result.fit.chain, result.fit.values) for s in prepared.segments]
+        raws = [s.motion.rotor_speed - path(s) for s in prepared.segments]
         by_rotor = [autoregression([r[:, j] for r in raws]) for j in range(raws[0].shape[1])]
 
         def white_speeds(segment: Segment, chain, values) -> np.ndarray:
@@ -107,9 +113,8 @@ def _leftover(found: Fitted, segments: Sequence[Segment]) -> Callable[[tuple, np
                 for name in ("force", "moment"):
                     if name in own and getattr(extra, name) is not None:
                         own[name] = own[name] - getattr(extra, name)
-            groups = [prepared.thinner(own[g]) if g in own else None for g in ("force", "moment")]
-            size = next(len(g) for g in groups if g is not None)
-            y = np.concatenate([np.zeros((size, 3)) if g is None else g for g in groups], axis=1)
+            nothing = np.zeros((moved.motion.size, 3))
+            y = np.concatenate([prepared.thinner(own.get(g, nothing)) for g in ("force", "moment")], axis=1)
             parts.append(white(y[:, :, None])[:, 0])
         y = np.concatenate([*parts, np.zeros(len(unit))])
         return y - basis @ (basis.T @ y)
@@ -203,7 +208,6 @@ class FittedSet:
     recordings: RecordingSet
     prepared: Prepared
     fitted: Fitted
-    findings: tuple[Finding, ...]
     questions: tuple[Question, ...]
     chains: tuple[tuple[_ChainModel, ...], ...]
     """The same of what lies between command and rotor speed."""
@@ -215,16 +219,20 @@ class FittedSet:
     """Of what the fitted model leaves, as a form with its values; none where they do not predict."""
 
     @property
+    def model(self) -> WrenchModel:
+        """The model of the set."""
+        return self.fitted.model
+
+    @property
     def regression(self) -> Regression:
         """The engine's normal equations of the set."""
-        return self.fitted.model.search.regression if self.whitened is None else self.whitened
+        return self.model.search.regression if self.whitened is None else self.whitened
 
 
 def known(
     recordings: RecordingSet,
     suggested: Sequence[str] = (),
     claimed: Collection[str] | None = None,
-    cutoff_hz: float = HIGHEST_CUTOFF_HZ,
 ) -> FittedSet:
     """The set fitted, and its open questions: classes left open, and ids in `suggested` that may as well be nothing.
 
@@ -238,7 +246,7 @@ def known(
     recordings, mistakes, _ = find_mistakes(recordings)
     split = split_runs(recordings)
     fit_part, unseen = parts_of(recordings, split)
-    prepared = prepare(fit_part, cutoff_hz, unseen=tuple(r.name for r in unseen.runs))
+    prepared = prepare(fit_part, unseen=tuple(r.name for r in unseen.runs))
     found = fitted(prepared)
     way = ways(found.model, found.values, found.model.selection.active)[0]
     findings, *_ = decided(found, (*mistakes, *findings_outside(found, prepared)), way.fit, way.moved)
@@ -260,7 +268,7 @@ def known(
                 needed = "these columns give no chain of the others to compare with"
                 more = "" if found.measured else "; record the rotor speeds next to the commands"
                 unanswerable.append((ids, needed + more))
-        elif (question := question_of(found, finding, ids)) is not None:
+        elif (question := question_of(found.model, finding, ids)) is not None:
             questions.append(question)
         else:
             unanswerable.append((ids, "these columns give no model of the others to compare with"))
@@ -271,7 +279,7 @@ def known(
     form = derivative_form(vehicle.model_copy(update={"derivatives": learnt.derivatives}))
     own = () if form is None else (form,)
     asked = tuple(questions), tuple(chains), tuple(unanswerable)
-    return FittedSet(recordings, prepared, found, findings, *asked, derivatives=own)
+    return FittedSet(recordings, prepared, found, *asked, derivatives=own)
 
 
 def known_from(recordings: RecordingSet, verdict: dict) -> FittedSet:
@@ -289,9 +297,9 @@ def claimed_in(verdict: dict) -> set[str]:
     return {i for e in claims for i in (e["id"], *e["alternatives"])}
 
 
-def question_of(found: Fitted, finding: Finding, ids: tuple[str, ...]) -> Question | None:
+def question_of(model: WrenchModel | ReadingModel, finding: Finding, ids: tuple[str, ...]) -> Question | None:
     """The competing models of a class of which `finding` is the one in the model; None with fewer than two models."""
-    search, selection = found.model.search, found.model.selection
+    search, selection = model.search, model.selection
     own = next((k for k in selection.active if search.terms[k].effect == finding.id), None)
     if own is None:
         return None
@@ -327,22 +335,21 @@ def best_of(regression: Regression, shared: Sequence[str], choices, terms: dict[
 def _hypothesis_of(
     regression: Regression, shared: Sequence[str], name: str, choices, terms: dict[str, Term], own: str
 ) -> Hypothesis:
-    """The model of an id in its best form, `own` where that is one of its `choices`, with the forms nearly as good."""
+    """The model of an id in its best form, `own` where that is one of its `choices`, with the forms nearly as good.
+
+    Each has its coefficients as this set has them.
+    """
     least_weight = 0.05  # Relative probability from which a form may as well be the true one.
     worth = partial(_worth, regression, shared, terms)
     best = (own,) if (own,) in choices else best_of(regression, shared, choices, terms)
     weights = {keys: float(np.exp(min(worth(keys) - worth(best), 0.0) / 2)) for keys in choices if keys != best}
-    others = (
-        replace(_hypothesis(regression, shared, name, k), weight=w) for k, w in weights.items() if w > least_weight
-    )
-    return replace(_hypothesis(regression, shared, name, best), others=tuple(others))
 
+    def with_terms(keys: tuple[str, ...], weight: float = 1.0, others: tuple[Hypothesis, ...] = ()) -> Hypothesis:
+        fit = regression.fit([*shared, *keys])
+        where = fit.places(regression.columns(keys))
+        return Hypothesis(name, keys, fit.beta[where], fit.covariance[np.ix_(where, where)], weight, others)
 
-def _hypothesis(regression: Regression, shared: Sequence[str], name: str, keys: tuple[str, ...]) -> Hypothesis:
-    """A competing model with its coefficients as this set has them."""
-    fit = regression.fit([*shared, *keys])
-    where = fit.places(regression.columns(keys))
-    return Hypothesis(name, keys, fit.beta[where], fit.covariance[np.ix_(where, where)])
+    return with_terms(best, others=tuple(with_terms(k, w) for k, w in weights.items() if w > least_weight))
 
 
 def joined_sets(first: RecordingSet, *others: RecordingSet) -> tuple[RecordingSet, tuple[str, ...]]:

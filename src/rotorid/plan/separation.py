@@ -28,10 +28,11 @@ from rotorid.mismatch.evidence.comparison import ENVIRONMENT_S
 from rotorid.mismatch.evidence.motion import Segment
 from rotorid.mismatch.evidence.regression import Regression, autoregression, build, ridge_inverse
 from rotorid.mismatch.evidence.rows import Rows, Term
-from rotorid.mismatch.evidence.split import HELD_OUT_SHARE, training_rule
+from rotorid.mismatch.evidence.split import HELD_OUT_SHARE
+from rotorid.mismatch.evidence.unknowns import UNKNOWNS
 from rotorid.mismatch.flight.absent import scales
-from rotorid.mismatch.flight.prepare import assemble_rows, prepare_like
-from rotorid.mismatch.flight.wrench import after_residual, block_seconds, channel_floor, chosen, path_segments
+from rotorid.mismatch.flight.prepare import Prepared, assemble_rows, prepare_like
+from rotorid.mismatch.flight.wrench import after_residual, block_seconds, channel_floor, chosen, path_segments, whitened
 from rotorid.plan.candidates import Limits, Reference
 from rotorid.plan.questions import FittedSet, Hypothesis, Question, chain_interval, chain_squares
 from rotorid.plan.simulate import ChangedVehicle, CompetingModel, SimulatedFlight, commands, fly, recorded
@@ -54,26 +55,19 @@ class Information:
     gram: np.ndarray
     """Normal equations of the set's terms, in the columns of the set's regression: (K, K), of a flight (C, K, K), one
     for each of SLOWER_LOOPS."""
-    squares: np.ndarray | None = None
-    """λ of every pair of competing chains, (P,) or (C, P); None for nothing."""
+    squares: np.ndarray | float = 0.0
+    """λ of every pair of competing chains, (P,) or (C, P); 0 for nothing."""
     seconds: float = 0.0
     """How long they are."""
     shares: np.ndarray | float = 0.0
     """Products (K, K) of the columns as shares of the weight, summed over these seconds; of flights alone."""
 
     def __add__(self, other: Information) -> Information:
-        known = [i.squares for i in (self, other) if i.squares is not None]
-        return Information(
-            self.gram + other.gram,
-            sum(known[1:], known[0]) if known else None,
-            self.seconds + other.seconds,
-            self.shares + other.shares,
-        )
+        return Information(*(a + b for a, b in zip(vars(self).values(), vars(other).values(), strict=True)))
 
     def share(self, of: float) -> Information:
         """A share of it: a part of the recordings in which the same is done."""
-        squares = None if self.squares is None else of * self.squares
-        return Information(of * self.gram, squares, of * self.seconds, of * self.shares)
+        return Information(*(of * value for value in vars(self).values()))
 
     @property
     def each(self) -> list[np.ndarray]:
@@ -98,13 +92,18 @@ class Separation:
 
 def asked_terms(known: FittedSet, ids: Iterable[str] = ()) -> list[Term]:
     """Terms that any open question needs, or that stand for some `ids`, in the order of the regression."""
-    wanted = {t.key for t in known.regression.terms if t.effect and t.effect in ids}
+    wanted = {*known.model.search.always, *known.model.selection.active}
     for question in known.questions:
-        wanted |= set(question.shared)
-        wanted |= {k for choices in question.rivals.values() for keys in choices for k in keys}
-        wanted |= {k for h in question.hypotheses for k in h.keys}
-    wanted |= set(known.fitted.model.search.always) | set(known.fitted.model.selection.active)
-    return [t for t in known.regression.terms if t.key in wanted]
+        wanted |= {*question.shared, *(k for choices in question.rivals.values() for keys in choices for k in keys)}
+    return [t for t in known.regression.terms if t.key in wanted or (t.effect and t.effect in ids)]
+
+
+def placed(known: FittedSet, terms: Sequence[Term], products: np.ndarray) -> np.ndarray:
+    """Products (k, k) of the columns of some terms at their places in the set's regression, (K, K)."""
+    columns = known.regression.columns([t.key for t in terms])
+    out = np.zeros_like(known.regression.gram[0])
+    out[np.ix_(columns, columns)] = products
+    return out
 
 
 def of_set(known: FittedSet) -> Information:
@@ -112,10 +111,9 @@ def of_set(known: FittedSet) -> Information:
     regression = known.regression
     gram, _, bias, _ = regression.normal(np.arange(len(regression.precision)))
     seconds = float(regression.training.sum() * regression.block_s)
-    shares = (
-        seconds * _shares_of(known.fitted.model.rows, known.prepared.vehicle) if isinstance(known, FittedSet) else 0.0
-    )
-    return Information(gram - bias, None, seconds, shares)
+    flight = isinstance(known, FittedSet)
+    shares = seconds * _shares_of(known.model.rows, known.prepared.vehicle) if flight else 0.0
+    return Information(gram - bias, seconds=seconds, shares=shares)
 
 
 def _shares_of(rows: Sequence[Rows], vehicle: Vehicle) -> np.ndarray:
@@ -125,60 +123,46 @@ def _shares_of(rows: Sequence[Rows], vehicle: Vehicle) -> np.ndarray:
     return sum(np.einsum("nci,ncj->ij", x, x, optimize=True) for x in columns) / sum(len(x) for x in columns)
 
 
-def world_of(known: FittedSet, question: Question | None, hypothesis: Hypothesis | None) -> CompetingModel:
-    """The model of a hypothesis, to fly; the model as fitted where none is given."""
-    model, regression = known.fitted.model, known.regression
-    if question is None or hypothesis is None:
-        effects = chosen(model)
-    else:
-        keys = [k for k in (*question.shared, *hypothesis.keys) if model.search.terms.get(k) is not None]
-        keys = [k for k in keys if model.search.terms[k].kind == "effect"]
-        fit = regression.fit([*question.shared, *hypothesis.keys])
-        effects = []
-        for key in keys:
-            term = model.search.terms[key]
+def world_of(
+    known: FittedSet, question: Question | None = None, hypothesis: Hypothesis | None = None
+) -> CompetingModel:
+    """The model of a hypothesis of a question, to fly; the model as fitted where none is given, or none with terms."""
+    model, regression = known.model, known.regression
+    effects = chosen(model)
+    if hypothesis is not None and hypothesis.keys:
+        keys = (*question.shared, *hypothesis.keys)
+        fit, effects = regression.fit(keys), []
+        for term in (t for k in keys if (t := model.search.terms.get(k)) is not None and t.kind == "effect"):
             values = np.array(term.values, float)
             if term.form.linear:
-                values[list(term.form.linear)] = fit.beta[fit.places(regression.columns([key]))]
+                values[list(term.form.linear)] = fit.beta[fit.places(regression.columns([term.key]))]
             effects.append((term.form, values))
-    from rotorid.mismatch.evidence.unknowns import UNKNOWNS
-
     unnamed = {t.form.name for t in regression.terms if t.kind == "effect" and t.effect in UNKNOWNS}
     effects = tuple(e for e in effects if e[0].name not in unnamed)
-    chain, full, volt = (), _full_speed_of(known), None
+    limits, segments = known.prepared.vehicle.rotor_speed_limits_rad_s, known.prepared.segments
+    commanded = (float(s.command.max()) for s in segments if s.command is not None)
+    chain, full, volt, scale = (), limits[1] if limits else max(commanded, default=1.0), None, 1.0
     if known.fitted.chain is not None:
-        result, full, volt = known.fitted.chain
+        result, full, volt, scale = known.fitted.chain
         chain = tuple((form, result.fit.of(key)[1]) for key, form in result.fit.chain)
-    voltages = [s.motion.voltage.mean() for s in known.prepared.segments if s.motion.voltage is not None]
+    voltages = [s.motion.voltage.mean() for s in segments if s.motion.voltage is not None]
     return CompetingModel(
         vehicle=known.prepared.vehicle,
         effects=effects,
         derivatives=known.derivatives,
         chain=chain,
         full_speed_rad_s=full,
+        scale=scale,
         voltage_v=float(np.mean(voltages)) if voltages else None,
         full_voltage_v=volt,
         wind_m_s=None if model.wind is None else np.array([*model.wind, 0.0]),
     )
 
 
-def _full_speed_of(known: FittedSet) -> float:
-    """Rotor speed, rad/s, of full throttle."""
-    limits = known.prepared.vehicle.rotor_speed_limits_rad_s
-    commands = [float(s.command.max()) for s in known.prepared.segments if s.command is not None]
-    return limits[1] if limits else max(commands, default=1.0)
-
-
 def step_of(known: FittedSet) -> float:
     """Step of the simulation, s: the recording's own, or a whole part of it."""
     rate = _own_rate_hz(known)
     return 1.0 / (rate * int(np.ceil(_LEAST_RATE_HZ / rate)))
-
-
-def _columns_of(known: FittedSet) -> tuple[str, ...]:
-    """Columns that every run of the set has."""
-    runs = known.recordings.runs
-    return tuple(n for n in runs[0].table.columns if all(r.has(n) for r in runs))
 
 
 @step("flying a manoeuvre in simulation")
@@ -203,9 +187,8 @@ def of_flights(
     After a `change` of the vehicle by hand all of the flight is compared with the set.
     """
     found = [_of_flight(known, flight, world, terms, change) for flight in flights]
-    squares = [i.squares for i in found if i.squares is not None]
-    grams = np.stack([i.gram for i in found])
-    whole = Information(grams, np.stack(squares) if squares else None, found[0].seconds, found[0].shares)
+    grams, squares = np.stack([i.gram for i in found]), np.stack([i.squares for i in found])
+    whole = Information(grams, squares, found[0].seconds, found[0].shares)
     return whole.share(FITTED_SHARE) if change is None else whole
 
 
@@ -221,41 +204,36 @@ def _of_flight(
     After a `change` by hand the columns are those of the changed vehicle in the parameters of the set, less what the
     nuisances of the change take over.
     """
-    rate = _own_rate_hz(known)
-    model, prepared = known.fitted.model, known.prepared
-    acting, nuisances = list(terms), []
+    model, prepared = known.model, known.prepared
+    acting, effects = list(terms), model.effects if model.effects is not None else chosen(model)
     if change is not None:
         prepared = replace(prepared, vehicle=change.vehicle)
-        acting, nuisances = [change.term(t) for t in terms], list(change.nuisances)
-
-    def segments_of(flight: SimulatedFlight) -> list[Segment]:
-        run = recorded(flight, world, _columns_of(known), rate, "planned")
-        return prepare_like(prepared, RecordingSet("planned", prepared.vehicle, (run,), ()))[0]
-
-    segments = segments_of(flight)
+        acting, effects = [*change.nuisances, *(change.term(t) for t in terms)], list(world.effects)
     apart = []
     for models in known.chains:
         for true, rival in permutations(models, 2):
-            at, chain = 0, []
-            for _, form in true.chain:
-                chain.append((form, true.values[at : at + len(form.parameters)]))
-                at += len(form.parameters)
-            asked = commands(replace(world, chain=tuple(chain)), flight.motion)
-            apart.append(chain_squares(known.fitted, segments_of(replace(flight, command_rad_s=asked)), true, rival))
+            asked = commands(replace(world, chain=true.steps), flight.motion)
+            made = _stretches_of(known, prepared, replace(flight, command_rad_s=asked), world)
+            apart.append(chain_squares(known.fitted, made, true, rival))
+    segments = _stretches_of(known, prepared, flight, world)
     if known.fitted.commanded:
         segments = path_segments(segments, known.fitted.chain, prepared.thinner.cutoff_hz)
-    effects = model.effects if model.effects is not None else chosen(model)
-    acting = [*nuisances, *acting]
-    rows = assemble_rows(prepared, acting, segments, effects if change is None else list(world.effects))
-    rate_hz = prepared.thinner.rate_hz
+    rows, rate_hz = assemble_rows(prepared, acting, segments, effects), prepared.thinner.rate_hz
     own = build(rows, acting, known.regression.filters, lambda run, t: True, block_seconds(rows, rate_hz), rate_hz)
-    every = known.regression.columns([t.key for t in terms])
-    gram, shares = np.zeros_like(known.regression.gram[0]), np.zeros_like(known.regression.gram[0])
-    gram[np.ix_(every, every)] = own.gram.sum(axis=0) if change is None else _after_change(own, terms, change)
     seconds = float(flight.motion.time_s[-1] - flight.motion.time_s[0])
-    if change is None:
-        shares[np.ix_(every, every)] = seconds * _shares_of(rows, prepared.vehicle)
-    return Information(gram, np.array(apart) if apart else None, seconds, shares)
+    gram = own.gram.sum(axis=0) if change is None else _after_change(own, terms, change)
+    shares = seconds * _shares_of(rows, prepared.vehicle) if change is None else 0.0
+    return Information(placed(known, terms, gram), np.array(apart), seconds, placed(known, terms, shares))
+
+
+def _stretches_of(
+    known: FittedSet, prepared: Prepared, flight: SimulatedFlight, world: CompetingModel, name: str = "planned"
+) -> list[Segment]:
+    """Stretches of a flight as the set's sensors would record it."""
+    runs = known.recordings.runs
+    columns = tuple(n for n in runs[0].table.columns if all(r.has(n) for r in runs))
+    run = recorded(flight, world, columns, _own_rate_hz(known), name)
+    return prepare_like(prepared, RecordingSet("planned", prepared.vehicle, (run,), ()))[0]
 
 
 def _after_change(own: Regression, terms: Sequence[Term], change: ChangedVehicle) -> np.ndarray:
@@ -271,24 +249,6 @@ def _after_change(own: Regression, terms: Sequence[Term], change: ChangedVehicle
     return share[:, None] * gram * share
 
 
-def recorded_after(known: FittedSet, change: ChangedVehicle, recorded: RecordingSet) -> Regression:
-    """Normal equations of a set and of a flight `recorded` after a change by hand, in the terms that a question needs
-    and the nuisances of the change; every block of both is fitted."""
-    model, terms = known.fitted.model, asked_terms(known)
-    acting = [*change.nuisances, *(change.term(t) for t in terms)]
-    prepared = replace(known.prepared, vehicle=change.vehicle)
-    segments = prepare_like(prepared, replace(recorded, vehicle=change.vehicle))[0]
-    starts = dict(zip([t.key for t in model.terms], np.cumsum([0, *(t.size for t in model.terms)]), strict=False))
-    at = np.concatenate([starts[t.key] + np.arange(t.size) for t in terms])
-    extra = sum(t.size for t in change.nuisances)
-    share = np.concatenate([np.ones(extra), *(np.full(t.size, change.shares.get(t.key, 1.0)) for t in terms)])
-    rows = [replace(r, x=np.pad(r.x[:, :, at], ((0, 0), (0, 0), (extra, 0)))) for r in model.rows]
-    rows += [replace(r, x=r.x * share) for r in assemble_rows(prepared, acting, segments, None)]
-    rate_hz = prepared.thinner.rate_hz
-    filters = expecting(known, []).regression.filters
-    return build(rows, acting, filters, lambda run, t: True, block_seconds(rows, rate_hz), rate_hz)
-
-
 def expecting(known: FittedSet, flights: Sequence[tuple[SimulatedFlight, CompetingModel]]) -> FittedSet:
     """The set with its normal equations as the engine would have them once flights are joined to it.
 
@@ -297,22 +257,17 @@ def expecting(known: FittedSet, flights: Sequence[tuple[SimulatedFlight, Competi
     much of a quick flight, in which it cannot. What the model leaves of the set is what it will leave of the flight,
     but no less than the share of the flight's own forces and moments below which the engine distinguishes nothing.
     """
-    model, prepared = known.fitted.model, known.prepared
-    rate, regression = _own_rate_hz(known), model.search.regression
-    segments = list(model.segments)
+    model, prepared = known.model, known.prepared
+    regression, segments = model.search.regression, list(model.segments)
     for number, (flight, world) in enumerate(flights):
-        run = recorded(flight, world, _columns_of(known), rate, f"planned {number}")
-        segments += prepare_like(prepared, RecordingSet("planned", prepared.vehicle, (run,), ()))[0]
+        segments += _stretches_of(known, prepared, flight, world, f"planned {number}")
     floor, remains = channel_floor(segments, prepared.vehicle), after_residual(model)
     # What is steady in a run is no noise: a filter that takes it out would see nothing slow.
     filters = {c: autoregression([r[:, c] - r[:, c].mean() for r in remains], floor[c]) for c in regression.filters}
-    rule, rate_hz = training_rule(prepared.split, model.segments), prepared.thinner.rate_hz
-    again = build(
-        model.rows, model.terms, filters, rule, block_seconds(model.rows, rate_hz), rate_hz, model.contributions.noisy
-    )
-    whitened = again.without_winds()
-    whitened.limit = regression.limit
-    return replace(known, whitened=whitened)
+    noisy = model.contributions.noisy
+    again = whitened(prepared, model.rows, model.terms, filters, model.segments, noisy).without_winds()
+    again.limit = regression.limit
+    return replace(known, whitened=again)
 
 
 def _own_rate_hz(known: FittedSet) -> float:
@@ -430,29 +385,32 @@ def separations(known: FittedSet, question: Question, before: Information, after
     Which rival is nearest hangs on the model's coefficients, of which the set knows no more than their interval: the
     separation is the median over draws from it of the smallest over all rivals.
     """
-    out = []
-    for true in question.hypotheses:
-        found = [_apart(known, question, true, gram) for gram in after.each] if true.keys else []
-        if not any(found):
-            continue
-        nearest = [np.min(list(f.values()), axis=0) for f in found]
-        worst = int(np.argmin([np.median(n) for n in nearest]))
-        rival = min(found[worst], key=lambda r: float(np.median(found[worst][r])))
-        so_far = _apart(known, question, true, before.each[0])[rival]
-        every = np.concatenate(nearest)
-        noise = np.random.default_rng(1).standard_normal(len(every))
-        low, high = np.quantile(np.maximum(every + noise, 0.0), [0.025, 0.975])
-        out.append(
-            Separation(
-                true.id,
-                rival,
-                float(np.median(nearest[worst])),
-                (float(low), float(high)),
-                float(np.median(so_far)),
-                log_odds(nearest[worst], after.seconds),
-            )
-        )
-    return out
+    every = (separation_of(known, question, true, before, after) for true in question.hypotheses)
+    return [s for s in every if s is not None]
+
+
+def separation_of(
+    known: FittedSet, question: Question, true: Hypothesis, before: Information, after: Information
+) -> Separation | None:
+    """One model of a question against its nearest rival, as `separations`; None where there is nothing to compare."""
+    found = [_apart(known, question, true, gram) for gram in after.each] if true.keys else []
+    if not any(found):
+        return None
+    nearest = [np.min(list(f.values()), axis=0) for f in found]
+    worst = int(np.argmin([np.median(n) for n in nearest]))
+    rival = min(found[worst], key=lambda r: float(np.median(found[worst][r])))
+    so_far = _apart(known, question, true, before.each[0])[rival]
+    every = np.concatenate(nearest)
+    noise = np.random.default_rng(1).standard_normal(len(every))
+    low, high = np.quantile(np.maximum(every + noise, 0.0), [0.025, 0.975])
+    return Separation(
+        true.id,
+        rival,
+        float(np.median(nearest[worst])),
+        (float(low), float(high)),
+        float(np.median(so_far)),
+        log_odds(nearest[worst], after.seconds),
+    )
 
 
 def chain_separations(
@@ -463,7 +421,7 @@ def chain_separations(
     for models in known.chains:
         found: dict[str, Separation] = {}
         for true, rival in permutations(models, 2):
-            every = np.zeros(1) if information.squares is None else np.sqrt(information.squares[..., at].ravel())
+            every = np.sqrt(information.squares[..., at].ravel()) if np.ndim(information.squares) else np.zeros(1)
             at += 1
             sigma, most = float(every.min()), float(every.max())
             if true.id not in found or sigma < found[true.id].sigma:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ from rotorid.errors import InputError
 from rotorid.io.text.writing import all_or_none, rounded
 from rotorid.mismatch.decide.findings import with_probabilities
 from rotorid.mismatch.evidence.regression import Regression, build
-from rotorid.mismatch.evidence.rows import Rows, Term
+from rotorid.mismatch.evidence.rows import Term
 from rotorid.mismatch.evidence.split import parts_of, split_runs
 from rotorid.mismatch.instrument.analyse import decided_of_reading, first_model, with_plainer_forms
 from rotorid.mismatch.instrument.chain import ChainResult, moved
@@ -34,14 +35,21 @@ from rotorid.mismatch.instrument.model import (
 )
 from rotorid.mismatch.instrument.setup import set_up, with_unseen
 from rotorid.plan.candidates import SessionLimits
-from rotorid.plan.plan import Forecast, Plan, Tried, chosen_pieces
+from rotorid.plan.plan import Forecast, Plan, Tried, better_first, first_and_second
 from rotorid.plan.questions import Question, claimed_in, in_thirds, question_of
-from rotorid.plan.separation import FITTED_SHARE, Information, of_set, separations
-from rotorid.plan.write import by_hand_as_data, draw_separations, questions_as_data, sentences
+from rotorid.plan.separation import FITTED_SHARE, Information, asked_terms, of_set, placed, separations
+from rotorid.plan.write import (
+    by_hand_as_data,
+    draw_separations,
+    draw_starts,
+    forecast_as_data,
+    sentences,
+    unanswerable_as_data,
+)
 from rotorid.recordings import RecordingSet, Run
 from rotorid.recordings import columns as c
 from rotorid.recordings.sufficient import sufficient
-from rotorid.report.plots.style import GREY, figure, use
+from rotorid.report.plots.style import figure, use
 from rotorid.steps import step
 
 REST_S = 2.0
@@ -80,19 +88,6 @@ class KnownInstrument:
         """The engine's normal equations of the set."""
         return self.model.regression
 
-    @property
-    def fitted(self) -> KnownInstrument:
-        """Where the questions of flights look for the model."""
-        return self
-
-
-@dataclass(frozen=True, kw_only=True)
-class SessionPlan(Plan):
-    """What to do next on a stand or bench, and what else was considered."""
-
-    kind: str
-    table: pd.DataFrame
-
 
 def known_instrument(recordings: RecordingSet, claimed: Collection[str] | None = None) -> KnownInstrument:
     """The set fitted as `rotorid.mismatch.instrument.analyse` does, and its open questions.
@@ -104,7 +99,6 @@ def known_instrument(recordings: RecordingSet, claimed: Collection[str] | None =
     setup = set_up(part, recordings)
     model, chain, loadings = first_model(setup, make_terms(setup)[0])
     model = with_plainer_forms(model, loadings)
-    holder = KnownInstrument(recordings, model, chain, (), ())
     questions, unanswerable = [], [(f.alternatives, f.sentence) for f in mistakes if f.status == "ambiguous"]
     chosen = chosen_already(model)
     inside = with_probabilities(decided_of_reading(model), chosen.found, chosen.support)
@@ -114,14 +108,14 @@ def known_instrument(recordings: RecordingSet, claimed: Collection[str] | None =
             continue
         if not ids or any(set(ids) == set(q.ids) for q in questions):
             continue
-        question = question_of(holder, finding, ids)
+        question = question_of(model, finding, ids)
         if question is None:
             unanswerable.append(
                 (ids, "it lies between command and rotor speed; record the speeds next to the commands")
             )
         else:
             questions.append(question)
-    return replace(holder, questions=tuple(questions), unanswerable=tuple(unanswerable))
+    return KnownInstrument(recordings, model, chain, tuple(questions), tuple(unanswerable))
 
 
 def known_instrument_from(recordings: RecordingSet, verdict: dict) -> KnownInstrument:
@@ -212,10 +206,8 @@ def options(known: KnownInstrument, limits: SessionLimits) -> list[SessionStep]:
                     level = course(t) if bench else np.sqrt(np.maximum(course(t), 0.0))
                     return level[:, None] * share
 
-                step = SessionStep(
-                    f"{name} {where}{' ' + leaning if leaning else ''}", mounted + what + words, 0.0, make, tilt
-                )
-                out.append(replace(step, duration_s=seconds + 2 * REST_S))
+                called = f"{name} {where}{' ' + leaning if leaning else ''}"
+                out.append(SessionStep(called, mounted + what + words, seconds + 2 * REST_S, make, tilt))
     return out
 
 
@@ -240,14 +232,6 @@ def table_of(known: KnownInstrument, step: SessionStep) -> pd.DataFrame:
         if all(r.has(name) for r in known.recordings.runs):
             table[name] = np.full(len(t), np.nanmedian(first.column(name)))
     return pd.DataFrame(table)
-
-
-def asked(known: KnownInstrument) -> list[Term]:
-    """Terms that any open question needs, in the order of the regression."""
-    wanted = {*known.model.search.always, *known.model.selection.active}
-    for question in known.questions:
-        wanted |= {*question.shared, *(k for choices in question.rivals.values() for keys in choices for k in keys)}
-    return [t for t in known.regression.terms if t.key in wanted]
 
 
 @step("predicting a step")
@@ -275,14 +259,10 @@ def _of_run(known: KnownInstrument, run: Run, terms: Sequence[Term]) -> Informat
     own = setup.loadings[len(model.setup.loadings) :]
     if known.chain is not None and not all(x.measured for x in setup.loadings):
         own = moved(replace(setup, loadings=own), known.chain)
-    rows = rows_of(model.setup, list(terms), own, whole_reading(model.terms, model.selection.active))
-    rows = [Rows(r.run, r.time_s, np.nan_to_num(r.y), r.x) for r in rows]
-    rate = model.setup.rate_hz
-    added = build(rows, list(terms), known.regression.filters, everything, model.regression.block_s, rate)
-    every = known.regression.columns([t.key for t in terms])
-    gram = np.zeros_like(known.regression.gram[0])
-    gram[np.ix_(every, every)] = added.gram.sum(axis=0)
-    return Information(gram, None, seconds)
+    made = rows_of(model.setup, list(terms), own, whole_reading(model.terms, model.selection.active))
+    rows, rate_hz = [replace(r, y=np.nan_to_num(r.y)) for r in made], model.setup.rate_hz
+    added = build(rows, list(terms), known.regression.filters, everything, model.regression.block_s, rate_hz)
+    return Information(placed(known, terms, added.gram.sum(axis=0)), seconds=seconds)
 
 
 def _fitted_runs(known: KnownInstrument, steps: Sequence[SessionStep]) -> list[Run]:
@@ -297,7 +277,7 @@ def _forecast(known: KnownInstrument, name: str, taken: Sequence[Tried]) -> Fore
     """What is expected of steps taken."""
     # What is mounted alike, and what is done alike, follows each other.
     taken = sorted(taken, key=lambda t: (t.piece.tilt_rad != (0.0, 0.0), t.piece.tilt_rad, t.piece.name))
-    steps, terms, before = tuple(t.piece for t in taken), asked(known), of_set(known)
+    steps, terms, before = tuple(t.piece for t in taken), asked_terms(known), of_set(known)
     after = before
     for run in _fitted_runs(known, steps) if steps else ():
         after = after + _of_run(known, run, terms)
@@ -313,34 +293,29 @@ def _standard_steps(tried: Sequence[Tried], limits: SessionLimits) -> list[Tried
     return once * min(int(limits.duration_s / seconds), _MOST_STEPS // len(once)) if once else []
 
 
-def plan_session(known: KnownInstrument, limits: SessionLimits) -> SessionPlan:
+def plan_session(known: KnownInstrument, limits: SessionLimits) -> Plan:
     """The steps that settle most in the time allowed; none where nothing is open or nothing helps."""
     about = {"set": known.recordings.name, "kind": known.recordings.vehicle.kind, "limits": limits}
     about |= {"unanswerable": known.unanswerable}
     if not known.questions:
-        return SessionPlan("chosen", (), None, None, (), (), **about, table=pd.DataFrame())
-    terms, tried = asked(known), []
+        return Plan("chosen", (), None, None, (), (), **about)
+    terms, tried = asked_terms(known), []
     for tested in options(known, limits):
         try:
             tried.append(Tried(tested, of_step(known, tested, terms), tested.duration_s))
         except InputError as error:
             tried.append(Tried(tested, None, tested.duration_s, str(error)))
-    taken, _ = chosen_pieces(known, limits, tried, _MOST_STEPS)
-    found = [_forecast(known, "chosen", taken)]
-    rest = [t for t in tried if taken and t.piece is not taken[0].piece]
-    if second := chosen_pieces(known, limits, rest, _MOST_STEPS)[0] if rest else []:
-        found.append(_forecast(known, "second", second))
+    found, _ = first_and_second(known, limits, tried, partial(_forecast, known), _MOST_STEPS)
     if usual := _standard_steps(tried, limits):
         found.append(_forecast(known, "standard", usual))
-    found.sort(key=lambda f: (-round(f.reached(limits.target_sigma), 2), f.duration_s))
-    best, *others = found
+    best, *others = better_first(found, limits.target_sigma)
     parts = [table_of(known, s).assign(run=f"step{i + 1:02d}") for i, s in enumerate(best.pieces)]
     table = pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
     readings = [n for n in table.columns if n in c.FORCE + c.MOMENT]
-    return SessionPlan(**vars(best), **about, table=table.drop(columns=readings), others=tuple(others))
+    return Plan(**vars(best), **about, table=table.drop(columns=readings), others=tuple(others))
 
 
-def text(plan: SessionPlan) -> list[str]:
+def text(plan: Plan) -> list[str]:
     """The session in sentences, for the screen and for a page."""
     return sentences(
         plan,
@@ -354,7 +329,7 @@ def text(plan: SessionPlan) -> list[str]:
     )
 
 
-def _forecast_as_data(session: Forecast, target: float) -> dict:
+def _session_as_data(session: Forecast, target: float) -> dict:
     """A session and what is expected of it, for JSON; its steps in the order in which they are recorded."""
     steps = [
         {
@@ -367,34 +342,29 @@ def _forecast_as_data(session: Forecast, target: float) -> dict:
         }
         for i, s in enumerate(session.pieces)
     ]
-    return {
-        "duration_s": session.duration_s,
-        "predicted_separation_sigma": session.sigma,
-        "steps": steps,
-        "questions": questions_as_data(session.questions, target),
-    }
+    return forecast_as_data(session, target, {"steps": steps})
 
 
-def _summary(plan: SessionPlan) -> dict:
+def _summary(plan: Plan) -> dict:
     """The session as data, for `plan.json`."""
     target = plan.limits.target_sigma
     return rounded(
         {"set": plan.set, "kind": plan.kind, "settles": plan.settles}
-        | _forecast_as_data(plan, target)
+        | _session_as_data(plan, target)
         | {
-            "others": [{"name": other.name} | _forecast_as_data(other, target) for other in plan.others],
-            "not_by_loading": [{"ids": list(ids), "what_it_takes": what} for ids, what in plan.unanswerable],
+            "others": [{"name": other.name} | _session_as_data(other, target) for other in plan.others],
+            "not_by_loading": unanswerable_as_data(plan),
             "by_hand": by_hand_as_data(plan),
             "limits": plan.limits.model_dump(mode="json"),
         }
     )
 
 
-def _draw(plan: SessionPlan, path: Path) -> None:
+def _draw(plan: Plan, path: Path) -> None:
     """Write the picture as PNG: the loads or speeds of the session one after the other, and the separations."""
     use()
     bench = plan.kind == "bench"
-    stem = [n for n in c.REFERENCE_FORCE] if bench else [n for n in plan.table.columns if n.startswith("rotor_speed")]
+    stem = list(c.REFERENCE_FORCE) if bench else [n for n in plan.table.columns if n.startswith("rotor_speed")]
     stem = stem or [n for n in plan.table.columns if n.startswith(("rotor_command", "throttle"))]
     fig, axes = figure(4.2, 2, 1)
     step = float(plan.table[c.TIME].iloc[1] - plan.table[c.TIME].iloc[0])
@@ -407,16 +377,12 @@ def _draw(plan: SessionPlan, path: Path) -> None:
     unit = "load [N]" if bench else ("throttle [-]" if stem[0].startswith("throttle") else "rotor speed [rad/s]")
     axes[0].set(xlabel="time [s]", ylabel=unit, xlim=(0, t[-1]))
     axes[0].legend(loc="upper right", ncols=4)
-    start = 0.0
-    for i, s in enumerate(plan.pieces):
-        axes[0].axvline(start, color=GREY, lw=0.5, ls=":")
-        axes[0].annotate(str(i + 1), (start, 1.0), xycoords=("data", "axes fraction"), va="bottom", fontsize=8)
-        start += s.duration_s
+    draw_starts(axes[0], np.cumsum([0.0, *(s.duration_s for s in plan.pieces[:-1])]), numbered=True)
     draw_separations(axes[1], plan, "session")
     fig.savefig(path, format="png")
 
 
-def write(plan: SessionPlan, folder: Path) -> list[Path]:
+def write(plan: Plan, folder: Path) -> list[Path]:
     """Write everything; returns the files, the picture last. Nothing is left half written."""
     paths = [folder / n for n in ("plan.json", *(("session.csv", "plan.png") if plan.pieces else ()))]
     with all_or_none(*paths) as parts:

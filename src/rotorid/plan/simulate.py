@@ -60,6 +60,8 @@ class CompetingModel:
     chain: tuple = ()
     """Speed forms with their values, in the order of their stages."""
     full_speed_rad_s: float = 1.0
+    scale: float = 1.0
+    """Rotor speed over the one that the chain makes (`CommandChain.scale`)."""
     voltage_v: float | None = None
     full_voltage_v: float | None = None
     wind_m_s: np.ndarray | None = None
@@ -215,7 +217,7 @@ def _held_longer(reference: Reference, step_s: float) -> Reference:
 def commands(world: CompetingModel, motion: Motion) -> np.ndarray:
     """Commands (n, k), rad/s, that make the rotor speeds of a motion through the model's chain."""
     steps_back = 8  # Rounds of the inversion of what lies between command and speed.
-    wanted = command = motion.rotor_speed
+    wanted = command = motion.rotor_speed / world.scale
     if not world.chain:
         return command
     start = SpeedPath(command, motion.time_s, world.full_speed_rad_s, motion.voltage, world.full_voltage_v)
@@ -351,16 +353,12 @@ def _attached(vehicle: Vehicle, place_m: tuple[float, float, float], words: str)
     rotors = tuple(
         Rotor(x_m=r.x_m - centre[0], y_m=r.y_m - centre[1], z_m=r.z_m - centre[2], spin=r.spin) for r in vehicle.rotors
     )
+    moments = {a + b: float(inertia["xyz".index(a), "xyz".index(b)]) for a, b in ("xx", "yy", "zz", "xy", "xz", "yz")}
     after = vehicle.model_copy(
         update={
             "mass_kg": mass + more,
             "rotors": rotors,
-            "inertia_kg_m2": Inertia(
-                **{
-                    a + b: float(inertia["xyz".index(a), "xyz".index(b)])
-                    for a, b in ("xx", "yy", "zz", "xy", "xz", "yz")
-                }
-            ),
+            "inertia_kg_m2": Inertia(**moments),
             "accelerometer_position_m": tuple(float(v) for v in np.array(vehicle.accelerometer_position_m) - centre),
         }
     )

@@ -24,6 +24,7 @@ import pandas as pd
 
 from rotorid.effects.catalogue import catalogue
 from rotorid.io.text.writing import all_or_none, rounded
+from rotorid.mismatch.decide.words import capital
 from rotorid.plan.candidates import Reference
 from rotorid.plan.plan import BETWEEN_S, SHARE, Forecast, Handled, Plan
 from rotorid.plan.separation import Questions, Separation
@@ -193,22 +194,32 @@ def questions_as_data(questions: Questions, target: float) -> list[dict]:
     ]
 
 
-def _forecast_as_data(flight: Forecast, target: float) -> dict:
-    """A flight and what is expected of it, for JSON."""
-    known = {w.name: [s if np.isfinite(s) else None for s in (w.before, w.after)] for w in flight.widths}
+def forecast_as_data(forecast: Forecast, target: float, pieces: dict[str, list[dict]]) -> dict:
+    """What is expected of a flight or session, for JSON, with its `pieces` by what they are called."""
     return {
-        "flight": flight.name,
-        "duration_s": flight.duration_s,
-        "predicted_separation_sigma": flight.sigma,
-        "manoeuvres": [{"name": p.name, "words": p.words, "duration_s": p.duration_s} for p in flight.pieces],
-        "questions": questions_as_data(flight.questions, target),
-        "intervals": [
-            {"name": w.name, "unit": w.unit}
-            | dict(zip(("half_width_before", "half_width_after"), known[w.name], strict=True))
-            | ({"wished": w.wished} if w.wished else {})
-            for w in flight.widths
-        ],
+        "duration_s": forecast.duration_s,
+        "predicted_separation_sigma": forecast.sigma,
+        **pieces,
+        "questions": questions_as_data(forecast.questions, target),
     }
+
+
+def _flight_as_data(flight: Forecast, target: float) -> dict:
+    """A flight and what is expected of it, for JSON."""
+    manoeuvres = [{"name": p.name, "words": p.words, "duration_s": p.duration_s} for p in flight.pieces]
+    sizes = [[s if np.isfinite(s) else None for s in (w.before, w.after)] for w in flight.widths]
+    intervals = [
+        {"name": w.name, "unit": w.unit, "half_width_before": before, "half_width_after": after}
+        | ({"wished": w.wished} if w.wished else {})
+        for w, (before, after) in zip(flight.widths, sizes, strict=True)
+    ]
+    data = forecast_as_data(flight, target, {"manoeuvres": manoeuvres})
+    return {"flight": flight.name, **data, "intervals": intervals}
+
+
+def unanswerable_as_data(plan: Plan) -> list[dict]:
+    """Classes that nothing with these columns settles, for JSON."""
+    return [{"ids": list(ids), "what_it_takes": what} for ids, what in plan.unanswerable]
 
 
 def _summary(plan: Plan) -> dict:
@@ -217,9 +228,9 @@ def _summary(plan: Plan) -> dict:
         {
             "set": plan.set,
             "settles": plan.settles,
-            **_forecast_as_data(plan, plan.limits.target_sigma),
-            "others": [_forecast_as_data(f, plan.limits.target_sigma) for f in plan.others],
-            "not_by_flying": [{"ids": list(ids), "what_it_takes": what} for ids, what in plan.unanswerable],
+            **_flight_as_data(plan, plan.limits.target_sigma),
+            "others": [_flight_as_data(f, plan.limits.target_sigma) for f in plan.others],
+            "not_by_flying": unanswerable_as_data(plan),
             "by_hand": by_hand_as_data(plan),
             "not_testable": [{"id": i, "reason": reason} for i, reason in plan.not_testable],
             "not_flown": [{"name": t.piece.name, "reason": t.reason} for t in plan.tried if t.reason],
@@ -280,7 +291,9 @@ def sentences(
         out.append(f"No {schedule} with these columns settles {' or '.join(_words_of(i) for i in ids)}: {what}.")
     if not out:
         out.append(f"Nothing is open: no {needed} is needed to distinguish effects.")
-    expected = {h.of: f" {_expected_by_hand(h, plan.limits.target_sigma)}" for h in plan.by_hand if h.sigma is not None}
+    expected = {
+        h.change.of: f" {_expected_by_hand(h, plan.limits.target_sigma)}" for h in plan.by_hand if h.sigma is not None
+    }
     return out + [f"By hand: {step}.{expected.get(i, '')}" for i, step in _manual_steps(plan).items()]
 
 
@@ -305,19 +318,18 @@ def _manual_steps(plan: Plan) -> dict[str, str]:
 def _expected_by_hand(step: Handled, target: float) -> str:
     """What a step by hand is expected to separate, as a sentence."""
     settles = "this settles it" if step.sigma >= target else "this alone does not settle it"
-    words = step.words[0].upper() + step.words[1:]
     return (
-        f"{words}, and hover for {step.hover_s:.0f} s (about {step.minutes:.0f} min in all): {step.sigma:.1f} standard "
-        f"errors at the least, {settles}."
+        f"{capital(step.change.words)}, and hover for {step.hover_s:.0f} s (about {step.minutes:.0f} min in all): "
+        f"{step.sigma:.1f} standard errors at the least, {settles}."
     )
 
 
 def by_hand_as_data(plan: Plan) -> list[dict]:
     """Manual steps, for JSON; `predicted` is null where no separation is."""
-    target, found = plan.limits.target_sigma, {h.of: h for h in plan.by_hand}
+    target, found = plan.limits.target_sigma, {h.change.of: h for h in plan.by_hand}
 
     def predicted(step: Handled) -> dict:
-        said = {"words": step.words, "hover_s": step.hover_s, "minutes": step.minutes}
+        said = {"words": step.change.words, "hover_s": step.hover_s, "minutes": step.minutes}
         questions = questions_as_data(step.questions, target)
         return said | {"predicted_separation_sigma": step.sigma, "questions": questions}
 
@@ -405,10 +417,7 @@ def _draw(plan: Plan, path: Path) -> None:
     for ax, values, label in series:
         ax.plot(t, values[: len(t)], color=BLUE)
         ax.set(xlabel="time [s]", ylabel=label, xlim=(0, t[-1]))
-        for i, start in enumerate(starts[:-1]):
-            ax.axvline(start, color=GREY, lw=0.5, ls=":")
-            if ax is axes[0, 1]:
-                ax.annotate(str(i + 1), (start, 1.0), xycoords=("data", "axes fraction"), va="bottom", fontsize=8)
+        draw_starts(ax, starts[:-1], numbered=ax is axes[0, 1])
     ax = axes[2, 1]
     if any(own for _, own in plan.questions):
         draw_separations(ax, plan, "flight")
@@ -416,6 +425,14 @@ def _draw(plan: Plan, path: Path) -> None:
     else:
         ax.set_axis_off()
     fig.savefig(path, format="png")
+
+
+def draw_starts(ax, starts_s: np.ndarray, numbered: bool) -> None:
+    """Draw where each piece begins, with its number where they are `numbered`."""
+    for i, start in enumerate(starts_s):
+        ax.axvline(start, color=GREY, lw=0.5, ls=":")
+        if numbered:
+            ax.annotate(str(i + 1), (start, 1.0), xycoords=("data", "axes fraction"), va="bottom", fontsize=8)
 
 
 def draw_separations(ax, plan: Plan, kind: str) -> None:

@@ -157,6 +157,13 @@ def test_commands_lead_the_rotors_by_their_lag() -> None:
     assert (lead[inner] * slope[inner]).sum() / (slope[inner] ** 2).sum() == pytest.approx(0.05, rel=0.1)
 
 
+def test_commands_are_those_of_the_chain_that_makes_the_thrust_felt() -> None:
+    """Where no speed is recorded rotors turn so many times as fast as the chain has it."""
+    motion = fly(CompetingModel(VEHICLE), joined([piece("shake height to 1 Hz")], 0.01), 9.0, LIMITS.middle_m).motion
+    asked = commands(CompetingModel(VEHICLE, scale=0.8), motion)
+    np.testing.assert_allclose(0.8 * asked, motion.rotor_speed)
+
+
 def test_rotors_that_would_turn_backwards_are_refused() -> None:
     t = np.arange(0, 4, 0.01)
     falls = np.zeros((len(t), 3))

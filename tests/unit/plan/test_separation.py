@@ -8,8 +8,10 @@ import pytest
 
 from rotorid.mismatch.evidence.regression import bounded, build
 from rotorid.mismatch.evidence.rows import Rows, Term
+from rotorid.mismatch.evidence.speedpath import CommandChain
 from rotorid.plan.questions import Hypothesis, Question
-from rotorid.plan.separation import Information, drawn, log_odds, separations, squares_left, within
+from rotorid.plan.separation import Information, drawn, log_odds, separations, squares_left, within, world_of
+from rotorid.recordings import templates
 
 RATE = 40.0
 THETA = 0.3
@@ -55,6 +57,19 @@ def size_of(reg, theta: float = THETA) -> float:
     forms = (["mass", "b/form"], ["mass", "b/other"])
     gram, own = reg.gram.sum(axis=0), np.array([[theta]])
     return min(float(squares_left(reg, gram, ["a/form"], others, own)[0]) for others in forms)
+
+
+def test_a_model_flies_by_the_chain_that_was_fitted() -> None:
+    chain = CommandChain(SimpleNamespace(fit=SimpleNamespace(chain=())), 2000.0, 12.0, 0.8)
+    known = SimpleNamespace(
+        model=SimpleNamespace(selection=SimpleNamespace(active=()), wind=None),
+        regression=SimpleNamespace(terms=()),
+        prepared=SimpleNamespace(vehicle=templates.read("thesis"), segments=()),
+        fitted=SimpleNamespace(chain=chain),
+        derivatives=(),
+    )
+    world = world_of(known)
+    assert (world.full_speed_rad_s, world.full_voltage_v, world.scale) == (2000.0, 12.0, 0.8)
 
 
 @pytest.mark.parametrize("trust", [10.0, 0.05, 0.001])

@@ -12,9 +12,9 @@ from rotorid.plan import session
 from rotorid.plan.candidates import SessionLimits
 from rotorid.plan.plan import Plan
 from rotorid.plan.questions import Hypothesis, Question
+from rotorid.plan.separation import asked_terms
 from rotorid.plan.session import (
     REST_S,
-    asked,
     courses,
     known_instrument,
     of_step,
@@ -85,7 +85,7 @@ def test_what_the_engine_finds_is_found_again(known) -> None:
 def test_a_longer_hold_tells_more_of_creep_than_quick_steps(known) -> None:
     steps = {s.name: s for s in options(known, LIMITS)}
     (key,) = known.model.selection.active
-    terms = asked(known)
+    terms = asked_terms(known)
     at = known.regression.columns([key])
 
     def told(name: str) -> float:

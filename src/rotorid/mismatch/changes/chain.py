@@ -13,10 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotorid.effects.contract import DELAY, LIMIT, Parameter
-from rotorid.mismatch.changes.problem import change_of, held, weighed_changes
+from rotorid.mismatch.changes.problem import PRIOR, change_of, held, weighed_changes
 from rotorid.mismatch.decide.posterior import Found
-from rotorid.mismatch.decide.problem import Prior
-from rotorid.mismatch.evidence.gram import Evidence, LinearParameter, evidence_from
+from rotorid.mismatch.evidence.gram import Evidence, EvidenceTerm, LinearParameter, evidence_from
 from rotorid.mismatch.evidence.motion import Segment
 from rotorid.mismatch.evidence.regression import autoregression, build
 from rotorid.mismatch.evidence.rows import Rows, Term
@@ -56,6 +55,12 @@ class ChainTerms:
         ]
 
     @property
+    def places(self) -> dict[str, slice]:
+        """Key of each form's term to where its parameters stand in `values`."""
+        ends = np.cumsum([0, *(t.size for t in self.terms)])
+        return {t.key: slice(a, b) for t, a, b in zip(self.terms, ends, ends[1:], strict=False)}
+
+    @property
     def spread(self) -> np.ndarray:
         """One-sigma (P,) of each parameter between two flights in which nothing changed, in its unit."""
         # One-sigma between two flights in which nothing changed: of a time constant relative to itself, and of a number
@@ -85,17 +90,15 @@ class ChainTerms:
     def starts(self) -> list[tuple[str, ChainTerms]]:
         """Chains to start from, each with the key of the form whose time constants are longer or shorter than here."""
         start_s = 0.025  # By how much longer or shorter time constants are from which a change is sought, too.
-        out, at = [("", self)], 0
-        for term in self.terms:
-            own = np.arange(at, at + term.size)
-            times = [i for i in own if self.parameters[i].unit == "s"]
-            at += term.size
+        out = [("", self)]
+        for key, own in self.places.items():
+            times = [i for i in range(own.start, own.stop) if self.parameters[i].unit == "s"]
             for away in (start_s, -start_s) if times else ():
                 values = self.values.copy()
                 values[times] += away
                 moved = self.at(values)
                 if not np.array_equal(moved.values, self.values):
-                    out.append((term.key, moved))
+                    out.append((key, moved))
         return out
 
     def stepped(self) -> list[ChainTerms]:
@@ -104,23 +107,21 @@ class ChainTerms:
 
     def named(self, evidence: Evidence, first: ChainTerms) -> Evidence:
         """Evidence whose terms know the parameters' symbols, as changes from those of the first set."""
-        at, known = 0, {}
-        for term, (_, form) in zip(self.terms, self.chain, strict=True):
-            values = first.values[at : at + term.size]
-            known[term.key] = (
-                form.name,
-                tuple(
-                    LinearParameter(p.symbol, p.unit, p.low - v, p.high - v, p.negligible)
-                    for p, v in zip(form.parameters, values, strict=True)
-                ),
+        places = self.places
+
+        def named(term: EvidenceTerm) -> EvidenceTerm:
+            if term.key not in places:
+                return term
+            own = places[term.key]
+            linear = (
+                LinearParameter(p.symbol, p.unit, p.low - v, p.high - v, p.negligible)
+                for p, v in zip(self.parameters[own], first.values[own], strict=True)
             )
-            at += term.size
-        named = (
-            replace(t, form=known[t.key][0], linear=known[t.key][1], of_change=True) if t.key in known else t
-            for t in evidence.terms
-        )
+            form = term.key.removeprefix(f"{term.effect}/")
+            return replace(term, form=form, linear=tuple(linear), of_change=True)
+
         offsets = {t.key for t in evidence.terms if t.key.startswith(_OF_ROTORS)}
-        return held(replace(evidence, terms=tuple(named)), offsets)
+        return held(replace(evidence, terms=tuple(named(t) for t in evidence.terms)), offsets)
 
 
 def chain_terms(found: Fitted, segments: Sequence[Segment]) -> ChainTerms | None:
@@ -144,12 +145,6 @@ def turning(found: Fitted, chain: ChainTerms) -> Fitted:
     result = found.chain.result
     fit = replace(result.fit, chain=chain.chain, values=chain.values)
     return replace(found, chain=found.chain._replace(result=replace(result, fit=fit)))
-
-
-def _change_of_chain(found: Found, chain: ChainTerms) -> np.ndarray:
-    """By how much the chain's parameters (P,) changed in a model, 0 of those that did not."""
-    change = change_of(found) * found.problem.unit
-    return np.concatenate([change[found.problem.columns_of[t.key]] for t in chain.terms])
 
 
 def chain_columns(
@@ -195,14 +190,13 @@ def speed_filters(rows: list[Rows]) -> dict[int, np.ndarray]:
 
 def squares_of_speeds(rows: list[Rows], segments: Sequence[Segment], chain: ChainTerms) -> dict[str, np.ndarray]:
     """To the key of each form what its columns amount to (k, k), as mean squares of shares of the thrust."""
-    out, at, count = {}, 0, sum(len(r.y) for r in rows)
-    for term in chain.terms:
-        own = [
-            2.0 * r.x[:, :, at : at + term.size] / np.maximum(s.motion.rotor_speed, 1.0)[:, :, None]
+    out, count = {}, sum(len(r.y) for r in rows)
+    for key, own in chain.places.items():
+        shares = [
+            2.0 * r.x[:, :, own] / np.maximum(s.motion.rotor_speed, 1.0)[:, :, None]
             for r, s in zip(rows, segments, strict=True)
         ]
-        out[term.key] = sum(np.einsum("nci,ncj->ij", x, x) / x.shape[1] for x in own) / count
-        at += term.size
+        out[key] = sum(np.einsum("nci,ncj->ij", x, x) / x.shape[1] for x in shares) / count
     return out
 
 
@@ -218,49 +212,6 @@ class ChainOption:
 
 _Products = Callable[[ChainTerms | None], tuple[Evidence, Evidence]]
 """Evidence of both sets with the second one's columns taken at a chain."""
-_BaseAt = Callable[[ChainTerms], Evidence]
-"""Evidence of the first set with its columns taken at another chain than its own."""
-
-
-def _option_of(
-    first: ChainTerms,
-    start: ChainTerms,
-    products_at: _Products,
-    spread: np.ndarray,
-    prior: Prior,
-    same: Collection[str] = (),
-) -> ChainOption:
-    """The most probable changes with the columns of the chain taken anew at what was found (Gauss and Newton).
-
-    Parameters
-    ----------
-    first, start
-        The first set's chain, and the one at which the columns are taken first.
-    products_at
-        Evidence of both sets.
-    spread
-        One-sigma (K,) of each coefficient between flights in which nothing changed.
-    same
-        Keys of the chain's forms that did not change, by assumption.
-    """
-    chain_rounds = 4  # Times that the chain's columns are taken, at most.
-    now = start
-    for _ in range(chain_rounds):
-        option = _decided_at(now, products_at, spread, prior, same)
-        chain = first.at(first.values + _change_of_chain(option.found, first))
-        if np.all(np.abs(chain.values - now.values) < first.spread):
-            break
-        now = chain
-    return option
-
-
-def _decided_at(
-    chain: ChainTerms | None, products_at: _Products, spread: np.ndarray, prior: Prior, same: Collection[str] = ()
-) -> ChainOption:
-    """The most probable changes with the columns taken at a chain."""
-    base, new = products_at(chain)
-    found, log_posterior = weighed_changes(base, held(new, same), spread, prior)
-    return ChainOption(found, chain, log_posterior)
 
 
 def remembering(products_at: _Products) -> _Products:
@@ -277,38 +228,61 @@ def remembering(products_at: _Products) -> _Products:
 
 
 def options_of(
-    first: ChainTerms | None, products_at: _Products, spread: np.ndarray, prior: Prior, base_at: _BaseAt | None = None
+    first: ChainTerms | None,
+    products_at: _Products,
+    spread: np.ndarray,
+    base_at: Callable[[ChainTerms], Evidence],
 ) -> list[ChainOption]:
     """The most probable changes, and those without each form of the chain that changed in them; the best first.
 
     `first` is None where the chain's columns are not among those compared. Each is sought from several chains: a delay
     of some samples is not seen from where there is none, nor from where a lag in its place has led to. Where another
     chain is found the first set is looked at with it, too (`base_at`): what suits both sets better is no change.
+    `spread` (K,) is the one-sigma of each coefficient between flights in which nothing changed.
     """
-    if first is None:
-        return [_decided_at(None, products_at, spread, prior)]
 
-    def best(same: frozenset[str] = frozenset()) -> ChainOption:
-        starts = [chain for key, chain in first.starts() if key not in same]
-        tried = (_option_of(first, start, products_at, spread, prior, same) for start in starts)
+    def decided_at(chain: ChainTerms | None, same: Collection[str] = ()) -> ChainOption:
+        """The most probable changes with the columns taken at a chain; the forms `same` did not change."""
+        base, new = products_at(chain)
+        found, log_posterior = weighed_changes(base, held(new, same), spread)
+        return ChainOption(found, chain, log_posterior)
+
+    if first is None:
+        return [decided_at(None)]
+
+    def from_start(now: ChainTerms, same: Collection[str]) -> ChainOption:
+        """The same with the columns of the chain taken anew at what was found (Gauss and Newton)."""
+        chain_rounds = 4  # Times that the chain's columns are taken, at most.
+        for _ in range(chain_rounds):
+            option = decided_at(now, same)
+            problem, change = option.found.problem, change_of(option.found) * option.found.problem.unit
+            away = np.concatenate([change[problem.columns_of[t.key]] for t in first.terms])
+            chain = first.at(first.values + away)
+            if np.all(np.abs(chain.values - now.values) < first.spread):
+                break
+            now = chain
+        return option
+
+    def best(same: Collection[str] = ()) -> ChainOption:
+        tried = (from_start(start, same) for key, start in first.starts() if key not in same)
         return max(tried, key=lambda o: o.log_posterior)
 
     plain = best()
-    others = [best(frozenset({t.key})) for t in first.terms if t.key in plain.found.model]
-    if base_at is not None and not np.array_equal(plain.chain.values, first.values):
+    others = [best((t.key,)) for t in first.terms if t.key in plain.found.model]
+    if not np.array_equal(plain.chain.values, first.values):
         base, moved, new = products_at(first)[0], base_at(plain.chain), products_at(plain.chain)[1]
-        found, log_posterior = weighed_changes(moved, new, spread, prior)
+        found, log_posterior = weighed_changes(moved, new, spread)
         gained = 0.5 * float(base.square.sum() - moved.square.sum())
         others.append(ChainOption(found, plain.chain, log_posterior + gained))
     return sorted([plain, *others], key=lambda o: -o.log_posterior)
 
 
-def others_in_place(options: Sequence[ChainOption], effect: str, prior: Prior) -> frozenset[str]:
+def others_in_place(options: Sequence[ChainOption], effect: str) -> frozenset[str]:
     """Ids that changed, in place of `effect`, in an option nearly as probable as the best one."""
 
     def ids(option: ChainOption) -> set[str]:
         return {option.found.problem.terms[key].effect for key in option.found.model}
 
     best = options[0]
-    near = [ids(o) for o in options[1:] if best.log_posterior - o.log_posterior < prior.open_nats]
+    near = [ids(o) for o in options[1:] if best.log_posterior - o.log_posterior < PRIOR.open_nats]
     return frozenset().union(*(own - ids(best) for own in near if effect not in own))

@@ -31,11 +31,10 @@ from rotorid.mismatch.changes.joint import (
     Effects,
     FittedReference,
     Joint,
-    evidence_at,
     joined_at,
     joints_of,
     moved_by,
-    on_terms,
+    on_columns,
     reference_of,
 )
 from rotorid.mismatch.changes.level_one import CAUSES, LevelOne, of_one_vehicle, seen_by
@@ -47,6 +46,7 @@ from rotorid.mismatch.changes.of_instruments import (
 from rotorid.mismatch.changes.problem import (
     MOST_CHANGE,
     NAMES,
+    PRIOR,
     change_of,
     feigned,
     form_spread,
@@ -56,7 +56,6 @@ from rotorid.mismatch.changes.problem import (
 )
 from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.decide.posterior import Found, scored
-from rotorid.mismatch.decide.problem import Prior
 from rotorid.mismatch.decide.selected import relative_change
 from rotorid.mismatch.decide.statements import (
     FORM_SD,
@@ -71,10 +70,9 @@ from rotorid.mismatch.decide.status import CLAIMED, Estimate, Status
 from rotorid.mismatch.decide.words import (
     capital,
     channel_words,
-    effect_words,
     listed,
+    name_words,
     number,
-    parameter_words,
     regime_words,
 )
 from rotorid.mismatch.evidence.comparison import CHANNELS_OF_WRENCH
@@ -158,21 +156,18 @@ class Changes:
 def changes_between(
     base: RecordingSet,
     new: RecordingSet,
-    prior: Prior = Prior(),  # noqa: B008
     seen: LevelOne | None = None,
 ) -> Changes:
     """What changed from the first set of flights to the second; `seen` as in `changes_from`."""
     base, new = of_one_vehicle((base, new))
-    if base.vehicle.kind == "flight":
-        return changes_from(reference_of(base), new, prior, seen or seen_by(base, new))
-    return changes_from(instrument_reference_of(base), new, prior)
+    reference = reference_of(base) if base.vehicle.kind == "flight" else instrument_reference_of(base)
+    return changes_from(reference, new, seen)
 
 
 @one_thread()
 def changes_from(
     reference: FittedReference | InstrumentReference,
     new: RecordingSet,
-    prior: Prior = Prior(),  # noqa: B008
     seen: LevelOne | None = None,
 ) -> Changes:
     """What changed from the flights of a reference to another set of flights; `seen` is what differs without a cause.
@@ -187,17 +182,18 @@ def changes_from(
             f"{new.name}/vehicle.yaml: kind is {new.vehicle.kind}, expected {base.vehicle.kind} as in {base.name}"
         )
     if isinstance(reference, FittedReference):
-        joint, options = _most_alike(reference, new, prior)
+        joint, options = _most_alike(reference, new)
         stretches = reference.recorded, _stretches_of_commands(reference, joint)
-        found, of_speeds = options[0].found, decided_of_speeds(reference.found, reference.chain, stretches, prior)
-        stated, notes = changes_in(options, prior), command_notes(*stretches, base.name, new.name)
+        found, of_speeds = options[0].found, decided_of_speeds(reference.found, reference.chain, stretches)
+        stated, notes = changes_in(options), command_notes(*stretches, base.name, new.name)
     else:
         joint, of_speeds = joint_of_instruments(reference, new), None
-        found = joint.decide(joint.base, joint.new, _yardstick(joint, reference.runs, prior), prior)
+        # A bench's runs load different axes: none can be compared with the others.
+        found = joint.decide(joint.base, joint.new, _yardstick(joint, ()))
         stated, notes = statements_of(found, of_change=True), ()
     limits = limits_of(found, joint.squares)
     if of_speeds:
-        stated = (*stated, *changes_in(of_speeds[0], prior))
+        stated = (*stated, *changes_in(of_speeds[0]))
         limits = (*limits, *limits_of(of_speeds[0][0].found, of_speeds[1]))
     vehicles = base.vehicle, new.vehicle
     changes = [
@@ -220,8 +216,9 @@ def changes_from(
         values=_values_of(found, *vehicles),
         residuals=(_residuals_of(reference.rows), _residuals_of(joint.rows_of_new)),
         notes=(
-            *_refused_notes([c.alternatives or (c.id,) for c in refused]),
-            *_notes_of(joint, base.name, new.name),
+            *_refused_notes(refused),
+            *_residual_notes(joint, base.name, new.name),
+            *regime_notes(joint.flown_by_base, joint.flown_by_new, base.name, new.name),
             *notes,
             *(f"{own.name}: {text}" for own in (base, new) for text in dict.fromkeys(own.left_out)),
         ),
@@ -231,30 +228,30 @@ def changes_from(
     )
 
 
-def _most_alike(reference: FittedReference, new: RecordingSet, prior: Prior) -> tuple[Joint, list[ChainOption]]:
+def _most_alike(reference: FittedReference, new: RecordingSet) -> tuple[Joint, list[ChainOption]]:
     """Two sets of flights and what changed, the second set corrected for its mistakes or as recorded.
 
     A mistake is one change more: corrected for it the two sets must be alike by more than it costs, less what columns
     that contradict each other say for it by themselves. So must they be with a payload that swings in the second set.
     What changed is then known well enough to predict the accelerations in the columns with it.
     """
-    both = [(joint, _flight_options(reference, joint, prior)) for joint in joints_of(reference, new)]
-    joint, options = max(both, key=lambda b: b[1][0].log_posterior - price_of(b[0].mistakes_of_new, prior))
+    both = [(joint, _flight_options(reference, joint)) for joint in joints_of(reference, new)]
+    joint, options = max(both, key=lambda b: b[1][0].log_posterior - price_of(b[0].mistakes_of_new))
     if (swinging := _carrying(reference, joint)) is not None:
         other, with_it, nats = swinging
-        own = _flight_options(other, with_it, prior)
+        own = _flight_options(other, with_it)
         if own[0].log_posterior - nats > options[0].log_posterior:
             reference, joint, options = other, with_it, own
     if changed := _changed_effects(reference, options[0].found):
         joint = moved_by(reference, joint, changed)
-        options = _flight_options(reference, joint, prior)
+        options = _flight_options(reference, joint)
     return joint, options
 
 
-def price_of(mistakes: Sequence[Finding], prior: Prior) -> float:
+def price_of(mistakes: Sequence[Finding]) -> float:
     """What mistakes in recordings cost, nats, less what their own columns say for them."""
     contradictions = ids_of("contradiction")
-    return prior.effect_nats * len(mistakes) - _CONTRADICTION_NATS * sum(m.id in contradictions for m in mistakes)
+    return PRIOR.effect_nats * len(mistakes) - _CONTRADICTION_NATS * sum(m.id in contradictions for m in mistakes)
 
 
 def _changed_effects(reference: FittedReference, found: Found) -> Effects:
@@ -270,7 +267,7 @@ def _changed_effects(reference: FittedReference, found: Found) -> Effects:
 
 
 @step("what changed")
-def _flight_options(reference: FittedReference, joint: Joint, prior: Prior) -> list[ChainOption]:
+def _flight_options(reference: FittedReference, joint: Joint) -> list[ChainOption]:
     """The most probable changes of force, moment and sensors, and where the chain changed those without; best first."""
     first = reference.chain if reference.found.commanded else None
 
@@ -281,32 +278,31 @@ def _flight_options(reference: FittedReference, joint: Joint, prior: Prior) -> l
         at = joined_at(reference, joint.recordings, joint.recorded, chain, joint.mistakes_of_new, joint.own_effects)
         return at.base, at.new
 
-    spread, base_at = _yardstick(joint, reference.runs, prior), partial(evidence_at, reference)
-    options = options_of(first, products_at, spread, prior, base_at)
+    def base_at(chain: ChainTerms) -> Evidence:
+        return on_columns(reference, reference.terms, chain).evidence
+
+    spread = _yardstick(joint, reference.runs)
+    options = options_of(first, products_at, spread, base_at)
     found = options[0].found
     if first is not None and found.model:
         own = slice(-len(first.values), None)
         loop = feigned(*products_at(options[0].chain), joint.inertia)
         spread[own] = np.hypot(spread[own], loop[own])
-        options = options_of(first, products_at, spread, prior, base_at)
+        options = options_of(first, products_at, spread, base_at)
         found = options[0].found
     if len(found.model) > 1:
         # What changed is known by its form, too, and what its form is wrong by is no second change.
         change = change_of(found) * found.problem.unit
         spread = np.hypot(spread, form_spread(joint.new, change, joint.form_sd))
-        options = options_of(first, products_at, spread, prior, base_at)
+        options = options_of(first, products_at, spread, base_at)
     return options
 
 
-def _yardstick(joint: Joint, runs: Sequence[Evidence], prior: Prior) -> np.ndarray:
+def _yardstick(joint: Joint, runs: Sequence[Evidence]) -> np.ndarray:
     """One-sigma (K,) by which each coefficient differs where nothing changed; `runs` are those of the first set."""
     usual = usual_spread(joint.base, joint.new, joint.known, joint.inertia, joint.form_sd)
     usual = np.hypot(usual, joint.more_usual)
-
-    def decide(flights: Evidence, other: Evidence) -> Found:
-        return joint.decide(flights, other, usual, prior)
-
-    return np.hypot(usual, spread_of_flights(runs, decide))
+    return np.hypot(usual, spread_of_flights(runs, partial(joint.decide, spread=usual)))
 
 
 def _stretches_of_commands(reference: FittedReference, joint: Joint) -> Sequence[Segment]:
@@ -331,7 +327,7 @@ def most_like(found: Fitted, chain: ChainTerms, variants: Sequence[Sequence[Segm
 
 @step("what changed between command and speed")
 def decided_of_speeds(
-    found: Fitted, first: ChainTerms | None, both: tuple[Sequence[Segment], Sequence[Segment]], prior: Prior
+    found: Fitted, first: ChainTerms | None, both: tuple[Sequence[Segment], Sequence[Segment]]
 ) -> tuple[list[ChainOption], Mapping[str, np.ndarray]] | None:
     """The changes between command and measured rotor speed, and what the columns amount to; None without both.
 
@@ -353,16 +349,16 @@ def decided_of_speeds(
         def base_at(chain: ChainTerms, filters=filters) -> Evidence:
             return speed_evidence(speed_rows(both[0], found, chain, first), filters, chain, first)
 
-        options = options_of(first, products_at, first.spread, prior, base_at)
+        options = options_of(first, products_at, first.spread, base_at)
         now = options[0].chain
     return options, squares_of_speeds(speed_rows(both[1], found, now, first), both[1], now)
 
 
-def changes_in(options: Sequence[ChainOption], prior: Prior) -> tuple[Statement, ...]:
+def changes_in(options: Sequence[ChainOption]) -> tuple[Statement, ...]:
     """What is stated of the best option; a part of the chain in whose place another would do is one of a class."""
     out = []
     for stated in statements_of(options[0].found, of_change=True, form_sd=FORM_SD):
-        others = others_in_place(options, stated.id, prior)
+        others = others_in_place(options, stated.id)
         if others and stated.status in CLAIMED:
             members = tuple(sorted({stated.id, *stated.alternatives, *others}))
             stated = replace(stated, status="ambiguous", alternatives=members)
@@ -535,18 +531,12 @@ def _carrying(reference: FittedReference, joint: Joint) -> tuple[FittedReference
     # One term of each form: the others keep the lengths that they have.
     first = {t.form.name: t.key for t in reversed(swings)}
     terms = [on_cable(t, cable) if t in swings and first[t.form.name] == t.key else t for t in reference.terms]
-    other = on_terms(reference, terms)
-    recorded = [hanging(s, h.motion.hung) for s, h in zip(joint.recorded, hung, strict=True)]
-    own = (as_effect(swings[0], cable, mass_kg),)
-    both = joined_at(other, joint.recordings, recorded, other.chain, joint.mistakes_of_new, own)
+    other = on_columns(reference, terms, reference.chain)
+    recorded = tuple(hanging(s, h.motion.hung) for s, h in zip(joint.recorded, hung, strict=True))
+    both = moved_by(other, replace(joint, recorded=recorded), [as_effect(swings[0], cable, mass_kg)])
     keys = {t.key for t in swings}
     alone = tuple(replace(t, alone=t.key in keys) for t in both.new.terms)
-    return other, replace(both, new=replace(both.new, terms=alone), uncorrected=joint.uncorrected), 0.5 * price(hung)
-
-
-def _notes_of(joint: Joint, base: str, new: str) -> tuple[str, ...]:
-    """Notes on a comparison, in sentences."""
-    return (*_residual_notes(joint, base, new), *regime_notes(joint.flown_by_base, joint.flown_by_new, base, new))
+    return other, replace(both, new=replace(both.new, terms=alone)), 0.5 * price(hung)
 
 
 def command_notes(reference: Sequence[Segment], recorded: Sequence[Segment], base: str, new: str) -> tuple[str, ...]:
@@ -590,16 +580,10 @@ def regime_notes(first: Mapping[str, float], second: Mapping[str, float], base: 
     ]
 
 
-def _refused_notes(ids: Sequence[Sequence[str]]) -> list[str]:
-    """That a name was not stated because it contradicts what differs; `ids` holds the class of each."""
+def _refused_notes(refused: Sequence[Change]) -> list[str]:
+    """That a name was not stated because it contradicts what differs."""
     return [
-        f"{capital(listed([_effect_or_value(i) for i in own], 'or'))} "
-        "would explain the motion, but would change trims, "
-        "shares or thrust by other amounts than they differ by: not stated."
-        for own in ids
+        f"{capital(listed([name_words(i) for i in c.alternatives or (c.id,)], 'or'))} would explain the motion, but "
+        "would change trims, shares or thrust by other amounts than they differ by: not stated."
+        for c in refused
     ]
-
-
-def _effect_or_value(name: str) -> str:
-    """An effect, or a value by its contract name, in words."""
-    return f"the {parameter_words(name)[0]}" if name in NAMES.values() else effect_words(name)

@@ -6,7 +6,7 @@ between them. The chain from command to rotor speed is the first set's, too, wit
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,16 +14,10 @@ import numpy as np
 from rotorid.effects.contract import Form
 from rotorid.effects.scale import hover_inflow_m_s
 from rotorid.errors import InputError
-from rotorid.mismatch.changes.chain import (
-    ChainTerms,
-    chain_columns,
-    chain_terms,
-    turning,
-)
+from rotorid.mismatch.changes.chain import ChainTerms, chain_columns, chain_terms, turning
 from rotorid.mismatch.changes.problem import decide_changes, of_environments
 from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.decide.posterior import Found
-from rotorid.mismatch.decide.problem import Prior
 from rotorid.mismatch.decide.statements import FORM_SD
 from rotorid.mismatch.evidence.gram import Evidence, EvidenceTerm, evidence_from
 from rotorid.mismatch.evidence.motion import Segment, regime_variables
@@ -34,6 +28,7 @@ from rotorid.mismatch.flight.fitted import Fitted, fitted
 from rotorid.mismatch.flight.prepare import assemble_rows, prepare, prepare_like, value_terms
 from rotorid.mismatch.flight.report_runs import as_flown, comparable
 from rotorid.mismatch.flight.wrench import WrenchModel, block_seconds, chosen, model_filters
+from rotorid.mismatch.instrument.model import ReadingModel
 from rotorid.mismatch.mistakes import find_mistakes, in_its_units
 from rotorid.recordings import RecordingSet, Vehicle
 from rotorid.steps import step
@@ -85,7 +80,7 @@ class Joint:
     """(K,) one-sigma of each coefficient between sets in which nothing changed, beyond `usual_spread`."""
     form_sd: float = FORM_SD
     """Share of what effects contribute that their forms are wrong by."""
-    decide: Callable[[Evidence, Evidence, np.ndarray, Prior], Found] = decide_changes
+    decide: Callable[[Evidence, Evidence, np.ndarray], Found] = decide_changes
     """The most probable changes from one set's evidence to another's, given the usual spread (K,)."""
 
 
@@ -101,7 +96,6 @@ class FittedReference:
     """From command to rotor speed; None where no commands are recorded."""
     terms: tuple[Term, ...]
     """Of force, moment and sensors, and where rotor speeds are known from commands alone of the chain."""
-    segments: tuple[Segment, ...]
     rows: tuple[Rows, ...]
     block_s: float
     """Length of a block of rows in both sets."""
@@ -123,11 +117,11 @@ class FittedReference:
 
 
 @step("the first set")
-def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> FittedReference:
+def reference_of(base: RecordingSet) -> FittedReference:
     """The first set as a verdict fits it, all of its runs."""
     as_recorded = base
     base, mistakes, _ = find_mistakes(replace(base, held_out=()))
-    found = fitted(prepare(base, cutoff_hz))
+    found = fitted(prepare(base))
     model = found.model
     # What one set's commands cannot tell apart from their own scale changes all the same from set to set.
     values = value_terms(model.prepared.vehicle, model.prepared.groups)
@@ -137,7 +131,7 @@ def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> FittedReference
     chain = chain_terms(found, recorded)
     segments, rows = _rows_of(found, terms, chain, recorded)
     of_chain = chain.terms if found.commanded else []
-    known = np.append(_known_effects(model, terms), np.zeros(sum(t.size for t in of_chain)))
+    known = coefficients_on([*terms, *of_chain], model, model.selection.active)
     block_s = block_seconds(rows, model.prepared.thinner.rate_hz)
     usual = np.zeros(len(known))
     if of_chain:
@@ -145,45 +139,37 @@ def reference_of(base: RecordingSet, cutoff_hz: float = 20.0) -> FittedReference
     again = _rows_of(found, terms, chain, noisy)[1] if noisy else []
     alike = [len(r.y) for r in rows] == [len(r.y) for r in again]
     regression = _regression_of(rows, [*terms, *of_chain], model, block_s, again if alike else None)
-    noise = _noise_of_a_block(regression)
-    evidence, runs = _evidence_of(regression, noise, known, *((chain, chain) if of_chain else ()))
+    found_noise = evidence_from(regression)
+    noise = found_noise.bias_gram / found_noise.blocks.sum()
+    evidence = _evidence_of(regression, noise, known, *((chain, chain) if of_chain else ()))
     return FittedReference(
         recordings=base,
         as_recorded=as_recorded,
         found=found,
         chain=chain,
         terms=tuple(terms),
-        segments=tuple(segments),
         rows=tuple(rows),
         block_s=block_s,
         known=known,
         usual_of_chain=usual,
         noise=noise,
         evidence=evidence,
-        runs=runs,
+        runs=by_run(evidence, regression),
         flown=_how_far([regime_variables(s, model.prepared) for s in segments]),
         recorded=tuple(recorded),
         mistakes=mistakes,
     )
 
 
-def on_terms(reference: FittedReference, terms: Sequence[Term]) -> FittedReference:
-    """The first set with the nonlinear parameters of its columns at other values."""
-    found, chain = reference.found, reference.chain
-    _, rows = _rows_of(found, terms, chain, reference.recorded)
+def on_columns(reference: FittedReference, terms: Sequence[Term], chain: ChainTerms | None) -> FittedReference:
+    """The first set with its columns at other nonlinear parameters of `terms`, or at another chain than its own."""
+    found, first = reference.found, reference.chain
+    _, rows = _rows_of(found, terms, chain, reference.recorded, first)
     of_chain = chain.terms if found.commanded else []
     regression = _regression_of(rows, [*terms, *of_chain], found.model, reference.block_s)
-    chains = (chain, chain) if of_chain else ()
-    evidence, runs = _evidence_of(regression, reference.noise, reference.known, *chains)
+    evidence = _evidence_of(regression, reference.noise, reference.known, *((chain, first) if of_chain else ()))
+    runs = by_run(evidence, regression)
     return replace(reference, terms=tuple(terms), rows=tuple(rows), evidence=evidence, runs=runs)
-
-
-def evidence_at(reference: FittedReference, chain: ChainTerms) -> Evidence:
-    """Evidence of the first set, known by commands, with its columns taken at another chain than its own."""
-    found, first = reference.found, reference.chain
-    _, rows = _rows_of(found, reference.terms, chain, reference.recorded, first)
-    regression = _regression_of(rows, [*reference.terms, *chain.terms], found.model, reference.block_s)
-    return _evidence_of(regression, reference.noise, reference.known, chain, first)[0]
 
 
 def _evidence_of(
@@ -192,26 +178,14 @@ def _evidence_of(
     known: np.ndarray,
     chain: ChainTerms | None = None,
     first: ChainTerms | None = None,
-) -> tuple[Evidence, tuple[Evidence, ...]]:
-    """Evidence of the first set's rows, and the same run by run; `noise` and `known` as of Reference.
+) -> Evidence:
+    """Evidence of a set's rows; `noise` and `known` as of FittedReference.
 
     `chain` is the one at which columns are taken, `first` the first set's; None where it has no columns.
     """
-    evidence = _with_known_effects(_noisy_evidence(regression, noise), known)
-    evidence = evidence if chain is None else chain.named(evidence, first)
-    return evidence, by_run(evidence, regression)
-
-
-def _noise_of_a_block(regression: Regression) -> np.ndarray:
-    """What the sensors' noise adds to the products in a block, (C, K, K); nothing of rows without noisy ones."""
     evidence = evidence_from(regression)
-    return evidence.bias_gram / evidence.blocks.sum()
-
-
-def _noisy_evidence(regression: Regression, noise: np.ndarray) -> Evidence:
-    """Evidence with the `noise` (C, K, K) of a block in its products."""
-    evidence = evidence_from(regression)
-    return replace(evidence, bias_gram=noise * evidence.blocks.sum())
+    evidence = _with_known_effects(replace(evidence, bias_gram=noise * evidence.blocks.sum()), known)
+    return evidence if chain is None else chain.named(evidence, first)
 
 
 @step("the second set")
@@ -256,7 +230,9 @@ def joined_at(
     """Two sets on the same columns, those of the second taken at a chain of its own; `own_effects` as `_rows_of`."""
     found, model = reference.found, reference.found.model
     segments, rows = _rows_of(found, reference.terms, chain, recorded, reference.chain, new.vehicle, own_effects)
-    rows = _as_seen(rows, reference)
+    # A column says something only in channels where it does in the first set.
+    seen = np.any([np.any(r.x != 0.0, axis=0) for r in reference.rows], axis=0)
+    rows = [replace(r, x=r.x * seen) for r in rows]
     terms = [*reference.terms, *(chain.terms if found.commanded else [])]
     regimes = [(s.run, regime_variables(s, model.prepared)) for s in segments]
     slow = slower(regimes, model.prepared.vehicle, reference.block_s, reference.flown)
@@ -266,14 +242,14 @@ def joined_at(
             f"set {new.name}: all of it is more than {FARTHER} times as fast as {reference.recordings.name}; "
             "expected some flight at the same airspeeds in both"
         )
-    evidence = _with_known_effects(_noisy_evidence(of_new, reference.noise), reference.known)
-    evidence = within_bounds(evidence, reference)
-    inertia, inertia_of_base = (
-        _inertia_of(v, reference.evidence.channels) for v in (new.vehicle, reference.recordings.vehicle)
-    )
+    chains = (chain, reference.chain) if found.commanded else ()
+    evidence = _evidence_of(of_new, reference.noise, reference.known, *chains)
+    vehicles, channels = (new.vehicle, reference.recordings.vehicle), reference.evidence.channels
+    inertia, inertia_of_base = (_inertia_of(v, channels) for v in vehicles)
+    compared = [t for t in terms if t.kind in ("effect", "value")]
     return Joint(
         base=reference.evidence,
-        new=chain.named(evidence, reference.chain) if found.commanded else evidence,
+        new=within_bounds(evidence, reference),
         known=reference.known,
         more_usual=reference.usual_of_chain,
         inertia=inertia / inertia_of_base,
@@ -285,9 +261,7 @@ def joined_at(
         rows_of_new=tuple(rows),
         mistakes_of_new=mistakes,
         own_effects=own_effects,
-        squares=squares_of(
-            replace(model, rows=rows, regression=of_new), [t for t in terms if t.kind in ("effect", "value")]
-        ),
+        squares=squares_of(replace(model, rows=rows, regression=of_new), compared),
     )
 
 
@@ -334,7 +308,9 @@ def _rows_of(
         model.prepared, list(terms), segments, [*lasting_effects(model), *own_effects], for_comparison=True
     )
     columns = chain_columns(rows, recorded, found, chain) if found.commanded else None
-    rows = _against_own(rows, model, segments, vehicle)
+    if vehicle not in (None, model.prepared.vehicle):
+        own = assemble_rows(replace(model.prepared, vehicle=vehicle), [], segments)
+        rows = [replace(r, y=o.y) for r, o in zip(rows, own, strict=True)]
     if columns is not None:
         away = chain.values - (first or chain).values
         rows = [
@@ -397,11 +373,11 @@ def by_run(evidence: Evidence, regression: Regression) -> tuple[Evidence, ...]:
     return tuple(of_environments(evidence, runs == r) for r in dict.fromkeys(runs.tolist()))
 
 
-def _known_effects(model: WrenchModel, terms: Sequence[Term]) -> np.ndarray:
-    """Coefficients (K,) of the effects that the first set's model holds, on the columns of `terms`."""
-    known, fit, active = model.regression.start, model.selection.fit, model.selection.active
+def coefficients_on(terms: Sequence[Term], model: WrenchModel | ReadingModel, keys: Container[str]) -> np.ndarray:
+    """Coefficients (K,) of the terms `keys` in the first set's model, on the columns of `terms`; 0 of all others."""
+    start, fit = model.regression.start, model.selection.fit
     found = dict(zip(fit.columns.tolist(), fit.beta, strict=True))
-    columns = [(known[t.key] + i if t.key in active else None) for t in terms for i in range(t.size)]
+    columns = [(start[t.key] + i if t.key in keys else None) for t in terms for i in range(t.size)]
     return np.array([found.get(column, 0.0) for column in columns])
 
 
@@ -445,25 +421,11 @@ def within_bounds(evidence: Evidence, reference: FittedReference) -> Evidence:
     return replace(evidence, terms=tuple(bounded(t) for t in evidence.terms))
 
 
-def _against_own(rows: list[Rows], model: WrenchModel, segments: list[Segment], vehicle: Vehicle | None) -> list[Rows]:
-    """Rows with what a set's own vehicle leaves of every channel."""
-    if vehicle in (None, model.prepared.vehicle):
-        return rows
-    own = assemble_rows(replace(model.prepared, vehicle=vehicle), [], segments)
-    return [replace(r, y=o.y) for r, o in zip(rows, own, strict=True)]
-
-
 def _recorded_stretches(found: Fitted, recordings: RecordingSet) -> tuple[list[Segment], list[Segment]]:
     """Stretches of a set with all that the first set's model needs: as recorded, and with noise added once more."""
     both = prepare_like(replace(found.prepared, vehicle=recordings.vehicle), recordings)
     as_it_is, noisy = ([s for s in own if comparable(s, found.model.segments[0])] for own in both)
     return as_it_is, noisy
-
-
-def _as_seen(rows: list[Rows], reference: FittedReference) -> list[Rows]:
-    """Rows in which a column says something only in channels where it does in the first set."""
-    seen = np.any([np.any(r.x != 0.0, axis=0) for r in reference.rows], axis=0)
-    return [replace(r, x=r.x * seen) for r in rows]
 
 
 def _regression_of(
@@ -480,13 +442,4 @@ def _regression_of(
     counts (`regression.build`).
     """
     rate_hz = model.prepared.thinner.rate_hz
-    return build(
-        rows,
-        terms,
-        model_filters(model),
-        within,
-        block_s,
-        rate_hz,
-        noisy,
-        by_channel=True,
-    )
+    return build(rows, terms, model_filters(model), within, block_s, rate_hz, noisy, by_channel=True)

@@ -334,7 +334,7 @@ def differences_at(
 ) -> tuple[Difference, ...]:
     """What differs between the first `count` flights and the others, the rarest first; `numbers` are of all."""
     kinds = [q.kind for q in numbers]
-    total = sum(BUDGET[kind] for kind in set(kinds))
+    total = sum(BUDGET[kind] for kind in dict.fromkeys(kinds))
     out = [
         _difference(q, own, count, names, usual[q.kind], BUDGET[q.kind] / total / kinds.count(q.kind))
         for q, own in numbers.items()

@@ -17,20 +17,11 @@ import numpy as np
 from rotorid.effects.catalogue import catalogue
 from rotorid.effects.loading import AXES, CHANNELS, Loading
 from rotorid.errors import InputError
-from rotorid.mismatch.changes.joint import Joint, by_run
-from rotorid.mismatch.changes.problem import (
-    change_of,
-    difference_of,
-    joined,
-    joint,
-    leftover_of,
-    problem_of_changes,
-    settled,
-)
+from rotorid.mismatch.changes.joint import Joint, by_run, coefficients_on
+from rotorid.mismatch.changes.problem import PRIOR, change_of, joined, pair_of
 from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.decide.posterior import Found, Model, Posterior
-from rotorid.mismatch.decide.problem import Prior, Problem
-from rotorid.mismatch.evidence.gram import TINY, Evidence, evidence_from, spectrum_of, unit_of
+from rotorid.mismatch.evidence.gram import TINY, Evidence, evidence_from
 from rotorid.mismatch.evidence.regression import Regression, build, ridge_inverse
 from rotorid.mismatch.evidence.rows import Rows, Term
 from rotorid.mismatch.flight.absent import mean_squares
@@ -56,7 +47,7 @@ from rotorid.mismatch.instrument.setup import (
     set_up,
     with_unseen,
 )
-from rotorid.recordings import RecordingSet
+from rotorid.recordings import RecordingSet, Vehicle
 
 _WANDERS = {"zero": ("constant", "b_{own}"), "drift": ("linear in time", "b_{own}")}
 """To what differs from run to run (`Effect.differs_between_runs`) how the names of its forms begin, and its symbol."""
@@ -111,11 +102,6 @@ class InstrumentReference:
         """Rows of all stretches."""
         return self.own.rows
 
-    @property
-    def runs(self) -> tuple[Evidence, ...]:
-        """None: a bench's runs load different axes, and none can be compared with the others."""
-        return ()
-
 
 def instrument_reference_of(base: RecordingSet) -> InstrumentReference:
     """The first set of a stand or bench as a verdict fits it, all of its runs."""
@@ -123,7 +109,8 @@ def instrument_reference_of(base: RecordingSet) -> InstrumentReference:
     setup = set_up(base)
     model, chain, loadings = first_model(setup, make_terms(setup)[0])
     terms = _compared_terms(model.terms, setup)
-    own, known = _on_columns(_rows_like(model, terms, model.loadings), terms, model), _known_effects(model, terms)
+    own = _on_columns(model, terms, model.loadings)
+    known = coefficients_on(terms, model, model.regression.start)
     return InstrumentReference(
         recordings=base,
         model=model,
@@ -152,14 +139,12 @@ def joint_of_instruments(reference: InstrumentReference, new: RecordingSet) -> J
     setup = replace(model.setup, recordings=new, loadings=_loadings_of(reference, new))
     if not any(pieces_of(x, setup.average) for x in setup.loadings):
         raise InputError(f"set {new.name}: no stretch is long enough to be compared with {reference.recordings.name}")
-
-    def of_new(terms: Sequence[Term]) -> _OnColumns:
-        return _on_columns(_against_own(_rows_like(model, terms, setup.loadings), reference, setup, new), terms, model)
-
-    terms, base, second = list(reference.terms), reference.own, of_new(reference.terms)
+    terms, base = list(reference.terms), reference.own
+    second = _on_columns(model, terms, setup.loadings, new.vehicle)
     if more_terms := _refined_on(second, setup, reference):
         terms += more_terms
-        base, second = _on_columns(_rows_like(model, terms, model.loadings), terms, model), of_new(terms)
+        base = _on_columns(model, terms, model.loadings)
+        second = _on_columns(model, terms, setup.loadings, new.vehicle)
     count, more = (len(base.by_run), len(second.by_run)), _mounted_anew(terms, setup)
     both: Sequence[Sequence[Evidence]] = (base.by_run, second.by_run)
     if min(count) >= fewest_runs:
@@ -185,16 +170,21 @@ def joint_of_instruments(reference: InstrumentReference, new: RecordingSet) -> J
     )
 
 
-def _rows_like(model: ReadingModel, terms: Sequence[Term], loadings: Sequence[Loading]) -> list[Rows]:
-    """Rows of stretches with columns of `terms`, what is at work in the model moved by its clock."""
-    return rows_of(model.setup, list(terms), loadings, whole_reading(model.terms, model.selection.active))
+def _on_columns(
+    model: ReadingModel, terms: Sequence[Term], loadings: Sequence[Loading], vehicle: Vehicle | None = None
+) -> _OnColumns:
+    """What stretches hold on the columns of `terms`, whitened as the model's, with its products by channel.
 
-
-def _on_columns(rows: Sequence[Rows], terms: Sequence[Term], model: ReadingModel) -> _OnColumns:
-    """What some rows hold, whitened as the model's, with its products by channel."""
-    rate_hz = model.setup.rate_hz
+    What is at work in the model is moved by its clock. The rows of another set have what its own `vehicle` leaves of
+    every channel; the columns stay the first's.
+    """
+    setup, rate_hz = model.setup, model.setup.rate_hz
+    rows = rows_of(setup, list(terms), loadings, whole_reading(model.terms, model.selection.active))
+    if vehicle not in (None, setup.vehicle):
+        own = rows_of(setup, [], [loaded_by(x, vehicle) for x in loadings])
+        rows = [replace(r, y=o.y) for r, o in zip(rows, own, strict=True)]
     block_s = model.rows_per_block / rate_hz
-    regression = build(list(rows), list(terms), model.regression.filters, everything, block_s, rate_hz, by_channel=True)
+    regression = build(rows, list(terms), model.regression.filters, everything, block_s, rate_hz, by_channel=True)
     evidence = evidence_from(regression)
     return _OnColumns(tuple(rows), regression, evidence, by_run(evidence, regression))
 
@@ -207,7 +197,9 @@ def _refined_on(second: _OnColumns, setup: PreparedInstrument, reference: Instru
     """
     most_refined = 4  # Ids whose nonlinear parameters are refined on the second set, the most promising first.
     model, terms = reference.model, {t.key: t for t in reference.terms}
-    problem = _problem_without_leftover(reference.own.evidence, second.evidence)
+    # All that no change explains is white noise here.
+    pair = pair_of(reference.own.evidence, second.evidence, np.zeros(len(reference.known)))
+    problem = pair.problem(np.zeros(len(pair.new.channels)))
     posterior, best = Posterior(problem), {}
     for key, effect in problem.effects.items():
         if key in terms and terms[key].form is not None and terms[key].form.nonlinear:
@@ -234,16 +226,7 @@ def _refined_on(second: _OnColumns, setup: PreparedInstrument, reference: Instru
     return out
 
 
-def _problem_without_leftover(base: Evidence, new: Evidence) -> Problem:
-    """The problem of all changes between two sets where all that no change explains is white noise."""
-    unit = unit_of(base, new)
-    spectra = spectrum_of(base, unit), spectrum_of(new, unit)
-    return problem_of_changes(new, spectra, np.zeros(len(new.channels)), np.zeros(len(unit)), Prior())
-
-
-def _decide_instrument_changes(
-    base: Evidence, new: Evidence, spread: np.ndarray, prior: Prior, sizes: np.ndarray
-) -> Found:
+def _decide_instrument_changes(base: Evidence, new: Evidence, spread: np.ndarray, sizes: np.ndarray) -> Found:
     """The most probable changes between two sets on the same columns.
 
     As `problem.decide_changes`, but with one effect that takes time in place of several where it explains nearly as
@@ -253,17 +236,15 @@ def _decide_instrument_changes(
     # One-sigmas between days in which nothing changed that a change is believed to have at least: narrower, its
     # estimate would be drawn to nothing by as much as the two differ.
     wide = 20.0
-    prior = replace(prior, value_reach=wide, change_reach=0.0)
-    unit = unit_of(base, new)
-    spectra = spectrum_of(base, unit), spectrum_of(new, unit)
-    starts = [np.zeros(len(unit)), difference_of(spectra)]
-    white = Posterior(problem_of_changes(new, spectra, np.zeros(len(new.channels)), spread, prior))
+    plain = pair_of(base, new, spread, replace(PRIOR, value_reach=wide, change_reach=0.0))
+    starts, white = [np.zeros(len(plain.unit)), plain.difference()], plain.at((), np.zeros(len(new.channels)))
     if of_time := [k for k, effect in white.problem.effects.items() if _takes_time(effect)]:
-        best = max(of_time, key=lambda k: white((k,)))
-        starts.append(change_of(Found(white, (best,), white((best,)))))
-    best, *others = (settled(new, spectra, leftover_of(spectra, d), spread, prior, sizes) for d in starts)
+        best = max(of_time, key=lambda k: white.posterior((k,)))
+        starts.append(change_of(Found(white.posterior, (best,), white.posterior((best,)))))
+    pair = replace(plain, sizes=sizes)
+    best, *others = (pair.settled(pair.leftover(d)) for d in starts)
     for found in others:
-        if joint(spectra, found, spread) - joint(spectra, best, spread) > prior.leftover_nats:
+        if pair.joint(found) - pair.joint(best) > PRIOR.leftover_nats:
             best = found
     return _with_one_of_time(best)
 
@@ -340,27 +321,12 @@ def _compared_terms(terms: Sequence[Term], setup: PreparedInstrument) -> list[Te
 
     A stand's gain is as good as its last calibration; a verdict takes it as it is, and asks of the rotors alone.
     """
-    kept = [t for t in terms if t.form is None or not _of_single_runs(t, setup)]
+    endings = tuple(f"({run})" for run in setup.instrument.runs)
+    kept = [t for t in terms if t.form is None or not any(p.symbol.endswith(endings) for p in t.form.parameters)]
     there = {t.key for t in kept}
     loaded = [k for k in setup.instrument.loaded if k < 3]
     gains = ["gain", *(f"gain_{'xyz'[k]}" for k in loaded if len(loaded) > 1)]
     return [*(Term(key, "value", prior_sd=(1.0,)) for key in gains if key not in there), *kept]
-
-
-def _of_single_runs(term: Term, setup: PreparedInstrument) -> bool:
-    """Whether parameters of a form are those of single runs, named after them."""
-    return any(p.symbol.endswith(f"({run})") for p in term.form.parameters for run in setup.instrument.runs)
-
-
-def _known_effects(model: ReadingModel, terms: Sequence[Term]) -> np.ndarray:
-    """Coefficients (K,) of what is at work in the first set's model, and of its values, on the columns of `terms`."""
-    fit, keys = model.selection.fit, {t.key for t in model.regression.terms}
-    found = {c: b for c, b in zip(fit.columns, fit.beta, strict=True)}
-    out: list[float] = []
-    for term in terms:
-        own = model.regression.columns([term.key]) if term.key in keys else [-1] * term.size
-        out += [found.get(c, 0.0) for c in own]
-    return np.array(out)
 
 
 def _loadings_of(reference: InstrumentReference, new: RecordingSet) -> tuple[Loading, ...]:
@@ -368,16 +334,6 @@ def _loadings_of(reference: InstrumentReference, new: RecordingSet) -> tuple[Loa
     setup = replace(reference.model.setup, session=session_of(new))
     own = with_unseen(setup, replace(new, vehicle=setup.vehicle)).loadings[len(setup.loadings) :]
     return own if reference.chain is None else moved(replace(setup, loadings=own), reference.chain)
-
-
-def _against_own(
-    rows: list[Rows], reference: InstrumentReference, setup: PreparedInstrument, new: RecordingSet
-) -> list[Rows]:
-    """Rows of the second set with what its own vehicle.yaml leaves of every channel; the columns stay the first's."""
-    if new.vehicle == setup.vehicle:
-        return rows
-    own = rows_of(setup, [], [loaded_by(x, new.vehicle) for x in setup.loadings])
-    return [replace(r, y=o.y) for r, o in zip(rows, own, strict=True)]
 
 
 def _wander_of(terms: Sequence[Term], own: _OnColumns, known: np.ndarray, model: ReadingModel) -> Wander:

@@ -26,7 +26,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -50,6 +51,8 @@ from rotorid.mismatch.evidence.regression import NEVER_EXCITED
 from rotorid.mismatch.evidence.rows import PARAMETER_NAMES
 from rotorid.mismatch.instrument.model import VALUE_NAMES
 
+PRIOR = Prior()
+"""What is believed of changes before any recording."""
 _OF_THE_AIR = ("thrust", "torque")
 """Values that the air's density changes."""
 _DERIVED = "rotor_acceleration"
@@ -71,12 +74,12 @@ _HIDDEN_NATS = 1e4
 stated. Two such forms share what one alone should have where their columns have different noise."""
 
 
-def decide_changes(base: Evidence, new: Evidence, spread: np.ndarray, prior: Prior) -> Found:
+def decide_changes(base: Evidence, new: Evidence, spread: np.ndarray) -> Found:
     """The most probable changes between two sets on the same columns; as `weighed_changes`."""
-    return weighed_changes(base, new, spread, prior)[0]
+    return weighed_changes(base, new, spread)[0]
 
 
-def weighed_changes(base: Evidence, new: Evidence, spread: np.ndarray, prior: Prior) -> tuple[Found, float]:
+def weighed_changes(base: Evidence, new: Evidence, spread: np.ndarray) -> tuple[Found, float]:
     """The most probable changes between two sets on the same columns, and their log posterior.
 
     `spread` (K,) is the one-sigma of each coefficient between flights in which nothing changed, in its unit. The
@@ -87,18 +90,10 @@ def weighed_changes(base: Evidence, new: Evidence, spread: np.ndarray, prior: Pr
     as recorded or corrected for a mistake, with the columns of one chain or of another.
     """
     new, normalisation = at_own_noise(base, new)
-    unit = unit_of(base, new)
-    spectra = spectrum_of(base, unit), spectrum_of(new, unit)
-    nothing, all_of_it = np.zeros(len(unit)), difference_of(spectra)
-    large, small = (settled(new, spectra, leftover_of(spectra, d), spread, prior) for d in (nothing, all_of_it))
-    of_large, of_small = (joint(spectra, found, spread) for found in (large, small))
-    end = (small, of_small) if of_small - of_large > prior.leftover_nats else (large, of_large)
-
-    def at(model: Model, variance: np.ndarray) -> Found:
-        posterior = Posterior(problem_of_changes(new, spectra, variance, spread, prior))
-        return Found(posterior, model, posterior(model))
-
-    chosen, value = against_leftover(spectra, *end, spread, at)
+    pair = pair_of(base, new, spread)
+    large, small = (pair.settled(pair.leftover(d)) for d in (np.zeros(len(pair.unit)), pair.difference()))
+    end = small if pair.joint(small) - pair.joint(large) > PRIOR.leftover_nats else large
+    chosen, value = pair.against_leftover(end)
     return chosen, value - 0.5 * float(new.square.sum()) - normalisation
 
 
@@ -123,79 +118,184 @@ def held(new: Evidence, keys: Collection[str]) -> Evidence:
     return replace(new, terms=tuple(terms))
 
 
-def settled(
-    new: Evidence,
-    spectra: tuple[Spectrum, Spectrum],
-    variance: np.ndarray,
-    spread: np.ndarray,
-    prior: Prior,
-    sizes: np.ndarray | None = None,
-) -> Found:
-    """The most probable changes and their leftover, from a `variance` (C,) of the leftover.
+@dataclass(frozen=True)
+class Pair:
+    """Two sets on the same columns, to be weighed against each other."""
 
-    `sizes` (C, K, K) are products that the sizes of contributions are taken from where they are not those of `new`.
-    """
-    starts = [()]
-    for _ in range(_ROUNDS):
-        found = most_probable(problem_of_changes(new, spectra, variance, spread, prior, sizes), starts)
-        starts = [(), found.model]
-        before, variance = variance, leftover_of(spectra, change_of(found))
-        if np.array_equal(before, variance):
-            break
-    return found
+    new: Evidence
+    spectra: tuple[Spectrum, Spectrum]
+    """Of both sets, in the same units."""
+    spread: np.ndarray
+    """(K,) one-sigma of each coefficient between flights in which nothing changed, in its unit."""
+    prior: Prior = PRIOR
+    sizes: np.ndarray | None = None
+    """(C, K, K) products that the sizes of contributions are taken from where they are not those of `new`."""
+
+    @property
+    def unit(self) -> np.ndarray:
+        """Units (K,) of both spectra."""
+        return self.spectra[1].unit
+
+    @property
+    def usual(self) -> np.ndarray:
+        """`spread` (K,), scaled; 0 of a column that is never excited."""
+        return np.divide(self.spread, self.unit, out=np.zeros(len(self.unit)), where=self.unit > 0)
+
+    def weighed(self, variance: np.ndarray) -> tuple[Weighed, Weighed]:
+        """Products of both sets with a leftover of `variance` (C,) taken out."""
+        base, new = self.spectra
+        return base.weighed(variance), new.weighed(variance)
+
+    def at(self, model: Model, variance: np.ndarray) -> Found:
+        """The posterior at a model, with a leftover of `variance` (C,)."""
+        posterior = Posterior(self.problem(variance))
+        return Found(posterior, model, posterior(model))
+
+    def settled(self, variance: np.ndarray) -> Found:
+        """The most probable changes and their leftover, from a `variance` (C,) of the leftover."""
+        starts: list[Model] = [()]
+
+        def decide(variance: np.ndarray) -> Found:
+            found = most_probable(self.problem(variance), starts)
+            starts[1:] = [found.model]
+            return found
+
+        return self._rounds(variance, decide)[-1]
+
+    def _rounds(self, variance: np.ndarray, decide: Callable[[np.ndarray], Found]) -> list[Found]:
+        """What `decide` makes of a `variance` (C,) of the leftover, then of the one that it leaves, until it stays."""
+        found: list[Found] = []
+        for _ in range(_ROUNDS):
+            found.append(decide(variance))
+            before, variance = variance, self.leftover(change_of(found[-1]))
+            if np.array_equal(before, variance):
+                break
+        return found
+
+    def against_leftover(self, found: Found) -> tuple[Found, float]:
+        """The most probable changes where each is also compared with the leftover that would explain it.
+
+        A change makes the leftover smaller that is learnt next to it, and looks the surer for it. Without the change
+        the leftover is learnt anew. With few environments it may explain as much; then the change is left out. Given
+        back is the log posterior of changes and leftover together (`joint`), too.
+        """
+        value = self.joint(found)
+        others = []
+        for key in found.model:
+            ends = self._rounds(found.problem.variance, partial(self.at, without(found.model, key)))
+            values = [self.joint(end) for end in ends]
+            best = int(np.argmax(values))
+            others.append((ends[best], values[best]))
+        best, most = max(others, key=lambda other: other[1], default=(found, value))
+        if most > value:
+            return self.against_leftover(best)
+        for other, own in others:
+            visited = found.posterior.visited
+            visited[other.model] = max(visited.get(other.model, -np.inf), found.log_posterior + own - value)
+        return found, value
+
+    def joint(self, found: Found) -> float:
+        """Log posterior of changes and leftover together, nats, less a constant."""
+        variance = found.problem.variance
+        base, new = self.weighed(variance)
+        free = _free_of(found.problem.terms, found.problem.columns_of, self.spectra[1].rows)
+        of_common = _integrated(base.gram + new.gram, base.cross + new.cross, free)
+        gram, cross, _ = _difference_products(base, new, free)
+        of_usual = _integrated(gram, cross, self.usual**2)
+        return found.log_posterior + of_common + of_usual + sum(s.evidence_of(variance) for s in self.spectra)
+
+    def leftover(self, change: np.ndarray) -> np.ndarray:
+        """The variance of each channel's leftover, (C,), with one fit of all columns for both sets.
+
+        `change` (K,) is what the second set's coefficients are more, in units of the spectra.
+        """
+        base, new = self.weighed(np.zeros(len(self.new.channels)))
+        gram = base.gram + new.gram
+        common = np.linalg.solve(gram + _RIDGE * np.eye(len(gram)), base.cross + new.cross - new.gram @ change)
+        gains = self.spectra[0].gains_of_leftover(common) + self.spectra[1].gains_of_leftover(common + change)
+        return VARIANCES[np.argmax(gains, axis=1)]
+
+    def difference(self) -> np.ndarray:
+        """Coefficients (K,) of all columns in the second set less those in the first, each fitted alone, scaled."""
+        base, new = self.weighed(np.zeros(len(self.new.channels)))
+        ridge = _RIDGE * np.eye(len(base.cross))
+        return np.linalg.solve(new.gram + ridge, new.cross) - np.linalg.solve(base.gram + ridge, base.cross)
+
+    def problem(self, variance: np.ndarray) -> Problem:
+        """The problem that two sets pose on the same columns, with a leftover of `variance` (C,) in each channel.
+
+        Every effect may have changed, in any direction, and every value.
+        """
+        prior, new, unit, usual = replace(self.prior, small_nats=_HIDDEN_NATS), self.new, self.unit, self.usual
+        size, rows = len(unit), self.spectra[1].rows
+        terms = {t.key: _as_change(t) for t in new.terms}
+        columns_of = {key: new.start[key] + np.arange(t.size) for key, t in terms.items()}
+        gram, cross, bias, bias_cross = self._products(variance, _free_of(terms, columns_of, rows))
+        root = limiting(gram, bias, prior)
+        effects = {key: t.effect for key, t in terms.items() if t.kind == "effect"}
+        sd, low, high, is_value = believed(terms.values(), {}, columns_of, unit, rows, prior)
+        # What one row says is little next to what flights differ by anyway: a narrower prior would shrink the change.
+        # What is stated of a nuisance stays.
+        own = np.concatenate([np.zeros(0, int), *(columns_of[key] for key in effects)])
+        alike = prior.change_reach * _looks_like(self.spectra[1].weighed(variance).gram, usual)
+        sd[own] = np.hypot(np.hypot(sd, prior.value_reach * usual), alike)[own]
+        for key, effect in effects.items():
+            at = columns_of[key]
+            if effect not in NAMES.values() and not terms[key].of_change:
+                low[at], high[at] = -np.inf, np.inf
+            elif effect in NAMES.values() and unit[at].all():
+                sd[at] = prior.freed_sd[0] / unit[at]
+        always = [columns_of[key] for key, t in terms.items() if t.kind not in ("effect", _UNCHANGED)]
+        return Problem(
+            terms=terms,
+            columns_of=columns_of,
+            always=np.concatenate([np.zeros(0, int), *always]),
+            effects=effects,
+            freed={},
+            log_prior_of=log_priors(effects, terms, prior),
+            unit=unit,
+            gram=gram,
+            cross=cross,
+            bias=bias,
+            limited_bias=bias * np.outer(root, root),
+            limited_bias_cross=bias_cross * root,
+            place_apart=np.full(size, -1),
+            gram_apart=np.zeros((0, size)),
+            cross_apart=np.zeros(0),
+            prior_sd=sd,
+            low=low,
+            high=high,
+            is_value=is_value,
+            rows=rows,
+            variance=variance,
+            prior=prior,
+            channel_gram=(new.gram.sum(axis=1) if self.sizes is None else self.sizes) * np.outer(unit, unit),
+            brought_by={k: frozenset(b for b in effects if e in terms[b].brings) for k, e in effects.items()},
+        )
+
+    def _products(
+        self, variance: np.ndarray, free: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """S̃ (K, K) and s̃ (K,) of the module's equations, scaled, and what the regressors' noise adds to each.
+
+        `free` (K,) is the variance of the common coefficients.
+        """
+        base, new = self.weighed(variance)
+        gram, cross, taken = _difference_products(base, new, free)
+        usual = self.usual**2
+        turn = np.linalg.inv(np.eye(len(cross)) + gram * usual)
+        rest = np.eye(len(free)) - taken
+        bias = turn @ (rest @ new.bias @ rest.T + taken @ base.bias @ taken.T) @ turn.T
+        turned = turn @ gram
+        return 0.5 * (turned + turned.T), turn @ cross, bias, -bias @ (usual * cross)
 
 
-def against_leftover(
-    spectra: tuple[Spectrum, Spectrum],
-    found: Found,
-    value: float,
-    spread: np.ndarray,
-    at: Callable[[Model, np.ndarray], Found],
-) -> tuple[Found, float]:
-    """The most probable changes where each is also compared with the leftover that would explain it.
-
-    A change makes the leftover smaller that is learnt next to it, and looks the surer for it. Without the change the
-    leftover is learnt anew. With few environments it may explain as much; then the change is left out. `value` is the
-    log posterior of changes and leftover together (`joint`), as is what is given back next to the changes; `at` gives
-    the posterior at a model with a variance (C,).
-    """
-    others = [_with_own_leftover(spectra, without(found.model, k), found, spread, at) for k in found.model]
-    best, most = max(others, key=lambda other: other[1], default=(found, value))
-    if most > value:
-        return against_leftover(spectra, best, most, spread, at)
-    for other, own in others:
-        visited = found.posterior.visited
-        visited[other.model] = max(visited.get(other.model, -np.inf), found.log_posterior + own - value)
-    return found, value
-
-
-def _with_own_leftover(
-    spectra: tuple[Spectrum, Spectrum],
-    model: Model,
-    near: Found,
-    spread: np.ndarray,
-    at: Callable[[Model, np.ndarray], Found],
-) -> tuple[Found, float]:
-    """The posterior at a model with the leftover that it leaves, from that of another one, and log joint posterior."""
-    ends, variance = [], near.problem.variance
-    for _ in range(_ROUNDS):
-        ends.append(at(model, variance))
-        before, variance = variance, leftover_of(spectra, change_of(ends[-1]))
-        if np.array_equal(before, variance):
-            break
-    values = [joint(spectra, end, spread) for end in ends]
-    best = int(np.argmax(values))
-    return ends[best], values[best]
-
-
-def joint(spectra: tuple[Spectrum, Spectrum], found: Found, spread: np.ndarray) -> float:
-    """Log posterior of changes and leftover together, nats, less a constant."""
-    variance = found.problem.variance
-    base, new = (s.weighed(variance) for s in spectra)
-    free = _free_of(found.problem.terms, found.problem.columns_of, spectra[1].rows)
-    of_common = _integrated(base.gram + new.gram, base.cross + new.cross, free)
-    of_usual = _integrated(*_difference_products(base, new, free), _in_units(spread, spectra[1].unit) ** 2)
-    return found.log_posterior + of_common + of_usual + sum(s.evidence_of(variance) for s in spectra)
+def pair_of(
+    base: Evidence, new: Evidence, spread: np.ndarray, prior: Prior = PRIOR, sizes: np.ndarray | None = None
+) -> Pair:
+    """Two sets, in units in which their columns have unit length in both together; the rest as of `Pair`."""
+    unit = unit_of(base, new)
+    return Pair(new, (spectrum_of(base, unit), spectrum_of(new, unit)), spread, prior, sizes)
 
 
 def _integrated(gram: np.ndarray, cross: np.ndarray, variance: np.ndarray) -> float:
@@ -206,104 +306,11 @@ def _integrated(gram: np.ndarray, cross: np.ndarray, variance: np.ndarray) -> fl
     return float(0.5 * scaled @ np.linalg.solve(inner, scaled) - 0.5 * np.linalg.slogdet(inner)[1])
 
 
-def leftover_of(spectra: tuple[Spectrum, Spectrum], change: np.ndarray) -> np.ndarray:
-    """The variance of each channel's leftover, (C,), with one fit of all columns for both sets.
-
-    `change` (K,) is what the second set's coefficients are more, in units of the spectra.
-    """
-    base, new = (s.weighed(np.zeros(len(s.channels))) for s in spectra)
-    gram = base.gram + new.gram
-    common = np.linalg.solve(gram + _RIDGE * np.eye(len(gram)), base.cross + new.cross - new.gram @ change)
-    gains = spectra[0].gains_of_leftover(common) + spectra[1].gains_of_leftover(common + change)
-    return VARIANCES[np.argmax(gains, axis=1)]
-
-
-def difference_of(spectra: tuple[Spectrum, Spectrum]) -> np.ndarray:
-    """Coefficients (K,) of all columns in the second set less those in the first, each fitted alone, scaled."""
-    base, new = (s.weighed(np.zeros(len(s.channels))) for s in spectra)
-    ridge = _RIDGE * np.eye(len(base.cross))
-    return np.linalg.solve(new.gram + ridge, new.cross) - np.linalg.solve(base.gram + ridge, base.cross)
-
-
 def change_of(found: Found) -> np.ndarray:
     """The changes (K,) of the columns' coefficients in a model."""
     at, out = scored(found.problem, found.model), np.zeros(len(found.problem.unit))
     out[at.columns] = at.mode.beta
     return out
-
-
-def problem_of_changes(
-    new: Evidence,
-    spectra: tuple[Spectrum, Spectrum],
-    variance: np.ndarray,
-    spread: np.ndarray,
-    prior: Prior,
-    sizes: np.ndarray | None = None,
-) -> Problem:
-    """The problem that two sets pose on the same columns, with a leftover of `variance` (C,) in each channel.
-
-    Every effect may have changed, in any direction, and every value.
-    """
-    prior = replace(prior, small_nats=_HIDDEN_NATS)
-    unit, size, rows = spectra[1].unit, len(spectra[1].unit), spectra[1].rows
-    terms = {t.key: _as_change(t) for t in new.terms}
-    columns_of = {key: new.start[key] + np.arange(t.size) for key, t in terms.items()}
-    gram, cross, bias, bias_cross = _products_of_changes(spectra, variance, spread, _free_of(terms, columns_of, rows))
-    root = limiting(gram, bias, prior)
-    effects = {key: t.effect for key, t in terms.items() if t.kind == "effect"}
-    sd, low, high, is_value = believed(terms.values(), {}, columns_of, unit, rows, prior)
-    # What one row says is little next to what flights differ by anyway: a narrower prior would shrink the change. What
-    # is stated of a nuisance stays.
-    own = np.concatenate([np.zeros(0, int), *(columns_of[key] for key in effects)])
-    usual = _in_units(spread, unit)
-    alike = prior.change_reach * _looks_like(spectra[1].weighed(variance).gram, usual)
-    sd[own] = np.hypot(np.hypot(sd, prior.value_reach * usual), alike)[own]
-    for key, effect in effects.items():
-        if effect in NAMES.values() and (own := unit[columns_of[key]]).all():
-            sd[columns_of[key]] = prior.freed_sd[0] / own
-    free = [columns_of[k] for k, effect in effects.items() if effect not in NAMES.values() and not terms[k].of_change]
-    free = np.concatenate(free) if free else np.zeros(0, int)
-    low[free], high[free] = -np.inf, np.inf
-    always = [columns_of[key] for key, t in terms.items() if t.kind not in ("effect", _UNCHANGED)]
-    return Problem(
-        terms=terms,
-        columns_of=columns_of,
-        always=np.concatenate(always) if always else np.zeros(0, int),
-        effects=effects,
-        freed={},
-        log_prior_of=log_priors(effects, terms, prior),
-        unit=unit,
-        gram=gram,
-        cross=cross,
-        bias=bias,
-        limited_bias=bias * np.outer(root, root),
-        limited_bias_cross=bias_cross * root,
-        place_apart=np.full(size, -1),
-        gram_apart=np.zeros((0, size)),
-        cross_apart=np.zeros(0),
-        prior_sd=sd,
-        low=low,
-        high=high,
-        is_value=is_value,
-        rows=rows,
-        variance=variance,
-        prior=prior,
-        channel_gram=(new.gram.sum(axis=1) if sizes is None else sizes) * np.outer(unit, unit),
-        brought_by={k: frozenset(b for b in effects if e in terms[b].brings) for k, e in effects.items()},
-    )
-
-
-def _products_of_changes(
-    spectra: tuple[Spectrum, Spectrum], variance: np.ndarray, spread: np.ndarray, free: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """S̃ (K, K) and s̃ (K,) of the module's equations, scaled, and what the regressors' noise adds to each."""
-    base, new = (s.weighed(variance) for s in spectra)
-    gram, cross = _difference_products(base, new, free)
-    usual = _in_units(spread, spectra[1].unit) ** 2
-    turn = np.linalg.inv(np.eye(len(cross)) + gram * usual)
-    bias = turn @ _noise_of_difference(base, new, free) @ turn.T
-    turned = turn @ gram
-    return 0.5 * (turned + turned.T), turn @ cross, bias, -bias @ (usual * cross)
 
 
 def _free_of(terms: Mapping[str, EvidenceTerm], columns_of: Mapping[str, np.ndarray], rows: int | float) -> np.ndarray:
@@ -316,20 +323,13 @@ def _free_of(terms: Mapping[str, EvidenceTerm], columns_of: Mapping[str, np.ndar
     return out
 
 
-def _difference_products(base: Weighed, new: Weighed, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """S (K, K) and s (K,): products of the second set with what is common to both integrated out, scaled.
+def _difference_products(base: Weighed, new: Weighed, free: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """S (K, K) and s (K,): products of the second set with what is common to both integrated out, scaled; and Q (K, K).
 
     `free` (K,) is the variance of the common coefficients.
     """
-    inverse = np.linalg.inv(base.gram + new.gram + np.diag(1.0 / free))
-    return new.gram - new.gram @ inverse @ new.gram, new.cross - new.gram @ inverse @ (base.cross + new.cross)
-
-
-def _noise_of_difference(base: Weighed, new: Weighed, free: np.ndarray) -> np.ndarray:
-    """What the noise of the regressors adds to S, (K, K)."""
     taken = new.gram @ np.linalg.inv(base.gram + new.gram + np.diag(1.0 / free))
-    rest = np.eye(len(free)) - taken
-    return rest @ new.bias @ rest.T + taken @ base.bias @ taken.T
+    return new.gram - taken @ new.gram, new.cross - taken @ (base.cross + new.cross), taken
 
 
 def _looks_like(gram: np.ndarray, spread: np.ndarray) -> np.ndarray:
@@ -337,11 +337,6 @@ def _looks_like(gram: np.ndarray, spread: np.ndarray) -> np.ndarray:
     own = np.diag(gram)
     seen = np.sqrt((gram**2) @ spread**2)
     return np.divide(seen, own, out=np.zeros(len(own)), where=own > 0)
-
-
-def _in_units(spread: np.ndarray, unit: np.ndarray) -> np.ndarray:
-    """Coefficients (K,) scaled; 0 of a column that is never excited."""
-    return np.divide(spread, unit, out=np.zeros(len(unit)), where=unit > 0)
 
 
 def _as_change(term: EvidenceTerm) -> EvidenceTerm:
@@ -406,21 +401,17 @@ def form_spread(evidence: Evidence, known: np.ndarray, form_sd: float) -> np.nda
     explained = np.einsum("k,ckl,l->c", known, gram, known)
     total = np.maximum(own.sum(axis=0), TINY)
     form = form_sd * np.sqrt((own * explained[:, None]).sum(axis=0)) / total
-    out = np.zeros(len(known))
-    for term in evidence.terms:
-        if term.kind == "effect":
-            at = evidence.start[term.key] + np.arange(term.size)
-            out[at] = form[at]
-    return share_of_form(evidence) * out
+    return share_of_form(evidence) * form
 
 
 def share_of_form(evidence: Evidence) -> np.ndarray:
     """What part of an effect's one-sigma each coefficient (K,) has: of its forms one is at work, no matter which.
 
     Forms of one effect look alike. Were each to differ by the whole, the effect would by the root of their number more.
+    What is no effect has no part.
     """
     forms = Counter(t.effect for t in evidence.terms if t.kind == "effect")
-    out = np.ones(evidence.gram.shape[-1])
+    out = np.zeros(evidence.gram.shape[-1])
     for term in evidence.terms:
         if term.kind == "effect":
             out[evidence.start[term.key] + np.arange(term.size)] = forms[term.effect] ** -0.5

@@ -250,18 +250,14 @@ def _of_rotors(asked, turned, groups, load, vehicle: Vehicle, thin: Thinner, gri
         y |= {f"sideways/{a}": force[:, k] for k, a in enumerate(_AXES[:2])}
         y["lift/all"] = _log(thrust / weight) - _log(np.maximum(1.0 + load, _LEAST_FELT))
     if "moment" in groups:
-        arm, torque = _levers(vehicle)
+        # The longest arm, and the rotors' mean torque over their thrust, m.
+        arm = float(np.linalg.norm(vehicle.rotor_positions_m()[:, :2], axis=1).max()) or 1.0
+        torque = float(vehicle.torque_coefficients_n_m_s2().sum() / vehicle.thrust_coefficients_n_s2().sum())
         turning = thin(groups["moment"]) / thrust[:, None]
         y |= {f"trim/{name}": turning[:, k] / arm for k, name in enumerate(_TURNS[:2])}
         if torque:
             y["yaw_trim/yaw"] = turning[:, 2] / torque
     return y
-
-
-def _levers(vehicle: Vehicle) -> tuple[float, float]:
-    """The longest arm, and the rotors' mean torque over their thrust, m."""
-    arm = float(np.linalg.norm(vehicle.rotor_positions_m()[:, :2], axis=1).max()) or 1.0
-    return arm, float(vehicle.torque_coefficients_n_m_s2().sum() / vehicle.thrust_coefficients_n_s2().sum())
 
 
 def _not_idle(values: np.ndarray) -> np.ndarray:

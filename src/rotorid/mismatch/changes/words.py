@@ -15,10 +15,9 @@ from rotorid.mismatch.decide.statements import UpperLimit
 from rotorid.mismatch.decide.status import CLAIMED, Estimate
 from rotorid.mismatch.decide.words import (
     capital,
-    effect_words,
     listed,
+    name_words,
     number,
-    parameter_words,
     percent,
     percent_words,
 )
@@ -140,11 +139,6 @@ def change_words(change: Change) -> str:
     surely = "" if change.probability is None else f" (probability {percent(change.probability)})"
     verb = "may have changed" if change.status == "suggested" else "changed"
     return f"{capital(names)} {verb}{size}{surely}."
-
-
-def name_words(name: str) -> str:
-    """An effect, or a value by its contract name, in words."""
-    return f"the {parameter_words(name)[0]}" if name in VALUES else effect_words(name)
 
 
 def _size_words(estimate: Estimate) -> str:

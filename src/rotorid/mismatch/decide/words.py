@@ -94,6 +94,11 @@ def effect_words(effect_id: str) -> str:
     return effect.name if effect else effect_id.replace("_", " ")
 
 
+def name_words(name: str) -> str:
+    """An id, or a value by its contract name, in words."""
+    return f"the {_PARAMETER_WORDS[name][0]}" if name in _PARAMETER_WORDS else effect_words(name)
+
+
 def number(value: float | None, digits: int = 2) -> str:
     """A number to so many significant digits: plain from 0.0001 to 99 999, else with an exponent."""
     if value is None or not math.isfinite(value):

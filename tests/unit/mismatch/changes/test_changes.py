@@ -182,8 +182,8 @@ def test_columns_that_contradict_each_other_speak_for_a_mistake_by_themselves():
     """A flipped axis is corrected unless force and moment plainly speak against it; exchanged rotors, which they alone
     show, only where they speak for it."""
     flipped, exchanged = (SimpleNamespace(id=i) for i in ("axis_sign", "rotor_order"))
-    assert price_of([exchanged], Prior()) == Prior().effect_nats > 0.0 > price_of([flipped], Prior())
-    assert price_of([flipped, exchanged], Prior()) == price_of([flipped], Prior()) + price_of([exchanged], Prior())
+    assert price_of([exchanged]) == Prior().effect_nats > 0.0 > price_of([flipped])
+    assert price_of([flipped, exchanged]) == price_of([flipped]) + price_of([exchanged])
 
 
 def test_a_unit_that_is_wrong_is_no_question():

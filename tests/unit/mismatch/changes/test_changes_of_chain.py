@@ -15,7 +15,6 @@ from rotorid.mismatch.changes.compare import (
     most_like,
 )
 from rotorid.mismatch.decide.findings import Finding
-from rotorid.mismatch.decide.problem import Prior
 from rotorid.mismatch.decide.status import Estimate
 from rotorid.mismatch.evidence.speedpath import CommandChain
 from tests.unit.mismatch.evidence.test_speedpath import FULL, recorded, searched
@@ -29,9 +28,9 @@ def compared(**at_work):
     first = [recorded(k, voltage=VOLTAGE, **GOOD) for k in (1, 2)]
     second = [recorded(k, voltage=VOLTAGE, **at_work) for k in (3, 4)]
     found = SimpleNamespace(chain=CommandChain(searched(*first), FULL, float(VOLTAGE.max())), commanded=False)
-    options, squares = decided_of_speeds(found, chain_terms(found, first), (first, second), Prior())
+    options, squares = decided_of_speeds(found, chain_terms(found, first), (first, second))
     assert all(np.all(np.linalg.eigvalsh(own) >= -1e-9) for own in squares.values())
-    return {s.id: s for s in changes_in(options, Prior()) if s.status in ("established", "ambiguous")}
+    return {s.id: s for s in changes_in(options) if s.status in ("established", "ambiguous")}
 
 
 def test_the_same_chain_did_not_change():

@@ -11,21 +11,18 @@ import pytest
 from rotorid.effects.catalogue import catalogue
 from rotorid.mismatch.changes.joint import within_bounds
 from rotorid.mismatch.changes.problem import (
-    against_leftover,
     at_own_noise,
     decide_changes,
     feigned,
     form_spread,
     hidden_in,
-    joint,
-    problem_of_changes,
+    pair_of,
     share_of_form,
     usual_spread,
 )
-from rotorid.mismatch.decide.posterior import Found, Posterior
 from rotorid.mismatch.decide.problem import Prior
 from rotorid.mismatch.decide.statements import statements_of, visited_instead
-from rotorid.mismatch.evidence.gram import EvidenceTerm, LinearParameter, spectrum_of, unit_of
+from rotorid.mismatch.evidence.gram import EvidenceTerm, LinearParameter
 from tests.unit.mismatch.decide.test_posterior import OFFSET, effect, flight
 
 DRAG, LIFT = "drag/plain", "lift/plain"
@@ -41,7 +38,7 @@ def made(beta: list[float], seed: int, noise: float = 1.0):
 
 
 def decided(new, spread: float = 0.0):
-    return decide_changes(made([0.0, 0.5, 0.0], 1), new, np.array([0.0, spread, spread, spread]), Prior())
+    return decide_changes(made([0.0, 0.5, 0.0], 1), new, np.array([0.0, spread, spread, spread]))
 
 
 def test_what_both_sets_have_is_no_change_and_what_one_has_more_is():
@@ -62,7 +59,7 @@ def test_noise_of_a_column_makes_no_change_smaller(spread):
         return replace(replace(of, x=shaken).evidence(), bias_gram=bias[None])
 
     def size(known: bool) -> float:
-        found = decide_changes(seen(own, 3, known), seen(new, 4, known), np.array([0.0, spread, spread]), Prior())
+        found = decide_changes(seen(own, 3, known), seen(new, 4, known), np.array([0.0, spread, spread]))
         (said,) = statements_of(found, of_change=True)
         return said.parameters[0].value
 
@@ -91,17 +88,10 @@ def scattered(sizes, seed: int):
 @pytest.mark.parametrize("sizes, stays", [([0.8], True), ([0.0] * 8 + [3.0], False)])
 def test_a_change_is_compared_with_the_leftover_that_would_explain_it(sizes, stays):
     """The same in every environment, or all of it in one of nine: the latter is more probably leftover."""
-    base, new, spread = made([0.0, 0.5, 0.0], 1), scattered(sizes, 2), np.zeros(4)
-    unit = unit_of(base, new)
-    spectra = spectrum_of(base, unit), spectrum_of(new, unit)
-
-    def at(model, variance):
-        posterior = Posterior(problem_of_changes(new, spectra, variance, spread, Prior()))
-        return Found(posterior, model, posterior(model))
-
-    found = at((DRAG,), np.zeros(1))
+    pair = pair_of(made([0.0, 0.5, 0.0], 1), scattered(sizes, 2), np.zeros(4))
+    found = pair.at((DRAG,), np.zeros(1))
     assert found.log_posterior - found.posterior(()) > 5.0
-    compared, _ = against_leftover(spectra, found, joint(spectra, found, spread), spread, at)
+    compared, _ = pair.against_leftover(found)
     assert compared.model == ((DRAG,) if stays else ())
     assert bool(compared.problem.variance.any()) is not stays
 
