@@ -206,7 +206,6 @@ class FittedSet:
     """A set as the engine fitted it, and what it leaves open."""
 
     recordings: RecordingSet
-    prepared: Prepared
     fitted: Fitted
     questions: tuple[Question, ...]
     chains: tuple[tuple[_ChainModel, ...], ...]
@@ -217,6 +216,11 @@ class FittedSet:
     """The set's normal equations through the filters that the engine would learn from it and a flight together."""
     derivatives: tuple[tuple[Form, np.ndarray], ...] = ()
     """Of what the fitted model leaves, as a form with its values; none where they do not predict."""
+
+    @property
+    def prepared(self) -> Prepared:
+        """What was fitted, with what commands alone cannot determine left out."""
+        return self.fitted.prepared
 
     @property
     def model(self) -> WrenchModel:
@@ -279,7 +283,7 @@ def known(
     form = derivative_form(vehicle.model_copy(update={"derivatives": learnt.derivatives}))
     own = () if form is None else (form,)
     asked = tuple(questions), tuple(chains), tuple(unanswerable)
-    return FittedSet(recordings, prepared, found, *asked, derivatives=own)
+    return FittedSet(recordings, found, *asked, derivatives=own)
 
 
 def known_from(recordings: RecordingSet, verdict: dict) -> FittedSet:
