@@ -19,7 +19,7 @@ BATTERY_CURRENT = "battery_current_a"
 TEMPERATURE = "temperature_c"
 MOUNT = ("roll_rad", "pitch_rad")
 
-_PER_ROTOR = {
+PER_ROTOR = {
     "rotor_speed": re.compile(r"rotor_speed_(0|[1-9]\d*)_rad_s"),
     "rotor_command": re.compile(r"rotor_command_(0|[1-9]\d*)_rad_s"),
     "throttle": re.compile(r"throttle_(0|[1-9]\d*)"),
@@ -46,7 +46,7 @@ def rotor_columns(kind: str, count: int) -> tuple[str, ...]:
 
 def rotor_number(column: str) -> tuple[str, int] | None:
     """Kind and rotor number of a per-rotor column, None for any other column."""
-    for kind, pattern in _PER_ROTOR.items():
+    for kind, pattern in PER_ROTOR.items():
         match = pattern.fullmatch(column)
         if match:
             return kind, int(match.group(1))

@@ -105,7 +105,7 @@ def dead_sensors(recordings: RecordingSet) -> list[tuple[str, ...]]:
     if recordings.vehicle.kind != "flight":
         return []
     dead = [names for names in SENSORS if _holds_one_value(recordings.runs, names)]
-    speeds, *ordered = rotor_groups(recordings.vehicle).values()
+    speeds, *ordered = recordings.vehicle.rotor_groups().values()
     turn = any(run.has(*speeds) and np.nanmax(run.array(speeds)) > 0 for run in recordings.runs)
     dead += [names for names in ordered if turn and _holds_one_value(recordings.runs, names, 0.0)]
     if c.QUATERNION in dead and any(_no_attitude(run, recordings.vehicle) for run in recordings.runs):
@@ -119,16 +119,13 @@ def _without_dead_sensors(recordings: RecordingSet, elsewhere: Iterable[tuple[st
     others = [names for names in elsewhere if names not in own and any(run.has(names[0]) for run in recordings.runs)]
     if not own and not others:
         return recordings
-    gone = [name for names in (*own, *others) for name in names]
-    kept = (replace(r, table=r.table.drop(columns=[n for n in gone if n in r.table])) for r in recordings.runs)
-    said = (
-        *(
-            f"Left out: {names[0]} to {names[-1]} hold one value in every run, so nothing was read from that sensor."
-            for names in own
-        ),
-        *(f"Left out: {names[0]} to {names[-1]}, which hold one value in another set." for names in others),
-    )
-    return replace(recordings, runs=tuple(kept), left_out=(*recordings.left_out, *said))
+    kept = recordings.without([name for names in (*own, *others) for name in names])
+    said = [
+        f"Left out: {names[0]} to {names[-1]} hold one value in every run, so nothing was read from that sensor."
+        for names in own
+    ]
+    said += [f"Left out: {names[0]} to {names[-1]}, which hold one value in another set." for names in others]
+    return recordings.mended(kept.runs, said)
 
 
 def _holds_one_value(runs: Iterable[Run], names: tuple[str, ...], value: float | None = None) -> bool:
@@ -150,28 +147,21 @@ def _with_alike_runs(recordings: RecordingSet) -> RecordingSet:
     poor = [run for run in recordings.runs if channels[run.name] != every]
     if not poor:
         return recordings
-    said = list(recordings.left_out)
     if 2 * len(poor) < len(recordings.runs):
-        for run in poor:
-            lost = listed(sorted(every - channels[run.name]))
-            said.append(f"Left out: {_whereof(run)}: lacks sensors that the other runs have (for {lost}).")
-        kept = tuple(run for run in recordings.runs if run not in poor)
-        return replace(recordings, runs=kept, left_out=tuple(said))
+        lost = [(_whereof(run), listed(sorted(every - channels[run.name]))) for run in poor]
+        said = [f"Left out: {run}: lacks sensors that the other runs have (for {names})." for run, names in lost]
+        return recordings.mended((run for run in recordings.runs if run not in poor), said)
     partly = [names for names in SENSORS if not all(_reads(run, names) for run in recordings.runs)]
     if all(_reads(run, c.VELOCITY) or _reads(run, c.POSITION) for run in recordings.runs):
         partly = [names for names in partly if names not in (c.VELOCITY, c.POSITION)]
     dropped = [names for names in partly if any(_reads(run, names) for run in recordings.runs)]
-    said += [f"Left out: {names[0]} to {names[-1]} are not recorded in every run." for names in dropped]
-    gone = {name for names in partly for name in names}
-    runs = (replace(r, table=r.table.drop(columns=[n for n in gone if n in r.table])) for r in recordings.runs)
-    return replace(recordings, runs=tuple(runs), left_out=tuple(said))
+    said = [f"Left out: {names[0]} to {names[-1]} are not recorded in every run." for names in dropped]
+    return recordings.mended(recordings.without([name for names in partly for name in names]).runs, said)
 
 
 def _reads(run: Run, names: tuple[str, ...]) -> bool:
     """Whether a sensor has enough complete readings in a run to count as recorded."""
-    if not run.has(*names):
-        return False
-    return int(np.isfinite(run.array(names)).all(axis=1).sum()) >= LEAST_VALUES
+    return run.has(*names) and int(run.complete(names).sum()) >= LEAST_VALUES
 
 
 def channels_of(run: Run) -> set[str]:
@@ -192,25 +182,20 @@ def _whereof(run: Run) -> str:
     return run.path or f"run {run.name}"
 
 
-def rotor_groups(vehicle: Vehicle) -> dict[str, tuple[str, ...]]:
-    """Kind of column to its names for the vehicle's rotors, measured speeds first."""
-    return {kind: c.rotor_columns(kind, vehicle.rotor_count) for kind in ("rotor_speed", "rotor_command", "throttle")}
-
-
 def driven_by(run: Run, vehicle: Vehicle) -> tuple[str, ...]:
     """Columns that the rotors' speeds are known from; empty where no kind of them is whole."""
-    return next((names for names in rotor_groups(vehicle).values() if names and run.has(*names)), ())
+    return next((names for names in vehicle.rotor_groups().values() if names and run.has(*names)), ())
 
 
 def _check_spelling(run: Run, vehicle: Vehicle) -> None:
     """InputError where an unknown column can only be a known one that is missing."""
     there = set(run.table.columns)
-    known = sorted(c.FIXED) + [name for names in rotor_groups(vehicle).values() for name in names]
+    known = sorted(c.FIXED) + [name for names in vehicle.rotor_groups().values() for name in names]
     missing = [name for name in known if name not in there]
     # Columns of a sensor whose columns only make sense together, where others of it are there.
     groups = {
-        "flight": (*rotor_groups(vehicle).values(), *SENSORS),
-        "stand": (*rotor_groups(vehicle).values(), c.MOUNT),
+        "flight": (*vehicle.rotor_groups().values(), *SENSORS),
+        "stand": (*vehicle.rotor_groups().values(), c.MOUNT),
     }
     begun = (names for names in groups.get(vehicle.kind, ()) if any(n in there for n in names))
     halved = {name for names in begun for name in names if name not in there}
@@ -279,7 +264,7 @@ def _no_rotors(run: Run, vehicle: Vehicle) -> str | None:
     if vehicle.kind == "bench" or driven_by(run, vehicle):
         return None
     there = run.table.columns
-    partly = {k: names for k, names in rotor_groups(vehicle).items() if any(run.has(n) for n in names)}
+    partly = {k: names for k, names in vehicle.rotor_groups().items() if any(run.has(n) for n in names)}
     if partly:
         kind, names = max(partly.items(), key=lambda item: sum(run.has(n) for n in item[1]))
         lost = [n for n in names if not run.has(n)]
@@ -291,7 +276,7 @@ def _no_rotors(run: Run, vehicle: Vehicle) -> str | None:
             f"{'are' if len(lost) > 1 else 'is'} {state}: vehicle.yaml lists {len(names)} rotors, the run has "
             f"the {kind.replace('_', ' ')} of {found}, and no other kind of rotor column is whole{_likely(run, lost)}"
         )
-    speeds, commands, throttles = rotor_groups(vehicle).values()
+    speeds, commands, throttles = vehicle.rotor_groups().values()
     empty = [n for n in (*speeds, *commands, *throttles) if n in there]
     found = f" ({listed(empty)} {'are' if len(empty) > 1 else 'is'} empty)" if empty else ""
     return (
@@ -328,7 +313,7 @@ def _still_rotors(run: Run, vehicle: Vehicle) -> str | None:
         supported = 2 * weight * np.sin(min(tilt, np.pi) / 2) if vehicle.tared else weight
         force = np.linalg.norm(np.nan_to_num(run.array(c.FORCE)), axis=1)
         largest = float(np.quantile(force, 0.9))
-        ordered = [n for k, g in rotor_groups(vehicle).items() if k != "rotor_speed" and run.has(*g) for n in g]
+        ordered = [n for k, g in vehicle.rotor_groups().items() if k != "rotor_speed" and run.has(*g) for n in g]
         commanded = bool(ordered) and np.nanmax(np.abs(run.array(tuple(ordered)))) > 0
         if largest <= supported + max(lifting * weight, least_lift_n) and not commanded:
             return None
@@ -405,7 +390,7 @@ def _too_short(run: Run, vehicle: Vehicle) -> str | None:
             f"{longest:.3g} s, expected at least {needed:.3g} s"
         )
     names = compared_readings(run, vehicle)
-    count = int(np.isfinite(run.array(tuple(names))).all(axis=1).sum())
+    count = int(run.complete(names).sum())
     if count >= least_readings:
         return None
     return (
@@ -441,7 +426,7 @@ def _check_not_constant(recordings: RecordingSet) -> None:
     vehicle, runs = recordings.vehicle, recordings.runs
     if vehicle.kind == "flight":
         names = driven_by(runs[0], vehicle)
-        ordered = names in list(rotor_groups(vehicle).values())[1:]
+        ordered = names in list(vehicle.rotor_groups().values())[1:]
         if ordered and all(driven_by(run, vehicle) == names for run in runs) and _holds_one_value(runs, names):
             held = np.nanmax(runs[0].array(names), axis=0)
             found = listed([f"{n} = {v:g}" for n, v in zip(names, held, strict=True)], most=6)
@@ -468,7 +453,7 @@ def _check_single(recordings: RecordingSet) -> None:
     run, vehicle = recordings.runs[0], recordings.vehicle
     if vehicle.kind != "flight":
         # The last third, less half the gap before it, must be more than next to nothing.
-        known = run.time_s[np.isfinite(run.array(tuple(compared_readings(run, vehicle)))).all(axis=1)]
+        known = run.time_s[run.complete(compared_readings(run, vehicle))]
         needed = (single_gap_s / 2 + LEAST_VALUES * float(np.median(np.diff(known)))) / held_out_share
         lasts = float(known[-1] - known[0])
         if lasts < needed:
