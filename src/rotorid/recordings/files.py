@@ -243,8 +243,9 @@ def write_set(recordings: RecordingSet, parent: Path, suffix: str = "") -> Path:
 
 def _write_files(recordings: RecordingSet, folder: Path, suffix: str) -> list[Path]:
     """Write the files of a set; returns them."""
-    written = [folder / VEHICLE, *write_runs({run.name: run.table for run in recordings.runs}, folder, suffix)]
+    written = [folder / VEHICLE]
     write_vehicle(recordings.vehicle, written[0])
+    written += write_runs({run.name: run.table for run in recordings.runs}, folder, suffix)
     if recordings.held_out is not None:
         written.append(folder / _SPLIT)
         written[-1].write_text(yaml.safe_dump({"held_out": list(recordings.held_out)}), encoding="utf-8")

@@ -38,6 +38,7 @@ import pandas as pd
 import scipy
 
 from rotorid.errors import InputError
+from rotorid.io.text.files import check_file
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.contract import Imported, Importer, text_of
 from rotorid.recordings.importers.faults import (
@@ -45,6 +46,7 @@ from rotorid.recordings.importers.faults import (
     airborne,
     blank_held,
     cut,
+    cut_off,
     drop_repeated_times,
     in_order,
     join_rows,
@@ -393,17 +395,14 @@ def _faults_of_end(data: bytes, offset: int, whole: bool, unknown: int | None, i
         faults.insert(0, ImportFault("checksum", "", found, "kept; bytes may be damaged", 1))
     elif inside or not (whole or unknown is not None):
         found = f"the file ends inside an event ({inside})" if inside else "the file ends without its checksum"
-        faults.append(ImportFault("cut_off", "", found, "what came before is kept; the log stopped before its end", 1))
+        faults.append(cut_off(found, 1))
     return faults
 
 
 def read_usd_log(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
     """Read a uSD log file; see `decode_usd_log`."""
-    try:
-        data = Path(path).read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{path}: file is missing") from None
-    return decode_usd_log(data, str(path))
+    check_file(path)
+    return decode_usd_log(path.read_bytes(), str(path))
 
 
 def _read(path: Path) -> Imported:

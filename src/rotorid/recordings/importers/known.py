@@ -102,9 +102,9 @@ class Parameters:
         """What holds at an instant."""
         return {**self.start, **{name: value for t, name, value in self.changes if t <= time}}
 
-    def mostly(self, times: np.ndarray) -> Values:
-        """What holds at most of some instants, each parameter by itself."""
-        values = dict(self.start)
+    def mostly(self, times: np.ndarray, flown: np.ndarray | None) -> Values:
+        """What holds at most of some instants (n,), each parameter by itself: at those in flight (n,), where any is."""
+        times, values = times if flown is None or not flown.any() else times[flown], dict(self.start)
         for name in {name for _, name, _ in self.changes}:
             own = [(t, v) for t, n, v in self.changes if n == name]
             held = [self.start[name], *(v for _, v in own)]

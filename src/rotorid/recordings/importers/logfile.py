@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import importlib
 import io
-import json
 import os
 import pkgutil
 import sys
@@ -34,13 +33,11 @@ import rotorid.recordings.importers
 from rotorid.errors import InputError
 from rotorid.io.text.files import (
     LARGEST_FILE,
-    LARGEST_METADATA,
     LEAST_MEMORY,
     MEMORY_TIMES_FILE,
     MOST_RUNS,
     check_file,
     parse_yaml,
-    read_text,
 )
 from rotorid.io.text.wording import printable
 from rotorid.io.text.writing import only_writer, staging, take_name, take_place
@@ -57,6 +54,7 @@ from rotorid.recordings.files import (
     usable_runs,
     vehicle_of,
     write_manifest,
+    write_runs,
 )
 from rotorid.recordings.importers.contract import Imported, Importer, text_of
 from rotorid.recordings.importers.faults import FILE_NAME as REPORT
@@ -65,7 +63,7 @@ from rotorid.recordings.importers.known import propose, thrust_coefficient
 from rotorid.recordings.importers.mapping import IMPORTER as TABLE
 from rotorid.recordings.importers.mapping import UNITS, Mapping, read_table
 from rotorid.recordings.settings import Settings, write_settings
-from rotorid.recordings.tables import check_table, parquet_is_here, write_table
+from rotorid.recordings.tables import check_table
 from rotorid.recordings.vehicle import Vehicle
 
 _USUAL_COEFFICIENT = 1.7e-5
@@ -138,21 +136,18 @@ def read_log(path: Path, mapping: Mapping | None = None) -> Imported:
     return replace(found, format=importer.name)
 
 
-def template_for(log: Imported) -> str:
-    """The template vehicle of a log's autopilot or format; empty where nothing says what vehicle it is."""
-    known = (importers().get(name) for name in (log.known.autopilot, log.format))
-    return next((importer.template for importer in known if importer and importer.template), "")
-
-
 @contextmanager
 def _limited(path: Path) -> Iterator[None]:
     """Inside, memory beyond the limit for this file is an InputError; nothing is limited where the system cannot."""
     try:
         import resource
-    except ImportError:  # pragma: no cover - depends on the platform
+
+        said = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+    except (ImportError, OSError):  # pragma: no cover - depends on the platform
         yield
         return
-    taken = _taken_bytes()
+    # Bytes that count against the limit already; None where the system does not say.
+    taken = next((int(line.split()[1]) * 1024 for line in said if line.startswith("VmData:")), None)
     size = path.stat().st_size if path.is_file() else sum(p.stat().st_size for p in path.rglob("*") if p.is_file())
     more = max(LEAST_MEMORY, MEMORY_TIMES_FILE * size)
     soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
@@ -187,15 +182,6 @@ def _silent() -> Iterator[None]:
             os.dup2(own, number)
             os.close(own)
         os.close(nowhere)
-
-
-def _taken_bytes() -> int | None:
-    """Bytes that count against the limit already; None where the system does not say."""
-    try:
-        lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
-    except OSError:
-        return None
-    return next((int(line.split()[1]) * 1024 for line in lines if line.startswith("VmData:")), None)
 
 
 def usual_coefficient(mass_kg: float, rotors: int) -> float:
@@ -327,15 +313,10 @@ class SetOfLogs:
 
     def _write_files(self, folder: Path, as_csv: bool) -> list[Path]:
         """Write the vehicle, unless it is kept, and the runs; returns their files."""
-        suffix = ".csv" if as_csv else ".parquet" if parquet_is_here() else ".csv.gz"
-        paths = []
-        if not self.kept_vehicle:
-            paths.append(folder / VEHICLE)
-            paths[-1].write_text(self.vehicle_text, encoding="utf-8")
-        for name, table in self.runs.items():
-            paths.append(folder / f"{name}{suffix}")
-            write_table(table, paths[-1])
-        return paths
+        vehicle = [] if self.kept_vehicle else [folder / VEHICLE]
+        for path in vehicle:
+            path.write_text(self.vehicle_text, encoding="utf-8")
+        return [*vehicle, *write_runs(self.runs, folder, ".csv" if as_csv else "")]
 
 
 def set_of_logs(
@@ -384,7 +365,9 @@ def set_of_logs(
     else:
         if kinds != {"flight"}:
             raise InputError(f"{logs[0]}: a log of a {kinds.pop()} needs --vehicle vehicle.yaml")
-        template = like or template_for(found[0])
+        # The template of the log's autopilot, else of its format.
+        known_as = (importers().get(name) for name in (found[0].known.autopilot, found[0].format))
+        template = like or next((importer.template for importer in known_as if importer and importer.template), "")
         if not template:
             raise InputError(
                 f"{logs[0]}: nothing says what vehicle this is; give --vehicle vehicle.yaml, or --like with one of "
@@ -436,7 +419,7 @@ def _signed_by_spin(
     found = "an export does not say which way its torque counts"
     done = f"its sign is that of a rotor that turns {spin}, as the vehicle's file states"
     signed = {name: runs[name].assign(**{c.MOMENT[2]: sign * runs[name][c.MOMENT[2]]}) for name in mine}
-    return {**runs, **signed}, [ImportFault("sign", c.MOMENT[2], found, done, 0)]
+    return {**runs, **signed}, [ImportFault("sign", c.MOMENT[2], found, done)]
 
 
 def _files_of(path: Path) -> dict[str, Path]:
@@ -479,7 +462,7 @@ def _add_to_set(staged: Sequence[Path], report: ImportReport, folder: Path) -> N
         raise InputError(
             f"{folder}: would have {len(runs)} runs, expected at most {MOST_RUNS}; make several sets of them"
         )
-    report = _after(report, folder)
+    report = report.after(folder)
     if listed_runs(folder) is None:
         write_manifest(folder, there)
     for path in staged:
@@ -488,16 +471,3 @@ def _add_to_set(staged: Sequence[Path], report: ImportReport, folder: Path) -> N
     report.write(staged[0].parent)
     take_place(staged[0].parent / REPORT, folder / REPORT)
     write_manifest(folder, [folder / name for name in runs])
-
-
-def _after(report: ImportReport, folder: Path) -> ImportReport:
-    """The report together with the set's own, where it has one."""
-    path = folder / REPORT
-    if not path.exists():
-        return report
-    try:
-        return report.after(json.loads(read_text(path, LARGEST_METADATA)))
-    except (ValueError, KeyError, TypeError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{path}: is no report of an import; move it away") from None
