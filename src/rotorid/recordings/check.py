@@ -217,7 +217,7 @@ def _contents(recordings: RecordingSet) -> SetCheck:
         if not has(c.BATTERY_VOLTAGE):
             lacks.append("No battery voltage: battery sag shows only as a drift in time.")
     else:
-        for force, reference in zip(c.FORCE, c.REFERENCE_FORCE, strict=True):
+        for force, reference in c.REFERENCE_OF.items():
             if has(force) != has(reference):
                 lacks.append(f"{force} and {reference} are not both there: that axis cannot be compared.")
     if len(recordings.runs) == 1:
@@ -296,11 +296,8 @@ def copies(recordings: RecordingSet) -> tuple[Doubt, ...]:
         found.setdefault(second, (first, f"{share:.0%} of its samples are equal to the last digit{later}"))
     rest = [run for run in recordings.runs if run.name not in found]
     noisy = [name for name in names if name in _NOISY]
-    if (
-        len(noisy) >= _LEAST_NOISY
-        and len(rest) > 1
-        and sum(len(run.table) for run in rest) * len(rest) <= most_correlated
-    ):
+    work = sum(len(run.table) for run in rest) * len(rest)
+    if len(noisy) >= _LEAST_NOISY and len(rest) > 1 and work <= most_correlated:
         noises = [(run.name, _noise(run, noisy)) for run in rest]
         for (first, own), (second, other) in combinations(noises, 2):
             # Short blocks spread over the first run.

@@ -18,24 +18,16 @@ BATTERY_VOLTAGE = "battery_voltage_v"
 BATTERY_CURRENT = "battery_current_a"
 TEMPERATURE = "temperature_c"
 MOUNT = ("roll_rad", "pitch_rad")
+REFERENCE_OF = dict(zip(FORCE, REFERENCE_FORCE, strict=True))
+"""To a force that a bench reads the known one."""
 
 PER_ROTOR = {
     "rotor_speed": re.compile(r"rotor_speed_(0|[1-9]\d*)_rad_s"),
     "rotor_command": re.compile(r"rotor_command_(0|[1-9]\d*)_rad_s"),
     "throttle": re.compile(r"throttle_(0|[1-9]\d*)"),
 }
-FIXED = frozenset(
-    (TIME, HEIGHT, BATTERY_VOLTAGE, BATTERY_CURRENT, TEMPERATURE)
-    + POSITION
-    + VELOCITY
-    + QUATERNION
-    + ANGULAR_VELOCITY
-    + SPECIFIC_FORCE
-    + FORCE
-    + MOMENT
-    + REFERENCE_FORCE
-    + MOUNT
-)
+_SEVERAL = (POSITION, VELOCITY, QUATERNION, ANGULAR_VELOCITY, SPECIFIC_FORCE, FORCE, MOMENT, REFERENCE_FORCE, MOUNT)
+FIXED = frozenset((TIME, HEIGHT, BATTERY_VOLTAGE, BATTERY_CURRENT, TEMPERATURE)).union(*_SEVERAL)
 
 
 def rotor_columns(kind: str, count: int) -> tuple[str, ...]:

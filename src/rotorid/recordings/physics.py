@@ -295,20 +295,21 @@ def _world(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
             own, place = f"velocity_{axis}_m_s", f"position_{axis}_m"
             r = _correlation(velocity[:, k], derived[:, k])
             scale = float(np.nanstd(velocity[:, k]) / np.nanstd(derived[:, k]))
+            what = own
             if r < _CONTRADICTS:
                 said = f"{own} goes against the derivative of {place} (correlation {r:.2f})"
-                yield Doubt(own, said, stops=True)
             elif r < 0.2:
                 said = (
                     f"{own} does not follow {place} (correlation {r:.2f}): one of them is in body axes, or axes are "
                     "exchanged"
                 )
-                yield Doubt(own, said, stops=True)
             elif r > _AGREES and not same_unit[0] < scale < same_unit[1]:
                 # Units that are used as well as metres are smaller: the column with the larger numbers is the one.
                 what, which = (own, "the velocity") if scale > 1 else (place, "the position")
                 said = f"{own} is {scale:.3g} times the derivative of {place}, expected 1: {which} is in another unit"
-                yield Doubt(what, said, stops=True)
+            else:
+                continue
+            yield Doubt(what, said, stops=True)
     if attitude is None or force is None:
         return
     known = np.isfinite(attitude).all(axis=1) & np.isfinite(force).all(axis=1)
@@ -417,11 +418,7 @@ def _command_order(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Do
         return
     _, follows = scipy.optimize.linear_sum_assignment(alike, maximize=True)
     wrong = [i for i, k in enumerate(follows) if i != k]
-    if (
-        wrong
-        and min(alike[i, follows[i]] for i in wrong) > _FOLLOWS
-        and max(alike[i, i] for i in wrong) < 0.5 * _FOLLOWS
-    ):
+    if wrong and alike[wrong, follows[wrong]].min() > _FOLLOWS and alike[wrong, wrong].max() < 0.5 * _FOLLOWS:
         pairs = ", ".join(f"rotor {i + 1} follows command {follows[i] + 1}" for i in wrong)
         yield Doubt("rotors", f"commands and measured speeds are in different orders: {pairs}", stops=True)
 

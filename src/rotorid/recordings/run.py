@@ -96,6 +96,11 @@ class Run:
         return replace(self, table=self.table.assign(**columns)) if columns else self
 
     @property
+    def where(self) -> str:
+        """The run's file, or its name where it was never one, for messages."""
+        return self.path or f"run {self.name}"
+
+    @property
     def unknown_columns(self) -> tuple[str, ...]:
         """Columns without a meaning in the contract, kept as candidate regime variables."""
         return tuple(n for n in self.table.columns if not c.is_known(n))
@@ -126,6 +131,11 @@ class RecordingSet:
     """One sentence for each run that could not be used."""
     proposed: tuple[Doubt, ...] = ()
     """Values of the vehicle that nobody measured."""
+
+    @property
+    def where(self) -> str:
+        """The set's folder, or its name where it was never one, for messages."""
+        return self.path or self.name
 
     def without(self, names: Collection[str]) -> RecordingSet:
         """The set without these columns in any run."""

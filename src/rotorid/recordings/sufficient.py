@@ -148,7 +148,7 @@ def _with_alike_runs(recordings: RecordingSet) -> RecordingSet:
     if not poor:
         return recordings
     if 2 * len(poor) < len(recordings.runs):
-        lost = [(_whereof(run), listed(sorted(every - channels[run.name]))) for run in poor]
+        lost = [(run.where, listed(sorted(every - channels[run.name]))) for run in poor]
         said = [f"Left out: {run}: lacks sensors that the other runs have (for {names})." for run, names in lost]
         return recordings.mended((run for run in recordings.runs if run not in poor), said)
     partly = [names for names in SENSORS if not all(_reads(run, names) for run in recordings.runs)]
@@ -177,11 +177,6 @@ def channels_of(run: Run) -> set[str]:
     return {name for name, there in found.items() if there}
 
 
-def _whereof(run: Run) -> str:
-    """The run's file, or its name where it was never one."""
-    return run.path or f"run {run.name}"
-
-
 def driven_by(run: Run, vehicle: Vehicle) -> tuple[str, ...]:
     """Columns that the rotors' speeds are known from; empty where no kind of them is whole."""
     return next((names for names in vehicle.rotor_groups().values() if names and run.has(*names)), ())
@@ -203,9 +198,7 @@ def _check_spelling(run: Run, vehicle: Vehicle) -> None:
         meant = next((name for name in missing if plain(name) == plain(column)), None)
         meant = meant or nearest(column, halved, _SURELY_MEANT)
         if meant:
-            raise InputError(
-                f"{_whereof(run)}: column {column} is not known and {meant} is missing; did you mean {meant}?"
-            )
+            raise InputError(f"{run.where}: column {column} is not known and {meant} is missing; did you mean {meant}?")
 
 
 def _absurd(run: Run, vehicle: Vehicle) -> str | None:
@@ -221,7 +214,7 @@ def _absurd(run: Run, vehicle: Vehicle) -> str | None:
         if len(bad):
             unit = c.unit_of(column)
             return (
-                f"{_whereof(run)}, {place(run.path, bad[0])}, column {column}: found {values[bad[0]]:g}, expected a "
+                f"{run.where}, {place(run.path, bad[0])}, column {column}: found {values[bad[0]]:g}, expected a "
                 f"number of at most {most:g}{' ' + unit if unit else ''} (an empty cell where nothing was measured)"
             )
     return None
@@ -238,22 +231,21 @@ def _no_attitude(run: Run, vehicle: Vehicle) -> str | None:
         return None
     many = f" ({len(bad)} of {len(norm)} samples are like it)" if len(bad) > 1 else ""
     return (
-        f"{_whereof(run)}, {place(run.path, bad[0])}, columns quaternion_w to quaternion_z: found the norm "
+        f"{run.where}, {place(run.path, bad[0])}, columns quaternion_w to quaternion_z: found the norm "
         f"{norm[bad[0]]:.3g}, expected 1{many}; leave the cells empty where the attitude is not known"
     )
 
 
 def _uneven_clock(run: Run, vehicle: Vehicle) -> str | None:
     """A clock that jumps so far, or counts in such a unit, that no even grid can hold the run."""
-    if jumped := clock_jump(run.time_s, _whereof(run)):
+    if jumped := clock_jump(run.time_s, run.where):
         return jumped
     median = float(np.median(np.diff(run.time_s)))
     if vehicle.kind == "flight" and median * _LEAST_FLIGHT_HZ > 1:
         unit = next((u for factor, u in ((1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds"))
                      if 1e-4 < median / factor < 0.2), None)  # fmt: skip
         return (
-            f"{_whereof(run)}: {c.TIME} has a usual step of {median:.6g} s, "
-            f"expected at most {1 / _LEAST_FLIGHT_HZ:g} s "
+            f"{run.where}: {c.TIME} has a usual step of {median:.6g} s, expected at most {1 / _LEAST_FLIGHT_HZ:g} s "
             f"({_LEAST_FLIGHT_HZ:g} samples a second)" + (f"; is it in {unit}?" if unit else "")
         )
     return None
@@ -272,7 +264,7 @@ def _no_rotors(run: Run, vehicle: Vehicle) -> str | None:
         state = "empty" if len(empty) == len(lost) else "missing"
         found = len(names) - len(lost)
         return (
-            f"{_whereof(run)}: {'columns' if len(lost) > 1 else 'column'} {listed(lost)} "
+            f"{run.where}: {'columns' if len(lost) > 1 else 'column'} {listed(lost)} "
             f"{'are' if len(lost) > 1 else 'is'} {state}: vehicle.yaml lists {len(names)} rotors, the run has "
             f"the {kind.replace('_', ' ')} of {found}, and no other kind of rotor column is whole{_likely(run, lost)}"
         )
@@ -280,7 +272,7 @@ def _no_rotors(run: Run, vehicle: Vehicle) -> str | None:
     empty = [n for n in (*speeds, *commands, *throttles) if n in there]
     found = f" ({listed(empty)} {'are' if len(empty) > 1 else 'is'} empty)" if empty else ""
     return (
-        f"{_whereof(run)}: no thrust can be predicted without {speeds[0]} to {speeds[-1]}, {commands[0]} … or "
+        f"{run.where}: no thrust can be predicted without {speeds[0]} to {speeds[-1]}, {commands[0]} … or "
         f"{throttles[0]} …: none of these columns has a value{found}{_likely(run, (*speeds, *commands, *throttles))}"
     )
 
@@ -319,7 +311,7 @@ def _still_rotors(run: Run, vehicle: Vehicle) -> str | None:
             return None
         because = f" although the sensor reads {largest:.3g} N" + (" and commands are given" if commanded else "")
     return (
-        f"{_whereof(run)}: columns {names[0]} to {names[-1]} are 0 throughout{because}, expected the speeds that the "
+        f"{run.where}: columns {names[0]} to {names[-1]} are 0 throughout{because}, expected the speeds that the "
         "rotors turned at (leave the columns out where nothing was measured)"
     )
 
@@ -336,7 +328,7 @@ def _nothing_compared(run: Run, vehicle: Vehicle) -> str | None:
             return None
         wanted = (*c.SPECIFIC_FORCE, *c.ANGULAR_VELOCITY, *c.QUATERNION)
         return (
-            f"{_whereof(run)}: nothing can be compared without {c.SPECIFIC_FORCE[0]} …, {c.ANGULAR_VELOCITY[0]} … or "
+            f"{run.where}: nothing can be compared without {c.SPECIFIC_FORCE[0]} …, {c.ANGULAR_VELOCITY[0]} … or "
             f"quaternion_w …: no such sensor has values in all its columns{_likely(run, wanted)}"
         )
     if vehicle.kind == "stand":
@@ -344,16 +336,16 @@ def _nothing_compared(run: Run, vehicle: Vehicle) -> str | None:
         if any(run.has(n) for n in names):
             return None
         return (
-            f"{_whereof(run)}: nothing can be compared without {names[0]} … or {c.MOMENT[0]} …: none of these columns "
+            f"{run.where}: nothing can be compared without {names[0]} … or {c.MOMENT[0]} …: none of these columns "
             f"has a value{_likely(run, names)}"
         )
-    pairs = tuple(zip(c.FORCE, c.REFERENCE_FORCE, strict=True))
-    if any(run.has(a, b) for a, b in pairs):
+    pairs = c.REFERENCE_OF.items()
+    if any(run.has(*pair) for pair in pairs):
         return None
     half = next(((b if run.has(a) else a, a if run.has(a) else b) for a, b in pairs if run.has(a) or run.has(b)), None)
     what = f"column {half[0]} is missing where {half[1]} is there" if half else "there is no such pair of columns"
     return (
-        f"{_whereof(run)}: nothing can be compared without a force_x_n … and its reference_force_x_n …: {what}"
+        f"{run.where}: nothing can be compared without a force_x_n … and its reference_force_x_n …: {what}"
         f"{_likely(run, (*c.FORCE, *c.REFERENCE_FORCE))}"
     )
 
@@ -368,9 +360,8 @@ def compared_readings(run: Run, vehicle: Vehicle) -> list[str]:
     """Columns of a stand or bench whose values are compared, on a bench with the loads that they are compared with."""
     names = [n for n in c.FORCE + c.MOMENT if run.has(n)]
     if vehicle.kind == "bench":
-        pairs = dict(zip(c.FORCE, c.REFERENCE_FORCE, strict=True))
-        names = [n for n in names if n in pairs and run.has(pairs[n])]
-        names += [pairs[n] for n in names]
+        names = [n for n in names if n in c.REFERENCE_OF and run.has(c.REFERENCE_OF[n])]
+        names += [c.REFERENCE_OF[n] for n in names]
     return names
 
 
@@ -386,7 +377,7 @@ def _too_short(run: Run, vehicle: Vehicle) -> str | None:
         if longest >= needed:
             return None
         return (
-            f"{_whereof(run)}: too little data: the longest stretch in which every sensor has readings lasts "
+            f"{run.where}: too little data: the longest stretch in which every sensor has readings lasts "
             f"{longest:.3g} s, expected at least {needed:.3g} s"
         )
     names = compared_readings(run, vehicle)
@@ -394,7 +385,7 @@ def _too_short(run: Run, vehicle: Vehicle) -> str | None:
     if count >= least_readings:
         return None
     return (
-        f"{_whereof(run)}: too little data: {count} samples have a value in {listed(names)} at once, expected at least "
+        f"{run.where}: too little data: {count} samples have a value in {listed(names)} at once, expected at least "
         f"{least_readings}"
     )
 
@@ -402,9 +393,8 @@ def _too_short(run: Run, vehicle: Vehicle) -> str | None:
 def _hardly_sampled(run: Run, vehicle: Vehicle) -> str | None:
     """A run of next to no samples."""
     count = len(run.table)
-    if count >= LEAST_VALUES:
-        return None
-    return f"{_whereof(run)}: too little data: found {count} samples, expected some seconds of them"
+    said = f"{run.where}: too little data: found {count} samples, expected some seconds of them"
+    return said if count < LEAST_VALUES else None
 
 
 _LOOKS: tuple[Callable[[Run, Vehicle], str | None], ...] = (
@@ -431,7 +421,7 @@ def _check_not_constant(recordings: RecordingSet) -> None:
             held = np.nanmax(runs[0].array(names), axis=0)
             found = listed([f"{n} = {v:g}" for n, v in zip(names, held, strict=True)], most=6)
             raise InputError(
-                f"{recordings.path or recordings.name}: nothing can be compared: the rotors' commands hold one value "
+                f"{recordings.where}: nothing can be compared: the rotors' commands hold one value "
                 f"in every run ({found}), expected the changes that keep a vehicle in the air; leave them out where "
                 "nothing was recorded"
             )
@@ -442,7 +432,7 @@ def _check_not_constant(recordings: RecordingSet) -> None:
         return
     found = listed([f"{name} = {np.nanmax(v):g}" for name, v in values.items()], most=6)
     raise InputError(
-        f"{recordings.path or recordings.name}: nothing can be compared: every reading holds one value in every run "
+        f"{recordings.where}: nothing can be compared: every reading holds one value in every run "
         f"({found}), expected the noise of a sensor and loads that differ"
     )
 
@@ -458,7 +448,7 @@ def _check_single(recordings: RecordingSet) -> None:
         lasts = float(known[-1] - known[0])
         if lasts < needed:
             raise InputError(
-                f"{_whereof(run)}: too little data: a single run must last at least {needed:.3g} s, because its last "
+                f"{run.where}: too little data: a single run must last at least {needed:.3g} s, because its last "
                 f"third is held out, after a gap; found {lasts:.3g} s"
             )
         return
@@ -467,7 +457,7 @@ def _check_single(recordings: RecordingSet) -> None:
         why = _first_reason(recordings)
         others = f", and the other runs cannot be used ({why})" if why else ""
         raise InputError(
-            f"{_whereof(run)}: too little data: a single run must last at least {LEAST_SINGLE_S:g} s without a hole, "
+            f"{run.where}: too little data: a single run must last at least {LEAST_SINGLE_S:g} s without a hole, "
             f"because its last third is held out; found {longest:.3g} s{others}"
         )
 
@@ -477,14 +467,13 @@ def _check_common(recordings: RecordingSet) -> None:
     vehicle, runs = recordings.vehicle, recordings.runs
     if vehicle.kind == "flight":
         if not set.intersection(*(channels_of(r) for r in runs)):
-            raise InputError(f"{recordings.path or recordings.name}: no force or moment is there in every run")
+            raise InputError(f"{recordings.where}: no force or moment is there in every run")
         return
-    pairs = dict(zip(c.FORCE, c.REFERENCE_FORCE, strict=True))
     names = [n for n in c.FORCE + c.MOMENT if all(r.has(n) for r in runs)]
     if vehicle.kind == "bench":
-        names = [n for n in names if n in pairs and any(r.has(pairs[n]) for r in runs)]
+        names = [n for n in names if n in c.REFERENCE_OF and any(r.has(c.REFERENCE_OF[n]) for r in runs)]
     if not names:
-        raise InputError(f"{recordings.path or recordings.name}: no force or moment is compared in every run")
+        raise InputError(f"{recordings.where}: no force or moment is compared in every run")
 
 
 def _first_reason(recordings: RecordingSet) -> str:
@@ -613,5 +602,4 @@ def _wanted(recordings: RecordingSet) -> dict[str, list[tuple[str, ...]]]:
             along = f"{group} along {listed(axes)}" if 0 < len(axes) < 3 else f"{group}s"
             wrench[along] = [tuple(name for name in names if not axes or not there(name))]
         return wrench | turning | {"attitude of the mount": [c.MOUNT]} | voltage
-    pairs = zip(c.FORCE, c.REFERENCE_FORCE, strict=True)
-    return {name: [(name,)] for pair in pairs if any(map(there, pair)) for name in pair}
+    return {name: [(name,)] for pair in c.REFERENCE_OF.items() if any(map(there, pair)) for name in pair}

@@ -466,7 +466,12 @@ def _connected(names: list[str], differences: list[_LatenessFound]) -> list[list
     return [sorted(g) for g in groups]
 
 
-_PREFERRED = ("gyroscope", "attitude", "accelerometer", "velocity", "rotors")
+def _trust(sensor: str) -> int:
+    """The place of a sensor among those whose clocks are believed, the first before others."""
+    order = ("gyroscope", "attitude", "accelerometer", "velocity", "rotors")
+    return order.index(sensor) if sensor in order else len(order)
+
+
 _INERTIAL = ("gyroscope", "accelerometer")
 
 
@@ -491,8 +496,7 @@ def in_agreement(solved: Lateness, group: list[str], least: dict[str, float], si
     for candidate in group:
         own = list(next(s for s in sets if candidate in s))
         late = [n for n in group if n not in own and (filtered(n, candidate) or filtered(candidate, n))]
-        preferred = -min((_PREFERRED.index(n) for n in own if n in _PREFERRED), default=len(_PREFERRED))
-        rank = (len(own) + len(late), len(own), preferred)
+        rank = (len(own) + len(late), len(own), -min(map(_trust, own)))
         if best is None or rank > best[0]:
             kept = own
             if late and any(filtered(candidate, n) for n in late):
@@ -511,9 +515,15 @@ def _relative_to_most(
     """
     zeros = [in_agreement(solved, group, least, sigmas, filter_s) for group in solved.groups]
     found = [_over_known(solved, group, right) for group, right in zip(solved.groups, zeros, strict=True)]
-    off = [{n: v for n, v in part.items() if _stands_out(n, v, least, sigmas)} for part in found]
+    off = [{n: v for n, v in part.items() if abs(v[0]) > max(least[n], sigmas * v[1], v[2])} for part in found]
+
+    def opposite(one: tuple[float, float, float], other: tuple[float, float, float]) -> bool:
+        """Whether two values differ in nothing but their sign."""
+        slack = max(filter_s, sigmas * np.hypot(one[1], other[1]))
+        return one[0] * other[0] < 0 and abs(one[0] + other[0]) < slack
+
     for a, b in permutations(range(len(off)), 2):
-        same = [n for n, v in off[b].items() if any(_opposite(v, w, sigmas, filter_s) for w in off[a].values())]
+        same = [n for n, v in off[b].items() if any(opposite(v, w) for w in off[a].values())]
         if same and len(off[b]) == len(same) and len(off[a]) >= len(off[b]):
             found[b] = _over_known(solved, solved.groups[b], same)
             break
@@ -527,15 +537,6 @@ def _over_known(solved: Lateness, group: list[str], right: list[str]) -> dict[st
         against = [solved.over(n, [c]) for c in right if c != n]
         out[n] = solved.over(n, right) if n in right else min(against, key=lambda v: v[1] + v[2])
     return out
-
-
-def _stands_out(name: str, value: tuple[float, float, float], least: dict[str, float], sigmas: float) -> bool:
-    return abs(value[0]) > max(least[name], sigmas * value[1], value[2])
-
-
-def _opposite(one: tuple[float, float, float], other: tuple[float, float, float], sigmas: float, slack: float) -> bool:
-    """Whether two values differ in nothing but their sign."""
-    return one[0] * other[0] < 0 and abs(one[0] + other[0]) < max(slack, sigmas * np.hypot(one[1], other[1]))
 
 
 def _own_period_s(all_signals: list[Signals]) -> dict[str, float]:
@@ -566,9 +567,8 @@ def _one_clock(differences: list[_LatenessFound], growing: list[_LatenessFound])
         left[name] = sum(
             (d.growth - d.of.part([name]) * rate) ** 2 / (d.sd(1) ** 2 + d.bound(1) ** 2) for d in differences
         )
-    trusted = {n: _PREFERRED.index(n) if n in _PREFERRED else len(_PREFERRED) for n in names}
     alike = [n for n in names if left[n] < min(left.values()) + as_well]
-    return tuple(sorted(alike, key=lambda n: (-trusted[n], n)))
+    return tuple(sorted(alike, key=lambda n: (-_trust(n), n)))
 
 
 def _skew(recordings: ReadSet, known: list[_SensorPair]) -> Corrected:

@@ -442,10 +442,7 @@ def _channels(values: Values, outputs: pd.DataFrame) -> tuple[dict[int, int], li
 def _throttles(outputs: pd.DataFrame, stated: Parameters, frame: float, faults: list[ImportFault]) -> list[tuple]:
     """Throttles with their times, each pulse by the parameters that held then; no pulse stops a motor."""
     times, throttles = outputs[c.TIME].to_numpy(float), {}
-    for start, stop, values in stated.spans(_CHANGED[0][0]):
-        inside = (times >= start) & (times < stop)
-        if not inside.any():
-            continue
+    for inside, values in stated.spans(_CHANGED[0][0], times):
         channels, kind = _channels({**values, "FRAME_CLASS": frame}, outputs)[0], int(values.get("MOT_PWM_TYPE", 0))
         every = outputs.loc[inside, [f"C{number}" for number in channels.values()]].to_numpy(float)
         short = kind in _SHORT and 0 < np.nanmax(every, initial=0.0) <= _LONGEST_SHORT_US

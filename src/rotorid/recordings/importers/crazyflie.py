@@ -221,7 +221,7 @@ def convert(log: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
     return table, faults + repeated + wild
 
 
-def in_the_air(table: pd.DataFrame, shortest_s: float = 4.0, margin_s: float = 1.0) -> list[tuple[float, float]]:
+def in_the_air(table: pd.DataFrame, shortest_s: float = 4.0) -> list[tuple[float, float]]:
     """Start and stop of every flight in a log: motors above 30 % and, where known, 0.1 m off the ground.
 
     The public recordings are cut so, with a second at each end, wherever a log begins or ends.
@@ -230,7 +230,7 @@ def in_the_air(table: pd.DataFrame, shortest_s: float = 4.0, margin_s: float = 1
     if "position_z_m" in table:
         flying &= -table["position_z_m"].to_numpy() > 0.1
     time = table[c.TIME].to_numpy()
-    return [(a + margin_s, b - margin_s) for a, b in true_stretches(flying, time, shortest_s)]
+    return [(a + 1.0, b - 1.0) for a, b in true_stretches(flying, time, shortest_s)]
 
 
 def _flown_stretches(table: pd.DataFrame) -> list[tuple[float, float]]:

@@ -34,7 +34,6 @@ _NEAR_WEIGHT = 0.85
 _LIFTS = 0.95
 """Share of the throttle of flight that a stretch begins and ends with: less is spool-up or a vehicle that settles."""
 _SMOOTHED_S = 1.0
-_SPEEDS = ("rotor_speed", "rotor_command")
 GOES_ON = 0.9
 """Share of the time that others of its kind go on which a sensor has at least, unless it stands still or ends early."""
 _SHUFFLED, LATE_STEPS = 0.05, 100.0
@@ -481,7 +480,8 @@ def airborne(table: pd.DataFrame, stated: np.ndarray | None = None) -> tuple[np.
     time_s = table[c.TIME].to_numpy(float)
     flying = np.ones(len(table), bool) if stated is None else stated
     # What drives the rotors (n, k): throttles, else measured, else commanded speeds.
-    kinds = ([n for n in table if c.rotor_number(n) and n.startswith(k)] for k in ("throttle", *_SPEEDS))
+    order = ("throttle", "rotor_speed", "rotor_command")
+    kinds = ([n for n in table if c.rotor_number(n) and n.startswith(kind)] for kind in order)
     drive = next((table[n].to_numpy(float) for n in kinds if n and table[n].notna().any().all()), None)
     felt = set(c.SPECIFIC_FORCE) <= set(table)
     if drive is None or len(table) < 2 or not flying.any() or (not felt and stated is not None):

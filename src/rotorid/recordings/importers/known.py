@@ -92,11 +92,12 @@ class Parameters:
             latest[name] = value
         return cls(first, tuple(sorted(changes, key=lambda change: change[0])))
 
-    def spans(self, names: str) -> list[tuple[float, float, Values]]:
-        """Spans of the log [from, to) in which no parameter whose whole name matches `names` changes, with the values
-        that hold in each; the first begins and the last ends at infinity."""
+    def spans(self, names: str, times: np.ndarray) -> list[tuple[np.ndarray, Values]]:
+        """Spans of the log in which no parameter whose whole name matches `names` changes: which of some instants (n,)
+        are in each, a mask, and the values that hold there; none without an instant."""
         cuts = sorted({time for time, name, _ in self.changes if re.fullmatch(names, name)})
-        return [(a, b, self.at(a)) for a, b in pairwise([-np.inf, *cuts, np.inf])]
+        every = [((times >= a) & (times < b), self.at(a)) for a, b in pairwise([-np.inf, *cuts, np.inf])]
+        return [(inside, values) for inside, values in every if inside.any()]
 
     def at(self, time: float) -> Values:
         """What holds at an instant."""

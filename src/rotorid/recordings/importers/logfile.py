@@ -198,60 +198,40 @@ def in_unit_of_weight(
 ) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
     """Flights whose rotor speeds are in the unit that carries the weight, and what was changed.
 
+    It is the stated one where its speeds are possible, or no other's are.
     `runs` are in contract columns, rotor speeds by the unit that the log states: `stated` has it for each run (`rad/s`,
     `rpm` or `hz`). The mass is as flown; C_F is that of usual propellers where it is not known.
     """
+    possible = 2.2  # Speeds of hover within this factor are.
+    expected = coefficient_n_s2 or usual_coefficient(mass_kg, rotors)
     out, faults = dict(runs), []
     for written in dict.fromkeys(stated[run] for run in runs):
         mine = [run for run in runs if stated[run] == written]
         for kind in ("rotor_speed", "rotor_command"):
             names = list(c.rotor_columns(kind, rotors))
             tables = [out[run] for run in mine]
-            unit, off = carrying_unit(tables, kind, written, mass_kg, rotors, coefficient_n_s2)
-            if unit == written:
-                if not 1 / _IMPOSSIBLE < off < _IMPOSSIBLE and np.isfinite(off):
-                    found = (
-                        f"in {written}, as stated, the rotors hover at {off:.2g} times the speed that carries "
-                        f"{mass_kg:.3g} kg, which no unit explains: electrical turns (divide by half of the motor's "
-                        "poles), or another vehicle"
-                    )
-                    faults.append(ImportFault("unit", kind, found, "kept as recorded", sum(len(t) for t in tables)))
+            flown = thrust_coefficient(tables, mass_kg, rotors, kind=kind)
+            # Speed of hover in the unit that is stated, over the one expected.
+            off = 1.0 if flown is None else float(np.sqrt(expected / flown))
+            if 1 / _IMPOSSIBLE < off < _IMPOSSIBLE:
                 continue
-            factor = UNITS["rotor"][unit] / UNITS["rotor"][written]
+            factors = {u: f / UNITS["rotor"][written] for u, f in UNITS["rotor"].items() if u != written}
+            unit = min(factors, key=lambda u, off=off, factors=factors: abs(np.log(off * factors[u])))
+            hover = f"the rotors hover at {off:.2g} times the speed that carries {mass_kg:.3g} kg"
+            samples = sum(len(t) for t in tables)
+            if abs(np.log(off * factors[unit])) >= np.log(possible):
+                found = (
+                    f"in {written}, as stated, {hover}, which no unit explains: electrical turns (divide by "
+                    "half of the motor's poles), or another vehicle"
+                )
+                faults.append(ImportFault("unit", kind, found, "kept as recorded", samples))
+                continue
             for run in mine:
                 if set(names) <= set(out[run].columns):
-                    out[run] = out[run].assign(**{name: out[run][name] * factor for name in names})
-            found = (
-                f"in {written}, as the log states, the rotors hover at {off:.2g} times the speed that carries "
-                f"{mass_kg:.3g} kg, in {unit} at {off * factor:.2g} times"
-            )
-            faults.append(ImportFault("unit", kind, found, f"taken as {unit}", sum(len(t) for t in tables)))
+                    out[run] = out[run].assign(**{name: out[run][name] * factors[unit] for name in names})
+            found = f"in {written}, as the log states, {hover}, in {unit} at {off * factors[unit]:.2g} times"
+            faults.append(ImportFault("unit", kind, found, f"taken as {unit}", samples))
     return out, faults
-
-
-def carrying_unit(
-    tables: Sequence[pd.DataFrame],
-    kind: str,
-    stated: str,
-    mass_kg: float,
-    rotors: int,
-    coefficient_n_s2: float | None = None,
-) -> tuple[str, float]:
-    """The unit of speeds that carries the weight, and the speed of hover in the stated one over the one expected.
-
-    The stated one where its speeds are possible, or no other's are.
-    """
-    possible = 2.2  # Speeds of hover within this factor are.
-    flown = thrust_coefficient(tables, mass_kg, rotors, kind=kind)
-    if flown is None:
-        return stated, np.nan
-    expected = coefficient_n_s2 or usual_coefficient(mass_kg, rotors)
-    off = float(np.sqrt(expected / flown))
-    if 1 / _IMPOSSIBLE < off < _IMPOSSIBLE:
-        return stated, off
-    others = {u: abs(np.log(off * f / UNITS["rotor"][stated])) for u, f in UNITS["rotor"].items() if u != stated}
-    best = min(others, key=others.get)
-    return (best, off) if others[best] < np.log(possible) else (stated, off)
 
 
 @dataclass(frozen=True)

@@ -286,9 +286,9 @@ def of_motors(data: _Fields, rotors: int, parameters: Parameters = _UNKNOWN) -> 
     faults = _more_rotors("actuator_motors", driven_motors(data), rotors)
     values, stopped = stops(values, names, "NaN")
     values, reversed_ = one_sense(values, names, 1.0)
-    for start, stop, stated in parameters.spans(_CHANGED[0][0]):
-        inside, curve = (times >= start) & (times < stop), float(stated.get("THR_MDL_FAC", 0.0))
-        if 0 < curve <= 1 and inside.any():  # PX4 turns the thrust asked for into the signal by this curve
+    for inside, stated in parameters.spans(_CHANGED[0][0], times):
+        curve = float(stated.get("THR_MDL_FAC", 0.0))
+        if 0 < curve <= 1:  # PX4 turns the thrust asked for into the signal by this curve
             half = (1 - curve) / (2 * curve)
             values[inside] = np.sqrt(half**2 + values[inside] / curve) - half
             seen = f"THR_MDL_FAC is {curve:g}: actuator_motors holds thrusts"
@@ -337,8 +337,7 @@ def _from_outputs(log: Px4Log, instances: Sequence[_Fields], rotors: int) -> _Pa
         faults += _more_rotors("actuator_outputs", rotors + len(further_motors(every, rotors)), rotors)
     times, given = _time(instances[chosen], sampled=False), stacks[chosen]
     throttle = np.full(given.shape, np.nan)
-    for start, stop, values in log.parameters.spans(_CHANGED[0][0]):
-        inside = (times >= start) & (times < stop)
+    for inside, values in log.parameters.spans(_CHANGED[0][0], times):
         low, high, by = _ends_of(values, port, outputs)
         share = (given[inside] - low) / (high - low)
         turning = given[inside] > 0
@@ -347,8 +346,6 @@ def _from_outputs(log: Px4Log, instances: Sequence[_Fields], rotors: int) -> _Pa
             found = f"outputs from {own.min():g} to {own.max():g} are not {by or 'pulse widths in µs'}"
             return _no_throttle("unit", names, found, len(given), faults)
         throttle[inside] = share
-        if not inside.any():
-            continue
         ends = f"{low[0]:g} and {high[0]:g}"
         if not by:
             found = "no parameter states the pulse widths of no and full throttle"
@@ -660,15 +657,14 @@ def convert(log: Px4Log, rotors: int) -> tuple[pd.DataFrame, list[ImportFault], 
     jumps, reset = jumps_at(table[c.TIME].to_numpy(), times, JUMPED)
     faults += reset
     faults += log.parameters.faults(_CHANGED, float(grid[0]), 1e-6)
-    if log.stray:
-        faults.append(ImportFault("damaged", "", f"{log.stray} bytes stand in front of the header", "left out"))
-    if log.rest:
-        faults.append(cut_off(f"the file ends inside a message, after {log.rest} bytes of it"))
-    if log.damaged:
-        faults.append(ImportFault("damaged", "", "the file is damaged", "what could be read is kept"))
-    if log.lost_s:
-        found = f"the logger lost {len(log.lost_s)} stretches, {sum(log.lost_s):.3g} s in all"
-        faults.append(ImportFault("dropout", c.TIME, found, "left as gaps", len(log.lost_s)))
+    lost = f"the logger lost {len(log.lost_s)} stretches, {sum(log.lost_s):.3g} s in all"
+    met = (
+        (log.stray, ImportFault("damaged", "", f"{log.stray} bytes stand in front of the header", "left out")),
+        (log.rest, cut_off(f"the file ends inside a message, after {log.rest} bytes of it")),
+        (log.damaged, ImportFault("damaged", "", "the file is damaged", "what could be read is kept")),
+        (log.lost_s, ImportFault("dropout", c.TIME, lost, "left as gaps", len(log.lost_s))),
+    )
+    faults += [fault for there, fault in met if there]
     return table, faults + report_gaps(table), flying & ~jumps, jumps
 
 

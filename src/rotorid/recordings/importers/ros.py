@@ -251,8 +251,8 @@ def _read_px4(found: _BagContent) -> list[ImportFault]:
 
 def _by_rosbags(path: Path) -> _BagContent:
     """A bag, MCAP file or folder of one that is whole and holds ROS alone."""
-    highlevel = needs("rosbags.highlevel", "ros", path)
-    typesys = needs("rosbags.typesys", "ros", path)
+    highlevel = needs("rosbags.highlevel", path)
+    typesys = needs("rosbags.typesys", path)
     found = _BagContent()
     with (
         Unpacking(path).in_rosbags(),
@@ -299,7 +299,7 @@ def _by_records(path: Path) -> _BagContent:
 
 def _found(path: Path) -> _BagContent:
     """InputError where nothing of a bag can be read."""
-    needs("rosbags.highlevel", "ros", path)
+    needs("rosbags.highlevel", path)
     try:
         return _by_rosbags(path)
     except (MemoryError, InputError):
