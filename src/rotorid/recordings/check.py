@@ -29,13 +29,8 @@ from rotorid.recordings import columns as c
 from rotorid.recordings.files import RUN_SUFFIXES, read_set, run_name
 from rotorid.recordings.held import (
     OTHERS_GO_ON,
-    SHORTEST_FREEZE_PERIODS,
-    SHORTEST_FREEZE_S,
-    SHORTEST_GAP_PERIODS,
-    SHORTEST_GAP_S,
     at_the_end,
-    contradiction,
-    held,
+    held_in,
     noisy_columns,
     standing_together,
     step_of,
@@ -43,7 +38,7 @@ from rotorid.recordings.held import (
 )
 from rotorid.recordings.physics import gravity, impossible_values, near_names, physical_doubts, voltages
 from rotorid.recordings.run import Doubt, RecordingSet, Run
-from rotorid.recordings.sufficient import SENSORS, compared_readings, rotor_groups, sufficient
+from rotorid.recordings.sufficient import SENSORS, compared_readings, sufficient
 from rotorid.recordings.vehicle import Vehicle
 
 _STUCK_ROWS, _STUCK_TIMES = 8, 4.0
@@ -222,7 +217,7 @@ def _contents(recordings: RecordingSet) -> SetCheck:
         if not has(c.BATTERY_VOLTAGE):
             lacks.append("No battery voltage: battery sag shows only as a drift in time.")
     else:
-        for force, reference in zip(c.FORCE, c.REFERENCE_FORCE, strict=True):
+        for force, reference in c.REFERENCE_OF.items():
             if has(force) != has(reference):
                 lacks.append(f"{force} and {reference} are not both there: that axis cannot be compared.")
     if len(recordings.runs) == 1:
@@ -301,13 +296,14 @@ def copies(recordings: RecordingSet) -> tuple[Doubt, ...]:
         found.setdefault(second, (first, f"{share:.0%} of its samples are equal to the last digit{later}"))
     rest = [run for run in recordings.runs if run.name not in found]
     noisy = [name for name in names if name in _NOISY]
-    if (
-        len(noisy) >= _LEAST_NOISY
-        and len(rest) > 1
-        and sum(len(run.table) for run in rest) * len(rest) <= most_correlated
-    ):
-        for first, second in _same_noise(rest, noisy):
-            found.setdefault(second, (first, "even the noise of its sensors is the same"))
+    work = sum(len(run.table) for run in rest) * len(rest)
+    if len(noisy) >= _LEAST_NOISY and len(rest) > 1 and work <= most_correlated:
+        noises = [(run.name, _noise(run, noisy)) for run in rest]
+        for (first, own), (second, other) in combinations(noises, 2):
+            # Short blocks spread over the first run.
+            starts = np.unique(np.linspace(0, len(own) - _BLOCK, _BLOCKS).astype(int)) if len(own) >= _BLOCK else ()
+            if any(_lies_in(own[start : start + _BLOCK], other) for start in starts):
+                found.setdefault(second, (first, "even the noise of its sensors is the same"))
     return tuple(
         Doubt(
             second,
@@ -344,30 +340,14 @@ def _equal_samples(runs: tuple[Run, ...], names: list[str]) -> Iterator[tuple[st
             yield runs[a].name, runs[b].name, share, float((equal["time_s"] - equal["time_s_first"]).median())
 
 
-def _same_noise(runs: list[Run], names: list[str]) -> Iterator[tuple[str, str]]:
-    """Names of pairs of runs of which a block of the first lies somewhere in the second."""
-    noises = [_noise(run, names) for run in runs]
-    for (a, first), (b, second) in combinations(zip(runs, noises, strict=True), 2):
-        if any(_lies_in(block, second) for block in _blocks(first)):
-            yield a.name, b.name
-
-
 def _noise(run: Run, names: list[str]) -> np.ndarray:
     """Second differences of the rows that are whole, clipped to a few of their usual size, (n, k)."""
-    values = run.array(tuple(names))
-    noise = np.diff(values[np.isfinite(values).all(axis=1)], n=2, axis=0)
+    noise = np.diff(run.array(tuple(names))[run.complete(names)], n=2, axis=0)
     if not len(noise):
         return noise
     # A single jump would correlate with every other jump.
     most = _JUMP * np.median(np.abs(noise), axis=0)
     return np.clip(noise, -most, most)
-
-
-def _blocks(noise: np.ndarray) -> Iterator[np.ndarray]:
-    """Short blocks spread over a run, (BLOCK, k)."""
-    if len(noise) >= _BLOCK:
-        for start in np.unique(np.linspace(0, len(noise) - _BLOCK, _BLOCKS).astype(int)):
-            yield noise[start : start + _BLOCK]
 
 
 def _lies_in(block: np.ndarray, noise: np.ndarray) -> bool:
@@ -407,7 +387,7 @@ def still_sensors(recordings: RecordingSet) -> Iterator[Doubt]:
     """One doubt for each sensor of a flight that stands still for a time, with the first run and its seconds."""
     still_s = 1.0  # A sensor of a flight that repeats one reading for so long is named.
     runs, vehicle = recordings.runs, recordings.vehicle
-    groups = (*SENSORS, *rotor_groups(vehicle).values())
+    groups = (*SENSORS, *vehicle.rotor_groups().values())
     noisy = noisy_columns(runs, [n for names in groups for n in names])
     found: dict[tuple[str, ...], list[tuple[str, float, float]]] = {}
     for run in runs:
@@ -415,7 +395,7 @@ def still_sensors(recordings: RecordingSet) -> Iterator[Doubt]:
             if not names or not run.has(*names):
                 continue
             rotors = names not in SENSORS
-            whole = standing_together(run, vehicle, names) if rotors else _held(run, vehicle, names, noisy)
+            whole = standing_together(run, vehicle, names) if rotors else held_in(run, vehicle, names, noisy)
             masks = {names: [mask for mask, _ in whole]}
             if rotors and not whole:
                 masks = {(n,): _alone(run, vehicle, n, names, noisy) for n in names}
@@ -435,20 +415,11 @@ def still_sensors(recordings: RecordingSet) -> Iterator[Doubt]:
         )
 
 
-def _held(run: Run, vehicle: Vehicle, names: tuple[str, ...], noisy: set[str]) -> list[tuple[np.ndarray, float]]:
-    """Stretches in which all columns of a sensor repeat one reading."""
-    shortest = (
-        (SHORTEST_FREEZE_S, SHORTEST_FREEZE_PERIODS) if len(names) > 1 else (SHORTEST_GAP_S, SHORTEST_GAP_PERIODS)
-    )
-    alive = not noisy.isdisjoint(names)
-    return held(run.time_s, run.array(names), *shortest, alive, contradiction(run, vehicle, names))
-
-
 def _alone(run: Run, vehicle: Vehicle, name: str, names: tuple[str, ...], noisy: set[str]) -> list[np.ndarray]:
     """Stretches in which one rotor stands still, not at the end of its range, while all others go on."""
     others = [run.column(n) for n in names if n != name]
     out = []
-    for mask, _ in _held(run, vehicle, (name,), noisy):
+    for mask, _ in held_in(run, vehicle, (name,), noisy):
         read = [v[mask][np.isfinite(v[mask])] for v in others]
         go_on = [len(v) > 1 and float((np.diff(v) != 0).mean()) > OTHERS_GO_ON for v in read]
         if go_on and all(go_on) and not at_the_end(run.column(name), mask):
@@ -543,7 +514,7 @@ def _coarse_readings(recordings: RecordingSet) -> Iterator[Doubt]:
 
 def _scattered_rotors(recordings: RecordingSet) -> Iterator[Doubt]:
     """One doubt for each kind of columns of a flight's rotors that have their values in different rows."""
-    for kind, names in rotor_groups(recordings.vehicle).items():
+    for kind, names in recordings.vehicle.rotor_groups().items():
         known = [np.isfinite(run.array(names)) for run in recordings.runs if names and run.has(*names)]
         apart = [float((own.any(axis=1) & ~own.all(axis=1)).mean()) for own in known]
         if max(apart, default=0.0) > _APART:

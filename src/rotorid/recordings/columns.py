@@ -18,24 +18,16 @@ BATTERY_VOLTAGE = "battery_voltage_v"
 BATTERY_CURRENT = "battery_current_a"
 TEMPERATURE = "temperature_c"
 MOUNT = ("roll_rad", "pitch_rad")
+REFERENCE_OF = dict(zip(FORCE, REFERENCE_FORCE, strict=True))
+"""To a force that a bench reads the known one."""
 
-_PER_ROTOR = {
+PER_ROTOR = {
     "rotor_speed": re.compile(r"rotor_speed_(0|[1-9]\d*)_rad_s"),
     "rotor_command": re.compile(r"rotor_command_(0|[1-9]\d*)_rad_s"),
     "throttle": re.compile(r"throttle_(0|[1-9]\d*)"),
 }
-FIXED = frozenset(
-    (TIME, HEIGHT, BATTERY_VOLTAGE, BATTERY_CURRENT, TEMPERATURE)
-    + POSITION
-    + VELOCITY
-    + QUATERNION
-    + ANGULAR_VELOCITY
-    + SPECIFIC_FORCE
-    + FORCE
-    + MOMENT
-    + REFERENCE_FORCE
-    + MOUNT
-)
+_SEVERAL = (POSITION, VELOCITY, QUATERNION, ANGULAR_VELOCITY, SPECIFIC_FORCE, FORCE, MOMENT, REFERENCE_FORCE, MOUNT)
+FIXED = frozenset((TIME, HEIGHT, BATTERY_VOLTAGE, BATTERY_CURRENT, TEMPERATURE)).union(*_SEVERAL)
 
 
 def rotor_columns(kind: str, count: int) -> tuple[str, ...]:
@@ -46,7 +38,7 @@ def rotor_columns(kind: str, count: int) -> tuple[str, ...]:
 
 def rotor_number(column: str) -> tuple[str, int] | None:
     """Kind and rotor number of a per-rotor column, None for any other column."""
-    for kind, pattern in _PER_ROTOR.items():
+    for kind, pattern in PER_ROTOR.items():
         match = pattern.fullmatch(column)
         if match:
             return kind, int(match.group(1))

@@ -15,6 +15,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import yaml
 from pydantic import ValidationError
 
@@ -30,7 +31,6 @@ from rotorid.recordings.tables import (
     numbers,
     parquet_is_here,
     read_cells,
-    read_parquet_cells,
     write_table,
 )
 from rotorid.recordings.vehicle import Vehicle
@@ -110,8 +110,7 @@ def read_run(path: Path) -> Run:
     if name is None:
         raise InputError(f"{path}: expected one of {', '.join(RUN_SUFFIXES)}")
     check_file(path)
-    cells = read_parquet_cells(path) if path.name.endswith(".parquet") else read_cells(path)
-    return Run(name, check_table(numbers(cells, path), str(path)), str(path))
+    return Run(name, check_table(numbers(read_cells(path), path), str(path)), str(path))
 
 
 def run_paths(folder: Path) -> list[Path]:
@@ -230,7 +229,6 @@ def write_set(recordings: RecordingSet, parent: Path, suffix: str = "") -> Path:
 
     `suffix` is one of RUN_SUFFIXES, by default .parquet, and .csv.gz where pyarrow is not installed.
     """
-    suffix = suffix or (".parquet" if parquet_is_here() else ".csv.gz")
     folder = Path(parent) / recordings.name
     if folder.is_dir():
         with staging(folder / "set") as part, only_writer(folder):
@@ -245,14 +243,22 @@ def write_set(recordings: RecordingSet, parent: Path, suffix: str = "") -> Path:
 
 def _write_files(recordings: RecordingSet, folder: Path, suffix: str) -> list[Path]:
     """Write the files of a set; returns them."""
-    written = [folder / VEHICLE, *(folder / f"{run.name}{suffix}" for run in recordings.runs)]
+    written = [folder / VEHICLE]
     write_vehicle(recordings.vehicle, written[0])
-    for run, path in zip(recordings.runs, written[1:], strict=True):
-        write_table(run.table, path)
+    written += write_runs({run.name: run.table for run in recordings.runs}, folder, suffix)
     if recordings.held_out is not None:
         written.append(folder / _SPLIT)
         written[-1].write_text(yaml.safe_dump({"held_out": list(recordings.held_out)}), encoding="utf-8")
     return written
+
+
+def write_runs(tables: Mapping[str, pd.DataFrame], folder: Path, suffix: str = "") -> list[Path]:
+    """Write the tables of runs by name, and return their files; `suffix` as in `write_set`."""
+    suffix = suffix or (".parquet" if parquet_is_here() else ".csv.gz")
+    paths = [folder / f"{name}{suffix}" for name in tables]
+    for table, path in zip(tables.values(), paths, strict=True):
+        write_table(table, path)
+    return paths
 
 
 def list_sets(parent: Path) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 
 import numpy as np
 
@@ -92,6 +92,18 @@ def held(
             continue
         out.append((mask, p))
     return out
+
+
+def held_in(run: Run, vehicle: Vehicle, names: Sequence[str], noisy: Collection[str]) -> list[tuple[np.ndarray, float]]:
+    """Stretches in which all columns of a sensor of a flight repeat one reading, as `held` has them.
+
+    `noisy` columns show in some run noise of their own (`noisy_columns`).
+    """
+    shortest = (
+        (SHORTEST_FREEZE_S, SHORTEST_FREEZE_PERIODS) if len(names) > 1 else (SHORTEST_GAP_S, SHORTEST_GAP_PERIODS)
+    )
+    alive, against = any(n in noisy for n in names), contradiction(run, vehicle, names)
+    return held(run.time_s, run.array(tuple(names)), *shortest, alive, against)
 
 
 def _may_stand(values: np.ndarray, start: int, stop: int, noisy: bool) -> bool:

@@ -78,8 +78,7 @@ def on_own_rates(recordings: RecordingSet) -> RecordingSet:
     torn = 0.8  # Share of a flight in long stretches in which every sensor has readings: below it, gaps are bridged.
     if recordings.vehicle.kind != "flight":
         return recordings
-    kinds = ("rotor_speed", "rotor_command", "throttle")
-    rotors = [c.rotor_columns(kind, recordings.vehicle.rotor_count) for kind in kinds]
+    rotors = list(recordings.vehicle.rotor_groups().values())
     recordings = _with_slow_joined(recordings, rotors)
     sensors = (*rotors, c.POSITION, c.VELOCITY, c.QUATERNION, c.ANGULAR_VELOCITY, c.SPECIFIC_FORCE, (c.HEIGHT,))
     there = {names: [run for run in recordings.runs if _is_read(run, names)] for names in sensors}
@@ -98,7 +97,7 @@ def on_own_rates(recordings: RecordingSet) -> RecordingSet:
     if not own:
         return recordings
     said = [_sentence(there[n], n, period, n in rotors) for n, period in own.items()]
-    return replace(even, left_out=(*recordings.left_out, *said))
+    return recordings.mended(even.runs, said)
 
 
 def _with_slow_joined(recordings: RecordingSet, rotors: Collection[tuple[str, ...]]) -> RecordingSet:
@@ -131,8 +130,8 @@ def _with_slow_joined(recordings: RecordingSet, rotors: Collection[tuple[str, ..
                     curve = scipy.interpolate.make_interp_spline(run.time_s[own], values[own], smooth_degree)
                     out[inside] = curve(run.time_s[inside])
             lowest = 0.0 if np.nanmin(values) >= 0 else -np.inf
-            table = run.table.assign(**dict(zip(names, np.maximum(out, lowest).T, strict=True)))
-            runs[k] = replace(run, table=table, joined_hz={**run.joined_hz, **dict.fromkeys(names, 1 / period)})
+            joined = run.holding(dict(zip(names, np.maximum(out, lowest).T, strict=True)))
+            runs[k] = replace(joined, joined_hz={**run.joined_hz, **dict.fromkeys(names, 1 / period)})
             rates.append(1 / period)
         if rates:
             rate = min(rates)
@@ -141,7 +140,7 @@ def _with_slow_joined(recordings: RecordingSet, rotors: Collection[tuple[str, ..
                 f"faster than {_USED_BAND * rate:.2g} Hz is not in them, and a lag of the motors shorter than "
                 f"{1 / rate:.2g} s cannot be distinguished from a delay."
             )
-    return replace(recordings, runs=tuple(runs), left_out=(*recordings.left_out, *said)) if said else recordings
+    return recordings.mended(runs, said) if said else recordings
 
 
 def _with_grids(
@@ -155,7 +154,7 @@ def _with_grids(
             if _is_read(run, names):
                 values = evenly(run, names, period, jumps=names in rotors)
                 new |= dict(zip(names, values.T, strict=True))
-        runs.append(replace(run, table=run.table.assign(**new)))
+        runs.append(run.holding(new))
     return replace(recordings, runs=tuple(runs))
 
 
@@ -164,7 +163,7 @@ def whole_stretches(run: Run, groups: Iterable[tuple[str, ...]]) -> tuple[list[t
     period, s."""
     time_s, holes, slowest = run.time_s, [], 0.0
     for names in groups:
-        known = time_s[np.isfinite(run.array(names)).all(axis=1)]
+        known = time_s[run.complete(names)]
         if len(known) < LEAST_VALUES:
             return [], float("inf")
         steps = np.diff(known)
@@ -220,7 +219,7 @@ def _steps_s(run: Run, names: tuple[str, ...]) -> list[np.ndarray]:
 
 def _whole_steps_s(run: Run, names: tuple[str, ...]) -> np.ndarray:
     """Steps between the rows in which every column has a reading, s."""
-    return np.diff(run.time_s[np.isfinite(run.array(names)).all(axis=1)])
+    return np.diff(run.time_s[run.complete(names)])
 
 
 def _cuts(steps_s: np.ndarray) -> int:
@@ -331,10 +330,10 @@ def without_spikes(recordings: RecordingSet) -> RecordingSet:
         return recordings
     runs = []
     for run in recordings.runs:
-        clean = {n: np.where(masks[run.name, n], np.nan, run.column(n)) for n in names if (run.name, n) in masks}
-        runs.append(replace(run, table=run.table.assign(**clean)) if clean else run)
+        spoilt = [n for n in names if (run.name, n) in masks]
+        runs.append(run.holding({n: np.where(masks[run.name, n], np.nan, run.column(n)) for n in spoilt}))
     said = [_of_spikes(recordings.runs, n, masks) for n in names if any(column == n for _, column in masks)]
-    return replace(recordings, runs=tuple(runs), left_out=(*recordings.left_out, *said))
+    return recordings.mended(runs, said)
 
 
 def spikes(values: np.ndarray) -> np.ndarray:
@@ -380,11 +379,11 @@ def without_jumps(recordings: RecordingSet) -> RecordingSet:
             if not _is_read(run, names):
                 continue
             out, size, count = _jumps(run, names)
-            read += int(np.isfinite(run.array(names)).all(axis=1).sum())
+            read += int(run.complete(names).sum())
             if out.any():
                 lost, anew, largest = lost + int(out.sum()), anew + count, max(largest, size)
                 values = np.where(out[:, None], np.nan, run.array(names))
-                runs[k] = replace(run, table=run.table.assign(**dict(zip(names, values.T, strict=True))))
+                runs[k] = run.holding(dict(zip(names, values.T, strict=True)))
         if lost:
             far = (
                 f"{np.degrees(largest):.0f} degrees"
@@ -396,7 +395,7 @@ def without_jumps(recordings: RecordingSet) -> RecordingSet:
                 f"{names[0]} to {names[-1]}: the {what} jumps by up to {far} from one reading to the next, as no "
                 f"motion does: {lost} readings ({100 * lost / read:.2g} %) are left out{stays}."
             )
-    return replace(recordings, runs=tuple(runs), left_out=(*recordings.left_out, *said)) if said else recordings
+    return recordings.mended(runs, said) if said else recordings
 
 
 def _jumps(run: Run, names: tuple[str, ...]) -> tuple[np.ndarray, float, int]:
@@ -508,12 +507,12 @@ def with_sizes_of_speeds(recordings: RecordingSet) -> RecordingSet:
         own = [n for n in signed if run.has(n)]
         sizes, backwards = by_sense(run.array(tuple(own)))
         against |= {n: against[n] + int(lost.sum()) for n, lost in zip(own, backwards.T, strict=True)}
-        runs.append(replace(run, table=run.table.assign(**dict(zip(own, sizes.T, strict=True)))))
+        runs.append(run.holding(dict(zip(own, sizes.T, strict=True))))
     said = [
         f"{listed(signed)}: negative readings; a sign that a rotor keeps is its turning sense, and its size is read."
     ]
     said += [f"{n}: the rotor turns backwards in {k} readings: left out." for n, k in against.items() if k]
-    return replace(recordings, runs=tuple(runs), left_out=(*recordings.left_out, *said))
+    return recordings.mended(runs, said)
 
 
 def _around(sizes: np.ndarray) -> np.ndarray:

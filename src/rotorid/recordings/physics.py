@@ -20,6 +20,7 @@ from rotorid.io.text.wording import listed
 from rotorid.recordings import columns as c
 from rotorid.recordings.body import Body, body_of, impossible, quantities
 from rotorid.recordings.run import Doubt, RecordingSet, Run, means_of
+from rotorid.recordings.sufficient import driven_by
 from rotorid.recordings.vehicle import Vehicle
 
 _STEP_S = 0.02
@@ -111,14 +112,12 @@ def _on(run: Run, clock: np.ndarray, names: tuple[str, ...], smooth_s: float = _
 
 def _speeds(run: Run, clock: np.ndarray, vehicle: Vehicle, smooth_s: float = _SMOOTH_S) -> np.ndarray | None:
     """Rotor speeds (n, rotors), rad/s: measured, else commanded, else throttle times the upper limit."""
-    for kind in ("rotor_speed", "rotor_command"):
-        values = _on(run, clock, c.rotor_columns(kind, vehicle.rotor_count), smooth_s)
-        if values is not None:
+    *speeds, throttle = vehicle.rotor_groups().values()
+    for names in speeds:
+        if (values := _on(run, clock, names, smooth_s)) is not None:
             return values
-    throttle = _on(run, clock, c.rotor_columns("throttle", vehicle.rotor_count), smooth_s)
-    if throttle is None or vehicle.rotor_speed_limits_rad_s is None:
-        return None
-    return throttle * vehicle.rotor_speed_limits_rad_s[1]
+    shares, limits = _on(run, clock, throttle, smooth_s), vehicle.rotor_speed_limits_rad_s
+    return None if shares is None or limits is None else shares * limits[1]
 
 
 def _correlation(a: np.ndarray, b: np.ndarray) -> float:
@@ -146,10 +145,8 @@ def _flown(run: Run, vehicle: Vehicle) -> tuple[tuple[float, float], float | Non
     lift = None if force is None else -float(np.nanmedian(force[:, 2]))
     if lift is None or not _LIFT_M_S2[0] < lift < _LIFT_M_S2[1]:
         lift = 9.81  # On average thrust balances weight in a flight; a wrong accelerometer is a doubt of its own.
-    kinds = ("rotor_speed", "rotor_command", "throttle")
-    column = next(n[0] for k in kinds if run.has(*(n := c.rotor_columns(k, vehicle.rotor_count))))
     hover, top = float(np.sqrt(thrust / coefficients.sum())), float(np.nanquantile(speeds, _TOP))
-    return (hover, top), lift if vehicle.kind == "flight" else None, column
+    return (hover, top), lift if vehicle.kind == "flight" else None, driven_by(run, vehicle)[0]
 
 
 def impossible_values(recordings: RecordingSet) -> tuple[Doubt, ...]:
@@ -298,20 +295,21 @@ def _world(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
             own, place = f"velocity_{axis}_m_s", f"position_{axis}_m"
             r = _correlation(velocity[:, k], derived[:, k])
             scale = float(np.nanstd(velocity[:, k]) / np.nanstd(derived[:, k]))
+            what = own
             if r < _CONTRADICTS:
                 said = f"{own} goes against the derivative of {place} (correlation {r:.2f})"
-                yield Doubt(own, said, stops=True)
             elif r < 0.2:
                 said = (
                     f"{own} does not follow {place} (correlation {r:.2f}): one of them is in body axes, or axes are "
                     "exchanged"
                 )
-                yield Doubt(own, said, stops=True)
             elif r > _AGREES and not same_unit[0] < scale < same_unit[1]:
                 # Units that are used as well as metres are smaller: the column with the larger numbers is the one.
                 what, which = (own, "the velocity") if scale > 1 else (place, "the position")
                 said = f"{own} is {scale:.3g} times the derivative of {place}, expected 1: {which} is in another unit"
-                yield Doubt(what, said, stops=True)
+            else:
+                continue
+            yield Doubt(what, said, stops=True)
     if attitude is None or force is None:
         return
     known = np.isfinite(attitude).all(axis=1) & np.isfinite(force).all(axis=1)
@@ -406,8 +404,7 @@ def _rotors(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
 
 def _command_order(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
     """Whether each rotor's measured speed follows its own command; if not, which one it follows."""
-    kinds = ("rotor_speed", "rotor_command", "throttle")
-    speeds, *asked = (_on(run, clock, c.rotor_columns(k, vehicle.rotor_count), 2 * _STEP_S) for k in kinds)
+    speeds, *asked = (_on(run, clock, names, 2 * _STEP_S) for names in vehicle.rotor_groups().values())
     commands = next((own for own in asked if own is not None), None)
     if speeds is None or commands is None or vehicle.rotor_count < 3:
         return
@@ -421,11 +418,7 @@ def _command_order(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Do
         return
     _, follows = scipy.optimize.linear_sum_assignment(alike, maximize=True)
     wrong = [i for i, k in enumerate(follows) if i != k]
-    if (
-        wrong
-        and min(alike[i, follows[i]] for i in wrong) > _FOLLOWS
-        and max(alike[i, i] for i in wrong) < 0.5 * _FOLLOWS
-    ):
+    if wrong and alike[wrong, follows[wrong]].min() > _FOLLOWS and alike[wrong, wrong].max() < 0.5 * _FOLLOWS:
         pairs = ", ".join(f"rotor {i + 1} follows command {follows[i] + 1}" for i in wrong)
         yield Doubt("rotors", f"commands and measured speeds are in different orders: {pairs}", stops=True)
 
@@ -446,12 +439,7 @@ def _throttle(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
 
 def _held(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
     """Rotor speeds that keep one value while the vehicle moves: they were not measured."""
-    kinds = [
-        k for k in ("rotor_speed", "rotor_command", "throttle") if run.has(*c.rotor_columns(k, vehicle.rotor_count))
-    ]
-    if not kinds:
-        return
-    names = c.rotor_columns(kinds[0], vehicle.rotor_count)
+    names = driven_by(run, vehicle)
     held = [name for name in names if np.nanmin(run.column(name)) == np.nanmax(run.column(name))]
     if held:
         value = float(np.nanmax(run.column(held[0])))
@@ -491,15 +479,15 @@ def _joined(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
 
 def _rest(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
     """Whether the vehicle stood on the ground for a part of the run."""
-    kinds = [k for k in ("rotor_speed", "throttle") if run.has(*c.rotor_columns(k, vehicle.rotor_count))]
-    if not kinds:
+    speeds, _, throttles = vehicle.rotor_groups().values()
+    names = next((names for names in (speeds, throttles) if run.has(*names)), ())
+    if not names:
         return
-    values = run.array(c.rotor_columns(kinds[0], vehicle.rotor_count))
-    mean = np.abs(values[np.isfinite(values).all(axis=1)]).mean(axis=1)
+    mean = np.abs(run.array(names)[run.complete(names)]).mean(axis=1)
     at_rest = float((mean < _AT_REST * np.median(mean[mean > 0])).mean()) if (mean > 0).any() else 1.0
     if at_rest > 0.02:
         yield Doubt(
-            c.rotor_columns(kinds[0], 1)[0],
+            names[0],
             f"all rotors are at rest in {at_rest:.0%} of the samples: keep only the part in the air",
         )
 
@@ -521,8 +509,7 @@ def _amount(recordings: RecordingSet) -> Iterator[Doubt]:
         rates = []
         for run in recordings.runs:
             if run.has(*columns):
-                known = np.isfinite(run.array(columns)).all(axis=1)
-                rates.append(known.sum() / max(float(run.time_s[-1] - run.time_s[0]), 1e-9))
+                rates.append(run.complete(columns).sum() / max(float(run.time_s[-1] - run.time_s[0]), 1e-9))
         if rates and min(rates) < least:
             come = "come" if name.endswith("s") else "comes"
             said = f"The {name} {come} at {min(rates):.3g} Hz, {least:g} Hz and more are better: {cost}."

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -87,6 +87,19 @@ class Run:
             self._arrays[name] = self.table[name].to_numpy(float)
         return self._arrays[name].copy()
 
+    def complete(self, names: Sequence[str]) -> np.ndarray:
+        """Rows in which every named column has a value, shape (n,)."""
+        return np.isfinite(self.array(tuple(names))).all(axis=1)
+
+    def holding(self, columns: Mapping[str, np.ndarray | pd.Series]) -> Run:
+        """The run with these columns, in place of its own of the same names; itself for none."""
+        return replace(self, table=self.table.assign(**columns)) if columns else self
+
+    @property
+    def where(self) -> str:
+        """The run's file, or its name where it was never one, for messages."""
+        return self.path or f"run {self.name}"
+
     @property
     def unknown_columns(self) -> tuple[str, ...]:
         """Columns without a meaning in the contract, kept as candidate regime variables."""
@@ -118,6 +131,20 @@ class RecordingSet:
     """One sentence for each run that could not be used."""
     proposed: tuple[Doubt, ...] = ()
     """Values of the vehicle that nobody measured."""
+
+    @property
+    def where(self) -> str:
+        """The set's folder, or its name where it was never one, for messages."""
+        return self.path or self.name
+
+    def without(self, names: Collection[str]) -> RecordingSet:
+        """The set without these columns in any run."""
+        tables = (run.table.drop(columns=[n for n in names if n in run.table]) for run in self.runs)
+        return replace(self, runs=tuple(replace(r, table=t) for r, t in zip(self.runs, tables, strict=True)))
+
+    def mended(self, runs: Iterable[Run], said: Iterable[str]) -> RecordingSet:
+        """The set with these runs in place of its own, and with sentences on what was done to them."""
+        return replace(self, runs=tuple(runs), left_out=(*self.left_out, *said))
 
     def run(self, name: str) -> Run:
         """The run of that name; KeyError if there is none."""

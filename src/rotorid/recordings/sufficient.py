@@ -105,7 +105,7 @@ def dead_sensors(recordings: RecordingSet) -> list[tuple[str, ...]]:
     if recordings.vehicle.kind != "flight":
         return []
     dead = [names for names in SENSORS if _holds_one_value(recordings.runs, names)]
-    speeds, *ordered = rotor_groups(recordings.vehicle).values()
+    speeds, *ordered = recordings.vehicle.rotor_groups().values()
     turn = any(run.has(*speeds) and np.nanmax(run.array(speeds)) > 0 for run in recordings.runs)
     dead += [names for names in ordered if turn and _holds_one_value(recordings.runs, names, 0.0)]
     if c.QUATERNION in dead and any(_no_attitude(run, recordings.vehicle) for run in recordings.runs):
@@ -119,16 +119,13 @@ def _without_dead_sensors(recordings: RecordingSet, elsewhere: Iterable[tuple[st
     others = [names for names in elsewhere if names not in own and any(run.has(names[0]) for run in recordings.runs)]
     if not own and not others:
         return recordings
-    gone = [name for names in (*own, *others) for name in names]
-    kept = (replace(r, table=r.table.drop(columns=[n for n in gone if n in r.table])) for r in recordings.runs)
-    said = (
-        *(
-            f"Left out: {names[0]} to {names[-1]} hold one value in every run, so nothing was read from that sensor."
-            for names in own
-        ),
-        *(f"Left out: {names[0]} to {names[-1]}, which hold one value in another set." for names in others),
-    )
-    return replace(recordings, runs=tuple(kept), left_out=(*recordings.left_out, *said))
+    kept = recordings.without([name for names in (*own, *others) for name in names])
+    said = [
+        f"Left out: {names[0]} to {names[-1]} hold one value in every run, so nothing was read from that sensor."
+        for names in own
+    ]
+    said += [f"Left out: {names[0]} to {names[-1]}, which hold one value in another set." for names in others]
+    return recordings.mended(kept.runs, said)
 
 
 def _holds_one_value(runs: Iterable[Run], names: tuple[str, ...], value: float | None = None) -> bool:
@@ -150,28 +147,21 @@ def _with_alike_runs(recordings: RecordingSet) -> RecordingSet:
     poor = [run for run in recordings.runs if channels[run.name] != every]
     if not poor:
         return recordings
-    said = list(recordings.left_out)
     if 2 * len(poor) < len(recordings.runs):
-        for run in poor:
-            lost = listed(sorted(every - channels[run.name]))
-            said.append(f"Left out: {_whereof(run)}: lacks sensors that the other runs have (for {lost}).")
-        kept = tuple(run for run in recordings.runs if run not in poor)
-        return replace(recordings, runs=kept, left_out=tuple(said))
+        lost = [(run.where, listed(sorted(every - channels[run.name]))) for run in poor]
+        said = [f"Left out: {run}: lacks sensors that the other runs have (for {names})." for run, names in lost]
+        return recordings.mended((run for run in recordings.runs if run not in poor), said)
     partly = [names for names in SENSORS if not all(_reads(run, names) for run in recordings.runs)]
     if all(_reads(run, c.VELOCITY) or _reads(run, c.POSITION) for run in recordings.runs):
         partly = [names for names in partly if names not in (c.VELOCITY, c.POSITION)]
     dropped = [names for names in partly if any(_reads(run, names) for run in recordings.runs)]
-    said += [f"Left out: {names[0]} to {names[-1]} are not recorded in every run." for names in dropped]
-    gone = {name for names in partly for name in names}
-    runs = (replace(r, table=r.table.drop(columns=[n for n in gone if n in r.table])) for r in recordings.runs)
-    return replace(recordings, runs=tuple(runs), left_out=tuple(said))
+    said = [f"Left out: {names[0]} to {names[-1]} are not recorded in every run." for names in dropped]
+    return recordings.mended(recordings.without([name for names in partly for name in names]).runs, said)
 
 
 def _reads(run: Run, names: tuple[str, ...]) -> bool:
     """Whether a sensor has enough complete readings in a run to count as recorded."""
-    if not run.has(*names):
-        return False
-    return int(np.isfinite(run.array(names)).all(axis=1).sum()) >= LEAST_VALUES
+    return run.has(*names) and int(run.complete(names).sum()) >= LEAST_VALUES
 
 
 def channels_of(run: Run) -> set[str]:
@@ -187,30 +177,20 @@ def channels_of(run: Run) -> set[str]:
     return {name for name, there in found.items() if there}
 
 
-def _whereof(run: Run) -> str:
-    """The run's file, or its name where it was never one."""
-    return run.path or f"run {run.name}"
-
-
-def rotor_groups(vehicle: Vehicle) -> dict[str, tuple[str, ...]]:
-    """Kind of column to its names for the vehicle's rotors, measured speeds first."""
-    return {kind: c.rotor_columns(kind, vehicle.rotor_count) for kind in ("rotor_speed", "rotor_command", "throttle")}
-
-
 def driven_by(run: Run, vehicle: Vehicle) -> tuple[str, ...]:
     """Columns that the rotors' speeds are known from; empty where no kind of them is whole."""
-    return next((names for names in rotor_groups(vehicle).values() if names and run.has(*names)), ())
+    return next((names for names in vehicle.rotor_groups().values() if names and run.has(*names)), ())
 
 
 def _check_spelling(run: Run, vehicle: Vehicle) -> None:
     """InputError where an unknown column can only be a known one that is missing."""
     there = set(run.table.columns)
-    known = sorted(c.FIXED) + [name for names in rotor_groups(vehicle).values() for name in names]
+    known = sorted(c.FIXED) + [name for names in vehicle.rotor_groups().values() for name in names]
     missing = [name for name in known if name not in there]
     # Columns of a sensor whose columns only make sense together, where others of it are there.
     groups = {
-        "flight": (*rotor_groups(vehicle).values(), *SENSORS),
-        "stand": (*rotor_groups(vehicle).values(), c.MOUNT),
+        "flight": (*vehicle.rotor_groups().values(), *SENSORS),
+        "stand": (*vehicle.rotor_groups().values(), c.MOUNT),
     }
     begun = (names for names in groups.get(vehicle.kind, ()) if any(n in there for n in names))
     halved = {name for names in begun for name in names if name not in there}
@@ -218,9 +198,7 @@ def _check_spelling(run: Run, vehicle: Vehicle) -> None:
         meant = next((name for name in missing if plain(name) == plain(column)), None)
         meant = meant or nearest(column, halved, _SURELY_MEANT)
         if meant:
-            raise InputError(
-                f"{_whereof(run)}: column {column} is not known and {meant} is missing; did you mean {meant}?"
-            )
+            raise InputError(f"{run.where}: column {column} is not known and {meant} is missing; did you mean {meant}?")
 
 
 def _absurd(run: Run, vehicle: Vehicle) -> str | None:
@@ -236,7 +214,7 @@ def _absurd(run: Run, vehicle: Vehicle) -> str | None:
         if len(bad):
             unit = c.unit_of(column)
             return (
-                f"{_whereof(run)}, {place(run.path, bad[0])}, column {column}: found {values[bad[0]]:g}, expected a "
+                f"{run.where}, {place(run.path, bad[0])}, column {column}: found {values[bad[0]]:g}, expected a "
                 f"number of at most {most:g}{' ' + unit if unit else ''} (an empty cell where nothing was measured)"
             )
     return None
@@ -253,22 +231,21 @@ def _no_attitude(run: Run, vehicle: Vehicle) -> str | None:
         return None
     many = f" ({len(bad)} of {len(norm)} samples are like it)" if len(bad) > 1 else ""
     return (
-        f"{_whereof(run)}, {place(run.path, bad[0])}, columns quaternion_w to quaternion_z: found the norm "
+        f"{run.where}, {place(run.path, bad[0])}, columns quaternion_w to quaternion_z: found the norm "
         f"{norm[bad[0]]:.3g}, expected 1{many}; leave the cells empty where the attitude is not known"
     )
 
 
 def _uneven_clock(run: Run, vehicle: Vehicle) -> str | None:
     """A clock that jumps so far, or counts in such a unit, that no even grid can hold the run."""
-    if jumped := clock_jump(run.time_s, _whereof(run)):
+    if jumped := clock_jump(run.time_s, run.where):
         return jumped
     median = float(np.median(np.diff(run.time_s)))
     if vehicle.kind == "flight" and median * _LEAST_FLIGHT_HZ > 1:
         unit = next((u for factor, u in ((1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds"))
                      if 1e-4 < median / factor < 0.2), None)  # fmt: skip
         return (
-            f"{_whereof(run)}: {c.TIME} has a usual step of {median:.6g} s, "
-            f"expected at most {1 / _LEAST_FLIGHT_HZ:g} s "
+            f"{run.where}: {c.TIME} has a usual step of {median:.6g} s, expected at most {1 / _LEAST_FLIGHT_HZ:g} s "
             f"({_LEAST_FLIGHT_HZ:g} samples a second)" + (f"; is it in {unit}?" if unit else "")
         )
     return None
@@ -279,7 +256,7 @@ def _no_rotors(run: Run, vehicle: Vehicle) -> str | None:
     if vehicle.kind == "bench" or driven_by(run, vehicle):
         return None
     there = run.table.columns
-    partly = {k: names for k, names in rotor_groups(vehicle).items() if any(run.has(n) for n in names)}
+    partly = {k: names for k, names in vehicle.rotor_groups().items() if any(run.has(n) for n in names)}
     if partly:
         kind, names = max(partly.items(), key=lambda item: sum(run.has(n) for n in item[1]))
         lost = [n for n in names if not run.has(n)]
@@ -287,15 +264,15 @@ def _no_rotors(run: Run, vehicle: Vehicle) -> str | None:
         state = "empty" if len(empty) == len(lost) else "missing"
         found = len(names) - len(lost)
         return (
-            f"{_whereof(run)}: {'columns' if len(lost) > 1 else 'column'} {listed(lost)} "
+            f"{run.where}: {'columns' if len(lost) > 1 else 'column'} {listed(lost)} "
             f"{'are' if len(lost) > 1 else 'is'} {state}: vehicle.yaml lists {len(names)} rotors, the run has "
             f"the {kind.replace('_', ' ')} of {found}, and no other kind of rotor column is whole{_likely(run, lost)}"
         )
-    speeds, commands, throttles = rotor_groups(vehicle).values()
+    speeds, commands, throttles = vehicle.rotor_groups().values()
     empty = [n for n in (*speeds, *commands, *throttles) if n in there]
     found = f" ({listed(empty)} {'are' if len(empty) > 1 else 'is'} empty)" if empty else ""
     return (
-        f"{_whereof(run)}: no thrust can be predicted without {speeds[0]} to {speeds[-1]}, {commands[0]} … or "
+        f"{run.where}: no thrust can be predicted without {speeds[0]} to {speeds[-1]}, {commands[0]} … or "
         f"{throttles[0]} …: none of these columns has a value{found}{_likely(run, (*speeds, *commands, *throttles))}"
     )
 
@@ -328,13 +305,13 @@ def _still_rotors(run: Run, vehicle: Vehicle) -> str | None:
         supported = 2 * weight * np.sin(min(tilt, np.pi) / 2) if vehicle.tared else weight
         force = np.linalg.norm(np.nan_to_num(run.array(c.FORCE)), axis=1)
         largest = float(np.quantile(force, 0.9))
-        ordered = [n for k, g in rotor_groups(vehicle).items() if k != "rotor_speed" and run.has(*g) for n in g]
+        ordered = [n for k, g in vehicle.rotor_groups().items() if k != "rotor_speed" and run.has(*g) for n in g]
         commanded = bool(ordered) and np.nanmax(np.abs(run.array(tuple(ordered)))) > 0
         if largest <= supported + max(lifting * weight, least_lift_n) and not commanded:
             return None
         because = f" although the sensor reads {largest:.3g} N" + (" and commands are given" if commanded else "")
     return (
-        f"{_whereof(run)}: columns {names[0]} to {names[-1]} are 0 throughout{because}, expected the speeds that the "
+        f"{run.where}: columns {names[0]} to {names[-1]} are 0 throughout{because}, expected the speeds that the "
         "rotors turned at (leave the columns out where nothing was measured)"
     )
 
@@ -351,7 +328,7 @@ def _nothing_compared(run: Run, vehicle: Vehicle) -> str | None:
             return None
         wanted = (*c.SPECIFIC_FORCE, *c.ANGULAR_VELOCITY, *c.QUATERNION)
         return (
-            f"{_whereof(run)}: nothing can be compared without {c.SPECIFIC_FORCE[0]} …, {c.ANGULAR_VELOCITY[0]} … or "
+            f"{run.where}: nothing can be compared without {c.SPECIFIC_FORCE[0]} …, {c.ANGULAR_VELOCITY[0]} … or "
             f"quaternion_w …: no such sensor has values in all its columns{_likely(run, wanted)}"
         )
     if vehicle.kind == "stand":
@@ -359,16 +336,16 @@ def _nothing_compared(run: Run, vehicle: Vehicle) -> str | None:
         if any(run.has(n) for n in names):
             return None
         return (
-            f"{_whereof(run)}: nothing can be compared without {names[0]} … or {c.MOMENT[0]} …: none of these columns "
+            f"{run.where}: nothing can be compared without {names[0]} … or {c.MOMENT[0]} …: none of these columns "
             f"has a value{_likely(run, names)}"
         )
-    pairs = tuple(zip(c.FORCE, c.REFERENCE_FORCE, strict=True))
-    if any(run.has(a, b) for a, b in pairs):
+    pairs = c.REFERENCE_OF.items()
+    if any(run.has(*pair) for pair in pairs):
         return None
     half = next(((b if run.has(a) else a, a if run.has(a) else b) for a, b in pairs if run.has(a) or run.has(b)), None)
     what = f"column {half[0]} is missing where {half[1]} is there" if half else "there is no such pair of columns"
     return (
-        f"{_whereof(run)}: nothing can be compared without a force_x_n … and its reference_force_x_n …: {what}"
+        f"{run.where}: nothing can be compared without a force_x_n … and its reference_force_x_n …: {what}"
         f"{_likely(run, (*c.FORCE, *c.REFERENCE_FORCE))}"
     )
 
@@ -383,9 +360,8 @@ def compared_readings(run: Run, vehicle: Vehicle) -> list[str]:
     """Columns of a stand or bench whose values are compared, on a bench with the loads that they are compared with."""
     names = [n for n in c.FORCE + c.MOMENT if run.has(n)]
     if vehicle.kind == "bench":
-        pairs = dict(zip(c.FORCE, c.REFERENCE_FORCE, strict=True))
-        names = [n for n in names if n in pairs and run.has(pairs[n])]
-        names += [pairs[n] for n in names]
+        names = [n for n in names if n in c.REFERENCE_OF and run.has(c.REFERENCE_OF[n])]
+        names += [c.REFERENCE_OF[n] for n in names]
     return names
 
 
@@ -401,15 +377,15 @@ def _too_short(run: Run, vehicle: Vehicle) -> str | None:
         if longest >= needed:
             return None
         return (
-            f"{_whereof(run)}: too little data: the longest stretch in which every sensor has readings lasts "
+            f"{run.where}: too little data: the longest stretch in which every sensor has readings lasts "
             f"{longest:.3g} s, expected at least {needed:.3g} s"
         )
     names = compared_readings(run, vehicle)
-    count = int(np.isfinite(run.array(tuple(names))).all(axis=1).sum())
+    count = int(run.complete(names).sum())
     if count >= least_readings:
         return None
     return (
-        f"{_whereof(run)}: too little data: {count} samples have a value in {listed(names)} at once, expected at least "
+        f"{run.where}: too little data: {count} samples have a value in {listed(names)} at once, expected at least "
         f"{least_readings}"
     )
 
@@ -417,9 +393,8 @@ def _too_short(run: Run, vehicle: Vehicle) -> str | None:
 def _hardly_sampled(run: Run, vehicle: Vehicle) -> str | None:
     """A run of next to no samples."""
     count = len(run.table)
-    if count >= LEAST_VALUES:
-        return None
-    return f"{_whereof(run)}: too little data: found {count} samples, expected some seconds of them"
+    said = f"{run.where}: too little data: found {count} samples, expected some seconds of them"
+    return said if count < LEAST_VALUES else None
 
 
 _LOOKS: tuple[Callable[[Run, Vehicle], str | None], ...] = (
@@ -441,12 +416,12 @@ def _check_not_constant(recordings: RecordingSet) -> None:
     vehicle, runs = recordings.vehicle, recordings.runs
     if vehicle.kind == "flight":
         names = driven_by(runs[0], vehicle)
-        ordered = names in list(rotor_groups(vehicle).values())[1:]
+        ordered = names in list(vehicle.rotor_groups().values())[1:]
         if ordered and all(driven_by(run, vehicle) == names for run in runs) and _holds_one_value(runs, names):
             held = np.nanmax(runs[0].array(names), axis=0)
             found = listed([f"{n} = {v:g}" for n, v in zip(names, held, strict=True)], most=6)
             raise InputError(
-                f"{recordings.path or recordings.name}: nothing can be compared: the rotors' commands hold one value "
+                f"{recordings.where}: nothing can be compared: the rotors' commands hold one value "
                 f"in every run ({found}), expected the changes that keep a vehicle in the air; leave them out where "
                 "nothing was recorded"
             )
@@ -457,7 +432,7 @@ def _check_not_constant(recordings: RecordingSet) -> None:
         return
     found = listed([f"{name} = {np.nanmax(v):g}" for name, v in values.items()], most=6)
     raise InputError(
-        f"{recordings.path or recordings.name}: nothing can be compared: every reading holds one value in every run "
+        f"{recordings.where}: nothing can be compared: every reading holds one value in every run "
         f"({found}), expected the noise of a sensor and loads that differ"
     )
 
@@ -468,12 +443,12 @@ def _check_single(recordings: RecordingSet) -> None:
     run, vehicle = recordings.runs[0], recordings.vehicle
     if vehicle.kind != "flight":
         # The last third, less half the gap before it, must be more than next to nothing.
-        known = run.time_s[np.isfinite(run.array(tuple(compared_readings(run, vehicle)))).all(axis=1)]
+        known = run.time_s[run.complete(compared_readings(run, vehicle))]
         needed = (single_gap_s / 2 + LEAST_VALUES * float(np.median(np.diff(known)))) / held_out_share
         lasts = float(known[-1] - known[0])
         if lasts < needed:
             raise InputError(
-                f"{_whereof(run)}: too little data: a single run must last at least {needed:.3g} s, because its last "
+                f"{run.where}: too little data: a single run must last at least {needed:.3g} s, because its last "
                 f"third is held out, after a gap; found {lasts:.3g} s"
             )
         return
@@ -482,7 +457,7 @@ def _check_single(recordings: RecordingSet) -> None:
         why = _first_reason(recordings)
         others = f", and the other runs cannot be used ({why})" if why else ""
         raise InputError(
-            f"{_whereof(run)}: too little data: a single run must last at least {LEAST_SINGLE_S:g} s without a hole, "
+            f"{run.where}: too little data: a single run must last at least {LEAST_SINGLE_S:g} s without a hole, "
             f"because its last third is held out; found {longest:.3g} s{others}"
         )
 
@@ -492,14 +467,13 @@ def _check_common(recordings: RecordingSet) -> None:
     vehicle, runs = recordings.vehicle, recordings.runs
     if vehicle.kind == "flight":
         if not set.intersection(*(channels_of(r) for r in runs)):
-            raise InputError(f"{recordings.path or recordings.name}: no force or moment is there in every run")
+            raise InputError(f"{recordings.where}: no force or moment is there in every run")
         return
-    pairs = dict(zip(c.FORCE, c.REFERENCE_FORCE, strict=True))
     names = [n for n in c.FORCE + c.MOMENT if all(r.has(n) for r in runs)]
     if vehicle.kind == "bench":
-        names = [n for n in names if n in pairs and any(r.has(pairs[n]) for r in runs)]
+        names = [n for n in names if n in c.REFERENCE_OF and any(r.has(c.REFERENCE_OF[n]) for r in runs)]
     if not names:
-        raise InputError(f"{recordings.path or recordings.name}: no force or moment is compared in every run")
+        raise InputError(f"{recordings.where}: no force or moment is compared in every run")
 
 
 def _first_reason(recordings: RecordingSet) -> str:
@@ -628,5 +602,4 @@ def _wanted(recordings: RecordingSet) -> dict[str, list[tuple[str, ...]]]:
             along = f"{group} along {listed(axes)}" if 0 < len(axes) < 3 else f"{group}s"
             wrench[along] = [tuple(name for name in names if not axes or not there(name))]
         return wrench | turning | {"attitude of the mount": [c.MOUNT]} | voltage
-    pairs = zip(c.FORCE, c.REFERENCE_FORCE, strict=True)
-    return {name: [(name,)] for pair in pairs if any(map(there, pair)) for name in pair}
+    return {name: [(name,)] for pair in c.REFERENCE_OF.items() if any(map(there, pair)) for name in pair}

@@ -47,6 +47,8 @@ _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _UTF_8, _LATIN_1 = "utf-8", "cp1252"
 """How text is written; the second is Latin-1 as Windows has it, in which instruments and spreadsheets write `°`."""
+_NO_LATIN_1 = frozenset(b"\0\x81\x8d\x8f\x90\x9d")
+"""Bytes that are no text so written."""
 _MOST_ABOVE, _ROWS_BELOW = 200, 3
 """Lines that may stand above a heading, and rows of numbers below by which one is known."""
 _DECIMAL_COMMA = re.compile(r"\s*[-+]?\d+,\d+([eE][-+]?\d+)?\s*")
@@ -152,17 +154,10 @@ def _check_encoding(text: bytes, path: Path, line: int, foreign: bool, encoding:
     try:
         check_text(text, path, line)
     except InputError:
-        if not foreign or b"\0" in text or text.startswith((b"\xff\xfe", b"\xfe\xff")):
+        if not foreign or text.startswith((b"\xff\xfe", b"\xfe\xff")) or set(text) & _NO_LATIN_1:
             raise
-        try:
-            text.decode(_LATIN_1)
-        except UnicodeDecodeError:
-            pass
-        else:
-            if encoding == _UTF_8:
-                raise _NoUtf8 from None
-            return
-        raise
+        if encoding == _UTF_8:
+            raise _NoUtf8 from None
 
 
 def _check_size(rows: int, columns: int, where: object) -> None:
@@ -410,11 +405,13 @@ class UnusableRun(InputError):
 
 
 def read_cells(path: Path, foreign: bool = False, used: Collection[str] | None = None) -> pd.DataFrame:
-    """The cells of a CSV file, plain or gzipped: numbers where a column holds nothing else.
+    """The cells of a Parquet or CSV file, plain or gzipped: numbers where a column holds nothing else.
 
-    `foreign` as in `_looked_through`; the table's `attrs` then hold the `layout` that was found. `used` names the
-    columns that are wanted, those of them that are there; None is all. The table is in the memory once.
+    Of a CSV: `foreign` as in `_looked_through`; the table's `attrs` then hold the `layout` that was found. `used` names
+    the columns that are wanted, those of them that are there; None is all. The table is in the memory once.
     """
+    if path.name.endswith(".parquet"):
+        return _read_parquet_cells(path)
     layout = _look_through(path, foreign)
     kept = [k for k, name in enumerate(layout.names) if used is None or name in used] or [0]
     try:
@@ -488,7 +485,7 @@ def write_table(table: pd.DataFrame, path: Path) -> None:
         table.to_csv(path, index=False, compression=compression)
 
 
-def read_parquet_cells(path: Path) -> pd.DataFrame:
+def _read_parquet_cells(path: Path) -> pd.DataFrame:
     """The cells of a Parquet file: numbers, or what else a column holds."""
     size = check_file(path)
     if not parquet_is_here():

@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from rotorid.io.models import KnownKeys
+from rotorid.recordings import columns as c
 
 _Number = Annotated[float, Field(strict=True)]
 """A number: no text, no `true`."""
@@ -185,6 +186,10 @@ class Vehicle(KnownKeys, frozen=True, allow_inf_nan=False):
     @property
     def rotor_count(self) -> int:
         return len(self.rotors)
+
+    def rotor_groups(self) -> dict[str, tuple[str, ...]]:
+        """Kind of column (measured speeds, commanded ones, throttles) to its names for these rotors."""
+        return {kind: c.rotor_columns(kind, self.rotor_count) for kind in c.PER_ROTOR}
 
     def rotor_positions_m(self) -> np.ndarray:
         """Rotor hubs, shape (n_rotors, 3), m, body axes."""

@@ -10,14 +10,13 @@ import numpy as np
 from scipy.stats import t as student
 from scipy.stats import ttest_1samp
 
-from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.mistakes import lagged
-from rotorid.mismatch.mistakes.lagged import LaggedFit, accelerating, moving, rolling, sideways, speeds_of, turning
 from rotorid.mismatch.mistakes.signals import (
     SENSOR_WORDS,
     Corrected,
     ReadSet,
     Signals,
+    established,
     replace_sensor,
     sensor_columns,
 )
@@ -32,11 +31,11 @@ _LEAST_GRAVITY = 0.6
 """Share of gravity that the mean specific force must show along an axis for its sign to count."""
 
 _ATTITUDES = {
-    "conjugated": (np.array([1.0, -1.0, -1.0, -1.0]), (0, 1, 2, 3)),
-    "forward-left-up in a north-west-up world": (np.array([1.0, 1.0, -1.0, -1.0]), (0, 1, 2, 3)),
-    "forward-left-up in a north-west-up world, conjugated": (np.array([1.0, -1.0, 1.0, 1.0]), (0, 1, 2, 3)),
-    "stored scalar last": (np.array([1.0, 1.0, 1.0, 1.0]), (3, 0, 1, 2)),
-    "stored scalar last and conjugated": (np.array([1.0, -1.0, -1.0, -1.0]), (3, 0, 1, 2)),
+    "conjugated": ([1, -1, -1, -1], [0, 1, 2, 3]),
+    "forward-left-up in a north-west-up world": ([1, 1, -1, -1], [0, 1, 2, 3]),
+    "forward-left-up in a north-west-up world, conjugated": ([1, -1, 1, 1], [0, 1, 2, 3]),
+    "stored scalar last": ([1, 1, 1, 1], [3, 0, 1, 2]),
+    "stored scalar last and conjugated": ([1, -1, -1, -1], [3, 0, 1, 2]),
 }
 """What may have been done to a quaternion: signs after an order of its columns, that undo it."""
 
@@ -80,7 +79,7 @@ class _Reading:
     p_value: float
 
 
-def read(fit: LaggedFit | None) -> _Reading | None:
+def read(fit: lagged.LaggedFit | None) -> _Reading | None:
     """Signed axes from the gains of a fit Y = M X, None where the motion determines too little.
 
     An axis that moves too little keeps the sign of the others' rule (itself).
@@ -108,17 +107,14 @@ def read(fit: LaggedFit | None) -> _Reading | None:
 
 
 def turned(recordings: ReadSet, sensor: str, turn: Turn, p_value: float) -> Corrected:
-    """The set with a sensor's columns in the contract's axes, and the finding that they were not."""
+    """The set with a sensor's columns in the contract's axes, and where they were not the finding that says so."""
+    if turn.identity:
+        return Corrected(recordings)
     names = sensor_columns(recordings.vehicle)[sensor]
     touched = [n for i, n in enumerate(names) if turn.sign[i] < 0 or turn.source[i] != i]
     remedy = "flipped" if turn.source == (0, 1, 2) else "put in order"
-    finding = Finding(
-        id="axis_sign",
-        status="established",
-        sentence=f"Of {SENSOR_WORDS[sensor]}'s axes, {turn.text()} ({', '.join(touched)}): {remedy}.",
-        p_value=p_value,
-        channels=tuple(touched),
-    )
+    sentence = f"Of {SENSOR_WORDS[sensor]}'s axes, {turn.text()} ({', '.join(touched)}): {remedy}."
+    finding = established("axis_sign", sentence, p_value, touched)
     return Corrected(replace_sensor(recordings, sensor, turn.undo), (finding,))
 
 
@@ -144,17 +140,13 @@ def _gravity(recordings: ReadSet) -> Corrected:
     source, sign = [0, 1, 2], [1, 1, 1]
     source[axis], source[2] = 2, axis
     sign[axis] = int(np.sign(mean[axis]))
-    return turned(recordings, "accelerometer", Turn(tuple(source), tuple(sign)), _gravity_p(runs, axis))
-
-
-def _gravity_p(runs: list[Signals], axis: int) -> float:
-    """p-value that the mean of an axis of the accelerometer is zero, from means of two seconds."""
-    means = []
+    means = []  # of two seconds each: whether the mean of the axis is zero
     for s in runs:
         values = s.values["accelerometer"][:, axis]
         count = max(1, int(len(values) / (2.0 * s.rate_hz)))
         means += [np.nanmean(part) for part in np.array_split(values, count) if np.isfinite(part).any()]
-    return float(ttest_1samp(means, 0.0).pvalue / 2) if len(means) > 2 else 1.0
+    p_value = float(ttest_1samp(means, 0.0).pvalue / 2) if len(means) > 2 else 1.0
+    return turned(recordings, "accelerometer", Turn(tuple(source), tuple(sign)), p_value)
 
 
 _UNITS = {
@@ -179,39 +171,28 @@ def _in_contract_units(recordings: ReadSet, sensor: str, reading: _Reading, amon
 def _turning(recordings: ReadSet) -> Corrected:
     """The gyroscope against the attitude, and who of the two is wrong."""
     vehicle = recordings.vehicle
-    reading = read(lagged.fit(turning(recordings.signals)))
+    reading = read(lagged.fit(lagged.turning(recordings.signals)))
     if reading is None:
         return _gyroscope_units(recordings)
     result = _in_contract_units(recordings, "gyroscope", reading)
-    if reading.turn.identity:
-        return result
-    if not _attitude_fits(result.recordings.signals, vehicle):
+    if not reading.turn.identity and not _attitude_fits(result.recordings.signals, vehicle):
         for name, (signs, order) in _ATTITUDES.items():
-            undo = partial(_quaternions, signs=signs, order=order)
-            trial = replace_sensor(result.recordings, "attitude", undo)
-            again = read(lagged.fit(turning(trial.signals)))
+            trial = replace_sensor(
+                result.recordings, "attitude", lambda q, order=order, signs=signs: q[:, order] * signs
+            )
+            again = read(lagged.fit(lagged.turning(trial.signals)))
             if again and again.turn.identity and _attitude_fits(trial.signals, vehicle, strict=True):
-                finding = Finding(
-                    id="axis_sign",
-                    status="established",
-                    sentence=f"The attitude's quaternion is {name}: put into the contract's form.",
-                    p_value=again.p_value,
-                    channels=sensor_columns(vehicle)["attitude"],
-                )
+                sentence = f"The attitude's quaternion is {name}: put into the contract's form."
+                finding = established("axis_sign", sentence, again.p_value, sensor_columns(vehicle)["attitude"])
                 return Corrected(trial, (*result.findings, finding))
     return result.then(partial(turned, sensor="gyroscope", turn=reading.turn, p_value=reading.p_value))
-
-
-def _quaternions(recorded: np.ndarray, signs: np.ndarray, order: tuple[int, ...]) -> np.ndarray:
-    """Quaternions (n, 4) reordered and flipped."""
-    return recorded[:, list(order)] * signs
 
 
 def _force_source(all_signals: list[Signals]) -> str | None:
     """What the velocity's changes are compared with: the accelerometer, else rotor speeds read or commanded."""
     if any("accelerometer" in s.values for s in all_signals):
         return "accelerometer"
-    return next((n for n in map(speeds_of, all_signals) if n in ("rotors", "commands")), None)
+    return next((n for n in map(lagged.speeds_of, all_signals) if n in ("rotors", "commands")), None)
 
 
 def _attitude_fits(all_signals: list[Signals], vehicle: Vehicle, strict: bool = False) -> bool:
@@ -227,7 +208,7 @@ def _attitude_fits(all_signals: list[Signals], vehicle: Vehicle, strict: bool = 
     if agree and not all(agree):
         return False
     source = _force_source(all_signals)
-    fit = lagged.fit(accelerating(all_signals, vehicle, source)) if source else None
+    fit = lagged.fit(lagged.accelerating(all_signals, vehicle, source)) if source else None
     if fit is None:
         return not strict or bool(agree)
     gains = [(fit.gain[k, k], fit.gain_sd[k, k]) for k in (0, 1) if fit.explained[k] > _LEAST_EXPLAINED]
@@ -239,10 +220,10 @@ def _attitude_fits(all_signals: list[Signals], vehicle: Vehicle, strict: bool = 
 def _gyroscope_units(recordings: ReadSet) -> Corrected:
     """Without an attitude that shows it: the gyroscope's unit from the size of the believed moments."""
     signals = recordings.signals
-    sensor = next((n for n in map(speeds_of, signals) if n), None)
+    sensor = next((n for n in map(lagged.speeds_of, signals) if n), None)
     if sensor is None or sensor == "throttle" and not recordings.vehicle.rotor_speed_limits_rad_s:
         return Corrected(recordings)
-    blocks = rolling(signals, recordings.vehicle, sensor)
+    blocks = lagged.rolling(signals, recordings.vehicle, sensor)
     if blocks is not None and sensor != "rotors":
         # The motors' lag takes most of a quick moment away.
         _, blocks = lagged.through_motor(blocks)
@@ -261,37 +242,28 @@ def _gyroscope_units(recordings: ReadSet) -> Corrected:
 def _accelerating(recordings: ReadSet) -> Corrected:
     """The velocity against the specific force turned into the world."""
     source = _force_source(recordings.signals)
-    if source is None:
-        return Corrected(recordings)
-    fit = lagged.fit(accelerating(recordings.signals, recordings.vehicle, source))
+    fit = lagged.fit(lagged.accelerating(recordings.signals, recordings.vehicle, source)) if source else None
     return _in_the_world(recordings, "velocity", fit)
 
 
-def _in_the_world(recordings: ReadSet, sensor: str, fit: LaggedFit | None) -> Corrected:
-    """Unit and axes of a sensor Y = M X with X sound."""
-    reading = read(_inverse(fit))
+def _in_the_world(recordings: ReadSet, sensor: str, fit: lagged.LaggedFit | None) -> Corrected:
+    """Unit and axes of a sensor Y = M X with X sound: of the fit as if Y and X had changed places."""
+    if fit is not None:
+        size = np.maximum(np.abs(fit.gain).max(axis=1, keepdims=True), 1e-300)
+        # Of each axis of X is explained what is of the axis of Y which it feeds.
+        explained = fit.explained[np.abs(fit.gain).argmax(axis=0)]
+        # For signed, scaled axes the inverse is the transpose over the squared scale.
+        fit = replace(fit, gain=(fit.gain / size**2).T, gain_sd=(fit.gain_sd / size**2).T, explained=explained)
+    reading = read(fit)
     if reading is None:
         return Corrected(recordings)
     result = _in_contract_units(recordings, sensor, reading)
-    if reading.turn.identity:
-        return result
     return result.then(partial(turned, sensor=sensor, turn=reading.turn, p_value=reading.p_value))
-
-
-def _inverse(fit: LaggedFit | None) -> LaggedFit | None:
-    """The fit as if Y and X had changed places, for a matrix of signed axes."""
-    if fit is None:
-        return None
-    size = np.maximum(np.abs(fit.gain).max(axis=1, keepdims=True), 1e-300)
-    # Of each axis of X is explained what is of the axis of Y which it feeds.
-    explained = fit.explained[np.abs(fit.gain).argmax(axis=0)]
-    # For signed, scaled axes the inverse is the transpose over the squared scale.
-    return replace(fit, gain=(fit.gain / size**2).T, gain_sd=(fit.gain_sd / size**2).T, explained=explained)
 
 
 def _sideways(recordings: ReadSet) -> Corrected:
     """The accelerometer's x and y, where there is enough sideways force to decide."""
-    fit = lagged.fit(sideways(recordings.signals, recordings.vehicle.gravity_m_s2), np.zeros(1))
+    fit = lagged.fit(lagged.sideways(recordings.signals, recordings.vehicle.gravity_m_s2), np.zeros(1))
     if fit is None:
         return Corrected(recordings)
     sign, p_values = [1, 1, 1], []
@@ -300,12 +272,9 @@ def _sideways(recordings: ReadSet) -> Corrected:
         if gain < 0 and -gain > _LEAST_T * sd and 0.5 < -gain < 2.0 and fit.explained[k] > _LEAST_EXPLAINED:
             sign[k] = -1
             p_values.append(float(student.sf(-gain / sd, max(fit.block_count - 1, 1))))
-    turn = Turn((0, 1, 2), tuple(sign))
-    if turn.identity:
-        return Corrected(recordings)
-    return turned(recordings, "accelerometer", turn, max(p_values))
+    return turned(recordings, "accelerometer", Turn((0, 1, 2), tuple(sign)), max(p_values, default=1.0))
 
 
 def _moving(recordings: ReadSet) -> Corrected:
     """The position against the velocity (already checked against the forces where there were any)."""
-    return _in_the_world(recordings, "position", lagged.fit(moving(recordings.signals)))
+    return _in_the_world(recordings, "position", lagged.fit(lagged.moving(recordings.signals)))

@@ -9,18 +9,17 @@ import numpy as np
 from rotorid.errors import InputError
 from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.evidence.split import parts_of, split_runs
-from rotorid.mismatch.mistakes.signals import COMMANDED, replace_columns, sensor_columns
+from rotorid.mismatch.mistakes.signals import COMMANDED, established, replace_columns, sensor_columns
 from rotorid.recordings import RecordingSet, Run, Vehicle
 from rotorid.recordings import columns as c
 from rotorid.recordings.held import (
     OTHERS_GO_ON,
-    SHORTEST_FREEZE_PERIODS,
-    SHORTEST_FREEZE_S,
     SHORTEST_GAP_PERIODS,
     SHORTEST_GAP_S,
     at_the_end,
     contradiction,
     held,
+    held_in,
     noisy_columns,
     standing_together,
     stretches,
@@ -32,7 +31,6 @@ from rotorid.recordings.sufficient import (
     driven_by,
     longest_stretch_s,
     moving_sensors,
-    rotor_groups,
     whole_stretches,
 )
 
@@ -75,17 +73,12 @@ def find(recordings: RecordingSet) -> tuple[RecordingSet, Finding | None]:
     kinds = " and ".join(dict.fromkeys(s.kind for s in found))
     run, start_s, stop_s = windows[0]
     more = "" if len(windows) == 1 else f" and {len(windows) - 1} more stretch{'es' if len(windows) > 2 else ''}"
-    finding = Finding(
-        id="sensor_dropout",
-        status="established",
-        sentence=(
-            f"Readings of {', '.join(columns)} dropped out ({kinds}) in {run} from {start_s:.2f} s to {stop_s:.2f} s"
-            f"{more}; these samples were left out."
-        ),
-        p_value=max(s.p_value for s in found),
-        channels=columns,
-        windows=tuple(windows),
+    sentence = (
+        f"Readings of {', '.join(columns)} dropped out ({kinds}) in {run} from {start_s:.2f} s to {stop_s:.2f} s"
+        f"{more}; these samples were left out."
     )
+    p_value = max(s.p_value for s in found)
+    finding = established("sensor_dropout", sentence, p_value, columns, windows=tuple(windows))
     return replace_columns(recordings, change), finding
 
 
@@ -137,20 +130,20 @@ def what_is_left(recordings: RecordingSet, before: RecordingSet, lost: Finding) 
         )
         return rest, (note, *more)
     gone = {n for own in sensors.values() for names in own if set(names) & set(lost.channels) for n in names}
-    runs = tuple(replace(r, table=r.table.drop(columns=[n for n in gone if n in r.table])) for r in recordings.runs)
-    if not all(driven_by(run, vehicle) and channels_of(run) for run in runs):
-        if len(runs) > 1:
+    rest = recordings.without(gone)
+    if not all(driven_by(run, vehicle) and channels_of(run) for run in rest.runs):
+        if len(rest.runs) > 1:
             return recordings, ()  # what the runs hold at other times may suffice
         raise InputError(
             f"set {recordings.name}: {lost.sentence.removesuffix('; these samples were left out.')}; without these "
             "readings nothing is left that can be compared"
         )
-    return replace(recordings, runs=runs), (f"Left out of every run: {', '.join(sorted(gone))}, lost for too long.",)
+    return rest, (f"Left out of every run: {', '.join(sorted(gone))}, lost for too long.",)
 
 
 def _sensors(run: Run, vehicle: Vehicle, alone: bool) -> list[tuple[str, ...]]:
     """Sensors that a run is compared by: of several runs one without rotor speeds is compared by its commands."""
-    rotors = [names for names in rotor_groups(vehicle).values() if names and run.has(*names)]
+    rotors = [names for names in vehicle.rotor_groups().values() if names and run.has(*names)]
     return [*(rotors if alone else rotors[-1:]), *moving_sensors(run)]
 
 
@@ -172,12 +165,7 @@ def _in_run(run: Run, vehicle: Vehicle, noisy: set[str]) -> list[_Dropout]:
             continue
         zero = standing_rotors(run, vehicle, names) if sensor == "rotors" and len(present) == len(names) > 2 else {}
         zero = {n: less for n, mask in zero.items() if (less := _not_asked_for(run, vehicle, n, mask)).any()}
-        frozen = []
-        if len(present) > 1 and not zero and flown:
-            alive = not noisy.isdisjoint(present)
-            against = contradiction(run, vehicle, present)
-            values = run.array(tuple(present))
-            frozen = held(run.time_s, values, SHORTEST_FREEZE_S, SHORTEST_FREEZE_PERIODS, alive, against)
+        frozen = held_in(run, vehicle, present, noisy) if len(present) > 1 and not zero and flown else []
         for name in present:
             values = run.column(name)
             blank = missing(run.time_s, values)
@@ -220,11 +208,9 @@ def _standing_commands(run: Run, vehicle: Vehicle, names: list[str], noisy: set[
     commands = run.array(tuple(names))
     moves = np.abs(np.diff(commands, axis=0, prepend=commands[:1])) > 0.0
     for k, name in enumerate(names):
-        own = commands[:, k]
-        against = contradiction(run, vehicle, [name])
-        for mask, p in held(run.time_s, own[:, None], noisy=name in noisy, contradicted=against):
+        for mask, p in held_in(run, vehicle, (name,), noisy):
             others = np.delete(moves[mask], k, axis=1).mean(axis=0)
-            if not at_the_end(own, mask) and others.min() > OTHERS_GO_ON:
+            if not at_the_end(commands[:, k], mask) and others.min() > OTHERS_GO_ON:
                 found += _as_dropouts(run, name, "held", mask, p)
     return found
 
@@ -236,10 +222,9 @@ def load_went_on(run: Run, vehicle: Vehicle, reading: np.ndarray, held_mask: np.
     """
     plain_change = 8.0  # Times the noise by which a reading should have changed to be called held.
     plain_steps = 2.0  # The same in steps of a coarse reading, which stands still until the load has changed by one.
-    families = (c.rotor_columns(f, vehicle.rotor_count) for f in ("rotor_speed", "rotor_command", "throttle"))
-    rotors = next((n for n in families if n and run.has(*n)), ())
     drivers = [run.column(n) for n in c.REFERENCE_FORCE if run.has(n)]
-    drivers += [run.column(n) ** 2 for n in rotors] + [np.sin(run.column(n)) for n in c.MOUNT if run.has(n)]
+    drivers += [run.column(n) ** 2 for n in driven_by(run, vehicle)]
+    drivers += [np.sin(run.column(n)) for n in c.MOUNT if run.has(n)]
     if not drivers:
         return False
     x = np.column_stack([np.ones(len(reading)), *drivers])

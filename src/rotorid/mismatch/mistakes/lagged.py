@@ -11,13 +11,13 @@ believed vehicle.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal.windows import hann
 
 from rotorid.mismatch.evidence.motion import rates_from_attitude, stretches
-from rotorid.mismatch.mistakes import lagged
 from rotorid.mismatch.mistakes.signals import Signals
 from rotorid.recordings import Vehicle
 from rotorid.recordings.signal import kernels
@@ -95,14 +95,6 @@ class Blocks:
         return Blocks(self.frequency_hz, *(v[chosen] for v in own))
 
 
-@dataclass(frozen=True)
-class Signal:
-    """Evenly sampled signals (n, m) and whether their derivative is meant."""
-
-    values: np.ndarray
-    derivative: bool = False
-
-
 def join(parts: list[Blocks | None]) -> Blocks | None:
     """Blocks of several runs as one, None for none."""
     parts = [p for p in parts if p is not None]
@@ -113,26 +105,29 @@ def join(parts: list[Blocks | None]) -> Blocks | None:
 
 
 def cut(
-    y: Signal, x: Signal, z: Signal | None, rate_hz: float, band_hz: tuple[float, float], run: int
+    sides: list[np.ndarray], changing: bool, rate_hz: float, band_hz: tuple[float, float], run: int
 ) -> Blocks | None:
-    """Blocks of one run: both sides pass the same low-pass, missing samples are left out."""
+    """Blocks of one run from evenly sampled Y, X and, where there are some, Z, (n, m) each.
+
+    `changing`: Y's derivative is meant. All sides pass the same low-pass, missing samples are left out.
+    """
     cutoff = band_hz[1]
-    parts = [y, x] + ([z] if z is not None else [])
-    good = np.all([np.isfinite(p.values).all(axis=1) for p in parts], axis=0)
+    good = np.all([np.isfinite(values).all(axis=1) for values in sides], axis=0)
     # Analysis above the band is thinned away; all runs must share one grid of frequencies.
     step = max(1, int(rate_hz / (_OVERSAMPLING * cutoff)))
     length = int(round(BLOCK_S * rate_hz / step))
     frequency = np.arange(1, int(np.ceil(band_hz[1] * BLOCK_S)) + 1) / BLOCK_S
     used = np.flatnonzero((frequency >= band_hz[0]) & (frequency <= band_hz[1]))
     taper = hann(length, sym=False)[:, None] / np.sqrt(length)
-    out = [[] for _ in parts]
+    out = [[] for _ in sides]
     times = []
     flat, slope = kernels.low_pass(rate_hz, 1.2 * cutoff), kernels.derivative(rate_hz, 1.2 * cutoff)
     half = kernels.half_length(rate_hz, 1.2 * cutoff)
     for start, stop in stretches(good):
         if stop - start < 2 * half + length * step:
             continue
-        filtered = [kernels.apply(slope if p.derivative else flat, p.values[start:stop])[::step] for p in parts]
+        filters = (slope if changing else flat, flat, flat)
+        filtered = [kernels.apply(own, v[start:stop])[::step] for own, v in zip(filters, sides, strict=False)]
         for k in range(len(filtered[0]) // length):
             inside = slice(k * length, (k + 1) * length)
             for store, f in zip(out, filtered, strict=True):
@@ -142,7 +137,7 @@ def cut(
     if not times:
         return None
     spectra = [np.array(s) for s in out]
-    if z is None:
+    if len(sides) < 3:
         spectra.append(np.zeros((len(times), len(used), 0), complex))
     return Blocks(frequency[used], *spectra, np.full(len(times), run), np.array(times))
 
@@ -376,17 +371,22 @@ def _band(all_signals: list[Signals], sensors: tuple[str, ...], wanted: tuple[fl
     return wanted[0], min(wanted[1], nyquist_share * min(rates, default=0.0))
 
 
-def gather(all_signals: list[Signals], sensors: tuple[str, ...], wanted: tuple[float, float], make) -> Blocks | None:
-    """Blocks of all runs that have the sensors; `make(signals)` gives Y, X and Z."""
-    limits = _band([s for s in all_signals if set(sensors) <= set(s.values)], sensors, wanted)
+def gather(
+    all_signals: list[Signals],
+    sensors: tuple[str, ...],
+    comparison: str,
+    make: Callable[[Signals], tuple[np.ndarray, ...]],
+    changing: bool = False,
+) -> Blocks | None:
+    """Blocks of all runs that have the sensors; `make` gives Y (or, `changing`, what changes by it), X and perhaps Z.
+
+    `comparison` is a key of `BANDS_HZ`.
+    """
+    limits = _band([s for s in all_signals if set(sensors) <= set(s.values)], sensors, BANDS_HZ[comparison])
     if limits[1] < 2.5 * limits[0]:
         return None
-    parts = []
-    for number, signals in enumerate(all_signals):
-        if set(sensors) <= set(signals.values):
-            y, x, z = make(signals)
-            parts.append(lagged.cut(y, x, z, signals.rate_hz, limits, number))
-    return lagged.join(parts)
+    runs = ((k, s) for k, s in enumerate(all_signals) if set(sensors) <= set(s.values))
+    return join([cut([*make(s)], changing, s.rate_hz, limits, k) for k, s in runs])
 
 
 def turning(all_signals: list[Signals]) -> Blocks | None:
@@ -394,10 +394,9 @@ def turning(all_signals: list[Signals]) -> Blocks | None:
 
     def make(s: Signals):
         q = s.values["attitude"]
-        slope = np.gradient(q, 1.0 / s.rate_hz, axis=0)
-        return Signal(rates_from_attitude(q, slope)), Signal(s.values["gyroscope"]), None
+        return rates_from_attitude(q, np.gradient(q, 1.0 / s.rate_hz, axis=0)), s.values["gyroscope"]
 
-    return gather(all_signals, ("attitude", "gyroscope"), BANDS_HZ["turning"], make)
+    return gather(all_signals, ("attitude", "gyroscope"), "turning", make)
 
 
 def accelerating(all_signals: list[Signals], vehicle: Vehicle, source: str) -> Blocks | None:
@@ -412,9 +411,9 @@ def accelerating(all_signals: list[Signals], vehicle: Vehicle, source: str) -> B
         else:
             lift = squared_speeds(s, vehicle, source).sum(axis=1) / vehicle.mass_kg
             body = np.stack([np.zeros_like(lift), np.zeros_like(lift), -lift], axis=1)
-        return Signal(s.values["velocity"], True), Signal(np.einsum("nij,nj->ni", s.rotation(), body)), None
+        return s.values["velocity"], np.einsum("nij,nj->ni", s.rotation(), body)
 
-    return gather(all_signals, ("velocity", "attitude", source), BANDS_HZ["accelerating"], make)
+    return gather(all_signals, ("velocity", "attitude", source), "accelerating", make, changing=True)
 
 
 def sideways(all_signals: list[Signals], gravity_m_s2: float) -> Blocks | None:
@@ -423,18 +422,15 @@ def sideways(all_signals: list[Signals], gravity_m_s2: float) -> Blocks | None:
     def make(s: Signals):
         slope = np.gradient(s.values["velocity"], 1.0 / s.rate_hz, axis=0)
         body = np.einsum("nji,nj->ni", s.rotation(), slope - np.array([0.0, 0.0, gravity_m_s2]))
-        return Signal(body[:, :2]), Signal(s.values["accelerometer"][:, :2]), None
+        return body[:, :2], s.values["accelerometer"][:, :2]
 
-    return gather(all_signals, ("velocity", "attitude", "accelerometer"), BANDS_HZ["sideways"], make)
+    return gather(all_signals, ("velocity", "attitude", "accelerometer"), "sideways", make)
 
 
 def moving(all_signals: list[Signals]) -> Blocks | None:
     """Y: derivative of the position; X: the velocity, m/s, world axes."""
-
-    def make(s: Signals):
-        return Signal(s.values["position"], True), Signal(s.values["velocity"]), None
-
-    return gather(all_signals, ("position", "velocity"), BANDS_HZ["moving"], make)
+    sensors = ("position", "velocity")
+    return gather(all_signals, sensors, "moving", lambda s: tuple(s.values[n] for n in sensors), changing=True)
 
 
 def rolling(all_signals: list[Signals], vehicle: Vehicle, sensor: str) -> Blocks | None:
@@ -444,9 +440,9 @@ def rolling(all_signals: list[Signals], vehicle: Vehicle, sensor: str) -> Blocks
     def make(s: Signals):
         rate, thrust = s.values["gyroscope"], squared_speeds(s, vehicle, sensor)
         turning = np.stack([-(thrust @ at[:, 1]) / inertia.xx, (thrust @ at[:, 0]) / inertia.yy], axis=1)
-        return Signal(rate[:, :2], True), Signal(turning), Signal(rate)
+        return rate[:, :2], turning, rate
 
-    return gather(all_signals, ("gyroscope", sensor), BANDS_HZ["rolling"], make)
+    return gather(all_signals, ("gyroscope", sensor), "rolling", make, changing=True)
 
 
 def lifting(all_signals: list[Signals], vehicle: Vehicle, sensor: str) -> Blocks | None:
@@ -454,21 +450,17 @@ def lifting(all_signals: list[Signals], vehicle: Vehicle, sensor: str) -> Blocks
 
     def make(s: Signals):
         lift = -squared_speeds(s, vehicle, sensor).sum(axis=1, keepdims=True) / vehicle.mass_kg
-        return Signal(s.values["accelerometer"][:, 2:]), Signal(lift), None
+        return s.values["accelerometer"][:, 2:], lift
 
-    return gather(all_signals, ("accelerometer", sensor), BANDS_HZ["lifting"], make)
+    return gather(all_signals, ("accelerometer", sensor), "lifting", make)
 
 
 def following(all_signals: list[Signals], sensor: str) -> Blocks | None:
     """Y: one rotor's measured speed; X: its command (or throttle), all rotors stacked as blocks."""
-    parts = []
     limits = _band(all_signals, ("rotors", sensor), BANDS_HZ["following"])
     if limits[1] < 2.5 * limits[0]:
         return None
-    for number, s in enumerate(all_signals):
-        if {"rotors", sensor} <= set(s.values):
-            for i in range(s.values["rotors"].shape[1]):
-                pick = slice(i, i + 1)
-                y, x = Signal(s.values["rotors"][:, pick]), Signal(s.values[sensor][:, pick])
-                parts.append(lagged.cut(y, x, None, s.rate_hz, limits, number))
-    return lagged.join(parts)
+    runs = ((k, s) for k, s in enumerate(all_signals) if {"rotors", sensor} <= set(s.values))
+    pairs = ((k, s, [s.values[n][:, i : i + 1] for n in ("rotors", sensor)]) for k, s in runs
+             for i in range(s.values["rotors"].shape[1]))  # fmt: skip
+    return join([cut(pair, False, s.rate_hz, limits, k) for k, s, pair in pairs])

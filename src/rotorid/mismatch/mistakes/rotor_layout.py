@@ -23,23 +23,11 @@ from scipy.signal import lfilter
 from scipy.sparse.csgraph import connected_components
 from scipy.stats import t as student
 
-from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.evidence.motion import stretches
 from rotorid.mismatch.evidence.split import HELD_OUT_SHARE, split_runs
 from rotorid.mismatch.mistakes import lagged
 from rotorid.mismatch.mistakes.axes import Turn, turned
-from rotorid.mismatch.mistakes.lagged import (
-    BANDS_HZ,
-    CAUSES_S,
-    OVERLAP,
-    Blocks,
-    LaggedFit,
-    Signal,
-    gather,
-    speeds_of,
-    squared_speeds,
-)
-from rotorid.mismatch.mistakes.signals import Corrected, ReadSet, Signals, replace_columns, sensor_columns
+from rotorid.mismatch.mistakes.signals import Corrected, ReadSet, Signals, established, replace_columns, sensor_columns
 from rotorid.recordings import Run, Vehicle
 from rotorid.recordings.run import Doubt
 
@@ -77,7 +65,7 @@ class _Moments:
         return float(self.square.sum()), self.cross.sum(axis=0), self.gram.sum(axis=0)
 
 
-def _moments(blocks: Blocks, output: int, lag_s: float, weight: np.ndarray) -> _Moments:
+def _moments(blocks: lagged.Blocks, output: int, lag_s: float, weight: np.ndarray) -> _Moments:
     """Moments of one output with the rotors delayed and Z projected out."""
     x = blocks.x * lagged.delay(blocks.frequency_hz, lag_s)[:, :, None]
     y, z = blocks.y[:, :, output], blocks.z
@@ -98,7 +86,7 @@ def _moments(blocks: Blocks, output: int, lag_s: float, weight: np.ndarray) -> _
 class _Axis:
     """One axis whose acceleration layouts predict."""
 
-    blocks: Blocks
+    blocks: lagged.Blocks
     output: int
     lags_s: tuple[float, ...]
     """Delays of the rotors that are tried."""
@@ -138,7 +126,7 @@ def _tie(whole: float, best: float) -> float:
     """Largest loss that still counts as the best."""
     # Layouts within this log-likelihood, or this share of what is explained, are not distinguished.
     tied_likelihood, tied_share = 12.0, 0.02
-    return best + max(OVERLAP * tied_likelihood, tied_share * (whole - best))
+    return best + max(lagged.OVERLAP * tied_likelihood, tied_share * (whole - best))
 
 
 def _losses_of_orders(m: list[_Moments], rows: np.ndarray, orders: np.ndarray) -> np.ndarray:
@@ -184,7 +172,7 @@ def _contest(axis_moments: list[_Moments], believed: list[np.ndarray], other: li
     count = len(score)
     step = float(score.sum() / max(curvature.sum(), 1e-300))
     rest = score - curvature * step
-    sd = np.sqrt(max(np.sum(rest**2) * count / max(count - 1, 1), OVERLAP * curvature.sum())) / max(
+    sd = np.sqrt(max(np.sum(rest**2) * count / max(count - 1, 1), lagged.OVERLAP * curvature.sum())) / max(
         curvature.sum(), 1e-300
     )
     return step, float(student.sf(step / sd, max(count - 1, 1)))
@@ -200,9 +188,9 @@ def find(recordings: ReadSet, by_yaw: bool = True) -> Corrected:
     if not 3 <= vehicle.rotor_count <= 8:
         return Corrected(recordings)
     signals = recordings.signals
-    sensor = next((n for n in map(speeds_of, signals) if n), None)
+    sensor = next((n for n in map(lagged.speeds_of, signals) if n), None)
     blocks = _thrust_blocks(signals, vehicle, sensor) if sensor else None
-    free = lagged.fit(blocks, CAUSES_S - _late_stamps(signals, vehicle, sensor)) if blocks else None
+    free = lagged.fit(blocks, lagged.CAUSES_S - _late_stamps(signals, vehicle, sensor)) if blocks else None
     if free is None:
         return Corrected(recordings)
     rolling = [_Axis(blocks, axis, (free.lag_s,), free.weight[axis]) for axis in (0, 1)]
@@ -221,7 +209,10 @@ def find(recordings: ReadSet, by_yaw: bool = True) -> Corrected:
         # Rotors that all turn alike make no moment that distinguishes them.
         return Corrected(recordings)
     whole = float(sum(m.square.sum() for m in parts) + (yaw[0].square.sum() if yaw else 0.0))
-    costs = np.array([_moves(o) for o in orders])[:, None] + (_turned_cost(senses, believed[orders]) if yaw else 0)
+    costs = np.array([_moves(o) for o in orders])[:, None]
+    if yaw:
+        changed = (senses[None, :, :] != believed[orders][:, None, :]).sum(axis=2)
+        costs = costs + np.where(changed == len(believed), 1, changed)  # all senses at once are one change
     least = float(losses.min())
     tied = np.argwhere(losses <= _tie(whole, least))
     ranked = sorted(tied.tolist(), key=lambda at: (costs[at[0], at[1]], losses[at[0], at[1]]))
@@ -247,13 +238,18 @@ def find(recordings: ReadSet, by_yaw: bool = True) -> Corrected:
     step, p_value = _contest(seen, now, then)
     p_value = min(1.0, p_value * losses.size)
     disputed = float(sum(m.square.sum() for m in seen))
-    likely = (as_believed - best) / OVERLAP > _LEAST_LIKELIHOOD
+    likely = (as_believed - best) / lagged.OVERLAP > _LEAST_LIKELIHOOD
     explains = disputed - best > least_advantage * (disputed - as_believed)
     if not (likely and explains and step > _LEAST_STEP and p_value < _P_LIMIT):
         return Corrected(recordings)
-    if order and _fits_early(blocks, free, rows) < least - yaw_losses.min() - OVERLAP * _LEAST_LIKELIHOOD:
-        # The believed order, with stamps of the rotors that are late: `timing` finds them.
-        return Corrected(recordings)
+    if order:
+        # What the believed order leaves of roll and pitch where the torque may come after the motion.
+        early = lagged.fit(blocks, -lagged.CAUSES_S[::-1])
+        moments = [_moments(blocks, axis, early.lag_s, free.weight[axis]) for axis in (0, 1)]
+        left = sum(_loss(m, _best_gain(m, row)) for m, row in zip(moments, rows, strict=True))
+        if left < least - yaw_losses.min() - lagged.OVERLAP * _LEAST_LIKELIHOOD:
+            # The believed order, with stamps of the rotors that are late: `timing` finds them.
+            return Corrected(recordings)
     held_out = _held_out(recordings, blocks)
     same = int(np.flatnonzero((senses == believed).all(axis=1))[0])
     if yaw and spun != same and not _foretells(recordings, sensor, believed, senses[spun], held_out):
@@ -277,12 +273,6 @@ def find(recordings: ReadSet, by_yaw: bool = True) -> Corrected:
         rotors = sorted(int(orders[order][i]) for i in turning)
         result = result.then(partial(_spun, rotors=rotors, p_value=p_value, ambiguous=rival))
     return result
-
-
-def _turned_cost(senses: np.ndarray, expected: np.ndarray) -> np.ndarray:
-    """Changes of sense from what each order expects, (orders, senses); all at once is one change."""
-    changed = (senses[None, :, :] != expected[:, None, :]).sum(axis=2)
-    return np.where(changed == senses.shape[1], 1, changed)
 
 
 def _turned_gyroscope(
@@ -324,13 +314,12 @@ def _turned_gyroscope(
     return Corrected(found.recordings, (finding,), (note,))
 
 
-def _thrust_blocks(signals: list[Signals], vehicle: Vehicle, sensor: str) -> Blocks | None:
+def _thrust_blocks(signals: list[Signals], vehicle: Vehicle, sensor: str) -> lagged.Blocks | None:
     def make(s: Signals):
         rate = s.values["gyroscope"]
-        thrust = squared_speeds(s, vehicle, sensor)
-        return Signal(rate[:, :2], True), Signal(thrust), Signal(rate)
+        return rate[:, :2], lagged.squared_speeds(s, vehicle, sensor), rate
 
-    return gather(signals, ("gyroscope", sensor), BANDS_HZ["rolling"], make)
+    return lagged.gather(signals, ("gyroscope", sensor), "rolling", make, changing=True)
 
 
 def _reordered(recordings: ReadSet, order: np.ndarray, p: float, ambiguous: bool) -> Corrected:
@@ -347,18 +336,14 @@ def _reordered(recordings: ReadSet, order: np.ndarray, p: float, ambiguous: bool
 
     wrong = [i for i in range(len(order)) if order[i] != i]
     moved = ", ".join(f"column {i + 1} belongs to rotor {order[i] + 1}" for i in wrong)
-    finding = Finding(
-        id="rotor_order",
-        status="ambiguous" if ambiguous else "established",
-        sentence=f"The rotor columns are in another order than vehicle.yaml: {moved}; put in order.",
-        p_value=p,
-        channels=tuple(names["rotors"][i] for i in wrong),
-        alternatives=("rotor_order", "spin_direction") if ambiguous else (),
-    )
-    return Corrected(recordings if ambiguous else replace_columns(recordings, change), (finding,))
+    sentence = f"The rotor columns are in another order than vehicle.yaml: {moved}; put in order."
+    finding = established("rotor_order", sentence, p, [names["rotors"][i] for i in wrong])
+    if ambiguous:
+        return Corrected(recordings, (finding.or_else(["spin_direction"]),))
+    return Corrected(replace_columns(recordings, change), (finding,))
 
 
-def _yaw_axis(signals: list[Signals], vehicle: Vehicle, sensor: str, roll: LaggedFit) -> _Axis | None:
+def _yaw_axis(signals: list[Signals], vehicle: Vehicle, sensor: str, roll: lagged.LaggedFit) -> _Axis | None:
     """Yaw acceleration against every rotor's torque (k) and acceleration (k); None without a torque coefficient.
 
     Measured rotors are as late as roll says. Commands may be later: of rotors that lag, torque and acceleration are.
@@ -368,12 +353,12 @@ def _yaw_axis(signals: list[Signals], vehicle: Vehicle, sensor: str, roll: Lagge
 
     def make(s: Signals):
         rate = s.values["gyroscope"]
-        torque = squared_speeds(s, vehicle, sensor) / vehicle.thrust_coefficients_n_s2()
+        torque = lagged.squared_speeds(s, vehicle, sensor) / vehicle.thrust_coefficients_n_s2()
         torque = torque * vehicle.torque_coefficients_n_m_s2() / vehicle.inertia_kg_m2.zz
         change = np.gradient(s.values[sensor], 1.0 / s.rate_hz, axis=0)
-        return Signal(rate[:, 2:], True), Signal(np.concatenate([torque, change], axis=1)), Signal(rate)
+        return rate[:, 2:], np.concatenate([torque, change], axis=1), rate
 
-    blocks = gather(signals, ("gyroscope", sensor), BANDS_HZ["yawing"], make)
+    blocks = lagged.gather(signals, ("gyroscope", sensor), "yawing", make, changing=True)
     sharp = roll.lag_sd < 0.005
     late = roll.lag_s if sharp else 0.0
     free = lagged.fit(blocks, np.array([late]))
@@ -390,14 +375,7 @@ def _late_stamps(signals: list[Signals], vehicle: Vehicle, sensor: str) -> float
     return max(0.0, -lift.lag_s - 2 * lift.lag_sd) if known else 0.0
 
 
-def _fits_early(blocks: Blocks, free: LaggedFit, rows: np.ndarray) -> float:
-    """What the believed order leaves of roll and pitch where the torque may come after the motion."""
-    early = lagged.fit(blocks, -CAUSES_S[::-1])
-    moments = [_moments(blocks, axis, early.lag_s, free.weight[axis]) for axis in (0, 1)]
-    return sum(_loss(m, _best_gain(m, row)) for m, row in zip(moments, rows, strict=True))
-
-
-def _held_out(recordings: ReadSet, blocks: Blocks) -> Callable[[int, float], bool]:
+def _held_out(recordings: ReadSet, blocks: lagged.Blocks) -> Callable[[int, float], bool]:
     """Whether a time (s since its start) of a run (its number) is held out.
 
     The last third of each run where no run is, or where those that are, or all others, have none of the blocks.
@@ -474,7 +452,9 @@ def _past_and_next(signals: Signals, vehicle: Vehicle, sensor: str):
     length = max(1, round(max(_STEP_S, own_s) * signals.rate_hz))
     step_s = length / signals.rate_hz
     torque = vehicle.torque_coefficients_n_m_s2() / vehicle.thrust_coefficients_n_s2()
-    both = np.concatenate([signals.values["gyroscope"], squared_speeds(signals, vehicle, sensor) * torque], axis=1)
+    both = np.concatenate(
+        [signals.values["gyroscope"], lagged.squared_speeds(signals, vehicle, sensor) * torque], axis=1
+    )
     parts = []
     for start, stop in stretches(np.isfinite(both).all(axis=1)):
         count = (stop - start) // length
@@ -503,22 +483,15 @@ def _spun(recordings: ReadSet, rotors: list[int], p_value: float, ambiguous: boo
     every = len(rotors) == vehicle.rotor_count
     numbers = ", ".join(str(i + 1) for i in rotors)
     who = "all rotors spin" if every else f"rotor {numbers} spins" if len(rotors) == 1 else f"rotors {numbers} spin"
+    sentence = f"The yaw moments say that {who} the other way than vehicle.yaml has it: turned round."
+    finding = established("spin_direction", sentence, p_value, ["moment_z"])
+    if ambiguous:
+        return Corrected(recordings, (finding.or_else(["rotor_order"]),))
     other = {"ccw": "cw", "cw": "ccw"}
     new = tuple(
         r.model_copy(update={"spin": other[r.spin]}) if i in rotors else r for i, r in enumerate(vehicle.rotors)
     )
-    finding = Finding(
-        id="spin_direction",
-        status="ambiguous" if ambiguous else "established",
-        sentence=f"The yaw moments say that {who} the other way than vehicle.yaml has it: turned round.",
-        p_value=p_value,
-        channels=("moment_z",),
-        alternatives=("rotor_order", "spin_direction") if ambiguous else (),
-    )
-    fixed = recordings
-    if not ambiguous:
-        fixed = replace(recordings, vehicle=vehicle.model_copy(update={"rotors": new}))
-    return Corrected(fixed, (finding,))
+    return Corrected(replace(recordings, vehicle=vehicle.model_copy(update={"rotors": new})), (finding,))
 
 
 def _yaw_row(m: _Moments, signs: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -133,11 +133,7 @@ class ReadSet(RecordingSet):
 
 def replace_columns(recordings: RecordingSet, change) -> RecordingSet:
     """The set with every run's table passed through `change(run) -> dict of columns or None`."""
-    runs = []
-    for run in recordings.runs:
-        columns = change(run)
-        runs.append(replace(run, table=run.table.assign(**columns)) if columns else run)
-    return replace(recordings, runs=tuple(runs))
+    return replace(recordings, runs=tuple(run.holding(change(run) or {}) for run in recordings.runs))
 
 
 def replace_sensor(recordings: RecordingSet, sensor: str, change: Callable[[np.ndarray], np.ndarray]) -> RecordingSet:
@@ -148,6 +144,11 @@ def replace_sensor(recordings: RecordingSet, sensor: str, change: Callable[[np.n
         return dict(zip(names, change(run.array(names)).T, strict=True)) if run.has(*names) else None
 
     return replace_columns(recordings, changed)
+
+
+def established(id: str, sentence: str, p_value: float, channels: Iterable[str], **more) -> Finding:
+    """What the recordings show by themselves to be a mistake in them."""
+    return Finding(id, "established", sentence=sentence, p_value=p_value, channels=tuple(channels), **more)
 
 
 @dataclass(frozen=True)

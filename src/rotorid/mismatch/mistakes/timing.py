@@ -14,26 +14,16 @@ from itertools import combinations, permutations
 import numpy as np
 from scipy.stats import t as student
 
-from rotorid.mismatch.decide.findings import Finding, in_interval
+from rotorid.mismatch.decide.findings import in_interval
 from rotorid.mismatch.decide.words import capital, listed
 from rotorid.mismatch.mistakes import lagged
-from rotorid.mismatch.mistakes.lagged import (
-    Blocks,
-    LaggedFit,
-    accelerating,
-    following,
-    lifting,
-    moving,
-    rolling,
-    speeds_of,
-    turning,
-)
 from rotorid.mismatch.mistakes.signals import (
     COMMANDED,
     SENSOR_WORDS,
     Corrected,
     ReadSet,
     Signals,
+    established,
     on_grid,
     replace_columns,
     sensor_columns,
@@ -75,8 +65,8 @@ class _SensorPair:
     """The later one."""
     over: str
     """The earlier one."""
-    blocks: Blocks
-    fit: LaggedFit
+    blocks: lagged.Blocks
+    fit: lagged.LaggedFit
     motor_s: float
     """Motor lag taken out of the command first."""
     shares: tuple[tuple[str, float], ...]
@@ -150,27 +140,27 @@ def _sensor_pairs(recordings: ReadSet) -> list[_SensorPair]:
     """Every comparison of two sensors that may show time."""
     all_signals, vehicle = recordings.signals, recordings.vehicle
     have = set().union(*(s.values for s in all_signals))
-    speeds = next((n for n in map(speeds_of, all_signals) if n), None)
+    speeds = next((n for n in map(lagged.speeds_of, all_signals) if n), None)
     force = "accelerometer" if "accelerometer" in have else None
     source = force or speeds
-    pairs: list[tuple[str, str, Blocks | None]] = []
+    pairs: list[tuple[str, str, lagged.Blocks | None]] = []
     if {"attitude", "gyroscope"} <= have:
-        pairs.append(("attitude", "gyroscope", turning(all_signals)))
+        pairs.append(("attitude", "gyroscope", lagged.turning(all_signals)))
     if {"velocity", "attitude"} <= have and (force or speeds in ("rotors", "commands")):
-        world = accelerating(all_signals, vehicle, source)
+        world = lagged.accelerating(all_signals, vehicle, source)
         if world is not None:
             # Level motion follows the tilt, so it compares with the attitude; vertical motion with the force.
             pairs.append(("velocity", "attitude", world.outputs([0, 1])))
             pairs.append(("velocity", source, world.outputs([2])))
     if {"position", "velocity"} <= have:
-        pairs.append(("position", "velocity", moving(all_signals)))
+        pairs.append(("position", "velocity", lagged.moving(all_signals)))
     if "gyroscope" in have and speeds:
-        pairs.append(("gyroscope", speeds, rolling(all_signals, vehicle, speeds)))
+        pairs.append(("gyroscope", speeds, lagged.rolling(all_signals, vehicle, speeds)))
     if force and speeds:
-        pairs.append(("accelerometer", speeds, lifting(all_signals, vehicle, speeds)))
+        pairs.append(("accelerometer", speeds, lagged.lifting(all_signals, vehicle, speeds)))
     if "rotors" in have and ("commands" in have or "throttle" in have):
         command = "commands" if "commands" in have else "throttle"
-        pairs.append(("rotors", command, following(all_signals, command)))
+        pairs.append(("rotors", command, lagged.following(all_signals, command)))
     out = []
     for late, over, blocks in pairs:
         if blocks is None:
@@ -194,7 +184,7 @@ def _sensor_pairs(recordings: ReadSet) -> list[_SensorPair]:
     return out
 
 
-def one_quantity(blocks: Blocks, own: Sequence[int]) -> Blocks | None:
+def one_quantity(blocks: lagged.Blocks, own: Sequence[int]) -> lagged.Blocks | None:
     """The widest band, from the lowest frequency up, in which two sensors show one quantity; None for none.
 
     Two readings of one quantity have a gain of one, or of a sensor's scale, at every frequency. Where it falls, noise
@@ -220,7 +210,7 @@ def one_quantity(blocks: Blocks, own: Sequence[int]) -> Blocks | None:
 
 
 def _shares_of(
-    all_signals: list[Signals], vehicle: Vehicle, source: str, outputs: list[int], found: LaggedFit
+    all_signals: list[Signals], vehicle: Vehicle, source: str, outputs: list[int], found: lagged.LaggedFit
 ) -> tuple[tuple[str, float], ...]:
     """By how much the lateness of the velocity follows that of the attitude, and that of the force turned by it.
 
@@ -230,7 +220,7 @@ def _shares_of(
     share_step_s = 0.004  # By how much a sensor is made late to see how far a comparison's lateness follows.
     steps = max(1, round(share_step_s * all_signals[0].rate_hz))
     moved = [_late(s, "attitude", steps) for s in all_signals]
-    blocks = accelerating(moved, vehicle, source)
+    blocks = lagged.accelerating(moved, vehicle, source)
     again = lagged.fit(blocks.outputs(outputs)) if blocks is not None else None
     if again is None:
         return (("attitude", 1.0),) if outputs == [0, 1] else ((source, 1.0),)
@@ -301,7 +291,7 @@ def _difference(of: _SensorPair, drifting: bool, free: bool = True) -> _Lateness
     return _LatenessFound(of, start, growth, covariance, rise, len(time_s), explained, gained, bias_s)
 
 
-def _disturbed_s(blocks: Blocks, found: LaggedFit) -> float:
+def _disturbed_s(blocks: lagged.Blocks, found: lagged.LaggedFit) -> float:
     """The most lateness that disturbances can feign where the rotors explain a share E of the motion, s.
 
     What disturbs a vehicle makes its controller answer, so that what is left of the motion is not independent of the
@@ -315,7 +305,7 @@ def _disturbed_s(blocks: Blocks, found: LaggedFit) -> float:
     return float((phase[:, None] * power * angular).sum() / (power * angular**2).sum())
 
 
-def _unblurred(blocks: Blocks, found: LaggedFit) -> LaggedFit:
+def _unblurred(blocks: lagged.Blocks, found: lagged.LaggedFit) -> lagged.LaggedFit:
     """The fit at the coarse growth that explains most, its delay that of the middle of the runs."""
     aside = blocks.time_s - blocks.time_s.mean()
     best = found
@@ -326,7 +316,7 @@ def _unblurred(blocks: Blocks, found: LaggedFit) -> LaggedFit:
     return best
 
 
-def _likelihood(blocks: Blocks, found: LaggedFit, lags: np.ndarray) -> np.ndarray:
+def _likelihood(blocks: lagged.Blocks, found: lagged.LaggedFit, lags: np.ndarray) -> np.ndarray:
     """Log-likelihood of every lag in every block, (b, lags), up to what no lag changes."""
     model = blocks.x @ found.gain.T
     rest = blocks.y - blocks.z @ found.nuisance.T
@@ -476,7 +466,12 @@ def _connected(names: list[str], differences: list[_LatenessFound]) -> list[list
     return [sorted(g) for g in groups]
 
 
-_PREFERRED = ("gyroscope", "attitude", "accelerometer", "velocity", "rotors")
+def _trust(sensor: str) -> int:
+    """The place of a sensor among those whose clocks are believed, the first before others."""
+    order = ("gyroscope", "attitude", "accelerometer", "velocity", "rotors")
+    return order.index(sensor) if sensor in order else len(order)
+
+
 _INERTIAL = ("gyroscope", "accelerometer")
 
 
@@ -501,8 +496,7 @@ def in_agreement(solved: Lateness, group: list[str], least: dict[str, float], si
     for candidate in group:
         own = list(next(s for s in sets if candidate in s))
         late = [n for n in group if n not in own and (filtered(n, candidate) or filtered(candidate, n))]
-        preferred = -min((_PREFERRED.index(n) for n in own if n in _PREFERRED), default=len(_PREFERRED))
-        rank = (len(own) + len(late), len(own), preferred)
+        rank = (len(own) + len(late), len(own), -min(map(_trust, own)))
         if best is None or rank > best[0]:
             kept = own
             if late and any(filtered(candidate, n) for n in late):
@@ -521,9 +515,15 @@ def _relative_to_most(
     """
     zeros = [in_agreement(solved, group, least, sigmas, filter_s) for group in solved.groups]
     found = [_over_known(solved, group, right) for group, right in zip(solved.groups, zeros, strict=True)]
-    off = [{n: v for n, v in part.items() if _stands_out(n, v, least, sigmas)} for part in found]
+    off = [{n: v for n, v in part.items() if abs(v[0]) > max(least[n], sigmas * v[1], v[2])} for part in found]
+
+    def opposite(one: tuple[float, float, float], other: tuple[float, float, float]) -> bool:
+        """Whether two values differ in nothing but their sign."""
+        slack = max(filter_s, sigmas * np.hypot(one[1], other[1]))
+        return one[0] * other[0] < 0 and abs(one[0] + other[0]) < slack
+
     for a, b in permutations(range(len(off)), 2):
-        same = [n for n, v in off[b].items() if any(_opposite(v, w, sigmas, filter_s) for w in off[a].values())]
+        same = [n for n, v in off[b].items() if any(opposite(v, w) for w in off[a].values())]
         if same and len(off[b]) == len(same) and len(off[a]) >= len(off[b]):
             found[b] = _over_known(solved, solved.groups[b], same)
             break
@@ -537,15 +537,6 @@ def _over_known(solved: Lateness, group: list[str], right: list[str]) -> dict[st
         against = [solved.over(n, [c]) for c in right if c != n]
         out[n] = solved.over(n, right) if n in right else min(against, key=lambda v: v[1] + v[2])
     return out
-
-
-def _stands_out(name: str, value: tuple[float, float, float], least: dict[str, float], sigmas: float) -> bool:
-    return abs(value[0]) > max(least[name], sigmas * value[1], value[2])
-
-
-def _opposite(one: tuple[float, float, float], other: tuple[float, float, float], sigmas: float, slack: float) -> bool:
-    """Whether two values differ in nothing but their sign."""
-    return one[0] * other[0] < 0 and abs(one[0] + other[0]) < max(slack, sigmas * np.hypot(one[1], other[1]))
 
 
 def _own_period_s(all_signals: list[Signals]) -> dict[str, float]:
@@ -576,9 +567,8 @@ def _one_clock(differences: list[_LatenessFound], growing: list[_LatenessFound])
         left[name] = sum(
             (d.growth - d.of.part([name]) * rate) ** 2 / (d.sd(1) ** 2 + d.bound(1) ** 2) for d in differences
         )
-    trusted = {n: _PREFERRED.index(n) if n in _PREFERRED else len(_PREFERRED) for n in names}
     alike = [n for n in names if left[n] < min(left.values()) + as_well]
-    return tuple(sorted(alike, key=lambda n: (-trusted[n], n)))
+    return tuple(sorted(alike, key=lambda n: (-_trust(n), n)))
 
 
 def _skew(recordings: ReadSet, known: list[_SensorPair]) -> Corrected:
@@ -624,17 +614,13 @@ def _skew(recordings: ReadSet, known: list[_SensorPair]) -> Corrected:
     # Large drifts move the motion out of its block: measured once more with the first estimate taken out.
     rate, sd = _remeasured(_shifted(recordings, wrong, 0.0, rate), wrong, 1, rate) or (rate, sd)
     change = "fall behind by" if rate > 0 else "gain"
-    finding = Finding(
-        id="clock_skew",
-        status="established",
-        sentence=(
-            f"The clock of {_listed(wrong)} runs at another rate{other}: its stamps {change} {1e3 * abs(rate):.2f} ms "
-            f"every second; put on the other sensors' time."
-        ),
-        parameters=(in_interval("skew", rate, "1", sd),),
-        p_value=min(p for p, _ in growing),
-        channels=tuple(sensor_columns(recordings.vehicle)[n][0] for n in wrong),
+    sentence = (
+        f"The clock of {_listed(wrong)} runs at another rate{other}: its stamps {change} {1e3 * abs(rate):.2f} ms "
+        f"every second; put on the other sensors' time."
     )
+    channels = [sensor_columns(recordings.vehicle)[n][0] for n in wrong]
+    parameters = (in_interval("skew", rate, "1", sd),)
+    finding = established("clock_skew", sentence, min(p for p, _ in growing), channels, parameters=parameters)
     return Corrected(_shifted(recordings, _with_position(wrong), 0.0, rate), (finding,))
 
 
@@ -692,22 +678,12 @@ def _delay(recordings: ReadSet, known: list[_SensorPair]) -> Corrected:
             notes.append(f"{capital(_listed(cluster))}: {1e3 * amount:+.1f} ms against the rest, below a sample.")
             continue
         fixed = _shifted(fixed, _with_position(cluster), amount)
-        word = "late" if amount > 0 else "early"
-        findings.append(
-            Finding(
-                id="delay",
-                status="established",
-                sentence=(
-                    f"The stamps of {_listed(cluster)} are {1e3 * abs(amount):.1f} ms {word} against the other "
-                    f"sensors': shifted."
-                ),
-                # A sensor whose stamps are early is seen as all others' delay: the id's parameter is a length of time.
-                late_s=amount,
-                parameters=(in_interval("T_d", abs(amount), "s", sd),),
-                p_value=max(p for n, p in wrong if n in cluster),
-                channels=tuple(sensor_columns(recordings.vehicle)[n][0] for n in cluster),
-            )
-        )
+        how = f"{1e3 * abs(amount):.1f} ms {'late' if amount > 0 else 'early'}"
+        sentence = f"The stamps of {_listed(cluster)} are {how} against the other sensors': shifted."
+        # A sensor whose stamps are early is seen as all others' delay: the id's parameter is a length of time.
+        parameters, p_value = (in_interval("T_d", abs(amount), "s", sd),), max(p for n, p in wrong if n in cluster)
+        channels = [sensor_columns(recordings.vehicle)[n][0] for n in cluster]
+        findings.append(established("delay", sentence, p_value, channels, late_s=amount, parameters=parameters))
     return Corrected(fixed, tuple(findings), tuple(notes))
 
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Mapping
 
 import numpy as np
 from scipy.constants import g
 from scipy.stats import norm
 
-from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.decide.status import Estimate
-from rotorid.mismatch.mistakes.signals import Corrected, ReadSet, replace_columns, sensor_columns
+from rotorid.mismatch.decide.words import capital
+from rotorid.mismatch.mistakes.signals import Corrected, ReadSet, established, replace_columns, sensor_columns
 from rotorid.recordings import Run
 from rotorid.recordings import columns as c
 
@@ -39,14 +38,6 @@ def nearest(ratio: float, factors: Mapping[str, float]) -> tuple[str, float] | N
     return (name, factors[name]) if abs(np.log(ratio / factors[name])) < _CLOSE else None
 
 
-def find(recordings: ReadSet) -> Corrected:
-    """The set in the contract's units, with every unit error that the mean sizes of columns give away."""
-    result = Corrected(recordings)
-    for correct in _by_size(recordings):
-        result = result.then(correct)
-    return result
-
-
 def _pooled(recordings: ReadSet, names: tuple[str, ...]) -> np.ndarray:
     """Values of columns over all runs that have them, (n, m)."""
     parts = [run.array(names) for run in recordings.runs if names and run.has(*names)]
@@ -60,18 +51,18 @@ def _spread(values: np.ndarray) -> float:
     return float(2.4 * np.std(np.log(np.maximum(parts, 1e-12))) / np.sqrt(len(parts)) + 1e-6)
 
 
-def _by_size(recordings: ReadSet) -> list[Callable[[ReadSet], Corrected]]:
-    """For every unit error that the mean sizes of columns give away what corrects it."""
-    vehicle, found = recordings.vehicle, []
+def find(recordings: ReadSet) -> Corrected:
+    """The set in the contract's units, with every unit error that the mean sizes of columns give away."""
+    vehicle, result = recordings.vehicle, Corrected(recordings)
     names = sensor_columns(vehicle)
 
     def add(columns, what, unit, expected, measured=None, spread=0.0) -> None:
+        nonlocal result
         if unit is not None:
             measured = unit[1] if measured is None else measured
             # How sure the recording is that the ratio is nearer to the unit's factor than to one.
-            surely = abs(np.log(measured)) / 2 / max(spread / 1.96, 1e-6)
-            error = dict(columns=columns, what=what, unit=unit, expected=expected, measured=measured, spread=spread)
-            found.append(partial(corrected, **error, p_value=float(norm.sf(surely))))
+            p_value = float(norm.sf(abs(np.log(measured)) / 2 / max(spread / 1.96, 1e-6)))
+            result = result.then(lambda now: corrected(now, columns, what, unit, expected, measured, spread, p_value))
 
     force = _pooled(recordings, names["accelerometer"])
     if len(force):
@@ -100,7 +91,7 @@ def _by_size(recordings: ReadSet) -> list[Callable[[ReadSet], Corrected]]:
     mount = _pooled(recordings, c.MOUNT)
     if len(mount) and np.max(np.abs(mount)) > 3.5:
         add(c.MOUNT, "the mount's angles", ("degrees", RATES["deg/s"]), "rad")
-    return found
+    return result
 
 
 def corrected(
@@ -128,15 +119,7 @@ def corrected(
 
     half = max(spread, abs(float(np.log(measured / factor))))
     low, high = factor * np.exp(-half), factor * np.exp(half)
-    finding = Finding(
-        id="unit_error",
-        status="established",
-        sentence=(
-            f"{what[0].upper()}{what[1:]} ({columns[0]} …) hold {name}, not {expected}: corrected by dividing by "
-            f"{factor:.6g}."
-        ),
-        parameters=(Estimate("factor", factor, "1", float(low), float(high)),),
-        p_value=p_value,
-        channels=columns,
-    )
+    sentence = f"{capital(what)} ({columns[0]} …) hold {name}, not {expected}: corrected by dividing by {factor:.6g}."
+    parameters = (Estimate("factor", factor, "1", float(low), float(high)),)
+    finding = established("unit_error", sentence, p_value, columns, parameters=parameters)
     return Corrected(replace_columns(recordings, change), (finding,))

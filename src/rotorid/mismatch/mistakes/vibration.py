@@ -14,10 +14,9 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.stats import gamma
 
-from rotorid.mismatch.decide.findings import Finding
 from rotorid.mismatch.decide.status import Estimate
 from rotorid.mismatch.evidence.motion import full_speed
-from rotorid.mismatch.mistakes.signals import P_LIMIT, Corrected, ReadSet, Signals
+from rotorid.mismatch.mistakes.signals import P_LIMIT, Corrected, ReadSet, Signals, established
 from rotorid.recordings import columns as c
 
 _WINDOW_S = 0.35
@@ -45,27 +44,12 @@ class _Turns:
     """(w, k) number of rotors that share the line."""
 
 
-@dataclass(frozen=True)
-class _Line:
-    """One axis of a sensor against the rotors' order."""
-
-    column: str
-    unit: str
-    order: int
-    amplitude: float
-    low: float
-    high: float
-    over_noise: float
-    p_value: float
-
-
 def find(recordings: ReadSet) -> Corrected:
     """A vibration that follows the rotors, if there is a clear one; the set stays as it is."""
-    least_amplitude = 0.5  # Line over the reading's own scatter next to it (one sigma a sample), at least, to matter.
     most_measured = 1000  # Windows of a run, spread over it, that a line is measured from.
     signals = _turning(recordings)
     turns = {order: [_turns(s, order, most_measured) for s in signals] for order in _ORDERS}
-    lines = []
+    lines: list[tuple[float, Estimate, str, int]] = []  # p-value, amplitude, column and order of each
     for sensor, columns, unit in (
         ("accelerometer", c.SPECIFIC_FORCE, "m/s2"),
         ("gyroscope", c.ANGULAR_VELOCITY, "rad/s"),
@@ -74,27 +58,20 @@ def find(recordings: ReadSet) -> Corrected:
         for axis, column in enumerate(columns):
             for order in _ORDERS:
                 seen = [(signals[k].values[sensor][:, axis], turns[order][k]) for k in have]
-                line = _measure(seen, column, unit, order)
-                if line and line.p_value < P_LIMIT and line.over_noise > least_amplitude:
-                    lines.append(line)
+                if measured := _measure(seen, column, unit):
+                    lines.append((*measured, column, order))
     if not lines:
         return Corrected(recordings)
-    lines.sort(key=lambda x: x.p_value)
-    strongest = max(lines, key=lambda x: (x.column.startswith("specific"), x.amplitude))
-    where = ", ".join(dict.fromkeys(x.column for x in lines))
-    finding = Finding(
-        id="vibration",
-        status="established",
-        sentence=(
-            f"A vibration of {strongest.amplitude:.2g} {strongest.unit} a rotor turns with the rotors (order "
-            f"{strongest.order}) in {where}; it may add a constant that grows with the thrust, which looks like a "
-            "wrong thrust coefficient."
-        ),
-        parameters=tuple(Estimate(f"amplitude ({x.column})", x.amplitude, x.unit, x.low, x.high) for x in lines),
-        p_value=lines[0].p_value,
-        channels=tuple(dict.fromkeys(x.column for x in lines)),
+    lines.sort(key=lambda line: line[0])
+    _, strongest, _, order = max(lines, key=lambda line: (line[2].startswith("specific"), line[1].value))
+    columns = dict.fromkeys(column for _, _, column, _ in lines)
+    sentence = (
+        f"A vibration of {strongest.value:.2g} {strongest.unit} a rotor turns with the rotors (order {order}) in "
+        f"{', '.join(columns)}; it may add a constant that grows with the thrust, which looks like a wrong thrust "
+        "coefficient."
     )
-    return Corrected(recordings, (finding,))
+    amplitudes = tuple(amplitude for _, amplitude, _, _ in lines)
+    return Corrected(recordings, (established("vibration", sentence, lines[0][0], columns, parameters=amplitudes),))
 
 
 def _turning(recordings: ReadSet) -> list[Signals]:
@@ -142,8 +119,12 @@ def _strongest_line(signals: list[Signals]) -> float:
     return best
 
 
-def _measure(all_seen: list[tuple[np.ndarray, _Turns | None]], column: str, unit: str, order: int) -> _Line | None:
-    """Power of readings (n,) at the rotors' order over that next to it, summed over windows and rotors."""
+def _measure(all_seen: list[tuple[np.ndarray, _Turns | None]], column: str, unit: str) -> tuple[float, Estimate] | None:
+    """p-value and amplitude of a line of readings (n,) at the rotors' order; None where none is clear.
+
+    By its power over that next to it, summed over windows and rotors.
+    """
+    least_amplitude = 0.5  # Line over the reading's own scatter next to it (one sigma a sample), at least, to matter.
     ratios, powers, levels, lengths = [], [], [], []
     for reading, turns in all_seen:
         if turns is None:
@@ -172,9 +153,9 @@ def _measure(all_seen: list[tuple[np.ndarray, _Turns | None]], column: str, unit
     amplitude, low, high = (np.sqrt(max(v, 0.0)) for v in (mean, mean - 1.96 * sd, mean + 1.96 * sd))
     # White noise of one sigma s a sample shows as 4 s² · 1.5 / length behind a Hann taper.
     noise = float(np.sqrt(level.mean() * np.median(length) / 6))
-    return _Line(
-        column, unit, order, float(amplitude), float(low), float(high), float(amplitude) / max(noise, 1e-12), p
-    )
+    if not (p < P_LIMIT and float(amplitude) / max(noise, 1e-12) > least_amplitude):
+        return None
+    return p, Estimate(f"amplitude ({column})", float(amplitude), unit, float(low), float(high))
 
 
 def _tapered(length: int) -> np.ndarray:

@@ -44,8 +44,10 @@ from rotorid.recordings.importers.faults import (
     ImportFault,
     airborne,
     alive_s,
+    cut_off,
     flights,
     goes_on,
+    held_on,
     jumps_at,
     moving_on,
     one_sense,
@@ -210,10 +212,10 @@ def order_of(values: Values) -> tuple[str, list[ImportFault]]:
     if kind == 1 and form in _ORDER_OF_FRAME:
         return _ORDER_OF_FRAME[form], []
     found = f"FRAME_CLASS {kind}, FRAME_TYPE {form}: the order of its rotors is not known here"
-    faults = [ImportFault("order", "vehicle.yaml", found, "taken from the template: check it", 0)]
+    faults = [ImportFault("order", "vehicle.yaml", found, "taken from the template: check it")]
     if kind == 1 and form in TILTED_TYPES:
         found = f"FRAME_TYPE {form} is a {TILTED_TYPES[form]}, whose rear rotors lean outwards"
-        faults.append(ImportFault("tilted_rotor", "vehicle.yaml", found, "their thrust is taken along -z", 0))
+        faults.append(ImportFault("tilted_rotor", "vehicle.yaml", found, "their thrust is taken along -z"))
     return "", faults
 
 
@@ -241,7 +243,7 @@ def _of_sensor(log: Log, kind: str, wished: float | None = None) -> tuple[pd.Dat
     if wished in alive and wished != taken and alive[wished] >= GOES_ON * max(alive.values()):
         taken = wished
         found = f"the vehicle flew by {kind} {wished:g}, that of its estimator"
-        faults = [ImportFault("instances", "", found, f"{kind} {wished:g} taken", 0)]
+        faults = [ImportFault("instances", "", found, f"{kind} {wished:g} taken")]
     return table[table["I"] == taken], [replace(fault, column="inertial sensor") for fault in faults]
 
 
@@ -276,10 +278,10 @@ def _flown_by(log: Log) -> _Flown:
     sensor = next((float(n) for k, n in enumerate(n for n in range(8) if mask >> n & 1) if k == last), None)
     if len(changed):
         found = f"core {last:g} of the estimator took over for good"
-        return _Flown(last, sensor, (), (ImportFault("estimate", "", found, "its estimate is taken throughout", 0),))
+        return _Flown(last, sensor, (), (ImportFault("estimate", "", found, "its estimate is taken throughout"),))
     if any(t["C"].min() < last for t in estimates):
         found = f"the vehicle flew by core {last:g} of the estimator"
-        return _Flown(last, sensor, (), (ImportFault("instances", "", found, "that one taken", 0),))
+        return _Flown(last, sensor, (), (ImportFault("instances", "", found, "that one taken"),))
     return _Flown(last, sensor)
 
 
@@ -320,8 +322,7 @@ def _clock(log: Log, where: object) -> tuple[np.ndarray, list[ImportFault]]:
 def _in_flight(log: Log, where: object) -> Values:
     """The parameters as they held for most of the flight."""
     grid, _ = _clock(log, where)
-    flown = _flying(log, grid)
-    return parameters(log).mostly(grid if flown is None or not flown.any() else grid[flown])
+    return parameters(log).mostly(grid, _flying(log, grid))
 
 
 def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[ImportFault], np.ndarray]:
@@ -332,8 +333,7 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[ImportFault], n
     _check_frame(log, values, where)
     faults += [*stated.faults(_CHANGED, grid[0]), *flown.faults]
     if END in log:
-        found = f"the file ends inside a message, after {int(log[END]['bytes'].iloc[0])} bytes of it"
-        faults.append(ImportFault("cut_off", "", found, "what came before is kept; the log stopped before its end", 0))
+        faults.append(cut_off(f"the file ends inside a message, after {int(log[END]['bytes'].iloc[0])} bytes of it"))
     parts: list[tuple] = []
 
     def put(names, table: pd.DataFrame | None, fields) -> bool:
@@ -361,7 +361,7 @@ def convert(log: Log, where: object) -> tuple[pd.DataFrame, list[ImportFault], n
         put((c.HEIGHT,), _of_first(below[(below["Stat"] == good) & (below["Orient"] == down)], "Instance"), ("Dist",))
     outputs = _outputs(log)
     if outputs is None:
-        faults.append(ImportFault("no_command", "", "RCOU is not logged", "no throttle columns", 0))
+        faults.append(ImportFault("no_command", "", "RCOU is not logged", "no throttle columns"))
     else:
         channels, more = _channels(values, outputs)
         faults += more
@@ -392,7 +392,7 @@ def _attitude(log: Log, cores: tuple[str, str], flown: _Flown, faults: list[Impo
     taken = max(rates, key=lambda name: round(min(rates[name], enough_hz)))
     if taken != next(iter(offered)):
         seen = ", ".join(f"{name} at {rate:.3g} Hz" for name, rate in rates.items())
-        faults.append(ImportFault("instances", "attitude", f"several state it: {seen}", f"{taken} taken", 0))
+        faults.append(ImportFault("instances", "attitude", f"several state it: {seen}", f"{taken} taken"))
     return [(c.QUATERNION, *offered[taken])]
 
 
@@ -416,20 +416,18 @@ def _channels(values: Values, outputs: pd.DataFrame) -> tuple[dict[int, int], li
         motor = _MOTORS.get(int(values.get(f"SERVO{number}_FUNCTION", -1)))
         if motor is not None and by_motor.setdefault(motor, number) != number:
             found = f"outputs {by_motor[motor]} and {number} are both motor {motor + 1}"
-            faults.append(
-                ImportFault("instances", f"throttle_{motor + 1}", found, f"output {by_motor[motor]} taken", 0)
-            )
+            faults.append(ImportFault("instances", f"throttle_{motor + 1}", found, f"output {by_motor[motor]} taken"))
     if not by_motor:
         count = count or 4
         found = "no SERVOn_FUNCTION is a motor"
         action = f"channels 1 to {count} taken for motors 1 to {count}"
         logged = {i: i + 1 for i in range(count) if f"C{i + 1}" in outputs}
-        return logged, [ImportFault("order", "throttle", found, action, 0)]
+        return logged, [ImportFault("order", "throttle", found, action)]
     count = count or max(by_motor) + 1
     unused = [number for motor, number in sorted(by_motor.items()) if motor >= count]
     if unused:
         found = f"outputs {', '.join(map(str, unused))} have the functions of motors beyond the {count} of the frame"
-        faults.append(ImportFault("order", "throttle", found, "left out", 0))
+        faults.append(ImportFault("order", "throttle", found, "left out"))
     for motor in range(count):
         if (number := by_motor.get(motor)) is None:
             found = f"no SERVOn_FUNCTION is motor {motor + 1} of {count}"
@@ -437,17 +435,14 @@ def _channels(values: Values, outputs: pd.DataFrame) -> tuple[dict[int, int], li
             found = f"output {number} is not logged"
         else:
             continue
-        faults.append(ImportFault("no_command", f"throttle_{motor + 1}", found, "column left out", 0))
+        faults.append(ImportFault("no_command", f"throttle_{motor + 1}", found, "column left out"))
     return {m: n for m, n in sorted(by_motor.items()) if m < count and f"C{n}" in outputs}, faults
 
 
 def _throttles(outputs: pd.DataFrame, stated: Parameters, frame: float, faults: list[ImportFault]) -> list[tuple]:
     """Throttles with their times, each pulse by the parameters that held then; no pulse stops a motor."""
     times, throttles = outputs[c.TIME].to_numpy(float), {}
-    for start, stop, values in stated.spans(_CHANGED[0][0]):
-        inside = (times >= start) & (times < stop)
-        if not inside.any():
-            continue
+    for inside, values in stated.spans(_CHANGED[0][0], times):
         channels, kind = _channels({**values, "FRAME_CLASS": frame}, outputs)[0], int(values.get("MOT_PWM_TYPE", 0))
         every = outputs.loc[inside, [f"C{number}" for number in channels.values()]].to_numpy(float)
         short = kind in _SHORT and 0 < np.nanmax(every, initial=0.0) <= _LONGEST_SHORT_US
@@ -553,14 +548,14 @@ def _speeds(esc: pd.DataFrame | None, channels: Mapping[int, int], faults: list[
     if not {number - 1 for number in outputs} & set(esc["Instance"]) and esc["Instance"].nunique() == len(outputs):
         order = dict(zip(sorted(set(esc["Instance"])), outputs, strict=True))
         seen = f"ESC counts {', '.join(f'{i:g}' for i in order)} for outputs {', '.join(map(str, outputs))}"
-        faults.append(ImportFault("order", "rotor_speed", seen, "taken in their order", 0))
+        faults.append(ImportFault("order", "rotor_speed", seen, "taken in their order"))
         esc = esc.assign(Instance=esc["Instance"].map(order) - 1)
     for motor, channel in channels.items():
         name = f"rotor_speed_{motor + 1}_rad_s"
         own = esc[esc["Instance"] == channel - 1]
         if not len(own) or not own["RPM"].abs().max() > 0:
             seen = f"ESC holds no speed of output {channel}"
-            faults.append(ImportFault("speed_missing", name, seen, "column left out", 0))
+            faults.append(ImportFault("speed_missing", name, seen, "column left out"))
             continue
         speeds, more = one_sense(own[["RPM"]].to_numpy(float) * RPM, (name,))
         faults += more
@@ -574,9 +569,7 @@ def _flying(log: Log, grid: np.ndarray) -> np.ndarray | None:
     if events is not None and "Id" in events:
         events = events[events["Id"].isin((_LANDED, _FLYING))]
         if (events["Id"] == _FLYING).any():
-            times, ups = events[c.TIME].to_numpy(float), (events["Id"] == _FLYING).to_numpy()
-            index = np.searchsorted(times, grid, side="right") - 1
-            return np.where(index >= 0, ups[np.maximum(index, 0)], False)
+            return held_on(grid, events[c.TIME].to_numpy(float), events["Id"] == _FLYING) > 0.5
     return None
 
 

@@ -182,8 +182,8 @@ class Unpacking:
         """What a part packed as `bz2`, `lz4` or `zstd` holds; EOFError where it is cut off and `whole` is wanted."""
         make = {
             "bz2": lambda: bz2.BZ2Decompressor(),
-            "lz4": lambda: needs("lz4.frame", "ros", self.path).LZ4FrameDecompressor(),
-            "zstd": lambda: needs("rosbags.rosbag2.storage_mcap", "ros", self.path).zstd.ZstdDecompressor(),
+            "lz4": lambda: needs("lz4.frame", self.path).LZ4FrameDecompressor(),
+            "zstd": lambda: needs("rosbags.rosbag2.storage_mcap", self.path).zstd.ZstdDecompressor(),
         }[compression]
         out, size, reader = [], 0, make()
         while True:
@@ -204,8 +204,7 @@ class Unpacking:
     def in_rosbags(self) -> Iterator[None]:
         """Inside, rosbags unpacks within the bounds."""
         ros1, mcap, ros2 = (
-            needs(f"rosbags.{name}", "ros", self.path)
-            for name in ("rosbag1.reader", "rosbag2.storage_mcap", "rosbag2.reader")
+            needs(f"rosbags.{name}", self.path) for name in ("rosbag1.reader", "rosbag2.storage_mcap", "rosbag2.reader")
         )
         bounded = {name: partial(self.of, name) for name in ("bz2", "lz4", "zstd")}
         of_files = SimpleNamespace(decompress=bounded["zstd"], open=partial(_BoundedFile, self, ros2.zstd))
@@ -244,7 +243,7 @@ class _BoundedFile:
 def typestores(channels: list[_Topic], path: Path) -> dict[str, object]:
     """rosbags' stores of types by encoding (`ros1`, `cdr`) with what the channels define; a definition that cannot be
     read leaves its type to those that are known."""
-    typesys = needs("rosbags.typesys", "ros", path)
+    typesys = needs("rosbags.typesys", path)
     stores = {"ros1": typesys.Stores.ROS1_NOETIC, "cdr": typesys.Stores.LATEST}
     found = {encoding: typesys.get_typestore(store) for encoding, store in stores.items()}
     for channel in channels:
@@ -296,7 +295,7 @@ def _spelled(msgtype: str) -> str:
     return f"{package}/msg/{name}" if package and "/" not in package else msgtype
 
 
-def needs(module: str, extra: str, path: object) -> ModuleType:
+def needs(module: str, path: object) -> ModuleType:
     """The module, or an InputError that says how it is installed."""
     try:
         return import_module(module)
@@ -304,5 +303,5 @@ def needs(module: str, extra: str, path: object) -> ModuleType:
         if error.name and error.name.split(".")[0] != module.split(".")[0]:
             raise
         raise InputError(
-            f"{path}: reading it needs {module.split('.')[0]}, which is not installed: pip install 'rotorid[{extra}]'"
+            f"{path}: reading it needs {module.split('.')[0]}, which is not installed: pip install 'rotorid[ros]'"
         ) from None

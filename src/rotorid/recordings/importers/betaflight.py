@@ -67,7 +67,7 @@ def _read(path: Path) -> Imported:
             flown, more = _flights(session, name, path)
         except InputError as error:
             reasons.append(str(error).removeprefix(f"{path}: "))
-            faults.append(ImportFault("no_flight", c.TIME, f"session {number}: {reasons[-1]}", "left out", 0))
+            faults.append(ImportFault("no_flight", c.TIME, f"session {number}: {reasons[-1]}", "left out"))
             continue
         runs |= flown
         faults += more
@@ -173,7 +173,7 @@ def convert(
         table[list(c.SPECIFIC_FORCE)] = half_turn_about_x(acceleration / one_g * G)
     else:
         found = "accSmooth is not logged" if acceleration is None else "the header does not state acc_1G"
-        faults.append(ImportFault("missing", ", ".join(c.SPECIFIC_FORCE), found, "no specific force", 0))
+        faults.append(ImportFault("missing", ", ".join(c.SPECIFIC_FORCE), found, "no specific force"))
     attitude = fields("imuQuaternion", 3)
     if attitude is not None:
         xyz = attitude / quaternion_scale
@@ -197,14 +197,14 @@ def convert(
         poles = _number(headers, "motor_poles", 0)
         if not poles > 0:
             poles, found = default_poles, "the header does not state motor_poles"
-            faults.append(ImportFault("unit", "rotor_speed", found, f"taken as {default_poles}", 0))
+            faults.append(ImportFault("unit", "rotor_speed", found, f"taken as {default_poles}"))
         speeds = np.where(np.isnan(throttle), np.nan, turns * 100 / (poles / 2) * 2 * np.pi / 60)
         for column, own in zip(c.rotor_columns("rotor_speed", turns.shape[1]), speeds.T, strict=True):
             if np.nanmax(own, initial=0.0) > 0:
                 table[column] = own
             else:
                 found = "its eRPM is not logged, or 0 throughout"
-                faults.append(ImportFault("speed_missing", column, found, "column left out", 0))
+                faults.append(ImportFault("speed_missing", column, found, "column left out"))
     battery, more = _battery(raw, headers)
     faults += more
     table = table.assign(**battery)
@@ -245,7 +245,7 @@ def _known_names(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
         like = [n for n in raw if core in n.lower() and not re.search(r"unfilt|legacy", n.lower())]
         if like and not any(n.split("[")[0] == base for n in raw):
             found = f"{base} is not logged, but {', '.join(like)} looks like it under a name that is not known"
-            faults.append(ImportFault("unknown_name", base, found, "left out", 0))
+            faults.append(ImportFault("unknown_name", base, found, "left out"))
     return raw, faults
 
 
@@ -269,7 +269,7 @@ def throttles(motors: np.ndarray, headers: Mapping[str, str]) -> tuple[np.ndarra
         if len(turning) and np.quantile(turning, 0.01) < slowest_pulse_us:
             low, high = dshot
         found = "the header does not state motorOutput"
-        faults.append(ImportFault("unit", "throttle", found, f"no and full throttle taken as {low:g} and {high:g}", 0))
+        faults.append(ImportFault("unit", "throttle", found, f"no and full throttle taken as {low:g} and {high:g}"))
     backwards = np.zeros(motors.shape, bool)
     if int(_number(headers, "features", 0)) & feature_3d:
         if low < slowest_pulse_us:

@@ -38,10 +38,6 @@ class Imported:
     """Name of the importer, filled in by `read_log`."""
 
 
-def _none(path: Path, head: bytes) -> bool:
-    return False
-
-
 @dataclass(frozen=True)
 class Importer:
     """A format of logs. One of `starts`, `inside` and `recognises` must hold for its logs and for no others."""
@@ -57,7 +53,7 @@ class Importer:
     """What a log may begin with."""
     inside: tuple[bytes, ...] = ()
     """What stands among the first 4096 bytes, behind what may be left of another log in the logger's memory."""
-    recognises: Callable[[Path, bytes], bool] = _none
+    recognises: Callable[[Path, bytes], bool] = lambda path, head: False
     """Whether a file with these first 4096 bytes, or a folder (no bytes), is a log; asked where nothing starts so."""
     known_by: str = "first bytes"
     """How a log is recognised, for the documentation."""

@@ -38,6 +38,7 @@ import pandas as pd
 import scipy
 
 from rotorid.errors import InputError
+from rotorid.io.text.files import check_file
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.contract import Imported, Importer, text_of
 from rotorid.recordings.importers.faults import (
@@ -45,6 +46,7 @@ from rotorid.recordings.importers.faults import (
     airborne,
     blank_held,
     cut,
+    cut_off,
     drop_repeated_times,
     in_order,
     join_rows,
@@ -219,7 +221,7 @@ def convert(log: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
     return table, faults + repeated + wild
 
 
-def in_the_air(table: pd.DataFrame, shortest_s: float = 4.0, margin_s: float = 1.0) -> list[tuple[float, float]]:
+def in_the_air(table: pd.DataFrame, shortest_s: float = 4.0) -> list[tuple[float, float]]:
     """Start and stop of every flight in a log: motors above 30 % and, where known, 0.1 m off the ground.
 
     The public recordings are cut so, with a second at each end, wherever a log begins or ends.
@@ -228,7 +230,7 @@ def in_the_air(table: pd.DataFrame, shortest_s: float = 4.0, margin_s: float = 1
     if "position_z_m" in table:
         flying &= -table["position_z_m"].to_numpy() > 0.1
     time = table[c.TIME].to_numpy()
-    return [(a + margin_s, b - margin_s) for a, b in true_stretches(flying, time, shortest_s)]
+    return [(a + 1.0, b - 1.0) for a, b in true_stretches(flying, time, shortest_s)]
 
 
 def _flown_stretches(table: pd.DataFrame) -> list[tuple[float, float]]:
@@ -393,17 +395,14 @@ def _faults_of_end(data: bytes, offset: int, whole: bool, unknown: int | None, i
         faults.insert(0, ImportFault("checksum", "", found, "kept; bytes may be damaged", 1))
     elif inside or not (whole or unknown is not None):
         found = f"the file ends inside an event ({inside})" if inside else "the file ends without its checksum"
-        faults.append(ImportFault("cut_off", "", found, "what came before is kept; the log stopped before its end", 1))
+        faults.append(cut_off(found, 1))
     return faults
 
 
 def read_usd_log(path: Path) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
     """Read a uSD log file; see `decode_usd_log`."""
-    try:
-        data = Path(path).read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{path}: file is missing") from None
-    return decode_usd_log(data, str(path))
+    check_file(path)
+    return decode_usd_log(path.read_bytes(), str(path))
 
 
 def _read(path: Path) -> Imported:

@@ -9,7 +9,7 @@ none is declared.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from operator import itemgetter
 
 import numpy as np
 import pandas as pd
@@ -41,12 +41,8 @@ _CONTROL = "control was lost (estimate, gains, order of rotors)"
 _NO_THRUST, _HIT = "the thrust was not enough (battery, weight)", "it hit something"
 
 
-@dataclass(frozen=True)
-class _Sign:
-    time_s: float
-    what: str
-    fits: tuple[tuple[str, int], ...]
-    """Causes and how much the sign speaks for each, where it is the first."""
+_Sign = tuple[float, str, tuple[tuple[str, int], ...]]
+"""When, what is seen, and causes with how much the sign speaks for each, where it is the first."""
 
 
 def ending(table: pd.DataFrame, start_s: float, stop_s: float) -> tuple[str, str] | None:
@@ -58,16 +54,16 @@ def ending(table: pd.DataFrame, start_s: float, stop_s: float) -> tuple[str, str
     flight = _Ending(table[(time_s >= start_s) & (time_s <= stop_s + _AFTER_S)], stop_s)
     if flight.begins_s <= start_s:
         return None
-    signs = sorted((*flight.of_rotors(), *flight.of_all(), *flight.of_attitude()), key=lambda sign: sign.time_s)
+    signs = [*flight.of_rotors(), *flight.of_all(), *flight.of_attitude()]
     if not signs:
         return None
-    signs = sorted((*signs, *flight.of_blow()), key=lambda sign: sign.time_s)
+    signs = sorted((*signs, *flight.of_blow()), key=itemgetter(0))
     weights: dict[str, float] = {}
-    for place, sign in enumerate(signs):
-        for cause, weight in sign.fits:
+    for place, (_, _, fits) in enumerate(signs):
+        for cause, weight in fits:
             weights[cause] = weights.get(cause, 0.0) + weight / (1 + place)
     ranked = sorted(weights, key=lambda cause: -weights[cause])
-    happened = "; ".join(f"at {sign.time_s:.2f} s {sign.what}" for sign in signs)
+    happened = "; ".join(f"at {time_s:.2f} s {what}" for time_s, what, _ in signs)
     return f"the last seconds in the air: {happened}", f"what fits, the likeliest first: {'; '.join(ranked)}"
 
 
@@ -112,15 +108,15 @@ class _Ending:
                     asked = self._throttles.get(rotor)
                     driven &= True if asked is None else asked.to_numpy() > _DRIVEN * self._usual(asked.to_numpy())
                     if (at := self._first((own < _STANDS * usual[rotor]) & driven)) is not None:
-                        yield _Sign(at, f"{name} stands although it is driven", ((_MOTOR.format(name), 4),))
+                        yield at, f"{name} stands although it is driven", ((_MOTOR.format(name), 4),)
                     continue
                 if (at := self._first((own <= _OFF) & driven)) is not None:
                     fits = ((_SIGNAL.format(name), 3), (_MOTOR.format(name), 2), (_CONTROL, 1))
-                    yield _Sign(at, f"the output of {name} goes to zero while the others go on", fits)
+                    yield at, f"the output of {name} goes to zero while the others go on", fits
                 others_full = np.mean([values[n].to_numpy() for n in rest], axis=0) >= _FULL
                 if (at := self._first((own >= _FULL) & ~others_full)) is not None:
                     fits = ((_MOTOR.format(name), 3), (_CONTROL, 2), (_NO_THRUST, 1))
-                    yield _Sign(at, f"{name} is at its limit", fits)
+                    yield at, f"{name} is at its limit", fits
 
     def of_all(self) -> Iterable[_Sign]:
         """All rotors at their limit, or switched off in the air."""
@@ -131,10 +127,10 @@ class _Ending:
             volts = self._known(c.BATTERY_VOLTAGE) if c.BATTERY_VOLTAGE in self._table else np.ones(1)
             sags = len(volts) > 1 and volts[~self._before].min() < _LOW_VOLTAGE * self._usual(volts)
             more = " and the battery's voltage drops" if sags else ""
-            yield _Sign(at, f"all rotors are at their limit{more}", ((_NO_THRUST, 4 if sags else 3), (_CONTROL, 1)))
+            yield at, f"all rotors are at their limit{more}", ((_NO_THRUST, 4 if sags else 3), (_CONTROL, 1))
         at = self._first(high <= _OFF, self._stop_s + _AFTER_S)
         if at is not None and (how := self._in_the_air(at)):
-            yield _Sign(at, f"all outputs go to zero {how}", ((_SWITCHED_OFF, 3), (_CONTROL, 1)))
+            yield at, f"all outputs go to zero {how}", ((_SWITCHED_OFF, 3), (_CONTROL, 1))
 
     def _in_the_air(self, at_s: float) -> str:
         """What shows that the vehicle is in the air at a time; empty where nothing does."""
@@ -166,7 +162,7 @@ class _Ending:
         at = self._first(lost)
         if at is not None and lost[(self._time_s >= at) & (self._time_s <= self._stop_s)].all():
             fits = ((_CONTROL, 3), (_MOTOR.format("one rotor"), 2))
-            yield _Sign(at, "the attitude is lost (tilted by more than 60°)", fits)
+            yield at, "the attitude is lost (tilted by more than 60°)", fits
 
     def of_blow(self) -> Iterable[_Sign]:
         """The first reading of the accelerometer that is far above those of the flight."""
@@ -178,4 +174,4 @@ class _Ending:
             blows = np.flatnonzero(~self._before & (force > max(_BLOW_M_S2, _BLOW * np.quantile(usual, 0.99))))
             if len(blows):
                 what = f"a blow of {force[blows[0]] / 9.81:.0f} g"
-                yield _Sign(float(self._time_s[blows[0]]), what, ((_HIT, 3),))
+                yield float(self._time_s[blows[0]]), what, ((_HIT, 3),)

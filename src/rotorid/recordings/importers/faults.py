@@ -7,7 +7,7 @@ row nearest in time, so that nothing is interpolated.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from itertools import pairwise
 from pathlib import Path
@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.errors import InputError
+from rotorid.io.text.files import LARGEST_METADATA, read_text
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.endings import ending
 from rotorid.recordings.mended import by_sense
@@ -33,7 +34,6 @@ _NEAR_WEIGHT = 0.85
 _LIFTS = 0.95
 """Share of the throttle of flight that a stretch begins and ends with: less is spool-up or a vehicle that settles."""
 _SMOOTHED_S = 1.0
-_SPEEDS = ("rotor_speed", "rotor_command")
 GOES_ON = 0.9
 """Share of the time that others of its kind go on which a sensor has at least, unless it stands still or ends early."""
 _SHUFFLED, LATE_STEPS = 0.05, 100.0
@@ -78,6 +78,11 @@ class ImportFault:
         return f"{place + ': ' if place else ''}{self.found}; {self.action}."
 
 
+def cut_off(found: str, samples: int = 0) -> ImportFault:
+    """The fault of a log that ends early."""
+    return ImportFault("cut_off", "", found, "what came before is kept; the log stopped before its end", samples)
+
+
 FILE_NAME = "import_report.json"
 
 
@@ -97,19 +102,29 @@ class ImportReport:
     faults: tuple[ImportFault, ...] = ()
     notes: tuple[str, ...] = ()
 
-    def after(self, earlier: dict) -> ImportReport:
-        """The report of a set that holds what was imported now and, as its earlier report says, before."""
-        faults = tuple(
-            ImportFault(**{f.name: fault[f.name] for f in fields(ImportFault)}) for fault in earlier["faults"]
-        )
-        files = {**earlier["files"], **self.files}
-        return replace(
-            self,
-            source=", ".join(files),
-            files=files,
-            faults=tuple(dict.fromkeys((*faults, *self.faults))),
-            notes=tuple(dict.fromkeys((*earlier["notes"], *self.notes))),
-        )
+    def after(self, folder: Path) -> ImportReport:
+        """The report of a set that holds what was imported now and, as the report in its folder says, before.
+
+        InputError where that is no report.
+        """
+        path = folder / FILE_NAME
+        if not path.exists():
+            return self
+        try:
+            earlier = json.loads(read_text(path, LARGEST_METADATA))
+            faults = [ImportFault(**{f.name: own[f.name] for f in fields(ImportFault)}) for own in earlier["faults"]]
+            files = {**earlier["files"], **self.files}
+            return replace(
+                self,
+                source=", ".join(files),
+                files=files,
+                faults=tuple(dict.fromkeys((*faults, *self.faults))),
+                notes=tuple(dict.fromkeys((*earlier["notes"], *self.notes))),
+            )
+        except InputError:
+            raise
+        except (ValueError, KeyError, TypeError):
+            raise InputError(f"{path}: is no report of an import; move it away") from None
 
     def write(self, folder: Path) -> Path:
         """Write `import_report.json` into a set's folder, the same bytes for the same content."""
@@ -331,7 +346,7 @@ def goes_on(alive: Mapping[int, float], what: str) -> tuple[int, list[ImportFaul
         return taken, []
     lasts = f"its readings change for {alive[first]:.1f} s, those of {what} {taken} for {alive[taken]:.1f} s"
     found = f"{what} {first} stands still or ends early ({lasts})"
-    return taken, [ImportFault("stuck", "", found, f"{what} {taken} taken", 0)]
+    return taken, [ImportFault("stuck", "", found, f"{what} {taken} taken")]
 
 
 def within(shares: np.ndarray, names: Sequence[str]) -> tuple[np.ndarray, list[ImportFault]]:
@@ -437,11 +452,22 @@ def on_grid(grid: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarra
     return out
 
 
-def table_on(grid_s: np.ndarray, parts: Sequence[tuple[Sequence[str], np.ndarray, np.ndarray]]) -> pd.DataFrame:
-    """A table on a grid (n,), s, of parts: names, times (m,), s, and values (m, k); empty columns are left out."""
-    columns = {c.TIME: grid_s - grid_s[0]}
-    for names, time_s, values in parts:
-        columns.update(zip(names, on_grid(grid_s, time_s, values).T, strict=True))
+def held_on(grid: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Values (m,) on a grid (n,), held until the next one; 0 in rows before the first."""
+    index = np.searchsorted(time, grid, side="right") - 1
+    return np.where(index >= 0, np.asarray(values, float)[np.maximum(index, 0)], 0.0)
+
+
+def table_on(
+    grid: np.ndarray, parts: Iterable[tuple[Sequence[str], np.ndarray, np.ndarray]], unit_s: float = 1.0
+) -> pd.DataFrame:
+    """A table on a grid (n,) of parts: names, times (m,), and values (m, k); empty columns are left out.
+
+    Times are in units of `unit_s`, the table's in seconds from the first row on.
+    """
+    columns = {c.TIME: (grid - grid[0]) * unit_s}
+    for names, time, values in parts:
+        columns.update(zip(names, on_grid(grid, time, values).T, strict=True))
     return pd.DataFrame({k: v for k, v in columns.items() if k == c.TIME or np.isfinite(v).any()})
 
 
@@ -453,20 +479,14 @@ def airborne(table: pd.DataFrame, stated: np.ndarray | None = None) -> tuple[np.
     """
     time_s = table[c.TIME].to_numpy(float)
     flying = np.ones(len(table), bool) if stated is None else stated
-
-    def of(names) -> np.ndarray | None:
-        return table[list(names)].to_numpy(float) if set(names) <= set(table) else None
-
     # What drives the rotors (n, k): throttles, else measured, else commanded speeds.
-    kinds = ([n for n in table if c.rotor_number(n) and n.startswith(k)] for k in ("throttle", *_SPEEDS))
+    order = ("throttle", "rotor_speed", "rotor_command")
+    kinds = ([n for n in table if c.rotor_number(n) and n.startswith(kind)] for kind in order)
     drive = next((table[n].to_numpy(float) for n in kinds if n and table[n].notna().any().all()), None)
-    force = of(c.SPECIFIC_FORCE)
-    if drive is None or len(table) < 2 or not flying.any() or (force is None and stated is not None):
+    felt = set(c.SPECIFIC_FORCE) <= set(table)
+    if drive is None or len(table) < 2 or not flying.any() or (not felt and stated is not None):
         return flying, []
-    height = of([c.HEIGHT])
-    found = off_the_ground(
-        flying, drive, force, time_s, of(c.ANGULAR_VELOCITY), None if height is None else height[:, 0]
-    )
+    found = _off_the_ground(table, flying, drive)
     lost = int((flying & ~found).sum())
     if stated is None or not lost:
         return found, []
@@ -478,23 +498,15 @@ def airborne(table: pd.DataFrame, stated: np.ndarray | None = None) -> tuple[np.
     return found, [ImportFault("on_ground", c.TIME, seen, "left out", lost)]
 
 
-def off_the_ground(
-    flying: np.ndarray,
-    drive: np.ndarray,
-    force: np.ndarray | None,
-    time_s: np.ndarray,
-    rates: np.ndarray | None = None,
-    height: np.ndarray | None = None,
-) -> np.ndarray:
+def _off_the_ground(table: pd.DataFrame, flying: np.ndarray, drive: np.ndarray) -> np.ndarray:
     """Rows of a mask (n,) of possible flight in which thrust carries the vehicle, or it falls, turns, or is up.
 
     On the ground the rotors turn below what flight takes while the specific force stays at 1 g and nothing turns. What
     flight takes is the median of the rows above half of what is mostly given. A log of the ground alone shows no flight
     and is not recognised. A stretch begins and ends with rotors that lift, unless the log begins or ends in it.
 
-    `drive` holds throttles or speeds of the rotors (n, k), NaN where there is no value; `force`, m/s², and `rates`,
-    rad/s, specific force and body rates (n, 3), None where they are not recorded; `time_s` the clock (n,); `height`
-    what a range finder or a motion capture says of the height above ground (n,), m.
+    `drive` holds throttles or speeds of the rotors (n, k), NaN where there is no value. Of the table are read the
+    specific force, the body rates, and what a range finder or a motion capture says of the height above ground.
     """
     # Share of the usual specific force, or of 1 g where that is more, below which a vehicle falls: on the ground it
     # stays at 1 g, and lively flights take more.
@@ -505,8 +517,13 @@ def off_the_ground(
     # that rocks on the ground at 0.3 to 0.8 with rotors at two thirds of what flight takes.
     turns_rad_s = 1.0
     ground_m, clear_m = 0.05, 0.5  # Heights below which a vehicle is on the ground, and above which it is in the air.
+    time_s = table[c.TIME].to_numpy(float)
     step_s = max(float(np.median(np.diff(time_s))), 1e-4)
     rows = max(int(_SMOOTHED_S / step_s), 1)
+    force, rates, height = (
+        table[list(names)].to_numpy(float) if set(names) <= set(table) else np.full((len(table), 1), np.nan)
+        for names in (c.SPECIFIC_FORCE, c.ANGULAR_VELOCITY, (c.HEIGHT,))
+    )
 
     def smooth(values: np.ndarray) -> np.ndarray:
         known = pd.Series(values).interpolate(limit_direction="both")
@@ -518,15 +535,14 @@ def off_the_ground(
     if full <= _DRIVEN:
         return flying
     of_flight = np.median(given[given > 0.5 * full])
-    turning = np.zeros(len(throttle), bool) if rates is None else _turning(rates, step_s) > turns_rad_s
-    up = np.zeros(len(throttle), bool)
-    if force is not None and np.isfinite(force).any():
+    turning, up = _turning(rates, step_s) > turns_rad_s, np.zeros(len(throttle), bool)
+    if np.isfinite(force).any():
         pull = smooth(np.linalg.norm(force, axis=1))
         flown = (throttle >= _NEAR_WEIGHT * of_flight) | (pull < falling * min(np.nanmedian(pull[flying]), one_g_m_s2))
     else:
         flown = throttle >= near_weight_alone * of_flight
-    if height is not None and np.isfinite(height).any():
-        above = smooth(height)
+    if np.isfinite(height).any():
+        above = smooth(height[:, 0])
         up = above > clear_m
         flown &= ~(above < ground_m)
     flown |= (turning | up) & (throttle >= 0.5 * of_flight)

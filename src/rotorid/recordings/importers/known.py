@@ -92,19 +92,20 @@ class Parameters:
             latest[name] = value
         return cls(first, tuple(sorted(changes, key=lambda change: change[0])))
 
-    def spans(self, names: str) -> list[tuple[float, float, Values]]:
-        """Spans of the log [from, to) in which no parameter whose whole name matches `names` changes, with the values
-        that hold in each; the first begins and the last ends at infinity."""
+    def spans(self, names: str, times: np.ndarray) -> list[tuple[np.ndarray, Values]]:
+        """Spans of the log in which no parameter whose whole name matches `names` changes: which of some instants (n,)
+        are in each, a mask, and the values that hold there; none without an instant."""
         cuts = sorted({time for time, name, _ in self.changes if re.fullmatch(names, name)})
-        return [(a, b, self.at(a)) for a, b in pairwise([-np.inf, *cuts, np.inf])]
+        every = [((times >= a) & (times < b), self.at(a)) for a, b in pairwise([-np.inf, *cuts, np.inf])]
+        return [(inside, values) for inside, values in every if inside.any()]
 
     def at(self, time: float) -> Values:
         """What holds at an instant."""
         return {**self.start, **{name: value for t, name, value in self.changes if t <= time}}
 
-    def mostly(self, times: np.ndarray) -> Values:
-        """What holds at most of some instants, each parameter by itself."""
-        values = dict(self.start)
+    def mostly(self, times: np.ndarray, flown: np.ndarray | None) -> Values:
+        """What holds at most of some instants (n,), each parameter by itself: at those in flight (n,), where any is."""
+        times, values = times if flown is None or not flown.any() else times[flown], dict(self.start)
         for name in {name for _, name, _ in self.changes}:
             own = [(t, v) for t, n, v in self.changes if n == name]
             held = [self.start[name], *(v for _, v in own)]

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import importlib
 import io
-import json
 import os
 import pkgutil
 import sys
@@ -34,13 +33,11 @@ import rotorid.recordings.importers
 from rotorid.errors import InputError
 from rotorid.io.text.files import (
     LARGEST_FILE,
-    LARGEST_METADATA,
     LEAST_MEMORY,
     MEMORY_TIMES_FILE,
     MOST_RUNS,
     check_file,
     parse_yaml,
-    read_text,
 )
 from rotorid.io.text.wording import printable
 from rotorid.io.text.writing import only_writer, staging, take_name, take_place
@@ -57,6 +54,7 @@ from rotorid.recordings.files import (
     usable_runs,
     vehicle_of,
     write_manifest,
+    write_runs,
 )
 from rotorid.recordings.importers.contract import Imported, Importer, text_of
 from rotorid.recordings.importers.faults import FILE_NAME as REPORT
@@ -65,7 +63,7 @@ from rotorid.recordings.importers.known import propose, thrust_coefficient
 from rotorid.recordings.importers.mapping import IMPORTER as TABLE
 from rotorid.recordings.importers.mapping import UNITS, Mapping, read_table
 from rotorid.recordings.settings import Settings, write_settings
-from rotorid.recordings.tables import check_table, parquet_is_here, write_table
+from rotorid.recordings.tables import check_table
 from rotorid.recordings.vehicle import Vehicle
 
 _USUAL_COEFFICIENT = 1.7e-5
@@ -138,21 +136,18 @@ def read_log(path: Path, mapping: Mapping | None = None) -> Imported:
     return replace(found, format=importer.name)
 
 
-def template_for(log: Imported) -> str:
-    """The template vehicle of a log's autopilot or format; empty where nothing says what vehicle it is."""
-    known = (importers().get(name) for name in (log.known.autopilot, log.format))
-    return next((importer.template for importer in known if importer and importer.template), "")
-
-
 @contextmanager
 def _limited(path: Path) -> Iterator[None]:
     """Inside, memory beyond the limit for this file is an InputError; nothing is limited where the system cannot."""
     try:
         import resource
-    except ImportError:  # pragma: no cover - depends on the platform
+
+        said = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+    except (ImportError, OSError):  # pragma: no cover - depends on the platform
         yield
         return
-    taken = _taken_bytes()
+    # Bytes that count against the limit already; None where the system does not say.
+    taken = next((int(line.split()[1]) * 1024 for line in said if line.startswith("VmData:")), None)
     size = path.stat().st_size if path.is_file() else sum(p.stat().st_size for p in path.rglob("*") if p.is_file())
     more = max(LEAST_MEMORY, MEMORY_TIMES_FILE * size)
     soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
@@ -189,15 +184,6 @@ def _silent() -> Iterator[None]:
         os.close(nowhere)
 
 
-def _taken_bytes() -> int | None:
-    """Bytes that count against the limit already; None where the system does not say."""
-    try:
-        lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
-    except OSError:
-        return None
-    return next((int(line.split()[1]) * 1024 for line in lines if line.startswith("VmData:")), None)
-
-
 def usual_coefficient(mass_kg: float, rotors: int) -> float:
     """C_F of a multirotor of usual propellers, N s²."""
     return _USUAL_COEFFICIENT * (mass_kg / rotors) ** (4 / 3)
@@ -212,60 +198,40 @@ def in_unit_of_weight(
 ) -> tuple[dict[str, pd.DataFrame], list[ImportFault]]:
     """Flights whose rotor speeds are in the unit that carries the weight, and what was changed.
 
+    It is the stated one where its speeds are possible, or no other's are.
     `runs` are in contract columns, rotor speeds by the unit that the log states: `stated` has it for each run (`rad/s`,
     `rpm` or `hz`). The mass is as flown; C_F is that of usual propellers where it is not known.
     """
+    possible = 2.2  # Speeds of hover within this factor are.
+    expected = coefficient_n_s2 or usual_coefficient(mass_kg, rotors)
     out, faults = dict(runs), []
     for written in dict.fromkeys(stated[run] for run in runs):
         mine = [run for run in runs if stated[run] == written]
         for kind in ("rotor_speed", "rotor_command"):
             names = list(c.rotor_columns(kind, rotors))
             tables = [out[run] for run in mine]
-            unit, off = carrying_unit(tables, kind, written, mass_kg, rotors, coefficient_n_s2)
-            if unit == written:
-                if not 1 / _IMPOSSIBLE < off < _IMPOSSIBLE and np.isfinite(off):
-                    found = (
-                        f"in {written}, as stated, the rotors hover at {off:.2g} times the speed that carries "
-                        f"{mass_kg:.3g} kg, which no unit explains: electrical turns (divide by half of the motor's "
-                        "poles), or another vehicle"
-                    )
-                    faults.append(ImportFault("unit", kind, found, "kept as recorded", sum(len(t) for t in tables)))
+            flown = thrust_coefficient(tables, mass_kg, rotors, kind=kind)
+            # Speed of hover in the unit that is stated, over the one expected.
+            off = 1.0 if flown is None else float(np.sqrt(expected / flown))
+            if 1 / _IMPOSSIBLE < off < _IMPOSSIBLE:
                 continue
-            factor = UNITS["rotor"][unit] / UNITS["rotor"][written]
+            factors = {u: f / UNITS["rotor"][written] for u, f in UNITS["rotor"].items() if u != written}
+            unit = min(factors, key=lambda u, off=off, factors=factors: abs(np.log(off * factors[u])))
+            hover = f"the rotors hover at {off:.2g} times the speed that carries {mass_kg:.3g} kg"
+            samples = sum(len(t) for t in tables)
+            if abs(np.log(off * factors[unit])) >= np.log(possible):
+                found = (
+                    f"in {written}, as stated, {hover}, which no unit explains: electrical turns (divide by "
+                    "half of the motor's poles), or another vehicle"
+                )
+                faults.append(ImportFault("unit", kind, found, "kept as recorded", samples))
+                continue
             for run in mine:
                 if set(names) <= set(out[run].columns):
-                    out[run] = out[run].assign(**{name: out[run][name] * factor for name in names})
-            found = (
-                f"in {written}, as the log states, the rotors hover at {off:.2g} times the speed that carries "
-                f"{mass_kg:.3g} kg, in {unit} at {off * factor:.2g} times"
-            )
-            faults.append(ImportFault("unit", kind, found, f"taken as {unit}", sum(len(t) for t in tables)))
+                    out[run] = out[run].assign(**{name: out[run][name] * factors[unit] for name in names})
+            found = f"in {written}, as the log states, {hover}, in {unit} at {off * factors[unit]:.2g} times"
+            faults.append(ImportFault("unit", kind, found, f"taken as {unit}", samples))
     return out, faults
-
-
-def carrying_unit(
-    tables: Sequence[pd.DataFrame],
-    kind: str,
-    stated: str,
-    mass_kg: float,
-    rotors: int,
-    coefficient_n_s2: float | None = None,
-) -> tuple[str, float]:
-    """The unit of speeds that carries the weight, and the speed of hover in the stated one over the one expected.
-
-    The stated one where its speeds are possible, or no other's are.
-    """
-    possible = 2.2  # Speeds of hover within this factor are.
-    flown = thrust_coefficient(tables, mass_kg, rotors, kind=kind)
-    if flown is None:
-        return stated, np.nan
-    expected = coefficient_n_s2 or usual_coefficient(mass_kg, rotors)
-    off = float(np.sqrt(expected / flown))
-    if 1 / _IMPOSSIBLE < off < _IMPOSSIBLE:
-        return stated, off
-    others = {u: abs(np.log(off * f / UNITS["rotor"][stated])) for u, f in UNITS["rotor"].items() if u != stated}
-    best = min(others, key=others.get)
-    return (best, off) if others[best] < np.log(possible) else (stated, off)
 
 
 @dataclass(frozen=True)
@@ -327,15 +293,10 @@ class SetOfLogs:
 
     def _write_files(self, folder: Path, as_csv: bool) -> list[Path]:
         """Write the vehicle, unless it is kept, and the runs; returns their files."""
-        suffix = ".csv" if as_csv else ".parquet" if parquet_is_here() else ".csv.gz"
-        paths = []
-        if not self.kept_vehicle:
-            paths.append(folder / VEHICLE)
-            paths[-1].write_text(self.vehicle_text, encoding="utf-8")
-        for name, table in self.runs.items():
-            paths.append(folder / f"{name}{suffix}")
-            write_table(table, paths[-1])
-        return paths
+        vehicle = [] if self.kept_vehicle else [folder / VEHICLE]
+        for path in vehicle:
+            path.write_text(self.vehicle_text, encoding="utf-8")
+        return [*vehicle, *write_runs(self.runs, folder, ".csv" if as_csv else "")]
 
 
 def set_of_logs(
@@ -384,7 +345,9 @@ def set_of_logs(
     else:
         if kinds != {"flight"}:
             raise InputError(f"{logs[0]}: a log of a {kinds.pop()} needs --vehicle vehicle.yaml")
-        template = like or template_for(found[0])
+        # The template of the log's autopilot, else of its format.
+        known_as = (importers().get(name) for name in (found[0].known.autopilot, found[0].format))
+        template = like or next((importer.template for importer in known_as if importer and importer.template), "")
         if not template:
             raise InputError(
                 f"{logs[0]}: nothing says what vehicle this is; give --vehicle vehicle.yaml, or --like with one of "
@@ -436,7 +399,7 @@ def _signed_by_spin(
     found = "an export does not say which way its torque counts"
     done = f"its sign is that of a rotor that turns {spin}, as the vehicle's file states"
     signed = {name: runs[name].assign(**{c.MOMENT[2]: sign * runs[name][c.MOMENT[2]]}) for name in mine}
-    return {**runs, **signed}, [ImportFault("sign", c.MOMENT[2], found, done, 0)]
+    return {**runs, **signed}, [ImportFault("sign", c.MOMENT[2], found, done)]
 
 
 def _files_of(path: Path) -> dict[str, Path]:
@@ -479,7 +442,7 @@ def _add_to_set(staged: Sequence[Path], report: ImportReport, folder: Path) -> N
         raise InputError(
             f"{folder}: would have {len(runs)} runs, expected at most {MOST_RUNS}; make several sets of them"
         )
-    report = _after(report, folder)
+    report = report.after(folder)
     if listed_runs(folder) is None:
         write_manifest(folder, there)
     for path in staged:
@@ -488,16 +451,3 @@ def _add_to_set(staged: Sequence[Path], report: ImportReport, folder: Path) -> N
     report.write(staged[0].parent)
     take_place(staged[0].parent / REPORT, folder / REPORT)
     write_manifest(folder, [folder / name for name in runs])
-
-
-def _after(report: ImportReport, folder: Path) -> ImportReport:
-    """The report together with the set's own, where it has one."""
-    path = folder / REPORT
-    if not path.exists():
-        return report
-    try:
-        return report.after(json.loads(read_text(path, LARGEST_METADATA)))
-    except (ValueError, KeyError, TypeError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{path}: is no report of an import; move it away") from None

@@ -62,7 +62,7 @@ from rotorid.recordings.importers.faults import (
     report_gaps,
     within,
 )
-from rotorid.recordings.tables import MANY_ROWS, clock_jump, numbers, read_cells, read_parquet_cells
+from rotorid.recordings.tables import MANY_ROWS, clock_jump, numbers, read_cells
 
 G = 9.80665
 """Standard gravity, m/s²."""
@@ -207,8 +207,8 @@ OPEN = "?"
 """What stands for an answer that only a person can give."""
 
 
-def _open_questions(mapping: Mapping) -> list[str]:
-    """What of a mapping is still `?`, each with what is expected there."""
+def _check_answered(mapping: Mapping, where: object) -> None:
+    """InputError where a mapping still holds a question (`?`), each with what is expected there."""
     found = [f"{key} ({' or '.join(known)})" for key, known in (("body", BODY), ("world", WORLD))
              if getattr(mapping, key) == OPEN]  # fmt: skip
     for name, channel in mapping.channels.items():
@@ -227,12 +227,7 @@ def _open_questions(mapping: Mapping) -> list[str]:
         for key, words in expected.items():
             if getattr(channel, key) == OPEN or key == "columns" and OPEN in channel.columns:
                 found.append(f"channels.{name}.{key} ({words})")
-    return found
-
-
-def _check_answered(mapping: Mapping, where: object) -> None:
-    """InputError where a mapping still holds a question."""
-    if found := _open_questions(mapping):
+    if found:
         raise InputError(
             f"{where}: still open ({OPEN}): {'; '.join(found)}; write the answer in its place, or remove the channel"
         )
@@ -281,7 +276,7 @@ def read_columns(path: Path, used: Collection[str] | None = None) -> pd.DataFram
     `used` names the columns that are wanted of a CSV file, None all of them.
     """
     path = Path(path)
-    table = read_parquet_cells(path) if path.name.endswith(".parquet") else read_cells(path, True, used)
+    table = read_cells(path, True, used)
     count = len(_there(table))
     if count < 2 or len(table) < 2:
         raise InputError(
@@ -319,14 +314,13 @@ def _seconds_of_dates(column: pd.Series) -> pd.Series:
     """Dates and times as seconds. Of a day and a month in either order those are meant in which less time goes by."""
     text, read = column.astype("string").str.strip().str.replace(",", "."), []
     for order in (r"\4-\3-\1 ", r"\4-\1-\3 "):
-        iso = text.str.replace(_DAY_FIRST, lambda m, o=order: _two_digits(m.expand(o)), regex=True)
+        # With two digits of each: a day or a month of one digit is none of ISO 8601.
+        iso = text.str.replace(
+            _DAY_FIRST, lambda m, o=order: re.sub(r"-(\d)(?=[- ])", r"-0\1", m.expand(o)), regex=True
+        )
         since = pd.to_datetime(iso, format="ISO8601", utc=True, errors="coerce") - pd.Timestamp(0, tz="UTC")
         read.append(since.dt.total_seconds())
     return min(read, key=lambda s: (int(s.isna().sum()), float(s.max() - s.min())))
-
-
-def _two_digits(date: str) -> str:
-    return re.sub(r"-(\d)(?=[- ])", r"-0\1", date)
 
 
 def read_by_mapping(path: Path, mapping: Mapping | None) -> tuple[pd.DataFrame, list[ImportFault], str]:

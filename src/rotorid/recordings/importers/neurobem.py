@@ -16,6 +16,7 @@ import pandas as pd
 import scipy
 
 from rotorid.errors import InputError
+from rotorid.io.text.files import check_file
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.contract import Imported, Importer
@@ -35,8 +36,7 @@ ANGULAR_ACCELERATION = tuple(f"angular_acceleration_{a}_rad_s2" for a in "xyz")
 
 def _read_matrix(path: Path) -> np.ndarray:
     """The one matrix in a NeuroBEM `.mat`, shape (n, at least 35)."""
-    if not Path(path).is_file():
-        raise InputError(f"{path}: file is missing")
+    check_file(path)
     try:
         content = scipy.io.loadmat(path)
     except MemoryError:

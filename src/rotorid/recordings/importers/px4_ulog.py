@@ -27,6 +27,7 @@ import pandas as pd
 from pyulog import ULog
 
 from rotorid.errors import InputError
+from rotorid.io.text.files import check_file
 from rotorid.io.text.wording import printable
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.contract import Imported, Importer
@@ -35,16 +36,18 @@ from rotorid.recordings.importers.faults import (
     ImportFault,
     airborne,
     alive_s,
+    cut_off,
     drop_repeated_times,
     fault_where,
     flights,
     further_motors,
     goes_on,
+    held_on,
     jumps_at,
-    on_grid,
     one_sense,
     report_gaps,
     stops,
+    table_on,
     within,
     without_pauses,
 )
@@ -97,6 +100,7 @@ _Fields = Mapping[str, np.ndarray]
 """Fields of one instance of a topic, (n,) each, named as pyulog does: `q[0]`, `esc[1].esc_rpm`."""
 _Topics = Mapping[str, Sequence[_Fields]]
 _Parts = tuple[dict[tuple[str, ...], tuple[np.ndarray, np.ndarray]], list[ImportFault]]
+"""To columns of the contract times, µs, and values (n, k), and what was found."""
 _UNKNOWN = Parameters({})
 
 
@@ -146,9 +150,8 @@ def _read_behind(data: bytes) -> _Reader:
 def open_log(path: Path) -> Px4Log:
     """Read a ULog file; InputError where it is none."""
     most_stray = 4096  # Bytes among which the header is looked for, as by whoever recognises the file.
-    if not Path(path).is_file():
-        raise InputError(f"{path}: file is missing")
-    data = Path(path).read_bytes()
+    check_file(path)
+    data = path.read_bytes()
     stray = max(data.find(_MAGIC, 0, most_stray), 0)
     try:
         log = _Reader(str(path)) if not stray else _read_behind(data[stray:])
@@ -199,8 +202,7 @@ def in_flight(log: Px4Log) -> Values:
     times = _clock(log.topics)
     if not log.parameters.changes or not len(times):
         return log.parameters.start
-    flown = _flying(log, times)
-    return log.parameters.mostly(times if flown is None or not flown.any() else times[flown])
+    return log.parameters.mostly(times, _flying(log, times))
 
 
 def rotor_count(log: Px4Log) -> int:
@@ -236,12 +238,6 @@ def _time(data: Mapping[str, np.ndarray], sampled: bool = True) -> np.ndarray:
     return np.where(near, taken, stamp) if sampled else stamp
 
 
-def _held(grid: np.ndarray, time: np.ndarray, values: np.ndarray, before: float) -> np.ndarray:
-    """Values held until the next one; `before` in rows before the first."""
-    index = np.searchsorted(time, grid, side="right") - 1
-    return np.where(index >= 0, np.asarray(values, float)[np.maximum(index, 0)], before)
-
-
 def _indexed(name: str, count: int) -> list[str]:
     return [f"{name}[{i}]" for i in range(count)]
 
@@ -268,22 +264,20 @@ def _first(topics: _Topics, name: str) -> tuple[_Fields, list[ImportFault]]:
 # Rotors -------------------------------------------------------------------------------------------
 
 
-def _throttles(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray, list[ImportFault]]:
-    """Throttles (n, rotors) with their times, µs, from either generation of actuator topics."""
+def _throttles(log: Px4Log, rotors: int) -> _Parts:
+    """Throttles from either generation of actuator topics."""
     motors, faults = _first(log.topics, "actuator_motors")
     if f"control[{rotors - 1}]" in motors:
-        values, times, more = of_motors(motors, rotors, log.parameters)
-        return values, times, faults + more
+        parts, more = of_motors(motors, rotors, log.parameters)
+        return parts, faults + more
     instances = log.topics.get("actuator_outputs", [])
     if not instances:
         return _no_throttle("no_command", "", "neither actuator_motors nor actuator_outputs is logged")
-    return _from_outputs(log, instances, rotors, ", ".join(c.rotor_columns("throttle", rotors)))
+    return _from_outputs(log, instances, rotors)
 
 
-def of_motors(
-    data: _Fields, rotors: int, parameters: Parameters = _UNKNOWN
-) -> tuple[np.ndarray, np.ndarray, list[ImportFault]]:
-    """Throttles (n, rotors) of `actuator_motors`, their times, µs, and what was found.
+def of_motors(data: _Fields, rotors: int, parameters: Parameters = _UNKNOWN) -> _Parts:
+    """Throttles of `actuator_motors`.
 
     NaN stops a motor, and all of them where PX4 is disarmed; one that never has a value is none.
     """
@@ -292,20 +286,18 @@ def of_motors(
     faults = _more_rotors("actuator_motors", driven_motors(data), rotors)
     values, stopped = stops(values, names, "NaN")
     values, reversed_ = one_sense(values, names, 1.0)
-    for start, stop, stated in parameters.spans(_CHANGED[0][0]):
-        inside, curve = (times >= start) & (times < stop), float(stated.get("THR_MDL_FAC", 0.0))
-        if 0 < curve <= 1 and inside.any():  # PX4 turns the thrust asked for into the signal by this curve
+    for inside, stated in parameters.spans(_CHANGED[0][0], times):
+        curve = float(stated.get("THR_MDL_FAC", 0.0))
+        if 0 < curve <= 1:  # PX4 turns the thrust asked for into the signal by this curve
             half = (1 - curve) / (2 * curve)
             values[inside] = np.sqrt(half**2 + values[inside] / curve) - half
             seen = f"THR_MDL_FAC is {curve:g}: actuator_motors holds thrusts"
             faults += fault_where(inside, "unit", ", ".join(names), seen, "turned into signals by PX4's own curve")
-    return values, times, faults + stopped + reversed_
+    return {names: (times, values)}, faults + stopped + reversed_
 
 
-def _no_throttle(
-    kind: str, names: str, found: str, samples: int = 0, before: Sequence[ImportFault] = ()
-) -> tuple[None, np.ndarray, list[ImportFault]]:
-    return None, np.zeros(0), [*before, ImportFault(kind, names, found, "no throttle columns", samples)]
+def _no_throttle(kind: str, names: str, found: str, samples: int = 0, before: Sequence[ImportFault] = ()) -> _Parts:
+    return {}, [*before, ImportFault(kind, names, found, "no throttle columns", samples)]
 
 
 def _more_rotors(topic: str, driven: int, rotors: int) -> list[ImportFault]:
@@ -313,14 +305,15 @@ def _more_rotors(topic: str, driven: int, rotors: int) -> list[ImportFault]:
     if driven <= rotors:
         return []
     found = f"{topic} drives {driven} motors, the log's parameters state {rotors}"
-    return [ImportFault("order", "", found, "the others are left out; check CA_ROTOR_COUNT and MAV_TYPE", 0)]
+    return [ImportFault("order", "", found, "the others are left out; check CA_ROTOR_COUNT and MAV_TYPE")]
 
 
-def _from_outputs(log: Px4Log, instances, rotors: int, names: str):
+def _from_outputs(log: Px4Log, instances: Sequence[_Fields], rotors: int) -> _Parts:
     """Throttles of `actuator_outputs` by the parameters that state what drives the motors, and in what unit."""
     # Share of the range by which outputs that turn may lie outside of it; farther, they are in another unit.
     plausible = 0.5
-    flown = in_flight(log)
+    flown, columns = in_flight(log), c.rotor_columns("throttle", rotors)
+    names = ", ".join(columns)
     port, outputs = _outputs_of_motors(flown, rotors)
     if outputs is None:
         found = f"no output of PWM_MAIN_FUNC*, PWM_AUX_FUNC* or their like is motor {port}, and actuator_motors is not"
@@ -333,19 +326,18 @@ def _from_outputs(log: Px4Log, instances, rotors: int, names: str):
     chosen = max(usable, key=lambda i: float(np.nanstd(stacks[i], axis=0).min()))
     if len(instances) > 1:
         found = f"{len(instances)} instances of actuator_outputs"
-        faults.append(ImportFault("instances", names, found, f"instance {chosen}, whose outputs move, taken", 0))
+        faults.append(ImportFault("instances", names, found, f"instance {chosen}, whose outputs move, taken"))
     stated = [int(v) for k, v in flown.items() if re.fullmatch(rf"{port}_FUNC\d+", k)]
     for motor in (m for m in range(rotors) if stated.count(_FIRST_MOTOR + m) > 1):
         found = f"{stated.count(_FIRST_MOTOR + motor)} outputs of {port} are motor {motor + 1}"
         action = f"output {outputs[motor] + 1} taken"
-        faults.append(ImportFault("instances", f"throttle_{motor + 1}", found, action, 0))
+        faults.append(ImportFault("instances", f"throttle_{motor + 1}", found, action))
     if not any("_FUNC" in name for name in flown):  # no output states what it is
         every = _stack(instances[chosen], [f for f in _indexed("output", 16) if f in instances[chosen]])
         faults += _more_rotors("actuator_outputs", rotors + len(further_motors(every, rotors)), rotors)
     times, given = _time(instances[chosen], sampled=False), stacks[chosen]
     throttle = np.full(given.shape, np.nan)
-    for start, stop, values in log.parameters.spans(_CHANGED[0][0]):
-        inside = (times >= start) & (times < stop)
+    for inside, values in log.parameters.spans(_CHANGED[0][0], times):
         low, high, by = _ends_of(values, port, outputs)
         share = (given[inside] - low) / (high - low)
         turning = given[inside] > 0
@@ -354,8 +346,6 @@ def _from_outputs(log: Px4Log, instances, rotors: int, names: str):
             found = f"outputs from {own.min():g} to {own.max():g} are not {by or 'pulse widths in µs'}"
             return _no_throttle("unit", names, found, len(given), faults)
         throttle[inside] = share
-        if not inside.any():
-            continue
         ends = f"{low[0]:g} and {high[0]:g}"
         if not by:
             found = "no parameter states the pulse widths of no and full throttle"
@@ -363,11 +353,9 @@ def _from_outputs(log: Px4Log, instances, rotors: int, names: str):
         elif not by.startswith("pulses"):
             faults += fault_where(inside, "unit", names, f"the outputs are {by}", f"no and full throttle are {ends}")
     both = [i for i in range(rotors) if int(flown.get("CA_R_REV", 0)) >> i & 1]  # 0 in the middle of their range
-    throttle[:, both], backwards = one_sense(
-        2 * throttle[:, both] - 1, [c.rotor_columns("throttle", rotors)[i] for i in both], 1.0
-    )
-    throttle, outside = within(throttle, c.rotor_columns("throttle", rotors))
-    return throttle, times, faults + backwards + outside
+    throttle[:, both], backwards = one_sense(2 * throttle[:, both] - 1, [columns[i] for i in both], 1.0)
+    throttle, outside = within(throttle, columns)
+    return {columns: (times, throttle)}, faults + backwards + outside
 
 
 def _outputs_of_motors(parameters: Values, rotors: int) -> tuple[str | int, list[int] | None]:
@@ -413,41 +401,42 @@ def _ends_of(parameters: Values, port: str, outputs: Sequence[int]) -> tuple[np.
     return np.where(reverse, high, low), np.where(reverse, low, high), f"pulses by {port}_*" if stated else ""
 
 
-def _speeds(log: Px4Log, rotors: int) -> tuple[np.ndarray | None, np.ndarray, list[ImportFault]]:
-    """Rotor speeds (n, rotors), rad/s, of `esc_status`."""
+def _speeds(log: Px4Log, rotors: int) -> _Parts:
+    """Rotor speeds, rad/s, of `esc_status`."""
     instances = log.topics.get("esc_status", [])
     turning = [d for d in instances if any(np.any(v) for field, v in d.items() if field.endswith(".esc_rpm"))]
     if not instances:
-        return None, np.zeros(0), []
+        return {}, []
     data, stuck = _first({"esc_status": turning or instances}, "esc_status")
-    values, times, faults = of_controllers(data, rotors)
-    if values is not None and len(turning) > 1 and not stuck:
+    parts, faults = of_controllers(data, rotors)
+    if parts and len(turning) > 1 and not stuck:
         found = f"{len(turning)} instances of esc_status hold speeds"
-        faults.append(ImportFault("instances", "rotor_speed", found, "the first of them taken", 0))
-    return values, times, faults + stuck
+        faults.append(ImportFault("instances", "rotor_speed", found, "the first of them taken"))
+    return parts, faults + stuck
 
 
-def of_controllers(data: _Fields, rotors: int) -> tuple[np.ndarray | None, np.ndarray, list[ImportFault]]:
-    """Rotor speeds (n, rotors), rad/s, of `esc_status`, each by the motor that its controller drives, with their times,
-    µs; NaN where a controller is not heard, None where there is no speed."""
+def of_controllers(data: _Fields, rotors: int) -> _Parts:
+    """Rotor speeds, rad/s, of `esc_status`, each by the motor that its controller drives; NaN where a controller is not
+    heard."""
     slots = _controllers(data)
     by_function = _slots_of_motors(data)
     place = {r: by_function.get(r, r) if by_function else r for r in range(rotors)}
     if not set(place.values()) <= set(slots):
         found = f"esc_status holds {len(slots)} controllers for {rotors} rotors"
-        return None, np.zeros(0), [ImportFault("speed_missing", "rotor_speed", found, "no rotor speeds", 0)]
+        return {}, [ImportFault("speed_missing", "rotor_speed", found, "no rotor speeds")]
+    names = c.rotor_columns("rotor_speed", rotors)
     online = np.asarray(data.get("esc_online_flags", np.full(len(data["timestamp"]), -1))).astype(np.int64)
     values = np.column_stack([np.asarray(data[f"esc[{place[r]}].esc_rpm"], float) for r in range(rotors)]) * RPM
-    values, faults = one_sense(values, c.rotor_columns("rotor_speed", rotors))
+    values, faults = one_sense(values, names)
     heard = np.column_stack([(online >> place[r]) & 1 for r in range(rotors)]).astype(bool)
     others = [i for i in slots if i not in place.values() and np.any(data[f"esc[{i}].esc_rpm"])]
     faults += _more_rotors("esc_status", rotors + len(others), rotors)
     if not np.nan_to_num(values).any():
         found = "every speed in esc_status is 0"
-        return None, np.zeros(0), [ImportFault("speed_missing", "rotor_speed", found, "no rotor speeds", len(values))]
+        return {}, [ImportFault("speed_missing", "rotor_speed", found, "no rotor speeds", len(values))]
     found = f"a speed controller is offline in {(~heard).any(axis=1).sum()} messages"
     faults += fault_where(~heard, "speed_missing", "rotor_speed", found, "made empty cells")
-    return np.where(heard, values, np.nan), _time(data, sampled=False), faults
+    return {names: (_time(data, sampled=False), np.where(heard, values, np.nan))}, faults
 
 
 def _controllers(data: _Fields) -> list[int]:
@@ -529,7 +518,7 @@ def _battery(data: _Fields) -> _Parts:
     values = {(c.BATTERY_VOLTAGE,): (time, np.where(voltage > 0, voltage, np.nan)[:, None])}
     if (current < 0).all():
         found = "-1 A throughout: not measured"
-        return values, [ImportFault("not_measured", c.BATTERY_CURRENT, found, "column left out", 0)]
+        return values, [ImportFault("not_measured", c.BATTERY_CURRENT, found, "column left out")]
     return values | {(c.BATTERY_CURRENT,): (time, np.where(current < 0, np.nan, current)[:, None])}, []
 
 
@@ -542,12 +531,13 @@ TOPICS: Mapping[str, Callable[[_Fields], _Parts]] = {
     "vehicle_odometry": _odometry,
     "battery_status": _battery,
 }
-"""What a topic states of the vehicle: columns of the contract with times, µs, and values (n, k), and what was found.
+"""What a topic states of the vehicle.
+
 Motors, controllers, flight and resets: `of_motors`, `of_controllers`, `in_the_air`, `resets_of`."""
 
 
-def _inertial(topics: _Topics) -> tuple[dict[tuple[str, ...], tuple[np.ndarray, np.ndarray]], list[ImportFault]]:
-    """Accelerometer and gyroscope: columns to times, µs, and values, each of the fastest topic that goes on."""
+def _inertial(topics: _Topics) -> _Parts:
+    """Accelerometer and gyroscope, each of the fastest topic that goes on."""
     found, faults = {}, []
     for columns, other in (
         (c.SPECIFIC_FORCE, "vehicle_acceleration"), (c.ANGULAR_VELOCITY, "vehicle_angular_velocity")
@@ -565,9 +555,9 @@ def _inertial(topics: _Topics) -> tuple[dict[tuple[str, ...], tuple[np.ndarray, 
     return found, faults
 
 
-def _batteries(topics: _Topics) -> tuple[list[tuple[tuple[str, ...], np.ndarray, np.ndarray]], list[ImportFault]]:
+def _batteries(topics: _Topics) -> _Parts:
     """Voltage and current of every battery; those after the first under names of their own."""
-    out, faults, number = [], [], 0
+    out, faults, number = {}, [], 0
     for data in topics.get("battery_status", []):
         parts, more = TOPICS["battery_status"](data)
         number += bool(parts)
@@ -578,7 +568,7 @@ def _batteries(topics: _Topics) -> tuple[list[tuple[tuple[str, ...], np.ndarray,
                 if name.endswith("_v"):
                     found = f"battery {number} is logged, too, at {np.nanmedian(values):.4g} V"
                     faults.append(ImportFault("instances", name, found, "kept under a name of its own", len(values)))
-            out.append(((name,), time, values))
+            out[name,] = time, values
     return out, faults
 
 
@@ -628,7 +618,7 @@ def flying_by(said: Sequence[tuple[np.ndarray, np.ndarray]], grid: np.ndarray, u
     """Rows of a grid (n,) in which all of several say (times, and whether it may fly) that the vehicle flies."""
     if not said:
         return None
-    up = np.all([_held(grid, time, values, 0.0) > 0.5 for time, values in said], axis=0)
+    up = np.all([held_on(grid, time, values) > 0.5 for time, values in said], axis=0)
     return without_pauses(up, (grid - grid[0]) * unit_s)
 
 
@@ -650,47 +640,31 @@ def convert(log: Px4Log, rotors: int) -> tuple[pd.DataFrame, list[ImportFault], 
         )
     frame, repeated = drop_repeated_times(pd.DataFrame({c.TIME: (base - base[0]) * 1e-6}))
     grid = (frame[c.TIME].to_numpy() * 1e6).round().astype(np.int64) + base[0]
-    faults, columns = repeated + faults, {c.TIME: (grid - grid[0]) * 1e-6}
-
-    def put(names: Sequence[str], time: np.ndarray, values: np.ndarray) -> None:
-        if names == c.QUATERNION:
-            values = continuous(values)
-        columns.update(zip(names, on_grid(grid, time, values).T, strict=True))
-
-    for names, (time, values) in inertial.items():
-        put(names, time, values)
+    faults, parts = repeated + faults, inertial
     for name in ("vehicle_attitude", "vehicle_local_position"):
         data, found = _first(log.topics, name)
         values, more = TOPICS[name](data) if data else ({}, [])
-        faults += found + more
-        for names, (time, block) in values.items():
-            put(names, time, block)
-    batteries, found = _batteries(log.topics)
-    faults += found
-    for names, time, values in batteries:
-        put(names, time, values)
-    for kind, reader in (("throttle", _throttles), ("rotor_speed", _speeds)):
-        values, time, found = reader(log, rotors)
-        faults += found
-        if values is not None:
-            put(c.rotor_columns(kind, rotors), time, values)
-    table = pd.DataFrame({k: v for k, v in columns.items() if k == c.TIME or np.isfinite(v).any()})
+        faults, parts = faults + found + more, parts | values
+    if c.QUATERNION in parts:
+        time, values = parts[c.QUATERNION]
+        parts[c.QUATERNION] = time, continuous(values)
+    for values, found in (_batteries(log.topics), _throttles(log, rotors), _speeds(log, rotors)):
+        faults, parts = faults + found, parts | values
+    table = table_on(grid, ((names, *part) for names, part in parts.items()), 1e-6)
     flying, ground = airborne(table, _flying(log, grid))
     faults += ground
     times = (_resets(log.topics) - grid[0]) * 1e-6
-    jumps, reset = jumps_at(columns[c.TIME], times, JUMPED)
+    jumps, reset = jumps_at(table[c.TIME].to_numpy(), times, JUMPED)
     faults += reset
     faults += log.parameters.faults(_CHANGED, float(grid[0]), 1e-6)
-    if log.stray:
-        faults.append(ImportFault("damaged", "", f"{log.stray} bytes stand in front of the header", "left out", 0))
-    if log.rest:
-        found = f"the file ends inside a message, after {log.rest} bytes of it"
-        faults.append(ImportFault("cut_off", "", found, "what came before is kept; the log stopped before its end", 0))
-    if log.damaged:
-        faults.append(ImportFault("damaged", "", "the file is damaged", "what could be read is kept", 0))
-    if log.lost_s:
-        found = f"the logger lost {len(log.lost_s)} stretches, {sum(log.lost_s):.3g} s in all"
-        faults.append(ImportFault("dropout", c.TIME, found, "left as gaps", len(log.lost_s)))
+    lost = f"the logger lost {len(log.lost_s)} stretches, {sum(log.lost_s):.3g} s in all"
+    met = (
+        (log.stray, ImportFault("damaged", "", f"{log.stray} bytes stand in front of the header", "left out")),
+        (log.rest, cut_off(f"the file ends inside a message, after {log.rest} bytes of it")),
+        (log.damaged, ImportFault("damaged", "", "the file is damaged", "what could be read is kept")),
+        (log.lost_s, ImportFault("dropout", c.TIME, lost, "left as gaps", len(log.lost_s))),
+    )
+    faults += [fault for there, fault in met if there]
     return table, faults + report_gaps(table), flying & ~jumps, jumps
 
 
@@ -733,7 +707,7 @@ def _untaken(parameters: Mapping[str, float], rotors: int) -> list[ImportFault]:
         if not which:
             return []
         who = f"rotor{'s' * (len(which) > 1)} {', '.join(map(str, which))}"
-        return [ImportFault(kind, "vehicle.yaml", found.format(who), action, 0)]
+        return [ImportFault(kind, "vehicle.yaml", found.format(who), action)]
 
     axes = np.column_stack([stated("AX", 0.0), stated("AY", 0.0), stated("AZ", -1.0)])
     size = np.linalg.norm(axes, axis=1)  # PX4 makes each axis a unit vector
@@ -751,7 +725,7 @@ def _untaken(parameters: Mapping[str, float], rotors: int) -> list[ImportFault]:
     faults += fault("tilted_rotor", by_servo, "a servo tilts {} (CA_ROTOR*_TILT)", "its thrust is taken along -z")
     if parameters.get("CA_SV_CS_COUNT", 0) > 0 or parameters.get("CA_SV_TL_COUNT", 0) > 0:
         found = "the vehicle has servos (CA_SV_CS_COUNT, CA_SV_TL_COUNT)"
-        faults.append(ImportFault("servo", "vehicle.yaml", found, "what they move is not taken", 0))
+        faults.append(ImportFault("servo", "vehicle.yaml", found, "what they move is not taken"))
     for name, default, action in (
         ("KM", 0.05, "their mean size is taken for the ratio of torque to thrust"),
         ("CT", 6.5, "one thrust coefficient is taken for all"),

@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from rotorid.errors import InputError
+from rotorid.io.text.files import check_file
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers.contract import Imported, Importer, text_of
 from rotorid.recordings.importers.faults import ImportFault, drop_repeated_times, fault_where
@@ -49,9 +50,9 @@ def decode_text(data: bytes) -> tuple[str, list[ImportFault]]:
             text = data.decode("utf-8")
         except UnicodeDecodeError:
             text = data.decode("latin-1")
-            faults.append(ImportFault("encoding", "", "file is not UTF-8", "read as latin-1", 0))
+            faults.append(ImportFault("encoding", "", "file is not UTF-8", "read as latin-1"))
     if "\r" in text and "\n" not in text:
-        faults.append(ImportFault("line_ends", "", "lines end with a bare carriage return", "read as line ends", 0))
+        faults.append(ImportFault("line_ends", "", "lines end with a bare carriage return", "read as line ends"))
     return text.replace("\r\n", "\n").replace("\r", "\n"), faults
 
 
@@ -105,7 +106,7 @@ def _places(headings: list[str], where: str) -> tuple[dict[str, tuple[int, str, 
                 f"{', '.join(UNITS[kind])}"
             )
         if not text:
-            faults.append(ImportFault("unit", "", f"the heading {title!r} names no unit", f"taken as {usual}", 0))
+            faults.append(ImportFault("unit", "", f"the heading {title!r} names no unit", f"taken as {usual}"))
         places[name] = place, kind, unit
     for title, (name, _, _) in HEADINGS.items():
         if name not in (*places, *_NOT_ALWAYS):
@@ -160,11 +161,8 @@ def _convert(raw: pd.DataFrame) -> tuple[pd.DataFrame, list[ImportFault]]:
 
 def read_rcbenchmark(path: Path) -> tuple[pd.DataFrame, list[ImportFault]]:
     """One stand run in contract columns, and its faults."""
-    try:
-        data = Path(path).read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{path}: file is missing") from None
-    text, faults = decode_text(data)
+    check_file(path)
+    text, faults = decode_text(path.read_bytes())
     raw, more = _read_table(text, str(path))
     table, converted_ = _convert(raw)
     return table, [*faults, *more, *converted_]

@@ -46,6 +46,7 @@ from rotorid.recordings.importers.faults import (
     ImportFault,
     airborne,
     alive_s,
+    cut_off,
     flights,
     further_motors,
     jumps_at,
@@ -232,8 +233,9 @@ def _read_px4(found: _BagContent) -> list[ImportFault]:
             stated["flying"] = stamp, up[:, None]
         if name in _ROTORS_OF_PX4:
             quantity, read, times = _ROTORS_OF_PX4[name]
-            values, stamp, more = read(data, driven_motors(data))
-            stated |= {} if values is None else {quantity: (stamp, values * times)}
+            parts, more = read(data, driven_motors(data))
+            for at, values in parts.values():
+                stated[quantity] = at, values * times
         else:
             parts, more = TOPICS[name](data) if name in TOPICS else ({}, [])
             for columns, (at, values) in parts.items():
@@ -249,8 +251,8 @@ def _read_px4(found: _BagContent) -> list[ImportFault]:
 
 def _by_rosbags(path: Path) -> _BagContent:
     """A bag, MCAP file or folder of one that is whole and holds ROS alone."""
-    highlevel = needs("rosbags.highlevel", "ros", path)
-    typesys = needs("rosbags.typesys", "ros", path)
+    highlevel = needs("rosbags.highlevel", path)
+    typesys = needs("rosbags.typesys", path)
     found = _BagContent()
     with (
         Unpacking(path).in_rosbags(),
@@ -297,7 +299,7 @@ def _by_records(path: Path) -> _BagContent:
 
 def _found(path: Path) -> _BagContent:
     """InputError where nothing of a bag can be read."""
-    needs("rosbags.highlevel", "ros", path)
+    needs("rosbags.highlevel", path)
     try:
         return _by_rosbags(path)
     except (MemoryError, InputError):
@@ -333,11 +335,11 @@ def _read_series(path: Path) -> tuple[dict[str, list[_TopicSeries]], list[Import
     if not found.rows:
         listed = ", ".join([*others, *foreign][:_LISTED]) or "none"
         raise InputError(f"{path}: no topic of a type that is known; found {listed}")
-    cut, gap = "what came before is kept; the log stopped before its end", "left out; their time is a gap"
+    gap = "left out; their time is a gap"
     lost, strange = f"{found.lost_chunks} chunks of messages", ", ".join(foreign[:_LISTED])
     broken = f"{found.broken} messages cannot be decoded"
     met = (
-        (found.cut, ImportFault("cut_off", "", "the file ends early, without its index", cut)),
+        (found.cut, cut_off("the file ends early, without its index")),
         (found.broken, ImportFault("damaged", "", broken, "left out", found.broken)),
         (found.lost_chunks, ImportFault("damaged", "", f"{lost} cannot be unpacked", gap, found.lost_chunks)),
         (foreign, ImportFault("unread", "", f"{strange} hold no messages of ROS", "left out")),
@@ -383,7 +385,7 @@ def _read_series(path: Path) -> tuple[dict[str, list[_TopicSeries]], list[Import
         seen = (
             f"no topic of a type that is read states {', '.join(missing)}; not read are {', '.join(others[:_LISTED])}"
         )
-        faults.append(ImportFault("unread", "", seen + more, "export what is missing as a CSV", 0))
+        faults.append(ImportFault("unread", "", seen + more, "export what is missing as a CSV"))
     for quantity, offered in series.items():
         if len(offered) > 1 and quantity not in _SAID:
             seen = f"{', '.join(s.topic for s in offered)} hold it"

@@ -10,6 +10,7 @@ from rotorid.mismatch.mistakes import dropout, find_mistakes, lagged
 from rotorid.mismatch.mistakes.lagged import Blocks
 from rotorid.mismatch.mistakes.timing import Lateness, in_agreement, one_quantity
 from rotorid.recordings import RecordingSet, Run, Vehicle
+from rotorid.recordings.held import SHORTEST_FREEZE_PERIODS, SHORTEST_FREEZE_S
 from rotorid.recordings.signal.kernels import gaussian
 from tests.unit.mismatch.flights import COLUMNS, controlled, quad, recorded, with_table
 
@@ -319,7 +320,7 @@ def test_a_slow_sensor_that_loses_packets_is_no_dropout():
     t = np.arange(20_000) / 250.0
     kept = np.flatnonzero((np.arange(t.size) % 10 == 0) & (rng.random(t.size) > 0.2))
     values = rng.standard_normal((t.size, 3))[kept[np.searchsorted(kept, np.arange(t.size), "right") - 1]]
-    assert dropout.held(t, values, dropout.SHORTEST_FREEZE_S, dropout.SHORTEST_FREEZE_PERIODS) == []
+    assert dropout.held(t, values, SHORTEST_FREEZE_S, SHORTEST_FREEZE_PERIODS) == []
 
 
 def test_a_rotor_that_is_hardly_ever_read(sound):

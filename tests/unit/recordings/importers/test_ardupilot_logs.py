@@ -9,7 +9,7 @@ import pytest
 
 from rotorid.recordings import columns as c
 from rotorid.recordings.importers import ardupilot
-from rotorid.recordings.importers.faults import off_the_ground
+from rotorid.recordings.importers.faults import airborne
 from tests import public_logs
 from tests.refusals import refused
 from tests.unit.recordings.importers.test_log_formats import PARAMETERS, dataflash, flown
@@ -204,7 +204,8 @@ def test_a_flight_of_climbs_and_falls_is_kept_whole(amplitude: float, period_s: 
     throttle = np.tile(0.5 * thrust[:, None] ** exponent, (1, 4))
     force = np.random.default_rng(0).normal(0, 0.3, (3000, 3))
     force[:, 2] -= 9.81 * thrust
-    air = off_the_ground(np.ones(3000, bool), throttle, force, time_s)
+    columns = dict(zip((*THROTTLES, *c.SPECIFIC_FORCE), np.hstack([throttle, force]).T, strict=True))
+    air, _ = airborne(pd.DataFrame({c.TIME: time_s} | columns))
     inside = (time_s > period_s) & (time_s < time_s[-1] - period_s)  # a low throttle at either end is cut as spool-up
     assert air[inside].all()
 

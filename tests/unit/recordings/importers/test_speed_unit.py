@@ -13,7 +13,7 @@ from rotorid.recordings import templates
 from rotorid.recordings.files import vehicle_of
 from rotorid.recordings.importers import px4_ulog
 from rotorid.recordings.importers.known import propose
-from rotorid.recordings.importers.logfile import carrying_unit, in_unit_of_weight, read_log, set_of_logs
+from rotorid.recordings.importers.logfile import in_unit_of_weight, read_log, set_of_logs
 from rotorid.recordings.importers.logfile import usual_coefficient as coefficient
 from rotorid.recordings.importers.mapping import UNITS, Mapping
 from tests.public_logs import public
@@ -49,7 +49,6 @@ def test_the_unit_that_carries_the_weight_is_taken(template: str, stated: str, w
 @pytest.mark.parametrize("wrong", [0.4, 1.0, 2.5])
 def test_a_mass_that_is_off_changes_no_unit(template: str, wrong: float) -> None:
     mass = wrong * templates.read(template).mass_kg
-    assert carrying_unit([hover(template)], "rotor_speed", "rad/s", mass, 4)[0] == "rad/s"
     table = hover(template)
     assert in_unit_of_weight({"run": table}, {"run": "rad/s"}, mass, 4)[0]["run"] is table
 
@@ -87,7 +86,7 @@ def test_public_logs_keep_their_unit(log: str, mass_kg: float, unit: str) -> Non
     found = read_log(public(log))
     assert found.speed_unit == unit
     for table in found.runs.values():
-        assert carrying_unit([table], "rotor_speed", unit, mass_kg, 4)[0] == unit
+        assert in_unit_of_weight({"run": table}, {"run": unit}, mass_kg, 4)[0]["run"] is table
 
 
 def test_a_geometry_of_one_metre_is_directions_alone() -> None:

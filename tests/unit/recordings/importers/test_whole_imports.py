@@ -13,9 +13,9 @@ import pytest
 
 from rotorid.errors import InputError
 from rotorid.io.text import writing
+from rotorid.recordings import files as writer
 from rotorid.recordings import list_sets, read_set, write_set
 from rotorid.recordings.files import FILE_NAME
-from rotorid.recordings.importers import logfile as writer
 from rotorid.recordings.importers.faults import read_report
 from rotorid.recordings.importers.logfile import SetOfLogs
 from tests.command_line import answer, refusal
@@ -152,14 +152,14 @@ def test_a_full_disk_is_one_sentence_and_loses_nothing(when: str, there: bool, t
 KILLED = """
 import os, signal, sys
 from rotorid.cli import app
-from rotorid.recordings.importers import logfile
+from rotorid.recordings import files
 
-write = logfile.write_table
+write = files.write_table
 def second_kills(table, path):
     if path.name.startswith("run2"):
         os.kill(os.getpid(), signal.SIGKILL)
     write(table, path)
-logfile.write_table = second_kills
+files.write_table = second_kills
 app(sys.argv[1:])
 """
 

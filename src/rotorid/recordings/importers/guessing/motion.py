@@ -9,21 +9,7 @@ import numpy as np
 
 from rotorid.recordings.importers.guessing import agreement as by
 from rotorid.recordings.importers.guessing import names as named
-from rotorid.recordings.importers.guessing.agreement import (
-    BY_NUMBERS_ALONE,
-    CONFIRMED,
-    CONTRADICTED,
-    FACTOR_OFF,
-    FASTEST_GYRO_RAD_S,
-    MOVES,
-    Agreement,
-    Draft,
-    in_words,
-    is_clear,
-    signed_continuous,
-    triples_of,
-    unit_by_factor,
-)
+from rotorid.recordings.importers.guessing.agreement import Agreement, Draft
 from rotorid.recordings.importers.guessing.names import Family
 from rotorid.recordings.importers.mapping import EULER, OPEN, THREE, TRAVEL, UNITS, from_angles
 
@@ -34,7 +20,7 @@ _SAME_ORDER_RAD = np.radians(2.0)
 
 
 def guess_velocity(draft: Draft) -> None:
-    triples = triples_of(draft)
+    triples = by.triples_of(draft)
     offered = [f for f in triples if named.is_named(f, "velocity")]
     force = draft.channels.get("specific_force")
     candidates = offered or [
@@ -51,7 +37,7 @@ def guess_velocity(draft: Draft) -> None:
             found["world", family], others[family] = _in_any_axes(draft.changes(values), gained, draft.world)
             found["body", family] = by.compare(draft.changes(by.into_world(draft.time_s, draft.wxyz, values)), gained)
     best = max(found, key=lambda key: found[key].correlation, default=None)
-    enough = CONFIRMED if offered else BY_NUMBERS_ALONE
+    enough = by.CONFIRMED if offered else by.BY_NUMBERS_ALONE
     if best is not None and found[best].correlation >= enough:
         _velocity_confirmed(draft, best, found, others[best[1]], bool(offered))
     elif offered:
@@ -71,8 +57,8 @@ def _in_any_axes(changes: np.ndarray, gained: np.ndarray, world: str) -> tuple[A
     for attitude in ("enu", "nwu") if world == "enu" else (world,):
         for own in TRAVEL:
             seen = by.compare(changes @ TRAVEL[own].T @ TRAVEL[attitude], gained)
-            turned = min(same.by_axis) < -CONTRADICTED and min(seen.by_axis) > CONTRADICTED
-            if (is_clear(seen, same) or turned) and seen.correlation > best.correlation:
+            turned = min(same.by_axis) < -by.CONTRADICTED and min(seen.by_axis) > by.CONTRADICTED
+            if (by.is_clear(seen, same) or turned) and seen.correlation > best.correlation:
                 best, axes = seen, (attitude, own)
     return best, axes
 
@@ -83,7 +69,7 @@ def _velocity_confirmed(
     axes, family = best
     agreed = found[best]
     other = found["body" if axes == "world" else "world", family]
-    unit = next((u for u, f in UNITS["velocity"].items() if abs(1 / agreed.slope / f - 1) < 2 * FACTOR_OFF), None)
+    unit = next((u for u, f in UNITS["velocity"].items() if abs(1 / agreed.slope / f - 1) < 2 * by.FACTOR_OFF), None)
     said = (
         f"{'by their names' if by_name else 'no name says it'}; follows accelerometer and attitude ({agreed.in_words}"
     )
@@ -96,7 +82,7 @@ def _velocity_confirmed(
     if unit is None or (family.unit in UNITS["velocity"] and family.unit != unit):
         question = f"the accelerometer asks for {1 / agreed.slope:.3g} m/s a unit"
         more["unit"] = OPEN
-    if not is_clear(agreed, other):
+    if not by.is_clear(agreed, other):
         more["axes"] = _stated_axes(family)
         if more["axes"] == OPEN:
             question = " ".join(filter(None, (question, "in world or body axes? The flight hardly distinguishes them")))
@@ -115,20 +101,20 @@ def _velocity_alone(draft: Draft, family: Family, found: dict) -> None:
     said, questions = [], []
     if found:
         agreed = max(found["world", family], found["body", family], key=lambda a: a.correlation)
-        said.append(in_words(agreed, "velocity", "accelerometer and attitude"))
+        said.append(by.in_words(agreed, "velocity", "accelerometer and attitude"))
         if said[0].startswith("does not"):
             questions.append("is it a velocity? It does not follow accelerometer and attitude")
             unit = OPEN
     readings = _moved_by(draft, draft.values(family.columns))
-    place = next((f for f in triples_of(draft) if named.is_named(f, "position") and f != family), None)
+    place = next((f for f in by.triples_of(draft) if named.is_named(f, "position") and f != family), None)
     if place is not None and readings and not questions:
         moved = draft.changes(draft.values(place.columns))
         seen = {name: by.compare(moved, values) for name, values in readings.items()}
         better = max(seen, key=lambda name: seen[name].correlation)
-        if seen[better].correlation > CONFIRMED:
+        if seen[better].correlation > by.CONFIRMED:
             said.append(f"integrates to the position in {better} axes ({seen[better].in_words})")
             others = [a for name, a in seen.items() if name != better]
-            axes = better if all(is_clear(seen[better], a) for a in others) or axes == better else OPEN
+            axes = better if all(by.is_clear(seen[better], a) for a in others) or axes == better else OPEN
     if axes == OPEN:
         questions.append("in world or body axes? Nothing in the table shows which")
     if unit == OPEN and len(questions) < 2:
@@ -149,7 +135,7 @@ def _moved_by(draft: Draft, velocity: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def guess_position(draft: Draft) -> None:
-    triples = triples_of(draft)
+    triples = by.triples_of(draft)
     offered = [f for f in triples if named.is_named(f, "position")]
     candidates = offered or [f for f in triples if not f.words & named.OTHER_THINGS]
     speed = draft.channels.get("velocity")
@@ -165,9 +151,9 @@ def guess_position(draft: Draft) -> None:
                 if agreed.correlation > found.get(family, Agreement()).correlation or family not in found:
                     found[family], own_axes[family] = agreed, axes
     best = max(found, key=lambda f: found[f].correlation, default=None)
-    if best is not None and found[best].correlation >= (CONFIRMED if offered else BY_NUMBERS_ALONE):
+    if best is not None and found[best].correlation >= (by.CONFIRMED if offered else by.BY_NUMBERS_ALONE):
         agreed = found[best]
-        unit = unit_by_factor("length", 1 / agreed.slope)
+        unit = by.unit_by_factor("length", 1 / agreed.slope)
         how = "by their names" if offered else "no name says it"
         evidence = f"{how}; the velocity integrates to it ({agreed.in_words})"
         question = "" if unit else f"the velocity asks for {1 / agreed.slope:.3g} m a unit"
@@ -178,7 +164,7 @@ def guess_position(draft: Draft) -> None:
     elif offered:
         family = offered[0]
         # The unit of the changes is not known: only the correlation is looked at.
-        off = family in found and found[family].correlation < CONTRADICTED
+        off = family in found and found[family].correlation < by.CONTRADICTED
         seen = f"the velocity does not integrate to it ({found[family].in_words})" if off else "no velocity confirms it"
         unit = family.unit if family.unit in UNITS["length"] and not off else OPEN
         question = "is it a position? The velocity does not integrate to it" if off else "in which unit?"
@@ -208,8 +194,8 @@ def guess_height(draft: Draft) -> None:
     if place is not None and place.unit != OPEN and draft.instants is not None:
         z = draft.values(place.columns)[:, [2]] * UNITS["length"][place.unit]
         agreed = by.compare(draft.changes(z), draft.changes(values))
-        unit = unit_by_factor("length", abs(agreed.slope)) if agreed.slope else None
-        if abs(agreed.correlation) > CONFIRMED and unit:
+        unit = by.unit_by_factor("length", abs(agreed.slope)) if agreed.slope else None
+        if abs(agreed.correlation) > by.CONFIRMED and unit:
             draft.put("height", [name], f"by its name; changes as the position's z does ({agreed.in_words})", unit=unit)
             return
     if stated in UNITS["length"]:
@@ -277,21 +263,25 @@ def _of_angles(columns: tuple[str, ...], values: np.ndarray, form: str, unit: st
 
 def guess_attitude_and_rates(draft: Draft) -> None:
     turns, why = _attitudes(draft)
-    triples = triples_of(draft)
+    triples = by.triples_of(draft)
     rates = {"rad": "rad/s", "deg": "deg/s", "mrad": "mrad/s"}  # `gyro_rad` of PX4
     offered = [replace(f, unit=rates.get(f.unit, f.unit)) for f in triples if named.is_named(f, "angular_velocity")]
     found: dict[tuple[int, Family], Agreement] = {}
 
     def look(first: int) -> None:
         for k, turn in enumerate(turns[first:], first):
-            moved = by.turned(draft.instants, draft.time_s, signed_continuous(turn.wxyz))
+            moved = by.turned(draft.instants, draft.time_s, by.signed_continuous(turn.wxyz))
             for family in offered or triples:
                 found[k, family] = by.compare(moved, draft.integrated(draft.values(family.columns)))
 
     if draft.instants is not None:
         look(0)
         best = max(found, key=lambda key: _rank(found[key], turns[key[0]]), default=None)
-        if turns and turns[0].form in EULER and best is not None and offered and _has_other_signs(found[best]):
+        # Whether no reading of angles as they are agrees about each axis.
+        other_signs = best is not None and (
+            found[best].correlation < by.CONFIRMED or min(found[best].by_axis) < -by.CONTRADICTED
+        )
+        if turns and turns[0].form in EULER and offered and other_signs:
             # Pitch may be positive nose down and yaw a heading, whatever the axes of the gyroscope.
             count, values = len(turns), draft.values(turns[0].columns)
             signs = list(product((1, -1), repeat=3))[1:]
@@ -300,27 +290,24 @@ def guess_attitude_and_rates(draft: Draft) -> None:
     best = max(found, key=lambda key: _rank(found[key], turns[key[0]]), default=None)
     if best is not None:
         agreed, family = found[best], best[1]
-        enough = CONFIRMED if offered else BY_NUMBERS_ALONE
-        if agreed.correlation >= enough and agreed.size > MOVES["angle"]:
+        enough = by.CONFIRMED if offered else by.BY_NUMBERS_ALONE
+        if agreed.correlation >= enough and agreed.size > by.MOVES["angle"]:
             _confirmed(draft, turns, found, best, why, bool(offered))
             return
         turns = [t for t in turns if t.signs is None]
         if offered:
-            _rates_alone(draft, offered[0], in_words(agreed, "angle", "the attitude"), _mirrored(draft, turns, family))
+            _rates_alone(
+                draft, offered[0], by.in_words(agreed, "angle", "the attitude"), _mirrored(draft, turns, family)
+            )
     elif offered:
         _rates_alone(draft, offered[0], "", "")
     if turns:
         _attitude_alone(draft, turns, why)
 
 
-def _has_other_signs(agreed: Agreement) -> bool:
-    """Whether no reading of angles as they are agrees about each axis."""
-    return agreed.correlation < CONFIRMED or min(agreed.by_axis) < -CONTRADICTED
-
-
 def _rank(agreed: Agreement, turn: _Turn) -> float:
     """Correlation of a reading; a factor that no unit has, and an attitude that must be inverted, rank lower."""
-    fits = any(abs(agreed.slope / f - 1) < FACTOR_OFF for f in UNITS["rate"].values())
+    fits = any(abs(agreed.slope / f - 1) < by.FACTOR_OFF for f in UNITS["rate"].values())
     straight = not turn.inverse and turn.signs is None
     return agreed.correlation - (0.0 if fits else 0.05) - (0.0 if straight else 0.02)
 
@@ -328,7 +315,7 @@ def _rank(agreed: Agreement, turn: _Turn) -> float:
 def _confirmed(draft: Draft, turns: list[_Turn], found: dict, best: tuple[int, Family], why: str, by_name: bool):
     """Attitude and gyroscope that integrate to each other."""
     agreed, turn, family = found[best], turns[best[0]], best[1]
-    unit = unit_by_factor("rate", agreed.slope)
+    unit = by.unit_by_factor("rate", agreed.slope)
     question = ""
     if unit is None:
         unit = OPEN
@@ -354,11 +341,11 @@ def _confirmed(draft: Draft, turns: list[_Turn], found: dict, best: tuple[int, F
     question, form = "", turn.form
     if turn.inverse:
         question, form = "it turns the world into the body: change the signs of x, y, z (or that of w)", OPEN
-    elif not is_clear(agreed, runner_up) and form in THREE:
+    elif not by.is_clear(agreed, runner_up) and form in THREE:
         apart = _apart([turns[k] for k in alike], turn.unit)
         form, question = (turns[0].form, "") if apart < _SAME_ORDER_RAD else (OPEN, _which_order(apart, turns[0].form))
         why += f", {np.degrees(apart):.2g}° apart at most in the two orders"
-    elif not is_clear(agreed, runner_up):
+    elif not by.is_clear(agreed, runner_up):
         question, form = f"the gyroscope hardly decides the order ({runner_up.correlation:.2f} for the other)", OPEN
     draft.put(
         "attitude",
@@ -371,7 +358,7 @@ def _confirmed(draft: Draft, turns: list[_Turn], found: dict, best: tuple[int, F
     )
     if form != OPEN:
         own = (form, turn.unit, turn.signs)
-        draft.wxyz = signed_continuous(next(t for t in turns if (t.form, t.unit, t.signs) == own).wxyz)
+        draft.wxyz = by.signed_continuous(next(t for t in turns if (t.form, t.unit, t.signs) == own).wxyz)
 
 
 def _apart(turns: list[_Turn], unit: str) -> float:
@@ -395,9 +382,9 @@ def _mirrored(draft: Draft, turns: list[_Turn], family: Family) -> str:
     """A question where the gyroscope follows the attitude with two axes reversed: other body axes; else empty."""
     reversed_ = draft.integrated(draft.values(family.columns) * [1, -1, -1])
     for turn in turns:
-        moved = by.turned(draft.instants, draft.time_s, signed_continuous(turn.wxyz))
+        moved = by.turned(draft.instants, draft.time_s, by.signed_continuous(turn.wxyz))
         agreed = by.compare(moved, reversed_)
-        if not turn.inverse and agreed.correlation > CONFIRMED and agreed.size > MOVES["angle"]:
+        if not turn.inverse and agreed.correlation > by.CONFIRMED and agreed.size > by.MOVES["angle"]:
             return (
                 f"with y and z reversed it integrates to the attitude ({agreed.in_words}): the two have different "
                 "body axes; write a table in which they have the same"
@@ -415,7 +402,7 @@ def _rates_alone(draft: Draft, family: Family, seen: str, mirrored: str) -> None
     elif family.unit in UNITS["rate"]:
         draft.put("angular_velocity", family.columns, evidence, unit=family.unit)
     else:
-        which = "deg/s, mrad/s or counts (then with a scale)" if top > FASTEST_GYRO_RAD_S else "rad/s or deg/s"
+        which = "deg/s, mrad/s or counts (then with a scale)" if top > by.FASTEST_GYRO_RAD_S else "rad/s or deg/s"
         question = f"{which}: neither the names nor an attitude show which"
         draft.put("angular_velocity", family.columns, evidence, question, unit=OPEN)
 
@@ -434,7 +421,7 @@ def _attitude_alone(draft: Draft, turns: list[_Turn], why: str) -> None:
     if len({(t.form, t.unit) for t in turns if not t.inverse}) == 1:
         more = {"unit": first.unit} if first.unit else {}
         draft.put("attitude", first.columns, why, form=first.form, **more)
-        draft.wxyz = signed_continuous(first.wxyz)
+        draft.wxyz = by.signed_continuous(first.wxyz)
         return
     ranked = sorted(straight, key=lambda k: -level[k])
     said = ", ".join(f"{turns[k].form or turns[k].unit} {level[k]:.2f}" for k in straight)
@@ -442,7 +429,7 @@ def _attitude_alone(draft: Draft, turns: list[_Turn], why: str) -> None:
     if first.form not in THREE and level[ranked[0]] > 0.95 and level[ranked[1]] < 0.8:
         evidence = f"{why}; level most of the time in this order (cosine of the tilt: {said})"
         draft.put("attitude", chosen.columns, evidence, form=chosen.form)
-        draft.wxyz = signed_continuous(chosen.wxyz)
+        draft.wxyz = by.signed_continuous(chosen.wxyz)
     elif first.form in THREE:
         units = list(dict.fromkeys(t.unit for t in straight_turns))
         unit = units[0] if len(units) == 1 else OPEN
@@ -457,7 +444,7 @@ def _attitude_alone(draft: Draft, turns: list[_Turn], why: str) -> None:
             )
         draft.put("attitude", first.columns, why, "; ".join(asked), form=form, unit=unit, **signs)
         if not asked:
-            draft.wxyz = signed_continuous(first.wxyz)
+            draft.wxyz = by.signed_continuous(first.wxyz)
     else:
         question = f"wxyz or xyzw: no gyroscope shows which (cosine of the tilt: {said})"
         draft.put("attitude", first.columns, why, question, form=OPEN)

@@ -112,6 +112,12 @@ class Family:
     """The mapping's unit that the names state, empty where they state none."""
     words: frozenset[str]
 
+    @classmethod
+    def of(cls, stem: str, members: Iterable[tuple[str, str]], axes: str, words: Iterable[str]) -> Family:
+        """Of columns with the unit that each states: the family states a unit where all state the same."""
+        columns, units = zip(*members, strict=True)
+        return cls(stem, columns, axes, units[0] if len(set(units)) == 1 else "", frozenset(words))
+
     @property
     def in_body(self) -> bool:
         """Whether a word of the names says body axes."""
@@ -172,9 +178,7 @@ def families(names: Iterable[str], axes: str) -> list[Family]:
     result = []
     for (stem, qualifiers), members in found.items():
         if set(members) == set(axes):
-            columns, units = zip(*(members[a] for a in axes), strict=True)
-            words = frozenset(stem.split("_")) | qualifiers
-            result.append(Family(stem, columns, axes, _the_one(units), words))
+            result.append(Family.of(stem, (members[a] for a in axes), axes, {*stem.split("_"), *qualifiers}))
     return sorted(result, key=lambda f: names.index(f.columns[0]))
 
 
@@ -194,14 +198,8 @@ def numbered(names: Iterable[str]) -> list[Family]:
     for stem, members in found.items():
         count, order = len(members), sorted(members)
         if 3 <= count <= 16 and order in (list(range(count)), list(range(1, count + 1))):
-            columns, units = zip(*(members[k] for k in order), strict=True)
-            result.append(Family(stem, columns, "number", _the_one(units), frozenset(stem.split("_"))))
+            result.append(Family.of(stem, (members[k] for k in order), "number", stem.split("_")))
     return result
-
-
-def _the_one(units: Iterable[str]) -> str:
-    """The unit that all members of a family state; empty where they state several."""
-    return next(iter(set(units))) if len(set(units)) == 1 else ""
 
 
 def of_mavlink(names: Iterable[str]) -> list[Family]:
@@ -232,8 +230,7 @@ def body_rates(names: Iterable[str]) -> list[Family]:
                 found.setdefault(axis, (name, unit))
     if len(found) < 3:
         return []
-    columns, units = zip(*(found[axis] for axis in range(3)), strict=True)
-    return [Family("omega", columns, "xyz", _the_one(units), frozenset(("omega",)))]
+    return [Family.of("omega", (found[axis] for axis in range(3)), "xyz", ["omega"])]
 
 
 def _ends_in(stem: str, words: frozenset[str]) -> bool:
@@ -277,18 +274,18 @@ def angles(names: Sequence[str]) -> tuple[tuple[str, str, str], str] | None:
         longer = any(family.stem == f.stem and len(f.columns) > 3 for f in numbered(names))
         if family.stem in _THREE_ANGLES and not longer and not family.words & (OTHER_THINGS | _TURNING):
             return family.columns, family.unit
-    found, units = [], []
+    found = []
     for meant in _ANGLES:
         for name in names:
             words, unit = _without_unit(words_of(name))
             other = frozenset(words) & (OTHER_THINGS | _TURNING) or unit.endswith("/s")
             if words and words[-1] in meant and not other:
-                found.append(name)
-                units.append(unit)
+                found.append((name, unit))
                 break
         else:
             return None
-    return (found[0], found[1], found[2]), _the_one(units)
+    family = Family.of("", found, "xyz", [])
+    return family.columns, family.unit
 
 
 def rotation_vector(names: Sequence[str]) -> tuple[tuple[str, ...], str] | None:
