@@ -294,7 +294,7 @@ def _world(run: Run, clock: np.ndarray, vehicle: Vehicle) -> Iterator[Doubt]:
                 continue
             own, place = f"velocity_{axis}_m_s", f"position_{axis}_m"
             r = _correlation(velocity[:, k], derived[:, k])
-            scale = float(np.nanstd(velocity[:, k]) / np.nanstd(derived[:, k]))
+            scale = float(np.nanstd(velocity[:, k]) / max(np.nanstd(derived[:, k]), 1e-300))
             what = own
             if r < _CONTRADICTS:
                 said = f"{own} goes against the derivative of {place} (correlation {r:.2f})"
