@@ -19,7 +19,6 @@ import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import pandas as pd
@@ -43,7 +42,7 @@ from rotorid.mismatch.changes.words import difference_words, in_unit_of_words, q
 from rotorid.recordings import RecordingSet, read_set
 from rotorid.recordings.templates import read
 from rotorid.report.deliver import FILES, OTHERS, deliver
-from rotorid.report.page import drawing, filled
+from rotorid.report.page import drawing, drawn, filled
 from rotorid.steps import one_thread
 from rotorid.vehicle.control import swings
 
@@ -276,23 +275,12 @@ def vehicle_page(vehicle: str, numbers: pd.DataFrame, events: pd.DataFrame) -> s
     """The page of one vehicle with its figure, from its rows of the tables of `history`."""
     from rotorid.report.plots.mismatch import draw_vehicle
 
-    with TemporaryDirectory() as folder:
-        figure = Path(folder) / "figure.svg"
-        draw_vehicle(numbers, events, figure)
-        return make_vehicle_page(vehicle, numbers, events, figure)
-
-
-def make_vehicle_page(vehicle: str, numbers: pd.DataFrame, events: pd.DataFrame, figure: Path) -> str:
-    """The page of one vehicle from its rows of the tables of `rotorid.report.fleet`, and their figure."""
-    sets = list(dict.fromkeys(numbers["set"]))
     return filled(
         "vehicle.html",
         vehicle=vehicle,
-        sets=len(sets),
-        first=sets[0],
-        last=sets[-1],
+        sets=list(dict.fromkeys(numbers["set"])),
         events=events.to_dict("records"),
-        figure=drawing(figure),
+        figure=drawn(draw_vehicle, numbers, events),
     )
 
 
