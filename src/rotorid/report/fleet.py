@@ -98,7 +98,7 @@ def _load() -> None:
     """
     made_up = swings(read("thesis"), "first", 3.0, 2, 1)
     with tempfile.TemporaryDirectory() as folder:
-        deliver(made_up, *(Path(folder) / name for name in FILES[:3]))
+        deliver(made_up, Path(folder))
 
 
 def _judge_apart(folder: Path, known: Path, out: Path) -> None:
@@ -140,7 +140,7 @@ def _judge_one(folder: Path, target: Path) -> None:
         _write_failure(target, str(error), fault=False)
         return
     try:
-        deliver(recordings, *(target / name for name in FILES[:3]))
+        deliver(recordings, target)
     except InputError as error:
         _write_failure(target, str(error), fault=False)
     except OSError as error:

@@ -15,12 +15,13 @@ from functools import partial
 from importlib.util import find_spec
 
 import numpy as np
+import pandas as pd
 
 from rotorid.errors import InputError
 from rotorid.mismatch.decide.findings import Analysis
-from rotorid.mismatch.decide.sizes import WINDOW_S, segments_of
+from rotorid.mismatch.decide.sizes import WINDOW_S
 from rotorid.mismatch.deliver.flown import UNITS, Model, driven_by, model_of
-from rotorid.mismatch.tell.forward import delivered_model
+from rotorid.mismatch.tell.forward import delivered_model, simulated_segments
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.attitude import normalised, quaternion_rate, rotation_from_quaternion
 from rotorid.vehicle.exports import autopilots
@@ -63,6 +64,15 @@ class NextToLog:
         """Root mean square over all samples but the restarts."""
         return float(np.sqrt(np.mean(self.errors[model][channel][:, 1:] ** 2)))
 
+    def table(self) -> pd.DataFrame:
+        """A row a model and channel: its error, unit, and of how many windows."""
+        rows = [
+            (model, channel, self.error(model, channel), UNITS[channel], len(self.windows))
+            for model, channels in self.errors.items()
+            for channel in channels
+        ]
+        return pd.DataFrame(rows, columns=["model", "channel", "rms_error", "unit", "windows"])
+
     def sentences(self) -> list[str]:
         """The numbers, a line a channel."""
         out = [f"flown in {self.how} on the log's rotor speeds, {len(self.windows)} windows of half a second:"]
@@ -89,9 +99,7 @@ def next_to_log(analysis: Analysis, to: str, exported: Exported) -> NextToLog:
     if package and find_spec(package) is None:
         raise InputError(f"{package} is not installed: the exported vehicle was not flown next to the log")
     found = []
-    usable = [
-        s for s in segments_of(analysis) if s.motion.rotor_speed is not None and s.motion.angular_velocity is not None
-    ]
+    usable = simulated_segments(analysis)
     for segment, inputs, states in zip(usable, *driven_by(usable, improved), strict=True):
         if states.quaternion is None:
             continue
@@ -119,12 +127,11 @@ def next_to_log(analysis: Analysis, to: str, exported: Exported) -> NextToLog:
 
 def _ours(model: Model, windows: Sequence[LogWindow]) -> list[States]:
     """The windows flown by our own simulator: the wrench of the model's forms at each instant."""
-    vehicle = model.vehicle
     out = []
     for window in windows:
         inputs = Inputs(window.speed, np.gradient(window.speed, window.time_s, axis=0), wind=window.wind)
         every = np.arange(len(window.time_s))[None]
-        made = simulate_windows(vehicle, model.forms, window.time_s, inputs, window.recorded, sample=every)
+        made = simulate_windows(model.vehicle, model.forms, window.time_s, inputs, window.recorded, sample=every)
         out.append(States(**{n: None if v is None else v[0] for n, v in vars(made.predicted).items()}))
     return out
 

@@ -113,9 +113,9 @@ def _verdict(folder: Path, state: dict[str, Any], say: Callable[..., None]) -> d
     own, answer = folder / SET / logs[0].name.split(".")[0], folder / ANSWER
     shutil.rmtree(folder / SET, ignore_errors=True)
     with _heard("verdict", say):
-        mass_kg, like, vehicle, mapping = Wishes(**state["wishes"]).files(folder)
+        stated = Wishes(**state["wishes"]).stated(folder)
         say(step="importing", line="importing the logs")
-        make_set(logs, own, mass_kg, like, vehicle, mapping)
+        make_set(logs, own, stated)
         found = write_verdict(own, answer)
     _pack(own, answer / "recording_set.zip")
     exported = _exports(answer)
@@ -172,7 +172,7 @@ def _compare(folder: Path, state: dict[str, Any], say: Callable[..., None]) -> d
         say(said=said)
 
     with _heard("compare on the page", say):
-        found, changed = compared(logs, tell, lambda command: nullcontext(), *Wishes(**state["wishes"]).files(folder))
+        found, changed = compared(logs, tell, lambda command: nullcontext(), Wishes(**state["wishes"]).stated(folder))
     texts = {"changes.html": make_changes_page(found), "changes.json": changes_text(found, changed)}
     write_texts({answer / name: text for name, text in texts.items()})
     first, *more = sentences(found)
