@@ -5,13 +5,12 @@ derivatives → noise), and three tiles below its sentence.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 
 from rotorid.effects.catalogue import before_the_rotors, catalogue
-from rotorid.effects.contract import Motion
 from rotorid.mismatch.decide.status import CLAIMED
 from rotorid.mismatch.decide.words import capital, channel_words, effect_words, listed, number, parameter_words
 from rotorid.mismatch.tell.consistency import quoted
@@ -20,6 +19,7 @@ from rotorid.mismatch.tell.sentences import MOST_NAMES, names_of, surest_locatio
 from rotorid.mismatch.tell.verdict import Channel, Location, Verdict
 from rotorid.recordings import Vehicle
 from rotorid.vehicle.derivatives import CHANNELS, QUANTITIES
+from rotorid.vehicle.simulator import at_rest
 
 _SWING = {**dict.fromkeys("uvw", 5.0), **dict.fromkeys("pqr", 2.0)}
 """Of each quantity, m/s and rad/s, how far a catalogue form is moved to see what it makes of it."""
@@ -131,20 +131,8 @@ def _moved_by() -> dict[str, frozenset[tuple[str, str]]]:
     for k, q in enumerate(quantities):
         for row, sign in ((1 + 2 * k, 1.0), (2 + 2 * k, -1.0)):
             (velocity if q in "uvw" else rates)[row, k % 3] = sign * _SWING[q]
-    speed = np.full((n, 4), np.sqrt(9.81 / 4e-5))
-    motion = Motion(
-        time_s=0.01 * np.arange(n),
-        rotor_speed=speed,
-        rotor_acceleration=np.zeros((n, 4)),
-        angular_velocity=rates,
-        angular_acceleration=np.zeros((n, 3)),
-        specific_force=np.tile([0.0, 0.0, -9.81], (n, 1)),
-        rotation=np.tile(np.eye(3), (n, 1, 1)),
-        velocity=velocity,
-        position=np.zeros((n, 3)),
-        height=np.ones(n),
-        voltage=np.ones(n),
-    )
+    hovering = at_rest(vehicle, 0.01 * np.arange(n), np.full((n, 4), np.sqrt(9.81 / 4e-5)), height_m=1.0)
+    motion = replace(hovering, velocity=velocity, angular_velocity=rates, voltage=np.ones(n))
     out = {}
     for effect_id, effect in catalogue().items():
         found, moving = set(), effect.fitted and effect.kind == "physics" and not effect.of_the_rig
