@@ -13,7 +13,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
@@ -65,6 +65,11 @@ class _KeysOfVerdict(BaseModel):
     """A group of keys of the verdict: none unknown, none missing."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    @classmethod
+    def filled(cls, *values: object) -> Self:
+        """Filled in the order of its keys."""
+        return cls(**dict(zip(cls.model_fields, values, strict=True)))
 
 
 class Runs(_KeysOfVerdict):
@@ -342,7 +347,7 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
     inverse, samples = _inverse_channels(analysis)
     locations = [*locations, *_missing_locations(analysis, locations, inverse, samples)]
     left, shares, basis = share_left(inverse, locations, samples), analysis.shares, basis_of(analysis.recordings)
-    stopped = any(d.stops for d in analysis.doubts)
+    stopped, wrong = any(d.stops for d in analysis.doubts), analysis.values.keys()
     word: VerdictWord = "not_judged" if stopped else verdict_word(analysis, locations, left, inverse)
     main = main_channel(analysis, locations, inverse)
     contents = Contents(analysis, word, locations, inverse, main, left if word != "no_mismatch" else 0.0, forward)
@@ -351,12 +356,8 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
         kind=analysis.recordings.vehicle.kind,
         runs=Runs(training=analysis.split.training, held_out=analysis.split.held_out),
         verdict=word,
-        basis=BasisOfVerdict(
-            sentence=basis.sentence,
-            recorded_s=basis.recorded_s,
-            in_the_air_s=basis.in_the_air_s,
-            ground_share=basis.ground_share,
-            not_recorded=basis.missing,
+        basis=BasisOfVerdict.filled(
+            basis.sentence, basis.recorded_s, basis.in_the_air_s, basis.ground_share, basis.missing
         ),
         doubts=tuple(DoubtOfSet.model_validate(d, from_attributes=True) for d in analysis.doubts),
         sentence=spoken(headline(contents), analysis),
@@ -372,50 +373,33 @@ def make_verdict(analysis: Analysis, locations: Sequence[Location], forward: Map
         delivered=Delivered(
             model=analysis.delivery.model,
             derivatives=analysis.delivery.derivatives,
-            scores=tuple(
-                Score(**dict(zip(Score.model_fields, score, strict=True))) for score in analysis.delivery.scores
-            ),
+            scores=tuple(Score.filled(*score) for score in analysis.delivery.scores),
         ),
         derivatives=tuple(DerivativeOf(**d.model_dump()) for d in analysis.improved.derivatives),
-        absent=tuple(
-            Absent(id=a.id, symbol=a.symbol, at_most=a.at_most, unit=a.unit, share_of_weight=a.share or None)
-            for a in analysis.absent
-        ),
+        absent=tuple(Absent.filled(a.id, a.symbol, a.at_most, a.unit, a.share or None) for a in analysis.absent),
         parameters={
-            name: WrongValue(believed=believed, refitted=refitted, interval_95=(low, high))
-            for name, (believed, refitted, low, high) in analysis.values.items()
+            name: WrongValue.filled(believed, refitted, interval)
+            for name, (believed, refitted, *interval) in analysis.values.items()
         },
         believed_values={
-            row.name: BelievedValue(
-                believed=row.believed,
-                estimate=row.estimate,
-                interval_95=(row.low, row.high),
-                delivered=row.delivered,
-                wrong=row.name in analysis.values,
-            )
-            for row in analysis.believed_values
+            r.name: BelievedValue.filled(r.believed, r.estimate, (r.low, r.high), r.delivered, r.name in wrong)
+            for r in analysis.believed_values
         },
-        correlations=tuple(Correlated(values=pair, correlation=r) for pair, r in analysis.value_correlations.items()),
+        correlations=tuple(Correlated.filled(*row) for row in analysis.value_correlations.items()),
         command_path=_estimates(analysis.command_path),
-        not_testable=tuple(NotTestable(id=i, reason=r) for i, r in sorted(analysis.not_testable.items())),
+        not_testable=tuple(NotTestable.filled(*row) for row in sorted(analysis.not_testable.items())),
         unexplained=Unexplained(
             share=float(np.clip(contents.left, 0.0, 1.0)),
             channels=analysis.unexplained_channels,
             depends_on=analysis.unexplained_depends_on,
             description=analysis.unexplained_description,
         ),
-        next_experiment=NextExperiment(
-            manoeuvre=analysis.next_manoeuvre,
-            separates=analysis.next_separates,
-            predicted_separation_sigma=None,
-        ),
+        next_experiment=NextExperiment.filled(analysis.next_manoeuvre, analysis.next_separates, None),
     )
 
 
 def _estimates(numbers: Sequence[Estimate]) -> tuple[ParameterEstimate, ...]:
-    return tuple(
-        ParameterEstimate(symbol=e.symbol, value=e.value, unit=e.unit, interval_95=(e.low, e.high)) for e in numbers
-    )
+    return tuple(ParameterEstimate.filled(e.symbol, e.value, e.unit, (e.low, e.high)) for e in numbers)
 
 
 def _size_of(size: Size | None) -> SizeOfError | None:
@@ -441,9 +425,7 @@ def _missing_locations(
         for run in dict.fromkeys(t.run for t in traces):
             own = [t for t in traces if t.run == run]
             start_s, stop_s = float(own[0].time_s[0]), float(own[-1].time_s[-1])
-            yield Location(
-                run=run, channel=channel, start_s=start_s, stop_s=stop_s, p_value=p_value, energy_share=1.0, regime=None
-            )
+            yield Location.filled(run, channel, start_s, stop_s, p_value, 1.0, None)
 
 
 def _inverse_channels(analysis: Analysis) -> tuple[dict[str, Channel], dict[str, int]]:
@@ -508,9 +490,7 @@ def effect_verdict(finding: Finding, share: float | None, size: Size | None = No
         parameters=_estimates(finding.parameters),
         probability=finding.probability,
         p_value=finding.p_value,
-        held_out_gain=None
-        if finding.gain is None
-        else Gain(rmse_ratio=finding.gain[0], interval_95=(finding.gain[1], finding.gain[2])),
+        held_out_gain=None if finding.gain is None else Gain.filled(finding.gain[0], finding.gain[1:]),
     )
 
 

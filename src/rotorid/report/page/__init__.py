@@ -108,7 +108,7 @@ def _environment() -> Environment:
     made.filters |= {"channel": channel_words, "value": parameter_words, "regime": regime_words}
     made.filters |= {"effect": lambda id_: capital(effect_words(id_)), "sentence": _sentence, "embedded": _embedded}
     sections = (_runs_text, _step_rows, _parameters, _effect_notes, _values, _where_text, _shown_locations)
-    sections += (_forward_text, _error_table, _rest_text, _ruled_out_text, _silent, _limit_bar, _ledger_row)
+    sections += (_forward_text, _by_method, _bars, _rest_text, _ruled_out_text, _silent, _limit_bar, _ledger_row)
     sections += (page_file, tiles, strip, next_text, symbol_of, would_explain, percent_words, with_unit)
     made.globals |= {writer.__name__.removeprefix("_"): writer for writer in sections}
     made.globals |= {"models": _MODELS, "quantities": _QUANTITY_WORDS}
@@ -343,32 +343,15 @@ def _values(analysis: Analysis) -> list[dict]:
     return rows
 
 
-def _error_table(channels: Mapping[str, Channel], fits: Mapping[str, tuple[float, float]]) -> list[dict]:
-    """Rows of errors, inverse dynamics and simulation run forward apart; `fits` in per cent, before and after."""
-    groups = []
-    for name, chosen in (
-        ("inverse dynamics", [c for c in channels if c not in FORWARD_WORDS]),
-        ("simulation run forward", [c for c in channels if c in FORWARD_WORDS]),
-    ):
-        rows = [
-            {
-                "name": channel_words(c).removesuffix(_AFTER),
-                "unit": _unit_text(channels[c].unit),
-                "noise": _cell(channels[c].noise_floor),
-                "bars": _bars(channels[c]),
-                "fit": pretty(" → ".join(f"{v:.0f}" for v in fits[c])) if c in fits else "–",
-                "held_out": [_cell(getattr(channels[c].rmse.held_out, s)) for s in _STAGES],
-                "training": [_cell(getattr(channels[c].rmse.training, s)) for s in _STAGES],
-            }
-            for c in chosen
-        ]
-        if rows:
-            groups.append({"name": name, "rows": rows})
-    return groups
+def _by_method(channels: Mapping[str, Channel]) -> list[tuple[str, dict[str, Channel]]]:
+    """Channels by what they are compared by: inverse dynamics, or simulation run forward."""
+    groups: dict[str, dict[str, Channel]] = {"inverse dynamics": {}, "simulation run forward": {}}
+    for name, channel in channels.items():
+        groups["simulation run forward" if name in FORWARD_WORDS else "inverse dynamics"][name] = channel
+    return [(method, own) for method, own in groups.items() if own]
 
 
 _AFTER = " after half a second"
-_STAGES = ("before", "refitted", "named", "after")
 _MODELS = {"believed": "as believed", "refitted": "values refitted", "named": "values and named physics"}
 
 
