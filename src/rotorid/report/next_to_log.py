@@ -25,7 +25,7 @@ from rotorid.mismatch.tell.forward import delivered_model, simulated_segments
 from rotorid.recordings.vehicle import Vehicle
 from rotorid.vehicle.attitude import normalised, quaternion_rate, rotation_from_quaternion
 from rotorid.vehicle.exports import autopilots
-from rotorid.vehicle.exports.flown import multirotor_of, passive_forces, read_by
+from rotorid.vehicle.exports.flown import passive_forces, read_by, through_rotorpy
 from rotorid.vehicle.exports.forms import FLU, KNOWS, Exported, expressed, parts_of
 from rotorid.vehicle.windows import Inputs, States, plan_windows, simulate_windows
 
@@ -242,7 +242,7 @@ def _shares(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow], 
 def _in_rotorpy(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow]) -> list[States]:
     """RotorPy's Multirotor with the exported parameters and their companion; the speeds are set at every sample and
     held over a step."""
-    out, multirotor = [], multirotor_of(exported)
+    out = []
     for window in windows:
         start, mid = window.recorded, 0.5 * (window.speed[:-1] + window.speed[1:])
         state = {
@@ -250,16 +250,7 @@ def _in_rotorpy(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindo
             "q": (start.quaternion[0] * [1, *FLU])[[1, 2, 3, 0]], "w": start.angular_velocity[0] * FLU,
             "rotor_speeds": mid[0],
         }  # fmt: skip
-        with read_by("RotorPy"):
-            flyer = multirotor(exported.parameters, state, control_abstraction="cmd_motor_speeds")
-        flyer.tau_m = 1e6
-        kept = [state]
-        for k, speed in enumerate(mid):
-            state = flyer.step(
-                {**state, "rotor_speeds": speed}, {"cmd_motor_speeds": speed}, window.time_s[k + 1] - window.time_s[k]
-            )
-            kept.append(state)
-        series = {key: np.array([np.asarray(s[key]) for s in kept]) for key in ("x", "v", "q", "w")}
+        series = through_rotorpy(exported, state, mid, np.diff(window.time_s), at_once=True)
         out.append(_from_flu(series["x"], series["v"], series["q"][:, [3, 0, 1, 2]], series["w"], start))
     return out
 
@@ -309,13 +300,9 @@ def _from_flu(position, velocity, quaternion, rates, start: States) -> States:
     )
 
 
-def as_expressed(to: str) -> Callable[[Vehicle, Exported, Sequence[LogWindow]], list[States]]:
+def as_expressed(to: str, vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow]) -> list[States]:
     """Our simulator with the effects that a form expresses."""
-
-    def fly(vehicle: Vehicle, exported: Exported, windows: Sequence[LogWindow]) -> list[States]:
-        return _ours(model_of(expressed(vehicle, to)), windows)
-
-    return fly
+    return _ours(model_of(expressed(vehicle, to)), windows)
 
 
 FLYERS: dict[str, tuple[str, str, Callable[[Vehicle, Exported, Sequence[LogWindow]], list[States]]]] = {
@@ -323,8 +310,12 @@ FLYERS: dict[str, tuple[str, str, Callable[[Vehicle, Exported, Sequence[LogWindo
     "ardupilot-json": ("ArduPilot's simulated frame by its published equations", "", in_ardupilot),
     "rotorpy": ("RotorPy", "rotorpy", _in_rotorpy),
     "mjcf": ("MuJoCo", "mujoco", _in_mujoco),
-    "sdf": ("our simulator with what the SDF file expresses", "", as_expressed("sdf")),
-    "gym-pybullet-drones": ("our simulator with what the URDF expresses", "", as_expressed("gym-pybullet-drones")),
-    "crazyflow": ("our simulator with what crazyflow's section expresses", "", as_expressed("crazyflow")),
+    "sdf": ("our simulator with what the SDF file expresses", "", partial(as_expressed, "sdf")),
+    "gym-pybullet-drones": (
+        "our simulator with what the URDF expresses",
+        "",
+        partial(as_expressed, "gym-pybullet-drones"),
+    ),
+    "crazyflow": ("our simulator with what crazyflow's section expresses", "", partial(as_expressed, "crazyflow")),
 }
 """By form what flies it, the package that must be there, and the flight."""

@@ -138,21 +138,17 @@ def _can(recordings: RecordingSet, columns: Sequence[str]) -> list[str]:
     def has(*names: str) -> bool:
         return set(names) <= set(columns)
 
-    count, out = vehicle.rotor_count, []
-    speeds = has(*c.rotor_columns("rotor_speed", count))
-    drives = has(*c.rotor_columns("throttle", count)) or has(*c.rotor_columns("rotor_command", count))
-    if speeds:
-        out.append(
-            "Rotor speeds are recorded: thrust, mass, battery and differences between rotors can be distinguished."
-        )
-    if drives:
-        out.append("Commands are recorded: how thrust follows them (curve, lag, delay) can be asked.")
-    if has(*c.SPECIFIC_FORCE):
-        out.append("The accelerometer is there: forces are compared with those that the model expects.")
-    if has(*c.ANGULAR_VELOCITY):
-        out.append("The gyroscope is there: moments, the inertia and the places of rotors and weights can be asked.")
-    if has(*c.VELOCITY) or has(*c.POSITION):
-        out.append("Velocity is there: drag of rotors and frame, and wind, can be asked.")
-    if has(c.BATTERY_VOLTAGE):
-        out.append("The battery's voltage is there: how thrust falls with it can be asked.")
-    return out
+    speeds, throttles, commands = (
+        has(*c.rotor_columns(name, vehicle.rotor_count)) for name in ("rotor_speed", "throttle", "rotor_command")
+    )
+    answers = {
+        "Rotor speeds are recorded: thrust, mass, battery and differences between rotors can be distinguished.": speeds,
+        "Commands are recorded: how thrust follows them (curve, lag, delay) can be asked.": throttles or commands,
+        "The accelerometer is there: forces are compared with those that the model expects.": has(*c.SPECIFIC_FORCE),
+        "The gyroscope is there: moments, the inertia and the places of rotors and weights can be asked.": has(
+            *c.ANGULAR_VELOCITY
+        ),
+        "Velocity is there: drag of rotors and frame, and wind, can be asked.": has(*c.VELOCITY) or has(*c.POSITION),
+        "The battery's voltage is there: how thrust falls with it can be asked.": has(c.BATTERY_VOLTAGE),
+    }
+    return [sentence for sentence, known in answers.items() if known]

@@ -399,12 +399,6 @@ def _flagged(series: Sequence[np.ndarray], hits: Iterable[tuple[int, int, np.nda
     return [(k, a, b, lowest[k]) for k, mask in enumerate(flagged) for a, b in stretches(mask)]
 
 
-def _nearby(trace: ChannelTrace, start: int, stop: int) -> slice:
-    """A stretch and a second on either side: where its edges are looked for."""
-    reach = int(round(1.0 / _period(trace)))
-    return slice(max(start - reach, 0), min(stop + reach, len(trace.named)))
-
-
 def _louder(traces, white, limit) -> list[_Interval]:
     """Windows with more energy than the spread of the windows' energies allows."""
     moves_s = 0.2  # Lags over which larger residuals may follow each other.
@@ -421,10 +415,9 @@ def _louder(traces, white, limit) -> list[_Interval]:
     out = []
     for k, start, stop, p in _flagged(white, hits):
         trace, w = traces[k], white[k]
-        here = _nearby(trace, start, stop)
         variance = max(float(np.mean(w[start:stop] ** 2)), 1.2)
-        likelihood = -0.5 * np.log(variance) + 0.5 * w[here] ** 2 * (1.0 - 1.0 / variance)
-        first, last = (here.start + edge for edge in _best_segment(likelihood))
+        likelihood = -0.5 * np.log(variance) + 0.5 * w**2 * (1.0 - 1.0 / variance)
+        first, last = _best_segment(trace, start, stop, likelihood)
         if _moves(w[first:last], w, int(moves_s / _period(trace))):
             out.append(_Interval(trace, first, last, p, False))
     return out
@@ -467,20 +460,20 @@ def _shifted(traces, white, parts, limit) -> list[_Interval]:
             hits.append((k, length, p, (p < limit) & (np.abs(local[k]) > _SHIFTED * noise)))
     out = []
     for k, start, stop, p in _flagged(white, hits):
-        here = _nearby(traces[k], start, stop)
         level = float(np.mean(parts[k][start:stop]))
-        first, last = (here.start + edge for edge in _best_segment(level * parts[k][here] - 0.5 * level**2))
+        first, last = _best_segment(traces[k], start, stop, level * parts[k] - 0.5 * level**2)
         out.append(_Interval(traces[k], first, last, p, False))
     return out
 
 
-def _best_segment(gain: np.ndarray) -> tuple[int, int]:
-    """Start and stop (exclusive) of the stretch with the largest sum: the most likely segment."""
-    total = np.concatenate([[0.0], np.cumsum(gain)])
-    lowest = np.minimum.accumulate(total)
-    stop = int(np.argmax(total - lowest))
-    start = int(np.argmin(total[: stop + 1]))
-    return start, max(stop, start + 1)
+def _best_segment(trace: ChannelTrace, start: int, stop: int, gain: np.ndarray) -> tuple[int, int]:
+    """Start and stop (exclusive) of the most likely segment, of the largest sum, within a second of a stretch."""
+    reach = int(round(1.0 / _period(trace)))
+    begin, end = max(start - reach, 0), min(stop + reach, len(trace.named))
+    total = np.concatenate([[0.0], np.cumsum(gain[begin:end])])
+    last = int(np.argmax(total - np.minimum.accumulate(total)))
+    first = int(np.argmin(total[: last + 1]))
+    return begin + first, begin + max(last, first + 1)
 
 
 def _disjoint(intervals: Sequence[_Interval], order: Mapping[tuple[str, str], int]) -> list[_Interval]:

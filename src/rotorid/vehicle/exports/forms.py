@@ -273,10 +273,8 @@ def _in_flu(inertia: np.ndarray) -> np.ndarray:
 def _companion(vehicle: Vehicle, name: str, text_of: Callable[[Vehicle], str]) -> tuple[list[str], dict[str, str]]:
     """Sentences for what a tool with a companion leaves of the derivatives, and the companion's name and text."""
     taken = of_state(vehicle)
-    if not taken:
-        return left_of(vehicle, ()), {}
-    said = f"derivatives: this file has none, {name} next to it adds them in the tool's own step"
-    return [said, *left_of(vehicle, taken)], {name: text_of(vehicle)}
+    said = [f"derivatives: this file has none, {name} next to it adds them in the tool's own step"] if taken else []
+    return [*said, *left_of(vehicle, taken)], {name: text_of(vehicle)} if taken else {}
 
 
 def rotorpy(vehicle: Vehicle) -> Exported:
