@@ -132,11 +132,14 @@ _DISK, _UNREADABLE = 74, 66
 def _judge_one(folder: Path, target: Path) -> None:
     """The files of a set's verdict, or why there are none, into `target`."""
     try:
-        try:
-            recordings = read_set(folder)
-        except OSError as error:
-            _write_failure(target, str(error), fault=False)
-            sys.exit(_UNREADABLE)
+        recordings = read_set(folder)
+    except OSError as error:
+        _write_failure(target, str(error), fault=False)
+        sys.exit(_UNREADABLE)
+    except InputError as error:
+        _write_failure(target, str(error), fault=False)
+        return
+    try:
         deliver(recordings, target)
     except InputError as error:
         _write_failure(target, str(error), fault=False)
